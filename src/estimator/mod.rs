@@ -1,0 +1,35 @@
+//! The sliding-window estimator: state (Eq. 7), residuals (Eqs. 8–10), solver, marginalization.
+//!
+//! It takes a [`StepInput`] per image and leaves a [`StepReport`] behind; nobody reaches in between.
+
+mod report;
+
+pub use report::{
+    CalibrationEstimate, ColumnBlock, ColumnGroup, Event, EventKind, FeatureReport, FrameStateReport, IterationReport,
+    LandmarkReport, Linearization, ObservationReport, Phase, ResidualSummary, StageTimes, StepReport,
+};
+
+use nalgebra::Vector3;
+
+use crate::flight_log::ImuSample;
+use crate::frontend::TrackedFrame;
+
+/// What one image brings to the estimator.
+#[derive(Clone, Debug)]
+pub struct StepInput<'a> {
+    /// Number of the image in its camera's stream.
+    pub frame_index: usize,
+    /// Header stamp of the image since the log began.
+    pub stamp_ns: i64,
+    /// IMU samples from the previous image's stamp to this one's, both ends included and interpolated.
+    pub imu: &'a [ImuSample],
+    /// Encoder angles at the stamp, in the order of the joints, `None` without encoders.
+    pub joint_angles_rad: Option<&'a [f64]>,
+    /// The tracked features.
+    pub tracks: &'a TrackedFrame,
+}
+
+/// Gravity in the world frame, whose z axis points up: `(0, 0, −g)` in m/s².
+pub fn gravity_in_world(gravity_m_per_s2: f64) -> Vector3<f64> {
+    Vector3::new(0.0, 0.0, -gravity_m_per_s2)
+}

@@ -1,0 +1,1 @@
+//! Tables, trajectories and pictures without a window.

@@ -1,0 +1,114 @@
+//! The rig: what sensors a log holds and how they sit, in Kalibr's names.
+
+use crate::gimbal::ClassicalChain;
+use crate::geometry::RigidTransform;
+use crate::camera::CameraModel;
+
+/// Noise of the inertial sensor, continuous-time densities as Kalibr gives them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ImuNoise {
+    /// m/s²/√Hz.
+    pub accelerometer_noise_density: f64,
+    /// m/s³/√Hz.
+    pub accelerometer_random_walk: f64,
+    /// rad/s/√Hz.
+    pub gyroscope_noise_density: f64,
+    /// rad/s²/√Hz.
+    pub gyroscope_random_walk: f64,
+}
+
+/// The inertial sensor.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ImuRig {
+    /// Topic of its `sensor_msgs/msg/Imu`.
+    pub topic: String,
+    /// Frame name.
+    pub frame_id: String,
+    /// Nominal rate.
+    pub rate_hz: f64,
+    /// Noise densities.
+    pub noise: ImuNoise,
+}
+
+/// How a camera is carried.
+#[derive(Clone, Debug, PartialEq)]
+pub enum CameraMount {
+    /// At the end of the rig's gimbal.
+    Gimbal,
+    /// Rigidly, at this pose (the inverse of Kalibr's `T_cam_imu`).
+    Static {
+        /// Maps points from the camera to the IMU.
+        imu_from_camera: RigidTransform,
+    },
+}
+
+/// One camera.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CameraRig {
+    /// Key in the rig file, `cam0`, `cam1`, ….
+    pub key: String,
+    /// How it is carried.
+    pub mount: CameraMount,
+    /// Topic of its images.
+    pub topic: String,
+    /// Frame name.
+    pub frame_id: String,
+    /// Nominal rate.
+    pub rate_hz: f64,
+    /// Projection model with its resolution.
+    pub model: CameraModel,
+    /// Kalibr's `timeshift_cam_imu`: `t_imu = t_cam + shift`.
+    pub timeshift_cam_imu_s: f64,
+}
+
+/// How wrong the rig's chain may be: bounds of a uniform error on each parameter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ChainPrior {
+    /// Bound on every translation, in metres.
+    pub translation_bound_m: f64,
+    /// Bound on every angle, in radians.
+    pub rotation_bound_rad: f64,
+}
+
+/// One joint's name and range.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Joint {
+    /// Name in the `JointState` messages.
+    pub name: String,
+    /// Lower and upper stop, in radians.
+    pub limits_rad: (f64, f64),
+}
+
+/// The gimbal.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GimbalRig {
+    /// Topic of its `sensor_msgs/msg/JointState`, `None` when there is none.
+    pub topic: Option<String>,
+    /// Nominal rate.
+    pub rate_hz: f64,
+    /// Standard deviation of a reading, `None` without encoders.
+    pub encoder_sigma_rad: Option<f64>,
+    /// How wrong `chain` may be.
+    pub prior: ChainPrior,
+    /// The chain in the classical form (Eqs. 5–6), links in order.
+    pub chain: ClassicalChain,
+    /// The joints, one per link of `chain`.
+    pub joints: Vec<Joint>,
+}
+
+/// A whole rig.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rig {
+    /// Its name.
+    pub name: String,
+    /// Magnitude of gravity in m/s².
+    pub gravity_m_per_s2: f64,
+    /// The inertial sensor.
+    pub imu: ImuRig,
+    /// Cameras in the order of their keys.
+    pub cameras: Vec<CameraRig>,
+    /// The gimbal, when there is one.
+    pub gimbal: Option<GimbalRig>,
+    /// Topic of the true pose of the IMU in the world.
+    pub ground_truth_topic: Option<String>,
+}

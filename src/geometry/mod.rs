@@ -1,0 +1,22 @@
+//! Rotations, rigid transforms and the perturbation rule.
+//!
+//! The rule is written here once: a perturbation is `[φ; δt]`, rotation first, with `R ← R·Exp(φ)` (right, local) and
+//! `t ← t + δt` (a vector in the outer frame).
+//! The paper's Eqs. 12–14 print the left form; `φ_left = R·φ_right`.
+
+mod rigid_transform;
+pub mod so3;
+#[cfg(test)]
+mod tests;
+
+pub use rigid_transform::RigidTransform;
+
+/// Seconds of a time stamp or duration in nanoseconds.
+pub fn seconds_from_ns(time_ns: i64) -> f64 {
+    time_ns as f64 * 1e-9
+}
+
+/// Nanoseconds of a time stamp or duration in seconds, rounded to the nearest.
+pub fn ns_from_seconds(time_s: f64) -> i64 {
+    (time_s * 1e9).round() as i64
+}

@@ -1,0 +1,101 @@
+use std::ops::Mul;
+
+use nalgebra::{Matrix3, Matrix4, Point3, Rotation3, UnitQuaternion, Vector3, Vector6};
+
+use super::so3;
+
+/// A rigid transform that maps points from one frame to another; a value is named `to_from_from`, as in
+/// `world_from_imu`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RigidTransform {
+    /// Rotates vectors into the outer frame.
+    pub rotation: UnitQuaternion<f64>,
+    /// Origin of the inner frame seen in the outer one, in metres.
+    pub translation_m: Vector3<f64>,
+}
+
+impl Default for RigidTransform {
+    fn default() -> Self {
+        Self::identity()
+    }
+}
+
+impl RigidTransform {
+    /// A transform from its two parts.
+    pub fn new(rotation: UnitQuaternion<f64>, translation_m: Vector3<f64>) -> Self {
+        Self { rotation, translation_m }
+    }
+
+    /// The transform that changes nothing.
+    pub fn identity() -> Self {
+        Self::new(UnitQuaternion::identity(), Vector3::zeros())
+    }
+
+    /// From a 4×4 homogeneous matrix, or `None` when its upper left block is further than `tolerance` (largest entry of
+    /// `RᵀR − I`) from a rotation, its determinant is negative, or its last row is not `0 0 0 1`.
+    pub fn from_matrix(matrix: &Matrix4<f64>, tolerance: f64) -> Option<Self> {
+        let block: Matrix3<f64> = matrix.fixed_view::<3, 3>(0, 0).into_owned();
+        let defect = (block.transpose() * block - Matrix3::identity()).amax();
+        let last_row = (matrix.row(3) - nalgebra::RowVector4::new(0.0, 0.0, 0.0, 1.0)).amax();
+        let finite = matrix.iter().all(|entry| entry.is_finite());
+        if !finite || defect > tolerance || last_row > tolerance || block.determinant() <= 0.0 {
+            return None;
+        }
+        let svd = block.svd(true, true);
+        let orthonormal = svd.u? * svd.v_t?;
+        let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(orthonormal));
+        Some(Self::new(rotation, matrix.fixed_view::<3, 1>(0, 3).into_owned()))
+    }
+
+    /// The 4×4 homogeneous matrix.
+    pub fn to_matrix(&self) -> Matrix4<f64> {
+        let mut matrix = Matrix4::identity();
+        matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(&self.rotation_matrix());
+        matrix.fixed_view_mut::<3, 1>(0, 3).copy_from(&self.translation_m);
+        matrix
+    }
+
+    /// The rotation as a 3×3 matrix.
+    pub fn rotation_matrix(&self) -> Matrix3<f64> {
+        self.rotation.to_rotation_matrix().into_inner()
+    }
+
+    /// The transform the other way round.
+    pub fn inverse(&self) -> Self {
+        let rotation = self.rotation.inverse();
+        Self::new(rotation, -(rotation * self.translation_m))
+    }
+
+    /// A point of the inner frame, in the outer frame.
+    pub fn transform_point(&self, point: &Point3<f64>) -> Point3<f64> {
+        self.rotation * point + self.translation_m
+    }
+
+    /// A position vector of the inner frame, in the outer frame (rotated and shifted).
+    pub fn transform(&self, position: &Vector3<f64>) -> Vector3<f64> {
+        self.rotation * position + self.translation_m
+    }
+
+    /// `x ⊞ [φ; δt]` by the perturbation rule of this module.
+    #[must_use]
+    pub fn plus(&self, delta: &Vector6<f64>) -> Self {
+        let phi = Vector3::new(delta[0], delta[1], delta[2]);
+        let rotation = UnitQuaternion::new_normalize((self.rotation * so3::exp(&phi)).into_inner());
+        Self::new(rotation, self.translation_m + Vector3::new(delta[3], delta[4], delta[5]))
+    }
+
+    /// `self ⊟ origin`, the `[φ; δt]` with `origin.plus([φ; δt]) = self`.
+    pub fn minus(&self, origin: &Self) -> Vector6<f64> {
+        let phi = so3::log(&(origin.rotation.inverse() * self.rotation));
+        let shift = self.translation_m - origin.translation_m;
+        Vector6::new(phi.x, phi.y, phi.z, shift.x, shift.y, shift.z)
+    }
+}
+
+impl Mul for RigidTransform {
+    type Output = Self;
+
+    fn mul(self, inner: Self) -> Self {
+        Self::new(self.rotation * inner.rotation, self.transform(&inner.translation_m))
+    }
+}

@@ -1,0 +1,49 @@
+//! Exponential, logarithm and right Jacobians of SO(3); angles in radians.
+
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+
+/// Below this angle (rad) the series take over; their error there is under 1e-16.
+const SMALL_ANGLE_RAD: f64 = 1e-4;
+
+/// The cross-product matrix `[v]^` with `hat(v)·w = v × w`.
+pub fn hat(v: &Vector3<f64>) -> Matrix3<f64> {
+    Matrix3::new(0.0, -v.z, v.y, v.z, 0.0, -v.x, -v.y, v.x, 0.0)
+}
+
+/// `Exp(φ)` for a rotation vector in radians.
+pub fn exp(phi: &Vector3<f64>) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_scaled_axis(*phi)
+}
+
+/// `Log(R)`, the rotation vector in radians with norm at most π.
+pub fn log(rotation: &UnitQuaternion<f64>) -> Vector3<f64> {
+    let q = if rotation.w < 0.0 { -rotation.into_inner() } else { rotation.into_inner() };
+    let v = q.imag();
+    let sine = v.norm();
+    if sine < 1e-9 {
+        return v * (2.0 / q.w);
+    }
+    v * (2.0 * sine.atan2(q.w) / sine)
+}
+
+/// The right Jacobian `J_r(φ)` with `Exp(φ + δ) ≈ Exp(φ)·Exp(J_r(φ)·δ)`.
+pub fn right_jacobian(phi: &Vector3<f64>) -> Matrix3<f64> {
+    let angle = phi.norm();
+    let k = hat(phi);
+    if angle < SMALL_ANGLE_RAD {
+        return Matrix3::identity() - k * 0.5 + k * k / 6.0;
+    }
+    let square = angle * angle;
+    Matrix3::identity() - k * ((1.0 - angle.cos()) / square) + k * k * ((angle - angle.sin()) / (square * angle))
+}
+
+/// The inverse of [`right_jacobian`]: `Log(Exp(φ)·Exp(δ)) ≈ φ + J_r⁻¹(φ)·δ`.
+pub fn right_jacobian_inverse(phi: &Vector3<f64>) -> Matrix3<f64> {
+    let angle = phi.norm();
+    let k = hat(phi);
+    if angle < SMALL_ANGLE_RAD {
+        return Matrix3::identity() + k * 0.5 + k * k / 12.0;
+    }
+    let factor = 1.0 / (angle * angle) - (1.0 + angle.cos()) / (2.0 * angle * angle.sin());
+    Matrix3::identity() + k * 0.5 + k * k * factor
+}

@@ -1,0 +1,71 @@
+use nalgebra::{Matrix4, Vector3, Vector6};
+
+use super::{RigidTransform, so3};
+
+/// Rotation vectors from tiny to just under a half turn.
+fn rotation_vectors() -> Vec<Vector3<f64>> {
+    let axes = [Vector3::x(), Vector3::new(0.3, -0.5, 0.8), Vector3::new(-0.7, 0.1, -0.2)];
+    let angles = [0.0, 1e-10, 1e-5, 0.9e-4, 1.1e-4, 0.01, 0.7, 2.0, 3.1];
+    axes.iter().flat_map(|axis| angles.iter().map(move |angle| axis.normalize() * *angle)).collect()
+}
+
+fn transforms() -> Vec<RigidTransform> {
+    rotation_vectors()
+        .iter()
+        .enumerate()
+        .map(|(index, phi)| RigidTransform::new(so3::exp(phi), Vector3::new(index as f64, -0.5, 0.25 * index as f64)))
+        .collect()
+}
+
+#[test]
+fn logarithm_inverts_the_exponential() {
+    for phi in rotation_vectors() {
+        assert!((so3::log(&so3::exp(&phi)) - phi).norm() < 1e-12, "{phi:?}");
+    }
+}
+
+#[test]
+fn right_jacobian_meets_central_differences() {
+    let step = 1e-6;
+    for phi in rotation_vectors() {
+        let analytic = so3::right_jacobian(&phi);
+        for axis in 0..3 {
+            let mut shift = Vector3::zeros();
+            shift[axis] = step;
+            let numeric = (so3::log(&(so3::exp(&phi).inverse() * so3::exp(&(phi + shift))))
+                - so3::log(&(so3::exp(&phi).inverse() * so3::exp(&(phi - shift)))))
+                / (2.0 * step);
+            assert!((analytic.column(axis) - numeric).norm() < 1e-9, "{phi:?} column {axis}");
+        }
+        let product = analytic * so3::right_jacobian_inverse(&phi);
+        assert!((product - nalgebra::Matrix3::identity()).amax() < 1e-9, "{phi:?}");
+    }
+}
+
+#[test]
+fn rigid_transform_obeys_the_manifold_laws() {
+    let deltas = [Vector6::new(0.1, -0.2, 0.3, 1.0, 2.0, -0.4), Vector6::new(1e-7, 0.0, 2e-7, 0.0, 1e-8, 0.0)];
+    for x in transforms() {
+        assert!(x.plus(&Vector6::zeros()).minus(&x).norm() < 1e-14);
+        for delta in &deltas {
+            assert!((x.plus(delta).minus(&x) - delta).norm() < 1e-12);
+        }
+        for y in transforms() {
+            let rebuilt = x.plus(&y.minus(&x));
+            assert!((rebuilt.to_matrix() - y.to_matrix()).amax() < 1e-12);
+        }
+    }
+}
+
+#[test]
+fn matrices_go_both_ways_and_bad_ones_are_refused() {
+    for x in transforms() {
+        let back = RigidTransform::from_matrix(&x.to_matrix(), 1e-9).unwrap();
+        assert!((back.to_matrix() - x.to_matrix()).amax() < 1e-12);
+        assert!(((x * x.inverse()).to_matrix() - Matrix4::identity()).amax() < 1e-12);
+    }
+    assert!(RigidTransform::from_matrix(&(Matrix4::identity() * 1.1), 1e-6).is_none());
+    let mut mirror = Matrix4::identity();
+    mirror[(0, 0)] = -1.0;
+    assert!(RigidTransform::from_matrix(&mirror, 1e-6).is_none());
+}

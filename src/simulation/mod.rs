@@ -1,0 +1,1 @@
+//! Synthetic flights with known truth, written as flight logs.
