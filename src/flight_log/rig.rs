@@ -1,8 +1,8 @@
 //! The rig: what sensors a log holds and how they sit, in Kalibr's names.
 
-use crate::gimbal::ClassicalChain;
-use crate::geometry::RigidTransform;
 use crate::camera::CameraModel;
+use crate::geometry::RigidTransform;
+use crate::gimbal::ClassicalChain;
 
 /// Noise of the inertial sensor, continuous-time densities as Kalibr gives them.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,5 +1,14 @@
 //! Panels, the 3D scene and the window: they read a recording at a cursor and push commands.
 
+#[cfg(test)]
+mod sample_calibration;
+#[cfg(test)]
+mod sample_images;
+#[cfg(test)]
+pub(crate) mod sample_recording;
+#[cfg(test)]
+mod tests;
+
 use std::sync::Arc;
 
 use crate::flight_log::GrayImage;

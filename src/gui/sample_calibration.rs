@@ -1,0 +1,184 @@
+//! Calibration and rank of the made-up recording.
+
+use super::sample_recording::{Dice, FIRST_TRACKED_FRAME};
+use crate::estimator::CalibrationEstimate;
+use crate::geometry::{RigidTransform, so3};
+use crate::gimbal::{ClassicalChain, DhLink};
+use crate::observability::{CalibrationDirection, RankReport};
+
+/// The calibration at a frame: the given chain at first, then ever nearer to the truth, faster for angles than for
+/// lengths, with a shrinking σ.
+pub(crate) fn calibration_at(
+    name: &str,
+    index: usize,
+    given: &ClassicalChain,
+    truth: &ClassicalChain,
+) -> CalibrationEstimate {
+    let age_s = index.saturating_sub(FIRST_TRACKED_FRAME) as f64 * 0.05;
+    let mixed = mix(given, truth, (-age_s / 2.0).exp());
+    let (names, values) = if name == "classical" { classical_values(&mixed) } else { minimal_values(&mixed) };
+    let units: Vec<&'static str> = names.iter().map(|name| unit_of(name)).collect();
+    let prior_sigmas: Vec<f64> = units.iter().map(|unit| if *unit == "rad" { 0.015 } else { 0.0035 }).collect();
+    let mut dice = Dice(index as u64 + 100);
+    let waiting = index < FIRST_TRACKED_FRAME;
+    let sigmas: Vec<f64> = prior_sigmas
+        .iter()
+        .zip(&units)
+        .map(|(prior, unit)| {
+            let speed = if *unit == "rad" { 2.5 } else { 0.5 };
+            if waiting { f64::NAN } else { prior / (1.0 + speed * age_s).sqrt() }
+        })
+        .collect();
+    let values = values
+        .iter()
+        .zip(&sigmas)
+        .map(|(value, sigma)| value + if waiting { 0.0 } else { 0.15 * sigma * dice.normal() })
+        .collect();
+    CalibrationEstimate {
+        parameterization: if name == "auto" { "minimal".to_owned() } else { name.to_owned() },
+        names,
+        units,
+        values,
+        sigmas,
+        prior_sigmas,
+        classical: mixed,
+        margins: vec![("base".to_owned(), 0.98), ("end".to_owned(), 0.93), ("L2".to_owned(), 0.99)],
+    }
+}
+
+/// The rank at a frame: everything structural at once, informed directions one after the other.
+pub(crate) fn rank_at(names: &[String], index: usize) -> RankReport {
+    let columns = names.len();
+    let redundant = if columns == 24 { 6 } else { 0 };
+    let structural = columns - redundant;
+    let age_s = index.saturating_sub(FIRST_TRACKED_FRAME) as f64 * 0.05;
+    let reference = 420.0;
+    let singular_values: Vec<f64> = (0..columns)
+        .map(|rank| {
+            if rank >= structural {
+                return 1e-14 * (columns - rank) as f64;
+            }
+            60.0 * (-0.45 * rank as f64).exp() * (0.25 + 0.3 * age_s)
+        })
+        .collect();
+    let informed = singular_values.iter().filter(|value| **value >= 1.0).count();
+    let directions = (informed..columns)
+        .rev()
+        .map(|rank| {
+            let mut weights = vec![0.0; columns];
+            let mut dice = Dice(rank as u64 * 977);
+            for entry in 0..3 {
+                weights[(rank * 5 + entry * 7) % columns] = if entry == 0 { 1.0 } else { 1.4 * dice.unit() - 0.7 };
+            }
+            let norm = weights.iter().map(|weight| weight * weight).sum::<f64>().sqrt();
+            CalibrationDirection {
+                singular_value: singular_values[rank],
+                structural: rank >= structural,
+                weights: weights.iter().map(|weight| weight / norm).collect(),
+            }
+        })
+        .collect();
+    RankReport {
+        names: names.to_vec(),
+        singular_values_with_priors: singular_values.iter().map(|value| (value * value + 1.0).sqrt()).collect(),
+        singular_values,
+        reference,
+        structural_threshold: 3e-11 * reference,
+        informed_threshold: 1.0,
+        rank_structural: structural,
+        rank_informed: informed,
+        deficit_parameterization: redundant,
+        deficit_joints: 0,
+        deficit_absorbed: 0,
+        deficit_motion: 0,
+        directions,
+        margins: vec![("base".to_owned(), 0.98), ("end".to_owned(), 0.93), ("L2".to_owned(), 0.99)],
+    }
+}
+
+fn mix(given: &ClassicalChain, truth: &ClassicalChain, weight_of_given: f64) -> ClassicalChain {
+    let pose = |given: &RigidTransform, truth: &RigidTransform| truth.plus(&(given.minus(truth) * weight_of_given));
+    let number = |given: f64, truth: f64| truth + (given - truth) * weight_of_given;
+    ClassicalChain {
+        imu_from_base: pose(&given.imu_from_base, &truth.imu_from_base),
+        links: given
+            .links
+            .iter()
+            .zip(&truth.links)
+            .map(|(given, truth)| DhLink {
+                theta_offset_rad: number(given.theta_offset_rad, truth.theta_offset_rad),
+                d_m: number(given.d_m, truth.d_m),
+                a_m: number(given.a_m, truth.a_m),
+                alpha_rad: number(given.alpha_rad, truth.alpha_rad),
+            })
+            .collect(),
+        effector_from_camera: pose(&given.effector_from_camera, &truth.effector_from_camera),
+    }
+}
+
+fn unit_of(name: &str) -> &'static str {
+    let last = name.rsplit('.').next().unwrap_or(name);
+    if matches!(last, "tx" | "ty" | "tz" | "d" | "a" | "y") { "m" } else { "rad" }
+}
+
+/// Names and values of the classical form, as in the golden files.
+fn classical_values(chain: &ClassicalChain) -> (Vec<String>, Vec<f64>) {
+    let mut entries = pose_entries("IB", &chain.imu_from_base);
+    for (number, link) in chain.links.iter().enumerate() {
+        entries.extend(link_entries(number + 1, link));
+    }
+    entries.extend(pose_entries("EC", &chain.effector_from_camera));
+    entries.into_iter().unzip()
+}
+
+/// Names and values of the minimal form by section 6 of the mathematics notes (three links, away from its locks).
+fn minimal_values(chain: &ClassicalChain) -> (Vec<String>, Vec<f64>) {
+    let base = chain.imu_from_base.rotation_matrix();
+    let (rx, ry) = ((-base[(1, 2)]).atan2(base[(2, 2)]), base[(0, 2)].atan2(base[(1, 2)].hypot(base[(2, 2)])));
+    let psi = (-base[(0, 1)]).atan2(base[(0, 0)]);
+    let tilt = so3::exp(&nalgebra::Vector3::new(rx, 0.0, 0.0)) * so3::exp(&nalgebra::Vector3::new(0.0, ry, 0.0));
+    let shift = tilt.inverse() * chain.imu_from_base.translation_m;
+    let mut links = chain.links.clone();
+    links[0].theta_offset_rad += psi;
+    links[0].d_m += shift.z;
+    let end = links[2];
+    let turn = RigidTransform::new(
+        so3::exp(&nalgebra::Vector3::new(0.0, 0.0, end.theta_offset_rad)),
+        nalgebra::Vector3::new(0.0, 0.0, end.d_m),
+    );
+    let twist = RigidTransform::new(
+        so3::exp(&nalgebra::Vector3::new(end.alpha_rad, 0.0, 0.0)),
+        nalgebra::Vector3::new(end.a_m, 0.0, 0.0),
+    );
+    let last = turn * twist * chain.effector_from_camera;
+    let matrix = last.rotation_matrix();
+    let cosine = matrix[(0, 1)].hypot(matrix[(1, 1)]);
+    let theta = (-matrix[(0, 1)]).atan2(matrix[(1, 1)]);
+    let alpha = matrix[(2, 1)].atan2(cosine);
+    let beta = (-matrix[(2, 0)]).atan2(matrix[(2, 2)]);
+    let lengths = so3::exp(&nalgebra::Vector3::new(0.0, 0.0, -theta)) * last.translation_m;
+    let y = lengths.y / cosine;
+    links[2] = DhLink { theta_offset_rad: theta, d_m: lengths.z - y * alpha.sin(), a_m: lengths.x, alpha_rad: alpha };
+    let mut entries: Vec<(String, f64)> = [("I.rx", rx), ("I.ry", ry), ("I.tx", shift.x), ("I.ty", shift.y)]
+        .map(|(name, value)| (name.into(), value))
+        .into();
+    for (number, link) in links.iter().enumerate() {
+        entries.extend(link_entries(number + 1, link));
+    }
+    entries.push(("L3.beta".to_owned(), beta));
+    entries.push(("L3.y".to_owned(), y));
+    entries.into_iter().unzip()
+}
+
+fn link_entries(number: usize, link: &DhLink) -> [(String, f64); 4] {
+    [("theta", link.theta_offset_rad), ("d", link.d_m), ("a", link.a_m), ("alpha", link.alpha_rad)]
+        .map(|(name, value)| (format!("L{number}.{name}"), value))
+}
+
+fn pose_entries(name: &str, pose: &RigidTransform) -> Vec<(String, f64)> {
+    let turn = so3::log(&pose.rotation);
+    let shift = pose.translation_m;
+    [("rx", turn.x), ("ry", turn.y), ("rz", turn.z), ("tx", shift.x), ("ty", shift.y), ("tz", shift.z)]
+        .map(|(entry, value)| (format!("{name}.{entry}"), value))
+        .into()
+}

@@ -1,0 +1,593 @@
+//! A made-up recording for the tests of panels and pictures: a flight in a walled yard with a three-axis gimbal.
+//!
+//! Two seconds of hover, then a figure of eight; two runs (`auto` in the minimal form, `classical`) whose calibration
+//! starts at the rig's wrong chain and approaches the true one.
+//! The geometry is consistent: features are projections of points on the walls that [`SampleImages`] draws.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use nalgebra::{UnitQuaternion, Vector2, Vector3};
+
+use super::sample_calibration::{calibration_at, rank_at};
+use super::sample_images::SampleImages;
+use crate::camera::{CameraModel, Distortion, Projection};
+use crate::estimator::{
+    Event, EventKind, FeatureReport, FrameStateReport, IterationReport, LandmarkReport, ObservationReport, Phase,
+    ResidualSummary, StageTimes, StepReport,
+};
+use crate::flight_log::rig::{CameraMount, CameraRig, ChainPrior, GimbalRig, ImuNoise, ImuRig, Joint};
+use crate::flight_log::{LogWarning, Rig};
+use crate::frontend::{FeatureId, FrontEndStatistics, TrackedFeature, TrackedFrame};
+use crate::geometry::{RigidTransform, so3};
+use crate::gimbal::{ClassicalChain, DhLink};
+use crate::session::{ParameterizationChoice, Recording, RunRecord, RunSpec, StepRecord};
+
+/// Nanoseconds between two images (20 Hz).
+pub(crate) const FRAME_PERIOD_NS: i64 = 50_000_000;
+/// The first frame that the made-up estimator tracks (2.5 s).
+pub(crate) const FIRST_TRACKED_FRAME: usize = 50;
+/// Half the side of the walled yard, in metres.
+pub(crate) const YARD_HALF_SIDE_M: f64 = 22.0;
+/// Height of its walls, in metres.
+pub(crate) const WALL_HEIGHT_M: f64 = 12.0;
+/// Focal lengths and principal point of the made-up camera, in pixels.
+pub(crate) const INTRINSICS_PX: [f64; 4] = [352.6, 352.1, 322.4, 238.1];
+/// Its resolution.
+pub(crate) const RESOLUTION_PX: [usize; 2] = [640, 480];
+
+/// A small seeded generator (splitmix64), so that the sample is the same everywhere.
+pub(crate) struct Dice(pub(crate) u64);
+
+impl Dice {
+    /// Uniform in `[0, 1)`.
+    pub(crate) fn unit(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    /// Roughly normal with unit variance (sum of twelve uniforms).
+    pub(crate) fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.unit()).sum::<f64>() - 6.0
+    }
+}
+
+/// Twelve seconds with the runs `auto` and `classical`.
+pub(crate) fn sample_recording() -> Recording {
+    sample_recording_of(240, &["auto", "classical"])
+}
+
+/// The images that belong to [`sample_recording`].
+pub(crate) fn sample_images() -> SampleImages {
+    SampleImages
+}
+
+/// A recording of `frame_count` frames with one run per name (`auto`, `classical`, …).
+pub(crate) fn sample_recording_of(frame_count: usize, run_names: &[&str]) -> Recording {
+    let true_chain = true_chain();
+    let given_chain = given_chain();
+    let flight: Vec<Instant> = (0..frame_count).map(|index| Instant::at(index, &true_chain)).collect();
+    let tracks = track_features(&flight);
+    let runs = run_names
+        .iter()
+        .enumerate()
+        .map(|(number, name)| sample_run(number, name, &flight, &tracks, &given_chain, &true_chain))
+        .collect();
+    Recording {
+        log_path: PathBuf::from("sample/yard.mcap"),
+        rig: Arc::new(rig_with(given_chain, "yard")),
+        truth_rig: Some(Arc::new(rig_with(true_chain, "yard"))),
+        duration_ns: frame_count as i64 * FRAME_PERIOD_NS,
+        epoch_ns: 1_718_451_937_250_000_000,
+        runs,
+        warnings: vec![LogWarning {
+            stamp_ns: 6_000_000_000,
+            message: "no IMU sample for 0.034 s at 6.00 s; bridged by interpolation".to_owned(),
+        }],
+    }
+}
+
+/// `world_from_imu`, joint angles and the camera's pose at one frame.
+pub(crate) struct Instant {
+    pub(crate) world_from_imu: RigidTransform,
+    pub(crate) velocity_m_per_s: Vector3<f64>,
+    pub(crate) joint_angles_rad: [f64; 3],
+    pub(crate) world_from_camera: RigidTransform,
+}
+
+impl Instant {
+    /// The true flight at a frame.
+    pub(crate) fn at(frame_index: usize, chain: &ClassicalChain) -> Self {
+        let t_s = frame_index as f64 * 0.05;
+        let position = position_m(t_s);
+        let velocity = (position_m(t_s + 0.01) - position_m(t_s - 0.01)) / 0.02;
+        let acceleration = (position_m(t_s + 0.05) + position_m(t_s - 0.05) - position * 2.0) / 0.0025;
+        let heading = 0.35 * (0.5 * t_s).sin() + 0.12 * t_s;
+        let turned = UnitQuaternion::from_euler_angles(0.0, 0.0, -heading) * acceleration;
+        let rotation = UnitQuaternion::from_euler_angles(
+            (-turned.y / 9.81).clamp(-0.5, 0.5),
+            (turned.x / 9.81).clamp(-0.5, 0.5),
+            heading,
+        );
+        let world_from_imu = RigidTransform::new(rotation, position);
+        let joint_angles_rad = [0.5 * (0.7 * t_s).sin(), 0.2 * (1.3 * t_s).sin(), -0.25 + 0.15 * (0.9 * t_s).sin()];
+        let world_from_camera = world_from_imu * chain_pose(chain, &joint_angles_rad);
+        Self { world_from_imu, velocity_m_per_s: velocity, joint_angles_rad, world_from_camera }
+    }
+}
+
+/// Hover for two seconds, then a figure of eight.
+fn position_m(t_s: f64) -> Vector3<f64> {
+    let moved_s = (t_s - 2.0).max(0.0);
+    let phase = 0.55 * moved_s * moved_s / (moved_s + 1.5);
+    let breath = 0.02 * (2.1 * t_s).sin();
+    Vector3::new(
+        11.0 * phase.sin() + breath,
+        6.5 * (2.0 * phase).sin() + 0.5 * breath,
+        3.0 + 1.4 * (1.0 - (0.9 * phase).cos()) + breath,
+    )
+}
+
+/// The classical chain at joint angles, link by link.
+pub(crate) fn chain_pose(chain: &ClassicalChain, joint_angles_rad: &[f64]) -> RigidTransform {
+    let mut pose = chain.imu_from_base;
+    for (link, angle_rad) in chain.links.iter().zip(joint_angles_rad) {
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle_rad + link.theta_offset_rad);
+        let twist = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), link.alpha_rad);
+        pose = pose
+            * RigidTransform::new(turn, Vector3::new(0.0, 0.0, link.d_m))
+            * RigidTransform::new(twist, Vector3::new(link.a_m, 0.0, 0.0));
+    }
+    pose * chain.effector_from_camera
+}
+
+fn pose_of(rotation_vector: [f64; 3], translation_m: [f64; 3]) -> RigidTransform {
+    RigidTransform::new(so3::exp(&Vector3::from(rotation_vector)), Vector3::from(translation_m))
+}
+
+fn link(theta_offset_rad: f64, d_m: f64, a_m: f64, alpha_rad: f64) -> DhLink {
+    DhLink { theta_offset_rad, d_m, a_m, alpha_rad }
+}
+
+/// The chain as it really is: yaw, roll, pitch, an optical camera frame that looks forward.
+pub(crate) fn true_chain() -> ClassicalChain {
+    ClassicalChain {
+        imu_from_base: pose_of([3.13, -0.04, 0.02], [0.09, 0.008, -0.062]),
+        links: vec![
+            link(-1.5568, 0.047, 0.013, -1.5481),
+            link(1.5603, -0.021, 0.034, -1.6005),
+            link(-1.5516, 0.024, 0.016, -1.5464),
+        ],
+        effector_from_camera: pose_of([-1.2092, 1.2092, -1.2092], [0.029, -0.005, 0.007]),
+    }
+}
+
+/// The chain as the rig gives it: each parameter wrong by up to 6 mm and 1.5°.
+pub(crate) fn given_chain() -> ClassicalChain {
+    let mut chain = true_chain();
+    let mut dice = Dice(7);
+    let mut wrong = |bound: f64| bound * (2.0 * dice.unit() - 1.0);
+    let shift = |pose: &RigidTransform, wrong: &mut dyn FnMut(f64) -> f64| {
+        let entries: Vec<f64> = (0..6).map(|entry| wrong(if entry < 3 { 0.026 } else { 0.006 })).collect();
+        pose.plus(&nalgebra::Vector6::from_column_slice(&entries))
+    };
+    chain.imu_from_base = shift(&chain.imu_from_base, &mut wrong);
+    for link in &mut chain.links {
+        link.theta_offset_rad += wrong(0.026);
+        link.d_m += wrong(0.006);
+        link.a_m += wrong(0.006);
+        link.alpha_rad += wrong(0.026);
+    }
+    chain.effector_from_camera = shift(&chain.effector_from_camera, &mut wrong);
+    chain
+}
+
+fn rig_with(chain: ClassicalChain, name: &str) -> Rig {
+    let joint = |name: &str, low_deg: f64, high_deg: f64| Joint {
+        name: name.to_owned(),
+        limits_rad: (low_deg.to_radians(), high_deg.to_radians()),
+    };
+    Rig {
+        name: name.to_owned(),
+        gravity_m_per_s2: 9.81,
+        imu: ImuRig {
+            topic: "/imu".to_owned(),
+            frame_id: "imu".to_owned(),
+            rate_hz: 200.0,
+            noise: ImuNoise {
+                accelerometer_noise_density: 0.004,
+                accelerometer_random_walk: 0.006,
+                gyroscope_noise_density: 3.4e-4,
+                gyroscope_random_walk: 3.9e-5,
+            },
+        },
+        cameras: vec![CameraRig {
+            key: "cam0".to_owned(),
+            mount: CameraMount::Gimbal,
+            topic: "/gimbal_camera/image_raw".to_owned(),
+            frame_id: "gimbal_camera".to_owned(),
+            rate_hz: 20.0,
+            model: CameraModel {
+                projection: Projection::Pinhole,
+                distortion: Distortion::None,
+                intrinsics_px: INTRINSICS_PX,
+                resolution_px: RESOLUTION_PX,
+            },
+            timeshift_cam_imu_s: 0.0,
+        }],
+        gimbal: Some(GimbalRig {
+            topic: Some("/gimbal/joint_states".to_owned()),
+            rate_hz: 200.0,
+            encoder_sigma_rad: Some(0.0087),
+            prior: ChainPrior { translation_bound_m: 0.006, rotation_bound_rad: 0.026 },
+            chain,
+            joints: vec![joint("yaw", -180.0, 180.0), joint("roll", -25.0, 25.0), joint("pitch", -120.0, 30.0)],
+        }),
+        ground_truth_topic: Some("/ground_truth/odometry".to_owned()),
+    }
+}
+
+/// Points on the walls and the ground of the yard.
+fn yard_points() -> Vec<Vector3<f64>> {
+    let mut dice = Dice(11);
+    let side = YARD_HALF_SIDE_M;
+    (0..6000)
+        .map(|index| {
+            let (along, other) = (2.0 * dice.unit() - 1.0, dice.unit());
+            match index % 5 {
+                0 => Vector3::new(side * along, side * (2.0 * other - 1.0), 0.0),
+                1 => Vector3::new(side, side * along, WALL_HEIGHT_M * other),
+                2 => Vector3::new(-side, side * along, WALL_HEIGHT_M * other),
+                3 => Vector3::new(side * along, side, WALL_HEIGHT_M * other),
+                _ => Vector3::new(side * along, -side, WALL_HEIGHT_M * other),
+            }
+        })
+        .collect()
+}
+
+fn project(world_from_camera: &RigidTransform, point_in_world: &Vector3<f64>) -> Option<(Vector2<f64>, f64)> {
+    let point = world_from_camera.inverse().transform(point_in_world);
+    let [fx, fy, cx, cy] = INTRINSICS_PX;
+    if point.z < 0.5 {
+        return None;
+    }
+    let uv = Vector2::new(fx * point.x / point.z + cx, fy * point.y / point.z + cy);
+    let inside =
+        (6.0..RESOLUTION_PX[0] as f64 - 6.0).contains(&uv.x) && (6.0..RESOLUTION_PX[1] as f64 - 6.0).contains(&uv.y);
+    inside.then_some((uv, point.z))
+}
+
+/// The point of a feature; its id is one more than the point's number.
+fn point_of(id: FeatureId, points: &[Vector3<f64>]) -> Vector3<f64> {
+    points[id.0 as usize - 1]
+}
+
+fn track_features(flight: &[Instant]) -> Vec<Arc<TrackedFrame>> {
+    const WANTED: usize = 140;
+    const MIN_DISTANCE_PX: f64 = 26.0;
+    let points = yard_points();
+    let mut dice = Dice(23);
+    let mut before: BTreeMap<u64, TrackedFeature> = BTreeMap::new();
+    let mut frames = Vec::new();
+    for (index, instant) in flight.iter().enumerate() {
+        let mut candidates: Vec<u64> = (1..=points.len() as u64).collect();
+        candidates.sort_by_key(|id| std::cmp::Reverse(before.get(id).map_or(0, |feature| feature.age + 1)));
+        let mut now: BTreeMap<u64, TrackedFeature> = BTreeMap::new();
+        let mut taken: Vec<Vector2<f64>> = Vec::new();
+        let mut detected = 0;
+        for id in candidates {
+            let earlier = before.get(&id);
+            if now.len() >= WANTED || (earlier.is_some() && dice.unit() < 0.015) {
+                continue;
+            }
+            let Some((uv, _)) = project(&instant.world_from_camera, &points[id as usize - 1]) else { continue };
+            if taken.iter().any(|other| (other - uv).norm() < MIN_DISTANCE_PX) {
+                continue;
+            }
+            taken.push(uv);
+            let uv_px = uv + Vector2::new(dice.normal(), dice.normal()) * 0.3;
+            let [fx, fy, cx, cy] = INTRINSICS_PX;
+            let bearing = Vector3::new((uv_px.x - cx) / fx, (uv_px.y - cy) / fy, 1.0).normalize();
+            detected += usize::from(earlier.is_none());
+            let feature = TrackedFeature {
+                id: FeatureId(id),
+                age: earlier.map_or(0, |feature| feature.age + 1),
+                uv_px,
+                previous_uv_px: earlier.map(|feature| feature.uv_px),
+                bearing,
+            };
+            now.insert(id, feature);
+        }
+        let tracked = now.len() - detected;
+        let statistics = FrontEndStatistics {
+            tracked,
+            detected,
+            lost: before.len() - tracked,
+            rejected: (before.len() - tracked) / 3,
+            mean_parallax_px: 2.4,
+            median_flow_px: 5.1,
+        };
+        let features = now.values().copied().collect();
+        frames.push(Arc::new(TrackedFrame { stamp_ns: index as i64 * FRAME_PERIOD_NS, features, statistics }));
+        before = now;
+    }
+    frames
+}
+
+fn sample_run(
+    number: usize,
+    name: &str,
+    flight: &[Instant],
+    tracks: &[Arc<TrackedFrame>],
+    given: &ClassicalChain,
+    truth: &ClassicalChain,
+) -> RunRecord {
+    let points = yard_points();
+    let true_from_estimate =
+        RigidTransform::new(UnitQuaternion::from_euler_angles(0.0, 0.0, 0.4), Vector3::new(1.0, -2.0, 0.3));
+    let mut dice = Dice(31 + number as u64);
+    let steps = (0..flight.len())
+        .map(|index| {
+            let estimate = Estimate { number, flight, true_from_estimate };
+            let calibration = calibration_at(name, index, given, truth);
+            let report = if index < FIRST_TRACKED_FRAME {
+                waiting_report(index, calibration)
+            } else {
+                tracking_report(index, &estimate, calibration, tracks, &points, &mut dice)
+            };
+            let rank = (index >= FIRST_TRACKED_FRAME).then(|| rank_at(&report.calibration.names, index));
+            Arc::new(StepRecord {
+                report,
+                rank,
+                tracks: Arc::clone(&tracks[index]),
+                truth: Some(flight[index].world_from_imu),
+                log_time_ns: index as i64 * FRAME_PERIOD_NS + 19_000_000,
+            })
+        })
+        .collect();
+    RunRecord {
+        spec: RunSpec {
+            label: name.to_owned(),
+            parameterization: match name {
+                "classical" => ParameterizationChoice::Classical,
+                "poe" => ParameterizationChoice::Poe,
+                _ => ParameterizationChoice::Auto,
+            },
+            encoder: true,
+            calibrate: true,
+            window: 10,
+        },
+        camera_key: "cam0".to_owned(),
+        steps,
+        finished: true,
+        error: None,
+        alignment: Some(true_from_estimate),
+    }
+}
+
+/// How the made-up estimate errs.
+struct Estimate<'a> {
+    number: usize,
+    flight: &'a [Instant],
+    true_from_estimate: RigidTransform,
+}
+
+impl Estimate<'_> {
+    /// The estimated pose: truth, a slow drift that differs by run, seen in the estimator's own world.
+    fn world_from_imu(&self, index: usize) -> RigidTransform {
+        let age_s = index.saturating_sub(FIRST_TRACKED_FRAME) as f64 * 0.05;
+        let gain = 0.03 + 0.05 * self.number as f64;
+        let drift = Vector3::new((0.5 * age_s).sin(), 1.0 - (0.4 * age_s).cos(), 0.3 * (0.7 * age_s).sin()) * gain;
+        let mut pose = self.flight[index].world_from_imu;
+        pose.translation_m += drift * (1.0 + 0.4 * age_s);
+        self.true_from_estimate.inverse() * pose
+    }
+}
+
+fn waiting_report(index: usize, calibration: crate::estimator::CalibrationEstimate) -> StepReport {
+    let motion = 0.004 * index as f64;
+    StepReport {
+        frame_index: index,
+        stamp_ns: index as i64 * FRAME_PERIOD_NS,
+        phase: Phase::Initializing,
+        restarts: 0,
+        events: vec![Event {
+            kind: EventKind::InitializationWaits,
+            message: format!("waits for motion: parallax {:.1} px of 10 px", motion * 50.0),
+            value: Some(motion * 50.0),
+            threshold: Some(10.0),
+        }],
+        window: Vec::new(),
+        calibration,
+        features: Vec::new(),
+        landmarks: Vec::new(),
+        residuals: Vec::new(),
+        reprojection_rms_before_px: f64::NAN,
+        reprojection_rms_after_px: f64::NAN,
+        iterations: Vec::new(),
+        linearization: None,
+        keyframe: false,
+        times: StageTimes { frontend_ms: 6.0, step_ms: 6.2, ..StageTimes::default() },
+        warnings: Vec::new(),
+    }
+}
+
+fn tracking_report(
+    index: usize,
+    estimate: &Estimate<'_>,
+    calibration: crate::estimator::CalibrationEstimate,
+    tracks: &[Arc<TrackedFrame>],
+    points: &[Vector3<f64>],
+    dice: &mut Dice,
+) -> StepReport {
+    let keyframe = index.is_multiple_of(4);
+    let mut indices: Vec<usize> =
+        (0..=index).rev().filter(|&frame| frame == index || frame.is_multiple_of(4)).collect();
+    indices.retain(|&frame| frame + 60 > index);
+    indices.truncate(11);
+    indices.reverse();
+    let window: Vec<FrameStateReport> = indices
+        .iter()
+        .map(|&frame| {
+            let angles = &estimate.flight[frame].joint_angles_rad;
+            FrameStateReport {
+                frame_index: frame,
+                stamp_ns: frame as i64 * FRAME_PERIOD_NS,
+                world_from_imu: estimate.world_from_imu(frame),
+                velocity_m_per_s: estimate.flight[frame].velocity_m_per_s,
+                accelerometer_bias_m_per_s2: Vector3::new(-0.49, -0.14, 0.39),
+                gyroscope_bias_rad_per_s: Vector3::new(-0.0006, -0.0002, -0.0075),
+                joint_angles_rad: angles.to_vec(),
+                encoder_angles_rad: Some(angles.iter().map(|angle| angle + 0.0087 * dice.normal()).collect()),
+                imu_from_camera: chain_pose(&calibration.classical, angles),
+                keyframe: frame.is_multiple_of(4),
+            }
+        })
+        .collect();
+    let features = feature_reports(index, &indices, estimate, tracks, points, dice);
+    let landmarks = features
+        .iter()
+        .map(|feature| LandmarkReport {
+            id: feature.id,
+            position_m: estimate.true_from_estimate.inverse().transform(&point_of(feature.id, points))
+                + Vector3::new(dice.normal(), dice.normal(), dice.normal()) * 0.06,
+        })
+        .collect();
+    let rms = |residual: fn(&ObservationReport) -> Option<Vector2<f64>>| {
+        let squares: Vec<f64> = features
+            .iter()
+            .flat_map(|feature| feature.observations.iter().filter_map(residual).map(|vector| vector.norm_squared()))
+            .collect();
+        (squares.iter().sum::<f64>() / (2.0 * squares.len().max(1) as f64)).sqrt()
+    };
+    let visual_count: usize = features.iter().map(|feature| 2 * (feature.observations.len() - 1)).sum();
+    let rejected = features.iter().filter(|feature| feature.rejected).count();
+    StepReport {
+        frame_index: index,
+        stamp_ns: index as i64 * FRAME_PERIOD_NS,
+        phase: Phase::Tracking,
+        restarts: 0,
+        events: sample_events(index, keyframe, rejected),
+        reprojection_rms_before_px: rms(|observation| observation.residual_before_px),
+        reprojection_rms_after_px: rms(|observation| observation.residual_after_px),
+        window,
+        calibration,
+        features,
+        landmarks,
+        residuals: [
+            ("visual", visual_count, 1.02),
+            ("imu", 150, 0.95),
+            ("encoder", 33, 1.1),
+            ("calibration prior", 18, 0.6),
+        ]
+        .map(|(factor, count, ratio)| ResidualSummary {
+            factor,
+            count,
+            chi2_before: count as f64 * ratio * (3.0 + dice.unit()),
+            chi2_after: count as f64 * ratio * (0.9 + 0.2 * dice.unit()),
+        })
+        .to_vec(),
+        iterations: (0..4)
+            .map(|iteration| IterationReport {
+                cost_before: 900.0 / 3_f64.powi(iteration) + 300.0,
+                cost_after: 900.0 / 3_f64.powi(iteration + 1) + 300.0,
+                damping: 1e-4,
+                step_norm: 0.1 / 5_f64.powi(iteration),
+                accepted: true,
+            })
+            .collect(),
+        linearization: None,
+        keyframe,
+        times: StageTimes {
+            frontend_ms: 7.0 + dice.unit(),
+            optimize_ms: 14.0 + 4.0 * dice.unit(),
+            marginalize_ms: 2.0,
+            observability_ms: 1.2,
+            step_ms: 26.0 + 4.0 * dice.unit(),
+        },
+        warnings: Vec::new(),
+    }
+}
+
+fn sample_events(index: usize, keyframe: bool, rejected: usize) -> Vec<Event> {
+    let event = |kind, message: String, value, threshold| Event { kind, message, value, threshold };
+    let mut events = Vec::new();
+    if index == FIRST_TRACKED_FRAME {
+        events.push(event(
+            EventKind::InitializedFromMotion,
+            "initialized: parallax 14.2 px".into(),
+            Some(14.2),
+            Some(10.0),
+        ));
+    }
+    if keyframe {
+        events.push(event(EventKind::KeyframeChosen, "keyframe: parallax 11.0 px".into(), Some(11.0), Some(10.0)));
+        events.push(event(EventKind::OldestMarginalized, "oldest frame marginalized".into(), None, None));
+    } else {
+        events.push(event(EventKind::SecondNewestMarginalized, "second-newest frame dropped".into(), None, None));
+    }
+    if rejected > 0 {
+        let message = format!("{rejected} features rejected: χ² over 9.21");
+        events.push(event(EventKind::OutliersRejected, message, Some(rejected as f64), Some(9.21)));
+    }
+    events
+}
+
+fn feature_reports(
+    index: usize,
+    window: &[usize],
+    estimate: &Estimate<'_>,
+    tracks: &[Arc<TrackedFrame>],
+    points: &[Vector3<f64>],
+    dice: &mut Dice,
+) -> Vec<FeatureReport> {
+    const SIGMA_PX: f64 = 0.4;
+    let find = |frame: usize, id: FeatureId| {
+        let features = &tracks[frame].features;
+        features.binary_search_by_key(&id, |feature| feature.id).ok().map(|at| features[at])
+    };
+    let mut reports = Vec::new();
+    for feature in &tracks[index].features {
+        let seen: Vec<usize> = window
+            .iter()
+            .copied()
+            .filter(|&frame| index - frame <= feature.age as usize && find(frame, feature.id).is_some())
+            .collect();
+        let (Some(&anchor), true) = (seen.first(), seen.len() >= 3) else { continue };
+        let rejected = dice.unit() < 0.03;
+        let point = point_of(feature.id, points);
+        let depth = project(&estimate.flight[anchor].world_from_camera, &point).map_or(10.0, |(_, depth)| depth);
+        let observations = seen
+            .iter()
+            .filter_map(|&frame| {
+                let measured_px = find(frame, feature.id)?.uv_px;
+                let scale = if rejected { 8.0 } else { 1.0 };
+                let after = Vector2::new(dice.normal(), dice.normal()) * SIGMA_PX * scale;
+                let push = Vector2::new(0.9, -0.5) * (0.6 + 0.3 * (measured_px.x * 0.01).sin());
+                let newest = if frame == index { 1.0 } else { 0.15 };
+                let chi2 = after.norm_squared() / (SIGMA_PX * SIGMA_PX);
+                let residual = |vector: Vector2<f64>| (frame != anchor).then_some(vector);
+                Some(ObservationReport {
+                    frame_index: frame,
+                    measured_px,
+                    residual_before_px: residual(after + push * newest),
+                    residual_after_px: residual(after),
+                    chi2: if frame == anchor { 0.0 } else { chi2 },
+                    robust_weight: 1.0 / (1.0 + chi2 / 9.0),
+                })
+            })
+            .collect();
+        reports.push(FeatureReport {
+            id: feature.id,
+            anchor_frame_index: anchor,
+            inverse_depth_per_m: 1.0 / depth,
+            observations,
+            rejected,
+        });
+    }
+    reports
+}

@@ -1,0 +1,20 @@
+use super::ImageSource as _;
+use super::sample_recording::{FIRST_TRACKED_FRAME, sample_images, sample_recording};
+
+#[test]
+fn the_sample_is_consistent() {
+    let recording = sample_recording();
+    assert_eq!(recording.runs.len(), 2);
+    let run = &recording.runs[0];
+    let step = run.step_at(recording.duration_ns).expect("the sample has steps");
+    let newest = step.report.newest().expect("it tracks by then");
+    assert!(step.report.features.len() > 60, "{} features", step.report.features.len());
+    assert_eq!(newest.frame_index, step.report.frame_index);
+    assert!(run.steps[FIRST_TRACKED_FRAME - 1].report.newest().is_none());
+    // The aligned estimate lies near the truth.
+    let aligned = run.alignment.expect("aligned") * newest.world_from_imu;
+    let error_m = (aligned.translation_m - step.truth.expect("truth").translation_m).norm();
+    assert!(error_m < 1.0, "{error_m} m off");
+    let image = sample_images().image("cam0", step.report.frame_index).expect("an image");
+    assert_eq!(image.pixels.len(), image.width * image.height);
+}
