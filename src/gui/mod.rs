@@ -8,9 +8,11 @@ mod sample_images;
 pub(crate) mod sample_recording;
 #[cfg(test)]
 mod tests;
+pub mod theme;
 
 use std::sync::Arc;
 
+use self::theme::Theme;
 use crate::flight_log::GrayImage;
 use crate::frontend::FeatureId;
 use crate::session::{Command, Recording};
@@ -22,7 +24,7 @@ pub trait ImageSource {
 }
 
 /// What is selected, linked across all panels.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Selection {
     /// A feature.
     pub feature: Option<FeatureId>,
@@ -42,6 +44,8 @@ pub struct PanelContext<'a> {
     pub images: &'a mut dyn ImageSource,
     /// The linked selection, which a panel may change.
     pub selection: &'a mut Selection,
+    /// Colours and sizes.
+    pub theme: &'a Theme,
     /// Commands that the panel wants applied after this picture.
     pub commands: &'a mut Vec<Command>,
 }

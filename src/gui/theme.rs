@@ -1,0 +1,410 @@
+//! All colours, dash patterns and sizes of the window and of exported pictures.
+//!
+//! Runs are told apart by Okabe–Ito colours *and* dash patterns, never by colour alone.
+
+use std::collections::BTreeMap;
+use std::str::FromStr;
+
+use egui::{Color32, CornerRadius, FontFamily, FontId, Stroke, TextStyle, vec2};
+
+/// Which theme.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ThemeName {
+    /// Dark ground, for the screen.
+    #[default]
+    Dark,
+    /// Light ground, for the screen.
+    Light,
+    /// White ground and dark ink, for reports and paper.
+    Print,
+}
+
+impl ThemeName {
+    /// Its name on the command line.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Dark => "dark",
+            Self::Light => "light",
+            Self::Print => "print",
+        }
+    }
+}
+
+/// No theme of that name.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("unknown theme '{name}': expected dark, light or print")]
+pub struct UnknownTheme {
+    /// What was written.
+    pub name: String,
+}
+
+impl FromStr for ThemeName {
+    type Err = UnknownTheme;
+
+    fn from_str(name: &str) -> Result<Self, UnknownTheme> {
+        match name {
+            "dark" => Ok(Self::Dark),
+            "light" => Ok(Self::Light),
+            "print" => Ok(Self::Print),
+            _ => Err(UnknownTheme { name: name.to_owned() }),
+        }
+    }
+}
+
+/// How one run is drawn everywhere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RunStyle {
+    /// Its Okabe–Ito colour.
+    pub color: Color32,
+    /// Lengths of dash, gap, dash, gap, … in points; empty for a solid line.
+    pub dashes: &'static [f32],
+}
+
+/// Dash, gap, … of run 0, 1, 2, 3: solid, long, dash-dot, short.
+const RUN_DASHES: [&[f32]; 4] = [&[], &[11.0, 4.0], &[8.0, 3.0, 2.0, 3.0], &[4.0, 3.0]];
+
+/// Dash and gap of the truth.
+const TRUTH_DASHES: &[f32] = &[5.0, 4.0];
+
+/// How many runs can be told apart.
+pub const MAX_RUNS: usize = RUN_DASHES.len();
+
+/// Corner radius of frames and buttons in points.
+pub const CORNER_RADIUS: u8 = 3;
+/// Space around the content of a panel in points.
+pub const PANEL_MARGIN: i8 = 6;
+/// Height of one line of a table or list in points.
+pub const ROW_HEIGHT: f32 = 16.0;
+/// Height of a lane of the timeline in points.
+pub const LANE_HEIGHT: f32 = 18.0;
+/// Width of the lane names beside the timeline in points.
+pub const LANE_LABEL_WIDTH: f32 = 118.0;
+/// Width of a curve in points.
+pub const CURVE_WIDTH: f32 = 1.5;
+/// Width of a thin line such as a grid in points.
+pub const HAIRLINE_WIDTH: f32 = 1.0;
+
+/// Every colour of a theme.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Theme {
+    /// Which one it is.
+    pub name: ThemeName,
+    /// Ground of the window.
+    pub background: Color32,
+    /// Ground of panels.
+    pub surface: Color32,
+    /// Ground of buttons and header rows.
+    pub surface_raised: Color32,
+    /// Ground of plots and of the scene.
+    pub plot_background: Color32,
+    /// Lines between panels and around frames.
+    pub outline: Color32,
+    /// Grid lines of plots and of the scene's floor.
+    pub grid: Color32,
+    /// Hatch over what is not informed.
+    pub hatch: Color32,
+    /// Ordinary text.
+    pub text: Color32,
+    /// Headings and values.
+    pub text_strong: Color32,
+    /// Labels, units, axes.
+    pub text_weak: Color32,
+    /// Selection, focus and links.
+    pub accent: Color32,
+    /// The cursor over time.
+    pub cursor: Color32,
+    /// X axis, softened red.
+    pub axis_x: Color32,
+    /// Y axis, softened green.
+    pub axis_y: Color32,
+    /// Z axis, softened blue.
+    pub axis_z: Color32,
+    /// Truth, always dashed.
+    pub truth: Color32,
+    /// Good news.
+    pub ok: Color32,
+    /// Something to look at.
+    pub warn: Color32,
+    /// Something wrong.
+    pub error: Color32,
+    /// Runs 0 to 3 (Okabe–Ito).
+    pub runs: [Color32; MAX_RUNS],
+    /// −1, 0, +1 of the diverging map.
+    diverging: [Color32; 3],
+}
+
+impl Default for Theme {
+    fn default() -> Self {
+        Self::of(ThemeName::default())
+    }
+}
+
+const fn rgb(hex: u32) -> Color32 {
+    Color32::from_rgb((hex >> 16) as u8, (hex >> 8) as u8, hex as u8)
+}
+
+impl Theme {
+    /// The theme of a name.
+    pub fn of(name: ThemeName) -> Self {
+        match name {
+            ThemeName::Dark => Self {
+                name,
+                background: rgb(0x101216),
+                surface: rgb(0x181b20),
+                surface_raised: rgb(0x272c34),
+                plot_background: rgb(0x0e1013),
+                outline: rgb(0x343a43),
+                grid: rgb(0x24282f),
+                hatch: rgb(0x3a4049),
+                text: rgb(0xc4cad3),
+                text_strong: rgb(0xf0f3f7),
+                text_weak: rgb(0x8d96a3),
+                accent: rgb(0x5aa9e6),
+                cursor: rgb(0xf5f0d8),
+                axis_x: rgb(0xe5746c),
+                axis_y: rgb(0x77c277),
+                axis_z: rgb(0x6ea3ec),
+                truth: rgb(0xa3a9b2),
+                ok: rgb(0x3fbf8f),
+                warn: rgb(0xf0b429),
+                error: rgb(0xf0655b),
+                runs: [rgb(0x56b4e9), rgb(0xe69f00), rgb(0x1fb88a), rgb(0xcc79a7)],
+                diverging: [rgb(0x3f9ae0), rgb(0x23272e), rgb(0xf07a35)],
+            },
+            ThemeName::Light => Self {
+                name,
+                background: rgb(0xe7eaee),
+                surface: rgb(0xf6f7f9),
+                surface_raised: rgb(0xe2e6eb),
+                plot_background: rgb(0xffffff),
+                outline: rgb(0xc6ccd4),
+                grid: rgb(0xe6e9ed),
+                hatch: rgb(0xd3d8de),
+                text: rgb(0x333a44),
+                text_strong: rgb(0x0d1117),
+                text_weak: rgb(0x616b78),
+                accent: rgb(0x1466b8),
+                cursor: rgb(0x222222),
+                axis_x: rgb(0xc9473f),
+                axis_y: rgb(0x3f9143),
+                axis_z: rgb(0x3a6fc4),
+                truth: rgb(0x747b85),
+                ok: rgb(0x087f5b),
+                warn: rgb(0x9a6700),
+                error: rgb(0xc4261d),
+                runs: [rgb(0x0072b2), rgb(0xd55e00), rgb(0x009e73), rgb(0xb5578c)],
+                diverging: [rgb(0x2f86cf), rgb(0xf1f3f5), rgb(0xe06520)],
+            },
+            ThemeName::Print => Self {
+                name,
+                background: Color32::WHITE,
+                surface: Color32::WHITE,
+                surface_raised: rgb(0xf0f0f0),
+                outline: rgb(0xb0b0b0),
+                hatch: rgb(0xd0d0d0),
+                text: rgb(0x1a1a1a),
+                text_strong: Color32::BLACK,
+                text_weak: rgb(0x4a4a4a),
+                cursor: Color32::BLACK,
+                truth: rgb(0x666666),
+                diverging: [rgb(0x2f86cf), Color32::WHITE, rgb(0xe06520)],
+                ..Self::of(ThemeName::Light)
+            },
+        }
+    }
+
+    /// Whether the ground is dark.
+    pub fn is_dark(&self) -> bool {
+        self.name == ThemeName::Dark
+    }
+
+    /// How run number `index` is drawn; numbers past the last repeat.
+    pub fn run(&self, index: usize) -> RunStyle {
+        RunStyle { color: self.runs[index % MAX_RUNS], dashes: RUN_DASHES[index % MAX_RUNS] }
+    }
+
+    /// How the truth is drawn.
+    pub fn truth_style(&self) -> RunStyle {
+        RunStyle { color: self.truth, dashes: TRUTH_DASHES }
+    }
+
+    /// The diverging colour of a signed weight in −1 to 1: blue, ground, orange; not-a-number is the ground.
+    pub fn diverging(&self, weight: f64) -> Color32 {
+        let weight = if weight.is_nan() { 0.0 } else { weight.clamp(-1.0, 1.0) as f32 };
+        let [negative, zero, positive] = self.diverging;
+        mix(zero, if weight < 0.0 { negative } else { positive }, weight.abs())
+    }
+
+    /// The ink that reads best on a ground.
+    pub fn text_on(ground: Color32) -> Color32 {
+        let (dark, light) = (rgb(0x0d1117), rgb(0xf0f3f7));
+        if contrast(dark, ground) > contrast(light, ground) { dark } else { light }
+    }
+
+    /// Puts the theme into egui: colours, fonts, spacing.
+    pub fn apply(&self, ctx: &egui::Context) {
+        let base = if self.is_dark() { egui::Theme::Dark } else { egui::Theme::Light };
+        let style = std::sync::Arc::new(self.style(base));
+        // The theme is the program's choice, not the desktop's: both of egui's slots hold it.
+        ctx.set_style_of(egui::Theme::Dark, style.clone());
+        ctx.set_style_of(egui::Theme::Light, style);
+        ctx.set_theme(base);
+    }
+
+    fn style(&self, base: egui::Theme) -> egui::Style {
+        let mut style = base.default_style();
+        style.text_styles = text_styles();
+        style.spacing.item_spacing = vec2(6.0, 4.0);
+        style.spacing.button_padding = vec2(6.0, 2.0);
+        style.spacing.interact_size = vec2(28.0, 20.0);
+        style.spacing.indent = 12.0;
+        style.interaction.selectable_labels = false;
+        style.interaction.tooltip_delay = 0.3;
+        style.animation_time = 0.08;
+
+        let visuals = &mut style.visuals;
+        visuals.panel_fill = self.surface;
+        visuals.window_fill = self.surface;
+        visuals.window_stroke = Stroke::new(1.0, self.outline);
+        visuals.extreme_bg_color = self.plot_background;
+        visuals.faint_bg_color = self.surface_raised.gamma_multiply(0.5);
+        visuals.code_bg_color = self.surface_raised;
+        visuals.weak_text_color = Some(self.text_weak);
+        visuals.hyperlink_color = self.accent;
+        visuals.warn_fg_color = self.warn;
+        visuals.error_fg_color = self.error;
+        visuals.selection.bg_fill = mix(self.surface, self.accent, 0.45);
+        visuals.selection.stroke = Stroke::new(1.0, self.text_strong);
+        visuals.window_shadow.color = Color32::from_black_alpha(if self.is_dark() { 110 } else { 40 });
+        visuals.popup_shadow.color = visuals.window_shadow.color;
+
+        let radius = CornerRadius::same(CORNER_RADIUS);
+        visuals.window_corner_radius = radius;
+        visuals.menu_corner_radius = radius;
+        let widgets = &mut visuals.widgets;
+        for (widget, ground, text) in [
+            (&mut widgets.noninteractive, self.surface, self.text),
+            (&mut widgets.inactive, self.surface_raised, self.text),
+            (&mut widgets.hovered, mix(self.surface_raised, self.accent, 0.25), self.text_strong),
+            (&mut widgets.active, mix(self.surface_raised, self.accent, 0.45), self.text_strong),
+            (&mut widgets.open, self.surface_raised, self.text_strong),
+        ] {
+            widget.bg_fill = ground;
+            widget.weak_bg_fill = ground;
+            widget.fg_stroke = Stroke::new(1.0, text);
+            widget.corner_radius = radius;
+            widget.expansion = 0.0;
+        }
+        widgets.noninteractive.bg_stroke = Stroke::new(1.0, self.outline);
+        widgets.hovered.bg_stroke = Stroke::new(1.0, self.accent);
+        widgets.active.bg_stroke = Stroke::new(1.0, self.accent);
+        style
+    }
+}
+
+fn text_styles() -> BTreeMap<TextStyle, FontId> {
+    use FontFamily::{Monospace, Proportional};
+    [
+        (TextStyle::Small, FontId::new(10.5, Proportional)),
+        (TextStyle::Body, FontId::new(12.5, Proportional)),
+        (TextStyle::Button, FontId::new(12.5, Proportional)),
+        (TextStyle::Heading, FontId::new(15.0, Proportional)),
+        (TextStyle::Monospace, FontId::new(11.5, Monospace)),
+    ]
+    .into_iter()
+    .collect()
+}
+
+/// Font of numbers in plots and tables.
+pub fn number_font() -> FontId {
+    FontId::new(11.0, FontFamily::Monospace)
+}
+
+/// Font of small labels in plots.
+pub fn label_font() -> FontId {
+    FontId::new(11.0, FontFamily::Proportional)
+}
+
+/// Mixes two opaque colours in their 8-bit values: `fraction` 0 is the first, 1 the second.
+pub fn mix(from: Color32, to: Color32, fraction: f32) -> Color32 {
+    let fraction = if fraction.is_nan() { 0.0 } else { fraction.clamp(0.0, 1.0) };
+    let blend = |a: u8, b: u8| (f32::from(a) + (f32::from(b) - f32::from(a)) * fraction).round() as u8;
+    Color32::from_rgb(blend(from.r(), to.r()), blend(from.g(), to.g()), blend(from.b(), to.b()))
+}
+
+/// Contrast ratio of WCAG 2.1 between two opaque colours.
+fn contrast(a: Color32, b: Color32) -> f64 {
+    let luminance = |color: Color32| {
+        let linear = |value: u8| {
+            let value = f64::from(value) / 255.0;
+            if value <= 0.03928 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
+        };
+        0.2126 * linear(color.r()) + 0.7152 * linear(color.g()) + 0.0722 * linear(color.b())
+    };
+    let (a, b) = (luminance(a), luminance(b));
+    (a.max(b) + 0.05) / (a.min(b) + 0.05)
+}
+
+/// Matplotlib's viridis from 0 to 1 in steps of a ninth, interpolated linearly between.
+const VIRIDIS: [u32; 10] =
+    [0x440154, 0x482878, 0x3e4a89, 0x31688e, 0x26828e, 0x1f9e89, 0x35b779, 0x6dcd59, 0xb4de2c, 0xfde725];
+
+/// Viridis at a fraction in 0 to 1, clamped; not-a-number counts as 0.
+pub fn viridis(fraction: f64) -> Color32 {
+    let fraction = if fraction.is_nan() { 0.0 } else { fraction.clamp(0.0, 1.0) };
+    let position = fraction * (VIRIDIS.len() - 1) as f64;
+    let lower = (position as usize).min(VIRIDIS.len() - 2);
+    mix(rgb(VIRIDIS[lower]), rgb(VIRIDIS[lower + 1]), (position - lower as f64) as f32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_read_back() {
+        for name in [ThemeName::Dark, ThemeName::Light, ThemeName::Print] {
+            assert_eq!(name.as_str().parse(), Ok(name));
+        }
+        let error = "blue".parse::<ThemeName>().unwrap_err();
+        assert_eq!(error.to_string(), "unknown theme 'blue': expected dark, light or print");
+    }
+
+    #[test]
+    fn maps_hit_their_ends_and_survive_nonsense() {
+        assert_eq!(viridis(0.0), rgb(0x440154));
+        assert_eq!(viridis(1.0), rgb(0xfde725));
+        assert_eq!(viridis(f64::NAN), viridis(-3.0));
+        let theme = Theme::of(ThemeName::Print);
+        assert_eq!(theme.diverging(0.0), Color32::WHITE);
+        assert_eq!(theme.diverging(-2.0), theme.diverging(-1.0));
+        assert_ne!(theme.diverging(-1.0), theme.diverging(1.0));
+        assert_eq!(theme.diverging(f64::NAN), Color32::WHITE);
+    }
+
+    #[test]
+    fn everything_that_is_read_can_be_read() {
+        for name in [ThemeName::Dark, ThemeName::Light, ThemeName::Print] {
+            let theme = Theme::of(name);
+            for text in [theme.text, theme.text_strong, theme.text_weak, theme.ok, theme.warn, theme.error] {
+                assert!(contrast(text, theme.surface) >= 4.5, "{name:?} {text:?}");
+            }
+            for line in theme.runs.into_iter().chain([theme.truth, theme.axis_x, theme.axis_y, theme.axis_z]) {
+                assert!(contrast(line, theme.plot_background) >= 3.0, "{name:?} {line:?}");
+            }
+            for weight in [-1.0, -0.5, 0.0, 0.5, 1.0] {
+                let ground = theme.diverging(weight);
+                assert!(contrast(Theme::text_on(ground), ground) >= 4.0, "{name:?} {weight}");
+            }
+        }
+    }
+
+    #[test]
+    fn runs_differ_by_dashes_too() {
+        for a in 0..MAX_RUNS {
+            for b in 0..a {
+                assert_ne!(RUN_DASHES[a], RUN_DASHES[b]);
+            }
+        }
+    }
+}
