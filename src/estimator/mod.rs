@@ -2,7 +2,13 @@
 //!
 //! It takes a [`StepInput`] per image and leaves a [`StepReport`] behind; nobody reaches in between.
 
+pub mod imu_factor;
+pub mod preintegration;
 mod report;
+#[cfg(test)]
+mod tests;
+
+pub use preintegration::{ImuBias, MotionIncrement, NavigationState, Preintegration};
 
 pub use report::{
     CalibrationEstimate, ColumnBlock, ColumnGroup, Event, EventKind, FeatureReport, FrameStateReport, IterationReport,

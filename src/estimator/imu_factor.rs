@@ -1,0 +1,84 @@
+//! The inertial residual between two frames and its Jacobians.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::preintegration::{Matrix15, NavigationState, Preintegration, Vector15};
+use crate::geometry::so3;
+
+/// Residual `[φ, p, v, b_g, b_a]` of two states against the samples between them (Eq. 8's inertial term), not whitened.
+pub fn residual(
+    preintegration: &Preintegration,
+    from: &NavigationState,
+    to: &NavigationState,
+    gravity_in_world: &Vector3<f64>,
+) -> Vector15 {
+    let motion = preintegration.corrected(&from.bias);
+    let t = preintegration.duration_s();
+    let back = from.world_from_imu.rotation.inverse();
+    let turn = back * to.world_from_imu.rotation;
+    let shift = to.world_from_imu.translation_m
+        - from.world_from_imu.translation_m
+        - from.velocity_m_per_s * t
+        - gravity_in_world * (0.5 * t * t);
+    let gain = to.velocity_m_per_s - from.velocity_m_per_s - gravity_in_world * t;
+
+    let mut residual = Vector15::zeros();
+    residual.fixed_rows_mut::<3>(0).copy_from(&so3::log(&(motion.rotation.inverse() * turn)));
+    residual.fixed_rows_mut::<3>(3).copy_from(&(back * shift - motion.position_m));
+    residual.fixed_rows_mut::<3>(6).copy_from(&(back * gain - motion.velocity_m_per_s));
+    residual.fixed_rows_mut::<3>(9).copy_from(&(to.bias.gyroscope_rad_per_s - from.bias.gyroscope_rad_per_s));
+    residual.fixed_rows_mut::<3>(12).copy_from(&(to.bias.accelerometer_m_per_s2 - from.bias.accelerometer_m_per_s2));
+    residual
+}
+
+/// Derivatives of [`residual`] by `from` and by `to`, each 15 × 15 in the order `[φ, p, v, b_g, b_a]`.
+pub fn jacobians(
+    preintegration: &Preintegration,
+    from: &NavigationState,
+    to: &NavigationState,
+    gravity_in_world: &Vector3<f64>,
+) -> (Matrix15, Matrix15) {
+    let t = preintegration.duration_s();
+    let by_bias = preintegration.bias_jacobian();
+    let change = preintegration.bias_change(&from.bias);
+    let motion = preintegration.corrected(&from.bias);
+    let back_rotation = from.world_from_imu.rotation.inverse();
+    let back: Matrix3<f64> = back_rotation.to_rotation_matrix().into_inner();
+    let turn = back_rotation * to.world_from_imu.rotation;
+    let rotation_error = so3::log(&(motion.rotation.inverse() * turn));
+    let error_inverse = so3::right_jacobian_inverse(&rotation_error);
+    let turn_back: Matrix3<f64> = turn.inverse().to_rotation_matrix().into_inner();
+    let shift = to.world_from_imu.translation_m
+        - from.world_from_imu.translation_m
+        - from.velocity_m_per_s * t
+        - gravity_in_world * (0.5 * t * t);
+    let gain = to.velocity_m_per_s - from.velocity_m_per_s - gravity_in_world * t;
+    let identity = Matrix3::<f64>::identity();
+
+    // The bias correction turns by Exp(J δb): its derivative, seen from the far side of the rotation error.
+    let correction = (by_bias.fixed_view::<3, 6>(0, 0) * change).fixed_rows::<3>(0).into_owned();
+    let error_back: Matrix3<f64> = so3::exp(&-rotation_error).to_rotation_matrix().into_inner();
+    let phi_by_bias =
+        -(error_inverse * error_back * so3::right_jacobian(&correction)) * by_bias.fixed_view::<3, 6>(0, 0);
+
+    let mut by_from = Matrix15::zeros();
+    by_from.fixed_view_mut::<3, 3>(0, 0).copy_from(&-(error_inverse * turn_back));
+    by_from.fixed_view_mut::<3, 6>(0, 9).copy_from(&phi_by_bias);
+    by_from.fixed_view_mut::<3, 3>(3, 0).copy_from(&so3::hat(&(back * shift)));
+    by_from.fixed_view_mut::<3, 3>(3, 3).copy_from(&-back);
+    by_from.fixed_view_mut::<3, 3>(3, 6).copy_from(&(-back * t));
+    by_from.fixed_view_mut::<3, 6>(3, 9).copy_from(&-by_bias.fixed_view::<3, 6>(3, 0));
+    by_from.fixed_view_mut::<3, 3>(6, 0).copy_from(&so3::hat(&(back * gain)));
+    by_from.fixed_view_mut::<3, 3>(6, 6).copy_from(&-back);
+    by_from.fixed_view_mut::<3, 6>(6, 9).copy_from(&-by_bias.fixed_view::<3, 6>(6, 0));
+    by_from.fixed_view_mut::<3, 3>(9, 9).copy_from(&-identity);
+    by_from.fixed_view_mut::<3, 3>(12, 12).copy_from(&-identity);
+
+    let mut by_to = Matrix15::zeros();
+    by_to.fixed_view_mut::<3, 3>(0, 0).copy_from(&error_inverse);
+    by_to.fixed_view_mut::<3, 3>(3, 3).copy_from(&back);
+    by_to.fixed_view_mut::<3, 3>(6, 6).copy_from(&back);
+    by_to.fixed_view_mut::<3, 3>(9, 9).copy_from(&identity);
+    by_to.fixed_view_mut::<3, 3>(12, 12).copy_from(&identity);
+    (by_from, by_to)
+}

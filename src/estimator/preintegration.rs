@@ -1,0 +1,320 @@
+//! Inertial samples between two instants, summed up once (Forster et al., TRO 2017) with covariance and bias Jacobians.
+//!
+//! Angular velocity and specific force are taken as linear between samples: rotations by the second Magnus term, velocity
+//! and position by Simpson's rule over each sample interval.
+//! Error vectors are ordered `[φ, p, v, b_g, b_a]` (15), with the perturbation rule of [`crate::geometry`].
+
+use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
+
+use crate::flight_log::{ImuSample, rig::ImuNoise};
+use crate::geometry::{RigidTransform, seconds_from_ns, so3};
+
+/// 15 × 15, ordered `[φ, p, v, b_g, b_a]`.
+pub type Matrix15 = SMatrix<f64, 15, 15>;
+/// 15, ordered `[φ, p, v, b_g, b_a]`.
+pub type Vector15 = SVector<f64, 15>;
+/// Derivative of `[φ, p, v]` by `[b_g, b_a]`.
+pub type BiasJacobian = SMatrix<f64, 9, 6>;
+
+/// Biases of the inertial sensor: what it shows beyond the truth.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ImuBias {
+    /// Of the gyroscope, in rad/s.
+    pub gyroscope_rad_per_s: Vector3<f64>,
+    /// Of the accelerometer, in m/s².
+    pub accelerometer_m_per_s2: Vector3<f64>,
+}
+
+/// Where the vehicle is, how it moves and what its inertial sensor adds.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct NavigationState {
+    /// Pose.
+    pub world_from_imu: RigidTransform,
+    /// Velocity in the world, in m/s.
+    pub velocity_m_per_s: Vector3<f64>,
+    /// Biases.
+    pub bias: ImuBias,
+}
+
+impl NavigationState {
+    /// `x ⊞ [φ, p, v, b_g, b_a]`.
+    #[must_use]
+    pub fn plus(&self, delta: &Vector15) -> Self {
+        Self {
+            world_from_imu: self.world_from_imu.plus(&delta.fixed_rows::<6>(0).into_owned()),
+            velocity_m_per_s: self.velocity_m_per_s + delta.fixed_rows::<3>(6),
+            bias: ImuBias {
+                gyroscope_rad_per_s: self.bias.gyroscope_rad_per_s + delta.fixed_rows::<3>(9),
+                accelerometer_m_per_s2: self.bias.accelerometer_m_per_s2 + delta.fixed_rows::<3>(12),
+            },
+        }
+    }
+
+    /// `self ⊟ origin`.
+    pub fn minus(&self, origin: &Self) -> Vector15 {
+        let mut delta = Vector15::zeros();
+        delta.fixed_rows_mut::<6>(0).copy_from(&self.world_from_imu.minus(&origin.world_from_imu));
+        delta.fixed_rows_mut::<3>(6).copy_from(&(self.velocity_m_per_s - origin.velocity_m_per_s));
+        delta.fixed_rows_mut::<3>(9).copy_from(&(self.bias.gyroscope_rad_per_s - origin.bias.gyroscope_rad_per_s));
+        delta
+            .fixed_rows_mut::<3>(12)
+            .copy_from(&(self.bias.accelerometer_m_per_s2 - origin.bias.accelerometer_m_per_s2));
+        delta
+    }
+}
+
+/// Motion of the IMU over an interval, seen in its frame at the beginning, gravity and the first velocity left out.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MotionIncrement {
+    /// `imu_i_from_imu_j`.
+    pub rotation: UnitQuaternion<f64>,
+    /// `R_iᵀ (p_j − p_i − v_i T − g T²/2)` in metres.
+    pub position_m: Vector3<f64>,
+    /// `R_iᵀ (v_j − v_i − g T)` in m/s.
+    pub velocity_m_per_s: Vector3<f64>,
+}
+
+/// What the inertial samples of an interval say about the motion over it.
+#[derive(Clone, Debug)]
+pub struct Preintegration {
+    noise: ImuNoise,
+    samples: Vec<ImuSample>,
+    bias: ImuBias,
+    duration_s: f64,
+    increment: MotionIncrement,
+    bias_jacobian: BiasJacobian,
+    covariance: Matrix15,
+}
+
+impl Preintegration {
+    /// An empty interval, to be integrated around `bias`.
+    pub fn new(noise: ImuNoise, bias: ImuBias) -> Self {
+        Self {
+            noise,
+            samples: Vec::new(),
+            bias,
+            duration_s: 0.0,
+            increment: MotionIncrement {
+                rotation: UnitQuaternion::identity(),
+                position_m: Vector3::zeros(),
+                velocity_m_per_s: Vector3::zeros(),
+            },
+            bias_jacobian: BiasJacobian::zeros(),
+            covariance: Matrix15::zeros(),
+        }
+    }
+
+    /// The samples of one interval, both ends included.
+    pub fn from_samples(noise: ImuNoise, bias: ImuBias, samples: &[ImuSample]) -> Self {
+        let mut preintegration = Self::new(noise, bias);
+        preintegration.extend(samples);
+        preintegration
+    }
+
+    /// Appends the samples of the interval that follows; samples that do not lie later than the last one, or hold a number
+    /// that is not finite, are passed over.
+    pub fn extend(&mut self, samples: &[ImuSample]) {
+        for sample in samples {
+            let finite = sample.angular_velocity_rad_per_s.iter().all(|x| x.is_finite())
+                && sample.specific_force_m_per_s2.iter().all(|x| x.is_finite());
+            let later = self.samples.last().is_none_or(|last| sample.stamp_ns > last.stamp_ns);
+            if !finite || !later {
+                continue;
+            }
+            if let Some(last) = self.samples.last().copied() {
+                self.propagate(&last, sample);
+            }
+            self.samples.push(*sample);
+        }
+    }
+
+    /// Integrates the same samples again around another bias.
+    pub fn reintegrate(&mut self, bias: ImuBias) {
+        let samples = std::mem::take(&mut self.samples);
+        *self = Self::from_samples(self.noise, bias, &samples);
+    }
+
+    /// The samples.
+    pub fn samples(&self) -> &[ImuSample] {
+        &self.samples
+    }
+
+    /// The bias it was integrated around.
+    pub fn bias(&self) -> &ImuBias {
+        &self.bias
+    }
+
+    /// Length of the interval in seconds.
+    pub fn duration_s(&self) -> f64 {
+        self.duration_s
+    }
+
+    /// The motion at the bias it was integrated around.
+    pub fn increment(&self) -> &MotionIncrement {
+        &self.increment
+    }
+
+    /// First-order derivative of `[φ, p, v]` of the increment by `[b_g, b_a]`.
+    pub fn bias_jacobian(&self) -> &BiasJacobian {
+        &self.bias_jacobian
+    }
+
+    /// Covariance of `[φ, p, v, b_g, b_a]` over the interval; the bias blocks are their random walk.
+    pub fn covariance(&self) -> &Matrix15 {
+        &self.covariance
+    }
+
+    /// The motion at another bias, to first order in the difference.
+    pub fn corrected(&self, bias: &ImuBias) -> MotionIncrement {
+        let change = self.bias_change(bias);
+        let shift: SVector<f64, 9> = self.bias_jacobian * change;
+        MotionIncrement {
+            rotation: self.increment.rotation * so3::exp(&shift.fixed_rows::<3>(0).into_owned()),
+            position_m: self.increment.position_m + shift.fixed_rows::<3>(3),
+            velocity_m_per_s: self.increment.velocity_m_per_s + shift.fixed_rows::<3>(6),
+        }
+    }
+
+    /// `[b_g, b_a]` of `bias` against the one it was integrated around.
+    pub fn bias_change(&self, bias: &ImuBias) -> SVector<f64, 6> {
+        let mut change = SVector::<f64, 6>::zeros();
+        change.fixed_rows_mut::<3>(0).copy_from(&(bias.gyroscope_rad_per_s - self.bias.gyroscope_rad_per_s));
+        change.fixed_rows_mut::<3>(3).copy_from(&(bias.accelerometer_m_per_s2 - self.bias.accelerometer_m_per_s2));
+        change
+    }
+
+    /// The state at the end of the interval, from the one at its beginning.
+    pub fn predict(&self, start: &NavigationState, gravity_in_world: &Vector3<f64>) -> NavigationState {
+        let motion = self.corrected(&start.bias);
+        let t = self.duration_s;
+        let rotation = start.world_from_imu.rotation;
+        NavigationState {
+            world_from_imu: RigidTransform::new(
+                UnitQuaternion::new_normalize((rotation * motion.rotation).into_inner()),
+                start.world_from_imu.translation_m
+                    + start.velocity_m_per_s * t
+                    + gravity_in_world * (0.5 * t * t)
+                    + rotation * motion.position_m,
+            ),
+            velocity_m_per_s: start.velocity_m_per_s + gravity_in_world * t + rotation * motion.velocity_m_per_s,
+            bias: start.bias,
+        }
+    }
+
+    /// The upper triangular `W` with `Wᵀ W = covariance⁻¹`, `None` for an empty interval.
+    pub fn square_root_information(&self) -> Option<Matrix15> {
+        let lower = self.covariance.cholesky()?.unpack();
+        let inverse = lower.solve_lower_triangular(&Matrix15::identity())?;
+        inverse.iter().all(|x| x.is_finite()).then_some(inverse)
+    }
+
+    fn propagate(&mut self, from: &ImuSample, to: &ImuSample) {
+        let h = seconds_from_ns(to.stamp_ns - from.stamp_ns);
+        let w0 = from.angular_velocity_rad_per_s - self.bias.gyroscope_rad_per_s;
+        let w1 = to.angular_velocity_rad_per_s - self.bias.gyroscope_rad_per_s;
+        let a0 = from.specific_force_m_per_s2 - self.bias.accelerometer_m_per_s2;
+        let a1 = to.specific_force_m_per_s2 - self.bias.accelerometer_m_per_s2;
+        let a_half = (a0 + a1) * 0.5;
+
+        // Rotations over the first half and over the whole, second Magnus term included.
+        let w_half = (w0 + w1) * 0.5;
+        let phi_half = (w0 + w_half) * (0.25 * h) + w0.cross(&w_half) * (h * h / 48.0);
+        let phi = w_half * h + w0.cross(&w1) * (h * h / 12.0);
+        let turn_half = so3::exp(&phi_half);
+        let turn = so3::exp(&phi);
+
+        // Simpson's rule, in the frame at `from`.
+        let force_half = turn_half * a_half;
+        let force_end = turn * a1;
+        let dv = (a0 + force_half * 4.0 + force_end) * (h / 6.0);
+        let dp = (a0 + force_half * 2.0) * (h * h / 6.0);
+
+        let r = self.increment.rotation.to_rotation_matrix().into_inner();
+        let e_half: Matrix3<f64> = turn_half.to_rotation_matrix().into_inner();
+        let e: Matrix3<f64> = turn.to_rotation_matrix().into_inner();
+        // Derivatives of the step by a constant change of angular velocity and specific force over it.
+        let phi_by_w = so3::right_jacobian(&phi) * (Matrix3::identity() * h - so3::hat(&(w1 - w0)) * (h * h / 12.0));
+        let phi_half_by_w = so3::right_jacobian(&phi_half)
+            * (Matrix3::identity() * (0.5 * h) - so3::hat(&(w_half - w0)) * (h * h / 48.0));
+        let half_by_w = -(e_half * so3::hat(&a_half) * phi_half_by_w);
+        let end_by_w = -(e * so3::hat(&a1) * phi_by_w);
+        let dv_by_w = r * (half_by_w * 4.0 + end_by_w) * (h / 6.0);
+        let dp_by_w = r * half_by_w * (h * h / 3.0);
+        let dv_by_a = r * (Matrix3::identity() + e_half * 4.0 + e) * (h / 6.0);
+        let dp_by_a = r * (Matrix3::identity() + e_half * 2.0) * (h * h / 6.0);
+        let turn_back = e.transpose();
+        let dv_by_phi = -(r * so3::hat(&dv));
+        let dp_by_phi = -(r * so3::hat(&dp));
+
+        self.propagate_bias_jacobian(
+            h,
+            &turn_back,
+            [&dp_by_phi, &dv_by_phi],
+            [&phi_by_w, &dp_by_w, &dv_by_w],
+            [&dp_by_a, &dv_by_a],
+        );
+
+        let mut transition = Matrix15::identity();
+        transition.fixed_view_mut::<3, 3>(0, 0).copy_from(&turn_back);
+        transition.fixed_view_mut::<3, 3>(0, 9).copy_from(&-phi_by_w);
+        transition.fixed_view_mut::<3, 3>(3, 0).copy_from(&dp_by_phi);
+        transition.fixed_view_mut::<3, 3>(3, 6).copy_from(&(Matrix3::identity() * h));
+        transition.fixed_view_mut::<3, 3>(3, 9).copy_from(&-dp_by_w);
+        transition.fixed_view_mut::<3, 3>(3, 12).copy_from(&-dp_by_a);
+        transition.fixed_view_mut::<3, 3>(6, 0).copy_from(&dv_by_phi);
+        transition.fixed_view_mut::<3, 3>(6, 9).copy_from(&-dv_by_w);
+        transition.fixed_view_mut::<3, 3>(6, 12).copy_from(&-dv_by_a);
+        self.covariance = transition * self.covariance * transition.transpose();
+        self.add_noise(h, &phi_by_w, &dp_by_w, &dv_by_w);
+
+        self.increment.position_m += self.increment.velocity_m_per_s * h + r * dp;
+        self.increment.velocity_m_per_s += r * dv;
+        self.increment.rotation = UnitQuaternion::new_normalize((self.increment.rotation * turn).into_inner());
+        self.duration_s += h;
+    }
+
+    fn propagate_bias_jacobian(
+        &mut self,
+        h: f64,
+        turn_back: &Matrix3<f64>,
+        [dp_by_phi, dv_by_phi]: [&Matrix3<f64>; 2],
+        [phi_by_w, dp_by_w, dv_by_w]: [&Matrix3<f64>; 3],
+        [dp_by_a, dv_by_a]: [&Matrix3<f64>; 2],
+    ) {
+        let j = &mut self.bias_jacobian;
+        let phi_by_bg: Matrix3<f64> = j.fixed_view::<3, 3>(0, 0).into_owned();
+        let v_by_bg: Matrix3<f64> = j.fixed_view::<3, 3>(6, 0).into_owned();
+        let v_by_ba: Matrix3<f64> = j.fixed_view::<3, 3>(6, 3).into_owned();
+        let mut p_by_bg = j.fixed_view_mut::<3, 3>(3, 0);
+        p_by_bg += v_by_bg * h + dp_by_phi * phi_by_bg - dp_by_w;
+        let mut p_by_ba = j.fixed_view_mut::<3, 3>(3, 3);
+        p_by_ba += v_by_ba * h - dp_by_a;
+        let mut v_by_bg = j.fixed_view_mut::<3, 3>(6, 0);
+        v_by_bg += dv_by_phi * phi_by_bg - dv_by_w;
+        let mut v_by_ba = j.fixed_view_mut::<3, 3>(6, 3);
+        v_by_ba -= dv_by_a;
+        j.fixed_view_mut::<3, 3>(0, 0).copy_from(&(turn_back * phi_by_bg - phi_by_w));
+    }
+
+    /// White noise and random walk of one sample interval, from the continuous densities.
+    fn add_noise(&mut self, h: f64, phi_by_w: &Matrix3<f64>, dp_by_w: &Matrix3<f64>, dv_by_w: &Matrix3<f64>) {
+        let square = |density: f64| density * density;
+        let gyro = square(self.noise.gyroscope_noise_density) / h;
+        let accel = square(self.noise.accelerometer_noise_density);
+        let mut by_w = SMatrix::<f64, 9, 3>::zeros();
+        by_w.fixed_view_mut::<3, 3>(0, 0).copy_from(phi_by_w);
+        by_w.fixed_view_mut::<3, 3>(3, 0).copy_from(dp_by_w);
+        by_w.fixed_view_mut::<3, 3>(6, 0).copy_from(dv_by_w);
+        let mut motion = self.covariance.fixed_view_mut::<9, 9>(0, 0);
+        motion += by_w * by_w.transpose() * gyro;
+        // White specific force over the interval moves velocity and position together; the rotation leaves it isotropic.
+        for axis in 0..3 {
+            self.covariance[(3 + axis, 3 + axis)] += accel * h * h * h / 3.0;
+            self.covariance[(3 + axis, 6 + axis)] += accel * h * h / 2.0;
+            self.covariance[(6 + axis, 3 + axis)] += accel * h * h / 2.0;
+            self.covariance[(6 + axis, 6 + axis)] += accel * h;
+            self.covariance[(9 + axis, 9 + axis)] += square(self.noise.gyroscope_random_walk) * h;
+            self.covariance[(12 + axis, 12 + axis)] += square(self.noise.accelerometer_random_walk) * h;
+        }
+    }
+}
