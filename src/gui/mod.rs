@@ -32,6 +32,27 @@ pub struct Selection {
     pub parameter: Option<String>,
     /// The run that single-run panels show.
     pub run: usize,
+    /// The stretch of time that plots show, begin and end since the log began; `None` for the whole log.
+    pub visible_ns: Option<(i64, i64)>,
+}
+
+/// How the cursor moves.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Playback {
+    /// Whether it runs.
+    pub playing: bool,
+    /// How fast, in log seconds per second.
+    pub speed: f64,
+    /// The range that is played over and over, since the log began.
+    pub loop_range_ns: Option<(i64, i64)>,
+    /// Marked instants, in time order.
+    pub markers_ns: Vec<i64>,
+}
+
+impl Default for Playback {
+    fn default() -> Self {
+        Self { playing: false, speed: 1.0, loop_range_ns: None, markers_ns: Vec::new() }
+    }
 }
 
 /// What every panel is given to draw.
@@ -40,6 +61,8 @@ pub struct PanelContext<'a> {
     pub recording: &'a Recording,
     /// Where the cursor stands, since the log began; panels show the last value at or before it.
     pub cursor_ns: i64,
+    /// How the cursor moves.
+    pub playback: &'a Playback,
     /// Images.
     pub images: &'a mut dyn ImageSource,
     /// The linked selection, which a panel may change.
