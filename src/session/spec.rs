@@ -1,3 +1,6 @@
+use std::fmt;
+use std::str::FromStr;
+
 use thiserror::Error;
 
 /// Which parameterization a run estimates in.
@@ -17,10 +20,39 @@ pub enum ParameterizationChoice {
     Static,
 }
 
+/// Names on the command line, in the order in which they are offered.
+const NAMES: [(&str, ParameterizationChoice); 6] = [
+    ("auto", ParameterizationChoice::Auto),
+    ("minimal", ParameterizationChoice::Minimal),
+    ("minimal-swapped", ParameterizationChoice::MinimalSwapped),
+    ("classical", ParameterizationChoice::Classical),
+    ("poe", ParameterizationChoice::Poe),
+    ("static", ParameterizationChoice::Static),
+];
+
+/// Smallest and largest window that makes sense: two keyframes give no parallax to spare, and beyond thirty the dense
+/// solve leaves real time far behind.
+const WINDOW_RANGE: std::ops::RangeInclusive<usize> = 4..=30;
+
+/// Keyframes in the window unless the specification says otherwise, as in the paper.
+const DEFAULT_WINDOW: usize = 10;
+
+impl ParameterizationChoice {
+    /// The name on the command line.
+    pub fn name(self) -> &'static str {
+        NAMES.iter().find(|(_, choice)| *choice == self).map_or("auto", |(name, _)| name)
+    }
+
+    /// Every choice with its name, in the order in which they are offered.
+    pub fn all() -> impl Iterator<Item = (&'static str, Self)> {
+        NAMES.into_iter()
+    }
+}
+
 /// One `--run NAME[:key=value,…]`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunSpec {
-    /// Its name on screen and as a folder: `name=…`, or the spec as written.
+    /// Its name on screen and as a folder: `name=…`, or the specification as written.
     pub label: String,
     /// The parameterization.
     pub parameterization: ParameterizationChoice,
@@ -30,6 +62,22 @@ pub struct RunSpec {
     pub calibrate: bool,
     /// Number of keyframes in the window (`window=10`).
     pub window: usize,
+    /// Camera to watch (`camera=cam1`); `None` is the gimballed one, or the first rigid one for `static` and for rigs
+    /// without a gimbal.
+    pub camera_key: Option<String>,
+}
+
+impl Default for RunSpec {
+    fn default() -> Self {
+        Self {
+            label: "auto".to_owned(),
+            parameterization: ParameterizationChoice::Auto,
+            encoder: true,
+            calibrate: true,
+            window: DEFAULT_WINDOW,
+            camera_key: None,
+        }
+    }
 }
 
 /// Why a run specification was refused.
@@ -49,4 +97,99 @@ pub enum RunSpecError {
         /// What is wrong with it, and what was expected.
         problem: String,
     },
+}
+
+impl FromStr for RunSpec {
+    type Err = RunSpecError;
+
+    fn from_str(spec: &str) -> Result<Self, RunSpecError> {
+        let (name, options) = spec.split_once(':').map_or((spec, ""), |(name, options)| (name, options));
+        let parameterization = NAMES
+            .iter()
+            .find(|(known, _)| *known == name)
+            .map(|(_, choice)| *choice)
+            .ok_or_else(|| RunSpecError::UnknownName { name: name.to_owned() })?;
+        let bad = |problem: String| RunSpecError::BadOption { spec: spec.to_owned(), problem };
+        let mut run = Self { label: folder_name(spec), parameterization, ..Self::default() };
+        for option in options.split(',').filter(|option| !option.is_empty()) {
+            let (key, value) = option
+                .split_once('=')
+                .ok_or_else(|| bad(format!("'{option}' has no value; write key=value, as in encoder=off")))?;
+            match key {
+                "encoder" => run.encoder = on_or_off(value).map_err(|problem| bad(format!("encoder: {problem}")))?,
+                "calibrate" => {
+                    run.calibrate = on_or_off(value).map_err(|problem| bad(format!("calibrate: {problem}")))?;
+                }
+                "window" => {
+                    run.window =
+                        value.parse().ok().filter(|window| WINDOW_RANGE.contains(window)).ok_or_else(|| {
+                            let (low, high) = (WINDOW_RANGE.start(), WINDOW_RANGE.end());
+                            bad(format!("window is '{value}', expected a number from {low} to {high}"))
+                        })?;
+                }
+                "camera" => run.camera_key = Some(value.to_owned()),
+                "name" if folder_name(value) == value && !value.is_empty() => run.label = value.to_owned(),
+                "name" => {
+                    return Err(bad(format!("name is '{value}', expected letters, digits, '-', '_' and '.' only")));
+                }
+                _ => {
+                    let known = "encoder, calibrate, window, camera, name";
+                    return Err(bad(format!("unknown key '{key}', expected one of {known}")));
+                }
+            }
+        }
+        Ok(run)
+    }
+}
+
+impl fmt::Display for RunSpec {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let standard = Self::default();
+        let mut options = Vec::new();
+        if !self.encoder {
+            options.push("encoder=off".to_owned());
+        }
+        if !self.calibrate {
+            options.push("calibrate=off".to_owned());
+        }
+        if self.window != standard.window {
+            options.push(format!("window={}", self.window));
+        }
+        options.extend(self.camera_key.iter().map(|key| format!("camera={key}")));
+        let name = self.parameterization.name();
+        let written = if options.is_empty() { name.to_owned() } else { format!("{name}:{}", options.join(",")) };
+        if self.label != folder_name(&written) {
+            options.push(format!("name={}", self.label));
+        }
+        if options.is_empty() { formatter.write_str(name) } else { write!(formatter, "{name}:{}", options.join(",")) }
+    }
+}
+
+/// The text with everything that a folder's name should not hold replaced by `-`; never empty, `.` or `..`.
+fn folder_name(text: &str) -> String {
+    let clean: String = text
+        .chars()
+        .map(|letter| if letter.is_ascii_alphanumeric() || "-_.".contains(letter) { letter } else { '-' })
+        .collect();
+    if clean.trim_matches('.').is_empty() { "run".to_owned() } else { clean }
+}
+
+fn on_or_off(value: &str) -> Result<bool, String> {
+    match value {
+        "on" => Ok(true),
+        "off" => Ok(false),
+        _ => Err(format!("it is '{value}', expected on or off")),
+    }
+}
+
+/// Makes the labels of several runs differ, by a number behind the later ones.
+pub fn distinct_labels(specs: &mut [RunSpec]) {
+    for index in 1..specs.len() {
+        let wanted = specs[index].label.clone();
+        let mut number = 2;
+        while specs[..index].iter().any(|earlier| earlier.label == specs[index].label) {
+            specs[index].label = format!("{wanted}-{number}");
+            number += 1;
+        }
+    }
 }

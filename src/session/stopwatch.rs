@@ -1,0 +1,20 @@
+use std::time::Instant;
+
+/// Times the stages of a step; the timings of a report are the only part of it that differs between replays.
+#[derive(Clone, Copy, Debug)]
+pub struct Stopwatch {
+    begin: Instant,
+}
+
+impl Stopwatch {
+    /// Starts it.
+    #[expect(clippy::disallowed_methods, reason = "stage timings are measured; nothing is computed from them")]
+    pub fn start() -> Self {
+        Self { begin: Instant::now() }
+    }
+
+    /// Milliseconds since the start.
+    pub fn elapsed_ms(&self) -> f64 {
+        self.begin.elapsed().as_secs_f64() * 1e3
+    }
+}

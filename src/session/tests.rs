@@ -1,0 +1,69 @@
+use nalgebra::{UnitQuaternion, Vector3};
+
+use super::accuracy::{Alignment, AlignmentSums};
+use super::spec::distinct_labels;
+use super::{ParameterizationChoice, RunSpec, RunSpecError};
+
+/// The specification, and its message when it is refused.
+fn parse(text: &str) -> Result<RunSpec, String> {
+    text.parse().map_err(|error: RunSpecError| error.to_string())
+}
+
+#[test]
+fn run_specifications_are_read_and_written() {
+    let run = parse("classical:encoder=off,window=8,name=left").unwrap();
+    assert_eq!(run.parameterization, ParameterizationChoice::Classical);
+    assert_eq!((run.encoder, run.calibrate, run.window, run.label.as_str()), (false, true, 8, "left"));
+    for text in
+        ["auto", "static", "minimal:calibrate=off", "classical:encoder=off,window=8,name=left", "poe:camera=cam1"]
+    {
+        let run = parse(text).unwrap();
+        assert_eq!(parse(&run.to_string()).unwrap(), run, "{text} is written as {run}");
+    }
+}
+
+#[test]
+fn refused_specifications_say_what_was_expected() {
+    let check = |text: &str, words: &[&str]| {
+        let message = parse(text).unwrap_err();
+        assert!(words.iter().all(|word| message.contains(word)), "{text}: {message}");
+    };
+    check("minimol", &["minimol", "minimal-swapped"]);
+    check("auto:encoder=maybe", &["encoder", "maybe", "on or off"]);
+    check("auto:window=2", &["window", "'2'", "4 to 30"]);
+    check("auto:speed=3", &["unknown key 'speed'", "calibrate"]);
+    check("auto:encoder", &["no value"]);
+    check("auto:name=../x", &["name", "letters"]);
+}
+
+#[test]
+fn labels_are_folders_and_differ() {
+    let mut runs =
+        vec![parse("auto").unwrap(), parse("auto").unwrap(), parse("static").unwrap(), parse("auto").unwrap()];
+    distinct_labels(&mut runs);
+    let labels: Vec<&str> = runs.iter().map(|run| run.label.as_str()).collect();
+    assert_eq!(labels, ["auto", "auto-2", "static", "auto-3"]);
+    assert_eq!(parse("minimal:calibrate=off").unwrap().label, "minimal-calibrate-off");
+}
+
+#[test]
+fn alignment_finds_yaw_shift_and_scale_again() {
+    let yaw = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 2.1);
+    let shift = Vector3::new(3.0, -2.0, 0.7);
+    let check = |alignment: Alignment, rotation: UnitQuaternion<f64>, scale: f64| {
+        let mut sums = AlignmentSums::default();
+        for step in 0..50 {
+            let time = f64::from(step) * 0.3;
+            let estimate = Vector3::new(time.sin(), (1.7 * time).cos() * 2.0, 0.4 * (0.9 * time).sin());
+            sums.add(&estimate, &(rotation * estimate * scale + shift));
+        }
+        let found = sums.solve(alignment).unwrap();
+        assert!(found.rigid.rotation.angle_to(&rotation) < 1e-9, "{alignment:?}");
+        assert!((found.rigid.translation_m - shift).norm() < 1e-9, "{alignment:?}");
+        assert!((found.scale - scale).abs() < 1e-9, "{alignment:?}");
+    };
+    check(Alignment::YawPosition, yaw, 1.0);
+    check(Alignment::Rigid, UnitQuaternion::from_euler_angles(0.3, -0.5, 2.0), 1.0);
+    check(Alignment::Similarity, UnitQuaternion::from_euler_angles(0.3, -0.5, 2.0), 1.3);
+    assert!(AlignmentSums::default().solve(Alignment::YawPosition).is_none());
+}
