@@ -1,1 +1,3 @@
-//! Integration tests
+//! Integration tests, a module per feature.
+
+mod evaluate;

@@ -1,0 +1,166 @@
+//! `dcvins evaluate`: absolute and relative trajectory errors of one TUM file against another.
+
+use std::fmt;
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::error::ExportError;
+use super::trajectory::read_tum;
+use crate::session::accuracy::{
+    Alignment, ErrorStatistics, RelativeDelta, absolute_errors_m, align, associate, path_length_m, relative_errors,
+};
+
+/// How to compare two trajectories; the defaults are those of `evo_ape tum --align` and `evo_rpe tum --align`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EvaluationOptions {
+    /// How the estimate is laid on the reference.
+    pub alignment: Alignment,
+    /// Length of the stretches of the relative error.
+    pub delta: RelativeDelta,
+    /// Largest difference of two stamps that count as the same instant.
+    pub max_difference_s: f64,
+}
+
+impl Default for EvaluationOptions {
+    fn default() -> Self {
+        Self { alignment: Alignment::Rigid, delta: RelativeDelta::Frames(1), max_difference_s: 0.01 }
+    }
+}
+
+/// Statistics as written to JSON.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Statistics {
+    /// Root of the mean square.
+    pub rmse: f64,
+    /// Mean.
+    pub mean: f64,
+    /// Median.
+    pub median: f64,
+    /// Standard deviation.
+    pub std: f64,
+    /// Smallest.
+    pub min: f64,
+    /// Largest.
+    pub max: f64,
+}
+
+impl From<ErrorStatistics> for Statistics {
+    fn from(statistics: ErrorStatistics) -> Self {
+        let ErrorStatistics { count: _, rmse, mean, median, std, min, max } = statistics;
+        Self { rmse, mean, median, std, min, max }
+    }
+}
+
+/// What the comparison found.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct EvaluationReport {
+    /// `none`, `yaw+position`, `se3` or `sim3`.
+    pub alignment: &'static str,
+    /// Poses that had a partner.
+    pub pairs: usize,
+    /// Poses of the estimate.
+    pub estimate_poses: usize,
+    /// Poses of the reference.
+    pub reference_poses: usize,
+    /// Path of the reference over the pairs, in metres.
+    pub reference_length_m: f64,
+    /// Scale that the alignment applied.
+    pub scale: f64,
+    /// Absolute error, in metres.
+    pub ate_m: Statistics,
+    /// Relative error, translation, in metres.
+    pub rpe_translation_m: Statistics,
+    /// Relative error, rotation, in degrees.
+    pub rpe_rotation_deg: Statistics,
+    /// Stretches of the relative error.
+    pub rpe_pairs: usize,
+}
+
+/// The name of an alignment in files.
+pub(super) fn alignment_name(alignment: Alignment) -> &'static str {
+    match alignment {
+        Alignment::None => "none",
+        Alignment::YawPosition => "yaw+position",
+        Alignment::Rigid => "se3",
+        Alignment::Similarity => "sim3",
+    }
+}
+
+/// Compares two TUM files.
+pub fn evaluate(
+    estimate: &Path,
+    reference: &Path,
+    options: &EvaluationOptions,
+) -> Result<EvaluationReport, ExportError> {
+    let estimate_poses = read_tum(estimate)?;
+    let reference_poses = read_tum(reference)?;
+    let pairs = associate(&estimate_poses, &reference_poses, options.max_difference_s);
+    let not_comparable = |problem: String| ExportError::NotComparable { problem };
+    if pairs.is_empty() {
+        return Err(not_comparable(format!(
+            "no stamps within {} s of each other: the estimate covers {:.3} to {:.3} s, the reference {:.3} to {:.3} s; \
+             give a larger --max-difference or check the clocks",
+            options.max_difference_s,
+            estimate_poses[0].stamp_s,
+            estimate_poses[estimate_poses.len() - 1].stamp_s,
+            reference_poses[0].stamp_s,
+            reference_poses[reference_poses.len() - 1].stamp_s,
+        )));
+    }
+    let transform = align(&pairs, options.alignment).ok_or_else(|| {
+        not_comparable(format!(
+            "{} common poses do not fix an alignment '{}'; try --align none",
+            pairs.len(),
+            alignment_name(options.alignment)
+        ))
+    })?;
+    let (translations, rotations) = relative_errors(&pairs, &transform, options.delta);
+    let rotations_deg: Vec<f64> = rotations.iter().map(|angle| angle.to_degrees()).collect();
+    let too_short = || not_comparable("the trajectory is shorter than one --delta; give a smaller one".to_owned());
+    let ate = ErrorStatistics::of(&absolute_errors_m(&pairs, &transform)).ok_or_else(too_short)?;
+    let rpe_translation = ErrorStatistics::of(&translations).ok_or_else(too_short)?;
+    let rpe_rotation = ErrorStatistics::of(&rotations_deg).ok_or_else(too_short)?;
+    Ok(EvaluationReport {
+        alignment: alignment_name(options.alignment),
+        pairs: pairs.len(),
+        estimate_poses: estimate_poses.len(),
+        reference_poses: reference_poses.len(),
+        reference_length_m: path_length_m(pairs.iter().map(|(_, reference)| &reference.pose.translation_m)),
+        scale: transform.scale,
+        ate_m: ate.into(),
+        rpe_translation_m: rpe_translation.into(),
+        rpe_rotation_deg: rpe_rotation.into(),
+        rpe_pairs: translations.len(),
+    })
+}
+
+impl fmt::Display for EvaluationReport {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            formatter,
+            "{} pairs of {} and {} poses, reference {:.2} m, alignment {}{}",
+            self.pairs,
+            self.estimate_poses,
+            self.reference_poses,
+            self.reference_length_m,
+            self.alignment,
+            if self.alignment == "sim3" { format!(", scale {:.6}", self.scale) } else { String::new() }
+        )?;
+        writeln!(
+            formatter,
+            "{:<24}{:>12}{:>12}{:>12}{:>12}{:>12}{:>12}",
+            "", "rmse", "mean", "median", "std", "min", "max"
+        )?;
+        let rows = [
+            ("ATE (m)", &self.ate_m),
+            ("RPE translation (m)", &self.rpe_translation_m),
+            ("RPE rotation (deg)", &self.rpe_rotation_deg),
+        ];
+        for (name, row) in rows {
+            let Statistics { rmse, mean, median, std, min, max } = row;
+            writeln!(formatter, "{name:<24}{rmse:>12.6}{mean:>12.6}{median:>12.6}{std:>12.6}{min:>12.6}{max:>12.6}")?;
+        }
+        Ok(())
+    }
+}
