@@ -18,3 +18,10 @@ fn the_sample_is_consistent() {
     let image = sample_images().image("cam0", step.report.frame_index).expect("an image");
     assert_eq!(image.pixels.len(), image.width * image.height);
 }
+
+/// Keeps a picture for looking at, in the folder that the variable `DCVINS_PICTURES` names.
+pub(crate) fn keep_picture(name: &str, picture: &image::RgbaImage) {
+    if let Some(folder) = std::env::var_os("DCVINS_PICTURES") {
+        picture.save(std::path::Path::new(&folder).join(format!("{name}.png"))).unwrap();
+    }
+}

@@ -1,0 +1,126 @@
+//! Runs a piece of user interface without a window and paints it on the CPU.
+
+use egui::{RawInput, Rect, TexturesDelta, Ui, Vec2, ViewportId, ViewportInfo};
+use image::RgbaImage;
+
+use super::painter::Painter;
+use super::theme::{Theme, ThemeName};
+
+/// Frames that run before the picture: layouts, scroll areas and plot bounds settle.
+const SETTLING_FRAMES: usize = 3;
+/// Seconds between two frames, long enough for every animation to end.
+const FRAME_TIME_S: f64 = 1.0;
+
+/// How large and in which theme.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HeadlessOptions {
+    /// Width and height of the picture in pixels.
+    pub size_px: [u32; 2],
+    /// Pixels per point: 1 as on an ordinary screen, 2 for print.
+    pub pixels_per_point: f32,
+    /// Colours.
+    pub theme: ThemeName,
+}
+
+/// What a frame left to paint.
+pub struct Frame {
+    /// Meshes, in points.
+    pub primitives: Vec<egui::ClippedPrimitive>,
+    /// Textures that changed.
+    pub textures: TexturesDelta,
+}
+
+/// An egui context without a window; fonts are egui's own, never the system's.
+pub struct Headless {
+    context: egui::Context,
+    options: HeadlessOptions,
+    frame_count: usize,
+}
+
+impl Headless {
+    /// A fresh context in the theme of the options.
+    pub fn new(options: HeadlessOptions) -> Self {
+        let context = egui::Context::default();
+        Theme::of(options.theme).apply(&context);
+        Self { context, options, frame_count: 0 }
+    }
+
+    /// The context, for setting it up before the first frame.
+    pub fn context(&self) -> &egui::Context {
+        &self.context
+    }
+
+    /// Runs one frame with input events.
+    pub fn frame(&mut self, events: Vec<egui::Event>, ui: impl FnMut(&mut Ui)) -> Frame {
+        let scale = self.options.pixels_per_point;
+        let size = Vec2::new(self.options.size_px[0] as f32, self.options.size_px[1] as f32) / scale;
+        let viewport = ViewportInfo { native_pixels_per_point: Some(scale), ..ViewportInfo::default() };
+        let input = RawInput {
+            screen_rect: Some(Rect::from_min_size(egui::Pos2::ZERO, size)),
+            viewports: std::iter::once((ViewportId::ROOT, viewport)).collect(),
+            max_texture_side: Some(8192),
+            time: Some(self.frame_count as f64 * FRAME_TIME_S),
+            focused: true,
+            events,
+            ..RawInput::default()
+        };
+        self.frame_count += 1;
+        let output = self.context.run_ui(input, ui);
+        let primitives = self.context.tessellate(output.shapes, output.pixels_per_point);
+        Frame { primitives, textures: output.textures_delta }
+    }
+
+    /// Runs the interface until it has settled and paints it over the theme's ground.
+    pub fn picture(&mut self, painter: &mut Painter, mut ui: impl FnMut(&mut Ui)) -> RgbaImage {
+        for _ in 1..SETTLING_FRAMES {
+            let mut frame = self.frame(Vec::new(), &mut ui);
+            painter.set_textures(&frame.textures);
+            painter.free_textures(&frame.textures);
+            frame.textures.clear();
+        }
+        let mut frame = self.frame(Vec::new(), &mut ui);
+        painter.set_textures(&frame.textures);
+        let background = Theme::of(self.options.theme).background;
+        let image = painter.paint(&frame.primitives, self.options.size_px, self.options.pixels_per_point, background);
+        painter.free_textures(&frame.textures);
+        frame.textures.clear();
+        image
+    }
+}
+
+/// One picture of a piece of user interface.
+pub fn draw(options: HeadlessOptions, ui: impl FnMut(&mut Ui)) -> RgbaImage {
+    Headless::new(options).picture(&mut Painter::new(), ui)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gui::tests::keep_picture;
+
+    fn options(theme: ThemeName, scale: f32) -> HeadlessOptions {
+        HeadlessOptions { size_px: [(200.0 * scale) as u32, (60.0 * scale) as u32], pixels_per_point: scale, theme }
+    }
+
+    fn text_ui(ui: &mut Ui) {
+        ui.label("ρ = 0.25 px, χ² 1.2, ±3σ");
+        let _ = ui.button("⏵ Play");
+    }
+
+    #[test]
+    fn pictures_are_repeatable_opaque_and_show_text() {
+        for theme in [ThemeName::Dark, ThemeName::Light, ThemeName::Print] {
+            for scale in [1.0, 1.5, 2.0] {
+                let options = options(theme, scale);
+                let image = draw(options, text_ui);
+                keep_picture(&format!("text-{}-{scale}", theme.as_str()), &image);
+                assert_eq!([image.width(), image.height()], options.size_px);
+                assert!(image == draw(options, text_ui), "two pictures differ");
+                assert!(image.pixels().all(|pixel| pixel.0[3] == 255));
+                let ground = Theme::of(theme).background.to_array();
+                let inked = image.pixels().filter(|pixel| pixel.0 != ground).count();
+                assert!(inked > 400, "{inked} pixels of ink");
+            }
+        }
+    }
+}

@@ -1,0 +1,100 @@
+//! Arithmetic on packed premultiplied pixels: red in the lowest byte, alpha in the highest.
+
+/// Two of the four channels, with room to carry.
+const LANES: u32 = 0x00ff_00ff;
+
+/// Packs red, green, blue, alpha.
+pub(super) const fn pack(rgba: [u8; 4]) -> u32 {
+    u32::from_le_bytes(rgba)
+}
+
+/// Red, green, blue, alpha of a packed pixel.
+pub(super) const fn unpack(pixel: u32) -> [u8; 4] {
+    pixel.to_le_bytes()
+}
+
+/// `source + below · (1 − source alpha)`, each channel rounded and held at 255.
+#[inline]
+pub(super) fn over(below: u32, source: u32) -> u32 {
+    let keep = 255 - (source >> 24);
+    let red_blue = (source & LANES) + scale_lanes(below & LANES, keep);
+    let green_alpha = ((source >> 8) & LANES) + scale_lanes((below >> 8) & LANES, keep);
+    saturate(red_blue) | (saturate(green_alpha) << 8)
+}
+
+/// Each channel times `factor / 255`, rounded.
+#[inline]
+pub(super) fn scale(pixel: u32, factor: u32) -> u32 {
+    scale_lanes(pixel & LANES, factor) | (scale_lanes((pixel >> 8) & LANES, factor) << 8)
+}
+
+/// Channel by channel `a · b / 255`, rounded.
+#[inline]
+pub(super) fn multiply(a: u32, b: u32) -> u32 {
+    let (a, b) = (unpack(a), unpack(b));
+    let mut product = [0; 4];
+    for channel in 0..4 {
+        let exact = u32::from(a[channel]) * u32::from(b[channel]) + 128;
+        product[channel] = ((exact + (exact >> 8)) >> 8) as u8;
+    }
+    pack(product)
+}
+
+/// `a + (b − a) · weight / 256` for each channel, rounded; `weight` is 0 to 256.
+#[inline]
+pub(super) fn mix(a: u32, b: u32, weight: u32) -> u32 {
+    const HALF: u32 = 0x0080_0080;
+    let rest = 256 - weight;
+    let red_blue = ((a & LANES) * rest + (b & LANES) * weight + HALF) >> 8;
+    let green_alpha = ((a >> 8) & LANES) * rest + ((b >> 8) & LANES) * weight + HALF;
+    (red_blue & LANES) | (green_alpha & !LANES)
+}
+
+/// Two lanes times `factor / 255`, rounded exactly.
+#[inline]
+fn scale_lanes(lanes: u32, factor: u32) -> u32 {
+    let exact = lanes * factor + 0x0080_0080;
+    ((exact + ((exact >> 8) & LANES)) >> 8) & LANES
+}
+
+/// Holds each of two lanes (at most 510) at 255.
+#[inline]
+fn saturate(lanes: u32) -> u32 {
+    let carry = lanes & 0x0100_0100;
+    (lanes | (carry - (carry >> 8))) & LANES
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn channels_are_rounded_exactly() {
+        for a in 0..=255_u32 {
+            for b in 0..=255_u32 {
+                let exact = (f64::from(a * b) / 255.0).round() as u8;
+                let (grey, factor) = (pack([a as u8; 4]), pack([b as u8; 4]));
+                assert_eq!(unpack(scale(grey, b)), [exact; 4], "{a} scaled by {b}");
+                assert_eq!(unpack(multiply(grey, factor)), [exact; 4], "{a} times {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn over_is_premultiplied_and_never_wraps() {
+        let ground = pack([10, 200, 255, 255]);
+        assert_eq!(over(ground, 0), ground);
+        assert_eq!(over(ground, pack([1, 2, 3, 255])), pack([1, 2, 3, 255]));
+        assert_eq!(unpack(over(ground, pack([64, 0, 0, 128]))), [69, 100, 127, 255]);
+        // Additive light: colour without alpha.
+        assert_eq!(unpack(over(ground, pack([100, 100, 100, 0]))), [110, 255, 255, 255]);
+    }
+
+    #[test]
+    fn mix_hits_both_ends() {
+        let (a, b) = (pack([0, 10, 250, 255]), pack([255, 20, 50, 0]));
+        assert_eq!(mix(a, b, 0), a);
+        assert_eq!(mix(a, b, 256), b);
+        assert_eq!(unpack(mix(a, b, 128)), [128, 15, 150, 128]);
+    }
+}

@@ -1,0 +1,175 @@
+//! Textures as egui hands them over, and how a pixel is looked up in them.
+
+use std::collections::BTreeMap;
+
+use egui::epaint::textures::{TextureFilter, TextureOptions, TextureWrapMode};
+use egui::epaint::{ImageData, ImageDelta};
+use egui::{Color32, TextureId, TexturesDelta};
+
+use super::blend;
+
+/// Fractional bits of a texel coordinate.
+pub(super) const TEXEL_BITS: u32 = 32;
+
+/// All textures by id.
+#[derive(Default)]
+pub(super) struct TextureStore {
+    textures: BTreeMap<TextureId, Texture>,
+}
+
+impl TextureStore {
+    pub(super) fn get(&self, id: TextureId) -> Option<&Texture> {
+        self.textures.get(&id)
+    }
+
+    pub(super) fn set(&mut self, delta: &TexturesDelta) {
+        // The textures do not depend on each other, so the order of the ids does not matter.
+        let mut ids: Vec<TextureId> = delta.set.keys().copied().collect();
+        ids.sort_unstable();
+        for id in ids {
+            for change in delta.set.get(&id).into_iter().flatten() {
+                self.change(id, change);
+            }
+        }
+    }
+
+    pub(super) fn free(&mut self, delta: &TexturesDelta) {
+        self.textures.retain(|id, _| !delta.free.contains(id));
+    }
+
+    fn change(&mut self, id: TextureId, delta: &ImageDelta) {
+        let ImageData::Color(image) = &delta.image;
+        let Some([left, top]) = delta.pos else {
+            self.textures.insert(id, Texture::new(image.size, &image.pixels, delta.options));
+            return;
+        };
+        let Some(texture) = self.textures.get_mut(&id) else { return };
+        texture.options = delta.options;
+        let width = image.width().min(texture.width.saturating_sub(left));
+        for (row, texels) in image.pixels.chunks_exact(image.width().max(1)).enumerate() {
+            if top + row >= texture.height {
+                break;
+            }
+            let start = (top + row) * texture.width + left;
+            for (texel, color) in texture.texels[start..start + width].iter_mut().zip(texels) {
+                *texel = blend::pack(color.to_array());
+            }
+            texture.kind = texture.kind.joined(TexelKind::of(&texels[..width]));
+        }
+    }
+}
+
+/// What all texels have in common.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum TexelKind {
+    /// Four equal channels: a coverage, as in the font atlas.
+    Coverage,
+    /// Alpha 255: an image.
+    Opaque,
+    /// Anything.
+    Mixed,
+}
+
+impl TexelKind {
+    fn of(texels: &[Color32]) -> Self {
+        let is_coverage = |color: &Color32| color.to_array() == [color.a(); 4];
+        if texels.iter().all(is_coverage) {
+            Self::Coverage
+        } else if texels.iter().all(|color| color.a() == 255) {
+            Self::Opaque
+        } else {
+            Self::Mixed
+        }
+    }
+
+    fn joined(self, other: Self) -> Self {
+        if self == other { self } else { Self::Mixed }
+    }
+}
+
+/// One texture.
+pub(super) struct Texture {
+    pub(super) width: usize,
+    pub(super) height: usize,
+    pub(super) kind: TexelKind,
+    options: TextureOptions,
+    texels: Vec<u32>,
+}
+
+impl Texture {
+    fn new(size: [usize; 2], pixels: &[Color32], options: TextureOptions) -> Self {
+        let texels = pixels.iter().map(|color| blend::pack(color.to_array())).collect();
+        Self { width: size[0], height: size[1], kind: TexelKind::of(pixels), options, texels }
+    }
+
+    /// The texel at the very corner, which egui uses for everything that has no texture.
+    pub(super) fn corner(&self) -> u32 {
+        self.texels.first().copied().unwrap_or(u32::MAX)
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.texels.is_empty()
+    }
+
+    pub(super) fn is_nearest(&self) -> bool {
+        self.options.magnification == TextureFilter::Nearest
+    }
+
+    /// One row of texels, wrapped.
+    pub(super) fn row(&self, row: i64) -> &[u32] {
+        let start = self.wrap(row, self.height) * self.width;
+        &self.texels[start..start + self.width]
+    }
+
+    /// A column number within the texture.
+    #[inline]
+    pub(super) fn column(&self, column: i64) -> usize {
+        self.wrap(column, self.width)
+    }
+
+    #[inline]
+    fn wrap(&self, index: i64, size: usize) -> usize {
+        let size = size as i64;
+        let wrapped = match self.options.wrap_mode {
+            TextureWrapMode::ClampToEdge => index.clamp(0, size - 1),
+            TextureWrapMode::Repeat => index.rem_euclid(size),
+            TextureWrapMode::MirroredRepeat => {
+                let phase = index.rem_euclid(2 * size);
+                phase.min(2 * size - 1 - phase)
+            }
+        };
+        wrapped as usize
+    }
+
+    /// The colour at a place in texels with [`TEXEL_BITS`] fractional bits, the corner of the first texel being 0.
+    #[inline]
+    pub(super) fn sample(&self, u: i64, v: i64) -> u32 {
+        if self.is_nearest() {
+            return self.row(v >> TEXEL_BITS)[self.column(u >> TEXEL_BITS)];
+        }
+        let (u, v) = (u - (1 << (TEXEL_BITS - 1)), v - (1 << (TEXEL_BITS - 1)));
+        let row = v >> TEXEL_BITS;
+        self.between(self.row(row), self.row(row + 1), u, weight(v))
+    }
+
+    /// Between four texels of two rows; `u` is counted from the centre of the first texel.
+    #[inline]
+    pub(super) fn between(&self, upper: &[u32], lower: &[u32], u: i64, down: u32) -> u32 {
+        let column = u >> TEXEL_BITS;
+        let (left, right) = (self.column(column), self.column(column + 1));
+        let across = weight(u);
+        let top = blend::mix(upper[left], upper[right], across);
+        if down == 0 {
+            return top;
+        }
+        blend::mix(top, blend::mix(lower[left], lower[right], across), down)
+    }
+}
+
+/// The fraction of a texel coordinate in 256ths, rounded: 0 to 256.
+#[inline]
+pub(super) fn weight(coordinate: i64) -> u32 {
+    const SHIFT: u32 = TEXEL_BITS - 8;
+    let fraction = coordinate & ((1 << TEXEL_BITS) - 1);
+    ((fraction + (1 << (SHIFT - 1))) >> SHIFT) as u32
+}
