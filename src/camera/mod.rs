@@ -1,24 +1,20 @@
 //! Camera models: projection and back-projection with their Jacobians, Kalibr's models and conventions.
 //!
 //! Pixel centres lie at integer coordinates (OpenCV, Kalibr). The camera looks along +z, x to the right, y down.
+//! A point becomes a pixel in three steps: the [`Projection`] takes it to the normalized image plane, the
+//! [`Distortion`] moves it there, and focal lengths and principal point make pixels of it.
+
+mod distortion;
+mod kalibr;
+mod projection;
+#[cfg(test)]
+mod tests;
+
+pub use distortion::Distortion;
+pub use projection::Projection;
 
 use nalgebra::{Matrix2x3, Vector2, Vector3};
-
-/// How a bearing becomes an image point before the lens distorts it (Kalibr's `camera_model`).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Projection {
-    /// Pinhole.
-    Pinhole,
-}
-
-/// How the lens distorts (Kalibr's `distortion_model` and its coefficients).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Distortion {
-    /// None.
-    None,
-    /// Radial–tangential `k1 k2 p1 p2`.
-    Radtan([f64; 4]),
-}
+use thiserror::Error;
 
 /// A calibrated camera.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,19 +29,153 @@ pub struct CameraModel {
     pub resolution_px: [usize; 2],
 }
 
+/// Why a description of a camera was refused.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum CameraError {
+    /// No such projection.
+    #[error("unknown camera_model '{name}': expected one of pinhole, omni, eucm, ds")]
+    UnknownModel {
+        /// What was written.
+        name: String,
+    },
+    /// No such distortion.
+    #[error("unknown distortion_model '{name}': expected one of none, radtan, equidistant, fov")]
+    UnknownDistortion {
+        /// What was written.
+        name: String,
+    },
+    /// A distortion that the projection does not go with.
+    #[error("camera_model '{model}' does not go with distortion_model '{distortion}': it takes {expected}")]
+    Combination {
+        /// The projection.
+        model: &'static str,
+        /// The distortion.
+        distortion: &'static str,
+        /// What would go.
+        expected: &'static str,
+    },
+    /// Too few or too many numbers.
+    #[error("{field} of '{model}' holds {found} numbers, expected {expected}: {meaning}")]
+    Count {
+        /// `intrinsics` or `distortion_coeffs`.
+        field: &'static str,
+        /// The model they belong to.
+        model: &'static str,
+        /// How many there are.
+        found: usize,
+        /// How many there should be.
+        expected: usize,
+        /// Their order.
+        meaning: &'static str,
+    },
+    /// A number out of its range.
+    #[error("{field} is {value}, expected {expected}")]
+    Value {
+        /// Which number.
+        field: &'static str,
+        /// What it is.
+        value: f64,
+        /// Its range.
+        expected: &'static str,
+    },
+}
+
 impl CameraModel {
+    /// A camera from its parts, each checked.
+    ///
+    /// # Errors
+    /// When a number is not finite or out of its range, or the distortion does not go with the projection.
+    pub fn new(
+        projection: Projection,
+        distortion: Distortion,
+        intrinsics_px: [f64; 4],
+        resolution_px: [usize; 2],
+    ) -> Result<Self, CameraError> {
+        projection.check()?;
+        distortion.check()?;
+        let names = ["focal length fx", "focal length fy", "principal point cx", "principal point cy"];
+        for (index, (field, value)) in names.into_iter().zip(intrinsics_px).enumerate() {
+            if !value.is_finite() || (index < 2 && value <= 0.0) {
+                let expected = if index < 2 { "a positive number of pixels" } else { "a finite number of pixels" };
+                return Err(CameraError::Value { field, value, expected });
+            }
+        }
+        for (field, value) in ["image width", "image height"].into_iter().zip(resolution_px) {
+            if value == 0 {
+                return Err(CameraError::Value { field, value: 0.0, expected: "at least one pixel" });
+            }
+        }
+        let goes_together = match projection {
+            Projection::Pinhole => true,
+            Projection::Omni { .. } => matches!(distortion, Distortion::None | Distortion::Radtan(_)),
+            Projection::Eucm { .. } | Projection::Ds { .. } => distortion == Distortion::None,
+        };
+        if !goes_together {
+            return Err(CameraError::Combination {
+                model: projection.name(),
+                distortion: distortion.name(),
+                expected: if matches!(projection, Projection::Omni { .. }) { "none or radtan" } else { "none" },
+            });
+        }
+        Ok(Self { projection, distortion, intrinsics_px, resolution_px })
+    }
+
+    /// An undistorted pinhole camera.
+    ///
+    /// # Errors
+    /// As [`CameraModel::new`].
+    pub fn pinhole(intrinsics_px: [f64; 4], resolution_px: [usize; 2]) -> Result<Self, CameraError> {
+        Self::new(Projection::Pinhole, Distortion::None, intrinsics_px, resolution_px)
+    }
+
     /// The pixel of a point in the camera frame, `None` when it cannot be seen (behind, or outside the model's domain).
+    ///
+    /// The pixel may lie outside the image; see [`CameraModel::contains`].
     pub fn project(&self, point_in_camera: &Vector3<f64>) -> Option<Vector2<f64>> {
-        self.project_with_jacobian(point_in_camera).map(|(uv_px, _)| uv_px)
+        let undistorted = self.projection.project(point_in_camera)?;
+        let distorted = self.distortion.distort(&undistorted)?;
+        let [fx, fy, cx, cy] = self.intrinsics_px;
+        let uv_px = Vector2::new(fx * distorted.x + cx, fy * distorted.y + cy);
+        (uv_px.x.is_finite() && uv_px.y.is_finite()).then_some(uv_px)
     }
 
     /// The pixel and its derivative by the point (2 × 3, px/m).
-    pub fn project_with_jacobian(&self, _point_in_camera: &Vector3<f64>) -> Option<(Vector2<f64>, Matrix2x3<f64>)> {
-        None
+    pub fn project_with_jacobian(&self, point_in_camera: &Vector3<f64>) -> Option<(Vector2<f64>, Matrix2x3<f64>)> {
+        let (undistorted, by_point) = self.projection.project_with_jacobian(point_in_camera)?;
+        let [fx, fy, cx, cy] = self.intrinsics_px;
+        let (distorted, mut jacobian) = if self.distortion == Distortion::None {
+            (undistorted, by_point)
+        } else {
+            let (distorted, by_undistorted) = self.distortion.distort_with_jacobian(&undistorted)?;
+            (distorted, by_undistorted * by_point)
+        };
+        for column in 0..3 {
+            jacobian[(0, column)] *= fx;
+            jacobian[(1, column)] *= fy;
+        }
+        let uv_px = Vector2::new(fx * distorted.x + cx, fy * distorted.y + cy);
+        (uv_px.x.is_finite() && uv_px.y.is_finite()).then_some((uv_px, jacobian))
     }
 
     /// The unit bearing of a pixel, `None` outside the model's domain.
-    pub fn unproject(&self, _uv_px: &Vector2<f64>) -> Option<Vector3<f64>> {
-        None
+    pub fn unproject(&self, uv_px: &Vector2<f64>) -> Option<Vector3<f64>> {
+        let [fx, fy, cx, cy] = self.intrinsics_px;
+        let distorted = Vector2::new((uv_px.x - cx) / fx, (uv_px.y - cy) / fy);
+        let undistorted = self.distortion.undistort(&distorted)?;
+        self.projection.unproject(&undistorted)
+    }
+
+    /// Whether a pixel lies on the image, at least `border_px` inside the outermost pixel centres.
+    pub fn contains(&self, uv_px: &Vector2<f64>, border_px: f64) -> bool {
+        let [width, height] = self.resolution_px;
+        uv_px.x >= border_px
+            && uv_px.y >= border_px
+            && uv_px.x <= width as f64 - 1.0 - border_px
+            && uv_px.y <= height as f64 - 1.0 - border_px
+    }
+
+    /// The geometric mean of the two focal lengths, to turn an angle at the image centre into pixels.
+    pub fn focal_length_px(&self) -> f64 {
+        (self.intrinsics_px[0] * self.intrinsics_px[1]).sqrt()
     }
 }
