@@ -113,7 +113,7 @@ impl Projection {
             }
         };
         let inverse = 1.0 / divisor;
-        let (u, v) = (x * inverse, y * inverse);
+        let (u, v) = (x / divisor, y / divisor);
         let jacobian = Matrix2x3::new(
             (1.0 - u * x * lateral) * inverse,
             -u * y * lateral * inverse,
