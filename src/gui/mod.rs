@@ -1,6 +1,7 @@
 //! Panels, the 3D scene and the window: they read a recording at a cursor and push commands.
 
 pub mod headless;
+pub mod image_panel;
 pub mod painter;
 #[cfg(test)]
 mod sample_calibration;

@@ -22,7 +22,7 @@ use crate::flight_log::{LogWarning, Rig};
 use crate::frontend::{FeatureId, FrontEndStatistics, TrackedFeature, TrackedFrame};
 use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::{ClassicalChain, DhLink};
-use crate::session::{ParameterizationChoice, Recording, RunRecord, RunSpec, StepRecord};
+use crate::session::{Recording, RunRecord, StepRecord};
 
 /// Nanoseconds between two images (20 Hz).
 pub(crate) const FRAME_PERIOD_NS: i64 = 50_000_000;
@@ -350,17 +350,7 @@ fn sample_run(
         })
         .collect();
     RunRecord {
-        spec: RunSpec {
-            label: name.to_owned(),
-            parameterization: match name {
-                "classical" => ParameterizationChoice::Classical,
-                "poe" => ParameterizationChoice::Poe,
-                _ => ParameterizationChoice::Auto,
-            },
-            encoder: true,
-            calibrate: true,
-            window: 10,
-        },
+        spec: name.parse().expect("the sample's runs are named after parameterizations"),
         camera_key: "cam0".to_owned(),
         steps,
         finished: true,

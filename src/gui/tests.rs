@@ -1,5 +1,7 @@
-use super::ImageSource as _;
 use super::sample_recording::{FIRST_TRACKED_FRAME, sample_images, sample_recording};
+use super::theme::Theme;
+use super::{ImageSource, PanelContext, Playback, Selection};
+use crate::session::Recording;
 
 #[test]
 fn the_sample_is_consistent() {
@@ -24,4 +26,18 @@ pub(crate) fn keep_picture(name: &str, picture: &image::RgbaImage) {
     if let Some(folder) = std::env::var_os("DCVINS_PICTURES") {
         picture.save(std::path::Path::new(&folder).join(format!("{name}.png"))).unwrap();
     }
+}
+
+/// Hands a panel a context with nothing playing; its commands are dropped.
+pub(crate) fn with_context(
+    recording: &Recording,
+    cursor_ns: i64,
+    images: &mut dyn ImageSource,
+    selection: &mut Selection,
+    theme: &Theme,
+    show: impl FnOnce(&mut PanelContext<'_>),
+) {
+    let (playback, mut commands) = (Playback::default(), Vec::new());
+    let commands = &mut commands;
+    show(&mut PanelContext { recording, cursor_ns, playback: &playback, images, selection, theme, commands });
 }

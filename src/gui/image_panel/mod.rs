@@ -1,0 +1,249 @@
+//! The camera image with its tracks and residuals.
+
+mod model;
+mod paint;
+#[cfg(test)]
+mod tests;
+
+use std::sync::Arc;
+
+use egui::{Align2, ColorImage, Rect, Sense, TextureHandle, TextureOptions, Ui, Vec2, pos2, vec2};
+
+use self::model::ImageModel;
+pub use self::model::SolveSide;
+use self::paint::{ImagePlacement, MarkOptions};
+use super::PanelContext;
+use super::theme::Theme;
+use crate::flight_log::GrayImage;
+
+/// Furthest that the image can be magnified over its fitting size.
+const LARGEST_ZOOM: f32 = 16.0;
+/// Height of the legend and of the caption in points.
+const LINE_HEIGHT: f32 = 18.0;
+
+/// The image panel: what is shown of the tracks, and which part of the image.
+pub struct ImagePanel {
+    /// Whose residuals.
+    pub side: SolveSide,
+    /// Residuals are drawn this many times as long as they are.
+    pub magnification: f32,
+    /// Draw residuals.
+    pub residuals: bool,
+    /// Draw where tracks come from.
+    pub tails: bool,
+    /// Write every feature's id.
+    pub ids: bool,
+    view: View,
+    texture: Option<CachedTexture>,
+}
+
+impl Default for ImagePanel {
+    fn default() -> Self {
+        Self {
+            side: SolveSide::After,
+            magnification: 20.0,
+            residuals: true,
+            tails: true,
+            ids: false,
+            view: View::default(),
+            texture: None,
+        }
+    }
+}
+
+/// Which part of the image is seen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct View {
+    /// Size over the size that fits.
+    zoom: f32,
+    /// What lies in the middle, as fractions of the image.
+    centre: Vec2,
+}
+
+impl Default for View {
+    fn default() -> Self {
+        Self { zoom: 1.0, centre: Vec2::splat(0.5) }
+    }
+}
+
+struct CachedTexture {
+    image: Arc<GrayImage>,
+    handle: TextureHandle,
+}
+
+impl ImagePanel {
+    /// Draws the panel into what is left of `ui`.
+    pub fn ui(&mut self, ui: &mut Ui, context: &mut PanelContext<'_>) {
+        let Some(run) = context.recording.runs.get(context.selection.run) else {
+            message_ui(ui, "No run to show");
+            return;
+        };
+        self.controls_ui(ui, context.theme, context.selection.run, &run.spec.label);
+        let Some(model) = ImageModel::at(run, context.cursor_ns) else {
+            message_ui(ui, "No image at or before the cursor");
+            return;
+        };
+        let size = ui.available_size() - vec2(0.0, 2.0 * LINE_HEIGHT + 2.0 * ui.spacing().item_spacing.y);
+        let (area, response) = ui.allocate_exact_size(size.max(Vec2::splat(16.0)), Sense::click_and_drag());
+        let image = context.images.image(&run.camera_key, model.frame_index);
+        self.image_ui(ui, area, &response, context, &model, image);
+        let (legend, _) = ui.allocate_exact_size(vec2(ui.available_width(), LINE_HEIGHT), Sense::hover());
+        paint::legend(ui.painter(), legend, context.theme, &self.mark_options());
+        ui.add(egui::Label::new(model.caption()).truncate());
+    }
+
+    fn mark_options(&self) -> MarkOptions {
+        let Self { side, magnification, residuals, tails, ids, .. } = *self;
+        MarkOptions { side, magnification, residuals, tails, ids }
+    }
+
+    fn controls_ui(&mut self, ui: &mut Ui, theme: &Theme, run: usize, run_label: &str) {
+        ui.horizontal(|ui| {
+            ui.colored_label(theme.run(run).color, run_label);
+            ui.separator();
+            ui.selectable_value(&mut self.side, SolveSide::Before, "Before")
+                .on_hover_text("Residuals before the solve");
+            ui.selectable_value(&mut self.side, SolveSide::After, "After").on_hover_text("Residuals after the solve");
+            ui.checkbox(&mut self.residuals, "Residuals");
+            ui.spacing_mut().slider_width = 70.0;
+            ui.add_enabled(
+                self.residuals,
+                egui::Slider::new(&mut self.magnification, 1.0..=200.0)
+                    .logarithmic(true)
+                    .fixed_decimals(0)
+                    .prefix("×")
+                    .text("magnification"),
+            );
+            ui.checkbox(&mut self.tails, "Tails");
+            ui.checkbox(&mut self.ids, "Ids");
+        });
+    }
+
+    fn image_ui(
+        &mut self,
+        ui: &Ui,
+        area: Rect,
+        response: &egui::Response,
+        context: &mut PanelContext<'_>,
+        model: &ImageModel,
+        image: Option<Arc<GrayImage>>,
+    ) {
+        let painter = ui.painter_at(area);
+        painter.rect_filled(area, 0.0, context.theme.plot_background);
+        let size_px = image.as_ref().map(|image| [image.width, image.height]).unwrap_or_else(|| {
+            let camera_key = context.recording.runs.get(context.selection.run).map(|run| run.camera_key.as_str());
+            let cameras = &context.recording.rig.cameras;
+            let camera = cameras.iter().find(|camera| Some(camera.key.as_str()) == camera_key);
+            camera.map_or([640, 480], |camera| camera.model.resolution_px)
+        });
+        self.navigate(ui, area, response, size_px);
+        let place = self.placement(area, size_px);
+        if let Some(image) = image {
+            let texture = self.texture(ui, image);
+            let uv = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
+            painter.image(texture, place.rect, uv, egui::Color32::WHITE);
+        } else {
+            let outline = egui::Stroke::new(1.0, context.theme.outline);
+            painter.rect_stroke(place.rect, 0.0, outline, egui::StrokeKind::Inside);
+            paint::label(&painter, area.center_top() + vec2(0.0, 8.0), Align2::CENTER_TOP, "image missing");
+        }
+        let options = self.mark_options();
+        for mark in &model.marks {
+            paint::feature(&painter, &place, mark, &options);
+        }
+        self.pick_ui(ui, &painter, &place, response, context, model);
+    }
+
+    /// Hover, click and the selected feature.
+    fn pick_ui(
+        &self,
+        ui: &Ui,
+        painter: &egui::Painter,
+        place: &ImagePlacement,
+        response: &egui::Response,
+        context: &mut PanelContext<'_>,
+        model: &ImageModel,
+    ) {
+        /// How near the pointer must be, in points.
+        const REACH: f32 = 10.0;
+        let nearest = response.hover_pos().and_then(|pointer| {
+            model
+                .marks
+                .iter()
+                .map(|mark| (mark, place.position(&mark.measured_px).distance(pointer)))
+                .filter(|(_, distance)| *distance <= REACH)
+                .min_by(|(_, a), (_, b)| a.total_cmp(b))
+                .map(|(mark, _)| mark)
+        });
+        if response.clicked() {
+            context.selection.feature = nearest.map(|mark| mark.id);
+        }
+        if let Some(mark) = model.marks.iter().find(|mark| Some(mark.id) == context.selection.feature) {
+            let at = place.position(&mark.measured_px);
+            paint::selection(painter, at);
+            if !self.ids {
+                let beside = at + vec2(paint::RING_RADIUS + 8.0, 0.0);
+                paint::label(painter, beside, Align2::LEFT_CENTER, &mark.id.0.to_string());
+            }
+        }
+        if let Some(mark) = nearest {
+            paint::selection(painter, place.position(&mark.measured_px));
+            ui.ctx().set_cursor_icon(egui::CursorIcon::PointingHand);
+            response.clone().on_hover_text_at_pointer(model::description(mark));
+        }
+    }
+
+    /// Wheel zooms about the pointer, dragging moves, a double click fits.
+    fn navigate(&mut self, ui: &Ui, area: Rect, response: &egui::Response, size_px: [usize; 2]) {
+        if response.double_clicked() {
+            self.view = View::default();
+        }
+        let before = self.placement(area, size_px);
+        if let Some(pointer) = response.hover_pos() {
+            let factor = ui.input(|input| input.zoom_delta() * (input.smooth_scroll_delta().y * 0.004).exp());
+            let zoom = (self.view.zoom * factor).clamp(1.0, LARGEST_ZOOM);
+            if zoom != self.view.zoom {
+                // The place under the pointer stays there.
+                let held = (pointer - before.rect.min) / before.rect.size();
+                self.view.centre = held + (self.view.centre - held) * (self.view.zoom / zoom);
+                self.view.zoom = zoom;
+            }
+        }
+        if response.dragged() {
+            self.view.centre -= response.drag_delta() / before.rect.size();
+        }
+        let room = 0.5 / self.view.zoom;
+        self.view.centre = self.view.centre.clamp(Vec2::splat(room), Vec2::splat(1.0 - room));
+    }
+
+    fn placement(&self, area: Rect, size_px: [usize; 2]) -> ImagePlacement {
+        let image = vec2(size_px[0].max(1) as f32, size_px[1].max(1) as f32);
+        let fitting = (area.width() / image.x).min(area.height() / image.y);
+        let size = image * fitting * self.view.zoom;
+        let rect = Rect::from_min_size(area.center() - self.view.centre * size, size);
+        ImagePlacement { rect, size_px }
+    }
+
+    fn texture(&mut self, ui: &Ui, image: Arc<GrayImage>) -> egui::TextureId {
+        if let Some(cached) = &self.texture
+            && Arc::ptr_eq(&cached.image, &image)
+        {
+            return cached.handle.id();
+        }
+        let wanted = image.width * image.height;
+        let mut pixels = image.pixels.clone();
+        pixels.resize(wanted, 0);
+        let color_image = ColorImage::from_gray([image.width, image.height], &pixels);
+        let mut cached = self.texture.take().unwrap_or_else(|| CachedTexture {
+            image: Arc::clone(&image),
+            handle: ui.ctx().load_texture("camera image", color_image.clone(), TextureOptions::LINEAR),
+        });
+        cached.handle.set(color_image, TextureOptions::LINEAR);
+        cached.image = image;
+        self.texture.insert(cached).handle.id()
+    }
+}
+
+fn message_ui(ui: &mut Ui, text: &str) {
+    ui.centered_and_justified(|ui| ui.weak(text));
+}

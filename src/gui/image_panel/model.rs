@@ -1,0 +1,166 @@
+//! What the image panel shows of one step, gathered from the report and the tracks.
+
+use nalgebra::Vector2;
+
+use crate::estimator::Phase;
+use crate::frontend::{FeatureId, FrontEndStatistics};
+use crate::geometry::seconds_from_ns;
+use crate::session::RunRecord;
+
+/// How many images a track's tail reaches back.
+const TAIL_FRAMES: usize = 4;
+
+/// Which side of the solve the residuals are from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SolveSide {
+    /// Before the solve.
+    Before,
+    /// After it.
+    #[default]
+    After,
+}
+
+/// One feature in the image.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct FeatureMark {
+    pub(super) id: FeatureId,
+    /// In how many images before this one it was seen.
+    pub(super) age: u32,
+    /// Where it was measured.
+    pub(super) measured_px: Vector2<f64>,
+    /// Where it was in the images before, newest first.
+    pub(super) tail_px: Vec<Vector2<f64>>,
+    /// What the solve made of it, `None` for a feature that took no part.
+    pub(super) solved: Option<SolvedMark>,
+}
+
+/// What the solve made of a feature.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct SolvedMark {
+    /// Predicted minus measured in this image, `None` in the image that anchors the feature.
+    pub(super) residual_before_px: Option<Vector2<f64>>,
+    pub(super) residual_after_px: Option<Vector2<f64>>,
+    pub(super) chi2: f64,
+    pub(super) robust_weight: f64,
+    pub(super) depth_m: f64,
+    pub(super) observation_count: usize,
+    pub(super) rejected: bool,
+}
+
+impl SolvedMark {
+    pub(super) fn residual_px(&self, side: SolveSide) -> Option<Vector2<f64>> {
+        match side {
+            SolveSide::Before => self.residual_before_px,
+            SolveSide::After => self.residual_after_px,
+        }
+    }
+}
+
+/// Everything that is drawn over one image.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct ImageModel {
+    pub(super) frame_index: usize,
+    pub(super) stamp_ns: i64,
+    pub(super) phase: Phase,
+    pub(super) keyframe: bool,
+    pub(super) statistics: FrontEndStatistics,
+    /// Features that the solve rejected.
+    pub(super) rejected: usize,
+    pub(super) rms_before_px: f64,
+    pub(super) rms_after_px: f64,
+    /// Ordered by id.
+    pub(super) marks: Vec<FeatureMark>,
+}
+
+impl ImageModel {
+    /// The last step of a run at or before the cursor, `None` before the first.
+    pub(super) fn at(run: &RunRecord, cursor_ns: i64) -> Option<Self> {
+        let after = run.steps.partition_point(|step| step.report.stamp_ns <= cursor_ns);
+        let earlier = run.steps.get(..after)?;
+        let (step, before) = earlier.split_last()?;
+        let report = &step.report;
+        let marks = step
+            .tracks
+            .features
+            .iter()
+            .map(|feature| {
+                let reach = TAIL_FRAMES.min(feature.age as usize);
+                let tail_px = before
+                    .iter()
+                    .rev()
+                    .take(reach)
+                    .map_while(|step| {
+                        let features = &step.tracks.features;
+                        let at = features.binary_search_by_key(&feature.id, |earlier| earlier.id).ok()?;
+                        features.get(at).map(|earlier| earlier.uv_px)
+                    })
+                    .collect();
+                let solved = report.features.iter().find(|solved| solved.id == feature.id).map(|solved| {
+                    let here = solved.observations.iter().find(|seen| seen.frame_index == report.frame_index);
+                    SolvedMark {
+                        residual_before_px: here.and_then(|seen| seen.residual_before_px),
+                        residual_after_px: here.and_then(|seen| seen.residual_after_px),
+                        chi2: here.map_or(f64::NAN, |seen| seen.chi2),
+                        robust_weight: here.map_or(f64::NAN, |seen| seen.robust_weight),
+                        depth_m: 1.0 / solved.inverse_depth_per_m,
+                        observation_count: solved.observations.len(),
+                        rejected: solved.rejected,
+                    }
+                });
+                FeatureMark { id: feature.id, age: feature.age, measured_px: feature.uv_px, tail_px, solved }
+            })
+            .collect();
+        Some(Self {
+            frame_index: report.frame_index,
+            stamp_ns: report.stamp_ns,
+            phase: report.phase,
+            keyframe: report.keyframe,
+            statistics: step.tracks.statistics,
+            rejected: report.features.iter().filter(|feature| feature.rejected).count(),
+            rms_before_px: report.reprojection_rms_before_px,
+            rms_after_px: report.reprojection_rms_after_px,
+            marks,
+        })
+    }
+
+    /// `frame 120 · 6.000 s · keyframe · 98 tracked, 12 new, 9 lost, 5 rejected · RMS 0.93 px before, 0.40 px after the solve`.
+    pub(super) fn caption(&self) -> String {
+        let mut parts = vec![format!("frame {}", self.frame_index), format!("{:.3} s", seconds_from_ns(self.stamp_ns))];
+        if self.keyframe {
+            parts.push("keyframe".to_owned());
+        }
+        let FrontEndStatistics { tracked, detected, lost, rejected, .. } = self.statistics;
+        parts.push(format!("{tracked} tracked, {detected} new, {lost} lost, {} rejected", rejected + self.rejected));
+        parts.push(match self.phase {
+            Phase::Initializing => "initializing".to_owned(),
+            Phase::Tracking => {
+                format!("RMS {:.2} px before, {:.2} px after the solve", self.rms_before_px, self.rms_after_px)
+            }
+        });
+        parts.join(" · ")
+    }
+}
+
+/// `17 · age 42 · …`, one fact per line, for the pointer that rests on a feature.
+pub(super) fn description(mark: &FeatureMark) -> String {
+    let mut lines = vec![
+        format!("feature {}", mark.id.0),
+        format!("age {} frames", mark.age),
+        format!("at ({:.2}, {:.2}) px", mark.measured_px.x, mark.measured_px.y),
+    ];
+    let Some(solved) = &mark.solved else {
+        lines.push("not in the solve".to_owned());
+        return lines.join("\n");
+    };
+    let residual = |vector: Option<Vector2<f64>>| {
+        vector.map_or_else(|| "–".to_owned(), |v| format!("{:.2} px ({:+.2}, {:+.2})", v.norm(), v.x, v.y))
+    };
+    lines.push(format!("residual before {}", residual(solved.residual_before_px)));
+    lines.push(format!("residual after {}", residual(solved.residual_after_px)));
+    lines.push(format!("χ² {:.2}, weight {:.2}", solved.chi2, solved.robust_weight));
+    lines.push(format!("depth {:.2} m from {} frames", solved.depth_m, solved.observation_count));
+    if solved.rejected {
+        lines.push("rejected as an outlier".to_owned());
+    }
+    lines.join("\n")
+}

@@ -1,0 +1,236 @@
+//! Paints tracks, residuals and the legend over an image.
+
+use egui::{Align2, Color32, Painter, Pos2, Rect, Shape, Stroke, pos2, vec2};
+use nalgebra::Vector2;
+
+use super::model::{FeatureMark, SolveSide};
+use crate::gui::theme::{self, Theme, ThemeName};
+
+/// Age that gets the last colour, in frames.
+const OLDEST_AGE: f64 = 100.0;
+/// Ages named in the legend.
+const LEGEND_AGES: [u32; 4] = [0, 10, 40, 100];
+/// Radius of the ring of a feature in the solve, in points.
+pub(super) const RING_RADIUS: f32 = 4.0;
+/// Radius of a feature that is only tracked.
+const DOT_RADIUS: f32 = 2.0;
+/// Shadow under bright marks, so that they are seen on light parts of the image.
+const HALO: Color32 = Color32::from_black_alpha(150);
+/// Glow under dark marks, so that they are seen on dark parts of the image.
+const GLOW: Color32 = Color32::from_rgba_premultiplied(190, 190, 190, 190);
+
+/// Where image pixels lie on the screen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct ImagePlacement {
+    /// Where the whole image lies, perhaps larger than what is seen of it.
+    pub(super) rect: Rect,
+    /// Columns and rows of the image.
+    pub(super) size_px: [usize; 2],
+}
+
+impl ImagePlacement {
+    /// The screen position of an image position; pixel centres lie at whole numbers.
+    pub(super) fn position(&self, uv_px: &Vector2<f64>) -> Pos2 {
+        let fraction = |at: f64, size: usize| ((at + 0.5) / size.max(1) as f64) as f32;
+        let [width, height] = self.size_px;
+        self.rect.lerp_inside(vec2(fraction(uv_px.x, width), fraction(uv_px.y, height)))
+    }
+
+    /// Points per image pixel.
+    pub(super) fn scale(&self) -> f32 {
+        self.rect.width() / self.size_px[0].max(1) as f32
+    }
+}
+
+/// What is drawn of each feature.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct MarkOptions {
+    pub(super) side: SolveSide,
+    pub(super) magnification: f32,
+    pub(super) residuals: bool,
+    pub(super) tails: bool,
+    pub(super) ids: bool,
+}
+
+/// Colour of an age in frames: viridis over the square root, so that young tracks differ most.
+pub(super) fn age_color(age: u32) -> Color32 {
+    theme::viridis((f64::from(age) / OLDEST_AGE).sqrt())
+}
+
+/// What lies under a mark of a colour.
+fn halo_of(color: Color32) -> Color32 {
+    let [red, green, blue, _] = color.to_array().map(u32::from);
+    if 2 * red + 5 * green + blue < 900 { GLOW } else { HALO }
+}
+
+/// The image is its own ground, so what lies on it has the same colours in every theme.
+fn ink() -> Theme {
+    Theme::of(ThemeName::Dark)
+}
+
+fn residual_color() -> Color32 {
+    ink().runs[1]
+}
+
+/// One feature: tail, ring, residual, cross, id.
+pub(super) fn feature(painter: &Painter, place: &ImagePlacement, mark: &FeatureMark, options: &MarkOptions) {
+    let at = place.position(&mark.measured_px);
+    let color = age_color(mark.age);
+    if options.tails && !mark.tail_px.is_empty() {
+        let points: Vec<Pos2> = std::iter::once(at).chain(mark.tail_px.iter().map(|uv| place.position(uv))).collect();
+        painter.add(Shape::line(points.clone(), Stroke::new(2.0, halo_of(color).gamma_multiply(0.4))));
+        painter.add(Shape::line(points, Stroke::new(1.0, color.gamma_multiply(0.8))));
+    }
+    if let Some(solved) = &mark.solved {
+        painter.circle_stroke(at, RING_RADIUS, Stroke::new(3.5, halo_of(color)));
+        painter.circle_stroke(at, RING_RADIUS, Stroke::new(2.0, color));
+        if options.residuals
+            && let Some(residual) = solved.residual_px(options.side)
+        {
+            let reach = residual * f64::from(options.magnification * place.scale());
+            let tip = at + vec2(reach.x as f32, reach.y as f32);
+            residual_arrow(painter, at, tip);
+        }
+        if solved.rejected {
+            cross(painter, at, RING_RADIUS + 3.0);
+        }
+    } else {
+        painter.circle_filled(at, DOT_RADIUS + 1.0, halo_of(color));
+        painter.circle_filled(at, DOT_RADIUS, color);
+    }
+    if options.ids {
+        label(painter, at + vec2(RING_RADIUS + 2.0, 0.0), Align2::LEFT_CENTER, &mark.id.0.to_string());
+    }
+}
+
+/// From the measurement to the (magnified) prediction, which gets a small diamond.
+fn residual_arrow(painter: &Painter, from: Pos2, tip: Pos2) {
+    let color = residual_color();
+    painter.line_segment([from, tip], Stroke::new(3.0, HALO));
+    painter.line_segment([from, tip], Stroke::new(1.5, color));
+    let side = 2.2;
+    let diamond = [vec2(side, 0.0), vec2(0.0, side), vec2(-side, 0.0), vec2(0.0, -side)].map(|corner| tip + corner);
+    painter.add(Shape::convex_polygon(diamond.to_vec(), color, Stroke::NONE));
+}
+
+/// The mark of a rejected feature.
+fn cross(painter: &Painter, at: Pos2, radius: f32) {
+    let arm = radius * std::f32::consts::FRAC_1_SQRT_2;
+    for stroke in [Stroke::new(4.0, HALO), Stroke::new(2.0, ink().error)] {
+        painter.line_segment([at + vec2(-arm, -arm), at + vec2(arm, arm)], stroke);
+        painter.line_segment([at + vec2(-arm, arm), at + vec2(arm, -arm)], stroke);
+    }
+}
+
+/// A ring around the selected feature.
+pub(super) fn selection(painter: &Painter, at: Pos2) {
+    painter.circle_stroke(at, RING_RADIUS + 5.0, Stroke::new(4.0, HALO));
+    painter.circle_stroke(at, RING_RADIUS + 5.0, Stroke::new(2.0, ink().cursor));
+}
+
+/// A text on the image with a dark plate under it.
+pub(super) fn label(painter: &Painter, at: Pos2, align: Align2, text: &str) -> Rect {
+    let galley = painter.layout_no_wrap(text.to_owned(), theme::label_font(), ink().text_strong);
+    let rect = align.anchor_size(at, galley.size());
+    painter.rect_filled(rect.expand2(vec2(2.0, 0.0)), 2.0, HALO);
+    painter.galley(rect.min, galley, ink().text_strong);
+    rect
+}
+
+/// The key to what the marks mean, in one line; what does not fit is left out from the right.
+pub(super) fn legend(painter: &Painter, rect: Rect, theme: &Theme, options: &MarkOptions) {
+    let painter = painter.with_clip_rect(rect);
+    let mut pen = LegendPen { painter: &painter, theme, at: rect.left_center(), end: rect.right() };
+    pen.text("age");
+    pen.color_bar();
+    pen.text("frames");
+    pen.gap();
+    pen.symbol("in the solve", |painter, at| {
+        painter.circle_stroke(at, RING_RADIUS, Stroke::new(1.5, theme.text));
+    });
+    pen.symbol("tracked only", |painter, at| {
+        painter.circle_filled(at, DOT_RADIUS, theme.text);
+    });
+    pen.symbol("rejected", |painter, at| {
+        let arm = 4.0;
+        let stroke = Stroke::new(2.0, theme.error);
+        painter.line_segment([at + vec2(-arm, -arm), at + vec2(arm, arm)], stroke);
+        painter.line_segment([at + vec2(-arm, arm), at + vec2(arm, -arm)], stroke);
+    });
+    if options.residuals {
+        let name = format!("prediction − measurement, ×{:.0}", options.magnification);
+        pen.symbol(&name, |painter, at| {
+            painter.circle_stroke(at + vec2(-5.0, 0.0), 2.5, Stroke::new(1.0, theme.text));
+            residual_arrow_plain(painter, at + vec2(-5.0, 0.0), at + vec2(6.0, 0.0), theme);
+        });
+    }
+}
+
+fn residual_arrow_plain(painter: &Painter, from: Pos2, tip: Pos2, theme: &Theme) {
+    let color = theme.runs[1];
+    painter.line_segment([from, tip], Stroke::new(1.5, color));
+    let side = 2.2;
+    let diamond = [vec2(side, 0.0), vec2(0.0, side), vec2(-side, 0.0), vec2(0.0, -side)].map(|corner| tip + corner);
+    painter.add(Shape::convex_polygon(diamond.to_vec(), color, Stroke::NONE));
+}
+
+/// Writes the legend from left to right.
+struct LegendPen<'a> {
+    painter: &'a Painter,
+    theme: &'a Theme,
+    at: Pos2,
+    end: f32,
+}
+
+impl LegendPen<'_> {
+    fn gap(&mut self) {
+        self.at.x += 6.0;
+    }
+
+    fn text(&mut self, text: &str) {
+        let galley = self.painter.layout_no_wrap(text.to_owned(), theme::label_font(), self.theme.text_weak);
+        if self.at.x + galley.size().x > self.end {
+            self.at.x = f32::INFINITY;
+            return;
+        }
+        let rect = Align2::LEFT_CENTER.anchor_size(self.at, galley.size());
+        self.painter.galley(rect.min, galley, self.theme.text_weak);
+        self.at.x = rect.right() + 4.0;
+    }
+
+    fn color_bar(&mut self) {
+        const WIDTH: f32 = 84.0;
+        let bar = Rect::from_min_size(self.at - vec2(0.0, 7.0), vec2(WIDTH, 14.0));
+        const STEPS: u16 = 28;
+        for step in 0..STEPS {
+            let [left, right] = [step, step + 1].map(|edge| bar.left() + WIDTH * f32::from(edge) / f32::from(STEPS));
+            let color = theme::viridis((f64::from(step) + 0.5) / f64::from(STEPS));
+            let slice = Rect::from_min_max(pos2(left, bar.top()), pos2(right, bar.bottom()));
+            self.painter.rect_filled(slice, 0.0, color);
+        }
+        for age in LEGEND_AGES {
+            let fraction = (f64::from(age) / OLDEST_AGE).sqrt() as f32;
+            let (align, inset) = match age {
+                0 => (Align2::LEFT_CENTER, 2.0),
+                100 => (Align2::RIGHT_CENTER, -2.0),
+                _ => (Align2::CENTER_CENTER, 0.0),
+            };
+            let at = pos2(bar.left() + WIDTH * fraction + inset, bar.center().y);
+            let ink = Theme::text_on(age_color(age));
+            self.painter.text(at, align, age.to_string(), egui::FontId::proportional(9.5), ink);
+        }
+        self.at.x = bar.right() + 4.0;
+    }
+
+    fn symbol(&mut self, name: &str, draw: impl FnOnce(&Painter, Pos2)) {
+        let width = self.painter.layout_no_wrap(name.to_owned(), theme::label_font(), self.theme.text).size().x;
+        if self.at.x + 20.0 + width > self.end {
+            self.at.x = f32::INFINITY;
+            return;
+        }
+        draw(self.painter, self.at + vec2(8.0, 0.0));
+        self.at.x += 18.0;
+        self.text(name);
+        self.gap();
+    }
+}

@@ -1,0 +1,169 @@
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable as _;
+use nalgebra::Vector2;
+
+use super::ImagePanel;
+use super::model::{ImageModel, SolveSide, description};
+use super::paint::ImagePlacement;
+use crate::gui::headless::{HeadlessOptions, draw};
+use crate::gui::sample_recording::{FIRST_TRACKED_FRAME, FRAME_PERIOD_NS, sample_images, sample_recording_of};
+use crate::gui::tests::{keep_picture, with_context};
+use crate::gui::theme::{Theme, ThemeName};
+use crate::gui::{ImageSource, Selection};
+use crate::session::Recording;
+
+/// A recording of 80 frames; the last one is tracked.
+fn recording() -> Recording {
+    sample_recording_of(80, &["auto"])
+}
+
+fn show(ui: &mut egui::Ui, panel: &mut ImagePanel, recording: &Recording, cursor_ns: i64, selection: &mut Selection) {
+    let theme = Theme::of(ThemeName::Dark);
+    theme.apply(ui.ctx());
+    with_context(recording, cursor_ns, &mut sample_images(), selection, &theme, |context| panel.ui(ui, context));
+}
+
+#[test]
+fn the_caption_tells_the_step_at_or_before_the_cursor() {
+    let recording = recording();
+    let model = ImageModel::at(&recording.runs[0], 70 * FRAME_PERIOD_NS + 30_000_000).unwrap();
+    assert_eq!(model.frame_index, 70);
+    let step = &recording.runs[0].steps[70];
+    let statistics = step.tracks.statistics;
+    let rejected = statistics.rejected + step.report.features.iter().filter(|feature| feature.rejected).count();
+    let expected = format!(
+        "frame 70 · 3.500 s · {} tracked, {} new, {} lost, {rejected} rejected · RMS {:.2} px before, {:.2} px after the solve",
+        statistics.tracked,
+        statistics.detected,
+        statistics.lost,
+        step.report.reprojection_rms_before_px,
+        step.report.reprojection_rms_after_px,
+    );
+    assert_eq!(model.caption(), expected);
+    let waiting = ImageModel::at(&recording.runs[0], (FIRST_TRACKED_FRAME as i64 - 1) * FRAME_PERIOD_NS).unwrap();
+    assert!(waiting.caption().ends_with("initializing"), "{}", waiting.caption());
+    assert!(ImageModel::at(&recording.runs[0], -1).is_none());
+}
+
+#[test]
+fn marks_hold_what_the_report_says() {
+    let recording = recording();
+    let step = &recording.runs[0].steps[79];
+    let model = ImageModel::at(&recording.runs[0], step.report.stamp_ns).unwrap();
+    assert_eq!(model.marks.len(), step.tracks.features.len());
+    let solved = model.marks.iter().filter(|mark| mark.solved.is_some()).count();
+    assert_eq!(solved, step.report.features.len());
+    for mark in &model.marks {
+        assert_eq!(mark.tail_px.len(), (mark.age as usize).min(4), "tail of {:?}", mark.id);
+        if let Some(earlier) = mark.tail_px.first() {
+            let track = step.tracks.features.iter().find(|feature| feature.id == mark.id).unwrap();
+            assert_eq!(Some(*earlier), track.previous_uv_px);
+        }
+    }
+    let rejected = model.marks.iter().find(|mark| mark.solved.is_some_and(|solved| solved.rejected)).unwrap();
+    let text = description(rejected);
+    assert!(text.contains(&format!("feature {}", rejected.id.0)) && text.contains("rejected as an outlier"), "{text}");
+    let fresh = model.marks.iter().find(|mark| mark.solved.is_none()).unwrap();
+    assert!(description(fresh).contains("not in the solve"));
+}
+
+#[test]
+fn pixel_centres_lie_at_whole_numbers() {
+    let rect = egui::Rect::from_min_size(egui::pos2(100.0, 50.0), egui::vec2(1280.0, 960.0));
+    let place = ImagePlacement { rect, size_px: [640, 480] };
+    assert_eq!(place.position(&Vector2::new(0.0, 0.0)), egui::pos2(101.0, 51.0));
+    assert_eq!(place.position(&Vector2::new(-0.5, -0.5)), rect.min);
+    assert_eq!(place.position(&Vector2::new(639.5, 479.5)), rect.max);
+    assert_eq!(place.scale(), 2.0);
+}
+
+#[test]
+fn controls_are_found_by_label_and_work() {
+    let recording = recording();
+    let end_ns = recording.duration_ns;
+    let mut harness = Harness::builder().with_size([900.0, 700.0]).build_ui_state(
+        move |ui, (panel, selection)| show(ui, panel, &recording, end_ns, selection),
+        (ImagePanel::default(), Selection::default()),
+    );
+    harness.run();
+    assert_eq!(harness.state().0.side, SolveSide::After);
+    harness.get_by_label("Before").click();
+    harness.get_by_label("Ids").click();
+    harness.get_by_label("Tails").click();
+    harness.run();
+    let panel = &harness.state().0;
+    assert_eq!((panel.side, panel.ids, panel.tails), (SolveSide::Before, true, false));
+    harness.get_by_label_contains("frame 79 · 3.950 s");
+}
+
+#[test]
+fn a_click_selects_the_feature_under_it() {
+    let recording = recording();
+    let end_ns = recording.duration_ns;
+    let model = ImageModel::at(&recording.runs[0], end_ns).unwrap();
+    let mut harness = Harness::builder().with_size([900.0, 700.0]).build_ui_state(
+        move |ui, (panel, selection)| show(ui, panel, &recording, end_ns, selection),
+        (ImagePanel::default(), Selection::default()),
+    );
+    harness.run();
+    // The image fills the width or the height of its area; look for a feature by trying its place.
+    let area = harness.ctx.globally_used_rect();
+    let mut found = None;
+    'search: for row in 0..60 {
+        for column in 0..60 {
+            let at = area.lerp_inside(egui::vec2(column as f32 / 59.0, 0.1 + 0.7 * row as f32 / 59.0));
+            harness.hover_at(at);
+            harness.step();
+            if harness.query_by_label_contains("residual after").is_some() {
+                found = Some(at);
+                break 'search;
+            }
+        }
+    }
+    let at = found.expect("some place shows a feature's description");
+    harness.drag_at(at);
+    harness.drop_at(at);
+    harness.run();
+    let selected = harness.state().1.feature.expect("the click selected it");
+    assert!(model.marks.iter().any(|mark| mark.id == selected));
+}
+
+#[test]
+fn missing_runs_frames_and_images_are_said() {
+    struct NoImages;
+    impl ImageSource for NoImages {
+        fn image(&mut self, _: &str, _: usize) -> Option<std::sync::Arc<crate::flight_log::GrayImage>> {
+            None
+        }
+    }
+    let recording = recording();
+    let check = |run: usize, cursor_ns: i64, expected: &str| {
+        let recording = recording.clone();
+        let mut harness = Harness::builder().with_size([700.0, 500.0]).build_ui(move |ui| {
+            let theme = Theme::of(ThemeName::Light);
+            let mut selection = Selection { run, ..Selection::default() };
+            with_context(&recording, cursor_ns, &mut NoImages, &mut selection, &theme, |context| {
+                ImagePanel::default().ui(ui, context);
+            });
+        });
+        harness.run();
+        harness.get_by_label_contains(expected);
+    };
+    check(7, 0, "No run to show");
+    check(0, -1, "No image at or before the cursor");
+    check(0, i64::MAX, "frame 79");
+}
+
+#[test]
+fn pictures_repeat_and_show_the_image() {
+    let recording = recording();
+    let options = HeadlessOptions { size_px: [900, 760], pixels_per_point: 1.0, theme: ThemeName::Dark };
+    let picture = |cursor_ns| {
+        let mut panel = ImagePanel::default();
+        draw(options, |ui| show(ui, &mut panel, &recording, cursor_ns, &mut Selection::default()))
+    };
+    let late = picture(recording.duration_ns);
+    keep_picture("image", &late);
+    assert!(late == picture(recording.duration_ns));
+    assert!(late != picture(60 * FRAME_PERIOD_NS));
+}
