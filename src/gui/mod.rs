@@ -11,6 +11,13 @@ mod sample_images;
 pub(crate) mod sample_recording;
 #[cfg(test)]
 mod tests;
+pub mod convergence;
+mod follow;
+mod histogram;
+mod plot;
+pub mod rank;
+pub mod residuals;
+mod units;
 pub mod theme;
 
 use std::sync::Arc;

@@ -1,0 +1,121 @@
+//! Where each parameter's small plot goes.
+
+use egui::{Rect, pos2, vec2};
+
+use super::names::{ChainPart, part_of};
+
+/// The lowest plot that can still be read, in points, its heading included.
+const LOWEST_CELL: f32 = 52.0;
+/// The narrowest plot that can still be read.
+const NARROWEST_CELL: f32 = 118.0;
+/// Space between plots.
+const GAP: f32 = 5.0;
+/// Width of the part names beside rows by part.
+pub(crate) const HEADING_WIDTH: f32 = 46.0;
+
+/// The places of the plots.
+#[derive(Debug, PartialEq)]
+pub(crate) struct Layout {
+    /// One cell per parameter, in order.
+    pub(crate) cells: Vec<Rect>,
+    /// Rows by part of the chain, with the heading's place; empty when the plots flow.
+    pub(crate) headings: Vec<(ChainPart, Rect)>,
+    /// Height of everything: more than was available when it has to be scrolled.
+    pub(crate) height: f32,
+}
+
+/// Lays out one cell per name (sorted along the chain): a row per part of the chain when that fits, else flowing.
+pub(crate) fn lay_out(names: &[String], available: Rect) -> Layout {
+    by_part(names, available).unwrap_or_else(|| flowing(names.len(), available))
+}
+
+fn by_part(names: &[String], available: Rect) -> Option<Layout> {
+    let mut rows: Vec<(ChainPart, usize)> = Vec::new();
+    for name in names {
+        let part = part_of(name);
+        match rows.last_mut() {
+            Some((last, count)) if *last == part => *count += 1,
+            _ => rows.push((part, 1)),
+        }
+    }
+    let columns = rows.iter().map(|(_, count)| *count).max()?;
+    let width = (available.width() - HEADING_WIDTH - GAP * columns as f32) / columns as f32;
+    let height = (available.height() - GAP * (rows.len() as f32 - 1.0)) / rows.len() as f32;
+    // Rows by part leave holes: only worth it when plots stay well legible and few places are empty.
+    let empty = rows.len() * columns - names.len();
+    if rows.len() < 2 || width < NARROWEST_CELL * 1.15 || height < LOWEST_CELL * 1.35 || 3 * empty > names.len() + 2 {
+        return None;
+    }
+    let mut layout = Layout { cells: Vec::new(), headings: Vec::new(), height: available.height() };
+    for (row, (part, count)) in rows.into_iter().enumerate() {
+        let top = available.top() + row as f32 * (height + GAP);
+        let heading = Rect::from_min_size(pos2(available.left(), top), vec2(HEADING_WIDTH, height));
+        layout.headings.push((part, heading));
+        layout.cells.extend((0..count).map(|column| {
+            let left = available.left() + HEADING_WIDTH + GAP + column as f32 * (width + GAP);
+            Rect::from_min_size(pos2(left, top), vec2(width, height))
+        }));
+    }
+    Some(layout)
+}
+
+fn flowing(count: usize, available: Rect) -> Layout {
+    const WANTED_ASPECT: f32 = 2.0;
+    let most = (((available.width() + GAP) / (NARROWEST_CELL + GAP)) as usize).clamp(1, count.max(1));
+    let size = |columns: usize| {
+        let rows = count.div_ceil(columns).max(1);
+        let width = (available.width() - GAP * (columns as f32 - 1.0)) / columns as f32;
+        let height = (available.height() - GAP * (rows as f32 - 1.0)) / rows as f32;
+        vec2(width.max(1.0), height.max(LOWEST_CELL))
+    };
+    let loss = |columns: usize| {
+        let size = size(columns);
+        let rows = count.div_ceil(columns).max(1);
+        let empty = (rows * columns - count) as f32 / count.max(1) as f32;
+        let overflow = (rows as f32 * (size.y + GAP) - GAP - available.height()).max(0.0) / available.height().max(1.0);
+        (size.x / size.y / WANTED_ASPECT).ln().abs() + empty + 10.0 * overflow
+    };
+    let columns = (1..=most).min_by(|a, b| loss(*a).total_cmp(&loss(*b))).unwrap_or(1);
+    let size = size(columns);
+    let cells: Vec<Rect> = (0..count)
+        .map(|index| {
+            let corner = vec2((index % columns) as f32 * (size.x + GAP), (index / columns) as f32 * (size.y + GAP));
+            Rect::from_min_size(available.min + corner, size)
+        })
+        .collect();
+    let bottom = cells.last().map_or(available.top(), |cell| cell.bottom());
+    Layout { cells, headings: Vec::new(), height: bottom - available.top() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(counts: &[(&str, usize)]) -> Vec<String> {
+        counts.iter().flat_map(|(head, count)| (0..*count).map(move |n| format!("{head}.{n}"))).collect()
+    }
+
+    fn check(names: &[String], width: f32, height: f32) -> Layout {
+        let available = Rect::from_min_size(pos2(20.0, 30.0), vec2(width, height));
+        let layout = lay_out(names, available);
+        assert_eq!(layout.cells.len(), names.len());
+        for (index, cell) in layout.cells.iter().enumerate() {
+            assert!(cell.height() >= LOWEST_CELL - 0.5, "{cell:?}");
+            assert!(cell.left() >= available.left() - 0.5 && cell.right() <= available.right() + 0.5, "{cell:?}");
+            assert!(layout.cells[..index].iter().all(|other| !other.shrink(0.1).intersects(cell.shrink(0.1))));
+        }
+        layout
+    }
+
+    #[test]
+    fn plots_never_overlap_and_scroll_rather_than_shrink() {
+        let minimal = names(&[("I", 4), ("L1", 4), ("L2", 4), ("L3", 6)]);
+        let classical = names(&[("IB", 6), ("L1", 4), ("L2", 4), ("L3", 4), ("EC", 6)]);
+        assert!(!check(&minimal, 1400.0, 420.0).headings.is_empty());
+        assert!(check(&minimal, 900.0, 260.0).height <= 260.5);
+        assert!(check(&classical, 1000.0, 330.0).height <= 330.5);
+        assert!(check(&classical, 300.0, 200.0).height > 200.0);
+        check(&[], 300.0, 200.0);
+        check(&minimal[..1], 40.0, 10.0);
+    }
+}

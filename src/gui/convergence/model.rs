@@ -1,0 +1,184 @@
+//! The calibration of each run over time, by parameter name.
+
+use std::collections::BTreeMap;
+
+use crate::gui::follow::Follower;
+use crate::observability::RankReport;
+use crate::session::{RunRecord, StepRecord};
+
+/// A parameter counts as lost to a set of directions when this much of its squared unit vector lies in them.
+const LOST_SHARE: f64 = 0.25;
+
+/// What a step could say about a parameter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Knowledge {
+    /// The window informs it beyond the prior.
+    Informed,
+    /// Too weakly seen in the window to beat the prior.
+    Weak,
+    /// Not seen at all: it lies in a structural null direction.
+    Unobservable,
+    /// The estimator still initializes.
+    Waiting,
+}
+
+impl Knowledge {
+    /// One word for a tag, empty when all is well.
+    pub(crate) fn tag(self) -> &'static str {
+        match self {
+            Self::Informed => "",
+            Self::Weak => "weak",
+            Self::Unobservable => "unobservable",
+            Self::Waiting => "waiting",
+        }
+    }
+}
+
+/// One parameter over time.
+#[derive(Debug, Default)]
+pub(crate) struct ParameterHistory {
+    /// `rad` or `m`.
+    pub(crate) unit: &'static str,
+    /// Value of each step; not-a-number where the chart has no such parameter.
+    pub(crate) values: Vec<f64>,
+    /// Value minus three standard deviations.
+    pub(crate) lower: Vec<f64>,
+    /// Value plus three standard deviations.
+    pub(crate) upper: Vec<f64>,
+    /// Standard deviation.
+    pub(crate) sigmas: Vec<f64>,
+    /// What each step could say.
+    pub(crate) knowledge: Vec<Knowledge>,
+}
+
+/// The calibration of one run over time.
+#[derive(Debug, Default)]
+pub(crate) struct CalibrationHistory {
+    follower: Follower,
+    /// Stamps of the steps.
+    pub(crate) stamps_ns: Vec<i64>,
+    /// The parameters in order of their first appearance.
+    pub(crate) parameters: Vec<(String, ParameterHistory)>,
+    /// Changes when steps were forgotten.
+    pub(crate) epoch: u64,
+}
+
+impl CalibrationHistory {
+    /// Reads the steps that have come since the last call.
+    pub(crate) fn read(&mut self, run: &RunRecord) {
+        let news = self.follower.news(run);
+        if news.restarted {
+            self.stamps_ns.clear();
+            self.parameters.clear();
+            self.epoch += 1;
+        }
+        for step in news.steps {
+            self.push(step);
+        }
+    }
+
+    fn push(&mut self, step: &StepRecord) {
+        let calibration = &step.report.calibration;
+        let row = self.stamps_ns.len();
+        self.stamps_ns.push(step.report.stamp_ns);
+        let known = knowledge(step.rank.as_ref());
+        for (index, name) in calibration.names.iter().enumerate() {
+            let place = match self.parameters.iter().position(|(known, _)| known == name) {
+                Some(place) => place,
+                None => {
+                    self.parameters.push((name.clone(), ParameterHistory::default()));
+                    self.parameters.len() - 1
+                }
+            };
+            let history = &mut self.parameters[place].1;
+            history.unit = calibration.units.get(index).copied().unwrap_or("");
+            history.pad(row);
+            let entry = |values: &[f64]| values.get(index).copied().unwrap_or(f64::NAN);
+            let (value, sigma) = (entry(&calibration.values), entry(&calibration.sigmas));
+            history.values.push(value);
+            history.sigmas.push(sigma);
+            history.lower.push(value - 3.0 * sigma);
+            history.upper.push(value + 3.0 * sigma);
+            history.knowledge.push(match &known {
+                Some(known) => known.get(name.as_str()).copied().unwrap_or(Knowledge::Informed),
+                None => Knowledge::Waiting,
+            });
+        }
+        for (_, history) in &mut self.parameters {
+            history.pad(row + 1);
+        }
+    }
+
+    /// The parameter of a name.
+    pub(crate) fn parameter(&self, name: &str) -> Option<&ParameterHistory> {
+        self.parameters.iter().find(|(known, _)| known == name).map(|(_, history)| history)
+    }
+
+    /// The row at or before a time.
+    pub(crate) fn row_at(&self, stamp_ns: i64) -> Option<usize> {
+        self.stamps_ns.partition_point(|stamp| *stamp <= stamp_ns).checked_sub(1)
+    }
+}
+
+impl ParameterHistory {
+    fn pad(&mut self, rows: usize) {
+        for column in [&mut self.values, &mut self.sigmas, &mut self.lower, &mut self.upper] {
+            column.resize(rows.max(column.len()), f64::NAN);
+        }
+        self.knowledge.resize(rows.max(self.knowledge.len()), Knowledge::Waiting);
+    }
+}
+
+/// What a step could say about each parameter, `None` while initializing.
+pub(crate) fn knowledge(rank: Option<&RankReport>) -> Option<BTreeMap<&str, Knowledge>> {
+    let rank = rank?;
+    let share = |column: usize, structural_only: bool| -> f64 {
+        let directions = rank.directions.iter().filter(|direction| direction.structural || !structural_only);
+        directions.filter_map(|direction| direction.weights.get(column)).map(|weight| weight * weight).sum()
+    };
+    let verdict = |column: usize| {
+        if share(column, true) >= LOST_SHARE {
+            Knowledge::Unobservable
+        } else if share(column, false) >= LOST_SHARE {
+            Knowledge::Weak
+        } else {
+            Knowledge::Informed
+        }
+    };
+    Some(rank.names.iter().enumerate().map(|(column, name)| (name.as_str(), verdict(column))).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gui::sample_recording::{FIRST_TRACKED_FRAME, sample_recording_of};
+
+    #[test]
+    fn columns_stay_aligned_when_names_come_and_go() {
+        let mut recording = sample_recording_of(60, &["auto"]);
+        let run = &mut recording.runs[0];
+        for step in &mut run.steps[55..] {
+            let step = std::sync::Arc::make_mut(step);
+            step.report.calibration.names[0] = "L3.gamma".to_owned();
+        }
+        let mut history = CalibrationHistory::default();
+        history.read(run);
+        assert_eq!(history.parameters.len(), 19);
+        assert!(history.parameters.iter().all(|(_, parameter)| parameter.values.len() == 60));
+        let renamed = history.parameter("L3.gamma").unwrap();
+        assert!(renamed.values[54].is_nan() && renamed.values[55].is_finite());
+        assert!(history.parameter("I.rx").unwrap().values[59].is_nan());
+        assert_eq!(history.row_at(-1), None);
+    }
+
+    #[test]
+    fn null_directions_make_their_parameters_unobservable() {
+        let recording = sample_recording_of(FIRST_TRACKED_FRAME + 5, &["classical"]);
+        let mut history = CalibrationHistory::default();
+        history.read(&recording.runs[0]);
+        let last = history.stamps_ns.len() - 1;
+        let lost = history.parameters.iter().filter(|(_, one)| one.knowledge[last] == Knowledge::Unobservable).count();
+        assert!(lost > 0, "the classical chain is redundant");
+        assert!(history.parameters.iter().all(|(_, one)| one.knowledge[0] == Knowledge::Waiting));
+    }
+}

@@ -1,0 +1,126 @@
+//! Following a run that grows, so that a panel reads each step once.
+
+use std::sync::Arc;
+
+use crate::session::{RunRecord, StepRecord};
+
+/// How far a panel has read a run.
+#[derive(Debug, Default)]
+pub(crate) struct Follower {
+    count: usize,
+    /// The last step read: held, so that its address cannot come back as another step's.
+    last: Option<Arc<StepRecord>>,
+}
+
+/// What is new in a run.
+pub(crate) struct News<'a> {
+    /// Whether it is another run than before, or was computed anew: forget everything.
+    pub(crate) restarted: bool,
+    /// The steps not read before.
+    pub(crate) steps: &'a [Arc<StepRecord>],
+}
+
+impl Follower {
+    /// The steps that have come since the last call.
+    pub(crate) fn news<'a>(&mut self, run: &'a RunRecord) -> News<'a> {
+        let same = match (&self.last, self.count.checked_sub(1).and_then(|index| run.steps.get(index))) {
+            (Some(last), Some(step)) => Arc::ptr_eq(last, step),
+            (None, None) => true,
+            _ => false,
+        };
+        let read = if same { self.count } else { 0 };
+        self.count = run.steps.len();
+        self.last = run.steps.last().cloned();
+        News { restarted: !same, steps: &run.steps[read..] }
+    }
+}
+
+/// Figures of a run's steps, one column each, for plots over time.
+#[derive(Debug, Default)]
+pub(crate) struct StepTable {
+    follower: Follower,
+    /// Stamps of the rows, since the log began.
+    pub(crate) stamps_ns: Vec<i64>,
+    /// The columns; not-a-number where a step has no such figure.
+    pub(crate) columns: Vec<Vec<f64>>,
+    /// Changes when rows were forgotten.
+    pub(crate) epoch: u64,
+}
+
+impl StepTable {
+    /// Reads the new steps of the run into `N` columns; returns whether there were any.
+    pub(crate) fn read<const N: usize>(&mut self, run: &RunRecord, row: impl Fn(&StepRecord) -> [f64; N]) -> bool {
+        let news = self.follower.news(run);
+        if news.restarted {
+            self.stamps_ns.clear();
+            self.columns.clear();
+            self.epoch += 1;
+        }
+        self.columns.resize_with(N, Vec::new);
+        for step in news.steps {
+            self.stamps_ns.push(step.report.stamp_ns);
+            for (column, value) in self.columns.iter_mut().zip(row(step)) {
+                column.push(value);
+            }
+        }
+        news.restarted || !news.steps.is_empty()
+    }
+
+    /// The value of a column at the last row at or before a time.
+    pub(crate) fn at(&self, column: usize, stamp_ns: i64) -> Option<f64> {
+        let after = self.stamps_ns.partition_point(|stamp| *stamp <= stamp_ns);
+        self.columns.get(column)?.get(after.checked_sub(1)?).copied().filter(|value| value.is_finite())
+    }
+}
+
+/// One table per run; runs that went away take theirs along.
+#[derive(Debug, Default)]
+pub(crate) struct RunTables {
+    tables: Vec<StepTable>,
+}
+
+impl RunTables {
+    /// Reads what is new in all runs and gives the tables in the runs' order.
+    pub(crate) fn read<const N: usize>(
+        &mut self,
+        runs: &[RunRecord],
+        row: impl Fn(&StepRecord) -> [f64; N],
+    ) -> &[StepTable] {
+        self.tables.resize_with(runs.len(), StepTable::default);
+        for (table, run) in self.tables.iter_mut().zip(runs) {
+            table.read(run, &row);
+        }
+        &self.tables
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gui::sample_recording::sample_recording_of;
+
+    #[test]
+    fn every_step_is_read_once_and_another_run_starts_anew() {
+        let recording = sample_recording_of(60, &["auto"]);
+        let whole = &recording.runs[0];
+        let mut growing = whole.clone();
+        growing.steps.truncate(20);
+        let mut table = StepTable::default();
+        let frame = |step: &StepRecord| [step.report.frame_index as f64];
+        assert!(table.read(&growing, frame));
+        assert!(!table.read(&growing, frame));
+        growing.steps = whole.steps.clone();
+        assert!(table.read(&growing, frame));
+        assert_eq!(table.columns[0], (0..60).map(f64::from).collect::<Vec<_>>());
+        assert_eq!(table.epoch, 0);
+        assert_eq!(table.at(0, table.stamps_ns[7] + 1), Some(7.0));
+        assert_eq!(table.at(0, -1), None);
+
+        let other = sample_recording_of(30, &["auto"]);
+        assert!(table.read(&other.runs[0], frame));
+        assert_eq!((table.stamps_ns.len(), table.epoch), (30, 1));
+        growing.steps.clear();
+        assert!(table.read(&growing, frame));
+        assert!(table.stamps_ns.is_empty());
+    }
+}

@@ -1,0 +1,176 @@
+//! Curves over time, reduced to what the pixel columns of a plot can show.
+
+use super::PlotArea;
+
+/// What a reduced curve was made from; the same key gives the same curve.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct CurveKey {
+    epoch: u64,
+    count: usize,
+    begin_ns: i64,
+    end_ns: i64,
+    width_px: u32,
+}
+
+/// A curve with its values by pixel column; remade only when its data, its range or its width changes.
+#[derive(Debug, Default)]
+pub(crate) struct Curve {
+    key: Option<CurveKey>,
+    /// Unbroken stretches of `(points right of the plot's left edge, value)`.
+    pub(crate) stretches: Vec<Vec<(f32, f64)>>,
+    /// Least and greatest value in range, `None` when there is none.
+    pub(crate) extent: Option<(f64, f64)>,
+}
+
+impl Curve {
+    /// Brings the curve up to date with `values` at `stamps_ns` (ascending); values that are not finite break it.
+    ///
+    /// `epoch` changes when earlier rows do; as long as it stays, rows are only added.
+    pub(crate) fn update(&mut self, area: &PlotArea, epoch: u64, stamps_ns: &[i64], values: &[f64]) {
+        let key = CurveKey {
+            epoch,
+            count: stamps_ns.len().min(values.len()),
+            begin_ns: area.begin_ns,
+            end_ns: area.end_ns,
+            width_px: area.rect.width().max(1.0) as u32,
+        };
+        if self.key != Some(key) {
+            self.key = Some(key);
+            self.stretches = reduce(area, &stamps_ns[..key.count], values);
+            let values = || self.stretches.iter().flatten().map(|(_, value)| *value);
+            let extent = (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
+            self.extent = (extent.0 <= extent.1).then_some(extent);
+        }
+    }
+}
+
+/// The rows from the one before the range to the one after it, so that lines run to the edges.
+fn rows_in_range(area: &PlotArea, stamps_ns: &[i64]) -> std::ops::Range<usize> {
+    let first = stamps_ns.partition_point(|stamp| *stamp < area.begin_ns).saturating_sub(1);
+    let end = (stamps_ns.partition_point(|stamp| *stamp <= area.end_ns) + 1).min(stamps_ns.len());
+    first..end.max(first)
+}
+
+/// First, least, greatest and last value of each pixel column, in the order in which they came.
+fn reduce(area: &PlotArea, stamps_ns: &[i64], values: &[f64]) -> Vec<Vec<(f32, f64)>> {
+    let rows = rows_in_range(area, stamps_ns);
+    let columns = area.rect.width().max(1.0) as usize;
+    let thin = rows.len() <= 2 * columns;
+    let mut stretches = Vec::new();
+    let mut stretch: Vec<(f32, f64)> = Vec::new();
+    let mut column: Option<Column> = None;
+    for row in rows {
+        let x = area.offset_of(stamps_ns[row]);
+        let value = values[row];
+        if !value.is_finite() {
+            flush(&mut stretch, &mut column);
+            if !stretch.is_empty() {
+                stretches.push(std::mem::take(&mut stretch));
+            }
+        } else if thin {
+            stretch.push((x, value));
+        } else {
+            match &mut column {
+                Some(open) if open.x.floor() == x.floor() => open.take(row, value),
+                _ => {
+                    flush(&mut stretch, &mut column);
+                    column = Some(Column {
+                        x,
+                        first: (row, value),
+                        least: (row, value),
+                        most: (row, value),
+                        last: (row, value),
+                    });
+                }
+            }
+        }
+    }
+    flush(&mut stretch, &mut column);
+    if !stretch.is_empty() {
+        stretches.push(stretch);
+    }
+    stretches
+}
+
+/// One pixel column: rows and values of its extremes.
+struct Column {
+    x: f32,
+    first: (usize, f64),
+    least: (usize, f64),
+    most: (usize, f64),
+    last: (usize, f64),
+}
+
+impl Column {
+    fn take(&mut self, row: usize, value: f64) {
+        if value < self.least.1 {
+            self.least = (row, value);
+        }
+        if value > self.most.1 {
+            self.most = (row, value);
+        }
+        self.last = (row, value);
+    }
+}
+
+fn flush(stretch: &mut Vec<(f32, f64)>, column: &mut Option<Column>) {
+    if let Some(Column { x, first, least, most, last }) = column.take() {
+        let mut points = [first, least, most, last];
+        points.sort_by_key(|(row, _)| *row);
+        let mut before = None;
+        for (row, value) in points {
+            if before != Some(row) {
+                stretch.push((x, value));
+            }
+            before = Some(row);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use egui::{Rect, pos2};
+
+    fn area(width: f32) -> PlotArea {
+        PlotArea {
+            rect: Rect::from_min_max(pos2(10.0, 0.0), pos2(10.0 + width, 50.0)),
+            begin_ns: 0,
+            end_ns: 10_000,
+            low: 0.0,
+            high: 1.0,
+        }
+    }
+
+    #[test]
+    fn a_spike_survives_and_points_stay_few() {
+        let stamps: Vec<i64> = (0..10_000).collect();
+        let mut values = vec![0.5; 10_000];
+        values[4321] = 9.0;
+        let mut curve = Curve::default();
+        curve.update(&area(100.0), 0, &stamps, &values);
+        assert_eq!(curve.extent, Some((0.5, 9.0)));
+        assert_eq!(curve.stretches.len(), 1);
+        assert!(curve.stretches[0].len() <= 400);
+        assert!(curve.stretches[0].is_sorted_by(|a, b| a.0 <= b.0));
+    }
+
+    #[test]
+    fn gaps_break_the_line() {
+        let mut curve = Curve::default();
+        curve.update(&area(100.0), 0, &[0, 10, 20, 30, 40], &[1.0, 2.0, f64::NAN, 3.0, 4.0]);
+        assert_eq!(curve.stretches.iter().map(Vec::len).collect::<Vec<_>>(), [2, 2]);
+        curve.update(&area(100.0), 1, &[], &[]);
+        assert_eq!((curve.stretches.len(), curve.extent), (0, None));
+    }
+
+    #[test]
+    fn it_is_remade_only_for_a_new_key() {
+        let mut curve = Curve::default();
+        curve.update(&area(100.0), 0, &[0, 10], &[1.0, 2.0]);
+        curve.update(&area(100.0), 0, &[0, 10], &[5.0, 6.0]);
+        assert_eq!(curve.extent, Some((1.0, 2.0)), "same key, same curve");
+        curve.update(&area(100.0), 0, &[0, 10, 20], &[5.0, 6.0, 7.0]);
+        assert_eq!(curve.extent, Some((5.0, 7.0)));
+    }
+}

@@ -1,0 +1,225 @@
+//! Small plots over time: the area they map to, ticks, curves, bands, hatching.
+//!
+//! All plots over time share the visible stretch of [`Selection`](super::Selection), so that zooming one zooms all.
+
+mod curve;
+mod navigate;
+mod ticks;
+
+use egui::epaint::{Mesh, Vertex, WHITE_UV};
+use egui::{Align2, Color32, Painter, Pos2, Rect, Shape, Stroke, pos2};
+
+pub(crate) use curve::Curve;
+pub(crate) use navigate::{Clicks, navigate, visible_range};
+pub(crate) use ticks::{decimals_of_step, ticks};
+
+use super::theme::{self, RunStyle, Theme};
+
+/// Where a plot over time lies and what it spans.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct PlotArea {
+    /// On screen, in points.
+    pub(crate) rect: Rect,
+    /// Time at the left edge, since the log began.
+    pub(crate) begin_ns: i64,
+    /// Time at the right edge.
+    pub(crate) end_ns: i64,
+    /// Value at the lower edge.
+    pub(crate) low: f64,
+    /// Value at the upper edge.
+    pub(crate) high: f64,
+}
+
+impl PlotArea {
+    /// Points right of the left edge.
+    pub(crate) fn offset_of(&self, stamp_ns: i64) -> f32 {
+        let span_ns = (self.end_ns - self.begin_ns).max(1);
+        ((stamp_ns - self.begin_ns) as f64 / span_ns as f64 * f64::from(self.rect.width())) as f32
+    }
+
+    /// Screen x of a time.
+    pub(crate) fn x(&self, stamp_ns: i64) -> f32 {
+        self.rect.left() + self.offset_of(stamp_ns)
+    }
+
+    /// Screen y of a value, kept within a few heights of the plot so that nothing overflows.
+    pub(crate) fn y(&self, value: f64) -> f32 {
+        let fraction = ((value - self.low) / (self.high - self.low)).clamp(-4.0, 5.0);
+        self.rect.bottom() - fraction as f32 * self.rect.height()
+    }
+
+    /// Time at a screen x.
+    pub(crate) fn stamp_ns_at(&self, x: f32) -> i64 {
+        let fraction = f64::from((x - self.rect.left()) / self.rect.width().max(1.0));
+        self.begin_ns + (fraction * (self.end_ns - self.begin_ns) as f64).round() as i64
+    }
+
+    /// Sets the range of values, widened when it is empty.
+    pub(crate) fn with_values(mut self, low: f64, high: f64) -> Self {
+        let (low, high) = if low.is_finite() && high.is_finite() && low <= high { (low, high) } else { (0.0, 1.0) };
+        let least = (1e-9_f64).max(low.abs().max(high.abs()) * 1e-9);
+        let widen = if high - low < least { least } else { 0.0 };
+        (self.low, self.high) = (low - widen, high + widen);
+        self
+    }
+}
+
+/// Ground and border of a plot.
+pub(crate) fn paint_ground(painter: &Painter, theme: &Theme, rect: Rect) {
+    painter.rect_filled(rect, 0.0, theme.plot_background);
+}
+
+/// Horizontal grid lines with their values inside the left edge; `factor` turns stored values into shown ones.
+pub(crate) fn paint_value_grid(painter: &Painter, theme: &Theme, area: &PlotArea, factor: f64, max_count: usize) {
+    let (marks, step) = ticks(area.low * factor, area.high * factor, max_count);
+    for shown in marks {
+        let y = area.y(shown / factor).round() + 0.5;
+        painter.hline(area.rect.x_range(), y, Stroke::new(theme::HAIRLINE_WIDTH, theme.grid));
+        // Labels that would leave the plot are left out.
+        if y - 10.0 > area.rect.top() && y < area.rect.bottom() - 1.0 {
+            let text = super::units::fixed(shown, decimals_of_step(step));
+            let font = egui::FontId::new(9.0, egui::FontFamily::Monospace);
+            painter.text(pos2(area.rect.left() + 2.0, y), Align2::LEFT_BOTTOM, text, font, theme.text_weak);
+        }
+    }
+}
+
+/// The cursor over time.
+pub(crate) fn paint_cursor(painter: &Painter, theme: &Theme, area: &PlotArea, cursor_ns: i64) {
+    let x = area.x(cursor_ns);
+    if area.rect.x_range().expand(0.5).contains(x) {
+        painter.vline(x, area.rect.y_range(), Stroke::new(1.0, theme.cursor.gamma_multiply(0.8)));
+    }
+}
+
+/// A curve with a run's colour and dashes.
+pub(crate) fn paint_curve(painter: &Painter, area: &PlotArea, curve: &Curve, style: RunStyle, width: f32) {
+    for stretch in &curve.stretches {
+        let points: Vec<Pos2> =
+            stretch.iter().map(|(offset, value)| pos2(area.rect.left() + offset, area.y(*value))).collect();
+        paint_line(painter, &points, style, width);
+    }
+}
+
+/// A curve whose value holds until the next one, for counts and states.
+pub(crate) fn paint_steps(painter: &Painter, area: &PlotArea, curve: &Curve, style: RunStyle, width: f32) {
+    for stretch in &curve.stretches {
+        let mut points: Vec<Pos2> = Vec::with_capacity(stretch.len() * 2);
+        for (offset, value) in stretch {
+            let corner = pos2(area.rect.left() + offset, area.y(*value));
+            if let Some(last) = points.last().copied() {
+                if last.y == corner.y {
+                    points.pop();
+                } else {
+                    points.push(pos2(corner.x, last.y));
+                }
+            }
+            points.push(corner);
+            if points.len() == 1 {
+                points.push(corner);
+            }
+        }
+        paint_line(painter, &points, style, width);
+    }
+}
+
+/// An open line with dashes; a single point becomes a dot.
+pub(crate) fn paint_line(painter: &Painter, points: &[Pos2], style: RunStyle, width: f32) {
+    let stroke = Stroke::new(width, style.color);
+    match points {
+        [] => {}
+        [point] => {
+            painter.circle_filled(*point, width, style.color);
+        }
+        _ if style.dashes.is_empty() => {
+            painter.add(Shape::line(points.to_vec(), stroke));
+        }
+        _ => {
+            let dashes: Vec<f32> = style.dashes.iter().copied().step_by(2).collect();
+            let gaps: Vec<f32> = style.dashes.iter().copied().skip(1).step_by(2).collect();
+            painter.extend(Shape::dashed_line_with_offset(points, stroke, &dashes, &gaps, 0.0));
+        }
+    }
+}
+
+/// The area between two curves with the same stamps.
+pub(crate) fn paint_band(painter: &Painter, area: &PlotArea, lower: &Curve, upper: &Curve, fill: Color32) {
+    for (low, high) in lower.stretches.iter().zip(&upper.stretches) {
+        let mut mesh = Mesh::default();
+        let vertex = |offset: f32, value: f64| Vertex {
+            pos: pos2(area.rect.left() + offset, area.y(value)),
+            uv: WHITE_UV,
+            color: fill,
+        };
+        for (low, high) in low.iter().zip(high) {
+            mesh.vertices.push(vertex(low.0, low.1));
+            mesh.vertices.push(vertex(high.0, high.1));
+        }
+        for corner in (2..mesh.vertices.len() as u32).step_by(2) {
+            mesh.add_triangle(corner - 2, corner - 1, corner);
+            mesh.add_triangle(corner - 1, corner, corner + 1);
+        }
+        painter.add(Shape::mesh(mesh));
+    }
+}
+
+/// Diagonal hatching of a part of a plot.
+pub(crate) fn paint_hatch(painter: &Painter, rect: Rect, color: Color32) {
+    const SPACING: f32 = 6.0;
+    if rect.width() < 0.5 || rect.height() < 0.5 {
+        return;
+    }
+    let painter = painter.with_clip_rect(painter.clip_rect().intersect(rect));
+    // The lines keep their places on the screen, so that neighbouring hatched stretches join.
+    let first = ((rect.left() + rect.top()) / SPACING).floor() as i64;
+    let last = ((rect.right() + rect.bottom()) / SPACING).ceil() as i64;
+    let lines = (first..=last).map(|line| {
+        let sum = line as f32 * SPACING;
+        let points = [pos2(sum - rect.top(), rect.top()), pos2(sum - rect.bottom(), rect.bottom())];
+        Shape::line_segment(points, Stroke::new(1.0, color))
+    });
+    painter.extend(lines);
+}
+
+/// Stretches of rows for which something holds, as times: begin of the first row to begin of the row after the last.
+pub(crate) fn stretches_where(stamps_ns: &[i64], holds: impl Fn(usize) -> bool) -> Vec<(i64, i64)> {
+    let mut stretches = Vec::new();
+    let mut begin = None;
+    for (row, stamp_ns) in stamps_ns.iter().enumerate() {
+        match (begin, holds(row)) {
+            (None, true) => begin = Some(*stamp_ns),
+            (Some(since), false) => {
+                stretches.push((since, *stamp_ns));
+                begin = None;
+            }
+            _ => {}
+        }
+    }
+    if let (Some(since), Some(last)) = (begin, stamps_ns.last()) {
+        stretches.push((since, *last));
+    }
+    stretches
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stretches_join_rows() {
+        let stamps = [0, 10, 20, 30, 40];
+        let holds = [true, true, false, true, true];
+        assert_eq!(stretches_where(&stamps, |row| holds[row]), [(0, 20), (30, 40)]);
+        assert!(stretches_where(&[], |_| true).is_empty());
+    }
+
+    #[test]
+    fn the_mapping_goes_back_and_forth_and_survives_empty_ranges() {
+        let rect = Rect::from_min_max(pos2(100.0, 10.0), pos2(300.0, 60.0));
+        let area = PlotArea { rect, begin_ns: 5, end_ns: 5_000_005, low: 0.0, high: 0.0 }.with_values(2.0, 2.0);
+        assert_eq!(area.stamp_ns_at(area.x(2_500_005)), 2_500_005);
+        assert_eq!(area.y(2.0), 35.0);
+        let nothing = PlotArea { end_ns: 5, ..area }.with_values(f64::NAN, f64::NAN);
+        assert!(nothing.x(5).is_finite() && nothing.y(0.3).is_finite());
+    }
+}

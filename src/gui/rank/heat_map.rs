@@ -1,0 +1,130 @@
+//! Null and weak directions by parameter name: a heat map with the signed weights written in.
+
+use egui::{Align2, FontFamily, FontId, Rect, RichText, Role, Sense, Stroke, StrokeKind, Ui, WidgetInfo, pos2, vec2};
+
+use super::verdict::parameters_of;
+use crate::gui::PanelContext;
+use crate::gui::convergence::names::{meaning_of, part_of};
+use crate::gui::theme::{self, Theme};
+use crate::gui::units::{counted, figure};
+use crate::observability::{CalibrationDirection, RankReport};
+
+const NAME_WIDTH: f32 = 62.0;
+const HEADER_HEIGHT: f32 = 28.0;
+const HIGHEST_ROW: f32 = 17.0;
+const LOWEST_ROW: f32 = 12.0;
+/// Narrowest column that still holds a signed number.
+const NUMBER_WIDTH: f32 = 30.0;
+const WIDEST_COLUMN: f32 = 46.0;
+const NARROWEST_COLUMN: f32 = 15.0;
+/// Weights below this may be left out when room is short.
+const SMALLEST_SHOWN: f64 = 0.1;
+
+/// Draws the heat map in about so many points of height; it takes more when it must.
+pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, rank: &RankReport, height: f32) {
+    let theme = *ctx.theme;
+    if rank.directions.is_empty() {
+        ui.label(RichText::new("No null or weak direction").color(theme.text_weak));
+        return;
+    }
+    let width = ui.available_width();
+    let room = (width - NAME_WIDTH).max(NARROWEST_COLUMN);
+    let count = rank.directions.len().min((room / NARROWEST_COLUMN) as usize).max(1);
+    let pitch = (room / count as f32).min(WIDEST_COLUMN);
+    let directions = &rank.directions[..count];
+
+    let mut rows: Vec<usize> = (0..rank.names.len()).collect();
+    rows.sort_by_key(|row| part_of(&rank.names[*row]));
+    let all = rows.len();
+    if (height - HEADER_HEIGHT) / (rows.len() as f32) < LOWEST_ROW {
+        rows.retain(|row| {
+            let weight = |direction: &CalibrationDirection| direction.weights.get(*row).copied().unwrap_or(0.0);
+            directions.iter().any(|direction| weight(direction).abs() >= SMALLEST_SHOWN)
+        });
+    }
+    let left_out = all - rows.len();
+    let row_height = ((height - HEADER_HEIGHT) / rows.len().max(1) as f32).clamp(LOWEST_ROW, HIGHEST_ROW);
+    let (_, rect) = ui.allocate_space(vec2(width, HEADER_HEIGHT + row_height * rows.len() as f32));
+
+    for (column, direction) in directions.iter().enumerate() {
+        let left = rect.left() + NAME_WIDTH + column as f32 * pitch;
+        let cell = Rect::from_min_size(pos2(left, rect.top()), vec2(pitch, HEADER_HEIGHT));
+        header(ui, &theme, rank, direction, column, cell);
+    }
+    for (place, row) in rows.iter().enumerate() {
+        let top = rect.top() + HEADER_HEIGHT + place as f32 * row_height;
+        let line = Rect::from_min_size(pos2(rect.left(), top), vec2(NAME_WIDTH + pitch * count as f32, row_height));
+        row_ui(ui, ctx, &rank.names[*row], *row, directions, line, pitch);
+    }
+    if left_out > 0 || count < rank.directions.len() {
+        let mut notes = Vec::new();
+        if left_out > 0 {
+            notes.push(format!("{} with weights under {SMALLEST_SHOWN}", counted(left_out, "parameter")));
+        }
+        if count < rank.directions.len() {
+            notes.push(counted(rank.directions.len() - count, "stronger direction"));
+        }
+        ui.label(RichText::new(format!("Not shown: {}", notes.join(", "))).small().color(theme.text_weak));
+    }
+}
+
+/// Number and singular value of a direction.
+fn header(ui: &Ui, theme: &Theme, rank: &RankReport, direction: &CalibrationDirection, column: usize, cell: Rect) {
+    let color = if direction.structural { theme.error } else { theme.warn };
+    let painter = ui.painter();
+    let mark = if direction.structural { "null" } else { "weak" };
+    let wide = cell.width() >= NUMBER_WIDTH;
+    let font = FontId::new(10.0, FontFamily::Proportional);
+    let top = cell.center_top();
+    painter.text(top, Align2::CENTER_TOP, if wide { mark } else { &mark[..1] }, font, color);
+    if wide {
+        let font = FontId::new(9.5, FontFamily::Monospace);
+        let value = if direction.structural { "0".to_owned() } else { figure(direction.singular_value) };
+        painter.text(top + vec2(0.0, 13.0), Align2::CENTER_TOP, value, font, theme.text_weak);
+    }
+    let response = ui.interact(cell, ui.unique_id().with(("direction", column)), Sense::hover());
+    let named = parameters_of(&rank.names, direction, 6);
+    response.widget_info(|| WidgetInfo::labeled(Role::Label, true, format!("{mark} direction {named}")));
+    response.on_hover_text(format!("{mark} direction, singular value {}\n{named}", figure(direction.singular_value)));
+}
+
+fn row_ui(
+    ui: &Ui,
+    ctx: &mut PanelContext<'_>,
+    name: &str,
+    row: usize,
+    directions: &[CalibrationDirection],
+    line: Rect,
+    pitch: f32,
+) {
+    let theme = *ctx.theme;
+    let painter = ui.painter();
+    let selected = ctx.selection.parameter.as_deref() == Some(name);
+    let color = if selected { theme.accent } else { theme.text };
+    painter.text(line.left_center(), Align2::LEFT_CENTER, name, theme::label_font(), color);
+    for (column, direction) in directions.iter().enumerate() {
+        let weight = direction.weights.get(row).copied().unwrap_or(0.0);
+        let left = line.left() + NAME_WIDTH + column as f32 * pitch;
+        let cell = Rect::from_min_size(pos2(left, line.top()), vec2(pitch, line.height())).shrink(0.5);
+        let ground = theme.diverging(weight);
+        painter.rect_filled(cell, 1.0, ground);
+        if weight.abs() >= 0.05 && pitch >= NUMBER_WIDTH {
+            let font = FontId::new((line.height() - 3.0).min(10.0), FontFamily::Monospace);
+            painter.text(cell.center(), Align2::CENTER_CENTER, format!("{weight:+.2}"), font, Theme::text_on(ground));
+        } else if weight.abs() >= 0.2 {
+            let sign = if weight < 0.0 { "−" } else { "+" };
+            let font = FontId::new(10.0, FontFamily::Monospace);
+            painter.text(cell.center(), Align2::CENTER_CENTER, sign, font, Theme::text_on(ground));
+        }
+    }
+    let response = ui.interact(line, ui.unique_id().with(("row", name)), Sense::click());
+    response.widget_info(|| WidgetInfo::selected(Role::Button, true, selected, format!("{name} weights")));
+    if selected || response.hovered() {
+        let stroke = Stroke::new(1.0, if selected { theme.accent } else { theme.outline });
+        painter.rect_stroke(line, 0.0, stroke, StrokeKind::Inside);
+    }
+    if response.clicked() {
+        ctx.selection.parameter = if selected { None } else { Some(name.to_owned()) };
+    }
+    response.on_hover_text(format!("{name}: {}", meaning_of(name, &ctx.recording.rig)));
+}

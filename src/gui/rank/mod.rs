@@ -1,0 +1,126 @@
+//! The rank panel: what the window can say about the calibration, in words, as a spectrum and by parameter name.
+
+mod heat_map;
+mod spectrum;
+pub(crate) mod verdict;
+
+use egui::{RichText, ScrollArea, Sense, Ui, vec2};
+
+use self::verdict::Level;
+use super::PanelContext;
+use super::convergence::empty_ui;
+use super::follow::RunTables;
+use super::plot::{Clicks, Curve, PlotArea, navigate, paint_cursor, paint_ground, paint_steps, visible_range};
+use super::theme::{CURVE_WIDTH, RunStyle, Theme};
+use crate::session::StepRecord;
+
+/// Columns of the tables over time.
+const STRUCTURAL: usize = 0;
+const INFORMED: usize = 1;
+const PARAMETERS: usize = 2;
+
+/// State of the rank panel.
+#[derive(Debug, Default)]
+pub struct RankPanel {
+    tables: RunTables,
+    /// By run: informed, then structural rank.
+    curves: Vec<[Curve; 2]>,
+}
+
+impl RankPanel {
+    /// Draws the panel.
+    pub fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
+        let recording = ctx.recording;
+        let Some(run) = recording.runs.get(ctx.selection.run.min(recording.runs.len().saturating_sub(1))) else {
+            empty_ui(ui, "No run yet");
+            return;
+        };
+        let Some(step) = run.step_at(ctx.cursor_ns) else {
+            empty_ui(ui, "No step at the cursor yet");
+            return;
+        };
+        let height = ui.available_height();
+        ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+            ui.spacing_mut().item_spacing.y = 3.0;
+            let top = ui.cursor().top();
+            verdict_ui(ui, ctx.theme, step);
+            let Some(rank) = step.rank.as_ref().filter(|rank| !rank.names.is_empty()) else {
+                self.over_time_ui(ui, ctx);
+                return;
+            };
+            spectrum::ui(ui, ctx.theme, rank, (0.2 * height).clamp(72.0, 130.0));
+            self.over_time_ui(ui, ctx);
+            let left = height - (ui.cursor().top() - top) - 4.0;
+            heat_map::ui(ui, ctx, rank, left);
+        });
+    }
+
+    /// Structural and informed rank of all runs over time.
+    fn over_time_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
+        const HEIGHT: f32 = 46.0;
+        let theme = *ctx.theme;
+        let tables = self.tables.read(&ctx.recording.runs, rank_row);
+        let most = tables.iter().flat_map(|table| &table.columns[PARAMETERS]).copied().fold(0.0, f64::max);
+        if most == 0.0 {
+            return;
+        }
+        let (_, rect) = ui.allocate_space(vec2(ui.available_width(), HEIGHT));
+        let (begin_ns, end_ns) = visible_range(ctx);
+        let area = PlotArea { rect, begin_ns, end_ns, low: 0.0, high: most * 1.08 };
+        let painter = ui.painter_at(rect);
+        paint_ground(&painter, &theme, rect);
+        self.curves.resize_with(tables.len(), Default::default);
+        for (run, (table, [informed, structural])) in tables.iter().zip(&mut self.curves).enumerate() {
+            informed.update(&area, table.epoch, &table.stamps_ns, &table.columns[INFORMED]);
+            structural.update(&area, table.epoch, &table.stamps_ns, &table.columns[STRUCTURAL]);
+            let style = theme.run(run);
+            let faint = RunStyle { color: style.color.gamma_multiply(0.45), ..style };
+            paint_steps(&painter, &area, structural, faint, CURVE_WIDTH);
+            paint_steps(&painter, &area, informed, style, CURVE_WIDTH);
+        }
+        paint_cursor(&painter, &theme, &area, ctx.cursor_ns);
+        let font = super::theme::label_font();
+        let place = rect.left_bottom() + vec2(3.0, -1.0);
+        painter.text(
+            place,
+            egui::Align2::LEFT_BOTTOM,
+            "informed rank over time (faint: structural)",
+            font,
+            theme.text_weak,
+        );
+        let id = ui.unique_id().with("rank over time");
+        navigate(ui, ctx, &area, id, "Rank over time", Clicks::Seek, false);
+    }
+}
+
+fn rank_row(step: &StepRecord) -> [f64; 3] {
+    step.rank.as_ref().filter(|rank| !rank.names.is_empty()).map_or([f64::NAN, f64::NAN, 0.0], |rank| {
+        [rank.rank_structural as f64, rank.rank_informed as f64, rank.names.len() as f64]
+    })
+}
+
+/// The verdict: a mark, one line, and the reasons.
+fn verdict_ui(ui: &mut Ui, theme: &Theme, step: &StepRecord) {
+    let verdict = verdict::verdict(step);
+    let (mark, color) = mark_of(verdict.level, theme);
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 5.0;
+        ui.label(RichText::new(mark).color(color).size(14.0));
+        ui.add(egui::Label::new(RichText::new(&verdict.headline).color(theme.text_strong).size(14.0)).truncate());
+    });
+    for reason in &verdict.reasons {
+        let response =
+            ui.add(egui::Label::new(RichText::new(reason).color(theme.text)).truncate().sense(Sense::hover()));
+        response.on_hover_text(reason);
+    }
+}
+
+/// A sign and its colour: never the colour alone.
+fn mark_of(level: Level, theme: &Theme) -> (&'static str, egui::Color32) {
+    match level {
+        Level::Good => ("✔", theme.ok),
+        Level::Weak => ("⚠", theme.warn),
+        Level::Lost => ("✖", theme.error),
+        Level::None => ("…", theme.text_weak),
+    }
+}

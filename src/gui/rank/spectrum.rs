@@ -1,0 +1,117 @@
+//! The singular values on a logarithmic axis, with both thresholds.
+
+use egui::{Align2, FontFamily, FontId, Rect, Role, Sense, Stroke, StrokeKind, Ui, WidgetInfo, pos2, vec2};
+
+use super::verdict::parameters_of;
+use crate::gui::plot::paint_ground;
+use crate::gui::theme::Theme;
+use crate::gui::units::figure;
+use crate::observability::RankReport;
+
+/// Draws the spectrum in so many points of height.
+pub(super) fn ui(ui: &mut Ui, theme: &Theme, rank: &RankReport, height: f32) {
+    let (_, rect) = ui.allocate_space(vec2(ui.available_width(), height));
+    let painter = ui.painter_at(rect);
+    paint_ground(&painter, theme, rect);
+    let plot = Rect::from_min_max(rect.min + vec2(30.0, 3.0), rect.max - vec2(4.0, 3.0));
+    let Some(axis) = LogAxis::of(rank, plot) else { return };
+
+    // Decades: a line for each third, its power of ten beside it.
+    let font = FontId::new(9.0, FontFamily::Monospace);
+    for decade in (axis.low.ceil() as i32..=axis.high.floor() as i32).filter(|decade| decade.rem_euclid(3) == 0) {
+        let y = axis.y_of_power(f64::from(decade));
+        painter.hline(plot.x_range(), y, Stroke::new(1.0, theme.grid));
+        painter.text(
+            pos2(plot.left() - 3.0, y),
+            Align2::RIGHT_CENTER,
+            format!("1e{decade}"),
+            font.clone(),
+            theme.text_weak,
+        );
+    }
+
+    let pitch = plot.width() / rank.singular_values.len() as f32;
+    let width = (pitch * 0.62).clamp(2.0, 22.0);
+    for (index, value) in rank.singular_values.iter().enumerate() {
+        let x = plot.left() + (index as f32 + 0.5) * pitch;
+        let color = if *value <= rank.structural_threshold {
+            theme.error
+        } else if *value < rank.informed_threshold {
+            theme.warn
+        } else {
+            theme.ok
+        };
+        let bar = Rect::from_min_max(pos2(x - width / 2.0, axis.y(*value)), pos2(x + width / 2.0, plot.bottom()));
+        if *value <= rank.structural_threshold {
+            // A zero has no height: an open box at the foot stands for it.
+            let zero = Rect::from_min_max(pos2(bar.left(), plot.bottom() - 5.0), bar.max);
+            painter.rect_stroke(zero, 0.0, Stroke::new(1.0, color), StrokeKind::Inside);
+        } else {
+            painter.rect_filled(bar, 0.0, color.gamma_multiply(0.85));
+        }
+        if let Some(with_priors) = rank.singular_values_with_priors.get(index) {
+            painter.hline(bar.x_range().expand(1.0), axis.y(*with_priors), Stroke::new(1.5, theme.text));
+        }
+    }
+    threshold(&painter, theme, plot, axis.y(rank.informed_threshold), "informed");
+    threshold(&painter, theme, plot, axis.y(rank.structural_threshold), "structural zero");
+
+    let response = ui.interact(rect, ui.unique_id().with("spectrum"), Sense::hover());
+    response.widget_info(|| WidgetInfo::labeled(Role::Image, true, "Singular values"));
+    if let Some(pointer) = response.hover_pos() {
+        let index = ((pointer.x - plot.left()) / pitch) as usize;
+        if let Some(value) = rank.singular_values.get(index).filter(|_| plot.x_range().contains(pointer.x)) {
+            let mut text = format!("σ{} = {}", index + 1, figure(*value));
+            if let Some(with_priors) = rank.singular_values_with_priors.get(index) {
+                text.push_str(&format!("\nwith priors {}", figure(*with_priors)));
+            }
+            // Directions come weakest first, singular values largest first.
+            let direction = (rank.singular_values.len() - 1).checked_sub(index).and_then(|d| rank.directions.get(d));
+            if let Some(direction) = direction {
+                text.push_str(&format!("\n{}", parameters_of(&rank.names, direction, 4)));
+            }
+            response.on_hover_text_at_pointer(text);
+        }
+    }
+}
+
+fn threshold(painter: &egui::Painter, theme: &Theme, plot: Rect, y: f32, name: &str) {
+    let points = [pos2(plot.left(), y), pos2(plot.right(), y)];
+    painter.extend(egui::Shape::dashed_line(&points, Stroke::new(1.0, theme.text_strong), 4.0, 3.0));
+    let galley =
+        painter.layout_no_wrap(name.to_owned(), FontId::new(10.0, FontFamily::Proportional), theme.text_strong);
+    let place = pos2(plot.right() - galley.size().x - 2.0, y - galley.size().y);
+    let ground = Rect::from_min_size(place, galley.size()).expand2(vec2(2.0, -1.0));
+    painter.rect_filled(ground, 2.0, theme.plot_background.gamma_multiply(0.8));
+    painter.galley(place, galley, theme.text_strong);
+}
+
+/// Powers of ten along the vertical axis.
+struct LogAxis {
+    plot: Rect,
+    low: f64,
+    high: f64,
+}
+
+impl LogAxis {
+    fn of(rank: &RankReport, plot: Rect) -> Option<Self> {
+        let largest = rank.singular_values.iter().chain(&rank.singular_values_with_priors).copied();
+        let largest = largest.filter(|value| value.is_finite()).fold(rank.informed_threshold, f64::max);
+        let smallest = if rank.structural_threshold > 0.0 { rank.structural_threshold } else { largest * 1e-12 };
+        let (low, high) = (smallest.log10() - 1.2, largest.log10() + 0.6);
+        (low.is_finite() && high.is_finite() && low < high && !rank.singular_values.is_empty()).then_some(Self {
+            plot,
+            low,
+            high,
+        })
+    }
+
+    fn y_of_power(&self, power: f64) -> f32 {
+        let fraction = ((power - self.low) / (self.high - self.low)).clamp(0.0, 1.0);
+        self.plot.bottom() - fraction as f32 * self.plot.height()
+    }
+
+    fn y(&self, value: f64) -> f32 {
+        if value > 0.0 { self.y_of_power(value.log10()) } else { self.plot.bottom() }
+    }
+}

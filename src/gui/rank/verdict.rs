@@ -1,0 +1,140 @@
+//! The rank of a step in words.
+
+use crate::estimator::{EventKind, Phase};
+use crate::gui::units::counted;
+use crate::observability::{CalibrationDirection, RankReport};
+use crate::session::StepRecord;
+
+/// How good the news is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Level {
+    /// Everything is informed.
+    Good,
+    /// Some directions are weak.
+    Weak,
+    /// Some directions are not seen at all.
+    Lost,
+    /// Nothing can be said yet.
+    None,
+}
+
+/// What the panel says first.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Verdict {
+    /// How good the news is.
+    pub(crate) level: Level,
+    /// One line.
+    pub(crate) headline: String,
+    /// Why, one line each.
+    pub(crate) reasons: Vec<String>,
+}
+
+/// What a step says about the calibration's observability.
+pub(crate) fn verdict(step: &StepRecord) -> Verdict {
+    match &step.rank {
+        Some(rank) if rank.names.is_empty() => {
+            let headline = "This run estimates no calibration".to_owned();
+            Verdict { level: Level::None, headline, reasons: Vec::new() }
+        }
+        Some(rank) => of_rank(rank),
+        None => {
+            let initializing = step.report.phase == Phase::Initializing;
+            let headline = if initializing { "Initializing, no rank yet" } else { "No rank for this step" };
+            let waits = step.report.events.iter().filter(|event| event.kind == EventKind::InitializationWaits);
+            let reasons = waits.map(|event| event.message.clone()).collect();
+            Verdict { level: Level::None, headline: headline.to_owned(), reasons }
+        }
+    }
+}
+
+fn of_rank(rank: &RankReport) -> Verdict {
+    let columns = rank.names.len();
+    let null = columns.saturating_sub(rank.rank_structural);
+    let weak = rank.rank_structural.saturating_sub(rank.rank_informed);
+    let (level, headline) = match (null, weak) {
+        (0, 0) => (Level::Good, format!("All {columns} directions informed")),
+        (0, _) => (Level::Weak, format!("Rank {columns} of {columns}, {} informed, {weak} weak", rank.rank_informed)),
+        _ => {
+            let kept = rank.rank_structural;
+            (Level::Lost, format!("Rank {kept} of {columns}: {null} unobservable, {weak} weak"))
+        }
+    };
+    let mut reasons = Vec::new();
+    let causes = [
+        (rank.deficit_parameterization, "redundant in the parameterization"),
+        (rank.deficit_joints, "joints that did not move"),
+        (rank.deficit_absorbed, "absorbed by free joint angles"),
+        (rank.deficit_motion, "motion of the vehicle"),
+    ];
+    let causes: Vec<String> =
+        causes.iter().filter(|(count, _)| *count > 0).map(|(count, cause)| format!("{count} {cause}")).collect();
+    if !causes.is_empty() {
+        reasons.push(format!("Lost to: {}", causes.join(", ")));
+    }
+    if let Some(direction) = rank.directions.iter().find(|direction| !direction.structural) {
+        reasons.push(format!("Weakest: {}", parameters_of(&rank.names, direction, 3)));
+    } else if let Some(direction) = rank.directions.first() {
+        reasons.push(format!("Unobservable: {}", parameters_of(&rank.names, direction, 3)));
+    }
+    if let Some((lock, margin)) =
+        rank.margins.iter().min_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, m)| *m < LOW_MARGIN)
+    {
+        reasons.push(format!("Chart near its lock: {lock} margin {margin:.2}"));
+    }
+    Verdict { level, headline, reasons }
+}
+
+/// Below this margin a chart is switched (section 6 of the mathematics notes).
+const LOW_MARGIN: f64 = 0.3;
+
+/// The strongest parameters of a direction, `L1.d - I.tx`, at most `most`.
+pub(crate) fn parameters_of(names: &[String], direction: &CalibrationDirection, most: usize) -> String {
+    const SMALLEST_NAMED: f64 = 0.2;
+    let mut entries: Vec<(usize, f64)> = direction.weights.iter().copied().enumerate().collect();
+    entries.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
+    entries.retain(|(_, weight)| weight.abs() >= SMALLEST_NAMED);
+    let left_out = entries.len().saturating_sub(most);
+    // A direction has no sign of its own: the first entry counts as positive.
+    let flip = entries.first().map_or(1.0, |(_, weight)| weight.signum());
+    let mut text = String::new();
+    for (place, (column, weight)) in entries.iter().take(most).enumerate() {
+        let sign = if weight * flip < 0.0 { " − " } else { " + " };
+        if place > 0 {
+            text.push_str(sign);
+        }
+        text.push_str(names.get(*column).map_or("?", String::as_str));
+    }
+    if left_out > 0 {
+        text.push_str(&format!(" and {}", counted(left_out, "other")));
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gui::sample_recording::{FIRST_TRACKED_FRAME, sample_recording_of};
+
+    #[test]
+    fn the_verdict_says_what_is_lost_and_to_what() {
+        let recording = sample_recording_of(FIRST_TRACKED_FRAME + 10, &["auto", "classical"]);
+        let said = |run: usize, step: usize| verdict(&recording.runs[run].steps[step]);
+        let waiting = said(0, 3);
+        assert_eq!((waiting.level, waiting.headline.as_str()), (Level::None, "Initializing, no rank yet"));
+        assert_eq!(said(0, FIRST_TRACKED_FRAME + 5).level, Level::Weak);
+        let classical = said(1, FIRST_TRACKED_FRAME + 5);
+        assert_eq!(classical.level, Level::Lost);
+        assert!(classical.headline.starts_with("Rank 18 of 24: 6 unobservable"), "{}", classical.headline);
+        assert_eq!(classical.reasons[0], "Lost to: 6 redundant in the parameterization");
+    }
+
+    #[test]
+    fn directions_are_named_by_their_strongest_parameters() {
+        let names: Vec<String> = ["a", "b", "c", "d"].map(str::to_owned).into();
+        let direction =
+            |weights: &[f64]| CalibrationDirection { singular_value: 0.0, structural: true, weights: weights.to_vec() };
+        assert_eq!(parameters_of(&names, &direction(&[-0.7, 0.7, 0.0, 0.1]), 3), "a − b");
+        assert_eq!(parameters_of(&names, &direction(&[0.5, 0.5, 0.5, 0.5]), 2), "a + b and 2 others");
+        assert_eq!(parameters_of(&names, &direction(&[0.0; 4]), 2), "");
+    }
+}

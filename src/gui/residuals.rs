@@ -1,0 +1,216 @@
+//! The residuals panel: how well the window fits, as a histogram, over time, and by kind of factor.
+
+use std::sync::Arc;
+
+use egui::{
+    Align2, FontFamily, FontId, Grid, Rect, RichText, Role, ScrollArea, Sense, Stroke, Ui, WidgetInfo, pos2, vec2,
+};
+
+use super::PanelContext;
+use super::convergence::empty_ui;
+use super::follow::RunTables;
+use super::histogram::ResidualHistogram;
+use super::plot::{
+    Clicks, Curve, PlotArea, decimals_of_step, navigate, paint_cursor, paint_curve, paint_ground, paint_value_grid,
+    ticks, visible_range,
+};
+use super::theme::{CURVE_WIDTH, Theme, label_font};
+use super::units::{figure, fixed};
+use crate::estimator::{ResidualSummary, StepReport};
+use crate::session::StepRecord;
+
+/// State of the residuals panel.
+#[derive(Debug, Default)]
+pub struct ResidualsPanel {
+    tables: RunTables,
+    curves: Vec<Curve>,
+    /// The step that the histogram was made of.
+    counted: Option<(Arc<StepRecord>, ResidualHistogram)>,
+}
+
+impl ResidualsPanel {
+    /// Draws the panel.
+    pub fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
+        let recording = ctx.recording;
+        let run = ctx.selection.run.min(recording.runs.len().saturating_sub(1));
+        let Some(step) = recording.runs.get(run).and_then(|run| run.step_at(ctx.cursor_ns)) else {
+            empty_ui(ui, "No step at the cursor yet");
+            return;
+        };
+        if !self.counted.as_ref().is_some_and(|(counted, _)| Arc::ptr_eq(counted, step)) {
+            self.counted = Some((Arc::clone(step), ResidualHistogram::of(&step.report)));
+        }
+        let height = ui.available_height();
+        let wide = ui.available_width() > 1.6 * height && ui.available_width() > 560.0;
+        ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+            ui.spacing_mut().item_spacing.y = 3.0;
+            if wide {
+                ui.columns(2, |columns| {
+                    self.left_ui(&mut columns[0], ctx, &step.report, height - 4.0);
+                    factors_ui(&mut columns[1], ctx.theme, &step.report.residuals);
+                });
+            } else {
+                let table = 22.0 + 19.0 * step.report.residuals.len() as f32;
+                self.left_ui(ui, ctx, &step.report, height - table - 8.0);
+                factors_ui(ui, ctx.theme, &step.report.residuals);
+            }
+        });
+    }
+
+    fn left_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>, report: &StepReport, height: f32) {
+        let theme = *ctx.theme;
+        let Some((_, histogram)) = &self.counted else { return };
+        summary_ui(ui, &theme, report, histogram);
+        let over_time = (0.3 * height).clamp(44.0, 110.0);
+        histogram_ui(ui, &theme, histogram, (height - over_time - 44.0).clamp(60.0, 260.0));
+        self.over_time_ui(ui, ctx, over_time);
+    }
+
+    /// Root mean square of the reprojection residuals after the solve, all runs.
+    fn over_time_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>, height: f32) {
+        let theme = *ctx.theme;
+        let (_, rect) = ui.allocate_space(vec2(ui.available_width(), height));
+        let (begin_ns, end_ns) = visible_range(ctx);
+        let mut area = PlotArea { rect, begin_ns, end_ns, low: 0.0, high: 1.0 };
+        let tables = self.tables.read(&ctx.recording.runs, |step| [rms_px(&step.report)]);
+        self.curves.resize_with(tables.len(), Curve::default);
+        for (table, curve) in tables.iter().zip(&mut self.curves) {
+            curve.update(&area, table.epoch, &table.stamps_ns, &table.columns[0]);
+        }
+        let most = self.curves.iter().filter_map(|curve| curve.extent).map(|(_, most)| most).fold(0.0, f64::max);
+        area = area.with_values(0.0, if most > 0.0 { 1.1 * most } else { 1.0 });
+        let painter = ui.painter_at(rect);
+        paint_ground(&painter, &theme, rect);
+        paint_value_grid(&painter, &theme, &area, 1.0, (height / 22.0) as usize + 1);
+        for (run, curve) in self.curves.iter().enumerate() {
+            paint_curve(&painter, &area, curve, theme.run(run), CURVE_WIDTH);
+        }
+        paint_cursor(&painter, &theme, &area, ctx.cursor_ns);
+        let place = rect.right_top() + vec2(-3.0, 1.0);
+        painter.text(place, Align2::RIGHT_TOP, "reprojection RMS over time, px", label_font(), theme.text_weak);
+        let id = ui.unique_id().with("rms over time");
+        navigate(ui, ctx, &area, id, "Reprojection RMS over time", Clicks::Seek, false);
+    }
+}
+
+/// The step's reprojection RMS after the solve, not-a-number without a solve.
+pub(crate) fn rms_px(report: &StepReport) -> f64 {
+    if report.window.is_empty() { f64::NAN } else { report.reprojection_rms_after_px }
+}
+
+/// The figures in one line.
+fn summary_ui(ui: &mut Ui, theme: &Theme, report: &StepReport, histogram: &ResidualHistogram) {
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing = vec2(4.0, 2.0);
+        let mut pair = |name: &str, value: String| {
+            ui.label(RichText::new(name).color(theme.text_weak));
+            ui.label(RichText::new(value).monospace().color(theme.text_strong));
+            ui.add_space(6.0);
+        };
+        let before = fixed(report.reprojection_rms_before_px, 2);
+        pair("RMS", format!("{before} → {} px", fixed(report.reprojection_rms_after_px, 2)));
+        pair("median", format!("{} px", fixed(histogram.median_px, 2)));
+        pair("95 %", format!("{} px", fixed(histogram.p95_px, 2)));
+        pair("mean u, v", format!("{}, {}", fixed(histogram.mean_px[0], 2), fixed(histogram.mean_px[1], 2)));
+        pair("observations", histogram.observations.to_string());
+        pair("downweighted", histogram.downweighted.to_string());
+        pair("rejected", histogram.rejected.to_string());
+    });
+}
+
+fn histogram_ui(ui: &mut Ui, theme: &Theme, histogram: &ResidualHistogram, height: f32) {
+    let (_, rect) = ui.allocate_space(vec2(ui.available_width(), height));
+    let painter = ui.painter_at(rect);
+    paint_ground(&painter, theme, rect);
+    let plot = Rect::from_min_max(rect.min + vec2(2.0, 4.0), rect.max - vec2(2.0, 14.0));
+    let reach = histogram.reach_px;
+    let x = |value: f64| plot.center().x + (value / reach) as f32 * plot.width() / 2.0;
+    let font = FontId::new(9.0, FontFamily::Monospace);
+    let (marks, step) = ticks(-reach, reach, (plot.width() / 60.0) as usize);
+    for mark in marks {
+        painter.vline(x(mark), plot.y_range(), Stroke::new(1.0, theme.grid));
+        let text = fixed(mark, decimals_of_step(step));
+        painter.text(pos2(x(mark), plot.bottom() + 1.0), Align2::CENTER_TOP, text, font.clone(), theme.text_weak);
+    }
+    let most = histogram.after.iter().chain(&histogram.before).copied().max().unwrap_or(0).max(1) as f32;
+    let pitch = plot.width() / histogram.after.len().max(1) as f32;
+    let y = |count: usize| plot.bottom() - count as f32 / most * plot.height();
+    for (bin, count) in histogram.after.iter().enumerate() {
+        let left = plot.left() + bin as f32 * pitch;
+        let bar = Rect::from_min_max(pos2(left + 0.5, y(*count)), pos2(left + pitch - 0.5, plot.bottom()));
+        painter.rect_filled(bar, 0.0, theme.accent.gamma_multiply(0.75));
+    }
+    let outline: Vec<_> = histogram
+        .before
+        .iter()
+        .enumerate()
+        .flat_map(|(bin, count)| {
+            let left = plot.left() + bin as f32 * pitch;
+            [pos2(left, y(*count)), pos2(left + pitch, y(*count))]
+        })
+        .collect();
+    painter.add(egui::Shape::line(outline, Stroke::new(1.0, theme.warn)));
+    painter.vline(x(0.0), plot.y_range(), Stroke::new(1.0, theme.text_weak));
+
+    let key = rect.left_top() + vec2(5.0, 2.0);
+    let end = painter.text(key, Align2::LEFT_TOP, "■ after", label_font(), theme.accent);
+    let next = pos2(end.right() + 8.0, key.y);
+    painter.text(next, Align2::LEFT_TOP, "— before the solve", label_font(), theme.warn);
+    let outside = if histogram.outside > 0 { format!("{} outside, px", histogram.outside) } else { "px".to_owned() };
+    painter.text(rect.right_top() + vec2(-5.0, 2.0), Align2::RIGHT_TOP, outside, label_font(), theme.text_weak);
+    let response = ui.interact(rect, ui.unique_id().with("histogram"), Sense::hover());
+    response.widget_info(|| WidgetInfo::labeled(Role::Image, true, "Histogram of reprojection residuals"));
+}
+
+/// χ² by kind of factor: before, after, and per residual, where about 1 is as expected.
+fn factors_ui(ui: &mut Ui, theme: &Theme, residuals: &[ResidualSummary]) {
+    if residuals.is_empty() {
+        ui.label(RichText::new("No solve in this step").color(theme.text_weak));
+        return;
+    }
+    Grid::new("chi2 by factor").num_columns(5).spacing(vec2(10.0, 2.0)).striped(true).show(ui, |ui| {
+        for heading in ["factor", "residuals", "χ² before", "χ² after", "per residual"] {
+            ui.label(RichText::new(heading).small().color(theme.text_weak));
+        }
+        ui.end_row();
+        for summary in residuals {
+            ui.label(RichText::new(summary.factor).color(theme.text));
+            let number = |text: String| RichText::new(text).monospace().color(theme.text_strong);
+            ui.label(number(summary.count.to_string()));
+            ui.label(number(figure(summary.chi2_before)));
+            ui.label(number(figure(summary.chi2_after)));
+            ratio_ui(ui, theme, summary.chi2_after / summary.count as f64);
+            ui.end_row();
+        }
+    });
+}
+
+/// χ² per residual with a bar around 1.
+fn ratio_ui(ui: &mut Ui, theme: &Theme, ratio: f64) {
+    let (color, says) = if !ratio.is_finite() {
+        (theme.text_weak, "")
+    } else if ratio > 2.0 {
+        (theme.error, "residuals larger than their noise says")
+    } else if ratio < 0.3 {
+        (theme.warn, "residuals smaller than their noise says")
+    } else {
+        (theme.ok, "as the noise says")
+    };
+    let response = ui
+        .horizontal(|ui| {
+            ui.label(RichText::new(fixed(ratio, 2)).monospace().color(color));
+            let (_, rect) = ui.allocate_space(vec2(48.0, 10.0));
+            let painter = ui.painter();
+            painter.rect_filled(rect, 1.0, theme.surface_raised);
+            if ratio.is_finite() {
+                let share = (ratio / 3.0).clamp(0.0, 1.0) as f32;
+                let bar = Rect::from_min_size(rect.min, vec2(rect.width() * share, rect.height()));
+                painter.rect_filled(bar, 1.0, color);
+            }
+            painter.vline(rect.left() + rect.width() / 3.0, rect.y_range().expand(1.0), Stroke::new(1.0, theme.text));
+        })
+        .response;
+    if !says.is_empty() {
+        response.on_hover_text(says);
+    }
+}

@@ -1,0 +1,110 @@
+//! How numbers are shown: degrees and millimetres on screen, radians and metres underneath.
+
+/// What a stored unit becomes on screen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Shown {
+    /// Stored value times this is the shown one.
+    pub(crate) factor: f64,
+    /// The shown unit with the space that belongs before it.
+    pub(crate) unit: &'static str,
+}
+
+impl Shown {
+    /// How a stored unit (`rad`, `m`) is shown; others stay as they are, without a unit.
+    pub(crate) fn of(stored_unit: &str) -> Self {
+        match stored_unit {
+            "rad" => Self { factor: 180.0 / std::f64::consts::PI, unit: "°" },
+            "m" => Self { factor: 1000.0, unit: " mm" },
+            _ => Self { factor: 1.0, unit: "" },
+        }
+    }
+
+    /// A stored value with its unit, as precise as its standard deviation says (two digits of it).
+    pub(crate) fn value(self, stored: f64, stored_sigma: f64) -> String {
+        format!("{}{}", fixed(stored * self.factor, decimals_for(stored_sigma * self.factor)), self.unit)
+    }
+
+    /// A standard deviation with its unit, to two digits.
+    pub(crate) fn sigma(self, stored_sigma: f64) -> String {
+        let sigma = stored_sigma * self.factor;
+        if sigma.is_finite() { format!("{}{}", fixed(sigma, decimals_for(sigma)), self.unit) } else { "–".to_owned() }
+    }
+}
+
+/// Decimals that show two digits of a standard deviation; two when it is unknown.
+fn decimals_for(sigma: f64) -> usize {
+    if sigma.is_finite() && sigma > 0.0 { (1.0 - sigma.log10().floor()).clamp(0.0, 5.0) as usize } else { 2 }
+}
+
+/// A number with so many decimals, a dash when it is not finite, never a negative zero.
+pub(crate) fn fixed(value: f64, decimals: usize) -> String {
+    if !value.is_finite() {
+        return "–".to_owned();
+    }
+    let text = format!("{value:.decimals$}");
+    match text.strip_prefix('-') {
+        Some(digits) if digits.bytes().all(|byte| matches!(byte, b'0' | b'.')) => digits.to_owned(),
+        _ => text,
+    }
+}
+
+/// A number to three significant digits, in powers of ten when it is very large or small.
+pub(crate) fn figure(value: f64) -> String {
+    let size = value.abs();
+    if !value.is_finite() {
+        "–".to_owned()
+    } else if size == 0.0 {
+        "0".to_owned()
+    } else if size < 1e-3 || size >= 1e6 {
+        format!("{value:.1e}")
+    } else {
+        fixed(value, (2.0 - size.log10().floor()).clamp(0.0, 4.0) as usize)
+    }
+}
+
+/// Seconds since the log began, in milliseconds' steps.
+pub(crate) fn seconds(stamp_ns: i64) -> String {
+    fixed(crate::geometry::seconds_from_ns(stamp_ns), 3)
+}
+
+/// A size in memory in binary units.
+pub(crate) fn bytes(count: u64) -> String {
+    let mebibytes = count as f64 / (1 << 20) as f64;
+    if mebibytes < 1024.0 { format!("{mebibytes:.0} MiB") } else { format!("{:.2} GiB", mebibytes / 1024.0) }
+}
+
+/// A count with its noun, `1 run`, `2 runs`.
+pub(crate) fn counted(count: usize, noun: &str) -> String {
+    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_as_precise_as_their_sigma() {
+        let angle = Shown::of("rad");
+        assert_eq!(angle.value(1.0, 0.0002), "57.296°");
+        assert_eq!(angle.sigma(0.0002), "0.011°");
+        assert_eq!(Shown::of("m").value(-0.0123, 0.0004), "-12.30 mm");
+        assert_eq!(Shown::of("m").value(0.05, f64::NAN), "50.00 mm");
+        assert_eq!(angle.sigma(f64::NAN), "–");
+        assert_eq!(Shown::of("s").value(0.25, 0.01), "0.250");
+    }
+
+    #[test]
+    fn numbers_never_look_silly() {
+        assert_eq!(fixed(-0.0004, 2), "0.00");
+        assert_eq!(fixed(-0.4, 1), "-0.4");
+        assert_eq!(fixed(f64::INFINITY, 1), "–");
+        assert_eq!(figure(0.0), "0");
+        assert_eq!(figure(1234.5), "1234");
+        assert_eq!(figure(0.012345), "0.0123");
+        assert_eq!(figure(3e-14), "3.0e-14");
+        assert_eq!(seconds(12_350_400_000), "12.350");
+        assert_eq!(bytes(300 << 20), "300 MiB");
+        assert_eq!(bytes(3 << 29), "1.50 GiB");
+        assert_eq!(counted(1, "run"), "1 run");
+    }
+}
