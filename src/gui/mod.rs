@@ -1,8 +1,16 @@
 //! Panels, the 3D scene and the window: they read a recording at a cursor and push commands.
 
+pub mod convergence;
+mod follow;
 pub mod headless;
+mod histogram;
 pub mod image_panel;
 pub mod painter;
+#[cfg(test)]
+mod panel_tests;
+mod plot;
+pub mod rank;
+pub mod residuals;
 #[cfg(test)]
 mod sample_calibration;
 #[cfg(test)]
@@ -11,14 +19,8 @@ mod sample_images;
 pub(crate) mod sample_recording;
 #[cfg(test)]
 mod tests;
-pub mod convergence;
-mod follow;
-mod histogram;
-mod plot;
-pub mod rank;
-pub mod residuals;
-mod units;
 pub mod theme;
+mod units;
 
 use std::sync::Arc;
 

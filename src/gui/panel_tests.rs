@@ -1,0 +1,125 @@
+//! Every panel is drawn at instants that try it; nothing may panic, and the pictures can be kept for looking at.
+
+use egui::Ui;
+
+use super::headless::{HeadlessOptions, draw};
+use super::sample_recording::{sample_images, sample_recording, sample_recording_of};
+use super::tests::{keep_picture, with_context};
+use super::theme::{Theme, ThemeName};
+use super::{PanelContext, Selection};
+use crate::session::Recording;
+
+const SECOND_NS: i64 = 1_000_000_000;
+
+/// Draws a panel at an instant and keeps the picture.
+fn picture(
+    name: &str,
+    recording: &Recording,
+    cursor_ns: i64,
+    size_px: [u32; 2],
+    theme: ThemeName,
+    selection: &Selection,
+    mut show: impl FnMut(&mut Ui, &mut PanelContext<'_>),
+) {
+    let mut selection = selection.clone();
+    let colors = Theme::of(theme);
+    let image = draw(HeadlessOptions { size_px, pixels_per_point: 1.0, theme }, |ui| {
+        let frame = egui::Frame::new().fill(colors.surface).inner_margin(super::theme::PANEL_MARGIN);
+        frame.show(ui, |ui| {
+            with_context(recording, cursor_ns, &mut sample_images(), &mut selection, &colors, |ctx| show(ui, ctx));
+        });
+    });
+    keep_picture(name, &image);
+}
+
+/// Recordings and instants that leave out what a panel may have counted on.
+fn trying_cases() -> Vec<(&'static str, Recording, i64)> {
+    let whole = sample_recording_of(70, &["auto", "classical"]);
+    let mut no_runs = whole.clone();
+    no_runs.runs.clear();
+    let mut no_steps = whole.clone();
+    for run in &mut no_steps.runs {
+        run.steps.clear();
+        run.alignment = None;
+    }
+    let mut no_truth = whole.clone();
+    no_truth.truth_rig = None;
+    for run in &mut no_truth.runs {
+        run.alignment = None;
+        for step in &mut run.steps {
+            std::sync::Arc::make_mut(step).truth = None;
+        }
+    }
+    let mut rigid = whole.clone();
+    std::sync::Arc::make_mut(&mut rigid.rig).gimbal = None;
+    rigid.truth_rig = None;
+    for step in rigid.runs.iter_mut().flat_map(|run| &mut run.steps) {
+        let step = std::sync::Arc::make_mut(step);
+        let calibration = &mut step.report.calibration;
+        calibration.names.clear();
+        calibration.units.clear();
+        calibration.values.clear();
+        calibration.sigmas.clear();
+        calibration.prior_sigmas.clear();
+        calibration.margins.clear();
+        calibration.classical.links.clear();
+        for frame in &mut step.report.window {
+            frame.joint_angles_rad.clear();
+            frame.encoder_angles_rad = None;
+        }
+        step.rank = None;
+    }
+    let mut instant = whole.clone();
+    instant.duration_ns = 0;
+    let end_ns = whole.duration_ns;
+    vec![
+        ("no-runs", no_runs, end_ns),
+        ("no-steps", no_steps, end_ns),
+        ("no-truth", no_truth, end_ns),
+        ("rigid", rigid, end_ns),
+        ("instant", instant, 0),
+        ("initializing", whole.clone(), SECOND_NS),
+        ("before", whole.clone(), -5),
+        ("after", whole, 9 * end_ns),
+    ]
+}
+
+/// Draws a panel as it is meant to be seen, then in every trying case, large and tiny.
+fn check<P: Default>(name: &str, size_px: [u32; 2], mut ui: impl FnMut(&mut P, &mut Ui, &mut PanelContext<'_>)) {
+    let recording = sample_recording();
+    let selection = Selection { parameter: Some("L2.alpha".to_owned()), ..Selection::default() };
+    let second = Selection { run: 1, ..Selection::default() };
+    let mut shown = |file: &str, cursor_ns: i64, size_px: [u32; 2], theme: ThemeName, selection: &Selection| {
+        let mut panel = P::default();
+        picture(&format!("{name}-{file}"), &recording, cursor_ns, size_px, theme, selection, |panel_ui, ctx| {
+            ui(&mut panel, panel_ui, ctx);
+        });
+    };
+    shown("dark", 9 * SECOND_NS, size_px, ThemeName::Dark, &selection);
+    shown("light", 9 * SECOND_NS, size_px, ThemeName::Light, &selection);
+    shown("print", 9 * SECOND_NS, size_px, ThemeName::Print, &second);
+    shown("second", 4 * SECOND_NS, size_px, ThemeName::Dark, &second);
+    shown("tiny", 9 * SECOND_NS, [90, 40], ThemeName::Dark, &selection);
+    for (case, recording, cursor_ns) in trying_cases() {
+        let mut panel = P::default();
+        let file = format!("{name}-{case}");
+        picture(&file, &recording, cursor_ns, size_px, ThemeName::Dark, &Selection::default(), |panel_ui, ctx| {
+            ui(&mut panel, panel_ui, ctx);
+        });
+    }
+}
+
+#[test]
+fn convergence_is_drawn_in_every_case() {
+    check("convergence", [1400, 420], super::convergence::ConvergencePanel::ui);
+}
+
+#[test]
+fn rank_is_drawn_in_every_case() {
+    check("rank", [480, 520], super::rank::RankPanel::ui);
+}
+
+#[test]
+fn residuals_are_drawn_in_every_case() {
+    check("residuals", [480, 420], super::residuals::ResidualsPanel::ui);
+}
