@@ -2,8 +2,25 @@
 //!
 //! Time is nanoseconds since the first message of the log (its header stamp drives; the log time is kept beside it).
 
+mod cdr;
+mod container;
+mod error;
+mod image_reader;
+mod log;
+mod messages;
+mod picture;
 pub mod rig;
 mod samples;
+mod stream;
+#[cfg(test)]
+mod tests;
+mod writer;
 
+pub use error::LogError;
+pub use image_reader::ImageReader;
+pub use log::{FlightLog, TopicInfo};
+pub use messages::MessageKind;
 pub use rig::Rig;
 pub use samples::{GrayImage, ImuSample, JointSample, LogWarning, PoseSample, SensorFrame};
+pub use stream::FrameStream;
+pub use writer::{LogCompression, LogWriter, LogWriterOptions, MessageTimes};

@@ -1,5 +1,14 @@
 //! The rig: what sensors a log holds and how they sit, in Kalibr's names.
 
+mod fields;
+mod find;
+mod kalibr;
+mod read;
+#[cfg(test)]
+mod tests;
+mod write;
+
+use super::LogError;
 use crate::camera::CameraModel;
 use crate::geometry::RigidTransform;
 use crate::gimbal::ClassicalChain;
@@ -111,4 +120,14 @@ pub struct Rig {
     pub gimbal: Option<GimbalRig>,
     /// Topic of the true pose of the IMU in the world.
     pub ground_truth_topic: Option<String>,
+}
+
+impl Rig {
+    /// The camera with a key such as `cam0`.
+    pub fn camera(&self, key: &str) -> Result<&CameraRig, LogError> {
+        self.cameras.iter().find(|camera| camera.key == key).ok_or_else(|| LogError::UnknownCamera {
+            key: key.to_owned(),
+            available: self.cameras.iter().map(|camera| camera.key.clone()).collect(),
+        })
+    }
 }

@@ -56,7 +56,8 @@ pub struct LogWarning {
 /// Everything that one image of one camera brings with it: what a front end and an estimator take in one step.
 #[derive(Clone, Debug)]
 pub struct SensorFrame {
-    /// Number of this image in its camera's stream, from 0, over the whole log (dropped images are not counted).
+    /// Number of this image in its camera's stream, from 0, over the whole log; images that are left out keep theirs, so
+    /// that it depends neither on where a replay starts nor on what was wrong before.
     pub index: usize,
     /// Header stamp of the image since the log began, on the camera's clock.
     pub stamp_ns: i64,

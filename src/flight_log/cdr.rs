@@ -1,0 +1,194 @@
+//! The Common Data Representation (OMG, XCDR1 plain) that ROS 2 writes: aligned little- or big-endian fields after a
+//! 4-byte encapsulation header.
+
+use thiserror::Error;
+
+/// Why a message could not be decoded.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[error("{what} at byte {offset} of the message")]
+pub(super) struct CdrError {
+    /// What is wrong.
+    pub(super) what: String,
+    /// Where, counted from the encapsulation header.
+    pub(super) offset: usize,
+}
+
+/// Size of the encapsulation header; alignment counts from its end.
+const ENCAPSULATION: usize = 4;
+
+/// Reads fields one after another, never past the end.
+#[derive(Clone, Debug)]
+pub(super) struct CdrReader<'a> {
+    message: &'a [u8],
+    /// Next byte, from the beginning of the message.
+    position: usize,
+    big_endian: bool,
+}
+
+macro_rules! read_number {
+    ($name:ident, $type:ty) => {
+        #[doc = concat!("The next `", stringify!($type), "`.")]
+        pub(super) fn $name(&mut self) -> Result<$type, CdrError> {
+            const SIZE: usize = size_of::<$type>();
+            self.align(SIZE);
+            let bytes = self.take(SIZE, stringify!($type))?;
+            let mut array = [0; SIZE];
+            array.copy_from_slice(bytes);
+            Ok(if self.big_endian { <$type>::from_be_bytes(array) } else { <$type>::from_le_bytes(array) })
+        }
+    };
+}
+
+impl<'a> CdrReader<'a> {
+    /// Reads the encapsulation header.
+    pub(super) fn new(message: &'a [u8]) -> Result<Self, CdrError> {
+        let big_endian = match message {
+            [0, 0, _, _, ..] => true,
+            [0, 1, _, _, ..] => false,
+            [first, second, _, _, ..] => {
+                let what =
+                    format!("encapsulation {first:#04x} {second:#04x} instead of plain CDR (0x00 0x00 or 0x00 0x01)");
+                return Err(CdrError { what, offset: 0 });
+            }
+            _ => {
+                let what = format!("{} bytes instead of an encapsulation header", message.len());
+                return Err(CdrError { what, offset: 0 });
+            }
+        };
+        Ok(Self { message, position: ENCAPSULATION, big_endian })
+    }
+
+    fn align(&mut self, size: usize) {
+        let offset = self.position - ENCAPSULATION;
+        self.position = ENCAPSULATION + offset.next_multiple_of(size);
+    }
+
+    fn take(&mut self, count: usize, what: &str) -> Result<&'a [u8], CdrError> {
+        let end = self.position.checked_add(count);
+        let bytes = end.and_then(|end| self.message.get(self.position..end)).ok_or_else(|| CdrError {
+            what: format!("ends at byte {} inside a {what} of {count} bytes", self.message.len()),
+            offset: self.position,
+        })?;
+        self.position += count;
+        Ok(bytes)
+    }
+
+    read_number!(read_u8, u8);
+    read_number!(read_u32, u32);
+    read_number!(read_i32, i32);
+    read_number!(read_f64, f64);
+
+    /// A fixed number of doubles.
+    pub(super) fn read_f64s<const N: usize>(&mut self) -> Result<[f64; N], CdrError> {
+        let mut values = [0.0; N];
+        for value in &mut values {
+            *value = self.read_f64()?;
+        }
+        Ok(values)
+    }
+
+    /// A sequence's length, refused when the rest of the message cannot hold that many elements.
+    fn read_length(&mut self, element_size: usize, what: &str) -> Result<usize, CdrError> {
+        let offset = self.position;
+        let count = self.read_u32()? as usize;
+        if count.saturating_mul(element_size) > self.message.len() - self.position {
+            let what = format!("{what} of {count} elements in a message of {} bytes", self.message.len());
+            return Err(CdrError { what, offset });
+        }
+        Ok(count)
+    }
+
+    /// A string without its terminating zero.
+    pub(super) fn read_string(&mut self) -> Result<&'a str, CdrError> {
+        let count = self.read_length(1, "string")?;
+        let offset = self.position;
+        let bytes = self.take(count, "string")?;
+        let text = bytes.strip_suffix(&[0]).unwrap_or(bytes);
+        std::str::from_utf8(text).map_err(|error| CdrError { what: format!("string is not UTF-8 ({error})"), offset })
+    }
+
+    /// A sequence of bytes, borrowed.
+    pub(super) fn read_bytes(&mut self) -> Result<&'a [u8], CdrError> {
+        let count = self.read_length(1, "byte sequence")?;
+        self.take(count, "byte sequence")
+    }
+
+    /// A sequence of strings.
+    pub(super) fn read_strings(&mut self) -> Result<Vec<&'a str>, CdrError> {
+        let count = self.read_length(4, "string sequence")?;
+        (0..count).map(|_| self.read_string()).collect()
+    }
+
+    /// A sequence of doubles.
+    pub(super) fn read_f64_sequence(&mut self) -> Result<Vec<f64>, CdrError> {
+        let count = self.read_length(8, "number sequence")?;
+        (0..count).map(|_| self.read_f64()).collect()
+    }
+}
+
+/// Writes fields one after another, little-endian.
+#[derive(Clone, Debug)]
+pub(super) struct CdrWriter {
+    message: Vec<u8>,
+}
+
+impl CdrWriter {
+    /// Begins with the encapsulation header.
+    pub(super) fn new() -> Self {
+        Self { message: vec![0, 1, 0, 0] }
+    }
+
+    fn align(&mut self, size: usize) {
+        let offset = self.message.len() - ENCAPSULATION;
+        self.message.resize(ENCAPSULATION + offset.next_multiple_of(size), 0);
+    }
+
+    pub(super) fn u8(&mut self, value: u8) {
+        self.message.push(value);
+    }
+
+    pub(super) fn u32(&mut self, value: u32) {
+        self.align(4);
+        self.message.extend_from_slice(&value.to_le_bytes());
+    }
+
+    pub(super) fn i32(&mut self, value: i32) {
+        self.align(4);
+        self.message.extend_from_slice(&value.to_le_bytes());
+    }
+
+    pub(super) fn f64s(&mut self, values: &[f64]) {
+        for value in values {
+            self.align(8);
+            self.message.extend_from_slice(&value.to_le_bytes());
+        }
+    }
+
+    pub(super) fn string(&mut self, text: &str) {
+        self.u32(text.len() as u32 + 1);
+        self.message.extend_from_slice(text.as_bytes());
+        self.message.push(0);
+    }
+
+    pub(super) fn bytes(&mut self, bytes: &[u8]) {
+        self.u32(bytes.len() as u32);
+        self.message.extend_from_slice(bytes);
+    }
+
+    pub(super) fn strings(&mut self, texts: &[String]) {
+        self.u32(texts.len() as u32);
+        for text in texts {
+            self.string(text);
+        }
+    }
+
+    pub(super) fn f64_sequence(&mut self, values: &[f64]) {
+        self.u32(values.len() as u32);
+        self.f64s(values);
+    }
+
+    /// The whole message.
+    pub(super) fn finish(self) -> Vec<u8> {
+        self.message
+    }
+}

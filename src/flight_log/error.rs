@@ -1,0 +1,150 @@
+use std::path::PathBuf;
+
+use thiserror::Error;
+
+/// Why a log or a rig could not be read or written; every message says what, where and what to do, the path last.
+#[derive(Debug, Error)]
+pub enum LogError {
+    /// The operating system refused.
+    #[error("cannot {action}: {source}: {}", path.display())]
+    Io {
+        /// What was tried: `open the log`, `write the log`, ….
+        action: &'static str,
+        /// The system's answer.
+        source: std::io::Error,
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file is no MCAP log at all.
+    #[error("not an MCAP log: {found}; {remedy}: {}", path.display())]
+    NotALog {
+        /// What the file is instead.
+        found: String,
+        /// What to do.
+        remedy: &'static str,
+        /// The file.
+        path: PathBuf,
+    },
+    /// An MCAP file in which no message of use could be read.
+    #[error("nothing in the log can be used: {problem}: {}", path.display())]
+    NothingReadable {
+        /// What was found, with its byte where there is one.
+        problem: String,
+        /// The log.
+        path: PathBuf,
+    },
+    /// The rig names a topic that the log has not.
+    #[error(
+        "{field} names the topic '{topic}', which the log lacks; its topics of type {expected} are {}; name one of them in \
+         the rig: {}",
+        list(available),
+        path.display()
+    )]
+    MissingTopic {
+        /// Field of the rig, `cam0.rostopic`.
+        field: String,
+        /// What it holds.
+        topic: String,
+        /// The message types that would do.
+        expected: String,
+        /// Topics of those types in the log.
+        available: Vec<String>,
+        /// The log.
+        path: PathBuf,
+    },
+    /// The rig has no such camera.
+    #[error("the rig has no camera '{key}'; it has {}", list(available))]
+    UnknownCamera {
+        /// What was asked for.
+        key: String,
+        /// What there is.
+        available: Vec<String>,
+    },
+    /// A joint of the rig does not occur in the joint messages.
+    #[error(
+        "gimbal.links[{link}].joint is '{joint}', but the messages on '{topic}' name {}; use those names in the rig: {}",
+        list(available),
+        path.display()
+    )]
+    UnknownJoint {
+        /// Number of the link.
+        link: usize,
+        /// What the rig calls the joint.
+        joint: String,
+        /// Where joint angles come from.
+        topic: String,
+        /// What the messages call their joints.
+        available: Vec<String>,
+        /// The log.
+        path: PathBuf,
+    },
+    /// A field of a rig is missing or wrong.
+    #[error("{field}: {problem}: {}", path.display())]
+    Rig {
+        /// Path of the field, `cam0.intrinsics`.
+        field: String,
+        /// What it holds and what was expected.
+        problem: String,
+        /// The rig.
+        path: PathBuf,
+    },
+    /// A rig that is no YAML.
+    #[error("the rig is not valid YAML: {problem}: {}", path.display())]
+    RigSyntax {
+        /// The parser's complaint with line and column.
+        problem: String,
+        /// The rig.
+        path: PathBuf,
+    },
+    /// There is no rig.
+    #[error("no rig for the log: neither {} nor an attachment named *.rig.yaml exists; give one with --rig FILE: {}",
+        beside.display(), path.display())]
+    NoRig {
+        /// Where it was looked for.
+        beside: PathBuf,
+        /// The log.
+        path: PathBuf,
+    },
+    /// One message could not be decoded.
+    #[error("message at {second:.3} s on '{topic}' (block at byte {byte}): {problem}: {}", path.display())]
+    BadMessage {
+        /// Its topic.
+        topic: String,
+        /// Log time in seconds since the log began.
+        second: f64,
+        /// First byte in the file of the chunk that holds it.
+        byte: usize,
+        /// What is wrong.
+        problem: String,
+        /// The log.
+        path: PathBuf,
+    },
+    /// An image was asked for that the log does not have.
+    #[error("'{topic}' has {count} images, none with number {index}: {}", path.display())]
+    NoSuchImage {
+        /// Topic of the camera.
+        topic: String,
+        /// What was asked for.
+        index: usize,
+        /// How many there are.
+        count: usize,
+        /// The log.
+        path: PathBuf,
+    },
+    /// The MCAP writer or the image encoder failed.
+    #[error("cannot write the log: {problem}: {}", path.display())]
+    Write {
+        /// What failed.
+        problem: String,
+        /// The log.
+        path: PathBuf,
+    },
+}
+
+/// `'a', 'b'`, or `none`.
+fn list(items: &[String]) -> String {
+    if items.is_empty() {
+        return "none".into();
+    }
+    items.iter().map(|item| format!("'{item}'")).collect::<Vec<_>>().join(", ")
+}

@@ -1,0 +1,102 @@
+use std::sync::{Arc, Mutex, PoisonError};
+
+use super::container::{BlockCache, MessagePosition};
+use super::messages::MessageKind;
+use super::picture::decode_picture;
+use super::{FlightLog, GrayImage, LogError, Rig};
+use crate::geometry::seconds_from_ns;
+
+/// Decompressed blocks kept, so that neighbouring images do not decompress their chunk again.
+const BLOCKS: usize = 2;
+/// Decoded images kept.
+const IMAGES: usize = 8;
+
+/// Any image of a log by its number, in any order.
+#[derive(Debug)]
+pub struct ImageReader {
+    log: Arc<FlightLog>,
+    cameras: Vec<CameraImages>,
+    cache: Mutex<ImageCache>,
+}
+
+#[derive(Debug)]
+struct CameraImages {
+    key: String,
+    topic: String,
+    kind: MessageKind,
+    positions: Vec<MessagePosition>,
+}
+
+#[derive(Debug)]
+struct ImageCache {
+    blocks: BlockCache,
+    /// By camera and number, most recently used last.
+    images: Vec<((usize, usize), Arc<GrayImage>)>,
+}
+
+impl ImageReader {
+    /// Finds the images of all cameras of a rig that the log has.
+    pub fn new(log: Arc<FlightLog>, rig: &Rig) -> Self {
+        let cameras = rig.cameras.iter().filter_map(|camera| {
+            let kind = log.topic(&camera.topic)?.kind.filter(|kind| kind.is_image())?;
+            let positions = log.positions(&camera.topic);
+            Some(CameraImages { key: camera.key.clone(), topic: camera.topic.clone(), kind, positions })
+        });
+        let cameras = cameras.collect();
+        let cache = ImageCache { blocks: BlockCache::new(BLOCKS), images: Vec::with_capacity(IMAGES + 1) };
+        Self { log, cameras, cache: Mutex::new(cache) }
+    }
+
+    /// How many images a camera has in the log, damaged ones included; 0 for a camera that is not there.
+    pub fn count(&self, camera_key: &str) -> usize {
+        self.cameras.iter().find(|camera| camera.key == camera_key).map_or(0, |camera| camera.positions.len())
+    }
+
+    /// Log time of an image since the log began, `None` past the end.
+    pub fn log_time_ns(&self, camera_key: &str, index: usize) -> Option<i64> {
+        let camera = self.cameras.iter().find(|camera| camera.key == camera_key)?;
+        camera.positions.get(index).map(|position| self.log.since_begin(position.log_time_ns))
+    }
+
+    /// One image of one camera, numbered as in [`SensorFrame::index`](super::SensorFrame::index).
+    pub fn image(&self, camera_key: &str, index: usize) -> Result<Arc<GrayImage>, LogError> {
+        let number = self.cameras.iter().position(|camera| camera.key == camera_key).ok_or_else(|| {
+            let available = self.cameras.iter().map(|camera| camera.key.clone()).collect();
+            LogError::UnknownCamera { key: camera_key.to_owned(), available }
+        })?;
+        let camera = &self.cameras[number];
+        let position = *camera.positions.get(index).ok_or_else(|| LogError::NoSuchImage {
+            topic: camera.topic.clone(),
+            index,
+            count: camera.positions.len(),
+            path: self.log.path().to_owned(),
+        })?;
+        // A panic of another reader leaves the cache whole: entries are only pushed when complete.
+        let mut cache = self.cache.lock().unwrap_or_else(PoisonError::into_inner);
+        let key = (number, index);
+        if let Some(found) = cache.images.iter().position(|(held, _)| *held == key) {
+            let entry = cache.images.remove(found);
+            let image = Arc::clone(&entry.1);
+            cache.images.push(entry);
+            return Ok(image);
+        }
+        let bad = |problem: String| LogError::BadMessage {
+            topic: camera.topic.clone(),
+            second: seconds_from_ns(self.log.since_begin(position.log_time_ns)),
+            byte: self.log.index().blocks[position.block].bytes.start,
+            problem,
+            path: self.log.path().to_owned(),
+        };
+        let Some((block, message)) = self.log.message(&mut cache.blocks, position) else {
+            let block = cache.blocks.get(self.log.file(), &self.log.index().blocks, position.block);
+            let damage = block.and_then(|block| block.damage.clone());
+            return Err(bad(damage.unwrap_or_else(|| "the index points to no message".into())));
+        };
+        let image = Arc::new(decode_picture(camera.kind, block.bytes(self.log.file(), &message.data)).map_err(bad)?);
+        if cache.images.len() == IMAGES {
+            cache.images.remove(0);
+        }
+        cache.images.push((key, Arc::clone(&image)));
+        Ok(image)
+    }
+}

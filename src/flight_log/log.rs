@@ -1,0 +1,321 @@
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+use memmap2::Mmap;
+
+use super::container::{BlockCache, ContainerIndex, DecodedBlock, MessagePosition, MessageSpan};
+use super::messages::{self, MessageKind};
+use super::{LogError, LogWarning};
+use crate::geometry::seconds_from_ns;
+
+/// First stamps further than this before the IMU's first one do not count for the log's begin: another clock made them.
+const CLOCK_TOLERANCE_NS: i64 = 60_000_000_000;
+
+/// One topic of a log.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TopicInfo {
+    /// Its name.
+    pub topic: String,
+    /// Name of its schema, `sensor_msgs/msg/Imu`.
+    pub schema: String,
+    /// What its messages are read as, `None` when they are ignored.
+    pub kind: Option<MessageKind>,
+    /// How many messages it has, as far as the log's index says.
+    pub count: u64,
+    /// Log time of the first message since the log began.
+    pub first_ns: i64,
+    /// Log time of the last message since the log began.
+    pub last_ns: i64,
+    /// Mean rate over its log times, 0 for fewer than two messages.
+    pub rate_hz: f64,
+}
+
+/// An open flight log: an MCAP file behind a memory map, with the index of its chunks.
+#[derive(Debug)]
+pub struct FlightLog {
+    path: PathBuf,
+    file: Mmap,
+    index: ContainerIndex,
+    /// Channels of each topic.
+    channel_ids: BTreeMap<String, Vec<u16>>,
+    topics: Vec<TopicInfo>,
+    epoch_ns: i64,
+    duration_ns: i64,
+    warnings: Vec<LogWarning>,
+}
+
+impl FlightLog {
+    /// Opens a log. An indexed log is not read, only its index, its first and its last messages; one without an index
+    /// (or cut off) is gone through once.
+    ///
+    /// The log begins (time zero) with the smallest header stamp among the first messages of all topics that are read,
+    /// those left out that lie more than a minute before the first IMU message (another clock made them).
+    pub fn open(path: &Path) -> Result<Self, LogError> {
+        let file = map_file(path)?;
+        check_magic(&file, path)?;
+        let index = ContainerIndex::read(&file);
+        let mut channel_ids: BTreeMap<String, Vec<u16>> = BTreeMap::new();
+        for (id, channel) in &index.channels {
+            channel_ids.entry(channel.topic.clone()).or_default().push(*id);
+        }
+        let mut log = Self {
+            path: path.to_owned(),
+            file,
+            index,
+            channel_ids,
+            topics: Vec::new(),
+            epoch_ns: 0,
+            duration_ns: 0,
+            warnings: Vec::new(),
+        };
+        log.find_topics_and_times()?;
+        log.report_damage();
+        Ok(log)
+    }
+
+    /// Where it lies.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Size of the file.
+    pub fn size_bytes(&self) -> u64 {
+        self.file.len() as u64
+    }
+
+    /// Its topics in the order of their names.
+    pub fn topics(&self) -> &[TopicInfo] {
+        &self.topics
+    }
+
+    /// One topic, when the log has messages on it.
+    pub fn topic(&self, name: &str) -> Option<&TopicInfo> {
+        self.topics.iter().find(|info| info.topic == name)
+    }
+
+    /// Absolute header stamp of the log's begin (time zero), in nanoseconds since the epoch.
+    pub fn epoch_ns(&self) -> i64 {
+        self.epoch_ns
+    }
+
+    /// From the log's begin to the latest header stamp among the last messages of its topics.
+    pub fn duration_ns(&self) -> i64 {
+        self.duration_ns
+    }
+
+    /// What opening the log found wrong. Every [`FrameStream`](super::FrameStream) tells it again at its time.
+    pub fn warnings(&self) -> &[LogWarning] {
+        &self.warnings
+    }
+
+    /// The content of the first attachment whose name ends so, with its name.
+    pub fn attachment(&self, name_ends_with: &str) -> Option<(&str, &[u8])> {
+        let place = self.index.attachments.iter().find(|place| place.name.ends_with(name_ends_with))?;
+        Some((&place.name, ContainerIndex::attachment(&self.file, place)?))
+    }
+
+    /// Names of the topics whose messages are read as one of these kinds.
+    pub fn topics_of(&self, kinds: &[MessageKind]) -> Vec<String> {
+        let of_kind = self.topics.iter().filter(|info| info.kind.is_some_and(|kind| kinds.contains(&kind)));
+        of_kind.map(|info| info.topic.clone()).collect()
+    }
+
+    /// The topic that a field of the rig names, when the log has it with a fitting type.
+    pub(super) fn require_topic(
+        &self,
+        field: &str,
+        topic: &str,
+        kinds: &[MessageKind],
+    ) -> Result<&TopicInfo, LogError> {
+        let found = self.topic(topic).filter(|info| info.kind.is_some_and(|kind| kinds.contains(&kind)));
+        found.ok_or_else(|| LogError::MissingTopic {
+            field: field.to_owned(),
+            topic: topic.to_owned(),
+            expected: kinds.iter().map(|kind| kind.schema_name()).collect::<Vec<_>>().join(" or "),
+            available: self.topics_of(kinds),
+            path: self.path.clone(),
+        })
+    }
+
+    /// Where the messages of a topic lie, in the order of their log times.
+    pub(super) fn positions(&self, topic: &str) -> Vec<MessagePosition> {
+        self.channel_ids.get(topic).map(|ids| self.index.positions(&self.file, ids)).unwrap_or_default()
+    }
+
+    /// The whole file.
+    pub(super) fn file(&self) -> &[u8] {
+        &self.file
+    }
+
+    /// What lies where.
+    pub(super) fn index(&self) -> &ContainerIndex {
+        &self.index
+    }
+
+    /// A log time since the log began.
+    pub(super) fn since_begin(&self, log_time_ns: u64) -> i64 {
+        i64::try_from(log_time_ns).unwrap_or(i64::MAX).saturating_sub(self.epoch_ns)
+    }
+
+    /// Calls `visit` for every readable message of a topic in the order of log times, with its log time since the log
+    /// began, until it returns `false`.
+    pub(super) fn for_each_message(&self, topic: &str, mut visit: impl FnMut(i64, &[u8]) -> bool) {
+        let mut cache = BlockCache::new(2);
+        for position in self.positions(topic) {
+            if let Some((block, message)) = self.message(&mut cache, position) {
+                let data = block.bytes(&self.file, &message.data);
+                if !visit(self.since_begin(position.log_time_ns), data) {
+                    return;
+                }
+            }
+        }
+    }
+
+    /// The block and the place in it of the message at a position, `None` when it cannot be read.
+    pub(super) fn message(
+        &self,
+        cache: &mut BlockCache,
+        position: MessagePosition,
+    ) -> Option<(std::sync::Arc<DecodedBlock>, MessageSpan)> {
+        let block = cache.get(&self.file, &self.index.blocks, position.block)?;
+        let message = block.message_at(position.offset)?.clone();
+        Some((block, message))
+    }
+
+    /// The first message of a topic that passes a test.
+    pub(super) fn find_message<T>(&self, topic: &str, mut test: impl FnMut(&[u8]) -> Option<T>) -> Option<T> {
+        let mut found = None;
+        self.for_each_message(topic, |_, data| {
+            found = test(data);
+            found.is_none()
+        });
+        found
+    }
+
+    fn find_topics_and_times(&mut self) -> Result<(), LogError> {
+        let mut cache = BlockCache::new(4);
+        // Stamps of the first and last messages of the topics that are read, with whether the topic is an IMU's.
+        let mut stamps: Vec<(bool, String, i64, i64)> = Vec::new();
+        let mut infos = Vec::new();
+        for (topic, ids) in &self.channel_ids {
+            let positions = self.index.positions(&self.file, ids);
+            let (Some(first), Some(last)) = (positions.first(), positions.last()) else { continue };
+            let channel = ids.first().and_then(|id| self.index.channels.get(id));
+            let Some(channel) = channel else { continue };
+            let kind = MessageKind::from_schema_name(&channel.schema_name).filter(|_| channel.encoding == "cdr");
+            if kind.is_some() {
+                let mut stamp = |position: &MessagePosition| {
+                    let (block, message) = self.message(&mut cache, *position)?;
+                    messages::header_stamp_ns(block.bytes(&self.file, &message.data)).ok()
+                };
+                let first_stamp = positions.iter().take(8).find_map(&mut stamp);
+                let last_stamp = positions.iter().rev().take(8).find_map(&mut stamp);
+                if let (Some(first_stamp), Some(last_stamp)) = (first_stamp, last_stamp) {
+                    stamps.push((kind == Some(MessageKind::Imu), topic.clone(), first_stamp, last_stamp));
+                }
+            }
+            infos.push((topic.clone(), channel.schema_name.clone(), kind, positions.len() as u64, *first, *last));
+        }
+        if infos.is_empty() {
+            let problem = match self.index.damages.first() {
+                Some(damage) => format!("{} at byte {}", damage.problem, damage.byte),
+                None => "it has no messages; record again, or try `mcap doctor`".into(),
+            };
+            return Err(LogError::NothingReadable { problem, path: self.path.clone() });
+        }
+        self.set_begin(&stamps, infos.iter().map(|info| info.4.log_time_ns).min().unwrap_or(0));
+        self.topics = infos
+            .into_iter()
+            .map(|(topic, schema, kind, count, first, last)| {
+                let (first_ns, last_ns) = (self.since_begin(first.log_time_ns), self.since_begin(last.log_time_ns));
+                let span_s = seconds_from_ns(last_ns - first_ns);
+                let rate_hz = if span_s > 0.0 { (count - 1) as f64 / span_s } else { 0.0 };
+                TopicInfo { topic, schema, kind, count, first_ns, last_ns, rate_hz }
+            })
+            .collect();
+        Ok(())
+    }
+
+    fn set_begin(&mut self, stamps: &[(bool, String, i64, i64)], first_log_time_ns: u64) {
+        let imu_first = stamps.iter().filter(|entry| entry.0).map(|entry| entry.2).min();
+        let earliest_ns = imu_first.map_or(i64::MIN, |first| first.saturating_sub(CLOCK_TOLERANCE_NS));
+        let counted = || stamps.iter().filter(|entry| entry.2 >= earliest_ns && entry.2 > 0);
+        let log_begin_ns = i64::try_from(first_log_time_ns).unwrap_or(0);
+        self.epoch_ns = counted().map(|entry| entry.2).min().unwrap_or(log_begin_ns);
+        self.duration_ns = counted().map(|entry| entry.3 - self.epoch_ns).max().unwrap_or(0).max(0);
+        for (_, topic, first_ns, _) in stamps {
+            if *first_ns < earliest_ns || *first_ns <= 0 {
+                let message = format!(
+                    "{topic}: its first header stamp is {:.3} s before the log's begin: another clock made it, or the \
+                     stamp was never set; the topic does not count for the log's begin",
+                    seconds_from_ns(self.epoch_ns.saturating_sub(*first_ns))
+                );
+                self.warnings.push(LogWarning { stamp_ns: 0, message });
+            }
+        }
+    }
+
+    fn report_damage(&mut self) {
+        for damage in &self.index.damages {
+            let after = if damage.after_log_time_ns == 0 { self.epoch_ns } else { damage.after_log_time_ns as i64 };
+            let stamp_ns = (after - self.epoch_ns).max(0);
+            let message = format!(
+                "the log is damaged after second {:.3}, at byte {} of {}: {}; everything before is used",
+                seconds_from_ns(stamp_ns),
+                damage.byte,
+                self.file.len(),
+                damage.problem
+            );
+            self.warnings.push(LogWarning { stamp_ns, message });
+        }
+        if self.index.profile != "ros2" && !self.topics.iter().any(|info| info.kind.is_some()) {
+            let message = format!(
+                "no topic has messages that are read: the profile is '{}', expected 'ros2' with CDR messages; convert the log",
+                self.index.profile
+            );
+            self.warnings.push(LogWarning { stamp_ns: 0, message });
+        }
+    }
+}
+
+fn map_file(path: &Path) -> Result<Mmap, LogError> {
+    let failed = |source| LogError::Io { action: "open the log", source, path: path.to_owned() };
+    let file = File::open(path).map_err(failed)?;
+    let metadata = file.metadata().map_err(failed)?;
+    let not_a_log = |found: &str, remedy| LogError::NotALog { found: found.into(), remedy, path: path.to_owned() };
+    if metadata.is_dir() {
+        return Err(not_a_log(
+            "a folder",
+            "name the .mcap file in it, or convert a EuRoC folder with `dcvins convert`",
+        ));
+    }
+    if metadata.len() == 0 {
+        return Err(not_a_log("the file is empty (0 bytes)", "copy or record it again"));
+    }
+    #[expect(unsafe_code, reason = "a memory map is the only way to open a log of gigabytes at once")]
+    // SAFETY: the map is only read. Another process that shortens or rewrites the file while we hold it could break the
+    // map's promise of immutable bytes; a flight log is finished when it is opened, and every length read from it is
+    // checked before use.
+    let map = unsafe { Mmap::map(&file) };
+    map.map_err(failed)
+}
+
+fn check_magic(file: &[u8], path: &Path) -> Result<(), LogError> {
+    if file.starts_with(mcap::MAGIC) {
+        return Ok(());
+    }
+    let convert = "convert it with `dcvins convert` or `mcap convert`";
+    let (found, remedy) = if file.starts_with(b"#ROSBAG") {
+        ("a ROS 1 bag".to_owned(), convert)
+    } else if file.starts_with(b"SQLite format 3") {
+        ("a ROS 2 bag in SQLite".to_owned(), convert)
+    } else if file.iter().take(512).all(|byte| byte.is_ascii_graphic() || byte.is_ascii_whitespace()) {
+        let start: String = file.iter().take(24).map(|byte| char::from(*byte)).collect();
+        (format!("a text file that begins with {start:?}"), "give the .mcap file itself")
+    } else {
+        let start: Vec<String> = file.iter().take(8).map(|byte| format!("{byte:02x}")).collect();
+        (format!("the file begins with {} instead of the MCAP magic", start.join(" ")), "give an MCAP log")
+    };
+    Err(LogError::NotALog { found, remedy, path: path.to_owned() })
+}

@@ -1,0 +1,210 @@
+//! The ROS messages that a flight log is made of, decoded from CDR.
+
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+
+use super::cdr::{CdrError, CdrReader};
+use crate::geometry::RigidTransform;
+
+/// A message type that is read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum MessageKind {
+    /// `sensor_msgs/msg/Imu`.
+    Imu,
+    /// `sensor_msgs/msg/Image`.
+    Image,
+    /// `sensor_msgs/msg/CompressedImage`.
+    CompressedImage,
+    /// `sensor_msgs/msg/CameraInfo`.
+    CameraInfo,
+    /// `sensor_msgs/msg/JointState`.
+    JointState,
+    /// `nav_msgs/msg/Odometry`.
+    Odometry,
+    /// `geometry_msgs/msg/PoseStamped`.
+    PoseStamped,
+    /// `geometry_msgs/msg/TransformStamped`.
+    TransformStamped,
+}
+
+impl MessageKind {
+    /// Every kind.
+    pub const ALL: [Self; 8] = [
+        Self::Imu,
+        Self::Image,
+        Self::CompressedImage,
+        Self::CameraInfo,
+        Self::JointState,
+        Self::Odometry,
+        Self::PoseStamped,
+        Self::TransformStamped,
+    ];
+
+    /// The schema's name in the log.
+    pub fn schema_name(self) -> &'static str {
+        match self {
+            Self::Imu => "sensor_msgs/msg/Imu",
+            Self::Image => "sensor_msgs/msg/Image",
+            Self::CompressedImage => "sensor_msgs/msg/CompressedImage",
+            Self::CameraInfo => "sensor_msgs/msg/CameraInfo",
+            Self::JointState => "sensor_msgs/msg/JointState",
+            Self::Odometry => "nav_msgs/msg/Odometry",
+            Self::PoseStamped => "geometry_msgs/msg/PoseStamped",
+            Self::TransformStamped => "geometry_msgs/msg/TransformStamped",
+        }
+    }
+
+    /// The kind of a schema's name; `sensor_msgs/Imu` is taken for `sensor_msgs/msg/Imu`.
+    pub fn from_schema_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| {
+            let full = kind.schema_name();
+            name == full || name == full.replace("/msg/", "/")
+        })
+    }
+
+    /// Whether its messages are images.
+    pub fn is_image(self) -> bool {
+        matches!(self, Self::Image | Self::CompressedImage)
+    }
+
+    /// Whether its messages are poses.
+    pub fn is_pose(self) -> bool {
+        matches!(self, Self::Odometry | Self::PoseStamped | Self::TransformStamped)
+    }
+}
+
+/// `std_msgs/msg/Header`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Header<'a> {
+    /// Nanoseconds since the epoch.
+    pub(super) stamp_ns: i64,
+    pub(super) frame_id: &'a str,
+}
+
+fn read_header<'a>(reader: &mut CdrReader<'a>) -> Result<Header<'a>, CdrError> {
+    let seconds = i64::from(reader.read_i32()?);
+    let nanoseconds = i64::from(reader.read_u32()?);
+    let frame_id = reader.read_string()?;
+    Ok(Header { stamp_ns: seconds * 1_000_000_000 + nanoseconds, frame_id })
+}
+
+/// The header stamp of any message that begins with a header, in nanoseconds since the epoch.
+pub(super) fn header_stamp_ns(message: &[u8]) -> Result<i64, CdrError> {
+    Ok(read_header(&mut CdrReader::new(message)?)?.stamp_ns)
+}
+
+/// `sensor_msgs/msg/Imu` without its orientation and covariances.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct ImuMessage {
+    pub(super) stamp_ns: i64,
+    pub(super) angular_velocity_rad_per_s: Vector3<f64>,
+    pub(super) specific_force_m_per_s2: Vector3<f64>,
+}
+
+pub(super) fn read_imu(message: &[u8]) -> Result<ImuMessage, CdrError> {
+    let mut reader = CdrReader::new(message)?;
+    let header = read_header(&mut reader)?;
+    reader.read_f64s::<4>()?; // orientation
+    reader.read_f64s::<9>()?;
+    let angular_velocity = reader.read_f64s::<3>()?;
+    reader.read_f64s::<9>()?;
+    let specific_force = reader.read_f64s::<3>()?;
+    Ok(ImuMessage {
+        stamp_ns: header.stamp_ns,
+        angular_velocity_rad_per_s: Vector3::from(angular_velocity),
+        specific_force_m_per_s2: Vector3::from(specific_force),
+    })
+}
+
+/// `sensor_msgs/msg/Image`, its pixels borrowed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct ImageMessage<'a> {
+    pub(super) width: usize,
+    pub(super) height: usize,
+    pub(super) encoding: &'a str,
+    pub(super) big_endian: bool,
+    /// Bytes per row.
+    pub(super) step: usize,
+    pub(super) data: &'a [u8],
+}
+
+pub(super) fn read_image(message: &[u8]) -> Result<ImageMessage<'_>, CdrError> {
+    let mut reader = CdrReader::new(message)?;
+    read_header(&mut reader)?;
+    let height = reader.read_u32()? as usize;
+    let width = reader.read_u32()? as usize;
+    let encoding = reader.read_string()?;
+    let big_endian = reader.read_u8()? != 0;
+    let step = reader.read_u32()? as usize;
+    let data = reader.read_bytes()?;
+    Ok(ImageMessage { width, height, encoding, big_endian, step, data })
+}
+
+/// `sensor_msgs/msg/CompressedImage`: its format and its bytes, borrowed.
+pub(super) fn read_compressed_image(message: &[u8]) -> Result<(&str, &[u8]), CdrError> {
+    let mut reader = CdrReader::new(message)?;
+    read_header(&mut reader)?;
+    let format = reader.read_string()?;
+    Ok((format, reader.read_bytes()?))
+}
+
+/// `sensor_msgs/msg/CameraInfo`, the part that calibrates.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct CameraInfoMessage {
+    pub(super) width: usize,
+    pub(super) height: usize,
+    /// `plumb_bob`, `equidistant`, ….
+    pub(super) distortion_model: String,
+    pub(super) distortion: Vec<f64>,
+    /// `K`, row by row.
+    pub(super) intrinsic_matrix: [f64; 9],
+}
+
+pub(super) fn read_camera_info(message: &[u8]) -> Result<CameraInfoMessage, CdrError> {
+    let mut reader = CdrReader::new(message)?;
+    read_header(&mut reader)?;
+    let height = reader.read_u32()? as usize;
+    let width = reader.read_u32()? as usize;
+    let distortion_model = reader.read_string()?.to_owned();
+    let distortion = reader.read_f64_sequence()?;
+    let intrinsic_matrix = reader.read_f64s::<9>()?;
+    Ok(CameraInfoMessage { width, height, distortion_model, distortion, intrinsic_matrix })
+}
+
+/// `sensor_msgs/msg/JointState` without velocities and efforts.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct JointMessage<'a> {
+    pub(super) stamp_ns: i64,
+    pub(super) names: Vec<&'a str>,
+    pub(super) positions_rad: Vec<f64>,
+}
+
+pub(super) fn read_joint_state(message: &[u8]) -> Result<JointMessage<'_>, CdrError> {
+    let mut reader = CdrReader::new(message)?;
+    let header = read_header(&mut reader)?;
+    let names = reader.read_strings()?;
+    let positions_rad = reader.read_f64_sequence()?;
+    Ok(JointMessage { stamp_ns: header.stamp_ns, names, positions_rad })
+}
+
+/// The pose in any of the pose messages, `None` when its numbers are no pose (not finite, or a zero quaternion).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct PoseMessage {
+    pub(super) stamp_ns: i64,
+    pub(super) pose: Option<RigidTransform>,
+}
+
+pub(super) fn read_pose(kind: MessageKind, message: &[u8]) -> Result<PoseMessage, CdrError> {
+    let mut reader = CdrReader::new(message)?;
+    let header = read_header(&mut reader)?;
+    if matches!(kind, MessageKind::Odometry | MessageKind::TransformStamped) {
+        reader.read_string()?; // child_frame_id
+    }
+    let position_m = reader.read_f64s::<3>()?;
+    let [x, y, z, w] = reader.read_f64s::<4>()?;
+    let quaternion = Quaternion::new(w, x, y, z);
+    let norm = quaternion.norm();
+    let usable = norm.is_finite() && norm > 0.5 && position_m.iter().all(|value| value.is_finite());
+    let pose =
+        usable.then(|| RigidTransform::new(UnitQuaternion::new_normalize(quaternion), Vector3::from(position_m)));
+    Ok(PoseMessage { stamp_ns: header.stamp_ns, pose })
+}

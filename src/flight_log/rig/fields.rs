@@ -1,0 +1,144 @@
+//! Reading a YAML tree field by field, so that every complaint names the field, what it holds and what was expected.
+
+use std::path::Path;
+
+use nalgebra::Matrix4;
+use serde_json::Value;
+
+use super::super::LogError;
+use crate::geometry::RigidTransform;
+
+/// A rotation block may be this far from orthonormal (largest entry of `RᵀR − I`); Kalibr writes 1e-16, people round.
+const ROTATION_TOLERANCE: f64 = 1e-3;
+
+/// One field of a rig, present or not.
+#[derive(Clone, Debug)]
+pub(super) struct Field<'a> {
+    path: String,
+    value: Option<&'a Value>,
+    file: &'a Path,
+}
+
+impl<'a> Field<'a> {
+    /// The whole document.
+    pub(super) fn root(value: &'a Value, file: &'a Path) -> Self {
+        Self { path: String::new(), value: Some(value), file }
+    }
+
+    /// A field of this mapping; whether it is there shows when it is read.
+    pub(super) fn field(&self, key: &str) -> Self {
+        let path = if self.path.is_empty() { key.to_owned() } else { format!("{}.{key}", self.path) };
+        let value = self.value.and_then(|value| value.get(key)).filter(|value| !value.is_null());
+        Self { path, value, file: self.file }
+    }
+
+    /// Whether it is there and not null.
+    pub(super) fn is_present(&self) -> bool {
+        self.value.is_some()
+    }
+
+    /// The field when it is there and not null.
+    pub(super) fn optional(self) -> Option<Self> {
+        self.is_present().then_some(self)
+    }
+
+    /// An error about this field.
+    pub(super) fn error(&self, problem: impl Into<String>) -> LogError {
+        let field = if self.path.is_empty() { "the rig" } else { &self.path };
+        LogError::Rig { field: field.to_owned(), problem: problem.into(), path: self.file.to_owned() }
+    }
+
+    /// `holds X, expected Y`, or `missing, expected Y`.
+    pub(super) fn unexpected(&self, expected: &str) -> LogError {
+        match self.value {
+            None => self.error(format!("missing, expected {expected}")),
+            Some(value) => self.error(format!("{}, expected {expected}", describe(value))),
+        }
+    }
+
+    /// The entries of a list.
+    pub(super) fn list(&self, expected: &str) -> Result<Vec<Self>, LogError> {
+        let items = self.value.and_then(Value::as_array).ok_or_else(|| self.unexpected(expected))?;
+        let item =
+            |(index, value)| Self { path: format!("{}[{index}]", self.path), value: Some(value), file: self.file };
+        Ok(items.iter().enumerate().map(item).collect())
+    }
+
+    /// The keys of a mapping.
+    pub(super) fn keys(&self, expected: &str) -> Result<Vec<&'a str>, LogError> {
+        let mapping = self.value.and_then(Value::as_object).ok_or_else(|| self.unexpected(expected))?;
+        Ok(mapping.keys().map(String::as_str).collect())
+    }
+
+    /// A text.
+    pub(super) fn text(&self, expected: &str) -> Result<&'a str, LogError> {
+        self.value.and_then(Value::as_str).ok_or_else(|| self.unexpected(expected))
+    }
+
+    /// A finite number.
+    pub(super) fn number(&self, expected: &str) -> Result<f64, LogError> {
+        let number = self.value.and_then(Value::as_f64).filter(|number| number.is_finite());
+        number.ok_or_else(|| self.unexpected(expected))
+    }
+
+    /// A number greater than zero.
+    pub(super) fn positive(&self, expected: &str) -> Result<f64, LogError> {
+        let number = self.number(expected)?;
+        if number > 0.0 { Ok(number) } else { Err(self.unexpected(expected)) }
+    }
+
+    /// A number that is not negative.
+    pub(super) fn not_negative(&self, expected: &str) -> Result<f64, LogError> {
+        let number = self.number(expected)?;
+        if number >= 0.0 { Ok(number) } else { Err(self.unexpected(expected)) }
+    }
+
+    /// Finite numbers, any count.
+    pub(super) fn numbers(&self, expected: &str) -> Result<Vec<f64>, LogError> {
+        let items = self.list(expected)?;
+        items.iter().map(|item| item.number("a number")).collect()
+    }
+
+    /// Exactly `N` finite numbers.
+    pub(super) fn exactly<const N: usize>(&self, expected: &str) -> Result<[f64; N], LogError> {
+        let numbers = self.numbers(expected)?;
+        <[f64; N]>::try_from(numbers.as_slice())
+            .map_err(|_wrong_count| self.error(format!("{} numbers, expected {expected}", numbers.len())))
+    }
+
+    /// A rigid transform as a 4×4 matrix, row by row.
+    pub(super) fn transform(&self) -> Result<RigidTransform, LogError> {
+        const EXPECTED: &str = "4 rows of 4 numbers, a homogeneous matrix";
+        let rows = self.list(EXPECTED)?;
+        if rows.len() != 4 {
+            return Err(self.error(format!("{} rows, expected {EXPECTED}", rows.len())));
+        }
+        let mut matrix = Matrix4::zeros();
+        for (index, row) in rows.iter().enumerate() {
+            let numbers = row.exactly::<4>("4 numbers, a row of a homogeneous matrix")?;
+            matrix.row_mut(index).copy_from_slice(&numbers);
+        }
+        RigidTransform::from_matrix(&matrix, ROTATION_TOLERANCE).ok_or_else(|| {
+            let block = matrix.fixed_view::<3, 3>(0, 0).into_owned();
+            let defect = (block.transpose() * block - nalgebra::Matrix3::identity()).amax();
+            self.error(format!(
+                "the upper left 3×3 block has determinant {:.4} and is {defect:.2e} from orthonormal, the last row is {:?}; \
+                 expected a rotation (determinant +1, within {ROTATION_TOLERANCE:.0e}) and the row [0, 0, 0, 1]",
+                block.determinant(),
+                matrix.row(3).iter().copied().collect::<Vec<_>>()
+            ))
+        })
+    }
+}
+
+/// What a value is, in a few words.
+fn describe(value: &Value) -> String {
+    match value {
+        Value::Null => "nothing".into(),
+        Value::Bool(value) => format!("holds {value}"),
+        Value::Number(number) => format!("holds {number}"),
+        Value::String(text) => format!("holds the text '{text}'"),
+        Value::Array(items) => format!("holds a list of {}", items.len()),
+        Value::Object(_) => "holds a mapping".into(),
+    }
+}

@@ -1,0 +1,144 @@
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use super::super::messages::{self, CameraInfoMessage, MessageKind};
+use super::super::{FlightLog, LogError};
+use super::Rig;
+use super::fields::Field;
+use super::kalibr;
+use super::read::{self, CameraFacts, NoFacts};
+use crate::camera::CameraModel;
+
+impl Rig {
+    /// Reads a rig file: our own schema, or Kalibr's `camchain-imucam.yaml` with `imu.yaml` beside it.
+    pub fn from_file(path: &Path) -> Result<Self, LogError> {
+        from_file(path, &NoFacts)
+    }
+
+    /// Parses the text of a rig in our own schema; `file` is named in errors.
+    pub fn from_yaml(text: &str, file: &Path) -> Result<Self, LogError> {
+        from_document(&read::parse_yaml(text, file)?, file, &NoFacts)
+    }
+
+    /// Reads `NAME.rig.yaml` beside `NAME.mcap`, `None` when there is no such file.
+    pub fn beside_log(log_path: &Path) -> Result<Option<Self>, LogError> {
+        let path = log_path.with_extension("rig.yaml");
+        path.is_file().then(|| Self::from_file(&path)).transpose()
+    }
+
+    /// The rig to use with a log: the file named by the user, else the one beside the log, else the one attached to it.
+    /// What it leaves open (intrinsics, image rates) comes from the log.
+    pub fn for_log(log: &FlightLog, explicit: Option<&Path>) -> Result<Self, LogError> {
+        let beside = log.path().with_extension("rig.yaml");
+        find(log, explicit, &beside, ".rig.yaml")?
+            .ok_or_else(|| LogError::NoRig { beside, path: log.path().to_owned() })
+    }
+
+    /// The rig with the true values, found in the same way (`NAME.truth.yaml`, or attached); `None` when there is none.
+    pub fn truth_for_log(log: &FlightLog, explicit: Option<&Path>) -> Result<Option<Self>, LogError> {
+        find(log, explicit, &log.path().with_extension("truth.yaml"), ".truth.yaml")
+    }
+}
+
+fn find(log: &FlightLog, explicit: Option<&Path>, beside: &Path, ending: &str) -> Result<Option<Rig>, LogError> {
+    if let Some(path) = explicit {
+        return from_file(path, log).map(Some);
+    }
+    if beside.is_file() {
+        return from_file(beside, log).map(Some);
+    }
+    let Some((name, content)) = log.attachment(ending) else { return Ok(None) };
+    let file = PathBuf::from(format!("{} (attachment {name})", log.path().display()));
+    let text = std::str::from_utf8(content)
+        .map_err(|error| LogError::RigSyntax { problem: error.to_string(), path: file.clone() })?;
+    from_document(&read::parse_yaml(text, &file)?, &file, log).map(Some)
+}
+
+fn read_text(path: &Path) -> Result<String, LogError> {
+    std::fs::read_to_string(path).map_err(|source| LogError::Io {
+        action: "read the rig",
+        source,
+        path: path.to_owned(),
+    })
+}
+
+fn from_file(path: &Path, facts: &dyn CameraFacts) -> Result<Rig, LogError> {
+    from_document(&read::parse_yaml(&read_text(path)?, path)?, path, facts)
+}
+
+fn from_document(document: &Value, file: &Path, facts: &dyn CameraFacts) -> Result<Rig, LogError> {
+    let root = Field::root(document, file);
+    let stem = file.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let name = stem.split('.').next().unwrap_or_default();
+    if !kalibr::is_camera_chain(document) {
+        return read::read_rig(&root, name, facts);
+    }
+    if root.field("imu0").is_present() {
+        return kalibr::read_camera_chain(&root, &root, name, facts);
+    }
+    let candidates = kalibr::imu_files(file);
+    let Some(imu_file) = candidates.iter().find(|candidate| candidate.is_file()) else {
+        let names: Vec<String> = candidates
+            .iter()
+            .filter_map(|path| path.file_name())
+            .map(|name| name.to_string_lossy().into_owned())
+            .collect();
+        let expected = format!("the IMU in one of {} beside this camera chain", names.join(", "));
+        return Err(root.field("imu0").unexpected(&expected));
+    };
+    let imu = read::parse_yaml(&read_text(imu_file)?, imu_file)?;
+    kalibr::read_camera_chain(&root, &Field::root(&imu, imu_file), name, facts)
+}
+
+impl CameraFacts for FlightLog {
+    fn camera_model(&self, image_topic: &str) -> Result<CameraModel, String> {
+        // By convention `camera_info` lies beside the images: `/ns/image_raw/compressed` → `/ns/camera_info`.
+        let mut parent = image_topic;
+        let mut tried = Vec::new();
+        while let Some((upper, _)) = parent.rsplit_once('/') {
+            parent = upper;
+            let topic = format!("{parent}/camera_info");
+            if self.topic(&topic).is_some_and(|info| info.kind == Some(MessageKind::CameraInfo)) {
+                let info = self.find_message(&topic, |data| messages::read_camera_info(data).ok());
+                let info = info.ok_or_else(|| format!("no readable message on {topic}"))?;
+                return model_of(&info).map_err(|problem| format!("{topic}: {problem}"));
+            }
+            tried.push(topic);
+        }
+        Err(format!("the log has none of {}", tried.join(", ")))
+    }
+
+    fn rate_hz(&self, image_topic: &str) -> Option<f64> {
+        self.topic(image_topic).map(|info| info.rate_hz)
+    }
+}
+
+/// The lens of a `CameraInfo`.
+fn model_of(info: &CameraInfoMessage) -> Result<CameraModel, String> {
+    let k = &info.intrinsic_matrix;
+    let intrinsics_px = [k[0], k[4], k[2], k[5]];
+    if !(intrinsics_px.iter().all(|value| value.is_finite()) && k[0] > 0.0 && k[4] > 0.0) {
+        return Err("its matrix K is not set".into());
+    }
+    if info.width == 0 || info.height == 0 {
+        return Err("its width and height are not set".into());
+    }
+    let resolution_px = [info.width, info.height];
+    let coefficients = info.distortion.as_slice();
+    let (name, coefficients) = match (info.distortion_model.as_str(), coefficients) {
+        (_, coefficients) if coefficients.iter().all(|value| *value == 0.0) => ("none", &[][..]),
+        // ROS writes a third radial coefficient, which our model has not.
+        ("plumb_bob" | "radtan", [_, _, _, _, third]) if *third == 0.0 => ("radtan", &coefficients[..4]),
+        ("plumb_bob" | "radtan", [_, _, _, _]) => ("radtan", coefficients),
+        ("equidistant", [_, _, _, _]) => ("equidistant", coefficients),
+        (other, coefficients) => {
+            return Err(format!(
+                "distortion '{other}' with {} coefficients, expected plumb_bob (k3 = 0) or equidistant",
+                coefficients.len()
+            ));
+        }
+    };
+    CameraModel::from_kalibr("pinhole", &intrinsics_px, name, coefficients, resolution_px)
+        .map_err(|error| error.to_string())
+}

@@ -1,0 +1,56 @@
+//! Kalibr's own files as a rig: `camchain-imucam.yaml` with `imu.yaml` beside it.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use super::super::LogError;
+use super::fields::Field;
+use super::read::{self, CameraFacts};
+use super::{CameraMount, Rig};
+
+/// Names that Kalibr and its users give to the IMU's file.
+const IMU_FILES: [&str; 3] = ["imu.yaml", "imu0.yaml", "imu-calib.yaml"];
+
+/// Whether a document is Kalibr's camera chain.
+pub(super) fn is_camera_chain(document: &Value) -> bool {
+    document.get("rig_version").is_none()
+        && document
+            .get("cam0")
+            .is_some_and(|camera| camera.get("mount").is_none() && camera.get("camera_model").is_some())
+}
+
+/// Where the IMU of a camera chain may be written, most likely first: `imu-RUN.yaml` beside `camchain-imucam-RUN.yaml`,
+/// then the plain names.
+pub(super) fn imu_files(camera_chain: &Path) -> Vec<PathBuf> {
+    let name = camera_chain.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let of_run = ["camchain-imucam", "camchain"].into_iter().find_map(|prefix| name.strip_prefix(prefix));
+    let of_run = of_run.filter(|rest| *rest != ".yaml").map(|rest| format!("imu{rest}"));
+    let names = of_run.into_iter().chain(IMU_FILES.into_iter().map(str::to_owned));
+    names.map(|name| camera_chain.with_file_name(name)).collect()
+}
+
+/// Reads a camera chain with its IMU (`imu` is the document of the IMU's own file, or the chain when it has `imu0`).
+pub(super) fn read_camera_chain(
+    chain: &Field<'_>,
+    imu: &Field<'_>,
+    name: &str,
+    facts: &dyn CameraFacts,
+) -> Result<Rig, LogError> {
+    let nested = imu.field("imu0");
+    let imu = read::read_imu(if nested.is_present() { &nested } else { imu }, None)?;
+    let mut cameras = Vec::new();
+    for key in read::camera_keys(chain)? {
+        let camera = chain.field(&key);
+        let imu_from_camera = camera.field("T_cam_imu").transform()?.inverse();
+        cameras.push(read::read_camera_as(&camera, &key, CameraMount::Static { imu_from_camera }, facts)?);
+    }
+    Ok(Rig {
+        name: name.to_owned(),
+        gravity_m_per_s2: read::STANDARD_GRAVITY_M_PER_S2,
+        imu,
+        cameras,
+        gimbal: None,
+        ground_truth_topic: None,
+    })
+}

@@ -1,0 +1,241 @@
+use std::path::Path;
+
+use serde_json::Value;
+
+use super::super::LogError;
+use super::fields::Field;
+use super::{CameraMount, CameraRig, ChainPrior, GimbalRig, ImuNoise, ImuRig, Joint, Rig};
+use crate::camera::{CameraError, CameraModel};
+use crate::gimbal::{ClassicalChain, DhLink};
+
+/// The version of the schema that is read and written.
+const RIG_VERSION: u64 = 1;
+/// Gravity where a rig of Kalibr's does not say.
+pub(super) const STANDARD_GRAVITY_M_PER_S2: f64 = 9.81;
+
+/// What a log can add to a rig that leaves it open, by image topic.
+pub(super) trait CameraFacts {
+    /// The lens from the camera's `CameraInfo`, or why there is none.
+    fn camera_model(&self, image_topic: &str) -> Result<CameraModel, String>;
+    /// Mean rate of the images.
+    fn rate_hz(&self, image_topic: &str) -> Option<f64>;
+}
+
+/// No log at hand.
+pub(super) struct NoFacts;
+
+impl CameraFacts for NoFacts {
+    fn camera_model(&self, _image_topic: &str) -> Result<CameraModel, String> {
+        Err("no log is at hand to take them from".into())
+    }
+
+    fn rate_hz(&self, _image_topic: &str) -> Option<f64> {
+        None
+    }
+}
+
+/// Parses the YAML text of any rig file.
+pub(super) fn parse_yaml(text: &str, file: &Path) -> Result<Value, LogError> {
+    serde_saphyr::from_str(text).map_err(|error| {
+        let problem = error.to_string();
+        let first_line = problem.lines().next().unwrap_or_default().to_owned();
+        LogError::RigSyntax { problem: first_line, path: file.to_owned() }
+    })
+}
+
+/// Reads a rig in our own schema.
+pub(super) fn read_rig(root: &Field<'_>, default_name: &str, facts: &dyn CameraFacts) -> Result<Rig, LogError> {
+    let version = root.field("rig_version").number("the number 1")?;
+    if version.total_cmp(&(RIG_VERSION as f64)).is_ne() {
+        return Err(root.field("rig_version").unexpected("the number 1, the only version so far"));
+    }
+    let name = root.field("name").optional().map_or(Ok(default_name), |name| name.text("a name"))?.to_owned();
+    let gravity_m_per_s2 = root.field("gravity").positive("gravity's magnitude in m/s²")?;
+    let imu = read_imu(&root.field("imu0"), None)?;
+    let gimbal = root.field("gimbal").optional().map(|gimbal| read_gimbal(&gimbal)).transpose()?;
+    let keys = camera_keys(root)?;
+    if keys.is_empty() {
+        return Err(root.field("cam0").unexpected("at least one camera, cam0"));
+    }
+    let cameras: Vec<CameraRig> =
+        keys.iter().map(|key| read_camera(&root.field(key), key, facts)).collect::<Result<_, _>>()?;
+    if gimbal.is_none()
+        && let Some(camera) = cameras.iter().find(|camera| camera.mount == CameraMount::Gimbal)
+    {
+        let expected = format!("a gimbal, since {}.mount is gimbal", camera.key);
+        return Err(root.field("gimbal").unexpected(&expected));
+    }
+    let truth = root.field("ground_truth").optional();
+    let ground_truth_topic = truth.and_then(|truth| truth.field("rostopic").optional());
+    let ground_truth_topic = ground_truth_topic.map(|topic| topic.text("a topic").map(str::to_owned)).transpose()?;
+    Ok(Rig { name, gravity_m_per_s2, imu, cameras, gimbal, ground_truth_topic })
+}
+
+/// `cam0`, `cam1`, … in the order of their numbers.
+pub(super) fn camera_keys(root: &Field<'_>) -> Result<Vec<String>, LogError> {
+    let number = |key: &str| key.strip_prefix("cam").and_then(|number| number.parse::<u32>().ok());
+    let mut keys: Vec<&str> = root.keys("a mapping with imu0, cam0, …")?;
+    keys.retain(|key| number(key).is_some());
+    keys.sort_by_key(|key| number(key));
+    Ok(keys.into_iter().map(str::to_owned).collect())
+}
+
+/// The inertial sensor; Kalibr's `imu.yaml` has the same fields without a frame name.
+pub(super) fn read_imu(imu: &Field<'_>, default_topic: Option<&str>) -> Result<ImuRig, LogError> {
+    if !imu.is_present() {
+        return Err(imu.unexpected("the IMU with its topic and noise densities"));
+    }
+    let topic = match (imu.field("rostopic").optional(), default_topic) {
+        (None, Some(topic)) => topic,
+        _ => imu.field("rostopic").text("the topic of its sensor_msgs/msg/Imu")?,
+    };
+    let density = |key: &str, unit: &str| imu.field(key).positive(&format!("a number greater than 0 in {unit}"));
+    Ok(ImuRig {
+        topic: topic.to_owned(),
+        frame_id: imu.field("frame_id").optional().map_or(Ok("imu"), |frame| frame.text("a frame's name"))?.to_owned(),
+        rate_hz: imu.field("update_rate").positive("the rate in Hz")?,
+        noise: ImuNoise {
+            accelerometer_noise_density: density("accelerometer_noise_density", "m/s²/√Hz")?,
+            accelerometer_random_walk: density("accelerometer_random_walk", "m/s³/√Hz")?,
+            gyroscope_noise_density: density("gyroscope_noise_density", "rad/s/√Hz")?,
+            gyroscope_random_walk: density("gyroscope_random_walk", "rad/s²/√Hz")?,
+        },
+    })
+}
+
+fn read_camera(camera: &Field<'_>, key: &str, facts: &dyn CameraFacts) -> Result<CameraRig, LogError> {
+    const MOUNTS: &str = "gimbal or static";
+    let mount = match camera.field("mount").text(MOUNTS)? {
+        "gimbal" => CameraMount::Gimbal,
+        "static" => CameraMount::Static { imu_from_camera: camera.field("T_cam_imu").transform()?.inverse() },
+        _ => return Err(camera.field("mount").unexpected(MOUNTS)),
+    };
+    read_camera_as(camera, key, mount, facts)
+}
+
+/// The fields that our rigs and Kalibr's share.
+pub(super) fn read_camera_as(
+    camera: &Field<'_>,
+    key: &str,
+    mount: CameraMount,
+    facts: &dyn CameraFacts,
+) -> Result<CameraRig, LogError> {
+    let topic = camera.field("rostopic").text("the topic of its images")?.to_owned();
+    let rate_hz = match (camera.field("update_rate").optional(), facts.rate_hz(&topic)) {
+        (None, Some(rate_hz)) if rate_hz > 0.0 => rate_hz,
+        _ => camera.field("update_rate").positive("the rate in Hz")?,
+    };
+    let shift = camera.field("timeshift_cam_imu").optional();
+    let model = if camera.field("intrinsics").is_present() {
+        read_camera_model(camera)?
+    } else {
+        facts.camera_model(&topic).map_err(|reason| {
+            let expected = format!("4 numbers (fx fy cx cy), or a CameraInfo in the log ({reason})");
+            camera.field("intrinsics").unexpected(&expected)
+        })?
+    };
+    Ok(CameraRig {
+        key: key.to_owned(),
+        mount,
+        rate_hz,
+        model,
+        frame_id: camera.field("frame_id").optional().map_or(Ok(key), |frame| frame.text("a frame's name"))?.to_owned(),
+        timeshift_cam_imu_s: shift.map_or(Ok(0.0), |shift| shift.number("seconds, t_imu = t_cam + shift"))?,
+        topic,
+    })
+}
+
+/// Projection, distortion, intrinsics and resolution in Kalibr's spelling and order.
+fn read_camera_model(camera: &Field<'_>) -> Result<CameraModel, LogError> {
+    let model = camera.field("camera_model").text(CAMERA_MODELS)?;
+    let intrinsics = camera.field("intrinsics").numbers("4 numbers (fx fy cx cy)")?;
+    let distortion_model = camera.field("distortion_model").optional();
+    let distortion_model = distortion_model.map_or(Ok("none"), |model| model.text(DISTORTION_MODELS))?;
+    let coefficients = match camera.field("distortion_coeffs").optional() {
+        Some(coefficients) => coefficients.numbers("the coefficients of the lens")?,
+        None if distortion_model == "none" => Vec::new(),
+        None => return Err(camera.field("distortion_coeffs").unexpected("the coefficients of the lens")),
+    };
+    let [width, height] = camera.field("resolution").exactly::<2>("2 (width height)")?;
+    if [width, height].iter().any(|side| *side < 1.0 || side.fract() != 0.0 || *side > 65_535.0) {
+        return Err(camera
+            .field("resolution")
+            .error(format!("{width}×{height}, expected whole pixels from 1 to 65535")));
+    }
+    CameraModel::from_kalibr(model, &intrinsics, distortion_model, &coefficients, [width as usize, height as usize])
+        .map_err(|error| name_the_field(camera, error))
+}
+
+const CAMERA_MODELS: &str = "pinhole, omni, eucm or ds";
+const DISTORTION_MODELS: &str = "none, radtan, equidistant or fov";
+
+/// A camera's complaint with the field of the rig that it is about.
+fn name_the_field(camera: &Field<'_>, error: CameraError) -> LogError {
+    match error {
+        CameraError::UnknownModel { .. } => camera.field("camera_model").unexpected(CAMERA_MODELS),
+        CameraError::UnknownDistortion { .. } => camera.field("distortion_model").unexpected(DISTORTION_MODELS),
+        CameraError::Combination { model, distortion, expected } => {
+            let problem = format!("'{distortion}' does not go with camera_model '{model}', expected {expected}");
+            camera.field("distortion_model").error(problem)
+        }
+        CameraError::Count { field, found, expected, meaning, .. } => {
+            camera.field(field).error(format!("{found} numbers, expected {expected} ({})", meaning.replace(',', "")))
+        }
+        CameraError::Value { field, value, expected } => {
+            let place = if field.contains("distortion") { "distortion_coeffs" } else { "intrinsics" };
+            camera.field(place).error(format!("{field} is {value}, expected {expected}"))
+        }
+    }
+}
+
+fn read_gimbal(gimbal: &Field<'_>) -> Result<GimbalRig, LogError> {
+    let topic = gimbal.field("rostopic").optional();
+    let topic =
+        topic.map(|topic| topic.text("the topic of its sensor_msgs/msg/JointState, or null").map(str::to_owned));
+    let topic = topic.transpose()?;
+    let rate = gimbal.field("update_rate").optional();
+    let rate_hz = match (&topic, rate) {
+        (None, None) => 0.0,
+        _ => gimbal.field("update_rate").positive("the rate in Hz")?,
+    };
+    let sigma = gimbal.field("encoder_sigma").optional();
+    let encoder_sigma_rad =
+        sigma.map(|sigma| sigma.positive("a standard deviation greater than 0 in rad, or null")).transpose()?;
+    let prior = gimbal.field("prior");
+    let prior = ChainPrior {
+        translation_bound_m: prior.field("translation_bound").not_negative("a bound in m")?,
+        rotation_bound_rad: prior.field("rotation_bound").not_negative("a bound in rad")?,
+    };
+    let mut links = Vec::new();
+    let mut joints: Vec<Joint> = Vec::new();
+    for link in gimbal.field("links").list("a list of links with joint, theta_offset, d, a, alpha and limits")? {
+        let name = link.field("joint").text("the joint's name in the JointState")?.to_owned();
+        if joints.iter().any(|joint| joint.name == name) {
+            return Err(link.field("joint").error(format!("'{name}' again, expected each joint once")));
+        }
+        let angle = |key: &str| link.field(key).number("an angle in rad");
+        let length = |key: &str| link.field(key).number("a length in m");
+        links.push(DhLink {
+            theta_offset_rad: angle("theta_offset")?,
+            d_m: length("d")?,
+            a_m: length("a")?,
+            alpha_rad: angle("alpha")?,
+        });
+        let limits = link.field("limits").optional();
+        let limits = match limits {
+            Some(limits) => limits.exactly::<2>("2 (lower upper, in rad)")?,
+            None => [-std::f64::consts::PI, std::f64::consts::PI],
+        };
+        if limits[0] >= limits[1] {
+            let problem = format!("lower stop {} not below upper stop {}", limits[0], limits[1]);
+            return Err(link.field("limits").error(problem));
+        }
+        joints.push(Joint { name, limits_rad: (limits[0], limits[1]) });
+    }
+    let chain = ClassicalChain {
+        imu_from_base: gimbal.field("T_I_B").transform()?,
+        links,
+        effector_from_camera: gimbal.field("T_E_C").transform()?,
+    };
+    Ok(GimbalRig { topic, rate_hz, encoder_sigma_rad, prior, chain, joints })
+}

@@ -1,0 +1,163 @@
+use std::fs;
+use std::path::Path;
+
+use super::Rig;
+use crate::flight_log::tests::RIG;
+
+fn parse(text: &str) -> Result<Rig, String> {
+    Rig::from_yaml(text, Path::new("some.rig.yaml")).map_err(|error| error.to_string())
+}
+
+#[test]
+fn a_rig_survives_being_written() {
+    let rig = parse(RIG).unwrap();
+    let yaml = rig.to_yaml();
+    let again = parse(&yaml).unwrap();
+    check_same(&rig, &again);
+    let mut odd = rig;
+    odd.name = "null".into();
+    odd.imu.noise.gyroscope_random_walk = 1e-5 / 3.0;
+    odd.imu.noise.accelerometer_random_walk = 1e22;
+    odd.cameras[0].frame_id = "a \"frame\": #1".into();
+    odd.gimbal.as_mut().unwrap().topic = None;
+    odd.gimbal.as_mut().unwrap().encoder_sigma_rad = None;
+    let yaml = odd.to_yaml();
+    assert!(yaml.contains("1.0e+22") && !yaml.contains("1e22"), "{yaml}");
+    check_same(&odd, &parse(&yaml).unwrap());
+}
+
+/// Equal in every number but the rotations, which are equal to within rounding.
+fn check_same(a: &Rig, b: &Rig) {
+    let (mut b, mut worst) = (b.clone(), 0.0_f64);
+    let mut settle = |a: &crate::geometry::RigidTransform, b: &mut crate::geometry::RigidTransform| {
+        worst = worst.max(a.minus(b).norm());
+        *b = *a;
+    };
+    for (a, b) in a.cameras.iter().zip(&mut b.cameras) {
+        if let (super::CameraMount::Static { imu_from_camera: a }, super::CameraMount::Static { imu_from_camera: b }) =
+            (&a.mount, &mut b.mount)
+        {
+            settle(a, b);
+        }
+    }
+    if let (Some(a), Some(b)) = (&a.gimbal, &mut b.gimbal) {
+        settle(&a.chain.imu_from_base, &mut b.chain.imu_from_base);
+        settle(&a.chain.effector_from_camera, &mut b.chain.effector_from_camera);
+    }
+    assert!(worst < 1e-14, "{worst}");
+    assert_eq!(*a, b);
+}
+
+#[test]
+fn a_wrong_field_is_named_with_what_it_holds() {
+    let cases = [
+        (
+            "intrinsics: [50.0, 50.0, 31.5, 23.5]",
+            "intrinsics: [50.0, 50.0, 31.5]",
+            "cam0.intrinsics: 3 numbers, expected 4 (fx fy cx cy)",
+        ),
+        (
+            "intrinsics: [50.0, 50.0, 31.5, 23.5]",
+            "intrinsics: [-50.0, 50.0, 31.5, 2]",
+            "cam0.intrinsics: focal length fx is -50, expected a positive number of pixels",
+        ),
+        ("  intrinsics: [50.0, 50.0, 31.5, 23.5]\n", "", "cam0.intrinsics: missing, expected 4 numbers (fx fy cx cy)"),
+        ("resolution: [64, 48]", "resolution: [64.5, 48]", "cam0.resolution: 64.5×48, expected whole pixels"),
+        ("mount: gimbal", "mount: fixed", "cam0.mount: holds the text 'fixed', expected gimbal or static"),
+        ("mount: gimbal", "mount: static", "cam0.T_cam_imu: missing, expected 4 rows of 4 numbers"),
+        (
+            "camera_model: pinhole",
+            "camera_model: fisheye",
+            "cam0.camera_model: holds the text 'fisheye', expected pinhole",
+        ),
+        (
+            "distortion_model: none",
+            "distortion_model: brown",
+            "cam0.distortion_model: holds the text 'brown', expected none, radtan",
+        ),
+        ("gravity: 9.81", "gravity: -9.81", "gravity: holds -9.81, expected gravity's magnitude in m/s²"),
+        ("gravity: 9.81\n", "", "gravity: missing, expected gravity's magnitude"),
+        ("update_rate: 200.0", "update_rate: fast", "imu0.update_rate: holds the text 'fast', expected the rate in Hz"),
+        (
+            "gyroscope_noise_density: 3.4e-4",
+            "gyro_noise: 3.4e-4",
+            "imu0.gyroscope_noise_density: missing, expected a number greater than 0 in rad/s/√Hz",
+        ),
+        ("rig_version: 1", "rig_version: 2", "rig_version: holds 2, expected the number 1"),
+        ("encoder_sigma: 0.0087", "encoder_sigma: -1", "gimbal.encoder_sigma: holds -1, expected a standard deviation"),
+        (
+            "T_I_B: [[1, 0, 0, 0.1]",
+            "T_I_B: [[1.1, 0, 0, 0.1]",
+            "gimbal.T_I_B: the upper left 3×3 block has determinant 1.1000",
+        ),
+        ("T_I_B: [[1, 0, 0, 0.1], ", "T_I_B: [", "gimbal.T_I_B: 3 rows, expected 4 rows of 4 numbers"),
+        ("[0, 1, 0, 0]", "[0, 1, 0]", "gimbal.T_I_B[1]: 3 numbers, expected 4 numbers, a row"),
+        (
+            "limits: [-3.14, 3.14]",
+            "limits: [3.14, -3.14]",
+            "gimbal.links[0].limits: lower stop 3.14 not below upper stop -3.14",
+        ),
+        ("alpha: -1.55, ", "", "gimbal.links[0].alpha: missing, expected an angle in rad"),
+        ("cam0:", "camera:", "cam0: missing, expected at least one camera"),
+        ("gimbal:\n", "gimble:\n", "gimbal: missing, expected a gimbal, since cam0.mount is gimbal"),
+    ];
+    assert!(parse(RIG).is_ok());
+    for (from, to, expected) in cases {
+        assert!(RIG.contains(from), "{from}");
+        let message = parse(&RIG.replacen(from, to, 1)).unwrap_err();
+        assert!(message.starts_with(expected), "{message}\nexpected {expected}");
+        assert!(message.ends_with("some.rig.yaml"), "{message}");
+    }
+    let syntax = parse("rig_version: [1").unwrap_err();
+    assert!(syntax.contains("not valid YAML"), "{syntax}");
+}
+
+const CAMERA_CHAIN: &str = "\
+cam0:
+  T_cam_imu:
+  - [0.0, 1.0, 0.0, 0.065]
+  - [-1.0, 0.0, 0.0, -0.02]
+  - [0.0, 0.0, 1.0, -0.008]
+  - [0.0, 0.0, 0.0, 1.0]
+  cam_overlaps: [1]
+  camera_model: pinhole
+  distortion_coeffs: [-0.28, 0.07, 0.0002, 1.8e-05]
+  distortion_model: radtan
+  intrinsics: [458.6, 457.3, 367.2, 248.4]
+  resolution: [752, 480]
+  rostopic: /cam0/image_raw
+  timeshift_cam_imu: 0.0012
+  update_rate: 20.0
+";
+const IMU: &str = "\
+accelerometer_noise_density: 0.002
+accelerometer_random_walk: 0.003
+gyroscope_noise_density: 0.00017
+gyroscope_random_walk: 1.9e-05
+rostopic: /imu0
+update_rate: 200.0
+";
+
+#[test]
+fn kalibrs_files_are_a_rig() {
+    let folder = tempfile::TempDir::new().unwrap();
+    let chain = folder.path().join("camchain-imucam.yaml");
+    fs::write(&chain, CAMERA_CHAIN).unwrap();
+    let missing = Rig::from_file(&chain).unwrap_err().to_string();
+    assert!(missing.contains("imu0: missing, expected the IMU in one of imu.yaml, imu0.yaml"), "{missing}");
+    fs::write(folder.path().join("imu.yaml"), IMU).unwrap();
+    let rig = Rig::from_file(&chain).unwrap();
+    assert_eq!((rig.imu.topic.as_str(), rig.imu.rate_hz, rig.cameras.len()), ("/imu0", 200.0, 1));
+    let camera = &rig.cameras[0];
+    assert_eq!(camera.timeshift_cam_imu_s, 0.0012);
+    let super::CameraMount::Static { imu_from_camera } = &camera.mount else { panic!("static") };
+    assert!((imu_from_camera.inverse().translation_m.x - 0.065).abs() < 1e-15);
+    check_same(&rig, &parse(&rig.to_yaml()).unwrap());
+
+    // The file of a named run, with the IMU nested as Kalibr's result has it.
+    let chain = folder.path().join("camchain-imucam-flight.yaml");
+    fs::write(&chain, CAMERA_CHAIN).unwrap();
+    let nested = format!("  {}", IMU.trim_end().replace('\n', "\n  "));
+    fs::write(folder.path().join("imu-flight.yaml"), format!("imu0:\n{nested}\n").replace("/imu0", "/other")).unwrap();
+    assert_eq!(Rig::from_file(&chain).unwrap().imu.topic, "/other");
+}

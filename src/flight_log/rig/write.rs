@@ -1,0 +1,116 @@
+use std::fmt::Write as _;
+
+use super::{CameraMount, CameraRig, GimbalRig, Rig};
+use crate::geometry::RigidTransform;
+
+impl Rig {
+    /// The rig as a YAML file in the classical form. Numbers are written so that they read back exactly; rotation
+    /// matrices come back to within rounding.
+    pub fn to_yaml(&self) -> String {
+        let mut out = String::from("# T_a_b maps points from b to a; metres, radians, seconds.\n");
+        line(&mut out, 0, "rig_version", "1");
+        line(&mut out, 0, "name", &text(&self.name));
+        line(&mut out, 0, "gravity", &number(self.gravity_m_per_s2));
+        line(&mut out, 0, "imu0", "");
+        line(&mut out, 1, "rostopic", &text(&self.imu.topic));
+        line(&mut out, 1, "frame_id", &text(&self.imu.frame_id));
+        line(&mut out, 1, "update_rate", &number(self.imu.rate_hz));
+        line(&mut out, 1, "accelerometer_noise_density", &number(self.imu.noise.accelerometer_noise_density));
+        line(&mut out, 1, "accelerometer_random_walk", &number(self.imu.noise.accelerometer_random_walk));
+        line(&mut out, 1, "gyroscope_noise_density", &number(self.imu.noise.gyroscope_noise_density));
+        line(&mut out, 1, "gyroscope_random_walk", &number(self.imu.noise.gyroscope_random_walk));
+        for camera in &self.cameras {
+            write_camera(&mut out, camera);
+        }
+        if let Some(gimbal) = &self.gimbal {
+            write_gimbal(&mut out, gimbal);
+        }
+        if let Some(topic) = &self.ground_truth_topic {
+            line(&mut out, 0, "ground_truth", "");
+            line(&mut out, 1, "rostopic", &text(topic));
+        }
+        out
+    }
+}
+
+fn write_camera(out: &mut String, camera: &CameraRig) {
+    line(out, 0, &camera.key, "");
+    let mount = if camera.mount == CameraMount::Gimbal { "gimbal" } else { "static" };
+    line(out, 1, "mount", mount);
+    line(out, 1, "rostopic", &text(&camera.topic));
+    line(out, 1, "frame_id", &text(&camera.frame_id));
+    line(out, 1, "update_rate", &number(camera.rate_hz));
+    line(out, 1, "camera_model", camera.model.projection.name());
+    line(out, 1, "intrinsics", &numbers(&camera.model.kalibr_intrinsics()));
+    line(out, 1, "distortion_model", camera.model.distortion.name());
+    line(out, 1, "distortion_coeffs", &numbers(&camera.model.kalibr_distortion_coeffs()));
+    let [width, height] = camera.model.resolution_px;
+    line(out, 1, "resolution", &format!("[{width}, {height}]"));
+    line(out, 1, "timeshift_cam_imu", &number(camera.timeshift_cam_imu_s));
+    if let CameraMount::Static { imu_from_camera } = &camera.mount {
+        write_transform(out, "T_cam_imu", &imu_from_camera.inverse());
+    }
+}
+
+fn write_gimbal(out: &mut String, gimbal: &GimbalRig) {
+    line(out, 0, "gimbal", "");
+    line(out, 1, "rostopic", &gimbal.topic.as_deref().map_or_else(|| "null".into(), text));
+    if gimbal.rate_hz > 0.0 {
+        line(out, 1, "update_rate", &number(gimbal.rate_hz));
+    }
+    line(out, 1, "encoder_sigma", &gimbal.encoder_sigma_rad.map_or_else(|| "null".into(), number));
+    line(out, 1, "prior", "");
+    line(out, 2, "translation_bound", &number(gimbal.prior.translation_bound_m));
+    line(out, 2, "rotation_bound", &number(gimbal.prior.rotation_bound_rad));
+    write_transform(out, "T_I_B", &gimbal.chain.imu_from_base);
+    line(out, 1, "links", if gimbal.joints.is_empty() { "[]" } else { "" });
+    for (joint, link) in gimbal.joints.iter().zip(&gimbal.chain.links) {
+        line(out, 1, "- joint", &text(&joint.name));
+        line(out, 2, "theta_offset", &number(link.theta_offset_rad));
+        line(out, 2, "d", &number(link.d_m));
+        line(out, 2, "a", &number(link.a_m));
+        line(out, 2, "alpha", &number(link.alpha_rad));
+        line(out, 2, "limits", &numbers(&[joint.limits_rad.0, joint.limits_rad.1]));
+    }
+    write_transform(out, "T_E_C", &gimbal.chain.effector_from_camera);
+}
+
+fn write_transform(out: &mut String, key: &str, transform: &RigidTransform) {
+    line(out, 1, key, "");
+    let matrix = transform.to_matrix();
+    for row in matrix.row_iter() {
+        let row: Vec<f64> = row.iter().copied().collect();
+        out.push_str("  - ");
+        out.push_str(&numbers(&row));
+        out.push('\n');
+    }
+}
+
+fn line(out: &mut String, depth: usize, key: &str, value: &str) {
+    let space = if value.is_empty() { "" } else { " " };
+    // Writing to a string cannot fail.
+    let _infallible = writeln!(out, "{:width$}{key}:{space}{value}", "", width = 2 * depth);
+}
+
+/// The shortest decimal that reads back as the same number, in a form that YAML 1.1 readers (`PyYAML`) take for a number
+/// too: they want a point before an exponent, and a sign in it.
+fn number(value: f64) -> String {
+    let written = format!("{value:?}");
+    let Some((mantissa, exponent)) = written.split_once('e') else { return written };
+    let point = if mantissa.contains('.') { "" } else { ".0" };
+    let sign = if exponent.starts_with('-') { "" } else { "+" };
+    format!("{mantissa}{point}e{sign}{exponent}")
+}
+
+fn numbers(values: &[f64]) -> String {
+    format!("[{}]", values.iter().map(|value| number(*value)).collect::<Vec<_>>().join(", "))
+}
+
+/// A plain scalar where YAML takes it for a text, else a quoted one.
+fn text(value: &str) -> String {
+    let plain = value.starts_with(|first: char| first.is_ascii_alphabetic() || first == '/')
+        && value.chars().all(|letter| letter.is_ascii_alphanumeric() || "/_-.".contains(letter))
+        && !["true", "false", "null", "yes", "no", "on", "off", "y", "n"]
+            .contains(&value.to_ascii_lowercase().as_str());
+    if plain { value.to_owned() } else { serde_json::Value::from(value).to_string() }
+}

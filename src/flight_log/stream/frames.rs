@@ -1,0 +1,476 @@
+use std::collections::VecDeque;
+use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
+
+use super::super::messages::{self, MessageKind};
+use super::super::picture::decode_picture;
+use super::super::{FlightLog, GrayImage, ImuSample, JointSample, LogError, LogWarning, PoseSample, Rig, SensorFrame};
+use super::ordered::{Decoder, MessageSource, OrderedSamples, ReadContext, Refusal};
+use crate::geometry::{RigidTransform, ns_from_seconds, seconds_from_ns};
+
+/// How far back the first frame's IMU samples go.
+const FIRST_FRAME_IMU_NS: i64 = 2_000_000_000;
+/// Log times may lag behind header stamps by this much; reading begins so much earlier.
+const SEEK_MARGIN_NS: i64 = 1_000_000_000;
+/// A joint angle or a true pose further than this from the image's stamp does not count.
+const NEAREST_NS: i64 = 100_000_000;
+/// Longer pauses between IMU samples, in periods, are told.
+const IMU_GAP_PERIODS: f64 = 3.5;
+/// Longer pauses between images, in periods, are told.
+const IMAGE_GAP_PERIODS: f64 = 1.75;
+
+/// An image message, not decoded yet.
+struct PendingImage {
+    number: usize,
+    log_time_ns: i64,
+    message: Vec<u8>,
+}
+
+/// A topic whose samples are looked up by time: those before the stamp, and the first one after it.
+struct Lookup<T> {
+    samples: OrderedSamples<T>,
+    before: Option<(i64, T)>,
+    after: Option<(i64, T)>,
+    ended: bool,
+}
+
+impl<T> Lookup<T> {
+    fn new(samples: OrderedSamples<T>) -> Self {
+        Self { samples, before: None, after: None, ended: false }
+    }
+
+    /// The last sample at or before a time and the first after it; times must not decrease.
+    fn around(&mut self, context: &mut ReadContext, stamp_ns: i64) -> [Option<&(i64, T)>; 2] {
+        while !self.ended && self.after.as_ref().is_none_or(|(after, _)| *after <= stamp_ns) {
+            if let Some(passed) = self.after.take() {
+                self.before = Some(passed);
+            }
+            self.after = self.samples.next(context);
+            self.ended = self.after.is_none();
+        }
+        [self.before.as_ref(), self.after.as_ref()]
+    }
+}
+
+/// Makes the frames of one camera, one after another.
+pub(super) struct FrameSource {
+    context: ReadContext,
+    camera: CameraStream,
+    imu: OrderedSamples<ImuSample>,
+    imu_topic: String,
+    imu_gap_ns: i64,
+    imu_ended: bool,
+    /// IMU samples not before the previous frame, and the first one after the frame.
+    samples: VecDeque<ImuSample>,
+    joints: Option<Lookup<JointSample>>,
+    truth: Option<Lookup<PoseSample>>,
+    /// IMU interpolated at the previous frame's end.
+    previous_end: Option<ImuSample>,
+    start_ns: i64,
+    end_ns: i64,
+    /// Warnings of the log itself that are still to be told.
+    log_warnings: VecDeque<LogWarning>,
+    /// Images before the first IMU sample.
+    skipped: usize,
+}
+
+/// The camera's topic and what is expected of it.
+struct CameraStream {
+    images: OrderedSamples<PendingImage>,
+    topic: String,
+    kind: MessageKind,
+    key: String,
+    resolution_px: [usize; 2],
+    shift_ns: i64,
+    gap_ns: i64,
+    previous_stamp_ns: Option<i64>,
+}
+
+impl FrameSource {
+    pub(super) fn new(
+        log: Arc<FlightLog>,
+        rig: &Rig,
+        camera_key: &str,
+        start_s: f64,
+        duration_s: Option<f64>,
+    ) -> Result<Self, LogError> {
+        let mut context = ReadContext::new(log);
+        let log = &*Arc::clone(&context.log);
+        let camera = rig.camera(camera_key)?;
+        let field = format!("{camera_key}.rostopic");
+        let images = log.require_topic(&field, &camera.topic, &[MessageKind::Image, MessageKind::CompressedImage])?;
+        let kind = images.kind.unwrap_or(MessageKind::Image);
+        let image_gap_ns = gap_ns(IMAGE_GAP_PERIODS, camera.rate_hz, images.rate_hz);
+        let imu = log.require_topic("imu0.rostopic", &rig.imu.topic, &[MessageKind::Imu])?;
+        let imu_gap_ns = gap_ns(IMU_GAP_PERIODS, rig.imu.rate_hz, imu.rate_hz);
+        let start_ns = ns_from_seconds(start_s);
+        let end_ns = duration_s.map_or(i64::MAX, |duration_s| start_ns.saturating_add(ns_from_seconds(duration_s)));
+        let shift_ns = ns_from_seconds(camera.timeshift_cam_imu_s);
+        let from_ns = start_ns.saturating_sub(FIRST_FRAME_IMU_NS + SEEK_MARGIN_NS + shift_ns.abs());
+        let joints = joint_samples(log, rig, from_ns)?.map(Lookup::new);
+        let truth = truth_samples(log, rig, from_ns, &mut context).map(Lookup::new);
+        let log_warnings = log.warnings().iter().cloned().collect();
+        let stream = CameraStream {
+            images: OrderedSamples::new(log, &camera.topic, from_ns, image_decoder(log.epoch_ns())),
+            topic: camera.topic.clone(),
+            kind,
+            key: camera_key.to_owned(),
+            resolution_px: camera.model.resolution_px,
+            shift_ns,
+            gap_ns: image_gap_ns,
+            previous_stamp_ns: None,
+        };
+        Ok(Self {
+            imu: OrderedSamples::new(log, &rig.imu.topic, from_ns, imu_decoder(log.epoch_ns())),
+            imu_topic: rig.imu.topic.clone(),
+            context,
+            camera: stream,
+            imu_gap_ns,
+            imu_ended: false,
+            samples: VecDeque::new(),
+            joints,
+            truth,
+            previous_end: None,
+            start_ns,
+            end_ns,
+            log_warnings,
+            skipped: 0,
+        })
+    }
+
+    /// The next frame, `None` at the end of the log or of the time asked for.
+    pub(super) fn next_frame(&mut self) -> Option<SensorFrame> {
+        loop {
+            let (stamp_ns, pending) = self.camera.images.next(&mut self.context)?;
+            if stamp_ns > self.end_ns {
+                return None;
+            }
+            self.camera.check_gap(&mut self.context, stamp_ns, self.start_ns);
+            let imu_stamp_ns = stamp_ns + self.camera.shift_ns;
+            self.read_imu_until(imu_stamp_ns);
+            let Some(last) = self.samples.back().filter(|last| last.stamp_ns >= imu_stamp_ns).copied() else {
+                self.tell_end_of_imu(stamp_ns, pending.number);
+                return None;
+            };
+            let first_known = self.samples.front().map_or(last.stamp_ns, |first| first.stamp_ns);
+            if self.previous_end.is_none() && first_known > imu_stamp_ns {
+                self.skipped += usize::from(stamp_ns >= self.start_ns);
+                continue;
+            }
+            if stamp_ns < self.start_ns {
+                self.forget_samples_before(imu_stamp_ns - FIRST_FRAME_IMU_NS);
+                continue;
+            }
+            let Some(image) = self.camera.decode(&mut self.context, stamp_ns, &pending) else { continue };
+            self.tell_skipped();
+            let imu = self.take_imu(imu_stamp_ns);
+            let joint_angles_rad = self.joint_angles_at(imu_stamp_ns);
+            let truth = self.truth_at(imu_stamp_ns);
+            while self.log_warnings.front().is_some_and(|warning| warning.stamp_ns <= stamp_ns) {
+                self.context.warnings.extend(self.log_warnings.pop_front());
+            }
+            return Some(SensorFrame {
+                index: pending.number,
+                stamp_ns,
+                log_time_ns: pending.log_time_ns,
+                image: Arc::new(image),
+                imu,
+                joint_angles_rad,
+                truth,
+                warnings: std::mem::take(&mut self.context.warnings),
+            });
+        }
+    }
+
+    /// Warnings after the last frame.
+    pub(super) fn finish(&mut self) -> Vec<LogWarning> {
+        self.tell_skipped();
+        self.imu.finish(&mut self.context);
+        if self.end_ns == i64::MAX {
+            self.context.warnings.extend(self.log_warnings.drain(..));
+        }
+        std::mem::take(&mut self.context.warnings)
+    }
+
+    fn read_imu_until(&mut self, stamp_ns: i64) {
+        while !self.imu_ended && self.samples.back().is_none_or(|last| last.stamp_ns < stamp_ns) {
+            let Some((_, sample)) = self.imu.next(&mut self.context) else {
+                self.imu_ended = true;
+                return;
+            };
+            if let Some(last) = self.samples.back()
+                && sample.stamp_ns - last.stamp_ns > self.imu_gap_ns
+            {
+                let message = format!(
+                    "{}: no samples for {:.3} s from {:.3} s on; the IMU is interpolated over the gap",
+                    self.imu_topic,
+                    seconds_from_ns(sample.stamp_ns - last.stamp_ns),
+                    seconds_from_ns(last.stamp_ns)
+                );
+                self.context.warn(last.stamp_ns, message);
+            }
+            self.samples.push_back(sample);
+        }
+    }
+
+    /// Drops samples that no later frame needs, but keeps the last one before the time.
+    fn forget_samples_before(&mut self, stamp_ns: i64) {
+        while self.samples.get(1).is_some_and(|second| second.stamp_ns <= stamp_ns) {
+            self.samples.pop_front();
+        }
+    }
+
+    /// The samples from the previous frame's end to `end_ns`, both ends interpolated.
+    fn take_imu(&mut self, end_ns: i64) -> Vec<ImuSample> {
+        let begin_ns = self.previous_end.map_or(end_ns - FIRST_FRAME_IMU_NS, |previous| previous.stamp_ns);
+        let mut imu: Vec<ImuSample> = self.previous_end.into_iter().collect();
+        let begins_with_sample = imu.is_empty();
+        let inside =
+            |stamp_ns: i64| (stamp_ns > begin_ns || (begins_with_sample && stamp_ns == begin_ns)) && stamp_ns < end_ns;
+        imu.extend(self.samples.iter().filter(|sample| inside(sample.stamp_ns)));
+        let after = self.samples.iter().position(|sample| sample.stamp_ns >= end_ns);
+        if let Some(after) = after {
+            let end = match after.checked_sub(1).and_then(|before| self.samples.get(before)) {
+                Some(before) => interpolate_imu(before, &self.samples[after], end_ns),
+                None => self.samples[after],
+            };
+            imu.push(end);
+            self.previous_end = Some(end);
+        }
+        self.forget_samples_before(end_ns);
+        imu
+    }
+
+    fn joint_angles_at(&mut self, stamp_ns: i64) -> Option<Vec<f64>> {
+        let [before, after] = self.joints.as_mut()?.around(&mut self.context, stamp_ns);
+        let nearest_ns = [before, after].into_iter().flatten().map(|(at, _)| (at - stamp_ns).abs()).min()?;
+        if nearest_ns > NEAREST_NS {
+            return None;
+        }
+        match (before, after) {
+            (Some((from_ns, from)), Some((to_ns, to))) => {
+                let share = share_of(*from_ns, *to_ns, stamp_ns);
+                let pairs = from.angles_rad.iter().zip(&to.angles_rad);
+                Some(pairs.map(|(from, to)| from + share * wrap_angle(to - from)).collect())
+            }
+            (Some((_, only)), None) | (None, Some((_, only))) => Some(only.angles_rad.clone()),
+            (None, None) => None,
+        }
+    }
+
+    fn truth_at(&mut self, stamp_ns: i64) -> Option<RigidTransform> {
+        let [before, after] = self.truth.as_mut()?.around(&mut self.context, stamp_ns);
+        let (from_ns, from) = before?;
+        if *from_ns == stamp_ns {
+            return Some(from.world_from_imu);
+        }
+        let (to_ns, to) = after?;
+        if (stamp_ns - from_ns).min(to_ns - stamp_ns) > NEAREST_NS {
+            return None;
+        }
+        Some(interpolate_pose(&from.world_from_imu, &to.world_from_imu, share_of(*from_ns, *to_ns, stamp_ns)))
+    }
+
+    fn tell_skipped(&mut self) {
+        let count = std::mem::take(&mut self.skipped);
+        if count > 0 {
+            let message = format!(
+                "{}: {count} images before the first IMU sample at {:.3} s are not used",
+                self.camera.topic,
+                seconds_from_ns(self.samples.front().map_or(0, |first| first.stamp_ns))
+            );
+            self.context.warn(self.start_ns, message);
+        }
+    }
+
+    fn tell_end_of_imu(&mut self, stamp_ns: i64, number: usize) {
+        let left = self.camera.images.count() - number;
+        let Some(last) = self.samples.back() else {
+            let message = format!("{}: no IMU sample for the images of {}", self.imu_topic, self.camera.key);
+            self.context.warn(stamp_ns, message);
+            return;
+        };
+        // The streams of a log seldom end together; the last image or two may have no IMU sample after them.
+        if left > 2 {
+            let message = format!(
+                "{}: the IMU ends at {:.3} s; the last {left} images of {} are not used",
+                self.imu_topic,
+                seconds_from_ns(last.stamp_ns),
+                self.camera.key
+            );
+            self.context.warn(last.stamp_ns, message);
+        }
+    }
+}
+
+impl CameraStream {
+    fn check_gap(&mut self, context: &mut ReadContext, stamp_ns: i64, start_ns: i64) {
+        if let Some(previous_ns) = self.previous_stamp_ns.filter(|previous| *previous >= start_ns)
+            && stamp_ns - previous_ns > self.gap_ns
+        {
+            let message = format!(
+                "{}: no image for {:.3} s from {:.3} s on",
+                self.topic,
+                seconds_from_ns(stamp_ns - previous_ns),
+                seconds_from_ns(previous_ns)
+            );
+            context.warn(previous_ns, message);
+        }
+        self.previous_stamp_ns = Some(stamp_ns);
+    }
+
+    /// The image, or a warning why it is left out.
+    fn decode(&self, context: &mut ReadContext, stamp_ns: i64, pending: &PendingImage) -> Option<GrayImage> {
+        let problem = match decode_picture(self.kind, &pending.message) {
+            Ok(image) if [image.width, image.height] == self.resolution_px => return Some(image),
+            Ok(image) => format!(
+                "it has {}×{} pixels, the rig says {}×{} for {}",
+                image.width, image.height, self.resolution_px[0], self.resolution_px[1], self.key
+            ),
+            Err(problem) => problem,
+        };
+        let message = format!(
+            "{}: image {} at {:.3} s left out: {problem}",
+            self.topic,
+            pending.number,
+            seconds_from_ns(stamp_ns)
+        );
+        context.warn(stamp_ns, message);
+        None
+    }
+}
+
+/// The longest pause that is not told: so many periods of the slower of the rig's rate and the log's mean rate.
+fn gap_ns(periods: f64, rig_rate_hz: f64, log_rate_hz: f64) -> i64 {
+    let slower = [rig_rate_hz, log_rate_hz].into_iter().filter(|rate| *rate > 0.0).fold(f64::INFINITY, f64::min);
+    if slower.is_finite() { ns_from_seconds(periods / slower) } else { i64::MAX }
+}
+
+fn share_of(from_ns: i64, to_ns: i64, stamp_ns: i64) -> f64 {
+    if to_ns > from_ns { (stamp_ns - from_ns) as f64 / (to_ns - from_ns) as f64 } else { 0.0 }
+}
+
+/// An angle brought into (−π, π].
+fn wrap_angle(angle_rad: f64) -> f64 {
+    PI - (PI - angle_rad).rem_euclid(TAU)
+}
+
+fn interpolate_imu(from: &ImuSample, to: &ImuSample, stamp_ns: i64) -> ImuSample {
+    let share = share_of(from.stamp_ns, to.stamp_ns, stamp_ns);
+    if share >= 1.0 {
+        return ImuSample { stamp_ns, ..*to };
+    }
+    ImuSample {
+        stamp_ns,
+        angular_velocity_rad_per_s: from.angular_velocity_rad_per_s.lerp(&to.angular_velocity_rad_per_s, share),
+        specific_force_m_per_s2: from.specific_force_m_per_s2.lerp(&to.specific_force_m_per_s2, share),
+    }
+}
+
+fn interpolate_pose(from: &RigidTransform, to: &RigidTransform, share: f64) -> RigidTransform {
+    // A half turn between two samples has no shortest way; then the earlier one stays.
+    let rotation = from.rotation.try_slerp(&to.rotation, share, 1e-9).unwrap_or(from.rotation);
+    RigidTransform::new(rotation, from.translation_m.lerp(&to.translation_m, share))
+}
+
+fn not_decodable(error: &impl ToString) -> Refusal {
+    Refusal { reason: "it cannot be decoded", detail: error.to_string() }
+}
+
+fn image_decoder(epoch_ns: i64) -> Decoder<PendingImage> {
+    Box::new(move |source: MessageSource<'_>| {
+        let stamp_ns = messages::header_stamp_ns(source.data).map_err(|error| not_decodable(&error))?;
+        let log_time_ns = i64::try_from(source.position.log_time_ns).unwrap_or(i64::MAX).saturating_sub(epoch_ns);
+        Ok((stamp_ns, PendingImage { number: source.number, log_time_ns, message: source.data.to_vec() }))
+    })
+}
+
+fn imu_decoder(epoch_ns: i64) -> Decoder<ImuSample> {
+    Box::new(move |source: MessageSource<'_>| {
+        let imu = messages::read_imu(source.data).map_err(|error| not_decodable(&error))?;
+        let numbers = imu.angular_velocity_rad_per_s.iter().chain(&imu.specific_force_m_per_s2);
+        if !numbers.clone().all(|number| number.is_finite()) {
+            let detail = format!(
+                "angular velocity {:?}, specific force {:?}",
+                imu.angular_velocity_rad_per_s.as_slice(),
+                imu.specific_force_m_per_s2.as_slice()
+            );
+            return Err(Refusal { reason: "numbers that are not finite", detail });
+        }
+        let sample = ImuSample {
+            stamp_ns: imu.stamp_ns.saturating_sub(epoch_ns),
+            angular_velocity_rad_per_s: imu.angular_velocity_rad_per_s,
+            specific_force_m_per_s2: imu.specific_force_m_per_s2,
+        };
+        Ok((imu.stamp_ns, sample))
+    })
+}
+
+/// The gimbal's encoder samples, `None` without a gimbal or encoders.
+fn joint_samples(log: &FlightLog, rig: &Rig, from_ns: i64) -> Result<Option<OrderedSamples<JointSample>>, LogError> {
+    let Some(gimbal) = rig.gimbal.as_ref().filter(|gimbal| gimbal.encoder_sigma_rad.is_some()) else {
+        return Ok(None);
+    };
+    let Some(topic) = &gimbal.topic else { return Ok(None) };
+    log.require_topic("gimbal.rostopic", topic, &[MessageKind::JointState])?;
+    let names: Vec<String> = gimbal.joints.iter().map(|joint| joint.name.clone()).collect();
+    let known = log.find_message(topic, |data| {
+        let message = messages::read_joint_state(data).ok()?;
+        Some(message.names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>())
+    });
+    if let Some(known) = known
+        && let Some(link) = names.iter().position(|name| !known.contains(name))
+    {
+        return Err(LogError::UnknownJoint {
+            link,
+            joint: names[link].clone(),
+            topic: topic.clone(),
+            available: known,
+            path: log.path().to_owned(),
+        });
+    }
+    let epoch_ns = log.epoch_ns();
+    let decode: Decoder<JointSample> = Box::new(move |source: MessageSource<'_>| {
+        let message = messages::read_joint_state(source.data).map_err(|error| not_decodable(&error))?;
+        let mut angles_rad = Vec::with_capacity(names.len());
+        for name in &names {
+            let place = message.names.iter().position(|known| known == name);
+            match place.and_then(|place| message.positions_rad.get(place)) {
+                Some(angle) if angle.is_finite() => angles_rad.push(*angle),
+                Some(angle) => {
+                    return Err(Refusal { reason: "numbers that are not finite", detail: format!("{name}: {angle}") });
+                }
+                None => return Err(Refusal { reason: "a joint is missing", detail: name.clone() }),
+            }
+        }
+        Ok((message.stamp_ns, JointSample { stamp_ns: message.stamp_ns.saturating_sub(epoch_ns), angles_rad }))
+    });
+    Ok(Some(OrderedSamples::new(log, topic, from_ns, decode)))
+}
+
+/// The true poses, `None` when the rig names none or the log has none.
+fn truth_samples(
+    log: &FlightLog,
+    rig: &Rig,
+    from_ns: i64,
+    context: &mut ReadContext,
+) -> Option<OrderedSamples<PoseSample>> {
+    let topic = rig.ground_truth_topic.as_ref()?;
+    let kinds = [MessageKind::Odometry, MessageKind::PoseStamped, MessageKind::TransformStamped];
+    let kind = match log.require_topic("ground_truth.rostopic", topic, &kinds) {
+        Ok(info) => info.kind?,
+        Err(error) => {
+            context.warn(0, format!("no ground truth: {error}"));
+            return None;
+        }
+    };
+    let epoch_ns = log.epoch_ns();
+    let decode: Decoder<PoseSample> = Box::new(move |source: MessageSource<'_>| {
+        let message = messages::read_pose(kind, source.data).map_err(|error| not_decodable(&error))?;
+        let refusal = || Refusal { reason: "it is no pose", detail: "not finite, or a zero quaternion".into() };
+        let world_from_imu = message.pose.ok_or_else(refusal)?;
+        let sample = PoseSample { stamp_ns: message.stamp_ns.saturating_sub(epoch_ns), world_from_imu };
+        Ok((message.stamp_ns, sample))
+    });
+    Some(OrderedSamples::new(log, topic, from_ns, decode))
+}

@@ -1,0 +1,99 @@
+//! The log as one camera's frames, each with the samples of the other sensors that belong to it.
+
+mod frames;
+mod ordered;
+
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, sync_channel};
+use std::thread::JoinHandle;
+
+use self::frames::FrameSource;
+use super::{FlightLog, LogError, LogWarning, Rig, SensorFrame};
+
+/// Frames made ahead of the reader; one takes about half a megabyte.
+const FRAMES_AHEAD: usize = 6;
+
+/// What the reading thread hands over.
+enum Delivery {
+    Frame(Box<SensorFrame>),
+    /// The log's end, with the warnings after the last frame.
+    End(Vec<LogWarning>),
+}
+
+/// The frames of one camera in the order of their stamps.
+///
+/// Reads the log chunk by chunk on a thread of its own, a few frames ahead; what comes out does not depend on how fast
+/// it is taken.
+#[derive(Debug)]
+pub struct FrameStream {
+    /// `None` once the end has been reached.
+    receiver: Option<Receiver<Delivery>>,
+    thread: Option<JoinHandle<()>>,
+    remaining_warnings: Vec<LogWarning>,
+}
+
+impl FrameStream {
+    /// Begins with the camera's first frame at or after `start_s` (seconds since the log began) and ends `duration_s`
+    /// later, or with the log. Fails when the rig and the log do not fit; a missing ground truth only warns.
+    pub fn new(
+        log: Arc<FlightLog>,
+        rig: &Rig,
+        camera_key: &str,
+        start_s: f64,
+        duration_s: Option<f64>,
+    ) -> Result<Self, LogError> {
+        let path = log.path().to_owned();
+        let mut source = FrameSource::new(log, rig, camera_key, start_s, duration_s)?;
+        let (sender, receiver) = sync_channel(FRAMES_AHEAD);
+        let read_ahead = move || {
+            while let Some(frame) = source.next_frame() {
+                if sender.send(Delivery::Frame(Box::new(frame))).is_err() {
+                    return; // nobody wants the rest
+                }
+            }
+            // A reader that has gone away needs no warnings either.
+            drop(sender.send(Delivery::End(source.finish())));
+        };
+        let thread = std::thread::Builder::new().name("log-reader".into()).spawn(read_ahead);
+        let thread =
+            thread.map_err(|source| LogError::Io { action: "start a thread to read the log", source, path })?;
+        Ok(Self { receiver: Some(receiver), thread: Some(thread), remaining_warnings: Vec::new() })
+    }
+
+    /// The next frame, `None` at the end.
+    pub fn next_frame(&mut self) -> Option<SensorFrame> {
+        match self.receiver.as_ref()?.recv() {
+            Ok(Delivery::Frame(frame)) => return Some(*frame),
+            Ok(Delivery::End(warnings)) => self.remaining_warnings = warnings,
+            Err(_) => {
+                let message = "reading stopped before the log's end: the reading thread failed".to_owned();
+                self.remaining_warnings.push(LogWarning { stamp_ns: 0, message });
+            }
+        }
+        self.receiver = None;
+        None
+    }
+
+    /// What was wrong with the log after the last frame; complete once `next_frame` has returned `None`.
+    pub fn remaining_warnings(&self) -> &[LogWarning] {
+        &self.remaining_warnings
+    }
+}
+
+impl Iterator for FrameStream {
+    type Item = SensorFrame;
+
+    fn next(&mut self) -> Option<SensorFrame> {
+        self.next_frame()
+    }
+}
+
+impl Drop for FrameStream {
+    fn drop(&mut self) {
+        self.receiver = None; // lets the thread's next send fail, so that it ends
+        if let Some(thread) = self.thread.take() {
+            // Its panic, if any, has been told as a missing end.
+            drop(thread.join());
+        }
+    }
+}

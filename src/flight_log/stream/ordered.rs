@@ -1,0 +1,188 @@
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use super::super::container::{BlockCache, MessagePosition};
+use super::super::{FlightLog, LogWarning};
+use crate::geometry::seconds_from_ns;
+
+/// Messages may come out of order by so much; later ones are dropped.
+const HORIZON_NS: i64 = 100_000_000;
+/// Blocks kept: one for each topic, and one ahead for those whose messages lie in the next block already.
+const BLOCKS: usize = 8;
+
+/// What all topics of a stream read from and complain to.
+#[derive(Debug)]
+pub(super) struct ReadContext {
+    pub(super) log: Arc<FlightLog>,
+    cache: BlockCache,
+    /// Damaged blocks that have been told of.
+    reported: BTreeSet<usize>,
+    /// Since they were last taken.
+    pub(super) warnings: Vec<LogWarning>,
+}
+
+impl ReadContext {
+    pub(super) fn new(log: Arc<FlightLog>) -> Self {
+        Self { log, cache: BlockCache::new(BLOCKS), reported: BTreeSet::new(), warnings: Vec::new() }
+    }
+
+    pub(super) fn warn(&mut self, stamp_ns: i64, message: String) {
+        self.warnings.push(LogWarning { stamp_ns, message });
+    }
+
+    fn report_block(&mut self, position: MessagePosition, damage: Option<&str>) {
+        let block = &self.log.index().blocks[position.block];
+        // A block beyond the file's end was told of when the log was opened.
+        if !self.reported.insert(position.block) || block.bytes.end > self.log.file().len() {
+            return;
+        }
+        let (first, last) = (self.log.since_begin(block.log_time_ns.0), self.log.since_begin(block.log_time_ns.1));
+        let message = format!(
+            "damaged chunk at byte {}, from second {:.3} to {:.3}: {}; reading goes on after it",
+            block.bytes.start,
+            seconds_from_ns(first),
+            seconds_from_ns(last),
+            damage.unwrap_or("the index points to no message")
+        );
+        self.warn(first, message);
+    }
+}
+
+/// Why a message was dropped, with the stamp it had if that could be read.
+pub(super) struct Refusal {
+    pub(super) reason: &'static str,
+    pub(super) detail: String,
+}
+
+/// Turns a message into its absolute header stamp and a sample.
+pub(super) type Decoder<T> = Box<dyn FnMut(MessageSource<'_>) -> Result<(i64, T), Refusal> + Send>;
+
+/// A message as a decoder gets it.
+pub(super) struct MessageSource<'a> {
+    pub(super) data: &'a [u8],
+    /// Its number among the messages of its topic.
+    pub(super) number: usize,
+    pub(super) position: MessagePosition,
+}
+
+/// Dropped messages of one reason, one after another.
+#[derive(Debug)]
+struct DroppedRun {
+    reason: &'static str,
+    detail: String,
+    first_ns: i64,
+    last_ns: i64,
+    count: usize,
+}
+
+/// The samples of one topic in the order of their header stamps.
+pub(super) struct OrderedSamples<T> {
+    topic: String,
+    positions: Vec<MessagePosition>,
+    next: usize,
+    decode: Decoder<T>,
+    /// By stamp since the log began and number.
+    pending: BTreeMap<(i64, usize), T>,
+    released_ns: Option<i64>,
+    dropped: Option<DroppedRun>,
+}
+
+impl<T> OrderedSamples<T> {
+    /// The messages of a topic whose log time is at or after `from_ns` since the log began.
+    pub(super) fn new(log: &FlightLog, topic: &str, from_ns: i64, decode: Decoder<T>) -> Self {
+        let positions = log.positions(topic);
+        let next = positions.partition_point(|position| log.since_begin(position.log_time_ns) < from_ns);
+        let topic = topic.to_owned();
+        Self { topic, positions, next, decode, pending: BTreeMap::new(), released_ns: None, dropped: None }
+    }
+
+    /// How many messages the topic has in the log.
+    pub(super) fn count(&self) -> usize {
+        self.positions.len()
+    }
+
+    /// The next sample with its stamp since the log began.
+    pub(super) fn next(&mut self, context: &mut ReadContext) -> Option<(i64, T)> {
+        loop {
+            let ready = match (self.pending.first_key_value(), self.pending.last_key_value()) {
+                (Some(((first, _), _)), Some(((last, _), _))) => {
+                    last - first > HORIZON_NS || self.next >= self.positions.len()
+                }
+                _ => false,
+            };
+            if ready && let Some(((stamp_ns, _), sample)) = self.pending.pop_first() {
+                self.released_ns = Some(stamp_ns);
+                return Some((stamp_ns, sample));
+            }
+            if self.next >= self.positions.len() {
+                self.finish(context);
+                return None;
+            }
+            self.read_one(context);
+        }
+    }
+
+    fn read_one(&mut self, context: &mut ReadContext) {
+        let position = self.positions[self.next];
+        let number = self.next;
+        self.next += 1;
+        let log = Arc::clone(&context.log);
+        let log_time_ns = log.since_begin(position.log_time_ns);
+        let Some((block, message)) = log.message(&mut context.cache, position) else {
+            let block = context.cache.get(log.file(), &log.index().blocks, position.block);
+            context.report_block(position, block.as_ref().and_then(|block| block.damage.as_deref()));
+            return;
+        };
+        let data = block.bytes(log.file(), &message.data);
+        match (self.decode)(MessageSource { data, number, position }) {
+            Ok((absolute_ns, sample)) => {
+                let stamp_ns = absolute_ns.saturating_sub(log.epoch_ns());
+                let newest_out = self.released_ns.is_some_and(|released| stamp_ns <= released);
+                let duplicate = self.pending.range((stamp_ns, 0)..=(stamp_ns, usize::MAX)).next().is_some();
+                if newest_out || duplicate {
+                    let reason = if duplicate || Some(stamp_ns) == self.released_ns {
+                        "the header stamp repeats"
+                    } else {
+                        "the header stamps run backwards"
+                    };
+                    let detail = format!("stamp {:.6} s", seconds_from_ns(stamp_ns));
+                    self.refuse(context, log_time_ns, Refusal { reason, detail });
+                } else {
+                    self.end_run(context);
+                    self.pending.insert((stamp_ns, number), sample);
+                }
+            }
+            Err(refusal) => self.refuse(context, log_time_ns, refusal),
+        }
+    }
+
+    fn refuse(&mut self, context: &mut ReadContext, log_time_ns: i64, refusal: Refusal) {
+        if let Some(run) = self.dropped.as_mut().filter(|run| run.reason == refusal.reason) {
+            run.count += 1;
+            run.last_ns = log_time_ns;
+            return;
+        }
+        self.end_run(context);
+        let Refusal { reason, detail } = refusal;
+        self.dropped = Some(DroppedRun { reason, detail, first_ns: log_time_ns, last_ns: log_time_ns, count: 1 });
+    }
+
+    /// Tells of the messages dropped one after another, once a good one comes or the log ends.
+    fn end_run(&mut self, context: &mut ReadContext) {
+        let Some(run) = self.dropped.take() else { return };
+        let (first, last) = (seconds_from_ns(run.first_ns), seconds_from_ns(run.last_ns));
+        let message = if run.count == 1 {
+            format!("{}: message at {first:.3} s dropped: {} ({})", self.topic, run.reason, run.detail)
+        } else {
+            format!(
+                "{}: {} messages from {first:.3} s to {last:.3} s dropped: {} (the first: {})",
+                self.topic, run.count, run.reason, run.detail
+            )
+        };
+        context.warn(run.first_ns, message);
+    }
+
+    pub(super) fn finish(&mut self, context: &mut ReadContext) {
+        self.end_run(context);
+    }
+}

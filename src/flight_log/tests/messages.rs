@@ -1,0 +1,129 @@
+use super::super::cdr::{CdrReader, CdrWriter};
+use super::super::messages::{self, MessageKind};
+use super::super::picture::decode_picture;
+use super::*;
+use crate::flight_log::writer::testing as encode;
+
+/// The little-endian bytes of a message made of 4- and 8-byte numbers after a header, turned into big-endian ones.
+fn imu_big_endian(stamp: (i32, u32), frame: &str, numbers: &[f64]) -> Vec<u8> {
+    let mut out = vec![0, 0, 0, 0];
+    out.extend(stamp.0.to_be_bytes());
+    out.extend(stamp.1.to_be_bytes());
+    out.extend((frame.len() as u32 + 1).to_be_bytes());
+    out.extend(frame.as_bytes());
+    out.push(0);
+    out.resize((out.len() - 4).next_multiple_of(8) + 4, 0);
+    out.extend(numbers.iter().flat_map(|number| number.to_be_bytes()));
+    out
+}
+
+#[test]
+fn imu_messages_read_in_both_byte_orders() {
+    let (rate, force) = (Vector3::new(0.1, -0.2, 0.3), Vector3::new(1.0, 2.0, -9.81));
+    for frame in ["", "imu", "imu_link", "base/imu_0"] {
+        let little = encode::imu(EPOCH_NS, frame, &rate, &force);
+        let mut numbers = vec![0.0; 37];
+        numbers[13..16].copy_from_slice(rate.as_slice());
+        numbers[25..28].copy_from_slice(force.as_slice());
+        let big = imu_big_endian((1_700_000_000, 250_000_000), frame, &numbers);
+        for message in [little, big] {
+            let imu = messages::read_imu(&message).unwrap();
+            assert_eq!(imu.stamp_ns, EPOCH_NS);
+            assert_eq!((imu.angular_velocity_rad_per_s, imu.specific_force_m_per_s2), (rate, force));
+        }
+    }
+}
+
+#[test]
+fn messages_cut_anywhere_are_errors_with_an_offset() {
+    let whole = encode::imu(EPOCH_NS, "imu", &Vector3::zeros(), &Vector3::zeros());
+    let needed = whole.len() - 72; // the last covariance is not read
+    for kept in 0..needed {
+        let error = messages::read_imu(&whole[..kept]).unwrap_err();
+        assert!(error.offset <= kept + 8, "{error}");
+    }
+    assert!(messages::read_imu(&whole[..needed]).is_ok());
+    let image = encode::image(EPOCH_NS, "camera", [4, 2], "mono8", &[7; 8]);
+    for kept in 0..image.len() {
+        assert!(messages::read_image(&image[..kept]).is_err());
+    }
+}
+
+#[test]
+fn foreign_encapsulations_and_absurd_lengths_are_refused() {
+    let error = CdrReader::new(&[0, 7, 0, 0, 1]).unwrap_err().to_string();
+    assert!(error.contains("encapsulation 0x00 0x07 instead of plain CDR"), "{error}");
+    let mut out = CdrWriter::new();
+    out.u32(u32::MAX);
+    let message = out.finish();
+    let error = CdrReader::new(&message).unwrap().read_f64_sequence().unwrap_err().to_string();
+    assert!(error.contains("4294967295 elements in a message of 8 bytes at byte 4"), "{error}");
+}
+
+#[test]
+fn raw_images_of_every_encoding_become_grey() {
+    let decode = |encoding: &str, data: &[u8]| {
+        decode_picture(MessageKind::Image, &encode::image(0, "camera", [2, 2], encoding, data))
+    };
+    for encoding in ["mono8", "8UC1"] {
+        assert_eq!(decode(encoding, &[1, 2, 3, 4]).unwrap().pixels, [1, 2, 3, 4]);
+    }
+    assert_eq!(decode("mono16", &[9, 1, 9, 2, 9, 3, 9, 4]).unwrap().pixels, [1, 2, 3, 4]);
+    let rgb = [255, 0, 0, 0, 255, 0, 0, 0, 255, 255, 255, 255];
+    assert_eq!(decode("rgb8", &rgb).unwrap().pixels, [76, 150, 29, 255]);
+    assert_eq!(decode("bgr8", &rgb).unwrap().pixels, [29, 150, 76, 255]);
+    assert!(decode("bayer_rggb8", &[0; 4]).unwrap_err().contains("encoding 'bayer_rggb8', expected mono8"));
+    assert!(decode("mono8", &[0; 2]).unwrap_err().contains("2 bytes with 1 per row for 2×2 mono8"));
+}
+
+#[test]
+fn compressed_images_are_known_by_their_bytes() {
+    let folder = TempDir::new().unwrap();
+    let original = picture(0, [WIDTH, HEIGHT]);
+    let gray = image::GrayImage::from_raw(WIDTH as u32, HEIGHT as u32, original.pixels.clone()).unwrap();
+    for (format, bound) in [("jpeg", 6), ("png", 0)] {
+        let path = folder.path().join(format!("picture.{format}"));
+        gray.save(&path).unwrap();
+        let data = std::fs::read(&path).unwrap();
+        let message = encode::compressed_image(0, "camera", "mono8; compressed", &data);
+        let decoded = decode_picture(MessageKind::CompressedImage, &message).unwrap();
+        assert_eq!((decoded.width, decoded.height), (WIDTH, HEIGHT));
+        let worst = decoded.pixels.iter().zip(&original.pixels).map(|(a, b)| a.abs_diff(*b)).max().unwrap();
+        assert!(worst <= bound, "{format}: {worst}");
+        let cut = encode::compressed_image(0, "camera", format, &data[..data.len() / 3]);
+        let cut = decode_picture(MessageKind::CompressedImage, &cut);
+        assert!(cut.is_err() || format == "jpeg", "a JPEG may be completed in grey");
+    }
+    let text = encode::compressed_image(0, "camera", "jpeg", b"no picture");
+    assert!(decode_picture(MessageKind::CompressedImage, &text).unwrap_err().contains("neither JPEG nor PNG"));
+}
+
+#[test]
+fn poses_of_every_kind_read_back() {
+    let pose = true_pose(700 * MS);
+    let zero = Vector3::zeros();
+    let messages = [
+        (MessageKind::Odometry, encode::odometry(EPOCH_NS, "world", "imu", &pose, &zero, &zero)),
+        (MessageKind::PoseStamped, encode::pose_stamped(EPOCH_NS, "world", &pose)),
+        (MessageKind::TransformStamped, encode::transform_stamped(EPOCH_NS, "world", "imu", &pose)),
+    ];
+    for (kind, message) in messages {
+        let read = messages::read_pose(kind, &message).unwrap();
+        assert_eq!(read.stamp_ns, EPOCH_NS);
+        assert!(read.pose.unwrap().minus(&pose).norm() < 1e-14);
+    }
+    let nowhere = RigidTransform::new(pose.rotation, Vector3::new(f64::NAN, 0.0, 0.0));
+    let message = encode::pose_stamped(EPOCH_NS, "world", &nowhere);
+    assert_eq!(messages::read_pose(MessageKind::PoseStamped, &message).unwrap().pose, None);
+}
+
+#[test]
+fn joint_states_read_back() {
+    let names = ["roll".to_owned(), "yaw".to_owned()];
+    let message = encode::joint_state(EPOCH_NS, &names, &[0.25, -1.5]);
+    let joints = messages::read_joint_state(&message).unwrap();
+    assert_eq!(
+        (joints.stamp_ns, joints.names, joints.positions_rad),
+        (EPOCH_NS, vec!["roll", "yaw"], vec![0.25, -1.5])
+    );
+}

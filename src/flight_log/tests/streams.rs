@@ -1,0 +1,151 @@
+use super::*;
+use crate::flight_log::ImageReader;
+use crate::geometry::seconds_from_ns;
+
+/// Every compression, with and without an index and chunks.
+fn all_options() -> Vec<LogWriterOptions> {
+    let compressions = [LogCompression::None, LogCompression::Lz4, LogCompression::Zstd];
+    let mut all = Vec::new();
+    for compression in compressions {
+        for indexed in [true, false] {
+            for chunk_bytes in [Some(40_000), None] {
+                all.push(LogWriterOptions { compression, chunk_bytes, indexed });
+            }
+        }
+    }
+    all
+}
+
+#[test]
+fn frames_are_the_same_whatever_the_container() {
+    let (expected, _) = play(&Flight::default(), RIG, 0.0);
+    assert_eq!(expected.len(), 60);
+    for options in all_options() {
+        let (frames, warnings) = play(&Flight { options: options.clone(), ..Flight::default() }, RIG, 0.0);
+        assert_eq!(warnings, [], "{options:?}");
+        assert_eq!(frames.len(), expected.len(), "{options:?}");
+        for (frame, expected) in frames.iter().zip(&expected) {
+            assert_eq!(frame.image, expected.image);
+            assert_eq!(
+                (frame.index, frame.stamp_ns, frame.log_time_ns),
+                (expected.index, expected.stamp_ns, expected.log_time_ns)
+            );
+            assert_eq!(
+                (&frame.imu, &frame.joint_angles_rad, frame.truth),
+                (&expected.imu, &expected.joint_angles_rad, expected.truth)
+            );
+        }
+    }
+}
+
+#[test]
+fn a_frame_holds_what_belongs_to_it() {
+    let (frames, warnings) = play(&Flight::default(), RIG, 0.0);
+    assert_eq!(warnings, []);
+    for (number, frame) in frames.iter().enumerate() {
+        let stamp_ns = (27 + 50 * number as i64) * MS;
+        assert_eq!((frame.index, frame.stamp_ns, frame.log_time_ns), (number, stamp_ns, stamp_ns + 18 * MS));
+        assert_eq!(*frame.image, picture(stamp_ns, [WIDTH, HEIGHT]));
+
+        // The IMU's signals are linear in time, so interpolation is exact.
+        let begin_ns = if number == 0 { 0 } else { stamp_ns - 50 * MS };
+        assert_eq!((frame.imu[0].stamp_ns, frame.imu[frame.imu.len() - 1].stamp_ns), (begin_ns, stamp_ns));
+        assert!(frame.imu.windows(2).all(|pair| pair[0].stamp_ns < pair[1].stamp_ns));
+        for sample in &frame.imu {
+            let time_s = seconds_from_ns(sample.stamp_ns);
+            assert!((sample.angular_velocity_rad_per_s - Vector3::new(time_s, 0.0, 0.4)).norm() < 1e-12);
+            assert!((sample.specific_force_m_per_s2 - Vector3::new(0.0, 0.1 * time_s, 9.81)).norm() < 1e-12);
+        }
+        if number > 0 {
+            assert_eq!(frame.imu[0], *frames[number - 1].imu.last().unwrap());
+            assert_eq!(frame.imu.len(), 12, "10 samples inside and two ends");
+        }
+
+        let angle = frame.joint_angles_rad.as_ref().unwrap()[0];
+        let defect = (angle - yaw_rad(stamp_ns)).rem_euclid(std::f64::consts::TAU);
+        assert!(defect.min(std::f64::consts::TAU - defect) < 1e-9, "{angle} at {stamp_ns}");
+        let defect = frame.truth.unwrap().minus(&true_pose(stamp_ns));
+        assert!(defect.norm() < 1e-9, "{defect}");
+    }
+}
+
+#[test]
+fn a_replay_from_the_middle_continues_the_numbers() {
+    let flight = Flight::default();
+    let (all, _) = play(&flight, RIG, 0.0);
+    let (late, _) = play(&flight, RIG, 2.2);
+    let first = &late[0];
+    assert_eq!((first.index, first.stamp_ns), (44, 2_227 * MS));
+    assert_eq!(first.imu[0].stamp_ns, 230 * MS, "two seconds of IMU before the first frame");
+    assert_eq!(first.imu.len(), 401);
+    for (late, all) in late[1..].iter().zip(&all[45..]) {
+        assert_eq!(
+            (late.index, &late.image, &late.imu, &late.joint_angles_rad),
+            (all.index, &all.image, &all.imu, &all.joint_angles_rad)
+        );
+    }
+}
+
+#[test]
+fn the_time_shift_moves_everything_but_the_image() {
+    let rig = RIG.replace("timeshift_cam_imu: 0.0", "timeshift_cam_imu: 0.012");
+    let (frames, _) = play(&Flight::default(), &rig, 0.0);
+    let frame = &frames[10];
+    assert_eq!(frame.stamp_ns, 527 * MS);
+    assert_eq!(frame.imu.last().unwrap().stamp_ns, 539 * MS);
+    assert!(frame.truth.unwrap().minus(&true_pose(539 * MS)).norm() < 1e-9);
+}
+
+#[test]
+fn a_rig_without_encoders_gives_frames_without_angles() {
+    for rig in [
+        RIG.replace("encoder_sigma: 0.0087", "encoder_sigma: null"),
+        RIG.replace("rostopic: /joints", "rostopic: null"),
+    ] {
+        let (frames, warnings) = play(&Flight { joints: false, ..Flight::default() }, &rig, 0.0);
+        assert_eq!((frames.len(), warnings.len()), (60, 0));
+        assert!(frames.iter().all(|frame| frame.joint_angles_rad.is_none()));
+    }
+}
+
+#[test]
+fn images_are_found_by_number_in_any_order() {
+    let folder = TempDir::new().unwrap();
+    for options in all_options() {
+        let path = Flight { options, ..Flight::default() }.write(folder.path());
+        let log = Arc::new(FlightLog::open(&path).unwrap());
+        let reader = ImageReader::new(Arc::clone(&log), &rig_from(RIG));
+        assert_eq!(reader.count("cam0"), 60);
+        for number in [59, 0, 31, 30, 31, 58] {
+            let stamp_ns = (27 + 50 * number as i64) * MS;
+            assert_eq!(*reader.image("cam0", number).unwrap(), picture(stamp_ns, [WIDTH, HEIGHT]));
+            assert_eq!(reader.log_time_ns("cam0", number), Some(stamp_ns + 18 * MS));
+        }
+        assert!(reader.image("cam0", 60).unwrap_err().to_string().contains("60 images, none with number 60"));
+        assert!(reader.image("cam1", 0).unwrap_err().to_string().contains("no camera 'cam1'; it has 'cam0'"));
+    }
+}
+
+#[test]
+fn a_log_tells_its_topics_and_times() {
+    let folder = TempDir::new().unwrap();
+    let log = FlightLog::open(&Flight::default().write(folder.path())).unwrap();
+    let names: Vec<&str> = log.topics().iter().map(|info| info.topic.as_str()).collect();
+    assert_eq!(names, ["/camera", "/imu", "/joints", "/truth"]);
+    assert_eq!((log.epoch_ns(), log.duration_ns()), (EPOCH_NS, 2_995 * MS));
+    let imu = log.topic("/imu").unwrap();
+    assert_eq!((imu.count, imu.first_ns, imu.last_ns), (600, MS, 2_996 * MS));
+    assert!((imu.rate_hz - 200.0).abs() < 1e-9);
+}
+
+#[test]
+fn a_stream_can_be_left_early_and_ends_after_its_duration() {
+    let folder = TempDir::new().unwrap();
+    let log = Arc::new(FlightLog::open(&Flight::default().write(folder.path())).unwrap());
+    let rig = rig_from(RIG);
+    let mut stream = FrameStream::new(Arc::clone(&log), &rig, "cam0", 0.0, None).unwrap();
+    assert!(stream.next_frame().is_some());
+    drop(stream);
+    let frames: Vec<SensorFrame> = FrameStream::new(log, &rig, "cam0", 1.0, Some(0.5)).unwrap().collect();
+    assert_eq!(frames.iter().map(|frame| frame.index).collect::<Vec<_>>(), (20..30).collect::<Vec<_>>());
+}

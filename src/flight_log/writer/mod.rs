@@ -1,0 +1,283 @@
+//! Writing a flight log: MCAP with CDR messages and their definitions, as ROS 2's recorder writes it.
+
+mod encode;
+mod schemas;
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+
+use image::codecs::jpeg::JpegEncoder;
+use image::{ExtendedColorType, ImageEncoder as _};
+use mcap::records::{MessageHeader, Metadata};
+use mcap::{Attachment, Compression, WriteOptions, Writer};
+use nalgebra::Vector3;
+
+use super::{GrayImage, LogError, MessageKind};
+use crate::camera::CameraModel;
+use crate::geometry::RigidTransform;
+
+/// How the chunks of a log are compressed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LogCompression {
+    /// Not at all.
+    None,
+    /// LZ4.
+    Lz4,
+    /// Zstandard.
+    Zstd,
+}
+
+/// How a log is written.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LogWriterOptions {
+    /// Compression of the chunks.
+    pub compression: LogCompression,
+    /// A chunk is closed when it has grown to this size; `None` writes messages without chunks.
+    pub chunk_bytes: Option<u64>,
+    /// Whether the file ends with an index; without one every reader has to go through the whole file.
+    pub indexed: bool,
+}
+
+impl Default for LogWriterOptions {
+    /// Zstandard, 4 MiB, indexed.
+    fn default() -> Self {
+        Self { compression: LogCompression::Zstd, chunk_bytes: Some(4 << 20), indexed: true }
+    }
+}
+
+/// The two times of a message, both in nanoseconds since the epoch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MessageTimes {
+    /// When it was measured.
+    pub stamp_ns: i64,
+    /// When it was recorded.
+    pub log_time_ns: i64,
+}
+
+/// Writes a log, message by message in the order of log times.
+pub struct LogWriter {
+    writer: Writer<BufWriter<File>>,
+    /// Channel and number of messages so far, by topic.
+    channels: BTreeMap<String, (u16, u32)>,
+    path: PathBuf,
+}
+
+impl std::fmt::Debug for LogWriter {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter
+            .debug_struct("LogWriter")
+            .field("path", &self.path)
+            .field("channels", &self.channels)
+            .finish_non_exhaustive()
+    }
+}
+
+/// The quality of service that recorders note for sensor topics; players need it.
+const QOS_PROFILE: &str = "- history: 1\n  depth: 10\n  reliability: 1\n  durability: 2\n  deadline:\n    sec: 2147483647\n    nsec: 4294967295\n";
+
+impl LogWriter {
+    /// Creates or overwrites a log.
+    pub fn create(path: &Path, options: &LogWriterOptions) -> Result<Self, LogError> {
+        let failed = |source| LogError::Io { action: "write the log", source, path: path.to_owned() };
+        let file = BufWriter::with_capacity(1 << 20, File::create(path).map_err(failed)?);
+        let compression = match options.compression {
+            LogCompression::None => None,
+            LogCompression::Lz4 => Some(Compression::Lz4),
+            LogCompression::Zstd => Some(Compression::Zstd),
+        };
+        let write_options = WriteOptions::new()
+            .profile("ros2")
+            .library(concat!("dcvins ", env!("CARGO_PKG_VERSION")))
+            .compression(compression)
+            .compression_threads(0) // the bytes must not depend on the machine
+            .use_chunks(options.chunk_bytes.is_some())
+            .chunk_size(options.chunk_bytes)
+            .emit_summary_records(options.indexed)
+            .emit_summary_offsets(options.indexed)
+            .emit_message_indexes(options.indexed);
+        let writer = write_options.create(file).map_err(|error| write_error(path, &error))?;
+        Ok(Self { writer, channels: BTreeMap::new(), path: path.to_owned() })
+    }
+
+    /// Writes an IMU sample: angular velocity, and specific force (+g upwards at rest).
+    pub fn write_imu(
+        &mut self,
+        topic: &str,
+        frame_id: &str,
+        times: MessageTimes,
+        angular_velocity_rad_per_s: &Vector3<f64>,
+        specific_force_m_per_s2: &Vector3<f64>,
+    ) -> Result<(), LogError> {
+        let message = encode::imu(times.stamp_ns, frame_id, angular_velocity_rad_per_s, specific_force_m_per_s2);
+        self.write(topic, MessageKind::Imu, times, &message)
+    }
+
+    /// Writes an image as JPEG of a quality from 1 to 100.
+    pub fn write_jpeg(
+        &mut self,
+        topic: &str,
+        frame_id: &str,
+        times: MessageTimes,
+        image: &GrayImage,
+        quality: u8,
+    ) -> Result<(), LogError> {
+        let mut jpeg = Vec::with_capacity(image.pixels.len() / 4);
+        JpegEncoder::new_with_quality(&mut jpeg, quality)
+            .write_image(&image.pixels, image.width as u32, image.height as u32, ExtendedColorType::L8)
+            .map_err(|error| write_error(&self.path, &error))?;
+        self.write_compressed_image(topic, frame_id, times, "jpeg", &jpeg)
+    }
+
+    /// Writes an image that is compressed already; `format` is `jpeg` or `png`.
+    pub fn write_compressed_image(
+        &mut self,
+        topic: &str,
+        frame_id: &str,
+        times: MessageTimes,
+        format: &str,
+        data: &[u8],
+    ) -> Result<(), LogError> {
+        let message = encode::compressed_image(times.stamp_ns, frame_id, format, data);
+        self.write(topic, MessageKind::CompressedImage, times, &message)
+    }
+
+    /// Writes a raw image of any ROS encoding, rows without padding, multi-byte pixels little-endian.
+    pub fn write_raw_image(
+        &mut self,
+        topic: &str,
+        frame_id: &str,
+        times: MessageTimes,
+        resolution_px: [usize; 2],
+        encoding: &str,
+        data: &[u8],
+    ) -> Result<(), LogError> {
+        let message = encode::image(times.stamp_ns, frame_id, resolution_px, encoding, data);
+        self.write(topic, MessageKind::Image, times, &message)
+    }
+
+    /// Writes a camera's intrinsics.
+    pub fn write_camera_info(
+        &mut self,
+        topic: &str,
+        frame_id: &str,
+        times: MessageTimes,
+        model: &CameraModel,
+    ) -> Result<(), LogError> {
+        self.write(topic, MessageKind::CameraInfo, times, &encode::camera_info(times.stamp_ns, frame_id, model))
+    }
+
+    /// Writes joint angles, one per name.
+    pub fn write_joints(
+        &mut self,
+        topic: &str,
+        times: MessageTimes,
+        names: &[String],
+        positions_rad: &[f64],
+    ) -> Result<(), LogError> {
+        self.write(topic, MessageKind::JointState, times, &encode::joint_state(times.stamp_ns, names, positions_rad))
+    }
+
+    /// Writes a pose of `child_frame_id` in `frame_id` with its velocities, both seen in the child frame.
+    #[expect(clippy::too_many_arguments, reason = "the fields of the message, each once")]
+    pub fn write_odometry(
+        &mut self,
+        topic: &str,
+        frame_id: &str,
+        child_frame_id: &str,
+        times: MessageTimes,
+        pose: &RigidTransform,
+        linear_m_per_s: &Vector3<f64>,
+        angular_rad_per_s: &Vector3<f64>,
+    ) -> Result<(), LogError> {
+        let message =
+            encode::odometry(times.stamp_ns, frame_id, child_frame_id, pose, linear_m_per_s, angular_rad_per_s);
+        self.write(topic, MessageKind::Odometry, times, &message)
+    }
+
+    /// Writes a pose alone, in `frame_id`.
+    pub fn write_pose(
+        &mut self,
+        topic: &str,
+        frame_id: &str,
+        times: MessageTimes,
+        pose: &RigidTransform,
+    ) -> Result<(), LogError> {
+        self.write(topic, MessageKind::PoseStamped, times, &encode::pose_stamped(times.stamp_ns, frame_id, pose))
+    }
+
+    /// Writes a pose of `child_frame_id` in `frame_id` as a transform.
+    pub fn write_transform(
+        &mut self,
+        topic: &str,
+        frame_id: &str,
+        child_frame_id: &str,
+        times: MessageTimes,
+        pose: &RigidTransform,
+    ) -> Result<(), LogError> {
+        let message = encode::transform_stamped(times.stamp_ns, frame_id, child_frame_id, pose);
+        self.write(topic, MessageKind::TransformStamped, times, &message)
+    }
+
+    /// Attaches a text file, such as `city.rig.yaml`.
+    pub fn attach(&mut self, name: &str, media_type: &str, content: &str, log_time_ns: i64) -> Result<(), LogError> {
+        let attachment = Attachment {
+            log_time: log_time_ns.max(0) as u64,
+            create_time: log_time_ns.max(0) as u64,
+            name: name.to_owned(),
+            media_type: media_type.to_owned(),
+            data: Cow::Borrowed(content.as_bytes()),
+        };
+        self.writer.attach(&attachment).map_err(|error| write_error(&self.path, &error))
+    }
+
+    /// Notes named texts about the log, such as the experiment and its seed.
+    pub fn write_metadata(&mut self, name: &str, texts: BTreeMap<String, String>) -> Result<(), LogError> {
+        let metadata = Metadata { name: name.to_owned(), metadata: texts };
+        self.writer.write_metadata(&metadata).map_err(|error| write_error(&self.path, &error))
+    }
+
+    /// Completes the file.
+    pub fn finish(mut self) -> Result<(), LogError> {
+        self.writer.finish().map_err(|error| write_error(&self.path, &error))?;
+        let flushed = self.writer.into_inner().into_inner();
+        let failed = |source| LogError::Io { action: "write the log", source, path: self.path.clone() };
+        flushed.map(drop).map_err(|error| failed(error.into_error()))
+    }
+
+    /// Writes a message that is encoded already.
+    pub(super) fn write(
+        &mut self,
+        topic: &str,
+        kind: MessageKind,
+        times: MessageTimes,
+        message: &[u8],
+    ) -> Result<(), LogError> {
+        let failed = |error: mcap::McapError| write_error(&self.path, &error);
+        if !self.channels.contains_key(topic) {
+            let definition = schemas::definition(kind);
+            let schema =
+                self.writer.add_schema(kind.schema_name(), "ros2msg", definition.as_bytes()).map_err(failed)?;
+            let qos = BTreeMap::from([("offered_qos_profiles".to_owned(), QOS_PROFILE.to_owned())]);
+            let id = self.writer.add_channel(schema, topic, "cdr", &qos).map_err(failed)?;
+            self.channels.insert(topic.to_owned(), (id, 0));
+        }
+        let (channel_id, sequence) = self.channels.entry(topic.to_owned()).or_default();
+        let log_time = times.log_time_ns.max(0) as u64;
+        let header = MessageHeader { channel_id: *channel_id, sequence: *sequence, log_time, publish_time: log_time };
+        *sequence = sequence.wrapping_add(1);
+        self.writer.write_to_known_channel(&header, message).map_err(failed)
+    }
+}
+
+fn write_error(path: &Path, error: &impl ToString) -> LogError {
+    LogError::Write { problem: error.to_string(), path: path.to_owned() }
+}
+
+/// The encoders, for tests of what reads them.
+#[cfg(test)]
+pub(super) mod testing {
+    pub(in super::super) use super::encode::*;
+}
