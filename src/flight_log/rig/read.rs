@@ -163,14 +163,14 @@ fn read_camera_model(camera: &Field<'_>) -> Result<CameraModel, LogError> {
             .error(format!("{width}×{height}, expected whole pixels from 1 to 65535")));
     }
     CameraModel::from_kalibr(model, &intrinsics, distortion_model, &coefficients, [width as usize, height as usize])
-        .map_err(|error| name_the_field(camera, error))
+        .map_err(|error| name_the_field(camera, &error))
 }
 
 const CAMERA_MODELS: &str = "pinhole, omni, eucm or ds";
 const DISTORTION_MODELS: &str = "none, radtan, equidistant or fov";
 
 /// A camera's complaint with the field of the rig that it is about.
-fn name_the_field(camera: &Field<'_>, error: CameraError) -> LogError {
+fn name_the_field(camera: &Field<'_>, error: &CameraError) -> LogError {
     match error {
         CameraError::UnknownModel { .. } => camera.field("camera_model").unexpected(CAMERA_MODELS),
         CameraError::UnknownDistortion { .. } => camera.field("distortion_model").unexpected(DISTORTION_MODELS),

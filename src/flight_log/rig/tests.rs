@@ -63,6 +63,8 @@ fn a_wrong_field_is_named_with_what_it_holds() {
         ),
         ("  intrinsics: [50.0, 50.0, 31.5, 23.5]\n", "", "cam0.intrinsics: missing, expected 4 numbers (fx fy cx cy)"),
         ("resolution: [64, 48]", "resolution: [64.5, 48]", "cam0.resolution: 64.5×48, expected whole pixels"),
+        ("distortion_model: none", "distortion_model: fov", "cam0.distortion_coeffs: 4 numbers, expected 1 (w)"),
+        ("camera_model: pinhole", "camera_model: ds", "cam0.intrinsics: 4 numbers, expected 6 (xi alpha fx fy cx cy)"),
         ("mount: gimbal", "mount: fixed", "cam0.mount: holds the text 'fixed', expected gimbal or static"),
         ("mount: gimbal", "mount: static", "cam0.T_cam_imu: missing, expected 4 rows of 4 numbers"),
         (
