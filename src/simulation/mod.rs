@@ -1,1 +1,27 @@
 //! Synthetic flights with known truth, written as flight logs.
+//!
+//! A multirotor follows a smooth aggressive path within its limits, a gimbal under its nose looks around and steadies
+//! the picture with lag, and sensors measure with noise.
+//! Everything follows from a seed; the same options give the same bits whatever the thread count.
+
+mod equipment;
+mod experiment;
+mod gimbal;
+mod inertial;
+mod random;
+mod route;
+mod scenario;
+mod spline;
+mod synthetic;
+#[cfg(test)]
+mod tests;
+mod trajectory;
+
+pub use equipment::Lens;
+pub use experiment::{Environment, Experiment};
+pub use gimbal::JointMotion;
+pub use inertial::ImuBias;
+pub use synthetic::{
+    SyntheticFlight, SyntheticFrame, SyntheticMotion, SyntheticMount, SyntheticOptions, synthetic_tracks,
+};
+pub use trajectory::{Kinematics, Trajectory, VehicleLimits};

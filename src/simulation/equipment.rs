@@ -1,0 +1,168 @@
+//! The firefly's rig: what is true, and the wrong one that an estimator is given.
+
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+
+use super::gimbal::{joints, true_chain};
+use super::inertial::FIREFLY_IMU;
+use super::random::RandomStream;
+use crate::camera::{CameraModel, Distortion, Projection};
+use crate::flight_log::Rig;
+use crate::flight_log::rig::{CameraMount, CameraRig, ChainPrior, GimbalRig, ImuRig};
+use crate::geometry::{RigidTransform, so3};
+use crate::gimbal::ClassicalChain;
+
+/// Gravity in the simulated worlds, in m/s².
+pub(crate) const GRAVITY_M_PER_S2: f64 = 9.81;
+/// Rate of the inertial sensor and of the encoders.
+pub(crate) const IMU_RATE_HZ: f64 = 200.0;
+/// Size that the intrinsics below belong to.
+const NOMINAL_SIZE_PX: [usize; 2] = [640, 480];
+
+/// The lens of the simulated cameras.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Lens {
+    /// A perfect pinhole.
+    Pinhole,
+    /// A mild barrel distortion, radial–tangential.
+    Radtan,
+}
+
+/// A simulated camera at this image size; `which` tells the gimbal's (0) from the static one (1).
+pub(crate) fn camera_model(which: usize, lens: Lens, resolution_px: [usize; 2]) -> CameraModel {
+    let [fx, fy, cx, cy] = [[361.4, 360.9, 318.6, 241.8], [357.8, 358.3, 322.7, 237.4]][which.min(1)];
+    let distortion = match (lens, which) {
+        (Lens::Pinhole, _) => Distortion::None,
+        (Lens::Radtan, 0) => Distortion::Radtan([-0.112, 0.028, 0.0005, -0.0003]),
+        (Lens::Radtan, _) => Distortion::Radtan([-0.124, 0.034, -0.0004, 0.0006]),
+    };
+    let scale = |axis: usize| resolution_px[axis] as f64 / NOMINAL_SIZE_PX[axis] as f64;
+    // Pixel centres lie at integers, so the image's corner lies at −0.5.
+    let centre = |c: f64, axis: usize| (c + 0.5) * scale(axis) - 0.5;
+    CameraModel {
+        projection: Projection::Pinhole,
+        distortion,
+        intrinsics_px: [fx * scale(0), fy * scale(1), centre(cx, 0), centre(cy, 1)],
+        resolution_px,
+    }
+}
+
+/// What a rig is to hold.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Equipment {
+    pub(crate) gimbal_camera: bool,
+    pub(crate) static_camera: bool,
+    pub(crate) lens: Lens,
+    pub(crate) resolution_px: [usize; 2],
+    pub(crate) camera_rate_hz: f64,
+    pub(crate) camera_time_offset_s: f64,
+    pub(crate) encoder_sigma_rad: Option<f64>,
+}
+
+impl Equipment {
+    /// The true rig, its chain's errors of manufacture drawn from a random stream.
+    pub(crate) fn true_rig(&self, name: &str, random: &mut RandomStream) -> Rig {
+        let chain = true_chain(random);
+        let static_mount = CameraMount::Static { imu_from_camera: static_mount(random) };
+        let mut cameras = Vec::new();
+        let kinds = [
+            (self.gimbal_camera, "gimbal_camera", CameraMount::Gimbal, 0),
+            (self.static_camera, "static_camera", static_mount, 1),
+        ];
+        for (wanted, camera, mount, which) in kinds {
+            if wanted {
+                cameras.push(CameraRig {
+                    key: format!("cam{}", cameras.len()),
+                    mount,
+                    topic: format!("/{camera}/image_raw/compressed"),
+                    frame_id: camera.to_owned(),
+                    rate_hz: self.camera_rate_hz,
+                    model: camera_model(which, self.lens, self.resolution_px),
+                    timeshift_cam_imu_s: self.camera_time_offset_s,
+                });
+            }
+        }
+        let gimbal = self.gimbal_camera.then(|| GimbalRig {
+            topic: self.encoder_sigma_rad.map(|_| "/gimbal/joint_states".to_owned()),
+            rate_hz: IMU_RATE_HZ,
+            encoder_sigma_rad: self.encoder_sigma_rad,
+            prior: ChainPrior { translation_bound_m: 0.0, rotation_bound_rad: 0.0 },
+            chain,
+            joints: joints(),
+        });
+        Rig {
+            name: name.to_owned(),
+            gravity_m_per_s2: GRAVITY_M_PER_S2,
+            imu: ImuRig {
+                topic: "/imu".to_owned(),
+                frame_id: "imu".to_owned(),
+                rate_hz: IMU_RATE_HZ,
+                noise: FIREFLY_IMU,
+            },
+            cameras,
+            gimbal,
+            ground_truth_topic: Some("/ground_truth/odometry".to_owned()),
+        }
+    }
+}
+
+/// A static camera under the nose, ahead and 12° down, give or take two degrees.
+fn static_mount(random: &mut RandomStream) -> RigidTransform {
+    let optical = Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
+    let optical = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(optical));
+    let down = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), 12_f64.to_radians());
+    let tilt = random.normal_vector(0.02);
+    let shift = random.normal_vector(0.004);
+    RigidTransform::new(down * optical * so3::exp(&tilt), Vector3::new(0.105, 0.003, 0.022) + shift)
+}
+
+/// The rig an estimator is given: each of the chain's `4N + 6` independent parameters (the minimal form's) is wrong by
+/// a uniform error within `bounds`, as the paper starts its experiments; static cameras are wrong within the same
+/// bounds, but by no more than 3 mm and 0.5° per axis, and the cameras' time offset is not told.
+pub(crate) fn given_rig(truth: &Rig, bounds: ChainPrior, random: &mut RandomStream) -> Rig {
+    let mut given = truth.clone();
+    if let Some(gimbal) = &mut given.gimbal {
+        gimbal.chain = wrong_chain(&gimbal.chain, bounds, random);
+        gimbal.prior = bounds;
+    }
+    let turn = bounds.rotation_bound_rad.min(0.5_f64.to_radians());
+    let shift = bounds.translation_bound_m.min(0.003);
+    for camera in &mut given.cameras {
+        camera.timeshift_cam_imu_s = 0.0;
+        if let CameraMount::Static { imu_from_camera } = &mut camera.mount {
+            let phi = Vector3::from_fn(|_, _| random.uniform(-turn, turn));
+            imu_from_camera.rotation *= so3::exp(&phi);
+            imu_from_camera.translation_m += Vector3::from_fn(|_, _| random.uniform(-shift, shift));
+        }
+    }
+    given
+}
+
+/// Puts a uniform error on the independent parameters: two tilts and two shifts of the base, all of each link, a turn
+/// about and a shift along the end's y axis.
+fn wrong_chain(chain: &ClassicalChain, bounds: ChainPrior, random: &mut RandomStream) -> ClassicalChain {
+    let mut wrong = chain.clone();
+    if chain.links.is_empty() {
+        let turn = bounds.rotation_bound_rad;
+        let phi = Vector3::from_fn(|_, _| random.uniform(-turn, turn));
+        wrong.imu_from_base.rotation *= so3::exp(&phi);
+        return wrong;
+    }
+    let mut turn = RandomStream::new(random.next_u64(), 0);
+    let mut angle = || turn.uniform(-bounds.rotation_bound_rad, bounds.rotation_bound_rad);
+    let mut length = || random.uniform(-bounds.translation_bound_m, bounds.translation_bound_m);
+    let tilt = Vector3::new(angle(), angle(), 0.0);
+    let aside = Vector3::new(length(), length(), 0.0);
+    wrong.imu_from_base.rotation *= so3::exp(&tilt);
+    wrong.imu_from_base.translation_m += aside;
+    for link in &mut wrong.links {
+        link.theta_offset_rad += angle();
+        link.alpha_rad += angle();
+        link.d_m += length();
+        link.a_m += length();
+    }
+    let end_turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), angle());
+    let end_shift = Vector3::new(0.0, length(), 0.0);
+    let end = &mut wrong.effector_from_camera;
+    *end = RigidTransform::new(end_turn * end.rotation, end.translation_m + end_shift);
+    wrong
+}

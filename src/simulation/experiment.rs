@@ -1,0 +1,160 @@
+//! The paper's experiments T1–T4 (§5.3) as flights over one of two worlds.
+
+use nalgebra::{Vector2, Vector3};
+
+use super::gimbal::LookAround;
+use super::random::RandomStream;
+use super::route::{Cruise, Flight, Pace, Path, Shuttle};
+use crate::flight_log::rig::ChainPrior;
+
+/// One of the paper's experiments.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Experiment {
+    /// Random aggressive manoeuvres around a house (environment 1), 461 m.
+    T1,
+    /// Forward and backward, then left and right before the house (environment 1), 181 m.
+    T2,
+    /// Random aggressive manoeuvres between buildings (environment 2), 384 m.
+    T3,
+    /// As T3 with a start calibration wrong by 3 cm and 10° and encoders of σ 7°, 456 m: online calibration.
+    T4,
+}
+
+/// A rendered world.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Environment {
+    /// Environment 1: a house in its garden.
+    House,
+    /// Environment 2: buildings and roads.
+    Town,
+}
+
+/// Side of a block of the town with its half of the roads around, in metres.
+pub(crate) const TOWN_PITCH_M: f64 = 30.0;
+/// Roads per direction of the town.
+pub(crate) const TOWN_ROADS: usize = 4;
+
+impl Experiment {
+    /// All four.
+    pub const ALL: [Self; 4] = [Self::T1, Self::T2, Self::T3, Self::T4];
+
+    /// Name as in the paper and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::T1 => "T1",
+            Self::T2 => "T2",
+            Self::T3 => "T3",
+            Self::T4 => "T4",
+        }
+    }
+
+    /// The experiment of this name, in either case.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|experiment| experiment.name().eq_ignore_ascii_case(name))
+    }
+
+    /// The world it is flown in.
+    pub fn environment(self) -> Environment {
+        match self {
+            Self::T1 | Self::T2 => Environment::House,
+            Self::T3 | Self::T4 => Environment::Town,
+        }
+    }
+
+    /// Length of the flight in the paper's Tables 2 and 3.
+    pub fn length_m(self) -> f64 {
+        match self {
+            Self::T1 => 461.0,
+            Self::T2 => 181.0,
+            Self::T3 => 384.0,
+            Self::T4 => 456.0,
+        }
+    }
+
+    /// Standard deviation of the encoders: 7° in T4 (§5.4), else 0.5°, which the paper leaves open.
+    pub fn encoder_sigma_rad(self) -> f64 {
+        match self {
+            Self::T4 => 7_f64.to_radians(),
+            _ => 0.5_f64.to_radians(),
+        }
+    }
+
+    /// How wrong the calibration is that the estimator starts from: 3 cm and 10° in T4 (§5.4), else 3 mm and 0.5°.
+    pub fn start_error(self) -> ChainPrior {
+        match self {
+            Self::T4 => ChainPrior { translation_bound_m: 0.03, rotation_bound_rad: 10_f64.to_radians() },
+            _ => ChainPrior { translation_bound_m: 0.003, rotation_bound_rad: 0.5_f64.to_radians() },
+        }
+    }
+
+    /// What the camera on the gimbal looks at.
+    pub(crate) fn look_around(self, random: &mut RandomStream) -> LookAround {
+        match self {
+            // Towards the house, which lies to the left of the round.
+            Self::T1 => LookAround::new([25.0, 25.0], [-6.0, 8.0], 0.0, random),
+            Self::T2 => LookAround::new([0.0, 25.0], [-4.0, 7.0], 0.0, random),
+            Self::T3 => LookAround::new([0.0, 30.0], [-6.0, 8.0], 0.0, random),
+            // Calibrating wants all joints moved.
+            Self::T4 => LookAround::new([0.0, 50.0], [-12.0, 18.0], 9.0, random),
+        }
+    }
+
+    /// The flight; a path that is not a round reaches at least `length_m` far.
+    pub(crate) fn flight(self, length_m: f64, random: &mut RandomStream) -> Box<dyn Flight> {
+        self.flight_at(Pace::aggressive(), length_m, random)
+    }
+
+    /// The flight at another pace.
+    pub(crate) fn flight_at(self, pace: Pace, length_m: f64, random: &mut RandomStream) -> Box<dyn Flight> {
+        match self {
+            Self::T1 => {
+                let (x, y) = (13.5, 12.0);
+                let corners = [(0.0, -y), (x, -y), (x, y), (-x, y), (-x, -y)];
+                let corners = corners.iter().map(|(x, y)| Vector2::new(*x, *y)).collect();
+                let path = Path::new(corners, true, 5);
+                Box::new(Cruise::new(pace, path, [2.6, 0.8], 1.3, 30_f64.to_radians(), random))
+            }
+            Self::T2 => Box::new(Shuttle {
+                pace: Pace { manoeuvre_m: [0.4, 0.3], manoeuvre_heading_rad: 0.13, ..pace },
+                centre_m: Vector3::new(4.5, -14.0, 2.3),
+                heading_rad: std::f64::consts::FRAC_PI_2,
+                stroke_m: 10.0,
+                period_s: 5.6,
+                forward_strokes: 5,
+            }),
+            Self::T3 | Self::T4 => {
+                let path = Path::new(streets(length_m, random), false, 5);
+                Box::new(Cruise::new(pace, path, [2.9, 0.8], 0.7, 0.0, random))
+            }
+        }
+    }
+}
+
+/// A random walk through the streets of the town that never turns on the spot.
+fn streets(length_m: f64, random: &mut RandomStream) -> Vec<Vector2<f64>> {
+    let roads = TOWN_ROADS as i32;
+    let position = |node: [i32; 2]| {
+        let place = |k: i32| (f64::from(k) - 0.5 * f64::from(roads - 1)) * TOWN_PITCH_M;
+        Vector2::new(place(node[0]), place(node[1]))
+    };
+    let inside = |node: [i32; 2]| node.iter().all(|k| (0..roads).contains(k));
+    let mut node = [1 + random.index(2) as i32, 1 + random.index(2) as i32];
+    let mut direction = [[1, 0], [0, 1], [-1, 0], [0, -1]][random.index(4)];
+    let step = |node: [i32; 2], direction: [i32; 2]| [node[0] + direction[0], node[1] + direction[1]];
+    let mut points = vec![position(node)];
+    let blocks = (length_m / TOWN_PITCH_M).ceil() as usize + 3;
+    for _ in 0..blocks {
+        let next = step(node, direction);
+        let along = Vector2::new(f64::from(direction[0]), f64::from(direction[1]));
+        // Points near the crossings keep the rounding of corners there.
+        points.push(position(node) + along * 7.0);
+        points.push(position(next) - along * 7.0);
+        points.push(position(next));
+        node = next;
+        let [x, y] = direction;
+        let choices: Vec<[i32; 2]> =
+            [[x, y], [-y, x], [y, -x]].into_iter().filter(|turn| inside(step(node, *turn))).collect();
+        direction = choices[random.index(choices.len())];
+    }
+    points
+}

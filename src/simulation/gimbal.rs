@@ -1,0 +1,216 @@
+//! The gimbal: its chain, a stabilizing controller with lag, and the joint angles that come of it.
+
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+
+use super::random::RandomStream;
+use super::route::Wave;
+use super::trajectory::Trajectory;
+use crate::flight_log::rig::Joint;
+use crate::geometry::{RigidTransform, so3};
+use crate::gimbal::{ClassicalChain, DhLink};
+
+/// Pose of the camera on the IMU at these joint angles, Eqs. 5–6.
+pub(crate) fn imu_from_camera(chain: &ClassicalChain, angles_rad: &[f64]) -> RigidTransform {
+    let mut pose = chain.imu_from_base;
+    for (link, angle_rad) in chain.links.iter().zip(angles_rad) {
+        pose = pose * link_transform(link, *angle_rad);
+    }
+    pose * chain.effector_from_camera
+}
+
+/// One link, Eq. 2.
+fn link_transform(link: &DhLink, angle_rad: f64) -> RigidTransform {
+    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle_rad + link.theta_offset_rad);
+    let twist = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), link.alpha_rad);
+    RigidTransform::new(turn * twist, turn * Vector3::new(link.a_m, 0.0, link.d_m))
+}
+
+/// The joints of the paper's gimbal (§5.1): yaw ±180°, roll ±25°, pitch −120° to 30°.
+pub(crate) fn joints() -> Vec<Joint> {
+    let joint = |name: &str, low_deg: f64, high_deg: f64| Joint {
+        name: name.to_owned(),
+        limits_rad: (low_deg.to_radians(), high_deg.to_radians()),
+    };
+    vec![joint("yaw", -180.0, 180.0), joint("roll", -25.0, 25.0), joint("pitch", -120.0, 30.0)]
+}
+
+/// A true chain: the nominal yaw–roll–pitch gimbal under the nose with machining and mounting errors drawn from a
+/// random stream.
+///
+/// Nominal: base z down; yaw about it, roll about the forward axis, pitch about the right one; all angles zero looks
+/// ahead with a level optical frame.
+pub(crate) fn true_chain(random: &mut RandomStream) -> ClassicalChain {
+    let mut angle = |nominal_deg: f64| (nominal_deg + 2.2 * random.normal().clamp(-2.0, 2.0)).to_radians();
+    let quarter = 90.0;
+    let offsets = [angle(-quarter), angle(quarter), angle(-quarter)];
+    let twists = [angle(-quarter), angle(-quarter), angle(-quarter)];
+    let tilt = Vector3::new(angle(0.0), angle(0.0), angle(0.0)) * 0.6;
+    let tip = Vector3::new(angle(0.0), angle(0.0), angle(0.0)) * 0.5;
+    let mut length = |nominal_m: f64| nominal_m + 0.004 * random.normal().clamp(-2.0, 2.0);
+    let along = [length(0.042), length(-0.024), length(0.028)];
+    let across = [length(0.012), length(0.031), length(0.014)];
+    let mount = Vector3::new(length(0.095), length(0.004), length(-0.058));
+    let lens = Vector3::new(length(0.026), length(-0.007), length(0.009));
+    let downwards = Rotation3::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+    let optical = Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
+    let optical = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(optical));
+    ClassicalChain {
+        imu_from_base: RigidTransform::new(UnitQuaternion::from_rotation_matrix(&downwards) * so3::exp(&tilt), mount),
+        links: (0..3)
+            .map(|k| DhLink { theta_offset_rad: offsets[k], d_m: along[k], a_m: across[k], alpha_rad: twists[k] })
+            .collect(),
+        effector_from_camera: RigidTransform::new(optical * so3::exp(&tip), lens),
+    }
+}
+
+/// What the camera operator wants: level roll, a pitch and a heading that look around.
+#[derive(Clone, Debug)]
+pub(crate) struct LookAround {
+    /// Heading against the vehicle's (smoothed) heading, and how far it swings.
+    pub(crate) yaw_rad: [f64; 2],
+    /// Pitch, positive up, and how far it swings.
+    pub(crate) pitch_rad: [f64; 2],
+    /// How far the roll swings about level.
+    pub(crate) roll_rad: f64,
+    waves: [Wave; 3],
+}
+
+impl LookAround {
+    /// Waves of about 11, 9 and 7 seconds with random phases.
+    pub(crate) fn new(yaw_deg: [f64; 2], pitch_deg: [f64; 2], roll_deg: f64, random: &mut RandomStream) -> Self {
+        Self {
+            yaw_rad: yaw_deg.map(f64::to_radians),
+            pitch_rad: pitch_deg.map(f64::to_radians),
+            roll_rad: roll_deg.to_radians(),
+            waves: [Wave::new(random, 11.3), Wave::new(random, 9.1), Wave::new(random, 7.3)],
+        }
+    }
+
+    /// The wanted orientation of the optical frame in the world.
+    fn orientation(&self, followed_heading_rad: f64, time_s: f64) -> UnitQuaternion<f64> {
+        let yaw = followed_heading_rad + self.yaw_rad[0] + self.yaw_rad[1] * self.waves[0].at(time_s);
+        let pitch = self.pitch_rad[0] + self.pitch_rad[1] * self.waves[1].at(time_s);
+        let roll = self.roll_rad * self.waves[2].at(time_s);
+        // Forward-left-up body with positive pitch up, then the optical axes.
+        let level = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw)
+            * UnitQuaternion::from_axis_angle(&Vector3::y_axis(), -pitch)
+            * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), roll);
+        let optical = Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
+        level * UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(optical))
+    }
+}
+
+/// Gains and limits of the stabilizing controller.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Stabilizer {
+    /// Rate asked for per radian of orientation error, in 1/s: its inverse is the lag.
+    pub(crate) gain_per_s: f64,
+    /// Time constant of the joint motors.
+    pub(crate) motor_s: f64,
+    /// Largest joint rate.
+    pub(crate) rate_rad_per_s: f64,
+    /// Time constant with which the camera's heading follows the vehicle's.
+    pub(crate) follow_s: f64,
+}
+
+impl Default for Stabilizer {
+    fn default() -> Self {
+        Self { gain_per_s: 9.0, motor_s: 0.03, rate_rad_per_s: 200_f64.to_radians(), follow_s: 0.5 }
+    }
+}
+
+/// Step of the controller and of the stored motion, in seconds.
+const CONTROL_STEP_S: f64 = 0.001;
+
+/// The true joint angles over a flight.
+#[derive(Clone, Debug)]
+pub struct JointMotion {
+    /// Angle and rate of each joint per control step.
+    states: Vec<([f64; 3], [f64; 3])>,
+}
+
+impl JointMotion {
+    /// Flies the gimbal: at every step the controller asks for joint rates that turn the camera to what is wanted, the
+    /// motors follow with lag, and the stops hold.
+    pub(crate) fn fly(
+        trajectory: &Trajectory,
+        chain: &ClassicalChain,
+        joints: &[Joint],
+        look: &LookAround,
+        stabilizer: &Stabilizer,
+    ) -> Self {
+        let steps = (trajectory.duration_s() / CONTROL_STEP_S).ceil() as usize + 2;
+        let mut followed_rad = trajectory.at(0.0).heading_rad;
+        let mut angles = start_angles(trajectory, chain, look, followed_rad);
+        let mut rates = [0.0; 3];
+        let mut states = Vec::with_capacity(steps);
+        for step in 0..steps {
+            let time_s = step as f64 * CONTROL_STEP_S;
+            states.push((angles, rates));
+            let vehicle = trajectory.at(time_s);
+            followed_rad += (vehicle.heading_rad - followed_rad) * (CONTROL_STEP_S / stabilizer.follow_s);
+            let wanted = look.orientation(followed_rad, time_s);
+            let asked = turn_towards(&vehicle.world_from_imu.rotation, chain, &angles, &wanted) * stabilizer.gain_per_s;
+            let limit = stabilizer.rate_rad_per_s;
+            for k in 0..3 {
+                let (low, high) = joints[k].limits_rad;
+                rates[k] += (asked[k].clamp(-limit, limit) - rates[k]) * (CONTROL_STEP_S / stabilizer.motor_s);
+                // Braking ahead of a stop keeps the motion smooth up to it.
+                let brake_per_s = 20.0;
+                rates[k] = rates[k].clamp((low - angles[k]) * brake_per_s, (high - angles[k]) * brake_per_s);
+                angles[k] = (angles[k] + rates[k] * CONTROL_STEP_S).clamp(low, high);
+            }
+        }
+        Self { states }
+    }
+
+    /// The true joint angles at a time, by cubic interpolation between control steps.
+    pub fn at(&self, time_s: f64) -> [f64; 3] {
+        let last = self.states.len() - 1;
+        let position = (time_s / CONTROL_STEP_S).clamp(0.0, last as f64);
+        let before = (position as usize).min(last - 1);
+        let u = position - before as f64;
+        let ((from, from_rate), (to, to_rate)) = (&self.states[before], &self.states[before + 1]);
+        let (u2, u3) = (u * u, u * u * u);
+        std::array::from_fn(|k| {
+            (2.0 * u3 - 3.0 * u2 + 1.0) * from[k]
+                + (u3 - 2.0 * u2 + u) * CONTROL_STEP_S * from_rate[k]
+                + (3.0 * u2 - 2.0 * u3) * to[k]
+                + (u3 - u2) * CONTROL_STEP_S * to_rate[k]
+        })
+    }
+}
+
+/// The joint steps that would turn the camera to the wanted orientation, to first order.
+fn turn_towards(
+    world_from_imu: &UnitQuaternion<f64>,
+    chain: &ClassicalChain,
+    angles_rad: &[f64; 3],
+    wanted: &UnitQuaternion<f64>,
+) -> Vector3<f64> {
+    let mut orientation = *world_from_imu * chain.imu_from_base.rotation;
+    let mut axes = Matrix3::zeros();
+    for (k, link) in chain.links.iter().take(3).enumerate() {
+        axes.set_column(k, &(orientation * Vector3::z()));
+        orientation *= link_transform(link, angles_rad[k]).rotation;
+    }
+    orientation *= chain.effector_from_camera.rotation;
+    let error = so3::log(&(wanted * orientation.inverse()));
+    // Damped, so that parallel axes ask for no infinite rate.
+    let normal = axes.transpose() * axes + Matrix3::identity() * 1e-3;
+    normal.try_inverse().map_or_else(Vector3::zeros, |inverse| inverse * (axes.transpose() * error))
+}
+
+/// The angles at which the gimbal already holds what is wanted when the log begins.
+fn start_angles(trajectory: &Trajectory, chain: &ClassicalChain, look: &LookAround, heading_rad: f64) -> [f64; 3] {
+    let rotation = trajectory.at(0.0).world_from_imu.rotation;
+    let wanted = look.orientation(heading_rad, 0.0);
+    let mut angles = [0.0; 3];
+    for _ in 0..40 {
+        let step = turn_towards(&rotation, chain, &angles, &wanted);
+        for k in 0..3 {
+            angles[k] += step[k].clamp(-0.3, 0.3);
+        }
+    }
+    angles
+}

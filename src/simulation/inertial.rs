@@ -1,0 +1,110 @@
+//! The inertial sensor: truth from the trajectory's derivatives, noise densities, bias walks and turn-on biases.
+
+use nalgebra::Vector3;
+
+use super::random::RandomStream;
+use super::trajectory::Trajectory;
+use crate::flight_log::ImuSample;
+use crate::flight_log::rig::ImuNoise;
+use crate::geometry::ns_from_seconds;
+
+/// Noise of the ADIS16448 as RotorS gives it, which the paper flew.
+pub(crate) const FIREFLY_IMU: ImuNoise = ImuNoise {
+    accelerometer_noise_density: 0.004,
+    accelerometer_random_walk: 0.006,
+    gyroscope_noise_density: 3.394e-4,
+    gyroscope_random_walk: 3.879e-5,
+};
+
+/// Standard deviation of the accelerometer's turn-on bias per axis (RotorS), in m/s².
+const ACCELEROMETER_TURN_ON_M_PER_S2: f64 = 0.196;
+/// Standard deviation of the gyroscope's turn-on bias per axis (RotorS), in rad/s.
+const GYROSCOPE_TURN_ON_RAD_PER_S: f64 = 0.0087;
+
+/// Biases at one instant, in the IMU frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ImuBias {
+    /// Added to the true specific force.
+    pub accelerometer_m_per_s2: Vector3<f64>,
+    /// Added to the true angular velocity.
+    pub gyroscope_rad_per_s: Vector3<f64>,
+}
+
+/// All samples of a flight with the biases that are in them.
+#[derive(Clone, Debug)]
+pub(crate) struct InertialRecord {
+    pub(crate) samples: Vec<ImuSample>,
+    pub(crate) biases: Vec<ImuBias>,
+}
+
+impl InertialRecord {
+    /// Measures a flight from its start to its end; `noise_scale` 0 gives perfect samples without bias.
+    pub(crate) fn measure(
+        trajectory: &Trajectory,
+        noise: &ImuNoise,
+        rate_hz: f64,
+        noise_scale: f64,
+        random: &mut RandomStream,
+    ) -> Self {
+        let count = (trajectory.duration_s() * rate_hz).floor() as usize + 1;
+        let mut bias = ImuBias {
+            accelerometer_m_per_s2: random.normal_vector(ACCELEROMETER_TURN_ON_M_PER_S2 * noise_scale),
+            gyroscope_rad_per_s: random.normal_vector(GYROSCOPE_TURN_ON_RAD_PER_S * noise_scale),
+        };
+        let white = noise_scale * rate_hz.sqrt();
+        let walk = noise_scale / rate_hz.sqrt();
+        let mut record = Self { samples: Vec::with_capacity(count), biases: Vec::with_capacity(count) };
+        for index in 0..count {
+            let time_s = index as f64 / rate_hz;
+            let truth = trajectory.at(time_s);
+            record.samples.push(ImuSample {
+                stamp_ns: ns_from_seconds(time_s),
+                angular_velocity_rad_per_s: truth.angular_velocity_rad_per_s
+                    + bias.gyroscope_rad_per_s
+                    + random.normal_vector(noise.gyroscope_noise_density * white),
+                specific_force_m_per_s2: truth.specific_force_m_per_s2
+                    + bias.accelerometer_m_per_s2
+                    + random.normal_vector(noise.accelerometer_noise_density * white),
+            });
+            record.biases.push(bias);
+            bias.gyroscope_rad_per_s += random.normal_vector(noise.gyroscope_random_walk * walk);
+            bias.accelerometer_m_per_s2 += random.normal_vector(noise.accelerometer_random_walk * walk);
+        }
+        record
+    }
+
+    /// The sample at a stamp, interpolated linearly; the first or last one outside.
+    pub(crate) fn interpolated(&self, stamp_ns: i64) -> Option<ImuSample> {
+        let after = self.samples.partition_point(|sample| sample.stamp_ns < stamp_ns);
+        let last = self.samples.last()?;
+        let Some(to) = self.samples.get(after) else { return Some(ImuSample { stamp_ns, ..*last }) };
+        let Some(from) = after.checked_sub(1).map(|index| &self.samples[index]) else {
+            return Some(ImuSample { stamp_ns, ..*to });
+        };
+        let share = (stamp_ns - from.stamp_ns) as f64 / (to.stamp_ns - from.stamp_ns) as f64;
+        Some(ImuSample {
+            stamp_ns,
+            angular_velocity_rad_per_s: from.angular_velocity_rad_per_s.lerp(&to.angular_velocity_rad_per_s, share),
+            specific_force_m_per_s2: from.specific_force_m_per_s2.lerp(&to.specific_force_m_per_s2, share),
+        })
+    }
+
+    /// The samples from one stamp to another, both ends included and interpolated.
+    pub(crate) fn between(&self, from_ns: i64, to_ns: i64) -> Vec<ImuSample> {
+        let first = self.samples.partition_point(|sample| sample.stamp_ns <= from_ns);
+        let end = self.samples.partition_point(|sample| sample.stamp_ns < to_ns);
+        let mut between = Vec::with_capacity(end.saturating_sub(first) + 2);
+        between.extend(self.interpolated(from_ns));
+        between.extend(self.samples.get(first..end).unwrap_or_default());
+        if to_ns > from_ns {
+            between.extend(self.interpolated(to_ns));
+        }
+        between
+    }
+
+    /// The biases at a stamp.
+    pub(crate) fn bias_at(&self, stamp_ns: i64) -> ImuBias {
+        let after = self.samples.partition_point(|sample| sample.stamp_ns <= stamp_ns);
+        self.biases.get(after.saturating_sub(1)).copied().unwrap_or_default()
+    }
+}

@@ -1,0 +1,294 @@
+//! Where the experiments fly: routes on the plan with speed, height, heading and how much they deviate.
+
+use nalgebra::{Vector2, Vector3};
+
+use super::random::RandomStream;
+
+/// What a flight wants at one time.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FlightPoint {
+    /// Position in the world.
+    pub(crate) position_m: Vector3<f64>,
+    /// Standard deviation of the random manoeuvres, per axis of the world.
+    pub(crate) deviation_m: Vector3<f64>,
+    /// Heading, continuous over time.
+    pub(crate) heading_rad: f64,
+    /// Standard deviation of the heading's.
+    pub(crate) deviation_heading_rad: f64,
+}
+
+/// A plan that a trajectory follows with its random manoeuvres.
+pub(crate) trait Flight {
+    /// Time between two manoeuvres.
+    fn knot_s(&self) -> f64 {
+        0.65
+    }
+
+    /// What is wanted at a time after the start.
+    fn point(&self, time_s: f64) -> FlightPoint;
+}
+
+/// How hard a flight is flown.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Pace {
+    /// Seconds of hover at the start.
+    pub(crate) hover_s: f64,
+    /// Sway while hovering (standard deviation).
+    pub(crate) sway_m: f64,
+    /// Seconds from hover to full speed.
+    pub(crate) ramp_s: f64,
+    /// Speed along the route once under way.
+    pub(crate) speed_m_per_s: f64,
+    /// Horizontal and vertical manoeuvres (standard deviation of the spline's control points).
+    pub(crate) manoeuvre_m: [f64; 2],
+    /// Manoeuvres in heading (standard deviation of the spline's control points).
+    pub(crate) manoeuvre_heading_rad: f64,
+}
+
+impl Pace {
+    /// Two seconds of near-hover, then random aggressive manoeuvres.
+    pub(crate) fn aggressive() -> Self {
+        Self {
+            hover_s: 2.0,
+            sway_m: 0.012,
+            ramp_s: 3.0,
+            speed_m_per_s: 3.0,
+            manoeuvre_m: [0.85, 0.55],
+            manoeuvre_heading_rad: 0.2,
+        }
+    }
+
+    /// Progress of the ramp: 0 while hovering, 1 under way, smooth in between.
+    pub(crate) fn liveliness(&self, time_s: f64) -> f64 {
+        let share = ((time_s - self.hover_s) / self.ramp_s).clamp(0.0, 1.0);
+        share * share * share * (share * (share * 6.0 - 15.0) + 10.0)
+    }
+
+    /// Time under way, with the ramp counted at its growing speed; its derivative is [`Self::liveliness`].
+    pub(crate) fn flown_s(&self, time_s: f64) -> f64 {
+        let share = ((time_s - self.hover_s) / self.ramp_s).clamp(0.0, 1.0);
+        let ramp = share.powi(4) * (share * (share - 3.0) + 2.5);
+        let after = (time_s - self.hover_s - self.ramp_s).max(0.0);
+        ramp * self.ramp_s + after
+    }
+
+    fn deviation_m(&self, time_s: f64) -> Vector3<f64> {
+        let share = self.liveliness(time_s);
+        let blend = |full: f64| self.sway_m + (full - self.sway_m) * share;
+        Vector3::new(blend(self.manoeuvre_m[0]), blend(self.manoeuvre_m[0]), blend(self.manoeuvre_m[1]))
+    }
+
+    fn deviation_heading_rad(&self, time_s: f64) -> f64 {
+        self.sway_m * 0.3 + self.manoeuvre_heading_rad * self.liveliness(time_s)
+    }
+}
+
+/// A slow wave: two sines with random phases, about one in amplitude.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Wave {
+    period_s: [f64; 2],
+    phase_rad: [f64; 2],
+}
+
+impl Wave {
+    pub(crate) fn new(random: &mut RandomStream, period_s: f64) -> Self {
+        let mut phase = || random.uniform(0.0, std::f64::consts::TAU);
+        Self { period_s: [period_s, period_s * 0.557], phase_rad: [phase(), phase()] }
+    }
+
+    pub(crate) fn at(&self, time_s: f64) -> f64 {
+        let sine = |k: usize| (std::f64::consts::TAU * time_s / self.period_s[k] + self.phase_rad[k]).sin();
+        0.65 * sine(0) + 0.35 * sine(1)
+    }
+}
+
+/// A polyline on the plan, walked by length; a closed one is walked round and round.
+#[derive(Clone, Debug)]
+pub(crate) struct Path {
+    points: Vec<Vector2<f64>>,
+    length_m: Vec<f64>,
+    heading_rad: Vec<f64>,
+    closed: bool,
+}
+
+impl Path {
+    /// From corners, which are rounded by cutting them `cuts` times.
+    pub(crate) fn new(mut points: Vec<Vector2<f64>>, closed: bool, cuts: usize) -> Self {
+        for _ in 0..cuts {
+            points = cut_corners(&points, closed);
+        }
+        if closed && let Some(first) = points.first().copied() {
+            points.push(first);
+        }
+        let mut sum = 0.0;
+        let mut length_m = vec![0.0];
+        let mut heading_rad: Vec<f64> = Vec::with_capacity(points.len());
+        for pair in points.windows(2) {
+            let step = pair[1] - pair[0];
+            sum += step.norm();
+            length_m.push(sum);
+            let angle = step.y.atan2(step.x);
+            heading_rad.push(heading_rad.last().map_or(angle, |before| before + wrapped(angle - before)));
+        }
+        Self { points, length_m, heading_rad, closed }
+    }
+
+    /// The point this far along, and the direction there as a heading that does not jump by full turns.
+    pub(crate) fn at(&self, along_m: f64) -> (Vector2<f64>, f64) {
+        let total = self.length_m.last().copied().unwrap_or(0.0).max(1e-9);
+        let laps = if self.closed { (along_m / total).floor() } else { 0.0 };
+        let rest = along_m - laps * total;
+        let after = self.length_m.partition_point(|length| *length <= rest).clamp(1, self.points.len() - 1);
+        let (from, to) = (self.points[after - 1], self.points[after]);
+        let step = to - from;
+        let share = (rest - self.length_m[after - 1]) / step.norm().max(1e-12);
+        let turn = if self.closed { self.turn_rad() * laps } else { 0.0 };
+        (from + step * share, self.heading_rad[after - 1] + turn)
+    }
+
+    /// By how much the direction turns in one round of a closed path.
+    fn turn_rad(&self) -> f64 {
+        let area: f64 = self.points.windows(2).map(|pair| pair[0].x * pair[1].y - pair[1].x * pair[0].y).sum();
+        std::f64::consts::TAU.copysign(area)
+    }
+}
+
+/// An angle brought between −π and π.
+pub(crate) fn wrapped(angle_rad: f64) -> f64 {
+    let turns = (angle_rad / std::f64::consts::TAU).round();
+    angle_rad - turns * std::f64::consts::TAU
+}
+
+/// Chaikin's corner cutting.
+fn cut_corners(points: &[Vector2<f64>], closed: bool) -> Vec<Vector2<f64>> {
+    let count = points.len();
+    if count < 3 {
+        return points.to_vec();
+    }
+    let mut cut = Vec::with_capacity(2 * count);
+    if !closed {
+        cut.push(points[0]);
+    }
+    let segments = if closed { count } else { count - 1 };
+    for k in 0..segments {
+        let (from, to) = (points[k], points[(k + 1) % count]);
+        cut.push(from * 0.75 + to * 0.25);
+        cut.push(from * 0.25 + to * 0.75);
+    }
+    if !closed {
+        cut.push(points[count - 1]);
+    }
+    cut
+}
+
+/// Along a path with slowly changing speed, height and distance from it.
+#[derive(Clone, Debug)]
+pub(crate) struct Cruise {
+    /// How hard.
+    pub(crate) pace: Pace,
+    /// Where.
+    pub(crate) path: Path,
+    /// Height over ground and how much it changes.
+    pub(crate) height_m: [f64; 2],
+    /// How far the flight wanders to the sides.
+    pub(crate) wander_m: f64,
+    /// Heading against the path's direction, positive to the left.
+    pub(crate) heading_offset_rad: f64,
+    waves: [Wave; 4],
+}
+
+impl Cruise {
+    pub(crate) fn new(
+        pace: Pace,
+        path: Path,
+        height_m: [f64; 2],
+        wander_m: f64,
+        offset_rad: f64,
+        random: &mut RandomStream,
+    ) -> Self {
+        let waves =
+            [Wave::new(random, 17.0), Wave::new(random, 13.3), Wave::new(random, 21.7), Wave::new(random, 11.1)];
+        Self { pace, path, height_m, wander_m, heading_offset_rad: offset_rad, waves }
+    }
+}
+
+impl Flight for Cruise {
+    fn point(&self, time_s: f64) -> FlightPoint {
+        let flown_s = self.pace.flown_s(time_s);
+        // The wave starts at no displacement, so that hovering really hovers.
+        let since = |wave: &Wave| wave.at(flown_s) - wave.at(0.0) * (-flown_s / 4.0).exp();
+        let speed_swing_m = 1.6 * self.pace.speed_m_per_s * since(&self.waves[0]) * 0.5;
+        let along_m = self.pace.speed_m_per_s * flown_s + speed_swing_m.max(-self.pace.speed_m_per_s * flown_s);
+        let (on_path, _) = self.path.at(along_m);
+        // The heading is that of a chord ahead: it turns before the corner does.
+        let (_, direction) = self.path.at(along_m);
+        let (_, ahead) = self.path.at(along_m + 2.5);
+        let side = Vector2::new(-direction.sin(), direction.cos()) * (self.wander_m * since(&self.waves[1]));
+        let height_m = self.height_m[0] + self.height_m[1] * since(&self.waves[2]);
+        FlightPoint {
+            position_m: Vector3::new(on_path.x + side.x, on_path.y + side.y, height_m),
+            deviation_m: self.pace.deviation_m(time_s),
+            heading_rad: 0.5 * (direction + ahead) + self.heading_offset_rad + 0.35 * since(&self.waves[3]),
+            deviation_heading_rad: self.pace.deviation_heading_rad(time_s),
+        }
+    }
+}
+
+/// Forward and backward along the heading, then left and right: experiment T2.
+#[derive(Clone, Debug)]
+pub(crate) struct Shuttle {
+    /// How hard.
+    pub(crate) pace: Pace,
+    /// Middle of the strokes.
+    pub(crate) centre_m: Vector3<f64>,
+    /// Heading throughout.
+    pub(crate) heading_rad: f64,
+    /// Length of a stroke from end to end.
+    pub(crate) stroke_m: f64,
+    /// Time of a stroke there and back.
+    pub(crate) period_s: f64,
+    /// How many times forward and back before it goes left and right.
+    pub(crate) forward_strokes: u32,
+}
+
+impl Flight for Shuttle {
+    fn point(&self, time_s: f64) -> FlightPoint {
+        let flown_s = self.pace.flown_s(time_s);
+        let strokes = flown_s / self.period_s;
+        let forward_share = f64::from(self.forward_strokes);
+        let swing = -(std::f64::consts::TAU * strokes).cos() * 0.5 * self.stroke_m;
+        // Each half starts and ends at the rear end of the forward stroke; the left-right half starts on the right.
+        let (ahead_m, left_m) =
+            if strokes < forward_share { (swing, 0.0) } else { (-0.5 * self.stroke_m, swing + 0.5 * self.stroke_m) };
+        let (sine, cosine) = self.heading_rad.sin_cos();
+        let shift = Vector3::new(cosine * ahead_m - sine * left_m, sine * ahead_m + cosine * left_m, 0.0);
+        FlightPoint {
+            position_m: self.centre_m + shift,
+            deviation_m: self.pace.deviation_m(time_s),
+            heading_rad: self.heading_rad,
+            deviation_heading_rad: self.pace.deviation_heading_rad(time_s),
+        }
+    }
+}
+
+/// Staying at one place, with the pace's sway and, once under way, its manoeuvres.
+#[derive(Clone, Debug)]
+pub(crate) struct Station {
+    /// How hard.
+    pub(crate) pace: Pace,
+    /// Where.
+    pub(crate) position_m: Vector3<f64>,
+    /// Heading.
+    pub(crate) heading_rad: f64,
+}
+
+impl Flight for Station {
+    fn point(&self, time_s: f64) -> FlightPoint {
+        FlightPoint {
+            position_m: self.position_m,
+            deviation_m: self.pace.deviation_m(time_s),
+            heading_rad: self.heading_rad,
+            deviation_heading_rad: self.pace.deviation_heading_rad(time_s),
+        }
+    }
+}

@@ -1,0 +1,114 @@
+//! A flight with its rig and everything that the sensors but the cameras measure.
+
+use super::equipment::{Equipment, GRAVITY_M_PER_S2, IMU_RATE_HZ, given_rig};
+use super::gimbal::{JointMotion, LookAround, Stabilizer, imu_from_camera};
+use super::inertial::{FIREFLY_IMU, InertialRecord};
+use super::random::RandomStream;
+use super::trajectory::Trajectory;
+use crate::flight_log::rig::{CameraMount, CameraRig, ChainPrior};
+use crate::flight_log::{JointSample, Rig};
+use crate::geometry::{RigidTransform, ns_from_seconds, seconds_from_ns};
+
+/// Streams of random numbers, one per purpose, so that they do not disturb each other.
+pub(crate) mod stream {
+    pub(crate) const ROUTE: u64 = 1;
+    pub(crate) const MANOEUVRES: u64 = 2;
+    pub(crate) const RIG: u64 = 3;
+    pub(crate) const GIVEN_RIG: u64 = 4;
+    pub(crate) const IMU: u64 = 5;
+    pub(crate) const LOOK: u64 = 6;
+    pub(crate) const ENCODERS: u64 = 7;
+    pub(crate) const FEATURES: u64 = 8;
+    pub(crate) const IMAGES: u64 = 9;
+    pub(crate) const DELIVERY: u64 = 10;
+}
+
+/// When the encoders are read after the inertial sensor.
+const ENCODER_PHASE_S: f64 = 0.002;
+
+/// A flight, its rig, and the measurements of its inertial sensor and encoders.
+#[derive(Clone, Debug)]
+pub(crate) struct Scenario {
+    pub(crate) trajectory: Trajectory,
+    pub(crate) joints: Option<JointMotion>,
+    pub(crate) inertial: InertialRecord,
+    pub(crate) true_rig: Rig,
+    pub(crate) given_rig: Rig,
+    seed: u64,
+}
+
+/// What a scenario is made from besides its trajectory.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ScenarioOptions<'a> {
+    pub(crate) name: &'a str,
+    pub(crate) seed: u64,
+    pub(crate) equipment: Equipment,
+    pub(crate) start_error: ChainPrior,
+    pub(crate) imu_noise_scale: f64,
+}
+
+impl Scenario {
+    /// Flies a trajectory with the gimbal looking around as told, and measures.
+    pub(crate) fn new(trajectory: Trajectory, look: &LookAround, options: &ScenarioOptions<'_>) -> Self {
+        let random = |stream| RandomStream::new(options.seed, stream);
+        let true_rig = options.equipment.true_rig(options.name, &mut random(stream::RIG));
+        let given_rig = given_rig(&true_rig, options.start_error, &mut random(stream::GIVEN_RIG));
+        let joints = true_rig
+            .gimbal
+            .as_ref()
+            .map(|gimbal| JointMotion::fly(&trajectory, &gimbal.chain, &gimbal.joints, look, &Stabilizer::default()));
+        let inertial = InertialRecord::measure(
+            &trajectory,
+            &FIREFLY_IMU,
+            IMU_RATE_HZ,
+            options.imu_noise_scale,
+            &mut random(stream::IMU),
+        );
+        Self { trajectory, joints, inertial, true_rig, given_rig, seed: options.seed }
+    }
+
+    /// The true pose of a camera in the world at a time of the inertial sensor's clock.
+    pub(crate) fn world_from_camera(&self, camera: &CameraRig, time_s: f64) -> RigidTransform {
+        let world_from_imu = self.trajectory.at(time_s).world_from_imu;
+        match (&camera.mount, &self.true_rig.gimbal, &self.joints) {
+            (CameraMount::Static { imu_from_camera }, ..) => world_from_imu * *imu_from_camera,
+            (CameraMount::Gimbal, Some(gimbal), Some(joints)) => {
+                world_from_imu * imu_from_camera(&gimbal.chain, &joints.at(time_s))
+            }
+            (CameraMount::Gimbal, ..) => world_from_imu,
+        }
+    }
+
+    /// The true joint angles at a time.
+    pub(crate) fn joint_angles_rad(&self, time_s: f64) -> Option<Vec<f64>> {
+        self.joints.as_ref().map(|joints| joints.at(time_s).to_vec())
+    }
+
+    /// The true joint angles at the encoders' stamps.
+    pub(crate) fn true_joint_samples(&self) -> Vec<JointSample> {
+        let Some(joints) = &self.joints else { return Vec::new() };
+        let duration_s = self.trajectory.duration_s();
+        let count = ((duration_s - ENCODER_PHASE_S) * IMU_RATE_HZ).floor().max(0.0) as usize + 1;
+        (0..count)
+            .map(|index| ns_from_seconds(index as f64 / IMU_RATE_HZ + ENCODER_PHASE_S))
+            .map(|stamp_ns| JointSample { stamp_ns, angles_rad: joints.at(seconds_from_ns(stamp_ns)).to_vec() })
+            .collect()
+    }
+
+    /// What the encoders read, white noise of this standard deviation on every reading.
+    pub(crate) fn encoder_samples(&self, sigma_rad: f64) -> Vec<JointSample> {
+        let mut random = RandomStream::new(self.seed, stream::ENCODERS);
+        let mut samples = self.true_joint_samples();
+        for sample in &mut samples {
+            for angle in &mut sample.angles_rad {
+                *angle += sigma_rad * random.normal();
+            }
+        }
+        samples
+    }
+}
+
+/// Gravity of all simulated worlds.
+pub(crate) fn gravity_m_per_s2() -> f64 {
+    GRAVITY_M_PER_S2
+}

@@ -1,0 +1,372 @@
+//! Flights without images: ideal feature tracks with noise, for judging an estimator quickly and against known truth.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Vector2, Vector3};
+
+use super::equipment::{Equipment, Lens};
+use super::experiment::Experiment;
+use super::gimbal::LookAround;
+use super::inertial::ImuBias;
+use super::random::RandomStream;
+use super::route::{Flight, Pace, Station};
+use super::scenario::{Scenario, ScenarioOptions, gravity_m_per_s2, stream};
+use super::trajectory::{Trajectory, VehicleLimits};
+use crate::camera::CameraModel;
+use crate::flight_log::rig::ChainPrior;
+use crate::flight_log::{ImuSample, Rig};
+use crate::frontend::{FeatureId, FrontEndStatistics, TrackedFeature, TrackedFrame};
+use crate::geometry::{RigidTransform, ns_from_seconds};
+
+/// What carries the camera of a synthetic flight.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SyntheticMount {
+    /// The three-joint gimbal, `cam0` with `mount: gimbal`.
+    Gimbal,
+    /// The vehicle itself; the rig has no gimbal.
+    Static,
+}
+
+/// How a synthetic flight moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SyntheticMotion {
+    /// Aggressive from the first frame on.
+    Aggressive,
+    /// Two seconds of hover with centimetres of sway, then aggressive.
+    HoverThenAggressive,
+    /// Two seconds without any motion, then aggressive.
+    StandstillThenAggressive,
+    /// Hover with centimetres of sway throughout: the calibration stays unobservable.
+    Hover,
+}
+
+/// What a synthetic flight is to be like.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SyntheticOptions {
+    /// What carries the camera.
+    pub mount: SyntheticMount,
+    /// How it moves.
+    pub motion: SyntheticMotion,
+    /// Everything random follows from this.
+    pub seed: u64,
+    /// Length in seconds.
+    pub duration_s: f64,
+    /// Rate of the frames.
+    pub frame_rate_hz: f64,
+    /// Noise of a feature's pixel, per axis.
+    pub pixel_sigma_px: f64,
+    /// Share of the features whose tracks slip off their landmark.
+    pub outlier_share: f64,
+    /// Most features in a frame.
+    pub features: usize,
+    /// Scales noise, bias walk and turn-on bias of the inertial sensor; 0 makes it perfect.
+    pub imu_noise_scale: f64,
+    /// Noise of the encoders; `None` without encoders.
+    pub encoder_sigma_rad: Option<f64>,
+    /// How wrong the given rig's chain is.
+    pub start_error: ChainPrior,
+    /// How far the gimbal looks around in yaw, in radians (pitch 0.4 and roll 0.15 of it); 0 stabilizes only.
+    pub look_around_rad: f64,
+    /// The lens.
+    pub lens: Lens,
+}
+
+impl Default for SyntheticOptions {
+    fn default() -> Self {
+        Self {
+            mount: SyntheticMount::Gimbal,
+            motion: SyntheticMotion::HoverThenAggressive,
+            seed: 1,
+            duration_s: 20.0,
+            frame_rate_hz: 20.0,
+            pixel_sigma_px: 0.3,
+            outlier_share: 0.0,
+            features: 150,
+            imu_noise_scale: 1.0,
+            encoder_sigma_rad: Some(0.5_f64.to_radians()),
+            start_error: Experiment::T1.start_error(),
+            look_around_rad: 0.5,
+            lens: Lens::Pinhole,
+        }
+    }
+}
+
+/// One frame: what an estimator is given, and the truth beside it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SyntheticFrame {
+    /// Number of the frame.
+    pub index: usize,
+    /// Stamp since the flight began.
+    pub stamp_ns: i64,
+    /// IMU samples from the previous frame's stamp to this one's, both ends included and interpolated; the first
+    /// frame has those since the flight began.
+    pub imu: Vec<ImuSample>,
+    /// Encoder angles, `None` without encoders.
+    pub joint_angles_rad: Option<Vec<f64>>,
+    /// The tracked features.
+    pub tracks: TrackedFrame,
+    /// True pose of the IMU in the world.
+    pub true_world_from_imu: RigidTransform,
+    /// True velocity in the world.
+    pub true_velocity_m_per_s: Vector3<f64>,
+    /// True biases.
+    pub true_bias: ImuBias,
+    /// True joint angles, empty for a rigid camera.
+    pub true_joint_angles_rad: Vec<f64>,
+    /// True pose of the camera in the world.
+    pub true_world_from_camera: RigidTransform,
+}
+
+/// A whole flight.
+#[derive(Clone, Debug)]
+pub struct SyntheticFlight {
+    /// Frames in time order.
+    pub frames: Vec<SyntheticFrame>,
+    /// The rig that the estimator is given; its only camera is `cam0`.
+    pub given_rig: Rig,
+    /// The rig as it is.
+    pub true_rig: Rig,
+    /// Where the tracked landmarks are.
+    pub landmarks: BTreeMap<FeatureId, Vector3<f64>>,
+}
+
+/// Stamp of the first frame.
+const FIRST_FRAME_S: f64 = 0.003;
+
+/// Flies a synthetic flight.
+pub fn synthetic_tracks(options: &SyntheticOptions) -> SyntheticFlight {
+    let gimbal = options.mount == SyntheticMount::Gimbal;
+    let equipment = Equipment {
+        gimbal_camera: gimbal,
+        static_camera: !gimbal,
+        lens: options.lens,
+        resolution_px: [640, 480],
+        camera_rate_hz: options.frame_rate_hz,
+        camera_time_offset_s: 0.0,
+        encoder_sigma_rad: options.encoder_sigma_rad,
+    };
+    let swing_deg = options.look_around_rad.to_degrees();
+    let look = LookAround::new(
+        [0.0, swing_deg],
+        [-5.0, 0.4 * swing_deg],
+        0.15 * swing_deg,
+        &mut RandomStream::new(options.seed, stream::LOOK),
+    );
+    let scenario = Scenario::new(
+        trajectory(options),
+        &look,
+        &ScenarioOptions {
+            name: "synthetic",
+            seed: options.seed,
+            equipment,
+            start_error: options.start_error,
+            imu_noise_scale: options.imu_noise_scale,
+        },
+    );
+    let camera = &scenario.true_rig.cameras[0];
+    let mut encoders = RandomStream::new(options.seed, stream::ENCODERS);
+    let mut tracker = Tracker::new(camera.model.clone(), options);
+    let count = ((options.duration_s - FIRST_FRAME_S) * options.frame_rate_hz).floor().max(0.0) as usize + 1;
+    let mut frames = Vec::with_capacity(count);
+    let mut previous_ns = 0;
+    for index in 0..count {
+        let time_s = FIRST_FRAME_S + index as f64 / options.frame_rate_hz;
+        let stamp_ns = ns_from_seconds(time_s);
+        let truth = scenario.trajectory.at(time_s);
+        let true_world_from_camera = scenario.world_from_camera(camera, time_s);
+        let true_joint_angles_rad = scenario.joint_angles_rad(time_s).unwrap_or_default();
+        let joint_angles_rad = options
+            .encoder_sigma_rad
+            .filter(|_| gimbal)
+            .map(|sigma| true_joint_angles_rad.iter().map(|angle| angle + sigma * encoders.normal()).collect());
+        frames.push(SyntheticFrame {
+            index,
+            stamp_ns,
+            imu: scenario.inertial.between(previous_ns, stamp_ns),
+            joint_angles_rad,
+            tracks: tracker.track(stamp_ns, &true_world_from_camera),
+            true_world_from_imu: truth.world_from_imu,
+            true_velocity_m_per_s: truth.velocity_m_per_s,
+            true_bias: scenario.inertial.bias_at(stamp_ns),
+            true_joint_angles_rad,
+            true_world_from_camera,
+        });
+        previous_ns = stamp_ns;
+    }
+    SyntheticFlight { frames, given_rig: scenario.given_rig, true_rig: scenario.true_rig, landmarks: tracker.landmarks }
+}
+
+/// The flight around the house of T1, or a stay at one place.
+fn trajectory(options: &SyntheticOptions) -> Trajectory {
+    let mut route = RandomStream::new(options.seed, stream::ROUTE);
+    let pace = match options.motion {
+        SyntheticMotion::Aggressive => Pace { hover_s: -30.0, ..Pace::aggressive() },
+        SyntheticMotion::HoverThenAggressive => Pace::aggressive(),
+        SyntheticMotion::StandstillThenAggressive => Pace { hover_s: 4.0, sway_m: 0.0, ..Pace::aggressive() },
+        SyntheticMotion::Hover => Pace { hover_s: 1e6, ..Pace::aggressive() },
+    };
+    let flight: Box<dyn Flight> = if options.motion == SyntheticMotion::Hover {
+        Box::new(Station { pace, position_m: Vector3::new(0.0, -12.0, 2.5), heading_rad: 1.0 })
+    } else {
+        Experiment::T1.flight_at(pace, 0.0, &mut route)
+    };
+    Trajectory::new(
+        flight.as_ref(),
+        &mut RandomStream::new(options.seed, stream::MANOEUVRES),
+        &VehicleLimits::default(),
+        options.duration_s,
+        gravity_m_per_s2(),
+    )
+}
+
+/// A feature on its way through the frames.
+struct Track {
+    id: FeatureId,
+    age: u32,
+    landmark_m: Vector3<f64>,
+    uv_px: Vector2<f64>,
+    slip_px: Option<Vector2<f64>>,
+    remaining: u32,
+}
+
+/// An ideal front end: it knows the landmarks.
+struct Tracker {
+    model: CameraModel,
+    random: RandomStream,
+    pixel_sigma_px: f64,
+    outlier_share: f64,
+    features: usize,
+    tracks: Vec<Track>,
+    landmarks: BTreeMap<FeatureId, Vector3<f64>>,
+    next_id: u64,
+    before: Option<RigidTransform>,
+}
+
+/// Features keep this distance when new.
+const SPACING_PX: f64 = 22.0;
+/// Features end this close to the border.
+const BORDER_PX: f64 = 6.0;
+/// Mean life of a track that stays in sight, in frames.
+const LIFE_FRAMES: f64 = 60.0;
+/// Nearest and farthest landmark when first seen.
+const DEPTH_M: [f64; 2] = [2.5, 20.0];
+
+impl Tracker {
+    fn new(model: CameraModel, options: &SyntheticOptions) -> Self {
+        Self {
+            model,
+            random: RandomStream::new(options.seed, stream::FEATURES),
+            pixel_sigma_px: options.pixel_sigma_px,
+            outlier_share: options.outlier_share,
+            features: options.features,
+            tracks: Vec::new(),
+            landmarks: BTreeMap::new(),
+            next_id: 0,
+            before: None,
+        }
+    }
+
+    /// The frame seen from a camera pose.
+    fn track(&mut self, stamp_ns: i64, world_from_camera: &RigidTransform) -> TrackedFrame {
+        let before = self.tracks.len();
+        let mut features = Vec::with_capacity(self.features);
+        self.follow(world_from_camera, &mut features);
+        let tracked = features.len();
+        let mut statistics = FrontEndStatistics { tracked, lost: before - tracked, ..Default::default() };
+        self.measure_motion(world_from_camera, &features, &mut statistics);
+        self.find(world_from_camera, &mut features);
+        statistics.detected = features.len() - tracked;
+        self.before = Some(*world_from_camera);
+        TrackedFrame { stamp_ns, features, statistics }
+    }
+
+    fn noisy(&mut self, uv_px: Vector2<f64>) -> Vector2<f64> {
+        uv_px + Vector2::new(self.random.normal(), self.random.normal()) * self.pixel_sigma_px
+    }
+
+    /// Follows the tracks that stay in sight.
+    fn follow(&mut self, world_from_camera: &RigidTransform, features: &mut Vec<TrackedFeature>) {
+        let camera_from_world = world_from_camera.inverse();
+        for mut track in std::mem::take(&mut self.tracks) {
+            let point = camera_from_world.transform(&track.landmark_m);
+            if let Some(slip) = &mut track.slip_px {
+                *slip += Vector2::new(self.random.normal(), self.random.normal()) * 1.5;
+            }
+            track.remaining = track.remaining.saturating_sub(1);
+            let seen = self.model.project(&point).filter(|_| point.z > 0.3 && track.remaining > 0);
+            let Some(ideal_px) = seen else { continue };
+            let uv_px = self.noisy(ideal_px) + track.slip_px.unwrap_or_default();
+            let Some(bearing) = self.model.unproject(&uv_px).filter(|_| self.model.contains(&uv_px, BORDER_PX)) else {
+                continue;
+            };
+            track.age += 1;
+            let previous_uv_px = Some(track.uv_px);
+            features.push(TrackedFeature { id: track.id, age: track.age, uv_px, previous_uv_px, bearing });
+            track.uv_px = uv_px;
+            self.tracks.push(track);
+        }
+    }
+
+    /// Fills free places of the image with new features.
+    fn find(&mut self, world_from_camera: &RigidTransform, features: &mut Vec<TrackedFeature>) {
+        let [width, height] = self.model.resolution_px.map(|size| size as f64);
+        for _ in 0..20 * self.features {
+            if features.len() >= self.features {
+                return;
+            }
+            let ideal_px = Vector2::new(self.random.uniform(0.0, width), self.random.uniform(0.0, height));
+            let taken = |feature: &TrackedFeature| (feature.uv_px - ideal_px).norm() < SPACING_PX;
+            if !self.model.contains(&ideal_px, 2.0 * BORDER_PX) || features.iter().any(taken) {
+                continue;
+            }
+            let Some(ray) = self.model.unproject(&ideal_px) else { continue };
+            let Some(landmark_m) = self.landmark(world_from_camera, &ray) else { continue };
+            let uv_px = self.noisy(ideal_px);
+            let Some(bearing) = self.model.unproject(&uv_px) else { continue };
+            let id = FeatureId(self.next_id);
+            self.next_id += 1;
+            let slips = self.random.chance(self.outlier_share);
+            let life = 2.0 - LIFE_FRAMES * (1.0 - self.random.unit()).ln();
+            self.landmarks.insert(id, landmark_m);
+            self.tracks.push(Track {
+                id,
+                age: 0,
+                landmark_m,
+                uv_px,
+                slip_px: slips.then(Vector2::zeros),
+                remaining: life as u32,
+            });
+            features.push(TrackedFeature { id, age: 0, uv_px, previous_uv_px: None, bearing });
+        }
+    }
+
+    /// A point on a ray: at a random distance, or on the ground before that.
+    fn landmark(&mut self, world_from_camera: &RigidTransform, ray: &Vector3<f64>) -> Option<Vector3<f64>> {
+        let [near, far] = DEPTH_M;
+        let distance_m = self.random.uniform(near.ln(), far.ln()).exp();
+        let direction = world_from_camera.rotation * ray;
+        let to_ground_m = if direction.z < -1e-3 { -world_from_camera.translation_m.z / direction.z } else { f64::MAX };
+        let distance_m = distance_m.min(to_ground_m);
+        (distance_m > 0.5).then(|| world_from_camera.translation_m + direction * distance_m)
+    }
+
+    /// Median motion in the image and mean parallax with the rotation taken out.
+    fn measure_motion(&self, pose: &RigidTransform, features: &[TrackedFeature], statistics: &mut FrontEndStatistics) {
+        let Some(before) = &self.before else { return };
+        let before_from_now = before.rotation.inverse() * pose.rotation;
+        let mut flows = Vec::with_capacity(features.len());
+        let mut parallax_px = 0.0;
+        let mut counted = 0_usize;
+        for feature in features {
+            let Some(previous_px) = feature.previous_uv_px else { continue };
+            flows.push((feature.uv_px - previous_px).norm());
+            if let Some(turned_px) = self.model.project(&(before_from_now * feature.bearing)) {
+                parallax_px += (turned_px - previous_px).norm();
+                counted += 1;
+            }
+        }
+        flows.sort_by(f64::total_cmp);
+        statistics.median_flow_px = flows.get(flows.len() / 2).copied().unwrap_or(0.0);
+        statistics.mean_parallax_px = parallax_px / counted.max(1) as f64;
+    }
+}

@@ -1,0 +1,128 @@
+use nalgebra::{SVector, Vector3};
+
+use super::super::equipment::{Equipment, GRAVITY_M_PER_S2, Lens};
+use super::super::experiment::Experiment;
+use super::super::random::RandomStream;
+use super::super::scenario::{Scenario, ScenarioOptions, stream};
+use super::super::spline::Spline;
+use super::super::trajectory::{Trajectory, VehicleLimits};
+use crate::geometry::so3;
+
+fn experiment_trajectory(experiment: Experiment, seed: u64, duration_s: f64) -> Trajectory {
+    let flight = experiment.flight(4.0 * duration_s, &mut RandomStream::new(seed, stream::ROUTE));
+    let mut random = RandomStream::new(seed, stream::MANOEUVRES);
+    Trajectory::new(flight.as_ref(), &mut random, &VehicleLimits::default(), duration_s, GRAVITY_M_PER_S2)
+}
+
+#[test]
+fn spline_derivatives_meet_central_differences() {
+    let mut random = RandomStream::new(4, 0);
+    let points = (0..20).map(|_| SVector::<f64, 2>::new(random.normal(), random.normal())).collect();
+    let spline = Spline { knot_s: 0.65, points };
+    let step = 1e-4;
+    for order in 0..4 {
+        for time_s in [0.2, 0.6498, 0.6502, 3.17, 7.4] {
+            let numeric =
+                (spline.derivative(time_s + step, order) - spline.derivative(time_s - step, order)) / (2.0 * step);
+            let analytic = spline.derivative(time_s, order + 1);
+            assert!((numeric - analytic).norm() < 1e-4 * (1.0 + analytic.norm()), "order {order} at {time_s}");
+        }
+    }
+}
+
+#[test]
+fn every_experiment_flies_its_length_hard_but_within_the_limits() {
+    let limits = VehicleLimits::default();
+    for experiment in Experiment::ALL {
+        let trajectory = experiment_trajectory(experiment, 3, 200.0);
+        let end_s = trajectory.time_of_length(experiment.length_m());
+        assert!((trajectory.length_m(end_s) - experiment.length_m()).abs() < 0.3, "{experiment:?}");
+        let mut rate_squares = 0.0;
+        let mut height_m = (f64::MAX, 0.0_f64);
+        let steps = (end_s / 0.05) as usize;
+        for step in 0..steps {
+            let state = trajectory.at(step as f64 * 0.05);
+            assert!(limits.admit(&state), "{experiment:?} at step {step}");
+            rate_squares += state.angular_velocity_rad_per_s.norm_squared();
+            let height = state.world_from_imu.translation_m.z;
+            height_m = (height_m.0.min(height), height_m.1.max(height));
+        }
+        let rate = (rate_squares / steps as f64).sqrt();
+        assert!(rate > 0.5, "{experiment:?} turns at {rate} rad/s only");
+        assert!(height_m.0 > 0.6 && height_m.1 < 6.0, "{experiment:?} height {height_m:?}");
+        // Two seconds of near-hover come first.
+        let hover = trajectory.at(1.0).velocity_m_per_s.norm();
+        assert!(hover < 0.1 && trajectory.length_m(2.0) < 0.15, "{experiment:?} hovers at {hover} m/s");
+    }
+}
+
+#[test]
+fn inertial_truth_integrates_back_to_the_trajectory() {
+    let trajectory = experiment_trajectory(Experiment::T3, 5, 30.0);
+    let step_s = 5e-4;
+    let start = trajectory.at(4.0);
+    let (mut rotation, mut position) = (start.world_from_imu.rotation, start.world_from_imu.translation_m);
+    let mut velocity = start.velocity_m_per_s;
+    let gravity = Vector3::new(0.0, 0.0, -GRAVITY_M_PER_S2);
+    let steps = (20.0 / step_s) as usize;
+    for step in 0..steps {
+        let middle = trajectory.at(4.0 + (step as f64 + 0.5) * step_s);
+        let half_turned = rotation * so3::exp(&(middle.angular_velocity_rad_per_s * (0.5 * step_s)));
+        let acceleration = half_turned * middle.specific_force_m_per_s2 + gravity;
+        position += velocity * step_s + acceleration * (0.5 * step_s * step_s);
+        velocity += acceleration * step_s;
+        rotation *= so3::exp(&(middle.angular_velocity_rad_per_s * step_s));
+    }
+    let end = trajectory.at(4.0 + steps as f64 * step_s);
+    let turn = so3::log(&(rotation.inverse() * end.world_from_imu.rotation)).norm();
+    assert!(turn < 1e-5, "{turn} rad");
+    assert!((velocity - end.velocity_m_per_s).norm() < 1e-4);
+    assert!((position - end.world_from_imu.translation_m).norm() < 1e-3);
+}
+
+#[test]
+fn gimbal_stays_within_its_stops_and_steadies_the_picture() {
+    for experiment in [Experiment::T1, Experiment::T4] {
+        let look = experiment.look_around(&mut RandomStream::new(8, stream::LOOK));
+        let equipment = Equipment {
+            gimbal_camera: true,
+            static_camera: true,
+            lens: Lens::Pinhole,
+            resolution_px: [640, 480],
+            camera_rate_hz: 20.0,
+            camera_time_offset_s: 0.0,
+            encoder_sigma_rad: Some(0.01),
+        };
+        let options = ScenarioOptions {
+            name: "test",
+            seed: 8,
+            equipment,
+            start_error: experiment.start_error(),
+            imu_noise_scale: 1.0,
+        };
+        let scenario = Scenario::new(experiment_trajectory(experiment, 8, 40.0), &look, &options);
+        let rig = &scenario.true_rig;
+        let limits: Vec<_> = rig.gimbal.as_ref().unwrap().joints.iter().map(|joint| joint.limits_rad).collect();
+        let mut swing = [0.0_f64; 2];
+        let mut roll_squares = [0.0; 2];
+        for step in 0..4000 {
+            let time_s = f64::from(step) * 0.01;
+            let angles = scenario.joint_angles_rad(time_s).unwrap();
+            for (angle, (low, high)) in angles.iter().zip(&limits) {
+                assert!(angle >= low && angle <= high, "{angles:?}");
+            }
+            let before = scenario.joint_angles_rad((time_s - 0.01).max(0.0)).unwrap();
+            swing[1] = swing[1].max((angles[2] - before[2]).abs() / 0.01);
+            swing[0] = swing[0].max((angles[0] - before[0]).abs() / 0.01);
+            for camera in 0..2 {
+                let pose = scenario.world_from_camera(&rig.cameras[camera], time_s);
+                // The optical x axis points right: level is no height.
+                roll_squares[camera] += (pose.rotation * Vector3::x()).z.powi(2);
+            }
+        }
+        assert!(swing.iter().all(|rate| *rate < 3.6), "{swing:?} rad/s");
+        if experiment == Experiment::T1 {
+            assert!(roll_squares[0] < 0.2 * roll_squares[1], "{roll_squares:?}");
+        }
+    }
+}

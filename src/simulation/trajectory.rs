@@ -1,0 +1,212 @@
+//! The multirotor's flight: a spline for position and one for heading, everything else by differential flatness.
+
+use nalgebra::{Matrix3, Rotation3, SVector, UnitQuaternion, Vector1, Vector3};
+
+use super::random::RandomStream;
+use super::route::Flight;
+use super::spline::Spline;
+use crate::geometry::RigidTransform;
+
+/// What the multirotor can do, after the AscTec Firefly of RotorS (1.57 kg, six rotors, about two g of thrust).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VehicleLimits {
+    /// Largest angle between thrust and the vertical, in radians.
+    pub tilt_rad: f64,
+    /// Least thrust over mass, in m/s².
+    pub least_thrust_m_per_s2: f64,
+    /// Largest thrust over mass, in m/s².
+    pub largest_thrust_m_per_s2: f64,
+    /// Largest angular rate about any axis, in rad/s.
+    pub rate_rad_per_s: f64,
+    /// Largest speed, in m/s.
+    pub speed_m_per_s: f64,
+}
+
+impl Default for VehicleLimits {
+    fn default() -> Self {
+        Self {
+            tilt_rad: 38_f64.to_radians(),
+            least_thrust_m_per_s2: 4.5,
+            largest_thrust_m_per_s2: 18.5,
+            rate_rad_per_s: 2.4,
+            speed_m_per_s: 7.0,
+        }
+    }
+}
+
+/// The vehicle at one instant. The body frame, which is the IMU frame, has x forward, y left, z up along the thrust.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Kinematics {
+    /// Pose of the IMU in the world, whose z axis points up.
+    pub world_from_imu: RigidTransform,
+    /// Velocity in the world.
+    pub velocity_m_per_s: Vector3<f64>,
+    /// Acceleration in the world.
+    pub acceleration_m_per_s2: Vector3<f64>,
+    /// Angular velocity in the IMU frame.
+    pub angular_velocity_rad_per_s: Vector3<f64>,
+    /// Specific force in the IMU frame: +g along z at rest.
+    pub specific_force_m_per_s2: Vector3<f64>,
+    /// Heading of the vehicle's route, in radians from the world's x axis, not wrapped.
+    pub heading_rad: f64,
+}
+
+/// A smooth flight in closed form: uniform quintic B-splines of position and heading.
+///
+/// Attitude, angular velocity and specific force follow from velocity, acceleration, jerk and heading (differential
+/// flatness of a multirotor with linear air drag `c`): the z axis lies along the thrust `a + g + c·v`, the y axis is
+/// square to it and to the heading.
+#[derive(Clone, Debug)]
+pub struct Trajectory {
+    position_m: Spline<3>,
+    heading_rad: Spline<1>,
+    gravity_m_per_s2: f64,
+    duration_s: f64,
+}
+
+/// Drag of the air over mass and speed, in 1/s.
+pub(crate) const AIR_DRAG_PER_S: f64 = 0.15;
+
+/// Step at which limits are checked and lengths are summed, in seconds.
+const CHECK_STEP_S: f64 = 0.02;
+
+impl Trajectory {
+    /// Flies `flight` with the perturbations of a random stream, softened where `limits` would be exceeded, for
+    /// `duration_s` seconds.
+    pub(crate) fn new(
+        flight: &dyn Flight,
+        random: &mut RandomStream,
+        limits: &VehicleLimits,
+        duration_s: f64,
+        gravity_m_per_s2: f64,
+    ) -> Self {
+        let knot_s = flight.knot_s();
+        let count = Spline::<3>::points_for(duration_s, knot_s);
+        let mut base = Vec::with_capacity(count);
+        let mut deviation = Vec::with_capacity(count);
+        let mut heading = Vec::with_capacity(count);
+        let mut clock = Spline::<3> { knot_s, points: Vec::new() };
+        for index in 0..count {
+            let time_s = clock.time_of_point(index);
+            let point = flight.point(time_s.max(0.0));
+            base.push(point.position_m);
+            let shares = Vector3::new(random.normal(), random.normal(), random.normal()).map(|x| x.clamp(-2.0, 2.0));
+            deviation.push(shares.component_mul(&point.deviation_m));
+            let turn = random.normal().clamp(-2.0, 2.0) * point.deviation_heading_rad;
+            heading.push(Vector1::new(point.heading_rad + turn));
+        }
+        clock.points = base.iter().zip(&deviation).map(|(position, shift)| position + shift).collect();
+        let heading_rad = Spline { knot_s, points: heading };
+        let mut flown = Self { position_m: clock, heading_rad, gravity_m_per_s2, duration_s };
+        flown.soften(&base, &mut deviation, limits);
+        flown
+    }
+
+    /// Shrinks the deviations that act where a limit is exceeded until none is, at most 200 times.
+    fn soften(&mut self, base: &[SVector<f64, 3>], deviation: &mut [SVector<f64, 3>], limits: &VehicleLimits) {
+        for _ in 0..200 {
+            let mut factor = vec![1.0_f64; base.len()];
+            let mut exceeded = false;
+            let steps = (self.duration_s / CHECK_STEP_S).ceil() as usize;
+            for step in 0..=steps {
+                let time_s = step as f64 * CHECK_STEP_S;
+                if limits.admit(&self.at(time_s)) {
+                    continue;
+                }
+                exceeded = true;
+                let first = self.position_m.first_acting(time_s);
+                for slot in factor.iter_mut().skip(first).take(6) {
+                    *slot = 0.92;
+                }
+            }
+            if !exceeded {
+                return;
+            }
+            for (index, slot) in factor.iter().enumerate() {
+                deviation[index] *= *slot;
+                self.position_m.points[index] = base[index] + deviation[index];
+            }
+        }
+    }
+
+    /// How long the flight is.
+    pub fn duration_s(&self) -> f64 {
+        self.duration_s
+    }
+
+    /// Where the vehicle is, how it moves and what a perfect inertial sensor would feel, `time_s` after the start.
+    pub fn at(&self, time_s: f64) -> Kinematics {
+        let position_m = self.position_m.derivative(time_s, 0);
+        let velocity_m_per_s = self.position_m.derivative(time_s, 1);
+        let acceleration_m_per_s2 = self.position_m.derivative(time_s, 2);
+        let jerk = self.position_m.derivative(time_s, 3);
+        let heading_rad = self.heading_rad.derivative(time_s, 0).x;
+        let heading_rate = self.heading_rad.derivative(time_s, 1).x;
+
+        let felt = acceleration_m_per_s2 + Vector3::new(0.0, 0.0, self.gravity_m_per_s2);
+        let thrust = felt + velocity_m_per_s * AIR_DRAG_PER_S;
+        let thrust_rate = jerk + acceleration_m_per_s2 * AIR_DRAG_PER_S;
+        let thrust_norm = thrust.norm();
+        let z_axis = thrust / thrust_norm;
+        let z_rate = (thrust_rate - z_axis * z_axis.dot(&thrust_rate)) / thrust_norm;
+        let (sine, cosine) = heading_rad.sin_cos();
+        let ahead = Vector3::new(cosine, sine, 0.0);
+        let ahead_rate = Vector3::new(-sine, cosine, 0.0) * heading_rate;
+        let side = z_axis.cross(&ahead);
+        let side_rate = z_rate.cross(&ahead) + z_axis.cross(&ahead_rate);
+        let side_norm = side.norm();
+        let y_axis = side / side_norm;
+        let x_axis = y_axis.cross(&z_axis);
+
+        // Columns are the body axes, so dR/dt = R·[ω]^ gives ω from the axes' rates.
+        let angular_velocity_rad_per_s =
+            Vector3::new(-z_rate.dot(&y_axis), z_rate.dot(&x_axis), -x_axis.dot(&side_rate) / side_norm);
+        let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[x_axis, y_axis, z_axis]));
+        Kinematics {
+            world_from_imu: RigidTransform::new(UnitQuaternion::from_rotation_matrix(&rotation), position_m),
+            velocity_m_per_s,
+            acceleration_m_per_s2,
+            angular_velocity_rad_per_s,
+            specific_force_m_per_s2: Vector3::new(x_axis.dot(&felt), y_axis.dot(&felt), z_axis.dot(&felt)),
+            heading_rad,
+        }
+    }
+
+    /// Length of the path flown until `time_s`, in metres.
+    pub fn length_m(&self, time_s: f64) -> f64 {
+        let steps = (time_s / CHECK_STEP_S).round().max(1.0) as usize;
+        let step_s = time_s / steps as f64;
+        (0..steps).map(|step| self.position_m.derivative((step as f64 + 0.5) * step_s, 1).norm() * step_s).sum()
+    }
+
+    /// When the path flown has this length, at most the duration; a multiple of 0.05 s.
+    pub(crate) fn time_of_length(&self, length_m: f64) -> f64 {
+        const STEP_S: f64 = 0.05;
+        let mut length = 0.0;
+        let mut step = 0_u32;
+        while length < length_m && f64::from(step) * STEP_S < self.duration_s {
+            length += self.position_m.derivative((f64::from(step) + 0.5) * STEP_S, 1).norm() * STEP_S;
+            step += 1;
+        }
+        f64::from(step) * STEP_S
+    }
+
+    /// The same flight, ended earlier.
+    pub(crate) fn cut(mut self, duration_s: f64) -> Self {
+        self.duration_s = self.duration_s.min(duration_s);
+        self
+    }
+}
+
+impl VehicleLimits {
+    /// Whether the vehicle can be in this state.
+    pub fn admit(&self, state: &Kinematics) -> bool {
+        let thrust = state.specific_force_m_per_s2.z;
+        let upright = (state.world_from_imu.rotation * Vector3::z()).z;
+        upright >= self.tilt_rad.cos()
+            && thrust >= self.least_thrust_m_per_s2
+            && thrust <= self.largest_thrust_m_per_s2
+            && state.angular_velocity_rad_per_s.amax() <= self.rate_rad_per_s
+            && state.velocity_m_per_s.norm() <= self.speed_m_per_s
+    }
+}
