@@ -1,10 +1,12 @@
 //! Panels, the 3D scene and the window: they read a recording at a cursor and push commands.
 
 pub mod convergence;
+mod events;
 mod follow;
 pub mod headless;
 mod histogram;
 pub mod image_panel;
+pub mod inspector;
 pub mod painter;
 #[cfg(test)]
 mod panel_tests;
@@ -20,6 +22,7 @@ pub(crate) mod sample_recording;
 #[cfg(test)]
 mod tests;
 pub mod theme;
+pub mod timeline;
 mod units;
 
 use std::sync::Arc;

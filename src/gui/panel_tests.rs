@@ -123,3 +123,18 @@ fn rank_is_drawn_in_every_case() {
 fn residuals_are_drawn_in_every_case() {
     check("residuals", [480, 420], super::residuals::ResidualsPanel::ui);
 }
+
+#[test]
+fn the_timeline_is_drawn_in_every_case() {
+    check("timeline", [1900, 190], super::timeline::TimelinePanel::ui);
+}
+
+#[test]
+fn the_inspector_is_drawn_in_every_case() {
+    check("inspector", [480, 700], |panel: &mut super::inspector::InspectorPanel, ui, ctx| {
+        let run = ctx.recording.runs.first();
+        let step = run.and_then(|run| run.step_at(ctx.cursor_ns));
+        ctx.selection.feature = step.and_then(|step| Some(step.report.features.first()?.id));
+        panel.ui(ui, ctx);
+    });
+}

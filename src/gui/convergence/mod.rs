@@ -90,6 +90,9 @@ impl ConvergencePanel {
         for (part, rect) in &layout.headings {
             paint::heading(ui, ctx, *part, *rect);
         }
+        if let Some(rect) = layout.legend {
+            paint::legend(ui, ctx, rect);
+        }
         for (name, rect) in names.iter().zip(&layout.cells) {
             if ui.is_rect_visible(*rect) {
                 paint::cell_ui(ui, ctx, &self.histories, &mut self.curves, shown, name, *rect);

@@ -83,13 +83,11 @@ impl CalibrationHistory {
         self.stamps_ns.push(step.report.stamp_ns);
         let known = knowledge(step.rank.as_ref());
         for (index, name) in calibration.names.iter().enumerate() {
-            let place = match self.parameters.iter().position(|(known, _)| known == name) {
-                Some(place) => place,
-                None => {
-                    self.parameters.push((name.clone(), ParameterHistory::default()));
-                    self.parameters.len() - 1
-                }
-            };
+            let known_place = self.parameters.iter().position(|(known, _)| known == name);
+            let place = known_place.unwrap_or(self.parameters.len());
+            if known_place.is_none() {
+                self.parameters.push((name.clone(), ParameterHistory::default()));
+            }
             let history = &mut self.parameters[place].1;
             history.unit = calibration.units.get(index).copied().unwrap_or("");
             history.pad(row);

@@ -9,12 +9,14 @@ use super::model::{CalibrationHistory, Knowledge, ParameterHistory};
 use super::names::{ChainPart, heading_of, meaning_of};
 use crate::gui::PanelContext;
 use crate::gui::plot::{
-    Clicks, PlotArea, navigate, paint_band, paint_cursor, paint_curve, paint_ground, paint_hatch, paint_value_grid,
-    stretches_where, visible_range,
+    Clicks, PlotArea, navigate, paint_band, paint_cursor, paint_curve, paint_ground, paint_hatch, paint_line,
+    paint_value_grid, stretches_where, visible_range,
 };
 use crate::gui::theme::{self, CURVE_WIDTH};
 use crate::gui::units::{Shown, fixed};
 
+/// Height of the strip at the foot of a plot.
+const STRIP_HEIGHT: f32 = 3.0;
 /// Height of the line with name and value.
 const TITLE_HEIGHT: f32 = 15.0;
 
@@ -25,6 +27,55 @@ pub(super) fn heading(ui: &Ui, ctx: &PanelContext<'_>, part: ChainPart, rect: Re
     painter.vline(rect.right(), rect.y_range(), Stroke::new(1.0, theme.outline));
     let place = pos2(rect.left(), rect.top() + 1.0);
     painter.text(place, Align2::LEFT_TOP, heading_of(part, &ctx.recording.rig), theme::label_font(), theme.text_weak);
+}
+
+/// What the lines and signs mean, where rows by part of the chain leave room.
+pub(super) fn legend(ui: &Ui, ctx: &PanelContext<'_>, rect: Rect) {
+    const LINE: f32 = 15.0;
+    let theme = ctx.theme;
+    let painter = ui.painter_at(rect);
+    let sample = |line: usize| {
+        let top = rect.top() + TITLE_HEIGHT + line as f32 * LINE;
+        Rect::from_min_size(pos2(rect.left() + 8.0, top), vec2(26.0, LINE - 4.0))
+    };
+    let mut line = 0;
+    let mut say = |text: &str, paint: &dyn Fn(Rect)| {
+        let place = sample(line);
+        if place.bottom() < rect.bottom() {
+            paint(place);
+            let left = place.right_center() + vec2(6.0, 0.0);
+            painter.text(left, Align2::LEFT_CENTER, text, theme::label_font(), theme.text);
+            line += 1;
+        }
+    };
+    for (number, run) in ctx.recording.runs.iter().enumerate() {
+        let style = theme.run(number);
+        say(&run.spec.label, &|place| {
+            paint_line(&painter, &[place.left_center(), place.right_center()], style, CURVE_WIDTH);
+        });
+    }
+    let band = theme.run(ctx.selection.run).color.gamma_multiply(0.22);
+    say("±3σ", &|place| {
+        painter.rect_filled(place, 0.0, band);
+    });
+    if ctx.recording.truth_rig.is_some() {
+        say("truth", &|place| {
+            paint_line(&painter, &[place.left_center(), place.right_center()], theme.truth_style(), CURVE_WIDTH);
+        });
+    }
+    for (state, text) in [
+        (Knowledge::Weak, "weak: no better than the prior"),
+        (Knowledge::Unobservable, "unobservable"),
+        (Knowledge::Waiting, "initializing"),
+    ] {
+        say(text, &|place| {
+            if state != Knowledge::Weak {
+                paint_hatch(&painter, place, theme.hatch);
+            }
+            let strip = Rect::from_min_max(pos2(place.left(), place.bottom() - STRIP_HEIGHT), place.max);
+            painter.rect_filled(strip, 0.0, state_color(theme, state));
+        });
+    }
 }
 
 /// Draws the plot of one parameter and lets the pointer select it.
@@ -131,7 +182,7 @@ fn value_range(extents: impl Iterator<Item = (f64, f64)>, parameter: &ParameterH
     (low - margin, high + margin)
 }
 
-/// Grey where the window informs the parameter too weakly, hatched where it cannot see it at all.
+/// Hatched where nothing informs the parameter; a strip at the foot tells why.
 fn paint_knowledge(
     painter: &egui::Painter,
     theme: &theme::Theme,
@@ -146,10 +197,11 @@ fn paint_knowledge(
             if stretch.width() <= 0.0 {
                 continue;
             }
-            painter.rect_filled(stretch, 0.0, theme.hatch.gamma_multiply(0.35));
-            if state == Knowledge::Unobservable {
+            if state != Knowledge::Weak {
                 paint_hatch(painter, stretch, theme.hatch);
             }
+            let strip = Rect::from_min_max(pos2(stretch.left(), stretch.bottom() - STRIP_HEIGHT), stretch.max);
+            painter.rect_filled(strip, 0.0, state_color(theme, state));
         }
     }
 }
