@@ -1,6 +1,12 @@
 //! Panels, the 3D scene and the window: they read a recording at a cursor and push commands.
 
+pub mod app;
 pub mod convergence;
+pub mod desktop;
+pub mod open_dialog;
+pub mod run_window;
+pub mod welcome;
+pub mod window;
 mod events;
 mod follow;
 pub mod headless;

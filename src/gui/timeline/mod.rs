@@ -4,6 +4,8 @@ mod lanes;
 mod model;
 mod transport;
 
+pub(crate) use transport::toggled_loop;
+
 use egui::{Align2, FontFamily, FontId, PointerButton, Rect, Response, Stroke, Ui, pos2, vec2};
 
 use self::lanes::Lane;
