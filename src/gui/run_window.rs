@@ -100,7 +100,8 @@ fn refused(problem: String) -> WindowError {
 fn without_loader_panics<T>(run: impl FnOnce() -> T) -> Result<T, String> {
     const SIGN: &str = "could not be loaded";
     let text = |payload: &(dyn std::any::Any + Send)| {
-        let text = payload.downcast_ref::<String>().map(String::as_str).or(payload.downcast_ref::<&str>().copied());
+        let text =
+            payload.downcast_ref::<String>().map(String::as_str).or_else(|| payload.downcast_ref::<&str>().copied());
         text.unwrap_or_default().to_owned()
     };
     let before = Arc::new(std::panic::take_hook());

@@ -51,7 +51,7 @@ impl Welcome {
                     ];
                     ui.columns(2, |columns| {
                         for (ui, (title, logs, none)) in columns.iter_mut().zip(lists) {
-                            chosen = list_ui(ui, theme, title, logs, none).or(chosen.take());
+                            chosen = list_ui(ui, theme, title, logs, none).or_else(|| chosen.take());
                         }
                     });
                 });

@@ -4,6 +4,7 @@ use egui::{RichText, Ui};
 
 use super::rows_ui;
 use crate::gui::PanelContext;
+use crate::gui::chain_values::true_values;
 use crate::gui::convergence::names::meaning_of;
 use crate::gui::convergence::{Knowledge, knowledge};
 use crate::gui::units::{Shown, fixed};
@@ -33,6 +34,12 @@ pub(super) fn ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, step: &St
     if let Some(begin) = begin {
         rows.push(("at the start".to_owned(), vec![shown.value(*begin, sigma)]));
         rows.push(("moved by".to_owned(), vec![shown.value(value - begin, sigma)]));
+    }
+    let truth = true_values(ctx.recording, run, ctx.cursor_ns).and_then(|truth| truth.get(name).copied());
+    if let Some(truth) = truth {
+        rows.push(("truth".to_owned(), vec![shown.value(truth, sigma)]));
+        let times = fixed((value - truth).abs() / sigma, 1);
+        rows.push(("error".to_owned(), vec![format!("{} ({times}σ)", shown.value(value - truth, sigma))]));
     }
     let state = knowledge(step.rank.as_ref())
         .map_or(Knowledge::Waiting, |known| known.get(name).copied().unwrap_or(Knowledge::Informed));

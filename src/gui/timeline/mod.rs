@@ -49,6 +49,8 @@ impl TimelinePanel {
         if plot.width() < 8.0 || plot.height() < RULER_HEIGHT {
             return;
         }
+        // The lanes take all the room there is, so that the panel around them keeps its height.
+        ui.advance_cursor_after_rect(rect);
         let (begin_ns, end_ns) = visible_range(ctx);
         let area = PlotArea { rect: plot, begin_ns, end_ns, low: 0.0, high: 1.0 };
         let theme = *ctx.theme;

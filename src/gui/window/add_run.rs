@@ -80,7 +80,9 @@ impl AddRunDialog {
         let modal = Modal::new(Id::unique("add run")).frame(dialog_frame(&theme));
         let response = modal.show(ui.ctx(), |ui| {
             ui.set_width(430.0);
-            ui.label(RichText::new("Add a run over the same log and the same tracks").size(15.0).color(theme.text_strong));
+            ui.label(
+                RichText::new("Add a run over the same log and the same tracks").size(15.0).color(theme.text_strong),
+            );
             ui.add_space(4.0);
             self.fields_ui(ui, &theme);
             let written = self.written();

@@ -78,7 +78,8 @@ fn entry_ui(
     let shown = ctx.selection.run == number;
     let text_color = if shown { theme.text_strong } else { theme.text };
     let label = ui.painter().layout_no_wrap(run.spec.label.clone(), egui::FontId::proportional(12.5), text_color);
-    let figure = ui.painter().layout_no_wrap(accuracy.clone().unwrap_or_default(), theme::number_font(), theme.text_weak);
+    let figure =
+        ui.painter().layout_no_wrap(accuracy.clone().unwrap_or_default(), theme::number_font(), theme.text_weak);
     let width = 34.0 + label.size().x + if accuracy.is_some() { 6.0 + figure.size().x } else { 0.0 } + 6.0;
     let (rect, response) = ui.allocate_exact_size(vec2(width, 22.0), Sense::click());
     let name = format!("Run {} {}", run.spec.label, accuracy.clone().unwrap_or_default());

@@ -59,7 +59,8 @@ impl Notices {
             return;
         }
         let mut dismissed = None;
-        let area = Area::new(Id::unique("notices")).order(Order::Foreground).anchor(Align2::RIGHT_TOP, vec2(-12.0, 40.0));
+        let area =
+            Area::new(Id::unique("notices")).order(Order::Foreground).anchor(Align2::RIGHT_TOP, vec2(-12.0, 40.0));
         area.show(ui.ctx(), |ui| {
             for (number, toast) in self.toasts.iter().enumerate() {
                 let (mark, color) = match toast.level {
