@@ -24,6 +24,7 @@ mod sample_calibration;
 mod sample_images;
 #[cfg(test)]
 pub(crate) mod sample_recording;
+pub mod scene;
 #[cfg(test)]
 mod tests;
 pub mod theme;
