@@ -37,6 +37,7 @@ impl Distortion {
 
     pub(super) fn check(&self) -> Result<(), CameraError> {
         match self {
+            Self::None => Ok(()),
             Self::Radtan(coefficients) | Self::Equidistant(coefficients) => {
                 match coefficients.iter().find(|value| !value.is_finite()) {
                     Some(&value) => Err(CameraError::Value {
@@ -52,7 +53,7 @@ impl Distortion {
                 value: *w,
                 expected: "0 to π, both excluded",
             }),
-            Self::None | Self::Fov(_) => Ok(()),
+            Self::Fov(_) => Ok(()),
         }
     }
 

@@ -3,7 +3,6 @@
 //! It takes a [`StepInput`] per image and leaves a [`StepReport`] behind; nobody reaches in between.
 
 pub mod imu_factor;
-pub mod initialization;
 pub mod preintegration;
 mod report;
 #[cfg(test)]

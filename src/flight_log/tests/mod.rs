@@ -2,7 +2,6 @@
 
 mod broken;
 mod messages;
-mod rigs;
 mod streams;
 
 use std::path::{Path, PathBuf};

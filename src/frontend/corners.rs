@@ -1,0 +1,287 @@
+//! Finding corners: Shi and Tomasi's smaller eigenvalue, spread over the image.
+
+use nalgebra::Vector2;
+
+use super::lucas_kanade::smaller_eigenvalue;
+use super::pyramid::cut_out;
+use crate::flight_log::GrayImage;
+
+/// Which corners are taken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CornerOptions {
+    /// No more features than this in an image, old and new together.
+    pub max_features: usize,
+    /// Least distance of a new feature from all others, in pixels.
+    pub min_distance_px: f64,
+    /// No corner is taken nearer to the border of the image, in pixels.
+    pub border_px: usize,
+    /// Smaller eigenvalue of the mean structure tensor below which there is no corner, in (grey levels/px)².
+    pub min_eigenvalue: f64,
+}
+
+impl Default for CornerOptions {
+    fn default() -> Self {
+        Self { max_features: 150, min_distance_px: 25.0, border_px: 8, min_eigenvalue: 2.0 }
+    }
+}
+
+/// Side of the squares that are searched one by one, in pixels.
+const TILE: usize = 32;
+/// The structure tensor is the mean over a square that reaches this far about a pixel.
+const BLOCK_RADIUS: usize = 2;
+const BLOCK: usize = 2 * BLOCK_RADIUS + 1;
+/// Scharr's weights add up to 32, and the mean is over the block.
+const UNIT: f32 = 1.0 / (32.0 * 32.0 * (BLOCK * BLOCK) as f32);
+/// Eigenvalues are needed one pixel beyond the tile, to know whether a pixel of its rim is a maximum.
+const RESPONSES: usize = TILE + 2;
+const GRADIENTS: usize = RESPONSES + 2 * BLOCK_RADIUS;
+const PIXELS: usize = GRADIENTS + 2;
+/// No more corners than this come from one tile.
+const CORNERS_PER_TILE: usize = 3;
+
+type Responses = [[f32; RESPONSES]; RESPONSES];
+
+/// A possible new feature.
+#[derive(Clone, Copy, Debug)]
+struct Candidate {
+    uv_px: Vector2<f64>,
+    response: f32,
+}
+
+/// Finds new corners; holds buffers that live on from image to image.
+#[derive(Clone, Debug, Default)]
+pub struct CornerDetector {
+    candidates: Vec<Candidate>,
+    in_tile: Vec<Candidate>,
+    taken: PointGrid,
+    /// How many features lie in each cell of the image.
+    crowd: Vec<usize>,
+}
+
+impl CornerDetector {
+    /// Adds to `found` corners of `image` until there are `max_features` with the `existing` ones (all in pixels).
+    ///
+    /// The image is divided into about as many cells as there may be features. First every cell that has no feature gets
+    /// its best corner, however weak beside those of other cells, then every cell that has one gets a second, and so on.
+    pub fn detect(
+        &mut self,
+        image: &GrayImage,
+        existing: impl Iterator<Item = Vector2<f64>>,
+        options: &CornerOptions,
+        found: &mut Vec<Vector2<f64>>,
+    ) {
+        found.clear();
+        self.taken.reset(image.width, image.height, options.min_distance_px);
+        let cells = Cells::new(image, options.max_features);
+        self.crowd.clear();
+        self.crowd.resize(cells.columns * cells.rows, 0);
+        let mut count = 0;
+        for uv in existing {
+            self.taken.insert(uv);
+            self.crowd[cells.index(&uv)] += 1;
+            count += 1;
+        }
+        if count >= options.max_features {
+            return;
+        }
+        self.collect(image, options);
+        self.candidates.sort_by(|a, b| b.response.total_cmp(&a.response));
+        let mut round = 0;
+        while count < options.max_features && !self.candidates.is_empty() {
+            let (taken, crowd) = (&mut self.taken, &mut self.crowd);
+            self.candidates.retain(|candidate| {
+                if !taken.is_free(&candidate.uv_px) {
+                    return false;
+                }
+                let crowd = &mut crowd[cells.index(&candidate.uv_px)];
+                if *crowd > round || count >= options.max_features {
+                    return true;
+                }
+                *crowd += 1;
+                count += 1;
+                taken.insert(candidate.uv_px);
+                found.push(candidate.uv_px);
+                false
+            });
+            round += 1;
+        }
+    }
+
+    /// Gathers the best corners of every tile that is not covered by features already.
+    fn collect(&mut self, image: &GrayImage, options: &CornerOptions) {
+        self.candidates.clear();
+        let mut responses = [[0.0; RESPONSES]; RESPONSES];
+        for top in (options.border_px..image.height.saturating_sub(options.border_px)).step_by(TILE) {
+            for left in (options.border_px..image.width.saturating_sub(options.border_px)).step_by(TILE) {
+                let width = TILE.min(image.width - options.border_px - left);
+                let height = TILE.min(image.height - options.border_px - top);
+                if self.is_covered(left, top, width, height) {
+                    continue;
+                }
+                structure_responses(image, left, top, &mut responses);
+                self.in_tile.clear();
+                for y in 0..height {
+                    for x in 0..width {
+                        let response = responses[y + 1][x + 1];
+                        if response >= options.min_eigenvalue as f32 && is_maximum(&responses, x + 1, y + 1) {
+                            let shift = peak_shift(&responses, x + 1, y + 1);
+                            let uv_px = Vector2::new((left + x) as f64, (top + y) as f64) + shift;
+                            if self.taken.is_free(&uv_px) {
+                                self.in_tile.push(Candidate { uv_px, response });
+                            }
+                        }
+                    }
+                }
+                self.in_tile.sort_by(|a, b| b.response.total_cmp(&a.response));
+                let first = self.candidates.len();
+                for candidate in &self.in_tile {
+                    let apart = self.candidates[first..]
+                        .iter()
+                        .all(|other| (other.uv_px - candidate.uv_px).norm() >= options.min_distance_px);
+                    if apart && self.candidates.len() < first + CORNERS_PER_TILE {
+                        self.candidates.push(*candidate);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Whether no corner of a tile could be far enough from the features, as far as a coarse look tells.
+    fn is_covered(&self, left: usize, top: usize, width: usize, height: usize) -> bool {
+        const LOOK: usize = 4;
+        (0..=LOOK).all(|j| {
+            (0..=LOOK).all(|i| {
+                let x = left as f64 + (width - 1) as f64 * i as f64 / LOOK as f64;
+                let y = top as f64 + (height - 1) as f64 * j as f64 / LOOK as f64;
+                !self.taken.is_free(&Vector2::new(x, y))
+            })
+        })
+    }
+}
+
+/// The division of an image into about as many cells as features are wanted.
+#[derive(Clone, Copy)]
+struct Cells {
+    side_px: f64,
+    columns: usize,
+    rows: usize,
+}
+
+impl Cells {
+    fn new(image: &GrayImage, count: usize) -> Self {
+        let side_px = ((image.width * image.height) as f64 / count.max(1) as f64).sqrt().max(1.0);
+        let along = |length: usize| ((length as f64 / side_px).ceil() as usize).max(1);
+        Self { side_px, columns: along(image.width), rows: along(image.height) }
+    }
+
+    fn index(&self, uv_px: &Vector2<f64>) -> usize {
+        let column = ((uv_px.x / self.side_px) as usize).min(self.columns - 1);
+        let row = ((uv_px.y / self.side_px) as usize).min(self.rows - 1);
+        row * self.columns + column
+    }
+}
+
+/// Points in squares of the least distance's side, so that only nine squares are asked whether a place is free.
+#[derive(Clone, Debug, Default)]
+pub(super) struct PointGrid {
+    distance_px: f64,
+    columns: usize,
+    squares: Vec<Vec<Vector2<f64>>>,
+}
+
+impl PointGrid {
+    pub(super) fn reset(&mut self, width: usize, height: usize, distance_px: f64) {
+        self.distance_px = distance_px.max(1.0);
+        self.columns = (width as f64 / self.distance_px) as usize + 3;
+        let rows = (height as f64 / self.distance_px) as usize + 3;
+        self.squares.iter_mut().for_each(Vec::clear);
+        self.squares.resize(self.columns * rows, Vec::new());
+    }
+
+    /// Column and row of a point's square; there is one more all around, so that every square has its eight neighbours.
+    fn square(&self, uv_px: &Vector2<f64>) -> (usize, usize) {
+        let last_row = self.squares.len() / self.columns - 2;
+        let column = (uv_px.x / self.distance_px) as usize + 1;
+        let row = (uv_px.y / self.distance_px) as usize + 1;
+        (column.min(self.columns - 2), row.min(last_row))
+    }
+
+    pub(super) fn insert(&mut self, uv_px: Vector2<f64>) {
+        let (column, row) = self.square(&uv_px);
+        self.squares[row * self.columns + column].push(uv_px);
+    }
+
+    /// Whether no point lies nearer than the least distance.
+    pub(super) fn is_free(&self, uv_px: &Vector2<f64>) -> bool {
+        let (column, row) = self.square(uv_px);
+        (row - 1..=row + 1).all(|row| {
+            self.squares[row * self.columns + column - 1..=row * self.columns + column + 1]
+                .iter()
+                .flatten()
+                .all(|other| (other - uv_px).norm_squared() >= self.distance_px * self.distance_px)
+        })
+    }
+}
+
+fn is_maximum(responses: &Responses, x: usize, y: usize) -> bool {
+    let here = responses[y][x];
+    // Of equal neighbours the first one counts.
+    let before = [(x - 1, y - 1), (x, y - 1), (x + 1, y - 1), (x - 1, y)];
+    let after = [(x + 1, y), (x - 1, y + 1), (x, y + 1), (x + 1, y + 1)];
+    before.into_iter().all(|(i, j)| here > responses[j][i]) && after.into_iter().all(|(i, j)| here >= responses[j][i])
+}
+
+/// From a maximum to the top of the parabolas through it and its neighbours, in pixels.
+fn peak_shift(responses: &Responses, x: usize, y: usize) -> Vector2<f64> {
+    let top = |before: f32, here: f32, after: f32| {
+        let curvature = before - 2.0 * here + after;
+        if curvature < 0.0 { f64::from(0.5 * (before - after) / curvature).clamp(-0.5, 0.5) } else { 0.0 }
+    };
+    let here = responses[y][x];
+    Vector2::new(
+        top(responses[y][x - 1], here, responses[y][x + 1]),
+        top(responses[y - 1][x], here, responses[y + 1][x]),
+    )
+}
+
+/// The smaller eigenvalue of the mean structure tensor at every pixel of the tile at `(left, top)` and one around it.
+#[expect(clippy::large_stack_arrays, reason = "18 KiB that stay in the nearest cache")]
+fn structure_responses(image: &GrayImage, left: usize, top: usize, responses: &mut Responses) {
+    let reach = (BLOCK_RADIUS + 2) as i32;
+    let mut pixels = [0.0_f32; PIXELS * PIXELS];
+    cut_out(image, [left as i32 - reach, top as i32 - reach], PIXELS, &mut pixels, f32::from);
+    let (pixels, _) = pixels.as_chunks::<PIXELS>();
+    let mut products = [[[0.0_f32; GRADIENTS]; GRADIENTS]; 3];
+    for y in 0..GRADIENTS {
+        let (above, here, below) = (&pixels[y], &pixels[y + 1], &pixels[y + 2]);
+        for x in 0..GRADIENTS {
+            // Scharr's derivative.
+            let along = 3.0 * (above[x + 2] - above[x] + below[x + 2] - below[x]) + 10.0 * (here[x + 2] - here[x]);
+            let down = 3.0 * (below[x] - above[x] + below[x + 2] - above[x + 2]) + 10.0 * (below[x + 1] - above[x + 1]);
+            products[0][y][x] = along * along;
+            products[1][y][x] = along * down;
+            products[2][y][x] = down * down;
+        }
+    }
+    let mut sums = [[[0.0_f32; RESPONSES]; RESPONSES]; 3];
+    for (product, sums) in products.iter().zip(&mut sums) {
+        for y in 0..RESPONSES {
+            let mut column_sums = [0.0_f32; GRADIENTS];
+            for line in &product[y..y + BLOCK] {
+                for x in 0..GRADIENTS {
+                    column_sums[x] += line[x];
+                }
+            }
+            for offset in 0..BLOCK {
+                for x in 0..RESPONSES {
+                    sums[y][x] += column_sums[x + offset] * UNIT;
+                }
+            }
+        }
+    }
+    for y in 0..RESPONSES {
+        for x in 0..RESPONSES {
+            responses[y][x] = smaller_eigenvalue([sums[0][y][x], sums[1][y][x], sums[2][y][x]]);
+        }
+    }
+}

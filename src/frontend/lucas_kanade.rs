@@ -1,0 +1,453 @@
+//! Following points from one image to the next: pyramidal Lucas–Kanade.
+
+use nalgebra::Vector2;
+
+use super::pyramid::{Pyramid, cut_out};
+use crate::flight_log::GrayImage;
+
+/// Side of the tracked square in pixels, on every level.
+const WINDOW: usize = 21;
+/// Its columns rounded up to whole vector registers; the surplus ones weigh nothing.
+const LANES: usize = 24;
+/// From the first column or row of the window to its centre.
+const CENTRE: f32 = (WINDOW / 2) as f32;
+/// Elements from one row to the next, of the weights and of what is cut out of the second image: with one stride for both,
+/// a sum over the window is a single loop.
+const STRIDE: usize = 32;
+/// Rows of what is cut out of the second image, so that the window can move within it.
+const SEARCH_HEIGHT: usize = 34;
+/// Largest first column and row of a window of which also the neighbours one and two further fit in.
+const LAST_COLUMN: i32 = (STRIDE - WINDOW - 2) as i32;
+const LAST_ROW: i32 = (SEARCH_HEIGHT - WINDOW - 3) as i32;
+/// Largest weight; times 128 grey levels times the window's area it still fits into an `i32`.
+const LARGEST_WEIGHT: f32 = 16383.0;
+
+/// What is cut out of the second image, row by row, grey levels less 128.
+type Search = [i16; STRIDE * SEARCH_HEIGHT];
+type Weights = [i16; STRIDE * WINDOW];
+
+/// How points are followed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LucasKanadeOptions {
+    /// Levels of the pyramid, the image itself included.
+    pub levels: usize,
+    /// The search ends when a step gets shorter than this on the level at hand, in pixels.
+    pub epsilon_px: f64,
+    /// The search fails after this many moves to another pixel on one level.
+    pub max_moves: usize,
+    /// Smaller eigenvalue of the mean structure tensor below which a window has no texture, in (grey levels/px)².
+    pub min_eigenvalue: f64,
+    /// Least share of the window that both images must show.
+    pub min_visible: f64,
+    /// A point is lost when, followed back, it comes out further than this from where it was, in pixels; `None` for no check.
+    pub forward_backward_px: Option<f64>,
+}
+
+impl Default for LucasKanadeOptions {
+    fn default() -> Self {
+        Self {
+            levels: 4,
+            epsilon_px: 0.01,
+            max_moves: 12,
+            min_eigenvalue: 0.05,
+            min_visible: 0.25,
+            forward_backward_px: Some(0.5),
+        }
+    }
+}
+
+/// What of the first image is compared with the second: the gradient of the window, freed of what brightness and contrast
+/// can do.
+///
+/// With `T` the window of the first image, `g` its gradient and `J` the second image, the shift `d` is sought for which
+/// `Σ g'·J(x + d) = 0`, where `g'` is `g` less its projection on `1` and `T`.
+/// That is the least-squares solution for `d`, a gain and an offset at once, the latter two eliminated, and `Σ g'·T = 0`.
+/// As `J(x + d)` is interpolated, the sum is a polynomial in the fraction of `d` whose coefficients are sums
+/// over whole pixels: iterations within one pixel cost nothing, and the sums are exact in integers.
+struct Template {
+    x: Weights,
+    y: Weights,
+    /// `Σ g'·gᵀ` as `xx, xy, yy`, in the unit of the weights times grey levels per pixel.
+    hessian: [f32; 3],
+}
+
+impl Template {
+    const EMPTY: Self = Self { x: [0; STRIDE * WINDOW], y: [0; STRIDE * WINDOW], hessian: [0.0; 3] };
+}
+
+/// A symmetric 2 × 2 matrix `[xx, xy, yy]` has this smaller eigenvalue.
+pub(super) fn smaller_eigenvalue([xx, xy, yy]: [f32; 3]) -> f32 {
+    0.5 * (xx + yy) - length([0.5 * (xx - yy), xy])
+}
+
+/// Length of a vector.
+#[expect(clippy::imprecise_flops, reason = "`hypot` is a call into the C library, this a vector instruction")]
+fn length([x, y]: [f32; 2]) -> f32 {
+    (x * x + y * y).sqrt()
+}
+
+/// Weights of the four pixels about a point that lies `t` after the second one, by Keys' cubic convolution.
+fn cubic_weights(t: f32) -> [f32; 4] {
+    [
+        ((2.0 - t) * t - 1.0) * t * 0.5,
+        ((3.0 * t - 5.0) * t * t + 2.0) * 0.5,
+        ((4.0 - 3.0 * t) * t + 1.0) * t * 0.5,
+        (t - 1.0) * t * t * 0.5,
+    ]
+}
+
+/// Derivative of [`cubic_weights`] by `t`.
+fn cubic_slopes(t: f32) -> [f32; 4] {
+    [
+        ((4.0 - 3.0 * t) * t - 1.0) * 0.5,
+        (9.0 * t - 10.0) * t * 0.5,
+        ((8.0 - 9.0 * t) * t + 1.0) * 0.5,
+        (3.0 * t - 2.0) * t * 0.5,
+    ]
+}
+
+fn linear_weights(t: f32) -> [f32; 2] {
+    [1.0 - t, t]
+}
+
+/// First and last column (or row) of a window about `centre` that shows pixels `margin` inside an image of `count`.
+fn visible(centre: f32, count: usize, margin: f32) -> (f32, f32) {
+    let first = (CENTRE - centre + margin).max(0.0).ceil();
+    let last = (CENTRE - centre + count as f32 - 1.0 - margin).min(WINDOW as f32 - 1.0).floor();
+    (first, last)
+}
+
+const PATCH_WIDTH: usize = LANES + 2;
+const PATCH_HEIGHT: usize = WINDOW + 2;
+
+impl Template {
+    /// Becomes the window of `image` about `at`, without what lies outside it or would lie outside when moved to `guess`.
+    /// Returns whether there is enough of it to be found again.
+    fn fill(&mut self, image: &GrayImage, at: [f32; 2], guess: [f32; 2], options: &LucasKanadeOptions) -> bool {
+        let columns = [visible(at[0], image.width, 1.0), visible(guess[0], image.width, 0.0)];
+        let rows = [visible(at[1], image.height, 1.0), visible(guess[1], image.height, 0.0)];
+        let (first_column, last_column) = (columns[0].0.max(columns[1].0), columns[0].1.min(columns[1].1));
+        let (first_row, last_row) = (rows[0].0.max(rows[1].0), rows[0].1.min(rows[1].1));
+        let area = (last_column - first_column + 1.0).max(0.0) * (last_row - first_row + 1.0).max(0.0);
+        if area < options.min_visible as f32 * (WINDOW * WINDOW) as f32 {
+            return false;
+        }
+        let mut patch = [[0.0; PATCH_WIDTH]; PATCH_HEIGHT];
+        interpolate(image, at, &mut patch);
+        let rows = first_row as usize..last_row as usize + 1;
+        let mut mask = [0.0; LANES];
+        mask[first_column as usize..=last_column as usize].fill(1.0);
+
+        let mut gradient = [[[0.0_f32; LANES]; 2]; WINDOW];
+        // Sums over the window of T, T², g and g·T, lane by lane.
+        let mut sums = [[0.0_f32; LANES]; 6];
+        for row in rows.clone() {
+            let (above, here, below) = (&patch[row], &patch[row + 1], &patch[row + 2]);
+            let [along_x, along_y] = &mut gradient[row];
+            for c in 0..LANES {
+                // Scharr's derivative.
+                let x = 3.0 * (above[c + 2] - above[c] + below[c + 2] - below[c]) + 10.0 * (here[c + 2] - here[c]);
+                let y =
+                    3.0 * (below[c] - above[c] + below[c + 2] - above[c + 2]) + 10.0 * (below[c + 1] - above[c + 1]);
+                let value = here[c + 1] * mask[c];
+                along_x[c] = x * mask[c] * (1.0 / 32.0);
+                along_y[c] = y * mask[c] * (1.0 / 32.0);
+                sums[0][c] += value;
+                sums[1][c] += value * value;
+                sums[2][c] += along_x[c];
+                sums[3][c] += along_y[c];
+                sums[4][c] += along_x[c] * value;
+                sums[5][c] += along_y[c] * value;
+            }
+        }
+        let [value, square, x, y, x_value, y_value] = sums.map(|lanes| lanes.iter().sum::<f32>() / area);
+        let variance = square - value * value;
+        // A flat window has no contrast to speak of.
+        let scale = if variance > 1e-3 { 1.0 / variance } else { 0.0 };
+        let slope_x = (x_value - x * value) * scale;
+        let slope_y = (y_value - y * value) * scale;
+        let (offset_x, offset_y) = (x - slope_x * value, y - slope_y * value);
+        let mut products = [[0.0_f32; LANES]; 3];
+        let mut largest = [0.0_f32; LANES];
+        for row in rows {
+            let here = &patch[row + 1];
+            let [along_x, along_y] = &mut gradient[row];
+            for c in 0..LANES {
+                along_x[c] -= (offset_x + slope_x * here[c + 1]) * mask[c];
+                along_y[c] -= (offset_y + slope_y * here[c + 1]) * mask[c];
+                products[0][c] += along_x[c] * along_x[c];
+                products[1][c] += along_x[c] * along_y[c];
+                products[2][c] += along_y[c] * along_y[c];
+                let larger = if along_x[c].abs() > along_y[c].abs() { along_x[c].abs() } else { along_y[c].abs() };
+                largest[c] = if larger > largest[c] { larger } else { largest[c] };
+            }
+        }
+        let hessian = products.map(|lanes| lanes.iter().sum());
+        if smaller_eigenvalue(hessian) <= options.min_eigenvalue as f32 * area {
+            return false;
+        }
+        let unit = LARGEST_WEIGHT / largest.iter().fold(0.0, |most: f32, value| most.max(*value));
+        self.hessian = hessian.map(|sum| unit * sum);
+        for (weights, axis) in [(&mut self.x, 0), (&mut self.y, 1)] {
+            for (line, gradient) in weights.as_chunks_mut::<STRIDE>().0.iter_mut().zip(&gradient) {
+                for c in 0..LANES {
+                    line[c] = rounded(unit * gradient[axis][c]);
+                }
+            }
+        }
+        true
+    }
+
+    /// Adds up `Σ g'·J` for the window whose first pixel is `(column, row)` of `search` and its neighbours to the right,
+    /// below and both; `[dy][dx]` holds the sums with the x and the y part of `g'`.
+    fn correlate(&self, search: &Search, column: usize, row: usize) -> [[[f32; 2]; 2]; 2] {
+        const LENGTH: usize = STRIDE * WINDOW;
+        let shifted = |offset: usize| -> &[i16; LENGTH] {
+            search[row * STRIDE + column + offset..].first_chunk().expect("callers keep within the search")
+        };
+        let sums = |offset| {
+            let pixels = shifted(offset);
+            [dot(&self.x, pixels) as f32, dot(&self.y, pixels) as f32]
+        };
+        [[sums(0), sums(1)], [sums(STRIDE), sums(STRIDE + 1)]]
+    }
+}
+
+/// A sum of products.
+///
+/// A function of its own over eight partial sums: in this form the compiler multiplies and adds eight pairs at a time.
+#[inline(never)]
+fn dot(weights: &Weights, pixels: &Weights) -> i32 {
+    let mut sums = [0_i32; 8];
+    for (weights, pixels) in weights.as_chunks::<8>().0.iter().zip(pixels.as_chunks::<8>().0) {
+        for lane in 0..8 {
+            sums[lane] += i32::from(weights[lane]) * i32::from(pixels[lane]);
+        }
+    }
+    sums.iter().sum()
+}
+
+/// The nearest integer of a value far below 2²²: adding 1.5·2²³ leaves it in the low bits, where vector units reach it
+/// faster than through a checked conversion.
+fn rounded(value: f32) -> i16 {
+    (value + 12_582_912.0).to_bits() as i16
+}
+
+/// The largest integer not above `value`, which must fit into an `i32`.
+fn floor(value: f32) -> i32 {
+    let towards_zero = value as i32;
+    towards_zero - i32::from(towards_zero as f32 > value)
+}
+
+/// The pixels about `at` by cubic convolution, one more on every side than the window.
+fn interpolate(image: &GrayImage, at: [f32; 2], patch: &mut [[f32; PATCH_WIDTH]; PATCH_HEIGHT]) {
+    let corner = at.map(floor);
+    let reach = (WINDOW / 2 + 2) as i32;
+    let mut pixels = [0.0_f32; (PATCH_WIDTH + 4) * (PATCH_HEIGHT + 3)];
+    cut_out(image, [corner[0] - reach, corner[1] - reach], PATCH_WIDTH + 4, &mut pixels, f32::from);
+    let (pixels, _) = pixels.as_chunks::<{ PATCH_WIDTH + 4 }>();
+    let (along, down) = (cubic_weights(at[0] - corner[0] as f32), cubic_weights(at[1] - corner[1] as f32));
+    for (y, line) in patch.iter_mut().enumerate() {
+        let mut column_sums = [0.0; PATCH_WIDTH + 4];
+        for (x, sum) in column_sums.iter_mut().enumerate() {
+            *sum = down[0] * pixels[y][x]
+                + down[1] * pixels[y + 1][x]
+                + down[2] * pixels[y + 2][x]
+                + down[3] * pixels[y + 3][x];
+        }
+        for (x, value) in line.iter_mut().enumerate() {
+            *value = along[0] * column_sums[x]
+                + along[1] * column_sums[x + 1]
+                + along[2] * column_sums[x + 2]
+                + along[3] * column_sums[x + 3];
+        }
+    }
+}
+
+/// The value of `Σ g'·J(x + d)` and its derivative by `d`, from its coefficients and the weights of the fraction of `d`.
+fn balance<const N: usize>(
+    sums: &[[[f32; 2]; N]; N],
+    along: ([f32; N], [f32; N]),
+    down: ([f32; N], [f32; N]),
+) -> ([f32; 2], [[f32; 2]; 2]) {
+    let (mut value, mut slope) = ([0.0; 2], [[0.0; 2]; 2]);
+    for (j, line) in sums.iter().enumerate() {
+        for (i, point) in line.iter().enumerate() {
+            for k in 0..2 {
+                value[k] += down.0[j] * along.0[i] * point[k];
+                slope[k][0] += down.0[j] * along.1[i] * point[k];
+                slope[k][1] += down.1[j] * along.0[i] * point[k];
+            }
+        }
+    }
+    (value, slope)
+}
+
+/// The step that brings `value` to zero: Newton's, or where that cannot be trusted the Gauss–Newton one.
+fn step_to_balance(value: [f32; 2], slope: [[f32; 2]; 2], [xx, xy, yy]: [f32; 3]) -> [f32; 2] {
+    let determinant = xx * yy - xy * xy;
+    let newton = slope[0][0] * slope[1][1] - slope[0][1] * slope[1][0];
+    let sound = slope[0][0] > 0.3 * xx && slope[1][1] > 0.3 * yy && newton > 0.1 * determinant;
+    let ([[a, b], [c, d]], determinant) = if sound { (slope, newton) } else { ([[xx, xy], [xy, yy]], determinant) };
+    [-(d * value[0] - b * value[1]) / determinant, -(a * value[1] - c * value[0]) / determinant]
+}
+
+/// How far a fraction may leave its pixel before the sums are taken anew; keeps a point on the border from going to and fro.
+const OVERHANG_PX: f32 = 0.02;
+/// Iterations within one pixel; more would only circle.
+const MAX_ITERATIONS: usize = 8;
+/// Longest single step in pixels of the level at hand.
+const LONGEST_STEP_PX: f32 = 6.0;
+
+/// The weights of `N` pixels at a fraction, and their derivatives by it.
+type Taps<const N: usize> = (fn(f32) -> [f32; N], fn(f32) -> [f32; N]);
+
+/// Iterates within one pixel; returns the fraction of `d` and whether the last step was shorter than `epsilon`.
+fn settle<const N: usize>(
+    sums: &[[[f32; 2]; N]; N],
+    kernel: Taps<N>,
+    mut fraction: [f32; 2],
+    hessian: [f32; 3],
+    epsilon: f32,
+) -> ([f32; 2], bool) {
+    for _ in 0..MAX_ITERATIONS {
+        let [along, down] = fraction.map(|t| (kernel.0(t), kernel.1(t)));
+        let (value, slope) = balance(sums, along, down);
+        let [x, y] = step_to_balance(value, slope, hessian);
+        let length = length([x, y]);
+        let shrink = if length > LONGEST_STEP_PX { LONGEST_STEP_PX / length } else { 1.0 };
+        fraction = [fraction[0] + shrink * x, fraction[1] + shrink * y];
+        if length < epsilon {
+            return (fraction, true);
+        }
+        if fraction.iter().any(|t| !(-OVERHANG_PX..=1.0 + OVERHANG_PX).contains(t)) {
+            return (fraction, false);
+        }
+    }
+    (fraction, true)
+}
+
+/// How the second image is interpolated.
+#[derive(Clone, Copy, PartialEq)]
+enum Kernel {
+    /// Between two pixels.
+    Linear,
+    /// Between four: exact enough for the last step.
+    Cubic,
+}
+
+/// Whether a place is finite and so near that it has whole pixels.
+fn is_sane(at: [f32; 2]) -> bool {
+    at.iter().all(|t| t.abs() < 1e5)
+}
+
+/// Moves `at` until the window of `image` about it balances the template; `None` when it does not come to rest.
+fn seek(
+    template: &Template,
+    image: &GrayImage,
+    mut at: [f32; 2],
+    kernel: Kernel,
+    options: &LucasKanadeOptions,
+) -> Option<[f32; 2]> {
+    let mut search: Search = [0; STRIDE * SEARCH_HEIGHT];
+    // The first pixel of what was cut out.
+    let mut origin: Option<[i32; 2]> = None;
+    let epsilon = options.epsilon_px as f32;
+    for _ in 0..options.max_moves {
+        if !is_sane(at) {
+            return None;
+        }
+        let first = at.map(|t| floor(t - CENTRE));
+        let cell = first.map(|t| t as f32);
+        let fits = |[left, top]: [i32; 2]| {
+            (1..=LAST_COLUMN).contains(&(first[0] - left)) && (1..=LAST_ROW).contains(&(first[1] - top))
+        };
+        let [left, top] = origin.filter(|corner| fits(*corner)).unwrap_or_else(|| {
+            let corner = [first[0] - LAST_COLUMN / 2, first[1] - LAST_ROW / 2];
+            cut_out(image, corner, STRIDE, &mut search, |pixel| i16::from(pixel) - 128);
+            corner
+        });
+        origin = Some([left, top]);
+        let (column, row) = ((first[0] - left) as usize, (first[1] - top) as usize);
+        let fraction = [at[0] - CENTRE - cell[0], at[1] - CENTRE - cell[1]];
+        let (fraction, rests) = match kernel {
+            Kernel::Linear => {
+                let sums = template.correlate(&search, column, row);
+                settle(&sums, (linear_weights, |_| [-1.0, 1.0]), fraction, template.hessian, epsilon)
+            }
+            Kernel::Cubic => {
+                let mut sums = [[[0.0; 2]; 4]; 4];
+                for (j, i) in [(0, 0), (0, 2), (2, 0), (2, 2)] {
+                    let block = template.correlate(&search, column + i - 1, row + j - 1);
+                    for (dj, line) in block.iter().enumerate() {
+                        sums[j + dj][i..i + 2].copy_from_slice(line);
+                    }
+                }
+                settle(&sums, (cubic_weights, cubic_slopes), fraction, template.hessian, 0.1 * epsilon)
+            }
+        };
+        at = [cell[0] + fraction[0] + CENTRE, cell[1] + fraction[1] + CENTRE];
+        if rests {
+            return Some(at);
+        }
+    }
+    None
+}
+
+/// Follows one point from one image to the next by pyramidal Lucas–Kanade with compensation of gain and offset.
+///
+/// `from_px` is its place in `previous`, `guess_px` where it is looked for in `now`; both in pixels of the image.
+/// Returns where it is, or `None` when it left the image, has no texture, or does not come back (see
+/// [`LucasKanadeOptions::forward_backward_px`]).
+pub fn track(
+    previous: &Pyramid,
+    now: &Pyramid,
+    from_px: &Vector2<f64>,
+    guess_px: &Vector2<f64>,
+    options: &LucasKanadeOptions,
+) -> Option<Vector2<f64>> {
+    let from = [from_px.x as f32, from_px.y as f32];
+    let mut guess = [guess_px.x as f32, guess_px.y as f32];
+    if !is_sane(from) || !is_sane(guess) {
+        return None;
+    }
+    let mut template = Template::EMPTY;
+    let levels = previous.levels().len().min(now.levels().len()).min(options.levels);
+    for level in (1..levels).rev() {
+        let scale = (0.5_f32).powi(level as i32);
+        let start = guess.map(|t| t * scale);
+        if template.fill(&previous.levels()[level], from.map(|t| t * scale), start, options)
+            && let Some(found) = seek(&template, &now.levels()[level], start, Kernel::Linear, options)
+        {
+            guess = found.map(|t| t / scale);
+        }
+    }
+    let found = track_on_image(&mut template, previous.levels().first()?, now.levels().first()?, from, guess, options)?;
+    if let Some(limit_px) = options.forward_backward_px {
+        let back =
+            track_on_image(&mut template, now.levels().first()?, previous.levels().first()?, found, from, options)?;
+        if length([back[0] - from[0], back[1] - from[1]]) > limit_px as f32 {
+            return None;
+        }
+    }
+    Some(Vector2::new(f64::from(found[0]), f64::from(found[1])))
+}
+
+/// The last stage of [`track`], on the image itself.
+fn track_on_image(
+    template: &mut Template,
+    previous: &GrayImage,
+    now: &GrayImage,
+    from: [f32; 2],
+    guess: [f32; 2],
+    options: &LucasKanadeOptions,
+) -> Option<[f32; 2]> {
+    if !template.fill(previous, from, guess, options) {
+        return None;
+    }
+    let near = seek(template, now, guess, Kernel::Linear, options)?;
+    let found = seek(template, now, near, Kernel::Cubic, options)?;
+    let inside =
+        found[0] >= 0.0 && found[1] >= 0.0 && found[0] <= (now.width - 1) as f32 && found[1] <= (now.height - 1) as f32;
+    inside.then_some(found)
+}

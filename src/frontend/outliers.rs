@@ -1,0 +1,387 @@
+//! Telling features that move with the scene from those that do not, by the epipolar geometry of two images.
+//!
+//! A predicted rotation helps but is not trusted: a gyroscope has a bias, a gimbal's chain may be off by degrees.
+//! The rotation is refined from the tracks themselves, together with the direction of the translation.
+
+use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
+
+use crate::geometry::so3;
+
+/// How outliers are told.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OutlierOptions {
+    /// Largest distance of an inlier from its epipolar line, in pixels at the image centre.
+    pub threshold_px: f64,
+    /// Random pairs of features whose direction of translation is tried, per stage and start.
+    pub hypotheses: usize,
+    /// With fewer tracks than this none is rejected: too few to say which of them are right.
+    pub min_tracks: usize,
+    /// When less than this share would stay, the geometry was not understood and none is rejected.
+    pub min_inlier_share: f64,
+    /// How far the predicted rotation may be off (one sigma), in radians.
+    pub rotation_sigma_rad: f64,
+    /// Seed of the random pairs; the same for every image.
+    pub seed: u64,
+}
+
+impl Default for OutlierOptions {
+    fn default() -> Self {
+        Self {
+            threshold_px: 1.5,
+            hypotheses: 24,
+            min_tracks: 8,
+            min_inlier_share: 0.4,
+            rotation_sigma_rad: 0.05,
+            seed: 0x5eed,
+        }
+    }
+}
+
+/// What the tracks of two images say about the motion between them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Motion {
+    /// Rotation `camera_now_from_camera_previous`, refined from the tracks.
+    pub rotation: UnitQuaternion<f64>,
+    /// Unit direction of the translation of points from the previous camera frame to this one, where there is parallax.
+    pub direction: Option<Vector3<f64>>,
+    /// Whether each track moves with the scene.
+    pub is_inlier: Vec<bool>,
+}
+
+/// A direction seen in both images, unit lengths.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BearingPair {
+    /// In the previous camera frame.
+    pub previous: Vector3<f64>,
+    /// In the camera frame of now.
+    pub now: Vector3<f64>,
+}
+
+/// A rotation with a direction of translation, and how badly they fit.
+#[derive(Clone, Copy)]
+struct Hypothesis {
+    rotation: UnitQuaternion<f64>,
+    direction: Vector3<f64>,
+    cost: f64,
+}
+
+/// Finds the motion of the scene and the tracks that obey it.
+///
+/// `predicted` is `camera_now_from_camera_previous`; `focal_px` turns angles into pixels.
+pub fn judge(
+    pairs: &[BearingPair],
+    predicted: Option<&UnitQuaternion<f64>>,
+    focal_px: f64,
+    options: &OutlierOptions,
+) -> Motion {
+    let start = predicted.copied().unwrap_or_else(UnitQuaternion::identity);
+    let rotation = fit_rotation(pairs, &start, options.threshold_px / focal_px);
+    let threshold = options.threshold_px / focal_px;
+    if pairs.len() < options.min_tracks {
+        return Motion { rotation, direction: None, is_inlier: vec![true; pairs.len()] };
+    }
+    let mut search = Search { pairs, predicted, options, dice: Dice(options.seed.max(1)), drawn: Vec::new() };
+    let epipolar = search.run(&start, &rotation, threshold);
+    let (rotation, direction) = choose_model(pairs, rotation, epipolar.as_ref(), threshold);
+    let is_inlier: Vec<bool> = match &direction {
+        Some(direction) => {
+            pairs.iter().map(|pair| epipolar_distance(pair, &rotation, direction) <= threshold).collect()
+        }
+        None => pairs.iter().map(|pair| (pair.now - rotation * pair.previous).norm() <= threshold).collect(),
+    };
+    let share = is_inlier.iter().filter(|inlier| **inlier).count() as f64 / pairs.len() as f64;
+    if share < options.min_inlier_share {
+        return Motion { rotation, direction: None, is_inlier: vec![true; pairs.len()] };
+    }
+    Motion { rotation, direction, is_inlier }
+}
+
+/// Share of the tracks that a rotation alone does not explain which a direction of translation must explain to count.
+const MIN_SHARE_EXPLAINED: f64 = 0.5;
+/// With fewer such tracks a direction could be drawn through any of them.
+const MIN_MOVING_TRACKS: usize = 6;
+
+/// Decides between pure rotation and a motion with parallax.
+///
+/// Without parallax any direction fits, and one that is drawn through two wrong tracks makes them look right.
+/// So a direction counts when it explains most of what the rotation alone leaves over.
+fn choose_model(
+    pairs: &[BearingPair],
+    rotation: UnitQuaternion<f64>,
+    epipolar: Option<&Hypothesis>,
+    threshold: f64,
+) -> (UnitQuaternion<f64>, Option<Vector3<f64>>) {
+    let Some(epipolar) = epipolar else { return (rotation, None) };
+    let moving = pairs.iter().filter(|pair| (pair.now - rotation * pair.previous).norm() > threshold);
+    let (mut left_over, mut explained) = (0, 0);
+    for pair in moving {
+        left_over += 1;
+        explained += usize::from(epipolar_distance(pair, &epipolar.rotation, &epipolar.direction) <= threshold);
+    }
+    let counts = left_over >= MIN_MOVING_TRACKS && explained as f64 >= MIN_SHARE_EXPLAINED * left_over as f64;
+    if counts { (epipolar.rotation, Some(epipolar.direction)) } else { (rotation, None) }
+}
+
+/// Distance of a pair from the epipolar geometry as an angle, to first order (Sampson's), in radians.
+///
+/// A point before both cameras moves towards `direction`; one that moves the other way is as far off as it moved.
+fn epipolar_distance(pair: &BearingPair, rotation: &UnitQuaternion<f64>, direction: &Vector3<f64>) -> f64 {
+    let turned = rotation * pair.previous;
+    let normal = direction.cross(&turned);
+    let other_normal = pair.now.cross(direction);
+    let gap = pair.now.dot(&normal);
+    let scale = normal.norm_squared() + other_normal.norm_squared() - 2.0 * gap * gap;
+    let sampson = if scale > 1e-12 { gap.abs() / scale.sqrt() } else { 0.0 };
+    let along = (direction - turned * turned.dot(direction)).dot(&(pair.now - turned)) / normal.norm().max(1e-6);
+    sampson.max(-along)
+}
+
+/// Angles on which a fit of the rotation is repeated until it rests.
+const ROTATION_ITERATIONS: usize = 12;
+
+/// The rotation that most of the pairs obey best, whatever the rest does, from a start that may be off.
+///
+/// Weights fall with the fourth power of the residual over a scale, which shrinks with the residuals' median to `floor`.
+pub fn fit_rotation(pairs: &[BearingPair], start: &UnitQuaternion<f64>, floor: f64) -> UnitQuaternion<f64> {
+    let mut rotation = *start;
+    let mut lengths: Vec<f64> = Vec::with_capacity(pairs.len());
+    for _ in 0..ROTATION_ITERATIONS {
+        lengths.clear();
+        lengths.extend(pairs.iter().map(|pair| (pair.now - rotation * pair.previous).norm()));
+        lengths.sort_by(f64::total_cmp);
+        let Some(median) = lengths.get(lengths.len() / 2) else { return rotation };
+        let scale = (2.0 * median).max(floor);
+        let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
+        for pair in pairs {
+            let turned = rotation * pair.previous;
+            let ratio = (pair.now - turned).norm_squared() / (scale * scale);
+            let weight = 1.0 / ((1.0 + ratio) * (1.0 + ratio));
+            normal += weight * (Matrix3::identity() - turned * turned.transpose());
+            right += weight * turned.cross(&pair.now);
+        }
+        // A few bearings close together say nothing about the turn about their middle; it then stays as it started.
+        normal += Matrix3::identity() * (1e-6 * normal.trace() + f64::MIN_POSITIVE);
+        let Some(step) = normal.cholesky().map(|factor| factor.solve(&right)) else { return rotation };
+        rotation = UnitQuaternion::new_normalize((so3::exp(&step) * rotation).into_inner());
+        if step.norm() < 1e-7 {
+            break;
+        }
+    }
+    rotation
+}
+
+/// The scales over which the search narrows down, in thresholds.
+const STAGES: [f64; 3] = [6.0, 2.0, 1.0];
+/// Steps of the refinement after each stage.
+const REFINEMENTS: usize = 6;
+
+/// With a larger share of outliers than this the search starts again with more freedom.
+const WORTH_A_SECOND_LOOK: f64 = 0.3;
+/// Random fives of tracks tried then, and Gauss–Newton steps for each.
+const FULL_HYPOTHESES: usize = 60;
+const MINIMAL_ITERATIONS: usize = 5;
+
+/// The search for a rotation and a direction of translation.
+struct Search<'a> {
+    pairs: &'a [BearingPair],
+    predicted: Option<&'a UnitQuaternion<f64>>,
+    options: &'a OutlierOptions,
+    dice: Dice,
+    /// Normals of the epipolar planes if there were no more than the rotation at hand.
+    drawn: Vec<Vector3<f64>>,
+}
+
+impl Search<'_> {
+    /// The best hypothesis from either start, `None` when there is no parallax at all to draw a direction from.
+    fn run(
+        &mut self,
+        predicted: &UnitQuaternion<f64>,
+        fitted: &UnitQuaternion<f64>,
+        threshold: f64,
+    ) -> Option<Hypothesis> {
+        let mut best: Option<Hypothesis> = None;
+        for rotation in [predicted, fitted] {
+            let found = self.descend(rotation, threshold);
+            if let Some(found) = found
+                && best.is_none_or(|best| found.cost < best.cost)
+            {
+                best = Some(found);
+            }
+        }
+        let outlier_share = |best: &Hypothesis| best.cost / self.pairs.len() as f64;
+        if best.as_ref().is_none_or(|best| outlier_share(best) > WORTH_A_SECOND_LOOK)
+            && let Some(found) = self.draw_with_rotation(fitted, threshold)
+            && best.is_none_or(|best| found.cost < best.cost)
+        {
+            best = Some(found);
+        }
+        best
+    }
+
+    /// The best of many motions through five random tracks each, for when no start was near enough.
+    fn draw_with_rotation(&mut self, rotation: &UnitQuaternion<f64>, threshold: f64) -> Option<Hypothesis> {
+        let mut best: Option<Hypothesis> = None;
+        for _ in 0..FULL_HYPOTHESES {
+            let sample: [BearingPair; 5] = std::array::from_fn(|_| self.pairs[self.dice.below(self.pairs.len())]);
+            let normals = [0, 1].map(|k: usize| (rotation * sample[k].previous).cross(&sample[k].now));
+            let Some(direction) = normals[0].cross(&normals[1]).try_normalize(1e-14) else { continue };
+            let mut trial = Hypothesis { rotation: *rotation, direction, cost: f64::INFINITY };
+            for _ in 0..MINIMAL_ITERATIONS {
+                // Hardly any damping and a scale so large that every one of the five counts.
+                let Some(step) = step_towards(&sample, &trial, 1.0, 1e-9, &Vector3::zeros()) else { break };
+                (trial.rotation, trial.direction) = step;
+            }
+            for direction in [trial.direction, -trial.direction] {
+                let cost = self.cost(&trial.rotation, &direction, threshold);
+                if best.is_none_or(|best| cost < best.cost) {
+                    best = Some(Hypothesis { direction, cost, ..trial });
+                }
+            }
+        }
+        best.map(|best| self.settle(best, threshold))
+    }
+
+    /// The best of a few steps downhill.
+    fn settle(&self, start: Hypothesis, scale: f64) -> Hypothesis {
+        let (mut best, mut at) = (start, start);
+        for _ in 0..REFINEMENTS {
+            let Some(refined) = self.refine(&at, scale) else { break };
+            at = refined;
+            if at.cost < best.cost {
+                best = at;
+            }
+        }
+        best
+    }
+
+    /// Draws directions and refines the best one, at ever smaller scales.
+    fn descend(&mut self, rotation: &UnitQuaternion<f64>, threshold: f64) -> Option<Hypothesis> {
+        let mut best = Hypothesis { rotation: *rotation, direction: Vector3::zeros(), cost: f64::INFINITY };
+        for stage in STAGES {
+            let scale = stage * threshold;
+            if best.cost.is_finite() {
+                best.cost = self.cost(&best.rotation, &best.direction, scale);
+            }
+            if let Some(drawn) = self.draw(&best.rotation, scale)
+                && drawn.cost < best.cost
+            {
+                best = drawn;
+            }
+            if best.cost.is_finite() {
+                best = self.settle(best, scale);
+            }
+        }
+        best.cost.is_finite().then_some(best)
+    }
+
+    /// The best direction of those that random pairs of tracks give, the rotation held.
+    fn draw(&mut self, rotation: &UnitQuaternion<f64>, scale: f64) -> Option<Hypothesis> {
+        self.drawn.clear();
+        self.drawn.extend(self.pairs.iter().map(|pair| (rotation * pair.previous).cross(&pair.now)));
+        let mut best: Option<Hypothesis> = None;
+        for _ in 0..self.options.hypotheses {
+            let (first, second) = (self.dice.below(self.pairs.len()), self.dice.below(self.pairs.len()));
+            let Some(axis) = self.drawn[first].cross(&self.drawn[second]).try_normalize(1e-14) else { continue };
+            let forward = self.cost(rotation, &axis, scale);
+            let backward = self.cost(rotation, &-axis, scale);
+            let (direction, cost) = if forward <= backward { (axis, forward) } else { (-axis, backward) };
+            if best.is_none_or(|best| cost < best.cost) {
+                best = Some(Hypothesis { rotation: *rotation, direction, cost });
+            }
+        }
+        best
+    }
+
+    /// Sum of squared distances over `scale`, each no larger than one, and what the prediction says of the rotation.
+    fn cost(&self, rotation: &UnitQuaternion<f64>, direction: &Vector3<f64>, scale: f64) -> f64 {
+        let sum: f64 = self
+            .pairs
+            .iter()
+            .map(|pair| {
+                let distance = epipolar_distance(pair, rotation, direction) / scale;
+                (distance * distance).min(1.0)
+            })
+            .sum();
+        let turn = self.predicted.map_or(0.0, |predicted| rotation.angle_to(predicted));
+        sum + (turn / self.options.rotation_sigma_rad).powi(2)
+    }
+
+    /// One Gauss–Newton step on the rotation and the direction, with weights that leave outliers out.
+    fn refine(&self, at: &Hypothesis, scale: f64) -> Option<Hypothesis> {
+        let turn_so_far = self.predicted.map_or_else(Vector3::zeros, |p| so3::log(&(at.rotation * p.inverse())));
+        let (rotation, direction) =
+            step_towards(self.pairs, at, scale, self.options.rotation_sigma_rad.powi(-2), &turn_so_far)?;
+        let cost = self.cost(&rotation, &direction, scale);
+        Some(Hypothesis { rotation, direction, cost })
+    }
+}
+
+/// A Gauss–Newton step on the epipolar distances of `pairs` in units of `scale`; each weighs less the further off it is.
+///
+/// `prior` is the information about the rotation, which lies `turn_so_far` from what is expected, both in radians.
+fn step_towards(
+    pairs: &[BearingPair],
+    at: &Hypothesis,
+    scale: f64,
+    prior: f64,
+    turn_so_far: &Vector3<f64>,
+) -> Option<(UnitQuaternion<f64>, Vector3<f64>)> {
+    let basis = tangent_basis(&at.direction);
+    let mut normal = SMatrix::<f64, 5, 5>::zeros();
+    let mut right = SVector::<f64, 5>::zeros();
+    for pair in pairs {
+        let turned = at.rotation * pair.previous;
+        let plane = at.direction.cross(&turned);
+        let other_plane = pair.now.cross(&at.direction);
+        let gap = pair.now.dot(&plane);
+        let spread = plane.norm_squared() + other_plane.norm_squared() - 2.0 * gap * gap;
+        if spread < 1e-12 {
+            continue;
+        }
+        let ratio = gap * gap / (spread * scale * scale);
+        let weight = 1.0 / (spread * scale * scale * (1.0 + ratio) * (1.0 + ratio));
+        let by_turn = turned.cross(&other_plane);
+        let by_direction = turned.cross(&pair.now);
+        let row = SVector::<f64, 5>::new(
+            by_turn.x,
+            by_turn.y,
+            by_turn.z,
+            by_direction.dot(&basis[0]),
+            by_direction.dot(&basis[1]),
+        );
+        normal += row * row.transpose() * weight;
+        right -= row * (gap * weight);
+    }
+    for k in 0..3 {
+        normal[(k, k)] += prior;
+        right[k] -= prior * turn_so_far[k];
+    }
+    for k in 3..5 {
+        normal[(k, k)] += 1e-3 * prior.min(1.0);
+    }
+    let step = normal.cholesky()?.solve(&right);
+    let turn = so3::exp(&Vector3::new(step[0], step[1], step[2]));
+    let rotation = UnitQuaternion::new_normalize((turn * at.rotation).into_inner());
+    let direction = (at.direction + basis[0] * step[3] + basis[1] * step[4]).try_normalize(1e-9)?;
+    Some((rotation, direction))
+}
+
+/// Two unit vectors that make a right-handed frame with `direction`.
+fn tangent_basis(direction: &Vector3<f64>) -> [Vector3<f64>; 2] {
+    let other = if direction.x.abs() < 0.6 { Vector3::x() } else { Vector3::y() };
+    let first = direction.cross(&other).normalize();
+    [first, direction.cross(&first)]
+}
+
+/// A small random number generator (xorshift64*), the same everywhere.
+struct Dice(u64);
+
+impl Dice {
+    fn below(&mut self, count: usize) -> usize {
+        self.0 ^= self.0 >> 12;
+        self.0 ^= self.0 << 25;
+        self.0 ^= self.0 >> 27;
+        let high = self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 32;
+        ((high * count as u64) >> 32) as usize
+    }
+}

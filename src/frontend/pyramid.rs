@@ -1,0 +1,108 @@
+use crate::flight_log::GrayImage;
+
+/// Pixels of mirror picture that the smoothing needs on either side.
+const FILTER_RADIUS: usize = 2;
+
+/// An image and its halvings, each smoothed by the binomial filter `1 4 6 4 1` before every second pixel is kept.
+///
+/// Pixel `(x, y)` of level `l` is pixel `(2ˡ·x, 2ˡ·y)` of the image.
+/// Beyond its borders an image goes on as its mirror picture about the outermost pixels (reflect-101), both in the
+/// smoothing and in the windows that the tracker cuts out, so no window is lost there.
+/// The buffers live on from image to image.
+#[derive(Clone, Debug, Default)]
+pub struct Pyramid {
+    levels: Vec<GrayImage>,
+    /// One row of column sums with mirrored pixels on either side.
+    column_sums: Vec<u16>,
+}
+
+impl Pyramid {
+    /// No level is narrower than this, in pixels: nothing can be tracked there.
+    pub const SMALLEST_LEVEL_PX: usize = 16;
+
+    /// Takes in an image and builds `levels` levels: the image itself, and fewer halvings when it is too small for all.
+    pub fn build(&mut self, image: &GrayImage, levels: usize) {
+        let (mut width, mut height) = (image.width, image.height);
+        let mut count = 0;
+        while count == 0 || (count < levels && width.min(height) >= Self::SMALLEST_LEVEL_PX) {
+            if count == self.levels.len() {
+                self.levels.push(GrayImage { width: 0, height: 0, pixels: Vec::new() });
+            }
+            let level = &mut self.levels[count];
+            (level.width, level.height) = (width, height);
+            level.pixels.resize(width * height, 0);
+            (width, height) = (width.div_ceil(2), height.div_ceil(2));
+            count += 1;
+        }
+        self.levels.truncate(count);
+        self.levels[0].pixels.copy_from_slice(&image.pixels);
+        for level in 1..count {
+            let (finer, coarser) = self.levels.split_at_mut(level);
+            halve(&finer[level - 1], &mut coarser[0], &mut self.column_sums);
+        }
+    }
+
+    /// The levels, the image itself first; empty before the first [`Self::build`].
+    pub fn levels(&self) -> &[GrayImage] {
+        &self.levels
+    }
+}
+
+/// Index of the pixel that stands at `index` when a line of `count` pixels is mirrored about its ends.
+pub(super) fn mirrored(index: i32, count: usize) -> usize {
+    let last = count as i32 - 1;
+    let from_the_left = index.abs();
+    let from_the_right = if from_the_left > last { 2 * last - from_the_left } else { from_the_left };
+    from_the_right.clamp(0, last) as usize
+}
+
+/// Cuts out the pixels from `first` (column, row) on, which may lie outside the image, in rows of `width`.
+pub(super) fn cut_out<T>(
+    image: &GrayImage,
+    first: [i32; 2],
+    width: usize,
+    window: &mut [T],
+    convert: impl Fn(u8) -> T,
+) {
+    let [left, top] = first;
+    let inside = left >= 0 && left as usize + width <= image.width;
+    for (y, target) in window.chunks_exact_mut(width).enumerate() {
+        let source = &image.pixels[mirrored(top + y as i32, image.height) * image.width..][..image.width];
+        if inside {
+            for (value, pixel) in target.iter_mut().zip(&source[left as usize..left as usize + width]) {
+                *value = convert(*pixel);
+            }
+        } else {
+            for (x, value) in target.iter_mut().enumerate() {
+                *value = convert(source[mirrored(left + x as i32, image.width)]);
+            }
+        }
+    }
+}
+
+/// Smooths `source` and keeps every second pixel of every second row.
+fn halve(source: &GrayImage, target: &mut GrayImage, column_sums: &mut Vec<u16>) {
+    let width = source.width;
+    // One pixel more on the right, so that an odd width still gives whole pairs.
+    column_sums.resize(width + 2 * FILTER_RADIUS + 1, 0);
+    let row = |y: i32| &source.pixels[mirrored(y, source.height) * width..][..width];
+    for (target_y, target_row) in target.pixels.chunks_exact_mut(target.width).enumerate() {
+        let y = 2 * target_y as i32;
+        let (above_2, above, middle, below, below_2) = (row(y - 2), row(y - 1), row(y), row(y + 1), row(y + 2));
+        let sums = &mut column_sums[FILTER_RADIUS..FILTER_RADIUS + width];
+        for x in 0..width {
+            let inner = u16::from(above[x]) + u16::from(below[x]);
+            sums[x] = u16::from(above_2[x]) + u16::from(below_2[x]) + 4 * inner + 6 * u16::from(middle[x]);
+        }
+        for x in 0..FILTER_RADIUS {
+            column_sums[x] = column_sums[FILTER_RADIUS + mirrored(x as i32 - FILTER_RADIUS as i32, width)];
+            column_sums[FILTER_RADIUS + width + x] = column_sums[FILTER_RADIUS + mirrored((width + x) as i32, width)];
+        }
+        let (pairs, _) = column_sums.as_chunks::<2>();
+        for (pixel, taps) in target_row.iter_mut().zip(pairs.windows(3)) {
+            let [[far_left, left], [middle, right], [far_right, _]] = *taps else { continue };
+            // At most 16 · 16 · 255 + 128, which a u16 holds.
+            *pixel = ((far_left + far_right + 4 * (left + right) + 6 * middle + 128) >> 8) as u8;
+        }
+    }
+}

@@ -1,0 +1,33 @@
+mod corners;
+mod following;
+mod front_end;
+mod homography;
+mod motion;
+
+use crate::camera::CameraModel;
+use crate::flight_log::GrayImage;
+use homography::{Scene, Texture};
+
+/// A plane of rich texture before a small camera.
+fn scene(speed: f64) -> Scene {
+    Scene { width: 320, height: 240, focal_px: 200.0, speed, noise: 2.0, flicker: 0.0 }
+}
+
+fn texture() -> Texture {
+    Texture::new(1024, 3)
+}
+
+fn camera_of(scene: &Scene) -> CameraModel {
+    let matrix = scene.camera_matrix();
+    let intrinsics_px = [matrix[(0, 0)], matrix[(1, 1)], matrix[(0, 2)], matrix[(1, 2)]];
+    CameraModel::pinhole(intrinsics_px, [scene.width, scene.height]).unwrap()
+}
+
+fn blank(scene: &Scene) -> GrayImage {
+    GrayImage { width: scene.width, height: scene.height, pixels: vec![90; scene.width * scene.height] }
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}

@@ -1,0 +1,160 @@
+//! Outliers and the rotation prediction.
+
+use nalgebra::{UnitQuaternion, Vector3};
+
+use super::homography::Dice;
+use crate::flight_log::ImuSample;
+use crate::frontend::outliers::{BearingPair, OutlierOptions, fit_rotation, judge};
+use crate::frontend::predict_camera_rotation;
+use crate::geometry::so3;
+
+const FOCAL_PX: f64 = 450.0;
+
+/// A made-up pair of images of scattered points.
+struct View {
+    rotation: Vector3<f64>,
+    translation: Vector3<f64>,
+    /// How wrong the predicted rotation is.
+    prediction_error: Vector3<f64>,
+    predicted: bool,
+    outlier_share: f64,
+    /// Depths between these, in the unit of the translation.
+    depths: (f64, f64),
+}
+
+impl Default for View {
+    fn default() -> Self {
+        Self {
+            rotation: Vector3::new(0.02, -0.03, 0.01),
+            translation: Vector3::new(0.1, -0.05, 0.2),
+            prediction_error: Vector3::zeros(),
+            predicted: true,
+            outlier_share: 0.15,
+            depths: (3.0, 15.0),
+        }
+    }
+}
+
+/// Judges 120 tracks and counts how many of the right ones are kept and how many of the wrong ones.
+fn check(name: &str, view: &View, least_right: f64, most_wrong: f64) {
+    for seed in 1..20 {
+        let mut dice = Dice(seed * 7919);
+        let rotation = so3::exp(&view.rotation);
+        let mut truth = Vec::new();
+        let mut pairs = Vec::new();
+        while pairs.len() < 120 {
+            let depth = view.depths.0 + (view.depths.1 - view.depths.0) * dice.uniform();
+            let point = Vector3::new(1.4 * dice.uniform() - 0.7, dice.uniform() - 0.5, 1.0) * depth;
+            let mut seen = rotation * point + view.translation;
+            seen /= seen.z;
+            seen += Vector3::new(dice.normal(), dice.normal(), 0.0) * (0.15 / FOCAL_PX);
+            let right = dice.uniform() >= view.outlier_share;
+            if !right {
+                let angle = std::f64::consts::TAU * dice.uniform();
+                seen += Vector3::new(angle.cos(), angle.sin(), 0.0) * ((8.0 + 40.0 * dice.uniform()) / FOCAL_PX);
+            }
+            truth.push(right);
+            pairs.push(BearingPair { previous: point.normalize(), now: seen.normalize() });
+        }
+        let predicted = so3::exp(&view.prediction_error) * rotation;
+        let motion = judge(&pairs, view.predicted.then_some(&predicted), FOCAL_PX, &OutlierOptions::default());
+        let count = |kind: bool| truth.iter().filter(|right| **right == kind).count().max(1) as f64;
+        let kept = |kind: bool| {
+            truth.iter().zip(&motion.is_inlier).filter(|(right, inlier)| **right == kind && **inlier).count() as f64
+        };
+        let (right, wrong) = (kept(true) / count(true), kept(false) / count(false));
+        assert!(right >= least_right, "{name}, seed {seed}: keeps {right} of the right ones");
+        assert!(wrong <= most_wrong, "{name}, seed {seed}: keeps {wrong} of the wrong ones");
+    }
+}
+
+#[test]
+fn a_good_prediction_tells_outliers() {
+    check("general", &View::default(), 0.97, 0.3);
+    check("sideways", &View { translation: Vector3::new(0.2, 0.0, 0.0), ..View::default() }, 0.97, 0.3);
+    check("many outliers", &View { outlier_share: 0.4, ..View::default() }, 0.95, 0.35);
+}
+
+#[test]
+fn a_prediction_that_is_degrees_off_does_no_harm() {
+    for error in [Vector3::new(0.05, 0.0, 0.0), Vector3::new(0.0, -0.07, 0.03), Vector3::new(0.02, 0.02, -0.1)] {
+        check("wrong prediction", &View { prediction_error: error, ..View::default() }, 0.9, 0.35);
+    }
+    check("no prediction", &View { predicted: false, ..View::default() }, 0.9, 0.35);
+    let spin = Vector3::new(0.1, 0.25, -0.1);
+    check("no prediction, fast", &View { predicted: false, rotation: spin, ..View::default() }, 0.9, 0.35);
+}
+
+#[test]
+fn pure_rotation_keeps_what_turns_and_nothing_else() {
+    let view = View { translation: Vector3::zeros(), ..View::default() };
+    check("pure rotation", &view, 0.99, 0.02);
+    let wrong = View { translation: Vector3::zeros(), prediction_error: Vector3::new(0.03, -0.05, 0.0), ..view };
+    check("pure rotation, wrong prediction", &wrong, 0.99, 0.02);
+}
+
+#[test]
+fn a_clean_scene_loses_nothing() {
+    check("clean", &View { outlier_share: 0.0, ..View::default() }, 0.99, 0.0);
+    let far = View { outlier_share: 0.0, depths: (50.0, 300.0), ..View::default() };
+    check("far", &far, 0.99, 0.0);
+}
+
+#[test]
+fn nonsense_rejects_nothing_rather_than_everything() {
+    let mut dice = Dice(5);
+    let mut direction = || Vector3::new(dice.uniform() - 0.5, dice.uniform() - 0.5, 1.0).normalize();
+    let pairs: Vec<_> = (0..60).map(|_| BearingPair { previous: direction(), now: direction() }).collect();
+    let motion = judge(&pairs, None, FOCAL_PX, &OutlierOptions::default());
+    let kept = motion.is_inlier.iter().filter(|inlier| **inlier).count();
+    assert!(kept >= 24, "{kept}");
+    for count in 0..8 {
+        let motion = judge(&pairs[..count], None, FOCAL_PX, &OutlierOptions::default());
+        assert_eq!(motion.is_inlier, vec![true; count]);
+    }
+}
+
+#[test]
+fn one_track_many_times_says_nothing_of_a_rotation() {
+    let pair = BearingPair { previous: Vector3::z(), now: Vector3::z() };
+    let rotation = fit_rotation(&[pair; 20], &UnitQuaternion::identity(), 1e-3);
+    assert!(rotation.angle() < 1e-9);
+}
+
+fn sample(stamp_ns: i64, angular_velocity: Vector3<f64>) -> ImuSample {
+    ImuSample {
+        stamp_ns,
+        angular_velocity_rad_per_s: angular_velocity,
+        specific_force_m_per_s2: Vector3::new(0.0, 0.0, 9.81),
+    }
+}
+
+#[test]
+fn the_predicted_rotation_is_that_of_the_chain_of_frames() {
+    let (rate, bias) = (Vector3::new(0.5, -1.0, 2.0), Vector3::new(0.1, 0.2, -0.3));
+    let imu: Vec<_> = (0..11).map(|k| sample(k * 5_000_000, rate + bias)).collect();
+    let previous = UnitQuaternion::from_euler_angles(0.3, -0.2, 1.0);
+    let now = UnitQuaternion::from_euler_angles(0.5, 0.1, 1.2);
+    let rotation = predict_camera_rotation(&imu, &bias, &previous, &now).unwrap();
+    // A direction fixed in the world: world = IMU at the first instant.
+    let world = Vector3::new(0.2, 0.7, -0.4);
+    let world_from_imu_now = so3::exp(&(rate * 0.05));
+    let in_previous = previous.inverse() * world;
+    let in_now = now.inverse() * (world_from_imu_now.inverse() * world);
+    assert!((rotation * in_previous - in_now).norm() < 1e-12);
+}
+
+#[test]
+fn no_rotation_is_predicted_from_broken_samples() {
+    let identity = UnitQuaternion::identity();
+    let good = [sample(0, Vector3::x()), sample(5_000_000, Vector3::x())];
+    assert!(predict_camera_rotation(&good, &Vector3::zeros(), &identity, &identity).is_some());
+    for imu in [
+        vec![],
+        vec![good[0]],
+        vec![good[1], good[0]],
+        vec![good[0], sample(5_000_000, Vector3::new(f64::NAN, 0.0, 0.0))],
+    ] {
+        assert_eq!(predict_camera_rotation(&imu, &Vector3::zeros(), &identity, &identity), None);
+    }
+}
