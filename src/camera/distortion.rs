@@ -37,7 +37,6 @@ impl Distortion {
 
     pub(super) fn check(&self) -> Result<(), CameraError> {
         match self {
-            Self::None => Ok(()),
             Self::Radtan(coefficients) | Self::Equidistant(coefficients) => {
                 match coefficients.iter().find(|value| !value.is_finite()) {
                     Some(&value) => Err(CameraError::Value {
@@ -53,7 +52,7 @@ impl Distortion {
                 value: *w,
                 expected: "0 to π, both excluded",
             }),
-            Self::Fov(_) => Ok(()),
+            Self::None | Self::Fov(_) => Ok(()),
         }
     }
 

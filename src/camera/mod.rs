@@ -1,6 +1,6 @@
 //! Camera models: projection and back-projection with their Jacobians, Kalibr's models and conventions.
 //!
-//! Pixel centres lie at integer coordinates (OpenCV, Kalibr). The camera looks along +z, x to the right, y down.
+//! Pixel centres lie at integer coordinates (`OpenCV`, Kalibr). The camera looks along +z, x to the right, y down.
 //! A point becomes a pixel in three steps: the [`Projection`] takes it to the normalized image plane, the
 //! [`Distortion`] moves it there, and focal lengths and principal point make pixels of it.
 

@@ -5,7 +5,7 @@ use super::{CameraError, CameraModel, Distortion, Projection};
 const INTRINSICS_PX: [f64; 4] = [352.6, 348.1, 322.4, 238.1];
 const RESOLUTION_PX: [usize; 2] = [640, 480];
 
-/// Every combination that Kalibr calibrates, with coefficients of real lenses (EuRoC, TUM-VI, BF2M2020S23).
+/// Every combination that Kalibr calibrates, with coefficients of real lenses (`EuRoC`, TUM-VI, BF2M2020S23).
 fn cameras() -> Vec<CameraModel> {
     let omni = Projection::Omni { xi: 1.6 };
     let weak_omni = Projection::Omni { xi: 0.7 };

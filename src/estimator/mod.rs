@@ -3,6 +3,7 @@
 //! It takes a [`StepInput`] per image and leaves a [`StepReport`] behind; nobody reaches in between.
 
 pub mod imu_factor;
+pub mod initialization;
 pub mod preintegration;
 mod report;
 #[cfg(test)]

@@ -1,6 +1,6 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::container::{BlockCache, MessagePosition};
+use super::container::{BlockCache, TopicIndex};
 use super::messages::MessageKind;
 use super::picture::decode_picture;
 use super::{FlightLog, GrayImage, LogError, Rig};
@@ -24,11 +24,13 @@ struct CameraImages {
     key: String,
     topic: String,
     kind: MessageKind,
-    positions: Vec<MessagePosition>,
+    count: usize,
 }
 
 #[derive(Debug)]
 struct ImageCache {
+    /// One per camera.
+    topics: Vec<TopicIndex>,
     blocks: BlockCache,
     /// By camera and number, most recently used last.
     images: Vec<((usize, usize), Arc<GrayImage>)>,
@@ -37,25 +39,24 @@ struct ImageCache {
 impl ImageReader {
     /// Finds the images of all cameras of a rig that the log has.
     pub fn new(log: Arc<FlightLog>, rig: &Rig) -> Self {
-        let cameras = rig.cameras.iter().filter_map(|camera| {
-            let kind = log.topic(&camera.topic)?.kind.filter(|kind| kind.is_image())?;
-            let positions = log.positions(&camera.topic);
-            Some(CameraImages { key: camera.key.clone(), topic: camera.topic.clone(), kind, positions })
-        });
-        let cameras = cameras.collect();
-        let cache = ImageCache { blocks: BlockCache::new(BLOCKS), images: Vec::with_capacity(IMAGES + 1) };
+        let cameras: Vec<CameraImages> = rig
+            .cameras
+            .iter()
+            .filter_map(|camera| {
+                let info = log.topic(&camera.topic)?;
+                let kind = info.kind.filter(|kind| kind.is_image())?;
+                let (key, topic) = (camera.key.clone(), camera.topic.clone());
+                Some(CameraImages { key, topic, kind, count: info.count as usize })
+            })
+            .collect();
+        let topics = cameras.iter().map(|camera| log.topic_index(&camera.topic)).collect();
+        let cache = ImageCache { topics, blocks: BlockCache::new(BLOCKS), images: Vec::with_capacity(IMAGES + 1) };
         Self { log, cameras, cache: Mutex::new(cache) }
     }
 
     /// How many images a camera has in the log, damaged ones included; 0 for a camera that is not there.
     pub fn count(&self, camera_key: &str) -> usize {
-        self.cameras.iter().find(|camera| camera.key == camera_key).map_or(0, |camera| camera.positions.len())
-    }
-
-    /// Log time of an image since the log began, `None` past the end.
-    pub fn log_time_ns(&self, camera_key: &str, index: usize) -> Option<i64> {
-        let camera = self.cameras.iter().find(|camera| camera.key == camera_key)?;
-        camera.positions.get(index).map(|position| self.log.since_begin(position.log_time_ns))
+        self.cameras.iter().find(|camera| camera.key == camera_key).map_or(0, |camera| camera.count)
     }
 
     /// One image of one camera, numbered as in [`SensorFrame::index`](super::SensorFrame::index).
@@ -65,14 +66,15 @@ impl ImageReader {
             LogError::UnknownCamera { key: camera_key.to_owned(), available }
         })?;
         let camera = &self.cameras[number];
-        let position = *camera.positions.get(index).ok_or_else(|| LogError::NoSuchImage {
-            topic: camera.topic.clone(),
-            index,
-            count: camera.positions.len(),
-            path: self.log.path().to_owned(),
-        })?;
         // A panic of another reader leaves the cache whole: entries are only pushed when complete.
         let mut cache = self.cache.lock().unwrap_or_else(PoisonError::into_inner);
+        let position = cache.topics[number].get(self.log.index(), self.log.file(), index);
+        let position = position.ok_or_else(|| LogError::NoSuchImage {
+            topic: camera.topic.clone(),
+            index,
+            count: camera.count,
+            path: self.log.path().to_owned(),
+        })?;
         let key = (number, index);
         if let Some(found) = cache.images.iter().position(|(held, _)| *held == key) {
             let entry = cache.images.remove(found);

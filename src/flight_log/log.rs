@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use memmap2::Mmap;
 
-use super::container::{BlockCache, ContainerIndex, DecodedBlock, MessagePosition, MessageSpan};
+use super::container::{BlockCache, ContainerIndex, DecodedBlock, MessagePosition, MessageSpan, TopicIndex};
 use super::messages::{self, MessageKind};
 use super::{LogError, LogWarning};
 use crate::geometry::seconds_from_ns;
@@ -138,9 +138,9 @@ impl FlightLog {
         })
     }
 
-    /// Where the messages of a topic lie, in the order of their log times.
-    pub(super) fn positions(&self, topic: &str) -> Vec<MessagePosition> {
-        self.channel_ids.get(topic).map(|ids| self.index.positions(&self.file, ids)).unwrap_or_default()
+    /// Where the messages of a topic lie.
+    pub(super) fn topic_index(&self, topic: &str) -> TopicIndex {
+        TopicIndex::new(&self.index, self.channel_ids.get(topic).map_or(&[], |ids| ids))
     }
 
     /// The whole file.
@@ -162,7 +162,10 @@ impl FlightLog {
     /// began, until it returns `false`.
     pub(super) fn for_each_message(&self, topic: &str, mut visit: impl FnMut(i64, &[u8]) -> bool) {
         let mut cache = BlockCache::new(2);
-        for position in self.positions(topic) {
+        let mut topic = self.topic_index(topic);
+        let mut number = 0;
+        while let Some(position) = topic.get(&self.index, &self.file, number) {
+            number += 1;
             if let Some((block, message)) = self.message(&mut cache, position) {
                 let data = block.bytes(&self.file, &message.data);
                 if !visit(self.since_begin(position.log_time_ns), data) {
@@ -199,8 +202,9 @@ impl FlightLog {
         let mut stamps: Vec<(bool, String, i64, i64)> = Vec::new();
         let mut infos = Vec::new();
         for (topic, ids) in &self.channel_ids {
-            let positions = self.index.positions(&self.file, ids);
-            let (Some(first), Some(last)) = (positions.first(), positions.last()) else { continue };
+            let mut positions = TopicIndex::new(&self.index, ids);
+            let [first_ones, last_ones] = positions.ends(&self.index, &self.file);
+            let (Some(first), Some(last)) = (first_ones.first(), last_ones.last()) else { continue };
             let channel = ids.first().and_then(|id| self.index.channels.get(id));
             let Some(channel) = channel else { continue };
             let kind = MessageKind::from_schema_name(&channel.schema_name).filter(|_| channel.encoding == "cdr");
@@ -209,13 +213,15 @@ impl FlightLog {
                     let (block, message) = self.message(&mut cache, *position)?;
                     messages::header_stamp_ns(block.bytes(&self.file, &message.data)).ok()
                 };
-                let first_stamp = positions.iter().take(8).find_map(&mut stamp);
-                let last_stamp = positions.iter().rev().take(8).find_map(&mut stamp);
+                let first_stamp = first_ones.iter().take(8).find_map(&mut stamp);
+                let last_stamp = last_ones.iter().rev().take(8).find_map(&mut stamp);
                 if let (Some(first_stamp), Some(last_stamp)) = (first_stamp, last_stamp) {
                     stamps.push((kind == Some(MessageKind::Imu), topic.clone(), first_stamp, last_stamp));
                 }
             }
-            infos.push((topic.clone(), channel.schema_name.clone(), kind, positions.len() as u64, *first, *last));
+            let counted = self.index.statistics.as_ref().map(|counts| ids.iter().filter_map(|id| counts.get(id)).sum());
+            let count = counted.unwrap_or_else(|| positions.count(&self.index, &self.file) as u64);
+            infos.push((topic.clone(), channel.schema_name.clone(), kind, count, *first, *last));
         }
         if infos.is_empty() {
             let problem = match self.index.damages.first() {
@@ -230,7 +236,7 @@ impl FlightLog {
             .map(|(topic, schema, kind, count, first, last)| {
                 let (first_ns, last_ns) = (self.since_begin(first.log_time_ns), self.since_begin(last.log_time_ns));
                 let span_s = seconds_from_ns(last_ns - first_ns);
-                let rate_hz = if span_s > 0.0 { (count - 1) as f64 / span_s } else { 0.0 };
+                let rate_hz = if span_s > 0.0 { count.saturating_sub(1) as f64 / span_s } else { 0.0 };
                 TopicInfo { topic, schema, kind, count, first_ns, last_ns, rate_hz }
             })
             .collect();

@@ -4,6 +4,7 @@
 //! `t ← t + δt` (a vector in the outer frame).
 //! The paper's Eqs. 12–14 print the left form; `φ_left = R·φ_right`.
 
+pub mod dense;
 mod rigid_transform;
 pub mod so3;
 #[cfg(test)]

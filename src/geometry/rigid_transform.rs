@@ -48,7 +48,7 @@ impl RigidTransform {
     }
 
     /// The 4×4 homogeneous matrix.
-    pub fn to_matrix(&self) -> Matrix4<f64> {
+    pub fn to_matrix(self) -> Matrix4<f64> {
         let mut matrix = Matrix4::identity();
         matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(&self.rotation_matrix());
         matrix.fixed_view_mut::<3, 1>(0, 3).copy_from(&self.translation_m);

@@ -1,27 +1,27 @@
 //! The actuated chain between the IMU and a gimballed camera, in each parameterization.
+//!
+//! Rigs write the [`ClassicalChain`]; the estimator works with a [`Chain`], which holds the same mechanism in one
+//! [`Parameterization`] and knows its columns: their names, values, derivatives, update rule and margins to the chart's
+//! locks.
+//! A joint's angle is the encoder's reading plus the static offset of its link.
 
-use crate::geometry::RigidTransform;
+mod chain;
+mod chart;
+mod classical;
+mod conversion;
+mod covariance;
+mod frame;
+mod linearize;
+mod manifold;
+mod parameterization;
+mod redundancy;
+#[cfg(test)]
+pub(crate) mod tests;
 
-/// One Denavit–Hartenberg link, `Rz(θ + theta_offset)·Tz(d)·Tx(a)·Rx(α)` (Eq. 2).
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct DhLink {
-    /// Static offset added to the encoder's angle.
-    pub theta_offset_rad: f64,
-    /// Shift along the joint's axis.
-    pub d_m: f64,
-    /// Shift along the link.
-    pub a_m: f64,
-    /// Twist about the link.
-    pub alpha_rad: f64,
-}
-
-/// The chain of Eqs. 5–6 as rigs write it; without links it is a rigid camera.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct ClassicalChain {
-    /// `T^{I:B}`.
-    pub imu_from_base: RigidTransform,
-    /// The links in order.
-    pub links: Vec<DhLink>,
-    /// `T^{E:C}`.
-    pub effector_from_camera: RigidTransform,
-}
+pub use chain::Chain;
+pub use chart::{SWITCH_MARGIN, auto_parameterization};
+pub use classical::{ClassicalChain, DhLink};
+pub use covariance::{generic_joint_angles, stacked_jacobian, transport, transport_covariance};
+pub use linearize::ChainLinearization;
+pub use parameterization::{Parameterization, UnknownParameterization};
+pub use redundancy::redundant_directions;

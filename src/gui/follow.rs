@@ -65,12 +65,6 @@ impl StepTable {
         }
         news.restarted || !news.steps.is_empty()
     }
-
-    /// The value of a column at the last row at or before a time.
-    pub(crate) fn at(&self, column: usize, stamp_ns: i64) -> Option<f64> {
-        let after = self.stamps_ns.partition_point(|stamp| *stamp <= stamp_ns);
-        self.columns.get(column)?.get(after.checked_sub(1)?).copied().filter(|value| value.is_finite())
-    }
 }
 
 /// One table per run; runs that went away take theirs along.
@@ -113,8 +107,6 @@ mod tests {
         assert!(table.read(&growing, frame));
         assert_eq!(table.columns[0], (0..60).map(f64::from).collect::<Vec<_>>());
         assert_eq!(table.epoch, 0);
-        assert_eq!(table.at(0, table.stamps_ns[7] + 1), Some(7.0));
-        assert_eq!(table.at(0, -1), None);
 
         let other = sample_recording_of(30, &["auto"]);
         assert!(table.read(&other.runs[0], frame));

@@ -45,7 +45,7 @@ impl ResidualHistogram {
             lengths.get((share * last as f64).round() as usize).copied()
         };
         let p95_px = quantile(0.95).unwrap_or(f64::NAN);
-        let reach_px = round_up(1.6 * quantile(0.95).unwrap_or(1.0));
+        let reach_px = round_up(4.0 * quantile(0.5).unwrap_or(1.0));
         let bin = |value: f64| {
             let place = ((value / reach_px + 1.0) * 0.5 * BINS as f64).floor();
             (place >= 0.0 && place < BINS as f64).then_some(place as usize)
@@ -81,11 +81,11 @@ impl ResidualHistogram {
     }
 }
 
-/// The next of 1, 2, 5, 10, … at or above a length, so that the axis does not jump from frame to frame.
+/// The next of 1, 2, 3, 5, 10, … at or above a length, so that the axis does not jump from frame to frame.
 fn round_up(length: f64) -> f64 {
     let length = if length.is_finite() { length.clamp(1e-3, 1e6) } else { 1.0 };
     let power = 10_f64.powf(length.log10().floor());
-    [1.0, 2.0, 5.0].into_iter().map(|digit| digit * power).find(|reach| *reach >= length).unwrap_or(10.0 * power)
+    [1.0, 2.0, 3.0, 5.0].into_iter().map(|digit| digit * power).find(|reach| *reach >= length).unwrap_or(10.0 * power)
 }
 
 #[cfg(test)]
@@ -101,7 +101,7 @@ mod tests {
         let counted = histogram.after.iter().sum::<usize>() + histogram.outside;
         assert!(histogram.observations > 100);
         assert_eq!(counted, 2 * histogram.observations);
-        assert!(histogram.median_px < histogram.p95_px && histogram.p95_px <= histogram.reach_px);
+        assert!(histogram.median_px < histogram.p95_px && histogram.median_px < histogram.reach_px);
         assert_eq!(histogram.rejected, report.features.iter().filter(|feature| feature.rejected).count());
     }
 
@@ -115,7 +115,7 @@ mod tests {
         assert_eq!(ResidualHistogram::of(&report).observations, 0);
         report.features.clear();
         assert_eq!(ResidualHistogram::of(&report).after.iter().sum::<usize>(), 0);
-        assert_eq!(round_up(0.3), 0.5);
+        assert_eq!(round_up(0.31), 0.5);
         assert_eq!(round_up(7.0), 10.0);
         assert_eq!(round_up(f64::NAN), 1.0);
     }

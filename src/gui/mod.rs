@@ -1,26 +1,37 @@
 //! Panels, the 3D scene and the window: they read a recording at a cursor and push commands.
 
+pub mod app;
+mod chain_values;
 pub mod convergence;
+pub mod desktop;
+mod events;
 mod follow;
 pub mod headless;
 mod histogram;
 pub mod image_panel;
+pub mod inspector;
+pub mod open_dialog;
 pub mod painter;
 #[cfg(test)]
 mod panel_tests;
 mod plot;
 pub mod rank;
 pub mod residuals;
+pub mod run_window;
 #[cfg(test)]
 mod sample_calibration;
 #[cfg(test)]
 mod sample_images;
 #[cfg(test)]
 pub(crate) mod sample_recording;
+pub mod scene;
 #[cfg(test)]
 mod tests;
 pub mod theme;
+pub mod timeline;
 mod units;
+pub mod welcome;
+pub mod window;
 
 use std::sync::Arc;
 

@@ -123,3 +123,34 @@ fn rank_is_drawn_in_every_case() {
 fn residuals_are_drawn_in_every_case() {
     check("residuals", [480, 420], super::residuals::ResidualsPanel::ui);
 }
+
+#[test]
+fn the_window_is_drawn_in_every_case() {
+    use super::window::{Preset, WindowState, window_ui};
+    check("window", [1920, 1080], |state: &mut WindowState, ui, ctx| window_ui(ui, state, ctx));
+    check("window-small", [1366, 768], |state: &mut WindowState, ui, ctx| window_ui(ui, state, ctx));
+    for preset in [Preset::Calibration, Preset::FrontEnd, Preset::Scene] {
+        let mut state = WindowState::default();
+        state.arrange(preset);
+        let (recording, selection) = (sample_recording(), Selection::default());
+        let name = format!("window-{preset:?}");
+        picture(&name, &recording, 9 * SECOND_NS, [1920, 1080], ThemeName::Dark, &selection, |ui, ctx| {
+            window_ui(ui, &mut state, ctx);
+        });
+    }
+}
+
+#[test]
+fn the_timeline_is_drawn_in_every_case() {
+    check("timeline", [1900, 190], super::timeline::TimelinePanel::ui);
+}
+
+#[test]
+fn the_inspector_is_drawn_in_every_case() {
+    check("inspector", [480, 700], |panel: &mut super::inspector::InspectorPanel, ui, ctx| {
+        let run = ctx.recording.runs.first();
+        let step = run.and_then(|run| run.step_at(ctx.cursor_ns));
+        ctx.selection.feature = step.and_then(|step| Some(step.report.features.first()?.id));
+        panel.ui(ui, ctx);
+    });
+}

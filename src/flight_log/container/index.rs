@@ -230,6 +230,12 @@ impl ContainerIndex {
             }
         }
         let mut entries: BTreeMap<u16, Entries> = BTreeMap::new();
+        let log_times = || decoded.messages.iter().map(|message| message.log_time_ns);
+        if let (Some(first), Some(last)) = (log_times().min(), log_times().max()) {
+            block.log_time_ns = (first, last);
+        } else if block.bytes.end > file.len() {
+            block.log_time_ns.1 = block.log_time_ns.0;
+        }
         for message in &decoded.messages {
             let entry = (message.log_time_ns, message.offset as u64);
             if let Entries::Own(list) = entries.entry(message.channel_id).or_insert_with(|| Entries::Own(Vec::new())) {
@@ -251,16 +257,6 @@ impl ContainerIndex {
         let damages = self.damages.len();
         self.scan_chunk(file, position..usize::MAX, schemas);
         self.damages.truncate(damages); // the caller reports the cut
-        if let Some(block) = self.blocks.last_mut() {
-            let last =
-                self.entries.last().into_iter().flat_map(|entries| entries.values()).filter_map(
-                    |entries| match entries {
-                        Entries::Own(list) => list.last().map(|(log_time, _)| *log_time),
-                        Entries::Record(_) => None,
-                    },
-                );
-            block.log_time_ns.1 = last.max().unwrap_or(block.log_time_ns.0);
-        }
     }
 
     fn scan_plain_message(&mut self, position: usize, end: usize, body: &[u8]) {
@@ -311,12 +307,17 @@ impl ContainerIndex {
         attachment(record.body).map(|(_, content)| content)
     }
 
-    /// The positions of all messages of some channels, in the order of their log times.
-    pub(in super::super) fn positions(&self, file: &[u8], channel_ids: &[u16]) -> Vec<MessagePosition> {
+    /// Numbers of the blocks that hold messages of some channels.
+    pub(super) fn blocks_with(&self, channel_ids: &[u16]) -> Vec<usize> {
+        let has = |entries: &BTreeMap<u16, Entries>| channel_ids.iter().any(|id| entries.contains_key(id));
+        self.entries.iter().enumerate().filter(|(_, entries)| has(entries)).map(|(number, _)| number).collect()
+    }
+
+    /// The positions of the messages of some channels in some blocks, in the order of their log times.
+    pub(super) fn positions(&self, file: &[u8], blocks: &[usize], channel_ids: &[u16]) -> Vec<MessagePosition> {
         let mut positions = Vec::new();
-        for (number, entries) in self.entries.iter().enumerate() {
-            for (channel_id, entries) in entries.iter().filter(|(channel_id, _)| channel_ids.contains(channel_id)) {
-                let place = |(log_time_ns, offset)| MessagePosition { log_time_ns, block: number, offset };
+        for number in blocks.iter().copied() {
+            for (channel_id, entries) in self.entries[number].iter().filter(|(id, _)| channel_ids.contains(id)) {
                 let indexed = match entries {
                     Entries::Own(list) => Some(list.clone()),
                     Entries::Record(at) => message_index(file, *at, *channel_id, &self.blocks[number]),
@@ -327,6 +328,7 @@ impl ContainerIndex {
                     let own = decoded.messages.iter().filter(|message| message.channel_id == *channel_id);
                     own.map(|message| (message.log_time_ns, message.offset as u64)).collect()
                 });
+                let place = |(log_time_ns, offset)| MessagePosition { log_time_ns, block: number, offset };
                 positions.extend(list.into_iter().map(place));
             }
         }

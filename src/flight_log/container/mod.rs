@@ -2,9 +2,11 @@
 
 mod block;
 mod index;
+mod topic;
 
 pub(super) use block::{BlockCache, DecodedBlock, MessageSpan};
 pub(super) use index::{ContainerIndex, MessagePosition};
+pub(super) use topic::TopicIndex;
 
 /// Every record begins with its opcode (1 byte) and the length of its body (8 bytes).
 const RECORD_HEADER: usize = 9;

@@ -77,6 +77,8 @@ pub(super) struct FrameSource {
 /// The camera's topic and what is expected of it.
 struct CameraStream {
     images: OrderedSamples<PendingImage>,
+    /// How many images the log has.
+    count: usize,
     topic: String,
     kind: MessageKind,
     key: String,
@@ -100,6 +102,7 @@ impl FrameSource {
         let field = format!("{camera_key}.rostopic");
         let images = log.require_topic(&field, &camera.topic, &[MessageKind::Image, MessageKind::CompressedImage])?;
         let kind = images.kind.unwrap_or(MessageKind::Image);
+        let count = images.count as usize;
         let image_gap_ns = gap_ns(IMAGE_GAP_PERIODS, camera.rate_hz, images.rate_hz);
         let imu = log.require_topic("imu0.rostopic", &rig.imu.topic, &[MessageKind::Imu])?;
         let imu_gap_ns = gap_ns(IMU_GAP_PERIODS, rig.imu.rate_hz, imu.rate_hz);
@@ -111,7 +114,8 @@ impl FrameSource {
         let truth = truth_samples(log, rig, from_ns, &mut context).map(Lookup::new);
         let log_warnings = log.warnings().iter().cloned().collect();
         let stream = CameraStream {
-            images: OrderedSamples::new(log, &camera.topic, from_ns, image_decoder(log.epoch_ns())),
+            images: OrderedSamples::new(log, &camera.topic, from_ns, true, image_decoder(log.epoch_ns())),
+            count,
             topic: camera.topic.clone(),
             kind,
             key: camera_key.to_owned(),
@@ -121,7 +125,7 @@ impl FrameSource {
             previous_stamp_ns: None,
         };
         Ok(Self {
-            imu: OrderedSamples::new(log, &rig.imu.topic, from_ns, imu_decoder(log.epoch_ns())),
+            imu: OrderedSamples::new(log, &rig.imu.topic, from_ns, false, imu_decoder(log.epoch_ns())),
             imu_topic: rig.imu.topic.clone(),
             context,
             camera: stream,
@@ -284,7 +288,7 @@ impl FrameSource {
     }
 
     fn tell_end_of_imu(&mut self, stamp_ns: i64, number: usize) {
-        let left = self.camera.images.count() - number;
+        let left = self.camera.count.saturating_sub(number);
         let Some(last) = self.samples.back() else {
             let message = format!("{}: no IMU sample for the images of {}", self.imu_topic, self.camera.key);
             self.context.warn(stamp_ns, message);
@@ -445,7 +449,7 @@ fn joint_samples(log: &FlightLog, rig: &Rig, from_ns: i64) -> Result<Option<Orde
         }
         Ok((message.stamp_ns, JointSample { stamp_ns: message.stamp_ns.saturating_sub(epoch_ns), angles_rad }))
     });
-    Ok(Some(OrderedSamples::new(log, topic, from_ns, decode)))
+    Ok(Some(OrderedSamples::new(log, topic, from_ns, false, decode)))
 }
 
 /// The true poses, `None` when the rig names none or the log has none.
@@ -472,5 +476,5 @@ fn truth_samples(
         let sample = PoseSample { stamp_ns: message.stamp_ns.saturating_sub(epoch_ns), world_from_imu };
         Ok((message.stamp_ns, sample))
     });
-    Some(OrderedSamples::new(log, topic, from_ns, decode))
+    Some(OrderedSamples::new(log, topic, from_ns, false, decode))
 }

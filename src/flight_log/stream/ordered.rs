@@ -1,7 +1,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::super::container::{BlockCache, MessagePosition};
+use super::super::container::{BlockCache, MessagePosition, TopicIndex};
 use super::super::{FlightLog, LogWarning};
 use crate::geometry::seconds_from_ns;
 
@@ -78,8 +78,11 @@ struct DroppedRun {
 /// The samples of one topic in the order of their header stamps.
 pub(super) struct OrderedSamples<T> {
     topic: String,
-    positions: Vec<MessagePosition>,
+    messages: TopicIndex,
+    /// Number of the next message to read.
     next: usize,
+    /// Whether all have been read.
+    exhausted: bool,
     decode: Decoder<T>,
     /// By stamp since the log began and number.
     pending: BTreeMap<(i64, usize), T>,
@@ -88,33 +91,31 @@ pub(super) struct OrderedSamples<T> {
 }
 
 impl<T> OrderedSamples<T> {
-    /// The messages of a topic whose log time is at or after `from_ns` since the log began.
-    pub(super) fn new(log: &FlightLog, topic: &str, from_ns: i64, decode: Decoder<T>) -> Self {
-        let positions = log.positions(topic);
-        let next = positions.partition_point(|position| log.since_begin(position.log_time_ns) < from_ns);
-        let topic = topic.to_owned();
-        Self { topic, positions, next, decode, pending: BTreeMap::new(), released_ns: None, dropped: None }
-    }
-
-    /// How many messages the topic has in the log.
-    pub(super) fn count(&self) -> usize {
-        self.positions.len()
+    /// The messages of a topic whose log time is at or after `from_ns` since the log began. The numbers that the decoder
+    /// gets count from the log's begin when `numbered`; that takes the index of everything before.
+    pub(super) fn new(log: &FlightLog, topic: &str, from_ns: i64, numbered: bool, decode: Decoder<T>) -> Self {
+        let mut messages = log.topic_index(topic);
+        let log_time_ns = u64::try_from(log.epoch_ns().saturating_add(from_ns)).unwrap_or(0);
+        if !numbered {
+            messages.skip_to(log.index(), log_time_ns);
+        }
+        let next = messages.first_at(log.index(), log.file(), log_time_ns);
+        let (topic, pending) = (topic.to_owned(), BTreeMap::new());
+        Self { topic, messages, next, exhausted: false, decode, pending, released_ns: None, dropped: None }
     }
 
     /// The next sample with its stamp since the log began.
     pub(super) fn next(&mut self, context: &mut ReadContext) -> Option<(i64, T)> {
         loop {
             let ready = match (self.pending.first_key_value(), self.pending.last_key_value()) {
-                (Some(((first, _), _)), Some(((last, _), _))) => {
-                    last - first > HORIZON_NS || self.next >= self.positions.len()
-                }
+                (Some(((first, _), _)), Some(((last, _), _))) => last - first > HORIZON_NS || self.exhausted,
                 _ => false,
             };
             if ready && let Some(((stamp_ns, _), sample)) = self.pending.pop_first() {
                 self.released_ns = Some(stamp_ns);
                 return Some((stamp_ns, sample));
             }
-            if self.next >= self.positions.len() {
+            if self.exhausted {
                 self.finish(context);
                 return None;
             }
@@ -123,10 +124,13 @@ impl<T> OrderedSamples<T> {
     }
 
     fn read_one(&mut self, context: &mut ReadContext) {
-        let position = self.positions[self.next];
-        let number = self.next;
-        self.next += 1;
         let log = Arc::clone(&context.log);
+        let number = self.next;
+        let Some(position) = self.messages.get(log.index(), log.file(), number) else {
+            self.exhausted = true;
+            return;
+        };
+        self.next += 1;
         let log_time_ns = log.since_begin(position.log_time_ns);
         let Some((block, message)) = log.message(&mut context.cache, position) else {
             let block = context.cache.get(log.file(), &log.index().blocks, position.block);

@@ -2,6 +2,7 @@
 
 mod broken;
 mod messages;
+mod rigs;
 mod streams;
 
 use std::path::{Path, PathBuf};

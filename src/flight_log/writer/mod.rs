@@ -76,7 +76,17 @@ impl std::fmt::Debug for LogWriter {
 }
 
 /// The quality of service that recorders note for sensor topics; players need it.
-const QOS_PROFILE: &str = "- history: 1\n  depth: 10\n  reliability: 1\n  durability: 2\n  deadline:\n    sec: 2147483647\n    nsec: 4294967295\n";
+const QOS_PROFILE: &str = "\
+- history: 1
+  depth: 10
+  reliability: 1
+  durability: 2
+  deadline: {sec: 9223372036, nsec: 854775807}
+  lifespan: {sec: 9223372036, nsec: 854775807}
+  liveliness: 1
+  liveliness_lease_duration: {sec: 9223372036, nsec: 854775807}
+  avoid_ros_namespace_conventions: false
+";
 
 impl LogWriter {
     /// Creates or overwrites a log.

@@ -20,6 +20,8 @@ pub(crate) struct Layout {
     pub(crate) cells: Vec<Rect>,
     /// Rows by part of the chain, with the heading's place; empty when the plots flow.
     pub(crate) headings: Vec<(ChainPart, Rect)>,
+    /// The largest room that rows by part leave free.
+    pub(crate) legend: Option<Rect>,
     /// Height of everything: more than was available when it has to be scrolled.
     pub(crate) height: f32,
 }
@@ -46,7 +48,13 @@ fn by_part(names: &[String], available: Rect) -> Option<Layout> {
     if rows.len() < 2 || width < NARROWEST_CELL * 1.15 || height < LOWEST_CELL * 1.35 || 3 * empty > names.len() + 2 {
         return None;
     }
-    let mut layout = Layout { cells: Vec::new(), headings: Vec::new(), height: available.height() };
+    let counts: Vec<usize> = rows.iter().map(|(_, count)| *count).collect();
+    let legend = free_corner(&counts, columns).map(|(first, free_rows, free_columns)| {
+        let size = vec2(free_columns as f32 * (width + GAP) - GAP, free_rows as f32 * (height + GAP) - GAP);
+        let top = available.top() + first as f32 * (height + GAP);
+        Rect::from_min_size(pos2(available.right() - size.x - GAP, top), size)
+    });
+    let mut layout = Layout { cells: Vec::new(), headings: Vec::new(), legend, height: available.height() };
     for (row, (part, count)) in rows.into_iter().enumerate() {
         let top = available.top() + row as f32 * (height + GAP);
         let heading = Rect::from_min_size(pos2(available.left(), top), vec2(HEADING_WIDTH, height));
@@ -57,6 +65,20 @@ fn by_part(names: &[String], available: Rect) -> Option<Layout> {
         }));
     }
     Some(layout)
+}
+
+/// First row, number of rows and number of columns of the largest room right of rows that are not full.
+fn free_corner(counts: &[usize], columns: usize) -> Option<(usize, usize, usize)> {
+    let mut best: Option<(usize, usize, usize)> = None;
+    for first in 0..counts.len() {
+        for end in first + 1..=counts.len() {
+            let free = columns - counts[first..end].iter().copied().max().unwrap_or(columns);
+            if free > 0 && best.is_none_or(|(_, rows, columns)| free * (end - first) > rows * columns) {
+                best = Some((first, end - first, free));
+            }
+        }
+    }
+    best
 }
 
 fn flowing(count: usize, available: Rect) -> Layout {
@@ -83,8 +105,8 @@ fn flowing(count: usize, available: Rect) -> Layout {
             Rect::from_min_size(available.min + corner, size)
         })
         .collect();
-    let bottom = cells.last().map_or(available.top(), |cell| cell.bottom());
-    Layout { cells, headings: Vec::new(), height: bottom - available.top() }
+    let bottom = cells.last().map_or_else(|| available.top(), |cell| cell.bottom());
+    Layout { cells, headings: Vec::new(), legend: None, height: bottom - available.top() }
 }
 
 #[cfg(test)]

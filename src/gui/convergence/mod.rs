@@ -9,9 +9,10 @@ use std::collections::BTreeMap;
 
 use egui::{Rect, RichText, ScrollArea, Ui, vec2};
 
-use self::model::CalibrationHistory;
+use self::model::{CalibrationHistory, ConvertedHistory};
 pub(crate) use self::model::{Knowledge, knowledge};
 use super::PanelContext;
+use super::chain_values::{NamedValues, true_values};
 use super::plot::Curve;
 
 /// The curves of one parameter of one run.
@@ -26,6 +27,8 @@ struct ParameterCurves {
 #[derive(Debug, Default)]
 pub struct ConvergencePanel {
     histories: Vec<CalibrationHistory>,
+    /// The other runs in the parameterization of the one on screen.
+    converted: Vec<ConvertedHistory>,
     /// By run and parameter name.
     curves: BTreeMap<(usize, String), ParameterCurves>,
 }
@@ -63,6 +66,8 @@ impl ConvergencePanel {
             return;
         }
         names.sort_by_key(|name| names::part_of(name));
+        self.read_converted(ctx, shown);
+        let truth = true_values(ctx.recording, &ctx.recording.runs[shown], ctx.cursor_ns).unwrap_or_default();
 
         let available = ui.available_rect_before_wrap();
         let layout = layout::lay_out(&names, available);
@@ -72,10 +77,27 @@ impl ConvergencePanel {
                 let narrow = Rect::from_min_size(top, vec2(available.width() - 10.0, available.height()));
                 let layout = layout::lay_out(&names, narrow);
                 ui.allocate_space(vec2(1.0, layout.height));
-                self.cells_ui(ui, ctx, shown, &names, &layout);
+                self.cells_ui(ui, ctx, shown, &names, &truth, &layout);
             });
         } else {
-            self.cells_ui(ui, ctx, shown, &names, &layout);
+            self.cells_ui(ui, ctx, shown, &names, &truth, &layout);
+        }
+    }
+
+    /// Brings the other runs into the parameterization that the shown run has at the cursor.
+    fn read_converted(&mut self, ctx: &PanelContext<'_>, shown: usize) {
+        let runs = &ctx.recording.runs;
+        let chart = |run: usize| {
+            let step = runs[run].step_at(ctx.cursor_ns).or_else(|| runs[run].steps.first())?;
+            Some(step.report.calibration.parameterization.as_str())
+        };
+        let target = chart(shown).and_then(|name| name.parse().ok());
+        self.converted.resize_with(runs.len(), ConvertedHistory::default);
+        for (run, converted) in self.converted.iter_mut().enumerate() {
+            match target {
+                Some(target) if run != shown && chart(run) != chart(shown) => converted.read(&runs[run], target),
+                _ => *converted = ConvertedHistory::default(),
+            }
         }
     }
 
@@ -85,14 +107,19 @@ impl ConvergencePanel {
         ctx: &mut PanelContext<'_>,
         shown: usize,
         names: &[String],
+        truth: &NamedValues,
         layout: &layout::Layout,
     ) {
         for (part, rect) in &layout.headings {
             paint::heading(ui, ctx, *part, *rect);
         }
+        if let Some(rect) = layout.legend {
+            paint::legend(ui, ctx, rect);
+        }
         for (name, rect) in names.iter().zip(&layout.cells) {
             if ui.is_rect_visible(*rect) {
-                paint::cell_ui(ui, ctx, &self.histories, &mut self.curves, shown, name, *rect);
+                let told = paint::Told { histories: &self.histories, converted: &self.converted, truth, shown };
+                paint::cell_ui(ui, ctx, &told, &mut self.curves, name, *rect);
             }
         }
     }

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use crate::gimbal::Parameterization;
+use crate::gui::chain_values::{NamedValues, named_values, turn_towards};
 use crate::gui::follow::Follower;
 use crate::observability::RankReport;
 use crate::session::{RunRecord, StepRecord};
@@ -61,6 +63,8 @@ pub(crate) struct CalibrationHistory {
     pub(crate) parameters: Vec<(String, ParameterHistory)>,
     /// Changes when steps were forgotten.
     pub(crate) epoch: u64,
+    /// The values of the last step, so that angles go on where they were.
+    last: NamedValues,
 }
 
 impl CalibrationHistory {
@@ -70,6 +74,7 @@ impl CalibrationHistory {
         if news.restarted {
             self.stamps_ns.clear();
             self.parameters.clear();
+            self.last.clear();
             self.epoch += 1;
         }
         for step in news.steps {
@@ -82,19 +87,20 @@ impl CalibrationHistory {
         let row = self.stamps_ns.len();
         self.stamps_ns.push(step.report.stamp_ns);
         let known = knowledge(step.rank.as_ref());
+        let mut values: NamedValues =
+            calibration.names.iter().cloned().zip(calibration.values.iter().copied()).collect();
+        turn_towards(&mut values, &self.last);
         for (index, name) in calibration.names.iter().enumerate() {
-            let place = match self.parameters.iter().position(|(known, _)| known == name) {
-                Some(place) => place,
-                None => {
-                    self.parameters.push((name.clone(), ParameterHistory::default()));
-                    self.parameters.len() - 1
-                }
-            };
+            let known_place = self.parameters.iter().position(|(known, _)| known == name);
+            let place = known_place.unwrap_or(self.parameters.len());
+            if known_place.is_none() {
+                self.parameters.push((name.clone(), ParameterHistory::default()));
+            }
             let history = &mut self.parameters[place].1;
             history.unit = calibration.units.get(index).copied().unwrap_or("");
             history.pad(row);
             let entry = |values: &[f64]| values.get(index).copied().unwrap_or(f64::NAN);
-            let (value, sigma) = (entry(&calibration.values), entry(&calibration.sigmas));
+            let (value, sigma) = (values.get(name).copied().unwrap_or(f64::NAN), entry(&calibration.sigmas));
             history.values.push(value);
             history.sigmas.push(sigma);
             history.lower.push(value - 3.0 * sigma);
@@ -107,6 +113,7 @@ impl CalibrationHistory {
         for (_, history) in &mut self.parameters {
             history.pad(row + 1);
         }
+        self.last = values;
     }
 
     /// The parameter of a name.
@@ -117,6 +124,58 @@ impl CalibrationHistory {
     /// The row at or before a time.
     pub(crate) fn row_at(&self, stamp_ns: i64) -> Option<usize> {
         self.stamps_ns.partition_point(|stamp| *stamp <= stamp_ns).checked_sub(1)
+    }
+}
+
+/// A run's calibration told in another run's parameterization.
+#[derive(Debug, Default)]
+pub(crate) struct ConvertedHistory {
+    follower: Follower,
+    target: Option<Parameterization>,
+    /// Stamps of the steps.
+    pub(crate) stamps_ns: Vec<i64>,
+    /// Values of the steps by parameter name.
+    pub(crate) values: BTreeMap<String, Vec<f64>>,
+    /// Changes when steps were forgotten; differs from every epoch of a [`CalibrationHistory`].
+    pub(crate) epoch: u64,
+    last: NamedValues,
+}
+
+impl ConvertedHistory {
+    /// Reads the steps that have come since the last call, or all when the parameterization is another one.
+    ///
+    /// Before the estimator tracks, its calibration is the rig's: nothing to compare.
+    pub(crate) fn read(&mut self, run: &RunRecord, target: Parameterization) {
+        const APART: u64 = 1 << 63;
+        if self.target != Some(target) {
+            self.follower = Follower::default();
+            self.target = Some(target);
+            self.forget();
+        }
+        let news = self.follower.news(run);
+        if news.restarted {
+            self.forget();
+        }
+        self.epoch |= APART;
+        for step in news.steps {
+            let row = self.stamps_ns.len();
+            self.stamps_ns.push(step.report.stamp_ns);
+            let mut values = named_values(&step.report.calibration.classical, target);
+            turn_towards(&mut values, &self.last);
+            for (name, value) in &values {
+                let column = self.values.entry(name.clone()).or_default();
+                column.resize(row, f64::NAN);
+                column.push(*value);
+            }
+            self.last = values;
+        }
+    }
+
+    fn forget(&mut self) {
+        self.stamps_ns.clear();
+        self.values.clear();
+        self.last.clear();
+        self.epoch += 1;
     }
 }
 
@@ -169,6 +228,23 @@ mod tests {
         assert!(renamed.values[54].is_nan() && renamed.values[55].is_finite());
         assert!(history.parameter("I.rx").unwrap().values[59].is_nan());
         assert_eq!(history.row_at(-1), None);
+    }
+
+    #[test]
+    fn another_run_is_told_in_the_same_columns() {
+        let recording = sample_recording_of(FIRST_TRACKED_FRAME + 30, &["auto", "classical"]);
+        let mut converted = ConvertedHistory::default();
+        converted.read(&recording.runs[1], Parameterization::Minimal);
+        let mut own = CalibrationHistory::default();
+        own.read(&recording.runs[0]);
+        for (name, parameter) in &own.parameters {
+            let (theirs, ours) = (converted.values[name].last().unwrap(), parameter.values.last().unwrap());
+            assert!((theirs - ours).abs() < 0.02, "{name}: {theirs} and {ours}");
+        }
+        let epoch = converted.epoch;
+        converted.read(&recording.runs[1], Parameterization::Classical);
+        assert_ne!(converted.epoch, epoch);
+        assert!(converted.values.contains_key("IB.rz"));
     }
 
     #[test]

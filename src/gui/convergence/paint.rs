@@ -5,16 +5,19 @@ use std::collections::BTreeMap;
 use egui::{Align2, Color32, FontFamily, FontId, Pos2, Rect, Stroke, StrokeKind, Ui, pos2, vec2};
 
 use super::ParameterCurves;
-use super::model::{CalibrationHistory, Knowledge, ParameterHistory};
+use super::model::{CalibrationHistory, ConvertedHistory, Knowledge, ParameterHistory};
 use super::names::{ChainPart, heading_of, meaning_of};
 use crate::gui::PanelContext;
+use crate::gui::chain_values::NamedValues;
 use crate::gui::plot::{
-    Clicks, PlotArea, navigate, paint_band, paint_cursor, paint_curve, paint_ground, paint_hatch, paint_value_grid,
-    stretches_where, visible_range,
+    Clicks, PlotArea, navigate, paint_band, paint_cursor, paint_curve, paint_ground, paint_hatch, paint_line,
+    paint_value_grid, stretches_where, visible_range,
 };
 use crate::gui::theme::{self, CURVE_WIDTH};
 use crate::gui::units::{Shown, fixed};
 
+/// Height of the strip at the foot of a plot.
+const STRIP_HEIGHT: f32 = 3.0;
 /// Height of the line with name and value.
 const TITLE_HEIGHT: f32 = 15.0;
 
@@ -27,17 +30,91 @@ pub(super) fn heading(ui: &Ui, ctx: &PanelContext<'_>, part: ChainPart, rect: Re
     painter.text(place, Align2::LEFT_TOP, heading_of(part, &ctx.recording.rig), theme::label_font(), theme.text_weak);
 }
 
+/// What the lines and signs mean, where rows by part of the chain leave room.
+pub(super) fn legend(ui: &Ui, ctx: &PanelContext<'_>, rect: Rect) {
+    const LINE: f32 = 15.0;
+    let theme = ctx.theme;
+    let painter = ui.painter_at(rect);
+    let sample = |line: usize| {
+        let top = rect.top() + TITLE_HEIGHT + line as f32 * LINE;
+        Rect::from_min_size(pos2(rect.left() + 8.0, top), vec2(26.0, LINE - 4.0))
+    };
+    let mut line = 0;
+    let mut say = |text: &str, paint: &dyn Fn(Rect)| {
+        let place = sample(line);
+        if place.bottom() < rect.bottom() {
+            paint(place);
+            let left = place.right_center() + vec2(6.0, 0.0);
+            painter.text(left, Align2::LEFT_CENTER, text, theme::label_font(), theme.text);
+            line += 1;
+        }
+    };
+    for (number, run) in ctx.recording.runs.iter().enumerate() {
+        let style = theme.run(number);
+        say(&run.spec.label, &|place| {
+            paint_line(&painter, &[place.left_center(), place.right_center()], style, CURVE_WIDTH);
+        });
+    }
+    let band = theme.run(ctx.selection.run).color.gamma_multiply(0.22);
+    say("±3σ", &|place| {
+        painter.rect_filled(place, 0.0, band);
+    });
+    if ctx.recording.truth_rig.is_some() {
+        say("truth", &|place| {
+            paint_line(&painter, &[place.left_center(), place.right_center()], theme.truth_style(), CURVE_WIDTH);
+        });
+    }
+    for (state, text) in [
+        (Knowledge::Weak, "weak: no better than the prior"),
+        (Knowledge::Unobservable, "unobservable"),
+        (Knowledge::Waiting, "initializing"),
+    ] {
+        say(text, &|place| {
+            if state != Knowledge::Weak {
+                paint_hatch(&painter, place, theme.hatch);
+            }
+            let strip = Rect::from_min_max(pos2(place.left(), place.bottom() - STRIP_HEIGHT), place.max);
+            painter.rect_filled(strip, 0.0, state_color(theme, state));
+        });
+    }
+}
+
+/// What the plots tell.
+pub(super) struct Told<'a> {
+    /// The calibration of each run in its own parameterization.
+    pub(super) histories: &'a [CalibrationHistory],
+    /// The runs that have another parameterization than the shown one, told in that.
+    pub(super) converted: &'a [ConvertedHistory],
+    /// True values in the shown run's parameterization.
+    pub(super) truth: &'a NamedValues,
+    /// The run on screen.
+    pub(super) shown: usize,
+}
+
+impl<'a> Told<'a> {
+    /// Epoch, stamps and values of a run's parameter.
+    fn values(&self, run: usize, name: &str) -> Option<(u64, &'a [i64], &'a [f64])> {
+        let converted = self.converted.get(run).filter(|converted| !converted.stamps_ns.is_empty());
+        if let Some(converted) = converted {
+            let values = converted.values.get(name)?;
+            return Some((converted.epoch, &converted.stamps_ns, values));
+        }
+        let history = self.histories.get(run)?;
+        Some((history.epoch, &history.stamps_ns, &history.parameter(name)?.values))
+    }
+}
+
 /// Draws the plot of one parameter and lets the pointer select it.
 pub(super) fn cell_ui(
     ui: &Ui,
     ctx: &mut PanelContext<'_>,
-    histories: &[CalibrationHistory],
+    told: &Told<'_>,
     curves: &mut BTreeMap<(usize, String), ParameterCurves>,
-    shown_run: usize,
     name: &str,
     rect: Rect,
 ) {
-    let Some(history) = histories.get(shown_run) else { return };
+    let shown_run = told.shown;
+    let Some(history) = told.histories.get(shown_run) else { return };
     let Some(parameter) = history.parameter(name) else { return };
     let shown = Shown::of(parameter.unit);
     let theme = *ctx.theme;
@@ -45,29 +122,20 @@ pub(super) fn cell_ui(
     let plot = Rect::from_min_max(pos2(rect.left(), rect.top() + TITLE_HEIGHT), rect.max);
     let mut area = PlotArea { rect: plot, begin_ns, end_ns, low: 0.0, high: 1.0 };
 
-    // Runs whose chart has the same parameter are laid over each other.
-    let same_chart = |run: usize| {
-        let chart = |run: usize| {
-            let steps = &ctx.recording.runs.get(run)?.steps;
-            steps.last().map(|step| step.report.calibration.parameterization.as_str())
-        };
-        run == shown_run || chart(run) == chart(shown_run)
-    };
-    let overlaid: Vec<usize> =
-        (0..histories.len()).filter(|run| same_chart(*run) && histories[*run].parameter(name).is_some()).collect();
+    let overlaid: Vec<usize> = (0..told.histories.len()).filter(|run| told.values(*run, name).is_some()).collect();
     for run in &overlaid {
-        let Some(parameter) = histories[*run].parameter(name) else { continue };
-        let (epoch, stamps_ns) = (histories[*run].epoch, &histories[*run].stamps_ns);
+        let Some((epoch, stamps_ns, values)) = told.values(*run, name) else { continue };
         let curves = curves.entry((*run, name.to_owned())).or_default();
-        curves.value.update(&area, epoch, stamps_ns, &parameter.values);
+        curves.value.update(&area, epoch, stamps_ns, values);
         if *run == shown_run {
             curves.lower.update(&area, epoch, stamps_ns, &parameter.lower);
             curves.upper.update(&area, epoch, stamps_ns, &parameter.upper);
         }
     }
     let curve_of = |run: usize| curves.get(&(run, name.to_owned()));
+    let truth = told.truth.get(name).copied();
     let extents = overlaid.iter().filter_map(|run| curve_of(*run)?.value.extent);
-    let (low, high) = value_range(extents, parameter);
+    let (low, high) = value_range(extents.chain(truth.map(|truth| (truth, truth))), parameter);
     area = area.with_values(low, high);
 
     let painter = ui.painter_at(rect.expand(1.0));
@@ -78,6 +146,11 @@ pub(super) fn cell_ui(
     if let Some(curves) = curve_of(shown_run) {
         let fill = theme.run(shown_run).color.gamma_multiply(0.22);
         paint_band(&inner, &area, &curves.lower, &curves.upper, fill);
+    }
+    if let Some(truth) = truth {
+        let y = area.y(truth);
+        let line = [pos2(plot.left(), y), pos2(plot.right(), y)];
+        paint_line(&inner, &line, theme.truth_style(), CURVE_WIDTH);
     }
     // The shown run comes last, on top.
     for run in overlaid.iter().filter(|run| **run != shown_run).chain([&shown_run]) {
@@ -100,8 +173,20 @@ pub(super) fn cell_ui(
         boxed_text(&inner, &theme, place, Align2::RIGHT_TOP, state.tag(), state_color(&theme, state));
     }
 
-    let text = value
+    let error = value.zip(truth).map(|((value, sigma), truth)| (value - truth, sigma));
+    if let Some((error, sigma)) = error {
+        let far = error.abs() > 3.0 * sigma;
+        let place = plot.right_bottom() + vec2(-3.0, -STRIP_HEIGHT - 1.0);
+        let color = if far { theme.error } else { theme.text_weak };
+        boxed_text(&inner, &theme, place, Align2::RIGHT_BOTTOM, &error_text(shown, error, sigma), color);
+    }
+
+    let mut text = value
         .map_or_else(String::new, |(value, sigma)| format!("{} ± {}", shown.value(value, sigma), shown.sigma(sigma)));
+    if let Some((error, sigma)) = error {
+        text.push_str(", ");
+        text.push_str(&error_text(shown, error, sigma));
+    }
     let label = format!("{name} {text} {}", state.tag());
     let id = ui.unique_id().with(("parameter", name));
     let response = navigate(ui, ctx, &area, id, label.trim_end(), Clicks::Select, false);
@@ -110,6 +195,14 @@ pub(super) fn cell_ui(
     }
     let meaning = meaning_of(name, &ctx.recording.rig);
     response.on_hover_text_at_pointer(format!("{name}: {meaning}\n{text}"));
+}
+
+/// The distance from the truth, with its sign, and in standard deviations.
+fn error_text(shown: Shown, error: f64, sigma: f64) -> String {
+    let sign = if error < 0.0 { "-" } else { "+" };
+    let times = error.abs() / sigma;
+    let text = format!("{sign}{}", shown.value(error.abs(), sigma));
+    if times.is_finite() { format!("{text} ({times:.1}σ) off") } else { format!("{text} off") }
 }
 
 /// The values to show: all curves, and three standard deviations around the last one, which keeps the wide bands of the
@@ -131,7 +224,7 @@ fn value_range(extents: impl Iterator<Item = (f64, f64)>, parameter: &ParameterH
     (low - margin, high + margin)
 }
 
-/// Grey where the window informs the parameter too weakly, hatched where it cannot see it at all.
+/// Hatched where nothing informs the parameter; a strip at the foot tells why.
 fn paint_knowledge(
     painter: &egui::Painter,
     theme: &theme::Theme,
@@ -146,10 +239,11 @@ fn paint_knowledge(
             if stretch.width() <= 0.0 {
                 continue;
             }
-            painter.rect_filled(stretch, 0.0, theme.hatch.gamma_multiply(0.35));
-            if state == Knowledge::Unobservable {
+            if state != Knowledge::Weak {
                 paint_hatch(painter, stretch, theme.hatch);
             }
+            let strip = Rect::from_min_max(pos2(stretch.left(), stretch.bottom() - STRIP_HEIGHT), stretch.max);
+            painter.rect_filled(strip, 0.0, state_color(theme, state));
         }
     }
 }

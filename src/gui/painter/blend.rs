@@ -4,12 +4,12 @@
 const LANES: u32 = 0x00ff_00ff;
 
 /// Packs red, green, blue, alpha.
-pub(super) const fn pack(rgba: [u8; 4]) -> u32 {
+pub(in crate::gui) const fn pack(rgba: [u8; 4]) -> u32 {
     u32::from_le_bytes(rgba)
 }
 
 /// Red, green, blue, alpha of a packed pixel.
-pub(super) const fn unpack(pixel: u32) -> [u8; 4] {
+pub(in crate::gui) const fn unpack(pixel: u32) -> [u8; 4] {
     pixel.to_le_bytes()
 }
 
@@ -50,6 +50,14 @@ pub(super) fn mix(a: u32, b: u32, weight: u32) -> u32 {
     (red_blue & LANES) | (green_alpha & !LANES)
 }
 
+/// The mean of four pixels, rounded.
+#[inline]
+pub(in crate::gui) fn average(pixels: [u32; 4]) -> u32 {
+    const TWO: u32 = 0x0002_0002;
+    let sum = |shift: u32| pixels.iter().map(|pixel| (pixel >> shift) & LANES).sum::<u32>();
+    (((sum(0) + TWO) >> 2) & LANES) | ((((sum(8) + TWO) >> 2) & LANES) << 8)
+}
+
 /// Two lanes times `factor / 255`, rounded exactly.
 #[inline]
 fn scale_lanes(lanes: u32, factor: u32) -> u32 {
@@ -88,6 +96,14 @@ mod tests {
         assert_eq!(unpack(over(ground, pack([64, 0, 0, 128]))), [69, 100, 127, 255]);
         // Additive light: colour without alpha.
         assert_eq!(unpack(over(ground, pack([100, 100, 100, 0]))), [110, 255, 255, 255]);
+    }
+
+    #[test]
+    fn four_pixels_are_averaged_by_channel() {
+        let mean =
+            average([pack([0, 255, 7, 255]), pack([255, 255, 7, 255]), pack([255, 255, 8, 255]), pack([255, 0, 8, 0])]);
+        assert_eq!(unpack(mean), [191, 191, 8, 191]);
+        assert_eq!(average([u32::MAX; 4]), u32::MAX);
     }
 
     #[test]

@@ -6,8 +6,8 @@
 //! an edge leave no gap and paint no pixel twice.
 //! Paint callbacks are not drawn: on the CPU the scene comes as a texture.
 
-mod blend;
-mod raster;
+pub(in crate::gui) mod blend;
+pub(in crate::gui) mod raster;
 #[cfg(test)]
 mod tests;
 mod texture;

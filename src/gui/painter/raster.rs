@@ -7,7 +7,7 @@ use super::blend;
 use super::texture::{TEXEL_BITS, TexelKind, Texture, weight};
 
 /// Steps per pixel that vertices are snapped to.
-const SUBPIXELS: i32 = 256;
+pub(in crate::gui) const SUBPIXELS: i32 = 256;
 /// Furthest coordinate in subpixels (32 768 pixels), so that products fit 64 bits.
 const FURTHEST: f32 = (1 << 23) as f32;
 
@@ -33,11 +33,11 @@ impl<'a> Band<'a> {
 
 /// Pixels `left..right` of rows `top..bottom`.
 #[derive(Clone, Copy)]
-struct Clip {
-    left: i32,
-    top: i32,
-    right: i32,
-    bottom: i32,
+pub(in crate::gui) struct Clip {
+    pub(in crate::gui) left: i32,
+    pub(in crate::gui) top: i32,
+    pub(in crate::gui) right: i32,
+    pub(in crate::gui) bottom: i32,
 }
 
 impl Clip {
@@ -228,7 +228,7 @@ fn first_centre(subpixels: i32) -> i32 {
 
 /// Calls `emit(row, left, right)` for each row of a triangle with at least one pixel centre inside, top-left rule.
 #[inline]
-fn spans(mut points: [[i32; 2]; 3], clip: Clip, mut emit: impl FnMut(i32, i32, i32)) {
+pub(in crate::gui) fn spans(mut points: [[i32; 2]; 3], clip: Clip, mut emit: impl FnMut(i32, i32, i32)) {
     points.sort_unstable_by_key(|point| point[1]);
     let [top, middle, bottom] = points;
     let turn = cross(top, bottom, middle);
@@ -305,15 +305,20 @@ impl Edge {
 
 /// A value that changes linearly over the picture, by pixels.
 #[derive(Clone, Copy)]
-struct Plane {
-    at_origin: f64,
+pub(in crate::gui) struct Plane {
+    at_corner: f64,
     per_column: f64,
     per_row: f64,
 }
 
 impl Plane {
+    /// From its value at the picture's corner and its slopes.
+    pub(in crate::gui) fn new(at_corner: f64, per_column: f64, per_row: f64) -> Self {
+        Self { at_corner, per_column, per_row }
+    }
+
     /// Through values at three corners; `None` for a triangle without area.
-    fn through(points: [[i32; 2]; 3], values: [f64; 3]) -> Option<Self> {
+    pub(in crate::gui) fn through(points: [[i32; 2]; 3], values: [f64; 3]) -> Option<Self> {
         let area = cross(points[0], points[1], points[2]);
         if area == 0 {
             return None;
@@ -323,14 +328,19 @@ impl Plane {
         let scale = f64::from(SUBPIXELS) / area as f64;
         let per_column = (db * (c[1] - a[1]) - dc * (b[1] - a[1])) * scale;
         let per_row = (dc * (b[0] - a[0]) - db * (c[0] - a[0])) * scale;
-        let half = f64::from(SUBPIXELS) / 2.0;
-        let [to_x, to_y] = [(half - a[0]) / f64::from(SUBPIXELS), (half - a[1]) / f64::from(SUBPIXELS)];
-        Some(Self { at_origin: values[0] + per_column * to_x + per_row * to_y, per_column, per_row })
+        let [x, y] = a.map(|coordinate| coordinate / f64::from(SUBPIXELS));
+        Some(Self { at_corner: values[0] - per_column * x - per_row * y, per_column, per_row })
+    }
+
+    /// The value at a place in pixels from the picture's corner.
+    #[inline]
+    pub(in crate::gui) fn at_place(&self, x_px: f64, y_px: f64) -> f64 {
+        self.at_corner + self.per_column * x_px + self.per_row * y_px
     }
 
     /// The value at a pixel's centre.
     fn at(&self, column: i32, row: i32) -> f64 {
-        self.at_origin + self.per_column * f64::from(column) + self.per_row * f64::from(row)
+        self.at_place(f64::from(column) + 0.5, f64::from(row) + 0.5)
     }
 }
 

@@ -31,10 +31,12 @@ pub(crate) struct PlotArea {
 }
 
 impl PlotArea {
-    /// Points right of the left edge.
+    /// Points right of the left edge, at most one width outside: dashes along a line that ran on for miles would take
+    /// all memory.
     pub(crate) fn offset_of(&self, stamp_ns: i64) -> f32 {
-        let span_ns = (self.end_ns - self.begin_ns).max(1);
-        ((stamp_ns - self.begin_ns) as f64 / span_ns as f64 * f64::from(self.rect.width())) as f32
+        let span_ns = self.end_ns.saturating_sub(self.begin_ns).max(1);
+        let fraction = stamp_ns.saturating_sub(self.begin_ns) as f64 / span_ns as f64;
+        fraction.clamp(-1.0, 2.0) as f32 * self.rect.width()
     }
 
     /// Screen x of a time.

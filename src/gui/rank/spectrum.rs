@@ -61,16 +61,16 @@ pub(super) fn ui(ui: &mut Ui, theme: &Theme, rank: &RankReport, height: f32) {
     if let Some(pointer) = response.hover_pos() {
         let index = ((pointer.x - plot.left()) / pitch) as usize;
         if let Some(value) = rank.singular_values.get(index).filter(|_| plot.x_range().contains(pointer.x)) {
-            let mut text = format!("σ{} = {}", index + 1, figure(*value));
+            let mut lines = vec![format!("σ{} = {}", index + 1, figure(*value))];
             if let Some(with_priors) = rank.singular_values_with_priors.get(index) {
-                text.push_str(&format!("\nwith priors {}", figure(*with_priors)));
+                lines.push(format!("with priors {}", figure(*with_priors)));
             }
             // Directions come weakest first, singular values largest first.
             let direction = (rank.singular_values.len() - 1).checked_sub(index).and_then(|d| rank.directions.get(d));
             if let Some(direction) = direction {
-                text.push_str(&format!("\n{}", parameters_of(&rank.names, direction, 4)));
+                lines.push(parameters_of(&rank.names, direction, 4));
             }
-            response.on_hover_text_at_pointer(text);
+            response.on_hover_text_at_pointer(lines.join("\n"));
         }
     }
 }

@@ -105,7 +105,8 @@ pub(crate) fn parameters_of(names: &[String], direction: &CalibrationDirection, 
         text.push_str(names.get(*column).map_or("?", String::as_str));
     }
     if left_out > 0 {
-        text.push_str(&format!(" and {}", counted(left_out, "other")));
+        text.push_str(" and ");
+        text.push_str(&counted(left_out, "other"));
     }
     text
 }

@@ -1,0 +1,362 @@
+//! Metric scale, gravity, velocities and biases for camera poses that are known up to scale.
+//!
+//! Everything is expressed in the IMU frame of the first view ("start").
+//! Rotations of the IMU come from the gyroscope, rotations of the camera from the images; between them stands the mount,
+//! which a gimbal turns, so that only its rotation at the first view is one unknown, averaged over all views.
+
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
+
+use super::bearing::median;
+use crate::estimator::{ImuBias, Preintegration};
+use crate::geometry::{RigidTransform, so3};
+
+/// Noise of a visual rotation between two views, added to the mount's.
+const VISUAL_ROTATION_SIGMA_RAD: f64 = 0.002;
+/// Typical distance of landmarks before the scale is known.
+const FIRST_DISTANCE_M: f64 = 8.0;
+/// Error of a gyroscope rotation over a window, which turns gravity into a false acceleration.
+const TILT_SIGMA_RAD: f64 = 0.003;
+/// Rounds of the linear system; from the second on the mount's rotation is free as well.
+const ROUNDS: usize = 5;
+
+/// A Gaussian belief about a vector, the same for each axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VectorPrior {
+    /// Expected value.
+    pub mean: Vector3<f64>,
+    /// Standard deviation of each component.
+    pub sigma: f64,
+}
+
+/// What the alignment is given.
+pub(super) struct AlignmentInput<'a> {
+    /// `first_camera_from_camera`, up to scale, one per view.
+    pub(super) cameras: &'a [RigidTransform],
+    /// The mount as calibration and encoders say, one per view.
+    pub(super) imu_from_camera: &'a [RigidTransform],
+    /// Motion from each view to the next, one fewer than views.
+    pub(super) increments: &'a [Preintegration],
+    /// Median distance of the landmarks, in the cameras' unit of length.
+    pub(super) median_distance: f64,
+    pub(super) bearing_sigma_rad: f64,
+    pub(super) gravity_m_per_s2: f64,
+    /// Error of the mount's rotation that all views share.
+    pub(super) mount_rotation_sigma_rad: f64,
+    /// Error of the mount's rotation of its own in each view.
+    pub(super) mount_rotation_noise_rad: f64,
+    pub(super) gyroscope_bias: VectorPrior,
+    pub(super) accelerometer_bias: VectorPrior,
+}
+
+/// A first metric solution, in the IMU frame of the first view.
+#[derive(Clone, Debug)]
+pub(super) struct Alignment {
+    /// Metres per unit of the cameras' translations.
+    pub(super) scale: f64,
+    /// Gravity (pointing down) with its exact magnitude.
+    pub(super) gravity: Vector3<f64>,
+    /// `start_from_imu` per view.
+    pub(super) poses: Vec<RigidTransform>,
+    /// Velocity per view.
+    pub(super) velocities: Vec<Vector3<f64>>,
+    /// The mount's rotation per view, after the images.
+    pub(super) imu_from_camera: Vec<RigidTransform>,
+    pub(super) bias: ImuBias,
+    /// Weighted squares that the linear system left.
+    cost: f64,
+}
+
+/// The mount's rotation at the first view and the gyroscope's bias, from rotations alone.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RotationAlignment {
+    pub(super) imu_from_first_camera: UnitQuaternion<f64>,
+    pub(super) gyroscope_bias: Vector3<f64>,
+}
+
+/// `start_from_imu` of every view at a gyroscope bias, with the derivative of each (right perturbation) by that bias.
+fn gyroscope_rotations(increments: &[Preintegration], bias: &Vector3<f64>) -> Vec<(UnitQuaternion<f64>, Matrix3<f64>)> {
+    let mut rotations = vec![(UnitQuaternion::identity(), Matrix3::zeros())];
+    let (mut rotation, mut by_bias) = (UnitQuaternion::identity(), Matrix3::zeros());
+    for increment in increments {
+        let bias = ImuBias { gyroscope_rad_per_s: *bias, ..*increment.bias() };
+        let turn = increment.corrected(&bias).rotation;
+        let own: Matrix3<f64> = increment.bias_jacobian().fixed_view::<3, 3>(0, 0).into_owned();
+        by_bias = turn.inverse().to_rotation_matrix().into_inner() * by_bias + own;
+        rotation = UnitQuaternion::new_normalize((rotation * turn).into_inner());
+        rotations.push((rotation, by_bias));
+    }
+    rotations
+}
+
+/// Solves for the mount's rotation at the first view and the gyroscope's bias together, robustly.
+///
+/// Each view says `imu_from_first_camera = start_from_imu · imu_from_camera · camera_from_first_camera`.
+pub(super) fn align_rotations(input: &AlignmentInput<'_>) -> Option<RotationAlignment> {
+    const ROUNDS: usize = 10;
+    let sigma = input.mount_rotation_noise_rad.hypot(VISUAL_ROTATION_SIGMA_RAD);
+    let mut bias = input.gyroscope_bias.mean;
+    let mut mount = input.imu_from_camera.first()?.rotation;
+    for _ in 0..ROUNDS {
+        let rotations = gyroscope_rotations(input.increments, &bias);
+        let (mut normal, mut rhs) = (Matrix6::<f64>::zeros(), Vector6::zeros());
+        let prior = 1.0 / input.gyroscope_bias.sigma.powi(2);
+        for axis in 0..3 {
+            normal[(3 + axis, 3 + axis)] += prior;
+            rhs[3 + axis] += (input.gyroscope_bias.mean[axis] - bias[axis]) * prior;
+        }
+        for ((start_from_imu, by_bias), (given, camera)) in
+            rotations.iter().zip(input.imu_from_camera.iter().zip(input.cameras))
+        {
+            let predicted = start_from_imu * given.rotation * camera.rotation.inverse();
+            let error = so3::log(&(mount.inverse() * predicted));
+            // A right turn of `start_from_imu` passes through the rest of the product.
+            let onward = (given.rotation * camera.rotation.inverse()).inverse().to_rotation_matrix().into_inner();
+            let by_bias = onward * by_bias;
+            let ratio = error.norm() / sigma;
+            let weight = 1.0 / (sigma * sigma * (1.0 + (ratio / 3.0).powi(2)));
+            // error(δ, db) ≈ error − δ + by_bias · db, for a right turn δ of the mount.
+            let mut jacobian = nalgebra::Matrix3x6::zeros();
+            jacobian.fixed_view_mut::<3, 3>(0, 0).copy_from(&-Matrix3::identity());
+            jacobian.fixed_view_mut::<3, 3>(0, 3).copy_from(&by_bias);
+            normal += jacobian.transpose() * jacobian * weight;
+            rhs -= jacobian.transpose() * error * weight;
+        }
+        let step = normal.cholesky()?.solve(&rhs);
+        mount = UnitQuaternion::new_normalize((mount * so3::exp(&step.fixed_rows::<3>(0).into_owned())).into_inner());
+        bias += step.fixed_rows::<3>(3);
+        if step.norm() < 1e-7 {
+            break;
+        }
+    }
+    (mount.norm().is_finite() && bias.norm().is_finite())
+        .then_some(RotationAlignment { imu_from_first_camera: mount, gyroscope_bias: bias })
+}
+
+/// Columns of the linear system: scale, mount (3), accelerometer bias (3), gravity (3), velocities (3 each).
+const SCALE: usize = 0;
+const MOUNT: usize = 1;
+const BIAS: usize = 4;
+const GRAVITY: usize = 7;
+const VELOCITY: usize = 10;
+
+/// Beyond this uncertainty of the mount's rotation the alignment is tried from rotations all around.
+const AMPLE_MOUNT_SIGMA_RAD: f64 = 0.6;
+
+/// Solves for scale, gravity of exact magnitude, velocities, accelerometer bias and what the mount's rotation still lacks.
+///
+/// Without encoders the mount may point anywhere: then the 24 rotations of a cube are tried as well, none of which lies
+/// further than 63° from any rotation, and the least cost wins.
+pub(super) fn align(input: &AlignmentInput<'_>, rotation: &RotationAlignment) -> Option<Alignment> {
+    let mut best = align_from(input, rotation, rotation.imu_from_first_camera);
+    if input.mount_rotation_sigma_rad > AMPLE_MOUNT_SIGMA_RAD {
+        for turn in cube_rotations() {
+            let candidate = align_from(input, rotation, turn * rotation.imu_from_first_camera);
+            let better = match (&candidate, &best) {
+                (Some(new), Some(old)) => new.scale > 0.0 && (old.scale <= 0.0 || new.cost < old.cost),
+                (Some(_), None) => true,
+                _ => false,
+            };
+            if better {
+                best = candidate;
+            }
+        }
+    }
+    best
+}
+
+/// The turns of a cube but for the identity.
+fn cube_rotations() -> impl Iterator<Item = UnitQuaternion<f64>> {
+    let axes = [Vector3::x(), -Vector3::x(), Vector3::y(), -Vector3::y(), Vector3::z(), -Vector3::z()];
+    axes.into_iter().flat_map(|up| (0..4).map(move |quarter| (up, quarter))).filter_map(|(up, quarter)| {
+        let tilt = UnitQuaternion::rotation_between(&Vector3::z(), &up)
+            .unwrap_or_else(|| UnitQuaternion::from_scaled_axis(Vector3::x() * std::f64::consts::PI));
+        let turn = Vector3::z() * (f64::from(quarter) * std::f64::consts::FRAC_PI_2);
+        let rotation = tilt * UnitQuaternion::from_scaled_axis(turn);
+        (rotation.angle() > 0.1).then_some(rotation)
+    })
+}
+
+/// The alignment from one first guess of the mount's rotation at the first view.
+fn align_from(
+    input: &AlignmentInput<'_>,
+    rotation: &RotationAlignment,
+    imu_from_first_camera: UnitQuaternion<f64>,
+) -> Option<Alignment> {
+    let rotations: Vec<UnitQuaternion<f64>> = gyroscope_rotations(input.increments, &rotation.gyroscope_bias)
+        .into_iter()
+        .map(|(rotation, _)| rotation)
+        .collect();
+    let mut mount = imu_from_first_camera;
+    let mut scale: Option<f64> = None;
+    let mut turned = so3::log(&(mount * rotation.imu_from_first_camera.inverse()));
+    let mut last: Option<(DVector<f64>, f64)> = None;
+    for _ in 0..ROUNDS {
+        let (normal, rhs, square) = linear_system(input, &rotations, &mount, scale, &turned, rotation);
+        let solution = solve_with_gravity_norm(&normal, &rhs, input.gravity_m_per_s2)?;
+        let cost = square + (solution.transpose() * (&normal * &solution - &rhs * 2.0))[0];
+        let turn = solution.fixed_rows::<3>(MOUNT).into_owned();
+        mount = UnitQuaternion::new_normalize((so3::exp(&turn) * mount).into_inner());
+        turned += turn;
+        // A negative scale would mirror the scene; go on from a small positive one.
+        scale = Some(solution[SCALE].max(1e-6));
+        last = Some((solution, cost));
+    }
+    let (solution, cost) = last?;
+    let scale = solution[SCALE];
+    if !solution.iter().all(|value| value.is_finite()) {
+        return None;
+    }
+    let gravity = solution.fixed_rows::<3>(GRAVITY).into_owned();
+    let lever = input.imu_from_camera.first()?.translation_m;
+    let mut poses = Vec::new();
+    let mut mounts = Vec::new();
+    for ((start_from_imu, camera), given) in rotations.iter().zip(input.cameras).zip(input.imu_from_camera) {
+        let camera_rotation = mount * camera.rotation;
+        let position = mount * camera.translation_m * scale + lever - start_from_imu * given.translation_m;
+        poses.push(RigidTransform::new(*start_from_imu, position));
+        mounts.push(RigidTransform::new(start_from_imu.inverse() * camera_rotation, given.translation_m));
+    }
+    let velocities = (0..poses.len()).map(|k| solution.fixed_rows::<3>(VELOCITY + 3 * k).into_owned()).collect();
+    let bias = ImuBias {
+        gyroscope_rad_per_s: rotation.gyroscope_bias,
+        accelerometer_m_per_s2: solution.fixed_rows::<3>(BIAS).into_owned(),
+    };
+    Some(Alignment { scale, gravity, poses, velocities, imu_from_camera: mounts, bias, cost })
+}
+
+/// Weighted normal equations `N x = b` of all intervals and priors, and the sum of the weighted squared right sides.
+fn linear_system(
+    input: &AlignmentInput<'_>,
+    rotations: &[UnitQuaternion<f64>],
+    mount: &UnitQuaternion<f64>,
+    scale: Option<f64>,
+    turned: &Vector3<f64>,
+    rotation: &RotationAlignment,
+) -> (DMatrix<f64>, DVector<f64>, f64) {
+    let columns = VELOCITY + 3 * rotations.len();
+    let mut normal = DMatrix::zeros(columns, columns);
+    let mut rhs = DVector::zeros(columns);
+    let mut square = 0.0;
+    let distance_m = scale.map_or(FIRST_DISTANCE_M, |scale| scale * input.median_distance);
+    let visual_sigma_m = 0.3 * input.bearing_sigma_rad * distance_m;
+    let bias =
+        ImuBias { gyroscope_rad_per_s: rotation.gyroscope_bias, accelerometer_m_per_s2: input.accelerometer_bias.mean };
+    let mut row = DMatrix::zeros(3, columns);
+    for (k, increment) in input.increments.iter().enumerate() {
+        let t = increment.duration_s();
+        let motion = increment.corrected(&bias);
+        let r = rotations[k].to_rotation_matrix().into_inner();
+        let jacobian = increment.bias_jacobian();
+        let p_by_ba: Matrix3<f64> = r * jacobian.fixed_view::<3, 3>(3, 3);
+        let v_by_ba: Matrix3<f64> = r * jacobian.fixed_view::<3, 3>(6, 3);
+        let lever = rotations[k + 1] * input.imu_from_camera[k + 1].translation_m
+            - rotations[k] * input.imu_from_camera[k].translation_m;
+        let baseline = mount * (input.cameras[k + 1].translation_m - input.cameras[k].translation_m);
+        let tilt = TILT_SIGMA_RAD * input.gravity_m_per_s2;
+
+        row.fill(0.0);
+        row.fixed_view_mut::<3, 1>(0, SCALE).copy_from(&baseline);
+        if let Some(scale) = scale {
+            row.fixed_view_mut::<3, 3>(0, MOUNT).copy_from(&(-so3::hat(&baseline) * scale));
+        }
+        row.fixed_view_mut::<3, 3>(0, BIAS).copy_from(&-p_by_ba);
+        row.fixed_view_mut::<3, 3>(0, GRAVITY).copy_from(&(Matrix3::identity() * (-0.5 * t * t)));
+        row.fixed_view_mut::<3, 3>(0, VELOCITY + 3 * k).copy_from(&(Matrix3::identity() * -t));
+        let sigma = visual_sigma_m.hypot(0.5 * tilt * t * t).max(1e-4);
+        let side = r * motion.position_m + lever - p_by_ba * bias.accelerometer_m_per_s2;
+        add_rows(&mut normal, &mut rhs, &mut square, &row, &side, sigma);
+
+        row.fill(0.0);
+        row.fixed_view_mut::<3, 3>(0, BIAS).copy_from(&-v_by_ba);
+        row.fixed_view_mut::<3, 3>(0, GRAVITY).copy_from(&(Matrix3::identity() * -t));
+        row.fixed_view_mut::<3, 3>(0, VELOCITY + 3 * k).copy_from(&-Matrix3::identity());
+        row.fixed_view_mut::<3, 3>(0, VELOCITY + 3 * k + 3).copy_from(&Matrix3::identity());
+        let sigma = (tilt * t).max(1e-4);
+        let side = r * motion.velocity_m_per_s - v_by_ba * bias.accelerometer_m_per_s2;
+        add_rows(&mut normal, &mut rhs, &mut square, &row, &side, sigma);
+    }
+    let bias_weight = 1.0 / input.accelerometer_bias.sigma.powi(2);
+    let mount_weight = 1.0 / input.mount_rotation_sigma_rad.max(1e-4).powi(2);
+    for axis in 0..3 {
+        normal[(BIAS + axis, BIAS + axis)] += bias_weight;
+        rhs[BIAS + axis] += bias_weight * input.accelerometer_bias.mean[axis];
+        square += bias_weight * input.accelerometer_bias.mean[axis].powi(2);
+        normal[(MOUNT + axis, MOUNT + axis)] += mount_weight;
+        rhs[MOUNT + axis] -= mount_weight * turned[axis];
+        square += mount_weight * turned[axis].powi(2);
+    }
+    (normal, rhs, square)
+}
+
+fn add_rows(
+    normal: &mut DMatrix<f64>,
+    rhs: &mut DVector<f64>,
+    square: &mut f64,
+    rows: &DMatrix<f64>,
+    side: &Vector3<f64>,
+    sigma: f64,
+) {
+    let weight = 1.0 / (sigma * sigma);
+    normal.gemm_tr(weight, rows, rows, 1.0);
+    rhs.gemv_tr(weight, rows, side, 1.0);
+    *square += weight * side.norm_squared();
+}
+
+/// The least-squares solution of `N x = b` whose three gravity entries have exactly the given norm.
+///
+/// All else is eliminated onto gravity; the multiplier of the constraint is the root of a function that falls
+/// monotonically beyond the last pole, found by bisection.
+pub(super) fn solve_with_gravity_norm(
+    normal: &DMatrix<f64>,
+    rhs: &DVector<f64>,
+    magnitude: f64,
+) -> Option<DVector<f64>> {
+    let n = rhs.len();
+    let others: Vec<usize> = (0..n).filter(|column| !(GRAVITY..GRAVITY + 3).contains(column)).collect();
+    let count = others.len();
+    let inner = DMatrix::from_fn(count, count, |row, col| normal[(others[row], others[col])]);
+    let coupling = DMatrix::from_fn(count, 3, |row, col| normal[(others[row], GRAVITY + col)]);
+    let inner_rhs = DVector::from_fn(count, |row, _| rhs[others[row]]);
+    let factor = inner.cholesky()?;
+    let solved_coupling = factor.solve(&coupling);
+    let solved_rhs = factor.solve(&inner_rhs);
+    let corner: Matrix3<f64> = normal.fixed_view::<3, 3>(GRAVITY, GRAVITY).into_owned();
+    let reduced: Matrix3<f64> = corner - coupling.tr_mul(&solved_coupling).fixed_view::<3, 3>(0, 0);
+    let reduced_rhs: Vector3<f64> = rhs.fixed_rows::<3>(GRAVITY) - coupling.tr_mul(&solved_rhs).fixed_rows::<3>(0);
+    let gravity = quadratic_on_sphere(&reduced, &reduced_rhs, magnitude)?;
+    let rest = solved_rhs - solved_coupling * gravity;
+    let mut solution = DVector::zeros(n);
+    for (value, column) in rest.iter().zip(&others) {
+        solution[*column] = *value;
+    }
+    solution.fixed_rows_mut::<3>(GRAVITY).copy_from(&gravity);
+    Some(solution)
+}
+
+/// The `x` of a given norm that makes `xᵀ A x − 2 bᵀ x` least.
+pub(super) fn quadratic_on_sphere(a: &Matrix3<f64>, b: &Vector3<f64>, norm: f64) -> Option<Vector3<f64>> {
+    const HALVINGS: usize = 200;
+    let eigen = ((a + a.transpose()) * 0.5).try_symmetric_eigen(1e-15, 500)?;
+    let c = eigen.eigenvectors.tr_mul(b);
+    let least = eigen.eigenvalues.min();
+    if b.norm() == 0.0 || !b.norm().is_finite() || !norm.is_finite() {
+        return None;
+    }
+    // (A + μ I) x = b with μ > −least: |x| falls from infinity to zero.
+    let length = |mu: f64| c.component_div(&eigen.eigenvalues.add_scalar(mu)).norm();
+    let (mut low, mut high) = (-least, -least + b.norm() / norm);
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        if length(middle) > norm { low = middle } else { high = middle }
+    }
+    let mu = high;
+    let x = eigen.eigenvectors * c.component_div(&eigen.eigenvalues.add_scalar(mu));
+    // The norm is met to rounding; in the hard case (b orthogonal to the weakest direction) it is made so.
+    let length = x.norm();
+    (length.is_finite() && length > 0.0).then(|| x * (norm / length))
+}
+
+/// Median distance of landmarks from their anchors, in their own unit.
+pub(super) fn median_distance(inverse_distances: impl Iterator<Item = f64>) -> f64 {
+    1.0 / median(inverse_distances.collect()).max(1e-9)
+}

@@ -1,0 +1,420 @@
+//! One attempt from beginning to end.
+
+use nalgebra::{UnitQuaternion, Vector3};
+
+use super::alignment::{Alignment, AlignmentInput, VectorPrior, align, align_rotations, median_distance};
+use super::checks::{Checklist, Shown};
+use super::refinement::{Refined, RefinedState, Refinement, RefinementInput};
+use super::selection::{guessed_rotations, select_views};
+use super::structure::{
+    Structure, StructureFailure, StructureLimits, ViewPair, collect_tracks, common_bearings, rank_pairs, reconstruct,
+};
+use super::visual_problem::mean_square;
+use super::{
+    InitializationDiagnostics, InitializationFrame, InitializationInput, InitializationOptions, InitializationOrigin,
+    InitializationOutcome, InitializationSolution, InitializedFrame, InitializedLandmark, StandstillEstimate,
+    StandstillPolicy, standstill,
+};
+use crate::estimator::{ImuBias, Preintegration};
+use crate::geometry::{RigidTransform, seconds_from_ns};
+
+/// Rounds of the refinement before and after landmarks that do not fit are dropped.
+const REFINEMENT_ROUNDS: [usize; 2] = [10, 6];
+/// A landmark with a sighting beyond this many standard deviations is dropped in between.
+const OUTLIER_SIGMAS: f64 = 4.0;
+/// A change of the gyroscope's bias by more than this is integrated anew.
+const REINTEGRATE_RAD_PER_S: f64 = 0.003;
+
+/// Tries to initialize on the frames given.
+pub fn try_initialize(input: &InitializationInput<'_>, options: &InitializationOptions) -> InitializationOutcome {
+    let mut still = Checklist::default();
+    let standing = standstill::detect(input, &mut still);
+    if let (Some(standing), StandstillPolicy::InitializeAtOnce) = (&standing, options.standstill_policy) {
+        return from_standstill(input, standing, still);
+    }
+    let mut checklist = Checklist::default();
+    match from_motion(input, options, standing.or(input.standstill).as_ref(), &mut checklist) {
+        Some(mut solution) => {
+            solution.passed = checklist.passed;
+            InitializationOutcome::Initialized(Box::new(solution))
+        }
+        None => {
+            InitializationOutcome::Waiting { reasons: checklist.failed, passed: checklist.passed, standstill: standing }
+        }
+    }
+}
+
+/// Gravity along the mean specific force; of the accelerometer's bias only what lies along it can be told.
+fn from_standstill(
+    input: &InitializationInput<'_>,
+    standing: &StandstillEstimate,
+    checklist: Checklist,
+) -> InitializationOutcome {
+    let force = standing.specific_force_m_per_s2;
+    let excess = 1.0 - input.gravity_m_per_s2 / force.norm();
+    let world_from_imu = RigidTransform::new(level(&-force), Vector3::zeros());
+    let frames = input
+        .frames
+        .iter()
+        .filter(|frame| standing.stamp_ns - frame.stamp_ns <= 1_000_000_000)
+        .map(|frame| InitializedFrame {
+            frame_index: frame.frame_index,
+            stamp_ns: frame.stamp_ns,
+            world_from_imu,
+            velocity_m_per_s: Vector3::zeros(),
+            imu_from_camera: frame.imu_from_camera,
+        })
+        .collect();
+    InitializationOutcome::Initialized(Box::new(InitializationSolution {
+        origin: InitializationOrigin::FromStandstill,
+        frames,
+        bias: ImuBias {
+            gyroscope_rad_per_s: standing.gyroscope_bias_rad_per_s,
+            accelerometer_m_per_s2: force * excess,
+        },
+        landmarks: Vec::new(),
+        diagnostics: InitializationDiagnostics {
+            gyroscope_bias_sigma_rad_per_s: standing.gyroscope_bias_sigma_rad_per_s,
+            ..InitializationDiagnostics::default()
+        },
+        passed: checklist.passed,
+    }))
+}
+
+/// `world_from_imu` that turns gravity (given in the IMU frame, pointing down) to −z and leaves no yaw.
+fn level(gravity_in_imu: &Vector3<f64>) -> UnitQuaternion<f64> {
+    let up = -gravity_in_imu.normalize();
+    // The shortest turn from `up` to z, or a half turn about x when they are opposite.
+    let tilt = UnitQuaternion::rotation_between(&up, &Vector3::z())
+        .unwrap_or_else(|| UnitQuaternion::from_scaled_axis(Vector3::x() * std::f64::consts::PI));
+    let forward = tilt * Vector3::x();
+    UnitQuaternion::from_scaled_axis(Vector3::z() * -forward.y.atan2(forward.x)) * tilt
+}
+
+fn from_motion(
+    input: &InitializationInput<'_>,
+    options: &InitializationOptions,
+    standing: Option<&StandstillEstimate>,
+    checklist: &mut Checklist,
+) -> Option<InitializationSolution> {
+    let gyroscope_prior = match standing {
+        Some(standing) => VectorPrior {
+            mean: standing.gyroscope_bias_rad_per_s,
+            sigma: standing.gyroscope_bias_sigma_rad_per_s.max(5e-4),
+        },
+        None => VectorPrior { mean: Vector3::zeros(), sigma: options.gyroscope_bias_sigma_rad_per_s },
+    };
+    let rotations = guessed_rotations(input.frames, &gyroscope_prior.mean);
+    let selected = select_views(input.frames, &rotations, options);
+    let count = selected.len() as f64;
+    checklist.at_least("views", "number of views", count, options.least_views as f64, Shown::Plain(""));
+    let span = match (selected.first(), selected.last()) {
+        (Some(&first), Some(&last)) => seconds_from_ns(input.frames[last].stamp_ns - input.frames[first].stamp_ns),
+        _ => 0.0,
+    };
+    checklist.at_least(
+        "window",
+        "time between the first and the last view",
+        span,
+        options.shortest_window_s,
+        Shown::Plain(" s"),
+    );
+    let views: Vec<_> = selected.iter().map(|&index| input.frames[index].features).collect();
+    let guesses: Vec<_> = selected.iter().map(|&index| rotations[index]).collect();
+    let tracks = collect_tracks(&views);
+    let pairs = rank_pairs(&tracks, &guesses, options.least_common_features);
+    let common = (1..views.len()).map(|view| common_bearings(&tracks, view - 1, view).len()).min().unwrap_or(0);
+    let least_common = options.least_common_features as f64;
+    checklist.at_least(
+        "features",
+        "features that neighbouring views share",
+        common as f64,
+        least_common,
+        Shown::Plain(""),
+    );
+    let parallax_rad = pairs.first().map_or(0.0, |pair: &ViewPair| pair.fit.median_parallax_rad);
+    let subject = "parallax between the best two views, rotation taken out,";
+    checklist.at_least("parallax", subject, parallax_rad, options.least_parallax_rad, Shown::Degrees);
+    let excitation = excitation(input.frames, &selected, &rotations);
+    let subject = "spread of the acceleration between views";
+    checklist.at_least("excitation", subject, excitation, options.least_excitation_m_per_s2, Shown::Plain(" m/s²"));
+    if !checklist.all_passed() {
+        return None;
+    }
+
+    let structure = structure_of(&tracks, &pairs, &guesses, input, options, checklist)?;
+    let kept: Vec<usize> = structure.views.iter().map(|&view| selected[view]).collect();
+    let problem = Problem { input, options, kept: &kept, structure: &structure, gyroscope_prior };
+    let (alignment, increments) = problem.align(checklist)?;
+    let refined = problem.refine(&alignment, &increments, checklist)?;
+    Some(problem.solution(&refined, parallax_rad))
+}
+
+/// Standard deviation of the mean specific force between neighbouring views, in a frame that does not turn.
+fn excitation(frames: &[InitializationFrame<'_>], selected: &[usize], camera_rotations: &[UnitQuaternion<f64>]) -> f64 {
+    let forces: Vec<Vector3<f64>> = selected
+        .windows(2)
+        .filter_map(|pair| {
+            let &[from, to] = pair else { return None };
+            let (mut sum, mut count) = (Vector3::zeros(), 0.0);
+            for index in from + 1..=to {
+                let rotation = camera_rotations[index] * frames[index].imu_from_camera.rotation.inverse();
+                for sample in frames[index].imu {
+                    sum += rotation * sample.specific_force_m_per_s2;
+                    count += 1.0;
+                }
+            }
+            (count > 0.0).then(|| sum / count)
+        })
+        .collect();
+    let count = forces.len().max(1) as f64;
+    let mean = forces.iter().sum::<Vector3<f64>>() / count;
+    (forces.iter().map(|force| (force - mean).norm_squared()).sum::<f64>() / count).sqrt()
+}
+
+fn structure_of(
+    tracks: &super::structure::Tracks,
+    pairs: &[ViewPair],
+    guesses: &[UnitQuaternion<f64>],
+    input: &InitializationInput<'_>,
+    options: &InitializationOptions,
+    checklist: &mut Checklist,
+) -> Option<Structure> {
+    let limits = StructureLimits {
+        bearing_sigma_rad: options.bearing_sigma_rad,
+        rotation_sigma_rad: (options.mount_rotation_noise_rad * 1.5)
+            .hypot(0.5 * options.mount_rotation_sigma_rad)
+            .hypot(0.02),
+        least_landmarks: options.least_landmarks,
+        least_views: options.least_views,
+        least_inlier_share: options.least_inlier_share,
+        seed: input.frames.last()?.frame_index as u64,
+    };
+    let plain = Shown::Plain("");
+    match reconstruct(tracks, pairs, guesses, &limits) {
+        Ok(structure) => {
+            let subject = "landmarks with a depth";
+            checklist.at_least(
+                "landmarks",
+                subject,
+                structure.landmarks.len() as f64,
+                limits.least_landmarks as f64,
+                plain,
+            );
+            let newest = structure.views.last().is_some_and(|&last| last + 1 == guesses.len());
+            checklist.at_least(
+                "newest view",
+                "whether the newest view could be placed",
+                f64::from(u8::from(newest)),
+                1.0,
+                plain,
+            );
+            checklist.all_passed().then_some(structure)
+        }
+        Err(StructureFailure::NoRelativePose { inlier_share }) => {
+            let subject = "share of features that agree with a relative pose";
+            checklist.at_least("relative pose", subject, inlier_share, limits.least_inlier_share, Shown::Percent);
+            None
+        }
+        Err(StructureFailure::FewLandmarks { landmarks }) => {
+            let subject = "landmarks with a depth";
+            checklist.at_least("landmarks", subject, landmarks as f64, limits.least_landmarks as f64, plain);
+            None
+        }
+        Err(StructureFailure::FewViews { views }) => {
+            let subject = "views that could be placed";
+            checklist.at_least("placed views", subject, views as f64, limits.least_views as f64, plain);
+            None
+        }
+    }
+}
+
+/// The views that were placed, with all that the metric part needs.
+struct Problem<'a> {
+    input: &'a InitializationInput<'a>,
+    options: &'a InitializationOptions,
+    /// Numbers of the frames behind the views.
+    kept: &'a [usize],
+    structure: &'a Structure,
+    gyroscope_prior: VectorPrior,
+}
+
+impl Problem<'_> {
+    fn mounts(&self) -> Vec<RigidTransform> {
+        self.kept.iter().map(|&index| self.input.frames[index].imu_from_camera).collect()
+    }
+
+    /// Motion between neighbouring views, integrated around a bias.
+    fn increments(&self, bias: ImuBias) -> Vec<Preintegration> {
+        self.kept
+            .windows(2)
+            .map(|pair| {
+                let mut increment = Preintegration::new(self.input.imu_noise, bias);
+                if let &[from, to] = pair {
+                    for frame in &self.input.frames[from + 1..=to] {
+                        increment.extend(frame.imu);
+                    }
+                }
+                increment
+            })
+            .collect()
+    }
+
+    fn accelerometer_prior(&self) -> VectorPrior {
+        VectorPrior { mean: Vector3::zeros(), sigma: self.options.accelerometer_bias_sigma_m_per_s2 }
+    }
+
+    fn alignment_input<'b>(
+        &'b self,
+        mounts: &'b [RigidTransform],
+        increments: &'b [Preintegration],
+    ) -> AlignmentInput<'b> {
+        AlignmentInput {
+            cameras: &self.structure.poses,
+            imu_from_camera: mounts,
+            increments,
+            median_distance: median_distance(self.structure.landmarks.iter().map(|landmark| landmark.inverse_distance)),
+            bearing_sigma_rad: self.options.bearing_sigma_rad,
+            gravity_m_per_s2: self.input.gravity_m_per_s2,
+            mount_rotation_sigma_rad: self.options.mount_rotation_sigma_rad,
+            mount_rotation_noise_rad: self.options.mount_rotation_noise_rad,
+            gyroscope_bias: self.gyroscope_prior,
+            accelerometer_bias: self.accelerometer_prior(),
+        }
+    }
+
+    fn align(&self, checklist: &mut Checklist) -> Option<(Alignment, Vec<Preintegration>)> {
+        let mounts = self.mounts();
+        let mut bias =
+            ImuBias { gyroscope_rad_per_s: self.gyroscope_prior.mean, accelerometer_m_per_s2: Vector3::zeros() };
+        let mut increments = self.increments(bias);
+        let rotation = align_rotations(&self.alignment_input(&mounts, &increments));
+        let subject = "gyroscope and images agree about rotations";
+        checklist.at_least("rotations", subject, f64::from(u8::from(rotation.is_some())), 1.0, Shown::Plain(""));
+        let rotation = rotation?;
+        if (rotation.gyroscope_bias - bias.gyroscope_rad_per_s).norm() > REINTEGRATE_RAD_PER_S {
+            bias.gyroscope_rad_per_s = rotation.gyroscope_bias;
+            increments = self.increments(bias);
+        }
+        let alignment = align(&self.alignment_input(&mounts, &increments), &rotation);
+        let scale = alignment.as_ref().map_or(0.0, |alignment| alignment.scale);
+        let subject = "metres per unit of the reconstruction, by the linear alignment,";
+        let positive = checklist.at_least("linear scale", subject, scale, 1e-3, Shown::Plain(" m"));
+        alignment.filter(|_| positive).map(|alignment| (alignment, increments))
+    }
+
+    fn refine(
+        &self,
+        alignment: &Alignment,
+        increments: &[Preintegration],
+        checklist: &mut Checklist,
+    ) -> Option<Refined> {
+        let options = self.options;
+        let mounts = self.mounts();
+        let input = RefinementInput {
+            imu_from_camera: &mounts,
+            increments,
+            bearing_sigma_rad: options.bearing_sigma_rad,
+            mount_rotation_sigma_rad: options.mount_rotation_sigma_rad,
+            mount_rotation_noise_rad: options.mount_rotation_noise_rad,
+            mount_translation_sigma_m: options.mount_translation_sigma_m,
+            gyroscope_bias: self.gyroscope_prior,
+            accelerometer_bias: self.accelerometer_prior(),
+        };
+        let refinement = Refinement::new(&input)?;
+        let start = RefinedState::new(&input, alignment, &self.structure.landmarks);
+        let mut refined = refinement.run(start, REFINEMENT_ROUNDS[0]);
+        let before = refined.state.landmarks.len();
+        let cameras = refined.state.cameras(&mounts);
+        refined.state.landmarks.retain(|landmark| {
+            landmark.inverse_distance > 0.0
+                && landmark.worst_ratio(&cameras, options.bearing_sigma_rad) < OUTLIER_SIGMAS
+        });
+        let rounds = refined.rounds;
+        let mut refined = refinement.run(refined.state, REFINEMENT_ROUNDS[1]);
+        refined.rounds += rounds;
+
+        let share = refined.state.landmarks.len() as f64 / before.max(1) as f64;
+        let subject = "share of landmarks that fit with positive depth";
+        checklist.at_least("positive depth", subject, share, options.least_inlier_share, Shown::Percent);
+        let cameras = refined.state.cameras(&mounts);
+        let rms = mean_square(&refined.state.landmarks, &cameras, options.bearing_sigma_rad).0.sqrt();
+        let subject = "reprojection error over its standard deviation";
+        checklist.at_most("reprojection", subject, rms, options.most_reprojection_sigmas, Shown::Plain(""));
+        let subject = "mean square of the whitened inertial residuals";
+        let value = refined.inertial_mean_square;
+        checklist.at_most("inertial residual", subject, value, options.most_inertial_mean_square, Shown::Plain(""));
+
+        refined.sigmas = refinement.sigmas(&refined.state);
+        let sigmas = refined.sigmas;
+        let or_far = |value: Option<f64>| value.unwrap_or(f64::INFINITY);
+        let scale = or_far(sigmas.map(|sigmas| sigmas.scale));
+        let subject = "standard deviation of the scale";
+        checklist.at_most("scale", subject, scale, options.most_scale_sigma, Shown::Percent);
+        let velocity = or_far(sigmas.map(|sigmas| sigmas.velocity_m_per_s));
+        let subject = "standard deviation of the velocity";
+        checklist.at_most("velocity", subject, velocity, options.most_velocity_sigma_m_per_s, Shown::Plain(" m/s"));
+        let gravity = or_far(sigmas.map(|sigmas| sigmas.gravity_rad));
+        let subject = "standard deviation of gravity's direction";
+        checklist.at_most("gravity", subject, gravity, options.most_gravity_sigma_rad, Shown::Degrees);
+        checklist.all_passed().then_some(refined)
+    }
+
+    /// Turns the refined state upright.
+    fn solution(&self, refined: &Refined, parallax_rad: f64) -> InitializationSolution {
+        let state = &refined.state;
+        let given = self.mounts();
+        let mounts = state.imu_from_camera(&given);
+        let upright = RigidTransform::new(level(&state.gravity), Vector3::zeros());
+        let world_from_camera: Vec<RigidTransform> =
+            state.cameras(&given).iter().map(|camera| upright * *camera).collect();
+        let frames = self
+            .kept
+            .iter()
+            .enumerate()
+            .map(|(view, &index)| InitializedFrame {
+                frame_index: self.input.frames[index].frame_index,
+                stamp_ns: self.input.frames[index].stamp_ns,
+                world_from_imu: upright * state.poses[view],
+                velocity_m_per_s: upright.rotation * state.velocities[view],
+                imu_from_camera: mounts[view],
+            })
+            .collect();
+        let mut landmarks: Vec<InitializedLandmark> = state
+            .landmarks
+            .iter()
+            .filter_map(|landmark| {
+                let depth_m = landmark.direction.z / landmark.inverse_distance;
+                (depth_m > 0.0).then_some(())?;
+                Some(InitializedLandmark {
+                    id: landmark.id,
+                    anchor_frame_index: self.input.frames[self.kept[landmark.anchor]].frame_index,
+                    position_m: landmark.position(&world_from_camera)?,
+                    inverse_depth_per_m: 1.0 / depth_m,
+                    views: landmark.sightings.len(),
+                })
+            })
+            .collect();
+        landmarks.sort_by_key(|landmark| landmark.id);
+        let sigmas = refined.sigmas.unwrap_or_default();
+        let (square, _) = mean_square(&state.landmarks, &state.cameras(&given), self.options.bearing_sigma_rad);
+        InitializationSolution {
+            origin: InitializationOrigin::FromMotion,
+            frames,
+            bias: state.bias,
+            landmarks,
+            diagnostics: InitializationDiagnostics {
+                scale_sigma: sigmas.scale,
+                velocity_sigma_m_per_s: sigmas.velocity_m_per_s,
+                gravity_sigma_rad: sigmas.gravity_rad,
+                gyroscope_bias_sigma_rad_per_s: sigmas.gyroscope_bias_rad_per_s,
+                accelerometer_bias_sigma_m_per_s2: sigmas.accelerometer_bias_m_per_s2,
+                reprojection_rms_rad: square.sqrt() * self.options.bearing_sigma_rad,
+                inertial_mean_square: refined.inertial_mean_square,
+                parallax_rad,
+                refinement_rounds: refined.rounds,
+            },
+            passed: Vec::new(),
+        }
+    }
+}

@@ -1,0 +1,218 @@
+//! Geometry of unit bearings: tangent planes, rotation between two sets, triangulation, pose from known points.
+
+use nalgebra::{Matrix2x3, Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
+
+use crate::geometry::{RigidTransform, so3};
+
+/// Two unit vectors that span the plane orthogonal to a unit bearing, as rows (2 × 3).
+///
+/// `basis · direction` is the small angle in radians between `direction` and the bearing, in that plane.
+pub fn tangent_basis(bearing: &Vector3<f64>) -> Matrix2x3<f64> {
+    let seed = if bearing.z.abs() < 0.7 { Vector3::z() } else { Vector3::x() };
+    let first = bearing.cross(&seed).normalize();
+    let second = bearing.cross(&first);
+    Matrix2x3::from_rows(&[first.transpose(), second.transpose()])
+}
+
+/// Weight of Huber's loss for a residual of `ratio` standard deviations.
+pub(super) fn huber_weight(ratio: f64, threshold: f64) -> f64 {
+    if ratio <= threshold { 1.0 } else { threshold / ratio }
+}
+
+/// What a rotation alone leaves between two sets of bearings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RotationFit {
+    /// `camera_j_from_camera_i`.
+    pub rotation: UnitQuaternion<f64>,
+    /// Median angle that remains, in radians: the rotation-compensated parallax.
+    pub median_parallax_rad: f64,
+}
+
+/// The rotation that best lays the first bearings of the pairs on the second ones, robustly, from a first guess.
+///
+/// Parallax of near points pulls a least-squares fit, so angles beyond the median count less (reweighted in rounds).
+/// Returns `None` with fewer than three pairs.
+pub fn fit_rotation(
+    pairs: &[(Vector3<f64>, Vector3<f64>)],
+    camera_j_from_camera_i: &UnitQuaternion<f64>,
+) -> Option<RotationFit> {
+    const ROUNDS: usize = 8;
+    if pairs.len() < 3 {
+        return None;
+    }
+    let mut rotation = *camera_j_from_camera_i;
+    for _ in 0..ROUNDS {
+        let scale = median_angle(pairs, &rotation).max(1e-6);
+        let (mut normal, mut rhs) = (Matrix3::zeros(), Vector3::zeros());
+        for (bearing_i, bearing_j) in pairs {
+            let turned = rotation * bearing_i;
+            let error = bearing_j.cross(&turned);
+            let weight = 1.0 / (1.0 + (error.norm() / scale).powi(2));
+            // A small left rotation δ moves `turned` by δ × turned; only its part across the bearing is seen.
+            normal += (Matrix3::identity() - turned * turned.transpose()) * weight;
+            rhs += turned.cross(bearing_j) * weight;
+        }
+        let step = normal.cholesky()?.solve(&rhs);
+        rotation = UnitQuaternion::new_normalize((so3::exp(&step) * rotation).into_inner());
+        if step.norm() < 1e-7 {
+            break;
+        }
+    }
+    Some(RotationFit { rotation, median_parallax_rad: median_angle(pairs, &rotation) })
+}
+
+/// Median angle between `rotation · first` and `second`, in radians.
+fn median_angle(pairs: &[(Vector3<f64>, Vector3<f64>)], rotation: &UnitQuaternion<f64>) -> f64 {
+    median(pairs.iter().map(|(first, second)| angle_between(&(rotation * first), second)).collect())
+}
+
+/// Angle between two unit vectors in radians, exact for small angles too.
+pub fn angle_between(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
+    a.cross(b).norm().atan2(a.dot(b))
+}
+
+/// The median (upper one for an even count), 0 for none.
+pub(super) fn median(mut values: Vec<f64>) -> f64 {
+    let middle = values.len() / 2;
+    if values.is_empty() {
+        return 0.0;
+    }
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// A point found from several bearings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TriangulatedPoint {
+    /// Where, in the frame that the camera poses are given in.
+    pub position: Vector3<f64>,
+    /// Largest angle between two of its rays, in radians.
+    pub parallax_rad: f64,
+    /// Whether it lies before every camera that saw it.
+    pub in_front: bool,
+    /// Largest angle between a measured bearing and the direction to the point, in radians.
+    pub worst_angle_rad: f64,
+}
+
+/// The point nearest to the rays of several cameras `(world_from_camera, bearing)`, in the least-squares sense with each
+/// ray weighted by the inverse square of its length; `None` when the rays are parallel or fewer than two.
+pub fn triangulate(rays: &[(RigidTransform, Vector3<f64>)]) -> Option<TriangulatedPoint> {
+    const ROUNDS: usize = 3;
+    if rays.len() < 2 {
+        return None;
+    }
+    let directions: Vec<Vector3<f64>> = rays.iter().map(|(pose, bearing)| pose.rotation * bearing).collect();
+    let mut parallax_rad = 0.0_f64;
+    for (index, first) in directions.iter().enumerate() {
+        for second in &directions[index + 1..] {
+            parallax_rad = parallax_rad.max(angle_between(first, second));
+        }
+    }
+    let mut weights = vec![1.0; rays.len()];
+    let mut position = Vector3::zeros();
+    for _ in 0..ROUNDS {
+        let (mut normal, mut rhs) = (Matrix3::zeros(), Vector3::zeros());
+        for (((pose, _), direction), weight) in rays.iter().zip(&directions).zip(&weights) {
+            let across = (Matrix3::identity() - direction * direction.transpose()) * *weight;
+            normal += across;
+            rhs += across * pose.translation_m;
+        }
+        position = normal.cholesky()?.solve(&rhs);
+        for (weight, (pose, _)) in weights.iter_mut().zip(rays) {
+            *weight = 1.0 / (position - pose.translation_m).norm_squared().max(1e-12);
+        }
+    }
+    if !position.iter().all(|value| value.is_finite()) {
+        return None;
+    }
+    let mut in_front = true;
+    let mut worst_angle_rad = 0.0_f64;
+    for ((pose, _), direction) in rays.iter().zip(&directions) {
+        let to_point = position - pose.translation_m;
+        in_front &= to_point.dot(direction) > 0.0;
+        worst_angle_rad = worst_angle_rad.max(angle_between(&to_point, direction));
+    }
+    Some(TriangulatedPoint { position, parallax_rad, in_front, worst_angle_rad })
+}
+
+/// A camera pose found from known points.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CameraPose {
+    /// The pose.
+    pub world_from_camera: RigidTransform,
+    /// Whether each point fits, in the order given.
+    pub inliers: Vec<bool>,
+    /// Root mean square angle of those that fit, in radians.
+    pub rms_rad: f64,
+}
+
+/// Refines a camera pose on known points `(point_in_world, bearing)` with a robust loss that tightens from round to round.
+///
+/// `bearing_sigma_rad` is the noise of a bearing; a point fits when its angle stays under `inlier_sigmas` of them.
+/// Returns `None` with fewer than four points or when the equations are singular.
+pub fn refine_camera_pose(
+    points: &[(Vector3<f64>, Vector3<f64>)],
+    guess: &RigidTransform,
+    bearing_sigma_rad: f64,
+    inlier_sigmas: f64,
+) -> Option<CameraPose> {
+    const TIGHTENING: [f64; 4] = [40.0, 10.0, 3.0, 1.5];
+    const ROUNDS: usize = 6;
+    if points.len() < 4 {
+        return None;
+    }
+    let mut pose = *guess;
+    for sigmas in TIGHTENING {
+        let scale = sigmas * bearing_sigma_rad;
+        for _ in 0..ROUNDS {
+            let (mut normal, mut rhs) = (Matrix6::<f64>::zeros(), Vector6::zeros());
+            for (point, bearing) in points {
+                let Some((error, jacobian)) = pose_residual(&pose, point, bearing) else { continue };
+                let weight = 1.0 / (1.0 + error.norm_squared() / (scale * scale));
+                normal += jacobian.transpose() * jacobian * weight;
+                rhs -= jacobian.transpose() * error * weight;
+            }
+            for index in 0..6 {
+                normal[(index, index)] *= 1.0 + 1e-9;
+            }
+            let step = normal.cholesky()?.solve(&rhs);
+            if !step.iter().all(|value| value.is_finite()) {
+                return None;
+            }
+            pose = pose.plus(&step);
+            if step.norm() < 1e-8 {
+                break;
+            }
+        }
+    }
+    let limit = inlier_sigmas * bearing_sigma_rad;
+    let angles: Vec<f64> = points
+        .iter()
+        .map(|(point, bearing)| angle_between(&(pose.rotation.inverse() * (point - pose.translation_m)), bearing))
+        .collect();
+    let inliers: Vec<bool> = angles.iter().map(|angle| *angle < limit).collect();
+    let count = inliers.iter().filter(|inlier| **inlier).count();
+    let sum: f64 = angles.iter().filter(|angle| **angle < limit).map(|angle| angle * angle).sum();
+    Some(CameraPose { world_from_camera: pose, inliers, rms_rad: (sum / count.max(1) as f64).sqrt() })
+}
+
+/// Angle error of a known point in the bearing's tangent plane and its derivative by the camera pose `[φ; δt]`,
+/// `None` when the point lies behind.
+fn pose_residual(
+    world_from_camera: &RigidTransform,
+    point: &Vector3<f64>,
+    bearing: &Vector3<f64>,
+) -> Option<(nalgebra::Vector2<f64>, nalgebra::Matrix2x6<f64>)> {
+    let back = world_from_camera.rotation_matrix().transpose();
+    let in_camera = back * (point - world_from_camera.translation_m);
+    let distance = in_camera.norm();
+    if in_camera.dot(bearing) <= 1e-3 * distance {
+        return None;
+    }
+    let direction = in_camera / distance;
+    let basis = tangent_basis(bearing);
+    let by_point = basis * (Matrix3::identity() - direction * direction.transpose()) / distance;
+    let mut jacobian = nalgebra::Matrix2x6::zeros();
+    jacobian.fixed_view_mut::<2, 3>(0, 0).copy_from(&(by_point * so3::hat(&in_camera)));
+    jacobian.fixed_view_mut::<2, 3>(0, 3).copy_from(&(-by_point * back));
+    Some((basis * direction, jacobian))
+}

@@ -1,0 +1,94 @@
+//! The checklist of an attempt: each test with its value and threshold.
+
+/// One test: what it asks, what was measured, what is asked for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WaitReason {
+    /// Short name of the test, always the same.
+    pub test: &'static str,
+    /// What it waits for (or what was found, when passed), in one sentence with units.
+    pub message: String,
+    /// The measured value.
+    pub value: f64,
+    /// The threshold it was held against.
+    pub threshold: f64,
+}
+
+/// Tests made so far.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Checklist {
+    pub(super) failed: Vec<WaitReason>,
+    pub(super) passed: Vec<WaitReason>,
+}
+
+/// A number's unit as people read it.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Shown {
+    Plain(&'static str),
+    /// Radians, shown as degrees.
+    Degrees,
+    /// A share, shown in percent.
+    Percent,
+}
+
+impl Shown {
+    fn text(self, value: f64) -> String {
+        match self {
+            Self::Plain(unit) if value.fract() == 0.0 => format!("{value:.0}{unit}"),
+            Self::Plain(unit) => format!("{value:.3}{unit}"),
+            Self::Degrees => format!("{:.2}°", value.to_degrees()),
+            Self::Percent => format!("{:.1} %", 100.0 * value),
+        }
+    }
+}
+
+impl Checklist {
+    /// The value must reach the threshold.
+    pub(super) fn at_least(
+        &mut self,
+        test: &'static str,
+        subject: &str,
+        value: f64,
+        threshold: f64,
+        shown: Shown,
+    ) -> bool {
+        self.decide(test, subject, value, threshold, shown, value >= threshold, "at least")
+    }
+
+    /// The value must not exceed the threshold.
+    pub(super) fn at_most(
+        &mut self,
+        test: &'static str,
+        subject: &str,
+        value: f64,
+        threshold: f64,
+        shown: Shown,
+    ) -> bool {
+        self.decide(test, subject, value, threshold, shown, value <= threshold, "at most")
+    }
+
+    #[expect(clippy::too_many_arguments, reason = "private, and both callers pass them on")]
+    fn decide(
+        &mut self,
+        test: &'static str,
+        subject: &str,
+        value: f64,
+        threshold: f64,
+        shown: Shown,
+        passed: bool,
+        relation: &str,
+    ) -> bool {
+        let message = format!("{subject} is {}, {relation} {} is needed", shown.text(value), shown.text(threshold));
+        let reason = WaitReason { test, message, value, threshold };
+        if passed {
+            self.passed.push(reason);
+        } else {
+            self.failed.push(reason);
+        }
+        passed
+    }
+
+    /// Whether nothing has failed so far.
+    pub(super) fn all_passed(&self) -> bool {
+        self.failed.is_empty()
+    }
+}

@@ -1,0 +1,176 @@
+//! Initialization: from a short stretch of tracked features and inertial samples to poses, velocities, gravity, biases and
+//! landmarks in metres.
+//!
+//! [`try_initialize`] is a pure function of its input; call it at frames while waiting, with the frames of the last
+//! [`InitializationOptions::longest_window_s`] seconds. Either it has a solution, or it says what it waits for.
+//!
+//! How it works, in the order of the checks that it reports:
+//!
+//! 1. *Standstill.* Quiet inertial samples and an unmoving picture give the gyroscope's bias and gravity's direction.
+//!    An accelerometer's turn-on bias of 0.5 m/s² tilts that direction by 3°, and only motion tells the two apart.
+//!    So by default a standstill is remembered ([`StandstillEstimate`]) and motion is awaited; with
+//!    [`StandstillPolicy::InitializeAtOnce`] it initializes right away, with velocity zero and no landmarks: the estimator
+//!    then has to find depths itself once there is parallax, and must give the accelerometer's bias its full prior.
+//! 2. *Selection.* A dozen views, spaced by parallax and time, so that a hover before the motion is held by few of them:
+//!    these few bind tilt and accelerometer bias together, which makes the scale of the motion after it reliable.
+//! 3. *Structure.* Camera poses from the images alone. A gimbal's encoders may be off by many degrees, so they only guess.
+//! 4. *Alignment.* The mount's rotation and the gyroscope's bias from rotations; scale, gravity of exact magnitude,
+//!    velocities and accelerometer bias from a linear system.
+//! 5. *Refinement.* All of it together with the inertial covariances, the calibration's error included as unknowns with priors.
+//! 6. *Acceptance.* Residuals, and the standard deviations of scale, velocity and gravity from the refined problem.
+//!    These decide: constant velocity, hover and pure rotation have no small standard deviation of the scale.
+//!
+//! The world has z up, its origin at the IMU of the first view, and no yaw there.
+
+mod alignment;
+pub mod bearing;
+mod checks;
+mod essential;
+mod options;
+mod polynomial;
+mod refinement;
+pub mod relative_pose;
+mod selection;
+mod standstill;
+mod structure;
+mod visual_problem;
+
+mod attempt;
+#[cfg(test)]
+mod tests;
+
+pub use alignment::VectorPrior;
+pub use attempt::try_initialize;
+pub use checks::WaitReason;
+pub use options::{InitializationOptions, StandstillPolicy};
+pub use standstill::StandstillEstimate;
+
+use nalgebra::Vector3;
+
+use crate::estimator::ImuBias;
+use crate::flight_log::{ImuSample, rig::ImuNoise};
+use crate::frontend::{FeatureId, TrackedFeature};
+use crate::geometry::RigidTransform;
+
+/// One frame that the initialization may use.
+#[derive(Clone, Copy, Debug)]
+pub struct InitializationFrame<'a> {
+    /// Number of the image in its camera's stream.
+    pub frame_index: usize,
+    /// Header stamp of the image since the log began.
+    pub stamp_ns: i64,
+    /// Its features, ordered by id; bearings are unit vectors in the camera.
+    pub features: &'a [TrackedFeature],
+    /// The mount as calibration and encoders say.
+    pub imu_from_camera: RigidTransform,
+    /// Inertial samples from the previous frame's stamp to this one's, both ends included.
+    pub imu: &'a [ImuSample],
+}
+
+/// Everything that an attempt looks at.
+#[derive(Clone, Debug)]
+pub struct InitializationInput<'a> {
+    /// Frames in time order, without gaps in the inertial samples between them.
+    pub frames: &'a [InitializationFrame<'a>],
+    /// Magnitude of gravity in m/s².
+    pub gravity_m_per_s2: f64,
+    /// Noise of the inertial sensor.
+    pub imu_noise: ImuNoise,
+    /// What the last standstill told, when there was one ([`InitializationOutcome::Waiting`] carries it).
+    pub standstill: Option<StandstillEstimate>,
+}
+
+/// What an attempt came to.
+#[derive(Clone, Debug, PartialEq)]
+pub enum InitializationOutcome {
+    /// There is a solution.
+    Initialized(Box<InitializationSolution>),
+    /// It has to wait.
+    Waiting {
+        /// Tests that failed, in the order in which they are made; those after the first failing group were not made.
+        reasons: Vec<WaitReason>,
+        /// Tests that passed, with the same figures.
+        passed: Vec<WaitReason>,
+        /// The vehicle stands still: to be kept and handed in with later attempts.
+        standstill: Option<StandstillEstimate>,
+    },
+}
+
+/// Where the initial state came from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum InitializationOrigin {
+    /// From motion: everything is known, scale included.
+    FromMotion,
+    /// From standstill: no landmark has a depth.
+    FromStandstill,
+}
+
+/// State of one view of the solution.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct InitializedFrame {
+    /// Number of the image in its camera's stream.
+    pub frame_index: usize,
+    /// Its stamp since the log began.
+    pub stamp_ns: i64,
+    /// Pose.
+    pub world_from_imu: RigidTransform,
+    /// Velocity in the world.
+    pub velocity_m_per_s: Vector3<f64>,
+    /// The mount as refined: on a gimbal with poor encoders its rotation is much better than the given one.
+    pub imu_from_camera: RigidTransform,
+}
+
+/// A feature with a depth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct InitializedLandmark {
+    /// Who it is.
+    pub id: FeatureId,
+    /// Number of the first view (its `frame_index`) that saw it.
+    pub anchor_frame_index: usize,
+    /// Where it is in the world.
+    pub position_m: Vector3<f64>,
+    /// Inverse depth along the anchor's optical axis, in 1/m.
+    pub inverse_depth_per_m: f64,
+    /// How many views of the solution see it.
+    pub views: usize,
+}
+
+/// How good the solution is.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct InitializationDiagnostics {
+    /// Relative standard deviation of the metric scale.
+    pub scale_sigma: f64,
+    /// Standard deviation of the newest velocity (worst axis).
+    pub velocity_sigma_m_per_s: f64,
+    /// Standard deviation of gravity's direction.
+    pub gravity_sigma_rad: f64,
+    /// Standard deviation of the gyroscope's bias (worst axis).
+    pub gyroscope_bias_sigma_rad_per_s: f64,
+    /// Standard deviation of the accelerometer's bias (worst axis).
+    pub accelerometer_bias_sigma_m_per_s2: f64,
+    /// Root mean square angle error of a bearing's coordinate.
+    pub reprojection_rms_rad: f64,
+    /// Mean square of the whitened inertial residuals (1 when the noise is as stated, less with few intervals).
+    pub inertial_mean_square: f64,
+    /// Largest rotation-compensated parallax between two views.
+    pub parallax_rad: f64,
+    /// Rounds of the refinement.
+    pub refinement_rounds: usize,
+}
+
+/// A solution.
+#[derive(Clone, Debug, PartialEq)]
+pub struct InitializationSolution {
+    /// From motion or from standstill.
+    pub origin: InitializationOrigin,
+    /// The views, in time order; a subset of the frames given, the newest among them.
+    pub frames: Vec<InitializedFrame>,
+    /// Biases over the window.
+    pub bias: ImuBias,
+    /// Landmarks by rising id; empty from standstill.
+    pub landmarks: Vec<InitializedLandmark>,
+    /// How good it is.
+    pub diagnostics: InitializationDiagnostics,
+    /// The tests that it passed.
+    pub passed: Vec<WaitReason>,
+}

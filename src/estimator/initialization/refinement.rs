@@ -1,0 +1,546 @@
+//! One adjustment of everything with images and inertial sensor together: poses, velocities, biases, gravity, the mount.
+//!
+//! The IMU frame of the first view is the frame of reference, so there is no gauge freedom left; gravity is a direction in
+//! it with known magnitude.
+//! The mount is the given one with an error that all views share (a turn on the IMU's side and a shift) and, on a
+//! gimbal, a turn of its own in each view: `R = Exp(shared)·given·Exp(own)`.
+
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix3x2, SMatrix, SVector, UnitQuaternion, Vector3};
+
+use super::alignment::{Alignment, VectorPrior};
+use super::bearing::tangent_basis;
+use super::visual_problem::{Landmark, VisualNormal, visual_cost};
+use crate::estimator::{ImuBias, Preintegration};
+use crate::geometry::{RigidTransform, so3};
+
+/// Tightest standard deviation that a prior on the mount may have, so that "exactly known" stays solvable.
+const LEAST_SIGMA: f64 = 1e-5;
+
+type Matrix9 = SMatrix<f64, 9, 9>;
+type Vector9 = SVector<f64, 9>;
+
+/// What stays the same during the adjustment.
+pub(super) struct RefinementInput<'a> {
+    /// The mount as calibration and encoders say, one per view.
+    pub(super) imu_from_camera: &'a [RigidTransform],
+    /// Motion from each view to the next.
+    pub(super) increments: &'a [Preintegration],
+    pub(super) bearing_sigma_rad: f64,
+    pub(super) mount_rotation_sigma_rad: f64,
+    pub(super) mount_rotation_noise_rad: f64,
+    pub(super) mount_translation_sigma_m: f64,
+    pub(super) gyroscope_bias: VectorPrior,
+    pub(super) accelerometer_bias: VectorPrior,
+}
+
+/// What is adjusted, in the IMU frame of the first view.
+#[derive(Clone, Debug)]
+pub(super) struct RefinedState {
+    pub(super) poses: Vec<RigidTransform>,
+    pub(super) velocities: Vec<Vector3<f64>>,
+    /// Gravity, pointing down.
+    pub(super) gravity: Vector3<f64>,
+    pub(super) bias: ImuBias,
+    pub(super) landmarks: Vec<Landmark>,
+    pub(super) shared_turn: UnitQuaternion<f64>,
+    pub(super) shared_shift: Vector3<f64>,
+    pub(super) own_turns: Vec<UnitQuaternion<f64>>,
+}
+
+/// Standard deviations from the inverse of the last normal matrix.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct RefinementSigmas {
+    /// Of the longest distance from the first view, relatively: of the metric scale.
+    pub(super) scale: f64,
+    pub(super) velocity_m_per_s: f64,
+    pub(super) gravity_rad: f64,
+    pub(super) gyroscope_bias_rad_per_s: f64,
+    pub(super) accelerometer_bias_m_per_s2: f64,
+}
+
+/// Where each block of columns begins.
+pub(super) struct Layout {
+    views: usize,
+    own_turns: bool,
+}
+
+impl Layout {
+    const SHARED_TURN: usize = 0;
+    const SHARED_SHIFT: usize = 3;
+    const GYROSCOPE: usize = 6;
+    const ACCELEROMETER: usize = 9;
+    const GRAVITY: usize = 12;
+    const GLOBALS: usize = 14;
+
+    fn per_view(&self) -> usize {
+        if self.own_turns { 12 } else { 9 }
+    }
+
+    /// Velocity of a view (3).
+    fn velocity(&self, view: usize) -> usize {
+        Self::GLOBALS + view * self.per_view()
+    }
+
+    /// Pose of a view (6); the first view's columns are held.
+    pub(super) fn pose(&self, view: usize) -> usize {
+        self.velocity(view) + 3
+    }
+
+    /// Own turn of a view's mount (3), when there is one.
+    fn own_turn(&self, view: usize) -> Option<usize> {
+        self.own_turns.then(|| self.velocity(view) + 9)
+    }
+
+    pub(super) fn columns(&self) -> usize {
+        Self::GLOBALS + self.views * self.per_view()
+    }
+}
+
+impl RefinedState {
+    /// Starts from an alignment; `landmarks` carry the cameras' unit of length and are scaled here.
+    pub(super) fn new(input: &RefinementInput<'_>, alignment: &Alignment, landmarks: &[Landmark]) -> Self {
+        // What the alignment changed about the mount is split: the mean turn on the IMU's side, the rest per view.
+        let changes: Vec<UnitQuaternion<f64>> = alignment
+            .imu_from_camera
+            .iter()
+            .zip(input.imu_from_camera)
+            .map(|(aligned, given)| aligned.rotation * given.rotation.inverse())
+            .collect();
+        let first = changes.first().copied().unwrap_or_else(UnitQuaternion::identity);
+        let from_first = changes.iter().map(|change| so3::log(&(first.inverse() * change))).sum::<Vector3<f64>>();
+        let shared_turn = first * so3::exp(&(from_first / changes.len().max(1) as f64));
+        let own = |(change, given): (&UnitQuaternion<f64>, &RigidTransform)| {
+            given.rotation.inverse() * shared_turn.inverse() * change * given.rotation
+        };
+        let own_turns = if input.mount_rotation_noise_rad > 0.0 {
+            changes.iter().zip(input.imu_from_camera).map(own).collect()
+        } else {
+            vec![UnitQuaternion::identity(); changes.len()]
+        };
+        let scaled = |landmark: &Landmark| Landmark {
+            inverse_distance: landmark.inverse_distance / alignment.scale,
+            ..landmark.clone()
+        };
+        Self {
+            poses: alignment.poses.clone(),
+            velocities: alignment.velocities.clone(),
+            gravity: alignment.gravity,
+            bias: alignment.bias,
+            landmarks: landmarks.iter().map(scaled).collect(),
+            shared_turn,
+            shared_shift: Vector3::zeros(),
+            own_turns,
+        }
+    }
+
+    /// The mount per view as adjusted.
+    pub(super) fn imu_from_camera(&self, given: &[RigidTransform]) -> Vec<RigidTransform> {
+        given
+            .iter()
+            .zip(&self.own_turns)
+            .map(|(given, own)| {
+                RigidTransform::new(
+                    UnitQuaternion::new_normalize((self.shared_turn * given.rotation * own).into_inner()),
+                    given.translation_m + self.shared_shift,
+                )
+            })
+            .collect()
+    }
+
+    /// `start_from_camera` per view.
+    pub(super) fn cameras(&self, given: &[RigidTransform]) -> Vec<RigidTransform> {
+        self.poses.iter().zip(self.imu_from_camera(given)).map(|(pose, mount)| *pose * mount).collect()
+    }
+
+    fn gravity_basis(&self) -> Matrix3x2<f64> {
+        let norm = self.gravity.norm();
+        tangent_basis(&(self.gravity / norm)).transpose() * norm
+    }
+
+    pub(super) fn moved(&self, step: &DVector<f64>, layout: &Layout, landmarks: Vec<Landmark>) -> Self {
+        let three = |start: usize| -> Vector3<f64> { step.fixed_rows::<3>(start).into_owned() };
+        let normalized = |q: UnitQuaternion<f64>| UnitQuaternion::new_normalize(q.into_inner());
+        let mut next = self.clone();
+        next.landmarks = landmarks;
+        next.shared_turn = normalized(so3::exp(&three(Layout::SHARED_TURN)) * self.shared_turn);
+        next.shared_shift += three(Layout::SHARED_SHIFT);
+        next.bias.gyroscope_rad_per_s += three(Layout::GYROSCOPE);
+        next.bias.accelerometer_m_per_s2 += three(Layout::ACCELEROMETER);
+        let gravity = self.gravity + self.gravity_basis() * step.fixed_rows::<2>(Layout::GRAVITY);
+        next.gravity = gravity * (self.gravity.norm() / gravity.norm());
+        for view in 0..layout.views {
+            next.velocities[view] += three(layout.velocity(view));
+            if view > 0 {
+                next.poses[view] = self.poses[view].plus(&step.fixed_rows::<6>(layout.pose(view)).into_owned());
+            }
+            if let Some(start) = layout.own_turn(view) {
+                next.own_turns[view] = normalized(self.own_turns[view] * so3::exp(&three(start)));
+            }
+        }
+        next
+    }
+}
+
+/// Whitened inertial residual `[φ, p, v]` of one interval.
+fn inertial_residual(
+    state: &RefinedState,
+    view: usize,
+    increment: &Preintegration,
+) -> (Vector9, Vector3<f64>, Vector3<f64>) {
+    let (from, to) = (&state.poses[view], &state.poses[view + 1]);
+    let t = increment.duration_s();
+    let motion = increment.corrected(&state.bias);
+    let turn = so3::log(&(motion.rotation.inverse() * from.rotation.inverse() * to.rotation));
+    let shift = from.rotation.inverse_transform_vector(
+        &(to.translation_m - from.translation_m - state.velocities[view] * t - state.gravity * (0.5 * t * t)),
+    );
+    let gain = from
+        .rotation
+        .inverse_transform_vector(&(state.velocities[view + 1] - state.velocities[view] - state.gravity * t));
+    let mut residual = Vector9::zeros();
+    residual.fixed_rows_mut::<3>(0).copy_from(&turn);
+    residual.fixed_rows_mut::<3>(3).copy_from(&(shift - motion.position_m));
+    residual.fixed_rows_mut::<3>(6).copy_from(&(gain - motion.velocity_m_per_s));
+    (residual, shift, gain)
+}
+
+/// The adjustment's problem: fixed data, whitening matrices and column layout.
+pub(super) struct Refinement<'a> {
+    input: &'a RefinementInput<'a>,
+    /// `Wᵀ W = covariance⁻¹` of each interval's `[φ, p, v]`.
+    whitening: Vec<Matrix9>,
+    pub(super) layout: Layout,
+}
+
+/// How an adjustment ended.
+#[derive(Clone, Debug)]
+pub(super) struct Refined {
+    pub(super) state: RefinedState,
+    /// Mean square of the whitened inertial residuals, biases' priors left out.
+    pub(super) inertial_mean_square: f64,
+    pub(super) sigmas: Option<RefinementSigmas>,
+    pub(super) rounds: usize,
+}
+
+impl<'a> Refinement<'a> {
+    /// `None` when an interval is empty.
+    pub(super) fn new(input: &'a RefinementInput<'a>) -> Option<Self> {
+        let whitening = input
+            .increments
+            .iter()
+            .map(|increment| {
+                let mut covariance: Matrix9 = increment.covariance().fixed_view::<9, 9>(0, 0).into_owned();
+                // Sampling and discretization: keeps short intervals from outweighing all else.
+                for index in 0..9 {
+                    covariance[(index, index)] *= 1.0 + 1e-9;
+                }
+                let lower = covariance.cholesky()?.unpack();
+                lower.solve_lower_triangular(&Matrix9::identity()).filter(|w| w.iter().all(|x| x.is_finite()))
+            })
+            .collect::<Option<Vec<_>>>()?;
+        let layout = Layout { views: input.imu_from_camera.len(), own_turns: input.mount_rotation_noise_rad > 0.0 };
+        Some(Self { input, whitening, layout })
+    }
+
+    /// Levenberg–Marquardt for at most `rounds` rounds.
+    pub(super) fn run(&self, start: RefinedState, rounds: usize) -> Refined {
+        let mut state = start;
+        let mut cost = self.cost(&state);
+        let mut damping = 1e-4;
+        let mut taken = 0;
+        while taken < rounds {
+            taken += 1;
+            let (normal, gradient, visual) = self.normal_equations(&state, damping);
+            let Some(step) = damped_step(normal, &gradient, damping) else {
+                damping *= 10.0;
+                continue;
+            };
+            let landmarks = visual.moved_landmarks(&state.landmarks, &self.camera_step(&state, &step));
+            let next = state.moved(&step, &self.layout, landmarks);
+            let next_cost = self.cost(&next);
+            if next_cost < cost {
+                let settled = cost - next_cost < 1e-4 * cost;
+                (state, cost) = (next, next_cost);
+                damping = (damping * 0.1).max(1e-9);
+                if settled {
+                    break;
+                }
+            } else {
+                damping *= 20.0;
+                if damping > 1e6 {
+                    break;
+                }
+            }
+        }
+        let inertial_mean_square = self.inertial_cost(&state) / (9 * self.input.increments.len()).max(1) as f64;
+        Refined { state, inertial_mean_square, sigmas: None, rounds: taken }
+    }
+
+    /// Standard deviations at a state.
+    pub(super) fn sigmas(&self, state: &RefinedState) -> Option<RefinementSigmas> {
+        let (normal, _, _) = self.normal_equations(state, 0.0);
+        let factor = normal.cholesky()?;
+        let layout = &self.layout;
+        // Columns of the covariance for a handful of quantities only.
+        let columns = layout.columns();
+        let variance = |direction: &DVector<f64>| direction.dot(&factor.solve(direction)).max(0.0);
+        let block = |start: usize, length: usize| {
+            (0..length)
+                .map(|index| {
+                    let mut unit = DVector::zeros(columns);
+                    unit[start + index] = 1.0;
+                    variance(&unit)
+                })
+                .fold(0.0, f64::max)
+                .sqrt()
+        };
+        let far = (1..layout.views).max_by(|&a, &b| {
+            let length = |view: usize| state.poses[view].translation_m.norm_squared();
+            length(a).total_cmp(&length(b))
+        })?;
+        let reach = state.poses[far].translation_m.norm();
+        let mut along = DVector::zeros(columns);
+        along.fixed_rows_mut::<3>(layout.pose(far) + 3).copy_from(&(state.poses[far].translation_m / reach));
+        Some(RefinementSigmas {
+            scale: variance(&along).sqrt() / reach,
+            velocity_m_per_s: block(layout.velocity(layout.views - 1), 3),
+            gravity_rad: block(Layout::GRAVITY, 2),
+            gyroscope_bias_rad_per_s: block(Layout::GYROSCOPE, 3),
+            accelerometer_bias_m_per_s2: block(Layout::ACCELEROMETER, 3),
+        })
+    }
+
+    pub(super) fn cost(&self, state: &RefinedState) -> f64 {
+        let cameras = state.cameras(self.input.imu_from_camera);
+        visual_cost(&state.landmarks, &cameras, self.input.bearing_sigma_rad)
+            + self.inertial_cost(state)
+            + self.prior_cost(state)
+    }
+
+    fn inertial_cost(&self, state: &RefinedState) -> f64 {
+        self.input
+            .increments
+            .iter()
+            .enumerate()
+            .map(|(view, increment)| {
+                (self.whitening[view] * inertial_residual(state, view, increment).0).norm_squared()
+            })
+            .sum()
+    }
+
+    fn prior_cost(&self, state: &RefinedState) -> f64 {
+        let input = self.input;
+        let square = |vector: Vector3<f64>, sigma: f64| vector.norm_squared() / sigma.max(LEAST_SIGMA).powi(2);
+        let mut cost = square(so3::log(&state.shared_turn), input.mount_rotation_sigma_rad)
+            + square(state.shared_shift, input.mount_translation_sigma_m)
+            + square(state.bias.gyroscope_rad_per_s - input.gyroscope_bias.mean, input.gyroscope_bias.sigma)
+            + square(state.bias.accelerometer_m_per_s2 - input.accelerometer_bias.mean, input.accelerometer_bias.sigma);
+        if self.layout.own_turns {
+            for own in &state.own_turns {
+                cost += square(so3::log(own), input.mount_rotation_noise_rad);
+            }
+        }
+        cost
+    }
+
+    /// Normal matrix, gradient, and the visual part for finding the depths again.
+    pub(super) fn normal_equations(
+        &self,
+        state: &RefinedState,
+        damping: f64,
+    ) -> (DMatrix<f64>, DVector<f64>, VisualNormal) {
+        let columns = self.layout.columns();
+        let mut normal = DMatrix::zeros(columns, columns);
+        let mut gradient = DVector::zeros(columns);
+        let cameras = state.cameras(self.input.imu_from_camera);
+        let visual = VisualNormal::new(&state.landmarks, &cameras, self.input.bearing_sigma_rad, damping);
+        self.add_visual(state, &visual, &mut normal, &mut gradient);
+        for (view, increment) in self.input.increments.iter().enumerate() {
+            self.add_inertial(state, view, increment, &mut normal, &mut gradient);
+        }
+        self.add_priors(state, &mut normal, &mut gradient);
+        // The first view is the frame of reference.
+        let held = self.layout.pose(0);
+        for column in held..held + 6 {
+            normal.row_mut(column).fill(0.0);
+            normal.column_mut(column).fill(0.0);
+            normal[(column, column)] = 1.0;
+            gradient[column] = 0.0;
+        }
+        (normal, gradient, visual)
+    }
+
+    /// Derivative of a camera pose by the columns it depends on: pairs of a column and a 6 × 3 block.
+    fn camera_blocks(&self, state: &RefinedState, view: usize) -> Vec<(usize, SMatrix<f64, 6, 3>)> {
+        let pose = &state.poses[view];
+        let given = &self.input.imu_from_camera[view];
+        let lever = given.translation_m + state.shared_shift;
+        let mount = (state.shared_turn * given.rotation * state.own_turns[view]).to_rotation_matrix().into_inner();
+        let rotation = pose.rotation_matrix();
+        let block = |top: Matrix3<f64>, bottom: Matrix3<f64>| {
+            let mut block = SMatrix::<f64, 6, 3>::zeros();
+            block.fixed_view_mut::<3, 3>(0, 0).copy_from(&top);
+            block.fixed_view_mut::<3, 3>(3, 0).copy_from(&bottom);
+            block
+        };
+        let start = self.layout.pose(view);
+        let mut blocks = vec![
+            (Layout::SHARED_TURN, block(mount.transpose(), Matrix3::zeros())),
+            (Layout::SHARED_SHIFT, block(Matrix3::zeros(), rotation)),
+            (start, block(mount.transpose(), -rotation * so3::hat(&lever))),
+            (start + 3, block(Matrix3::zeros(), Matrix3::identity())),
+        ];
+        if let Some(start) = self.layout.own_turn(view) {
+            blocks.push((start, block(Matrix3::identity(), Matrix3::zeros())));
+        }
+        blocks
+    }
+
+    fn add_visual(
+        &self,
+        state: &RefinedState,
+        visual: &VisualNormal,
+        normal: &mut DMatrix<f64>,
+        gradient: &mut DVector<f64>,
+    ) {
+        let blocks: Vec<_> = (0..self.layout.views).map(|view| self.camera_blocks(state, view)).collect();
+        for (view_a, blocks_a) in blocks.iter().enumerate() {
+            let slope = visual.gradient.fixed_rows::<6>(6 * view_a);
+            for (column, block) in blocks_a {
+                let mut target = gradient.fixed_rows_mut::<3>(*column);
+                target += block.tr_mul(&slope);
+            }
+            for (view_b, blocks_b) in blocks.iter().enumerate() {
+                let corner = visual.hessian.fixed_view::<6, 6>(6 * view_a, 6 * view_b);
+                for (column_b, block_b) in blocks_b {
+                    let product = corner * block_b;
+                    for (column_a, block_a) in blocks_a {
+                        let mut target = normal.fixed_view_mut::<3, 3>(*column_a, *column_b);
+                        target += block_a.tr_mul(&product);
+                    }
+                }
+            }
+        }
+    }
+
+    /// How the cameras move when the state moves by `step`.
+    fn camera_step(&self, state: &RefinedState, step: &DVector<f64>) -> DVector<f64> {
+        let mut cameras = DVector::zeros(6 * self.layout.views);
+        for view in 0..self.layout.views {
+            let mut target = cameras.fixed_rows_mut::<6>(6 * view);
+            for (column, block) in self.camera_blocks(state, view) {
+                target += block * step.fixed_rows::<3>(column);
+            }
+        }
+        cameras
+    }
+
+    fn add_inertial(
+        &self,
+        state: &RefinedState,
+        view: usize,
+        increment: &Preintegration,
+        normal: &mut DMatrix<f64>,
+        gradient: &mut DVector<f64>,
+    ) {
+        let (residual, shift, gain) = inertial_residual(state, view, increment);
+        let whitening = &self.whitening[view];
+        let t = increment.duration_s();
+        let from = state.poses[view].rotation_matrix();
+        let to = state.poses[view + 1].rotation_matrix();
+        let back = from.transpose();
+        let turn: Vector3<f64> = residual.fixed_rows::<3>(0).into_owned();
+        let by_turn = so3::right_jacobian_inverse(&turn);
+        let by_bias = increment.bias_jacobian();
+        let change: Vector3<f64> = by_bias.fixed_rows::<3>(0) * increment.bias_change(&state.bias);
+        let turn_by_bg: Matrix3<f64> = -by_turn
+            * so3::exp(&turn).inverse().to_rotation_matrix().into_inner()
+            * so3::right_jacobian(&change)
+            * by_bias.fixed_view::<3, 3>(0, 0);
+        let column = |top: Option<Matrix3<f64>>, middle: Option<Matrix3<f64>>, bottom: Option<Matrix3<f64>>| {
+            let mut block = SMatrix::<f64, 9, 3>::zeros();
+            for (row, part) in [(0, top), (3, middle), (6, bottom)] {
+                if let Some(part) = part {
+                    block.fixed_view_mut::<3, 3>(row, 0).copy_from(&part);
+                }
+            }
+            whitening * block
+        };
+        let (pose_i, pose_j) = (self.layout.pose(view), self.layout.pose(view + 1));
+        let (velocity_i, velocity_j) = (self.layout.velocity(view), self.layout.velocity(view + 1));
+        let part = |row: usize, col: usize| -> Matrix3<f64> { -by_bias.fixed_view::<3, 3>(row, col).into_owned() };
+        let blocks = [
+            (pose_i, column(Some(-by_turn * to.transpose() * from), Some(so3::hat(&shift)), Some(so3::hat(&gain)))),
+            (pose_i + 3, column(None, Some(-back), None)),
+            (pose_j, column(Some(by_turn), None, None)),
+            (pose_j + 3, column(None, Some(back), None)),
+            (velocity_i, column(None, Some(-back * t), Some(-back))),
+            (velocity_j, column(None, None, Some(back))),
+            (Layout::GYROSCOPE, column(Some(turn_by_bg), Some(part(3, 0)), Some(part(6, 0)))),
+            (Layout::ACCELEROMETER, column(None, Some(part(3, 3)), Some(part(6, 3)))),
+        ];
+        let gravity_block = whitening * gravity_columns(state, &back, t);
+        let whitened = whitening * residual;
+        for (column_a, block_a) in &blocks {
+            let mut target = gradient.fixed_rows_mut::<3>(*column_a);
+            target += block_a.tr_mul(&whitened);
+            for (column_b, block_b) in &blocks {
+                let mut target = normal.fixed_view_mut::<3, 3>(*column_a, *column_b);
+                target += block_a.tr_mul(block_b);
+            }
+            let cross = block_a.tr_mul(&gravity_block);
+            let mut target = normal.fixed_view_mut::<3, 2>(*column_a, Layout::GRAVITY);
+            target += cross;
+            let mut target = normal.fixed_view_mut::<2, 3>(Layout::GRAVITY, *column_a);
+            target += cross.transpose();
+        }
+        let mut target = gradient.fixed_rows_mut::<2>(Layout::GRAVITY);
+        target += gravity_block.tr_mul(&whitened);
+        let mut target = normal.fixed_view_mut::<2, 2>(Layout::GRAVITY, Layout::GRAVITY);
+        target += gravity_block.tr_mul(&gravity_block);
+    }
+
+    fn add_priors(&self, state: &RefinedState, normal: &mut DMatrix<f64>, gradient: &mut DVector<f64>) {
+        let input = self.input;
+        let mut add = |start: usize, residual: &Vector3<f64>, jacobian: &Matrix3<f64>, sigma: f64| {
+            let weight = 1.0 / sigma.max(LEAST_SIGMA).powi(2);
+            let mut target = normal.fixed_view_mut::<3, 3>(start, start);
+            target += jacobian.tr_mul(jacobian) * weight;
+            let mut target = gradient.fixed_rows_mut::<3>(start);
+            target += jacobian.tr_mul(residual) * weight;
+        };
+        // The shared turn moves on the left: Log(Exp(δ)·Exp(x)) = x + J_l⁻¹(x)·δ with J_l⁻¹(x) = J_r⁻¹(−x).
+        let shared = so3::log(&state.shared_turn);
+        add(Layout::SHARED_TURN, &shared, &so3::right_jacobian_inverse(&-shared), input.mount_rotation_sigma_rad);
+        let identity = Matrix3::identity();
+        add(Layout::SHARED_SHIFT, &state.shared_shift, &identity, input.mount_translation_sigma_m);
+        let gyroscope = state.bias.gyroscope_rad_per_s - input.gyroscope_bias.mean;
+        add(Layout::GYROSCOPE, &gyroscope, &identity, input.gyroscope_bias.sigma);
+        let accelerometer = state.bias.accelerometer_m_per_s2 - input.accelerometer_bias.mean;
+        add(Layout::ACCELEROMETER, &accelerometer, &identity, input.accelerometer_bias.sigma);
+        for (view, own) in state.own_turns.iter().enumerate() {
+            if let Some(start) = self.layout.own_turn(view) {
+                let own = so3::log(own);
+                add(start, &own, &so3::right_jacobian_inverse(&own), input.mount_rotation_noise_rad);
+            }
+        }
+    }
+}
+
+/// Derivative of an inertial residual by the two gravity columns (9 × 2), not yet whitened.
+fn gravity_columns(state: &RefinedState, back: &Matrix3<f64>, t: f64) -> SMatrix<f64, 9, 2> {
+    let turned = back * state.gravity_basis();
+    let mut block = SMatrix::<f64, 9, 2>::zeros();
+    block.fixed_view_mut::<3, 2>(3, 0).copy_from(&(turned * (-0.5 * t * t)));
+    block.fixed_view_mut::<3, 2>(6, 0).copy_from(&(turned * -t));
+    block
+}
+
+/// Solves `(N + damping · diag N) x = −gradient`.
+fn damped_step(mut normal: DMatrix<f64>, gradient: &DVector<f64>, damping: f64) -> Option<DVector<f64>> {
+    for index in 0..gradient.len() {
+        normal[(index, index)] *= 1.0 + damping;
+    }
+    let step = -normal.cholesky()?.solve(gradient);
+    step.iter().all(|value| value.is_finite()).then_some(step)
+}

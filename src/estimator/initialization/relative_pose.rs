@@ -1,0 +1,309 @@
+//! The pose between two views from bearing pairs: five-point hypotheses, a rotation prior, robust refinement.
+
+use nalgebra::{Matrix3, Matrix5, UnitQuaternion, Vector3, Vector5};
+
+use super::bearing::{angle_between, tangent_basis};
+use super::essential::{decompose, five_point};
+use crate::geometry::{RigidTransform, so3};
+
+/// Largest number of five-point samples drawn.
+const MAX_SAMPLES: usize = 160;
+/// Chance that one of the samples was free of outliers before the search ends early.
+const CONFIDENCE: f64 = 0.999;
+/// A pair fits when its epipolar angle stays under this many standard deviations.
+const INLIER_SIGMAS: f64 = 3.0;
+
+/// Samples drawn beyond those, for the second solution of a plane.
+const EXTRA_SAMPLES: usize = 12;
+/// Hypotheses kept while sampling.
+const KEPT: usize = 5;
+/// Two hypotheses closer than both of these are one.
+const SAME_ROTATION_RAD: f64 = 0.02;
+/// See [`SAME_ROTATION_RAD`].
+const SAME_HEADING_RAD: f64 = 0.2;
+/// A pose whose cost (χ²) lies within this much per pair of the best one is returned as well.
+const AMBIGUOUS_SHARE: f64 = 0.3;
+
+/// What is known of a rotation before looking.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RotationPrior {
+    /// The expected rotation.
+    pub rotation: UnitQuaternion<f64>,
+    /// Its standard deviation about each axis.
+    pub sigma_rad: f64,
+}
+
+/// A relative pose up to scale.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RelativePose {
+    /// Maps points of camera i into camera j; the translation has unit length.
+    pub camera_j_from_camera_i: RigidTransform,
+    /// Indices of the pairs that fit and lie before both cameras.
+    pub inliers: Vec<usize>,
+    /// Root mean square epipolar angle of those, in radians.
+    pub rms_rad: f64,
+}
+
+/// Finds the relative poses of two cameras that explain the pairs `(bearing_i, bearing_j)`, the best one first.
+///
+/// There is more than one when the points (nearly) lie in a plane: both then fit, and only a third view or a good prior on
+/// the rotation tells them apart; without any, give a `sigma_rad` of π.
+/// The samples are drawn from a generator that `seed` starts, so equal input gives equal bits.
+pub fn relative_poses(
+    pairs: &[(Vector3<f64>, Vector3<f64>)],
+    prior: &RotationPrior,
+    bearing_sigma_rad: f64,
+    seed: u64,
+) -> Vec<RelativePose> {
+    if pairs.len() < 8 {
+        return Vec::new();
+    }
+    let mut candidates = Candidates { pairs, prior, sigma_rad: bearing_sigma_rad, found: Vec::new() };
+    if let Some(translation) = translation_for_rotation(pairs, &prior.rotation) {
+        for sign in [1.0, -1.0] {
+            let pose = RigidTransform::new(prior.rotation, translation * sign);
+            candidates.consider(&refine(pairs, &pose, bearing_sigma_rad));
+        }
+    }
+    let mut random = SplitMix(seed);
+    let mut needed = MAX_SAMPLES;
+    let mut drawn = 0;
+    while drawn < needed {
+        drawn += 1;
+        let sample = random.five_of(pairs.len()).map(|index| pairs[index]);
+        for essential in five_point(&sample) {
+            if epipolar_cost(pairs, &essential, bearing_sigma_rad) >= candidates.worst_kept() {
+                continue;
+            }
+            let Some(poses) = decompose(&essential) else { continue };
+            for (rotation, translation) in poses {
+                candidates.consider(&RigidTransform::new(rotation, translation));
+            }
+        }
+        if let Some((_, pose)) = candidates.found.first() {
+            let share = inliers(pairs, pose, bearing_sigma_rad).len() as f64 / pairs.len() as f64;
+            let clean = share.powi(5).clamp(1e-9, 1.0 - 1e-9);
+            needed = needed.min(((1.0 - CONFIDENCE).ln() / (1.0 - clean).ln()).ceil() as usize + EXTRA_SAMPLES);
+        }
+    }
+    candidates.finish()
+}
+
+/// The best few hypotheses that differ from each other, least cost first.
+struct Candidates<'a> {
+    pairs: &'a [(Vector3<f64>, Vector3<f64>)],
+    prior: &'a RotationPrior,
+    sigma_rad: f64,
+    found: Vec<(f64, RigidTransform)>,
+}
+
+impl Candidates<'_> {
+    /// What a hypothesis must undercut to be of interest.
+    fn worst_kept(&self) -> f64 {
+        if self.found.len() < KEPT { f64::INFINITY } else { self.found.last().map_or(f64::INFINITY, |(cost, _)| *cost) }
+    }
+
+    /// Cost with points behind a camera counted as outliers and the prior added.
+    fn cost(&self, pose: &RigidTransform) -> f64 {
+        let limit = INLIER_SIGMAS * INLIER_SIGMAS;
+        let essential = essential_of(pose);
+        let mut cost = (self.prior.rotation.inverse() * pose.rotation).angle().powi(2) / self.prior.sigma_rad.powi(2);
+        for pair in self.pairs {
+            let ratio = (epipolar_angle(&essential, pair) / self.sigma_rad).powi(2);
+            cost += if ratio < limit && lies_in_front(pose, pair, self.sigma_rad) { ratio } else { limit };
+        }
+        cost
+    }
+
+    fn consider(&mut self, pose: &RigidTransform) {
+        let cost = self.cost(pose);
+        if !cost.is_finite() || cost >= self.worst_kept() {
+            return;
+        }
+        let same = |(_, other): &(f64, RigidTransform)| {
+            (other.rotation.inverse() * pose.rotation).angle() < SAME_ROTATION_RAD
+                && angle_between(&other.translation_m, &pose.translation_m) < SAME_HEADING_RAD
+        };
+        if self.found.iter().any(|other| same(other) && other.0 <= cost) {
+            return;
+        }
+        self.found.retain(|other| !same(other));
+        let place = self.found.partition_point(|(other, _)| *other <= cost);
+        self.found.insert(place, (cost, *pose));
+        self.found.truncate(KEPT);
+    }
+
+    /// Refines what was kept, drops what fell together or fits clearly worse than the best.
+    fn finish(self) -> Vec<RelativePose> {
+        let mut refined = Candidates { found: Vec::new(), ..self };
+        for (_, pose) in &self.found {
+            refined.consider(&refine(self.pairs, pose, self.sigma_rad));
+        }
+        let limit =
+            refined.found.first().map_or(0.0, |(cost, _)| cost + (AMBIGUOUS_SHARE * self.pairs.len() as f64).max(10.0));
+        let poses = refined.found.iter().take_while(|(cost, _)| *cost <= limit);
+        poses
+            .filter_map(|(_, pose)| {
+                let inliers = inliers(self.pairs, pose, self.sigma_rad);
+                let essential = essential_of(pose);
+                let sum: f64 =
+                    inliers.iter().map(|&index| epipolar_angle(&essential, &self.pairs[index]).powi(2)).sum();
+                let rms_rad = (sum / inliers.len() as f64).sqrt();
+                (!inliers.is_empty()).then_some(RelativePose { camera_j_from_camera_i: *pose, inliers, rms_rad })
+            })
+            .collect()
+    }
+}
+
+fn essential_of(camera_j_from_camera_i: &RigidTransform) -> Matrix3<f64> {
+    so3::hat(&camera_j_from_camera_i.translation_m) * camera_j_from_camera_i.rotation_matrix()
+}
+
+/// Distance of a pair from the epipolar constraint, to first order, in radians.
+fn epipolar_angle(essential: &Matrix3<f64>, (bearing_i, bearing_j): &(Vector3<f64>, Vector3<f64>)) -> f64 {
+    let line_j = essential * bearing_i;
+    let line_i = essential.tr_mul(bearing_j);
+    let gradient = (line_i.norm_squared() + line_j.norm_squared()).sqrt();
+    if gradient > 0.0 { bearing_j.dot(&line_j).abs() / gradient } else { 0.0 }
+}
+
+fn epipolar_cost(pairs: &[(Vector3<f64>, Vector3<f64>)], essential: &Matrix3<f64>, sigma_rad: f64) -> f64 {
+    let limit = INLIER_SIGMAS * INLIER_SIGMAS;
+    pairs.iter().map(|pair| (epipolar_angle(essential, pair) / sigma_rad).powi(2).min(limit)).sum()
+}
+
+/// Whether the pair's point lies before both cameras; too little parallax to tell counts as yes.
+fn lies_in_front(
+    camera_j_from_camera_i: &RigidTransform,
+    (bearing_i, bearing_j): &(Vector3<f64>, Vector3<f64>),
+    sigma_rad: f64,
+) -> bool {
+    let turned = camera_j_from_camera_i.rotation * bearing_i;
+    // distance_j · bearing_j = distance_i · turned + t; cross with each ray to solve for the other distance.
+    let normal = turned.cross(bearing_j);
+    if normal.norm() < 2.0 * sigma_rad {
+        return true;
+    }
+    let t = &camera_j_from_camera_i.translation_m;
+    let along_i = bearing_j.cross(t).dot(&normal);
+    let along_j = turned.cross(t).dot(&normal);
+    along_i > 0.0 && along_j > 0.0
+}
+
+fn inliers(pairs: &[(Vector3<f64>, Vector3<f64>)], pose: &RigidTransform, sigma_rad: f64) -> Vec<usize> {
+    let essential = essential_of(pose);
+    let fits = |pair: &(Vector3<f64>, Vector3<f64>)| {
+        epipolar_angle(&essential, pair) < INLIER_SIGMAS * sigma_rad && lies_in_front(pose, pair, sigma_rad)
+    };
+    (0..pairs.len()).filter(|&index| fits(&pairs[index])).collect()
+}
+
+/// The direction of translation that suits a known rotation best (least eigenvector of the epipolar normals).
+fn translation_for_rotation(
+    pairs: &[(Vector3<f64>, Vector3<f64>)],
+    rotation: &UnitQuaternion<f64>,
+) -> Option<Vector3<f64>> {
+    let mut moment = Matrix3::zeros();
+    for (bearing_i, bearing_j) in pairs {
+        let normal = (rotation * bearing_i).cross(bearing_j);
+        moment += normal * normal.transpose();
+    }
+    let eigen = moment.try_symmetric_eigen(1e-15, 200)?;
+    let least = (0..3).min_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]))?;
+    Some(eigen.eigenvectors.column(least).into_owned())
+}
+
+/// Robust Gauss–Newton on the epipolar angles over rotation (3) and direction of translation (2).
+fn refine(pairs: &[(Vector3<f64>, Vector3<f64>)], start: &RigidTransform, sigma_rad: f64) -> RigidTransform {
+    const ROUNDS: usize = 12;
+    let mut pose = *start;
+    let mut damping = 1e-4;
+    let mut cost = robust_cost(pairs, &pose, sigma_rad);
+    for _ in 0..ROUNDS {
+        let basis = tangent_basis(&pose.translation_m);
+        let rotation = pose.rotation_matrix();
+        let essential = essential_of(&pose);
+        let (mut normal, mut rhs) = (Matrix5::<f64>::zeros(), Vector5::zeros());
+        for (bearing_i, bearing_j) in pairs {
+            let gradient = ((essential * bearing_i).norm_squared() + essential.tr_mul(bearing_j).norm_squared()).sqrt();
+            if gradient < 1e-12 {
+                continue;
+            }
+            let residual = bearing_j.dot(&(essential * bearing_i)) / gradient;
+            let by_rotation = -(bearing_j.transpose() * so3::hat(&pose.translation_m) * rotation * so3::hat(bearing_i));
+            let by_direction = basis * (rotation * bearing_i).cross(bearing_j);
+            let row =
+                Vector5::new(by_rotation.x, by_rotation.y, by_rotation.z, by_direction.x, by_direction.y) / gradient;
+            let weight = 1.0 / (1.0 + (residual / (2.0 * sigma_rad)).powi(2)).powi(2);
+            normal += row * row.transpose() * weight;
+            rhs -= row * (residual * weight);
+        }
+        let mut damped = normal;
+        for index in 0..5 {
+            damped[(index, index)] *= 1.0 + damping;
+        }
+        let Some(factor) = damped.cholesky() else { break };
+        let step = factor.solve(&rhs);
+        let turn = so3::exp(&Vector3::new(step[0], step[1], step[2]));
+        let direction = pose.translation_m + basis.transpose() * nalgebra::Vector2::new(step[3], step[4]);
+        let next = RigidTransform::new(
+            UnitQuaternion::new_normalize((pose.rotation * turn).into_inner()),
+            direction.normalize(),
+        );
+        let next_cost = robust_cost(pairs, &next, sigma_rad);
+        if next_cost < cost {
+            let gain = cost - next_cost;
+            (pose, cost) = (next, next_cost);
+            damping = (damping * 0.1).max(1e-9);
+            if gain < 1e-6 * cost {
+                break;
+            }
+        } else {
+            damping *= 30.0;
+            if damping > 1e6 {
+                break;
+            }
+        }
+    }
+    pose
+}
+
+/// Geman–McClure cost of the epipolar angles, scale two standard deviations.
+fn robust_cost(pairs: &[(Vector3<f64>, Vector3<f64>)], pose: &RigidTransform, sigma_rad: f64) -> f64 {
+    let essential = essential_of(pose);
+    let square = |pair| (epipolar_angle(&essential, pair) / (2.0 * sigma_rad)).powi(2);
+    pairs.iter().map(|pair| square(pair) / (1.0 + square(pair))).sum()
+}
+
+/// The `splitmix64` generator (Steele, Lea, Flood 2014): small, and the same numbers everywhere.
+pub(super) struct SplitMix(pub(super) u64);
+
+impl SplitMix {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// A number from 0 (included) to 1 (not).
+    #[cfg(test)]
+    pub(super) fn unit(&mut self) -> f64 {
+        (self.next() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// Five different numbers below `count` (which must be at least five).
+    fn five_of(&mut self, count: usize) -> [usize; 5] {
+        let mut chosen = [usize::MAX; 5];
+        let mut filled = 0;
+        while filled < 5 {
+            let candidate = (self.next() % count.max(5) as u64) as usize;
+            if !chosen[..filled].contains(&candidate) {
+                chosen[filled] = candidate;
+                filled += 1;
+            }
+        }
+        chosen
+    }
+}

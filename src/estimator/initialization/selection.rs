@@ -1,0 +1,104 @@
+//! Which of the frames become views: spaced by parallax and time, newest first.
+
+use nalgebra::{UnitQuaternion, Vector3};
+
+use super::bearing::fit_rotation;
+use super::{InitializationFrame, InitializationOptions};
+use crate::flight_log::ImuSample;
+use crate::frontend::TrackedFeature;
+use crate::geometry::{seconds_from_ns, so3};
+
+/// Rotation of the camera of every frame, `first_imu_from_camera`, by gyroscope (bias taken off) and mount.
+pub(super) fn guessed_rotations(
+    frames: &[InitializationFrame<'_>],
+    gyroscope_bias: &Vector3<f64>,
+) -> Vec<UnitQuaternion<f64>> {
+    let mut first_from_imu = UnitQuaternion::identity();
+    let mut rotations = Vec::with_capacity(frames.len());
+    for (index, frame) in frames.iter().enumerate() {
+        if index > 0 {
+            first_from_imu *= gyroscope_rotation(frame.imu, gyroscope_bias);
+        }
+        rotations.push(UnitQuaternion::new_normalize((first_from_imu * frame.imu_from_camera.rotation).into_inner()));
+    }
+    rotations
+}
+
+fn gyroscope_rotation(samples: &[ImuSample], bias: &Vector3<f64>) -> UnitQuaternion<f64> {
+    let mut rotation = UnitQuaternion::identity();
+    for pair in samples.windows(2) {
+        let [from, to] = pair else { continue };
+        let rate = (from.angular_velocity_rad_per_s + to.angular_velocity_rad_per_s) * 0.5 - bias;
+        let turn = rate * seconds_from_ns(to.stamp_ns - from.stamp_ns);
+        if turn.iter().all(|value| value.is_finite()) {
+            rotation *= so3::exp(&turn);
+        }
+    }
+    rotation
+}
+
+/// Numbers of the frames that become views, rising; the newest is always one.
+///
+/// Going back in time, a frame is taken once it shows enough parallax against the last one taken or lies far enough
+/// from it in time; where the common features run out before that, the frame before they do is taken.
+/// Where even neighbouring frames share too few, the views begin.
+pub(super) fn select_views(
+    frames: &[InitializationFrame<'_>],
+    rotations: &[UnitQuaternion<f64>],
+    options: &InitializationOptions,
+) -> Vec<usize> {
+    let Some(newest) = frames.len().checked_sub(1) else { return Vec::new() };
+    let age = |from: usize, to: usize| seconds_from_ns(frames[to].stamp_ns - frames[from].stamp_ns);
+    let mut selected = vec![newest];
+    let mut last = newest;
+    let mut candidate = newest;
+    // The farthest frame so far that still shares enough features with the last one taken.
+    let mut linked = None;
+    while candidate > 0 && selected.len() < options.most_views {
+        candidate -= 1;
+        if age(candidate, newest) > options.longest_window_s {
+            break;
+        }
+        let pairs = shared_bearings(frames[candidate].features, frames[last].features);
+        let mut taken = None;
+        if pairs.len() < options.least_common_features {
+            let Some(frame) = linked else { break };
+            taken = Some(frame);
+        } else {
+            linked = Some(candidate);
+            let spacing = age(candidate, last);
+            if spacing >= options.most_spacing_s {
+                taken = linked;
+            } else if spacing >= options.least_spacing_s {
+                let guess = rotations[last].inverse() * rotations[candidate];
+                let parallax = fit_rotation(&pairs, &guess).map_or(0.0, |fit| fit.median_parallax_rad);
+                taken = linked.filter(|_| parallax >= options.spacing_parallax_rad);
+            }
+        }
+        if let Some(frame) = taken {
+            selected.push(frame);
+            (last, candidate, linked) = (frame, frame, None);
+        }
+    }
+    selected.reverse();
+    selected
+}
+
+/// Bearings of the features that two frames share; both are ordered by id.
+pub(super) fn shared_bearings(
+    first: &[TrackedFeature],
+    second: &[TrackedFeature],
+) -> Vec<(Vector3<f64>, Vector3<f64>)> {
+    let mut shared = Vec::new();
+    let mut rest = second.iter().peekable();
+    for feature in first {
+        while rest.next_if(|other| other.id < feature.id).is_some() {}
+        if let Some(other) = rest.next_if(|other| other.id == feature.id)
+            && feature.bearing.norm().is_finite()
+            && other.bearing.norm().is_finite()
+        {
+            shared.push((feature.bearing, other.bearing));
+        }
+    }
+    shared
+}

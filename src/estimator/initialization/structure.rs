@@ -1,0 +1,366 @@
+//! Camera poses and landmarks from the images alone, up to scale: two views first, the others one by one, then all at once.
+//!
+//! The cameras are free here: a gimbal may turn them as it likes.
+//! Gyroscope and encoders only give first guesses of rotations, and break the tie that a plane leaves.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{DMatrix, DVector, UnitQuaternion, Vector3};
+
+use super::bearing::{RotationFit, fit_rotation, refine_camera_pose, triangulate};
+use super::relative_pose::{RelativePose, RotationPrior, relative_poses};
+use super::visual_problem::{Landmark, Sighting, VisualNormal, mean_square, visual_cost};
+use crate::frontend::{FeatureId, TrackedFeature};
+use crate::geometry::RigidTransform;
+
+/// A feature must be seen under at least this angle before its depth counts.
+const LEAST_PARALLAX_RAD: f64 = 0.006;
+/// Pairs looked at when the parallax of two views is measured.
+const PARALLAX_PAIRS: usize = 60;
+/// Parallax beyond this makes a pair of views no better.
+const AMPLE_PARALLAX_RAD: f64 = 0.14;
+/// Common features beyond this make a pair of views no better.
+const AMPLE_PAIRS: f64 = 60.0;
+/// How many pairs of views are tried.
+const PAIRS_TRIED: usize = 3;
+/// A landmark with a sighting beyond this many standard deviations is dropped.
+const OUTLIER_SIGMAS: f64 = 4.0;
+
+/// All sightings of one feature as `(view, bearing)`, views rising.
+pub(super) type Tracks = BTreeMap<FeatureId, Vec<(usize, Vector3<f64>)>>;
+
+/// Collects the sightings of all features that at least two of the views hold.
+pub(super) fn collect_tracks(views: &[&[TrackedFeature]]) -> Tracks {
+    let mut tracks = Tracks::new();
+    for (view, features) in views.iter().enumerate() {
+        for feature in *features {
+            let norm = feature.bearing.norm();
+            if norm.is_finite() && norm > 1e-9 {
+                let sightings = tracks.entry(feature.id).or_default();
+                if sightings.last().is_none_or(|(last, _)| *last != view) {
+                    sightings.push((view, feature.bearing / norm));
+                }
+            }
+        }
+    }
+    tracks.retain(|_, sightings| sightings.len() >= 2);
+    tracks
+}
+
+/// Bearings of the features that two views share.
+pub(super) fn common_bearings(tracks: &Tracks, view_i: usize, view_j: usize) -> Vec<(Vector3<f64>, Vector3<f64>)> {
+    let in_view = |sightings: &[(usize, Vector3<f64>)], view: usize| {
+        sightings.binary_search_by_key(&view, |(view, _)| *view).ok().map(|index| sightings[index].1)
+    };
+    tracks.values().filter_map(|sightings| Some((in_view(sightings, view_i)?, in_view(sightings, view_j)?))).collect()
+}
+
+/// Two views and what lies between them.
+#[derive(Clone, Debug)]
+pub(super) struct ViewPair {
+    pub(super) view_i: usize,
+    pub(super) view_j: usize,
+    /// Features that both hold.
+    pub(super) common: usize,
+    /// `camera_j_from_camera_i` and the parallax it leaves.
+    pub(super) fit: RotationFit,
+}
+
+impl ViewPair {
+    fn score(&self) -> f64 {
+        (self.common as f64).min(AMPLE_PAIRS) * self.fit.median_parallax_rad.min(AMPLE_PARALLAX_RAD)
+    }
+}
+
+/// Every pair of views with at least `least_common` features in common, best base for a reconstruction first.
+pub(super) fn rank_pairs(
+    tracks: &Tracks,
+    guessed_rotations: &[UnitQuaternion<f64>],
+    least_common: usize,
+) -> Vec<ViewPair> {
+    let mut pairs = Vec::new();
+    for view_j in 1..guessed_rotations.len() {
+        for view_i in 0..view_j {
+            let bearings = common_bearings(tracks, view_i, view_j);
+            if bearings.len() < least_common {
+                continue;
+            }
+            // Every n-th one: ids follow the grid in which features were found, so this stays spread.
+            let stride = bearings.len().div_ceil(PARALLAX_PAIRS);
+            let sample: Vec<_> = bearings.iter().step_by(stride).copied().collect();
+            let guess = guessed_rotations[view_j].inverse() * guessed_rotations[view_i];
+            if let Some(fit) = fit_rotation(&sample, &guess) {
+                pairs.push(ViewPair { view_i, view_j, common: bearings.len(), fit });
+            }
+        }
+    }
+    pairs.sort_by(|a, b| b.score().total_cmp(&a.score()).then((a.view_i, a.view_j).cmp(&(b.view_i, b.view_j))));
+    pairs
+}
+
+/// Why there is no reconstruction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum StructureFailure {
+    /// No pair of views has a relative pose that enough features agree with; the best share of them.
+    NoRelativePose {
+        /// Inliers of the best pair over its common features.
+        inlier_share: f64,
+    },
+    /// Too few landmarks remained; how many.
+    FewLandmarks {
+        /// Landmarks with a depth.
+        landmarks: usize,
+    },
+    /// Too few views could be placed; how many.
+    FewViews {
+        /// Placed views.
+        views: usize,
+    },
+}
+
+/// A reconstruction in the frame of its first view, the unit of length arbitrary.
+#[derive(Clone, Debug)]
+pub(super) struct Structure {
+    /// Which of the given views were placed, rising; all other fields count these only.
+    pub(super) views: Vec<usize>,
+    /// `first_camera_from_camera`, one per placed view.
+    pub(super) poses: Vec<RigidTransform>,
+    /// Landmarks; anchors and sightings are numbers of placed views.
+    pub(super) landmarks: Vec<Landmark>,
+    /// Root mean square angle error per coordinate, in radians.
+    pub(super) rms_rad: f64,
+}
+
+impl Structure {
+    /// Number of sightings of all landmarks.
+    fn sightings(&self) -> usize {
+        self.landmarks.iter().map(|landmark| landmark.sightings.len()).sum()
+    }
+}
+
+/// Limits of the reconstruction.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct StructureLimits {
+    pub(super) bearing_sigma_rad: f64,
+    /// Standard deviation of the guessed relative rotations.
+    pub(super) rotation_sigma_rad: f64,
+    pub(super) least_landmarks: usize,
+    pub(super) least_views: usize,
+    pub(super) least_inlier_share: f64,
+    pub(super) seed: u64,
+}
+
+/// Reconstructs the views, trying the best few pairs as a base.
+pub(super) fn reconstruct(
+    tracks: &Tracks,
+    pairs: &[ViewPair],
+    guessed_rotations: &[UnitQuaternion<f64>],
+    limits: &StructureLimits,
+) -> Result<Structure, StructureFailure> {
+    let mut failure = StructureFailure::NoRelativePose { inlier_share: 0.0 };
+    for pair in pairs.iter().take(PAIRS_TRIED) {
+        match reconstruct_from(tracks, pair, guessed_rotations, limits) {
+            Ok(structure) => return Ok(structure),
+            Err(reason) => failure = reason,
+        }
+    }
+    Err(failure)
+}
+
+fn reconstruct_from(
+    tracks: &Tracks,
+    pair: &ViewPair,
+    guessed_rotations: &[UnitQuaternion<f64>],
+    limits: &StructureLimits,
+) -> Result<Structure, StructureFailure> {
+    let bearings = common_bearings(tracks, pair.view_i, pair.view_j);
+    let guess = guessed_rotations[pair.view_j].inverse() * guessed_rotations[pair.view_i];
+    let prior = RotationPrior { rotation: guess, sigma_rad: limits.rotation_sigma_rad };
+    let bases = relative_poses(&bearings, &prior, limits.bearing_sigma_rad, limits.seed);
+    let share = |base: &RelativePose| base.inliers.len() as f64 / bearings.len() as f64;
+    let inlier_share = bases.iter().map(share).fold(0.0, f64::max);
+    let mut best: Result<Structure, StructureFailure> = Err(StructureFailure::NoRelativePose { inlier_share });
+    for base in bases.iter().filter(|base| share(base) >= limits.least_inlier_share) {
+        let grown = grow(tracks, pair, base, guessed_rotations, limits);
+        // Of two solutions of a plane the wrong one places fewer views or landmarks.
+        let merit = |structure: &Structure| {
+            structure.sightings() as f64 * (1.0 - structure.rms_rad / limits.bearing_sigma_rad / 3.0)
+        };
+        match (&grown, &best) {
+            (Ok(new), Ok(old)) if merit(new) > merit(old) => best = grown,
+            (_, Err(_)) => best = grown,
+            _ => {}
+        }
+    }
+    best
+}
+
+/// Places all other views on the points of the first two, then adjusts everything.
+fn grow(
+    tracks: &Tracks,
+    pair: &ViewPair,
+    base: &RelativePose,
+    guessed_rotations: &[UnitQuaternion<f64>],
+    limits: &StructureLimits,
+) -> Result<Structure, StructureFailure> {
+    let mut map = GrowingMap {
+        tracks,
+        poses: vec![None; guessed_rotations.len()],
+        points: BTreeMap::new(),
+        sigma_rad: limits.bearing_sigma_rad,
+    };
+    map.poses[pair.view_i] = Some(RigidTransform::identity());
+    map.poses[pair.view_j] = Some(base.camera_j_from_camera_i.inverse());
+    map.triangulate_all();
+    for view in by_distance(pair, guessed_rotations.len()) {
+        map.place(view, guessed_rotations, limits);
+    }
+    let structure = map.finish();
+    if structure.views.len() < limits.least_views {
+        return Err(StructureFailure::FewViews { views: structure.views.len() });
+    }
+    let structure = adjust(structure, limits.bearing_sigma_rad);
+    if structure.landmarks.len() < limits.least_landmarks {
+        return Err(StructureFailure::FewLandmarks { landmarks: structure.landmarks.len() });
+    }
+    Ok(structure)
+}
+
+/// The other views: those between the pair from both ends inwards, then those outside, nearest first.
+fn by_distance(pair: &ViewPair, count: usize) -> Vec<usize> {
+    let distance = |view: usize| view.abs_diff(pair.view_i).min(view.abs_diff(pair.view_j));
+    let outside = |view: usize| view < pair.view_i || view > pair.view_j;
+    let mut views: Vec<usize> = (0..count).filter(|view| *view != pair.view_i && *view != pair.view_j).collect();
+    views.sort_by_key(|&view| (outside(view), distance(view), view));
+    views
+}
+
+/// Views and points placed so far.
+struct GrowingMap<'a> {
+    tracks: &'a Tracks,
+    poses: Vec<Option<RigidTransform>>,
+    points: BTreeMap<FeatureId, Vector3<f64>>,
+    sigma_rad: f64,
+}
+
+impl GrowingMap<'_> {
+    /// Triangulates every feature that has no point yet (or anew) from all views placed so far.
+    fn triangulate_all(&mut self) {
+        self.points.clear();
+        for (id, sightings) in self.tracks {
+            let rays: Vec<(RigidTransform, Vector3<f64>)> =
+                sightings.iter().filter_map(|(view, bearing)| Some((self.poses[*view]?, *bearing))).collect();
+            let Some(point) = triangulate(&rays) else { continue };
+            let fits = point.worst_angle_rad < OUTLIER_SIGMAS * self.sigma_rad;
+            if point.in_front && fits && point.parallax_rad > LEAST_PARALLAX_RAD {
+                self.points.insert(*id, point.position);
+            }
+        }
+    }
+
+    /// Places one more view on the points, starting from its nearest placed neighbour.
+    fn place(&mut self, view: usize, guessed_rotations: &[UnitQuaternion<f64>], limits: &StructureLimits) {
+        let known: Vec<(Vector3<f64>, Vector3<f64>)> = self
+            .points
+            .iter()
+            .filter_map(|(id, point)| {
+                let sightings = self.tracks.get(id)?;
+                let index = sightings.binary_search_by_key(&view, |(view, _)| *view).ok()?;
+                Some((*point, sightings[index].1))
+            })
+            .collect();
+        let placed = (0..self.poses.len()).filter(|&other| self.poses[other].is_some());
+        let Some(neighbour) = placed.min_by_key(|other| other.abs_diff(view)) else { return };
+        let Some(neighbour_pose) = self.poses[neighbour] else { return };
+        let guess = guessed_rotations[neighbour].inverse() * guessed_rotations[view];
+        let shared = common_bearings(self.tracks, view, neighbour);
+        let rotation = fit_rotation(&shared, &guess).map_or(guess, |fit| fit.rotation);
+        let start = RigidTransform::new(neighbour_pose.rotation * rotation, neighbour_pose.translation_m);
+        let Some(pose) = refine_camera_pose(&known, &start, self.sigma_rad, OUTLIER_SIGMAS) else { return };
+        let fitting = pose.inliers.iter().filter(|inlier| **inlier).count();
+        let needed = (limits.least_inlier_share * known.len() as f64).max(8.0);
+        if fitting as f64 >= needed {
+            self.poses[view] = Some(pose.world_from_camera);
+            self.triangulate_all();
+        }
+    }
+
+    /// Numbers the placed views anew, with the first of them as the frame of reference.
+    fn finish(self) -> Structure {
+        let views: Vec<usize> = (0..self.poses.len()).filter(|&view| self.poses[view].is_some()).collect();
+        let placed: Vec<RigidTransform> = self.poses.iter().filter_map(|pose| *pose).collect();
+        let first_from_base = placed.first().map_or_else(RigidTransform::identity, RigidTransform::inverse);
+        let poses: Vec<RigidTransform> = placed.iter().map(|pose| first_from_base * *pose).collect();
+        let mut landmarks = Vec::new();
+        for (id, point) in &self.points {
+            let Some(sightings) = self.tracks.get(id) else { continue };
+            let seen: Vec<Sighting> = sightings
+                .iter()
+                .filter_map(|(view, bearing)| Some(Sighting::new(views.binary_search(view).ok()?, *bearing)))
+                .collect();
+            let Some(anchor) = seen.first().map(|sighting| sighting.view) else { continue };
+            let distance = (first_from_base.transform(point) - poses[anchor].translation_m).norm();
+            landmarks.extend(Landmark::new(*id, 1.0 / distance, seen));
+        }
+        Structure { views, poses, landmarks, rms_rad: 0.0 }
+    }
+}
+
+/// Adjusts all poses and depths together, twice, with bad landmarks dropped in between.
+fn adjust(mut structure: Structure, sigma_rad: f64) -> Structure {
+    for _ in 0..2 {
+        bundle_adjust(&mut structure, sigma_rad);
+        let poses = &structure.poses;
+        structure.landmarks.retain(|landmark| {
+            landmark.inverse_distance > 0.0 && landmark.worst_ratio(poses, sigma_rad) < OUTLIER_SIGMAS
+        });
+    }
+    structure.rms_rad = mean_square(&structure.landmarks, &structure.poses, sigma_rad).0.sqrt() * sigma_rad;
+    structure
+}
+
+/// Levenberg–Marquardt over all poses but the first; the free scale is held by the damping alone.
+fn bundle_adjust(structure: &mut Structure, sigma_rad: f64) {
+    const ROUNDS: usize = 8;
+    let mut damping = 1e-3;
+    let mut cost = visual_cost(&structure.landmarks, &structure.poses, sigma_rad);
+    for _ in 0..ROUNDS {
+        let normal = VisualNormal::new(&structure.landmarks, &structure.poses, sigma_rad, damping);
+        let free = normal.gradient.len().saturating_sub(6);
+        if free == 0 {
+            return;
+        }
+        let mut hessian: DMatrix<f64> = normal.hessian.view((6, 6), (free, free)).into_owned();
+        for index in 0..free {
+            hessian[(index, index)] = hessian[(index, index)] * (1.0 + damping) + 1e-9;
+        }
+        let Some(factor) = hessian.cholesky() else {
+            damping *= 10.0;
+            continue;
+        };
+        let solved = factor.solve(&normal.gradient.rows(6, free));
+        let mut step = DVector::zeros(free + 6);
+        step.rows_mut(6, free).copy_from(&-solved);
+        let poses: Vec<RigidTransform> = structure
+            .poses
+            .iter()
+            .enumerate()
+            .map(|(view, pose)| pose.plus(&step.fixed_rows::<6>(6 * view).into_owned()))
+            .collect();
+        let landmarks = normal.moved_landmarks(&structure.landmarks, &step);
+        let next = visual_cost(&landmarks, &poses, sigma_rad);
+        if next < cost {
+            let settled = cost - next < 1e-4 * cost;
+            (structure.poses, structure.landmarks, cost) = (poses, landmarks, next);
+            damping = (damping * 0.1).max(1e-8);
+            if settled {
+                break;
+            }
+        } else {
+            damping *= 20.0;
+            if damping > 1e8 {
+                break;
+            }
+        }
+    }
+}

@@ -1,0 +1,248 @@
+//! From the classical form to the others and back; closed forms that exist for every chain.
+
+use std::f64::consts::PI;
+
+use nalgebra::{Matrix3, Rotation3, Vector3};
+
+use crate::geometry::RigidTransform;
+
+use super::chain::{Form, MinimalChain};
+use super::frame::{Axis, Frame};
+use super::{Chain, ClassicalChain, DhLink, Parameterization};
+
+/// Below this cosine (or sine) of the middle angle a decomposition counts as locked.
+const LOCK: f64 = 1e-12;
+
+/// The minimal form of a chain of at least one joint.
+///
+/// A base at its lock leaves its first angle at zero; an end block at its lock leaves `y` (or `alpha`) at zero.
+pub(super) fn minimal(classical: &ClassicalChain, parameterization: Parameterization) -> MinimalChain {
+    let base = split_base(&Frame::of(&classical.imu_from_base), parameterization.base_yx());
+    let mut links = classical.links.clone();
+    links[0].theta_offset_rad += base.turn_rad;
+    links[0].d_m += base.slide_m;
+    let end = links.len() - 1;
+    let block = split_end(&end_block(&links[end], &classical.effector_from_camera), parameterization.end_swapped());
+    links[end] = block.link;
+    MinimalChain {
+        base_angles_rad: base.angles_rad,
+        base_shift_m: base.shift_m,
+        links,
+        beta_rad: block.beta_rad,
+        y_m: block.y_m,
+    }
+}
+
+/// What the last link and the camera behind it do together, at the link's joint angle zero.
+pub(super) fn end_block(link: &DhLink, effector_from_camera: &RigidTransform) -> Frame {
+    let mut frame = Frame::identity();
+    link.extend(&mut frame, 0.0);
+    frame.then(effector_from_camera);
+    frame
+}
+
+struct Base {
+    angles_rad: [f64; 2],
+    shift_m: [f64; 2],
+    /// Turn and slide along z that are left for the first joint.
+    turn_rad: f64,
+    slide_m: f64,
+}
+
+/// `Rx·Ry·T(tx, ty, 0)·Rz(turn)·Tz(slide)`, or with `Ry·Rx`.
+fn split_base(base: &Frame, yx: bool) -> Base {
+    let r = &base.rotation;
+    let (angles_rad, axes) = if yx {
+        let middle_cosine = r[(0, 2)].hypot(r[(2, 2)]);
+        let ry = if middle_cosine < LOCK { 0.0 } else { r[(0, 2)].atan2(r[(2, 2)]) };
+        ([ry, (-r[(1, 2)]).atan2(middle_cosine)], [Axis::Y, Axis::X])
+    } else {
+        let middle_cosine = r[(1, 2)].hypot(r[(2, 2)]);
+        let rx = if middle_cosine < LOCK { 0.0 } else { (-r[(1, 2)]).atan2(r[(2, 2)]) };
+        ([rx, r[(0, 2)].atan2(middle_cosine)], [Axis::X, Axis::Y])
+    };
+    let mut turned = Frame::identity();
+    turned.turn(axes[0], angles_rad[0]);
+    turned.turn(axes[1], angles_rad[1]);
+    let rest = turned.rotation.tr_mul(r);
+    let shift = turned.rotation.tr_mul(&base.origin);
+    Base { angles_rad, shift_m: [shift.x, shift.y], turn_rad: rest[(1, 0)].atan2(rest[(1, 1)]), slide_m: shift.z }
+}
+
+struct End {
+    link: DhLink,
+    beta_rad: f64,
+    y_m: f64,
+}
+
+/// `Rz·Tz·Tx·Rx·Ry(beta)·Ty(y)` (Eq. 19), or `Rz·Tz·Tx·Ty(y)·Ry(beta)·Rx`.
+fn split_end(block: &Frame, swapped: bool) -> End {
+    let (r, t) = (&block.rotation, &block.origin);
+    if swapped {
+        let middle_cosine = r[(0, 0)].hypot(r[(1, 0)]);
+        let locked = middle_cosine < LOCK;
+        let beta_rad = (-r[(2, 0)]).atan2(middle_cosine);
+        // Locked, only a combination of theta and alpha is determined: R·Ry(−beta) is the turn about z for alpha = 0.
+        let theta_offset_rad = if locked { (-r[(0, 1)]).atan2(r[(1, 1)]) } else { r[(1, 0)].atan2(r[(0, 0)]) };
+        let alpha_rad = if locked { 0.0 } else { r[(2, 1)].atan2(r[(2, 2)]) };
+        let shift = turned_back(theta_offset_rad, t);
+        return End {
+            link: DhLink { theta_offset_rad, d_m: shift.z, a_m: shift.x, alpha_rad },
+            beta_rad,
+            y_m: shift.y,
+        };
+    }
+    let middle_cosine = r[(0, 1)].hypot(r[(1, 1)]);
+    let alpha_rad = r[(2, 1)].atan2(middle_cosine);
+    if middle_cosine < LOCK {
+        // Theta and beta turn about the same line; theta is chosen so that y is not needed.
+        let theta_offset_rad = if t.x == 0.0 && t.y == 0.0 { 0.0 } else { t.y.atan2(t.x) };
+        let mut turned = Frame::identity();
+        turned.turn(Axis::Z, theta_offset_rad);
+        turned.turn(Axis::X, alpha_rad);
+        let rest = turned.rotation.tr_mul(r);
+        return End {
+            link: DhLink { theta_offset_rad, d_m: t.z, a_m: t.x.hypot(t.y), alpha_rad },
+            beta_rad: rest[(0, 2)].atan2(rest[(0, 0)]),
+            y_m: 0.0,
+        };
+    }
+    let theta_offset_rad = (-r[(0, 1)]).atan2(r[(1, 1)]);
+    let shift = turned_back(theta_offset_rad, t);
+    let y_m = shift.y / middle_cosine;
+    End {
+        link: DhLink { theta_offset_rad, d_m: shift.z - y_m * alpha_rad.sin(), a_m: shift.x, alpha_rad },
+        beta_rad: (-r[(2, 0)]).atan2(r[(2, 2)]),
+        y_m,
+    }
+}
+
+/// `Rz(−angle)·v`.
+fn turned_back(angle_rad: f64, v: &Vector3<f64>) -> Vector3<f64> {
+    let (sine, cosine) = angle_rad.sin_cos();
+    Vector3::new(cosine * v.x + sine * v.y, cosine * v.y - sine * v.x, v.z)
+}
+
+/// The classical form of a minimal chain: the base keeps its turns, and what follows the last link (for the swapped
+/// end block: what follows its shift) becomes the camera's pose on the effector.
+pub(super) fn classical_of_minimal(chain: &MinimalChain, parameterization: Parameterization) -> ClassicalChain {
+    let mut base = Frame::identity();
+    let order = if parameterization.base_yx() { [Axis::Y, Axis::X] } else { [Axis::X, Axis::Y] };
+    for (axis, angle) in order.into_iter().zip(chain.base_angles_rad) {
+        base.turn(axis, angle);
+    }
+    base.slide(Axis::X, chain.base_shift_m[0]);
+    base.slide(Axis::Y, chain.base_shift_m[1]);
+    let mut links = chain.links.clone();
+    let mut camera = Frame::identity();
+    if parameterization.end_swapped() {
+        camera.slide(Axis::Y, chain.y_m);
+        camera.turn(Axis::Y, chain.beta_rad);
+        if let Some(last) = links.last_mut() {
+            camera.turn(Axis::X, last.alpha_rad);
+            last.alpha_rad = 0.0;
+        }
+    } else {
+        camera.turn(Axis::Y, chain.beta_rad);
+        camera.slide(Axis::Y, chain.y_m);
+    }
+    ClassicalChain { imu_from_base: base.to_transform(), links, effector_from_camera: camera.to_transform() }
+}
+
+/// The blocks `X0 … XN` of a chain of at least one joint.
+pub(super) fn poe_blocks(classical: &ClassicalChain) -> Vec<RigidTransform> {
+    let mut blocks = vec![classical.imu_from_base];
+    blocks.extend(classical.links.iter().map(|link| link.transform(0.0)));
+    let end = blocks.len() - 1;
+    blocks[end] = blocks[end] * classical.effector_from_camera;
+    blocks
+}
+
+/// The classical form of a product of exponentials.
+///
+/// Inner blocks become links, each handing the screw along its own z axis that a link cannot hold to the next block; the
+/// last block becomes a link with a turn and a shift about y behind it, in the end block with the larger margin.
+pub(super) fn classical_of_poe(blocks: &[RigidTransform]) -> ClassicalChain {
+    let last = blocks.len() - 1;
+    let mut links = Vec::with_capacity(last);
+    let mut handed_on = RigidTransform::identity();
+    for block in &blocks[1..last] {
+        let (link, turn_rad, slide_m) = split_inner(&Frame::of(&(handed_on * *block)));
+        links.push(link);
+        handed_on = RigidTransform::new(
+            Rotation3::from_axis_angle(&Vector3::z_axis(), turn_rad).into(),
+            Vector3::new(0.0, 0.0, slide_m),
+        );
+    }
+    let block = Frame::of(&(handed_on * blocks[last]));
+    let swapped = block.rotation[(2, 0)].abs() < block.rotation[(2, 1)].abs();
+    let end = split_end(&block, swapped);
+    links.push(end.link);
+    let chain =
+        MinimalChain { base_angles_rad: [0.0; 2], base_shift_m: [0.0; 2], links, beta_rad: end.beta_rad, y_m: end.y_m };
+    let on_the_first_joint = classical_of_minimal(&chain, Parameterization::minimal(false, swapped));
+    ClassicalChain { imu_from_base: blocks[0], ..on_the_first_joint }
+}
+
+/// `Rz·Tz·Tx·Rx·Rz(turn)·Tz(slide)`, with a twist between 0 and π.
+fn split_inner(block: &Frame) -> (DhLink, f64, f64) {
+    let (r, t) = (&block.rotation, &block.origin);
+    let twist_sine = r[(0, 2)].hypot(r[(1, 2)]);
+    let alpha_rad = twist_sine.atan2(r[(2, 2)]);
+    let parallel = twist_sine < LOCK;
+    let theta_offset_rad = if !parallel {
+        r[(0, 2)].atan2(-r[(1, 2)])
+    } else if t.x == 0.0 && t.y == 0.0 {
+        0.0
+    } else {
+        t.y.atan2(t.x)
+    };
+    let mut turned = Frame::identity();
+    turned.turn(Axis::Z, theta_offset_rad);
+    turned.turn(Axis::X, alpha_rad);
+    let rest: Matrix3<f64> = turned.rotation.tr_mul(r);
+    let turn_rad = rest[(1, 0)].atan2(rest[(0, 0)]);
+    let shift = turned_back(theta_offset_rad, t);
+    let slide_m = if parallel { 0.0 } else { -shift.y / twist_sine };
+    let d_m = shift.z - slide_m * r[(2, 2)];
+    (DhLink { theta_offset_rad, d_m, a_m: shift.x, alpha_rad }, turn_rad, slide_m)
+}
+
+impl Chain {
+    /// The representative that equal mechanisms share: base and end middle angles within ±π/2, twists of the middle
+    /// links within 0 to π, offsets and turns within ±π. Other forms than the minimal ones come back as they are.
+    ///
+    /// Unique away from the chart's locks and from parallel neighbouring axes.
+    #[must_use]
+    pub fn canonical(&self) -> Self {
+        if !matches!(self.form, Form::Minimal(_)) {
+            return self.clone();
+        }
+        let mut canonical = Self::from_classical(&self.to_classical(), self.parameterization);
+        canonical.offsets_hidden = self.offsets_hidden;
+        if let Form::Minimal(chain) = &mut canonical.form {
+            for index in 0..chain.links.len() - 1 {
+                let link = &mut chain.links[index];
+                link.alpha_rad = wrapped(link.alpha_rad);
+                if link.alpha_rad < 0.0 {
+                    // DH(θ, d, a, α) = DH(θ + π, d, −a, −α)·Rz(−π)
+                    link.theta_offset_rad += PI;
+                    link.a_m = -link.a_m;
+                    link.alpha_rad = -link.alpha_rad;
+                    chain.links[index + 1].theta_offset_rad -= PI;
+                }
+            }
+            for link in &mut chain.links {
+                link.theta_offset_rad = wrapped(link.theta_offset_rad);
+                link.alpha_rad = wrapped(link.alpha_rad);
+            }
+        }
+        canonical
+    }
+}
+
+/// The same angle within −π (included) and π.
+fn wrapped(angle_rad: f64) -> f64 {
+    let turns = ((angle_rad + PI) / (2.0 * PI)).floor();
+    angle_rad - turns * 2.0 * PI
+}

@@ -1,0 +1,167 @@
+//! Covariances between parameterizations, by what their columns do to the camera at many joint angles.
+
+use std::f64::consts::PI;
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::geometry::dense::thin_svd;
+
+use super::{Chain, ClassicalChain, Parameterization};
+
+/// Scale that makes a radian and a metre comparable in the least-squares fits: 10°.
+const ROTATION_SCALE_RAD: f64 = 10.0 * PI / 180.0;
+/// The same for lengths: 3 cm.
+const TRANSLATION_SCALE_M: f64 = 0.03;
+/// Singular values of the scaled, stacked chain Jacobian below this fraction of the largest are zero; regular
+/// mechanisms stay above 2e-4, redundant columns below 1e-15.
+const RANK_TOLERANCE: f64 = 1e-10;
+/// Gains of the scaled transport below this lead nowhere; regular mechanisms have gains of 0.1 and more.
+const REACH_TOLERANCE: f64 = 1e-6;
+
+/// Joint angles that a mechanism has no preference for: a low-discrepancy sequence over whole turns, the same ones in
+/// every call.
+pub fn generic_joint_angles(joints: usize, count: usize) -> Vec<Vec<f64>> {
+    if joints == 0 {
+        return vec![vec![]];
+    }
+    // Additive recurrence with the generalized golden ratio, the positive root of x^(joints + 1) = x + 1.
+    let mut ratio = 2.0_f64;
+    for _ in 0..60 {
+        ratio = (1.0 + ratio).powf(1.0 / (joints as f64 + 1.0));
+    }
+    (0..count)
+        .map(|index| {
+            (1..=joints)
+                .map(|joint| {
+                    let fraction = (0.5 + (index + 1) as f64 / ratio.powi(joint as i32)).fract();
+                    2.0 * PI * fraction - PI
+                })
+                .collect()
+        })
+        .collect()
+}
+
+/// The chain's Jacobians at several joint angles under one another (6·count × dof), in radians and metres.
+pub fn stacked_jacobian(chain: &Chain, joint_angles_rad: &[Vec<f64>]) -> DMatrix<f64> {
+    let mut stacked = DMatrix::zeros(6 * joint_angles_rad.len(), chain.dof());
+    for (index, angles) in joint_angles_rad.iter().enumerate() {
+        stacked.rows_mut(6 * index, 6).copy_from(&chain.linearize(angles).by_parameters);
+    }
+    stacked
+}
+
+/// How the columns of `to` move when those of `from` do, for two forms of one mechanism (`to.dof()` × `from.dof()`).
+///
+/// Least squares over generic joint angles: exact where the chart of `to` is regular, of least norm where it is not.
+/// All entries are NaN when a number of the chains is not finite.
+///
+/// # Panics
+/// When the numbers of joints differ.
+pub fn transport(from: &Chain, to: &Chain) -> DMatrix<f64> {
+    assert_eq!(from.joint_count(), to.joint_count(), "two forms of one mechanism");
+    let whole = |chain: &Chain| Chain { offsets_hidden: false, ..chain.clone() };
+    let angles = generic_joint_angles(to.joint_count(), 12 * (to.joint_count() + 1));
+    let (whole_from, whole_to) = (whole(from), whole(to));
+    let scale = column_scale(&whole_to, ROTATION_SCALE_RAD, TRANSLATION_SCALE_M);
+    let mut target = stacked_jacobian(&whole_to, &angles);
+    scale_columns(&mut target, &scale);
+    let source = stacked_jacobian(&whole_from, &angles);
+    let Some(svd) = thin_svd(&target) else {
+        return DMatrix::from_element(to.dof(), from.dof(), f64::NAN);
+    };
+    let largest = svd.singular_values.max();
+    let solve = |right: &DMatrix<f64>| {
+        let mut projected = svd.u.tr_mul(right);
+        for (mut row, singular_value) in projected.row_iter_mut().zip(&svd.singular_values) {
+            row.scale_mut(if *singular_value > RANK_TOLERANCE * largest { 1.0 / singular_value } else { 0.0 });
+        }
+        &svd.v * &projected
+    };
+    // One refinement step takes the rounding of the decomposition away.
+    let first = solve(&source);
+    let mut motion = &first + solve(&(&source - &target * &first));
+    for (mut row, scale) in motion.row_iter_mut().zip(&scale) {
+        row.scale_mut(*scale);
+    }
+    motion.select_rows(&to.kept_columns()).select_columns(&from.kept_columns())
+}
+
+/// A covariance of `from`'s columns as one of `to`'s, for a switch of charts.
+///
+/// Directions of `to` that no motion of `from` leads to, at a lock or where one of the forms is redundant, are given 10°
+/// and 3 cm, so that they stay free instead of becoming certain.
+///
+/// # Panics
+/// When the numbers of joints differ, or the covariance does not belong to `from`.
+pub fn transport_covariance(from: &Chain, covariance: &DMatrix<f64>, to: &Chain) -> DMatrix<f64> {
+    transported(from, covariance, to, ROTATION_SCALE_RAD, TRANSLATION_SCALE_M)
+}
+
+fn transported(
+    from: &Chain,
+    covariance: &DMatrix<f64>,
+    to: &Chain,
+    rotation_sigma_rad: f64,
+    translation_sigma_m: f64,
+) -> DMatrix<f64> {
+    let motion = transport(from, to);
+    let (from_scale, to_scale) = (
+        column_scale(from, ROTATION_SCALE_RAD, TRANSLATION_SCALE_M),
+        column_scale(to, ROTATION_SCALE_RAD, TRANSLATION_SCALE_M),
+    );
+    let scaled = DMatrix::from_fn(motion.nrows(), motion.ncols(), |row, column| {
+        motion[(row, column)] * from_scale[column] / to_scale[row]
+    });
+    let Some(svd) = thin_svd(&scaled) else {
+        return DMatrix::from_element(to.dof(), to.dof(), f64::NAN);
+    };
+    let mut reached = svd.u;
+    for (mut column, singular_value) in reached.column_iter_mut().zip(&svd.singular_values) {
+        if *singular_value < REACH_TOLERANCE {
+            column.fill(0.0);
+        }
+    }
+    let sigma = column_scale(to, rotation_sigma_rad, translation_sigma_m);
+    let free = DMatrix::identity(to.dof(), to.dof()) - &reached * reached.transpose();
+    let free = DMatrix::from_fn(to.dof(), to.dof(), |row, column| free[(row, column)] * sigma[row] * sigma[column]);
+    let result = &motion * covariance * motion.transpose() + free;
+    (&result + result.transpose()) * 0.5
+}
+
+/// The scale of each column by its unit.
+fn column_scale(chain: &Chain, rotation: f64, translation: f64) -> DVector<f64> {
+    let units = chain.parameter_units();
+    DVector::from_iterator(units.len(), units.iter().map(|unit| if *unit == "rad" { rotation } else { translation }))
+}
+
+fn scale_columns(matrix: &mut DMatrix<f64>, scale: &DVector<f64>) {
+    for (mut column, scale) in matrix.column_iter_mut().zip(scale) {
+        column.scale_mut(*scale);
+    }
+}
+
+impl Chain {
+    /// The covariance of its columns when every number of the rig's classical form is uncertain on its own, with these
+    /// standard deviations (rad, m); diagonal for the classical form.
+    ///
+    /// `classical` is the mechanism that this chain was converted from.
+    ///
+    /// # Panics
+    /// When the numbers of joints differ.
+    pub fn prior_covariance(
+        &self,
+        classical: &ClassicalChain,
+        translation_sigma_m: f64,
+        rotation_sigma_rad: f64,
+    ) -> DMatrix<f64> {
+        let given = Self::from_classical(classical, Parameterization::Classical);
+        let variances = |chain: &Self| {
+            let sigma = column_scale(chain, rotation_sigma_rad, translation_sigma_m);
+            DMatrix::from_diagonal(&sigma.component_mul(&sigma))
+        };
+        if self.parameterization == Parameterization::Classical {
+            return variances(self);
+        }
+        transported(&given, &variances(&given), self, rotation_sigma_rad, translation_sigma_m)
+    }
+}

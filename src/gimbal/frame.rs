@@ -1,0 +1,69 @@
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+
+use crate::geometry::RigidTransform;
+
+/// A coordinate axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Axis {
+    X,
+    Y,
+    Z,
+}
+
+impl Axis {
+    fn index(self) -> usize {
+        match self {
+            Self::X => 0,
+            Self::Y => 1,
+            Self::Z => 2,
+        }
+    }
+}
+
+/// A frame that walks along the chain: orientation and origin in the frame where the walk began.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Frame {
+    pub(super) rotation: Matrix3<f64>,
+    pub(super) origin: Vector3<f64>,
+}
+
+impl Frame {
+    pub(super) fn identity() -> Self {
+        Self { rotation: Matrix3::identity(), origin: Vector3::zeros() }
+    }
+
+    pub(super) fn of(transform: &RigidTransform) -> Self {
+        Self { rotation: transform.rotation_matrix(), origin: transform.translation_m }
+    }
+
+    /// One of its axes in the outer frame.
+    pub(super) fn axis(&self, axis: Axis) -> Vector3<f64> {
+        self.rotation.column(axis.index()).into_owned()
+    }
+
+    /// Turns about its own axis.
+    pub(super) fn turn(&mut self, axis: Axis, angle_rad: f64) {
+        let (sine, cosine) = angle_rad.sin_cos();
+        let (next, after) = ((axis.index() + 1) % 3, (axis.index() + 2) % 3);
+        let first = self.rotation.column(next) * cosine + self.rotation.column(after) * sine;
+        let second = self.rotation.column(after) * cosine - self.rotation.column(next) * sine;
+        self.rotation.set_column(next, &first);
+        self.rotation.set_column(after, &second);
+    }
+
+    /// Moves along its own axis.
+    pub(super) fn slide(&mut self, axis: Axis, distance_m: f64) {
+        self.origin += self.rotation.column(axis.index()) * distance_m;
+    }
+
+    /// Moves by a transform given in its own axes.
+    pub(super) fn then(&mut self, inner: &RigidTransform) {
+        self.origin += self.rotation * inner.translation_m;
+        self.rotation *= inner.rotation_matrix();
+    }
+
+    pub(super) fn to_transform(self) -> RigidTransform {
+        let rotation = Rotation3::from_matrix_unchecked(self.rotation);
+        RigidTransform::new(UnitQuaternion::from_rotation_matrix(&rotation), self.origin)
+    }
+}

@@ -1,0 +1,212 @@
+//! Forward kinematics and its closed-form derivatives, one walk along the chain for all forms.
+//!
+//! Every column is an elementary motion: a turn about an axis `w` through a point `p`, whose column is
+//! `[Rᵀ·w; w × (t − p)]`, or a slide along `w`, whose column is `[0; w]`; `R`, `t` are the camera's.
+
+use nalgebra::{Matrix6xX, Vector3};
+
+use crate::geometry::RigidTransform;
+
+use super::chain::Form;
+use super::frame::{Axis, Frame};
+use super::{Chain, DhLink};
+
+/// Forward kinematics and its derivatives at one set of joint angles.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ChainLinearization {
+    /// The camera's pose.
+    pub imu_from_camera: RigidTransform,
+    /// Its `[φ; δt]` by the columns of the chain (6 × dof).
+    pub by_parameters: Matrix6xX<f64>,
+    /// Its `[φ; δt]` by the joint angles (6 × N).
+    pub by_joints: Matrix6xX<f64>,
+}
+
+impl Chain {
+    /// Forward kinematics at the encoder angles, one per joint.
+    ///
+    /// # Panics
+    /// When the number of angles is not the number of joints.
+    pub fn imu_from_camera(&self, joint_angles_rad: &[f64]) -> RigidTransform {
+        self.walk(joint_angles_rad, &mut Unrecorded).to_transform()
+    }
+
+    /// Forward kinematics and its derivatives.
+    ///
+    /// # Panics
+    /// When the number of angles is not the number of joints.
+    pub fn linearize(&self, joint_angles_rad: &[f64]) -> ChainLinearization {
+        let mut recorder = Recorder {
+            parameters: Columns::new(self.dof()),
+            joints: Columns::new(self.joint_count()),
+            offsets: !self.offsets_hidden,
+        };
+        let frame = self.walk(joint_angles_rad, &mut recorder);
+        ChainLinearization {
+            imu_from_camera: frame.to_transform(),
+            by_parameters: recorder.parameters.finish(&frame),
+            by_joints: recorder.joints.finish(&frame),
+        }
+    }
+
+    fn walk<S: Sink>(&self, joint_angles_rad: &[f64], sink: &mut S) -> Frame {
+        assert_eq!(joint_angles_rad.len(), self.joint_count(), "one angle per joint");
+        let mut frame = Frame::identity();
+        match &self.form {
+            Form::Classical(chain) => {
+                walk_block(&mut frame, &chain.imu_from_base, sink);
+                for (link, angle) in chain.links.iter().zip(joint_angles_rad) {
+                    walk_link(&mut frame, link, *angle, sink);
+                    turn(&mut frame, Axis::X, link.alpha_rad, sink);
+                }
+                walk_block(&mut frame, &chain.effector_from_camera, sink);
+            }
+            Form::Minimal(chain) => {
+                let order = if self.parameterization.base_yx() { [Axis::Y, Axis::X] } else { [Axis::X, Axis::Y] };
+                for (axis, angle) in order.into_iter().zip(chain.base_angles_rad) {
+                    turn(&mut frame, axis, angle, sink);
+                }
+                slide(&mut frame, Axis::X, chain.base_shift_m[0], sink);
+                slide(&mut frame, Axis::Y, chain.base_shift_m[1], sink);
+                let end = chain.links.len() - 1;
+                for (index, (link, angle)) in chain.links.iter().zip(joint_angles_rad).enumerate() {
+                    walk_link(&mut frame, link, *angle, sink);
+                    if index == end && self.parameterization.end_swapped() {
+                        slide(&mut frame, Axis::Y, chain.y_m, sink);
+                        turn(&mut frame, Axis::Y, chain.beta_rad, sink);
+                    }
+                    turn(&mut frame, Axis::X, link.alpha_rad, sink);
+                }
+                if !self.parameterization.end_swapped() {
+                    turn(&mut frame, Axis::Y, chain.beta_rad, sink);
+                    slide(&mut frame, Axis::Y, chain.y_m, sink);
+                }
+            }
+            Form::Poe(blocks) => {
+                for (block, angle) in blocks.iter().zip(joint_angles_rad) {
+                    frame.then(block);
+                    for axis in [Axis::X, Axis::Y] {
+                        sink.turn(&frame.axis(axis), &frame.origin);
+                    }
+                    for axis in [Axis::X, Axis::Y] {
+                        sink.slide(&frame.axis(axis));
+                    }
+                    sink.joint(&frame.axis(Axis::Z), &frame.origin);
+                    frame.turn(Axis::Z, *angle);
+                }
+                walk_block(&mut frame, &blocks[blocks.len() - 1], sink);
+            }
+            Form::Rigid(transform) => walk_block(&mut frame, transform, sink),
+        }
+        frame
+    }
+}
+
+/// What a walk along the chain meets, in column order.
+trait Sink {
+    fn turn(&mut self, axis: &Vector3<f64>, point: &Vector3<f64>);
+    fn slide(&mut self, axis: &Vector3<f64>);
+    fn joint(&mut self, axis: &Vector3<f64>, point: &Vector3<f64>);
+    fn offset(&mut self, axis: &Vector3<f64>, point: &Vector3<f64>);
+}
+
+/// For forward kinematics alone.
+struct Unrecorded;
+
+impl Sink for Unrecorded {
+    fn turn(&mut self, _axis: &Vector3<f64>, _point: &Vector3<f64>) {}
+    fn slide(&mut self, _axis: &Vector3<f64>) {}
+    fn joint(&mut self, _axis: &Vector3<f64>, _point: &Vector3<f64>) {}
+    fn offset(&mut self, _axis: &Vector3<f64>, _point: &Vector3<f64>) {}
+}
+
+struct Recorder {
+    parameters: Columns,
+    joints: Columns,
+    offsets: bool,
+}
+
+impl Sink for Recorder {
+    fn turn(&mut self, axis: &Vector3<f64>, point: &Vector3<f64>) {
+        self.parameters.push(axis, point);
+    }
+
+    fn slide(&mut self, axis: &Vector3<f64>) {
+        self.parameters.push(&Vector3::zeros(), axis);
+    }
+
+    fn joint(&mut self, axis: &Vector3<f64>, point: &Vector3<f64>) {
+        self.joints.push(axis, point);
+    }
+
+    fn offset(&mut self, axis: &Vector3<f64>, point: &Vector3<f64>) {
+        if self.offsets {
+            self.parameters.push(axis, point);
+        }
+    }
+}
+
+/// Columns in the making: axis and point of a turn, or zero and axis of a slide, until the camera's pose is known.
+struct Columns {
+    matrix: Matrix6xX<f64>,
+    filled: usize,
+}
+
+impl Columns {
+    fn new(count: usize) -> Self {
+        Self { matrix: Matrix6xX::zeros(count), filled: 0 }
+    }
+
+    fn push(&mut self, axis: &Vector3<f64>, point: &Vector3<f64>) {
+        let mut column = self.matrix.column_mut(self.filled);
+        column.fixed_rows_mut::<3>(0).copy_from(axis);
+        column.fixed_rows_mut::<3>(3).copy_from(point);
+        self.filled += 1;
+    }
+
+    fn finish(mut self, camera: &Frame) -> Matrix6xX<f64> {
+        debug_assert_eq!(self.filled, self.matrix.ncols(), "the walk met every column");
+        for mut column in self.matrix.column_iter_mut() {
+            let axis: Vector3<f64> = column.fixed_rows::<3>(0).into_owned();
+            // The axis of a turn has unit length, that of a slide was put where the point would be.
+            if axis != Vector3::zeros() {
+                let arm = camera.origin - column.fixed_rows::<3>(3);
+                column.fixed_rows_mut::<3>(0).copy_from(&camera.rotation.tr_mul(&axis));
+                column.fixed_rows_mut::<3>(3).copy_from(&axis.cross(&arm));
+            }
+        }
+        self.matrix
+    }
+}
+
+fn turn<S: Sink>(frame: &mut Frame, axis: Axis, angle_rad: f64, sink: &mut S) {
+    sink.turn(&frame.axis(axis), &frame.origin);
+    frame.turn(axis, angle_rad);
+}
+
+fn slide<S: Sink>(frame: &mut Frame, axis: Axis, distance_m: f64, sink: &mut S) {
+    sink.slide(&frame.axis(axis));
+    frame.slide(axis, distance_m);
+}
+
+/// A link up to its twist.
+fn walk_link<S: Sink>(frame: &mut Frame, link: &DhLink, joint_angle_rad: f64, sink: &mut S) {
+    let axis = frame.axis(Axis::Z);
+    sink.joint(&axis, &frame.origin);
+    sink.offset(&axis, &frame.origin);
+    frame.turn(Axis::Z, joint_angle_rad + link.theta_offset_rad);
+    slide(frame, Axis::Z, link.d_m, sink);
+    slide(frame, Axis::X, link.a_m, sink);
+}
+
+/// A rigid transform with its six columns: it turns about its inner axes and slides along its outer ones.
+fn walk_block<S: Sink>(frame: &mut Frame, transform: &RigidTransform, sink: &mut S) {
+    let outer = *frame;
+    frame.then(transform);
+    for axis in [Axis::X, Axis::Y, Axis::Z] {
+        sink.turn(&frame.axis(axis), &frame.origin);
+    }
+    for axis in [Axis::X, Axis::Y, Axis::Z] {
+        sink.slide(&outer.axis(axis));
+    }
+}

@@ -1,0 +1,5 @@
+mod conversions;
+mod derivatives;
+pub(crate) mod golden;
+mod priors;
+pub(crate) mod random;

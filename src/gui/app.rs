@@ -1,0 +1,257 @@
+//! The window's program: it owns the session, feeds it time and commands, and draws what it has computed.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, TryRecvError, channel};
+
+use egui::{CentralPanel, Frame, Ui, ViewportCommand};
+
+use super::desktop::Desktop;
+use super::theme::{Theme, ThemeName};
+use super::welcome::Welcome;
+use super::window::{NoticeLevel, WindowRequest, WindowState, window_ui};
+use super::{ImageSource, PanelContext, Playback, Selection};
+use crate::flight_log::GrayImage;
+use crate::session::{Command, Recording};
+
+/// A log that plays: what the window needs of a session.
+pub trait PlayingLog: Send {
+    /// What has been computed so far; cheap.
+    fn recording(&self) -> Arc<Recording>;
+    /// Changes whenever something new has been computed.
+    fn generation(&self) -> u64;
+    /// Where the cursor stands, since the log began.
+    fn cursor_ns(&self) -> i64;
+    /// How the cursor moves.
+    fn playback(&self) -> Playback;
+    /// Does what a person asked for.
+    fn apply(&mut self, command: Command);
+    /// Lets the cursor run for so many seconds of the wall.
+    fn advance(&mut self, elapsed_s: f64);
+    /// An image of the log.
+    fn image(&mut self, camera_key: &str, frame_index: usize) -> Option<Arc<GrayImage>>;
+    /// What could not be done as asked, since the last call.
+    fn take_notices(&mut self) -> Vec<String>;
+}
+
+/// Opens a log; the message of an error says what was wrong and what to do.
+pub type OpenLog = Arc<dyn Fn(&Path) -> Result<Box<dyn PlayingLog>, String> + Send + Sync>;
+
+/// Seconds that the cursor moves at most per picture, so that a stall does not become a jump.
+const LONGEST_STEP_S: f64 = 0.1;
+/// Milliseconds between two looks at what the estimators have computed.
+const LOOK_MS: u64 = 60;
+/// Seconds between two readings of the process's memory.
+const MEMORY_PERIOD_S: f64 = 1.0;
+
+/// A log that is being opened on a thread of its own.
+struct Opening {
+    path: PathBuf,
+    result: Receiver<Result<Box<dyn PlayingLog>, String>>,
+}
+
+/// The program of the window.
+pub struct App {
+    open_log: OpenLog,
+    desktop: Arc<dyn Desktop>,
+    log: Option<Box<dyn PlayingLog>>,
+    opening: Option<Opening>,
+    welcome: Welcome,
+    state: WindowState,
+    selection: Selection,
+    theme: Theme,
+    themed: bool,
+    title: String,
+    memory_read_s: Option<f64>,
+}
+
+impl App {
+    /// A window without a log.
+    pub fn new(open_log: OpenLog, desktop: Arc<dyn Desktop>, theme: ThemeName) -> Self {
+        let mut state = WindowState::default();
+        state.show_times = true;
+        state.open_dialog.set_desktop(Arc::clone(&desktop));
+        Self {
+            welcome: Welcome::new(Arc::clone(&desktop)),
+            open_log,
+            desktop,
+            log: None,
+            opening: None,
+            state,
+            selection: Selection::default(),
+            theme: Theme::of(theme),
+            themed: false,
+            title: String::new(),
+            memory_read_s: None,
+        }
+    }
+
+    /// Begins to open a log; the one before stays until it is there.
+    pub fn open(&mut self, path: PathBuf) {
+        let (sender, result) = channel();
+        let (open_log, target) = (Arc::clone(&self.open_log), path.clone());
+        let thread = std::thread::Builder::new().name("open-log".to_owned()).spawn(move || {
+            // Nobody waits any more when another log was asked for meanwhile.
+            drop(sender.send(open_log(&target)));
+        });
+        match thread {
+            Ok(_) => self.opening = Some(Opening { path, result }),
+            Err(error) => self.state.notices.say(NoticeLevel::Error, format!("Cannot start a thread: {error}")),
+        }
+    }
+
+    /// Shows a session that is open already.
+    pub fn show(&mut self, log: Box<dyn PlayingLog>) {
+        self.desktop.remember_log(&log.recording().log_path);
+        self.log = Some(log);
+        self.selection = Selection::default();
+    }
+
+    /// The session, when a log is open.
+    pub fn log(&self) -> Option<&dyn PlayingLog> {
+        self.log.as_deref()
+    }
+
+    /// Draws one picture and does what was asked for in it.
+    pub fn ui(&mut self, ui: &mut Ui) {
+        if !self.themed {
+            self.theme.apply(ui.ctx());
+            self.themed = true;
+        }
+        self.take_opened();
+        self.take_dropped(ui);
+        self.read_memory(ui);
+        if self.log.is_some() {
+            self.session_ui(ui);
+        } else {
+            self.welcome_ui(ui);
+        }
+        for request in std::mem::take(&mut self.state.requests) {
+            match request {
+                WindowRequest::OpenLog(path) => self.open(path),
+                WindowRequest::ToggleTheme => {
+                    self.theme = Theme::of(if self.theme.is_dark() { ThemeName::Light } else { ThemeName::Dark });
+                    self.theme.apply(ui.ctx());
+                }
+            }
+        }
+        self.update_title(ui);
+        if self.opening.is_some() {
+            ui.ctx().request_repaint_after(std::time::Duration::from_millis(LOOK_MS));
+        }
+    }
+
+    fn session_ui(&mut self, ui: &mut Ui) {
+        let Some(log) = &mut self.log else { return };
+        let elapsed_s = f64::from(ui.input(|input| input.stable_dt)).min(LONGEST_STEP_S);
+        log.advance(elapsed_s);
+        for notice in log.take_notices() {
+            self.state.notices.say(NoticeLevel::Warning, notice);
+        }
+        let (recording, playback, generation) = (log.recording(), log.playback(), log.generation());
+        let mut commands = Vec::new();
+        let mut context = PanelContext {
+            recording: &recording,
+            cursor_ns: log.cursor_ns(),
+            playback: &playback,
+            images: &mut Images(log.as_mut()),
+            selection: &mut self.selection,
+            theme: &self.theme,
+            commands: &mut commands,
+        };
+        window_ui(ui, &mut self.state, &mut context);
+        let commanded = !commands.is_empty();
+        for command in commands {
+            log.apply(command);
+        }
+        let computing = recording.runs.iter().any(|run| !run.finished && run.error.is_none());
+        if commanded || playback.playing || log.generation() != generation {
+            ui.ctx().request_repaint();
+        } else if computing {
+            ui.ctx().request_repaint_after(std::time::Duration::from_millis(LOOK_MS));
+        }
+    }
+
+    fn welcome_ui(&mut self, ui: &mut Ui) {
+        let opening = self.opening.as_ref().map(|opening| opening.path.as_path());
+        let frame = Frame::new().fill(self.theme.surface).inner_margin(20);
+        let chosen = CentralPanel::no_frame().frame(frame).show(ui, |ui| self.welcome.ui(ui, &self.theme, opening));
+        self.state.notices.toasts_ui(ui, &self.theme);
+        if let Some(path) = chosen.inner {
+            self.open(path);
+        }
+    }
+
+    /// Takes over a log that has been opened.
+    fn take_opened(&mut self) {
+        let Some(opening) = &self.opening else { return };
+        match opening.result.try_recv() {
+            Ok(Ok(log)) => {
+                self.opening = None;
+                self.show(log);
+            }
+            Ok(Err(message)) => {
+                self.opening = None;
+                self.state.notices.say(NoticeLevel::Error, message);
+            }
+            Err(TryRecvError::Empty) => {}
+            Err(TryRecvError::Disconnected) => {
+                let text = format!("Opening {} ended without a result", opening.path.display());
+                self.state.notices.say(NoticeLevel::Error, text);
+                self.opening = None;
+            }
+        }
+    }
+
+    /// Opens the first of the files that were dropped.
+    fn take_dropped(&mut self, ui: &Ui) {
+        let dropped: Vec<PathBuf> =
+            ui.input(|input| input.raw.dropped_files.iter().map(|file| file.path().to_path_buf()).collect());
+        if dropped.len() > 1 {
+            let text = format!("{} files were dropped: the first one is opened", dropped.len());
+            self.state.notices.say(NoticeLevel::Info, text);
+        }
+        if let Some(path) = dropped.into_iter().next() {
+            self.open(path);
+        }
+    }
+
+    fn read_memory(&mut self, ui: &Ui) {
+        let now_s = ui.input(|input| input.time);
+        if self.memory_read_s.is_none_or(|read_s| now_s - read_s >= MEMORY_PERIOD_S) {
+            self.memory_read_s = Some(now_s);
+            self.state.memory_bytes = self.desktop.resident_bytes();
+        }
+    }
+
+    /// The window is called after the log.
+    fn update_title(&mut self, ui: &Ui) {
+        let title = self.log.as_ref().map_or_else(
+            || "dcvins".to_owned(),
+            |log| {
+                let path = log.recording().log_path.clone();
+                let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+                format!("{name} – dcvins")
+            },
+        );
+        if title != self.title {
+            ui.ctx().send_viewport_cmd(ViewportCommand::Title(title.clone()));
+            self.title = title;
+        }
+    }
+}
+
+/// The session's images, for the panels.
+struct Images<'a>(&'a mut dyn PlayingLog);
+
+impl ImageSource for Images<'_> {
+    fn image(&mut self, camera_key: &str, frame_index: usize) -> Option<Arc<GrayImage>> {
+        self.0.image(camera_key, frame_index)
+    }
+}
+
+impl eframe::App for App {
+    fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
+        Self::ui(self, ui);
+    }
+}

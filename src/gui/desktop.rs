@@ -1,0 +1,26 @@
+//! What the window needs of the machine; files are other people's business, so it asks for them here.
+
+use std::path::{Path, PathBuf};
+
+/// A path that could be meant.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PathEntry {
+    /// The whole path, as it would be typed.
+    pub path: String,
+    /// Whether it is a folder.
+    pub folder: bool,
+}
+
+/// Files and figures of the machine.
+pub trait Desktop: Send + Sync {
+    /// Folders and logs whose paths begin as typed, in order.
+    fn complete(&self, typed: &str) -> Vec<PathEntry>;
+    /// Logs opened lately that still exist, the newest first.
+    fn recent_logs(&self) -> Vec<PathBuf>;
+    /// Puts a log at the head of the recent ones.
+    fn remember_log(&self, path: &Path);
+    /// Logs that come with the program.
+    fn sample_logs(&self) -> Vec<PathBuf>;
+    /// Memory of this process in bytes.
+    fn resident_bytes(&self) -> Option<u64>;
+}

@@ -1,0 +1,97 @@
+//! How events look and what they are called.
+
+use egui::{Color32, Painter, Pos2, Shape, Stroke, pos2};
+
+use super::theme::Theme;
+use crate::estimator::EventKind;
+
+/// The sign of an event: kinds differ by shape, not by colour alone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Mark {
+    /// A line over the whole lane.
+    Line,
+    /// A triangle that points up.
+    Triangle,
+    /// A cross.
+    Cross,
+    /// A rhombus.
+    Rhombus,
+    /// A disc.
+    Disc,
+    /// A square.
+    Square,
+}
+
+/// The name of a kind of event, for people.
+pub(crate) fn name_of(kind: EventKind) -> &'static str {
+    match kind {
+        EventKind::InitializationWaits => "initialization waits",
+        EventKind::InitializedFromMotion => "initialized from motion",
+        EventKind::InitializedFromStandstill => "initialized from standstill",
+        EventKind::KeyframeChosen => "keyframe",
+        EventKind::OldestMarginalized => "oldest frame marginalized",
+        EventKind::SecondNewestMarginalized => "second-newest frame dropped",
+        EventKind::OutliersRejected => "outliers rejected",
+        EventKind::Standstill => "standstill",
+        EventKind::Failure => "failure",
+        EventKind::ChartSwitched => "chart switched",
+        EventKind::MeasurementMissing => "measurement missing",
+    }
+}
+
+/// Whether a kind is rare enough for the lane of events; the others have lanes of their own or none.
+pub(crate) fn is_notable(kind: EventKind) -> bool {
+    match kind {
+        EventKind::InitializedFromMotion
+        | EventKind::InitializedFromStandstill
+        | EventKind::Standstill
+        | EventKind::Failure
+        | EventKind::ChartSwitched
+        | EventKind::MeasurementMissing => true,
+        EventKind::InitializationWaits
+        | EventKind::KeyframeChosen
+        | EventKind::OldestMarginalized
+        | EventKind::SecondNewestMarginalized
+        | EventKind::OutliersRejected => false,
+    }
+}
+
+/// The sign and colour of a kind of event.
+pub(crate) fn look_of(kind: EventKind, theme: &Theme) -> (Mark, Color32) {
+    match kind {
+        EventKind::InitializedFromMotion | EventKind::InitializedFromStandstill => (Mark::Triangle, theme.ok),
+        EventKind::Failure => (Mark::Cross, theme.error),
+        EventKind::ChartSwitched => (Mark::Rhombus, theme.accent),
+        EventKind::MeasurementMissing => (Mark::Square, theme.warn),
+        EventKind::Standstill | EventKind::InitializationWaits => (Mark::Disc, theme.text_weak),
+        EventKind::OutliersRejected => (Mark::Cross, theme.warn),
+        EventKind::KeyframeChosen | EventKind::OldestMarginalized | EventKind::SecondNewestMarginalized => {
+            (Mark::Line, theme.text_weak)
+        }
+    }
+}
+
+/// Paints a sign of so many points across.
+pub(crate) fn paint_mark(painter: &Painter, mark: Mark, center: Pos2, size: f32, color: Color32) {
+    let half = size / 2.0;
+    let at = |x: f32, y: f32| pos2(center.x + x * half, center.y + y * half);
+    match mark {
+        Mark::Line => {
+            painter.vline(center.x, center.y - half..=center.y + half, Stroke::new(1.0, color));
+        }
+        Mark::Disc => {
+            painter.circle_filled(center, half * 0.8, color);
+        }
+        Mark::Cross => {
+            painter.line_segment([at(-0.8, -0.8), at(0.8, 0.8)], Stroke::new(2.0, color));
+            painter.line_segment([at(-0.8, 0.8), at(0.8, -0.8)], Stroke::new(2.0, color));
+        }
+        Mark::Triangle => fill(painter, vec![at(0.0, -1.0), at(1.0, 0.8), at(-1.0, 0.8)], color),
+        Mark::Rhombus => fill(painter, vec![at(0.0, -1.0), at(1.0, 0.0), at(0.0, 1.0), at(-1.0, 0.0)], color),
+        Mark::Square => fill(painter, vec![at(-0.8, -0.8), at(0.8, -0.8), at(0.8, 0.8), at(-0.8, 0.8)], color),
+    }
+}
+
+fn fill(painter: &Painter, corners: Vec<Pos2>, color: Color32) {
+    painter.add(Shape::convex_polygon(corners, color, Stroke::NONE));
+}

@@ -1,0 +1,94 @@
+//! The inspector: all numbers of what is selected, and of the step at the cursor.
+
+mod feature;
+mod parameter;
+mod step;
+
+use egui::{CollapsingHeader, Grid, RichText, ScrollArea, Ui, vec2};
+
+use super::PanelContext;
+use super::convergence::empty_ui;
+use super::theme::Theme;
+use crate::session::{RunRecord, StepRecord};
+
+/// State of the inspector.
+#[derive(Debug, Default)]
+pub struct InspectorPanel {
+    /// Whether stage timings are shown: they differ from run to run, and pictures must not.
+    pub show_times: bool,
+}
+
+impl InspectorPanel {
+    /// Draws the panel.
+    #[expect(clippy::needless_pass_by_ref_mut, reason = "all panels are called alike")]
+    pub fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
+        let recording = ctx.recording;
+        let run = ctx.selection.run.min(recording.runs.len().saturating_sub(1));
+        let Some((run, step)) = recording.runs.get(run).and_then(|run| Some((run, run.step_at(ctx.cursor_ns)?))) else {
+            empty_ui(ui, "No step at the cursor yet");
+            return;
+        };
+        ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+            ui.spacing_mut().item_spacing = vec2(6.0, 2.0);
+            self.sections_ui(ui, ctx, run, step);
+        });
+    }
+
+    fn sections_ui(&self, ui: &mut Ui, ctx: &mut PanelContext<'_>, run: &RunRecord, step: &StepRecord) {
+        if ctx.selection.parameter.is_some() || ctx.selection.feature.is_some() {
+            let clear = ui.small_button("Clear selection").on_hover_text("Escape");
+            if clear.clicked() {
+                (ctx.selection.parameter, ctx.selection.feature) = (None, None);
+            }
+        }
+        if let Some(name) = ctx.selection.parameter.clone() {
+            section_ui(ui, ctx.theme, &format!("Parameter {name}"), |ui| parameter::ui(ui, ctx, run, step, &name));
+        }
+        if let Some(id) = ctx.selection.feature {
+            section_ui(ui, ctx.theme, &format!("Feature {}", id.0), |ui| feature::ui(ui, ctx, step, id));
+        }
+        let title = format!("Frame {}", step.report.frame_index);
+        section_ui(ui, ctx.theme, &title, |ui| step::frame_ui(ui, ctx, run, step));
+        section_ui(ui, ctx.theme, "Events", |ui| step::events_ui(ui, ctx.theme, &step.report));
+        section_ui(ui, ctx.theme, "Solver iterations", |ui| step::iterations_ui(ui, ctx.theme, &step.report));
+        if self.show_times {
+            section_ui(ui, ctx.theme, "Stage times", |ui| step::times_ui(ui, ctx.theme, &step.report));
+        }
+    }
+}
+
+fn section_ui(ui: &mut Ui, theme: &Theme, title: &str, contents: impl FnOnce(&mut Ui)) {
+    // The first word names the section: it stays open or closed when another parameter or frame is shown.
+    let salt = title.split(' ').next().unwrap_or(title);
+    let title = RichText::new(title).strong().color(theme.text_strong);
+    CollapsingHeader::new(title).id_salt(salt).default_open(true).show_unindented(ui, contents);
+}
+
+/// Rows of a name and its values, aligned.
+fn rows_ui(ui: &mut Ui, theme: &Theme, salt: &str, rows: &[(String, Vec<String>)]) {
+    Grid::new(salt).spacing(vec2(8.0, 1.0)).min_row_height(15.0).show(ui, |ui| {
+        for (name, values) in rows {
+            ui.label(RichText::new(name).color(theme.text_weak));
+            for value in values {
+                ui.label(RichText::new(value).monospace().color(theme.text_strong));
+            }
+            ui.end_row();
+        }
+    });
+}
+
+/// A table with headings.
+fn table_ui(ui: &mut Ui, theme: &Theme, salt: &str, headings: &[&str], rows: impl Iterator<Item = Vec<String>>) {
+    Grid::new(salt).striped(true).spacing(vec2(9.0, 1.0)).min_row_height(15.0).show(ui, |ui| {
+        for heading in headings {
+            ui.label(RichText::new(*heading).small().color(theme.text_weak));
+        }
+        ui.end_row();
+        for row in rows {
+            for cell in row {
+                ui.label(RichText::new(cell).monospace().color(theme.text_strong));
+            }
+            ui.end_row();
+        }
+    });
+}

@@ -1,0 +1,134 @@
+//! The step at the cursor: state, events, iterations, times.
+
+use egui::{RichText, Sense, Ui, vec2};
+
+use super::{rows_ui, table_ui};
+use crate::estimator::{Phase, StepReport};
+use crate::geometry::so3;
+use crate::gui::PanelContext;
+use crate::gui::events::{look_of, name_of, paint_mark};
+use crate::gui::theme::Theme;
+use crate::gui::units::{figure, fixed, seconds};
+use crate::session::{RunRecord, StepRecord};
+
+/// State of the newest frame.
+pub(super) fn frame_ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, step: &StepRecord) {
+    let report = &step.report;
+    let delay_ms = (step.log_time_ns - report.stamp_ns) as f64 * 1e-6;
+    let phase = match report.phase {
+        Phase::Initializing => "initializing",
+        Phase::Tracking if report.keyframe => "tracking, keyframe",
+        Phase::Tracking => "tracking",
+    };
+    let mut rows = vec![
+        ("time".to_owned(), vec![format!("{} s, logged {delay_ms:+.1} ms", seconds(report.stamp_ns))]),
+        ("phase".to_owned(), vec![phase.to_owned()]),
+    ];
+    if report.restarts > 0 {
+        rows.push(("restarts".to_owned(), vec![report.restarts.to_string()]));
+    }
+    let statistics = &step.tracks.statistics;
+    let tracks = format!("{} tracked, {} new", statistics.tracked, statistics.detected);
+    rows.push(("features".to_owned(), vec![tracks]));
+    rows_ui(ui, ctx.theme, "step", &rows);
+    let Some(newest) = report.newest() else { return };
+
+    let three = |name: &str, values: [f64; 3], decimals: usize| {
+        (name.to_owned(), values.map(|value| fixed(value, decimals)).to_vec())
+    };
+    let (roll, pitch, yaw) = newest.world_from_imu.rotation.euler_angles();
+    let [p, v] = [newest.world_from_imu.translation_m, newest.velocity_m_per_s];
+    let [a, g] = [newest.accelerometer_bias_m_per_s2, newest.gyroscope_bias_rad_per_s];
+    let mut rows = vec![
+        (String::new(), ["x", "y", "z"].map(str::to_owned).to_vec()),
+        three("position, m", [p.x, p.y, p.z], 3),
+        three("velocity, m/s", [v.x, v.y, v.z], 3),
+        three("roll pitch yaw, °", [roll, pitch, yaw].map(f64::to_degrees), 2),
+        three("accelerometer bias, m/s²", [a.x, a.y, a.z], 4),
+        three("gyroscope bias, °/s", [g.x, g.y, g.z].map(f64::to_degrees), 4),
+    ];
+    if let (Some(alignment), Some(truth)) = (run.alignment, step.truth) {
+        let aligned = alignment * newest.world_from_imu;
+        let error = aligned.translation_m - truth.translation_m;
+        rows.push(three("position error, m", [error.x, error.y, error.z], 3));
+        let turn = so3::log(&(truth.rotation.inverse() * aligned.rotation));
+        rows.push(three("attitude error, °", [turn.x, turn.y, turn.z].map(f64::to_degrees), 2));
+    }
+    rows_ui(ui, ctx.theme, "state", &rows);
+    if !newest.joint_angles_rad.is_empty() {
+        let encoders = newest.encoder_angles_rad.as_deref();
+        let joints = ctx.recording.rig.gimbal.as_ref().map_or(&[][..], |gimbal| &gimbal.joints);
+        let lines = newest.joint_angles_rad.iter().enumerate().map(|(number, angle)| {
+            let encoder = encoders.and_then(|angles| angles.get(number)).copied().unwrap_or(f64::NAN);
+            let name = joints.get(number).map_or_else(|| format!("joint {}", number + 1), |joint| joint.name.clone());
+            let shown = |angle: f64| fixed(angle.to_degrees(), 2);
+            vec![name, shown(*angle), shown(encoder), shown(angle - encoder)]
+        });
+        table_ui(ui, ctx.theme, "joints", &["joint", "estimate °", "encoder °", "difference °"], lines);
+    }
+}
+
+/// What happened in the step, with the figures that decided it.
+pub(super) fn events_ui(ui: &mut Ui, theme: &Theme, report: &StepReport) {
+    if report.events.is_empty() && report.warnings.is_empty() {
+        ui.label(RichText::new("Nothing happened").color(theme.text_weak));
+    }
+    for event in &report.events {
+        ui.horizontal(|ui| {
+            let (mark, color) = look_of(event.kind, theme);
+            let (rect, _) = ui.allocate_exact_size(vec2(11.0, 14.0), Sense::hover());
+            paint_mark(ui.painter(), mark, rect.center(), 8.0, color);
+            let figures = match (event.value, event.threshold) {
+                (Some(value), Some(threshold)) => format!("{} / {}", figure(value), figure(threshold)),
+                (Some(value), None) => figure(value),
+                (None, _) => String::new(),
+            };
+            if !figures.is_empty() {
+                let text = RichText::new(figures).monospace().color(theme.text_strong);
+                ui.label(text).on_hover_text("measured value / threshold");
+            }
+            let text = RichText::new(&event.message).color(theme.text);
+            ui.add(egui::Label::new(text).truncate().sense(Sense::hover())).on_hover_text(format!(
+                "{}: {}",
+                name_of(event.kind),
+                event.message
+            ));
+        });
+    }
+    for warning in &report.warnings {
+        ui.add(egui::Label::new(RichText::new(format!("⚠ {warning}")).color(theme.warn)).wrap());
+    }
+}
+
+/// The solver's iterations.
+pub(super) fn iterations_ui(ui: &mut Ui, theme: &Theme, report: &StepReport) {
+    if report.iterations.is_empty() {
+        ui.label(RichText::new("No solve in this step").color(theme.text_weak));
+        return;
+    }
+    let lines = report.iterations.iter().enumerate().map(|(number, iteration)| {
+        vec![
+            (number + 1).to_string(),
+            figure(iteration.cost_before),
+            figure(iteration.cost_after),
+            figure(iteration.step_norm),
+            figure(iteration.damping),
+            if iteration.accepted { "taken" } else { "refused" }.to_owned(),
+        ]
+    });
+    table_ui(ui, theme, "iterations", &["", "cost before", "after", "step", "damping", ""], lines);
+}
+
+/// Milliseconds by stage.
+pub(super) fn times_ui(ui: &mut Ui, theme: &Theme, report: &StepReport) {
+    let times = &report.times;
+    let row = |name: &str, value: f64| (name.to_owned(), vec![format!("{} ms", fixed(value, 1))]);
+    let rows = [
+        row("front end", times.frontend_ms),
+        row("optimize", times.optimize_ms),
+        row("marginalize", times.marginalize_ms),
+        row("observability", times.observability_ms),
+        row("whole step", times.step_ms),
+    ];
+    rows_ui(ui, theme, "times", &rows);
+}

@@ -1,0 +1,185 @@
+//! A box for the path of a log, with completion.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use egui::{Id, Key, Modal, Modifiers, RichText, ScrollArea, TextEdit, Ui};
+
+use super::desktop::{Desktop, PathEntry};
+use super::theme::Theme;
+use super::window::dialog_frame;
+
+/// How many completions are listed.
+const MOST_ENTRIES: usize = 200;
+
+/// State of the dialog.
+#[derive(Default)]
+pub struct OpenDialog {
+    open: bool,
+    path_box: PathBox,
+}
+
+impl OpenDialog {
+    /// Lets it complete paths.
+    pub fn set_desktop(&mut self, desktop: Arc<dyn Desktop>) {
+        self.path_box = PathBox::new(desktop);
+    }
+
+    /// Opens it.
+    pub fn show(&mut self) {
+        self.open = true;
+    }
+
+    /// Closes it.
+    pub fn hide(&mut self) {
+        self.open = false;
+    }
+
+    /// Draws it; returns the path that was chosen.
+    pub fn ui(&mut self, ui: &Ui, theme: &Theme) -> Option<PathBuf> {
+        if !self.open {
+            return None;
+        }
+        let modal = Modal::new(Id::unique("open log")).frame(dialog_frame(theme));
+        let response = modal.show(ui.ctx(), |ui| {
+            ui.set_width(560.0);
+            ui.label(RichText::new("Open a flight log").size(15.0).color(theme.text_strong));
+            ui.label(RichText::new("A log can also be dropped onto the window").color(theme.text_weak));
+            ui.add_space(4.0);
+            let chosen = self.path_box.ui(ui, theme, true, 300.0);
+            ui.add_space(4.0);
+            let cancelled = ui.button("Cancel").clicked();
+            (chosen, cancelled)
+        });
+        let close = response.should_close();
+        let (chosen, cancelled) = response.inner;
+        if chosen.is_some() || cancelled || close {
+            self.open = false;
+        }
+        chosen
+    }
+}
+
+/// A line for a path, and what it could become.
+#[derive(Default)]
+pub(crate) struct PathBox {
+    desktop: Option<Arc<dyn Desktop>>,
+    typed: String,
+    chosen: Option<usize>,
+    /// What was completed, and how.
+    completed: Option<(String, Vec<PathEntry>)>,
+}
+
+impl PathBox {
+    /// An empty line that completes paths.
+    pub(crate) fn new(desktop: Arc<dyn Desktop>) -> Self {
+        Self { desktop: Some(desktop), ..Self::default() }
+    }
+
+    /// Draws it; returns the path that was chosen.
+    pub(crate) fn ui(&mut self, ui: &mut Ui, theme: &Theme, focus: bool, height: f32) -> Option<PathBuf> {
+        if self.completed.as_ref().is_none_or(|(typed, _)| *typed != self.typed) {
+            let entries = self.desktop.as_ref().map_or_else(Vec::new, |desktop| desktop.complete(&self.typed));
+            self.completed = Some((self.typed.clone(), entries));
+            self.chosen = None;
+        }
+        let entries = self.completed.as_ref().map_or(&[][..], |(_, entries)| entries);
+        let shown = &entries[..entries.len().min(MOST_ENTRIES)];
+        let id = ui.unique_id().with("path");
+        let focused = ui.memory(|memory| memory.has_focus(id));
+        let (up, down, tab, enter) = ui.input_mut(|input| {
+            let mut key = |key| focused && input.consume_key(Modifiers::NONE, key);
+            (key(Key::ArrowUp), key(Key::ArrowDown), key(Key::Tab), key(Key::Enter))
+        });
+        if down && !shown.is_empty() {
+            self.chosen = Some(self.chosen.map_or(0, |chosen| (chosen + 1).min(shown.len() - 1)));
+        }
+        if up {
+            self.chosen = self.chosen.and_then(|chosen| chosen.checked_sub(1));
+        }
+        let mut filled = None;
+        let mut opened = None;
+        let marked = self.chosen.and_then(|chosen| shown.get(chosen));
+        if tab {
+            let common = || common_beginning(shown.iter().map(|entry| entry.path.as_str()));
+            filled = marked.map_or_else(common, |entry| Some(entry.path.clone()));
+        }
+        if enter {
+            match marked {
+                Some(entry) if entry.folder => filled = Some(entry.path.clone()),
+                Some(entry) => opened = Some(entry.path.clone()),
+                None if !self.typed.trim().is_empty() => opened = Some(self.typed.trim().to_owned()),
+                None => {}
+            }
+        }
+
+        ui.horizontal(|ui| {
+            let width = ui.available_width() - 60.0;
+            let edit = TextEdit::singleline(&mut self.typed).id(id).hint_text("/path/to/log.mcap").desired_width(width);
+            let edit = ui.add(edit.lock_focus(true));
+            edit.widget_info(|| egui::WidgetInfo::labeled(egui::Role::TextInput, true, "Path of the log"));
+            if focus && !edit.has_focus() {
+                edit.request_focus();
+            }
+            let ready = !self.typed.trim().is_empty();
+            if ui.add_enabled(ready, egui::Button::new("Open")).clicked() {
+                opened = Some(self.typed.trim().to_owned());
+            }
+        });
+        ScrollArea::vertical().max_height(height).auto_shrink([false, true]).show(ui, |ui| {
+            for (number, entry) in shown.iter().enumerate() {
+                let text = if entry.folder { format!("📁 {}", entry.path) } else { entry.path.clone() };
+                let color = if entry.folder { theme.text_weak } else { theme.text };
+                let row = ui.selectable_label(self.chosen == Some(number), RichText::new(text).color(color));
+                if row.clicked() {
+                    if entry.folder {
+                        filled = Some(entry.path.clone());
+                    } else {
+                        opened = Some(entry.path.clone());
+                    }
+                }
+            }
+            if entries.len() > shown.len() {
+                let text = format!("and {} more", entries.len() - shown.len());
+                ui.label(RichText::new(text).small().color(theme.text_weak));
+            }
+        });
+        if let Some(path) = filled {
+            self.typed = path;
+            move_caret_to_end(ui, id, self.typed.chars().count());
+        }
+        opened.map(PathBuf::from)
+    }
+}
+
+fn move_caret_to_end(ui: &Ui, id: Id, end: usize) {
+    if let Some(mut state) = TextEdit::load_state(ui.ctx(), id) {
+        let caret = egui::text::CCursor::new(end);
+        state.cursor.set_char_range(Some(egui::text::CCursorRange::one(caret)));
+        state.store(ui.ctx(), id);
+    }
+}
+
+/// The longest beginning that all have in common, `None` of nothing.
+fn common_beginning<'a>(mut paths: impl Iterator<Item = &'a str>) -> Option<String> {
+    let mut common = paths.next()?.to_owned();
+    for path in paths {
+        let same = common.char_indices().zip(path.chars()).find(|((_, a), b)| a != b).map(|((at, _), _)| at);
+        common.truncate(same.unwrap_or_else(|| common.len().min(path.len())));
+    }
+    Some(common)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_common_beginning_ends_between_letters() {
+        let common = |paths: &[&str]| common_beginning(paths.iter().copied());
+        assert_eq!(common(&["/a/yard.mcap", "/a/yärd.mcap"]).as_deref(), Some("/a/y"));
+        assert_eq!(common(&["/a/b", "/a/bcd"]).as_deref(), Some("/a/b"));
+        assert_eq!(common(&["/a/bcd", "/a/b"]).as_deref(), Some("/a/b"));
+        assert_eq!(common(&[]), None);
+    }
+}

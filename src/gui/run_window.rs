@@ -1,0 +1,142 @@
+//! Opening the window on a screen.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use egui::ViewportBuilder;
+use thiserror::Error;
+
+use super::app::{App, OpenLog, PlayingLog};
+use super::desktop::Desktop;
+use super::theme::ThemeName;
+
+/// What a server without a desktop needs for the window (Debian and Ubuntu).
+pub const WINDOW_PACKAGES: &str = "mesa-vulkan-drivers libx11-6 libxcursor1 libxi6 libxkbcommon-x11-0";
+
+/// Why there is no window.
+#[derive(Debug, Error)]
+pub enum WindowError {
+    /// No screen to open it on.
+    #[error(
+        "there is no display: neither WAYLAND_DISPLAY nor DISPLAY is set\n\
+         start it in a desktop session or with 'ssh -X', or draw pictures without a display with 'dcvins screenshot'"
+    )]
+    NoDisplay,
+    /// A library or a graphics driver is missing, or the screen refused.
+    #[error("the window cannot be opened: {problem}\n{remedy}")]
+    Refused {
+        /// What the system said.
+        problem: String,
+        /// What to do about it.
+        remedy: String,
+    },
+}
+
+/// What the window begins with.
+pub struct WindowOptions {
+    /// A session that is open already.
+    pub log: Option<Box<dyn PlayingLog>>,
+    /// A log to open while the window is up already.
+    pub log_path: Option<PathBuf>,
+    /// How logs are opened.
+    pub open_log: OpenLog,
+    /// Files and figures of the machine.
+    pub desktop: Arc<dyn Desktop>,
+    /// Colours.
+    pub theme: ThemeName,
+}
+
+/// Opens the window and returns when it is closed.
+pub fn run_window(options: WindowOptions) -> Result<(), WindowError> {
+    let set = |name: &str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
+    if cfg!(target_os = "linux") && !["WAYLAND_DISPLAY", "WAYLAND_SOCKET", "DISPLAY"].into_iter().any(set) {
+        return Err(WindowError::NoDisplay);
+    }
+    let viewport = ViewportBuilder::default()
+        .with_title("dcvins")
+        .with_app_id("dcvins")
+        .with_inner_size([1600.0, 900.0])
+        .with_min_inner_size([640.0, 400.0])
+        .with_drag_and_drop(true);
+    let native = eframe::NativeOptions { viewport, system_font_fallback: false, ..eframe::NativeOptions::default() };
+    let start = move || {
+        eframe::run_native(
+            "dcvins",
+            native,
+            Box::new(move |_| {
+                let mut app = App::new(options.open_log, options.desktop, options.theme);
+                if let Some(log) = options.log {
+                    app.show(log);
+                }
+                if let Some(path) = options.log_path {
+                    app.open(path);
+                }
+                Ok(Box::new(app))
+            }),
+        )
+    };
+    // The loader of a keyboard library panics when the library is missing; that is a message like any other.
+    match without_loader_panics(start) {
+        Ok(Ok(())) => Ok(()),
+        Ok(Err(error)) => Err(refused(error.to_string())),
+        Err(problem) => Err(refused(problem)),
+    }
+}
+
+fn refused(problem: String) -> WindowError {
+    let remedy = if cfg!(target_os = "linux") {
+        format!(
+            "on a machine without a desktop install what the window needs: apt-get install {WINDOW_PACKAGES}\n\
+             pictures need nothing: 'dcvins screenshot'"
+        )
+    } else {
+        "check that the graphics driver supports Vulkan, Metal, Direct3D 12 or OpenGL".to_owned()
+    };
+    WindowError::Refused { problem, remedy }
+}
+
+/// Runs something whose panic about a library that cannot be loaded becomes an error; other panics go on.
+fn without_loader_panics<T>(run: impl FnOnce() -> T) -> Result<T, String> {
+    const SIGN: &str = "could not be loaded";
+    let text = |payload: &(dyn std::any::Any + Send)| {
+        let text =
+            payload.downcast_ref::<String>().map(String::as_str).or_else(|| payload.downcast_ref::<&str>().copied());
+        text.unwrap_or_default().to_owned()
+    };
+    let before = Arc::new(std::panic::take_hook());
+    let forward = Arc::clone(&before);
+    std::panic::set_hook(Box::new(move |info| {
+        if !text(info.payload()).contains(SIGN) {
+            forward(info);
+        }
+    }));
+    let result = catch_unwind(AssertUnwindSafe(run));
+    drop(std::panic::take_hook());
+    std::panic::set_hook(Box::new(move |info| before(info)));
+    result.or_else(|payload| {
+        let message = text(payload.as_ref());
+        if message.contains(SIGN) { Err(message) } else { std::panic::resume_unwind(payload) }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn missing_libraries_become_errors_and_other_panics_go_on() {
+        assert_eq!(without_loader_panics(|| 7), Ok(7));
+        let missing = without_loader_panics::<()>(|| panic!("Library {} could not be loaded.", "libx.so"));
+        assert_eq!(missing, Err("Library libx.so could not be loaded.".to_owned()));
+        let other = catch_unwind(|| without_loader_panics::<()>(|| std::panic::panic_any("something else")));
+        assert!(other.is_err());
+    }
+
+    #[test]
+    fn a_refusal_says_what_to_install() {
+        let text = refused("no adapter".to_owned()).to_string();
+        assert!(text.starts_with("the window cannot be opened: no adapter"));
+        assert!(!cfg!(target_os = "linux") || text.contains(WINDOW_PACKAGES));
+    }
+}

@@ -1,0 +1,233 @@
+//! Where the scene is seen from, and how it falls on the screen.
+//!
+//! No sine or cosine is taken unless a person turns the view, so that pictures do not depend on a system's library.
+
+use nalgebra::{Unit, UnitQuaternion, Vector3};
+
+/// Tangent of half the angle of view along the shorter side of a viewport of the world.
+const WORLD_HALF_TANGENT: f64 = 0.40;
+/// The same close up, where a small angle keeps near and far things of one size.
+const CLOSE_UP_HALF_TANGENT: f64 = 0.08;
+/// Nearest visible distance as a share of the distance to the target.
+const NEAR_SHARE: f64 = 0.02;
+/// The steepest view: sine of the elevation, short of straight down so that "up" stays defined.
+const STEEPEST: f64 = 0.999;
+/// Share of the viewport that framed points may fill.
+const FRAME_SHARE: f64 = 0.86;
+
+/// A camera that looks at a target, with the frame's z axis up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct OrbitCamera {
+    pub(super) target_m: Vector3<f64>,
+    /// Unit vector from the target to the eye.
+    pub(super) towards: Vector3<f64>,
+    pub(super) distance_m: f64,
+}
+
+/// The rectangle drawn into, in pixels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Viewport {
+    pub(super) size_px: [u32; 2],
+    /// Left, top, right, bottom of the part that framing may use.
+    pub(super) frame_px: [f64; 4],
+    /// Tangent of half the angle of view along the shorter side of that part.
+    half_tangent: f64,
+}
+
+impl Viewport {
+    /// For the world, with the part of it that framing may use.
+    pub(super) fn world(size_px: [u32; 2], frame_px: [f64; 4]) -> Self {
+        Self { size_px, frame_px, half_tangent: WORLD_HALF_TANGENT }
+    }
+
+    /// For something small, over the whole size.
+    pub(super) fn close_up(size_px: [u32; 2]) -> Self {
+        let frame_px = [0.0, 0.0, f64::from(size_px[0]), f64::from(size_px[1])];
+        Self { size_px, frame_px, half_tangent: CLOSE_UP_HALF_TANGENT }
+    }
+
+    fn centre_px(&self) -> [f64; 2] {
+        let [left, top, right, bottom] = self.frame_px;
+        [0.5 * (left + right), 0.5 * (top + bottom)]
+    }
+
+    fn half_size_px(&self) -> [f64; 2] {
+        let [left, top, right, bottom] = self.frame_px;
+        [0.5 * (right - left).max(1.0), 0.5 * (bottom - top).max(1.0)]
+    }
+
+    fn focal_px(&self) -> f64 {
+        let [half_width, half_height] = self.half_size_px();
+        half_width.min(half_height) / self.half_tangent
+    }
+}
+
+/// A camera and its viewport, ready to project.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct View {
+    pub(super) camera: OrbitCamera,
+    pub(super) viewport: Viewport,
+    right: Vector3<f64>,
+    up: Vector3<f64>,
+    pub(super) near_m: f64,
+}
+
+/// A place on the screen: pixels from the upper left corner, and depth 1 at the near plane, 0 at infinity.
+///
+/// Depth is the near distance over the distance along the view, so it is linear over the screen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct ScreenPoint {
+    pub(super) x_px: f64,
+    pub(super) y_px: f64,
+    pub(super) depth: f64,
+}
+
+impl ScreenPoint {
+    /// Between two places, which is also between them in depth.
+    pub(super) fn lerp(&self, other: &Self, fraction: f64) -> Self {
+        Self {
+            x_px: self.x_px + (other.x_px - self.x_px) * fraction,
+            y_px: self.y_px + (other.y_px - self.y_px) * fraction,
+            depth: self.depth + (other.depth - self.depth) * fraction,
+        }
+    }
+}
+
+impl View {
+    pub(super) fn new(camera: OrbitCamera, viewport: Viewport) -> Self {
+        let [right, up] = screen_axes(&camera.towards);
+        Self { camera, viewport, right, up, near_m: (camera.distance_m * NEAR_SHARE).max(1e-6) }
+    }
+
+    /// Right, up and away from the eye, in metres.
+    pub(super) fn in_view(&self, point_m: &Vector3<f64>) -> Vector3<f64> {
+        let offset = point_m - self.camera.target_m;
+        let away = self.camera.distance_m - self.camera.towards.dot(&offset);
+        Vector3::new(self.right.dot(&offset), self.up.dot(&offset), away)
+    }
+
+    /// Where something at or behind the near plane falls, given [`View::in_view`].
+    pub(super) fn on_screen(&self, in_view_m: &Vector3<f64>) -> ScreenPoint {
+        let [centre_x, centre_y] = self.viewport.centre_px();
+        let scale = self.viewport.focal_px() / in_view_m.z;
+        ScreenPoint {
+            x_px: centre_x + in_view_m.x * scale,
+            y_px: centre_y - in_view_m.y * scale,
+            depth: self.near_m / in_view_m.z,
+        }
+    }
+
+    /// Where a place falls, `None` in front of the near plane.
+    pub(super) fn project(&self, point_m: &Vector3<f64>) -> Option<ScreenPoint> {
+        let in_view = self.in_view(point_m);
+        (in_view.z >= self.near_m).then(|| self.on_screen(&in_view))
+    }
+
+    /// Metres per pixel at the target.
+    pub(super) fn metres_per_px(&self) -> f64 {
+        self.camera.distance_m / self.viewport.focal_px()
+    }
+
+    /// How far the target moves when it is dragged over the screen, in metres.
+    pub(super) fn drag_m(&self, drag_px: [f64; 2]) -> Vector3<f64> {
+        (self.up * drag_px[1] - self.right * drag_px[0]) * self.metres_per_px()
+    }
+}
+
+/// Right and up of a view from a direction.
+pub(super) fn screen_axes(towards: &Vector3<f64>) -> [Vector3<f64>; 2] {
+    let right = Vector3::z().cross(towards);
+    let right = if right.norm() > 1e-9 { right.normalize() } else { Vector3::x() };
+    [right, towards.cross(&right)]
+}
+
+/// A camera from a direction that has all points within the viewport's frame, as large as possible.
+pub(super) fn frame(points_m: &[Vector3<f64>], towards: Vector3<f64>, viewport: &Viewport) -> OrbitCamera {
+    let finite = || points_m.iter().filter(|point| point.iter().all(|coordinate| coordinate.is_finite()));
+    let Some(first) = finite().next() else {
+        return OrbitCamera { target_m: Vector3::zeros(), towards, distance_m: 10.0 };
+    };
+    let (low, high) = finite().fold((*first, *first), |(low, high), point| (low.inf(point), high.sup(point)));
+    let [right, up] = screen_axes(&towards);
+    let smallest_m = ((high - low).norm() * 0.05).max(1e-3);
+    let reach = viewport.half_size_px().map(|half| FRAME_SHARE * half / viewport.focal_px());
+    let middle = (low + high) * 0.5;
+    // A point at `across` and `nearer` (towards the eye) is inside when |across − shift| ≤ reach · (distance − nearer).
+    // For each side that bounds the shift from above or below; where both bounds meet is the smallest distance.
+    let solve = |axis: &Vector3<f64>, reach: f64| {
+        let (most, least) = finite().fold((f64::NEG_INFINITY, f64::INFINITY), |(most, least), point| {
+            let offset = point - middle;
+            let (across, nearer) = (axis.dot(&offset), towards.dot(&offset) * reach);
+            (most.max(across + nearer), least.min(across - nearer))
+        });
+        ((most - least) / (2.0 * reach), 0.5 * (most + least))
+    };
+    let (across, shift_right) = solve(&right, reach[0]);
+    let (upright, shift_up) = solve(&up, reach[1]);
+    let distance_m = across.max(upright).max(smallest_m / reach[0].min(reach[1]));
+    OrbitCamera { target_m: middle + right * shift_right + up * shift_up, towards, distance_m }
+}
+
+/// How a person has turned, shifted and zoomed a view that otherwise frames its content.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Orbit {
+    pub(super) towards: Vector3<f64>,
+    pub(super) zoom: f64,
+    pub(super) shift_m: Vector3<f64>,
+}
+
+impl Orbit {
+    /// Untouched, looking from a direction that is not zero.
+    pub(super) fn from_direction(direction: Vector3<f64>) -> Self {
+        Self { towards: direction.normalize(), zoom: 1.0, shift_m: Vector3::zeros() }
+    }
+
+    /// The framing camera as the person wants it.
+    pub(super) fn applied(&self, framing: OrbitCamera) -> OrbitCamera {
+        OrbitCamera {
+            target_m: framing.target_m + self.shift_m,
+            towards: self.towards,
+            distance_m: framing.distance_m / self.zoom,
+        }
+    }
+
+    /// Turns by angles in radians: about z, and up.
+    pub(super) fn turn(&mut self, about_z_rad: f64, up_rad: f64) {
+        let [right, _] = screen_axes(&self.towards);
+        let turned = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), about_z_rad) * self.towards;
+        let elevated = UnitQuaternion::from_axis_angle(&Unit::new_normalize(right), -up_rad) * self.towards;
+        let level = Vector3::new(turned.x, turned.y, 0.0);
+        let sine = elevated.z.clamp(-STEEPEST, STEEPEST);
+        let went_over = elevated.x * self.towards.x + elevated.y * self.towards.y < 0.0;
+        let sine = if went_over { STEEPEST.copysign(self.towards.z) } else { sine };
+        if level.norm() > 1e-9 {
+            let cosine = (1.0 - sine * sine).sqrt();
+            self.towards = level.normalize() * cosine + Vector3::new(0.0, 0.0, sine);
+        }
+    }
+
+    pub(super) fn zoom_by(&mut self, factor: f64) {
+        self.zoom = (self.zoom * factor).clamp(0.02, 500.0);
+    }
+}
+
+/// Length of a vector in the plane.
+#[expect(clippy::imprecise_flops, reason = "a square root rounds alike everywhere, which `hypot` does not promise")]
+pub(super) fn length(x: f64, y: f64) -> f64 {
+    (x * x + y * y).sqrt()
+}
+
+/// The largest of 1, 2 or 5 times a power of ten at or below a length.
+pub(super) fn round_length(at_most: f64) -> f64 {
+    if !(at_most > 0.0 && at_most.is_finite()) {
+        return 1.0;
+    }
+    let mut decade: f64 = 1.0;
+    while decade > at_most {
+        decade /= 10.0;
+    }
+    while decade * 10.0 <= at_most {
+        decade *= 10.0;
+    }
+    [5.0, 2.0].into_iter().map(|step| step * decade).find(|length| *length <= at_most).unwrap_or(decade)
+}

@@ -1,0 +1,83 @@
+//! Shows a drawing in a rectangle, by whichever back end the context was given.
+
+use std::sync::Arc;
+
+use egui::{Context, Id, Pos2, Rect, TextureHandle, TextureOptions, Ui, pos2};
+
+use super::layout::Drawing;
+use super::{cpu, gpu};
+
+/// How scenes are drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SceneBackend {
+    /// On the CPU into a texture: for pictures, and for windows on an adapter that computes on the CPU anyway.
+    #[default]
+    Cpu,
+    /// With wgpu in egui's paint callback, into targets of that format.
+    Wgpu(wgpu::TextureFormat),
+}
+
+impl SceneBackend {
+    fn key() -> Id {
+        Id::unique("scene back end")
+    }
+
+    /// Chooses the back end of a context; without a choice it is the CPU.
+    pub fn set(self, context: &Context) {
+        context.data_mut(|data| data.insert_temp(Self::key(), self));
+    }
+
+    /// The back end of a context.
+    pub fn of(context: &Context) -> Self {
+        context.data(|data| data.get_temp(Self::key())).unwrap_or_default()
+    }
+}
+
+/// Keeps the last drawing, so that it is drawn again only when it changes.
+pub(super) struct Canvas {
+    name: &'static str,
+    drawing: Option<Arc<Drawing>>,
+    texture: Option<(Arc<Drawing>, TextureHandle)>,
+}
+
+impl Canvas {
+    /// An empty canvas; the name tells two of one panel apart.
+    pub(super) fn new(name: &'static str) -> Self {
+        Self { name, drawing: None, texture: None }
+    }
+
+    /// Draws everything but the labels; `rect` lies on whole pixels.
+    pub(super) fn show(&mut self, ui: &Ui, rect: Rect, drawing: Drawing) -> Arc<Drawing> {
+        let drawing = match self.drawing.take() {
+            Some(last) if *last == drawing => last,
+            _ => Arc::new(drawing),
+        };
+        self.drawing = Some(Arc::clone(&drawing));
+        match SceneBackend::of(ui.ctx()) {
+            SceneBackend::Cpu => self.show_texture(ui, rect, &drawing),
+            SceneBackend::Wgpu(format) => {
+                let callback = gpu::SceneCallback::new(ui.scope_id().with(self.name), Arc::clone(&drawing), format);
+                ui.painter().add(eframe::egui_wgpu::Callback::new_paint_callback(rect, callback));
+            }
+        }
+        drawing
+    }
+
+    fn show_texture(&mut self, ui: &Ui, rect: Rect, drawing: &Arc<Drawing>) {
+        let is_current = self.texture.as_ref().is_some_and(|(shown, _)| Arc::ptr_eq(shown, drawing));
+        if !is_current {
+            let image = cpu::draw(drawing);
+            if let Some((shown, handle)) = &mut self.texture {
+                handle.set(image, TextureOptions::NEAREST);
+                *shown = Arc::clone(drawing);
+            } else {
+                let handle = ui.ctx().load_texture(self.name, image, TextureOptions::NEAREST);
+                self.texture = Some((Arc::clone(drawing), handle));
+            }
+        }
+        if let Some((_, handle)) = &self.texture {
+            let whole = Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0));
+            ui.painter().image(handle.id(), rect, whole, egui::Color32::WHITE);
+        }
+    }
+}

@@ -1,0 +1,439 @@
+//! Draws a scene with wgpu: into its own colour and depth targets, four samples per pixel, then copied into egui's pass.
+//!
+//! egui's pass has no depth, and so the scene is drawn again only when it changed.
+
+use std::sync::Arc;
+
+use bytemuck::{Pod, Zeroable};
+use eframe::egui_wgpu::{CallbackResources, CallbackTrait, ScreenDescriptor};
+use egui::PaintCallbackInfo;
+use wgpu::util::DeviceExt as _;
+
+use super::layout::{Corner, Disc, Drawing, PictureCorner, Segment};
+use crate::flight_log::GrayImage;
+
+/// Samples per pixel, as on the CPU.
+const SAMPLES: u32 = 4;
+const COLOR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
+const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+/// Vertices of the two triangles of a segment.
+const SEGMENT_VERTICES: u32 = 6;
+/// Vertices of the triangles of a disc, drawn as an octagon.
+const DISC_VERTICES: u32 = 18;
+
+/// One view of a scene in egui's list of things to paint.
+pub(super) struct SceneCallback {
+    canvas: egui::Id,
+    drawing: Arc<Drawing>,
+    target_format: wgpu::TextureFormat,
+}
+
+impl SceneCallback {
+    /// `canvas` tells views apart, so that each keeps its targets.
+    pub(super) fn new(canvas: egui::Id, drawing: Arc<Drawing>, target_format: wgpu::TextureFormat) -> Self {
+        Self { canvas, drawing, target_format }
+    }
+}
+
+impl CallbackTrait for SceneCallback {
+    fn prepare(
+        &self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        _screen: &ScreenDescriptor,
+        encoder: &mut wgpu::CommandEncoder,
+        resources: &mut CallbackResources,
+    ) -> Vec<wgpu::CommandBuffer> {
+        let renderer =
+            resources.entry::<SceneRenderer>().or_insert_with(|| SceneRenderer::new(device, self.target_format));
+        renderer.prepare(device, queue, encoder, self.canvas, &self.drawing);
+        Vec::new()
+    }
+
+    fn paint(&self, _info: PaintCallbackInfo, pass: &mut wgpu::RenderPass<'static>, resources: &CallbackResources) {
+        if let Some(renderer) = resources.get::<SceneRenderer>() {
+            renderer.copy(pass, self.canvas);
+        }
+    }
+}
+
+/// What the shaders need to know about the view.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+struct Uniforms {
+    size_px: [f32; 2],
+    padding: [f32; 2],
+}
+
+/// Pipelines, and the targets of each view.
+struct SceneRenderer {
+    picture_pipeline: wgpu::RenderPipeline,
+    face_pipeline: wgpu::RenderPipeline,
+    segment_pipeline: wgpu::RenderPipeline,
+    disc_pipeline: wgpu::RenderPipeline,
+    copy_pipeline: wgpu::RenderPipeline,
+    uniform_layout: wgpu::BindGroupLayout,
+    texture_layout: wgpu::BindGroupLayout,
+    linear: wgpu::Sampler,
+    canvases: egui::IdMap<Canvas>,
+}
+
+/// The targets of one view and what was drawn last.
+struct Canvas {
+    drawing: Arc<Drawing>,
+    size_px: [u32; 2],
+    samples: wgpu::TextureView,
+    depth: wgpu::TextureView,
+    resolved: wgpu::TextureView,
+    copy_group: wgpu::BindGroup,
+}
+
+impl SceneRenderer {
+    fn new(device: &wgpu::Device, target_format: wgpu::TextureFormat) -> Self {
+        let shader = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some("scene"),
+            source: wgpu::ShaderSource::Wgsl(include_str!("scene.wgsl").into()),
+        });
+        let uniform_layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some("scene view"),
+            entries: &[wgpu::BindGroupLayoutEntry {
+                binding: 0,
+                visibility: wgpu::ShaderStages::VERTEX,
+                ty: wgpu::BindingType::Buffer {
+                    ty: wgpu::BufferBindingType::Uniform,
+                    has_dynamic_offset: false,
+                    min_binding_size: None,
+                },
+                count: None,
+            }],
+        });
+        let texture_layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some("scene texture"),
+            entries: &[
+                wgpu::BindGroupLayoutEntry {
+                    binding: 0,
+                    visibility: wgpu::ShaderStages::FRAGMENT,
+                    ty: wgpu::BindingType::Texture {
+                        sample_type: wgpu::TextureSampleType::Float { filterable: true },
+                        view_dimension: wgpu::TextureViewDimension::D2,
+                        multisampled: false,
+                    },
+                    count: None,
+                },
+                wgpu::BindGroupLayoutEntry {
+                    binding: 1,
+                    visibility: wgpu::ShaderStages::FRAGMENT,
+                    ty: wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering),
+                    count: None,
+                },
+            ],
+        });
+        let pipelines =
+            PipelineMaker { device, shader: &shader, uniform_layout: &uniform_layout, texture_layout: &texture_layout };
+        let per_instance = wgpu::VertexStepMode::Instance;
+        let per_vertex = wgpu::VertexStepMode::Vertex;
+        let copy_fragment = if target_format.is_srgb() { "copy_linear" } else { "copy_gamma" };
+        Self {
+            picture_pipeline: pipelines.scene(
+                ["picture_vertex", "picture_fragment"],
+                Some(wgpu::VertexBufferLayout {
+                    array_stride: size_of::<PictureCorner>() as u64,
+                    step_mode: per_vertex,
+                    attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x2],
+                }),
+            ),
+            face_pipeline: pipelines.scene(
+                ["face_vertex", "color_fragment"],
+                Some(wgpu::VertexBufferLayout {
+                    array_stride: size_of::<Corner>() as u64,
+                    step_mode: per_vertex,
+                    attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Unorm8x4],
+                }),
+            ),
+            segment_pipeline: pipelines.scene(
+                ["segment_vertex", "color_fragment"],
+                Some(wgpu::VertexBufferLayout {
+                    array_stride: size_of::<Segment>() as u64,
+                    step_mode: per_instance,
+                    attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32, 3 => Unorm8x4],
+                }),
+            ),
+            disc_pipeline: pipelines.scene(
+                ["disc_vertex", "color_fragment"],
+                Some(wgpu::VertexBufferLayout {
+                    array_stride: size_of::<Disc>() as u64,
+                    step_mode: per_instance,
+                    attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32, 2 => Unorm8x4],
+                }),
+            ),
+            copy_pipeline: pipelines.copy(copy_fragment, target_format),
+            uniform_layout,
+            texture_layout,
+            linear: device.create_sampler(&wgpu::SamplerDescriptor {
+                label: Some("scene picture"),
+                mag_filter: wgpu::FilterMode::Nearest,
+                min_filter: wgpu::FilterMode::Nearest,
+                ..wgpu::SamplerDescriptor::default()
+            }),
+            canvases: egui::IdMap::default(),
+        }
+    }
+
+    /// Draws a view when it changed.
+    fn prepare(
+        &mut self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        encoder: &mut wgpu::CommandEncoder,
+        id: egui::Id,
+        drawing: &Arc<Drawing>,
+    ) {
+        let old = self.canvases.remove(&id);
+        if let Some(canvas) = old.as_ref().filter(|canvas| Arc::ptr_eq(&canvas.drawing, drawing)) {
+            debug_assert_eq!(canvas.size_px, drawing.size_px);
+            self.canvases.extend(old.map(|canvas| (id, canvas)));
+            return;
+        }
+        let mut canvas = old
+            .filter(|canvas| canvas.size_px == drawing.size_px)
+            .unwrap_or_else(|| Canvas::new(device, drawing, &self.texture_layout, &self.linear));
+        canvas.drawing = Arc::clone(drawing);
+        self.draw(device, queue, encoder, &canvas);
+        self.canvases.insert(id, canvas);
+    }
+
+    fn draw(&self, device: &wgpu::Device, queue: &wgpu::Queue, encoder: &mut wgpu::CommandEncoder, canvas: &Canvas) {
+        let drawing = &canvas.drawing;
+        let buffer = |label, contents: &[u8], usage| {
+            device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some(label), contents, usage })
+        };
+        let vertices = |label, contents: &[u8]| {
+            (!contents.is_empty()).then(|| buffer(label, contents, wgpu::BufferUsages::VERTEX))
+        };
+        let uniforms = Uniforms { size_px: drawing.size_px.map(|side| side as f32), padding: [0.0; 2] };
+        let uniforms = buffer("scene view", bytemuck::bytes_of(&uniforms), wgpu::BufferUsages::UNIFORM);
+        let uniform_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("scene view"),
+            layout: &self.uniform_layout,
+            entries: &[wgpu::BindGroupEntry { binding: 0, resource: uniforms.as_entire_binding() }],
+        });
+        let pictures: Vec<_> = drawing
+            .pictures
+            .iter()
+            .filter_map(|picture| {
+                let corners = vertices("scene pictures", bytemuck::cast_slice(&picture.corners))?;
+                Some((corners, picture.corners.len() as u32, self.picture_group(device, queue, &picture.image)?))
+            })
+            .collect();
+        let faces = vertices("scene faces", bytemuck::cast_slice(&drawing.corners));
+        let segments = vertices("scene segments", bytemuck::cast_slice(&drawing.segments));
+        let discs = vertices("scene discs", bytemuck::cast_slice(&drawing.discs));
+
+        let [red, green, blue, _] = drawing.background.to_array().map(|channel| f64::from(channel) / 255.0);
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("scene"),
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: &canvas.samples,
+                depth_slice: None,
+                resolve_target: Some(&canvas.resolved),
+                ops: wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(wgpu::Color { r: red, g: green, b: blue, a: 1.0 }),
+                    store: wgpu::StoreOp::Discard,
+                },
+            })],
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: &canvas.depth,
+                depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Discard }),
+                stencil_ops: None,
+            }),
+            ..wgpu::RenderPassDescriptor::default()
+        });
+        pass.set_bind_group(0, &uniform_group, &[]);
+        pass.set_pipeline(&self.picture_pipeline);
+        for (corners, count, group) in &pictures {
+            pass.set_bind_group(1, group, &[]);
+            pass.set_vertex_buffer(0, corners.slice(..));
+            pass.draw(0..*count, 0..1);
+        }
+        if let Some(faces) = &faces {
+            pass.set_pipeline(&self.face_pipeline);
+            pass.set_vertex_buffer(0, faces.slice(..));
+            pass.draw(0..drawing.corners.len() as u32, 0..1);
+        }
+        if let Some(segments) = &segments {
+            pass.set_pipeline(&self.segment_pipeline);
+            pass.set_vertex_buffer(0, segments.slice(..));
+            pass.draw(0..SEGMENT_VERTICES, 0..drawing.segments.len() as u32);
+        }
+        if let Some(discs) = &discs {
+            pass.set_pipeline(&self.disc_pipeline);
+            pass.set_vertex_buffer(0, discs.slice(..));
+            pass.draw(0..DISC_VERTICES, 0..drawing.discs.len() as u32);
+        }
+    }
+
+    /// The image as a texture; `None` when it has no pixels.
+    fn picture_group(&self, device: &wgpu::Device, queue: &wgpu::Queue, image: &GrayImage) -> Option<wgpu::BindGroup> {
+        if image.pixels.is_empty() || image.pixels.len() < image.width * image.height {
+            return None;
+        }
+        let size = wgpu::Extent3d { width: image.width as u32, height: image.height as u32, depth_or_array_layers: 1 };
+        let texture = device.create_texture_with_data(
+            queue,
+            &wgpu::TextureDescriptor {
+                label: Some("scene picture"),
+                size,
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format: wgpu::TextureFormat::R8Unorm,
+                usage: wgpu::TextureUsages::TEXTURE_BINDING,
+                view_formats: &[],
+            },
+            wgpu::util::TextureDataOrder::LayerMajor,
+            &image.pixels[..image.width * image.height],
+        );
+        let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+        Some(texture_group(device, &self.texture_layout, &view, &self.linear))
+    }
+
+    /// Copies a view that was prepared into egui's pass.
+    fn copy(&self, pass: &mut wgpu::RenderPass<'static>, id: egui::Id) {
+        if let Some(canvas) = self.canvases.get(&id) {
+            pass.set_pipeline(&self.copy_pipeline);
+            pass.set_bind_group(0, &canvas.copy_group, &[]);
+            pass.draw(0..3, 0..1);
+        }
+    }
+}
+
+impl Canvas {
+    fn new(
+        device: &wgpu::Device,
+        drawing: &Arc<Drawing>,
+        texture_layout: &wgpu::BindGroupLayout,
+        sampler: &wgpu::Sampler,
+    ) -> Self {
+        let size_px = drawing.size_px;
+        let target = |label, format, sample_count, usage| {
+            let texture = device.create_texture(&wgpu::TextureDescriptor {
+                label: Some(label),
+                size: wgpu::Extent3d { width: size_px[0], height: size_px[1], depth_or_array_layers: 1 },
+                mip_level_count: 1,
+                sample_count,
+                dimension: wgpu::TextureDimension::D2,
+                format,
+                usage,
+                view_formats: &[],
+            });
+            texture.create_view(&wgpu::TextureViewDescriptor::default())
+        };
+        let attachment = wgpu::TextureUsages::RENDER_ATTACHMENT;
+        let resolved = target("scene", COLOR_FORMAT, 1, attachment | wgpu::TextureUsages::TEXTURE_BINDING);
+        Self {
+            drawing: Arc::clone(drawing),
+            size_px,
+            samples: target("scene samples", COLOR_FORMAT, SAMPLES, attachment),
+            depth: target("scene depth", DEPTH_FORMAT, SAMPLES, attachment),
+            copy_group: texture_group(device, texture_layout, &resolved, sampler),
+            resolved,
+        }
+    }
+}
+
+fn texture_group(
+    device: &wgpu::Device,
+    layout: &wgpu::BindGroupLayout,
+    view: &wgpu::TextureView,
+    sampler: &wgpu::Sampler,
+) -> wgpu::BindGroup {
+    device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some("scene texture"),
+        layout,
+        entries: &[
+            wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(view) },
+            wgpu::BindGroupEntry { binding: 1, resource: wgpu::BindingResource::Sampler(sampler) },
+        ],
+    })
+}
+
+/// Makes pipelines of one shader.
+struct PipelineMaker<'a> {
+    device: &'a wgpu::Device,
+    shader: &'a wgpu::ShaderModule,
+    uniform_layout: &'a wgpu::BindGroupLayout,
+    texture_layout: &'a wgpu::BindGroupLayout,
+}
+
+impl PipelineMaker<'_> {
+    /// Draws into the scene's own targets, nearest wins.
+    fn scene(
+        &self,
+        [vertex, fragment]: [&str; 2],
+        buffer: Option<wgpu::VertexBufferLayout<'_>>,
+    ) -> wgpu::RenderPipeline {
+        let layout = self.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some(vertex),
+            bind_group_layouts: &[Some(self.uniform_layout), Some(self.texture_layout)]
+                [..if fragment == "picture_fragment" { 2 } else { 1 }],
+            immediate_size: 0,
+        });
+        self.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some(vertex),
+            layout: Some(&layout),
+            vertex: wgpu::VertexState {
+                module: self.shader,
+                entry_point: Some(vertex),
+                buffers: &[buffer],
+                compilation_options: wgpu::PipelineCompilationOptions::default(),
+            },
+            primitive: wgpu::PrimitiveState::default(),
+            depth_stencil: Some(wgpu::DepthStencilState {
+                format: DEPTH_FORMAT,
+                depth_write_enabled: Some(true),
+                depth_compare: Some(wgpu::CompareFunction::GreaterEqual),
+                stencil: wgpu::StencilState::default(),
+                bias: wgpu::DepthBiasState::default(),
+            }),
+            multisample: wgpu::MultisampleState { count: SAMPLES, ..wgpu::MultisampleState::default() },
+            fragment: Some(wgpu::FragmentState {
+                module: self.shader,
+                entry_point: Some(fragment),
+                targets: &[Some(COLOR_FORMAT.into())],
+                compilation_options: wgpu::PipelineCompilationOptions::default(),
+            }),
+            multiview_mask: None,
+            cache: None,
+        })
+    }
+
+    /// Copies the finished scene into egui's pass.
+    fn copy(&self, fragment: &str, target_format: wgpu::TextureFormat) -> wgpu::RenderPipeline {
+        let layout = self.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some("scene copy"),
+            bind_group_layouts: &[Some(self.texture_layout)],
+            immediate_size: 0,
+        });
+        self.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some("scene copy"),
+            layout: Some(&layout),
+            vertex: wgpu::VertexState {
+                module: self.shader,
+                entry_point: Some("copy_vertex"),
+                buffers: &[],
+                compilation_options: wgpu::PipelineCompilationOptions::default(),
+            },
+            primitive: wgpu::PrimitiveState::default(),
+            depth_stencil: None,
+            multisample: wgpu::MultisampleState::default(),
+            fragment: Some(wgpu::FragmentState {
+                module: self.shader,
+                entry_point: Some(fragment),
+                targets: &[Some(target_format.into())],
+                compilation_options: wgpu::PipelineCompilationOptions::default(),
+            }),
+            multiview_mask: None,
+            cache: None,
+        })
+    }
+}

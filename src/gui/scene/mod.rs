@@ -1,0 +1,322 @@
+//! The 3D scene: the flight in the world, and the gimbal's chain close up.
+//!
+//! `world.rs` and `chain.rs` describe what there is, `camera.rs` and `layout.rs` put it on the screen, and `cpu.rs` or
+//! `gpu.rs` draws it.
+
+mod camera;
+mod canvas;
+mod chain;
+mod cpu;
+mod gpu;
+mod layout;
+mod model;
+mod overlay;
+#[cfg(test)]
+mod tests;
+mod world;
+
+use egui::{Rect, Response, Sense, Ui, Vec2, pos2, vec2};
+use nalgebra::Vector3;
+
+use self::camera::{Orbit, OrbitCamera, View, Viewport, frame};
+use self::canvas::Canvas;
+pub use self::canvas::SceneBackend;
+use self::chain::{ChainModel, ChainPose};
+use self::layout::lay_out;
+use self::overlay::LegendLine;
+use self::world::{RunView, WorldBuilder, WorldOptions, framing_points_m, ground_height_m};
+use super::PanelContext;
+use crate::camera::CameraModel;
+use crate::flight_log::Rig;
+use crate::flight_log::rig::CameraMount;
+use crate::gimbal::ClassicalChain;
+use crate::session::RunRecord;
+
+/// What the view of the world keeps in its middle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Follow {
+    /// All trajectories.
+    #[default]
+    Trajectory,
+    /// The vehicle at the cursor.
+    Vehicle,
+}
+
+/// How much nearer the view is to the vehicle than to the whole trajectory.
+const VEHICLE_SHARE: f64 = 0.3;
+/// Radians that the view turns per point of dragging.
+const TURN_PER_POINT: f64 = 0.008;
+/// Smallest panel that has room for the close-up.
+const CLOSE_UP_FROM: Vec2 = vec2(400.0, 230.0);
+
+/// The scene panel: what is shown, and from where.
+pub struct ScenePanel {
+    /// What stays in the middle.
+    pub follow: Follow,
+    /// Show landmarks.
+    pub landmarks: bool,
+    /// Show the window's keyframes.
+    pub keyframes: bool,
+    /// Show the newest image in its camera's pyramid.
+    pub image: bool,
+    /// Show the close-up of the gimbal's chain.
+    pub chain: bool,
+    world: Orbit,
+    /// `None` while nobody has turned it.
+    close_up: Option<Orbit>,
+    world_canvas: Canvas,
+    close_up_canvas: Canvas,
+}
+
+impl Default for ScenePanel {
+    fn default() -> Self {
+        Self {
+            follow: Follow::Trajectory,
+            landmarks: true,
+            keyframes: true,
+            image: true,
+            chain: true,
+            world: default_world_orbit(),
+            close_up: None,
+            world_canvas: Canvas::new("world"),
+            close_up_canvas: Canvas::new("close-up"),
+        }
+    }
+}
+
+fn default_world_orbit() -> Orbit {
+    Orbit::from_direction(Vector3::new(-0.45, -0.75, 0.55))
+}
+
+impl ScenePanel {
+    /// Draws the panel into what is left of `ui`.
+    pub fn ui(&mut self, ui: &mut Ui, context: &mut PanelContext<'_>) {
+        self.controls_ui(ui);
+        let (area, response) =
+            ui.allocate_exact_size(ui.available_size().max(Vec2::splat(16.0)), Sense::click_and_drag());
+        let area = on_pixels(area, ui.pixels_per_point());
+        let has_room = area.width() >= CLOSE_UP_FROM.x && area.height() >= CLOSE_UP_FROM.y;
+        let chain = (self.chain && has_room).then(|| chain_model(context)).flatten();
+        let close_up = chain.as_ref().map(|_| close_up_rect(area, ui.pixels_per_point()));
+        self.world_ui(ui, area, close_up, &response, context);
+        if let (Some(chain), Some(rect)) = (chain, close_up) {
+            self.close_up_ui(ui, rect, &chain, context);
+        }
+    }
+
+    fn controls_ui(&mut self, ui: &mut Ui) {
+        ui.horizontal(|ui| {
+            ui.selectable_value(&mut self.follow, Follow::Trajectory, "Trajectory")
+                .on_hover_text("Keep all trajectories in view");
+            ui.selectable_value(&mut self.follow, Follow::Vehicle, "Vehicle").on_hover_text("Stay with the vehicle");
+            if ui.button("Fit").on_hover_text("Back to the view that shows everything (double click)").clicked() {
+                self.world = default_world_orbit();
+                self.close_up = None;
+            }
+            if ui.button("Top").on_hover_text("Look straight down").clicked() {
+                self.world = Orbit::from_direction(Vector3::new(0.0, -0.01, 1.0));
+            }
+            ui.separator();
+            ui.checkbox(&mut self.landmarks, "Landmarks");
+            ui.checkbox(&mut self.keyframes, "Keyframes");
+            ui.checkbox(&mut self.image, "Image");
+            ui.checkbox(&mut self.chain, "Chain");
+        });
+    }
+
+    fn world_ui(
+        &mut self,
+        ui: &Ui,
+        area: Rect,
+        close_up: Option<Rect>,
+        response: &Response,
+        context: &mut PanelContext<'_>,
+    ) {
+        let theme = context.theme;
+        let scale = ui.pixels_per_point();
+        let views: Vec<RunView<'_>> = context
+            .recording
+            .runs
+            .iter()
+            .enumerate()
+            .map(|(number, run)| RunView::new(number, run, context.cursor_ns))
+            .collect();
+        let points = framing_points_m(context.recording);
+        let viewport = world_viewport(area, close_up, scale);
+        let mut framing = frame(&points, self.world.towards, &viewport);
+        if self.follow == Follow::Vehicle
+            && let Some(at) = views.get(context.selection.run).and_then(RunView::position_m)
+        {
+            framing = OrbitCamera { target_m: at, distance_m: framing.distance_m * VEHICLE_SHARE, ..framing };
+        }
+        let view = View::new(self.world.applied(framing), viewport);
+        navigate(ui, response, &mut self.world, default_world_orbit(), &view);
+        let view = View::new(self.world.applied(framing), viewport);
+
+        let options = WorldOptions { landmarks: self.landmarks, keyframes: self.keyframes, image: self.image };
+        let mut builder = WorldBuilder::new(theme, options, view.camera.distance_m);
+        let spacing_m = builder.ground(&points);
+        if let Some(first) = views.first() {
+            builder.truth(first);
+        }
+        for run in &views {
+            let camera = camera_of(&context.recording.rig, run.run);
+            let is_selected = run.number == context.selection.run;
+            let image = (is_selected && self.image)
+                .then(|| run.newest().and_then(|frame| context.images.image(&run.run.camera_key, frame.frame_index)))
+                .flatten();
+            if is_selected {
+                builder.details(run, camera, ground_height_m(&points));
+            }
+            builder.run(run, camera, image);
+        }
+        let drawing = lay_out(&builder.scene, &view, scale, theme.plot_background);
+        let drawing = self.world_canvas.show(ui, area, drawing);
+        let painter = ui.painter_at(area);
+        overlay::labels(&painter, area, scale, &drawing.labels, theme.plot_background);
+        overlay::legend(&painter, area, theme, &legend_lines(&views, theme), builder.height_range_m);
+        overlay::scale_bar(&painter, area, scale, theme, &view, &format!(", grid {spacing_m} m"));
+        overlay::gizmo(&painter, area.left_bottom() + vec2(34.0, -62.0), theme, &view);
+    }
+
+    fn close_up_ui(&mut self, ui: &Ui, rect: Rect, chain: &ChainModel, context: &PanelContext<'_>) {
+        let theme = context.theme;
+        let scale = ui.pixels_per_point();
+        let response = ui.interact(rect, ui.scope_id().with("close-up"), Sense::click_and_drag());
+        let painter = ui.painter_at(rect.expand(1.0));
+        painter.rect_filled(rect, 0.0, theme.surface);
+        let table_height = overlay::chain_table_height(chain);
+        let title = Rect::from_min_size(rect.min, vec2(rect.width(), overlay::LINE_HEIGHT + 4.0));
+        let picture = Rect::from_min_max(title.left_bottom(), rect.max - vec2(0.0, table_height));
+        let picture = on_pixels(picture, scale);
+        let viewport = Viewport::close_up(size_px(picture, scale));
+        let home = Orbit::from_direction(close_up_direction(context));
+        let mut orbit = self.close_up.unwrap_or(home);
+        let framing = frame(&chain.framing_points_m(), orbit.towards, &viewport);
+        let view = View::new(orbit.applied(framing), viewport);
+        navigate(ui, &response, &mut orbit, home, &view);
+        self.close_up = (orbit != home).then_some(orbit);
+        let view = View::new(orbit.applied(framing), viewport);
+        let drawing = lay_out(&chain.scene(theme), &view, scale, theme.surface);
+        let drawing = self.close_up_canvas.show(ui, picture, drawing);
+        overlay::labels(&painter, picture, scale, &drawing.labels, theme.surface);
+        overlay::scale_bar(&painter, picture, scale, theme, &view, "");
+        let label = context.recording.runs.get(context.selection.run).map_or("", |run| run.spec.label.as_str());
+        let text = match &chain.truth {
+            Some(_) => format!("Gimbal chain, {label}; truth dashed"),
+            None => format!("Gimbal chain, {label}"),
+        };
+        let at = title.left_center() + vec2(8.0, 0.0);
+        painter.text(at, egui::Align2::LEFT_CENTER, text, super::theme::label_font(), theme.text_strong);
+        let table = Rect::from_min_max(picture.left_bottom(), rect.max);
+        overlay::chain_table(&painter, table, theme, chain);
+        let outline = egui::Stroke::new(1.0, theme.outline);
+        painter.rect_stroke(rect, 0.0, outline, egui::StrokeKind::Inside);
+    }
+}
+
+/// Runs in order, then the truth.
+fn legend_lines(views: &[RunView<'_>], theme: &super::theme::Theme) -> Vec<LegendLine> {
+    let mut lines: Vec<LegendLine> = views
+        .iter()
+        .map(|view| {
+            let label = &view.run.spec.label;
+            let text = match (view.error_m(), view.newest(), view.run.alignment) {
+                (Some(error_m), ..) => format!("{label}, {error_m:.2} m from truth"),
+                (None, None, _) => format!("{label}, initializing"),
+                (None, Some(_), None) if view.has_truth() => format!("{label}, not aligned yet"),
+                _ => label.clone(),
+            };
+            LegendLine { style: theme.run(view.number), text }
+        })
+        .collect();
+    if views.first().is_some_and(RunView::has_truth) {
+        lines.push(LegendLine { style: theme.truth_style(), text: "truth".to_owned() });
+    }
+    lines
+}
+
+/// The chain of the selected run at the cursor.
+fn chain_model(context: &PanelContext<'_>) -> Option<ChainModel> {
+    let run = context.recording.runs.get(context.selection.run)?;
+    let step = run.step_at(context.cursor_ns)?;
+    let chain = &step.report.calibration.classical;
+    let true_chain = context.recording.truth_rig.as_ref().and_then(|rig| chain_of(rig, &run.camera_key));
+    let true_chain = true_chain.filter(|truth| truth.links.len() == chain.links.len());
+    let joints = context.recording.rig.gimbal.iter().flat_map(|gimbal| &gimbal.joints);
+    let joint_names: Vec<String> = joints.map(|joint| joint.name.clone()).collect();
+    let angles_rad = step.report.newest().map_or(&[][..], |frame| &frame.joint_angles_rad);
+    Some(ChainModel::at(angles_rad, chain, true_chain.as_ref(), &joint_names))
+}
+
+/// From where the close-up looks: chosen for the chain that the rig gives, so that it does not depend on the cursor.
+fn close_up_direction(context: &PanelContext<'_>) -> Vector3<f64> {
+    let camera_key = context.recording.runs.get(context.selection.run).map_or("", |run| run.camera_key.as_str());
+    ChainPose::best_direction(&chain_of(&context.recording.rig, camera_key).unwrap_or_default())
+}
+
+/// The chain that carries a camera of a rig.
+fn chain_of(rig: &Rig, camera_key: &str) -> Option<ClassicalChain> {
+    let camera = rig.cameras.iter().find(|camera| camera.key == camera_key)?;
+    match camera.mount {
+        CameraMount::Gimbal => rig.gimbal.as_ref().map(|gimbal| gimbal.chain.clone()),
+        CameraMount::Static { imu_from_camera } => {
+            Some(ClassicalChain { imu_from_base: imu_from_camera, ..ClassicalChain::default() })
+        }
+    }
+}
+
+fn camera_of<'a>(rig: &'a Rig, run: &RunRecord) -> Option<&'a CameraModel> {
+    rig.cameras.iter().find(|camera| camera.key == run.camera_key).map(|camera| &camera.model)
+}
+
+/// Moves a rectangle's edges onto whole pixels.
+fn on_pixels(rect: Rect, pixels_per_point: f32) -> Rect {
+    let snap = |coordinate: f32| (coordinate * pixels_per_point).round() / pixels_per_point;
+    Rect::from_min_max(pos2(snap(rect.min.x), snap(rect.min.y)), pos2(snap(rect.max.x), snap(rect.max.y)))
+}
+
+/// Width and height of a rectangle in pixels.
+fn size_px(rect: Rect, pixels_per_point: f32) -> [u32; 2] {
+    [rect.width(), rect.height()].map(|side| (side * pixels_per_point).round().max(1.0) as u32)
+}
+
+/// The whole area, framed to the left of the close-up.
+fn world_viewport(area: Rect, close_up: Option<Rect>, pixels_per_point: f32) -> Viewport {
+    let size_px = size_px(area, pixels_per_point);
+    let right = close_up.unwrap_or(Rect::from_min_max(area.right_top(), area.right_bottom())).left();
+    let frame_px = [
+        0.0,
+        overlay::LINE_HEIGHT * pixels_per_point,
+        (right - area.left()) * pixels_per_point,
+        area.height() * pixels_per_point,
+    ];
+    Viewport::world(size_px, frame_px.map(f64::from))
+}
+
+/// The lower right corner.
+fn close_up_rect(area: Rect, pixels_per_point: f32) -> Rect {
+    const INSET: f32 = 6.0;
+    let size = vec2((0.42 * area.width()).clamp(190.0, 420.0), (0.8 * area.height()).clamp(180.0, 420.0));
+    on_pixels(Rect::from_min_max(area.max - size - Vec2::splat(INSET), area.max - Vec2::splat(INSET)), pixels_per_point)
+}
+
+/// Dragging turns, with Shift or another button it shifts, the wheel zooms, a double click goes back.
+fn navigate(ui: &Ui, response: &Response, orbit: &mut Orbit, home: Orbit, view: &View) {
+    if response.double_clicked() {
+        *orbit = home;
+    }
+    let scale = f64::from(ui.pixels_per_point());
+    let drag = response.drag_delta();
+    let drag = [f64::from(drag.x), f64::from(drag.y)];
+    let shifts = ui.input(|input| input.modifiers.shift) || !response.dragged_by(egui::PointerButton::Primary);
+    if response.dragged() && shifts {
+        orbit.shift_m += view.drag_m(drag.map(|points| points * scale));
+    } else if response.dragged() {
+        orbit.turn(-drag[0] * TURN_PER_POINT, drag[1] * TURN_PER_POINT);
+    }
+    if response.hovered() {
+        let factor = ui.input(|input| input.zoom_delta() * (input.smooth_scroll_delta().y * 0.004).exp());
+        orbit.zoom_by(f64::from(factor));
+    }
+}

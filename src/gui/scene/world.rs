@@ -1,0 +1,313 @@
+//! The scene in the world: ground, trajectories, landmarks, cameras and the vehicle.
+
+use std::sync::Arc;
+
+use egui::Color32;
+use nalgebra::{Vector2, Vector3};
+
+use super::camera::round_length;
+use super::chain::axis_colors;
+use super::model::{Dot, Picture, SceneModel};
+use crate::camera::CameraModel;
+use crate::estimator::{FrameStateReport, LandmarkReport};
+use crate::flight_log::GrayImage;
+use crate::geometry::RigidTransform;
+use crate::gui::theme::{self, Theme, mix};
+use crate::session::{Recording, RunRecord};
+
+/// Most points that one trajectory is drawn with.
+const MOST_TRAJECTORY_POINTS: usize = 4000;
+/// Most earlier steps whose landmarks are shown.
+const MOST_LANDMARK_STEPS: usize = 128;
+/// Most landmarks in one picture.
+const MOST_LANDMARKS: usize = 20_000;
+
+/// What of the world is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct WorldOptions {
+    pub(super) landmarks: bool,
+    pub(super) keyframes: bool,
+    pub(super) image: bool,
+}
+
+/// A run of the recording up to the cursor, laid on the truth.
+pub(super) struct RunView<'a> {
+    pub(super) number: usize,
+    pub(super) run: &'a RunRecord,
+    /// Steps at or before the cursor.
+    shown: usize,
+    aligned: RigidTransform,
+}
+
+impl<'a> RunView<'a> {
+    pub(super) fn new(number: usize, run: &'a RunRecord, cursor_ns: i64) -> Self {
+        let shown = run.steps.partition_point(|step| step.report.stamp_ns <= cursor_ns);
+        Self { number, run, shown, aligned: run.alignment.unwrap_or_default() }
+    }
+
+    /// The newest frame at the cursor, `None` while the run does not track.
+    pub(super) fn newest(&self) -> Option<&'a FrameStateReport> {
+        self.run.steps[..self.shown].last()?.report.newest()
+    }
+
+    /// Distance between the aligned estimate and the truth at the cursor, in metres.
+    pub(super) fn error_m(&self) -> Option<f64> {
+        let step = self.run.steps[..self.shown].last()?;
+        let estimate = self.run.alignment? * step.report.newest()?.world_from_imu;
+        Some((estimate.translation_m - step.truth?.translation_m).norm())
+    }
+
+    /// Where the vehicle is at the cursor, aligned.
+    pub(super) fn position_m(&self) -> Option<Vector3<f64>> {
+        Some((self.aligned * self.newest()?.world_from_imu).translation_m)
+    }
+
+    /// Whether the log has a truth for this run up to the cursor.
+    pub(super) fn has_truth(&self) -> bool {
+        self.run.steps[..self.shown].iter().any(|step| step.truth.is_some())
+    }
+
+    /// Aligned positions, broken where the run did not track.
+    fn trajectory_m(&self) -> Vec<Vec<Vector3<f64>>> {
+        let positions = |step: &Arc<crate::session::StepRecord>| {
+            step.report.newest().map(|frame| self.aligned.transform(&frame.world_from_imu.translation_m))
+        };
+        broken_line(&self.run.steps[..self.shown], positions)
+    }
+
+    fn truth_m(&self) -> Vec<Vec<Vector3<f64>>> {
+        broken_line(&self.run.steps[..self.shown], |step| step.truth.map(|pose| pose.translation_m))
+    }
+}
+
+/// Positions of steps as lines; long ones are thinned by a power of two, so that what is drawn does not flicker.
+fn broken_line<T>(steps: &[T], position: impl Fn(&T) -> Option<Vector3<f64>>) -> Vec<Vec<Vector3<f64>>> {
+    let mut stride = 1;
+    while steps.len() / stride > MOST_TRAJECTORY_POINTS {
+        stride *= 2;
+    }
+    let mut lines = vec![Vec::new()];
+    for (index, step) in steps.iter().enumerate() {
+        if !index.is_multiple_of(stride) && index + 1 != steps.len() {
+            continue;
+        }
+        match position(step).filter(|point| point.iter().all(|coordinate| coordinate.is_finite())) {
+            Some(point) => {
+                if let Some(line) = lines.last_mut() {
+                    line.push(point);
+                }
+            }
+            None if lines.last().is_some_and(|line| !line.is_empty()) => lines.push(Vec::new()),
+            None => {}
+        }
+    }
+    lines.retain(|line| !line.is_empty());
+    lines
+}
+
+/// Everything that a view of the flight must hold: all trajectories over the whole recording.
+pub(super) fn framing_points_m(recording: &Recording) -> Vec<Vector3<f64>> {
+    let mut points: Vec<Vector3<f64>> = recording
+        .runs
+        .iter()
+        .enumerate()
+        .flat_map(|(number, run)| {
+            let whole = RunView::new(number, run, i64::MAX);
+            whole.trajectory_m().into_iter().chain(whole.truth_m())
+        })
+        .flatten()
+        .collect();
+    if let Some((low, high)) = bounds(&points) {
+        // Hover and a first second still get a view of some metres.
+        let room = Vector3::new(1.0, 1.0, 0.5) * (1.5 - (high - low).norm()).max(0.0);
+        points.extend([low - room, high + room]);
+    }
+    points
+}
+
+fn bounds(points: &[Vector3<f64>]) -> Option<(Vector3<f64>, Vector3<f64>)> {
+    let first = *points.first()?;
+    Some(points.iter().fold((first, first), |(low, high), point| (low.inf(point), high.sup(point))))
+}
+
+/// Height of the grid: zero, or the lowest place when the flight goes below.
+pub(super) fn ground_height_m(points: &[Vector3<f64>]) -> f64 {
+    points.iter().map(|point| point.z).fold(0.0, f64::min)
+}
+
+/// Builds the world; sizes of things without a size of their own follow `view_distance_m`.
+pub(super) struct WorldBuilder<'a> {
+    pub(super) theme: &'a Theme,
+    pub(super) options: WorldOptions,
+    pub(super) view_distance_m: f64,
+    pub(super) scene: SceneModel,
+    /// Heights of the first and the last colour of the landmarks.
+    pub(super) height_range_m: Option<(f64, f64)>,
+}
+
+impl<'a> WorldBuilder<'a> {
+    pub(super) fn new(theme: &'a Theme, options: WorldOptions, view_distance_m: f64) -> Self {
+        Self { theme, options, view_distance_m, scene: SceneModel::default(), height_range_m: None }
+    }
+
+    /// A square grid under the flight; returns its spacing in metres.
+    pub(super) fn ground(&mut self, points_m: &[Vector3<f64>]) -> f64 {
+        let Some((low, high)) = bounds(points_m) else { return 1.0 };
+        let extent_m = (high.x - low.x).max(high.y - low.y);
+        let spacing_m = round_length(extent_m / 6.0);
+        let height_m = ground_height_m(points_m);
+        let cells = |from: f64, to: f64| ((from / spacing_m).floor() as i64 - 1)..=((to / spacing_m).ceil() as i64 + 1);
+        let (columns, rows) = (cells(low.x, high.x), cells(low.y, high.y));
+        let color = mix(self.theme.grid, self.theme.outline, 0.35);
+        let strong = mix(self.theme.grid, self.theme.outline, 1.0);
+        let ink = |index: i64| if index.rem_euclid(5) == 0 { strong } else { color };
+        let place = |column: i64, row: i64| Vector3::new(column as f64 * spacing_m, row as f64 * spacing_m, height_m);
+        for column in columns.clone() {
+            let (from, to) = (place(column, *rows.start()), place(column, *rows.end()));
+            self.scene.segment(from, to, ink(column), 1.0);
+        }
+        for row in rows.clone() {
+            let (from, to) = (place(*columns.start(), row), place(*columns.end(), row));
+            self.scene.segment(from, to, ink(row), 1.0);
+        }
+        spacing_m
+    }
+
+    /// The true trajectory up to the cursor.
+    pub(super) fn truth(&mut self, view: &RunView<'_>) {
+        let style = self.theme.truth_style();
+        for line in view.truth_m() {
+            self.scene.line(line, style.color, 1.5, style.dashes);
+        }
+    }
+
+    /// A run's trajectory and its newest camera.
+    pub(super) fn run(&mut self, view: &RunView<'_>, camera: Option<&CameraModel>, image: Option<Arc<GrayImage>>) {
+        let style = self.theme.run(view.number);
+        for line in view.trajectory_m() {
+            self.scene.line(line, style.color, 2.0, style.dashes);
+        }
+        let Some(frame) = view.newest() else { return };
+        let world_from_imu = view.aligned * frame.world_from_imu;
+        let world_from_camera = world_from_imu * frame.imu_from_camera;
+        self.scene.label(world_from_imu.translation_m, view.run.spec.label.clone(), style.color);
+        self.scene.axes(&world_from_imu, 0.05 * self.view_distance_m, axis_colors(self.theme), 2.5);
+        if let Some(camera) = camera {
+            let depth_m = if image.is_some() { 0.13 } else { 0.08 } * self.view_distance_m;
+            let image = image.filter(|_| self.options.image);
+            self.frustum(&world_from_camera, camera, depth_m, style.color, 1.8, image);
+        }
+    }
+
+    /// What only the selected run shows: window, landmarks, height over the ground.
+    pub(super) fn details(&mut self, view: &RunView<'_>, camera: Option<&CameraModel>, ground_height_m: f64) {
+        let Some(step) = view.run.steps[..view.shown].last() else { return };
+        if self.options.landmarks {
+            self.landmarks(view);
+        }
+        let color = self.theme.run(view.number).color;
+        let faint = mix(self.theme.plot_background, color, 0.5);
+        if self.options.keyframes
+            && let Some((_, older)) = step.report.window.split_last()
+        {
+            for frame in older {
+                let world_from_imu = view.aligned * frame.world_from_imu;
+                self.dot(world_from_imu.translation_m, color, if frame.keyframe { 3.0 } else { 2.0 });
+                if let Some(camera) = camera.filter(|_| frame.keyframe) {
+                    let pose = world_from_imu * frame.imu_from_camera;
+                    self.frustum(&pose, camera, 0.03 * self.view_distance_m, faint, 1.0, None);
+                }
+            }
+        }
+        if let Some(frame) = view.newest() {
+            let at = (view.aligned * frame.world_from_imu).translation_m;
+            let foot = Vector3::new(at.x, at.y, ground_height_m);
+            self.scene.line(vec![at, foot], faint, 1.0, &[2.0, 3.0]);
+            self.dot(foot, faint, 2.5);
+        }
+    }
+
+    fn dot(&mut self, position_m: Vector3<f64>, color: Color32, radius: f32) {
+        self.scene.dots.push(Dot { position_m, color, radius });
+    }
+
+    /// Landmarks of the step at the cursor, and fainter those of earlier steps; viridis over their height.
+    fn landmarks(&mut self, view: &RunView<'_>) {
+        let steps = &view.run.steps[..view.shown];
+        let Some((now, _)) = steps.split_last() else { return };
+        let mut stride = 4;
+        while steps.len() / stride > MOST_LANDMARK_STEPS {
+            stride *= 2;
+        }
+        let mut latest: Vec<(u64, usize, Vector3<f64>)> = Vec::new();
+        let mut take = |age: usize, landmarks: &[LandmarkReport]| {
+            latest.extend(landmarks.iter().map(|landmark| (landmark.id.0, age, landmark.position_m)));
+        };
+        take(0, &now.report.landmarks);
+        for (index, step) in steps.iter().enumerate().rev().filter(|(index, _)| index.is_multiple_of(stride)) {
+            take(steps.len() - index, &step.report.landmarks);
+        }
+        latest.sort_by_key(|(id, age, _)| (*id, *age));
+        latest.dedup_by_key(|(id, _, _)| *id);
+        latest.retain(|(_, _, position)| position.iter().all(|coordinate| coordinate.is_finite()));
+        latest.sort_by_key(|(id, age, _)| (*age > 0, std::cmp::Reverse(*id)));
+        latest.truncate(MOST_LANDMARKS);
+        for (_, _, position) in &mut latest {
+            *position = view.aligned.transform(position);
+        }
+        self.height_range_m = height_range_m(latest.iter().map(|(_, _, position)| position.z));
+        let Some((low_m, high_m)) = self.height_range_m else { return };
+        for (_, age, position_m) in latest {
+            let color = theme::viridis((position_m.z - low_m) / (high_m - low_m).max(1e-6));
+            if age == 0 {
+                self.dot(position_m, color, 2.0);
+            } else {
+                self.dot(position_m, mix(self.theme.plot_background, color, 0.55), 1.2);
+            }
+        }
+    }
+
+    /// A camera's pyramid of view, with the image at its far end.
+    fn frustum(
+        &mut self,
+        world_from_camera: &RigidTransform,
+        camera: &CameraModel,
+        depth_m: f64,
+        color: Color32,
+        width: f32,
+        image: Option<Arc<GrayImage>>,
+    ) {
+        let corners_m = frustum_corners(camera).map(|corner| world_from_camera.transform(&(corner * depth_m)));
+        let apex = world_from_camera.translation_m;
+        for (index, corner) in corners_m.iter().enumerate() {
+            self.scene.segment(apex, *corner, color, width);
+            self.scene.segment(*corner, corners_m[(index + 1) % 4], color, width);
+        }
+        // A small roof marks the image's upper side.
+        let [left, right] = [corners_m[0], corners_m[1]];
+        let above = (corners_m[0] - corners_m[3]) * 0.18 + (left + right) * 0.5;
+        self.scene.line(vec![left + (right - left) * 0.35, above, left + (right - left) * 0.65], color, width, &[]);
+        if let Some(image) = image {
+            self.scene.pictures.push(Picture { corners_m, image });
+        }
+    }
+}
+
+/// Heights between which most landmarks lie, in metres.
+fn height_range_m(heights_m: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    let mut heights: Vec<f64> = heights_m.collect();
+    heights.sort_by(f64::total_cmp);
+    let last = heights.len().checked_sub(1)?;
+    Some((heights[last / 50], heights[last - last / 50]))
+}
+
+/// The image's corners at unit depth: top left, top right, bottom right, bottom left.
+fn frustum_corners(camera: &CameraModel) -> [Vector3<f64>; 4] {
+    let [width, height] = camera.resolution_px.map(|side| side as f64 - 0.5);
+    let [fx, fy, cx, cy] = camera.intrinsics_px;
+    [(-0.5, -0.5), (width, -0.5), (width, height), (-0.5, height)].map(|(u, v)| {
+        let bearing = camera.unproject(&Vector2::new(u, v)).filter(|bearing| bearing.z > 0.1);
+        // Wide lenses see behind the image plane; there the pinhole's corner must do.
+        bearing.map_or_else(|| Vector3::new((u - cx) / fx, (v - cy) / fy, 1.0), |bearing| bearing / bearing.z)
+    })
+}

@@ -1,0 +1,193 @@
+//! Painting one lane after the other.
+
+use egui::{Align2, Color32, FontFamily, FontId, Painter, Rect, Stroke, pos2, vec2};
+
+use super::model::{FEATURES, INFORMED, RMS, RunLanes, STRUCTURAL};
+use crate::gui::PanelContext;
+use crate::gui::events::{Mark, look_of, paint_mark};
+use crate::gui::plot::{Curve, PlotArea, paint_curve, paint_hatch, paint_steps, stretches_where};
+use crate::gui::theme::{self, RunStyle, Theme};
+use crate::gui::units::fixed;
+
+/// A lane.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Lane {
+    /// Phases and keyframes of a run.
+    Run(usize),
+    /// Rare events of all runs.
+    Events,
+    /// Informed rank.
+    Rank,
+    /// Number of tracked features.
+    Features,
+    /// Reprojection RMS.
+    Reprojection,
+    /// Rejected outliers.
+    Outliers,
+    /// Warnings of the log (gaps and the like) and of steps.
+    Warnings,
+}
+
+impl Lane {
+    /// Its name beside the lane.
+    pub(crate) fn name(self, ctx: &PanelContext<'_>) -> String {
+        match self {
+            Self::Run(run) => ctx.recording.runs.get(run).map_or_else(String::new, |run| run.spec.label.clone()),
+            Self::Events => "events".to_owned(),
+            Self::Rank => "informed rank".to_owned(),
+            Self::Features => "features".to_owned(),
+            Self::Reprojection => "reprojection px".to_owned(),
+            Self::Outliers => "outliers".to_owned(),
+            Self::Warnings => "warnings".to_owned(),
+        }
+    }
+
+    /// Its value at the cursor in a run.
+    pub(crate) fn value(self, lanes: &RunLanes, cursor_ns: i64) -> Option<String> {
+        match self {
+            Self::Rank => lanes.at(INFORMED, cursor_ns).map(|value| fixed(value, 0)),
+            Self::Features => lanes.at(FEATURES, cursor_ns).map(|value| fixed(value, 0)),
+            Self::Reprojection => lanes.at(RMS, cursor_ns).map(|value| fixed(value, 2)),
+            Self::Run(_) | Self::Events | Self::Outliers | Self::Warnings => None,
+        }
+    }
+
+    /// The column of the runs' tables that it plots.
+    pub(crate) fn column(self) -> Option<usize> {
+        match self {
+            Self::Rank => Some(INFORMED),
+            Self::Features => Some(FEATURES),
+            Self::Reprojection => Some(RMS),
+            Self::Run(_) | Self::Events | Self::Outliers | Self::Warnings => None,
+        }
+    }
+}
+
+/// The phases of a run as a bar, keyframes as ticks in it; what is not computed yet stays empty.
+pub(super) fn run(painter: &Painter, theme: &Theme, area: &PlotArea, lanes: &RunLanes, style: RunStyle) {
+    let bar = area.rect.shrink2(vec2(0.0, 4.0));
+    let stretch =
+        |begin_ns, end_ns| Rect::from_x_y_ranges(area.x(begin_ns)..=area.x(end_ns), bar.y_range()).intersect(bar);
+    for (begin_ns, end_ns) in stretches_where(&lanes.stamps_ns, |row| !lanes.tracking[row]) {
+        let rect = stretch(begin_ns, end_ns);
+        painter.rect_filled(rect, 0.0, style.color.gamma_multiply(0.12));
+        paint_hatch(painter, rect, style.color.gamma_multiply(0.5));
+        if rect.width() > 64.0 {
+            let font = FontId::new(9.5, FontFamily::Proportional);
+            let galley = painter.layout_no_wrap("initializing".to_owned(), font, theme.text_strong);
+            let place = rect.left_center() + vec2(4.0, -galley.size().y / 2.0);
+            let ground = Rect::from_min_size(place, galley.size()).expand2(vec2(2.0, -1.0));
+            painter.rect_filled(ground, 2.0, theme.plot_background.gamma_multiply(0.85));
+            painter.galley(place, galley, theme.text_strong);
+        }
+    }
+    for (begin_ns, end_ns) in stretches_where(&lanes.stamps_ns, |row| lanes.tracking[row]) {
+        painter.rect_filled(stretch(begin_ns, end_ns), 0.0, style.color.gamma_multiply(0.4));
+    }
+    let tick = Stroke::new(1.0, style.color);
+    each_pixel(area, lanes.keyframes_ns.iter().copied(), |x| {
+        painter.vline(x, bar.bottom() - 4.0..=bar.bottom(), tick);
+    });
+}
+
+/// Calls for each stamp in range, once per pixel column.
+fn each_pixel(area: &PlotArea, stamps_ns: impl Iterator<Item = i64>, mut paint: impl FnMut(f32)) {
+    let mut last = f32::NEG_INFINITY;
+    for stamp_ns in stamps_ns.filter(|stamp_ns| (area.begin_ns..=area.end_ns).contains(stamp_ns)) {
+        let x = area.x(stamp_ns).round() + 0.5;
+        if x > last {
+            paint(x);
+            last = x;
+        }
+    }
+}
+
+/// Rare events as signs.
+pub(super) fn events(painter: &Painter, theme: &Theme, area: &PlotArea, runs: &[RunLanes]) {
+    for (number, lanes) in runs.iter().enumerate() {
+        let rise = if runs.len() > 1 { number as f32 / (runs.len() - 1) as f32 - 0.5 } else { 0.0 };
+        for event in &lanes.events {
+            if (area.begin_ns..=area.end_ns).contains(&event.stamp_ns) {
+                let (mark, color) = look_of(event.kind, theme);
+                let center = pos2(area.x(event.stamp_ns), area.rect.center().y + rise * (area.rect.height() - 9.0));
+                paint_mark(painter, mark, center, 9.0, color);
+            }
+        }
+    }
+}
+
+/// A figure of all runs as curves; whole numbers as steps.
+pub(super) fn figures(
+    painter: &Painter,
+    theme: &Theme,
+    area: &PlotArea,
+    lane: Lane,
+    runs: &[RunLanes],
+    curves: &mut Vec<Curve>,
+) {
+    let Some(column) = lane.column() else { return };
+    curves.resize_with(runs.len(), Curve::default);
+    let mut most = 0.0_f64;
+    for (lanes, curve) in runs.iter().zip(curves.iter_mut()) {
+        curve.update(area, lanes.epoch, &lanes.stamps_ns, &lanes.columns[column]);
+        most = most.max(curve.extent.map_or(0.0, |(_, most)| most));
+        if lane == Lane::Rank {
+            most = lanes.columns[STRUCTURAL].iter().copied().filter(|value| value.is_finite()).fold(most, f64::max);
+        }
+    }
+    let area = area.with_values(0.0, if most > 0.0 { most * 1.15 } else { 1.0 });
+    for (run, curve) in curves.iter().enumerate() {
+        let style = theme.run(run);
+        if lane == Lane::Reprojection {
+            paint_curve(painter, &area, curve, style, 1.2);
+        } else {
+            paint_steps(painter, &area, curve, style, 1.2);
+        }
+    }
+}
+
+/// Rejected outliers: a line as high as their number.
+pub(super) fn outliers(painter: &Painter, theme: &Theme, area: &PlotArea, runs: &[RunLanes]) {
+    let most = runs.iter().flat_map(|lanes| &lanes.rejected).map(|(_, count)| *count).max().unwrap_or(1);
+    for (run, lanes) in runs.iter().enumerate() {
+        let color = theme.run(run).color;
+        for (stamp_ns, count) in &lanes.rejected {
+            if (area.begin_ns..=area.end_ns).contains(stamp_ns) {
+                let height = (area.rect.height() - 3.0) * *count as f32 / most as f32;
+                let (x, foot) = (area.x(*stamp_ns), area.rect.bottom() - 1.0);
+                painter.vline(x, foot - height..=foot, Stroke::new(1.0, color));
+            }
+        }
+    }
+}
+
+/// Warnings of the log and of the steps.
+pub(super) fn warnings(painter: &Painter, theme: &Theme, area: &PlotArea, log_ns: &[i64], runs: &[RunLanes]) {
+    let step_ns = runs.iter().flat_map(|lanes| &lanes.warnings).map(|(stamp_ns, _)| *stamp_ns);
+    let place = |stamp_ns: i64, mark: Mark, color: Color32| {
+        if (area.begin_ns..=area.end_ns).contains(&stamp_ns) {
+            paint_mark(painter, mark, pos2(area.x(stamp_ns), area.rect.center().y), 9.0, color);
+        }
+    };
+    for stamp_ns in step_ns {
+        place(stamp_ns, Mark::Disc, theme.warn);
+    }
+    for stamp_ns in log_ns {
+        place(*stamp_ns, Mark::Square, theme.warn);
+    }
+}
+
+/// The name of a lane with its value at the cursor.
+pub(super) fn label(painter: &Painter, theme: &Theme, rect: Rect, name: &str, value: Option<String>, color: Color32) {
+    let clipped = painter.with_clip_rect(rect.intersect(painter.clip_rect()));
+    let mut right = rect.right() - 4.0;
+    if let Some(value) = value {
+        let place = pos2(right, rect.center().y);
+        right = painter.text(place, Align2::RIGHT_CENTER, value, theme::number_font(), theme.text_strong).left() - 4.0;
+    }
+    let font = theme::label_font();
+    let galley = clipped.layout_no_wrap(name.to_owned(), font, color);
+    let room = Rect::from_min_max(rect.min, pos2(right, rect.bottom()));
+    let place = pos2(rect.left() + 2.0, rect.center().y - galley.size().y / 2.0);
+    painter.with_clip_rect(room.intersect(painter.clip_rect())).galley(place, galley, color);
+}

@@ -1,0 +1,218 @@
+//! The timeline: lanes over the whole log, and the cursor that all panels follow.
+
+mod lanes;
+mod model;
+mod transport;
+
+pub(crate) use transport::toggled_loop;
+
+use egui::{Align2, FontFamily, FontId, PointerButton, Rect, Response, Stroke, Ui, pos2, vec2};
+
+use self::lanes::Lane;
+use self::model::RunLanes;
+use super::PanelContext;
+use super::events::name_of;
+use super::plot::{Clicks, Curve, PlotArea, decimals_of_step, navigate, paint_ground, ticks, visible_range};
+use super::theme::{LANE_HEIGHT, LANE_LABEL_WIDTH, Theme};
+use super::units::{fixed, seconds};
+use crate::geometry::seconds_from_ns;
+use crate::session::Command;
+
+const RULER_HEIGHT: f32 = 16.0;
+
+/// State of the timeline.
+#[derive(Debug, Default)]
+pub struct TimelinePanel {
+    runs: Vec<RunLanes>,
+    /// Curves of the lanes that plot figures, by lane: rank, features, reprojection.
+    curves: [Vec<Curve>; 3],
+    /// Where a range was begun with Shift.
+    range_begin_ns: Option<i64>,
+}
+
+impl TimelinePanel {
+    /// Height that shows the transport and all lanes of so many runs.
+    pub fn height_for(runs: usize) -> f32 {
+        transport::HEIGHT + RULER_HEIGHT + LANE_HEIGHT * (runs + 6) as f32 + 10.0
+    }
+
+    /// Draws the panel.
+    pub fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
+        self.runs.resize_with(ctx.recording.runs.len(), RunLanes::default);
+        for (lanes, run) in self.runs.iter_mut().zip(&ctx.recording.runs) {
+            lanes.read(run);
+        }
+        transport::ui(ui, ctx);
+        let rect = ui.available_rect_before_wrap();
+        let left = (rect.left() + LANE_LABEL_WIDTH).min(rect.center().x);
+        let plot = Rect::from_min_max(pos2(left, rect.top()), rect.max - vec2(4.0, 0.0));
+        if plot.width() < 8.0 || plot.height() < RULER_HEIGHT {
+            return;
+        }
+        // The lanes take all the room there is, so that the panel around them keeps its height.
+        ui.advance_cursor_after_rect(rect);
+        let (begin_ns, end_ns) = visible_range(ctx);
+        let area = PlotArea { rect: plot, begin_ns, end_ns, low: 0.0, high: 1.0 };
+        let theme = *ctx.theme;
+        let painter = ui.painter_at(rect);
+        paint_ruler(&painter, &theme, &area);
+
+        let shown: Vec<Lane> = (0..self.runs.len())
+            .map(Lane::Run)
+            .chain([Lane::Events, Lane::Rank, Lane::Features, Lane::Reprojection, Lane::Outliers, Lane::Warnings])
+            .collect();
+        let lanes_height = plot.height() - RULER_HEIGHT;
+        let height = (lanes_height / shown.len() as f32).clamp(11.0, 1.6 * LANE_HEIGHT);
+        for (place, lane) in shown.iter().enumerate() {
+            let top = plot.top() + RULER_HEIGHT + place as f32 * height;
+            if top + height > rect.bottom() + 1.0 {
+                break;
+            }
+            let lane_rect = Rect::from_min_size(pos2(plot.left(), top), vec2(plot.width(), height - 2.0));
+            let label_rect = Rect::from_min_max(pos2(rect.left(), top), pos2(plot.left(), top + height - 2.0));
+            self.lane(ui, ctx, *lane, PlotArea { rect: lane_rect, ..area }, label_rect);
+        }
+        paint_range(&painter, ctx, &area);
+        paint_markers(&painter, &theme, &area, &ctx.playback.markers_ns);
+        paint_cursor(&painter, &theme, &area, ctx.cursor_ns);
+
+        let id = ui.unique_id().with("timeline");
+        let response = navigate(ui, ctx, &area, id, "Timeline", Clicks::Seek, true);
+        self.select_range(ui, ctx, &area, &response);
+        self.hover(ui, ctx, &area, response);
+    }
+
+    fn lane(&mut self, ui: &Ui, ctx: &PanelContext<'_>, lane: Lane, area: PlotArea, label_rect: Rect) {
+        let theme = *ctx.theme;
+        let painter = ui.painter_at(area.rect.union(label_rect));
+        let inner = painter.with_clip_rect(area.rect.intersect(painter.clip_rect()));
+        paint_ground(&painter, &theme, area.rect);
+        match lane {
+            Lane::Run(run) => {
+                if let Some(lanes) = self.runs.get(run) {
+                    lanes::run(&inner, &theme, &area, lanes, theme.run(run));
+                }
+            }
+            Lane::Events => lanes::events(&inner, &theme, &area, &self.runs),
+            Lane::Rank => lanes::figures(&inner, &theme, &area, lane, &self.runs, &mut self.curves[0]),
+            Lane::Features => lanes::figures(&inner, &theme, &area, lane, &self.runs, &mut self.curves[1]),
+            Lane::Reprojection => lanes::figures(&inner, &theme, &area, lane, &self.runs, &mut self.curves[2]),
+            Lane::Outliers => lanes::outliers(&inner, &theme, &area, &self.runs),
+            Lane::Warnings => {
+                let stamps_ns: Vec<i64> = ctx.recording.warnings.iter().map(|warning| warning.stamp_ns).collect();
+                lanes::warnings(&inner, &theme, &area, &stamps_ns, &self.runs);
+            }
+        }
+        let selected = ctx.selection.run.min(self.runs.len().saturating_sub(1));
+        let value = self.runs.get(selected).and_then(|run| lane.value(run, ctx.cursor_ns));
+        let color = match lane {
+            Lane::Run(run) => theme.run(run).color,
+            _ => theme.text_weak,
+        };
+        lanes::label(&painter, &theme, label_rect, &lane.name(ctx), value, color);
+    }
+
+    /// Shift and drag sets the range that is played over and over.
+    fn select_range(&mut self, ui: &Ui, ctx: &mut PanelContext<'_>, area: &PlotArea, response: &Response) {
+        let shift = ui.input(|input| input.modifiers.shift);
+        let Some(pointer) = response.interact_pointer_pos() else {
+            self.range_begin_ns = None;
+            return;
+        };
+        let stamp_ns = area.stamp_ns_at(pointer.x).clamp(0, ctx.recording.duration_ns.max(0));
+        if response.drag_started_by(PointerButton::Primary) && shift {
+            self.range_begin_ns = Some(stamp_ns);
+        } else if let Some(begin_ns) = self.range_begin_ns.filter(|begin_ns| *begin_ns != stamp_ns) {
+            ctx.commands.push(Command::SetLoop(Some((begin_ns.min(stamp_ns), begin_ns.max(stamp_ns)))));
+        }
+    }
+
+    /// Says what lies under the pointer.
+    fn hover(&self, ui: &Ui, ctx: &PanelContext<'_>, area: &PlotArea, response: Response) {
+        const REACH: f32 = 5.0;
+        let Some(pointer) = response.hover_pos() else { return };
+        let stamp_ns = area.stamp_ns_at(pointer.x);
+        ui.painter_at(area.rect).vline(pointer.x, area.rect.y_range(), Stroke::new(1.0, ctx.theme.outline));
+        let reach_ns = area.stamp_ns_at(pointer.x + REACH) - stamp_ns;
+        let near = |other_ns: i64| (other_ns - stamp_ns).abs() <= reach_ns;
+        let mut text = format!("{} s", seconds(stamp_ns));
+        let mut lines = 0;
+        let mut say = |line: String| {
+            lines += 1;
+            if lines <= 8 {
+                text.push('\n');
+                text.push_str(&line);
+            }
+        };
+        for (run, lanes) in ctx.recording.runs.iter().zip(&self.runs) {
+            for event in lanes.events.iter().filter(|event| near(event.stamp_ns)) {
+                let message = run.steps.get(event.step).and_then(|step| step.report.events.get(event.event));
+                let message = message.map_or("", |event| event.message.as_str());
+                say(format!("{}: {}, {message}", run.spec.label, name_of(event.kind)));
+            }
+            for (_, step) in lanes.warnings.iter().filter(|(stamp_ns, _)| near(*stamp_ns)) {
+                for warning in run.steps.get(*step).iter().flat_map(|step| &step.report.warnings) {
+                    say(format!("{}: {warning}", run.spec.label));
+                }
+            }
+        }
+        for warning in ctx.recording.warnings.iter().filter(|warning| near(warning.stamp_ns)) {
+            say(warning.message.clone());
+        }
+        response.on_hover_text_at_pointer(text);
+    }
+}
+
+/// The range that is played over and over.
+fn paint_range(painter: &egui::Painter, ctx: &PanelContext<'_>, area: &PlotArea) {
+    if let Some((begin_ns, end_ns)) = ctx.playback.loop_range_ns {
+        let rect = Rect::from_x_y_ranges(area.x(begin_ns)..=area.x(end_ns), area.rect.y_range());
+        let rect = rect.intersect(area.rect);
+        if rect.width() > 0.0 {
+            painter.rect_filled(rect, 0.0, ctx.theme.accent.gamma_multiply(0.13));
+            let edge = Stroke::new(1.0, ctx.theme.accent);
+            painter.vline(rect.left(), rect.y_range(), edge);
+            painter.vline(rect.right(), rect.y_range(), edge);
+        }
+    }
+}
+
+/// Seconds along the upper edge, with a line under each through the lanes.
+fn paint_ruler(painter: &egui::Painter, theme: &Theme, area: &PlotArea) {
+    let (begin_s, end_s) = (seconds_from_ns(area.begin_ns), seconds_from_ns(area.end_ns));
+    let (marks, step) = ticks(begin_s, end_s, ((area.rect.width() / 70.0) as usize).max(1));
+    for mark in marks {
+        let x = area.x((mark * 1e9).round() as i64).round() + 0.5;
+        painter.vline(x, area.rect.top() + RULER_HEIGHT - 4.0..=area.rect.bottom(), Stroke::new(1.0, theme.grid));
+        let text = format!("{} s", fixed(mark, decimals_of_step(step)));
+        let font = FontId::new(9.5, FontFamily::Monospace);
+        let align = if x + 24.0 > area.rect.right() {
+            Align2::RIGHT_TOP
+        } else if x - 16.0 < area.rect.left() {
+            Align2::LEFT_TOP
+        } else {
+            Align2::CENTER_TOP
+        };
+        painter.text(pos2(x, area.rect.top()), align, text, font, theme.text_weak);
+    }
+}
+
+fn paint_markers(painter: &egui::Painter, theme: &Theme, area: &PlotArea, markers_ns: &[i64]) {
+    for stamp_ns in markers_ns.iter().filter(|stamp_ns| (area.begin_ns..=area.end_ns).contains(stamp_ns)) {
+        let x = area.x(*stamp_ns);
+        painter.vline(x, area.rect.y_range(), Stroke::new(1.0, theme.ok.gamma_multiply(0.7)));
+        let flag = vec![pos2(x, area.rect.top()), pos2(x + 8.0, area.rect.top() + 4.0), pos2(x, area.rect.top() + 8.0)];
+        painter.add(egui::Shape::convex_polygon(flag, theme.ok, Stroke::NONE));
+    }
+}
+
+fn paint_cursor(painter: &egui::Painter, theme: &Theme, area: &PlotArea, cursor_ns: i64) {
+    let x = area.x(cursor_ns);
+    if !area.rect.x_range().expand(1.0).contains(x) {
+        return;
+    }
+    let top = area.rect.top();
+    painter.vline(x, top..=area.rect.bottom(), Stroke::new(1.5, theme.cursor));
+    let head = vec![pos2(x - 5.0, top), pos2(x + 5.0, top), pos2(x, top + 8.0)];
+    painter.add(egui::Shape::convex_polygon(head, theme.cursor, Stroke::NONE));
+}

@@ -1,0 +1,121 @@
+//! What the lanes of the timeline show, read from the steps as they come.
+
+use crate::estimator::{EventKind, Phase};
+use crate::gui::events::is_notable;
+use crate::gui::follow::Follower;
+use crate::gui::residuals::rms_px;
+use crate::session::RunRecord;
+
+/// An event and where to find it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct TimedEvent {
+    /// When, since the log began.
+    pub(crate) stamp_ns: i64,
+    /// What kind.
+    pub(crate) kind: EventKind,
+    /// Number of the step in the run.
+    pub(crate) step: usize,
+    /// Number of the event in the step.
+    pub(crate) event: usize,
+}
+
+/// Columns of a run's table.
+pub(crate) const FEATURES: usize = 0;
+pub(crate) const RMS: usize = 1;
+pub(crate) const INFORMED: usize = 2;
+pub(crate) const STRUCTURAL: usize = 3;
+/// Number of columns.
+pub(crate) const COLUMNS: usize = 4;
+
+/// One run over time.
+#[derive(Debug, Default)]
+pub(crate) struct RunLanes {
+    follower: Follower,
+    /// Stamps of the steps.
+    pub(crate) stamps_ns: Vec<i64>,
+    /// Figures of the steps, not-a-number where there are none.
+    pub(crate) columns: [Vec<f64>; COLUMNS],
+    /// Whether each step tracked.
+    pub(crate) tracking: Vec<bool>,
+    /// Stamps of keyframes.
+    pub(crate) keyframes_ns: Vec<i64>,
+    /// Rare events.
+    pub(crate) events: Vec<TimedEvent>,
+    /// Steps that rejected outliers: stamp and number of features.
+    pub(crate) rejected: Vec<(i64, usize)>,
+    /// Steps with warnings.
+    pub(crate) warnings: Vec<(i64, usize)>,
+    /// Changes when steps were forgotten.
+    pub(crate) epoch: u64,
+}
+
+impl RunLanes {
+    /// Reads the steps that have come since the last call.
+    pub(crate) fn read(&mut self, run: &RunRecord) {
+        let news = self.follower.news(run);
+        if news.restarted {
+            let epoch = self.epoch + 1;
+            *self = Self { follower: std::mem::take(&mut self.follower), epoch, ..Self::default() };
+        }
+        for step in news.steps {
+            let report = &step.report;
+            let (stamp_ns, number) = (report.stamp_ns, self.stamps_ns.len());
+            self.stamps_ns.push(stamp_ns);
+            self.tracking.push(report.phase == Phase::Tracking);
+            let rank = step.rank.as_ref().filter(|rank| !rank.names.is_empty());
+            let row = [
+                step.tracks.features.len() as f64,
+                rms_px(report),
+                rank.map_or(f64::NAN, |rank| rank.rank_informed as f64),
+                rank.map_or(f64::NAN, |rank| rank.rank_structural as f64),
+            ];
+            for (column, value) in self.columns.iter_mut().zip(row) {
+                column.push(value);
+            }
+            if report.keyframe {
+                self.keyframes_ns.push(stamp_ns);
+            }
+            let rejected = report.features.iter().filter(|feature| feature.rejected).count();
+            if rejected > 0 {
+                self.rejected.push((stamp_ns, rejected));
+            }
+            if !report.warnings.is_empty() {
+                self.warnings.push((stamp_ns, number));
+            }
+            let events = report.events.iter().enumerate().filter(|(_, event)| is_notable(event.kind));
+            self.events.extend(events.map(|(event, one)| TimedEvent { stamp_ns, kind: one.kind, step: number, event }));
+        }
+    }
+
+    /// The value of a column at the last step at or before a time.
+    pub(crate) fn at(&self, column: usize, stamp_ns: i64) -> Option<f64> {
+        let row = self.stamps_ns.partition_point(|stamp| *stamp <= stamp_ns).checked_sub(1)?;
+        self.columns[column].get(row).copied().filter(|value| value.is_finite())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gui::sample_recording::{FIRST_TRACKED_FRAME, sample_recording_of};
+
+    #[test]
+    fn lanes_hold_what_the_steps_said() {
+        let recording = sample_recording_of(FIRST_TRACKED_FRAME + 20, &["auto"]);
+        let run = &recording.runs[0];
+        let mut lanes = RunLanes::default();
+        lanes.read(run);
+        lanes.read(run);
+        assert_eq!(lanes.stamps_ns.len(), run.steps.len());
+        assert_eq!(lanes.tracking.iter().filter(|tracking| **tracking).count(), 20);
+        let initialized = lanes.events.iter().find(|event| event.kind == EventKind::InitializedFromMotion).unwrap();
+        assert_eq!(initialized.step, FIRST_TRACKED_FRAME);
+        assert!(lanes.keyframes_ns.len() > 2);
+        assert_eq!(lanes.at(INFORMED, 0), None);
+        assert!(lanes.at(FEATURES, recording.duration_ns).unwrap() > 60.0);
+        let mut other = run.clone();
+        other.steps.truncate(3);
+        lanes.read(&other);
+        assert_eq!((lanes.stamps_ns.len(), lanes.epoch, lanes.events.len()), (3, 1, 0));
+    }
+}

@@ -1,0 +1,110 @@
+//! Play, pause, step, seek: the buttons above the lanes.
+
+use egui::{Button, ComboBox, RichText, Ui, vec2};
+
+use crate::gui::PanelContext;
+use crate::gui::units::{fixed, seconds};
+use crate::session::{Command, PlaybackSpeed};
+
+/// Height of the row of buttons.
+pub(super) const HEIGHT: f32 = 26.0;
+
+/// Speeds to choose from, in log seconds per second.
+const SPEEDS: [f64; 7] = [0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 10.0];
+
+/// Draws the buttons, the time, and how far the estimation has come.
+pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>) {
+    ui.horizontal(|ui| {
+        ui.set_height(HEIGHT - 4.0);
+        ui.spacing_mut().item_spacing.x = 3.0;
+        let playing = ctx.playback.playing;
+        let (icon, name) = if playing { ("⏸", "Pause") } else { ("▶", "Play") };
+        let buttons = [
+            ("⏮", "Go to start", "Home", Command::GoToStart),
+            ("⏪", "Previous event", "Ctrl+←", Command::JumpToEvent { forward: false }),
+            ("◀", "Step back", "←", Command::StepFrames(-1)),
+            (icon, name, "Space", Command::TogglePlay),
+            ("▶|", "Step", "→", Command::StepFrames(1)),
+            ("⏩", "Next event", "Ctrl+→", Command::JumpToEvent { forward: true }),
+            ("⏭", "Go to end", "End", Command::GoToEnd),
+        ];
+        for (icon, name, keys, command) in buttons {
+            if icon_button(ui, icon, name, keys, name == "Pause") {
+                ctx.commands.push(command);
+            }
+        }
+        ui.add_space(4.0);
+        speed_ui(ui, ctx);
+        loop_ui(ui, ctx);
+        let marked = ctx.playback.markers_ns.binary_search(&ctx.cursor_ns).is_ok();
+        if icon_button(ui, "⚑", "Marker", "M", marked) {
+            ctx.commands.push(Command::ToggleMarker);
+        }
+        ui.add_space(8.0);
+        time_ui(ui, ctx);
+        ui.add_space(12.0);
+        progress_ui(ui, ctx);
+    });
+}
+
+fn icon_button(ui: &mut Ui, icon: &str, name: &str, keys: &str, on: bool) -> bool {
+    let response = ui.add(Button::new(icon).selected(on).min_size(vec2(26.0, 20.0)));
+    response.widget_info(|| egui::WidgetInfo::selected(egui::Role::Button, true, on, name));
+    response.on_hover_text(format!("{name} ({keys})")).clicked()
+}
+
+fn speed_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>) {
+    let text = |speed: f64| format!("{speed}×");
+    let combo = ComboBox::from_id_salt("speed").width(52.0).selected_text(text(ctx.playback.speed));
+    let response = combo.show_ui(ui, |ui| {
+        for speed in SPEEDS {
+            if ui.selectable_label(ctx.playback.speed == speed, text(speed)).clicked() {
+                ctx.commands.push(Command::SetSpeed(PlaybackSpeed(speed)));
+            }
+        }
+    });
+    response.response.on_hover_text("Playback speed");
+}
+
+fn loop_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>) {
+    let on = ctx.playback.loop_range_ns.is_some();
+    if icon_button(ui, "🔁", "Loop", "L; Shift and drag over the lanes for a range", on) {
+        ctx.commands.push(toggled_loop(ctx));
+    }
+}
+
+/// Ends the loop, or begins one over what is visible.
+pub(crate) fn toggled_loop(ctx: &PanelContext<'_>) -> Command {
+    let range = ctx.playback.loop_range_ns.is_none().then(|| crate::gui::plot::visible_range(ctx));
+    Command::SetLoop(range)
+}
+
+/// The time at the cursor, the length of the log, and the number of the frame.
+fn time_ui(ui: &mut Ui, ctx: &PanelContext<'_>) {
+    let theme = ctx.theme;
+    ui.label(RichText::new(format!("{} s", seconds(ctx.cursor_ns))).monospace().size(14.0).color(theme.text_strong));
+    ui.label(RichText::new(format!("of {} s", seconds(ctx.recording.duration_ns))).monospace().color(theme.text_weak));
+    let run = ctx.recording.runs.get(ctx.selection.run.min(ctx.recording.runs.len().saturating_sub(1)));
+    if let Some(step) = run.and_then(|run| run.step_at(ctx.cursor_ns)) {
+        ui.add_space(8.0);
+        ui.label(RichText::new("frame").color(theme.text_weak));
+        ui.label(RichText::new(step.report.frame_index.to_string()).monospace().color(theme.text_strong));
+    }
+}
+
+/// How far each run has come, until all are done.
+fn progress_ui(ui: &mut Ui, ctx: &PanelContext<'_>) {
+    let theme = ctx.theme;
+    let duration_ns = ctx.recording.duration_ns.max(1);
+    for (number, run) in ctx.recording.runs.iter().enumerate().filter(|(_, run)| !run.finished) {
+        let computed_ns = run.steps.last().map_or(0, |step| step.report.stamp_ns);
+        let share = (computed_ns as f64 / duration_ns as f64).clamp(0.0, 1.0);
+        let text = format!(
+            "{} computed to {} s ({} %)",
+            run.spec.label,
+            fixed(computed_ns as f64 * 1e-9, 1),
+            fixed(100.0 * share, 0)
+        );
+        ui.label(RichText::new(text).color(theme.run(number).color));
+    }
+}

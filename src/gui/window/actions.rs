@@ -1,0 +1,154 @@
+//! What a key, a button or the command palette can do, in one table.
+
+use egui::{Key, KeyboardShortcut, Modifiers, Ui};
+
+use super::WindowState;
+use super::tiles::Preset;
+use crate::gui::PanelContext;
+use crate::gui::timeline::toggled_loop;
+use crate::session::Command;
+
+/// Something that a person can ask the window to do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Action {
+    /// Play or pause.
+    TogglePlay,
+    /// Move the cursor by so many frames.
+    Step(i64),
+    /// To the next or the previous event.
+    Event(bool),
+    /// To the first frame.
+    Start,
+    /// To the last computed frame.
+    End,
+    /// Loop over what is visible, or no longer.
+    Loop,
+    /// Set or clear a marker.
+    Marker,
+    /// Show the whole log in all plots.
+    WholeLog,
+    /// Forget the selection and close what is open.
+    Dismiss,
+    /// Show the next run in the panels that show one.
+    NextRun,
+    /// Open a log.
+    Open,
+    /// Add a run.
+    AddRun,
+    /// List all commands.
+    Palette,
+    /// List all shortcuts.
+    Shortcuts,
+    /// List the warnings.
+    Warnings,
+    /// Arrange the panels.
+    Layout(Preset),
+    /// Dark or light.
+    Theme,
+}
+
+/// One row of the table.
+pub(crate) struct Entry {
+    /// What it does.
+    pub(crate) action: Action,
+    /// In words.
+    pub(crate) name: &'static str,
+    /// The keys as a person reads them.
+    pub(crate) keys: &'static str,
+    shortcuts: &'static [(Modifiers, Key)],
+}
+
+const fn entry(
+    action: Action,
+    name: &'static str,
+    keys: &'static str,
+    shortcuts: &'static [(Modifiers, Key)],
+) -> Entry {
+    Entry { action, name, keys, shortcuts }
+}
+
+const NONE: Modifiers = Modifiers::NONE;
+const SHIFT: Modifiers = Modifiers::SHIFT;
+const CTRL: Modifiers = Modifiers::COMMAND;
+
+/// All actions; those with more modifiers come first, because keys match whatever else is held.
+pub(crate) const TABLE: &[Entry] = &[
+    entry(Action::Event(true), "Next event", "Ctrl+→", &[(CTRL, Key::ArrowRight)]),
+    entry(Action::Event(false), "Previous event", "Ctrl+←", &[(CTRL, Key::ArrowLeft)]),
+    entry(Action::Step(10), "Ten frames forward", "Shift+→", &[(SHIFT, Key::ArrowRight)]),
+    entry(Action::Step(-10), "Ten frames back", "Shift+←", &[(SHIFT, Key::ArrowLeft)]),
+    entry(Action::Open, "Open a log…", "Ctrl+O", &[(CTRL, Key::O)]),
+    entry(Action::Palette, "Command palette…", "Ctrl+P", &[(CTRL, Key::P)]),
+    entry(Action::TogglePlay, "Play or pause", "Space", &[(NONE, Key::Space)]),
+    entry(Action::Step(1), "One frame forward", "→", &[(NONE, Key::ArrowRight)]),
+    entry(Action::Step(-1), "One frame back", "←", &[(NONE, Key::ArrowLeft)]),
+    entry(Action::Start, "Go to start", "Home", &[(NONE, Key::Home)]),
+    entry(Action::End, "Go to end", "End", &[(NONE, Key::End)]),
+    entry(Action::Loop, "Loop over the visible range", "L", &[(NONE, Key::L)]),
+    entry(Action::Marker, "Set or clear a marker", "M", &[(NONE, Key::M)]),
+    entry(Action::WholeLog, "Show the whole log", "Z", &[(NONE, Key::Z)]),
+    entry(Action::NextRun, "Show the next run", "R", &[(NONE, Key::R)]),
+    entry(Action::AddRun, "Add a run…", "A", &[(NONE, Key::A)]),
+    entry(Action::Warnings, "List warnings", "W", &[(NONE, Key::W)]),
+    entry(Action::Theme, "Dark or light theme", "T", &[(NONE, Key::T)]),
+    entry(Action::Layout(Preset::Overview), "Layout: overview", "1", &[(NONE, Key::Num1)]),
+    entry(Action::Layout(Preset::Calibration), "Layout: calibration", "2", &[(NONE, Key::Num2)]),
+    entry(Action::Layout(Preset::FrontEnd), "Layout: front end", "3", &[(NONE, Key::Num3)]),
+    entry(Action::Layout(Preset::Scene), "Layout: scene", "4", &[(NONE, Key::Num4)]),
+    entry(Action::Shortcuts, "Shortcuts", "F1", &[(NONE, Key::F1)]),
+    entry(Action::Dismiss, "Clear the selection", "Escape", &[(NONE, Key::Escape)]),
+];
+
+/// Takes the actions whose keys were pressed; none while somebody types, and no bare keys while a widget has the focus.
+pub(crate) fn pressed(ui: &Ui) -> Vec<Action> {
+    if ui.egui_wants_keyboard_input() {
+        return Vec::new();
+    }
+    let focused = ui.memory(|memory| memory.focused().is_some());
+    let mut actions = Vec::new();
+    ui.input_mut(|input| {
+        for entry in TABLE {
+            for (modifiers, key) in entry.shortcuts {
+                // Space and the arrows belong to a focused widget; letters and the rest stay ours.
+                let widget_key = matches!(key, Key::Space | Key::ArrowLeft | Key::ArrowRight | Key::Home | Key::End);
+                if focused && *modifiers == NONE && widget_key {
+                    continue;
+                }
+                let shortcut = KeyboardShortcut::new(*modifiers, *key);
+                let foreign = (input.modifiers.alt || input.modifiers.command) && *modifiers == NONE;
+                if !foreign && input.consume_shortcut(&shortcut) {
+                    actions.push(entry.action);
+                }
+            }
+        }
+    });
+    actions
+}
+
+/// Does an action: commands for the session, state for the window.
+pub(crate) fn perform(action: Action, state: &mut WindowState, ctx: &mut PanelContext<'_>) {
+    match action {
+        Action::TogglePlay => ctx.commands.push(Command::TogglePlay),
+        Action::Step(frames) => ctx.commands.push(Command::StepFrames(frames)),
+        Action::Event(forward) => ctx.commands.push(Command::JumpToEvent { forward }),
+        Action::Start => ctx.commands.push(Command::GoToStart),
+        Action::End => ctx.commands.push(Command::GoToEnd),
+        Action::Loop => ctx.commands.push(toggled_loop(ctx)),
+        Action::Marker => ctx.commands.push(Command::ToggleMarker),
+        Action::WholeLog => ctx.selection.visible_ns = None,
+        Action::Dismiss => {
+            (ctx.selection.feature, ctx.selection.parameter) = (None, None);
+            state.close_dialogs();
+        }
+        Action::NextRun => {
+            ctx.selection.run = (ctx.selection.run + 1) % ctx.recording.runs.len().max(1);
+        }
+        Action::Open => state.open_dialog.show(),
+        Action::AddRun => state.add_run.show(),
+        Action::Palette => state.palette.show(),
+        Action::Shortcuts => state.shortcuts_open = !state.shortcuts_open,
+        Action::Warnings => state.notices.list_open = !state.notices.list_open,
+        Action::Layout(preset) => state.layout.arrange(preset),
+        Action::Theme => state.requests.push(super::WindowRequest::ToggleTheme),
+    }
+}

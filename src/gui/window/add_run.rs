@@ -1,0 +1,158 @@
+//! The dialog that adds a run over the same log.
+
+use egui::{ComboBox, Grid, Id, Modal, RichText, TextEdit, Ui, vec2};
+
+use super::dialog_frame;
+use crate::gui::PanelContext;
+use crate::session::{Command, RunSpec};
+
+/// What a parameterization is called on the command line, and what it is.
+const CHOICES: [(&str, &str); 6] = [
+    ("auto", "the minimal form in the chart that suits the mechanism"),
+    ("minimal", "the minimal form as printed"),
+    ("minimal-swapped", "the minimal form with the end block swapped"),
+    ("classical", "base, links and camera, with redundant directions"),
+    ("poe", "the chart-free product of exponentials"),
+    ("static", "the rigid camera of the rig"),
+];
+
+/// State of the dialog.
+#[derive(Debug)]
+pub struct AddRunDialog {
+    open: bool,
+    choice: usize,
+    encoder: bool,
+    calibrate: bool,
+    window: usize,
+    name: String,
+}
+
+impl Default for AddRunDialog {
+    fn default() -> Self {
+        let standard = RunSpec::default();
+        Self {
+            open: false,
+            choice: 3,
+            encoder: standard.encoder,
+            calibrate: standard.calibrate,
+            window: standard.window,
+            name: String::new(),
+        }
+    }
+}
+
+impl AddRunDialog {
+    /// Opens it.
+    pub fn show(&mut self) {
+        self.open = true;
+    }
+
+    /// Closes it.
+    pub fn hide(&mut self) {
+        self.open = false;
+    }
+
+    /// What it would add, as on the command line.
+    fn written(&self) -> String {
+        let mut options = Vec::new();
+        if !self.encoder {
+            options.push("encoder=off".to_owned());
+        }
+        if !self.calibrate {
+            options.push("calibrate=off".to_owned());
+        }
+        if self.window != RunSpec::default().window {
+            options.push(format!("window={}", self.window));
+        }
+        if !self.name.trim().is_empty() {
+            options.push(format!("name={}", self.name.trim()));
+        }
+        let name = CHOICES[self.choice].0;
+        if options.is_empty() { name.to_owned() } else { format!("{name}:{}", options.join(",")) }
+    }
+
+    /// Draws it; the run it makes joins the commands.
+    pub(crate) fn ui(&mut self, ui: &Ui, ctx: &mut PanelContext<'_>) {
+        if !self.open {
+            return;
+        }
+        let theme = *ctx.theme;
+        let modal = Modal::new(Id::unique("add run")).frame(dialog_frame(&theme));
+        let response = modal.show(ui.ctx(), |ui| {
+            ui.set_width(430.0);
+            ui.label(
+                RichText::new("Add a run over the same log and the same tracks").size(15.0).color(theme.text_strong),
+            );
+            ui.add_space(4.0);
+            self.fields_ui(ui, &theme);
+            let written = self.written();
+            let parsed: Result<RunSpec, _> = written.parse();
+            ui.add_space(6.0);
+            match &parsed {
+                Ok(_) => ui.label(RichText::new(format!("--run {written}")).monospace().color(theme.text_weak)),
+                Err(error) => ui.add(egui::Label::new(RichText::new(error.to_string()).color(theme.error)).wrap()),
+            };
+            ui.add_space(6.0);
+            let enter = ui.input(|input| input.key_pressed(egui::Key::Enter));
+            ui.horizontal(|ui| {
+                let add = ui.add_enabled(parsed.is_ok(), egui::Button::new("Add run")).clicked();
+                if let (true, Ok(spec)) = (add || enter, parsed) {
+                    ctx.commands.push(Command::AddRun(spec));
+                    self.open = false;
+                }
+                if ui.button("Cancel").clicked() {
+                    self.open = false;
+                }
+            });
+        });
+        if response.should_close() {
+            self.open = false;
+        }
+    }
+
+    fn fields_ui(&mut self, ui: &mut Ui, theme: &crate::gui::theme::Theme) {
+        Grid::new("add run").num_columns(2).spacing(vec2(12.0, 6.0)).show(ui, |ui| {
+            let name = ui.label("Parameterization");
+            let combo = ComboBox::from_id_salt("parameterization").width(260.0).selected_text(CHOICES[self.choice].0);
+            let shown = combo.show_ui(ui, |ui| {
+                for (number, (name, meaning)) in CHOICES.iter().enumerate() {
+                    ui.selectable_value(&mut self.choice, number, *name).on_hover_text(*meaning);
+                }
+            });
+            shown.response.labelled_by(name.id);
+            ui.end_row();
+            ui.label("");
+            ui.label(RichText::new(CHOICES[self.choice].1).color(theme.text_weak));
+            ui.end_row();
+            ui.label("Use");
+            ui.checkbox(&mut self.encoder, "Encoder readings");
+            ui.end_row();
+            ui.label("Estimate");
+            ui.checkbox(&mut self.calibrate, "Static calibration");
+            ui.end_row();
+            let name = ui.label("Keyframes in the window");
+            ui.add(egui::DragValue::new(&mut self.window).range(4..=30)).labelled_by(name.id);
+            ui.end_row();
+            let name = ui.label("Name");
+            let edit = TextEdit::singleline(&mut self.name).hint_text("as above").desired_width(260.0);
+            ui.add(edit).labelled_by(name.id);
+            ui.end_row();
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_choice_is_understood() {
+        for (choice, (name, _)) in CHOICES.iter().enumerate() {
+            let dialog = AddRunDialog { choice, encoder: false, window: 12, ..AddRunDialog::default() };
+            let spec: RunSpec = dialog.written().parse().unwrap();
+            assert_eq!(spec.parameterization.name(), *name);
+            assert!(!spec.encoder && spec.calibrate);
+            assert_eq!(spec.window, 12);
+        }
+    }
+}

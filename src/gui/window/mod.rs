@@ -1,0 +1,160 @@
+//! Everything inside the window: bars, panels, timeline, dialogs.
+//!
+//! The real window and the headless pictures draw the same [`window_ui`].
+
+mod actions;
+mod add_run;
+mod legend;
+mod notices;
+mod palette;
+mod status_bar;
+mod tiles;
+mod top_bar;
+
+use std::path::PathBuf;
+
+use egui::{CentralPanel, Frame, Margin, Panel, Ui};
+
+use self::actions::Action;
+pub use self::add_run::AddRunDialog;
+pub use self::legend::RunLegend;
+pub use self::notices::{NoticeLevel, Notices};
+pub use self::palette::CommandPalette;
+pub use self::tiles::Preset;
+use self::tiles::{Layout, Pane};
+use super::PanelContext;
+use super::convergence::ConvergencePanel;
+use super::image_panel::ImagePanel;
+use super::inspector::InspectorPanel;
+use super::open_dialog::OpenDialog;
+use super::rank::RankPanel;
+use super::residuals::ResidualsPanel;
+use super::theme::Theme;
+use super::timeline::TimelinePanel;
+
+/// What the window wants of the program, beyond what a session can do.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum WindowRequest {
+    /// Open a log.
+    OpenLog(PathBuf),
+    /// Dark when light, light when dark.
+    ToggleTheme,
+}
+
+/// The panels' own state.
+#[derive(Default)]
+pub struct Panels {
+    /// The camera's image.
+    pub image: ImagePanel,
+    /// Calibration over time.
+    pub convergence: ConvergencePanel,
+    /// Rank and null directions.
+    pub rank: RankPanel,
+    /// Residuals.
+    pub residuals: ResidualsPanel,
+    /// Numbers of what is selected.
+    pub inspector: InspectorPanel,
+}
+
+impl Panels {
+    fn pane_ui(&mut self, pane: Pane, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
+        match pane {
+            Pane::Image => self.image.ui(ui, ctx),
+            Pane::Scene => super::convergence::empty_ui(ui, "Scene"),
+            Pane::Convergence => self.convergence.ui(ui, ctx),
+            Pane::Rank => self.rank.ui(ui, ctx),
+            Pane::Residuals => self.residuals.ui(ui, ctx),
+            Pane::Inspector => self.inspector.ui(ui, ctx),
+        }
+    }
+}
+
+/// State of everything in the window that is not the session's.
+#[derive(Default)]
+pub struct WindowState {
+    /// The panels.
+    pub panels: Panels,
+    /// The timeline.
+    pub timeline: TimelinePanel,
+    /// Runs with their accuracy.
+    pub legend: RunLegend,
+    /// What went wrong, for people to see.
+    pub notices: Notices,
+    /// Adds a run.
+    pub add_run: AddRunDialog,
+    /// Opens a log.
+    pub open_dialog: OpenDialog,
+    /// Lists commands.
+    pub palette: CommandPalette,
+    /// Whether the sheet of shortcuts is open.
+    pub shortcuts_open: bool,
+    /// Memory of the process in bytes, when it is known; pictures leave it out, because it differs from run to run.
+    pub memory_bytes: Option<u64>,
+    /// Whether step times are shown; pictures leave them out for the same reason.
+    pub show_times: bool,
+    /// What the window wants of the program; the program takes them after each picture.
+    pub requests: Vec<WindowRequest>,
+    layout: Layout,
+}
+
+impl WindowState {
+    fn close_dialogs(&mut self) {
+        self.add_run.hide();
+        self.open_dialog.hide();
+        self.palette.hide();
+        self.shortcuts_open = false;
+        self.notices.list_open = false;
+    }
+
+    /// Arranges the panels as in a preset.
+    pub fn arrange(&mut self, preset: Preset) {
+        self.layout.arrange(preset);
+    }
+}
+
+/// Draws all of the window's content over a session.
+pub fn window_ui(ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_>) {
+    let theme = *ctx.theme;
+    let mut actions: Vec<Action> = actions::pressed(ui);
+    state.panels.inspector.show_times = state.show_times;
+
+    let bar = Frame::new().fill(theme.surface).inner_margin(Margin::symmetric(8, 3));
+    Panel::top("top bar").exact_size(30.0).frame(bar).show(ui, |ui| top_bar::ui(ui, state, ctx, &mut actions));
+    let status = Frame::new().fill(theme.surface).inner_margin(Margin::symmetric(8, 2));
+    Panel::bottom("status bar").exact_size(22.0).frame(status).show(ui, |ui| status_bar::ui(ui, state, ctx));
+    notices::banner_ui(ui, ctx);
+
+    let wanted = TimelinePanel::height_for(ctx.recording.runs.len()).min(0.3 * ui.available_height());
+    let frame = Frame::new().fill(theme.surface).inner_margin(Margin::symmetric(6, 4));
+    let timeline = Panel::bottom("timeline").resizable(true).default_size(wanted).min_size(60.0).frame(frame);
+    timeline.show(ui, |ui| state.timeline.ui(ui, ctx));
+
+    let ground = Frame::new().fill(theme.background).inner_margin(Margin::same(3));
+    CentralPanel::no_frame().frame(ground).show(ui, |ui| state.layout.ui(ui, &mut state.panels, ctx));
+
+    dialogs_ui(ui, state, ctx, &mut actions);
+    for action in actions {
+        actions::perform(action, state, ctx);
+    }
+}
+
+fn dialogs_ui(ui: &Ui, state: &mut WindowState, ctx: &mut PanelContext<'_>, actions: &mut Vec<Action>) {
+    state.add_run.ui(ui, ctx);
+    if let Some(path) = state.open_dialog.ui(ui, ctx.theme) {
+        state.requests.push(WindowRequest::OpenLog(path));
+    }
+    state.palette.ui(ui, ctx.theme, actions);
+    palette::shortcuts_ui(ui, ctx.theme, &mut state.shortcuts_open);
+    state.notices.list_ui(ui, ctx);
+    state.notices.toasts_ui(ui, ctx.theme);
+}
+
+/// A frame for small windows and menus.
+pub(crate) fn dialog_frame(theme: &Theme) -> Frame {
+    Frame::new()
+        .fill(theme.surface)
+        .stroke(egui::Stroke::new(1.0, theme.outline))
+        .corner_radius(super::theme::CORNER_RADIUS)
+        .inner_margin(12)
+        .shadow(egui::Shadow { offset: [0, 6], blur: 18, spread: 0, color: egui::Color32::from_black_alpha(90) })
+}

@@ -1,0 +1,71 @@
+//! The bar at the bottom: step time, real-time factor, memory, clock, warnings.
+
+use egui::{Align, Button, Layout as UiLayout, RichText, Ui};
+
+use super::WindowState;
+use crate::gui::PanelContext;
+use crate::gui::units::{bytes, counted, fixed};
+use crate::session::{RunRecord, StepRecord};
+
+/// Steps over which the real-time factor is taken.
+const STEPS_OF_MEAN: usize = 100;
+
+pub(super) fn ui(ui: &mut Ui, state: &mut WindowState, ctx: &PanelContext<'_>) {
+    let theme = *ctx.theme;
+    let run = ctx.recording.runs.get(ctx.selection.run.min(ctx.recording.runs.len().saturating_sub(1)));
+    ui.horizontal_centered(|ui| {
+        ui.spacing_mut().item_spacing.x = 5.0;
+        let pair = |ui: &mut Ui, name: &str, value: String, hover: &str| {
+            ui.label(RichText::new(name).small().color(theme.text_weak)).on_hover_text(hover);
+            ui.label(RichText::new(value).monospace().size(10.5).color(theme.text)).on_hover_text(hover);
+            ui.add_space(10.0);
+        };
+        if let Some(run) = run.filter(|_| state.show_times) {
+            if let Some(step) = run.step_at(ctx.cursor_ns) {
+                let hover = "Time that the step at the cursor took";
+                pair(ui, "step", format!("{} ms", fixed(step.report.times.step_ms, 1)), hover);
+            }
+            if let Some(factor) = real_time_factor(run, ctx.cursor_ns) {
+                let hover = "Log seconds per second of computing, over the last hundred steps";
+                pair(ui, "speed", format!("{}× real time", fixed(factor, 1)), hover);
+            }
+        }
+        if let Some(memory) = state.memory_bytes {
+            pair(ui, "memory", bytes(memory), "Memory of the whole process");
+        }
+        let delay = run.and_then(|run| run.step_at(ctx.cursor_ns)).map(|step| log_delay(step));
+        let clock = delay.map_or_else(|| "header stamp".to_owned(), |delay| format!("header stamp, log {delay}"));
+        pair(ui, "clock", clock, "The header stamp drives; the log time is kept beside it");
+        if let Some(step) = run.and_then(|run| run.step_at(ctx.cursor_ns)) {
+            let stamp_ns = ctx.recording.epoch_ns + step.report.stamp_ns;
+            let text = format!("{}.{:09}", stamp_ns.div_euclid(1_000_000_000), stamp_ns.rem_euclid(1_000_000_000));
+            pair(ui, "stamp", text, "Absolute header stamp of the frame, in seconds since the epoch");
+        }
+        ui.with_layout(UiLayout::right_to_left(Align::Center), |ui| {
+            let count = ctx.recording.warnings.len();
+            let (text, color) = if count == 0 {
+                ("No warnings".to_owned(), theme.text_weak)
+            } else {
+                (format!("⚠ {}", counted(count, "warning")), theme.warn)
+            };
+            let button = Button::new(RichText::new(text).small().color(color)).frame(count > 0);
+            if ui.add(button).on_hover_text("What is wrong with the log (W)").clicked() {
+                state.notices.list_open = !state.notices.list_open;
+            }
+        });
+    });
+}
+
+fn log_delay(step: &StepRecord) -> String {
+    format!("{:+.1} ms", (step.log_time_ns - step.report.stamp_ns) as f64 * 1e-6)
+}
+
+/// Log time over computing time of the steps up to the cursor.
+fn real_time_factor(run: &RunRecord, cursor_ns: i64) -> Option<f64> {
+    let end = run.steps.partition_point(|step| step.report.stamp_ns <= cursor_ns);
+    let steps = &run.steps[end.saturating_sub(STEPS_OF_MEAN)..end];
+    let (first, last) = (steps.first()?, steps.last()?);
+    let log_s = (last.report.stamp_ns - first.report.stamp_ns) as f64 * 1e-9;
+    let computing_s = steps.iter().skip(1).map(|step| step.report.times.step_ms).sum::<f64>() * 1e-3;
+    (log_s > 0.0 && computing_s > 0.0).then(|| log_s / computing_s)
+}

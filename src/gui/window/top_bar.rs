@@ -1,0 +1,71 @@
+//! The bar at the top: what to open, the runs, the layouts.
+
+use egui::{Align, Button, Layout as UiLayout, RichText, Ui, vec2};
+
+use super::WindowState;
+use super::actions::{Action, TABLE};
+use super::tiles::{Pane, Preset};
+use crate::gui::PanelContext;
+use crate::gui::theme::MAX_RUNS;
+use crate::session::Recording;
+
+pub(super) fn ui(ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_>, actions: &mut Vec<Action>) {
+    ui.horizontal_centered(|ui| {
+        action_button(ui, "Open…", Action::Open, true, actions);
+        let room = ctx.recording.runs.len() < MAX_RUNS;
+        action_button(ui, "Add run…", Action::AddRun, room, actions);
+        ui.separator();
+        ui.label(RichText::new(log_name(ctx.recording)).color(ctx.theme.text_strong));
+        ui.label(RichText::new(format!("rig {}", ctx.recording.rig.name)).color(ctx.theme.text_weak));
+        ui.separator();
+        state.legend.ui(ui, ctx);
+        ui.with_layout(UiLayout::right_to_left(Align::Center), |ui| {
+            ui.spacing_mut().item_spacing.x = 3.0;
+            action_button(ui, "?", Action::Shortcuts, true, actions);
+            action_button(ui, "☀", Action::Theme, true, actions);
+            panels_menu(ui, state);
+            ui.add_space(6.0);
+            for (number, preset) in Preset::ALL.into_iter().enumerate().rev() {
+                layout_button(ui, state, preset, number + 1, actions);
+            }
+        });
+    });
+}
+
+/// The file name of the log.
+pub(crate) fn log_name(recording: &Recording) -> String {
+    recording.log_path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
+}
+
+fn action_button(ui: &mut Ui, text: &str, action: Action, enabled: bool, actions: &mut Vec<Action>) {
+    let entry = TABLE.iter().find(|entry| entry.action == action);
+    let (name, keys) = entry.map_or((text, ""), |entry| (entry.name, entry.keys));
+    let response = ui.add_enabled(enabled, Button::new(text));
+    // A sign alone would be read out as the sign.
+    let label = if text.chars().count() < 3 { name } else { text };
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, enabled, label));
+    if response.on_hover_text(format!("{name} ({keys})")).clicked() {
+        actions.push(action);
+    }
+}
+
+fn layout_button(ui: &mut Ui, state: &WindowState, preset: Preset, number: usize, actions: &mut Vec<Action>) {
+    let on = state.layout.preset == preset;
+    let response = ui.add(Button::new(number.to_string()).selected(on).min_size(vec2(22.0, 20.0)));
+    let name = format!("Layout {}", preset.name());
+    response.widget_info(|| egui::WidgetInfo::selected(egui::Role::Button, true, on, &name));
+    if response.on_hover_text(format!("{name} ({number})")).clicked() {
+        actions.push(Action::Layout(preset));
+    }
+}
+
+fn panels_menu(ui: &mut Ui, state: &mut WindowState) {
+    ui.menu_button("Panels", |ui| {
+        for pane in Pane::ALL {
+            let mut visible = state.layout.is_visible(pane);
+            if ui.checkbox(&mut visible, pane.name()).changed() {
+                state.layout.set_visible(pane, visible);
+            }
+        }
+    });
+}
