@@ -199,9 +199,9 @@ pub(super) fn cell_ui(
 
 /// The distance from the truth, with its sign, and in standard deviations.
 fn error_text(shown: Shown, error: f64, sigma: f64) -> String {
-    let sign = if error < 0.0 { "-" } else { "+" };
     let times = error.abs() / sigma;
-    let text = format!("{sign}{}", shown.value(error.abs(), sigma));
+    let value = shown.value(error, sigma);
+    let text = if value.starts_with('-') { value } else { format!("+{value}") };
     if times.is_finite() { format!("{text} ({times:.1}σ) off") } else { format!("{text} off") }
 }
 

@@ -119,10 +119,13 @@ impl TimelinePanel {
             self.range_begin_ns = None;
             return;
         };
-        let stamp_ns = area.stamp_ns_at(pointer.x).clamp(0, ctx.recording.duration_ns.max(0));
+        let stamp_at = |x: f32| area.stamp_ns_at(x).clamp(0, ctx.recording.duration_ns.max(0));
+        let stamp_ns = stamp_at(pointer.x);
         if response.drag_started_by(PointerButton::Primary) && shift {
-            self.range_begin_ns = Some(stamp_ns);
-        } else if let Some(begin_ns) = self.range_begin_ns.filter(|begin_ns| *begin_ns != stamp_ns) {
+            // A drag is noticed some points after the press.
+            self.range_begin_ns = ui.input(|input| input.pointer.press_origin()).map(|origin| stamp_at(origin.x));
+        }
+        if let Some(begin_ns) = self.range_begin_ns.filter(|begin_ns| *begin_ns != stamp_ns) {
             ctx.commands.push(Command::SetLoop(Some((begin_ns.min(stamp_ns), begin_ns.max(stamp_ns)))));
         }
     }

@@ -21,11 +21,11 @@ pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>) {
         let (icon, name) = if playing { ("⏸", "Pause") } else { ("▶", "Play") };
         let buttons = [
             ("⏮", "Go to start", "Home", Command::GoToStart),
-            ("⏪", "Previous event", "Ctrl+←", Command::JumpToEvent { forward: false }),
-            ("◀", "Step back", "←", Command::StepFrames(-1)),
+            ("⏪", "Previous event", "Ctrl+Left", Command::JumpToEvent { forward: false }),
+            ("◀", "Step back", "Left", Command::StepFrames(-1)),
             (icon, name, "Space", Command::TogglePlay),
-            ("▶|", "Step", "→", Command::StepFrames(1)),
-            ("⏩", "Next event", "Ctrl+→", Command::JumpToEvent { forward: true }),
+            ("▶|", "Step", "Right", Command::StepFrames(1)),
+            ("⏩", "Next event", "Ctrl+Right", Command::JumpToEvent { forward: true }),
             ("⏭", "Go to end", "End", Command::GoToEnd),
         ];
         for (icon, name, keys, command) in buttons {

@@ -73,15 +73,15 @@ const CTRL: Modifiers = Modifiers::COMMAND;
 
 /// All actions; those with more modifiers come first, because keys match whatever else is held.
 pub(crate) const TABLE: &[Entry] = &[
-    entry(Action::Event(true), "Next event", "Ctrl+→", &[(CTRL, Key::ArrowRight)]),
-    entry(Action::Event(false), "Previous event", "Ctrl+←", &[(CTRL, Key::ArrowLeft)]),
-    entry(Action::Step(10), "Ten frames forward", "Shift+→", &[(SHIFT, Key::ArrowRight)]),
-    entry(Action::Step(-10), "Ten frames back", "Shift+←", &[(SHIFT, Key::ArrowLeft)]),
+    entry(Action::Event(true), "Next event", "Ctrl+Right", &[(CTRL, Key::ArrowRight)]),
+    entry(Action::Event(false), "Previous event", "Ctrl+Left", &[(CTRL, Key::ArrowLeft)]),
+    entry(Action::Step(10), "Ten frames forward", "Shift+Right", &[(SHIFT, Key::ArrowRight)]),
+    entry(Action::Step(-10), "Ten frames back", "Shift+Left", &[(SHIFT, Key::ArrowLeft)]),
     entry(Action::Open, "Open a log…", "Ctrl+O", &[(CTRL, Key::O)]),
     entry(Action::Palette, "Command palette…", "Ctrl+P", &[(CTRL, Key::P)]),
     entry(Action::TogglePlay, "Play or pause", "Space", &[(NONE, Key::Space)]),
-    entry(Action::Step(1), "One frame forward", "→", &[(NONE, Key::ArrowRight)]),
-    entry(Action::Step(-1), "One frame back", "←", &[(NONE, Key::ArrowLeft)]),
+    entry(Action::Step(1), "One frame forward", "Right", &[(NONE, Key::ArrowRight)]),
+    entry(Action::Step(-1), "One frame back", "Left", &[(NONE, Key::ArrowLeft)]),
     entry(Action::Start, "Go to start", "Home", &[(NONE, Key::Home)]),
     entry(Action::End, "Go to end", "End", &[(NONE, Key::End)]),
     entry(Action::Loop, "Loop over the visible range", "L", &[(NONE, Key::L)]),

@@ -8,6 +8,8 @@ mod legend;
 mod notices;
 mod palette;
 mod status_bar;
+#[cfg(test)]
+mod tests;
 mod tiles;
 mod top_bar;
 

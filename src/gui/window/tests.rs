@@ -1,0 +1,310 @@
+//! The window, asked by the labels that a person and a screen reader see.
+
+use egui::{Key, Modifiers, Role};
+use egui_kittest::Harness;
+use egui_kittest::kittest::{NodeT as _, Queryable as _};
+
+use super::{Preset, WindowRequest, WindowState, window_ui};
+use crate::gui::sample_recording::{sample_images, sample_recording_of};
+use crate::gui::theme::{Theme, ThemeName};
+use crate::gui::{PanelContext, Playback, Selection};
+use crate::session::{Command, PlaybackSpeed, Recording};
+
+const SECOND_NS: i64 = 1_000_000_000;
+
+/// A window over the sample, with the commands it pushed.
+struct Bench {
+    recording: Recording,
+    cursor_ns: i64,
+    playback: Playback,
+    selection: Selection,
+    window: WindowState,
+    commands: Vec<Command>,
+}
+
+impl Bench {
+    fn ui(&mut self, ui: &mut egui::Ui) {
+        let theme = Theme::of(ThemeName::Dark);
+        let mut context = PanelContext {
+            recording: &self.recording,
+            cursor_ns: self.cursor_ns,
+            playback: &self.playback,
+            images: &mut sample_images(),
+            selection: &mut self.selection,
+            theme: &theme,
+            commands: &mut self.commands,
+        };
+        window_ui(ui, &mut self.window, &mut context);
+    }
+}
+
+fn bench() -> Harness<'static, Bench> {
+    let bench = Bench {
+        recording: sample_recording_of(80, &["auto", "classical"]),
+        cursor_ns: 3 * SECOND_NS,
+        playback: Playback::default(),
+        selection: Selection::default(),
+        window: WindowState::default(),
+        commands: Vec::new(),
+    };
+    let mut harness = Harness::builder()
+        .with_size([1600.0, 900.0])
+        .with_max_steps(20)
+        .with_context_setup(|ctx| Theme::of(ThemeName::Dark).apply(ctx))
+        .build_ui_state(|ui, bench: &mut Bench| bench.ui(ui), bench);
+    harness.run_steps(3);
+    harness
+}
+
+/// Does something and gives the commands that came of it.
+fn commands_of(harness: &mut Harness<'static, Bench>, act: impl FnOnce(&Harness<'static, Bench>)) -> Vec<Command> {
+    harness.state_mut().commands.clear();
+    act(harness);
+    harness.run_steps(3);
+    std::mem::take(&mut harness.state_mut().commands)
+}
+
+#[test]
+fn the_transport_pushes_commands() {
+    let mut harness = bench();
+    for (label, command) in [
+        ("Play", Command::TogglePlay),
+        ("Step", Command::StepFrames(1)),
+        ("Step back", Command::StepFrames(-1)),
+        ("Next event", Command::JumpToEvent { forward: true }),
+        ("Previous event", Command::JumpToEvent { forward: false }),
+        ("Go to start", Command::GoToStart),
+        ("Go to end", Command::GoToEnd),
+        ("Marker", Command::ToggleMarker),
+        ("Loop", Command::SetLoop(Some((0, 4 * SECOND_NS)))),
+    ] {
+        let pushed = commands_of(&mut harness, |harness| harness.get_by_label(label).click());
+        assert_eq!(pushed, [command], "{label}");
+    }
+    harness.state_mut().playback.playing = true;
+    harness.run_steps(2);
+    assert!(harness.query_by_label("Play").is_none());
+    assert_eq!(commands_of(&mut harness, |harness| harness.get_by_label("Pause").click()), [Command::TogglePlay]);
+}
+
+#[test]
+fn the_speed_is_chosen_from_a_list() {
+    let mut harness = bench();
+    commands_of(&mut harness, |harness| {
+        let combo = harness.get_all_by_role(Role::ComboBox).find(|node| node.value().as_deref() == Some("1×"));
+        combo.unwrap().click();
+    });
+    let pushed = commands_of(&mut harness, |harness| harness.get_by_label("0.25×").click());
+    assert_eq!(pushed, [Command::SetSpeed(PlaybackSpeed(0.25))]);
+}
+
+#[test]
+fn keys_push_the_same_commands() {
+    let mut harness = bench();
+    for (modifiers, key, command) in [
+        (Modifiers::NONE, Key::Space, Command::TogglePlay),
+        (Modifiers::NONE, Key::ArrowRight, Command::StepFrames(1)),
+        (Modifiers::NONE, Key::ArrowLeft, Command::StepFrames(-1)),
+        (Modifiers::SHIFT, Key::ArrowRight, Command::StepFrames(10)),
+        (Modifiers::SHIFT, Key::ArrowLeft, Command::StepFrames(-10)),
+        (Modifiers::COMMAND, Key::ArrowRight, Command::JumpToEvent { forward: true }),
+        (Modifiers::COMMAND, Key::ArrowLeft, Command::JumpToEvent { forward: false }),
+        (Modifiers::NONE, Key::Home, Command::GoToStart),
+        (Modifiers::NONE, Key::End, Command::GoToEnd),
+        (Modifiers::NONE, Key::M, Command::ToggleMarker),
+        (Modifiers::NONE, Key::L, Command::SetLoop(Some((0, 4 * SECOND_NS)))),
+    ] {
+        let pushed = commands_of(&mut harness, |harness| harness.key_press_modifiers(modifiers, key));
+        assert_eq!(pushed, [command], "{key:?}");
+    }
+    harness.key_press(Key::Num3);
+    harness.run_steps(3);
+    assert_eq!(harness.state().window.layout.preset, Preset::FrontEnd);
+    harness.key_press(Key::T);
+    harness.run_steps(2);
+    assert_eq!(harness.state().window.requests, [WindowRequest::ToggleTheme]);
+}
+
+#[test]
+fn a_click_on_the_timeline_seeks_there() {
+    let mut harness = bench();
+    let lanes = harness.get_by_label("Timeline").rect();
+    let middle = lanes.center();
+    let pushed = commands_of(&mut harness, |harness| {
+        harness.event(egui::Event::PointerMoved(middle));
+        for pressed in [true, false] {
+            let button = egui::PointerButton::Primary;
+            harness.event(egui::Event::PointerButton { pos: middle, button, pressed, modifiers: Modifiers::NONE });
+        }
+    });
+    let Some(Command::Seek { stamp_ns }) = pushed.last() else { panic!("{pushed:?}") };
+    assert!((stamp_ns - 2 * SECOND_NS).abs() < SECOND_NS / 50, "{stamp_ns}");
+}
+
+#[test]
+fn shift_and_drag_sets_the_range_to_loop_over() {
+    let mut harness = bench();
+    let lanes = harness.get_by_label("Timeline").rect();
+    let at = |fraction: f32| egui::pos2(lanes.left() + fraction * lanes.width(), lanes.center().y);
+    let button = |pos, pressed| egui::Event::PointerButton {
+        pos,
+        button: egui::PointerButton::Primary,
+        pressed,
+        modifiers: Modifiers::SHIFT,
+    };
+    harness.state_mut().commands.clear();
+    harness.event(egui::Event::ModifiersChanged(Modifiers::SHIFT));
+    harness.event(egui::Event::PointerMoved(at(0.25)));
+    harness.event(button(at(0.25), true));
+    for fraction in [0.3, 0.5] {
+        harness.event(egui::Event::PointerMoved(at(fraction)));
+    }
+    harness.event(button(at(0.5), false));
+    harness.event(egui::Event::ModifiersChanged(Modifiers::NONE));
+    harness.run_steps(2);
+    let commands = &harness.state().commands;
+    let Some(Command::SetLoop(Some((begin_ns, end_ns)))) = commands.last() else { panic!("{commands:?}") };
+    assert!((begin_ns - SECOND_NS).abs() < SECOND_NS / 5 && (end_ns - 2 * SECOND_NS).abs() < SECOND_NS / 20);
+    assert!(!commands.iter().any(|command| matches!(command, Command::Seek { .. })), "{commands:?}");
+}
+
+#[test]
+fn a_run_is_added_through_the_dialog() {
+    let mut harness = bench();
+    commands_of(&mut harness, |harness| harness.get_by_label("Add run…").click());
+    assert!(harness.query_by_label("--run classical").is_some());
+    harness.get_by_label("Encoder readings").click();
+    harness.run_steps(2);
+    assert!(harness.query_by_label("--run classical:encoder=off").is_some());
+    let pushed = commands_of(&mut harness, |harness| harness.get_by_label("Add run").click());
+    let Some(Command::AddRun(spec)) = pushed.first() else { panic!("{pushed:?}") };
+    assert_eq!(spec.to_string(), "classical:encoder=off");
+    assert!(harness.query_by_label("Encoder readings").is_none(), "the dialog closes");
+}
+
+#[test]
+fn the_dialog_refuses_what_the_command_line_refuses() {
+    let mut harness = bench();
+    commands_of(&mut harness, |harness| harness.get_by_label("Add run…").click());
+    harness.get_by_role_and_label(Role::TextInput, "Name").focus();
+    harness.run_steps(1);
+    harness.get_by_role_and_label(Role::TextInput, "Name").type_text("a/b");
+    harness.run_steps(2);
+    assert!(harness.get_by_label("Add run").accesskit_node().is_disabled());
+    let pushed = commands_of(&mut harness, |harness| harness.key_press(Key::Escape));
+    assert!(pushed.is_empty());
+}
+
+#[test]
+fn while_somebody_types_keys_are_letters() {
+    let mut harness = bench();
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::P);
+    harness.run_steps(3);
+    let pushed = commands_of(&mut harness, |harness| {
+        harness.event(egui::Event::Text("loop".to_owned()));
+        harness.key_press(Key::L);
+    });
+    assert!(pushed.is_empty(), "{pushed:?}");
+    assert!(harness.query_by_label("Loop over the visible range").is_some());
+    assert!(harness.query_by_label("Go to start").is_some_and(|node| node.accesskit_node().role() == Role::Button));
+    let pushed = commands_of(&mut harness, |harness| harness.key_press(Key::Enter));
+    assert_eq!(pushed, [Command::SetLoop(Some((0, 4 * SECOND_NS)))]);
+    assert!(harness.query_by_label("Loop over the visible range").is_none(), "the palette closes");
+}
+
+#[test]
+fn panels_show_names_and_values() {
+    let mut harness = bench();
+    let step = harness.state().recording.runs[0].step_at(3 * SECOND_NS).unwrap().clone();
+    for name in &step.report.calibration.names {
+        assert!(harness.query_all_by_label_contains(&format!("{name} ")).next().is_some(), "{name}");
+    }
+    let rank = step.rank.as_ref().unwrap();
+    let headline = format!("Rank 18 of 18, {} informed", rank.rank_informed);
+    assert!(harness.query_by_label_contains(&headline).is_some());
+    assert!(harness.query_by_label(&format!("Frame {}", step.report.frame_index)).is_some());
+    assert!(harness.query_by_label_contains("Run auto ATE").is_some());
+    let position = step.report.newest().unwrap().world_from_imu.translation_m;
+    let shown = crate::gui::units::fixed(position.x, 3);
+    assert!(harness.query_all_by_label(&shown).next().is_some(), "position {shown}");
+
+    harness.get_by_label_contains("Run classical").click();
+    harness.run_steps(3);
+    assert_eq!(harness.state().selection.run, 1);
+    assert!(harness.query_by_label_contains("Rank 18 of 24: 6 unobservable").is_some());
+    assert!(harness.query_all_by_label_contains("EC.rx ").next().is_some());
+}
+
+#[test]
+fn a_parameter_is_selected_everywhere() {
+    let mut harness = bench();
+    let label = |harness: &Harness<'static, Bench>| {
+        let mut nodes = harness.query_all_by_label_contains("L2.alpha -");
+        nodes.next().and_then(|node| node.accesskit_node().label()).unwrap()
+    };
+    let text = label(&harness);
+    harness.get_by_label(&text).click();
+    harness.run_steps(3);
+    assert_eq!(harness.state().selection.parameter.as_deref(), Some("L2.alpha"));
+    assert!(harness.query_by_label("Parameter L2.alpha").is_some());
+    harness.get_by_label("Clear selection").click();
+    harness.run_steps(2);
+    assert_eq!(harness.state().selection, Selection::default());
+}
+
+#[test]
+fn warnings_are_listed_and_lead_to_their_time() {
+    let mut harness = bench();
+    harness.get_by_label("⚠ 1 warning").click();
+    harness.run_steps(3);
+    assert!(harness.query_by_label_contains("no IMU sample for 0.034 s").is_some());
+    let pushed = commands_of(&mut harness, |harness| harness.get_by_label("6.000 s").click());
+    assert_eq!(pushed, [Command::Seek { stamp_ns: 6 * SECOND_NS }]);
+}
+
+#[test]
+fn a_run_that_stopped_says_so() {
+    let mut harness = bench();
+    harness.state_mut().recording.runs[1].error = Some("the log ends in a damaged chunk".to_owned());
+    harness.run_steps(2);
+    assert!(harness.query_by_label("✖ Run classical stopped: the log ends in a damaged chunk").is_some());
+}
+
+#[test]
+fn panels_can_be_hidden_and_brought_back() {
+    let mut harness = bench();
+    let toggle = |harness: &mut Harness<'static, Bench>| {
+        harness.get_by_label("Panels").click();
+        harness.run_steps(2);
+        harness.get_by_role_and_label(Role::CheckBox, "Inspector").click();
+        harness.run_steps(2);
+        harness.key_press(Key::Escape);
+        harness.run_steps(2);
+    };
+    toggle(&mut harness);
+    assert!(harness.query_by_label("Frame 60").is_none());
+    toggle(&mut harness);
+    assert!(harness.query_by_label("Frame 60").is_some());
+}
+
+#[test]
+fn f1_shows_every_shortcut() {
+    let mut harness = bench();
+    harness.key_press(Key::F1);
+    harness.run_steps(3);
+    for entry in super::actions::TABLE {
+        assert!(harness.query_all_by_label(entry.name).next().is_some(), "{}", entry.name);
+        assert!(harness.query_all_by_label(entry.keys).next().is_some(), "{}", entry.keys);
+    }
+}
+
+#[test]
+fn every_sign_has_a_glyph() {
+    // A missing glyph panics here; in the window it would be an empty box.
+    let mut harness = Harness::new_ui(|ui| {
+        ui.label("°±²·×ρσχ–—…ℹ−■▶◀☀⚑⚠✔✖⏩⏪⏭⏮⏸📁🔁");
+        ui.monospace("→ °±×σχ–");
+    });
+    harness.run();
+    assert!(harness.query_by_label("→ °±×σχ–").is_some());
+}
