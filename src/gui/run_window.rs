@@ -9,6 +9,7 @@ use thiserror::Error;
 
 use super::app::{App, OpenLog, PlayingLog};
 use super::desktop::Desktop;
+use super::scene::SceneBackend;
 use super::theme::ThemeName;
 
 /// What a server without a desktop needs for the window (Debian and Ubuntu).
@@ -64,7 +65,8 @@ pub fn run_window(options: WindowOptions) -> Result<(), WindowError> {
         eframe::run_native(
             "dcvins",
             native,
-            Box::new(move |_| {
+            Box::new(move |creation| {
+                scene_backend(creation.wgpu_render_state.as_ref()).set(&creation.egui_ctx);
                 let mut app = App::new(options.open_log, options.desktop, options.theme);
                 if let Some(log) = options.log {
                     app.show(log);
@@ -81,6 +83,16 @@ pub fn run_window(options: WindowOptions) -> Result<(), WindowError> {
         Ok(Ok(())) => Ok(()),
         Ok(Err(error)) => Err(refused(error.to_string())),
         Err(problem) => Err(refused(problem)),
+    }
+}
+
+/// Scenes are drawn by the graphics card; an adapter that computes on the CPU is slower than drawing there ourselves.
+fn scene_backend(state: Option<&eframe::egui_wgpu::RenderState>) -> SceneBackend {
+    match state {
+        Some(state) if state.adapter.get_info().device_type != wgpu::DeviceType::Cpu => {
+            SceneBackend::Wgpu(state.target_format)
+        }
+        _ => SceneBackend::Cpu,
     }
 }
 

@@ -31,6 +31,7 @@ use super::inspector::InspectorPanel;
 use super::open_dialog::OpenDialog;
 use super::rank::RankPanel;
 use super::residuals::ResidualsPanel;
+use super::scene::ScenePanel;
 use super::theme::Theme;
 use super::timeline::TimelinePanel;
 
@@ -48,6 +49,8 @@ pub enum WindowRequest {
 pub struct Panels {
     /// The camera's image.
     pub image: ImagePanel,
+    /// The scene in three dimensions.
+    pub scene: ScenePanel,
     /// Calibration over time.
     pub convergence: ConvergencePanel,
     /// Rank and null directions.
@@ -62,7 +65,7 @@ impl Panels {
     fn pane_ui(&mut self, pane: Pane, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
         match pane {
             Pane::Image => self.image.ui(ui, ctx),
-            Pane::Scene => super::convergence::empty_ui(ui, "Scene"),
+            Pane::Scene => self.scene.ui(ui, ctx),
             Pane::Convergence => self.convergence.ui(ui, ctx),
             Pane::Rank => self.rank.ui(ui, ctx),
             Pane::Residuals => self.residuals.ui(ui, ctx),
