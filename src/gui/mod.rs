@@ -26,7 +26,7 @@ mod sample_images;
 pub(crate) mod sample_recording;
 pub mod scene;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 pub mod theme;
 pub mod timeline;
 mod units;

@@ -284,7 +284,7 @@ fn size_px(rect: Rect, pixels_per_point: f32) -> [u32; 2] {
 /// The whole area, framed to the left of the close-up.
 fn world_viewport(area: Rect, close_up: Option<Rect>, pixels_per_point: f32) -> Viewport {
     let size_px = size_px(area, pixels_per_point);
-    let right = close_up.unwrap_or(Rect::from_min_max(area.right_top(), area.right_bottom())).left();
+    let right = close_up.map_or_else(|| area.right(), |rect| rect.left());
     let frame_px = [
         0.0,
         overlay::LINE_HEIGHT * pixels_per_point,

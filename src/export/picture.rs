@@ -1,0 +1,224 @@
+//! Pictures of panels without a window: the same bytes on every machine.
+
+use std::fs;
+use std::io::Cursor;
+use std::path::Path;
+
+use egui::{CentralPanel, Frame, Ui};
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{ExtendedColorType, ImageEncoder as _, RgbaImage};
+use thiserror::Error;
+
+use super::error::ExportError;
+use crate::gui::headless::{self, HeadlessOptions};
+use crate::gui::theme::{PANEL_MARGIN, Theme, ThemeName};
+use crate::gui::window::{WindowState, window_ui};
+use crate::gui::{ImageSource, PanelContext, Playback, Selection};
+use crate::session::Recording;
+
+/// Panels by name; `all` is the whole window.
+pub const PANEL_NAMES: [&str; 8] =
+    ["all", "image", "scene", "convergence", "rank", "residuals", "inspector", "timeline"];
+
+/// Largest side of a picture in pixels.
+const LARGEST_SIDE_PX: u32 = 16_384;
+
+/// How a picture is drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PictureOptions {
+    /// Width and height in pixels.
+    pub size_px: [u32; 2],
+    /// Pixels per point: 1 as on an ordinary screen, 2 draws everything twice as large.
+    pub pixels_per_point: f32,
+    /// Colours.
+    pub theme: ThemeName,
+}
+
+impl Default for PictureOptions {
+    fn default() -> Self {
+        Self { size_px: [1920, 1080], pixels_per_point: 1.0, theme: ThemeName::Light }
+    }
+}
+
+/// Why there is no picture.
+#[derive(Debug, Error)]
+pub enum PictureError {
+    /// No such panel.
+    #[error("no panel is called '{name}': expected one of {}", PANEL_NAMES.join(", "))]
+    UnknownPanel {
+        /// What was asked for.
+        name: String,
+    },
+    /// No picture can have this size.
+    #[error("a picture of {width}×{height} pixels cannot be drawn: expected 16 to {LARGEST_SIDE_PX} each way")]
+    Size {
+        /// Width in pixels.
+        width: u32,
+        /// Height in pixels.
+        height: u32,
+    },
+    /// No picture can have this scale.
+    #[error("a scale of {scale} cannot be drawn: expected 0.25 to 8 pixels per point")]
+    Scale {
+        /// Pixels per point.
+        scale: f32,
+    },
+    /// The picture could not be encoded.
+    #[error("cannot encode the picture as PNG: {source}")]
+    Encode {
+        /// What the encoder said.
+        source: image::ImageError,
+    },
+    /// The file could not be written.
+    #[error(transparent)]
+    Write(#[from] ExportError),
+}
+
+/// Names that [`draw_panel`] knows.
+pub fn panel_names() -> &'static [&'static str] {
+    &PANEL_NAMES
+}
+
+/// Draws one panel, or the whole window, over a recording at a cursor.
+pub fn draw_panel(
+    name: &str,
+    recording: &Recording,
+    cursor_ns: i64,
+    images: &mut dyn ImageSource,
+    options: &PictureOptions,
+) -> Result<RgbaImage, PictureError> {
+    let panel = PANEL_NAMES.into_iter().find(|known| *known == name);
+    let panel = panel.ok_or_else(|| PictureError::UnknownPanel { name: name.to_owned() })?;
+    check(options)?;
+    let theme = Theme::of(options.theme);
+    let mut state = WindowState::default();
+    let mut selection = Selection::default();
+    let playback = Playback::default();
+    let mut ui = |ui: &mut Ui| {
+        // Nobody is there to carry out what a panel may ask for.
+        let commands = &mut Vec::new();
+        let selection = &mut selection;
+        let images = &mut *images;
+        let context =
+            &mut PanelContext { recording, cursor_ns, playback: &playback, images, selection, theme: &theme, commands };
+        if panel == "all" {
+            window_ui(ui, &mut state, context);
+        } else {
+            let frame = Frame::new().fill(theme.surface).inner_margin(PANEL_MARGIN);
+            CentralPanel::no_frame().frame(frame).show(ui, |ui| panel_ui(panel, ui, &mut state, context));
+        }
+    };
+    let PictureOptions { size_px, pixels_per_point, theme } = *options;
+    Ok(headless::draw(HeadlessOptions { size_px, pixels_per_point, theme }, &mut ui))
+}
+
+fn check(options: &PictureOptions) -> Result<(), PictureError> {
+    let [width, height] = options.size_px;
+    if [width, height].iter().any(|side| !(16..=LARGEST_SIDE_PX).contains(side)) {
+        return Err(PictureError::Size { width, height });
+    }
+    let scale = options.pixels_per_point;
+    if (0.25..=8.0).contains(&scale) { Ok(()) } else { Err(PictureError::Scale { scale }) }
+}
+
+fn panel_ui(name: &str, ui: &mut Ui, state: &mut WindowState, context: &mut PanelContext<'_>) {
+    let panels = &mut state.panels;
+    match name {
+        "image" => panels.image.ui(ui, context),
+        "scene" => panels.scene.ui(ui, context),
+        "convergence" => panels.convergence.ui(ui, context),
+        "rank" => panels.rank.ui(ui, context),
+        "residuals" => panels.residuals.ui(ui, context),
+        "inspector" => panels.inspector.ui(ui, context),
+        _ => state.timeline.ui(ui, context),
+    }
+}
+
+/// Encodes an opaque picture as PNG, always with the same settings.
+pub fn png_bytes(picture: &RgbaImage) -> Result<Vec<u8>, PictureError> {
+    let rgb: Vec<u8> = picture.pixels().flat_map(|pixel| [pixel.0[0], pixel.0[1], pixel.0[2]]).collect();
+    let mut bytes = Cursor::new(Vec::new());
+    let encoder = PngEncoder::new_with_quality(&mut bytes, CompressionType::Default, FilterType::Adaptive);
+    encoder
+        .write_image(&rgb, picture.width(), picture.height(), ExtendedColorType::Rgb8)
+        .map_err(|source| PictureError::Encode { source })?;
+    Ok(bytes.into_inner())
+}
+
+/// Writes a picture as PNG, making its folder when it is missing.
+pub fn write_png(picture: &RgbaImage, path: &Path) -> Result<(), PictureError> {
+    let bytes = png_bytes(picture)?;
+    if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+        fs::create_dir_all(folder).map_err(ExportError::write(folder))?;
+    }
+    Ok(fs::write(path, bytes).map_err(ExportError::write(path))?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gui::sample_recording::{sample_images, sample_recording};
+    use crate::gui::tests::keep_picture;
+
+    #[test]
+    fn every_panel_is_drawn_twice_alike() {
+        let recording = sample_recording();
+        let mut seen: Vec<Vec<u8>> = Vec::new();
+        for name in panel_names() {
+            let options = PictureOptions { size_px: [800, 500], ..PictureOptions::default() };
+            let draw = || {
+                let picture = draw_panel(name, &recording, 9_000_000_000, &mut sample_images(), &options).unwrap();
+                assert_eq!([picture.width(), picture.height()], options.size_px);
+                png_bytes(&picture).unwrap()
+            };
+            let bytes = draw();
+            assert!(bytes == draw(), "two pictures of '{name}' differ");
+            assert!(!seen.contains(&bytes), "'{name}' looks like another panel");
+            let back = image::load_from_memory(&bytes).unwrap().to_rgba8();
+            assert_eq!([back.width(), back.height()], options.size_px);
+            seen.push(bytes);
+        }
+    }
+
+    #[test]
+    fn the_window_has_its_size_at_any_scale() {
+        let recording = sample_recording();
+        for (theme, scale, size_px) in [
+            (ThemeName::Dark, 1.0, [1920, 1080]),
+            (ThemeName::Light, 1.0, [1920, 1080]),
+            (ThemeName::Print, 1.5, [2400, 1350]),
+        ] {
+            let options = PictureOptions { size_px, pixels_per_point: scale, theme };
+            let picture = draw_panel("all", &recording, 9_000_000_000, &mut sample_images(), &options).unwrap();
+            keep_picture(&format!("all-{}", theme.as_str()), &picture);
+            assert_eq!([picture.width(), picture.height()], size_px);
+        }
+    }
+
+    #[test]
+    fn refusals_say_what_was_expected() {
+        let recording = sample_recording();
+        let draw = |name: &str, size_px, scale| {
+            let options = PictureOptions { size_px, pixels_per_point: scale, ..PictureOptions::default() };
+            draw_panel(name, &recording, 0, &mut sample_images(), &options).unwrap_err().to_string()
+        };
+        let text = draw("images", [640, 480], 1.0);
+        assert!(text.starts_with("no panel is called 'images': expected one of all, image, scene"), "{text}");
+        let text = draw("image", [0, 480], 1.0);
+        assert!(text.starts_with("a picture of 0×480 pixels cannot be drawn"), "{text}");
+        for scale in [0.0, -1.0, f32::NAN, 100.0] {
+            assert!(draw("image", [640, 480], scale).contains("pixels per point"));
+        }
+    }
+
+    #[test]
+    fn files_are_written_into_new_folders() {
+        let folder = tempfile::tempdir().unwrap();
+        let picture = RgbaImage::from_pixel(20, 30, image::Rgba([1, 2, 3, 255]));
+        let path = folder.path().join("a/b/picture.png");
+        write_png(&picture, &path).unwrap();
+        assert_eq!(fs::read(&path).unwrap(), png_bytes(&picture).unwrap());
+        let error = write_png(&picture, &path.join("below-a-file.png")).unwrap_err().to_string();
+        assert!(error.starts_with("cannot write"), "{error}");
+    }
+}
