@@ -2,13 +2,36 @@
 //!
 //! It takes a [`StepInput`] per image and leaves a [`StepReport`] behind; nobody reaches in between.
 
+mod calibration;
+mod camera_pose;
+mod config;
+mod dense;
+#[expect(clippy::module_inception, reason = "the type that the folder is about")]
+mod estimator;
+mod features;
 pub mod imu_factor;
 pub mod initialization;
+mod layout;
+mod marginalization;
+mod options;
 pub mod preintegration;
+mod prior;
+mod problem;
 mod report;
+mod reporting;
+mod reprojection;
+mod rows;
+mod solver;
+mod startup;
 #[cfg(test)]
 mod tests;
+mod tracking;
+mod visual;
+mod window;
 
+pub use config::{DEFAULT_CHAIN_PRIOR, EstimatorConfig};
+pub use estimator::Estimator;
+pub use options::{EstimatorOptions, LandmarkModel, RobustLoss, TrackContinuation};
 pub use preintegration::{ImuBias, MotionIncrement, NavigationState, Preintegration};
 
 pub use report::{

@@ -186,7 +186,7 @@ pub enum ColumnGroup {
 }
 
 /// A run of columns that belong together.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ColumnBlock {
     /// What kind.
     pub group: ColumnGroup,

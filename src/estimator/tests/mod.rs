@@ -1,6 +1,9 @@
 //! Tests of the estimator.
 
+mod fixture;
+mod flight;
 mod preintegration;
+mod window;
 
 use nalgebra::Vector3;
 

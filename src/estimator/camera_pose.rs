@@ -1,0 +1,57 @@
+//! Where the cameras are, and how that follows the unknowns of the window.
+
+use nalgebra::{DMatrix, Matrix6xX};
+
+use super::calibration::Calibration;
+use super::layout::POSE;
+use super::reprojection::CameraPose;
+use super::window::FrameState;
+use crate::geometry::so3;
+
+/// Pose of the camera at a state: the IMU's pose and the mount at the state's joint angles.
+pub(super) fn at(state: &FrameState, calibration: &Calibration) -> CameraPose {
+    let pose = state.navigation.world_from_imu * calibration.imu_from_camera(&state.joints_rad);
+    CameraPose { rotation: pose.rotation_matrix(), position_m: pose.translation_m }
+}
+
+/// Poses of the camera by slot.
+pub(super) fn by_slot(frames: &[FrameState], calibration: &Calibration) -> Vec<CameraPose> {
+    frames.iter().map(|state| at(state, calibration)).collect()
+}
+
+/// How the camera poses follow the unknowns, by slot: `[φ; δt]` of `world_from_camera`.
+#[derive(Clone, Debug)]
+pub(super) struct CameraMaps {
+    /// 6 × (6 + N), by pose and joints of the frame.
+    pub(super) own: Vec<DMatrix<f64>>,
+    /// 6 × calibration.
+    pub(super) calibration: Vec<DMatrix<f64>>,
+}
+
+impl CameraMaps {
+    /// The maps at these states and this calibration.
+    pub(super) fn new(frames: &[FrameState], calibration: &Calibration) -> Self {
+        let mut maps = Self { own: Vec::new(), calibration: Vec::new() };
+        for state in frames {
+            let chain = calibration.linearize(&state.joints_rad);
+            let world_from_imu = state.navigation.world_from_imu.rotation_matrix();
+            let camera_from_imu = chain.imu_from_camera.rotation_matrix().transpose();
+            let lever = chain.imu_from_camera.translation_m;
+            let joints = state.joints_rad.len();
+            let mut own = DMatrix::zeros(6, POSE + joints);
+            own.fixed_view_mut::<3, 3>(0, 0).copy_from(&camera_from_imu);
+            own.fixed_view_mut::<3, 3>(3, 0).copy_from(&(world_from_imu * so3::hat(&lever) * -1.0));
+            own.fixed_view_mut::<3, 3>(3, 3).fill_with_identity();
+            let carried = |part: &Matrix6xX<f64>| {
+                let mut carried = DMatrix::from_column_slice(6, part.ncols(), part.as_slice());
+                let shift = world_from_imu * part.fixed_rows::<3>(3);
+                carried.fixed_rows_mut::<3>(3).copy_from(&shift);
+                carried
+            };
+            own.columns_mut(POSE, joints).copy_from(&carried(&chain.by_joints));
+            maps.own.push(own);
+            maps.calibration.push(carried(&chain.by_parameters));
+        }
+        maps
+    }
+}

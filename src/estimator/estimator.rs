@@ -1,0 +1,239 @@
+//! The estimator: what it holds between images, and the step from one image to the next.
+
+use std::collections::VecDeque;
+
+use nalgebra::Vector3;
+
+use super::calibration::{Calibration, GivenSigmas};
+use super::config::{DEFAULT_CHAIN_PRIOR, EstimatorConfig};
+use super::initialization::StandstillEstimate;
+use super::prior::{Prior, StartPrior};
+use super::startup::WaitingFrame;
+use super::window::{FeatureMap, Frame};
+use super::{Event, EventKind, Phase, StepInput, StepReport, gravity_in_world};
+use crate::flight_log::rig::ImuNoise;
+use crate::geometry::RigidTransform;
+use crate::gimbal::ClassicalChain;
+
+/// A sliding-window visual-inertial estimator for a camera on a gimbal, or on a rigid mount.
+///
+/// It is a plain value: a clone is a snapshot from which the same steps give the same bits.
+#[derive(Clone, Debug)]
+pub struct Estimator {
+    pub(super) config: EstimatorConfig,
+    pub(super) noise: ImuNoise,
+    pub(super) gravity_in_world: Vector3<f64>,
+    pub(super) calibration: Calibration,
+    pub(super) phase: Phase,
+    pub(super) restarts: usize,
+    /// Frames that wait for the initialization.
+    pub(super) waiting: VecDeque<WaitingFrame>,
+    pub(super) standstill: Option<StandstillEstimate>,
+    /// Frames of the window, oldest first.
+    pub(super) frames: Vec<Frame>,
+    pub(super) features: FeatureMap,
+    pub(super) prior: Option<Prior>,
+    pub(super) start: Option<StartPrior>,
+    /// Posterior standard deviations of the calibration after the last solve.
+    pub(super) calibration_sigmas: Vec<f64>,
+    /// How many frames in a row saw too few landmarks.
+    pub(super) blind_frames: usize,
+    /// Where a restarted window should begin: the last pose before the failure.
+    pub(super) resume_at: Option<RigidTransform>,
+}
+
+impl Estimator {
+    /// An estimator that waits for its first images.
+    pub fn new(config: EstimatorConfig) -> Self {
+        let factor = config.options.imu_noise_factor;
+        let noise = ImuNoise {
+            accelerometer_noise_density: config.imu_noise.accelerometer_noise_density * factor,
+            accelerometer_random_walk: config.imu_noise.accelerometer_random_walk * factor,
+            gyroscope_noise_density: config.imu_noise.gyroscope_noise_density * factor,
+            gyroscope_random_walk: config.imu_noise.gyroscope_random_walk * factor,
+        };
+        let (translation_m, rotation_rad) = config.chain_prior.unwrap_or(DEFAULT_CHAIN_PRIOR);
+        let calibration = Calibration::new(
+            &config.chain,
+            config.parameterization,
+            GivenSigmas { translation_m, rotation_rad },
+            config.calibrate,
+            config.encoder_in_use().is_some(),
+        );
+        Self {
+            noise,
+            gravity_in_world: gravity_in_world(config.gravity_m_per_s2),
+            calibration,
+            phase: Phase::Initializing,
+            restarts: 0,
+            waiting: VecDeque::new(),
+            standstill: None,
+            frames: Vec::new(),
+            features: FeatureMap::new(),
+            prior: None,
+            start: None,
+            calibration_sigmas: Vec::new(),
+            blind_frames: 0,
+            resume_at: None,
+            config,
+        }
+    }
+
+    /// What it was made from.
+    pub fn config(&self) -> &EstimatorConfig {
+        &self.config
+    }
+
+    /// Asks for [`StepReport::linearization`] from the next step on, or no longer.
+    pub fn set_keep_linearization(&mut self, keep: bool) {
+        self.config.options.keep_linearization = keep;
+    }
+
+    /// The chain as it is estimated now, in the classical form.
+    pub fn classical_chain(&self) -> ClassicalChain {
+        self.calibration.chain().to_classical()
+    }
+
+    /// Takes in one image's tracks with the inertial samples before it, and tells everything about what came of it.
+    pub fn step(&mut self, input: &StepInput<'_>) -> StepReport {
+        let begin_ms = (self.config.clock_ms)();
+        let mut report = match self.phase {
+            Phase::Initializing => self.wait(input, Vec::new()),
+            Phase::Tracking => self.track(input),
+        };
+        report.times.step_ms = (self.config.clock_ms)() - begin_ms;
+        report
+    }
+
+    fn track(&mut self, input: &StepInput<'_>) -> StepReport {
+        let newest_stamp_ns = self.frames.last().map_or(i64::MIN, |frame| frame.stamp_ns);
+        if input.stamp_ns <= newest_stamp_ns {
+            return self.skip(input, newest_stamp_ns);
+        }
+        let begin_ms = (self.config.clock_ms)();
+        if let Err(failure) = self.push_frame(input) {
+            return self.restart(input, vec![failure]);
+        }
+        let predicted = self.newest_state().navigation;
+        let mut solved = self.solve_window(self.config.options.iterations);
+        let mut events = Vec::new();
+        if let Some(failure) = self.failure(&predicted) {
+            return self.restart(input, vec![failure]);
+        }
+        let (keyframe, chosen) = self.choose_keyframe();
+        if let Some(newest) = self.frames.last_mut() {
+            newest.keyframe = keyframe;
+        }
+        events.push(chosen);
+        let optimized_ms = (self.config.clock_ms)();
+
+        let mut report = self.tracking_report(input, &mut solved);
+        self.forget_rejected(&solved, &mut events);
+        self.switch_chart_when_needed(&mut events);
+        let marginalizing_ms = (self.config.clock_ms)();
+        self.make_room(&mut events);
+        report.times.optimize_ms = optimized_ms - begin_ms;
+        report.times.marginalize_ms = (self.config.clock_ms)() - marginalizing_ms;
+        report.events.extend(events);
+        report
+    }
+
+    /// An image that is not later than the newest one changes nothing.
+    fn skip(&self, input: &StepInput<'_>, newest_stamp_ns: i64) -> StepReport {
+        let mut report = self.empty_report(input, Phase::Tracking);
+        report.window = self.window_report();
+        report.events.push(Event {
+            kind: EventKind::MeasurementMissing,
+            message: format!(
+                "image {} is stamped {:.3} s, not after the newest one: passed over",
+                input.frame_index,
+                crate::geometry::seconds_from_ns(input.stamp_ns)
+            ),
+            value: Some(crate::geometry::seconds_from_ns(input.stamp_ns)),
+            threshold: Some(crate::geometry::seconds_from_ns(newest_stamp_ns)),
+        });
+        report
+    }
+
+    pub(super) fn newest_state(&self) -> &super::window::FrameState {
+        &self.frames.last().expect("a running window has frames").state
+    }
+
+    /// What says that the window has failed, against the newest state's prediction.
+    fn failure(&mut self, predicted: &super::NavigationState) -> Option<Event> {
+        let options = &self.config.options;
+        let slot = self.frames.len() - 1;
+        let seen = self
+            .features
+            .values()
+            .filter(|feature| feature.landmark.is_some() && feature.observation(slot).is_some())
+            .count();
+        self.blind_frames = if seen < options.min_landmarks { self.blind_frames + 1 } else { 0 };
+        let state = self.newest_state().navigation;
+        let checks = [
+            (
+                "the accelerometer's bias is out of bounds, m/s²",
+                state.bias.accelerometer_m_per_s2.norm(),
+                options.max_accelerometer_bias,
+            ),
+            (
+                "the gyroscope's bias is out of bounds, rad/s",
+                state.bias.gyroscope_rad_per_s.norm(),
+                options.max_gyroscope_bias,
+            ),
+            ("the speed is out of bounds, m/s", state.velocity_m_per_s.norm(), options.max_speed),
+            (
+                "the newest position was corrected by too much, m",
+                (state.world_from_imu.translation_m - predicted.world_from_imu.translation_m).norm(),
+                options.max_position_correction_m,
+            ),
+            (
+                "too many frames in a row saw too few landmarks",
+                self.blind_frames as f64,
+                options.max_blind_frames as f64,
+            ),
+        ];
+        checks.into_iter().find(|(_, value, limit)| !value.is_finite() || value > limit).map(
+            |(reason, value, limit)| Event {
+                kind: EventKind::Failure,
+                message: format!("{reason}: {value:.3} against {limit:.3}"),
+                value: Some(value),
+                threshold: Some(limit),
+            },
+        )
+    }
+
+    /// Forgets the window and begins anew with this image.
+    fn restart(&mut self, input: &StepInput<'_>, events: Vec<Event>) -> StepReport {
+        let good = self.frames.iter().rev().find(|frame| {
+            let pose = &frame.state.navigation.world_from_imu;
+            frame.index != input.frame_index && pose.translation_m.iter().all(|x| x.is_finite())
+        });
+        self.resume_at = good.map(|frame| frame.state.navigation.world_from_imu).or(self.resume_at);
+        let resume_at = self.resume_at;
+        let restarts = self.restarts + 1;
+        *self = Self::new(self.config.clone());
+        self.resume_at = resume_at;
+        self.restarts = restarts;
+        self.wait(input, events)
+    }
+
+    fn switch_chart_when_needed(&mut self, events: &mut Vec<Event>) {
+        if !self.config.auto_chart || self.calibration.dof() == 0 {
+            return;
+        }
+        let Some(better) = self.calibration.chain().should_switch() else { return };
+        let margin = self.calibration.chain().margins().iter().map(|(_, margin)| *margin).fold(1.0, f64::min);
+        let layout = super::window::layout(&self.frames, self.calibration.dof());
+        let old_from_new = self.calibration.switch_chart(better);
+        if let Some(prior) = &mut self.prior {
+            prior.transport_calibration(&old_from_new, &layout);
+        }
+        events.push(Event {
+            kind: EventKind::ChartSwitched,
+            message: format!("the chain goes over to the chart {better}: the old one is near its lock"),
+            value: Some(margin),
+            threshold: Some(crate::gimbal::SWITCH_MARGIN),
+        });
+    }
+}

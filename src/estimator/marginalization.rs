@@ -1,0 +1,65 @@
+//! Taking a frame out of the window: what is known about the others because of it becomes their prior.
+
+use nalgebra::DMatrix;
+
+use super::prior::Prior;
+use super::problem::{Estimate, Problem};
+use super::reprojection::Landmark;
+use super::rows::stack;
+use super::visual::Track;
+use super::window::Frame;
+
+/// The prior that is left when the oldest frame goes, together with the features of `tracks` (all that it saw and that
+/// leave with it).
+///
+/// Its residuals refer to the first estimates: of frames that the old prior held those stay, all others take the present
+/// estimate as theirs.
+pub(super) fn oldest(
+    problem: &Problem<'_>,
+    estimate: &Estimate,
+    tracks: &[Track],
+    landmarks: &[Landmark],
+) -> Option<Prior> {
+    let mut parts = vec![problem.prior_rows(estimate), problem.encoder_rows(0, estimate)];
+    if problem.frames.len() > 1 {
+        parts.push(problem.inertial_rows(1, estimate));
+    }
+    if !tracks.is_empty() {
+        parts.push(problem.visual_rows(estimate, tracks, landmarks));
+    }
+    eliminated(problem, estimate, &parts, 0)
+}
+
+/// The prior without the frame at `slot`, whose encoder readings go into it while its sightings are forgotten and its
+/// inertial samples pass to the next frame; `None` when there is no prior.
+pub(super) fn dropped(problem: &Problem<'_>, estimate: &Estimate, slot: usize) -> Option<Prior> {
+    let prior = problem.prior?;
+    if !prior.holds_frame(slot) {
+        return Some(prior.clone());
+    }
+    let held = prior.rows(&problem.layout, &problem.deviation(estimate));
+    eliminated(problem, estimate, &[held, problem.encoder_rows(slot, estimate)], slot)
+}
+
+/// Rows with residuals at the present estimate become a prior that keeps them at the first estimates.
+fn eliminated(problem: &Problem<'_>, estimate: &Estimate, parts: &[DMatrix<f64>], slot: usize) -> Option<Prior> {
+    let total = problem.layout.total();
+    let mut rows = stack(parts, total + 1);
+    let shift = rows.columns(0, total) * problem.deviation(estimate);
+    let mut residual = rows.column_mut(total);
+    residual -= shift;
+    Prior::eliminating(&rows, &problem.layout, slot)
+}
+
+/// Frames that a new prior holds keep their present state as their first estimate.
+pub(super) fn keep_first_estimates(prior: &Prior, frames: &mut [Frame]) {
+    for (slot, frame) in frames.iter_mut().enumerate() {
+        if prior.holds_frame(slot) {
+            if frame.first_estimate.is_none() {
+                frame.first_estimate = Some(frame.state.clone());
+            }
+        } else {
+            frame.first_estimate = None;
+        }
+    }
+}

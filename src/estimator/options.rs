@@ -1,0 +1,154 @@
+//! What can be tuned in the estimator, with its defaults.
+
+use nalgebra::Vector3;
+
+use super::preintegration::ImuBias;
+
+/// How the squared whitened residuals of the visual factors grow.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum RobustLoss {
+    /// Quadratic everywhere.
+    None,
+    /// Quadratic up to this many sigmas, linear beyond.
+    Huber(f64),
+    /// Logarithmic, half weight at this many sigmas.
+    Cauchy(f64),
+}
+
+impl RobustLoss {
+    /// Cost and weight `dρ/ds²` of a squared whitened residual.
+    pub fn cost_and_weight(self, squared: f64) -> (f64, f64) {
+        match self {
+            Self::None => (squared, 1.0),
+            Self::Huber(limit) => {
+                if squared <= limit * limit {
+                    (squared, 1.0)
+                } else {
+                    let norm = squared.sqrt();
+                    (2.0 * limit * norm - limit * limit, limit / norm)
+                }
+            }
+            Self::Cauchy(scale) => {
+                let ratio = squared / (scale * scale);
+                (scale * scale * ratio.ln_1p(), 1.0 / (1.0 + ratio))
+            }
+        }
+    }
+}
+
+/// What the unknowns of a feature are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LandmarkModel {
+    /// The inverse distance along the anchor's measured bearing (Eq. 9): the anchor's measurement counts as exact.
+    InverseDistance,
+    /// Bearing and inverse distance in the anchor's frame: the anchor's measurement is one like the others.
+    BearingAndInverseDistance,
+}
+
+/// What becomes of a feature whose anchor leaves the window while it is still being tracked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TrackContinuation {
+    /// Its measurements go into the marginalization prior and stay in the window as well, as in VINS-Fusion: they count
+    /// twice, which stiffens the window.
+    Reuse,
+    /// Every measurement is used once: those that went into the prior leave the window.
+    UseOnce,
+    /// The anchor's measurement is forgotten and the others stay.
+    ForgetAnchor,
+}
+
+/// Tunables of the estimator.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EstimatorOptions {
+    /// Number of keyframes in the window beside the newest frame.
+    pub window: usize,
+    /// Standard deviation of a tracked pixel, per coordinate.
+    pub pixel_sigma_px: f64,
+    /// Loss on the visual residuals.
+    pub loss: RobustLoss,
+    /// Unknowns of a feature.
+    pub landmark_model: LandmarkModel,
+    /// What happens to tracks whose anchor leaves.
+    pub track_continuation: TrackContinuation,
+    /// Most iterations of a solve.
+    pub iterations: usize,
+    /// A solve ends when the cost falls by less than this share.
+    pub relative_cost_tolerance: f64,
+    /// A feature takes part from this many observations on.
+    pub min_observations: usize,
+    /// Rays of a feature must open this far before it is triangulated, in radians.
+    pub min_triangulation_angle_rad: f64,
+    /// Nearest and farthest distance at which a triangulated feature is believed, in metres.
+    pub distance_range_m: (f64, f64),
+    /// Rotation-compensated mean parallax against the last keyframe that makes a keyframe, in radians.
+    pub keyframe_parallax_rad: f64,
+    /// Fewer features in common with the last keyframe than this make a keyframe.
+    pub keyframe_min_tracked: usize,
+    /// A larger share of features new since the last keyframe makes a keyframe.
+    pub keyframe_new_share: f64,
+    /// Features whose mean reprojection error exceeds this are rejected, in pixels.
+    pub outlier_px: f64,
+    /// Jacobians of states that the prior holds are evaluated where it was linearized.
+    pub first_estimates: bool,
+    /// The same for the static calibration's columns.
+    pub calibration_first_estimates: bool,
+    /// Standard deviation of the accelerometer's bias at the start, in m/s².
+    pub accelerometer_bias_sigma: f64,
+    /// Standard deviation of the gyroscope's bias at the start, in rad/s.
+    pub gyroscope_bias_sigma: f64,
+    /// The inertial noise densities of the rig are multiplied by this.
+    pub imu_noise_factor: f64,
+    /// Change of the biases at which an interval is integrated again.
+    pub reintegration_change: ImuBias,
+    /// Failure: norm of the accelerometer's bias, in m/s².
+    pub max_accelerometer_bias: f64,
+    /// Failure: norm of the gyroscope's bias, in rad/s.
+    pub max_gyroscope_bias: f64,
+    /// Failure: speed, in m/s.
+    pub max_speed: f64,
+    /// Failure: correction of the newest position against its prediction, in metres.
+    pub max_position_correction_m: f64,
+    /// Failure: so many frames in a row with fewer than `min_landmarks` landmarks in view.
+    pub max_blind_frames: usize,
+    /// Fewer landmarks in view than this count as blind.
+    pub min_landmarks: usize,
+    /// Fill [`super::StepReport::linearization`].
+    pub keep_linearization: bool,
+}
+
+impl Default for EstimatorOptions {
+    fn default() -> Self {
+        Self {
+            window: 10,
+            pixel_sigma_px: 1.0,
+            loss: RobustLoss::Huber(1.5),
+            landmark_model: LandmarkModel::BearingAndInverseDistance,
+            track_continuation: TrackContinuation::Reuse,
+            iterations: 6,
+            relative_cost_tolerance: 1e-4,
+            min_observations: 3,
+            min_triangulation_angle_rad: 0.01,
+            distance_range_m: (0.1, 300.0),
+            keyframe_parallax_rad: 10.0 / 460.0,
+            keyframe_min_tracked: 50,
+            keyframe_new_share: 0.5,
+            outlier_px: 3.0,
+            first_estimates: true,
+            calibration_first_estimates: true,
+            accelerometer_bias_sigma: 0.5,
+            gyroscope_bias_sigma: 0.02,
+            imu_noise_factor: 1.0,
+            reintegration_change: ImuBias {
+                gyroscope_rad_per_s: Vector3::repeat(0.005),
+                accelerometer_m_per_s2: Vector3::repeat(0.05),
+            },
+            max_accelerometer_bias: 3.0,
+            max_gyroscope_bias: 0.5,
+            max_speed: 50.0,
+            max_position_correction_m: 5.0,
+            max_blind_frames: 20,
+            min_landmarks: 6,
+            keep_linearization: false,
+        }
+    }
+}

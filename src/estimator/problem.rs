@@ -1,0 +1,333 @@
+//! The least-squares problem of one window: cost, normal equations, whitened rows.
+
+use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, Vector3, Vector6};
+
+use super::calibration::Calibration;
+use super::camera_pose::{self, CameraMaps};
+use super::imu_factor;
+use super::layout::{Layout, POSE, SPEED_BIAS};
+use super::preintegration::{Matrix15, Vector15};
+use super::prior::{Prior, StartPrior};
+use super::reprojection::Landmark;
+use super::visual::{self, ReducedVisualSystem, Track, VisualModel, VisualSystem};
+use super::window::{Frame, FrameState};
+
+/// Values of all unknowns.
+#[derive(Clone, Debug)]
+pub(super) struct Estimate {
+    /// By slot.
+    pub(super) frames: Vec<FrameState>,
+    /// The static calibration.
+    pub(super) calibration: Calibration,
+    /// In the order of the tracks.
+    pub(super) landmarks: Vec<Landmark>,
+}
+
+/// Everything that the unknowns are held against.
+#[derive(Clone, Debug)]
+pub(super) struct Problem<'a> {
+    pub(super) layout: Layout,
+    pub(super) visual: VisualModel<'a>,
+    pub(super) gravity_in_world: Vector3<f64>,
+    pub(super) frames: &'a [Frame],
+    pub(super) tracks: &'a [Track],
+    pub(super) encoder_sigma_rad: Option<f64>,
+    pub(super) prior: Option<&'a Prior>,
+    pub(super) start: Option<&'a StartPrior>,
+    pub(super) first_estimates: bool,
+    pub(super) calibration_first_estimates: bool,
+}
+
+/// Twice the cost by kind of factor: robust for the visual one, χ² for the others.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Costs {
+    pub(super) visual: f64,
+    pub(super) imu: f64,
+    pub(super) encoder: f64,
+    pub(super) calibration: f64,
+    pub(super) prior: f64,
+}
+
+impl Costs {
+    /// The cost that the solver lowers.
+    pub(super) fn total(&self) -> f64 {
+        0.5 * (self.visual + self.imu + self.encoder + self.calibration + self.prior)
+    }
+}
+
+/// The problem linearized at an estimate.
+#[derive(Clone, Debug)]
+pub(super) struct NormalEquations {
+    pub(super) visual: VisualSystem,
+    pub(super) maps: CameraMaps,
+    /// All other factors; the lower triangle counts.
+    hessian: DMatrix<f64>,
+    gradient: DVector<f64>,
+}
+
+impl Problem<'_> {
+    /// States at which derivatives are taken.
+    pub(super) fn linearization_frames(&self, estimate: &Estimate) -> Vec<FrameState> {
+        self.frames
+            .iter()
+            .zip(&estimate.frames)
+            .map(|(frame, current)| frame.linearization_point(current, self.first_estimates).clone())
+            .collect()
+    }
+
+    /// The cost by kind of factor.
+    pub(super) fn costs(&self, estimate: &Estimate) -> Costs {
+        let cameras = camera_pose::by_slot(&estimate.frames, &estimate.calibration);
+        let mut costs = Costs {
+            visual: 2.0 * visual::cost(&self.visual, &cameras, self.tracks, &estimate.landmarks),
+            ..Costs::default()
+        };
+        for slot in 1..self.frames.len() {
+            if let Some(residual) = self.imu_residual(slot, &estimate.frames) {
+                costs.imu += residual.norm_squared();
+            }
+        }
+        for slot in 0..self.frames.len() {
+            costs.encoder += self.encoder_residuals(slot, &estimate.frames[slot]).map(|(_, r, _)| r * r).sum::<f64>();
+        }
+        if self.layout.calibration > 0 {
+            costs.calibration = estimate.calibration.prior_residual().norm_squared();
+        }
+        if let Some(prior) = self.prior {
+            costs.prior += prior.residual(&self.layout, &self.deviation(estimate)).norm_squared();
+        }
+        if let (Some(start), Some(first)) = (self.start, estimate.frames.first()) {
+            costs.prior += start.rows(first).1.norm_squared();
+        }
+        costs
+    }
+
+    /// `x ⊟ x₀` of everything that has a first estimate, zero elsewhere.
+    pub(super) fn deviation(&self, estimate: &Estimate) -> DVector<f64> {
+        let mut deviation = DVector::zeros(self.layout.total());
+        for (slot, (frame, current)) in self.frames.iter().zip(&estimate.frames).enumerate() {
+            if let Some(first) = &frame.first_estimate {
+                deviation.rows_range_mut(self.layout.frame(slot)).copy_from(&current.minus(first));
+            }
+        }
+        if self.layout.calibration > 0
+            && let Some(change) = estimate.calibration.deviation()
+        {
+            deviation.rows_range_mut(self.layout.calibration()).copy_from(&change);
+        }
+        deviation
+    }
+
+    fn imu_residual(&self, slot: usize, frames: &[FrameState]) -> Option<Vector15> {
+        let information = self.frames[slot].motion_information.as_ref()?;
+        let residual = imu_factor::residual(
+            &self.frames[slot].motion,
+            &frames[slot - 1].navigation,
+            &frames[slot].navigation,
+            &self.gravity_in_world,
+        );
+        Some(information * residual)
+    }
+
+    /// Joint, whitened residual and its derivative, for each encoder reading of a frame.
+    pub(super) fn encoder_residuals<'s>(
+        &'s self,
+        slot: usize,
+        state: &'s FrameState,
+    ) -> impl Iterator<Item = (usize, f64, f64)> + 's {
+        let readings = self.frames[slot].encoder_rad.as_deref().unwrap_or(&[]);
+        let sigma = self.encoder_sigma_rad;
+        state.joints_rad.iter().zip(readings).enumerate().filter_map(move |(joint, (angle, reading))| {
+            let sigma = sigma?;
+            Some((joint, wrap(angle - reading) / sigma, 1.0 / sigma))
+        })
+    }
+
+    /// Calibration at which derivatives are taken.
+    pub(super) fn linearization_calibration(&self, current: &Calibration) -> Calibration {
+        if self.calibration_first_estimates { current.at_first_estimate() } else { current.clone() }
+    }
+
+    /// Linearizes every factor.
+    pub(super) fn linearize(&self, estimate: &Estimate) -> NormalEquations {
+        let frames = self.linearization_frames(estimate);
+        let calibration = self.linearization_calibration(&estimate.calibration);
+        let current = camera_pose::by_slot(&estimate.frames, &estimate.calibration);
+        let linearized = camera_pose::by_slot(&frames, &calibration);
+        let visual = VisualSystem::new(&self.visual, &current, &linearized, self.tracks, &estimate.landmarks);
+        let maps = CameraMaps::new(&frames, &calibration);
+
+        let total = self.layout.total();
+        let mut hessian = DMatrix::zeros(total, total);
+        let mut gradient = DVector::zeros(total);
+        for slot in 1..self.frames.len() {
+            if let Some((by_from, by_to, residual)) = self.imu_rows(slot, estimate, &frames) {
+                self.add_imu(slot, &by_from, &by_to, &residual, &mut hessian, &mut gradient);
+            }
+        }
+        for slot in 0..self.frames.len() {
+            let start = self.layout.joints(slot).start;
+            for (joint, residual, slope) in self.encoder_residuals(slot, &estimate.frames[slot]) {
+                hessian[(start + joint, start + joint)] += slope * slope;
+                gradient[start + joint] += slope * residual;
+            }
+        }
+        if self.layout.calibration > 0 {
+            let place = self.layout.calibration();
+            let rows = estimate.calibration.prior_jacobian();
+            let residual = estimate.calibration.prior_residual();
+            let mut corner = hessian.view_range_mut(place.clone(), place.clone());
+            corner += rows.tr_mul(&rows);
+            let mut part = gradient.rows_range_mut(place);
+            part += rows.tr_mul(&residual);
+        }
+        if let Some(prior) = self.prior {
+            prior.add_to(&self.layout, &self.deviation(estimate), &mut hessian, &mut gradient);
+        }
+        if let (Some(start), Some(first)) = (self.start, estimate.frames.first()) {
+            let (rows, residual) = start.rows(first);
+            let place = self.layout.frame(0);
+            let mut corner = hessian.view_range_mut(place.clone(), place.clone());
+            corner += rows.tr_mul(&rows);
+            let mut part = gradient.rows_range_mut(place);
+            part += rows.tr_mul(&residual);
+        }
+        NormalEquations { visual, maps, hessian, gradient }
+    }
+
+    /// Whitened Jacobians and residual of the inertial factor that ends at `slot`.
+    pub(super) fn imu_rows(
+        &self,
+        slot: usize,
+        estimate: &Estimate,
+        linearized: &[FrameState],
+    ) -> Option<(Matrix15, Matrix15, Vector15)> {
+        let information = self.frames[slot].motion_information.as_ref()?;
+        let residual = self.imu_residual(slot, &estimate.frames)?;
+        let (by_from, by_to) = imu_factor::jacobians(
+            &self.frames[slot].motion,
+            &linearized[slot - 1].navigation,
+            &linearized[slot].navigation,
+            &self.gravity_in_world,
+        );
+        Some((information * by_from, information * by_to, residual))
+    }
+
+    fn add_imu(
+        &self,
+        slot: usize,
+        by_from: &Matrix15,
+        by_to: &Matrix15,
+        residual: &Vector15,
+        hessian: &mut DMatrix<f64>,
+        gradient: &mut DVector<f64>,
+    ) {
+        let places = [
+            (self.layout.pose(slot - 1).start, by_from.fixed_columns::<POSE>(0).into_owned()),
+            (self.layout.pose(slot).start, by_to.fixed_columns::<POSE>(0).into_owned()),
+        ];
+        let speeds = [
+            (self.layout.speed_bias(slot - 1).start, by_from.fixed_columns::<SPEED_BIAS>(POSE).into_owned()),
+            (self.layout.speed_bias(slot).start, by_to.fixed_columns::<SPEED_BIAS>(POSE).into_owned()),
+        ];
+        for (row, left) in &places {
+            add_vector(gradient, *row, &left.tr_mul(residual));
+            for (column, right) in &places {
+                add_block(hessian, *row, *column, &left.tr_mul(right));
+            }
+            for (column, right) in &speeds {
+                let block: SMatrix<f64, POSE, SPEED_BIAS> = left.tr_mul(right);
+                add_block(hessian, *row, *column, &block);
+                add_block(hessian, *column, *row, &block.transpose());
+            }
+        }
+        for (row, left) in &speeds {
+            add_vector(gradient, *row, &left.tr_mul(residual));
+            for (column, right) in &speeds {
+                add_block(hessian, *row, *column, &left.tr_mul(right));
+            }
+        }
+    }
+
+    /// The estimate after a step.
+    pub(super) fn stepped(&self, estimate: &Estimate, step: &DVector<f64>, landmarks: &[Vector3<f64>]) -> Estimate {
+        Estimate {
+            frames: self
+                .frames
+                .iter()
+                .zip(&estimate.frames)
+                .enumerate()
+                .map(|(slot, (frame, current))| {
+                    current.stepped(frame.first_estimate.as_ref(), &step.as_slice()[self.layout.frame(slot)])
+                })
+                .collect(),
+            calibration: estimate.calibration.stepped(&step.as_slice()[self.layout.calibration()]),
+            landmarks: estimate.landmarks.iter().zip(landmarks).map(|(landmark, delta)| landmark.plus(delta)).collect(),
+        }
+    }
+}
+
+impl NormalEquations {
+    /// The reduced normal equations over poses, joints, speeds, biases and calibration; the lower triangle counts.
+    pub(super) fn reduced(&self, layout: &Layout, visual: &ReducedVisualSystem) -> (DMatrix<f64>, DVector<f64>) {
+        let mut hessian = self.hessian.clone();
+        let mut gradient = self.gradient.clone();
+        let calibration = layout.calibration();
+        for row in 0..layout.frames {
+            let mut by_cameras: DMatrix<f64> = DMatrix::zeros(6, layout.calibration);
+            for column in 0..layout.frames {
+                let block: Matrix6<f64> =
+                    if row <= column { *visual.block(row, column) } else { visual.block(column, row).transpose() };
+                by_cameras += block * &self.maps.calibration[column];
+                if column <= row {
+                    // Lower triangle: the frame `row` below the frame `column`.
+                    let carried = self.maps.own[row].tr_mul(&(block * &self.maps.own[column]));
+                    let mut place = hessian.view_range_mut(layout.camera(row), layout.camera(column));
+                    place += &carried;
+                }
+            }
+            let mut coupling = hessian.view_range_mut(calibration.clone(), layout.camera(row));
+            coupling += by_cameras.tr_mul(&self.maps.own[row]);
+            let mut corner = hessian.view_range_mut(calibration.clone(), calibration.clone());
+            corner += self.maps.calibration[row].tr_mul(&by_cameras);
+            let camera_gradient = visual.gradient(row);
+            let mut part = gradient.rows_range_mut(layout.camera(row));
+            part += self.maps.own[row].tr_mul(camera_gradient);
+            let mut part = gradient.rows_range_mut(calibration.clone());
+            part += self.maps.calibration[row].tr_mul(camera_gradient);
+        }
+        (hessian, gradient)
+    }
+
+    /// Steps of the camera poses that belong to a step of the unknowns.
+    pub(super) fn camera_steps(&self, layout: &Layout, step: &DVector<f64>) -> Vec<Vector6<f64>> {
+        (0..layout.frames)
+            .map(|slot| {
+                let moved = &self.maps.own[slot] * step.rows_range(layout.camera(slot))
+                    + &self.maps.calibration[slot] * step.rows_range(layout.calibration());
+                Vector6::from_column_slice(moved.as_slice())
+            })
+            .collect()
+    }
+}
+
+/// An angle brought into (−π, π].
+pub(super) fn wrap(angle_rad: f64) -> f64 {
+    let turns = (angle_rad / std::f64::consts::TAU).round();
+    angle_rad - turns * std::f64::consts::TAU
+}
+
+fn add_block<const R: usize, const C: usize>(
+    matrix: &mut DMatrix<f64>,
+    row: usize,
+    column: usize,
+    block: &SMatrix<f64, R, C>,
+) {
+    let mut place = matrix.fixed_view_mut::<R, C>(row, column);
+    place += block;
+}
+
+fn add_vector<const R: usize>(vector: &mut DVector<f64>, row: usize, part: &SMatrix<f64, R, 1>) {
+    let mut place = vector.fixed_rows_mut::<R>(row);
+    place += part;
+}

@@ -1,0 +1,242 @@
+//! From the window to the report of a step.
+
+use nalgebra::{DVector, Vector2};
+
+use super::estimator::Estimator;
+use super::layout::Layout;
+use super::problem::{Costs, Estimate, Problem};
+use super::rows::stack;
+use super::solver;
+use super::tracking::{SolvedWindow, TrackResiduals};
+use super::{
+    CalibrationEstimate, ColumnBlock, ColumnGroup, FeatureReport, FrameStateReport, LandmarkReport, Linearization,
+    ObservationReport, Phase, ResidualSummary, StageTimes, StepInput, StepReport,
+};
+
+impl Estimator {
+    /// A report that holds nothing but the calibration.
+    pub(super) fn empty_report(&self, input: &StepInput<'_>, phase: Phase) -> StepReport {
+        StepReport {
+            frame_index: input.frame_index,
+            stamp_ns: input.stamp_ns,
+            phase,
+            restarts: self.restarts,
+            events: Vec::new(),
+            window: Vec::new(),
+            calibration: self.calibration_report(),
+            features: Vec::new(),
+            landmarks: Vec::new(),
+            residuals: Vec::new(),
+            reprojection_rms_before_px: 0.0,
+            reprojection_rms_after_px: 0.0,
+            iterations: Vec::new(),
+            linearization: None,
+            keyframe: false,
+            times: StageTimes::default(),
+            warnings: Vec::new(),
+        }
+    }
+
+    /// The report of a solved window.
+    pub(super) fn tracking_report(&mut self, input: &StepInput<'_>, solved: &mut SolvedWindow) -> StepReport {
+        self.calibration_sigmas = solver::sigmas(&solved.solution.calibration_covariance).iter().copied().collect();
+        let mut report = self.empty_report(input, Phase::Tracking);
+        report.window = self.window_report();
+        report.keyframe = self.frames.last().is_some_and(|frame| frame.keyframe);
+        report.features = self.feature_reports(solved);
+        report.landmarks = self.landmark_reports(solved);
+        report.residuals = self.residual_summaries(solved);
+        report.reprojection_rms_before_px = root_mean_square(&solved.residuals_before);
+        report.reprojection_rms_after_px = root_mean_square(&solved.residuals_after);
+        report.iterations = std::mem::take(&mut solved.solution.iterations);
+        if self.config.options.keep_linearization {
+            report.linearization = Some(self.linearization(solved));
+        }
+        report
+    }
+
+    /// The frames of the window.
+    pub(super) fn window_report(&self) -> Vec<FrameStateReport> {
+        self.frames
+            .iter()
+            .map(|frame| {
+                let navigation = &frame.state.navigation;
+                FrameStateReport {
+                    frame_index: frame.index,
+                    stamp_ns: frame.stamp_ns,
+                    world_from_imu: navigation.world_from_imu,
+                    velocity_m_per_s: navigation.velocity_m_per_s,
+                    accelerometer_bias_m_per_s2: navigation.bias.accelerometer_m_per_s2,
+                    gyroscope_bias_rad_per_s: navigation.bias.gyroscope_rad_per_s,
+                    joint_angles_rad: frame.state.joints_rad.clone(),
+                    encoder_angles_rad: frame.encoder_rad.clone(),
+                    imu_from_camera: self.calibration.imu_from_camera(&frame.state.joints_rad),
+                    keyframe: frame.keyframe,
+                }
+            })
+            .collect()
+    }
+
+    fn calibration_report(&self) -> CalibrationEstimate {
+        let chain = self.calibration.chain();
+        let count = chain.dof();
+        let sigmas = if self.calibration.dof() == 0 {
+            vec![0.0; count]
+        } else if self.calibration_sigmas.len() == count {
+            self.calibration_sigmas.clone()
+        } else {
+            vec![f64::NAN; count]
+        };
+        CalibrationEstimate {
+            parameterization: chain.parameterization().name().to_owned(),
+            names: chain.parameter_names(),
+            units: chain.parameter_units(),
+            values: chain.values().iter().copied().collect(),
+            sigmas,
+            prior_sigmas: self.calibration.prior_sigmas().iter().copied().collect(),
+            classical: chain.to_classical(),
+            margins: chain.margins(),
+        }
+    }
+
+    fn feature_reports(&self, solved: &SolvedWindow) -> Vec<FeatureReport> {
+        let sigma = self.config.options.pixel_sigma_px;
+        let loss = self.config.options.loss;
+        let observation =
+            |slot: usize, uv_px: Vector2<f64>, before: Option<Vector2<f64>>, after: Option<Vector2<f64>>| {
+                let chi2 = after.map_or(0.0, |residual| residual.norm_squared() / (sigma * sigma));
+                ObservationReport {
+                    frame_index: self.frames[slot].index,
+                    measured_px: uv_px,
+                    residual_before_px: before,
+                    residual_after_px: after,
+                    chi2,
+                    robust_weight: after.map_or(0.0, |_| loss.cost_and_weight(chi2).1),
+                }
+            };
+        (0..solved.ids.len())
+            .map(|index| {
+                let sightings = &solved.tracks[index].sightings;
+                let landmark = &solved.solution.estimate.landmarks[index];
+                let (before, after) = (&solved.residuals_before[index], &solved.residuals_after[index]);
+                FeatureReport {
+                    id: solved.ids[index],
+                    anchor_frame_index: self.frames[sightings[0].slot].index,
+                    inverse_depth_per_m: landmark.inverse_distance / landmark.bearing.z,
+                    observations: sightings
+                        .iter()
+                        .zip(before.iter().zip(after))
+                        .map(|(sighting, (before, after))| observation(sighting.slot, sighting.uv_px, *before, *after))
+                        .collect(),
+                    rejected: solved.rejected[index],
+                }
+            })
+            .collect()
+    }
+
+    fn landmark_reports(&self, solved: &SolvedWindow) -> Vec<LandmarkReport> {
+        let cameras = self.camera_poses();
+        (0..solved.ids.len())
+            .filter(|index| !solved.rejected[*index])
+            .map(|index| {
+                let camera = &cameras[solved.tracks[index].sightings[0].slot];
+                let point = solved.solution.estimate.landmarks[index].point_in_anchor();
+                LandmarkReport { id: solved.ids[index], position_m: camera.rotation * point + camera.position_m }
+            })
+            .collect()
+    }
+
+    fn residual_summaries(&self, solved: &SolvedWindow) -> Vec<ResidualSummary> {
+        let problem = self.problem(&solved.tracks);
+        let joints = problem.layout.joints;
+        let sightings: usize = solved.tracks.iter().map(|track| track.sightings.len()).sum();
+        let read = self.frames.iter().filter(|frame| frame.encoder_rad.is_some()).count();
+        let intervals = self.frames.iter().skip(1).filter(|frame| frame.motion_information.is_some()).count();
+        let held = self.prior.as_ref().map_or(0, super::prior::Prior::len)
+            + if self.start.is_some() { super::prior::StartPrior::LEN } else { 0 };
+        let (before, after) = (&solved.solution.costs_before, &solved.solution.costs_after);
+        let summary = |factor: &'static str, count: usize, part: fn(&Costs) -> f64| ResidualSummary {
+            factor,
+            count,
+            chi2_before: part(before),
+            chi2_after: part(after),
+        };
+        vec![
+            summary("visual", 2 * sightings, |costs| costs.visual),
+            summary("imu", 15 * intervals, |costs| costs.imu),
+            summary("encoder", joints * read, |costs| costs.encoder),
+            summary("calibration prior", problem.layout.calibration, |costs| costs.calibration),
+            summary("marginalization prior", held, |costs| costs.prior),
+        ]
+    }
+
+    /// The linearization at the final estimate: the measurements' rows, and those of the priors.
+    fn linearization(&self, solved: &SolvedWindow) -> Linearization {
+        let problem = self.problem(&solved.tracks);
+        let estimate = &solved.solution.estimate;
+        let layout = problem.layout;
+        let columns = layout.total() + 1;
+        let mut parts = vec![problem.visual_rows(estimate, &solved.tracks, &estimate.landmarks)];
+        parts.extend((1..layout.frames).map(|slot| problem.inertial_rows(slot, estimate)));
+        parts.extend((0..layout.frames).map(|slot| problem.encoder_rows(slot, estimate)));
+        let measured = stack(&parts, columns);
+        let priors = stack(&[problem.calibration_prior_rows(estimate), problem.prior_rows(estimate)], columns);
+        let order = column_order(&layout);
+        let names = self.column_blocks(&layout);
+        Linearization {
+            columns: names,
+            jacobian: measured.select_columns(&order),
+            prior_jacobian: priors.select_columns(&order),
+            calibration_column_norms: calibration_column_norms(&problem, estimate),
+        }
+    }
+
+    fn column_blocks(&self, layout: &Layout) -> Vec<ColumnBlock> {
+        let mut blocks = Vec::new();
+        let mut start = 0;
+        let mut push = |group: ColumnGroup, name: String, len: usize| {
+            if len > 0 {
+                blocks.push(ColumnBlock { group, name, start, len });
+                start += len;
+            }
+        };
+        if layout.calibration > 0 {
+            for name in self.calibration.chain().parameter_names() {
+                push(ColumnGroup::Calibration, name, 1);
+            }
+        }
+        for (group, kind, len) in [
+            (ColumnGroup::Joints, "joints", layout.joints),
+            (ColumnGroup::Pose, "pose", super::layout::POSE),
+            (ColumnGroup::SpeedBias, "speed-bias", super::layout::SPEED_BIAS),
+        ] {
+            for frame in &self.frames {
+                push(group, format!("{kind} {}", frame.index), len);
+            }
+        }
+        blocks
+    }
+}
+
+fn calibration_column_norms(problem: &Problem<'_>, estimate: &Estimate) -> DVector<f64> {
+    let equations = problem.linearize(estimate);
+    equations.visual.squared_column_norms(&equations.maps.calibration).map(|squared| squared.max(0.0).sqrt())
+}
+
+/// Columns of the layout in the order of the report: calibration, joints, poses, speeds and biases.
+fn column_order(layout: &Layout) -> Vec<usize> {
+    let mut order: Vec<usize> = layout.calibration().collect();
+    order.extend((0..layout.frames).flat_map(|slot| layout.joints(slot)));
+    order.extend((0..layout.frames).flat_map(|slot| layout.pose(slot)));
+    order.extend((0..layout.frames).flat_map(|slot| layout.speed_bias(slot)));
+    order
+}
+
+fn root_mean_square(residuals: &TrackResiduals) -> f64 {
+    let (sum, count) = residuals
+        .iter()
+        .flatten()
+        .flatten()
+        .fold((0.0, 0_usize), |(sum, count), residual| (sum + residual.norm_squared(), count + 1));
+    (sum / count.max(1) as f64).sqrt()
+}

@@ -1,0 +1,101 @@
+//! Factors as whitened rows `[columns of the layout | residual]`, for the marginalization and for the report.
+
+use nalgebra::DMatrix;
+
+use super::camera_pose::{self, CameraMaps};
+use super::layout::{POSE, SPEED_BIAS};
+use super::problem::{Estimate, Problem};
+use super::reprojection::Landmark;
+use super::visual::{self, Track};
+
+impl Problem<'_> {
+    /// The reprojection factors of `tracks`, landmarks projected out; at most `6·frames` rows.
+    pub(super) fn visual_rows(&self, estimate: &Estimate, tracks: &[Track], landmarks: &[Landmark]) -> DMatrix<f64> {
+        let frames = self.linearization_frames(estimate);
+        let calibration = self.linearization_calibration(&estimate.calibration);
+        let current = camera_pose::by_slot(&estimate.frames, &estimate.calibration);
+        let linearized = camera_pose::by_slot(&frames, &calibration);
+        let by_camera = visual::projected_rows(&self.visual, &current, &linearized, tracks, landmarks);
+        let maps = CameraMaps::new(&frames, &calibration);
+
+        let total = self.layout.total();
+        // The last row of a full triangle holds nothing but the residual that no camera pose can change.
+        let height = by_camera.nrows().min(6 * self.layout.frames);
+        let mut rows = DMatrix::zeros(height, total + 1);
+        for slot in 0..self.layout.frames {
+            let columns = by_camera.view((0, 6 * slot), (height, 6));
+            let own = columns * &maps.own[slot];
+            rows.columns_range_mut(self.layout.camera(slot)).copy_from(&own);
+            let mut shared = rows.columns_range_mut(self.layout.calibration());
+            shared += columns * &maps.calibration[slot];
+        }
+        rows.set_column(total, &by_camera.view((0, 6 * self.layout.frames), (height, 1)).column(0));
+        rows
+    }
+
+    /// The inertial factor that ends at `slot`, 15 rows, or none.
+    pub(super) fn inertial_rows(&self, slot: usize, estimate: &Estimate) -> DMatrix<f64> {
+        let total = self.layout.total();
+        let linearized = self.linearization_frames(estimate);
+        let Some((by_from, by_to, residual)) = self.imu_rows(slot, estimate, &linearized) else {
+            return DMatrix::zeros(0, total + 1);
+        };
+        let mut rows = DMatrix::zeros(15, total + 1);
+        for (slot, part) in [(slot - 1, &by_from), (slot, &by_to)] {
+            rows.columns_range_mut(self.layout.pose(slot)).copy_from(&part.fixed_columns::<POSE>(0));
+            rows.columns_range_mut(self.layout.speed_bias(slot)).copy_from(&part.fixed_columns::<SPEED_BIAS>(POSE));
+        }
+        rows.set_column(total, &residual);
+        rows
+    }
+
+    /// The encoder readings of a frame, a row each.
+    pub(super) fn encoder_rows(&self, slot: usize, estimate: &Estimate) -> DMatrix<f64> {
+        let readings: Vec<_> = self.encoder_residuals(slot, &estimate.frames[slot]).collect();
+        let mut rows = DMatrix::zeros(readings.len(), self.layout.total() + 1);
+        for (row, (joint, residual, slope)) in readings.into_iter().enumerate() {
+            rows[(row, self.layout.joints(slot).start + joint)] = slope;
+            rows[(row, self.layout.total())] = residual;
+        }
+        rows
+    }
+
+    /// The marginalization prior and what was known at the start.
+    pub(super) fn prior_rows(&self, estimate: &Estimate) -> DMatrix<f64> {
+        let total = self.layout.total();
+        let held = self
+            .prior
+            .map_or_else(|| DMatrix::zeros(0, total + 1), |prior| prior.rows(&self.layout, &self.deviation(estimate)));
+        let (Some(start), Some(first)) = (self.start, estimate.frames.first()) else { return held };
+        let (jacobian, residual) = start.rows(first);
+        let mut rows = DMatrix::zeros(jacobian.nrows(), total + 1);
+        rows.columns_range_mut(self.layout.frame(0)).copy_from(&jacobian);
+        rows.set_column(total, &residual);
+        stack(&[held, rows], total + 1)
+    }
+
+    /// The rig's prior on the calibration.
+    pub(super) fn calibration_prior_rows(&self, estimate: &Estimate) -> DMatrix<f64> {
+        let total = self.layout.total();
+        if self.layout.calibration == 0 {
+            return DMatrix::zeros(0, total + 1);
+        }
+        let jacobian = estimate.calibration.prior_jacobian();
+        let mut rows = DMatrix::zeros(jacobian.nrows(), total + 1);
+        rows.columns_range_mut(self.layout.calibration()).copy_from(&jacobian);
+        rows.set_column(total, &estimate.calibration.prior_residual());
+        rows
+    }
+}
+
+/// One matrix above the other.
+pub(super) fn stack(parts: &[DMatrix<f64>], columns: usize) -> DMatrix<f64> {
+    let height = parts.iter().map(DMatrix::nrows).sum();
+    let mut stacked = DMatrix::zeros(height, columns);
+    let mut start = 0;
+    for part in parts {
+        stacked.rows_mut(start, part.nrows()).copy_from(part);
+        start += part.nrows();
+    }
+    stacked
+}

@@ -1,0 +1,322 @@
+//! Before the window runs: frames are kept until the initialization has a solution, which then becomes the first window.
+
+use nalgebra::{DMatrix, DVector, UnitQuaternion, Vector3};
+
+use super::calibration::Calibration;
+use super::config::DEFAULT_CHAIN_PRIOR;
+use super::estimator::Estimator;
+use super::features;
+use super::initialization::{
+    InitializationFrame, InitializationInput, InitializationOptions, InitializationOrigin, InitializationOutcome,
+    InitializationSolution, WaitReason, try_initialize,
+};
+use super::preintegration::{NavigationState, Preintegration};
+use super::prior::StartPrior;
+use super::window::{Frame, FrameState};
+use super::{Event, EventKind, Phase, StepInput, StepReport};
+use crate::flight_log::ImuSample;
+use crate::frontend::TrackedFrame;
+use crate::geometry::{RigidTransform, seconds_from_ns, so3};
+
+/// A frame kept until the initialization succeeds.
+#[derive(Clone, Debug)]
+pub(super) struct WaitingFrame {
+    index: usize,
+    stamp_ns: i64,
+    tracks: TrackedFrame,
+    encoder_rad: Option<Vec<f64>>,
+    imu_from_camera: RigidTransform,
+    imu: Vec<ImuSample>,
+}
+
+/// Longest hole in the inertial samples that frames on both sides may be used together.
+const LONGEST_HOLE_S: f64 = 0.1;
+/// Standard deviation with which the joint angles are fitted to the mounts that the initialization found.
+const MOUNT_FIT_SIGMA_RAD: f64 = 0.01;
+/// Solves of the first window: the first from far, the later ones after outliers have been taken out.
+const FIRST_SOLVES: [usize; 3] = [15, 10, 5];
+
+impl Estimator {
+    /// One step while there is no window.
+    pub(super) fn wait(&mut self, input: &StepInput<'_>, mut events: Vec<Event>) -> StepReport {
+        let begin_ms = (self.config.clock_ms)();
+        self.keep_waiting_frame(input, &mut events);
+        let outcome = self.attempt();
+        let mut report = match outcome {
+            InitializationOutcome::Initialized(solution) => self.begin(input, &solution, &mut events),
+            InitializationOutcome::Waiting { reasons, standstill, .. } => {
+                if let Some(standing) = standstill {
+                    events.push(Event {
+                        kind: EventKind::Standstill,
+                        message: "standing still: the gyroscope's bias is measured, motion is awaited".to_owned(),
+                        value: Some(standing.gyroscope_bias_rad_per_s.norm()),
+                        threshold: None,
+                    });
+                    self.standstill = Some(standing);
+                }
+                events.extend(reasons.into_iter().map(|reason| waits(&reason)));
+                self.empty_report(input, Phase::Initializing)
+            }
+        };
+        report.times.optimize_ms = (self.config.clock_ms)() - begin_ms;
+        let own = std::mem::take(&mut report.events);
+        report.events = events;
+        report.events.extend(own);
+        report
+    }
+
+    fn keep_waiting_frame(&mut self, input: &StepInput<'_>, events: &mut Vec<Event>) {
+        let encoder_rad = self.encoder_reading(input);
+        let joints = encoder_rad.clone().unwrap_or_else(|| vec![0.0; self.calibration.joint_count()]);
+        if let Some(last) = self.waiting.back() {
+            let interval_s = seconds_from_ns(input.stamp_ns - last.stamp_ns);
+            let hole_s = longest_hole_s(input, last.stamp_ns);
+            if interval_s <= 0.0 || hole_s > LONGEST_HOLE_S {
+                events.push(Event {
+                    kind: EventKind::MeasurementMissing,
+                    message: format!(
+                        "a hole of {hole_s:.3} s in the inertial samples: the frames before it are forgotten"
+                    ),
+                    value: Some(hole_s),
+                    threshold: Some(LONGEST_HOLE_S),
+                });
+                self.waiting.clear();
+                self.standstill = None;
+            }
+        }
+        self.waiting.push_back(WaitingFrame {
+            index: input.frame_index,
+            stamp_ns: input.stamp_ns,
+            tracks: input.tracks.clone(),
+            imu_from_camera: self.calibration.imu_from_camera(&joints),
+            encoder_rad,
+            imu: input.imu.to_vec(),
+        });
+        let longest_ns = (self.initialization_options().longest_window_s * 1e9) as i64;
+        while self.waiting.front().is_some_and(|first| input.stamp_ns - first.stamp_ns > longest_ns) {
+            self.waiting.pop_front();
+        }
+    }
+
+    fn initialization_options(&self) -> InitializationOptions {
+        let options = &self.config.options;
+        let (translation_m, rotation_rad) = self.config.chain_prior.unwrap_or(DEFAULT_CHAIN_PRIOR);
+        let focal = 0.5 * (self.config.camera.intrinsics_px[0] + self.config.camera.intrinsics_px[1]);
+        let base = InitializationOptions {
+            bearing_sigma_rad: options.pixel_sigma_px / focal,
+            accelerometer_bias_sigma_m_per_s2: options.accelerometer_bias_sigma,
+            ..InitializationOptions::default()
+        };
+        let joints = self.calibration.joint_count();
+        if joints == 0 {
+            return base.for_rigid_mount(rotation_rad, translation_m);
+        }
+        // The rig's bounds are those of uniform errors.
+        let bounds = crate::flight_log::rig::ChainPrior {
+            translation_bound_m: translation_m * 3.0_f64.sqrt(),
+            rotation_bound_rad: rotation_rad * 3.0_f64.sqrt(),
+        };
+        base.for_gimbal(&bounds, joints, self.config.encoder_in_use())
+    }
+
+    fn attempt(&self) -> InitializationOutcome {
+        let frames: Vec<InitializationFrame<'_>> = self
+            .waiting
+            .iter()
+            .map(|frame| InitializationFrame {
+                frame_index: frame.index,
+                stamp_ns: frame.stamp_ns,
+                features: &frame.tracks.features,
+                imu_from_camera: frame.imu_from_camera,
+                imu: &frame.imu,
+            })
+            .collect();
+        let input = InitializationInput {
+            frames: &frames,
+            gravity_m_per_s2: self.config.gravity_m_per_s2,
+            imu_noise: self.noise,
+            standstill: self.standstill,
+        };
+        try_initialize(&input, &self.initialization_options())
+    }
+
+    /// The solution becomes the window, which is solved right away.
+    fn begin(
+        &mut self,
+        input: &StepInput<'_>,
+        solution: &InitializationSolution,
+        events: &mut Vec<Event>,
+    ) -> StepReport {
+        self.fill_window(solution);
+        self.phase = Phase::Tracking;
+        let mut solved = self.solve_window(FIRST_SOLVES[0]);
+        for iterations in &FIRST_SOLVES[1..] {
+            self.forget_rejected(&solved, events);
+            solved = self.solve_window(*iterations);
+        }
+        if let Some(start) = &mut self.start {
+            start.reference = self.frames[0].state.clone();
+        }
+        let (kind, how) = match solution.origin {
+            InitializationOrigin::FromMotion => (EventKind::InitializedFromMotion, "motion"),
+            InitializationOrigin::FromStandstill => (EventKind::InitializedFromStandstill, "standstill"),
+        };
+        events.push(Event {
+            kind,
+            message: format!(
+                "initialized from {how}: {} frames, {} landmarks, scale known to {:.1} %",
+                solution.frames.len(),
+                solution.landmarks.len(),
+                100.0 * solution.diagnostics.scale_sigma
+            ),
+            value: Some(solution.diagnostics.scale_sigma),
+            threshold: Some(self.initialization_options().most_scale_sigma),
+        });
+        let (keyframe, chosen) = self.choose_keyframe();
+        if let Some(newest) = self.frames.last_mut() {
+            newest.keyframe = keyframe;
+        }
+        events.push(chosen);
+        let report = self.tracking_report(input, &mut solved);
+        self.forget_rejected(&solved, events);
+        self.make_room(events);
+        report
+    }
+
+    fn fill_window(&mut self, solution: &InitializationSolution) {
+        let world = self.world_of(solution);
+        let views = &solution.frames[solution.frames.len().saturating_sub(self.config.options.window + 1)..];
+        let mut imu = Preintegration::new(self.noise, solution.bias);
+        let mut mounts = Vec::new();
+        for waiting in std::mem::take(&mut self.waiting) {
+            let Some(view) = views.iter().find(|view| view.frame_index == waiting.index) else {
+                imu.extend(&waiting.imu);
+                continue;
+            };
+            imu.extend(&waiting.imu);
+            let motion = std::mem::replace(&mut imu, Preintegration::new(self.noise, solution.bias));
+            let first = self.frames.is_empty();
+            let motion = if first { Preintegration::new(self.noise, solution.bias) } else { motion };
+            let joints_rad = waiting.encoder_rad.clone().unwrap_or_else(|| vec![0.0; self.calibration.joint_count()]);
+            let navigation = NavigationState {
+                world_from_imu: world * view.world_from_imu,
+                velocity_m_per_s: world.rotation * view.velocity_m_per_s,
+                bias: solution.bias,
+            };
+            let slot = self.frames.len();
+            self.frames.push(Frame {
+                index: waiting.index,
+                stamp_ns: waiting.stamp_ns,
+                state: FrameState { navigation, joints_rad },
+                first_estimate: None,
+                encoder_rad: waiting.encoder_rad,
+                keyframe: true,
+                motion_information: motion.square_root_information(),
+                motion,
+            });
+            mounts.push(view.imu_from_camera);
+            features::observe(&mut self.features, slot, &waiting.tracks);
+        }
+        if let Some(newest) = self.frames.last_mut() {
+            newest.keyframe = false;
+        }
+        self.fit_mounts(&mounts);
+        let options = &self.config.options;
+        self.start = self.frames.first().map(|first| StartPrior {
+            reference: first.state.clone(),
+            bias: super::ImuBias {
+                gyroscope_rad_per_s: solution.bias.gyroscope_rad_per_s,
+                accelerometer_m_per_s2: Vector3::zeros(),
+            },
+            accelerometer_bias_sigma: options.accelerometer_bias_sigma,
+            gyroscope_bias_sigma: options.gyroscope_bias_sigma,
+        });
+    }
+
+    /// Where the solution's world lies: at the origin, or where the window before a failure ended.
+    fn world_of(&self, solution: &InitializationSolution) -> RigidTransform {
+        let (Some(resume), Some(first)) = (&self.resume_at, solution.frames.first()) else {
+            return RigidTransform::identity();
+        };
+        let yaw = |rotation: &UnitQuaternion<f64>| {
+            let forward = rotation * Vector3::x();
+            forward.y.atan2(forward.x)
+        };
+        let turn = yaw(&resume.rotation) - yaw(&first.world_from_imu.rotation);
+        let rotation = so3::exp(&Vector3::new(0.0, 0.0, turn));
+        RigidTransform::new(rotation, resume.translation_m - rotation * first.world_from_imu.translation_m)
+    }
+
+    /// Joint angles and chain that explain the mounts' rotations, between encoder readings and the rig's prior.
+    fn fit_mounts(&mut self, mounts: &[RigidTransform]) {
+        let joints = self.calibration.joint_count();
+        if joints == 0 || mounts.len() != self.frames.len() {
+            return;
+        }
+        let dof = self.calibration.dof();
+        let total = dof + joints * mounts.len();
+        let sigma = self.config.encoder_in_use().unwrap_or(1.0);
+        let starts: Vec<Vec<f64>> = self.frames.iter().map(|frame| frame.state.joints_rad.clone()).collect();
+        let mut angles = starts.clone();
+        let mut calibration: Calibration = self.calibration.clone();
+        for _ in 0..10 {
+            let mut hessian = DMatrix::zeros(total, total);
+            let mut gradient = DVector::zeros(total);
+            if dof > 0 {
+                let rows = calibration.prior_jacobian();
+                hessian.view_mut((0, 0), (dof, dof)).copy_from(&rows.tr_mul(&rows));
+                gradient.rows_mut(0, dof).copy_from(&rows.tr_mul(&calibration.prior_residual()));
+            }
+            for (slot, mount) in mounts.iter().enumerate() {
+                let chain = calibration.linearize(&angles[slot]);
+                let error = so3::log(&(mount.rotation.inverse() * chain.imu_from_camera.rotation));
+                let mut rows = DMatrix::zeros(3, total);
+                let place = dof + joints * slot;
+                rows.columns_mut(0, dof).copy_from(&chain.by_parameters.fixed_rows::<3>(0));
+                rows.columns_mut(place, joints).copy_from(&chain.by_joints.fixed_rows::<3>(0));
+                let rows = so3::right_jacobian_inverse(&error) * rows / MOUNT_FIT_SIGMA_RAD;
+                hessian += rows.tr_mul(&rows);
+                gradient += rows.tr_mul(&(error / MOUNT_FIT_SIGMA_RAD));
+                for joint in 0..joints {
+                    hessian[(place + joint, place + joint)] += 1.0 / (sigma * sigma);
+                    gradient[place + joint] += (angles[slot][joint] - starts[slot][joint]) / (sigma * sigma);
+                }
+            }
+            let Some(factor) = hessian.cholesky() else { return };
+            let step = -factor.solve(&gradient);
+            calibration = calibration.stepped(&step.as_slice()[..dof]);
+            for (slot, angles) in angles.iter_mut().enumerate() {
+                for (joint, angle) in angles.iter_mut().enumerate() {
+                    *angle += step[dof + joints * slot + joint];
+                }
+            }
+            if step.amax() < 1e-6 {
+                break;
+            }
+        }
+        if angles.iter().flatten().all(|angle| angle.is_finite()) {
+            for (frame, angles) in self.frames.iter_mut().zip(angles) {
+                frame.state.joints_rad = angles;
+            }
+            self.calibration = calibration;
+        }
+    }
+}
+
+fn waits(reason: &WaitReason) -> Event {
+    Event {
+        kind: EventKind::InitializationWaits,
+        message: reason.message.clone(),
+        value: Some(reason.value),
+        threshold: Some(reason.threshold),
+    }
+}
+
+/// The longest time without an inertial sample between the last image and this one.
+fn longest_hole_s(input: &StepInput<'_>, last_stamp_ns: i64) -> f64 {
+    let stamps = std::iter::once(last_stamp_ns)
+        .chain(input.imu.iter().map(|sample| sample.stamp_ns).filter(|stamp| *stamp > last_stamp_ns))
+        .chain(std::iter::once(input.stamp_ns));
+    let stamps: Vec<i64> = stamps.collect();
+    stamps.windows(2).map(|pair| seconds_from_ns(pair[1] - pair[0])).fold(0.0, f64::max)
+}

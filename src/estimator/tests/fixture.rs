@@ -1,0 +1,149 @@
+//! Windows and estimators made from synthetic flights.
+
+use nalgebra::DVector;
+
+use super::Noise;
+use crate::camera::CameraModel;
+use crate::estimator::layout::Layout;
+use crate::estimator::preintegration::{ImuBias, NavigationState, Preintegration};
+use crate::estimator::prior::StartPrior;
+use crate::estimator::window::{Frame, FrameState};
+use crate::estimator::{Estimator, EstimatorConfig, EstimatorOptions, features};
+use crate::flight_log::Rig;
+use crate::flight_log::rig::CameraMount;
+use crate::gimbal::{Chain, ClassicalChain, Parameterization};
+use crate::simulation::{Lens, SyntheticFlight, SyntheticMount, SyntheticOptions, synthetic_tracks};
+
+pub(super) fn camera(lens: Lens) -> CameraModel {
+    let options = SyntheticOptions { duration_s: 0.1, lens, ..SyntheticOptions::default() };
+    synthetic_tracks(&options).given_rig.cameras[0].model.clone()
+}
+
+/// The mount of `cam0` in a rig.
+pub(super) fn chain(rig: &Rig) -> ClassicalChain {
+    match &rig.cameras[0].mount {
+        CameraMount::Gimbal => rig.gimbal.as_ref().unwrap().chain.clone(),
+        CameraMount::Static { imu_from_camera } => {
+            ClassicalChain { imu_from_base: *imu_from_camera, ..ClassicalChain::default() }
+        }
+    }
+}
+
+/// An estimator for a rig's `cam0`.
+pub(super) fn config(rig: &Rig, parameterization: Parameterization, options: EstimatorOptions) -> EstimatorConfig {
+    let root = 3.0_f64.sqrt();
+    EstimatorConfig {
+        camera: rig.cameras[0].model.clone(),
+        imu_noise: rig.imu.noise,
+        gravity_m_per_s2: rig.gravity_m_per_s2,
+        chain: chain(rig),
+        parameterization,
+        auto_chart: false,
+        encoder_sigma_rad: rig.gimbal.as_ref().and_then(|gimbal| gimbal.encoder_sigma_rad),
+        use_encoder: true,
+        calibrate: true,
+        chain_prior: rig
+            .gimbal
+            .as_ref()
+            .map(|gimbal| (gimbal.prior.translation_bound_m / root, gimbal.prior.rotation_bound_rad / root)),
+        options,
+        clock_ms: || 0.0,
+    }
+}
+
+fn flight(gimbal: bool) -> SyntheticFlight {
+    synthetic_tracks(&SyntheticOptions {
+        mount: if gimbal { SyntheticMount::Gimbal } else { SyntheticMount::Static },
+        duration_s: 8.0,
+        features: 40,
+        ..SyntheticOptions::default()
+    })
+}
+
+/// A window of six frames at the truth (landmarks from the noisy tracks), with the given chain.
+pub(super) fn window(parameterization: Parameterization, gimbal: bool, options: EstimatorOptions) -> Estimator {
+    let flight = flight(gimbal);
+    let mut estimator = Estimator::new(config(&flight.given_rig, parameterization, options));
+    estimator.calibration.set_chain(Chain::from_classical(&chain(&flight.true_rig), parameterization));
+    let spacing = 4;
+    let first = 100;
+    for slot in 0..6 {
+        let index = first + slot * spacing;
+        let truth = &flight.frames[index];
+        let bias = ImuBias {
+            gyroscope_rad_per_s: truth.true_bias.gyroscope_rad_per_s,
+            accelerometer_m_per_s2: truth.true_bias.accelerometer_m_per_s2,
+        };
+        let mut motion = Preintegration::new(estimator.noise, bias);
+        if slot > 0 {
+            for frame in &flight.frames[index - spacing + 1..=index] {
+                motion.extend(&frame.imu);
+            }
+        }
+        estimator.frames.push(Frame {
+            index,
+            stamp_ns: truth.stamp_ns,
+            state: FrameState {
+                navigation: NavigationState {
+                    world_from_imu: truth.true_world_from_imu,
+                    velocity_m_per_s: truth.true_velocity_m_per_s,
+                    bias,
+                },
+                joints_rad: truth.true_joint_angles_rad.clone(),
+            },
+            first_estimate: None,
+            encoder_rad: truth.joint_angles_rad.clone(),
+            keyframe: true,
+            motion_information: motion.square_root_information(),
+            motion,
+        });
+        features::observe(&mut estimator.features, slot, &truth.tracks);
+    }
+    estimator.start = Some(StartPrior {
+        reference: estimator.frames[0].state.clone(),
+        bias: ImuBias::default(),
+        accelerometer_bias_sigma: 0.5,
+        gyroscope_bias_sigma: 0.02,
+    });
+    estimator.triangulate_new();
+    assert!(estimator.active_tracks().0.len() > 20, "enough landmarks");
+    estimator
+}
+
+/// Marginalizes the oldest frame, so that there is a prior and there are first estimates.
+pub(super) fn marginalize_once(estimator: &mut Estimator) {
+    estimator.config.options.window = estimator.frames.len() - 1;
+    estimator.make_room(&mut Vec::new());
+    assert!(estimator.prior.is_some());
+}
+
+/// Moves every unknown at random; `scale` 1 is 2 cm and 1° of pose, 0.1 m/s, 2 mm and 0.2° of calibration.
+pub(super) fn shake(estimator: &mut Estimator, scale: f64) {
+    let mut random = Noise::new(11);
+    let layout = Layout {
+        frames: estimator.frames.len(),
+        joints: estimator.calibration.joint_count(),
+        calibration: estimator.calibration.dof(),
+    };
+    let mut delta = DVector::zeros(layout.total());
+    for slot in 0..layout.frames {
+        for (offset, column) in layout.pose(slot).enumerate() {
+            delta[column] = random.normal() * if offset < 3 { 0.017 } else { 0.02 };
+        }
+        for column in layout.joints(slot) {
+            delta[column] = random.normal() * 0.01;
+        }
+        for (offset, column) in layout.speed_bias(slot).enumerate() {
+            delta[column] = random.normal() * [0.1, 0.003, 0.05][offset / 3];
+        }
+    }
+    let units = estimator.calibration.chain().parameter_units();
+    for (unit, column) in units.iter().zip(layout.calibration()) {
+        delta[column] = random.normal() * if *unit == "rad" { 0.0035 } else { 0.002 };
+    }
+    delta *= scale;
+    for (slot, frame) in estimator.frames.iter_mut().enumerate() {
+        frame.state = frame.state.stepped(frame.first_estimate.as_ref(), &delta.as_slice()[layout.frame(slot)]);
+    }
+    estimator.calibration = estimator.calibration.stepped(&delta.as_slice()[layout.calibration()]);
+}

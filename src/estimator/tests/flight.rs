@@ -1,0 +1,169 @@
+//! Whole synthetic flights: accuracy, calibration, replay, trouble.
+
+use nalgebra::Vector3;
+
+use super::fixture;
+use crate::estimator::{Estimator, EstimatorConfig, EstimatorOptions, EventKind, Phase, StepInput, StepReport};
+use crate::geometry::so3;
+use crate::gimbal::Parameterization;
+use crate::simulation::{SyntheticFlight, SyntheticFrame, SyntheticMount, SyntheticOptions, synthetic_tracks};
+
+fn options(mount: SyntheticMount) -> SyntheticOptions {
+    SyntheticOptions {
+        mount,
+        seed: 5,
+        duration_s: 10.0,
+        pixel_sigma_px: 0.5,
+        outlier_share: 0.02,
+        features: 100,
+        ..SyntheticOptions::default()
+    }
+}
+
+fn step(estimator: &mut Estimator, frame: &SyntheticFrame) -> StepReport {
+    estimator.step(&StepInput {
+        frame_index: frame.index,
+        stamp_ns: frame.stamp_ns,
+        imu: &frame.imu,
+        joint_angles_rad: frame.joint_angles_rad.as_deref(),
+        tracks: &frame.tracks,
+    })
+}
+
+fn fly(flight: &SyntheticFlight, config: EstimatorConfig) -> (Estimator, Vec<StepReport>) {
+    let mut estimator = Estimator::new(config);
+    let reports = flight.frames.iter().map(|frame| step(&mut estimator, frame)).collect();
+    (estimator, reports)
+}
+
+/// Root mean square of the position errors once yaw and position are laid on the truth, and how far was flown meanwhile.
+fn trajectory_error_m(flight: &SyntheticFlight, reports: &[StepReport]) -> (f64, f64) {
+    let pairs: Vec<(Vector3<f64>, Vector3<f64>)> = reports
+        .iter()
+        .zip(&flight.frames)
+        .filter_map(|(report, frame)| {
+            Some((report.newest()?.world_from_imu.translation_m, frame.true_world_from_imu.translation_m))
+        })
+        .collect();
+    assert!(pairs.len() > 100, "estimated {} of {} frames", pairs.len(), reports.len());
+    let count = pairs.len() as f64;
+    let middle =
+        |pick: fn(&(Vector3<f64>, Vector3<f64>)) -> Vector3<f64>| pairs.iter().map(pick).sum::<Vector3<f64>>() / count;
+    let (estimated, truth) = (middle(|pair| pair.0), middle(|pair| pair.1));
+    let (mut cosine, mut sine) = (0.0, 0.0);
+    for (e, t) in pairs.iter().map(|pair| (pair.0 - estimated, pair.1 - truth)) {
+        cosine += e.x * t.x + e.y * t.y;
+        sine += e.x * t.y - e.y * t.x;
+    }
+    let turn = so3::exp(&Vector3::new(0.0, 0.0, sine.atan2(cosine)));
+    let squares: f64 = pairs.iter().map(|pair| (turn * (pair.0 - estimated) - (pair.1 - truth)).norm_squared()).sum();
+    let length = pairs.windows(2).map(|two| (two[1].1 - two[0].1).norm()).sum();
+    ((squares / count).sqrt(), length)
+}
+
+/// Mean error of the chain over the joint angles of the flight, in metres and radians.
+fn chain_error(flight: &SyntheticFlight, estimator: &Estimator) -> (f64, f64) {
+    let (estimated, truth) = (estimator.classical_chain(), fixture::chain(&flight.true_rig));
+    let count = flight.frames.len() as f64;
+    flight.frames.iter().fold((0.0, 0.0), |(shift, turn), frame| {
+        let angles = &frame.true_joint_angles_rad;
+        let error = estimated.imu_from_camera(angles).inverse() * truth.imu_from_camera(angles);
+        (shift + error.translation_m.norm() / count, turn + so3::log(&error.rotation).norm() / count)
+    })
+}
+
+#[test]
+fn a_rigid_camera_follows_the_flight() {
+    let flight = synthetic_tracks(&options(SyntheticMount::Static));
+    let config = fixture::config(&flight.given_rig, Parameterization::Minimal, EstimatorOptions::default());
+    let (estimator, reports) = fly(&flight, config);
+    let (error, length) = trajectory_error_m(&flight, &reports);
+    assert!(error < 0.003 * length, "{error} m over {length} m");
+    assert_eq!(estimator.restarts, 0);
+    let last = reports.last().unwrap();
+    assert_eq!(last.calibration.names.len(), 6);
+    assert!(last.calibration.sigmas.iter().zip(&last.calibration.prior_sigmas).all(|(after, before)| after < before));
+    assert!(last.window.iter().all(|frame| frame.joint_angles_rad.is_empty()));
+}
+
+#[test]
+fn a_gimbal_camera_follows_the_flight_and_calibrates_its_chain() {
+    let flight = synthetic_tracks(&options(SyntheticMount::Gimbal));
+    for parameterization in [Parameterization::Minimal, Parameterization::Classical, Parameterization::Poe] {
+        let config = fixture::config(&flight.given_rig, parameterization, EstimatorOptions::default());
+        let before = chain_error(&flight, &Estimator::new(config.clone()));
+        let (estimator, reports) = fly(&flight, config);
+        let (error, length) = trajectory_error_m(&flight, &reports);
+        assert!(error < 0.003 * length, "{parameterization}: {error} m over {length} m");
+        let after = chain_error(&flight, &estimator);
+        assert!(after.1 < 0.5 * before.1, "{parameterization}: {before:?} to {after:?}");
+        let last = reports.last().unwrap();
+        assert_eq!(last.calibration.names.len(), estimator.calibration.chain().dof());
+    }
+}
+
+#[test]
+fn a_fixed_chain_stays_as_it_was_given() {
+    let flight = synthetic_tracks(&SyntheticOptions { duration_s: 8.5, ..options(SyntheticMount::Gimbal) });
+    let mut config = fixture::config(&flight.given_rig, Parameterization::Minimal, EstimatorOptions::default());
+    config.calibrate = false;
+    let given = Estimator::new(config.clone()).classical_chain();
+    let (estimator, reports) = fly(&flight, config);
+    assert_eq!(estimator.classical_chain(), given);
+    let last = reports.last().unwrap();
+    assert_eq!(last.phase, Phase::Tracking);
+    assert!(last.calibration.sigmas.iter().all(|sigma| *sigma == 0.0));
+    assert_eq!(last.newest().unwrap().joint_angles_rad.len(), 3);
+}
+
+/// A clone goes on exactly as the original, and a second run gives the same reports.
+#[test]
+fn replays_and_clones_give_the_same_bits() {
+    let flight = synthetic_tracks(&SyntheticOptions { duration_s: 7.0, ..options(SyntheticMount::Gimbal) });
+    let config = fixture::config(&flight.given_rig, Parameterization::Minimal, EstimatorOptions::default());
+    let (_, reports) = fly(&flight, config.clone());
+    let mut estimator = Estimator::new(config);
+    let half = flight.frames.len() / 2 + 10;
+    let comparable = |report: &StepReport| format!("{report:?}");
+    for (frame, report) in flight.frames[..half].iter().zip(&reports) {
+        assert_eq!(comparable(&step(&mut estimator, frame)), comparable(report));
+    }
+    assert_eq!(estimator.phase, Phase::Tracking);
+    let mut copy = estimator.clone();
+    for (frame, report) in flight.frames[half..].iter().zip(&reports[half..]) {
+        assert_eq!(comparable(&step(&mut copy, frame)), comparable(report));
+    }
+}
+
+#[test]
+fn trouble_is_reported_and_survived() {
+    let flight = synthetic_tracks(&SyntheticOptions { duration_s: 14.0, ..options(SyntheticMount::Static) });
+    let config = fixture::config(&flight.given_rig, Parameterization::Minimal, EstimatorOptions::default());
+    let mut estimator = Estimator::new(config);
+    let mut kinds = Vec::new();
+    let mut last = None;
+    for frame in &flight.frames {
+        let mut frame = frame.clone();
+        match frame.index {
+            // A sample that is no number, and an image from the past.
+            100 => frame.imu[3].specific_force_m_per_s2 = Vector3::repeat(f64::NAN),
+            105 => frame.stamp_ns -= 400_000_000,
+            // Half a second without a picture, then one and a half without inertial samples.
+            120..130 => frame.tracks.features.clear(),
+            140..170 => continue,
+            170 => frame.imu.clear(),
+            _ => {}
+        }
+        let report = step(&mut estimator, &frame);
+        kinds.extend(report.events.iter().map(|event| event.kind));
+        if let Some(newest) = report.newest() {
+            assert!(newest.world_from_imu.translation_m.iter().all(|x| x.is_finite()), "image {}", frame.index);
+        }
+        last = Some(report);
+    }
+    assert!(kinds.contains(&EventKind::MeasurementMissing));
+    assert!(kinds.contains(&EventKind::Failure));
+    let last = last.unwrap();
+    assert_eq!(last.restarts, 1);
+    assert_eq!(last.phase, Phase::Tracking, "recovered after the gap: {:?}", last.events);
+}

@@ -1,0 +1,256 @@
+//! The window's problem: Jacobians, elimination, marginalization, solving.
+
+use nalgebra::{DMatrix, DVector, Vector2, Vector3, Vector6};
+
+use super::{Noise, fixture};
+use crate::estimator::Estimator;
+use crate::estimator::dense::{self, Cholesky};
+use crate::estimator::marginalization;
+use crate::estimator::options::{EstimatorOptions, RobustLoss};
+use crate::estimator::problem::Estimate;
+use crate::estimator::reprojection::{self, CameraPose, Landmark, RelativePose};
+use crate::estimator::rows::stack;
+use crate::estimator::solver::{self, SolverLimits};
+use crate::geometry::{RigidTransform, so3};
+use crate::gimbal::Parameterization;
+use crate::simulation::Lens;
+
+fn quadratic() -> EstimatorOptions {
+    EstimatorOptions { loss: RobustLoss::None, ..EstimatorOptions::default() }
+}
+
+/// A gimbal's window in each form, and a rigid camera's.
+fn windows() -> Vec<(&'static str, Estimator)> {
+    let gimbal = |parameterization| fixture::window(parameterization, true, quadratic());
+    vec![
+        ("minimal", gimbal(Parameterization::Minimal)),
+        ("minimal-swapped-yx", gimbal(Parameterization::MinimalSwappedYx)),
+        ("classical", gimbal(Parameterization::Classical)),
+        ("poe", gimbal(Parameterization::Poe)),
+        ("rigid", fixture::window(Parameterization::Minimal, false, quadratic())),
+    ]
+}
+
+fn estimate_of(estimator: &Estimator, landmarks: Vec<Landmark>) -> Estimate {
+    Estimate {
+        frames: estimator.frames.iter().map(|frame| frame.state.clone()).collect(),
+        calibration: estimator.calibration.clone(),
+        landmarks,
+    }
+}
+
+fn moved(pose: &RigidTransform, delta: &Vector6<f64>) -> CameraPose {
+    let pose = pose.plus(delta);
+    CameraPose { rotation: pose.rotation_matrix(), position_m: pose.translation_m }
+}
+
+#[test]
+fn reprojection_jacobians_meet_central_differences() {
+    let mut random = Noise::new(3);
+    for lens in [Lens::Pinhole, Lens::Radtan] {
+        let camera = fixture::camera(lens);
+        for _ in 0..40 {
+            let anchor = RigidTransform::new(so3::exp(&(random.vector() * 0.3)), random.vector() * 0.3);
+            let observer = RigidTransform::new(so3::exp(&(random.vector() * 0.3)), random.vector() * 0.3);
+            let bearing = Vector3::new(0.3 * random.normal(), 0.3 * random.normal(), 1.0).normalize();
+            let landmark = Landmark { bearing, inverse_distance: 0.05 + 0.4 * random.uniform() };
+            let measured = Vector2::new(300.0, 200.0);
+            let zero = Vector6::zeros();
+            let at = |a: &Vector6<f64>, o: &Vector6<f64>, l: &Vector3<f64>| {
+                let relative = RelativePose::new(&moved(&anchor, a), &moved(&observer, o));
+                reprojection::residual_px(&camera, &relative, &landmark.plus(l), &measured)
+            };
+            let relative = RelativePose::new(&moved(&anchor, &zero), &moved(&observer, &zero));
+            let Some(term) = reprojection::linearize(&camera, &relative, &relative, &landmark, &measured) else {
+                continue;
+            };
+            let step = 1e-6;
+            for column in 0..6 {
+                let mut delta = Vector6::zeros();
+                delta[column] = step;
+                let still = Vector3::zeros();
+                let by_anchor =
+                    (at(&delta, &zero, &still).unwrap() - at(&-delta, &zero, &still).unwrap()) / (2.0 * step);
+                let by_observer =
+                    (at(&zero, &delta, &still).unwrap() - at(&zero, &-delta, &still).unwrap()) / (2.0 * step);
+                assert!((term.by_anchor.column(column) - by_anchor).amax() < 1e-4, "anchor, column {column}");
+                assert!((term.by_observer.column(column) - by_observer).amax() < 1e-4, "observer, column {column}");
+            }
+            for column in 0..3 {
+                let mut delta = Vector3::zeros();
+                delta[column] = step;
+                let numeric = (at(&zero, &zero, &delta).unwrap() - at(&zero, &zero, &-delta).unwrap()) / (2.0 * step);
+                assert!((term.by_landmark.column(column) - numeric).amax() < 1e-4, "landmark, column {column}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_gradient_of_every_factor_meets_central_differences() {
+    for (name, mut estimator) in windows() {
+        // Steps count from the first estimates, so that derivatives are plain ones only there.
+        fixture::shake(&mut estimator, 0.2);
+        fixture::marginalize_once(&mut estimator);
+        let (_, tracks, landmarks) = estimator.active_tracks();
+        let problem = estimator.problem(&tracks);
+        assert!(problem.prior.is_some(), "{name}: a prior takes part");
+        let estimate = estimate_of(&estimator, landmarks);
+        let equations = problem.linearize(&estimate);
+        // Damped without end, the landmarks stay where they are.
+        let held = equations.visual.eliminate(1e14);
+        let (_, gradient) = equations.reduced(&problem.layout, &held);
+        let still = vec![Vector3::zeros(); estimate.landmarks.len()];
+        for column in 0..problem.layout.total() {
+            let step = 1e-6;
+            let mut delta = DVector::zeros(problem.layout.total());
+            delta[column] = step;
+            let up = problem.costs(&problem.stepped(&estimate, &delta, &still)).total();
+            let down = problem.costs(&problem.stepped(&estimate, &-delta, &still)).total();
+            let numeric = (up - down) / (2.0 * step);
+            // Rows of poe's prior are taken as flat.
+            let tolerance = if name == "poe" { 2e-2 } else { 2e-5 };
+            let scale = gradient.amax().min(1e3 + gradient[column].abs());
+            assert!(
+                (gradient[column] - numeric).abs() < tolerance * scale,
+                "{name}, column {column} of {}: {} against {numeric}",
+                problem.layout.total(),
+                gradient[column]
+            );
+        }
+    }
+}
+
+#[test]
+fn projecting_landmarks_out_equals_their_schur_complement() {
+    for (name, estimator) in windows() {
+        let (_, tracks, landmarks) = estimator.active_tracks();
+        let problem = estimator.problem(&tracks);
+        let estimate = estimate_of(&estimator, landmarks);
+        let rows = problem.visual_rows(&estimate, &tracks, &estimate.landmarks);
+        let total = problem.layout.total();
+        let jacobian = rows.columns(0, total);
+        let equations = problem.linearize(&estimate);
+        let reduced = equations.visual.eliminate(0.0);
+        let (with, gradient_with) = equations.reduced(&problem.layout, &reduced);
+        let without = estimator.problem(&[]);
+        let plain = without.linearize(&Estimate { landmarks: Vec::new(), ..estimate.clone() });
+        let nothing = plain.visual.eliminate(0.0);
+        let (others, gradient_others) = plain.reduced(&problem.layout, &nothing);
+        let expected = with - others;
+        let found = jacobian.tr_mul(&jacobian);
+        let scale = expected.amax();
+        for column in 0..total {
+            for row in column..total {
+                let difference = (expected[(row, column)] - found[(row, column)]).abs();
+                assert!(difference < 1e-7 * scale, "{name}: entry {row}, {column} differs by {difference}");
+            }
+        }
+        let gradient = jacobian.tr_mul(&rows.column(total));
+        let expected = gradient_with - gradient_others;
+        assert!((gradient - &expected).amax() < 1e-7 * expected.amax(), "{name}: gradient");
+    }
+}
+
+/// The step of the others is the same whether the oldest frame is solved with them or was marginalized before.
+#[test]
+fn marginalizing_the_oldest_agrees_with_the_full_batch() {
+    for (name, estimator) in windows() {
+        let (_, tracks, landmarks) = estimator.active_tracks();
+        let problem = estimator.problem(&tracks);
+        let layout = problem.layout;
+        let estimate = estimate_of(&estimator, landmarks.clone());
+        // Everything in one batch.
+        let equations = problem.linearize(&estimate);
+        let (hessian, gradient) = equations.reduced(&layout, &equations.visual.eliminate(0.0));
+        let batch = Cholesky::new(&hessian).unwrap().solve(&-gradient);
+
+        // The oldest frame and all tracks first, the rest of the factors on what they leave.
+        let mut prior = marginalization::oldest(&problem, &estimate, &tracks, &landmarks).unwrap();
+        let mut rest = vec![problem.calibration_prior_rows(&estimate)];
+        rest.extend((2..layout.frames).map(|slot| problem.inertial_rows(slot, &estimate)));
+        rest.extend((1..layout.frames).map(|slot| problem.encoder_rows(slot, &estimate)));
+        let rest = stack(&rest, layout.total() + 1);
+        prior.renumber(0);
+        let later = crate::estimator::layout::Layout { frames: layout.frames - 1, ..layout };
+        let kept: Vec<usize> = (layout.frame(1).start..=layout.total()).collect();
+        let zero = DVector::zeros(later.total());
+        let rows = stack(&[rest.select_columns(&kept), prior.rows(&later, &zero)], later.total() + 1);
+        let upper = dense::triangularize(&rows);
+        let count = later.total();
+        let solution =
+            upper.view((0, 0), (count, count)).solve_upper_triangular(&-upper.view((0, count), (count, 1))).unwrap();
+        let difference = solution.column(0) - batch.rows(layout.frame(1).start, count);
+        assert!(difference.amax() < 1e-5 * batch.amax(), "{name}: {}", difference.amax());
+    }
+}
+
+#[test]
+fn dropping_a_frame_from_the_prior_keeps_what_it_said_about_the_others() {
+    let mut estimator = fixture::window(Parameterization::Minimal, true, quadratic());
+    fixture::marginalize_once(&mut estimator);
+    let problem = estimator.problem(&[]);
+    let estimate = estimate_of(&estimator, Vec::new());
+    let (prior, layout) = (problem.prior.unwrap(), problem.layout);
+    let gone = 2;
+    assert!(prior.holds_frame(gone));
+    let zero = DVector::zeros(layout.total());
+    let held = prior.rows(&layout, &zero);
+    let rows = stack(&[held.clone(), problem.encoder_rows(gone, &estimate)], layout.total() + 1);
+    let information = |rows: &DMatrix<f64>, columns: &[usize]| {
+        let part = rows.select_columns(columns);
+        part.tr_mul(&part)
+    };
+    let leaving: Vec<usize> = layout.camera(gone).collect();
+    let kept: Vec<usize> = (0..layout.total())
+        .filter(|column| !leaving.contains(column))
+        .filter(|column| held.column(*column).amax() > 0.0)
+        .collect();
+    let cross = rows.select_columns(&kept).tr_mul(&rows.select_columns(&leaving));
+    let inverse = information(&rows, &leaving).try_inverse().unwrap();
+    let expected = information(&rows, &kept) - &cross * inverse * cross.transpose();
+    let dropped = marginalization::dropped(&problem, &estimate, gone).unwrap();
+    assert!(!dropped.holds_frame(gone));
+    let found = information(&dropped.rows(&layout, &zero), &kept);
+    let difference = (&found - &expected).amax() / expected.amax();
+    assert!(difference < 1e-7, "{difference}");
+}
+
+/// Along the six directions that the classical chain cannot tell apart nothing that is measured changes.
+#[test]
+fn the_classical_chain_keeps_its_null_directions_with_first_estimates() {
+    let mut estimator = fixture::window(Parameterization::Classical, true, quadratic());
+    fixture::marginalize_once(&mut estimator);
+    fixture::shake(&mut estimator, 0.5);
+    let (_, tracks, landmarks) = estimator.active_tracks();
+    let problem = estimator.problem(&tracks);
+    let estimate = estimate_of(&estimator, landmarks);
+    let total = problem.layout.total();
+    let mut parts = vec![
+        problem.visual_rows(&estimate, &tracks, &estimate.landmarks),
+        problem.prior.unwrap().rows(&problem.layout, &DVector::zeros(total)),
+    ];
+    parts.extend((1..problem.layout.frames).map(|slot| problem.inertial_rows(slot, &estimate)));
+    let rows = stack(&parts, total + 1);
+    let first = estimate.calibration.at_first_estimate();
+    let directions = crate::gimbal::redundant_directions(&first.chain().to_classical());
+    assert_eq!(directions.ncols(), 6);
+    let calibration = rows.columns_range(problem.layout.calibration()).into_owned();
+    let moved = &calibration * &directions;
+    assert!(moved.amax() < 1e-9 * calibration.norm(), "{}", moved.amax() / calibration.norm());
+}
+
+#[test]
+fn solving_finds_the_truth_from_a_shaken_start() {
+    for (name, mut estimator) in windows() {
+        fixture::shake(&mut estimator, 1.0);
+        let (_, tracks, landmarks) = estimator.active_tracks();
+        let problem = estimator.problem(&tracks);
+        let limits = SolverLimits { iterations: 20, relative_cost_tolerance: 1e-9 };
+        let solution = solver::solve(&problem, estimate_of(&estimator, landmarks), limits);
+        let residuals = 2 * tracks.iter().map(|track| track.sightings.len()).sum::<usize>();
+        let expected = residuals as f64 * 0.09;
+        assert!(solution.costs_after.visual < 1.5 * expected, "{name}: {:?} of {expected}", solution.costs_after);
+        assert!(solution.costs_after.total() < 0.01 * solution.costs_before.total(), "{name}");
+    }
+}

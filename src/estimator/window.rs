@@ -1,0 +1,125 @@
+//! The frames of the window and the features that they see.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{DVector, Vector2, Vector3};
+
+use super::layout::{Layout, POSE, SPEED_BIAS};
+use super::preintegration::{Matrix15, NavigationState, Preintegration, Vector15};
+use super::reprojection::Landmark;
+use crate::frontend::FeatureId;
+
+/// The unknowns of one frame (Eq. 7).
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct FrameState {
+    /// Pose, velocity, biases.
+    pub(super) navigation: NavigationState,
+    /// Joint angles without the static offsets, in radians.
+    pub(super) joints_rad: Vec<f64>,
+}
+
+impl FrameState {
+    /// `x ⊞ δ` with `δ` in the order of [`Layout`]: pose, joints, speed and biases.
+    pub(super) fn plus(&self, delta: &[f64]) -> Self {
+        let joints = self.joints_rad.len();
+        let mut navigation = Vector15::zeros();
+        navigation.as_mut_slice()[..POSE].copy_from_slice(&delta[..POSE]);
+        navigation.as_mut_slice()[POSE..].copy_from_slice(&delta[POSE + joints..POSE + joints + SPEED_BIAS]);
+        Self {
+            navigation: self.navigation.plus(&navigation),
+            joints_rad: self.joints_rad.iter().zip(&delta[POSE..]).map(|(angle, step)| angle + step).collect(),
+        }
+    }
+
+    /// `self ⊟ origin` in the order of [`Layout`].
+    pub(super) fn minus(&self, origin: &Self) -> DVector<f64> {
+        let joints = self.joints_rad.len();
+        let navigation = self.navigation.minus(&origin.navigation);
+        let mut delta = DVector::zeros(POSE + joints + SPEED_BIAS);
+        delta.rows_mut(0, POSE).copy_from(&navigation.fixed_rows::<POSE>(0));
+        delta.rows_mut(POSE + joints, SPEED_BIAS).copy_from(&navigation.fixed_rows::<SPEED_BIAS>(POSE));
+        for (joint, (angle, start)) in self.joints_rad.iter().zip(&origin.joints_rad).enumerate() {
+            delta[POSE + joint] = angle - start;
+        }
+        delta
+    }
+
+    /// A step of the solver: states that the prior holds count their step from its linearization point, so that the
+    /// prior stays exactly linear.
+    pub(super) fn stepped(&self, first_estimate: Option<&Self>, delta: &[f64]) -> Self {
+        let Some(first) = first_estimate else { return self.plus(delta) };
+        let mut sum = self.minus(first);
+        for (entry, step) in sum.iter_mut().zip(delta) {
+            *entry += step;
+        }
+        first.plus(sum.as_slice())
+    }
+}
+
+/// One frame of the window.
+#[derive(Clone, Debug)]
+pub(super) struct Frame {
+    /// Number of the image in its camera's stream.
+    pub(super) index: usize,
+    /// Its stamp since the log began.
+    pub(super) stamp_ns: i64,
+    /// Current estimate.
+    pub(super) state: FrameState,
+    /// Where the marginalization prior was linearized, for frames that it holds.
+    pub(super) first_estimate: Option<FrameState>,
+    /// Encoder readings.
+    pub(super) encoder_rad: Option<Vec<f64>>,
+    /// Whether it is a keyframe.
+    pub(super) keyframe: bool,
+    /// Inertial samples from the frame before it in the window.
+    pub(super) motion: Preintegration,
+    /// Square-root information of `motion`, `None` when it is empty.
+    pub(super) motion_information: Option<Matrix15>,
+}
+
+impl Frame {
+    /// The state at which derivatives are taken.
+    pub(super) fn linearization_point<'a>(&'a self, current: &'a FrameState, first_estimates: bool) -> &'a FrameState {
+        if first_estimates { self.first_estimate.as_ref().unwrap_or(current) } else { current }
+    }
+}
+
+/// One sighting of a feature.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Observation {
+    /// Slot of the frame.
+    pub(super) slot: usize,
+    /// Measured pixel.
+    pub(super) uv_px: Vector2<f64>,
+    /// Measured unit direction.
+    pub(super) bearing: Vector3<f64>,
+}
+
+/// One feature with everything that the window saw of it.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Feature {
+    /// In the order of the slots; the first one's frame is the anchor.
+    pub(super) observations: Vec<Observation>,
+    /// Its estimate in the anchor's camera, once triangulated.
+    pub(super) landmark: Option<Landmark>,
+}
+
+impl Feature {
+    /// Slot of the anchor.
+    pub(super) fn anchor(&self) -> Option<usize> {
+        self.observations.first().map(|first| first.slot)
+    }
+
+    pub(super) fn observation(&self, slot: usize) -> Option<&Observation> {
+        self.observations.iter().find(|observation| observation.slot == slot)
+    }
+}
+
+/// All features by their identity.
+pub(super) type FeatureMap = BTreeMap<FeatureId, Feature>;
+
+/// The layout of a window of these frames.
+pub(super) fn layout(frames: &[Frame], calibration: usize) -> Layout {
+    let joints = frames.first().map_or(0, |frame| frame.state.joints_rad.len());
+    Layout { frames: frames.len(), joints, calibration }
+}
