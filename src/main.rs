@@ -1,1 +1,30 @@
-fn main() {}
+//! The command line of `dcvins`: parse the arguments, pick a mode, print errors.
+
+mod arguments;
+mod commands;
+
+use std::io::Write as _;
+use std::process::ExitCode;
+
+use clap::Parser as _;
+
+use arguments::{Arguments, Command, ViewArguments};
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let result = match arguments.command.unwrap_or_else(|| Command::View(ViewArguments::default())) {
+        Command::View(view) => commands::view(&view),
+        Command::Run(run) => commands::run(&run),
+        #[cfg(feature = "gui")]
+        Command::Screenshot(screenshot) => commands::screenshot(&screenshot),
+        Command::Evaluate(evaluate) => commands::evaluate(&evaluate),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            // With standard error gone there is nobody left to tell.
+            let _ = writeln!(std::io::stderr(), "dcvins: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}

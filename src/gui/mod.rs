@@ -25,6 +25,7 @@ mod sample_images;
 #[cfg(test)]
 pub(crate) mod sample_recording;
 pub mod scene;
+mod session_log;
 #[cfg(test)]
 pub(crate) mod tests;
 pub mod theme;

@@ -1,16 +1,60 @@
 //! A log, the runs over it, and the reports they left.
 //!
 //! A [`Recording`] is what has been computed so far; the window and the exports draw it at a cursor.
+//! [`compute`] fills one without a window; a [`Session`] plays one while it still grows.
 
 pub mod accuracy;
 mod command;
+mod configuration;
+mod engine;
+mod plan;
+mod playback;
 mod recording;
+mod run_engine;
 mod spec;
 mod stopwatch;
 #[cfg(test)]
 mod tests;
+mod tracker;
 
 pub use command::{Command, PlaybackSpeed};
+pub use engine::EngineMessage;
+pub use plan::{MAX_RUNS, SessionError, SessionPlan, SessionRequest};
+pub use playback::Session;
 pub use recording::{Recording, RunRecord, StepRecord};
-pub use spec::{ParameterizationChoice, RunSpec, RunSpecError, distinct_labels};
+pub use spec::{ParameterizationChoice, RunSpec, RunSpecError};
 pub use stopwatch::Stopwatch;
+
+use engine::Engine;
+
+/// Computes every run of the plan and returns all their reports; `on_step` is called after each step.
+///
+/// `until_ns` ends the work once every run has passed that time (for a picture of one instant).
+pub fn compute(
+    plan: &SessionPlan,
+    until_ns: Option<i64>,
+    on_step: &mut dyn FnMut(&Recording),
+) -> Result<Recording, SessionError> {
+    let mut recording = Recording::new(plan);
+    let mut engine = Engine::start(plan)?;
+    engine.no_more_runs();
+    while let Some(message) = engine.receive() {
+        // Steps after the wanted time would depend on how the threads are scheduled.
+        let late = |stamp_ns: i64| until_ns.is_some_and(|until_ns| stamp_ns > until_ns);
+        match message {
+            EngineMessage::Step { run, record } if late(record.report.stamp_ns) => {
+                recording.take(EngineMessage::Finished { run, error: None });
+            }
+            message => recording.take(message),
+        }
+        on_step(&recording);
+        if recording.runs.iter().all(|run| run.finished) {
+            break;
+        }
+    }
+    if let Some(until_ns) = until_ns {
+        // The threads read ahead by as much as they are let.
+        recording.warnings.retain(|warning| warning.stamp_ns <= until_ns);
+    }
+    Ok(recording)
+}

@@ -2,6 +2,9 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::RunSpec;
+use super::accuracy::{Alignment, AlignmentSums};
+use super::engine::EngineMessage;
+use super::plan::SessionPlan;
 use crate::estimator::StepReport;
 use crate::flight_log::{LogWarning, Rig};
 use crate::frontend::TrackedFrame;
@@ -39,9 +42,33 @@ pub struct RunRecord {
     /// `true_from_estimate`: the yaw and translation that lay the estimated trajectory on the truth, once there are
     /// enough frames with truth.
     pub alignment: Option<RigidTransform>,
+    /// Sums over the frames with truth so far, from which `alignment` follows.
+    pub alignment_sums: AlignmentSums,
 }
 
 impl RunRecord {
+    /// A run before its first step.
+    pub fn new(spec: RunSpec, camera_key: String) -> Self {
+        Self {
+            spec,
+            camera_key,
+            steps: Vec::new(),
+            finished: false,
+            error: None,
+            alignment: None,
+            alignment_sums: AlignmentSums::default(),
+        }
+    }
+
+    /// Adds a step behind the last one.
+    pub fn push(&mut self, record: StepRecord) {
+        if let (Some(newest), Some(truth)) = (record.report.newest(), &record.truth) {
+            self.alignment_sums.add(&newest.world_from_imu.translation_m, &truth.translation_m);
+            self.alignment = self.alignment_sums.solve(Alignment::YawPosition).map(|transform| transform.rigid);
+        }
+        self.steps.push(Arc::new(record));
+    }
+
     /// The last step at or before a time, as a cursor shows it.
     pub fn step_at(&self, stamp_ns: i64) -> Option<&Arc<StepRecord>> {
         let after = self.steps.partition_point(|step| step.report.stamp_ns <= stamp_ns);
@@ -66,4 +93,62 @@ pub struct Recording {
     pub runs: Vec<RunRecord>,
     /// What is wrong with the log, as found so far.
     pub warnings: Vec<LogWarning>,
+}
+
+impl Recording {
+    /// Nothing computed yet.
+    pub fn new(plan: &SessionPlan) -> Self {
+        Self {
+            log_path: plan.log_path.clone(),
+            rig: Arc::clone(&plan.rig),
+            truth_rig: plan.truth_rig.clone(),
+            duration_ns: plan.log.duration_ns(),
+            epoch_ns: plan.log.epoch_ns(),
+            runs: plan.runs.iter().map(|(spec, camera_key)| RunRecord::new(spec.clone(), camera_key.clone())).collect(),
+            warnings: Vec::new(),
+        }
+        .with_warnings(plan.log.warnings())
+    }
+
+    fn with_warnings(mut self, warnings: &[LogWarning]) -> Self {
+        self.take(EngineMessage::Warnings(warnings.to_vec()));
+        self
+    }
+
+    /// Adds what a thread has reported.
+    pub fn take(&mut self, message: EngineMessage) {
+        match message {
+            EngineMessage::Step { run, record } => {
+                if let Some(run) = self.runs.get_mut(run) {
+                    run.push(*record);
+                }
+            }
+            EngineMessage::Finished { run, error } => {
+                if let Some(run) = self.runs.get_mut(run) {
+                    run.finished = true;
+                    run.error = error;
+                }
+            }
+            EngineMessage::Warnings(warnings) => {
+                for warning in warnings {
+                    let key = |known: &LogWarning| (known.stamp_ns, known.message.clone());
+                    // Two cameras read the same log and find the same faults, in an order that their threads decide.
+                    if let Err(index) = self.warnings.binary_search_by_key(&key(&warning), key) {
+                        self.warnings.insert(index, warning);
+                    }
+                }
+            }
+        }
+    }
+
+    /// How far every run has come, in nanoseconds since the log began; the end when all are finished.
+    pub fn computed_ns(&self) -> i64 {
+        let reached = |run: &RunRecord| run.steps.last().map_or(0, |step| step.report.stamp_ns);
+        self.runs.iter().filter(|run| !run.finished).map(reached).min().unwrap_or_else(|| self.last_stamp_ns())
+    }
+
+    /// Stamp of the last step of any run.
+    pub fn last_stamp_ns(&self) -> i64 {
+        self.runs.iter().filter_map(|run| run.steps.last()).map(|step| step.report.stamp_ns).max().unwrap_or(0)
+    }
 }

@@ -1,4 +1,11 @@
+use std::sync::LazyLock;
 use std::time::Instant;
+
+/// Milliseconds of a clock that only runs forward, for the stage times of reports.
+pub fn clock_ms() -> f64 {
+    static BEGIN: LazyLock<Stopwatch> = LazyLock::new(Stopwatch::start);
+    BEGIN.elapsed_ms()
+}
 
 /// Times the stages of a step; the timings of a report are the only part of it that differs between replays.
 #[derive(Clone, Copy, Debug)]

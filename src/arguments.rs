@@ -1,0 +1,218 @@
+//! The command line: one spelling and one set of defaults for all sub-commands.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use dcvins::session::accuracy::{Alignment, RelativeDelta};
+use dcvins::session::{RunSpec, SessionRequest};
+
+/// Debugger for visual-inertial navigation with a camera on a gimbal.
+#[derive(Debug, Parser)]
+#[command(version, about, propagate_version = true)]
+pub struct Arguments {
+    /// What to do; without a command the window opens.
+    #[command(subcommand)]
+    pub command: Option<Command>,
+}
+
+/// The sub-commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Open the window on a log; without a display, write the pictures instead and say where.
+    View(ViewArguments),
+    /// Run the estimator over a log without a window and write its files.
+    Run(RunArguments),
+    /// Draw one panel at one instant into a PNG, without a display.
+    #[cfg(feature = "gui")]
+    Screenshot(ScreenshotArguments),
+    /// Compare a trajectory with a reference: absolute and relative errors, as evo computes them.
+    Evaluate(EvaluateArguments),
+}
+
+/// The runs and the stretch of the log, shared by everything that estimates.
+#[derive(Args, Clone, Debug, Default)]
+pub struct EstimationArguments {
+    /// A run over the log: NAME[:key=value,…], NAME one of auto, minimal, minimal-swapped, classical, poe, static; keys
+    /// encoder=on|off, calibrate=on|off, window=N, camera=KEY, name=LABEL. Up to four.
+    #[arg(long = "run", value_name = "SPEC")]
+    pub runs: Vec<RunSpec>,
+    /// The rig, when it is not beside the log (LOG with .rig.yaml) or attached to it.
+    #[arg(long, value_name = "FILE")]
+    pub rig: Option<PathBuf>,
+    /// The rig's true values, when they are not beside the log (LOG with .truth.yaml).
+    #[arg(long, value_name = "FILE")]
+    pub truth: Option<PathBuf>,
+    /// Leave out this many seconds at the begin of the log.
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = seconds)]
+    pub start: f64,
+    /// Read this many seconds from there.
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    pub duration: Option<f64>,
+}
+
+impl EstimationArguments {
+    /// The session that these arguments ask for.
+    pub fn request(&self, log_path: PathBuf) -> SessionRequest {
+        SessionRequest {
+            log_path,
+            rig_path: self.rig.clone(),
+            truth_path: self.truth.clone(),
+            specs: self.runs.clone(),
+            start_s: self.start,
+            duration_s: self.duration,
+        }
+    }
+}
+
+/// `dcvins view`.
+#[derive(Args, Clone, Debug, Default)]
+pub struct ViewArguments {
+    /// The log; without one the window welcomes with the sample logs and the recent files.
+    pub log: Option<PathBuf>,
+    /// Where the pictures go when there is no display [default: dcvins-output/NAME].
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    #[command(flatten)]
+    pub estimation: EstimationArguments,
+}
+
+/// `dcvins run`.
+#[derive(Args, Clone, Debug)]
+pub struct RunArguments {
+    /// The log.
+    pub log: PathBuf,
+    /// Folder for the files; each run gets a folder of its name in it.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    #[command(flatten)]
+    pub estimation: EstimationArguments,
+    /// Leave the measured times out of frames.csv and summary.json, so that two runs give the same bytes in every file.
+    #[arg(long)]
+    pub no_timing: bool,
+    /// Print the summaries as JSON instead of a table.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `dcvins screenshot`.
+#[cfg(feature = "gui")]
+#[derive(Args, Clone, Debug)]
+pub struct ScreenshotArguments {
+    /// The log.
+    pub log: PathBuf,
+    /// Seconds since the first message of the log.
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    pub at: f64,
+    /// Which panel; `all` is the whole window.
+    #[arg(long, value_name = "NAME", default_value = "all")]
+    pub panel: String,
+    /// The PNG to write.
+    #[arg(short, long, value_name = "FILE.png")]
+    pub output: PathBuf,
+    /// Size of the picture in pixels.
+    #[arg(long, value_name = "WxH", default_value = "1920x1080", value_parser = size)]
+    pub size: [usize; 2],
+    /// Pixels per point: 2 draws everything twice as large.
+    #[arg(long, value_name = "N", default_value_t = 1.0, value_parser = scale)]
+    pub scale: f32,
+    /// Colours.
+    #[arg(long, value_enum, default_value_t = ThemeArgument::Light)]
+    pub theme: ThemeArgument,
+    /// What draws: `cpu` needs no driver and gives the same bytes everywhere.
+    #[arg(long, value_enum, default_value_t = RendererArgument::Cpu)]
+    pub renderer: RendererArgument,
+    #[command(flatten)]
+    pub estimation: EstimationArguments,
+}
+
+/// Names of the themes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ThemeArgument {
+    /// Dark on light.
+    Light,
+    /// Light on dark.
+    Dark,
+    /// For paper.
+    Print,
+}
+
+/// Names of the renderers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum RendererArgument {
+    /// The CPU painter.
+    Cpu,
+    /// Any adapter that wgpu finds.
+    Wgpu,
+}
+
+/// `dcvins evaluate`.
+#[derive(Args, Clone, Debug)]
+pub struct EvaluateArguments {
+    /// The trajectory to judge: t x y z qx qy qz qw.
+    pub estimate: PathBuf,
+    /// The trajectory to judge it by.
+    pub reference: PathBuf,
+    /// How the estimate is laid on the reference.
+    #[arg(long, value_enum, default_value_t = AlignArgument::Se3)]
+    pub align: AlignArgument,
+    /// Length of the stretches of the relative error: frames (5f) or metres (10m).
+    #[arg(long, value_name = "Nf|Xm", default_value = "1f", value_parser = delta)]
+    pub delta: RelativeDelta,
+    /// Largest difference of two stamps that count as the same instant.
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.01, value_parser = seconds)]
+    pub max_difference: f64,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Names of the alignments.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum AlignArgument {
+    /// Leave the estimate where it is.
+    None,
+    /// Rotation about the vertical and a shift.
+    Yaw,
+    /// Rotation and a shift (evo's --align).
+    Se3,
+    /// Rotation, shift and scale (evo's --align --correct_scale).
+    Sim3,
+}
+
+impl From<AlignArgument> for Alignment {
+    fn from(argument: AlignArgument) -> Self {
+        match argument {
+            AlignArgument::None => Self::None,
+            AlignArgument::Yaw => Self::YawPosition,
+            AlignArgument::Se3 => Self::Rigid,
+            AlignArgument::Sim3 => Self::Similarity,
+        }
+    }
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    let value = text.parse::<f64>().ok().filter(|value| value.is_finite() && *value >= 0.0);
+    value.ok_or_else(|| "expected seconds, a number from 0 up".to_owned())
+}
+
+#[cfg(feature = "gui")]
+fn scale(text: &str) -> Result<f32, String> {
+    let value = text.parse::<f32>().ok().filter(|value| (0.25..=8.0).contains(value));
+    value.ok_or_else(|| "expected a number from 0.25 to 8".to_owned())
+}
+
+#[cfg(feature = "gui")]
+fn size(text: &str) -> Result<[usize; 2], String> {
+    let parse = |side: &str| side.parse::<usize>().ok().filter(|side| (64..=8192).contains(side));
+    let sides = text.split_once('x').and_then(|(width, height)| Some([parse(width)?, parse(height)?]));
+    sides.ok_or_else(|| "expected WIDTHxHEIGHT, each from 64 to 8192, as in 1920x1080".to_owned())
+}
+
+fn delta(text: &str) -> Result<RelativeDelta, String> {
+    let frames = text.strip_suffix('f').and_then(|number| number.parse::<usize>().ok()).filter(|number| *number > 0);
+    let metres = text.strip_suffix('m').and_then(|number| number.parse::<f64>().ok()).filter(|number| *number > 0.0);
+    frames
+        .map(RelativeDelta::Frames)
+        .or_else(|| metres.map(RelativeDelta::Metres))
+        .ok_or_else(|| "expected frames as in 5f, or metres as in 10m".to_owned())
+}

@@ -1,0 +1,271 @@
+//! The sub-commands: each turns its arguments into calls of the library and prints what came of it.
+
+use std::io::{self, IsTerminal as _, Write as _};
+use std::path::Path;
+#[cfg(feature = "gui")]
+use std::sync::Arc;
+
+use anyhow::{Context as _, Result, bail};
+use dcvins::export::{self, EvaluationOptions, RunFileOptions, RunSummary};
+use dcvins::geometry::seconds_from_ns;
+use dcvins::session::{self, Recording, SessionPlan, SessionRequest, Stopwatch};
+
+use crate::arguments::{EvaluateArguments, RunArguments, ViewArguments};
+
+/// Least time between two drawings of the progress bar.
+const PROGRESS_PERIOD_MS: f64 = 100.0;
+/// Width of the progress bar in characters.
+const PROGRESS_WIDTH: usize = 32;
+
+/// Writes to standard output; a reader that went away is no failure.
+fn print(text: &str) -> Result<()> {
+    let mut stdout = io::stdout().lock();
+    match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        other => other.context("cannot write to standard output"),
+    }
+}
+
+/// Says something to the person at the terminal.
+fn tell(text: &str) {
+    // With standard error gone there is nobody left to tell.
+    let _ = writeln!(io::stderr(), "{text}");
+}
+
+/// A bar on standard error, none when that is not a terminal.
+struct Progress {
+    watch: Option<Stopwatch>,
+    drawn_ms: f64,
+}
+
+impl Progress {
+    fn new() -> Self {
+        Self { watch: io::stderr().is_terminal().then(Stopwatch::start), drawn_ms: -PROGRESS_PERIOD_MS }
+    }
+
+    fn show(&mut self, share: f64, text: impl FnOnce() -> String) {
+        let Some(watch) = &self.watch else { return };
+        let now_ms = watch.elapsed_ms();
+        if now_ms - self.drawn_ms < PROGRESS_PERIOD_MS {
+            return;
+        }
+        self.drawn_ms = now_ms;
+        let filled = ((share.clamp(0.0, 1.0) * PROGRESS_WIDTH as f64) as usize).min(PROGRESS_WIDTH);
+        let bar = "█".repeat(filled) + &"░".repeat(PROGRESS_WIDTH - filled);
+        let _ = write!(io::stderr(), "\r{bar} {:3.0} % {}\x1b[K", share * 100.0, text());
+    }
+
+    fn clear(&self) {
+        if self.watch.is_some() {
+            let _ = write!(io::stderr(), "\r\x1b[K");
+        }
+    }
+}
+
+/// Computes a request to its end (or to a time of the log) with a progress bar.
+fn compute(request: &SessionRequest, until_ns: Option<i64>) -> Result<(SessionPlan, Recording)> {
+    let plan = SessionPlan::open(request)?;
+    let begin_s = request.start_s;
+    let log_end_s = seconds_from_ns(plan.log.duration_ns());
+    let end_s = request.duration_s.map_or(log_end_s, |duration_s| log_end_s.min(begin_s + duration_s));
+    let end_s = until_ns.map_or(end_s, |until_ns| end_s.min(seconds_from_ns(until_ns)));
+    let mut progress = Progress::new();
+    let recording = session::compute(&plan, until_ns, &mut |recording| {
+        let now_s = seconds_from_ns(recording.computed_ns());
+        progress.show((now_s - begin_s) / (end_s - begin_s).max(1e-3), || format!("{now_s:.1} of {end_s:.1} s"));
+    })?;
+    progress.clear();
+    Ok((plan, recording))
+}
+
+/// `dcvins run`.
+pub fn run(arguments: &RunArguments) -> Result<()> {
+    let (_, recording) = compute(&arguments.estimation.request(arguments.log.clone()), None)?;
+    let mut summaries = Vec::new();
+    for run in &recording.runs {
+        let options = RunFileOptions { timing: !arguments.no_timing };
+        let (folder, summary) = export::write_run(&recording, run, &arguments.out, options)?;
+        summaries.push((folder, summary));
+    }
+    if arguments.json {
+        let all: Vec<&RunSummary> = summaries.iter().map(|(_, summary)| summary).collect();
+        print(&(serde_json::to_string_pretty(&all)? + "\n"))?;
+    } else {
+        for (folder, summary) in &summaries {
+            print(&describe(folder, summary))?;
+        }
+    }
+    let failed: Vec<&str> = recording.runs.iter().filter_map(|run| run.error.as_deref()).collect();
+    if !failed.is_empty() {
+        bail!("{}", failed.join("; "));
+    }
+    if recording.runs.iter().all(|run| run.steps.is_empty()) {
+        let log = export::log_name(&arguments.log);
+        bail!("no image of '{log}' could be used; 'dcvins check {}' says why", arguments.log.display());
+    }
+    Ok(())
+}
+
+/// A run's summary in a few lines.
+fn describe(folder: &Path, summary: &RunSummary) -> String {
+    let frames = &summary.frames;
+    let mut text = format!("{} on {} ({})\n", summary.run, summary.log, summary.camera);
+    let begin = frames
+        .initialized_at_s
+        .map_or("never initialized".to_owned(), |time_s| format!("initialized at {time_s:.2} s"));
+    text += &format!(
+        "  frames       {} of {} estimated, {} keyframes, {begin}, {} restarts\n",
+        frames.estimated, frames.total, frames.keyframes, frames.restarts
+    );
+    if let Some(accuracy) = &summary.accuracy {
+        text += &format!(
+            "  accuracy     ATE {:.3} m rmse, {:.3} m max ({}), {:.2} % of {:.1} m\n",
+            accuracy.ate_rmse_m,
+            accuracy.ate_max_m,
+            accuracy.alignment,
+            accuracy.ate_percent_of_length,
+            summary.length_m
+        );
+    } else if let Some(reason) = &summary.accuracy_missing {
+        text += &format!("  accuracy     none: {reason}\n");
+    }
+    let calibration = &summary.calibration;
+    if let (Some(first), Some(last)) = (&calibration.chain_error_initial, &calibration.chain_error) {
+        text += &format!(
+            "  chain error  {:.1} mm, {:.2}° with the rig's values; {:.1} ± {:.1} mm, {:.2} ± {:.2}° at the end ({})\n",
+            first.translation_mean_m * 1e3,
+            first.rotation_mean_rad.to_degrees(),
+            last.translation_mean_m * 1e3,
+            last.translation_std_m * 1e3,
+            last.rotation_mean_rad.to_degrees(),
+            last.rotation_std_rad.to_degrees(),
+            calibration.parameterization
+        );
+    }
+    if let Some(rank) = &summary.rank {
+        text += &format!(
+            "  rank         structural {} of {}, informed {}; lost: {} parameterization, {} joints, {} absorbed, {} motion\n",
+            rank.rank_structural,
+            rank.columns,
+            rank.rank_informed,
+            rank.deficit.parameterization,
+            rank.deficit.joints,
+            rank.deficit.absorbed,
+            rank.deficit.motion
+        );
+    }
+    if let (Some(timing), Some(factor)) = (&summary.timing_ms, summary.real_time_factor) {
+        let stage = |stage: &export::StageSummary| format!("{:.1}/{:.1}", stage.p50, stage.p95);
+        text += &format!(
+            "  ms p50/p95   front end {}, optimize {}, marginalize {}, observability {}, step {}; {factor:.1} × real time\n",
+            stage(&timing.frontend),
+            stage(&timing.optimize),
+            stage(&timing.marginalize),
+            stage(&timing.observability),
+            stage(&timing.step)
+        );
+    }
+    for warning in &summary.warnings {
+        text += &format!("  warning      {warning}\n");
+    }
+    text + &format!("  files        {}\n", folder.display())
+}
+
+/// `dcvins evaluate`.
+pub fn evaluate(arguments: &EvaluateArguments) -> Result<()> {
+    let options = EvaluationOptions {
+        alignment: arguments.align.into(),
+        delta: arguments.delta,
+        max_difference_s: arguments.max_difference,
+    };
+    let report = export::evaluate(&arguments.estimate, &arguments.reference, &options)?;
+    if arguments.json { print(&(serde_json::to_string_pretty(&report)? + "\n")) } else { print(&report.to_string()) }
+}
+
+/// `dcvins view`: the window, or its pictures where there is no display.
+#[cfg(feature = "gui")]
+pub fn view(arguments: &ViewArguments) -> Result<()> {
+    use dcvins::export::Home;
+    use dcvins::gui::app::PlayingLog;
+    use dcvins::gui::run_window::{WindowError, WindowOptions, run_window};
+    use dcvins::gui::theme::ThemeName;
+    use dcvins::session::Session;
+
+    let estimation = arguments.estimation.clone();
+    let open_log = move |path: &Path| {
+        let session = Session::open(&estimation.request(path.to_owned())).map_err(|error| error.to_string())?;
+        Ok(Box::new(session) as Box<dyn PlayingLog>)
+    };
+    if let Some(log) = &arguments.log {
+        // What is wrong with the log or its rig is told here, before a window opens.
+        SessionPlan::open(&arguments.estimation.request(log.clone()))?;
+    }
+    let options = WindowOptions {
+        log: None,
+        log_path: arguments.log.clone(),
+        open_log: Arc::new(open_log),
+        desktop: Arc::new(Home::of_user()),
+        theme: ThemeName::Light,
+    };
+    match (run_window(options), &arguments.log) {
+        (Err(WindowError::NoDisplay), Some(log)) => write_pictures(log, arguments),
+        (result, _) => Ok(result?),
+    }
+}
+
+/// `dcvins view` of a program that was built without the window.
+#[cfg(not(feature = "gui"))]
+pub fn view(_arguments: &ViewArguments) -> Result<()> {
+    bail!("this program was built without the window (cargo feature 'gui'); 'dcvins run LOG --out DIR' works")
+}
+
+/// What the window would show at the end of the log, as pictures.
+#[cfg(feature = "gui")]
+fn write_pictures(log: &Path, arguments: &ViewArguments) -> Result<()> {
+    use dcvins::export::{PANEL_NAMES, PictureOptions, draw_panel, write_png};
+    use dcvins::flight_log::ImageReader;
+
+    let stem = log.file_stem().unwrap_or(log.as_os_str());
+    let folder = arguments.out.clone().unwrap_or_else(|| Path::new("dcvins-output").join(stem));
+    tell(&format!("dcvins: there is no display, so the pictures are written to {}", folder.display()));
+    let (plan, recording) = compute(&arguments.estimation.request(log.to_owned()), None)?;
+    let mut images = ImageReader::new(Arc::clone(&plan.log), &plan.rig);
+    let options = PictureOptions::default();
+    for name in PANEL_NAMES {
+        let path = folder.join(format!("{name}.png"));
+        write_png(&draw_panel(name, &recording, recording.last_stamp_ns(), &mut images, &options)?, &path)?;
+        print(&format!("{}\n", path.display()))?;
+    }
+    for run in &recording.runs {
+        let (folder, summary) = export::write_run(&recording, run, &folder, RunFileOptions { timing: true })?;
+        print(&describe(&folder, &summary))?;
+    }
+    Ok(())
+}
+
+/// `dcvins screenshot`.
+#[cfg(feature = "gui")]
+pub fn screenshot(arguments: &crate::arguments::ScreenshotArguments) -> Result<()> {
+    use crate::arguments::ThemeArgument;
+    use dcvins::export::{PANEL_NAMES, PictureOptions, draw_panel, write_png};
+    use dcvins::flight_log::ImageReader;
+    use dcvins::gui::theme::ThemeName;
+
+    if !PANEL_NAMES.contains(&arguments.panel.as_str()) {
+        bail!("no panel is called '{}': expected one of {}", arguments.panel, PANEL_NAMES.join(", "));
+    }
+    let at_ns = dcvins::geometry::ns_from_seconds(arguments.at);
+    let (plan, recording) = compute(&arguments.estimation.request(arguments.log.clone()), Some(at_ns))?;
+    let mut images = ImageReader::new(Arc::clone(&plan.log), &plan.rig);
+    let options = PictureOptions {
+        size_px: arguments.size.map(|side| side as u32),
+        pixels_per_point: arguments.scale,
+        theme: match arguments.theme {
+            ThemeArgument::Light => ThemeName::Light,
+            ThemeArgument::Dark => ThemeName::Dark,
+            ThemeArgument::Print => ThemeName::Print,
+        },
+    };
+    let picture = draw_panel(&arguments.panel, &recording, at_ns, &mut images, &options)?;
+    Ok(write_png(&picture, &arguments.output)?)
+}

@@ -1,0 +1,63 @@
+//! The files that `dcvins run` writes for each run.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::error::ExportError;
+use super::summary::{RunSummary, summarize, to_json};
+use super::tables::{calibration_csv, frames_csv, rank_csv};
+use super::trajectory::tum_of_run;
+use crate::flight_log::Rig;
+use crate::flight_log::rig::CameraMount;
+use crate::session::{Recording, RunRecord};
+
+/// What goes into the files.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RunFileOptions {
+    /// Write measured times; without them two runs give the same bytes in every file.
+    pub timing: bool,
+}
+
+/// Writes the files of one run into `folder/LABEL/` and returns that folder and the summary.
+pub fn write_run(
+    recording: &Recording,
+    run: &RunRecord,
+    folder: &Path,
+    options: RunFileOptions,
+) -> Result<(PathBuf, RunSummary), ExportError> {
+    let folder = folder.join(&run.spec.label);
+    fs::create_dir_all(&folder).map_err(ExportError::write(&folder))?;
+    let summary = summarize(recording, run, options.timing);
+    let json = to_json(&summary)
+        .map_err(|source| ExportError::Write { source: source.into(), path: folder.join("summary.json") })?;
+    let files = [
+        ("trajectory.tum", tum_of_run(run, recording.epoch_ns)),
+        ("calibration.csv", calibration_csv(run, &recording.rig)),
+        ("rank.csv", rank_csv(run)),
+        ("frames.csv", frames_csv(run, options.timing)),
+        ("rig.yaml", calibrated_rig(recording, run).to_yaml()),
+        ("summary.json", json),
+    ];
+    for (name, text) in files {
+        let path = folder.join(name);
+        fs::write(&path, text).map_err(ExportError::write(&path))?;
+    }
+    Ok((folder, summary))
+}
+
+/// The rig with the calibration that the run ended with.
+fn calibrated_rig(recording: &Recording, run: &RunRecord) -> Rig {
+    let mut rig = (*recording.rig).clone();
+    let Some(last) = run.steps.last() else { return rig };
+    let chain = &last.report.calibration.classical;
+    let Some(camera) = rig.cameras.iter_mut().find(|camera| camera.key == run.camera_key) else { return rig };
+    match &mut camera.mount {
+        CameraMount::Gimbal => {
+            if let Some(gimbal) = &mut rig.gimbal {
+                gimbal.chain = chain.clone();
+            }
+        }
+        CameraMount::Static { imu_from_camera } => *imu_from_camera = chain.imu_from_camera(&[]),
+    }
+    rig
+}

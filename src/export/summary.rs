@@ -1,0 +1,484 @@
+//! `summary.json`: what one run came to.
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::evaluation::alignment_name;
+use super::tables::parameter_name;
+use crate::estimator::{EventKind, Phase, StageTimes};
+use crate::flight_log::rig::{CameraMount, Rig};
+use crate::geometry::{seconds_from_ns, so3};
+use crate::gimbal::{Chain, ClassicalChain, Parameterization};
+use crate::session::accuracy::{
+    Alignment, ErrorStatistics, RelativeDelta, StampedPose, absolute_errors_m, align, path_length_m, relative_errors,
+};
+use crate::session::{Recording, RunRecord};
+
+/// Stretches over which the relative error is given, in metres.
+const RELATIVE_LENGTHS_M: [f64; 3] = [5.0, 10.0, 25.0];
+
+/// Frames of a run.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FrameCounts {
+    /// Images that reached the estimator.
+    pub total: usize,
+    /// Images with a pose.
+    pub estimated: usize,
+    /// Keyframes.
+    pub keyframes: usize,
+    /// Time of the first pose since the log began.
+    pub initialized_at_s: Option<f64>,
+    /// Restarts after a failure.
+    pub restarts: usize,
+}
+
+/// Relative error over one length.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RelativeError {
+    /// Path length of a stretch.
+    pub delta_m: f64,
+    /// Number of stretches.
+    pub pairs: usize,
+    /// Root mean square of the translation error.
+    pub translation_rmse_m: f64,
+    /// Root mean square of the rotation error.
+    pub rotation_rmse_deg: f64,
+}
+
+/// Trajectory errors against the truth.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Accuracy {
+    /// How the estimate was laid on the truth.
+    pub alignment: &'static str,
+    /// Root mean square of the position error.
+    pub ate_rmse_m: f64,
+    /// Mean of the position error.
+    pub ate_mean_m: f64,
+    /// Its standard deviation.
+    pub ate_std_m: f64,
+    /// Its median.
+    pub ate_median_m: f64,
+    /// The largest.
+    pub ate_max_m: f64,
+    /// Root mean square of the position error in percent of the length.
+    pub ate_percent_of_length: f64,
+    /// Relative errors.
+    pub rpe: Vec<RelativeError>,
+}
+
+/// One calibration parameter, first and last.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ParameterSummary {
+    /// Its name, joints by name.
+    pub name: String,
+    /// `rad` or `m`.
+    pub unit: &'static str,
+    /// What the rig gave.
+    pub initial: f64,
+    /// What the run ended with.
+    #[serde(rename = "final")]
+    pub last: f64,
+    /// Posterior standard deviation.
+    pub sigma: Option<f64>,
+    /// The true value.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub truth: Option<f64>,
+    /// Final minus true.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error: Option<f64>,
+}
+
+/// How far `imu_from_camera` is from the truth over the joint angles visited.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ChainError {
+    /// Mean distance.
+    pub translation_mean_m: f64,
+    /// Its standard deviation.
+    pub translation_std_m: f64,
+    /// Mean angle.
+    pub rotation_mean_rad: f64,
+    /// Its standard deviation.
+    pub rotation_std_rad: f64,
+}
+
+/// The calibration of a run.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CalibrationSummary {
+    /// In use at the end.
+    pub parameterization: String,
+    /// Number of parameters.
+    pub columns: usize,
+    /// Each of them.
+    pub parameters: Vec<ParameterSummary>,
+    /// Distance of the whole chain from the truth at the end.
+    pub chain_error: Option<ChainError>,
+    /// The same at the begin, with the values the rig gave.
+    pub chain_error_initial: Option<ChainError>,
+}
+
+/// Deficit of the rank by cause.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct DeficitSummary {
+    /// Lost to the parameterization.
+    pub parameterization: usize,
+    /// Joints that did not move.
+    pub joints: usize,
+    /// Absorbed by free joint angles.
+    pub absorbed: usize,
+    /// Motion of the vehicle.
+    pub motion: usize,
+}
+
+/// Weight of one parameter in a direction.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct DirectionWeight {
+    /// Parameter.
+    pub name: String,
+    /// Signed weight in the prior-scaled unit direction.
+    pub weight: f64,
+}
+
+/// Observability at the last step.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RankSummary {
+    /// Calibration columns.
+    pub columns: usize,
+    /// Structural rank.
+    pub rank_structural: usize,
+    /// Informed rank.
+    pub rank_informed: usize,
+    /// What is lost, by cause.
+    pub deficit: DeficitSummary,
+    /// Structural null directions, each as its parameters with weight over a hundredth.
+    pub null_directions: Vec<Vec<DirectionWeight>>,
+}
+
+/// Percentiles of one stage's time.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct StageSummary {
+    /// Median.
+    pub p50: f64,
+    /// 95th percentile.
+    pub p95: f64,
+    /// Maximum.
+    pub max: f64,
+}
+
+/// Times of all stages in milliseconds, over the estimated frames.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TimingSummary {
+    /// Front end.
+    pub frontend: StageSummary,
+    /// Solve.
+    pub optimize: StageSummary,
+    /// Marginalization.
+    pub marginalize: StageSummary,
+    /// Observability analysis.
+    pub observability: StageSummary,
+    /// Whole step.
+    pub step: StageSummary,
+}
+
+/// `summary.json`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RunSummary {
+    /// File name of the log.
+    pub log: String,
+    /// The run as given on the command line.
+    pub run: String,
+    /// Camera it watched.
+    pub camera: String,
+    /// Frames.
+    pub frames: FrameCounts,
+    /// Length of the true path over the estimated frames, of the estimated one without truth.
+    pub length_m: f64,
+    /// Against the truth, when there is one and the run was initialized.
+    pub accuracy: Option<Accuracy>,
+    /// Why there is no accuracy.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub accuracy_missing: Option<String>,
+    /// Calibration.
+    pub calibration: CalibrationSummary,
+    /// Observability, `None` before the first solve.
+    pub rank: Option<RankSummary>,
+    /// Times, `None` when they were left out for the sake of equal bytes.
+    pub timing_ms: Option<TimingSummary>,
+    /// Seconds of log per second of work.
+    pub real_time_factor: Option<f64>,
+    /// What went wrong without stopping the run.
+    pub warnings: Vec<String>,
+}
+
+/// Sums up one run of a recording.
+pub fn summarize(recording: &Recording, run: &RunRecord, timing: bool) -> RunSummary {
+    let estimated: Vec<_> = run.steps.iter().filter(|step| step.report.newest().is_some()).collect();
+    let pairs = pairs_with_truth(run);
+    let positions: Vec<_> = estimated.iter().filter_map(|step| step.report.newest()).collect();
+    let length_m = if pairs.is_empty() {
+        path_length_m(positions.iter().map(|frame| &frame.world_from_imu.translation_m))
+    } else {
+        path_length_m(pairs.iter().map(|(_, truth)| &truth.pose.translation_m))
+    };
+    let accuracy = accuracy(&pairs, length_m);
+    let accuracy_missing = match (&accuracy, estimated.is_empty(), pairs.is_empty()) {
+        (Some(_), _, _) => None,
+        (None, true, _) => Some(never_initialized(run)),
+        (None, false, true) => Some("the log holds no ground truth for the estimated frames".to_owned()),
+        (None, false, false) => Some("too few frames with ground truth to align".to_owned()),
+    };
+    RunSummary {
+        log: log_name(&recording.log_path),
+        run: run.spec.to_string(),
+        camera: run.camera_key.clone(),
+        frames: FrameCounts {
+            total: run.steps.len(),
+            estimated: estimated.len(),
+            keyframes: estimated.iter().filter(|step| step.report.keyframe).count(),
+            initialized_at_s: estimated.first().map(|step| seconds_from_ns(step.report.stamp_ns)),
+            restarts: run.steps.last().map_or(0, |step| step.report.restarts),
+        },
+        length_m,
+        accuracy,
+        accuracy_missing,
+        calibration: calibration(recording, run),
+        rank: rank(recording, run),
+        timing_ms: if timing { timing_summary(run) } else { None },
+        real_time_factor: if timing { real_time_factor(run) } else { None },
+        warnings: warnings(recording, run),
+    }
+}
+
+/// The reasons of the last initialization attempt.
+fn never_initialized(run: &RunRecord) -> String {
+    let waits = run.steps.iter().rev().find_map(|step| {
+        let reasons: Vec<&str> = step
+            .report
+            .events
+            .iter()
+            .filter(|event| event.kind == EventKind::InitializationWaits)
+            .map(|event| event.message.as_str())
+            .collect();
+        (!reasons.is_empty()).then(|| reasons.join("; "))
+    });
+    waits.map_or_else(
+        || "the run never initialized: no image reached the estimator".to_owned(),
+        |reasons| format!("the run never initialized; the last attempt says: {reasons}"),
+    )
+}
+
+fn pairs_with_truth(run: &RunRecord) -> Vec<(StampedPose, StampedPose)> {
+    run.steps
+        .iter()
+        .filter_map(|step| {
+            let newest = step.report.newest()?;
+            let stamp_s = seconds_from_ns(newest.stamp_ns);
+            Some((StampedPose { stamp_s, pose: newest.world_from_imu }, StampedPose { stamp_s, pose: step.truth? }))
+        })
+        .collect()
+}
+
+fn accuracy(pairs: &[(StampedPose, StampedPose)], length_m: f64) -> Option<Accuracy> {
+    let transform = align(pairs, Alignment::YawPosition)?;
+    let errors = ErrorStatistics::of(&absolute_errors_m(pairs, &transform))?;
+    let rpe = RELATIVE_LENGTHS_M
+        .into_iter()
+        .filter_map(|delta_m| {
+            let (translations, rotations) = relative_errors(pairs, &transform, RelativeDelta::Metres(delta_m));
+            let translation = ErrorStatistics::of(&translations)?;
+            let rotation = ErrorStatistics::of(&rotations)?;
+            Some(RelativeError {
+                delta_m,
+                pairs: translation.count,
+                translation_rmse_m: translation.rmse,
+                rotation_rmse_deg: rotation.rmse.to_degrees(),
+            })
+        })
+        .collect();
+    Some(Accuracy {
+        alignment: alignment_name(Alignment::YawPosition),
+        ate_rmse_m: errors.rmse,
+        ate_mean_m: errors.mean,
+        ate_std_m: errors.std,
+        ate_median_m: errors.median,
+        ate_max_m: errors.max,
+        ate_percent_of_length: if length_m > 0.0 { 100.0 * errors.rmse / length_m } else { 0.0 },
+        rpe,
+    })
+}
+
+/// The chain of a run's camera with the true values.
+fn true_chain(truth_rig: &Rig, camera_key: &str) -> Option<ClassicalChain> {
+    let camera = truth_rig.cameras.iter().find(|camera| camera.key == camera_key)?;
+    match &camera.mount {
+        CameraMount::Gimbal => truth_rig.gimbal.as_ref().map(|gimbal| gimbal.chain.clone()),
+        CameraMount::Static { imu_from_camera } => {
+            Some(ClassicalChain { imu_from_base: *imu_from_camera, ..ClassicalChain::default() })
+        }
+    }
+}
+
+fn calibration(recording: &Recording, run: &RunRecord) -> CalibrationSummary {
+    let Some(last) = run.steps.last().map(|step| &step.report.calibration) else {
+        return CalibrationSummary {
+            parameterization: run.spec.parameterization.name().to_owned(),
+            columns: 0,
+            parameters: Vec::new(),
+            chain_error: None,
+            chain_error_initial: None,
+        };
+    };
+    let truth = recording.truth_rig.as_ref().and_then(|rig| true_chain(rig, &run.camera_key));
+    let in_parameters = |chain: &ClassicalChain| {
+        let parameterization: Parameterization = last.parameterization.parse().ok()?;
+        let chain = Chain::from_classical(chain, parameterization);
+        let values = chain.values();
+        Some(chain.parameter_names().into_iter().zip(values.iter().copied()).collect::<Vec<_>>())
+    };
+    let given = true_chain(&recording.rig, &run.camera_key);
+    let initial_values = given.as_ref().and_then(in_parameters).unwrap_or_default();
+    let true_values = truth.as_ref().and_then(in_parameters).unwrap_or_default();
+    let value_of =
+        |values: &[(String, f64)], name: &str| values.iter().find(|(known, _)| known == name).map(|(_, value)| *value);
+    let parameters = last
+        .names
+        .iter()
+        .enumerate()
+        .map(|(index, name)| {
+            let unit = last.units[index];
+            let value = last.values[index];
+            let truth = value_of(&true_values, name);
+            ParameterSummary {
+                name: parameter_name(name, &recording.rig),
+                unit,
+                initial: value_of(&initial_values, name).unwrap_or(value),
+                last: value,
+                sigma: last.sigmas.get(index).copied().filter(|sigma| sigma.is_finite()),
+                truth,
+                error: truth.map(|truth| if unit == "rad" { wrapped(value - truth) } else { value - truth }),
+            }
+        })
+        .collect();
+    let chain_error = |chain: &ClassicalChain| truth.as_ref().and_then(|truth| chain_error(run, chain, truth));
+    CalibrationSummary {
+        parameterization: last.parameterization.clone(),
+        columns: last.names.len(),
+        parameters,
+        chain_error: chain_error(&last.classical),
+        chain_error_initial: given.as_ref().and_then(chain_error),
+    }
+}
+
+/// The angle within ±π.
+fn wrapped(angle_rad: f64) -> f64 {
+    angle_rad - (angle_rad / std::f64::consts::TAU).round() * std::f64::consts::TAU
+}
+
+fn chain_error(run: &RunRecord, chain: &ClassicalChain, truth: &ClassicalChain) -> Option<ChainError> {
+    let mut translations = Vec::new();
+    let mut rotations = Vec::new();
+    for newest in run.steps.iter().filter_map(|step| step.report.newest()) {
+        let estimate = chain.imu_from_camera(&newest.joint_angles_rad);
+        let reference = truth.imu_from_camera(&newest.joint_angles_rad);
+        translations.push((estimate.translation_m - reference.translation_m).norm());
+        rotations.push(so3::log(&(reference.rotation.inverse() * estimate.rotation)).norm());
+    }
+    let translation = ErrorStatistics::of(&translations)?;
+    let rotation = ErrorStatistics::of(&rotations)?;
+    Some(ChainError {
+        translation_mean_m: translation.mean,
+        translation_std_m: translation.std,
+        rotation_mean_rad: rotation.mean,
+        rotation_std_rad: rotation.std,
+    })
+}
+
+fn rank(recording: &Recording, run: &RunRecord) -> Option<RankSummary> {
+    let rank = run.steps.iter().rev().find_map(|step| step.rank.as_ref())?;
+    let null_directions = rank
+        .directions
+        .iter()
+        .filter(|direction| direction.structural)
+        .map(|direction| {
+            let weights = rank.names.iter().zip(&direction.weights);
+            weights
+                .filter(|(_, weight)| weight.abs() > 0.01)
+                .map(|(name, weight)| DirectionWeight { name: parameter_name(name, &recording.rig), weight: *weight })
+                .collect()
+        })
+        .collect();
+    Some(RankSummary {
+        columns: rank.names.len(),
+        rank_structural: rank.rank_structural,
+        rank_informed: rank.rank_informed,
+        deficit: DeficitSummary {
+            parameterization: rank.deficit_parameterization,
+            joints: rank.deficit_joints,
+            absorbed: rank.deficit_absorbed,
+            motion: rank.deficit_motion,
+        },
+        null_directions,
+    })
+}
+
+fn timing_summary(run: &RunRecord) -> Option<TimingSummary> {
+    let times: Vec<&StageTimes> =
+        run.steps.iter().filter(|step| step.report.phase == Phase::Tracking).map(|step| &step.report.times).collect();
+    let stage = |time_of: fn(&StageTimes) -> f64| {
+        let mut sorted: Vec<f64> = times.iter().map(|times| time_of(times)).collect();
+        sorted.sort_by(f64::total_cmp);
+        let at = |share: f64| {
+            sorted.get(((sorted.len() as f64 * share) as usize).min(sorted.len().saturating_sub(1))).copied()
+        };
+        Some(StageSummary { p50: at(0.5)?, p95: at(0.95)?, max: at(1.0)? })
+    };
+    Some(TimingSummary {
+        frontend: stage(|times| times.frontend_ms)?,
+        optimize: stage(|times| times.optimize_ms)?,
+        marginalize: stage(|times| times.marginalize_ms)?,
+        observability: stage(|times| times.observability_ms)?,
+        step: stage(|times| times.step_ms)?,
+    })
+}
+
+fn real_time_factor(run: &RunRecord) -> Option<f64> {
+    let first = run.steps.first()?;
+    let last = run.steps.last()?;
+    let work_ms: f64 = run.steps.iter().map(|step| step.report.times.step_ms).sum();
+    let log_s = seconds_from_ns(last.report.stamp_ns - first.report.stamp_ns);
+    (work_ms > 0.0).then(|| log_s * 1e3 / work_ms)
+}
+
+/// Warnings of the log, then of the run, each with its time; a step's repeated warning is told once with its count.
+fn warnings(recording: &Recording, run: &RunRecord) -> Vec<String> {
+    let mut texts: Vec<String> = recording
+        .warnings
+        .iter()
+        .map(|warning| format!("{:.3} s: {}", seconds_from_ns(warning.stamp_ns), warning.message))
+        .collect();
+    let mut seen: Vec<(&String, f64, usize)> = Vec::new();
+    for step in &run.steps {
+        for warning in &step.report.warnings {
+            match seen.iter_mut().find(|(known, _, _)| *known == warning) {
+                Some((_, _, count)) => *count += 1,
+                None => seen.push((warning, seconds_from_ns(step.report.stamp_ns), 1)),
+            }
+        }
+    }
+    for (warning, first_s, count) in seen {
+        let times = if count > 1 { format!(" ({count} times)") } else { String::new() };
+        texts.push(format!("{first_s:.3} s: {warning}{times}"));
+    }
+    texts.extend(run.error.iter().cloned());
+    texts
+}
+
+/// Writes a summary as the text of `summary.json`.
+pub(super) fn to_json(summary: &RunSummary) -> Result<String, serde_json::Error> {
+    serde_json::to_string_pretty(summary).map(|text| text + "\n")
+}
+
+/// File name of a log without its folder, for messages.
+pub fn log_name(path: &Path) -> String {
+    path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
+}

@@ -1,0 +1,198 @@
+//! The CSV tables of a run, one row per frame.
+
+use std::fmt::Write as _;
+
+use crate::estimator::{Event, Phase};
+use crate::flight_log::Rig;
+use crate::geometry::seconds_from_ns;
+use crate::session::{RunRecord, StepRecord};
+
+/// A golden parameter name with its joint's name in place of the link's number: `L1.alpha` becomes `yaw.alpha`.
+pub(super) fn parameter_name(name: &str, rig: &Rig) -> String {
+    let joint_name = |rest: &str| {
+        let (number, quantity) = rest.split_once('.')?;
+        let index = number.parse::<usize>().ok()?.checked_sub(1)?;
+        let joint = rig.gimbal.as_ref()?.joints.get(index)?;
+        Some(format!("{}.{quantity}", joint.name))
+    };
+    name.strip_prefix('L').and_then(joint_name).unwrap_or_else(|| name.to_owned())
+}
+
+/// Seconds since the log began with all their nanoseconds.
+fn seconds_text(stamp_ns: i64) -> String {
+    format!("{:.9}", seconds_from_ns(stamp_ns))
+}
+
+fn push_cell(text: &mut String, cell: &str) {
+    text.push(',');
+    if cell.contains([',', '"', '\n']) {
+        text.push('"');
+        text.push_str(&cell.replace('"', "\"\""));
+        text.push('"');
+    } else {
+        text.push_str(cell);
+    }
+}
+
+fn push_number(text: &mut String, number: f64) {
+    if number.is_finite() {
+        // Writing into a string cannot fail.
+        let _ = write!(text, ",{number}");
+    } else {
+        text.push(',');
+    }
+}
+
+/// `calibration.csv`: each parameter and its sigma, then the joint angles. A chart switch changes the parameters, so
+/// the columns are those of all charts, and a cell is empty while another chart is in use.
+pub(super) fn calibration_csv(run: &RunRecord, rig: &Rig) -> String {
+    let mut columns: Vec<(String, &'static str)> = Vec::new();
+    for step in &run.steps {
+        let calibration = &step.report.calibration;
+        for (name, unit) in calibration.names.iter().zip(&calibration.units) {
+            if !columns.iter().any(|(known, _)| known == name) {
+                columns.push((name.clone(), unit));
+            }
+        }
+    }
+    let joints = joint_names(run, rig);
+    let mut text = "t_s".to_owned();
+    for (name, unit) in &columns {
+        let name = parameter_name(name, rig);
+        let _ = write!(text, ",{name}_{unit},{name}_sigma_{unit}");
+    }
+    for joint in &joints {
+        let _ = write!(text, ",{joint}_rad");
+    }
+    text.push('\n');
+    for step in run.steps.iter().filter(|step| step.report.newest().is_some()) {
+        let calibration = &step.report.calibration;
+        text.push_str(&seconds_text(step.report.stamp_ns));
+        for (name, _) in &columns {
+            let index = calibration.names.iter().position(|known| known == name);
+            for series in [&calibration.values, &calibration.sigmas] {
+                push_number(&mut text, index.and_then(|index| series.get(index)).copied().unwrap_or(f64::NAN));
+            }
+        }
+        let angles = step.report.newest().map_or(&[][..], |newest| &newest.joint_angles_rad);
+        for index in 0..joints.len() {
+            push_number(&mut text, angles.get(index).copied().unwrap_or(f64::NAN));
+        }
+        text.push('\n');
+    }
+    text
+}
+
+fn joint_names(run: &RunRecord, rig: &Rig) -> Vec<String> {
+    let count =
+        run.steps.iter().filter_map(|step| step.report.newest()).map(|newest| newest.joint_angles_rad.len()).max();
+    let named = rig.gimbal.iter().flat_map(|gimbal| gimbal.joints.iter().map(|joint| joint.name.clone()));
+    named.take(count.unwrap_or(0)).collect()
+}
+
+/// `rank.csv`: ranks, deficit by cause, thresholds, margins and singular values.
+pub(super) fn rank_csv(run: &RunRecord) -> String {
+    let ranked: Vec<(&StepRecord, _)> =
+        run.steps.iter().filter_map(|step| step.rank.as_ref().map(|rank| (step.as_ref(), rank))).collect();
+    let columns = ranked.iter().map(|(_, rank)| rank.names.len()).max().unwrap_or(0);
+    let mut margins: Vec<&String> = Vec::new();
+    for (name, _) in ranked.iter().flat_map(|(_, rank)| &rank.margins) {
+        if !margins.contains(&name) {
+            margins.push(name);
+        }
+    }
+    let mut text =
+        "t_s,columns,rank_structural,rank_informed,deficit_parameterization,deficit_joints,deficit_absorbed,\
+                    deficit_motion,reference,structural_threshold,informed_threshold"
+            .to_owned();
+    for name in &margins {
+        let _ = write!(text, ",margin_{}", name.replace([' ', ','], "_"));
+    }
+    for index in 1..=columns {
+        let _ = write!(text, ",singular_value_{index}");
+    }
+    for index in 1..=columns {
+        let _ = write!(text, ",singular_value_with_priors_{index}");
+    }
+    text.push('\n');
+    for (step, rank) in ranked {
+        text.push_str(&seconds_text(step.report.stamp_ns));
+        let counts = [
+            rank.names.len(),
+            rank.rank_structural,
+            rank.rank_informed,
+            rank.deficit_parameterization,
+            rank.deficit_joints,
+            rank.deficit_absorbed,
+            rank.deficit_motion,
+        ];
+        for count in counts {
+            let _ = write!(text, ",{count}");
+        }
+        for number in [rank.reference, rank.structural_threshold, rank.informed_threshold] {
+            push_number(&mut text, number);
+        }
+        for name in &margins {
+            let margin = rank.margins.iter().find(|(known, _)| known == *name);
+            push_number(&mut text, margin.map_or(f64::NAN, |(_, margin)| *margin));
+        }
+        for series in [&rank.singular_values, &rank.singular_values_with_priors] {
+            for index in 0..columns {
+                push_number(&mut text, series.get(index).copied().unwrap_or(f64::NAN));
+            }
+        }
+        text.push('\n');
+    }
+    text
+}
+
+/// `frames.csv`: counts, residuals, iterations, stage times and events. Without `timing` the time cells stay empty, so
+/// that two runs give the same bytes.
+pub(super) fn frames_csv(run: &RunRecord, timing: bool) -> String {
+    let mut text = "t_s,frame,log_time_s,phase,tracked,new,lost,rejected,inliers,keyframe,reprojection_rms_before_px,\
+                    reprojection_rms_after_px,iterations,frontend_ms,optimize_ms,marginalize_ms,observability_ms,step_ms,\
+                    events,warnings\n"
+        .to_owned();
+    for step in &run.steps {
+        let report = &step.report;
+        let statistics = &step.tracks.statistics;
+        text.push_str(&seconds_text(report.stamp_ns));
+        let phase = match report.phase {
+            Phase::Initializing => "initializing",
+            Phase::Tracking => "tracking",
+        };
+        let inliers = report.features.iter().filter(|feature| !feature.rejected).count();
+        let _ = write!(
+            text,
+            ",{},{},{phase},{},{},{},{},{inliers},{}",
+            report.frame_index,
+            seconds_text(step.log_time_ns),
+            statistics.tracked,
+            statistics.detected,
+            statistics.lost,
+            statistics.rejected,
+            u8::from(report.keyframe),
+        );
+        push_number(&mut text, report.reprojection_rms_before_px);
+        push_number(&mut text, report.reprojection_rms_after_px);
+        let _ = write!(text, ",{}", report.iterations.len());
+        let times = &report.times;
+        for time_ms in
+            [times.frontend_ms, times.optimize_ms, times.marginalize_ms, times.observability_ms, times.step_ms]
+        {
+            if timing {
+                let _ = write!(text, ",{time_ms:.3}");
+            } else {
+                text.push(',');
+            }
+        }
+        push_cell(&mut text, &report.events.iter().map(event_text).collect::<Vec<_>>().join("; "));
+        push_cell(&mut text, &report.warnings.join("; "));
+        text.push('\n');
+    }
+    text
+}
+
+fn event_text(event: &Event) -> String {
+    format!("{:?}: {}", event.kind, event.message)
+}

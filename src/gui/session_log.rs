@@ -1,0 +1,53 @@
+//! A session as the log that the window plays.
+
+use std::sync::Arc;
+
+use super::app::PlayingLog;
+use super::{ImageSource, Playback};
+use crate::flight_log::{GrayImage, ImageReader};
+use crate::session::{Command, Recording, Session};
+
+impl PlayingLog for Session {
+    fn recording(&self) -> Arc<Recording> {
+        Self::recording(self)
+    }
+
+    fn generation(&self) -> u64 {
+        Self::generation(self)
+    }
+
+    fn cursor_ns(&self) -> i64 {
+        Self::cursor_ns(self)
+    }
+
+    fn playback(&self) -> Playback {
+        Playback {
+            playing: self.is_playing(),
+            speed: self.speed().0,
+            loop_range_ns: self.loop_range_ns(),
+            markers_ns: self.markers_ns().to_vec(),
+        }
+    }
+
+    fn apply(&mut self, command: Command) {
+        Self::apply(self, command);
+    }
+
+    fn advance(&mut self, elapsed_s: f64) {
+        Self::advance(self, elapsed_s);
+    }
+
+    fn image(&mut self, camera_key: &str, frame_index: usize) -> Option<Arc<GrayImage>> {
+        Self::image(self, camera_key, frame_index)
+    }
+
+    fn take_notices(&mut self) -> Vec<String> {
+        Self::take_notices(self)
+    }
+}
+
+impl ImageSource for ImageReader {
+    fn image(&mut self, camera_key: &str, frame_index: usize) -> Option<Arc<GrayImage>> {
+        Self::image(self, camera_key, frame_index).ok()
+    }
+}

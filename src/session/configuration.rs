@@ -1,0 +1,56 @@
+//! From a rig and a run specification to an estimator's configuration.
+
+use super::plan::{SessionError, camera_of_run};
+use super::spec::{ParameterizationChoice, RunSpec};
+use super::stopwatch::clock_ms;
+use super::tracker::chain_of_camera;
+use crate::estimator::{EstimatorConfig, EstimatorOptions};
+use crate::flight_log::Rig;
+use crate::flight_log::rig::{CameraMount, ChainPrior};
+use crate::gimbal::{Parameterization, auto_parameterization};
+
+/// How wrong a rigid camera's pose on the IMU may be when the rig has no prior: a target calibration is better than this.
+const RIGID_CAMERA_PRIOR: ChainPrior = ChainPrior { translation_bound_m: 0.01, rotation_bound_rad: 0.0175 };
+
+/// Standard deviation of a uniform error within ±1.
+const SIGMA_PER_BOUND: f64 = 0.577_350_269_189_625_8;
+
+/// The estimator that a run asks for.
+pub fn estimator_config(rig: &Rig, spec: &RunSpec) -> Result<EstimatorConfig, SessionError> {
+    let camera = camera_of_run(rig, spec)?;
+    let chain = chain_of_camera(rig, &camera.mount);
+    let gimbal = rig.gimbal.as_ref().filter(|_| camera.mount == CameraMount::Gimbal);
+    let prior = match (&gimbal, &rig.gimbal) {
+        (Some(gimbal), _) => gimbal.prior,
+        // The rigid camera of a gimbal rig was calibrated with the same care as its gimbal, but never better than a
+        // rigid camera usually is.
+        (None, Some(gimbal)) => ChainPrior {
+            translation_bound_m: gimbal.prior.translation_bound_m.min(RIGID_CAMERA_PRIOR.translation_bound_m),
+            rotation_bound_rad: gimbal.prior.rotation_bound_rad.min(RIGID_CAMERA_PRIOR.rotation_bound_rad),
+        },
+        (None, None) => RIGID_CAMERA_PRIOR,
+    };
+    let parameterization = match spec.parameterization {
+        ParameterizationChoice::Auto => auto_parameterization(&chain),
+        ParameterizationChoice::Minimal | ParameterizationChoice::Static => Parameterization::Minimal,
+        ParameterizationChoice::MinimalSwapped => Parameterization::MinimalSwapped,
+        ParameterizationChoice::Classical => Parameterization::Classical,
+        ParameterizationChoice::Poe => Parameterization::Poe,
+    };
+    let encoder_sigma_rad = gimbal.and_then(|gimbal| gimbal.encoder_sigma_rad);
+    let has_joints = !chain.links.is_empty();
+    Ok(EstimatorConfig {
+        camera: camera.model.clone(),
+        imu_noise: rig.imu.noise,
+        gravity_m_per_s2: rig.gravity_m_per_s2,
+        chain,
+        parameterization,
+        auto_chart: spec.parameterization == ParameterizationChoice::Auto && has_joints,
+        encoder_sigma_rad,
+        use_encoder: spec.encoder && encoder_sigma_rad.is_some(),
+        calibrate: spec.calibrate,
+        chain_prior: Some((prior.translation_bound_m * SIGMA_PER_BOUND, prior.rotation_bound_rad * SIGMA_PER_BOUND)),
+        options: EstimatorOptions { window: spec.window, keep_linearization: true, ..EstimatorOptions::default() },
+        clock_ms,
+    })
+}

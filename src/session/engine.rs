@@ -1,0 +1,186 @@
+//! The threads of a session: one tracker per camera, one estimator per run, results in order over one channel.
+//!
+//! Every run is computed on its own thread from its own copy of the tracks, so what comes out does not depend on how the
+//! threads are scheduled.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::thread::{Builder, JoinHandle};
+
+use super::configuration::estimator_config;
+use super::plan::{SessionError, SessionPlan};
+use super::recording::StepRecord;
+use super::run_engine::RunEngine;
+use super::tracker::{CameraTracker, TrackedSensorFrame};
+use crate::flight_log::LogWarning;
+
+/// Frames that may wait between the tracker and an estimator.
+const QUEUED_FRAMES: usize = 8;
+/// Steps that may wait for whoever collects them.
+const QUEUED_STEPS: usize = 64;
+
+/// What the threads report.
+#[derive(Debug)]
+pub enum EngineMessage {
+    /// A run has done a step.
+    Step {
+        /// Number of the run.
+        run: usize,
+        /// The step.
+        record: Box<StepRecord>,
+    },
+    /// A run has reached the end of the log, or failed for a reason that no restart cures.
+    Finished {
+        /// Number of the run.
+        run: usize,
+        /// Why it ended early.
+        error: Option<String>,
+    },
+    /// The log has something wrong with it.
+    Warnings(Vec<LogWarning>),
+}
+
+/// Running threads; dropping it stops them.
+#[derive(Debug)]
+pub struct Engine {
+    sender: Option<SyncSender<EngineMessage>>,
+    receiver: Option<Receiver<EngineMessage>>,
+    cancelled: Arc<AtomicBool>,
+    threads: Vec<JoinHandle<()>>,
+}
+
+impl Default for Engine {
+    fn default() -> Self {
+        let (sender, receiver) = sync_channel(QUEUED_STEPS);
+        Self {
+            sender: Some(sender),
+            receiver: Some(receiver),
+            cancelled: Arc::new(AtomicBool::new(false)),
+            threads: Vec::new(),
+        }
+    }
+}
+
+impl Engine {
+    /// Starts every run of the plan; runs that watch the same camera share one tracker.
+    pub fn start(plan: &SessionPlan) -> Result<Self, SessionError> {
+        let mut engine = Self::default();
+        let mut cameras: Vec<&String> = plan.runs.iter().map(|(_, camera_key)| camera_key).collect();
+        cameras.sort();
+        cameras.dedup();
+        for camera_key in cameras {
+            let runs: Vec<usize> = (0..plan.runs.len()).filter(|run| plan.runs[*run].1 == *camera_key).collect();
+            engine.start_camera(plan, camera_key, &runs)?;
+        }
+        Ok(engine)
+    }
+
+    /// Starts the given runs of the plan, which all watch the same camera, from the begin of the log.
+    pub fn start_camera(&mut self, plan: &SessionPlan, camera_key: &str, runs: &[usize]) -> Result<(), SessionError> {
+        let Some(sender) = &self.sender else { return Ok(()) };
+        let tracker = CameraTracker::new(Arc::clone(&plan.log), &plan.rig, camera_key, plan.start_s, plan.duration_s)?;
+        let mut queues = Vec::new();
+        for &run in runs {
+            let (spec, _) = &plan.runs[run];
+            let engine = RunEngine::new(estimator_config(&plan.rig, spec)?);
+            let (queue, frames) = sync_channel(QUEUED_FRAMES);
+            let results = sender.clone();
+            self.threads.push(spawn(format!("estimator {run}"), move || {
+                run_thread(run, engine, &frames, &results);
+            })?);
+            queues.push(queue);
+        }
+        let results = sender.clone();
+        let cancelled = Arc::clone(&self.cancelled);
+        self.threads.push(spawn(format!("tracker {camera_key}"), move || {
+            track_thread(tracker, queues, &results, &cancelled);
+        })?);
+        Ok(())
+    }
+
+    /// Lets go of the engine's own end of the channel: once all runs are done, [`Engine::receive`] returns `None`.
+    pub fn no_more_runs(&mut self) {
+        self.sender = None;
+    }
+
+    /// Takes the receiving end, for a collecting thread of one's own.
+    pub fn take_receiver(&mut self) -> Option<Receiver<EngineMessage>> {
+        self.receiver.take()
+    }
+
+    /// The next message; waits for it. `None` when every thread has ended.
+    pub fn receive(&self) -> Option<EngineMessage> {
+        self.receiver.as_ref().and_then(|receiver| receiver.recv().ok())
+    }
+}
+
+impl Drop for Engine {
+    fn drop(&mut self) {
+        self.cancelled.store(true, Ordering::Relaxed);
+        self.sender = None;
+        self.receiver = None;
+        for thread in self.threads.drain(..) {
+            // A thread that panicked has already reported its run as failed.
+            drop(thread.join());
+        }
+    }
+}
+
+fn spawn(name: String, work: impl FnOnce() + Send + 'static) -> Result<JoinHandle<()>, SessionError> {
+    Builder::new().name(name).spawn(work).map_err(|source| SessionError::Thread { source })
+}
+
+/// Feeds the tracked frames to every estimator of the camera.
+fn track_thread(
+    mut tracker: CameraTracker,
+    mut queues: Vec<SyncSender<Arc<TrackedSensorFrame>>>,
+    results: &SyncSender<EngineMessage>,
+    cancelled: &AtomicBool,
+) {
+    while !cancelled.load(Ordering::Relaxed) {
+        let Some(tracked) = tracker.next_frame() else {
+            // Nobody listens any more when the session was closed.
+            drop(results.send(EngineMessage::Warnings(tracker.remaining_warnings().to_vec())));
+            return;
+        };
+        if !tracked.frame.warnings.is_empty()
+            && results.send(EngineMessage::Warnings(tracked.frame.warnings.clone())).is_err()
+        {
+            return;
+        }
+        let tracked = Arc::new(tracked);
+        queues.retain(|queue| queue.send(Arc::clone(&tracked)).is_ok());
+        if queues.is_empty() {
+            return;
+        }
+    }
+}
+
+/// Steps one estimator over the frames that come, and reports each step.
+fn run_thread(
+    run: usize,
+    mut engine: RunEngine,
+    frames: &Receiver<Arc<TrackedSensorFrame>>,
+    results: &SyncSender<EngineMessage>,
+) {
+    let mut error = None;
+    while let Ok(tracked) = frames.recv() {
+        match catch_unwind(AssertUnwindSafe(|| engine.step(&tracked))) {
+            Ok(record) => {
+                if results.send(EngineMessage::Step { run, record: Box::new(record) }).is_err() {
+                    return;
+                }
+            }
+            Err(_) => {
+                let time_s = crate::geometry::seconds_from_ns(tracked.frame.stamp_ns);
+                error =
+                    Some(format!("internal error in the estimator at {time_s:.3} s; please report it with the log"));
+                break;
+            }
+        }
+    }
+    // Nobody listens any more when the session was closed.
+    drop(results.send(EngineMessage::Finished { run, error }));
+}

@@ -1,0 +1,134 @@
+//! What a session is to do: a log, its rigs, the stretch of time, and the runs with the camera that each watches.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use thiserror::Error;
+
+use super::spec::{ParameterizationChoice, RunSpec, distinct_labels};
+use crate::flight_log::rig::{CameraMount, CameraRig};
+use crate::flight_log::{FlightLog, LogError, Rig};
+
+/// The most runs side by side.
+pub const MAX_RUNS: usize = 4;
+
+/// Why a session cannot start.
+#[derive(Debug, Error)]
+pub enum SessionError {
+    /// The log, its rig or its truth cannot be read.
+    #[error(transparent)]
+    Log(#[from] LogError),
+    /// The rig has no camera that the run can watch.
+    #[error("run '{run}' needs {wanted}, but the rig '{rig}' has only {present}")]
+    NoCamera {
+        /// The run.
+        run: String,
+        /// What was looked for.
+        wanted: String,
+        /// Name of the rig.
+        rig: String,
+        /// The rig's cameras.
+        present: String,
+    },
+    /// More runs than can be told apart.
+    #[error("{count} runs were asked for, at most {MAX_RUNS} fit side by side: leave some out")]
+    TooManyRuns {
+        /// How many.
+        count: usize,
+    },
+    /// A thread could not be started.
+    #[error("cannot start a thread for the estimation: {source}")]
+    Thread {
+        /// What the system said.
+        source: std::io::Error,
+    },
+}
+
+/// What to open.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SessionRequest {
+    /// The log.
+    pub log_path: PathBuf,
+    /// The rig, when it is not beside the log or in it.
+    pub rig_path: Option<PathBuf>,
+    /// The true values, when they are not beside the log.
+    pub truth_path: Option<PathBuf>,
+    /// The runs; none means one `auto`.
+    pub specs: Vec<RunSpec>,
+    /// Seconds of the log to leave out at its begin.
+    pub start_s: f64,
+    /// Seconds to read from there, `None` to the end.
+    pub duration_s: Option<f64>,
+}
+
+/// Everything that the threads of a session need, checked.
+#[derive(Clone, Debug)]
+pub struct SessionPlan {
+    /// The opened log.
+    pub log: Arc<FlightLog>,
+    /// Where it lies.
+    pub log_path: PathBuf,
+    /// The rig that the runs are given.
+    pub rig: Arc<Rig>,
+    /// The rig with the true values.
+    pub truth_rig: Option<Arc<Rig>>,
+    /// The runs and the camera of each.
+    pub runs: Vec<(RunSpec, String)>,
+    /// Seconds left out at the begin.
+    pub start_s: f64,
+    /// Seconds to read.
+    pub duration_s: Option<f64>,
+}
+
+impl SessionPlan {
+    /// Opens the log and its rigs and finds each run's camera.
+    pub fn open(request: &SessionRequest) -> Result<Self, SessionError> {
+        let log = Arc::new(FlightLog::open(&request.log_path)?);
+        let rig = Rig::for_log(&log, request.rig_path.as_deref())?;
+        let truth_rig = Rig::truth_for_log(&log, request.truth_path.as_deref())?;
+        let mut specs = request.specs.clone();
+        if specs.is_empty() {
+            specs.push(RunSpec::default());
+        }
+        if specs.len() > MAX_RUNS {
+            return Err(SessionError::TooManyRuns { count: specs.len() });
+        }
+        distinct_labels(&mut specs);
+        let runs = specs
+            .into_iter()
+            .map(|spec| camera_of_run(&rig, &spec).map(|camera| (spec, camera.key.clone())))
+            .collect::<Result<Vec<_>, _>>()?;
+        Ok(Self {
+            log,
+            log_path: request.log_path.clone(),
+            rig: Arc::new(rig),
+            truth_rig: truth_rig.map(Arc::new),
+            runs,
+            start_s: request.start_s,
+            duration_s: request.duration_s,
+        })
+    }
+}
+
+/// The camera that a run watches.
+pub fn camera_of_run<'rig>(rig: &'rig Rig, spec: &RunSpec) -> Result<&'rig CameraRig, SessionError> {
+    let is_gimballed = |camera: &&CameraRig| camera.mount == CameraMount::Gimbal;
+    let (camera, wanted) = if let Some(key) = &spec.camera_key {
+        (rig.cameras.iter().find(|camera| camera.key == *key), format!("camera '{key}'"))
+    } else if spec.parameterization == ParameterizationChoice::Static || rig.gimbal.is_none() {
+        (rig.cameras.iter().find(|camera| !is_gimballed(camera)), "a camera with mount: static".to_owned())
+    } else {
+        (rig.cameras.iter().find(is_gimballed), "a camera with mount: gimbal".to_owned())
+    };
+    camera.ok_or_else(|| SessionError::NoCamera {
+        run: spec.label.clone(),
+        wanted,
+        rig: rig.name.clone(),
+        present: rig.cameras.iter().map(describe).collect::<Vec<_>>().join(", "),
+    })
+}
+
+fn describe(camera: &CameraRig) -> String {
+    let mount = if camera.mount == CameraMount::Gimbal { "gimbal" } else { "static" };
+    format!("{} (mount: {mount})", camera.key)
+}

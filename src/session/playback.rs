@@ -1,0 +1,310 @@
+//! A session that plays: a cursor over what the threads have computed so far.
+
+use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::{Builder, JoinHandle};
+
+use super::command::{Command, PlaybackSpeed};
+use super::engine::Engine;
+use super::plan::{MAX_RUNS, SessionError, SessionPlan, SessionRequest, camera_of_run};
+use super::recording::{Recording, RunRecord};
+use super::spec::{RunSpec, distinct_labels};
+use crate::estimator::EventKind;
+use crate::flight_log::{GrayImage, ImageReader};
+use crate::geometry::ns_from_seconds;
+
+/// A recording that grows while others look at it.
+#[derive(Debug)]
+struct SharedRecording {
+    recording: Mutex<Arc<Recording>>,
+    generation: AtomicU64,
+}
+
+impl SharedRecording {
+    fn lock(&self) -> MutexGuard<'_, Arc<Recording>> {
+        self.recording.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn change(&self, change: impl FnOnce(&mut Recording)) {
+        change(Arc::make_mut(&mut self.lock()));
+        self.generation.fetch_add(1, Ordering::Release);
+    }
+}
+
+/// A log with its runs, computed on threads of their own, and a cursor that plays over the results.
+///
+/// Nothing here waits for the estimators: a picture shows what is there.
+#[derive(Debug)]
+pub struct Session {
+    plan: SessionPlan,
+    shared: Arc<SharedRecording>,
+    engine: Engine,
+    collector: Option<JoinHandle<()>>,
+    images: ImageReader,
+    cursor_ns: i64,
+    playing: bool,
+    speed: PlaybackSpeed,
+    loop_range_ns: Option<(i64, i64)>,
+    markers_ns: Vec<i64>,
+    notices: Vec<String>,
+}
+
+impl Session {
+    /// Opens the log and starts the runs.
+    pub fn open(request: &SessionRequest) -> Result<Self, SessionError> {
+        let plan = SessionPlan::open(request)?;
+        let shared = Arc::new(SharedRecording {
+            recording: Mutex::new(Arc::new(Recording::new(&plan))),
+            generation: AtomicU64::new(1),
+        });
+        let mut engine = Engine::start(&plan)?;
+        let receiver = engine.take_receiver();
+        let target = Arc::clone(&shared);
+        let collector = Builder::new()
+            .name("collector".to_owned())
+            .spawn(move || {
+                for message in receiver.iter().flatten() {
+                    target.change(|recording| recording.take(message));
+                }
+            })
+            .map_err(|source| SessionError::Thread { source })?;
+        let images = ImageReader::new(Arc::clone(&plan.log), &plan.rig);
+        Ok(Self {
+            cursor_ns: ns_from_seconds(request.start_s),
+            plan,
+            shared,
+            engine,
+            collector: Some(collector),
+            images,
+            playing: false,
+            speed: PlaybackSpeed(1.0),
+            loop_range_ns: None,
+            markers_ns: Vec::new(),
+            notices: Vec::new(),
+        })
+    }
+
+    /// What has been computed so far; cheap.
+    pub fn recording(&self) -> Arc<Recording> {
+        Arc::clone(&self.shared.lock())
+    }
+
+    /// Changes whenever something new has been computed.
+    pub fn generation(&self) -> u64 {
+        self.shared.generation.load(Ordering::Acquire)
+    }
+
+    /// The log.
+    pub fn log_path(&self) -> &Path {
+        &self.plan.log_path
+    }
+
+    /// Where the cursor stands, since the log began.
+    pub fn cursor_ns(&self) -> i64 {
+        self.cursor_ns
+    }
+
+    /// Whether the cursor runs.
+    pub fn is_playing(&self) -> bool {
+        self.playing
+    }
+
+    /// How fast it runs.
+    pub fn speed(&self) -> PlaybackSpeed {
+        self.speed
+    }
+
+    /// The range that is played over and over.
+    pub fn loop_range_ns(&self) -> Option<(i64, i64)> {
+        self.loop_range_ns
+    }
+
+    /// Marked instants, in time order.
+    pub fn markers_ns(&self) -> &[i64] {
+        &self.markers_ns
+    }
+
+    /// What could not be done as asked, since the last call.
+    pub fn take_notices(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.notices)
+    }
+
+    /// An image of the log by camera and number in its stream, `None` when it is missing or not decodable.
+    pub fn image(&self, camera_key: &str, frame_index: usize) -> Option<Arc<GrayImage>> {
+        self.images.image(camera_key, frame_index).ok()
+    }
+
+    /// Lets the cursor run for `elapsed_s` seconds of the wall; it waits where nothing is computed yet, goes round in a
+    /// loop, and stops at the end.
+    pub fn advance(&mut self, elapsed_s: f64) {
+        if !self.playing {
+            return;
+        }
+        let recording = self.recording();
+        let mut next_ns = self.cursor_ns + ns_from_seconds(elapsed_s * self.speed.0);
+        if let Some((begin_ns, end_ns)) = self.loop_range_ns {
+            if next_ns >= end_ns || next_ns < begin_ns {
+                next_ns = begin_ns;
+            }
+        }
+        let computed_ns = recording.computed_ns();
+        if next_ns >= computed_ns {
+            next_ns = computed_ns.max(self.cursor_ns.min(computed_ns));
+            let finished = recording.runs.iter().all(|run| run.finished);
+            if finished && self.loop_range_ns.is_none() {
+                self.playing = false;
+            }
+        }
+        self.cursor_ns = next_ns;
+    }
+
+    /// Does what a person asked for.
+    pub fn apply(&mut self, command: Command) {
+        match command {
+            Command::Play => self.play(),
+            Command::Pause => self.playing = false,
+            Command::TogglePlay if self.playing => self.playing = false,
+            Command::TogglePlay => self.play(),
+            Command::SetSpeed(speed) if speed.0.is_finite() && speed.0 > 0.0 => self.speed = speed,
+            Command::SetSpeed(_) => self.notices.push("The speed must be a positive number".to_owned()),
+            Command::Seek { stamp_ns } => self.seek(stamp_ns),
+            Command::StepFrames(count) => self.step_frames(count),
+            Command::JumpToEvent { forward } => self.jump_to_event(forward),
+            Command::GoToStart => self.seek(self.first_stamp_ns()),
+            Command::GoToEnd => self.seek(self.recording().last_stamp_ns()),
+            Command::SetLoop(range) => self.loop_range_ns = range.filter(|(begin, end)| begin < end),
+            Command::ToggleMarker => self.toggle_marker(),
+            Command::AddRun(spec) => self.add_run(spec),
+            Command::RemoveRun(run) => self.remove_run(run),
+        }
+    }
+
+    fn first_stamp_ns(&self) -> i64 {
+        let recording = self.recording();
+        let first = recording.runs.iter().filter_map(|run| run.steps.first()).map(|step| step.report.stamp_ns).min();
+        first.unwrap_or_else(|| ns_from_seconds(self.plan.start_s))
+    }
+
+    fn play(&mut self) {
+        let recording = self.recording();
+        let finished = recording.runs.iter().all(|run| run.finished);
+        if finished && self.cursor_ns >= recording.last_stamp_ns() {
+            self.cursor_ns = self.first_stamp_ns();
+        }
+        self.playing = true;
+    }
+
+    fn seek(&mut self, stamp_ns: i64) {
+        let last_ns = self.recording().last_stamp_ns();
+        let first_ns = self.first_stamp_ns().min(last_ns);
+        self.cursor_ns = stamp_ns.clamp(first_ns, last_ns);
+    }
+
+    /// Moves over the frames of all runs, each instant once.
+    fn step_frames(&mut self, count: i64) {
+        self.playing = false;
+        let recording = self.recording();
+        let stamps_ns = instants_ns(&recording, |_| true);
+        self.cursor_ns = moved(&stamps_ns, self.cursor_ns, count).unwrap_or(self.cursor_ns);
+    }
+
+    fn jump_to_event(&mut self, forward: bool) {
+        self.playing = false;
+        let recording = self.recording();
+        let stamps_ns = instants_ns(&recording, |step| step.report.events.iter().any(|event| is_notable(event.kind)));
+        self.cursor_ns = moved(&stamps_ns, self.cursor_ns, if forward { 1 } else { -1 }).unwrap_or(self.cursor_ns);
+    }
+
+    fn toggle_marker(&mut self) {
+        match self.markers_ns.binary_search(&self.cursor_ns) {
+            Ok(index) => {
+                self.markers_ns.remove(index);
+            }
+            Err(index) => self.markers_ns.insert(index, self.cursor_ns),
+        }
+    }
+
+    fn add_run(&mut self, spec: RunSpec) {
+        let result = (|| {
+            if self.plan.runs.len() >= MAX_RUNS {
+                return Err(SessionError::TooManyRuns { count: self.plan.runs.len() + 1 });
+            }
+            let mut specs: Vec<RunSpec> = self.plan.runs.iter().map(|(spec, _)| spec.clone()).collect();
+            specs.push(spec);
+            distinct_labels(&mut specs);
+            let Some(spec) = specs.pop() else { return Ok(()) };
+            let camera_key = camera_of_run(&self.plan.rig, &spec)?.key.clone();
+            self.plan.runs.push((spec.clone(), camera_key.clone()));
+            self.shared.change(|recording| recording.runs.push(RunRecord::new(spec, camera_key.clone())));
+            self.engine.start_camera(&self.plan, &camera_key, &[self.plan.runs.len() - 1])
+        })();
+        if let Err(error) = result {
+            self.notices.push(error.to_string());
+        }
+    }
+
+    /// Takes the last run away; an earlier one keeps its number, so only the last can go.
+    fn remove_run(&mut self, run: usize) {
+        let last = self.plan.runs.len().saturating_sub(1);
+        let finished = self.recording().runs.get(run).is_some_and(|run| run.finished);
+        if run == last && run > 0 && finished {
+            self.plan.runs.pop();
+            self.shared.change(|recording| {
+                recording.runs.pop();
+            });
+        } else {
+            self.notices.push("Only the last run can be removed, once it is computed".to_owned());
+        }
+    }
+}
+
+impl Drop for Session {
+    fn drop(&mut self) {
+        self.engine = Engine::default();
+        self.engine.no_more_runs();
+        if let Some(collector) = self.collector.take() {
+            drop(collector.join());
+        }
+    }
+}
+
+/// Stamps of the steps of all runs that pass the filter, in order, each once.
+fn instants_ns(recording: &Recording, wanted: impl Fn(&super::StepRecord) -> bool) -> Vec<i64> {
+    let mut stamps_ns: Vec<i64> = recording
+        .runs
+        .iter()
+        .flat_map(|run| run.steps.iter())
+        .filter(|step| wanted(step))
+        .map(|step| step.report.stamp_ns)
+        .collect();
+    stamps_ns.sort_unstable();
+    stamps_ns.dedup();
+    stamps_ns
+}
+
+/// The stamp `count` places after the cursor (before it when negative), or the outermost one; `None` when there is none
+/// in that direction.
+fn moved(stamps_ns: &[i64], cursor_ns: i64, count: i64) -> Option<i64> {
+    if count >= 0 {
+        let after = stamps_ns.partition_point(|stamp| *stamp <= cursor_ns);
+        let target = (after + count as usize).saturating_sub(1).min(stamps_ns.len().saturating_sub(1));
+        stamps_ns.get(target).copied().filter(|stamp| *stamp > cursor_ns)
+    } else {
+        let before = stamps_ns.partition_point(|stamp| *stamp < cursor_ns);
+        let target = before.saturating_sub(count.unsigned_abs() as usize);
+        stamps_ns.get(target).copied().filter(|stamp| *stamp < cursor_ns)
+    }
+}
+
+/// Whether a person wants to jump to an event of this kind: those that nearly every frame has are none.
+fn is_notable(kind: EventKind) -> bool {
+    !matches!(
+        kind,
+        EventKind::InitializationWaits
+            | EventKind::KeyframeChosen
+            | EventKind::OldestMarginalized
+            | EventKind::SecondNewestMarginalized
+            | EventKind::OutliersRejected
+    )
+}
