@@ -1,6 +1,7 @@
 //! Decompositions of dense matrices: nalgebra keeps them, faer factors them.
 
-use faer::{Mat, MatRef};
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::{Conj, Mat, MatRef, Par};
 use nalgebra::{DMatrix, DVector};
 
 /// `A = U·diag(s)·Vᵀ` with as many columns as the smaller side has, largest singular value first.
@@ -64,4 +65,25 @@ pub fn from_faer(matrix: MatRef<'_, f64>) -> DMatrix<f64> {
 /// A copy of a matrix for faer.
 pub fn to_faer(matrix: &DMatrix<f64>) -> Mat<f64> {
     as_faer(matrix).to_owned()
+}
+
+/// Turns the rows of `rest` by the orthogonal factor of `spanning`, so that the first rows, as many as returned, are the
+/// part within the column space of `spanning` and the others the part outside of it.
+///
+/// Column-pivoted Householder QR, hence also right for dependent columns: a pivot counts when it exceeds `tolerance`, so
+/// the columns of `spanning` should have norms around 1. Both matrices have as many rows; both must be finite.
+pub fn split_by_column_space(spanning: Mat<f64>, rest: &mut Mat<f64>, tolerance: f64) -> usize {
+    use faer::linalg::householder::{
+        apply_block_householder_sequence_transpose_on_the_left_in_place_scratch as scratch,
+        apply_block_householder_sequence_transpose_on_the_left_in_place_with_conj as apply,
+    };
+    let factors = spanning.col_piv_qr();
+    let pivots = factors.R().diagonal().column_vector();
+    let rank = (0..pivots.nrows()).take_while(|&index| pivots[index].abs() > tolerance).count();
+    let (basis, coefficients) = (factors.Q_basis(), factors.Q_coeff());
+    if rank > 0 && rest.ncols() > 0 {
+        let mut memory = MemBuffer::new(scratch::<f64>(basis.nrows(), coefficients.nrows(), rest.ncols()));
+        apply(basis, coefficients, Conj::No, rest.as_mut(), Par::Seq, MemStack::new(&mut memory));
+    }
+    rank
 }

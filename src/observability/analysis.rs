@@ -1,0 +1,221 @@
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::estimator::{ColumnGroup, Linearization};
+use crate::geometry::dense;
+use crate::gimbal::{Chain, Parameterization, redundant_directions};
+
+use super::RankReport;
+use super::classification::{ROTATION_SCALE_RAD, TRANSLATION_SCALE_M, classify, tolerance};
+use super::directions::weak_directions;
+use super::elimination::{Rows, column_norms};
+
+/// Below this scaled singular value a direction is uninformed: the window leaves it over 0.71 of its scale.
+const INFORMED_THRESHOLD: f64 = 1.0;
+
+/// Speeds and biases are projected out so many columns at a time, three frames: fewer pay for the calls, more for the
+/// zeros between frames that are not neighbours (measured at windows of 11 frames: 1.0 ms against 1.6 and 1.2).
+const BANDED_COLUMNS: usize = 27;
+
+/// What the calibration columns are multiplied by, so that angles and lengths compare and 1 means as much as the scale.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum ScalingRule {
+    /// 10° for angles and 3 cm for lengths, the same for every rig.
+    #[default]
+    Fixed,
+    /// A standard deviation for each column, such as the rig's prior: 1 then means as much as was known before.
+    PriorSigmas(Vec<f64>),
+}
+
+impl ScalingRule {
+    fn scale(&self, columns: &[String]) -> DVector<f64> {
+        let given = match self {
+            Self::PriorSigmas(sigmas) if sigmas.len() == columns.len() => Some(sigmas),
+            _ => None,
+        };
+        DVector::from_fn(columns.len(), |index, _| match given {
+            Some(sigmas) => sigmas[index],
+            None if is_length(&columns[index]) => TRANSLATION_SCALE_M,
+            None => ROTATION_SCALE_RAD,
+        })
+    }
+}
+
+/// Whether a calibration column is a length, by the last part of its name.
+fn is_length(name: &str) -> bool {
+    matches!(name.rsplit('.').next(), Some("tx" | "ty" | "tz" | "d" | "a" | "y" | "vx" | "vy"))
+}
+
+/// The ranks of a step's calibration, columns scaled by 10° and 3 cm; `None` when the linearization is not finite.
+///
+/// `chain` is the calibration that the linearization's columns belong to, `joint_angles_rad` those of each frame of the
+/// window, and `joints_free` says that the angles are unknowns without encoder readings or a prior.
+pub fn analyse<A: AsRef<[f64]>>(
+    linearization: &Linearization,
+    chain: &Chain,
+    joint_angles_rad: &[A],
+    joints_free: bool,
+) -> Option<RankReport> {
+    analyse_with_scaling(linearization, chain, joint_angles_rad, joints_free, &ScalingRule::Fixed)
+}
+
+/// [`analyse`] with another rule for the scale of the columns.
+pub fn analyse_with_scaling<A: AsRef<[f64]>>(
+    linearization: &Linearization,
+    chain: &Chain,
+    joint_angles_rad: &[A],
+    joints_free: bool,
+    scaling: &ScalingRule,
+) -> Option<RankReport> {
+    let names = calibration_names(linearization);
+    let scale = scaling.scale(&names);
+    let columns = names.len();
+    let projected = Projected::new(linearization)?;
+    let block = scaled(projected.measurements, &scale);
+    let svd = dense::thin_svd(&block)?;
+    let with_priors = dense::singular_values(&scaled(projected.with_priors, &scale))?;
+    let singular_values: Vec<f64> = svd.singular_values.iter().copied().collect();
+
+    // The Frobenius norm stands in for the spectral one, which the column norms alone do not give; it is larger by at
+    // most the root of the number of columns.
+    let reference = linearization.calibration_column_norms.component_mul(&scale).norm();
+    let structural_threshold = tolerance(linearization.jacobian.nrows(), columns) * reference;
+    let count_above = |threshold: f64| singular_values.iter().filter(|value| **value > threshold).count();
+    let rank_structural = count_above(structural_threshold);
+    let rank_informed = singular_values.iter().filter(|value| **value >= INFORMED_THRESHOLD).count();
+    let angles: Vec<Vec<f64>> = joint_angles_rad
+        .iter()
+        .map(|angles| angles.as_ref().to_vec())
+        .filter(|angles| angles.len() == chain.joint_count())
+        .collect();
+    let deficits = classify(chain, &angles, joints_free, columns, rank_structural);
+    Some(RankReport {
+        directions: weak_directions(&block, &svd.v, &singular_values, rank_structural, INFORMED_THRESHOLD),
+        names,
+        singular_values,
+        singular_values_with_priors: with_priors,
+        reference,
+        structural_threshold,
+        informed_threshold: INFORMED_THRESHOLD,
+        rank_structural,
+        rank_informed: rank_informed.min(rank_structural),
+        deficit_parameterization: deficits.parameterization,
+        deficit_joints: deficits.joints,
+        deficit_absorbed: deficits.absorbed,
+        deficit_motion: deficits.motion,
+        margins: chain.margins(),
+    })
+}
+
+/// How much of the known redundancy of the classical form (Eqs. 11–17) the linearization claims to see, as the largest
+/// scaled response to one of the six directions relative to the reference of the rank rule; 0 when what is known and what
+/// was measured agree. `None` for the other forms, which have no such directions, and for columns that are not the
+/// chain's.
+pub fn redundancy_residual(linearization: &Linearization, chain: &Chain) -> Option<f64> {
+    let names = calibration_names(linearization);
+    if chain.parameterization() != Parameterization::Classical || names != chain.parameter_names() {
+        return None;
+    }
+    if chain.hides_joint_offsets() {
+        return None;
+    }
+    let scale = ScalingRule::Fixed.scale(&names);
+    let block = Projected::new(linearization)?.measurements;
+    let reference = linearization.calibration_column_norms.component_mul(&scale).norm();
+    let directions = redundant_directions(&chain.to_classical());
+    let responses = directions.column_iter().map(|direction| {
+        let size = direction.component_div(&scale).norm();
+        (&block * direction).norm() / size
+    });
+    let largest = responses.fold(0.0, f64::max);
+    Some(if reference > 0.0 { largest / reference } else { 0.0 })
+}
+
+fn calibration_names(linearization: &Linearization) -> Vec<String> {
+    let blocks = linearization.columns.iter().filter(|block| block.group == ColumnGroup::Calibration);
+    blocks
+        .flat_map(|block| {
+            let single = (block.len == 1).then(|| block.name.clone());
+            let numbered = |index| single.clone().unwrap_or_else(|| format!("{} {index}", block.name));
+            (0..block.len).map(numbered).collect::<Vec<_>>()
+        })
+        .collect()
+}
+
+/// The calibration columns with everything else projected out, at least as many rows as columns.
+struct Projected {
+    measurements: DMatrix<f64>,
+    with_priors: DMatrix<f64>,
+}
+
+impl Projected {
+    fn new(linearization: &Linearization) -> Option<Self> {
+        let (measurements, priors) = (&linearization.jacobian, &linearization.prior_jacobian);
+        if !measurements.iter().chain(priors.iter()).all(|entry| entry.is_finite()) {
+            return None;
+        }
+        let columns = calibration_names(linearization).len();
+        let norms = column_norms(measurements, priors);
+        // Blocks that no prior touches are projected out once for both readings.
+        let held = |block: &Range<usize>| {
+            priors.nrows() > 0 && priors.columns_range(block.clone()).iter().any(|entry| *entry != 0.0)
+        };
+        let (held, free): (Vec<_>, Vec<_>) = nuisance_blocks(linearization).into_iter().partition(held);
+        let mut rows = Rows::new(measurements);
+        for block in merged(free) {
+            rows.project_out(&block, &norms);
+        }
+        let mut with_priors = rows.stacked_on(priors);
+        for block in merged(held) {
+            rows.project_out(&block, &norms);
+            with_priors.project_out(&block, &norms);
+        }
+        let padded = |block: DMatrix<f64>| {
+            let height = block.nrows().max(columns);
+            block.resize_vertically(height, 0.0)
+        };
+        Some(Self {
+            measurements: padded(rows.leading_columns(columns)),
+            with_priors: padded(with_priors.leading_columns(columns)),
+        })
+    }
+}
+
+/// The blocks that are not calibration in a cheap order of elimination: speeds and biases from the newest frame back,
+/// which are coupled to their neighbours only, then depths and joints, then poses, which are coupled to everything.
+fn nuisance_blocks(linearization: &Linearization) -> Vec<Range<usize>> {
+    let of = |group: ColumnGroup| {
+        let blocks = linearization.columns.iter().filter(move |block| block.group == group);
+        blocks.map(|block| block.start..block.start + block.len)
+    };
+    let mut blocks: Vec<_> = of(ColumnGroup::SpeedBias).collect();
+    blocks.reverse();
+    blocks.extend(of(ColumnGroup::InverseDepth));
+    blocks.extend(of(ColumnGroup::Joints));
+    blocks.extend(of(ColumnGroup::Pose));
+    blocks
+}
+
+/// Neighbouring blocks as one: going forward (joints, poses: dense in their rows) without limit, going back (speeds and
+/// biases: banded) until they hold [`BANDED_COLUMNS`].
+fn merged(blocks: impl IntoIterator<Item = Range<usize>>) -> Vec<Range<usize>> {
+    let mut merged: Vec<Range<usize>> = Vec::new();
+    for block in blocks {
+        match merged.last_mut() {
+            Some(last) if last.end == block.start => last.end = block.end,
+            Some(last) if block.end == last.start && last.len() + block.len() <= BANDED_COLUMNS => {
+                last.start = block.start;
+            }
+            _ => merged.push(block),
+        }
+    }
+    merged
+}
+
+fn scaled(mut block: DMatrix<f64>, scale: &DVector<f64>) -> DMatrix<f64> {
+    for (mut column, scale) in block.column_iter_mut().zip(scale) {
+        column.scale_mut(*scale);
+    }
+    block
+}

@@ -1,0 +1,109 @@
+//! Why directions are lost, from the chain's Jacobians alone.
+
+use nalgebra::DMatrix;
+
+use crate::geometry::dense;
+use crate::gimbal::{Chain, generic_joint_angles, stacked_jacobian};
+
+/// Scales that make a radian and a metre comparable: 10° and 3 cm.
+pub(super) const ROTATION_SCALE_RAD: f64 = 10.0 * std::f64::consts::PI / 180.0;
+pub(super) const TRANSLATION_SCALE_M: f64 = 0.03;
+
+/// How many columns are lost to what.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Deficits {
+    /// Redundant in the parameterization, or its chart singular: lost at any joint angles.
+    pub(super) parameterization: usize,
+    /// Lost at the joint angles of the window.
+    pub(super) joints: usize,
+    /// Lost because a motion of the joints does the same in every frame.
+    pub(super) absorbed: usize,
+    /// The rest: motion of the vehicle, and the scene.
+    pub(super) motion: usize,
+}
+
+/// Splits what `rank` lacks of `columns` into its causes, as differences of ranks of the chain's Jacobians.
+pub(super) fn classify(
+    chain: &Chain,
+    joint_angles_rad: &[Vec<f64>],
+    joints_free: bool,
+    columns: usize,
+    rank: usize,
+) -> Deficits {
+    let deficit = columns.saturating_sub(rank);
+    let generic = generic_joint_angles(chain.joint_count(), 4 * (chain.joint_count() + 1));
+    let anywhere = stack_rank(&scaled_stack(chain, &generic));
+    let parameterization = columns.saturating_sub(anywhere).min(deficit);
+    if joint_angles_rad.is_empty() {
+        return Deficits { parameterization, joints: 0, absorbed: 0, motion: deficit - parameterization };
+    }
+    let mut stack = scaled_stack(chain, joint_angles_rad);
+    let here = stack_rank(&stack).min(anywhere);
+    let joints = (anywhere - here).min(deficit - parameterization);
+    let mut absorbed = 0;
+    if joints_free && chain.joint_count() > 0 {
+        let reference = spectral_norm(&stack);
+        project_joints_out(chain, joint_angles_rad, &mut stack);
+        let unabsorbed = rank_above(&stack, reference).min(here);
+        absorbed = (here - unabsorbed).min(deficit - parameterization - joints);
+    }
+    Deficits { parameterization, joints, absorbed, motion: deficit - parameterization - joints - absorbed }
+}
+
+/// The chain's Jacobians under one another, rows and columns in units of the two scales.
+fn scaled_stack(chain: &Chain, joint_angles_rad: &[Vec<f64>]) -> DMatrix<f64> {
+    let mut stack = stacked_jacobian(chain, joint_angles_rad);
+    for (mut column, unit) in stack.column_iter_mut().zip(chain.parameter_units()) {
+        let column_scale = if unit == "rad" { ROTATION_SCALE_RAD } else { TRANSLATION_SCALE_M };
+        for (row, entry) in column.iter_mut().enumerate() {
+            *entry *= column_scale / row_scale(row);
+        }
+    }
+    stack
+}
+
+fn row_scale(row: usize) -> f64 {
+    if row % 6 < 3 { ROTATION_SCALE_RAD } else { TRANSLATION_SCALE_M }
+}
+
+/// Takes from each frame's six rows what its joints can do.
+fn project_joints_out(chain: &Chain, joint_angles_rad: &[Vec<f64>], stack: &mut DMatrix<f64>) {
+    for (frame, angles) in joint_angles_rad.iter().enumerate() {
+        let mut by_joints =
+            DMatrix::from_iterator(6, chain.joint_count(), chain.linearize(angles).by_joints.iter().copied());
+        for mut column in by_joints.column_iter_mut() {
+            column.iter_mut().enumerate().for_each(|(row, entry)| *entry /= row_scale(row));
+            let norm = column.norm();
+            if norm > 0.0 {
+                column /= norm;
+            }
+        }
+        let Some(svd) = dense::thin_svd(&by_joints) else { continue };
+        let mut rows = stack.rows_mut(6 * frame, 6);
+        for (direction, singular_value) in svd.u.column_iter().zip(&svd.singular_values) {
+            if *singular_value > tolerance(6, chain.joint_count()) {
+                let along = direction.tr_mul(&rows);
+                rows -= direction * along;
+            }
+        }
+    }
+}
+
+/// `100·ε·max(m, n)`, the relative threshold of a structural zero.
+pub(super) fn tolerance(rows: usize, columns: usize) -> f64 {
+    100.0 * f64::EPSILON * rows.max(columns) as f64
+}
+
+fn spectral_norm(matrix: &DMatrix<f64>) -> f64 {
+    dense::singular_values(matrix).and_then(|values| values.first().copied()).unwrap_or(0.0)
+}
+
+fn stack_rank(stack: &DMatrix<f64>) -> usize {
+    rank_above(stack, spectral_norm(stack))
+}
+
+fn rank_above(stack: &DMatrix<f64>, reference: f64) -> usize {
+    let threshold = tolerance(stack.nrows(), stack.ncols()) * reference;
+    let values = dense::singular_values(stack).unwrap_or_default();
+    values.iter().filter(|value| **value > threshold).count()
+}

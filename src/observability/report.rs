@@ -1,0 +1,82 @@
+/// Ranks of the calibration block at one step, by the rule of section 3 of the mathematics notes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RankReport {
+    /// Names of the calibration columns.
+    pub names: Vec<String>,
+    /// Singular values of the prior-scaled, projected calibration columns, largest first, one per column.
+    pub singular_values: Vec<f64>,
+    /// Singular values with the priors kept in.
+    pub singular_values_with_priors: Vec<f64>,
+    /// Norm of the prior-scaled calibration columns before projection: the reference of the structural threshold.
+    pub reference: f64,
+    /// At or below this a singular value is a structural zero.
+    pub structural_threshold: f64,
+    /// Below this a direction is uninformed (1: the posterior is over 0.71 of the prior).
+    pub informed_threshold: f64,
+    /// Number of singular values over the structural threshold.
+    pub rank_structural: usize,
+    /// Number of singular values at or over the informed threshold.
+    pub rank_informed: usize,
+    /// Lost to the parameterization.
+    pub deficit_parameterization: usize,
+    /// Lost because joints did not move in the window.
+    pub deficit_joints: usize,
+    /// Absorbed by free joint angles.
+    pub deficit_absorbed: usize,
+    /// Lost to the motion of the vehicle.
+    pub deficit_motion: usize,
+    /// Null and weak directions, weakest first.
+    pub directions: Vec<CalibrationDirection>,
+    /// Margins to the chart's locks.
+    pub margins: Vec<(String, f64)>,
+}
+
+/// One right singular direction of the calibration block.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CalibrationDirection {
+    /// Its singular value.
+    pub singular_value: f64,
+    /// Whether it is a structural zero (else merely uninformed).
+    pub structural: bool,
+    /// Signed weight of each parameter in the prior-scaled, unit direction.
+    pub weights: Vec<f64>,
+}
+
+impl RankReport {
+    /// The report in one line: `18 of 24 structural; 6 redundant in the parameterization; 15 informed; weakest L3.d`.
+    pub fn verdict(&self) -> String {
+        let causes = [
+            (self.deficit_parameterization, "redundant in the parameterization"),
+            (self.deficit_joints, "lost to joints that did not move"),
+            (self.deficit_absorbed, "absorbed by free joint angles"),
+            (self.deficit_motion, "lost to the motion of the vehicle"),
+        ];
+        let mut parts = vec![format!("{} of {} structural", self.rank_structural, self.names.len())];
+        parts.extend(causes.iter().filter(|(count, _)| *count > 0).map(|(count, cause)| format!("{count} {cause}")));
+        parts.push(format!("{} informed", self.rank_informed));
+        if let Some(name) = self.weakest() {
+            parts.push(format!("weakest {name}"));
+        }
+        parts.join("; ")
+    }
+
+    /// The parameter with the largest share in the weakest direction that is not a structural zero.
+    pub fn weakest(&self) -> Option<&str> {
+        let direction = self.directions.iter().find(|direction| !direction.structural)?;
+        direction.leading(&self.names)
+    }
+}
+
+impl CalibrationDirection {
+    /// The parameter with the largest share.
+    pub fn leading<'a>(&self, names: &'a [String]) -> Option<&'a str> {
+        let mut leading = None;
+        let mut largest = 0.0;
+        for (name, weight) in names.iter().zip(&self.weights) {
+            if weight.abs() > largest {
+                (leading, largest) = (Some(name.as_str()), weight.abs());
+            }
+        }
+        leading
+    }
+}

@@ -1,0 +1,4 @@
+mod elimination;
+mod golden;
+mod scenarios;
+mod window;

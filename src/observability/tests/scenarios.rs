@@ -1,0 +1,253 @@
+//! The causes of rank loss in windows made here, as in the truth table of the mathematics notes.
+
+use nalgebra::{DMatrix, DVector, UnitQuaternion, Vector3};
+
+use super::window::{Landmark, Window};
+use crate::camera::CameraModel;
+use crate::geometry::{RigidTransform, so3};
+use crate::gimbal::tests::random::{Random, special_chains};
+use crate::gimbal::{Chain, ClassicalChain, Parameterization};
+use crate::observability::{RankReport, ScalingRule, analyse, analyse_with_scaling, redundancy_residual};
+
+const FRAMES: usize = 10;
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Motion {
+    Exciting,
+    NeverRotates,
+    Hover,
+    CameraNeverRotates,
+    JointFrozen,
+    AllJointsFrozen,
+}
+
+/// Yaw, roll and pitch with an optical camera frame; the axes intersect, or miss each other by centimetres.
+fn mechanism(offsets: bool) -> ClassicalChain {
+    let (_, mut chain) = special_chains().remove(0);
+    if offsets {
+        let mut random = Random(41);
+        for link in &mut chain.links {
+            link.d_m += random.within(0.05);
+            link.a_m += 0.04 + random.within(0.02);
+            link.alpha_rad += random.within(0.05);
+        }
+        chain.imu_from_base = RigidTransform::new(so3::exp(&random.vector(0.05)), random.vector(0.1));
+        chain.effector_from_camera = RigidTransform::new(
+            chain.effector_from_camera.rotation * so3::exp(&random.vector(0.05)),
+            random.vector(0.05),
+        );
+    }
+    chain
+}
+
+fn window(classical: &ClassicalChain, motion: Motion) -> Window {
+    let mut random = Random(42);
+    let wave = |size: f64, frame: usize, speed: f64, phase: f64| size * (speed * frame as f64 + phase).sin();
+    let camera = CameraModel::pinhole([460.0, 460.0, 0.0, 0.0], [640, 480]).unwrap();
+    let joint_angles_rad: Vec<Vec<f64>> = (0..FRAMES)
+        .map(|frame| {
+            let mut angles = vec![wave(0.4, frame, 0.5, 0.1), wave(0.25, frame, 0.8, 1.0), wave(0.3, frame, 0.6, 2.0)];
+            match motion {
+                Motion::JointFrozen => angles[1] = 0.2,
+                Motion::AllJointsFrozen => angles = vec![0.3, 0.2, -0.1],
+                _ => {}
+            }
+            angles
+        })
+        .collect();
+    let turned = |frame: usize| {
+        Vector3::new(wave(0.2, frame, 0.7, 0.4), wave(0.25, frame, 0.5, 1.3), wave(0.3, frame, 0.4, 0.2))
+    };
+    let moved =
+        |frame: usize| Vector3::new(wave(1.2, frame, 0.4, 0.0), wave(0.9, frame, 0.6, 0.7), wave(0.7, frame, 0.5, 1.9));
+    let world_from_imu: Vec<RigidTransform> = (0..FRAMES)
+        .map(|frame| {
+            let rotation = match motion {
+                Motion::NeverRotates | Motion::Hover => so3::exp(&turned(0)),
+                Motion::CameraNeverRotates => classical.imu_from_camera(&joint_angles_rad[frame]).rotation.inverse(),
+                _ => so3::exp(&turned(frame)),
+            };
+            let translation = if motion == Motion::Hover { moved(0) } else { moved(frame) };
+            RigidTransform::new(UnitQuaternion::new_normalize(rotation.into_inner()), translation)
+        })
+        .collect();
+    let cameras: Vec<_> = world_from_imu
+        .iter()
+        .zip(&joint_angles_rad)
+        .map(|(world_from_imu, angles)| *world_from_imu * classical.imu_from_camera(angles))
+        .collect();
+    let (mut landmarks, mut observations) = (vec![], vec![]);
+    for anchor in 0..6 {
+        for _ in 0..12 {
+            let bearing = Vector3::new(random.within(0.4), random.within(0.3), 1.0);
+            let inverse_depth_per_m = 1.0 / (9.0 + random.within(5.0));
+            let point_in_world = cameras[anchor].transform(&(bearing / inverse_depth_per_m));
+            let index = landmarks.len();
+            landmarks.push(Landmark { anchor, bearing, inverse_depth_per_m });
+            for (observer, camera) in cameras.iter().enumerate() {
+                let seen = camera.inverse().transform(&point_in_world).z > 1.0;
+                if observer != anchor && seen {
+                    observations.push([index, anchor, observer]);
+                }
+            }
+        }
+    }
+    Window { camera, world_from_imu, joint_angles_rad, landmarks, observations }
+}
+
+struct Case {
+    report: RankReport,
+    chain: Chain,
+}
+
+fn case(offsets: bool, motion: Motion, joints_free: bool, parameterization: Parameterization) -> Case {
+    let classical = mechanism(offsets);
+    let window = window(&classical, motion);
+    let chain = Chain::from_classical(&classical, parameterization);
+    let linearization = window.linearize(&chain, joints_free);
+    let report = analyse(&linearization, &chain, &window.joint_angles_rad, joints_free).unwrap();
+    Case { report, chain }
+}
+
+fn deficits(report: &RankReport) -> [usize; 4] {
+    [report.deficit_parameterization, report.deficit_joints, report.deficit_absorbed, report.deficit_motion]
+}
+
+#[test]
+fn every_loss_is_put_down_to_its_cause() {
+    // Offsets, motion, free joints; the deficits of the minimal form. The classical one has six more in the first.
+    let table = [
+        (true, Motion::Exciting, false, [0, 0, 0, 0]),
+        (true, Motion::Exciting, true, [0, 0, 3, 0]),
+        (false, Motion::Exciting, false, [0, 0, 0, 0]),
+        (false, Motion::Exciting, true, [0, 0, 9, 0]),
+        (true, Motion::NeverRotates, false, [0, 0, 0, 3]),
+        (true, Motion::Hover, false, [0, 0, 0, 7]),
+        (true, Motion::CameraNeverRotates, false, [0, 0, 0, 3]),
+        (true, Motion::JointFrozen, false, [0, 4, 0, 0]),
+        (true, Motion::AllJointsFrozen, false, [0, 12, 0, 0]),
+        (true, Motion::JointFrozen, true, [0, 4, 3, 0]),
+    ];
+    for (offsets, motion, joints_free, expected) in table {
+        for parameterization in [Parameterization::Minimal, Parameterization::Poe, Parameterization::Classical] {
+            let Case { report, chain } = case(offsets, motion, joints_free, parameterization);
+            let redundant = chain.dof() - 18;
+            let context =
+                format!("{motion:?}, free {joints_free}, offsets {offsets}, {parameterization}: {}", report.verdict());
+            assert_eq!(deficits(&report), [redundant, expected[1], expected[2], expected[3]], "{context}");
+            assert_eq!(report.rank_structural, 18 - expected.iter().sum::<usize>(), "{context}");
+            let structural = report.directions.iter().filter(|direction| direction.structural).count();
+            assert_eq!(structural, chain.dof() - report.rank_structural, "{context}");
+            let weak = report.directions.len() - structural;
+            assert_eq!(weak, report.rank_structural - report.rank_informed, "{context}");
+            for direction in &report.directions {
+                let norm = direction.weights.iter().map(|weight| weight * weight).sum::<f64>().sqrt();
+                assert!((norm - 1.0).abs() < 1e-9, "{context}");
+            }
+        }
+    }
+}
+
+#[test]
+fn known_parameters_carry_the_null_directions() {
+    let null_names = |case: &Case| -> Vec<String> {
+        let names = &case.report.names;
+        let structural = case.report.directions.iter().filter(|direction| direction.structural);
+        let mut found: Vec<String> = structural
+            .flat_map(|direction| names.iter().zip(&direction.weights).filter(|(_, weight)| weight.abs() > 1e-6))
+            .map(|(name, _)| name.clone())
+            .collect();
+        found.sort();
+        found.dedup();
+        found
+    };
+    let minimal = Parameterization::Minimal;
+    let free = case(true, Motion::Exciting, true, minimal);
+    assert_eq!(null_names(&free), ["L1.theta", "L2.theta", "L3.theta"]);
+    for direction in free.report.directions.iter().filter(|direction| direction.structural) {
+        assert_eq!(direction.weights.iter().filter(|weight| **weight != 0.0).count(), 1, "{direction:?}");
+    }
+    assert_eq!(null_names(&case(true, Motion::NeverRotates, false, minimal)), ["I.tx", "I.ty", "L1.d"]);
+    assert_eq!(null_names(&case(true, Motion::CameraNeverRotates, false, minimal)), ["L3.a", "L3.d", "L3.y"]);
+    // An informed window is told in a line, a weak one names its weakest parameter.
+    let verdict = case(true, Motion::Exciting, false, Parameterization::Classical).report.verdict();
+    assert_eq!(verdict, "18 of 24 structural; 6 redundant in the parameterization; 18 informed");
+    let hover = case(true, Motion::Hover, true, minimal).report;
+    let weak = hover.rank_structural - hover.rank_informed;
+    let expected = format!(
+        "{} of 18 structural; 3 absorbed by free joint angles; {} lost to the motion of the vehicle; {} informed",
+        hover.rank_structural, hover.deficit_motion, hover.rank_informed
+    );
+    let expected = match hover.weakest() {
+        Some(name) if weak > 0 => format!("{expected}; weakest {name}"),
+        _ => expected,
+    };
+    assert_eq!(hover.verdict(), expected);
+}
+
+#[test]
+fn moving_along_a_redundant_direction_leaves_the_camera_where_it_was() {
+    let Case { report, chain } = case(true, Motion::Exciting, false, Parameterization::Classical);
+    let units = chain.parameter_units();
+    let mut random = Random(43);
+    for direction in report.directions.iter().filter(|direction| direction.structural) {
+        let step = DVector::from_fn(24, |index, _| {
+            direction.weights[index] * if units[index] == "rad" { 10_f64.to_radians() } else { 0.03 }
+        });
+        let angles = random.angles(3);
+        let shift = |scale: f64| {
+            let moved = chain.plus(&(&step * scale)).imu_from_camera(&angles);
+            moved.minus(&chain.imu_from_camera(&angles)).norm()
+        };
+        assert!(shift(1e-4) < 1e-8, "{}", shift(1e-4));
+        // Any single parameter of it moves the camera by far more.
+        let leading = direction.leading(&report.names).unwrap();
+        let index = report.names.iter().position(|name| name == leading).unwrap();
+        let mut alone = DVector::zeros(24);
+        alone[index] = step[index] * 1e-4;
+        let moved = chain.plus(&alone).imu_from_camera(&angles).minus(&chain.imu_from_camera(&angles)).norm();
+        assert!(moved > 1e-7, "{leading}: {moved}");
+    }
+}
+
+#[test]
+fn known_and_measured_redundancy_agree() {
+    let classical = mechanism(true);
+    let window = window(&classical, Motion::Exciting);
+    let chain = Chain::from_classical(&classical, Parameterization::Classical);
+    let linearization = window.linearize(&chain, false);
+    assert!(redundancy_residual(&linearization, &chain).unwrap() < 1e-14);
+    // A linearization that mixes two values of the calibration sees what nobody can see.
+    let elsewhere = chain.plus(&DVector::from_element(24, 0.02));
+    let mixed = window.linearize(&elsewhere, false);
+    let mut inconsistent = linearization.clone();
+    let half = inconsistent.jacobian.nrows() / 2;
+    inconsistent.jacobian.rows_mut(0, half).copy_from(&mixed.jacobian.rows(0, half));
+    assert!(redundancy_residual(&inconsistent, &chain).unwrap() > 1e-6);
+    let report = analyse(&inconsistent, &chain, &window.joint_angles_rad, false).unwrap();
+    assert!(report.rank_structural > 18, "{}", report.verdict());
+    let minimal = Chain::from_classical(&classical, Parameterization::Minimal);
+    assert_eq!(redundancy_residual(&window.linearize(&minimal, false), &minimal), None);
+}
+
+#[test]
+fn priors_and_scales_add_up() {
+    let classical = mechanism(true);
+    let window = window(&classical, Motion::Hover);
+    let chain = Chain::from_classical(&classical, Parameterization::Minimal);
+    let mut linearization = window.linearize(&chain, false);
+    let units = chain.parameter_units();
+    let sigmas: Vec<f64> = units.iter().map(|unit| if *unit == "rad" { 0.01 } else { 0.003 }).collect();
+    linearization.prior_jacobian =
+        DMatrix::from_diagonal(&DVector::from_iterator(18, sigmas.iter().map(|sigma| 1.0 / sigma)));
+    let scaling = ScalingRule::PriorSigmas(sigmas);
+    let report = analyse_with_scaling(&linearization, &chain, &window.joint_angles_rad, false, &scaling).unwrap();
+    assert_eq!(report.rank_structural, 11);
+    // In units of the prior, the prior adds one to each squared singular value.
+    for (with, without) in report.singular_values_with_priors.iter().zip(&report.singular_values) {
+        assert!((with.powi(2) - without.powi(2) - 1.0).abs() < 1e-6 * with.powi(2), "{with} {without}");
+    }
+    let fixed = analyse(&linearization, &chain, &window.joint_angles_rad, false).unwrap();
+    assert_eq!(fixed.rank_structural, report.rank_structural);
+    assert!(fixed.rank_informed >= report.rank_informed);
+}
