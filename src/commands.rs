@@ -185,7 +185,7 @@ pub fn evaluate(arguments: &EvaluateArguments) -> Result<()> {
 /// `dcvins view`: the window, or its pictures where there is no display.
 #[cfg(feature = "gui")]
 pub fn view(arguments: &ViewArguments) -> Result<()> {
-    use dcvins::export::Home;
+    use dcvins::export::Machine;
     use dcvins::gui::app::PlayingLog;
     use dcvins::gui::run_window::{WindowError, WindowOptions, run_window};
     use dcvins::gui::theme::ThemeName;
@@ -204,7 +204,7 @@ pub fn view(arguments: &ViewArguments) -> Result<()> {
         log: None,
         log_path: arguments.log.clone(),
         open_log: Arc::new(open_log),
-        desktop: Arc::new(Home::of_user()),
+        desktop: Arc::new(Machine::new()),
         theme: ThemeName::Light,
     };
     match (run_window(options), &arguments.log) {

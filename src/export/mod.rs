@@ -1,21 +1,23 @@
 //! Tables, trajectories and pictures without a window.
 
+#[cfg(feature = "gui")]
+mod desktop;
 mod error;
 mod evaluation;
 #[cfg(feature = "gui")]
-mod home;
-#[cfg(feature = "gui")]
 mod picture;
+mod recent_files;
 mod run_files;
 mod summary;
 mod tables;
 pub mod trajectory;
 
+#[cfg(feature = "gui")]
+pub use desktop::Machine;
 pub use error::ExportError;
 pub use evaluation::{EvaluationOptions, EvaluationReport, evaluate};
 #[cfg(feature = "gui")]
-pub use home::Home;
-#[cfg(feature = "gui")]
 pub use picture::{PANEL_NAMES, PictureError, PictureOptions, draw_panel, panel_names, png_bytes, write_png};
+pub use recent_files::RecentFiles;
 pub use run_files::{RunFileOptions, write_run};
 pub use summary::{RunSummary, StageSummary, log_name, summarize};

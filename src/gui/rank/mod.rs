@@ -19,6 +19,9 @@ const STRUCTURAL: usize = 0;
 const INFORMED: usize = 1;
 const PARAMETERS: usize = 2;
 
+/// Height from which the ranks over time have room, in points.
+const LOWEST_WITH_TIME: f32 = 340.0;
+
 /// State of the rank panel.
 #[derive(Debug, Default)]
 pub struct RankPanel {
@@ -48,8 +51,11 @@ impl RankPanel {
                 self.over_time_ui(ui, ctx);
                 return;
             };
-            spectrum::ui(ui, ctx.theme, rank, (0.2 * height).clamp(72.0, 130.0));
-            self.over_time_ui(ui, ctx);
+            spectrum::ui(ui, ctx.theme, rank, (0.2 * height).clamp(64.0, 130.0));
+            // The timeline has a lane for it too, so it yields to the heat map first.
+            if height > LOWEST_WITH_TIME {
+                self.over_time_ui(ui, ctx);
+            }
             let left = height - (ui.cursor().top() - top) - 4.0;
             heat_map::ui(ui, ctx, rank, left);
         });

@@ -129,7 +129,7 @@ pub fn window_ui(ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_
     Panel::bottom("status bar").exact_size(22.0).frame(status).show(ui, |ui| status_bar::ui(ui, state, ctx));
     notices::banner_ui(ui, ctx);
 
-    let wanted = TimelinePanel::height_for(ctx.recording.runs.len()).min(0.3 * ui.available_height());
+    let wanted = TimelinePanel::height_for(ctx.recording.runs.len()).min(0.22 * ui.available_height());
     let frame = Frame::new().fill(theme.surface).inner_margin(Margin::symmetric(6, 4));
     let timeline = Panel::bottom("timeline").resizable(true).default_size(wanted).min_size(60.0).frame(frame);
     timeline.show(ui, |ui| state.timeline.ui(ui, ctx));

@@ -1,17 +1,20 @@
 //! The window's program: it owns the session, feeds it time and commands, and draws what it has computed.
 
+#[cfg(test)]
+mod tests;
+
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
 use egui::{CentralPanel, Frame, Ui, ViewportCommand};
 
-use super::desktop::Desktop;
-use super::theme::{Theme, ThemeName};
-use super::welcome::Welcome;
-use super::window::{NoticeLevel, WindowRequest, WindowState, window_ui};
-use super::{ImageSource, PanelContext, Playback, Selection};
 use crate::flight_log::GrayImage;
+use crate::gui::desktop::Desktop;
+use crate::gui::theme::{Theme, ThemeName};
+use crate::gui::welcome::Welcome;
+use crate::gui::window::{NoticeLevel, WindowRequest, WindowState, window_ui};
+use crate::gui::{ImageSource, PanelContext, Playback, Selection};
 use crate::session::{Command, Recording};
 
 /// A log that plays: what the window needs of a session.

@@ -1,0 +1,96 @@
+//! The logs opened lately, kept in the user's state folder; everything here is a convenience, so nothing here can fail.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// How many are kept.
+const MOST_KEPT: usize = 12;
+
+/// The list in one file: a path per line, the newest first.
+#[derive(Clone, Debug)]
+pub struct RecentFiles {
+    file: Option<PathBuf>,
+}
+
+impl RecentFiles {
+    /// The user's list: `$XDG_STATE_HOME/dcvins/recent`, else `~/.local/state/dcvins/recent`.
+    pub fn of_user() -> Self {
+        let folder = |name: &str| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
+        let home = folder("HOME").or_else(|| folder("USERPROFILE"));
+        let state = folder("XDG_STATE_HOME").or_else(|| Some(home?.join(".local/state")));
+        Self { file: state.map(|state| state.join("dcvins/recent")) }
+    }
+
+    /// A list in a file of one's own.
+    pub fn in_file(file: PathBuf) -> Self {
+        Self { file: Some(file) }
+    }
+
+    /// The logs that still exist, the newest first.
+    pub fn list(&self) -> Vec<PathBuf> {
+        self.read().into_iter().filter(|path| path.is_file()).collect()
+    }
+
+    fn read(&self) -> Vec<PathBuf> {
+        let text = self.file.as_ref().and_then(|file| fs::read_to_string(file).ok()).unwrap_or_default();
+        text.lines().filter(|line| !line.trim().is_empty()).map(PathBuf::from).take(MOST_KEPT).collect()
+    }
+
+    /// Puts a log at the head of the list; a state folder that cannot be written loses nothing but this.
+    pub fn remember(&self, path: &Path) {
+        let Some(file) = &self.file else { return };
+        let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
+        let line = path.to_string_lossy().into_owned();
+        if line.contains('\n') {
+            return;
+        }
+        let mut lines = vec![line];
+        for known in self.read() {
+            let known = known.to_string_lossy().into_owned();
+            if lines.len() < MOST_KEPT && !lines.contains(&known) {
+                lines.push(known);
+            }
+        }
+        if let Some(folder) = file.parent() {
+            drop(fs::create_dir_all(folder));
+        }
+        let text: String = lines.iter().flat_map(|line| [line.as_str(), "\n"]).collect();
+        drop(fs::write(file, text));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_newest_comes_first_and_each_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let recent = RecentFiles::in_file(folder.path().join("state/dcvins/recent"));
+        assert!(recent.list().is_empty());
+        let logs: Vec<PathBuf> = (0..20).map(|number| folder.path().join(format!("{number}.mcap"))).collect();
+        for log in &logs {
+            fs::write(log, "").unwrap();
+            recent.remember(log);
+        }
+        recent.remember(&logs[15]);
+        let names: Vec<String> =
+            recent.list().iter().map(|path| path.file_stem().unwrap().to_string_lossy().into_owned()).collect();
+        assert_eq!(names.len(), MOST_KEPT);
+        assert_eq!(names[..4], ["15", "19", "18", "17"]);
+        assert_eq!(names.iter().filter(|name| *name == "15").count(), 1);
+        fs::remove_file(&logs[15]).unwrap();
+        assert_eq!(recent.list().len(), MOST_KEPT - 1, "what is gone is not offered");
+    }
+
+    #[test]
+    fn a_place_that_cannot_be_written_is_no_error() {
+        let folder = tempfile::tempdir().unwrap();
+        let blocked = folder.path().join("file");
+        fs::write(&blocked, "").unwrap();
+        let recent = RecentFiles::in_file(blocked.join("recent"));
+        recent.remember(Path::new("/a.mcap"));
+        assert!(recent.list().is_empty());
+        RecentFiles { file: None }.remember(Path::new("/a.mcap"));
+    }
+}

@@ -1,0 +1,230 @@
+//! The program of the window over a log that plays without files and threads of its own.
+
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, OnceLock};
+
+use egui::{Key, Modifiers};
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable as _;
+
+use super::{App, OpenLog, PlayingLog};
+use crate::flight_log::GrayImage;
+use crate::gui::desktop::{Desktop, PathEntry};
+use crate::gui::sample_recording::{FRAME_PERIOD_NS, sample_images, sample_recording_of};
+use crate::gui::theme::ThemeName;
+use crate::gui::{ImageSource as _, Playback};
+use crate::session::{Command, Recording};
+
+/// A log that is computed already.
+struct SampleLog {
+    recording: Arc<Recording>,
+    cursor_ns: i64,
+    playback: Playback,
+}
+
+impl SampleLog {
+    fn new(path: &Path) -> Self {
+        static SAMPLE: OnceLock<Recording> = OnceLock::new();
+        let sample = SAMPLE.get_or_init(|| sample_recording_of(70, &["auto", "classical"]));
+        let recording = Arc::new(Recording { log_path: path.to_path_buf(), ..sample.clone() });
+        Self { recording, cursor_ns: 0, playback: Playback::default() }
+    }
+}
+
+impl PlayingLog for SampleLog {
+    fn recording(&self) -> Arc<Recording> {
+        Arc::clone(&self.recording)
+    }
+
+    fn generation(&self) -> u64 {
+        1
+    }
+
+    fn cursor_ns(&self) -> i64 {
+        self.cursor_ns
+    }
+
+    fn playback(&self) -> Playback {
+        self.playback.clone()
+    }
+
+    fn apply(&mut self, command: Command) {
+        match command {
+            Command::TogglePlay => self.playback.playing = !self.playback.playing,
+            Command::Seek { stamp_ns } => self.cursor_ns = stamp_ns,
+            Command::StepFrames(count) => self.cursor_ns += count * FRAME_PERIOD_NS,
+            Command::GoToEnd => self.cursor_ns = self.recording.duration_ns,
+            _ => {}
+        }
+    }
+
+    fn advance(&mut self, elapsed_s: f64) {
+        if self.playback.playing {
+            self.cursor_ns += (elapsed_s * 1e9) as i64;
+        }
+    }
+
+    fn image(&mut self, camera_key: &str, frame_index: usize) -> Option<Arc<GrayImage>> {
+        sample_images().image(camera_key, frame_index)
+    }
+
+    fn take_notices(&mut self) -> Vec<String> {
+        Vec::new()
+    }
+}
+
+/// A machine with two sample logs.
+#[derive(Default)]
+struct TestDesktop {
+    remembered: Mutex<Vec<PathBuf>>,
+}
+
+impl Desktop for TestDesktop {
+    fn complete(&self, typed: &str) -> Vec<PathEntry> {
+        let entry = |path: &str, folder| PathEntry { path: path.to_owned(), folder };
+        let all = [entry("/logs/", true), entry("/logs/city.mcap", false), entry("/logs/city-2.mcap", false)];
+        let depth = |path: &str| path.trim_end_matches('/').matches('/').count();
+        all.into_iter()
+            .filter(|it| it.path.starts_with(typed) && depth(&it.path) == typed.matches('/').count())
+            .collect()
+    }
+
+    fn recent_logs(&self) -> Vec<PathBuf> {
+        vec![PathBuf::from("/somewhere/house.mcap")]
+    }
+
+    fn remember_log(&self, path: &Path) {
+        self.remembered.lock().unwrap().push(path.to_path_buf());
+    }
+
+    fn sample_logs(&self) -> Vec<PathBuf> {
+        vec![PathBuf::from("/samples/yard.mcap")]
+    }
+
+    fn resident_bytes(&self) -> Option<u64> {
+        Some(300 << 20)
+    }
+}
+
+#[derive(Debug)]
+struct Dropped(PathBuf);
+
+impl egui::DroppedFile for Dropped {
+    fn path(&self) -> &Path {
+        &self.0
+    }
+
+    fn bytes(&self) -> Result<Vec<u8>, String> {
+        Err("not needed".to_owned())
+    }
+}
+
+fn app() -> (Harness<'static, App>, Arc<TestDesktop>) {
+    let open: OpenLog = Arc::new(|path: &Path| {
+        if path.extension().is_some_and(|extension| extension == "mcap") {
+            Ok(Box::new(SampleLog::new(path)) as Box<dyn PlayingLog>)
+        } else {
+            Err(format!("this is not an MCAP file: it begins with 'hello' ({})", path.display()))
+        }
+    });
+    let desktop = Arc::new(TestDesktop::default());
+    let app = App::new(open, Arc::clone(&desktop) as Arc<dyn Desktop>, ThemeName::Dark);
+    let mut harness = Harness::builder().with_size([1400.0, 850.0]).build_ui_state(|ui, app: &mut App| app.ui(ui), app);
+    harness.run_steps(2);
+    (harness, desktop)
+}
+
+/// Runs until something holds; opening happens on a thread of its own.
+fn run_until(harness: &mut Harness<'static, App>, holds: impl Fn(&Harness<'static, App>) -> bool) {
+    for _ in 0..2000 {
+        harness.run_steps(1);
+        if holds(harness) {
+            return;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(2));
+    }
+    panic!("it never happened");
+}
+
+fn opened(harness: &Harness<'static, App>) -> Option<PathBuf> {
+    harness.state().log().map(|log| log.recording().log_path.clone())
+}
+
+#[test]
+fn the_welcome_view_offers_logs_and_opens_them() {
+    let (mut harness, desktop) = app();
+    assert!(harness.query_by_label("Sample logs").is_some() && harness.query_by_label("Recent logs").is_some());
+    harness.get_by_label("Open yard.mcap").click();
+    run_until(&mut harness, |harness| opened(harness).is_some());
+    assert_eq!(opened(&harness), Some(PathBuf::from("/samples/yard.mcap")));
+    assert_eq!(*desktop.remembered.lock().unwrap(), [PathBuf::from("/samples/yard.mcap")]);
+    assert!(harness.query_by_label("Play").is_some());
+    assert!(harness.query_by_label("300 MiB").is_some(), "the status bar tells the memory");
+}
+
+#[test]
+fn a_dropped_log_is_opened_and_a_wrong_file_explained() {
+    let (mut harness, _) = app();
+    harness.input_mut().dropped_files.push(Arc::new(Dropped(PathBuf::from("/x/notes.txt"))));
+    run_until(&mut harness, |harness| harness.query_by_label_contains("this is not an MCAP file").is_some());
+    assert!(opened(&harness).is_none());
+    harness.get_by_label("Dismiss notice").click();
+    harness.run_steps(2);
+    assert!(harness.query_by_label_contains("this is not an MCAP file").is_none());
+    harness.input_mut().dropped_files.push(Arc::new(Dropped(PathBuf::from("/x/a.mcap"))));
+    run_until(&mut harness, |harness| opened(harness).is_some());
+    harness.input_mut().dropped_files.push(Arc::new(Dropped(PathBuf::from("/x/b.mcap"))));
+    run_until(&mut harness, |harness| opened(harness) == Some(PathBuf::from("/x/b.mcap")));
+}
+
+#[test]
+fn the_open_dialog_completes_paths() {
+    let (mut harness, _) = app();
+    harness.get_by_label("Open yard.mcap").click();
+    run_until(&mut harness, |harness| opened(harness).is_some());
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::O);
+    harness.run_steps(3);
+    harness.event(egui::Event::Text("/lo".to_owned()));
+    harness.run_steps(3);
+    harness.key_press(Key::Tab);
+    harness.run_steps(3);
+    assert!(harness.query_by_label("/logs/city.mcap").is_some(), "Tab fills in the folder and lists it");
+    harness.key_press(Key::Tab);
+    harness.run_steps(3);
+    assert!(harness.query_all_by_value("/logs/city").next().is_some(), "Tab fills in what is common");
+    harness.key_press(Key::ArrowDown);
+    harness.run_steps(2);
+    harness.key_press(Key::Enter);
+    run_until(&mut harness, |harness| opened(harness) == Some(PathBuf::from("/logs/city.mcap")));
+    assert!(harness.query_by_label("/logs/city.mcap").is_none(), "the dialog closes");
+}
+
+#[test]
+fn commands_reach_the_log_and_playing_moves_the_cursor() {
+    let (mut harness, _) = app();
+    harness.get_by_label("Open yard.mcap").click();
+    run_until(&mut harness, |harness| opened(harness).is_some());
+    let cursor = |harness: &Harness<'static, App>| harness.state().log().unwrap().cursor_ns();
+    harness.key_press(Key::ArrowRight);
+    harness.run_steps(2);
+    assert_eq!(cursor(&harness), FRAME_PERIOD_NS);
+    harness.key_press(Key::Space);
+    harness.run_steps(10);
+    assert!(cursor(&harness) > FRAME_PERIOD_NS);
+    harness.get_by_label("Pause").click();
+    harness.run_steps(2);
+    let held = cursor(&harness);
+    harness.run_steps(5);
+    assert_eq!(cursor(&harness), held);
+}
+
+#[test]
+fn the_theme_changes_at_a_key() {
+    let (mut harness, _) = app();
+    harness.get_by_label("Open yard.mcap").click();
+    run_until(&mut harness, |harness| opened(harness).is_some());
+    assert_eq!(harness.ctx.theme(), egui::Theme::Dark);
+    harness.key_press(Key::T);
+    harness.run_steps(2);
+    assert_eq!(harness.ctx.theme(), egui::Theme::Light);
+}
