@@ -79,7 +79,11 @@ impl PathBox {
     /// Draws it; returns the path that was chosen.
     pub(crate) fn ui(&mut self, ui: &mut Ui, theme: &Theme, focus: bool, height: f32) -> Option<PathBuf> {
         if self.completed.as_ref().is_none_or(|(typed, _)| *typed != self.typed) {
-            let entries = self.desktop.as_ref().map_or_else(Vec::new, |desktop| desktop.complete(&self.typed));
+            let mut entries = self.desktop.as_ref().map_or_else(Vec::new, |desktop| desktop.complete(&self.typed));
+            // A folder that is filled in shall show what it holds next.
+            for entry in entries.iter_mut().filter(|entry| entry.folder && !entry.path.ends_with('/')) {
+                entry.path.push('/');
+            }
             self.completed = Some((self.typed.clone(), entries));
             self.chosen = None;
         }
