@@ -154,3 +154,44 @@ fn the_inspector_is_drawn_in_every_case() {
         panel.ui(ui, ctx);
     });
 }
+
+/// Prints what a picture of the whole window costs: `cargo test --release --lib time_of_a -- --ignored --nocapture`.
+#[test]
+#[ignore = "a measurement, not a test"]
+#[expect(clippy::disallowed_methods, clippy::print_stdout, reason = "it measures and says so")]
+fn time_of_a_window_frame() {
+    use super::headless::Headless;
+    use super::painter::Painter;
+    use super::window::{WindowState, window_ui};
+    use std::time::Instant;
+
+    let recording = sample_recording_of(2400, &["auto", "classical"]);
+    let options = HeadlessOptions { size_px: [1920, 1080], pixels_per_point: 1.0, theme: ThemeName::Dark };
+    let (mut headless, mut painter) = (Headless::new(options), Painter::new());
+    let (mut state, mut selection, mut images) = (WindowState::default(), Selection::default(), sample_images());
+    let theme = Theme::of(ThemeName::Dark);
+    let mut times_ms: Vec<[f64; 2]> = Vec::new();
+    for number in 0..60 {
+        let begin = Instant::now();
+        let mut frame = headless.frame(Vec::new(), |ui| {
+            let cursor_ns = 100 * SECOND_NS + number * SECOND_NS / 20;
+            with_context(&recording, cursor_ns, &mut images, &mut selection, &theme, |ctx| {
+                window_ui(ui, &mut state, ctx);
+            });
+        });
+        let drawn = Instant::now();
+        painter.set_textures(&frame.textures);
+        painter.paint(&frame.primitives, options.size_px, 1.0, theme.background);
+        frame.textures.clear();
+        let painted = Instant::now();
+        times_ms.push([drawn - begin, painted - drawn].map(|time| time.as_secs_f64() * 1e3));
+    }
+    for (part, name) in ["interface and tessellation", "CPU painter"].into_iter().enumerate() {
+        let mut part_ms: Vec<f64> = times_ms[5..].iter().map(|times| times[part]).collect();
+        part_ms.sort_by(f64::total_cmp);
+        println!(
+            "{name}: first {:.1} ms, median {:.1} ms, worst {:.1} ms",
+            times_ms[0][part], part_ms[27], part_ms[54]
+        );
+    }
+}

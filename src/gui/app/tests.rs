@@ -228,3 +228,40 @@ fn the_theme_changes_at_a_key() {
     harness.run_steps(2);
     assert_eq!(harness.ctx.theme(), egui::Theme::Light);
 }
+
+#[test]
+fn dialogs_can_be_looked_at() {
+    use crate::gui::headless::{Headless, HeadlessOptions};
+    use crate::gui::painter::Painter;
+    use crate::gui::tests::keep_picture;
+
+    let options = HeadlessOptions { size_px: [1366, 768], pixels_per_point: 1.0, theme: ThemeName::Dark };
+    let key = |key, modifiers| egui::Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers };
+    let cases = [
+        ("welcome", None),
+        ("add-run", Some(key(Key::A, Modifiers::NONE))),
+        ("palette", Some(key(Key::P, Modifiers::COMMAND))),
+        ("open", Some(key(Key::O, Modifiers::COMMAND))),
+        ("shortcuts", Some(key(Key::F1, Modifiers::NONE))),
+        ("warnings", Some(key(Key::W, Modifiers::NONE))),
+    ];
+    for (name, event) in cases {
+        let open: OpenLog = Arc::new(|path: &Path| Ok(Box::new(SampleLog::new(path)) as Box<dyn PlayingLog>));
+        let mut app = App::new(open, Arc::new(TestDesktop::default()), ThemeName::Dark);
+        let (mut headless, mut painter) = (Headless::new(options), Painter::new());
+        let log_is_shown = event.is_some();
+        if log_is_shown {
+            app.show(Box::new(SampleLog::new(Path::new("/logs/city.mcap"))));
+        }
+        let events = event.map(|event| {
+            let modifiers = if let egui::Event::Key { modifiers, .. } = &event { *modifiers } else { Modifiers::NONE };
+            vec![egui::Event::ModifiersChanged(modifiers), event, egui::Event::ModifiersChanged(Modifiers::NONE)]
+        });
+        let mut first = headless.frame(events.unwrap_or_default(), |ui| app.ui(ui));
+        painter.set_textures(&first.textures);
+        first.textures.clear();
+        let picture = headless.picture(&mut painter, |ui| app.ui(ui));
+        keep_picture(name, &picture);
+        assert_eq!(app.log().is_some(), log_is_shown);
+    }
+}

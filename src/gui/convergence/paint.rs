@@ -276,7 +276,8 @@ fn title(
     let color = if state == Knowledge::Informed { theme.text_strong } else { theme.text_weak };
     let font = FontId::new(10.5, FontFamily::Monospace);
     let with_sigma = format!("{} ±{}", fixed_value(shown, value, sigma), shown.sigma(sigma));
-    for text in [with_sigma, shown.value(value, sigma)] {
+    let texts = [with_sigma, shown.value(value, sigma)];
+    for text in texts.into_iter().skip(usize::from(!sigma.is_finite())) {
         let galley = painter.layout_no_wrap(text, font.clone(), color);
         if galley.size().x + 6.0 < rect.right() - end {
             painter.galley(rect.right_top() - vec2(galley.size().x, 0.0), galley, color);
