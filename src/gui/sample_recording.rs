@@ -22,6 +22,7 @@ use crate::flight_log::{LogWarning, Rig};
 use crate::frontend::{FeatureId, FrontEndStatistics, TrackedFeature, TrackedFrame};
 use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::{ClassicalChain, DhLink};
+use crate::session::accuracy::AlignmentSums;
 use crate::session::{Recording, RunRecord, StepRecord};
 
 /// Nanoseconds between two images (20 Hz).
@@ -356,6 +357,7 @@ fn sample_run(
         finished: true,
         error: None,
         alignment: Some(true_from_estimate),
+        alignment_sums: AlignmentSums::default(),
     }
 }
 
