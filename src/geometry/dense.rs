@@ -72,7 +72,7 @@ pub fn to_faer(matrix: &DMatrix<f64>) -> Mat<f64> {
 ///
 /// Column-pivoted Householder QR, hence also right for dependent columns: a pivot counts when it exceeds `tolerance`, so
 /// the columns of `spanning` should have norms around 1. Both matrices have as many rows; both must be finite.
-pub fn split_by_column_space(spanning: Mat<f64>, rest: &mut Mat<f64>, tolerance: f64) -> usize {
+pub fn split_by_column_space(spanning: MatRef<'_, f64>, rest: &mut Mat<f64>, tolerance: f64) -> usize {
     use faer::linalg::householder::{
         apply_block_householder_sequence_transpose_on_the_left_in_place_scratch as scratch,
         apply_block_householder_sequence_transpose_on_the_left_in_place_with_conj as apply,

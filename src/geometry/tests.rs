@@ -69,3 +69,24 @@ fn matrices_go_both_ways_and_bad_ones_are_refused() {
     mirror[(0, 0)] = -1.0;
     assert!(RigidTransform::from_matrix(&mirror, 1e-6).is_none());
 }
+
+#[test]
+fn rows_are_split_by_a_column_space_even_with_dependent_columns() {
+    use super::dense::{split_by_column_space, thin_svd, to_faer};
+    let entry = |row: usize, column: usize| ((row * 7 + column * 13 + 5) as f64 * 0.37).sin();
+    let mut spanning = nalgebra::DMatrix::from_fn(12, 5, entry);
+    let repeated = spanning.column(0) + spanning.column(2);
+    spanning.set_column(3, &repeated);
+    let rest = nalgebra::DMatrix::from_fn(12, 4, |row, column| entry(row, column + 9));
+    let mut turned = to_faer(&rest);
+    let rank = split_by_column_space(to_faer(&spanning).as_ref(), &mut turned, 1e-11);
+    assert_eq!(rank, 4);
+    // What is left has the Gram matrix of the part orthogonal to the columns.
+    let svd = thin_svd(&spanning).unwrap();
+    let basis = svd.u.columns(0, 4);
+    let outside = &rest - basis * basis.tr_mul(&rest);
+    let left = nalgebra::DMatrix::from_fn(12 - rank, 4, |row, column| turned[(rank + row, column)]);
+    assert!((left.tr_mul(&left) - outside.tr_mul(&outside)).amax() < 1e-13);
+    let product = &svd.u * nalgebra::DMatrix::from_diagonal(&svd.singular_values) * svd.v.transpose();
+    assert!((product - spanning).amax() < 1e-14);
+}

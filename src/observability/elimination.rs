@@ -66,7 +66,7 @@ impl Rows {
         });
         let mut rest =
             Mat::from_fn(touched.len(), others.len(), |row, index| self.transposed[(others[index], touched[row])]);
-        let rank = dense::split_by_column_space(spanning, &mut rest, DEPENDENT);
+        let rank = dense::split_by_column_space(spanning.as_ref(), &mut rest, DEPENDENT);
         for (row, target) in touched.iter().enumerate().skip(rank) {
             let mut column = self.transposed.column_mut(*target);
             column.rows_mut(block.start, block.len()).fill(0.0);
