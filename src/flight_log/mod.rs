@@ -3,6 +3,7 @@
 //! Time is nanoseconds since the first message of the log (its header stamp drives; the log time is kept beside it).
 
 mod cdr;
+pub mod check;
 mod container;
 mod error;
 mod image_reader;

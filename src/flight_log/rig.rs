@@ -8,6 +8,8 @@ mod read;
 mod tests;
 mod write;
 
+pub(super) use read::CameraFacts;
+
 use super::LogError;
 use crate::camera::CameraModel;
 use crate::geometry::RigidTransform;

@@ -14,7 +14,7 @@ const RIG_VERSION: u64 = 1;
 pub(super) const STANDARD_GRAVITY_M_PER_S2: f64 = 9.81;
 
 /// What a log can add to a rig that leaves it open, by image topic.
-pub(super) trait CameraFacts {
+pub(in super::super) trait CameraFacts {
     /// The lens from the camera's `CameraInfo`, or why there is none.
     fn camera_model(&self, image_topic: &str) -> Result<CameraModel, String>;
     /// Mean rate of the images.

@@ -1,0 +1,143 @@
+use super::super::Rig;
+use super::super::rig::{GimbalRig, Joint};
+use super::statistics::percentile;
+use super::survey::Survey;
+use super::{Area, Findings, Severity};
+use crate::geometry::seconds_from_ns;
+
+/// A joint that moves less than this over the log tells nothing about its parameters.
+const SMALLEST_RANGE_RAD: f64 = 0.05;
+/// A reading this close to a stop counts as being there.
+const AT_STOP_RAD: f64 = 0.01;
+
+/// Names, coverage, stops and noise of the encoders.
+pub(super) fn check_joints(survey: &Survey, rig: &Rig, findings: &mut Findings) {
+    let Some(gimbal) = &rig.gimbal else { return };
+    if gimbal.topic.is_none() || gimbal.encoder_sigma_rad.is_none() {
+        let evidence = match (&gimbal.topic, gimbal.encoder_sigma_rad) {
+            (None, _) => "gimbal.rostopic is null",
+            (Some(_), _) => "gimbal.encoder_sigma is null",
+        };
+        let title = "the gimbal's encoders are not used";
+        let remedy = "joint angles are then unknowns of every frame; more has to be seen before they settle";
+        return findings.add(Severity::Note, Area::Encoders, title, evidence, remedy);
+    }
+    if survey.joints.is_empty() {
+        return;
+    }
+    for (number, joint) in gimbal.joints.iter().enumerate() {
+        check_joint(survey, gimbal, number, joint, findings);
+    }
+}
+
+fn check_joint(survey: &Survey, gimbal: &GimbalRig, number: usize, joint: &Joint, findings: &mut Findings) {
+    let name = &joint.name;
+    let readings = || survey.joints.iter().filter_map(|message| Some((message.stamp_ns, message.angles_rad[number]?)));
+    let missing = survey.joints.len() - readings().count();
+    if missing > 0 {
+        let evidence = format!(
+            "missing in {missing} of {} messages, which name {}",
+            survey.joints.len(),
+            survey.joint_names.join(", ")
+        );
+        let severity = if missing == survey.joints.len() { Severity::Error } else { Severity::Warning };
+        let remedy = format!("write the messages' name into gimbal.links[{number}].joint");
+        findings.add(severity, Area::Encoders, format!("joint '{name}' is not in the messages"), evidence, remedy);
+    }
+    let bad = readings().filter(|(_, angle)| !angle.is_finite()).count();
+    if bad > 0 {
+        let evidence = format!("{bad} readings");
+        let remedy = "look at the driver; these messages are dropped";
+        findings.add(
+            Severity::Warning,
+            Area::Encoders,
+            format!("readings of '{name}' are not finite"),
+            evidence,
+            remedy,
+        );
+    }
+    let angles: Vec<(i64, f64)> = readings().filter(|(_, angle)| angle.is_finite()).collect();
+    let values: Vec<f64> = angles.iter().map(|(_, angle)| *angle).collect();
+    if values.len() < 3 {
+        return;
+    }
+    let (low, high) = (percentile(&values, 0.0), percentile(&values, 1.0));
+    let (lower, upper) = joint.limits_rad;
+    let sigma = gimbal.encoder_sigma_rad.unwrap_or(0.0);
+    let degrees = f64::to_degrees;
+    let range = format!(
+        "{:+.1}° to {:+.1}°, stops at {:+.1}° and {:+.1}°",
+        degrees(low),
+        degrees(high),
+        degrees(lower),
+        degrees(upper)
+    );
+    if high.abs().max(low.abs()) > 2.0 * std::f64::consts::TAU {
+        let evidence = format!("readings from {low:.1} to {high:.1}");
+        let remedy = "sensor_msgs/JointState wants radians";
+        return findings.add(Severity::Error, Area::Encoders, format!("'{name}' looks like degrees"), evidence, remedy);
+    }
+    let margin = 0.03 + 4.0 * sigma;
+    if low < lower - margin || high > upper + margin {
+        let remedy = format!("correct gimbal.links[{number}].limits, or the encoder's zero");
+        findings.add(
+            Severity::Warning,
+            Area::Encoders,
+            format!("'{name}' goes beyond its stops"),
+            range.clone(),
+            remedy,
+        );
+    }
+    let white = white_sigma(&values);
+    // The range without the noise of single readings.
+    let moved = percentile(&values, 0.98) - percentile(&values, 0.02) - 4.0 * white;
+    if moved < SMALLEST_RANGE_RAD {
+        let title = format!("'{name}' hardly moves");
+        let remedy =
+            "its static parameters cannot be told apart without motion; fly with the joint moving, or keep them fixed";
+        findings.add(Severity::Warning, Area::Encoders, title, range, remedy);
+    } else {
+        findings.good(Area::Encoders, format!("'{name}' moves"), range);
+    }
+    let at_stop =
+        angles.iter().filter(|(_, angle)| *angle < lower + AT_STOP_RAD || *angle > upper - AT_STOP_RAD).count();
+    let share = at_stop as f64 / angles.len() as f64;
+    if share > 0.01 && upper - lower < std::f64::consts::TAU - 0.1 {
+        let first = angles.iter().find(|(_, angle)| *angle < lower + AT_STOP_RAD || *angle > upper - AT_STOP_RAD);
+        let evidence = format!(
+            "{:.0} % of the readings, the first at {:.1} s",
+            share * 100.0,
+            first.map_or(0.0, |(at, _)| seconds_from_ns(*at))
+        );
+        let remedy = "the camera is not stabilized there: expect faster image motion";
+        findings.add(Severity::Note, Area::Encoders, format!("'{name}' meets its stop"), evidence, remedy);
+    }
+    judge_sigma(name, white, sigma, findings);
+}
+
+/// Standard deviation of the white part of the readings, from second differences with wraps taken out. The middle of
+/// them counts, so that jumps do not.
+fn white_sigma(values: &[f64]) -> f64 {
+    let wrap = |angle: f64| (angle + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU) - std::f64::consts::PI;
+    let second: Vec<f64> =
+        values.windows(3).map(|three| (wrap(three[2] - three[1]) - wrap(three[1] - three[0])).abs()).collect();
+    // The median of |x| for a normal x is 0.6745 of its deviation.
+    percentile(&second, 0.5) / 0.6745 / 6.0_f64.sqrt()
+}
+
+fn judge_sigma(name: &str, measured: f64, given: f64, findings: &mut Findings) {
+    let ratio = measured / given;
+    let evidence =
+        format!("{:.3}° from reading to reading, {:.3}° in the rig", measured.to_degrees(), given.to_degrees());
+    if ratio > 2.0 {
+        let remedy = format!("raise gimbal.encoder_sigma to {measured:.4}");
+        let title = format!("the encoder of '{name}' is noisier than the rig says by {ratio:.1}");
+        findings.add(Severity::Warning, Area::Encoders, title, evidence, remedy);
+    } else if ratio < 0.2 {
+        let title = format!("the encoder of '{name}' scatters less than the rig says");
+        let remedy = "the rig's value may stand for slow errors such as backlash; else lower gimbal.encoder_sigma";
+        findings.add(Severity::Note, Area::Encoders, title, evidence, remedy);
+    } else {
+        findings.good(Area::Encoders, format!("the encoder of '{name}' is as noisy as the rig says"), evidence);
+    }
+}

@@ -1,0 +1,293 @@
+//! What is in a log and what is wrong with it, before anyone trusts a result: everything that can be known without the
+//! estimator, each finding with its evidence and its remedy.
+
+mod images;
+mod inertial;
+mod joints;
+mod render;
+mod rig_sanity;
+mod rotation;
+mod statistics;
+mod survey;
+#[cfg(test)]
+mod tests;
+mod timing;
+
+use nalgebra::UnitQuaternion;
+use serde::Serialize;
+
+use self::survey::Survey;
+use super::{FlightLog, LogError, MessageKind, Rig};
+use crate::geometry::seconds_from_ns;
+
+/// How bad a finding is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Severity {
+    /// It was looked at and is in order.
+    Good,
+    /// Worth knowing.
+    Note,
+    /// It makes results worse or harder to get.
+    Warning,
+    /// No result can be trusted before it is put right.
+    Error,
+}
+
+/// What a finding is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Area {
+    /// The file and its topics.
+    Log,
+    /// Clocks, rates, gaps and order.
+    Time,
+    /// Units, gravity, biases, noise and saturation of the IMU.
+    Inertial,
+    /// Standstill, hover and fast turns.
+    Motion,
+    /// Joint angles and their limits.
+    Encoders,
+    /// Size, blur, exposure and texture.
+    Images,
+    /// Camera models and lenses.
+    Intrinsics,
+    /// Where the cameras sit.
+    Extrinsics,
+}
+
+/// One thing that was looked at.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Finding {
+    /// How bad it is.
+    pub severity: Severity,
+    /// What it is about.
+    pub area: Area,
+    /// The finding in one sentence.
+    pub title: String,
+    /// The numbers it rests on.
+    pub evidence: String,
+    /// What to do about it; empty when nothing is to be done.
+    pub remedy: String,
+}
+
+/// One topic of the log.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TopicReport {
+    /// Its name.
+    pub topic: String,
+    /// Name of its schema.
+    pub schema: String,
+    /// What it is used as: `imu0`, `cam0`, `gimbal`, `ground truth`, `not in the rig`, or `ignored`.
+    pub role: String,
+    /// How many messages it has.
+    pub count: u64,
+    /// Mean rate over its log times.
+    pub rate_hz: f64,
+    /// First header stamp since the log began, in seconds; log time for an ignored topic.
+    pub first_s: f64,
+    /// Last one.
+    pub last_s: f64,
+    /// Median of log time minus header stamp in seconds, `None` for an ignored topic.
+    pub latency_s: Option<f64>,
+}
+
+/// The rotation between two images of one camera, as somebody measured it from the pictures alone.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ImageRotation {
+    /// Key of the camera.
+    pub camera_key: String,
+    /// Header stamp of the first image since the log began.
+    pub from_ns: i64,
+    /// Header stamp of the second image.
+    pub to_ns: i64,
+    /// Rotates vectors of the first image's camera frame into the second one's.
+    pub second_from_first: UnitQuaternion<f64>,
+}
+
+/// What `check` found.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CheckReport {
+    /// Path of the log.
+    pub log: String,
+    /// Name of the rig, `None` when there is none that can be read.
+    pub rig: Option<String>,
+    /// Absolute header stamp of the log's begin in nanoseconds.
+    pub epoch_ns: i64,
+    /// Length of the log.
+    pub duration_s: f64,
+    /// All topics in the order of their names.
+    pub topics: Vec<TopicReport>,
+    /// What was found, worst first, then by area.
+    pub findings: Vec<Finding>,
+}
+
+/// Looks through a whole log.
+///
+/// `rig` may be the error that reading it gave: that becomes a finding, and the rest is checked without it.
+/// `image_rotations` are optional: with them the extrinsic rotations and the time offset of the cameras are checked
+/// against the gyroscope.
+pub fn check(log: &FlightLog, rig: Result<&Rig, &LogError>, image_rotations: &[ImageRotation]) -> CheckReport {
+    let survey = Survey::of(log, rig.ok());
+    let mut findings = Findings::default();
+    check_file(log, &survey, &mut findings);
+    match rig {
+        Ok(rig) => {
+            check_topics(log, rig, &mut findings);
+            rig_sanity::check_rig(log, rig, &mut findings);
+        }
+        Err(error) => findings.add(
+            Severity::Error,
+            Area::Log,
+            "there is no rig that can be used",
+            error.to_string(),
+            "put the rig beside the log as NAME.rig.yaml, or name one with --rig",
+        ),
+    }
+    timing::check_timing(&survey, rig.ok(), &mut findings);
+    let inertial = inertial::check_inertial(&survey, rig.ok(), &mut findings);
+    if let Ok(rig) = rig {
+        joints::check_joints(&survey, rig, &mut findings);
+        images::check_images(&survey, rig, &inertial, &mut findings);
+        rotation::check_rotations(&survey, rig, &inertial, image_rotations, &mut findings);
+    }
+    let mut findings = findings.list;
+    findings.sort_by_key(|finding| (std::cmp::Reverse(finding.severity), finding.area));
+    CheckReport {
+        log: log.path().display().to_string(),
+        rig: rig.ok().map(|rig| rig.name.clone()),
+        epoch_ns: log.epoch_ns(),
+        duration_s: seconds_from_ns(log.duration_ns()),
+        topics: topic_reports(log, &survey, rig.ok()),
+        findings,
+    }
+}
+
+impl CheckReport {
+    /// The worst severity among the findings.
+    pub fn worst(&self) -> Severity {
+        self.findings.iter().map(|finding| finding.severity).max().unwrap_or(Severity::Good)
+    }
+}
+
+/// Findings as they come.
+#[derive(Debug, Default)]
+struct Findings {
+    list: Vec<Finding>,
+}
+
+impl Findings {
+    fn add(
+        &mut self,
+        severity: Severity,
+        area: Area,
+        title: impl Into<String>,
+        evidence: impl Into<String>,
+        remedy: impl Into<String>,
+    ) {
+        let (title, evidence, remedy) = (title.into(), evidence.into(), remedy.into());
+        self.list.push(Finding { severity, area, title, evidence, remedy });
+    }
+
+    fn good(&mut self, area: Area, title: impl Into<String>, evidence: impl Into<String>) {
+        self.add(Severity::Good, area, title, evidence, "");
+    }
+}
+
+/// Damage to the file, unreadable messages, and topics nobody reads.
+fn check_file(log: &FlightLog, survey: &Survey, findings: &mut Findings) {
+    for warning in log.warnings() {
+        let evidence = warning.message.clone();
+        let remedy = "copy the file again from where it was recorded; what lies after the damage is not used";
+        findings.add(Severity::Warning, Area::Log, "the file is not whole", evidence, remedy);
+    }
+    for damage in &survey.damages {
+        let remedy = "copy the file again; the chunk is left out and reading goes on after it";
+        findings.add(Severity::Warning, Area::Log, "a chunk is damaged", damage.clone(), remedy);
+    }
+    for topic in survey.topics.values().filter(|topic| topic.unreadable > 0) {
+        let title = format!("messages of {} cannot be decoded", topic.topic);
+        let evidence = format!("{} of {}; the first: {}", topic.unreadable, topic.times.len(), topic.first_problem);
+        findings.add(Severity::Warning, Area::Log, title, evidence, "check the recorder's message definitions");
+    }
+    let ignored: Vec<&str> =
+        log.topics().iter().filter(|info| info.kind.is_none()).map(|info| info.topic.as_str()).collect();
+    if !ignored.is_empty() {
+        let title = "some topics have messages that nothing reads";
+        findings.add(Severity::Note, Area::Log, title, ignored.join(", "), "");
+    }
+}
+
+const IMAGES: [MessageKind; 2] = [MessageKind::Image, MessageKind::CompressedImage];
+const POSES: [MessageKind; 3] = [MessageKind::Odometry, MessageKind::PoseStamped, MessageKind::TransformStamped];
+
+/// Whether the topics that the rig names are there.
+fn check_topics(log: &FlightLog, rig: &Rig, findings: &mut Findings) {
+    let mut named = 0;
+    let mut require = |field: String, topic: &str, kinds: &[MessageKind], severity| {
+        named += 1;
+        if let Err(error) = log.require_topic(&field, topic, kinds) {
+            let remedy = "name one of the log's topics in the rig";
+            findings.add(
+                severity,
+                Area::Log,
+                format!("{field} names a topic that the log lacks"),
+                error.to_string(),
+                remedy,
+            );
+            named -= 1;
+        }
+    };
+    require("imu0.rostopic".into(), &rig.imu.topic, &[MessageKind::Imu], Severity::Error);
+    for camera in &rig.cameras {
+        require(format!("{}.rostopic", camera.key), &camera.topic, &IMAGES, Severity::Error);
+    }
+    if let Some(topic) = rig.gimbal.as_ref().and_then(|gimbal| gimbal.topic.as_ref()) {
+        require("gimbal.rostopic".into(), topic, &[MessageKind::JointState], Severity::Error);
+    }
+    if let Some(topic) = &rig.ground_truth_topic {
+        require("ground_truth.rostopic".into(), topic, &POSES, Severity::Note);
+    }
+    if named > 0 {
+        findings.good(Area::Log, "the log has the topics of the rig", format!("{named} of them"));
+    }
+}
+
+/// What a topic is to the rig.
+fn role_of(topic: &str, kind: Option<MessageKind>, rig: Option<&Rig>) -> String {
+    let Some(kind) = kind else { return "ignored".into() };
+    if let Some(rig) = rig {
+        if topic == rig.imu.topic {
+            return "imu0".into();
+        }
+        if let Some(camera) = rig.cameras.iter().find(|camera| camera.topic == topic) {
+            return camera.key.clone();
+        }
+        if rig.gimbal.as_ref().is_some_and(|gimbal| gimbal.topic.as_deref() == Some(topic)) {
+            return "gimbal".into();
+        }
+        if rig.ground_truth_topic.as_deref() == Some(topic) {
+            return "ground truth".into();
+        }
+    }
+    if kind == MessageKind::CameraInfo { "intrinsics".into() } else { "not in the rig".into() }
+}
+
+fn topic_reports(log: &FlightLog, survey: &Survey, rig: Option<&Rig>) -> Vec<TopicReport> {
+    let report = |info: &super::TopicInfo| {
+        let times = survey.topics.get(&info.topic).filter(|topic| !topic.times.is_empty());
+        let stamps = times.map(|topic| topic.stamp_range());
+        let (first_ns, last_ns) = stamps.unwrap_or((info.first_ns, info.last_ns));
+        TopicReport {
+            topic: info.topic.clone(),
+            schema: info.schema.clone(),
+            role: role_of(&info.topic, info.kind, rig),
+            count: info.count,
+            rate_hz: info.rate_hz,
+            first_s: seconds_from_ns(first_ns),
+            last_s: seconds_from_ns(last_ns),
+            latency_s: times.map(|topic| topic.median_latency_s()),
+        }
+    };
+    log.topics().iter().map(report).collect()
+}

@@ -1,0 +1,97 @@
+use std::fmt::{Display, Formatter, Result, Write as _};
+
+use super::{Area, CheckReport, Severity};
+
+impl Severity {
+    /// Its name as it stands before a finding.
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::Good => "good",
+            Self::Note => "note",
+            Self::Warning => "warning",
+            Self::Error => "error",
+        }
+    }
+}
+
+impl Area {
+    /// Its name.
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::Log => "log",
+            Self::Time => "time",
+            Self::Inertial => "IMU",
+            Self::Motion => "motion",
+            Self::Encoders => "encoders",
+            Self::Images => "images",
+            Self::Intrinsics => "intrinsics",
+            Self::Extrinsics => "extrinsics",
+        }
+    }
+}
+
+/// The report as text: topics as a table, then the findings, worst first.
+impl Display for CheckReport {
+    fn fmt(&self, out: &mut Formatter<'_>) -> Result {
+        let rig = self.rig.as_deref().map_or_else(|| "no rig".to_owned(), |name| format!("rig {name}"));
+        writeln!(out, "{}: {:.3} s, {rig}", self.log, self.duration_s)?;
+        writeln!(out)?;
+        let header = ["topic", "type", "used as", "messages", "Hz", "from s", "to s", "late ms"].map(str::to_owned);
+        let mut rows = vec![header];
+        for topic in &self.topics {
+            rows.push([
+                topic.topic.clone(),
+                topic.schema.clone(),
+                topic.role.clone(),
+                topic.count.to_string(),
+                format!("{:.1}", topic.rate_hz),
+                format!("{:.3}", topic.first_s),
+                format!("{:.3}", topic.last_s),
+                topic.latency_s.map_or_else(String::new, |latency| format!("{:.1}", latency * 1e3)),
+            ]);
+        }
+        write_table(out, &rows)?;
+        for severity in [Severity::Error, Severity::Warning, Severity::Note, Severity::Good] {
+            let findings: Vec<_> = self.findings.iter().filter(|finding| finding.severity == severity).collect();
+            if findings.is_empty() {
+                continue;
+            }
+            writeln!(out)?;
+            for finding in findings {
+                write!(
+                    out,
+                    "{:<8}{:<11} {}: {}",
+                    severity.label(),
+                    finding.area.label(),
+                    finding.title,
+                    finding.evidence
+                )?;
+                if !finding.remedy.is_empty() {
+                    write!(out, "\n{:20}→ {}", "", finding.remedy)?;
+                }
+                writeln!(out)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Columns as wide as their widest cell, numbers to the right.
+fn write_table<const N: usize>(out: &mut Formatter<'_>, rows: &[[String; N]]) -> Result {
+    const FIRST_NUMBER: usize = 3;
+    let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..N).map(width).collect();
+    for row in rows {
+        let mut line = String::new();
+        for (column, cell) in row.iter().enumerate() {
+            let width = widths[column];
+            if column < FIRST_NUMBER {
+                write!(line, "{cell:<width$}  ")?;
+            } else {
+                write!(line, "{cell:>width$}  ")?;
+            }
+        }
+        writeln!(out, "  {}", line.trim_end())?;
+    }
+    Ok(())
+}

@@ -1,0 +1,140 @@
+use nalgebra::Vector2;
+
+use super::super::rig::{CameraRig, ChainPrior, GimbalRig};
+use super::super::{FlightLog, Rig};
+use super::{Area, Findings, Severity};
+use crate::camera::{CameraModel, Projection};
+
+/// A camera further from the IMU than this is unusual on a drone.
+const LONGEST_LEVER_M: f64 = 1.0;
+/// Intrinsics in the log that differ from the rig's by more than this share are told.
+const INTRINSICS_TOLERANCE: f64 = 0.02;
+
+/// Whether the rig's numbers can be what they claim to be.
+pub(super) fn check_rig(log: &FlightLog, rig: &Rig, findings: &mut Findings) {
+    for camera in &rig.cameras {
+        check_lens(camera, findings);
+        check_camera_info(log, camera, findings);
+        if camera.timeshift_cam_imu_s.abs() > 0.1 {
+            let evidence = format!("{:+.4} s, t_imu = t_cam + shift", camera.timeshift_cam_imu_s);
+            let title = format!("{}.timeshift_cam_imu is large", camera.key);
+            let remedy = "check its sign and unit (seconds); better stamp the images at mid-exposure";
+            findings.add(Severity::Warning, Area::Time, title, evidence, remedy);
+        }
+    }
+    if let Some(gimbal) = &rig.gimbal {
+        check_chain(gimbal, findings);
+    }
+}
+
+fn check_lens(camera: &CameraRig, findings: &mut Findings) {
+    let model = &camera.model;
+    let [fx, fy, cx, cy] = model.intrinsics_px;
+    let [width, height] = model.resolution_px.map(|side| side as f64);
+    let centre = [cx / (0.5 * width), cy / (0.5 * height)];
+    let before = findings.list.len();
+    let numbers = format!("fx {fx:.1}, fy {fy:.1}, cx {cx:.1}, cy {cy:.1} at {width:.0}×{height:.0}");
+    let off = centre.map(|ratio| (ratio - 1.0).abs());
+    if off[0].max(off[1]) > 0.25 {
+        let scale = 0.5 * (centre[0] + centre[1]);
+        let remedy = if (centre[0] - centre[1]).abs() < 0.1 * scale {
+            format!(
+                "the intrinsics look like those of an image {scale:.2} times as large: scale them, or set resolution"
+            )
+        } else {
+            "check the order fx fy cx cy, and that resolution is [width, height]".to_owned()
+        };
+        let title = format!("the principal point of {} is far from the image centre", camera.key);
+        let severity = if off[0].max(off[1]) > 0.4 { Severity::Error } else { Severity::Warning };
+        findings.add(severity, Area::Intrinsics, title, numbers.clone(), remedy);
+    }
+    if !(0.9..=1.1).contains(&(fx / fy)) && model.projection == Projection::Pinhole {
+        let title = format!("the focal lengths of {} differ", camera.key);
+        let remedy = "pixels are nearly always square: calibrate again, or check how the image was resized";
+        findings.add(Severity::Warning, Area::Intrinsics, title, numbers.clone(), remedy);
+    }
+    let Some(fov_deg) = field_of_view_deg(model) else {
+        let title = format!("the lens of {} does not cover its image", camera.key);
+        let evidence = format!("a pixel at the image's edge has no direction; {numbers}");
+        let remedy =
+            "the distortion folds inside the image: calibrate with points near the edge, or take another model";
+        findings.add(Severity::Warning, Area::Intrinsics, title, evidence, remedy);
+        return;
+    };
+    if !(25.0..=200.0).contains(&fov_deg) {
+        let title = format!("the field of view of {} is unusual", camera.key);
+        let evidence = format!("{fov_deg:.0}° across; {numbers}");
+        let remedy = "check that fx and fy are in pixels, and the camera model";
+        findings.add(Severity::Warning, Area::Intrinsics, title, evidence, remedy);
+    }
+    if findings.list.len() == before {
+        let title = format!("the intrinsics of {} are plausible", camera.key);
+        findings.good(Area::Intrinsics, title, format!("{fov_deg:.0}° across; {numbers}"));
+    }
+}
+
+/// Angle between the directions of the middle pixels at the left and right edge, `None` when the model has none there
+/// or in a corner's neighbourhood.
+fn field_of_view_deg(model: &CameraModel) -> Option<f64> {
+    let [width, height] = model.resolution_px.map(|side| side as f64);
+    let direction = |u: f64, v: f64| model.unproject(&Vector2::new(u, v));
+    for corner in [(0.0, 0.0), (width - 1.0, 0.0), (0.0, height - 1.0), (width - 1.0, height - 1.0)] {
+        let inside = (0.9 * corner.0 + 0.05 * width, 0.9 * corner.1 + 0.05 * height);
+        direction(inside.0, inside.1)?;
+    }
+    let [_, _, cx, cy] = model.intrinsics_px;
+    let (left, right) = (direction(0.0, cy)?, direction(width - 1.0, cy)?);
+    let axis = direction(cx, cy)?;
+    Some((left.angle(&axis) + right.angle(&axis)).to_degrees())
+}
+
+fn check_camera_info(log: &FlightLog, camera: &CameraRig, findings: &mut Findings) {
+    use super::super::rig::CameraFacts as _;
+    let Ok(told) = log.camera_model(&camera.topic) else { return };
+    let (rig, log) = (camera.model.intrinsics_px, told.intrinsics_px);
+    let scale = camera.model.focal_length_px();
+    let worst = rig.iter().zip(&log).map(|(a, b)| (a - b).abs() / scale).fold(0.0, f64::max);
+    let evidence = format!("the rig has {rig:?}, the log's CameraInfo {log:?}");
+    if worst > INTRINSICS_TOLERANCE || told.resolution_px != camera.model.resolution_px {
+        let title = format!("the log's CameraInfo contradicts the rig for {}", camera.key);
+        let remedy = "find out which calibration belongs to this flight; the rig is used";
+        findings.add(Severity::Warning, Area::Intrinsics, title, evidence, remedy);
+    } else {
+        findings.good(
+            Area::Intrinsics,
+            format!("the log's CameraInfo agrees with the rig for {}", camera.key),
+            evidence,
+        );
+    }
+}
+
+fn check_chain(gimbal: &GimbalRig, findings: &mut Findings) {
+    // The camera's place over a grid of joint angles within the stops.
+    let middle: Vec<f64> = gimbal.joints.iter().map(|joint| 0.5 * (joint.limits_rad.0 + joint.limits_rad.1)).collect();
+    let mut farthest = 0.0_f64;
+    for (number, joint) in gimbal.joints.iter().enumerate() {
+        for share in [0.0, 0.5, 1.0] {
+            let mut angles = middle.clone();
+            angles[number] = joint.limits_rad.0 + share * (joint.limits_rad.1 - joint.limits_rad.0);
+            farthest = farthest.max(gimbal.chain.imu_from_camera(&angles).translation_m.norm());
+        }
+    }
+    let evidence = format!("the gimbal's camera comes up to {farthest:.3} m from the IMU");
+    if farthest > LONGEST_LEVER_M {
+        let remedy = "lengths are in metres: check d, a and the translations of T_I_B and T_E_C";
+        findings.add(Severity::Warning, Area::Extrinsics, "the gimbal's chain is long", evidence, remedy);
+    } else {
+        findings.good(Area::Extrinsics, "the gimbal's chain has a plausible length", evidence);
+    }
+    let ChainPrior { translation_bound_m, rotation_bound_rad } = gimbal.prior;
+    let evidence = format!("±{:.1} mm and ±{:.2}°", translation_bound_m * 1e3, rotation_bound_rad.to_degrees());
+    if translation_bound_m == 0.0 || rotation_bound_rad == 0.0 {
+        let remedy = "give gimbal.prior the errors that the chain may have; zero holds it fixed";
+        findings.add(Severity::Note, Area::Extrinsics, "the chain's prior leaves it no room", evidence, remedy);
+    } else if translation_bound_m > 0.1 || rotation_bound_rad > 0.35 {
+        let remedy = "measure the gimbal better: a loose prior lets the first seconds carry the chain away";
+        findings.add(Severity::Note, Area::Extrinsics, "the chain's prior is loose", evidence, remedy);
+    } else {
+        findings.good(Area::Extrinsics, "the chain has a prior of usual width", evidence);
+    }
+}

@@ -1,0 +1,51 @@
+//! Small statistics over plain numbers.
+
+use nalgebra::Vector3;
+
+/// The value below which the share `fraction` of the numbers lies; 0 for none.
+pub(super) fn percentile(values: &[f64], fraction: f64) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let last = sorted.len().saturating_sub(1);
+    sorted.get((fraction * last as f64).round() as usize).copied().unwrap_or(0.0)
+}
+
+pub(super) fn median(values: &[f64]) -> f64 {
+    percentile(values, 0.5)
+}
+
+/// Mean of vectors; zero for none.
+pub(super) fn mean(vectors: &[Vector3<f64>]) -> Vector3<f64> {
+    let sum: Vector3<f64> = vectors.iter().sum();
+    if vectors.is_empty() { sum } else { sum / vectors.len() as f64 }
+}
+
+/// Standard deviation of each component.
+pub(super) fn deviation(vectors: &[Vector3<f64>]) -> Vector3<f64> {
+    let centre = mean(vectors);
+    let squares: Vec<Vector3<f64>> =
+        vectors.iter().map(|vector| (vector - centre).map(|entry| entry * entry)).collect();
+    mean(&squares).map(f64::sqrt)
+}
+
+/// Standard deviation of the white part of each component, from second differences: motion that is smooth over three
+/// samples drops out. `var(x₋ − 2x + x₊) = 6σ²`.
+pub(super) fn white_deviation(vectors: &[Vector3<f64>]) -> Vector3<f64> {
+    let second: Vec<Vector3<f64>> =
+        vectors.windows(3).map(|three| (three[0] - three[1] * 2.0 + three[2]).map(|entry| entry * entry)).collect();
+    (mean(&second) / 6.0).map(f64::sqrt)
+}
+
+/// Slope and standard error of `y` over `x` by least squares; zeros for fewer than three points.
+pub(super) fn slope(points: &[(f64, f64)]) -> (f64, f64) {
+    let count = points.len() as f64;
+    if count < 3.0 {
+        return (0.0, 0.0);
+    }
+    let mean_x = points.iter().map(|(x, _)| x).sum::<f64>() / count;
+    let mean_y = points.iter().map(|(_, y)| y).sum::<f64>() / count;
+    let spread = points.iter().map(|(x, _)| (x - mean_x).powi(2)).sum::<f64>();
+    let slope = points.iter().map(|(x, y)| (x - mean_x) * (y - mean_y)).sum::<f64>() / spread.max(f64::MIN_POSITIVE);
+    let rest = points.iter().map(|(x, y)| (y - mean_y - slope * (x - mean_x)).powi(2)).sum::<f64>();
+    (slope, (rest / (count - 2.0) / spread.max(f64::MIN_POSITIVE)).sqrt())
+}

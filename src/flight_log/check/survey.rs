@@ -1,0 +1,179 @@
+use std::collections::BTreeMap;
+
+use super::super::container::DecodedBlock;
+use super::super::messages::{self, MessageKind};
+use super::super::picture::decode_picture;
+use super::super::{FlightLog, ImuSample, Rig};
+use super::images::{ImageMeasure, measure};
+use super::statistics::median;
+use crate::geometry::seconds_from_ns;
+
+/// So many images of each camera are decoded, spread evenly over the log.
+const IMAGES_LOOKED_AT: u64 = 60;
+
+/// Both times of a message since the log began.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Times {
+    pub(super) log_time_ns: i64,
+    pub(super) stamp_ns: i64,
+}
+
+/// The times of one topic in the order of log times.
+#[derive(Clone, Debug, Default)]
+pub(super) struct TopicSurvey {
+    pub(super) topic: String,
+    pub(super) times: Vec<Times>,
+    /// Messages that cannot be decoded, and why the first one could not.
+    pub(super) unreadable: usize,
+    pub(super) first_problem: String,
+}
+
+impl TopicSurvey {
+    pub(super) fn stamp_range(&self) -> (i64, i64) {
+        let stamps = || self.times.iter().map(|times| times.stamp_ns);
+        (stamps().min().unwrap_or(0), stamps().max().unwrap_or(0))
+    }
+
+    pub(super) fn median_latency_s(&self) -> f64 {
+        let latencies: Vec<f64> =
+            self.times.iter().map(|times| seconds_from_ns(times.log_time_ns - times.stamp_ns)).collect();
+        median(&latencies)
+    }
+
+    fn refuse(&mut self, problem: String) {
+        self.unreadable += 1;
+        if self.first_problem.is_empty() {
+            self.first_problem = problem;
+        }
+    }
+}
+
+/// The joint angles of one message, `None` for a joint that it does not name.
+#[derive(Clone, Debug)]
+pub(super) struct JointAngles {
+    pub(super) stamp_ns: i64,
+    /// In the order of the rig's joints.
+    pub(super) angles_rad: Vec<Option<f64>>,
+}
+
+/// One image that was looked at.
+#[derive(Clone, Debug)]
+pub(super) struct ImageLook {
+    pub(super) stamp_ns: i64,
+    pub(super) measure: ImageMeasure,
+}
+
+/// What one pass through the log collects.
+#[derive(Debug, Default)]
+pub(super) struct Survey {
+    /// Topics that are read, by name.
+    pub(super) topics: BTreeMap<String, TopicSurvey>,
+    /// Topic of the IMU: the rig's, or the only one.
+    pub(super) imu_topic: Option<String>,
+    /// Its samples in the order of log times, numbers as they are.
+    pub(super) imu: Vec<ImuSample>,
+    /// The encoders' messages in the order of log times.
+    pub(super) joints: Vec<JointAngles>,
+    /// Names that the joint messages use.
+    pub(super) joint_names: Vec<String>,
+    /// Images by camera key.
+    pub(super) images: BTreeMap<String, Vec<ImageLook>>,
+    /// Damaged chunks, in words.
+    pub(super) damages: Vec<String>,
+}
+
+impl Survey {
+    /// Goes through the whole log once.
+    pub(super) fn of(log: &FlightLog, rig: Option<&Rig>) -> Self {
+        let mut survey = Self::default();
+        let imu_topics = log.topics_of(&[MessageKind::Imu]);
+        let named = rig.map(|rig| rig.imu.topic.clone()).filter(|topic| imu_topics.contains(topic));
+        survey.imu_topic = named.or_else(|| imu_topics.first().cloned());
+        let mut counts: BTreeMap<String, u64> = BTreeMap::new();
+        for block in &log.index().blocks {
+            let decoded = DecodedBlock::decode(log.file(), block);
+            if let Some(damage) = decoded.damage.as_ref().filter(|_| block.bytes.end <= log.file().len()) {
+                let (first, last) = block.log_time_ns;
+                survey.damages.push(format!(
+                    "chunk at byte {}, from second {:.3} to {:.3}: {damage}",
+                    block.bytes.start,
+                    seconds_from_ns(log.since_begin(first)),
+                    seconds_from_ns(log.since_begin(last))
+                ));
+            }
+            for message in &decoded.messages {
+                let Some(channel) = log.index().channels.get(&message.channel_id) else { continue };
+                let Some(info) = log.topic(&channel.topic) else { continue };
+                let Some(kind) = info.kind else { continue };
+                let number = counts.entry(info.topic.clone()).or_default();
+                let stride = info.count.div_ceil(IMAGES_LOOKED_AT).max(1);
+                let looked_at = number.is_multiple_of(stride);
+                *number += 1;
+                let data = decoded.bytes(log.file(), &message.data);
+                survey.take(log, rig, &info.topic, kind, log.since_begin(message.log_time_ns), data, looked_at);
+            }
+        }
+        for topic in survey.topics.values_mut() {
+            topic.times.sort_by_key(|times| times.log_time_ns);
+        }
+        survey
+    }
+
+    #[expect(clippy::too_many_arguments, reason = "what is known about one message, each once")]
+    fn take(
+        &mut self,
+        log: &FlightLog,
+        rig: Option<&Rig>,
+        topic: &str,
+        kind: MessageKind,
+        log_time_ns: i64,
+        data: &[u8],
+        looked_at: bool,
+    ) {
+        let entry = self
+            .topics
+            .entry(topic.to_owned())
+            .or_insert_with(|| TopicSurvey { topic: topic.to_owned(), ..TopicSurvey::default() });
+        let stamp_ns = match messages::header_stamp_ns(data) {
+            Ok(absolute_ns) => absolute_ns.saturating_sub(log.epoch_ns()),
+            Err(error) => return entry.refuse(error.to_string()),
+        };
+        entry.times.push(Times { log_time_ns, stamp_ns });
+        if kind == MessageKind::Imu && self.imu_topic.as_deref() == Some(topic) {
+            match messages::read_imu(data) {
+                Ok(imu) => self.imu.push(ImuSample {
+                    stamp_ns,
+                    angular_velocity_rad_per_s: imu.angular_velocity_rad_per_s,
+                    specific_force_m_per_s2: imu.specific_force_m_per_s2,
+                }),
+                Err(error) => entry.refuse(error.to_string()),
+            }
+        }
+        let Some(rig) = rig else { return };
+        if let Some(gimbal) = rig.gimbal.as_ref().filter(|gimbal| gimbal.topic.as_deref() == Some(topic)) {
+            match messages::read_joint_state(data) {
+                Ok(message) => {
+                    let angle = |name: &str| {
+                        let place = message.names.iter().position(|known| *known == name)?;
+                        message.positions_rad.get(place).copied()
+                    };
+                    let angles_rad = gimbal.joints.iter().map(|joint| angle(&joint.name)).collect();
+                    self.joints.push(JointAngles { stamp_ns, angles_rad });
+                    if self.joint_names.is_empty() {
+                        self.joint_names = message.names.iter().map(|name| (*name).to_owned()).collect();
+                    }
+                }
+                Err(error) => entry.refuse(error.to_string()),
+            }
+        }
+        if looked_at && let Some(camera) = rig.cameras.iter().find(|camera| camera.topic == topic && kind.is_image()) {
+            match decode_picture(kind, data) {
+                Ok(image) => {
+                    let look = ImageLook { stamp_ns, measure: measure(&image) };
+                    self.images.entry(camera.key.clone()).or_default().push(look);
+                }
+                Err(problem) => entry.refuse(problem),
+            }
+        }
+    }
+}

@@ -1,0 +1,448 @@
+use std::fmt::Write as _;
+use std::path::Path;
+
+use nalgebra::{UnitQuaternion, Vector3};
+use tempfile::TempDir;
+
+use super::super::{FlightLog, GrayImage, LogWriter, LogWriterOptions, MessageTimes, Rig};
+use super::{CheckReport, ImageRotation, Severity, check};
+use crate::camera::CameraModel;
+use crate::geometry::so3;
+
+const EPOCH_NS: i64 = 1_700_000_000_000_000_000;
+const MS: i64 = 1_000_000;
+const DURATION_MS: i64 = 12_000;
+const RATE_HZ: f64 = 200.0;
+const GYRO_DENSITY: f64 = 3.4e-4;
+const ACCEL_DENSITY: f64 = 0.004;
+
+/// Normal random numbers, always the same ones.
+struct Noise(u64);
+
+impl Noise {
+    fn uniform(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
+    }
+
+    fn vector(&mut self) -> Vector3<f64> {
+        Vector3::new(self.normal(), self.normal(), self.normal())
+    }
+}
+
+/// Angular velocity: still for 2.5 s, then turning about all axes.
+fn rate_at(time_s: f64) -> Vector3<f64> {
+    let t = (time_s - 2.5).max(0.0);
+    let grow = (t / 2.0).min(1.0);
+    Vector3::new((1.1 * t).sin(), 0.8 * (1.7 * t).sin(), 0.9 * (0.7 * t).sin()) * (0.5 * grow)
+}
+
+/// What is done to the sound flight; every part may be replaced.
+struct Flight {
+    imu: fn(i64, &mut MessageTimes, &mut Vector3<f64>, &mut Vector3<f64>) -> bool,
+    image: fn(i64, &mut MessageTimes, &mut GrayImage) -> bool,
+    joint: fn(i64, &mut f64),
+    rig: String,
+    camera_info: [f64; 4],
+}
+
+impl Default for Flight {
+    fn default() -> Self {
+        Self {
+            imu: |_, _, _, _| true,
+            image: |_, _, _| true,
+            joint: |_, _| {},
+            rig: rig_text(),
+            camera_info: [80.0, 80.0, 79.5, 59.5],
+        }
+    }
+}
+
+fn rig_text() -> String {
+    // The camera looks along the IMU's x axis, the IMU's z axis is up.
+    format!(
+        "rig_version: 1
+name: sound
+gravity: 9.81
+imu0: {{rostopic: /imu, update_rate: {RATE_HZ}, accelerometer_noise_density: {ACCEL_DENSITY}, accelerometer_random_walk: 0.006,
+       gyroscope_noise_density: {GYRO_DENSITY}, gyroscope_random_walk: 3.9e-5}}
+cam0:
+  mount: static
+  rostopic: /camera/image
+  update_rate: 20.0
+  camera_model: pinhole
+  intrinsics: [80.0, 80.0, 79.5, 59.5]
+  distortion_model: none
+  resolution: [160, 120]
+  timeshift_cam_imu: 0.0
+  T_cam_imu: [[0, -1, 0, 0], [0, 0, -1, 0.05], [1, 0, 0, -0.1], [0, 0, 0, 1]]
+gimbal:
+  rostopic: /joints
+  update_rate: 50.0
+  encoder_sigma: 0.0087
+  prior: {{translation_bound: 0.003, rotation_bound: 0.0087}}
+  T_I_B: [[1, 0, 0, 0.1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+  links:
+  - {{joint: yaw, theta_offset: 0, d: 0.046, a: 0.016, alpha: -1.55, limits: [-1.0, 1.0]}}
+  T_E_C: [[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0.2], [0, 0, 0, 1]]
+"
+    )
+}
+
+fn texture(shift: usize) -> GrayImage {
+    let (width, height) = (160, 120);
+    let pixel = |index: usize| {
+        let (column, row) = (index % width + shift, index / width);
+        if (column / 6 + row / 6) % 2 == 0 { 60 } else { 180 }
+    };
+    GrayImage { width, height, pixels: (0..width * height).map(pixel).collect() }
+}
+
+impl Flight {
+    fn write(&self, folder: &Path) -> FlightLog {
+        let path = folder.join("flight.mcap");
+        let mut writer = LogWriter::create(&path, &LogWriterOptions::default()).unwrap();
+        let mut noise = Noise(7);
+        let model = CameraModel::pinhole(self.camera_info, [160, 120]).unwrap();
+        for millisecond in 0..DURATION_MS {
+            let at = EPOCH_NS + millisecond * MS;
+            let times = MessageTimes { stamp_ns: at, log_time_ns: at + 2 * MS };
+            let time_s = millisecond as f64 * 1e-3;
+            if millisecond % 5 == 0 {
+                let sigma = RATE_HZ.sqrt();
+                let mut rate = rate_at(time_s) + noise.vector() * (GYRO_DENSITY * sigma);
+                let mut force =
+                    Vector3::new(0.3 * rate_at(time_s).x, 0.0, 9.81) + noise.vector() * (ACCEL_DENSITY * sigma);
+                let mut times = times;
+                if (self.imu)(millisecond, &mut times, &mut rate, &mut force) {
+                    writer.write_imu("/imu", "imu", times, &rate, &force).unwrap();
+                }
+            }
+            if millisecond % 20 == 1 {
+                let mut angle = 0.7 * (0.9 * time_s).sin() + 0.0087 * noise.normal();
+                (self.joint)(millisecond, &mut angle);
+                writer.write_joints("/joints", times, &["yaw".to_owned()], &[angle]).unwrap();
+            }
+            if millisecond % 50 == 10 {
+                let mut times = MessageTimes { log_time_ns: at + 18 * MS, ..times };
+                let mut image = texture(millisecond as usize / 50);
+                if (self.image)(millisecond, &mut times, &mut image) {
+                    let size = [image.width, image.height];
+                    writer.write_raw_image("/camera/image", "camera", times, size, "mono8", &image.pixels).unwrap();
+                }
+                writer.write_camera_info("/camera/camera_info", "camera", times, &model).unwrap();
+            }
+        }
+        writer.finish().unwrap();
+        FlightLog::open(&path).unwrap()
+    }
+
+    fn check(&self, rotations: &[ImageRotation]) -> CheckReport {
+        let folder = TempDir::new().unwrap();
+        let log = self.write(folder.path());
+        let rig = Rig::from_yaml(&self.rig, Path::new("test.rig.yaml"));
+        check(&log, rig.as_ref(), rotations)
+    }
+}
+
+/// A flight with a fault leads to exactly one finding above `Good` with these words beyond those of the sound flight.
+fn expect(flight: &Flight, severity: Severity, words: &[&str]) {
+    let report = flight.check(&[]);
+    let found: Vec<_> = report
+        .findings
+        .iter()
+        .filter(|finding| {
+            let text = format!("{} {} {}", finding.title, finding.evidence, finding.remedy);
+            finding.severity == severity && words.iter().all(|word| text.contains(word))
+        })
+        .collect();
+    assert_eq!(found.len(), 1, "{severity:?} {words:?} in\n{report}");
+}
+
+#[test]
+fn a_sound_flight_has_nothing_to_complain_about() {
+    let report = Flight::default().check(&[]);
+    assert_eq!(report.worst(), Severity::Note, "{report}");
+    let notes: Vec<&str> = report
+        .findings
+        .iter()
+        .filter(|finding| finding.severity == Severity::Note)
+        .map(|finding| finding.title.as_str())
+        .collect();
+    assert_eq!(notes, ["the vehicle stands still or hovers"], "{report}");
+    let still = report.findings.iter().find(|finding| finding.title.contains("still")).unwrap();
+    assert!(still.evidence.contains("0.0–2.5 s") || still.evidence.contains("0.0–3.0 s"), "{}", still.evidence);
+    assert_eq!(
+        report.topics.iter().map(|topic| topic.role.as_str()).collect::<Vec<_>>(),
+        ["intrinsics", "cam0", "imu0", "gimbal"]
+    );
+    let latency_s = report.topics[1].latency_s.unwrap();
+    assert!((latency_s - 0.018).abs() < 1e-9);
+    let json = serde_json::to_value(&report).unwrap();
+    assert_eq!(json["rig"], "sound");
+    assert_eq!(json["findings"][0]["severity"], "note");
+    let mut text = String::new();
+    write!(text, "{report}").unwrap();
+    assert!(text.contains("/camera/image") && text.contains("good    IMU"), "{text}");
+}
+
+#[test]
+fn inertial_faults_are_found() {
+    use Severity::{Error, Note, Warning};
+    let imu = |imu| Flight { imu, ..Flight::default() };
+    let rig = |from: &str, to: &str| {
+        assert!(rig_text().contains(from));
+        Flight { rig: rig_text().replace(from, to), ..Flight::default() }
+    };
+    expect(&imu(|_, _, _, force| scaled(force, 1.0 / 9.81)), Error, &["accelerations are in g"]);
+    expect(&imu(|_, _, _, force| scaled(force, 4.5)), Error, &["do not measure gravity", "44.1"]);
+    expect(&imu(|_, _, _, force| shifted(force, 0.5)), Note, &["large bias or scale error", "+0.5"]);
+    expect(&imu(|_, _, rate, _| scaled(rate, 180.0)), Error, &["look like degrees"]);
+    expect(&imu(|_, _, rate, _| shifted(rate, 0.05)), Note, &["gyroscope's bias is large", "+0.05"]);
+    let clip = |_: i64, _: &mut MessageTimes, rate: &mut Vector3<f64>, _: &mut Vector3<f64>| {
+        rate.x = (rate.x * 4.0).clamp(-1.5, 1.5);
+        true
+    };
+    expect(&imu(clip), Warning, &["the gyroscope saturates on x", "±1.5000 rad/s"]);
+    let nan = |ms: i64, _: &mut MessageTimes, rate: &mut Vector3<f64>, _: &mut Vector3<f64>| {
+        rate.y = if ms == 5000 { f64::NAN } else { rate.y };
+        true
+    };
+    expect(&imu(nan), Warning, &["not finite", "1 of 2400 samples, the first at 5.000 s"]);
+    expect(
+        &rig("gyroscope_noise_density: 0.00034", "gyroscope_noise_density: 3.4e-5"),
+        Warning,
+        &["gyroscope's noise is too small in the rig by 9.6"],
+    );
+    expect(
+        &rig("gyroscope_noise_density: 0.00034", "gyroscope_noise_density: 2.4e-5"),
+        Warning,
+        &["divided by √rate once too often"],
+    );
+    expect(
+        &rig("accelerometer_noise_density: 0.004", "accelerometer_noise_density: 0.0566"),
+        Note,
+        &["accelerometer's noise is 15 times too large", "it looks like the noise of one sample"],
+    );
+    expect(&rig("gravity: 9.81", "gravity: 9.6"), Warning, &["gravity is unusual"]);
+    // Vibration once the vehicle flies.
+    let vibrates = |ms: i64, _: &mut MessageTimes, _: &mut Vector3<f64>, force: &mut Vector3<f64>| {
+        force.z += if ms > 3000 && ms % 10 == 0 { 3.0 } else { 0.0 };
+        true
+    };
+    expect(&imu(vibrates), Note, &["the accelerometer vibrates in flight"]);
+}
+
+fn scaled(vector: &mut Vector3<f64>, factor: f64) -> bool {
+    *vector *= factor;
+    true
+}
+
+fn shifted(vector: &mut Vector3<f64>, shift: f64) -> bool {
+    vector.z += shift;
+    true
+}
+
+#[test]
+fn faults_of_time_are_found() {
+    use Severity::{Error, Warning};
+    let imu = |imu| Flight { imu, ..Flight::default() };
+    let image = |image| Flight { image, ..Flight::default() };
+    expect(
+        &image(|ms, _, _| !(4000..6000).contains(&ms)),
+        Warning,
+        &["cam0 has gaps", "the longest 2.050 s after 3.960 s", "about 40 of"],
+    );
+    let jump = |ms: i64, times: &mut MessageTimes, _: &mut Vector3<f64>, _: &mut Vector3<f64>| {
+        times.stamp_ns -= if ms == 6000 { 500 * MS } else { 0 };
+        true
+    };
+    expect(&imu(jump), Error, &["stamps of imu0 run backwards", "the deepest by 0.495 s"]);
+    let repeat = |ms: i64, times: &mut MessageTimes, _: &mut Vector3<f64>, _: &mut Vector3<f64>| {
+        times.stamp_ns -= if ms == 6000 { 5 * MS } else { 0 };
+        true
+    };
+    expect(&imu(repeat), Warning, &["stamps of imu0 repeat", "1 of 2399"]);
+    let scatter = |ms: i64, times: &mut MessageTimes, _: &mut Vector3<f64>, _: &mut Vector3<f64>| {
+        times.stamp_ns += if ms / 5 % 3 == 0 { 3 * MS } else { 0 };
+        true
+    };
+    expect(&imu(scatter), Warning, &["stamps of imu0 scatter"]);
+    expect(
+        &imu(|ms, _, _, _| ms % 10 == 0),
+        Warning,
+        &["imu0 runs at another rate", "100.0 Hz measured, 200.0 Hz in the rig"],
+    );
+    let late = |_: i64, times: &mut MessageTimes, _: &mut GrayImage| {
+        times.stamp_ns -= 1000 * MS;
+        true
+    };
+    expect(&image(late), Error, &["cam0 and imu0 are stamped by different clocks", "cam0 1018.0 ms"]);
+    let drift = |ms: i64, times: &mut MessageTimes, _: &mut GrayImage| {
+        times.stamp_ns -= ms * MS / 1000;
+        true
+    };
+    expect(&image(drift), Warning, &["the clock of cam0 drifts", "ppm"]);
+    let future = |_: i64, times: &mut MessageTimes, _: &mut GrayImage| {
+        times.stamp_ns += 50 * MS;
+        true
+    };
+    expect(&image(future), Warning, &["stamps of cam0 lie in the future", "the median by 0.032 s"]);
+}
+
+#[test]
+fn faults_of_images_and_lenses_are_found() {
+    use Severity::{Error, Note, Warning};
+    let image = |image| Flight { image, ..Flight::default() };
+    let rig = |from: &str, to: &str| {
+        assert!(rig_text().contains(from));
+        Flight { rig: rig_text().replace(from, to), ..Flight::default() }
+    };
+    expect(
+        &rig("resolution: [160, 120]", "resolution: [320, 240]"),
+        Error,
+        &["cam0 has another size", "160×120 in", "scaled by 0.500"],
+    );
+    expect(
+        &rig("[80.0, 80.0, 79.5, 59.5]", "[160.0, 160.0, 159.5, 119.5]"),
+        Error,
+        &["principal point of cam0", "1.99 times as large"],
+    );
+    expect(&rig("[80.0, 80.0, 79.5, 59.5]", "[80.0, 120.0, 79.5, 59.5]"), Warning, &["focal lengths of cam0 differ"]);
+    expect(
+        &rig("[80.0, 80.0, 79.5, 59.5]", "[3000.0, 3000.0, 79.5, 59.5]"),
+        Warning,
+        &["field of view of cam0 is unusual"],
+    );
+    expect(
+        &Flight { camera_info: [90.0, 90.0, 79.5, 59.5], ..Flight::default() },
+        Warning,
+        &["CameraInfo contradicts the rig for cam0"],
+    );
+    let blur = |ms: i64, _: &mut MessageTimes, image: &mut GrayImage| {
+        if ms > 10_000 {
+            let sharp = image.pixels.clone();
+            for index in 0..sharp.len() {
+                let from = index.saturating_sub(4);
+                let part = &sharp[from..(index + 5).min(sharp.len())];
+                image.pixels[index] = (part.iter().map(|value| usize::from(*value)).sum::<usize>() / part.len()) as u8;
+            }
+            for column in 0..160 {
+                for row in 4..116 {
+                    let sum: usize = (row - 4..row + 5).map(|row| usize::from(image.pixels[row * 160 + column])).sum();
+                    image.pixels[row * 160 + column] = (sum / 9) as u8;
+                }
+            }
+        }
+        true
+    };
+    expect(&image(blur), Warning, &["some images of cam0 are blurred", "10."]);
+    let dark = |_: i64, _: &mut MessageTimes, image: &mut GrayImage| {
+        image.pixels.iter_mut().for_each(|pixel| *pixel /= 12);
+        true
+    };
+    expect(&image(dark), Warning, &["cam0 is underexposed"]);
+    expect(&image(dark), Warning, &["the images of cam0 are soft throughout"]);
+    expect(&image(dark), Warning, &["cam0 sees little texture at times"]);
+    let bright = |_: i64, _: &mut MessageTimes, image: &mut GrayImage| {
+        image.pixels.iter_mut().for_each(|pixel| *pixel = pixel.saturating_add(150));
+        true
+    };
+    expect(&image(bright), Warning, &["cam0 is overexposed"]);
+    expect(&rig("update_rate: 20.0", "update_rate: 2.0"), Note, &["cam0 turns fast"]);
+}
+
+#[test]
+fn faults_of_the_gimbal_and_the_extrinsics_are_found() {
+    use Severity::{Error, Note, Warning};
+    let joint = |joint| Flight { joint, ..Flight::default() };
+    let rig = |from: &str, to: &str| {
+        assert!(rig_text().contains(from));
+        Flight { rig: rig_text().replace(from, to), ..Flight::default() }
+    };
+    expect(&joint(|_, angle| *angle = 0.3), Warning, &["'yaw' hardly moves"]);
+    expect(&joint(|_, angle| *angle = angle.to_degrees()), Error, &["'yaw' looks like degrees"]);
+    expect(&joint(|_, angle| *angle *= 2.0), Warning, &["'yaw' goes beyond its stops"]);
+    expect(&joint(|_, angle| *angle = (*angle * 2.0).clamp(-1.0, 1.0)), Note, &["'yaw' meets its stop", "%"]);
+    expect(&rig("encoder_sigma: 0.0087", "encoder_sigma: 0.002"), Warning, &["noisier than the rig says by 4."]);
+    expect(&rig("encoder_sigma: 0.0087", "encoder_sigma: 0.1"), Note, &["scatters less than the rig says"]);
+    expect(&rig("encoder_sigma: 0.0087", "encoder_sigma: null"), Note, &["encoders are not used"]);
+    expect(&rig("joint: yaw", "joint: pan"), Error, &["joint 'pan' is not in the messages", "name yaw"]);
+    expect(
+        &rig("rostopic: /joints", "rostopic: /gone"),
+        Error,
+        &["gimbal.rostopic names a topic that the log lacks", "'/joints'"],
+    );
+    expect(&rig("translation_bound: 0.003", "translation_bound: 0.0"), Note, &["leaves it no room"]);
+    expect(&rig("d: 0.046", "d: 46.0"), Warning, &["the gimbal's chain is long"]);
+    // The matrix the other way round: a camera that looks along x becomes one that looks along the IMU's −y, image up.
+    expect(
+        &rig(
+            "[[0, -1, 0, 0], [0, 0, -1, 0.05], [1, 0, 0, -0.1], [0, 0, 0, 1]]",
+            "[[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]]",
+        ),
+        Error,
+        &["the extrinsics of cam0 look inverted"],
+    );
+    expect(
+        &rig(
+            "[[0, -1, 0, 0], [0, 0, -1, 0.05], [1, 0, 0, -0.1], [0, 0, 0, 1]]",
+            "[[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]",
+        ),
+        Warning,
+        &["the rotation of cam0 is the identity"],
+    );
+}
+
+#[test]
+fn a_log_without_a_rig_is_checked_all_the_same() {
+    let flight = Flight { rig: "rig_version: 1\n".into(), ..Flight::default() };
+    expect(&flight, Severity::Error, &["there is no rig that can be used", "gravity: missing"]);
+    let report = flight.check(&[]);
+    assert!(report.findings.iter().any(|finding| finding.title == "the accelerometer measures gravity"), "{report}");
+}
+
+/// Image rotations of the true motion with the images late by so much and the camera turned by `error`.
+fn rotations(late_s: f64, error: UnitQuaternion<f64>) -> Vec<ImageRotation> {
+    let camera_from_imu = {
+        let columns = nalgebra::Matrix3::new(0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0);
+        error * UnitQuaternion::from_matrix(&columns)
+    };
+    let turn = |from_s: f64| {
+        let mut turn = UnitQuaternion::identity();
+        for step in 0..500 {
+            turn *= so3::exp(&(rate_at(from_s + (f64::from(step) + 0.5) * 1e-4) * 1e-4));
+        }
+        turn
+    };
+    (60..200)
+        .map(|number| {
+            let from_s = f64::from(number) * 0.05;
+            let second_from_first = camera_from_imu * turn(from_s + late_s).inverse() * camera_from_imu.inverse();
+            let from_ns = i64::from(number) * 50 * MS;
+            ImageRotation { camera_key: "cam0".into(), from_ns, to_ns: from_ns + 50 * MS, second_from_first }
+        })
+        .collect()
+}
+
+#[test]
+fn image_rotations_tell_offsets_and_wrong_extrinsics() {
+    let check = |late_s: f64, error: Vector3<f64>, words: &[&str], severity: Severity| {
+        let report = Flight::default().check(&rotations(late_s, so3::exp(&error)));
+        let found = report.findings.iter().filter(|finding| {
+            finding.severity == severity
+                && words.iter().all(|word| format!("{} {}", finding.title, finding.remedy).contains(word))
+        });
+        assert_eq!(found.count(), 1, "{words:?} in\n{report}");
+    };
+    check(0.0, Vector3::zeros(), &["cam0 points where the rig says"], Severity::Good);
+    check(0.0, Vector3::zeros(), &["cam0 and the gyroscope turn at the same time"], Severity::Good);
+    check(0.03, Vector3::zeros(), &["cam0 and the gyroscope are +30 ms apart", "to +0.030"], Severity::Warning);
+    check(0.03, Vector3::zeros(), &["cam0 points where the rig says"], Severity::Good);
+    check(0.0, Vector3::new(0.0, 0.2, 0.0), &["cam0 does not point where the rig says"], Severity::Warning);
+    check(-0.05, Vector3::new(1.5, 0.0, 0.0), &["cam0 does not point where the rig says"], Severity::Error);
+}

@@ -1,0 +1,233 @@
+use super::super::Rig;
+use super::statistics::{median, percentile, slope};
+use super::survey::{Survey, TopicSurvey};
+use super::{Area, Findings, Severity};
+use crate::geometry::seconds_from_ns;
+
+/// Rates further than this share from the rig's are told.
+const RATE_TOLERANCE: f64 = 0.05;
+/// Stamps that scatter more than this share of the period are told.
+const JITTER_TOLERANCE: f64 = 0.2;
+/// Header stamps of different topics whose distance from the log times differs by more come from different clocks.
+const CLOCK_TOLERANCE_S: f64 = 0.2;
+/// Clock drift is told from this much over the log.
+const DRIFT_TOLERANCE_S: f64 = 0.005;
+/// A stream that begins later or ends earlier than the IMU by more is told.
+const OVERLAP_TOLERANCE_S: f64 = 1.0;
+
+/// Rates, gaps, order and clocks of every topic that is used.
+pub(super) fn check_timing(survey: &Survey, rig: Option<&Rig>, findings: &mut Findings) {
+    let used = used_topics(survey, rig);
+    let mut sound = Vec::new();
+    for (role, topic, nominal_hz, sparse) in &used {
+        let before = findings.list.len();
+        check_order_and_gaps(role, topic, *sparse, findings);
+        check_rate(role, topic, *nominal_hz, findings);
+        check_latency(role, topic, findings);
+        if findings.list.len() == before {
+            sound.push(format!("{role} {:.1} Hz", 1.0 / period_s(topic).max(f64::MIN_POSITIVE)));
+        }
+    }
+    if !sound.is_empty() {
+        findings.good(Area::Time, "stamps come in order, without gaps, at the rate of the rig", sound.join(", "));
+    }
+    check_clocks(&used, findings);
+    check_overlap(&used, findings);
+}
+
+/// Role, times, the rig's rate, and whether one lost message counts as a gap (images).
+type Used<'a> = (String, &'a TopicSurvey, Option<f64>, bool);
+
+fn used_topics<'a>(survey: &'a Survey, rig: Option<&Rig>) -> Vec<Used<'a>> {
+    let mut used: Vec<Used<'a>> = Vec::new();
+    let mut add = |role: String, topic: Option<&str>, nominal_hz: Option<f64>, sparse: bool| {
+        if let Some(topic) = topic.and_then(|topic| survey.topics.get(topic)).filter(|topic| topic.times.len() > 2) {
+            used.push((role, topic, nominal_hz, sparse));
+        }
+    };
+    add("imu0".into(), survey.imu_topic.as_deref(), rig.map(|rig| rig.imu.rate_hz), false);
+    let Some(rig) = rig else { return used };
+    for camera in &rig.cameras {
+        add(camera.key.clone(), Some(&camera.topic), Some(camera.rate_hz), true);
+    }
+    if let Some(gimbal) = &rig.gimbal {
+        add("gimbal".into(), gimbal.topic.as_deref(), Some(gimbal.rate_hz), false);
+    }
+    add("ground truth".into(), rig.ground_truth_topic.as_deref(), None, false);
+    used
+}
+
+/// Median distance of neighbouring header stamps.
+fn period_s(topic: &TopicSurvey) -> f64 {
+    median(&steps_s(topic))
+}
+
+fn steps_s(topic: &TopicSurvey) -> Vec<f64> {
+    topic.times.windows(2).map(|pair| seconds_from_ns(pair[1].stamp_ns - pair[0].stamp_ns)).collect()
+}
+
+fn check_order_and_gaps(role: &str, topic: &TopicSurvey, sparse: bool, findings: &mut Findings) {
+    let steps = steps_s(topic);
+    let period = median(&steps);
+    let at = |index: usize| seconds_from_ns(topic.times[index].stamp_ns);
+    let backwards: Vec<usize> = (0..steps.len()).filter(|index| steps[*index] < 0.0).collect();
+    if let Some(first) = backwards.first() {
+        let deepest = steps.iter().copied().fold(0.0, f64::min);
+        let evidence = format!(
+            "{} of {} steps go back, the first after {:.3} s, the deepest by {:.3} s",
+            backwards.len(),
+            steps.len(),
+            at(*first),
+            -deepest
+        );
+        let severity =
+            if deepest < -0.1 || backwards.len() * 100 > steps.len() { Severity::Error } else { Severity::Warning };
+        let remedy = "look at how the driver stamps; samples up to 0.1 s late are put in order, others are dropped";
+        findings.add(severity, Area::Time, format!("stamps of {role} run backwards"), evidence, remedy);
+    }
+    let repeats = steps.iter().filter(|step| **step == 0.0).count();
+    if repeats > 0 {
+        let evidence = format!("{repeats} of {} stamps equal the one before", steps.len());
+        let remedy = "the driver or a relay sends messages twice; repeats are dropped";
+        findings.add(Severity::Warning, Area::Time, format!("stamps of {role} repeat"), evidence, remedy);
+    }
+    let limit = if sparse { 1.75 * period } else { 2.5 * period };
+    let gaps: Vec<usize> = (0..steps.len()).filter(|index| period > 0.0 && steps[*index] > limit).collect();
+    if let Some(longest) = gaps.iter().copied().max_by(|a, b| steps[*a].total_cmp(&steps[*b])) {
+        let lost: f64 = gaps.iter().map(|index| (steps[*index] / period).round() - 1.0).sum();
+        let evidence = format!(
+            "{} gaps, the longest {:.3} s after {:.3} s; about {lost:.0} of {} messages are missing",
+            gaps.len(),
+            steps[longest],
+            at(longest),
+            lost + topic.times.len() as f64
+        );
+        let severity = if lost > 0.01 * topic.times.len() as f64 || steps[longest] > 0.5 {
+            Severity::Warning
+        } else {
+            Severity::Note
+        };
+        let remedy =
+            "record with less load or a larger buffer; over a gap the IMU is interpolated and features are lost";
+        findings.add(severity, Area::Time, format!("{role} has gaps"), evidence, remedy);
+    }
+    let scatter: Vec<f64> = steps.iter().map(|step| (step - period).abs()).collect();
+    let jitter = percentile(&scatter, 0.95);
+    if period > 0.0 && jitter > JITTER_TOLERANCE * period {
+        let evidence =
+            format!("5 % of the steps differ from {:.3} ms by more than {:.3} ms", period * 1e3, jitter * 1e3);
+        let severity = if jitter > 0.5 * period { Severity::Warning } else { Severity::Note };
+        let remedy = "these look like times of arrival; stamp in the driver, from the sensor's own clock or trigger";
+        findings.add(severity, Area::Time, format!("stamps of {role} scatter"), evidence, remedy);
+    }
+}
+
+fn check_rate(role: &str, topic: &TopicSurvey, nominal_hz: Option<f64>, findings: &mut Findings) {
+    let measured_hz = 1.0 / period_s(topic).max(f64::MIN_POSITIVE);
+    if let Some(nominal_hz) = nominal_hz.filter(|rate| *rate > 0.0)
+        && (measured_hz / nominal_hz - 1.0).abs() > RATE_TOLERANCE
+    {
+        let evidence = format!("{measured_hz:.1} Hz measured, {nominal_hz:.1} Hz in the rig");
+        let remedy = format!("set {role}.update_rate; where noise was given per sample, convert it with the true rate");
+        findings.add(
+            Severity::Warning,
+            Area::Time,
+            format!("{role} runs at another rate than the rig says"),
+            evidence,
+            remedy,
+        );
+    }
+    let slowest_hz = match role {
+        "imu0" => 100.0,
+        _ if role.starts_with("cam") => 5.0,
+        _ => return,
+    };
+    if measured_hz < 0.95 * slowest_hz {
+        let evidence = format!("{measured_hz:.1} Hz, usually at least {slowest_hz:.0} Hz");
+        let remedy = "record faster; between samples the motion is taken as smooth";
+        findings.add(Severity::Warning, Area::Time, format!("{role} is slow"), evidence, remedy);
+    }
+}
+
+fn check_latency(role: &str, topic: &TopicSurvey, findings: &mut Findings) {
+    let points: Vec<(f64, f64)> = topic
+        .times
+        .iter()
+        .map(|times| (seconds_from_ns(times.stamp_ns), seconds_from_ns(times.log_time_ns - times.stamp_ns)))
+        .collect();
+    let latencies: Vec<f64> = points.iter().map(|point| point.1).collect();
+    let early = latencies.iter().filter(|latency| **latency < -1e-3).count();
+    if early * 20 > latencies.len() {
+        let evidence = format!(
+            "{early} of {} messages were logged before their stamp, the median by {:.3} s",
+            latencies.len(),
+            -median(&latencies)
+        );
+        let remedy =
+            "the sensor's clock runs ahead of the recorder's: synchronize them (PTP, chrony), or expect a time offset";
+        findings.add(Severity::Warning, Area::Time, format!("stamps of {role} lie in the future"), evidence, remedy);
+    }
+    let (drift, error) = slope(&points);
+    let length_s = points.last().map_or(0.0, |last| last.0) - points.first().map_or(0.0, |first| first.0);
+    if (drift * length_s).abs() > DRIFT_TOLERANCE_S && drift.abs() > 6.0 * error {
+        let evidence = format!(
+            "log time minus stamp changes by {:.1} ms over {length_s:.1} s ({:.0} ppm ± {:.0})",
+            drift * length_s * 1e3,
+            drift * 1e6,
+            error * 1e6
+        );
+        let remedy = "two clocks are at work: synchronize them, or stamp all sensors with one";
+        findings.add(Severity::Warning, Area::Time, format!("the clock of {role} drifts"), evidence, remedy);
+    }
+}
+
+fn check_clocks(used: &[Used<'_>], findings: &mut Findings) {
+    let latencies: Vec<(&str, f64)> =
+        used.iter().map(|(role, topic, _, _)| (role.as_str(), topic.median_latency_s())).collect();
+    let Some((_, reference)) = latencies.first().copied() else { return };
+    let listed: Vec<String> =
+        latencies.iter().map(|(role, latency)| format!("{role} {:.1} ms", latency * 1e3)).collect();
+    let evidence = format!("median of log time minus stamp: {}", listed.join(", "));
+    let apart: Vec<&str> = latencies
+        .iter()
+        .filter(|(_, latency)| (latency - reference).abs() > CLOCK_TOLERANCE_S)
+        .map(|(role, _)| *role)
+        .collect();
+    if !apart.is_empty() {
+        let title = format!("{} and imu0 are stamped by different clocks", apart.join(", "));
+        let remedy = "stamp all sensors with one clock, or give timeshift_cam_imu";
+        return findings.add(Severity::Error, Area::Time, title, evidence, remedy);
+    }
+    let arrival =
+        |topic: &TopicSurvey| topic.times.iter().all(|times| (times.log_time_ns - times.stamp_ns).abs() < 1000);
+    if used.len() > 1 && used.iter().all(|(_, topic, _, _)| arrival(topic)) {
+        let remedy = "if the driver stamps on arrival, calibrate timeshift_cam_imu; a converted log is fine";
+        let title = "log times equal the header stamps: nothing tells when messages arrived";
+        return findings.add(Severity::Note, Area::Time, title, evidence, remedy);
+    }
+    findings.good(Area::Time, "all sensors seem to be stamped by one clock", evidence);
+}
+
+fn check_overlap(used: &[Used<'_>], findings: &mut Findings) {
+    let Some((_, imu, _, _)) = used.iter().find(|(role, ..)| role == "imu0") else { return };
+    let (imu_first, imu_last) = imu.stamp_range();
+    for (role, topic, _, _) in used.iter().filter(|(role, ..)| role != "imu0") {
+        let (first, last) = topic.stamp_range();
+        let (late_s, early_s) = (seconds_from_ns(first - imu_first), seconds_from_ns(imu_last - last));
+        let outside_s = (-late_s).max(-early_s);
+        let evidence = format!(
+            "{role} from {:.3} to {:.3} s, the IMU from {:.3} to {:.3} s",
+            seconds_from_ns(first),
+            seconds_from_ns(last),
+            seconds_from_ns(imu_first),
+            seconds_from_ns(imu_last)
+        );
+        if outside_s > OVERLAP_TOLERANCE_S && role.starts_with("cam") {
+            let title = format!("{role} reaches beyond the IMU");
+            findings.add(Severity::Warning, Area::Time, title, evidence, "images without IMU samples are not used");
+        } else if late_s.max(early_s) > OVERLAP_TOLERANCE_S {
+            let title = format!("{role} covers only part of the log");
+            findings.add(Severity::Note, Area::Time, title, evidence, "");
+        }
+    }
+}
