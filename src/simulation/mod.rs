@@ -9,6 +9,7 @@ mod experiment;
 mod gimbal;
 mod inertial;
 mod random;
+mod render;
 mod route;
 mod scenario;
 mod spline;
@@ -16,6 +17,7 @@ mod synthetic;
 #[cfg(test)]
 mod tests;
 mod trajectory;
+mod world;
 
 pub use equipment::Lens;
 pub use experiment::{Environment, Experiment};

@@ -1,0 +1,14 @@
+//! Pictures of a world without a driver: z-buffered faces, four samples per pixel at edges, filtered textures, shadows.
+//!
+//! Faces are first rasterized to a buffer of face numbers at twice the resolution; then every pixel is shaded once, or
+//! once per face where several meet, so that edges are smooth and textures cost no more than what is seen.
+
+mod raster;
+mod sensor;
+mod shade;
+mod shadow;
+mod view;
+
+pub(crate) use sensor::{Sensor, SensorOptions};
+pub(crate) use shade::Renderer;
+pub(crate) use view::{View, Workspace};

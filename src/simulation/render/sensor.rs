@@ -1,0 +1,60 @@
+use super::view::View;
+use crate::flight_log::GrayImage;
+use crate::simulation::random::mix;
+
+/// What a camera's sensor does to the light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct SensorOptions {
+    /// Standard deviation of the noise in grey values.
+    pub(crate) noise: f64,
+    /// How far the exposure drifts, as a share of its mean.
+    pub(crate) exposure_drift: f64,
+    /// How much darker the farthest corner is, as a share.
+    pub(crate) vignetting: f64,
+}
+
+/// A sensor: exposure that drifts slowly, corners darker than the middle, noise on every pixel.
+#[derive(Clone, Debug)]
+pub(crate) struct Sensor {
+    options: SensorOptions,
+    width: usize,
+    height: usize,
+    shading: Vec<f32>,
+    seed: u64,
+}
+
+impl Sensor {
+    /// A sensor whose noise is a function of this seed, the frame's number and the pixel.
+    pub(crate) fn new(view: &View, options: SensorOptions, seed: u64) -> Self {
+        let half = [0.5 * view.width as f64, 0.5 * view.height as f64];
+        let corner = half[0] * half[0] + half[1] * half[1];
+        let mut shading = Vec::with_capacity(view.pixels());
+        for row in 0..view.height {
+            for column in 0..view.width {
+                let (x, y) = (column as f64 + 0.5 - half[0], row as f64 + 0.5 - half[1]);
+                shading.push((1.0 - options.vignetting * (x * x + y * y) / corner) as f32);
+            }
+        }
+        Self { options, width: view.width, height: view.height, shading, seed }
+    }
+
+    /// Exposes a picture of linear grey values.
+    pub(crate) fn expose(&self, picture: &[f32], frame_index: usize, time_s: f64) -> GrayImage {
+        let phase = (self.seed % 628) as f64 * 0.01;
+        let gain =
+            1.0 + self.options.exposure_drift * (0.41 * time_s + phase).sin() * (0.173 * time_s + 2.0 * phase).cos();
+        let gain = gain as f32;
+        // The sum of four bytes is nearly normal; this is one over its standard deviation.
+        let noise = (self.options.noise / 147.8) as f32;
+        let key = mix(self.seed ^ (frame_index as u64).wrapping_mul(0xA24B_AED4_963E_E407));
+        let mut pixels = Vec::with_capacity(picture.len());
+        for (index, (value, shading)) in picture.iter().zip(&self.shading).enumerate() {
+            let word = mix(key.wrapping_add((index as u64) >> 1)) >> (32 * (index & 1));
+            let bytes = [word, word >> 8, word >> 16, word >> 24].map(|part| (part & 255) as i32);
+            let disturbance = (bytes.iter().sum::<i32>() - 510) as f32 * noise;
+            let grey = value * shading * gain + disturbance;
+            pixels.push((grey + 0.5).clamp(0.0, 255.0) as u8);
+        }
+        GrayImage { width: self.width, height: self.height, pixels }
+    }
+}

@@ -1,0 +1,138 @@
+use nalgebra::Vector2;
+
+use crate::camera::CameraModel;
+
+/// Samples per pixel along each axis.
+pub(super) const SAMPLES: usize = 2;
+
+/// Marks a pixel that the lens does not show.
+const DARK: f32 = f32::NAN;
+
+/// A camera prepared for rendering: the ray of every pixel and where its four samples lie in the sample grid.
+///
+/// The grid is that of a pinhole camera wide enough for all rays.
+#[derive(Clone, Debug)]
+pub(crate) struct View {
+    pub(super) width: usize,
+    pub(super) height: usize,
+    /// `x/z` and `y/z` per pixel; NaN where the lens shows nothing.
+    pub(super) rays: Vec<[f32; 2]>,
+    pub(super) grid: Grid,
+    /// Per pixel its samples' places in the grid; `None` when they simply are its 2 × 2 block.
+    pub(super) places: Option<Vec<[u32; SAMPLES * SAMPLES]>>,
+}
+
+/// The sample grid: sample `(i, j)` has the ray `(origin.x + i·step.x, origin.y + j·step.y, 1)`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Grid {
+    pub(super) columns: usize,
+    pub(super) rows: usize,
+    pub(super) origin: [f64; 2],
+    pub(super) step: [f64; 2],
+}
+
+/// The ray of a pixel and how it changes to the neighbours.
+#[derive(Clone, Copy)]
+pub(super) struct PixelRay {
+    pub(super) ray: [f32; 2],
+    pub(super) right: [f32; 2],
+    pub(super) down: [f32; 2],
+}
+
+/// Buffers that a thread keeps between pictures.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Workspace {
+    pub(super) inverse_depth: Vec<f32>,
+    pub(super) face: Vec<u32>,
+    pub(super) prepared: Vec<super::raster::Prepared>,
+    pub(super) outline: Vec<[f64; 2]>,
+}
+
+impl View {
+    /// Prepares a camera.
+    pub(crate) fn new(model: &CameraModel) -> Self {
+        let [width, height] = model.resolution_px;
+        let ray = |u: f64, v: f64| {
+            let bearing = model.unproject(&Vector2::new(u, v)).filter(|bearing| bearing.z > 0.05);
+            bearing.map(|bearing| [bearing.x / bearing.z, bearing.y / bearing.z])
+        };
+        let mut rays = Vec::with_capacity(width * height);
+        for row in 0..height {
+            for column in 0..width {
+                let ray = ray(column as f64, row as f64);
+                rays.push(ray.map_or([DARK; 2], |ray| ray.map(|component| component as f32)));
+            }
+        }
+        let regular = model.distortion == crate::camera::Distortion::None
+            && model.projection == crate::camera::Projection::Pinhole;
+        let [fx, fy, cx, cy] = model.intrinsics_px;
+        let offset = |index: usize| (index as f64 + 0.5) / SAMPLES as f64 - 0.5;
+        let step = [1.0 / (fx * SAMPLES as f64), 1.0 / (fy * SAMPLES as f64)];
+        if regular {
+            let origin = [(offset(0) - cx) / fx, (offset(0) - cy) / fy];
+            let grid = Grid { columns: width * SAMPLES, rows: height * SAMPLES, origin, step };
+            return Self { width, height, rays, grid, places: None };
+        }
+        let bound = |axis: usize, pick: fn(f64, f64) -> f64, start: f64| {
+            rays.iter().map(|ray| f64::from(ray[axis])).filter(|value| value.is_finite()).fold(start, pick)
+        };
+        let margin = 2.0;
+        let origin = [0, 1].map(|axis| bound(axis, f64::min, 0.0) - margin * step[axis]);
+        let end = [0, 1].map(|axis| bound(axis, f64::max, 0.0) + margin * step[axis]);
+        let count = [0, 1].map(|axis: usize| ((end[axis] - origin[axis]) / step[axis]).ceil() as usize + 1);
+        let grid = Grid { columns: count[0], rows: count[1], origin, step };
+        let mut view = Self { width, height, rays, grid, places: None };
+        let mut places = Vec::with_capacity(width * height);
+        for row in 0..height {
+            for column in 0..width {
+                let Some(PixelRay { ray, right, down }) = view.pixel_ray(column, row) else {
+                    places.push([0; SAMPLES * SAMPLES]);
+                    continue;
+                };
+                places.push(std::array::from_fn(|sample| {
+                    let (x, y) = (offset(sample % SAMPLES), offset(sample / SAMPLES));
+                    let within =
+                        |axis: usize| f64::from(ray[axis]) + x * f64::from(right[axis]) + y * f64::from(down[axis]);
+                    grid.nearest([within(0), within(1)])
+                }));
+            }
+        }
+        view.places = Some(places);
+        view
+    }
+
+    /// The ray of a pixel with its differences to the neighbours; `None` where the lens shows nothing.
+    pub(super) fn pixel_ray(&self, column: usize, row: usize) -> Option<PixelRay> {
+        let at = |x: usize, y: usize| self.rays[y * self.width + x];
+        let ray = at(column, row);
+        let difference = |to: [f32; 2], from: [f32; 2]| [to[0] - from[0], to[1] - from[1]];
+        let right = if column + 1 < self.width {
+            difference(at(column + 1, row), ray)
+        } else {
+            difference(ray, at(column.saturating_sub(1), row))
+        };
+        let down = if row + 1 < self.height {
+            difference(at(column, row + 1), ray)
+        } else {
+            difference(ray, at(column, row.saturating_sub(1)))
+        };
+        let seen = ray[0].is_finite() && right[0].is_finite() && down[0].is_finite();
+        seen.then_some(PixelRay { ray, right, down })
+    }
+
+    /// Number of pixels.
+    pub(crate) fn pixels(&self) -> usize {
+        self.width * self.height
+    }
+}
+
+impl Grid {
+    /// The place of the sample nearest to a ray.
+    fn nearest(&self, ray: [f64; 2]) -> u32 {
+        let index = |axis: usize, count: usize| {
+            let place = ((ray[axis] - self.origin[axis]) / self.step[axis]).round().max(0.0) as usize;
+            place.min(count - 1)
+        };
+        (index(1, self.rows) * self.columns + index(0, self.columns)) as u32
+    }
+}

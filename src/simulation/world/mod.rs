@@ -1,0 +1,24 @@
+//! The worlds that experiments fly through, built from painted surfaces.
+
+mod canvas;
+mod facade;
+mod furniture;
+mod house;
+mod landscape;
+mod mesh;
+mod surface;
+mod texture;
+mod town;
+
+pub(crate) use mesh::{Affine, World};
+pub(crate) use texture::Texture;
+
+use super::experiment::Environment;
+
+/// Builds a world; its looks follow from the seed, its plan does not.
+pub(crate) fn build(environment: Environment, seed: u64) -> World {
+    match environment {
+        Environment::House => house::build(seed),
+        Environment::Town => town::build(seed),
+    }
+}
