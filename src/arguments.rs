@@ -25,6 +25,10 @@ pub enum Command {
     /// Draw one panel at one instant into a PNG, without a display.
     #[cfg(feature = "gui")]
     Screenshot(ScreenshotArguments),
+    /// Say what is in a log and what is wrong with it, before anyone trusts a result.
+    Check(CheckArguments),
+    /// Write a synthetic flight with known truth: the log, its rig and its truth.
+    Simulate(SimulateArguments),
     /// Compare a trajectory with a reference: absolute and relative errors, as evo computes them.
     Evaluate(EvaluateArguments),
 }
@@ -145,6 +149,61 @@ pub enum RendererArgument {
     Wgpu,
 }
 
+/// `dcvins check`.
+#[derive(Args, Clone, Debug)]
+pub struct CheckArguments {
+    /// The log.
+    pub log: PathBuf,
+    /// The rig, when it is not beside the log or attached to it.
+    #[arg(long, value_name = "FILE")]
+    pub rig: Option<PathBuf>,
+    /// Print the findings as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `dcvins simulate`.
+#[derive(Args, Clone, Debug)]
+pub struct SimulateArguments {
+    /// The paper's experiment: T1, T2, T3 or T4.
+    #[arg(value_name = "EXPERIMENT", ignore_case = true)]
+    pub experiment: ExperimentArgument,
+    /// The log to write; its rig and truth get the same name with .rig.yaml and .truth.yaml.
+    #[arg(short, long, value_name = "LOG.mcap")]
+    pub output: PathBuf,
+    /// Seed of every random number.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Length of the flight [default: the experiment's].
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    pub duration: Option<f64>,
+    /// Standard deviation of the encoders in degrees, or none [default: the experiment's].
+    #[arg(long, value_name = "D|none", value_parser = encoder_sigma)]
+    pub encoder_sigma_deg: Option<EncoderArgument>,
+}
+
+/// Names of the experiments.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ExperimentArgument {
+    /// The paper's T1.
+    T1,
+    /// The paper's T2.
+    T2,
+    /// The paper's T3.
+    T3,
+    /// The paper's T4.
+    T4,
+}
+
+/// What `--encoder-sigma-deg` may say.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum EncoderArgument {
+    /// No encoders in the log.
+    None,
+    /// White noise of this standard deviation, in degrees.
+    Sigma(f64),
+}
+
 /// `dcvins evaluate`.
 #[derive(Args, Clone, Debug)]
 pub struct EvaluateArguments {
@@ -206,6 +265,14 @@ fn size(text: &str) -> Result<[usize; 2], String> {
     let parse = |side: &str| side.parse::<usize>().ok().filter(|side| (64..=8192).contains(side));
     let sides = text.split_once('x').and_then(|(width, height)| Some([parse(width)?, parse(height)?]));
     sides.ok_or_else(|| "expected WIDTHxHEIGHT, each from 64 to 8192, as in 1920x1080".to_owned())
+}
+
+fn encoder_sigma(text: &str) -> Result<EncoderArgument, String> {
+    if text == "none" {
+        return Ok(EncoderArgument::None);
+    }
+    let value = text.parse::<f64>().ok().filter(|value| value.is_finite() && *value > 0.0);
+    value.map(EncoderArgument::Sigma).ok_or_else(|| "expected degrees, a number above 0, or none".to_owned())
 }
 
 fn delta(text: &str) -> Result<RelativeDelta, String> {

@@ -7,10 +7,15 @@ use std::sync::Arc;
 
 use anyhow::{Context as _, Result, bail};
 use dcvins::export::{self, EvaluationOptions, RunFileOptions, RunSummary};
+use dcvins::flight_log::{self, FlightLog, Rig};
 use dcvins::geometry::seconds_from_ns;
 use dcvins::session::{self, Recording, SessionPlan, SessionRequest, Stopwatch};
+use dcvins::simulation::{self, Experiment, SimulationOptions};
 
-use crate::arguments::{EvaluateArguments, RunArguments, ViewArguments};
+use crate::arguments::{
+    CheckArguments, EncoderArgument, EvaluateArguments, ExperimentArgument, RunArguments, SimulateArguments,
+    ViewArguments,
+};
 
 /// Least time between two drawings of the progress bar.
 const PROGRESS_PERIOD_MS: f64 = 100.0;
@@ -268,4 +273,48 @@ pub fn screenshot(arguments: &crate::arguments::ScreenshotArguments) -> Result<(
     };
     let picture = draw_panel(&arguments.panel, &recording, at_ns, &mut images, &options)?;
     Ok(write_png(&picture, &arguments.output)?)
+}
+
+/// `dcvins check`.
+pub fn check(arguments: &CheckArguments) -> Result<()> {
+    let log = FlightLog::open(&arguments.log)?;
+    let rig = Rig::for_log(&log, arguments.rig.as_deref());
+    let report = flight_log::check(&log, rig.as_ref(), &[]);
+    if arguments.json { print(&(serde_json::to_string_pretty(&report)? + "\n")) } else { print(&report.to_string()) }
+}
+
+/// `dcvins simulate`.
+pub fn simulate(arguments: &SimulateArguments) -> Result<()> {
+    let experiment = match arguments.experiment {
+        ExperimentArgument::T1 => Experiment::T1,
+        ExperimentArgument::T2 => Experiment::T2,
+        ExperimentArgument::T3 => Experiment::T3,
+        ExperimentArgument::T4 => Experiment::T4,
+    };
+    let mut options = SimulationOptions::new(experiment);
+    options.seed = arguments.seed;
+    options.duration_s = arguments.duration;
+    match arguments.encoder_sigma_deg {
+        Some(EncoderArgument::None) => options.encoder_sigma_rad = None,
+        Some(EncoderArgument::Sigma(sigma_deg)) => options.encoder_sigma_rad = Some(sigma_deg.to_radians()),
+        None => {}
+    }
+    let mut progress = Progress::new();
+    let summary = simulation::simulate(&options, &arguments.output, &mut |at| {
+        let share = at.images_done as f64 / at.images_total.max(1) as f64;
+        progress.show(share, || format!("{} of {} images", at.images_done, at.images_total));
+    })?;
+    progress.clear();
+    let (translation_m, rotation_rad) = summary.given_chain_error;
+    print(&format!(
+        "{}: {:.1} s, {:.1} m, {} images; the given chain is off by {:.1} mm and {:.2}°\n{}\n{}\n",
+        summary.log.display(),
+        summary.duration_s,
+        summary.path_length_m,
+        summary.images,
+        translation_m * 1e3,
+        rotation_rad.to_degrees(),
+        summary.rig.display(),
+        summary.truth.display(),
+    ))
 }

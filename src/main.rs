@@ -17,6 +17,8 @@ fn main() -> ExitCode {
         Command::Run(run) => commands::run(&run),
         #[cfg(feature = "gui")]
         Command::Screenshot(screenshot) => commands::screenshot(&screenshot),
+        Command::Check(check) => commands::check(&check),
+        Command::Simulate(simulate) => commands::simulate(&simulate),
         Command::Evaluate(evaluate) => commands::evaluate(&evaluate),
     };
     match result {

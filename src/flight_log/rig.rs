@@ -4,6 +4,7 @@ mod fields;
 mod find;
 mod kalibr;
 mod read;
+mod save;
 #[cfg(test)]
 mod tests;
 mod write;

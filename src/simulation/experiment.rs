@@ -123,7 +123,9 @@ impl Experiment {
                 forward_strokes: 5,
             }),
             Self::T3 | Self::T4 => {
-                let path = Path::new(streets(length_m, random), false, 5);
+                // Streets of their own stream: a longer flight begins as a shorter one does.
+                let mut turns = RandomStream::new(random.next_u64(), 0);
+                let path = Path::new(streets(length_m, &mut turns), false, 5);
                 Box::new(Cruise::new(pace, path, [2.9, 0.8], 0.7, 0.0, random))
             }
         }

@@ -9,22 +9,6 @@ use crate::flight_log::rig::Joint;
 use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::{ClassicalChain, DhLink};
 
-/// Pose of the camera on the IMU at these joint angles, Eqs. 5–6.
-pub(crate) fn imu_from_camera(chain: &ClassicalChain, angles_rad: &[f64]) -> RigidTransform {
-    let mut pose = chain.imu_from_base;
-    for (link, angle_rad) in chain.links.iter().zip(angles_rad) {
-        pose = pose * link_transform(link, *angle_rad);
-    }
-    pose * chain.effector_from_camera
-}
-
-/// One link, Eq. 2.
-fn link_transform(link: &DhLink, angle_rad: f64) -> RigidTransform {
-    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle_rad + link.theta_offset_rad);
-    let twist = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), link.alpha_rad);
-    RigidTransform::new(turn * twist, turn * Vector3::new(link.a_m, 0.0, link.d_m))
-}
-
 /// The joints of the paper's gimbal (§5.1): yaw ±180°, roll ±25°, pitch −120° to 30°.
 pub(crate) fn joints() -> Vec<Joint> {
     let joint = |name: &str, low_deg: f64, high_deg: f64| Joint {
@@ -192,7 +176,7 @@ fn turn_towards(
     let mut axes = Matrix3::zeros();
     for (k, link) in chain.links.iter().take(3).enumerate() {
         axes.set_column(k, &(orientation * Vector3::z()));
-        orientation *= link_transform(link, angles_rad[k]).rotation;
+        orientation *= link.transform(angles_rad[k]).rotation;
     }
     orientation *= chain.effector_from_camera.rotation;
     let error = so3::log(&(wanted * orientation.inverse()));

@@ -8,10 +8,12 @@ mod equipment;
 mod experiment;
 mod gimbal;
 mod inertial;
+mod options;
 mod random;
 mod render;
 mod route;
 mod scenario;
+mod simulate;
 mod spline;
 mod synthetic;
 #[cfg(test)]
@@ -23,6 +25,8 @@ pub use equipment::Lens;
 pub use experiment::{Environment, Experiment};
 pub use gimbal::JointMotion;
 pub use inertial::ImuBias;
+pub use options::{Disturbances, SimulationError, SimulationOptions, SimulationProgress, SimulationSummary};
+pub use simulate::simulate;
 pub use synthetic::{
     SyntheticFlight, SyntheticFrame, SyntheticMotion, SyntheticMount, SyntheticOptions, synthetic_tracks,
 };

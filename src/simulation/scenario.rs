@@ -1,7 +1,7 @@
 //! A flight with its rig and everything that the sensors but the cameras measure.
 
 use super::equipment::{Equipment, GRAVITY_M_PER_S2, IMU_RATE_HZ, given_rig};
-use super::gimbal::{JointMotion, LookAround, Stabilizer, imu_from_camera};
+use super::gimbal::{JointMotion, LookAround, Stabilizer};
 use super::inertial::{FIREFLY_IMU, InertialRecord};
 use super::random::RandomStream;
 use super::trajectory::Trajectory;
@@ -73,7 +73,7 @@ impl Scenario {
         match (&camera.mount, &self.true_rig.gimbal, &self.joints) {
             (CameraMount::Static { imu_from_camera }, ..) => world_from_imu * *imu_from_camera,
             (CameraMount::Gimbal, Some(gimbal), Some(joints)) => {
-                world_from_imu * imu_from_camera(&gimbal.chain, &joints.at(time_s))
+                world_from_imu * gimbal.chain.imu_from_camera(&joints.at(time_s))
             }
             (CameraMount::Gimbal, ..) => world_from_imu,
         }

@@ -1,2 +1,4 @@
 mod flight;
+mod logs;
+mod pictures;
 mod synthetic;

@@ -97,8 +97,8 @@ impl Workspace {
         let outside =
             |beyond: fn(&[f64; 2], f64, f64) -> bool| self.outline.iter().all(|place| beyond(place, columns, rows));
         self.outline.len() >= 3
-            && !outside(|place, _, _| place[0] < 0.0)
-            && !outside(|place, columns, _| place[0] > columns)
+            && !outside(|place, _, _| place[0] < -1.0)
+            && !outside(|place, columns, _| place[0] > columns + 1.0)
             && !outside(|place, _, _| place[1] < 0.0)
             && !outside(|place, _, rows| place[1] > rows)
     }
@@ -118,12 +118,13 @@ impl Workspace {
         let mut drawn = false;
         for row in first_row..last_row {
             let (left, right) = self.span(row as f64);
-            let from = (left.ceil().max(0.0) as usize).min(grid.columns);
-            let to = (right.ceil().max(0.0) as usize).min(grid.columns);
+            let shift = Grid::shift(row);
+            let from = ((left - shift).ceil().max(0.0) as usize).min(grid.columns);
+            let to = ((right - shift).ceil().max(0.0) as usize).min(grid.columns);
             if from >= to {
                 continue;
             }
-            let start = at_origin + inverse_depth.y * grid.step[1] * row as f64 + slope * from as f64;
+            let start = at_origin + inverse_depth.y * grid.step[1] * row as f64 + slope * (from as f64 + shift);
             let places = row * grid.columns + from..row * grid.columns + to;
             let depths = &mut self.inverse_depth[places.clone()];
             let faces = &mut self.face[places];

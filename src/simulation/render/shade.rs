@@ -2,7 +2,7 @@ use nalgebra::Vector3;
 
 use super::raster::{Eye, Prepared, SKY};
 use super::shadow::ShadowMap;
-use super::view::{PixelRay, SAMPLES, View, Workspace};
+use super::view::{OFFSETS_PX, PixelRay, SAMPLES, View, Workspace};
 use crate::geometry::RigidTransform;
 use crate::simulation::world::{Texture, World};
 
@@ -68,9 +68,8 @@ impl<'a> Renderer<'a> {
                 let faces = match &view.places {
                     Some(places) => places[pixel].map(|place| workspace.face[place as usize]),
                     None => {
-                        let first = row * SAMPLES * view.grid.columns + column * SAMPLES;
-                        let below = first + view.grid.columns;
-                        [first, first + 1, below, below + 1].map(|place| workspace.face[place])
+                        let first = row * SAMPLES * view.grid.columns + column;
+                        std::array::from_fn(|sample| workspace.face[first + sample * view.grid.columns])
                     }
                 };
                 picture[pixel] += share * self.pixel(&workspace.prepared, &light, faces, ray);
@@ -79,8 +78,8 @@ impl<'a> Renderer<'a> {
     }
 
     /// The mean over a pixel's samples; each face in it is shaded once, in the middle of its samples.
-    fn pixel(&self, prepared: &[Prepared], light: &Light, faces: [u32; 4], ray: PixelRay) -> f32 {
-        if faces[0] == faces[1] && faces[0] == faces[2] && faces[0] == faces[3] {
+    fn pixel(&self, prepared: &[Prepared], light: &Light, faces: [u32; SAMPLES], ray: PixelRay) -> f32 {
+        if faces[1..].iter().all(|face| *face == faces[0]) {
             return self.shade(prepared, light, faces[0], ray);
         }
         let mut sum = 0.0;
@@ -89,18 +88,18 @@ impl<'a> Renderer<'a> {
                 continue;
             }
             let (mut count, mut x, mut y) = (0.0, 0.0, 0.0);
-            for (sample, other) in faces.iter().enumerate() {
+            for (offset, other) in OFFSETS_PX.iter().zip(&faces) {
                 if other == face {
                     count += 1.0;
-                    x += if sample % SAMPLES == 0 { -0.25 } else { 0.25 };
-                    y += if sample / SAMPLES == 0 { -0.25 } else { 0.25 };
+                    x += offset[0];
+                    y += offset[1];
                 }
             }
             let (x, y) = (x / count, y / count);
             let within = [0, 1].map(|axis: usize| ray.ray[axis] + ray.right[axis] * x + ray.down[axis] * y);
             sum += count * self.shade(prepared, light, *face, PixelRay { ray: within, ..ray });
         }
-        0.25 * sum
+        sum / SAMPLES as f32
     }
 
     /// The grey of one face (or the sky) along a ray.

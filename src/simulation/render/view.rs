@@ -2,8 +2,23 @@ use nalgebra::Vector2;
 
 use crate::camera::CameraModel;
 
-/// Samples per pixel along each axis.
-pub(super) const SAMPLES: usize = 2;
+/// Samples per pixel. Each lies on a row and a column of its own, so that edges in any direction move smoothly.
+pub(super) const SAMPLES: usize = 8;
+
+/// Where the samples lie in their pixel, in pixels from its centre.
+pub(super) const OFFSETS_PX: [[f32; 2]; SAMPLES] = offsets();
+
+const fn offsets() -> [[f32; 2]; SAMPLES] {
+    let mut offsets = [[0.0; 2]; SAMPLES];
+    let mut k = 0;
+    while k < SAMPLES {
+        // Eight rooks that do not threaten each other.
+        let column = (3 * k) % SAMPLES;
+        offsets[k] = [(column as f32 + 0.5) / SAMPLES as f32 - 0.5, (k as f32 + 0.5) / SAMPLES as f32 - 0.5];
+        k += 1;
+    }
+    offsets
+}
 
 /// Marks a pixel that the lens does not show.
 const DARK: f32 = f32::NAN;
@@ -18,11 +33,12 @@ pub(crate) struct View {
     /// `x/z` and `y/z` per pixel; NaN where the lens shows nothing.
     pub(super) rays: Vec<[f32; 2]>,
     pub(super) grid: Grid,
-    /// Per pixel its samples' places in the grid; `None` when they simply are its 2 × 2 block.
-    pub(super) places: Option<Vec<[u32; SAMPLES * SAMPLES]>>,
+    /// Per pixel its samples' places in the grid; `None` when they simply are the rows of its column.
+    pub(super) places: Option<Vec<[u32; SAMPLES]>>,
 }
 
-/// The sample grid: sample `(i, j)` has the ray `(origin.x + i·step.x, origin.y + j·step.y, 1)`.
+/// The sample grid, with one column and [`SAMPLES`] rows per pixel: sample `(i, j)` has the ray
+/// `(origin.x + (i + shift)·step.x, origin.y + j·step.y, 1)`, where the shift is that of row `j`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Grid {
     pub(super) columns: usize,
@@ -66,11 +82,11 @@ impl View {
         let regular = model.distortion == crate::camera::Distortion::None
             && model.projection == crate::camera::Projection::Pinhole;
         let [fx, fy, cx, cy] = model.intrinsics_px;
-        let offset = |index: usize| (index as f64 + 0.5) / SAMPLES as f64 - 0.5;
-        let step = [1.0 / (fx * SAMPLES as f64), 1.0 / (fy * SAMPLES as f64)];
+        let first = f64::from(OFFSETS_PX[0][1]);
+        let step = [1.0 / fx, 1.0 / (fy * SAMPLES as f64)];
         if regular {
-            let origin = [(offset(0) - cx) / fx, (offset(0) - cy) / fy];
-            let grid = Grid { columns: width * SAMPLES, rows: height * SAMPLES, origin, step };
+            let origin = [-cx / fx, (first - cy) / fy];
+            let grid = Grid { columns: width, rows: height * SAMPLES, origin, step };
             return Self { width, height, rays, grid, places: None };
         }
         let bound = |axis: usize, pick: fn(f64, f64) -> f64, start: f64| {
@@ -86,11 +102,11 @@ impl View {
         for row in 0..height {
             for column in 0..width {
                 let Some(PixelRay { ray, right, down }) = view.pixel_ray(column, row) else {
-                    places.push([0; SAMPLES * SAMPLES]);
+                    places.push([0; SAMPLES]);
                     continue;
                 };
-                places.push(std::array::from_fn(|sample| {
-                    let (x, y) = (offset(sample % SAMPLES), offset(sample / SAMPLES));
+                places.push(OFFSETS_PX.map(|offset| {
+                    let [x, y] = offset.map(f64::from);
                     let within =
                         |axis: usize| f64::from(ray[axis]) + x * f64::from(right[axis]) + y * f64::from(down[axis]);
                     grid.nearest([within(0), within(1)])
@@ -126,13 +142,38 @@ impl View {
     }
 }
 
+#[cfg(test)]
+impl Workspace {
+    /// Depth of what the first sample of a pixel saw in the last picture.
+    pub(crate) fn depth_m(&self, view: &View, column: usize, row: usize) -> f64 {
+        let place = view
+            .places
+            .as_ref()
+            .map_or(row * SAMPLES * view.grid.columns + column, |places| places[row * view.width + column][0] as usize);
+        1.0 / f64::from(self.inverse_depth[place])
+    }
+}
+
 impl Grid {
+    /// How far the samples of a row lie to the right of whole columns.
+    pub(super) fn shift(row: usize) -> f64 {
+        f64::from(OFFSETS_PX[row % SAMPLES][0])
+    }
+
     /// The place of the sample nearest to a ray.
     fn nearest(&self, ray: [f64; 2]) -> u32 {
-        let index = |axis: usize, count: usize| {
-            let place = ((ray[axis] - self.origin[axis]) / self.step[axis]).round().max(0.0) as usize;
-            place.min(count - 1)
-        };
-        (index(1, self.rows) * self.columns + index(0, self.columns)) as u32
+        let [x, y] = [0, 1].map(|axis: usize| (ray[axis] - self.origin[axis]) / self.step[axis]);
+        let middle = (y.round().max(0.0) as usize).min(self.rows - 1);
+        let reach = SAMPLES / 2;
+        let mut best = (f64::MAX, 0);
+        for row in middle.saturating_sub(reach)..(middle + reach + 1).min(self.rows) {
+            let along = x - Self::shift(row);
+            let column = (along.round().max(0.0) as usize).min(self.columns - 1);
+            let away = (along - column as f64).powi(2) + ((y - row as f64) / SAMPLES as f64).powi(2);
+            if away < best.0 {
+                best = (away, row * self.columns + column);
+            }
+        }
+        best.1 as u32
     }
 }

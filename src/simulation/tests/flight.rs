@@ -8,7 +8,7 @@ use super::super::spline::Spline;
 use super::super::trajectory::{Trajectory, VehicleLimits};
 use crate::geometry::so3;
 
-fn experiment_trajectory(experiment: Experiment, seed: u64, duration_s: f64) -> Trajectory {
+pub(super) fn experiment_trajectory(experiment: Experiment, seed: u64, duration_s: f64) -> Trajectory {
     let flight = experiment.flight(4.0 * duration_s, &mut RandomStream::new(seed, stream::ROUTE));
     let mut random = RandomStream::new(seed, stream::MANOEUVRES);
     Trajectory::new(flight.as_ref(), &mut random, &VehicleLimits::default(), duration_s, GRAVITY_M_PER_S2)

@@ -3,7 +3,6 @@ use nalgebra::Vector3;
 use super::super::{SyntheticMotion, SyntheticMount, SyntheticOptions, synthetic_tracks};
 use crate::flight_log::rig::CameraMount;
 use crate::geometry::{RigidTransform, so3};
-use crate::simulation::gimbal::imu_from_camera;
 
 fn short(mount: SyntheticMount, motion: SyntheticMotion) -> SyntheticOptions {
     SyntheticOptions { mount, motion, duration_s: 8.0, seed: 11, ..SyntheticOptions::default() }
@@ -20,7 +19,7 @@ fn tracks_are_projections_of_their_landmarks_through_the_true_rig() {
             let extrinsic = match &camera.mount {
                 CameraMount::Static { imu_from_camera } => *imu_from_camera,
                 CameraMount::Gimbal => {
-                    imu_from_camera(&flight.true_rig.gimbal.as_ref().unwrap().chain, &frame.true_joint_angles_rad)
+                    flight.true_rig.gimbal.as_ref().unwrap().chain.imu_from_camera(&frame.true_joint_angles_rad)
                 }
             };
             let world_from_camera: RigidTransform = frame.true_world_from_imu * extrinsic;

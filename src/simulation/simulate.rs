@@ -1,0 +1,372 @@
+//! An experiment flown, pictured and written as a flight log with its rig and its truth.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::fmt::Write as _;
+use std::path::Path;
+
+use image::codecs::jpeg::JpegEncoder;
+use image::{ExtendedColorType, ImageEncoder as _};
+use rayon::prelude::*;
+
+use super::equipment::Equipment;
+use super::experiment::Experiment;
+use super::options::{SimulationError, SimulationOptions, SimulationProgress, SimulationSummary};
+use super::random::RandomStream;
+use super::render::{Renderer, Sensor, SensorOptions, View, Workspace};
+use super::scenario::{Scenario, ScenarioOptions, gravity_m_per_s2, stream};
+use super::trajectory::{AIR_DRAG_PER_S, Trajectory, VehicleLimits};
+use super::world;
+use crate::flight_log::rig::CameraRig;
+use crate::flight_log::{ImuSample, JointSample, LogWriter, LogWriterOptions, MessageTimes};
+use crate::geometry::{ns_from_seconds, seconds_from_ns, so3};
+
+/// When simulated logs begin: 15 June 2025, 15:06:40 UTC.
+const EPOCH_NS: i64 = 1_750_000_000_000_000_000;
+/// Stamp of the first image; streams are not aligned on purpose.
+const FIRST_IMAGE_S: f64 = 0.003;
+/// Images that are rendered at once, over all threads.
+const BATCH: usize = 24;
+/// Pictures that make up one blurred image.
+const BLUR_STEPS: usize = 7;
+/// Mean speed that flights are planned for, rather too low.
+const PLANNED_M_PER_S: f64 = 2.5;
+/// Delay from measurement to recording: inertial sensor, encoders, first camera, and each further camera.
+const DELAYS_S: [f64; 4] = [0.0004, 0.0007, 0.018, 0.0015];
+
+/// Flies an experiment and writes `output` (an MCAP log) with `.rig.yaml` and `.truth.yaml` beside it.
+///
+/// The same options and file name give the same bytes whatever the thread count. `progress` is called as images are
+/// done.
+///
+/// # Errors
+/// When an option is out of its range, or a file cannot be written.
+pub fn simulate(
+    options: &SimulationOptions,
+    output: &Path,
+    progress: &mut dyn FnMut(SimulationProgress),
+) -> Result<SimulationSummary, SimulationError> {
+    options.check()?;
+    let name = output.file_stem().map_or_else(|| "simulation".to_owned(), |stem| stem.to_string_lossy().into_owned());
+    let scenario = fly(options, &name);
+    let chain_error = given_chain_error(&scenario);
+    let truth_notes = truth_notes(options, &scenario, chain_error);
+    let (rig_path, truth_path) = (output.with_extension("rig.yaml"), output.with_extension("truth.yaml"));
+
+    let mut log = LogWriter::create(output, &LogWriterOptions::default())?;
+    let notes = BTreeMap::from([
+        ("experiment".to_owned(), options.experiment.name().to_owned()),
+        ("seed".to_owned(), options.seed.to_string()),
+    ]);
+    log.write_metadata("dcvins simulate", notes)?;
+    let images = write_messages(options, &scenario, &mut log, progress)?;
+    let attachments = [("rig", scenario.given_rig.to_yaml()), ("truth", scenario.true_rig.to_yaml() + &truth_notes)];
+    for (kind, text) in attachments {
+        log.attach(&format!("{name}.{kind}.yaml"), "application/yaml", &text, EPOCH_NS)?;
+    }
+    log.finish()?;
+    scenario.given_rig.save(&rig_path, "")?;
+    scenario.true_rig.save(&truth_path, &truth_notes)?;
+    let duration_s = scenario.trajectory.duration_s();
+    Ok(SimulationSummary {
+        log: output.to_owned(),
+        rig: rig_path,
+        truth: truth_path,
+        duration_s,
+        path_length_m: scenario.trajectory.length_m(duration_s),
+        images,
+        given_chain_error: chain_error,
+    })
+}
+
+/// The flight with its measurements.
+fn fly(options: &SimulationOptions, name: &str) -> Scenario {
+    let experiment = options.experiment;
+    let variant = 100 * Experiment::ALL.iter().position(|other| *other == experiment).unwrap_or(0) as u64;
+    let random = |stream: u64| RandomStream::new(options.seed, stream + variant);
+    let planned_s = (experiment.length_m() / PLANNED_M_PER_S).max(options.duration_s.unwrap_or(0.0));
+    let flight = experiment.flight(4.0 * planned_s, &mut random(stream::ROUTE));
+    let trajectory = Trajectory::new(
+        flight.as_ref(),
+        &mut random(stream::MANOEUVRES),
+        &VehicleLimits::default(),
+        planned_s,
+        gravity_m_per_s2(),
+    );
+    let end_s = options.duration_s.unwrap_or_else(|| trajectory.time_of_length(experiment.length_m()));
+    let look = experiment.look_around(&mut random(stream::LOOK));
+    let mut scenario = Scenario::new(
+        trajectory.cut(end_s),
+        &look,
+        &ScenarioOptions {
+            name,
+            seed: options.seed,
+            equipment: Equipment {
+                gimbal_camera: true,
+                static_camera: options.static_camera,
+                lens: options.lens,
+                resolution_px: options.resolution_px,
+                camera_rate_hz: options.camera_rate_hz,
+                camera_time_offset_s: options.disturbances.camera_time_offset_s,
+                encoder_sigma_rad: options.encoder_sigma_rad,
+            },
+            start_error: options.start_error,
+            imu_noise_scale: options.imu_noise_scale,
+        },
+    );
+    for sample in &mut scenario.inertial.samples {
+        if let Some(range) = options.disturbances.gyroscope_range_rad_per_s {
+            sample.angular_velocity_rad_per_s.apply(|rate| *rate = rate.clamp(-range.abs(), range.abs()));
+        }
+        if let Some(range) = options.disturbances.accelerometer_range_m_per_s2 {
+            sample.specific_force_m_per_s2.apply(|force| *force = force.clamp(-range.abs(), range.abs()));
+        }
+    }
+    scenario
+}
+
+/// A message on its way into the log, by its number among its kind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Message {
+    Truth(usize),
+    TrueJoints(usize),
+    Imu(usize),
+    Joints(usize),
+    Image(usize),
+}
+
+/// An image to be rendered.
+#[derive(Clone, Copy, Debug)]
+struct Shot {
+    camera: usize,
+    frame_index: usize,
+    stamp_ns: i64,
+}
+
+/// Everything that is recorded, as it was measured.
+struct Recordings {
+    imu: Vec<ImuSample>,
+    joints: Vec<JointSample>,
+    true_joints: Vec<JointSample>,
+    shots: Vec<Shot>,
+}
+
+fn write_messages(
+    options: &SimulationOptions,
+    scenario: &Scenario,
+    log: &mut LogWriter,
+    progress: &mut dyn FnMut(SimulationProgress),
+) -> Result<usize, SimulationError> {
+    let recordings = recordings(options, scenario);
+    let schedule = schedule(&recordings, options.seed);
+    let world = world::build(options.experiment.environment(), options.seed);
+    let studio = Studio::new(options, scenario, &world);
+    let rig = &scenario.true_rig;
+    let joint_names: Vec<String> =
+        rig.gimbal.iter().flat_map(|gimbal| &gimbal.joints).map(|joint| joint.name.clone()).collect();
+    let total = recordings.shots.len();
+    let mut ready: VecDeque<Vec<u8>> = VecDeque::new();
+    let mut done = 0;
+    for (log_time_ns, message) in schedule {
+        let times = |stamp_ns: i64| MessageTimes { stamp_ns: EPOCH_NS + stamp_ns, log_time_ns: EPOCH_NS + log_time_ns };
+        match message {
+            Message::Imu(index) => {
+                let ImuSample { stamp_ns, angular_velocity_rad_per_s, specific_force_m_per_s2 } =
+                    &recordings.imu[index];
+                let imu = &rig.imu;
+                let times = times(*stamp_ns);
+                log.write_imu(&imu.topic, &imu.frame_id, times, angular_velocity_rad_per_s, specific_force_m_per_s2)?;
+            }
+            Message::Truth(index) => {
+                let stamp_ns = recordings.imu[index].stamp_ns;
+                let truth = scenario.trajectory.at(seconds_from_ns(stamp_ns));
+                let velocity = truth.world_from_imu.rotation.inverse() * truth.velocity_m_per_s;
+                let topic = rig.ground_truth_topic.as_deref().unwrap_or("/ground_truth/odometry");
+                let (pose, rate) = (&truth.world_from_imu, &truth.angular_velocity_rad_per_s);
+                log.write_odometry(topic, "world", "imu", times(stamp_ns), pose, &velocity, rate)?;
+            }
+            Message::Joints(index) => {
+                let sample = &recordings.joints[index];
+                let stamp_ns = sample.stamp_ns + ns_from_seconds(options.disturbances.joint_lag_s);
+                log.write_joints("/gimbal/joint_states", times(stamp_ns), &joint_names, &sample.angles_rad)?;
+            }
+            Message::TrueJoints(index) => {
+                let sample = &recordings.true_joints[index];
+                let topic = "/ground_truth/joint_states";
+                log.write_joints(topic, times(sample.stamp_ns), &joint_names, &sample.angles_rad)?;
+            }
+            Message::Image(index) => {
+                if ready.is_empty() {
+                    let batch = &recordings.shots[index..total.min(index + BATCH)];
+                    ready = studio.develop(batch)?;
+                }
+                let shot = recordings.shots[index];
+                let camera = &rig.cameras[shot.camera];
+                let info = camera.topic.replace("image_raw/compressed", "camera_info");
+                let times = times(shot.stamp_ns);
+                log.write_camera_info(&info, &camera.frame_id, times, &camera.model)?;
+                if let Some(jpeg) = ready.pop_front() {
+                    log.write_compressed_image(&camera.topic, &camera.frame_id, times, "jpeg", &jpeg)?;
+                }
+                done += 1;
+                progress(SimulationProgress { images_done: done, images_total: total });
+            }
+        }
+    }
+    Ok(done)
+}
+
+fn recordings(options: &SimulationOptions, scenario: &Scenario) -> Recordings {
+    let start_ns = ns_from_seconds(options.disturbances.joint_start_s);
+    let mut joints = options.encoder_sigma_rad.map(|sigma| scenario.encoder_samples(sigma)).unwrap_or_default();
+    joints.retain(|sample| sample.stamp_ns >= start_ns);
+    let duration_s = scenario.trajectory.duration_s();
+    let shift_s = options.disturbances.camera_time_offset_s;
+    let mut shots = Vec::new();
+    for (camera, _) in scenario.true_rig.cameras.iter().enumerate() {
+        let period_s = 1.0 / options.camera_rate_hz;
+        let mut frame_index = 0;
+        loop {
+            let stamp_s = FIRST_IMAGE_S + frame_index as f64 * period_s;
+            if stamp_s.max(stamp_s + shift_s) > duration_s {
+                break;
+            }
+            let gap = options.disturbances.image_gap_s;
+            let lost = gap.is_some_and(|[start, length]| stamp_s >= start && stamp_s < start + length);
+            if stamp_s + shift_s >= 0.0 && !lost {
+                shots.push(Shot { camera, frame_index, stamp_ns: ns_from_seconds(stamp_s) });
+            }
+            frame_index += 1;
+        }
+    }
+    // In the order in which they will be written.
+    shots.sort_by_key(|shot| (shot.stamp_ns, shot.camera));
+    Recordings { imu: scenario.inertial.samples.clone(), joints, true_joints: scenario.true_joint_samples(), shots }
+}
+
+/// All messages in the order of their log times, which come later than the stamps by a delay that jitters.
+fn schedule(recordings: &Recordings, seed: u64) -> Vec<(i64, Message)> {
+    let mut random = RandomStream::new(seed, stream::DELIVERY);
+    let mut late = |delay_s: f64| ns_from_seconds(delay_s * (1.0 + 0.06 * random.unit()));
+    let mut messages = Vec::new();
+    for (index, sample) in recordings.imu.iter().enumerate() {
+        messages.push((sample.stamp_ns, Message::Truth(index)));
+        messages.push((sample.stamp_ns + late(DELAYS_S[0]), Message::Imu(index)));
+    }
+    for (index, sample) in recordings.true_joints.iter().enumerate() {
+        messages.push((sample.stamp_ns, Message::TrueJoints(index)));
+    }
+    for (index, sample) in recordings.joints.iter().enumerate() {
+        messages.push((sample.stamp_ns + late(DELAYS_S[1]), Message::Joints(index)));
+    }
+    let mut before_ns = 0;
+    for (index, shot) in recordings.shots.iter().enumerate() {
+        let delay = late(DELAYS_S[2] + DELAYS_S[3] * shot.camera as f64);
+        before_ns = (shot.stamp_ns + delay).max(before_ns);
+        messages.push((before_ns, Message::Image(index)));
+    }
+    messages.sort_unstable();
+    messages
+}
+
+/// Renders and compresses images.
+struct Studio<'a> {
+    options: &'a SimulationOptions,
+    scenario: &'a Scenario,
+    renderer: Renderer<'a>,
+    cameras: Vec<(&'a CameraRig, View, Sensor)>,
+}
+
+impl<'a> Studio<'a> {
+    fn new(options: &'a SimulationOptions, scenario: &'a Scenario, world: &'a world::World) -> Self {
+        let sensor = SensorOptions { noise: options.image_noise, exposure_drift: 0.05, vignetting: 0.12 };
+        let cameras = scenario.true_rig.cameras.iter().enumerate().map(|(index, camera)| {
+            let view = View::new(&camera.model);
+            let seed = RandomStream::new(options.seed, stream::IMAGES + 1000 * (index as u64 + 1)).next_u64();
+            let sensor = Sensor::new(&view, sensor, seed);
+            (camera, view, sensor)
+        });
+        Self { options, scenario, renderer: Renderer::new(world), cameras: cameras.collect() }
+    }
+
+    /// The images of some shots as JPEG, in their order.
+    fn develop(&self, shots: &[Shot]) -> Result<VecDeque<Vec<u8>>, SimulationError> {
+        let developed: Result<Vec<_>, _> = shots
+            .par_iter()
+            .map_init(
+                || (Workspace::default(), Vec::new()),
+                |(workspace, picture), shot| self.shoot(*shot, workspace, picture),
+            )
+            .collect();
+        developed.map(VecDeque::from)
+    }
+
+    fn shoot(&self, shot: Shot, workspace: &mut Workspace, picture: &mut Vec<f32>) -> Result<Vec<u8>, SimulationError> {
+        let (camera, view, sensor) = &self.cameras[shot.camera];
+        let disturbances = &self.options.disturbances;
+        let time_s = seconds_from_ns(shot.stamp_ns) + disturbances.camera_time_offset_s;
+        picture.clear();
+        picture.resize(view.pixels(), 0.0);
+        let steps = if disturbances.exposure_s > 0.0 { BLUR_STEPS } else { 1 };
+        for step in 0..steps {
+            // The stamp is the middle of the exposure.
+            let place = (step as f64 + 0.5) / steps as f64 - 0.5;
+            let at_s = (time_s + place * disturbances.exposure_s).clamp(0.0, self.scenario.trajectory.duration_s());
+            let pose = self.scenario.world_from_camera(camera, at_s);
+            self.renderer.render(view, &pose, 1.0 / steps as f32, workspace, picture);
+        }
+        let image = sensor.expose(picture, shot.frame_index, time_s);
+        let mut jpeg = Vec::with_capacity(image.pixels.len() / 4);
+        JpegEncoder::new_with_quality(&mut jpeg, self.options.jpeg_quality)
+            .write_image(&image.pixels, image.width as u32, image.height as u32, ExtendedColorType::L8)
+            .map_err(|error| SimulationError::Image { problem: error.to_string() })?;
+        Ok(jpeg)
+    }
+}
+
+/// How far the given chain is off over the joint angles visited: mean translation in metres and rotation in radians.
+fn given_chain_error(scenario: &Scenario) -> (f64, f64) {
+    let (Some(given), Some(truth)) = (&scenario.given_rig.gimbal, &scenario.true_rig.gimbal) else { return (0.0, 0.0) };
+    let samples = scenario.true_joint_samples();
+    let mut sums = (0.0, 0.0);
+    for sample in &samples {
+        let (given, truth) =
+            (given.chain.imu_from_camera(&sample.angles_rad), truth.chain.imu_from_camera(&sample.angles_rad));
+        sums.0 += (given.translation_m - truth.translation_m).norm();
+        sums.1 += so3::log(&(truth.rotation.inverse() * given.rotation)).norm();
+    }
+    let count = samples.len().max(1) as f64;
+    (sums.0 / count, sums.1 / count)
+}
+
+/// What else is true, as further entries of the truth's YAML.
+fn truth_notes(options: &SimulationOptions, scenario: &Scenario, chain_error: (f64, f64)) -> String {
+    let environment = match options.experiment.environment() {
+        super::Environment::House => 1,
+        super::Environment::Town => 2,
+    };
+    let duration_s = scenario.trajectory.duration_s();
+    let first = scenario.inertial.biases.first().copied().unwrap_or_default();
+    let last = scenario.inertial.biases.last().copied().unwrap_or_default();
+    let mut notes = String::from("truth:\n");
+    let mut entry = |name: &str, value: String| {
+        // Writing into a string cannot fail.
+        writeln!(notes, "  {name}: {value}").is_ok()
+    };
+    entry("experiment", options.experiment.name().to_owned());
+    entry("environment", environment.to_string());
+    entry("seed", options.seed.to_string());
+    entry("epoch_ns", EPOCH_NS.to_string());
+    entry("duration", format!("{duration_s:?}"));
+    entry("path_length", format!("{:?}", scenario.trajectory.length_m(duration_s)));
+    entry("gyroscope_bias_start", list(&first.gyroscope_rad_per_s));
+    entry("gyroscope_bias_end", list(&last.gyroscope_rad_per_s));
+    entry("accelerometer_bias_start", list(&first.accelerometer_m_per_s2));
+    entry("accelerometer_bias_end", list(&last.accelerometer_m_per_s2));
+    entry("air_drag_per_s", format!("{AIR_DRAG_PER_S:?}"));
+    entry("given_chain_error", format!("{{translation_m: {:?}, rotation_rad: {:?}}}", chain_error.0, chain_error.1));
+    notes
+}
+
+fn list(vector: &nalgebra::Vector3<f64>) -> String {
+    format!("[{:?}, {:?}, {:?}]", vector.x, vector.y, vector.z)
+}

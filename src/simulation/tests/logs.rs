@@ -1,0 +1,103 @@
+use std::path::Path;
+use std::sync::Arc;
+
+use super::super::{Experiment, SimulationError, SimulationOptions, SimulationSummary, simulate};
+use crate::flight_log::{FlightLog, FrameStream, Rig};
+
+fn small(experiment: Experiment) -> SimulationOptions {
+    SimulationOptions { duration_s: Some(1.0), resolution_px: [96, 72], ..SimulationOptions::new(experiment) }
+}
+
+fn write(options: &SimulationOptions, folder: &Path) -> SimulationSummary {
+    let mut last = 0;
+    let summary = simulate(options, &folder.join("flight.mcap"), &mut |progress| {
+        assert_eq!(progress.images_done, last + 1);
+        last = progress.images_done;
+    });
+    let summary = summary.unwrap();
+    assert_eq!(summary.images, last);
+    summary
+}
+
+#[test]
+fn a_simulated_log_reads_back_with_its_rig_and_truth() {
+    let folder = tempfile::tempdir().unwrap();
+    let summary = write(&small(Experiment::T3), folder.path());
+    assert_eq!(summary.images, 40);
+    let log = Arc::new(FlightLog::open(&summary.log).unwrap());
+    assert!(log.warnings().is_empty(), "{:?}", log.warnings());
+    let rig = Rig::for_log(&log, None).unwrap();
+    let truth = Rig::truth_for_log(&log, None).unwrap().unwrap();
+    assert_ne!(rig.gimbal, truth.gimbal);
+    assert_eq!(rig.imu, truth.imu);
+    assert!(summary.given_chain_error.0 > 1e-3 && summary.given_chain_error.0 < 0.02, "{summary:?}");
+    for camera in ["cam0", "cam1"] {
+        let frames: Vec<_> = FrameStream::new(Arc::clone(&log), &rig, camera, 0.0, None).unwrap().collect();
+        assert_eq!(frames.len(), 20);
+        for frame in &frames {
+            assert!(frame.log_time_ns > frame.stamp_ns + 15_000_000);
+            assert_eq!([frame.image.width, frame.image.height], [96, 72]);
+            assert!(frame.truth.is_some());
+            assert_eq!(frame.joint_angles_rad.as_ref().map(Vec::len), Some(3));
+            let spread = frame.image.pixels.iter().max().unwrap() - frame.image.pixels.iter().min().unwrap();
+            assert!(spread > 60);
+        }
+        assert!(frames[1..].iter().all(|frame| frame.imu.len() >= 11));
+    }
+}
+
+#[test]
+fn the_same_options_give_the_same_bytes_whatever_the_thread_count() {
+    let options = small(Experiment::T1);
+    let read = |threads: usize, seed: u64| {
+        let folder = tempfile::tempdir().unwrap();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let summary = pool.install(|| write(&SimulationOptions { seed, ..options.clone() }, folder.path()));
+        [summary.log, summary.rig, summary.truth].map(|path| std::fs::read(path).unwrap())
+    };
+    let first = read(1, 7);
+    assert_eq!(first, read(3, 7));
+    assert_ne!(first, read(3, 8));
+}
+
+#[test]
+fn a_shorter_flight_is_the_beginning_of_a_longer_one() {
+    let truth = |duration_s: f64| {
+        let folder = tempfile::tempdir().unwrap();
+        let options = SimulationOptions {
+            duration_s: Some(duration_s),
+            static_camera: false,
+            resolution_px: [32, 24],
+            camera_rate_hz: 2.0,
+            ..SimulationOptions::new(Experiment::T4)
+        };
+        let summary = write(&options, folder.path());
+        let log = Arc::new(FlightLog::open(&summary.log).unwrap());
+        let rig = Rig::for_log(&log, None).unwrap();
+        let frames = FrameStream::new(log, &rig, "cam0", 0.0, None).unwrap();
+        frames.map(|frame| frame.truth).collect::<Vec<_>>()
+    };
+    let (short, long) = (truth(4.0), truth(8.0));
+    assert_eq!(short[..7], long[..7]);
+}
+
+#[test]
+fn encoderless_logs_have_no_joint_angles() {
+    let folder = tempfile::tempdir().unwrap();
+    let summary = write(&SimulationOptions { encoder_sigma_rad: None, ..small(Experiment::T2) }, folder.path());
+    let log = FlightLog::open(&summary.log).unwrap();
+    assert!(log.topic("/gimbal/joint_states").is_none());
+    let rig = Rig::from_file(&summary.rig).unwrap();
+    assert_eq!(rig.gimbal.unwrap().topic, None);
+}
+
+#[test]
+fn impossible_options_are_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let options = SimulationOptions { duration_s: Some(f64::NAN), ..small(Experiment::T1) };
+    let error = simulate(&options, &folder.path().join("x.mcap"), &mut |_| ()).unwrap_err();
+    assert!(matches!(error, SimulationError::BadOption { option: "duration in seconds", .. }), "{error}");
+    let lost = folder.path().join("no such folder").join("x.mcap");
+    let error = simulate(&small(Experiment::T1), &lost, &mut |_| ()).unwrap_err();
+    assert!(matches!(error, SimulationError::Log(_)), "{error}");
+}

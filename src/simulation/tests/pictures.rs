@@ -1,0 +1,173 @@
+use nalgebra::Vector3;
+
+use super::super::equipment::{Lens, camera_model};
+use super::super::experiment::{Environment, Experiment};
+use super::super::random::RandomStream;
+use super::super::render::{Renderer, Sensor, SensorOptions, View, Workspace};
+use super::super::world::{self, World};
+use super::flight::experiment_trajectory;
+use crate::flight_log::GrayImage;
+use crate::geometry::{RigidTransform, so3};
+
+/// A picture from a place, looking along a heading, 8° down.
+fn picture(world: &World, lens: Lens, place_m: [f64; 3], heading_deg: f64) -> GrayImage {
+    let view = View::new(&camera_model(0, lens, [640, 480]));
+    let optical = nalgebra::Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
+    let optical = nalgebra::UnitQuaternion::from_matrix(&optical);
+    let turn = so3::exp(&Vector3::new(0.0, 0.0, heading_deg.to_radians())) * so3::exp(&Vector3::new(0.0, 0.14, 0.0));
+    let mut grey = vec![0.0; view.pixels()];
+    let pose = RigidTransform::new(turn * optical, Vector3::from(place_m));
+    Renderer::new(world).render(&view, &pose, 1.0, &mut Workspace::default(), &mut grey);
+    let options = SensorOptions { noise: 2.0, exposure_drift: 0.0, vignetting: 0.12 };
+    Sensor::new(&view, options, 5).expose(&grey, 0, 0.0)
+}
+
+/// Cells of 32 × 32 pixels that hold a strong corner (smaller eigenvalue of the gradient's 7 × 7 structure tensor).
+fn cells_with_corners(image: &GrayImage) -> usize {
+    let at = |x: usize, y: usize| f64::from(image.pixels[y * image.width + x]);
+    let mut cells = std::collections::BTreeSet::new();
+    for y in (8..image.height - 8).step_by(3) {
+        for x in (8..image.width - 8).step_by(3) {
+            let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+            for dy in 0..7 {
+                for dx in 0..7 {
+                    let (px, py) = (x + dx - 3, y + dy - 3);
+                    let gx = 0.5 * (at(px + 1, py) - at(px - 1, py));
+                    let gy = 0.5 * (at(px, py + 1) - at(px, py - 1));
+                    xx += gx * gx;
+                    xy += gx * gy;
+                    yy += gy * gy;
+                }
+            }
+            let smaller = 0.5 * (xx + yy - ((xx - yy).powi(2) + 4.0 * xy * xy).sqrt()) / 49.0;
+            // Noise of two grey values alone gives 2.
+            if smaller > 40.0 {
+                cells.insert((x / 32, y / 32));
+            }
+        }
+    }
+    cells.len()
+}
+
+#[test]
+fn both_worlds_are_rich_in_corners_and_well_exposed() {
+    for (environment, place_m) in [(Environment::House, [-13.0, -11.0, 2.6]), (Environment::Town, [-15.0, -4.0, 2.9])] {
+        let world = world::build(environment, 1);
+        for lens in [Lens::Pinhole, Lens::Radtan] {
+            for heading_deg in [0.0, 50.0, 90.0, 180.0] {
+                let image = picture(&world, lens, place_m, heading_deg);
+                let mean = image.pixels.iter().map(|pixel| f64::from(*pixel)).sum::<f64>() / image.pixels.len() as f64;
+                let clipped = image.pixels.iter().filter(|pixel| matches!(**pixel, 0 | 255)).count();
+                let cells = cells_with_corners(&image);
+                let case = format!("{environment:?} {lens:?} {heading_deg}°");
+                assert!(cells > 100, "{case}: corners in {cells} of 300 cells only");
+                assert!((70.0..190.0).contains(&mean), "{case}: mean grey {mean}");
+                assert!(clipped < image.pixels.len() / 50, "{case}: {clipped} pixels at black or white");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_pixel_sees_what_its_ray_hits() {
+    // A point of the house's corner edge projects to where the picture changes from wall to wall.
+    let world = world::build(Environment::House, 1);
+    let model = camera_model(0, Lens::Radtan, [640, 480]);
+    let view = View::new(&model);
+    let place = Vector3::new(-13.0, -11.0, 2.6);
+    let corner = Vector3::new(-6.0, -4.5, 2.6);
+    let forward = (corner - place).normalize();
+    let right = forward.cross(&Vector3::z()).normalize();
+    let rotation = nalgebra::Matrix3::from_columns(&[right, forward.cross(&right), forward]);
+    let pose = RigidTransform::new(nalgebra::UnitQuaternion::from_matrix(&rotation), place);
+    let mut workspace = Workspace::default();
+    let mut grey = vec![0.0; view.pixels()];
+    Renderer::new(&world).render(&view, &pose, 1.0, &mut workspace, &mut grey);
+    for height_m in [1.9, 2.3, 2.9, 3.4] {
+        let edge = Vector3::new(corner.x, corner.y, height_m);
+        let uv = model.project(&pose.inverse().transform(&edge)).unwrap();
+        // Left of the edge the western wall (x = −6) is seen, right of it the southern one (y = −4.5).
+        let mut sides = [0.0; 2];
+        for (side, offset) in [(0, -2.0), (1, 2.0)] {
+            let ray = pose.rotation * model.unproject(&(uv + nalgebra::Vector2::new(offset, 0.0))).unwrap();
+            let along = if side == 0 { (corner.x - place.x) / ray.x } else { (corner.y - place.y) / ray.y };
+            sides[side] = along * model.unproject(&(uv + nalgebra::Vector2::new(offset, 0.0))).unwrap().z;
+        }
+        for (side, offset) in [(0, -2.0), (1, 2.0)] {
+            let depth = workspace.depth_m(&view, (uv.x + offset).round() as usize, uv.y.round() as usize);
+            assert!(
+                (depth - sides[side]).abs() < 0.06,
+                "side {side} at {height_m} m: {depth} instead of {}",
+                sides[side]
+            );
+        }
+    }
+}
+
+#[test]
+fn textures_do_not_shimmer_when_the_camera_creeps() {
+    // Moving by a hundredth of a pixel at a time, a tracked patch must change smoothly: neighbouring pictures are far
+    // more alike than pictures a pixel apart.
+    let world = world::build(Environment::Town, 1);
+    let renderer = Renderer::new(&world);
+    let view = View::new(&camera_model(0, Lens::Pinhole, [320, 240]));
+    let optical = nalgebra::Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
+    let optical = nalgebra::UnitQuaternion::from_matrix(&optical);
+    let shot = |turn_px: f64| {
+        let turn = so3::exp(&Vector3::new(0.0, 0.0, 0.4 + turn_px / 180.0));
+        let mut grey = vec![0.0; view.pixels()];
+        let pose = RigidTransform::new(turn * optical, Vector3::new(-15.0, -4.0, 2.9));
+        renderer.render(&view, &pose, 1.0, &mut Workspace::default(), &mut grey);
+        grey
+    };
+    let first = shot(0.0);
+    let difference = |other: &[f32]| {
+        let sum: f64 = first.iter().zip(other).map(|(a, b)| f64::from(a - b).powi(2)).sum();
+        (sum / first.len() as f64).sqrt()
+    };
+    let (tenth, half, whole) = (difference(&shot(0.1)), difference(&shot(0.5)), difference(&shot(1.0)));
+    assert!(tenth < 0.2 * whole && half < 0.65 * whole, "{tenth} {half} {whole}");
+    assert!(whole > 3.0, "{whole}");
+}
+
+#[test]
+fn flights_keep_clear_of_everything_built() {
+    for experiment in Experiment::ALL {
+        let world = world::build(experiment.environment(), 1);
+        for seed in 1..4 {
+            let trajectory = experiment_trajectory(experiment, seed, 160.0);
+            for step in 0..800 {
+                let place = trajectory.at(f64::from(step) * 0.2).world_from_imu.translation_m;
+                for face in &world.faces {
+                    let off = face.normal.dot(&place) - face.distance;
+                    if off.abs() > 0.45 || (face.corners[0] - place).norm() > 700.0 {
+                        continue;
+                    }
+                    let foot = place - face.normal * off;
+                    let outside = (0..face.corners.len())
+                        .map(|k| {
+                            let (from, to) = (face.corners[k], face.corners[(k + 1) % face.corners.len()]);
+                            (foot - from).dot(&(to - from).cross(&face.normal).normalize())
+                        })
+                        .fold(f64::MIN, f64::max);
+                    assert!(outside > 0.45, "{experiment:?} seed {seed} hits a face near {place:?}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn noise_follows_from_frame_and_pixel_alone() {
+    let view = View::new(&camera_model(0, Lens::Pinhole, [64, 48]));
+    let options = SensorOptions { noise: 3.0, exposure_drift: 0.0, vignetting: 0.0 };
+    let sensor = Sensor::new(&view, options, RandomStream::new(2, 0).next_u64());
+    let flat = vec![100.0; view.pixels()];
+    let (first, again, next) =
+        (sensor.expose(&flat, 4, 0.0), sensor.expose(&flat, 4, 0.0), sensor.expose(&flat, 5, 0.0));
+    assert_eq!(first, again);
+    assert_ne!(first, next);
+    let squares: f64 = first.pixels.iter().map(|pixel| (f64::from(*pixel) - 100.0).powi(2)).sum();
+    let sigma = (squares / first.pixels.len() as f64).sqrt();
+    assert!((sigma - 3.0).abs() < 0.2, "{sigma}");
+}
