@@ -9,7 +9,7 @@ use dcvins::session::{RunSpec, SessionRequest};
 /// Debugger for visual-inertial navigation with a camera on a gimbal.
 #[derive(Debug, Parser)]
 #[command(version, about, propagate_version = true)]
-pub struct Arguments {
+pub(crate) struct Arguments {
     /// What to do; without a command the window opens.
     #[command(subcommand)]
     pub command: Option<Command>,
@@ -17,7 +17,7 @@ pub struct Arguments {
 
 /// The sub-commands.
 #[derive(Debug, Subcommand)]
-pub enum Command {
+pub(crate) enum Command {
     /// Open the window on a log; without a display, write the pictures instead and say where.
     View(ViewArguments),
     /// Run the estimator over a log without a window and write its files.
@@ -35,7 +35,7 @@ pub enum Command {
 
 /// The runs and the stretch of the log, shared by everything that estimates.
 #[derive(Args, Clone, Debug, Default)]
-pub struct EstimationArguments {
+pub(crate) struct EstimationArguments {
     /// A run over the log: NAME[:key=value,…], NAME one of auto, minimal, minimal-swapped, classical, poe, static; keys
     /// encoder=on|off, calibrate=on|off, window=N, camera=KEY, name=LABEL. Up to four.
     #[arg(long = "run", value_name = "SPEC")]
@@ -56,7 +56,7 @@ pub struct EstimationArguments {
 
 impl EstimationArguments {
     /// The session that these arguments ask for.
-    pub fn request(&self, log_path: PathBuf) -> SessionRequest {
+    pub(crate) fn request(&self, log_path: PathBuf) -> SessionRequest {
         SessionRequest {
             log_path,
             rig_path: self.rig.clone(),
@@ -70,7 +70,7 @@ impl EstimationArguments {
 
 /// `dcvins view`.
 #[derive(Args, Clone, Debug, Default)]
-pub struct ViewArguments {
+pub(crate) struct ViewArguments {
     /// The log; without one the window welcomes with the sample logs and the recent files.
     pub log: Option<PathBuf>,
     /// Where the pictures go when there is no display [default: dcvins-output/NAME].
@@ -82,7 +82,7 @@ pub struct ViewArguments {
 
 /// `dcvins run`.
 #[derive(Args, Clone, Debug)]
-pub struct RunArguments {
+pub(crate) struct RunArguments {
     /// The log.
     pub log: PathBuf,
     /// Folder for the files; each run gets a folder of its name in it.
@@ -101,7 +101,7 @@ pub struct RunArguments {
 /// `dcvins screenshot`.
 #[cfg(feature = "gui")]
 #[derive(Args, Clone, Debug)]
-pub struct ScreenshotArguments {
+pub(crate) struct ScreenshotArguments {
     /// The log.
     pub log: PathBuf,
     /// Seconds since the first message of the log.
@@ -122,16 +122,13 @@ pub struct ScreenshotArguments {
     /// Colours.
     #[arg(long, value_enum, default_value_t = ThemeArgument::Light)]
     pub theme: ThemeArgument,
-    /// What draws: `cpu` needs no driver and gives the same bytes everywhere.
-    #[arg(long, value_enum, default_value_t = RendererArgument::Cpu)]
-    pub renderer: RendererArgument,
     #[command(flatten)]
     pub estimation: EstimationArguments,
 }
 
 /// Names of the themes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum ThemeArgument {
+pub(crate) enum ThemeArgument {
     /// Dark on light.
     Light,
     /// Light on dark.
@@ -140,18 +137,9 @@ pub enum ThemeArgument {
     Print,
 }
 
-/// Names of the renderers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum RendererArgument {
-    /// The CPU painter.
-    Cpu,
-    /// Any adapter that wgpu finds.
-    Wgpu,
-}
-
 /// `dcvins check`.
 #[derive(Args, Clone, Debug)]
-pub struct CheckArguments {
+pub(crate) struct CheckArguments {
     /// The log.
     pub log: PathBuf,
     /// The rig, when it is not beside the log or attached to it.
@@ -164,7 +152,7 @@ pub struct CheckArguments {
 
 /// `dcvins simulate`.
 #[derive(Args, Clone, Debug)]
-pub struct SimulateArguments {
+pub(crate) struct SimulateArguments {
     /// The paper's experiment: T1, T2, T3 or T4.
     #[arg(value_name = "EXPERIMENT", ignore_case = true)]
     pub experiment: ExperimentArgument,
@@ -184,7 +172,7 @@ pub struct SimulateArguments {
 
 /// Names of the experiments.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum ExperimentArgument {
+pub(crate) enum ExperimentArgument {
     /// The paper's T1.
     T1,
     /// The paper's T2.
@@ -197,7 +185,7 @@ pub enum ExperimentArgument {
 
 /// What `--encoder-sigma-deg` may say.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum EncoderArgument {
+pub(crate) enum EncoderArgument {
     /// No encoders in the log.
     None,
     /// White noise of this standard deviation, in degrees.
@@ -206,7 +194,7 @@ pub enum EncoderArgument {
 
 /// `dcvins evaluate`.
 #[derive(Args, Clone, Debug)]
-pub struct EvaluateArguments {
+pub(crate) struct EvaluateArguments {
     /// The trajectory to judge: t x y z qx qy qz qw.
     pub estimate: PathBuf,
     /// The trajectory to judge it by.
@@ -227,14 +215,14 @@ pub struct EvaluateArguments {
 
 /// Names of the alignments.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum AlignArgument {
+pub(crate) enum AlignArgument {
     /// Leave the estimate where it is.
     None,
     /// Rotation about the vertical and a shift.
     Yaw,
     /// Rotation and a shift (evo's --align).
     Se3,
-    /// Rotation, shift and scale (evo's --align --correct_scale).
+    /// Rotation, shift and scale (evo's `--align --correct_scale`).
     Sim3,
 }
 

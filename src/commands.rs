@@ -34,7 +34,7 @@ fn print(text: &str) -> Result<()> {
 /// Says something to the person at the terminal.
 fn tell(text: &str) {
     // With standard error gone there is nobody left to tell.
-    let _ = writeln!(io::stderr(), "{text}");
+    drop(writeln!(io::stderr(), "{text}"));
 }
 
 /// A bar on standard error, none when that is not a terminal.
@@ -56,13 +56,13 @@ impl Progress {
         }
         self.drawn_ms = now_ms;
         let filled = ((share.clamp(0.0, 1.0) * PROGRESS_WIDTH as f64) as usize).min(PROGRESS_WIDTH);
-        let bar = "█".repeat(filled) + &"░".repeat(PROGRESS_WIDTH - filled);
-        let _ = write!(io::stderr(), "\r{bar} {:3.0} % {}\x1b[K", share * 100.0, text());
+        let bar = ["█".repeat(filled), "░".repeat(PROGRESS_WIDTH - filled)].concat();
+        drop(write!(io::stderr(), "\r{bar} {:3.0} % {}\x1b[K", share * 100.0, text()));
     }
 
     fn clear(&self) {
         if self.watch.is_some() {
-            let _ = write!(io::stderr(), "\r\x1b[K");
+            drop(write!(io::stderr(), "\r\x1b[K"));
         }
     }
 }
@@ -84,7 +84,7 @@ fn compute(request: &SessionRequest, until_ns: Option<i64>) -> Result<(SessionPl
 }
 
 /// `dcvins run`.
-pub fn run(arguments: &RunArguments) -> Result<()> {
+pub(crate) fn run(arguments: &RunArguments) -> Result<()> {
     let (_, recording) = compute(&arguments.estimation.request(arguments.log.clone()), None)?;
     let mut summaries = Vec::new();
     for run in &recording.runs {
@@ -94,7 +94,7 @@ pub fn run(arguments: &RunArguments) -> Result<()> {
     }
     if arguments.json {
         let all: Vec<&RunSummary> = summaries.iter().map(|(_, summary)| summary).collect();
-        print(&(serde_json::to_string_pretty(&all)? + "\n"))?;
+        print(&format!("{}\n", serde_json::to_string_pretty(&all)?))?;
     } else {
         for (folder, summary) in &summaries {
             print(&describe(folder, summary))?;
@@ -114,29 +114,29 @@ pub fn run(arguments: &RunArguments) -> Result<()> {
 /// A run's summary in a few lines.
 fn describe(folder: &Path, summary: &RunSummary) -> String {
     let frames = &summary.frames;
-    let mut text = format!("{} on {} ({})\n", summary.run, summary.log, summary.camera);
+    let mut lines = vec![format!("{} on {} ({})\n", summary.run, summary.log, summary.camera)];
     let begin = frames
         .initialized_at_s
-        .map_or("never initialized".to_owned(), |time_s| format!("initialized at {time_s:.2} s"));
-    text += &format!(
+        .map_or_else(|| "never initialized".to_owned(), |time_s| format!("initialized at {time_s:.2} s"));
+    lines.push(format!(
         "  frames       {} of {} estimated, {} keyframes, {begin}, {} restarts\n",
         frames.estimated, frames.total, frames.keyframes, frames.restarts
-    );
+    ));
     if let Some(accuracy) = &summary.accuracy {
-        text += &format!(
+        lines.push(format!(
             "  accuracy     ATE {:.3} m rmse, {:.3} m max ({}), {:.2} % of {:.1} m\n",
             accuracy.ate_rmse_m,
             accuracy.ate_max_m,
             accuracy.alignment,
             accuracy.ate_percent_of_length,
             summary.length_m
-        );
+        ));
     } else if let Some(reason) = &summary.accuracy_missing {
-        text += &format!("  accuracy     none: {reason}\n");
+        lines.push(format!("  accuracy     none: {reason}\n"));
     }
     let calibration = &summary.calibration;
     if let (Some(first), Some(last)) = (&calibration.chain_error_initial, &calibration.chain_error) {
-        text += &format!(
+        lines.push(format!(
             "  chain error  {:.1} mm, {:.2}° with the rig's values; {:.1} ± {:.1} mm, {:.2} ± {:.2}° at the end ({})\n",
             first.translation_mean_m * 1e3,
             first.rotation_mean_rad.to_degrees(),
@@ -145,10 +145,10 @@ fn describe(folder: &Path, summary: &RunSummary) -> String {
             last.rotation_mean_rad.to_degrees(),
             last.rotation_std_rad.to_degrees(),
             calibration.parameterization
-        );
+        ));
     }
     if let Some(rank) = &summary.rank {
-        text += &format!(
+        lines.push(format!(
             "  rank         structural {} of {}, informed {}; lost: {} parameterization, {} joints, {} absorbed, {} motion\n",
             rank.rank_structural,
             rank.columns,
@@ -157,39 +157,44 @@ fn describe(folder: &Path, summary: &RunSummary) -> String {
             rank.deficit.joints,
             rank.deficit.absorbed,
             rank.deficit.motion
-        );
+        ));
     }
     if let (Some(timing), Some(factor)) = (&summary.timing_ms, summary.real_time_factor) {
         let stage = |stage: &export::StageSummary| format!("{:.1}/{:.1}", stage.p50, stage.p95);
-        text += &format!(
+        lines.push(format!(
             "  ms p50/p95   front end {}, optimize {}, marginalize {}, observability {}, step {}; {factor:.1} × real time\n",
             stage(&timing.frontend),
             stage(&timing.optimize),
             stage(&timing.marginalize),
             stage(&timing.observability),
             stage(&timing.step)
-        );
+        ));
     }
     for warning in &summary.warnings {
-        text += &format!("  warning      {warning}\n");
+        lines.push(format!("  warning      {warning}\n"));
     }
-    text + &format!("  files        {}\n", folder.display())
+    lines.push(format!("  files        {}\n", folder.display()));
+    lines.concat()
 }
 
 /// `dcvins evaluate`.
-pub fn evaluate(arguments: &EvaluateArguments) -> Result<()> {
+pub(crate) fn evaluate(arguments: &EvaluateArguments) -> Result<()> {
     let options = EvaluationOptions {
         alignment: arguments.align.into(),
         delta: arguments.delta,
         max_difference_s: arguments.max_difference,
     };
     let report = export::evaluate(&arguments.estimate, &arguments.reference, &options)?;
-    if arguments.json { print(&(serde_json::to_string_pretty(&report)? + "\n")) } else { print(&report.to_string()) }
+    if arguments.json {
+        print(&format!("{}\n", serde_json::to_string_pretty(&report)?))
+    } else {
+        print(&report.to_string())
+    }
 }
 
 /// `dcvins view`: the window, or its pictures where there is no display.
 #[cfg(feature = "gui")]
-pub fn view(arguments: &ViewArguments) -> Result<()> {
+pub(crate) fn view(arguments: &ViewArguments) -> Result<()> {
     use dcvins::export::Machine;
     use dcvins::gui::app::PlayingLog;
     use dcvins::gui::run_window::{WindowError, WindowOptions, run_window};
@@ -220,7 +225,7 @@ pub fn view(arguments: &ViewArguments) -> Result<()> {
 
 /// `dcvins view` of a program that was built without the window.
 #[cfg(not(feature = "gui"))]
-pub fn view(_arguments: &ViewArguments) -> Result<()> {
+pub(crate) fn view(_arguments: &ViewArguments) -> Result<()> {
     bail!("this program was built without the window (cargo feature 'gui'); 'dcvins run LOG --out DIR' works")
 }
 
@@ -250,7 +255,7 @@ fn write_pictures(log: &Path, arguments: &ViewArguments) -> Result<()> {
 
 /// `dcvins screenshot`.
 #[cfg(feature = "gui")]
-pub fn screenshot(arguments: &crate::arguments::ScreenshotArguments) -> Result<()> {
+pub(crate) fn screenshot(arguments: &crate::arguments::ScreenshotArguments) -> Result<()> {
     use crate::arguments::ThemeArgument;
     use dcvins::export::{PANEL_NAMES, PictureOptions, draw_panel, write_png};
     use dcvins::flight_log::ImageReader;
@@ -276,15 +281,19 @@ pub fn screenshot(arguments: &crate::arguments::ScreenshotArguments) -> Result<(
 }
 
 /// `dcvins check`.
-pub fn check(arguments: &CheckArguments) -> Result<()> {
+pub(crate) fn check(arguments: &CheckArguments) -> Result<()> {
     let log = FlightLog::open(&arguments.log)?;
     let rig = Rig::for_log(&log, arguments.rig.as_deref());
-    let report = flight_log::check(&log, rig.as_ref(), &[]);
-    if arguments.json { print(&(serde_json::to_string_pretty(&report)? + "\n")) } else { print(&report.to_string()) }
+    let report = flight_log::check::check(&log, rig.as_ref(), &[]);
+    if arguments.json {
+        print(&format!("{}\n", serde_json::to_string_pretty(&report)?))
+    } else {
+        print(&report.to_string())
+    }
 }
 
 /// `dcvins simulate`.
-pub fn simulate(arguments: &SimulateArguments) -> Result<()> {
+pub(crate) fn simulate(arguments: &SimulateArguments) -> Result<()> {
     let experiment = match arguments.experiment {
         ExperimentArgument::T1 => Experiment::T1,
         ExperimentArgument::T2 => Experiment::T2,

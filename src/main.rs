@@ -25,7 +25,7 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             // With standard error gone there is nobody left to tell.
-            let _ = writeln!(std::io::stderr(), "dcvins: {error:#}");
+            drop(writeln!(std::io::stderr(), "dcvins: {error:#}"));
             ExitCode::FAILURE
         }
     }

@@ -118,7 +118,7 @@ pub struct CalibrationSummary {
 }
 
 /// Deficit of the rank by cause.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct DeficitSummary {
     /// Lost to the parameterization.
     pub parameterization: usize,
@@ -475,7 +475,7 @@ fn warnings(recording: &Recording, run: &RunRecord) -> Vec<String> {
 
 /// Writes a summary as the text of `summary.json`.
 pub(super) fn to_json(summary: &RunSummary) -> Result<String, serde_json::Error> {
-    serde_json::to_string_pretty(summary).map(|text| text + "\n")
+    serde_json::to_string_pretty(summary).map(|text| format!("{text}\n"))
 }
 
 /// File name of a log without its folder, for messages.

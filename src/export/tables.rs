@@ -7,6 +7,9 @@ use crate::flight_log::Rig;
 use crate::geometry::seconds_from_ns;
 use crate::session::{RunRecord, StepRecord};
 
+/// Why writing into a text needs no error of its own.
+pub(super) const INTO_STRING: &str = "writing into a string cannot fail";
+
 /// A golden parameter name with its joint's name in place of the link's number: `L1.alpha` becomes `yaw.alpha`.
 pub(super) fn parameter_name(name: &str, rig: &Rig) -> String {
     let joint_name = |rest: &str| {
@@ -36,8 +39,7 @@ fn push_cell(text: &mut String, cell: &str) {
 
 fn push_number(text: &mut String, number: f64) {
     if number.is_finite() {
-        // Writing into a string cannot fail.
-        let _ = write!(text, ",{number}");
+        write!(text, ",{number}").expect(INTO_STRING);
     } else {
         text.push(',');
     }
@@ -59,10 +61,10 @@ pub(super) fn calibration_csv(run: &RunRecord, rig: &Rig) -> String {
     let mut text = "t_s".to_owned();
     for (name, unit) in &columns {
         let name = parameter_name(name, rig);
-        let _ = write!(text, ",{name}_{unit},{name}_sigma_{unit}");
+        write!(text, ",{name}_{unit},{name}_sigma_{unit}").expect(INTO_STRING);
     }
     for joint in &joints {
-        let _ = write!(text, ",{joint}_rad");
+        write!(text, ",{joint}_rad").expect(INTO_STRING);
     }
     text.push('\n');
     for step in run.steps.iter().filter(|step| step.report.newest().is_some()) {
@@ -106,13 +108,13 @@ pub(super) fn rank_csv(run: &RunRecord) -> String {
                     deficit_motion,reference,structural_threshold,informed_threshold"
             .to_owned();
     for name in &margins {
-        let _ = write!(text, ",margin_{}", name.replace([' ', ','], "_"));
+        write!(text, ",margin_{}", name.replace([' ', ','], "_")).expect(INTO_STRING);
     }
     for index in 1..=columns {
-        let _ = write!(text, ",singular_value_{index}");
+        write!(text, ",singular_value_{index}").expect(INTO_STRING);
     }
     for index in 1..=columns {
-        let _ = write!(text, ",singular_value_with_priors_{index}");
+        write!(text, ",singular_value_with_priors_{index}").expect(INTO_STRING);
     }
     text.push('\n');
     for (step, rank) in ranked {
@@ -127,7 +129,7 @@ pub(super) fn rank_csv(run: &RunRecord) -> String {
             rank.deficit_motion,
         ];
         for count in counts {
-            let _ = write!(text, ",{count}");
+            write!(text, ",{count}").expect(INTO_STRING);
         }
         for number in [rank.reference, rank.structural_threshold, rank.informed_threshold] {
             push_number(&mut text, number);
@@ -162,7 +164,7 @@ pub(super) fn frames_csv(run: &RunRecord, timing: bool) -> String {
             Phase::Tracking => "tracking",
         };
         let inliers = report.features.iter().filter(|feature| !feature.rejected).count();
-        let _ = write!(
+        write!(
             text,
             ",{},{},{phase},{},{},{},{},{inliers},{}",
             report.frame_index,
@@ -172,16 +174,17 @@ pub(super) fn frames_csv(run: &RunRecord, timing: bool) -> String {
             statistics.lost,
             statistics.rejected,
             u8::from(report.keyframe),
-        );
+        )
+        .expect(INTO_STRING);
         push_number(&mut text, report.reprojection_rms_before_px);
         push_number(&mut text, report.reprojection_rms_after_px);
-        let _ = write!(text, ",{}", report.iterations.len());
+        write!(text, ",{}", report.iterations.len()).expect(INTO_STRING);
         let times = &report.times;
         for time_ms in
             [times.frontend_ms, times.optimize_ms, times.marginalize_ms, times.observability_ms, times.step_ms]
         {
             if timing {
-                let _ = write!(text, ",{time_ms:.3}");
+                write!(text, ",{time_ms:.3}").expect(INTO_STRING);
             } else {
                 text.push(',');
             }

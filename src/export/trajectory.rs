@@ -7,6 +7,7 @@ use std::path::Path;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use super::error::ExportError;
+use super::tables::INTO_STRING;
 use crate::geometry::RigidTransform;
 use crate::session::RunRecord;
 use crate::session::accuracy::StampedPose;
@@ -34,8 +35,7 @@ pub fn tum_of_run(run: &RunRecord, epoch_ns: i64) -> String {
         let numbers = [position.x, position.y, position.z, rotation.i, rotation.j, rotation.k, rotation.w];
         text.push_str(&stamp);
         for number in numbers {
-            // Writing into a string cannot fail.
-            let _ = write!(text, " {number:.9}");
+            write!(text, " {number:.9}").expect(INTO_STRING);
         }
         text.push('\n');
     }

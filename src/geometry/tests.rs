@@ -73,7 +73,8 @@ fn matrices_go_both_ways_and_bad_ones_are_refused() {
 #[test]
 fn rows_are_split_by_a_column_space_even_with_dependent_columns() {
     use super::dense::{split_by_column_space, thin_svd, to_faer};
-    let entry = |row: usize, column: usize| ((row * 7 + column * 13 + 5) as f64 * 0.37).sin();
+    let entry =
+        |row: usize, column: usize| ((row * row * 7 + column * 13 + row * column * 5 + 5) % 31) as f64 / 31.0 - 0.5;
     let mut spanning = nalgebra::DMatrix::from_fn(12, 5, entry);
     let repeated = spanning.column(0) + spanning.column(2);
     spanning.set_column(3, &repeated);

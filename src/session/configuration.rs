@@ -16,7 +16,7 @@ const RIGID_CAMERA_PRIOR: ChainPrior = ChainPrior { translation_bound_m: 0.01, r
 const SIGMA_PER_BOUND: f64 = 0.577_350_269_189_625_8;
 
 /// The estimator that a run asks for.
-pub fn estimator_config(rig: &Rig, spec: &RunSpec) -> Result<EstimatorConfig, SessionError> {
+pub(super) fn estimator_config(rig: &Rig, spec: &RunSpec) -> Result<EstimatorConfig, SessionError> {
     let camera = camera_of_run(rig, spec)?;
     let chain = chain_of_camera(rig, &camera.mount);
     let gimbal = rig.gimbal.as_ref().filter(|_| camera.mount == CameraMount::Gimbal);

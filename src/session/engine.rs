@@ -44,7 +44,7 @@ pub enum EngineMessage {
 
 /// Running threads; dropping it stops them.
 #[derive(Debug)]
-pub struct Engine {
+pub(super) struct Engine {
     sender: Option<SyncSender<EngineMessage>>,
     receiver: Option<Receiver<EngineMessage>>,
     cancelled: Arc<AtomicBool>,
@@ -65,7 +65,7 @@ impl Default for Engine {
 
 impl Engine {
     /// Starts every run of the plan; runs that watch the same camera share one tracker.
-    pub fn start(plan: &SessionPlan) -> Result<Self, SessionError> {
+    pub(super) fn start(plan: &SessionPlan) -> Result<Self, SessionError> {
         let mut engine = Self::default();
         let mut cameras: Vec<&String> = plan.runs.iter().map(|(_, camera_key)| camera_key).collect();
         cameras.sort();
@@ -78,7 +78,12 @@ impl Engine {
     }
 
     /// Starts the given runs of the plan, which all watch the same camera, from the begin of the log.
-    pub fn start_camera(&mut self, plan: &SessionPlan, camera_key: &str, runs: &[usize]) -> Result<(), SessionError> {
+    pub(super) fn start_camera(
+        &mut self,
+        plan: &SessionPlan,
+        camera_key: &str,
+        runs: &[usize],
+    ) -> Result<(), SessionError> {
         let Some(sender) = &self.sender else { return Ok(()) };
         let tracker = CameraTracker::new(Arc::clone(&plan.log), &plan.rig, camera_key, plan.start_s, plan.duration_s)?;
         let mut queues = Vec::new();
@@ -101,17 +106,17 @@ impl Engine {
     }
 
     /// Lets go of the engine's own end of the channel: once all runs are done, [`Engine::receive`] returns `None`.
-    pub fn no_more_runs(&mut self) {
+    pub(super) fn no_more_runs(&mut self) {
         self.sender = None;
     }
 
     /// Takes the receiving end, for a collecting thread of one's own.
-    pub fn take_receiver(&mut self) -> Option<Receiver<EngineMessage>> {
+    pub(super) fn take_receiver(&mut self) -> Option<Receiver<EngineMessage>> {
         self.receiver.take()
     }
 
     /// The next message; waits for it. `None` when every thread has ended.
-    pub fn receive(&self) -> Option<EngineMessage> {
+    pub(super) fn receive(&self) -> Option<EngineMessage> {
         self.receiver.as_ref().and_then(|receiver| receiver.recv().ok())
     }
 }
@@ -167,18 +172,13 @@ fn run_thread(
 ) {
     let mut error = None;
     while let Ok(tracked) = frames.recv() {
-        match catch_unwind(AssertUnwindSafe(|| engine.step(&tracked))) {
-            Ok(record) => {
-                if results.send(EngineMessage::Step { run, record: Box::new(record) }).is_err() {
-                    return;
-                }
-            }
-            Err(_) => {
-                let time_s = crate::geometry::seconds_from_ns(tracked.frame.stamp_ns);
-                error =
-                    Some(format!("internal error in the estimator at {time_s:.3} s; please report it with the log"));
-                break;
-            }
+        let Ok(record) = catch_unwind(AssertUnwindSafe(|| engine.step(&tracked))) else {
+            let time_s = crate::geometry::seconds_from_ns(tracked.frame.stamp_ns);
+            error = Some(format!("internal error in the estimator at {time_s:.3} s; please report it with the log"));
+            break;
+        };
+        if results.send(EngineMessage::Step { run, record: Box::new(record) }).is_err() {
+            return;
         }
     }
     // Nobody listens any more when the session was closed.

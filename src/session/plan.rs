@@ -111,7 +111,7 @@ impl SessionPlan {
 }
 
 /// The camera that a run watches.
-pub fn camera_of_run<'rig>(rig: &'rig Rig, spec: &RunSpec) -> Result<&'rig CameraRig, SessionError> {
+pub(super) fn camera_of_run<'rig>(rig: &'rig Rig, spec: &RunSpec) -> Result<&'rig CameraRig, SessionError> {
     let is_gimballed = |camera: &&CameraRig| camera.mount == CameraMount::Gimbal;
     let (camera, wanted) = if let Some(key) = &spec.camera_key {
         (rig.cameras.iter().find(|camera| camera.key == *key), format!("camera '{key}'"))

@@ -143,10 +143,10 @@ impl Session {
         }
         let recording = self.recording();
         let mut next_ns = self.cursor_ns + ns_from_seconds(elapsed_s * self.speed.0);
-        if let Some((begin_ns, end_ns)) = self.loop_range_ns {
-            if next_ns >= end_ns || next_ns < begin_ns {
-                next_ns = begin_ns;
-            }
+        if let Some((begin_ns, end_ns)) = self.loop_range_ns
+            && !(begin_ns..end_ns).contains(&next_ns)
+        {
+            next_ns = begin_ns;
         }
         let computed_ns = recording.computed_ns();
         if next_ns >= computed_ns {
@@ -162,10 +162,9 @@ impl Session {
     /// Does what a person asked for.
     pub fn apply(&mut self, command: Command) {
         match command {
-            Command::Play => self.play(),
-            Command::Pause => self.playing = false,
             Command::TogglePlay if self.playing => self.playing = false,
-            Command::TogglePlay => self.play(),
+            Command::Play | Command::TogglePlay => self.play(),
+            Command::Pause => self.playing = false,
             Command::SetSpeed(speed) if speed.0.is_finite() && speed.0 > 0.0 => self.speed = speed,
             Command::SetSpeed(_) => self.notices.push("The speed must be a positive number".to_owned()),
             Command::Seek { stamp_ns } => self.seek(stamp_ns),

@@ -9,7 +9,7 @@ use crate::observability::{RankReport, analyse};
 
 /// One estimator and the analysis of each of its steps.
 #[derive(Clone, Debug)]
-pub struct RunEngine {
+pub(super) struct RunEngine {
     estimator: Estimator,
     has_joints: bool,
     joints_free: bool,
@@ -17,14 +17,14 @@ pub struct RunEngine {
 
 impl RunEngine {
     /// A fresh estimator.
-    pub fn new(config: EstimatorConfig) -> Self {
+    pub(super) fn new(config: EstimatorConfig) -> Self {
         let has_joints = !config.chain.links.is_empty();
         let joints_free = has_joints && !config.use_encoder;
         Self { estimator: Estimator::new(config), has_joints, joints_free }
     }
 
     /// One image through the estimator and the observability analysis.
-    pub fn step(&mut self, tracked: &TrackedSensorFrame) -> StepRecord {
+    pub(super) fn step(&mut self, tracked: &TrackedSensorFrame) -> StepRecord {
         let frame = &tracked.frame;
         let watch = Stopwatch::start();
         let mut report = self.estimator.step(&StepInput {

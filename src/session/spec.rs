@@ -50,7 +50,7 @@ impl ParameterizationChoice {
 }
 
 /// One `--run NAME[:key=value,…]`.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RunSpec {
     /// Its name on screen and as a folder: `name=…`, or the specification as written.
     pub label: String,
@@ -183,7 +183,7 @@ fn on_or_off(value: &str) -> Result<bool, String> {
 }
 
 /// Makes the labels of several runs differ, by a number behind the later ones.
-pub fn distinct_labels(specs: &mut [RunSpec]) {
+pub(super) fn distinct_labels(specs: &mut [RunSpec]) {
     for index in 1..specs.len() {
         let wanted = specs[index].label.clone();
         let mut number = 2;

@@ -13,7 +13,7 @@ use crate::gimbal::ClassicalChain;
 
 /// An image with its tracks.
 #[derive(Clone, Debug)]
-pub struct TrackedSensorFrame {
+pub(super) struct TrackedSensorFrame {
     /// The sensors' part.
     pub frame: SensorFrame,
     /// The front end's part.
@@ -23,7 +23,7 @@ pub struct TrackedSensorFrame {
 }
 
 /// Reads a camera's stream and tracks its features.
-pub struct CameraTracker {
+pub(super) struct CameraTracker {
     stream: FrameStream,
     front_end: FrontEnd,
     chain: ClassicalChain,
@@ -32,7 +32,7 @@ pub struct CameraTracker {
 
 impl CameraTracker {
     /// Starts at a time of the log.
-    pub fn new(
+    pub(super) fn new(
         log: Arc<FlightLog>,
         rig: &Rig,
         camera_key: &str,
@@ -51,7 +51,7 @@ impl CameraTracker {
 
     /// The next image with its tracks, `None` at the end of the stream; an image that the front end refuses is left out
     /// with a warning.
-    pub fn next_frame(&mut self) -> Option<TrackedSensorFrame> {
+    pub(super) fn next_frame(&mut self) -> Option<TrackedSensorFrame> {
         let mut refused = Vec::new();
         loop {
             let mut frame = self.stream.next_frame()?;
@@ -83,7 +83,7 @@ impl CameraTracker {
     }
 
     /// What was wrong with the log behind the last frame.
-    pub fn remaining_warnings(&self) -> &[LogWarning] {
+    pub(super) fn remaining_warnings(&self) -> &[LogWarning] {
         self.stream.remaining_warnings()
     }
 
@@ -100,7 +100,7 @@ impl CameraTracker {
 }
 
 /// The chain that carries a camera; without links for a rigid one.
-pub fn chain_of_camera(rig: &Rig, mount: &CameraMount) -> ClassicalChain {
+pub(super) fn chain_of_camera(rig: &Rig, mount: &CameraMount) -> ClassicalChain {
     match (mount, &rig.gimbal) {
         (CameraMount::Static { imu_from_camera }, _) => {
             ClassicalChain { imu_from_base: *imu_from_camera, ..ClassicalChain::default() }

@@ -8,7 +8,7 @@ use crate::flight_log::ImuSample;
 use crate::flight_log::rig::ImuNoise;
 use crate::geometry::ns_from_seconds;
 
-/// Noise of the ADIS16448 as RotorS gives it, which the paper flew.
+/// Noise of the ADIS16448 as `RotorS` gives it, which the paper flew.
 pub(crate) const FIREFLY_IMU: ImuNoise = ImuNoise {
     accelerometer_noise_density: 0.004,
     accelerometer_random_walk: 0.006,
@@ -16,9 +16,9 @@ pub(crate) const FIREFLY_IMU: ImuNoise = ImuNoise {
     gyroscope_random_walk: 3.879e-5,
 };
 
-/// Standard deviation of the accelerometer's turn-on bias per axis (RotorS), in m/s².
+/// Standard deviation of the accelerometer's turn-on bias per axis (`RotorS`), in m/s².
 const ACCELEROMETER_TURN_ON_M_PER_S2: f64 = 0.196;
-/// Standard deviation of the gyroscope's turn-on bias per axis (RotorS), in rad/s.
+/// Standard deviation of the gyroscope's turn-on bias per axis (`RotorS`), in rad/s.
 const GYROSCOPE_TURN_ON_RAD_PER_S: f64 = 0.0087;
 
 /// Biases at one instant, in the IMU frame.

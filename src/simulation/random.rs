@@ -9,7 +9,7 @@ pub(crate) struct RandomStream {
     spare_normal: Option<f64>,
 }
 
-/// One round of SplitMix64, a good mixer of structured integers.
+/// One round of `SplitMix64`, a good mixer of structured integers.
 pub(crate) fn mix(value: u64) -> u64 {
     let mut z = value.wrapping_add(0x9E37_79B9_7F4A_7C15);
     z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);

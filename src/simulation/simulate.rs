@@ -59,7 +59,8 @@ pub fn simulate(
     ]);
     log.write_metadata("dcvins simulate", notes)?;
     let images = write_messages(options, &scenario, &mut log, progress)?;
-    let attachments = [("rig", scenario.given_rig.to_yaml()), ("truth", scenario.true_rig.to_yaml() + &truth_notes)];
+    let attachments =
+        [("rig", scenario.given_rig.to_yaml()), ("truth", format!("{}{truth_notes}", scenario.true_rig.to_yaml()))];
     for (kind, text) in attachments {
         log.attach(&format!("{name}.{kind}.yaml"), "application/yaml", &text, EPOCH_NS)?;
     }

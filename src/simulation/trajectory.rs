@@ -7,7 +7,7 @@ use super::route::Flight;
 use super::spline::Spline;
 use crate::geometry::RigidTransform;
 
-/// What the multirotor can do, after the AscTec Firefly of RotorS (1.57 kg, six rotors, about two g of thrust).
+/// What the multirotor can do, after the `AscTec` Firefly of `RotorS` (1.57 kg, six rotors, about two g of thrust).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VehicleLimits {
     /// Largest angle between thrust and the vertical, in radians.

@@ -16,7 +16,7 @@ fn data(name: &str) -> PathBuf {
 
 fn compare(alignment: Alignment, delta: RelativeDelta) -> EvaluationReport {
     let options = EvaluationOptions { alignment, delta, ..EvaluationOptions::default() };
-    evaluate(&data("estimate.tum"), &data("reference.tum"), &options).unwrap()
+    evaluate(&data("estimate.tum"), &data("reference.tum"), &options).expect("the fixtures can be compared")
 }
 
 /// `[rmse, mean, median, max]` of the absolute error.

@@ -1,3 +1,5 @@
 //! Integration tests, a module per feature.
 
+mod command_line;
 mod evaluate;
+mod sample_log;

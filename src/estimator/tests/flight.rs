@@ -8,6 +8,9 @@ use crate::geometry::so3;
 use crate::gimbal::Parameterization;
 use crate::simulation::{SyntheticFlight, SyntheticFrame, SyntheticMount, SyntheticOptions, synthetic_tracks};
 
+/// An estimated and a true position.
+type Pair = (Vector3<f64>, Vector3<f64>);
+
 fn options(mount: SyntheticMount) -> SyntheticOptions {
     SyntheticOptions {
         mount,
@@ -47,8 +50,7 @@ fn trajectory_error_m(flight: &SyntheticFlight, reports: &[StepReport]) -> (f64,
         .collect();
     assert!(pairs.len() > 100, "estimated {} of {} frames", pairs.len(), reports.len());
     let count = pairs.len() as f64;
-    let middle =
-        |pick: fn(&(Vector3<f64>, Vector3<f64>)) -> Vector3<f64>| pairs.iter().map(pick).sum::<Vector3<f64>>() / count;
+    let middle = |pick: fn(&Pair) -> Vector3<f64>| pairs.iter().map(pick).sum::<Vector3<f64>>() / count;
     let (estimated, truth) = (middle(|pair| pair.0), middle(|pair| pair.1));
     let (mut cosine, mut sine) = (0.0, 0.0);
     for (e, t) in pairs.iter().map(|pair| (pair.0 - estimated, pair.1 - truth)) {

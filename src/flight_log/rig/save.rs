@@ -6,7 +6,7 @@ use crate::flight_log::LogError;
 impl Rig {
     /// Writes the rig as YAML, with `appended` (further top-level entries, or nothing) at its end.
     pub fn save(&self, path: &Path, appended: &str) -> Result<(), LogError> {
-        std::fs::write(path, self.to_yaml() + appended).map_err(|source| LogError::Io {
+        std::fs::write(path, format!("{}{appended}", self.to_yaml())).map_err(|source| LogError::Io {
             action: "write the rig",
             source,
             path: path.to_owned(),

@@ -58,6 +58,8 @@ pub struct App {
     open_log: OpenLog,
     desktop: Arc<dyn Desktop>,
     log: Option<Box<dyn PlayingLog>>,
+    /// Whether the cursor has been put on the log's first frame.
+    at_first_frame: bool,
     opening: Option<Opening>,
     welcome: Welcome,
     state: WindowState,
@@ -79,6 +81,7 @@ impl App {
             open_log,
             desktop,
             log: None,
+            at_first_frame: false,
             opening: None,
             state,
             selection: Selection::default(),
@@ -107,6 +110,7 @@ impl App {
     pub fn show(&mut self, log: Box<dyn PlayingLog>) {
         self.desktop.remember_log(&log.recording().log_path);
         self.log = Some(log);
+        self.at_first_frame = false;
         self.selection = Selection::default();
     }
 
@@ -150,6 +154,9 @@ impl App {
         log.advance(elapsed_s);
         for notice in log.take_notices() {
             self.state.notices.say(NoticeLevel::Warning, notice);
+        }
+        if !self.at_first_frame {
+            self.at_first_frame = go_to_first_frame(log.as_mut());
         }
         let (recording, playback, generation) = (log.recording(), log.playback(), log.generation());
         let mut commands = Vec::new();
@@ -242,6 +249,17 @@ impl App {
             self.title = title;
         }
     }
+}
+
+/// Moves a cursor that stands before the first frame there, so that a log just opened shows something; whether there is
+/// a frame yet.
+fn go_to_first_frame(log: &mut dyn PlayingLog) -> bool {
+    let recording = log.recording();
+    let first = recording.runs.iter().filter_map(|run| run.steps.first()).map(|step| step.report.stamp_ns).min();
+    if first.is_some_and(|first_ns| log.cursor_ns() < first_ns) {
+        log.apply(Command::GoToStart);
+    }
+    first.is_some()
 }
 
 /// The session's images, for the panels.

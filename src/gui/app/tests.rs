@@ -23,11 +23,12 @@ struct SampleLog {
 }
 
 impl SampleLog {
+    /// The cursor stands before the first frame, as in a log whose images begin after its first message.
     fn new(path: &Path) -> Self {
         static SAMPLE: OnceLock<Recording> = OnceLock::new();
         let sample = SAMPLE.get_or_init(|| sample_recording_of(70, &["auto", "classical"]));
         let recording = Arc::new(Recording { log_path: path.to_path_buf(), ..sample.clone() });
-        Self { recording, cursor_ns: 0, playback: Playback::default() }
+        Self { recording, cursor_ns: -5, playback: Playback::default() }
     }
 }
 
@@ -53,6 +54,7 @@ impl PlayingLog for SampleLog {
             Command::TogglePlay => self.playback.playing = !self.playback.playing,
             Command::Seek { stamp_ns } => self.cursor_ns = stamp_ns,
             Command::StepFrames(count) => self.cursor_ns += count * FRAME_PERIOD_NS,
+            Command::GoToStart => self.cursor_ns = 0,
             Command::GoToEnd => self.cursor_ns = self.recording.duration_ns,
             _ => {}
         }
@@ -159,6 +161,7 @@ fn the_welcome_view_offers_logs_and_opens_them() {
     assert_eq!(opened(&harness), Some(PathBuf::from("/samples/yard.mcap")));
     assert_eq!(*desktop.remembered.lock().unwrap(), [PathBuf::from("/samples/yard.mcap")]);
     assert!(harness.query_by_label("Play").is_some());
+    assert!(harness.query_by_label("Frame 0").is_some(), "the cursor goes to the first frame");
     assert!(harness.query_by_label("300 MiB").is_some(), "the status bar tells the memory");
 }
 

@@ -65,12 +65,11 @@ impl<'a> Renderer<'a> {
             for column in 0..view.width {
                 let pixel = row * view.width + column;
                 let Some(ray) = view.pixel_ray(column, row) else { continue };
-                let faces = match &view.places {
-                    Some(places) => places[pixel].map(|place| workspace.face[place as usize]),
-                    None => {
-                        let first = row * SAMPLES * view.grid.columns + column;
-                        std::array::from_fn(|sample| workspace.face[first + sample * view.grid.columns])
-                    }
+                let faces = if let Some(places) = &view.places {
+                    places[pixel].map(|place| workspace.face[place as usize])
+                } else {
+                    let first = row * SAMPLES * view.grid.columns + column;
+                    std::array::from_fn(|sample| workspace.face[first + sample * view.grid.columns])
                 };
                 picture[pixel] += share * self.pixel(&workspace.prepared, &light, faces, ray);
             }

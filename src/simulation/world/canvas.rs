@@ -167,7 +167,7 @@ impl Canvas {
             let (dx, dy) = (x - reach, y - reach);
             let along = (dx * cosine + dy * sine) / radii[0];
             let across = (dy * cosine - dx * sine) / radii[1];
-            let inside = (1.0 - (along * along + across * across).sqrt()) / soft + 0.5;
+            let inside = (1.0 - along.hypot(across)) / soft + 0.5;
             (value, share * inside.clamp(0.0, 1.0))
         });
     }

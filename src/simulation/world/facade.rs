@@ -167,7 +167,7 @@ fn clutter(canvas: &mut Canvas, front: &Front, random: &mut RandomStream) {
         );
         canvas.shade(patch, number(random, 0.78, 1.22));
     }
-    for _ in 0..1 + random.index(2) {
+    for _ in 0..=random.index(2) {
         // A rain pipe with its brackets.
         let x = number(random, 0.2, w - 0.3);
         canvas.fill(Area::new(x, 0.0, 0.1, h), |u, v| {
@@ -175,7 +175,7 @@ fn clutter(canvas: &mut Canvas, front: &Front, random: &mut RandomStream) {
             (if bracket { 205.0 } else { 60.0 + 500.0 * u }, 1.0)
         });
     }
-    for _ in 0..(area * 0.05) as usize + 1 {
+    for _ in 0..=(area * 0.05) as usize {
         let vent = Area::new(number(random, 0.1, w - 0.5), number(random, 0.2, h - 0.4), 0.32, 0.24);
         canvas.rectangle(vent.inset(-0.025), 190.0);
         canvas.fill(vent, |_, v| (if (v * 24.0).fract() < 0.5 { 40.0 } else { 125.0 }, 1.0));

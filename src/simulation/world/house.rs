@@ -252,6 +252,6 @@ fn neighbours(world: &mut World, palette: &Palette, random: &mut RandomStream) {
         lamp(world, palette, [-31.0 + 12.0 * f64::from(k), -25.2], -1.57, random);
     }
     for (x, y) in [(-16.0, -31.4), (-4.0, -27.6), (9.5, -31.4), (23.0, -27.6)] {
-        car(world, palette, [x, y], if y < -30.0 { 0.0 } else { 3.14 }, random);
+        car(world, palette, [x, y], if y < -30.0 { 0.0 } else { std::f64::consts::PI }, random);
     }
 }

@@ -1,0 +1,121 @@
+//! The main job on the sample log: files, equal bytes, accuracy against the truth, pictures, and damage.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+const FILES: [&str; 6] = ["trajectory.tum", "calibration.csv", "rank.csv", "frames.csv", "rig.yaml", "summary.json"];
+
+fn sample(name: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("sample_logs").join(name)
+}
+
+fn dcvins(arguments: &[&str], threads: &str) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_dcvins"));
+    command.args(arguments).env("RAYON_NUM_THREADS", threads).env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
+    command.output().expect("the program starts")
+}
+
+/// Runs and asserts success; returns what was printed.
+fn succeed(arguments: &[&str], threads: &str) -> String {
+    let output = dcvins(arguments, threads);
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+fn text_of(path: &Path) -> &str {
+    path.to_str().expect("paths of tests are UTF-8")
+}
+
+#[test]
+fn three_runs_leave_the_same_bytes_twice_and_stay_near_the_truth() {
+    let folder = tempfile::tempdir().unwrap();
+    let log = sample("garden.mcap");
+    let run = |name: &str, threads: &str| {
+        let out = folder.path().join(name);
+        let specs = ["--run", "auto", "--run", "classical", "--run", "static"];
+        let mut arguments = vec!["run", text_of(&log), "--out", text_of(&out), "--no-timing"];
+        arguments.extend(specs);
+        succeed(&arguments, threads);
+        out
+    };
+    let (first, second) = (run("first", "2"), run("second", "1"));
+    for label in ["auto", "classical", "static"] {
+        for file in FILES {
+            let bytes = fs::read(first.join(label).join(file)).unwrap();
+            assert!(!bytes.is_empty(), "{label}/{file} is empty");
+            assert!(bytes == fs::read(second.join(label).join(file)).unwrap(), "{label}/{file} differs");
+        }
+        let text = fs::read_to_string(first.join(label).join("summary.json")).unwrap();
+        let summary: Value = serde_json::from_str(&text).unwrap();
+        let percent = summary["accuracy"]["ate_percent_of_length"].as_f64().unwrap();
+        assert!(percent < 1.0, "{label}: ATE {percent} % of the length");
+        let columns = summary["rank"]["columns"].as_u64().unwrap();
+        let structural = summary["rank"]["rank_structural"].as_u64().unwrap();
+        let expected = match label {
+            "auto" => (18, 18),
+            "classical" => (24, 18),
+            _ => (6, 6),
+        };
+        assert_eq!((columns, structural), expected, "{label}");
+        let calibrated = first.join(label).join("rig.yaml");
+        let again = folder.path().join("again");
+        let short = ["--duration", "0.5", "--rig", text_of(&calibrated), "--out", text_of(&again)];
+        let mut arguments = vec!["run", text_of(&log)];
+        arguments.extend(short);
+        succeed(&arguments, "2");
+    }
+}
+
+#[test]
+fn pictures_of_every_panel_repeat_to_the_byte() {
+    let folder = tempfile::tempdir().unwrap();
+    let log = sample("garden.mcap");
+    let draw = |panel: &str, name: &str, threads: &str| {
+        let file = folder.path().join(name);
+        let arguments =
+            ["screenshot", text_of(&log), "--at", "5", "--panel", panel, "--size", "640x400", "-o", text_of(&file)];
+        succeed(&arguments, threads);
+        fs::read(file).unwrap()
+    };
+    let first = draw("all", "first.png", "2");
+    assert!(first.starts_with(b"\x89PNG"));
+    assert!(first == draw("all", "second.png", "1"), "the same picture twice has the same bytes");
+    let output = dcvins(&["screenshot", text_of(&log), "--at", "5", "--panel", "speed", "-o", "x.png"], "2");
+    assert_eq!(output.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("convergence"), "the panels that exist are named");
+}
+
+#[test]
+fn a_truncated_log_plays_up_to_the_damage_with_a_warning() {
+    let folder = tempfile::tempdir().unwrap();
+    let bytes = fs::read(sample("garden.mcap")).unwrap();
+    let log = folder.path().join("cut.mcap");
+    fs::write(&log, &bytes[..bytes.len() / 2]).unwrap();
+    fs::copy(sample("garden.rig.yaml"), folder.path().join("cut.rig.yaml")).unwrap();
+    let out = folder.path().join("out");
+    let printed = succeed(&["run", text_of(&log), "--out", text_of(&out)], "2");
+    assert!(printed.contains("warning"), "{printed}");
+    assert!(succeed(&["check", text_of(&log)], "2").contains("cut.mcap"));
+}
+
+#[test]
+fn a_rig_with_a_missing_field_or_topic_is_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let rig = fs::read_to_string(sample("garden.rig.yaml")).unwrap();
+    let check = |from: &str, to: &str, words: &[&str]| {
+        assert!(rig.contains(from), "the sample rig holds '{from}'");
+        let file = folder.path().join("bad.yaml");
+        fs::write(&file, rig.replacen(from, to, 1)).unwrap();
+        let out = folder.path().join("out");
+        let log = sample("garden.mcap");
+        let output = dcvins(&["run", text_of(&log), "--rig", text_of(&file), "--out", text_of(&out)], "2");
+        let complaint = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(1), "{complaint}");
+        assert!(words.iter().all(|word| complaint.contains(word)), "{complaint}");
+    };
+    check("gravity:", "heaviness:", &["gravity"]);
+    check("rostopic: /imu", "rostopic: /nowhere", &["/nowhere", "/imu"]);
+}
