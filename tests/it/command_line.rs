@@ -23,7 +23,7 @@ fn wrong_use_is_exit_code_2() {
     check(&["fly"], 2, &["unrecognized subcommand", "fly"]);
     check(&["run", "log.mcap"], 2, &["--out"]);
     check(&["run", "log.mcap", "--out", "x", "--run", "minimol"], 2, &["minimol", "minimal-swapped"]);
-    check(&["run", "log.mcap", "--out", "x", "--start", "-3"], 2, &["--start"]);
+    check(&["run", "log.mcap", "--out", "x", "--start=-3"], 2, &["--start"]);
     check(&["evaluate", "a.tum", "b.tum", "--delta", "3x"], 2, &["--delta", "10m"]);
     check(&["simulate", "T9", "-o", "x.mcap"], 2, &["T9", "t1"]);
 }
