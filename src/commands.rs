@@ -32,6 +32,7 @@ fn print(text: &str) -> Result<()> {
 }
 
 /// Says something to the person at the terminal.
+#[cfg(feature = "gui")]
 fn tell(text: &str) {
     // With standard error gone there is nobody left to tell.
     drop(writeln!(io::stderr(), "{text}"));
