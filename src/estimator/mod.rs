@@ -41,7 +41,7 @@ pub use report::{
 
 use nalgebra::Vector3;
 
-use crate::flight_log::ImuSample;
+use crate::flight_log::{ImuSample, JointAngles};
 use crate::frontend::TrackedFrame;
 
 /// What one image brings to the estimator.
@@ -53,8 +53,8 @@ pub struct StepInput<'a> {
     pub stamp_ns: i64,
     /// IMU samples from the previous image's stamp to this one's, both ends included and interpolated.
     pub imu: &'a [ImuSample],
-    /// Encoder angles at the stamp, in the order of the joints, `None` without encoders.
-    pub joint_angles_rad: Option<&'a [f64]>,
+    /// Encoder angles at the stamp with their standard deviations, `None` without encoders.
+    pub joint_angles: Option<&'a JointAngles>,
     /// The tracked features.
     pub tracks: &'a TrackedFrame,
 }

@@ -31,7 +31,6 @@ pub(super) struct Problem<'a> {
     pub(super) gravity_in_world: Vector3<f64>,
     pub(super) frames: &'a [Frame],
     pub(super) tracks: &'a [Track],
-    pub(super) encoder_sigma_rad: Option<f64>,
     pub(super) prior: Option<&'a Prior>,
     pub(super) start: Option<&'a StartPrior>,
     pub(super) first_estimates: bool,
@@ -135,12 +134,14 @@ impl Problem<'_> {
         slot: usize,
         state: &'s FrameState,
     ) -> impl Iterator<Item = (usize, f64, f64)> + 's {
-        let readings = self.frames[slot].encoder_rad.as_deref().unwrap_or(&[]);
-        let sigma = self.encoder_sigma_rad;
-        state.joints_rad.iter().zip(readings).enumerate().filter_map(move |(joint, (angle, reading))| {
-            let sigma = sigma?;
-            Some((joint, wrap(angle - reading) / sigma, 1.0 / sigma))
-        })
+        let readings =
+            self.frames[slot].encoder.iter().flat_map(|encoder| encoder.angles_rad.iter().zip(&encoder.sigmas_rad));
+        state
+            .joints_rad
+            .iter()
+            .zip(readings)
+            .enumerate()
+            .map(|(joint, (angle, (reading, sigma)))| (joint, wrap(angle - reading) / sigma, 1.0 / sigma))
     }
 
     /// Calibration at which derivatives are taken.

@@ -72,8 +72,10 @@ pub struct FrameStateReport {
     pub gyroscope_bias_rad_per_s: Vector3<f64>,
     /// Joint angles as estimated (without the static offsets), empty for a rigid camera.
     pub joint_angles_rad: Vec<f64>,
-    /// Encoder readings, `None` without.
+    /// Encoder angles at the stamp, `None` without encoders.
     pub encoder_angles_rad: Option<Vec<f64>>,
+    /// Their standard deviations, from the noise of the readings and how many could be averaged.
+    pub encoder_sigmas_rad: Option<Vec<f64>>,
     /// Pose of the camera on the IMU at these joint angles.
     pub imu_from_camera: RigidTransform,
     /// Whether it is a keyframe.

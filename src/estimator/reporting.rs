@@ -69,7 +69,8 @@ impl Estimator {
                     accelerometer_bias_m_per_s2: navigation.bias.accelerometer_m_per_s2,
                     gyroscope_bias_rad_per_s: navigation.bias.gyroscope_rad_per_s,
                     joint_angles_rad: frame.state.joints_rad.clone(),
-                    encoder_angles_rad: frame.encoder_rad.clone(),
+                    encoder_angles_rad: frame.encoder.as_ref().map(|encoder| encoder.angles_rad.clone()),
+                    encoder_sigmas_rad: frame.encoder.as_ref().map(|encoder| encoder.sigmas_rad.clone()),
                     imu_from_camera: self.calibration.imu_from_camera(&frame.state.joints_rad),
                     keyframe: frame.keyframe,
                 }
@@ -150,7 +151,7 @@ impl Estimator {
         let problem = self.problem(&solved.tracks);
         let joints = problem.layout.joints;
         let sightings: usize = solved.tracks.iter().map(|track| track.sightings.len()).sum();
-        let read = self.frames.iter().filter(|frame| frame.encoder_rad.is_some()).count();
+        let read = self.frames.iter().filter(|frame| frame.encoder.is_some()).count();
         let intervals = self.frames.iter().skip(1).filter(|frame| frame.motion_information.is_some()).count();
         let held = self.prior.as_ref().map_or(0, super::prior::Prior::len)
             + if self.start.is_some() { super::prior::StartPrior::LEN } else { 0 };

@@ -12,9 +12,10 @@ use super::initialization::{
 };
 use super::preintegration::{NavigationState, Preintegration};
 use super::prior::StartPrior;
+use super::tracking::UNKNOWN_TURN_RAD;
 use super::window::{Frame, FrameState};
 use super::{Event, EventKind, Phase, StepInput, StepReport};
-use crate::flight_log::ImuSample;
+use crate::flight_log::{ImuSample, JointAngles};
 use crate::frontend::TrackedFrame;
 use crate::geometry::{RigidTransform, seconds_from_ns, so3};
 
@@ -24,7 +25,7 @@ pub(super) struct WaitingFrame {
     index: usize,
     stamp_ns: i64,
     tracks: TrackedFrame,
-    encoder_rad: Option<Vec<f64>>,
+    encoder: Option<JointAngles>,
     imu_from_camera: RigidTransform,
     imu: Vec<ImuSample>,
 }
@@ -66,8 +67,8 @@ impl Estimator {
     }
 
     fn keep_waiting_frame(&mut self, input: &StepInput<'_>, events: &mut Vec<Event>) {
-        let encoder_rad = self.encoder_reading(input);
-        let joints = encoder_rad.clone().unwrap_or_else(|| vec![0.0; self.calibration.joint_count()]);
+        let encoder = self.encoder_reading(input);
+        let joints = self.angles_to_start_from(encoder.as_ref());
         if let Some(last) = self.waiting.back() {
             let interval_s = seconds_from_ns(input.stamp_ns - last.stamp_ns);
             let hole_s = longest_hole_s(input, last.stamp_ns);
@@ -89,13 +90,24 @@ impl Estimator {
             stamp_ns: input.stamp_ns,
             tracks: input.tracks.clone(),
             imu_from_camera: self.calibration.imu_from_camera(&joints),
-            encoder_rad,
+            encoder,
             imu: input.imu.to_vec(),
         });
         let longest_ns = (self.initialization_options().longest_window_s * 1e9) as i64;
         while self.waiting.front().is_some_and(|first| input.stamp_ns - first.stamp_ns > longest_ns) {
             self.waiting.pop_front();
         }
+    }
+
+    fn angles_to_start_from(&self, encoder: Option<&JointAngles>) -> Vec<f64> {
+        encoder.map_or_else(|| vec![0.0; self.calibration.joint_count()], |encoder| encoder.angles_rad.clone())
+    }
+
+    /// The largest standard deviation of the angles that the waiting frames start from, `None` when one has none.
+    fn largest_encoder_sigma_rad(&self) -> Option<f64> {
+        self.waiting.iter().try_fold(0.0, |largest: f64, frame| {
+            frame.encoder.as_ref().map(|encoder| encoder.sigmas_rad.iter().copied().fold(largest, f64::max))
+        })
     }
 
     fn initialization_options(&self) -> InitializationOptions {
@@ -116,7 +128,7 @@ impl Estimator {
             translation_bound_m: translation_m * 3.0_f64.sqrt(),
             rotation_bound_rad: rotation_rad * 3.0_f64.sqrt(),
         };
-        base.for_gimbal(&bounds, joints, self.config.encoder_in_use())
+        base.for_gimbal(&bounds, joints, self.largest_encoder_sigma_rad())
     }
 
     fn attempt(&self) -> InitializationOutcome {
@@ -197,7 +209,7 @@ impl Estimator {
             let motion = std::mem::replace(&mut imu, Preintegration::new(self.noise, solution.bias));
             let first = self.frames.is_empty();
             let motion = if first { Preintegration::new(self.noise, solution.bias) } else { motion };
-            let joints_rad = waiting.encoder_rad.clone().unwrap_or_else(|| vec![0.0; self.calibration.joint_count()]);
+            let joints_rad = self.angles_to_start_from(waiting.encoder.as_ref());
             let navigation = NavigationState {
                 world_from_imu: world * view.world_from_imu,
                 velocity_m_per_s: world.rotation * view.velocity_m_per_s,
@@ -209,7 +221,7 @@ impl Estimator {
                 stamp_ns: waiting.stamp_ns,
                 state: FrameState { navigation, joints_rad },
                 first_estimate: None,
-                encoder_rad: waiting.encoder_rad,
+                encoder: waiting.encoder,
                 keyframe: true,
                 motion_information: motion.square_root_information(),
                 motion,
@@ -255,7 +267,9 @@ impl Estimator {
         }
         let dof = self.calibration.dof();
         let total = dof + joints * mounts.len();
-        let sigma = self.config.encoder_in_use().unwrap_or(1.0);
+        let sigma = |slot: usize, joint: usize| -> f64 {
+            self.frames[slot].encoder.as_ref().map_or(UNKNOWN_TURN_RAD, |encoder| encoder.sigmas_rad[joint])
+        };
         let starts: Vec<Vec<f64>> = self.frames.iter().map(|frame| frame.state.joints_rad.clone()).collect();
         let mut angles = starts.clone();
         let mut calibration: Calibration = self.calibration.clone();
@@ -278,8 +292,9 @@ impl Estimator {
                 hessian += rows.tr_mul(&rows);
                 gradient += rows.tr_mul(&(error / MOUNT_FIT_SIGMA_RAD));
                 for joint in 0..joints {
-                    hessian[(place + joint, place + joint)] += 1.0 / (sigma * sigma);
-                    gradient[place + joint] += (angles[slot][joint] - starts[slot][joint]) / (sigma * sigma);
+                    let weight = sigma(slot, joint).powi(-2);
+                    hessian[(place + joint, place + joint)] += weight;
+                    gradient[place + joint] += (angles[slot][joint] - starts[slot][joint]) * weight;
                 }
             }
             let Some(factor) = hessian.cholesky() else { return };

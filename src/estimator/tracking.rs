@@ -14,8 +14,12 @@ use super::solver::{self, Solution, SolverLimits};
 use super::visual::{self, RelativePoses, Sighting, Track, VisualModel};
 use super::window::{self, Frame, FrameState};
 use super::{Event, EventKind, StepInput};
+use crate::flight_log::JointAngles;
 use crate::frontend::FeatureId;
 use crate::geometry::seconds_from_ns;
+
+/// How far a joint may have turned since the frame before where no encoder tells it, as a standard deviation.
+pub(super) const UNKNOWN_TURN_RAD: f64 = 1.0;
 
 /// Pixel residuals by track and sighting.
 pub(super) type TrackResiduals = Vec<Vec<Option<Vector2<f64>>>>;
@@ -47,15 +51,16 @@ impl Estimator {
             });
         }
         let navigation = motion.predict(&last.state.navigation, &self.gravity_in_world);
-        let encoder_rad = self.encoder_reading(input);
-        let joints_rad = encoder_rad.clone().unwrap_or_else(|| last.state.joints_rad.clone());
+        let encoder = self.encoder_reading(input);
+        let joints_rad =
+            encoder.as_ref().map_or_else(|| last.state.joints_rad.clone(), |encoder| encoder.angles_rad.clone());
         let motion_information = motion.square_root_information();
         self.frames.push(Frame {
             index: input.frame_index,
             stamp_ns: input.stamp_ns,
             state: FrameState { navigation, joints_rad },
             first_estimate: None,
-            encoder_rad,
+            encoder,
             keyframe: false,
             motion,
             motion_information,
@@ -66,12 +71,16 @@ impl Estimator {
         Ok(())
     }
 
-    /// Encoder readings that can be used.
-    pub(super) fn encoder_reading(&self, input: &StepInput<'_>) -> Option<Vec<f64>> {
+    /// Encoder angles that can be used.
+    pub(super) fn encoder_reading(&self, input: &StepInput<'_>) -> Option<JointAngles> {
         self.config.encoder_in_use()?;
-        let readings = input.joint_angles_rad?;
-        let usable = readings.len() == self.calibration.joint_count() && readings.iter().all(|angle| angle.is_finite());
-        usable.then(|| readings.to_vec())
+        let angles = input.joint_angles?;
+        let count = self.calibration.joint_count();
+        let usable = angles.angles_rad.len() == count
+            && angles.sigmas_rad.len() == count
+            && angles.angles_rad.iter().all(|angle| angle.is_finite())
+            && angles.sigmas_rad.iter().all(|sigma| sigma.is_finite() && *sigma > 0.0);
+        usable.then(|| angles.clone())
     }
 
     /// Turns the newest frame's joints so that the known landmarks meet their measurements, pose held: an encoder may be
@@ -84,8 +93,9 @@ impl Estimator {
         let slot = self.frames.len() - 1;
         let cameras = self.camera_poses();
         let sigma = self.config.options.pixel_sigma_px;
-        let prior_sigma =
-            self.config.encoder_in_use().filter(|_| self.frames[slot].encoder_rad.is_some()).unwrap_or(1.0);
+        let known = self.frames[slot].encoder.as_ref().map(|encoder| encoder.sigmas_rad.as_slice());
+        let prior =
+            DVector::from_fn(joints, |joint, _| known.map_or(UNKNOWN_TURN_RAD, |sigmas| sigmas[joint]).powi(-2));
         let start = self.frames[slot].state.joints_rad.clone();
         let mut angles = start.clone();
         for _ in 0..5 {
@@ -94,9 +104,8 @@ impl Estimator {
             let camera = camera_pose::at(&state, &self.calibration);
             let own = CameraMaps::new(std::slice::from_ref(&state), &self.calibration).own.remove(0);
             let by_joints = own.columns(6, joints).into_owned();
-            let mut hessian = DMatrix::identity(joints, joints) / (prior_sigma * prior_sigma);
-            let mut gradient =
-                DVector::from_fn(joints, |joint, _| (angles[joint] - start[joint]) / (prior_sigma * prior_sigma));
+            let mut hessian = DMatrix::from_diagonal(&prior);
+            let mut gradient = DVector::from_fn(joints, |joint, _| (angles[joint] - start[joint]) * prior[joint]);
             for feature in self.features.values() {
                 let (Some(anchor), Some(landmark), Some(seen)) =
                     (feature.anchor(), feature.landmark.as_ref(), feature.observation(slot))
@@ -146,7 +155,6 @@ impl Estimator {
             gravity_in_world: self.gravity_in_world,
             frames: &self.frames,
             tracks,
-            encoder_sigma_rad: self.config.encoder_in_use(),
             prior: self.prior.as_ref(),
             start: self.start.as_ref(),
             first_estimates: options.first_estimates,

@@ -7,6 +7,7 @@ use nalgebra::{DVector, Vector2, Vector3};
 use super::layout::{Layout, POSE, SPEED_BIAS};
 use super::preintegration::{Matrix15, NavigationState, Preintegration, Vector15};
 use super::reprojection::Landmark;
+use crate::flight_log::JointAngles;
 use crate::frontend::FeatureId;
 
 /// The unknowns of one frame (Eq. 7).
@@ -67,8 +68,8 @@ pub(super) struct Frame {
     pub(super) state: FrameState,
     /// Where the marginalization prior was linearized, for frames that it holds.
     pub(super) first_estimate: Option<FrameState>,
-    /// Encoder readings.
-    pub(super) encoder_rad: Option<Vec<f64>>,
+    /// What the encoders say.
+    pub(super) encoder: Option<JointAngles>,
     /// Whether it is a keyframe.
     pub(super) keyframe: bool,
     /// Inertial samples from the frame before it in the window.

@@ -22,6 +22,6 @@ pub use image_reader::ImageReader;
 pub use log::{FlightLog, TopicInfo};
 pub use messages::MessageKind;
 pub use rig::Rig;
-pub use samples::{GrayImage, ImuSample, JointSample, LogWarning, PoseSample, SensorFrame};
+pub use samples::{GrayImage, ImuSample, JointAngles, JointSample, LogWarning, PoseSample, SensorFrame};
 pub use stream::FrameStream;
 pub use writer::{LogCompression, LogWriter, LogWriterOptions, MessageTimes};

@@ -24,6 +24,16 @@ pub struct JointSample {
     pub angles_rad: Vec<f64>,
 }
 
+/// The joint angles at an image's stamp as the encoders tell them, in the order of the rig's links, without the static
+/// offsets.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JointAngles {
+    /// One angle per joint in radians.
+    pub angles_rad: Vec<f64>,
+    /// Standard deviation of each in radians: less than the rig's for one reading where several could be averaged.
+    pub sigmas_rad: Vec<f64>,
+}
+
 /// A ground-truth pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseSample {
@@ -69,8 +79,8 @@ pub struct SensorFrame {
     /// interpolated to the very stamps (shifted by the rig's `timeshift_cam_imu`).
     /// The first frame has the samples before it, as far as they go back (at most 2 s).
     pub imu: Vec<ImuSample>,
-    /// Encoder angles interpolated at the stamp, `None` without encoders or when no sample lies within 0.1 s.
-    pub joint_angles_rad: Option<Vec<f64>>,
+    /// Encoder angles at the stamp, from all readings around it; `None` without encoders or when none lies within 0.1 s.
+    pub joint_angles: Option<JointAngles>,
     /// Ground truth interpolated at the stamp: for comparison and drawing only, never for estimating.
     pub truth: Option<RigidTransform>,
     /// What was wrong with the log since the frame before.

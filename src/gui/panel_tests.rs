@@ -66,6 +66,7 @@ fn trying_cases() -> Vec<(&'static str, Recording, i64)> {
         for frame in &mut step.report.window {
             frame.joint_angles_rad.clear();
             frame.encoder_angles_rad = None;
+            frame.encoder_sigmas_rad = None;
         }
         step.rank = None;
     }

@@ -435,6 +435,7 @@ fn tracking_report(
                 gyroscope_bias_rad_per_s: Vector3::new(-0.0006, -0.0002, -0.0075),
                 joint_angles_rad: angles.to_vec(),
                 encoder_angles_rad: Some(angles.iter().map(|angle| angle + 0.0087 * dice.normal()).collect()),
+                encoder_sigmas_rad: Some(vec![0.0087; 3]),
                 imu_from_camera: chain_pose(&calibration.classical, angles),
                 keyframe: frame.is_multiple_of(4),
             }

@@ -37,7 +37,9 @@ pub(super) fn estimator_config(rig: &Rig, spec: &RunSpec) -> Result<EstimatorCon
         ParameterizationChoice::Classical => Parameterization::Classical,
         ParameterizationChoice::Poe => Parameterization::Poe,
     };
-    let encoder_sigma_rad = gimbal.and_then(|gimbal| gimbal.encoder_sigma_rad);
+    // Without a topic there is no reading, whatever its noise would be.
+    let encoders = gimbal.filter(|gimbal| gimbal.topic.is_some());
+    let encoder_sigma_rad = encoders.and_then(|gimbal| gimbal.encoder_sigma_rad);
     let has_joints = !chain.links.is_empty();
     Ok(EstimatorConfig {
         camera: camera.model.clone(),

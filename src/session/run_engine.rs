@@ -31,7 +31,7 @@ impl RunEngine {
             frame_index: frame.index,
             stamp_ns: frame.stamp_ns,
             imu: &frame.imu,
-            joint_angles_rad: frame.joint_angles_rad.as_deref().filter(|_| self.has_joints),
+            joint_angles: frame.joint_angles.as_ref().filter(|_| self.has_joints),
             tracks: &tracked.tracks,
         });
         let estimated_ms = watch.elapsed_ms();

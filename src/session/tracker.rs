@@ -89,10 +89,10 @@ impl CameraTracker {
 
     /// Orientation of the camera on the IMU by the rig and the encoders, `None` when a joint's angle is not known.
     fn imu_from_camera(&self, frame: &SensorFrame) -> Option<UnitQuaternion<f64>> {
-        let angles_rad = match &frame.joint_angles_rad {
+        let angles_rad = match &frame.joint_angles {
             // A rigid camera of a gimbal rig has readings beside it that are not its own.
             _ if self.chain.links.is_empty() => &[],
-            Some(angles_rad) => angles_rad.as_slice(),
+            Some(angles) => angles.angles_rad.as_slice(),
             None => return None,
         };
         Some(self.chain.imu_from_camera(angles_rad).rotation)

@@ -9,10 +9,10 @@ use crate::estimator::preintegration::{ImuBias, NavigationState, Preintegration}
 use crate::estimator::prior::StartPrior;
 use crate::estimator::window::{Frame, FrameState};
 use crate::estimator::{Estimator, EstimatorConfig, EstimatorOptions, features};
-use crate::flight_log::Rig;
 use crate::flight_log::rig::CameraMount;
+use crate::flight_log::{JointAngles, Rig};
 use crate::gimbal::{Chain, ClassicalChain, Parameterization};
-use crate::simulation::{Lens, SyntheticFlight, SyntheticMount, SyntheticOptions, synthetic_tracks};
+use crate::simulation::{Lens, SyntheticFlight, SyntheticFrame, SyntheticMount, SyntheticOptions, synthetic_tracks};
 
 pub(super) fn camera(lens: Lens) -> CameraModel {
     let options = SyntheticOptions { duration_s: 0.1, lens, ..SyntheticOptions::default() };
@@ -49,6 +49,13 @@ pub(super) fn config(rig: &Rig, parameterization: Parameterization, options: Est
         options,
         clock_ms: || 0.0,
     }
+}
+
+/// What the encoders of a synthetic frame say.
+pub(super) fn encoder(frame: &SyntheticFrame, sigma_rad: Option<f64>) -> Option<JointAngles> {
+    let sigma_rad = sigma_rad?;
+    let angles_rad = frame.joint_angles_rad.clone()?;
+    Some(JointAngles { sigmas_rad: vec![sigma_rad; angles_rad.len()], angles_rad })
 }
 
 fn flight(gimbal: bool) -> SyntheticFlight {
@@ -92,7 +99,7 @@ pub(super) fn window(parameterization: Parameterization, gimbal: bool, options: 
                 joints_rad: truth.true_joint_angles_rad.clone(),
             },
             first_estimate: None,
-            encoder_rad: truth.joint_angles_rad.clone(),
+            encoder: encoder(truth, estimator.config.encoder_sigma_rad),
             keyframe: true,
             motion_information: motion.square_root_information(),
             motion,

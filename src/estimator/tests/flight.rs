@@ -24,11 +24,12 @@ fn options(mount: SyntheticMount) -> SyntheticOptions {
 }
 
 fn step(estimator: &mut Estimator, frame: &SyntheticFrame) -> StepReport {
+    let joint_angles = fixture::encoder(frame, estimator.config().encoder_sigma_rad);
     estimator.step(&StepInput {
         frame_index: frame.index,
         stamp_ns: frame.stamp_ns,
         imu: &frame.imu,
-        joint_angles_rad: frame.joint_angles_rad.as_deref(),
+        joint_angles: joint_angles.as_ref(),
         tracks: &frame.tracks,
     })
 }

@@ -1,10 +1,10 @@
 use std::collections::VecDeque;
-use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
 use super::super::messages::{self, MessageKind};
 use super::super::picture::decode_picture;
 use super::super::{FlightLog, GrayImage, ImuSample, JointSample, LogError, LogWarning, PoseSample, Rig, SensorFrame};
+use super::joint_angles::JointAngleStream;
 use super::ordered::{Decoder, MessageSource, OrderedSamples, ReadContext, Refusal};
 use crate::geometry::{RigidTransform, ns_from_seconds, seconds_from_ns};
 
@@ -12,7 +12,7 @@ use crate::geometry::{RigidTransform, ns_from_seconds, seconds_from_ns};
 const FIRST_FRAME_IMU_NS: i64 = 2_000_000_000;
 /// Log times may lag behind header stamps by this much; reading begins so much earlier.
 const SEEK_MARGIN_NS: i64 = 1_000_000_000;
-/// A joint angle or a true pose further than this from the image's stamp does not count.
+/// A true pose further than this from the image's stamp does not count.
 const NEAREST_NS: i64 = 100_000_000;
 /// Longer pauses between IMU samples, in periods, are told.
 const IMU_GAP_PERIODS: f64 = 3.5;
@@ -62,7 +62,7 @@ pub(super) struct FrameSource {
     imu_ended: bool,
     /// IMU samples not before the previous frame, and the first one after the frame.
     samples: VecDeque<ImuSample>,
-    joints: Option<Lookup<JointSample>>,
+    joints: Option<JointAngleStream>,
     truth: Option<Lookup<PoseSample>>,
     /// IMU interpolated at the previous frame's end.
     previous_end: Option<ImuSample>,
@@ -110,7 +110,9 @@ impl FrameSource {
         let end_ns = duration_s.map_or(i64::MAX, |duration_s| start_ns.saturating_add(ns_from_seconds(duration_s)));
         let shift_ns = ns_from_seconds(camera.timeshift_cam_imu_s);
         let from_ns = start_ns.saturating_sub(FIRST_FRAME_IMU_NS + SEEK_MARGIN_NS + shift_ns.abs());
-        let joints = joint_samples(log, rig, from_ns)?.map(Lookup::new);
+        let half_interval_ns = gap_ns(0.5, camera.rate_hz, images.rate_hz);
+        let joints = joint_samples(log, rig, from_ns)?
+            .map(|(samples, sigma_rad)| JointAngleStream::new(samples, sigma_rad, half_interval_ns));
         let truth = truth_samples(log, rig, from_ns, &mut context).map(Lookup::new);
         let log_warnings = log.warnings().iter().cloned().collect();
         let stream = CameraStream {
@@ -149,6 +151,7 @@ impl FrameSource {
             if stamp_ns > self.end_ns {
                 return None;
             }
+            let previous_ns = self.camera.previous_stamp_ns.map(|previous| previous + self.camera.shift_ns);
             self.camera.check_gap(&mut self.context, stamp_ns, self.start_ns);
             let imu_stamp_ns = stamp_ns + self.camera.shift_ns;
             self.read_imu_until(imu_stamp_ns);
@@ -168,7 +171,8 @@ impl FrameSource {
             let Some(image) = self.camera.decode(&mut self.context, stamp_ns, &pending) else { continue };
             self.tell_skipped();
             let imu = self.take_imu(imu_stamp_ns);
-            let joint_angles_rad = self.joint_angles_at(imu_stamp_ns);
+            let context = &mut self.context;
+            let joint_angles = self.joints.as_mut().and_then(|joints| joints.at(context, imu_stamp_ns, previous_ns));
             let truth = self.truth_at(imu_stamp_ns);
             while self.log_warnings.front().is_some_and(|warning| warning.stamp_ns <= stamp_ns) {
                 self.context.warnings.extend(self.log_warnings.pop_front());
@@ -179,7 +183,7 @@ impl FrameSource {
                 log_time_ns: pending.log_time_ns,
                 image: Arc::new(image),
                 imu,
-                joint_angles_rad,
+                joint_angles,
                 truth,
                 warnings: std::mem::take(&mut self.context.warnings),
             });
@@ -243,23 +247,6 @@ impl FrameSource {
         }
         self.forget_samples_before(end_ns);
         imu
-    }
-
-    fn joint_angles_at(&mut self, stamp_ns: i64) -> Option<Vec<f64>> {
-        let [before, after] = self.joints.as_mut()?.around(&mut self.context, stamp_ns);
-        let nearest_ns = [before, after].into_iter().flatten().map(|(at, _)| (at - stamp_ns).abs()).min()?;
-        if nearest_ns > NEAREST_NS {
-            return None;
-        }
-        match (before, after) {
-            (Some((from_ns, from)), Some((to_ns, to))) => {
-                let share = share_of(*from_ns, *to_ns, stamp_ns);
-                let pairs = from.angles_rad.iter().zip(&to.angles_rad);
-                Some(pairs.map(|(from, to)| from + share * wrap_angle(to - from)).collect())
-            }
-            (Some((_, only)), None) | (None, Some((_, only))) => Some(only.angles_rad.clone()),
-            (None, None) => None,
-        }
     }
 
     fn truth_at(&mut self, stamp_ns: i64) -> Option<RigidTransform> {
@@ -354,11 +341,6 @@ fn share_of(from_ns: i64, to_ns: i64, stamp_ns: i64) -> f64 {
     if to_ns > from_ns { (stamp_ns - from_ns) as f64 / (to_ns - from_ns) as f64 } else { 0.0 }
 }
 
-/// An angle brought into (−π, π].
-fn wrap_angle(angle_rad: f64) -> f64 {
-    PI - (PI - angle_rad).rem_euclid(TAU)
-}
-
 fn interpolate_imu(from: &ImuSample, to: &ImuSample, stamp_ns: i64) -> ImuSample {
     let share = share_of(from.stamp_ns, to.stamp_ns, stamp_ns);
     if share >= 1.0 {
@@ -410,12 +392,14 @@ fn imu_decoder(epoch_ns: i64) -> Decoder<ImuSample> {
     })
 }
 
-/// The gimbal's encoder samples, `None` without a gimbal or encoders.
-fn joint_samples(log: &FlightLog, rig: &Rig, from_ns: i64) -> Result<Option<OrderedSamples<JointSample>>, LogError> {
-    let Some(gimbal) = rig.gimbal.as_ref().filter(|gimbal| gimbal.encoder_sigma_rad.is_some()) else {
-        return Ok(None);
-    };
-    let Some(topic) = &gimbal.topic else { return Ok(None) };
+/// The gimbal's encoder samples and their noise, `None` without a gimbal or encoders.
+fn joint_samples(
+    log: &FlightLog,
+    rig: &Rig,
+    from_ns: i64,
+) -> Result<Option<(OrderedSamples<JointSample>, f64)>, LogError> {
+    let Some(gimbal) = &rig.gimbal else { return Ok(None) };
+    let (Some(topic), Some(sigma_rad)) = (&gimbal.topic, gimbal.encoder_sigma_rad) else { return Ok(None) };
     log.require_topic("gimbal.rostopic", topic, &[MessageKind::JointState])?;
     let names: Vec<String> = gimbal.joints.iter().map(|joint| joint.name.clone()).collect();
     let known = log.find_message(topic, |data| {
@@ -449,7 +433,7 @@ fn joint_samples(log: &FlightLog, rig: &Rig, from_ns: i64) -> Result<Option<Orde
         }
         Ok((message.stamp_ns, JointSample { stamp_ns: message.stamp_ns.saturating_sub(epoch_ns), angles_rad }))
     });
-    Ok(Some(OrderedSamples::new(log, topic, from_ns, false, decode)))
+    Ok(Some((OrderedSamples::new(log, topic, from_ns, false, decode), sigma_rad)))
 }
 
 /// The true poses, `None` when the rig names none or the log has none.

@@ -1,7 +1,11 @@
 //! The log as one camera's frames, each with the samples of the other sensors that belong to it.
 
+mod angle_fit;
 mod frames;
+mod joint_angles;
 mod ordered;
+#[cfg(test)]
+mod tests;
 
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, sync_channel};

@@ -31,8 +31,8 @@ fn frames_are_the_same_whatever_the_container() {
                 (expected.index, expected.stamp_ns, expected.log_time_ns)
             );
             assert_eq!(
-                (&frame.imu, &frame.joint_angles_rad, frame.truth),
-                (&expected.imu, &expected.joint_angles_rad, expected.truth)
+                (&frame.imu, &frame.joint_angles, frame.truth),
+                (&expected.imu, &expected.joint_angles, expected.truth)
             );
         }
     }
@@ -61,7 +61,7 @@ fn a_frame_holds_what_belongs_to_it() {
             assert_eq!(frame.imu.len(), 12, "10 samples inside and two ends");
         }
 
-        let angle = frame.joint_angles_rad.as_ref().unwrap()[0];
+        let angle = frame.joint_angles.as_ref().unwrap().angles_rad[0];
         let defect = (angle - yaw_rad(stamp_ns)).rem_euclid(std::f64::consts::TAU);
         assert!(defect.min(std::f64::consts::TAU - defect) < 1e-9, "{angle} at {stamp_ns}");
         let defect = frame.truth.unwrap().minus(&true_pose(stamp_ns));
@@ -80,8 +80,8 @@ fn a_replay_from_the_middle_continues_the_numbers() {
     assert_eq!(first.imu.len(), 401);
     for (late, all) in late[1..].iter().zip(&all[45..]) {
         assert_eq!(
-            (late.index, &late.image, &late.imu, &late.joint_angles_rad),
-            (all.index, &all.image, &all.imu, &all.joint_angles_rad)
+            (late.index, &late.image, &late.imu, &late.joint_angles),
+            (all.index, &all.image, &all.imu, &all.joint_angles)
         );
     }
 }
@@ -104,7 +104,7 @@ fn a_rig_without_encoders_gives_frames_without_angles() {
     ] {
         let (frames, warnings) = play(&Flight { joints: false, ..Flight::default() }, &rig, 0.0);
         assert_eq!((frames.len(), warnings.len()), (60, 0));
-        assert!(frames.iter().all(|frame| frame.joint_angles_rad.is_none()));
+        assert!(frames.iter().all(|frame| frame.joint_angles.is_none()));
     }
 }
 

@@ -38,7 +38,7 @@ fn a_simulated_log_reads_back_with_its_rig_and_truth() {
             assert!(frame.log_time_ns > frame.stamp_ns + 15_000_000);
             assert_eq!([frame.image.width, frame.image.height], [96, 72]);
             assert!(frame.truth.is_some());
-            assert_eq!(frame.joint_angles_rad.as_ref().map(Vec::len), Some(3));
+            assert_eq!(frame.joint_angles.as_ref().map(|angles| angles.angles_rad.len()), Some(3));
             let spread = frame.image.pixels.iter().max().unwrap() - frame.image.pixels.iter().min().unwrap();
             assert!(spread > 60);
         }
