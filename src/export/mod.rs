@@ -20,4 +20,4 @@ pub use evaluation::{EvaluationOptions, EvaluationReport, evaluate};
 pub use picture::{PANEL_NAMES, PictureError, PictureOptions, draw_panel, panel_names, png_bytes, write_png};
 pub use recent_files::RecentFiles;
 pub use run_files::{RunFileOptions, write_run};
-pub use summary::{RunSummary, StageSummary, log_name, summarize};
+pub use summary::{RunSummary, StageSummary, TimingSummary, log_name, summarize};
