@@ -1,9 +1,11 @@
 use nalgebra::{UnitQuaternion, Vector2, Vector3};
 use thiserror::Error;
 
+use super::coarse::{self, CoarseAligner};
 use super::corners::{CornerDetector, CornerOptions, PointGrid};
 use super::lucas_kanade::{self, LucasKanadeOptions};
 use super::outliers::{self, BearingPair, Motion, OutlierOptions};
+use super::prediction::PredictedRotation;
 use super::pyramid::Pyramid;
 use super::tracks::{FeatureId, FrontEndStatistics, TrackedFeature, TrackedFrame};
 use crate::camera::CameraModel;
@@ -75,6 +77,7 @@ pub struct FrontEnd {
     now: Pyramid,
     tracks: Vec<Track>,
     next_id: u64,
+    coarse: CoarseAligner,
     detector: CornerDetector,
     crowd: PointGrid,
     found: Vec<Vector2<f64>>,
@@ -91,6 +94,7 @@ impl FrontEnd {
     /// A front end for one camera, before its first image.
     pub fn new(camera: CameraModel, options: FrontEndOptions) -> Self {
         Self {
+            coarse: CoarseAligner::new(camera.clone()),
             camera,
             options,
             previous: Pyramid::default(),
@@ -110,7 +114,7 @@ impl FrontEnd {
 
     /// Takes in the next image.
     ///
-    /// `predicted_rotation` is `camera_now_from_camera_previous` since the last image that was taken in, as from
+    /// `predicted` is the rotation since the last image that was taken in, as from
     /// [`predict_camera_rotation`](super::predict_camera_rotation); it may be wrong, and `None` when nothing is known.
     ///
     /// # Errors
@@ -119,20 +123,21 @@ impl FrontEnd {
         &mut self,
         image: &GrayImage,
         stamp_ns: i64,
-        predicted_rotation: Option<&UnitQuaternion<f64>>,
+        predicted: Option<&PredictedRotation>,
     ) -> Result<TrackedFrame, FrontEndError> {
         self.check(image)?;
-        self.now.build(image, self.options.lucas_kanade.levels);
+        self.now.build(image, self.options.lucas_kanade.levels + coarse::EXTRA_LEVELS);
         let mut statistics = FrontEndStatistics::default();
         let before = self.tracks.len();
-        let steps = self.follow(predicted_rotation);
+        let expected = self.coarse.search_rotation(&self.previous, &self.now, predicted);
+        let steps = self.follow(expected.as_ref());
         statistics.lost = before - steps.len();
-        let (steps, motion) = self.reject(steps, predicted_rotation);
+        let (steps, motion) = self.reject(steps, expected.as_ref(), predicted);
         let steps = self.thin_out(steps);
         statistics.tracked = steps.len();
         statistics.rejected = before - statistics.lost - steps.len();
         statistics.median_flow_px = median(steps.iter().map(|step| (step.uv_px - step.track.uv_px).norm()).collect());
-        statistics.mean_parallax_px = self.mean_parallax_px(&steps, predicted_rotation.unwrap_or(&motion.rotation));
+        statistics.mean_parallax_px = self.mean_parallax_px(&steps, &motion.rotation);
 
         let mut features: Vec<TrackedFeature> = steps
             .iter()
@@ -170,21 +175,21 @@ impl FrontEnd {
     }
 
     /// Looks for every feature where it should be now, then for the lost ones where the found ones say they should be.
-    fn follow(&self, predicted_rotation: Option<&UnitQuaternion<f64>>) -> Vec<Step> {
+    fn follow(&self, expected: Option<&UnitQuaternion<f64>>) -> Vec<Step> {
         let guesses: Vec<Vector2<f64>> = self
             .tracks
             .iter()
-            .map(|track| predicted_rotation.map_or(track.uv_px, |rotation| self.turned(track, rotation)))
+            .map(|track| expected.map_or(track.uv_px, |rotation| self.turned(track, rotation)))
             .collect();
         let mut results: Vec<Option<Step>> =
             self.tracks.iter().zip(&guesses).map(|(track, guess)| self.track(track, guess)).collect();
         let found: Vec<BearingPair> = results.iter().flatten().map(pair_of).collect();
         let lost = results.len() - found.len();
         if lost > 0 {
-            let start = predicted_rotation.copied().unwrap_or_else(UnitQuaternion::identity);
+            let start = expected.copied().unwrap_or_else(UnitQuaternion::identity);
             let floor = self.options.outliers.threshold_px / self.camera.focal_length_px();
             let seen = (found.len() >= MIN_TRACKS_FOR_GUESS).then(|| outliers::fit_rotation(&found, &start, floor));
-            // When most are lost, the prediction may be all wrong.
+            // When most are lost, the expectation may be all wrong.
             let start_over = 2 * lost > results.len();
             for ((track, guess), result) in self.tracks.iter().zip(&guesses).zip(&mut results) {
                 let others =
@@ -215,9 +220,16 @@ impl FrontEnd {
     }
 
     /// Leaves out what does not move with the scene.
-    fn reject(&self, steps: Vec<Step>, predicted_rotation: Option<&UnitQuaternion<f64>>) -> (Vec<Step>, Motion) {
+    fn reject(
+        &self,
+        steps: Vec<Step>,
+        expected: Option<&UnitQuaternion<f64>>,
+        predicted: Option<&PredictedRotation>,
+    ) -> (Vec<Step>, Motion) {
         let pairs: Vec<BearingPair> = steps.iter().map(pair_of).collect();
-        let motion = outliers::judge(&pairs, predicted_rotation, self.camera.focal_length_px(), &self.options.outliers);
+        let start = expected.copied().unwrap_or_else(UnitQuaternion::identity);
+        let focal_px = self.camera.focal_length_px();
+        let motion = outliers::judge(&pairs, &start, predicted, focal_px, &self.options.outliers);
         let kept = steps.into_iter().zip(&motion.is_inlier).filter_map(|(step, inlier)| inlier.then_some(step));
         (kept.collect(), motion)
     }

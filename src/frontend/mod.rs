@@ -3,9 +3,11 @@
 //! The front end knows the camera and a predicted rotation, never the estimator: every run of a comparison sees the same
 //! tracks.
 //!
-//! [`FrontEnd`] takes images one by one. It follows the features it has by [`lucas_kanade`], leaves out those that do not
-//! move with the scene ([`outliers`]), and fills the gaps with new [`corners`].
+//! [`FrontEnd`] takes images one by one. It looks for the features it has where a [`PredictedRotation`] or, when that cannot
+//! be trusted, the coarse images say, follows them by [`lucas_kanade`], leaves out those that do not move with the scene
+//! ([`outliers`]), and fills the gaps with new [`corners`].
 
+mod coarse;
 pub mod corners;
 mod front_end;
 pub mod lucas_kanade;
@@ -17,6 +19,6 @@ mod tests;
 mod tracks;
 
 pub use front_end::{FrontEnd, FrontEndError, FrontEndOptions};
-pub use prediction::predict_camera_rotation;
+pub use prediction::{MountOrientation, PredictedRotation, PredictionNoise, predict_camera_rotation};
 pub use pyramid::Pyramid;
 pub use tracks::{FeatureId, FrontEndStatistics, TrackedFeature, TrackedFrame};

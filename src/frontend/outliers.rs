@@ -5,6 +5,7 @@
 
 use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
 
+use super::prediction::PredictedRotation;
 use crate::geometry::so3;
 
 /// How outliers are told.
@@ -18,8 +19,8 @@ pub struct OutlierOptions {
     pub min_tracks: usize,
     /// When less than this share would stay, the geometry was not understood and none is rejected.
     pub min_inlier_share: f64,
-    /// How far the predicted rotation may be off (one sigma), in radians.
-    pub rotation_sigma_rad: f64,
+    /// Standard deviation of a right track, in pixels: what a predicted rotation's own is weighed against.
+    pub track_sigma_px: f64,
     /// Seed of the random pairs; the same for every image.
     pub seed: u64,
 }
@@ -31,7 +32,7 @@ impl Default for OutlierOptions {
             hypotheses: 24,
             min_tracks: 8,
             min_inlier_share: 0.4,
-            rotation_sigma_rad: 0.05,
+            track_sigma_px: 0.3,
             seed: 0x5eed,
         }
     }
@@ -67,21 +68,23 @@ struct Hypothesis {
 
 /// Finds the motion of the scene and the tracks that obey it.
 ///
-/// `predicted` is `camera_now_from_camera_previous`; `focal_px` turns angles into pixels.
+/// `start` is the rotation from which the search begins; `predicted` is what is known of it without the tracks, and pulls
+/// as much as its covariance says; `focal_px` turns angles into pixels.
 pub fn judge(
     pairs: &[BearingPair],
-    predicted: Option<&UnitQuaternion<f64>>,
+    start: &UnitQuaternion<f64>,
+    predicted: Option<&PredictedRotation>,
     focal_px: f64,
     options: &OutlierOptions,
 ) -> Motion {
-    let start = predicted.copied().unwrap_or_else(UnitQuaternion::identity);
-    let rotation = fit_rotation(pairs, &start, options.threshold_px / focal_px);
+    let rotation = fit_rotation(pairs, start, options.threshold_px / focal_px);
     let threshold = options.threshold_px / focal_px;
     if pairs.len() < options.min_tracks {
         return Motion { rotation, direction: None, is_inlier: vec![true; pairs.len()] };
     }
-    let mut search = Search { pairs, predicted, options, dice: Dice(options.seed.max(1)), drawn: Vec::new() };
-    let epipolar = search.run(&start, &rotation, threshold);
+    let prior = Prior::new(predicted, options.track_sigma_px / focal_px);
+    let mut search = Search { pairs, prior, options, dice: Dice(options.seed.max(1)), drawn: Vec::new() };
+    let epipolar = search.run(start, &rotation, threshold);
     let (rotation, direction) = choose_model(pairs, rotation, epipolar.as_ref(), threshold);
     let is_inlier: Vec<bool> = match &direction {
         Some(direction) => {
@@ -181,10 +184,36 @@ const WORTH_A_SECOND_LOOK: f64 = 0.3;
 const FULL_HYPOTHESES: usize = 60;
 const MINIMAL_ITERATIONS: usize = 5;
 
+/// What is known of the rotation without the tracks, in units of a right track's variance.
+struct Prior {
+    rotation: UnitQuaternion<f64>,
+    /// Information over that of a right track, without a unit.
+    information: Matrix3<f64>,
+    track_sigma_rad: f64,
+}
+
+impl Prior {
+    fn new(predicted: Option<&PredictedRotation>, track_sigma_rad: f64) -> Self {
+        Self {
+            rotation: predicted.map_or_else(UnitQuaternion::identity, |predicted| predicted.rotation),
+            information: predicted.map_or_else(Matrix3::zeros, PredictedRotation::information),
+            track_sigma_rad,
+        }
+    }
+
+    /// The information beside squared track residuals over `scale`, and how far a rotation is off.
+    ///
+    /// Residuals are measured by a scale that is larger than their noise; the prior shrinks alike.
+    fn at(&self, rotation: &UnitQuaternion<f64>, scale: f64) -> (Matrix3<f64>, Vector3<f64>) {
+        let turn = so3::log(&(rotation * self.rotation.inverse()));
+        (self.information * (self.track_sigma_rad / scale).powi(2), turn)
+    }
+}
+
 /// The search for a rotation and a direction of translation.
 struct Search<'a> {
     pairs: &'a [BearingPair],
-    predicted: Option<&'a UnitQuaternion<f64>>,
+    prior: Prior,
     options: &'a OutlierOptions,
     dice: Dice,
     /// Normals of the epipolar planes if there were no more than the rotation at hand.
@@ -228,7 +257,8 @@ impl Search<'_> {
             let mut trial = Hypothesis { rotation: *rotation, direction, cost: f64::INFINITY };
             for _ in 0..MINIMAL_ITERATIONS {
                 // Hardly any damping and a scale so large that every one of the five counts.
-                let Some(step) = step_towards(&sample, &trial, 1.0, 1e-9, &Vector3::zeros()) else { break };
+                let barely = Matrix3::identity() * 1e-9;
+                let Some(step) = step_towards(&sample, &trial, 1.0, &barely, &Vector3::zeros()) else { break };
                 (trial.rotation, trial.direction) = step;
             }
             for direction in [trial.direction, -trial.direction] {
@@ -302,28 +332,30 @@ impl Search<'_> {
                 (distance * distance).min(1.0)
             })
             .sum();
-        let turn = self.predicted.map_or(0.0, |predicted| rotation.angle_to(predicted));
-        sum + (turn / self.options.rotation_sigma_rad).powi(2)
+        let (information, turn) = self.prior.at(rotation, scale);
+        sum + turn.dot(&(information * turn))
     }
 
     /// One Gauss–Newton step on the rotation and the direction, with weights that leave outliers out.
     fn refine(&self, at: &Hypothesis, scale: f64) -> Option<Hypothesis> {
-        let turn_so_far = self.predicted.map_or_else(Vector3::zeros, |p| so3::log(&(at.rotation * p.inverse())));
-        let (rotation, direction) =
-            step_towards(self.pairs, at, scale, self.options.rotation_sigma_rad.powi(-2), &turn_so_far)?;
+        let (information, turn_so_far) = self.prior.at(&at.rotation, scale);
+        let (rotation, direction) = step_towards(self.pairs, at, scale, &information, &turn_so_far)?;
         let cost = self.cost(&rotation, &direction, scale);
         Some(Hypothesis { rotation, direction, cost })
     }
 }
 
+/// Holds what neither tracks nor prior determine, in the unit of [`step_towards`]'s normal matrix.
+const LEAST_INFORMATION: f64 = 1e-9;
+
 /// A Gauss–Newton step on the epipolar distances of `pairs` in units of `scale`; each weighs less the further off it is.
 ///
-/// `prior` is the information about the rotation, which lies `turn_so_far` from what is expected, both in radians.
+/// `prior` is the information about the rotation, which lies `turn_so_far` from what is expected, in radians.
 fn step_towards(
     pairs: &[BearingPair],
     at: &Hypothesis,
     scale: f64,
-    prior: f64,
+    prior: &Matrix3<f64>,
     turn_so_far: &Vector3<f64>,
 ) -> Option<(UnitQuaternion<f64>, Vector3<f64>)> {
     let basis = tangent_basis(&at.direction);
@@ -352,12 +384,13 @@ fn step_towards(
         normal += row * row.transpose() * weight;
         right -= row * (gap * weight);
     }
-    for k in 0..3 {
-        normal[(k, k)] += prior;
-        right[k] -= prior * turn_so_far[k];
-    }
-    for k in 3..5 {
-        normal[(k, k)] += 1e-3 * prior.min(1.0);
+    let mut corner = normal.fixed_view_mut::<3, 3>(0, 0);
+    corner += prior;
+    let mut top = right.fixed_rows_mut::<3>(0);
+    top -= prior * turn_so_far;
+    for k in 0..5 {
+        // Without parallax the direction is free, and without a prior the turn about a single track.
+        normal[(k, k)] += LEAST_INFORMATION;
     }
     let step = normal.cholesky()?.solve(&right);
     let turn = so3::exp(&Vector3::new(step[0], step[1], step[2]));

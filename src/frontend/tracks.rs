@@ -30,7 +30,7 @@ pub struct FrontEndStatistics {
     pub lost: usize,
     /// Rejected as geometric outliers.
     pub rejected: usize,
-    /// Mean parallax of the tracked ones against the image before, rotation prediction removed, in pixels.
+    /// Mean parallax of the tracked ones against the image before, their common rotation removed, in pixels.
     pub mean_parallax_px: f64,
     /// Median length of the tracked ones' motion in the image, in pixels.
     pub median_flow_px: f64,

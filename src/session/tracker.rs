@@ -2,13 +2,15 @@
 
 use std::sync::Arc;
 
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::Vector3;
 
 use super::plan::SessionError;
 use super::stopwatch::Stopwatch;
 use crate::flight_log::rig::{CameraMount, Rig};
 use crate::flight_log::{FlightLog, FrameStream, LogWarning, SensorFrame};
-use crate::frontend::{FrontEnd, FrontEndOptions, TrackedFrame, predict_camera_rotation};
+use crate::frontend::{
+    FrontEnd, FrontEndOptions, MountOrientation, PredictionNoise, TrackedFrame, predict_camera_rotation,
+};
 use crate::gimbal::ClassicalChain;
 
 /// An image with its tracks.
@@ -27,8 +29,14 @@ pub(super) struct CameraTracker {
     stream: FrameStream,
     front_end: FrontEnd,
     chain: ClassicalChain,
-    previous_imu_from_camera: Option<UnitQuaternion<f64>>,
+    noise: PredictionNoise,
+    previous_mount: Option<MountOrientation>,
 }
+
+/// The turn-on bias of a gyroscope that nothing is known of, in rad/s (1.1°/s, of the small MEMS kind).
+const GYROSCOPE_BIAS_SIGMA_RAD_PER_S: f64 = 0.02;
+/// How wrong the orientation of a rigid camera on the IMU may be, in radians (0.6°).
+const RIGID_MOUNT_SIGMA_RAD: f64 = 0.01;
 
 impl CameraTracker {
     /// Starts at a time of the log.
@@ -45,7 +53,8 @@ impl CameraTracker {
             stream,
             front_end: FrontEnd::new(camera.model.clone(), FrontEndOptions::default()),
             chain: chain_of_camera(rig, &camera.mount),
-            previous_imu_from_camera: None,
+            noise: prediction_noise(rig, &camera.mount),
+            previous_mount: None,
         })
     }
 
@@ -56,15 +65,15 @@ impl CameraTracker {
         loop {
             let mut frame = self.stream.next_frame()?;
             let watch = Stopwatch::start();
-            let imu_from_camera = self.imu_from_camera(&frame);
-            let predicted = match (self.previous_imu_from_camera, imu_from_camera) {
+            let mount = self.mount(&frame);
+            let predicted = match (&self.previous_mount, &mount) {
                 // The bias is the estimators' business; over one frame it turns the image by a pixel or two at most.
-                (Some(previous), Some(current)) => {
-                    predict_camera_rotation(&frame.imu, &Vector3::zeros(), &previous, &current)
+                (Some(previous), Some(now)) => {
+                    predict_camera_rotation(&frame.imu, &Vector3::zeros(), previous, now, &self.noise)
                 }
                 _ => None,
             };
-            self.previous_imu_from_camera = imu_from_camera;
+            self.previous_mount = mount;
             match self.front_end.process(&frame.image, frame.stamp_ns, predicted.as_ref()) {
                 Ok(tracks) => {
                     frame.warnings.append(&mut refused);
@@ -87,15 +96,27 @@ impl CameraTracker {
         self.stream.remaining_warnings()
     }
 
-    /// Orientation of the camera on the IMU by the rig and the encoders, `None` when a joint's angle is not known.
-    fn imu_from_camera(&self, frame: &SensorFrame) -> Option<UnitQuaternion<f64>> {
-        let angles_rad = match &frame.joint_angles {
+    /// How the camera sits on the IMU by the rig and the encoders, `None` when a joint's angle is not known.
+    fn mount(&self, frame: &SensorFrame) -> Option<MountOrientation> {
+        let (angles_rad, sigmas_rad) = match &frame.joint_angles {
             // A rigid camera of a gimbal rig has readings beside it that are not its own.
-            _ if self.chain.links.is_empty() => &[],
-            Some(angles) => angles.angles_rad.as_slice(),
+            _ if self.chain.links.is_empty() => (&[][..], &[][..]),
+            Some(angles) => (angles.angles_rad.as_slice(), angles.sigmas_rad.as_slice()),
             None => return None,
         };
-        Some(self.chain.imu_from_camera(angles_rad).rotation)
+        Some(MountOrientation::new(&self.chain, angles_rad, sigmas_rad))
+    }
+}
+
+/// How wrong the rig says that may be of which a camera's rotation is predicted.
+fn prediction_noise(rig: &Rig, mount: &CameraMount) -> PredictionNoise {
+    let gimbal = rig.gimbal.as_ref().filter(|_| *mount == CameraMount::Gimbal);
+    PredictionNoise {
+        gyroscope_bias_rad_per_s: GYROSCOPE_BIAS_SIGMA_RAD_PER_S,
+        gyroscope_noise_density: rig.imu.noise.gyroscope_noise_density,
+        // A uniform error of bound b has standard deviation b/√3.
+        chain_rotation_rad: gimbal
+            .map_or(RIGID_MOUNT_SIGMA_RAD, |gimbal| gimbal.prior.rotation_bound_rad / 3.0_f64.sqrt()),
     }
 }
 

@@ -6,13 +6,16 @@ use super::homography::{Scene, Texture};
 use super::{blank, camera_of, median, scene, texture};
 use crate::flight_log::GrayImage;
 use crate::frontend::corners::CornerOptions;
-use crate::frontend::{FeatureId, FrontEnd, FrontEndError, FrontEndOptions, TrackedFrame};
+use crate::frontend::{FeatureId, FrontEnd, FrontEndError, FrontEndOptions, PredictedRotation, TrackedFrame};
 use crate::geometry::so3;
 
 fn front_end(scene: &Scene) -> FrontEnd {
     let corners = CornerOptions { max_features: 60, min_distance_px: 18.0, ..Default::default() };
     FrontEnd::new(camera_of(scene), FrontEndOptions { corners, ..Default::default() })
 }
+
+/// A prediction claims to be this good.
+const PREDICTION_SIGMA_RAD: f64 = 0.01;
 
 /// The true `camera_now_from_camera_previous` between two images of a scene.
 fn rotation_between(scene: &Scene, previous: usize, now: usize) -> UnitQuaternion<f64> {
@@ -31,6 +34,7 @@ fn play(
     let mut frames = Vec::new();
     for (k, index) in indices.iter().enumerate() {
         let predicted = if k == 0 { None } else { prediction(indices[k - 1], *index) };
+        let predicted = predicted.map(|rotation| PredictedRotation::isotropic(rotation, PREDICTION_SIGMA_RAD));
         let image = scene.render(texture, *index);
         frames.push(front_end.process(&image, *index as i64, predicted.as_ref()).unwrap());
     }

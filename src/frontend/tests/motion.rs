@@ -1,12 +1,13 @@
 //! Outliers and the rotation prediction.
 
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use super::homography::Dice;
 use crate::flight_log::ImuSample;
 use crate::frontend::outliers::{BearingPair, OutlierOptions, fit_rotation, judge};
-use crate::frontend::predict_camera_rotation;
-use crate::geometry::so3;
+use crate::frontend::{MountOrientation, PredictedRotation, PredictionNoise, predict_camera_rotation};
+use crate::geometry::{RigidTransform, so3};
+use crate::gimbal::{ClassicalChain, DhLink};
 
 const FOCAL_PX: f64 = 450.0;
 
@@ -56,8 +57,10 @@ fn check(name: &str, view: &View, least_right: f64, most_wrong: f64) {
             truth.push(right);
             pairs.push(BearingPair { previous: point.normalize(), now: seen.normalize() });
         }
-        let predicted = so3::exp(&view.prediction_error) * rotation;
-        let motion = judge(&pairs, view.predicted.then_some(&predicted), FOCAL_PX, &OutlierOptions::default());
+        let predicted = PredictedRotation::isotropic(so3::exp(&view.prediction_error) * rotation, 0.05);
+        let predicted = view.predicted.then_some(&predicted);
+        let start = predicted.map_or_else(UnitQuaternion::identity, |predicted| predicted.rotation);
+        let motion = judge(&pairs, &start, predicted, FOCAL_PX, &OutlierOptions::default());
         let count = |kind: bool| truth.iter().filter(|right| **right == kind).count().max(1) as f64;
         let kept = |kind: bool| {
             truth.iter().zip(&motion.is_inlier).filter(|(right, inlier)| **right == kind && **inlier).count() as f64
@@ -105,11 +108,12 @@ fn nonsense_rejects_nothing_rather_than_everything() {
     let mut dice = Dice(5);
     let mut direction = || Vector3::new(dice.uniform() - 0.5, dice.uniform() - 0.5, 1.0).normalize();
     let pairs: Vec<_> = (0..60).map(|_| BearingPair { previous: direction(), now: direction() }).collect();
-    let motion = judge(&pairs, None, FOCAL_PX, &OutlierOptions::default());
+    let identity = UnitQuaternion::identity();
+    let motion = judge(&pairs, &identity, None, FOCAL_PX, &OutlierOptions::default());
     let kept = motion.is_inlier.iter().filter(|inlier| **inlier).count();
     assert!(kept >= 24, "{kept}");
     for count in 0..8 {
-        let motion = judge(&pairs[..count], None, FOCAL_PX, &OutlierOptions::default());
+        let motion = judge(&pairs[..count], &identity, None, FOCAL_PX, &OutlierOptions::default());
         assert_eq!(motion.is_inlier, vec![true; count]);
     }
 }
@@ -129,13 +133,33 @@ fn sample(stamp_ns: i64, angular_velocity: Vector3<f64>) -> ImuSample {
     }
 }
 
+const NOISE: PredictionNoise =
+    PredictionNoise { gyroscope_bias_rad_per_s: 0.02, gyroscope_noise_density: 3e-4, chain_rotation_rad: 0.05 };
+
+const JOINT_SIGMA_RAD: f64 = 0.03;
+
+/// A gimbal of one joint with everything off the axes.
+fn chain() -> ClassicalChain {
+    let turn = |x, y, z| RigidTransform::new(so3::exp(&Vector3::new(x, y, z)), Vector3::new(0.1, 0.0, -0.1));
+    ClassicalChain {
+        imu_from_base: turn(3.0, 0.1, -0.2),
+        links: vec![DhLink { theta_offset_rad: -1.5, d_m: 0.03, a_m: 0.02, alpha_rad: 0.7 }],
+        effector_from_camera: turn(0.1, 1.5, 0.2),
+    }
+}
+
+fn rigid(rotation: UnitQuaternion<f64>) -> MountOrientation {
+    let imu_from_base = RigidTransform::new(rotation, Vector3::zeros());
+    MountOrientation::new(&ClassicalChain { imu_from_base, ..ClassicalChain::default() }, &[], &[])
+}
+
 #[test]
 fn the_predicted_rotation_is_that_of_the_chain_of_frames() {
     let (rate, bias) = (Vector3::new(0.5, -1.0, 2.0), Vector3::new(0.1, 0.2, -0.3));
     let imu: Vec<_> = (0..11).map(|k| sample(k * 5_000_000, rate + bias)).collect();
     let previous = UnitQuaternion::from_euler_angles(0.3, -0.2, 1.0);
     let now = UnitQuaternion::from_euler_angles(0.5, 0.1, 1.2);
-    let rotation = predict_camera_rotation(&imu, &bias, &previous, &now).unwrap();
+    let rotation = predict_camera_rotation(&imu, &bias, &rigid(previous), &rigid(now), &NOISE).unwrap().rotation;
     // A direction fixed in the world: world = IMU at the first instant.
     let world = Vector3::new(0.2, 0.7, -0.4);
     let world_from_imu_now = so3::exp(&(rate * 0.05));
@@ -145,16 +169,47 @@ fn the_predicted_rotation_is_that_of_the_chain_of_frames() {
 }
 
 #[test]
+fn the_covariance_is_that_of_predictions_from_wrong_numbers() {
+    let imu: Vec<_> = (0..11).map(|k| sample(k * 5_000_000, Vector3::new(0.9, -1.6, 6.0))).collect();
+    let predict = |chain: &ClassicalChain, bias: &Vector3<f64>, angles: [f64; 2]| {
+        let [previous, now] = angles.map(|angle| MountOrientation::new(chain, &[angle], &[JOINT_SIGMA_RAD]));
+        predict_camera_rotation(&imu, bias, &previous, &now, &NOISE).unwrap()
+    };
+    let angles = [0.4, -0.1];
+    let given = predict(&chain(), &Vector3::zeros(), angles);
+    let mut dice = Dice(11);
+    let mut measured = Matrix3::zeros();
+    let count = 20_000;
+    // So small that the first order holds.
+    let shrink = 0.1;
+    for _ in 0..count {
+        let mut vector = |sigma: f64| Vector3::from_fn(|_, _| shrink * sigma * dice.normal());
+        let mut wrong = chain();
+        let [base, effector, camera] = [0, 1, 2].map(|_| so3::exp(&vector(NOISE.chain_rotation_rad)));
+        wrong.imu_from_base.rotation *= base;
+        wrong.effector_from_camera.rotation = effector * wrong.effector_from_camera.rotation * camera;
+        let bias = vector(NOISE.gyroscope_bias_rad_per_s);
+        let error = vector(JOINT_SIGMA_RAD);
+        let seen = predict(&wrong, &bias, [angles[0] + error.x, angles[1] + error.y]);
+        let error = so3::log(&(seen.rotation * given.rotation.inverse())) / shrink;
+        measured += error * error.transpose() / f64::from(count);
+    }
+    // The gyroscope's noise is no part of this, and negligible.
+    let difference = (given.covariance_rad2 - measured).norm() / measured.norm();
+    assert!(difference < 0.03, "{} instead of {measured}", given.covariance_rad2);
+}
+
+#[test]
 fn no_rotation_is_predicted_from_broken_samples() {
-    let identity = UnitQuaternion::identity();
+    let mount = rigid(UnitQuaternion::identity());
     let good = [sample(0, Vector3::x()), sample(5_000_000, Vector3::x())];
-    assert!(predict_camera_rotation(&good, &Vector3::zeros(), &identity, &identity).is_some());
+    assert!(predict_camera_rotation(&good, &Vector3::zeros(), &mount, &mount, &NOISE).is_some());
     for imu in [
         vec![],
         vec![good[0]],
         vec![good[1], good[0]],
         vec![good[0], sample(5_000_000, Vector3::new(f64::NAN, 0.0, 0.0))],
     ] {
-        assert_eq!(predict_camera_rotation(&imu, &Vector3::zeros(), &identity, &identity), None);
+        assert_eq!(predict_camera_rotation(&imu, &Vector3::zeros(), &mount, &mount, &NOISE), None);
     }
 }
