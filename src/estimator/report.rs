@@ -42,6 +42,26 @@ pub enum EventKind {
     MeasurementMissing,
 }
 
+impl EventKind {
+    /// Whether it is rare enough to jump to, and for the lane of events; nearly every frame has one of the others, which
+    /// have lanes of their own or none.
+    pub fn is_notable(self) -> bool {
+        match self {
+            Self::InitializedFromMotion
+            | Self::InitializedFromStandstill
+            | Self::Standstill
+            | Self::Failure
+            | Self::ChartSwitched
+            | Self::MeasurementMissing => true,
+            Self::InitializationWaits
+            | Self::KeyframeChosen
+            | Self::OldestMarginalized
+            | Self::SecondNewestMarginalized
+            | Self::OutliersRejected => false,
+        }
+    }
+}
+
 /// Something that happened in a step, with the figure that decided it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Event {

@@ -39,23 +39,6 @@ pub(crate) fn name_of(kind: EventKind) -> &'static str {
     }
 }
 
-/// Whether a kind is rare enough for the lane of events; the others have lanes of their own or none.
-pub(crate) fn is_notable(kind: EventKind) -> bool {
-    match kind {
-        EventKind::InitializedFromMotion
-        | EventKind::InitializedFromStandstill
-        | EventKind::Standstill
-        | EventKind::Failure
-        | EventKind::ChartSwitched
-        | EventKind::MeasurementMissing => true,
-        EventKind::InitializationWaits
-        | EventKind::KeyframeChosen
-        | EventKind::OldestMarginalized
-        | EventKind::SecondNewestMarginalized
-        | EventKind::OutliersRejected => false,
-    }
-}
-
 /// The sign and colour of a kind of event.
 pub(crate) fn look_of(kind: EventKind, theme: &Theme) -> (Mark, Color32) {
     match kind {

@@ -10,7 +10,6 @@ use super::engine::Engine;
 use super::plan::{MAX_RUNS, SessionError, SessionPlan, SessionRequest, camera_of_run};
 use super::recording::{Recording, RunRecord};
 use super::spec::{RunSpec, distinct_labels};
-use crate::estimator::EventKind;
 use crate::flight_log::{GrayImage, ImageReader};
 use crate::geometry::ns_from_seconds;
 
@@ -211,7 +210,7 @@ impl Session {
     fn jump_to_event(&mut self, forward: bool) {
         self.playing = false;
         let recording = self.recording();
-        let stamps_ns = instants_ns(&recording, |step| step.report.events.iter().any(|event| is_notable(event.kind)));
+        let stamps_ns = instants_ns(&recording, |step| step.report.events.iter().any(|event| event.kind.is_notable()));
         self.cursor_ns = moved(&stamps_ns, self.cursor_ns, if forward { 1 } else { -1 }).unwrap_or(self.cursor_ns);
     }
 
@@ -294,16 +293,4 @@ fn moved(stamps_ns: &[i64], cursor_ns: i64, count: i64) -> Option<i64> {
         let target = before.saturating_sub(count.unsigned_abs() as usize);
         stamps_ns.get(target).copied().filter(|stamp| *stamp < cursor_ns)
     }
-}
-
-/// Whether a person wants to jump to an event of this kind: those that nearly every frame has are none.
-fn is_notable(kind: EventKind) -> bool {
-    !matches!(
-        kind,
-        EventKind::InitializationWaits
-            | EventKind::KeyframeChosen
-            | EventKind::OldestMarginalized
-            | EventKind::SecondNewestMarginalized
-            | EventKind::OutliersRejected
-    )
 }

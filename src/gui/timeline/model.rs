@@ -1,7 +1,6 @@
 //! What the lanes of the timeline show, read from the steps as they come.
 
 use crate::estimator::{EventKind, Phase};
-use crate::gui::events::is_notable;
 use crate::gui::follow::Follower;
 use crate::gui::residuals::rms_px;
 use crate::session::RunRecord;
@@ -82,7 +81,7 @@ impl RunLanes {
             if !report.warnings.is_empty() {
                 self.warnings.push((stamp_ns, number));
             }
-            let events = report.events.iter().enumerate().filter(|(_, event)| is_notable(event.kind));
+            let events = report.events.iter().enumerate().filter(|(_, event)| event.kind.is_notable());
             self.events.extend(events.map(|(event, one)| TimedEvent { stamp_ns, kind: one.kind, step: number, event }));
         }
     }
