@@ -7,7 +7,6 @@ use serde::Serialize;
 use super::evaluation::alignment_name;
 use super::tables::parameter_name;
 use crate::estimator::{EventKind, Phase, StageTimes};
-use crate::flight_log::rig::{CameraMount, Rig};
 use crate::geometry::{seconds_from_ns, so3};
 use crate::gimbal::{Chain, ClassicalChain, Parameterization};
 use crate::session::accuracy::{
@@ -307,17 +306,6 @@ fn accuracy(pairs: &[(StampedPose, StampedPose)], length_m: f64) -> Option<Accur
     })
 }
 
-/// The chain of a run's camera with the true values.
-fn true_chain(truth_rig: &Rig, camera_key: &str) -> Option<ClassicalChain> {
-    let camera = truth_rig.cameras.iter().find(|camera| camera.key == camera_key)?;
-    match &camera.mount {
-        CameraMount::Gimbal => truth_rig.gimbal.as_ref().map(|gimbal| gimbal.chain.clone()),
-        CameraMount::Static { imu_from_camera } => {
-            Some(ClassicalChain { imu_from_base: *imu_from_camera, ..ClassicalChain::default() })
-        }
-    }
-}
-
 fn calibration(recording: &Recording, run: &RunRecord) -> CalibrationSummary {
     let Some(last) = run.steps.last().map(|step| &step.report.calibration) else {
         return CalibrationSummary {
@@ -328,14 +316,14 @@ fn calibration(recording: &Recording, run: &RunRecord) -> CalibrationSummary {
             chain_error_initial: None,
         };
     };
-    let truth = recording.truth_rig.as_ref().and_then(|rig| true_chain(rig, &run.camera_key));
+    let truth = recording.truth_rig.as_ref().and_then(|rig| rig.chain_of_camera(&run.camera_key));
     let in_parameters = |chain: &ClassicalChain| {
         let parameterization: Parameterization = last.parameterization.parse().ok()?;
         let chain = Chain::from_classical(chain, parameterization);
         let values = chain.values();
         Some(chain.parameter_names().into_iter().zip(values.iter().copied()).collect::<Vec<_>>())
     };
-    let given = true_chain(&recording.rig, &run.camera_key);
+    let given = recording.rig.chain_of_camera(&run.camera_key);
     let initial_values = given.as_ref().and_then(in_parameters).unwrap_or_default();
     let true_values = truth.as_ref().and_then(in_parameters).unwrap_or_default();
     let value_of =

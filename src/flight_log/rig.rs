@@ -133,4 +133,16 @@ impl Rig {
             available: self.cameras.iter().map(|camera| camera.key.clone()).collect(),
         })
     }
+
+    /// The chain that carries the camera with a key: the gimbal's, or one without links for a rigid camera. `None` for an
+    /// unknown key, or for a camera on a gimbal that the rig does not describe.
+    pub fn chain_of_camera(&self, key: &str) -> Option<ClassicalChain> {
+        let camera = self.cameras.iter().find(|camera| camera.key == key)?;
+        match &camera.mount {
+            CameraMount::Gimbal => self.gimbal.as_ref().map(|gimbal| gimbal.chain.clone()),
+            CameraMount::Static { imu_from_camera } => {
+                Some(ClassicalChain { imu_from_base: *imu_from_camera, ..ClassicalChain::default() })
+            }
+        }
+    }
 }

@@ -3,8 +3,6 @@
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 
-use crate::flight_log::Rig;
-use crate::flight_log::rig::CameraMount;
 use crate::gimbal::{Chain, ClassicalChain, Parameterization};
 use crate::session::{Recording, RunRecord};
 
@@ -22,22 +20,11 @@ pub(crate) fn named_values(classical: &ClassicalChain, parameterization: Paramet
 /// `None` when the truth is not known.
 pub(crate) fn true_values(recording: &Recording, run: &RunRecord, stamp_ns: i64) -> Option<NamedValues> {
     let calibration = &run.step_at(stamp_ns).or_else(|| run.steps.first())?.report.calibration;
-    let classical = chain_of_camera(recording.truth_rig.as_ref()?, &run.camera_key)?;
+    let classical = recording.truth_rig.as_ref()?.chain_of_camera(&run.camera_key)?;
     let mut values = named_values(&classical, calibration.parameterization.parse().ok()?);
     let estimate: NamedValues = calibration.names.iter().cloned().zip(calibration.values.iter().copied()).collect();
     turn_towards(&mut values, &estimate);
     Some(values)
-}
-
-/// The chain that carries a camera; without joints when it is rigid.
-fn chain_of_camera(rig: &Rig, camera_key: &str) -> Option<ClassicalChain> {
-    let camera = rig.cameras.iter().find(|camera| camera.key == camera_key)?;
-    match &camera.mount {
-        CameraMount::Gimbal => Some(rig.gimbal.as_ref()?.chain.clone()),
-        CameraMount::Static { imu_from_camera } => {
-            Some(ClassicalChain { imu_from_base: *imu_from_camera, ..ClassicalChain::default() })
-        }
-    }
 }
 
 /// Replaces angles by equal ones that lie nearest to a reference: whole turns are added, and rotation vectors may go the

@@ -3,7 +3,6 @@
 use super::plan::{SessionError, camera_of_run};
 use super::spec::{ParameterizationChoice, RunSpec};
 use super::stopwatch::clock_ms;
-use super::tracker::chain_of_camera;
 use crate::estimator::{EstimatorConfig, EstimatorOptions};
 use crate::flight_log::Rig;
 use crate::flight_log::rig::{CameraMount, ChainPrior};
@@ -18,7 +17,7 @@ const SIGMA_PER_BOUND: f64 = 0.577_350_269_189_625_8;
 /// The estimator that a run asks for.
 pub(super) fn estimator_config(rig: &Rig, spec: &RunSpec) -> Result<EstimatorConfig, SessionError> {
     let camera = camera_of_run(rig, spec)?;
-    let chain = chain_of_camera(rig, &camera.mount);
+    let chain = rig.chain_of_camera(&camera.key).unwrap_or_default();
     let gimbal = rig.gimbal.as_ref().filter(|_| camera.mount == CameraMount::Gimbal);
     let prior = match (&gimbal, &rig.gimbal) {
         (Some(gimbal), _) => gimbal.prior,

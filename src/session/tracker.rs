@@ -52,7 +52,7 @@ impl CameraTracker {
         Ok(Self {
             stream,
             front_end: FrontEnd::new(camera.model.clone(), FrontEndOptions::default()),
-            chain: chain_of_camera(rig, &camera.mount),
+            chain: rig.chain_of_camera(camera_key).unwrap_or_default(),
             noise: prediction_noise(rig, &camera.mount),
             previous_mount: None,
         })
@@ -117,16 +117,5 @@ fn prediction_noise(rig: &Rig, mount: &CameraMount) -> PredictionNoise {
         // A uniform error of bound b has standard deviation b/√3.
         chain_rotation_rad: gimbal
             .map_or(RIGID_MOUNT_SIGMA_RAD, |gimbal| gimbal.prior.rotation_bound_rad / 3.0_f64.sqrt()),
-    }
-}
-
-/// The chain that carries a camera; without links for a rigid one.
-pub(super) fn chain_of_camera(rig: &Rig, mount: &CameraMount) -> ClassicalChain {
-    match (mount, &rig.gimbal) {
-        (CameraMount::Static { imu_from_camera }, _) => {
-            ClassicalChain { imu_from_base: *imu_from_camera, ..ClassicalChain::default() }
-        }
-        (CameraMount::Gimbal, Some(gimbal)) => gimbal.chain.clone(),
-        (CameraMount::Gimbal, None) => ClassicalChain::default(),
     }
 }

@@ -9,24 +9,13 @@ use crate::estimator::preintegration::{ImuBias, NavigationState, Preintegration}
 use crate::estimator::prior::StartPrior;
 use crate::estimator::window::{Frame, FrameState};
 use crate::estimator::{Estimator, EstimatorConfig, EstimatorOptions, features};
-use crate::flight_log::rig::CameraMount;
 use crate::flight_log::{JointAngles, Rig};
-use crate::gimbal::{Chain, ClassicalChain, Parameterization};
+use crate::gimbal::{Chain, Parameterization};
 use crate::simulation::{Lens, SyntheticFlight, SyntheticFrame, SyntheticMount, SyntheticOptions, synthetic_tracks};
 
 pub(super) fn camera(lens: Lens) -> CameraModel {
     let options = SyntheticOptions { duration_s: 0.1, lens, ..SyntheticOptions::default() };
     synthetic_tracks(&options).given_rig.cameras[0].model.clone()
-}
-
-/// The mount of `cam0` in a rig.
-pub(super) fn chain(rig: &Rig) -> ClassicalChain {
-    match &rig.cameras[0].mount {
-        CameraMount::Gimbal => rig.gimbal.as_ref().unwrap().chain.clone(),
-        CameraMount::Static { imu_from_camera } => {
-            ClassicalChain { imu_from_base: *imu_from_camera, ..ClassicalChain::default() }
-        }
-    }
 }
 
 /// An estimator for a rig's `cam0`.
@@ -36,7 +25,7 @@ pub(super) fn config(rig: &Rig, parameterization: Parameterization, options: Est
         camera: rig.cameras[0].model.clone(),
         imu_noise: rig.imu.noise,
         gravity_m_per_s2: rig.gravity_m_per_s2,
-        chain: chain(rig),
+        chain: rig.chain_of_camera("cam0").unwrap(),
         parameterization,
         auto_chart: false,
         encoder_sigma_rad: rig.gimbal.as_ref().and_then(|gimbal| gimbal.encoder_sigma_rad),
@@ -71,7 +60,8 @@ fn flight(gimbal: bool) -> SyntheticFlight {
 pub(super) fn window(parameterization: Parameterization, gimbal: bool, options: EstimatorOptions) -> Estimator {
     let flight = flight(gimbal);
     let mut estimator = Estimator::new(config(&flight.given_rig, parameterization, options));
-    estimator.calibration.set_chain(Chain::from_classical(&chain(&flight.true_rig), parameterization));
+    let true_chain = flight.true_rig.chain_of_camera("cam0").unwrap();
+    estimator.calibration.set_chain(Chain::from_classical(&true_chain, parameterization));
     let spacing = 4;
     let first = 100;
     for slot in 0..6 {

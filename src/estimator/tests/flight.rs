@@ -66,7 +66,7 @@ fn trajectory_error_m(flight: &SyntheticFlight, reports: &[StepReport]) -> (f64,
 
 /// Mean error of the chain over the joint angles of the flight, in metres and radians.
 fn chain_error(flight: &SyntheticFlight, estimator: &Estimator) -> (f64, f64) {
-    let (estimated, truth) = (estimator.classical_chain(), fixture::chain(&flight.true_rig));
+    let (estimated, truth) = (estimator.classical_chain(), flight.true_rig.chain_of_camera("cam0").unwrap());
     let count = flight.frames.len() as f64;
     flight.frames.iter().fold((0.0, 0.0), |(shift, turn), frame| {
         let angles = &frame.true_joint_angles_rad;

@@ -28,8 +28,6 @@ use self::world::{RunView, WorldBuilder, WorldOptions, framing_points_m, ground_
 use super::PanelContext;
 use crate::camera::CameraModel;
 use crate::flight_log::Rig;
-use crate::flight_log::rig::CameraMount;
-use crate::gimbal::ClassicalChain;
 use crate::session::RunRecord;
 
 /// What the view of the world keeps in its middle.
@@ -241,7 +239,7 @@ fn chain_model(context: &PanelContext<'_>) -> Option<ChainModel> {
     let run = context.recording.runs.get(context.selection.run)?;
     let step = run.step_at(context.cursor_ns)?;
     let chain = &step.report.calibration.classical;
-    let true_chain = context.recording.truth_rig.as_ref().and_then(|rig| chain_of(rig, &run.camera_key));
+    let true_chain = context.recording.truth_rig.as_ref().and_then(|rig| rig.chain_of_camera(&run.camera_key));
     let true_chain = true_chain.filter(|truth| truth.links.len() == chain.links.len());
     let joints = context.recording.rig.gimbal.iter().flat_map(|gimbal| &gimbal.joints);
     let joint_names: Vec<String> = joints.map(|joint| joint.name.clone()).collect();
@@ -252,18 +250,7 @@ fn chain_model(context: &PanelContext<'_>) -> Option<ChainModel> {
 /// From where the close-up looks: chosen for the chain that the rig gives, so that it does not depend on the cursor.
 fn close_up_direction(context: &PanelContext<'_>) -> Vector3<f64> {
     let camera_key = context.recording.runs.get(context.selection.run).map_or("", |run| run.camera_key.as_str());
-    ChainPose::best_direction(&chain_of(&context.recording.rig, camera_key).unwrap_or_default())
-}
-
-/// The chain that carries a camera of a rig.
-fn chain_of(rig: &Rig, camera_key: &str) -> Option<ClassicalChain> {
-    let camera = rig.cameras.iter().find(|camera| camera.key == camera_key)?;
-    match camera.mount {
-        CameraMount::Gimbal => rig.gimbal.as_ref().map(|gimbal| gimbal.chain.clone()),
-        CameraMount::Static { imu_from_camera } => {
-            Some(ClassicalChain { imu_from_base: imu_from_camera, ..ClassicalChain::default() })
-        }
-    }
+    ChainPose::best_direction(&context.recording.rig.chain_of_camera(camera_key).unwrap_or_default())
 }
 
 fn camera_of<'a>(rig: &'a Rig, run: &RunRecord) -> Option<&'a CameraModel> {

@@ -1,7 +1,6 @@
 use nalgebra::Vector3;
 
 use super::super::{SyntheticMotion, SyntheticMount, SyntheticOptions, synthetic_tracks};
-use crate::flight_log::rig::CameraMount;
 use crate::geometry::{RigidTransform, so3};
 
 fn short(mount: SyntheticMount, motion: SyntheticMotion) -> SyntheticOptions {
@@ -14,15 +13,11 @@ fn tracks_are_projections_of_their_landmarks_through_the_true_rig() {
         let options = SyntheticOptions { pixel_sigma_px: 0.0, ..short(mount, SyntheticMotion::Aggressive) };
         let flight = synthetic_tracks(&options);
         let camera = &flight.true_rig.cameras[0];
+        let chain = flight.true_rig.chain_of_camera(&camera.key).unwrap();
         assert_eq!(flight.frames.len(), 160);
         for frame in &flight.frames {
-            let extrinsic = match &camera.mount {
-                CameraMount::Static { imu_from_camera } => *imu_from_camera,
-                CameraMount::Gimbal => {
-                    flight.true_rig.gimbal.as_ref().unwrap().chain.imu_from_camera(&frame.true_joint_angles_rad)
-                }
-            };
-            let world_from_camera: RigidTransform = frame.true_world_from_imu * extrinsic;
+            let imu_from_camera = chain.imu_from_camera(&frame.true_joint_angles_rad);
+            let world_from_camera: RigidTransform = frame.true_world_from_imu * imu_from_camera;
             assert!(frame.tracks.features.len() > 120, "{} features", frame.tracks.features.len());
             assert!(frame.tracks.features.windows(2).all(|pair| pair[0].id < pair[1].id));
             for feature in &frame.tracks.features {
