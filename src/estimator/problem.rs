@@ -11,6 +11,7 @@ use super::prior::{Prior, StartPrior};
 use super::reprojection::Landmark;
 use super::visual::{self, ReducedVisualSystem, Track, VisualModel, VisualSystem};
 use super::window::{Frame, FrameState};
+use crate::geometry::wrap_angle;
 
 /// Values of all unknowns.
 #[derive(Clone, Debug)]
@@ -141,7 +142,7 @@ impl Problem<'_> {
             .iter()
             .zip(readings)
             .enumerate()
-            .map(|(joint, (angle, (reading, sigma)))| (joint, wrap(angle - reading) / sigma, 1.0 / sigma))
+            .map(|(joint, (angle, (reading, sigma)))| (joint, wrap_angle(angle - reading) / sigma, 1.0 / sigma))
     }
 
     /// Calibration at which derivatives are taken.
@@ -310,12 +311,6 @@ impl NormalEquations {
             })
             .collect()
     }
-}
-
-/// An angle brought into (−π, π].
-pub(super) fn wrap(angle_rad: f64) -> f64 {
-    let turns = (angle_rad / std::f64::consts::TAU).round();
-    angle_rad - turns * std::f64::consts::TAU
 }
 
 fn add_block<const R: usize, const C: usize>(

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::evaluation::alignment_name;
 use super::tables::parameter_name;
 use crate::estimator::{EventKind, Phase, StageTimes};
-use crate::geometry::{seconds_from_ns, so3};
+use crate::geometry::{seconds_from_ns, so3, wrap_angle};
 use crate::gimbal::{Chain, ClassicalChain, Parameterization};
 use crate::session::accuracy::{
     Alignment, ErrorStatistics, RelativeDelta, StampedPose, absolute_errors_m, align, path_length_m, relative_errors,
@@ -343,7 +343,7 @@ fn calibration(recording: &Recording, run: &RunRecord) -> CalibrationSummary {
                 last: value,
                 sigma: last.sigmas.get(index).copied().filter(|sigma| sigma.is_finite()),
                 truth,
-                error: truth.map(|truth| if unit == "rad" { wrapped(value - truth) } else { value - truth }),
+                error: truth.map(|truth| if unit == "rad" { wrap_angle(value - truth) } else { value - truth }),
             }
         })
         .collect();
@@ -355,11 +355,6 @@ fn calibration(recording: &Recording, run: &RunRecord) -> CalibrationSummary {
         chain_error: chain_error(&last.classical),
         chain_error_initial: given.as_ref().and_then(chain_error),
     }
-}
-
-/// The angle within ±π.
-fn wrapped(angle_rad: f64) -> f64 {
-    angle_rad - (angle_rad / std::f64::consts::TAU).round() * std::f64::consts::TAU
 }
 
 fn chain_error(run: &RunRecord, chain: &ClassicalChain, truth: &ClassicalChain) -> Option<ChainError> {

@@ -4,12 +4,14 @@
 //! `t ← t + δt` (a vector in the outer frame).
 //! The paper's Eqs. 12–14 print the left form; `φ_left = R·φ_right`.
 
+mod angle;
 pub mod dense;
 mod rigid_transform;
 pub mod so3;
 #[cfg(test)]
 mod tests;
 
+pub use angle::wrap_angle;
 pub use rigid_transform::RigidTransform;
 
 /// Seconds of a time stamp or duration in nanoseconds.

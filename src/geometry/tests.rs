@@ -91,3 +91,18 @@ fn rows_are_split_by_a_column_space_even_with_dependent_columns() {
     let product = &svd.u * nalgebra::DMatrix::from_diagonal(&svd.singular_values) * svd.v.transpose();
     assert!((product - spanning).amax() < 1e-14);
 }
+
+#[test]
+fn angles_are_wrapped_to_one_turn_and_left_alone_within_it() {
+    use super::wrap_angle;
+    use std::f64::consts::{PI, TAU};
+    for angle in [0.0, 1e-300, -1e-17, 0.1, -2.5, 3.13, -PI, -PI + 1e-15] {
+        assert_eq!(wrap_angle(angle).to_bits(), angle.to_bits(), "{angle}");
+    }
+    assert_eq!(wrap_angle(PI), -PI);
+    for turns in -3..=3 {
+        for angle in [-3.0, -0.5, 0.0, 0.7, 3.1] {
+            assert!((wrap_angle(angle + f64::from(turns) * TAU) - angle).abs() < 1e-14, "{angle} and {turns} turns");
+        }
+    }
+}

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
-use crate::geometry::RigidTransform;
+use crate::geometry::{RigidTransform, wrap_angle};
 
 use super::chain::{Form, MinimalChain};
 use super::frame::{Axis, Frame};
@@ -223,7 +223,7 @@ impl Chain {
         if let Form::Minimal(chain) = &mut canonical.form {
             for index in 0..chain.links.len() - 1 {
                 let link = &mut chain.links[index];
-                link.alpha_rad = wrapped(link.alpha_rad);
+                link.alpha_rad = wrap_angle(link.alpha_rad);
                 if link.alpha_rad < 0.0 {
                     // DH(θ, d, a, α) = DH(θ + π, d, −a, −α)·Rz(−π)
                     link.theta_offset_rad += PI;
@@ -233,16 +233,10 @@ impl Chain {
                 }
             }
             for link in &mut chain.links {
-                link.theta_offset_rad = wrapped(link.theta_offset_rad);
-                link.alpha_rad = wrapped(link.alpha_rad);
+                link.theta_offset_rad = wrap_angle(link.theta_offset_rad);
+                link.alpha_rad = wrap_angle(link.alpha_rad);
             }
         }
         canonical
     }
-}
-
-/// The same angle within −π (included) and π.
-fn wrapped(angle_rad: f64) -> f64 {
-    let turns = ((angle_rad + PI) / (2.0 * PI)).floor();
-    angle_rad - turns * 2.0 * PI
 }

@@ -3,6 +3,7 @@
 use nalgebra::{Vector2, Vector3};
 
 use super::random::RandomStream;
+use crate::geometry::wrap_angle;
 
 /// What a flight wants at one time.
 #[derive(Clone, Copy, Debug)]
@@ -128,7 +129,7 @@ impl Path {
             sum += step.norm();
             length_m.push(sum);
             let angle = step.y.atan2(step.x);
-            heading_rad.push(heading_rad.last().map_or(angle, |before| before + wrapped(angle - before)));
+            heading_rad.push(heading_rad.last().map_or(angle, |before| before + wrap_angle(angle - before)));
         }
         Self { points, length_m, heading_rad, closed }
     }
@@ -151,12 +152,6 @@ impl Path {
         let area: f64 = self.points.windows(2).map(|pair| pair[0].x * pair[1].y - pair[1].x * pair[0].y).sum();
         std::f64::consts::TAU.copysign(area)
     }
-}
-
-/// An angle brought between −π and π.
-pub(crate) fn wrapped(angle_rad: f64) -> f64 {
-    let turns = (angle_rad / std::f64::consts::TAU).round();
-    angle_rad - turns * std::f64::consts::TAU
 }
 
 /// Chaikin's corner cutting.

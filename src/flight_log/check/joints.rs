@@ -3,7 +3,7 @@ use super::super::rig::{GimbalRig, Joint};
 use super::statistics::percentile;
 use super::survey::Survey;
 use super::{Area, Findings, Severity};
-use crate::geometry::seconds_from_ns;
+use crate::geometry::{seconds_from_ns, wrap_angle};
 
 /// A joint that moves less than this over the log tells nothing about its parameters.
 const SMALLEST_RANGE_RAD: f64 = 0.05;
@@ -118,9 +118,9 @@ fn check_joint(survey: &Survey, gimbal: &GimbalRig, number: usize, joint: &Joint
 /// Standard deviation of the white part of the readings, from second differences with wraps taken out. The middle of
 /// them counts, so that jumps do not.
 fn white_sigma(values: &[f64]) -> f64 {
-    let wrap = |angle: f64| (angle + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU) - std::f64::consts::PI;
+    let turn = |from: f64, to: f64| wrap_angle(to - from);
     let second: Vec<f64> =
-        values.windows(3).map(|three| (wrap(three[2] - three[1]) - wrap(three[1] - three[0])).abs()).collect();
+        values.windows(3).map(|three| (turn(three[1], three[2]) - turn(three[0], three[1])).abs()).collect();
     // The median of |x| for a normal x is 0.6745 of its deviation.
     percentile(&second, 0.5) / 0.6745 / 6.0_f64.sqrt()
 }
