@@ -8,11 +8,13 @@ mod angle;
 pub mod dense;
 mod rigid_transform;
 pub mod so3;
+mod split_mix;
 #[cfg(test)]
 mod tests;
 
 pub use angle::wrap_angle;
 pub use rigid_transform::RigidTransform;
+pub use split_mix::SplitMix64;
 
 /// Seconds of a time stamp or duration in nanoseconds.
 pub fn seconds_from_ns(time_ns: i64) -> f64 {

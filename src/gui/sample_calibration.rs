@@ -19,7 +19,7 @@ pub(crate) fn calibration_at(
     let (names, values) = if name == "classical" { classical_values(&mixed) } else { minimal_values(&mixed) };
     let units: Vec<&'static str> = names.iter().map(|name| unit_of(name)).collect();
     let prior_sigmas: Vec<f64> = units.iter().map(|unit| if *unit == "rad" { 0.015 } else { 0.0035 }).collect();
-    let mut dice = Dice(index as u64 + 100);
+    let mut dice = Dice::new(index as u64 + 100);
     let waiting = index < FIRST_TRACKED_FRAME;
     let sigmas: Vec<f64> = prior_sigmas
         .iter()
@@ -66,7 +66,7 @@ pub(crate) fn rank_at(names: &[String], index: usize) -> RankReport {
         .rev()
         .map(|rank| {
             let mut weights = vec![0.0; columns];
-            let mut dice = Dice(rank as u64 * 977);
+            let mut dice = Dice::new(rank as u64 * 977);
             for entry in 0..3 {
                 weights[(rank * 5 + entry * 7) % columns] = if entry == 0 { 1.0 } else { 1.4 * dice.unit() - 0.7 };
             }

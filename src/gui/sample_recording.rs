@@ -20,7 +20,7 @@ use crate::estimator::{
 use crate::flight_log::rig::{CameraMount, CameraRig, ChainPrior, GimbalRig, ImuNoise, ImuRig, Joint};
 use crate::flight_log::{LogWarning, Rig};
 use crate::frontend::{FeatureId, FrontEndStatistics, TrackedFeature, TrackedFrame};
-use crate::geometry::{RigidTransform, so3};
+use crate::geometry::{RigidTransform, SplitMix64, so3};
 use crate::gimbal::{ClassicalChain, DhLink};
 use crate::session::accuracy::AlignmentSums;
 use crate::session::{Recording, RunRecord, StepRecord};
@@ -38,17 +38,17 @@ pub(crate) const INTRINSICS_PX: [f64; 4] = [352.6, 352.1, 322.4, 238.1];
 /// Its resolution.
 pub(crate) const RESOLUTION_PX: [usize; 2] = [640, 480];
 
-/// A small seeded generator (splitmix64), so that the sample is the same everywhere.
-pub(crate) struct Dice(pub(crate) u64);
+/// Seeded random numbers, so that the sample is the same everywhere.
+pub(crate) struct Dice(SplitMix64);
 
 impl Dice {
+    pub(crate) fn new(seed: u64) -> Self {
+        Self(SplitMix64::new(seed))
+    }
+
     /// Uniform in `[0, 1)`.
     pub(crate) fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+        self.0.next_unit()
     }
 
     /// Roughly normal with unit variance (sum of twelve uniforms).
@@ -170,7 +170,7 @@ pub(crate) fn true_chain() -> ClassicalChain {
 /// The chain as the rig gives it: each parameter wrong by up to 6 mm and 1.5°.
 pub(crate) fn given_chain() -> ClassicalChain {
     let mut chain = true_chain();
-    let mut dice = Dice(7);
+    let mut dice = Dice::new(7);
     let mut wrong = |bound: f64| bound * (2.0 * dice.unit() - 1.0);
     let shift = |pose: &RigidTransform, wrong: &mut dyn FnMut(f64) -> f64| {
         let entries: Vec<f64> = (0..6).map(|entry| wrong(if entry < 3 { 0.026 } else { 0.006 })).collect();
@@ -234,7 +234,7 @@ fn rig_with(chain: ClassicalChain, name: &str) -> Rig {
 
 /// Points on the walls and the ground of the yard.
 fn yard_points() -> Vec<Vector3<f64>> {
-    let mut dice = Dice(11);
+    let mut dice = Dice::new(11);
     let side = YARD_HALF_SIDE_M;
     (0..6000)
         .map(|index| {
@@ -271,7 +271,7 @@ fn track_features(flight: &[Instant]) -> Vec<Arc<TrackedFrame>> {
     const WANTED: usize = 140;
     const MIN_DISTANCE_PX: f64 = 26.0;
     let points = yard_points();
-    let mut dice = Dice(23);
+    let mut dice = Dice::new(23);
     let mut before: BTreeMap<u64, TrackedFeature> = BTreeMap::new();
     let mut frames = Vec::new();
     for (index, instant) in flight.iter().enumerate() {
@@ -330,7 +330,7 @@ fn sample_run(
     let points = yard_points();
     let true_from_estimate =
         RigidTransform::new(UnitQuaternion::from_euler_angles(0.0, 0.0, 0.4), Vector3::new(1.0, -2.0, 0.3));
-    let mut dice = Dice(31 + number as u64);
+    let mut dice = Dice::new(31 + number as u64);
     let steps = (0..flight.len())
         .map(|index| {
             let estimate = Estimate { number, flight, true_from_estimate };

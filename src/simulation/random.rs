@@ -1,3 +1,5 @@
+use crate::geometry::SplitMix64;
+
 /// A stream of random numbers that is a function of a seed, a stream number and a counter only.
 ///
 /// The generator is PCG-RXS-M-XS 64 (O'Neill 2014) over a 64-bit linear congruential state; streams differ by their
@@ -9,12 +11,9 @@ pub(crate) struct RandomStream {
     spare_normal: Option<f64>,
 }
 
-/// One round of `SplitMix64`, a good mixer of structured integers.
+/// One round of `splitmix64`, a good mixer of structured integers.
 pub(crate) fn mix(value: u64) -> u64 {
-    let mut z = value.wrapping_add(0x9E37_79B9_7F4A_7C15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    z ^ (z >> 31)
+    SplitMix64::new(value).next_u64()
 }
 
 impl RandomStream {

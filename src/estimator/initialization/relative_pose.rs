@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Matrix5, UnitQuaternion, Vector3, Vector5};
 
 use super::bearing::{angle_between, tangent_basis};
 use super::essential::{decompose, five_point};
-use crate::geometry::{RigidTransform, so3};
+use crate::geometry::{RigidTransform, SplitMix64, so3};
 
 /// Largest number of five-point samples drawn.
 const MAX_SAMPLES: usize = 160;
@@ -65,12 +65,12 @@ pub fn relative_poses(
             candidates.consider(&refine(pairs, &pose, bearing_sigma_rad));
         }
     }
-    let mut random = SplitMix(seed);
+    let mut random = SplitMix64::new(seed);
     let mut needed = MAX_SAMPLES;
     let mut drawn = 0;
     while drawn < needed {
         drawn += 1;
-        let sample = random.five_of(pairs.len()).map(|index| pairs[index]);
+        let sample = five_of(&mut random, pairs.len()).map(|index| pairs[index]);
         for essential in five_point(&sample) {
             if epipolar_cost(pairs, &essential, bearing_sigma_rad) >= candidates.worst_kept() {
                 continue;
@@ -275,35 +275,16 @@ fn robust_cost(pairs: &[(Vector3<f64>, Vector3<f64>)], pose: &RigidTransform, si
     pairs.iter().map(|pair| square(pair) / (1.0 + square(pair))).sum()
 }
 
-/// The `splitmix64` generator (Steele, Lea, Flood 2014): small, and the same numbers everywhere.
-pub(super) struct SplitMix(pub(super) u64);
-
-impl SplitMix {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    /// A number from 0 (included) to 1 (not).
-    #[cfg(test)]
-    pub(super) fn unit(&mut self) -> f64 {
-        (self.next() >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    /// Five different numbers below `count` (which must be at least five).
-    fn five_of(&mut self, count: usize) -> [usize; 5] {
-        let mut chosen = [usize::MAX; 5];
-        let mut filled = 0;
-        while filled < 5 {
-            let candidate = (self.next() % count.max(5) as u64) as usize;
-            if !chosen[..filled].contains(&candidate) {
-                chosen[filled] = candidate;
-                filled += 1;
-            }
+/// Five different numbers below `count` (which must be at least five).
+fn five_of(random: &mut SplitMix64, count: usize) -> [usize; 5] {
+    let mut chosen = [usize::MAX; 5];
+    let mut filled = 0;
+    while filled < 5 {
+        let candidate = (random.next_u64() % count.max(5) as u64) as usize;
+        if !chosen[..filled].contains(&candidate) {
+            chosen[filled] = candidate;
+            filled += 1;
         }
-        chosen
     }
+    chosen
 }

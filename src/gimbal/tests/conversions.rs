@@ -10,7 +10,7 @@ fn distance(a: &RigidTransform, b: &RigidTransform) -> f64 {
 
 #[test]
 fn every_form_has_the_same_forward_kinematics() {
-    let mut random = Random(1);
+    let mut random = Random::new(1);
     for (name, classical) in all_chains() {
         for parameterization in Parameterization::ALL {
             let chain = Chain::from_classical(&classical, parameterization);
@@ -40,7 +40,7 @@ fn every_form_has_the_same_forward_kinematics() {
 
 #[test]
 fn a_link_is_the_product_of_its_four_motions() {
-    let mut random = Random(2);
+    let mut random = Random::new(2);
     for _ in 0..50 {
         let link = random.chain(1).links[0];
         let angle = random.within(3.0);
@@ -72,7 +72,7 @@ fn a_link_is_the_product_of_its_four_motions() {
 
 #[test]
 fn frames_end_at_the_camera() {
-    let mut random = Random(3);
+    let mut random = Random::new(3);
     for joints in 0..5 {
         let chain = random.chain(joints);
         let angles = random.angles(joints);
@@ -89,7 +89,7 @@ fn frames_end_at_the_camera() {
 
 #[test]
 fn columns_are_as_many_as_stated() {
-    let mut random = Random(4);
+    let mut random = Random::new(4);
     for joints in 0..=5 {
         let classical = random.chain(joints);
         for parameterization in Parameterization::ALL {
@@ -151,7 +151,7 @@ fn margins_show_the_locks_and_auto_avoids_them() {
 
 #[test]
 fn auto_never_starts_near_a_lock_and_switches_late() {
-    let mut random = Random(5);
+    let mut random = Random::new(5);
     for _ in 0..500 {
         let classical = random.chain(3);
         let auto = auto_parameterization(&classical);
@@ -183,7 +183,7 @@ fn auto_never_starts_near_a_lock_and_switches_late() {
 
 #[test]
 fn canonical_numbers_do_not_depend_on_how_the_chain_was_written() {
-    let mut random = Random(6);
+    let mut random = Random::new(6);
     for joints in 1..=4 {
         for _ in 0..20 {
             let classical = random.chain(joints);

@@ -18,7 +18,7 @@ fn every_chain() -> Vec<(String, Chain)> {
 
 #[test]
 fn derivatives_meet_central_differences() {
-    let mut random = Random(11);
+    let mut random = Random::new(11);
     let step = 1e-6;
     for (name, chain) in every_chain() {
         let angles = random.angles(chain.joint_count());
@@ -51,7 +51,7 @@ fn derivatives_meet_central_differences() {
 
 #[test]
 fn chains_obey_the_manifold_laws() {
-    let mut random = Random(12);
+    let mut random = Random::new(12);
     for (name, chain) in every_chain() {
         let zero = DVector::zeros(chain.dof());
         assert!(chain.plus(&zero).minus(&chain).amax() < 1e-14, "{name}");
@@ -72,7 +72,7 @@ fn chains_obey_the_manifold_laws() {
 
 #[test]
 fn values_move_with_the_scalars() {
-    let mut random = Random(13);
+    let mut random = Random::new(13);
     for (name, chain) in every_chain() {
         let delta = DVector::from_fn(chain.dof(), |_, _| random.within(1e-3));
         let difference = chain.plus(&delta).values() - chain.values();
@@ -86,7 +86,7 @@ fn values_move_with_the_scalars() {
 
 #[test]
 fn redundant_directions_of_the_classical_form_move_nothing() {
-    let mut random = Random(14);
+    let mut random = Random::new(14);
     for (name, classical) in all_chains() {
         let directions = redundant_directions(&classical);
         assert_eq!(directions.shape(), (12 + 4 * classical.joint_count(), 6));
@@ -108,7 +108,7 @@ fn ranks_over_all_joint_angles_are_four_per_joint_and_six() {
         let values = stacked_jacobian(chain, &angles).singular_values();
         values.iter().filter(|value| **value > 1e-10 * values.max()).count()
     };
-    let mut random = Random(15);
+    let mut random = Random::new(15);
     for joints in 0..=4 {
         let classical = random.chain(joints);
         for parameterization in Parameterization::ALL {

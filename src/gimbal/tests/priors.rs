@@ -8,7 +8,7 @@ const ROTATION_SIGMA_RAD: f64 = 0.0087;
 
 #[test]
 fn transport_moves_the_camera_as_the_columns_it_came_from() {
-    let mut random = Random(21);
+    let mut random = Random::new(21);
     for (name, classical) in all_chains() {
         let given = Chain::from_classical(&classical, Parameterization::Classical);
         for parameterization in Parameterization::ALL {
@@ -27,7 +27,7 @@ fn transport_moves_the_camera_as_the_columns_it_came_from() {
 
 #[test]
 fn the_prior_covers_what_the_rig_may_be_wrong_by() {
-    let mut random = Random(22);
+    let mut random = Random::new(22);
     let (_, mut classical) = special_chains().remove(0);
     classical.links.iter_mut().for_each(|link| {
         link.d_m += random.within(0.05);
@@ -85,7 +85,7 @@ fn every_prior_can_be_inverted_even_at_a_lock() {
 
 #[test]
 fn a_switch_of_charts_keeps_the_prior() {
-    let mut random = Random(23);
+    let mut random = Random::new(23);
     for joints in 1..=4 {
         let classical = random.chain(joints);
         for offsets in [true, false] {

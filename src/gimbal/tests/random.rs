@@ -2,24 +2,20 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use crate::geometry::{RigidTransform, so3};
+use crate::geometry::{RigidTransform, SplitMix64, so3};
 use crate::gimbal::{ClassicalChain, DhLink};
 
-/// Splitmix64, enough for test data.
-pub(crate) struct Random(pub(crate) u64);
+/// Random numbers for test data.
+pub(crate) struct Random(SplitMix64);
 
 impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
+    pub(crate) fn new(seed: u64) -> Self {
+        Self(SplitMix64::new(seed))
     }
 
     /// Uniform within `±bound`.
     pub(crate) fn within(&mut self, bound: f64) -> f64 {
-        ((self.next() >> 11) as f64 / (1_u64 << 53) as f64 * 2.0 - 1.0) * bound
+        (self.0.next_unit() * 2.0 - 1.0) * bound
     }
 
     pub(crate) fn vector(&mut self, bound: f64) -> Vector3<f64> {
@@ -96,7 +92,7 @@ pub(crate) fn special_chains() -> Vec<(&'static str, ClassicalChain)> {
 /// Ten random chains of every length from 0 to 5, and the special ones.
 pub(crate) fn all_chains() -> Vec<(String, ClassicalChain)> {
     let mut chains: Vec<_> = special_chains().into_iter().map(|(name, chain)| (name.to_owned(), chain)).collect();
-    let mut random = Random(7);
+    let mut random = Random::new(7);
     for joints in 0..=5 {
         for index in 0..10 {
             chains.push((format!("random {index} with {joints} joints"), random.chain(joints)));

@@ -92,12 +92,12 @@ fn by_definition(jacobian: &DMatrix<f64>, scale: &[f64]) -> Vec<f64> {
 }
 
 fn chain() -> Chain {
-    Chain::from_classical(&Random(31).chain(JOINTS), Parameterization::Minimal)
+    Chain::from_classical(&Random::new(31).chain(JOINTS), Parameterization::Minimal)
 }
 
 #[test]
 fn elimination_by_blocks_is_the_projection() {
-    let mut random = Random(32);
+    let mut random = Random::new(32);
     let chain = chain();
     let units = chain.parameter_units();
     let scale: Vec<f64> = units.iter().map(|unit| if *unit == "rad" { 10_f64.to_radians() } else { 0.03 }).collect();
@@ -122,7 +122,7 @@ fn elimination_by_blocks_is_the_projection() {
 #[test]
 fn a_linearization_that_is_not_finite_has_no_ranks() {
     let chain = chain();
-    let mut linearization = window(&mut Random(33), &chain.parameter_names());
+    let mut linearization = window(&mut Random::new(33), &chain.parameter_names());
     linearization.jacobian[(3, 5)] = f64::NAN;
     assert_eq!(analyse::<Vec<f64>>(&linearization, &chain, &[], false), None);
 }
@@ -130,7 +130,7 @@ fn a_linearization_that_is_not_finite_has_no_ranks() {
 #[test]
 fn empty_linearizations_are_analysed() {
     let chain = chain();
-    let mut linearization = window(&mut Random(34), &chain.parameter_names());
+    let mut linearization = window(&mut Random::new(34), &chain.parameter_names());
     linearization.jacobian = DMatrix::zeros(0, COLUMNS);
     linearization.prior_jacobian = DMatrix::zeros(0, COLUMNS);
     linearization.calibration_column_norms.fill(0.0);

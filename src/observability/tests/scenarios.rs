@@ -25,7 +25,7 @@ enum Motion {
 fn mechanism(offsets: bool) -> ClassicalChain {
     let (_, mut chain) = special_chains().remove(0);
     if offsets {
-        let mut random = Random(41);
+        let mut random = Random::new(41);
         for link in &mut chain.links {
             link.d_m += random.within(0.05);
             link.a_m += 0.04 + random.within(0.02);
@@ -41,7 +41,7 @@ fn mechanism(offsets: bool) -> ClassicalChain {
 }
 
 fn window(classical: &ClassicalChain, motion: Motion) -> Window {
-    let mut random = Random(42);
+    let mut random = Random::new(42);
     let wave = |size: f64, frame: usize, speed: f64, phase: f64| size * (speed * frame as f64 + phase).sin();
     let camera = CameraModel::pinhole([460.0, 460.0, 0.0, 0.0], [640, 480]).unwrap();
     let joint_angles_rad: Vec<Vec<f64>> = (0..FRAMES)
@@ -189,7 +189,7 @@ fn known_parameters_carry_the_null_directions() {
 fn moving_along_a_redundant_direction_leaves_the_camera_where_it_was() {
     let Case { report, chain } = case(true, Motion::Exciting, false, Parameterization::Classical);
     let units = chain.parameter_units();
-    let mut random = Random(43);
+    let mut random = Random::new(43);
     for direction in report.directions.iter().filter(|direction| direction.structural) {
         let step = DVector::from_fn(24, |index, _| {
             direction.weights[index] * if units[index] == "rad" { 10_f64.to_radians() } else { 0.03 }

@@ -2,10 +2,9 @@
 
 use nalgebra::{UnitQuaternion, Vector2, Vector3};
 
-use crate::estimator::initialization::relative_pose::SplitMix;
 use crate::flight_log::{ImuSample, rig::ImuNoise};
 use crate::frontend::{FeatureId, TrackedFeature};
-use crate::geometry::{RigidTransform, so3};
+use crate::geometry::{RigidTransform, SplitMix64, so3};
 
 pub(super) const GRAVITY: f64 = 9.81;
 pub(super) const FOCAL_PX: f64 = 352.0;
@@ -13,15 +12,15 @@ const FRAME_NS: i64 = 50_000_000;
 const SAMPLE_NS: i64 = 5_000_000;
 
 /// Uniform and normal numbers.
-pub(super) struct Random(SplitMix);
+pub(super) struct Random(SplitMix64);
 
 impl Random {
     pub(super) fn new(seed: u64) -> Self {
-        Self(SplitMix(seed.wrapping_mul(0x5851_f42d_4c95_7f2d) + 1))
+        Self(SplitMix64::new(seed.wrapping_mul(0x5851_f42d_4c95_7f2d) + 1))
     }
 
     pub(super) fn uniform(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.0.unit()
+        low + (high - low) * self.0.next_unit()
     }
 
     pub(super) fn normal(&mut self) -> f64 {
