@@ -1,12 +1,11 @@
 //! The joint angles at an image's stamp, from all encoder readings that belong to it.
 
 use std::collections::VecDeque;
-use std::f64::consts::{PI, TAU};
 
 use super::super::{JointAngles, JointSample};
 use super::angle_fit::{self, Reading};
 use super::ordered::{OrderedSamples, ReadContext};
-use crate::geometry::seconds_from_ns;
+use crate::geometry::{seconds_from_ns, wrap_angle};
 
 /// A reading further than this from the stamp tells nothing about the angle there.
 const NEAREST_NS: i64 = 100_000_000;
@@ -214,9 +213,4 @@ impl WhiteNoise {
             .fold((0.0, 0), |(squares, freedom), (more, further)| (squares + more, freedom + further));
         (freedom >= LEAST_FREEDOM).then(|| MeasuredNoise { variance: squares / freedom as f64, freedom })
     }
-}
-
-/// An angle brought into (−π, π].
-fn wrap_angle(angle_rad: f64) -> f64 {
-    PI - (PI - angle_rad).rem_euclid(TAU)
 }
