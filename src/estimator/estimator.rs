@@ -13,7 +13,7 @@ use super::window::{FeatureMap, Frame};
 use super::{Event, EventKind, Phase, StepInput, StepReport, gravity_in_world};
 use crate::flight_log::rig::ImuNoise;
 use crate::geometry::RigidTransform;
-use crate::gimbal::ClassicalChain;
+use crate::gimbal::{ClassicalChain, Parameterization};
 
 /// A sliding-window visual-inertial estimator for a camera on a gimbal, or on a rigid mount.
 ///
@@ -224,16 +224,23 @@ impl Estimator {
         }
         let Some(better) = self.calibration.chain().should_switch() else { return };
         let margin = self.calibration.chain().margins().iter().map(|(_, margin)| *margin).fold(1.0, f64::min);
-        let layout = super::window::layout(&self.frames, self.calibration.dof());
-        let old_from_new = self.calibration.switch_chart(better);
-        if let Some(prior) = &mut self.prior {
-            prior.transport_calibration(&old_from_new, &layout);
-        }
+        self.switch_chart(better);
         events.push(Event {
             kind: EventKind::ChartSwitched,
             message: format!("the chain goes over to the chart {better}: the old one is near its lock"),
             value: Some(margin),
             threshold: Some(crate::gimbal::SWITCH_MARGIN),
         });
+    }
+
+    /// Goes over to another chart: the calibration is the same, and the prior says the same about it.
+    pub(super) fn switch_chart(&mut self, parameterization: Parameterization) {
+        let layout = super::window::layout(&self.frames, self.calibration.dof());
+        let before = self.calibration.deviation();
+        let old_from_new = self.calibration.switch_chart(parameterization);
+        if let Some(prior) = &mut self.prior {
+            let deviations = before.zip(self.calibration.deviation());
+            prior.transport_calibration(&old_from_new, deviations.as_ref(), &layout);
+        }
     }
 }

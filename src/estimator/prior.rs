@@ -144,7 +144,16 @@ impl Prior {
     }
 
     /// Its calibration columns carried to another chart: `old = by_new · new` to first order.
-    pub(super) fn transport_calibration(&mut self, old_from_new: &DMatrix<f64>, layout: &Layout) {
+    ///
+    /// `deviations` are the calibration's from its first estimate in the old and in the new chart. Where the two differ by
+    /// more than the first order, the residual takes the difference up, so that cost and gradient stay what they are at
+    /// the present estimate.
+    pub(super) fn transport_calibration(
+        &mut self,
+        old_from_new: &DMatrix<f64>,
+        deviations: Option<&(DVector<f64>, DVector<f64>)>,
+        layout: &Layout,
+    ) {
         let zero = DVector::zeros(layout.total());
         let rows = self.rows(layout, &zero);
         let calibration = layout.calibration();
@@ -157,7 +166,11 @@ impl Prior {
         }
         jacobian.columns_mut(columns.len(), moved.ncols()).copy_from(&moved);
         columns.extend((0..moved.ncols()).map(PriorColumn::Calibration));
-        *self = Self::new(columns, jacobian, self.residual.clone());
+        let mut residual = self.residual.clone();
+        if let Some((old, new)) = deviations {
+            residual += rows.columns_range(calibration) * (old - old_from_new * new);
+        }
+        *self = Self::new(columns, jacobian, residual);
     }
 
     fn gather(&self, layout: &Layout, deviation: &DVector<f64>) -> DVector<f64> {
