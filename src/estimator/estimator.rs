@@ -8,6 +8,7 @@ use super::calibration::{Calibration, GivenSigmas};
 use super::config::{DEFAULT_CHAIN_PRIOR, EstimatorConfig};
 use super::initialization::StandstillEstimate;
 use super::prior::{Prior, StartPrior};
+use super::standstill::RestWatch;
 use super::startup::WaitingFrame;
 use super::window::{FeatureMap, Frame};
 use super::{Event, EventKind, Phase, StepInput, StepReport, gravity_in_world};
@@ -36,6 +37,8 @@ pub struct Estimator {
     pub(super) start: Option<StartPrior>,
     /// Posterior standard deviations of the calibration after the last solve.
     pub(super) calibration_sigmas: Vec<f64>,
+    /// Watches for rest while the window runs.
+    pub(super) rest_watch: RestWatch,
     /// How many frames in a row saw too few landmarks.
     pub(super) blind_frames: usize,
     /// Where a restarted window should begin: the last pose before the failure.
@@ -73,6 +76,7 @@ impl Estimator {
             prior: None,
             start: None,
             calibration_sigmas: Vec::new(),
+            rest_watch: RestWatch::default(),
             blind_frames: 0,
             resume_at: None,
             config,
@@ -114,11 +118,13 @@ impl Estimator {
         if let Err(failure) = self.push_frame(input) {
             return self.restart(input, vec![failure]);
         }
+        let mut events: Vec<Event> = self.saturation().into_iter().collect();
+        events.extend(self.watch_for_rest(input));
         let predicted = self.newest_state().navigation;
         let mut solved = self.solve_window(self.config.options.iterations);
-        let mut events = Vec::new();
         if let Some(failure) = self.failure(&predicted) {
-            return self.restart(input, vec![failure]);
+            events.push(failure);
+            return self.restart(input, events);
         }
         let (keyframe, chosen) = self.choose_keyframe();
         if let Some(newest) = self.frames.last_mut() {
@@ -159,6 +165,21 @@ impl Estimator {
         &self.frames.last().expect("a running window has frames").state
     }
 
+    /// Inertial samples of the newest interval that were at the end of the sensor's range.
+    fn saturation(&self) -> Option<Event> {
+        let motion = &self.frames.last()?.motion;
+        let (saturated, count) = (motion.saturated_samples(), motion.samples().len());
+        (saturated > 0).then(|| Event {
+            kind: EventKind::MeasurementMissing,
+            message: format!(
+                "the inertial sensor is saturated in {saturated} of {count} samples: an axis repeats a large value; it \
+                 counts for little there"
+            ),
+            value: Some(saturated as f64),
+            threshold: Some(0.0),
+        })
+    }
+
     /// What says that the window has failed, against the newest state's prediction.
     fn failure(&mut self, predicted: &super::NavigationState) -> Option<Event> {
         let options = &self.config.options;
@@ -168,7 +189,9 @@ impl Estimator {
             .values()
             .filter(|feature| feature.landmark.is_some() && feature.observation(slot).is_some())
             .count();
-        self.blind_frames = if seen < options.min_landmarks { self.blind_frames + 1 } else { 0 };
+        // A vehicle at rest needs no landmarks to know where it is.
+        let blind = seen < options.min_landmarks && self.frames[slot].rest.is_none();
+        self.blind_frames = if blind { self.blind_frames + 1 } else { 0 };
         let state = self.newest_state().navigation;
         let checks = [
             (

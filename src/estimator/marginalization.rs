@@ -6,6 +6,7 @@ use super::prior::Prior;
 use super::problem::{Estimate, Problem};
 use super::reprojection::Landmark;
 use super::rows::stack;
+use super::standstill;
 use super::visual::Track;
 use super::window::Frame;
 
@@ -21,8 +22,10 @@ pub(super) fn oldest(
     landmarks: &[Landmark],
 ) -> Option<Prior> {
     let mut parts = vec![problem.prior_rows(estimate), problem.encoder_rows(0, estimate)];
+    parts.push(problem.rest_rows(&standstill::speed_terms(problem.layout, &problem.frames[0], 0, &estimate.frames[0])));
     if problem.frames.len() > 1 {
         parts.push(problem.inertial_rows(1, estimate));
+        parts.push(problem.rest_rows(&standstill::place_terms(problem.layout, problem.frames, 1, &estimate.frames)));
     }
     if !tracks.is_empty() {
         parts.push(problem.visual_rows(estimate, tracks, landmarks));

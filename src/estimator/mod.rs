@@ -11,6 +11,7 @@ mod estimator;
 mod features;
 pub mod imu_factor;
 pub mod initialization;
+mod joints;
 mod layout;
 mod marginalization;
 mod options;
@@ -22,6 +23,7 @@ mod reporting;
 mod reprojection;
 mod rows;
 mod solver;
+mod standstill;
 mod startup;
 #[cfg(test)]
 mod tests;

@@ -74,6 +74,48 @@ pub struct MotionIncrement {
     pub velocity_m_per_s: Vector3<f64>,
 }
 
+/// An axis that shows the same value so often, and one as large as [`LEAST_SATURATED_RAD_PER_S`] or
+/// [`LEAST_SATURATED_M_PER_S2`], is at the end of its range: noise never repeats a value of full resolution.
+const SATURATED_REPEATS: u8 = 3;
+/// Slower turns are in every sensor's range.
+const LEAST_SATURATED_RAD_PER_S: f64 = 0.5;
+/// Every sensor's range reaches beyond gravity.
+const LEAST_SATURATED_M_PER_S2: f64 = 12.0;
+/// Noise density of an axis at the end of its range, as a share of what it shows, in √s: the truth lies beyond by about
+/// half of it (standard deviation) for about a tenth of a second.
+const SATURATED_DENSITY: f64 = 0.16;
+
+/// How often each axis has shown the same value in a row.
+#[derive(Clone, Copy, Debug, Default)]
+struct Repeats {
+    gyroscope: [u8; 3],
+    accelerometer: [u8; 3],
+}
+
+impl Repeats {
+    fn count(&mut self, from: &ImuSample, to: &ImuSample) {
+        let follow = |counts: &mut [u8; 3], before: &Vector3<f64>, now: &Vector3<f64>| {
+            for axis in 0..3 {
+                counts[axis] = if before[axis] == now[axis] { counts[axis].saturating_add(1) } else { 0 };
+            }
+        };
+        follow(&mut self.gyroscope, &from.angular_velocity_rad_per_s, &to.angular_velocity_rad_per_s);
+        follow(&mut self.accelerometer, &from.specific_force_m_per_s2, &to.specific_force_m_per_s2);
+    }
+
+    /// Squared noise densities of the axes, those of saturated ones raised.
+    fn densities(counts: &[u8; 3], shown: &Vector3<f64>, least: f64, density: f64) -> (Vector3<f64>, bool) {
+        let mut saturated = false;
+        let squares = Vector3::from_fn(|axis, _| {
+            let at_end = counts[axis] + 1 >= SATURATED_REPEATS && shown[axis].abs() >= least;
+            saturated |= at_end;
+            let density = if at_end { SATURATED_DENSITY * shown[axis].abs() } else { density };
+            density * density
+        });
+        (squares, saturated)
+    }
+}
+
 /// What the inertial samples of an interval say about the motion over it.
 #[derive(Clone, Debug)]
 pub struct Preintegration {
@@ -84,6 +126,8 @@ pub struct Preintegration {
     increment: MotionIncrement,
     bias_jacobian: BiasJacobian,
     covariance: Matrix15,
+    repeats: Repeats,
+    saturated: usize,
 }
 
 impl Preintegration {
@@ -101,6 +145,8 @@ impl Preintegration {
             },
             bias_jacobian: BiasJacobian::zeros(),
             covariance: Matrix15::zeros(),
+            repeats: Repeats::default(),
+            saturated: 0,
         }
     }
 
@@ -147,6 +193,11 @@ impl Preintegration {
     /// Length of the interval in seconds.
     pub fn duration_s(&self) -> f64 {
         self.duration_s
+    }
+
+    /// Number of samples at which an axis was at the end of its range.
+    pub fn saturated_samples(&self) -> usize {
+        self.saturated
     }
 
     /// The motion at the bias it was integrated around.
@@ -210,6 +261,20 @@ impl Preintegration {
 
     fn propagate(&mut self, from: &ImuSample, to: &ImuSample) {
         let h = seconds_from_ns(to.stamp_ns - from.stamp_ns);
+        self.repeats.count(from, to);
+        let (turn_noise, turn_saturated) = Repeats::densities(
+            &self.repeats.gyroscope,
+            &to.angular_velocity_rad_per_s,
+            LEAST_SATURATED_RAD_PER_S,
+            self.noise.gyroscope_noise_density,
+        );
+        let (force_noise, force_saturated) = Repeats::densities(
+            &self.repeats.accelerometer,
+            &to.specific_force_m_per_s2,
+            LEAST_SATURATED_M_PER_S2,
+            self.noise.accelerometer_noise_density,
+        );
+        self.saturated += usize::from(turn_saturated || force_saturated);
         let w0 = from.angular_velocity_rad_per_s - self.bias.gyroscope_rad_per_s;
         let w1 = to.angular_velocity_rad_per_s - self.bias.gyroscope_rad_per_s;
         let a0 = from.specific_force_m_per_s2 - self.bias.accelerometer_m_per_s2;
@@ -265,7 +330,12 @@ impl Preintegration {
         transition.fixed_view_mut::<3, 3>(6, 9).copy_from(&-dv_by_w);
         transition.fixed_view_mut::<3, 3>(6, 12).copy_from(&-dv_by_a);
         self.covariance = transition * self.covariance * transition.transpose();
-        self.add_noise(h, &phi_by_w, &dp_by_w, &dv_by_w);
+        self.add_noise(
+            h,
+            [&phi_by_w, &dp_by_w, &dv_by_w],
+            &turn_noise,
+            &(r * Matrix3::from_diagonal(&force_noise) * r.transpose()),
+        );
 
         self.increment.position_m += self.increment.velocity_m_per_s * h + r * dp;
         self.increment.velocity_m_per_s += r * dv;
@@ -296,23 +366,28 @@ impl Preintegration {
         j.fixed_view_mut::<3, 3>(0, 0).copy_from(&(turn_back * phi_by_bg - phi_by_w));
     }
 
-    /// White noise and random walk of one sample interval, from the continuous densities.
-    fn add_noise(&mut self, h: f64, phi_by_w: &Matrix3<f64>, dp_by_w: &Matrix3<f64>, dv_by_w: &Matrix3<f64>) {
+    /// White noise and random walk of one sample interval, from the squared continuous densities: of the angular velocity
+    /// by axis, of the specific force as a matrix in the frame of the interval's begin.
+    fn add_noise(
+        &mut self,
+        h: f64,
+        [phi_by_w, dp_by_w, dv_by_w]: [&Matrix3<f64>; 3],
+        turn_noise: &Vector3<f64>,
+        force_noise: &Matrix3<f64>,
+    ) {
         let square = |density: f64| density * density;
-        let gyro = square(self.noise.gyroscope_noise_density) / h;
-        let accel = square(self.noise.accelerometer_noise_density);
         let mut by_w = SMatrix::<f64, 9, 3>::zeros();
         by_w.fixed_view_mut::<3, 3>(0, 0).copy_from(phi_by_w);
         by_w.fixed_view_mut::<3, 3>(3, 0).copy_from(dp_by_w);
         by_w.fixed_view_mut::<3, 3>(6, 0).copy_from(dv_by_w);
         let mut motion = self.covariance.fixed_view_mut::<9, 9>(0, 0);
-        motion += by_w * by_w.transpose() * gyro;
-        // White specific force over the interval moves velocity and position together; the rotation leaves it isotropic.
+        motion += by_w * Matrix3::from_diagonal(turn_noise) * by_w.transpose() / h;
+        // White specific force over the interval moves velocity and position together.
+        for (row, column, factor) in [(3, 3, h * h * h / 3.0), (3, 6, h * h / 2.0), (6, 3, h * h / 2.0), (6, 6, h)] {
+            let mut block = self.covariance.fixed_view_mut::<3, 3>(row, column);
+            block += force_noise * factor;
+        }
         for axis in 0..3 {
-            self.covariance[(3 + axis, 3 + axis)] += accel * h * h * h / 3.0;
-            self.covariance[(3 + axis, 6 + axis)] += accel * h * h / 2.0;
-            self.covariance[(6 + axis, 3 + axis)] += accel * h * h / 2.0;
-            self.covariance[(6 + axis, 6 + axis)] += accel * h;
             self.covariance[(9 + axis, 9 + axis)] += square(self.noise.gyroscope_random_walk) * h;
             self.covariance[(12 + axis, 12 + axis)] += square(self.noise.accelerometer_random_walk) * h;
         }

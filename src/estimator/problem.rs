@@ -9,6 +9,7 @@ use super::layout::{Layout, POSE, SPEED_BIAS};
 use super::preintegration::{Matrix15, Vector15};
 use super::prior::{Prior, StartPrior};
 use super::reprojection::Landmark;
+use super::standstill::{self, RestTerm};
 use super::visual::{self, ReducedVisualSystem, Track, VisualModel, VisualSystem};
 use super::window::{Frame, FrameState};
 use crate::geometry::wrap_angle;
@@ -44,6 +45,7 @@ pub(super) struct Costs {
     pub(super) visual: f64,
     pub(super) imu: f64,
     pub(super) encoder: f64,
+    pub(super) rest: f64,
     pub(super) calibration: f64,
     pub(super) prior: f64,
 }
@@ -51,7 +53,7 @@ pub(super) struct Costs {
 impl Costs {
     /// The cost that the solver lowers.
     pub(super) fn total(&self) -> f64 {
-        0.5 * (self.visual + self.imu + self.encoder + self.calibration + self.prior)
+        0.5 * (self.visual + self.imu + self.encoder + self.rest + self.calibration + self.prior)
     }
 }
 
@@ -90,6 +92,7 @@ impl Problem<'_> {
         for slot in 0..self.frames.len() {
             costs.encoder += self.encoder_residuals(slot, &estimate.frames[slot]).map(|(_, r, _)| r * r).sum::<f64>();
         }
+        costs.rest = self.rest_terms(&estimate.frames).map(|term| term.residual * term.residual).sum();
         if self.layout.calibration > 0 {
             costs.calibration = estimate.calibration.prior_residual().norm_squared();
         }
@@ -145,6 +148,15 @@ impl Problem<'_> {
             .map(|(joint, (angle, (reading, sigma)))| (joint, wrap_angle(angle - reading) / sigma, 1.0 / sigma))
     }
 
+    /// What standing still says about all frames.
+    pub(super) fn rest_terms<'s>(&'s self, states: &'s [FrameState]) -> impl Iterator<Item = RestTerm> + 's {
+        self.frames.iter().enumerate().flat_map(move |(slot, frame)| {
+            let mut terms = standstill::speed_terms(self.layout, frame, slot, &states[slot]);
+            terms.extend(standstill::place_terms(self.layout, self.frames, slot, states));
+            terms
+        })
+    }
+
     /// Calibration at which derivatives are taken.
     pub(super) fn linearization_calibration(&self, current: &Calibration) -> Calibration {
         if self.calibration_first_estimates { current.at_first_estimate() } else { current.clone() }
@@ -172,6 +184,17 @@ impl Problem<'_> {
             for (joint, residual, slope) in self.encoder_residuals(slot, &estimate.frames[slot]) {
                 hessian[(start + joint, start + joint)] += slope * slope;
                 gradient[start + joint] += slope * residual;
+            }
+        }
+        for term in self.rest_terms(&estimate.frames) {
+            let square = term.slope * term.slope;
+            hessian[(term.column, term.column)] += square;
+            gradient[term.column] += term.slope * term.residual;
+            if let Some(against) = term.against {
+                hessian[(against, against)] += square;
+                hessian[(term.column, against)] -= square;
+                hessian[(against, term.column)] -= square;
+                gradient[against] -= term.slope * term.residual;
             }
         }
         if self.layout.calibration > 0 {

@@ -182,7 +182,7 @@ pub struct IterationReport {
 /// Sum of squared whitened residuals of one kind of factor, and how many there are.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ResidualSummary {
-    /// `visual`, `imu`, `encoder`, `calibration prior`, `marginalization prior`.
+    /// `visual`, `imu`, `encoder`, `calibration prior`, `marginalization prior`, and `standstill` where there is one.
     pub factor: &'static str,
     /// Number of scalar residuals.
     pub count: usize,

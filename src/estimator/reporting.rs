@@ -152,6 +152,7 @@ impl Estimator {
         let joints = problem.layout.joints;
         let sightings: usize = solved.tracks.iter().map(|track| track.sightings.len()).sum();
         let read = self.frames.iter().filter(|frame| frame.encoder.is_some()).count();
+        let resting = problem.rest_terms(&solved.solution.estimate.frames).count();
         let intervals = self.frames.iter().skip(1).filter(|frame| frame.motion_information.is_some()).count();
         let held = self.prior.as_ref().map_or(0, super::prior::Prior::len)
             + if self.start.is_some() { super::prior::StartPrior::LEN } else { 0 };
@@ -162,13 +163,17 @@ impl Estimator {
             chi2_before: part(before),
             chi2_after: part(after),
         };
-        vec![
+        let mut summaries = vec![
             summary("visual", 2 * sightings, |costs| costs.visual),
             summary("imu", 15 * intervals, |costs| costs.imu),
             summary("encoder", joints * read, |costs| costs.encoder),
             summary("calibration prior", problem.layout.calibration, |costs| costs.calibration),
             summary("marginalization prior", held, |costs| costs.prior),
-        ]
+        ];
+        if resting > 0 {
+            summaries.push(summary("standstill", resting, |costs| costs.rest));
+        }
+        summaries
     }
 
     /// The linearization at the final estimate: the measurements' rows, and those of the priors.
@@ -180,6 +185,8 @@ impl Estimator {
         let mut parts = vec![problem.visual_rows(estimate, &solved.tracks, &estimate.landmarks)];
         parts.extend((1..layout.frames).map(|slot| problem.inertial_rows(slot, estimate)));
         parts.extend((0..layout.frames).map(|slot| problem.encoder_rows(slot, estimate)));
+        let rest: Vec<_> = problem.rest_terms(&estimate.frames).collect();
+        parts.push(problem.rest_rows(&rest));
         let measured = stack(&parts, columns);
         let priors = stack(&[problem.calibration_prior_rows(estimate), problem.prior_rows(estimate)], columns);
         let order = column_order(&layout);

@@ -6,6 +6,7 @@ use super::camera_pose::{self, CameraMaps};
 use super::layout::{POSE, SPEED_BIAS};
 use super::problem::{Estimate, Problem};
 use super::reprojection::Landmark;
+use super::standstill::RestTerm;
 use super::visual::{self, Track};
 
 impl Problem<'_> {
@@ -56,6 +57,19 @@ impl Problem<'_> {
         for (row, (joint, residual, slope)) in readings.into_iter().enumerate() {
             rows[(row, self.layout.joints(slot).start + joint)] = slope;
             rows[(row, self.layout.total())] = residual;
+        }
+        rows
+    }
+
+    /// What standing still says, a row for each term.
+    pub(super) fn rest_rows(&self, terms: &[RestTerm]) -> DMatrix<f64> {
+        let mut rows = DMatrix::zeros(terms.len(), self.layout.total() + 1);
+        for (row, term) in terms.iter().enumerate() {
+            rows[(row, term.column)] = term.slope;
+            if let Some(against) = term.against {
+                rows[(row, against)] = -term.slope;
+            }
+            rows[(row, self.layout.total())] = term.residual;
         }
         rows
     }

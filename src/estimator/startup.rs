@@ -10,9 +10,9 @@ use super::initialization::{
     InitializationFrame, InitializationInput, InitializationOptions, InitializationOrigin, InitializationOutcome,
     InitializationSolution, WaitReason, try_initialize,
 };
+use super::joints::UNKNOWN_TURN_RAD;
 use super::preintegration::{NavigationState, Preintegration};
 use super::prior::StartPrior;
-use super::tracking::UNKNOWN_TURN_RAD;
 use super::window::{Frame, FrameState};
 use super::{Event, EventKind, Phase, StepInput, StepReport};
 use crate::flight_log::{ImuSample, JointAngles};
@@ -222,6 +222,7 @@ impl Estimator {
                 state: FrameState { navigation, joints_rad },
                 first_estimate: None,
                 encoder: waiting.encoder,
+                rest: None,
                 keyframe: true,
                 motion_information: motion.square_root_information(),
                 motion,

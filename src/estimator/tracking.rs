@@ -1,25 +1,29 @@
 //! One step of a running window: predict, observe, solve, reject, decide, marginalize.
 
-use nalgebra::{DMatrix, DVector, Vector2};
+use nalgebra::Vector2;
 
-use super::camera_pose::{self, CameraMaps};
+use super::camera_pose;
 use super::estimator::Estimator;
 use super::features;
 use super::marginalization;
 use super::options::{LandmarkModel, TrackContinuation};
 use super::preintegration::Preintegration;
 use super::problem::{Estimate, Problem};
-use super::reprojection::{self, CameraPose, Landmark, RelativePose};
+use super::reprojection::{CameraPose, Landmark};
 use super::solver::{self, Solution, SolverLimits};
+use super::standstill;
 use super::visual::{self, RelativePoses, Sighting, Track, VisualModel};
 use super::window::{self, Frame, FrameState};
 use super::{Event, EventKind, StepInput};
-use crate::flight_log::JointAngles;
 use crate::frontend::FeatureId;
 use crate::geometry::seconds_from_ns;
 
-/// How far a joint may have turned since the frame before where no encoder tells it, as a standard deviation.
-pub(super) const UNKNOWN_TURN_RAD: f64 = 1.0;
+/// Distance of a scene of which no landmark is known.
+const UNKNOWN_DISTANCE_M: f64 = 10.0;
+/// A scene counts as no farther than this.
+const FARTHEST_USUAL_M: f64 = 100.0;
+/// A vehicle at rest gives a keyframe this often, so that inertial intervals stay short enough to be integrated again.
+const KEYFRAME_AT_REST_NS: i64 = 5_000_000_000;
 
 /// Pixel residuals by track and sighting.
 pub(super) type TrackResiduals = Vec<Vec<Option<Vector2<f64>>>>;
@@ -61,6 +65,7 @@ impl Estimator {
             state: FrameState { navigation, joints_rad },
             first_estimate: None,
             encoder,
+            rest: None,
             keyframe: false,
             motion,
             motion_information,
@@ -71,74 +76,31 @@ impl Estimator {
         Ok(())
     }
 
-    /// Encoder angles that can be used.
-    pub(super) fn encoder_reading(&self, input: &StepInput<'_>) -> Option<JointAngles> {
-        self.config.encoder_in_use()?;
-        let angles = input.joint_angles?;
-        let count = self.calibration.joint_count();
-        let usable = angles.angles_rad.len() == count
-            && angles.sigmas_rad.len() == count
-            && angles.angles_rad.iter().all(|angle| angle.is_finite())
-            && angles.sigmas_rad.iter().all(|sigma| sigma.is_finite() && *sigma > 0.0);
-        usable.then(|| angles.clone())
+    /// Looks whether the vehicle stands still at the newest frame.
+    pub(super) fn watch_for_rest(&mut self, input: &StepInput<'_>) -> Option<Event> {
+        let newest = self.frames.last()?;
+        let navigation = newest.state.navigation;
+        let known = standstill::Known {
+            noise: &self.noise,
+            bias: &navigation.bias,
+            speed_m_per_s: navigation.velocity_m_per_s.norm(),
+            imu_from_camera: self.calibration.imu_from_camera(&newest.state.joints_rad).rotation,
+            distance_m: self.usual_distance_m(),
+        };
+        let (rest, event) = self.rest_watch.observe(input, &known)?;
+        self.frames.last_mut()?.rest = Some(rest);
+        Some(event)
     }
 
-    /// Turns the newest frame's joints so that the known landmarks meet their measurements, pose held: an encoder may be
-    /// off by many degrees, and without one there is nothing else to start from.
-    fn align_newest_joints(&mut self) {
-        let joints = self.calibration.joint_count();
-        if joints == 0 {
-            return;
+    /// Median distance of the landmarks from where they are anchored.
+    fn usual_distance_m(&self) -> f64 {
+        let mut inverse: Vec<f64> =
+            self.features.values().filter_map(|feature| Some(feature.landmark?.inverse_distance)).collect();
+        if inverse.is_empty() {
+            return UNKNOWN_DISTANCE_M;
         }
-        let slot = self.frames.len() - 1;
-        let cameras = self.camera_poses();
-        let sigma = self.config.options.pixel_sigma_px;
-        let known = self.frames[slot].encoder.as_ref().map(|encoder| encoder.sigmas_rad.as_slice());
-        let prior =
-            DVector::from_fn(joints, |joint, _| known.map_or(UNKNOWN_TURN_RAD, |sigmas| sigmas[joint]).powi(-2));
-        let start = self.frames[slot].state.joints_rad.clone();
-        let mut angles = start.clone();
-        for _ in 0..5 {
-            let mut state = self.frames[slot].state.clone();
-            state.joints_rad = angles.clone();
-            let camera = camera_pose::at(&state, &self.calibration);
-            let own = CameraMaps::new(std::slice::from_ref(&state), &self.calibration).own.remove(0);
-            let by_joints = own.columns(6, joints).into_owned();
-            let mut hessian = DMatrix::from_diagonal(&prior);
-            let mut gradient = DVector::from_fn(joints, |joint, _| (angles[joint] - start[joint]) * prior[joint]);
-            for feature in self.features.values() {
-                let (Some(anchor), Some(landmark), Some(seen)) =
-                    (feature.anchor(), feature.landmark.as_ref(), feature.observation(slot))
-                else {
-                    continue;
-                };
-                if anchor == slot {
-                    continue;
-                }
-                let relative = RelativePose::new(&cameras[anchor], &camera);
-                let Some(term) =
-                    reprojection::linearize(&self.config.camera, &relative, &relative, landmark, &seen.uv_px)
-                else {
-                    continue;
-                };
-                let squared = term.residual_px.norm_squared() / (sigma * sigma);
-                let weight = 1.0 / (sigma * sigma * squared.sqrt().max(1.0));
-                let rows = term.by_observer * &by_joints;
-                hessian += rows.tr_mul(&rows) * weight;
-                gradient += rows.tr_mul(&term.residual_px) * weight;
-            }
-            let Some(factor) = hessian.cholesky() else { return };
-            let step = factor.solve(&gradient);
-            for (angle, change) in angles.iter_mut().zip(step.iter()) {
-                *angle -= change;
-            }
-            if step.amax() < 1e-5 {
-                break;
-            }
-        }
-        if angles.iter().all(|angle| angle.is_finite()) {
-            self.frames[slot].state.joints_rad = angles;
-        }
+        let middle = inverse.len() / 2;
+        1.0 / (*inverse.select_nth_unstable_by(middle, f64::total_cmp).1).max(1.0 / FARTHEST_USUAL_M)
     }
 
     /// Poses of the camera by slot.
@@ -267,6 +229,18 @@ impl Estimator {
         let Some(last) = (0..newest).rev().find(|slot| self.frames[*slot].keyframe) else {
             return event(true, "the first keyframe of the window".to_owned(), 0.0, 0.0);
         };
+        if let Some(rest) = &self.frames[newest].rest {
+            let first = self.frames[last].stamp_ns < rest.since_ns;
+            let age_ns = self.frames[newest].stamp_ns - self.frames[last].stamp_ns;
+            let chosen = first || age_ns >= KEYFRAME_AT_REST_NS;
+            let message = if first { "keyframe: the first at rest" } else { "at rest: only time makes a keyframe, s" };
+            return event(
+                chosen,
+                message.to_owned(),
+                seconds_from_ns(age_ns),
+                if first { 0.0 } else { seconds_from_ns(KEYFRAME_AT_REST_NS) },
+            );
+        }
         let cameras = self.camera_poses();
         let (parallax, common) = features::compensated_parallax(&self.features, &cameras, last, newest);
         let seen = self.features.values().filter(|feature| feature.observation(newest).is_some()).count();
@@ -324,6 +298,9 @@ impl Estimator {
 
     fn drop_second_newest(&mut self) {
         let gone = self.frames.len() - 2;
+        if self.prior.as_ref().is_none_or(|prior| !prior.holds_frame(gone)) {
+            self.carry_encoder(gone, gone + 1);
+        }
         let prior = marginalization::dropped(&self.problem(&[]), &self.present_estimate(), gone);
         self.prior = prior;
         let cameras = self.camera_poses();

@@ -7,6 +7,7 @@ use nalgebra::{DVector, Vector2, Vector3};
 use super::layout::{Layout, POSE, SPEED_BIAS};
 use super::preintegration::{Matrix15, NavigationState, Preintegration, Vector15};
 use super::reprojection::Landmark;
+use super::standstill::Rest;
 use crate::flight_log::JointAngles;
 use crate::frontend::FeatureId;
 
@@ -70,6 +71,8 @@ pub(super) struct Frame {
     pub(super) first_estimate: Option<FrameState>,
     /// What the encoders say.
     pub(super) encoder: Option<JointAngles>,
+    /// Whether the vehicle stands still there.
+    pub(super) rest: Option<Rest>,
     /// Whether it is a keyframe.
     pub(super) keyframe: bool,
     /// Inertial samples from the frame before it in the window.

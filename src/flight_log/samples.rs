@@ -32,6 +32,8 @@ pub struct JointAngles {
     pub angles_rad: Vec<f64>,
     /// Standard deviation of each in radians: less than the rig's for one reading where several could be averaged.
     pub sigmas_rad: Vec<f64>,
+    /// The part of it that neighbouring images share, so that no average takes it away (zero for white noise).
+    pub lasting_sigmas_rad: Vec<f64>,
 }
 
 /// A ground-truth pose.

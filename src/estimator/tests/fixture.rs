@@ -44,7 +44,8 @@ pub(super) fn config(rig: &Rig, parameterization: Parameterization, options: Est
 pub(super) fn encoder(frame: &SyntheticFrame, sigma_rad: Option<f64>) -> Option<JointAngles> {
     let sigma_rad = sigma_rad?;
     let angles_rad = frame.joint_angles_rad.clone()?;
-    Some(JointAngles { sigmas_rad: vec![sigma_rad; angles_rad.len()], angles_rad })
+    let count = angles_rad.len();
+    Some(JointAngles { angles_rad, sigmas_rad: vec![sigma_rad; count], lasting_sigmas_rad: vec![0.0; count] })
 }
 
 fn flight(gimbal: bool) -> SyntheticFlight {
@@ -90,6 +91,7 @@ pub(super) fn window(parameterization: Parameterization, gimbal: bool, options: 
             },
             first_estimate: None,
             encoder: encoder(truth, estimator.config.encoder_sigma_rad),
+            rest: None,
             keyframe: true,
             motion_information: motion.square_root_information(),
             motion,

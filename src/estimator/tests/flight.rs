@@ -23,7 +23,7 @@ fn options(mount: SyntheticMount) -> SyntheticOptions {
     }
 }
 
-fn step(estimator: &mut Estimator, frame: &SyntheticFrame) -> StepReport {
+pub(super) fn step(estimator: &mut Estimator, frame: &SyntheticFrame) -> StepReport {
     let joint_angles = fixture::encoder(frame, estimator.config().encoder_sigma_rad);
     estimator.step(&StepInput {
         frame_index: frame.index,
@@ -34,17 +34,17 @@ fn step(estimator: &mut Estimator, frame: &SyntheticFrame) -> StepReport {
     })
 }
 
-fn fly(flight: &SyntheticFlight, config: EstimatorConfig) -> (Estimator, Vec<StepReport>) {
+pub(super) fn fly(frames: &[SyntheticFrame], config: EstimatorConfig) -> (Estimator, Vec<StepReport>) {
     let mut estimator = Estimator::new(config);
-    let reports = flight.frames.iter().map(|frame| step(&mut estimator, frame)).collect();
+    let reports = frames.iter().map(|frame| step(&mut estimator, frame)).collect();
     (estimator, reports)
 }
 
 /// Root mean square of the position errors once yaw and position are laid on the truth, and how far was flown meanwhile.
-fn trajectory_error_m(flight: &SyntheticFlight, reports: &[StepReport]) -> (f64, f64) {
+pub(super) fn trajectory_error_m(frames: &[SyntheticFrame], reports: &[StepReport]) -> (f64, f64) {
     let pairs: Vec<(Vector3<f64>, Vector3<f64>)> = reports
         .iter()
-        .zip(&flight.frames)
+        .zip(frames)
         .filter_map(|(report, frame)| {
             Some((report.newest()?.world_from_imu.translation_m, frame.true_world_from_imu.translation_m))
         })
@@ -65,7 +65,7 @@ fn trajectory_error_m(flight: &SyntheticFlight, reports: &[StepReport]) -> (f64,
 }
 
 /// Mean error of the chain over the joint angles of the flight, in metres and radians.
-fn chain_error(flight: &SyntheticFlight, estimator: &Estimator) -> (f64, f64) {
+pub(super) fn chain_error(flight: &SyntheticFlight, estimator: &Estimator) -> (f64, f64) {
     let (estimated, truth) = (estimator.classical_chain(), flight.true_rig.chain_of_camera("cam0").unwrap());
     let count = flight.frames.len() as f64;
     flight.frames.iter().fold((0.0, 0.0), |(shift, turn), frame| {
@@ -79,8 +79,8 @@ fn chain_error(flight: &SyntheticFlight, estimator: &Estimator) -> (f64, f64) {
 fn a_rigid_camera_follows_the_flight() {
     let flight = synthetic_tracks(&options(SyntheticMount::Static));
     let config = fixture::config(&flight.given_rig, Parameterization::Minimal, EstimatorOptions::default());
-    let (estimator, reports) = fly(&flight, config);
-    let (error, length) = trajectory_error_m(&flight, &reports);
+    let (estimator, reports) = fly(&flight.frames, config);
+    let (error, length) = trajectory_error_m(&flight.frames, &reports);
     assert!(error < 0.003 * length, "{error} m over {length} m");
     assert_eq!(estimator.restarts, 0);
     let last = reports.last().unwrap();
@@ -95,8 +95,8 @@ fn a_gimbal_camera_follows_the_flight_and_calibrates_its_chain() {
     for parameterization in [Parameterization::Minimal, Parameterization::Classical, Parameterization::Poe] {
         let config = fixture::config(&flight.given_rig, parameterization, EstimatorOptions::default());
         let before = chain_error(&flight, &Estimator::new(config.clone()));
-        let (estimator, reports) = fly(&flight, config);
-        let (error, length) = trajectory_error_m(&flight, &reports);
+        let (estimator, reports) = fly(&flight.frames, config);
+        let (error, length) = trajectory_error_m(&flight.frames, &reports);
         assert!(error < 0.003 * length, "{parameterization}: {error} m over {length} m");
         let after = chain_error(&flight, &estimator);
         assert!(after.1 < 0.5 * before.1, "{parameterization}: {before:?} to {after:?}");
@@ -111,7 +111,7 @@ fn a_fixed_chain_stays_as_it_was_given() {
     let mut config = fixture::config(&flight.given_rig, Parameterization::Minimal, EstimatorOptions::default());
     config.calibrate = false;
     let given = Estimator::new(config.clone()).classical_chain();
-    let (estimator, reports) = fly(&flight, config);
+    let (estimator, reports) = fly(&flight.frames, config);
     assert_eq!(estimator.classical_chain(), given);
     let last = reports.last().unwrap();
     assert_eq!(last.phase, Phase::Tracking);
@@ -124,7 +124,7 @@ fn a_fixed_chain_stays_as_it_was_given() {
 fn replays_and_clones_give_the_same_bits() {
     let flight = synthetic_tracks(&SyntheticOptions { duration_s: 7.0, ..options(SyntheticMount::Gimbal) });
     let config = fixture::config(&flight.given_rig, Parameterization::Minimal, EstimatorOptions::default());
-    let (_, reports) = fly(&flight, config.clone());
+    let (_, reports) = fly(&flight.frames, config.clone());
     let mut estimator = Estimator::new(config);
     let half = flight.frames.len() / 2 + 10;
     let comparable = |report: &StepReport| format!("{report:?}");

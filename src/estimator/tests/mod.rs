@@ -3,6 +3,8 @@
 mod fixture;
 mod flight;
 mod preintegration;
+mod rest;
+mod trouble;
 mod window;
 
 use nalgebra::Vector3;

@@ -2,26 +2,23 @@
 
 use super::joint_angles::EncoderAverage;
 use crate::flight_log::{JointAngles, JointSample};
-use crate::geometry::{ns_from_seconds, seconds_from_ns};
+use crate::geometry::{SplitMix64, ns_from_seconds, seconds_from_ns};
 
 const IMAGE_NS: i64 = 50_000_000;
 const READING_NS: i64 = 5_000_000;
 const SIGMA_RAD: f64 = 0.01;
 
-/// Seeded normal noise (splitmix64 and Box–Muller).
-struct Noise(u64);
+/// Seeded normal noise (Box–Muller).
+struct Noise(SplitMix64);
 
 impl Noise {
-    fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64 + 1e-17
+    fn new(seed: u64) -> Self {
+        Self(SplitMix64::new(seed))
     }
 
     fn normal(&mut self) -> f64 {
-        (-2.0 * self.uniform().ln()).sqrt() * (std::f64::consts::TAU * self.uniform()).cos()
+        let radius = (-2.0 * (1.0 - self.0.next_unit()).ln()).sqrt();
+        radius * (std::f64::consts::TAU * self.0.next_unit()).cos()
     }
 }
 
@@ -66,7 +63,7 @@ fn swing(time_s: f64) -> f64 {
 #[test]
 fn white_noise_is_averaged_down_as_predicted() {
     for sigma in [0.12, 0.0087, 0.0009] {
-        let mut noise = Noise(3);
+        let mut noise = Noise::new(3);
         let played = play(120, sigma, |at| Some(swing(seconds_from_ns(at)) + sigma * noise.normal()));
         let (error, stated) = errors(&played, swing);
         // Ten readings, and a little more for the bend that they leave open.
@@ -80,7 +77,7 @@ fn white_noise_is_averaged_down_as_predicted() {
 #[test]
 fn a_slow_error_is_not_believed() {
     // Half of the variance is an error that keeps its value for seconds.
-    let mut noise = Noise(5);
+    let mut noise = Noise::new(5);
     let mut slow = 0.0;
     let played = play(300, SIGMA_RAD, |at| {
         if at % ns_from_seconds(2.0) < READING_NS {
@@ -97,7 +94,7 @@ fn a_slow_error_is_not_believed() {
 #[test]
 fn noise_that_outlasts_a_reading_is_not_taken_for_white() {
     // First-order low-pass noise of 25 ms: neighbouring readings share most of it.
-    let mut noise = Noise(6);
+    let mut noise = Noise::new(6);
     let keep: f64 = (-5.0_f64 / 25.0).exp();
     let mut level = 0.0;
     let played = play(200, SIGMA_RAD, |at| {
@@ -133,7 +130,7 @@ fn a_slew_and_a_reversal_are_followed() {
         angles.push(angles[millisecond as usize] + 0.5e-3 * (rate_at(millisecond) + rate_at(millisecond + 1)));
     }
     let truth = |time_s: f64| angles[(time_s * 1e3).round() as usize];
-    let mut noise = Noise(7);
+    let mut noise = Noise::new(7);
     for sigma in [0.0087, 0.0009] {
         let played = play(120, sigma, |at| Some(truth(seconds_from_ns(at)) + sigma * noise.normal()));
         let bend = ACCELERATION * 0.025_f64.powi(2) / 6.0;
@@ -151,7 +148,7 @@ fn a_slew_and_a_reversal_are_followed() {
 #[test]
 fn angles_beyond_a_turn_are_averaged_as_neighbours() {
     let truth = |time_s: f64| std::f64::consts::PI + 0.05 * (3.0 * time_s).sin();
-    let mut noise = Noise(8);
+    let mut noise = Noise::new(8);
     let played = play(30, SIGMA_RAD, |at| {
         let angle = truth(seconds_from_ns(at)) + SIGMA_RAD * noise.normal();
         Some(angle.sin().atan2(angle.cos()))
@@ -165,7 +162,7 @@ fn angles_beyond_a_turn_are_averaged_as_neighbours() {
 
 #[test]
 fn gaps_a_late_start_and_an_early_end_are_told_by_the_sigmas() {
-    let mut noise = Noise(9);
+    let mut noise = Noise::new(9);
     let played = play(30, SIGMA_RAD, |at| {
         let time_s = seconds_from_ns(at);
         let there = (5.0..12.0).contains(&time_s) || (12.08..20.0).contains(&time_s) || (21.0..28.0).contains(&time_s);

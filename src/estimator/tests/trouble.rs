@@ -1,0 +1,242 @@
+//! Flights with something missing: encoders, pictures, an inertial sensor that is wide enough.
+
+use nalgebra::DMatrix;
+
+use super::fixture;
+use super::flight::{chain_error, fly, step, trajectory_error_m};
+use crate::estimator::dense::Cholesky;
+use crate::estimator::problem::Estimate;
+use crate::estimator::{Estimator, EstimatorConfig, EstimatorOptions, EventKind, Phase, StepReport};
+use crate::flight_log::ImuSample;
+use crate::frontend::FeatureId;
+use crate::gimbal::{Parameterization, transport_covariance};
+use crate::simulation::{SyntheticFlight, SyntheticFrame, SyntheticMount, SyntheticOptions, synthetic_tracks};
+
+fn options(mount: SyntheticMount, seed: u64) -> SyntheticOptions {
+    SyntheticOptions {
+        mount,
+        seed,
+        duration_s: 14.0,
+        pixel_sigma_px: 0.5,
+        outlier_share: 0.02,
+        features: 100,
+        ..SyntheticOptions::default()
+    }
+}
+
+fn config(flight: &SyntheticFlight) -> EstimatorConfig {
+    fixture::config(&flight.given_rig, Parameterization::Minimal, EstimatorOptions::default())
+}
+
+fn kinds(reports: &[StepReport]) -> Vec<EventKind> {
+    reports.iter().flat_map(|report| report.events.iter().map(|event| event.kind)).collect()
+}
+
+/// Frames that go on under other names, as after a picture that no track survives.
+fn renamed(frame: &mut SyntheticFrame) {
+    for feature in &mut frame.tracks.features {
+        feature.id = FeatureId(feature.id.0 + 1_000_000);
+    }
+}
+
+#[test]
+fn without_encoders_the_flight_is_followed_and_the_calibration_stays_weak() {
+    for seed in [5, 6, 8] {
+        let flight =
+            synthetic_tracks(&SyntheticOptions { encoder_sigma_rad: None, ..options(SyntheticMount::Gimbal, seed) });
+        let config = EstimatorConfig { use_encoder: false, ..config(&flight) };
+        let before = chain_error(&flight, &Estimator::new(config.clone()));
+        let (estimator, reports) = fly(&flight.frames, config);
+        assert_eq!(estimator.restarts, 0, "seed {seed}");
+        let (error, length) = trajectory_error_m(&flight.frames, &reports);
+        assert!(error < 0.01 * length, "seed {seed}: {error} m over {length} m");
+        let last = &reports.last().unwrap().calibration;
+        // 18 columns without the three offsets, which free joint angles would take up.
+        assert_eq!(last.names.len(), 15);
+        let learnt: Vec<f64> =
+            last.sigmas.iter().zip(&last.prior_sigmas).map(|(after, before)| after / before).collect();
+        assert!(learnt.iter().all(|share| *share > 0.05 && *share < 1.01), "seed {seed}: {learnt:?}");
+        let after = chain_error(&flight, &estimator);
+        assert!(after.1 < 1.5 * before.1, "seed {seed}: {before:?} to {after:?}");
+        for report in &reports {
+            let Some(newest) = report.newest() else { continue };
+            assert!(newest.encoder_angles_rad.is_none());
+            assert!(newest.joint_angles_rad.iter().all(|angle| angle.is_finite()));
+        }
+    }
+}
+
+/// Joint angles that come late or pause are no reason to fail.
+#[test]
+fn encoders_that_start_late_and_pause_are_survived() {
+    let flight = synthetic_tracks(&options(SyntheticMount::Gimbal, 5));
+    let mut frames = flight.frames.clone();
+    for frame in &mut frames {
+        if frame.index < 120 || (180..200).contains(&frame.index) {
+            frame.joint_angles_rad = None;
+        }
+    }
+    let (estimator, reports) = fly(&frames, config(&flight));
+    assert_eq!(estimator.restarts, 0);
+    let (error, length) = trajectory_error_m(&frames, &reports);
+    assert!(error < 0.006 * length, "{error} m over {length} m");
+}
+
+#[test]
+fn three_seconds_without_pictures_are_bridged() {
+    for mount in [SyntheticMount::Gimbal, SyntheticMount::Static] {
+        let flight = synthetic_tracks(&options(mount, 5));
+        let mut frames: Vec<SyntheticFrame> = Vec::new();
+        let mut waiting: Vec<ImuSample> = Vec::new();
+        for frame in &flight.frames {
+            let mut frame = frame.clone();
+            if (160..220).contains(&frame.index) {
+                waiting.extend(&frame.imu);
+                continue;
+            }
+            if frame.index >= 220 {
+                renamed(&mut frame);
+            }
+            waiting.append(&mut frame.imu);
+            frame.imu = std::mem::take(&mut waiting);
+            frames.push(frame);
+        }
+        let (estimator, reports) = fly(&frames, config(&flight));
+        let last = reports.last().unwrap();
+        assert_eq!(last.phase, Phase::Tracking, "{mount:?}: {:?}", last.events);
+        // Three seconds on the inertial sensor alone: centimetres to decimetres.
+        let (error, length) = trajectory_error_m(&frames, &reports);
+        assert!(error < 0.3, "{mount:?}: {error} m over {length} m, {} restarts", estimator.restarts);
+    }
+}
+
+#[test]
+fn a_long_blindness_ends_in_a_restart_that_finds_its_way() {
+    let flight = synthetic_tracks(&SyntheticOptions { duration_s: 18.0, ..options(SyntheticMount::Gimbal, 5) });
+    let mut frames = flight.frames.clone();
+    for frame in &mut frames {
+        if (160..200).contains(&frame.index) {
+            frame.tracks.features.clear();
+        }
+        if frame.index >= 200 {
+            renamed(frame);
+        }
+    }
+    let (estimator, reports) = fly(&frames, config(&flight));
+    let failed =
+        reports.iter().position(|report| kinds(std::slice::from_ref(report)).contains(&EventKind::Failure)).unwrap();
+    let event = reports[failed].events.iter().find(|event| event.kind == EventKind::Failure).unwrap();
+    assert!((175..200).contains(&failed), "failed at {failed}");
+    assert!(event.value.unwrap() > event.threshold.unwrap(), "{event:?}");
+    assert_eq!(estimator.restarts, 1);
+    let again = failed + reports[failed..].iter().position(|report| report.phase == Phase::Tracking).unwrap();
+    assert!(again < 290, "tracking again at {again}");
+    // Each part by itself is as good as ever.
+    for range in [0..failed, again..frames.len()] {
+        let (error, length) = trajectory_error_m(&frames[range.clone()], &reports[range]);
+        assert!(error < 0.006 * length, "{error} m over {length} m");
+    }
+    // The second part begins near where the first one ended.
+    let place = |index: usize| reports[index].newest().unwrap().world_from_imu.translation_m;
+    assert!((place(again) - place(failed - 1)).norm() < 25.0);
+}
+
+#[test]
+fn a_saturated_inertial_sensor_does_not_throw_the_window_off() {
+    for mount in [SyntheticMount::Gimbal, SyntheticMount::Static] {
+        let flight = synthetic_tracks(&options(mount, 5));
+        let mut frames = flight.frames.clone();
+        let limit = |value: f64, most: f64| value.clamp(-most, most);
+        let mut clipped = 0;
+        for sample in frames.iter_mut().filter(|frame| frame.index >= 150).flat_map(|frame| &mut frame.imu) {
+            let before = *sample;
+            sample.angular_velocity_rad_per_s = sample.angular_velocity_rad_per_s.map(|rate| limit(rate, 1.0));
+            sample.specific_force_m_per_s2 = sample.specific_force_m_per_s2.map(|force| limit(force, 13.0));
+            clipped += usize::from(before != *sample);
+        }
+        let (estimator, reports) = fly(&frames, config(&flight));
+        let last = reports.last().unwrap();
+        assert_eq!(last.phase, Phase::Tracking);
+        let (error, length) = trajectory_error_m(&frames, &reports);
+        println!("{mount:?}: {clipped} samples clipped: {error} m over {length} m, {} restarts", estimator.restarts);
+        assert!(error < 0.02 * length, "{mount:?}: {error} m over {length} m, {clipped} samples clipped");
+        let told = reports[150..].iter().flat_map(|report| &report.events);
+        assert!(told.filter(|event| event.message.contains("saturated")).count() > 0);
+    }
+}
+
+/// Covariance of the calibration at the present estimate, all else marginalized.
+fn calibration_covariance(estimator: &Estimator) -> DMatrix<f64> {
+    let (_, tracks, landmarks) = estimator.active_tracks();
+    let problem = estimator.problem(&tracks);
+    let estimate = Estimate {
+        frames: estimator.frames.iter().map(|frame| frame.state.clone()).collect(),
+        calibration: estimator.calibration.clone(),
+        landmarks,
+    };
+    let equations = problem.linearize(&estimate);
+    let (hessian, _) = equations.reduced(&problem.layout, &equations.visual.eliminate(0.0));
+    Cholesky::new(&hessian).unwrap().trailing_covariance(problem.layout.calibration)
+}
+
+/// The same flight with and without a switch of the chart: the posterior is carried over, not only the values.
+#[test]
+fn a_switch_of_charts_in_a_running_window_changes_nothing_else() {
+    let flight = synthetic_tracks(&SyntheticOptions { duration_s: 9.0, ..options(SyntheticMount::Gimbal, 5) });
+    let config = config(&flight);
+    let mut stays = Estimator::new(config.clone());
+    let half = 150;
+    for frame in &flight.frames[..half] {
+        step(&mut stays, frame);
+    }
+    assert!(stays.prior.is_some() && stays.calibration.deviation().is_some());
+    let mut switches = stays.clone();
+    switches.switch_chart(Parameterization::MinimalYx);
+    let angles = &flight.frames[half].true_joint_angles_rad;
+    let pose = |estimator: &Estimator| estimator.calibration.imu_from_camera(angles);
+    assert!(pose(&stays).minus(&pose(&switches)).norm() < 1e-12);
+
+    // What is known about the chain is the same in either chart.
+    let expected =
+        transport_covariance(stays.calibration.chain(), &calibration_covariance(&stays), switches.calibration.chain());
+    let found = calibration_covariance(&switches);
+    for row in 0..18 {
+        for column in 0..18 {
+            let difference = (expected[(row, column)] - found[(row, column)]).abs();
+            let scale = (expected[(row, row)] * expected[(column, column)]).sqrt();
+            assert!(difference < 0.02 * scale, "{row}, {column}: {difference} of {scale}");
+        }
+    }
+
+    for frame in &flight.frames[half..] {
+        let (one, other) = (step(&mut stays, frame), step(&mut switches, frame));
+        let (one, other) = (one.newest().unwrap(), other.newest().unwrap());
+        let apart = one.world_from_imu.minus(&other.world_from_imu).norm();
+        assert!(apart < 2e-3, "image {}: {apart}", frame.index);
+        assert!(one.imu_from_camera.minus(&other.imu_from_camera).norm() < 1e-3);
+    }
+}
+
+#[test]
+fn a_chart_near_its_lock_is_left_once_and_for_good() {
+    let flight = synthetic_tracks(&SyntheticOptions { duration_s: 8.0, ..options(SyntheticMount::Gimbal, 5) });
+    let config = EstimatorConfig { auto_chart: true, ..config(&flight) };
+    let mut estimator = Estimator::new(config);
+    let mut switched = 0;
+    for frame in &flight.frames {
+        if frame.index == 130 {
+            assert_eq!(estimator.phase, Phase::Tracking);
+            // As if the mechanism had come near: the swapped end block locks on this gimbal.
+            estimator.switch_chart(Parameterization::MinimalSwapped);
+        }
+        let report = step(&mut estimator, frame);
+        for event in report.events.iter().filter(|event| event.kind == EventKind::ChartSwitched) {
+            switched += 1;
+            assert_eq!(frame.index, 130);
+            assert!(event.value.unwrap() < event.threshold.unwrap());
+        }
+    }
+    assert_eq!(switched, 1);
+    assert_eq!(estimator.calibration.chain().parameterization(), Parameterization::Minimal);
+    assert_eq!(estimator.restarts, 0);
+}
