@@ -3,6 +3,7 @@ use thiserror::Error;
 
 use super::coarse::{self, CoarseAligner};
 use super::corners::{CornerDetector, CornerOptions, PointGrid};
+use super::keyed::{Key, KeyOptions, Sighting};
 use super::lucas_kanade::{self, LucasKanadeOptions};
 use super::outliers::{self, BearingPair, Motion, OutlierOptions};
 use super::prediction::PredictedRotation;
@@ -16,8 +17,10 @@ use crate::flight_log::GrayImage;
 pub struct FrontEndOptions {
     /// Finding new features.
     pub corners: CornerOptions,
-    /// Following them.
+    /// Following them from image to image.
     pub lucas_kanade: LucasKanadeOptions,
+    /// Holding them to their first sighting.
+    pub keys: KeyOptions,
     /// Rejecting those that do not move with the scene.
     pub outliers: OutlierOptions,
 }
@@ -50,20 +53,28 @@ pub enum FrontEndError {
 }
 
 /// A feature on its way.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct Track {
     id: FeatureId,
     age: u32,
     uv_px: Vector2<f64>,
     bearing: Vector3<f64>,
+    /// What it looked like at first, `None` when too near to the border then.
+    key: Option<Key>,
 }
 
 /// A feature that was found in the image of now.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct Step {
-    track: Track,
+    /// What it was in the image before.
+    id: FeatureId,
+    age: u32,
+    previous_uv_px: Vector2<f64>,
+    previous_bearing: Vector3<f64>,
+    /// What it is now.
     uv_px: Vector2<f64>,
     bearing: Vector3<f64>,
+    key: Option<Key>,
 }
 
 /// Follows features through one camera's images.
@@ -136,27 +147,30 @@ impl FrontEnd {
         let steps = self.thin_out(steps);
         statistics.tracked = steps.len();
         statistics.rejected = before - statistics.lost - steps.len();
-        statistics.median_flow_px = median(steps.iter().map(|step| (step.uv_px - step.track.uv_px).norm()).collect());
+        statistics.median_flow_px =
+            median(steps.iter().map(|step| (step.uv_px - step.previous_uv_px).norm()).collect());
         statistics.mean_parallax_px = self.mean_parallax_px(&steps, &motion.rotation);
 
         let mut features: Vec<TrackedFeature> = steps
             .iter()
             .map(|step| TrackedFeature {
-                id: step.track.id,
-                age: step.track.age + 1,
+                id: step.id,
+                age: step.age + 1,
                 uv_px: step.uv_px,
-                previous_uv_px: Some(step.track.uv_px),
+                previous_uv_px: Some(step.previous_uv_px),
                 bearing: step.bearing,
             })
             .collect();
         self.detect(image, &mut features);
         statistics.detected = features.len() - steps.len();
+        let keys = steps.into_iter().map(|step| step.key).chain(std::iter::repeat(None));
         self.tracks.clear();
-        self.tracks.extend(features.iter().map(|feature| Track {
+        self.tracks.extend(features.iter().zip(keys).map(|(feature, key)| Track {
             id: feature.id,
             age: feature.age,
             uv_px: feature.uv_px,
             bearing: feature.bearing,
+            key: key.or_else(|| Key::cut(image, &feature.uv_px)),
         }));
         std::mem::swap(&mut self.previous, &mut self.now);
         Ok(TrackedFrame { stamp_ns, features, statistics })
@@ -206,9 +220,29 @@ impl FrontEnd {
 
     fn track(&self, track: &Track, guess_px: &Vector2<f64>) -> Option<Step> {
         let options = &self.options.lucas_kanade;
-        let uv_px = lucas_kanade::track(&self.previous, &self.now, &track.uv_px, guess_px, options)?;
+        let near_px = lucas_kanade::approach(&self.previous, &self.now, &track.uv_px, guess_px, options)?;
+        let mut key = track.key.clone();
+        let sighting = match &mut key {
+            Some(key) => key.find(self.now.levels().first()?, &near_px, &self.options.keys),
+            None => Sighting::OutOfView,
+        };
+        let uv_px = match sighting {
+            Sighting::Found(uv_px) => uv_px,
+            Sighting::Changed | Sighting::OutOfView => {
+                key = key.filter(|_| sighting == Sighting::OutOfView);
+                lucas_kanade::arrive(&self.previous, &self.now, &track.uv_px, &near_px, options)?
+            }
+        };
         let bearing = self.camera.unproject(&uv_px)?;
-        Some(Step { track: *track, uv_px, bearing })
+        Some(Step {
+            id: track.id,
+            age: track.age,
+            previous_uv_px: track.uv_px,
+            previous_bearing: track.bearing,
+            uv_px,
+            bearing,
+            key,
+        })
     }
 
     /// Where a feature comes to lie when the camera only turns; where it was when that is out of view.
@@ -238,7 +272,7 @@ impl FrontEnd {
     fn thin_out(&mut self, mut steps: Vec<Step>) -> Vec<Step> {
         let [width, height] = self.camera.resolution_px;
         self.crowd.reset(width, height, CROWDED_SHARE * self.options.corners.min_distance_px);
-        steps.sort_by_key(|step| (std::cmp::Reverse(step.track.age), step.track.id));
+        steps.sort_by_key(|step| (std::cmp::Reverse(step.age), step.id));
         steps.retain(|step| {
             let free = self.crowd.is_free(&step.uv_px);
             if free {
@@ -246,7 +280,7 @@ impl FrontEnd {
             }
             free
         });
-        steps.sort_by_key(|step| step.track.id);
+        steps.sort_by_key(|step| step.id);
         steps
     }
 
@@ -265,7 +299,7 @@ impl FrontEnd {
     fn mean_parallax_px(&self, steps: &[Step], rotation: &UnitQuaternion<f64>) -> f64 {
         let (mut sum, mut count) = (0.0, 0);
         for step in steps {
-            if let Some(turned) = self.camera.project(&(rotation * step.track.bearing)) {
+            if let Some(turned) = self.camera.project(&(rotation * step.previous_bearing)) {
                 sum += (step.uv_px - turned).norm();
                 count += 1;
             }
@@ -275,7 +309,7 @@ impl FrontEnd {
 }
 
 fn pair_of(step: &Step) -> BearingPair {
-    BearingPair { previous: step.track.bearing, now: step.bearing }
+    BearingPair { previous: step.previous_bearing, now: step.bearing }
 }
 
 /// The upper median, zero of nothing.

@@ -406,6 +406,20 @@ pub fn track(
     guess_px: &Vector2<f64>,
     options: &LucasKanadeOptions,
 ) -> Option<Vector2<f64>> {
+    let near_px = approach(previous, now, from_px, guess_px, options)?;
+    arrive(previous, now, from_px, &near_px, options)
+}
+
+/// The first stage of [`track`]: comes near on the halved images, to about half a pixel.
+///
+/// Where a level shows nothing the guess is handed on; `None` only for places that make no sense.
+pub(super) fn approach(
+    previous: &Pyramid,
+    now: &Pyramid,
+    from_px: &Vector2<f64>,
+    guess_px: &Vector2<f64>,
+    options: &LucasKanadeOptions,
+) -> Option<Vector2<f64>> {
     let from = [from_px.x as f32, from_px.y as f32];
     let mut guess = [guess_px.x as f32, guess_px.y as f32];
     if !is_sane(from) || !is_sane(guess) {
@@ -422,7 +436,21 @@ pub fn track(
             guess = found.map(|t| t / scale);
         }
     }
-    let found = track_on_image(&mut template, previous.levels().first()?, now.levels().first()?, from, guess, options)?;
+    Some(Vector2::new(f64::from(guess[0]), f64::from(guess[1])))
+}
+
+/// The second stage of [`track`]: on the images themselves, and back again.
+pub(super) fn arrive(
+    previous: &Pyramid,
+    now: &Pyramid,
+    from_px: &Vector2<f64>,
+    near_px: &Vector2<f64>,
+    options: &LucasKanadeOptions,
+) -> Option<Vector2<f64>> {
+    let from = [from_px.x as f32, from_px.y as f32];
+    let near = [near_px.x as f32, near_px.y as f32];
+    let mut template = Template::EMPTY;
+    let found = track_on_image(&mut template, previous.levels().first()?, now.levels().first()?, from, near, options)?;
     if let Some(limit_px) = options.forward_backward_px {
         let back =
             track_on_image(&mut template, now.levels().first()?, previous.levels().first()?, found, from, options)?;

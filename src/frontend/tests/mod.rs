@@ -2,6 +2,7 @@ mod corners;
 mod following;
 mod front_end;
 mod homography;
+mod keyed;
 mod motion;
 
 use crate::camera::CameraModel;

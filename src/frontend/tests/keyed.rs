@@ -1,0 +1,91 @@
+//! Features held to their first sighting.
+
+use nalgebra::Vector2;
+
+use super::homography::Scene;
+use super::{blank, camera_of, median, scene, texture};
+use crate::frontend::keyed::{Key, KeyOptions, Sighting};
+use crate::frontend::{FeatureId, FrontEnd, FrontEndOptions};
+
+/// Whole-pixel and fractional places well inside the image.
+fn places() -> Vec<Vector2<f64>> {
+    let lattice = (40..200).step_by(23).flat_map(|y| (40..280).step_by(23).map(move |x| (x, y)));
+    lattice.map(|(x, y)| Vector2::new(f64::from(x) + 0.37, f64::from(y) - 0.21)).collect()
+}
+
+/// Looks for keys of image 4 in image `to`, from half a pixel beside; returns errors and how many were looked for.
+fn find_all(scene: &Scene, to: usize) -> (Vec<f64>, usize) {
+    let texture = texture();
+    let (first, later) = (scene.render(&texture, 4), scene.render(&texture, to));
+    let seen: Vec<_> = places().into_iter().filter(|uv| scene.sees(&scene.flow(4, to, uv))).collect();
+    let mut errors = Vec::new();
+    for uv in &seen {
+        let truth = scene.flow(4, to, uv);
+        let mut key = Key::cut(&first, uv).unwrap();
+        if let Sighting::Found(found) = key.find(&later, &(truth + Vector2::new(0.4, -0.3)), &KeyOptions::default()) {
+            errors.push((found - truth).norm());
+        }
+    }
+    (errors, seen.len())
+}
+
+#[test]
+fn a_key_is_found_again_turned_and_grown() {
+    for (to, speed, flicker) in [(5, 0.3, 0.0), (7, 0.8, 0.0), (7, 0.8, 0.3)] {
+        let (errors, count) = find_all(&Scene { flicker, ..scene(speed) }, to);
+        assert!(count > 50 && errors.len() * 20 >= count * 19, "{} of {count} in image {to}", errors.len());
+        let median_px = median(errors);
+        assert!(median_px < 0.06, "median error {median_px} px in image {to}");
+    }
+}
+
+#[test]
+fn a_key_that_changed_is_not_found() {
+    let scene = scene(0.3);
+    let texture = texture();
+    let image = scene.render(&texture, 4);
+    let mut upside_down = image.clone();
+    upside_down.pixels.reverse();
+    for uv in places() {
+        let mut key = Key::cut(&image, &uv).unwrap();
+        let before = key.clone();
+        for other in [&blank(&scene), &upside_down] {
+            assert_eq!(key.find(other, &uv, &KeyOptions::default()), Sighting::Changed, "{uv}");
+        }
+        assert_eq!(key, before, "a failure leaves the warp");
+        let lost = Vector2::new(f64::NAN, 3.0);
+        assert!(!matches!(key.find(&image, &lost, &KeyOptions::default()), Sighting::Found(_)));
+    }
+}
+
+#[test]
+fn at_the_border_a_key_says_nothing() {
+    let image = scene(0.3).render(&texture(), 4);
+    for uv in [Vector2::new(5.0, 100.0), Vector2::new(100.0, 233.0), Vector2::new(f64::NAN, 1.0)] {
+        assert_eq!(Key::cut(&image, &uv), None);
+    }
+    let mut key = Key::cut(&image, &Vector2::new(100.0, 100.0)).unwrap();
+    assert_eq!(key.find(&image, &Vector2::new(5.0, 100.0), &KeyOptions::default()), Sighting::OutOfView);
+}
+
+#[test]
+fn long_tracks_do_not_drift() {
+    let (scene, texture) = (scene(0.6), texture());
+    let mut front_end = FrontEnd::new(camera_of(&scene), FrontEndOptions::default());
+    let mut births: Vec<(FeatureId, usize, Vector2<f64>)> = Vec::new();
+    let mut errors = Vec::new();
+    for index in 0..22 {
+        let frame = front_end.process(&scene.render(&texture, index), index as i64, None).unwrap();
+        for feature in &frame.features {
+            if feature.age == 0 {
+                births.push((feature.id, index, feature.uv_px));
+            } else if feature.age >= 12 {
+                let (_, birth, uv) = births.iter().find(|(id, ..)| *id == feature.id).unwrap();
+                errors.push((feature.uv_px - scene.flow(*birth, index, uv)).norm());
+            }
+        }
+    }
+    assert!(errors.len() > 200, "{}", errors.len());
+    let median_px = median(errors);
+    assert!(median_px < 0.07, "{median_px} px");
+}
