@@ -163,9 +163,11 @@ fn describe(folder: &Path, summary: &RunSummary) -> String {
     if let (Some(timing), Some(factor)) = (&summary.timing_ms, summary.real_time_factor) {
         let stage = |stage: &export::StageSummary| format!("{:.1}/{:.1}", stage.p50, stage.p95);
         lines.push(format!(
-            "  ms p50/p95   front end {}, optimize {}, marginalize {}, observability {}, step {}; {factor:.1} × real time\n",
+            "  ms p50/p95   front end {}, optimize {}, linearize {}, report {}, marginalize {}, observability {}, step {}; {factor:.1} × real time\n",
             stage(&timing.frontend),
             stage(&timing.optimize),
+            stage(&timing.linearize),
+            stage(&timing.report),
             stage(&timing.marginalize),
             stage(&timing.observability),
             stage(&timing.step)

@@ -1,8 +1,12 @@
 //! Dense algebra on the window: nalgebra keeps the matrices, faer factors them.
 
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::qr::no_pivoting::factor::{qr_in_place, qr_in_place_scratch, recommended_block_size};
 use faer::linalg::solvers::Solve as _;
-use faer::{MatMut, MatRef, Side};
+use faer::{Mat, MatMut, MatRef, Par, Side};
 use nalgebra::{DMatrix, DVector};
+
+use crate::geometry::dense::as_faer;
 
 /// A lower Cholesky factor.
 #[derive(Clone, Debug)]
@@ -46,12 +50,26 @@ impl Cholesky {
 ///
 /// Dependent columns leave explicit zeros, so that a row's first non-zero entry tells which column it belongs to.
 pub(super) fn triangularize(matrix: &DMatrix<f64>) -> DMatrix<f64> {
-    let (rows, columns) = matrix.shape();
+    triangularized(as_faer(matrix))
+}
+
+/// [`triangularize`] of rows of so many entries, one after another.
+pub(super) fn triangularize_rows(entries: &[f64], columns: usize) -> DMatrix<f64> {
+    triangularized(MatRef::from_row_major_slice(entries, entries.len() / columns.max(1), columns))
+}
+
+fn triangularized(view: MatRef<'_, f64>) -> DMatrix<f64> {
+    let (rows, columns) = view.shape();
     if rows == 0 || columns == 0 {
         return DMatrix::zeros(0, columns);
     }
-    let view = MatRef::from_column_major_slice(matrix.as_slice(), rows, columns);
-    let factors = view.qr();
-    let upper = factors.thin_R();
-    DMatrix::from_fn(upper.nrows(), columns, |row, column| if row <= column { upper[(row, column)] } else { 0.0 })
+    let mut factors = view.to_owned();
+    let height = rows.min(columns);
+    let block = recommended_block_size::<f64>(rows, columns);
+    let mut coefficients = Mat::zeros(block, height);
+    let scratch = qr_in_place_scratch::<f64>(rows, columns, block, Par::Seq, Default::default());
+    let mut memory = MemBuffer::new(scratch);
+    let stack = MemStack::new(&mut memory);
+    qr_in_place(factors.as_mut(), coefficients.as_mut(), Par::Seq, stack, Default::default());
+    DMatrix::from_fn(height, columns, |row, column| if row <= column { factors[(row, column)] } else { 0.0 })
 }

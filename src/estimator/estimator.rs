@@ -134,9 +134,9 @@ impl Estimator {
         let optimized_ms = (self.config.clock_ms)();
 
         let mut report = self.tracking_report(input, &mut solved);
+        let marginalizing_ms = (self.config.clock_ms)();
         self.forget_rejected(&solved, &mut events);
         self.switch_chart_when_needed(&mut events);
-        let marginalizing_ms = (self.config.clock_ms)();
         self.make_room(&mut events);
         report.times.optimize_ms = optimized_ms - begin_ms;
         report.times.marginalize_ms = (self.config.clock_ms)() - marginalizing_ms;

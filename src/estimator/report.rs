@@ -239,11 +239,15 @@ pub struct Linearization {
 /// Milliseconds spent in each stage of the step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StageTimes {
-    /// Decoding, tracking and detecting.
+    /// Tracking and detecting (images are read and decoded ahead, on a thread of their own).
     pub frontend_ms: f64,
-    /// Solving.
+    /// Preintegrating, predicting and solving; the initialization while there is no window.
     pub optimize_ms: f64,
-    /// Marginalizing.
+    /// The window linearized at its final estimate, for the observability analysis.
+    pub linearize_ms: f64,
+    /// Building the report.
+    pub report_ms: f64,
+    /// Rejecting outliers, switching charts, marginalizing.
     pub marginalize_ms: f64,
     /// Observability analysis.
     pub observability_ms: f64,

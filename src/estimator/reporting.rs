@@ -1,16 +1,14 @@
 //! From the window to the report of a step.
 
-use nalgebra::{DVector, Vector2};
+use nalgebra::Vector2;
 
 use super::estimator::Estimator;
-use super::layout::Layout;
-use super::problem::{Costs, Estimate, Problem};
-use super::rows::stack;
+use super::problem::Costs;
 use super::solver;
 use super::tracking::{SolvedWindow, TrackResiduals};
 use super::{
-    CalibrationEstimate, ColumnBlock, ColumnGroup, FeatureReport, FrameStateReport, LandmarkReport, Linearization,
-    ObservationReport, Phase, ResidualSummary, StageTimes, StepInput, StepReport,
+    CalibrationEstimate, FeatureReport, FrameStateReport, LandmarkReport, ObservationReport, Phase, ResidualSummary,
+    StageTimes, StepInput, StepReport,
 };
 
 impl Estimator {
@@ -39,6 +37,7 @@ impl Estimator {
 
     /// The report of a solved window.
     pub(super) fn tracking_report(&mut self, input: &StepInput<'_>, solved: &mut SolvedWindow) -> StepReport {
+        let begin_ms = (self.config.clock_ms)();
         self.calibration_sigmas = solver::sigmas(&solved.solution.calibration_covariance).iter().copied().collect();
         let mut report = self.empty_report(input, Phase::Tracking);
         report.window = self.window_report();
@@ -49,9 +48,12 @@ impl Estimator {
         report.reprojection_rms_before_px = root_mean_square(&solved.residuals_before);
         report.reprojection_rms_after_px = root_mean_square(&solved.residuals_after);
         report.iterations = std::mem::take(&mut solved.solution.iterations);
+        let reported_ms = (self.config.clock_ms)();
         if self.config.options.keep_linearization {
             report.linearization = Some(self.linearization(solved));
         }
+        report.times.report_ms = reported_ms - begin_ms;
+        report.times.linearize_ms = (self.config.clock_ms)() - reported_ms;
         report
     }
 
@@ -175,69 +177,6 @@ impl Estimator {
         }
         summaries
     }
-
-    /// The linearization at the final estimate: the measurements' rows, and those of the priors.
-    fn linearization(&self, solved: &SolvedWindow) -> Linearization {
-        let problem = self.problem(&solved.tracks);
-        let estimate = &solved.solution.estimate;
-        let layout = problem.layout;
-        let columns = layout.total() + 1;
-        let mut parts = vec![problem.visual_rows(estimate, &solved.tracks, &estimate.landmarks)];
-        parts.extend((1..layout.frames).map(|slot| problem.inertial_rows(slot, estimate)));
-        parts.extend((0..layout.frames).map(|slot| problem.encoder_rows(slot, estimate)));
-        let rest: Vec<_> = problem.rest_terms(&estimate.frames).collect();
-        parts.push(problem.rest_rows(&rest));
-        let measured = stack(&parts, columns);
-        let priors = stack(&[problem.calibration_prior_rows(estimate), problem.prior_rows(estimate)], columns);
-        let order = column_order(&layout);
-        let names = self.column_blocks(&layout);
-        Linearization {
-            columns: names,
-            jacobian: measured.select_columns(&order),
-            prior_jacobian: priors.select_columns(&order),
-            calibration_column_norms: calibration_column_norms(&problem, estimate),
-        }
-    }
-
-    fn column_blocks(&self, layout: &Layout) -> Vec<ColumnBlock> {
-        let mut blocks = Vec::new();
-        let mut start = 0;
-        let mut push = |group: ColumnGroup, name: String, len: usize| {
-            if len > 0 {
-                blocks.push(ColumnBlock { group, name, start, len });
-                start += len;
-            }
-        };
-        if layout.calibration > 0 {
-            for name in self.calibration.chain().parameter_names() {
-                push(ColumnGroup::Calibration, name, 1);
-            }
-        }
-        for (group, kind, len) in [
-            (ColumnGroup::Joints, "joints", layout.joints),
-            (ColumnGroup::Pose, "pose", super::layout::POSE),
-            (ColumnGroup::SpeedBias, "speed-bias", super::layout::SPEED_BIAS),
-        ] {
-            for frame in &self.frames {
-                push(group, format!("{kind} {}", frame.index), len);
-            }
-        }
-        blocks
-    }
-}
-
-fn calibration_column_norms(problem: &Problem<'_>, estimate: &Estimate) -> DVector<f64> {
-    let equations = problem.linearize(estimate);
-    equations.visual.squared_column_norms(&equations.maps.calibration).map(|squared| squared.max(0.0).sqrt())
-}
-
-/// Columns of the layout in the order of the report: calibration, joints, poses, speeds and biases.
-fn column_order(layout: &Layout) -> Vec<usize> {
-    let mut order: Vec<usize> = layout.calibration().collect();
-    order.extend((0..layout.frames).flat_map(|slot| layout.joints(slot)));
-    order.extend((0..layout.frames).flat_map(|slot| layout.pose(slot)));
-    order.extend((0..layout.frames).flat_map(|slot| layout.speed_bias(slot)));
-    order
 }
 
 fn root_mean_square(residuals: &TrackResiduals) -> f64 {

@@ -5,30 +5,45 @@ use nalgebra::DMatrix;
 use super::camera_pose::{self, CameraMaps};
 use super::layout::{POSE, SPEED_BIAS};
 use super::problem::{Estimate, Problem};
-use super::reprojection::Landmark;
+use super::projection::ProjectedRows;
+use super::reprojection::{CameraPose, Landmark};
 use super::standstill::RestTerm;
-use super::visual::{self, Track};
+use super::visual::Track;
+use super::window::FrameState;
 
 impl Problem<'_> {
     /// The reprojection factors of `tracks`, landmarks projected out; at most `6·frames` rows.
     pub(super) fn visual_rows(&self, estimate: &Estimate, tracks: &[Track], landmarks: &[Landmark]) -> DMatrix<f64> {
         let frames = self.linearization_frames(estimate);
         let calibration = self.linearization_calibration(&estimate.calibration);
-        let current = camera_pose::by_slot(&estimate.frames, &estimate.calibration);
-        let linearized = camera_pose::by_slot(&frames, &calibration);
-        let by_camera = visual::projected_rows(&self.visual, &current, &linearized, tracks, landmarks);
         let maps = CameraMaps::new(&frames, &calibration);
+        let cameras = camera_pose::by_slot(&frames, &calibration);
+        let projected = self.projected_rows(estimate, &cameras, tracks, landmarks);
+        self.carried_rows(&projected, &maps)
+    }
 
+    /// The reprojection factors of `tracks` by camera poses; derivatives at `linearized`.
+    pub(super) fn projected_rows(
+        &self,
+        estimate: &Estimate,
+        linearized: &[CameraPose],
+        tracks: &[Track],
+        landmarks: &[Landmark],
+    ) -> ProjectedRows {
+        let current = camera_pose::by_slot(&estimate.frames, &estimate.calibration);
+        ProjectedRows::new(&self.visual, &current, linearized, tracks, landmarks)
+    }
+
+    /// Rows by camera poses carried on to the unknowns.
+    pub(super) fn carried_rows(&self, projected: &ProjectedRows, maps: &CameraMaps) -> DMatrix<f64> {
+        let by_camera = &projected.rows;
         let total = self.layout.total();
-        // The last row of a full triangle holds nothing but the residual that no camera pose can change.
-        let height = by_camera.nrows().min(6 * self.layout.frames);
+        let height = by_camera.nrows();
         let mut rows = DMatrix::zeros(height, total + 1);
         for slot in 0..self.layout.frames {
             let columns = by_camera.view((0, 6 * slot), (height, 6));
-            let own = columns * &maps.own[slot];
-            rows.columns_range_mut(self.layout.camera(slot)).copy_from(&own);
-            let mut shared = rows.columns_range_mut(self.layout.calibration());
-            shared += columns * &maps.calibration[slot];
+            rows.columns_range_mut(self.layout.camera(slot)).gemm(1.0, &columns, &maps.own[slot], 0.0);
+            rows.columns_range_mut(self.layout.calibration()).gemm(1.0, &columns, &maps.calibration[slot], 1.0);
         }
         rows.set_column(total, &by_camera.view((0, 6 * self.layout.frames), (height, 1)).column(0));
         rows
@@ -36,9 +51,13 @@ impl Problem<'_> {
 
     /// The inertial factor that ends at `slot`, 15 rows, or none.
     pub(super) fn inertial_rows(&self, slot: usize, estimate: &Estimate) -> DMatrix<f64> {
+        self.inertial_rows_at(slot, estimate, &self.linearization_frames(estimate))
+    }
+
+    /// [`Self::inertial_rows`] with the states at which derivatives are taken.
+    pub(super) fn inertial_rows_at(&self, slot: usize, estimate: &Estimate, linearized: &[FrameState]) -> DMatrix<f64> {
         let total = self.layout.total();
-        let linearized = self.linearization_frames(estimate);
-        let Some((by_from, by_to, residual)) = self.imu_rows(slot, estimate, &linearized) else {
+        let Some((by_from, by_to, residual)) = self.imu_rows(slot, estimate, linearized) else {
             return DMatrix::zeros(0, total + 1);
         };
         let mut rows = DMatrix::zeros(15, total + 1);
@@ -104,12 +123,19 @@ impl Problem<'_> {
 
 /// One matrix above the other.
 pub(super) fn stack(parts: &[DMatrix<f64>], columns: usize) -> DMatrix<f64> {
+    stack_columns(parts, 0..columns)
+}
+
+/// These columns of the matrices, one above the other.
+pub(super) fn stack_columns(parts: &[DMatrix<f64>], columns: impl ExactSizeIterator<Item = usize>) -> DMatrix<f64> {
     let height = parts.iter().map(DMatrix::nrows).sum();
-    let mut stacked = DMatrix::zeros(height, columns);
-    let mut start = 0;
-    for part in parts {
-        stacked.rows_mut(start, part.nrows()).copy_from(part);
-        start += part.nrows();
+    let mut stacked = DMatrix::zeros(height, columns.len());
+    for (target, source) in columns.enumerate() {
+        let mut start = 0;
+        for part in parts {
+            stacked.view_mut((start, target), (part.nrows(), 1)).copy_from(&part.column(source));
+            start += part.nrows();
+        }
     }
     stacked
 }

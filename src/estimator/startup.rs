@@ -59,7 +59,8 @@ impl Estimator {
                 self.empty_report(input, Phase::Initializing)
             }
         };
-        report.times.optimize_ms = (self.config.clock_ms)() - begin_ms;
+        let reporting_ms = report.times.report_ms + report.times.linearize_ms;
+        report.times.optimize_ms = (self.config.clock_ms)() - begin_ms - reporting_ms;
         let own = std::mem::take(&mut report.events);
         report.events = events;
         report.events.extend(own);

@@ -3,10 +3,10 @@
 //! Six columns per frame hold whatever the camera sees, however many joints and parameters move it: the Schur
 //! complement of the landmarks is formed there and only its result is carried on to the states.
 
-use nalgebra::{DMatrix, DVector, Matrix2x3, Matrix2x6, Matrix3, Matrix6, Matrix6x3, Vector2, Vector3, Vector6};
+use nalgebra::{Matrix2x3, Matrix2x6, Matrix3, Matrix6, Matrix6x3, Vector2, Vector3, Vector6};
 
-use super::dense;
 use super::options::{EstimatorOptions, LandmarkModel, RobustLoss};
+use super::pose_blocks::PoseBlocks;
 use super::reprojection::{self, CameraPose, Landmark, RelativePose, Reprojection};
 use crate::camera::CameraModel;
 
@@ -111,9 +111,7 @@ struct LandmarkBlock {
 /// Normal equations of the reprojection factors: camera poses on one side, landmarks on the other.
 #[derive(Clone, Debug)]
 pub(super) struct VisualSystem {
-    frames: usize,
-    /// Upper blocks of the camera poses, row-wise: `(0,0) (0,1) … (1,1) …`.
-    hessian: Vec<Matrix6<f64>>,
+    hessian: PoseBlocks,
     gradient: Vec<Vector6<f64>>,
     landmarks: Vec<LandmarkBlock>,
 }
@@ -121,16 +119,10 @@ pub(super) struct VisualSystem {
 /// The camera side after the landmarks were eliminated.
 #[derive(Clone, Debug)]
 pub(super) struct ReducedVisualSystem {
-    frames: usize,
-    hessian: Vec<Matrix6<f64>>,
+    hessian: PoseBlocks,
     gradient: Vec<Vector6<f64>>,
     /// For the way back: inverse of each damped landmark block.
     inverses: Vec<Matrix3<f64>>,
-}
-
-fn pair_index(frames: usize, row: usize, column: usize) -> usize {
-    debug_assert!(row <= column && column < frames, "upper blocks only");
-    row * (2 * frames + 1 - row) / 2 + column - row
 }
 
 impl VisualSystem {
@@ -146,8 +138,7 @@ impl VisualSystem {
         let relative = RelativePoses::new(current);
         let relative_linearized = RelativePoses::new(linearized);
         let mut system = Self {
-            frames,
-            hessian: vec![Matrix6::zeros(); frames * (frames + 1) / 2],
+            hessian: PoseBlocks::new(frames),
             gradient: vec![Vector6::zeros(); frames],
             landmarks: Vec::with_capacity(tracks.len()),
         };
@@ -179,19 +170,16 @@ impl VisualSystem {
             if sighting.slot == anchor {
                 continue;
             }
-            let index = pair_index(self.frames, sighting.slot, sighting.slot);
-            self.hessian[index] += term.by_observer.tr_mul(&term.by_observer);
+            *self.hessian.block_mut(sighting.slot, sighting.slot) += term.by_observer.tr_mul(&term.by_observer);
             self.gradient[sighting.slot] += term.by_observer.tr_mul(&term.residual_px);
             block.couplings.push((sighting.slot, term.by_observer.tr_mul(&term.by_landmark)));
             anchor_hessian += term.by_anchor.tr_mul(&term.by_anchor);
             anchor_gradient += term.by_anchor.tr_mul(&term.residual_px);
             anchor_coupling += term.by_anchor.tr_mul(&term.by_landmark);
             // Sightings come in the order of the slots and the anchor is the first of them.
-            let index = pair_index(self.frames, anchor, sighting.slot);
-            self.hessian[index] += term.by_anchor.tr_mul(&term.by_observer);
+            *self.hessian.block_mut(anchor, sighting.slot) += term.by_anchor.tr_mul(&term.by_observer);
         }
-        let index = pair_index(self.frames, anchor, anchor);
-        self.hessian[index] += anchor_hessian;
+        *self.hessian.block_mut(anchor, anchor) += anchor_hessian;
         self.gradient[anchor] += anchor_gradient;
         block.couplings.insert(0, (anchor, anchor_coupling));
         block
@@ -200,7 +188,6 @@ impl VisualSystem {
     /// Eliminates the landmarks, their diagonal raised by the factor `1 + damping`.
     pub(super) fn eliminate(&self, damping: f64) -> ReducedVisualSystem {
         let mut reduced = ReducedVisualSystem {
-            frames: self.frames,
             hessian: self.hessian.clone(),
             gradient: self.gradient.clone(),
             inverses: Vec::with_capacity(self.landmarks.len()),
@@ -213,8 +200,7 @@ impl VisualSystem {
             for (first, (row, _)) in block.couplings.iter().enumerate() {
                 reduced.gradient[*row] -= weighted[first] * block.gradient;
                 for (column, coupling) in &block.couplings[first..] {
-                    let index = pair_index(self.frames, *row, *column);
-                    reduced.hessian[index] -= weighted[first] * coupling.transpose();
+                    *reduced.hessian.block_mut(*row, *column) -= weighted[first] * coupling.transpose();
                 }
             }
             reduced.inverses.push(inverse);
@@ -236,24 +222,6 @@ impl VisualSystem {
             })
             .collect()
     }
-
-    /// Sum of squares of the columns of all camera poses before the elimination, mapped by `columns`
-    /// (per slot 6 × n): the squared norms of the `n` columns that move the cameras through them.
-    pub(super) fn squared_column_norms(&self, columns: &[DMatrix<f64>]) -> DVector<f64> {
-        let count = columns.first().map_or(0, DMatrix::ncols);
-        let mut norms = DVector::zeros(count);
-        for row in 0..self.frames {
-            for column in row..self.frames {
-                let block = &self.hessian[pair_index(self.frames, row, column)];
-                let factor = if row == column { 1.0 } else { 2.0 };
-                for k in 0..count {
-                    let right = block * columns[column].fixed_view::<6, 1>(0, k);
-                    norms[k] += factor * columns[row].fixed_view::<6, 1>(0, k).dot(&right);
-                }
-            }
-        }
-        norms
-    }
 }
 
 /// The inverse of a landmark's block with its diagonal raised; directions without information get no step.
@@ -269,7 +237,7 @@ fn damped_inverse(hessian: &Matrix3<f64>, damping: f64) -> Matrix3<f64> {
 impl ReducedVisualSystem {
     /// The block of two camera poses, `row ≤ column`.
     pub(super) fn block(&self, row: usize, column: usize) -> &Matrix6<f64> {
-        &self.hessian[pair_index(self.frames, row, column)]
+        self.hessian.block(row, column)
     }
 
     /// The gradient by one camera pose.
@@ -279,7 +247,7 @@ impl ReducedVisualSystem {
 }
 
 /// One sighting linearized, divided by sigma and by the root of its robust weight.
-fn whitened(
+pub(super) fn whitened(
     model: &VisualModel<'_>,
     relative: &RelativePoses,
     linearized: &RelativePoses,
@@ -310,101 +278,4 @@ fn whitened(
     let by_anchor: Matrix2x6<f64> = term.by_anchor * scale;
     let by_observer: Matrix2x6<f64> = term.by_observer * scale;
     Some(Reprojection { residual_px: term.residual_px * scale, by_anchor, by_observer, by_landmark })
-}
-
-/// The reprojection factors as whitened rows `[camera poses 6·frames | residual]` with every landmark projected out
-/// orthogonally (its own rows turned so that it shows in the first few, which are dropped), compressed to at most
-/// `6·frames + 1` rows by a further rotation. No normal equations are formed.
-pub(super) fn projected_rows(
-    model: &VisualModel<'_>,
-    current: &[CameraPose],
-    linearized: &[CameraPose],
-    tracks: &[Track],
-    landmarks: &[Landmark],
-) -> DMatrix<f64> {
-    let columns = 6 * current.len() + 1;
-    let relative = RelativePoses::new(current);
-    let relative_linearized = RelativePoses::new(linearized);
-    let mut stacked = RowStack::new(columns);
-    for (track, landmark) in tracks.iter().zip(landmarks) {
-        let Some(anchor) = track.sightings.first().map(|first| first.slot) else { continue };
-        let terms: Vec<(usize, Reprojection)> = track
-            .sightings
-            .iter()
-            .filter_map(|sighting| {
-                let term = whitened(model, &relative, &relative_linearized, anchor, landmark, sighting)?;
-                Some((sighting.slot, term))
-            })
-            .collect();
-        let mut rows = DMatrix::zeros(2 * terms.len(), 3 + columns);
-        for (index, (slot, term)) in terms.iter().enumerate() {
-            let mut pair = rows.fixed_rows_mut::<2>(2 * index);
-            pair.fixed_columns_mut::<3>(0).copy_from(&term.by_landmark);
-            if *slot != anchor {
-                pair.fixed_columns_mut::<6>(3 + 6 * anchor).copy_from(&term.by_anchor);
-                pair.fixed_columns_mut::<6>(3 + 6 * slot).copy_from(&term.by_observer);
-            }
-            pair.fixed_columns_mut::<1>(2 + columns).copy_from(&term.residual_px);
-        }
-        let used = project_out_leading(&mut rows, 3);
-        for row in used..rows.nrows() {
-            stacked.push(rows.row(row).columns_range(3..).iter().copied());
-        }
-    }
-    stacked.triangularized()
-}
-
-/// Householder reflections that clear the first `count` columns below as many rows (fewer for dependent columns);
-/// returns how many rows those columns still fill.
-fn project_out_leading(rows: &mut DMatrix<f64>, count: usize) -> usize {
-    let (height, width) = rows.shape();
-    let mut pivot = 0;
-    for column in 0..count {
-        if pivot >= height {
-            break;
-        }
-        let scale = rows.column(column).norm();
-        let tail = rows.view((pivot, column), (height - pivot, 1)).norm();
-        if tail <= 1e-12 * scale.max(1e-300) {
-            rows.view_mut((pivot, column), (height - pivot, 1)).fill(0.0);
-            continue;
-        }
-        let head = rows[(pivot, column)];
-        let target = if head > 0.0 { -tail } else { tail };
-        let mut reflector: DVector<f64> = rows.view((pivot, column), (height - pivot, 1)).column(0).into_owned();
-        reflector[0] -= target;
-        let squared = reflector.norm_squared();
-        for other in column..width {
-            let mut part = rows.view_mut((pivot, other), (height - pivot, 1));
-            let dot = part.column(0).dot(&reflector) * 2.0 / squared;
-            if dot != 0.0 {
-                part.column_mut(0).axpy(-dot, &reflector, 1.0);
-            }
-        }
-        pivot += 1;
-    }
-    pivot
-}
-
-/// Rows collected one by one.
-#[derive(Clone, Debug)]
-pub(super) struct RowStack {
-    columns: usize,
-    entries: Vec<f64>,
-}
-
-impl RowStack {
-    pub(super) fn new(columns: usize) -> Self {
-        Self { columns, entries: Vec::new() }
-    }
-
-    pub(super) fn push(&mut self, row: impl Iterator<Item = f64>) {
-        self.entries.extend(row);
-    }
-
-    /// The upper echelon factor of the stack.
-    pub(super) fn triangularized(self) -> DMatrix<f64> {
-        let rows = self.entries.len() / self.columns;
-        dense::triangularize(&DMatrix::from_row_slice(rows, self.columns, &self.entries))
-    }
 }

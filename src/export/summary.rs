@@ -171,6 +171,10 @@ pub struct TimingSummary {
     pub frontend: StageSummary,
     /// Solve.
     pub optimize: StageSummary,
+    /// Linearization for the observability analysis.
+    pub linearize: StageSummary,
+    /// Building the report.
+    pub report: StageSummary,
     /// Marginalization.
     pub marginalize: StageSummary,
     /// Observability analysis.
@@ -418,6 +422,8 @@ fn timing_summary(run: &RunRecord) -> Option<TimingSummary> {
     Some(TimingSummary {
         frontend: stage(|times| times.frontend_ms)?,
         optimize: stage(|times| times.optimize_ms)?,
+        linearize: stage(|times| times.linearize_ms)?,
+        report: stage(|times| times.report_ms)?,
         marginalize: stage(|times| times.marginalize_ms)?,
         observability: stage(|times| times.observability_ms)?,
         step: stage(|times| times.step_ms)?,

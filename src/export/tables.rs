@@ -152,8 +152,8 @@ pub(super) fn rank_csv(run: &RunRecord) -> String {
 /// that two runs give the same bytes.
 pub(super) fn frames_csv(run: &RunRecord, timing: bool) -> String {
     let mut text = "t_s,frame,log_time_s,phase,tracked,new,lost,rejected,inliers,keyframe,reprojection_rms_before_px,\
-                    reprojection_rms_after_px,iterations,frontend_ms,optimize_ms,marginalize_ms,observability_ms,step_ms,\
-                    events,warnings\n"
+                    reprojection_rms_after_px,iterations,frontend_ms,optimize_ms,linearize_ms,report_ms,marginalize_ms,\
+                    observability_ms,step_ms,events,warnings\n"
         .to_owned();
     for step in &run.steps {
         let report = &step.report;
@@ -180,9 +180,16 @@ pub(super) fn frames_csv(run: &RunRecord, timing: bool) -> String {
         push_number(&mut text, report.reprojection_rms_after_px);
         write!(text, ",{}", report.iterations.len()).expect(INTO_STRING);
         let times = &report.times;
-        for time_ms in
-            [times.frontend_ms, times.optimize_ms, times.marginalize_ms, times.observability_ms, times.step_ms]
-        {
+        let stages_ms = [
+            times.frontend_ms,
+            times.optimize_ms,
+            times.linearize_ms,
+            times.report_ms,
+            times.marginalize_ms,
+            times.observability_ms,
+            times.step_ms,
+        ];
+        for time_ms in stages_ms {
             if timing {
                 write!(text, ",{time_ms:.3}").expect(INTO_STRING);
             } else {

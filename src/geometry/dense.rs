@@ -1,7 +1,7 @@
 //! Decompositions of dense matrices: nalgebra keeps them, faer factors them.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::{Conj, Mat, MatRef, Par};
+use faer::{Conj, Mat, MatMut, MatRef, Par};
 use nalgebra::{DMatrix, DVector};
 
 /// `A = U·diag(s)·Vᵀ` with as many columns as the smaller side has, largest singular value first.
@@ -72,7 +72,7 @@ pub fn to_faer(matrix: &DMatrix<f64>) -> Mat<f64> {
 ///
 /// Column-pivoted Householder QR, hence also right for dependent columns: a pivot counts when it exceeds `tolerance`, so
 /// the columns of `spanning` should have norms around 1. Both matrices have as many rows; both must be finite.
-pub fn split_by_column_space(spanning: MatRef<'_, f64>, rest: &mut Mat<f64>, tolerance: f64) -> usize {
+pub fn split_by_column_space(spanning: MatRef<'_, f64>, rest: MatMut<'_, f64>, tolerance: f64) -> usize {
     use faer::linalg::householder::{
         apply_block_householder_sequence_transpose_on_the_left_in_place_scratch as scratch,
         apply_block_householder_sequence_transpose_on_the_left_in_place_with_conj as apply,
@@ -83,7 +83,7 @@ pub fn split_by_column_space(spanning: MatRef<'_, f64>, rest: &mut Mat<f64>, tol
     let (basis, coefficients) = (factors.Q_basis(), factors.Q_coeff());
     if rank > 0 && rest.ncols() > 0 {
         let mut memory = MemBuffer::new(scratch::<f64>(basis.nrows(), coefficients.nrows(), rest.ncols()));
-        apply(basis, coefficients, Conj::No, rest.as_mut(), Par::Seq, MemStack::new(&mut memory));
+        apply(basis, coefficients, Conj::No, rest, Par::Seq, MemStack::new(&mut memory));
     }
     rank
 }

@@ -80,7 +80,7 @@ fn rows_are_split_by_a_column_space_even_with_dependent_columns() {
     spanning.set_column(3, &repeated);
     let rest = nalgebra::DMatrix::from_fn(12, 4, |row, column| entry(row, column + 9));
     let mut turned = to_faer(&rest);
-    let rank = split_by_column_space(to_faer(&spanning).as_ref(), &mut turned, 1e-11);
+    let rank = split_by_column_space(to_faer(&spanning).as_ref(), turned.as_mut(), 1e-11);
     assert_eq!(rank, 4);
     // What is left has the Gram matrix of the part orthogonal to the columns.
     let svd = thin_svd(&spanning).unwrap();

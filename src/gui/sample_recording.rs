@@ -498,6 +498,8 @@ fn tracking_report(
         times: StageTimes {
             frontend_ms: 7.0 + dice.unit(),
             optimize_ms: 14.0 + 4.0 * dice.unit(),
+            linearize_ms: 1.0,
+            report_ms: 0.3,
             marginalize_ms: 2.0,
             observability_ms: 1.2,
             step_ms: 26.0 + 4.0 * dice.unit(),

@@ -32,19 +32,22 @@ pub(super) fn classify(
 ) -> Deficits {
     let deficit = columns.saturating_sub(rank);
     let generic = generic_joint_angles(chain.joint_count(), 4 * (chain.joint_count() + 1));
-    let anywhere = stack_rank(&scaled_stack(chain, &generic));
+    let anywhere = scaled_stack(chain, &generic);
+    let values = singular_values(&anywhere);
+    let anywhere = rank_above(&anywhere, &values, largest(&values));
     let parameterization = columns.saturating_sub(anywhere).min(deficit);
     if joint_angles_rad.is_empty() {
         return Deficits { parameterization, joints: 0, absorbed: 0, motion: deficit - parameterization };
     }
     let mut stack = scaled_stack(chain, joint_angles_rad);
-    let here = stack_rank(&stack).min(anywhere);
+    let values = singular_values(&stack);
+    let reference = largest(&values);
+    let here = rank_above(&stack, &values, reference).min(anywhere);
     let joints = (anywhere - here).min(deficit - parameterization);
     let mut absorbed = 0;
     if joints_free && chain.joint_count() > 0 {
-        let reference = spectral_norm(&stack);
         project_joints_out(chain, joint_angles_rad, &mut stack);
-        let unabsorbed = rank_above(&stack, reference).min(here);
+        let unabsorbed = rank_above(&stack, &singular_values(&stack), reference).min(here);
         absorbed = (here - unabsorbed).min(deficit - parameterization - joints);
     }
     Deficits { parameterization, joints, absorbed, motion: deficit - parameterization - joints - absorbed }
@@ -94,16 +97,18 @@ pub(super) fn tolerance(rows: usize, columns: usize) -> f64 {
     100.0 * f64::EPSILON * rows.max(columns) as f64
 }
 
-fn spectral_norm(matrix: &DMatrix<f64>) -> f64 {
-    dense::singular_values(matrix).and_then(|values| values.first().copied()).unwrap_or(0.0)
+/// In descending order; none for a matrix that is not finite.
+fn singular_values(matrix: &DMatrix<f64>) -> Vec<f64> {
+    dense::singular_values(matrix).unwrap_or_default()
 }
 
-fn stack_rank(stack: &DMatrix<f64>) -> usize {
-    rank_above(stack, spectral_norm(stack))
+/// The spectral norm.
+fn largest(singular_values: &[f64]) -> f64 {
+    singular_values.first().copied().unwrap_or(0.0)
 }
 
-fn rank_above(stack: &DMatrix<f64>, reference: f64) -> usize {
-    let threshold = tolerance(stack.nrows(), stack.ncols()) * reference;
-    let values = dense::singular_values(stack).unwrap_or_default();
-    values.iter().filter(|value| **value > threshold).count()
+/// How many singular values of a matrix count against a reference norm.
+fn rank_above(matrix: &DMatrix<f64>, singular_values: &[f64], reference: f64) -> usize {
+    let threshold = tolerance(matrix.nrows(), matrix.ncols()) * reference;
+    singular_values.iter().filter(|value| **value > threshold).count()
 }

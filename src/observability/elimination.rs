@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use faer::Mat;
+use faer::{MatMut, MatRef};
 use nalgebra::DMatrix;
 
 use crate::geometry::dense;
@@ -44,38 +44,69 @@ impl Rows {
 
     /// Projects a block of columns out; `column_norms` are those of all columns before any projection.
     pub(super) fn project_out(&mut self, block: &Range<usize>, column_norms: &[f64]) {
-        let touches = |row: &usize| {
-            let column = self.transposed.column(*row);
-            column.as_slice()[block.clone()].iter().any(|entry| *entry != 0.0)
-        };
+        let touches = |row: &usize| self.row(*row)[block.clone()].iter().any(|entry| *entry != 0.0);
         let touched: Vec<usize> = self.alive.iter().copied().filter(touches).collect();
         if touched.is_empty() {
             return;
         }
-        let mut used = vec![false; self.transposed.nrows()];
+        let others = self.filled_columns(&touched, block);
+        let width: usize = others.iter().map(ExactSizeIterator::len).sum();
+        let scale: Vec<f64> =
+            column_norms[block.clone()].iter().map(|norm| if *norm > 0.0 { norm.recip() } else { 0.0 }).collect();
+        let mut spanning = Vec::with_capacity(touched.len() * block.len());
+        let mut rest = Vec::with_capacity(touched.len() * width);
         for row in &touched {
-            for (used, entry) in used.iter_mut().zip(self.transposed.column(*row).iter()) {
-                *used |= *entry != 0.0;
+            let entries = self.row(*row);
+            spanning.extend(entries[block.clone()].iter().zip(&scale).map(|(entry, scale)| entry * scale));
+            for run in &others {
+                rest.extend_from_slice(&entries[run.clone()]);
             }
         }
-        let others: Vec<usize> = (0..used.len()).filter(|index| used[*index] && !block.contains(index)).collect();
-        let spanning = Mat::from_fn(touched.len(), block.len(), |row, index| {
-            let column = block.start + index;
-            let norm = column_norms[column];
-            if norm > 0.0 { self.transposed[(column, touched[row])] / norm } else { 0.0 }
-        });
-        let mut rest =
-            Mat::from_fn(touched.len(), others.len(), |row, index| self.transposed[(others[index], touched[row])]);
-        let rank = dense::split_by_column_space(spanning.as_ref(), &mut rest, DEPENDENT);
-        for (row, target) in touched.iter().enumerate().skip(rank) {
-            let mut column = self.transposed.column_mut(*target);
-            column.rows_mut(block.start, block.len()).fill(0.0);
-            for (index, other) in others.iter().enumerate() {
-                column[*other] = rest[(row, index)];
+        let rank = dense::split_by_column_space(
+            MatRef::from_row_major_slice(&spanning, touched.len(), block.len()),
+            MatMut::from_row_major_slice_mut(&mut rest, touched.len(), width),
+            DEPENDENT,
+        );
+        for (index, row) in touched.iter().enumerate().skip(rank) {
+            let entries = self.row_mut(*row);
+            entries[block.clone()].fill(0.0);
+            let mut from = index * width;
+            for run in &others {
+                entries[run.clone()].copy_from_slice(&rest[from..from + run.len()]);
+                from += run.len();
             }
         }
         let dropped = &touched[..rank];
         self.alive.retain(|row| dropped.binary_search(row).is_err());
+    }
+
+    /// Runs of columns outside of a block in which some of the rows have entries.
+    fn filled_columns(&self, rows: &[usize], block: &Range<usize>) -> Vec<Range<usize>> {
+        let mut filled = vec![false; self.transposed.nrows()];
+        for row in rows {
+            for (filled, entry) in filled.iter_mut().zip(self.row(*row)) {
+                *filled |= *entry != 0.0;
+            }
+        }
+        filled[block.clone()].fill(false);
+        let mut runs: Vec<Range<usize>> = Vec::new();
+        for index in (0..filled.len()).filter(|index| filled[*index]) {
+            match runs.last_mut() {
+                Some(run) if run.end == index => run.end += 1,
+                _ => runs.push(index..index + 1),
+            }
+        }
+        runs
+    }
+
+    fn row(&self, row: usize) -> &[f64] {
+        let width = self.transposed.nrows();
+        &self.transposed.as_slice()[row * width..(row + 1) * width]
+    }
+
+    fn row_mut(&mut self, row: usize) -> &mut [f64] {
+        let width = self.transposed.nrows();
+        &mut self.transposed.as_mut_slice()[row * width..(row + 1) * width]
     }
 
     /// The first `count` columns of the rows that are left.

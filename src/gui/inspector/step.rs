@@ -126,6 +126,8 @@ pub(super) fn times_ui(ui: &mut Ui, theme: &Theme, report: &StepReport) {
     let rows = [
         row("front end", times.frontend_ms),
         row("optimize", times.optimize_ms),
+        row("linearize", times.linearize_ms),
+        row("report", times.report_ms),
         row("marginalize", times.marginalize_ms),
         row("observability", times.observability_ms),
         row("whole step", times.step_ms),

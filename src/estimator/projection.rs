@@ -1,0 +1,172 @@
+//! The reprojection factors as rows over the camera poses, every landmark projected out orthogonally: no normal
+//! equations are formed, so that what is exactly unseen stays exactly unseen.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::dense;
+use super::pose_blocks::PoseBlocks;
+use super::reprojection::{CameraPose, Landmark, Reprojection};
+use super::visual::{RelativePoses, Track, VisualModel, whitened};
+
+/// Columns of a landmark.
+const LANDMARK: usize = 3;
+/// Columns of a camera pose.
+const POSE: usize = 6;
+
+/// The whitened rows of some tracks.
+#[derive(Clone, Debug)]
+pub(super) struct ProjectedRows {
+    /// `[camera poses 6·frames | residual]`, compressed to its upper echelon factor.
+    pub(super) rows: DMatrix<f64>,
+    /// `JᵀJ` of the camera poses before the landmarks were projected out.
+    blocks: PoseBlocks,
+}
+
+impl ProjectedRows {
+    /// Linearizes at `current`, with the derivatives by poses taken at `linearized`.
+    pub(super) fn new(
+        model: &VisualModel<'_>,
+        current: &[CameraPose],
+        linearized: &[CameraPose],
+        tracks: &[Track],
+        landmarks: &[Landmark],
+    ) -> Self {
+        let frames = current.len();
+        let relative = RelativePoses::new(current);
+        let relative_linearized = RelativePoses::new(linearized);
+        let mut blocks = PoseBlocks::new(frames);
+        let columns = POSE * frames + 1;
+        let mut rows = Vec::new();
+        let mut local = TrackRows::default();
+        for (track, landmark) in tracks.iter().zip(landmarks) {
+            let Some(anchor) = track.sightings.first().map(|first| first.slot) else { continue };
+            local.begin(anchor, track.sightings.len());
+            for sighting in &track.sightings {
+                let term = whitened(model, &relative, &relative_linearized, anchor, landmark, sighting);
+                let Some(term) = term else { continue };
+                if sighting.slot != anchor {
+                    blocks.add(anchor, sighting.slot, &term);
+                }
+                local.push(sighting.slot, &term);
+            }
+            local.project_out_landmark();
+            local.append_to(&mut rows, columns);
+        }
+        let upper = dense::triangularize_rows(&rows, columns);
+        // The last row of a full triangle holds nothing but the residual that no camera pose can change.
+        let height = upper.nrows().min(POSE * frames);
+        Self { rows: upper.resize_vertically(height, 0.0), blocks }
+    }
+
+    /// Sum of squares of the columns that move the cameras by `columns` (per slot 6 × n), before the projection.
+    pub(super) fn squared_column_norms(&self, columns: &[DMatrix<f64>]) -> DVector<f64> {
+        self.blocks.squared_norms(columns)
+    }
+}
+
+/// The rows of one track, `[landmark 3 | anchor 6 | observers 6 each | residual]`: of the camera poses only those that
+/// the track has sightings from.
+#[derive(Debug, Default)]
+struct TrackRows {
+    /// Row-major.
+    entries: Vec<f64>,
+    width: usize,
+    /// Slots of the blocks of columns, the anchor's first.
+    slots: Vec<usize>,
+    /// Rows that the landmark still fills after the projection.
+    used: usize,
+    reflector: Vec<f64>,
+    products: Vec<f64>,
+}
+
+impl TrackRows {
+    /// A track without rows yet, of at most so many sightings.
+    fn begin(&mut self, anchor: usize, sightings: usize) {
+        self.slots.clear();
+        self.slots.push(anchor);
+        self.entries.clear();
+        self.width = LANDMARK + POSE * sightings.max(1) + 1;
+        self.used = 0;
+    }
+
+    fn height(&self) -> usize {
+        self.entries.len() / self.width
+    }
+
+    fn push(&mut self, slot: usize, term: &Reprojection) {
+        let anchor = self.slots[0];
+        if slot != anchor {
+            self.slots.push(slot);
+        }
+        let place = LANDMARK + POSE * (self.slots.len() - 1);
+        for axis in 0..2 {
+            let begin = self.entries.len();
+            self.entries.resize(begin + self.width, 0.0);
+            let row = &mut self.entries[begin..];
+            for k in 0..LANDMARK {
+                row[k] = term.by_landmark[(axis, k)];
+            }
+            if slot != anchor {
+                for k in 0..POSE {
+                    row[LANDMARK + k] = term.by_anchor[(axis, k)];
+                    row[place + k] = term.by_observer[(axis, k)];
+                }
+            }
+            row[self.width - 1] = term.residual_px[axis];
+        }
+    }
+
+    /// Householder reflections that clear the landmark's columns below as many rows (fewer for dependent columns).
+    fn project_out_landmark(&mut self) {
+        let (height, width) = (self.height(), self.width);
+        for column in 0..LANDMARK {
+            if self.used >= height {
+                break;
+            }
+            let entry = |row: usize| self.entries[row * width + column];
+            let norm = (0..height).map(|row| entry(row) * entry(row)).sum::<f64>().sqrt();
+            let tail = (self.used..height).map(|row| entry(row) * entry(row)).sum::<f64>().sqrt();
+            if tail <= 1e-12 * norm.max(1e-300) {
+                continue;
+            }
+            self.reflector.clear();
+            self.reflector.extend((self.used..height).map(entry));
+            self.reflector[0] += if self.reflector[0] > 0.0 { tail } else { -tail };
+            let factor = 2.0 / self.reflector.iter().map(|entry| entry * entry).sum::<f64>();
+            self.reflect(factor);
+            self.used += 1;
+        }
+    }
+
+    /// `A ← A − factor·v·(vᵀA)` on the rows from `used` on.
+    fn reflect(&mut self, factor: f64) {
+        let rows = &mut self.entries[self.used * self.width..];
+        self.products.clear();
+        self.products.resize(self.width, 0.0);
+        for (row, weight) in rows.chunks_exact(self.width).zip(&self.reflector) {
+            for (product, entry) in self.products.iter_mut().zip(row) {
+                *product += weight * entry;
+            }
+        }
+        for (row, weight) in rows.chunks_exact_mut(self.width).zip(&self.reflector) {
+            let weight = factor * weight;
+            for (entry, product) in row.iter_mut().zip(&self.products) {
+                *entry -= weight * product;
+            }
+        }
+    }
+
+    /// The rows that the landmark does not fill, with all camera poses of the window.
+    fn append_to(&self, rows: &mut Vec<f64>, columns: usize) {
+        for row in self.entries.chunks_exact(self.width).skip(self.used) {
+            let begin = rows.len();
+            rows.resize(begin + columns, 0.0);
+            let target = &mut rows[begin..];
+            for (index, slot) in self.slots.iter().enumerate() {
+                let from = LANDMARK + POSE * index;
+                target[POSE * slot..POSE * (slot + 1)].copy_from_slice(&row[from..from + POSE]);
+            }
+            target[columns - 1] = row[self.width - 1];
+        }
+    }
+}
