@@ -9,12 +9,14 @@ mod dense;
 #[expect(clippy::module_inception, reason = "the type that the folder is about")]
 mod estimator;
 mod features;
+mod footprint;
 pub mod imu_factor;
 pub mod initialization;
 mod joints;
 mod layout;
 mod linearization;
 mod marginalization;
+mod observations;
 mod options;
 mod pose_blocks;
 pub mod preintegration;
@@ -36,6 +38,8 @@ mod window;
 
 pub use config::{DEFAULT_CHAIN_PRIOR, EstimatorConfig};
 pub use estimator::Estimator;
+pub use footprint::{ReportBytes, allocated_bytes};
+pub use observations::Observations;
 pub use options::{EstimatorOptions, LandmarkModel, RobustLoss, TrackContinuation};
 pub use preintegration::{ImuBias, MotionIncrement, NavigationState, Preintegration};
 

@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, Vector2, Vector3};
 
+use super::Observations;
 use crate::frontend::FeatureId;
 use crate::geometry::RigidTransform;
 use crate::gimbal::ClassicalChain;
@@ -150,7 +151,7 @@ pub struct FeatureReport {
     /// Inverse depth along the anchor's optical axis, in 1/m.
     pub inverse_depth_per_m: f64,
     /// All its observations in the window, the anchor's first.
-    pub observations: Vec<ObservationReport>,
+    pub observations: Observations,
     /// Rejected as an outlier after this solve.
     pub rejected: bool,
 }

@@ -139,14 +139,17 @@ impl Estimator {
 
     fn landmark_reports(&self, solved: &SolvedWindow) -> Vec<LandmarkReport> {
         let cameras = self.camera_poses();
-        (0..solved.ids.len())
+        let mut landmarks: Vec<LandmarkReport> = (0..solved.ids.len())
             .filter(|index| !solved.rejected[*index])
             .map(|index| {
                 let camera = &cameras[solved.tracks[index].sightings[0].slot];
                 let point = solved.solution.estimate.landmarks[index].point_in_anchor();
                 LandmarkReport { id: solved.ids[index], position_m: camera.rotation * point + camera.position_m }
             })
-            .collect()
+            .collect();
+        // Reports are kept: what growing left over is given back.
+        landmarks.shrink_to_fit();
+        landmarks
     }
 
     fn residual_summaries(&self, solved: &SolvedWindow) -> Vec<ResidualSummary> {

@@ -33,7 +33,7 @@ const BINS: usize = 41;
 impl ResidualHistogram {
     /// The histogram of a step.
     pub(crate) fn of(report: &StepReport) -> Self {
-        let observations = || report.features.iter().flat_map(|feature| &feature.observations);
+        let observations = || report.features.iter().flat_map(|feature| feature.observations.iter());
         let after: Vec<_> =
             observations().filter_map(|one| one.residual_after_px).filter(|r| r.norm().is_finite()).collect();
         let before: Vec<_> =
@@ -91,6 +91,7 @@ fn round_up(length: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::estimator::ObservationReport;
     use crate::gui::sample_recording::sample_recording_of;
 
     #[test]
@@ -109,8 +110,13 @@ mod tests {
     fn nothing_and_nonsense_are_harmless() {
         let recording = sample_recording_of(60, &["auto"]);
         let mut report = recording.runs[0].steps[59].report.clone();
-        for observation in report.features.iter_mut().flat_map(|feature| &mut feature.observations) {
-            observation.residual_after_px = Some(nalgebra::Vector2::new(f64::NAN, 1.0));
+        for feature in &mut report.features {
+            let spoilt = Some(nalgebra::Vector2::new(f64::NAN, 1.0));
+            feature.observations = feature
+                .observations
+                .iter()
+                .map(|observation| ObservationReport { residual_after_px: spoilt, ..observation })
+                .collect();
         }
         assert_eq!(ResidualHistogram::of(&report).observations, 0);
         report.features.clear();

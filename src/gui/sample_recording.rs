@@ -23,7 +23,7 @@ use crate::frontend::{FeatureId, FrontEndStatistics, TrackedFeature, TrackedFram
 use crate::geometry::{RigidTransform, SplitMix64, so3};
 use crate::gimbal::{ClassicalChain, DhLink};
 use crate::session::accuracy::AlignmentSums;
-use crate::session::{Recording, RunRecord, StepRecord};
+use crate::session::{Recording, RunMemory, RunRecord, StepRecord};
 
 /// Nanoseconds between two images (20 Hz).
 pub(crate) const FRAME_PERIOD_NS: i64 = 50_000_000;
@@ -358,6 +358,7 @@ fn sample_run(
         error: None,
         alignment: Some(true_from_estimate),
         alignment_sums: AlignmentSums::default(),
+        memory: RunMemory::default(),
     }
 }
 
@@ -450,7 +451,7 @@ fn tracking_report(
                 + Vector3::new(dice.normal(), dice.normal(), dice.normal()) * 0.06,
         })
         .collect();
-    let rms = |residual: fn(&ObservationReport) -> Option<Vector2<f64>>| {
+    let rms = |residual: fn(ObservationReport) -> Option<Vector2<f64>>| {
         let squares: Vec<f64> = features
             .iter()
             .flat_map(|feature| feature.observations.iter().filter_map(residual).map(|vector| vector.norm_squared()))

@@ -1,3 +1,5 @@
+use crate::estimator::allocated_bytes;
+
 /// Ranks of the calibration block at one step, by the rule of section 3 of the mathematics notes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RankReport {
@@ -60,6 +62,20 @@ impl RankReport {
         parts.join("; ")
     }
 
+    /// Bytes that it takes on the heap.
+    pub fn heap_bytes(&self) -> usize {
+        let texts = self.names.iter().chain(self.margins.iter().map(|(name, _)| name));
+        let texts: usize = texts.map(|text| allocated_bytes(text.capacity())).sum();
+        let weights = self.directions.iter().map(|direction| of_vec(&direction.weights)).sum::<usize>();
+        texts
+            + weights
+            + of_vec(&self.names)
+            + of_vec(&self.margins)
+            + of_vec(&self.singular_values)
+            + of_vec(&self.singular_values_with_priors)
+            + of_vec(&self.directions)
+    }
+
     /// The parameter with the largest share in the weakest direction that is not a structural zero.
     pub fn weakest(&self) -> Option<&str> {
         let direction = self.directions.iter().find(|direction| !direction.structural)?;
@@ -79,4 +95,8 @@ impl CalibrationDirection {
         }
         leading
     }
+}
+
+fn of_vec<T>(vec: &Vec<T>) -> usize {
+    allocated_bytes(vec.capacity() * size_of::<T>())
 }

@@ -7,6 +7,8 @@ pub mod accuracy;
 mod command;
 mod configuration;
 mod engine;
+#[cfg(test)]
+mod memory_tests;
 mod plan;
 mod playback;
 mod recording;
@@ -21,7 +23,7 @@ pub use command::{Command, PlaybackSpeed};
 pub use engine::EngineMessage;
 pub use plan::{MAX_RUNS, SessionError, SessionPlan, SessionRequest};
 pub use playback::Session;
-pub use recording::{Recording, RunRecord, StepRecord};
+pub use recording::{Recording, RunMemory, RunRecord, StepRecord};
 pub use spec::{ParameterizationChoice, RunSpec, RunSpecError};
 pub use stopwatch::Stopwatch;
 

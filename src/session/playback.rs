@@ -94,6 +94,11 @@ impl Session {
         self.shared.generation.load(Ordering::Acquire)
     }
 
+    /// How much memory the recorded steps take, in bytes.
+    pub fn memory_bytes(&self) -> usize {
+        self.shared.lock().memory_bytes()
+    }
+
     /// The log.
     pub fn log_path(&self) -> &Path {
         &self.plan.log_path

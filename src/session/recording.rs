@@ -1,3 +1,4 @@
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -5,9 +6,9 @@ use super::RunSpec;
 use super::accuracy::{Alignment, AlignmentSums};
 use super::engine::EngineMessage;
 use super::plan::SessionPlan;
-use crate::estimator::StepReport;
+use crate::estimator::{StepReport, allocated_bytes};
 use crate::flight_log::{LogWarning, Rig};
-use crate::frontend::TrackedFrame;
+use crate::frontend::{TrackedFeature, TrackedFrame};
 use crate::geometry::RigidTransform;
 use crate::observability::RankReport;
 
@@ -24,6 +25,41 @@ pub struct StepRecord {
     pub truth: Option<RigidTransform>,
     /// Log time of the image since the log began, beside the report's header stamp.
     pub log_time_ns: i64,
+}
+
+impl StepRecord {
+    /// Bytes that it takes, without the tracks, which the runs that watch the same camera share.
+    pub fn own_bytes(&self) -> usize {
+        let reference_counts = 2 * size_of::<usize>();
+        // The report's own fields lie within the record's.
+        let fields = size_of::<Self>() - size_of::<StepReport>();
+        allocated_bytes(reference_counts + fields)
+            + self.report.bytes().total()
+            + self.rank.as_ref().map_or(0, RankReport::heap_bytes)
+    }
+
+    /// Bytes of the tracks.
+    pub fn tracks_bytes(&self) -> usize {
+        let features = &self.tracks.features;
+        allocated_bytes(size_of::<TrackedFrame>() + 2 * size_of::<usize>())
+            + allocated_bytes(features.capacity() * size_of::<TrackedFeature>())
+    }
+}
+
+/// How much memory the steps of a run take, in bytes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RunMemory {
+    /// Everything but the tracks.
+    pub own: usize,
+    /// The tracks, which runs that watch the same camera share.
+    pub tracks: usize,
+}
+
+impl RunMemory {
+    fn add(&mut self, step: &StepRecord) {
+        self.own += step.own_bytes();
+        self.tracks += step.tracks_bytes();
+    }
 }
 
 /// One run: an estimator over the log, and all its steps so far in time order.
@@ -44,6 +80,8 @@ pub struct RunRecord {
     pub alignment: Option<RigidTransform>,
     /// Sums over the frames with truth so far, from which `alignment` follows.
     pub alignment_sums: AlignmentSums,
+    /// How much memory its steps take.
+    pub memory: RunMemory,
 }
 
 impl RunRecord {
@@ -57,6 +95,7 @@ impl RunRecord {
             error: None,
             alignment: None,
             alignment_sums: AlignmentSums::default(),
+            memory: RunMemory::default(),
         }
     }
 
@@ -66,6 +105,7 @@ impl RunRecord {
             self.alignment_sums.add(&newest.world_from_imu.translation_m, &truth.translation_m);
             self.alignment = self.alignment_sums.solve(Alignment::YawPosition).map(|transform| transform.rigid);
         }
+        self.memory.add(&record);
         self.steps.push(Arc::new(record));
     }
 
@@ -139,6 +179,16 @@ impl Recording {
                 }
             }
         }
+    }
+
+    /// How much memory the recorded steps take, in bytes; tracks that runs share are counted once.
+    pub fn memory_bytes(&self) -> usize {
+        let mut tracks: BTreeMap<&str, usize> = BTreeMap::new();
+        for run in &self.runs {
+            let shared = tracks.entry(&run.camera_key).or_default();
+            *shared = run.memory.tracks.max(*shared);
+        }
+        tracks.values().sum::<usize>() + self.runs.iter().map(|run| run.memory.own).sum::<usize>()
     }
 
     /// How far every run has come, in nanoseconds since the log began; the end when all are finished.

@@ -1,0 +1,62 @@
+//! How much memory a recording takes.
+
+use std::sync::Arc;
+
+use super::RunRecord;
+use super::configuration::estimator_config;
+use super::run_engine::RunEngine;
+use super::tracker::TrackedSensorFrame;
+use crate::estimator::Phase;
+use crate::flight_log::{GrayImage, JointAngles, SensorFrame};
+use crate::simulation::{SyntheticFlight, SyntheticFrame, SyntheticOptions, synthetic_tracks};
+
+fn tracked(frame: &SyntheticFrame, encoder_sigma_rad: f64) -> TrackedSensorFrame {
+    let joint_angles = frame.joint_angles_rad.as_ref().map(|angles_rad| JointAngles {
+        angles_rad: angles_rad.clone(),
+        sigmas_rad: vec![encoder_sigma_rad; angles_rad.len()],
+    });
+    TrackedSensorFrame {
+        frame: SensorFrame {
+            index: frame.index,
+            stamp_ns: frame.stamp_ns,
+            log_time_ns: frame.stamp_ns,
+            image: Arc::new(GrayImage { width: 0, height: 0, pixels: Vec::new() }),
+            imu: frame.imu.clone(),
+            joint_angles,
+            truth: Some(frame.true_world_from_imu),
+            warnings: Vec::new(),
+        },
+        tracks: Arc::new(frame.tracks.clone()),
+        frontend_ms: 0.0,
+    }
+}
+
+fn recorded(flight: &SyntheticFlight, spec: &str) -> RunRecord {
+    let spec: super::RunSpec = spec.parse().unwrap();
+    let config = estimator_config(&flight.given_rig, &spec).unwrap();
+    let sigma_rad = config.encoder_sigma_rad.unwrap();
+    let mut engine = RunEngine::new(config);
+    let mut run = RunRecord::new(spec, "cam0".to_owned());
+    for frame in &flight.frames {
+        run.push(engine.step(&tracked(frame, sigma_rad)));
+    }
+    run
+}
+
+/// Ten minutes at 20 images a second must fit into 1.5 GiB, tracks included: 134 kB a frame. A frame with 150 features
+/// in a window of eleven takes about half of that.
+#[test]
+fn a_recorded_frame_stays_small() {
+    let flight = synthetic_tracks(&SyntheticOptions { duration_s: 10.0, ..SyntheticOptions::default() });
+    let run = recorded(&flight, "auto");
+    let steps: Vec<_> = run.steps.iter().rev().take(60).collect();
+    assert!(steps.iter().all(|step| step.report.phase == Phase::Tracking && step.report.linearization.is_none()));
+    let observations: usize =
+        steps.iter().flat_map(|step| &step.report.features).map(|feature| feature.observations.len()).sum();
+    assert!(observations / steps.len() > 500, "a full window: {} observations", observations / steps.len());
+    let bytes = steps.iter().map(|step| step.own_bytes() + step.tracks_bytes()).sum::<usize>() / steps.len();
+    assert!(bytes < 90_000, "{bytes} bytes a frame: {:?}", steps[0].report.bytes());
+    // The running sum says the same.
+    let summed: usize = run.steps.iter().map(|step| step.own_bytes() + step.tracks_bytes()).sum();
+    assert_eq!(run.memory.own + run.memory.tracks, summed);
+}
