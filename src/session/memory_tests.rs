@@ -14,6 +14,7 @@ fn tracked(frame: &SyntheticFrame, encoder_sigma_rad: f64) -> TrackedSensorFrame
     let joint_angles = frame.joint_angles_rad.as_ref().map(|angles_rad| JointAngles {
         angles_rad: angles_rad.clone(),
         sigmas_rad: vec![encoder_sigma_rad; angles_rad.len()],
+        lasting_sigmas_rad: vec![0.0; angles_rad.len()],
     });
     TrackedSensorFrame {
         frame: SensorFrame {
