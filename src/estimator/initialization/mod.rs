@@ -28,6 +28,7 @@ mod checks;
 mod essential;
 mod options;
 mod polynomial;
+mod reconstruction;
 mod refinement;
 pub mod relative_pose;
 mod selection;
@@ -43,6 +44,7 @@ pub use alignment::VectorPrior;
 pub use attempt::try_initialize;
 pub use checks::WaitReason;
 pub use options::{InitializationOptions, StandstillPolicy};
+pub use reconstruction::{Reconstruction, ReconstructionGuess, reconstruct_views};
 pub use standstill::StandstillEstimate;
 
 use nalgebra::Vector3;

@@ -1,0 +1,57 @@
+//! Camera poses from images alone, for those who align them by other means than the initialization.
+
+use nalgebra::UnitQuaternion;
+
+use super::InitializationOptions;
+use super::structure::{StructureLimits, collect_tracks, rank_pairs, reconstruct};
+use crate::frontend::TrackedFeature;
+use crate::geometry::RigidTransform;
+
+/// What is known of the cameras before a reconstruction.
+#[derive(Clone, Copy, Debug)]
+pub struct ReconstructionGuess<'a> {
+    /// Orientation of every view in any common frame.
+    pub rotations: &'a [UnitQuaternion<f64>],
+    /// Standard deviation of the turns between them, in radians.
+    pub sigma_rad: f64,
+    /// Starts the random samples.
+    pub seed: u64,
+}
+
+/// Poses of views up to scale, in the frame of the first one that was placed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reconstruction {
+    /// Which of the views were placed, rising.
+    pub views: Vec<usize>,
+    /// `first_camera_from_camera`, one per placed view.
+    pub poses: Vec<RigidTransform>,
+    /// Root mean square angle error of a bearing's coordinate, in radians.
+    pub rms_rad: f64,
+}
+
+/// Reconstructs views of one camera from their features (step 3 of this module's list), `None` when too few of them or of
+/// their landmarks could be placed, or when they show too little parallax.
+///
+/// The limits are those of `options`.
+pub fn reconstruct_views(
+    views: &[&[TrackedFeature]],
+    guess: &ReconstructionGuess<'_>,
+    options: &InitializationOptions,
+) -> Option<Reconstruction> {
+    let tracks = collect_tracks(views);
+    let pairs = rank_pairs(&tracks, guess.rotations, options.least_common_features);
+    if pairs.first()?.fit.median_parallax_rad < options.least_parallax_rad {
+        return None;
+    }
+    let limits = StructureLimits {
+        bearing_sigma_rad: options.bearing_sigma_rad,
+        rotation_sigma_rad: guess.sigma_rad,
+        least_landmarks: options.least_landmarks,
+        least_views: options.least_views,
+        least_inlier_share: options.least_inlier_share,
+        seed: guess.seed,
+    };
+    let structure = reconstruct(&tracks, &pairs, guess.rotations, &limits).ok()?;
+    let fits = structure.rms_rad <= options.most_reprojection_sigmas * options.bearing_sigma_rad;
+    fits.then_some(Reconstruction { views: structure.views, poses: structure.poses, rms_rad: structure.rms_rad })
+}
