@@ -13,6 +13,7 @@
 //! | [`frontend`] | image in, feature tracks out | the estimator, so that runs share tracks |
 //! | [`estimator`] | window state, residuals, solver, marginalization; each step leaves a `StepReport` | files, screens, the wall clock |
 //! | [`observability`] | a linearization with named columns in, ranks and null directions out | how it was made |
+//! | [`calibration`] | a whole flight of both cameras in, the offline calibration of mount and gimbal out | logs, files |
 //! | [`session`] | a cursor over a log, runs side by side, stored reports | pixels on a screen |
 //! | `gui` | panels, 3D scene, theme: reads reports, sends commands | the inside of the estimator |
 //! | [`export`] | the same tables and panels without a window | windows |
@@ -21,6 +22,7 @@
 //! [`flight_log`], [`export`] and `main.rs` touch the file system, and only `gui` asks the wall clock for anything but
 //! the stage timings of a report.
 
+pub mod calibration;
 pub mod camera;
 pub mod estimator;
 pub mod export;

@@ -1,0 +1,356 @@
+//! The bundle: both cameras' sightings, the inertial samples between the instants, encoder readings and priors.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{DMatrix, DVector, Matrix6, Vector3, Vector6};
+
+use super::arrow::ArrowMatrix;
+use super::chain_prior::ChainTerm;
+use super::landmark::ViewPose;
+use super::state::{Camera, Columns, Estimate, ViewId, ViewMap};
+use super::timeline::Instant;
+use super::visual::{PixelModel, ReducedEquations, Track, VisualEquations};
+use crate::estimator::NavigationState;
+use crate::estimator::imu_factor;
+use crate::estimator::preintegration::Vector15;
+use crate::geometry::{RigidTransform, so3, wrap_angle};
+
+/// Standard deviation of the first position, which only fixes where the map lies, in metres.
+const GAUGE_SIGMA_M: f64 = 1e-3;
+/// Standard deviation of the first heading, which only fixes how the map is turned, in radians.
+const GAUGE_SIGMA_RAD: f64 = 1e-4;
+
+/// What is known beforehand besides the chain.
+#[derive(Clone, Debug)]
+pub(super) struct Priors {
+    /// The gimbal's chain.
+    pub(super) chain: ChainTerm,
+    /// The static camera's pose on the IMU.
+    pub(super) mount: RigidTransform,
+    /// Its standard deviations per axis, in metres and radians.
+    pub(super) mount_sigmas: (f64, f64),
+    pub(super) time_shift_sigma_s: f64,
+    /// Of the biases about zero at the first instant, in rad/s and m/s².
+    pub(super) bias_sigmas: (f64, f64),
+    /// Where the first instant lies on the map.
+    pub(super) first: NavigationState,
+}
+
+/// A bundle to be adjusted.
+#[derive(Clone, Debug)]
+pub(super) struct Bundle<'a> {
+    pub(super) columns: Columns,
+    pub(super) instants: &'a [Instant],
+    pub(super) gravity_in_world: Vector3<f64>,
+    pub(super) priors: &'a Priors,
+    pub(super) pixels: PixelModel<'a>,
+    pub(super) tracks: &'a [Track],
+}
+
+/// What a reading says about its joint, and through the gimbal camera's time shift about that.
+struct EncoderEquation {
+    /// Of the band.
+    column: usize,
+    information: f64,
+    /// `q − reading`.
+    residual: f64,
+    /// How fast the reading changes, in rad/s.
+    rate: f64,
+}
+
+/// Normal equations without the visual factors' part of the view poses.
+pub(super) struct BundleEquations {
+    visual: VisualEquations,
+    maps: BTreeMap<ViewId, ViewMap>,
+    /// Rows that touch one or two neighbouring instants.
+    inertial: Vec<(usize, DMatrix<f64>, Vector15)>,
+    encoders: Vec<EncoderEquation>,
+    /// Blocks on the first instant: columns within it, rows, residuals.
+    first: (DMatrix<f64>, DVector<f64>),
+    border_hessian: DMatrix<f64>,
+    border_gradient: DVector<f64>,
+}
+
+impl Bundle<'_> {
+    /// Views that take part: those with a sighting.
+    fn views(&self) -> Vec<ViewId> {
+        let mut views: Vec<ViewId> =
+            self.tracks.iter().flat_map(|track| track.sightings.iter().map(|sighting| sighting.view)).collect();
+        views.sort_unstable();
+        views.dedup();
+        views
+    }
+
+    /// Poses of all views that take part.
+    pub(super) fn poses(&self, estimate: &Estimate) -> BTreeMap<ViewId, ViewPose> {
+        let pose = |view: ViewId| (view, estimate.view(view, self.instants, &self.gravity_in_world));
+        self.views().into_iter().map(pose).collect()
+    }
+
+    /// Twice the cost.
+    pub(super) fn cost(&self, estimate: &Estimate) -> f64 {
+        let mut cost = self.pixels.cost(&self.poses(estimate), self.tracks, &estimate.landmarks);
+        for instant in 1..self.instants.len() {
+            if let Some(residual) = self.inertial_residual(instant, estimate) {
+                cost += residual.norm_squared();
+            }
+        }
+        for (_, information, residual) in self.encoder_terms(estimate) {
+            cost += residual * residual * information;
+        }
+        cost += self.first_rows(estimate).1.norm_squared();
+        cost + self.border_rows(estimate).1.norm_squared()
+    }
+
+    fn inertial_residual(&self, instant: usize, estimate: &Estimate) -> Option<Vector15> {
+        let (motion, information) = self.instants[instant].motion.as_ref()?;
+        let (from, to) = (&estimate.navigation[instant - 1], &estimate.navigation[instant]);
+        Some(information * imu_factor::residual(motion, from, to, &self.gravity_in_world))
+    }
+
+    /// `(instant and joint, 1/σ², q − reading)` of every encoder reading, the reading carried along by the time shift.
+    fn encoder_terms<'s>(&'s self, estimate: &'s Estimate) -> impl Iterator<Item = ((usize, usize), f64, f64)> + 's {
+        let shift_s = estimate.shifts_s[1];
+        self.instants
+            .iter()
+            .enumerate()
+            .filter_map(|(index, instant)| Some((index, instant.gimbal.as_ref()?)))
+            .flat_map(move |(index, gimbal)| {
+                let angles = &estimate.joints_rad[index];
+                let encoder = &gimbal.encoder;
+                let readings = encoder.angles_rad.iter().zip(&encoder.sigmas_rad).zip(&gimbal.reading_rate_rad_per_s);
+                angles.iter().zip(readings).enumerate().map(move |(joint, (angle, ((reading, sigma), rate)))| {
+                    ((index, joint), 1.0 / (sigma * sigma), wrap_angle(angle - reading - rate * shift_s))
+                })
+            })
+    }
+
+    /// Rows on the first instant's navigation state: position and heading of the map, biases.
+    fn first_rows(&self, estimate: &Estimate) -> (DMatrix<f64>, DVector<f64>) {
+        let (state, first) = (&estimate.navigation[0], &self.priors.first);
+        let (gyroscope, accelerometer) = self.priors.bias_sigmas;
+        let mut rows = DMatrix::zeros(10, 15);
+        let mut residual = DVector::zeros(10);
+        let turn = so3::log(&(first.world_from_imu.rotation.inverse() * state.world_from_imu.rotation));
+        // The vertical in the first instant's own axes.
+        let vertical: Vector3<f64> = first.world_from_imu.rotation.inverse() * Vector3::z();
+        let heading = vertical.transpose() * so3::right_jacobian_inverse(&turn);
+        rows.fixed_view_mut::<1, 3>(0, 0).copy_from(&(heading / GAUGE_SIGMA_RAD));
+        residual[0] = vertical.dot(&turn) / GAUGE_SIGMA_RAD;
+        let shift = state.world_from_imu.translation_m - first.world_from_imu.translation_m;
+        for axis in 0..3 {
+            rows[(1 + axis, 3 + axis)] = 1.0 / GAUGE_SIGMA_M;
+            residual[1 + axis] = shift[axis] / GAUGE_SIGMA_M;
+            rows[(4 + axis, 9 + axis)] = 1.0 / gyroscope;
+            residual[4 + axis] = state.bias.gyroscope_rad_per_s[axis] / gyroscope;
+            rows[(7 + axis, 12 + axis)] = 1.0 / accelerometer;
+            residual[7 + axis] = state.bias.accelerometer_m_per_s2[axis] / accelerometer;
+        }
+        (rows, residual)
+    }
+
+    /// Rows of the priors on what all instants share.
+    fn border_rows(&self, estimate: &Estimate) -> (DMatrix<f64>, DVector<f64>) {
+        let columns = &self.columns;
+        let count = columns.borders();
+        let (mut rows, mut residual) = (DMatrix::zeros(count, count), DVector::zeros(count));
+        let (translation_m, rotation_rad) = self.priors.mount_sigmas;
+        let change = estimate.mount.minus(&self.priors.mount);
+        let turn: Vector3<f64> = change.fixed_rows::<3>(0).into_owned();
+        rows.fixed_view_mut::<3, 3>(0, 0).copy_from(&(so3::right_jacobian_inverse(&turn) / rotation_rad));
+        residual.fixed_rows_mut::<3>(0).copy_from(&(turn / rotation_rad));
+        for axis in 3..6 {
+            rows[(axis, axis)] = 1.0 / translation_m;
+            residual[axis] = change[axis] / translation_m;
+        }
+        for (column, shift_s) in
+            [(Columns::STATIC_SHIFT, estimate.shifts_s[0]), (columns.gimbal_shift(), estimate.shifts_s[1])]
+        {
+            rows[(column, column)] = 1.0 / self.priors.time_shift_sigma_s;
+            residual[column] = shift_s / self.priors.time_shift_sigma_s;
+        }
+        let chain = Columns::CHAIN..columns.gimbal_shift();
+        rows.view_range_mut(chain.clone(), chain.clone()).copy_from(self.priors.chain.jacobian());
+        residual.rows_range_mut(chain).copy_from(&self.priors.chain.residual(&estimate.chain));
+        (rows, residual)
+    }
+
+    /// The information of the priors on the border.
+    pub(super) fn border_prior_information(&self, estimate: &Estimate) -> DMatrix<f64> {
+        let (rows, _) = self.border_rows(estimate);
+        rows.tr_mul(&rows)
+    }
+
+    /// Linearizes every factor.
+    pub(super) fn linearize(&self, estimate: &Estimate) -> BundleEquations {
+        let poses = self.poses(estimate);
+        let map = |view: ViewId| (view, estimate.view_map(view, &self.columns, self.instants, &self.gravity_in_world));
+        let maps: BTreeMap<ViewId, ViewMap> = poses.keys().map(|view| map(*view)).collect();
+        let (border_rows, border_residual) = self.border_rows(estimate);
+        let mut equations = BundleEquations {
+            visual: VisualEquations::new(&self.pixels, &poses, self.tracks, &estimate.landmarks),
+            maps,
+            inertial: Vec::with_capacity(self.instants.len()),
+            encoders: Vec::new(),
+            first: self.first_rows(estimate),
+            border_hessian: border_rows.tr_mul(&border_rows),
+            border_gradient: border_rows.tr_mul(&border_residual),
+        };
+        for instant in 1..self.instants.len() {
+            let Some(residual) = self.inertial_residual(instant, estimate) else { continue };
+            let Some((motion, information)) = &self.instants[instant].motion else { continue };
+            let (from, to) = (&estimate.navigation[instant - 1], &estimate.navigation[instant]);
+            let (by_from, by_to) = imu_factor::jacobians(motion, from, to, &self.gravity_in_world);
+            let mut rows = DMatrix::zeros(15, 30);
+            rows.fixed_columns_mut::<15>(0).copy_from(&(information * by_from));
+            rows.fixed_columns_mut::<15>(15).copy_from(&(information * by_to));
+            equations.inertial.push((instant, rows, residual));
+        }
+        for ((instant, joint), information, residual) in self.encoder_terms(estimate) {
+            equations.encoders.push(EncoderEquation {
+                column: instant * self.columns.block() + Columns::joint(joint),
+                information,
+                residual,
+                rate: self.instants[instant].gimbal.as_ref().map_or(0.0, |g| g.reading_rate_rad_per_s[joint]),
+            });
+        }
+        equations
+    }
+
+    /// Column of the band of an entry of a navigation state.
+    fn navigation_column(&self, instant: usize, entry: usize) -> usize {
+        instant * self.columns.block() + self.columns.navigation(entry)
+    }
+
+    /// Most instants between two sightings of one landmark, at least one for the inertial factors.
+    fn reach(&self) -> usize {
+        let span = |track: &Track| match (track.sightings.first(), track.sightings.last()) {
+            (Some(first), Some(last)) => last.view.instant() - first.view.instant(),
+            _ => 0,
+        };
+        self.tracks.iter().map(span).max().unwrap_or(0).max(1)
+    }
+
+    /// The reduced normal equations and their right side `−gradient`.
+    pub(super) fn assemble(
+        &self,
+        equations: &BundleEquations,
+        reduced: &ReducedEquations,
+    ) -> (ArrowMatrix, Vec<f64>, DVector<f64>) {
+        let columns = &self.columns;
+        let mut matrix =
+            ArrowMatrix::zeros(columns.band(), (self.reach() + 1) * columns.block() - 1, columns.borders());
+        let mut band = vec![0.0; columns.band()];
+        let mut border = -&equations.border_gradient;
+        *matrix.corner_mut() += &equations.border_hessian;
+        for (instant, rows, residual) in &equations.inertial {
+            let column = |entry: usize| self.navigation_column(instant - 1 + entry / 15, entry % 15);
+            let hessian = rows.tr_mul(rows);
+            let gradient = rows.tr_mul(residual);
+            for a in 0..30 {
+                band[column(a)] -= gradient[a];
+                for b in 0..30 {
+                    matrix.add(column(a), column(b), hessian[(a, b)]);
+                }
+            }
+        }
+        let shift = columns.gimbal_shift();
+        for encoder in &equations.encoders {
+            let EncoderEquation { column, information, residual, rate } = *encoder;
+            matrix.add(column, column, information);
+            matrix.add_border(shift, column, -rate * information);
+            matrix.corner_mut()[(shift, shift)] += rate * rate * information;
+            band[column] -= information * residual;
+            border[shift] += rate * information * residual;
+        }
+        let (rows, residual) = &equations.first;
+        let (hessian, gradient) = (rows.tr_mul(rows), rows.tr_mul(residual));
+        for a in 0..15 {
+            band[self.navigation_column(0, a)] -= gradient[a];
+            for b in 0..15 {
+                matrix.add(self.navigation_column(0, a), self.navigation_column(0, b), hessian[(a, b)]);
+            }
+        }
+        for (view, gradient) in &reduced.gradient {
+            let map = &equations.maps[view];
+            let start = view.instant() * columns.block();
+            for (offset, value) in map.own.tr_mul(gradient).iter().enumerate() {
+                band[start + offset] -= value;
+            }
+            border -= map.shared.tr_mul(gradient);
+        }
+        for ((first, second), block) in &reduced.hessian {
+            self.add_pair(&mut matrix, (*first, &equations.maps[first]), (*second, &equations.maps[second]), block);
+        }
+        (matrix, band, border)
+    }
+
+    /// Carries the block of two view poses (`first ≤ second`) on to the unknowns.
+    fn add_pair(
+        &self,
+        matrix: &mut ArrowMatrix,
+        (first, first_map): (ViewId, &ViewMap),
+        (second, second_map): (ViewId, &ViewMap),
+        block: &Matrix6<f64>,
+    ) {
+        let size = self.columns.block();
+        let (at_first, at_second) = (first.instant() * size, second.instant() * size);
+        let right = block * &second_map.own;
+        let own = first_map.own.tr_mul(&right);
+        let shared_right = block * &second_map.shared;
+        let corner = first_map.shared.tr_mul(&shared_right);
+        let by_second = first_map.shared.tr_mul(&right);
+        let by_first = first_map.own.tr_mul(&shared_right);
+        for a in 0..own.nrows() {
+            for b in 0..own.ncols() {
+                // Rows of the later instant; within one instant the lower triangle, both orders of a mixed pair.
+                matrix.add(at_second + b, at_first + a, own[(a, b)]);
+                if first != second && at_first == at_second {
+                    matrix.add(at_first + a, at_second + b, own[(a, b)]);
+                }
+            }
+        }
+        for border in 0..by_second.nrows() {
+            for b in 0..by_second.ncols() {
+                matrix.add_border(border, at_second + b, by_second[(border, b)]);
+            }
+            if first != second {
+                for a in 0..by_first.nrows() {
+                    matrix.add_border(border, at_first + a, by_first[(a, border)]);
+                }
+            }
+        }
+        *matrix.corner_mut() += &corner;
+        if first != second {
+            *matrix.corner_mut() += corner.transpose();
+        }
+    }
+
+    /// Steps of the view poses that belong to a step of the unknowns.
+    pub(super) fn view_steps(
+        &self,
+        equations: &BundleEquations,
+        band: &[f64],
+        border: &DVector<f64>,
+    ) -> BTreeMap<ViewId, Vector6<f64>> {
+        let own = self.columns.own();
+        let step = |(view, map): (&ViewId, &ViewMap)| {
+            let start = view.instant() * self.columns.block();
+            let moved = &map.own * DVector::from_column_slice(&band[start..start + own]) + &map.shared * border;
+            (*view, Vector6::from_column_slice(moved.as_slice()))
+        };
+        equations.maps.iter().map(step).collect()
+    }
+}
+
+impl BundleEquations {
+    /// The visual part.
+    pub(super) fn visual(&self) -> &VisualEquations {
+        &self.visual
+    }
+}
+
+/// The gimbal camera's view of an instant.
+pub(super) fn gimbal_view(instant: usize) -> ViewId {
+    ViewId::new(instant, Camera::Gimbal)
+}

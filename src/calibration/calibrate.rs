@@ -1,0 +1,346 @@
+//! The calibration from beginning to end.
+
+use nalgebra::{DMatrix, DVector, Vector3};
+
+use super::bundle::{Priors, gimbal_view};
+use super::chain_prior::{self, ChainTerm};
+use super::outcome::{
+    CalibratedParameter, CalibrationOutcome, InertialReport, MountReport, PixelReport, PoseLoopReport,
+};
+use super::pose_loop::{PoseLoopSolution, PoseLoops, paired};
+use super::rounds::{Stage, StageResult};
+use super::segments::{self, Segment, SegmentCounts};
+use super::state::{Camera, Columns, Estimate};
+use super::statistics::Statistics;
+use super::timeline::{Instant, instants};
+use super::{CalibrationError, CalibrationInput, CalibrationOptions, observations, trajectory};
+use crate::estimator::{ColumnBlock, ColumnGroup, Linearization, gravity_in_world, imu_factor};
+use crate::flight_log::JointAngles;
+use crate::geometry::seconds_from_ns;
+use crate::gimbal::Chain;
+use crate::observability::{RankReport, analyse};
+
+/// Names of the steps, for messages.
+const ALONE: &str = "camera-IMU calibration";
+const LOOPS: &str = "pose loops";
+const BOTH: &str = "bundle of both cameras";
+
+fn singular(stage: &'static str) -> CalibrationError {
+    CalibrationError::Singular { stage }
+}
+
+/// How far a calibration is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CalibrationProgress {
+    /// What is being done.
+    pub stage: &'static str,
+    /// Share of the whole, 0 to 1.
+    pub share: f64,
+}
+
+/// Calibrates static camera and gimbal from a flight: camera–IMU first, then the pose loops, then the pixels of both
+/// cameras together.
+///
+/// # Errors
+/// When the flight cannot tell: no trajectory, no moving joint, too few pairs of camera poses.
+pub fn calibrate(
+    input: &CalibrationInput,
+    options: &CalibrationOptions,
+    on_progress: &mut dyn FnMut(CalibrationProgress),
+) -> Result<CalibrationOutcome, CalibrationError> {
+    let mut tell = |stage: &'static str, share: f64| on_progress(CalibrationProgress { stage, share });
+    let images = input.static_camera.views.len().max(1) as f64;
+    let states = trajectory::fly(&input.static_camera, &input.estimator, &mut |place| {
+        tell("flying the static camera", 0.5 * place as f64 / images);
+    })?;
+    let (mut instants, navigation) = instants(input, options, &states);
+    let stretch_ns = stretch(&instants);
+    check_joint_motion(input, options, &instants, stretch_ns)?;
+
+    let priors = priors(input, options, &navigation);
+    let stage = |name: &'static str| Stage {
+        name,
+        cameras: [&input.static_camera.model, &input.gimbal_camera.model],
+        gravity_in_world: gravity_in_world(input.gravity_m_per_s2),
+        priors: &priors,
+        options,
+    };
+    let joints = input.gimbal_camera.chain.joint_count();
+    let first = Estimate {
+        joints_rad: instants
+            .iter()
+            .map(|instant| {
+                instant.gimbal.as_ref().map_or_else(|| vec![0.0; joints], |gimbal| gimbal.encoder.angles_rad.clone())
+            })
+            .collect(),
+        navigation,
+        mount: input.static_camera.imu_from_camera,
+        shifts_s: [0.0; 2],
+        chain: priors.chain.given.clone(),
+        landmarks: Vec::new(),
+    };
+    let static_tracks = observations::collect(input, options, &instants, Camera::Static, &|_| true);
+    let alone = stage(ALONE).run(&mut instants, &static_tracks, first, &mut |round| {
+        tell("calibrating the static camera", 0.5 + 0.05 * round as f64);
+    })?;
+
+    tell("reconstructing the gimbal camera's poses", 0.7);
+    let (segments, counts) = segments::reconstruct(input, options, &instants, &alone.estimate);
+    check_measurements(options, &segments, counts, stretch_ns)?;
+    tell("closing the pose loops", 0.75);
+    let (loops, gaps_m) = close_loops(input, &priors, &instants, &segments, &alone.estimate)?;
+
+    let mut start = alone.estimate.clone();
+    start.chain = loops.chain.clone();
+    let mut measured = vec![false; instants.len()];
+    for (segment, joints_rad) in segments.iter().zip(&loops.joints_rad) {
+        for (&instant, angles) in segment.instants.iter().zip(joints_rad) {
+            start.joints_rad[instant].clone_from(angles);
+            measured[instant] = true;
+        }
+    }
+    let mut tracks = static_tracks;
+    tracks.extend(observations::collect(input, options, &instants, Camera::Gimbal, &|instant| measured[instant]));
+    tracks.sort_by_key(|track| track.sightings[0].view);
+    let both = stage(BOTH).run(&mut instants, &tracks, start, &mut |round| {
+        tell("adjusting both cameras together", 0.8 + 0.05 * round as f64);
+    })?;
+
+    let visited_rad: Vec<Vec<f64>> =
+        measured.iter().zip(&both.estimate.joints_rad).filter(|(used, _)| **used).map(|(_, q)| q.clone()).collect();
+    let columns = both.columns();
+    let chain_sigmas = |place: usize| both.covariance[(Columns::CHAIN + place, Columns::CHAIN + place)].max(0.0).sqrt();
+    let pixels = |result: &StageResult, camera: Camera| pixel_report(input, result, camera);
+    Ok(CalibrationOutcome {
+        stretch_ns,
+        instants: instants.len(),
+        mount_alone: mount_report(input, &alone),
+        static_pixels: pixels(&alone, Camera::Static).ok_or_else(|| singular(ALONE))?,
+        pose_loop: PoseLoopReport {
+            segments: segments.len(),
+            pairs: segments.iter().map(|segment| segment.instants.len()).sum(),
+            fitting: loops.weights.iter().flatten().filter(|weight| **weight >= 0.5).count(),
+            gaps_m,
+            position_sigma_m: loops.position_sigma_m,
+            chain: loops.chain.to_classical(),
+            sigmas: loops.covariance.diagonal().iter().map(|variance| variance.max(0.0).sqrt()).collect(),
+            iterations: loops.iterations,
+        },
+        mount: mount_report(input, &both),
+        gimbal_time_shift_s: (
+            both.estimate.shifts_s[1],
+            both.covariance[(columns.gimbal_shift(), columns.gimbal_shift())].max(0.0).sqrt(),
+        ),
+        chain: both.estimate.chain.to_classical(),
+        given_chain: input.gimbal_camera.chain.clone(),
+        parameterization: both.estimate.chain.parameterization().name(),
+        parameters: parameters(&priors.chain, &both.estimate.chain, &chain_sigmas),
+        pixels: [
+            pixels(&both, Camera::Static).ok_or_else(|| singular(BOTH))?,
+            pixels(&both, Camera::Gimbal).ok_or_else(|| singular(BOTH))?,
+        ],
+        iterations: [alone.iterations, both.iterations],
+        inertial: inertial_report(input, &instants, &both.estimate).ok_or_else(|| singular(BOTH))?,
+        rank: rank(&both, &visited_rad),
+        warnings: warnings(counts, &segments, &instants),
+        visited_rad,
+    })
+}
+
+fn stretch(instants: &[Instant]) -> (i64, i64) {
+    (instants.first().map_or(0, |first| first.stamp_ns), instants.last().map_or(0, |last| last.stamp_ns))
+}
+
+/// A joint moves when its readings spread by more than their noise and the limit explain.
+fn check_joint_motion(
+    input: &CalibrationInput,
+    options: &CalibrationOptions,
+    instants: &[Instant],
+    (from_ns, to_ns): (i64, i64),
+) -> Result<(), CalibrationError> {
+    let gimbal = &input.gimbal_camera;
+    let readings: Vec<&Vec<f64>> =
+        instants.iter().filter_map(|instant| Some(&instant.gimbal.as_ref()?.encoder.angles_rad)).collect();
+    let count = readings.len().max(1) as f64;
+    let noise = segments::encoder_sigma_rad(instants).powi(2);
+    // The variance of the readings is itself uncertain by this much.
+    let doubt = 3.0 * noise * (2.0 / count).sqrt();
+    let mut moving = false;
+    let mut spreads = Vec::new();
+    for (joint, name) in gimbal.joints.iter().enumerate() {
+        let angles: Vec<f64> = readings.iter().filter_map(|reading| reading.get(joint).copied()).collect();
+        let variance = Statistics::of(&angles).map_or(0.0, |statistics| statistics.std.powi(2));
+        moving |= variance - noise > options.least_joint_motion_rad.powi(2) + doubt;
+        spreads.push(format!("{name} {:.1}°", (variance - noise).max(0.0).sqrt().to_degrees()));
+    }
+    if moving || readings.is_empty() {
+        return Ok(());
+    }
+    Err(CalibrationError::NoJointMotion {
+        limit_deg: options.least_joint_motion_rad.to_degrees(),
+        from_s: seconds_from_ns(from_ns),
+        to_s: seconds_from_ns(to_ns),
+        spreads: spreads.join(", "),
+    })
+}
+
+fn check_measurements(
+    options: &CalibrationOptions,
+    segments: &[Segment],
+    counts: SegmentCounts,
+    (from_ns, to_ns): (i64, i64),
+) -> Result<(), CalibrationError> {
+    let found: usize = segments.iter().map(|segment| segment.instants.len()).sum();
+    if found >= options.least_measurements {
+        return Ok(());
+    }
+    let SegmentCounts { offered, broken, unsolved } = counts;
+    Err(CalibrationError::TooFewMeasurements {
+        found,
+        needed: options.least_measurements,
+        from_s: seconds_from_ns(from_ns),
+        to_s: seconds_from_ns(to_ns),
+        reason: format!(
+            "of {offered} instants with a gimbal image and encoder readings {broken} had too few common features and \
+             {unsolved} too little parallax"
+        ),
+    })
+}
+
+fn priors(
+    input: &CalibrationInput,
+    options: &CalibrationOptions,
+    navigation: &[crate::estimator::NavigationState],
+) -> Priors {
+    Priors {
+        chain: ChainTerm::new(&input.gimbal_camera.chain, &input.gimbal_camera.prior),
+        mount: input.static_camera.imu_from_camera,
+        mount_sigmas: chain_prior::sigmas(&input.static_camera.prior),
+        time_shift_sigma_s: options.time_shift_sigma_s,
+        bias_sigmas: options.bias_sigmas,
+        first: navigation.first().copied().unwrap_or_default(),
+    }
+}
+
+/// The pose loops, and the lengths of the gaps that they leave.
+fn close_loops(
+    input: &CalibrationInput,
+    priors: &Priors,
+    instants: &[Instant],
+    segments: &[Segment],
+    estimate: &Estimate,
+) -> Result<(PoseLoopSolution, Statistics), CalibrationError> {
+    let gravity = gravity_in_world(input.gravity_m_per_s2);
+    let pairs =
+        paired(segments, &|instant| estimate.world_from_imu(gimbal_view(instant), instants, &gravity), &|instant| {
+            let none =
+                || JointAngles { angles_rad: Vec::new(), sigmas_rad: Vec::new(), lasting_sigmas_rad: Vec::new() };
+            instants[instant].gimbal.as_ref().map_or_else(none, |gimbal| gimbal.encoder.clone())
+        });
+    let loops = PoseLoops { segments: &pairs, prior: &priors.chain };
+    let solution = loops.solve().ok_or_else(|| singular(LOOPS))?;
+    let gaps = Statistics::of(&loops.gaps_m(&solution)).ok_or_else(|| singular(LOOPS))?;
+    Ok((solution, gaps))
+}
+
+fn mount_report(input: &CalibrationInput, result: &StageResult) -> MountReport {
+    let sigma = |column: usize| result.covariance[(column, column)].max(0.0).sqrt();
+    MountReport {
+        initial: input.static_camera.imu_from_camera,
+        imu_from_camera: result.estimate.mount,
+        sigmas: std::array::from_fn(|axis| sigma(Columns::MOUNT + axis)),
+        time_shift_s: (result.estimate.shifts_s[0], sigma(Columns::STATIC_SHIFT)),
+    }
+}
+
+fn parameters(prior: &ChainTerm, chain: &Chain, sigma: &dyn Fn(usize) -> f64) -> Vec<CalibratedParameter> {
+    let (initial, values) = (prior.given.values(), chain.values());
+    let units = chain.parameter_units();
+    chain
+        .parameter_names()
+        .into_iter()
+        .enumerate()
+        .map(|(place, name)| CalibratedParameter {
+            name,
+            unit: units[place],
+            initial: initial[place],
+            value: values[place],
+            sigma: sigma(place),
+            prior_sigma: prior.prior_sigmas[place],
+        })
+        .collect()
+}
+
+fn pixel_report(input: &CalibrationInput, result: &StageResult, camera: Camera) -> Option<PixelReport> {
+    let which = usize::from(camera == Camera::Gimbal);
+    let sees = |track: &&super::visual::Track| track.sightings.iter().any(|sighting| sighting.view.camera() == camera);
+    Some(PixelReport {
+        camera: [&input.static_camera.key, &input.gimbal_camera.key][which].clone(),
+        landmarks: result.tracks.iter().filter(sees).count(),
+        residuals_px: Statistics::of(&result.residuals_px[which])?,
+        sigma_px: result.sigma_px[which],
+    })
+}
+
+/// Rotation and velocity residuals of the intervals over their length.
+fn inertial_report(input: &CalibrationInput, instants: &[Instant], estimate: &Estimate) -> Option<InertialReport> {
+    let gravity: Vector3<f64> = gravity_in_world(input.gravity_m_per_s2);
+    let (mut gyroscope, mut accelerometer) = (Vec::new(), Vec::new());
+    for index in 1..instants.len() {
+        let Some((motion, _)) = &instants[index].motion else { continue };
+        let residual =
+            imu_factor::residual(motion, &estimate.navigation[index - 1], &estimate.navigation[index], &gravity);
+        gyroscope.push(residual.fixed_rows::<3>(0).norm() / motion.duration_s());
+        accelerometer.push(residual.fixed_rows::<3>(6).norm() / motion.duration_s());
+    }
+    Some(InertialReport {
+        gyroscope_rad_per_s: Statistics::of(&gyroscope)?,
+        accelerometer_m_per_s2: Statistics::of(&accelerometer)?,
+    })
+}
+
+/// Ranks of the chain over the whole flight, everything else eliminated.
+fn rank(result: &StageResult, visited_rad: &[Vec<f64>]) -> Option<RankReport> {
+    let chain = &result.estimate.chain;
+    let count = chain.dof();
+    let place = (Columns::CHAIN, Columns::CHAIN);
+    let block = |matrix: &DMatrix<f64>| matrix.view(place, (count, count)).into_owned();
+    // Beside the chain the border holds mount and time offsets: marginal information of the chain is the inverse of its
+    // covariance.
+    let with_priors = block(&result.covariance).cholesky()?.inverse();
+    let priors = block(&result.prior_information);
+    let measured = &with_priors - &priors;
+    let square_root = |matrix: DMatrix<f64>| {
+        let eigen = matrix.symmetric_eigen();
+        let roots = eigen.eigenvalues.map(|value| value.max(0.0).sqrt());
+        DMatrix::from_diagonal(&roots) * eigen.eigenvectors.transpose()
+    };
+    let names = chain.parameter_names();
+    let linearization = Linearization {
+        columns: names
+            .into_iter()
+            .enumerate()
+            .map(|(start, name)| ColumnBlock { group: ColumnGroup::Calibration, name, start, len: 1 })
+            .collect(),
+        calibration_column_norms: DVector::from_fn(count, |k, _| measured[(k, k)].max(0.0).sqrt()),
+        jacobian: square_root(measured),
+        prior_jacobian: square_root(priors),
+    };
+    analyse(&linearization, chain, visited_rad, false)
+}
+
+fn warnings(counts: SegmentCounts, segments: &[Segment], instants: &[Instant]) -> Vec<String> {
+    let mut warnings = Vec::new();
+    let used: usize = segments.iter().map(|segment| segment.instants.len()).sum();
+    let missing = instants.len() - counts.offered;
+    if missing > 0 {
+        warnings.push(format!("{missing} of {} instants have no gimbal image with encoder readings", instants.len()));
+    }
+    if 2 * used < counts.offered {
+        warnings.push(format!(
+            "only {used} of {} gimbal images could be measured: {} had too few common features, {} too little parallax",
+            counts.offered, counts.broken, counts.unsolved
+        ));
+    }
+    warnings
+}

@@ -1,0 +1,59 @@
+//! What the rig says about the chain, as a least-squares term on its minimal form.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::flight_log::rig::ChainPrior;
+use crate::gimbal::{Chain, ClassicalChain, auto_parameterization};
+
+/// Standard deviation of a uniform error within ±1.
+const SIGMA_PER_BOUND: f64 = 0.577_350_269_189_625_8;
+/// Variance added to every column, so that one that the prior fixes entirely leaves the covariance regular.
+const LEAST_VARIANCE: f64 = 1e-12;
+
+/// Standard deviations (m, rad) of errors that are uniform within bounds.
+pub(super) fn sigmas(prior: &ChainPrior) -> (f64, f64) {
+    (prior.translation_bound_m * SIGMA_PER_BOUND, prior.rotation_bound_rad * SIGMA_PER_BOUND)
+}
+
+/// The given chain in the minimal chart that suits it, and how wrong it may be.
+#[derive(Clone, Debug)]
+pub(super) struct ChainTerm {
+    pub(super) given: Chain,
+    /// Prior standard deviation of each column.
+    pub(super) prior_sigmas: DVector<f64>,
+    /// `W` with `WᵀW` the inverse of the prior covariance.
+    square_root_information: DMatrix<f64>,
+}
+
+impl ChainTerm {
+    pub(super) fn new(classical: &ClassicalChain, prior: &ChainPrior) -> Self {
+        let given = Chain::from_classical(classical, auto_parameterization(classical));
+        let (translation_m, rotation_rad) = sigmas(prior);
+        let mut covariance = given.prior_covariance(classical, translation_m, rotation_rad);
+        for k in 0..covariance.nrows() {
+            covariance[(k, k)] += LEAST_VARIANCE;
+        }
+        let prior_sigmas = covariance.diagonal().map(f64::sqrt);
+        let dof = given.dof();
+        let square_root_information = covariance
+            .cholesky()
+            .and_then(|factor| factor.l().solve_lower_triangular(&DMatrix::identity(dof, dof)))
+            .unwrap_or_else(|| DMatrix::from_diagonal(&prior_sigmas.map(|sigma| 1.0 / sigma)));
+        Self { given, prior_sigmas, square_root_information }
+    }
+
+    /// Whitened deviation from the given chain; every column of a minimal form is a plain number.
+    pub(super) fn residual(&self, chain: &Chain) -> DVector<f64> {
+        &self.square_root_information * chain.minus(&self.given)
+    }
+
+    /// Derivative of the residual by a step.
+    pub(super) fn jacobian(&self) -> &DMatrix<f64> {
+        &self.square_root_information
+    }
+
+    /// `WᵀW`.
+    pub(super) fn information(&self) -> DMatrix<f64> {
+        self.square_root_information.tr_mul(&self.square_root_information)
+    }
+}

@@ -1,0 +1,113 @@
+//! From the front ends' tracks to the bundle's: which landmark was seen at which instants.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Vector3;
+
+use super::landmark::{self, Landmark, ViewPose};
+use super::state::{Camera, ViewId};
+use super::timeline::Instant;
+use super::visual::{PixelModel, Sighting, Track};
+use super::{CalibrationInput, CalibrationOptions};
+use crate::frontend::{FeatureId, TrackedFrame};
+
+/// What a camera saw at an instant.
+pub(super) fn tracked<'a>(input: &'a CalibrationInput, instant: &Instant, camera: Camera) -> Option<&'a TrackedFrame> {
+    match camera {
+        Camera::Static => Some(&input.static_camera.views[instant.static_view].tracks),
+        Camera::Gimbal => instant.gimbal.as_ref().map(|gimbal| &*input.gimbal_camera.views[gimbal.view].tracks),
+    }
+}
+
+/// The tracks of one camera over the instants that `wanted` admits, cut into pieces that span no more instants than the
+/// options say; neighbouring pieces of one track share no sighting.
+pub(super) fn collect(
+    input: &CalibrationInput,
+    options: &CalibrationOptions,
+    instants: &[Instant],
+    camera: Camera,
+    wanted: &dyn Fn(usize) -> bool,
+) -> Vec<Track> {
+    let mut open: BTreeMap<FeatureId, Track> = BTreeMap::new();
+    let mut finished = Vec::new();
+    for (index, instant) in instants.iter().enumerate() {
+        let Some(frame) = tracked(input, instant, camera).filter(|_| wanted(index)) else { continue };
+        for feature in &frame.features {
+            let finite = feature.bearing.iter().chain(&feature.uv_px).all(|value| value.is_finite());
+            if !finite {
+                continue;
+            }
+            let track = open.entry(feature.id).or_default();
+            let begin = track.sightings.first().map_or(index, |first| first.view.instant());
+            if index - begin >= options.most_instants_per_track {
+                finished.push(std::mem::take(track));
+            }
+            let view = ViewId::new(index, camera);
+            track.sightings.push(Sighting { view, uv_px: feature.uv_px, bearing: feature.bearing });
+        }
+    }
+    finished.extend(open.into_values());
+    finished.retain(|track| track.sightings.len() >= options.least_sightings);
+    finished.sort_by_key(|track| track.sightings[0].view);
+    finished
+}
+
+/// Landmarks of the tracks at the present poses; tracks without one are left out.
+pub(super) fn triangulated(
+    tracks: Vec<Track>,
+    poses: &BTreeMap<ViewId, ViewPose>,
+    options: &CalibrationOptions,
+) -> (Vec<Track>, Vec<Landmark>) {
+    tracks
+        .into_iter()
+        .filter_map(|track| {
+            let rays: Vec<(ViewPose, Vector3<f64>)> = track
+                .sightings
+                .iter()
+                .filter_map(|sighting| Some((*poses.get(&sighting.view)?, sighting.bearing)))
+                .collect();
+            let landmark = landmark::triangulate(&rays, options.least_parallax_rad)?;
+            Some((track, landmark))
+        })
+        .unzip()
+}
+
+/// Drops the sightings beyond `limit` standard deviations of their camera, and landmarks that keep too few.
+pub(super) fn without_outliers(
+    tracks: Vec<Track>,
+    landmarks: &[Landmark],
+    poses: &BTreeMap<ViewId, ViewPose>,
+    pixels: &PixelModel<'_>,
+    limit: f64,
+    options: &CalibrationOptions,
+) -> (Vec<Track>, Vec<Landmark>) {
+    tracks
+        .into_iter()
+        .zip(landmarks)
+        .filter_map(|(mut track, landmark)| {
+            track.sightings.retain(|sighting| {
+                let sigma = pixels.sigma_px[sighting.view.0 % 2];
+                pixels.residual_px(poses, landmark, sighting).is_some_and(|residual| residual.norm() <= limit * sigma)
+            });
+            (track.sightings.len() >= options.least_sightings).then_some((track, *landmark))
+        })
+        .unzip()
+}
+
+/// Lengths of the residuals of one camera in pixels.
+pub(super) fn residual_lengths_px(
+    tracks: &[Track],
+    landmarks: &[Landmark],
+    poses: &BTreeMap<ViewId, ViewPose>,
+    pixels: &PixelModel<'_>,
+    camera: Camera,
+) -> Vec<f64> {
+    tracks
+        .iter()
+        .zip(landmarks)
+        .flat_map(|(track, landmark)| track.sightings.iter().map(move |sighting| (landmark, sighting)))
+        .filter(|(_, sighting)| sighting.view.camera() == camera)
+        .filter_map(|(landmark, sighting)| pixels.residual_px(poses, landmark, sighting))
+        .map(|residual| residual.norm())
+        .collect()
+}

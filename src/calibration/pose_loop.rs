@@ -1,0 +1,423 @@
+//! The pose-loop formulation: static camera's pose, then the chain, must lead to the gimbal camera's measured pose.
+//!
+//! The measured poses of a segment are known up to where, how turned and how large it is on the map, which is unknown
+//! along with the joint angles of every view.
+//! All that belongs to one segment is eliminated onto the chain.
+
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix6xX, UnitQuaternion, Vector3, Vector6};
+
+use super::chain_prior::ChainTerm;
+use super::rounds::median;
+use super::segments::Segment;
+use crate::estimator::RobustLoss;
+use crate::flight_log::JointAngles;
+use crate::geometry::{RigidTransform, so3, wrap_angle};
+use crate::gimbal::Chain;
+
+/// Standard deviation of the rotations of a measured pose, in radians: a pixel over the root of the features.
+const ROTATION_SIGMA_RAD: f64 = 1e-3;
+/// What the loops are held to at first, when the chain and the readings are far off: they pull, but do not tear.
+const FIRST_NOISE: LoopNoise = LoopNoise { rotation_rad: 0.02, position_m: 0.05, loss: RobustLoss::None };
+/// Positions are never better than this, in metres.
+const LEAST_POSITION_SIGMA_M: f64 = 2e-3;
+/// Standard deviations at which a pair has half its weight.
+const CAUCHY_SIGMAS: f64 = 3.0;
+/// How often the noise of the positions is learnt.
+const ROUNDS: usize = 4;
+const ITERATIONS: usize = 25;
+const MOST_DAMPING: f64 = 1e10;
+/// Columns of a segment's frame: turn, shift, logarithm of its unit.
+const FRAME: usize = 7;
+/// Median length of a three-dimensional normal error, in standard deviations of a coordinate.
+const MEDIAN_LENGTH: f64 = 1.538_172_254_455_05;
+
+/// One pair of camera poses.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct PosePair {
+    /// Pose of the vehicle at the gimbal camera's image by the static camera's trajectory.
+    pub(super) world_from_imu: RigidTransform,
+    /// `segment_from_camera` as measured.
+    pub(super) segment_from_camera: RigidTransform,
+    /// What the encoders say.
+    pub(super) encoder: JointAngles,
+}
+
+impl PosePair {
+    /// Reading and standard deviation of each joint.
+    fn readings(&self) -> impl Iterator<Item = (&f64, &f64)> {
+        self.encoder.angles_rad.iter().zip(&self.encoder.sigmas_rad)
+    }
+}
+
+/// The pairs of one segment.
+pub(super) type PairedSegment = Vec<PosePair>;
+
+/// Pairs the measured poses with the trajectory.
+pub(super) fn paired(
+    segments: &[Segment],
+    world_from_imu: &dyn Fn(usize) -> RigidTransform,
+    encoder: &dyn Fn(usize) -> JointAngles,
+) -> Vec<PairedSegment> {
+    segments
+        .iter()
+        .map(|segment| {
+            let pair = |(&instant, pose): (&usize, &RigidTransform)| PosePair {
+                world_from_imu: world_from_imu(instant),
+                segment_from_camera: *pose,
+                encoder: encoder(instant),
+            };
+            segment.instants.iter().zip(&segment.poses).map(pair).collect()
+        })
+        .collect()
+}
+
+/// Where a segment lies on the map.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct SegmentFrame {
+    pub(super) world_from_segment: RigidTransform,
+    pub(super) metres_per_unit: f64,
+}
+
+impl SegmentFrame {
+    fn world_from_camera(&self, segment_from_camera: &RigidTransform) -> RigidTransform {
+        let scaled =
+            RigidTransform::new(segment_from_camera.rotation, segment_from_camera.translation_m * self.metres_per_unit);
+        self.world_from_segment * scaled
+    }
+
+    /// `x ⊞ [φ; δt; δ ln unit]`.
+    pub(super) fn plus(&self, delta: &[f64]) -> Self {
+        Self {
+            world_from_segment: self.world_from_segment.plus(&Vector6::from_column_slice(&delta[..6])),
+            metres_per_unit: self.metres_per_unit * delta[6].exp(),
+        }
+    }
+}
+
+/// What the pose loops came to.
+#[derive(Clone, Debug)]
+pub(super) struct PoseLoopSolution {
+    pub(super) chain: Chain,
+    /// By segment and pair.
+    pub(super) joints_rad: Vec<Vec<Vec<f64>>>,
+    pub(super) frames: Vec<SegmentFrame>,
+    /// Covariance of the chain's columns.
+    pub(super) covariance: DMatrix<f64>,
+    /// Standard deviation of a measured position per coordinate, as the residuals show it.
+    pub(super) position_sigma_m: f64,
+    /// Robust weight of each pair, 0 to 1, by segment.
+    pub(super) weights: Vec<Vec<f64>>,
+    pub(super) iterations: usize,
+}
+
+/// How loops are weighed.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LoopNoise {
+    /// Standard deviation of a rotation's coordinate.
+    pub(super) rotation_rad: f64,
+    /// Standard deviation of a position's coordinate.
+    pub(super) position_m: f64,
+    pub(super) loss: RobustLoss,
+}
+
+/// The pose loops of a flight.
+pub(super) struct PoseLoops<'a> {
+    pub(super) segments: &'a [PairedSegment],
+    pub(super) prior: &'a ChainTerm,
+}
+
+#[derive(Clone, Debug)]
+pub(super) struct LoopState {
+    pub(super) chain: Chain,
+    pub(super) joints_rad: Vec<Vec<Vec<f64>>>,
+    pub(super) frames: Vec<SegmentFrame>,
+}
+
+/// Whitened rows of one pair.
+pub(super) struct PairRows {
+    pub(super) residual: Vector6<f64>,
+    pub(super) by_frame: Matrix6xX<f64>,
+    pub(super) by_joints: Matrix6xX<f64>,
+    pub(super) by_chain: Matrix6xX<f64>,
+}
+
+/// One segment eliminated: what is left on the chain, and how to come back.
+struct Eliminated {
+    factor: nalgebra::linalg::Cholesky<f64, nalgebra::Dyn>,
+    coupling: DMatrix<f64>,
+    gradient: DVector<f64>,
+}
+
+impl PoseLoops<'_> {
+    /// Solves from the given chain and the readings; `None` when the equations are singular.
+    pub(super) fn solve(&self) -> Option<PoseLoopSolution> {
+        let chain = self.prior.given.clone();
+        let joints_rad: Vec<Vec<Vec<f64>>> = self
+            .segments
+            .iter()
+            .map(|pairs| pairs.iter().map(|pair| pair.encoder.angles_rad.clone()).collect())
+            .collect();
+        let frames = self.segments.iter().map(|pairs| first_frame(pairs, &chain)).collect();
+        let mut state = LoopState { chain, joints_rad, frames };
+        let mut noise = FIRST_NOISE;
+        let mut iterations = 0;
+        let mut covariance = None;
+        for _ in 0..ROUNDS {
+            let (next, used, found) = self.descend(state, &noise);
+            (state, covariance) = (next, found);
+            iterations += used;
+            let lengths = self.each_pair().map(|(segment, pair)| self.position_error(&state, segment, pair).norm());
+            let spread_m = median(lengths.collect())? / MEDIAN_LENGTH;
+            noise = LoopNoise {
+                rotation_rad: ROTATION_SIGMA_RAD,
+                position_m: (spread_m * self.lost_freedom()).max(LEAST_POSITION_SIGMA_M),
+                loss: RobustLoss::Cauchy(CAUCHY_SIGMAS),
+            };
+        }
+        let weights = (0..self.segments.len())
+            .map(|segment| {
+                let weight = |pair| {
+                    noise.loss.cost_and_weight(self.rows(&state, segment, pair, &noise).residual.norm_squared()).1
+                };
+                (0..self.segments[segment].len()).map(weight).collect()
+            })
+            .collect();
+        Some(PoseLoopSolution {
+            chain: state.chain,
+            joints_rad: state.joints_rad,
+            frames: state.frames,
+            covariance: covariance?,
+            position_sigma_m: noise.position_m,
+            weights,
+            iterations,
+        })
+    }
+
+    /// By how much the segments' own frames make residuals of positions smaller than their errors.
+    fn lost_freedom(&self) -> f64 {
+        let coordinates = 3.0 * self.each_pair().count() as f64;
+        let free = coordinates - (FRAME * self.segments.len()) as f64;
+        if free > 0.0 { (coordinates / free).sqrt() } else { 1.0 }
+    }
+
+    /// Distances between the ends of the loops.
+    pub(super) fn gaps_m(&self, solution: &PoseLoopSolution) -> Vec<f64> {
+        let state = LoopState {
+            chain: solution.chain.clone(),
+            joints_rad: solution.joints_rad.clone(),
+            frames: solution.frames.clone(),
+        };
+        self.each_pair().map(|(segment, pair)| self.position_error(&state, segment, pair).norm()).collect()
+    }
+
+    fn each_pair(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        self.segments.iter().enumerate().flat_map(|(segment, pairs)| (0..pairs.len()).map(move |pair| (segment, pair)))
+    }
+
+    fn position_error(&self, state: &LoopState, segment: usize, pair: usize) -> Vector3<f64> {
+        let measured = &self.segments[segment][pair];
+        let predicted = measured.world_from_imu * state.chain.imu_from_camera(&state.joints_rad[segment][pair]);
+        predicted.translation_m - state.frames[segment].world_from_camera(&measured.segment_from_camera).translation_m
+    }
+
+    /// The whitened loop of one pair, linearized.
+    pub(super) fn rows(&self, state: &LoopState, segment: usize, pair: usize, noise: &LoopNoise) -> PairRows {
+        let measured = &self.segments[segment][pair];
+        let frame = &state.frames[segment];
+        let chain = state.chain.linearize(&state.joints_rad[segment][pair]);
+        let predicted = measured.world_from_imu * chain.imu_from_camera;
+        let on_map = frame.world_from_camera(&measured.segment_from_camera);
+        let turn = so3::log(&(on_map.rotation.inverse() * predicted.rotation));
+        let shift = predicted.translation_m - on_map.translation_m;
+        let (rotation, position) = (1.0 / noise.rotation_rad, 1.0 / noise.position_m);
+        let mut residual = Vector6::zeros();
+        residual.fixed_rows_mut::<3>(0).copy_from(&(turn * rotation));
+        residual.fixed_rows_mut::<3>(3).copy_from(&(shift * position));
+
+        let by_turn = so3::right_jacobian_inverse(&turn);
+        let world_from_imu = measured.world_from_imu.rotation_matrix();
+        let carried = |part: &Matrix6xX<f64>| {
+            let mut rows = part.clone();
+            let turned = by_turn * part.fixed_rows::<3>(0) * rotation;
+            rows.fixed_rows_mut::<3>(0).copy_from(&turned);
+            let shifted = world_from_imu * part.fixed_rows::<3>(3) * position;
+            rows.fixed_rows_mut::<3>(3).copy_from(&shifted);
+            rows
+        };
+        let segment_rotation: Matrix3<f64> = frame.world_from_segment.rotation_matrix();
+        let camera_from_segment: Matrix3<f64> = measured.segment_from_camera.rotation_matrix().transpose();
+        let place = measured.segment_from_camera.translation_m * frame.metres_per_unit;
+        let mut by_frame = Matrix6xX::zeros(FRAME);
+        by_frame.fixed_view_mut::<3, 3>(0, 0).copy_from(&(by_turn.transpose() * camera_from_segment * -rotation));
+        by_frame.fixed_view_mut::<3, 3>(3, 0).copy_from(&(segment_rotation * so3::hat(&place) * position));
+        by_frame.fixed_view_mut::<3, 3>(3, 3).fill_diagonal(-position);
+        by_frame.fixed_view_mut::<3, 1>(3, 6).copy_from(&(segment_rotation * place * -position));
+        PairRows { residual, by_frame, by_joints: carried(&chain.by_joints), by_chain: carried(&chain.by_parameters) }
+    }
+
+    fn cost(&self, state: &LoopState, noise: &LoopNoise) -> f64 {
+        let mut cost = self.prior.residual(&state.chain).norm_squared();
+        for (segment, pair) in self.each_pair() {
+            let measured = &self.segments[segment][pair];
+            let predicted = measured.world_from_imu * state.chain.imu_from_camera(&state.joints_rad[segment][pair]);
+            let on_map = state.frames[segment].world_from_camera(&measured.segment_from_camera);
+            let turn = so3::log(&(on_map.rotation.inverse() * predicted.rotation)) / noise.rotation_rad;
+            let shift = (predicted.translation_m - on_map.translation_m) / noise.position_m;
+            cost += noise.loss.cost_and_weight(turn.norm_squared() + shift.norm_squared()).0;
+            for (angle, (reading, sigma)) in state.joints_rad[segment][pair].iter().zip(measured.readings()) {
+                cost += (wrap_angle(angle - reading) / sigma).powi(2);
+            }
+        }
+        cost
+    }
+
+    /// Levenberg–Marquardt; also returns the steps tried and the chain's covariance at the last linearization.
+    fn descend(&self, start: LoopState, noise: &LoopNoise) -> (LoopState, usize, Option<DMatrix<f64>>) {
+        let mut state = start;
+        let mut cost = self.cost(&state, noise);
+        let mut damping = 1e-4;
+        let mut covariance = None;
+        let mut tried = 0;
+        while tried < ITERATIONS {
+            tried += 1;
+            if let Some((next, found)) = self.step(&state, noise, damping) {
+                let next_cost = self.cost(&next, noise);
+                if next_cost.is_finite() && next_cost <= cost {
+                    let settled = cost - next_cost <= 1e-8 * cost;
+                    (state, cost, covariance) = (next, next_cost, Some(found));
+                    damping = (damping * 0.1).max(1e-10);
+                    if settled {
+                        break;
+                    }
+                    continue;
+                }
+                covariance = covariance.or(Some(found));
+            }
+            damping *= 20.0;
+            if damping > MOST_DAMPING {
+                break;
+            }
+        }
+        (state, tried, covariance)
+    }
+
+    fn step(&self, state: &LoopState, noise: &LoopNoise, damping: f64) -> Option<(LoopState, DMatrix<f64>)> {
+        let count = state.chain.dof();
+        let mut hessian = self.prior.information();
+        let mut gradient = self.prior.jacobian().tr_mul(&self.prior.residual(&state.chain));
+        let mut undamped = hessian.clone();
+        let mut eliminated = Vec::with_capacity(self.segments.len());
+        for segment in 0..self.segments.len() {
+            let (own, coupling, own_gradient) =
+                self.segment_equations(state, segment, noise, &mut hessian, &mut gradient, &mut undamped);
+            let exact = own.clone().cholesky()?;
+            undamped -= coupling.tr_mul(&exact.solve(&coupling));
+            let mut damped = own;
+            for k in 0..damped.nrows() {
+                damped[(k, k)] *= 1.0 + damping;
+            }
+            let factor = damped.cholesky()?;
+            hessian -= coupling.tr_mul(&factor.solve(&coupling));
+            gradient -= coupling.tr_mul(&factor.solve(&own_gradient));
+            eliminated.push(Eliminated { factor, coupling, gradient: own_gradient });
+        }
+        for k in 0..count {
+            hessian[(k, k)] *= 1.0 + damping;
+        }
+        let delta = -hessian.cholesky()?.solve(&gradient);
+        let mut next = state.clone();
+        next.chain = state.chain.plus(&delta);
+        for (segment, part) in eliminated.iter().enumerate() {
+            let own = -part.factor.solve(&(&part.gradient + &part.coupling * &delta));
+            next.frames[segment] = state.frames[segment].plus(&own.as_slice()[..FRAME]);
+            for (angle, step) in next.joints_rad[segment].iter_mut().flatten().zip(own.iter().skip(FRAME)) {
+                *angle += step;
+            }
+        }
+        Some((next, undamped.cholesky()?.inverse()))
+    }
+
+    /// Normal equations of one segment: its own block, its coupling with the chain (own × chain) and its own gradient;
+    /// what touches the chain alone is added to `hessian`, `undamped` and `gradient`.
+    fn segment_equations(
+        &self,
+        state: &LoopState,
+        segment: usize,
+        noise: &LoopNoise,
+        hessian: &mut DMatrix<f64>,
+        gradient: &mut DVector<f64>,
+        undamped: &mut DMatrix<f64>,
+    ) -> (DMatrix<f64>, DMatrix<f64>, DVector<f64>) {
+        let joints = state.chain.joint_count();
+        let pairs = &self.segments[segment];
+        let size = FRAME + joints * pairs.len();
+        let mut own = DMatrix::zeros(size, size);
+        let mut coupling = DMatrix::zeros(size, state.chain.dof());
+        let mut own_gradient = DVector::zeros(size);
+        for (pair, measured) in pairs.iter().enumerate() {
+            let rows = self.rows(state, segment, pair, noise);
+            let weight = noise.loss.cost_and_weight(rows.residual.norm_squared()).1;
+            let at = FRAME + joints * pair;
+            let parts = [(0, &rows.by_frame), (at, &rows.by_joints)];
+            for (row, left) in parts {
+                for (column, right) in parts {
+                    let mut place = own.view_mut((row, column), (left.ncols(), right.ncols()));
+                    place += left.tr_mul(right) * weight;
+                }
+                let mut place = coupling.rows_mut(row, left.ncols());
+                place += left.tr_mul(&rows.by_chain) * weight;
+                let mut place = own_gradient.rows_mut(row, left.ncols());
+                place += left.tr_mul(&rows.residual) * weight;
+            }
+            let corner = rows.by_chain.tr_mul(&rows.by_chain) * weight;
+            *hessian += &corner;
+            *undamped += &corner;
+            *gradient += rows.by_chain.tr_mul(&rows.residual) * weight;
+            for (joint, (angle, (reading, sigma))) in
+                state.joints_rad[segment][pair].iter().zip(measured.readings()).enumerate()
+            {
+                let information = 1.0 / (sigma * sigma);
+                own[(at + joint, at + joint)] += information;
+                own_gradient[at + joint] += information * wrap_angle(angle - reading);
+            }
+        }
+        (own, coupling, own_gradient)
+    }
+}
+
+/// A segment's frame when the chain and the readings are taken as they are: mean turn, then unit and place by least squares.
+fn first_frame(pairs: &[PosePair], chain: &Chain) -> SegmentFrame {
+    let predicted: Vec<RigidTransform> =
+        pairs.iter().map(|pair| pair.world_from_imu * chain.imu_from_camera(&pair.encoder.angles_rad)).collect();
+    let turns: Vec<UnitQuaternion<f64>> = pairs
+        .iter()
+        .zip(&predicted)
+        .map(|(pair, predicted)| predicted.rotation * pair.segment_from_camera.rotation.inverse())
+        .collect();
+    let mut rotation = turns.first().copied().unwrap_or_else(UnitQuaternion::identity);
+    for _ in 0..5 {
+        let sum: Vector3<f64> = turns.iter().map(|turn| so3::log(&(rotation.inverse() * turn))).sum();
+        rotation =
+            UnitQuaternion::new_normalize((rotation * so3::exp(&(sum / turns.len().max(1) as f64))).into_inner());
+    }
+    let count = pairs.len().max(1) as f64;
+    let turned: Vec<Vector3<f64>> =
+        pairs.iter().map(|pair| rotation * pair.segment_from_camera.translation_m).collect();
+    let middle = turned.iter().sum::<Vector3<f64>>() / count;
+    let middle_m = predicted.iter().map(|pose| pose.translation_m).sum::<Vector3<f64>>() / count;
+    let (mut along, mut square, mut square_m) = (0.0, 0.0, 0.0);
+    for (place, pose) in turned.iter().zip(&predicted) {
+        along += (place - middle).dot(&(pose.translation_m - middle_m));
+        square += (place - middle).norm_squared();
+        square_m += (pose.translation_m - middle_m).norm_squared();
+    }
+    let square = square.max(1e-12);
+    // A rotation that is far off may even turn the sign; the ratio of the extents is then the better guess.
+    let metres_per_unit =
+        if along > 0.3 * (square * square_m).sqrt() { along / square } else { (square_m / square).sqrt() };
+    let metres_per_unit = metres_per_unit.max(1e-6);
+    SegmentFrame {
+        world_from_segment: RigidTransform::new(rotation, middle_m - middle * metres_per_unit),
+        metres_per_unit,
+    }
+}

@@ -1,0 +1,149 @@
+//! The bundle in rounds: triangulate, adjust, drop what does not fit, learn how exact pixels are.
+
+use nalgebra::{DMatrix, Vector3};
+
+use super::bundle::{Bundle, Priors};
+use super::observations;
+use super::solver::{adjust, border_covariance};
+use super::state::{Camera, Columns, Estimate};
+use super::timeline::Instant;
+use super::visual::{PixelModel, Track};
+use super::{CalibrationError, CalibrationOptions};
+use crate::camera::CameraModel;
+use crate::estimator::RobustLoss;
+
+/// What a tracked pixel is worth before the residuals say, per coordinate.
+const FIRST_SIGMA_PX: f64 = 1.0;
+/// No tracker is better than this, per coordinate.
+const LEAST_SIGMA_PX: f64 = 0.05;
+/// Standard deviations up to which the loss is quadratic.
+const HUBER_SIGMAS: f64 = 1.5;
+/// Median length of a two-dimensional normal error, in standard deviations of a coordinate.
+const MEDIAN_LENGTH: f64 = 1.177_410_022_515_474_7;
+
+/// What the rounds of one stage share.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stage<'a> {
+    /// For messages.
+    pub(super) name: &'static str,
+    pub(super) cameras: [&'a CameraModel; 2],
+    pub(super) gravity_in_world: Vector3<f64>,
+    pub(super) priors: &'a Priors,
+    pub(super) options: &'a CalibrationOptions,
+}
+
+/// How a stage ended.
+#[derive(Clone, Debug)]
+pub(super) struct StageResult {
+    pub(super) estimate: Estimate,
+    pub(super) tracks: Vec<Track>,
+    /// Standard deviation of a pixel's coordinate of each camera, as the residuals show it.
+    pub(super) sigma_px: [f64; 2],
+    pub(super) iterations: usize,
+    /// Covariance of the border.
+    pub(super) covariance: DMatrix<f64>,
+    /// Information of the priors on the border.
+    pub(super) prior_information: DMatrix<f64>,
+    /// Residual lengths of each camera in pixels.
+    pub(super) residuals_px: [Vec<f64>; 2],
+}
+
+impl StageResult {
+    /// Where the unknowns have their columns.
+    pub(super) fn columns(&self) -> Columns {
+        columns(&self.estimate)
+    }
+}
+
+fn columns(estimate: &Estimate) -> Columns {
+    Columns { instants: estimate.navigation.len(), joints: estimate.chain.joint_count(), chain: estimate.chain.dof() }
+}
+
+impl Stage<'_> {
+    fn pixels(&self, sigma_px: [f64; 2]) -> PixelModel<'_> {
+        PixelModel { cameras: self.cameras, sigma_px, loss: RobustLoss::Huber(HUBER_SIGMAS) }
+    }
+
+    fn bundle<'b>(
+        &'b self,
+        instants: &'b [Instant],
+        columns: Columns,
+        tracks: &'b [Track],
+        sigma_px: [f64; 2],
+    ) -> Bundle<'b> {
+        Bundle {
+            columns,
+            instants,
+            gravity_in_world: self.gravity_in_world,
+            priors: self.priors,
+            pixels: self.pixels(sigma_px),
+            tracks,
+        }
+    }
+
+    /// Adjusts all unknowns to all tracks in rounds.
+    pub(super) fn run(
+        &self,
+        instants: &mut [Instant],
+        all_tracks: &[Track],
+        start: Estimate,
+        on_round: &mut dyn FnMut(usize),
+    ) -> Result<StageResult, CalibrationError> {
+        let singular = || CalibrationError::Singular { stage: self.name };
+        let columns = columns(&start);
+        let mut estimate = start;
+        let mut sigma_px = [FIRST_SIGMA_PX; 2];
+        let mut iterations = 0;
+        let mut kept: Vec<Track> = Vec::new();
+        let rounds = self.options.rounds.max(1);
+        for round in 0..=rounds {
+            on_round(round);
+            Self::reintegrate(instants, &estimate);
+            let poses = self.bundle(instants, columns, all_tracks, sigma_px).poses(&estimate);
+            let (tracks, landmarks) = observations::triangulated(all_tracks.to_vec(), &poses, self.options);
+            // The first poses are rough: what does not fit them may fit later.
+            let limit = if round == 0 { 30.0 / FIRST_SIGMA_PX } else { self.options.outlier_sigmas };
+            let pixels = self.pixels(sigma_px);
+            let (tracks, landmarks) =
+                observations::without_outliers(tracks, &landmarks, &poses, &pixels, limit, self.options);
+            estimate.landmarks = landmarks;
+            let bundle = self.bundle(instants, columns, &tracks, sigma_px);
+            let adjusted = adjust(&bundle, estimate, self.options).ok_or_else(singular)?;
+            iterations += adjusted.iterations;
+            estimate = adjusted.estimate;
+            let poses = bundle.poses(&estimate);
+            for camera in [Camera::Static, Camera::Gimbal] {
+                let lengths =
+                    observations::residual_lengths_px(&tracks, &estimate.landmarks, &poses, &bundle.pixels, camera);
+                if let Some(median) = median(lengths) {
+                    sigma_px[usize::from(camera == Camera::Gimbal)] = (median / MEDIAN_LENGTH).max(LEAST_SIGMA_PX);
+                }
+            }
+            kept = tracks;
+        }
+        let bundle = self.bundle(instants, columns, &kept, sigma_px);
+        let covariance = border_covariance(&bundle, &estimate).ok_or_else(singular)?;
+        let poses = bundle.poses(&estimate);
+        let residuals_px = [Camera::Static, Camera::Gimbal].map(|camera| {
+            observations::residual_lengths_px(&kept, &estimate.landmarks, &poses, &bundle.pixels, camera)
+        });
+        let prior_information = bundle.border_prior_information(&estimate);
+        Ok(StageResult { estimate, tracks: kept, sigma_px, iterations, covariance, prior_information, residuals_px })
+    }
+
+    fn reintegrate(instants: &mut [Instant], estimate: &Estimate) {
+        for index in 0..instants.len() {
+            let before = index.checked_sub(1).map(|before| estimate.navigation[before].bias);
+            instants[index].reintegrate(before.as_ref(), &estimate.navigation[index].bias);
+        }
+    }
+}
+
+/// The median (upper one for an even count), `None` of none.
+pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
+    if values.is_empty() {
+        return None;
+    }
+    let middle = values.len() / 2;
+    Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}

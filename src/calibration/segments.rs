@@ -1,0 +1,133 @@
+//! Measured poses of the gimbal camera: short reconstructions from its images alone, each in a frame and a unit of length
+//! of its own.
+
+use nalgebra::UnitQuaternion;
+
+use super::bundle::gimbal_view;
+use super::observations::tracked;
+use super::state::{Camera, Estimate};
+use super::timeline::Instant;
+use super::{CalibrationInput, CalibrationOptions};
+use crate::estimator::gravity_in_world;
+use crate::estimator::initialization::{InitializationOptions, ReconstructionGuess, reconstruct_views};
+use crate::frontend::TrackedFeature;
+use crate::geometry::RigidTransform;
+
+/// A reconstruction breaks off where neighbouring views share fewer features.
+const LEAST_COMMON: usize = 25;
+/// Fewest views of a reconstruction: its frame and unit take seven of their six equations each.
+const LEAST_VIEWS: usize = 6;
+
+/// One reconstruction.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Segment {
+    /// The instants of its views, rising.
+    pub(super) instants: Vec<usize>,
+    /// `segment_from_camera` of each, translations in the segment's unit.
+    pub(super) poses: Vec<RigidTransform>,
+}
+
+/// How many views of the gimbal camera there were, and what became of them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct SegmentCounts {
+    /// Instants with an image of the gimbal camera and encoder readings.
+    pub(super) offered: usize,
+    /// Of these, in stretches too short to reconstruct.
+    pub(super) broken: usize,
+    /// Of these, in stretches whose reconstruction failed, for lack of parallax mostly.
+    pub(super) unsolved: usize,
+}
+
+/// Reconstructs the gimbal camera over the whole flight, stretch by stretch.
+pub(super) fn reconstruct(
+    input: &CalibrationInput,
+    options: &CalibrationOptions,
+    instants: &[Instant],
+    estimate: &Estimate,
+) -> (Vec<Segment>, SegmentCounts) {
+    let gravity = gravity_in_world(input.gravity_m_per_s2);
+    let gimbal = &input.gimbal_camera;
+    // Guesses of the turns between views: two readings on each joint, and the part of the chain's error that turns along.
+    let joints = gimbal.chain.joint_count() as f64;
+    let chain_rad = super::chain_prior::sigmas(&gimbal.prior).1;
+    let sigma_rad =
+        (encoder_sigma_rad(instants) * (2.0 * joints).sqrt()).hypot(chain_rad * (joints + 2.0).sqrt()).max(0.02);
+    let limits = InitializationOptions { least_views: LEAST_VIEWS, ..InitializationOptions::default() };
+    let mut counts = SegmentCounts::default();
+    let mut segments = Vec::new();
+    for stretch in stretches(input, options, instants, &mut counts) {
+        let views: Vec<&[TrackedFeature]> = stretch
+            .iter()
+            .filter_map(|&index| tracked(input, &instants[index], Camera::Gimbal))
+            .map(|frame| frame.features.as_slice())
+            .collect();
+        let rotations: Vec<UnitQuaternion<f64>> = stretch
+            .iter()
+            .map(|&index| {
+                let vehicle = estimate.world_from_imu(gimbal_view(index), instants, &gravity);
+                vehicle.rotation * estimate.chain.imu_from_camera(&estimate.joints_rad[index]).rotation
+            })
+            .collect();
+        let guess = ReconstructionGuess { rotations: &rotations, sigma_rad, seed: stretch[0] as u64 };
+        match reconstruct_views(&views, &guess, &limits) {
+            Some(reconstruction) => {
+                counts.unsolved += stretch.len() - reconstruction.views.len();
+                segments.push(Segment {
+                    instants: reconstruction.views.iter().map(|view| stretch[*view]).collect(),
+                    poses: reconstruction.poses,
+                });
+            }
+            None => counts.unsolved += stretch.len(),
+        }
+    }
+    (segments, counts)
+}
+
+/// Root mean square of the standard deviations of all readings.
+pub(super) fn encoder_sigma_rad(instants: &[Instant]) -> f64 {
+    let sigmas = instants.iter().filter_map(|instant| instant.gimbal.as_ref()).flat_map(|g| &g.encoder.sigmas_rad);
+    let (sum, count) = sigmas.fold((0.0, 0_usize), |(sum, count), sigma| (sum + sigma * sigma, count + 1));
+    (sum / count.max(1) as f64).sqrt()
+}
+
+/// Runs of neighbouring instants whose gimbal views share features, none longer than the options say.
+fn stretches(
+    input: &CalibrationInput,
+    options: &CalibrationOptions,
+    instants: &[Instant],
+    counts: &mut SegmentCounts,
+) -> Vec<Vec<usize>> {
+    let mut stretches: Vec<Vec<usize>> = vec![Vec::new()];
+    for index in 0..instants.len() {
+        let Some(frame) = tracked(input, &instants[index], Camera::Gimbal) else {
+            stretches.push(Vec::new());
+            continue;
+        };
+        counts.offered += 1;
+        let Some(last) = stretches.last_mut() else { continue };
+        let linked = last.last().is_none_or(|before| {
+            tracked(input, &instants[*before], Camera::Gimbal)
+                .is_some_and(|other| common(&other.features, &frame.features) >= LEAST_COMMON)
+        });
+        if linked && last.len() < options.segment_views {
+            last.push(index);
+        } else {
+            stretches.push(vec![index]);
+        }
+    }
+    let (long, short): (Vec<_>, Vec<_>) = stretches.into_iter().partition(|stretch| stretch.len() >= LEAST_VIEWS);
+    counts.broken += short.iter().map(Vec::len).sum::<usize>();
+    long
+}
+
+/// Number of features that two images share; both are ordered by id.
+fn common(first: &[TrackedFeature], second: &[TrackedFeature]) -> usize {
+    let mut rest = second.iter().peekable();
+    first
+        .iter()
+        .filter(|feature| {
+            while rest.next_if(|other| other.id < feature.id).is_some() {}
+            rest.next_if(|other| other.id == feature.id).is_some()
+        })
+        .count()
+}

@@ -1,0 +1,239 @@
+//! The unknowns of the bundle and where each has its columns.
+
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+
+use super::landmark::{Landmark, ViewPose};
+use super::timeline::Instant;
+use crate::estimator::NavigationState;
+use crate::estimator::preintegration::Vector15;
+use crate::geometry::{RigidTransform, so3};
+use crate::gimbal::Chain;
+
+/// Pose and velocity, which come first in an instant's block.
+const MOTION: usize = 9;
+/// All of a navigation state.
+const NAVIGATION: usize = 15;
+
+/// Which camera a view belongs to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Camera {
+    /// The one fixed to the vehicle.
+    Static,
+    /// The one on the gimbal.
+    Gimbal,
+}
+
+/// An image in the bundle: an instant and a camera.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct ViewId(pub(super) usize);
+
+impl ViewId {
+    pub(super) fn new(instant: usize, camera: Camera) -> Self {
+        Self(2 * instant + usize::from(camera == Camera::Gimbal))
+    }
+
+    pub(super) fn instant(self) -> usize {
+        self.0 / 2
+    }
+
+    pub(super) fn camera(self) -> Camera {
+        if self.0.is_multiple_of(2) { Camera::Static } else { Camera::Gimbal }
+    }
+}
+
+/// Values of all unknowns.
+#[derive(Clone, Debug)]
+pub(super) struct Estimate {
+    /// By instant.
+    pub(super) navigation: Vec<NavigationState>,
+    /// Joint angles at the gimbal camera's image, without the static offsets; by instant.
+    pub(super) joints_rad: Vec<Vec<f64>>,
+    /// `imu_from_camera` of the static camera.
+    pub(super) mount: RigidTransform,
+    /// `t_imu = t_cam + shift`, beyond what the rig says, of the static and the gimbal camera, in seconds.
+    pub(super) shifts_s: [f64; 2],
+    /// The gimbal's chain.
+    pub(super) chain: Chain,
+    /// In the order of the tracks.
+    pub(super) landmarks: Vec<Landmark>,
+}
+
+/// Columns: a block per instant, `[φ p v | joints | b_g b_a]`, and the border that all instants share,
+/// `[mount 6 | static shift | chain | gimbal shift]`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Columns {
+    pub(super) instants: usize,
+    pub(super) joints: usize,
+    pub(super) chain: usize,
+}
+
+impl Columns {
+    pub(super) const MOUNT: usize = 0;
+    pub(super) const STATIC_SHIFT: usize = 6;
+    pub(super) const CHAIN: usize = 7;
+
+    pub(super) fn gimbal_shift(&self) -> usize {
+        Self::CHAIN + self.chain
+    }
+
+    pub(super) fn borders(&self) -> usize {
+        Self::CHAIN + self.chain + 1
+    }
+
+    pub(super) fn block(&self) -> usize {
+        NAVIGATION + self.joints
+    }
+
+    pub(super) fn band(&self) -> usize {
+        self.instants * self.block()
+    }
+
+    /// Columns that move a view directly: pose, velocity and joints of its instant.
+    pub(super) fn own(&self) -> usize {
+        MOTION + self.joints
+    }
+
+    /// Column of an entry of the navigation state within the block.
+    pub(super) fn navigation(&self, entry: usize) -> usize {
+        if entry < MOTION { entry } else { entry + self.joints }
+    }
+
+    /// Column of a joint within the block.
+    pub(super) fn joint(joint: usize) -> usize {
+        MOTION + joint
+    }
+}
+
+impl Estimate {
+    /// The estimate moved by a step of the band, of the border and of the landmarks.
+    pub(super) fn moved(
+        &self,
+        columns: &Columns,
+        band: &[f64],
+        border: &DVector<f64>,
+        landmarks: &[Vector3<f64>],
+    ) -> Self {
+        let mut moved = self.clone();
+        for (instant, block) in band.chunks_exact(columns.block()).enumerate() {
+            let step = Vector15::from_fn(|entry, _| block[columns.navigation(entry)]);
+            moved.navigation[instant] = self.navigation[instant].plus(&step);
+            for (joint, angle) in moved.joints_rad[instant].iter_mut().enumerate() {
+                *angle += block[Columns::joint(joint)];
+            }
+        }
+        moved.mount = self.mount.plus(&border.fixed_rows::<6>(Columns::MOUNT).into_owned());
+        moved.shifts_s[0] += border[Columns::STATIC_SHIFT];
+        moved.chain = self.chain.plus_slice(&border.as_slice()[Columns::CHAIN..columns.gimbal_shift()]);
+        moved.shifts_s[1] += border[columns.gimbal_shift()];
+        for (landmark, step) in moved.landmarks.iter_mut().zip(landmarks) {
+            *landmark = landmark.plus(step);
+        }
+        moved
+    }
+
+    /// The state of the vehicle when a view was taken, its rotation over the time shift left out, with the angular velocity
+    /// there.
+    fn vehicle_at(
+        &self,
+        view: ViewId,
+        instants: &[Instant],
+        gravity: &Vector3<f64>,
+    ) -> (NavigationState, Vector3<f64>) {
+        let instant = &instants[view.instant()];
+        let here = NavigationState { bias: instant.bias, ..self.navigation[view.instant()] };
+        match (view.camera(), &instant.gimbal) {
+            (Camera::Gimbal, Some(gimbal)) => {
+                (gimbal.hop.predict(&here, gravity), gimbal.gyroscope_rad_per_s - here.bias.gyroscope_rad_per_s)
+            }
+            _ => (here, instant.gyroscope_rad_per_s - here.bias.gyroscope_rad_per_s),
+        }
+    }
+
+    /// `world_from_imu` when a view was taken.
+    pub(super) fn world_from_imu(&self, view: ViewId, instants: &[Instant], gravity: &Vector3<f64>) -> RigidTransform {
+        let (state, rate) = self.vehicle_at(view, instants, gravity);
+        let shift_s = self.shifts_s[usize::from(view.camera() == Camera::Gimbal)];
+        RigidTransform::new(
+            state.world_from_imu.rotation * so3::exp(&(rate * shift_s)),
+            state.world_from_imu.translation_m + state.velocity_m_per_s * shift_s,
+        )
+    }
+
+    fn imu_from_camera(&self, view: ViewId) -> RigidTransform {
+        match view.camera() {
+            Camera::Static => self.mount,
+            Camera::Gimbal => self.chain.imu_from_camera(&self.joints_rad[view.instant()]),
+        }
+    }
+
+    /// Pose of a view.
+    pub(super) fn view(&self, view: ViewId, instants: &[Instant], gravity: &Vector3<f64>) -> ViewPose {
+        let pose = self.world_from_imu(view, instants, gravity) * self.imu_from_camera(view);
+        ViewPose { rotation: pose.rotation_matrix(), position_m: pose.translation_m }
+    }
+
+    /// How the pose of a view follows the unknowns.
+    pub(super) fn view_map(
+        &self,
+        view: ViewId,
+        columns: &Columns,
+        instants: &[Instant],
+        gravity: &Vector3<f64>,
+    ) -> ViewMap {
+        let (state, rate) = self.vehicle_at(view, instants, gravity);
+        let instant = view.instant();
+        let here = &self.navigation[instant];
+        let gimbal = view.camera() == Camera::Gimbal;
+        let shift_s = self.shifts_s[usize::from(gimbal)];
+        let node: Matrix3<f64> = here.world_from_imu.rotation_matrix();
+        let hop = instants[instant].gimbal.as_ref().filter(|_| gimbal).map(|gimbal| &gimbal.hop);
+        let world_from_imu: Matrix3<f64> =
+            (state.world_from_imu.rotation * so3::exp(&(rate * shift_s))).to_rotation_matrix().into_inner();
+        // From the instant's body axes to the camera.
+        let imu_from_node = world_from_imu.tr_mul(&node);
+        let (lag_s, carried) = hop.map_or_else(
+            || (0.0, Vector3::zeros()),
+            |hop| {
+                let motion = hop.corrected(&instants[instant].bias);
+                (hop.duration_s(), motion.position_m + motion.velocity_m_per_s * shift_s)
+            },
+        );
+        let mount = self.imu_from_camera(view);
+        let camera_from_imu: Matrix3<f64> = mount.rotation_matrix().transpose();
+        let turn = camera_from_imu * imu_from_node;
+        let lever = world_from_imu * so3::hat(&mount.translation_m);
+
+        let mut own = DMatrix::zeros(6, columns.own());
+        own.fixed_view_mut::<3, 3>(0, 0).copy_from(&turn);
+        own.fixed_view_mut::<3, 3>(3, 0).copy_from(&-(lever * imu_from_node + node * so3::hat(&carried)));
+        own.fixed_view_mut::<3, 3>(3, 3).fill_with_identity();
+        own.fixed_view_mut::<3, 3>(3, 6).fill_diagonal(lag_s + shift_s);
+        let mut shared = DMatrix::zeros(6, columns.borders());
+        let shift = if gimbal { columns.gimbal_shift() } else { Columns::STATIC_SHIFT };
+        shared.fixed_view_mut::<3, 1>(0, shift).copy_from(&(camera_from_imu * rate));
+        shared.fixed_view_mut::<3, 1>(3, shift).copy_from(&(state.velocity_m_per_s - lever * rate));
+        if gimbal {
+            let chain = self.chain.linearize(&self.joints_rad[instant]);
+            let carry = |part: &nalgebra::Matrix6xX<f64>, mut place: nalgebra::DMatrixViewMut<'_, f64>| {
+                place.copy_from(part);
+                let outer = world_from_imu * part.fixed_rows::<3>(3);
+                place.fixed_rows_mut::<3>(3).copy_from(&outer);
+            };
+            carry(&chain.by_joints, own.columns_mut(MOTION, columns.joints));
+            carry(&chain.by_parameters, shared.columns_mut(Columns::CHAIN, columns.chain));
+        } else {
+            shared.fixed_view_mut::<3, 3>(0, Columns::MOUNT).fill_with_identity();
+            shared.fixed_view_mut::<3, 3>(3, Columns::MOUNT + 3).copy_from(&world_from_imu);
+        }
+        ViewMap { own, shared }
+    }
+}
+
+/// `[φ; δt]` of `world_from_camera` of one view by the unknowns.
+#[derive(Clone, Debug)]
+pub(super) struct ViewMap {
+    /// By pose, velocity and joints of its instant (6 × own).
+    pub(super) own: DMatrix<f64>,
+    /// By the border (6 × borders).
+    pub(super) shared: DMatrix<f64>,
+}

@@ -1,0 +1,212 @@
+//! Derivatives against central differences.
+
+use nalgebra::{DVector, Vector2, Vector3, Vector6};
+
+use super::fixture::{Flight, flight, true_states};
+use crate::calibration::CalibrationOptions;
+use crate::calibration::bundle::{Bundle, Priors};
+use crate::calibration::chain_prior::ChainTerm;
+use crate::calibration::landmark::{self, Landmark, ViewPose};
+use crate::calibration::observations;
+use crate::calibration::state::{Camera, Columns, Estimate, ViewId};
+use crate::calibration::timeline::{Instant, instants};
+use crate::calibration::visual::{PixelModel, Track};
+use crate::estimator::{RobustLoss, gravity_in_world};
+use crate::geometry::{RigidTransform, so3};
+use crate::simulation::{SyntheticMotion, SyntheticOptions};
+
+const STEP: f64 = 1e-6;
+
+/// A short flight whose gimbal images lie 50 ms after the static ones, at an estimate away from the truth.
+struct Example {
+    flight: Flight,
+    instants: Vec<Instant>,
+    estimate: Estimate,
+    tracks: Vec<Track>,
+    priors: Priors,
+    columns: Columns,
+}
+
+fn example() -> Example {
+    let mut flight = flight(&SyntheticOptions {
+        duration_s: 1.5,
+        features: 25,
+        motion: SyntheticMotion::Aggressive,
+        ..SyntheticOptions::default()
+    });
+    let odd = |view: &crate::calibration::TrackedView| view.frame_index % 2 == 1;
+    flight.input.gimbal_camera.views.retain(odd);
+    let options = CalibrationOptions { spacing_s: 0.2, ..CalibrationOptions::default() };
+    let states: Vec<_> = true_states(&flight).into_iter().map(Some).collect();
+    let (instants, navigation) = instants(&flight.input, &options, &states);
+    assert!(instants.iter().filter(|instant| instant.gimbal.is_some()).count() > 4);
+    let term = ChainTerm::new(&flight.input.gimbal_camera.chain, &flight.input.gimbal_camera.prior);
+    let chain = term.given.clone();
+    let priors = Priors {
+        chain: term,
+        mount: flight.input.static_camera.imu_from_camera,
+        mount_sigmas: (0.003, 0.005),
+        time_shift_sigma_s: 0.01,
+        bias_sigmas: (0.05, 0.5),
+        first: navigation[0],
+    };
+    let joint = |instant: &Instant| {
+        instant
+            .gimbal
+            .as_ref()
+            .map_or_else(|| vec![0.0; 3], |g| g.encoder.angles_rad.iter().map(|q| q + 0.01).collect())
+    };
+    let mut estimate = Estimate {
+        joints_rad: instants.iter().map(joint).collect(),
+        navigation,
+        mount: flight.true_mount,
+        shifts_s: [0.002, -0.003],
+        chain: chain.plus(&DVector::from_fn(chain.dof(), |k, _| 0.001 * (k as f64).sin())),
+        landmarks: Vec::new(),
+    };
+    let columns = Columns { instants: instants.len(), joints: 3, chain: chain.dof() };
+    let mut tracks = observations::collect(&flight.input, &options, &instants, Camera::Static, &|_| true);
+    tracks.extend(observations::collect(&flight.input, &options, &instants, Camera::Gimbal, &|_| true));
+    let mut example = Example { flight, instants, estimate: estimate.clone(), tracks: tracks.clone(), priors, columns };
+    let poses = bundle(&example).poses(&estimate);
+    let (tracks, landmarks) = observations::triangulated(tracks, &poses, &options);
+    assert!(tracks.iter().any(|track| track.sightings[0].view.camera() == Camera::Gimbal));
+    estimate.landmarks = landmarks;
+    (example.estimate, example.tracks) = (estimate, tracks);
+    example
+}
+
+fn bundle(example: &Example) -> Bundle<'_> {
+    Bundle {
+        columns: example.columns,
+        instants: &example.instants,
+        gravity_in_world: gravity_in_world(9.81),
+        priors: &example.priors,
+        pixels: PixelModel {
+            cameras: [&example.flight.input.static_camera.model, &example.flight.input.gimbal_camera.model],
+            sigma_px: [0.5, 0.7],
+            loss: RobustLoss::Huber(1.5),
+        },
+        tracks: &example.tracks,
+    }
+}
+
+#[test]
+fn a_sighting_is_differentiated() {
+    let example = example();
+    let camera = &example.flight.input.gimbal_camera.model;
+    let view = ViewPose {
+        rotation: *so3::exp(&Vector3::new(0.3, -0.2, 1.0)).to_rotation_matrix().matrix(),
+        position_m: Vector3::new(1.0, 2.0, 0.5),
+    };
+    let point = view.position_m + view.rotation * Vector3::new(0.6, -0.4, 3.0);
+    let landmark = Landmark::seen_from(Vector3::new(0.2, 1.5, 0.1), &point).unwrap();
+    let measured = Vector2::new(300.0, 200.0);
+    let term = landmark::linearize(camera, &view, &landmark, &measured).unwrap();
+    let residual =
+        |view: &ViewPose, landmark: &Landmark| landmark::residual_px(camera, view, landmark, &measured).unwrap();
+    for k in 0..6 {
+        let moved = |sign: f64| {
+            let mut step = Vector6::zeros();
+            step[k] = sign * STEP;
+            let turn = so3::exp(&step.fixed_rows::<3>(0).into_owned()).to_rotation_matrix();
+            residual(
+                &ViewPose {
+                    rotation: view.rotation * turn.matrix(),
+                    position_m: view.position_m + step.fixed_rows::<3>(3),
+                },
+                &landmark,
+            )
+        };
+        let slope = (moved(1.0) - moved(-1.0)) / (2.0 * STEP);
+        assert!((slope - term.by_view.column(k)).amax() < 1e-4, "view {k}");
+    }
+    for k in 0..3 {
+        let moved = |sign: f64| {
+            let mut step = Vector3::zeros();
+            step[k] = sign * STEP;
+            residual(&view, &landmark.plus(&step))
+        };
+        let slope = (moved(1.0) - moved(-1.0)) / (2.0 * STEP);
+        assert!((slope - term.by_landmark.column(k)).amax() < 1e-4, "landmark {k}");
+    }
+}
+
+fn pose_difference(to: &ViewPose, from: &ViewPose) -> Vector6<f64> {
+    let pose = |view: &ViewPose| {
+        let rotation = nalgebra::Rotation3::from_matrix_unchecked(view.rotation);
+        RigidTransform::new(nalgebra::UnitQuaternion::from_rotation_matrix(&rotation), view.position_m)
+    };
+    pose(to).minus(&pose(from))
+}
+
+#[test]
+fn views_follow_every_unknown() {
+    let example = example();
+    let (estimate, columns, gravity) = (&example.estimate, &example.columns, gravity_in_world(9.81));
+    let landmarks = vec![Vector3::zeros(); estimate.landmarks.len()];
+    for camera in [Camera::Static, Camera::Gimbal] {
+        let view = ViewId::new(3, camera);
+        let map = estimate.view_map(view, columns, &example.instants, &gravity);
+        let slope = |band: &dyn Fn(f64) -> Vec<f64>, border: &dyn Fn(f64) -> DVector<f64>| {
+            let at = |sign: f64| {
+                let moved = estimate.moved(columns, &band(sign * STEP), &border(sign * STEP), &landmarks);
+                moved.view(view, &example.instants, &gravity)
+            };
+            pose_difference(&at(1.0), &at(-1.0)) / (2.0 * STEP)
+        };
+        let still_band = |_| vec![0.0; columns.band()];
+        let still_border = |_| DVector::zeros(columns.borders());
+        for k in 0..columns.own() {
+            let band = |step: f64| {
+                let mut band = still_band(step);
+                band[3 * columns.block() + k] = step;
+                band
+            };
+            assert!((slope(&band, &still_border) - map.own.column(k)).amax() < 1e-6, "{camera:?} own {k}");
+        }
+        for k in 0..columns.borders() {
+            let border = |step: f64| {
+                let mut border = still_border(step);
+                border[k] = step;
+                border
+            };
+            // The turn by the time shift is taken to first order in the shift.
+            assert!(
+                (slope(&still_band, &border) - map.shared.column(k)).amax()
+                    < 2e-2 * map.shared.column(k).amax().max(1e-4),
+                "{camera:?} shared {k}"
+            );
+        }
+    }
+}
+
+#[test]
+fn the_gradient_of_the_whole_bundle_is_that_of_its_cost() {
+    let example = example();
+    let bundle = bundle(&example);
+    let columns = &example.columns;
+    let equations = bundle.linearize(&example.estimate);
+    // Landmarks that are held by such a damping do not move: what is left is the plain gradient.
+    let reduced = equations.visual().eliminate(1e18);
+    let (_, band, border) = bundle.assemble(&equations, &reduced);
+    let landmarks = vec![Vector3::zeros(); example.estimate.landmarks.len()];
+    let slope = |column: usize| {
+        let cost = |step: f64| {
+            let (mut band, mut border) = (vec![0.0; columns.band()], DVector::zeros(columns.borders()));
+            if column < columns.band() {
+                band[column] = step
+            } else {
+                border[column - columns.band()] = step
+            }
+            bundle.cost(&example.estimate.moved(columns, &band, &border, &landmarks))
+        };
+        // The bundle's cost is twice the one whose gradient is taken.
+        -(cost(1e-5) - cost(-1e-5)) / (4.0 * 1e-5)
+    };
+    for column in 0..columns.band() + columns.borders() {
+        let found = if column < columns.band() { band[column] } else { border[column - columns.band()] };
+        let expected = slope(column);
+        assert!((found - expected).abs() < 2e-3 * expected.abs() + 0.5, "column {column}: {found} against {expected}");
+    }
+}

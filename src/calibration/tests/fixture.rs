@@ -1,0 +1,102 @@
+//! Synthetic flights with both cameras.
+
+use std::sync::Arc;
+
+use crate::calibration::{CalibrationInput, GimbalCamera, StaticCamera, TrackedView};
+use crate::estimator::{EstimatorConfig, EstimatorOptions, ImuBias, NavigationState};
+use crate::flight_log::rig::{CameraMount, ChainPrior};
+use crate::flight_log::{JointAngles, Rig};
+use crate::geometry::RigidTransform;
+use crate::gimbal::{ClassicalChain, Parameterization};
+use crate::simulation::{SyntheticFlight, SyntheticFrame, SyntheticMount, SyntheticOptions, synthetic_tracks};
+
+/// A flight seen by both cameras, and the truth.
+pub(super) struct Flight {
+    pub(super) input: CalibrationInput,
+    pub(super) true_mount: RigidTransform,
+    pub(super) true_chain: ClassicalChain,
+    rigid: SyntheticFlight,
+}
+
+/// The true state at every image of the static camera.
+pub(super) fn true_states(flight: &Flight) -> Vec<NavigationState> {
+    let state = |frame: &SyntheticFrame| NavigationState {
+        world_from_imu: frame.true_world_from_imu,
+        velocity_m_per_s: frame.true_velocity_m_per_s,
+        bias: ImuBias {
+            gyroscope_rad_per_s: frame.true_bias.gyroscope_rad_per_s,
+            accelerometer_m_per_s2: frame.true_bias.accelerometer_m_per_s2,
+        },
+    };
+    flight.rigid.frames.iter().map(state).collect()
+}
+
+pub(super) fn mount(rig: &Rig) -> RigidTransform {
+    match &rig.cameras[0].mount {
+        CameraMount::Static { imu_from_camera } => *imu_from_camera,
+        CameraMount::Gimbal => panic!("a rigid camera"),
+    }
+}
+
+fn views(flight: &SyntheticFlight, encoder_sigma_rad: f64) -> Vec<TrackedView> {
+    flight
+        .frames
+        .iter()
+        .map(|frame| TrackedView {
+            frame_index: frame.index,
+            stamp_ns: frame.stamp_ns,
+            imu: frame.imu.clone(),
+            joint_angles: frame.joint_angles_rad.clone().map(|angles_rad| JointAngles {
+                sigmas_rad: vec![encoder_sigma_rad; angles_rad.len()],
+                lasting_sigmas_rad: vec![0.0; angles_rad.len()],
+                angles_rad,
+            }),
+            tracks: Arc::new(frame.tracks.clone()),
+        })
+        .collect()
+}
+
+/// The same flight with either camera: one seed gives one trajectory and one inertial record.
+pub(super) fn flight(options: &SyntheticOptions) -> Flight {
+    let gimbal = synthetic_tracks(&SyntheticOptions { mount: SyntheticMount::Gimbal, ..options.clone() });
+    let rigid = synthetic_tracks(&SyntheticOptions { mount: SyntheticMount::Static, ..options.clone() });
+    assert_eq!(gimbal.frames[7].imu, rigid.frames[7].imu, "one flight");
+    let given_mount = mount(&rigid.given_rig);
+    let mount_prior = ChainPrior { translation_bound_m: 0.003, rotation_bound_rad: 0.0087 };
+    let given = gimbal.given_rig.gimbal.clone().unwrap();
+    let sigma_rad = given.encoder_sigma_rad.unwrap();
+    let input = CalibrationInput {
+        static_camera: StaticCamera {
+            key: "cam1".to_owned(),
+            model: rigid.given_rig.cameras[0].model.clone(),
+            imu_from_camera: given_mount,
+            prior: mount_prior,
+            views: views(&rigid, sigma_rad),
+        },
+        gimbal_camera: GimbalCamera {
+            key: "cam0".to_owned(),
+            model: gimbal.given_rig.cameras[0].model.clone(),
+            chain: given.chain,
+            joints: given.joints.iter().map(|joint| joint.name.clone()).collect(),
+            prior: given.prior,
+            views: views(&gimbal, sigma_rad),
+        },
+        imu_noise: rigid.given_rig.imu.noise,
+        gravity_m_per_s2: rigid.given_rig.gravity_m_per_s2,
+        estimator: EstimatorConfig {
+            camera: rigid.given_rig.cameras[0].model.clone(),
+            imu_noise: rigid.given_rig.imu.noise,
+            gravity_m_per_s2: rigid.given_rig.gravity_m_per_s2,
+            chain: ClassicalChain { imu_from_base: given_mount, ..ClassicalChain::default() },
+            parameterization: Parameterization::Minimal,
+            auto_chart: false,
+            encoder_sigma_rad: None,
+            use_encoder: false,
+            calibrate: true,
+            chain_prior: Some((0.0017, 0.005)),
+            options: EstimatorOptions::default(),
+            clock_ms: || 0.0,
+        },
+    };
+    Flight { input, true_mount: mount(&rigid.true_rig), true_chain: gimbal.true_rig.gimbal.unwrap().chain, rigid }
+}

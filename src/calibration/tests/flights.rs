@@ -1,0 +1,89 @@
+//! Whole synthetic flights against their truth.
+
+use super::fixture::flight;
+use crate::calibration::{CalibrationError, CalibrationOptions, calibrate, chain_distance, transform_distance};
+use crate::flight_log::rig::ChainPrior;
+use crate::geometry::wrap_angle;
+use crate::gimbal::{Chain, ClassicalChain, Parameterization};
+use crate::simulation::SyntheticOptions;
+
+fn options(seed: u64) -> SyntheticOptions {
+    SyntheticOptions {
+        seed,
+        duration_s: 14.0,
+        features: 60,
+        pixel_sigma_px: 0.5,
+        outlier_share: 0.02,
+        encoder_sigma_rad: Some(2_f64.to_radians()),
+        start_error: ChainPrior { translation_bound_m: 0.03, rotation_bound_rad: 10_f64.to_radians() },
+        ..SyntheticOptions::default()
+    }
+}
+
+/// Mean over the parameters of the squared error in standard deviations.
+fn normalized_square(chain: &ClassicalChain, sigmas: &[f64], truth: &ClassicalChain, form: Parameterization) -> f64 {
+    let chain = Chain::from_classical(chain, form);
+    let error = chain.minus(&Chain::from_classical(truth, form));
+    let units = chain.parameter_units();
+    let square = |k: usize| {
+        let error = if units[k] == "rad" { wrap_angle(error[k]) } else { error[k] };
+        (error / sigmas[k]).powi(2)
+    };
+    (0..sigmas.len()).map(square).sum::<f64>() / sigmas.len() as f64
+}
+
+#[test]
+fn a_wrong_chain_is_found_within_its_sigmas() {
+    let mut of_pixels = 0.0;
+    for seed in 1..=3 {
+        let flight = flight(&options(seed));
+        let outcome = calibrate(&flight.input, &CalibrationOptions::default(), &mut |_| {}).unwrap();
+        let distance = |chain| chain_distance(chain, &flight.true_chain, &outcome.visited_rad).unwrap();
+        let ((given_m, given_rad), (_, loop_rad)) =
+            (distance(&outcome.given_chain), distance(&outcome.pose_loop.chain));
+        let (found_m, found_rad) = distance(&outcome.chain);
+        assert!(loop_rad.mean < 0.2 * given_rad.mean, "seed {seed}: loops leave {} rad", loop_rad.mean);
+        assert!(found_rad.mean < 0.2 * given_rad.mean, "seed {seed}: {} rad", found_rad.mean);
+        assert!(found_m.mean < 0.5 * given_m.mean, "seed {seed}: {} of {} m", found_m.mean, given_m.mean);
+        let (shift_m, turn_rad) = transform_distance(&outcome.mount.imu_from_camera, &flight.true_mount);
+        assert!(shift_m < 0.005 && turn_rad < 0.002, "seed {seed}: mount {shift_m} m, {turn_rad} rad");
+        let (shift_s, sigma_s) = outcome.mount.time_shift_s;
+        assert!(shift_s.abs() < 4.0 * sigma_s && sigma_s < 2e-4, "seed {seed}: {shift_s} ± {sigma_s} s");
+        assert!(outcome.parameters.iter().all(|parameter| parameter.sigma < parameter.prior_sigma));
+        assert_eq!(outcome.rank.as_ref().map(|rank| rank.rank_structural), Some(18));
+
+        let form = outcome.parameterization.parse().unwrap();
+        let sigmas: Vec<f64> = outcome.parameters.iter().map(|parameter| parameter.sigma).collect();
+        of_pixels += normalized_square(&outcome.chain, &sigmas, &flight.true_chain, form) / 3.0;
+    }
+    // The parameters of one flight are correlated: they count as a third as many numbers.
+    let tolerance = 4.0 * (2.0_f64 / (3.0 * 18.0 / 3.0)).sqrt();
+    assert!((of_pixels - 1.0).abs() < tolerance, "pixels: mean square of error over sigma {of_pixels}");
+}
+
+#[test]
+fn the_same_flight_gives_the_same_numbers() {
+    let flight = flight(&SyntheticOptions { duration_s: 10.0, ..options(4) });
+    let once = || calibrate(&flight.input, &CalibrationOptions::default(), &mut |_| {}).unwrap();
+    assert_eq!(once(), once());
+}
+
+#[test]
+fn a_flight_that_cannot_tell_says_why() {
+    let mut flight = flight(&SyntheticOptions { duration_s: 8.0, ..options(5) });
+    let options = CalibrationOptions::default();
+    let more = CalibrationOptions { least_measurements: 1000, ..options };
+    let error = calibrate(&flight.input, &more, &mut |_| {}).unwrap_err();
+    assert!(matches!(error, CalibrationError::TooFewMeasurements { needed: 1000, .. }), "{error}");
+    for view in &mut flight.input.gimbal_camera.views {
+        if let Some(angles) = &mut view.joint_angles {
+            angles.angles_rad = vec![0.3, 0.0, -0.2];
+        }
+    }
+    let error = calibrate(&flight.input, &options, &mut |_| {}).unwrap_err();
+    assert!(matches!(error, CalibrationError::NoJointMotion { .. }), "{error}");
+    assert!(error.to_string().contains("yaw 0.0°"), "{error}");
+    flight.input.static_camera.views.truncate(20);
+    let error = calibrate(&flight.input, &options, &mut |_| {}).unwrap_err();
+    assert!(matches!(error, CalibrationError::NoTrajectory { .. }), "{error}");
+}

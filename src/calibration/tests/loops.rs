@@ -1,0 +1,193 @@
+//! Pose loops with known answers.
+
+use nalgebra::{DVector, UnitQuaternion, Vector3, Vector6};
+
+use crate::calibration::chain_distance;
+use crate::calibration::chain_prior::ChainTerm;
+use crate::calibration::pose_loop::{LoopNoise, LoopState, PairedSegment, PoseLoops, PosePair, SegmentFrame};
+use crate::estimator::RobustLoss;
+use crate::flight_log::JointAngles;
+use crate::flight_log::rig::ChainPrior;
+use crate::geometry::{RigidTransform, SplitMix64, so3, wrap_angle};
+use crate::gimbal::{Chain, ClassicalChain, Parameterization};
+use crate::simulation::{SyntheticOptions, synthetic_tracks};
+
+struct Random(SplitMix64);
+
+impl Random {
+    /// Uniform within ±1.
+    fn next(&mut self) -> f64 {
+        2.0 * self.0.next_unit() - 1.0
+    }
+
+    fn vector(&mut self, scale: f64) -> Vector3<f64> {
+        Vector3::from_fn(|_, _| self.next()) * scale
+    }
+
+    /// About normal, of this standard deviation.
+    fn normal(&mut self, sigma: f64) -> f64 {
+        (0..12).map(|_| 0.5 * self.next()).sum::<f64>() * sigma
+    }
+}
+
+struct Example {
+    truth: ClassicalChain,
+    given: ClassicalChain,
+    segments: Vec<PairedSegment>,
+    visited: Vec<Vec<f64>>,
+}
+
+/// Poses measured up to `noise` of rotation and position, the given chain wrong by up to 10° and 3 cm.
+fn example(seed: u64, encoder_sigma_rad: f64, noise: (f64, f64), still: bool) -> Example {
+    let flight =
+        synthetic_tracks(&SyntheticOptions { seed, duration_s: 0.2, features: 1, ..SyntheticOptions::default() });
+    let truth = flight.true_rig.gimbal.unwrap().chain;
+    let mut random = Random(SplitMix64::new(seed));
+    let minimal = Chain::from_classical(&truth, Parameterization::MinimalYx);
+    let units = minimal.parameter_units();
+    let error = DVector::from_fn(minimal.dof(), |k, _| random.next() * if units[k] == "rad" { 0.17 } else { 0.03 });
+    let given = minimal.plus(&error).to_classical();
+    let mut visited = Vec::new();
+    let segments = (0..8)
+        .map(|_| {
+            let frame = SegmentFrame {
+                world_from_segment: RigidTransform::new(so3::exp(&random.vector(2.0)), random.vector(5.0)),
+                metres_per_unit: 0.5 + random.next().abs() * 3.0,
+            };
+            let start = random.vector(10.0);
+            (0..10)
+                .map(|step| {
+                    let angles: Vec<f64> = if still {
+                        vec![0.1, 0.0, -0.1]
+                    } else {
+                        vec![random.next(), 0.4 * random.next(), 0.5 * random.next()]
+                    };
+                    let world_from_imu = RigidTransform::new(
+                        so3::exp(&random.vector(0.6)),
+                        start + Vector3::new(0.4, 0.1, 0.0) * f64::from(step) + random.vector(0.2),
+                    );
+                    let camera = world_from_imu * truth.imu_from_camera(&angles);
+                    let mut seen = frame.world_from_segment.inverse() * camera;
+                    let mut errors = || Vector3::from_fn(|_, _| random.normal(1.0));
+                    let (turn, shift) = (errors() * noise.0, errors() * noise.1);
+                    seen = RigidTransform::new(seen.rotation * so3::exp(&turn), seen.translation_m + shift);
+                    seen.translation_m /= frame.metres_per_unit;
+                    let readings = angles.iter().map(|angle| angle + random.normal(encoder_sigma_rad)).collect();
+                    visited.push(angles);
+                    PosePair {
+                        world_from_imu,
+                        segment_from_camera: RigidTransform::new(
+                            UnitQuaternion::new_normalize(seen.rotation.into_inner()),
+                            seen.translation_m,
+                        ),
+                        encoder: JointAngles {
+                            angles_rad: readings,
+                            sigmas_rad: vec![encoder_sigma_rad; 3],
+                            lasting_sigmas_rad: vec![0.0; 3],
+                        },
+                    }
+                })
+                .collect()
+        })
+        .collect();
+    Example { truth, given, segments, visited }
+}
+
+fn prior() -> ChainPrior {
+    ChainPrior { translation_bound_m: 0.03, rotation_bound_rad: 0.175 }
+}
+
+#[test]
+fn rows_are_differentiated() {
+    let example = example(3, 0.05, (0.0, 0.0), false);
+    let term = ChainTerm::new(&example.given, &prior());
+    let loops = PoseLoops { segments: &example.segments, prior: &term };
+    let noise = LoopNoise { rotation_rad: 0.01, position_m: 0.02, loss: RobustLoss::None };
+    let state = LoopState {
+        chain: term.given.clone(),
+        joints_rad: example
+            .segments
+            .iter()
+            .map(|pairs| pairs.iter().map(|pair| pair.encoder.angles_rad.clone()).collect())
+            .collect(),
+        frames: (0..example.segments.len())
+            .map(|k| SegmentFrame {
+                world_from_segment: RigidTransform::new(
+                    so3::exp(&Vector3::new(0.3, 0.1 * k as f64, 0.2)),
+                    Vector3::new(1.0, 2.0, 3.0),
+                ),
+                metres_per_unit: 1.3,
+            })
+            .collect(),
+    };
+    let rows = loops.rows(&state, 2, 4, &noise);
+    let step = 1e-6;
+    let check = |name: &str, column: nalgebra::Matrix6xX<f64>, move_by: &dyn Fn(&mut LoopState, usize, f64)| {
+        for k in 0..column.ncols() {
+            let at = |sign: f64| -> Vector6<f64> {
+                let mut moved = state.clone();
+                move_by(&mut moved, k, sign * step);
+                loops.rows(&moved, 2, 4, &noise).residual
+            };
+            let slope = (at(1.0) - at(-1.0)) / (2.0 * step);
+            assert!((slope - column.column(k)).amax() < 1e-4, "{name} {k}");
+        }
+    };
+    check("chain", rows.by_chain.clone(), &|state, k, step| {
+        let delta = DVector::from_fn(state.chain.dof(), |row, _| if row == k { step } else { 0.0 });
+        state.chain = state.chain.plus(&delta);
+    });
+    check("joints", rows.by_joints.clone(), &|state, k, step| state.joints_rad[2][4][k] += step);
+    check("frame", rows.by_frame.clone(), &|state, k, step| {
+        let mut delta = [0.0; 7];
+        delta[k] = step;
+        state.frames[2] = state.frames[2].plus(&delta);
+    });
+}
+
+#[test]
+fn exact_poses_give_the_chain_back_to_what_the_encoders_leave_open() {
+    for seed in 1..=4 {
+        let example = example(seed, 1e-4, (0.0, 0.0), false);
+        let term = ChainTerm::new(&example.given, &prior());
+        let solution = PoseLoops { segments: &example.segments, prior: &term }.solve().unwrap();
+        let (before, _) = chain_distance(&example.given, &example.truth, &example.visited).unwrap();
+        let (shift, turn) = chain_distance(&solution.chain.to_classical(), &example.truth, &example.visited).unwrap();
+        assert!(before.mean > 0.01, "seed {seed} begins {} m off", before.mean);
+        assert!(shift.mean < 5e-4 && turn.mean < 1e-3, "seed {seed}: {} m, {} rad", shift.mean, turn.mean);
+    }
+}
+
+#[test]
+fn noisy_encoders_leave_the_chain_within_its_sigmas() {
+    let (mut square, mut count) = (0.0, 0.0);
+    for seed in 11..=16 {
+        let example = example(seed, 0.1, (1e-3, 5e-3), false);
+        let term = ChainTerm::new(&example.given, &prior());
+        let solution = PoseLoops { segments: &example.segments, prior: &term }.solve().unwrap();
+        let truth = Chain::from_classical(&example.truth, solution.chain.parameterization());
+        let error = solution.chain.minus(&truth).map(wrap_angle);
+        let information = solution.covariance.clone().try_inverse().unwrap();
+        square += (error.transpose() * information * &error)[0];
+        count += error.len() as f64;
+    }
+    // Mean of a χ² over its degrees of freedom: within four standard deviations of one.
+    let ratio: f64 = square / count;
+    assert!((ratio - 1.0).abs() < 4.0 * (2.0 / count).sqrt(), "normalized square of the error {ratio}");
+}
+
+/// With still joints only one rigid transform can be told: the parameters stay as uncertain as they were, but it is found.
+#[test]
+fn still_joints_leave_the_prior_on_what_they_do_not_show() {
+    let moving = example(5, 0.01, (0.0, 0.0), false);
+    let example = example(5, 0.01, (0.0, 0.0), true);
+    let term = ChainTerm::new(&example.given, &prior());
+    let solution = PoseLoops { segments: &example.segments, prior: &term }.solve().unwrap();
+    let moved = PoseLoops { segments: &moving.segments, prior: &term }.solve().unwrap();
+    let total = |covariance: &nalgebra::DMatrix<f64>| {
+        (0..covariance.nrows()).map(|k| covariance[(k, k)] / term.prior_sigmas[k].powi(2)).sum::<f64>()
+    };
+    assert!(total(&solution.covariance) > 5.0 * total(&moved.covariance));
+    let (shift, turn) = chain_distance(&solution.chain.to_classical(), &example.truth, &example.visited).unwrap();
+    assert!(shift.mean < 0.01 && turn.mean < 0.02, "{} m, {} rad", shift.mean, turn.mean);
+}

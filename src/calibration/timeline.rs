@@ -1,0 +1,193 @@
+//! The instants whose states are estimated: an image of the static camera each, and the gimbal camera's image next to it.
+
+use nalgebra::Vector3;
+
+use super::input::TrackedView;
+use super::{CalibrationInput, CalibrationOptions};
+use crate::estimator::preintegration::Matrix15;
+use crate::estimator::{ImuBias, NavigationState, Preintegration};
+use crate::flight_log::rig::ImuNoise;
+use crate::flight_log::{ImuSample, JointAngles};
+use crate::geometry::{ns_from_seconds, seconds_from_ns, wrap_angle};
+
+/// An image of the gimbal camera belongs to an instant when it was taken at most this long after it.
+const LONGEST_HOP_NS: i64 = 60_000_000;
+
+/// The gimbal camera's image that belongs to an instant.
+#[derive(Clone, Debug)]
+pub(super) struct GimbalView {
+    /// Its place among the camera's views.
+    pub(super) view: usize,
+    /// Motion from the instant to the image: so short that it counts as exact.
+    pub(super) hop: Preintegration,
+    /// Angular velocity measured at the image's stamp, in rad/s.
+    pub(super) gyroscope_rad_per_s: Vector3<f64>,
+    /// What the encoders say.
+    pub(super) encoder: JointAngles,
+    /// Their rates of change by the readings before and after, in rad/s.
+    pub(super) reading_rate_rad_per_s: Vec<f64>,
+}
+
+/// One instant.
+#[derive(Clone, Debug)]
+pub(super) struct Instant {
+    /// Since the log began.
+    pub(super) stamp_ns: i64,
+    /// Place of the static camera's image among its views.
+    pub(super) static_view: usize,
+    /// Angular velocity measured there, in rad/s.
+    pub(super) gyroscope_rad_per_s: Vector3<f64>,
+    /// Bias that is taken off for what happens within milliseconds: the way to the gimbal camera's image, time offsets.
+    pub(super) bias: ImuBias,
+    /// Inertial samples since the instant before, and their square-root information; `None` at the first.
+    pub(super) motion: Option<(Preintegration, Matrix15)>,
+    /// The gimbal camera's image.
+    pub(super) gimbal: Option<GimbalView>,
+}
+
+impl Instant {
+    /// Integrates the inertial samples again around the bias of the state that they begin at.
+    pub(super) fn reintegrate(&mut self, before: Option<&ImuBias>, here: &ImuBias) {
+        if let (Some((motion, information)), Some(bias)) = (&mut self.motion, before) {
+            motion.reintegrate(*bias);
+            if let Some(renewed) = motion.square_root_information() {
+                *information = renewed;
+            }
+        }
+        self.bias = *here;
+        if let Some(gimbal) = &mut self.gimbal {
+            gimbal.hop.reintegrate(*here);
+        }
+    }
+}
+
+/// All inertial samples in time order.
+pub(super) struct InertialTape {
+    samples: Vec<ImuSample>,
+}
+
+impl InertialTape {
+    /// From the stretches that came with the images of a camera.
+    pub(super) fn new(views: &[TrackedView]) -> Self {
+        let mut samples: Vec<ImuSample> = Vec::new();
+        for sample in views.iter().flat_map(|view| &view.imu) {
+            let finite = sample.angular_velocity_rad_per_s.iter().chain(&sample.specific_force_m_per_s2);
+            let later = samples.last().is_none_or(|last| sample.stamp_ns > last.stamp_ns);
+            if later && finite.into_iter().all(|value| value.is_finite()) {
+                samples.push(*sample);
+            }
+        }
+        Self { samples }
+    }
+
+    /// The sample at a time, linear between its neighbours; the nearest one beyond the ends.
+    pub(super) fn at(&self, stamp_ns: i64) -> Option<ImuSample> {
+        let after = self.samples.partition_point(|sample| sample.stamp_ns < stamp_ns);
+        let Some(next) = self.samples.get(after) else { return self.samples.last().copied() };
+        let Some(before) = after.checked_sub(1).map(|index| &self.samples[index]) else { return Some(*next) };
+        let share = (stamp_ns - before.stamp_ns) as f64 / (next.stamp_ns - before.stamp_ns) as f64;
+        Some(ImuSample {
+            stamp_ns,
+            angular_velocity_rad_per_s: before.angular_velocity_rad_per_s.lerp(&next.angular_velocity_rad_per_s, share),
+            specific_force_m_per_s2: before.specific_force_m_per_s2.lerp(&next.specific_force_m_per_s2, share),
+        })
+    }
+
+    /// The samples of an interval, both ends interpolated.
+    pub(super) fn between(&self, from_ns: i64, to_ns: i64) -> Vec<ImuSample> {
+        let inside = self.samples.partition_point(|sample| sample.stamp_ns <= from_ns)
+            ..self.samples.partition_point(|sample| sample.stamp_ns < to_ns);
+        let mut samples = Vec::with_capacity(inside.len() + 2);
+        samples.extend(self.at(from_ns).map(|sample| ImuSample { stamp_ns: from_ns, ..sample }));
+        if to_ns > from_ns {
+            samples.extend_from_slice(self.samples.get(inside).unwrap_or(&[]));
+            samples.extend(self.at(to_ns).map(|sample| ImuSample { stamp_ns: to_ns, ..sample }));
+        }
+        samples
+    }
+
+    fn integrated(&self, noise: ImuNoise, bias: ImuBias, from_ns: i64, to_ns: i64) -> Preintegration {
+        Preintegration::from_samples(noise, bias, &self.between(from_ns, to_ns))
+    }
+}
+
+/// The instants of the longest stretch for which the static camera has states, with those states.
+pub(super) fn instants(
+    input: &CalibrationInput,
+    options: &CalibrationOptions,
+    states: &[Option<NavigationState>],
+) -> (Vec<Instant>, Vec<NavigationState>) {
+    let static_views = &input.static_camera.views;
+    let tape = InertialTape::new(static_views);
+    let spacing_ns = ns_from_seconds(options.spacing_s);
+    let mut chosen: Vec<(usize, NavigationState)> = Vec::new();
+    for index in longest_stretch(states) {
+        let Some(state) = &states[index] else { continue };
+        // Half an image period early is nearer than half a period late.
+        let due = chosen.last().is_none_or(|(last, _)| {
+            let period_ns = static_views[index].stamp_ns - static_views[index - 1].stamp_ns;
+            static_views[index].stamp_ns - static_views[*last].stamp_ns >= spacing_ns - period_ns / 2
+        });
+        if due {
+            chosen.push((index, *state));
+        }
+    }
+    let mut instants: Vec<Instant> = Vec::with_capacity(chosen.len());
+    for (index, state) in &chosen {
+        let stamp_ns = static_views[*index].stamp_ns;
+        let motion = instants.last().zip(instants.len().checked_sub(1)).and_then(|(before, place)| {
+            let bias = chosen[place].1.bias;
+            let motion = tape.integrated(input.imu_noise, bias, before.stamp_ns, stamp_ns);
+            let information = motion.square_root_information()?;
+            Some((motion, information))
+        });
+        instants.push(Instant {
+            stamp_ns,
+            static_view: *index,
+            gyroscope_rad_per_s: tape.at(stamp_ns).map_or_else(Vector3::zeros, |s| s.angular_velocity_rad_per_s),
+            bias: state.bias,
+            motion,
+            gimbal: gimbal_view(input, &tape, stamp_ns, &state.bias),
+        });
+    }
+    (instants, chosen.into_iter().map(|(_, state)| state).collect())
+}
+
+/// The first image of the gimbal camera at or after an instant, when it follows closely and has encoder readings.
+fn gimbal_view(input: &CalibrationInput, tape: &InertialTape, stamp_ns: i64, bias: &ImuBias) -> Option<GimbalView> {
+    let views = &input.gimbal_camera.views;
+    let index = views.partition_point(|view| view.stamp_ns < stamp_ns);
+    let view = views.get(index)?;
+    if view.stamp_ns - stamp_ns > LONGEST_HOP_NS {
+        return None;
+    }
+    let encoder = view.joint_angles.clone()?;
+    Some(GimbalView {
+        view: index,
+        hop: tape.integrated(input.imu_noise, *bias, stamp_ns, view.stamp_ns),
+        gyroscope_rad_per_s: tape.at(view.stamp_ns)?.angular_velocity_rad_per_s,
+        reading_rate_rad_per_s: reading_rates(views, index).unwrap_or_else(|| vec![0.0; encoder.angles_rad.len()]),
+        encoder,
+    })
+}
+
+fn reading_rates(views: &[TrackedView], index: usize) -> Option<Vec<f64>> {
+    let (before, after) = (views.get(index.checked_sub(1)?)?, views.get(index + 1)?);
+    let duration_s = seconds_from_ns(after.stamp_ns - before.stamp_ns);
+    let pairs = before.joint_angles.as_ref()?.angles_rad.iter().zip(&after.joint_angles.as_ref()?.angles_rad);
+    (duration_s > 0.0).then(|| pairs.map(|(from, to)| wrap_angle(to - from) / duration_s).collect())
+}
+
+/// The longest run of images with a state.
+fn longest_stretch(states: &[Option<NavigationState>]) -> std::ops::Range<usize> {
+    let (mut longest, mut begin) = (0..0, 0);
+    for index in 0..=states.len() {
+        if index == states.len() || states[index].is_none() {
+            if index - begin > longest.len() {
+                longest = begin..index;
+            }
+            begin = index + 1;
+        }
+    }
+    longest
+}
