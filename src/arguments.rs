@@ -25,6 +25,8 @@ pub(crate) enum Command {
     /// Draw one panel at one instant into a PNG, without a display.
     #[cfg(feature = "gui")]
     Screenshot(ScreenshotArguments),
+    /// Calibrate static camera and gimbal offline from a flight with both, as the paper's baseline does.
+    Calibrate(CalibrateArguments),
     /// Say what is in a log and what is wrong with it, before anyone trusts a result.
     Check(CheckArguments),
     /// Write a synthetic flight with known truth: the log, its rig and its truth.
@@ -135,6 +137,31 @@ pub(crate) enum ThemeArgument {
     Dark,
     /// For paper.
     Print,
+}
+
+/// `dcvins calibrate`.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct CalibrateArguments {
+    /// The log; its rig names a static camera, a gimbal camera and encoders.
+    pub log: PathBuf,
+    /// Folder for rig.yaml, calibration.json and report.txt.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// The rig, when it is not beside the log (LOG with .rig.yaml) or attached to it.
+    #[arg(long, value_name = "FILE")]
+    pub rig: Option<PathBuf>,
+    /// The rig's true values, when they are not beside the log (LOG with .truth.yaml).
+    #[arg(long, value_name = "FILE")]
+    pub truth: Option<PathBuf>,
+    /// Leave out this many seconds at the begin of the log.
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = seconds)]
+    pub start: f64,
+    /// Read this many seconds from there.
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    pub duration: Option<f64>,
+    /// Print calibration.json instead of the report.
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// `dcvins check`.

@@ -6,15 +6,16 @@ use std::path::Path;
 use std::sync::Arc;
 
 use anyhow::{Context as _, Result, bail};
+use dcvins::calibration::CalibrationOptions;
 use dcvins::export::{self, EvaluationOptions, RunFileOptions, RunSummary};
 use dcvins::flight_log::{self, FlightLog, Rig};
 use dcvins::geometry::seconds_from_ns;
-use dcvins::session::{self, Recording, SessionPlan, SessionRequest, Stopwatch};
+use dcvins::session::{self, CalibrationRequest, Recording, SessionPlan, SessionRequest, Stopwatch};
 use dcvins::simulation::{self, Experiment, SimulationOptions};
 
 use crate::arguments::{
-    CheckArguments, EncoderArgument, EvaluateArguments, ExperimentArgument, RunArguments, SimulateArguments,
-    ViewArguments,
+    CalibrateArguments, CheckArguments, EncoderArgument, EvaluateArguments, ExperimentArgument, RunArguments,
+    SimulateArguments, ViewArguments,
 };
 
 /// Least time between two drawings of the progress bar.
@@ -281,6 +282,30 @@ pub(crate) fn screenshot(arguments: &crate::arguments::ScreenshotArguments) -> R
     };
     let picture = draw_panel(&arguments.panel, &recording, at_ns, &mut images, &options)?;
     Ok(write_png(&picture, &arguments.output)?)
+}
+
+/// `dcvins calibrate`.
+pub(crate) fn calibrate(arguments: &CalibrateArguments) -> Result<()> {
+    let request = CalibrationRequest {
+        log_path: arguments.log.clone(),
+        rig_path: arguments.rig.clone(),
+        truth_path: arguments.truth.clone(),
+        start_s: arguments.start,
+        duration_s: arguments.duration,
+    };
+    let mut progress = Progress::new();
+    let run = session::calibrate(&request, &CalibrationOptions::default(), &mut |at| {
+        progress.show(at.share, || at.stage.to_owned());
+    });
+    progress.clear();
+    let run = run?;
+    let report = export::report_calibration(&run);
+    export::write_calibration(&run, &report, &arguments.out)?;
+    if arguments.json {
+        print(&format!("{}\n", serde_json::to_string_pretty(&report)?))
+    } else {
+        print(&format!("{report}  files        {}\n", arguments.out.display()))
+    }
 }
 
 /// `dcvins check`.

@@ -17,6 +17,7 @@ fn main() -> ExitCode {
         Command::Run(run) => commands::run(&run),
         #[cfg(feature = "gui")]
         Command::Screenshot(screenshot) => commands::screenshot(&screenshot),
+        Command::Calibrate(calibrate) => commands::calibrate(&calibrate),
         Command::Check(check) => commands::check(&check),
         Command::Simulate(simulate) => commands::simulate(&simulate),
         Command::Evaluate(evaluate) => commands::evaluate(&evaluate),

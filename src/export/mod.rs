@@ -1,5 +1,7 @@
 //! Tables, trajectories and pictures without a window.
 
+mod calibration_files;
+mod calibration_report;
 #[cfg(feature = "gui")]
 mod desktop;
 mod error;
@@ -12,6 +14,8 @@ mod summary;
 mod tables;
 pub mod trajectory;
 
+pub use calibration_files::write_calibration;
+pub use calibration_report::{CalibrationReport, report_calibration};
 #[cfg(feature = "gui")]
 pub use desktop::Machine;
 pub use error::ExportError;

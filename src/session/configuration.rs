@@ -5,7 +5,7 @@ use super::spec::{ParameterizationChoice, RunSpec};
 use super::stopwatch::clock_ms;
 use crate::estimator::{EstimatorConfig, EstimatorOptions};
 use crate::flight_log::Rig;
-use crate::flight_log::rig::{CameraMount, ChainPrior};
+use crate::flight_log::rig::{CameraMount, CameraRig, ChainPrior};
 use crate::gimbal::{Parameterization, auto_parameterization};
 
 /// How wrong a rigid camera's pose on the IMU may be when the rig has no prior: a target calibration is better than this.
@@ -14,21 +14,26 @@ const RIGID_CAMERA_PRIOR: ChainPrior = ChainPrior { translation_bound_m: 0.01, r
 /// Standard deviation of a uniform error within ±1.
 const SIGMA_PER_BOUND: f64 = 0.577_350_269_189_625_8;
 
+/// How wrong the rig may be about how a camera is carried.
+pub(super) fn mount_prior(rig: &Rig, camera: &CameraRig) -> ChainPrior {
+    match (&rig.gimbal, &camera.mount) {
+        (Some(gimbal), CameraMount::Gimbal) => gimbal.prior,
+        // The rigid camera of a gimbal rig was calibrated with the same care as its gimbal, but never better than a
+        // rigid camera usually is.
+        (Some(gimbal), CameraMount::Static { .. }) => ChainPrior {
+            translation_bound_m: gimbal.prior.translation_bound_m.min(RIGID_CAMERA_PRIOR.translation_bound_m),
+            rotation_bound_rad: gimbal.prior.rotation_bound_rad.min(RIGID_CAMERA_PRIOR.rotation_bound_rad),
+        },
+        (None, _) => RIGID_CAMERA_PRIOR,
+    }
+}
+
 /// The estimator that a run asks for.
 pub(super) fn estimator_config(rig: &Rig, spec: &RunSpec) -> Result<EstimatorConfig, SessionError> {
     let camera = camera_of_run(rig, spec)?;
     let chain = rig.chain_of_camera(&camera.key).unwrap_or_default();
     let gimbal = rig.gimbal.as_ref().filter(|_| camera.mount == CameraMount::Gimbal);
-    let prior = match (&gimbal, &rig.gimbal) {
-        (Some(gimbal), _) => gimbal.prior,
-        // The rigid camera of a gimbal rig was calibrated with the same care as its gimbal, but never better than a
-        // rigid camera usually is.
-        (None, Some(gimbal)) => ChainPrior {
-            translation_bound_m: gimbal.prior.translation_bound_m.min(RIGID_CAMERA_PRIOR.translation_bound_m),
-            rotation_bound_rad: gimbal.prior.rotation_bound_rad.min(RIGID_CAMERA_PRIOR.rotation_bound_rad),
-        },
-        (None, None) => RIGID_CAMERA_PRIOR,
-    };
+    let prior = mount_prior(rig, camera);
     let parameterization = match spec.parameterization {
         ParameterizationChoice::Auto => auto_parameterization(&chain),
         ParameterizationChoice::Minimal | ParameterizationChoice::Static => Parameterization::Minimal,

@@ -4,6 +4,7 @@
 //! [`compute`] fills one without a window; a [`Session`] plays one while it still grows.
 
 pub mod accuracy;
+mod calibrate;
 mod command;
 mod configuration;
 mod engine;
@@ -19,6 +20,7 @@ mod stopwatch;
 mod tests;
 mod tracker;
 
+pub use calibrate::{CalibrationRequest, CalibrationRun, CalibrationRunError, calibrate};
 pub use command::{Command, PlaybackSpeed};
 pub use engine::EngineMessage;
 pub use plan::{MAX_RUNS, SessionError, SessionPlan, SessionRequest};

@@ -22,6 +22,7 @@ fn check(arguments: &[&str], code: i32, words: &[&str]) {
 fn wrong_use_is_exit_code_2() {
     check(&["fly"], 2, &["unrecognized subcommand", "fly"]);
     check(&["run", "log.mcap"], 2, &["--out"]);
+    check(&["calibrate", "log.mcap"], 2, &["--out"]);
     check(&["run", "log.mcap", "--out", "x", "--run", "minimol"], 2, &["minimol", "minimal-swapped"]);
     check(&["run", "log.mcap", "--out", "x", "--start=-3"], 2, &["--start"]);
     check(&["evaluate", "a.tum", "b.tum", "--delta", "3x"], 2, &["--delta", "10m"]);
@@ -38,6 +39,7 @@ fn failed_work_is_exit_code_1_and_one_message() {
     check(&["run", &path("empty.mcap"), "--out", &out], 1, &["empty.mcap"]);
     std::fs::write(path("text.mcap"), b"this is no log, but a text of some length\n").unwrap();
     check(&["run", &path("text.mcap"), "--out", &out], 1, &["text.mcap"]);
+    check(&["calibrate", &path("text.mcap"), "--out", &out], 1, &["text.mcap"]);
     check(&["check", &path("text.mcap")], 1, &["text.mcap"]);
     check(&["evaluate", &path("a.tum"), &path("b.tum")], 1, &["a.tum"]);
     assert!(!Path::new(&out).exists(), "nothing is written for a log that cannot be read");

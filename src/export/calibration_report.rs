@@ -1,0 +1,426 @@
+//! `calibration.json` and the printed report of `dcvins calibrate`, after Kalibr's.
+
+use std::fmt;
+
+use nalgebra::Matrix4;
+use serde::Serialize;
+
+use super::summary::log_name;
+use super::tables::parameter_name;
+use crate::calibration::{
+    CalibrationOutcome, MountReport, PixelReport, Statistics, chain_distance, transform_distance,
+};
+use crate::flight_log::Rig;
+use crate::flight_log::rig::CameraMount;
+use crate::geometry::{RigidTransform, seconds_from_ns, so3, wrap_angle};
+use crate::gimbal::{Chain, ClassicalChain};
+use crate::session::CalibrationRun;
+
+/// Statistics of a series of lengths, in the unit that the field's name says.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct StatisticsReport {
+    /// How many.
+    pub count: usize,
+    /// Mean.
+    pub mean: f64,
+    /// Median.
+    pub median: f64,
+    /// Standard deviation about the mean.
+    pub std: f64,
+    /// Root of the mean square.
+    pub rms: f64,
+}
+
+impl From<Statistics> for StatisticsReport {
+    fn from(statistics: Statistics) -> Self {
+        let Statistics { count, mean, median, std, rms } = statistics;
+        Self { count, mean, median, std, rms }
+    }
+}
+
+/// One parameter, before and after.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ParameterReport {
+    /// Its name, joints and cameras by name.
+    pub name: String,
+    /// `rad`, `m` or `s`.
+    pub unit: &'static str,
+    /// What the rig gave.
+    pub initial: f64,
+    /// What was found.
+    #[serde(rename = "final")]
+    pub last: f64,
+    /// Its standard deviation.
+    pub sigma: f64,
+    /// Its standard deviation by the rig alone.
+    pub prior_sigma: Option<f64>,
+    /// The true value.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub truth: Option<f64>,
+    /// Final minus true.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error: Option<f64>,
+}
+
+/// Reprojection errors of one camera.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ReprojectionReport {
+    /// Key of the camera.
+    pub camera: String,
+    /// Landmarks that it saw.
+    pub landmarks: usize,
+    /// Lengths in pixels, one per sighting.
+    pub error_px: StatisticsReport,
+}
+
+impl From<&PixelReport> for ReprojectionReport {
+    fn from(pixels: &PixelReport) -> Self {
+        Self { camera: pixels.camera.clone(), landmarks: pixels.landmarks, error_px: pixels.residuals_px.into() }
+    }
+}
+
+/// Distance of a calibration from the truth.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct DistanceReport {
+    /// Mean distance over the joint angles visited.
+    pub translation_mean_m: f64,
+    /// Its standard deviation.
+    pub translation_std_m: f64,
+    /// Mean angle.
+    pub rotation_mean_rad: f64,
+    /// Its standard deviation.
+    pub rotation_std_rad: f64,
+}
+
+/// Distances from the truth, stage by stage.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TruthReport {
+    /// `imu_from_camera` of the static camera as the rig gave it.
+    pub static_initial: DistanceReport,
+    /// After the camera–IMU calibration alone.
+    pub static_camera_imu: DistanceReport,
+    /// After the bundle of both cameras.
+    pub static_final: DistanceReport,
+    /// The chain as the rig gave it.
+    pub chain_initial: DistanceReport,
+    /// After the pose loops.
+    pub chain_pose_loop: DistanceReport,
+    /// After the bundle of both cameras.
+    pub chain_final: DistanceReport,
+}
+
+/// Pairs of camera poses and the loops that they close.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LoopReport {
+    /// Reconstructions of the gimbal camera.
+    pub segments: usize,
+    /// Pairs of camera poses.
+    pub pairs: usize,
+    /// Pairs that kept at least half of their weight.
+    pub fitting: usize,
+    /// Lengths of the gaps in metres.
+    pub gap_m: StatisticsReport,
+}
+
+/// Ranks of the chain over the whole flight.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct CalibrationRank {
+    /// Parameters.
+    pub columns: usize,
+    /// Structural rank.
+    pub rank_structural: usize,
+    /// Directions about which the flight says more than 10° and 3 cm.
+    pub rank_informed: usize,
+    /// In one line.
+    pub verdict: String,
+}
+
+/// `calibration.json`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CalibrationReport {
+    /// File name of the log.
+    pub log: String,
+    /// Begin and end of the stretch that was used, in seconds since the log began.
+    pub stretch_s: [f64; 2],
+    /// Instants whose states were estimated.
+    pub instants: usize,
+    /// Form in which the chain was estimated.
+    pub parameterization: String,
+    /// Static camera alone.
+    pub camera_imu_reprojection: ReprojectionReport,
+    /// Both cameras in one bundle, static one first.
+    pub reprojection: Vec<ReprojectionReport>,
+    /// Mean angular velocity between instants against the gyroscope's, in rad/s.
+    pub gyroscope_error_rad_per_s: StatisticsReport,
+    /// Mean acceleration between instants against the accelerometer's, in m/s².
+    pub accelerometer_error_m_per_s2: StatisticsReport,
+    /// The pose loops.
+    pub pose_loops: LoopReport,
+    /// Every calibrated parameter: static camera, time offsets, chain.
+    pub parameters: Vec<ParameterReport>,
+    /// `T_cam_imu` of the static camera, rows.
+    pub static_t_cam_imu: [[f64; 4]; 4],
+    /// `T_imu_cam` of the gimbal camera with all joints at zero, rows.
+    pub gimbal_t_imu_cam_at_zero: [[f64; 4]; 4],
+    /// Observability of the chain.
+    pub rank: Option<CalibrationRank>,
+    /// Against the truth, where it is known.
+    pub truth: Option<TruthReport>,
+    /// What a user should know.
+    pub warnings: Vec<String>,
+}
+
+/// Puts a calibration into the report's form.
+pub fn report_calibration(run: &CalibrationRun) -> CalibrationReport {
+    let outcome = &run.outcome;
+    let zero = vec![0.0; outcome.chain.joint_count()];
+    let mut warnings = outcome.warnings.clone();
+    warnings.extend(
+        run.warnings.iter().map(|warning| format!("{:.3} s: {}", seconds_from_ns(warning.stamp_ns), warning.message)),
+    );
+    CalibrationReport {
+        log: log_name(&run.log_path),
+        stretch_s: [seconds_from_ns(outcome.stretch_ns.0), seconds_from_ns(outcome.stretch_ns.1)],
+        instants: outcome.instants,
+        parameterization: outcome.parameterization.to_owned(),
+        camera_imu_reprojection: (&outcome.static_pixels).into(),
+        reprojection: outcome.pixels.iter().map(Into::into).collect(),
+        gyroscope_error_rad_per_s: outcome.inertial.gyroscope_rad_per_s.into(),
+        accelerometer_error_m_per_s2: outcome.inertial.accelerometer_m_per_s2.into(),
+        pose_loops: LoopReport {
+            segments: outcome.pose_loop.segments,
+            pairs: outcome.pose_loop.pairs,
+            fitting: outcome.pose_loop.fitting,
+            gap_m: outcome.pose_loop.gaps_m.into(),
+        },
+        parameters: parameters(run),
+        static_t_cam_imu: rows(&outcome.mount.imu_from_camera.inverse()),
+        gimbal_t_imu_cam_at_zero: rows(&outcome.chain.imu_from_camera(&zero)),
+        rank: outcome.rank.as_ref().map(|rank| CalibrationRank {
+            columns: rank.names.len(),
+            rank_structural: rank.rank_structural,
+            rank_informed: rank.rank_informed,
+            verdict: rank.verdict(),
+        }),
+        truth: run.truth_rig.as_ref().and_then(|truth| truth_report(run, truth)),
+        warnings,
+    }
+}
+
+fn rows(transform: &RigidTransform) -> [[f64; 4]; 4] {
+    let matrix: Matrix4<f64> = transform.to_matrix();
+    std::array::from_fn(|row| std::array::from_fn(|column| matrix[(row, column)]))
+}
+
+fn true_mount(truth: &Rig, key: &str) -> Option<RigidTransform> {
+    truth.cameras.iter().find(|camera| camera.key == key).and_then(|camera| match &camera.mount {
+        CameraMount::Static { imu_from_camera } => Some(*imu_from_camera),
+        CameraMount::Gimbal => None,
+    })
+}
+
+fn truth_report(run: &CalibrationRun, truth: &Rig) -> Option<TruthReport> {
+    let outcome = &run.outcome;
+    let mount = true_mount(truth, &run.static_camera)?;
+    let chain = &truth.gimbal.as_ref()?.chain;
+    if chain.joint_count() != outcome.chain.joint_count() {
+        return None;
+    }
+    let of_mount = |found: &RigidTransform| {
+        let (translation_mean_m, rotation_mean_rad) = transform_distance(found, &mount);
+        DistanceReport { translation_mean_m, translation_std_m: 0.0, rotation_mean_rad, rotation_std_rad: 0.0 }
+    };
+    let of_chain = |found: &ClassicalChain| {
+        let (translation, rotation) = chain_distance(found, chain, &outcome.visited_rad)?;
+        Some(DistanceReport {
+            translation_mean_m: translation.mean,
+            translation_std_m: translation.std,
+            rotation_mean_rad: rotation.mean,
+            rotation_std_rad: rotation.std,
+        })
+    };
+    Some(TruthReport {
+        static_initial: of_mount(&outcome.mount.initial),
+        static_camera_imu: of_mount(&outcome.mount_alone.imu_from_camera),
+        static_final: of_mount(&outcome.mount.imu_from_camera),
+        chain_initial: of_chain(&outcome.given_chain)?,
+        chain_pose_loop: of_chain(&outcome.pose_loop.chain)?,
+        chain_final: of_chain(&outcome.chain)?,
+    })
+}
+
+/// Static camera, time offsets, then the chain.
+fn parameters(run: &CalibrationRun) -> Vec<ParameterReport> {
+    let outcome = &run.outcome;
+    let mut parameters = mount_parameters(run, &outcome.mount);
+    parameters.push(time_shift(run, &run.static_camera, outcome.mount.time_shift_s));
+    parameters.extend(chain_parameters(run, outcome));
+    parameters.push(time_shift(run, &run.gimbal_camera, outcome.gimbal_time_shift_s));
+    parameters
+}
+
+fn mount_parameters(run: &CalibrationRun, mount: &MountReport) -> Vec<ParameterReport> {
+    let values = |transform: &RigidTransform| {
+        let (turn, shift) = (so3::log(&transform.rotation), transform.translation_m);
+        [turn.x, turn.y, turn.z, shift.x, shift.y, shift.z]
+    };
+    let truth = run.truth_rig.as_ref().and_then(|rig| true_mount(rig, &run.static_camera));
+    let (initial, last) = (values(&mount.initial), values(&mount.imu_from_camera));
+    let truth_values = truth.as_ref().map(values);
+    let error = truth.map(|truth| mount.imu_from_camera.minus(&truth));
+    ["rx", "ry", "rz", "tx", "ty", "tz"]
+        .into_iter()
+        .enumerate()
+        .map(|(axis, name)| ParameterReport {
+            name: format!("{}.{name}", run.static_camera),
+            unit: if axis < 3 { "rad" } else { "m" },
+            initial: initial[axis],
+            last: last[axis],
+            sigma: mount.sigmas[axis],
+            prior_sigma: None,
+            truth: truth_values.map(|truth| truth[axis]),
+            error: error.map(|error| error[axis]),
+        })
+        .collect()
+}
+
+fn time_shift(run: &CalibrationRun, key: &str, (change_s, sigma_s): (f64, f64)) -> ParameterReport {
+    let of = |rig: &Rig| rig.cameras.iter().find(|camera| camera.key == key).map(|camera| camera.timeshift_cam_imu_s);
+    let initial = of(&run.given_rig).unwrap_or(0.0);
+    let truth = run.truth_rig.as_ref().and_then(of);
+    ParameterReport {
+        name: format!("{key}.timeshift_cam_imu"),
+        unit: "s",
+        initial,
+        last: initial + change_s,
+        sigma: sigma_s,
+        prior_sigma: None,
+        truth,
+        error: truth.map(|truth| initial + change_s - truth),
+    }
+}
+
+fn chain_parameters(run: &CalibrationRun, outcome: &CalibrationOutcome) -> Vec<ParameterReport> {
+    let truth = run.truth_rig.as_ref().and_then(|rig| {
+        let parameterization = outcome.parameterization.parse().ok()?;
+        let chain = Chain::from_classical(&rig.gimbal.as_ref()?.chain, parameterization);
+        (chain.dof() == outcome.parameters.len()).then(|| chain.values())
+    });
+    outcome
+        .parameters
+        .iter()
+        .enumerate()
+        .map(|(place, parameter)| {
+            let truth = truth.as_ref().map(|values| values[place]);
+            ParameterReport {
+                name: parameter_name(&parameter.name, &run.given_rig),
+                unit: parameter.unit,
+                initial: parameter.initial,
+                last: parameter.value,
+                sigma: parameter.sigma,
+                prior_sigma: Some(parameter.prior_sigma),
+                truth,
+                error: truth.map(|truth| {
+                    let difference = parameter.value - truth;
+                    if parameter.unit == "rad" { wrap_angle(difference) } else { difference }
+                }),
+            }
+        })
+        .collect()
+}
+
+impl fmt::Display for CalibrationReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "Offline calibration from {}, {:.2} to {:.2} s, {} instants, {} form",
+            self.log, self.stretch_s[0], self.stretch_s[1], self.instants, self.parameterization
+        )?;
+        let line = |f: &mut fmt::Formatter<'_>, name: &str, unit: &str, s: &StatisticsReport| {
+            writeln!(
+                f,
+                "  {:<38} mean {:.4}, median {:.4}, std {:.4}, rms {:.4} ({})",
+                format!("{name} [{unit}]:"),
+                s.mean,
+                s.median,
+                s.std,
+                s.rms,
+                s.count
+            )
+        };
+        writeln!(f, "\nCamera-IMU calibration of the static camera")?;
+        let alone = &self.camera_imu_reprojection;
+        line(f, &format!("Reprojection error ({})", alone.camera), "px", &alone.error_px)?;
+        writeln!(f, "\nPose loops")?;
+        let loops = &self.pose_loops;
+        writeln!(
+            f,
+            "  {} pairs of static and gimbal camera poses in {} stretches, {} of them fitting",
+            loops.pairs, loops.segments, loops.fitting
+        )?;
+        line(f, "Gap of a loop", "m", &loops.gap_m)?;
+        writeln!(f, "\nBundle of both cameras")?;
+        for camera in &self.reprojection {
+            line(f, &format!("Reprojection error ({})", camera.camera), "px", &camera.error_px)?;
+        }
+        line(f, "Gyroscope error", "rad/s", &self.gyroscope_error_rad_per_s)?;
+        line(f, "Accelerometer error", "m/s²", &self.accelerometer_error_m_per_s2)?;
+        if let Some(rank) = &self.rank {
+            writeln!(f, "  Observability: {}", rank.verdict)?;
+        }
+        writeln!(f, "\nParameters                        initial       final     ± sigma")?;
+        for parameter in &self.parameters {
+            let (factor, unit) = match parameter.unit {
+                "rad" => (180.0 / std::f64::consts::PI, "°"),
+                "m" => (1e3, "mm"),
+                _ => (1e3, "ms"),
+            };
+            write!(
+                f,
+                "  {:<26} {:>12.4} {:>11.4} ± {:<9.4} {unit}",
+                parameter.name,
+                parameter.initial * factor,
+                parameter.last * factor,
+                parameter.sigma * factor
+            )?;
+            match parameter.error {
+                Some(error) => writeln!(f, "  (error {:+.4})", error * factor)?,
+                None => writeln!(f)?,
+            }
+        }
+        matrix(f, "T_cam_imu of the static camera", &self.static_t_cam_imu)?;
+        matrix(f, "T_imu_cam of the gimbal camera, all joints at zero", &self.gimbal_t_imu_cam_at_zero)?;
+        if let Some(truth) = &self.truth {
+            writeln!(f, "\nAgainst the truth")?;
+            for (name, distance) in [
+                ("static camera, given", &truth.static_initial),
+                ("static camera, camera-IMU", &truth.static_camera_imu),
+                ("static camera, bundle", &truth.static_final),
+                ("gimbal, given", &truth.chain_initial),
+                ("gimbal, pose loops", &truth.chain_pose_loop),
+                ("gimbal, bundle", &truth.chain_final),
+            ] {
+                writeln!(
+                    f,
+                    "  {name:<26} {:8.2} ± {:5.2} mm {:8.3} ± {:6.3}°",
+                    distance.translation_mean_m * 1e3,
+                    distance.translation_std_m * 1e3,
+                    distance.rotation_mean_rad.to_degrees(),
+                    distance.rotation_std_rad.to_degrees()
+                )?;
+            }
+        }
+        for warning in &self.warnings {
+            writeln!(f, "  warning      {warning}")?;
+        }
+        Ok(())
+    }
+}
+
+fn matrix(f: &mut fmt::Formatter<'_>, title: &str, rows: &[[f64; 4]; 4]) -> fmt::Result {
+    writeln!(f, "\n{title}")?;
+    for row in rows {
+        writeln!(f, "  [{:>12.8} {:>12.8} {:>12.8} {:>12.8}]", row[0], row[1], row[2], row[3])?;
+    }
+    Ok(())
+}

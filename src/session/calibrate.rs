@@ -1,0 +1,281 @@
+//! An offline calibration over a log: both cameras' images through the front end, then the calibration.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use thiserror::Error;
+
+use super::configuration::{estimator_config, mount_prior};
+use super::plan::SessionError;
+use super::spec::{ParameterizationChoice, RunSpec};
+use super::tracker::CameraTracker;
+use crate::calibration::{
+    self, CalibrationError, CalibrationInput, CalibrationOptions, CalibrationOutcome, CalibrationProgress,
+    GimbalCamera, StaticCamera, TrackedView,
+};
+use crate::flight_log::rig::{CameraMount, CameraRig, ChainPrior, GimbalRig};
+use crate::flight_log::{FlightLog, LogError, LogWarning, Rig};
+use crate::geometry::{RigidTransform, ns_from_seconds, seconds_from_ns};
+
+/// Share of the whole work that tracking takes.
+const TRACKING_SHARE: f64 = 0.6;
+/// Bound of a uniform error per standard deviation.
+const BOUND_PER_SIGMA: f64 = 1.732_050_807_568_877_2;
+
+/// Why a log could not be calibrated from.
+#[derive(Debug, Error)]
+pub enum CalibrationRunError {
+    /// The log, its rig or its truth cannot be read.
+    #[error(transparent)]
+    Log(#[from] LogError),
+    /// A run cannot be configured.
+    #[error(transparent)]
+    Session(#[from] SessionError),
+    /// The rig lacks what is to be calibrated.
+    #[error("the rig '{rig}' has no {missing}; {remedy}: {path}")]
+    Missing {
+        /// Name of the rig.
+        rig: String,
+        /// What it lacks.
+        missing: &'static str,
+        /// What to do.
+        remedy: &'static str,
+        /// The log.
+        path: PathBuf,
+    },
+    /// The flight cannot tell.
+    #[error("{source}: {path}")]
+    Calibration {
+        /// Why.
+        source: CalibrationError,
+        /// The log.
+        path: PathBuf,
+    },
+    /// The camera's images could not be read to the end.
+    #[error("internal error while tracking {camera}; please report it with the log: {path}")]
+    Tracking {
+        /// Key of the camera.
+        camera: String,
+        /// The log.
+        path: PathBuf,
+    },
+}
+
+/// What to calibrate from.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CalibrationRequest {
+    /// The log.
+    pub log_path: PathBuf,
+    /// The rig, when it is not beside the log or in it.
+    pub rig_path: Option<PathBuf>,
+    /// The true values, when they are not beside the log.
+    pub truth_path: Option<PathBuf>,
+    /// Seconds of the log to leave out at its begin.
+    pub start_s: f64,
+    /// Seconds to read from there, `None` to the end.
+    pub duration_s: Option<f64>,
+}
+
+/// A calibrated log.
+#[derive(Clone, Debug)]
+pub struct CalibrationRun {
+    /// Where the log lies.
+    pub log_path: PathBuf,
+    /// The rig that was given.
+    pub given_rig: Rig,
+    /// The rig with the calibrated values, its prior as tight as they are certain.
+    pub rig: Rig,
+    /// The rig with the true values, when known.
+    pub truth_rig: Option<Rig>,
+    /// Key of the static camera.
+    pub static_camera: String,
+    /// Key of the camera on the gimbal.
+    pub gimbal_camera: String,
+    /// The calibration.
+    pub outcome: CalibrationOutcome,
+    /// What is wrong with the log.
+    pub warnings: Vec<LogWarning>,
+}
+
+/// Tracks both cameras over the log and calibrates.
+///
+/// # Errors
+/// When the log cannot be read, the rig lacks a camera or encoders, or the flight cannot tell.
+pub fn calibrate(
+    request: &CalibrationRequest,
+    options: &CalibrationOptions,
+    on_progress: &mut dyn FnMut(CalibrationProgress),
+) -> Result<CalibrationRun, CalibrationRunError> {
+    let log = Arc::new(FlightLog::open(&request.log_path)?);
+    let given_rig = Rig::for_log(&log, request.rig_path.as_deref())?;
+    let truth_rig = Rig::truth_for_log(&log, request.truth_path.as_deref())?;
+    let parts = RigParts::of(&given_rig, request)?;
+    let (input, warnings) = track(&log, &given_rig, &parts, request, on_progress)?;
+    let outcome = calibration::calibrate(&input, options, &mut |progress| {
+        on_progress(CalibrationProgress {
+            share: TRACKING_SHARE + (1.0 - TRACKING_SHARE) * progress.share,
+            ..progress
+        });
+    })
+    .map_err(|source| CalibrationRunError::Calibration { source, path: request.log_path.clone() })?;
+    Ok(CalibrationRun {
+        log_path: request.log_path.clone(),
+        rig: calibrated(&given_rig, &parts, &outcome),
+        static_camera: parts.static_camera.key.clone(),
+        gimbal_camera: parts.gimbal_camera.key.clone(),
+        given_rig,
+        truth_rig,
+        outcome,
+        warnings,
+    })
+}
+
+/// What of a rig is calibrated.
+#[derive(Clone, Debug)]
+struct RigParts {
+    static_camera: CameraRig,
+    imu_from_camera: RigidTransform,
+    gimbal_camera: CameraRig,
+    gimbal: GimbalRig,
+}
+
+impl RigParts {
+    fn of(rig: &Rig, request: &CalibrationRequest) -> Result<Self, CalibrationRunError> {
+        let missing = |missing: &'static str, remedy: &'static str| CalibrationRunError::Missing {
+            rig: rig.name.clone(),
+            missing,
+            remedy,
+            path: request.log_path.clone(),
+        };
+        let gimbal = rig.gimbal.clone().filter(|gimbal| !gimbal.joints.is_empty()).ok_or_else(|| {
+            missing(
+                "gimbal",
+                "the offline calibration is for gimbals; a rigid camera calibrates in 'dcvins run --run static'",
+            )
+        })?;
+        let gimbal_camera = rig.cameras.iter().find(|camera| camera.mount == CameraMount::Gimbal).ok_or_else(|| {
+            missing("camera with mount: gimbal", "name the camera that the gimbal carries in the rig")
+        })?;
+        let found = rig.cameras.iter().find_map(|camera| match &camera.mount {
+            CameraMount::Static { imu_from_camera } => Some((camera, *imu_from_camera)),
+            CameraMount::Gimbal => None,
+        });
+        let (static_camera, imu_from_camera) = found.ok_or_else(|| {
+            missing(
+                "camera with mount: static",
+                "the gimbal is calibrated against a static camera; record one, or calibrate online with 'dcvins run --run auto'",
+            )
+        })?;
+        if gimbal.encoder_sigma_rad.is_none() || gimbal.topic.is_none() {
+            return Err(missing(
+                "encoders (gimbal.rostopic and gimbal.encoder_sigma)",
+                "the offline calibration needs joint angles; fly online with 'dcvins run --run auto:encoder=off'",
+            ));
+        }
+        Ok(Self { static_camera: static_camera.clone(), imu_from_camera, gimbal_camera: gimbal_camera.clone(), gimbal })
+    }
+}
+
+/// Both cameras' tracks, each on a thread of its own.
+fn track(
+    log: &Arc<FlightLog>,
+    rig: &Rig,
+    parts: &RigParts,
+    request: &CalibrationRequest,
+    on_progress: &mut dyn FnMut(CalibrationProgress),
+) -> Result<(CalibrationInput, Vec<LogWarning>), CalibrationRunError> {
+    let tracker =
+        |camera: &CameraRig| CameraTracker::new(Arc::clone(log), rig, &camera.key, request.start_s, request.duration_s);
+    let (mut of_static, mut of_gimbal) = (tracker(&parts.static_camera)?, tracker(&parts.gimbal_camera)?);
+    let end_s = seconds_from_ns(log.duration_ns()) - request.start_s;
+    let length_s = request.duration_s.map_or(end_s, |duration_s| duration_s.min(end_s)).max(1e-3);
+    let (static_result, gimbal_result) = std::thread::scope(|scope| {
+        let gimbal = scope.spawn(|| views(&mut of_gimbal, &parts.gimbal_camera, &mut |_| {}));
+        let rigid = views(&mut of_static, &parts.static_camera, &mut |stamp_ns| {
+            let share = TRACKING_SHARE * (seconds_from_ns(stamp_ns) - request.start_s) / length_s;
+            on_progress(CalibrationProgress { stage: "tracking both cameras", share });
+        });
+        (rigid, gimbal.join())
+    });
+    let Ok((gimbal_views, gimbal_warnings)) = gimbal_result else {
+        let camera = parts.gimbal_camera.key.clone();
+        return Err(CalibrationRunError::Tracking { camera, path: request.log_path.clone() });
+    };
+    let (static_views, mut warnings) = static_result;
+    warnings.extend(gimbal_warnings);
+    warnings.extend(log.warnings().iter().cloned());
+    warnings.sort_by(|a, b| (a.stamp_ns, &a.message).cmp(&(b.stamp_ns, &b.message)));
+    warnings.dedup();
+    let spec = RunSpec {
+        parameterization: ParameterizationChoice::Static,
+        camera_key: Some(parts.static_camera.key.clone()),
+        ..RunSpec::default()
+    };
+    let mut estimator = estimator_config(rig, &spec)?;
+    estimator.options.keep_linearization = false;
+    let input = CalibrationInput {
+        static_camera: StaticCamera {
+            key: parts.static_camera.key.clone(),
+            model: parts.static_camera.model.clone(),
+            imu_from_camera: parts.imu_from_camera,
+            prior: mount_prior(rig, &parts.static_camera),
+            views: static_views,
+        },
+        gimbal_camera: GimbalCamera {
+            key: parts.gimbal_camera.key.clone(),
+            model: parts.gimbal_camera.model.clone(),
+            chain: parts.gimbal.chain.clone(),
+            joints: parts.gimbal.joints.iter().map(|joint| joint.name.clone()).collect(),
+            prior: mount_prior(rig, &parts.gimbal_camera),
+            views: gimbal_views,
+        },
+        imu_noise: rig.imu.noise,
+        gravity_m_per_s2: rig.gravity_m_per_s2,
+        estimator,
+    };
+    Ok((input, warnings))
+}
+
+fn views(
+    tracker: &mut CameraTracker,
+    camera: &CameraRig,
+    on_image: &mut dyn FnMut(i64),
+) -> (Vec<TrackedView>, Vec<LogWarning>) {
+    let shift_ns = ns_from_seconds(camera.timeshift_cam_imu_s);
+    let (mut views, mut warnings) = (Vec::new(), Vec::new());
+    while let Some(tracked) = tracker.next_frame() {
+        on_image(tracked.frame.stamp_ns);
+        warnings.extend(tracked.frame.warnings);
+        views.push(TrackedView {
+            frame_index: tracked.frame.index,
+            stamp_ns: tracked.frame.stamp_ns.saturating_add(shift_ns),
+            imu: tracked.frame.imu,
+            joint_angles: tracked.frame.joint_angles,
+            tracks: tracked.tracks,
+        });
+    }
+    warnings.extend_from_slice(tracker.remaining_warnings());
+    (views, warnings)
+}
+
+/// The rig with what was found; its prior is the largest uncertainty of a parameter, as bounds of a uniform error.
+fn calibrated(rig: &Rig, parts: &RigParts, outcome: &CalibrationOutcome) -> Rig {
+    let mut calibrated = rig.clone();
+    let largest = |unit: &str| {
+        let sigmas = outcome.parameters.iter().filter(|parameter| parameter.unit == unit);
+        BOUND_PER_SIGMA * sigmas.map(|parameter| parameter.sigma).fold(0.0, f64::max)
+    };
+    for camera in &mut calibrated.cameras {
+        if camera.key == parts.static_camera.key {
+            camera.mount = CameraMount::Static { imu_from_camera: outcome.mount.imu_from_camera };
+            camera.timeshift_cam_imu_s += outcome.mount.time_shift_s.0;
+        } else if camera.key == parts.gimbal_camera.key {
+            camera.timeshift_cam_imu_s += outcome.gimbal_time_shift_s.0;
+        }
+    }
+    if let Some(gimbal) = &mut calibrated.gimbal {
+        gimbal.chain = outcome.chain.clone();
+        gimbal.prior = ChainPrior { translation_bound_m: largest("m"), rotation_bound_rad: largest("rad") };
+    }
+    calibrated
+}
