@@ -13,14 +13,13 @@ use self::model::{CalibrationHistory, ConvertedHistory};
 pub(crate) use self::model::{Knowledge, knowledge};
 use super::PanelContext;
 use super::chain_values::{NamedValues, true_values};
-use super::plot::Curve;
+use super::plot::{BandCurve, Curve};
 
 /// The curves of one parameter of one run.
 #[derive(Debug, Default)]
 struct ParameterCurves {
     value: Curve,
-    lower: Curve,
-    upper: Curve,
+    band: BandCurve,
 }
 
 /// State of the convergence panel.

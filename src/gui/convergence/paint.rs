@@ -128,8 +128,7 @@ pub(super) fn cell_ui(
         let curves = curves.entry((*run, name.to_owned())).or_default();
         curves.value.update(&area, epoch, stamps_ns, values);
         if *run == shown_run {
-            curves.lower.update(&area, epoch, stamps_ns, &parameter.lower);
-            curves.upper.update(&area, epoch, stamps_ns, &parameter.upper);
+            curves.band.update(&area, epoch, stamps_ns, &parameter.lower, &parameter.upper);
         }
     }
     let curve_of = |run: usize| curves.get(&(run, name.to_owned()));
@@ -145,7 +144,7 @@ pub(super) fn cell_ui(
     paint_value_grid(&inner, &theme, &area, shown.factor, (plot.height() / 22.0) as usize + 1);
     if let Some(curves) = curve_of(shown_run) {
         let fill = theme.run(shown_run).color.gamma_multiply(0.22);
-        paint_band(&inner, &area, &curves.lower, &curves.upper, fill);
+        paint_band(&inner, &area, &curves.band, fill);
     }
     if let Some(truth) = truth {
         let y = area.y(truth);

@@ -22,18 +22,19 @@ pub(crate) struct Curve {
     pub(crate) extent: Option<(f64, f64)>,
 }
 
+impl CurveKey {
+    fn of(area: &PlotArea, epoch: u64, count: usize) -> Self {
+        let (begin_ns, end_ns) = (area.begin_ns, area.end_ns);
+        Self { epoch, count, begin_ns, end_ns, width_px: area.rect.width().max(1.0) as u32 }
+    }
+}
+
 impl Curve {
     /// Brings the curve up to date with `values` at `stamps_ns` (ascending); values that are not finite break it.
     ///
     /// `epoch` changes when earlier rows do; as long as it stays, rows are only added.
     pub(crate) fn update(&mut self, area: &PlotArea, epoch: u64, stamps_ns: &[i64], values: &[f64]) {
-        let key = CurveKey {
-            epoch,
-            count: stamps_ns.len().min(values.len()),
-            begin_ns: area.begin_ns,
-            end_ns: area.end_ns,
-            width_px: area.rect.width().max(1.0) as u32,
-        };
+        let key = CurveKey::of(area, epoch, stamps_ns.len().min(values.len()));
         if self.key != Some(key) {
             self.key = Some(key);
             self.stretches = reduce(area, &stamps_ns[..key.count], values);
@@ -42,6 +43,52 @@ impl Curve {
             self.extent = (extent.0 <= extent.1).then_some(extent);
         }
     }
+}
+
+/// A band between two values over time, by pixel column.
+///
+/// Both edges are reduced together: two curves of their own would keep different rows of a column, and a band between
+/// points that do not belong together frays.
+#[derive(Debug, Default)]
+pub(crate) struct BandCurve {
+    key: Option<CurveKey>,
+    /// Unbroken stretches of `(points right of the plot's left edge, lower, upper value)`.
+    pub(crate) stretches: Vec<Vec<(f32, f64, f64)>>,
+}
+
+impl BandCurve {
+    /// Brings the band up to date, as [`Curve::update`] does; a row without both values breaks it.
+    pub(crate) fn update(&mut self, area: &PlotArea, epoch: u64, stamps_ns: &[i64], lower: &[f64], upper: &[f64]) {
+        let count = stamps_ns.len().min(lower.len()).min(upper.len());
+        let key = CurveKey::of(area, epoch, count);
+        if self.key != Some(key) {
+            self.key = Some(key);
+            self.stretches = reduce_band(area, &stamps_ns[..count], lower, upper);
+        }
+    }
+}
+
+/// Least lower and greatest upper value of each pixel column.
+fn reduce_band(area: &PlotArea, stamps_ns: &[i64], lower: &[f64], upper: &[f64]) -> Vec<Vec<(f32, f64, f64)>> {
+    let mut stretches: Vec<Vec<(f32, f64, f64)>> = vec![Vec::new()];
+    for row in rows_in_range(area, stamps_ns) {
+        let (x, low, high) = (area.offset_of(stamps_ns[row]), lower[row], upper[row]);
+        let Some(stretch) = stretches.last_mut() else { break };
+        if !(low.is_finite() && high.is_finite()) {
+            if !stretch.is_empty() {
+                stretches.push(Vec::new());
+            }
+            continue;
+        }
+        match stretch.last_mut() {
+            Some((open, least, most)) if open.floor() == x.floor() => {
+                (*least, *most) = (least.min(low), most.max(high));
+            }
+            _ => stretch.push((x, low, high)),
+        }
+    }
+    stretches.retain(|stretch| !stretch.is_empty());
+    stretches
 }
 
 /// The rows from the one before the range to the one after it, so that lines run to the edges.
@@ -162,6 +209,26 @@ mod tests {
         assert_eq!(curve.stretches.iter().map(Vec::len).collect::<Vec<_>>(), [2, 2]);
         curve.update(&area(100.0), 1, &[], &[]);
         assert_eq!((curve.stretches.len(), curve.extent), (0, None));
+    }
+
+    #[test]
+    fn a_band_keeps_both_edges_of_a_column_together() {
+        // Each edge has its extremes at rows of its own, and once both are missing.
+        let stamps: Vec<i64> = (0..10_000).collect();
+        let lower: Vec<f64> = stamps.iter().map(|row| -1.0 - f64::from((row * 7 % 13) as i32)).collect();
+        let mut upper: Vec<f64> = stamps.iter().map(|row| 1.0 + f64::from((row * 5 % 11) as i32)).collect();
+        upper[5000] = f64::NAN;
+        let mut band = BandCurve::default();
+        band.update(&area(100.0), 0, &stamps, &lower, &upper);
+        assert_eq!(band.stretches.len(), 2);
+        for stretch in &band.stretches {
+            assert!(stretch.is_sorted_by(|a, b| a.0.floor() < b.0.floor()), "one entry per column");
+            assert!(stretch.iter().all(|(_, low, high)| (*low, *high) == (-13.0, 11.0)), "the whole reach of a column");
+        }
+        assert!(band.stretches.iter().map(Vec::len).sum::<usize>() <= 102);
+        // Few rows stay as they are.
+        band.update(&area(100.0), 1, &[0, 5000], &[1.0, 2.0], &[3.0, 4.0]);
+        assert_eq!(band.stretches, [[(0.0, 1.0, 3.0), (50.0, 2.0, 4.0)]]);
     }
 
     #[test]

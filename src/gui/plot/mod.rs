@@ -9,7 +9,7 @@ mod ticks;
 use egui::epaint::{Mesh, Vertex, WHITE_UV};
 use egui::{Align2, Color32, Painter, Pos2, Rect, Shape, Stroke, pos2};
 
-pub(crate) use curve::Curve;
+pub(crate) use curve::{BandCurve, Curve};
 pub(crate) use navigate::{Clicks, navigate, visible_range};
 pub(crate) use ticks::{decimals_of_step, ticks};
 
@@ -106,23 +106,30 @@ pub(crate) fn paint_curve(painter: &Painter, area: &PlotArea, curve: &Curve, sty
 /// A curve whose value holds until the next one, for counts and states.
 pub(crate) fn paint_steps(painter: &Painter, area: &PlotArea, curve: &Curve, style: RunStyle, width: f32) {
     for stretch in &curve.stretches {
-        let mut points: Vec<Pos2> = Vec::with_capacity(stretch.len() * 2);
-        for (offset, value) in stretch {
-            let corner = pos2(area.rect.left() + offset, area.y(*value));
-            if let Some(last) = points.last().copied() {
-                if last.y == corner.y {
-                    points.pop();
-                } else {
-                    points.push(pos2(corner.x, last.y));
-                }
-            }
-            points.push(corner);
-            if points.len() == 1 {
-                points.push(corner);
-            }
-        }
-        paint_line(painter, &points, style, width);
+        let places = stretch.iter().map(|(offset, value)| pos2(area.rect.left() + offset, area.y(*value)));
+        paint_line(painter, &staircase(places), style, width);
     }
+}
+
+/// The corners of a staircase: level from each place to the next one, then straight up or down.
+fn staircase(places: impl Iterator<Item = Pos2>) -> Vec<Pos2> {
+    let mut corners: Vec<Pos2> = Vec::new();
+    for place in places {
+        let Some(last) = corners.last().copied() else {
+            corners.push(place);
+            continue;
+        };
+        let foot = pos2(place.x, last.y);
+        match corners.as_mut_slice() {
+            // A level stretch goes on: its end moves along.
+            [.., begin, end] if begin.y == end.y => *end = foot,
+            _ => corners.push(foot),
+        }
+        if place.y != foot.y {
+            corners.push(place);
+        }
+    }
+    corners
 }
 
 /// An open line with dashes; a single point becomes a dot.
@@ -144,18 +151,15 @@ pub(crate) fn paint_line(painter: &Painter, points: &[Pos2], style: RunStyle, wi
     }
 }
 
-/// The area between two curves with the same stamps.
-pub(crate) fn paint_band(painter: &Painter, area: &PlotArea, lower: &Curve, upper: &Curve, fill: Color32) {
-    for (low, high) in lower.stretches.iter().zip(&upper.stretches) {
+/// The area of a band.
+pub(crate) fn paint_band(painter: &Painter, area: &PlotArea, band: &BandCurve, fill: Color32) {
+    for stretch in &band.stretches {
         let mut mesh = Mesh::default();
-        let vertex = |offset: f32, value: f64| Vertex {
-            pos: pos2(area.rect.left() + offset, area.y(value)),
-            uv: WHITE_UV,
-            color: fill,
-        };
-        for (low, high) in low.iter().zip(high) {
-            mesh.vertices.push(vertex(low.0, low.1));
-            mesh.vertices.push(vertex(high.0, high.1));
+        for (offset, low, high) in stretch {
+            for value in [*low, *high] {
+                let pos = pos2(area.rect.left() + offset, area.y(value));
+                mesh.vertices.push(Vertex { pos, uv: WHITE_UV, color: fill });
+            }
         }
         for corner in (2..mesh.vertices.len() as u32).step_by(2) {
             mesh.add_triangle(corner - 2, corner - 1, corner);
@@ -206,6 +210,15 @@ pub(crate) fn stretches_where(stamps_ns: &[i64], holds: impl Fn(usize) -> bool) 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_staircase_is_level_or_upright_everywhere() {
+        let places = [(0.0, 5.0), (1.0, 5.0), (2.0, 5.0), (3.0, 4.0), (4.0, 4.0), (5.0, 4.0), (6.0, 5.0), (7.0, 5.0)];
+        let corners = staircase(places.into_iter().map(|(x, y)| pos2(x, y)));
+        let expected = [(0.0, 5.0), (3.0, 5.0), (3.0, 4.0), (6.0, 4.0), (6.0, 5.0), (7.0, 5.0)];
+        assert_eq!(corners, expected.map(|(x, y)| pos2(x, y)));
+        assert_eq!(staircase([pos2(1.0, 2.0)].into_iter()), [pos2(1.0, 2.0)]);
+    }
 
     #[test]
     fn stretches_join_rows() {
