@@ -57,6 +57,7 @@ impl Painter {
         background: Color32,
     ) -> RgbaImage {
         let [width, height] = size_px.map(|side| side as usize);
+        let mut bytes = vec![0; width * height * 4];
         let ground = Color32::from_rgb(background.r(), background.g(), background.b());
         let mut pixels = vec![blend::pack(ground.to_array()); width * height];
         let meshes: Vec<PreparedMesh<'_>> = primitives
@@ -70,14 +71,43 @@ impl Painter {
             })
             .collect();
         if width > 0 {
-            pixels.par_chunks_mut(width * BAND_ROWS).enumerate().for_each(|(number, rows)| {
+            let bands = sort_into_bands(&meshes, height.div_ceil(BAND_ROWS));
+            let rows = pixels.par_chunks_mut(width * BAND_ROWS).zip(bytes.par_chunks_mut(width * BAND_ROWS * 4));
+            rows.zip(bands).enumerate().for_each(|(number, ((rows, bytes), pieces))| {
                 let mut band = Band::new(rows, width, (number * BAND_ROWS) as i32);
-                for mesh in &meshes {
-                    mesh.paint(&mut band);
+                for Piece { mesh, triangle } in pieces {
+                    meshes[mesh as usize].paint(triangle as usize, &mut band);
+                }
+                for (bytes, pixel) in bytes.chunks_exact_mut(4).zip(rows) {
+                    bytes.copy_from_slice(&blend::unpack(*pixel));
                 }
             });
         }
-        let bytes = pixels.iter().flat_map(|pixel| blend::unpack(*pixel)).collect();
         RgbaImage::from_raw(size_px[0], size_px[1], bytes).expect("four bytes were written per pixel")
     }
+}
+
+/// A triangle of a mesh, by their numbers.
+#[derive(Clone, Copy)]
+struct Piece {
+    mesh: u32,
+    triangle: u32,
+}
+
+/// The triangles that touch each band, in the order in which they are painted.
+fn sort_into_bands(meshes: &[PreparedMesh<'_>], bands: usize) -> Vec<Vec<Piece>> {
+    let mut sorted = vec![Vec::new(); bands];
+    for (mesh, prepared) in meshes.iter().enumerate() {
+        for triangle in 0..prepared.triangles() {
+            let rows = prepared.rows(triangle);
+            if rows.is_empty() {
+                continue;
+            }
+            let (first, last) = (rows.start as usize / BAND_ROWS, (rows.end as usize - 1) / BAND_ROWS);
+            for band in &mut sorted[first..=last] {
+                band.push(Piece { mesh: mesh as u32, triangle: triangle as u32 });
+            }
+        }
+    }
+    sorted
 }

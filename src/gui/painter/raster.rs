@@ -1,5 +1,7 @@
 //! Triangles to spans of pixels, and spans to colours.
 
+use std::ops::Range;
+
 use egui::Rect;
 use egui::epaint::{Mesh, Vertex};
 
@@ -32,7 +34,7 @@ impl<'a> Band<'a> {
 }
 
 /// Pixels `left..right` of rows `top..bottom`.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 pub(in crate::gui) struct Clip {
     pub(in crate::gui) left: i32,
     pub(in crate::gui) top: i32,
@@ -91,30 +93,46 @@ impl<'a> PreparedMesh<'a> {
         Some(Self { mesh, texture, clip, points })
     }
 
-    pub(super) fn paint(&self, band: &mut Band<'_>) {
+    /// How many triangles it has.
+    pub(super) fn triangles(&self) -> usize {
+        self.mesh.indices.len() / 3
+    }
+
+    /// Numbers of the corners of a triangle.
+    fn corners(&self, triangle: usize) -> [usize; 3] {
+        [0, 1, 2].map(|corner| self.mesh.indices[3 * triangle + corner] as usize)
+    }
+
+    /// Places of the corners of a triangle, `None` when one is not finite.
+    fn points(&self, triangle: usize) -> Option<[[i32; 2]; 3]> {
+        let [a, b, c] = self.corners(triangle).map(|corner| self.points.get(corner).copied().flatten());
+        Some([a?, b?, c?])
+    }
+
+    /// Rows of the picture that a triangle may touch; empty when nothing of it can be seen.
+    pub(super) fn rows(&self, triangle: usize) -> Range<i32> {
+        let Some(points) = self.points(triangle) else { return 0..0 };
+        let [across, down] = [0, 1].map(|axis| points.map(|point| point[axis]));
+        let first = |values: [i32; 3]| first_centre(values[0].min(values[1]).min(values[2]));
+        let end = |values: [i32; 3]| first_centre(values[0].max(values[1]).max(values[2]));
+        let clip = &self.clip;
+        let is_seen = first(across) < clip.right && end(across) > clip.left;
+        let is_inked =
+            || self.corners(triangle).iter().any(|corner| self.mesh.vertices[*corner].color.to_array() != [0; 4]);
+        if is_seen && is_inked() { first(down).max(clip.top)..end(down).min(clip.bottom) } else { 0..0 }
+    }
+
+    /// Paints what of a triangle lies in a band.
+    pub(super) fn paint(&self, triangle: usize, band: &mut Band<'_>) {
         let clip =
             Clip { top: self.clip.top.max(band.first_row), bottom: self.clip.bottom.min(band.end_row), ..self.clip };
-        if clip.top >= clip.bottom {
-            return;
-        }
-        for triangle in self.mesh.indices.chunks_exact(3) {
-            let point = |corner: usize| self.points.get(triangle[corner] as usize).copied().flatten();
-            let (Some(a), Some(b), Some(c)) = (point(0), point(1), point(2)) else { continue };
-            let lowest = a[1].max(b[1]).max(c[1]);
-            let highest = a[1].min(b[1]).min(c[1]);
-            if first_centre(lowest) <= clip.top || first_centre(highest) >= clip.bottom {
-                continue;
-            }
-            let vertices = [0, 1, 2].map(|corner| &self.mesh.vertices[triangle[corner] as usize]);
-            self.paint_triangle([a, b, c], vertices, clip, band);
-        }
+        let Some(points) = self.points(triangle) else { return };
+        let vertices = self.corners(triangle).map(|corner| &self.mesh.vertices[corner]);
+        self.paint_triangle(points, vertices, clip, band);
     }
 
     fn paint_triangle(&self, points: [[i32; 2]; 3], vertices: [&Vertex; 3], clip: Clip, band: &mut Band<'_>) {
         let colors = vertices.map(|vertex| blend::pack(vertex.color.to_array()));
-        if colors == [0; 3] {
-            return;
-        }
         let one_color = colors[0] == colors[1] && colors[1] == colors[2];
         let uvs = vertices.map(|vertex| vertex.uv);
         let untextured = uvs[0] == uvs[1] && uvs[1] == uvs[2];

@@ -19,8 +19,18 @@ pub(super) fn draw(drawing: &Drawing) -> ColorImage {
     let background = blend::pack(drawing.background.to_array());
     let mut pixels = vec![Color32::TRANSPARENT; width * height];
     if width > 0 {
-        pixels.par_chunks_mut(width * BAND_ROWS).enumerate().for_each(|(number, rows)| {
-            let mut band = Band::new(width, rows.len() / width, number * BAND_ROWS, background);
+        let bands = height.div_ceil(BAND_ROWS);
+        let segments = sort_into_bands(&drawing.segments, bands, |segment| {
+            let reach = 2.0 * segment.half_width_px;
+            let (from, to) = (segment.from[1], segment.to[1]);
+            (from.min(to) - reach, from.max(to) + reach)
+        });
+        let discs = sort_into_bands(&drawing.discs, bands, |disc| {
+            (disc.centre[1] - disc.radius_px - 1.0, disc.centre[1] + disc.radius_px + 1.0)
+        });
+        let rows = pixels.par_chunks_mut(width * BAND_ROWS).zip(segments).zip(discs).enumerate();
+        rows.for_each_init(Band::default, |band, (number, ((rows, segments), discs))| {
+            band.begin(width, rows.len() / width, number * BAND_ROWS, background);
             for picture in &drawing.pictures {
                 band.picture(picture);
             }
@@ -28,10 +38,10 @@ pub(super) fn draw(drawing: &Drawing) -> ColorImage {
                 let color = blend::pack(triangle[0].color);
                 band.triangle([triangle[0].position, triangle[1].position, triangle[2].position], |_, _, _| color);
             }
-            for segment in &drawing.segments {
+            for segment in segments {
                 band.segment(segment);
             }
-            for disc in &drawing.discs {
+            for disc in discs {
                 band.disc(disc);
             }
             band.resolve(rows);
@@ -40,7 +50,25 @@ pub(super) fn draw(drawing: &Drawing) -> ColorImage {
     ColorImage::new([width, height], pixels)
 }
 
-/// The samples of some rows.
+/// The shapes that touch each band, in order, given the rows between which one lies.
+fn sort_into_bands<T>(shapes: &[T], bands: usize, reach_px: impl Fn(&T) -> (f32, f32)) -> Vec<Vec<&T>> {
+    let mut sorted = vec![Vec::new(); bands];
+    for shape in shapes {
+        let (top, bottom) = reach_px(shape);
+        // Not-a-number becomes 0 and infinity the last band: what cannot be drawn is left out there.
+        let band_of = |row: f32| (row.max(0.0) as usize) / BAND_ROWS;
+        let (first, end) = (band_of(top), band_of(bottom).saturating_add(1).min(bands));
+        if bottom >= 0.0 && first < end {
+            for band in &mut sorted[first..end] {
+                band.push(shape);
+            }
+        }
+    }
+    sorted
+}
+
+/// The samples of some rows; one worker uses it for band after band.
+#[derive(Default)]
 struct Band {
     clip: Clip,
     width: usize,
@@ -48,17 +76,23 @@ struct Band {
 }
 
 /// One sample of each pixel.
+#[derive(Default)]
 struct SamplePlane {
     colors: Vec<u32>,
     depths: Vec<f32>,
 }
 
 impl Band {
-    fn new(width: usize, rows: usize, first_row: usize, background: u32) -> Self {
-        let clip = Clip { left: 0, top: first_row as i32, right: width as i32, bottom: (first_row + rows) as i32 };
-        let planes =
-            SAMPLES.map(|_| SamplePlane { colors: vec![background; width * rows], depths: vec![0.0; width * rows] });
-        Self { clip, width, planes }
+    /// Empties it for other rows.
+    fn begin(&mut self, width: usize, rows: usize, first_row: usize, background: u32) {
+        self.clip = Clip { left: 0, top: first_row as i32, right: width as i32, bottom: (first_row + rows) as i32 };
+        self.width = width;
+        for plane in &mut self.planes {
+            plane.colors.clear();
+            plane.colors.resize(width * rows, background);
+            plane.depths.clear();
+            plane.depths.resize(width * rows, 0.0);
+        }
     }
 
     /// Whether something between two heights touches the band.
@@ -106,9 +140,6 @@ impl Band {
     fn segment(&mut self, segment: &Segment) {
         let half = segment.half_width_px;
         let ([x0, y0, z0], [x1, y1, z1]) = (segment.from, segment.to);
-        if self.misses(y0.min(y1) - 2.0 * half, y0.max(y1) + 2.0 * half) {
-            return;
-        }
         let length = camera::length(f64::from(x1 - x0), f64::from(y1 - y0)) as f32;
         if length < 1e-3 {
             return self.disc(&Disc { centre: segment.from, radius_px: half, color: segment.color });
@@ -136,9 +167,6 @@ impl Band {
     fn disc(&mut self, disc: &Disc) {
         let [x, y, depth] = disc.centre;
         let radius = disc.radius_px;
-        if self.misses(y - radius - 1.0, y + radius + 1.0) {
-            return;
-        }
         let color = blend::pack(disc.color);
         let clip = self.clip;
         for (plane, sample) in self.planes.iter_mut().zip(SAMPLES) {
