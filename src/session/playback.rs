@@ -52,7 +52,11 @@ pub struct Session {
 impl Session {
     /// Opens the log and starts the runs.
     pub fn open(request: &SessionRequest) -> Result<Self, SessionError> {
-        let plan = SessionPlan::open(request)?;
+        Self::start(SessionPlan::open(request)?)
+    }
+
+    /// Starts the runs of a plan.
+    pub fn start(plan: SessionPlan) -> Result<Self, SessionError> {
         let shared = Arc::new(SharedRecording {
             recording: Mutex::new(Arc::new(Recording::new(&plan))),
             generation: AtomicU64::new(1),
@@ -70,7 +74,7 @@ impl Session {
             .map_err(|source| SessionError::Thread { source })?;
         let images = ImageReader::new(Arc::clone(&plan.log), &plan.rig);
         Ok(Self {
-            cursor_ns: ns_from_seconds(request.start_s),
+            cursor_ns: ns_from_seconds(plan.start_s),
             plan,
             shared,
             engine,

@@ -5,9 +5,14 @@ use egui::{Align2, Color32, FontFamily, FontId, Painter, Rect, Stroke, pos2, vec
 use super::model::{FEATURES, INFORMED, RMS, RunLanes, STRUCTURAL};
 use crate::gui::PanelContext;
 use crate::gui::events::{Mark, look_of, paint_mark};
-use crate::gui::plot::{Curve, PlotArea, paint_curve, paint_hatch, paint_steps, stretches_where};
+use crate::gui::plot::{Curve, PlotArea, paint_curve, paint_hatch, paint_steps, paint_value_grid, stretches_where};
 use crate::gui::theme::{self, RunStyle, Theme};
 use crate::gui::units::fixed;
+
+/// Height of the bar of a run where there is room, in points.
+const HIGHEST_BAR: f32 = 24.0;
+/// Height from which a lane has room for a scale, in points.
+const LOWEST_WITH_SCALE: f32 = 28.0;
 
 /// A lane.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -65,7 +70,7 @@ impl Lane {
 
 /// The phases of a run as a bar, keyframes as ticks in it; what is not computed yet stays empty.
 pub(super) fn run(painter: &Painter, theme: &Theme, area: &PlotArea, lanes: &RunLanes, style: RunStyle) {
-    let bar = area.rect.shrink2(vec2(0.0, 4.0));
+    let bar = area.rect.shrink2(vec2(0.0, (0.5 * (area.rect.height() - HIGHEST_BAR)).max(4.0)));
     let stretch =
         |begin_ns, end_ns| Rect::from_x_y_ranges(area.x(begin_ns)..=area.x(end_ns), bar.y_range()).intersect(bar);
     for (begin_ns, end_ns) in stretches_where(&lanes.stamps_ns, |row| !lanes.tracking[row]) {
@@ -136,6 +141,9 @@ pub(super) fn figures(
         }
     }
     let area = area.with_values(0.0, if most > 0.0 { most * 1.15 } else { 1.0 });
+    if area.rect.height() >= LOWEST_WITH_SCALE {
+        paint_value_grid(painter, theme, &area, 1.0, (area.rect.height() / 22.0) as usize);
+    }
     for (run, curve) in curves.iter().enumerate() {
         let style = theme.run(run);
         if lane == Lane::Reprojection {

@@ -2,8 +2,10 @@
 
 mod lanes;
 mod model;
+mod pace;
 mod transport;
 
+pub use pace::{Pace, Reading};
 pub(crate) use transport::toggled_loop;
 
 use egui::{Align2, FontFamily, FontId, PointerButton, Rect, Response, Stroke, Ui, pos2, vec2};
@@ -18,11 +20,15 @@ use super::units::{fixed, seconds};
 use crate::geometry::seconds_from_ns;
 use crate::session::Command;
 
-const RULER_HEIGHT: f32 = 16.0;
+const RULER_HEIGHT: f32 = 18.0;
+/// Height that a lane takes where there is room, in points.
+const HIGHEST_LANE: f32 = 90.0;
 
 /// State of the timeline.
 #[derive(Debug, Default)]
 pub struct TimelinePanel {
+    /// How fast the cursor really runs.
+    pub pace: Pace,
     runs: Vec<RunLanes>,
     /// Curves of the lanes that plot figures, by lane: rank, features, reprojection.
     curves: [Vec<Curve>; 3],
@@ -42,7 +48,7 @@ impl TimelinePanel {
         for (lanes, run) in self.runs.iter_mut().zip(&ctx.recording.runs) {
             lanes.read(run);
         }
-        transport::ui(ui, ctx);
+        transport::ui(ui, ctx, self.pace.reading());
         let rect = ui.available_rect_before_wrap();
         let left = (rect.left() + LANE_LABEL_WIDTH).min(rect.center().x);
         let plot = Rect::from_min_max(pos2(left, rect.top()), rect.max - vec2(4.0, 0.0));
@@ -62,7 +68,7 @@ impl TimelinePanel {
             .chain([Lane::Events, Lane::Rank, Lane::Features, Lane::Reprojection, Lane::Outliers, Lane::Warnings])
             .collect();
         let lanes_height = plot.height() - RULER_HEIGHT;
-        let height = (lanes_height / shown.len() as f32).clamp(11.0, 1.6 * LANE_HEIGHT);
+        let height = (lanes_height / shown.len() as f32).clamp(11.0, HIGHEST_LANE);
         for (place, lane) in shown.iter().enumerate() {
             let top = plot.top() + RULER_HEIGHT + place as f32 * height;
             if top + height > rect.bottom() + 1.0 {
@@ -214,8 +220,9 @@ fn paint_cursor(painter: &egui::Painter, theme: &Theme, area: &PlotArea, cursor_
     if !area.rect.x_range().expand(1.0).contains(x) {
         return;
     }
-    let top = area.rect.top();
-    painter.vline(x, top..=area.rect.bottom(), Stroke::new(1.5, theme.cursor));
-    let head = vec![pos2(x - 5.0, top), pos2(x + 5.0, top), pos2(x, top + 8.0)];
+    // The head stays under the seconds, which must be read right where the cursor is.
+    let foot = area.rect.top() + RULER_HEIGHT;
+    painter.vline(x, foot - 1.0..=area.rect.bottom(), Stroke::new(1.5, theme.cursor));
+    let head = vec![pos2(x - 5.0, foot - 6.0), pos2(x + 5.0, foot - 6.0), pos2(x, foot)];
     painter.add(egui::Shape::convex_polygon(head, theme.cursor, Stroke::NONE));
 }

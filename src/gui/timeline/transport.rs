@@ -2,6 +2,7 @@
 
 use egui::{Button, ComboBox, RichText, Ui, vec2};
 
+use super::pace::Reading;
 use crate::gui::PanelContext;
 use crate::gui::units::{fixed, seconds};
 use crate::session::{Command, PlaybackSpeed};
@@ -13,7 +14,7 @@ pub(super) const HEIGHT: f32 = 26.0;
 const SPEEDS: [f64; 7] = [0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 10.0];
 
 /// Draws the buttons, the time, and how far the estimation has come.
-pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>) {
+pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, pace: Option<Reading>) {
     ui.horizontal(|ui| {
         ui.set_height(HEIGHT - 4.0);
         ui.spacing_mut().item_spacing.x = 3.0;
@@ -43,6 +44,9 @@ pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>) {
         ui.add_space(8.0);
         time_ui(ui, ctx);
         ui.add_space(12.0);
+        if let Some(pace) = pace {
+            pace_ui(ui, ctx, pace);
+        }
         progress_ui(ui, ctx);
     });
 }
@@ -83,6 +87,7 @@ pub(crate) fn toggled_loop(ctx: &PanelContext<'_>) -> Command {
 fn time_ui(ui: &mut Ui, ctx: &PanelContext<'_>) {
     let theme = ctx.theme;
     ui.label(RichText::new(format!("{} s", seconds(ctx.cursor_ns))).monospace().size(14.0).color(theme.text_strong));
+    ui.add_space(5.0);
     ui.label(RichText::new(format!("of {} s", seconds(ctx.recording.duration_ns))).monospace().color(theme.text_weak));
     let run = ctx.recording.runs.get(ctx.selection.run.min(ctx.recording.runs.len().saturating_sub(1)));
     if let Some(step) = run.and_then(|run| run.step_at(ctx.cursor_ns)) {
@@ -90,6 +95,21 @@ fn time_ui(ui: &mut Ui, ctx: &PanelContext<'_>) {
         ui.label(RichText::new("frame").color(theme.text_weak));
         ui.label(RichText::new(step.report.frame_index.to_string()).monospace().color(theme.text_strong));
     }
+}
+
+/// How many pictures a second, and a warning when the cursor runs slower than asked: pictures are left out before time
+/// is, so then it waits for the estimation.
+fn pace_ui(ui: &mut Ui, ctx: &PanelContext<'_>, pace: Reading) {
+    /// Below this share of the speed asked for the cursor counts as late.
+    const LATE_SHARE: f64 = 0.9;
+    let theme = ctx.theme;
+    let text = format!("{} pictures/s", fixed(pace.pictures_per_s, 0));
+    ui.label(RichText::new(text).color(theme.text_weak)).on_hover_text("Pictures drawn per second while playing");
+    if pace.speed < LATE_SHARE * ctx.playback.speed {
+        let text = format!("⚠ {}×, waits for the estimation", fixed(pace.speed, 2));
+        ui.label(RichText::new(text).color(theme.warn)).on_hover_text("The speed that is reached");
+    }
+    ui.add_space(8.0);
 }
 
 /// How far each run has come, until all are done.
