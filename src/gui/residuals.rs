@@ -61,8 +61,8 @@ impl ResidualsPanel {
         let theme = *ctx.theme;
         let Some((_, histogram)) = &self.counted else { return };
         summary_ui(ui, &theme, report, histogram);
-        let over_time = (0.3 * height).clamp(44.0, 110.0);
-        histogram_ui(ui, &theme, histogram, (height - over_time - 44.0).clamp(60.0, 260.0));
+        let over_time = (0.3 * height).max(44.0);
+        histogram_ui(ui, &theme, histogram, (height - over_time - 44.0).max(60.0));
         self.over_time_ui(ui, ctx, over_time);
     }
 
@@ -130,7 +130,14 @@ fn histogram_ui(ui: &mut Ui, theme: &Theme, histogram: &ResidualHistogram, heigh
     for mark in marks {
         painter.vline(x(mark), plot.y_range(), Stroke::new(1.0, theme.grid));
         let text = fixed(mark, decimals_of_step(step));
-        painter.text(pos2(x(mark), plot.bottom() + 1.0), Align2::CENTER_TOP, text, font.clone(), theme.text_weak);
+        let align = if x(mark) < plot.left() + 16.0 {
+            Align2::LEFT_TOP
+        } else if x(mark) > plot.right() - 16.0 {
+            Align2::RIGHT_TOP
+        } else {
+            Align2::CENTER_TOP
+        };
+        painter.text(pos2(x(mark), plot.bottom() + 1.0), align, text, font.clone(), theme.text_weak);
     }
     let most = histogram.after.iter().chain(&histogram.before).copied().max().unwrap_or(0).max(1) as f32;
     let pitch = plot.width() / histogram.after.len().max(1) as f32;
@@ -156,7 +163,9 @@ fn histogram_ui(ui: &mut Ui, theme: &Theme, histogram: &ResidualHistogram, heigh
     let end = painter.text(key, Align2::LEFT_TOP, "■ after", label_font(), theme.accent);
     let next = pos2(end.right() + 8.0, key.y);
     painter.text(next, Align2::LEFT_TOP, "— before the solve", label_font(), theme.warn);
-    let outside = if histogram.outside > 0 { format!("{} outside, px", histogram.outside) } else { "px".to_owned() };
+    let unit = "prediction − measurement, px";
+    let outside =
+        if histogram.outside > 0 { format!("{} outside · {unit}", histogram.outside) } else { unit.to_owned() };
     painter.text(rect.right_top() + vec2(-5.0, 2.0), Align2::RIGHT_TOP, outside, label_font(), theme.text_weak);
     let response = ui.interact(rect, ui.unique_id().with("histogram"), Sense::hover());
     response.widget_info(|| WidgetInfo::labeled(Role::Image, true, "Histogram of reprojection residuals"));

@@ -235,6 +235,12 @@ impl Theme {
         mix(zero, if weight < 0.0 { negative } else { positive }, weight.abs())
     }
 
+    /// Viridis over heights, without the end that this theme's ground swallows.
+    pub fn height_color(&self, fraction: f64) -> Color32 {
+        let (low, high) = if self.is_dark() { (0.3, 1.0) } else { (0.0, 0.75) };
+        viridis(low + (high - low) * fraction.clamp(0.0, 1.0))
+    }
+
     /// The ink that reads best on a ground.
     pub fn text_on(ground: Color32) -> Color32 {
         let (dark, light) = (rgb(0x0d1117), rgb(0xf0f3f7));
@@ -391,6 +397,9 @@ mod tests {
             }
             for line in theme.runs.into_iter().chain([theme.truth, theme.axis_x, theme.axis_y, theme.axis_z]) {
                 assert!(contrast(line, theme.plot_background) >= 3.0, "{name:?} {line:?}");
+            }
+            for fraction in [0.0, 0.5, 1.0] {
+                assert!(contrast(theme.height_color(fraction), theme.plot_background) >= 1.8, "{name:?} {fraction}");
             }
             for weight in [-1.0, -0.5, 0.0, 0.5, 1.0] {
                 let ground = theme.diverging(weight);

@@ -7,7 +7,8 @@ mod tests;
 
 use std::sync::Arc;
 
-use egui::{Align2, ColorImage, Rect, Sense, TextureHandle, TextureOptions, Ui, Vec2, pos2, vec2};
+use egui::containers::menu::{MenuButton, MenuConfig};
+use egui::{Align2, ColorImage, PopupCloseBehavior, Rect, Sense, TextureHandle, TextureOptions, Ui, Vec2, pos2, vec2};
 
 use self::model::ImageModel;
 pub use self::model::SolveSide;
@@ -18,6 +19,8 @@ use crate::flight_log::GrayImage;
 
 /// Furthest that the image can be magnified over its fitting size.
 const LARGEST_ZOOM: f32 = 16.0;
+/// Width that a row of all options needs, in points.
+const OPTIONS_WIDTH: f32 = 395.0;
 /// Height of the legend and of the caption in points.
 const LINE_HEIGHT: f32 = 18.0;
 
@@ -72,6 +75,12 @@ struct CachedTexture {
 }
 
 impl ImagePanel {
+    /// A panel that shows the same and holds no texture of a window.
+    pub(in crate::gui) fn view_copy(&self) -> Self {
+        let Self { side, magnification, residuals, tails, ids, view, .. } = *self;
+        Self { side, magnification, residuals, tails, ids, view, texture: None }
+    }
+
     /// Draws the panel into what is left of `ui`.
     pub fn ui(&mut self, ui: &mut Ui, context: &mut PanelContext<'_>) {
         let Some(run) = context.recording.runs.get(context.selection.run) else {
@@ -104,19 +113,29 @@ impl ImagePanel {
             ui.selectable_value(&mut self.side, SolveSide::Before, "Before")
                 .on_hover_text("Residuals before the solve");
             ui.selectable_value(&mut self.side, SolveSide::After, "After").on_hover_text("Residuals after the solve");
-            ui.checkbox(&mut self.residuals, "Residuals");
-            ui.spacing_mut().slider_width = 70.0;
-            ui.add_enabled(
-                self.residuals,
-                egui::Slider::new(&mut self.magnification, 1.0..=200.0)
-                    .logarithmic(true)
-                    .fixed_decimals(0)
-                    .prefix("×")
-                    .text("magnification"),
-            );
-            ui.checkbox(&mut self.tails, "Tails");
-            ui.checkbox(&mut self.ids, "Ids");
+            if ui.available_width() >= OPTIONS_WIDTH {
+                self.options_ui(ui);
+            } else {
+                let config = MenuConfig::new().close_behavior(PopupCloseBehavior::CloseOnClickOutside);
+                MenuButton::new("Show").config(config).ui(ui, |ui| self.options_ui(ui));
+            }
         });
+    }
+
+    /// What is drawn over the image: in a row where there is room, else in a menu.
+    fn options_ui(&mut self, ui: &mut Ui) {
+        ui.checkbox(&mut self.residuals, "Residuals");
+        ui.spacing_mut().slider_width = 70.0;
+        ui.add_enabled(
+            self.residuals,
+            egui::Slider::new(&mut self.magnification, 1.0..=200.0)
+                .logarithmic(true)
+                .fixed_decimals(0)
+                .prefix("×")
+                .text("magnification"),
+        );
+        ui.checkbox(&mut self.tails, "Tails");
+        ui.checkbox(&mut self.ids, "Ids");
     }
 
     fn image_ui(
@@ -180,14 +199,14 @@ impl ImagePanel {
         }
         if let Some(mark) = model.marks.iter().find(|mark| Some(mark.id) == context.selection.feature) {
             let at = place.position(&mark.measured_px);
-            paint::selection(painter, at);
+            paint::selection(painter, place, at);
             if !self.ids {
-                let beside = at + vec2(paint::RING_RADIUS + 8.0, 0.0);
+                let beside = at + vec2(place.ring_radius() + 8.0, 0.0);
                 paint::label(painter, beside, Align2::LEFT_CENTER, &mark.id.0.to_string());
             }
         }
         if let Some(mark) = nearest {
-            paint::selection(painter, place.position(&mark.measured_px));
+            paint::selection(painter, place, place.position(&mark.measured_px));
             ui.ctx().set_cursor_icon(egui::CursorIcon::PointingHand);
             response.clone().on_hover_text_at_pointer(model::description(mark));
         }

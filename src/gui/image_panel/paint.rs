@@ -10,8 +10,10 @@ use crate::gui::theme::{self, Theme, ThemeName};
 const OLDEST_AGE: f64 = 100.0;
 /// Ages named in the legend.
 const LEGEND_AGES: [u32; 4] = [0, 10, 40, 100];
-/// Radius of the ring of a feature in the solve, in points.
-pub(super) const RING_RADIUS: f32 = 4.0;
+/// Radius of the ring of a feature in the solve, in points, where the image is large enough for it.
+const RING_RADIUS: f32 = 4.0;
+/// Radius of the ring in pixels of the image, so that rings do not hide a small image.
+const RING_RADIUS_PX: f32 = 7.0;
 /// Radius of a feature that is only tracked.
 const DOT_RADIUS: f32 = 2.0;
 /// Shadow under bright marks, so that they are seen on light parts of the image.
@@ -34,6 +36,11 @@ impl ImagePlacement {
         let fraction = |at: f64, size: usize| ((at + 0.5) / size.max(1) as f64) as f32;
         let [width, height] = self.size_px;
         self.rect.lerp_inside(vec2(fraction(uv_px.x, width), fraction(uv_px.y, height)))
+    }
+
+    /// Radius of the ring of a feature in the solve, in points.
+    pub(super) fn ring_radius(&self) -> f32 {
+        (RING_RADIUS_PX * self.scale()).clamp(0.5 * RING_RADIUS, RING_RADIUS)
     }
 
     /// Points per image pixel.
@@ -75,15 +82,17 @@ fn residual_color() -> Color32 {
 /// One feature: tail, ring, residual, cross, id.
 pub(super) fn feature(painter: &Painter, place: &ImagePlacement, mark: &FeatureMark, options: &MarkOptions) {
     let at = place.position(&mark.measured_px);
-    let color = age_color(mark.age);
+    let (color, ring) = (age_color(mark.age), place.ring_radius());
     if options.tails && !mark.tail_px.is_empty() {
         let points: Vec<Pos2> = std::iter::once(at).chain(mark.tail_px.iter().map(|uv| place.position(uv))).collect();
         painter.add(Shape::line(points.clone(), Stroke::new(2.0, halo_of(color).gamma_multiply(0.4))));
         painter.add(Shape::line(points, Stroke::new(1.0, color.gamma_multiply(0.8))));
     }
     if let Some(solved) = &mark.solved {
-        painter.circle_stroke(at, RING_RADIUS, Stroke::new(3.5, halo_of(color)));
-        painter.circle_stroke(at, RING_RADIUS, Stroke::new(2.0, color));
+        // Small rings are thin rings.
+        let thickness = 0.5 * ring;
+        painter.circle_stroke(at, ring, Stroke::new(thickness + 1.5, halo_of(color)));
+        painter.circle_stroke(at, ring, Stroke::new(thickness, color));
         if options.residuals
             && let Some(residual) = solved.residual_px(options.side)
         {
@@ -92,14 +101,14 @@ pub(super) fn feature(painter: &Painter, place: &ImagePlacement, mark: &FeatureM
             residual_arrow(painter, at, tip);
         }
         if solved.rejected {
-            cross(painter, at, RING_RADIUS + 3.0);
+            cross(painter, at, ring + 3.0);
         }
     } else {
         painter.circle_filled(at, DOT_RADIUS + 1.0, halo_of(color));
         painter.circle_filled(at, DOT_RADIUS, color);
     }
     if options.ids {
-        label(painter, at + vec2(RING_RADIUS + 2.0, 0.0), Align2::LEFT_CENTER, &mark.id.0.to_string());
+        label(painter, at + vec2(ring + 2.0, 0.0), Align2::LEFT_CENTER, &mark.id.0.to_string());
     }
 }
 
@@ -123,9 +132,10 @@ fn cross(painter: &Painter, at: Pos2, radius: f32) {
 }
 
 /// A ring around the selected feature.
-pub(super) fn selection(painter: &Painter, at: Pos2) {
-    painter.circle_stroke(at, RING_RADIUS + 5.0, Stroke::new(4.0, HALO));
-    painter.circle_stroke(at, RING_RADIUS + 5.0, Stroke::new(2.0, ink().cursor));
+pub(super) fn selection(painter: &Painter, place: &ImagePlacement, at: Pos2) {
+    let radius = place.ring_radius() + 5.0;
+    painter.circle_stroke(at, radius, Stroke::new(4.0, HALO));
+    painter.circle_stroke(at, radius, Stroke::new(2.0, ink().cursor));
 }
 
 /// A text on the image with a dark plate under it.

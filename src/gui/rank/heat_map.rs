@@ -1,5 +1,6 @@
 //! Null and weak directions by parameter name: a heat map with the signed weights written in.
 
+use egui::epaint::TextShape;
 use egui::{Align2, FontFamily, FontId, Rect, RichText, Role, Sense, Stroke, StrokeKind, Ui, WidgetInfo, pos2, vec2};
 
 use super::verdict::parameters_of;
@@ -11,11 +12,13 @@ use crate::observability::{CalibrationDirection, RankReport};
 
 const NAME_WIDTH: f32 = 62.0;
 const HEADER_HEIGHT: f32 = 28.0;
-const HIGHEST_ROW: f32 = 17.0;
+/// Height of the heads of narrow columns, whose numbers stand upright.
+const UPRIGHT_HEADER_HEIGHT: f32 = 40.0;
+const HIGHEST_ROW: f32 = 26.0;
 const LOWEST_ROW: f32 = 12.0;
 /// Narrowest column that still holds a signed number.
 const NUMBER_WIDTH: f32 = 30.0;
-const WIDEST_COLUMN: f32 = 46.0;
+const WIDEST_COLUMN: f32 = 84.0;
 const NARROWEST_COLUMN: f32 = 15.0;
 /// Weights below this may be left out when room is short.
 const SMALLEST_SHOWN: f64 = 0.1;
@@ -36,23 +39,24 @@ pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, rank: &RankReport, hei
     let mut rows: Vec<usize> = (0..rank.names.len()).collect();
     rows.sort_by_key(|row| part_of(&rank.names[*row]));
     let all = rows.len();
-    if (height - HEADER_HEIGHT) / (rows.len() as f32) < LOWEST_ROW {
+    let header_height = if pitch >= NUMBER_WIDTH { HEADER_HEIGHT } else { UPRIGHT_HEADER_HEIGHT };
+    if (height - header_height) / (rows.len() as f32) < LOWEST_ROW {
         rows.retain(|row| {
             let weight = |direction: &CalibrationDirection| direction.weights.get(*row).copied().unwrap_or(0.0);
             directions.iter().any(|direction| weight(direction).abs() >= SMALLEST_SHOWN)
         });
     }
     let left_out = all - rows.len();
-    let row_height = ((height - HEADER_HEIGHT) / rows.len().max(1) as f32).clamp(LOWEST_ROW, HIGHEST_ROW);
-    let (_, rect) = ui.allocate_space(vec2(width, HEADER_HEIGHT + row_height * rows.len() as f32));
+    let row_height = ((height - header_height) / rows.len().max(1) as f32).clamp(LOWEST_ROW, HIGHEST_ROW);
+    let (_, rect) = ui.allocate_space(vec2(width, header_height + row_height * rows.len() as f32));
 
     for (column, direction) in directions.iter().enumerate() {
         let left = rect.left() + NAME_WIDTH + column as f32 * pitch;
-        let cell = Rect::from_min_size(pos2(left, rect.top()), vec2(pitch, HEADER_HEIGHT));
+        let cell = Rect::from_min_size(pos2(left, rect.top()), vec2(pitch, header_height));
         header(ui, &theme, rank, direction, column, cell);
     }
     for (place, row) in rows.iter().enumerate() {
-        let top = rect.top() + HEADER_HEIGHT + place as f32 * row_height;
+        let top = rect.top() + header_height + place as f32 * row_height;
         let line = Rect::from_min_size(pos2(rect.left(), top), vec2(NAME_WIDTH + pitch * count as f32, row_height));
         row_ui(ui, ctx, &rank.names[*row], *row, directions, line, pitch);
     }
@@ -73,14 +77,16 @@ fn header(ui: &Ui, theme: &Theme, rank: &RankReport, direction: &CalibrationDire
     let color = if direction.structural { theme.error } else { theme.warn };
     let painter = ui.painter();
     let mark = if direction.structural { "null" } else { "weak" };
-    let wide = cell.width() >= NUMBER_WIDTH;
-    let font = FontId::new(10.0, FontFamily::Proportional);
-    let top = cell.center_top();
-    painter.text(top, Align2::CENTER_TOP, if wide { mark } else { &mark[..1] }, font, color);
-    if wide {
-        let font = FontId::new(9.5, FontFamily::Monospace);
-        let value = if direction.structural { "0".to_owned() } else { figure(direction.singular_value) };
-        painter.text(top + vec2(0.0, 13.0), Align2::CENTER_TOP, value, font, theme.text_weak);
+    let value = if direction.structural { "0".to_owned() } else { figure(direction.singular_value) };
+    let small = FontId::new(9.5, FontFamily::Monospace);
+    if cell.width() >= NUMBER_WIDTH {
+        let top = cell.center_top();
+        painter.text(top, Align2::CENTER_TOP, mark, FontId::new(10.0, FontFamily::Proportional), color);
+        painter.text(top + vec2(0.0, 13.0), Align2::CENTER_TOP, value, small, theme.text_weak);
+    } else {
+        let galley = painter.layout_no_wrap(value, small, color);
+        let foot = cell.center_bottom() - vec2(0.5 * galley.size().y, 2.0);
+        painter.add(TextShape::new(foot, galley, color).with_angle(-std::f32::consts::FRAC_PI_2));
     }
     let response = ui.interact(cell, ui.unique_id().with(("direction", column)), Sense::hover());
     let named = parameters_of(&rank.names, direction, 6);
@@ -109,7 +115,8 @@ fn row_ui(
         let ground = theme.diverging(weight);
         painter.rect_filled(cell, 1.0, ground);
         if weight.abs() >= 0.05 && pitch >= NUMBER_WIDTH {
-            let font = FontId::new((line.height() - 3.0).min(10.0), FontFamily::Monospace);
+            let font =
+                FontId::new((line.height() - 3.0).min(if pitch > 50.0 { 12.0 } else { 10.0 }), FontFamily::Monospace);
             painter.text(cell.center(), Align2::CENTER_CENTER, format!("{weight:+.2}"), font, Theme::text_on(ground));
         } else if weight.abs() >= 0.2 {
             let sign = if weight < 0.0 { "−" } else { "+" };

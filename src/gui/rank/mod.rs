@@ -51,7 +51,7 @@ impl RankPanel {
                 self.over_time_ui(ui, ctx);
                 return;
             };
-            spectrum::ui(ui, ctx.theme, rank, (0.2 * height).clamp(64.0, 130.0));
+            spectrum::ui(ui, ctx.theme, rank, (0.16 * height).clamp(60.0, 150.0));
             // The timeline has a lane for it too, so it yields to the heat map first.
             if height > LOWEST_WITH_TIME {
                 self.over_time_ui(ui, ctx);
@@ -63,16 +63,22 @@ impl RankPanel {
 
     /// Structural and informed rank of all runs over time.
     fn over_time_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
-        const HEIGHT: f32 = 46.0;
+        /// Room for the caption over the plot, and for the plot.
+        const CAPTION: f32 = 14.0;
+        const HEIGHT: f32 = 58.0;
         let theme = *ctx.theme;
         let tables = self.tables.read(&ctx.recording.runs, rank_row);
         let most = tables.iter().flat_map(|table| &table.columns[PARAMETERS]).copied().fold(0.0, f64::max);
         if most == 0.0 {
             return;
         }
-        let (_, rect) = ui.allocate_space(vec2(ui.available_width(), HEIGHT));
+        let (_, all) = ui.allocate_space(vec2(ui.available_width(), HEIGHT));
+        let rect = egui::Rect::from_min_max(all.min + vec2(0.0, CAPTION), all.max);
         let (begin_ns, end_ns) = visible_range(ctx);
         let area = PlotArea { rect, begin_ns, end_ns, low: 0.0, high: most * 1.08 };
+        let caption = format!("informed rank over time, of {most:.0} (faint: structural)");
+        let place = all.left_top() + vec2(3.0, 0.0);
+        ui.painter().text(place, egui::Align2::LEFT_TOP, caption, super::theme::label_font(), theme.text_weak);
         let painter = ui.painter_at(rect);
         paint_ground(&painter, &theme, rect);
         self.curves.resize_with(tables.len(), Default::default);
@@ -85,15 +91,6 @@ impl RankPanel {
             paint_steps(&painter, &area, informed, style, CURVE_WIDTH);
         }
         paint_cursor(&painter, &theme, &area, ctx.cursor_ns);
-        let font = super::theme::label_font();
-        let place = rect.left_bottom() + vec2(3.0, -1.0);
-        painter.text(
-            place,
-            egui::Align2::LEFT_BOTTOM,
-            "informed rank over time (faint: structural)",
-            font,
-            theme.text_weak,
-        );
         let id = ui.unique_id().with("rank over time");
         navigate(ui, ctx, &area, id, "Rank over time", Clicks::Seek, false);
     }

@@ -44,8 +44,10 @@ pub enum Follow {
 const VEHICLE_SHARE: f64 = 0.3;
 /// Radians that the view turns per point of dragging.
 const TURN_PER_POINT: f64 = 0.008;
+/// Width that the table of the chain's links needs.
+const TABLE_WIDTH: f32 = 256.0;
 /// Smallest panel that has room for the close-up.
-const CLOSE_UP_FROM: Vec2 = vec2(400.0, 230.0);
+const CLOSE_UP_FROM: Vec2 = vec2(440.0, 230.0);
 
 /// The scene panel: what is shown, and from where.
 pub struct ScenePanel {
@@ -87,6 +89,12 @@ fn default_world_orbit() -> Orbit {
 }
 
 impl ScenePanel {
+    /// A panel that shows the same and holds no texture of a window.
+    pub(in crate::gui) fn view_copy(&self) -> Self {
+        let Self { follow, landmarks, keyframes, image, chain, world, close_up, .. } = *self;
+        Self { follow, landmarks, keyframes, image, chain, world, close_up, ..Self::default() }
+    }
+
     /// Draws the panel into what is left of `ui`.
     pub fn ui(&mut self, ui: &mut Ui, context: &mut PanelContext<'_>) {
         self.controls_ui(ui);
@@ -140,7 +148,9 @@ impl ScenePanel {
             .map(|(number, run)| RunView::new(number, run, context.cursor_ns))
             .collect();
         let points = framing_points_m(context.recording);
-        let viewport = world_viewport(area, close_up, scale);
+        // The key in the upper left corner: a line per run, the truth's, the landmarks'.
+        let key = overlay::LINE_HEIGHT * (views.len() + 2) as f32;
+        let viewport = world_viewport(area, close_up, key.min(0.22 * area.height()), scale);
         let mut framing = frame(&points, self.world.towards, &viewport);
         if self.follow == Follow::Vehicle
             && let Some(at) = views.get(context.selection.run).and_then(RunView::position_m)
@@ -268,13 +278,13 @@ fn size_px(rect: Rect, pixels_per_point: f32) -> [u32; 2] {
     [rect.width(), rect.height()].map(|side| (side * pixels_per_point).round().max(1.0) as u32)
 }
 
-/// The whole area, framed to the left of the close-up.
-fn world_viewport(area: Rect, close_up: Option<Rect>, pixels_per_point: f32) -> Viewport {
+/// The whole area, framed to the left of the close-up and under the key.
+fn world_viewport(area: Rect, close_up: Option<Rect>, key_height: f32, pixels_per_point: f32) -> Viewport {
     let size_px = size_px(area, pixels_per_point);
     let right = close_up.map_or_else(|| area.right(), |rect| rect.left());
     let frame_px = [
         0.0,
-        overlay::LINE_HEIGHT * pixels_per_point,
+        key_height * pixels_per_point,
         (right - area.left()) * pixels_per_point,
         area.height() * pixels_per_point,
     ];
@@ -284,7 +294,9 @@ fn world_viewport(area: Rect, close_up: Option<Rect>, pixels_per_point: f32) -> 
 /// The lower right corner.
 fn close_up_rect(area: Rect, pixels_per_point: f32) -> Rect {
     const INSET: f32 = 6.0;
-    let size = vec2((0.42 * area.width()).clamp(190.0, 420.0), (0.8 * area.height()).clamp(180.0, 420.0));
+    // The table of links needs some width, but the flight half of the panel.
+    let least = (0.5 * area.width()).min(TABLE_WIDTH);
+    let size = vec2((0.42 * area.width()).clamp(least, 420.0), (0.8 * area.height()).clamp(180.0, 420.0));
     on_pixels(Rect::from_min_max(area.max - size - Vec2::splat(INSET), area.max - Vec2::splat(INSET)), pixels_per_point)
 }
 

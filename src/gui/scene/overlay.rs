@@ -43,7 +43,7 @@ pub(super) fn labels(painter: &Painter, rect: Rect, pixels_per_point: f32, label
 /// A text on a half transparent plate.
 fn plated(painter: &Painter, at: Pos2, galley: Arc<Galley>, color: Color32, ground: Color32) {
     let plate = Rect::from_min_size(at, galley.size()).expand2(vec2(2.0, -1.0));
-    painter.rect_filled(plate, 2.0, ground.gamma_multiply(0.7));
+    painter.rect_filled(plate, 2.0, ground.gamma_multiply(0.8));
     painter.galley(at, galley, color);
 }
 
@@ -82,7 +82,7 @@ pub(super) fn legend(
         const STEPS: u16 = 14;
         for step in 0..STEPS {
             let slice = Rect::from_min_size(at + vec2(2.0 * f32::from(step), 4.0), vec2(2.0, 8.0));
-            let color = theme::viridis((f64::from(step) + 0.5) / f64::from(STEPS));
+            let color = theme.height_color((f64::from(step) + 0.5) / f64::from(STEPS));
             painter.rect_filled(slice, 0.0, color);
         }
         let text = format!("landmarks, height {low_m:.1} to {high_m:.1} m");
@@ -148,7 +148,7 @@ pub(super) fn chain_table(painter: &Painter, rect: Rect, theme: &Theme, chain: &
     let font = FontId::monospace(10.5);
     let mut y = rect.top() + 2.0;
     // Right edges of the columns of numbers, as shares of the width.
-    const EDGES: [f32; 5] = [0.34, 0.54, 0.70, 0.84, 1.0];
+    const EDGES: [f32; 5] = [0.3, 0.49, 0.65, 0.81, 1.0];
     let inner = rect.shrink2(vec2(8.0, 0.0));
     let mut row = |cells: [String; 6], color: Color32| {
         let [name, numbers @ ..] = cells;

@@ -12,7 +12,7 @@ use crate::camera::CameraModel;
 use crate::estimator::{FrameStateReport, LandmarkReport};
 use crate::flight_log::GrayImage;
 use crate::geometry::RigidTransform;
-use crate::gui::theme::{self, Theme, mix};
+use crate::gui::theme::{Theme, mix};
 use crate::session::{Recording, RunRecord};
 
 /// Most points that one trajectory is drawn with.
@@ -258,11 +258,11 @@ impl<'a> WorldBuilder<'a> {
         self.height_range_m = height_range_m(latest.iter().map(|(_, _, position)| position.z));
         let Some((low_m, high_m)) = self.height_range_m else { return };
         for (_, age, position_m) in latest {
-            let color = theme::viridis((position_m.z - low_m) / (high_m - low_m).max(1e-6));
+            let color = self.theme.height_color((position_m.z - low_m) / (high_m - low_m).max(1e-6));
             if age == 0 {
                 self.dot(position_m, color, 2.0);
             } else {
-                self.dot(position_m, mix(self.theme.plot_background, color, 0.55), 1.2);
+                self.dot(position_m, mix(self.theme.plot_background, color, 0.6), 1.3);
             }
         }
     }
