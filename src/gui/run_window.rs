@@ -10,6 +10,7 @@ use thiserror::Error;
 use super::app::{App, OpenLog, PlayingLog};
 use super::desktop::Desktop;
 use super::scene::SceneBackend;
+use super::software_window::SoftwareWindow;
 use super::theme::ThemeName;
 
 /// What a server without a desktop needs for the window (Debian and Ubuntu).
@@ -66,7 +67,7 @@ pub fn run_window(options: WindowOptions) -> Result<(), WindowError> {
             "dcvins",
             native,
             Box::new(move |creation| {
-                scene_backend(creation.wgpu_render_state.as_ref()).set(&creation.egui_ctx);
+                arrange_drawing(creation.wgpu_render_state.as_ref(), &creation.egui_ctx);
                 let mut app = App::new(options.open_log, options.desktop, options.theme);
                 if let Some(log) = options.log {
                     app.show(log);
@@ -86,13 +87,17 @@ pub fn run_window(options: WindowOptions) -> Result<(), WindowError> {
     }
 }
 
-/// Scenes are drawn by the graphics card; an adapter that computes on the CPU is slower than drawing there ourselves.
-fn scene_backend(state: Option<&eframe::egui_wgpu::RenderState>) -> SceneBackend {
+/// A graphics card draws the scene and everything else; an adapter that computes on the CPU is several times slower than
+/// drawing there ourselves.
+fn arrange_drawing(state: Option<&eframe::egui_wgpu::RenderState>, context: &egui::Context) {
     match state {
         Some(state) if state.adapter.get_info().device_type != wgpu::DeviceType::Cpu => {
-            SceneBackend::Wgpu(state.target_format)
+            SceneBackend::Wgpu(state.target_format).set(context);
         }
-        _ => SceneBackend::Cpu,
+        _ => {
+            SceneBackend::Cpu.set(context);
+            context.add_plugin(SoftwareWindow::default());
+        }
     }
 }
 

@@ -1,0 +1,88 @@
+//! Paints the whole window ourselves where the graphics adapter computes on the CPU anyway.
+//!
+//! A software Vulkan takes several times as long for egui's meshes as [`Painter`] does, so the window's meshes are
+//! painted here and the adapter is left one textured rectangle.
+
+use std::sync::Arc;
+
+use egui::epaint::{ClippedShape, ImageDelta, Mesh};
+use egui::{Color32, ColorImage, Context, FullOutput, Plugin, Pos2, Rect, Shape, TextureId, TextureOptions, pos2};
+use image::RgbaImage;
+
+use super::painter::Painter;
+
+/// The texture that shows the window; egui counts its own up from 0.
+const PICTURE: TextureId = TextureId::Managed(u64::MAX);
+
+/// Replaces what a picture of the window consists of by one texture.
+#[derive(Default)]
+pub(super) struct SoftwareWindow {
+    painter: Painter,
+    shown: Option<RgbaImage>,
+}
+
+impl Plugin for SoftwareWindow {
+    fn debug_name(&self) -> &'static str {
+        "software window"
+    }
+
+    fn output_hook(&mut self, ctx: &Context, output: &mut FullOutput) {
+        let scale = output.pixels_per_point;
+        let size = ctx.viewport_rect().max.to_vec2();
+        let size_px = [size.x, size.y].map(|side| (side * scale).round().max(0.0) as u32);
+        let shapes = std::mem::take(&mut output.shapes);
+        let primitives = ctx.tessellate(shapes, scale);
+        self.painter.set_textures(&output.textures_delta);
+        let picture = self.painter.paint(&primitives, size_px, scale, Color32::BLACK);
+        self.painter.free_textures(&output.textures_delta);
+        output.textures_delta.clear();
+        if picture.is_empty() {
+            return;
+        }
+        if self.shown.as_ref() != Some(&picture) {
+            let size = size_px.map(|side| side as usize);
+            let image = Arc::new(ColorImage::from_rgba_premultiplied(size, &picture));
+            output.textures_delta.push(PICTURE, ImageDelta::full(image, TextureOptions::NEAREST));
+            self.shown = Some(picture);
+        }
+        let rect = Rect::from_min_size(Pos2::ZERO, egui::vec2(size_px[0] as f32, size_px[1] as f32) / scale);
+        let mut mesh = Mesh::with_texture(PICTURE);
+        mesh.add_rect_with_uv(rect, Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0)), Color32::WHITE);
+        output.shapes = vec![ClippedShape::new(rect, Shape::mesh(mesh))];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gui::headless::{Headless, HeadlessOptions};
+    use crate::gui::theme::ThemeName;
+
+    fn sample_ui(ui: &mut egui::Ui) {
+        ui.label("one textured rectangle");
+        ui.add(egui::Slider::new(&mut 0.3, 0.0..=1.0));
+        ui.button("unchanged").highlight();
+    }
+
+    #[test]
+    fn the_window_comes_as_one_texture_with_the_same_pixels() {
+        for scale in [1.0, 1.5] {
+            let options = HeadlessOptions { size_px: [360, 180], pixels_per_point: scale, theme: ThemeName::Light };
+            let panel = |ui: &mut egui::Ui| {
+                egui::CentralPanel::default().show(ui, sample_ui);
+            };
+            let (mut plain, mut painter) = (Headless::new(options), Painter::new());
+            let Ok(expected) = plain.picture(&mut painter, panel);
+
+            let (mut window, mut adapter) = (Headless::new(options), Painter::new());
+            window.context().add_plugin(SoftwareWindow::default());
+            let Ok(seen) = window.picture(&mut adapter, panel);
+            assert!(seen == expected, "at {scale}");
+
+            let mut again = window.frame(Vec::new(), panel);
+            assert_eq!(again.primitives.len(), 1, "one rectangle is left to the adapter");
+            assert!(again.textures.is_empty(), "what did not change is not handed over again");
+            again.textures.clear();
+        }
+    }
+}
