@@ -124,8 +124,21 @@ pub(crate) struct ScreenshotArguments {
     /// Colours.
     #[arg(long, value_enum, default_value_t = ThemeArgument::Light)]
     pub theme: ThemeArgument,
+    /// Who draws: cpu needs no driver and gives the same bytes everywhere, wgpu uses a graphics adapter.
+    #[arg(long, value_enum, default_value_t = RendererArgument::Cpu)]
+    pub renderer: RendererArgument,
     #[command(flatten)]
     pub estimation: EstimationArguments,
+}
+
+/// Names of the renderers.
+#[cfg(feature = "gui")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum RendererArgument {
+    /// The program itself.
+    Cpu,
+    /// A graphics adapter.
+    Wgpu,
 }
 
 /// Names of the themes.

@@ -3,14 +3,14 @@
 use std::io::{self, IsTerminal as _, Write as _};
 use std::path::Path;
 #[cfg(feature = "gui")]
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use anyhow::{Context as _, Result, bail};
 use dcvins::calibration::CalibrationOptions;
 use dcvins::export::{self, EvaluationOptions, RunFileOptions, RunSummary};
 use dcvins::flight_log::{self, FlightLog, Rig};
 use dcvins::geometry::seconds_from_ns;
-use dcvins::session::{self, CalibrationRequest, Recording, SessionPlan, SessionRequest, Stopwatch};
+use dcvins::session::{self, CalibrationRequest, Recording, SessionPlan, Stopwatch};
 use dcvins::simulation::{self, Experiment, SimulationOptions};
 
 use crate::arguments::{
@@ -69,25 +69,25 @@ impl Progress {
     }
 }
 
-/// Computes a request to its end (or to a time of the log) with a progress bar.
-fn compute(request: &SessionRequest, until_ns: Option<i64>) -> Result<(SessionPlan, Recording)> {
-    let plan = SessionPlan::open(request)?;
-    let begin_s = request.start_s;
+/// Computes a plan to its end (or to a time of the log) with a progress bar.
+fn compute(plan: &SessionPlan, until_ns: Option<i64>) -> Result<Recording> {
+    let begin_s = plan.start_s;
     let log_end_s = seconds_from_ns(plan.log.duration_ns());
-    let end_s = request.duration_s.map_or(log_end_s, |duration_s| log_end_s.min(begin_s + duration_s));
+    let end_s = plan.duration_s.map_or(log_end_s, |duration_s| log_end_s.min(begin_s + duration_s));
     let end_s = until_ns.map_or(end_s, |until_ns| end_s.min(seconds_from_ns(until_ns)));
     let mut progress = Progress::new();
-    let recording = session::compute(&plan, until_ns, &mut |recording| {
+    let recording = session::compute(plan, until_ns, &mut |recording| {
         let now_s = seconds_from_ns(recording.computed_ns());
         progress.show((now_s - begin_s) / (end_s - begin_s).max(1e-3), || format!("{now_s:.1} of {end_s:.1} s"));
     })?;
     progress.clear();
-    Ok((plan, recording))
+    Ok(recording)
 }
 
 /// `dcvins run`.
 pub(crate) fn run(arguments: &RunArguments) -> Result<()> {
-    let (_, recording) = compute(&arguments.estimation.request(arguments.log.clone()), None)?;
+    let plan = SessionPlan::open(&arguments.estimation.request(arguments.log.clone()))?;
+    let recording = compute(&plan, None)?;
     let mut summaries = Vec::new();
     for run in &recording.runs {
         let options = RunFileOptions { timing: !arguments.no_timing };
@@ -205,15 +205,20 @@ pub(crate) fn view(arguments: &ViewArguments) -> Result<()> {
     use dcvins::gui::theme::ThemeName;
     use dcvins::session::Session;
 
+    // What is wrong with the log or its rig is told here, before a window opens.
+    let request = |log: &Path| arguments.estimation.request(log.to_owned());
+    let plan = arguments.log.as_deref().map(|log| SessionPlan::open(&request(log))).transpose()?;
+    let opened = Mutex::new(plan.clone());
     let estimation = arguments.estimation.clone();
     let open_log = move |path: &Path| {
-        let session = Session::open(&estimation.request(path.to_owned())).map_err(|error| error.to_string())?;
-        Ok(Box::new(session) as Box<dyn PlayingLog>)
+        let mut opened = opened.lock().unwrap_or_else(PoisonError::into_inner);
+        // The log of the command line is open already; whatever comes later is opened here.
+        let session = match opened.take().filter(|plan| plan.log_path == path) {
+            Some(plan) => Session::start(plan),
+            None => Session::open(&estimation.request(path.to_owned())),
+        };
+        Ok(Box::new(session.map_err(|error| error.to_string())?) as Box<dyn PlayingLog>)
     };
-    if let Some(log) = &arguments.log {
-        // What is wrong with the log or its rig is told here, before a window opens.
-        SessionPlan::open(&arguments.estimation.request(log.clone()))?;
-    }
     let options = WindowOptions {
         log: None,
         log_path: arguments.log.clone(),
@@ -221,8 +226,8 @@ pub(crate) fn view(arguments: &ViewArguments) -> Result<()> {
         desktop: Arc::new(Machine::new()),
         theme: ThemeName::Light,
     };
-    match (run_window(options), &arguments.log) {
-        (Err(WindowError::NoDisplay), Some(log)) => write_pictures(log, arguments),
+    match (run_window(options), &plan) {
+        (Err(WindowError::NoDisplay), Some(plan)) => write_pictures(plan, arguments.out.as_deref()),
         (result, _) => Ok(result?),
     }
 }
@@ -235,14 +240,14 @@ pub(crate) fn view(_arguments: &ViewArguments) -> Result<()> {
 
 /// What the window would show at the end of the log, as pictures.
 #[cfg(feature = "gui")]
-fn write_pictures(log: &Path, arguments: &ViewArguments) -> Result<()> {
+fn write_pictures(plan: &SessionPlan, out: Option<&Path>) -> Result<()> {
     use dcvins::export::{PANEL_NAMES, PictureOptions, draw_panel, write_png};
     use dcvins::flight_log::ImageReader;
 
-    let stem = log.file_stem().unwrap_or(log.as_os_str());
-    let folder = arguments.out.clone().unwrap_or_else(|| Path::new("dcvins-output").join(stem));
+    let stem = plan.log_path.file_stem().unwrap_or(plan.log_path.as_os_str());
+    let folder = out.map_or_else(|| Path::new("dcvins-output").join(stem), Path::to_path_buf);
     tell(&format!("dcvins: there is no display, so the pictures are written to {}", folder.display()));
-    let (plan, recording) = compute(&arguments.estimation.request(log.to_owned()), None)?;
+    let recording = compute(plan, None)?;
     let mut images = ImageReader::new(Arc::clone(&plan.log), &plan.rig);
     let options = PictureOptions::default();
     for name in PANEL_NAMES {
@@ -260,8 +265,8 @@ fn write_pictures(log: &Path, arguments: &ViewArguments) -> Result<()> {
 /// `dcvins screenshot`.
 #[cfg(feature = "gui")]
 pub(crate) fn screenshot(arguments: &crate::arguments::ScreenshotArguments) -> Result<()> {
-    use crate::arguments::ThemeArgument;
-    use dcvins::export::{PANEL_NAMES, PictureOptions, draw_panel, write_png};
+    use crate::arguments::{RendererArgument, ThemeArgument};
+    use dcvins::export::{PANEL_NAMES, PictureOptions, Renderer, draw_panel, write_png};
     use dcvins::flight_log::ImageReader;
     use dcvins::gui::theme::ThemeName;
 
@@ -269,7 +274,15 @@ pub(crate) fn screenshot(arguments: &crate::arguments::ScreenshotArguments) -> R
         bail!("no panel is called '{}': expected one of {}", arguments.panel, PANEL_NAMES.join(", "));
     }
     let at_ns = dcvins::geometry::ns_from_seconds(arguments.at);
-    let (plan, recording) = compute(&arguments.estimation.request(arguments.log.clone()), Some(at_ns))?;
+    let plan = SessionPlan::open(&arguments.estimation.request(arguments.log.clone()))?;
+    let recording = compute(&plan, Some(at_ns))?;
+    if at_ns > plan.log.duration_ns() {
+        tell(&format!(
+            "dcvins: the log ends at {:.3} s, which is what is drawn",
+            seconds_from_ns(plan.log.duration_ns())
+        ));
+    }
+    let at_ns = at_ns.min(plan.log.duration_ns());
     let mut images = ImageReader::new(Arc::clone(&plan.log), &plan.rig);
     let options = PictureOptions {
         size_px: arguments.size.map(|side| side as u32),
@@ -278,6 +291,10 @@ pub(crate) fn screenshot(arguments: &crate::arguments::ScreenshotArguments) -> R
             ThemeArgument::Light => ThemeName::Light,
             ThemeArgument::Dark => ThemeName::Dark,
             ThemeArgument::Print => ThemeName::Print,
+        },
+        renderer: match arguments.renderer {
+            RendererArgument::Cpu => Renderer::Cpu,
+            RendererArgument::Wgpu => Renderer::Wgpu,
         },
     };
     let picture = draw_panel(&arguments.panel, &recording, at_ns, &mut images, &options)?;

@@ -21,7 +21,7 @@ pub use desktop::Machine;
 pub use error::ExportError;
 pub use evaluation::{EvaluationOptions, EvaluationReport, evaluate};
 #[cfg(feature = "gui")]
-pub use picture::{PANEL_NAMES, PictureError, PictureOptions, draw_panel, panel_names, png_bytes, write_png};
+pub use picture::{PANEL_NAMES, PictureError, PictureOptions, Renderer, draw_panel, panel_names, png_bytes, write_png};
 pub use recent_files::RecentFiles;
 pub use run_files::{RunFileOptions, write_run};
 pub use summary::{RunSummary, StageSummary, TimingSummary, log_name, summarize};

@@ -4,24 +4,38 @@ use std::fs;
 use std::io::Cursor;
 use std::path::Path;
 
-use egui::{CentralPanel, Frame, Ui};
+use egui::Ui;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder as _, RgbaImage};
 use thiserror::Error;
 
 use super::error::ExportError;
 use crate::gui::headless::{self, HeadlessOptions};
-use crate::gui::theme::{PANEL_MARGIN, Theme, ThemeName};
-use crate::gui::window::{WindowState, window_ui};
+use crate::gui::offscreen::{Offscreen, OffscreenError};
+use crate::gui::theme::{Theme, ThemeName};
+use crate::gui::window::{PanelName, WindowState, alone_ui, window_ui};
 use crate::gui::{ImageSource, PanelContext, Playback, Selection};
 use crate::session::Recording;
 
 /// Panels by name; `all` is the whole window.
 pub const PANEL_NAMES: [&str; 8] =
-    ["all", "image", "scene", "convergence", "rank", "residuals", "inspector", "timeline"];
+    [WHOLE_WINDOW, "image", "scene", "convergence", "rank", "residuals", "inspector", "timeline"];
+
+/// The name that stands for all panels.
+const WHOLE_WINDOW: &str = "all";
 
 /// Largest side of a picture in pixels.
 const LARGEST_SIDE_PX: u32 = 16_384;
+
+/// Who draws a picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Renderer {
+    /// The program itself: needs no driver, and gives the same bytes everywhere.
+    #[default]
+    Cpu,
+    /// A graphics adapter through wgpu, as in the window.
+    Wgpu,
+}
 
 /// How a picture is drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,11 +46,13 @@ pub struct PictureOptions {
     pub pixels_per_point: f32,
     /// Colours.
     pub theme: ThemeName,
+    /// Who draws it.
+    pub renderer: Renderer,
 }
 
 impl Default for PictureOptions {
     fn default() -> Self {
-        Self { size_px: [1920, 1080], pixels_per_point: 1.0, theme: ThemeName::Light }
+        Self { size_px: [1920, 1080], pixels_per_point: 1.0, theme: ThemeName::Light, renderer: Renderer::Cpu }
     }
 }
 
@@ -63,6 +79,9 @@ pub enum PictureError {
         /// Pixels per point.
         scale: f32,
     },
+    /// The graphics adapter could not draw it.
+    #[error(transparent)]
+    Graphics(#[from] OffscreenError),
     /// The picture could not be encoded.
     #[error("cannot encode the picture as PNG: {source}")]
     Encode {
@@ -87,8 +106,10 @@ pub fn draw_panel(
     images: &mut dyn ImageSource,
     options: &PictureOptions,
 ) -> Result<RgbaImage, PictureError> {
-    let panel = PANEL_NAMES.into_iter().find(|known| *known == name);
-    let panel = panel.ok_or_else(|| PictureError::UnknownPanel { name: name.to_owned() })?;
+    let panel = PanelName::ALL.into_iter().find(|known| known.as_str() == name);
+    if panel.is_none() && name != WHOLE_WINDOW {
+        return Err(PictureError::UnknownPanel { name: name.to_owned() });
+    }
     check(options)?;
     let theme = Theme::of(options.theme);
     let mut state = WindowState::default();
@@ -101,15 +122,17 @@ pub fn draw_panel(
         let images = &mut *images;
         let context =
             &mut PanelContext { recording, cursor_ns, playback: &playback, images, selection, theme: &theme, commands };
-        if panel == "all" {
-            window_ui(ui, &mut state, context);
-        } else {
-            let frame = Frame::new().fill(theme.surface).inner_margin(PANEL_MARGIN);
-            CentralPanel::no_frame().frame(frame).show(ui, |ui| panel_ui(panel, ui, &mut state, context));
+        match panel {
+            Some(panel) => alone_ui(panel, ui, &mut state, context),
+            None => window_ui(ui, &mut state, context),
         }
     };
-    let PictureOptions { size_px, pixels_per_point, theme } = *options;
-    Ok(headless::draw(HeadlessOptions { size_px, pixels_per_point, theme }, &mut ui))
+    let PictureOptions { size_px, pixels_per_point, theme, renderer } = *options;
+    let options = HeadlessOptions { size_px, pixels_per_point, theme };
+    match renderer {
+        Renderer::Cpu => Ok(headless::draw(options, &mut ui)),
+        Renderer::Wgpu => Ok(Offscreen::open()?.draw(options, &mut ui)?),
+    }
 }
 
 fn check(options: &PictureOptions) -> Result<(), PictureError> {
@@ -119,19 +142,6 @@ fn check(options: &PictureOptions) -> Result<(), PictureError> {
     }
     let scale = options.pixels_per_point;
     if (0.25..=8.0).contains(&scale) { Ok(()) } else { Err(PictureError::Scale { scale }) }
-}
-
-fn panel_ui(name: &str, ui: &mut Ui, state: &mut WindowState, context: &mut PanelContext<'_>) {
-    let panels = &mut state.panels;
-    match name {
-        "image" => panels.image.ui(ui, context),
-        "scene" => panels.scene.ui(ui, context),
-        "convergence" => panels.convergence.ui(ui, context),
-        "rank" => panels.rank.ui(ui, context),
-        "residuals" => panels.residuals.ui(ui, context),
-        "inspector" => panels.inspector.ui(ui, context),
-        _ => state.timeline.ui(ui, context),
-    }
 }
 
 /// Encodes an opaque picture as PNG, always with the same settings.
@@ -188,7 +198,7 @@ mod tests {
             (ThemeName::Light, 1.0, [1920, 1080]),
             (ThemeName::Print, 1.5, [2400, 1350]),
         ] {
-            let options = PictureOptions { size_px, pixels_per_point: scale, theme };
+            let options = PictureOptions { size_px, pixels_per_point: scale, theme, ..PictureOptions::default() };
             let picture = draw_panel("all", &recording, 9_000_000_000, &mut sample_images(), &options).unwrap();
             keep_picture(&format!("all-{}", theme.as_str()), &picture);
             assert_eq!([picture.width(), picture.height()], size_px);

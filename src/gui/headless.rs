@@ -1,6 +1,8 @@
-//! Runs a piece of user interface without a window and paints it on the CPU.
+//! Runs a piece of user interface without a window and paints it, on the CPU or with [`Offscreen`](super::offscreen).
 
-use egui::{RawInput, Rect, TexturesDelta, Ui, Vec2, ViewportId, ViewportInfo};
+use std::convert::Infallible;
+
+use egui::{ClippedPrimitive, Color32, RawInput, Rect, TexturesDelta, Ui, Vec2, ViewportId, ViewportInfo};
 use image::RgbaImage;
 
 use super::painter::Painter;
@@ -28,6 +30,49 @@ pub struct Frame {
     pub primitives: Vec<egui::ClippedPrimitive>,
     /// Textures that changed.
     pub textures: TexturesDelta,
+}
+
+/// Turns frames into pixels.
+pub trait FramePainter {
+    /// Why there is no picture.
+    type Error;
+
+    /// Takes over new and changed textures; called with every frame, before it is painted.
+    fn set_textures(&mut self, delta: &TexturesDelta);
+
+    /// Forgets the textures that a frame frees; called with every frame, after it is painted.
+    fn free_textures(&mut self, delta: &TexturesDelta);
+
+    /// Paints primitives, whose positions are in points, over an opaque ground.
+    fn paint(
+        &mut self,
+        primitives: &[ClippedPrimitive],
+        size_px: [u32; 2],
+        pixels_per_point: f32,
+        background: Color32,
+    ) -> Result<RgbaImage, Self::Error>;
+}
+
+impl FramePainter for Painter {
+    type Error = Infallible;
+
+    fn set_textures(&mut self, delta: &TexturesDelta) {
+        Self::set_textures(self, delta);
+    }
+
+    fn free_textures(&mut self, delta: &TexturesDelta) {
+        Self::free_textures(self, delta);
+    }
+
+    fn paint(
+        &mut self,
+        primitives: &[ClippedPrimitive],
+        size_px: [u32; 2],
+        pixels_per_point: f32,
+        background: Color32,
+    ) -> Result<RgbaImage, Infallible> {
+        Ok(Self::paint(self, primitives, size_px, pixels_per_point, background))
+    }
 }
 
 /// An egui context without a window; fonts are egui's own, never the system's.
@@ -71,7 +116,11 @@ impl Headless {
     }
 
     /// Runs the interface until it has settled and paints it over the theme's ground.
-    pub fn picture(&mut self, painter: &mut Painter, mut ui: impl FnMut(&mut Ui)) -> RgbaImage {
+    pub fn picture<P: FramePainter>(
+        &mut self,
+        painter: &mut P,
+        mut ui: impl FnMut(&mut Ui),
+    ) -> Result<RgbaImage, P::Error> {
         for _ in 1..SETTLING_FRAMES {
             let mut frame = self.frame(Vec::new(), &mut ui);
             painter.set_textures(&frame.textures);
@@ -88,9 +137,10 @@ impl Headless {
     }
 }
 
-/// One picture of a piece of user interface.
+/// One picture of a piece of user interface, painted on the CPU.
 pub fn draw(options: HeadlessOptions, ui: impl FnMut(&mut Ui)) -> RgbaImage {
-    Headless::new(options).picture(&mut Painter::new(), ui)
+    let Ok(picture) = Headless::new(options).picture(&mut Painter::new(), ui);
+    picture
 }
 
 #[cfg(test)]

@@ -10,6 +10,7 @@ pub mod headless;
 mod histogram;
 pub mod image_panel;
 pub mod inspector;
+pub mod offscreen;
 pub mod open_dialog;
 pub mod painter;
 #[cfg(test)]
@@ -26,6 +27,7 @@ mod sample_images;
 pub(crate) mod sample_recording;
 pub mod scene;
 mod session_log;
+mod software_window;
 #[cfg(test)]
 pub(crate) mod tests;
 pub mod theme;

@@ -2,4 +2,6 @@
 
 mod command_line;
 mod evaluate;
+#[cfg(feature = "gui")]
+mod renderers;
 mod sample_log;

@@ -1,0 +1,218 @@
+//! Paints frames with wgpu, as the window does, but into a texture that is read back: for comparing graphics drivers with
+//! the CPU painter, and for pictures of scenes that are large.
+//!
+//! The bytes of such a picture depend on the driver; those of the CPU painter do not.
+
+use std::time::Duration;
+
+use eframe::egui_wgpu::{self, RendererOptions, ScreenDescriptor};
+use egui::{ClippedPrimitive, Color32, TextureId, TexturesDelta, Ui};
+use image::RgbaImage;
+use thiserror::Error;
+
+use super::headless::{FramePainter, Headless, HeadlessOptions};
+use super::scene::SceneBackend;
+
+/// What is painted into: eight bits per channel in gamma space, where egui blends.
+const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
+const BYTES_PER_PIXEL: u32 = 4;
+/// A driver that has not finished a picture after this long never will.
+const DRIVER_HANGS_AFTER: Duration = Duration::from_mins(1);
+
+/// Why there is no picture.
+#[derive(Debug, Error)]
+pub enum OffscreenError {
+    /// No driver, or none that can be used.
+    #[error("no graphics adapter: {problem}; use --renderer cpu")]
+    NoAdapter {
+        /// What was tried.
+        problem: String,
+    },
+    /// The picture does not fit the adapter's textures.
+    #[error(
+        "a picture of {width}×{height} pixels is too large for the graphics adapter {adapter}, which draws up to \
+         {largest} each way; use --renderer cpu"
+    )]
+    TooLarge {
+        /// Width in pixels.
+        width: u32,
+        /// Height in pixels.
+        height: u32,
+        /// Largest side in pixels.
+        largest: u32,
+        /// Its name.
+        adapter: String,
+    },
+    /// The picture was not delivered.
+    #[error("the graphics adapter {adapter} delivered no picture: {problem}; use --renderer cpu")]
+    NotDelivered {
+        /// Its name.
+        adapter: String,
+        /// What the driver said.
+        problem: String,
+    },
+}
+
+/// A graphics adapter without a window.
+pub struct Offscreen {
+    device: wgpu::Device,
+    queue: wgpu::Queue,
+    renderer: egui_wgpu::Renderer,
+    largest_side_px: u32,
+    adapter: String,
+}
+
+impl Offscreen {
+    /// Finds an adapter: through Vulkan, Metal or Direct3D 12, and through OpenGL when there is none; the variable
+    /// `WGPU_BACKEND` chooses otherwise.
+    pub fn open() -> Result<Self, OffscreenError> {
+        let tries = wgpu::Backends::from_env()
+            .map_or_else(|| vec![wgpu::Backends::PRIMARY, wgpu::Backends::GL], |chosen| vec![chosen]);
+        let mut problems = Vec::new();
+        for backends in tries {
+            match pollster::block_on(Self::open_with(backends)) {
+                Ok(opened) => return Ok(opened),
+                Err(problem) => problems.push(problem),
+            }
+        }
+        Err(OffscreenError::NoAdapter { problem: problems.join("; ") })
+    }
+
+    async fn open_with(backends: wgpu::Backends) -> Result<Self, String> {
+        let descriptor =
+            wgpu::InstanceDescriptor { backends, ..wgpu::InstanceDescriptor::new_without_display_handle_from_env() };
+        let instance = wgpu::Instance::new(descriptor);
+        let options = wgpu::RequestAdapterOptions {
+            power_preference: wgpu::PowerPreference::from_env().unwrap_or(wgpu::PowerPreference::HighPerformance),
+            ..wgpu::RequestAdapterOptions::default()
+        };
+        let adapter = instance.request_adapter(&options).await.map_err(|error| error.to_string())?;
+        let info = adapter.get_info();
+        let limits = wgpu::Limits::downlevel_defaults().using_resolution(adapter.limits());
+        let largest_side_px = limits.max_texture_dimension_2d;
+        let descriptor = wgpu::DeviceDescriptor {
+            label: Some("offscreen"),
+            required_limits: limits,
+            ..wgpu::DeviceDescriptor::default()
+        };
+        let (device, queue) =
+            adapter.request_device(&descriptor).await.map_err(|error| format!("{}: {error}", info.name))?;
+        let renderer = egui_wgpu::Renderer::new(&device, FORMAT, RendererOptions::PREDICTABLE);
+        Ok(Self { device, queue, renderer, largest_side_px, adapter: format!("{} ({:?})", info.name, info.backend) })
+    }
+
+    /// The adapter's name and the interface it is used through.
+    pub fn adapter(&self) -> &str {
+        &self.adapter
+    }
+
+    /// One picture of a piece of user interface.
+    pub fn draw(&mut self, options: HeadlessOptions, ui: impl FnMut(&mut Ui)) -> Result<RgbaImage, OffscreenError> {
+        let [width, height] = options.size_px;
+        if width.max(height) > self.largest_side_px {
+            let (largest, adapter) = (self.largest_side_px, self.adapter.clone());
+            return Err(OffscreenError::TooLarge { width, height, largest, adapter });
+        }
+        let mut headless = Headless::new(options);
+        SceneBackend::Wgpu(FORMAT).set(headless.context());
+        headless.picture(self, ui)
+    }
+
+    fn not_delivered(&self, problem: &impl ToString) -> OffscreenError {
+        OffscreenError::NotDelivered { adapter: self.adapter.clone(), problem: problem.to_string() }
+    }
+
+    /// Copies a finished texture into memory.
+    fn read_back(
+        &self,
+        mut encoder: wgpu::CommandEncoder,
+        before: Vec<wgpu::CommandBuffer>,
+        texture: &wgpu::Texture,
+    ) -> Result<RgbaImage, OffscreenError> {
+        let (width, height) = (texture.width(), texture.height());
+        let row_bytes = width * BYTES_PER_PIXEL;
+        let padded_bytes = row_bytes.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("picture"),
+            size: u64::from(padded_bytes) * u64::from(height),
+            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(padded_bytes), rows_per_image: None };
+        let target = wgpu::TexelCopyBufferInfo { buffer: &buffer, layout };
+        encoder.copy_texture_to_buffer(texture.as_image_copy(), target, texture.size());
+        let submission = self.queue.submit(before.into_iter().chain([encoder.finish()]));
+        // What mapping says is asked below, when the range is taken.
+        buffer.map_async(wgpu::MapMode::Read, .., drop);
+        let wait = wgpu::PollType::Wait { submission_index: Some(submission), timeout: Some(DRIVER_HANGS_AFTER) };
+        self.device.poll(wait).map_err(|error| self.not_delivered(&error))?;
+        let rows = buffer.get_mapped_range(..).map_err(|error| self.not_delivered(&error))?;
+        let bytes = rows.chunks_exact(padded_bytes as usize).flat_map(|row| &row[..row_bytes as usize]).copied();
+        RgbaImage::from_raw(width, height, bytes.collect()).ok_or_else(|| self.not_delivered(&"too few bytes"))
+    }
+}
+
+impl FramePainter for Offscreen {
+    type Error = OffscreenError;
+
+    fn set_textures(&mut self, delta: &TexturesDelta) {
+        // The textures do not depend on each other, but a fixed order costs nothing.
+        let mut ids: Vec<TextureId> = delta.set.keys().copied().collect();
+        ids.sort_unstable();
+        for id in ids {
+            for change in delta.set.get(&id).into_iter().flatten() {
+                self.renderer.update_texture(&self.device, &self.queue, id, change);
+            }
+        }
+    }
+
+    fn free_textures(&mut self, delta: &TexturesDelta) {
+        let mut ids: Vec<&TextureId> = delta.free.iter().collect();
+        ids.sort_unstable();
+        for id in ids {
+            self.renderer.free_texture(id);
+        }
+    }
+
+    fn paint(
+        &mut self,
+        primitives: &[ClippedPrimitive],
+        size_px: [u32; 2],
+        pixels_per_point: f32,
+        background: Color32,
+    ) -> Result<RgbaImage, OffscreenError> {
+        let screen = ScreenDescriptor { size_in_pixels: size_px, pixels_per_point };
+        let label = Some("picture");
+        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label });
+        let before = self.renderer.update_buffers(&self.device, &self.queue, &mut encoder, primitives, &screen);
+        let texture = self.device.create_texture(&wgpu::TextureDescriptor {
+            label,
+            size: wgpu::Extent3d { width: size_px[0], height: size_px[1], depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: FORMAT,
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
+            view_formats: &[],
+        });
+        let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+        let [r, g, b] = [background.r(), background.g(), background.b()].map(|channel| f64::from(channel) / 255.0);
+        {
+            let pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                label,
+                color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                    view: &view,
+                    depth_slice: None,
+                    resolve_target: None,
+                    ops: wgpu::Operations {
+                        load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a: 1.0 }),
+                        store: wgpu::StoreOp::Store,
+                    },
+                })],
+                ..wgpu::RenderPassDescriptor::default()
+            });
+            self.renderer.render(&mut pass.forget_lifetime(), primitives, &screen);
+        }
+        self.read_back(encoder, before, &texture)
+    }
+}

@@ -1,0 +1,137 @@
+//! The same pictures from the CPU painter and from a graphics adapter (a software Vulkan will do), within a tolerance.
+
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::Arc;
+
+use dcvins::export::{PictureError, PictureOptions, Renderer, draw_panel};
+use dcvins::flight_log::ImageReader;
+use dcvins::geometry::ns_from_seconds;
+use dcvins::gui::offscreen::{Offscreen, OffscreenError};
+use dcvins::gui::theme::ThemeName;
+use dcvins::session::{self, SessionPlan, SessionRequest};
+use image::RgbaImage;
+
+/// A pixel counts as different when a channel is off by more than this, of 255.
+const NOTICEABLE: u8 = 16;
+/// Share of the pixels that may be different: edges of lines, where the two place their samples a little apart.
+const MOST_DIFFERENT: f64 = 0.005;
+/// Largest mean difference of a channel, of 255.
+const MOST_MEAN: f64 = 0.25;
+
+/// How far two pictures of one size are apart.
+#[derive(Clone, Copy, Debug)]
+struct Difference {
+    /// Share of pixels with a channel off by more than [`NOTICEABLE`].
+    different: f64,
+    /// Mean over all pixels and channels, of 255.
+    mean: f64,
+}
+
+impl Difference {
+    fn between(a: &RgbaImage, b: &RgbaImage) -> Self {
+        assert_eq!(a.dimensions(), b.dimensions());
+        let (mut different, mut sum) = (0, 0);
+        for (a, b) in a.pixels().zip(b.pixels()) {
+            let apart = [0, 1, 2].map(|channel| a.0[channel].abs_diff(b.0[channel]));
+            different += u64::from(apart.iter().any(|channel| *channel > NOTICEABLE));
+            sum += apart.iter().map(|channel| u64::from(*channel)).sum::<u64>();
+        }
+        let pixels = a.pixels().len() as f64;
+        Self { different: different as f64 / pixels, mean: sum as f64 / (3.0 * pixels) }
+    }
+
+    fn is_tolerable(&self) -> bool {
+        self.different <= MOST_DIFFERENT && self.mean <= MOST_MEAN
+    }
+}
+
+/// Says something at once, whether the test passes or not.
+fn say(text: &str) {
+    // With standard error gone there is nobody left to tell.
+    drop(writeln!(std::io::stderr(), "{text}"));
+}
+
+fn sample_log() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("sample_logs/garden.mcap")
+}
+
+#[test]
+fn a_graphics_adapter_draws_what_the_cpu_draws() {
+    match Offscreen::open() {
+        Ok(adapter) => say(&format!("comparing the CPU's pictures with those of {}", adapter.adapter())),
+        Err(error @ OffscreenError::NoAdapter { .. }) => {
+            say(&format!("SKIPPED, nothing compared: {error} (on Debian: apt-get install mesa-vulkan-drivers)"));
+            return;
+        }
+        Err(error) => panic!("{error}"),
+    }
+    let request = SessionRequest { log_path: sample_log(), ..SessionRequest::default() };
+    let plan = SessionPlan::open(&request).expect("the sample log opens");
+    let cursor_ns = ns_from_seconds(5.0);
+    let recording = session::compute(&plan, Some(cursor_ns), &mut |_| {}).expect("the sample log is computed");
+    let mut images = ImageReader::new(Arc::clone(&plan.log), &plan.rig);
+    let mut draw = |panel: &str, renderer, options: PictureOptions| {
+        let options = PictureOptions { renderer, ..options };
+        draw_panel(panel, &recording, cursor_ns, &mut images, &options).expect("the picture is drawn")
+    };
+    let cases = [
+        ("all", ThemeName::Light, [1920, 1080], 1.0),
+        ("all", ThemeName::Dark, [1366, 768], 1.0),
+        ("image", ThemeName::Dark, [900, 700], 1.5),
+        ("scene", ThemeName::Light, [900, 700], 1.0),
+        ("convergence", ThemeName::Print, [1400, 500], 2.0),
+    ];
+    let mut pictures = Vec::new();
+    for (panel, theme, size_px, pixels_per_point) in cases {
+        let options = PictureOptions { size_px, pixels_per_point, theme, ..PictureOptions::default() };
+        let (cpu, wgpu) = (draw(panel, Renderer::Cpu, options), draw(panel, Renderer::Wgpu, options));
+        let difference = Difference::between(&cpu, &wgpu);
+        say(&format!(
+            "  {panel} {}×{}: {:.3} % of the pixels off by more than {NOTICEABLE}, mean {:.3} of 255",
+            size_px[0],
+            size_px[1],
+            100.0 * difference.different,
+            difference.mean
+        ));
+        assert!(difference.is_tolerable(), "{panel} at {size_px:?}: {difference:?}");
+        pictures.push(cpu);
+    }
+    // The measure tells pictures apart that are not the same: a panel from itself shifted by a pixel, and one empty.
+    let scene = &pictures[3];
+    let shifted = RgbaImage::from_fn(scene.width(), scene.height(), |x, y| *scene.get_pixel(x.saturating_sub(1), y));
+    assert!(!Difference::between(scene, &shifted).is_tolerable());
+    let empty = RgbaImage::from_pixel(scene.width(), scene.height(), *scene.get_pixel(450, 350));
+    assert!(!Difference::between(scene, &empty).is_tolerable());
+    // Larger than any adapter draws.
+    let options = PictureOptions { size_px: [16_384, 64], renderer: Renderer::Wgpu, ..PictureOptions::default() };
+    match draw_panel("rank", &recording, cursor_ns, &mut images, &options) {
+        Ok(picture) => assert_eq!(picture.dimensions(), (16_384, 64)),
+        Err(PictureError::Graphics(error @ OffscreenError::TooLarge { .. })) => {
+            assert!(error.to_string().contains("use --renderer cpu"), "{error}");
+        }
+        Err(error) => panic!("{error}"),
+    }
+}
+
+#[test]
+fn without_an_adapter_the_program_says_what_to_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let picture = folder.path().join("picture.png");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_dcvins"));
+    command.args(["screenshot", "--at", "0.5", "--panel", "timeline", "--renderer", "wgpu", "--size", "320x200", "-o"]);
+    command.arg(&picture).arg(sample_log());
+    // No Vulkan driver can be found.
+    command.env("WGPU_BACKEND", "vulkan");
+    for variable in ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"] {
+        command.env(variable, folder.path().join("no-driver.json"));
+    }
+    let output = command.output().expect("the program starts");
+    let complaint = String::from_utf8_lossy(&output.stderr);
+    if cfg!(target_os = "linux") {
+        assert_eq!(output.status.code(), Some(1), "{complaint}");
+        let told = complaint.contains("no graphics adapter: ") && complaint.contains("; use --renderer cpu");
+        assert!(told && !complaint.contains("panicked") && !picture.exists(), "{complaint}");
+    }
+}
