@@ -3,8 +3,11 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::recent_files::RecentFiles;
+use super::error::ExportError;
+use super::picture::write_png;
+use super::recent_files::{RecentFiles, state_folder};
 use crate::gui::desktop::{Desktop, PathEntry};
+use crate::gui::window::PanelExport;
 
 /// How many entries of a folder are looked at.
 const MOST_READ: usize = 5000;
@@ -15,12 +18,17 @@ const LEVELS_ABOVE: usize = 4;
 #[derive(Clone, Debug)]
 pub struct Machine {
     recent: RecentFiles,
+    /// The file of saved layouts, when the user has a place for it.
+    layouts: Option<PathBuf>,
+    /// Where exported panels go.
+    output: PathBuf,
 }
 
 impl Machine {
     /// The machine with the user's list of recent logs.
     pub fn new() -> Self {
-        Self { recent: RecentFiles::of_user() }
+        let layouts = state_folder().map(|folder| folder.join("layouts.json"));
+        Self { recent: RecentFiles::of_user(), layouts, output: PathBuf::from("dcvins-output") }
     }
 }
 
@@ -75,6 +83,23 @@ impl Desktop for Machine {
         folders.map(|folder| logs_in(&folder)).find(|logs| !logs.is_empty()).unwrap_or_default()
     }
 
+    fn kept_layouts(&self) -> Option<String> {
+        fs::read_to_string(self.layouts.as_ref()?).ok()
+    }
+
+    fn keep_layouts(&self, text: &str) -> Result<(), String> {
+        let file = self.layouts.as_ref().ok_or("there is no home folder to keep layouts in: set HOME")?;
+        let folder = file.parent().map_or(Ok(()), fs::create_dir_all);
+        folder.and_then(|()| fs::write(file, text)).map_err(|error| ExportError::write(file)(error).to_string())
+    }
+
+    fn write_panel(&self, export: &PanelExport) -> Result<Vec<PathBuf>, String> {
+        let [picture, table] = ["png", "csv"].map(|kind| self.output.join(format!("{}.{kind}", export.name)));
+        write_png(&export.picture, &picture).map_err(|error| error.to_string())?;
+        fs::write(&table, &export.table).map_err(|error| ExportError::write(&table)(error).to_string())?;
+        Ok([picture, table].map(|path| fs::canonicalize(&path).unwrap_or(path)).to_vec())
+    }
+
     fn resident_bytes(&self) -> Option<u64> {
         let status = fs::read_to_string("/proc/self/status").ok()?;
         let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
@@ -98,6 +123,32 @@ fn logs_in(folder: &Path) -> Vec<PathBuf> {
 mod tests {
     use super::*;
 
+    fn machine_in(folder: &Path) -> Machine {
+        Machine {
+            recent: RecentFiles::in_file(folder.join("recent")),
+            layouts: Some(folder.join("state/layouts.json")),
+            output: folder.join("output"),
+        }
+    }
+
+    #[test]
+    fn panels_and_layouts_are_written_where_they_are_found_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let machine = machine_in(folder.path());
+        assert_eq!(machine.kept_layouts(), None);
+        machine.keep_layouts("{}").unwrap();
+        assert_eq!(machine.kept_layouts().as_deref(), Some("{}"));
+        let picture = image::RgbaImage::from_pixel(20, 10, image::Rgba([9, 8, 7, 255]));
+        let export = PanelExport { name: "yard/rank-1.500s".to_owned(), picture, table: "a,b\n1,2\n".to_owned() };
+        let written = machine.write_panel(&export).unwrap();
+        assert!(written[0].ends_with("output/yard/rank-1.500s.png"), "{written:?}");
+        assert_eq!(image::open(&written[0]).unwrap().to_rgba8(), export.picture);
+        assert_eq!(fs::read_to_string(&written[1]).unwrap(), export.table);
+        fs::write(folder.path().join("blocked"), "").unwrap();
+        let blocked = Machine { output: folder.path().join("blocked"), ..machine };
+        assert!(blocked.write_panel(&export).unwrap_err().starts_with("cannot write"));
+    }
+
     #[test]
     fn folders_come_first_and_only_logs_are_offered() {
         let folder = tempfile::tempdir().unwrap();
@@ -105,7 +156,7 @@ mod tests {
             fs::write(folder.path().join(name), "").unwrap();
         }
         fs::create_dir(folder.path().join("bags")).unwrap();
-        let machine = Machine { recent: RecentFiles::in_file(folder.path().join("recent")) };
+        let machine = machine_in(folder.path());
         let root = folder.path().to_string_lossy().into_owned();
         let names = |typed: String| -> Vec<String> {
             machine.complete(&typed).into_iter().map(|entry| entry.path.replacen(&root, "", 1)).collect()

@@ -12,13 +12,18 @@ pub struct RecentFiles {
     file: Option<PathBuf>,
 }
 
+/// Where the program keeps what it remembers: `$XDG_STATE_HOME/dcvins`, else `~/.local/state/dcvins`.
+pub(super) fn state_folder() -> Option<PathBuf> {
+    let folder = |name: &str| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
+    let home = folder("HOME").or_else(|| folder("USERPROFILE"));
+    let state = folder("XDG_STATE_HOME").or_else(|| Some(home?.join(".local/state")));
+    state.map(|state| state.join("dcvins"))
+}
+
 impl RecentFiles {
     /// The user's list: `$XDG_STATE_HOME/dcvins/recent`, else `~/.local/state/dcvins/recent`.
     pub fn of_user() -> Self {
-        let folder = |name: &str| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
-        let home = folder("HOME").or_else(|| folder("USERPROFILE"));
-        let state = folder("XDG_STATE_HOME").or_else(|| Some(home?.join(".local/state")));
-        Self { file: state.map(|state| state.join("dcvins/recent")) }
+        Self { file: state_folder().map(|folder| folder.join("recent")) }
     }
 
     /// A list in a file of one's own.

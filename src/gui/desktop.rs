@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use super::window::PanelExport;
+
 /// A path that could be meant.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PathEntry {
@@ -21,6 +23,12 @@ pub trait Desktop: Send + Sync {
     fn remember_log(&self, path: &Path);
     /// Logs that come with the program.
     fn sample_logs(&self) -> Vec<PathBuf>;
+    /// What [`Desktop::keep_layouts`] kept last.
+    fn kept_layouts(&self) -> Option<String>;
+    /// Keeps the saved layouts for the next start.
+    fn keep_layouts(&self, text: &str) -> Result<(), String>;
+    /// Writes a panel as a picture and as a table, and says where.
+    fn write_panel(&self, export: &PanelExport) -> Result<Vec<PathBuf>, String>;
     /// Memory of this process in bytes.
     fn resident_bytes(&self) -> Option<u64>;
 }

@@ -13,7 +13,7 @@ use crate::flight_log::GrayImage;
 use crate::gui::desktop::Desktop;
 use crate::gui::theme::{Theme, ThemeName};
 use crate::gui::welcome::Welcome;
-use crate::gui::window::{NoticeLevel, WindowRequest, WindowState, window_ui};
+use crate::gui::window::{NoticeLevel, PanelExport, SavedLayouts, WindowRequest, WindowState, window_ui};
 use crate::gui::{ImageSource, PanelContext, Playback, Selection};
 use crate::session::{Command, Recording};
 
@@ -40,8 +40,8 @@ pub trait PlayingLog: Send {
 /// Opens a log; the message of an error says what was wrong and what to do.
 pub type OpenLog = Arc<dyn Fn(&Path) -> Result<Box<dyn PlayingLog>, String> + Send + Sync>;
 
-/// Seconds that the cursor moves at most per picture, so that a stall does not become a jump.
-const LONGEST_STEP_S: f64 = 0.1;
+/// Seconds between two pictures from which the cursor does not catch up: the window was hidden, or the machine asleep.
+const STALL_S: f64 = 2.0;
 /// Milliseconds between two looks at what the estimators have computed.
 const LOOK_MS: u64 = 60;
 /// Seconds between two readings of the process's memory.
@@ -76,6 +76,7 @@ impl App {
         let mut state = WindowState::default();
         state.show_times = true;
         state.open_dialog.set_desktop(Arc::clone(&desktop));
+        state.saved_layouts = SavedLayouts::from_text(&desktop.kept_layouts().unwrap_or_default());
         Self {
             welcome: Welcome::new(Arc::clone(&desktop)),
             open_log,
@@ -134,12 +135,20 @@ impl App {
             self.welcome_ui(ui);
         }
         for request in std::mem::take(&mut self.state.requests) {
+            // What comes of it is seen in the next picture.
+            ui.ctx().request_repaint();
             match request {
                 WindowRequest::OpenLog(path) => self.open(path),
                 WindowRequest::ToggleTheme => {
                     self.theme = Theme::of(if self.theme.is_dark() { ThemeName::Light } else { ThemeName::Dark });
                     self.theme.apply(ui.ctx());
                 }
+                WindowRequest::KeepLayouts(text) => {
+                    if let Err(problem) = self.desktop.keep_layouts(&text) {
+                        self.state.notices.say(NoticeLevel::Error, problem);
+                    }
+                }
+                WindowRequest::WritePanel(export) => self.write_panel(&export),
             }
         }
         self.update_title(ui);
@@ -148,10 +157,26 @@ impl App {
         }
     }
 
+    fn write_panel(&mut self, export: &PanelExport) {
+        match self.desktop.write_panel(export) {
+            Ok(paths) => {
+                let paths: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
+                self.state.notices.say(NoticeLevel::Info, format!("Written:\n{}", paths.join("\n")));
+            }
+            Err(problem) => self.state.notices.say(NoticeLevel::Error, problem),
+        }
+    }
+
     fn session_ui(&mut self, ui: &mut Ui) {
         let Some(log) = &mut self.log else { return };
-        let elapsed_s = f64::from(ui.input(|input| input.stable_dt)).min(LONGEST_STEP_S);
-        log.advance(elapsed_s);
+        // Log time follows the wall: slow drawing leaves out pictures, not time.
+        let (elapsed_s, now_s) = ui.input(|input| (f64::from(input.stable_dt), input.time));
+        if elapsed_s < STALL_S {
+            log.advance(elapsed_s);
+        } else if log.playback().playing {
+            let text = format!("Nothing could be drawn for {elapsed_s:.1} s; playing goes on from where it was");
+            self.state.notices.say(NoticeLevel::Warning, text);
+        }
         for notice in log.take_notices() {
             self.state.notices.say(NoticeLevel::Warning, notice);
         }
@@ -159,6 +184,7 @@ impl App {
             self.at_first_frame = go_to_first_frame(log.as_mut());
         }
         let (recording, playback, generation) = (log.recording(), log.playback(), log.generation());
+        self.state.timeline.pace.picture(playback.playing, now_s, log.cursor_ns());
         let mut commands = Vec::new();
         let mut context = PanelContext {
             recording: &recording,

@@ -12,6 +12,7 @@ use crate::flight_log::GrayImage;
 use crate::gui::desktop::{Desktop, PathEntry};
 use crate::gui::sample_recording::{FRAME_PERIOD_NS, sample_images, sample_recording_of};
 use crate::gui::theme::ThemeName;
+use crate::gui::window::PanelExport;
 use crate::gui::{ImageSource as _, Playback};
 use crate::session::{Command, Recording};
 
@@ -79,6 +80,8 @@ impl PlayingLog for SampleLog {
 #[derive(Default)]
 struct TestDesktop {
     remembered: Mutex<Vec<PathBuf>>,
+    layouts: Mutex<Option<String>>,
+    written: Mutex<Vec<PanelExport>>,
 }
 
 impl Desktop for TestDesktop {
@@ -101,6 +104,20 @@ impl Desktop for TestDesktop {
 
     fn sample_logs(&self) -> Vec<PathBuf> {
         vec![PathBuf::from("/samples/yard.mcap")]
+    }
+
+    fn kept_layouts(&self) -> Option<String> {
+        self.layouts.lock().unwrap().clone()
+    }
+
+    fn keep_layouts(&self, text: &str) -> Result<(), String> {
+        *self.layouts.lock().unwrap() = Some(text.to_owned());
+        Ok(())
+    }
+
+    fn write_panel(&self, export: &PanelExport) -> Result<Vec<PathBuf>, String> {
+        self.written.lock().unwrap().push(export.clone());
+        Ok(vec![PathBuf::from(format!("/out/{}.png", export.name))])
     }
 
     fn resident_bytes(&self) -> Option<u64> {
@@ -222,6 +239,62 @@ fn commands_reach_the_log_and_playing_moves_the_cursor() {
 }
 
 #[test]
+fn the_panel_clicked_last_is_written_as_picture_and_table() {
+    let (mut harness, desktop) = app();
+    harness.get_by_label("Open yard.mcap").click();
+    run_until(&mut harness, |harness| opened(harness).is_some());
+    harness.key_press(Key::End);
+    harness.run_steps(2);
+    let written = |harness: &mut Harness<'static, App>| {
+        harness.key_press_modifiers(Modifiers::COMMAND, Key::E);
+        harness.run_steps(3);
+        desktop.written.lock().unwrap().last().cloned().unwrap()
+    };
+    let image = written(&mut harness);
+    assert!(image.name.starts_with("yard/image-"), "{}", image.name);
+    assert!(image.table.starts_with("id,age_frames,u_px") && image.table.lines().count() > 60, "{}", image.table);
+    assert!(harness.query_by_label_contains("/out/yard/image-").is_some(), "it says where");
+
+    harness.get_by_label("Dismiss notice").click();
+    harness.run_steps(2);
+    let verdict = harness.get_by_label_contains("Rank 18 of 18").rect().center();
+    harness.event(egui::Event::PointerMoved(verdict));
+    for pressed in [true, false] {
+        let (button, modifiers) = (egui::PointerButton::Primary, Modifiers::NONE);
+        harness.event(egui::Event::PointerButton { pos: verdict, button, pressed, modifiers });
+    }
+    harness.run_steps(2);
+    let rank = written(&mut harness);
+    assert!(rank.name.starts_with("yard/rank-"), "{}", rank.name);
+    assert_eq!(rank.table.lines().count(), 19, "a line for each singular value: {}", rank.table);
+    assert!(rank.table.lines().all(|line| line.matches(',').count() == 21), "{}", rank.table);
+    assert!(rank.picture != image.picture && rank.picture.width() > 400);
+}
+
+#[test]
+fn a_layout_is_kept_for_the_next_start() {
+    let (mut harness, desktop) = app();
+    harness.get_by_label("Open yard.mcap").click();
+    run_until(&mut harness, |harness| opened(harness).is_some());
+    harness.key_press(Key::Num4);
+    harness.get_by_label("Panels").click();
+    harness.run_steps(2);
+    let name = || egui::Role::TextInput;
+    harness.get_by_role_and_label(name(), "Name of the layout").focus();
+    harness.run_steps(1);
+    harness.get_by_role_and_label(name(), "Name of the layout").type_text("flight");
+    harness.run_steps(2);
+    harness.get_by_label("Save layout").click();
+    harness.run_steps(2);
+    assert!(harness.query_by_label("Layout flight").is_some());
+    let kept = desktop.layouts.lock().unwrap().clone().unwrap();
+    assert!(kept.contains("flight"), "{kept}");
+    harness.get_by_label("Forget flight").click();
+    harness.run_steps(2);
+    assert_eq!(desktop.layouts.lock().unwrap().as_deref(), Some("{}"));
+}
+
+#[test]
 fn the_theme_changes_at_a_key() {
     let (mut harness, _) = app();
     harness.get_by_label("Open yard.mcap").click();
@@ -263,7 +336,7 @@ fn dialogs_can_be_looked_at() {
         let mut first = headless.frame(events.unwrap_or_default(), |ui| app.ui(ui));
         painter.set_textures(&first.textures);
         first.textures.clear();
-        let picture = headless.picture(&mut painter, |ui| app.ui(ui));
+        let Ok(picture) = headless.picture(&mut painter, |ui| app.ui(ui));
         keep_picture(name, &picture);
         assert_eq!(app.log().is_some(), log_is_shown);
     }

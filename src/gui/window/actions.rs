@@ -1,6 +1,6 @@
 //! What a key, a button or the command palette can do, in one table.
 
-use egui::{Key, KeyboardShortcut, Modifiers, Ui};
+use egui::{Key, KeyboardShortcut, Modifiers, Popup, Ui};
 
 use super::WindowState;
 use super::tiles::Preset;
@@ -41,6 +41,8 @@ pub(crate) enum Action {
     Shortcuts,
     /// List the warnings.
     Warnings,
+    /// Write the panel with the focus to files.
+    Export,
     /// Arrange the panels.
     Layout(Preset),
     /// Dark or light.
@@ -78,6 +80,7 @@ pub(crate) const TABLE: &[Entry] = &[
     entry(Action::Step(10), "Ten frames forward", "Shift+Right", &[(SHIFT, Key::ArrowRight)]),
     entry(Action::Step(-10), "Ten frames back", "Shift+Left", &[(SHIFT, Key::ArrowLeft)]),
     entry(Action::Open, "Open a log…", "Ctrl+O", &[(CTRL, Key::O)]),
+    entry(Action::Export, "Export this panel (PNG, CSV)", "Ctrl+E", &[(CTRL, Key::E)]),
     entry(Action::Palette, "Command palette…", "Ctrl+P", &[(CTRL, Key::P)]),
     entry(Action::TogglePlay, "Play or pause", "Space", &[(NONE, Key::Space)]),
     entry(Action::Step(1), "One frame forward", "Right", &[(NONE, Key::ArrowRight)]),
@@ -105,13 +108,16 @@ pub(crate) fn pressed(ui: &Ui) -> Vec<Action> {
         return Vec::new();
     }
     let focused = ui.memory(|memory| memory.focused().is_some());
+    let menu_open = Popup::is_any_open(ui.ctx());
     let mut actions = Vec::new();
     ui.input_mut(|input| {
         for entry in TABLE {
             for (modifiers, key) in entry.shortcuts {
                 // Space and the arrows belong to a focused widget; letters and the rest stay ours.
                 let widget_key = matches!(key, Key::Space | Key::ArrowLeft | Key::ArrowRight | Key::Home | Key::End);
-                if focused && *modifiers == NONE && widget_key {
+                // Escape closes an open menu first.
+                let menu_key = menu_open && *key == Key::Escape;
+                if menu_key || focused && *modifiers == NONE && widget_key {
                     continue;
                 }
                 let shortcut = KeyboardShortcut::new(*modifiers, *key);
@@ -148,6 +154,10 @@ pub(crate) fn perform(action: Action, state: &mut WindowState, ctx: &mut PanelCo
         Action::Palette => state.palette.show(),
         Action::Shortcuts => state.shortcuts_open = !state.shortcuts_open,
         Action::Warnings => state.notices.list_open = !state.notices.list_open,
+        Action::Export => {
+            let export = super::panel_export::export(state, ctx);
+            state.requests.push(super::WindowRequest::WritePanel(Box::new(export)));
+        }
         Action::Layout(preset) => state.layout.arrange(preset),
         Action::Theme => state.requests.push(super::WindowRequest::ToggleTheme),
     }

@@ -7,6 +7,9 @@ mod add_run;
 mod legend;
 mod notices;
 mod palette;
+mod panel_export;
+mod panel_table;
+mod saved_layouts;
 mod status_bar;
 #[cfg(test)]
 mod tests;
@@ -15,13 +18,15 @@ mod top_bar;
 
 use std::path::PathBuf;
 
-use egui::{CentralPanel, Frame, Margin, Panel, Ui};
+use egui::{CentralPanel, Frame, Margin, Panel, Rect, Ui, Vec2};
 
 use self::actions::Action;
 pub use self::add_run::AddRunDialog;
 pub use self::legend::RunLegend;
 pub use self::notices::{NoticeLevel, Notices};
 pub use self::palette::CommandPalette;
+pub use self::panel_export::{PanelExport, alone_ui};
+pub use self::saved_layouts::SavedLayouts;
 pub use self::tiles::Preset;
 use self::tiles::{Layout, Pane};
 use super::PanelContext;
@@ -42,6 +47,48 @@ pub enum WindowRequest {
     OpenLog(PathBuf),
     /// Dark when light, light when dark.
     ToggleTheme,
+    /// Keep the saved layouts, written as text.
+    KeepLayouts(String),
+    /// Write a panel to files.
+    WritePanel(Box<PanelExport>),
+}
+
+/// A panel by its name on the command line and in the names of files.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum PanelName {
+    /// The camera's image.
+    Image,
+    /// The scene in three dimensions.
+    Scene,
+    /// Calibration over time.
+    Convergence,
+    /// Rank and null directions.
+    Rank,
+    /// Residuals.
+    Residuals,
+    /// Numbers of what is selected.
+    Inspector,
+    /// The lanes over time.
+    Timeline,
+}
+
+impl PanelName {
+    /// All of them.
+    pub const ALL: [Self; 7] =
+        [Self::Image, Self::Scene, Self::Convergence, Self::Rank, Self::Residuals, Self::Inspector, Self::Timeline];
+
+    /// Its name.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Image => "image",
+            Self::Scene => "scene",
+            Self::Convergence => "convergence",
+            Self::Rank => "rank",
+            Self::Residuals => "residuals",
+            Self::Inspector => "inspector",
+            Self::Timeline => "timeline",
+        }
+    }
 }
 
 /// The panels' own state.
@@ -62,6 +109,11 @@ pub struct Panels {
 }
 
 impl Panels {
+    /// Panels that show the same and hold nothing of a window.
+    fn views(&self) -> Self {
+        Self { image: self.image.view_copy(), scene: self.scene.view_copy(), ..Self::default() }
+    }
+
     fn pane_ui(&mut self, pane: Pane, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
         match pane {
             Pane::Image => self.image.ui(ui, ctx),
@@ -99,7 +151,13 @@ pub struct WindowState {
     pub show_times: bool,
     /// What the window wants of the program; the program takes them after each picture.
     pub requests: Vec<WindowRequest>,
+    /// Layouts that a person has made.
+    pub saved_layouts: SavedLayouts,
     layout: Layout,
+    /// The panel that was clicked last.
+    focus: Option<PanelName>,
+    /// Where the panels lie that are on the screen.
+    places: Vec<(PanelName, Rect)>,
 }
 
 impl WindowState {
@@ -109,6 +167,21 @@ impl WindowState {
         self.palette.hide();
         self.shortcuts_open = false;
         self.notices.list_open = false;
+    }
+
+    /// The panel that commands about one panel mean, and its size in points.
+    fn focused(&self) -> (PanelName, Vec2) {
+        let panel = self.focus.unwrap_or(PanelName::Image);
+        let place = self.places.iter().find(|(known, _)| *known == panel);
+        (panel, place.map_or(panel_export::HIDDEN_PANEL_SIZE, |(_, rect)| rect.size()))
+    }
+
+    /// A click into a panel gives it the focus.
+    fn follow_focus(&mut self, ui: &Ui) {
+        let pressed = ui.input(|input| input.pointer.any_pressed().then(|| input.pointer.interact_pos()).flatten());
+        let Some(pressed) = pressed.filter(|at| ui.ctx().layer_id_at(*at) == Some(ui.layer_id())) else { return };
+        let place = self.places.iter().find(|(_, rect)| rect.contains(pressed));
+        self.focus = place.map_or(self.focus, |(panel, _)| Some(*panel));
     }
 
     /// Arranges the panels as in a preset.
@@ -132,10 +205,15 @@ pub fn window_ui(ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_
     let wanted = TimelinePanel::height_for(ctx.recording.runs.len()).min(0.22 * ui.available_height());
     let frame = Frame::new().fill(theme.surface).inner_margin(Margin::symmetric(6, 4));
     let timeline = Panel::bottom("timeline").resizable(true).default_size(wanted).min_size(60.0).frame(frame);
-    timeline.show(ui, |ui| state.timeline.ui(ui, ctx));
+    let timeline = timeline.show(ui, |ui| state.timeline.ui(ui, ctx));
+    state.places.clear();
+    state.places.push((PanelName::Timeline, timeline.response.rect));
 
     let ground = Frame::new().fill(theme.background).inner_margin(Margin::same(3));
-    CentralPanel::no_frame().frame(ground).show(ui, |ui| state.layout.ui(ui, &mut state.panels, ctx));
+    CentralPanel::no_frame().frame(ground).show(ui, |ui| {
+        state.layout.ui(ui, &mut state.panels, ctx, state.focus, &mut state.places);
+    });
+    state.follow_focus(ui);
 
     dialogs_ui(ui, state, ctx, &mut actions);
     for action in actions {

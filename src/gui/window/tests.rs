@@ -125,7 +125,7 @@ fn keys_push_the_same_commands() {
     }
     harness.key_press(Key::Num3);
     harness.run_steps(3);
-    assert_eq!(harness.state().window.layout.preset, Preset::FrontEnd);
+    assert_eq!(harness.state().window.layout.preset, Some(Preset::FrontEnd));
     harness.key_press(Key::T);
     harness.run_steps(2);
     assert_eq!(harness.state().window.requests, [WindowRequest::ToggleTheme]);

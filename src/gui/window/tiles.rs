@@ -1,16 +1,18 @@
 //! The movable panels and their layouts.
 
-use egui::{Color32, Stroke, Ui, Visuals, WidgetText};
+use egui::{Color32, Rect, Stroke, Ui, Visuals, WidgetText};
 use egui_tiles::{
     Behavior, Container, Linear, LinearDir, SimplificationOptions, Tile, TileId, Tiles, Tree, UiResponse,
 };
 
-use super::Panels;
+use serde::{Deserialize, Serialize};
+
+use super::{PanelName, Panels};
 use crate::gui::PanelContext;
 use crate::gui::theme::{PANEL_MARGIN, Theme};
 
 /// A panel that can be moved.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize)]
 pub(crate) enum Pane {
     /// The camera's image.
     Image,
@@ -30,6 +32,18 @@ impl Pane {
     /// All of them.
     pub(crate) const ALL: [Self; 6] =
         [Self::Image, Self::Scene, Self::Convergence, Self::Rank, Self::Residuals, Self::Inspector];
+
+    /// Which panel it is.
+    fn panel(self) -> PanelName {
+        match self {
+            Self::Image => PanelName::Image,
+            Self::Scene => PanelName::Scene,
+            Self::Convergence => PanelName::Convergence,
+            Self::Rank => PanelName::Rank,
+            Self::Residuals => PanelName::Residuals,
+            Self::Inspector => PanelName::Inspector,
+        }
+    }
 
     /// Its name.
     pub(crate) fn name(self) -> &'static str {
@@ -77,13 +91,13 @@ impl Preset {
 #[derive(Debug)]
 pub(crate) struct Layout {
     tree: Tree<Pane>,
-    /// The preset that was chosen last.
-    pub(crate) preset: Preset,
+    /// The preset that was chosen last, `None` for a layout of one's own.
+    pub(crate) preset: Option<Preset>,
 }
 
 impl Default for Layout {
     fn default() -> Self {
-        Self { tree: tree_of(Preset::default()), preset: Preset::default() }
+        Self { tree: tree_of(Preset::default()), preset: Some(Preset::default()) }
     }
 }
 
@@ -91,7 +105,18 @@ impl Layout {
     /// Arranges the panels as in a preset, all visible.
     pub(crate) fn arrange(&mut self, preset: Preset) {
         self.tree = tree_of(preset);
-        self.preset = preset;
+        self.preset = Some(preset);
+    }
+
+    /// Arranges the panels as in a layout of one's own.
+    pub(crate) fn take(&mut self, tree: Tree<Pane>) {
+        self.tree = tree;
+        self.preset = None;
+    }
+
+    /// Where the panels are, for keeping.
+    pub(crate) fn tree(&self) -> &Tree<Pane> {
+        &self.tree
     }
 
     /// Whether a panel is shown.
@@ -109,9 +134,16 @@ impl Layout {
         }
     }
 
-    /// Draws the panels.
-    pub(crate) fn ui(&mut self, ui: &mut Ui, panels: &mut Panels, ctx: &mut PanelContext<'_>) {
-        self.tree.ui(&mut Shown { panels, ctx }, ui);
+    /// Draws the panels, marks the one with the focus, and notes where they lie.
+    pub(crate) fn ui(
+        &mut self,
+        ui: &mut Ui,
+        panels: &mut Panels,
+        ctx: &mut PanelContext<'_>,
+        focus: Option<PanelName>,
+        places: &mut Vec<(PanelName, Rect)>,
+    ) {
+        self.tree.ui(&mut Shown { panels, ctx, focus, places }, ui);
     }
 }
 
@@ -163,15 +195,22 @@ fn split(tiles: &mut Tiles<Pane>, direction: LinearDir, children: [TileId; 2], f
 struct Shown<'a, 'b> {
     panels: &'a mut Panels,
     ctx: &'a mut PanelContext<'b>,
+    focus: Option<PanelName>,
+    places: &'a mut Vec<(PanelName, Rect)>,
 }
 
 impl Behavior<Pane> for Shown<'_, '_> {
     fn pane_ui(&mut self, ui: &mut Ui, _tile: TileId, pane: &mut Pane) -> UiResponse {
         let theme: &Theme = self.ctx.theme;
+        let place = ui.max_rect();
+        self.places.push((pane.panel(), place));
         egui::Frame::new().fill(theme.surface).inner_margin(PANEL_MARGIN).show(ui, |ui| {
             ui.set_min_size(ui.available_size());
             self.panels.pane_ui(*pane, ui, self.ctx);
         });
+        if self.focus == Some(pane.panel()) {
+            ui.painter().hline(place.x_range(), place.top() + 1.0, Stroke::new(2.0, theme.accent));
+        }
         UiResponse::None
     }
 

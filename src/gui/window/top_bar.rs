@@ -1,12 +1,13 @@
 //! The bar at the top: what to open, the runs, the layouts.
 
-use egui::{Align, Button, Layout as UiLayout, RichText, Ui, vec2};
+use egui::containers::menu::{MenuButton, MenuConfig};
+use egui::{Align, Button, Layout as UiLayout, PopupCloseBehavior, RichText, Ui, vec2};
 
-use super::WindowState;
 use super::actions::{Action, TABLE};
 use super::tiles::{Pane, Preset};
+use super::{WindowRequest, WindowState};
 use crate::gui::PanelContext;
-use crate::gui::theme::MAX_RUNS;
+use crate::gui::theme::{MAX_RUNS, Theme};
 use crate::session::Recording;
 
 pub(super) fn ui(ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_>, actions: &mut Vec<Action>) {
@@ -23,7 +24,7 @@ pub(super) fn ui(ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_
             ui.spacing_mut().item_spacing.x = 3.0;
             action_button(ui, "?", Action::Shortcuts, true, actions);
             action_button(ui, "☀", Action::Theme, true, actions);
-            panels_menu(ui, state);
+            panels_menu(ui, state, ctx.theme);
             ui.add_space(6.0);
             for (number, preset) in Preset::ALL.into_iter().enumerate().rev() {
                 layout_button(ui, state, preset, number + 1, actions);
@@ -50,7 +51,7 @@ fn action_button(ui: &mut Ui, text: &str, action: Action, enabled: bool, actions
 }
 
 fn layout_button(ui: &mut Ui, state: &WindowState, preset: Preset, number: usize, actions: &mut Vec<Action>) {
-    let on = state.layout.preset == preset;
+    let on = state.layout.preset == Some(preset);
     let response = ui.add(Button::new(number.to_string()).selected(on).min_size(vec2(22.0, 20.0)));
     let name = format!("Layout {}", preset.name());
     response.widget_info(|| egui::WidgetInfo::selected(egui::Role::Button, true, on, &name));
@@ -59,13 +60,18 @@ fn layout_button(ui: &mut Ui, state: &WindowState, preset: Preset, number: usize
     }
 }
 
-fn panels_menu(ui: &mut Ui, state: &mut WindowState) {
-    ui.menu_button("Panels", |ui| {
+fn panels_menu(ui: &mut Ui, state: &mut WindowState, theme: &Theme) {
+    let config = MenuConfig::new().close_behavior(PopupCloseBehavior::CloseOnClickOutside);
+    MenuButton::new("Panels").config(config).ui(ui, |ui| {
         for pane in Pane::ALL {
             let mut visible = state.layout.is_visible(pane);
             if ui.checkbox(&mut visible, pane.name()).changed() {
                 state.layout.set_visible(pane, visible);
             }
+        }
+        ui.separator();
+        if state.saved_layouts.ui(ui, theme, &mut state.layout) {
+            state.requests.push(WindowRequest::KeepLayouts(state.saved_layouts.to_text()));
         }
     });
 }

@@ -1,0 +1,276 @@
+//! What a panel shows, as a table of comma-separated values: seconds, radians, metres and pixels, whatever is on screen.
+
+use std::fmt::Write as _;
+
+use super::PanelName;
+use crate::geometry::seconds_from_ns;
+use crate::gui::PanelContext;
+use crate::gui::chain_values::true_values;
+use crate::gui::events::name_of;
+use crate::gui::residuals::rms_px;
+use crate::session::{RunRecord, StepRecord};
+
+/// A table that grows row by row.
+struct Table {
+    text: String,
+}
+
+impl Table {
+    fn new(columns: &[&str]) -> Self {
+        let mut table = Self { text: String::new() };
+        table.row(columns.iter().map(|name| (*name).to_owned()));
+        table
+    }
+
+    fn row(&mut self, cells: impl IntoIterator<Item = String>) {
+        for (number, cell) in cells.into_iter().enumerate() {
+            if number > 0 {
+                self.text.push(',');
+            }
+            if cell.contains([',', '"', '\n']) {
+                write!(self.text, "\"{}\"", cell.replace('"', "\"\"")).expect("writing into a string cannot fail");
+            } else {
+                self.text.push_str(&cell);
+            }
+        }
+        self.text.push('\n');
+    }
+}
+
+/// A number with all its digits, nothing when it is not finite.
+fn number(value: f64) -> String {
+    if value.is_finite() { value.to_string() } else { String::new() }
+}
+
+fn seconds(stamp_ns: i64) -> String {
+    format!("{:.9}", seconds_from_ns(stamp_ns))
+}
+
+/// The table of a panel.
+pub(super) fn table_of(panel: PanelName, ctx: &PanelContext<'_>) -> String {
+    let Some(run) = ctx.recording.runs.get(ctx.selection.run) else { return String::new() };
+    match panel {
+        PanelName::Image => features(run, ctx.cursor_ns),
+        PanelName::Scene => trajectories(ctx),
+        PanelName::Convergence => calibration(run, ctx),
+        PanelName::Rank => directions(run, ctx.cursor_ns),
+        PanelName::Residuals => residuals(ctx),
+        PanelName::Inspector => state(run, ctx.cursor_ns),
+        PanelName::Timeline => events(ctx),
+    }
+}
+
+/// The features of the image at the cursor.
+fn features(run: &RunRecord, cursor_ns: i64) -> String {
+    let mut table = Table::new(&[
+        "id",
+        "age_frames",
+        "u_px",
+        "v_px",
+        "residual_before_u_px",
+        "residual_before_v_px",
+        "residual_after_u_px",
+        "residual_after_v_px",
+        "chi2",
+        "weight",
+        "depth_m",
+        "rejected",
+    ]);
+    let Some(step) = run.step_at(cursor_ns) else { return table.text };
+    for feature in &step.tracks.features {
+        let solved = step.report.features.iter().find(|solved| solved.id == feature.id);
+        let here = solved
+            .and_then(|solved| solved.observations.iter().find(|seen| seen.frame_index == step.report.frame_index));
+        let vector = |residual: Option<nalgebra::Vector2<f64>>| {
+            let [u, v] = residual.map_or([f64::NAN; 2], |residual| [residual.x, residual.y]);
+            [number(u), number(v)]
+        };
+        let [before_u, before_v] = vector(here.and_then(|seen| seen.residual_before_px));
+        let [after_u, after_v] = vector(here.and_then(|seen| seen.residual_after_px));
+        table.row([
+            feature.id.0.to_string(),
+            feature.age.to_string(),
+            number(feature.uv_px.x),
+            number(feature.uv_px.y),
+            before_u,
+            before_v,
+            after_u,
+            after_v,
+            number(here.map_or(f64::NAN, |seen| seen.chi2)),
+            number(here.map_or(f64::NAN, |seen| seen.robust_weight)),
+            number(solved.map_or(f64::NAN, |solved| 1.0 / solved.inverse_depth_per_m)),
+            solved.map_or_else(String::new, |solved| solved.rejected.to_string()),
+        ]);
+    }
+    table.text
+}
+
+/// Positions of all runs up to the cursor, laid on the truth as in the scene, and the truth.
+fn trajectories(ctx: &PanelContext<'_>) -> String {
+    let mut table = Table::new(&["t_s", "run", "x_m", "y_m", "z_m", "truth_x_m", "truth_y_m", "truth_z_m"]);
+    for run in &ctx.recording.runs {
+        let aligned = run.alignment.unwrap_or_default();
+        for step in run.steps.iter().take_while(|step| step.report.stamp_ns <= ctx.cursor_ns) {
+            let estimate = step.report.newest().map(|frame| aligned.transform(&frame.world_from_imu.translation_m));
+            let truth = step.truth.map(|pose| pose.translation_m);
+            let places = [estimate, truth];
+            let coordinates =
+                places.iter().flat_map(|at| at.map_or([f64::NAN; 3], |at| [at.x, at.y, at.z]).map(number));
+            table.row([seconds(step.report.stamp_ns), run.spec.label.clone()].into_iter().chain(coordinates));
+        }
+    }
+    table.text
+}
+
+/// The calibration of the shown run over the whole recording, with the truth in the columns of the cursor's chart.
+fn calibration(run: &RunRecord, ctx: &PanelContext<'_>) -> String {
+    let truth = true_values(ctx.recording, run, ctx.cursor_ns).unwrap_or_default();
+    let mut names: Vec<(&String, &str)> = Vec::new();
+    for calibration in run.steps.iter().map(|step| &step.report.calibration) {
+        for (name, unit) in calibration.names.iter().zip(&calibration.units) {
+            if !names.iter().any(|(known, _)| *known == name) {
+                names.push((name, unit));
+            }
+        }
+    }
+    let mut columns = vec!["t_s".to_owned()];
+    for (name, unit) in &names {
+        columns.extend(["", "_sigma", "_truth"].map(|part| format!("{name}{part}_{unit}")));
+    }
+    let mut table = Table { text: String::new() };
+    table.row(columns);
+    for step in run.steps.iter().filter(|step| step.report.newest().is_some()) {
+        let calibration = &step.report.calibration;
+        let cells = names.iter().flat_map(|(name, _)| {
+            let index = calibration.names.iter().position(|known| known == *name);
+            let entry = |values: &[f64]| index.and_then(|index| values.get(index)).copied().unwrap_or(f64::NAN);
+            let truth = truth.get(*name).copied().unwrap_or(f64::NAN);
+            [entry(&calibration.values), entry(&calibration.sigmas), truth].map(number)
+        });
+        table.row(std::iter::once(seconds(step.report.stamp_ns)).chain(cells));
+    }
+    table.text
+}
+
+/// Singular values of the step at the cursor, and each null or weak direction as weights by parameter name.
+fn directions(run: &RunRecord, cursor_ns: i64) -> String {
+    let Some(rank) = run.step_at(cursor_ns).and_then(|step| step.rank.as_ref()) else { return String::new() };
+    let mut table = Table { text: String::new() };
+    let heads = ["number", "singular_value", "singular_value_with_priors", "kind"].map(str::to_owned);
+    table.row(heads.into_iter().chain(rank.names.iter().cloned()));
+    for (index, value) in rank.singular_values.iter().enumerate() {
+        // Directions come weakest first, singular values largest first.
+        let direction = rank.directions.get(rank.singular_values.len() - 1 - index);
+        let kind = direction.map_or("informed", |direction| if direction.structural { "null" } else { "weak" });
+        let with_priors = rank.singular_values_with_priors.get(index).copied().unwrap_or(f64::NAN);
+        let weights = (0..rank.names.len()).map(|column| {
+            let weight = direction.and_then(|direction| direction.weights.get(column));
+            number(weight.copied().unwrap_or(f64::NAN))
+        });
+        let heads = [(index + 1).to_string(), number(*value), number(with_priors), kind.to_owned()];
+        table.row(heads.into_iter().chain(weights));
+    }
+    table.text
+}
+
+/// Reprojection RMS and χ² by kind of factor, for every step of every run.
+fn residuals(ctx: &PanelContext<'_>) -> String {
+    let solved = |step: &&std::sync::Arc<StepRecord>| !step.report.window.is_empty();
+    let mut factors: Vec<&'static str> = Vec::new();
+    for summary in ctx.recording.runs.iter().flat_map(|run| &run.steps).flat_map(|step| &step.report.residuals) {
+        if !factors.contains(&summary.factor) {
+            factors.push(summary.factor);
+        }
+    }
+    let mut columns = ["t_s", "run", "rms_before_px", "rms_after_px"].map(str::to_owned).to_vec();
+    for factor in &factors {
+        let factor = factor.replace(' ', "_");
+        columns.extend(["count", "chi2_before", "chi2_after"].map(|part| format!("{factor}_{part}")));
+    }
+    let mut table = Table { text: String::new() };
+    table.row(columns);
+    for run in &ctx.recording.runs {
+        for step in run.steps.iter().filter(solved) {
+            let report = &step.report;
+            let heads = [
+                seconds(report.stamp_ns),
+                run.spec.label.clone(),
+                number(report.reprojection_rms_before_px),
+                number(rms_px(report)),
+            ];
+            let cells = factors.iter().flat_map(|factor| {
+                let summary = report.residuals.iter().find(|summary| summary.factor == *factor);
+                summary.map_or_else(Default::default, |summary| {
+                    [summary.count.to_string(), number(summary.chi2_before), number(summary.chi2_after)]
+                })
+            });
+            table.row(heads.into_iter().chain(cells));
+        }
+    }
+    table.text
+}
+
+/// The state of the newest frame at the cursor.
+fn state(run: &RunRecord, cursor_ns: i64) -> String {
+    let mut table = Table::new(&["quantity", "unit", "value"]);
+    let Some(step) = run.step_at(cursor_ns) else { return table.text };
+    let mut say = |quantity: &str, unit: &str, value: f64| {
+        table.row([quantity.to_owned(), unit.to_owned(), number(value)]);
+    };
+    say("time", "s", seconds_from_ns(step.report.stamp_ns));
+    say("frame", "", step.report.frame_index as f64);
+    if let Some(newest) = step.report.newest() {
+        let rotation = newest.world_from_imu.rotation;
+        let vectors = [
+            ("position", "m", newest.world_from_imu.translation_m),
+            ("velocity", "m/s", newest.velocity_m_per_s),
+            ("accelerometer bias", "m/s2", newest.accelerometer_bias_m_per_s2),
+            ("gyroscope bias", "rad/s", newest.gyroscope_bias_rad_per_s),
+        ];
+        for (name, unit, vector) in vectors {
+            for (axis, value) in ["x", "y", "z"].into_iter().zip(vector.iter()) {
+                say(&format!("{name} {axis}"), unit, *value);
+            }
+        }
+        for (name, value) in ["x", "y", "z", "w"].into_iter().zip(rotation.coords.iter()) {
+            say(&format!("attitude q{name}"), "", *value);
+        }
+        for (joint, angle) in newest.joint_angles_rad.iter().enumerate() {
+            say(&format!("joint {}", joint + 1), "rad", *angle);
+        }
+    }
+    let calibration = &step.report.calibration;
+    for (index, name) in calibration.names.iter().enumerate() {
+        let unit = calibration.units.get(index).copied().unwrap_or_default();
+        say(name, unit, calibration.values.get(index).copied().unwrap_or(f64::NAN));
+        say(&format!("{name} sigma"), unit, calibration.sigmas.get(index).copied().unwrap_or(f64::NAN));
+    }
+    table.text
+}
+
+/// Rare events of all runs and the warnings of the log, in time order.
+fn events(ctx: &PanelContext<'_>) -> String {
+    let mut rows: Vec<(i64, [String; 5])> = Vec::new();
+    for run in &ctx.recording.runs {
+        for step in &run.steps {
+            for event in step.report.events.iter().filter(|event| event.kind.is_notable()) {
+                let figure = |value: Option<f64>| number(value.unwrap_or(f64::NAN));
+                let label = run.spec.label.clone();
+                let (value, threshold) = (figure(event.value), figure(event.threshold));
+                let cells = [label, name_of(event.kind).to_owned(), value, threshold, event.message.clone()];
+                rows.push((step.report.stamp_ns, cells));
+            }
+        }
+    }
+    for warning in &ctx.recording.warnings {
+        let cells = ["", "warning", "", ""].map(str::to_owned);
+        let [run, kind, value, threshold] = cells;
+        rows.push((warning.stamp_ns, [run, kind, value, threshold, warning.message.clone()]));
+    }
+    rows.sort_by_key(|(stamp_ns, _)| *stamp_ns);
+    let mut table = Table::new(&["t_s", "run", "event", "value", "threshold", "message"]);
+    for (stamp_ns, cells) in rows {
+        table.row(std::iter::once(seconds(stamp_ns)).chain(cells));
+    }
+    table.text
+}
