@@ -33,7 +33,8 @@ fn spread(mut values: Vec<f64>) -> Option<(f64, f64, f64)> {
     values.sort_by(f64::total_cmp);
     let (first, last) = (*values.first()?, *values.last()?);
     let middle = values.len() / 2;
-    let median = if values.len() % 2 == 0 { 0.5 * (values[middle - 1] + values[middle]) } else { values[middle] };
+    let median =
+        if values.len().is_multiple_of(2) { 0.5 * (values[middle - 1] + values[middle]) } else { values[middle] };
     Some((median, first, last))
 }
 
@@ -44,7 +45,7 @@ fn written(values: Vec<f64>, digits: usize) -> String {
     )
 }
 
-fn of<'f>(flights: &'f [Flight], experiment: Experiment) -> impl Iterator<Item = &'f Flight> {
+fn of(flights: &[Flight], experiment: Experiment) -> impl Iterator<Item = &Flight> {
     flights.iter().filter(move |flight| flight.experiment == experiment)
 }
 

@@ -146,7 +146,9 @@ impl<'a> Landing<'a> {
             let stamp_ns = self.next_stamp_ns();
             let later = stamp_ns - frame.stamp_ns;
             let mut imu = frame.imu.clone();
-            imu.iter_mut().for_each(|sample| sample.stamp_ns += later);
+            for sample in &mut imu {
+                sample.stamp_ns += later;
+            }
             let features = frame
                 .tracks
                 .features

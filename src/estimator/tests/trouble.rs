@@ -158,8 +158,11 @@ fn a_saturated_inertial_sensor_does_not_throw_the_window_off() {
         let last = reports.last().unwrap();
         assert_eq!(last.phase, Phase::Tracking);
         let (error, length) = trajectory_error_m(&frames, &reports);
-        println!("{mount:?}: {clipped} samples clipped: {error} m over {length} m, {} restarts", estimator.restarts);
-        assert!(error < 0.02 * length, "{mount:?}: {error} m over {length} m, {clipped} samples clipped");
+        let restarts = estimator.restarts;
+        assert!(
+            error < 0.02 * length,
+            "{mount:?}: {error} m over {length} m, {clipped} samples clipped, {restarts} restarts"
+        );
         let told = reports[150..].iter().flat_map(|report| &report.events);
         assert!(told.filter(|event| event.message.contains("saturated")).count() > 0);
     }

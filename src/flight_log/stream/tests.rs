@@ -95,7 +95,7 @@ fn a_slow_error_is_not_believed() {
 fn noise_that_outlasts_a_reading_is_not_taken_for_white() {
     // First-order low-pass noise of 25 ms: neighbouring readings share most of it.
     let mut noise = Noise::new(6);
-    let keep: f64 = (-5.0_f64 / 25.0).exp();
+    let keep = (-5.0_f64 / 25.0).exp();
     let mut level = 0.0;
     let played = play(200, SIGMA_RAD, |at| {
         level = keep * level + SIGMA_RAD * (1.0 - keep * keep).sqrt() * noise.normal();
