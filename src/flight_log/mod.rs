@@ -7,6 +7,7 @@ pub mod check;
 mod container;
 mod error;
 mod image_reader;
+mod joint_merge;
 mod log;
 mod messages;
 mod picture;

@@ -34,15 +34,18 @@ fn check_joint(survey: &Survey, gimbal: &GimbalRig, number: usize, joint: &Joint
     let name = &joint.name;
     let readings = || survey.joints.iter().filter_map(|message| Some((message.stamp_ns, message.angles_rad[number]?)));
     let missing = survey.joints.len() - readings().count();
-    if missing > 0 {
-        let evidence = format!(
-            "missing in {missing} of {} messages, which name {}",
-            survey.joints.len(),
-            survey.joint_names.join(", ")
-        );
-        let severity = if missing == survey.joints.len() { Severity::Error } else { Severity::Warning };
+    let all = survey.joints.len();
+    // A message that names another joint may come from that joint's driver; one that names none of the rig's is amiss.
+    let silent = survey.joints.iter().filter(|message| message.angles_rad.iter().all(Option::is_none)).count();
+    if missing == all || silent > 0 {
+        let evidence = format!("missing in {missing} of {all} messages, which name {}", survey.joint_names.join(", "));
+        let severity = if missing == all { Severity::Error } else { Severity::Warning };
         let remedy = format!("write the messages' name into gimbal.links[{number}].joint");
         findings.add(severity, Area::Encoders, format!("joint '{name}' is not in the messages"), evidence, remedy);
+    } else if missing > 0 {
+        let title = format!("'{name}' comes in messages of its own");
+        let evidence = format!("it is in {} of {all} messages; the joints are merged by name", all - missing);
+        findings.add(Severity::Note, Area::Encoders, title, evidence, "");
     }
     let bad = readings().filter(|(_, angle)| !angle.is_finite()).count();
     if bad > 0 {

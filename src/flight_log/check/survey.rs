@@ -1,15 +1,25 @@
 use std::collections::BTreeMap;
 
 use super::super::container::DecodedBlock;
+use super::super::joint_merge::{JointMerge, JointReading};
 use super::super::messages::{self, MessageKind};
 use super::super::picture::decode_picture;
-use super::super::{FlightLog, ImuSample, Rig};
+use super::super::stream::angle_fit;
+use super::super::{FlightLog, ImuSample, JointSample, Rig};
 use super::images::{ImageMeasure, measure};
 use super::statistics::median;
-use crate::geometry::seconds_from_ns;
+use crate::geometry::{seconds_from_ns, wrap_angle};
 
 /// So many images of each camera are decoded, spread evenly over the log.
 const IMAGES_LOOKED_AT: u64 = 60;
+
+/// Joint readings so far to both sides of a time are averaged: beyond, a stabilized joint is no parabola any more.
+const HALF_BATCH_NS: i64 = 25_000_000;
+/// Joint readings further apart than this are not interpolated.
+const LONGEST_HOLE_NS: i64 = 200_000_000;
+
+/// No encoder is taken to be better than this.
+const LEAST_SIGMA_RAD: f64 = 1e-5;
 
 /// Both times of a message since the log began.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -48,14 +58,6 @@ impl TopicSurvey {
     }
 }
 
-/// The joint angles of one message, `None` for a joint that it does not name.
-#[derive(Clone, Debug)]
-pub(super) struct JointAngles {
-    pub(super) stamp_ns: i64,
-    /// In the order of the rig's joints.
-    pub(super) angles_rad: Vec<Option<f64>>,
-}
-
 /// One image that was looked at.
 #[derive(Clone, Debug)]
 pub(super) struct ImageLook {
@@ -73,7 +75,11 @@ pub(super) struct Survey {
     /// Its samples in the order of log times, numbers as they are.
     pub(super) imu: Vec<ImuSample>,
     /// The encoders' messages in the order of log times.
-    pub(super) joints: Vec<JointAngles>,
+    pub(super) joints: Vec<JointReading>,
+    /// All joints at once, in the order of the stamps, from the finite readings.
+    pub(super) joint_samples: Vec<JointSample>,
+    /// Variance of a reading by the rig.
+    encoder_variance_rad2: f64,
     /// Names that the joint messages use.
     pub(super) joint_names: Vec<String>,
     /// Images by camera key.
@@ -89,6 +95,8 @@ impl Survey {
         let imu_topics = log.topics_of(&[MessageKind::Imu]);
         let named = rig.map(|rig| rig.imu.topic.clone()).filter(|topic| imu_topics.contains(topic));
         survey.imu_topic = named.or_else(|| imu_topics.first().cloned());
+        let sigma_rad = rig.and_then(|rig| rig.gimbal.as_ref()?.encoder_sigma_rad).unwrap_or(0.0);
+        survey.encoder_variance_rad2 = sigma_rad.max(LEAST_SIGMA_RAD).powi(2);
         let mut counts: BTreeMap<String, u64> = BTreeMap::new();
         for block in &log.index().blocks {
             let decoded = DecodedBlock::decode(log.file(), block);
@@ -116,7 +124,30 @@ impl Survey {
         for topic in survey.topics.values_mut() {
             topic.times.sort_by_key(|times| times.log_time_ns);
         }
+        survey.joint_samples = merged(&survey.joints);
         survey
+    }
+
+    /// All joint angles at a time, from the readings around it; `None` where there are none on both sides.
+    pub(super) fn joint_angles_at(&self, stamp_ns: i64) -> Option<Vec<f64>> {
+        let before = |time_ns: i64| self.joint_samples.partition_point(|sample| sample.stamp_ns < time_ns);
+        let after = before(stamp_ns);
+        let begin = before(stamp_ns - HALF_BATCH_NS).min(after.checked_sub(1)?);
+        let end = before(stamp_ns + HALF_BATCH_NS).max(after + 1);
+        let batch = self.joint_samples.get(begin..end)?;
+        if batch.last()?.stamp_ns - batch.first()?.stamp_ns > LONGEST_HOLE_NS {
+            return None;
+        }
+        let around = &self.joint_samples.get(after)?.angles_rad;
+        let angle = |joint: usize| {
+            let reading = |sample: &JointSample| {
+                let turned = wrap_angle(sample.angles_rad[joint] - around[joint]);
+                (seconds_from_ns(sample.stamp_ns - stamp_ns), around[joint] + turned)
+            };
+            let readings: Vec<_> = batch.iter().map(reading).collect();
+            angle_fit::fit(&readings, self.encoder_variance_rad2).map(|fitted| fitted.angle_rad)
+        };
+        (0..around.len()).map(angle).collect()
     }
 
     #[expect(clippy::too_many_arguments, reason = "what is known about one message, each once")]
@@ -158,9 +189,11 @@ impl Survey {
                         message.positions_rad.get(place).copied()
                     };
                     let angles_rad = gimbal.joints.iter().map(|joint| angle(&joint.name)).collect();
-                    self.joints.push(JointAngles { stamp_ns, angles_rad });
-                    if self.joint_names.is_empty() {
-                        self.joint_names = message.names.iter().map(|name| (*name).to_owned()).collect();
+                    self.joints.push(JointReading { stamp_ns, angles_rad });
+                    for name in &message.names {
+                        if !self.joint_names.iter().any(|known| known == name) {
+                            self.joint_names.push((*name).to_owned());
+                        }
                     }
                 }
                 Err(error) => entry.refuse(error.to_string()),
@@ -176,4 +209,22 @@ impl Survey {
             }
         }
     }
+}
+
+/// The readings of all messages as samples of all joints; those that are not finite are left out.
+fn merged(readings: &[JointReading]) -> Vec<JointSample> {
+    let Some(joints) = readings.first().map(|reading| reading.angles_rad.len()) else { return Vec::new() };
+    let mut ordered: Vec<&JointReading> = readings.iter().collect();
+    ordered.sort_by_key(|reading| reading.stamp_ns);
+    let mut merge = JointMerge::new(joints);
+    let mut samples = Vec::new();
+    for reading in ordered {
+        let finite = |angle: &Option<f64>| angle.filter(|angle| angle.is_finite());
+        let angles_rad = reading.angles_rad.iter().map(finite).collect();
+        merge.push(&JointReading { stamp_ns: reading.stamp_ns, angles_rad });
+        samples.extend(std::iter::from_fn(|| merge.pop()));
+    }
+    merge.finish();
+    samples.extend(std::iter::from_fn(|| merge.pop()));
+    samples
 }

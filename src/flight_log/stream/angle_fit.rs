@@ -3,14 +3,14 @@
 use nalgebra::{Matrix3, Vector3};
 
 /// A reading: seconds after the instant, and the angle there in radians, not wrapped.
-pub(super) type Reading = (f64, f64);
+pub(in crate::flight_log) type Reading = (f64, f64);
 
 /// The angle at the instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct FittedAngle {
-    pub(super) angle_rad: f64,
+pub(in crate::flight_log) struct FittedAngle {
+    pub(in crate::flight_log) angle_rad: f64,
     /// From white noise on the readings, and from what the motion between them may have done.
-    pub(super) variance_rad2: f64,
+    pub(in crate::flight_log) variance_rad2: f64,
 }
 
 /// How strongly a gimbal accelerates its joints, as a standard deviation.
@@ -25,7 +25,7 @@ const ACCELERATION_RAD_PER_S2: f64 = 10.0;
 ///
 /// It is the linear estimate with the least mean square error for such a motion, exact for a constant rate.
 /// `None` for fewer than two instants.
-pub(super) fn fit(readings: &[Reading], white_variance_rad2: f64) -> Option<FittedAngle> {
+pub(in crate::flight_log) fn fit(readings: &[Reading], white_variance_rad2: f64) -> Option<FittedAngle> {
     if readings.len() < 2 {
         return None;
     }

@@ -3,8 +3,9 @@ use std::sync::Arc;
 
 use super::super::messages::{self, MessageKind};
 use super::super::picture::decode_picture;
-use super::super::{FlightLog, GrayImage, ImuSample, JointSample, LogError, LogWarning, PoseSample, Rig, SensorFrame};
+use super::super::{FlightLog, GrayImage, ImuSample, LogError, LogWarning, PoseSample, Rig, SensorFrame};
 use super::joint_angles::JointAngleStream;
+use super::joint_topic::JointSamples;
 use super::ordered::{Decoder, MessageSource, OrderedSamples, ReadContext, Refusal};
 use crate::geometry::{RigidTransform, ns_from_seconds, seconds_from_ns};
 
@@ -111,8 +112,7 @@ impl FrameSource {
         let shift_ns = ns_from_seconds(camera.timeshift_cam_imu_s);
         let from_ns = start_ns.saturating_sub(FIRST_FRAME_IMU_NS + SEEK_MARGIN_NS + shift_ns.abs());
         let half_interval_ns = gap_ns(0.5, camera.rate_hz, images.rate_hz);
-        let joints = joint_samples(log, rig, from_ns)?
-            .map(|(samples, sigma_rad)| JointAngleStream::new(samples, sigma_rad, half_interval_ns));
+        let joints = joint_angles(log, rig, from_ns, half_interval_ns)?;
         let truth = truth_samples(log, rig, from_ns, &mut context).map(Lookup::new);
         let log_warnings = log.warnings().iter().cloned().collect();
         let stream = CameraStream {
@@ -359,7 +359,7 @@ fn interpolate_pose(from: &RigidTransform, to: &RigidTransform, share: f64) -> R
     RigidTransform::new(rotation, from.translation_m.lerp(&to.translation_m, share))
 }
 
-fn not_decodable(error: &impl ToString) -> Refusal {
+pub(super) fn not_decodable(error: &impl ToString) -> Refusal {
     Refusal { reason: "it cannot be decoded", detail: error.to_string() }
 }
 
@@ -392,48 +392,17 @@ fn imu_decoder(epoch_ns: i64) -> Decoder<ImuSample> {
     })
 }
 
-/// The gimbal's encoder samples and their noise, `None` without a gimbal or encoders.
-fn joint_samples(
+/// The gimbal's joint angles, `None` without a gimbal or encoders.
+fn joint_angles(
     log: &FlightLog,
     rig: &Rig,
     from_ns: i64,
-) -> Result<Option<(OrderedSamples<JointSample>, f64)>, LogError> {
+    half_interval_ns: i64,
+) -> Result<Option<JointAngleStream>, LogError> {
     let Some(gimbal) = &rig.gimbal else { return Ok(None) };
     let (Some(topic), Some(sigma_rad)) = (&gimbal.topic, gimbal.encoder_sigma_rad) else { return Ok(None) };
-    log.require_topic("gimbal.rostopic", topic, &[MessageKind::JointState])?;
-    let names: Vec<String> = gimbal.joints.iter().map(|joint| joint.name.clone()).collect();
-    let known = log.find_message(topic, |data| {
-        let message = messages::read_joint_state(data).ok()?;
-        Some(message.names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>())
-    });
-    if let Some(known) = known
-        && let Some(link) = names.iter().position(|name| !known.contains(name))
-    {
-        return Err(LogError::UnknownJoint {
-            link,
-            joint: names[link].clone(),
-            topic: topic.clone(),
-            available: known,
-            path: log.path().to_owned(),
-        });
-    }
-    let epoch_ns = log.epoch_ns();
-    let decode: Decoder<JointSample> = Box::new(move |source: MessageSource<'_>| {
-        let message = messages::read_joint_state(source.data).map_err(|error| not_decodable(&error))?;
-        let mut angles_rad = Vec::with_capacity(names.len());
-        for name in &names {
-            let place = message.names.iter().position(|known| known == name);
-            match place.and_then(|place| message.positions_rad.get(place)) {
-                Some(angle) if angle.is_finite() => angles_rad.push(*angle),
-                Some(angle) => {
-                    return Err(Refusal { reason: "numbers that are not finite", detail: format!("{name}: {angle}") });
-                }
-                None => return Err(Refusal { reason: "a joint is missing", detail: name.clone() }),
-            }
-        }
-        Ok((message.stamp_ns, JointSample { stamp_ns: message.stamp_ns.saturating_sub(epoch_ns), angles_rad }))
-    });
-    Ok(Some((OrderedSamples::new(log, topic, from_ns, false, decode), sigma_rad)))
+    let samples = JointSamples::new(log, gimbal, topic, from_ns)?;
+    Ok(Some(JointAngleStream::new(samples, sigma_rad, half_interval_ns)))
 }
 
 /// The true poses, `None` when the rig names none or the log has none.

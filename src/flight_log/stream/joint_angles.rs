@@ -4,7 +4,8 @@ use std::collections::VecDeque;
 
 use super::super::{JointAngles, JointSample};
 use super::angle_fit::{self, Reading};
-use super::ordered::{OrderedSamples, ReadContext};
+use super::joint_topic::JointSamples;
+use super::ordered::ReadContext;
 use crate::geometry::{seconds_from_ns, wrap_angle};
 
 /// A reading further than this from the stamp tells nothing about the angle there.
@@ -18,14 +19,14 @@ const UNKNOWN_RATE_RAD_PER_S: f64 = 1.0;
 
 /// Encoder readings of a log, looked up image by image.
 pub(super) struct JointAngleStream {
-    samples: OrderedSamples<JointSample>,
+    samples: JointSamples,
     ended: bool,
     average: EncoderAverage,
 }
 
 impl JointAngleStream {
     /// `sigma_rad` is the rig's standard deviation of a reading, `half_interval_ns` half an image interval.
-    pub(super) fn new(samples: OrderedSamples<JointSample>, sigma_rad: f64, half_interval_ns: i64) -> Self {
+    pub(super) fn new(samples: JointSamples, sigma_rad: f64, half_interval_ns: i64) -> Self {
         Self { samples, ended: false, average: EncoderAverage::new(sigma_rad, half_interval_ns) }
     }
 
@@ -39,7 +40,7 @@ impl JointAngleStream {
     ) -> Option<JointAngles> {
         while !self.ended && self.average.wants_readings(stamp_ns) {
             match self.samples.next(context) {
-                Some((_, sample)) => self.average.push(sample),
+                Some(sample) => self.average.push(sample),
                 None => self.ended = true,
             }
         }

@@ -1,8 +1,9 @@
 //! The log as one camera's frames, each with the samples of the other sensors that belong to it.
 
-mod angle_fit;
+pub(super) mod angle_fit;
 mod frames;
 mod joint_angles;
+mod joint_topic;
 mod ordered;
 #[cfg(test)]
 mod tests;

@@ -87,6 +87,8 @@ pub(super) struct OrderedSamples<T> {
     /// By stamp since the log began and number.
     pending: BTreeMap<(i64, usize), T>,
     released_ns: Option<i64>,
+    /// Whether several samples may have one stamp.
+    equal_stamps: bool,
     dropped: Option<DroppedRun>,
 }
 
@@ -101,7 +103,13 @@ impl<T> OrderedSamples<T> {
         }
         let next = messages.first_at(log.index(), log.file(), log_time_ns);
         let (topic, pending) = (topic.to_owned(), BTreeMap::new());
-        Self { topic, messages, next, exhausted: false, decode, pending, released_ns: None, dropped: None }
+        let (released_ns, equal_stamps, dropped) = (None, false, None);
+        Self { topic, messages, next, exhausted: false, decode, pending, released_ns, equal_stamps, dropped }
+    }
+
+    /// Several messages may carry one stamp: they come from different senders.
+    pub(super) fn with_equal_stamps(self) -> Self {
+        Self { equal_stamps: true, ..self }
     }
 
     /// The next sample with its stamp since the log began.
@@ -141,8 +149,10 @@ impl<T> OrderedSamples<T> {
         match (self.decode)(MessageSource { data, number, position }) {
             Ok((absolute_ns, sample)) => {
                 let stamp_ns = absolute_ns.saturating_sub(log.epoch_ns());
-                let newest_out = self.released_ns.is_some_and(|released| stamp_ns <= released);
-                let duplicate = self.pending.range((stamp_ns, 0)..=(stamp_ns, usize::MAX)).next().is_some();
+                let repeats = Some(stamp_ns) == self.released_ns && !self.equal_stamps;
+                let newest_out = repeats || self.released_ns.is_some_and(|released| stamp_ns < released);
+                let duplicate =
+                    !self.equal_stamps && self.pending.range((stamp_ns, 0)..=(stamp_ns, usize::MAX)).next().is_some();
                 if newest_out || duplicate {
                     let reason = if duplicate || Some(stamp_ns) == self.released_ns {
                         "the header stamp repeats"

@@ -1,0 +1,113 @@
+//! The encoder messages of a log as samples of all joints.
+
+use super::super::joint_merge::{JointMerge, JointReading};
+use super::super::messages::{self, JointMessage, MessageKind};
+use super::super::rig::GimbalRig;
+use super::super::{FlightLog, JointSample, LogError};
+use super::frames::not_decodable;
+use super::ordered::{Decoder, MessageSource, OrderedSamples, ReadContext, Refusal};
+
+/// So many messages may pass before every joint of the rig has been named once.
+const MESSAGES_LOOKED_AT: usize = 1000;
+
+/// The joints' samples in time order; joints that come in messages of their own are merged by name.
+pub(super) struct JointSamples {
+    topic: String,
+    readings: OrderedSamples<JointReading>,
+    merge: JointMerge,
+    ended: bool,
+    told_of_repeats: bool,
+}
+
+impl JointSamples {
+    /// Reads from a time on; `topic` is the gimbal's.
+    pub(super) fn new(log: &FlightLog, gimbal: &GimbalRig, topic: &str, from_ns: i64) -> Result<Self, LogError> {
+        log.require_topic("gimbal.rostopic", topic, &[MessageKind::JointState])?;
+        let names: Vec<String> = gimbal.joints.iter().map(|joint| joint.name.clone()).collect();
+        let together = named_together(log, topic, &names)?;
+        let joints = names.len();
+        let readings = OrderedSamples::new(log, topic, from_ns, false, reading_decoder(names, log.epoch_ns()));
+        Ok(Self {
+            topic: topic.to_owned(),
+            readings: if together { readings } else { readings.with_equal_stamps() },
+            merge: JointMerge::new(joints),
+            ended: false,
+            told_of_repeats: false,
+        })
+    }
+
+    /// The next sample, `None` at the end of the log.
+    pub(super) fn next(&mut self, context: &mut ReadContext) -> Option<JointSample> {
+        loop {
+            if let Some(sample) = self.merge.pop() {
+                return Some(sample);
+            }
+            if self.ended {
+                return None;
+            }
+            let Some((stamp_ns, reading)) = self.readings.next(context) else {
+                self.ended = true;
+                self.merge.finish();
+                continue;
+            };
+            if !self.merge.push(&reading) && !std::mem::replace(&mut self.told_of_repeats, true) {
+                let message = format!("{}: a joint has two readings of one stamp; the first one counts", self.topic);
+                context.warn(stamp_ns, message);
+            }
+        }
+    }
+}
+
+/// Whether the messages name all joints at once; refuses a rig with a joint that none of the first ones names.
+fn named_together(log: &FlightLog, topic: &str, names: &[String]) -> Result<bool, LogError> {
+    let mut known: Vec<String> = Vec::new();
+    let mut together = true;
+    let mut looked_at = 0;
+    let complete = log.find_message(topic, |data| {
+        looked_at += 1;
+        if let Ok(message) = messages::read_joint_state(data) {
+            for name in &message.names {
+                if !known.iter().any(|other| other == name) {
+                    known.push((*name).to_owned());
+                }
+            }
+            together &= names.iter().all(|name| message.names.contains(&name.as_str()));
+            if names.iter().all(|name| known.contains(name)) {
+                return Some(true);
+            }
+        }
+        (looked_at >= MESSAGES_LOOKED_AT).then_some(false)
+    });
+    let missing = names.iter().position(|name| !known.contains(name));
+    match missing.filter(|_| complete != Some(true) && !known.is_empty()) {
+        Some(link) => Err(LogError::UnknownJoint {
+            link,
+            joint: names[link].clone(),
+            topic: topic.to_owned(),
+            available: known,
+            path: log.path().to_owned(),
+        }),
+        None => Ok(together),
+    }
+}
+
+fn reading_decoder(names: Vec<String>, epoch_ns: i64) -> Decoder<JointReading> {
+    Box::new(move |source: MessageSource<'_>| {
+        let message = messages::read_joint_state(source.data).map_err(|error| not_decodable(&error))?;
+        let angles_rad: Vec<Option<f64>> = names.iter().map(|name| angle_of(&message, name)).collect();
+        if let Some(joint) = angles_rad.iter().position(|angle| angle.is_some_and(|angle| !angle.is_finite())) {
+            let detail = format!("{}: {}", names[joint], angles_rad[joint].unwrap_or(f64::NAN));
+            return Err(Refusal { reason: "numbers that are not finite", detail });
+        }
+        if angles_rad.iter().all(Option::is_none) {
+            return Err(Refusal { reason: "it names no joint of the rig", detail: message.names.join(", ") });
+        }
+        let stamp_ns = message.stamp_ns.saturating_sub(epoch_ns);
+        Ok((message.stamp_ns, JointReading { stamp_ns, angles_rad }))
+    })
+}
+
+fn angle_of(message: &JointMessage<'_>, name: &str) -> Option<f64> {
+    let place = message.names.iter().position(|known| *known == name)?;
+    message.positions_rad.get(place).copied()
+}
