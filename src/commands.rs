@@ -2,8 +2,9 @@
 
 use std::io::{self, IsTerminal as _, Write as _};
 use std::path::Path;
+use std::sync::Arc;
 #[cfg(feature = "gui")]
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Mutex, PoisonError};
 
 use anyhow::{Context as _, Result, bail};
 use dcvins::calibration::CalibrationOptions;
@@ -327,9 +328,10 @@ pub(crate) fn calibrate(arguments: &CalibrateArguments) -> Result<()> {
 
 /// `dcvins check`.
 pub(crate) fn check(arguments: &CheckArguments) -> Result<()> {
-    let log = FlightLog::open(&arguments.log)?;
+    let log = Arc::new(FlightLog::open(&arguments.log)?);
     let rig = Rig::for_log(&log, arguments.rig.as_deref());
-    let report = flight_log::check::check(&log, rig.as_ref(), &[]);
+    let rotations = rig.as_ref().map_or_else(|_| Vec::new(), |rig| session::image_rotations(&log, rig));
+    let report = flight_log::check::check(&log, rig.as_ref(), &rotations);
     if arguments.json {
         print(&format!("{}\n", serde_json::to_string_pretty(&report)?))
     } else {

@@ -8,6 +8,7 @@ mod calibrate;
 mod command;
 mod configuration;
 mod engine;
+mod image_rotations;
 #[cfg(test)]
 mod memory_tests;
 mod plan;
@@ -23,6 +24,7 @@ mod tracker;
 pub use calibrate::{CalibrationRequest, CalibrationRun, CalibrationRunError, calibrate};
 pub use command::{Command, PlaybackSpeed};
 pub use engine::EngineMessage;
+pub use image_rotations::image_rotations;
 pub use plan::{MAX_RUNS, SessionError, SessionPlan, SessionRequest};
 pub use playback::Session;
 pub use recording::{Recording, RunMemory, RunRecord, StepRecord};

@@ -1,5 +1,6 @@
 //! Integration tests, a module per feature.
 
+mod check;
 mod command_line;
 mod evaluate;
 #[cfg(feature = "gui")]

@@ -1,6 +1,7 @@
 //! What is in a log and what is wrong with it, before anyone trusts a result: everything that can be known without the
 //! estimator, each finding with its evidence and its remedy.
 
+mod hand_eye;
 mod images;
 mod inertial;
 mod joints;

@@ -1,0 +1,249 @@
+//! Cameras against the gyroscope: the rotations that somebody measured from the pictures alone, against those that the
+//! gyroscope, the encoders and the rig predict. What differs by a constant rotation is the extrinsics' fault, what
+//! differs by a delay that of the clocks.
+
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+
+use super::super::Rig;
+use super::super::rig::{CameraMount, CameraRig};
+use super::inertial::InertialFacts;
+use super::statistics::median;
+use super::survey::Survey;
+use super::{Area, Findings, ImageRotation, Severity};
+use crate::geometry::{ns_from_seconds, so3};
+use crate::gimbal::ClassicalChain;
+
+/// Fewer image rotations than this say nothing.
+const FEWEST_ROTATIONS: usize = 20;
+/// Turns smaller than this in the median say nothing.
+const LEAST_TURN_RAD: f64 = 0.003;
+/// Time offsets are searched so far to both sides.
+const LARGEST_OFFSET_S: f64 = 0.15;
+/// Step of that search.
+const OFFSET_STEP_S: f64 = 0.005;
+/// Offsets from this size on are told: an image interval of 20 Hz holds twelve of them, and rolling shutters and
+/// exposures shift stamps by less.
+const OFFSET_TOLERANCE_S: f64 = 0.004;
+/// An offset counts when it takes at least this share off the mean square of the misfit.
+const LEAST_GAIN: f64 = 0.2;
+/// A camera may be this far from where the rotations say it points.
+const ROTATION_TOLERANCE_RAD: f64 = 0.07;
+/// From here on the error is no inaccuracy but a wrong matrix.
+const WRONG_ROTATION_RAD: f64 = 0.35;
+/// Where turns are predicted no better than by this share of them (noisy encoders under a stabilized camera), they tell
+/// nothing.
+const MOST_NOISE: f64 = 0.5;
+/// Turns about less than this share of the strongest axis leave the rotation about that axis open.
+const LEAST_SPREAD: f64 = 0.02;
+
+/// Rotation vectors: predicted and measured.
+type Pair = (Vector3<f64>, Vector3<f64>);
+
+/// One camera's rotations beside what predicts them.
+struct HandEye<'a> {
+    survey: &'a Survey,
+    inertial: &'a InertialFacts,
+    camera: &'a CameraRig,
+    rotations: Vec<&'a ImageRotation>,
+}
+
+/// Checks a camera's orientation and clock by its image rotations, if there are any.
+pub(super) fn check_against_gyroscope(
+    survey: &Survey,
+    rig: &Rig,
+    camera: &CameraRig,
+    inertial: &InertialFacts,
+    rotations: &[ImageRotation],
+    findings: &mut Findings,
+) {
+    let rotations: Vec<_> = rotations.iter().filter(|rotation| rotation.camera_key == camera.key).collect();
+    let Some(chain) = rig.chain_of_camera(&camera.key).filter(|_| rotations.len() >= FEWEST_ROTATIONS) else { return };
+    let hand_eye = HandEye { survey, inertial, camera, rotations };
+    let given = hand_eye.pairs(&chain, 0.0);
+    let turns: Vec<f64> = given.iter().map(|(_, measured)| measured.norm()).collect();
+    if given.len() < FEWEST_ROTATIONS || median(&turns) < LEAST_TURN_RAD {
+        let title = format!("{} turns too little to check its extrinsics", camera.key);
+        let evidence = format!("{} image rotations, {:.2}° in the median", given.len(), median(&turns).to_degrees());
+        return findings.add(Severity::Note, Area::Extrinsics, title, evidence, "fly turns about all axes");
+    }
+    let turn_rad = median(&turns);
+    let offset_s = hand_eye.check_clock(&chain, turn_rad, findings);
+    hand_eye.check_orientation(&chain, turn_rad, offset_s, findings);
+}
+
+impl HandEye<'_> {
+    /// Predicted and measured rotation vectors, for a chain and an offset of the clocks.
+    fn pairs(&self, chain: &ClassicalChain, offset_s: f64) -> Vec<Pair> {
+        let shift = ns_from_seconds(self.camera.timeshift_cam_imu_s + offset_s);
+        let mount = |stamp_ns: i64| {
+            let angles_rad = if chain.links.is_empty() { Vec::new() } else { self.survey.joint_angles_at(stamp_ns)? };
+            Some(chain.imu_from_camera(&angles_rad).rotation)
+        };
+        let pair = |rotation: &&ImageRotation| {
+            let (from_ns, to_ns) = (rotation.from_ns + shift, rotation.to_ns + shift);
+            let turn = imu_turn(self.inertial, from_ns, to_ns)?;
+            let predicted = so3::log(&(mount(to_ns)?.inverse() * turn * mount(from_ns)?));
+            Some((predicted, so3::log(&rotation.second_from_first)))
+        };
+        self.rotations.iter().filter_map(pair).collect()
+    }
+
+    /// The offset that brings image and gyroscope rotations together, whatever constant rotation lies between them;
+    /// 0 when there is none worth telling.
+    fn check_clock(&self, chain: &ClassicalChain, turn_rad: f64, findings: &mut Findings) -> f64 {
+        let key = &self.camera.key;
+        let cost = |offset_s: f64| {
+            let pairs = self.pairs(chain, offset_s);
+            best_rotation(&pairs).map_or(f64::INFINITY, |(error, _)| misfit_rad(&pairs, &error))
+        };
+        let steps = (LARGEST_OFFSET_S / OFFSET_STEP_S).round() as i32;
+        let costs: Vec<(f64, f64)> =
+            (-steps..=steps).map(|step| f64::from(step) * OFFSET_STEP_S).map(|offset| (offset, cost(offset))).collect();
+        let best = (0..costs.len()).min_by(|a, b| costs[*a].1.total_cmp(&costs[*b].1)).unwrap_or(0);
+        let unshifted = costs[steps as usize].1;
+        let (offset_s, least) = (vertex(&costs, best), costs[best].1);
+        let evidence = format!(
+            "turns of {:.3}° in the median differ by {:.3}°, by {:.3}° with the images {:+.1} ms later",
+            turn_rad.to_degrees(),
+            unshifted.to_degrees(),
+            least.to_degrees(),
+            offset_s * 1e3
+        );
+        let far = costs.iter().filter(|(offset, _)| (offset - offset_s).abs() > 0.05).map(|(_, cost)| *cost);
+        let gain = |from: f64| 1.0 - (least / from.max(f64::MIN_POSITIVE)).powi(2);
+        if least > MOST_NOISE * turn_rad || gain(far.fold(f64::INFINITY, f64::min)) < LEAST_GAIN {
+            let title = format!("the clock of {key} cannot be told from its turns");
+            let remedy = "fly faster turns, or trust a calibration such as Kalibr's timeshift_cam_imu";
+            findings.add(Severity::Note, Area::Time, title, evidence, remedy);
+            return 0.0;
+        }
+        if offset_s.abs() < OFFSET_TOLERANCE_S || gain(unshifted) < LEAST_GAIN {
+            findings.good(Area::Time, format!("{key} and the gyroscope turn at the same time"), evidence);
+            return 0.0;
+        }
+        let title = format!("{key} and the gyroscope are {:+.0} ms apart", offset_s * 1e3);
+        let remedy = format!("set {key}.timeshift_cam_imu to {:+.3}", self.camera.timeshift_cam_imu_s + offset_s);
+        findings.add(Severity::Warning, Area::Time, title, evidence, remedy);
+        offset_s
+    }
+
+    fn check_orientation(&self, chain: &ClassicalChain, turn_rad: f64, offset_s: f64, findings: &mut Findings) {
+        let key = &self.camera.key;
+        let pairs = self.pairs(chain, offset_s);
+        let Some((error, spread)) = best_rotation(&pairs) else { return };
+        let (given, corrected) = (misfit_rad(&pairs, &UnitQuaternion::identity()), misfit_rad(&pairs, &error));
+        let evidence = format!(
+            "image rotations differ from the gyroscope's by {:.3}° in the median, by {:.3}° with the camera turned by {:.1}°; \
+             {} pairs, second axis {:.0} % of the first",
+            given.to_degrees(),
+            corrected.to_degrees(),
+            error.angle().to_degrees(),
+            pairs.len(),
+            spread * 100.0
+        );
+        let inverted = self.inverted(chain, offset_s, given);
+        if let Some((field, misfit)) = inverted {
+            let title = format!("{field} is inverted, by the turns of {key}");
+            let evidence = format!("{evidence}; by {:.3}° with {field} the other way round", misfit.to_degrees());
+            let remedy = format!(
+                "write the inverse of {field}: T_a_b maps points from b to a (Kalibr: T_cam_imu from the IMU to the camera)"
+            );
+            findings.add(Severity::Error, Area::Extrinsics, title, evidence, remedy);
+        } else if corrected > MOST_NOISE * turn_rad {
+            let title = format!("the turns of {key} are predicted too badly to check where it points");
+            let remedy = if self.camera.mount == CameraMount::Gimbal {
+                "the encoders' noise is as large as the turns: fly with the gimbal held, or look at its other findings"
+            } else {
+                "images and gyroscope contradict each other: look at the findings on time and intrinsics"
+            };
+            findings.add(Severity::Note, Area::Extrinsics, title, evidence, remedy);
+        } else if spread < LEAST_SPREAD {
+            let title = format!("{key} turned about one axis only: its rotation cannot be checked");
+            findings.add(Severity::Note, Area::Extrinsics, title, evidence, "fly turns about all axes");
+        } else if error.angle() > ROTATION_TOLERANCE_RAD && corrected < 0.8 * given {
+            let severity = if error.angle() > WRONG_ROTATION_RAD { Severity::Error } else { Severity::Warning };
+            let title = format!("{key} does not point where the rig says");
+            let remedy =
+                "check direction and axes of the extrinsics (T_cam_imu maps from the IMU to the camera), or calibrate";
+            findings.add(severity, Area::Extrinsics, title, evidence, remedy);
+        } else {
+            findings.good(Area::Extrinsics, format!("{key} points where the rig says"), evidence);
+        }
+    }
+
+    /// The transform of the rig whose inverse explains the rotations much better than itself and leaves the camera no
+    /// more than inaccurate, with the misfit then.
+    fn inverted(&self, chain: &ClassicalChain, offset_s: f64, given_rad: f64) -> Option<(String, f64)> {
+        let key = &self.camera.key;
+        let base = ClassicalChain { imu_from_base: chain.imu_from_base.inverse(), ..chain.clone() };
+        let candidates = if self.camera.mount == CameraMount::Gimbal {
+            let end = ClassicalChain { effector_from_camera: chain.effector_from_camera.inverse(), ..chain.clone() };
+            let both = ClassicalChain { effector_from_camera: end.effector_from_camera, ..base.clone() };
+            vec![
+                ("gimbal.T_E_C".to_owned(), end),
+                ("gimbal.T_I_B".to_owned(), base),
+                ("each of gimbal.T_I_B and gimbal.T_E_C".to_owned(), both),
+            ]
+        } else {
+            vec![(format!("{key}.T_cam_imu"), base)]
+        };
+        let misfits = candidates.into_iter().filter_map(|(field, chain)| {
+            let pairs = self.pairs(&chain, offset_s);
+            let (error, _) = best_rotation(&pairs)?;
+            let misfit = misfit_rad(&pairs, &UnitQuaternion::identity());
+            (error.angle() < ROTATION_TOLERANCE_RAD).then_some((field, misfit))
+        });
+        misfits.filter(|(_, misfit)| *misfit < 0.5 * given_rad).min_by(|a, b| a.1.total_cmp(&b.1))
+    }
+}
+
+/// The IMU's turn between two times by its gyroscope, bias removed: rotates vectors of its first frame into its second.
+fn imu_turn(inertial: &InertialFacts, from_ns: i64, to_ns: i64) -> Option<UnitQuaternion<f64>> {
+    let samples = &inertial.samples;
+    let (first, last) = (samples.first()?.stamp_ns, samples.last()?.stamp_ns);
+    if from_ns < first || to_ns > last || to_ns <= from_ns {
+        return None;
+    }
+    let bias = inertial.rest_rate_rad_per_s.unwrap_or_default();
+    let mut first_from_now = UnitQuaternion::identity();
+    let begin = samples.partition_point(|sample| sample.stamp_ns <= from_ns).saturating_sub(1);
+    for pair in samples[begin..].windows(2) {
+        let (start, end) = (pair[0].stamp_ns.max(from_ns), pair[1].stamp_ns.min(to_ns));
+        if start >= to_ns {
+            break;
+        }
+        let rate = (pair[0].angular_velocity_rad_per_s + pair[1].angular_velocity_rad_per_s) * 0.5 - bias;
+        first_from_now *= so3::exp(&(rate * ((end - start).max(0) as f64 * 1e-9)));
+    }
+    Some(first_from_now.inverse())
+}
+
+/// The rotation that brings the predicted rotation vectors closest to the measured ones (Wahba's problem), with the
+/// second singular value over the first: near zero when all turns were about one axis.
+fn best_rotation(pairs: &[Pair]) -> Option<(UnitQuaternion<f64>, f64)> {
+    let sum: Matrix3<f64> = pairs.iter().map(|(predicted, measured)| measured * predicted.transpose()).sum();
+    let svd = sum.svd(true, true);
+    let (u, v_t) = (svd.u?, svd.v_t?);
+    let mut handed = Matrix3::identity();
+    handed[(2, 2)] = (u * v_t).determinant().signum();
+    let rotation = Rotation3::from_matrix_unchecked(u * handed * v_t);
+    Some((UnitQuaternion::from_rotation_matrix(&rotation), svd.singular_values[1] / svd.singular_values[0].max(1e-12)))
+}
+
+/// Median angle between the measured rotation vectors and the predicted ones after a constant rotation.
+fn misfit_rad(pairs: &[Pair], error: &UnitQuaternion<f64>) -> f64 {
+    median(&pairs.iter().map(|(predicted, measured)| (error * predicted - measured).norm()).collect::<Vec<_>>())
+}
+
+/// Where the parabola through the squared costs around the best offset has its least value; the offset itself at the
+/// end of the range.
+fn vertex(costs: &[(f64, f64)], best: usize) -> f64 {
+    let square = |index: usize| costs[index].1 * costs[index].1;
+    let offset_s = costs[best].0;
+    if best == 0 || best + 1 >= costs.len() {
+        return offset_s;
+    }
+    let (left, middle, right) = (square(best - 1), square(best), square(best + 1));
+    let curvature = left - 2.0 * middle + right;
+    if curvature > 0.0 { offset_s + 0.5 * OFFSET_STEP_S * (left - right) / curvature } else { offset_s }
+}

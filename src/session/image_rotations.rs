@@ -1,0 +1,86 @@
+//! The rotations between the images of a log's cameras, from their pictures alone: what `check` holds the rig against.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use nalgebra::{UnitQuaternion, Vector3};
+use rayon::prelude::*;
+
+use crate::estimator::initialization::relative_pose::{RotationPrior, relative_poses};
+use crate::flight_log::check::ImageRotation;
+use crate::flight_log::rig::CameraRig;
+use crate::flight_log::{FlightLog, FrameStream, Rig};
+use crate::frontend::{FeatureId, FrontEnd, FrontEndOptions, TrackedFrame};
+use crate::geometry::seconds_from_ns;
+
+/// Stretches of the log that are looked at, spread evenly.
+const STRETCHES: usize = 3;
+/// Length of each.
+const STRETCH_S: f64 = 5.0;
+/// Standard deviation of a tracked pixel, per coordinate.
+const PIXEL_SIGMA_PX: f64 = 0.5;
+/// How far a camera may turn from one image to the next, about each axis; not what the rig says, which is to be judged.
+const TURN_SIGMA_RAD: f64 = 0.3;
+/// Fewer features in common give no rotation.
+const FEWEST_PAIRS: usize = 30;
+/// A smaller share of features that fit one motion gives no rotation.
+const LEAST_INLIER_SHARE: f64 = 0.6;
+
+/// Rotations from image to image over some stretches of the log, for every camera of the rig that the log has.
+///
+/// Neither gyroscope nor encoders nor extrinsics enter. A camera whose images cannot be read has none; `check` says why.
+pub fn image_rotations(log: &Arc<FlightLog>, rig: &Rig) -> Vec<ImageRotation> {
+    let duration_s = seconds_from_ns(log.duration_ns());
+    let length_s = STRETCH_S.min(duration_s / STRETCHES as f64);
+    let stretch = |number: usize| {
+        let middle_s = duration_s * (number as f64 + 0.5) / STRETCHES as f64;
+        middle_s - 0.5 * length_s
+    };
+    let jobs: Vec<(&CameraRig, f64)> =
+        rig.cameras.iter().flat_map(|camera| (0..STRETCHES).map(move |number| (camera, stretch(number)))).collect();
+    let found: Vec<Vec<ImageRotation>> =
+        jobs.par_iter().map(|(camera, start_s)| rotations_of(log, rig, camera, *start_s, length_s)).collect();
+    found.into_iter().flatten().collect()
+}
+
+fn rotations_of(
+    log: &Arc<FlightLog>,
+    rig: &Rig,
+    camera: &CameraRig,
+    start_s: f64,
+    length_s: f64,
+) -> Vec<ImageRotation> {
+    let Ok(mut stream) = FrameStream::new(Arc::clone(log), rig, &camera.key, start_s, Some(length_s)) else {
+        return Vec::new();
+    };
+    let mut front_end = FrontEnd::new(camera.model.clone(), FrontEndOptions::default());
+    let focal_px = 0.5 * (camera.model.intrinsics_px[0] + camera.model.intrinsics_px[1]);
+    let mut previous: Option<(TrackedFrame, i64)> = None;
+    let mut rotations = Vec::new();
+    while let Some(frame) = stream.next_frame() {
+        let Ok(tracks) = front_end.process(&frame.image, frame.stamp_ns, None) else { continue };
+        if let Some((before, from_ns)) = &previous
+            && let Some(second_from_first) = rotation_between(before, &tracks, PIXEL_SIGMA_PX / focal_px)
+        {
+            let (camera_key, to_ns) = (camera.key.clone(), frame.stamp_ns);
+            rotations.push(ImageRotation { camera_key, from_ns: *from_ns, to_ns, second_from_first });
+        }
+        previous = Some((tracks, frame.stamp_ns));
+    }
+    rotations
+}
+
+/// The rotation that takes directions of the first camera into the second one, from the features that both see.
+fn rotation_between(first: &TrackedFrame, second: &TrackedFrame, sigma_rad: f64) -> Option<UnitQuaternion<f64>> {
+    let before: BTreeMap<FeatureId, Vector3<f64>> =
+        first.features.iter().map(|feature| (feature.id, feature.bearing)).collect();
+    let pairs: Vec<(Vector3<f64>, Vector3<f64>)> =
+        second.features.iter().filter_map(|feature| Some((*before.get(&feature.id)?, feature.bearing))).collect();
+    if pairs.len() < FEWEST_PAIRS {
+        return None;
+    }
+    let prior = RotationPrior { rotation: UnitQuaternion::identity(), sigma_rad: TURN_SIGMA_RAD };
+    let best = relative_poses(&pairs, &prior, sigma_rad, second.stamp_ns.unsigned_abs()).into_iter().next()?;
+    let fits = best.inliers.len() as f64 >= LEAST_INLIER_SHARE * pairs.len() as f64;
+    fits.then_some(best.camera_j_from_camera_i.rotation)
+}
