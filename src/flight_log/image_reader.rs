@@ -2,7 +2,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use super::container::{BlockCache, TopicIndex};
 use super::messages::MessageKind;
-use super::picture::decode_picture;
+use super::picture::{BitDepth, decode_picture};
 use super::{FlightLog, GrayImage, LogError, Rig};
 use crate::geometry::seconds_from_ns;
 
@@ -24,6 +24,7 @@ struct CameraImages {
     key: String,
     topic: String,
     kind: MessageKind,
+    depth: BitDepth,
     count: usize,
 }
 
@@ -46,7 +47,8 @@ impl ImageReader {
                 let info = log.topic(&camera.topic)?;
                 let kind = info.kind.filter(|kind| kind.is_image())?;
                 let (key, topic) = (camera.key.clone(), camera.topic.clone());
-                Some(CameraImages { key, topic, kind, count: info.count as usize })
+                let depth = BitDepth::of_topic(&log, &topic, kind);
+                Some(CameraImages { key, topic, kind, depth, count: info.count as usize })
             })
             .collect();
         let topics = cameras.iter().map(|camera| log.topic_index(&camera.topic)).collect();
@@ -94,7 +96,8 @@ impl ImageReader {
             let damage = block.and_then(|block| block.damage.clone());
             return Err(bad(damage.unwrap_or_else(|| "the index points to no message".into())));
         };
-        let image = Arc::new(decode_picture(camera.kind, block.bytes(self.log.file(), &message.data)).map_err(bad)?);
+        let data = block.bytes(self.log.file(), &message.data);
+        let image = Arc::new(decode_picture(camera.kind, data, camera.depth).map_err(bad)?);
         if cache.images.len() == IMAGES {
             cache.images.remove(0);
         }

@@ -71,6 +71,11 @@ pub(super) fn check_images(survey: &Survey, rig: &Rig, inertial: &InertialFacts,
     for camera in &rig.cameras {
         let Some(looks) = survey.images.get(&camera.key).filter(|looks| !looks.is_empty()) else { continue };
         check_size(camera, looks, findings);
+        if let Some(bits) = survey.depths.get(&camera.key).map(|depth| depth.bits()).filter(|bits| *bits < 16) {
+            let title = format!("{} has grey values of {bits} bits in 16", camera.key);
+            let evidence = format!("by the brightest pixel of its first image; bits {} to {bits} are used", bits - 7);
+            findings.add(Severity::Note, Area::Images, title, evidence, "");
+        }
         check_blur(camera, looks, findings);
         check_exposure(camera, looks, findings);
         check_texture(camera, looks, findings);

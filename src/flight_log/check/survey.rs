@@ -3,7 +3,7 @@ use std::collections::BTreeMap;
 use super::super::container::DecodedBlock;
 use super::super::joint_merge::{JointMerge, JointReading};
 use super::super::messages::{self, MessageKind};
-use super::super::picture::decode_picture;
+use super::super::picture::{BitDepth, decode_picture};
 use super::super::stream::angle_fit;
 use super::super::{FlightLog, ImuSample, JointSample, Rig};
 use super::images::{ImageMeasure, measure};
@@ -84,6 +84,8 @@ pub(super) struct Survey {
     pub(super) joint_names: Vec<String>,
     /// Images by camera key.
     pub(super) images: BTreeMap<String, Vec<ImageLook>>,
+    /// Bits of a grey value by camera key.
+    pub(super) depths: BTreeMap<String, BitDepth>,
     /// Damaged chunks, in words.
     pub(super) damages: Vec<String>,
 }
@@ -200,7 +202,11 @@ impl Survey {
             }
         }
         if looked_at && let Some(camera) = rig.cameras.iter().find(|camera| camera.topic == topic && kind.is_image()) {
-            match decode_picture(kind, data) {
+            let known = self.depths.get(&camera.key).copied().or_else(|| BitDepth::of(kind, data));
+            if let Some(depth) = known {
+                self.depths.insert(camera.key.clone(), depth);
+            }
+            match decode_picture(kind, data, known.unwrap_or_default()) {
                 Ok(image) => {
                     let look = ImageLook { stamp_ns, measure: measure(&image) };
                     self.images.entry(camera.key.clone()).or_default().push(look);

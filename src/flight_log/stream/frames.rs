@@ -2,7 +2,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use super::super::messages::{self, MessageKind};
-use super::super::picture::decode_picture;
+use super::super::picture::{BitDepth, decode_picture};
 use super::super::{FlightLog, GrayImage, ImuSample, LogError, LogWarning, PoseSample, Rig, SensorFrame};
 use super::joint_angles::JointAngleStream;
 use super::joint_topic::JointSamples;
@@ -82,6 +82,7 @@ struct CameraStream {
     count: usize,
     topic: String,
     kind: MessageKind,
+    depth: BitDepth,
     key: String,
     resolution_px: [usize; 2],
     shift_ns: i64,
@@ -120,6 +121,7 @@ impl FrameSource {
             count,
             topic: camera.topic.clone(),
             kind,
+            depth: BitDepth::of_topic(log, &camera.topic, kind),
             key: camera_key.to_owned(),
             resolution_px: camera.model.resolution_px,
             shift_ns,
@@ -312,7 +314,7 @@ impl CameraStream {
 
     /// The image, or a warning why it is left out.
     fn decode(&self, context: &mut ReadContext, stamp_ns: i64, pending: &PendingImage) -> Option<GrayImage> {
-        let problem = match decode_picture(self.kind, &pending.message) {
+        let problem = match decode_picture(self.kind, &pending.message, self.depth) {
             Ok(image) if [image.width, image.height] == self.resolution_px => return Some(image),
             Ok(image) => format!(
                 "it has {}×{} pixels, the rig says {}×{} for {}",
