@@ -114,12 +114,11 @@ impl Estimator {
     fn initialization_options(&self) -> InitializationOptions {
         let options = &self.config.options;
         let (translation_m, rotation_rad) = self.config.chain_prior.unwrap_or(DEFAULT_CHAIN_PRIOR);
-        let focal = 0.5 * (self.config.camera.intrinsics_px[0] + self.config.camera.intrinsics_px[1]);
         let base = InitializationOptions {
-            bearing_sigma_rad: options.pixel_sigma_px / focal,
             accelerometer_bias_sigma_m_per_s2: options.accelerometer_bias_sigma,
             ..InitializationOptions::default()
-        };
+        }
+        .for_camera(self.config.camera.focal_length_px(), options.pixel_sigma_px);
         let joints = self.calibration.joint_count();
         if joints == 0 {
             return base.for_rigid_mount(rotation_rad, translation_m);

@@ -8,6 +8,7 @@ use super::refinement::{Refined, RefinedState, Refinement, RefinementInput};
 use super::selection::{guessed_rotations, select_views};
 use super::structure::{
     Structure, StructureFailure, StructureLimits, ViewPair, collect_tracks, common_bearings, rank_pairs, reconstruct,
+    thin_out,
 };
 use super::visual_problem::mean_square;
 use super::{
@@ -121,7 +122,7 @@ fn from_motion(
     );
     let views: Vec<_> = selected.iter().map(|&index| input.frames[index].features).collect();
     let guesses: Vec<_> = selected.iter().map(|&index| rotations[index]).collect();
-    let tracks = collect_tracks(&views);
+    let mut tracks = collect_tracks(&views);
     let pairs = rank_pairs(&tracks, &guesses, options.least_common_features);
     let common = (1..views.len()).map(|view| common_bearings(&tracks, view - 1, view).len()).min().unwrap_or(0);
     let least_common = options.least_common_features as f64;
@@ -142,6 +143,7 @@ fn from_motion(
         return None;
     }
 
+    thin_out(&mut tracks, views.len(), options.most_landmarks);
     let structure = structure_of(&tracks, &pairs, &guesses, input, options, checklist)?;
     let kept: Vec<usize> = structure.views.iter().map(|&view| selected[view]).collect();
     let problem = Problem { input, options, kept: &kept, structure: &structure, gyroscope_prior };
@@ -227,6 +229,14 @@ fn structure_of(
             None
         }
     }
+}
+
+/// What the mean of so many squared normal numbers exceeds once in a thousand times (the quantile of χ² over its degrees of
+/// freedom, by the cube root of Wilson and Hilferty).
+fn upper_mean_square(count: usize) -> f64 {
+    const NORMAL_QUANTILE: f64 = 3.09;
+    let share = 2.0 / (9.0 * count.max(1) as f64);
+    (1.0 - share + NORMAL_QUANTILE * share.sqrt()).powi(3)
 }
 
 /// The views that were placed, with all that the metric part needs.
@@ -343,7 +353,9 @@ impl Problem<'_> {
         checklist.at_most("reprojection", subject, rms, options.most_reprojection_sigmas, Shown::Plain(""));
         let subject = "mean square of the whitened inertial residuals";
         let value = refined.inertial_mean_square;
-        checklist.at_most("inertial residual", subject, value, options.most_inertial_mean_square, Shown::Plain(""));
+        let chance = upper_mean_square(9 * increments.len());
+        let limit = options.inertial_noise_factor.powi(2) * chance;
+        checklist.at_most("inertial residual", subject, value, limit, Shown::Plain(""));
 
         refined.sigmas = refinement.sigmas(&refined.state);
         let sigmas = refined.sigmas;

@@ -101,12 +101,10 @@ pub fn triangulate(rays: &[(RigidTransform, Vector3<f64>)]) -> Option<Triangulat
         return None;
     }
     let directions: Vec<Vector3<f64>> = rays.iter().map(|(pose, bearing)| pose.rotation * bearing).collect();
-    let mut parallax_rad = 0.0_f64;
-    for (index, first) in directions.iter().enumerate() {
-        for second in &directions[index + 1..] {
-            parallax_rad = parallax_rad.max(angle_between(first, second));
-        }
-    }
+    let pairs =
+        directions.iter().enumerate().flat_map(|(index, a)| directions[index + 1..].iter().map(move |b| (a, b)));
+    let widest = pairs.min_by(|(a, b), (c, d)| a.dot(b).total_cmp(&c.dot(d)));
+    let parallax_rad = widest.map_or(0.0, |(a, b)| angle_between(a, b));
     let mut weights = vec![1.0; rays.len()];
     let mut position = Vector3::zeros();
     for _ in 0..ROUNDS {

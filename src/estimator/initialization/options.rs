@@ -57,10 +57,12 @@ pub struct InitializationOptions {
     pub least_inlier_share: f64,
     /// Fewest landmarks with a depth.
     pub least_landmarks: usize,
+    /// Most features that take part.
+    pub most_landmarks: usize,
     /// Largest root mean square reprojection error, in standard deviations of a bearing.
     pub most_reprojection_sigmas: f64,
-    /// Largest mean square of the whitened inertial residuals.
-    pub most_inertial_mean_square: f64,
+    /// The inertial sensor may be noisier than its rig says by this factor before its residuals speak against a solution.
+    pub inertial_noise_factor: f64,
     /// Largest relative standard deviation of the scale.
     pub most_scale_sigma: f64,
     /// Largest standard deviation of the newest velocity.
@@ -91,16 +93,32 @@ impl Default for InitializationOptions {
             least_excitation_m_per_s2: 0.25,
             least_inlier_share: 0.6,
             least_landmarks: 25,
+            most_landmarks: 200,
             most_reprojection_sigmas: 1.5,
-            most_inertial_mean_square: 4.0,
-            most_scale_sigma: 0.08,
+            inertial_noise_factor: 1.5,
+            most_scale_sigma: 0.05,
             most_velocity_sigma_m_per_s: 0.25,
             most_gravity_sigma_rad: 0.06,
         }
     }
 }
 
+/// Parallax, in standard deviations of a bearing, that two views need to tell depths: a landmark that is seen under so wide
+/// an angle has a depth to about a fifth (the noise of two bearings over it), and hundreds of them make a base.
+const PARALLAX_SIGMAS: f64 = 7.0;
+
 impl InitializationOptions {
+    /// Sets what depends on the camera: the noise of a bearing, and the parallaxes that are measured by it.
+    ///
+    /// Times do not depend on the camera's rate: what they wait for is the motion of the vehicle.
+    #[must_use]
+    pub fn for_camera(mut self, focal_length_px: f64, pixel_sigma_px: f64) -> Self {
+        self.bearing_sigma_rad = pixel_sigma_px / focal_length_px;
+        self.spacing_parallax_rad = PARALLAX_SIGMAS * self.bearing_sigma_rad;
+        self.least_parallax_rad = PARALLAX_SIGMAS * self.bearing_sigma_rad;
+        self
+    }
+
     /// Sets the mount's errors for a gimbal of `joints` joints: bounds of the chain's uniform errors, and the noise of an
     /// encoder reading (`None` without encoders: the mount's rotation is then hardly known).
     #[must_use]

@@ -3,7 +3,7 @@
 //! The cameras are free here: a gimbal may turn them as it likes.
 //! Gyroscope and encoders only give first guesses of rotations, and break the tie that a plane leaves.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use nalgebra::{DMatrix, DVector, UnitQuaternion, Vector3};
 
@@ -45,6 +45,35 @@ pub(super) fn collect_tracks(views: &[&[TrackedFeature]]) -> Tracks {
     }
     tracks.retain(|_, sightings| sightings.len() >= 2);
     tracks
+}
+
+/// Keeps at most `most` tracks: one pair of neighbouring views after the other takes the longest track that both see and
+/// that is not yet taken, so that every pair keeps its share; in the image the front end has spread them already.
+pub(super) fn thin_out(tracks: &mut Tracks, views: usize, most: usize) {
+    if tracks.len() <= most {
+        return;
+    }
+    let mut longest_first: Vec<_> = tracks.iter().collect();
+    longest_first.sort_by_key(|(id, sightings)| (std::cmp::Reverse(sightings.len()), **id));
+    let mut queues: Vec<VecDeque<FeatureId>> = vec![VecDeque::new(); views];
+    for (id, sightings) in longest_first {
+        for pair in sightings.windows(2).filter(|pair| pair[0].0 + 1 == pair[1].0) {
+            queues[pair[0].0].push_back(*id);
+        }
+    }
+    let mut kept = BTreeSet::new();
+    while kept.len() < most && queues.iter().any(|queue| !queue.is_empty()) {
+        for queue in &mut queues {
+            while kept.len() < most
+                && let Some(id) = queue.pop_front()
+            {
+                if kept.insert(id) {
+                    break;
+                }
+            }
+        }
+    }
+    tracks.retain(|id, _| kept.contains(id));
 }
 
 /// Bearings of the features that two views share.
@@ -211,7 +240,7 @@ fn grow(
     };
     map.poses[pair.view_i] = Some(RigidTransform::identity());
     map.poses[pair.view_j] = Some(base.camera_j_from_camera_i.inverse());
-    map.triangulate_all();
+    map.triangulate_seen_in(pair.view_i);
     for view in by_distance(pair, guessed_rotations.len()) {
         map.place(view, guessed_rotations, limits);
     }
@@ -244,12 +273,16 @@ struct GrowingMap<'a> {
 }
 
 impl GrowingMap<'_> {
-    /// Triangulates every feature that has no point yet (or anew) from all views placed so far.
-    fn triangulate_all(&mut self) {
-        self.points.clear();
+    /// Triangulates every feature that a view holds, anew, from all views placed so far; the others stay as they are, as
+    /// their views are the same.
+    fn triangulate_seen_in(&mut self, view: usize) {
         for (id, sightings) in self.tracks {
+            if sightings.binary_search_by_key(&view, |(view, _)| *view).is_err() {
+                continue;
+            }
             let rays: Vec<(RigidTransform, Vector3<f64>)> =
                 sightings.iter().filter_map(|(view, bearing)| Some((self.poses[*view]?, *bearing))).collect();
+            self.points.remove(id);
             let Some(point) = triangulate(&rays) else { continue };
             let fits = point.worst_angle_rad < OUTLIER_SIGMAS * self.sigma_rad;
             if point.in_front && fits && point.parallax_rad > LEAST_PARALLAX_RAD {
@@ -281,7 +314,7 @@ impl GrowingMap<'_> {
         let needed = (limits.least_inlier_share * known.len() as f64).max(8.0);
         if fitting as f64 >= needed {
             self.poses[view] = Some(pose.world_from_camera);
-            self.triangulate_all();
+            self.triangulate_seen_in(view);
         }
     }
 

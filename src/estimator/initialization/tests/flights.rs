@@ -11,7 +11,7 @@ use crate::estimator::initialization::{
 use crate::flight_log::rig::ChainPrior;
 
 fn options_for(flight: &FlightOptions) -> InitializationOptions {
-    let options = InitializationOptions { bearing_sigma_rad: 1.0 / FOCAL_PX, ..InitializationOptions::default() };
+    let options = InitializationOptions::default().for_camera(FOCAL_PX, 1.0);
     if flight.gimbal {
         let prior = ChainPrior {
             translation_bound_m: flight.chain_translation_bound_m,
