@@ -19,8 +19,8 @@ use super::{
 use crate::estimator::{ImuBias, Preintegration};
 use crate::geometry::{RigidTransform, seconds_from_ns};
 
-/// Rounds of the refinement before and after landmarks that do not fit are dropped.
-const REFINEMENT_ROUNDS: [usize; 2] = [10, 6];
+/// Most rounds of the refinement before and after landmarks that do not fit are dropped.
+const REFINEMENT_ROUNDS: [usize; 2] = [10, 25];
 /// A landmark with a sighting beyond this many standard deviations is dropped in between.
 const OUTLIER_SIGMAS: f64 = 4.0;
 /// A change of the gyroscope's bias by more than this is integrated anew.
@@ -344,6 +344,8 @@ impl Problem<'_> {
         let mut refined = refinement.run(refined.state, REFINEMENT_ROUNDS[1]);
         refined.rounds += rounds;
 
+        let subject = "whether the refinement came to rest";
+        checklist.at_least("settled", subject, f64::from(u8::from(refined.settled)), 1.0, Shown::Plain(""));
         let share = refined.state.landmarks.len() as f64 / before.max(1) as f64;
         let subject = "share of landmarks that fit with positive depth";
         checklist.at_least("positive depth", subject, share, options.least_inlier_share, Shown::Percent);

@@ -220,6 +220,8 @@ pub(super) struct Refined {
     pub(super) inertial_mean_square: f64,
     pub(super) sigmas: Option<RefinementSigmas>,
     pub(super) rounds: usize,
+    /// The last round changed next to nothing.
+    pub(super) settled: bool,
 }
 
 impl<'a> Refinement<'a> {
@@ -247,8 +249,8 @@ impl<'a> Refinement<'a> {
         let mut state = start;
         let mut cost = self.cost(&state);
         let mut damping = 1e-4;
-        let mut taken = 0;
-        while taken < rounds {
+        let (mut taken, mut settled) = (0, false);
+        while taken < rounds && !settled {
             taken += 1;
             let (normal, gradient, visual) = self.normal_equations(&state, damping);
             let Some(step) = damped_step(normal, &gradient, damping) else {
@@ -259,21 +261,17 @@ impl<'a> Refinement<'a> {
             let next = state.moved(&step, &self.layout, landmarks);
             let next_cost = self.cost(&next);
             if next_cost < cost {
-                let settled = cost - next_cost < 1e-4 * cost;
+                settled = cost - next_cost < 1e-4 * cost;
                 (state, cost) = (next, next_cost);
                 damping = (damping * 0.1).max(1e-9);
-                if settled {
-                    break;
-                }
             } else {
                 damping *= 20.0;
-                if damping > 1e6 {
-                    break;
-                }
+                // No step leads down any more.
+                settled = damping > 1e6;
             }
         }
         let inertial_mean_square = self.inertial_cost(&state) / (9 * self.input.increments.len()).max(1) as f64;
-        Refined { state, inertial_mean_square, sigmas: None, rounds: taken }
+        Refined { state, inertial_mean_square, sigmas: None, rounds: taken, settled }
     }
 
     /// Standard deviations at a state.
