@@ -1,6 +1,7 @@
 //! The front end on images whose true motion is known: time per image, tracked points, errors.
 //!
-//! `cargo bench --bench frontend` prints the table of the motion tracker and of the whole front end.
+//! `cargo bench --bench frontend` prints the table of the motion tracker from one image to the next, and of the whole front
+//! end over all images: how far features have drifted from their first sighting, by age, with and without keys.
 //! With `FRONTEND_BENCH_EXPORT=DIR` the frames (PGM) and the points with their true motion (CSV) are written there, to run
 //! other trackers on the same.
 
@@ -9,12 +10,14 @@
 #[path = "../src/frontend/tests/homography.rs"]
 mod homography;
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::time::Instant;
 
+use dcvins::camera::CameraModel;
 use dcvins::flight_log::GrayImage;
-use dcvins::frontend::Pyramid;
 use dcvins::frontend::lucas_kanade::{LucasKanadeOptions, track};
+use dcvins::frontend::{FeatureId, FrontEnd, FrontEndOptions, KeyOptions, Pyramid};
 use homography::{Dice, Scene, Texture};
 use nalgebra::Vector2;
 
@@ -115,6 +118,48 @@ fn bench_tracker(sequence: &Sequence, label: &str, options: &LucasKanadeOptions)
     );
 }
 
+/// Youngest ages of the groups that drift is shown for, in images.
+const AGES: [usize; 5] = [1, 2, 5, 9, 17];
+
+fn bench_front_end(sequence: &Sequence, label: &str, options: &FrontEndOptions) {
+    let scene = &sequence.scene;
+    let matrix = scene.camera_matrix();
+    let intrinsics_px = [matrix[(0, 0)], matrix[(1, 1)], matrix[(0, 2)], matrix[(1, 2)]];
+    let camera = CameraModel::pinhole(intrinsics_px, [scene.width, scene.height]).expect("a sound camera");
+    let mut best_ms = vec![f64::INFINITY; FRAMES];
+    let mut drift: [Vec<f64>; AGES.len()] = Default::default();
+    let mut tracked = 0;
+    for repetition in 0..REPETITIONS {
+        let mut front_end = FrontEnd::new(camera.clone(), *options);
+        let mut births = BTreeMap::<FeatureId, (usize, Vector2<f64>)>::new();
+        for (index, image) in sequence.frames.iter().enumerate() {
+            let start = Instant::now();
+            let frame = front_end.process(image, index as i64, None).expect("images of the camera's size");
+            best_ms[index] = best_ms[index].min(start.elapsed().as_secs_f64() * 1e3);
+            if repetition > 0 {
+                continue;
+            }
+            tracked += frame.statistics.tracked;
+            for feature in &frame.features {
+                let (birth, uv) = *births.entry(feature.id).or_insert((index, feature.uv_px));
+                if let Some(group) = AGES.iter().rposition(|age| *age <= index - birth) {
+                    drift[group].push((feature.uv_px - scene.flow(birth, index, &uv)).norm());
+                }
+            }
+        }
+    }
+    print!(
+        "{:<6} front end {label:<18} {:6.2} ms  {} tracked  drift by age (median):",
+        sequence.name,
+        median(&mut best_ms),
+        tracked / (FRAMES - 1)
+    );
+    for (age, errors) in AGES.iter().zip(&mut drift) {
+        print!("  {age}+ {:.3} px", median(errors));
+    }
+    println!();
+}
+
 fn main() {
     let texture = Texture::new(2048, 1);
     let scene = Scene {
@@ -135,5 +180,9 @@ fn main() {
         let forward = LucasKanadeOptions { forward_backward_px: None, ..Default::default() };
         bench_tracker(sequence, "forward", &forward);
         bench_tracker(sequence, "forward and backward", &LucasKanadeOptions::default());
+        // No window correlates better than perfectly.
+        let without = KeyOptions { min_correlation: 2.0, ..Default::default() };
+        bench_front_end(sequence, "without keys", &FrontEndOptions { keys: without, ..Default::default() });
+        bench_front_end(sequence, "with keys", &FrontEndOptions::default());
     }
 }
