@@ -195,9 +195,9 @@ fn the_gradient_of_the_whole_bundle_is_that_of_its_cost() {
         let cost = |step: f64| {
             let (mut band, mut border) = (vec![0.0; columns.band()], DVector::zeros(columns.borders()));
             if column < columns.band() {
-                band[column] = step
+                band[column] = step;
             } else {
-                border[column - columns.band()] = step
+                border[column - columns.band()] = step;
             }
             bundle.cost(&example.estimate.moved(columns, &band, &border, &landmarks))
         };
