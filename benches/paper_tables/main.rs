@@ -1,4 +1,4 @@
-//! The paper's experiments T1–T4 flown by `simulate` and estimated by `dcvins`, beside the paper's Tables 2 and 3.
+//! The paper's experiments T1–T4 flown by `simulate` and estimated by `dcvins`, beside the paper's Tables 1 to 3.
 //!
 //! `cargo bench --bench paper_tables` flies every experiment over its full length with five seeds and prints median and
 //! range over all of them, never the best. It takes hours on two cores, most of it for rendering; with
@@ -81,6 +81,7 @@ fn main() -> Result<()> {
     }
     print!("{}", tables::accuracy(&flights));
     print!("{}", tables::calibration(&flights));
+    print!("{}", tables::offline(&flights));
     print!("{}", tables::speed(&flights));
     Ok(())
 }
