@@ -44,10 +44,10 @@ pub enum CalibrationRunError {
         path: PathBuf,
     },
     /// The flight cannot tell.
-    #[error("{source}: {path}")]
+    #[error("{reason}: {path}")]
     Calibration {
         /// Why.
-        source: CalibrationError,
+        reason: CalibrationError,
         /// The log.
         path: PathBuf,
     },
@@ -117,7 +117,7 @@ pub fn calibrate(
             ..progress
         });
     })
-    .map_err(|source| CalibrationRunError::Calibration { source, path: request.log_path.clone() })?;
+    .map_err(|reason| CalibrationRunError::Calibration { reason, path: request.log_path.clone() })?;
     Ok(CalibrationRun {
         log_path: request.log_path.clone(),
         rig: calibrated(&given_rig, &parts, &outcome),
