@@ -7,7 +7,7 @@ use nalgebra::{Matrix2x3, Matrix2x6, Matrix3, Matrix6, Matrix6x3, Vector2, Vecto
 use super::landmark::{self, Landmark, ViewPose};
 use super::state::ViewId;
 use crate::camera::CameraModel;
-use crate::estimator::RobustLoss;
+use crate::estimator::{RobustLoss, damped_inverse};
 
 /// Squared whitened residual of a sighting whose landmark lies behind the camera.
 const UNSEEN_SQUARED: f64 = 1e4;
@@ -176,14 +176,4 @@ impl VisualEquations {
             })
             .collect()
     }
-}
-
-/// The inverse of a landmark's block with its diagonal raised; directions without information get no step.
-fn damped_inverse(hessian: &Matrix3<f64>, damping: f64) -> Matrix3<f64> {
-    let mut damped = *hessian;
-    let floor = 1e-9 * hessian.trace().max(1e-6);
-    for axis in 0..3 {
-        damped[(axis, axis)] += damping * hessian[(axis, axis)] + floor;
-    }
-    damped.cholesky().map_or_else(Matrix3::zeros, |factor| factor.inverse())
 }

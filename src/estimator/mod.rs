@@ -42,6 +42,7 @@ pub use footprint::{ReportBytes, allocated_bytes};
 pub use observations::Observations;
 pub use options::{EstimatorOptions, LandmarkModel, RobustLoss, TrackContinuation};
 pub use preintegration::{ImuBias, MotionIncrement, NavigationState, Preintegration};
+pub(crate) use visual::damped_inverse;
 
 pub use report::{
     CalibrationEstimate, ColumnBlock, ColumnGroup, Event, EventKind, FeatureReport, FrameStateReport, IterationReport,

@@ -225,7 +225,7 @@ impl VisualSystem {
 }
 
 /// The inverse of a landmark's block with its diagonal raised; directions without information get no step.
-fn damped_inverse(hessian: &Matrix3<f64>, damping: f64) -> Matrix3<f64> {
+pub(crate) fn damped_inverse(hessian: &Matrix3<f64>, damping: f64) -> Matrix3<f64> {
     let mut damped = *hessian;
     let floor = 1e-9 * hessian.trace().max(1e-6);
     for axis in 0..3 {
