@@ -79,6 +79,7 @@ fn config(flight: &SyntheticFlight) -> EstimatorConfig {
             .gimbal
             .as_ref()
             .map(|gimbal| (gimbal.prior.translation_bound_m / root, gimbal.prior.rotation_bound_rad / root)),
+        rigid_cameras: Vec::new(),
         options: EstimatorOptions { keep_linearization: true, ..EstimatorOptions::default() },
         clock_ms,
     }
@@ -96,6 +97,7 @@ fn step(estimator: &mut Estimator, frame: &SyntheticFrame, encoder_sigma_rad: f6
         imu: &frame.imu,
         joint_angles: joint_angles.as_ref(),
         tracks: &frame.tracks,
+        rigid_tracks: &[],
     })
 }
 

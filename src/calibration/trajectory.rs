@@ -27,6 +27,7 @@ pub(super) fn fly(
             imu: &view.imu,
             joint_angles: None,
             tracks: &view.tracks,
+            rigid_tracks: &[],
         });
         for event in report.events.iter().filter(|event| event.kind == EventKind::InitializationWaits) {
             waits.clone_from(&event.message);

@@ -59,13 +59,18 @@ impl Calibration {
         self.chain.joint_count()
     }
 
+    /// Pose of the camera at a frame's joint angles, which a rigid mount does not follow.
     pub(super) fn imu_from_camera(&self, joints_rad: &[f64]) -> RigidTransform {
-        self.chain.imu_from_camera(joints_rad)
+        self.chain.imu_from_camera(self.own(joints_rad))
+    }
+
+    fn own<'a>(&self, joints_rad: &'a [f64]) -> &'a [f64] {
+        &joints_rad[..self.joint_count().min(joints_rad.len())]
     }
 
     /// Pose of the camera with its derivatives by the free columns and by the joints.
     pub(super) fn linearize(&self, joints_rad: &[f64]) -> ChainLinearization {
-        let mut linearization = self.chain.linearize(joints_rad);
+        let mut linearization = self.chain.linearize(self.own(joints_rad));
         if !self.free {
             linearization.by_parameters = linearization.by_parameters.columns(0, 0).into_owned();
         }

@@ -24,7 +24,7 @@ pub(super) fn by_slot(frames: &[FrameState], calibration: &Calibration) -> Vec<C
 pub(super) struct CameraMaps {
     /// 6 × (6 + N), by pose and joints of the frame.
     pub(super) own: Vec<DMatrix<f64>>,
-    /// 6 × calibration.
+    /// 6 × the camera's own calibration.
     pub(super) calibration: Vec<DMatrix<f64>>,
 }
 
@@ -48,7 +48,8 @@ impl CameraMaps {
                 carried.fixed_rows_mut::<3>(3).copy_from(&shift);
                 carried
             };
-            own.columns_mut(POSE, joints).copy_from(&carried(&chain.by_joints));
+            // A rigid camera does not follow the joints.
+            own.columns_mut(POSE, chain.by_joints.ncols()).copy_from(&carried(&chain.by_joints));
             maps.own.push(own);
             maps.calibration.push(carried(&chain.by_parameters));
         }

@@ -3,7 +3,8 @@
 use super::options::EstimatorOptions;
 use crate::camera::CameraModel;
 use crate::flight_log::rig::ImuNoise;
-use crate::gimbal::{ClassicalChain, Parameterization};
+use crate::geometry::RigidTransform;
+use crate::gimbal::{Chain, ClassicalChain, Parameterization};
 
 /// What an estimator is told once.
 #[derive(Clone, Debug)]
@@ -28,16 +29,55 @@ pub struct EstimatorConfig {
     pub calibrate: bool,
     /// Standard deviations of the given chain's numbers, in metres and radians; `None` for [`DEFAULT_CHAIN_PRIOR`].
     pub chain_prior: Option<(f64, f64)>,
+    /// Rigid cameras that are watched beside `camera`.
+    pub rigid_cameras: Vec<RigidCamera>,
     /// Tunables.
     pub options: EstimatorOptions,
     /// Milliseconds of a clock that only runs forward, for the stage times of the reports.
     pub clock_ms: fn() -> f64,
 }
 
+/// A rigid camera that is watched beside the main one.
+#[derive(Clone, Debug)]
+pub struct RigidCamera {
+    /// What its columns are called by: its key in the rig, `cam1`.
+    pub key: String,
+    /// Its model.
+    pub model: CameraModel,
+    /// Its pose on the IMU as given.
+    pub imu_from_camera: RigidTransform,
+    /// Standard deviations of that pose's numbers, in metres and radians.
+    pub prior: (f64, f64),
+}
+
+/// Names and values of the six columns of a rigid camera that is watched beside the main one: rotation vector and
+/// translation of its pose on the IMU, behind its key.
+pub fn rigid_columns(key: &str, imu_from_camera: &RigidTransform) -> Vec<(String, f64)> {
+    let chain = Chain::from_classical(&rigid_mount(imu_from_camera), Parameterization::Minimal);
+    let name = |name: &String| format!("{key}.{}", name.rsplit('.').next().unwrap_or(name));
+    chain.parameter_names().iter().map(name).zip(chain.values().iter().copied()).collect()
+}
+
+/// A mount without joints.
+pub(super) fn rigid_mount(imu_from_camera: &RigidTransform) -> ClassicalChain {
+    ClassicalChain { imu_from_base: *imu_from_camera, ..ClassicalChain::default() }
+}
+
 /// What a calibration that says nothing about its quality is taken to be worth, per number: 5 mm and 0.5°.
 pub const DEFAULT_CHAIN_PRIOR: (f64, f64) = (0.005, 0.0087);
 
 impl EstimatorConfig {
+    /// Model of a camera by its number, the main one's first.
+    pub(super) fn model(&self, camera: usize) -> &CameraModel {
+        camera.checked_sub(1).map_or(&self.camera, |rigid| &self.rigid_cameras[rigid].model)
+    }
+
+    /// Standard deviations of the numbers of a camera's mount as given, in metres and radians.
+    pub(super) fn mount_sigmas(&self, camera: usize) -> (f64, f64) {
+        let main = self.chain_prior.unwrap_or(DEFAULT_CHAIN_PRIOR);
+        camera.checked_sub(1).map_or(main, |rigid| self.rigid_cameras[rigid].prior)
+    }
+
     /// Whether encoder readings with a known noise are there to be used.
     pub(super) fn encoder_in_use(&self) -> Option<f64> {
         self.encoder_sigma_rad.filter(|_| self.use_encoder)

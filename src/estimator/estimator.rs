@@ -5,7 +5,8 @@ use std::collections::VecDeque;
 use nalgebra::Vector3;
 
 use super::calibration::{Calibration, GivenSigmas};
-use super::config::{DEFAULT_CHAIN_PRIOR, EstimatorConfig};
+use super::calibrations::{Calibrations, MAIN};
+use super::config::{EstimatorConfig, rigid_mount};
 use super::initialization::StandstillEstimate;
 use super::prior::{Prior, StartPrior};
 use super::standstill::RestWatch;
@@ -16,7 +17,7 @@ use crate::flight_log::rig::ImuNoise;
 use crate::geometry::RigidTransform;
 use crate::gimbal::{ClassicalChain, Parameterization};
 
-/// A sliding-window visual-inertial estimator for a camera on a gimbal, or on a rigid mount.
+/// A sliding-window visual-inertial estimator for a camera on a gimbal, or on a rigid mount, and for rigid cameras beside it.
 ///
 /// It is a plain value: a clone is a snapshot from which the same steps give the same bits.
 #[derive(Clone, Debug)]
@@ -24,7 +25,7 @@ pub struct Estimator {
     pub(super) config: EstimatorConfig,
     pub(super) noise: ImuNoise,
     pub(super) gravity_in_world: Vector3<f64>,
-    pub(super) calibration: Calibration,
+    pub(super) calibration: Calibrations,
     pub(super) phase: Phase,
     pub(super) restarts: usize,
     /// Frames that wait for the initialization.
@@ -32,7 +33,8 @@ pub struct Estimator {
     pub(super) standstill: Option<StandstillEstimate>,
     /// Frames of the window, oldest first.
     pub(super) frames: Vec<Frame>,
-    pub(super) features: FeatureMap,
+    /// Features by camera: none is seen by two of them.
+    pub(super) features: Vec<FeatureMap>,
     pub(super) prior: Option<Prior>,
     pub(super) start: Option<StartPrior>,
     /// Posterior standard deviations of the calibration after the last solve.
@@ -55,14 +57,22 @@ impl Estimator {
             gyroscope_noise_density: config.imu_noise.gyroscope_noise_density * factor,
             gyroscope_random_walk: config.imu_noise.gyroscope_random_walk * factor,
         };
-        let (translation_m, rotation_rad) = config.chain_prior.unwrap_or(DEFAULT_CHAIN_PRIOR);
-        let calibration = Calibration::new(
+        let given = |camera: usize| {
+            let (translation_m, rotation_rad) = config.mount_sigmas(camera);
+            GivenSigmas { translation_m, rotation_rad }
+        };
+        let main = Calibration::new(
             &config.chain,
             config.parameterization,
-            GivenSigmas { translation_m, rotation_rad },
+            given(MAIN),
             config.calibrate,
             config.encoder_in_use().is_some(),
         );
+        let rigid = config.rigid_cameras.iter().enumerate().map(|(index, camera)| {
+            let mount = rigid_mount(&camera.imu_from_camera);
+            Calibration::new(&mount, Parameterization::Minimal, given(index + 1), config.calibrate, false)
+        });
+        let calibration = Calibrations::new(main, rigid);
         Self {
             noise,
             gravity_in_world: gravity_in_world(config.gravity_m_per_s2),
@@ -72,7 +82,7 @@ impl Estimator {
             waiting: VecDeque::new(),
             standstill: None,
             frames: Vec::new(),
-            features: FeatureMap::new(),
+            features: vec![FeatureMap::new(); config.rigid_cameras.len() + 1],
             prior: None,
             start: None,
             calibration_sigmas: Vec::new(),
@@ -95,7 +105,7 @@ impl Estimator {
 
     /// The chain as it is estimated now, in the classical form.
     pub fn classical_chain(&self) -> ClassicalChain {
-        self.calibration.chain().to_classical()
+        self.calibration.of(MAIN).chain().to_classical()
     }
 
     /// Takes in one image's tracks with the inertial samples before it, and tells everything about what came of it.
@@ -186,7 +196,8 @@ impl Estimator {
         let slot = self.frames.len() - 1;
         let seen = self
             .features
-            .values()
+            .iter()
+            .flat_map(FeatureMap::values)
             .filter(|feature| feature.landmark.is_some() && feature.observation(slot).is_some())
             .count();
         // A vehicle at rest needs no landmarks to know where it is.
@@ -245,8 +256,9 @@ impl Estimator {
         if !self.config.auto_chart || self.calibration.dof() == 0 {
             return;
         }
-        let Some(better) = self.calibration.chain().should_switch() else { return };
-        let margin = self.calibration.chain().margins().iter().map(|(_, margin)| *margin).fold(1.0, f64::min);
+        let chain = self.calibration.of(MAIN).chain();
+        let Some(better) = chain.should_switch() else { return };
+        let margin = chain.margins().iter().map(|(_, margin)| *margin).fold(1.0, f64::min);
         self.switch_chart(better);
         events.push(Event {
             kind: EventKind::ChartSwitched,

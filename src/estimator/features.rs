@@ -5,11 +5,11 @@ use nalgebra::{Matrix3, Vector3};
 use super::options::EstimatorOptions;
 use super::reprojection::{CameraPose, Landmark};
 use super::window::{Feature, FeatureMap, Observation};
-use crate::frontend::TrackedFrame;
+use crate::frontend::TrackedFeature;
 
-/// Takes in what the newest frame saw.
-pub(super) fn observe(features: &mut FeatureMap, slot: usize, tracks: &TrackedFrame) {
-    for tracked in &tracks.features {
+/// Takes in what a camera saw at a frame.
+pub(super) fn observe(features: &mut FeatureMap, slot: usize, seen: &[TrackedFeature]) {
+    for tracked in seen {
         let finite = tracked.bearing.iter().chain(tracked.uv_px.iter()).all(|x| x.is_finite());
         if !finite {
             continue;

@@ -94,4 +94,6 @@ fn of_calibration(calibration: &CalibrationEstimate) -> usize {
         + of_vec(&calibration.classical.links)
         + of_vec(&calibration.margins)
         + calibration.margins.iter().map(|(name, _)| of_text(name)).sum::<usize>()
+        + of_vec(&calibration.rigid_cameras)
+        + calibration.rigid_cameras.iter().map(|(key, _)| of_text(key)).sum::<usize>()
 }

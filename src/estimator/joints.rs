@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::StepInput;
+use super::calibrations::MAIN;
 use super::camera_pose::{self, CameraMaps};
 use super::estimator::Estimator;
 use super::reprojection::{self, CameraPose, RelativePose};
@@ -22,7 +23,7 @@ impl Estimator {
     pub(super) fn encoder_reading(&self, input: &StepInput<'_>) -> Option<JointAngles> {
         self.config.encoder_in_use()?;
         let angles = input.joint_angles?;
-        let count = self.calibration.joint_count();
+        let count = self.calibration.of(MAIN).joint_count();
         let usable = angles.angles_rad.len() == count
             && angles.sigmas_rad.len() == count
             && angles.lasting_sigmas_rad.len() == count
@@ -34,12 +35,12 @@ impl Estimator {
     /// Turns the newest frame's joints so that the known landmarks meet their measurements, pose held: an encoder may be
     /// off by many degrees, and without one there is nothing else to start from.
     pub(super) fn align_newest_joints(&mut self) {
-        let joints = self.calibration.joint_count();
+        let joints = self.calibration.of(MAIN).joint_count();
         if joints == 0 {
             return;
         }
         let slot = self.frames.len() - 1;
-        let cameras = self.camera_poses();
+        let cameras = self.camera_poses(MAIN);
         let known = self.frames[slot].encoder.as_ref().map(|encoder| encoder.sigmas_rad.as_slice());
         let prior =
             DVector::from_fn(joints, |joint, _| known.map_or(UNKNOWN_TURN_RAD, |sigmas| sigmas[joint]).powi(-2));
@@ -76,13 +77,14 @@ impl Estimator {
         let sigma = self.config.options.pixel_sigma_px;
         let mut state = self.frames[slot].state.clone();
         state.joints_rad = angles_rad.to_vec();
-        let camera = camera_pose::at(&state, &self.calibration);
-        let own = CameraMaps::new(std::slice::from_ref(&state), &self.calibration).own.remove(0);
+        let calibration = self.calibration.of(MAIN);
+        let camera = camera_pose::at(&state, calibration);
+        let own = CameraMaps::new(std::slice::from_ref(&state), calibration).own.remove(0);
         let by_joints = own.columns(6, joints).into_owned();
         let mut hessian = DMatrix::zeros(joints, joints);
         let mut gradient = DVector::zeros(joints);
         let mut count = 0;
-        for feature in self.features.values() {
+        for feature in self.features[MAIN].values() {
             let (Some(anchor), Some(landmark), Some(seen)) =
                 (feature.anchor(), feature.landmark.as_ref(), feature.observation(slot))
             else {
@@ -119,7 +121,7 @@ impl Estimator {
     /// Only the independent part of their errors is averaged; what the picture may have got wrong is added.
     pub(super) fn carry_encoder(&mut self, from: usize, to: usize) {
         let (Some(leaving), Some(own)) = (&self.frames[from].encoder, &self.frames[to].encoder) else { return };
-        let cameras = self.camera_poses();
+        let cameras = self.camera_poses(MAIN);
         let (Some(variance_from), Some(variance_to)) =
             (self.visual_variances(from, &cameras), self.visual_variances(to, &cameras))
         else {

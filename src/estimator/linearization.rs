@@ -1,5 +1,7 @@
 //! The linearization of a solved window, for the analysis of its observability and for looking at.
 
+use nalgebra::DVector;
+
 use super::camera_pose::{self, CameraMaps};
 use super::estimator::Estimator;
 use super::layout::Layout;
@@ -10,28 +12,32 @@ use super::{ColumnBlock, ColumnGroup, Linearization};
 impl Estimator {
     /// The linearization at the final estimate: the measurements' rows, and those of the priors.
     pub(super) fn linearization(&self, solved: &SolvedWindow) -> Linearization {
-        let problem = self.problem(&solved.tracks);
+        let problem = self.problem(&solved.cameras);
         let estimate = &solved.solution.estimate;
         let layout = problem.layout;
         let frames = problem.linearization_frames(estimate);
         let calibration = problem.linearization_calibration(&estimate.calibration);
-        let maps = CameraMaps::new(&frames, &calibration);
-        let cameras = camera_pose::by_slot(&frames, &calibration);
-        let projected = problem.projected_rows(estimate, &cameras, &solved.tracks, &estimate.landmarks);
-
-        let mut measured = vec![problem.carried_rows(&projected, &maps)];
+        let mut measured = Vec::new();
+        let mut norms = Vec::new();
+        for camera in 0..problem.cameras.len() {
+            let maps = CameraMaps::new(&frames, calibration.of(camera));
+            let poses = camera_pose::by_slot(&frames, calibration.of(camera));
+            let projected = problem.projected_rows(camera, estimate, &poses);
+            measured.push(problem.carried_rows(camera, &projected, &maps));
+            let squared = projected.squared_column_norms(&maps.calibration);
+            norms.extend(squared.iter().map(|squared| squared.max(0.0).sqrt()));
+        }
         measured.extend((1..layout.frames).map(|slot| problem.inertial_rows_at(slot, estimate, &frames)));
         measured.extend((0..layout.frames).map(|slot| problem.encoder_rows(slot, estimate)));
         let rest: Vec<_> = problem.rest_terms(&estimate.frames).collect();
         measured.push(problem.rest_rows(&rest));
         let priors = [problem.calibration_prior_rows(estimate), problem.prior_rows(estimate)];
         let order = column_order(&layout);
-        let norms = projected.squared_column_norms(&maps.calibration).map(|squared| squared.max(0.0).sqrt());
         Linearization {
             columns: self.column_blocks(&layout),
             jacobian: stack_columns(&measured, order.iter().copied()),
             prior_jacobian: stack_columns(&priors, order.iter().copied()),
-            calibration_column_norms: norms,
+            calibration_column_norms: DVector::from_vec(norms),
         }
     }
 
@@ -45,7 +51,7 @@ impl Estimator {
             }
         };
         if layout.calibration > 0 {
-            for name in self.calibration.chain().parameter_names() {
+            for name in self.calibration_names() {
                 push(ColumnGroup::Calibration, name, 1);
             }
         }

@@ -4,32 +4,23 @@ use nalgebra::DMatrix;
 
 use super::prior::Prior;
 use super::problem::{Estimate, Problem};
-use super::reprojection::Landmark;
 use super::rows::stack;
 use super::standstill;
-use super::visual::Track;
 use super::window::Frame;
 
-/// The prior that is left when the oldest frame goes, together with the features of `tracks` (all that it saw and that
-/// leave with it).
+/// The prior that is left when the oldest frame goes, together with the features of the problem's tracks (all that it saw
+/// and that leave with it).
 ///
 /// Its residuals refer to the first estimates: of frames that the old prior held those stay, all others take the present
 /// estimate as theirs.
-pub(super) fn oldest(
-    problem: &Problem<'_>,
-    estimate: &Estimate,
-    tracks: &[Track],
-    landmarks: &[Landmark],
-) -> Option<Prior> {
+pub(super) fn oldest(problem: &Problem<'_>, estimate: &Estimate) -> Option<Prior> {
     let mut parts = vec![problem.prior_rows(estimate), problem.encoder_rows(0, estimate)];
     parts.push(problem.rest_rows(&standstill::speed_terms(problem.layout, &problem.frames[0], 0, &estimate.frames[0])));
     if problem.frames.len() > 1 {
         parts.push(problem.inertial_rows(1, estimate));
         parts.push(problem.rest_rows(&standstill::place_terms(problem.layout, problem.frames, 1, &estimate.frames)));
     }
-    if !tracks.is_empty() {
-        parts.push(problem.visual_rows(estimate, tracks, landmarks));
-    }
+    parts.push(problem.visual_rows(estimate));
     eliminated(problem, estimate, &parts, 0)
 }
 

@@ -3,6 +3,7 @@
 //! It takes a [`StepInput`] per image and leaves a [`StepReport`] behind; nobody reaches in between.
 
 mod calibration;
+mod calibrations;
 mod camera_pose;
 mod config;
 mod dense;
@@ -36,7 +37,7 @@ mod tracking;
 mod visual;
 mod window;
 
-pub use config::{DEFAULT_CHAIN_PRIOR, EstimatorConfig};
+pub use config::{DEFAULT_CHAIN_PRIOR, EstimatorConfig, RigidCamera, rigid_columns};
 pub use estimator::Estimator;
 pub use footprint::{ReportBytes, allocated_bytes};
 pub use observations::Observations;
@@ -52,7 +53,7 @@ pub use report::{
 use nalgebra::Vector3;
 
 use crate::flight_log::{ImuSample, JointAngles};
-use crate::frontend::TrackedFrame;
+use crate::frontend::{TrackedFeature, TrackedFrame};
 
 /// What one image brings to the estimator.
 #[derive(Clone, Debug)]
@@ -65,8 +66,20 @@ pub struct StepInput<'a> {
     pub imu: &'a [ImuSample],
     /// Encoder angles at the stamp with their standard deviations, `None` without encoders.
     pub joint_angles: Option<&'a JointAngles>,
-    /// The tracked features.
+    /// The tracked features; none where the main camera has no image at this instant.
     pub tracks: &'a TrackedFrame,
+    /// Those of [`EstimatorConfig::rigid_cameras`] at the same instant, in their order; none where an image is missing.
+    pub rigid_tracks: &'a [&'a TrackedFrame],
+}
+
+impl StepInput<'_> {
+    /// What a camera has seen, the main one being the first.
+    pub(super) fn features(&self, camera: usize) -> &[TrackedFeature] {
+        match camera.checked_sub(1) {
+            None => &self.tracks.features,
+            Some(rigid) => self.rigid_tracks.get(rigid).map_or(&[], |tracks| &tracks.features),
+        }
+    }
 }
 
 /// Gravity in the world frame, whose z axis points up: `(0, 0, −g)` in m/s².

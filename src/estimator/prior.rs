@@ -1,5 +1,7 @@
 //! The marginalization prior, in square-root form around fixed linearization points.
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::dense;
@@ -100,9 +102,10 @@ impl Prior {
         self.columns.iter().any(|column| matches!(column, PriorColumn::Frame { slot: held, .. } if *held == slot))
     }
 
-    /// Whether it holds calibration parameters.
-    pub(super) fn holds_calibration(&self) -> bool {
-        self.columns.iter().any(|column| matches!(column, PriorColumn::Calibration(_)))
+    /// Whether it holds some of these calibration parameters.
+    pub(super) fn holds_calibration(&self, parameters: &Range<usize>) -> bool {
+        let held = |column: &PriorColumn| matches!(column, PriorColumn::Calibration(held) if parameters.contains(held));
+        self.columns.iter().any(held)
     }
 
     /// Number of scalar residuals.

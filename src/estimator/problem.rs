@@ -1,8 +1,10 @@
 //! The least-squares problem of one window: cost, normal equations, whitened rows.
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, Vector3, Vector6};
 
-use super::calibration::Calibration;
+use super::calibrations::Calibrations;
 use super::camera_pose::{self, CameraMaps};
 use super::imu_factor;
 use super::layout::{Layout, POSE, SPEED_BIAS};
@@ -20,19 +22,28 @@ pub(super) struct Estimate {
     /// By slot.
     pub(super) frames: Vec<FrameState>,
     /// The static calibration.
-    pub(super) calibration: Calibration,
-    /// In the order of the tracks.
-    pub(super) landmarks: Vec<Landmark>,
+    pub(super) calibration: Calibrations,
+    /// By camera, in the order of its tracks.
+    pub(super) landmarks: Vec<Vec<Landmark>>,
+}
+
+/// What one camera has seen.
+#[derive(Clone, Debug)]
+pub(super) struct CameraFactors<'a> {
+    pub(super) visual: VisualModel<'a>,
+    pub(super) tracks: &'a [Track],
+    /// Columns of its calibration.
+    pub(super) columns: Range<usize>,
 }
 
 /// Everything that the unknowns are held against.
 #[derive(Clone, Debug)]
 pub(super) struct Problem<'a> {
     pub(super) layout: Layout,
-    pub(super) visual: VisualModel<'a>,
+    /// No feature is seen by two cameras, so that each has a visual system of its own.
+    pub(super) cameras: Vec<CameraFactors<'a>>,
     pub(super) gravity_in_world: Vector3<f64>,
     pub(super) frames: &'a [Frame],
-    pub(super) tracks: &'a [Track],
     pub(super) prior: Option<&'a Prior>,
     pub(super) start: Option<&'a StartPrior>,
     pub(super) first_estimates: bool,
@@ -57,11 +68,18 @@ impl Costs {
     }
 }
 
+/// One camera's reprojection factors.
+#[derive(Clone, Debug)]
+struct CameraEquations {
+    visual: VisualSystem,
+    maps: CameraMaps,
+    columns: Range<usize>,
+}
+
 /// The problem linearized at an estimate.
 #[derive(Clone, Debug)]
 pub(super) struct NormalEquations {
-    pub(super) visual: VisualSystem,
-    pub(super) maps: CameraMaps,
+    cameras: Vec<CameraEquations>,
     /// All other factors; the lower triangle counts.
     hessian: DMatrix<f64>,
     gradient: DVector<f64>,
@@ -79,11 +97,11 @@ impl Problem<'_> {
 
     /// The cost by kind of factor.
     pub(super) fn costs(&self, estimate: &Estimate) -> Costs {
-        let cameras = camera_pose::by_slot(&estimate.frames, &estimate.calibration);
-        let mut costs = Costs {
-            visual: 2.0 * visual::cost(&self.visual, &cameras, self.tracks, &estimate.landmarks),
-            ..Costs::default()
-        };
+        let mut costs = Costs::default();
+        for (camera, (factors, landmarks)) in self.cameras.iter().zip(&estimate.landmarks).enumerate() {
+            let poses = camera_pose::by_slot(&estimate.frames, estimate.calibration.of(camera));
+            costs.visual += 2.0 * visual::cost(&factors.visual, &poses, factors.tracks, landmarks);
+        }
         for slot in 1..self.frames.len() {
             if let Some(residual) = self.imu_residual(slot, &estimate.frames) {
                 costs.imu += residual.norm_squared();
@@ -158,7 +176,7 @@ impl Problem<'_> {
     }
 
     /// Calibration at which derivatives are taken.
-    pub(super) fn linearization_calibration(&self, current: &Calibration) -> Calibration {
+    pub(super) fn linearization_calibration(&self, current: &Calibrations) -> Calibrations {
         if self.calibration_first_estimates { current.at_first_estimate() } else { current.clone() }
     }
 
@@ -166,10 +184,21 @@ impl Problem<'_> {
     pub(super) fn linearize(&self, estimate: &Estimate) -> NormalEquations {
         let frames = self.linearization_frames(estimate);
         let calibration = self.linearization_calibration(&estimate.calibration);
-        let current = camera_pose::by_slot(&estimate.frames, &estimate.calibration);
-        let linearized = camera_pose::by_slot(&frames, &calibration);
-        let visual = VisualSystem::new(&self.visual, &current, &linearized, self.tracks, &estimate.landmarks);
-        let maps = CameraMaps::new(&frames, &calibration);
+        let cameras = self
+            .cameras
+            .iter()
+            .zip(&estimate.landmarks)
+            .enumerate()
+            .map(|(camera, (factors, landmarks))| {
+                let current = camera_pose::by_slot(&estimate.frames, estimate.calibration.of(camera));
+                let linearized = camera_pose::by_slot(&frames, calibration.of(camera));
+                CameraEquations {
+                    visual: VisualSystem::new(&factors.visual, &current, &linearized, factors.tracks, landmarks),
+                    maps: CameraMaps::new(&frames, calibration.of(camera)),
+                    columns: factors.columns.clone(),
+                }
+            })
+            .collect();
 
         let total = self.layout.total();
         let mut hessian = DMatrix::zeros(total, total);
@@ -217,7 +246,7 @@ impl Problem<'_> {
             let mut part = gradient.rows_range_mut(place);
             part += rows.tr_mul(&residual);
         }
-        NormalEquations { visual, maps, hessian, gradient }
+        NormalEquations { cameras, hessian, gradient }
     }
 
     /// Whitened Jacobians and residual of the inertial factor that ends at `slot`.
@@ -275,7 +304,15 @@ impl Problem<'_> {
     }
 
     /// The estimate after a step.
-    pub(super) fn stepped(&self, estimate: &Estimate, step: &DVector<f64>, landmarks: &[Vector3<f64>]) -> Estimate {
+    pub(super) fn stepped(
+        &self,
+        estimate: &Estimate,
+        step: &DVector<f64>,
+        landmarks: &[Vec<Vector3<f64>>],
+    ) -> Estimate {
+        let moved = |(of_camera, deltas): (&Vec<Landmark>, &Vec<Vector3<f64>>)| {
+            of_camera.iter().zip(deltas).map(|(landmark, delta)| landmark.plus(delta)).collect()
+        };
         Estimate {
             frames: self
                 .frames
@@ -287,19 +324,54 @@ impl Problem<'_> {
                 })
                 .collect(),
             calibration: estimate.calibration.stepped(&step.as_slice()[self.layout.calibration()]),
-            landmarks: estimate.landmarks.iter().zip(landmarks).map(|(landmark, delta)| landmark.plus(delta)).collect(),
+            landmarks: estimate.landmarks.iter().zip(landmarks).map(moved).collect(),
         }
     }
 }
 
 impl NormalEquations {
+    /// Eliminates the landmarks of every camera.
+    pub(super) fn eliminate(&self, damping: f64) -> Vec<ReducedVisualSystem> {
+        self.cameras.iter().map(|camera| camera.visual.eliminate(damping)).collect()
+    }
+
     /// The reduced normal equations over poses, joints, speeds, biases and calibration; the lower triangle counts.
-    pub(super) fn reduced(&self, layout: &Layout, visual: &ReducedVisualSystem) -> (DMatrix<f64>, DVector<f64>) {
+    pub(super) fn reduced(&self, layout: &Layout, visual: &[ReducedVisualSystem]) -> (DMatrix<f64>, DVector<f64>) {
         let mut hessian = self.hessian.clone();
         let mut gradient = self.gradient.clone();
-        let calibration = layout.calibration();
+        for (camera, visual) in self.cameras.iter().zip(visual) {
+            camera.add_to(layout, visual, &mut hessian, &mut gradient);
+        }
+        (hessian, gradient)
+    }
+
+    /// Steps of the landmarks, by camera, that belong to a step of the unknowns.
+    pub(super) fn landmark_steps(
+        &self,
+        layout: &Layout,
+        reduced: &[ReducedVisualSystem],
+        step: &DVector<f64>,
+    ) -> Vec<Vec<Vector3<f64>>> {
+        self.cameras
+            .iter()
+            .zip(reduced)
+            .map(|(camera, reduced)| camera.visual.substitute(reduced, &camera.pose_steps(layout, step)))
+            .collect()
+    }
+}
+
+impl CameraEquations {
+    /// Carries what is known about the camera's poses on to the unknowns.
+    fn add_to(
+        &self,
+        layout: &Layout,
+        visual: &ReducedVisualSystem,
+        hessian: &mut DMatrix<f64>,
+        gradient: &mut DVector<f64>,
+    ) {
+        let calibration = self.columns.clone();
         for row in 0..layout.frames {
-            let mut by_cameras: DMatrix<f64> = DMatrix::zeros(6, layout.calibration);
+            let mut by_cameras: DMatrix<f64> = DMatrix::zeros(6, calibration.len());
             for column in 0..layout.frames {
                 let block: Matrix6<f64> =
                     if row <= column { *visual.block(row, column) } else { visual.block(column, row).transpose() };
@@ -321,15 +393,14 @@ impl NormalEquations {
             let mut part = gradient.rows_range_mut(calibration.clone());
             part += self.maps.calibration[row].tr_mul(camera_gradient);
         }
-        (hessian, gradient)
     }
 
-    /// Steps of the camera poses that belong to a step of the unknowns.
-    pub(super) fn camera_steps(&self, layout: &Layout, step: &DVector<f64>) -> Vec<Vector6<f64>> {
+    /// Steps of the camera's poses that belong to a step of the unknowns.
+    fn pose_steps(&self, layout: &Layout, step: &DVector<f64>) -> Vec<Vector6<f64>> {
         (0..layout.frames)
             .map(|slot| {
                 let moved = &self.maps.own[slot] * step.rows_range(layout.camera(slot))
-                    + &self.maps.calibration[slot] * step.rows_range(layout.calibration());
+                    + &self.maps.calibration[slot] * step.rows_range(self.columns.clone());
                 Vector6::from_column_slice(moved.as_slice())
             })
             .collect()

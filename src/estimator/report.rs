@@ -108,7 +108,8 @@ pub struct FrameStateReport {
 pub struct CalibrationEstimate {
     /// Name of the parameterization in use, as on the command line.
     pub parameterization: String,
-    /// Parameter names in column order, as in the golden files (`IB.rx`, `L1.theta`, …).
+    /// Parameter names in column order, as in the golden files (`IB.rx`, `L1.theta`, …); those of a rigid camera beside
+    /// the main one begin with its key (`cam1.rx`).
     pub names: Vec<String>,
     /// Unit of each: `rad` or `m`.
     pub units: Vec<&'static str>,
@@ -122,6 +123,9 @@ pub struct CalibrationEstimate {
     pub classical: ClassicalChain,
     /// Margins to the chart's locks: base, end, then |sin alpha| of each middle link.
     pub margins: Vec<(String, f64)>,
+    /// The rigid cameras that are watched beside the main one, with their poses on the IMU; their columns follow the
+    /// chain's.
+    pub rigid_cameras: Vec<(String, RigidTransform)>,
 }
 
 /// One measurement of a feature by a frame of the window.
@@ -144,7 +148,7 @@ pub struct ObservationReport {
 /// One feature that took part in the solve.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FeatureReport {
-    /// Who it is.
+    /// Who it is; [`FeatureId::camera`] tells which camera sees it.
     pub id: FeatureId,
     /// The frame it is anchored in.
     pub anchor_frame_index: usize,

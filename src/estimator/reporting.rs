@@ -2,6 +2,8 @@
 
 use nalgebra::Vector2;
 
+use super::calibrations::MAIN;
+use super::config::rigid_columns;
 use super::estimator::Estimator;
 use super::problem::Costs;
 use super::solver;
@@ -45,8 +47,9 @@ impl Estimator {
         report.features = self.feature_reports(solved);
         report.landmarks = self.landmark_reports(solved);
         report.residuals = self.residual_summaries(solved);
-        report.reprojection_rms_before_px = root_mean_square(&solved.residuals_before);
-        report.reprojection_rms_after_px = root_mean_square(&solved.residuals_after);
+        report.reprojection_rms_before_px =
+            root_mean_square(solved.checks.iter().map(|checks| &checks.residuals_before));
+        report.reprojection_rms_after_px = root_mean_square(solved.checks.iter().map(|checks| &checks.residuals_after));
         report.iterations = std::mem::take(&mut solved.solution.iterations);
         let reported_ms = (self.config.clock_ms)();
         if self.config.options.keep_linearization {
@@ -73,7 +76,7 @@ impl Estimator {
                     joint_angles_rad: frame.state.joints_rad.clone(),
                     encoder_angles_rad: frame.encoder.as_ref().map(|encoder| encoder.angles_rad.clone()),
                     encoder_sigmas_rad: frame.encoder.as_ref().map(|encoder| encoder.sigmas_rad.clone()),
-                    imu_from_camera: self.calibration.imu_from_camera(&frame.state.joints_rad),
+                    imu_from_camera: self.calibration.of(MAIN).imu_from_camera(&frame.state.joints_rad),
                     keyframe: frame.keyframe,
                 }
             })
@@ -81,8 +84,9 @@ impl Estimator {
     }
 
     fn calibration_report(&self) -> CalibrationEstimate {
-        let chain = self.calibration.chain();
-        let count = chain.dof();
+        let cameras = || (0..self.calibration.cameras()).map(|camera| self.calibration.of(camera));
+        let count = cameras().map(|calibration| calibration.chain().dof()).sum();
+        let chain = self.calibration.of(MAIN).chain();
         let sigmas = if self.calibration.dof() == 0 {
             vec![0.0; count]
         } else if self.calibration_sigmas.len() == count {
@@ -92,14 +96,30 @@ impl Estimator {
         };
         CalibrationEstimate {
             parameterization: chain.parameterization().name().to_owned(),
-            names: chain.parameter_names(),
-            units: chain.parameter_units(),
-            values: chain.values().iter().copied().collect(),
+            names: self.calibration_names(),
+            units: cameras().flat_map(|calibration| calibration.chain().parameter_units()).collect(),
+            values: cameras().flat_map(|calibration| calibration.chain().values().data.as_vec().clone()).collect(),
             sigmas,
-            prior_sigmas: self.calibration.prior_sigmas().iter().copied().collect(),
+            prior_sigmas: cameras().flat_map(|calibration| calibration.prior_sigmas().iter().copied()).collect(),
             classical: chain.to_classical(),
             margins: chain.margins(),
+            rigid_cameras: self
+                .config
+                .rigid_cameras
+                .iter()
+                .zip(cameras().skip(1))
+                .map(|(camera, calibration)| (camera.key.clone(), calibration.imu_from_camera(&[])))
+                .collect(),
         }
+    }
+
+    /// Names of the calibration's columns, free or not: the chain's, then those of the rigid cameras behind their keys.
+    pub(super) fn calibration_names(&self) -> Vec<String> {
+        let mut names = self.calibration.of(MAIN).chain().parameter_names();
+        let rigid = self.config.rigid_cameras.iter();
+        names
+            .extend(rigid.flat_map(|camera| rigid_columns(&camera.key, &camera.imu_from_camera)).map(|(name, _)| name));
+        names
     }
 
     fn feature_reports(&self, solved: &SolvedWindow) -> Vec<FeatureReport> {
@@ -117,13 +137,15 @@ impl Estimator {
                     robust_weight: after.map_or(0.0, |_| loss.cost_and_weight(chi2).1),
                 }
             };
-        (0..solved.ids.len())
-            .map(|index| {
-                let sightings = &solved.tracks[index].sightings;
-                let landmark = &solved.solution.estimate.landmarks[index];
-                let (before, after) = (&solved.residuals_before[index], &solved.residuals_after[index]);
+        let mut reports = Vec::new();
+        for (camera, of_camera) in solved.cameras.iter().enumerate() {
+            let checks = &solved.checks[camera];
+            reports.extend((0..of_camera.ids.len()).map(|index| {
+                let sightings = &of_camera.tracks[index].sightings;
+                let landmark = &solved.solution.estimate.landmarks[camera][index];
+                let (before, after) = (&checks.residuals_before[index], &checks.residuals_after[index]);
                 FeatureReport {
-                    id: solved.ids[index],
+                    id: of_camera.ids[index].of_camera(camera),
                     anchor_frame_index: self.frames[sightings[0].slot].index,
                     inverse_depth_per_m: landmark.inverse_distance / landmark.bearing.z,
                     observations: sightings
@@ -131,31 +153,39 @@ impl Estimator {
                         .zip(before.iter().zip(after))
                         .map(|(sighting, (before, after))| observation(sighting.slot, sighting.uv_px, *before, *after))
                         .collect(),
-                    rejected: solved.rejected[index],
+                    rejected: checks.rejected[index],
                 }
-            })
-            .collect()
+            }));
+        }
+        // Reports are kept: what growing left over is given back.
+        reports.shrink_to_fit();
+        reports
     }
 
     fn landmark_reports(&self, solved: &SolvedWindow) -> Vec<LandmarkReport> {
-        let cameras = self.camera_poses();
-        let mut landmarks: Vec<LandmarkReport> = (0..solved.ids.len())
-            .filter(|index| !solved.rejected[*index])
-            .map(|index| {
-                let camera = &cameras[solved.tracks[index].sightings[0].slot];
-                let point = solved.solution.estimate.landmarks[index].point_in_anchor();
-                LandmarkReport { id: solved.ids[index], position_m: camera.rotation * point + camera.position_m }
-            })
-            .collect();
+        let mut landmarks = Vec::new();
+        for (camera, of_camera) in solved.cameras.iter().enumerate() {
+            let poses = self.camera_poses(camera);
+            let kept = (0..of_camera.ids.len()).filter(|index| !solved.checks[camera].rejected[*index]);
+            landmarks.extend(kept.map(|index| {
+                let pose = &poses[of_camera.tracks[index].sightings[0].slot];
+                let point = solved.solution.estimate.landmarks[camera][index].point_in_anchor();
+                LandmarkReport {
+                    id: of_camera.ids[index].of_camera(camera),
+                    position_m: pose.rotation * point + pose.position_m,
+                }
+            }));
+        }
         // Reports are kept: what growing left over is given back.
         landmarks.shrink_to_fit();
         landmarks
     }
 
     fn residual_summaries(&self, solved: &SolvedWindow) -> Vec<ResidualSummary> {
-        let problem = self.problem(&solved.tracks);
+        let problem = self.problem(&solved.cameras);
         let joints = problem.layout.joints;
-        let sightings: usize = solved.tracks.iter().map(|track| track.sightings.len()).sum();
+        let tracks = solved.cameras.iter().flat_map(|of_camera| &of_camera.tracks);
+        let sightings: usize = tracks.map(|track| track.sightings.len()).sum();
         let read = self.frames.iter().filter(|frame| frame.encoder.is_some()).count();
         let resting = problem.rest_terms(&solved.solution.estimate.frames).count();
         let intervals = self.frames.iter().skip(1).filter(|frame| frame.motion_information.is_some()).count();
@@ -182,9 +212,9 @@ impl Estimator {
     }
 }
 
-fn root_mean_square(residuals: &TrackResiduals) -> f64 {
+fn root_mean_square<'a>(residuals: impl Iterator<Item = &'a TrackResiduals>) -> f64 {
     let (sum, count) = residuals
-        .iter()
+        .flatten()
         .flatten()
         .flatten()
         .fold((0.0, 0_usize), |(sum, count), residual| (sum + residual.norm_squared(), count + 1));

@@ -6,44 +6,49 @@ use super::camera_pose::{self, CameraMaps};
 use super::layout::{POSE, SPEED_BIAS};
 use super::problem::{Estimate, Problem};
 use super::projection::ProjectedRows;
-use super::reprojection::{CameraPose, Landmark};
+use super::reprojection::CameraPose;
 use super::standstill::RestTerm;
-use super::visual::Track;
 use super::window::FrameState;
 
 impl Problem<'_> {
-    /// The reprojection factors of `tracks`, landmarks projected out; at most `6·frames` rows.
-    pub(super) fn visual_rows(&self, estimate: &Estimate, tracks: &[Track], landmarks: &[Landmark]) -> DMatrix<f64> {
+    /// The reprojection factors, landmarks projected out; at most `6·frames` rows a camera.
+    pub(super) fn visual_rows(&self, estimate: &Estimate) -> DMatrix<f64> {
         let frames = self.linearization_frames(estimate);
         let calibration = self.linearization_calibration(&estimate.calibration);
-        let maps = CameraMaps::new(&frames, &calibration);
-        let cameras = camera_pose::by_slot(&frames, &calibration);
-        let projected = self.projected_rows(estimate, &cameras, tracks, landmarks);
-        self.carried_rows(&projected, &maps)
+        let seeing = (0..self.cameras.len()).filter(|camera| !self.cameras[*camera].tracks.is_empty());
+        let rows: Vec<DMatrix<f64>> = seeing
+            .map(|camera| {
+                let maps = CameraMaps::new(&frames, calibration.of(camera));
+                let poses = camera_pose::by_slot(&frames, calibration.of(camera));
+                self.carried_rows(camera, &self.projected_rows(camera, estimate, &poses), &maps)
+            })
+            .collect();
+        stack(&rows, self.layout.total() + 1)
     }
 
-    /// The reprojection factors of `tracks` by camera poses; derivatives at `linearized`.
+    /// The reprojection factors of one camera by its poses; derivatives at `linearized`.
     pub(super) fn projected_rows(
         &self,
+        camera: usize,
         estimate: &Estimate,
         linearized: &[CameraPose],
-        tracks: &[Track],
-        landmarks: &[Landmark],
     ) -> ProjectedRows {
-        let current = camera_pose::by_slot(&estimate.frames, &estimate.calibration);
-        ProjectedRows::new(&self.visual, &current, linearized, tracks, landmarks)
+        let factors = &self.cameras[camera];
+        let current = camera_pose::by_slot(&estimate.frames, estimate.calibration.of(camera));
+        ProjectedRows::new(&factors.visual, &current, linearized, factors.tracks, &estimate.landmarks[camera])
     }
 
-    /// Rows by camera poses carried on to the unknowns.
-    pub(super) fn carried_rows(&self, projected: &ProjectedRows, maps: &CameraMaps) -> DMatrix<f64> {
+    /// Rows by the poses of a camera carried on to the unknowns.
+    pub(super) fn carried_rows(&self, camera: usize, projected: &ProjectedRows, maps: &CameraMaps) -> DMatrix<f64> {
         let by_camera = &projected.rows;
         let total = self.layout.total();
         let height = by_camera.nrows();
+        let calibration = &self.cameras[camera].columns;
         let mut rows = DMatrix::zeros(height, total + 1);
         for slot in 0..self.layout.frames {
             let columns = by_camera.view((0, 6 * slot), (height, 6));
             rows.columns_range_mut(self.layout.camera(slot)).gemm(1.0, &columns, &maps.own[slot], 0.0);
-            rows.columns_range_mut(self.layout.calibration()).gemm(1.0, &columns, &maps.calibration[slot], 1.0);
+            rows.columns_range_mut(calibration.clone()).gemm(1.0, &columns, &maps.calibration[slot], 1.0);
         }
         rows.set_column(total, &by_camera.view((0, 6 * self.layout.frames), (height, 1)).column(0));
         rows

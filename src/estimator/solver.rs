@@ -49,15 +49,14 @@ pub(super) fn solve(problem: &Problem<'_>, start: Estimate, limits: SolverLimits
         let mut done = true;
         while tries < limits.iterations {
             tries += 1;
-            let reduced = equations.visual.eliminate(damping);
+            let reduced = equations.eliminate(damping);
             let (hessian, gradient) = equations.reduced(&problem.layout, &reduced);
             let Some(factor) = Cholesky::new(&damped(&hessian, damping)) else {
                 damping = (damping * 100.0).min(MOST_DAMPING);
                 continue;
             };
             let step = -factor.solve(&gradient);
-            let camera_steps = equations.camera_steps(&problem.layout, &step);
-            let landmarks = equations.visual.substitute(&reduced, &camera_steps);
+            let landmarks = equations.landmark_steps(&problem.layout, &reduced, &step);
             let candidate = problem.stepped(&solution.estimate, &step, &landmarks);
             let costs = problem.costs(&candidate);
             let before = solution.costs_after.total();

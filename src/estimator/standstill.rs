@@ -17,7 +17,7 @@ use super::preintegration::ImuBias;
 use super::window::{Frame, FrameState};
 use super::{Event, EventKind, StepInput};
 use crate::flight_log::rig::ImuNoise;
-use crate::frontend::FeatureId;
+use crate::frontend::{FeatureId, TrackedFeature};
 use crate::geometry::seconds_from_ns;
 
 /// Both witnesses must have been quiet for this long.
@@ -94,6 +94,8 @@ impl Default for RestWatch {
 /// What the window knows when a new image comes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Known<'a> {
+    /// What the camera that is asked has seen.
+    pub(super) features: &'a [TrackedFeature],
     pub(super) noise: &'a ImuNoise,
     pub(super) bias: &'a ImuBias,
     pub(super) speed_m_per_s: f64,
@@ -107,7 +109,7 @@ impl RestWatch {
     pub(super) fn observe(&mut self, input: &StepInput<'_>, known: &Known<'_>) -> Option<(Rest, Event)> {
         self.take_interval(input);
         let before_ns = self.unmoved_since_ns;
-        let parallax_rad = self.compare_picture(input, known.imu_from_camera);
+        let parallax_rad = self.compare_picture(input.stamp_ns, known);
         let spread = self.spread(input.stamp_ns, known);
         let quiet = spread.as_ref().is_some_and(Spread::is_quiet) && known.speed_m_per_s <= MOST_SPEED_M_PER_S;
         let unmoved_ns = input.stamp_ns - self.unmoved_since_ns;
@@ -173,13 +175,13 @@ impl RestWatch {
     }
 
     /// How far the picture has moved since the vehicle may be standing; a picture that has moved too far begins anew.
-    fn compare_picture(&mut self, input: &StepInput<'_>, imu_from_camera: UnitQuaternion<f64>) -> Option<f64> {
+    fn compare_picture(&mut self, stamp_ns: i64, known: &Known<'_>) -> Option<f64> {
+        let (features, imu_from_camera) = (known.features, known.imu_from_camera);
         let parallax_rad = self.reference.as_ref().and_then(|reference| {
             let pairs: Vec<(Vector3<f64>, Vector3<f64>)> = reference
                 .bearings
                 .iter()
                 .filter_map(|(id, before)| {
-                    let features = &input.tracks.features;
                     let place = features.binary_search_by_key(id, |feature| feature.id).ok()?;
                     Some((*before, features[place].bearing)).filter(|(_, now)| now.iter().all(|x| x.is_finite()))
                 })
@@ -195,13 +197,13 @@ impl RestWatch {
         // Tracks end in a picture at rest, too: the rest goes on from the newest picture before too few are left.
         let fading = self.reference.is_some() && parallax_rad.is_none() && self.resting_since_ns.is_some();
         if moved {
-            let bearings = input.tracks.features.iter().map(|feature| (feature.id, feature.bearing)).collect();
+            let bearings = features.iter().map(|feature| (feature.id, feature.bearing)).collect();
             self.reference = Some(Reference { bearings, imu_from_camera });
             if !fading {
-                self.unmoved_since_ns = input.stamp_ns;
+                self.unmoved_since_ns = stamp_ns;
             }
         }
-        if fading && input.tracks.features.len() >= LEAST_COMMON { Some(MOST_PARALLAX_RAD) } else { parallax_rad }
+        if fading && features.len() >= LEAST_COMMON { Some(MOST_PARALLAX_RAD) } else { parallax_rad }
     }
 
     /// Spread of the last second's samples, `None` while that much is not there.

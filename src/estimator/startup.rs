@@ -1,9 +1,11 @@
 //! Before the window runs: frames are kept until the initialization has a solution, which then becomes the first window.
 
+use std::borrow::Cow;
+
 use nalgebra::{DMatrix, DVector, UnitQuaternion, Vector3};
 
 use super::calibration::Calibration;
-use super::config::DEFAULT_CHAIN_PRIOR;
+use super::calibrations::MAIN;
 use super::estimator::Estimator;
 use super::features;
 use super::initialization::{
@@ -16,7 +18,7 @@ use super::prior::StartPrior;
 use super::window::{Frame, FrameState};
 use super::{Event, EventKind, Phase, StepInput, StepReport};
 use crate::flight_log::{ImuSample, JointAngles};
-use crate::frontend::TrackedFrame;
+use crate::frontend::TrackedFeature;
 use crate::geometry::{RigidTransform, seconds_from_ns, so3};
 
 /// A frame kept until the initialization succeeds.
@@ -24,8 +26,10 @@ use crate::geometry::{RigidTransform, seconds_from_ns, so3};
 pub(super) struct WaitingFrame {
     index: usize,
     stamp_ns: i64,
-    tracks: TrackedFrame,
+    /// By camera.
+    features: Vec<Vec<TrackedFeature>>,
     encoder: Option<JointAngles>,
+    /// Of the leading camera.
     imu_from_camera: RigidTransform,
     imu: Vec<ImuSample>,
 }
@@ -89,8 +93,8 @@ impl Estimator {
         self.waiting.push_back(WaitingFrame {
             index: input.frame_index,
             stamp_ns: input.stamp_ns,
-            tracks: input.tracks.clone(),
-            imu_from_camera: self.calibration.imu_from_camera(&joints),
+            features: (0..self.calibration.cameras()).map(|camera| input.features(camera).to_vec()).collect(),
+            imu_from_camera: self.calibration.of(self.calibration.leading()).imu_from_camera(&joints),
             encoder,
             imu: input.imu.to_vec(),
         });
@@ -101,7 +105,7 @@ impl Estimator {
     }
 
     fn angles_to_start_from(&self, encoder: Option<&JointAngles>) -> Vec<f64> {
-        encoder.map_or_else(|| vec![0.0; self.calibration.joint_count()], |encoder| encoder.angles_rad.clone())
+        encoder.map_or_else(|| vec![0.0; self.calibration.of(MAIN).joint_count()], |encoder| encoder.angles_rad.clone())
     }
 
     /// The largest standard deviation of the angles that the waiting frames start from, `None` when one has none.
@@ -113,13 +117,14 @@ impl Estimator {
 
     fn initialization_options(&self) -> InitializationOptions {
         let options = &self.config.options;
-        let (translation_m, rotation_rad) = self.config.chain_prior.unwrap_or(DEFAULT_CHAIN_PRIOR);
+        let camera = self.calibration.leading();
+        let (translation_m, rotation_rad) = self.config.mount_sigmas(camera);
         let base = InitializationOptions {
             accelerometer_bias_sigma_m_per_s2: options.accelerometer_bias_sigma,
             ..InitializationOptions::default()
         }
-        .for_camera(self.config.camera.focal_length_px(), options.pixel_sigma_px);
-        let joints = self.calibration.joint_count();
+        .for_camera(self.config.model(camera).focal_length_px(), options.pixel_sigma_px);
+        let joints = self.calibration.of(camera).joint_count();
         if joints == 0 {
             return base.for_rigid_mount(rotation_rad, translation_m);
         }
@@ -132,15 +137,35 @@ impl Estimator {
     }
 
     fn attempt(&self) -> InitializationOutcome {
+        let leading = self.calibration.leading();
+        // Beside other cameras the leading one may lack an image; its motion goes to the next frame.
+        let looked = |frame: &WaitingFrame| frame.features.len() == 1 || !frame.features[leading].is_empty();
+        if !self.waiting.back().is_some_and(looked) {
+            return InitializationOutcome::Waiting { reasons: Vec::new(), passed: Vec::new(), standstill: None };
+        }
+        let mut motions: Vec<Cow<'_, [ImuSample]>> = Vec::new();
+        let mut pending: Vec<ImuSample> = Vec::new();
+        for frame in &self.waiting {
+            if !looked(frame) {
+                pending.extend(&frame.imu);
+            } else if pending.is_empty() {
+                motions.push(Cow::Borrowed(&frame.imu));
+            } else {
+                pending.extend(&frame.imu);
+                motions.push(Cow::Owned(std::mem::take(&mut pending)));
+            }
+        }
         let frames: Vec<InitializationFrame<'_>> = self
             .waiting
             .iter()
-            .map(|frame| InitializationFrame {
+            .filter(|frame| looked(frame))
+            .zip(&motions)
+            .map(|(frame, imu)| InitializationFrame {
                 frame_index: frame.index,
                 stamp_ns: frame.stamp_ns,
-                features: &frame.tracks.features,
+                features: &frame.features[leading],
                 imu_from_camera: frame.imu_from_camera,
-                imu: &frame.imu,
+                imu,
             })
             .collect();
         let input = InitializationInput {
@@ -159,9 +184,13 @@ impl Estimator {
         solution: &InitializationSolution,
         events: &mut Vec<Event>,
     ) -> StepReport {
-        self.fill_window(solution);
+        let joining = self.fill_window(solution);
         self.phase = Phase::Tracking;
         let mut solved = self.solve_window(FIRST_SOLVES[0]);
+        if self.join(&joining) {
+            self.forget_rejected(&solved, events);
+            solved = self.solve_window(FIRST_SOLVES[0]);
+        }
         for iterations in &FIRST_SOLVES[1..] {
             self.forget_rejected(&solved, events);
             solved = self.solve_window(*iterations);
@@ -195,7 +224,11 @@ impl Estimator {
         report
     }
 
-    fn fill_window(&mut self, solution: &InitializationSolution) {
+    /// Makes the window of the solution's views, with the features of the leading camera; returns by view what each camera
+    /// has seen.
+    fn fill_window(&mut self, solution: &InitializationSolution) -> Vec<Vec<Vec<TrackedFeature>>> {
+        let leading = self.calibration.leading();
+        let mut seen = Vec::new();
         let world = self.world_of(solution);
         let views = &solution.frames[solution.frames.len().saturating_sub(self.config.options.window + 1)..];
         let mut imu = Preintegration::new(self.noise, solution.bias);
@@ -228,12 +261,15 @@ impl Estimator {
                 motion,
             });
             mounts.push(view.imu_from_camera);
-            features::observe(&mut self.features, slot, &waiting.tracks);
+            features::observe(&mut self.features[leading], slot, &waiting.features[leading]);
+            seen.push(waiting.features);
         }
         if let Some(newest) = self.frames.last_mut() {
             newest.keyframe = false;
         }
-        self.fit_mounts(&mounts);
+        if leading == MAIN {
+            self.fit_mounts(&mounts);
+        }
         let options = &self.config.options;
         self.start = self.frames.first().map(|first| StartPrior {
             reference: first.state.clone(),
@@ -244,6 +280,19 @@ impl Estimator {
             accelerometer_bias_sigma: options.accelerometer_bias_sigma,
             gyroscope_bias_sigma: options.gyroscope_bias_sigma,
         });
+        seen
+    }
+
+    /// The cameras beside the leading one join the window that it has begun, and say whether there are any: what the rig
+    /// says about their mounts may be far off, so that they do not take part in finding out where the vehicle is.
+    fn join(&mut self, seen: &[Vec<Vec<TrackedFeature>>]) -> bool {
+        let leading = self.calibration.leading();
+        for (slot, by_camera) in seen.iter().enumerate() {
+            for (camera, features) in by_camera.iter().enumerate().filter(|(camera, _)| *camera != leading) {
+                features::observe(&mut self.features[camera], slot, features);
+            }
+        }
+        self.calibration.cameras() > 1
     }
 
     /// Where the solution's world lies: at the origin, or where the window before a failure ended.
@@ -262,18 +311,18 @@ impl Estimator {
 
     /// Joint angles and chain that explain the mounts' rotations, between encoder readings and the rig's prior.
     fn fit_mounts(&mut self, mounts: &[RigidTransform]) {
-        let joints = self.calibration.joint_count();
+        let joints = self.calibration.of(MAIN).joint_count();
         if joints == 0 || mounts.len() != self.frames.len() {
             return;
         }
-        let dof = self.calibration.dof();
+        let dof = self.calibration.of(MAIN).dof();
         let total = dof + joints * mounts.len();
         let sigma = |slot: usize, joint: usize| -> f64 {
             self.frames[slot].encoder.as_ref().map_or(UNKNOWN_TURN_RAD, |encoder| encoder.sigmas_rad[joint])
         };
         let starts: Vec<Vec<f64>> = self.frames.iter().map(|frame| frame.state.joints_rad.clone()).collect();
         let mut angles = starts.clone();
-        let mut calibration: Calibration = self.calibration.clone();
+        let mut calibration: Calibration = self.calibration.of(MAIN).clone();
         for _ in 0..10 {
             let mut hessian = DMatrix::zeros(total, total);
             let mut gradient = DVector::zeros(total);
@@ -314,7 +363,7 @@ impl Estimator {
             for (frame, angles) in self.frames.iter_mut().zip(angles) {
                 frame.state.joints_rad = angles;
             }
-            self.calibration = calibration;
+            *self.calibration.of_mut(MAIN) = calibration;
         }
     }
 }

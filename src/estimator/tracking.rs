@@ -2,18 +2,19 @@
 
 use nalgebra::Vector2;
 
+use super::calibrations::MAIN;
 use super::camera_pose;
 use super::estimator::Estimator;
 use super::features;
 use super::marginalization;
 use super::options::{LandmarkModel, TrackContinuation};
 use super::preintegration::Preintegration;
-use super::problem::{Estimate, Problem};
+use super::problem::{CameraFactors, Estimate, Problem};
 use super::reprojection::{CameraPose, Landmark};
 use super::solver::{self, Solution, SolverLimits};
 use super::standstill;
 use super::visual::{self, RelativePoses, Sighting, Track, VisualModel};
-use super::window::{self, Frame, FrameState};
+use super::window::{self, FeatureMap, Frame, FrameState};
 use super::{Event, EventKind, StepInput};
 use crate::frontend::FeatureId;
 use crate::geometry::seconds_from_ns;
@@ -28,12 +29,27 @@ const KEYFRAME_AT_REST_NS: i64 = 5_000_000_000;
 /// Pixel residuals by track and sighting.
 pub(super) type TrackResiduals = Vec<Vec<Option<Vector2<f64>>>>;
 
+/// The features of one camera that take part, in the order of their identity.
+#[derive(Clone, Debug, Default)]
+pub(super) struct ActiveTracks {
+    pub(super) ids: Vec<FeatureId>,
+    pub(super) tracks: Vec<Track>,
+    pub(super) landmarks: Vec<Landmark>,
+}
+
 /// What a solve of the window used and found, for the report.
 #[derive(Clone, Debug)]
 pub(super) struct SolvedWindow {
-    pub(super) ids: Vec<FeatureId>,
-    pub(super) tracks: Vec<Track>,
+    /// By camera, with the landmarks as they were before.
+    pub(super) cameras: Vec<ActiveTracks>,
     pub(super) solution: Solution,
+    /// By camera.
+    pub(super) checks: Vec<TrackChecks>,
+}
+
+/// How well the tracks of one camera fit.
+#[derive(Clone, Debug)]
+pub(super) struct TrackChecks {
     pub(super) residuals_before: TrackResiduals,
     pub(super) residuals_after: TrackResiduals,
     pub(super) rejected: Vec<bool>,
@@ -71,7 +87,9 @@ impl Estimator {
             motion_information,
         });
         let slot = self.frames.len() - 1;
-        features::observe(&mut self.features, slot, input.tracks);
+        for (camera, features) in self.features.iter_mut().enumerate() {
+            features::observe(features, slot, input.features(camera));
+        }
         self.align_newest_joints();
         Ok(())
     }
@@ -80,11 +98,13 @@ impl Estimator {
     pub(super) fn watch_for_rest(&mut self, input: &StepInput<'_>) -> Option<Event> {
         let newest = self.frames.last()?;
         let navigation = newest.state.navigation;
+        let camera = self.calibration.leading();
         let known = standstill::Known {
+            features: input.features(camera),
             noise: &self.noise,
             bias: &navigation.bias,
             speed_m_per_s: navigation.velocity_m_per_s.norm(),
-            imu_from_camera: self.calibration.imu_from_camera(&newest.state.joints_rad).rotation,
+            imu_from_camera: self.calibration.of(camera).imu_from_camera(&newest.state.joints_rad).rotation,
             distance_m: self.usual_distance_m(),
         };
         let (rest, event) = self.rest_watch.observe(input, &known)?;
@@ -94,8 +114,8 @@ impl Estimator {
 
     /// Median distance of the landmarks from where they are anchored.
     fn usual_distance_m(&self) -> f64 {
-        let mut inverse: Vec<f64> =
-            self.features.values().filter_map(|feature| Some(feature.landmark?.inverse_distance)).collect();
+        let features = self.features.iter().flat_map(FeatureMap::values);
+        let mut inverse: Vec<f64> = features.filter_map(|feature| Some(feature.landmark?.inverse_distance)).collect();
         if inverse.is_empty() {
             return UNKNOWN_DISTANCE_M;
         }
@@ -103,20 +123,31 @@ impl Estimator {
         1.0 / (*inverse.select_nth_unstable_by(middle, f64::total_cmp).1).max(1.0 / FARTHEST_USUAL_M)
     }
 
-    /// Poses of the camera by slot.
-    pub(super) fn camera_poses(&self) -> Vec<CameraPose> {
-        self.frames.iter().map(|frame| camera_pose::at(&frame.state, &self.calibration)).collect()
+    /// Poses of a camera by slot.
+    pub(super) fn camera_poses(&self, camera: usize) -> Vec<CameraPose> {
+        let calibration = self.calibration.of(camera);
+        self.frames.iter().map(|frame| camera_pose::at(&frame.state, calibration)).collect()
     }
 
-    /// The least-squares problem of the window as it is.
-    pub(super) fn problem<'a>(&'a self, tracks: &'a [Track]) -> Problem<'a> {
+    /// The least-squares problem of the window as it is, with the tracks that each camera has; cameras without any may be
+    /// left out at the end.
+    pub(super) fn problem<'a>(&'a self, active: &'a [ActiveTracks]) -> Problem<'a> {
         let options = &self.config.options;
+        let layout = window::layout(&self.frames, self.calibration.dof());
+        let start = layout.calibration().start;
+        let factors = |camera: usize| {
+            let columns = self.calibration.columns(camera);
+            CameraFactors {
+                visual: VisualModel::new(self.config.model(camera), options),
+                tracks: active.get(camera).map_or(&[], |active| &active.tracks),
+                columns: start + columns.start..start + columns.end,
+            }
+        };
         Problem {
-            layout: window::layout(&self.frames, self.calibration.dof()),
-            visual: VisualModel::new(&self.config.camera, options),
+            layout,
+            cameras: (0..self.calibration.cameras()).map(factors).collect(),
             gravity_in_world: self.gravity_in_world,
             frames: &self.frames,
-            tracks,
             prior: self.prior.as_ref(),
             start: self.start.as_ref(),
             first_estimates: options.first_estimates,
@@ -126,54 +157,55 @@ impl Estimator {
 
     /// Gives depths to features whose rays open far enough.
     pub(super) fn triangulate_new(&mut self) {
-        let cameras = self.camera_poses();
-        for feature in self.features.values_mut() {
-            if feature.landmark.is_none() {
-                feature.landmark = features::triangulate(feature, &cameras, &self.config.options);
+        for camera in 0..self.features.len() {
+            let poses = self.camera_poses(camera);
+            for feature in self.features[camera].values_mut() {
+                if feature.landmark.is_none() {
+                    feature.landmark = features::triangulate(feature, &poses, &self.config.options);
+                }
             }
         }
     }
 
-    /// Features that take part, in the order of their identity, with their landmarks.
-    pub(super) fn active_tracks(&self) -> (Vec<FeatureId>, Vec<Track>, Vec<Landmark>) {
-        let (mut ids, mut tracks, mut landmarks) = (Vec::new(), Vec::new(), Vec::new());
-        for (id, feature) in &self.features {
-            let Some(landmark) = feature.landmark else { continue };
-            if feature.observations.len() < 2 {
-                continue;
-            }
-            let sighting =
-                |observation: &window::Observation| Sighting { slot: observation.slot, uv_px: observation.uv_px };
-            ids.push(*id);
-            tracks.push(Track { sightings: feature.observations.iter().map(sighting).collect() });
-            landmarks.push(landmark);
-        }
-        (ids, tracks, landmarks)
+    /// The features that take part, by camera.
+    pub(super) fn active_tracks(&self) -> Vec<ActiveTracks> {
+        self.features.iter().map(active_tracks).collect()
     }
 
     /// Solves the window, takes the estimate over and rejects features that do not fit.
     pub(super) fn solve_window(&mut self, iterations: usize) -> SolvedWindow {
         self.reintegrate();
         self.triangulate_new();
-        let (ids, tracks, landmarks) = self.active_tracks();
+        let cameras = self.active_tracks();
+        let landmarks = cameras.iter().map(|active| active.landmarks.clone()).collect();
         let start = Estimate { landmarks, ..self.present_estimate() };
         let limits = SolverLimits { iterations, relative_cost_tolerance: self.config.options.relative_cost_tolerance };
-        let problem = self.problem(&tracks);
-        let residuals_before = track_residuals(&problem, &start);
+        let problem = self.problem(&cameras);
+        let before = track_residuals(&problem, &start);
         let solution = solver::solve(&problem, start, limits);
-        let residuals_after = track_residuals(&problem, &solution.estimate);
+        let after = track_residuals(&problem, &solution.estimate);
 
         for (frame, state) in self.frames.iter_mut().zip(&solution.estimate.frames) {
             frame.state = state.clone();
         }
         self.calibration = solution.estimate.calibration.clone();
-        for (id, landmark) in ids.iter().zip(&solution.estimate.landmarks) {
-            if let Some(feature) = self.features.get_mut(id) {
-                feature.landmark = Some(*landmark);
+        for (camera, active) in cameras.iter().enumerate() {
+            for (id, landmark) in active.ids.iter().zip(&solution.estimate.landmarks[camera]) {
+                if let Some(feature) = self.features[camera].get_mut(id) {
+                    feature.landmark = Some(*landmark);
+                }
             }
         }
-        let rejected = residuals_after.iter().map(|residuals| self.is_outlier(residuals)).collect();
-        SolvedWindow { ids, tracks, solution, residuals_before, residuals_after, rejected }
+        let checks = before
+            .into_iter()
+            .zip(after)
+            .map(|(residuals_before, residuals_after)| TrackChecks {
+                rejected: residuals_after.iter().map(|residuals| self.is_outlier(residuals)).collect(),
+                residuals_before,
+                residuals_after,
+            })
+            .collect();
+        SolvedWindow { cameras, solution, checks }
     }
 
     fn is_outlier(&self, residuals: &[Option<Vector2<f64>>]) -> bool {
@@ -185,16 +217,19 @@ impl Estimator {
 
     /// Forgets rejected features; a track that goes on starts anew with its next sighting.
     pub(super) fn forget_rejected(&mut self, solved: &SolvedWindow, events: &mut Vec<Event>) {
-        let mut count = 0;
-        for (id, _) in solved.ids.iter().zip(&solved.rejected).filter(|(_, rejected)| **rejected) {
-            self.features.remove(id);
-            count += 1;
+        let (mut count, mut all) = (0, 0);
+        for (features, (active, checks)) in self.features.iter_mut().zip(solved.cameras.iter().zip(&solved.checks)) {
+            for (id, _) in active.ids.iter().zip(&checks.rejected).filter(|(_, rejected)| **rejected) {
+                features.remove(id);
+                count += 1;
+            }
+            all += active.ids.len();
         }
         if count > 0 {
             let limit = self.config.options.outlier_px;
             events.push(Event {
                 kind: EventKind::OutliersRejected,
-                message: format!("{count} of {} features off by more than {limit:.1} px on average", solved.ids.len()),
+                message: format!("{count} of {all} features off by more than {limit:.1} px on average"),
                 value: Some(count as f64),
                 threshold: Some(limit),
             });
@@ -219,7 +254,6 @@ impl Estimator {
 
     /// Whether the newest frame becomes a keyframe, with the figure that decides.
     pub(super) fn choose_keyframe(&self) -> (bool, Event) {
-        let options = &self.config.options;
         let newest = self.frames.len() - 1;
         let event = |keyframe: bool, message: String, value: f64, threshold: f64| {
             let decided =
@@ -241,9 +275,29 @@ impl Estimator {
                 if first { 0.0 } else { seconds_from_ns(KEYFRAME_AT_REST_NS) },
             );
         }
-        let cameras = self.camera_poses();
-        let (parallax, common) = features::compensated_parallax(&self.features, &cameras, last, newest);
-        let seen = self.features.values().filter(|feature| feature.observation(newest).is_some()).count();
+        // Whichever camera asks for a keyframe gets it; one without an image has nothing to say.
+        let seen = |camera: usize| self.features[camera].values().filter(|f| f.observation(newest).is_some()).count();
+        let seen: Vec<(usize, usize)> = (0..self.features.len()).map(|camera| (camera, seen(camera))).collect();
+        let asked = seen.iter().filter(|(_, seen)| *seen > 0);
+        let mut decisions: Vec<(bool, Event)> =
+            asked.map(|(camera, seen)| self.keyframe_by_picture(*camera, last, newest, *seen)).collect();
+        if decisions.is_empty() {
+            decisions.push(self.keyframe_by_picture(MAIN, last, newest, 0));
+        }
+        let first = decisions.iter().position(|(keyframe, _)| *keyframe).unwrap_or(0);
+        decisions.swap_remove(first)
+    }
+
+    /// Whether one camera asks for a keyframe, by what it has in common with the last one.
+    fn keyframe_by_picture(&self, camera: usize, last: usize, newest: usize, seen: usize) -> (bool, Event) {
+        let options = &self.config.options;
+        let event = |keyframe: bool, message: String, value: f64, threshold: f64| {
+            let decided =
+                Event { kind: EventKind::KeyframeChosen, message, value: Some(value), threshold: Some(threshold) };
+            (keyframe, decided)
+        };
+        let poses = self.camera_poses(camera);
+        let (parallax, common) = features::compensated_parallax(&self.features[camera], &poses, last, newest);
         let new_share = 1.0 - common as f64 / seen.max(1) as f64;
         if common < options.keyframe_min_tracked {
             let limit = options.keyframe_min_tracked as f64;
@@ -292,7 +346,7 @@ impl Estimator {
         Estimate {
             frames: self.frames.iter().map(|frame| frame.state.clone()).collect(),
             calibration: self.calibration.clone(),
-            landmarks: Vec::new(),
+            landmarks: vec![Vec::new(); self.features.len()],
         }
     }
 
@@ -303,8 +357,7 @@ impl Estimator {
         }
         let prior = marginalization::dropped(&self.problem(&[]), &self.present_estimate(), gone);
         self.prior = prior;
-        let cameras = self.camera_poses();
-        features::forget_frame(&mut self.features, gone, &cameras);
+        self.forget_sightings(gone);
         let dropped = self.frames.remove(gone);
         let newest = &mut self.frames[gone];
         let mut motion = dropped.motion;
@@ -317,30 +370,32 @@ impl Estimator {
     fn marginalize_oldest(&mut self) {
         let newest = self.frames.len() - 1;
         let continuation = self.config.options.track_continuation;
-        let (ids, tracks, landmarks) = self.active_tracks();
-        let leaving: Vec<usize> = (0..ids.len())
-            .filter(|index| {
-                let sightings = &tracks[*index].sightings;
-                let continues = sightings.last().is_some_and(|last| last.slot == newest);
-                let anchored = sightings.first().is_some_and(|first| first.slot == 0);
-                anchored && !(continues && continuation == TrackContinuation::ForgetAnchor)
+        let leaving: Vec<ActiveTracks> = self
+            .active_tracks()
+            .into_iter()
+            .map(|active| {
+                active.filtered(|track| {
+                    let continues = track.sightings.last().is_some_and(|last| last.slot == newest);
+                    let anchored = track.sightings.first().is_some_and(|first| first.slot == 0);
+                    anchored && !(continues && continuation == TrackContinuation::ForgetAnchor)
+                })
             })
             .collect();
-        let used_tracks: Vec<Track> = leaving.iter().map(|index| tracks[*index].clone()).collect();
-        let used_landmarks: Vec<Landmark> = leaving.iter().map(|index| landmarks[*index]).collect();
-        let estimate = self.present_estimate();
-        let prior = marginalization::oldest(&self.problem(&used_tracks), &estimate, &used_tracks, &used_landmarks);
+        let landmarks = leaving.iter().map(|active| active.landmarks.clone()).collect();
+        let estimate = Estimate { landmarks, ..self.present_estimate() };
+        let prior = marginalization::oldest(&self.problem(&leaving), &estimate);
 
-        for (index, track) in leaving.iter().zip(&used_tracks) {
-            let ended = track.sightings.last().is_none_or(|last| last.slot != newest);
-            if ended || continuation == TrackContinuation::UseOnce {
-                self.features.remove(&ids[*index]);
+        for (features, active) in self.features.iter_mut().zip(&leaving) {
+            for (id, track) in active.ids.iter().zip(&active.tracks) {
+                let ended = track.sightings.last().is_none_or(|last| last.slot != newest);
+                if ended || continuation == TrackContinuation::UseOnce {
+                    features.remove(id);
+                }
             }
         }
         self.prior = prior;
         self.start = None;
-        let cameras = self.camera_poses();
-        features::forget_frame(&mut self.features, 0, &cameras);
+        self.forget_sightings(0);
         if self.config.options.landmark_model == LandmarkModel::InverseDistance {
             self.face_measured_bearings();
         }
@@ -348,9 +403,17 @@ impl Estimator {
         self.renumber_prior(0);
     }
 
+    /// Takes a frame out of what the cameras have seen.
+    fn forget_sightings(&mut self, gone: usize) {
+        for camera in 0..self.features.len() {
+            let poses = self.camera_poses(camera);
+            features::forget_frame(&mut self.features[camera], gone, &poses);
+        }
+    }
+
     /// Landmarks that moved to another anchor lie on the bearing that it measured.
     fn face_measured_bearings(&mut self) {
-        for feature in self.features.values_mut() {
+        for feature in self.features.iter_mut().flat_map(FeatureMap::values_mut) {
             if let (Some(first), Some(landmark)) = (feature.observations.first(), feature.landmark.as_mut()) {
                 landmark.bearing = first.bearing;
             }
@@ -362,27 +425,61 @@ impl Estimator {
         if let Some(prior) = &mut self.prior {
             prior.renumber(gone);
             marginalization::keep_first_estimates(prior, &mut self.frames);
-            self.calibration.keep_first_estimate(prior.holds_calibration());
         } else {
             self.frames.iter_mut().for_each(|frame| frame.first_estimate = None);
-            self.calibration.keep_first_estimate(false);
         }
+        self.calibration.keep_first_estimates(self.prior.as_ref());
     }
 }
 
-/// Pixel residuals of all sightings at an estimate.
-fn track_residuals(problem: &Problem<'_>, estimate: &Estimate) -> TrackResiduals {
-    let relative = RelativePoses::new(&camera_pose::by_slot(&estimate.frames, &estimate.calibration));
-    problem
-        .tracks
-        .iter()
-        .zip(&estimate.landmarks)
-        .map(|(track, landmark)| {
-            let anchor = track.sightings[0].slot;
-            let residual = |sighting: &Sighting| {
-                visual::sighting_residual_px(&problem.visual, &relative, anchor, landmark, sighting)
-            };
-            track.sightings.iter().map(residual).collect()
-        })
-        .collect()
+impl ActiveTracks {
+    /// Those whose tracks are wanted.
+    fn filtered(self, wanted: impl Fn(&Track) -> bool) -> Self {
+        let mut kept = Self::default();
+        for ((id, track), landmark) in self.ids.into_iter().zip(self.tracks).zip(self.landmarks) {
+            if wanted(&track) {
+                kept.ids.push(id);
+                kept.tracks.push(track);
+                kept.landmarks.push(landmark);
+            }
+        }
+        kept
+    }
+}
+
+fn active_tracks(features: &FeatureMap) -> ActiveTracks {
+    let mut active = ActiveTracks::default();
+    for (id, feature) in features {
+        let Some(landmark) = feature.landmark else { continue };
+        if feature.observations.len() < 2 {
+            continue;
+        }
+        let sighting =
+            |observation: &window::Observation| Sighting { slot: observation.slot, uv_px: observation.uv_px };
+        active.ids.push(*id);
+        active.tracks.push(Track { sightings: feature.observations.iter().map(sighting).collect() });
+        active.landmarks.push(landmark);
+    }
+    active
+}
+
+/// Pixel residuals of all sightings at an estimate, by camera.
+fn track_residuals(problem: &Problem<'_>, estimate: &Estimate) -> Vec<TrackResiduals> {
+    let of_camera = |(camera, factors): (usize, &CameraFactors<'_>)| {
+        let poses = camera_pose::by_slot(&estimate.frames, estimate.calibration.of(camera));
+        let relative = RelativePoses::new(&poses);
+        factors
+            .tracks
+            .iter()
+            .zip(&estimate.landmarks[camera])
+            .map(|(track, landmark)| {
+                let anchor = track.sightings[0].slot;
+                let residual = |sighting: &Sighting| {
+                    visual::sighting_residual_px(&factors.visual, &relative, anchor, landmark, sighting)
+                };
+                track.sightings.iter().map(residual).collect()
+            })
+            .collect()
+    };
+    problem.cameras.iter().enumerate().map(of_camera).collect()
 }

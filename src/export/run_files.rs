@@ -49,7 +49,14 @@ pub fn write_run(
 fn calibrated_rig(recording: &Recording, run: &RunRecord) -> Rig {
     let mut rig = (*recording.rig).clone();
     let Some(last) = run.steps.last() else { return rig };
-    let chain = &last.report.calibration.classical;
+    let calibration = &last.report.calibration;
+    for (key, pose) in &calibration.rigid_cameras {
+        let camera = rig.cameras.iter_mut().find(|camera| camera.key == *key);
+        if let Some(CameraMount::Static { imu_from_camera }) = camera.map(|camera| &mut camera.mount) {
+            *imu_from_camera = *pose;
+        }
+    }
+    let chain = &calibration.classical;
     let Some(camera) = rig.cameras.iter_mut().find(|camera| camera.key == run.camera_key) else { return rig };
     match &mut camera.mount {
         CameraMount::Gimbal => {

@@ -8,7 +8,7 @@ use super::evaluation::alignment_name;
 use super::tables::parameter_name;
 use crate::estimator::{EventKind, Phase, StageTimes};
 use crate::geometry::{seconds_from_ns, so3, wrap_angle};
-use crate::gimbal::{Chain, ClassicalChain, Parameterization};
+use crate::gimbal::ClassicalChain;
 use crate::session::accuracy::{
     Alignment, ErrorStatistics, RelativeDelta, StampedPose, absolute_errors_m, align, path_length_m, relative_errors,
 };
@@ -233,7 +233,7 @@ pub fn summarize(recording: &Recording, run: &RunRecord, timing: bool) -> RunSum
     RunSummary {
         log: log_name(&recording.log_path),
         run: run.spec.to_string(),
-        camera: run.camera_key.clone(),
+        camera: cameras(run),
         frames: FrameCounts {
             total: run.steps.len(),
             estimated: estimated.len(),
@@ -250,6 +250,12 @@ pub fn summarize(recording: &Recording, run: &RunRecord, timing: bool) -> RunSum
         real_time_factor: if timing { real_time_factor(run) } else { None },
         warnings: warnings(recording, run),
     }
+}
+
+/// Keys of the cameras that the run watches, the one that is shown first.
+fn cameras(run: &RunRecord) -> String {
+    let rigid = run.steps.last().into_iter().flat_map(|step| &step.report.calibration.rigid_cameras);
+    rigid.fold(run.camera_key.clone(), |cameras, (key, _)| format!("{cameras}, {key}"))
 }
 
 /// The reasons of the last initialization attempt.
@@ -321,15 +327,9 @@ fn calibration(recording: &Recording, run: &RunRecord) -> CalibrationSummary {
         };
     };
     let truth = recording.truth_rig.as_ref().and_then(|rig| rig.chain_of_camera(&run.camera_key));
-    let in_parameters = |chain: &ClassicalChain| {
-        let parameterization: Parameterization = last.parameterization.parse().ok()?;
-        let chain = Chain::from_classical(chain, parameterization);
-        let values = chain.values();
-        Some(chain.parameter_names().into_iter().zip(values.iter().copied()).collect::<Vec<_>>())
-    };
     let given = recording.rig.chain_of_camera(&run.camera_key);
-    let initial_values = given.as_ref().and_then(in_parameters).unwrap_or_default();
-    let true_values = truth.as_ref().and_then(in_parameters).unwrap_or_default();
+    let initial_values = run.values_in(&recording.rig, last).unwrap_or_default();
+    let true_values = recording.truth_rig.as_ref().and_then(|rig| run.values_in(rig, last)).unwrap_or_default();
     let value_of =
         |values: &[(String, f64)], name: &str| values.iter().find(|(known, _)| known == name).map(|(_, value)| *value);
     let parameters = last

@@ -4,6 +4,21 @@ use nalgebra::{Vector2, Vector3};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct FeatureId(pub u64);
 
+/// More than a camera finds: the ids of the next camera begin there.
+const IDS_PER_CAMERA: u64 = 1_000_000_000;
+
+impl FeatureId {
+    /// The same feature told apart from those of other cameras; ids of camera 0 stay as they are.
+    pub fn of_camera(self, camera: usize) -> Self {
+        Self(self.0 + camera as u64 * IDS_PER_CAMERA)
+    }
+
+    /// Number of the camera that [`Self::of_camera`] has named.
+    pub fn camera(self) -> usize {
+        (self.0 / IDS_PER_CAMERA) as usize
+    }
+}
+
 /// One feature in one image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrackedFeature {

@@ -20,8 +20,7 @@ pub(crate) fn named_values(classical: &ClassicalChain, parameterization: Paramet
 /// `None` when the truth is not known.
 pub(crate) fn true_values(recording: &Recording, run: &RunRecord, stamp_ns: i64) -> Option<NamedValues> {
     let calibration = &run.step_at(stamp_ns).or_else(|| run.steps.first())?.report.calibration;
-    let classical = recording.truth_rig.as_ref()?.chain_of_camera(&run.camera_key)?;
-    let mut values = named_values(&classical, calibration.parameterization.parse().ok()?);
+    let mut values: NamedValues = run.values_in(recording.truth_rig.as_ref()?, calibration)?.into_iter().collect();
     let estimate: NamedValues = calibration.names.iter().cloned().zip(calibration.values.iter().copied()).collect();
     turn_towards(&mut values, &estimate);
     Some(values)

@@ -43,6 +43,7 @@ pub(crate) fn calibration_at(
         prior_sigmas,
         classical: mixed,
         margins: vec![("base".to_owned(), 0.98), ("end".to_owned(), 0.93), ("L2".to_owned(), 0.99)],
+        rigid_cameras: Vec::new(),
     }
 }
 

@@ -35,7 +35,9 @@ pub(super) fn classify(
     let anywhere = scaled_stack(chain, &generic);
     let values = singular_values(&anywhere);
     let anywhere = rank_above(&anywhere, &values, largest(&values));
-    let parameterization = columns.saturating_sub(anywhere).min(deficit);
+    // Columns of other cameras are as many motions of their own.
+    let others = columns.saturating_sub(chain.dof());
+    let parameterization = columns.saturating_sub(anywhere + others).min(deficit);
     if joint_angles_rad.is_empty() {
         return Deficits { parameterization, joints: 0, absorbed: 0, motion: deficit - parameterization };
     }

@@ -1,9 +1,9 @@
 //! From a rig and a run specification to an estimator's configuration.
 
-use super::plan::{SessionError, camera_of_run};
+use super::plan::{SessionError, WatchedCameras, cameras_of_run};
 use super::spec::{ParameterizationChoice, RunSpec};
 use super::stopwatch::clock_ms;
-use crate::estimator::{EstimatorConfig, EstimatorOptions};
+use crate::estimator::{EstimatorConfig, EstimatorOptions, RigidCamera};
 use crate::flight_log::Rig;
 use crate::flight_log::rig::{CameraMount, CameraRig, ChainPrior};
 use crate::gimbal::{Parameterization, auto_parameterization};
@@ -30,12 +30,12 @@ pub(super) fn mount_prior(rig: &Rig, camera: &CameraRig) -> ChainPrior {
 
 /// The estimator that a run asks for.
 pub(super) fn estimator_config(rig: &Rig, spec: &RunSpec) -> Result<EstimatorConfig, SessionError> {
-    let camera = camera_of_run(rig, spec)?;
+    let WatchedCameras { main: camera, rigid } = cameras_of_run(rig, spec)?;
     let chain = rig.chain_of_camera(&camera.key).unwrap_or_default();
     let gimbal = rig.gimbal.as_ref().filter(|_| camera.mount == CameraMount::Gimbal);
     let prior = mount_prior(rig, camera);
     let parameterization = match spec.parameterization {
-        ParameterizationChoice::Auto => auto_parameterization(&chain),
+        ParameterizationChoice::Auto | ParameterizationChoice::Cluster => auto_parameterization(&chain),
         ParameterizationChoice::Minimal | ParameterizationChoice::Static => Parameterization::Minimal,
         ParameterizationChoice::MinimalSwapped => Parameterization::MinimalSwapped,
         ParameterizationChoice::Classical => Parameterization::Classical,
@@ -51,12 +51,29 @@ pub(super) fn estimator_config(rig: &Rig, spec: &RunSpec) -> Result<EstimatorCon
         gravity_m_per_s2: rig.gravity_m_per_s2,
         chain,
         parameterization,
-        auto_chart: spec.parameterization == ParameterizationChoice::Auto && has_joints,
+        auto_chart: has_joints
+            && matches!(spec.parameterization, ParameterizationChoice::Auto | ParameterizationChoice::Cluster),
         encoder_sigma_rad,
         use_encoder: spec.encoder && encoder_sigma_rad.is_some(),
         calibrate: spec.calibrate,
-        chain_prior: Some((prior.translation_bound_m * SIGMA_PER_BOUND, prior.rotation_bound_rad * SIGMA_PER_BOUND)),
+        chain_prior: Some(sigmas(prior)),
+        rigid_cameras: rigid.into_iter().filter_map(|camera| rigid_camera(rig, camera)).collect(),
         options: EstimatorOptions { window: spec.window, keep_linearization: true, ..EstimatorOptions::default() },
         clock_ms,
     })
+}
+
+fn rigid_camera(rig: &Rig, camera: &CameraRig) -> Option<RigidCamera> {
+    let CameraMount::Static { imu_from_camera } = &camera.mount else { return None };
+    Some(RigidCamera {
+        key: camera.key.clone(),
+        model: camera.model.clone(),
+        imu_from_camera: *imu_from_camera,
+        prior: sigmas(mount_prior(rig, camera)),
+    })
+}
+
+/// Standard deviations in metres and radians of errors that are uniform within the bounds.
+fn sigmas(prior: ChainPrior) -> (f64, f64) {
+    (prior.translation_bound_m * SIGMA_PER_BOUND, prior.rotation_bound_rad * SIGMA_PER_BOUND)
 }

@@ -1,8 +1,9 @@
 //! The threads of a session: one tracker per camera, one estimator per run, results in order over one channel.
 //!
 //! Every run is computed on its own thread from its own copy of the tracks, so what comes out does not depend on how the
-//! threads are scheduled.
+//! threads are scheduled. A run that watches two cameras is fed by two trackers, each on its own thread.
 
+use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -10,7 +11,8 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::{Builder, JoinHandle};
 
 use super::configuration::estimator_config;
-use super::plan::{SessionError, SessionPlan};
+use super::instants::Instants;
+use super::plan::{SessionError, SessionPlan, cameras_of_run};
 use super::recording::StepRecord;
 use super::run_engine::RunEngine;
 use super::tracker::{CameraTracker, TrackedSensorFrame};
@@ -64,44 +66,40 @@ impl Default for Engine {
 }
 
 impl Engine {
-    /// Starts every run of the plan; runs that watch the same camera share one tracker.
+    /// Starts every run of the plan.
     pub(super) fn start(plan: &SessionPlan) -> Result<Self, SessionError> {
         let mut engine = Self::default();
-        let mut cameras: Vec<&String> = plan.runs.iter().map(|(_, camera_key)| camera_key).collect();
-        cameras.sort();
-        cameras.dedup();
-        for camera_key in cameras {
-            let runs: Vec<usize> = (0..plan.runs.len()).filter(|run| plan.runs[*run].1 == *camera_key).collect();
-            engine.start_camera(plan, camera_key, &runs)?;
-        }
+        engine.start_runs(plan, &(0..plan.runs.len()).collect::<Vec<_>>())?;
         Ok(engine)
     }
 
-    /// Starts the given runs of the plan, which all watch the same camera, from the begin of the log.
-    pub(super) fn start_camera(
-        &mut self,
-        plan: &SessionPlan,
-        camera_key: &str,
-        runs: &[usize],
-    ) -> Result<(), SessionError> {
-        let Some(sender) = &self.sender else { return Ok(()) };
-        let tracker = CameraTracker::new(Arc::clone(&plan.log), &plan.rig, camera_key, plan.start_s, plan.duration_s)?;
-        let mut queues = Vec::new();
+    /// Starts the given runs of the plan from the begin of the log; runs that watch the same camera share one tracker.
+    pub(super) fn start_runs(&mut self, plan: &SessionPlan, runs: &[usize]) -> Result<(), SessionError> {
+        let Some(sender) = self.sender.clone() else { return Ok(()) };
+        let mut queues: BTreeMap<&str, Vec<SyncSender<Arc<TrackedSensorFrame>>>> = BTreeMap::new();
         for &run in runs {
             let (spec, _) = &plan.runs[run];
+            let mut frames = Vec::new();
+            for camera in cameras_of_run(&plan.rig, spec)?.iter() {
+                let (queue, receiver) = sync_channel(QUEUED_FRAMES);
+                queues.entry(&camera.key).or_default().push(queue);
+                frames.push((camera.key.clone(), receiver));
+            }
             let engine = RunEngine::new(estimator_config(&plan.rig, spec)?);
-            let (queue, frames) = sync_channel(QUEUED_FRAMES);
             let results = sender.clone();
             self.threads.push(spawn(format!("estimator {run}"), move || {
-                run_thread(run, engine, &frames, &results);
+                run_thread(run, engine, Instants::new(frames), &results);
             })?);
-            queues.push(queue);
         }
-        let results = sender.clone();
-        let cancelled = Arc::clone(&self.cancelled);
-        self.threads.push(spawn(format!("tracker {camera_key}"), move || {
-            track_thread(tracker, queues, &results, &cancelled);
-        })?);
+        for (camera_key, queues) in queues {
+            let tracker =
+                CameraTracker::new(Arc::clone(&plan.log), &plan.rig, camera_key, plan.start_s, plan.duration_s)?;
+            let results = sender.clone();
+            let cancelled = Arc::clone(&self.cancelled);
+            self.threads.push(spawn(format!("tracker {camera_key}"), move || {
+                track_thread(tracker, queues, &results, &cancelled);
+            })?);
+        }
         Ok(())
     }
 
@@ -163,17 +161,20 @@ fn track_thread(
     }
 }
 
-/// Steps one estimator over the frames that come, and reports each step.
-fn run_thread(
-    run: usize,
-    mut engine: RunEngine,
-    frames: &Receiver<Arc<TrackedSensorFrame>>,
-    results: &SyncSender<EngineMessage>,
-) {
+/// Steps one estimator over the instants that come, and reports each step.
+fn run_thread(run: usize, mut engine: RunEngine, mut instants: Instants, results: &SyncSender<EngineMessage>) {
     let mut error = None;
-    while let Ok(tracked) = frames.recv() {
-        let Ok(record) = catch_unwind(AssertUnwindSafe(|| engine.step(&tracked))) else {
-            let time_s = crate::geometry::seconds_from_ns(tracked.frame.stamp_ns);
+    loop {
+        let instant = match instants.next() {
+            Ok(Some(instant)) => instant,
+            Ok(None) => break,
+            Err(reason) => {
+                error = Some(reason.to_string());
+                break;
+            }
+        };
+        let Ok(record) = catch_unwind(AssertUnwindSafe(|| engine.step(&instant))) else {
+            let time_s = crate::geometry::seconds_from_ns(instant.stamp_ns());
             error = Some(format!("internal error in the estimator at {time_s:.3} s; please report it with the log"));
             break;
         };

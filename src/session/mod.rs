@@ -9,6 +9,7 @@ mod command;
 mod configuration;
 mod engine;
 mod image_rotations;
+mod instants;
 #[cfg(test)]
 mod memory_tests;
 mod plan;

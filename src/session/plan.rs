@@ -72,7 +72,7 @@ pub struct SessionPlan {
     pub rig: Arc<Rig>,
     /// The rig with the true values.
     pub truth_rig: Option<Arc<Rig>>,
-    /// The runs and the camera of each.
+    /// The runs and the main camera of each.
     pub runs: Vec<(RunSpec, String)>,
     /// Seconds left out at the begin.
     pub start_s: f64,
@@ -96,7 +96,7 @@ impl SessionPlan {
         distinct_labels(&mut specs);
         let runs = specs
             .into_iter()
-            .map(|spec| camera_of_run(&rig, &spec).map(|camera| (spec, camera.key.clone())))
+            .map(|spec| cameras_of_run(&rig, &spec).map(|cameras| (spec, cameras.main.key.clone())))
             .collect::<Result<Vec<_>, _>>()?;
         Ok(Self {
             log,
@@ -110,22 +110,54 @@ impl SessionPlan {
     }
 }
 
-/// The camera that a run watches.
-pub(super) fn camera_of_run<'rig>(rig: &'rig Rig, spec: &RunSpec) -> Result<&'rig CameraRig, SessionError> {
+/// The cameras that a run watches.
+#[derive(Clone, Debug)]
+pub(super) struct WatchedCameras<'rig> {
+    /// The one whose image is shown.
+    pub(super) main: &'rig CameraRig,
+    /// The rigid one beside it.
+    pub(super) rigid: Option<&'rig CameraRig>,
+}
+
+impl<'rig> WatchedCameras<'rig> {
+    /// The main camera, then the other.
+    pub(super) fn iter(&self) -> impl Iterator<Item = &'rig CameraRig> {
+        std::iter::once(self.main).chain(self.rigid)
+    }
+}
+
+/// Finds the cameras that a run watches.
+pub(super) fn cameras_of_run<'rig>(rig: &'rig Rig, spec: &RunSpec) -> Result<WatchedCameras<'rig>, SessionError> {
     let is_gimballed = |camera: &&CameraRig| camera.mount == CameraMount::Gimbal;
-    let (camera, wanted) = if let Some(key) = &spec.camera_key {
-        (rig.cameras.iter().find(|camera| camera.key == *key), format!("camera '{key}'"))
-    } else if spec.parameterization == ParameterizationChoice::Static || rig.gimbal.is_none() {
-        (rig.cameras.iter().find(|camera| !is_gimballed(camera)), "a camera with mount: static".to_owned())
-    } else {
-        (rig.cameras.iter().find(is_gimballed), "a camera with mount: gimbal".to_owned())
+    let gimballed = || "a camera with mount: gimbal".to_owned();
+    let rigid = || (rig.cameras.iter().find(|camera| !is_gimballed(camera)), "a camera with mount: static".to_owned());
+    let cluster = spec.parameterization == ParameterizationChoice::Cluster;
+    let (camera, wanted) = match &spec.camera_key {
+        Some(key) if cluster => {
+            let camera = rig.cameras.iter().find(|camera| camera.key == *key).filter(is_gimballed);
+            (camera, format!("camera '{key}' with mount: gimbal"))
+        }
+        Some(key) => (rig.cameras.iter().find(|camera| camera.key == *key), format!("camera '{key}'")),
+        None if cluster => (rig.cameras.iter().find(is_gimballed), gimballed()),
+        None if spec.parameterization == ParameterizationChoice::Static || rig.gimbal.is_none() => rigid(),
+        None => (rig.cameras.iter().find(is_gimballed), gimballed()),
     };
-    camera.ok_or_else(|| SessionError::NoCamera {
-        run: spec.label.clone(),
-        wanted,
-        rig: rig.name.clone(),
-        present: rig.cameras.iter().map(describe).collect::<Vec<_>>().join(", "),
-    })
+    let found = |camera: Option<&'rig CameraRig>, wanted: String| {
+        camera.ok_or_else(|| SessionError::NoCamera {
+            run: spec.label.clone(),
+            wanted,
+            rig: rig.name.clone(),
+            present: rig.cameras.iter().map(describe).collect::<Vec<_>>().join(", "),
+        })
+    };
+    let main = found(camera, wanted)?;
+    let rigid = if cluster {
+        let (camera, wanted) = rigid();
+        Some(found(camera, wanted)?)
+    } else {
+        None
+    };
+    Ok(WatchedCameras { main, rigid })
 }
 
 fn describe(camera: &CameraRig) -> String {

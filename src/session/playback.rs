@@ -7,7 +7,7 @@ use std::thread::{Builder, JoinHandle};
 
 use super::command::{Command, PlaybackSpeed};
 use super::engine::Engine;
-use super::plan::{MAX_RUNS, SessionError, SessionPlan, SessionRequest, camera_of_run};
+use super::plan::{MAX_RUNS, SessionError, SessionPlan, SessionRequest, cameras_of_run};
 use super::recording::{Recording, RunRecord};
 use super::spec::{RunSpec, distinct_labels};
 use crate::flight_log::{GrayImage, ImageReader};
@@ -241,10 +241,10 @@ impl Session {
             specs.push(spec);
             distinct_labels(&mut specs);
             let Some(spec) = specs.pop() else { return Ok(()) };
-            let camera_key = camera_of_run(&self.plan.rig, &spec)?.key.clone();
+            let camera_key = cameras_of_run(&self.plan.rig, &spec)?.main.key.clone();
             self.plan.runs.push((spec.clone(), camera_key.clone()));
-            self.shared.change(|recording| recording.runs.push(RunRecord::new(spec, camera_key.clone())));
-            self.engine.start_camera(&self.plan, &camera_key, &[self.plan.runs.len() - 1])
+            self.shared.change(|recording| recording.runs.push(RunRecord::new(spec, camera_key)));
+            self.engine.start_runs(&self.plan, &[self.plan.runs.len() - 1])
         })();
         if let Err(error) = result {
             self.notices.push(error.to_string());

@@ -6,10 +6,11 @@ use super::RunSpec;
 use super::accuracy::{Alignment, AlignmentSums};
 use super::engine::EngineMessage;
 use super::plan::SessionPlan;
-use crate::estimator::{StepReport, allocated_bytes};
+use crate::estimator::{CalibrationEstimate, StepReport, allocated_bytes, rigid_columns};
 use crate::flight_log::{LogWarning, Rig};
 use crate::frontend::{TrackedFeature, TrackedFrame};
 use crate::geometry::RigidTransform;
+use crate::gimbal::Chain;
 use crate::observability::RankReport;
 
 /// One step of one run with what it was computed from.
@@ -19,7 +20,7 @@ pub struct StepRecord {
     pub report: StepReport,
     /// Observability of the calibration in this step, `None` while initializing.
     pub rank: Option<RankReport>,
-    /// The tracks the step was given.
+    /// The tracks the step was given, of two cameras those of the main one; empty where it has no image.
     pub tracks: Arc<TrackedFrame>,
     /// True pose of the IMU, for drawing and comparing.
     pub truth: Option<RigidTransform>,
@@ -67,7 +68,7 @@ impl RunMemory {
 pub struct RunRecord {
     /// What was asked for; its `label` is the run's name on screen.
     pub spec: RunSpec,
-    /// Key of the camera it watches (`cam0`).
+    /// Key of the camera it watches (`cam0`), of two the one whose image is shown.
     pub camera_key: String,
     /// Steps in time order.
     pub steps: Vec<Arc<StepRecord>>,
@@ -107,6 +108,18 @@ impl RunRecord {
         }
         self.memory.add(&record);
         self.steps.push(Arc::new(record));
+    }
+
+    /// What a rig says about the columns of the run's calibration, by name, in the parameterization of an estimate; `None`
+    /// when the rig does not have the cameras.
+    pub fn values_in(&self, rig: &Rig, estimate: &CalibrationEstimate) -> Option<Vec<(String, f64)>> {
+        let main = rig.chain_of_camera(&self.camera_key)?;
+        let chain = Chain::from_classical(&main, estimate.parameterization.parse().ok()?);
+        let mut values: Vec<_> = chain.parameter_names().into_iter().zip(chain.values().iter().copied()).collect();
+        for (key, _) in &estimate.rigid_cameras {
+            values.extend(rigid_columns(key, &rig.chain_of_camera(key)?.imu_from_camera(&[])));
+        }
+        Some(values)
     }
 
     /// The last step at or before a time, as a cursor shows it.

@@ -1,11 +1,15 @@
 use std::sync::Arc;
 
+use super::instants::Instant;
 use super::recording::StepRecord;
 use super::stopwatch::Stopwatch;
-use super::tracker::TrackedSensorFrame;
 use crate::estimator::{Estimator, EstimatorConfig, StepInput, StepReport};
+use crate::frontend::TrackedFrame;
 use crate::gimbal::Chain;
 use crate::observability::{RankReport, analyse};
+
+/// Columns of a rigid camera beside the main one: its pose on the IMU.
+const RIGID_COLUMNS: usize = 6;
 
 /// One estimator and the analysis of each of its steps.
 #[derive(Clone, Debug)]
@@ -13,6 +17,8 @@ pub(super) struct RunEngine {
     estimator: Estimator,
     has_joints: bool,
     joints_free: bool,
+    /// What a camera without an image has seen.
+    nothing: Arc<TrackedFrame>,
 }
 
 impl RunEngine {
@@ -20,32 +26,30 @@ impl RunEngine {
     pub(super) fn new(config: EstimatorConfig) -> Self {
         let has_joints = !config.chain.links.is_empty();
         let joints_free = has_joints && !config.use_encoder;
-        Self { estimator: Estimator::new(config), has_joints, joints_free }
+        Self { estimator: Estimator::new(config), has_joints, joints_free, nothing: Arc::default() }
     }
 
-    /// One image through the estimator and the observability analysis.
-    pub(super) fn step(&mut self, tracked: &TrackedSensorFrame) -> StepRecord {
-        let frame = &tracked.frame;
+    /// The images of one instant through the estimator and the observability analysis.
+    pub(super) fn step(&mut self, instant: &Instant) -> StepRecord {
+        let tracks = |camera: usize| instant.tracks(camera).unwrap_or(&self.nothing);
+        let main = Arc::clone(tracks(0));
+        let rigid: Vec<Arc<TrackedFrame>> = (1..instant.cameras()).map(|camera| Arc::clone(tracks(camera))).collect();
+        let rigid: Vec<&TrackedFrame> = rigid.iter().map(Arc::as_ref).collect();
         let watch = Stopwatch::start();
         let mut report = self.estimator.step(&StepInput {
-            frame_index: frame.index,
-            stamp_ns: frame.stamp_ns,
-            imu: &frame.imu,
-            joint_angles: frame.joint_angles.as_ref().filter(|_| self.has_joints),
-            tracks: &tracked.tracks,
+            frame_index: instant.frame_index(),
+            stamp_ns: instant.stamp_ns(),
+            imu: instant.imu(),
+            joint_angles: instant.joint_angles().filter(|_| self.has_joints),
+            tracks: &main,
+            rigid_tracks: &rigid,
         });
         let estimated_ms = watch.elapsed_ms();
         let rank = self.rank(&mut report);
         report.times.observability_ms = watch.elapsed_ms() - estimated_ms;
-        report.times.frontend_ms = tracked.frontend_ms;
-        report.times.step_ms = tracked.frontend_ms + watch.elapsed_ms();
-        StepRecord {
-            report,
-            rank,
-            tracks: Arc::clone(&tracked.tracks),
-            truth: frame.truth,
-            log_time_ns: frame.log_time_ns,
-        }
+        report.times.frontend_ms = instant.frontend_ms();
+        report.times.step_ms = instant.frontend_ms() + watch.elapsed_ms();
+        StepRecord { report, rank, tracks: main, truth: instant.truth(), log_time_ns: instant.log_time_ns() }
     }
 
     /// Analyses the step's linearization and lets go of it: one a frame would fill the memory.
@@ -55,7 +59,8 @@ impl RunEngine {
         let calibration = &report.calibration;
         let parameterization = calibration.parameterization.parse().ok()?;
         let chain = Chain::from_classical(&calibration.classical, parameterization);
-        let chain = if chain.dof() == calibration.names.len() { chain } else { chain.without_joint_offsets() };
+        let rigid = RIGID_COLUMNS * calibration.rigid_cameras.len();
+        let chain = if chain.dof() + rigid == calibration.names.len() { chain } else { chain.without_joint_offsets() };
         analyse(&linearization, &chain, &angles, self.joints_free)
     }
 }

@@ -18,16 +18,19 @@ pub enum ParameterizationChoice {
     Poe,
     /// The rigid camera of the rig.
     Static,
+    /// The gimbal camera as in `auto` and the rigid camera of the rig, in one window.
+    Cluster,
 }
 
 /// Names on the command line, in the order in which they are offered.
-const NAMES: [(&str, ParameterizationChoice); 6] = [
+const NAMES: [(&str, ParameterizationChoice); 7] = [
     ("auto", ParameterizationChoice::Auto),
     ("minimal", ParameterizationChoice::Minimal),
     ("minimal-swapped", ParameterizationChoice::MinimalSwapped),
     ("classical", ParameterizationChoice::Classical),
     ("poe", ParameterizationChoice::Poe),
     ("static", ParameterizationChoice::Static),
+    ("cluster", ParameterizationChoice::Cluster),
 ];
 
 /// Smallest and largest window that makes sense: two keyframes give no parallax to spare, and beyond thirty the dense
@@ -63,7 +66,7 @@ pub struct RunSpec {
     /// Number of keyframes in the window (`window=10`).
     pub window: usize,
     /// Camera to watch (`camera=cam1`); `None` is the gimballed one, or the first rigid one for `static` and for rigs
-    /// without a gimbal.
+    /// without a gimbal. A `cluster` watches the first rigid one beside it.
     pub camera_key: Option<String>,
 }
 
@@ -84,7 +87,7 @@ impl Default for RunSpec {
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum RunSpecError {
     /// No such parameterization.
-    #[error("unknown run '{name}': expected one of auto, minimal, minimal-swapped, classical, poe, static")]
+    #[error("unknown run '{name}': expected one of auto, minimal, minimal-swapped, classical, poe, static, cluster")]
     UnknownName {
         /// What was written.
         name: String,

@@ -14,9 +14,14 @@ fn run_specifications_are_read_and_written() {
     let run = parse("classical:encoder=off,window=8,name=left").unwrap();
     assert_eq!(run.parameterization, ParameterizationChoice::Classical);
     assert_eq!((run.encoder, run.calibrate, run.window, run.label.as_str()), (false, true, 8, "left"));
-    for text in
-        ["auto", "static", "minimal:calibrate=off", "classical:encoder=off,window=8,name=left", "poe:camera=cam1"]
-    {
+    for text in [
+        "auto",
+        "static",
+        "cluster:window=8",
+        "minimal:calibrate=off",
+        "classical:encoder=off,window=8,name=left",
+        "poe:camera=cam1",
+    ] {
         let run = parse(text).unwrap();
         assert_eq!(parse(&run.to_string()).unwrap(), run, "{text} is written as {run}");
     }

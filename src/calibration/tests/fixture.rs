@@ -94,6 +94,7 @@ pub(super) fn flight(options: &SyntheticOptions) -> Flight {
             use_encoder: false,
             calibrate: true,
             chain_prior: Some((0.0017, 0.005)),
+            rigid_cameras: Vec::new(),
             options: EstimatorOptions::default(),
             clock_ms: || 0.0,
         },

@@ -4,11 +4,12 @@ use nalgebra::DVector;
 
 use super::Noise;
 use crate::camera::CameraModel;
+use crate::estimator::calibrations::MAIN;
 use crate::estimator::layout::Layout;
 use crate::estimator::preintegration::{ImuBias, NavigationState, Preintegration};
 use crate::estimator::prior::StartPrior;
 use crate::estimator::window::{Frame, FrameState};
-use crate::estimator::{Estimator, EstimatorConfig, EstimatorOptions, features};
+use crate::estimator::{DEFAULT_CHAIN_PRIOR, Estimator, EstimatorConfig, EstimatorOptions, RigidCamera, features};
 use crate::flight_log::{JointAngles, Rig};
 use crate::gimbal::{Chain, Parameterization};
 use crate::simulation::{Lens, SyntheticFlight, SyntheticFrame, SyntheticMount, SyntheticOptions, synthetic_tracks};
@@ -35,8 +36,19 @@ pub(super) fn config(rig: &Rig, parameterization: Parameterization, options: Est
             .gimbal
             .as_ref()
             .map(|gimbal| (gimbal.prior.translation_bound_m / root, gimbal.prior.rotation_bound_rad / root)),
+        rigid_cameras: Vec::new(),
         options,
         clock_ms: || 0.0,
+    }
+}
+
+/// The camera of a rigid flight, as one that is watched beside another.
+pub(super) fn rigid_camera(flight: &SyntheticFlight) -> RigidCamera {
+    RigidCamera {
+        key: "cam1".to_owned(),
+        model: flight.given_rig.cameras[0].model.clone(),
+        imu_from_camera: flight.given_rig.chain_of_camera("cam0").unwrap().imu_from_camera(&[]),
+        prior: DEFAULT_CHAIN_PRIOR,
     }
 }
 
@@ -59,10 +71,29 @@ fn flight(gimbal: bool) -> SyntheticFlight {
 
 /// A window of six frames at the truth (landmarks from the noisy tracks), with the given chain.
 pub(super) fn window(parameterization: Parameterization, gimbal: bool, options: EstimatorOptions) -> Estimator {
-    let flight = flight(gimbal);
-    let mut estimator = Estimator::new(config(&flight.given_rig, parameterization, options));
-    let true_chain = flight.true_rig.chain_of_camera("cam0").unwrap();
-    estimator.calibration.set_chain(Chain::from_classical(&true_chain, parameterization));
+    window_of(&flight(gimbal), None, config(&flight(gimbal).given_rig, parameterization, options))
+}
+
+/// The same with a rigid camera beside the gimballed one.
+pub(super) fn cluster_window(options: EstimatorOptions) -> Estimator {
+    let (main, rigid) = (flight(true), flight(false));
+    assert_eq!(main.frames[7].imu, rigid.frames[7].imu, "one flight");
+    let config = EstimatorConfig {
+        rigid_cameras: vec![rigid_camera(&rigid)],
+        ..config(&main.given_rig, Parameterization::Minimal, options)
+    };
+    window_of(&main, Some(&rigid), config)
+}
+
+fn window_of(flight: &SyntheticFlight, rigid: Option<&SyntheticFlight>, config: EstimatorConfig) -> Estimator {
+    let parameterization = config.parameterization;
+    let mut estimator = Estimator::new(config);
+    let true_chain = |flight: &SyntheticFlight| flight.true_rig.chain_of_camera("cam0").unwrap();
+    estimator.calibration.of_mut(MAIN).set_chain(Chain::from_classical(&true_chain(flight), parameterization));
+    if let Some(rigid) = rigid {
+        let mount = Chain::from_classical(&true_chain(rigid), Parameterization::Minimal);
+        estimator.calibration.of_mut(1).set_chain(mount);
+    }
     let spacing = 4;
     let first = 100;
     for slot in 0..6 {
@@ -96,7 +127,10 @@ pub(super) fn window(parameterization: Parameterization, gimbal: bool, options: 
             motion_information: motion.square_root_information(),
             motion,
         });
-        features::observe(&mut estimator.features, slot, &truth.tracks);
+        features::observe(&mut estimator.features[MAIN], slot, &truth.tracks.features);
+        if let Some(rigid) = rigid {
+            features::observe(&mut estimator.features[1], slot, &rigid.frames[index].tracks.features);
+        }
     }
     estimator.start = Some(StartPrior {
         reference: estimator.frames[0].state.clone(),
@@ -105,7 +139,7 @@ pub(super) fn window(parameterization: Parameterization, gimbal: bool, options: 
         gyroscope_bias_sigma: 0.02,
     });
     estimator.triangulate_new();
-    assert!(estimator.active_tracks().0.len() > 20, "enough landmarks");
+    assert!(estimator.active_tracks().iter().all(|active| active.ids.len() > 20), "enough landmarks");
     estimator
 }
 
@@ -121,7 +155,7 @@ pub(super) fn shake(estimator: &mut Estimator, scale: f64) {
     let mut random = Noise::new(11);
     let layout = Layout {
         frames: estimator.frames.len(),
-        joints: estimator.calibration.joint_count(),
+        joints: estimator.calibration.of(MAIN).joint_count(),
         calibration: estimator.calibration.dof(),
     };
     let mut delta = DVector::zeros(layout.total());
@@ -136,9 +170,10 @@ pub(super) fn shake(estimator: &mut Estimator, scale: f64) {
             delta[column] = random.normal() * [0.1, 0.003, 0.05][offset / 3];
         }
     }
-    let units = estimator.calibration.chain().parameter_units();
-    for (unit, column) in units.iter().zip(layout.calibration()) {
-        delta[column] = random.normal() * if *unit == "rad" { 0.0035 } else { 0.002 };
+    let units = (0..estimator.calibration.cameras())
+        .flat_map(|camera| estimator.calibration.of(camera).chain().parameter_units());
+    for (unit, column) in units.zip(layout.calibration()) {
+        delta[column] = random.normal() * if unit == "rad" { 0.0035 } else { 0.002 };
     }
     delta *= scale;
     for (slot, frame) in estimator.frames.iter_mut().enumerate() {

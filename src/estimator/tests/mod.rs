@@ -1,5 +1,6 @@
 //! Tests of the estimator.
 
+mod cluster;
 mod fixture;
 mod flight;
 mod preintegration;

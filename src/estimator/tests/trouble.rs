@@ -4,6 +4,7 @@ use nalgebra::DMatrix;
 
 use super::fixture;
 use super::flight::{chain_error, fly, step, trajectory_error_m};
+use crate::estimator::calibrations::MAIN;
 use crate::estimator::dense::Cholesky;
 use crate::estimator::problem::Estimate;
 use crate::estimator::{Estimator, EstimatorConfig, EstimatorOptions, EventKind, Phase, StepReport};
@@ -170,15 +171,15 @@ fn a_saturated_inertial_sensor_does_not_throw_the_window_off() {
 
 /// Covariance of the calibration at the present estimate, all else marginalized.
 fn calibration_covariance(estimator: &Estimator) -> DMatrix<f64> {
-    let (_, tracks, landmarks) = estimator.active_tracks();
-    let problem = estimator.problem(&tracks);
+    let active = estimator.active_tracks();
+    let problem = estimator.problem(&active);
     let estimate = Estimate {
         frames: estimator.frames.iter().map(|frame| frame.state.clone()).collect(),
         calibration: estimator.calibration.clone(),
-        landmarks,
+        landmarks: active.iter().map(|active| active.landmarks.clone()).collect(),
     };
     let equations = problem.linearize(&estimate);
-    let (hessian, _) = equations.reduced(&problem.layout, &equations.visual.eliminate(0.0));
+    let (hessian, _) = equations.reduced(&problem.layout, &equations.eliminate(0.0));
     Cholesky::new(&hessian).unwrap().trailing_covariance(problem.layout.calibration)
 }
 
@@ -196,12 +197,12 @@ fn a_switch_of_charts_in_a_running_window_changes_nothing_else() {
     let mut switches = stays.clone();
     switches.switch_chart(Parameterization::MinimalYx);
     let angles = &flight.frames[half].true_joint_angles_rad;
-    let pose = |estimator: &Estimator| estimator.calibration.imu_from_camera(angles);
+    let pose = |estimator: &Estimator| estimator.calibration.of(MAIN).imu_from_camera(angles);
     assert!(pose(&stays).minus(&pose(&switches)).norm() < 1e-12);
 
     // What is known about the chain is the same in either chart.
-    let expected =
-        transport_covariance(stays.calibration.chain(), &calibration_covariance(&stays), switches.calibration.chain());
+    let chain = |estimator: &Estimator| estimator.calibration.of(MAIN).chain().clone();
+    let expected = transport_covariance(&chain(&stays), &calibration_covariance(&stays), &chain(&switches));
     let found = calibration_covariance(&switches);
     for row in 0..18 {
         for column in 0..18 {
@@ -240,6 +241,6 @@ fn a_chart_near_its_lock_is_left_once_and_for_good() {
         }
     }
     assert_eq!(switched, 1);
-    assert_eq!(estimator.calibration.chain().parameterization(), Parameterization::Minimal);
+    assert_eq!(estimator.calibration.of(MAIN).chain().parameterization(), Parameterization::Minimal);
     assert_eq!(estimator.restarts, 0);
 }

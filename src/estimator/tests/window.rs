@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector, Vector2, Vector3, Vector6};
 
 use super::{Noise, fixture};
 use crate::estimator::Estimator;
+use crate::estimator::calibrations::MAIN;
 use crate::estimator::dense::{self, Cholesky};
 use crate::estimator::marginalization;
 use crate::estimator::options::{EstimatorOptions, RobustLoss};
@@ -11,6 +12,7 @@ use crate::estimator::problem::Estimate;
 use crate::estimator::reprojection::{self, CameraPose, Landmark, RelativePose};
 use crate::estimator::rows::stack;
 use crate::estimator::solver::{self, SolverLimits};
+use crate::estimator::tracking::ActiveTracks;
 use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::Parameterization;
 use crate::simulation::Lens;
@@ -19,7 +21,7 @@ fn quadratic() -> EstimatorOptions {
     EstimatorOptions { loss: RobustLoss::None, ..EstimatorOptions::default() }
 }
 
-/// A gimbal's window in each form, and a rigid camera's.
+/// A gimbal's window in each form, a rigid camera's, and one of both cameras.
 fn windows() -> Vec<(&'static str, Estimator)> {
     let gimbal = |parameterization| fixture::window(parameterization, true, quadratic());
     vec![
@@ -28,14 +30,15 @@ fn windows() -> Vec<(&'static str, Estimator)> {
         ("classical", gimbal(Parameterization::Classical)),
         ("poe", gimbal(Parameterization::Poe)),
         ("rigid", fixture::window(Parameterization::Minimal, false, quadratic())),
+        ("cluster", fixture::cluster_window(quadratic())),
     ]
 }
 
-fn estimate_of(estimator: &Estimator, landmarks: Vec<Landmark>) -> Estimate {
+fn estimate_of(estimator: &Estimator, active: &[ActiveTracks]) -> Estimate {
     Estimate {
         frames: estimator.frames.iter().map(|frame| frame.state.clone()).collect(),
         calibration: estimator.calibration.clone(),
-        landmarks,
+        landmarks: active.iter().map(|active| active.landmarks.clone()).collect(),
     }
 }
 
@@ -92,15 +95,16 @@ fn the_gradient_of_every_factor_meets_central_differences() {
         // Steps count from the first estimates, so that derivatives are plain ones only there.
         fixture::shake(&mut estimator, 0.2);
         fixture::marginalize_once(&mut estimator);
-        let (_, tracks, landmarks) = estimator.active_tracks();
-        let problem = estimator.problem(&tracks);
+        let active = estimator.active_tracks();
+        let problem = estimator.problem(&active);
         assert!(problem.prior.is_some(), "{name}: a prior takes part");
-        let estimate = estimate_of(&estimator, landmarks);
+        let estimate = estimate_of(&estimator, &active);
         let equations = problem.linearize(&estimate);
         // Damped without end, the landmarks stay where they are.
-        let held = equations.visual.eliminate(1e14);
+        let held = equations.eliminate(1e14);
         let (_, gradient) = equations.reduced(&problem.layout, &held);
-        let still = vec![Vector3::zeros(); estimate.landmarks.len()];
+        let still: Vec<Vec<Vector3<f64>>> =
+            estimate.landmarks.iter().map(|landmarks| vec![Vector3::zeros(); landmarks.len()]).collect();
         for column in 0..problem.layout.total() {
             let step = 1e-6;
             let mut delta = DVector::zeros(problem.layout.total());
@@ -124,18 +128,18 @@ fn the_gradient_of_every_factor_meets_central_differences() {
 #[test]
 fn projecting_landmarks_out_equals_their_schur_complement() {
     for (name, estimator) in windows() {
-        let (_, tracks, landmarks) = estimator.active_tracks();
-        let problem = estimator.problem(&tracks);
-        let estimate = estimate_of(&estimator, landmarks);
-        let rows = problem.visual_rows(&estimate, &tracks, &estimate.landmarks);
+        let active = estimator.active_tracks();
+        let problem = estimator.problem(&active);
+        let estimate = estimate_of(&estimator, &active);
+        let rows = problem.visual_rows(&estimate);
         let total = problem.layout.total();
         let jacobian = rows.columns(0, total);
         let equations = problem.linearize(&estimate);
-        let reduced = equations.visual.eliminate(0.0);
+        let reduced = equations.eliminate(0.0);
         let (with, gradient_with) = equations.reduced(&problem.layout, &reduced);
         let without = estimator.problem(&[]);
         let plain = without.linearize(&Estimate { landmarks: Vec::new(), ..estimate.clone() });
-        let nothing = plain.visual.eliminate(0.0);
+        let nothing = plain.eliminate(0.0);
         let (others, gradient_others) = plain.reduced(&problem.layout, &nothing);
         let expected = with - others;
         let found = jacobian.tr_mul(&jacobian);
@@ -156,17 +160,17 @@ fn projecting_landmarks_out_equals_their_schur_complement() {
 #[test]
 fn marginalizing_the_oldest_agrees_with_the_full_batch() {
     for (name, estimator) in windows() {
-        let (_, tracks, landmarks) = estimator.active_tracks();
-        let problem = estimator.problem(&tracks);
+        let active = estimator.active_tracks();
+        let problem = estimator.problem(&active);
         let layout = problem.layout;
-        let estimate = estimate_of(&estimator, landmarks.clone());
+        let estimate = estimate_of(&estimator, &active);
         // Everything in one batch.
         let equations = problem.linearize(&estimate);
-        let (hessian, gradient) = equations.reduced(&layout, &equations.visual.eliminate(0.0));
+        let (hessian, gradient) = equations.reduced(&layout, &equations.eliminate(0.0));
         let batch = Cholesky::new(&hessian).unwrap().solve(&-gradient);
 
         // The oldest frame and all tracks first, the rest of the factors on what they leave.
-        let mut prior = marginalization::oldest(&problem, &estimate, &tracks, &landmarks).unwrap();
+        let mut prior = marginalization::oldest(&problem, &estimate).unwrap();
         let mut rest = vec![problem.calibration_prior_rows(&estimate)];
         rest.extend((2..layout.frames).map(|slot| problem.inertial_rows(slot, &estimate)));
         rest.extend((1..layout.frames).map(|slot| problem.encoder_rows(slot, &estimate)));
@@ -190,7 +194,7 @@ fn dropping_a_frame_from_the_prior_keeps_what_it_said_about_the_others() {
     let mut estimator = fixture::window(Parameterization::Minimal, true, quadratic());
     fixture::marginalize_once(&mut estimator);
     let problem = estimator.problem(&[]);
-    let estimate = estimate_of(&estimator, Vec::new());
+    let estimate = estimate_of(&estimator, &[]);
     let (prior, layout) = (problem.prior.unwrap(), problem.layout);
     let gone = 2;
     assert!(prior.holds_frame(gone));
@@ -222,18 +226,16 @@ fn the_classical_chain_keeps_its_null_directions_with_first_estimates() {
     let mut estimator = fixture::window(Parameterization::Classical, true, quadratic());
     fixture::marginalize_once(&mut estimator);
     fixture::shake(&mut estimator, 0.5);
-    let (_, tracks, landmarks) = estimator.active_tracks();
-    let problem = estimator.problem(&tracks);
-    let estimate = estimate_of(&estimator, landmarks);
+    let active = estimator.active_tracks();
+    let problem = estimator.problem(&active);
+    let estimate = estimate_of(&estimator, &active);
     let total = problem.layout.total();
-    let mut parts = vec![
-        problem.visual_rows(&estimate, &tracks, &estimate.landmarks),
-        problem.prior.unwrap().rows(&problem.layout, &DVector::zeros(total)),
-    ];
+    let mut parts =
+        vec![problem.visual_rows(&estimate), problem.prior.unwrap().rows(&problem.layout, &DVector::zeros(total))];
     parts.extend((1..problem.layout.frames).map(|slot| problem.inertial_rows(slot, &estimate)));
     let rows = stack(&parts, total + 1);
     let first = estimate.calibration.at_first_estimate();
-    let directions = crate::gimbal::redundant_directions(&first.chain().to_classical());
+    let directions = crate::gimbal::redundant_directions(&first.of(MAIN).chain().to_classical());
     assert_eq!(directions.ncols(), 6);
     let calibration = rows.columns_range(problem.layout.calibration()).into_owned();
     let moved = &calibration * &directions;
@@ -244,11 +246,12 @@ fn the_classical_chain_keeps_its_null_directions_with_first_estimates() {
 fn solving_finds_the_truth_from_a_shaken_start() {
     for (name, mut estimator) in windows() {
         fixture::shake(&mut estimator, 1.0);
-        let (_, tracks, landmarks) = estimator.active_tracks();
-        let problem = estimator.problem(&tracks);
+        let active = estimator.active_tracks();
+        let problem = estimator.problem(&active);
         let limits = SolverLimits { iterations: 20, relative_cost_tolerance: 1e-9 };
-        let solution = solver::solve(&problem, estimate_of(&estimator, landmarks), limits);
-        let residuals = 2 * tracks.iter().map(|track| track.sightings.len()).sum::<usize>();
+        let solution = solver::solve(&problem, estimate_of(&estimator, &active), limits);
+        let tracks = active.iter().flat_map(|active| &active.tracks);
+        let residuals = 2 * tracks.map(|track| track.sightings.len()).sum::<usize>();
         let expected = residuals as f64 * 0.09;
         assert!(solution.costs_after.visual < 1.5 * expected, "{name}: {:?} of {expected}", solution.costs_after);
         assert!(solution.costs_after.total() < 0.01 * solution.costs_before.total(), "{name}");

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::estimator::rigid_columns;
 use crate::gimbal::Parameterization;
 use crate::gui::chain_values::{NamedValues, named_values, turn_towards};
 use crate::gui::follow::Follower;
@@ -160,7 +161,9 @@ impl ConvertedHistory {
         for step in news.steps {
             let row = self.stamps_ns.len();
             self.stamps_ns.push(step.report.stamp_ns);
-            let mut values = named_values(&step.report.calibration.classical, target);
+            let calibration = &step.report.calibration;
+            let mut values = named_values(&calibration.classical, target);
+            values.extend(calibration.rigid_cameras.iter().flat_map(|(key, pose)| rigid_columns(key, pose)));
             turn_towards(&mut values, &self.last);
             for (name, value) in &values {
                 let column = self.values.entry(name.clone()).or_default();

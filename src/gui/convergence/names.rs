@@ -11,6 +11,8 @@ pub(crate) enum ChainPart {
     Link(usize),
     /// Between the last joint and the camera, and what else there is.
     End,
+    /// The mount of a rigid camera that is watched beside the gimballed one.
+    Rigid,
 }
 
 /// The part of the chain that a parameter's name (`I.rx`, `L2.alpha`, `EC.tz`) speaks of.
@@ -18,6 +20,7 @@ pub(crate) fn part_of(name: &str) -> ChainPart {
     let head = name.split('.').next().unwrap_or(name);
     match head {
         "I" | "IB" => ChainPart::Base,
+        _ if head.starts_with("cam") => ChainPart::Rigid,
         _ => match head.strip_prefix('L').and_then(|number| number.parse().ok()) {
             Some(number) => ChainPart::Link(number),
             None => ChainPart::End,
@@ -31,6 +34,7 @@ pub(crate) fn heading_of(part: ChainPart, rig: &Rig) -> String {
         ChainPart::Base => "base".to_owned(),
         ChainPart::Link(number) => joint_name(number, rig).unwrap_or("link").to_owned(),
         ChainPart::End => "camera".to_owned(),
+        ChainPart::Rigid => "rigid".to_owned(),
     }
 }
 
@@ -68,6 +72,7 @@ pub(crate) fn meaning_of(name: &str, rig: &Rig) -> String {
         },
         ChainPart::End if head == "EC" => "effector to camera".to_owned(),
         ChainPart::End => "end of the chain".to_owned(),
+        ChainPart::Rigid => format!("IMU to the rigid {head}"),
     };
     format!("{kind} ({place})")
 }

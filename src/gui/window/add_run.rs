@@ -7,13 +7,14 @@ use crate::gui::PanelContext;
 use crate::session::{Command, RunSpec};
 
 /// What a parameterization is called on the command line, and what it is.
-const CHOICES: [(&str, &str); 6] = [
+const CHOICES: [(&str, &str); 7] = [
     ("auto", "the minimal form in the chart that suits the mechanism"),
     ("minimal", "the minimal form as printed"),
     ("minimal-swapped", "the minimal form with the end block swapped"),
     ("classical", "base, links and camera, with redundant directions"),
     ("poe", "the chart-free product of exponentials"),
     ("static", "the rigid camera of the rig"),
+    ("cluster", "the gimbal camera and the rigid one in one window"),
 ];
 
 /// State of the dialog.

@@ -1,0 +1,179 @@
+//! A gimballed and a rigid camera in one window.
+
+use super::fixture;
+use super::flight::{chain_error, fly, trajectory_error_m};
+use crate::estimator::{Estimator, EstimatorConfig, EstimatorOptions, Phase, StepInput, StepReport};
+use crate::flight_log::rig::ChainPrior;
+use crate::frontend::TrackedFrame;
+use crate::geometry::so3;
+use crate::gimbal::Parameterization;
+use crate::simulation::{SyntheticFlight, SyntheticMount, SyntheticOptions, synthetic_tracks};
+
+/// One flight seen by both cameras.
+struct BothFlights {
+    gimbal: SyntheticFlight,
+    rigid: SyntheticFlight,
+}
+
+impl BothFlights {
+    /// The given chain is off by up to 10° and 3 cm in every parameter, the rigid mount by what a good calibration leaves.
+    fn new(seed: u64, duration_s: f64) -> Self {
+        let options = |mount| SyntheticOptions {
+            mount,
+            seed,
+            duration_s,
+            pixel_sigma_px: 0.5,
+            outlier_share: 0.02,
+            features: 80,
+            ..SyntheticOptions::default()
+        };
+        let start_error = ChainPrior { translation_bound_m: 0.03, rotation_bound_rad: 10.0_f64.to_radians() };
+        let gimbal = synthetic_tracks(&SyntheticOptions { start_error, ..options(SyntheticMount::Gimbal) });
+        let rigid = synthetic_tracks(&options(SyntheticMount::Static));
+        assert_eq!(gimbal.frames[7].imu, rigid.frames[7].imu, "one flight");
+        Self { gimbal, rigid }
+    }
+
+    fn config(&self) -> EstimatorConfig {
+        EstimatorConfig {
+            rigid_cameras: vec![fixture::rigid_camera(&self.rigid)],
+            ..fixture::config(&self.gimbal.given_rig, Parameterization::Minimal, EstimatorOptions::default())
+        }
+    }
+
+    /// One step; a camera whose image is missing has seen nothing.
+    fn step(&self, estimator: &mut Estimator, index: usize, [gimbal, rigid]: [bool; 2]) -> StepReport {
+        let nothing = TrackedFrame::default();
+        let frame = &self.gimbal.frames[index];
+        let joint_angles = fixture::encoder(frame, estimator.config().encoder_sigma_rad);
+        estimator.step(&StepInput {
+            frame_index: frame.index,
+            stamp_ns: frame.stamp_ns,
+            imu: &frame.imu,
+            joint_angles: joint_angles.as_ref(),
+            tracks: if gimbal { &frame.tracks } else { &nothing },
+            rigid_tracks: &[if rigid { &self.rigid.frames[index].tracks } else { &nothing }],
+        })
+    }
+
+    fn fly(&self, config: EstimatorConfig, seen: impl Fn(usize) -> [bool; 2]) -> (Estimator, Vec<StepReport>) {
+        let mut estimator = Estimator::new(config);
+        let steps = 0..self.gimbal.frames.len();
+        let reports = steps.map(|index| self.step(&mut estimator, index, seen(index))).collect();
+        (estimator, reports)
+    }
+}
+
+fn both(_: usize) -> [bool; 2] {
+    [true, true]
+}
+
+#[test]
+fn both_cameras_beat_either_where_the_chain_is_given_wrong() {
+    let (mut cluster_m, mut gimbal_m, mut rigid_m) = (0.0, 0.0, 0.0);
+    let (mut cluster_rad, mut gimbal_rad) = (0.0, 0.0);
+    for seed in [5, 6, 8] {
+        let flights = BothFlights::new(seed, 14.0);
+        let config = flights.config();
+        let given = chain_error(&flights.gimbal, &Estimator::new(config.clone()));
+        assert!(given.1 > 5.0_f64.to_radians(), "seed {seed}: the chain is given wrong by {} rad", given.1);
+        let alone = EstimatorConfig { rigid_cameras: Vec::new(), ..config.clone() };
+        let (estimator, reports) = fly(&flights.gimbal.frames, alone);
+        gimbal_m += trajectory_error_m(&flights.gimbal.frames, &reports).0;
+        gimbal_rad += chain_error(&flights.gimbal, &estimator).1;
+        let alone = fixture::config(&flights.rigid.given_rig, Parameterization::Minimal, EstimatorOptions::default());
+        let (_, reports) = fly(&flights.rigid.frames, alone);
+        rigid_m += trajectory_error_m(&flights.rigid.frames, &reports).0;
+        let (estimator, reports) = flights.fly(config, both);
+        assert_eq!(estimator.restarts, 0, "seed {seed}");
+        cluster_m += trajectory_error_m(&flights.gimbal.frames, &reports).0;
+        cluster_rad += chain_error(&flights.gimbal, &estimator).1;
+    }
+    assert!(
+        cluster_m < gimbal_m && cluster_m < rigid_m,
+        "{cluster_m} m with both, {gimbal_m} m with the gimballed one, {rigid_m} m with the rigid one"
+    );
+    assert!(cluster_rad < 1.1 * gimbal_rad, "{cluster_rad} rad with both, {gimbal_rad} rad with the gimballed one");
+}
+
+#[test]
+fn both_calibrations_are_columns_with_names_of_their_own() {
+    let flights = BothFlights::new(5, 10.0);
+    let options = EstimatorOptions { keep_linearization: true, ..EstimatorOptions::default() };
+    let config = EstimatorConfig { options, ..flights.config() };
+    let (estimator, reports) = flights.fly(config, both);
+    let last = reports.last().unwrap();
+    let calibration = &last.calibration;
+    assert_eq!(calibration.names.len(), 24);
+    let mut names = calibration.names.clone();
+    names.sort();
+    names.dedup();
+    assert_eq!(names.len(), 24, "{names:?}");
+    assert_eq!(calibration.names[18..], ["rx", "ry", "rz", "tx", "ty", "tz"].map(|tail| format!("cam1.{tail}")));
+    for of_column in [&calibration.values, &calibration.sigmas, &calibration.prior_sigmas] {
+        assert!(of_column.len() == 24 && of_column.iter().all(|number| number.is_finite()));
+    }
+    assert!(calibration.sigmas.iter().zip(&calibration.prior_sigmas).all(|(after, before)| after < before));
+    let linearization = last.linearization.as_ref().unwrap();
+    assert_eq!(linearization.calibration_column_norms.len(), 24);
+    let names: Vec<&String> = linearization.columns[..24].iter().map(|column| &column.name).collect();
+    assert!(names.iter().zip(&calibration.names).all(|(column, name)| *column == name), "{names:?}");
+
+    // The rigid mount is found as well.
+    let truth = flights.rigid.true_rig.chain_of_camera("cam0").unwrap().imu_from_camera(&[]);
+    let angle = |pose: &crate::geometry::RigidTransform| so3::log(&(pose.rotation.inverse() * truth.rotation)).norm();
+    let [(key, mount)] = calibration.rigid_cameras.as_slice() else { panic!("one rigid camera") };
+    assert_eq!(key, "cam1");
+    let given = estimator.config().rigid_cameras[0].imu_from_camera;
+    assert!(angle(mount) < 0.3 * angle(&given), "{} of {} rad", angle(mount), angle(&given));
+
+    // Features are told apart.
+    let of = |camera: usize| last.features.iter().filter(|feature| feature.id.camera() == camera).count();
+    assert!(of(0) > 30 && of(1) > 30, "{} and {}", of(0), of(1));
+    assert!(last.landmarks.iter().any(|landmark| landmark.id.camera() == 1));
+}
+
+#[test]
+fn a_missing_image_leaves_the_step_to_the_other_camera() {
+    let flights = BothFlights::new(6, 12.0);
+    let seen = |index: usize| match index {
+        // One by one at the start, then a second without each camera.
+        0..60 => [!index.is_multiple_of(3), !index.is_multiple_of(4)],
+        120..140 => [false, true],
+        160..180 => [true, false],
+        _ => [true, true],
+    };
+    let (estimator, reports) = flights.fly(flights.config(), seen);
+    assert_eq!(estimator.restarts, 0);
+    assert!(reports[100..].iter().all(|report| report.phase == Phase::Tracking));
+    let (error, length) = trajectory_error_m(&flights.gimbal.frames, &reports);
+    assert!(error < 0.006 * length, "{error} m over {length} m");
+}
+
+#[test]
+fn fixed_calibrations_stay_as_they_were_given() {
+    let flights = BothFlights::new(5, 8.5);
+    let config = EstimatorConfig { calibrate: false, ..flights.config() };
+    let given = Estimator::new(config.clone()).classical_chain();
+    let (estimator, reports) = flights.fly(config, both);
+    assert_eq!(estimator.classical_chain(), given);
+    let calibration = &reports.last().unwrap().calibration;
+    assert_eq!(calibration.rigid_cameras[0].1, fixture::rigid_camera(&flights.rigid).imu_from_camera);
+    assert_eq!(calibration.sigmas, vec![0.0; 24]);
+}
+
+#[test]
+fn replays_and_clones_give_the_same_bits() {
+    let flights = BothFlights::new(8, 6.5);
+    let (_, reports) = flights.fly(flights.config(), both);
+    let mut estimator = Estimator::new(flights.config());
+    let half = flights.gimbal.frames.len() / 2 + 10;
+    for (index, report) in reports[..half].iter().enumerate() {
+        assert_eq!(format!("{:?}", flights.step(&mut estimator, index, both(index))), format!("{report:?}"));
+    }
+    assert_eq!(estimator.phase, Phase::Tracking);
+    let mut copy = estimator.clone();
+    for (index, report) in reports.iter().enumerate().skip(half) {
+        assert_eq!(format!("{:?}", flights.step(&mut copy, index, both(index))), format!("{report:?}"));
+    }
+}
