@@ -38,6 +38,8 @@ pub(super) struct NotSynchronized {
 pub(super) struct Instant {
     /// By camera of the run, the main one's first; at least one is there.
     frames: Vec<Option<Arc<TrackedSensorFrame>>>,
+    /// Header stamp since the log began, on the main camera's clock.
+    stamp_ns: i64,
     /// Since the instant before, where that is not what an image brings.
     motion: Option<Vec<ImuSample>>,
 }
@@ -46,7 +48,7 @@ impl Instant {
     /// An instant of a run that watches one camera.
     #[cfg(test)]
     pub(super) fn of_one(frame: Arc<TrackedSensorFrame>) -> Self {
-        Self { frames: vec![Some(frame)], motion: None }
+        Self { stamp_ns: frame.frame.stamp_ns, frames: vec![Some(frame)], motion: None }
     }
 
     /// The image that tells what all cameras share: the main camera's where there is one.
@@ -60,9 +62,9 @@ impl Instant {
         if self.frames[0].is_some() { index } else { BESIDE_MAIN + index }
     }
 
-    /// Header stamp since the log began.
+    /// Header stamp since the log began, on the main camera's clock.
     pub(super) fn stamp_ns(&self) -> i64 {
-        self.any().frame.stamp_ns
+        self.stamp_ns
     }
 
     /// Log time since the log began.
@@ -122,8 +124,7 @@ impl CameraImages {
 
     /// When the next image was taken, on the clock of the IMU.
     fn next_ns(&self) -> Option<i64> {
-        let frame = &self.next.as_ref()?.frame;
-        Some(frame.imu.last().map_or(frame.stamp_ns, |last| last.stamp_ns))
+        self.next.as_deref().map(taken_ns)
     }
 }
 
@@ -133,6 +134,8 @@ pub(super) struct Instants {
     cameras: Vec<CameraImages>,
     /// Inertial sample at the end of the last instant.
     end: Option<ImuSample>,
+    /// How far the IMU's clock is ahead of the main camera's, once an image of it has told.
+    main_shift_ns: Option<i64>,
 }
 
 impl Instants {
@@ -142,7 +145,7 @@ impl Instants {
             .into_iter()
             .map(|(key, images)| CameraImages { key, images, next: None, ended: false, lone_ns: Vec::new() })
             .collect();
-        Self { cameras, end: None }
+        Self { cameras, end: None, main_shift_ns: None }
     }
 
     /// Waits for the next instant, `None` at the end of all streams.
@@ -156,7 +159,12 @@ impl Instants {
             camera.lone_ns.extend(taken_ns);
         }
         self.check_together(&frames)?;
-        let mut instant = Instant { frames, motion: None };
+        if let Some(main) = &frames[0] {
+            self.main_shift_ns = Some(taken_ns(main) - main.frame.stamp_ns);
+        }
+        let mut instant = Instant { frames, stamp_ns: 0, motion: None };
+        let image = instant.any();
+        instant.stamp_ns = self.main_shift_ns.map_or(image.frame.stamp_ns, |shift_ns| taken_ns(image) - shift_ns);
         if self.cameras.len() > 1 {
             let motion = self.motion_to(&instant);
             self.end = motion.last().copied().or(self.end);
@@ -190,6 +198,11 @@ impl Instants {
             count: offsets_ns.len(),
         })
     }
+}
+
+/// When an image was taken, on the clock of the IMU.
+fn taken_ns(image: &TrackedSensorFrame) -> i64 {
+    image.frame.imu.last().map_or(image.frame.stamp_ns, |last| last.stamp_ns)
 }
 
 /// How much later an instant is than the nearest of others.

@@ -1,8 +1,13 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::accuracy::{Alignment, AlignmentSums};
+use super::configuration::estimator_config;
+use super::plan::cameras_of_run;
 use super::spec::distinct_labels;
 use super::{ParameterizationChoice, RunSpec, RunSpecError};
+use crate::flight_log::Rig;
+use crate::flight_log::rig::CameraRig;
+use crate::simulation::{SyntheticMount, SyntheticOptions, synthetic_tracks};
 
 /// The specification, and its message when it is refused.
 fn parse(text: &str) -> Result<RunSpec, String> {
@@ -71,4 +76,34 @@ fn alignment_finds_yaw_shift_and_scale_again() {
     check(Alignment::Rigid, UnitQuaternion::from_euler_angles(0.3, -0.5, 2.0), 1.0);
     check(Alignment::Similarity, UnitQuaternion::from_euler_angles(0.3, -0.5, 2.0), 1.3);
     assert!(AlignmentSums::default().solve(Alignment::YawPosition).is_none());
+}
+
+#[test]
+fn a_cluster_watches_the_gimballed_camera_and_the_rigid_one() {
+    let rig_of =
+        |mount| synthetic_tracks(&SyntheticOptions { mount, duration_s: 0.1, ..SyntheticOptions::default() }).given_rig;
+    let (mut rig, rigid) = (rig_of(SyntheticMount::Gimbal), rig_of(SyntheticMount::Static));
+    let refused = |rig: &Rig, text: &str| cameras_of_run(rig, &parse(text).unwrap()).unwrap_err().to_string();
+    let message = refused(&rig, "cluster");
+    assert!(message.contains("mount: static") && message.contains("cam0 (mount: gimbal)"), "{message}");
+    let message = refused(&rigid, "cluster");
+    assert!(message.contains("mount: gimbal") && message.contains("cam0 (mount: static)"), "{message}");
+
+    rig.cameras.push(CameraRig { key: "cam1".to_owned(), ..rigid.cameras[0].clone() });
+    let keys = |text: &str| -> Vec<String> {
+        cameras_of_run(&rig, &parse(text).unwrap()).unwrap().iter().map(|camera| camera.key.clone()).collect()
+    };
+    assert_eq!((keys("auto"), keys("static")), (vec!["cam0".to_owned()], vec!["cam1".to_owned()]));
+    assert_eq!(keys("cluster"), ["cam0", "cam1"]);
+    let message = refused(&rig, "cluster:camera=cam1");
+    assert!(message.contains("camera 'cam1' with mount: gimbal"), "{message}");
+
+    // Both cameras are given as the runs that watch one of them are given them.
+    let config = |text: &str| estimator_config(&rig, &parse(text).unwrap()).unwrap();
+    let (cluster, alone) = (config("cluster:window=8,calibrate=off,encoder=off"), config("static"));
+    assert_eq!((cluster.options.window, cluster.calibrate, cluster.use_encoder), (8, false, false));
+    assert_eq!(cluster.chain, config("auto").chain);
+    let [beside] = cluster.rigid_cameras.as_slice() else { panic!("one rigid camera") };
+    assert_eq!((beside.key.as_str(), beside.imu_from_camera), ("cam1", alone.chain.imu_from_base));
+    assert_eq!(Some(beside.prior), alone.chain_prior);
 }
