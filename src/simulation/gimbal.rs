@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
+use super::exercise::Exercise;
 use super::random::RandomStream;
 use super::route::Wave;
 use super::trajectory::Trajectory;
@@ -146,6 +147,23 @@ impl JointMotion {
             }
         }
         Self { states }
+    }
+
+    /// From a time on the joints are held where they are, but for an exercise's swing within the stops.
+    pub(crate) fn exercise_from(&mut self, start_s: f64, exercise: &Exercise, joints: &[Joint]) {
+        let first = ((start_s / CONTROL_STEP_S).ceil() as usize).min(self.states.len() - 1);
+        let held = self.states[first].0;
+        for (step, (angles, rates)) in self.states.iter_mut().enumerate().skip(first) {
+            let time_s = (step - first) as f64 * CONTROL_STEP_S;
+            for (joint, (angle, rate)) in angles.iter_mut().zip(rates).enumerate() {
+                let swung = |time_s: f64| {
+                    let (low, high) = joints[joint].limits_rad;
+                    (held[joint] + exercise.joint_rad(joint, time_s)).clamp(low, high)
+                };
+                *angle = swung(time_s);
+                *rate = (swung(time_s + CONTROL_STEP_S) - swung(time_s - CONTROL_STEP_S)) / (2.0 * CONTROL_STEP_S);
+            }
+        }
     }
 
     /// The true joint angles at a time, by cubic interpolation between control steps.

@@ -5,6 +5,7 @@
 //! Everything follows from a seed; the same options give the same bits whatever the thread count.
 
 mod equipment;
+mod exercise;
 mod experiment;
 mod gimbal;
 mod inertial;
@@ -22,6 +23,7 @@ mod trajectory;
 mod world;
 
 pub use equipment::Lens;
+pub use exercise::{Exercise, JOINT_PERIOD_S, JointSwing, SWING_M, VehicleSwing, YAW_SWING_RAD};
 pub use experiment::{Environment, Experiment};
 pub use gimbal::JointMotion;
 pub use inertial::ImuBias;

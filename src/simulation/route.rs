@@ -2,6 +2,7 @@
 
 use nalgebra::{Vector2, Vector3};
 
+use super::exercise::Exercise;
 use super::random::RandomStream;
 use crate::geometry::wrap_angle;
 
@@ -275,6 +276,54 @@ pub(crate) struct Station {
     pub(crate) position_m: Vector3<f64>,
     /// Heading.
     pub(crate) heading_rad: f64,
+}
+
+/// A stay at one place with a lively warm-up, then an exercise from rest.
+#[derive(Clone, Debug)]
+pub(crate) struct Drill {
+    /// Where.
+    pub(crate) position_m: Vector3<f64>,
+    /// Heading at rest.
+    pub(crate) heading_rad: f64,
+    /// When the exercise begins.
+    pub(crate) start_s: f64,
+    /// What is exercised.
+    pub(crate) exercise: Exercise,
+}
+
+impl Drill {
+    /// Rest before and after the warm-up.
+    const REST_S: f64 = 1.0;
+
+    /// Share of the warm-up's size at a time: none while resting.
+    fn liveliness(&self, time_s: f64) -> f64 {
+        let (begin_s, end_s) = (Self::REST_S, self.start_s - Self::REST_S);
+        let share = ((time_s - begin_s) / (end_s - begin_s).max(1e-3)).clamp(0.0, 1.0);
+        (std::f64::consts::PI * share).sin().powi(2)
+    }
+}
+
+impl Flight for Drill {
+    fn knot_s(&self) -> f64 {
+        0.1
+    }
+
+    fn point(&self, time_s: f64) -> FlightPoint {
+        let wave =
+            |size: f64, period_s: f64, phase: f64| size * (std::f64::consts::TAU * time_s / period_s + phase).sin();
+        let warm_up = Vector3::new(wave(0.8, 2.9, 0.0), wave(0.7, 2.3, 1.0), wave(0.4, 2.1, 2.0));
+        let liveliness = self.liveliness(time_s);
+        let exercise_s = (time_s - self.start_s).max(0.0);
+        let (sine, cosine) = self.heading_rad.sin_cos();
+        let shift = self.exercise.shift_m(exercise_s);
+        let shift = Vector3::new(cosine * shift.x - sine * shift.y, sine * shift.x + cosine * shift.y, shift.z);
+        FlightPoint {
+            position_m: self.position_m + warm_up * liveliness + shift,
+            deviation_m: Vector3::zeros(),
+            heading_rad: self.heading_rad + liveliness * wave(0.4, 3.7, 0.5) + self.exercise.turn_rad(exercise_s),
+            deviation_heading_rad: 0.0,
+        }
+    }
 }
 
 impl Flight for Station {

@@ -5,11 +5,12 @@ use std::collections::BTreeMap;
 use nalgebra::{Vector2, Vector3};
 
 use super::equipment::{Equipment, Lens};
+use super::exercise::Exercise;
 use super::experiment::Experiment;
 use super::gimbal::LookAround;
 use super::inertial::ImuBias;
 use super::random::RandomStream;
-use super::route::{Flight, Pace, Station};
+use super::route::{Drill, Flight, Pace, Station};
 use super::scenario::{Scenario, ScenarioOptions, gravity_m_per_s2, stream};
 use super::trajectory::{Trajectory, VehicleLimits};
 use crate::camera::CameraModel;
@@ -69,6 +70,8 @@ pub struct SyntheticOptions {
     pub look_around_rad: f64,
     /// The lens.
     pub lens: Lens,
+    /// In place of the motion: a stay with a warm-up until this second, then the exercise.
+    pub exercise: Option<(f64, Exercise)>,
 }
 
 impl Default for SyntheticOptions {
@@ -87,6 +90,7 @@ impl Default for SyntheticOptions {
             start_error: Experiment::T1.start_error(),
             look_around_rad: 0.5,
             lens: Lens::Pinhole,
+            exercise: None,
         }
     }
 }
@@ -152,7 +156,7 @@ pub fn synthetic_tracks(options: &SyntheticOptions) -> SyntheticFlight {
         0.15 * swing_deg,
         &mut RandomStream::new(options.seed, stream::LOOK),
     );
-    let scenario = Scenario::new(
+    let mut scenario = Scenario::new(
         trajectory(options),
         &look,
         &ScenarioOptions {
@@ -163,6 +167,11 @@ pub fn synthetic_tracks(options: &SyntheticOptions) -> SyntheticFlight {
             imu_noise_scale: options.imu_noise_scale,
         },
     );
+    if let (Some((start_s, exercise)), Some(motion), Some(gimbal)) =
+        (&options.exercise, &mut scenario.joints, &scenario.true_rig.gimbal)
+    {
+        motion.exercise_from(*start_s, exercise, &gimbal.joints);
+    }
     let camera = &scenario.true_rig.cameras[0];
     let mut encoders = RandomStream::new(options.seed, stream::ENCODERS);
     let mut tracker = Tracker::new(camera.model.clone(), options);
@@ -205,8 +214,11 @@ fn trajectory(options: &SyntheticOptions) -> Trajectory {
         SyntheticMotion::StandstillThenAggressive => Pace { hover_s: 4.0, sway_m: 0.0, ..Pace::aggressive() },
         SyntheticMotion::Hover => Pace { hover_s: 1e6, ..Pace::aggressive() },
     };
-    let flight: Box<dyn Flight> = if options.motion == SyntheticMotion::Hover {
-        Box::new(Station { pace, position_m: Vector3::new(0.0, -12.0, 2.5), heading_rad: 1.0 })
+    let station_m = Vector3::new(0.0, -12.0, 2.5);
+    let flight: Box<dyn Flight> = if let Some((start_s, exercise)) = options.exercise {
+        Box::new(Drill { position_m: station_m, heading_rad: 1.0, start_s, exercise })
+    } else if options.motion == SyntheticMotion::Hover {
+        Box::new(Station { pace, position_m: station_m, heading_rad: 1.0 })
     } else {
         Experiment::T1.flight_at(pace, 0.0, &mut route)
     };

@@ -1,0 +1,98 @@
+//! Exercises: single swings of the vehicle and of one joint, for flights that are to excite something.
+
+use std::f64::consts::TAU;
+
+use nalgebra::Vector3;
+
+/// How the vehicle swings; a multirotor tilts as its acceleration asks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum VehicleSwing {
+    /// It hovers.
+    Hover,
+    /// Forward and back.
+    Forward,
+    /// Left and right.
+    Sideways,
+    /// Up and down.
+    UpDown,
+    /// Quickly left and right, so that it rolls.
+    Roll,
+    /// Quickly forward and back, so that it pitches.
+    Pitch,
+    /// About the vertical.
+    Yaw,
+}
+
+impl VehicleSwing {
+    /// All of them.
+    pub const ALL: [Self; 7] =
+        [Self::Hover, Self::Forward, Self::Sideways, Self::UpDown, Self::Roll, Self::Pitch, Self::Yaw];
+}
+
+/// A swing of one joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointSwing {
+    /// Which joint, from 0.
+    pub joint: usize,
+    /// How far to either side of where it is.
+    pub amplitude_rad: f64,
+}
+
+/// Swings of the vehicle and of a joint at once, the other joints held.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Exercise {
+    /// The vehicle's.
+    pub vehicle: VehicleSwing,
+    /// The joint's.
+    pub joint: Option<JointSwing>,
+}
+
+/// Slow swings go this far to either side.
+pub const SWING_M: f64 = 0.75;
+/// Period of a slow swing.
+const SWING_PERIOD_S: f64 = 4.0;
+/// Quick ones go this far.
+const ROCK_M: f64 = 0.12;
+/// Period of a quick swing: 3 m/s² and 17° of tilt at its turning points.
+const ROCK_PERIOD_S: f64 = 1.25;
+/// The vehicle's yaw goes this far.
+pub const YAW_SWING_RAD: f64 = 20.0 * std::f64::consts::PI / 180.0;
+/// Period of the vehicle's yaw.
+const YAW_PERIOD_S: f64 = 3.3;
+/// Period of a joint's swing; no simple ratio to the vehicle's, so that the two do not go in step.
+pub const JOINT_PERIOD_S: f64 = 2.6;
+/// A swing grows to its size in this time.
+const GROWTH_S: f64 = 1.0;
+
+fn swing(time_s: f64, period_s: f64) -> f64 {
+    let share = (time_s / GROWTH_S).clamp(0.0, 1.0);
+    let grown = share * share * share * (share * (share * 6.0 - 15.0) + 10.0);
+    grown * (TAU * time_s / period_s).sin()
+}
+
+impl Exercise {
+    /// Shift of the vehicle from where it began: forward, left, up, in metres.
+    pub fn shift_m(&self, time_s: f64) -> Vector3<f64> {
+        let slow = SWING_M * swing(time_s, SWING_PERIOD_S);
+        let quick = ROCK_M * swing(time_s, ROCK_PERIOD_S);
+        match self.vehicle {
+            VehicleSwing::Hover | VehicleSwing::Yaw => Vector3::zeros(),
+            VehicleSwing::Forward => Vector3::new(slow, 0.0, 0.0),
+            VehicleSwing::Sideways => Vector3::new(0.0, slow, 0.0),
+            VehicleSwing::UpDown => Vector3::new(0.0, 0.0, slow),
+            VehicleSwing::Roll => Vector3::new(0.0, quick, 0.0),
+            VehicleSwing::Pitch => Vector3::new(quick, 0.0, 0.0),
+        }
+    }
+
+    /// Turn of the vehicle about the vertical, in radians.
+    pub fn turn_rad(&self, time_s: f64) -> f64 {
+        if self.vehicle == VehicleSwing::Yaw { YAW_SWING_RAD * swing(time_s, YAW_PERIOD_S) } else { 0.0 }
+    }
+
+    /// How far a joint is from where it began, in radians.
+    pub fn joint_rad(&self, joint: usize, time_s: f64) -> f64 {
+        let swung = self.joint.filter(|swung| swung.joint == joint);
+        swung.map_or(0.0, |swung| swung.amplitude_rad * swing(time_s, JOINT_PERIOD_S))
+    }
+}
