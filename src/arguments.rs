@@ -6,6 +6,8 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use dcvins::session::accuracy::{Alignment, RelativeDelta};
 use dcvins::session::{RunSpec, SessionRequest};
 
+use crate::degeneracy::DegeneracyArguments;
+
 /// Debugger for visual-inertial navigation with a camera on a gimbal.
 #[derive(Debug, Parser)]
 #[command(version, about, propagate_version = true)]
@@ -31,6 +33,8 @@ pub(crate) enum Command {
     Check(CheckArguments),
     /// Write a synthetic flight with known truth: the log, its rig and its truth.
     Simulate(SimulateArguments),
+    /// Tell which calibration parameters a mechanism, its parameterization and a motion can identify, without a log.
+    Degeneracy(DegeneracyArguments),
     /// Compare a trajectory with a reference: absolute and relative errors, as evo computes them.
     Evaluate(EvaluateArguments),
 }

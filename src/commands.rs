@@ -25,7 +25,7 @@ const PROGRESS_PERIOD_MS: f64 = 100.0;
 const PROGRESS_WIDTH: usize = 32;
 
 /// Writes to standard output; a reader that went away is no failure.
-fn print(text: &str) -> Result<()> {
+pub(crate) fn print(text: &str) -> Result<()> {
     let mut stdout = io::stdout().lock();
     match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
@@ -161,6 +161,17 @@ fn describe(folder: &Path, summary: &RunSummary) -> String {
             rank.deficit.absorbed,
             rank.deficit.motion
         ));
+        let held = |known: &export::KnownLossSummary| known.agreeing == known.steps;
+        if !rank.known.is_empty() {
+            let agreeing = rank.known.iter().filter(|known| held(known)).count();
+            lines.push(format!(
+                "  structure    {agreeing} of {} known losses measured as null in every step\n",
+                rank.known.len()
+            ));
+        }
+        lines.extend(rank.known.iter().filter(|known| !held(known)).map(|known| {
+            format!("               null in {} of {} steps only: {}\n", known.agreeing, known.steps, known.reason)
+        }));
     }
     if let (Some(timing), Some(factor)) = (&summary.timing_ms, summary.real_time_factor) {
         let stage = |stage: &export::StageSummary| format!("{:.1}/{:.1}", stage.p50, stage.p95);

@@ -2,6 +2,7 @@
 
 mod arguments;
 mod commands;
+mod degeneracy;
 
 use std::io::Write as _;
 use std::process::ExitCode;
@@ -20,6 +21,7 @@ fn main() -> ExitCode {
         Command::Calibrate(calibrate) => commands::calibrate(&calibrate),
         Command::Check(check) => commands::check(&check),
         Command::Simulate(simulate) => commands::simulate(&simulate),
+        Command::Degeneracy(arguments) => degeneracy::degeneracy(&arguments),
         Command::Evaluate(evaluate) => commands::evaluate(&evaluate),
     };
     match result {

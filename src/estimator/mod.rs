@@ -31,6 +31,7 @@ mod rows;
 mod solver;
 mod standstill;
 mod startup;
+mod supposed;
 #[cfg(test)]
 mod tests;
 mod tracking;
@@ -43,6 +44,7 @@ pub use footprint::{ReportBytes, allocated_bytes};
 pub use observations::Observations;
 pub use options::{EstimatorOptions, LandmarkModel, RobustLoss, TrackContinuation};
 pub use preintegration::{ImuBias, MotionIncrement, NavigationState, Preintegration};
+pub use supposed::{JointKnowledge, PoseKnowledge, SupposedFrame, SupposedLandmark, SupposedWindow};
 pub(crate) use visual::damped_inverse;
 
 pub use report::{

@@ -33,10 +33,14 @@ impl PoseBlocks {
         &mut self.blocks[index]
     }
 
-    /// Adds the `JᵀJ` of one sighting, `anchor < observer`.
+    /// Adds the `JᵀJ` of one sighting from another frame than the anchor.
     pub(super) fn add(&mut self, anchor: usize, observer: usize, term: &Reprojection) {
         *self.block_mut(observer, observer) += term.by_observer.tr_mul(&term.by_observer);
-        *self.block_mut(anchor, observer) += term.by_anchor.tr_mul(&term.by_observer);
+        if anchor < observer {
+            *self.block_mut(anchor, observer) += term.by_anchor.tr_mul(&term.by_observer);
+        } else {
+            *self.block_mut(observer, anchor) += term.by_observer.tr_mul(&term.by_anchor);
+        }
         *self.block_mut(anchor, anchor) += term.by_anchor.tr_mul(&term.by_anchor);
     }
 

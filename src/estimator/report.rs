@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector, Vector2, Vector3};
 use super::Observations;
 use crate::frontend::FeatureId;
 use crate::geometry::RigidTransform;
-use crate::gimbal::ClassicalChain;
+use crate::gimbal::{Chain, ClassicalChain};
 
 /// Where the estimator is in its life.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -239,6 +239,8 @@ pub struct Linearization {
     pub prior_jacobian: DMatrix<f64>,
     /// Norm of each calibration column before the depths were projected out, for the reference of the rank rule.
     pub calibration_column_norms: DVector<f64>,
+    /// The chain at which the calibration's columns were taken (with first estimates not the present one).
+    pub chain: Chain,
 }
 
 /// Milliseconds spent in each stage of the step.

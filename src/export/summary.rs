@@ -5,6 +5,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::evaluation::alignment_name;
+use super::structure::{KnownLossSummary, known_losses};
 use super::tables::parameter_name;
 use crate::estimator::{EventKind, Phase, StageTimes};
 use crate::geometry::{seconds_from_ns, so3, wrap_angle};
@@ -151,6 +152,8 @@ pub struct RankSummary {
     pub deficit: DeficitSummary,
     /// Structural null directions, each as its parameters with weight over a hundredth.
     pub null_directions: Vec<Vec<DirectionWeight>>,
+    /// What the form of the chain is known to lose, held against every step.
+    pub known: Vec<KnownLossSummary>,
 }
 
 /// Percentiles of one stage's time.
@@ -405,6 +408,7 @@ fn rank(recording: &Recording, run: &RunRecord) -> Option<RankSummary> {
             motion: rank.deficit_motion,
         },
         null_directions,
+        known: known_losses(run),
     })
 }
 

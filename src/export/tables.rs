@@ -105,7 +105,7 @@ pub(super) fn rank_csv(run: &RunRecord) -> String {
     }
     let mut text =
         "t_s,columns,rank_structural,rank_informed,deficit_parameterization,deficit_joints,deficit_absorbed,\
-                    deficit_motion,reference,structural_threshold,informed_threshold"
+                    deficit_motion,known_directions,known_agreeing,reference,structural_threshold,informed_threshold"
             .to_owned();
     for name in &margins {
         write!(text, ",margin_{}", name.replace([' ', ','], "_")).expect(INTO_STRING);
@@ -127,6 +127,8 @@ pub(super) fn rank_csv(run: &RunRecord) -> String {
             rank.deficit_joints,
             rank.deficit_absorbed,
             rank.deficit_motion,
+            rank.known.len(),
+            rank.known_agreeing(),
         ];
         for count in counts {
             write!(text, ",{count}").expect(INTO_STRING);

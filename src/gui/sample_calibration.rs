@@ -93,6 +93,9 @@ pub(crate) fn rank_at(names: &[String], index: usize) -> RankReport {
         deficit_absorbed: 0,
         deficit_motion: 0,
         directions,
+        known: Vec::new(),
+        posterior: crate::observability::PackedFactor::default(),
+        joint_count: names.iter().filter(|name| name.ends_with(".a")).count(),
         margins: vec![("base".to_owned(), 0.98), ("end".to_owned(), 0.93), ("L2".to_owned(), 0.99)],
     }
 }

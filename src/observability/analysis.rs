@@ -4,12 +4,13 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::estimator::{ColumnGroup, Linearization};
 use crate::geometry::dense;
-use crate::gimbal::{Chain, Parameterization, redundant_directions};
+use crate::gimbal::Chain;
 
-use super::RankReport;
 use super::classification::{ROTATION_SCALE_RAD, TRANSLATION_SCALE_M, classify, tolerance};
 use super::directions::weak_directions;
 use super::elimination::{Rows, column_norms};
+use super::structure::{compare, known_losses};
+use super::{PackedFactor, RankReport};
 
 /// Below this scaled singular value a direction is uninformed: the window leaves it over 0.71 of its scale.
 const INFORMED_THRESHOLD: f64 = 1.0;
@@ -74,7 +75,8 @@ pub fn analyse_with_scaling<A: AsRef<[f64]>>(
     let projected = Projected::new(linearization)?;
     let block = scaled(projected.measurements, &scale);
     let svd = dense::thin_svd(&block)?;
-    let with_priors = dense::singular_values(&scaled(projected.with_priors, &scale))?;
+    let with_priors = scaled(projected.with_priors, &scale);
+    let with_priors = if columns == 0 { with_priors } else { with_priors.qr().unpack_r() };
     let singular_values: Vec<f64> = svd.singular_values.iter().copied().collect();
 
     // The Frobenius norm stands in for the spectral one, which the column norms alone do not give; it is larger by at
@@ -90,11 +92,15 @@ pub fn analyse_with_scaling<A: AsRef<[f64]>>(
         .filter(|angles| angles.len() == chain.joint_count())
         .collect();
     let deficits = classify(chain, &angles, joints_free, columns, rank_structural);
+    let null_space = svd.v.columns(rank_structural, columns - rank_structural);
+    let losses = known_losses(&linearization.chain, joints_free);
+    let known = compare(losses, &scale, &block, &null_space, reference, structural_threshold);
     Some(RankReport {
         directions: weak_directions(&block, &svd.v, &singular_values, rank_structural, INFORMED_THRESHOLD),
         names,
         singular_values,
-        singular_values_with_priors: with_priors,
+        singular_values_with_priors: dense::singular_values(&with_priors)?,
+        posterior: PackedFactor::new(&with_priors),
         reference,
         structural_threshold,
         informed_threshold: INFORMED_THRESHOLD,
@@ -105,31 +111,17 @@ pub fn analyse_with_scaling<A: AsRef<[f64]>>(
         deficit_absorbed: deficits.absorbed,
         deficit_motion: deficits.motion,
         margins: chain.margins(),
+        known,
+        joint_count: chain.joint_count(),
     })
 }
 
-/// How much of the known redundancy of the classical form (Eqs. 11–17) the linearization claims to see, as the largest
-/// scaled response to one of the six directions relative to the reference of the rank rule; 0 when what is known and what
-/// was measured agree. `None` for the other forms, which have no such directions, and for columns that are not the
-/// chain's.
-pub fn redundancy_residual(linearization: &Linearization, chain: &Chain) -> Option<f64> {
-    let names = calibration_names(linearization);
-    if chain.parameterization() != Parameterization::Classical || names != chain.parameter_names() {
-        return None;
-    }
-    if chain.hides_joint_offsets() {
-        return None;
-    }
-    let scale = ScalingRule::Fixed.scale(&names);
-    let block = Projected::new(linearization)?.measurements;
-    let reference = linearization.calibration_column_norms.component_mul(&scale).norm();
-    let directions = redundant_directions(&chain.to_classical());
-    let responses = directions.column_iter().map(|direction| {
-        let size = direction.component_div(&scale).norm();
-        (&block * direction).norm() / size
-    });
-    let largest = responses.fold(0.0, f64::max);
-    Some(if reference > 0.0 { largest / reference } else { 0.0 })
+/// What the measurements alone tell about the calibration, as the information of its columns in units of 10° and 3 cm;
+/// `None` when the linearization is not finite.
+pub(super) fn measured_information(linearization: &Linearization) -> Option<DMatrix<f64>> {
+    let scale = ScalingRule::Fixed.scale(&calibration_names(linearization));
+    let block = scaled(Projected::new(linearization)?.measurements, &scale);
+    Some(block.tr_mul(&block))
 }
 
 fn calibration_names(linearization: &Linearization) -> Vec<String> {

@@ -55,6 +55,20 @@ pub(super) fn classify(
     Deficits { parameterization, joints, absorbed, motion: deficit - parameterization - joints - absorbed }
 }
 
+/// Orthonormal directions, in units of the two scales, that some motion of joints and vehicle can tell: what is neither
+/// redundant in the parameterization nor absorbed by free joint angles. Empty for a chain that is not finite.
+pub(super) fn excitable_directions(chain: &Chain, joints_free: bool) -> DMatrix<f64> {
+    let generic = generic_joint_angles(chain.joint_count(), 4 * (chain.joint_count() + 1));
+    let mut stack = scaled_stack(chain, &generic);
+    let reference = largest(&singular_values(&stack));
+    if joints_free && chain.joint_count() > 0 {
+        project_joints_out(chain, &generic, &mut stack);
+    }
+    let Some(svd) = dense::thin_svd(&stack) else { return DMatrix::zeros(chain.dof(), 0) };
+    let values: Vec<f64> = svd.singular_values.iter().copied().collect();
+    svd.v.columns(0, rank_above(&stack, &values, reference)).into_owned()
+}
+
 /// The chain's Jacobians under one another, rows and columns in units of the two scales.
 fn scaled_stack(chain: &Chain, joint_angles_rad: &[Vec<f64>]) -> DMatrix<f64> {
     let mut stack = stacked_jacobian(chain, joint_angles_rad);

@@ -11,9 +11,16 @@ mod analysis;
 mod classification;
 mod directions;
 mod elimination;
+mod factor;
+pub mod laboratory;
+mod persistence;
 mod report;
+mod structure;
 #[cfg(test)]
 mod tests;
 
-pub use analysis::{ScalingRule, analyse, analyse_with_scaling, redundancy_residual};
+pub use analysis::{ScalingRule, analyse, analyse_with_scaling};
+pub use factor::PackedFactor;
+pub use persistence::steps_lost;
 pub use report::{CalibrationDirection, RankReport};
+pub use structure::{KnownDirection, KnownLoss, known_losses};

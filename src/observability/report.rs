@@ -1,3 +1,4 @@
+use super::{KnownDirection, PackedFactor};
 use crate::estimator::allocated_bytes;
 
 /// Ranks of the calibration block at one step, by the rule of section 3 of the mathematics notes.
@@ -31,6 +32,12 @@ pub struct RankReport {
     pub directions: Vec<CalibrationDirection>,
     /// Margins to the chart's locks.
     pub margins: Vec<(String, f64)>,
+    /// What is known to be lost from the form of the chain, held against this measurement.
+    pub known: Vec<KnownDirection>,
+    /// Number of joints of the chain.
+    pub joint_count: usize,
+    /// Everything that is known of the calibration after the step, priors included, columns in units of the scale.
+    pub posterior: PackedFactor,
 }
 
 /// One right singular direction of the calibration block.
@@ -74,6 +81,13 @@ impl RankReport {
             + of_vec(&self.singular_values)
             + of_vec(&self.singular_values_with_priors)
             + of_vec(&self.directions)
+            + of_vec(&self.known)
+            + self.posterior.heap_bytes()
+    }
+
+    /// How many of the known directions the measurement finds null.
+    pub fn known_agreeing(&self) -> usize {
+        self.known.iter().filter(|known| known.agrees).count()
     }
 
     /// The parameter with the largest share in the weakest direction that is not a structural zero.

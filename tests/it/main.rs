@@ -2,6 +2,7 @@
 
 mod check;
 mod command_line;
+mod degeneracy;
 mod evaluate;
 #[cfg(feature = "gui")]
 mod renderers;

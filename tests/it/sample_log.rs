@@ -60,12 +60,33 @@ fn three_runs_leave_the_same_bytes_twice_and_stay_near_the_truth() {
             _ => (6, 6),
         };
         assert_eq!((columns, structural), expected, "{label}");
+        check_structure(&summary, &first.join(label).join("rank.csv"), expected);
         let calibrated = first.join(label).join("rig.yaml");
         let again = folder.path().join("again");
         let short = ["--duration", "0.5", "--rig", text_of(&calibrated), "--out", text_of(&again)];
         let mut arguments = vec!["run", text_of(&log)];
         arguments.extend(short);
         succeed(&arguments, "2");
+    }
+}
+
+/// What the form of the chain is known to lose is what every step measured, and nothing else is lost to the form.
+fn check_structure(summary: &Value, rank_csv: &Path, (columns, structural): (u64, u64)) {
+    let known = summary["rank"]["known"].as_array().expect("the known losses are a list");
+    assert_eq!(known.len() as u64, columns - structural);
+    for loss in known {
+        assert!(loss["steps"].as_u64() > Some(50) && loss["agreeing"] == loss["steps"], "{loss}");
+        assert!(loss["reason"].as_str().is_some_and(|reason| reason.contains("same motion (")), "{loss}");
+        assert!(loss["largest_response"].as_f64().is_some_and(|response| response < 1e-11), "{loss}");
+    }
+    let text = fs::read_to_string(rank_csv).expect("the run wrote its ranks");
+    let mut lines = text.lines();
+    let header: Vec<&str> = lines.next().expect("a head").split(',').collect();
+    let column = |name: &str| header.iter().position(|head| *head == name).expect("the column is there");
+    let (lost, agreeing) = (column("deficit_parameterization"), column("known_agreeing"));
+    for line in lines {
+        let cells: Vec<&str> = line.split(',').collect();
+        assert_eq!(cells[lost], cells[agreeing], "{line}");
     }
 }
 

@@ -7,7 +7,7 @@ use crate::camera::CameraModel;
 use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::tests::random::{Random, special_chains};
 use crate::gimbal::{Chain, ClassicalChain, Parameterization};
-use crate::observability::{RankReport, ScalingRule, analyse, analyse_with_scaling, redundancy_residual};
+use crate::observability::{KnownLoss, RankReport, ScalingRule, analyse, analyse_with_scaling};
 
 const FRAMES: usize = 10;
 
@@ -216,18 +216,60 @@ fn known_and_measured_redundancy_agree() {
     let window = window(&classical, Motion::Exciting);
     let chain = Chain::from_classical(&classical, Parameterization::Classical);
     let linearization = window.linearize(&chain, false);
-    assert!(redundancy_residual(&linearization, &chain).unwrap() < 1e-14);
+    let report = analyse(&linearization, &chain, &window.joint_angles_rad, false).unwrap();
+    assert_eq!((report.known.len(), report.known_agreeing()), (6, 6), "{:?}", report.known);
+    let reasons: Vec<String> = report.known.iter().map(|known| known.loss.reason(3)).collect();
+    assert_eq!(
+        reasons[1],
+        "base_from_joint2.d and the translation of imu_from_base along that axis are the same motion (Eqs. 11–17)"
+    );
+    assert!(reasons[3].starts_with("joint3_from_effector.d and"), "{reasons:?}");
     // A linearization that mixes two values of the calibration sees what nobody can see.
     let elsewhere = chain.plus(&DVector::from_element(24, 0.02));
     let mixed = window.linearize(&elsewhere, false);
     let mut inconsistent = linearization.clone();
     let half = inconsistent.jacobian.nrows() / 2;
     inconsistent.jacobian.rows_mut(0, half).copy_from(&mixed.jacobian.rows(0, half));
-    assert!(redundancy_residual(&inconsistent, &chain).unwrap() > 1e-6);
     let report = analyse(&inconsistent, &chain, &window.joint_angles_rad, false).unwrap();
     assert!(report.rank_structural > 18, "{}", report.verdict());
+    let wrong: Vec<_> = report.known.iter().filter(|known| !known.agrees).collect();
+    assert!(!wrong.is_empty() && wrong.iter().any(|known| known.response > 1e-6), "{:?}", report.known);
+    // The minimal form has lost nothing by itself, and without encoders its offsets.
     let minimal = Chain::from_classical(&classical, Parameterization::Minimal);
-    assert_eq!(redundancy_residual(&window.linearize(&minimal, false), &minimal), None);
+    let known = |joints_free: bool| {
+        let linearization = window.linearize(&minimal, joints_free);
+        analyse(&linearization, &minimal, &window.joint_angles_rad, joints_free).unwrap().known
+    };
+    assert!(known(false).is_empty());
+    let free = known(true);
+    let losses: Vec<_> = free.iter().map(|known| known.loss).collect();
+    assert_eq!(losses, [0, 1, 2].map(KnownLoss::FreeAngle));
+    assert!(free.iter().all(|known| known.agrees), "{free:?}");
+    // Without offsets and encoders all six directions of the classical form remain, with encoders four.
+    let without = Chain::from_classical(&classical, Parameterization::Classical).without_joint_offsets();
+    for (joints_free, count) in [(true, 6), (false, 4)] {
+        let linearization = window.linearize(&without, joints_free);
+        let report = analyse(&linearization, &without, &window.joint_angles_rad, joints_free).unwrap();
+        assert_eq!((report.known.len(), report.known_agreeing()), (count, count), "{:?}", report.known);
+    }
+}
+
+#[test]
+fn neighbours_on_parallel_axes_lose_what_is_said() {
+    for (name, expected) in [
+        ("parallel axes", &[KnownLoss::ParallelD(0)][..]),
+        ("coaxial axes", &[KnownLoss::ParallelD(0), KnownLoss::CoaxialTheta(0)]),
+    ] {
+        let (_, classical) = special_chains().into_iter().find(|(known, _)| *known == name).unwrap();
+        let window = window(&classical, Motion::Exciting);
+        let chain = Chain::from_classical(&classical, Parameterization::Minimal);
+        let linearization = window.linearize(&chain, false);
+        let report = analyse(&linearization, &chain, &window.joint_angles_rad, false).unwrap();
+        let losses: Vec<_> = report.known.iter().map(|known| known.loss).collect();
+        assert_eq!(losses, expected, "{name}");
+        assert_eq!(report.known_agreeing(), losses.len(), "{name}: {:?}", report.known);
+        assert_eq!(report.deficit_parameterization, losses.len(), "{name}: {}", report.verdict());
+    }
 }
 
 #[test]

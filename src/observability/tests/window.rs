@@ -1,12 +1,14 @@
-//! A window of known poses as a linearization, its depths projected out.
+//! A window of known poses as the estimator linearizes it.
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::Vector3;
 
 use crate::camera::CameraModel;
-use crate::estimator::{ColumnBlock, ColumnGroup, Linearization};
+use crate::estimator::{
+    ImuBias, JointKnowledge, LandmarkModel, Linearization, NavigationState, PoseKnowledge, SupposedFrame,
+    SupposedLandmark, SupposedWindow,
+};
 use crate::geometry::RigidTransform;
 use crate::gimbal::Chain;
-use crate::gimbal::tests::golden::Reprojection;
 
 pub(super) struct Landmark {
     pub(super) anchor: usize,
@@ -25,75 +27,40 @@ pub(super) struct Window {
 }
 
 impl Window {
-    /// The whitened linearization (1 px) with the joint angles known, or free in every frame.
+    /// The whitened linearization (1 px) with the joint angles known, or free in every frame; the bearings of the
+    /// landmarks count as exact, as in Eq. 9.
     pub(super) fn linearize(&self, chain: &Chain, joints_free: bool) -> Linearization {
-        let (columns, joints) = (chain.dof(), if joints_free { chain.joint_count() } else { 0 });
-        let frames = self.world_from_imu.len();
-        let width = columns + joints * frames;
-        let mut jacobian = DMatrix::zeros(0, width);
-        let mut squared_norms = DVector::zeros(columns);
-        for (index, landmark) in self.landmarks.iter().enumerate() {
-            let seen: Vec<_> = self.observations.iter().filter(|observation| observation[0] == index).collect();
-            if seen.is_empty() {
-                continue;
-            }
-            let mut rows = DMatrix::zeros(2 * seen.len(), width + 1);
-            for (place, [_, anchor, observer]) in seen.iter().enumerate() {
-                let frame = |slot: usize| (&self.world_from_imu[slot], self.joint_angles_rad[slot].as_slice());
-                let found = Reprojection::new(
-                    chain,
-                    &self.camera,
-                    frame(*anchor),
-                    frame(*observer),
-                    &landmark.bearing,
-                    landmark.inverse_depth_per_m,
-                );
-                let mut rows = rows.rows_mut(2 * place, 2);
-                rows.columns_mut(0, columns).copy_from(&found.by_parameters);
-                if joints_free {
-                    rows.columns_mut(columns + joints * anchor, joints).copy_from(&found.by_joints_i);
-                    rows.columns_mut(columns + joints * observer, joints).copy_from(&found.by_joints_j);
-                }
-                rows.column_mut(width).copy_from(&found.by_inverse_depth);
-            }
-            for column in 0..columns {
-                squared_norms[column] += rows.column(column).norm_squared();
-            }
-            let kept = without_last_column(rows);
-            let before = jacobian.nrows();
-            jacobian = jacobian.resize_vertically(before + kept.nrows(), 0.0);
-            jacobian.rows_mut(before, kept.nrows()).copy_from(&kept);
-        }
-        let mut blocks: Vec<_> = chain
-            .parameter_names()
-            .into_iter()
-            .enumerate()
-            .map(|(start, name)| ColumnBlock { group: ColumnGroup::Calibration, name, start, len: 1 })
-            .collect();
-        if joints > 0 {
-            blocks.extend((0..frames).map(|slot| ColumnBlock {
-                group: ColumnGroup::Joints,
-                name: format!("joints {slot}"),
-                start: columns + joints * slot,
-                len: joints,
-            }));
-        }
-        Linearization {
-            columns: blocks,
-            prior_jacobian: DMatrix::zeros(0, width),
-            jacobian,
-            calibration_column_norms: squared_norms.map(f64::sqrt),
-        }
+        let frames = self.world_from_imu.iter().zip(&self.joint_angles_rad).enumerate();
+        let landmarks = self.landmarks.iter().enumerate();
+        let supposed = SupposedWindow {
+            camera: self.camera.clone(),
+            frames: frames
+                .map(|(slot, (world_from_imu, joints_rad))| SupposedFrame {
+                    time_s: slot as f64,
+                    navigation: NavigationState {
+                        world_from_imu: *world_from_imu,
+                        velocity_m_per_s: Vector3::zeros(),
+                        bias: ImuBias::default(),
+                    },
+                    joints_rad: joints_rad.clone(),
+                    imu: Vec::new(),
+                })
+                .collect(),
+            landmarks: landmarks
+                .map(|(index, landmark)| SupposedLandmark {
+                    anchor: landmark.anchor,
+                    bearing: landmark.bearing,
+                    inverse_distance_per_m: landmark.inverse_depth_per_m / landmark.bearing.norm(),
+                    observers: self.observations.iter().filter(|seen| seen[0] == index).map(|seen| seen[2]).collect(),
+                })
+                .collect(),
+            poses: PoseKnowledge::Known,
+            joints: if joints_free { JointKnowledge::Unknown } else { JointKnowledge::Known },
+            pixel_sigma_px: 1.0,
+            landmark_model: LandmarkModel::InverseDistance,
+            gravity_in_world: Vector3::new(0.0, 0.0, -9.81),
+            chain_prior: (0.03, 10_f64.to_radians()),
+        };
+        supposed.linearize(&chain.to_classical(), chain.parameterization(), !chain.hides_joint_offsets())
     }
-}
-
-/// Mirrors the rows so that only the first one has an entry in the last column, and drops both.
-fn without_last_column(mut rows: DMatrix<f64>) -> DMatrix<f64> {
-    let last = rows.ncols() - 1;
-    let mut mirror = rows.column(last).into_owned();
-    let norm = mirror.norm();
-    mirror[0] += if mirror[0] < 0.0 { -norm } else { norm };
-    let along = rows.tr_mul(&mirror) * (2.0 / mirror.norm_squared());
-    rows -= &mirror * along.transpose();
-    rows.remove_row(0).remove_column(last)
 }

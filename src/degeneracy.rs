@@ -1,0 +1,231 @@
+//! `dcvins degeneracy`: what a mechanism, its forms and a motion can tell about the calibration, without a log.
+
+use std::path::PathBuf;
+
+use anyhow::{Context as _, Result, bail};
+use clap::{Args, ValueEnum};
+use dcvins::estimator::{JointKnowledge, PoseKnowledge};
+use dcvins::flight_log::Rig;
+use dcvins::gimbal::Parameterization;
+use dcvins::observability::laboratory::{
+    Advice, Excitation, LABORATORY_IMU, LaboratoryForm, LaboratoryMotion, LaboratoryReport, LaboratorySetup, Mechanism,
+    Situation, advise, excitation, truth_table,
+};
+
+use crate::commands::print;
+
+/// `dcvins degeneracy`.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct DegeneracyArguments {
+    /// Measure the whole truth table of the mathematics notes and hold it against them; what happens without arguments.
+    #[arg(long, conflicts_with_all = ["mechanism", "rig", "forms", "motion", "freeze", "encoder_sigma_deg", "poses"])]
+    pub table: bool,
+    /// A mechanism by name; `--list` tells them all [default: yaw-roll-pitch-offset].
+    #[arg(long, value_name = "NAME", conflicts_with = "rig")]
+    pub mechanism: Option<String>,
+    /// The mechanism of a rig file.
+    #[arg(long, value_name = "FILE")]
+    pub rig: Option<PathBuf>,
+    /// The rig's camera [default: the first one on the gimbal, or the first].
+    #[arg(long, value_name = "KEY", requires = "rig")]
+    pub camera: Option<String>,
+    /// Forms to compare: classical, minimal, minimal-yx, minimal-swapped, minimal-swapped-yx, poe, each also with
+    /// `-without-offsets` [default: classical,minimal,minimal-swapped,poe].
+    #[arg(long = "form", value_name = "NAME", value_delimiter = ',')]
+    pub forms: Vec<LaboratoryForm>,
+    /// How vehicle and camera move; `--list` tells all motions [default: aggressive].
+    #[arg(long, value_name = "NAME")]
+    pub motion: Option<LaboratoryMotion>,
+    /// Numbers of joints that do not move, from 1.
+    #[arg(long, value_name = "N,…", value_delimiter = ',')]
+    pub freeze: Vec<usize>,
+    /// Standard deviation of the encoders in degrees, `known` for exact angles, `none` without encoders
+    /// [default: known].
+    #[arg(long, value_name = "D|known|none", value_parser = joint_knowledge)]
+    pub encoder_sigma_deg: Option<JointKnowledge>,
+    /// What is known of the vehicle's poses [default: known].
+    #[arg(long, value_enum)]
+    pub poses: Option<PosesArgument>,
+    /// Number of frames, 0.25 s apart [default: 10].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(2..=64))]
+    pub frames: Option<u16>,
+    /// Number of landmarks [default: 100].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=2000))]
+    pub landmarks: Option<u16>,
+    /// Tell what to fly next: candidate motions from the end of the experiment, by what they would leave of the direction
+    /// that is known least, and which motion told what so far; for the first form.
+    #[arg(long, conflicts_with = "table")]
+    pub advise: bool,
+    /// Tell the mechanisms and motions by name.
+    #[arg(long)]
+    pub list: bool,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// What is known of the poses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum PosesArgument {
+    /// Everything.
+    Known,
+    /// What the inertial sensor tells, its biases unknown.
+    Imu,
+    /// What the inertial sensor tells, its biases known.
+    ImuBiasKnown,
+}
+
+fn joint_knowledge(text: &str) -> Result<JointKnowledge, String> {
+    match text {
+        "known" => Ok(JointKnowledge::Known),
+        "none" => Ok(JointKnowledge::Unknown),
+        _ => text
+            .parse::<f64>()
+            .ok()
+            .filter(|sigma_deg| sigma_deg.is_finite() && *sigma_deg > 0.0)
+            .map(|sigma_deg| JointKnowledge::Encoder(sigma_deg.to_radians()))
+            .ok_or_else(|| "expected degrees, a number above 0, or known, or none".to_owned()),
+    }
+}
+
+/// Runs the command.
+pub(crate) fn degeneracy(arguments: &DegeneracyArguments) -> Result<()> {
+    if arguments.list {
+        return print(&list());
+    }
+    if arguments.asks_nothing() {
+        let table = truth_table();
+        return print_as(&table, arguments.json);
+    }
+    let setup = arguments.setup()?;
+    let forms = match (arguments.forms.is_empty(), arguments.advise) {
+        (false, _) => arguments.forms.clone(),
+        (true, false) => DEFAULT_FORMS.to_vec(),
+        (true, true) => vec![LaboratoryForm::whole(Parameterization::Minimal)],
+    };
+    let results = setup.run_all(&forms);
+    if results.len() < forms.len() {
+        bail!("the numbers of the mechanism '{}' are too large to compute with", setup.mechanism.name);
+    }
+    let report = LaboratoryReport::new(&setup, &results);
+    if !arguments.advise {
+        return print_as(&report, arguments.json);
+    }
+    let form = forms.first().copied().context("--advise needs a form")?;
+    print_as(&Advised::new(report, &setup, form)?, arguments.json)
+}
+
+/// An experiment with what should be flown after it.
+#[derive(Debug, serde::Serialize)]
+struct Advised {
+    experiment: LaboratoryReport,
+    form: String,
+    excitation: Option<Excitation>,
+    advice: Advice,
+}
+
+impl Advised {
+    fn new(experiment: LaboratoryReport, setup: &LaboratorySetup, form: LaboratoryForm) -> Result<Self> {
+        let names: Vec<String> = setup.mechanism.joints.iter().map(|joint| joint.name.clone()).collect();
+        let advice = Situation::of_experiment(setup, form, LABORATORY_IMU).as_ref().and_then(advise);
+        Ok(Self {
+            experiment,
+            form: form.name(),
+            excitation: excitation(&setup.window(), &form.chain(&setup.mechanism), &names),
+            advice: advice.context("no motion can tell anything about this mechanism")?,
+        })
+    }
+}
+
+impl std::fmt::Display for Advised {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        writeln!(out, "{}", self.experiment)?;
+        if let Some(excitation) = &self.excitation {
+            writeln!(out, "{excitation}")?;
+        }
+        write!(out, "{}", self.advice)?;
+        self.advice.sentence().map_or(Ok(()), |sentence| writeln!(out, "\n{}: {sentence}", self.form))
+    }
+}
+
+const DEFAULT_FORMS: [LaboratoryForm; 4] = [
+    LaboratoryForm::whole(Parameterization::Classical),
+    LaboratoryForm::whole(Parameterization::Minimal),
+    LaboratoryForm::whole(Parameterization::MinimalSwapped),
+    LaboratoryForm::whole(Parameterization::Poe),
+];
+
+fn print_as<T: serde::Serialize + std::fmt::Display>(report: &T, json: bool) -> Result<()> {
+    if json { print(&format!("{}\n", serde_json::to_string_pretty(report)?)) } else { print(&report.to_string()) }
+}
+
+fn list() -> String {
+    let mut text = "mechanisms\n".to_owned();
+    for (name, meaning) in Mechanism::NAMES {
+        text.push_str(&format!("  {name:<28}{meaning}\n"));
+    }
+    text.push_str("motions\n");
+    for motion in LaboratoryMotion::ALL {
+        text.push_str(&format!("  {:<28}{}\n", motion.name(), motion.meaning()));
+    }
+    text
+}
+
+impl DegeneracyArguments {
+    fn asks_nothing(&self) -> bool {
+        self.table
+            || (self.mechanism.is_none()
+                && self.rig.is_none()
+                && self.forms.is_empty()
+                && self.motion.is_none()
+                && self.freeze.is_empty()
+                && self.encoder_sigma_deg.is_none()
+                && self.poses.is_none()
+                && !self.advise
+                && self.frames.is_none()
+                && self.landmarks.is_none())
+    }
+
+    fn setup(&self) -> Result<LaboratorySetup> {
+        let mut imu_noise = LABORATORY_IMU;
+        let mut setup = if let Some(path) = &self.rig {
+            let rig = Rig::from_file(path)?;
+            let key = self.camera_key(&rig)?;
+            let camera = rig.camera(&key)?;
+            let mechanism =
+                Mechanism::of_rig(&rig, &key).with_context(|| format!("the rig's camera '{key}' has no mount"))?;
+            imu_noise = rig.imu.noise;
+            LaboratorySetup { camera: camera.model.clone(), ..LaboratorySetup::new(mechanism) }
+        } else {
+            LaboratorySetup::new(Mechanism::named(self.mechanism.as_deref().unwrap_or("yaw-roll-pitch-offset"))?)
+        };
+        let joints = setup.mechanism.chain.joint_count();
+        for joint in &self.freeze {
+            let index = joint.checked_sub(1).filter(|index| *index < joints);
+            let Some(index) = index else {
+                bail!("--freeze names joint {joint}, but '{}' has {joints} joints", setup.mechanism.name);
+            };
+            setup.frozen.push(index);
+        }
+        setup.motion = self.motion.unwrap_or(setup.motion);
+        setup.joints = self.encoder_sigma_deg.unwrap_or(setup.joints);
+        setup.poses = match self.poses.unwrap_or(PosesArgument::Known) {
+            PosesArgument::Known => PoseKnowledge::Known,
+            PosesArgument::Imu => PoseKnowledge::Inertial { noise: imu_noise, biases_known: false },
+            PosesArgument::ImuBiasKnown => PoseKnowledge::Inertial { noise: imu_noise, biases_known: true },
+        };
+        setup.frames = self.frames.map_or(setup.frames, usize::from);
+        setup.landmarks = self.landmarks.map_or(setup.landmarks, usize::from);
+        Ok(setup)
+    }
+
+    fn camera_key(&self, rig: &Rig) -> Result<String> {
+        use dcvins::flight_log::rig::CameraMount;
+        if let Some(key) = &self.camera {
+            return Ok(key.clone());
+        }
+        let on_gimbal = rig.cameras.iter().find(|camera| camera.mount == CameraMount::Gimbal);
+        let camera = on_gimbal.or_else(|| rig.cameras.first()).context("the rig has no camera")?;
+        Ok(camera.key.clone())
+    }
+}

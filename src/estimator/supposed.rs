@@ -1,0 +1,225 @@
+//! Windows that nobody flew: supposed states and landmarks whose measurements are exact, linearized by the estimator's own
+//! factors, for asking what a motion would tell before it is flown.
+
+use nalgebra::{DMatrix, Vector3};
+
+use super::calibration::{Calibration, GivenSigmas};
+use super::calibrations::Calibrations;
+use super::camera_pose;
+use super::options::{LandmarkModel, RobustLoss};
+use super::preintegration::{NavigationState, Preintegration};
+use super::problem::{CameraFactors, Estimate, Problem};
+use super::reprojection::{Landmark, RelativePose};
+use super::visual::{Sighting, Track, VisualModel};
+use super::window::{Frame, FrameState, layout};
+use super::{ColumnBlock, ColumnGroup, Linearization};
+use crate::camera::CameraModel;
+use crate::flight_log::rig::ImuNoise;
+use crate::flight_log::{ImuSample, JointAngles};
+use crate::geometry::ns_from_seconds;
+use crate::gimbal::{ClassicalChain, Parameterization};
+
+/// What is known of the poses of a supposed window.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum PoseKnowledge {
+    /// Everything.
+    Known,
+    /// What the inertial sensor tells, its biases being known or not.
+    Inertial {
+        /// Noise of the sensor.
+        noise: ImuNoise,
+        /// Whether the biases are known.
+        biases_known: bool,
+    },
+}
+
+/// What is known of the joint angles of a supposed window.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum JointKnowledge {
+    /// Everything.
+    Known,
+    /// A reading per frame and joint with white noise of this standard deviation, in radians.
+    Encoder(f64),
+    /// Nothing.
+    Unknown,
+}
+
+/// One frame of a supposed window.
+#[derive(Clone, Debug)]
+pub struct SupposedFrame {
+    /// When, in seconds.
+    pub time_s: f64,
+    /// Pose, velocity and biases.
+    pub navigation: NavigationState,
+    /// Joint angles without the static offsets.
+    pub joints_rad: Vec<f64>,
+    /// Inertial samples since the frame before it, both ends included; not needed where the poses are known.
+    pub imu: Vec<ImuSample>,
+}
+
+/// A landmark of a supposed window and who sees it.
+#[derive(Clone, Debug)]
+pub struct SupposedLandmark {
+    /// Slot of the frame in which it is anchored.
+    pub anchor: usize,
+    /// Direction in the anchor's camera, of any length.
+    pub bearing: Vector3<f64>,
+    /// One over the distance from the anchor's camera, in 1/m.
+    pub inverse_distance_per_m: f64,
+    /// Slots of the other frames that see it.
+    pub observers: Vec<usize>,
+}
+
+/// A window of supposed states with exact measurements.
+#[derive(Clone, Debug)]
+pub struct SupposedWindow {
+    /// The camera.
+    pub camera: CameraModel,
+    /// Oldest first.
+    pub frames: Vec<SupposedFrame>,
+    /// What is seen.
+    pub landmarks: Vec<SupposedLandmark>,
+    /// What is known of the poses.
+    pub poses: PoseKnowledge,
+    /// What is known of the joint angles.
+    pub joints: JointKnowledge,
+    /// Standard deviation of a pixel.
+    pub pixel_sigma_px: f64,
+    /// Unknowns of a landmark.
+    pub landmark_model: LandmarkModel,
+    /// Gravity in the world, in m/s².
+    pub gravity_in_world: Vector3<f64>,
+    /// Standard deviations of the chain's numbers in the rows of the priors, in metres and radians.
+    pub chain_prior: (f64, f64),
+}
+
+impl SupposedWindow {
+    /// The linearization with the mount in one form, with or without its joint offsets as columns.
+    ///
+    /// What is known has no columns. The rows of the priors are those of the rig's prior alone.
+    pub fn linearize(
+        &self,
+        chain: &ClassicalChain,
+        parameterization: Parameterization,
+        joint_offsets: bool,
+    ) -> Linearization {
+        let (translation_m, rotation_rad) = self.chain_prior;
+        let sigmas = GivenSigmas { translation_m, rotation_rad };
+        let calibration = Calibration::new(chain, parameterization, sigmas, true, joint_offsets);
+        let frames: Vec<Frame> = self.frames.iter().enumerate().map(|(slot, it)| self.frame(slot, it)).collect();
+        let states: Vec<FrameState> = frames.iter().map(|frame| frame.state.clone()).collect();
+        let (tracks, landmarks) = self.tracks(&states, &calibration);
+        let layout = layout(&frames, calibration.dof());
+        let visual = VisualModel {
+            camera: &self.camera,
+            sigma_px: self.pixel_sigma_px,
+            loss: RobustLoss::None,
+            landmark_model: self.landmark_model,
+        };
+        let problem = Problem {
+            layout,
+            cameras: vec![CameraFactors { visual, tracks: &tracks, columns: layout.calibration() }],
+            gravity_in_world: self.gravity_in_world,
+            frames: &frames,
+            prior: None,
+            start: None,
+            first_estimates: false,
+            calibration_first_estimates: false,
+        };
+        let numbers: Vec<usize> = (0..frames.len()).collect();
+        let names = calibration.chain().parameter_names();
+        let calibration = Calibrations::new(calibration, []);
+        let estimate = Estimate { frames: states, calibration, landmarks: vec![landmarks] };
+        let whole = problem.linearization(&estimate, &names, &numbers);
+        keeping(&whole, |group| match (group, &self.poses, &self.joints) {
+            (ColumnGroup::Joints, _, JointKnowledge::Known)
+            | (ColumnGroup::Pose | ColumnGroup::SpeedBias, PoseKnowledge::Known, _) => 0,
+            // The biases come after the velocity.
+            (ColumnGroup::SpeedBias, PoseKnowledge::Inertial { biases_known: true, .. }, _) => 3,
+            _ => usize::MAX,
+        })
+    }
+
+    fn frame(&self, slot: usize, supposed: &SupposedFrame) -> Frame {
+        let navigation = supposed.navigation;
+        let motion = match &self.poses {
+            PoseKnowledge::Inertial { noise, .. } if slot > 0 => {
+                Preintegration::from_samples(*noise, navigation.bias, &supposed.imu)
+            }
+            PoseKnowledge::Inertial { noise, .. } => Preintegration::new(*noise, navigation.bias),
+            PoseKnowledge::Known => Preintegration::new(NO_NOISE, navigation.bias),
+        };
+        let encoder = match self.joints {
+            JointKnowledge::Encoder(sigma_rad) => Some(JointAngles {
+                angles_rad: supposed.joints_rad.clone(),
+                sigmas_rad: vec![sigma_rad; supposed.joints_rad.len()],
+                lasting_sigmas_rad: vec![0.0; supposed.joints_rad.len()],
+            }),
+            JointKnowledge::Known | JointKnowledge::Unknown => None,
+        };
+        Frame {
+            index: slot,
+            stamp_ns: ns_from_seconds(supposed.time_s),
+            state: FrameState { navigation, joints_rad: supposed.joints_rad.clone() },
+            first_estimate: None,
+            encoder,
+            rest: None,
+            keyframe: true,
+            motion_information: motion.square_root_information(),
+            motion,
+        }
+    }
+
+    /// The landmarks with their exact pixels; those that cannot be projected somewhere are not seen there.
+    fn tracks(&self, states: &[FrameState], calibration: &Calibration) -> (Vec<Track>, Vec<Landmark>) {
+        let cameras = camera_pose::by_slot(states, calibration);
+        let mut tracks = Vec::with_capacity(self.landmarks.len());
+        let mut landmarks = Vec::with_capacity(self.landmarks.len());
+        for supposed in &self.landmarks {
+            let landmark =
+                Landmark { bearing: supposed.bearing.normalize(), inverse_distance: supposed.inverse_distance_per_m };
+            let anchor = supposed.anchor;
+            let Some(uv_px) = self.camera.project(&landmark.bearing) else { continue };
+            let mut sightings = vec![Sighting { slot: anchor, uv_px }];
+            for slot in supposed.observers.iter().copied().filter(|slot| *slot != anchor) {
+                let relative = RelativePose::new(&cameras[anchor], &cameras[slot]);
+                let seen = self.camera.project(&relative.direction(&landmark));
+                sightings.extend(seen.map(|uv_px| Sighting { slot, uv_px }));
+            }
+            if sightings.len() > 1 {
+                tracks.push(Track { sightings });
+                landmarks.push(landmark);
+            }
+        }
+        (tracks, landmarks)
+    }
+}
+
+/// For intervals of which nothing is measured.
+const NO_NOISE: ImuNoise = ImuNoise {
+    accelerometer_noise_density: 0.0,
+    accelerometer_random_walk: 0.0,
+    gyroscope_noise_density: 0.0,
+    gyroscope_random_walk: 0.0,
+};
+
+/// The linearization with only the first columns of each block, as many as `count` says for its group.
+fn keeping(whole: &Linearization, count: impl Fn(ColumnGroup) -> usize) -> Linearization {
+    let mut kept = Vec::new();
+    let mut columns = Vec::new();
+    for block in &whole.columns {
+        let len = block.len.min(count(block.group));
+        if len > 0 {
+            columns.push(ColumnBlock { start: kept.len(), len, ..block.clone() });
+            kept.extend(block.start..block.start + len);
+        }
+    }
+    let select = |matrix: &DMatrix<f64>| matrix.select_columns(&kept);
+    Linearization {
+        columns,
+        jacobian: select(&whole.jacobian),
+        prior_jacobian: select(&whole.prior_jacobian),
+        calibration_column_norms: whole.calibration_column_norms.clone(),
+        chain: whole.chain.clone(),
+    }
+}

@@ -1,0 +1,38 @@
+//! What is known to be lost, over all steps of a run.
+
+use serde::Serialize;
+
+use crate::observability::KnownLoss;
+use crate::session::RunRecord;
+
+/// A known loss held against every step of a run.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct KnownLossSummary {
+    /// Why it is lost, in one sentence with its equation.
+    pub reason: String,
+    /// In how many steps the form of the chain had it.
+    pub steps: usize,
+    /// In how many of them the measurement found it null.
+    pub agreeing: usize,
+    /// The window's largest response to it, relative to the reference of the rank rule.
+    pub largest_response: f64,
+}
+
+/// The known losses of a run in the order in which they first appeared.
+pub(super) fn known_losses(run: &RunRecord) -> Vec<KnownLossSummary> {
+    let mut found: Vec<(KnownLoss, KnownLossSummary)> = Vec::new();
+    for rank in run.steps.iter().filter_map(|step| step.rank.as_ref()) {
+        for known in &rank.known {
+            let place = found.iter().position(|(loss, _)| *loss == known.loss).unwrap_or_else(|| {
+                let reason = known.loss.reason(rank.joint_count);
+                found.push((known.loss, KnownLossSummary { reason, steps: 0, agreeing: 0, largest_response: 0.0 }));
+                found.len() - 1
+            });
+            let summary = &mut found[place].1;
+            summary.steps += 1;
+            summary.agreeing += usize::from(known.agrees);
+            summary.largest_response = summary.largest_response.max(known.response);
+        }
+    }
+    found.into_iter().map(|(_, summary)| summary).collect()
+}

@@ -1,0 +1,379 @@
+//! What to fly next: candidate motions from here, linearized, and what each would leave of the weakest direction.
+
+use std::fmt;
+
+use nalgebra::{DMatrix, DVector, UnitQuaternion, Vector2, Vector3};
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::super::analysis::measured_information;
+use super::super::classification::excitable_directions;
+use super::Situation;
+use super::mechanism::LaboratoryJoint;
+use crate::estimator::{
+    LandmarkModel, NavigationState, PoseKnowledge, SupposedFrame, SupposedLandmark, SupposedWindow,
+};
+use crate::flight_log::ImuSample;
+use crate::geometry::{RigidTransform, ns_from_seconds, so3};
+use crate::simulation::{Exercise, JOINT_PERIOD_S, JointSwing, SWING_M, VehicleSwing, YAW_SWING_RAD};
+
+/// How long a candidate is flown, in seconds.
+pub const ADVICE_DURATION_S: f64 = 4.0;
+/// Frames of a candidate's window.
+const FRAMES: usize = 11;
+/// Landmarks drawn in each frame's view.
+const LANDMARKS_PER_FRAME: usize = 12;
+/// A landmark takes part from so many sightings on, as in the estimator.
+const LEAST_SIGHTINGS: usize = 3;
+/// Landmarks are drawn this far from the border, and followed up to it.
+const BORDER_PX: f64 = 8.0;
+/// Rate of the supposed inertial samples: their covariance hardly depends on it.
+const IMU_RATE_HZ: f64 = 50.0;
+/// A joint swings this far at most.
+const JOINT_SWING_RAD: f64 = 20.0 * std::f64::consts::PI / 180.0;
+/// A joint turns at most this fast, in rad/s: slow for any gimbal.
+const JOINT_RATE_RAD_PER_S: f64 = 60.0 * std::f64::consts::PI / 180.0;
+/// A joint with less room than this is left alone, in radians.
+const LEAST_SWING_RAD: f64 = 3.0 * std::f64::consts::PI / 180.0;
+/// A vehicle's speed at the start fades with this time constant, in seconds.
+const BRAKING_S: f64 = 0.8;
+
+/// Which motion would tell most about what is known least.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Advice {
+    /// The direction that is known least, of all that some motion can tell.
+    pub weakest: WeakDirection,
+    /// Every candidate, the best one first.
+    pub candidates: Vec<CandidateReport>,
+    /// How long each is flown.
+    pub duration_s: f64,
+}
+
+/// A direction of the calibration and how well it is known.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct WeakDirection {
+    /// Names of the columns.
+    pub names: Vec<String>,
+    /// Weight of each in the unit direction, in units of 10° and 3 cm.
+    pub weights: Vec<f64>,
+    /// Standard deviation along it, in the same units.
+    pub sigma: f64,
+    /// The parameter with the largest share.
+    pub leading: String,
+    /// The deviation of the leading parameter that belongs to one sigma along the direction, in radians or metres.
+    pub leading_sigma: f64,
+    /// Unit of the leading parameter.
+    pub unit: &'static str,
+}
+
+/// A candidate and what it would leave.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CandidateReport {
+    /// What to do, in words.
+    pub words: String,
+    /// The standard deviation along the weakest direction that it would leave.
+    pub sigma_after: f64,
+    /// The same over what it is now.
+    pub remaining: f64,
+    /// What is flown.
+    #[serde(skip)]
+    pub exercise: Exercise,
+}
+
+/// Linearizes every candidate from here and orders them by what they would leave of the weakest direction; `None` when
+/// nothing is estimated or a number is not finite.
+///
+/// A candidate's window stands alone: positions, yaw, speeds and biases at its start count as unknown, so that what it
+/// tells is added to what is known of the calibration.
+pub fn advise(situation: &Situation) -> Option<Advice> {
+    let excitable = excitable_directions(&situation.chain, situation.joints_free());
+    if excitable.ncols() == 0 {
+        return None;
+    }
+    let known = excitable.tr_mul(&(&situation.information * &excitable));
+    let eigen = known.clone().symmetric_eigen();
+    let weakest = eigen.eigenvalues.imin();
+    let along: DVector<f64> = eigen.eigenvectors.column(weakest).into_owned();
+    let sigma_along = |information: &DMatrix<f64>| {
+        let solved = information.clone().cholesky()?.solve(&along);
+        Some(along.dot(&solved).sqrt()).filter(|sigma| sigma.is_finite())
+    };
+    let sigma = sigma_along(&known)?;
+    let candidates: Vec<Exercise> = candidates(situation);
+    let mut reports: Vec<CandidateReport> = candidates
+        .par_iter()
+        .filter_map(|exercise| {
+            let gained = information_of(situation, exercise)?;
+            let gained = excitable.tr_mul(&(gained * &excitable));
+            let sigma_after = sigma_along(&(&known + gained))?;
+            Some(CandidateReport {
+                words: words(exercise, &situation.joints),
+                sigma_after,
+                remaining: sigma_after / sigma,
+                exercise: *exercise,
+            })
+        })
+        .collect();
+    // A stable sort: candidates that leave the same stay in their order.
+    reports.sort_by(|a, b| a.sigma_after.total_cmp(&b.sigma_after));
+    let direction = &excitable * along;
+    Some(Advice {
+        weakest: WeakDirection::new(situation, &direction, sigma),
+        candidates: reports,
+        duration_s: ADVICE_DURATION_S,
+    })
+}
+
+impl WeakDirection {
+    fn new(situation: &Situation, direction: &DVector<f64>, sigma: f64) -> Self {
+        let leading = direction.iamax();
+        let flip = direction[leading].signum();
+        let names = situation.chain.parameter_names();
+        Self {
+            leading: names[leading].clone(),
+            leading_sigma: sigma * direction[leading].abs() * situation.scale()[leading],
+            unit: situation.chain.parameter_units()[leading],
+            weights: direction.iter().map(|weight| weight * flip).collect(),
+            names,
+            sigma,
+        }
+    }
+}
+
+/// Every swing of the vehicle with every swing of a joint that has room for it.
+fn candidates(situation: &Situation) -> Vec<Exercise> {
+    let mut swings = vec![None];
+    for (joint, angle_rad) in situation.joints_rad.iter().enumerate() {
+        let (low, high) = situation.joints.get(joint).map_or((-JOINT_SWING_RAD, JOINT_SWING_RAD), |it| it.limits_rad);
+        let room = (high - angle_rad).min(angle_rad - low);
+        let by_rate = JOINT_RATE_RAD_PER_S * JOINT_PERIOD_S / std::f64::consts::TAU;
+        let amplitude_rad = JOINT_SWING_RAD.min(room).min(by_rate);
+        if amplitude_rad >= LEAST_SWING_RAD {
+            swings.push(Some(JointSwing { joint, amplitude_rad }));
+        }
+    }
+    let with = |vehicle: VehicleSwing| swings.iter().map(move |joint| Exercise { vehicle, joint: *joint });
+    VehicleSwing::ALL.into_iter().flat_map(with).collect()
+}
+
+/// What flying a candidate tells about the calibration, in units of 10° and 3 cm.
+fn information_of(situation: &Situation, exercise: &Exercise) -> Option<DMatrix<f64>> {
+    let states: Vec<(f64, NavigationState, Vec<f64>)> = (0..FRAMES)
+        .map(|slot| {
+            let time_s = ADVICE_DURATION_S * slot as f64 / (FRAMES - 1) as f64;
+            (time_s, navigation_at(situation, exercise, time_s), joints_at(situation, exercise, time_s))
+        })
+        .collect();
+    let gravity = situation.gravity_in_world;
+    let frames: Vec<SupposedFrame> = states
+        .iter()
+        .enumerate()
+        .map(|(slot, (time_s, navigation, joints_rad))| SupposedFrame {
+            time_s: *time_s,
+            navigation: *navigation,
+            joints_rad: joints_rad.clone(),
+            imu: slot.checked_sub(1).map_or_else(Vec::new, |before| {
+                let motion = |time_s: f64| navigation_at(situation, exercise, time_s);
+                samples(&motion, states[before].0, *time_s, &gravity)
+            }),
+        })
+        .collect();
+    let window = SupposedWindow {
+        camera: situation.camera.clone(),
+        landmarks: landmarks(situation, &frames),
+        frames,
+        poses: PoseKnowledge::Inertial { noise: situation.imu_noise, biases_known: false },
+        joints: situation.encoders,
+        pixel_sigma_px: situation.pixel_sigma_px,
+        landmark_model: LandmarkModel::BearingAndInverseDistance,
+        gravity_in_world: gravity,
+        chain_prior: (0.03, 10_f64.to_radians()),
+    };
+    let chain = &situation.chain;
+    let linearization = window.linearize(&chain.to_classical(), chain.parameterization(), !chain.hides_joint_offsets());
+    measured_information(&linearization)
+}
+
+fn joints_at(situation: &Situation, exercise: &Exercise, time_s: f64) -> Vec<f64> {
+    let angles = situation.joints_rad.iter().enumerate();
+    angles.map(|(joint, angle)| angle + exercise.joint_rad(joint, time_s)).collect()
+}
+
+/// Position of the vehicle: its speed fades, and the exercise comes on top.
+fn position_at(situation: &Situation, exercise: &Exercise, time_s: f64) -> Vector3<f64> {
+    let start = &situation.navigation;
+    let shift = exercise.shift_m(time_s.max(0.0));
+    let forward = forward_of(&start.world_from_imu);
+    let left = Vector3::z().cross(&forward);
+    let glide = start.velocity_m_per_s * (BRAKING_S * (1.0 - (-time_s / BRAKING_S).exp()));
+    start.world_from_imu.translation_m + glide + forward * shift.x + left * shift.y + Vector3::z() * shift.z
+}
+
+/// Where the body looks on the plan: its x axis, or its z axis when that one is upright.
+fn forward_of(world_from_imu: &RigidTransform) -> Vector3<f64> {
+    let flat = |axis: Vector3<f64>| {
+        let axis = world_from_imu.rotation * axis;
+        Vector3::new(axis.x, axis.y, 0.0)
+    };
+    let ahead = flat(Vector3::x());
+    let ahead = if ahead.norm() < 0.5 { flat(Vector3::z()) } else { ahead };
+    ahead.try_normalize(1e-6).unwrap_or_else(Vector3::x)
+}
+
+/// Pose and speed during a candidate: the vehicle tilts as a multirotor must to accelerate so (without drag).
+fn navigation_at(situation: &Situation, exercise: &Exercise, time_s: f64) -> NavigationState {
+    const STEP_S: f64 = 1e-3;
+    let at = |steps: f64| position_at(situation, exercise, time_s + steps * STEP_S);
+    let (before, here, after) = (at(-1.0), at(0.0), at(1.0));
+    let acceleration = (after - here * 2.0 + before) / (STEP_S * STEP_S);
+    let thrust = acceleration - situation.gravity_in_world;
+    let tilt = UnitQuaternion::rotation_between(&Vector3::z(), &thrust).unwrap_or_else(UnitQuaternion::identity);
+    let turn = so3::exp(&(Vector3::z() * exercise.turn_rad(time_s.max(0.0))));
+    let rotation = tilt * turn * situation.navigation.world_from_imu.rotation;
+    NavigationState {
+        world_from_imu: RigidTransform::new(rotation, here),
+        velocity_m_per_s: (after - before) / (2.0 * STEP_S),
+        bias: situation.navigation.bias,
+    }
+}
+
+/// What an inertial sensor feels over an interval of a motion, both ends included.
+fn samples(
+    motion: &dyn Fn(f64) -> NavigationState,
+    from_s: f64,
+    to_s: f64,
+    gravity_in_world: &Vector3<f64>,
+) -> Vec<ImuSample> {
+    const STEP_S: f64 = 2e-3;
+    let count = ((to_s - from_s) * IMU_RATE_HZ).round().max(1.0) as usize;
+    (0..=count)
+        .map(|index| {
+            let time_s = from_s + (to_s - from_s) * index as f64 / count as f64;
+            let (before, here, after) = (motion(time_s - STEP_S), motion(time_s), motion(time_s + STEP_S));
+            let turned = before.world_from_imu.rotation.inverse() * after.world_from_imu.rotation;
+            let acceleration = (after.velocity_m_per_s - before.velocity_m_per_s) / (2.0 * STEP_S);
+            let felt = here.world_from_imu.rotation.inverse() * (acceleration - gravity_in_world);
+            ImuSample {
+                stamp_ns: ns_from_seconds(time_s),
+                angular_velocity_rad_per_s: so3::log(&turned) / (2.0 * STEP_S) + here.bias.gyroscope_rad_per_s,
+                specific_force_m_per_s2: felt + here.bias.accelerometer_m_per_s2,
+            }
+        })
+        .collect()
+}
+
+/// Landmarks in every frame's view at the scene's distances, each followed while it stays in sight.
+fn landmarks(situation: &Situation, frames: &[SupposedFrame]) -> Vec<SupposedLandmark> {
+    let camera = &situation.camera;
+    let poses: Vec<RigidTransform> = frames
+        .iter()
+        .map(|frame| frame.navigation.world_from_imu * situation.chain.imu_from_camera(&frame.joints_rad))
+        .collect();
+    let scene_m = situation.scene_m();
+    let [width, height] = camera.resolution_px.map(|size| size as f64);
+    let mut landmarks = Vec::new();
+    for index in 0..LANDMARKS_PER_FRAME * frames.len() {
+        let home = index % frames.len();
+        // A low-discrepancy sequence over the picture and over the distances (Roberts' R3).
+        let fraction = |factor: f64| (0.5 + factor * (index + 1) as f64).fract();
+        let (across, down, far) = (fraction(0.819_172_513_4), fraction(0.671_043_606_7), fraction(0.549_700_477_9));
+        let inside = |share: f64, size: f64| BORDER_PX + share * (size - 2.0 * BORDER_PX);
+        let uv_px = Vector2::new(inside(across, width), inside(down, height));
+        let distance_m = scene_m[((far * scene_m.len() as f64) as usize).min(scene_m.len() - 1)];
+        let Some(ray) = camera.unproject(&uv_px) else { continue };
+        let point = poses[home].transform(&(ray.normalize() * distance_m));
+        let seen = |slot: &usize| {
+            let in_camera = poses[*slot].inverse().transform(&point);
+            let seen = camera.project(&in_camera).filter(|_| in_camera.z > 0.0);
+            *slot == home || seen.is_some_and(|uv_px| camera.contains(&uv_px, 0.0))
+        };
+        let first = (0..=home).rev().take_while(seen).last().unwrap_or(home);
+        let last = (home..frames.len()).take_while(seen).last().unwrap_or(home);
+        if last + 1 - first < LEAST_SIGHTINGS {
+            continue;
+        }
+        let in_anchor = poses[first].inverse().transform(&point);
+        landmarks.push(SupposedLandmark {
+            anchor: first,
+            bearing: in_anchor.normalize(),
+            inverse_distance_per_m: in_anchor.norm().recip(),
+            observers: (first + 1..=last).collect(),
+        });
+    }
+    landmarks
+}
+
+/// What a candidate asks for.
+fn words(exercise: &Exercise, joints: &[LaboratoryJoint]) -> String {
+    let swing = exercise.joint.map(|swing| {
+        let name = joints.get(swing.joint).map_or("a joint", |joint| joint.name.as_str());
+        let size_deg = swing.amplitude_rad.to_degrees();
+        if ["yaw", "pitch", "roll", "pan", "tilt"].contains(&name) {
+            format!("{name} the gimbal ±{size_deg:.0}°")
+        } else {
+            format!("swing {name} ±{size_deg:.0}°")
+        }
+    });
+    let yaw_deg = YAW_SWING_RAD.to_degrees();
+    let (alone, beside) = match exercise.vehicle {
+        VehicleSwing::Hover => ("hover".to_owned(), "hovering".to_owned()),
+        VehicleSwing::Forward => {
+            (format!("fly forward and back ±{SWING_M} m"), format!("flying forward and back ±{SWING_M} m"))
+        }
+        VehicleSwing::Sideways => {
+            (format!("translate sideways ±{SWING_M} m"), format!("translating sideways ±{SWING_M} m"))
+        }
+        VehicleSwing::UpDown => (format!("climb and sink ±{SWING_M} m"), format!("climbing and sinking ±{SWING_M} m")),
+        VehicleSwing::Roll => ("rock quickly in roll".to_owned(), "rocking quickly in roll".to_owned()),
+        VehicleSwing::Pitch => ("rock quickly in pitch".to_owned(), "rocking quickly in pitch".to_owned()),
+        VehicleSwing::Yaw => (format!("yaw the vehicle ±{yaw_deg:.0}°"), format!("yawing the vehicle ±{yaw_deg:.0}°")),
+    };
+    match swing {
+        Some(swing) => format!("{swing} while {beside}"),
+        None if joints.is_empty() => alone,
+        None => format!("{alone} with the gimbal held"),
+    }
+}
+
+impl Advice {
+    /// The best candidate in one sentence with what it would bring.
+    pub fn sentence(&self) -> Option<String> {
+        let best = self.candidates.first()?;
+        Some(format!(
+            "{}: {:.0} s of it leave {:.0} % of the deviation of {}",
+            best.words,
+            self.duration_s,
+            100.0 * best.remaining,
+            self.weakest
+        ))
+    }
+}
+
+impl fmt::Display for WeakDirection {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (size, unit) = if self.unit == "rad" {
+            (self.leading_sigma.to_degrees(), "°")
+        } else {
+            (self.leading_sigma * 1e3, " mm")
+        };
+        write!(out, "{} (±{size:.2}{unit}", self.leading)?;
+        let others =
+            self.names.iter().zip(&self.weights).filter(|(name, weight)| **name != self.leading && weight.abs() >= 0.3);
+        let others: Vec<&str> = others.map(|(name, _)| name.as_str()).collect();
+        if !others.is_empty() {
+            write!(out, ", with {}", others.join(", "))?;
+        }
+        write!(out, ")")
+    }
+}
+
+impl fmt::Display for Advice {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(out, "known least   {}", self.weakest)?;
+        writeln!(out, "to be flown   what {:.0} s of it leave of that deviation, in percent", self.duration_s)?;
+        for candidate in &self.candidates {
+            writeln!(out, "  {:5.1}  {}", 100.0 * candidate.remaining, candidate.words)?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,162 @@
+//! What told what: how much a window says about each parameter per second, and which motion that is owed to.
+
+use std::fmt;
+
+use nalgebra::{DMatrix, Vector3};
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::super::analysis::measured_information;
+use crate::estimator::{SupposedFrame, SupposedLandmark, SupposedWindow};
+use crate::geometry::{RigidTransform, so3};
+use crate::gimbal::Chain;
+
+/// The gain of information by parameter and by motion over a window.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Excitation {
+    /// The motions: translations along and rotations about the body's axes, then the joints.
+    pub motions: Vec<String>,
+    /// Each parameter.
+    pub parameters: Vec<ParameterExcitation>,
+    /// Length of the window.
+    pub duration_s: f64,
+}
+
+/// One parameter's gain.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ParameterExcitation {
+    /// Its name.
+    pub name: String,
+    /// How fast the window narrows it from the prior on, in bits per second: a bit halves the standard deviation.
+    pub bits_per_s: f64,
+    /// How much of that would be missing without each motion.
+    pub by_motion: Vec<f64>,
+}
+
+/// A motion that can be taken out of a window.
+#[derive(Clone, Copy, Debug)]
+enum Motion {
+    Translation(usize),
+    Rotation(usize),
+    Joint(usize),
+}
+
+/// How much a window tells about each parameter per second beyond a prior of 10° and 3 cm, and how much of it would be
+/// missing if one motion had not been flown: the same window is linearized again with that motion taken out of its states,
+/// the landmarks where they are and seen by the same frames. `None` for windows without length or finite numbers.
+///
+/// What is missing without each motion need not add up to the whole: two motions may tell the same, or only together.
+pub fn excitation(window: &SupposedWindow, chain: &Chain, joint_names: &[String]) -> Option<Excitation> {
+    let (first, last) = (window.frames.first()?, window.frames.last()?);
+    let duration_s = last.time_s - first.time_s;
+    if duration_s <= 0.0 {
+        return None;
+    }
+    let joints = chain.joint_count();
+    let mut motions: Vec<Motion> = (0..3).map(Motion::Translation).chain((0..3).map(Motion::Rotation)).collect();
+    motions.extend((0..joints).map(Motion::Joint));
+    let whole = variances(window, chain)?;
+    let without: Vec<Option<Vec<f64>>> =
+        motions.par_iter().map(|motion| variances(&without(window, chain, *motion), chain)).collect();
+    let without = without.into_iter().collect::<Option<Vec<_>>>()?;
+    let bits = |more: f64, less: f64| 0.5 * (more / less).log2() / duration_s;
+    let parameters = chain.parameter_names().into_iter().enumerate().map(|(column, name)| ParameterExcitation {
+        name,
+        // In units of the prior the variance begins at 1.
+        bits_per_s: bits(1.0, whole[column]),
+        by_motion: without.iter().map(|variances| bits(variances[column], whole[column])).collect(),
+    });
+    Some(Excitation {
+        parameters: parameters.collect(),
+        motions: motions.iter().map(|motion| motion.name(joint_names)).collect(),
+        duration_s,
+    })
+}
+
+/// Variance of each column after the window, in units of the prior.
+fn variances(window: &SupposedWindow, chain: &Chain) -> Option<Vec<f64>> {
+    let linearization = window.linearize(&chain.to_classical(), chain.parameterization(), !chain.hides_joint_offsets());
+    let information = measured_information(&linearization)?;
+    let count = information.ncols();
+    let covariance = (information + DMatrix::identity(count, count)).cholesky()?.inverse();
+    Some(covariance.diagonal().iter().copied().collect())
+}
+
+/// The window with a motion taken out of its states.
+fn without(window: &SupposedWindow, chain: &Chain, motion: Motion) -> SupposedWindow {
+    let middle = &window.frames[window.frames.len() / 2];
+    let about = middle.navigation.world_from_imu;
+    let frames: Vec<SupposedFrame> = window
+        .frames
+        .iter()
+        .map(|frame| {
+            let mut frame = frame.clone();
+            let pose = &mut frame.navigation.world_from_imu;
+            match motion {
+                Motion::Translation(axis) => {
+                    let axis = about.rotation * Vector3::ith(axis, 1.0);
+                    pose.translation_m -= axis * axis.dot(&(pose.translation_m - about.translation_m));
+                    let velocity = &mut frame.navigation.velocity_m_per_s;
+                    *velocity -= axis * axis.dot(velocity);
+                }
+                Motion::Rotation(axis) => {
+                    let mut turn = so3::log(&(about.rotation.inverse() * pose.rotation));
+                    turn[axis] = 0.0;
+                    pose.rotation = about.rotation * so3::exp(&turn);
+                }
+                Motion::Joint(joint) => frame.joints_rad[joint] = middle.joints_rad[joint],
+            }
+            frame
+        })
+        .collect();
+    let poses = |frames: &[SupposedFrame]| -> Vec<RigidTransform> {
+        let pose = |frame: &SupposedFrame| frame.navigation.world_from_imu * chain.imu_from_camera(&frame.joints_rad);
+        frames.iter().map(pose).collect()
+    };
+    let (before, after) = (poses(&window.frames), poses(&frames));
+    let landmarks = window.landmarks.iter().filter_map(|landmark| {
+        let at = landmark.bearing.normalize() / landmark.inverse_distance_per_m;
+        let in_anchor = after[landmark.anchor].inverse().transform(&before[landmark.anchor].transform(&at));
+        (in_anchor.z > 0.0).then(|| SupposedLandmark {
+            bearing: in_anchor.normalize(),
+            inverse_distance_per_m: in_anchor.norm().recip(),
+            ..landmark.clone()
+        })
+    });
+    SupposedWindow { landmarks: landmarks.collect(), frames, ..window.clone() }
+}
+
+impl Motion {
+    fn name(self, joint_names: &[String]) -> String {
+        match self {
+            Self::Translation(axis) => format!("move {}", ["x", "y", "z"][axis]),
+            Self::Rotation(axis) => ["roll", "pitch", "yaw"][axis].to_owned(),
+            Self::Joint(joint) => joint_names.get(joint).cloned().unwrap_or_else(|| format!("joint {}", joint + 1)),
+        }
+    }
+}
+
+impl fmt::Display for Excitation {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let joints = self.motions.len().saturating_sub(6);
+        writeln!(
+            out,
+            "information   bits per second (one halves a deviation) over {:.2} s, and what would be missing without a\n             {:14}motion of the body (axes of the IMU) or of {joints} joints",
+            self.duration_s, ""
+        )?;
+        let width = |name: &str| name.len().max(6) + 2;
+        write!(out, "  {:<12}{:>8}", "", "all")?;
+        for name in &self.motions {
+            write!(out, "{name:>width$}", width = width(name))?;
+        }
+        writeln!(out)?;
+        for parameter in &self.parameters {
+            write!(out, "  {:<12}{:>8.2}", parameter.name, parameter.bits_per_s)?;
+            for (name, missing) in self.motions.iter().zip(&parameter.by_motion) {
+                write!(out, "{missing:>width$.2}", width = width(name))?;
+            }
+            writeln!(out)?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,242 @@
+//! One experiment: a mechanism in a motion, its window linearized and analysed in several forms.
+
+use nalgebra::Vector3;
+use serde::Serialize;
+
+use super::mechanism::Mechanism;
+use super::motion::{Flight, LaboratoryMotion};
+use crate::camera::CameraModel;
+use crate::estimator::{
+    JointKnowledge, LandmarkModel, PoseKnowledge, SupposedFrame, SupposedLandmark, SupposedWindow, gravity_in_world,
+};
+use crate::flight_log::rig::ImuNoise;
+use crate::geometry::SplitMix64;
+use crate::gimbal::{Chain, Parameterization};
+use crate::observability::{RankReport, analyse};
+
+/// A parameterization of the mechanism, with or without its joint offsets as columns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct LaboratoryForm {
+    /// The chart.
+    pub parameterization: Parameterization,
+    /// Whether the joint offsets are estimated.
+    pub joint_offsets: bool,
+}
+
+impl LaboratoryForm {
+    /// The form with its offsets.
+    pub const fn whole(parameterization: Parameterization) -> Self {
+        Self { parameterization, joint_offsets: true }
+    }
+
+    /// Its name on the command line.
+    pub fn name(self) -> String {
+        let suffix = if self.joint_offsets { "" } else { "-without-offsets" };
+        format!("{}{suffix}", self.parameterization)
+    }
+
+    /// The mechanism in this form.
+    pub fn chain(self, mechanism: &Mechanism) -> Chain {
+        let chain = Chain::from_classical(&mechanism.chain, self.parameterization);
+        if self.joint_offsets { chain } else { chain.without_joint_offsets() }
+    }
+}
+
+impl std::str::FromStr for LaboratoryForm {
+    type Err = crate::gimbal::UnknownParameterization;
+
+    fn from_str(name: &str) -> Result<Self, Self::Err> {
+        let (chart, joint_offsets) = match name.strip_suffix("-without-offsets") {
+            Some(chart) => (chart, false),
+            None => (name, true),
+        };
+        Ok(Self { parameterization: chart.parse()?, joint_offsets })
+    }
+}
+
+/// What an experiment consists of.
+#[derive(Clone, Debug)]
+pub struct LaboratorySetup {
+    /// The gimbal.
+    pub mechanism: Mechanism,
+    /// The camera.
+    pub camera: CameraModel,
+    /// How everything moves.
+    pub motion: LaboratoryMotion,
+    /// Which joints do not move, counted from 0.
+    pub frozen: Vec<usize>,
+    /// What is known of the joint angles.
+    pub joints: JointKnowledge,
+    /// What is known of the poses.
+    pub poses: PoseKnowledge,
+    /// Number of frames, [`FRAME_PERIOD_S`] apart.
+    pub frames: usize,
+    /// Number of landmarks.
+    pub landmarks: usize,
+}
+
+/// Time between two frames of an experiment.
+pub const FRAME_PERIOD_S: f64 = 0.25;
+/// Magnitude of gravity in an experiment.
+const GRAVITY_M_PER_S2: f64 = 9.81;
+/// Rate of the inertial sensor.
+const IMU_RATE_HZ: f64 = 200.0;
+/// Standard deviation of a pixel.
+pub const PIXEL_SIGMA_PX: f64 = 1.0;
+/// Nearest and farthest landmark, along the optical axis of the frame that it was drawn in.
+const DEPTH_M: [f64; 2] = [4.0, 14.0];
+/// Landmarks are drawn within this tangent of the optical axis, across and down.
+const VIEW: [f64; 2] = [0.6, 0.45];
+/// A landmark is seen by every camera that has it this far in front of it.
+const LEAST_DEPTH_M: f64 = 1.0;
+/// Standard deviations of the chain's numbers with the priors kept in: 3 cm and 10°, the scale of the columns.
+const CHAIN_PRIOR: (f64, f64) = (0.03, 10.0 * std::f64::consts::PI / 180.0);
+
+/// The inertial sensor of an experiment without a rig: the ADIS16448 that the paper flew, as `RotorS` gives it.
+pub const LABORATORY_IMU: ImuNoise = ImuNoise {
+    accelerometer_noise_density: 0.004,
+    accelerometer_random_walk: 0.006,
+    gyroscope_noise_density: 3.394e-4,
+    gyroscope_random_walk: 3.879e-5,
+};
+
+impl LaboratorySetup {
+    /// A mechanism flown aggressively, with poses and joint angles known, ten frames and a hundred landmarks.
+    pub fn new(mechanism: Mechanism) -> Self {
+        let camera = CameraModel::pinhole([460.0, 460.0, 320.0, 240.0], [640, 480]);
+        Self {
+            mechanism,
+            camera: camera.expect("four positive numbers make a pinhole camera"),
+            motion: LaboratoryMotion::Aggressive,
+            frozen: Vec::new(),
+            joints: JointKnowledge::Known,
+            poses: PoseKnowledge::Known,
+            frames: 10,
+            landmarks: 100,
+        }
+    }
+
+    /// Runs the experiment in one form; `None` when a number of the mechanism is not finite.
+    pub fn run(&self, form: LaboratoryForm) -> Option<LaboratoryResult> {
+        self.run_all(&[form]).pop()
+    }
+
+    /// Runs the experiment in several forms, leaving out those whose numbers are not finite.
+    pub fn run_all(&self, forms: &[LaboratoryForm]) -> Vec<LaboratoryResult> {
+        let window = self.window();
+        let angles: Vec<&[f64]> = window.frames.iter().map(|frame| frame.joints_rad.as_slice()).collect();
+        let free = self.joints == JointKnowledge::Unknown && self.mechanism.chain.joint_count() > 0;
+        let result = |form: &LaboratoryForm| {
+            let chain = form.chain(&self.mechanism);
+            let linearization = window.linearize(&self.mechanism.chain, form.parameterization, form.joint_offsets);
+            let rank = analyse(&linearization, &chain, &angles, free)?;
+            Some(LaboratoryResult { form: *form, units: chain.parameter_units(), rank })
+        };
+        forms.iter().filter_map(result).collect()
+    }
+
+    /// The window of the experiment.
+    pub fn window(&self) -> SupposedWindow {
+        let gravity_in_world = gravity_in_world(GRAVITY_M_PER_S2);
+        let flight = Flight { mechanism: &self.mechanism, motion: self.motion, frozen: &self.frozen, gravity_in_world };
+        let inertial = matches!(self.poses, PoseKnowledge::Inertial { .. });
+        let time_of = |slot: usize| slot as f64 * FRAME_PERIOD_S;
+        let frames: Vec<SupposedFrame> = (0..self.frames)
+            .map(|slot| SupposedFrame {
+                time_s: time_of(slot),
+                navigation: flight.navigation(time_of(slot)),
+                joints_rad: flight.joints_rad(time_of(slot)),
+                imu: if inertial && slot > 0 {
+                    flight.imu(time_of(slot - 1), time_of(slot), IMU_RATE_HZ)
+                } else {
+                    Vec::new()
+                },
+            })
+            .collect();
+        let landmarks = self.landmarks_of(&frames);
+        SupposedWindow {
+            camera: self.camera.clone(),
+            frames,
+            landmarks,
+            poses: self.poses,
+            joints: self.joints,
+            pixel_sigma_px: PIXEL_SIGMA_PX,
+            landmark_model: LandmarkModel::BearingAndInverseDistance,
+            gravity_in_world,
+            chain_prior: CHAIN_PRIOR,
+        }
+    }
+
+    /// Landmarks drawn in the views of all frames in turn, anchored in the first frame that sees them.
+    fn landmarks_of(&self, frames: &[SupposedFrame]) -> Vec<SupposedLandmark> {
+        let mut random = SplitMix64::new(1);
+        let mut within = |low: f64, high: f64| low + (high - low) * random.next_unit();
+        let cameras: Vec<_> = frames
+            .iter()
+            .map(|frame| frame.navigation.world_from_imu * self.mechanism.chain.imu_from_camera(&frame.joints_rad))
+            .collect();
+        (0..self.landmarks)
+            .filter_map(|index| {
+                let ray = Vector3::new(within(-VIEW[0], VIEW[0]), within(-VIEW[1], VIEW[1]), 1.0);
+                let point = cameras[index % cameras.len()].transform(&(ray * within(DEPTH_M[0], DEPTH_M[1])));
+                let seen = |slot: &usize| cameras[*slot].inverse().transform(&point).z > LEAST_DEPTH_M;
+                let mut observers = (0..cameras.len()).filter(seen);
+                let anchor = observers.next()?;
+                let in_anchor = cameras[anchor].inverse().transform(&point);
+                Some(SupposedLandmark {
+                    anchor,
+                    bearing: in_anchor.normalize(),
+                    inverse_distance_per_m: in_anchor.norm().recip(),
+                    observers: observers.collect(),
+                })
+            })
+            .collect()
+    }
+}
+
+/// What came of an experiment in one form.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LaboratoryResult {
+    /// The form.
+    pub form: LaboratoryForm,
+    /// Unit of each column, `rad` or `m`.
+    pub units: Vec<&'static str>,
+    /// Its ranks and directions.
+    pub rank: RankReport,
+}
+
+/// How many columns are lost to what.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Deficit {
+    /// Redundant in the parameterization, or its chart singular (G).
+    pub parameterization: usize,
+    /// Joints that did not move (F).
+    pub joints: usize,
+    /// Absorbed by free joint angles (E).
+    pub absorbed: usize,
+    /// Motion of the vehicle and scene (M).
+    pub motion: usize,
+}
+
+impl LaboratoryResult {
+    /// The deficit by cause.
+    pub fn deficit(&self) -> Deficit {
+        Deficit {
+            parameterization: self.rank.deficit_parameterization,
+            joints: self.rank.deficit_joints,
+            absorbed: self.rank.deficit_absorbed,
+            motion: self.rank.deficit_motion,
+        }
+    }
+
+    /// Names of the parameters that take part in null directions, in column order.
+    pub fn null_names(&self) -> Vec<&str> {
+        let null: Vec<_> = self.rank.directions.iter().filter(|direction| direction.structural).collect();
+        let takes_part = |column: usize| null.iter().any(|direction| direction.weights[column].abs() > TAKES_PART);
+        let named = self.rank.names.iter().enumerate().filter(|(column, _)| takes_part(*column));
+        named.map(|(_, name)| name.as_str()).collect()
+    }
+}
+
+/// A scaled weight from which on a parameter takes part in a null direction.
+const TAKES_PART: f64 = 1e-5;

@@ -1,0 +1,30 @@
+//! The laboratory: what a mechanism, a parameterization and a motion can tell about the calibration, without a log.
+//!
+//! An experiment supposes a window, linearizes it with the estimator's own factors
+//! ([`crate::estimator::SupposedWindow`]) and analyses it as every step is analysed.
+//! [`truth_table`] runs all experiments of the mathematics notes and holds the ranks against theirs.
+
+mod advice;
+mod excitation;
+mod experiment;
+mod mechanism;
+mod motion;
+mod report;
+mod situation;
+mod step_window;
+mod table;
+#[cfg(test)]
+mod tests;
+mod truth;
+
+pub use advice::{ADVICE_DURATION_S, Advice, CandidateReport, WeakDirection, advise};
+pub use excitation::{Excitation, ParameterExcitation, excitation};
+pub use experiment::{
+    Deficit, FRAME_PERIOD_S, LABORATORY_IMU, LaboratoryForm, LaboratoryResult, LaboratorySetup, PIXEL_SIGMA_PX,
+};
+pub use mechanism::{LaboratoryJoint, Mechanism, UnknownMechanism};
+pub use motion::{LaboratoryMotion, UnknownMotion};
+pub use report::LaboratoryReport;
+pub use situation::Situation;
+pub use step_window::window_of_step;
+pub use table::{TableEntry, TableRow, TableSection, TruthTable, truth_table};

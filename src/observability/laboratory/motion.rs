@@ -1,0 +1,311 @@
+//! Motions by name: how the vehicle and the joints move, in closed form.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{UnitQuaternion, Vector3};
+use thiserror::Error;
+
+use super::mechanism::Mechanism;
+use crate::estimator::{ImuBias, NavigationState};
+use crate::flight_log::ImuSample;
+use crate::geometry::{RigidTransform, ns_from_seconds, so3};
+
+/// How the vehicle moves, or what the camera is to do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LaboratoryMotion {
+    /// Turns and translates about all axes.
+    Aggressive,
+    /// Translates and never rotates.
+    TranslationOnly,
+    /// Neither translates nor rotates.
+    Hover,
+    /// Constant velocity without rotation.
+    ConstantVelocity,
+    /// Yaws and translates in space, level.
+    YawOnly,
+    /// Yaws and translates in the horizontal plane, level.
+    YawPlanar,
+    /// Yaws about the vertical and translates, the body tilted.
+    YawTilted,
+    /// Yaws without translating.
+    YawInPlace,
+    /// Rotates about all axes without translating.
+    RotationOnly,
+    /// Rotates about all axes at constant velocity.
+    ConstantVelocityRotation,
+    /// Rotates about all axes and accelerates on a straight line.
+    StraightLine,
+    /// The camera never rotates in the world while vehicle and joints move.
+    Stabilized,
+    /// The camera turns about the vertical only.
+    YawFollowing,
+    /// The camera never rotates in the world; the vehicle rotates without translating.
+    StabilizedRotationOnly,
+    /// The camera never rotates in the world; the vehicle translates only, so that no joint moves.
+    StabilizedTranslationOnly,
+    /// The camera neither turns nor moves in the world.
+    CameraHeldStill,
+    /// As aggressive, the second joint (or the only one) held.
+    OneJointFrozen,
+    /// As aggressive, all joints held.
+    AllJointsFrozen,
+}
+
+/// A name that no motion has.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[error("unknown motion '{given}': expected one of {}", LaboratoryMotion::ALL.map(|it| it.name()).join(", "))]
+pub struct UnknownMotion {
+    /// What was asked for.
+    pub given: String,
+}
+
+impl LaboratoryMotion {
+    /// All of them.
+    pub const ALL: [Self; 18] = [
+        Self::Aggressive,
+        Self::TranslationOnly,
+        Self::Hover,
+        Self::ConstantVelocity,
+        Self::YawOnly,
+        Self::YawPlanar,
+        Self::YawTilted,
+        Self::YawInPlace,
+        Self::RotationOnly,
+        Self::ConstantVelocityRotation,
+        Self::StraightLine,
+        Self::Stabilized,
+        Self::YawFollowing,
+        Self::StabilizedRotationOnly,
+        Self::StabilizedTranslationOnly,
+        Self::CameraHeldStill,
+        Self::OneJointFrozen,
+        Self::AllJointsFrozen,
+    ];
+
+    /// The name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Aggressive => "aggressive",
+            Self::TranslationOnly => "translation-only",
+            Self::Hover => "hover",
+            Self::ConstantVelocity => "constant-velocity",
+            Self::YawOnly => "yaw-only",
+            Self::YawPlanar => "yaw-planar",
+            Self::YawTilted => "yaw-tilted",
+            Self::YawInPlace => "yaw-in-place",
+            Self::RotationOnly => "rotation-only",
+            Self::ConstantVelocityRotation => "constant-velocity-rotation",
+            Self::StraightLine => "straight-line",
+            Self::Stabilized => "stabilized",
+            Self::YawFollowing => "yaw-following",
+            Self::StabilizedRotationOnly => "stabilized-rotation-only",
+            Self::StabilizedTranslationOnly => "stabilized-translation-only",
+            Self::CameraHeldStill => "camera-held-still",
+            Self::OneJointFrozen => "one-joint-frozen",
+            Self::AllJointsFrozen => "all-joints-frozen",
+        }
+    }
+
+    /// What happens in it.
+    pub fn meaning(self) -> &'static str {
+        match self {
+            Self::Aggressive => "the vehicle turns and translates about all axes",
+            Self::TranslationOnly => "the vehicle translates and never rotates",
+            Self::Hover => "the vehicle neither translates nor rotates",
+            Self::ConstantVelocity => "the vehicle flies at constant velocity without rotation",
+            Self::YawOnly => "the level vehicle yaws and translates in space",
+            Self::YawPlanar => "the level vehicle yaws and translates in the horizontal plane",
+            Self::YawTilted => "the tilted vehicle turns about the vertical only and translates",
+            Self::YawInPlace => "the vehicle yaws without translating",
+            Self::RotationOnly => "the vehicle rotates about all axes without translating",
+            Self::ConstantVelocityRotation => "the vehicle rotates about all axes at constant velocity",
+            Self::StraightLine => "the vehicle rotates and accelerates on a straight line",
+            Self::Stabilized => "the camera never rotates in the world while vehicle and joints move",
+            Self::YawFollowing => "the camera turns about the vertical only while vehicle and joints move",
+            Self::StabilizedRotationOnly => "the camera never rotates in the world, the vehicle does not translate",
+            Self::StabilizedTranslationOnly => "the camera never rotates in the world, nor do vehicle and joints",
+            Self::CameraHeldStill => "the camera neither turns nor moves in the world while vehicle and joints do",
+            Self::OneJointFrozen => "all move about all axes but the second joint, or the only one, which rests",
+            Self::AllJointsFrozen => "the vehicle turns and translates about all axes while all joints rest",
+        }
+    }
+
+    /// Whether a joint of so many rests although it could move.
+    fn holds_joint(self, joint: usize, joints: usize) -> bool {
+        match self {
+            Self::StabilizedTranslationOnly | Self::AllJointsFrozen => true,
+            Self::OneJointFrozen => joint == 1 || joints == 1,
+            _ => false,
+        }
+    }
+}
+
+impl std::str::FromStr for LaboratoryMotion {
+    type Err = UnknownMotion;
+
+    fn from_str(name: &str) -> Result<Self, Self::Err> {
+        Self::ALL.into_iter().find(|it| it.name() == name).ok_or_else(|| UnknownMotion { given: name.to_owned() })
+    }
+}
+
+/// A sine wave.
+#[derive(Clone, Copy, Debug)]
+struct Sine {
+    size: f64,
+    rate_rad_per_s: f64,
+    phase_rad: f64,
+}
+
+impl Sine {
+    /// Its value or a derivative by time.
+    fn at(&self, time_s: f64, derivative: i32) -> f64 {
+        let quarter_turns = f64::from(derivative) * 0.25 * TAU;
+        let phase = self.rate_rad_per_s * time_s + self.phase_rad + quarter_turns;
+        self.size * self.rate_rad_per_s.powi(derivative) * phase.sin()
+    }
+}
+
+const fn sine(size: f64, rate_rad_per_s: f64, phase_rad: f64) -> Sine {
+    Sine { size, rate_rad_per_s, phase_rad }
+}
+
+/// Turns of the vehicle, as a rotation vector in radians.
+const TURN: [Sine; 3] = [sine(0.2, 2.8, 0.4), sine(0.25, 2.0, 1.3), sine(0.3, 1.6, 0.2)];
+/// Its position in metres.
+const PATH: [Sine; 3] = [sine(1.2, 1.6, 0.0), sine(0.9, 2.4, 0.7), sine(0.7, 2.0, 1.9)];
+/// Its constant velocity, where it has one.
+const VELOCITY_M_PER_S: Vector3<f64> = Vector3::new(0.9, 0.4, -0.3);
+/// Rates and phases of the joints, again from the front when there are more.
+const JOINTS: [Sine; 5] =
+    [sine(0.4, 2.0, 0.1), sine(0.4, 3.2, 1.0), sine(0.4, 2.4, 2.0), sine(0.4, 2.8, 0.6), sine(0.4, 1.8, 1.5)];
+/// Step of the numeric derivatives of rotations and of composed positions.
+const STEP_S: f64 = 1e-3;
+/// A joint uses this part of the room between its rest and the nearer stop at most.
+const ROOM_SHARE: f64 = 0.9;
+
+/// A mechanism in motion, some of its joints held.
+#[derive(Clone, Debug)]
+pub(super) struct Flight<'a> {
+    pub(super) mechanism: &'a Mechanism,
+    pub(super) motion: LaboratoryMotion,
+    /// Which joints are held, in order.
+    pub(super) frozen: &'a [usize],
+    pub(super) gravity_in_world: Vector3<f64>,
+}
+
+impl Flight<'_> {
+    /// Joint angles at a time.
+    pub(super) fn joints_rad(&self, time_s: f64) -> Vec<f64> {
+        let joints = self.mechanism.chain.joint_count();
+        (0..joints)
+            .map(|joint| {
+                let (low, high) = self.mechanism.joints.get(joint).map_or((-TAU, TAU), |joint| joint.limits_rad);
+                // At zero, or where there is room to both sides.
+                let quarter = 0.25 * (high - low).max(0.0);
+                let rest = 0.0_f64.max(low + quarter).min(high - quarter);
+                if self.frozen.contains(&joint) || self.motion.holds_joint(joint, joints) {
+                    return rest;
+                }
+                let wave = JOINTS[joint % JOINTS.len()];
+                let room = ROOM_SHARE * (high - rest).min(rest - low);
+                rest + wave.at(time_s, 0) * (room / wave.size).min(1.0)
+            })
+            .collect()
+    }
+
+    fn path_m(&self, time_s: f64, derivative: i32) -> Vector3<f64> {
+        let wave = Vector3::from_fn(|axis, _| PATH[axis].at(time_s, derivative));
+        let steady = match derivative {
+            0 => VELOCITY_M_PER_S * time_s,
+            1 => VELOCITY_M_PER_S,
+            _ => Vector3::zeros(),
+        };
+        match self.motion {
+            LaboratoryMotion::Hover
+            | LaboratoryMotion::YawInPlace
+            | LaboratoryMotion::RotationOnly
+            | LaboratoryMotion::StabilizedRotationOnly => Vector3::zeros(),
+            LaboratoryMotion::ConstantVelocity | LaboratoryMotion::ConstantVelocityRotation => steady,
+            LaboratoryMotion::StraightLine => VELOCITY_M_PER_S.normalize() * wave.x,
+            LaboratoryMotion::YawPlanar => Vector3::new(wave.x, wave.y, 0.0),
+            _ => wave,
+        }
+    }
+
+    fn rotation(&self, time_s: f64, joints_rad: &[f64]) -> UnitQuaternion<f64> {
+        let turn = |time_s: f64| Vector3::from_fn(|axis, _| TURN[axis].at(time_s, 0));
+        let yaw = so3::exp(&(Vector3::z() * (2.0 * TURN[2].at(time_s, 0))));
+        let imu_from_camera = || self.mechanism.chain.imu_from_camera(joints_rad).rotation;
+        let start = || so3::exp(&turn(0.0)) * self.mechanism.chain.imu_from_camera(&self.joints_rad(0.0)).rotation;
+        match self.motion {
+            LaboratoryMotion::TranslationOnly
+            | LaboratoryMotion::Hover
+            | LaboratoryMotion::ConstantVelocity
+            | LaboratoryMotion::StabilizedTranslationOnly => so3::exp(&turn(0.0)),
+            LaboratoryMotion::YawOnly | LaboratoryMotion::YawPlanar | LaboratoryMotion::YawInPlace => yaw,
+            LaboratoryMotion::YawTilted => yaw * so3::exp(&turn(0.0)),
+            LaboratoryMotion::Stabilized
+            | LaboratoryMotion::StabilizedRotationOnly
+            | LaboratoryMotion::CameraHeldStill => start() * imu_from_camera().inverse(),
+            LaboratoryMotion::YawFollowing => yaw * start() * imu_from_camera().inverse(),
+            LaboratoryMotion::Aggressive
+            | LaboratoryMotion::OneJointFrozen
+            | LaboratoryMotion::AllJointsFrozen
+            | LaboratoryMotion::RotationOnly
+            | LaboratoryMotion::ConstantVelocityRotation
+            | LaboratoryMotion::StraightLine => so3::exp(&turn(time_s)),
+        }
+    }
+
+    /// Pose of the IMU at a time.
+    pub(super) fn world_from_imu(&self, time_s: f64) -> RigidTransform {
+        let joints_rad = self.joints_rad(time_s);
+        let rotation = self.rotation(time_s, &joints_rad);
+        let position_m = if self.motion == LaboratoryMotion::CameraHeldStill {
+            -(rotation * self.mechanism.chain.imu_from_camera(&joints_rad).translation_m)
+        } else {
+            self.path_m(time_s, 0)
+        };
+        RigidTransform::new(rotation, position_m)
+    }
+
+    /// Pose and velocity at a time; the biases are zero.
+    pub(super) fn navigation(&self, time_s: f64) -> NavigationState {
+        NavigationState {
+            world_from_imu: self.world_from_imu(time_s),
+            velocity_m_per_s: self.derivative_m(time_s, 1),
+            bias: ImuBias::default(),
+        }
+    }
+
+    /// First or second derivative of the position: exact, but for a path that hangs on the joints.
+    fn derivative_m(&self, time_s: f64, derivative: i32) -> Vector3<f64> {
+        if self.motion != LaboratoryMotion::CameraHeldStill {
+            return self.path_m(time_s, derivative);
+        }
+        let at = |steps: f64| self.world_from_imu(time_s + steps * STEP_S).translation_m;
+        if derivative == 1 {
+            (at(1.0) - at(-1.0)) / (2.0 * STEP_S)
+        } else {
+            (at(1.0) - at(0.0) * 2.0 + at(-1.0)) / (STEP_S * STEP_S)
+        }
+    }
+
+    /// What a perfect inertial sensor feels at a time.
+    fn imu_sample(&self, time_s: f64) -> ImuSample {
+        let rotation_at = |time_s: f64| self.world_from_imu(time_s).rotation;
+        let turned = rotation_at(time_s - STEP_S).inverse() * rotation_at(time_s + STEP_S);
+        let felt = self.derivative_m(time_s, 2) - self.gravity_in_world;
+        ImuSample {
+            stamp_ns: ns_from_seconds(time_s),
+            angular_velocity_rad_per_s: so3::log(&turned) / (2.0 * STEP_S),
+            specific_force_m_per_s2: rotation_at(time_s).inverse() * felt,
+        }
+    }
+
+    /// The samples of an interval, both ends included.
+    pub(super) fn imu(&self, from_s: f64, to_s: f64, rate_hz: f64) -> Vec<ImuSample> {
+        let count = ((to_s - from_s) * rate_hz).round().max(1.0) as usize;
+        (0..=count).map(|index| self.imu_sample(from_s + (to_s - from_s) * index as f64 / count as f64)).collect()
+    }
+}

@@ -1,0 +1,282 @@
+//! One experiment in words and numbers: the forms in columns, then each form's directions and spectrum.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::{Deficit, FRAME_PERIOD_S, LaboratoryResult, LaboratorySetup, PIXEL_SIGMA_PX};
+use crate::estimator::{JointKnowledge, PoseKnowledge};
+use crate::observability::CalibrationDirection;
+
+/// What came of an experiment in several forms.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LaboratoryReport {
+    /// Name of the mechanism.
+    pub mechanism: String,
+    /// Number of its joints.
+    pub joint_count: usize,
+    /// Name of the motion.
+    pub motion: String,
+    /// What happens in it.
+    pub motion_meaning: String,
+    /// Names of the joints that do not move.
+    pub frozen_joints: Vec<String>,
+    /// What is known of the joint angles.
+    pub joint_angles: String,
+    /// What is known of the poses.
+    pub poses: String,
+    /// Number of frames.
+    pub frames: usize,
+    /// Time between them.
+    pub frame_period_s: f64,
+    /// Number of landmarks.
+    pub landmarks: usize,
+    /// Standard deviation of a pixel.
+    pub pixel_sigma_px: f64,
+    /// The forms, in the order asked for.
+    pub forms: Vec<FormReport>,
+}
+
+/// One form.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FormReport {
+    /// Its name.
+    pub form: String,
+    /// Names of the columns.
+    pub names: Vec<String>,
+    /// Structural rank.
+    pub rank_structural: usize,
+    /// Informed rank.
+    pub rank_informed: usize,
+    /// What is lost to what.
+    pub deficit: Deficit,
+    /// Singular values, scaled by 10° and 3 cm, largest first.
+    pub singular_values: Vec<f64>,
+    /// At or below this a singular value is zero.
+    pub structural_threshold: f64,
+    /// Below this a direction is uninformed.
+    pub informed_threshold: f64,
+    /// Margins to the chart's locks.
+    pub margins: Vec<Margin>,
+    /// Null and weak directions, weakest first.
+    pub directions: Vec<DirectionReport>,
+    /// What is known to be lost from the form of the chain, and whether it was measured.
+    pub known: Vec<KnownReport>,
+}
+
+/// A known loss beside the measurement.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct KnownReport {
+    /// Why it is lost, in one sentence with its equation.
+    pub reason: String,
+    /// Response of the window relative to the reference of the rank rule.
+    pub response: f64,
+    /// Whether the measurement agrees.
+    pub agrees: bool,
+}
+
+/// How far a chart is from a lock.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Margin {
+    /// Which lock.
+    pub lock: String,
+    /// 1 far away, 0 at the lock.
+    pub margin: f64,
+}
+
+/// A null or weak direction.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct DirectionReport {
+    /// Whether it is structurally unseen, else merely weak.
+    pub null: bool,
+    /// Its singular value.
+    pub singular_value: f64,
+    /// Its parameters, strongest first.
+    pub parameters: Vec<ParameterShare>,
+}
+
+/// A parameter's part in a direction.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ParameterShare {
+    /// Its name.
+    pub name: String,
+    /// Its weight in the unit direction, columns scaled by 10° and 3 cm.
+    pub weight: f64,
+}
+
+/// Weights below this are left out of a direction's parameters.
+const SMALLEST_WEIGHT: f64 = 0.005;
+
+impl LaboratoryReport {
+    /// The report of an experiment and what came of it.
+    pub fn new(setup: &LaboratorySetup, results: &[LaboratoryResult]) -> Self {
+        let joint_name = |joint: &usize| {
+            let known = setup.mechanism.joints.get(*joint);
+            known.map_or_else(|| format!("joint {}", joint + 1), |joint| joint.name.clone())
+        };
+        Self {
+            mechanism: setup.mechanism.name.clone(),
+            joint_count: setup.mechanism.chain.joint_count(),
+            motion: setup.motion.name().to_owned(),
+            motion_meaning: setup.motion.meaning().to_owned(),
+            frozen_joints: setup.frozen.iter().map(joint_name).collect(),
+            joint_angles: match setup.joints {
+                JointKnowledge::Known => "known".to_owned(),
+                JointKnowledge::Encoder(sigma_rad) => format!("read within {:.3}°", sigma_rad.to_degrees()),
+                JointKnowledge::Unknown => "unknown".to_owned(),
+            },
+            poses: match setup.poses {
+                PoseKnowledge::Known => "known",
+                PoseKnowledge::Inertial { biases_known: true, .. } => "from the IMU, its biases known",
+                PoseKnowledge::Inertial { biases_known: false, .. } => "from the IMU, its biases unknown",
+            }
+            .to_owned(),
+            frames: setup.frames,
+            frame_period_s: FRAME_PERIOD_S,
+            landmarks: setup.landmarks,
+            pixel_sigma_px: PIXEL_SIGMA_PX,
+            forms: results.iter().map(FormReport::new).collect(),
+        }
+    }
+}
+
+impl FormReport {
+    fn new(result: &LaboratoryResult) -> Self {
+        let rank = &result.rank;
+        Self {
+            form: result.form.name(),
+            names: rank.names.clone(),
+            rank_structural: rank.rank_structural,
+            rank_informed: rank.rank_informed,
+            deficit: result.deficit(),
+            singular_values: rank.singular_values.clone(),
+            structural_threshold: rank.structural_threshold,
+            informed_threshold: rank.informed_threshold,
+            margins: rank.margins.iter().map(|(lock, margin)| Margin { lock: lock.clone(), margin: *margin }).collect(),
+            directions: rank.directions.iter().map(|it| DirectionReport::new(it, &rank.names)).collect(),
+            known: rank
+                .known
+                .iter()
+                .map(|known| KnownReport {
+                    reason: known.loss.reason(rank.joint_count),
+                    response: known.response,
+                    agrees: known.agrees,
+                })
+                .collect(),
+        }
+    }
+}
+
+impl DirectionReport {
+    fn new(direction: &CalibrationDirection, names: &[String]) -> Self {
+        let mut parameters: Vec<ParameterShare> = names
+            .iter()
+            .zip(&direction.weights)
+            .filter(|(_, weight)| weight.abs() >= SMALLEST_WEIGHT)
+            .map(|(name, weight)| ParameterShare { name: name.clone(), weight: *weight })
+            .collect();
+        parameters.sort_by(|a, b| b.weight.abs().total_cmp(&a.weight.abs()));
+        Self { null: direction.structural, singular_value: direction.singular_value, parameters }
+    }
+}
+
+impl fmt::Display for DirectionReport {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        const SHOWN: usize = 8;
+        for (place, share) in self.parameters.iter().take(SHOWN).enumerate() {
+            let sign = match (place, share.weight < 0.0) {
+                (0, false) => "",
+                (0, true) => "−",
+                (_, false) => " + ",
+                (_, true) => " − ",
+            };
+            write!(out, "{sign}{:.2} {}", share.weight.abs(), share.name)?;
+        }
+        if self.parameters.len() > SHOWN {
+            write!(out, " and {} smaller", self.parameters.len() - SHOWN)?;
+        }
+        Ok(())
+    }
+}
+
+const LABEL: usize = 30;
+
+impl fmt::Display for LaboratoryReport {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let plural = if self.joint_count == 1 { "" } else { "s" };
+        writeln!(out, "mechanism  {} ({} joint{plural})", self.mechanism, self.joint_count)?;
+        writeln!(out, "motion     {}: {}", self.motion, self.motion_meaning)?;
+        if !self.frozen_joints.is_empty() {
+            writeln!(out, "           {} held", self.frozen_joints.join(", "))?;
+        }
+        writeln!(out, "knowledge  joint angles {}, poses {}", self.joint_angles, self.poses)?;
+        writeln!(
+            out,
+            "window     {} frames {} s apart, {} landmarks, {} px; columns scaled by 10° and 3 cm\n",
+            self.frames, self.frame_period_s, self.landmarks, self.pixel_sigma_px
+        )?;
+        self.write_columns(out)?;
+        for form in &self.forms {
+            writeln!(out, "\n{form}")?;
+        }
+        Ok(())
+    }
+}
+
+impl LaboratoryReport {
+    fn write_columns(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let width = |form: &FormReport| form.form.len().max(9) + 2;
+        let line = |out: &mut fmt::Formatter<'_>, label: &str, cell: &dyn Fn(&FormReport) -> String| {
+            write!(out, "{label:<LABEL$}")?;
+            for form in &self.forms {
+                write!(out, "{:>width$}", cell(form), width = width(form))?;
+            }
+            writeln!(out)
+        };
+        line(out, "", &|form| form.form.clone())?;
+        line(out, "columns", &|form| form.names.len().to_string())?;
+        line(out, "structural rank", &|form| form.rank_structural.to_string())?;
+        line(out, "informed rank", &|form| form.rank_informed.to_string())?;
+        line(out, "lost to the parameterization", &|form| form.deficit.parameterization.to_string())?;
+        line(out, "lost to joints at rest", &|form| form.deficit.joints.to_string())?;
+        line(out, "absorbed by free angles", &|form| form.deficit.absorbed.to_string())?;
+        line(out, "lost to the motion", &|form| form.deficit.motion.to_string())?;
+        line(out, "weakest seen direction", &|form| {
+            let weakest = form.rank_structural.checked_sub(1).map(|index| form.singular_values[index]);
+            weakest.map_or_else(|| "-".to_owned(), |value| format!("{value:.3}"))
+        })?;
+        line(out, "least margin to a lock", &|form| {
+            let least = form.margins.iter().min_by(|a, b| a.margin.total_cmp(&b.margin));
+            least.map_or_else(|| "-".to_owned(), |margin| format!("{:.2}", margin.margin))
+        })
+    }
+}
+
+impl fmt::Display for FormReport {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(out, "{}", self.form)?;
+        if self.directions.is_empty() {
+            writeln!(out, "  no null or weak direction")?;
+        }
+        for direction in &self.directions {
+            let (mark, value) = if direction.null {
+                ("null", String::new())
+            } else {
+                ("weak", format!("{:.3}  ", direction.singular_value))
+            };
+            writeln!(out, "  {mark}  {value}{direction}")?;
+        }
+        for known in &self.known {
+            let mark = if known.agrees { "as known" } else { "AGAINST what is known" };
+            writeln!(out, "  {mark}  {}", known.reason)?;
+        }
+        let values: Vec<String> = self
+            .singular_values
+            .iter()
+            .map(|value| if *value <= self.structural_threshold { "0".to_owned() } else { format!("{value:.3}") })
+            .collect();
+        let lines: Vec<String> = values.chunks(12).map(|part| part.join(" ")).collect();
+        write!(out, "  spectrum  {}", lines.join("\n            "))?;
+        write!(out, "  (0: at most {:.0e})", self.structural_threshold)
+    }
+}

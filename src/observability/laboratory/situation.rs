@@ -1,0 +1,144 @@
+//! Where a flight is and what it knows of its calibration: the starting point of every question about what to fly next.
+
+use nalgebra::{DMatrix, DVector, Vector3};
+
+use super::super::classification::{ROTATION_SCALE_RAD, TRANSLATION_SCALE_M};
+use super::mechanism::LaboratoryJoint;
+use super::{LaboratoryForm, LaboratorySetup};
+use crate::camera::CameraModel;
+use crate::estimator::{JointKnowledge, NavigationState, PoseKnowledge, StepReport, gravity_in_world};
+use crate::flight_log::Rig;
+use crate::flight_log::rig::ImuNoise;
+use crate::gimbal::Chain;
+use crate::observability::{RankReport, analyse};
+
+/// A moment of a flight.
+#[derive(Clone, Debug)]
+pub struct Situation {
+    /// The camera.
+    pub camera: CameraModel,
+    /// The chain in the form in which it is estimated.
+    pub chain: Chain,
+    /// Its joints.
+    pub joints: Vec<LaboratoryJoint>,
+    /// What is known of the calibration, as information of its columns in units of 10° and 3 cm.
+    pub information: DMatrix<f64>,
+    /// Pose, velocity and biases.
+    pub navigation: NavigationState,
+    /// Joint angles.
+    pub joints_rad: Vec<f64>,
+    /// What the encoders will tell.
+    pub encoders: JointKnowledge,
+    /// Noise of the inertial sensor.
+    pub imu_noise: ImuNoise,
+    /// Gravity in the world, in m/s².
+    pub gravity_in_world: Vector3<f64>,
+    /// Standard deviation of a pixel.
+    pub pixel_sigma_px: f64,
+    /// Distances at which the scene has landmarks, in metres.
+    pub distances_m: Vec<f64>,
+}
+
+/// Where a scene is taken to be that has no landmarks yet, in metres.
+const UNKNOWN_DISTANCE_M: [f64; 3] = [4.0, 7.0, 12.0];
+
+impl Situation {
+    /// The moment after a step of a run with a rig's camera; `None` while there is no rank.
+    pub fn of_step(report: &StepReport, rank: &RankReport, rig: &Rig, camera_key: &str) -> Option<Self> {
+        let newest = report.newest()?;
+        let parameterization = report.calibration.parameterization.parse().ok()?;
+        let chain = Chain::from_classical(&report.calibration.classical, parameterization);
+        let whole = rank.names.starts_with(&chain.parameter_names());
+        let chain = if whole { chain } else { chain.without_joint_offsets() };
+        if !rank.names.starts_with(&chain.parameter_names()) || rank.posterior.columns() != rank.names.len() {
+            return None;
+        }
+        let information = marginal(rank.posterior.information(), chain.dof())?;
+        let sigma_of_joints = newest.encoder_sigmas_rad.as_ref().and_then(|sigmas| mean(sigmas));
+        let position_m = (newest.world_from_imu * newest.imu_from_camera).translation_m;
+        let mut distances_m: Vec<f64> =
+            report.landmarks.iter().map(|landmark| (landmark.position_m - position_m).norm()).collect();
+        distances_m.sort_by(f64::total_cmp);
+        let joints = rig.gimbal.iter().flat_map(|gimbal| &gimbal.joints).take(chain.joint_count());
+        Some(Self {
+            camera: rig.camera(camera_key).ok()?.model.clone(),
+            joints: joints
+                .map(|joint| LaboratoryJoint { name: joint.name.clone(), limits_rad: joint.limits_rad })
+                .collect(),
+            information,
+            navigation: NavigationState {
+                world_from_imu: newest.world_from_imu,
+                velocity_m_per_s: newest.velocity_m_per_s,
+                bias: crate::estimator::ImuBias {
+                    gyroscope_rad_per_s: newest.gyroscope_bias_rad_per_s,
+                    accelerometer_m_per_s2: newest.accelerometer_bias_m_per_s2,
+                },
+            },
+            joints_rad: newest.joint_angles_rad.clone(),
+            encoders: sigma_of_joints.map_or(JointKnowledge::Unknown, JointKnowledge::Encoder),
+            imu_noise: rig.imu.noise,
+            gravity_in_world: gravity_in_world(rig.gravity_m_per_s2),
+            pixel_sigma_px: 1.0,
+            distances_m,
+            chain,
+        })
+    }
+
+    /// The moment at the end of an experiment: its prior (10° and 3 cm) and its window are what is known.
+    pub fn of_experiment(setup: &LaboratorySetup, form: LaboratoryForm, imu_noise: ImuNoise) -> Option<Self> {
+        let window = setup.window();
+        let chain = form.chain(&setup.mechanism);
+        let linearization = window.linearize(&setup.mechanism.chain, form.parameterization, form.joint_offsets);
+        let angles: Vec<&[f64]> = window.frames.iter().map(|frame| frame.joints_rad.as_slice()).collect();
+        let free = setup.joints == JointKnowledge::Unknown && chain.joint_count() > 0;
+        let rank = analyse(&linearization, &chain, &angles, free)?;
+        let last = window.frames.last()?;
+        let imu_noise = match setup.poses {
+            PoseKnowledge::Inertial { noise, .. } => noise,
+            PoseKnowledge::Known => imu_noise,
+        };
+        Some(Self {
+            camera: setup.camera.clone(),
+            joints: setup.mechanism.joints.clone(),
+            information: rank.posterior.information(),
+            navigation: last.navigation,
+            joints_rad: last.joints_rad.clone(),
+            encoders: setup.joints,
+            imu_noise,
+            gravity_in_world: window.gravity_in_world,
+            pixel_sigma_px: window.pixel_sigma_px,
+            distances_m: window.landmarks.iter().map(|landmark| landmark.inverse_distance_per_m.recip()).collect(),
+            chain,
+        })
+    }
+
+    /// Distances of the scene's landmarks, or what is taken for them.
+    pub(super) fn scene_m(&self) -> &[f64] {
+        if self.distances_m.is_empty() { &UNKNOWN_DISTANCE_M } else { &self.distances_m }
+    }
+
+    /// Whether the joint angles have to be found from the pictures alone.
+    pub(super) fn joints_free(&self) -> bool {
+        self.encoders == JointKnowledge::Unknown && self.chain.joint_count() > 0
+    }
+
+    /// One unit of each column: 10° or 3 cm.
+    pub(super) fn scale(&self) -> DVector<f64> {
+        let units = self.chain.parameter_units();
+        let scale = |unit: &&str| if *unit == "rad" { ROTATION_SCALE_RAD } else { TRANSLATION_SCALE_M };
+        DVector::from_iterator(units.len(), units.iter().map(scale))
+    }
+}
+
+/// The information of the first columns when the others (those of further cameras) are unknown.
+fn marginal(information: DMatrix<f64>, count: usize) -> Option<DMatrix<f64>> {
+    if information.ncols() <= count {
+        return Some(information);
+    }
+    let covariance = information.cholesky()?.inverse();
+    Some(covariance.view((0, 0), (count, count)).into_owned().cholesky()?.inverse())
+}
+
+fn mean(values: &[f64]) -> Option<f64> {
+    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+}

@@ -1,0 +1,191 @@
+use nalgebra::DVector;
+
+use super::super::{
+    Advice, LABORATORY_IMU, LaboratoryForm, LaboratoryMotion, LaboratorySetup, Mechanism, Situation, advise,
+    excitation, window_of_step,
+};
+use crate::estimator::{Estimator, EstimatorConfig, EstimatorOptions, StepInput, StepReport};
+use crate::flight_log::{JointAngles, Rig};
+use crate::gimbal::{Chain, Parameterization};
+use crate::observability::{RankReport, analyse};
+use crate::simulation::{
+    Exercise, SyntheticFlight, SyntheticFrame, SyntheticMotion, SyntheticOptions, VehicleSwing, synthetic_tracks,
+};
+
+/// When the exercise begins.
+const START_S: f64 = 6.0;
+/// Exercises may differ from here on: a spline looks three knots ahead.
+const SHARED_S: f64 = START_S - 0.4;
+/// How long it is flown: as long as the advice supposes.
+const FLOWN_S: f64 = super::super::ADVICE_DURATION_S;
+
+fn flight(exercise: Exercise, seed: u64) -> SyntheticFlight {
+    synthetic_tracks(&SyntheticOptions {
+        seed,
+        duration_s: START_S + FLOWN_S,
+        features: 80,
+        motion: SyntheticMotion::Hover,
+        look_around_rad: 0.3,
+        exercise: Some((START_S, exercise)),
+        ..SyntheticOptions::default()
+    })
+}
+
+fn estimator(rig: &Rig) -> Estimator {
+    let root = 3.0_f64.sqrt();
+    let gimbal = rig.gimbal.as_ref().unwrap();
+    Estimator::new(EstimatorConfig {
+        camera: rig.cameras[0].model.clone(),
+        rigid_cameras: Vec::new(),
+        imu_noise: rig.imu.noise,
+        gravity_m_per_s2: rig.gravity_m_per_s2,
+        chain: rig.chain_of_camera("cam0").unwrap(),
+        parameterization: Parameterization::Minimal,
+        auto_chart: false,
+        encoder_sigma_rad: gimbal.encoder_sigma_rad,
+        use_encoder: true,
+        calibrate: true,
+        chain_prior: Some((gimbal.prior.translation_bound_m / root, gimbal.prior.rotation_bound_rad / root)),
+        options: EstimatorOptions { keep_linearization: true, ..EstimatorOptions::default() },
+        clock_ms: || 0.0,
+    })
+}
+
+fn step(estimator: &mut Estimator, frame: &SyntheticFrame) -> (StepReport, Option<RankReport>) {
+    let sigma = estimator.config().encoder_sigma_rad.unwrap();
+    let angles_rad = frame.joint_angles_rad.clone().unwrap();
+    let count = angles_rad.len();
+    let joints = JointAngles { angles_rad, sigmas_rad: vec![sigma; count], lasting_sigmas_rad: vec![0.0; count] };
+    let report = estimator.step(&StepInput {
+        frame_index: frame.index,
+        stamp_ns: frame.stamp_ns,
+        imu: &frame.imu,
+        joint_angles: Some(&joints),
+        tracks: &frame.tracks,
+        rigid_tracks: &[],
+    });
+    let rank = report.linearization.as_ref().and_then(|linearization| {
+        let angles: Vec<&[f64]> = report.window.iter().map(|frame| frame.joint_angles_rad.as_slice()).collect();
+        let chain = Chain::from_classical(&report.calibration.classical, Parameterization::Minimal);
+        analyse(linearization, &chain, &angles, false)
+    });
+    (report, rank)
+}
+
+/// Flies frames up to a time and returns what the last of them told.
+fn fly(estimator: &mut Estimator, flight: &SyntheticFlight, from_s: f64, to_s: f64) -> (StepReport, RankReport) {
+    let mut last = None;
+    for frame in &flight.frames {
+        let time_s = frame.stamp_ns as f64 * 1e-9;
+        if time_s > from_s && time_s <= to_s {
+            let (report, rank) = step(estimator, frame);
+            last = rank.map(|rank| (report, rank));
+        }
+    }
+    last.expect("the estimator tracks at the end")
+}
+
+/// Standard deviation along a direction after a step.
+fn sigma(rank: &RankReport, direction: &[f64]) -> f64 {
+    let direction = DVector::from_column_slice(direction);
+    let solved = rank.posterior.information().cholesky().unwrap().solve(&direction);
+    direction.dot(&solved).sqrt()
+}
+
+/// Flies the advised motion and every seventh of the others from the same moment; returns the advice and, for each, what
+/// the advice foretold and what the estimator then had left of the weakest direction's deviation.
+fn flown(seed: u64, every: usize) -> (Advice, Vec<(String, f64, f64)>) {
+    let rest = Exercise { vehicle: VehicleSwing::Hover, joint: None };
+    let warm_up = flight(rest, seed);
+    let mut start = estimator(&warm_up.given_rig);
+    let (report, rank) = fly(&mut start, &warm_up, -1.0, SHARED_S);
+    let situation = Situation::of_step(&report, &rank, &warm_up.given_rig, "cam0").unwrap();
+    let advice = advise(&situation).unwrap();
+    let before = sigma(&rank, &advice.weakest.weights);
+    assert!((before / advice.weakest.sigma - 1.0).abs() < 1e-3, "{before} {}", advice.weakest.sigma);
+    let outcomes = advice
+        .candidates
+        .iter()
+        .step_by(every)
+        .map(|candidate| {
+            let mut estimator = start.clone();
+            let flight = flight(candidate.exercise, seed);
+            let (_, rank) = fly(&mut estimator, &flight, SHARED_S, START_S + FLOWN_S);
+            (candidate.words.clone(), candidate.remaining, sigma(&rank, &advice.weakest.weights) / before)
+        })
+        .collect();
+    (advice, outcomes)
+}
+
+#[test]
+fn flying_the_advised_motion_lowers_the_weakest_sigma_more_than_the_alternatives() {
+    let (advice, outcomes) = flown(3, 5);
+    let table: Vec<String> = outcomes
+        .iter()
+        .map(|(words, foretold, left)| format!("{foretold:.3} foretold, {left:.3} left: {words}"))
+        .collect();
+    let table = format!("{}\n{}", advice.weakest, table.join("\n"));
+    assert_eq!(advice.candidates.len(), 28, "seven swings of the vehicle with none or one of three joints");
+    let (_, _, best) = &outcomes[0];
+    assert!(*best < 0.97, "{table}");
+    for (words, _, left) in &outcomes[1..] {
+        assert!(best < left, "{words}\n{table}");
+    }
+    assert!(advice.sentence().unwrap().starts_with(&advice.candidates[0].words));
+}
+
+#[test]
+fn advice_repeats_bit_by_bit_and_answers_in_words() {
+    let mut setup = LaboratorySetup::new(Mechanism::named("yaw-roll-pitch-offset").unwrap());
+    setup.motion = LaboratoryMotion::Hover;
+    let form = LaboratoryForm::whole(Parameterization::Minimal);
+    let situation = Situation::of_experiment(&setup, form, LABORATORY_IMU).unwrap();
+    let advice = advise(&situation).unwrap();
+    assert_eq!(advice, advise(&situation).unwrap());
+    // Hover tells no lever arm of the IMU's side: hovering on is the worst that can be done, and turning the vehicle helps.
+    let worst = advice.candidates.last().unwrap();
+    assert!(worst.words.contains("hover"), "{advice}");
+    assert!(!advice.candidates[0].words.contains("hover"), "{advice}");
+    assert!(advice.candidates[0].remaining < 0.9 * worst.remaining, "{advice}");
+    // Redundant directions cannot be excited: the classical form gets advice about the others.
+    let classical = LaboratoryForm::whole(Parameterization::Classical);
+    let situation = Situation::of_experiment(&setup, classical, LABORATORY_IMU).unwrap();
+    let advice = advise(&situation).unwrap();
+    assert!(advice.candidates[0].remaining < 0.9, "{advice}");
+}
+
+#[test]
+fn information_is_put_down_to_the_motion_that_brought_it() {
+    let setup = LaboratorySetup::new(Mechanism::named("yaw-roll-pitch-offset").unwrap());
+    let form = LaboratoryForm::whole(Parameterization::Minimal);
+    let chain = form.chain(&setup.mechanism);
+    let told = excitation(&setup.window(), &chain, &[]).unwrap();
+    let gain = |parameter: &str, motion: &str| {
+        let parameter = told.parameters.iter().find(|it| it.name == parameter).unwrap();
+        parameter.by_motion[told.motions.iter().position(|name| name == motion).unwrap()]
+    };
+    assert_eq!(told.motions.len(), 9);
+    assert!(told.parameters.iter().all(|parameter| parameter.bits_per_s > 0.0), "{told}");
+    // What a link turns with its joint is told by that joint: without its motion the link merges with its neighbour.
+    assert!(gain("L2.alpha", "joint 2") > 10.0 * gain("L2.alpha", "move x").abs(), "{told}");
+    assert!(gain("L3.alpha", "joint 3") > gain("L3.alpha", "move z"), "{told}");
+}
+
+#[test]
+fn the_window_of_a_step_is_what_the_step_linearized() {
+    let rest = Exercise { vehicle: VehicleSwing::Hover, joint: None };
+    let flight = flight(rest, 5);
+    let mut estimator = estimator(&flight.given_rig);
+    let (report, rank) = fly(&mut estimator, &flight, -1.0, 4.0);
+    let situation = Situation::of_step(&report, &rank, &flight.given_rig, "cam0").unwrap();
+    let window = window_of_step(&report, &situation);
+    let chain = &situation.chain;
+    let linearization = window.linearize(&chain.to_classical(), chain.parameterization(), true);
+    let angles: Vec<&[f64]> = report.window.iter().map(|frame| frame.joint_angles_rad.as_slice()).collect();
+    let again = analyse(&linearization, chain, &angles, false).unwrap();
+    assert_eq!(again.rank_structural, rank.rank_structural);
+    // Inertial samples are made up, weights of outliers and encoders' averages are left out.
+    for (found, expected) in again.singular_values.iter().zip(&rank.singular_values).take(9) {
+        assert!((found / expected).ln().abs() < 0.5, "{found} for {expected}");
+    }
+}

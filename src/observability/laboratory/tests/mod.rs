@@ -1,0 +1,4 @@
+//! The truth table, and advice that is flown.
+
+mod excitation;
+mod table;

@@ -1,0 +1,41 @@
+use super::super::{LaboratoryForm, LaboratoryMotion, LaboratorySetup, Mechanism, truth_table};
+use crate::gimbal::Parameterization;
+
+#[test]
+fn everything_measured_agrees_with_the_notes() {
+    let table = truth_table();
+    let rows = table.sections.iter().flat_map(|section| &section.rows);
+    let wrong: Vec<_> = rows.filter(|row| !row.agrees).collect();
+    assert!(wrong.is_empty(), "{table}");
+    assert!(table.compared >= 200 && table.agreeing == table.compared, "{}", table.compared);
+    assert!(table.to_string().lines().filter(|line| line.starts_with('!')).count() == 0);
+}
+
+#[test]
+fn mechanisms_are_what_their_names_say() {
+    for (name, _) in Mechanism::NAMES {
+        let mechanism = Mechanism::named(name).unwrap();
+        assert_eq!(mechanism.name, name);
+        assert_eq!(mechanism.joints.len(), mechanism.chain.joint_count(), "{name}");
+        assert!(
+            mechanism.chain.imu_from_camera(&vec![0.3; mechanism.joints.len()]).translation_m.norm() < 1.5,
+            "{name}"
+        );
+    }
+    assert!(Mechanism::named("windmill").unwrap_err().to_string().contains("pan-tilt"));
+    let ideal = Mechanism::named("yaw-roll-pitch-ideal").unwrap().chain;
+    for link in &ideal.links[..2] {
+        assert!(link.a_m.abs() < 1e-12 && link.alpha_rad.cos().abs() < 1e-12, "{link:?}");
+    }
+    // All angles zero: the camera looks ahead, level.
+    let ahead = ideal.imu_from_camera(&[0.0; 3]).rotation * nalgebra::Vector3::z();
+    assert!((ahead - nalgebra::Vector3::x()).norm() < 1e-12, "{ahead}");
+}
+
+#[test]
+fn experiments_repeat_bit_by_bit() {
+    let mut setup = LaboratorySetup::new(Mechanism::named("pan-tilt").unwrap());
+    setup.motion = LaboratoryMotion::YawTilted;
+    let form = LaboratoryForm::whole(Parameterization::Classical);
+    assert_eq!(setup.run(form).unwrap(), setup.run(form).unwrap());
+}

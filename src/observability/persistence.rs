@@ -1,0 +1,85 @@
+//! Since when a direction has been lost.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::RankReport;
+
+/// A direction counts as lost in another step when this share of it lies among that step's null and weak directions.
+const SAME_SHARE: f64 = 0.9;
+
+/// In how many of the earlier steps, the latest first, a direction was null or weak without interruption.
+///
+/// The iteration ends at the first step that sees the direction, or has other columns.
+pub fn steps_lost<'a>(
+    names: &[String],
+    direction: &[f64],
+    earlier: impl IntoIterator<Item = Option<&'a RankReport>>,
+) -> usize {
+    let direction = DVector::from_column_slice(direction);
+    let lost = |rank: &Option<&RankReport>| rank.is_some_and(|rank| rank.names == names && rank.loses(&direction));
+    earlier.into_iter().take_while(lost).count()
+}
+
+impl RankReport {
+    /// Whether a unit direction lies among the null and weak directions.
+    fn loses(&self, direction: &DVector<f64>) -> bool {
+        if self.directions.is_empty() {
+            return false;
+        }
+        let rows = direction.len();
+        let basis = DMatrix::from_fn(rows, self.directions.len(), |row, column| {
+            self.directions[column].weights.get(row).copied().unwrap_or(0.0)
+        });
+        basis.qr().q().tr_mul(direction).norm() >= SAME_SHARE * direction.norm()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::observability::{CalibrationDirection, PackedFactor};
+
+    fn report(directions: &[[f64; 3]]) -> RankReport {
+        RankReport {
+            names: ["a", "b", "c"].map(str::to_owned).into(),
+            singular_values: vec![3.0, 2.0, 0.1],
+            singular_values_with_priors: vec![3.0, 2.0, 1.0],
+            reference: 1.0,
+            structural_threshold: 1e-12,
+            informed_threshold: 1.0,
+            rank_structural: 3,
+            rank_informed: 3 - directions.len(),
+            deficit_parameterization: 0,
+            deficit_joints: 0,
+            deficit_absorbed: 0,
+            deficit_motion: 0,
+            directions: directions
+                .iter()
+                .map(|weights| CalibrationDirection {
+                    singular_value: 0.1,
+                    structural: false,
+                    weights: weights.to_vec(),
+                })
+                .collect(),
+            margins: Vec::new(),
+            known: Vec::new(),
+            joint_count: 0,
+            posterior: PackedFactor::default(),
+        }
+    }
+
+    #[test]
+    fn a_direction_is_lost_until_a_step_sees_it() {
+        let names: Vec<String> = ["a", "b", "c"].map(str::to_owned).into();
+        let (first, mixed) = ([1.0, 0.0, 0.0], [0.6, 0.8, 0.0]);
+        let (lost, seen) = (report(&[[0.0, 1.0, 0.0], first]), report(&[[0.0, 0.0, 1.0]]));
+        let count =
+            |direction: &[f64], earlier: &[Option<&RankReport>]| steps_lost(&names, direction, earlier.iter().copied());
+        assert_eq!(count(&first, &[Some(&lost), Some(&lost), Some(&seen), Some(&lost)]), 2);
+        // A mixture of lost directions is lost as well, however they are named from step to step.
+        assert_eq!(count(&mixed, &[Some(&lost), Some(&report(&[mixed])), Some(&report(&[first]))]), 2);
+        assert_eq!(count(&first, &[None, Some(&lost)]), 0);
+        assert_eq!(steps_lost(&names[..2], &first, [Some(&lost)]), 0);
+        assert_eq!(count(&first, &[Some(&report(&[]))]), 0);
+    }
+}

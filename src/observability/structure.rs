@@ -1,0 +1,245 @@
+//! What is known to be lost before anything is measured: directions in which the chain's numbers move without moving the
+//! camera at any joint angles, in closed form, each with its reason.
+//!
+//! The paper claims six degenerate columns of the classical chain (§4.5): `d`, `a`, `α` and `θ` of the last link and `d`
+//! and `θ` of the first one. It proves the one of `d` (Eqs. 11–17) and fixes the others by the forms of Eqs. 19 and 20.
+//! Its print is wrong in three places, none of which touches the claim. Eq. 12 has a minus before the lever-arm block
+//! where a plus belongs (left convention; the proof uses other columns only). Eq. 18 has `−cos β` in the lower right
+//! corner of a rotation, while Eq. 19 needs `+cos β`. And the advice to switch the rotations of α and β against the lock
+//! of Eq. 19 works only when `y` is moved together with β: that form is
+//! [`crate::gimbal::Parameterization::MinimalSwapped`].
+//! The paper has its proof in the left convention of rotations; the directions here are in the right one, as all else.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::gimbal::{Chain, Parameterization, redundant_directions};
+
+/// Something that no measurement can tell, known from the form of the chain.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum KnownLoss {
+    /// The first link's offset against a turn of `imu_from_base`.
+    BaseTheta,
+    /// The first link's `d` against a shift of `imu_from_base`.
+    BaseD,
+    /// The last link's offset against `effector_from_camera`.
+    EndTheta,
+    /// The last link's `d` against a shift of `effector_from_camera`.
+    EndD,
+    /// The last link's `a` against a shift of `effector_from_camera`.
+    EndA,
+    /// The last link's `α` against a turn of `effector_from_camera`.
+    EndAlpha,
+    /// Without joints: a turn of `imu_from_base` about this axis against `effector_from_camera`.
+    RigidTurn(usize),
+    /// Without joints: a shift of `imu_from_base` along this axis against `effector_from_camera`.
+    RigidShift(usize),
+    /// A link's offset (counted from 0) against its joint's angles, when these are unknown.
+    FreeAngle(usize),
+    /// The `d` of this link and of the next one, whose axes are parallel.
+    ParallelD(usize),
+    /// The offsets of this link and of the next one, whose axes are the same line.
+    CoaxialTheta(usize),
+}
+
+/// A known loss held against a measurement.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct KnownDirection {
+    /// What is lost.
+    pub loss: KnownLoss,
+    /// Scaled response of the window to the direction, relative to the reference of the rank rule: rounding when the
+    /// measurement agrees.
+    pub response: f64,
+    /// Share of the scaled direction that lies in the measured null space, 1 when the measurement agrees.
+    pub share_in_null_space: f64,
+    /// Whether the measurement agrees.
+    pub agrees: bool,
+}
+
+/// Sine of a twist under which axes count as parallel, and length of a link under which parallel axes count as one line,
+/// in metres: far under what anyone can build, far over rounding.
+const PARALLEL: f64 = 1e-12;
+
+/// A share of the null space from which on a direction counts as inside.
+const INSIDE: f64 = 1.0 - 1e-6;
+
+/// All known losses of a chain, each with its direction in the chain's columns, in radians and metres.
+pub fn known_losses(chain: &Chain, joints_free: bool) -> Vec<(KnownLoss, DVector<f64>)> {
+    let mut losses = Vec::new();
+    if chain.parameterization() == Parameterization::Classical {
+        redundant(chain, joints_free, &mut losses);
+    }
+    links(chain, joints_free, &mut losses);
+    losses
+}
+
+/// The six of the classical form.
+fn redundant(chain: &Chain, joints_free: bool, losses: &mut Vec<(KnownLoss, DVector<f64>)>) {
+    let classical = chain.to_classical();
+    let directions = redundant_directions(&classical);
+    let rigid = [0, 1, 2].map(KnownLoss::RigidTurn).into_iter().chain([0, 1, 2].map(KnownLoss::RigidShift));
+    let jointed = [
+        KnownLoss::BaseTheta,
+        KnownLoss::BaseD,
+        KnownLoss::EndTheta,
+        KnownLoss::EndD,
+        KnownLoss::EndA,
+        KnownLoss::EndAlpha,
+    ];
+    let names: Vec<KnownLoss> = if classical.links.is_empty() { rigid.collect() } else { jointed.into() };
+    let hidden = chain.hides_joint_offsets();
+    // Where the offsets have no columns, unknown joint angles take their part; known ones do not.
+    let whole = chain.parameter_names();
+    let kept: Vec<usize> = if hidden {
+        let link = |row: usize| row.checked_sub(6).filter(|row| *row < 4 * classical.links.len());
+        (0..directions.nrows()).filter(|row| link(*row).is_none_or(|row| row % 4 != 0)).collect()
+    } else {
+        (0..directions.nrows()).collect()
+    };
+    debug_assert_eq!(kept.len(), whole.len(), "a row per column");
+    for (loss, direction) in names.into_iter().zip(directions.column_iter()) {
+        let by_offset = matches!(loss, KnownLoss::BaseTheta | KnownLoss::EndTheta);
+        if !hidden || joints_free || !by_offset {
+            losses.push((loss, DVector::from_iterator(kept.len(), kept.iter().map(|row| direction[*row]))));
+        }
+    }
+}
+
+/// What links lose: offsets to free angles, and neighbours on parallel axes to each other.
+fn links(chain: &Chain, joints_free: bool, losses: &mut Vec<(KnownLoss, DVector<f64>)>) {
+    let names = chain.parameter_names();
+    let column = |link: usize, number: &str| names.iter().position(|name| *name == format!("L{}.{number}", link + 1));
+    let direction = |entries: &[(usize, f64)]| {
+        let mut direction = DVector::zeros(names.len());
+        entries.iter().for_each(|(column, weight)| direction[*column] = *weight);
+        direction
+    };
+    if joints_free {
+        for joint in 0..chain.joint_count() {
+            if let Some(theta) = column(joint, "theta") {
+                losses.push((KnownLoss::FreeAngle(joint), direction(&[(theta, 1.0)])));
+            }
+        }
+    }
+    if chain.parameterization() == Parameterization::Poe {
+        return;
+    }
+    let classical = chain.to_classical();
+    for link in 0..classical.links.len().saturating_sub(1) {
+        let (sine, cosine) = classical.links[link].alpha_rad.sin_cos();
+        if sine.abs() > PARALLEL {
+            continue;
+        }
+        let pair =
+            |number: &str| Some(direction(&[(column(link, number)?, 1.0), (column(link + 1, number)?, -cosine)]));
+        losses.extend(pair("d").map(|direction| (KnownLoss::ParallelD(link), direction)));
+        if classical.links[link].a_m.abs() <= PARALLEL {
+            losses.extend(pair("theta").map(|direction| (KnownLoss::CoaxialTheta(link), direction)));
+        }
+    }
+}
+
+/// Holds the known losses against the scaled, projected calibration block and the basis of its null space.
+pub(super) fn compare(
+    losses: Vec<(KnownLoss, DVector<f64>)>,
+    scale: &DVector<f64>,
+    block: &DMatrix<f64>,
+    null_space: &nalgebra::DMatrixView<'_, f64>,
+    reference: f64,
+    structural_threshold: f64,
+) -> Vec<KnownDirection> {
+    losses
+        .into_iter()
+        .filter(|(_, direction)| direction.len() <= scale.len())
+        .map(|(loss, direction)| {
+            // The chain's columns come first, those of other cameras behind them take no part.
+            let direction = direction.resize_vertically(scale.len(), 0.0).component_div(scale).normalize();
+            let response = (block * &direction).norm();
+            let share_in_null_space = null_space.tr_mul(&direction).norm();
+            KnownDirection {
+                loss,
+                response: if reference > 0.0 { response / reference } else { 0.0 },
+                share_in_null_space,
+                agrees: response <= structural_threshold && share_in_null_space >= INSIDE,
+            }
+        })
+        .collect()
+}
+
+impl KnownLoss {
+    /// Where it is written: equations of the paper.
+    pub fn equations(self) -> &'static str {
+        match self {
+            Self::BaseD => "Eqs. 11–17",
+            Self::BaseTheta => "§4.5, removed by Eq. 20",
+            Self::EndTheta | Self::EndD | Self::EndA | Self::EndAlpha => "§4.5, removed by Eq. 19",
+            Self::RigidTurn(_) | Self::RigidShift(_) => "Eq. 5 without links",
+            Self::FreeAngle(_) | Self::ParallelD(_) | Self::CoaxialTheta(_) => "Eq. 2",
+        }
+    }
+
+    /// Why it cannot be told, in one sentence, for a chain of so many joints.
+    pub fn reason(self, joints: usize) -> String {
+        let first = link_name(0, joints);
+        let last = link_name(joints.saturating_sub(1), joints);
+        let axis = |axis: usize| ["x", "y", "z"].get(axis).copied().unwrap_or("?");
+        let what = match self {
+            Self::BaseTheta => {
+                format!("{first}.theta and the rotation of imu_from_base about that axis are the same motion")
+            }
+            Self::BaseD => {
+                format!("{first}.d and the translation of imu_from_base along that axis are the same motion")
+            }
+            Self::EndTheta => {
+                format!("{last}.theta and a motion of effector_from_camera about the last axis are the same motion")
+            }
+            Self::EndD => {
+                format!("{last}.d and the translation of effector_from_camera along the last axis are the same motion")
+            }
+            Self::EndA => {
+                format!("{last}.a and the x translation of effector_from_camera are the same motion")
+            }
+            Self::EndAlpha => {
+                format!(
+                    "{last}.alpha and a rotation of effector_from_camera about the effector's x axis are the same motion"
+                )
+            }
+            Self::RigidTurn(about) => format!(
+                "without joints a rotation of imu_from_base about {} is one of effector_from_camera",
+                axis(about)
+            ),
+            Self::RigidShift(along) => format!(
+                "without joints a translation of imu_from_base along {} is one of effector_from_camera",
+                axis(along)
+            ),
+            Self::FreeAngle(joint) => {
+                format!(
+                    "{}.theta and the unknown angles of joint {} are seen as their sum only",
+                    link_name(joint, joints),
+                    joint + 1
+                )
+            }
+            Self::ParallelD(link) => format!(
+                "the axes of joints {} and {} are parallel, so that {}.d and {}.d are the same motion",
+                link + 1,
+                link + 2,
+                link_name(link, joints),
+                link_name(link + 1, joints)
+            ),
+            Self::CoaxialTheta(link) => format!(
+                "the axes of joints {} and {} are one line, so that {}.theta and {}.theta are the same motion",
+                link + 1,
+                link + 2,
+                link_name(link, joints),
+                link_name(link + 1, joints)
+            ),
+        };
+        format!("{what} ({})", self.equations())
+    }
+}
+
+/// The link from one joint's frame to the next: `base_from_joint2`, …, `joint3_from_effector`.
+fn link_name(link: usize, joints: usize) -> String {
+    let from = if link == 0 { "base".to_owned() } else { format!("joint{}", link + 1) };
+    let to = if link + 1 == joints { "effector".to_owned() } else { format!("joint{}", link + 2) };
+    format!("{from}_from_{to}")
+}
