@@ -1,11 +1,13 @@
 //! The rank panel: what the window can say about the calibration, in words, as a spectrum and by parameter name.
 
+mod advice;
 mod heat_map;
 mod spectrum;
 pub(crate) mod verdict;
 
 use egui::{RichText, ScrollArea, Sense, Ui, vec2};
 
+use self::advice::AdviceUi;
 use self::verdict::Level;
 use super::PanelContext;
 use super::convergence::empty_ui;
@@ -28,6 +30,7 @@ pub struct RankPanel {
     tables: RunTables,
     /// By run: informed, then structural rank.
     curves: Vec<[Curve; 2]>,
+    advice: AdviceUi,
 }
 
 impl RankPanel {
@@ -51,6 +54,7 @@ impl RankPanel {
                 self.over_time_ui(ui, ctx);
                 return;
             };
+            self.advice.ui(ui, ctx, run, step);
             spectrum::ui(ui, ctx.theme, rank, (0.16 * height).clamp(60.0, 150.0));
             // The timeline has a lane for it too, so it yields to the heat map first.
             if height > LOWEST_WITH_TIME {
@@ -116,6 +120,15 @@ fn verdict_ui(ui: &mut Ui, theme: &Theme, step: &StepRecord) {
             ui.add(egui::Label::new(RichText::new(reason).color(theme.text)).truncate().sense(Sense::hover()));
         response.on_hover_text(reason);
     }
+    let Some(rank) = step.rank.as_ref().filter(|rank| !rank.known.is_empty()) else { return };
+    let title = format!("Known structure: {} of {} measured as null", rank.known_agreeing(), rank.known.len());
+    let title =
+        RichText::new(title).color(if rank.known_agreeing() == rank.known.len() { theme.text } else { theme.error });
+    egui::CollapsingHeader::new(title).id_salt("known structure").show(ui, |ui| {
+        for line in verdict::structure_lines(rank) {
+            ui.add(egui::Label::new(RichText::new(line).small().color(theme.text)).wrap());
+        }
+    });
 }
 
 /// A sign and its colour: never the colour alone.

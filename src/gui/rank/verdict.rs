@@ -2,7 +2,7 @@
 
 use crate::estimator::{EventKind, Phase};
 use crate::gui::units::counted;
-use crate::observability::{CalibrationDirection, RankReport};
+use crate::observability::{CalibrationDirection, KnownDirection, RankReport};
 use crate::session::StepRecord;
 
 /// How good the news is.
@@ -82,6 +82,15 @@ fn of_rank(rank: &RankReport) -> Verdict {
         reasons.push(format!("Chart near its lock: {lock} margin {margin:.2}"));
     }
     Verdict { level, headline, reasons }
+}
+
+/// Every known loss with its reason and what was measured, a line each.
+pub(crate) fn structure_lines(rank: &RankReport) -> Vec<String> {
+    let line = |known: &KnownDirection| {
+        let mark = if known.agrees { "✔" } else { "✖" };
+        format!("{mark} {}", known.loss.reason(rank.joint_count))
+    };
+    rank.known.iter().map(line).collect()
 }
 
 /// Below this margin a chart is switched (section 6 of the mathematics notes).
