@@ -160,15 +160,11 @@ fn print_as<T: serde::Serialize + std::fmt::Display>(report: &T, json: bool) -> 
 }
 
 fn list() -> String {
-    let mut text = "mechanisms\n".to_owned();
-    for (name, meaning) in Mechanism::NAMES {
-        text.push_str(&format!("  {name:<28}{meaning}\n"));
-    }
-    text.push_str("motions\n");
-    for motion in LaboratoryMotion::ALL {
-        text.push_str(&format!("  {:<28}{}\n", motion.name(), motion.meaning()));
-    }
-    text
+    let line = |(name, meaning): (&str, &str)| format!("  {name:<28}{meaning}\n");
+    let mechanisms: String = Mechanism::NAMES.into_iter().map(line).collect();
+    let motions: String =
+        LaboratoryMotion::ALL.into_iter().map(|motion| line((motion.name(), motion.meaning()))).collect();
+    format!("mechanisms\n{mechanisms}motions\n{motions}")
 }
 
 impl DegeneracyArguments {

@@ -95,7 +95,7 @@ pub(crate) fn rank_at(names: &[String], index: usize) -> RankReport {
         directions,
         known: Vec::new(),
         posterior: crate::observability::PackedFactor::default(),
-        joint_count: names.iter().filter(|name| name.ends_with(".a")).count(),
+        joint_count: names.iter().filter(|name| name.split_once('.').is_some_and(|(_, number)| number == "a")).count(),
         margins: vec![("base".to_owned(), 0.98), ("end".to_owned(), 0.93), ("L2".to_owned(), 0.99)],
     }
 }

@@ -16,8 +16,8 @@ pub fn steps_lost<'a>(
     earlier: impl IntoIterator<Item = Option<&'a RankReport>>,
 ) -> usize {
     let direction = DVector::from_column_slice(direction);
-    let lost = |rank: &Option<&RankReport>| rank.is_some_and(|rank| rank.names == names && rank.loses(&direction));
-    earlier.into_iter().take_while(lost).count()
+    let loses = |rank: &RankReport| rank.names == names && rank.loses(&direction);
+    earlier.into_iter().take_while(|rank| rank.is_some_and(loses)).count()
 }
 
 impl RankReport {

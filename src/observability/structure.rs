@@ -110,7 +110,9 @@ fn links(chain: &Chain, joints_free: bool, losses: &mut Vec<(KnownLoss, DVector<
     let column = |link: usize, number: &str| names.iter().position(|name| *name == format!("L{}.{number}", link + 1));
     let direction = |entries: &[(usize, f64)]| {
         let mut direction = DVector::zeros(names.len());
-        entries.iter().for_each(|(column, weight)| direction[*column] = *weight);
+        for (column, weight) in entries {
+            direction[*column] = *weight;
+        }
         direction
     };
     if joints_free {

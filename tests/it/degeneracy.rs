@@ -77,7 +77,7 @@ fn wrong_names_are_refused_with_the_right_ones() {
         (&["--freeze", "4"], 1, "3 joints"),
         (&["--freeze", "0"], 1, "3 joints"),
         (&["--frames", "1"], 2, "2..=64"),
-        (&["--encoder-sigma-deg", "-1"], 2, "known"),
+        (&["--encoder-sigma-deg=-1"], 2, "known"),
         (&["--rig", "none.yaml"], 1, "none.yaml"),
         (&["--table", "--motion", "hover"], 2, "--table"),
     ] {

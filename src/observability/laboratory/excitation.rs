@@ -153,6 +153,8 @@ impl fmt::Display for Excitation {
         for parameter in &self.parameters {
             write!(out, "  {:<12}{:>8.2}", parameter.name, parameter.bits_per_s)?;
             for (name, missing) in self.motions.iter().zip(&parameter.by_motion) {
+                // Rounding of either sign is nothing.
+                let missing = if missing.abs() < 0.005 { 0.0 } else { *missing };
                 write!(out, "{missing:>width$.2}", width = width(name))?;
             }
             writeln!(out)?;

@@ -11,7 +11,6 @@ mod mechanism;
 mod motion;
 mod report;
 mod situation;
-mod step_window;
 mod table;
 #[cfg(test)]
 mod tests;
@@ -26,5 +25,4 @@ pub use mechanism::{LaboratoryJoint, Mechanism, UnknownMechanism};
 pub use motion::{LaboratoryMotion, UnknownMotion};
 pub use report::LaboratoryReport;
 pub use situation::Situation;
-pub use step_window::window_of_step;
 pub use table::{TableEntry, TableRow, TableSection, TruthTable, truth_table};

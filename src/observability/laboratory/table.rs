@@ -16,7 +16,7 @@ const MOST_FRAMES: usize = 16;
 const LANDMARKS_WITHOUT_ENCODER: usize = 130;
 
 /// The table, measured.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct TruthTable {
     /// Its parts.
     pub sections: Vec<TableSection>,
@@ -27,7 +27,7 @@ pub struct TruthTable {
 }
 
 /// A part of the table.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct TableSection {
     /// What it is about.
     pub title: String,
@@ -36,7 +36,7 @@ pub struct TableSection {
 }
 
 /// One experiment.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct TableRow {
     /// What is flown.
     pub scenario: String,
@@ -59,7 +59,7 @@ pub struct TableRow {
 }
 
 /// The rank of an experiment in one form.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct TableEntry {
     /// Name of the form.
     pub form: String,

@@ -135,7 +135,7 @@ pub(super) const SECTIONS: [Section; 6] = [
         title: "Joint angles and poses (exciting motion)",
         rows: &[
             says(row("encoder known, poses known", OFFSET), ALL_18, [6, 0, 0, 0], NOTHING),
-            says(row("encoder known, poses known", "generic"), ALL_18, [6, 0, 0, 0], NOTHING),
+            says(row("encoder known, poses known, generic", "generic"), ALL_18, [6, 0, 0, 0], NOTHING),
             says(
                 knowing(row("encoder known, IMU, bias known", OFFSET), Known, Poses::BiasKnown, 10),
                 ALL_18,
@@ -167,7 +167,7 @@ pub(super) const SECTIONS: [Section; 6] = [
                 OFFSETS,
             ),
             says(
-                knowing(row("no encoder, poses known", "generic"), Free, Poses::Known, 16),
+                knowing(row("no encoder, poses known, generic", "generic"), Free, Poses::Known, 16),
                 ALL_15,
                 [6, 0, 3, 0],
                 OFFSETS,
@@ -299,7 +299,12 @@ pub(super) const SECTIONS: [Section; 6] = [
             says(moving(row("joints 1, 2 move", OFFSET), Motion::Aggressive, &[3]), TWO_14, [6, 4, 0, 0], None),
             says(moving(row("joints 1, 3 move", OFFSET), Motion::Aggressive, &[2]), TWO_14, [6, 4, 0, 0], None),
             says(moving(row("joints 2, 3 move", OFFSET), Motion::Aggressive, &[1]), TWO_14, [6, 4, 0, 0], None),
-            says(moving(row("joints 1, 2 move", "generic"), Motion::Aggressive, &[3]), TWO_14, [6, 4, 0, 0], None),
+            says(
+                moving(row("joints 1, 2 move, generic", "generic"), Motion::Aggressive, &[3]),
+                TWO_14,
+                [6, 4, 0, 0],
+                None,
+            ),
             says(moving(row("joint 1 moves", OFFSET), Motion::Aggressive, &[2, 3]), TWO_10, [6, 8, 0, 0], None),
             says(moving(row("joint 2 moves", OFFSET), Motion::Aggressive, &[1, 3]), TWO_10, [6, 8, 0, 0], None),
             says(moving(row("joint 3 moves", OFFSET), Motion::Aggressive, &[1, 2]), TWO_10, [6, 8, 0, 0], None),

@@ -1,8 +1,7 @@
 use nalgebra::DVector;
 
 use super::super::{
-    Advice, LABORATORY_IMU, LaboratoryForm, LaboratoryMotion, LaboratorySetup, Mechanism, Situation, advise,
-    excitation, window_of_step,
+    Advice, LABORATORY_IMU, LaboratoryForm, LaboratoryMotion, LaboratorySetup, Mechanism, Situation, advise, excitation,
 };
 use crate::estimator::{Estimator, EstimatorConfig, EstimatorOptions, StepInput, StepReport};
 use crate::flight_log::{JointAngles, Rig};
@@ -169,23 +168,4 @@ fn information_is_put_down_to_the_motion_that_brought_it() {
     // What a link turns with its joint is told by that joint: without its motion the link merges with its neighbour.
     assert!(gain("L2.alpha", "joint 2") > 10.0 * gain("L2.alpha", "move x").abs(), "{told}");
     assert!(gain("L3.alpha", "joint 3") > gain("L3.alpha", "move z"), "{told}");
-}
-
-#[test]
-fn the_window_of_a_step_is_what_the_step_linearized() {
-    let rest = Exercise { vehicle: VehicleSwing::Hover, joint: None };
-    let flight = flight(rest, 5);
-    let mut estimator = estimator(&flight.given_rig);
-    let (report, rank) = fly(&mut estimator, &flight, -1.0, 4.0);
-    let situation = Situation::of_step(&report, &rank, &flight.given_rig, "cam0").unwrap();
-    let window = window_of_step(&report, &situation);
-    let chain = &situation.chain;
-    let linearization = window.linearize(&chain.to_classical(), chain.parameterization(), true);
-    let angles: Vec<&[f64]> = report.window.iter().map(|frame| frame.joint_angles_rad.as_slice()).collect();
-    let again = analyse(&linearization, chain, &angles, false).unwrap();
-    assert_eq!(again.rank_structural, rank.rank_structural);
-    // Inertial samples are made up, weights of outliers and encoders' averages are left out.
-    for (found, expected) in again.singular_values.iter().zip(&rank.singular_values).take(9) {
-        assert!((found / expected).ln().abs() < 0.5, "{found} for {expected}");
-    }
 }
