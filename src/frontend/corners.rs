@@ -48,11 +48,22 @@ struct Candidate {
     response: f32,
 }
 
+/// A square of the image that is searched by itself, smaller where the image ends.
+#[derive(Clone, Copy, Debug)]
+struct Tile {
+    left: usize,
+    top: usize,
+    width: usize,
+    height: usize,
+}
+
 /// Finds new corners; holds buffers that live on from image to image.
 #[derive(Clone, Debug, Default)]
 pub struct CornerDetector {
     candidates: Vec<Candidate>,
     in_tile: Vec<Candidate>,
+    /// What of the image has not been searched yet.
+    tiles: Vec<Tile>,
     taken: PointGrid,
     /// How many features lie in each cell of the image.
     crowd: Vec<usize>,
@@ -84,11 +95,18 @@ impl CornerDetector {
         if count >= options.max_features {
             return;
         }
-        self.collect(image, options);
-        self.candidates.sort_by(|a, b| b.response.total_cmp(&a.response));
+        self.candidates.clear();
+        self.tiles.clear();
+        self.tiles.extend(tiles_of(image, options.border_px));
+        let mut crowd = std::mem::take(&mut self.crowd);
         let mut round = 0;
-        while count < options.max_features && !self.candidates.is_empty() {
-            let (taken, crowd) = (&mut self.taken, &mut self.crowd);
+        while count < options.max_features {
+            // The first round fills empty cells, so it needs the corners of no others; most often it is the only one.
+            self.collect(image, options, |tile| round > 0 || cells.about(tile).any(|cell| crowd[cell] == 0));
+            if self.candidates.is_empty() && self.tiles.is_empty() {
+                break;
+            }
+            let taken = &mut self.taken;
             self.candidates.retain(|candidate| {
                 if !taken.is_free(&candidate.uv_px) {
                     return false;
@@ -105,58 +123,87 @@ impl CornerDetector {
             });
             round += 1;
         }
+        self.crowd = crowd;
     }
 
-    /// Gathers the best corners of every tile that is not covered by features already.
-    fn collect(&mut self, image: &GrayImage, options: &CornerOptions) {
-        self.candidates.clear();
+    /// Gathers the best corners of those tiles that are `wanted`, have not been searched and are not covered by features
+    /// already.
+    fn collect(&mut self, image: &GrayImage, options: &CornerOptions, wanted: impl Fn(&Tile) -> bool) {
+        let mut tiles = std::mem::take(&mut self.tiles);
+        let before = self.candidates.len();
+        tiles.retain(|tile| {
+            let searched = wanted(tile);
+            if searched && !self.is_covered(tile) {
+                self.search(image, tile, options);
+            }
+            !searched
+        });
+        self.tiles = tiles;
+        if self.candidates.len() > before {
+            self.candidates.sort_by(|a, b| b.response.total_cmp(&a.response).then(a.place().cmp(&b.place())));
+        }
+    }
+
+    /// Adds the best corners of a tile to the candidates.
+    fn search(&mut self, image: &GrayImage, tile: &Tile, options: &CornerOptions) {
         let mut responses = [[0.0; RESPONSES]; RESPONSES];
-        for top in (options.border_px..image.height.saturating_sub(options.border_px)).step_by(TILE) {
-            for left in (options.border_px..image.width.saturating_sub(options.border_px)).step_by(TILE) {
-                let width = TILE.min(image.width - options.border_px - left);
-                let height = TILE.min(image.height - options.border_px - top);
-                if self.is_covered(left, top, width, height) {
-                    continue;
-                }
-                structure_responses(image, left, top, &mut responses);
-                self.in_tile.clear();
-                for y in 0..height {
-                    for x in 0..width {
-                        let response = responses[y + 1][x + 1];
-                        if response >= options.min_eigenvalue as f32 && is_maximum(&responses, x + 1, y + 1) {
-                            let shift = peak_shift(&responses, x + 1, y + 1);
-                            let uv_px = Vector2::new((left + x) as f64, (top + y) as f64) + shift;
-                            if self.taken.is_free(&uv_px) {
-                                self.in_tile.push(Candidate { uv_px, response });
-                            }
-                        }
+        structure_responses(image, tile.left, tile.top, &mut responses);
+        self.in_tile.clear();
+        for y in 0..tile.height {
+            for x in 0..tile.width {
+                let response = responses[y + 1][x + 1];
+                if response >= options.min_eigenvalue as f32 && is_maximum(&responses, x + 1, y + 1) {
+                    let shift = peak_shift(&responses, x + 1, y + 1);
+                    let uv_px = Vector2::new((tile.left + x) as f64, (tile.top + y) as f64) + shift;
+                    if self.taken.is_free(&uv_px) {
+                        self.in_tile.push(Candidate { uv_px, response });
                     }
                 }
-                self.in_tile.sort_by(|a, b| b.response.total_cmp(&a.response));
-                let first = self.candidates.len();
-                for candidate in &self.in_tile {
-                    let apart = self.candidates[first..]
-                        .iter()
-                        .all(|other| (other.uv_px - candidate.uv_px).norm() >= options.min_distance_px);
-                    if apart && self.candidates.len() < first + CORNERS_PER_TILE {
-                        self.candidates.push(*candidate);
-                    }
-                }
+            }
+        }
+        self.in_tile.sort_by(|a, b| b.response.total_cmp(&a.response));
+        let first = self.candidates.len();
+        for candidate in &self.in_tile {
+            let apart = self.candidates[first..]
+                .iter()
+                .all(|other| (other.uv_px - candidate.uv_px).norm() >= options.min_distance_px);
+            if apart && self.candidates.len() < first + CORNERS_PER_TILE {
+                self.candidates.push(*candidate);
             }
         }
     }
 
     /// Whether no corner of a tile could be far enough from the features, as far as a coarse look tells.
-    fn is_covered(&self, left: usize, top: usize, width: usize, height: usize) -> bool {
+    fn is_covered(&self, tile: &Tile) -> bool {
         const LOOK: usize = 4;
         (0..=LOOK).all(|j| {
             (0..=LOOK).all(|i| {
-                let x = left as f64 + (width - 1) as f64 * i as f64 / LOOK as f64;
-                let y = top as f64 + (height - 1) as f64 * j as f64 / LOOK as f64;
+                let x = tile.left as f64 + (tile.width - 1) as f64 * i as f64 / LOOK as f64;
+                let y = tile.top as f64 + (tile.height - 1) as f64 * j as f64 / LOOK as f64;
                 !self.taken.is_free(&Vector2::new(x, y))
             })
         })
     }
+}
+
+impl Candidate {
+    /// The pixel it lies in, row first: what decides between equal ones.
+    fn place(&self) -> (usize, usize) {
+        (self.uv_px.y.round() as usize, self.uv_px.x.round() as usize)
+    }
+}
+
+/// All tiles of an image, row by row.
+fn tiles_of(image: &GrayImage, border_px: usize) -> impl Iterator<Item = Tile> {
+    let (right, bottom) = (image.width.saturating_sub(border_px), image.height.saturating_sub(border_px));
+    (border_px..bottom).step_by(TILE).flat_map(move |top| {
+        (border_px..right).step_by(TILE).map(move |left| Tile {
+            left,
+            top,
+            width: TILE.min(right - left),
+            height: TILE.min(bottom - top),
+        })
+    })
 }
 
 /// The division of an image into about as many cells as features are wanted.
@@ -178,6 +225,19 @@ impl Cells {
         let column = ((uv_px.x / self.side_px) as usize).min(self.columns - 1);
         let row = ((uv_px.y / self.side_px) as usize).min(self.rows - 1);
         row * self.columns + column
+    }
+
+    /// The cells in which a corner of a tile can lie.
+    fn about(&self, tile: &Tile) -> impl Iterator<Item = usize> {
+        // A corner may lie half a pixel beside its pixel.
+        let range = |first: usize, length: usize, count: usize| {
+            let at = |pixel: usize| ((pixel as f64 / self.side_px) as usize).min(count - 1);
+            at(first.saturating_sub(1))..at(first + length) + 1
+        };
+        let columns = range(tile.left, tile.width, self.columns);
+        let width = self.columns;
+        range(tile.top, tile.height, self.rows)
+            .flat_map(move |row| columns.clone().map(move |column| row * width + column))
     }
 }
 
@@ -248,9 +308,8 @@ fn peak_shift(responses: &Responses, x: usize, y: usize) -> Vector2<f64> {
 #[expect(clippy::large_stack_arrays, reason = "18 KiB that stay in the nearest cache")]
 fn structure_responses(image: &GrayImage, left: usize, top: usize, responses: &mut Responses) {
     let reach = (BLOCK_RADIUS + 2) as i32;
-    let mut pixels = [0.0_f32; PIXELS * PIXELS];
-    cut_out(image, [left as i32 - reach, top as i32 - reach], PIXELS, &mut pixels, f32::from);
-    let (pixels, _) = pixels.as_chunks::<PIXELS>();
+    let mut pixels = [[0.0_f32; PIXELS]; PIXELS];
+    cut_out(image, [left as i32 - reach, top as i32 - reach], &mut pixels, f32::from);
     let mut products = [[[0.0_f32; GRADIENTS]; GRADIENTS]; 3];
     for y in 0..GRADIENTS {
         let (above, here, below) = (&pixels[y], &pixels[y + 1], &pixels[y + 2]);

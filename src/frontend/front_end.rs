@@ -59,7 +59,7 @@ struct Track {
     age: u32,
     uv_px: Vector2<f64>,
     bearing: Vector3<f64>,
-    /// What it looked like at first, `None` when too near to the border then.
+    /// What it looked like at first, `None` when too near to the border or without texture then.
     key: Option<Key>,
 }
 

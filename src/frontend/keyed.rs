@@ -6,8 +6,11 @@
 //! Baker and Matthews put it).
 //! When the key does not fit any more, the feature goes on from image to image and gets a new key.
 
+use std::sync::Arc;
+
 use nalgebra::{Matrix2, Matrix6, Vector2, Vector6};
 
+use super::pyramid::cut_out;
 use crate::flight_log::GrayImage;
 
 /// Side of the window in pixels.
@@ -38,11 +41,10 @@ impl Default for KeyOptions {
 }
 
 /// A feature's window as it was first seen.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub(super) struct Key {
-    /// Row by row about a whole pixel.
-    pixels: Box<[u8; SIDE * SIDE]>,
-    /// From that pixel to the feature.
+    template: Arc<Template>,
+    /// From the window's middle, a whole pixel, to the feature.
     offset_px: Vector2<f64>,
     /// Maps steps in the key to steps in the newest image.
     warp: Matrix2<f64>,
@@ -62,7 +64,7 @@ pub(super) enum Sighting {
 type Rows = [[f32; LANES]; WINDOW];
 
 impl Key {
-    /// The window about a feature, `None` when part of it lies outside the image.
+    /// The window about a feature, `None` when part of it lies outside the image or it has no texture.
     pub(super) fn cut(image: &GrayImage, uv_px: &Vector2<f64>) -> Option<Self> {
         let middle = uv_px.map(f64::round);
         let reach = (SIDE / 2) as f64;
@@ -71,17 +73,16 @@ impl Key {
         if !inside {
             return None;
         }
-        let (left, top) = (middle.x as usize - SIDE / 2, middle.y as usize - SIDE / 2);
-        let mut pixels = Box::new([0; SIDE * SIDE]);
-        for (y, row) in pixels.chunks_exact_mut(SIDE).enumerate() {
-            row.copy_from_slice(&image.pixels[(top + y) * image.width + left..][..SIDE]);
-        }
-        Some(Self { pixels, offset_px: uv_px - middle, warp: Matrix2::identity() })
+        let first = [middle.x as i32 - (SIDE / 2) as i32, middle.y as i32 - (SIDE / 2) as i32];
+        let mut grey = [[0.0; SIDE]; SIDE];
+        cut_out(image, first, &mut grey, f32::from);
+        let template = Template::new(&grey)?;
+        Some(Self { template: Arc::new(template), offset_px: uv_px - middle, warp: Matrix2::identity() })
     }
 
     /// Looks for the key about a rough place; when it is found, the warp is kept for the next image.
     pub(super) fn find(&mut self, image: &GrayImage, rough_px: &Vector2<f64>, options: &KeyOptions) -> Sighting {
-        let Some(template) = Template::new(&self.pixels) else { return Sighting::Changed };
+        let template = &*self.template;
         let mut warp = self.warp;
         let mut middle = rough_px - warp * self.offset_px;
         let mut window = [[0.0; LANES]; WINDOW];
@@ -119,6 +120,7 @@ impl Key {
 const SHORT_STEP_PX: f64 = 0.01;
 
 /// The key's window with what is needed to compare another window with it.
+#[derive(Debug)]
 struct Template {
     /// Grey values less their mean; the surplus columns are zero.
     value: Rows,
@@ -130,12 +132,11 @@ struct Template {
 }
 
 impl Template {
-    fn new(pixels: &[u8; SIDE * SIDE]) -> Option<Self> {
+    /// That of a window with one more pixel all around, row by row; `None` when it has no texture.
+    fn new(pixels: &[[f32; SIDE]; SIDE]) -> Option<Self> {
         let mut grey = [[0.0_f32; LANES + 2]; SIDE];
-        for (row, source) in grey.iter_mut().zip(pixels.chunks_exact(SIDE)) {
-            for (value, pixel) in row.iter_mut().zip(source) {
-                *value = f32::from(*pixel);
-            }
+        for (row, source) in grey.iter_mut().zip(pixels) {
+            row[..SIDE].copy_from_slice(source);
         }
         let area = (WINDOW * WINDOW) as f32;
         let mean = grey[1..=WINDOW].iter().flat_map(|row| &row[1..=WINDOW]).sum::<f32>() / area;

@@ -243,9 +243,8 @@ fn floor(value: f32) -> i32 {
 fn interpolate(image: &GrayImage, at: [f32; 2], patch: &mut [[f32; PATCH_WIDTH]; PATCH_HEIGHT]) {
     let corner = at.map(floor);
     let reach = (WINDOW / 2 + 2) as i32;
-    let mut pixels = [0.0_f32; (PATCH_WIDTH + 4) * (PATCH_HEIGHT + 3)];
-    cut_out(image, [corner[0] - reach, corner[1] - reach], PATCH_WIDTH + 4, &mut pixels, f32::from);
-    let (pixels, _) = pixels.as_chunks::<{ PATCH_WIDTH + 4 }>();
+    let mut pixels = [[0.0_f32; PATCH_WIDTH + 4]; PATCH_HEIGHT + 3];
+    cut_out(image, [corner[0] - reach, corner[1] - reach], &mut pixels, f32::from);
     let (along, down) = (cubic_weights(at[0] - corner[0] as f32), cubic_weights(at[1] - corner[1] as f32));
     for (y, line) in patch.iter_mut().enumerate() {
         let mut column_sums = [0.0; PATCH_WIDTH + 4];
@@ -364,7 +363,7 @@ fn seek(
         };
         let [left, top] = origin.filter(|corner| fits(*corner)).unwrap_or_else(|| {
             let corner = [first[0] - LAST_COLUMN / 2, first[1] - LAST_ROW / 2];
-            cut_out(image, corner, STRIDE, &mut search, |pixel| i16::from(pixel) - 128);
+            cut_out(image, corner, search.as_chunks_mut::<STRIDE>().0, |pixel| i16::from(pixel) - 128);
             corner
         });
         origin = Some([left, top]);

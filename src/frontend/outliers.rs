@@ -83,7 +83,7 @@ pub fn judge(
         return Motion { rotation, direction: None, is_inlier: vec![true; pairs.len()] };
     }
     let prior = Prior::new(predicted, options.track_sigma_px / focal_px);
-    let mut search = Search { pairs, prior, options, dice: Dice(options.seed.max(1)), drawn: Vec::new() };
+    let mut search = Search { pairs, prior, options, dice: Dice(options.seed.max(1)), turned: Vec::new() };
     let epipolar = search.run(start, &rotation, threshold);
     let (rotation, direction) = choose_model(pairs, rotation, epipolar.as_ref(), threshold);
     let is_inlier: Vec<bool> = match &direction {
@@ -129,14 +129,20 @@ fn choose_model(
 ///
 /// A point before both cameras moves towards `direction`; one that moves the other way is as far off as it moved.
 fn epipolar_distance(pair: &BearingPair, rotation: &UnitQuaternion<f64>, direction: &Vector3<f64>) -> f64 {
-    let turned = rotation * pair.previous;
+    let turned = BearingPair { previous: rotation * pair.previous, now: pair.now };
+    epipolar_distances(&turned, direction)[0]
+}
+
+/// [`epipolar_distance`] of a pair whose previous bearing is turned already, for a direction and for the opposite one.
+fn epipolar_distances(pair: &BearingPair, direction: &Vector3<f64>) -> [f64; 2] {
+    let turned = pair.previous;
     let normal = direction.cross(&turned);
     let other_normal = pair.now.cross(direction);
     let gap = pair.now.dot(&normal);
     let scale = normal.norm_squared() + other_normal.norm_squared() - 2.0 * gap * gap;
     let sampson = if scale > 1e-12 { gap.abs() / scale.sqrt() } else { 0.0 };
     let along = (direction - turned * turned.dot(direction)).dot(&(pair.now - turned)) / normal.norm().max(1e-6);
-    sampson.max(-along)
+    [sampson.max(-along), sampson.max(along)]
 }
 
 /// Angles on which a fit of the rotation is repeated until it rests.
@@ -216,8 +222,8 @@ struct Search<'a> {
     prior: Prior,
     options: &'a OutlierOptions,
     dice: Dice,
-    /// Normals of the epipolar planes if there were no more than the rotation at hand.
-    drawn: Vec<Vector3<f64>>,
+    /// The pairs with the previous bearing turned by the rotation at hand.
+    turned: Vec<BearingPair>,
 }
 
 impl Search<'_> {
@@ -306,20 +312,38 @@ impl Search<'_> {
 
     /// The best direction of those that random pairs of tracks give, the rotation held.
     fn draw(&mut self, rotation: &UnitQuaternion<f64>, scale: f64) -> Option<Hypothesis> {
-        self.drawn.clear();
-        self.drawn.extend(self.pairs.iter().map(|pair| (rotation * pair.previous).cross(&pair.now)));
+        self.turned.clear();
+        self.turned
+            .extend(self.pairs.iter().map(|pair| BearingPair { previous: rotation * pair.previous, now: pair.now }));
+        let pull = self.prior_cost(rotation, scale);
         let mut best: Option<Hypothesis> = None;
         for _ in 0..self.options.hypotheses {
-            let (first, second) = (self.dice.below(self.pairs.len()), self.dice.below(self.pairs.len()));
-            let Some(axis) = self.drawn[first].cross(&self.drawn[second]).try_normalize(1e-14) else { continue };
-            let forward = self.cost(rotation, &axis, scale);
-            let backward = self.cost(rotation, &-axis, scale);
+            // Normals of the epipolar planes if there were no more than the rotation at hand.
+            let normals = [0, 1].map(|_| {
+                let pair = &self.turned[self.dice.below(self.turned.len())];
+                pair.previous.cross(&pair.now)
+            });
+            let Some(axis) = normals[0].cross(&normals[1]).try_normalize(1e-14) else { continue };
+            let [forward, backward] = self.costs(&axis, scale).map(|cost| cost + pull);
             let (direction, cost) = if forward <= backward { (axis, forward) } else { (-axis, backward) };
             if best.is_none_or(|best| cost < best.cost) {
                 best = Some(Hypothesis { rotation: *rotation, direction, cost });
             }
         }
         best
+    }
+
+    /// Sums of squared distances of the turned pairs for a direction and for the opposite one, each distance over `scale`
+    /// and no larger than one.
+    fn costs(&self, direction: &Vector3<f64>, scale: f64) -> [f64; 2] {
+        let mut sums = [0.0; 2];
+        for pair in &self.turned {
+            let distances = epipolar_distances(pair, direction);
+            for (sum, distance) in sums.iter_mut().zip(distances) {
+                *sum += (distance / scale).powi(2).min(1.0);
+            }
+        }
+        sums
     }
 
     /// Sum of squared distances over `scale`, each no larger than one, and what the prediction says of the rotation.
@@ -332,8 +356,13 @@ impl Search<'_> {
                 (distance * distance).min(1.0)
             })
             .sum();
+        sum + self.prior_cost(rotation, scale)
+    }
+
+    /// What the prediction says of a rotation, in the unit of [`Self::cost`].
+    fn prior_cost(&self, rotation: &UnitQuaternion<f64>, scale: f64) -> f64 {
         let (information, turn) = self.prior.at(rotation, scale);
-        sum + turn.dot(&(information * turn))
+        turn.dot(&(information * turn))
     }
 
     /// One Gauss–Newton step on the rotation and the direction, with weights that leave outliers out.

@@ -56,20 +56,20 @@ pub(super) fn mirrored(index: i32, count: usize) -> usize {
     from_the_right.clamp(0, last) as usize
 }
 
-/// Cuts out the pixels from `first` (column, row) on, which may lie outside the image, in rows of `width`.
-pub(super) fn cut_out<T>(
+/// Cuts out the pixels from `first` (column, row) on, which may lie outside the image.
+#[inline]
+pub(super) fn cut_out<T, const WIDTH: usize>(
     image: &GrayImage,
     first: [i32; 2],
-    width: usize,
-    window: &mut [T],
+    window: &mut [[T; WIDTH]],
     convert: impl Fn(u8) -> T,
 ) {
     let [left, top] = first;
-    let inside = left >= 0 && left as usize + width <= image.width;
-    for (y, target) in window.chunks_exact_mut(width).enumerate() {
+    let inside = left >= 0 && left as usize + WIDTH <= image.width;
+    for (y, target) in window.iter_mut().enumerate() {
         let source = &image.pixels[mirrored(top + y as i32, image.height) * image.width..][..image.width];
-        if inside {
-            for (value, pixel) in target.iter_mut().zip(&source[left as usize..left as usize + width]) {
+        if inside && let Some(source) = source[left as usize..].first_chunk::<WIDTH>() {
+            for (value, pixel) in target.iter_mut().zip(source) {
                 *value = convert(*pixel);
             }
         } else {
