@@ -3,7 +3,7 @@ use thiserror::Error;
 
 use super::coarse::{self, CoarseAligner};
 use super::corners::{CornerDetector, CornerOptions, PointGrid};
-use super::keyed::{Key, KeyOptions, Sighting};
+use super::keyed::{Key, KeyFinder, KeyOptions, Sighting};
 use super::lucas_kanade::{self, LucasKanadeOptions};
 use super::outliers::{self, BearingPair, Motion, OutlierOptions};
 use super::prediction::PredictedRotation;
@@ -75,6 +75,12 @@ struct Step {
     uv_px: Vector2<f64>,
     bearing: Vector3<f64>,
     key: Option<Key>,
+}
+
+/// What following features works on.
+struct Buffers {
+    motion: Box<lucas_kanade::Buffers>,
+    keys: KeyFinder,
 }
 
 /// Follows features through one camera's images.
@@ -195,8 +201,9 @@ impl FrontEnd {
             .iter()
             .map(|track| expected.map_or(track.uv_px, |rotation| self.turned(track, rotation)))
             .collect();
+        let mut buffers = Buffers { motion: lucas_kanade::Buffers::new(), keys: KeyFinder::new() };
         let mut results: Vec<Option<Step>> =
-            self.tracks.iter().zip(&guesses).map(|(track, guess)| self.track(track, guess)).collect();
+            self.tracks.iter().zip(&guesses).map(|(track, guess)| self.track(track, guess, &mut buffers)).collect();
         let found: Vec<BearingPair> = results.iter().flatten().map(pair_of).collect();
         let lost = results.len() - found.len();
         if lost > 0 {
@@ -210,7 +217,7 @@ impl FrontEnd {
                     [seen.as_ref().map(|rotation| self.turned(track, rotation)), start_over.then_some(track.uv_px)];
                 for other in others.into_iter().flatten() {
                     if result.is_none() && (other - guess).norm() > DIFFERENT_GUESS_PX {
-                        *result = self.track(track, &other);
+                        *result = self.track(track, &other, &mut buffers);
                     }
                 }
             }
@@ -218,19 +225,20 @@ impl FrontEnd {
         results.into_iter().flatten().collect()
     }
 
-    fn track(&self, track: &Track, guess_px: &Vector2<f64>) -> Option<Step> {
+    fn track(&self, track: &Track, guess_px: &Vector2<f64>, buffers: &mut Buffers) -> Option<Step> {
         let options = &self.options.lucas_kanade;
-        let near_px = lucas_kanade::approach(&self.previous, &self.now, &track.uv_px, guess_px, options)?;
+        let Buffers { motion, keys } = buffers;
+        let near_px = lucas_kanade::approach(&self.previous, &self.now, &track.uv_px, guess_px, options, motion)?;
         let mut key = track.key.clone();
         let sighting = match &mut key {
-            Some(key) => key.find(self.now.levels().first()?, &near_px, &self.options.keys),
+            Some(key) => key.find(self.now.levels().first()?, &near_px, &self.options.keys, keys),
             None => Sighting::OutOfView,
         };
         let uv_px = match sighting {
             Sighting::Found(uv_px) => uv_px,
             Sighting::Changed | Sighting::OutOfView => {
                 key = key.filter(|_| sighting == Sighting::OutOfView);
-                lucas_kanade::arrive(&self.previous, &self.now, &track.uv_px, &near_px, options)?
+                lucas_kanade::arrive(&self.previous, &self.now, &track.uv_px, &near_px, options, motion)?
             }
         };
         let bearing = self.camera.unproject(&uv_px)?;

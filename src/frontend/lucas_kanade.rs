@@ -1,5 +1,7 @@
 //! Following points from one image to the next: pyramidal Lucas–Kanade.
 
+use std::ops::Range;
+
 use nalgebra::Vector2;
 
 use super::pyramid::{Pyramid, cut_out};
@@ -23,7 +25,7 @@ const LAST_ROW: i32 = (SEARCH_HEIGHT - WINDOW - 3) as i32;
 const LARGEST_WEIGHT: f32 = 16383.0;
 
 /// What is cut out of the second image, row by row, grey levels less 128.
-type Search = [i16; STRIDE * SEARCH_HEIGHT];
+type Search = [[i16; STRIDE]; SEARCH_HEIGHT];
 type Weights = [i16; STRIDE * WINDOW];
 
 /// How points are followed.
@@ -64,6 +66,7 @@ impl Default for LucasKanadeOptions {
 /// That is the least-squares solution for `d`, a gain and an offset at once, the latter two eliminated, and `Σ g'·T = 0`.
 /// As `J(x + d)` is interpolated, the sum is a polynomial in the fraction of `d` whose coefficients are sums
 /// over whole pixels: iterations within one pixel cost nothing, and the sums are exact in integers.
+#[derive(Clone, Debug)]
 struct Template {
     x: Weights,
     y: Weights,
@@ -71,8 +74,26 @@ struct Template {
     hessian: [f32; 3],
 }
 
-impl Template {
-    const EMPTY: Self = Self { x: [0; STRIDE * WINDOW], y: [0; STRIDE * WINDOW], hessian: [0.0; 3] };
+/// What following a point works on; it holds nothing from one point to the next.
+#[derive(Clone, Debug)]
+pub(super) struct Buffers {
+    template: Template,
+    /// The first image about the window.
+    patch: Patch,
+    /// Its gradient; surplus columns and rows that do not count are zero.
+    gradient: Gradient,
+    search: Search,
+}
+
+impl Buffers {
+    pub(super) fn new() -> Box<Self> {
+        Box::new(Self {
+            template: Template { x: [0; STRIDE * WINDOW], y: [0; STRIDE * WINDOW], hessian: [0.0; 3] },
+            patch: [[0.0; PATCH_WIDTH]; PATCH_HEIGHT],
+            gradient: [[[0.0; LANES]; 2]; WINDOW],
+            search: [[0; STRIDE]; SEARCH_HEIGHT],
+        })
+    }
 }
 
 /// A symmetric 2 × 2 matrix `[xx, xy, yy]` has this smaller eigenvalue.
@@ -119,11 +140,13 @@ fn visible(centre: f32, count: usize, margin: f32) -> (f32, f32) {
 
 const PATCH_WIDTH: usize = LANES + 2;
 const PATCH_HEIGHT: usize = WINDOW + 2;
+type Patch = [[f32; PATCH_WIDTH]; PATCH_HEIGHT];
 
-impl Template {
-    /// Becomes the window of `image` about `at`, without what lies outside it or would lie outside when moved to `guess`.
-    /// Returns whether there is enough of it to be found again.
+impl Buffers {
+    /// Makes the template of the window of `image` about `at`, without what lies outside it or would lie outside when moved
+    /// to `guess`. Returns whether there is enough of it to be found again.
     fn fill(&mut self, image: &GrayImage, at: [f32; 2], guess: [f32; 2], options: &LucasKanadeOptions) -> bool {
+        let Self { template, patch, gradient, .. } = self;
         let columns = [visible(at[0], image.width, 1.0), visible(guess[0], image.width, 0.0)];
         let rows = [visible(at[1], image.height, 1.0), visible(guess[1], image.height, 0.0)];
         let (first_column, last_column) = (columns[0].0.max(columns[1].0), columns[0].1.min(columns[1].1));
@@ -132,64 +155,26 @@ impl Template {
         if area < options.min_visible as f32 * (WINDOW * WINDOW) as f32 {
             return false;
         }
-        let mut patch = [[0.0; PATCH_WIDTH]; PATCH_HEIGHT];
-        interpolate(image, at, &mut patch);
+        interpolate(image, at, patch);
         let rows = first_row as usize..last_row as usize + 1;
         let mut mask = [0.0; LANES];
         mask[first_column as usize..=last_column as usize].fill(1.0);
-
-        let mut gradient = [[[0.0_f32; LANES]; 2]; WINDOW];
-        // Sums over the window of T, T², g and g·T, lane by lane.
-        let mut sums = [[0.0_f32; LANES]; 6];
-        for row in rows.clone() {
-            let (above, here, below) = (&patch[row], &patch[row + 1], &patch[row + 2]);
-            let [along_x, along_y] = &mut gradient[row];
-            for c in 0..LANES {
-                // Scharr's derivative.
-                let x = 3.0 * (above[c + 2] - above[c] + below[c + 2] - below[c]) + 10.0 * (here[c + 2] - here[c]);
-                let y =
-                    3.0 * (below[c] - above[c] + below[c + 2] - above[c + 2]) + 10.0 * (below[c + 1] - above[c + 1]);
-                let value = here[c + 1] * mask[c];
-                along_x[c] = x * mask[c] * (1.0 / 32.0);
-                along_y[c] = y * mask[c] * (1.0 / 32.0);
-                sums[0][c] += value;
-                sums[1][c] += value * value;
-                sums[2][c] += along_x[c];
-                sums[3][c] += along_y[c];
-                sums[4][c] += along_x[c] * value;
-                sums[5][c] += along_y[c] * value;
-            }
-        }
-        let [value, square, x, y, x_value, y_value] = sums.map(|lanes| lanes.iter().sum::<f32>() / area);
+        let [value, square, x, y, x_value, y_value] =
+            differentiate(patch, rows.clone(), &mask, gradient).map(|sum| sum / area);
         let variance = square - value * value;
         // A flat window has no contrast to speak of.
         let scale = if variance > 1e-3 { 1.0 / variance } else { 0.0 };
-        let slope_x = (x_value - x * value) * scale;
-        let slope_y = (y_value - y * value) * scale;
-        let (offset_x, offset_y) = (x - slope_x * value, y - slope_y * value);
-        let mut products = [[0.0_f32; LANES]; 3];
-        let mut largest = [0.0_f32; LANES];
-        for row in rows {
-            let here = &patch[row + 1];
-            let [along_x, along_y] = &mut gradient[row];
-            for c in 0..LANES {
-                along_x[c] -= (offset_x + slope_x * here[c + 1]) * mask[c];
-                along_y[c] -= (offset_y + slope_y * here[c + 1]) * mask[c];
-                products[0][c] += along_x[c] * along_x[c];
-                products[1][c] += along_x[c] * along_y[c];
-                products[2][c] += along_y[c] * along_y[c];
-                let larger = if along_x[c].abs() > along_y[c].abs() { along_x[c].abs() } else { along_y[c].abs() };
-                largest[c] = if larger > largest[c] { larger } else { largest[c] };
-            }
-        }
-        let hessian = products.map(|lanes| lanes.iter().sum());
+        let slopes = [(x_value - x * value) * scale, (y_value - y * value) * scale];
+        let offsets = [x - slopes[0] * value, y - slopes[1] * value];
+        let ([xx, xy, yy], largest) = free_of_brightness(patch, rows, &mask, offsets, slopes, gradient);
+        let hessian = [xx, xy, yy];
         if smaller_eigenvalue(hessian) <= options.min_eigenvalue as f32 * area {
             return false;
         }
-        let unit = LARGEST_WEIGHT / largest.iter().fold(0.0, |most: f32, value| most.max(*value));
-        self.hessian = hessian.map(|sum| unit * sum);
-        for (weights, axis) in [(&mut self.x, 0), (&mut self.y, 1)] {
-            for (line, gradient) in weights.as_chunks_mut::<STRIDE>().0.iter_mut().zip(&gradient) {
+        let unit = LARGEST_WEIGHT / largest;
+        template.hessian = hessian.map(|sum| unit * sum);
+        for (weights, axis) in [(&mut template.x, 0), (&mut template.y, 1)] {
+            for (line, gradient) in weights.as_chunks_mut::<STRIDE>().0.iter_mut().zip(gradient.iter()) {
                 for c in 0..LANES {
                     line[c] = rounded(unit * gradient[axis][c]);
                 }
@@ -197,13 +182,82 @@ impl Template {
         }
         true
     }
+}
 
+/// `[gx, gy]` of a window, row by row.
+type Gradient = [[[f32; LANES]; 2]; WINDOW];
+
+/// Puts the gradient of some rows of a window, times `mask` along each, into `gradient`, the others being zero.
+///
+/// Returns the sums over the window of `T, T², gx, gy, gx·T, gy·T`.
+fn differentiate(patch: &Patch, rows: Range<usize>, mask: &[f32; LANES], gradient: &mut Gradient) -> [f32; 6] {
+    for row in (0..rows.start).chain(rows.end..WINDOW) {
+        gradient[row] = [[0.0; LANES]; 2];
+    }
+    let mut sums = [[0.0_f32; LANES]; 6];
+    for row in rows {
+        let (above, here, below) = (&patch[row], &patch[row + 1], &patch[row + 2]);
+        let (mut along_x, mut along_y) = ([0.0_f32; LANES], [0.0_f32; LANES]);
+        for c in 0..LANES {
+            // Scharr's derivative.
+            let x = 3.0 * (above[c + 2] - above[c] + below[c + 2] - below[c]) + 10.0 * (here[c + 2] - here[c]);
+            let y = 3.0 * (below[c] - above[c] + below[c + 2] - above[c + 2]) + 10.0 * (below[c + 1] - above[c + 1]);
+            along_x[c] = x * mask[c] * (1.0 / 32.0);
+            along_y[c] = y * mask[c] * (1.0 / 32.0);
+        }
+        for c in 0..LANES {
+            let value = here[c + 1] * mask[c];
+            sums[0][c] += value;
+            sums[1][c] += value * value;
+            sums[2][c] += along_x[c];
+            sums[3][c] += along_y[c];
+            sums[4][c] += along_x[c] * value;
+            sums[5][c] += along_y[c] * value;
+        }
+        gradient[row] = [along_x, along_y];
+    }
+    sums.map(|lanes| lanes.iter().sum())
+}
+
+/// Takes `offsets + slopes·T` off the gradient; returns its sums of products `xx, xy, yy` and its largest part.
+fn free_of_brightness(
+    patch: &Patch,
+    rows: Range<usize>,
+    mask: &[f32; LANES],
+    offsets: [f32; 2],
+    slopes: [f32; 2],
+    gradient: &mut Gradient,
+) -> ([f32; 3], f32) {
+    let mut products = [[0.0_f32; LANES]; 3];
+    let mut largest = [0.0_f32; LANES];
+    for row in rows {
+        let here = &patch[row + 1];
+        let [mut along_x, mut along_y] = gradient[row];
+        for c in 0..LANES {
+            along_x[c] -= (offsets[0] + slopes[0] * here[c + 1]) * mask[c];
+            along_y[c] -= (offsets[1] + slopes[1] * here[c + 1]) * mask[c];
+        }
+        for c in 0..LANES {
+            products[0][c] += along_x[c] * along_x[c];
+            products[1][c] += along_x[c] * along_y[c];
+            products[2][c] += along_y[c] * along_y[c];
+            let larger = if along_x[c].abs() > along_y[c].abs() { along_x[c].abs() } else { along_y[c].abs() };
+            largest[c] = if larger > largest[c] { larger } else { largest[c] };
+        }
+        gradient[row] = [along_x, along_y];
+    }
+    (products.map(|lanes| lanes.iter().sum()), largest.into_iter().fold(0.0, f32::max))
+}
+
+impl Template {
     /// Adds up `Σ g'·J` for the window whose first pixel is `(column, row)` of `search` and its neighbours to the right,
     /// below and both; `[dy][dx]` holds the sums with the x and the y part of `g'`.
     fn correlate(&self, search: &Search, column: usize, row: usize) -> [[[f32; 2]; 2]; 2] {
         const LENGTH: usize = STRIDE * WINDOW;
         let shifted = |offset: usize| -> &[i16; LENGTH] {
-            search[row * STRIDE + column + offset..].first_chunk().expect("callers keep within the search")
+            search.as_flattened()[row * STRIDE + column + offset..]
+                .first_chunk()
+                .expect("callers keep within the search")
         };
         let sums = |offset| {
             let pixels = shifted(offset);
@@ -240,9 +294,13 @@ fn floor(value: f32) -> i32 {
 }
 
 /// The pixels about `at` by cubic convolution, one more on every side than the window.
-fn interpolate(image: &GrayImage, at: [f32; 2], patch: &mut [[f32; PATCH_WIDTH]; PATCH_HEIGHT]) {
+fn interpolate(image: &GrayImage, at: [f32; 2], patch: &mut Patch) {
     let corner = at.map(floor);
     let reach = (WINDOW / 2 + 2) as i32;
+    if corner.map(|t| t as f32) == at {
+        cut_out(image, [corner[0] - reach + 1, corner[1] - reach + 1], patch, f32::from);
+        return;
+    }
     let mut pixels = [[0.0_f32; PATCH_WIDTH + 4]; PATCH_HEIGHT + 3];
     cut_out(image, [corner[0] - reach, corner[1] - reach], &mut pixels, f32::from);
     let (along, down) = (cubic_weights(at[0] - corner[0] as f32), cubic_weights(at[1] - corner[1] as f32));
@@ -343,12 +401,12 @@ fn is_sane(at: [f32; 2]) -> bool {
 /// Moves `at` until the window of `image` about it balances the template; `None` when it does not come to rest.
 fn seek(
     template: &Template,
+    search: &mut Search,
     image: &GrayImage,
     mut at: [f32; 2],
     kernel: Kernel,
     options: &LucasKanadeOptions,
 ) -> Option<[f32; 2]> {
-    let mut search: Search = [0; STRIDE * SEARCH_HEIGHT];
     // The first pixel of what was cut out.
     let mut origin: Option<[i32; 2]> = None;
     let epsilon = options.epsilon_px as f32;
@@ -363,7 +421,7 @@ fn seek(
         };
         let [left, top] = origin.filter(|corner| fits(*corner)).unwrap_or_else(|| {
             let corner = [first[0] - LAST_COLUMN / 2, first[1] - LAST_ROW / 2];
-            cut_out(image, corner, search.as_chunks_mut::<STRIDE>().0, |pixel| i16::from(pixel) - 128);
+            cut_out(image, corner, search, |pixel| i16::from(pixel) - 128);
             corner
         });
         origin = Some([left, top]);
@@ -371,13 +429,13 @@ fn seek(
         let fraction = [at[0] - CENTRE - cell[0], at[1] - CENTRE - cell[1]];
         let (fraction, rests) = match kernel {
             Kernel::Linear => {
-                let sums = template.correlate(&search, column, row);
+                let sums = template.correlate(search, column, row);
                 settle(&sums, (linear_weights, |_| [-1.0, 1.0]), fraction, template.hessian, epsilon)
             }
             Kernel::Cubic => {
                 let mut sums = [[[0.0; 2]; 4]; 4];
                 for (j, i) in [(0, 0), (0, 2), (2, 0), (2, 2)] {
-                    let block = template.correlate(&search, column + i - 1, row + j - 1);
+                    let block = template.correlate(search, column + i - 1, row + j - 1);
                     for (dj, line) in block.iter().enumerate() {
                         sums[j + dj][i..i + 2].copy_from_slice(line);
                     }
@@ -405,12 +463,14 @@ pub fn track(
     guess_px: &Vector2<f64>,
     options: &LucasKanadeOptions,
 ) -> Option<Vector2<f64>> {
-    let near_px = approach(previous, now, from_px, guess_px, options)?;
-    arrive(previous, now, from_px, &near_px, options)
+    let mut buffers = Buffers::new();
+    let near_px = approach(previous, now, from_px, guess_px, options, &mut buffers)?;
+    arrive(previous, now, from_px, &near_px, options, &mut buffers)
 }
 
 /// The first stage of [`track`]: comes near on the halved images, to about half a pixel.
 ///
+/// The window of a level is the one about the nearest whole pixel, which moves as the point does.
 /// Where a level shows nothing the guess is handed on; `None` only for places that make no sense.
 pub(super) fn approach(
     previous: &Pyramid,
@@ -418,21 +478,22 @@ pub(super) fn approach(
     from_px: &Vector2<f64>,
     guess_px: &Vector2<f64>,
     options: &LucasKanadeOptions,
+    buffers: &mut Buffers,
 ) -> Option<Vector2<f64>> {
     let from = [from_px.x as f32, from_px.y as f32];
     let mut guess = [guess_px.x as f32, guess_px.y as f32];
     if !is_sane(from) || !is_sane(guess) {
         return None;
     }
-    let mut template = Template::EMPTY;
     let levels = previous.levels().len().min(now.levels().len()).min(options.levels);
     for level in (1..levels).rev() {
         let scale = (0.5_f32).powi(level as i32);
-        let start = guess.map(|t| t * scale);
-        if template.fill(&previous.levels()[level], from.map(|t| t * scale), start, options)
-            && let Some(found) = seek(&template, &now.levels()[level], start, Kernel::Linear, options)
+        let at = from.map(|t| (t * scale).round());
+        let start = [0, 1].map(|k| at[k] + (guess[k] - from[k]) * scale);
+        if buffers.fill(&previous.levels()[level], at, start, options)
+            && let Some(found) = buffers.seek(&now.levels()[level], start, Kernel::Linear, options)
         {
-            guess = found.map(|t| t / scale);
+            guess = [0, 1].map(|k| from[k] + (found[k] - at[k]) / scale);
         }
     }
     Some(Vector2::new(f64::from(guess[0]), f64::from(guess[1])))
@@ -445,14 +506,14 @@ pub(super) fn arrive(
     from_px: &Vector2<f64>,
     near_px: &Vector2<f64>,
     options: &LucasKanadeOptions,
+    buffers: &mut Buffers,
 ) -> Option<Vector2<f64>> {
     let from = [from_px.x as f32, from_px.y as f32];
     let near = [near_px.x as f32, near_px.y as f32];
-    let mut template = Template::EMPTY;
-    let found = track_on_image(&mut template, previous.levels().first()?, now.levels().first()?, from, near, options)?;
+    let (previous, now) = (previous.levels().first()?, now.levels().first()?);
+    let found = buffers.track_on_image(previous, now, from, near, options)?;
     if let Some(limit_px) = options.forward_backward_px {
-        let back =
-            track_on_image(&mut template, now.levels().first()?, previous.levels().first()?, found, from, options)?;
+        let back = buffers.track_on_image(now, previous, found, from, options)?;
         if length([back[0] - from[0], back[1] - from[1]]) > limit_px as f32 {
             return None;
         }
@@ -460,21 +521,32 @@ pub(super) fn arrive(
     Some(Vector2::new(f64::from(found[0]), f64::from(found[1])))
 }
 
-/// The last stage of [`track`], on the image itself.
-fn track_on_image(
-    template: &mut Template,
-    previous: &GrayImage,
-    now: &GrayImage,
-    from: [f32; 2],
-    guess: [f32; 2],
-    options: &LucasKanadeOptions,
-) -> Option<[f32; 2]> {
-    if !template.fill(previous, from, guess, options) {
-        return None;
+impl Buffers {
+    fn seek(
+        &mut self,
+        image: &GrayImage,
+        at: [f32; 2],
+        kernel: Kernel,
+        options: &LucasKanadeOptions,
+    ) -> Option<[f32; 2]> {
+        seek(&self.template, &mut self.search, image, at, kernel, options)
     }
-    let near = seek(template, now, guess, Kernel::Linear, options)?;
-    let found = seek(template, now, near, Kernel::Cubic, options)?;
-    let inside =
-        found[0] >= 0.0 && found[1] >= 0.0 && found[0] <= (now.width - 1) as f32 && found[1] <= (now.height - 1) as f32;
-    inside.then_some(found)
+
+    /// The last stage of [`track`], on the image itself.
+    fn track_on_image(
+        &mut self,
+        previous: &GrayImage,
+        now: &GrayImage,
+        from: [f32; 2],
+        guess: [f32; 2],
+        options: &LucasKanadeOptions,
+    ) -> Option<[f32; 2]> {
+        if !self.fill(previous, from, guess, options) {
+            return None;
+        }
+        let near = self.seek(now, guess, Kernel::Linear, options)?;
+        let [x, y] = self.seek(now, near, Kernel::Cubic, options)?;
+        let inside = x >= 0.0 && y >= 0.0 && x <= (now.width - 1) as f32 && y <= (now.height - 1) as f32;
+        inside.then_some([x, y])
+    }
 }

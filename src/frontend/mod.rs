@@ -8,6 +8,7 @@
 //! ([`KeyOptions`]), leaves out those that do not move with the scene ([`outliers`]), and fills the gaps with new
 //! [`corners`].
 
+mod appearance;
 mod coarse;
 pub mod corners;
 mod front_end;
@@ -16,6 +17,7 @@ pub mod lucas_kanade;
 pub mod outliers;
 mod prediction;
 mod pyramid;
+mod resample;
 #[cfg(test)]
 mod tests;
 mod tracks;

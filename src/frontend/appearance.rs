@@ -1,0 +1,171 @@
+//! What a feature's window looks like, prepared to be compared with other windows.
+
+use nalgebra::{Matrix6, Vector6};
+
+use super::keyed::{CENTRE, LANES, Rows, SIDE, WINDOW};
+
+/// A window with less variance than this has no appearance, in squared grey levels.
+const LEAST_VARIANCE: f32 = 4.0;
+
+/// A window with what is needed to compare another window with it.
+///
+/// Surplus columns are zero.
+#[derive(Debug)]
+pub(super) struct Appearance {
+    /// Mean grey value.
+    level: f32,
+    /// Grey values less their mean.
+    value: Rows,
+    /// Gradient along a row.
+    along_x: Rows,
+    /// Gradient along a column.
+    along_y: Rows,
+    /// Means of the gradient and of its first moments `[gx, gy, gx·x, gx·y, gy·x, gy·y]`.
+    means: [f32; 6],
+    /// Their regressions on the grey values.
+    regressions: [f32; 6],
+    /// Inverse of the normal matrix of these six, freed of what brightness and contrast can do.
+    inverse: Matrix6<f64>,
+    /// `Σ value²`.
+    square: f32,
+}
+
+impl Appearance {
+    /// That of a window with one more pixel all around, row by row; `None` when it has no texture.
+    pub(super) fn new(pixels: &[[f32; SIDE]; SIDE]) -> Option<Self> {
+        let mut grey = [[0.0_f32; LANES + 2]; SIDE];
+        for (row, source) in grey.iter_mut().zip(pixels) {
+            row[..SIDE].copy_from_slice(source);
+        }
+        let area = (WINDOW * WINDOW) as f32;
+        let level = grey[1..=WINDOW].iter().flat_map(|row| &row[1..=WINDOW]).sum::<f32>() / area;
+        let mut mask = [0.0_f32; LANES];
+        mask[..WINDOW].fill(1.0);
+        let across: [f32; LANES] = std::array::from_fn(|c| c as f32 - CENTRE as f32);
+
+        let [mut value, mut along_x, mut along_y] = [[[0.0; LANES]; WINDOW]; 3];
+        let mut slopes = [[[0.0; LANES]; WINDOW]; 6];
+        let mut squares = [0.0_f32; LANES];
+        let mut sums = [[[0.0_f32; LANES]; 2]; 6];
+        for row in 0..WINDOW {
+            let (above, here, below) = (&grey[row], &grey[row + 1], &grey[row + 2]);
+            let down = row as f32 - CENTRE as f32;
+            for c in 0..LANES {
+                // Scharr's derivative.
+                let x = 3.0 * (above[c + 2] - above[c] + below[c + 2] - below[c]) + 10.0 * (here[c + 2] - here[c]);
+                let y =
+                    3.0 * (below[c] - above[c] + below[c + 2] - above[c + 2]) + 10.0 * (below[c + 1] - above[c + 1]);
+                let (x, y) = (x * mask[c] * (1.0 / 32.0), y * mask[c] * (1.0 / 32.0));
+                let grey = (here[c + 1] - level) * mask[c];
+                value[row][c] = grey;
+                along_x[row][c] = x;
+                along_y[row][c] = y;
+                squares[c] += grey * grey;
+                let parts = [x, y, x * across[c], x * down, y * across[c], y * down];
+                for k in 0..6 {
+                    slopes[k][row][c] = parts[k];
+                    sums[k][0][c] += parts[k];
+                    sums[k][1][c] += parts[k] * grey;
+                }
+            }
+        }
+        let square: f32 = squares.iter().sum();
+        if square < LEAST_VARIANCE * area {
+            return None;
+        }
+        let means = [0, 1, 2, 3, 4, 5].map(|k: usize| sums[k][0].iter().sum::<f32>() / area);
+        let regressions = [0, 1, 2, 3, 4, 5].map(|k: usize| sums[k][1].iter().sum::<f32>() / square);
+        for (k, slope) in slopes.iter_mut().enumerate() {
+            for (row, value) in slope.iter_mut().zip(&value) {
+                for c in 0..LANES {
+                    row[c] -= (means[k] + regressions[k] * value[c]) * mask[c];
+                }
+            }
+        }
+        let mut normal = Matrix6::zeros();
+        for a in 0..6 {
+            for b in a..6 {
+                let product = f64::from(dot(&slopes[a], &slopes[b]));
+                normal[(a, b)] = product;
+                normal[(b, a)] = product;
+            }
+        }
+        let inverse = normal.cholesky()?.inverse();
+        Some(Self { level, value, along_x, along_y, means, regressions, inverse, square })
+    }
+
+    /// The grey level to take off a window before it is compared.
+    pub(super) fn level(&self) -> f32 {
+        self.level
+    }
+
+    /// How well a window, less [`Self::level`] and with surplus columns of zero, correlates with this one, and the shift
+    /// and change of shape of this one that would make it more alike: `[dx, dy]`, then the derivatives of dx and of dy by
+    /// x and y; `None` when nothing in them is alike.
+    pub(super) fn compare(&self, window: &Rows) -> Option<(f64, Vector6<f64>)> {
+        let moments = self.moments(window);
+        let area = (WINDOW * WINDOW) as f32;
+        let square = moments.square - moments.sum * moments.sum / area;
+        let correlation = f64::from(moments.common) / (f64::from(self.square) * f64::from(square)).sqrt();
+        if correlation.is_nan() || correlation <= 0.0 {
+            return None;
+        }
+        let gain = f64::from(moments.common / self.square);
+        let right = Vector6::from_fn(|k, _| {
+            let free = self.means[k] * moments.sum + self.regressions[k] * moments.common;
+            f64::from(moments.slopes[k] - free)
+        });
+        Some((correlation, self.inverse * right / gain))
+    }
+
+    fn moments(&self, window: &Rows) -> Moments {
+        let [mut sum, mut square, mut common] = [[0.0_f32; LANES]; 3];
+        let [mut x, mut x_down, mut y, mut y_down] = [[0.0_f32; LANES]; 4];
+        for row in 0..WINDOW {
+            let (value, along_x, along_y) = (&self.value[row], &self.along_x[row], &self.along_y[row]);
+            let grey = &window[row];
+            let down = row as f32 - CENTRE as f32;
+            for c in 0..LANES {
+                sum[c] += grey[c];
+                square[c] += grey[c] * grey[c];
+                common[c] += value[c] * grey[c];
+                x[c] += along_x[c] * grey[c];
+                x_down[c] += down * along_x[c] * grey[c];
+                y[c] += along_y[c] * grey[c];
+                y_down[c] += down * along_y[c] * grey[c];
+            }
+        }
+        let across = |lanes: &[f32; LANES]| -> f32 {
+            lanes.iter().enumerate().map(|(c, lane)| (c as f32 - CENTRE as f32) * lane).sum()
+        };
+        let total = |lanes: &[f32; LANES]| -> f32 { lanes.iter().sum() };
+        Moments {
+            sum: total(&sum),
+            square: total(&square),
+            common: total(&common),
+            slopes: [total(&x), total(&y), across(&x), total(&x_down), across(&y), total(&y_down)],
+        }
+    }
+}
+
+/// Sums over a window.
+struct Moments {
+    /// Of its grey values.
+    sum: f32,
+    /// Of their squares.
+    square: f32,
+    /// Of their products with those of the appearance.
+    common: f32,
+    /// Of their products with the gradient and its first moments.
+    slopes: [f32; 6],
+}
+
+fn dot(a: &Rows, b: &Rows) -> f32 {
+    let mut sums = [0.0_f32; LANES];
+    for (a, b) in a.iter().zip(b) {
+        for c in 0..LANES {
+            sums[c] += a[c] * b[c];
+        }
+    }
+    sums.iter().sum()
+}

@@ -1,0 +1,156 @@
+//! Reading an image at the places of a window that is moved, turned, stretched and sheared.
+
+use nalgebra::{Matrix2, Vector2};
+
+use super::keyed::{CENTRE, LANES, Rows, WINDOW};
+use crate::flight_log::GrayImage;
+
+/// Elements from one row of a patch to the next, and its rows: what a window of twice the area needs at any turn.
+const STRIDE: usize = 64;
+const HEIGHT: usize = 64;
+/// Pixels beyond what is needed at first on every side, so that a window can move.
+const MARGIN: usize = 2;
+
+/// Steps of a pixel between which the weights are the same.
+const FRACTIONS: usize = 128;
+
+/// Weights of the four pixels about a point, by Keys' cubic convolution, at fractions of a pixel.
+static CUBIC: [[f32; 4]; FRACTIONS] = cubic_table();
+
+const fn cubic_table() -> [[f32; 4]; FRACTIONS] {
+    let mut table = [[0.0; 4]; FRACTIONS];
+    let mut index = 0;
+    while index < FRACTIONS {
+        let t = index as f32 / FRACTIONS as f32;
+        table[index] = [
+            ((2.0 - t) * t - 1.0) * t * 0.5,
+            ((3.0 * t - 5.0) * t * t + 2.0) * 0.5,
+            ((4.0 - 3.0 * t) * t + 1.0) * t * 0.5,
+            (t - 1.0) * t * t * 0.5,
+        ];
+        index += 1;
+    }
+    table
+}
+
+/// A part of an image in floating point, from which windows are read.
+#[derive(Clone, Debug)]
+pub(super) struct Patch {
+    /// Row by row; with as much behind the last one that the four rows about any pixel are there.
+    pixels: Box<[f32; STRIDE * HEIGHT + SURPLUS]>,
+    /// Column and row of its first pixel in the image.
+    first: [usize; 2],
+    /// Columns and rows that it holds.
+    size: [usize; 2],
+}
+
+const SURPLUS: usize = 3 * STRIDE + 4;
+
+impl Patch {
+    #[expect(clippy::large_stack_arrays, reason = "17 KiB that go to the heap at once")]
+    pub(super) fn new() -> Self {
+        Self { pixels: Box::new([0.0; STRIDE * HEIGHT + SURPLUS]), first: [0; 2], size: [0; 2] }
+    }
+
+    /// Forgets the image.
+    pub(super) fn clear(&mut self) {
+        self.size = [0; 2];
+    }
+
+    /// Reads the image at `middle + warp·step` for every step of the window, less `level`.
+    ///
+    /// Returns whether all of that lies inside the image, and near enough together for a patch.
+    /// `image` is the same until the patch is [cleared](Self::clear).
+    pub(super) fn read(
+        &mut self,
+        image: &GrayImage,
+        warp: &Matrix2<f64>,
+        middle: &Vector2<f64>,
+        level: f32,
+        window: &mut Rows,
+    ) -> bool {
+        let reach = CENTRE as f64;
+        let extent = Vector2::new(
+            (warp[(0, 0)].abs() + warp[(0, 1)].abs()) * reach,
+            (warp[(1, 0)].abs() + warp[(1, 1)].abs()) * reach,
+        );
+        let (low, high) = (middle - extent, middle + extent);
+        // The four pixels about a point reach from one before it to two after it, and it may be rounded up.
+        let inside =
+            low.x >= 1.0 && low.y >= 1.0 && high.x < image.width as f64 - 3.0 && high.y < image.height as f64 - 3.0;
+        if !inside {
+            return false;
+        }
+        let needed = [[low.x, high.x], [low.y, high.y]].map(|[low, high]| [low as usize - 1, high as usize + 3]);
+        if !self.holds(needed) && !self.cut_out(image, needed) {
+            return false;
+        }
+        self.interpolate(warp, middle, level, window);
+        true
+    }
+
+    fn holds(&self, needed: [[usize; 2]; 2]) -> bool {
+        (0..2).all(|k| needed[k][0] >= self.first[k] && needed[k][1] < self.first[k] + self.size[k])
+    }
+
+    /// Takes in what is needed and the margin; returns whether there is room for it.
+    fn cut_out(&mut self, image: &GrayImage, needed: [[usize; 2]; 2]) -> bool {
+        let counts = [image.width, image.height];
+        for k in 0..2 {
+            let [first, last] = needed[k];
+            self.first[k] = first.saturating_sub(MARGIN);
+            self.size[k] = (last + MARGIN + 1).min(counts[k]) - self.first[k];
+        }
+        let ([left, top], [width, height]) = (self.first, self.size);
+        if width > STRIDE || height > HEIGHT {
+            self.clear();
+            return false;
+        }
+        for (y, row) in self.pixels.chunks_exact_mut(STRIDE).take(height).enumerate() {
+            let source = &image.pixels[(top + y) * image.width + left..][..width];
+            for (value, pixel) in row.iter_mut().zip(source) {
+                *value = f32::from(*pixel);
+            }
+        }
+        true
+    }
+
+    fn interpolate(&self, warp: &Matrix2<f64>, middle: &Vector2<f64>, level: f32, window: &mut Rows) {
+        let unit = FRACTIONS as f64;
+        let corner = Vector2::new(self.first[0] as f64, self.first[1] as f64);
+        let step = [warp[(0, 0)], warp[(1, 0)]].map(|step| (step * unit) as f32);
+        for (row, line) in window.iter_mut().enumerate() {
+            let down = row as f64 - CENTRE as f64;
+            let start = middle - corner + warp * Vector2::new(-(CENTRE as f64), down);
+            let start = [(start.x * unit) as f32, (start.y * unit) as f32];
+            let mut places = [[0; LANES]; 3];
+            for c in 0..LANES {
+                let [x, y] = [0, 1].map(|k| rounded(start[k] + c as f32 * step[k]));
+                places[0][c] = y / FRACTIONS as u32 * STRIDE as u32 + x / FRACTIONS as u32;
+                places[1][c] = x % FRACTIONS as u32;
+                places[2][c] = y % FRACTIONS as u32;
+            }
+            let mut products = [[0.0_f32; 4]; LANES];
+            for (c, products) in products[..WINDOW].iter_mut().enumerate() {
+                // One row and one column before the pixel; the remainder tells the compiler that it lies within.
+                let first = (places[0][c] as usize).wrapping_sub(STRIDE + 1) % (STRIDE * HEIGHT);
+                let (along, down) = (&CUBIC[places[1][c] as usize], &CUBIC[places[2][c] as usize]);
+                let taps = &self.pixels[first..first + SURPLUS];
+                for i in 0..4 {
+                    let sum = (down[0] * taps[i] + down[1] * taps[STRIDE + i])
+                        + (down[2] * taps[2 * STRIDE + i] + down[3] * taps[3 * STRIDE + i]);
+                    products[i] = along[i] * sum;
+                }
+            }
+            for (value, [a, b, c, d]) in line[..WINDOW].iter_mut().zip(products) {
+                *value = ((a + b) + (c + d)) - level;
+            }
+        }
+    }
+}
+
+/// The nearest integer of a value from 0 to 2²²: adding 1.5·2²³ leaves it in the low bits, where vector units reach it faster
+/// than through a checked conversion.
+fn rounded(value: f32) -> u32 {
+    (value + 12_582_912.0).to_bits() & 0x003f_ffff
+}
