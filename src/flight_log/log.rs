@@ -1,10 +1,8 @@
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::path::{Path, PathBuf};
 
-use memmap2::Mmap;
-
 use super::container::{BlockCache, ContainerIndex, DecodedBlock, MessagePosition, MessageSpan, TopicIndex};
+use super::file::LogFile;
 use super::messages::{self, MessageKind};
 use super::{LogError, LogWarning};
 use crate::geometry::seconds_from_ns;
@@ -35,7 +33,7 @@ pub struct TopicInfo {
 #[derive(Debug)]
 pub struct FlightLog {
     path: PathBuf,
-    file: Mmap,
+    file: LogFile,
     index: ContainerIndex,
     /// Channels of each topic.
     channel_ids: BTreeMap<String, Vec<u16>>,
@@ -52,7 +50,7 @@ impl FlightLog {
     /// The log begins (time zero) with the smallest header stamp among the first messages of all topics that are read,
     /// those left out that lie more than a minute before the first IMU message (another clock made them).
     pub fn open(path: &Path) -> Result<Self, LogError> {
-        let file = map_file(path)?;
+        let file = LogFile::open(path)?;
         check_magic(&file, path)?;
         let index = ContainerIndex::read(&file);
         let mut channel_ids: BTreeMap<String, Vec<u16>> = BTreeMap::new();
@@ -71,6 +69,8 @@ impl FlightLog {
         };
         log.find_topics_and_times()?;
         log.report_damage();
+        // Without an index all of it has been read.
+        log.file.release(&(0..log.file.len()));
         Ok(log)
     }
 
@@ -144,7 +144,7 @@ impl FlightLog {
     }
 
     /// The whole file.
-    pub(super) fn file(&self) -> &[u8] {
+    pub(super) fn file(&self) -> &LogFile {
         &self.file
     }
 
@@ -283,28 +283,6 @@ impl FlightLog {
             self.warnings.push(LogWarning { stamp_ns: 0, message });
         }
     }
-}
-
-fn map_file(path: &Path) -> Result<Mmap, LogError> {
-    let failed = |source| LogError::Io { action: "open the log", source, path: path.to_owned() };
-    let file = File::open(path).map_err(failed)?;
-    let metadata = file.metadata().map_err(failed)?;
-    let not_a_log = |found: &str, remedy| LogError::NotALog { found: found.into(), remedy, path: path.to_owned() };
-    if metadata.is_dir() {
-        return Err(not_a_log(
-            "a folder",
-            "name the .mcap file in it, or convert a EuRoC folder with `dcvins convert`",
-        ));
-    }
-    if metadata.len() == 0 {
-        return Err(not_a_log("the file is empty (0 bytes)", "copy or record it again"));
-    }
-    #[expect(unsafe_code, reason = "a memory map is the only way to open a log of gigabytes at once")]
-    // SAFETY: the map is only read. Another process that shortens or rewrites the file while we hold it could break the
-    // map's promise of immutable bytes; a flight log is finished when it is opened, and every length read from it is
-    // checked before use.
-    let map = unsafe { Mmap::map(&file) };
-    map.map_err(failed)
 }
 
 fn check_magic(file: &[u8], path: &Path) -> Result<(), LogError> {

@@ -6,6 +6,7 @@ mod cdr;
 pub mod check;
 mod container;
 mod error;
+mod file;
 mod image_reader;
 mod joint_merge;
 mod log;

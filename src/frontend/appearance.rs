@@ -10,7 +10,7 @@ const LEAST_VARIANCE: f32 = 4.0;
 /// A window with what is needed to compare another window with it.
 ///
 /// Surplus columns are zero.
-#[derive(Debug)]
+#[derive(Debug, PartialEq)]
 pub(super) struct Appearance {
     /// Mean grey value.
     level: f32,

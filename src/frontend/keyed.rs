@@ -43,7 +43,7 @@ impl Default for KeyOptions {
 }
 
 /// A feature's window as it was first seen.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Key {
     appearance: Arc<Appearance>,
     /// From the window's middle, a whole pixel, to the feature.

@@ -4,6 +4,7 @@ use std::sync::Arc;
 use mcap::records::{ChunkHeader, Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
+use super::super::file::LogFile;
 use super::{RECORD_HEADER, record_at};
 
 /// A stretch of the file that holds messages: one chunk record, or message records outside of chunks.
@@ -276,8 +277,13 @@ impl BlockCache {
         Self { entries: Vec::with_capacity(capacity + 1), capacity }
     }
 
-    /// The block with a number, decoded now or before.
-    pub(in super::super) fn get(&mut self, file: &[u8], blocks: &[Block], number: usize) -> Option<Arc<DecodedBlock>> {
+    /// The block with a number, decoded now or before. The file's bytes of the one that has to make room are released.
+    pub(in super::super) fn get(
+        &mut self,
+        file: &LogFile,
+        blocks: &[Block],
+        number: usize,
+    ) -> Option<Arc<DecodedBlock>> {
         if let Some(found) = self.entries.iter().position(|(held, _)| *held == number) {
             let entry = self.entries.remove(found);
             let block = Arc::clone(&entry.1);
@@ -286,7 +292,10 @@ impl BlockCache {
         }
         let decoded = Arc::new(DecodedBlock::decode(file, blocks.get(number)?));
         if self.entries.len() == self.capacity {
-            self.entries.remove(0);
+            let (oldest, _) = self.entries.remove(0);
+            if let Some(block) = blocks.get(oldest) {
+                file.release(&block.bytes);
+            }
         }
         self.entries.push((number, Arc::clone(&decoded)));
         Some(decoded)

@@ -1,3 +1,4 @@
+mod appearance;
 mod corners;
 mod following;
 mod front_end;

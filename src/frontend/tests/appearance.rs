@@ -1,0 +1,72 @@
+//! Windows read from an image and compared.
+
+use nalgebra::{Matrix2, Vector2};
+
+use super::{scene, texture};
+use crate::flight_log::GrayImage;
+use crate::frontend::appearance::Appearance;
+use crate::frontend::keyed::{CENTRE, LANES, Rows, SIDE, WINDOW};
+use crate::frontend::pyramid::cut_out;
+use crate::frontend::resample::Patch;
+
+fn read(image: &GrayImage, warp: &Matrix2<f64>, middle: &Vector2<f64>) -> Option<Rows> {
+    let mut window = [[0.0; LANES]; WINDOW];
+    Patch::new().read(image, warp, middle, 0.0, &mut window).then_some(window)
+}
+
+#[test]
+fn a_window_of_a_plane_is_the_plane() {
+    let grey = |x: f64, y: f64| 20.0 + 1.5 * x + 0.5 * y;
+    let pixels = (0..80 * 120).map(|index| grey(f64::from(index % 120), f64::from(index / 120)).round() as u8);
+    let image = GrayImage { width: 120, height: 80, pixels: pixels.collect() };
+    let middle = Vector2::new(58.37, 41.68);
+    for warp in [Matrix2::identity(), Matrix2::new(1.3, -0.2, 0.1, 0.9), Matrix2::new(0.2, -1.1, 1.2, 0.1)] {
+        let window = read(&image, &warp, &middle).unwrap();
+        for (row, line) in window.iter().enumerate() {
+            for (column, value) in line[..WINDOW].iter().enumerate() {
+                let step = Vector2::new(column as f64 - CENTRE as f64, row as f64 - CENTRE as f64);
+                let at = middle + warp * step;
+                // The pixels are rounded, the places to the 128th of a pixel.
+                assert!((f64::from(*value) - grey(at.x, at.y)).abs() < 0.7, "{value} at {at}");
+            }
+            assert!(line[WINDOW..].iter().all(|surplus| *surplus == 0.0));
+        }
+    }
+}
+
+#[test]
+fn a_window_beyond_the_image_or_too_large_is_none() {
+    let image = GrayImage { width: 400, height: 400, pixels: vec![9; 400 * 400] };
+    let still = Matrix2::identity();
+    assert!(read(&image, &still, &Vector2::new(200.0, 200.0)).is_some());
+    assert!(read(&image, &still, &Vector2::new(11.0, 386.99)).is_some());
+    for middle in [(10.9, 200.0), (200.0, 387.0), (-1e9, 3.0), (f64::NAN, 200.0), (f64::INFINITY, 200.0)] {
+        assert!(read(&image, &still, &Vector2::new(middle.0, middle.1)).is_none(), "{middle:?}");
+    }
+    assert!(read(&image, &Matrix2::new(4.0, 0.0, 0.0, 0.25), &Vector2::new(200.0, 200.0)).is_none());
+}
+
+#[test]
+fn brightness_does_not_move_a_window_and_a_shift_is_seen() {
+    let image = scene(0.3).render(&texture(), 4);
+    let middle = Vector2::new(150.0, 120.0);
+    let mut pixels = [[0.0; SIDE]; SIDE];
+    cut_out(&image, [150 - SIDE as i32 / 2, 120 - SIDE as i32 / 2], &mut pixels, f32::from);
+    let appearance = Appearance::new(&pixels).unwrap();
+    let compare = |gain: f32, offset: f32, shift: Vector2<f64>| {
+        let mut window = read(&image, &Matrix2::identity(), &(middle + shift)).unwrap();
+        for value in window.iter_mut().flat_map(|line| &mut line[..WINDOW]) {
+            *value = gain * *value + offset - appearance.level();
+        }
+        appearance.compare(&window).unwrap()
+    };
+    for (gain, offset) in [(1.0, 0.0), (0.6, 70.0), (1.4, -30.0)] {
+        let (correlation, step) = compare(gain, offset, Vector2::zeros());
+        assert!((correlation - 1.0).abs() < 1e-4 && step.norm() < 1e-3, "{correlation} {step}");
+        let shift = Vector2::new(0.25, -0.125);
+        let (correlation, step) = compare(gain, offset, shift);
+        let error = (step.fixed_rows::<2>(0) - shift).norm();
+        assert!(correlation > 0.8 && error < 0.1, "{correlation} {step}");
+    }
+    assert!(Appearance::new(&[[80.0; SIDE]; SIDE]).is_none(), "no texture");
+}
