@@ -1,5 +1,7 @@
 //! Which face is seen at every sample.
 
+use std::ops::Range;
+
 use nalgebra::{Matrix3, Vector3};
 
 use super::view::{Grid, Workspace};
@@ -45,40 +47,48 @@ impl Eye {
     }
 }
 
+/// A face's outline in the sample grid, ready to be drawn band by band.
+#[derive(Clone, Debug)]
+pub(super) struct Shape {
+    /// Its corners among all outlines; the first one stands at the end once more.
+    corners: Range<usize>,
+    rows: Range<usize>,
+    /// Inverse depth at the grid's first sample, and what it grows by over a row and over a column.
+    inverse_depth: f64,
+    down: f64,
+    right: f64,
+    /// The edges that the row drawn last crossed.
+    crossed: Option<[usize; 2]>,
+}
+
 impl Workspace {
-    /// Fills the buffers of face numbers (into `prepared`) and inverse depths.
-    pub(super) fn rasterize(&mut self, world: &World, eye: &Eye, grid: &Grid) {
-        let samples = grid.columns * grid.rows;
-        self.inverse_depth.clear();
-        self.inverse_depth.resize(samples, 0.0);
-        self.face.clear();
-        self.face.resize(samples, SKY);
+    /// Projects the faces of a world: into `prepared` what shading needs, into `shapes` what drawing needs.
+    pub(super) fn prepare(&mut self, world: &World, eye: &Eye, grid: &Grid) {
         self.prepared.clear();
+        self.shapes.clear();
+        self.outlines.clear();
         for face in &world.faces {
             // How far the camera's centre stands before the face.
             let before_m = face.normal.dot(&eye.centre_m) - face.distance;
             if before_m <= 1e-4 {
                 continue;
             }
-            if !self.outline_of(&face.corners, eye, grid) {
+            let inverse_depth = eye.camera_from_world * face.normal / -before_m;
+            if !self.outline(&face.corners, &inverse_depth, eye, grid) {
                 continue;
             }
-            let inverse_depth = eye.camera_from_world * face.normal / -before_m;
-            let number = self.prepared.len() as u32;
-            if self.fill(grid, &inverse_depth, number) {
-                self.prepared.push(Prepared {
-                    inverse_depth: [inverse_depth.x as f32, inverse_depth.y as f32, inverse_depth.z as f32],
-                    texture_m: [0, 1].map(|axis: usize| eye.over_depth(&face.texture_m[axis], &inverse_depth)),
-                    sun: eye.over_depth(&face.sun, &inverse_depth),
-                    material: face.material.0 as u32,
-                });
-            }
+            self.prepared.push(Prepared {
+                inverse_depth: [inverse_depth.x as f32, inverse_depth.y as f32, inverse_depth.z as f32],
+                texture_m: [0, 1].map(|axis: usize| eye.over_depth(&face.texture_m[axis], &inverse_depth)),
+                sun: eye.over_depth(&face.sun, &inverse_depth),
+                material: face.material.0 as u32,
+            });
         }
     }
 
-    /// Projects a face's corners, cut at the near plane, to places in the grid; false when it lies outside.
-    fn outline_of(&mut self, corners: &[Vector3<f64>], eye: &Eye, grid: &Grid) -> bool {
-        self.outline.clear();
+    /// Adds a face's corners, cut at the near plane, as a shape; false when it lies outside the grid.
+    fn outline(&mut self, corners: &[Vector3<f64>], inverse_depth: &Vector3<f64>, eye: &Eye, grid: &Grid) -> bool {
+        let first = self.outlines.len();
         let seen = |corner: &Vector3<f64>| eye.camera_from_world * (corner - eye.centre_m);
         let Some(last) = corners.last() else { return false };
         let mut before = seen(last);
@@ -86,75 +96,114 @@ impl Workspace {
             let point = seen(corner);
             if (before.z > NEAR_M) != (point.z > NEAR_M) {
                 let share = (NEAR_M - before.z) / (point.z - before.z);
-                self.outline.push(grid.place(&(before + (point - before) * share)));
+                self.outlines.push(grid.place(&(before + (point - before) * share)));
             }
             if point.z > NEAR_M {
-                self.outline.push(grid.place(&point));
+                self.outlines.push(grid.place(&point));
             }
             before = point;
         }
-        let (columns, rows) = (grid.columns as f64, grid.rows as f64);
-        let outside =
-            |beyond: fn(&[f64; 2], f64, f64) -> bool| self.outline.iter().all(|place| beyond(place, columns, rows));
-        self.outline.len() >= 3
-            && !outside(|place, _, _| place[0] < -1.0)
-            && !outside(|place, columns, _| place[0] > columns + 1.0)
-            && !outside(|place, _, _| place[1] < 0.0)
-            && !outside(|place, _, rows| place[1] > rows)
+        let outline = &self.outlines[first..];
+        let bound = |axis: usize, start: f64, pick: fn(f64, f64) -> f64| {
+            outline.iter().map(|place| place[axis]).fold(start, pick)
+        };
+        let (left, right) = (bound(0, f64::MAX, f64::min), bound(0, f64::MIN, f64::max));
+        let (top, bottom) = (bound(1, f64::MAX, f64::min), bound(1, f64::MIN, f64::max));
+        let rows = ceiled(top)..ceiled(bottom).min(grid.rows);
+        if outline.len() < 3 || right < -1.0 || left > grid.columns as f64 + 1.0 || rows.is_empty() {
+            self.outlines.truncate(first);
+            return false;
+        }
+        self.outlines.push(self.outlines[first]);
+        self.shapes.push(Shape {
+            corners: first..self.outlines.len(),
+            rows,
+            inverse_depth: inverse_depth.x * grid.origin[0] + inverse_depth.y * grid.origin[1] + inverse_depth.z,
+            down: inverse_depth.y * grid.step[1],
+            right: inverse_depth.x * grid.step[0],
+            crossed: None,
+        });
+        true
     }
 
-    /// Draws the outline's inside where it is nearest; whether anything was drawn.
-    fn fill(&mut self, grid: &Grid, inverse_depth: &Vector3<f64>, number: u32) -> bool {
-        let (mut top, mut bottom) = (f64::MAX, f64::MIN);
-        for place in &self.outline {
-            top = top.min(place[1]);
-            bottom = bottom.max(place[1]);
-        }
-        let first_row = top.ceil().max(0.0) as usize;
-        let last_row = (bottom.ceil().max(0.0) as usize).min(grid.rows);
-        // Over a grid column the inverse depth grows by this.
-        let slope = inverse_depth.x * grid.step[0];
-        let at_origin = inverse_depth.x * grid.origin[0] + inverse_depth.y * grid.origin[1] + inverse_depth.z;
-        let mut drawn = false;
-        for row in first_row..last_row {
-            let (left, right) = self.span(row as f64);
-            let shift = Grid::shift(row);
-            let from = ((left - shift).ceil().max(0.0) as usize).min(grid.columns);
-            let to = ((right - shift).ceil().max(0.0) as usize).min(grid.columns);
-            if from >= to {
-                continue;
-            }
-            let start = at_origin + inverse_depth.y * grid.step[1] * row as f64 + slope * (from as f64 + shift);
-            let places = row * grid.columns + from..row * grid.columns + to;
-            let depths = &mut self.inverse_depth[places.clone()];
-            let faces = &mut self.face[places];
-            let (start, slope) = (start as f32, slope as f32);
-            for (index, (depth, face)) in depths.iter_mut().zip(faces).enumerate() {
-                let here = start + slope * index as f32;
-                let nearer = here > *depth;
-                *depth = if nearer { here } else { *depth };
-                *face = if nearer { number } else { *face };
-                drawn |= nearer;
+    /// Fills the buffers of face numbers (into `prepared`) and inverse depths for some rows of the grid; bands of rows
+    /// are drawn from the top down.
+    pub(super) fn draw(&mut self, grid: &Grid, band: Range<usize>) {
+        let samples = grid.columns * band.len();
+        self.inverse_depth.clear();
+        self.inverse_depth.resize(samples, 0.0);
+        self.face.clear();
+        self.face.resize(samples, SKY);
+        for (number, shape) in (0..).zip(&mut self.shapes) {
+            for row in shape.rows.start.max(band.start)..shape.rows.end.min(band.end) {
+                let (left, right) = shape.span(&self.outlines, row as f64);
+                let shift = Grid::shift(row);
+                let (from, to) = (ceiled(left - shift), ceiled(right - shift).min(grid.columns));
+                if from >= to {
+                    continue;
+                }
+                let start = shape.inverse_depth + shape.down * row as f64 + shape.right * (from as f64 + shift);
+                let line = (row - band.start) * grid.columns;
+                fill(
+                    &mut self.inverse_depth[line + from..line + to],
+                    &mut self.face[line + from..line + to],
+                    [start as f32, shape.right as f32],
+                    number,
+                );
             }
         }
-        drawn
     }
+}
 
+impl Shape {
     /// Where a row of the grid enters and leaves the outline.
-    fn span(&self, row: f64) -> (f64, f64) {
-        let (mut left, mut right) = (f64::MAX, f64::MIN);
-        let count = self.outline.len();
-        for k in 0..count {
-            let (from, to) = (self.outline[k], self.outline[(k + 1) % count]);
-            if (from[1] < row) == (to[1] < row) {
-                continue;
-            }
-            let x = from[0] + (to[0] - from[0]) * ((row - from[1]) / (to[1] - from[1]));
-            left = left.min(x);
-            right = right.max(x);
+    #[inline]
+    fn span(&mut self, outlines: &[[f64; 2]], row: f64) -> (f64, f64) {
+        let outline = &outlines[self.corners.clone()];
+        let crossing = |edge: usize| {
+            let (from, to) = (outline[edge], outline[edge + 1]);
+            let crosses = (from[1] < row) != (to[1] < row);
+            crosses.then(|| from[0] + (to[0] - from[0]) * ((row - from[1]) / (to[1] - from[1])))
+        };
+        // A convex outline is crossed twice, mostly where it was crossed before.
+        if let Some([one, other]) = self.crossed
+            && let (Some(one), Some(other)) = (crossing(one), crossing(other))
+        {
+            return (one.min(other), one.max(other));
         }
-        (left, right)
+        let (mut left, mut right) = ((f64::MAX, 0), (f64::MIN, 0));
+        for edge in 0..outline.len() - 1 {
+            let Some(x) = crossing(edge) else { continue };
+            if x < left.0 {
+                left = (x, edge);
+            }
+            if x > right.0 {
+                right = (x, edge);
+            }
+        }
+        self.crossed = (left.1 != right.1).then_some([left.1, right.1]);
+        (left.0, right.0)
     }
+}
+
+/// Draws a face into a line of samples where it is nearest: inverse depth at the first sample and per sample.
+#[inline]
+fn fill(depths: &mut [f32], faces: &mut [u32], [start, slope]: [f32; 2], number: u32) {
+    let faces = &mut faces[..depths.len()];
+    for index in 0..depths.len() {
+        // Through 32 bits and masks, so that the loop becomes vector code.
+        let here = start + slope * (index as i32) as f32;
+        let nearer = u32::from(here > depths[index]).wrapping_neg();
+        depths[index] = f32::from_bits(here.to_bits() & nearer | depths[index].to_bits() & !nearer);
+        faces[index] = number & nearer | faces[index] & !nearer;
+    }
+}
+
+/// The least whole number that is not below a value, at least 0.
+#[inline]
+fn ceiled(value: f64) -> usize {
+    let whole = value as i64;
+    whole.saturating_add(i64::from((whole as f64) < value)).max(0) as usize
 }
 
 impl Grid {

@@ -48,12 +48,14 @@ impl Sensor {
         let noise = (self.options.noise / 147.8) as f32;
         let key = mix(self.seed ^ (frame_index as u64).wrapping_mul(0xA24B_AED4_963E_E407));
         let mut pixels = Vec::with_capacity(picture.len());
-        for (index, (value, shading)) in picture.iter().zip(&self.shading).enumerate() {
-            let word = mix(key.wrapping_add((index as u64) >> 1)) >> (32 * (index & 1));
-            let bytes = [word, word >> 8, word >> 16, word >> 24].map(|part| (part & 255) as i32);
-            let disturbance = (bytes.iter().sum::<i32>() - 510) as f32 * noise;
-            let grey = value * shading * gain + disturbance;
-            pixels.push((grey + 0.5).clamp(0.0, 255.0) as u8);
+        // One random word serves two pixels.
+        for (index, (values, shading)) in (0_u64..).zip(picture.chunks(2).zip(self.shading.chunks(2))) {
+            let word = mix(key.wrapping_add(index));
+            for ((value, shading), part) in values.iter().zip(shading).zip([word as u32, (word >> 32) as u32]) {
+                let sum: i32 = part.to_le_bytes().into_iter().map(i32::from).sum();
+                let grey = value * shading * gain + (sum - 510) as f32 * noise;
+                pixels.push((grey + 0.5).clamp(0.0, 255.0) as u8);
+            }
         }
         GrayImage { width: self.width, height: self.height, pixels }
     }

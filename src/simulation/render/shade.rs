@@ -2,9 +2,16 @@ use nalgebra::Vector3;
 
 use super::raster::{Eye, Prepared, SKY};
 use super::shadow::ShadowMap;
-use super::view::{OFFSETS_PX, PixelRay, SAMPLES, View, Workspace};
+use super::view::{OFFSETS_PX, PixelRay, Rays, SAMPLES, View, Workspace};
 use crate::geometry::RigidTransform;
-use crate::simulation::world::{Texture, World};
+use crate::simulation::world::{Footprints, World};
+
+/// Rows of pixels whose samples are drawn at once.
+const BAND_ROWS: usize = 8;
+/// Pixels that are shaded at once where they see the same face.
+const LANES: usize = 8;
+/// Marks a pixel whose samples see several faces.
+const MIXED: u32 = SKY - 1;
 
 /// Share of the light that comes from the sky on all sides.
 const AMBIENT: f32 = 0.6;
@@ -29,6 +36,7 @@ struct Light {
     shadow_offset: [f32; 3],
 }
 
+#[inline]
 fn dot(linear: &[f32; 3], ray: [f32; 2]) -> f32 {
     linear[0] * ray[0] + linear[1] * ray[1] + linear[2]
 }
@@ -53,7 +61,7 @@ impl<'a> Renderer<'a> {
         picture: &mut [f32],
     ) {
         let eye = Eye::new(world_from_camera);
-        workspace.rasterize(self.world, &eye, &view.grid);
+        workspace.prepare(self.world, &eye, &view.grid);
         let world_from_ray = eye.camera_from_world.transpose();
         let offset: Vector3<f64> = self.shadows.linear * eye.centre_m + self.shadows.offset;
         let light = Light {
@@ -61,26 +69,92 @@ impl<'a> Renderer<'a> {
             shadow_from_ray: rows(&(self.shadows.linear * world_from_ray)),
             shadow_offset: [offset.x as f32, offset.y as f32, offset.z as f32],
         };
-        for row in 0..view.height {
-            for column in 0..view.width {
-                let pixel = row * view.width + column;
-                let Some(ray) = view.pixel_ray(column, row) else { continue };
-                let faces = if let Some(places) = &view.places {
-                    places[pixel].map(|place| workspace.face[place as usize])
-                } else {
-                    let first = row * SAMPLES * view.grid.columns + column;
-                    std::array::from_fn(|sample| workspace.face[first + sample * view.grid.columns])
-                };
-                picture[pixel] += share * self.pixel(&workspace.prepared, &light, faces, ray);
+        // A band's samples stay in the cache; where the lens bends rows, all are needed at once.
+        let band = if view.places.is_some() { view.height } else { BAND_ROWS };
+        for top in (0..view.height).step_by(band) {
+            let bottom = (top + band).min(view.height);
+            let samples = if view.places.is_some() { 0..view.grid.rows } else { top * SAMPLES..bottom * SAMPLES };
+            workspace.draw(&view.grid, samples.clone());
+            for row in top..bottom {
+                let pixels = &mut picture[row * view.width..][..view.width];
+                self.shade_row(view, &light, row, samples.start, share, workspace, pixels);
+            }
+        }
+    }
+
+    /// Adds a row of pixels; `first_sample` is the row of the grid that the workspace begins with.
+    #[expect(clippy::too_many_arguments, reason = "a row of a picture needs all that the picture needs")]
+    fn shade_row(
+        &self,
+        view: &View,
+        light: &Light,
+        row: usize,
+        first_sample: usize,
+        share: f32,
+        workspace: &mut Workspace,
+        pixels: &mut [f32],
+    ) {
+        let faces_of = |face: &[u32], column: usize| -> [u32; SAMPLES] {
+            if let Some(places) = &view.places {
+                places[row * view.width + column].map(|place| face[place as usize])
+            } else {
+                let first = (row * SAMPLES - first_sample) * view.grid.columns + column;
+                std::array::from_fn(|sample| face[first + sample * view.grid.columns])
+            }
+        };
+        let Workspace { face, prepared, seen, differs, .. } = workspace;
+        seen.clear();
+        if view.places.is_some() {
+            seen.extend((0..view.width).map(|column| {
+                let faces = faces_of(face, column);
+                if faces.iter().all(|other| *other == faces[0]) { faces[0] } else { MIXED }
+            }));
+        } else {
+            // Line by line, as vector code wants it.
+            let line = |sample: usize| {
+                &face[(row * SAMPLES - first_sample + sample) * view.grid.columns..][..view.grid.columns]
+            };
+            seen.extend_from_slice(line(0));
+            differs.clear();
+            differs.resize(view.width, 0);
+            for sample in 1..SAMPLES {
+                for ((differs, first), other) in differs.iter_mut().zip(line(0)).zip(line(sample)) {
+                    *differs |= first ^ other;
+                }
+            }
+            for (seen, differs) in seen.iter_mut().zip(differs.iter()) {
+                *seen = if *differs == 0 { *seen } else { MIXED };
+            }
+        }
+        let mut column = 0;
+        while column < view.width {
+            let face_here = seen[column];
+            let Some(ray) = view.pixel_ray(column, row) else {
+                column += 1;
+                continue;
+            };
+            if face_here == MIXED {
+                pixels[column] += share * self.mixed(prepared, light, faces_of(face, column), ray);
+                column += 1;
+            } else if face_here == SKY {
+                pixels[column] += share * self.sky(light, ray.ray);
+                column += 1;
+            } else {
+                let dark = |at: usize| view.places.is_some() && view.pixel_ray(at, row).is_none();
+                let last = (column + LANES).min(view.width);
+                let end = (column + 1..last).find(|at| seen[*at] != face_here || dark(*at)).unwrap_or(last);
+                let rays = view.rays::<LANES>(column..end, row);
+                let greys = self.shade(&prepared[face_here as usize], light, &rays, end - column);
+                for (pixel, grey) in pixels[column..end].iter_mut().zip(greys) {
+                    *pixel += share * grey;
+                }
+                column = end;
             }
         }
     }
 
     /// The mean over a pixel's samples; each face in it is shaded once, in the middle of its samples.
-    fn pixel(&self, prepared: &[Prepared], light: &Light, faces: [u32; SAMPLES], ray: PixelRay) -> f32 {
-        if faces[1..].iter().all(|face| *face == faces[0]) {
-            return self.shade(prepared, light, faces[0], ray);
-        }
+    fn mixed(&self, prepared: &[Prepared], light: &Light, faces: [u32; SAMPLES], ray: PixelRay) -> f32 {
         let mut sum = 0.0;
         for (index, face) in faces.iter().enumerate() {
             if faces[..index].contains(face) {
@@ -96,48 +170,59 @@ impl<'a> Renderer<'a> {
             }
             let (x, y) = (x / count, y / count);
             let within = [0, 1].map(|axis: usize| ray.ray[axis] + ray.right[axis] * x + ray.down[axis] * y);
-            sum += count * self.shade(prepared, light, *face, PixelRay { ray: within, ..ray });
+            let grey = if *face == SKY {
+                self.sky(light, within)
+            } else {
+                let [grey] = self.shade(&prepared[*face as usize], light, &PixelRay { ray: within, ..ray }.into(), 1);
+                grey
+            };
+            sum += count * grey;
         }
         sum / SAMPLES as f32
     }
 
-    /// The grey of one face (or the sky) along a ray.
-    fn shade(&self, prepared: &[Prepared], light: &Light, face: u32, at: PixelRay) -> f32 {
-        if face == SKY {
-            return self.sky(light, at.ray);
-        }
-        let face = &prepared[face as usize];
-        let inverse_depth = dot(&face.inverse_depth, at.ray).max(1e-5);
-        let depth_m = 1.0 / inverse_depth;
-        let place = face.texture_m.map(|linear| dot(&linear, at.ray) * depth_m);
+    /// The greys of a face along the first `count` rays.
+    fn shade<const N: usize>(&self, face: &Prepared, light: &Light, at: &Rays<N>, count: usize) -> [f32; N] {
+        let along = |linear: &[f32; 3]| -> [f32; N] {
+            std::array::from_fn(|k| linear[0] * at.ray[0][k] + linear[1] * at.ray[1][k] + linear[2])
+        };
+        let depth_m = along(&face.inverse_depth).map(|inverse| 1.0 / inverse.max(1e-5));
+        let times_depth = |values: [f32; N]| -> [f32; N] { std::array::from_fn(|k| values[k] * depth_m[k]) };
+        let place = [0, 1].map(|axis: usize| times_depth(along(&face.texture_m[axis])));
         // Quotient rule: d(u)/d(ray) = (u's linear part − u · inverse depth's) · depth.
-        let change = |axis: usize, step: [f32; 2]| {
-            let along = |k: usize| face.texture_m[axis][k] - place[axis] * face.inverse_depth[k];
-            (along(0) * step[0] + along(1) * step[1]) * depth_m
+        let change = |step: &[[f32; N]; 2]| {
+            [0, 1].map(|axis: usize| -> [f32; N] {
+                let along =
+                    |k: usize, part: usize| face.texture_m[axis][part] - place[axis][k] * face.inverse_depth[part];
+                std::array::from_fn(|k| (along(k, 0) * step[0][k] + along(k, 1) * step[1][k]) * depth_m[k])
+            })
         };
-        let right = [change(0, at.right), change(1, at.right)];
-        let down = [change(0, at.down), change(1, at.down)];
+        let footprints = Footprints { centre: place, sides: [change(&at.right), change(&at.down)] };
         let material = &self.world.materials[face.material as usize];
-        let footprint = |texture: &Texture| {
-            let scale = texture.texels_per_m();
-            [place, right, down].map(|side| [side[0] * scale, side[1] * scale])
-        };
         let texture = &self.world.textures[material.texture];
-        let [centre, side_x, side_y] = footprint(texture);
-        let mut grey = texture.sample(centre, side_x, side_y);
+        let mut greys = texture.sample(&footprints.scaled(texture.texels_per_m()), count);
         if let Some(overlay) = material.overlay {
             let overlay = &self.world.textures[overlay];
-            let [centre, side_x, side_y] = footprint(overlay);
-            grey *= overlay.sample_roughly(centre, side_x, side_y) * (1.0 / 128.0);
+            let shades = overlay.sample_roughly(&footprints.scaled(overlay.texels_per_m()), count);
+            for (grey, shade) in greys.iter_mut().zip(shades) {
+                *grey *= shade * (1.0 / 128.0);
+            }
         }
-        let mut sun = (dot(&face.sun, at.ray) * depth_m).clamp(0.0, 1.0);
-        if sun > 0.01 {
-            let [column, row, height] =
-                [0, 1, 2].map(|k: usize| dot(&light.shadow_from_ray[k], at.ray) * depth_m + light.shadow_offset[k]);
-            sun *= self.shadows.lit(column, row, height);
+        let mut sun = times_depth(along(&face.sun)).map(|sun| sun.clamp(0.0, 1.0));
+        let in_shadow_map: [[f32; N]; 3] = std::array::from_fn(|axis| {
+            let scaled = times_depth(along(&light.shadow_from_ray[axis]));
+            scaled.map(|place| place + light.shadow_offset[axis])
+        });
+        for k in 0..count.min(N) {
+            if sun[k] > 0.01 {
+                let [column, row, height] = in_shadow_map.map(|axis| axis[k]);
+                sun[k] *= self.shadows.lit(column, row, height);
+            }
         }
-        grey *= BRIGHTNESS * (AMBIENT + (1.0 - AMBIENT) * sun);
-        grey + (HAZE - grey) * (depth_m / (depth_m + HAZE_M))
+        std::array::from_fn(|k| {
+            let grey = greys[k] * (BRIGHTNESS * (AMBIENT + (1.0 - AMBIENT) * sun[k]));
+            grey + (HAZE - grey) * (depth_m[k] / (depth_m[k] + HAZE_M))
+        })
     }
 
     /// The sky: brighter upwards, with soft clouds on a plane high above.
@@ -151,7 +236,8 @@ impl<'a> Renderer<'a> {
         let stretch = 0.0028 * 62.0 * lift;
         let side = [stretch, 0.0];
         let far = [0.0, stretch * lift];
-        let cloud = self.world.textures[self.world.clouds].sample(place, side, far) - 128.0;
+        let footprint = Footprints { centre: place.map(|x| [x]), sides: [side, far].map(|side| side.map(|x| [x])) };
+        let [cloud] = self.world.textures[self.world.clouds].sample(&footprint, 1).map(|grey| grey - 128.0);
         base + cloud * (height * 3.0).min(1.0) * 0.55
     }
 }

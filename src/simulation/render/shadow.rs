@@ -70,6 +70,7 @@ impl ShadowMap {
     }
 
     /// How much of the sun reaches a place, 0 to 1, smoothed over three cells.
+    #[inline]
     pub(super) fn lit(&self, column: f32, row: f32, height: f32) -> f32 {
         let (x, y) = (column - 0.5, row - 0.5);
         let last = (CELLS - 2) as f32;

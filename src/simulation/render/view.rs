@@ -55,13 +55,34 @@ pub(super) struct PixelRay {
     pub(super) down: [f32; 2],
 }
 
+/// The rays of some pixels, component by component, as vector code wants them.
+#[derive(Clone, Copy)]
+pub(super) struct Rays<const N: usize> {
+    pub(super) ray: [[f32; N]; 2],
+    pub(super) right: [[f32; N]; 2],
+    pub(super) down: [[f32; N]; 2],
+}
+
+impl From<PixelRay> for Rays<1> {
+    #[inline]
+    fn from(PixelRay { ray, right, down }: PixelRay) -> Self {
+        Self { ray: ray.map(|x| [x]), right: right.map(|x| [x]), down: down.map(|x| [x]) }
+    }
+}
+
 /// Buffers that a thread keeps between pictures.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Workspace {
+    /// Of a band of the sample grid.
     pub(super) inverse_depth: Vec<f32>,
     pub(super) face: Vec<u32>,
     pub(super) prepared: Vec<super::raster::Prepared>,
-    pub(super) outline: Vec<[f64; 2]>,
+    pub(super) shapes: Vec<super::raster::Shape>,
+    pub(super) outlines: Vec<[f64; 2]>,
+    /// What the pixels of a row see.
+    pub(super) seen: Vec<u32>,
+    /// Not 0 where a row's pixels see several faces.
+    pub(super) differs: Vec<u32>,
 }
 
 impl View {
@@ -118,6 +139,7 @@ impl View {
     }
 
     /// The ray of a pixel with its differences to the neighbours; `None` where the lens shows nothing.
+    #[inline]
     pub(super) fn pixel_ray(&self, column: usize, row: usize) -> Option<PixelRay> {
         let at = |x: usize, y: usize| self.rays[y * self.width + x];
         let ray = at(column, row);
@@ -136,6 +158,34 @@ impl View {
         seen.then_some(PixelRay { ray, right, down })
     }
 
+    /// The rays of `N` pixels from a column on that the lens all shows; past `end` the last one stands in.
+    #[inline]
+    pub(super) fn rays<const N: usize>(&self, columns: std::ops::Range<usize>, row: usize) -> Rays<N> {
+        let line = |row: usize| &self.rays[row * self.width..][..self.width];
+        let here = line(row);
+        let inner = columns.start + N < self.width && row + 1 < self.height;
+        if inner && columns.len() >= N {
+            let rays: &[[f32; 2]] = &here[columns.start..=columns.start + N];
+            let below: &[[f32; 2]] = &line(row + 1)[columns.start..][..N];
+            return Rays {
+                ray: [0, 1].map(|axis: usize| std::array::from_fn(|k| rays[k][axis])),
+                right: [0, 1].map(|axis: usize| std::array::from_fn(|k| rays[k + 1][axis] - rays[k][axis])),
+                down: [0, 1].map(|axis: usize| std::array::from_fn(|k| below[k][axis] - rays[k][axis])),
+            };
+        }
+        let mut rays = Rays { ray: [[0.0; N]; 2], right: [[0.0; N]; 2], down: [[0.0; N]; 2] };
+        for k in 0..N {
+            let column = (columns.start + k).min(columns.end - 1);
+            let Some(PixelRay { ray, right, down }) = self.pixel_ray(column, row) else { continue };
+            for axis in 0..2 {
+                rays.ray[axis][k] = ray[axis];
+                rays.right[axis][k] = right[axis];
+                rays.down[axis][k] = down[axis];
+            }
+        }
+        rays
+    }
+
     /// Number of pixels.
     pub(crate) fn pixels(&self) -> usize {
         self.width * self.height
@@ -143,19 +193,36 @@ impl View {
 }
 
 #[cfg(test)]
+impl View {
+    /// Pixels in a row.
+    pub(crate) fn width(&self) -> usize {
+        self.width
+    }
+}
+
+#[cfg(test)]
 impl Workspace {
-    /// Depth of what the first sample of a pixel saw in the last picture.
-    pub(crate) fn depth_m(&self, view: &View, column: usize, row: usize) -> f64 {
-        let place = view
-            .places
-            .as_ref()
-            .map_or(row * SAMPLES * view.grid.columns + column, |places| places[row * view.width + column][0] as usize);
-        1.0 / f64::from(self.inverse_depth[place])
+    /// Depth of what the first sample of every pixel sees from a pose.
+    pub(crate) fn depths_m(
+        &mut self,
+        view: &View,
+        world: &crate::simulation::world::World,
+        world_from_camera: &crate::geometry::RigidTransform,
+    ) -> Vec<f64> {
+        self.prepare(world, &super::raster::Eye::new(world_from_camera), &view.grid);
+        self.draw(&view.grid, 0..view.grid.rows);
+        let place = |pixel: usize| {
+            let (row, column) = (pixel / view.width, pixel % view.width);
+            let regular = row * SAMPLES * view.grid.columns + column;
+            view.places.as_ref().map_or(regular, |places| places[pixel][0] as usize)
+        };
+        (0..view.pixels()).map(|pixel| 1.0 / f64::from(self.inverse_depth[place(pixel)])).collect()
     }
 }
 
 impl Grid {
     /// How far the samples of a row lie to the right of whole columns.
+    #[inline]
     pub(super) fn shift(row: usize) -> f64 {
         f64::from(OFFSETS_PX[row % SAMPLES][0])
     }

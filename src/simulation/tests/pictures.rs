@@ -80,9 +80,7 @@ fn a_pixel_sees_what_its_ray_hits() {
     let right = forward.cross(&Vector3::z()).normalize();
     let rotation = nalgebra::Matrix3::from_columns(&[right, forward.cross(&right), forward]);
     let pose = RigidTransform::new(nalgebra::UnitQuaternion::from_matrix(&rotation), place);
-    let mut workspace = Workspace::default();
-    let mut grey = vec![0.0; view.pixels()];
-    Renderer::new(&world).render(&view, &pose, 1.0, &mut workspace, &mut grey);
+    let depths = Workspace::default().depths_m(&view, &world, &pose);
     for height_m in [1.9, 2.3, 2.9, 3.4] {
         let edge = Vector3::new(corner.x, corner.y, height_m);
         let uv = model.project(&pose.inverse().transform(&edge)).unwrap();
@@ -94,7 +92,7 @@ fn a_pixel_sees_what_its_ray_hits() {
             sides[side] = along * model.unproject(&(uv + nalgebra::Vector2::new(offset, 0.0))).unwrap().z;
         }
         for (side, offset) in [(0, -2.0), (1, 2.0)] {
-            let depth = workspace.depth_m(&view, (uv.x + offset).round() as usize, uv.y.round() as usize);
+            let depth = depths[uv.y.round() as usize * view.width() + (uv.x + offset).round() as usize];
             assert!(
                 (depth - sides[side]).abs() < 0.06,
                 "side {side} at {height_m} m: {depth} instead of {}",

@@ -78,8 +78,8 @@ impl Canvas {
 
     /// The finished texture.
     pub(crate) fn finish(self) -> Texture {
-        let texels = self.values.iter().map(|value| value.round().clamp(0.0, 255.0) as u8).collect();
-        Texture::new(self.width, self.height, texels, self.wrap, self.texels_per_m)
+        let texels: Vec<u8> = self.values.iter().map(|value| value.round().clamp(0.0, 255.0) as u8).collect();
+        Texture::new(self.width, self.height, &texels, self.wrap, self.texels_per_m)
     }
 
     /// Blends a value into one texel.

@@ -11,7 +11,7 @@ mod texture;
 mod town;
 
 pub(crate) use mesh::{Affine, World};
-pub(crate) use texture::Texture;
+pub(crate) use texture::Footprints;
 
 use super::experiment::Environment;
 

@@ -14,7 +14,31 @@ struct Level {
     height: usize,
     /// Of this level's size by the finest one's, per axis.
     scale: [f32; 2],
+    /// Rows of one texel more than the width, and one row more than the height: what follows when the texture repeats,
+    /// the border again when it does not.
     texels: Vec<u8>,
+}
+
+/// The footprints of some pixels in a texture: centres and two sides, in texels of the finest level.
+#[derive(Clone, Copy)]
+pub(crate) struct Footprints<const N: usize> {
+    pub(crate) centre: [[f32; N]; 2],
+    pub(crate) sides: [[[f32; N]; 2]; 2],
+}
+
+impl<const N: usize> Footprints<N> {
+    /// Scaled from other units to texels.
+    #[inline]
+    pub(crate) fn scaled(&self, scale: f32) -> Self {
+        let scaled = |values: [[f32; N]; 2]| values.map(|axis| axis.map(|value| value * scale));
+        Self { centre: scaled(self.centre), sides: self.sides.map(scaled) }
+    }
+
+    /// Squared lengths of the two sides.
+    #[inline]
+    fn squares(&self) -> [[f32; N]; 2] {
+        self.sides.map(|side| std::array::from_fn(|k| side[0][k] * side[0][k] + side[1][k] * side[1][k]))
+    }
 }
 
 /// Most samples along the stretched direction of a footprint.
@@ -30,58 +54,87 @@ const LEVEL_BIAS: f32 = -0.2;
 
 impl Texture {
     /// From the finest level, rows top to bottom.
-    pub(crate) fn new(width: usize, height: usize, texels: Vec<u8>, wrap: bool, texels_per_m: f32) -> Self {
+    pub(crate) fn new(width: usize, height: usize, texels: &[u8], wrap: bool, texels_per_m: f32) -> Self {
         debug_assert!(!wrap || (width.is_power_of_two() && height.is_power_of_two()));
-        let mut levels = vec![Level { width, height, scale: [1.0; 2], texels }];
+        let mut levels = vec![Level::new([width, height], [1.0; 2], texels, wrap)];
         while let Some(finer) = levels.last()
             && (finer.width > 1 || finer.height > 1)
         {
-            let coarser = finer.halved([width, height]);
+            let coarser = finer.halved([width, height], wrap);
             levels.push(coarser);
         }
         Self { levels, wrap, texels_per_m }
     }
 
     /// Finest texels per metre.
+    #[inline]
     pub(crate) fn texels_per_m(&self) -> f32 {
         self.texels_per_m
     }
 
-    /// The mean over a footprint: its centre and its two sides, in texels of the finest level.
+    /// The means over the first `count` footprints.
     ///
     /// Trilinear samples are spread along the longer side, so that slanted surfaces stay sharp without shimmer.
-    pub(crate) fn sample(&self, centre: [f32; 2], side_x: [f32; 2], side_y: [f32; 2]) -> f32 {
-        let square = |side: [f32; 2]| side[0] * side[0] + side[1] * side[1];
-        let (mut long, mut long2, mut short2) = (side_x, square(side_x), square(side_y));
-        if short2 > long2 {
-            (long, long2, short2) = (side_y, short2, long2);
-        }
+    pub(crate) fn sample<const N: usize>(&self, footprints: &Footprints<N>, count: usize) -> [f32; N] {
+        let [across, down] = footprints.squares();
+        let turned: [bool; N] = std::array::from_fn(|k| down[k] > across[k]);
+        let pick = |turned: bool, no: f32, yes: f32| if turned { yes } else { no };
+        let long: [[f32; N]; 2] = [0, 1].map(|axis: usize| {
+            std::array::from_fn(|k| pick(turned[k], footprints.sides[0][axis][k], footprints.sides[1][axis][k]))
+        });
+        let long2: [f32; N] = std::array::from_fn(|k| pick(turned[k], across[k], down[k]));
+        let short2: [f32; N] = std::array::from_fn(|k| pick(turned[k], down[k], across[k]));
         // One sample more for every whole time that the longer side exceeds the shorter one.
-        let count = 1 + (1..LARGEST_ANISOTROPY).filter(|k| long2 > (k * k) as f32 * short2).count();
-        let share = SHARES[count];
-        let width2 = (long2 * share * share).max(short2.min(long2));
-        let level = (0.5 * fast_log2(width2.max(1e-6)) + LEVEL_BIAS).max(0.0);
+        let mut counts = [1_i32; N];
+        for times in 1..LARGEST_ANISOTROPY {
+            let square = (times * times) as f32;
+            for k in 0..N {
+                counts[k] += i32::from(long2[k] > square * short2[k]);
+            }
+        }
+        let levels: [f32; N] = std::array::from_fn(|k| {
+            let share = 1.0 / counts[k] as f32;
+            let width2 = (long2[k] * share * share).max(short2[k].min(long2[k]));
+            (0.5 * fast_log2(width2.max(1e-6)) + LEVEL_BIAS).max(0.0)
+        });
+        let mut means = [0.0; N];
+        for k in 0..count.min(N) {
+            let (centre, long) = (footprints.centre.map(|axis| axis[k]), long.map(|axis| axis[k]));
+            means[k] = self.trilinear(levels[k], centre, long, counts[k] as usize);
+        }
+        means
+    }
+
+    /// The mean of `count` samples along a side of a footprint, between two levels of detail.
+    #[inline]
+    fn trilinear(&self, level: f32, centre: [f32; 2], side: [f32; 2], count: usize) -> f32 {
         let last = self.levels.len() - 1;
         let fine = (level as usize).min(last);
         let blend = level - fine as f32;
-        let near = self.along(&self.levels[fine], centre, long, count);
+        let near = self.along(&self.levels[fine], centre, side, count);
         if blend < 0.02 || fine == last {
             return near;
         }
         // Half as many samples of the coarser level cover the footprint as well.
-        let far = self.along(&self.levels[fine + 1], centre, long, count.div_ceil(2));
+        let far = self.along(&self.levels[fine + 1], centre, side, count.div_ceil(2));
         near + (far - near) * blend
     }
 
     /// As [`Texture::sample`] with one sample as wide as the footprint is long: for textures without detail.
-    pub(crate) fn sample_roughly(&self, centre: [f32; 2], side_x: [f32; 2], side_y: [f32; 2]) -> f32 {
-        let square = |side: [f32; 2]| side[0] * side[0] + side[1] * side[1];
-        let width2 = square(side_x).max(square(side_y));
-        let level = (0.5 * fast_log2(width2.max(1.0)) + 0.5) as usize;
-        self.along(&self.levels[level.min(self.levels.len() - 1)], centre, [0.0; 2], 1)
+    pub(crate) fn sample_roughly<const N: usize>(&self, footprints: &Footprints<N>, count: usize) -> [f32; N] {
+        let [across, down] = footprints.squares();
+        let mut values = [0.0; N];
+        for k in 0..count.min(N) {
+            let width2 = across[k].max(down[k]);
+            let level = (0.5 * fast_log2(width2.max(1.0)) + 0.5) as usize;
+            let centre = footprints.centre.map(|axis| axis[k]);
+            values[k] = self.along(&self.levels[level.min(self.levels.len() - 1)], centre, [0.0; 2], 1);
+        }
+        values
     }
 
     /// The mean of `count` bilinear samples spread along a side of the footprint, in fixed point.
+    #[inline]
     fn along(&self, level: &Level, centre: [f32; 2], side: [f32; 2], count: usize) -> f32 {
         let share = SHARES[count];
         let first = 0.5 * share - 0.5;
@@ -91,7 +144,7 @@ impl Texture {
         let (step_u, step_v) = (step(0), step(1));
         let mut sum = 0_u32;
         for _ in 0..count {
-            sum += if self.wrap { level.bilinear::<true>(u, v) } else { level.bilinear::<false>(u, v) };
+            sum += if self.wrap { level.bilinear::<true>(u, v) } else { level.bilinear::<false>(u, v) } as u32;
             u += step_u;
             v += step_v;
         }
@@ -100,24 +153,35 @@ impl Texture {
 }
 
 impl Level {
+    /// From rows of texels.
+    fn new([width, height]: [usize; 2], scale: [f32; 2], texels: &[u8], wrap: bool) -> Self {
+        let after = |size: usize| if wrap { 0 } else { size - 1 };
+        let mut padded = Vec::with_capacity((width + 1) * (height + 1));
+        for row in (0..height).chain([after(height)]) {
+            let row = &texels[row * width..][..width];
+            padded.extend_from_slice(row);
+            padded.push(row[after(width)]);
+        }
+        Self { width, height, scale, texels: padded }
+    }
+
     /// The value between four texels times `FRACTION²`, at a place in fixed point.
-    fn bilinear<const WRAP: bool>(&self, u: i32, v: i32) -> u32 {
+    #[inline]
+    fn bilinear<const WRAP: bool>(&self, u: i32, v: i32) -> i32 {
         const MASK: i32 = (1 << FRACTION_BITS) - 1;
-        let index = |at: i32, size: usize| {
-            if WRAP { at as usize & (size - 1) } else { at.clamp(0, size as i32 - 1) as usize }
-        };
-        let (left, top) = (u >> FRACTION_BITS, v >> FRACTION_BITS);
-        let (fx, fy) = ((u & MASK) as u32, (v & MASK) as u32);
-        let (x0, x1) = (index(left, self.width), index(left + 1, self.width));
-        let upper = &self.texels[index(top, self.height) * self.width..][..self.width];
-        let lower = &self.texels[index(top + 1, self.height) * self.width..][..self.width];
-        let whole = 1 << FRACTION_BITS;
-        let mix = |row: &[u8]| u32::from(row[x0]) * (whole - fx) + u32::from(row[x1]) * fx;
-        mix(upper) * (whole - fy) + mix(lower) * fy
+        let within = |at: i32, size: usize| if WRAP { at } else { at.clamp(0, (size as i32 - 1) << FRACTION_BITS) };
+        let (u, v) = (within(u, self.width), within(v, self.height));
+        let index = |at: i32, size: usize| (at >> FRACTION_BITS) as usize & if WRAP { size - 1 } else { usize::MAX };
+        let stride = self.width + 1;
+        let at = index(v, self.height) * stride + index(u, self.width);
+        let (upper, lower) = (&self.texels[at..at + 2], &self.texels[at + stride..at + stride + 2]);
+        let mix = |from: i32, to: i32, share: i32| (from << FRACTION_BITS) + (to - from) * share;
+        let across = |row: &[u8]| mix(i32::from(row[0]), i32::from(row[1]), u & MASK);
+        mix(across(upper), across(lower), v & MASK)
     }
 
     /// The next coarser level by a 2 × 2 box.
-    fn halved(&self, finest: [usize; 2]) -> Self {
+    fn halved(&self, finest: [usize; 2], wrap: bool) -> Self {
         let (width, height) = (self.width.div_ceil(2), self.height.div_ceil(2));
         let mut texels = Vec::with_capacity(width * height);
         for y in 0..height {
@@ -125,17 +189,18 @@ impl Level {
                 let at = |dx: usize, dy: usize| {
                     let column = (2 * x + dx).min(self.width - 1);
                     let row = (2 * y + dy).min(self.height - 1);
-                    u32::from(self.texels[row * self.width + column])
+                    u32::from(self.texels[row * (self.width + 1) + column])
                 };
                 texels.push(((at(0, 0) + at(1, 0) + at(0, 1) + at(1, 1) + 2) / 4) as u8);
             }
         }
         let scale = [width as f32 / finest[0] as f32, height as f32 / finest[1] as f32];
-        Self { width, height, scale, texels }
+        Self::new([width, height], scale, &texels, wrap)
     }
 }
 
 /// The binary logarithm of a positive number to about 0.01, the same on every machine.
+#[inline]
 fn fast_log2(value: f32) -> f32 {
     let bits = value.to_bits();
     let exponent = ((bits >> 23) as i32 - 127) as f32;
