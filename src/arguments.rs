@@ -212,6 +212,11 @@ pub(crate) struct SimulateArguments {
     /// Standard deviation of the encoders in degrees, or none [default: the experiment's].
     #[arg(long, value_name = "D|none", value_parser = encoder_sigma)]
     pub encoder_sigma_deg: Option<EncoderArgument>,
+    /// Something that goes wrong, in seconds and SI units; may be given several times: camera-offset=S, joint-lag=S,
+    /// joint-start=S, image-gap=START,LENGTH, exposure=S, gyroscope-range=RAD/S, accelerometer-range=M/S²,
+    /// light=START,FACTOR, blank=START,LENGTH, slew=START,LENGTH, spin=START,LENGTH,RAD/S.
+    #[arg(long, value_name = "KEY=VALUE[,VALUE…]")]
+    pub disturb: Vec<String>,
 }
 
 /// Names of the experiments.

@@ -366,6 +366,9 @@ pub(crate) fn simulate(arguments: &SimulateArguments) -> Result<()> {
         Some(EncoderArgument::Sigma(sigma_deg)) => options.encoder_sigma_rad = Some(sigma_deg.to_radians()),
         None => {}
     }
+    for disturbance in &arguments.disturb {
+        options.disturbances.set(disturbance)?;
+    }
     let mut progress = Progress::new();
     let summary = simulation::simulate(&options, &arguments.output, &mut |at| {
         let share = at.images_done as f64 / at.images_total.max(1) as f64;

@@ -57,6 +57,8 @@ pub(crate) struct LookAround {
     pub(crate) pitch_rad: [f64; 2],
     /// How far the roll swings about level.
     pub(crate) roll_rad: f64,
+    /// From when and for how long the heading is swung to and fro as fast as the motors follow.
+    pub(crate) slew_s: Option<[f64; 2]>,
     waves: [Wave; 3],
 }
 
@@ -67,13 +69,28 @@ impl LookAround {
             yaw_rad: yaw_deg.map(f64::to_radians),
             pitch_rad: pitch_deg.map(f64::to_radians),
             roll_rad: roll_deg.to_radians(),
+            slew_s: None,
             waves: [Wave::new(random, 11.3), Wave::new(random, 9.1), Wave::new(random, 7.3)],
         }
     }
 
+    /// A triangle wave of 60° to each side at the motors' largest rate while the camera is slewed.
+    fn slew_rad(&self, time_s: f64) -> f64 {
+        let Some([start_s, length_s]) = self.slew_s else { return 0.0 };
+        let since_s = time_s - start_s;
+        if since_s < 0.0 || since_s >= length_s {
+            return 0.0;
+        }
+        let amplitude = 60_f64.to_radians();
+        let quarters = since_s * Stabilizer::default().rate_rad_per_s / amplitude;
+        let place = (quarters + 1.0).rem_euclid(4.0);
+        amplitude * if place < 2.0 { place - 1.0 } else { 3.0 - place }
+    }
+
     /// The wanted orientation of the optical frame in the world.
     fn orientation(&self, followed_heading_rad: f64, time_s: f64) -> UnitQuaternion<f64> {
-        let yaw = followed_heading_rad + self.yaw_rad[0] + self.yaw_rad[1] * self.waves[0].at(time_s);
+        let wave = self.yaw_rad[1] * self.waves[0].at(time_s);
+        let yaw = followed_heading_rad + self.yaw_rad[0] + wave + self.slew_rad(time_s);
         let pitch = self.pitch_rad[0] + self.pitch_rad[1] * self.waves[1].at(time_s);
         let roll = self.roll_rad * self.waves[2].at(time_s);
         // Forward-left-up body with positive pitch up, then the optical axes.

@@ -4,6 +4,7 @@
 //! the picture with lag, and sensors measure with noise.
 //! Everything follows from a seed; the same options give the same bits whatever the thread count.
 
+mod disturbances;
 mod equipment;
 mod exercise;
 mod experiment;
@@ -22,12 +23,13 @@ mod tests;
 mod trajectory;
 mod world;
 
+pub use disturbances::Disturbances;
 pub use equipment::Lens;
 pub use exercise::{Exercise, JOINT_PERIOD_S, JointSwing, SWING_M, VehicleSwing, YAW_SWING_RAD};
 pub use experiment::{Environment, Experiment};
 pub use gimbal::JointMotion;
 pub use inertial::ImuBias;
-pub use options::{Disturbances, SimulationError, SimulationOptions, SimulationProgress, SimulationSummary};
+pub use options::{SimulationError, SimulationOptions, SimulationProgress, SimulationSummary};
 pub use simulate::simulate;
 pub use synthetic::{
     SyntheticFlight, SyntheticFrame, SyntheticMotion, SyntheticMount, SyntheticOptions, synthetic_tracks,

@@ -2,6 +2,7 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
+use super::disturbances::Disturbances;
 use super::equipment::Lens;
 use super::experiment::Experiment;
 use crate::flight_log::LogError;
@@ -37,25 +38,6 @@ pub struct SimulationOptions {
     pub jpeg_quality: u8,
     /// What goes wrong.
     pub disturbances: Disturbances,
-}
-
-/// What may go wrong on a flight; by default nothing.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Disturbances {
-    /// Kalibr's `timeshift_cam_imu`, untold to the given rig: `t_imu = t_cam + shift`.
-    pub camera_time_offset_s: f64,
-    /// How much later than measured the joint angles are stamped.
-    pub joint_lag_s: f64,
-    /// Joint angles are recorded from this time on.
-    pub joint_start_s: f64,
-    /// From when and for how long no image is recorded.
-    pub image_gap_s: Option<[f64; 2]>,
-    /// Exposure time: images are blurred by the motion during it.
-    pub exposure_s: f64,
-    /// Largest rate that the gyroscope can measure, in rad/s.
-    pub gyroscope_range_rad_per_s: Option<f64>,
-    /// Largest specific force that the accelerometer can measure, in m/s².
-    pub accelerometer_range_m_per_s2: Option<f64>,
 }
 
 impl SimulationOptions {
@@ -98,10 +80,7 @@ impl SimulationOptions {
         within("camera rate in Hz", self.camera_rate_hz, 0.1, 200.0)?;
         within("image noise in grey values", self.image_noise, 0.0, 100.0)?;
         within("JPEG quality", f64::from(self.jpeg_quality), 1.0, 100.0)?;
-        within("camera time offset in seconds", self.disturbances.camera_time_offset_s, -1.0, 1.0)?;
-        within("joint lag in seconds", self.disturbances.joint_lag_s, 0.0, 10.0)?;
-        within("start of the joint angles in seconds", self.disturbances.joint_start_s, 0.0, 3600.0)?;
-        within("exposure in seconds", self.disturbances.exposure_s, 0.0, 0.2)
+        self.disturbances.check()
     }
 }
 
@@ -136,6 +115,14 @@ pub struct SimulationProgress {
 /// Why a simulation ended without its files.
 #[derive(Debug, Error)]
 pub enum SimulationError {
+    /// A disturbance that cannot be read.
+    #[error("disturbance '{text}': {expected}")]
+    BadDisturbance {
+        /// As it was written.
+        text: String,
+        /// What was expected.
+        expected: String,
+    },
     /// An option out of its range.
     #[error("{option} is {value}: expected {low} to {high}")]
     BadOption {

@@ -8,6 +8,7 @@ use image::codecs::jpeg::JpegEncoder;
 use image::{ExtendedColorType, ImageEncoder as _};
 use rayon::prelude::*;
 
+use super::disturbances::{BLANK_GREY, during};
 use super::equipment::Equipment;
 use super::experiment::Experiment;
 use super::options::{SimulationError, SimulationOptions, SimulationProgress, SimulationSummary};
@@ -86,7 +87,7 @@ fn fly(options: &SimulationOptions, name: &str) -> Scenario {
     let random = |stream: u64| RandomStream::new(options.seed, stream + variant);
     let planned_s = (experiment.length_m() / PLANNED_M_PER_S).max(options.duration_s.unwrap_or(0.0));
     let flight = experiment.flight(4.0 * planned_s, &mut random(stream::ROUTE));
-    let trajectory = Trajectory::new(
+    let mut trajectory = Trajectory::new(
         flight.as_ref(),
         &mut random(stream::MANOEUVRES),
         &VehicleLimits::default(),
@@ -94,7 +95,11 @@ fn fly(options: &SimulationOptions, name: &str) -> Scenario {
         gravity_m_per_s2(),
     );
     let end_s = options.duration_s.unwrap_or_else(|| trajectory.time_of_length(experiment.length_m()));
-    let look = experiment.look_around(&mut random(stream::LOOK));
+    if let Some([start_s, length_s, rate_rad_per_s]) = options.disturbances.spin {
+        trajectory.spin([start_s, length_s], rate_rad_per_s);
+    }
+    let mut look = experiment.look_around(&mut random(stream::LOOK));
+    look.slew_s = options.disturbances.gimbal_slew_s;
     let mut scenario = Scenario::new(
         trajectory.cut(end_s),
         &look,
@@ -231,8 +236,7 @@ fn recordings(options: &SimulationOptions, scenario: &Scenario) -> Recordings {
             if stamp_s.max(stamp_s + shift_s) > duration_s {
                 break;
             }
-            let gap = options.disturbances.image_gap_s;
-            let lost = gap.is_some_and(|[start, length]| stamp_s >= start && stamp_s < start + length);
+            let lost = during(options.disturbances.image_gap_s, stamp_s);
             if stamp_s + shift_s >= 0.0 && !lost {
                 shots.push(Shot { camera, frame_index, stamp_ns: ns_from_seconds(stamp_s) });
             }
@@ -307,13 +311,26 @@ impl<'a> Studio<'a> {
         let time_s = seconds_from_ns(shot.stamp_ns) + disturbances.camera_time_offset_s;
         picture.clear();
         picture.resize(view.pixels(), 0.0);
-        let steps = if disturbances.exposure_s > 0.0 { BLUR_STEPS } else { 1 };
+        let steps = match disturbances.exposure_s {
+            _ if disturbances.blank_at(time_s) => {
+                picture.fill(BLANK_GREY);
+                0
+            }
+            exposure_s if exposure_s > 0.0 => BLUR_STEPS,
+            _ => 1,
+        };
         for step in 0..steps {
             // The stamp is the middle of the exposure.
             let place = (step as f64 + 0.5) / steps as f64 - 0.5;
             let at_s = (time_s + place * disturbances.exposure_s).clamp(0.0, self.scenario.trajectory.duration_s());
             let pose = self.scenario.world_from_camera(camera, at_s);
             self.renderer.render(view, &pose, 1.0 / steps as f32, workspace, picture);
+        }
+        let light = disturbances.light_at(time_s) as f32;
+        if light != 1.0 {
+            for grey in picture.iter_mut() {
+                *grey *= light;
+            }
         }
         let image = sensor.expose(picture, shot.frame_index, time_s);
         let mut jpeg = Vec::with_capacity(image.pixels.len() / 4);

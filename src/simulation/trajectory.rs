@@ -129,6 +129,14 @@ impl Trajectory {
         }
     }
 
+    /// Turns the vehicle about the vertical for a stretch of start and length in seconds, beyond what it turns anyway.
+    pub(crate) fn spin(&mut self, [start_s, length_s]: [f64; 2], rate_rad_per_s: f64) {
+        for index in 0..self.heading_rad.points.len() {
+            let time_s = self.heading_rad.time_of_point(index);
+            self.heading_rad.points[index].x += rate_rad_per_s * (time_s - start_s).clamp(0.0, length_s.max(0.0));
+        }
+    }
+
     /// How long the flight is.
     pub fn duration_s(&self) -> f64 {
         self.duration_s

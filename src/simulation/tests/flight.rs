@@ -2,6 +2,7 @@ use nalgebra::{SVector, Vector3};
 
 use super::super::equipment::{Equipment, GRAVITY_M_PER_S2, Lens};
 use super::super::experiment::Experiment;
+use super::super::gimbal::{JointMotion, Stabilizer, joints, true_chain};
 use super::super::random::RandomStream;
 use super::super::scenario::{Scenario, ScenarioOptions, stream};
 use super::super::spline::Spline;
@@ -125,4 +126,29 @@ fn gimbal_stays_within_its_stops_and_steadies_the_picture() {
             assert!(roll_squares[0] < 0.2 * roll_squares[1], "{roll_squares:?}");
         }
     }
+}
+
+#[test]
+fn a_slewed_gimbal_and_a_spun_vehicle_turn_as_fast_as_asked_and_only_then() {
+    let mut trajectory = experiment_trajectory(Experiment::T3, 1, 12.0);
+    let plain = trajectory.clone();
+    trajectory.spin([5.0, 2.0], 3.0);
+    let rate = |trajectory: &Trajectory| (trajectory.at(6.05).heading_rad - trajectory.at(5.95).heading_rad) / 0.1;
+    let added = rate(&trajectory) - rate(&plain);
+    // The flight's spline rounds the ends of the stretch, which reaches a little into its middle.
+    assert!((added / 3.0 - 1.0).abs() < 0.05, "{added} rad/s");
+    for (time_s, turned_rad) in [(1.0, 0.0), (10.0, 6.0)] {
+        let turned = trajectory.at(time_s).heading_rad - plain.at(time_s).heading_rad;
+        assert!((turned - turned_rad).abs() < 1e-9, "{turned} rad at {time_s} s");
+    }
+
+    let mut random = RandomStream::new(1, 5);
+    let chain = true_chain(&mut random);
+    let mut look = Experiment::T3.look_around(&mut random);
+    look.slew_s = Some([5.0, 4.0]);
+    let motion = JointMotion::fly(&plain, &chain, &joints(), &look, &Stabilizer::default());
+    let yaw_rate = |time_s: f64| ((motion.at(time_s + 0.01)[0] - motion.at(time_s - 0.01)[0]) / 0.02).abs();
+    let largest = |from_s: f64| (0..300).map(|step| yaw_rate(from_s + 0.01 * f64::from(step))).fold(0.0, f64::max);
+    assert!(largest(5.5) > 150_f64.to_radians(), "{} rad/s", largest(5.5));
+    assert!(largest(1.0) < 100_f64.to_radians(), "{} rad/s", largest(1.0));
 }

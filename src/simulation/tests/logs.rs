@@ -1,7 +1,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use super::super::{Experiment, SimulationError, SimulationOptions, SimulationSummary, simulate};
+use super::super::{Disturbances, Experiment, SimulationError, SimulationOptions, SimulationSummary, simulate};
 use crate::flight_log::{FlightLog, FrameStream, Rig};
 
 fn small(experiment: Experiment) -> SimulationOptions {
@@ -100,4 +100,59 @@ fn impossible_options_are_refused_by_name() {
     let lost = folder.path().join("no such folder").join("x.mcap");
     let error = simulate(&small(Experiment::T1), &lost, &mut |_| ()).unwrap_err();
     assert!(matches!(error, SimulationError::Log(_)), "{error}");
+}
+
+#[test]
+fn disturbances_are_read_as_they_are_written_on_the_command_line() {
+    let mut disturbances = Disturbances::default();
+    for text in ["camera-offset=0.01", "image-gap=3,0.5", "light=4,0.5", "blank=5,1.5", "slew=6,2", "spin=7,1,3.5"] {
+        disturbances.set(text).unwrap();
+    }
+    let expected = Disturbances {
+        camera_time_offset_s: 0.01,
+        image_gap_s: Some([3.0, 0.5]),
+        light_change: Some([4.0, 0.5]),
+        blank_s: Some([5.0, 1.5]),
+        gimbal_slew_s: Some([6.0, 2.0]),
+        spin: Some([7.0, 1.0, 3.5]),
+        ..Disturbances::default()
+    };
+    assert_eq!(disturbances, expected);
+    for (text, words) in [
+        ("blanc=1,2", "expected one of camera-offset"),
+        ("blank=1", "2 numbers"),
+        ("blank=1,x", "numbers after 'blank='"),
+        ("blank", "expected one of"),
+    ] {
+        let message = disturbances.set(text).unwrap_err().to_string();
+        assert!(message.contains(words) && message.contains(text), "{message}");
+    }
+}
+
+#[test]
+fn light_and_fog_change_the_pictures_only_while_they_last() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut options = small(Experiment::T1);
+    let means_and_spreads = |options: &SimulationOptions| -> Vec<(f64, f64)> {
+        let log = Arc::new(FlightLog::open(&write(options, folder.path()).log).unwrap());
+        let rig = Rig::for_log(&log, None).unwrap();
+        let frames = FrameStream::new(log, &rig, "cam0", 0.0, None).unwrap();
+        let statistics = frames.map(|frame| {
+            let greys: Vec<f64> = frame.image.pixels.iter().map(|pixel| f64::from(*pixel)).collect();
+            let mean = greys.iter().sum::<f64>() / greys.len() as f64;
+            (mean, (greys.iter().map(|grey| (grey - mean).powi(2)).sum::<f64>() / greys.len() as f64).sqrt())
+        });
+        statistics.collect()
+    };
+    let plain = means_and_spreads(&options);
+    options.disturbances.light_change = Some([0.4, 0.5]);
+    options.disturbances.blank_s = Some([0.75, 0.1]);
+    let disturbed = means_and_spreads(&options);
+    assert_eq!(plain[..7], disturbed[..7]);
+    // Frame 8 is taken at 0.403 s, just after the light has halved; frames 15 and 16 see fog.
+    let share = disturbed[8].0 / plain[8].0;
+    assert!((share - 0.5).abs() < 0.02, "{share}");
+    assert!(disturbed[12].0 / plain[12].0 > share + 0.05);
+    assert!(disturbed[15].1 < 10.0 && plain[15].1 > 20.0, "{:?} {:?}", disturbed[15], plain[15]);
+    assert!(disturbed[17].1 > 12.0);
 }

@@ -1,0 +1,114 @@
+//! What goes wrong on a flight, on purpose.
+
+use super::options::SimulationError;
+
+/// What may go wrong on a flight; by default nothing.
+///
+/// Times are seconds since the log began.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Disturbances {
+    /// Kalibr's `timeshift_cam_imu`, untold to the given rig: `t_imu = t_cam + shift`.
+    pub camera_time_offset_s: f64,
+    /// How much later than measured the joint angles are stamped.
+    pub joint_lag_s: f64,
+    /// Joint angles are recorded from this time on.
+    pub joint_start_s: f64,
+    /// From when and for how long no image is recorded.
+    pub image_gap_s: Option<[f64; 2]>,
+    /// Exposure time: images are blurred by the motion during it.
+    pub exposure_s: f64,
+    /// Largest rate that the gyroscope can measure, in rad/s.
+    pub gyroscope_range_rad_per_s: Option<f64>,
+    /// Largest specific force that the accelerometer can measure, in m/s².
+    pub accelerometer_range_m_per_s2: Option<f64>,
+    /// When the light changes (a cloud, a shadow's edge) and by which factor; the cameras' automatic exposure makes it
+    /// good with a time constant of 0.4 s.
+    pub light_change: Option<[f64; 2]>,
+    /// From when and for how long the cameras see an even grey, as in fog or close before a bare wall; their noise stays.
+    pub blank_s: Option<[f64; 2]>,
+    /// From when and for how long the operator swings the gimbal's heading to and fro, 60° to each side, as fast as the
+    /// motors follow (200°/s).
+    pub gimbal_slew_s: Option<[f64; 2]>,
+    /// From when and for how long the vehicle turns about the vertical, and how fast (in rad/s), beyond the limits that
+    /// experiments keep to.
+    pub spin: Option<[f64; 3]>,
+}
+
+/// Time constant of the cameras' automatic exposure.
+const AUTO_EXPOSURE_S: f64 = 0.4;
+/// Grey of what the cameras see while there is nothing to see.
+pub(crate) const BLANK_GREY: f32 = 150.0;
+
+/// What [`Disturbances::set`] reads, for messages and help.
+const KEYS: &str = "camera-offset=S, joint-lag=S, joint-start=S, image-gap=START,LENGTH, exposure=S, \
+                    gyroscope-range=RAD/S, accelerometer-range=M/S², light=START,FACTOR, blank=START,LENGTH, \
+                    slew=START,LENGTH or spin=START,LENGTH,RAD/S";
+
+impl Disturbances {
+    /// Adds one disturbance written as `KEY=VALUE[,VALUE…]`, in seconds and SI units, as on the command line.
+    ///
+    /// # Errors
+    /// When there is no such key, or it wants other values.
+    pub fn set(&mut self, text: &str) -> Result<(), SimulationError> {
+        let bad = |expected: String| SimulationError::BadDisturbance { text: text.to_owned(), expected };
+        let unknown = || bad(format!("expected one of {KEYS}"));
+        let (key, values) = text.split_once('=').ok_or_else(unknown)?;
+        let values: Vec<f64> = values
+            .split(',')
+            .map(|value| value.parse::<f64>().ok().filter(|value| value.is_finite()))
+            .collect::<Option<_>>()
+            .ok_or_else(|| bad(format!("expected numbers after '{key}='")))?;
+        let wants = |count: usize| bad(format!("'{key}' wants {count} numbers between commas, not {}", values.len()));
+        let one = || <[f64; 1]>::try_from(values.as_slice()).map(|[value]| value).map_err(|_length| wants(1));
+        let two = || <[f64; 2]>::try_from(values.as_slice()).map_err(|_length| wants(2));
+        match key {
+            "camera-offset" => self.camera_time_offset_s = one()?,
+            "joint-lag" => self.joint_lag_s = one()?,
+            "joint-start" => self.joint_start_s = one()?,
+            "image-gap" => self.image_gap_s = Some(two()?),
+            "exposure" => self.exposure_s = one()?,
+            "gyroscope-range" => self.gyroscope_range_rad_per_s = Some(one()?),
+            "accelerometer-range" => self.accelerometer_range_m_per_s2 = Some(one()?),
+            "light" => self.light_change = Some(two()?),
+            "blank" => self.blank_s = Some(two()?),
+            "slew" => self.gimbal_slew_s = Some(two()?),
+            "spin" => self.spin = Some(<[f64; 3]>::try_from(values.as_slice()).map_err(|_length| wants(3))?),
+            _ => return Err(unknown()),
+        }
+        Ok(())
+    }
+
+    /// Refuses what cannot be flown or recorded.
+    pub(crate) fn check(&self) -> Result<(), SimulationError> {
+        let within = |option: &'static str, value: f64, low: f64, high: f64| {
+            let inside = value >= low && value <= high;
+            inside.then_some(()).ok_or(SimulationError::BadOption { option, value, low, high })
+        };
+        within("camera time offset in seconds", self.camera_time_offset_s, -1.0, 1.0)?;
+        within("joint lag in seconds", self.joint_lag_s, 0.0, 10.0)?;
+        within("start of the joint angles in seconds", self.joint_start_s, 0.0, 3600.0)?;
+        within("exposure in seconds", self.exposure_s, 0.0, 0.2)?;
+        within("range of the gyroscope in rad/s", self.gyroscope_range_rad_per_s.unwrap_or(1.0), 1e-3, 1e3)?;
+        within("range of the accelerometer in m/s²", self.accelerometer_range_m_per_s2.unwrap_or(1.0), 1e-3, 1e4)?;
+        within("factor of the light", self.light_change.map_or(1.0, |[_, factor]| factor), 0.01, 100.0)?;
+        within("rate of the spin in rad/s", self.spin.map_or(0.0, |[_, _, rate]| rate), -6.0, 6.0)
+    }
+
+    /// How much brighter pictures are at a time than without a change of the light.
+    pub(crate) fn light_at(&self, time_s: f64) -> f64 {
+        match self.light_change {
+            Some([start_s, factor]) if time_s >= start_s => factor.powf((-(time_s - start_s) / AUTO_EXPOSURE_S).exp()),
+            _ => 1.0,
+        }
+    }
+
+    /// Whether there is nothing to see at a time.
+    pub(crate) fn blank_at(&self, time_s: f64) -> bool {
+        during(self.blank_s, time_s)
+    }
+}
+
+/// Whether a time lies in a stretch of start and length.
+pub(crate) fn during(stretch_s: Option<[f64; 2]>, time_s: f64) -> bool {
+    stretch_s.is_some_and(|[start_s, length_s]| time_s >= start_s && time_s < start_s + length_s)
+}
