@@ -1,23 +1,35 @@
-//! One flight: simulated, estimated by every run, summed up.
+//! One flight of an experiment, estimated by every run.
 
-use std::fs;
 use std::path::Path;
 use std::time::Instant;
 
 use anyhow::Result;
 use dcvins::calibration::CalibrationOptions;
-use dcvins::export::{CalibrationReport, RunSummary, report_calibration, summarize, write_calibration};
-use dcvins::session::{self, CalibrationRequest, SessionPlan, SessionRequest};
-use dcvins::simulation::{Experiment, SimulationOptions, simulate};
+use dcvins::export::{CalibrationReport, report_calibration, write_calibration};
+use dcvins::session::{self, CalibrationRequest};
+use dcvins::simulation::Experiment;
 
-/// The runs over each flight: the camera on the gimbal with online calibration, the same with the given chain held
-/// fixed, and the static camera.
-pub(crate) const RUNS: [&str; 3] = ["auto", "minimal:calibrate=off,name=fixed", "static"];
+use crate::drive::{Driven, Variant, drive};
+use crate::logs::{Archive, Log};
+
+/// The runs over each flight, by name and specification: the camera on the gimbal with online calibration, the same with
+/// the given chain held fixed, the static camera, and both cameras in one window.
+pub(crate) const RUNS: [(&str, &str); 4] = [
+    ("online", "auto"),
+    ("given chain fixed", "minimal:calibrate=off,name=fixed"),
+    ("static", "static"),
+    ("cluster", "cluster"),
+];
+/// Indices of [`RUNS`].
+pub(crate) const ONLINE: usize = 0;
+pub(crate) const FIXED: usize = 1;
+pub(crate) const STATIC: usize = 2;
+pub(crate) const CLUSTER: usize = 3;
 
 /// The offline baseline: calibrated from the same flight, then flown with that calibration held fixed.
 pub(crate) struct Offline {
     pub(crate) calibration: CalibrationReport,
-    pub(crate) run: RunSummary,
+    pub(crate) run: Driven,
     pub(crate) calibrated_in_s: f64,
 }
 
@@ -28,116 +40,109 @@ pub(crate) struct Flight {
     pub(crate) duration_s: f64,
     pub(crate) path_length_m: f64,
     /// In the order of [`RUNS`].
-    pub(crate) runs: Vec<RunSummary>,
+    pub(crate) runs: Vec<Driven>,
     /// For T4 alone, as in the paper; `Err` tells why it could not be calibrated.
     pub(crate) offline: Option<Result<Offline, String>>,
-    pub(crate) simulated_in_s: f64,
+    pub(crate) simulated_in_s: Option<f64>,
     pub(crate) estimated_in_s: f64,
 }
 
 impl Flight {
-    /// ATE of each run in metres, as far as there is one.
-    pub(crate) fn ate_m(&self, run: usize) -> Option<f64> {
-        Some(self.runs[run].accuracy.as_ref()?.ate_rmse_m)
+    /// Estimates the log of an experiment.
+    pub(crate) fn fly(archive: &Archive, experiment: Experiment, seed: u64, duration_s: Option<f64>) -> Result<Self> {
+        let log = archive.flight(experiment, seed, duration_s)?;
+        let begin = Instant::now();
+        let variants = RUNS.map(|(name, spec)| Variant { analysed: true, ..Variant::plain(name, spec) });
+        let runs = drive(&log, None, &variants)?;
+        let estimated_in_s = begin.elapsed().as_secs_f64();
+        let offline = (experiment == Experiment::T4)
+            .then(|| calibrate_and_fly(&log, &archive.folder).map_err(|error| format!("{error:#}")));
+        Ok(Self {
+            experiment,
+            seed,
+            duration_s: log.duration_s,
+            path_length_m: runs.iter().map(|run| run.summary.length_m).fold(0.0, f64::max),
+            runs,
+            offline,
+            simulated_in_s: log.simulated_in_s,
+            estimated_in_s,
+        })
     }
 
-    /// Mean error of the chain at the end: metres and degrees.
-    pub(crate) fn chain_error(&self, run: usize) -> Option<(f64, f64)> {
-        let error = self.runs[run].calibration.chain_error.as_ref()?;
-        Some((error.translation_mean_m, error.rotation_mean_rad.to_degrees()))
+    /// The flights of an experiment.
+    pub(crate) fn of(flights: &[Self], experiment: Experiment) -> impl Iterator<Item = &Self> {
+        flights.iter().filter(move |flight| flight.experiment == experiment)
     }
 
+    /// The experiments that were flown, in their order.
+    pub(crate) fn experiments(flights: &[Self]) -> impl Iterator<Item = Experiment> {
+        Experiment::ALL.into_iter().filter(|experiment| Self::of(flights, *experiment).next().is_some())
+    }
+
+    /// Every experiment with every run: index and name.
+    pub(crate) fn experiments_and_runs(flights: &[Self]) -> impl Iterator<Item = (Experiment, usize, &'static str)> {
+        let runs = |experiment| RUNS.iter().enumerate().map(move |(run, (name, _))| (experiment, run, *name));
+        Self::experiments(flights).flat_map(runs)
+    }
+
+    /// What a person who waits wants to know.
     pub(crate) fn in_a_line(&self) -> String {
-        let ates: Vec<String> = self
-            .runs
-            .iter()
-            .enumerate()
-            .map(|(run, summary)| {
-                let ate = self.ate_m(run).map_or_else(|| "none".to_owned(), |ate_m| format!("{ate_m:.3} m"));
-                format!("{} {ate} ({} restarts)", summary.run, summary.frames.restarts)
-            })
-            .collect();
-        let offline = match &self.offline {
-            None => String::new(),
-            Some(Err(error)) => format!(", offline failed: {error}"),
-            Some(Ok(offline)) => {
-                let ate = offline.run.accuracy.as_ref();
-                ate.map_or_else(|| ", offline none".to_owned(), |ate| format!(", offline {:.3} m", ate.ate_rmse_m))
-            }
-        };
-        let chain = self
-            .chain_error(0)
-            .map_or_else(String::new, |(metres, degrees)| format!("; chain {:.1} mm {degrees:.2}°", metres * 1e3));
-        format!(
-            "{} seed {}: {:.0} s, {:.0} m; ATE {}{offline}{chain}; simulated in {:.0} s, estimated in {:.0} s",
+        let mut parts = vec![format!(
+            "{} seed {}: {:.0} s, {:.0} m; ATE",
             self.experiment.name(),
             self.seed,
             self.duration_s,
-            self.path_length_m,
-            ates.join(", "),
-            self.simulated_in_s,
-            self.estimated_in_s
-        )
+            self.path_length_m
+        )];
+        parts.extend(RUNS.iter().zip(&self.runs).map(|((name, _), run)| format!("{name} {},", run.ate_in_words())));
+        match &self.offline {
+            None => {}
+            Some(Err(error)) => parts.push(format!("offline failed: {error},")),
+            Some(Ok(offline)) => parts.push(format!("offline {},", offline.run.ate_in_words())),
+        }
+        if let Some((metres, degrees)) = self.runs[ONLINE].chain_error() {
+            parts.push(format!("chain {:.1} mm {degrees:.2}°,", metres * 1e3));
+        }
+        parts.push(format!("estimated in {:.0} s", self.estimated_in_s));
+        parts.join(" ")
     }
 }
 
-/// Writes the log of an experiment and estimates it.
-pub(crate) fn fly(
-    experiment: Experiment,
-    seed: u64,
-    duration_s: Option<f64>,
-    folder: &Path,
-    keep: bool,
-) -> Result<Flight> {
-    let mut options = SimulationOptions::new(experiment);
-    options.seed = seed;
-    options.duration_s = duration_s;
-    let log_path = folder.join(format!("{}-{seed}.mcap", experiment.name()));
-    let begin = Instant::now();
-    let simulated = simulate(&options, &log_path, &mut |_| ())?;
-    let simulated_in_s = begin.elapsed().as_secs_f64();
+impl Driven {
+    /// Root mean square of the position error, as far as there is one.
+    pub(crate) fn ate_m(&self) -> Option<f64> {
+        Some(self.summary.accuracy.as_ref()?.ate_rmse_m)
+    }
 
-    let begin = Instant::now();
-    let specs = RUNS.iter().map(|spec| spec.parse()).collect::<Result<_, _>>()?;
-    let request = SessionRequest { log_path: log_path.clone(), specs, ..SessionRequest::default() };
-    let plan = SessionPlan::open(&request)?;
-    let recording = session::compute(&plan, None, &mut |_| ())?;
-    let runs = recording.runs.iter().map(|run| summarize(&recording, run, true)).collect();
-    let estimated_in_s = begin.elapsed().as_secs_f64();
-    let offline = (experiment == Experiment::T4)
-        .then(|| calibrate_and_fly(&log_path, folder).map_err(|error| format!("{error:#}")));
-    if !keep {
-        for file in [&simulated.log, &simulated.rig, &simulated.truth] {
-            fs::remove_file(file)?;
+    /// Mean error of the chain at the end: metres and degrees.
+    pub(crate) fn chain_error(&self) -> Option<(f64, f64)> {
+        let error = self.summary.calibration.chain_error.as_ref()?;
+        Some((error.translation_mean_m, error.rotation_mean_rad.to_degrees()))
+    }
+
+    fn ate_in_words(&self) -> String {
+        let ate = self.ate_m().map_or_else(|| "none".to_owned(), |ate_m| format!("{ate_m:.3} m"));
+        match self.summary.frames.restarts {
+            0 => ate,
+            restarts => format!("{ate} ({restarts} restarts: {})", self.failures.join("; ")),
         }
     }
-    Ok(Flight {
-        experiment,
-        seed,
-        duration_s: simulated.duration_s,
-        path_length_m: simulated.path_length_m,
-        runs,
-        offline,
-        simulated_in_s,
-        estimated_in_s,
-    })
 }
 
 /// The paper's other way: calibrate first, then fly with the result as it is.
-fn calibrate_and_fly(log_path: &Path, folder: &Path) -> Result<Offline> {
+fn calibrate_and_fly(log: &Log, folder: &Path) -> Result<Offline> {
     let begin = Instant::now();
-    let request = CalibrationRequest { log_path: log_path.to_owned(), ..CalibrationRequest::default() };
+    let request = CalibrationRequest {
+        log_path: log.path.clone(),
+        duration_s: Some(log.duration_s),
+        ..CalibrationRequest::default()
+    };
     let calibrated = session::calibrate(&request, &CalibrationOptions::default(), &mut |_| ())?;
     let calibration = report_calibration(&calibrated);
-    let rig_folder = folder.join("offline");
+    let rig_folder = folder.join(format!("offline-{}-{}", log.experiment.name(), log.seed));
     write_calibration(&calibrated, &calibration, &rig_folder)?;
     let calibrated_in_s = begin.elapsed().as_secs_f64();
-    let request = SessionRequest {
-        log_path: log_path.to_owned(),
-        rig_path: Some(rig_folder.join("rig.yaml")),
-        specs: vec!["minimal:calibrate=off,name=offline".parse()?],
-        ..SessionRequest::default()
-    };
-    let recording = session::compute(&SessionPlan::open(&request)?, None, &mut |_| ())?;
-    Ok(Offline { calibration, run: summarize(&recording, &recording.runs[0], true), calibrated_in_s })
+    let variant = Variant::plain("offline", "minimal:calibrate=off,name=offline");
+    let mut runs = drive(log, Some(&rig_folder.join("rig.yaml")), &[variant])?;
+    Ok(Offline { calibration, run: runs.swap_remove(0), calibrated_in_s })
 }

@@ -26,4 +26,4 @@ pub use picture::{PANEL_NAMES, PictureError, PictureOptions, Renderer, draw_pane
 pub use recent_files::RecentFiles;
 pub use run_files::{RunFileOptions, write_run};
 pub use structure::KnownLossSummary;
-pub use summary::{RunSummary, StageSummary, TimingSummary, log_name, summarize};
+pub use summary::{CalibrationSummary, RunSummary, StageSummary, TimingSummary, log_name, summarize};

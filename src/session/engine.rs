@@ -85,7 +85,11 @@ impl Engine {
                 queues.entry(&camera.key).or_default().push(queue);
                 frames.push((camera.key.clone(), receiver));
             }
-            let engine = RunEngine::new(estimator_config(&plan.rig, spec)?);
+            let mut config = estimator_config(&plan.rig, spec)?;
+            if let Some(change) = plan.changes.get(run) {
+                change(&mut config);
+            }
+            let engine = RunEngine::new(config, plan.keep_linearization_every);
             let results = sender.clone();
             self.threads.push(spawn(format!("estimator {run}"), move || {
                 run_thread(run, engine, Instants::new(frames), &results);

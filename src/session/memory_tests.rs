@@ -37,7 +37,7 @@ fn recorded(flight: &SyntheticFlight, spec: &str) -> RunRecord {
     let spec: super::RunSpec = spec.parse().unwrap();
     let config = estimator_config(&flight.given_rig, &spec).unwrap();
     let sigma_rad = config.encoder_sigma_rad.unwrap();
-    let mut engine = RunEngine::new(config);
+    let mut engine = RunEngine::new(config, None);
     let mut run = RunRecord::new(spec, "cam0".to_owned());
     for frame in &flight.frames {
         run.push(engine.step(&Instant::of_one(Arc::new(tracked(frame, sigma_rad)))));

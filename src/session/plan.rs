@@ -6,6 +6,7 @@ use std::sync::Arc;
 use thiserror::Error;
 
 use super::spec::{ParameterizationChoice, RunSpec, distinct_labels};
+use crate::estimator::EstimatorConfig;
 use crate::flight_log::rig::{CameraMount, CameraRig};
 use crate::flight_log::{FlightLog, LogError, Rig};
 
@@ -78,6 +79,10 @@ pub struct SessionPlan {
     pub start_s: f64,
     /// Seconds to read.
     pub duration_s: Option<f64>,
+    /// Changes to the runs' estimators beyond what a specification can say, by run; a bench tries options with them.
+    pub changes: Vec<fn(&mut EstimatorConfig)>,
+    /// One report in so many frames keeps its linearization for whoever wants covariances; `None` keeps none.
+    pub keep_linearization_every: Option<usize>,
 }
 
 impl SessionPlan {
@@ -106,6 +111,8 @@ impl SessionPlan {
             runs,
             start_s: request.start_s,
             duration_s: request.duration_s,
+            changes: Vec::new(),
+            keep_linearization_every: None,
         })
     }
 }

@@ -19,14 +19,17 @@ pub(super) struct RunEngine {
     joints_free: bool,
     /// What a camera without an image has seen.
     nothing: Arc<TrackedFrame>,
+    /// One report in so many frames keeps its linearization.
+    keep_linearization_every: Option<usize>,
 }
 
 impl RunEngine {
     /// A fresh estimator.
-    pub(super) fn new(config: EstimatorConfig) -> Self {
+    pub(super) fn new(config: EstimatorConfig, keep_linearization_every: Option<usize>) -> Self {
         let has_joints = !config.chain.links.is_empty();
         let joints_free = has_joints && !config.use_encoder;
-        Self { estimator: Estimator::new(config), has_joints, joints_free, nothing: Arc::default() }
+        let estimator = Estimator::new(config);
+        Self { estimator, has_joints, joints_free, nothing: Arc::default(), keep_linearization_every }
     }
 
     /// The images of one instant through the estimator and the observability analysis.
@@ -52,7 +55,7 @@ impl RunEngine {
         StepRecord { report, rank, tracks: main, truth: instant.truth(), log_time_ns: instant.log_time_ns() }
     }
 
-    /// Analyses the step's linearization and lets go of it: one a frame would fill the memory.
+    /// Analyses the step's linearization and lets go of it unless it is to be kept: one a frame would fill the memory.
     fn rank(&self, report: &mut StepReport) -> Option<RankReport> {
         let linearization = report.linearization.take()?;
         let angles: Vec<&[f64]> = report.window.iter().map(|frame| frame.joint_angles_rad.as_slice()).collect();
@@ -61,6 +64,9 @@ impl RunEngine {
         let chain = Chain::from_classical(&calibration.classical, parameterization);
         let rigid = RIGID_COLUMNS * calibration.rigid_cameras.len();
         let chain = if chain.dof() + rigid == calibration.names.len() { chain } else { chain.without_joint_offsets() };
-        analyse(&linearization, &chain, &angles, self.joints_free)
+        let rank = analyse(&linearization, &chain, &angles, self.joints_free);
+        let kept = self.keep_linearization_every.is_some_and(|every| report.frame_index.is_multiple_of(every));
+        report.linearization = kept.then_some(linearization);
+        rank
     }
 }

@@ -1,0 +1,104 @@
+//! What each part of the estimator is worth: runs that differ from the default by one option, over the same pieces.
+
+use anyhow::Result;
+use dcvins::estimator::{EstimatorConfig, LandmarkModel, RobustLoss, TrackContinuation};
+use dcvins::simulation::Experiment;
+
+use crate::drive::{Driven, Variant, drive};
+use crate::logs::Archive;
+use crate::table::{Table, ratios, written};
+
+/// Length of a piece: long enough for the chain to settle, short enough for many.
+const PIECE_S: f64 = 40.0;
+
+/// The default and what differs from it by one option.
+fn variants() -> Vec<Variant> {
+    let changed = |name, change: fn(&mut EstimatorConfig)| Variant { change, ..Variant::plain(name, "auto") };
+    vec![
+        Variant::plain("as it is", "auto"),
+        changed("pixel σ 0.5 px", |config| config.options.pixel_sigma_px = 0.5),
+        changed("pixel σ 2 px", |config| config.options.pixel_sigma_px = 2.0),
+        changed("no robust loss", |config| config.options.loss = RobustLoss::None),
+        changed("Huber at 1 σ", |config| config.options.loss = RobustLoss::Huber(1.0)),
+        changed("Huber at 3 σ", |config| config.options.loss = RobustLoss::Huber(3.0)),
+        changed("Cauchy at 2 σ", |config| config.options.loss = RobustLoss::Cauchy(2.0)),
+        changed("no first estimates", |config| {
+            config.options.first_estimates = false;
+            config.options.calibration_first_estimates = false;
+        }),
+        changed("no first estimates of the calibration", |config| config.options.calibration_first_estimates = false),
+        changed("no prior on the chain", |config| config.chain_prior = None),
+        changed("anchor's measurement exact", |config| {
+            config.options.landmark_model = LandmarkModel::InverseDistance;
+        }),
+        changed("every measurement used once", |config| {
+            config.options.track_continuation = TrackContinuation::UseOnce;
+        }),
+        changed("anchor's measurement forgotten", |config| {
+            config.options.track_continuation = TrackContinuation::ForgetAnchor;
+        }),
+        changed("12 iterations", |config| config.options.iterations = 12),
+        changed("inertial noise × 2", |config| config.options.imu_noise_factor = 2.0),
+        changed("encoders believed twice as good", |config| {
+            config.encoder_sigma_rad = config.encoder_sigma_rad.map(|sigma| 0.5 * sigma);
+        }),
+        Variant::plain("without encoders", "auto:encoder=off"),
+        Variant::plain("calibration held fixed", "auto:calibrate=off"),
+        Variant::plain("window of 15", "auto:window=15"),
+        Variant::plain("classical", "classical"),
+        Variant::plain("minimal as printed", "minimal"),
+        Variant::plain("minimal, swapped", "minimal-swapped"),
+        Variant::plain("product of exponentials", "poe"),
+    ]
+}
+
+/// Flies the variants over the first seconds of an experiment's flights and writes what is known after each.
+pub(crate) fn fly(
+    archive: &Archive,
+    experiment: Experiment,
+    seeds: &[u64],
+    progress: &mut dyn FnMut(&Table) -> Result<()>,
+) -> Result<Table> {
+    let variants = variants();
+    let mut pieces: Vec<Vec<Driven>> = Vec::new();
+    for seed in seeds {
+        let log = match archive.flight(experiment, *seed, Some(PIECE_S)) {
+            Ok(log) => log,
+            Err(_) if !archive.render => continue,
+            Err(error) => return Err(error),
+        };
+        pieces.push(drive(&log, None, &variants)?);
+        progress(&table(experiment, &variants, &pieces))?;
+    }
+    Ok(table(experiment, &variants, &pieces))
+}
+
+fn table(experiment: Experiment, variants: &[Variant], pieces: &[Vec<Driven>]) -> Table {
+    let mut table = Table::new(
+        if experiment == Experiment::T4 { "ablation_t4" } else { "ablation" },
+        format!(
+            "Ablation: the first {PIECE_S} s of {} flights of {}; ratios to the first row on the same flight, geometric \
+             mean [lowest, highest]",
+            pieces.len(),
+            experiment.name()
+        ),
+        &["what differs", "ATE m", "× ATE", "× chain mm", "× chain °", "restarts", "lost"],
+    );
+    for (index, variant) in variants.iter().enumerate() {
+        let against = |value: fn(&Driven) -> Option<f64>| -> Vec<f64> {
+            pieces.iter().filter_map(|runs| Some(value(&runs[index])? / value(&runs[0])?)).collect()
+        };
+        let errors: Vec<f64> = pieces.iter().filter_map(|runs| runs[index].ate_m()).collect();
+        let restarts: usize = pieces.iter().map(|runs| runs[index].summary.frames.restarts).sum();
+        table.row([
+            variant.name.to_owned(),
+            written(errors.clone(), 3),
+            ratios(&against(Driven::ate_m)),
+            ratios(&against(|run| run.chain_error().map(|(metres, _)| metres))),
+            ratios(&against(|run| run.chain_error().map(|(_, degrees)| degrees))),
+            restarts.to_string(),
+            (pieces.len() - errors.len()).to_string(),
+        ]);
+    }
+    table
+}

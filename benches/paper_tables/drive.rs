@@ -1,0 +1,113 @@
+//! Estimators over a log, with settings that no run specification has and a look at their covariances.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use anyhow::Result;
+use dcvins::estimator::{EstimatorConfig, EventKind};
+use dcvins::export::{RunSummary, summarize};
+use dcvins::geometry::RigidTransform;
+use dcvins::session::{self, Recording, RunRecord, SessionPlan, SessionRequest};
+
+use crate::consistency::{CalibrationSample, PoseSample, calibration_sample, pose_sample};
+use crate::logs::Log;
+
+/// Frames between two looks at the covariances: about as long as a window, so that samples hardly share measurements.
+const SAMPLED_FRAMES: usize = 60;
+
+/// One estimator over a log.
+#[derive(Clone)]
+pub(crate) struct Variant {
+    pub(crate) name: &'static str,
+    pub(crate) spec: &'static str,
+    /// Whether the covariances are wanted as well.
+    pub(crate) analysed: bool,
+    pub(crate) change: fn(&mut EstimatorConfig),
+}
+
+impl Variant {
+    /// A run as its specification says.
+    pub(crate) fn plain(name: &'static str, spec: &'static str) -> Self {
+        Self { name, spec, analysed: false, change: |_| () }
+    }
+}
+
+/// What came of one estimator.
+pub(crate) struct Driven {
+    pub(crate) summary: RunSummary,
+    pub(crate) poses: Vec<PoseSample>,
+    /// The last one.
+    pub(crate) calibration: Option<CalibrationSample>,
+    /// Mean over the steps of χ² per residual after the solve, by factor.
+    pub(crate) chi2: BTreeMap<&'static str, f64>,
+    /// Seconds without a pose after the first one.
+    pub(crate) lost_s: f64,
+    /// Messages of the failures.
+    pub(crate) failures: Vec<String>,
+}
+
+/// Flies the variants over a log, with another rig than the log's if one is given; the results in the variants' order.
+pub(crate) fn drive(log: &Log, rig_path: Option<&Path>, variants: &[Variant]) -> Result<Vec<Driven>> {
+    let recording = session::compute(&plan(log, rig_path, variants)?, None, &mut |_| ())?;
+    Ok(recording.runs.iter().map(|run| driven(&recording, run)).collect())
+}
+
+fn plan(log: &Log, rig_path: Option<&Path>, variants: &[Variant]) -> Result<SessionPlan> {
+    let request = |spec: &str| -> Result<SessionRequest> {
+        Ok(SessionRequest {
+            log_path: log.path.clone(),
+            rig_path: rig_path.map(Path::to_owned),
+            specs: vec![spec.parse()?],
+            duration_s: Some(log.duration_s),
+            ..SessionRequest::default()
+        })
+    };
+    let mut plan = SessionPlan::open(&request(variants[0].spec)?)?;
+    // More runs than fit side by side in a window, so one by one.
+    plan.runs.clear();
+    for variant in variants {
+        let mut runs = SessionPlan::open(&request(variant.spec)?)?.runs;
+        plan.runs.append(&mut runs);
+    }
+    plan.changes = variants.iter().map(|variant| variant.change).collect();
+    plan.keep_linearization_every = variants.iter().any(|variant| variant.analysed).then_some(SAMPLED_FRAMES);
+    Ok(plan)
+}
+
+fn driven(recording: &Recording, run: &RunRecord) -> Driven {
+    let truths: BTreeMap<i64, RigidTransform> =
+        run.steps.iter().filter_map(|step| Some((step.report.stamp_ns, step.truth?))).collect();
+    let mut poses: Vec<PoseSample> = run.steps.iter().filter_map(|step| pose_sample(&step.report)).collect();
+    poses.retain_mut(|sample| sample.judge(&truths));
+    let truth = recording.truth_rig.as_ref().and_then(|rig| rig.chain_of_camera(&run.camera_key));
+    let last = run.steps.iter().rev().find_map(|step| calibration_sample(&step.report));
+
+    let mut sums: BTreeMap<&'static str, (f64, usize)> = BTreeMap::new();
+    let mut failures = Vec::new();
+    let (mut before_ns, mut lost_ns) = (None, 0);
+    for report in run.steps.iter().map(|step| &step.report) {
+        for part in report.residuals.iter().filter(|part| part.count > 0) {
+            let sum = sums.entry(part.factor).or_default();
+            *sum = (sum.0 + part.chi2_after / part.count as f64, sum.1 + 1);
+        }
+        let failed = report.events.iter().filter(|event| event.kind == EventKind::Failure);
+        failures.extend(failed.map(|event| format!("{:.1} s: {}", report.stamp_ns as f64 * 1e-9, event.message)));
+        let estimated = report.newest().is_some();
+        if let Some(before_ns) = before_ns
+            && !estimated
+        {
+            lost_ns += report.stamp_ns - before_ns;
+        }
+        if before_ns.is_some() || estimated {
+            before_ns = Some(report.stamp_ns);
+        }
+    }
+    Driven {
+        summary: summarize(recording, run, true),
+        poses,
+        calibration: last.zip(truth).and_then(|(sample, truth)| sample.judged(&truth)),
+        chi2: sums.into_iter().map(|(factor, (sum, count))| (factor, sum / count as f64)).collect(),
+        lost_s: lost_ns as f64 * 1e-9,
+        failures,
+    }
+}
