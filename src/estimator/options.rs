@@ -62,6 +62,8 @@ pub enum TrackContinuation {
 pub struct EstimatorOptions {
     /// Number of keyframes in the window beside the newest frame.
     pub window: usize,
+    /// The first window grows to this many times `window` before anything is marginalized.
+    pub first_window_factor: usize,
     /// Standard deviation of a tracked pixel, per coordinate.
     pub pixel_sigma_px: f64,
     /// Loss on the visual residuals.
@@ -88,9 +90,14 @@ pub struct EstimatorOptions {
     pub keyframe_new_share: f64,
     /// Features whose mean reprojection error exceeds this are rejected, in pixels.
     pub outlier_px: f64,
-    /// Jacobians of states that the prior holds are evaluated where it was linearized.
-    pub first_estimates: bool,
-    /// The same for the static calibration's columns.
+    /// Jacobians of states that the prior holds are evaluated where it was linearized, as long as attitude and joint
+    /// angles are no farther from there, in radians; 0 evaluates all at the present estimate.
+    ///
+    /// First estimates keep what the window cannot see from being learned by mistake. A poor one, as after a start with a
+    /// chain that is degrees off, pulls the solution to a wrong place instead: a hundredth of a radian makes a derivative
+    /// wrong by a percent.
+    pub first_estimate_reach_rad: f64,
+    /// Jacobians of the static calibration's columns are evaluated where the prior was linearized, however far.
     pub calibration_first_estimates: bool,
     /// Standard deviation of the accelerometer's bias at the start, in m/s².
     pub accelerometer_bias_sigma: f64,
@@ -120,6 +127,7 @@ impl Default for EstimatorOptions {
     fn default() -> Self {
         Self {
             window: 10,
+            first_window_factor: 2,
             pixel_sigma_px: 1.0,
             loss: RobustLoss::Huber(1.5),
             landmark_model: LandmarkModel::BearingAndInverseDistance,
@@ -133,7 +141,7 @@ impl Default for EstimatorOptions {
             keyframe_min_tracked: 50,
             keyframe_new_share: 0.5,
             outlier_px: 3.0,
-            first_estimates: true,
+            first_estimate_reach_rad: 0.01,
             calibration_first_estimates: true,
             accelerometer_bias_sigma: 0.5,
             gyroscope_bias_sigma: 0.02,

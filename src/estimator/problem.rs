@@ -46,7 +46,7 @@ pub(super) struct Problem<'a> {
     pub(super) frames: &'a [Frame],
     pub(super) prior: Option<&'a Prior>,
     pub(super) start: Option<&'a StartPrior>,
-    pub(super) first_estimates: bool,
+    pub(super) first_estimate_reach_rad: f64,
     pub(super) calibration_first_estimates: bool,
 }
 
@@ -91,7 +91,7 @@ impl Problem<'_> {
         self.frames
             .iter()
             .zip(&estimate.frames)
-            .map(|(frame, current)| frame.linearization_point(current, self.first_estimates).clone())
+            .map(|(frame, current)| frame.linearization_point(current, self.first_estimate_reach_rad).clone())
             .collect()
     }
 

@@ -230,7 +230,7 @@ impl Estimator {
         let leading = self.calibration.leading();
         let mut seen = Vec::new();
         let world = self.world_of(solution);
-        let views = &solution.frames[solution.frames.len().saturating_sub(self.config.options.window + 1)..];
+        let views = &solution.frames[solution.frames.len().saturating_sub(self.room() + 1)..];
         let mut imu = Preintegration::new(self.noise, solution.bias);
         let mut mounts = Vec::new();
         for waiting in std::mem::take(&mut self.waiting) {

@@ -123,7 +123,7 @@ impl SupposedWindow {
             frames: &frames,
             prior: None,
             start: None,
-            first_estimates: false,
+            first_estimate_reach_rad: 0.0,
             calibration_first_estimates: false,
         };
         let numbers: Vec<usize> = (0..frames.len()).collect();

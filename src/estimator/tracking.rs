@@ -26,6 +26,9 @@ const FARTHEST_USUAL_M: f64 = 100.0;
 /// A vehicle at rest gives a keyframe this often, so that inertial intervals stay short enough to be integrated again.
 const KEYFRAME_AT_REST_NS: i64 = 5_000_000_000;
 
+/// A window that is larger than usual shrinks by one frame per keyframe.
+const MOST_MARGINALIZED_AT_ONCE: usize = 2;
+
 /// Pixel residuals by track and sighting.
 pub(super) type TrackResiduals = Vec<Vec<Option<Vector2<f64>>>>;
 
@@ -150,7 +153,7 @@ impl Estimator {
             frames: &self.frames,
             prior: self.prior.as_ref(),
             start: self.start.as_ref(),
-            first_estimates: options.first_estimates,
+            first_estimate_reach_rad: options.first_estimate_reach_rad,
             calibration_first_estimates: options.calibration_first_estimates,
         }
     }
@@ -330,15 +333,28 @@ impl Estimator {
                 threshold: None,
             });
             self.drop_second_newest();
-        } else if self.frames.len() > self.config.options.window {
+            return;
+        }
+        for _ in 0..MOST_MARGINALIZED_AT_ONCE {
+            let room = self.room();
+            if self.frames.len() <= room {
+                break;
+            }
             events.push(Event {
                 kind: EventKind::OldestMarginalized,
                 message: format!("image {} marginalized: the window is full", self.frames[0].index),
                 value: Some(self.frames.len() as f64),
-                threshold: Some(self.config.options.window as f64),
+                threshold: Some(room as f64),
             });
             self.marginalize_oldest();
         }
+    }
+
+    /// How many frames may stay. The first window is larger: what is marginalized is linearized for good, and the chain has
+    /// to come near its true values first.
+    pub(super) fn room(&self) -> usize {
+        let options = &self.config.options;
+        if self.prior.is_none() { options.window * options.first_window_factor } else { options.window }
     }
 
     /// The unknowns of the frames and of the calibration as they are.

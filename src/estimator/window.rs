@@ -10,6 +10,7 @@ use super::reprojection::Landmark;
 use super::standstill::Rest;
 use crate::flight_log::JointAngles;
 use crate::frontend::FeatureId;
+use crate::geometry::wrap_angle;
 
 /// The unknowns of one frame (Eq. 7).
 #[derive(Clone, Debug, PartialEq)]
@@ -44,6 +45,13 @@ impl FrameState {
             delta[POSE + joint] = angle - start;
         }
         delta
+    }
+
+    /// The largest of the turn of the vehicle and those of the joints from another state, in radians.
+    fn turn_from_rad(&self, other: &Self) -> f64 {
+        let vehicle = self.navigation.world_from_imu.rotation.angle_to(&other.navigation.world_from_imu.rotation);
+        let joints = self.joints_rad.iter().zip(&other.joints_rad);
+        joints.map(|(angle, start)| wrap_angle(angle - start).abs()).fold(vehicle, f64::max)
     }
 
     /// A step of the solver: states that the prior holds count their step from its linearization point, so that the
@@ -82,9 +90,10 @@ pub(super) struct Frame {
 }
 
 impl Frame {
-    /// The state at which derivatives are taken.
-    pub(super) fn linearization_point<'a>(&'a self, current: &'a FrameState, first_estimates: bool) -> &'a FrameState {
-        if first_estimates { self.first_estimate.as_ref().unwrap_or(current) } else { current }
+    /// The state at which derivatives are taken: the first estimate while `current` is within `reach_rad` of it, in attitude
+    /// and joint angles.
+    pub(super) fn linearization_point<'a>(&'a self, current: &'a FrameState, reach_rad: f64) -> &'a FrameState {
+        self.first_estimate.as_ref().filter(|first| current.turn_from_rad(first) <= reach_rad).unwrap_or(current)
     }
 }
 

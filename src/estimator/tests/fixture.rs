@@ -146,6 +146,7 @@ fn window_of(flight: &SyntheticFlight, rigid: Option<&SyntheticFlight>, config: 
 /// Marginalizes the oldest frame, so that there is a prior and there are first estimates.
 pub(super) fn marginalize_once(estimator: &mut Estimator) {
     estimator.config.options.window = estimator.frames.len() - 1;
+    estimator.config.options.first_window_factor = 1;
     estimator.make_room(&mut Vec::new());
     assert!(estimator.prior.is_some());
 }
