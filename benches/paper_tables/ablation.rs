@@ -23,9 +23,11 @@ fn variants() -> Vec<Variant> {
         changed("Huber at 3 σ", |config| config.options.loss = RobustLoss::Huber(3.0)),
         changed("Cauchy at 2 σ", |config| config.options.loss = RobustLoss::Cauchy(2.0)),
         changed("no first estimates", |config| {
-            config.options.first_estimates = false;
+            config.options.first_estimate_reach_rad = 0.0;
             config.options.calibration_first_estimates = false;
         }),
+        changed("first estimates however far", |config| config.options.first_estimate_reach_rad = f64::INFINITY),
+        changed("first window as the later ones", |config| config.options.first_window_factor = 1),
         changed("no first estimates of the calibration", |config| config.options.calibration_first_estimates = false),
         changed("no prior on the chain", |config| config.chain_prior = None),
         changed("anchor's measurement exact", |config| {
