@@ -103,6 +103,12 @@ impl Estimator {
         self.config.options.keep_linearization = keep;
     }
 
+    /// Most steps that the solver tries from the next image on: with fewer than a step took, that step ends as it was in
+    /// between.
+    pub fn set_iterations(&mut self, iterations: usize) {
+        self.config.options.iterations = iterations;
+    }
+
     /// The chain as it is estimated now, in the classical form.
     pub fn classical_chain(&self) -> ClassicalChain {
         self.calibration.of(MAIN).chain().to_classical()

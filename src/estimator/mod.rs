@@ -48,8 +48,8 @@ pub use supposed::{JointKnowledge, PoseKnowledge, SupposedFrame, SupposedLandmar
 pub(crate) use visual::damped_inverse;
 
 pub use report::{
-    CalibrationEstimate, ColumnBlock, ColumnGroup, Event, EventKind, FeatureReport, FrameStateReport, IterationReport,
-    LandmarkReport, Linearization, ObservationReport, Phase, ResidualSummary, StageTimes, StepReport,
+    CalibrationEstimate, ColumnBlock, ColumnGroup, Event, EventKind, FeatureCounts, FeatureReport, FrameStateReport,
+    IterationReport, LandmarkReport, Linearization, ObservationReport, Phase, ResidualSummary, StageTimes, StepReport,
 };
 
 use nalgebra::Vector3;

@@ -113,6 +113,12 @@ impl Prior {
         self.residual.len()
     }
 
+    /// Bytes on the heap.
+    pub(super) fn heap_bytes(&self) -> usize {
+        let numbers = self.jacobian.len() + self.residual.len() + self.hessian.len() + self.gradient.len();
+        self.columns.capacity() * size_of::<PriorColumn>() + numbers * size_of::<f64>()
+    }
+
     /// The residuals at an estimate; `deviation` is `x ⊟ x₀` in the window's layout.
     pub(super) fn residual(&self, layout: &Layout, deviation: &DVector<f64>) -> DVector<f64> {
         &self.residual + &self.jacobian * self.gather(layout, deviation)

@@ -44,6 +44,11 @@ pub enum EventKind {
 }
 
 impl EventKind {
+    /// Whether it tells that the step made the first window.
+    pub fn begins_window(self) -> bool {
+        matches!(self, Self::InitializedFromMotion | Self::InitializedFromStandstill)
+    }
+
     /// Whether it is rare enough to jump to, and for the lane of events; nearly every frame has one of the others, which
     /// have lanes of their own or none.
     pub fn is_notable(self) -> bool {
@@ -158,6 +163,33 @@ pub struct FeatureReport {
     pub observations: Observations,
     /// Rejected as an outlier after this solve.
     pub rejected: bool,
+}
+
+/// How many features took part in the solve; known of every step, also where the features themselves are not kept.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct FeatureCounts {
+    /// Features that took part.
+    pub solved: usize,
+    /// Of them rejected as outliers after the solve.
+    pub rejected: usize,
+    /// All their observations in the window.
+    pub observations: usize,
+}
+
+impl FeatureCounts {
+    /// Of the features of a report.
+    pub fn of(features: &[FeatureReport]) -> Self {
+        Self {
+            solved: features.len(),
+            rejected: features.iter().filter(|feature| feature.rejected).count(),
+            observations: features.iter().map(|feature| feature.observations.len()).sum(),
+        }
+    }
+
+    /// Features that took part and were not rejected.
+    pub fn inliers(&self) -> usize {
+        self.solved - self.rejected
+    }
 }
 
 /// A feature as a point of the world, for drawing.
@@ -281,6 +313,8 @@ pub struct StepReport {
     pub calibration: CalibrationEstimate,
     /// Features that took part in the solve.
     pub features: Vec<FeatureReport>,
+    /// How many they are.
+    pub counts: FeatureCounts,
     /// Points of the map in the world.
     pub landmarks: Vec<LandmarkReport>,
     /// χ² by kind of factor.

@@ -9,8 +9,8 @@ use super::problem::Costs;
 use super::solver;
 use super::tracking::{SolvedWindow, TrackResiduals};
 use super::{
-    CalibrationEstimate, FeatureReport, FrameStateReport, LandmarkReport, ObservationReport, Phase, ResidualSummary,
-    StageTimes, StepInput, StepReport,
+    CalibrationEstimate, FeatureCounts, FeatureReport, FrameStateReport, LandmarkReport, ObservationReport, Phase,
+    ResidualSummary, StageTimes, StepInput, StepReport,
 };
 
 impl Estimator {
@@ -25,6 +25,7 @@ impl Estimator {
             window: Vec::new(),
             calibration: self.calibration_report(),
             features: Vec::new(),
+            counts: FeatureCounts::default(),
             landmarks: Vec::new(),
             residuals: Vec::new(),
             reprojection_rms_before_px: 0.0,
@@ -45,6 +46,7 @@ impl Estimator {
         report.window = self.window_report();
         report.keyframe = self.frames.last().is_some_and(|frame| frame.keyframe);
         report.features = self.feature_reports(solved);
+        report.counts = FeatureCounts::of(&report.features);
         report.landmarks = self.landmark_reports(solved);
         report.residuals = self.residual_summaries(solved);
         report.reprojection_rms_before_px =

@@ -34,6 +34,15 @@ pub(super) struct WaitingFrame {
     imu: Vec<ImuSample>,
 }
 
+impl WaitingFrame {
+    /// Bytes that it takes.
+    pub(super) fn bytes(&self) -> usize {
+        let features: usize = self.features.iter().map(|seen| seen.capacity() * size_of::<TrackedFeature>()).sum();
+        let encoder = self.encoder.as_ref().map_or(0, JointAngles::heap_bytes);
+        size_of::<Self>() + features + encoder + self.imu.capacity() * size_of::<ImuSample>()
+    }
+}
+
 /// Longest hole in the inertial samples that frames on both sides may be used together.
 const LONGEST_HOLE_S: f64 = 0.1;
 /// Standard deviation with which the joint angles are fitted to the mounts that the initialization found.

@@ -165,7 +165,7 @@ pub(super) fn frames_csv(run: &RunRecord, timing: bool) -> String {
             Phase::Initializing => "initializing",
             Phase::Tracking => "tracking",
         };
-        let inliers = report.features.iter().filter(|feature| !feature.rejected).count();
+        let inliers = report.counts.inliers();
         write!(
             text,
             ",{},{},{phase},{},{},{},{},{inliers},{}",

@@ -36,6 +36,14 @@ pub struct JointAngles {
     pub lasting_sigmas_rad: Vec<f64>,
 }
 
+impl JointAngles {
+    /// Bytes on the heap.
+    pub fn heap_bytes(&self) -> usize {
+        let numbers = self.angles_rad.capacity() + self.sigmas_rad.capacity() + self.lasting_sigmas_rad.capacity();
+        numbers * size_of::<f64>()
+    }
+}
+
 /// A ground-truth pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseSample {

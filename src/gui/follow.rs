@@ -8,8 +8,8 @@ use crate::session::{RunRecord, StepRecord};
 #[derive(Debug, Default)]
 pub(crate) struct Follower {
     count: usize,
-    /// The last step read: held, so that its address cannot come back as another step's.
-    last: Option<Arc<StepRecord>>,
+    /// The run that was read.
+    run: Option<u64>,
 }
 
 /// What is new in a run.
@@ -23,14 +23,11 @@ pub(crate) struct News<'a> {
 impl Follower {
     /// The steps that have come since the last call.
     pub(crate) fn news<'a>(&mut self, run: &'a RunRecord) -> News<'a> {
-        let same = match (&self.last, self.count.checked_sub(1).and_then(|index| run.steps.get(index))) {
-            (Some(last), Some(step)) => Arc::ptr_eq(last, step),
-            (None, None) => true,
-            _ => false,
-        };
+        // Steps that were read may be kept in outline later; they are the same steps.
+        let same = self.count <= run.steps.len() && self.run.is_none_or(|id| id == run.id);
         let read = if same { self.count } else { 0 };
         self.count = run.steps.len();
-        self.last = run.steps.last().cloned();
+        self.run = Some(run.id);
         News { restarted: !same, steps: &run.steps[read..] }
     }
 }

@@ -41,7 +41,7 @@ use std::sync::Arc;
 use self::theme::Theme;
 use crate::flight_log::GrayImage;
 use crate::frontend::FeatureId;
-use crate::session::{Command, Recording};
+use crate::session::{Command, Recording, SolverPosition};
 
 /// Gives the images of the log's cameras, by camera key and number in the stream.
 pub trait ImageSource {
@@ -73,11 +73,16 @@ pub struct Playback {
     pub loop_range_ns: Option<(i64, i64)>,
     /// Marked instants, in time order.
     pub markers_ns: Vec<i64>,
+    /// Where in the solver's work the step at the cursor is shown, `None` at its end.
+    pub solver: Option<SolverPosition>,
+    /// Whether steps at the cursor are being taken again.
+    pub retaking: bool,
 }
 
 impl Default for Playback {
     fn default() -> Self {
-        Self { playing: false, speed: 1.0, loop_range_ns: None, markers_ns: Vec::new() }
+        let (loop_range_ns, markers_ns) = (None, Vec::new());
+        Self { playing: false, speed: 1.0, loop_range_ns, markers_ns, solver: None, retaking: false }
     }
 }
 

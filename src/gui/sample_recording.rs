@@ -14,16 +14,15 @@ use super::sample_calibration::{calibration_at, rank_at};
 use super::sample_images::SampleImages;
 use crate::camera::{CameraModel, Distortion, Projection};
 use crate::estimator::{
-    Event, EventKind, FeatureReport, FrameStateReport, IterationReport, LandmarkReport, ObservationReport, Phase,
-    ResidualSummary, StageTimes, StepReport,
+    Event, EventKind, FeatureCounts, FeatureReport, FrameStateReport, IterationReport, LandmarkReport,
+    ObservationReport, Phase, ResidualSummary, StageTimes, StepReport,
 };
 use crate::flight_log::rig::{CameraMount, CameraRig, ChainPrior, GimbalRig, ImuNoise, ImuRig, Joint};
 use crate::flight_log::{LogWarning, Rig};
 use crate::frontend::{FeatureId, FrontEndStatistics, TrackedFeature, TrackedFrame};
 use crate::geometry::{RigidTransform, SplitMix64, so3};
 use crate::gimbal::{ClassicalChain, DhLink};
-use crate::session::accuracy::AlignmentSums;
-use crate::session::{Recording, RunMemory, RunRecord, StepRecord};
+use crate::session::{Recording, RunRecord, StepRecord};
 
 /// Nanoseconds between two images (20 Hz).
 pub(crate) const FRAME_PERIOD_NS: i64 = 50_000_000;
@@ -89,6 +88,7 @@ pub(crate) fn sample_recording_of(frame_count: usize, run_names: &[&str]) -> Rec
             stamp_ns: 6_000_000_000,
             message: "no IMU sample for 0.034 s at 6.00 s; bridged by interpolation".to_owned(),
         }],
+        memory_budget_bytes: crate::session::DEFAULT_MEMORY_BUDGET_BYTES,
     }
 }
 
@@ -347,19 +347,14 @@ fn sample_run(
                 tracks: Arc::clone(&tracks[index]),
                 truth: Some(flight[index].world_from_imu),
                 log_time_ns: index as i64 * FRAME_PERIOD_NS + 19_000_000,
+                outlined: false,
             })
         })
         .collect();
-    RunRecord {
-        spec: name.parse().expect("the sample's runs are named after parameterizations"),
-        camera_key: "cam0".to_owned(),
-        steps,
-        finished: true,
-        error: None,
-        alignment: Some(true_from_estimate),
-        alignment_sums: AlignmentSums::default(),
-        memory: RunMemory::default(),
-    }
+    let spec = name.parse().expect("the sample's runs are named after parameterizations");
+    let mut run = RunRecord::new(spec, "cam0".to_owned());
+    (run.steps, run.finished, run.alignment) = (steps, true, Some(true_from_estimate));
+    run
 }
 
 /// How the made-up estimate errs.
@@ -397,6 +392,7 @@ fn waiting_report(index: usize, calibration: crate::estimator::CalibrationEstima
         window: Vec::new(),
         calibration,
         features: Vec::new(),
+        counts: FeatureCounts::default(),
         landmarks: Vec::new(),
         residuals: Vec::new(),
         reprojection_rms_before_px: f64::NAN,
@@ -470,6 +466,7 @@ fn tracking_report(
         reprojection_rms_after_px: rms(|observation| observation.residual_after_px),
         window,
         calibration,
+        counts: FeatureCounts::of(&features),
         features,
         landmarks,
         residuals: [

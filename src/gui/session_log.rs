@@ -26,6 +26,8 @@ impl PlayingLog for Session {
             speed: self.speed().0,
             loop_range_ns: self.loop_range_ns(),
             markers_ns: self.markers_ns().to_vec(),
+            solver: self.solver_position(),
+            retaking: self.is_retaking(),
         }
     }
 

@@ -22,6 +22,11 @@ pub enum Command {
     },
     /// Move the cursor by whole frames, backwards when negative.
     StepFrames(i64),
+    /// Look at the step at the cursor one iteration of its solver further, or back; beyond its ends at its neighbours.
+    StepIteration {
+        /// Direction.
+        forward: bool,
+    },
     /// Move the cursor to the next event (`forward`) or the previous one.
     JumpToEvent {
         /// Direction.

@@ -11,9 +11,11 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::{Builder, JoinHandle};
 
 use super::configuration::estimator_config;
+use super::history::History;
 use super::instants::Instants;
+use super::material::Material;
 use super::plan::{SessionError, SessionPlan, cameras_of_run};
-use super::recording::StepRecord;
+use super::recording::{Recording, StepRecord};
 use super::run_engine::RunEngine;
 use super::tracker::{CameraTracker, TrackedSensorFrame};
 use crate::flight_log::LogWarning;
@@ -66,15 +68,20 @@ impl Default for Engine {
 }
 
 impl Engine {
-    /// Starts every run of the plan.
-    pub(super) fn start(plan: &SessionPlan) -> Result<Self, SessionError> {
+    /// Starts every run of the plan; each keeps its way in the history of its record.
+    pub(super) fn start(plan: &SessionPlan, recording: &Recording) -> Result<Self, SessionError> {
         let mut engine = Self::default();
-        engine.start_runs(plan, &(0..plan.runs.len()).collect::<Vec<_>>())?;
+        engine.start_runs(plan, recording, &(0..plan.runs.len()).collect::<Vec<_>>())?;
         Ok(engine)
     }
 
     /// Starts the given runs of the plan from the begin of the log; runs that watch the same camera share one tracker.
-    pub(super) fn start_runs(&mut self, plan: &SessionPlan, runs: &[usize]) -> Result<(), SessionError> {
+    pub(super) fn start_runs(
+        &mut self,
+        plan: &SessionPlan,
+        recording: &Recording,
+        runs: &[usize],
+    ) -> Result<(), SessionError> {
         let Some(sender) = self.sender.clone() else { return Ok(()) };
         let mut queues: BTreeMap<&str, Vec<SyncSender<Arc<TrackedSensorFrame>>>> = BTreeMap::new();
         for &run in runs {
@@ -91,8 +98,9 @@ impl Engine {
             }
             let engine = RunEngine::new(config, plan.keep_linearization_every);
             let results = sender.clone();
+            let Some(history) = recording.runs.get(run).and_then(|record| record.history.clone()) else { continue };
             self.threads.push(spawn(format!("estimator {run}"), move || {
-                run_thread(run, engine, Instants::new(frames), &results);
+                run_thread(run, engine, Instants::new(frames), &history, &results);
             })?);
         }
         for (camera_key, queues) in queues {
@@ -166,9 +174,15 @@ fn track_thread(
 }
 
 /// Steps one estimator over the instants that come, and reports each step.
-fn run_thread(run: usize, mut engine: RunEngine, mut instants: Instants, results: &SyncSender<EngineMessage>) {
+fn run_thread(
+    run: usize,
+    mut engine: RunEngine,
+    mut instants: Instants,
+    history: &History,
+    results: &SyncSender<EngineMessage>,
+) {
     let mut error = None;
-    loop {
+    for step in 0.. {
         let instant = match instants.next() {
             Ok(Some(instant)) => instant,
             Ok(None) => break,
@@ -177,13 +191,16 @@ fn run_thread(run: usize, mut engine: RunEngine, mut instants: Instants, results
                 break;
             }
         };
-        let Ok(record) = catch_unwind(AssertUnwindSafe(|| engine.step(&instant))) else {
-            let time_s = crate::geometry::seconds_from_ns(instant.stamp_ns());
+        let material = Arc::new(Material::of(&instant));
+        history.before_step(step, &engine, &material);
+        history.materials().push(Arc::clone(&material));
+        let Ok(record) = catch_unwind(AssertUnwindSafe(|| engine.step(&material))) else {
+            let time_s = crate::geometry::seconds_from_ns(material.stamp_ns);
             error = Some(format!("internal error in the estimator at {time_s:.3} s; please report it with the log"));
             break;
         };
         if results.send(EngineMessage::Step { run, record: Box::new(record) }).is_err() {
-            return;
+            break;
         }
     }
     // Nobody listens any more when the session was closed.

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::RunRecord;
 use super::configuration::estimator_config;
 use super::instants::Instant;
+use super::material::Material;
 use super::run_engine::RunEngine;
 use super::tracker::TrackedSensorFrame;
 use crate::estimator::Phase;
@@ -40,7 +41,7 @@ fn recorded(flight: &SyntheticFlight, spec: &str) -> RunRecord {
     let mut engine = RunEngine::new(config, None);
     let mut run = RunRecord::new(spec, "cam0".to_owned());
     for frame in &flight.frames {
-        run.push(engine.step(&Instant::of_one(Arc::new(tracked(frame, sigma_rad)))));
+        run.push(engine.step(&Material::of(&Instant::of_one(Arc::new(tracked(frame, sigma_rad))))));
     }
     run
 }

@@ -8,14 +8,19 @@ mod calibrate;
 mod command;
 mod configuration;
 mod engine;
+mod history;
 mod image_rotations;
 mod instants;
+mod material;
 #[cfg(test)]
 mod memory_tests;
+mod outline;
 mod plan;
 mod playback;
 mod recording;
+mod retaking;
 mod run_engine;
+mod solver_trace;
 mod spec;
 mod stopwatch;
 #[cfg(test)]
@@ -25,10 +30,12 @@ mod tracker;
 pub use calibrate::{CalibrationRequest, CalibrationRun, CalibrationRunError, calibrate};
 pub use command::{Command, PlaybackSpeed};
 pub use engine::EngineMessage;
+pub use history::History;
 pub use image_rotations::image_rotations;
-pub use plan::{MAX_RUNS, SessionError, SessionPlan, SessionRequest};
+pub use plan::{DEFAULT_MEMORY_BUDGET_BYTES, MAX_RUNS, SessionError, SessionPlan, SessionRequest};
 pub use playback::Session;
 pub use recording::{Recording, RunMemory, RunRecord, StepRecord};
+pub use solver_trace::{SolverPosition, SolverTrace};
 pub use spec::{ParameterizationChoice, RunSpec, RunSpecError};
 pub use stopwatch::Stopwatch;
 
@@ -43,7 +50,7 @@ pub fn compute(
     on_step: &mut dyn FnMut(&Recording),
 ) -> Result<Recording, SessionError> {
     let mut recording = Recording::new(plan);
-    let mut engine = Engine::start(plan)?;
+    let mut engine = Engine::start(plan, &recording)?;
     engine.no_more_runs();
     while let Some(message) = engine.receive() {
         // Steps after the wanted time would depend on how the threads are scheduled.

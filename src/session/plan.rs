@@ -83,7 +83,13 @@ pub struct SessionPlan {
     pub changes: Vec<fn(&mut EstimatorConfig)>,
     /// One report in so many frames keeps its linearization for whoever wants covariances; `None` keeps none.
     pub keep_linearization_every: Option<usize>,
+    /// How much memory what is recorded may take, in bytes: beyond it, steps are kept in outline and taken again when
+    /// somebody looks at them.
+    pub memory_budget_bytes: usize,
 }
+
+/// What a recording may take, so that the whole process of a played log stays under 1.5 GiB.
+pub const DEFAULT_MEMORY_BUDGET_BYTES: usize = 1200 << 20;
 
 impl SessionPlan {
     /// Opens the log and its rigs and finds each run's camera.
@@ -113,6 +119,7 @@ impl SessionPlan {
             duration_s: request.duration_s,
             changes: Vec::new(),
             keep_linearization_every: None,
+            memory_budget_bytes: DEFAULT_MEMORY_BUDGET_BYTES,
         })
     }
 }

@@ -9,6 +9,8 @@ use super::command::{Command, PlaybackSpeed};
 use super::engine::Engine;
 use super::plan::{MAX_RUNS, SessionError, SessionPlan, SessionRequest, cameras_of_run};
 use super::recording::{Recording, RunRecord};
+use super::retaking::{Detail, Retaking, Wish};
+use super::solver_trace::SolverPosition;
 use super::spec::{RunSpec, distinct_labels};
 use crate::flight_log::{GrayImage, ImageReader};
 use crate::geometry::ns_from_seconds;
@@ -20,9 +22,14 @@ struct SharedRecording {
     generation: AtomicU64,
 }
 
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    // What these hold is only ever replaced whole.
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 impl SharedRecording {
     fn lock(&self) -> MutexGuard<'_, Arc<Recording>> {
-        self.recording.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.recording)
     }
 
     fn change(&self, change: impl FnOnce(&mut Recording)) {
@@ -40,6 +47,9 @@ pub struct Session {
     shared: Arc<SharedRecording>,
     engine: Engine,
     collector: Option<JoinHandle<()>>,
+    retaking: Retaking,
+    /// Where in the solver's work the step at the cursor is looked at.
+    solver: Arc<Mutex<Option<SolverPosition>>>,
     images: ImageReader,
     cursor_ns: i64,
     playing: bool,
@@ -57,11 +67,10 @@ impl Session {
 
     /// Starts the runs of a plan.
     pub fn start(plan: SessionPlan) -> Result<Self, SessionError> {
-        let shared = Arc::new(SharedRecording {
-            recording: Mutex::new(Arc::new(Recording::new(&plan))),
-            generation: AtomicU64::new(1),
-        });
-        let mut engine = Engine::start(&plan)?;
+        let recording = Recording::new(&plan);
+        let mut engine = Engine::start(&plan, &recording)?;
+        let shared =
+            Arc::new(SharedRecording { recording: Mutex::new(Arc::new(recording)), generation: AtomicU64::new(1) });
         let receiver = engine.take_receiver();
         let target = Arc::clone(&shared);
         let collector = Builder::new()
@@ -72,6 +81,12 @@ impl Session {
                 }
             })
             .map_err(|source| SessionError::Thread { source })?;
+        let solver = Arc::new(Mutex::new(None));
+        let (target, position) = (Arc::clone(&shared), Arc::clone(&solver));
+        let retaking = Retaking::start(move |wish, retaken| {
+            let position = lock(&position).unwrap_or(SolverPosition::BeforeLast(0));
+            target.change(|recording| recording.take_retaken(wish, retaken, position));
+        })?;
         let images = ImageReader::new(Arc::clone(&plan.log), &plan.rig);
         Ok(Self {
             cursor_ns: ns_from_seconds(plan.start_s),
@@ -79,6 +94,8 @@ impl Session {
             shared,
             engine,
             collector: Some(collector),
+            retaking,
+            solver,
             images,
             playing: false,
             speed: PlaybackSpeed(1.0),
@@ -146,9 +163,13 @@ impl Session {
     /// Lets the cursor run for `elapsed_s` seconds of the wall; it waits where nothing is computed yet, goes round in a
     /// loop, and stops at the end.
     pub fn advance(&mut self, elapsed_s: f64) {
-        if !self.playing {
-            return;
+        if self.playing {
+            self.move_on(elapsed_s);
         }
+        self.look();
+    }
+
+    fn move_on(&mut self, elapsed_s: f64) {
         let recording = self.recording();
         let mut next_ns = self.cursor_ns + ns_from_seconds(elapsed_s * self.speed.0);
         if let Some((begin_ns, end_ns)) = self.loop_range_ns
@@ -169,6 +190,69 @@ impl Session {
 
     /// Does what a person asked for.
     pub fn apply(&mut self, command: Command) {
+        let cursor_ns = self.cursor_ns;
+        let iterating = matches!(command, Command::StepIteration { .. });
+        self.perform(command);
+        if self.cursor_ns != cursor_ns && !iterating {
+            *lock(&self.solver) = None;
+        }
+        self.look();
+    }
+
+    /// Waits until the steps at the cursor are there with everything.
+    pub fn settle(&self) {
+        self.look();
+        self.retaking.settle();
+    }
+
+    /// Whether steps at the cursor are being taken again.
+    pub fn is_retaking(&self) -> bool {
+        self.retaking.is_busy()
+    }
+
+    /// Where in the solver's work the step at the cursor is looked at, `None` at its end.
+    pub fn solver_position(&self) -> Option<SolverPosition> {
+        *lock(&self.solver)
+    }
+
+    /// Asks for what is needed to show the steps at the cursor, and forgets what is not needed any more.
+    fn look(&self) {
+        let recording = self.recording();
+        let solver = self.solver_position();
+        let mut wishes = Vec::new();
+        for run in &recording.runs {
+            let (Some(step), Some(history)) = (run.index_at(self.cursor_ns), &run.history) else { continue };
+            let wish = |detail| Wish { run: run.id, history: Arc::clone(history), step, detail };
+            if run.lacks(step) {
+                wishes.push(wish(Detail::Whole));
+            }
+            if solver.is_some() && run.trace.as_ref().is_none_or(|trace| trace.step != step) {
+                wishes.push(wish(Detail::Iterations));
+            }
+        }
+        self.retaking.want(wishes);
+        let stale = |run: &RunRecord| match (&run.trace, solver) {
+            (None, _) => false,
+            (Some(_), None) => true,
+            (Some(trace), Some(position)) => {
+                run.index_at(self.cursor_ns) != Some(trace.step) || trace.at != position.of(trace.iterations())
+            }
+        };
+        if recording.runs.iter().any(stale) {
+            let cursor_ns = self.cursor_ns;
+            self.shared.change(|recording| {
+                for run in &mut recording.runs {
+                    let here = run.index_at(cursor_ns);
+                    run.trace = run.trace.take().filter(|trace| Some(trace.step) == here).and_then(|mut trace| {
+                        trace.at = solver?.of(trace.iterations());
+                        Some(trace)
+                    });
+                }
+            });
+        }
+    }
+
+    fn perform(&mut self, command: Command) {
         match command {
             Command::TogglePlay if self.playing => self.playing = false,
             Command::Play | Command::TogglePlay => self.play(),
@@ -177,6 +261,7 @@ impl Session {
             Command::SetSpeed(_) => self.notices.push("The speed must be a positive number".to_owned()),
             Command::Seek { stamp_ns } => self.seek(stamp_ns),
             Command::StepFrames(count) => self.step_frames(count),
+            Command::StepIteration { forward } => self.step_iteration(forward),
             Command::JumpToEvent { forward } => self.jump_to_event(forward),
             Command::GoToStart => self.seek(self.first_stamp_ns()),
             Command::GoToEnd => self.seek(self.recording().last_stamp_ns()),
@@ -216,6 +301,24 @@ impl Session {
         self.cursor_ns = moved(&stamps_ns, self.cursor_ns, count).unwrap_or(self.cursor_ns);
     }
 
+    /// Goes through the solver's work of the step at the cursor, and on to the neighbouring steps.
+    fn step_iteration(&mut self, forward: bool) {
+        self.playing = false;
+        let recording = self.recording();
+        let steps = recording.runs.iter().filter_map(|run| run.steps.get(run.index_at(self.cursor_ns)?));
+        let iterations = steps.map(|step| step.report.iterations.len()).max().unwrap_or(0);
+        let position = self.solver_position().unwrap_or(SolverPosition::BeforeLast(0));
+        let next = position.moved(forward, iterations).or_else(|| {
+            let cursor_ns = self.cursor_ns;
+            self.step_frames(if forward { 1 } else { -1 });
+            let beyond = if forward { SolverPosition::AfterFirst(0) } else { SolverPosition::BeforeLast(0) };
+            (self.cursor_ns != cursor_ns).then_some(beyond)
+        });
+        if let Some(next) = next {
+            *lock(&self.solver) = Some(next);
+        }
+    }
+
     fn jump_to_event(&mut self, forward: bool) {
         self.playing = false;
         let recording = self.recording();
@@ -243,8 +346,8 @@ impl Session {
             let Some(spec) = specs.pop() else { return Ok(()) };
             let camera_key = cameras_of_run(&self.plan.rig, &spec)?.main.key.clone();
             self.plan.runs.push((spec.clone(), camera_key.clone()));
-            self.shared.change(|recording| recording.runs.push(RunRecord::new(spec, camera_key)));
-            self.engine.start_runs(&self.plan, &[self.plan.runs.len() - 1])
+            self.shared.change(|recording| recording.add_run(RunRecord::new(spec, camera_key)));
+            self.engine.start_runs(&self.plan, &self.recording(), &[self.plan.runs.len() - 1])
         })();
         if let Err(error) = result {
             self.notices.push(error.to_string());

@@ -1,14 +1,20 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::RunSpec;
 use super::accuracy::{Alignment, AlignmentSums};
 use super::engine::EngineMessage;
+use super::history::History;
+use super::material::tracks_bytes;
+use super::outline::Thinning;
 use super::plan::SessionPlan;
+use super::retaking::{Retaken, Wish};
+use super::solver_trace::{SolverPosition, SolverTrace};
 use crate::estimator::{CalibrationEstimate, StepReport, allocated_bytes, rigid_columns};
 use crate::flight_log::{LogWarning, Rig};
-use crate::frontend::{TrackedFeature, TrackedFrame};
+use crate::frontend::TrackedFrame;
 use crate::geometry::RigidTransform;
 use crate::gimbal::Chain;
 use crate::observability::RankReport;
@@ -26,6 +32,9 @@ pub struct StepRecord {
     pub truth: Option<RigidTransform>,
     /// Log time of the image since the log began, beside the report's header stamp.
     pub log_time_ns: i64,
+    /// Whether features, older frames of the window and most landmarks were let go to save memory; see
+    /// [`RunRecord::step_at`].
+    pub outlined: bool,
 }
 
 impl StepRecord {
@@ -41,9 +50,7 @@ impl StepRecord {
 
     /// Bytes of the tracks.
     pub fn tracks_bytes(&self) -> usize {
-        let features = &self.tracks.features;
-        allocated_bytes(size_of::<TrackedFrame>() + 2 * size_of::<usize>())
-            + allocated_bytes(features.capacity() * size_of::<TrackedFeature>())
+        tracks_bytes(&self.tracks)
     }
 }
 
@@ -54,13 +61,8 @@ pub struct RunMemory {
     pub own: usize,
     /// The tracks, which runs that watch the same camera share.
     pub tracks: usize,
-}
-
-impl RunMemory {
-    fn add(&mut self, step: &StepRecord) {
-        self.own += step.own_bytes();
-        self.tracks += step.tracks_bytes();
-    }
+    /// Number of steps that are kept in outline only.
+    pub outlined: usize,
 }
 
 /// One run: an estimator over the log, and all its steps so far in time order.
@@ -83,6 +85,15 @@ pub struct RunRecord {
     pub alignment_sums: AlignmentSums,
     /// How much memory its steps take.
     pub memory: RunMemory,
+    /// How its steps came to be, so that any of them can be taken again; `None` for a run that was not computed here.
+    pub history: Option<Arc<History>>,
+    /// Outlined steps by number that were taken again, because somebody looks at them.
+    pub retaken: BTreeMap<usize, Arc<StepRecord>>,
+    /// The step that is looked at as the solver went through it.
+    pub trace: Option<SolverTrace>,
+    /// Tells the run apart from others, also from one that takes its place.
+    pub id: u64,
+    thinning: Thinning,
 }
 
 impl RunRecord {
@@ -97,6 +108,11 @@ impl RunRecord {
             alignment: None,
             alignment_sums: AlignmentSums::default(),
             memory: RunMemory::default(),
+            history: None,
+            retaken: BTreeMap::new(),
+            trace: None,
+            id: NEXT_ID.fetch_add(1, Ordering::Relaxed),
+            thinning: Thinning::default(),
         }
     }
 
@@ -106,8 +122,87 @@ impl RunRecord {
             self.alignment_sums.add(&newest.world_from_imu.translation_m, &truth.translation_m);
             self.alignment = self.alignment_sums.solve(Alignment::YawPosition).map(|transform| transform.rigid);
         }
-        self.memory.add(&record);
+        self.memory.own += record.own_bytes();
+        self.memory.tracks += record.tracks_bytes();
         self.steps.push(Arc::new(record));
+    }
+
+    /// Number of the last step at or before a time.
+    pub fn index_at(&self, stamp_ns: i64) -> Option<usize> {
+        self.steps.partition_point(|step| step.report.stamp_ns <= stamp_ns).checked_sub(1)
+    }
+
+    /// A step as it is shown: as the solver went through it, or with everything where it has been taken again.
+    pub fn step(&self, number: usize) -> Option<&Arc<StepRecord>> {
+        let traced = self.trace.as_ref().filter(|trace| trace.step == number).and_then(SolverTrace::shown);
+        traced.or_else(|| self.retaken.get(&number)).or_else(|| self.steps.get(number))
+    }
+
+    /// Whether the step is there in outline only.
+    pub(super) fn lacks(&self, number: usize) -> bool {
+        self.steps.get(number).is_some_and(|step| step.outlined) && !self.retaken.contains_key(&number)
+    }
+
+    /// Takes over steps that were taken again around `number`; those farthest from it are forgotten.
+    fn take_again(&mut self, number: usize, steps: Vec<(usize, StepRecord)>) {
+        let outlined = |step: usize| self.steps.get(step).is_some_and(|step| step.outlined);
+        let steps: Vec<_> = steps.into_iter().filter(|(step, _)| outlined(*step)).collect();
+        self.retaken.extend(steps.into_iter().map(|(step, record)| (step, Arc::new(record))));
+        while self.retaken.len() > MOST_RETAKEN {
+            let (first, last) = (self.retaken.first_key_value(), self.retaken.last_key_value());
+            let (Some((first, _)), Some((last, _))) = (first, last) else { return };
+            let farthest = if number.abs_diff(*first) > number.abs_diff(*last) { *first } else { *last };
+            self.retaken.remove(&farthest);
+        }
+    }
+
+    /// The step with everything that it left, taken again where only its outline was kept: the same bits, but for the
+    /// measured times.
+    pub fn whole_step(&self, number: usize) -> Option<Arc<StepRecord>> {
+        let step = self.steps.get(number)?;
+        if !step.outlined {
+            return Some(Arc::clone(step));
+        }
+        let (_, record) = self.retake(number, 1).pop()?;
+        Some(Arc::new(record))
+    }
+
+    /// Takes the step `last` again, and before it up to `most - 1` others, from the nearest snapshot of the estimator,
+    /// whatever is kept of them; with their numbers, in order.
+    pub fn retake(&self, last: usize, most: usize) -> Vec<(usize, StepRecord)> {
+        self.history.as_ref().map_or_else(Vec::new, |history| history.retake(last, most))
+    }
+
+    /// The states that the solver went through in a step: before its first iteration, after it, and so on to the last,
+    /// which is the step itself. A step that makes the first window has only that.
+    pub fn solver_states(&self, number: usize) -> Vec<StepRecord> {
+        self.history.as_ref().map_or_else(Vec::new, |history| history.iterations(number))
+    }
+
+    /// Bytes of its steps, its snapshots and what its steps were given, without tracks that runs share.
+    pub fn own_bytes(&self) -> usize {
+        let retaken = self.retaken.values().chain(self.trace.iter().flat_map(|trace| &trace.records));
+        self.memory.own
+            + retaken.map(|step| step.own_bytes()).sum::<usize>()
+            + self.history.as_ref().map_or(0, |history| history.bytes())
+    }
+
+    /// Keeps one more step in outline; whether there was one left.
+    fn outline_one(&mut self) -> bool {
+        let Some(history) = &self.history else { return false };
+        let spacing = history.spacing();
+        while let Some(victim) = self.thinning.next_victim(history.begin(), self.steps.len(), spacing) {
+            let step = &self.steps[victim];
+            if step.outlined {
+                continue;
+            }
+            let outline = step.outline(victim);
+            self.memory.own -= step.own_bytes() - outline.own_bytes();
+            self.memory.outlined += 1;
+            self.steps[victim] = Arc::new(outline);
+            return true;
+        }
+        false
     }
 
     /// What a rig says about the columns of the run's calibration, by name, in the parameterization of an estimate; `None`
@@ -124,10 +219,18 @@ impl RunRecord {
 
     /// The last step at or before a time, as a cursor shows it.
     pub fn step_at(&self, stamp_ns: i64) -> Option<&Arc<StepRecord>> {
-        let after = self.steps.partition_point(|step| step.report.stamp_ns <= stamp_ns);
-        after.checked_sub(1).and_then(|index| self.steps.get(index))
+        self.step(self.index_at(stamp_ns)?)
     }
 }
+
+/// Number of the next run.
+static NEXT_ID: AtomicU64 = AtomicU64::new(0);
+
+/// Outlined steps of a run that are kept when they were taken again.
+const MOST_RETAKEN: usize = 96;
+
+/// Of the memory of a recording, the share that snapshots may take.
+const SNAPSHOT_SHARE: usize = 4;
 
 /// Everything computed so far about one log.
 #[derive(Clone, Debug)]
@@ -146,12 +249,14 @@ pub struct Recording {
     pub runs: Vec<RunRecord>,
     /// What is wrong with the log, as found so far.
     pub warnings: Vec<LogWarning>,
+    /// How much memory it may take, in bytes.
+    pub memory_budget_bytes: usize,
 }
 
 impl Recording {
     /// Nothing computed yet.
     pub fn new(plan: &SessionPlan) -> Self {
-        Self {
+        let mut recording = Self {
             log_path: plan.log_path.clone(),
             rig: Arc::clone(&plan.rig),
             truth_rig: plan.truth_rig.clone(),
@@ -159,13 +264,42 @@ impl Recording {
             epoch_ns: plan.log.epoch_ns(),
             runs: plan.runs.iter().map(|(spec, camera_key)| RunRecord::new(spec.clone(), camera_key.clone())).collect(),
             warnings: Vec::new(),
+            memory_budget_bytes: plan.memory_budget_bytes,
+        };
+        for run in std::mem::take(&mut recording.runs) {
+            recording.add_run(run);
         }
-        .with_warnings(plan.log.warnings())
+        recording.take(EngineMessage::Warnings(plan.log.warnings().to_vec()));
+        recording
     }
 
-    fn with_warnings(mut self, warnings: &[LogWarning]) -> Self {
-        self.take(EngineMessage::Warnings(warnings.to_vec()));
-        self
+    /// Adds a run that is to be computed.
+    pub(super) fn add_run(&mut self, mut run: RunRecord) {
+        if run.history.is_none() {
+            run.history = Some(Arc::new(History::new(Arc::default(), 0, self.memory_budget_bytes)));
+        }
+        self.runs.push(run);
+        self.share_out_memory();
+    }
+
+    /// Divides what snapshots may take among the runs.
+    fn share_out_memory(&self) {
+        let each = self.memory_budget_bytes / SNAPSHOT_SHARE / self.runs.len().max(1);
+        for history in self.runs.iter().filter_map(|run| run.history.as_ref()) {
+            history.set_budget(each);
+        }
+    }
+
+    /// Keeps steps in outline until the recording fits into its memory, or only the newest steps are left.
+    fn keep_within_budget(&mut self) {
+        while self.memory_bytes() > self.memory_budget_bytes {
+            // The run with the most to give goes first; forks come after the run that they share steps with.
+            let mut runs: Vec<usize> = (0..self.runs.len()).collect();
+            runs.sort_by_key(|run| std::cmp::Reverse(self.runs[*run].memory.own));
+            if !runs.into_iter().any(|run| self.runs[run].outline_one()) {
+                return;
+            }
+        }
     }
 
     /// Adds what a thread has reported.
@@ -175,6 +309,7 @@ impl Recording {
                 if let Some(run) = self.runs.get_mut(run) {
                     run.push(*record);
                 }
+                self.keep_within_budget();
             }
             EngineMessage::Finished { run, error } => {
                 if let Some(run) = self.runs.get_mut(run) {
@@ -194,6 +329,19 @@ impl Recording {
         }
     }
 
+    /// Takes over what was taken again of a run; the state of the solver is the one at a position.
+    pub(super) fn take_retaken(&mut self, wish: &Wish, retaken: Retaken, position: SolverPosition) {
+        let Some(run) = self.runs.iter_mut().find(|run| run.id == wish.run) else { return };
+        match retaken {
+            Retaken::Whole(steps) => run.take_again(wish.step, steps),
+            Retaken::Iterations(records) => {
+                let records: Vec<_> = records.into_iter().map(Arc::new).collect();
+                let at = position.of(records.len().saturating_sub(1));
+                run.trace = Some(SolverTrace { step: wish.step, records, at });
+            }
+        }
+    }
+
     /// How much memory the recorded steps take, in bytes; tracks that runs share are counted once.
     pub fn memory_bytes(&self) -> usize {
         let mut tracks: BTreeMap<&str, usize> = BTreeMap::new();
@@ -201,7 +349,7 @@ impl Recording {
             let shared = tracks.entry(&run.camera_key).or_default();
             *shared = run.memory.tracks.max(*shared);
         }
-        tracks.values().sum::<usize>() + self.runs.iter().map(|run| run.memory.own).sum::<usize>()
+        tracks.values().sum::<usize>() + self.runs.iter().map(RunRecord::own_bytes).sum::<usize>()
     }
 
     /// How far every run has come, in nanoseconds since the log began; the end when all are finished.

@@ -1,6 +1,6 @@
 use std::sync::Arc;
 
-use super::instants::Instant;
+use super::material::Material;
 use super::recording::StepRecord;
 use super::stopwatch::Stopwatch;
 use crate::estimator::{Estimator, EstimatorConfig, StepInput, StepReport};
@@ -17,8 +17,6 @@ pub(super) struct RunEngine {
     estimator: Estimator,
     has_joints: bool,
     joints_free: bool,
-    /// What a camera without an image has seen.
-    nothing: Arc<TrackedFrame>,
     /// One report in so many frames keeps its linearization.
     keep_linearization_every: Option<usize>,
 }
@@ -29,30 +27,56 @@ impl RunEngine {
         let has_joints = !config.chain.links.is_empty();
         let joints_free = has_joints && !config.use_encoder;
         let estimator = Estimator::new(config);
-        Self { estimator, has_joints, joints_free, nothing: Arc::default(), keep_linearization_every }
+        Self { estimator, has_joints, joints_free, keep_linearization_every }
     }
 
     /// The images of one instant through the estimator and the observability analysis.
-    pub(super) fn step(&mut self, instant: &Instant) -> StepRecord {
-        let tracks = |camera: usize| instant.tracks(camera).unwrap_or(&self.nothing);
-        let main = Arc::clone(tracks(0));
-        let rigid: Vec<Arc<TrackedFrame>> = (1..instant.cameras()).map(|camera| Arc::clone(tracks(camera))).collect();
-        let rigid: Vec<&TrackedFrame> = rigid.iter().map(Arc::as_ref).collect();
+    pub(super) fn step(&mut self, material: &Material) -> StepRecord {
         let watch = Stopwatch::start();
-        let mut report = self.estimator.step(&StepInput {
-            frame_index: instant.frame_index(),
-            stamp_ns: instant.stamp_ns(),
-            imu: instant.imu(),
-            joint_angles: instant.joint_angles().filter(|_| self.has_joints),
-            tracks: &main,
-            rigid_tracks: &rigid,
-        });
+        let mut report = self.estimate(material);
         let estimated_ms = watch.elapsed_ms();
         let rank = self.rank(&mut report);
         report.times.observability_ms = watch.elapsed_ms() - estimated_ms;
-        report.times.frontend_ms = instant.frontend_ms();
-        report.times.step_ms = instant.frontend_ms() + watch.elapsed_ms();
-        StepRecord { report, rank, tracks: main, truth: instant.truth(), log_time_ns: instant.log_time_ns() }
+        report.times.frontend_ms = material.frontend_ms;
+        report.times.step_ms = material.frontend_ms + watch.elapsed_ms();
+        StepRecord {
+            report,
+            rank,
+            tracks: Arc::clone(material.main_tracks()),
+            truth: material.truth,
+            log_time_ns: material.log_time_ns,
+            outlined: false,
+        }
+    }
+
+    /// The same step without a look at its observability: the estimator ends in the same state.
+    pub(super) fn pass(&mut self, material: &Material) {
+        let keep = self.estimator.config().options.keep_linearization;
+        self.estimator.set_keep_linearization(false);
+        drop(self.estimate(material));
+        self.estimator.set_keep_linearization(keep);
+    }
+
+    /// Most steps that the solver tries from the next image on.
+    pub(super) fn set_iterations(&mut self, iterations: usize) {
+        self.estimator.set_iterations(iterations);
+    }
+
+    /// How much memory a snapshot of it takes.
+    pub(super) fn bytes(&self) -> usize {
+        size_of::<Self>() - size_of::<Estimator>() + self.estimator.bytes()
+    }
+
+    fn estimate(&mut self, material: &Material) -> StepReport {
+        let rigid: Vec<&TrackedFrame> = material.tracks.iter().skip(1).map(Arc::as_ref).collect();
+        self.estimator.step(&StepInput {
+            frame_index: material.frame_index,
+            stamp_ns: material.stamp_ns,
+            imu: &material.imu,
+            joint_angles: material.joint_angles.as_ref().filter(|_| self.has_joints),
+            tracks: material.main_tracks(),
+            rigid_tracks: &rigid,
+        })
     }
 
     /// Analyses the step's linearization and lets go of it unless it is to be kept: one a frame would fill the memory.

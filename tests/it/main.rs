@@ -7,3 +7,4 @@ mod evaluate;
 #[cfg(feature = "gui")]
 mod renderers;
 mod sample_log;
+mod time_travel;

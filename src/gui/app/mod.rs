@@ -203,7 +203,7 @@ impl App {
         let computing = recording.runs.iter().any(|run| !run.finished && run.error.is_none());
         if commanded || playback.playing || log.generation() != generation {
             ui.ctx().request_repaint();
-        } else if computing {
+        } else if computing || playback.retaking {
             ui.ctx().request_repaint_after(std::time::Duration::from_millis(LOOK_MS));
         }
     }

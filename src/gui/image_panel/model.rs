@@ -77,7 +77,8 @@ impl ImageModel {
     pub(super) fn at(run: &RunRecord, cursor_ns: i64) -> Option<Self> {
         let after = run.steps.partition_point(|step| step.report.stamp_ns <= cursor_ns);
         let earlier = run.steps.get(..after)?;
-        let (step, before) = earlier.split_last()?;
+        let (_, before) = earlier.split_last()?;
+        let step = run.step(before.len())?;
         let report = &step.report;
         let marks = step
             .tracks

@@ -45,14 +45,19 @@ impl<'a> RunView<'a> {
         Self { number, run, shown, aligned: run.alignment.unwrap_or_default() }
     }
 
+    /// The step at the cursor.
+    fn step(&self) -> Option<&'a Arc<crate::session::StepRecord>> {
+        self.run.step(self.shown.checked_sub(1)?)
+    }
+
     /// The newest frame at the cursor, `None` while the run does not track.
     pub(super) fn newest(&self) -> Option<&'a FrameStateReport> {
-        self.run.steps[..self.shown].last()?.report.newest()
+        self.step()?.report.newest()
     }
 
     /// Distance between the aligned estimate and the truth at the cursor, in metres.
     pub(super) fn error_m(&self) -> Option<f64> {
-        let step = self.run.steps[..self.shown].last()?;
+        let step = self.step()?;
         let estimate = self.run.alignment? * step.report.newest()?.world_from_imu;
         Some((estimate.translation_m - step.truth?.translation_m).norm())
     }
@@ -201,7 +206,7 @@ impl<'a> WorldBuilder<'a> {
 
     /// What only the selected run shows: window, landmarks, height over the ground.
     pub(super) fn details(&mut self, view: &RunView<'_>, camera: Option<&CameraModel>, ground_height_m: f64) {
-        let Some(step) = view.run.steps[..view.shown].last() else { return };
+        let Some(step) = view.step() else { return };
         if self.options.landmarks {
             self.landmarks(view);
         }
@@ -234,7 +239,7 @@ impl<'a> WorldBuilder<'a> {
     /// Landmarks of the step at the cursor, and fainter those of earlier steps; viridis over their height.
     fn landmarks(&mut self, view: &RunView<'_>) {
         let steps = &view.run.steps[..view.shown];
-        let Some((now, _)) = steps.split_last() else { return };
+        let Some(now) = view.step() else { return };
         let mut stride = 4;
         while steps.len() / stride > MOST_LANDMARK_STEPS {
             stride *= 2;

@@ -74,7 +74,7 @@ impl RunLanes {
             if report.keyframe {
                 self.keyframes_ns.push(stamp_ns);
             }
-            let rejected = report.features.iter().filter(|feature| feature.rejected).count();
+            let rejected = report.counts.rejected;
             if rejected > 0 {
                 self.rejected.push((stamp_ns, rejected));
             }

@@ -5,7 +5,7 @@ use egui::{Button, ComboBox, RichText, Ui, vec2};
 use super::pace::Reading;
 use crate::gui::PanelContext;
 use crate::gui::units::{fixed, seconds};
-use crate::session::{Command, PlaybackSpeed};
+use crate::session::{Command, PlaybackSpeed, RunRecord};
 
 /// Height of the row of buttons.
 pub(super) const HEIGHT: f32 = 26.0;
@@ -94,6 +94,35 @@ fn time_ui(ui: &mut Ui, ctx: &PanelContext<'_>) {
         ui.add_space(8.0);
         ui.label(RichText::new("frame").color(theme.text_weak));
         ui.label(RichText::new(step.report.frame_index.to_string()).monospace().color(theme.text_strong));
+    }
+    if ctx.playback.solver.is_some()
+        && let Some(run) = run
+    {
+        solver_ui(ui, ctx, run);
+    }
+    if ctx.playback.retaking {
+        ui.label(RichText::new("taken again…").color(theme.text_weak))
+            .on_hover_text("What this step left is computed again from the nearest snapshot of the estimator");
+    }
+}
+
+/// Which state of the solver is shown, and what its last iteration did.
+fn solver_ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord) {
+    let theme = ctx.theme;
+    ui.add_space(8.0);
+    ui.label(RichText::new("iteration").color(theme.text_weak));
+    let Some(trace) = &run.trace else {
+        ui.label(RichText::new("…").color(theme.text_weak));
+        return;
+    };
+    let text = format!("{} of {}", trace.at, trace.iterations());
+    ui.label(RichText::new(text).monospace().color(theme.warn)).on_hover_text(
+        "The picture shows the window after so many iterations of its solver; , and . step through them",
+    );
+    if let Some(iteration) = trace.shown().and_then(|state| state.report.iterations.last()) {
+        let (before, after) = (fixed(iteration.cost_before, 2), fixed(iteration.cost_after, 2));
+        let taken = if iteration.accepted { "" } else { ", not taken" };
+        ui.label(RichText::new(format!("cost {before} → {after}{taken}")).monospace().color(theme.text));
     }
 }
 

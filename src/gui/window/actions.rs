@@ -15,6 +15,8 @@ pub(crate) enum Action {
     TogglePlay,
     /// Move the cursor by so many frames.
     Step(i64),
+    /// To the next or the previous iteration of the solver.
+    Iteration(bool),
     /// To the next or the previous event.
     Event(bool),
     /// To the first frame.
@@ -85,6 +87,8 @@ pub(crate) const TABLE: &[Entry] = &[
     entry(Action::TogglePlay, "Play or pause", "Space", &[(NONE, Key::Space)]),
     entry(Action::Step(1), "One frame forward", "Right", &[(NONE, Key::ArrowRight)]),
     entry(Action::Step(-1), "One frame back", "Left", &[(NONE, Key::ArrowLeft)]),
+    entry(Action::Iteration(true), "One iteration of the solver forward", ".", &[(NONE, Key::Period)]),
+    entry(Action::Iteration(false), "One iteration of the solver back", ",", &[(NONE, Key::Comma)]),
     entry(Action::Start, "Go to start", "Home", &[(NONE, Key::Home)]),
     entry(Action::End, "Go to end", "End", &[(NONE, Key::End)]),
     entry(Action::Loop, "Loop over the visible range", "L", &[(NONE, Key::L)]),
@@ -136,6 +140,7 @@ pub(crate) fn perform(action: Action, state: &mut WindowState, ctx: &mut PanelCo
     match action {
         Action::TogglePlay => ctx.commands.push(Command::TogglePlay),
         Action::Step(frames) => ctx.commands.push(Command::StepFrames(frames)),
+        Action::Iteration(forward) => ctx.commands.push(Command::StepIteration { forward }),
         Action::Event(forward) => ctx.commands.push(Command::JumpToEvent { forward }),
         Action::Start => ctx.commands.push(Command::GoToStart),
         Action::End => ctx.commands.push(Command::GoToEnd),

@@ -5,7 +5,7 @@ use egui::{Align, Button, Layout as UiLayout, RichText, Ui};
 use super::WindowState;
 use crate::gui::PanelContext;
 use crate::gui::units::{bytes, counted, fixed};
-use crate::session::{RunRecord, StepRecord};
+use crate::session::{Recording, RunRecord, StepRecord};
 
 /// Steps over which the real-time factor is taken.
 const STEPS_OF_MEAN: usize = 100;
@@ -32,6 +32,8 @@ pub(super) fn ui(ui: &mut Ui, state: &mut WindowState, ctx: &PanelContext<'_>) {
         }
         if let Some(memory) = state.memory_bytes {
             pair(ui, "memory", bytes(memory), "Memory of the whole process");
+            let (text, hover) = recorded(ctx.recording);
+            pair(ui, "recorded", text, &hover);
         }
         let delay = run.and_then(|run| run.step_at(ctx.cursor_ns)).map(|step| log_delay(step));
         let clock = delay.map_or_else(|| "header stamp".to_owned(), |delay| format!("header stamp, log {delay}"));
@@ -54,6 +56,18 @@ pub(super) fn ui(ui: &mut Ui, state: &mut WindowState, ctx: &PanelContext<'_>) {
             }
         });
     });
+}
+
+/// How much memory the recording takes of what it may, and what that means for its steps.
+fn recorded(recording: &Recording) -> (String, String) {
+    let steps: usize = recording.runs.iter().map(|run| run.steps.len()).sum();
+    let outlined: usize = recording.runs.iter().map(|run| run.memory.outlined).sum();
+    let share =
+        format!("{} of {}", bytes(recording.memory_bytes() as u64), bytes(recording.memory_budget_bytes as u64));
+    let text = if outlined > 0 { format!("{share}, {outlined} of {steps} steps in outline") } else { share };
+    let hover = "Memory of all steps and of the snapshots of the estimators. When it is full, features and landmarks of \
+                 older steps are let go, and taken again from the nearest snapshot, to the same bits, when you go there";
+    (text, hover.to_owned())
 }
 
 fn log_delay(step: &StepRecord) -> String {

@@ -115,6 +115,8 @@ fn keys_push_the_same_commands() {
         (Modifiers::SHIFT, Key::ArrowLeft, Command::StepFrames(-10)),
         (Modifiers::COMMAND, Key::ArrowRight, Command::JumpToEvent { forward: true }),
         (Modifiers::COMMAND, Key::ArrowLeft, Command::JumpToEvent { forward: false }),
+        (Modifiers::NONE, Key::Period, Command::StepIteration { forward: true }),
+        (Modifiers::NONE, Key::Comma, Command::StepIteration { forward: false }),
         (Modifiers::NONE, Key::Home, Command::GoToStart),
         (Modifiers::NONE, Key::End, Command::GoToEnd),
         (Modifiers::NONE, Key::M, Command::ToggleMarker),

@@ -1,0 +1,147 @@
+//! How a run came to where it is: what its steps were given, and snapshots of the estimator in between.
+//!
+//! An estimator is a plain value and its steps are exact, so that any step of a run can be taken again from the nearest
+//! snapshot before it, with the same bits.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use super::material::{Material, Materials};
+use super::recording::StepRecord;
+use super::run_engine::RunEngine;
+
+/// Steps between two snapshots while there is room for all of them.
+const CLOSEST_SPACING: usize = 16;
+
+/// The way of one run; the recording and the threads share it.
+#[derive(Debug)]
+pub struct History {
+    materials: Arc<Materials>,
+    /// Number of the first step that is this run's own.
+    begin: usize,
+    snapshots: Mutex<Snapshots>,
+}
+
+/// Snapshots by the number of the step that they are ready to take.
+#[derive(Debug)]
+struct Snapshots {
+    kept: BTreeMap<usize, (Arc<RunEngine>, usize)>,
+    spacing: usize,
+    bytes: usize,
+    budget_bytes: usize,
+    material_bytes: usize,
+}
+
+impl History {
+    /// A run whose first own step is `begin`; snapshots may take so many bytes together.
+    pub(super) fn new(materials: Arc<Materials>, begin: usize, budget_bytes: usize) -> Self {
+        let snapshots =
+            Snapshots { kept: BTreeMap::new(), spacing: CLOSEST_SPACING, bytes: 0, budget_bytes, material_bytes: 0 };
+        Self { materials, begin, snapshots: Mutex::new(snapshots) }
+    }
+
+    /// What the steps were given.
+    pub(super) fn materials(&self) -> &Arc<Materials> {
+        &self.materials
+    }
+
+    /// Number of the first step that is this run's own.
+    pub(super) fn begin(&self) -> usize {
+        self.begin
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Snapshots> {
+        // Snapshots are only ever put in and taken out whole.
+        self.snapshots.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Notes what the engine is about to do, and keeps a snapshot of it where one is due.
+    pub(super) fn before_step(&self, step: usize, engine: &RunEngine, material: &Material) {
+        let mut snapshots = self.lock();
+        snapshots.material_bytes += material.own_bytes();
+        if step != self.begin && !step.is_multiple_of(snapshots.spacing) {
+            return;
+        }
+        let bytes = engine.bytes();
+        snapshots.bytes += bytes;
+        snapshots.kept.insert(step, (Arc::new(engine.clone()), bytes));
+        snapshots.keep_within_budget(self.begin);
+    }
+
+    /// From now on snapshots may take so many bytes together.
+    pub(super) fn set_budget(&self, budget_bytes: usize) {
+        let mut snapshots = self.lock();
+        snapshots.budget_bytes = budget_bytes;
+        snapshots.keep_within_budget(self.begin);
+    }
+
+    /// Steps between two snapshots.
+    pub(super) fn spacing(&self) -> usize {
+        self.lock().spacing
+    }
+
+    /// Bytes of snapshots and material.
+    pub(super) fn bytes(&self) -> usize {
+        let snapshots = self.lock();
+        snapshots.bytes + snapshots.material_bytes
+    }
+
+    /// The engine as it was before a step, `None` for a step that this run has not taken itself.
+    pub(super) fn engine_before(&self, step: usize) -> Option<RunEngine> {
+        let (at, snapshot) = self.snapshot_before(step)?;
+        let mut engine = RunEngine::clone(&snapshot);
+        for number in at..step {
+            engine.pass(&*self.materials.get(number)?);
+        }
+        Some(engine)
+    }
+
+    fn snapshot_before(&self, step: usize) -> Option<(usize, Arc<RunEngine>)> {
+        let snapshots = self.lock();
+        let (at, (engine, _)) = snapshots.kept.range(..=step).next_back()?;
+        Some((*at, Arc::clone(engine)))
+    }
+
+    /// Takes the steps up to `last` again from the snapshot before it, and returns the last `most` of them with their
+    /// numbers; empty for a step that this run has not taken itself.
+    pub(super) fn retake(&self, last: usize, most: usize) -> Vec<(usize, StepRecord)> {
+        let Some((at, _)) = self.snapshot_before(last) else { return Vec::new() };
+        let first = (last + 1).saturating_sub(most.max(1)).max(at);
+        let Some(mut engine) = self.engine_before(first) else { return Vec::new() };
+        let materials = (first..=last).map_while(|step| Some((step, self.materials.get(step)?)));
+        materials.map(|(step, material)| (step, engine.step(&material))).collect()
+    }
+
+    /// The states that the solver went through in a step, as reports of their own: before its first iteration, after it,
+    /// after the second, and so on to the last, which is the step itself.
+    pub(super) fn iterations(&self, step: usize) -> Vec<StepRecord> {
+        let (Some(engine), Some(material)) = (self.engine_before(step), self.materials.get(step)) else {
+            return Vec::new();
+        };
+        let whole = engine.clone().step(&material);
+        // The first window is solved several times over, outliers taken out in between.
+        let begins = whole.report.events.iter().any(|event| event.kind.begins_window());
+        let iterations = if begins { 0 } else { whole.report.iterations.len() };
+        let mut records: Vec<StepRecord> = (0..iterations)
+            .map(|count| {
+                let mut engine = engine.clone();
+                engine.set_iterations(count);
+                engine.step(&material)
+            })
+            .collect();
+        records.push(whole);
+        records
+    }
+}
+
+impl Snapshots {
+    /// Every other snapshot goes until they fit; the first one stays, without which nothing could be taken again.
+    fn keep_within_budget(&mut self, begin: usize) {
+        while self.bytes > self.budget_bytes && self.kept.len() > 1 {
+            self.spacing *= 2;
+            let spacing = self.spacing;
+            self.kept.retain(|step, _| *step == begin || step.is_multiple_of(spacing));
+            self.bytes = self.kept.values().map(|(_, bytes)| bytes).sum();
+        }
+    }
+}

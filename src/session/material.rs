@@ -1,0 +1,93 @@
+//! What a step is given, kept so that it can be taken again.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use super::instants::Instant;
+use crate::estimator::allocated_bytes;
+use crate::flight_log::{ImuSample, JointAngles};
+use crate::frontend::{TrackedFeature, TrackedFrame};
+use crate::geometry::RigidTransform;
+
+/// Everything that one step of a run was given.
+///
+/// The front end does not know the estimator, so its tracks are the same whatever the run does with them: they are kept,
+/// and no image has to be tracked again.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Material {
+    /// Number of the main camera's image; where it is missing, one that no image has.
+    pub(super) frame_index: usize,
+    /// Header stamp since the log began, on the main camera's clock.
+    pub(super) stamp_ns: i64,
+    /// Log time since the log began.
+    pub(super) log_time_ns: i64,
+    /// Inertial samples since the instant before.
+    pub(super) imu: Vec<ImuSample>,
+    /// Encoder angles at the stamp.
+    pub(super) joint_angles: Option<JointAngles>,
+    /// Tracks by camera of the run, the main one's first; empty ones where an image is missing.
+    pub(super) tracks: Vec<Arc<TrackedFrame>>,
+    /// True pose of the IMU.
+    pub(super) truth: Option<RigidTransform>,
+    /// What the front ends took.
+    pub(super) frontend_ms: f64,
+}
+
+impl Material {
+    /// What an instant brings to the estimator, without its images.
+    pub(super) fn of(instant: &Instant) -> Self {
+        let tracks = |camera: usize| instant.tracks(camera).map_or_else(Arc::default, Arc::clone);
+        Self {
+            frame_index: instant.frame_index(),
+            stamp_ns: instant.stamp_ns(),
+            log_time_ns: instant.log_time_ns(),
+            imu: instant.imu().to_vec(),
+            joint_angles: instant.joint_angles().cloned(),
+            tracks: (0..instant.cameras()).map(tracks).collect(),
+            truth: instant.truth(),
+            frontend_ms: instant.frontend_ms(),
+        }
+    }
+
+    /// The main camera's tracks.
+    pub(super) fn main_tracks(&self) -> &Arc<TrackedFrame> {
+        &self.tracks[0]
+    }
+
+    /// Bytes that it takes, without the main camera's tracks, which the step's record counts.
+    pub(super) fn own_bytes(&self) -> usize {
+        let rigid: usize = self.tracks.iter().skip(1).map(|tracks| tracks_bytes(tracks)).sum();
+        allocated_bytes(size_of::<Self>() + 2 * size_of::<usize>())
+            + allocated_bytes(self.imu.capacity() * size_of::<ImuSample>())
+            + self.joint_angles.as_ref().map_or(0, |angles| allocated_bytes(angles.heap_bytes()))
+            + rigid
+    }
+}
+
+/// Bytes of tracks.
+pub(super) fn tracks_bytes(tracks: &TrackedFrame) -> usize {
+    allocated_bytes(size_of::<TrackedFrame>() + 2 * size_of::<usize>())
+        + allocated_bytes(tracks.features.capacity() * size_of::<TrackedFeature>())
+}
+
+/// The material of a run's steps so far, which the runs that branch off from it share.
+#[derive(Debug, Default)]
+pub(super) struct Materials {
+    steps: Mutex<Vec<Arc<Material>>>,
+}
+
+impl Materials {
+    fn lock(&self) -> MutexGuard<'_, Vec<Arc<Material>>> {
+        // Material is only ever pushed whole.
+        self.steps.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Adds the material of the next step.
+    pub(super) fn push(&self, material: Arc<Material>) {
+        self.lock().push(material);
+    }
+
+    /// The material of a step that has been taken.
+    pub(super) fn get(&self, step: usize) -> Option<Arc<Material>> {
+        self.lock().get(step).cloned()
+    }
+}

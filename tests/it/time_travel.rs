@@ -1,0 +1,157 @@
+//! Going back in time on the sample log: every step taken again is the step that was recorded, whatever was kept of it.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use dcvins::estimator::StageTimes;
+use dcvins::session::{self, Command, Recording, RunRecord, Session, SessionPlan, SessionRequest, StepRecord};
+
+fn plan(specs: &[&str], memory_budget_bytes: usize) -> SessionPlan {
+    let specs = specs.iter().map(|spec| spec.parse().expect("the specifications of tests are valid"));
+    let request = SessionRequest {
+        log_path: PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("sample_logs/garden.mcap"),
+        specs: specs.collect(),
+        ..SessionRequest::default()
+    };
+    let plan = SessionPlan::open(&request).expect("the sample log opens");
+    SessionPlan { memory_budget_bytes, ..plan }
+}
+
+/// Everything in a record by its bits (missing numbers are equal), but for the measured times.
+fn bits(record: &StepRecord) -> String {
+    let mut record = record.clone();
+    record.report.times = StageTimes::default();
+    format!("{record:?}")
+}
+
+/// A recording with memory for everything, made straight from begin to end.
+fn straight(specs: &[&str]) -> Recording {
+    let recording = session::compute(&plan(specs, usize::MAX), None, &mut |_| {}).expect("the runs start");
+    assert!(recording.runs.iter().all(|run| run.error.is_none() && run.memory.outlined == 0));
+    recording
+}
+
+fn check_step(run: &RunRecord, number: usize, again: &StepRecord) {
+    assert_eq!(bits(again), bits(&run.steps[number]), "step {number} of {}", run.spec.label);
+}
+
+#[test]
+fn every_step_taken_again_is_the_step_that_was_recorded() {
+    const AT_ONCE: usize = 20;
+    let recording = straight(&["auto", "cluster"]);
+    for run in &recording.runs {
+        let mut end = run.steps.len();
+        while end > 0 {
+            let steps = run.retake(end - 1, AT_ONCE);
+            let (first, _) = steps.first().expect("every step can be taken again");
+            assert!((end.saturating_sub(AT_ONCE)..end).contains(first));
+            let next = *first;
+            for (number, again) in steps {
+                check_step(run, number, &again);
+            }
+            end = next;
+        }
+        // And in any order.
+        for number in [3, 150, 77, 141, 16] {
+            let (last, again) = run.retake(number, 1).pop().expect("every step can be taken again");
+            assert_eq!(last, number);
+            check_step(run, number, &again);
+        }
+        assert!(run.retake(run.steps.len(), 1).is_empty());
+    }
+}
+
+/// Plays to the end of the log.
+fn played(session: &mut Session) {
+    while session.recording().runs.iter().any(|run| !run.finished) {
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    session.apply(Command::GoToEnd);
+}
+
+#[test]
+fn stepping_back_shows_what_was_seen_on_the_way_forward_with_little_memory() {
+    let forwards = straight(&["auto"]);
+    let expected = &forwards.runs[0];
+    let mut session = Session::start(plan(&["auto"], 0)).expect("the session starts");
+    played(&mut session);
+    let kept = Arc::clone(&session.recording());
+    assert!(kept.runs[0].memory.outlined > 90, "{:?}", kept.runs[0].memory);
+    assert!(kept.memory_bytes() < forwards.memory_bytes());
+    for number in (0..expected.steps.len()).rev() {
+        session.settle();
+        let recording = session.recording();
+        let shown = recording.runs[0].step_at(session.cursor_ns()).expect("a step is shown");
+        assert!(!shown.outlined);
+        check_step(expected, number, shown);
+        session.apply(Command::StepFrames(-1));
+    }
+    for number in [120, 15, 64, 101] {
+        session.apply(Command::Seek { stamp_ns: expected.steps[number].report.stamp_ns });
+        session.settle();
+        let recording = session.recording();
+        check_step(expected, number, recording.runs[0].step_at(session.cursor_ns()).expect("a step is shown"));
+    }
+}
+
+#[test]
+fn outlines_hold_everything_that_is_plotted_over_time() {
+    let (whole, outlined) = (straight(&["auto"]), session::compute(&plan(&["auto"], 0), None, &mut |_| {}));
+    let outlined = outlined.expect("the runs start");
+    assert!(outlined.runs[0].memory.outlined > 90);
+    for (whole, outlined) in whole.runs[0].steps.iter().zip(&outlined.runs[0].steps) {
+        let mut report = whole.report.clone();
+        if outlined.outlined {
+            report.window.drain(..report.window.len().saturating_sub(1));
+            report.features.clear();
+            assert!(outlined.report.landmarks.is_empty() || outlined.report.landmarks == report.landmarks);
+            report.landmarks = outlined.report.landmarks.clone();
+        }
+        let expected = StepRecord { report, outlined: outlined.outlined, ..StepRecord::clone(whole) };
+        assert_eq!(bits(outlined), bits(&expected));
+    }
+}
+
+#[test]
+fn the_solver_can_be_followed_through_a_step() {
+    let forwards = straight(&["auto"]);
+    let run = &forwards.runs[0];
+    let number = 150;
+    let iterations = &run.steps[number].report.iterations;
+    let states = run.solver_states(number);
+    assert_eq!(states.len(), iterations.len() + 1);
+    assert!(iterations.len() > 1, "a step with more than one iteration");
+    check_step(run, number, states.last().expect("the last state is the step"));
+    for (count, state) in states.iter().enumerate() {
+        assert_eq!(state.report.iterations, iterations[..count]);
+        let chi2 = |after: bool| -> f64 {
+            let of = |it: &dcvins::estimator::ResidualSummary| if after { it.chi2_after } else { it.chi2_before };
+            state.report.residuals.iter().map(of).sum()
+        };
+        // The cost of the solver is that of the report.
+        let expected = if count == 0 { chi2(false) } else { 2.0 * iterations[count - 1].cost_after };
+        let shown = chi2(true);
+        assert!((shown - expected).abs() < 1e-6 * expected || count == 0 && shown == expected, "{shown} {expected}");
+    }
+
+    let mut session = Session::start(plan(&["auto"], usize::MAX)).expect("the session starts");
+    played(&mut session);
+    session.apply(Command::Seek { stamp_ns: run.steps[number].report.stamp_ns });
+    let mut shown = Vec::new();
+    for _ in 0..=iterations.len() {
+        session.settle();
+        let recording = session.recording();
+        shown.push(bits(recording.runs[0].step_at(session.cursor_ns()).expect("a step is shown")));
+        session.apply(Command::StepIteration { forward: false });
+    }
+    let expected: Vec<String> = states.iter().rev().map(bits).collect();
+    assert!(shown == expected);
+    // One more went to the frame before; forward again comes back to the first state here.
+    session.settle();
+    assert_eq!(session.cursor_ns(), run.steps[number - 1].report.stamp_ns);
+    session.apply(Command::StepIteration { forward: true });
+    session.settle();
+    let recording = session.recording();
+    let state = recording.runs[0].step_at(session.cursor_ns()).expect("a step is shown");
+    assert_eq!(bits(state), bits(&states[0]));
+}
