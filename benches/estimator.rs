@@ -75,6 +75,8 @@ fn config(flight: &SyntheticFlight) -> EstimatorConfig {
         encoder_sigma_rad: Some(encoder_sigma_rad(flight)),
         use_encoder: true,
         calibrate: true,
+        estimate_timeshift: false,
+        timeshift_s: 0.0,
         chain_prior: rig
             .gimbal
             .as_ref()
@@ -90,6 +92,7 @@ fn step(estimator: &mut Estimator, frame: &SyntheticFrame, encoder_sigma_rad: f6
         angles_rad: angles_rad.clone(),
         sigmas_rad: vec![encoder_sigma_rad; angles_rad.len()],
         lasting_sigmas_rad: vec![0.0; angles_rad.len()],
+        rates_rad_per_s: vec![0.0; angles_rad.len()],
     });
     estimator.step(&StepInput {
         frame_index: frame.index,

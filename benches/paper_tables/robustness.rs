@@ -10,40 +10,45 @@ use crate::table::{Table, ratios, written};
 /// Length of a flight; what goes wrong does so in its middle.
 const FLIGHT_S: f64 = 25.0;
 
-/// Name, and the disturbances as `dcvins simulate --disturb` takes them.
-const ROWS: [(&str, &[&str]); 16] = [
-    ("nothing", &[]),
-    ("fast rotation, 3 rad/s for 2 s", &["spin=11,2,3"]),
-    ("exposure 10 ms", &["exposure=0.01"]),
-    ("fast rotation and exposure 10 ms", &["spin=11,2,3", "exposure=0.01"]),
-    ("light halves", &["light=11,0.5"]),
-    ("light doubles", &["light=11,2"]),
-    ("nothing to see for 1 s", &["blank=11,1"]),
-    ("nothing to see for 3 s", &["blank=11,3"]),
-    ("gimbal slews at 200°/s for 3 s", &["slew=11,3"]),
-    ("images lost for 0.5 s", &["image-gap=11,0.5"]),
-    ("images lost for 2 s", &["image-gap=11,2"]),
-    ("gyroscope saturates at 1 rad/s", &["gyroscope-range=1"]),
-    ("accelerometer saturates at 12 m/s²", &["accelerometer-range=12"]),
-    ("joint angles start at 5 s", &["joint-start=5"]),
-    ("joint angles 20 ms late", &["joint-lag=0.02"]),
-    ("camera clock 10 ms off", &["camera-offset=0.01"]),
+/// Name, the disturbances as `dcvins simulate --disturb` takes them, and the run.
+const ROWS: [(&str, &[&str], &str); 18] = [
+    ("nothing", &[], "auto"),
+    ("fast rotation, 3 rad/s for 2 s", &["spin=11,2,3"], "auto"),
+    ("exposure 10 ms", &["exposure=0.01"], "auto"),
+    ("fast rotation and exposure 10 ms", &["spin=11,2,3", "exposure=0.01"], "auto"),
+    ("light halves", &["light=11,0.5"], "auto"),
+    ("light doubles", &["light=11,2"], "auto"),
+    ("nothing to see for 1 s", &["blank=11,1"], "auto"),
+    ("nothing to see for 3 s", &["blank=11,3"], "auto"),
+    ("gimbal slews at 200°/s for 3 s", &["slew=11,3"], "auto"),
+    ("images lost for 0.5 s", &["image-gap=11,0.5"], "auto"),
+    ("images lost for 2 s", &["image-gap=11,2"], "auto"),
+    ("gyroscope saturates at 1 rad/s", &["gyroscope-range=1"], "auto"),
+    ("accelerometer saturates at 12 m/s²", &["accelerometer-range=12"], "auto"),
+    ("joint angles start at 5 s", &["joint-start=5"], "auto"),
+    ("joint angles 20 ms late", LATE_JOINTS, "auto"),
+    ("joint angles 20 ms late, timeshift=on", LATE_JOINTS, "auto:timeshift=on"),
+    ("camera clock 10 ms off", LATE_CAMERA, "auto"),
+    ("camera clock 10 ms off, timeshift=on", LATE_CAMERA, "auto:timeshift=on"),
 ];
+const LATE_JOINTS: &[&str] = &["joint-lag=0.02"];
+const LATE_CAMERA: &[&str] = &["camera-offset=0.01"];
 
 /// Flies each disturbance over some seeds.
 pub(crate) fn fly(archive: &Archive, seeds: &[u64], progress: &mut dyn FnMut(&Table) -> Result<()>) -> Result<Table> {
     let mut flown: Vec<Vec<Driven>> = ROWS.iter().map(|_| Vec::new()).collect();
     for seed in seeds {
-        for (index, ((_, disturbances), runs)) in ROWS.iter().zip(&mut flown).enumerate() {
+        for ((_, disturbances, spec), runs) in ROWS.iter().zip(&mut flown) {
             let mut options = SimulationOptions::new(Experiment::T3);
             (options.seed, options.duration_s, options.static_camera) = (*seed, Some(FLIGHT_S), false);
             options.disturbances = read(disturbances)?;
-            let log = match archive.log(&format!("robustness-{index}-{seed}"), &options) {
+            let name = format!("robustness-{}-{seed}", disturbances.join("-").replace(['=', ','], "_"));
+            let log = match archive.log(&name, &options) {
                 Ok(log) => log,
                 Err(_) if !archive.render => continue,
                 Err(error) => return Err(error),
             };
-            runs.append(&mut drive(&log, None, &[Variant::plain("disturbed", "auto")])?);
+            runs.append(&mut drive(&log, None, &[Variant::plain("disturbed", spec)])?);
         }
         progress(&table(&flown))?;
     }
@@ -67,7 +72,7 @@ fn table(flown: &[Vec<Driven>]) -> Table {
         ),
         &["what goes wrong", "flights", "ATE m", "× undisturbed", "restarts", "without pose s", "lost", "what it says"],
     );
-    for ((name, _), runs) in ROWS.iter().zip(flown) {
+    for ((name, ..), runs) in ROWS.iter().zip(flown) {
         let against = runs.iter().zip(&flown[0]).filter_map(|(run, plain)| Some(run.ate_m()? / plain.ate_m()?));
         let mut said: Vec<&String> = runs.iter().flat_map(|run| &run.failures).collect();
         said.extend(runs.iter().flat_map(|run| &run.summary.warnings));

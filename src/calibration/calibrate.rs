@@ -233,8 +233,7 @@ fn close_loops(
     let gravity = gravity_in_world(input.gravity_m_per_s2);
     let pairs =
         paired(segments, &|instant| estimate.world_from_imu(gimbal_view(instant), instants, &gravity), &|instant| {
-            let none =
-                || JointAngles { angles_rad: Vec::new(), sigmas_rad: Vec::new(), lasting_sigmas_rad: Vec::new() };
+            let none = JointAngles::default;
             instants[instant].gimbal.as_ref().map_or_else(none, |gimbal| gimbal.encoder.clone())
         });
     let loops = PoseLoops { segments: &pairs, prior: &priors.chain };

@@ -24,12 +24,70 @@ struct GivenChain {
     square_root_information: DMatrix<f64>,
 }
 
-/// The chain, free or fixed.
+/// Standard deviation of a clock's offset beyond what the rig says, in seconds: transport and exposure delay an image by
+/// a frame's length at most.
+const CLOCK_SIGMA_S: f64 = 0.02;
+
+/// Which clocks are compared with the inertial sensor's.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum FreeClocks {
+    /// All are taken to agree.
+    None,
+    /// The camera's.
+    Camera,
+    /// The camera's and the encoders'.
+    CameraAndEncoders,
+}
+
+impl FreeClocks {
+    /// Names of the offsets, in the order of their columns behind the chain's.
+    fn names(self) -> &'static [&'static str] {
+        let all = &["timeshift", "encoder.timeshift"];
+        match self {
+            Self::None => &[],
+            Self::Camera => &all[..1],
+            Self::CameraAndEncoders => all,
+        }
+    }
+}
+
+/// The numbers that are estimated.
+#[derive(Clone, Debug)]
+struct Values {
+    chain: Chain,
+    /// Offsets of the clocks beyond what the rig says, in seconds: the inertial sensor's time is the stamp plus this. The
+    /// camera's, then the encoders'; as many as are estimated.
+    clocks_s: DVector<f64>,
+}
+
+impl Values {
+    fn dof(&self) -> usize {
+        self.chain.dof() + self.clocks_s.len()
+    }
+
+    fn plus(&self, delta: &[f64]) -> Self {
+        let (chain, clocks) = delta.split_at(self.chain.dof());
+        Self { chain: self.chain.plus_slice(chain), clocks_s: &self.clocks_s + DVector::from_column_slice(clocks) }
+    }
+
+    fn minus(&self, origin: &Self) -> DVector<f64> {
+        let mut difference = DVector::zeros(self.dof());
+        let chain = self.chain.dof();
+        difference.rows_mut(0, chain).copy_from(&self.chain.minus(&origin.chain));
+        difference.rows_mut(chain, self.clocks_s.len()).copy_from(&(&self.clocks_s - &origin.clocks_s));
+        difference
+    }
+}
+
+/// The chain and the offsets of the clocks, free or fixed.
 #[derive(Clone, Debug)]
 pub(super) struct Calibration {
-    chain: Chain,
+    values: Values,
     given: GivenChain,
-    first_estimate: Option<Chain>,
+    clocks: FreeClocks,
+    /// What the rig says the camera's clock is off by: stamps have it in them already.
+    given_timeshift_s: f64,
+    first_estimate: Option<Values>,
     free: bool,
 }
 
@@ -43,36 +101,83 @@ impl Calibration {
         joint_offsets: bool,
     ) -> Self {
         let given = GivenChain::new(classical, parameterization, sigmas, joint_offsets);
-        Self { chain: given.chain.clone(), given, first_estimate: None, free }
+        let values = Values { chain: given.chain.clone(), clocks_s: DVector::zeros(0) };
+        Self { values, given, clocks: FreeClocks::None, given_timeshift_s: 0.0, first_estimate: None, free }
+    }
+
+    /// The same with offsets of clocks beside the chain; a calibration that is held fixed has none.
+    pub(super) fn with_clocks(self, clocks: FreeClocks, given_timeshift_s: f64) -> Self {
+        let clocks = if self.free { clocks } else { FreeClocks::None };
+        let clocks_s = DVector::zeros(clocks.names().len());
+        Self { values: Values { clocks_s, ..self.values }, clocks, given_timeshift_s, ..self }
     }
 
     pub(super) fn chain(&self) -> &Chain {
-        &self.chain
+        &self.values.chain
+    }
+
+    /// Offset of the camera's clock beyond what the rig says: it saw an image so many seconds after its stamp.
+    pub(super) fn camera_shift_s(&self) -> f64 {
+        self.values.clocks_s.get(0).copied().unwrap_or(0.0)
+    }
+
+    /// Its column among the calibration's.
+    pub(super) fn camera_shift_column(&self) -> Option<usize> {
+        (self.clocks != FreeClocks::None).then(|| self.chain().dof())
+    }
+
+    /// Offset of the encoders' clock: their readings belong to so many seconds after their stamps.
+    pub(super) fn encoder_shift_s(&self) -> f64 {
+        self.values.clocks_s.get(1).copied().unwrap_or(0.0)
+    }
+
+    /// Its column among the calibration's.
+    pub(super) fn encoder_shift_column(&self) -> Option<usize> {
+        (self.clocks == FreeClocks::CameraAndEncoders).then(|| self.chain().dof() + 1)
+    }
+
+    /// Names of all columns, free or not.
+    pub(super) fn names(&self) -> Vec<String> {
+        let clocks = self.clocks.names().iter().map(|name| (*name).to_owned());
+        self.chain().parameter_names().into_iter().chain(clocks).collect()
+    }
+
+    /// Units of all columns.
+    pub(super) fn units(&self) -> Vec<&'static str> {
+        let clocks = self.clocks.names().iter().map(|_| "s");
+        self.chain().parameter_units().into_iter().chain(clocks).collect()
+    }
+
+    /// Values of all columns; the camera's clock as Kalibr's `timeshift_cam_imu`.
+    pub(super) fn values(&self) -> Vec<f64> {
+        let given = [self.given_timeshift_s, 0.0];
+        let clocks = self.values.clocks_s.iter().zip(given).map(|(shift_s, given_s)| given_s + shift_s);
+        self.chain().values().iter().copied().chain(clocks).collect()
     }
 
     /// Number of free columns.
     pub(super) fn dof(&self) -> usize {
-        if self.free { self.chain.dof() } else { 0 }
+        if self.free { self.values.dof() } else { 0 }
     }
 
     pub(super) fn joint_count(&self) -> usize {
-        self.chain.joint_count()
+        self.chain().joint_count()
     }
 
     /// Pose of the camera at a frame's joint angles, which a rigid mount does not follow.
     pub(super) fn imu_from_camera(&self, joints_rad: &[f64]) -> RigidTransform {
-        self.chain.imu_from_camera(self.own(joints_rad))
+        self.chain().imu_from_camera(self.own(joints_rad))
     }
 
     fn own<'a>(&self, joints_rad: &'a [f64]) -> &'a [f64] {
         &joints_rad[..self.joint_count().min(joints_rad.len())]
     }
 
-    /// Pose of the camera with its derivatives by the free columns and by the joints.
+    /// Pose of the camera with its derivatives by the free columns and by the joints; clocks do not move the mount.
     pub(super) fn linearize(&self, joints_rad: &[f64]) -> ChainLinearization {
-        let mut linearization = self.chain.linearize(self.own(joints_rad));
-        if !self.free {
-            linearization.by_parameters = linearization.by_parameters.columns(0, 0).into_owned();
+        let mut linearization = self.chain().linearize(self.own(joints_rad));
+        if linearization.by_parameters.ncols() != self.dof() {
+            linearization.by_parameters = linearization.by_parameters.resize_horizontally(self.dof(), 0.0);
         }
         linearization
     }
@@ -82,36 +187,38 @@ impl Calibration {
         if !self.free {
             return self.clone();
         }
-        let chain = match &self.first_estimate {
-            None => self.chain.plus_slice(delta),
-            Some(first) => first.plus(&(self.chain.minus(first) + DVector::from_column_slice(delta))),
+        let values = match &self.first_estimate {
+            None => self.values.plus(delta),
+            Some(first) => first.plus((self.values.minus(first) + DVector::from_column_slice(delta)).as_slice()),
         };
-        Self { chain, ..self.clone() }
+        Self { values, ..self.clone() }
     }
 
     /// `x ⊟ x₀`, `None` without a first estimate.
     pub(super) fn deviation(&self) -> Option<DVector<f64>> {
-        self.first_estimate.as_ref().map(|first| self.chain.minus(first))
+        self.first_estimate.as_ref().map(|first| self.values.minus(first))
     }
 
     /// The calibration at the first estimate, or as it is.
     pub(super) fn at_first_estimate(&self) -> Self {
-        let chain = self.first_estimate.as_ref().unwrap_or(&self.chain).clone();
-        Self { chain, ..self.clone() }
+        let values = self.first_estimate.as_ref().unwrap_or(&self.values).clone();
+        Self { values, ..self.clone() }
     }
 
     /// The prior holds the calibration (keep the first estimate, or take the present one), or holds it no more.
     pub(super) fn keep_first_estimate(&mut self, held: bool) {
         self.first_estimate = match self.first_estimate.take() {
             Some(first) if held => Some(first),
-            None if held => Some(self.chain.clone()),
+            None if held => Some(self.values.clone()),
             _ => None,
         };
     }
 
-    /// Whitened deviation from the given chain.
+    /// Whitened deviation from the given chain and from clocks that agree.
     pub(super) fn prior_residual(&self) -> DVector<f64> {
-        &self.given.square_root_information * self.chain.minus(&self.given.chain)
+        let chain = &self.given.square_root_information * self.chain().minus(&self.given.chain);
+        let clocks = self.values.clocks_s.iter().map(|shift_s| shift_s / CLOCK_SIGMA_S);
+        DVector::from_iterator(self.values.dof(), chain.iter().copied().chain(clocks))
     }
 
     /// Its derivative by a step.
@@ -119,17 +226,19 @@ impl Calibration {
     /// For rotation blocks the logarithm of the deviation turns with the deviation itself, and a step counts from the first
     /// estimate; the inner blocks of `poe` are taken as flat.
     pub(super) fn prior_jacobian(&self) -> DMatrix<f64> {
-        let mut jacobian = self.given.square_root_information.clone();
-        let starts: &[usize] = match self.chain.parameterization() {
-            Parameterization::Classical => &[0, self.chain.dof() - 6],
-            Parameterization::Poe => &[self.chain.dof() - 6],
+        let (all, chain) = (self.values.dof(), self.chain().dof());
+        let mut jacobian = self.given.square_root_information.clone().resize(all, all, 0.0);
+        (chain..all).for_each(|clock| jacobian[(clock, clock)] = CLOCK_SIGMA_S.recip());
+        let starts: &[usize] = match self.chain().parameterization() {
+            Parameterization::Classical => &[0, chain - 6],
+            Parameterization::Poe => &[chain - 6],
             _ if self.joint_count() == 0 => &[0],
             _ => &[],
         };
         if starts.is_empty() {
             return jacobian;
         }
-        let from_given = self.chain.minus(&self.given.chain);
+        let from_given = self.chain().minus(&self.given.chain);
         let from_first = self.deviation();
         for start in starts {
             let turn: Vector3<f64> = from_given.fixed_rows::<3>(*start).into_owned();
@@ -144,24 +253,30 @@ impl Calibration {
     }
 
     /// Prior standard deviation of each column.
-    pub(super) fn prior_sigmas(&self) -> &DVector<f64> {
-        &self.given.prior_sigmas
+    pub(super) fn prior_sigmas(&self) -> impl Iterator<Item = f64> + '_ {
+        let clocks = std::iter::repeat_n(CLOCK_SIGMA_S, self.values.clocks_s.len());
+        self.given.prior_sigmas.iter().copied().chain(clocks)
     }
 
     /// Moves to the truth of a test.
     #[cfg(test)]
     pub(super) fn set_chain(&mut self, chain: Chain) {
-        self.chain = chain;
+        self.values.chain = chain;
     }
 
     /// Goes over to another chart; returns how the old columns follow the new ones at the first estimate.
     pub(super) fn switch_chart(&mut self, parameterization: Parameterization) -> DMatrix<f64> {
-        let offsets = !self.chain.hides_joint_offsets();
-        let old = self.first_estimate.as_ref().unwrap_or(&self.chain).clone();
+        let offsets = !self.chain().hides_joint_offsets();
+        let old = &self.first_estimate.as_ref().unwrap_or(&self.values).chain;
         let new = old.in_parameterization(parameterization);
-        let old_from_new = transport(&new, &old);
-        self.first_estimate = self.first_estimate.as_ref().map(|_| new);
-        self.chain = self.chain.in_parameterization(parameterization);
+        let chain = transport(&new, old);
+        let clocks = self.values.clocks_s.len();
+        let mut old_from_new = DMatrix::identity(chain.nrows() + clocks, chain.ncols() + clocks);
+        old_from_new.view_mut((0, 0), chain.shape()).copy_from(&chain);
+        if let Some(first) = &mut self.first_estimate {
+            first.chain = new;
+        }
+        self.values.chain = self.values.chain.in_parameterization(parameterization);
         self.given = GivenChain::new(&self.given.classical, parameterization, self.given.sigmas, offsets);
         old_from_new
     }

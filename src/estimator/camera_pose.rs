@@ -1,5 +1,7 @@
 //! Where the cameras are, and how that follows the unknowns of the window.
 
+use std::borrow::Cow;
+
 use nalgebra::{DMatrix, Matrix6xX};
 
 use super::calibration::Calibration;
@@ -8,10 +10,18 @@ use super::reprojection::CameraPose;
 use super::window::FrameState;
 use crate::geometry::so3;
 
-/// Pose of the camera at a state: the IMU's pose and the mount at the state's joint angles.
+/// Pose of the camera at a state: the IMU's pose and the mount at the state's joint angles, when the camera's clock says
+/// the frame's stamp.
 pub(super) fn at(state: &FrameState, calibration: &Calibration) -> CameraPose {
+    let state = &*when_seen(state, calibration);
     let pose = state.navigation.world_from_imu * calibration.imu_from_camera(&state.joints_rad);
     CameraPose { rotation: pose.rotation_matrix(), position_m: pose.translation_m }
+}
+
+/// The state at which the camera took its picture, since its clock may be off.
+fn when_seen<'a>(state: &'a FrameState, calibration: &Calibration) -> Cow<'a, FrameState> {
+    let shift_s = calibration.camera_shift_s();
+    if shift_s == 0.0 { Cow::Borrowed(state) } else { Cow::Owned(state.later(shift_s)) }
 }
 
 /// Poses of the camera by slot.
@@ -30,9 +40,12 @@ pub(super) struct CameraMaps {
 
 impl CameraMaps {
     /// The maps at these states and this calibration.
+    ///
+    /// That a clock's offset multiplies speed and gyroscope bias is left out: a centisecond of a bias' change moves nothing.
     pub(super) fn new(frames: &[FrameState], calibration: &Calibration) -> Self {
         let mut maps = Self { own: Vec::new(), calibration: Vec::new() };
-        for state in frames {
+        for stamped in frames {
+            let state = &*when_seen(stamped, calibration);
             let chain = calibration.linearize(&state.joints_rad);
             let world_from_imu = state.navigation.world_from_imu.rotation_matrix();
             let camera_from_imu = chain.imu_from_camera.rotation_matrix().transpose();
@@ -50,8 +63,18 @@ impl CameraMaps {
             };
             // A rigid camera does not follow the joints.
             own.columns_mut(POSE, chain.by_joints.ncols()).copy_from(&carried(&chain.by_joints));
+            let mut by_calibration = carried(&chain.by_parameters);
+            if let Some(column) = calibration.camera_shift_column() {
+                by_calibration.set_column(column, &(&own * state.motion()));
+            }
+            if calibration.camera_shift_s() != 0.0 {
+                // The attitude that is unknown is the one at the stamp.
+                let at_stamp = stamped.navigation.world_from_imu.rotation_matrix();
+                let by_turn = own.fixed_columns::<3>(0) * world_from_imu.tr_mul(&at_stamp);
+                own.fixed_columns_mut::<3>(0).copy_from(&by_turn);
+            }
             maps.own.push(own);
-            maps.calibration.push(carried(&chain.by_parameters));
+            maps.calibration.push(by_calibration);
         }
         maps
     }

@@ -29,6 +29,11 @@ pub struct EstimatorConfig {
     pub calibrate: bool,
     /// Standard deviations of the given chain's numbers, in metres and radians; `None` for [`DEFAULT_CHAIN_PRIOR`].
     pub chain_prior: Option<(f64, f64)>,
+    /// Whether the offsets of the clocks of cameras and encoders against the inertial sensor's are estimated as well; only
+    /// together with `calibrate`.
+    pub estimate_timeshift: bool,
+    /// What the rig says about `camera`'s offset, in seconds (`t_imu = t_cam + shift`): stamps have it in them already.
+    pub timeshift_s: f64,
     /// Rigid cameras that are watched beside `camera`.
     pub rigid_cameras: Vec<RigidCamera>,
     /// Tunables.
@@ -48,14 +53,21 @@ pub struct RigidCamera {
     pub imu_from_camera: RigidTransform,
     /// Standard deviations of that pose's numbers, in metres and radians.
     pub prior: (f64, f64),
+    /// What the rig says about the offset of its clock, in seconds.
+    pub timeshift_s: f64,
 }
 
 /// Names and values of the six columns of a rigid camera that is watched beside the main one: rotation vector and
 /// translation of its pose on the IMU, behind its key.
 pub fn rigid_columns(key: &str, imu_from_camera: &RigidTransform) -> Vec<(String, f64)> {
     let chain = Chain::from_classical(&rigid_mount(imu_from_camera), Parameterization::Minimal);
-    let name = |name: &String| format!("{key}.{}", name.rsplit('.').next().unwrap_or(name));
-    chain.parameter_names().iter().map(name).zip(chain.values().iter().copied()).collect()
+    let names = chain.parameter_names();
+    names.iter().map(|name| rigid_column(key, name)).zip(chain.values().iter().copied()).collect()
+}
+
+/// What a column of a rigid camera's mount is called when the camera is watched beside the main one.
+pub(super) fn rigid_column(key: &str, name: &str) -> String {
+    format!("{key}.{}", name.rsplit('.').next().unwrap_or(name))
 }
 
 /// A mount without joints.

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use nalgebra::Vector3;
 
-use super::calibration::{Calibration, GivenSigmas};
+use super::calibration::{Calibration, FreeClocks, GivenSigmas};
 use super::calibrations::{Calibrations, MAIN};
 use super::config::{EstimatorConfig, rigid_mount};
 use super::initialization::StandstillEstimate;
@@ -68,9 +68,17 @@ impl Estimator {
             config.calibrate,
             config.encoder_in_use().is_some(),
         );
+        let clocks = |encoders: bool| match (config.estimate_timeshift, encoders) {
+            (false, _) => FreeClocks::None,
+            (true, false) => FreeClocks::Camera,
+            (true, true) => FreeClocks::CameraAndEncoders,
+        };
+        let read = main.joint_count() > 0 && config.encoder_in_use().is_some();
+        let main = main.with_clocks(clocks(read), config.timeshift_s);
         let rigid = config.rigid_cameras.iter().enumerate().map(|(index, camera)| {
             let mount = rigid_mount(&camera.imu_from_camera);
             Calibration::new(&mount, Parameterization::Minimal, given(index + 1), config.calibrate, false)
+                .with_clocks(clocks(false), camera.timeshift_s)
         });
         let calibration = Calibrations::new(main, rigid);
         Self {

@@ -138,6 +138,10 @@ impl Estimator {
             }
             let leaving_part = leaving_part + between;
             let share = own_part / (own_part + leaving_part);
+            // A reading that is late by the clocks' offset is late at either frame's rate.
+            let faster = self.frames[to].state.rates.joint_rad_per_s(joint)
+                - self.frames[from].state.rates.joint_rad_per_s(joint);
+            let turned = turned + faster * self.calibration.of(MAIN).encoder_shift_s();
             let change = wrap_angle(leaving.angles_rad[joint] + turned - own.angles_rad[joint]);
             let lasting = own_lasting.max(leaving_lasting);
             combined.angles_rad[joint] = own.angles_rad[joint] + share * change;

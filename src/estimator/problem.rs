@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, Vector3, Vector6};
 
-use super::calibrations::Calibrations;
+use super::calibrations::{Calibrations, MAIN};
 use super::camera_pose::{self, CameraMaps};
 use super::imu_factor;
 use super::layout::{Layout, POSE, SPEED_BIAS};
@@ -108,7 +108,7 @@ impl Problem<'_> {
             }
         }
         for slot in 0..self.frames.len() {
-            costs.encoder += self.encoder_residuals(slot, &estimate.frames[slot]).map(|(_, r, _)| r * r).sum::<f64>();
+            costs.encoder += self.encoder_residuals(slot, estimate).map(|(_, r, _)| r * r).sum::<f64>();
         }
         costs.rest = self.rest_terms(&estimate.frames).map(|term| term.residual * term.residual).sum();
         if self.layout.calibration > 0 {
@@ -150,20 +150,28 @@ impl Problem<'_> {
         Some(information * residual)
     }
 
-    /// Joint, whitened residual and its derivative, for each encoder reading of a frame.
+    /// Joint, whitened residual and its derivative by the angle, for each encoder reading of a frame.
     pub(super) fn encoder_residuals<'s>(
         &'s self,
         slot: usize,
-        state: &'s FrameState,
+        estimate: &'s Estimate,
     ) -> impl Iterator<Item = (usize, f64, f64)> + 's {
+        let state = &estimate.frames[slot];
+        let shift_s = estimate.calibration.of(MAIN).encoder_shift_s();
         let readings =
             self.frames[slot].encoder.iter().flat_map(|encoder| encoder.angles_rad.iter().zip(&encoder.sigmas_rad));
-        state
-            .joints_rad
-            .iter()
-            .zip(readings)
-            .enumerate()
-            .map(|(joint, (angle, (reading, sigma)))| (joint, wrap_angle(angle - reading) / sigma, 1.0 / sigma))
+        state.joints_rad.iter().zip(readings).enumerate().map(move |(joint, (angle, (reading, sigma)))| {
+            let read = angle + state.rates.joint_rad_per_s(joint) * shift_s;
+            (joint, wrap_angle(read - reading) / sigma, 1.0 / sigma)
+        })
+    }
+
+    /// Column of the offset of the encoders' clock, if that is estimated; its derivative is that of the angle times the
+    /// joint's rate.
+    pub(super) fn encoder_clock_column(&self, estimate: &Estimate) -> Option<usize> {
+        let calibration = &estimate.calibration;
+        let column = calibration.of(MAIN).encoder_shift_column()?;
+        Some(self.layout.calibration().start + calibration.columns(MAIN).start + column)
     }
 
     /// What standing still says about all frames.
@@ -208,11 +216,18 @@ impl Problem<'_> {
                 self.add_imu(slot, &by_from, &by_to, &residual, &mut hessian, &mut gradient);
             }
         }
+        let clock = self.encoder_clock_column(estimate);
         for slot in 0..self.frames.len() {
             let start = self.layout.joints(slot).start;
-            for (joint, residual, slope) in self.encoder_residuals(slot, &estimate.frames[slot]) {
+            for (joint, residual, slope) in self.encoder_residuals(slot, estimate) {
                 hessian[(start + joint, start + joint)] += slope * slope;
                 gradient[start + joint] += slope * residual;
+                if let Some(clock) = clock {
+                    let by_clock = slope * estimate.frames[slot].rates.joint_rad_per_s(joint);
+                    hessian[(clock, start + joint)] += by_clock * slope;
+                    hessian[(clock, clock)] += by_clock * by_clock;
+                    gradient[clock] += by_clock * residual;
+                }
             }
         }
         for term in self.rest_terms(&estimate.frames) {

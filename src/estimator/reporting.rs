@@ -2,8 +2,9 @@
 
 use nalgebra::Vector2;
 
+use super::calibration::Calibration;
 use super::calibrations::MAIN;
-use super::config::rigid_columns;
+use super::config::rigid_column;
 use super::estimator::Estimator;
 use super::problem::Costs;
 use super::solver;
@@ -87,7 +88,7 @@ impl Estimator {
 
     fn calibration_report(&self) -> CalibrationEstimate {
         let cameras = || (0..self.calibration.cameras()).map(|camera| self.calibration.of(camera));
-        let count = cameras().map(|calibration| calibration.chain().dof()).sum();
+        let count = cameras().map(|calibration| calibration.units().len()).sum();
         let chain = self.calibration.of(MAIN).chain();
         let sigmas = if self.calibration.dof() == 0 {
             vec![0.0; count]
@@ -99,10 +100,10 @@ impl Estimator {
         CalibrationEstimate {
             parameterization: chain.parameterization().name().to_owned(),
             names: self.calibration_names(),
-            units: cameras().flat_map(|calibration| calibration.chain().parameter_units()).collect(),
-            values: cameras().flat_map(|calibration| calibration.chain().values().data.as_vec().clone()).collect(),
+            units: cameras().flat_map(Calibration::units).collect(),
+            values: cameras().flat_map(Calibration::values).collect(),
             sigmas,
-            prior_sigmas: cameras().flat_map(|calibration| calibration.prior_sigmas().iter().copied()).collect(),
+            prior_sigmas: cameras().flat_map(Calibration::prior_sigmas).collect(),
             classical: chain.to_classical(),
             margins: chain.margins(),
             rigid_cameras: self
@@ -117,10 +118,10 @@ impl Estimator {
 
     /// Names of the calibration's columns, free or not: the chain's, then those of the rigid cameras behind their keys.
     pub(super) fn calibration_names(&self) -> Vec<String> {
-        let mut names = self.calibration.of(MAIN).chain().parameter_names();
-        let rigid = self.config.rigid_cameras.iter();
-        names
-            .extend(rigid.flat_map(|camera| rigid_columns(&camera.key, &camera.imu_from_camera)).map(|(name, _)| name));
+        let mut names = self.calibration.of(MAIN).names();
+        for (index, camera) in self.config.rigid_cameras.iter().enumerate() {
+            names.extend(self.calibration.of(index + 1).names().iter().map(|name| rigid_column(&camera.key, name)));
+        }
         names
     }
 

@@ -76,10 +76,14 @@ impl Problem<'_> {
 
     /// The encoder readings of a frame, a row each.
     pub(super) fn encoder_rows(&self, slot: usize, estimate: &Estimate) -> DMatrix<f64> {
-        let readings: Vec<_> = self.encoder_residuals(slot, &estimate.frames[slot]).collect();
+        let readings: Vec<_> = self.encoder_residuals(slot, estimate).collect();
+        let clock = self.encoder_clock_column(estimate);
         let mut rows = DMatrix::zeros(readings.len(), self.layout.total() + 1);
         for (row, (joint, residual, slope)) in readings.into_iter().enumerate() {
             rows[(row, self.layout.joints(slot).start + joint)] = slope;
+            if let Some(clock) = clock {
+                rows[(row, clock)] = slope * estimate.frames[slot].rates.joint_rad_per_s(joint);
+            }
             rows[(row, self.layout.total())] = residual;
         }
         rows

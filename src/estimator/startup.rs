@@ -15,7 +15,7 @@ use super::initialization::{
 use super::joints::UNKNOWN_TURN_RAD;
 use super::preintegration::{NavigationState, Preintegration};
 use super::prior::StartPrior;
-use super::window::{Frame, FrameState};
+use super::window::{Frame, FrameState, Rates};
 use super::{Event, EventKind, Phase, StepInput, StepReport};
 use crate::flight_log::{ImuSample, JointAngles};
 use crate::frontend::TrackedFeature;
@@ -261,7 +261,7 @@ impl Estimator {
             self.frames.push(Frame {
                 index: waiting.index,
                 stamp_ns: waiting.stamp_ns,
-                state: FrameState { navigation, joints_rad },
+                state: FrameState { navigation, joints_rad, rates: Rates::at(&waiting.imu, waiting.encoder.as_ref()) },
                 first_estimate: None,
                 encoder: waiting.encoder,
                 rest: None,

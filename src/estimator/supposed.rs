@@ -1,6 +1,8 @@
 //! Windows that nobody flew: supposed states and landmarks whose measurements are exact, linearized by the estimator's own
 //! factors, for asking what a motion would tell before it is flown.
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, Vector3};
 
 use super::calibration::{Calibration, GivenSigmas};
@@ -11,7 +13,7 @@ use super::preintegration::{NavigationState, Preintegration};
 use super::problem::{CameraFactors, Estimate, Problem};
 use super::reprojection::{Landmark, RelativePose};
 use super::visual::{Sighting, Track, VisualModel};
-use super::window::{Frame, FrameState, layout};
+use super::window::{Frame, FrameState, Rates, layout};
 use super::{ColumnBlock, ColumnGroup, Linearization};
 use crate::camera::CameraModel;
 use crate::flight_log::rig::ImuNoise;
@@ -154,13 +156,18 @@ impl SupposedWindow {
                 angles_rad: supposed.joints_rad.clone(),
                 sigmas_rad: vec![sigma_rad; supposed.joints_rad.len()],
                 lasting_sigmas_rad: vec![0.0; supposed.joints_rad.len()],
+                rates_rad_per_s: vec![0.0; supposed.joints_rad.len()],
             }),
             JointKnowledge::Known | JointKnowledge::Unknown => None,
         };
         Frame {
             index: slot,
             stamp_ns: ns_from_seconds(supposed.time_s),
-            state: FrameState { navigation, joints_rad: supposed.joints_rad.clone() },
+            state: FrameState {
+                navigation,
+                joints_rad: supposed.joints_rad.clone(),
+                rates: Arc::new(Rates::default()),
+            },
             first_estimate: None,
             encoder,
             rest: None,

@@ -14,7 +14,7 @@ use super::reprojection::{CameraPose, Landmark};
 use super::solver::{self, Solution, SolverLimits};
 use super::standstill;
 use super::visual::{self, RelativePoses, Sighting, Track, VisualModel};
-use super::window::{self, FeatureMap, Frame, FrameState};
+use super::window::{self, FeatureMap, Frame, FrameState, Rates};
 use super::{Event, EventKind, StepInput};
 use crate::frontend::FeatureId;
 use crate::geometry::seconds_from_ns;
@@ -81,7 +81,7 @@ impl Estimator {
         self.frames.push(Frame {
             index: input.frame_index,
             stamp_ns: input.stamp_ns,
-            state: FrameState { navigation, joints_rad },
+            state: FrameState { navigation, joints_rad, rates: Rates::at(input.imu, encoder.as_ref()) },
             first_estimate: None,
             encoder,
             rest: None,

@@ -1,6 +1,7 @@
 //! The frames of the window and the features that they see.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use nalgebra::{DVector, Vector2, Vector3};
 
@@ -8,9 +9,9 @@ use super::layout::{Layout, POSE, SPEED_BIAS};
 use super::preintegration::{Matrix15, NavigationState, Preintegration, Vector15};
 use super::reprojection::Landmark;
 use super::standstill::Rest;
-use crate::flight_log::JointAngles;
+use crate::flight_log::{ImuSample, JointAngles};
 use crate::frontend::FeatureId;
-use crate::geometry::wrap_angle;
+use crate::geometry::{so3, wrap_angle};
 
 /// The unknowns of one frame (Eq. 7).
 #[derive(Clone, Debug, PartialEq)]
@@ -19,9 +20,63 @@ pub(super) struct FrameState {
     pub(super) navigation: NavigationState,
     /// Joint angles without the static offsets, in radians.
     pub(super) joints_rad: Vec<f64>,
+    /// How fast it all turned, as measured.
+    pub(super) rates: Arc<Rates>,
+}
+
+/// What the sensors measured of the motion at a frame's stamp: where a camera was a moment earlier or later.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Rates {
+    /// What the gyroscope showed, in rad/s.
+    pub(super) gyroscope_rad_per_s: Vector3<f64>,
+    /// What the encoders say about each joint, in rad/s; empty without readings.
+    pub(super) joints_rad_per_s: Vec<f64>,
+}
+
+impl Rates {
+    /// The rates at the last of these samples, whose stamp is the frame's.
+    pub(super) fn at(imu: &[ImuSample], encoder: Option<&JointAngles>) -> Arc<Self> {
+        let gyroscope_rad_per_s = imu.last().map_or_else(Vector3::zeros, |sample| sample.angular_velocity_rad_per_s);
+        let finite = gyroscope_rad_per_s.iter().all(|rate| rate.is_finite());
+        let joints = encoder.map_or_else(Vec::new, |encoder| encoder.rates_rad_per_s.clone());
+        Arc::new(Self {
+            gyroscope_rad_per_s: if finite { gyroscope_rad_per_s } else { Vector3::zeros() },
+            joints_rad_per_s: if joints.iter().all(|rate| rate.is_finite()) { joints } else { Vec::new() },
+        })
+    }
+
+    /// Of one joint, in rad/s; zero where nothing tells it.
+    pub(super) fn joint_rad_per_s(&self, joint: usize) -> f64 {
+        self.joints_rad_per_s.get(joint).copied().unwrap_or(0.0)
+    }
 }
 
 impl FrameState {
+    /// The state so many seconds later, at the rates of this moment.
+    pub(super) fn later(&self, seconds: f64) -> Self {
+        let mut later = self.clone();
+        let turned = self.turn_rate_rad_per_s() * seconds;
+        let pose = &mut later.navigation.world_from_imu;
+        pose.rotation *= so3::exp(&turned);
+        pose.translation_m += self.navigation.velocity_m_per_s * seconds;
+        for (joint, angle) in later.joints_rad.iter_mut().enumerate() {
+            *angle += self.rates.joint_rad_per_s(joint) * seconds;
+        }
+        later
+    }
+
+    /// Derivative of pose and joints, as [`Layout::camera`] orders them, by time.
+    pub(super) fn motion(&self) -> DVector<f64> {
+        let joints = (0..self.joints_rad.len()).map(|joint| self.rates.joint_rad_per_s(joint));
+        let (turn, shift) = (self.turn_rate_rad_per_s(), self.navigation.velocity_m_per_s);
+        let all: Vec<f64> = turn.iter().chain(shift.iter()).copied().chain(joints).collect();
+        DVector::from_vec(all)
+    }
+
+    fn turn_rate_rad_per_s(&self) -> Vector3<f64> {
+        self.rates.gyroscope_rad_per_s - self.navigation.bias.gyroscope_rad_per_s
+    }
+
     /// `x ⊞ δ` with `δ` in the order of [`Layout`]: pose, joints, speed and biases.
     pub(super) fn plus(&self, delta: &[f64]) -> Self {
         let joints = self.joints_rad.len();
@@ -31,6 +86,7 @@ impl FrameState {
         Self {
             navigation: self.navigation.plus(&navigation),
             joints_rad: self.joints_rad.iter().zip(&delta[POSE..]).map(|(angle, step)| angle + step).collect(),
+            rates: Arc::clone(&self.rates),
         }
     }
 

@@ -56,6 +56,16 @@ fn calibrated_rig(recording: &Recording, run: &RunRecord) -> Rig {
             *imu_from_camera = *pose;
         }
     }
+    for (name, shift_s) in calibration.names.iter().zip(&calibration.values) {
+        let key = match name.strip_suffix("timeshift") {
+            Some("") => run.camera_key.as_str(),
+            Some(owner) => owner.trim_end_matches('.'),
+            None => continue,
+        };
+        if let Some(camera) = rig.cameras.iter_mut().find(|camera| camera.key == key) {
+            camera.timeshift_cam_imu_s = *shift_s;
+        }
+    }
     let chain = &calibration.classical;
     let Some(camera) = rig.cameras.iter_mut().find(|camera| camera.key == run.camera_key) else { return rig };
     match &mut camera.mount {

@@ -26,7 +26,7 @@ pub struct JointSample {
 
 /// The joint angles at an image's stamp as the encoders tell them, in the order of the rig's links, without the static
 /// offsets.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct JointAngles {
     /// One angle per joint in radians.
     pub angles_rad: Vec<f64>,
@@ -34,6 +34,8 @@ pub struct JointAngles {
     pub sigmas_rad: Vec<f64>,
     /// The part of it that neighbouring images share, so that no average takes it away (zero for white noise).
     pub lasting_sigmas_rad: Vec<f64>,
+    /// How fast each joint turns in rad/s, as far as the readings around the stamp tell it; zero where they do not.
+    pub rates_rad_per_s: Vec<f64>,
 }
 
 impl JointAngles {

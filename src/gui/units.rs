@@ -10,11 +10,12 @@ pub(crate) struct Shown {
 }
 
 impl Shown {
-    /// How a stored unit (`rad`, `m`) is shown; others stay as they are, without a unit.
+    /// How a stored unit (`rad`, `m`, `s`) is shown; others stay as they are, without a unit.
     pub(crate) fn of(stored_unit: &str) -> Self {
         match stored_unit {
             "rad" => Self { factor: 180.0 / std::f64::consts::PI, unit: "°" },
             "m" => Self { factor: 1000.0, unit: " mm" },
+            "s" => Self { factor: 1000.0, unit: " ms" },
             _ => Self { factor: 1.0, unit: "" },
         }
     }

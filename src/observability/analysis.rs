@@ -6,7 +6,7 @@ use crate::estimator::{ColumnGroup, Linearization};
 use crate::geometry::dense;
 use crate::gimbal::Chain;
 
-use super::classification::{ROTATION_SCALE_RAD, TRANSLATION_SCALE_M, classify, tolerance};
+use super::classification::{ROTATION_SCALE_RAD, TIME_SCALE_S, TRANSLATION_SCALE_M, classify, tolerance};
 use super::directions::weak_directions;
 use super::elimination::{Rows, column_norms};
 use super::structure::{compare, known_losses};
@@ -22,7 +22,7 @@ const BANDED_COLUMNS: usize = 27;
 /// What the calibration columns are multiplied by, so that angles and lengths compare and 1 means as much as the scale.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum ScalingRule {
-    /// 10° for angles and 3 cm for lengths, the same for every rig.
+    /// 10° for angles, 3 cm for lengths and 20 ms for clocks, the same for every rig.
     #[default]
     Fixed,
     /// A standard deviation for each column, such as the rig's prior: 1 then means as much as was known before.
@@ -37,15 +37,13 @@ impl ScalingRule {
         };
         DVector::from_fn(columns.len(), |index, _| match given {
             Some(sigmas) => sigmas[index],
-            None if is_length(&columns[index]) => TRANSLATION_SCALE_M,
-            None => ROTATION_SCALE_RAD,
+            None => match columns[index].rsplit('.').next() {
+                Some("tx" | "ty" | "tz" | "d" | "a" | "y" | "vx" | "vy") => TRANSLATION_SCALE_M,
+                Some("timeshift") => TIME_SCALE_S,
+                _ => ROTATION_SCALE_RAD,
+            },
         })
     }
-}
-
-/// Whether a calibration column is a length, by the last part of its name.
-fn is_length(name: &str) -> bool {
-    matches!(name.rsplit('.').next(), Some("tx" | "ty" | "tz" | "d" | "a" | "y" | "vx" | "vy"))
 }
 
 /// The ranks of a step's calibration, columns scaled by 10° and 3 cm; `None` when the linearization is not finite.

@@ -8,6 +8,8 @@ use crate::gimbal::{Chain, generic_joint_angles, stacked_jacobian};
 /// Scales that make a radian and a metre comparable: 10° and 3 cm.
 pub(super) const ROTATION_SCALE_RAD: f64 = 10.0 * std::f64::consts::PI / 180.0;
 pub(super) const TRANSLATION_SCALE_M: f64 = 0.03;
+/// Unit of the columns of clocks.
+pub(super) const TIME_SCALE_S: f64 = 0.02;
 
 /// How many columns are lost to what.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

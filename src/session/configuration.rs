@@ -56,6 +56,8 @@ pub(super) fn estimator_config(rig: &Rig, spec: &RunSpec) -> Result<EstimatorCon
         encoder_sigma_rad,
         use_encoder: spec.encoder && encoder_sigma_rad.is_some(),
         calibrate: spec.calibrate,
+        estimate_timeshift: spec.timeshift,
+        timeshift_s: camera.timeshift_cam_imu_s,
         chain_prior: Some(sigmas(prior)),
         rigid_cameras: rigid.into_iter().filter_map(|camera| rigid_camera(rig, camera)).collect(),
         options: EstimatorOptions { window: spec.window, keep_linearization: true, ..EstimatorOptions::default() },
@@ -70,6 +72,7 @@ fn rigid_camera(rig: &Rig, camera: &CameraRig) -> Option<RigidCamera> {
         model: camera.model.clone(),
         imu_from_camera: *imu_from_camera,
         prior: sigmas(mount_prior(rig, camera)),
+        timeshift_s: camera.timeshift_cam_imu_s,
     })
 }
 

@@ -17,6 +17,7 @@ fn tracked(frame: &SyntheticFrame, encoder_sigma_rad: f64) -> TrackedSensorFrame
         angles_rad: angles_rad.clone(),
         sigmas_rad: vec![encoder_sigma_rad; angles_rad.len()],
         lasting_sigmas_rad: vec![0.0; angles_rad.len()],
+        rates_rad_per_s: vec![0.0; angles_rad.len()],
     });
     TrackedSensorFrame {
         frame: SensorFrame {

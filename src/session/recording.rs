@@ -211,8 +211,11 @@ impl RunRecord {
         let main = rig.chain_of_camera(&self.camera_key)?;
         let chain = Chain::from_classical(&main, estimate.parameterization.parse().ok()?);
         let mut values: Vec<_> = chain.parameter_names().into_iter().zip(chain.values().iter().copied()).collect();
+        let timeshift = |key: &str| rig.camera(key).map(|camera| camera.timeshift_cam_imu_s).ok();
+        values.push(("timeshift".to_owned(), timeshift(&self.camera_key)?));
         for (key, _) in &estimate.rigid_cameras {
             values.extend(rigid_columns(key, &rig.chain_of_camera(key)?.imu_from_camera(&[])));
+            values.push((format!("{key}.timeshift"), timeshift(key)?));
         }
         Some(values)
     }

@@ -87,7 +87,9 @@ impl RunEngine {
         let parameterization = calibration.parameterization.parse().ok()?;
         let chain = Chain::from_classical(&calibration.classical, parameterization);
         let rigid = RIGID_COLUMNS * calibration.rigid_cameras.len();
-        let chain = if chain.dof() + rigid == calibration.names.len() { chain } else { chain.without_joint_offsets() };
+        let clocks = calibration.units.iter().filter(|unit| **unit == "s").count();
+        let mounts = calibration.names.len() - clocks;
+        let chain = if chain.dof() + rigid == mounts { chain } else { chain.without_joint_offsets() };
         let rank = analyse(&linearization, &chain, &angles, self.joints_free);
         let kept = self.keep_linearization_every.is_some_and(|every| report.frame_index.is_multiple_of(every));
         report.linearization = kept.then_some(linearization);

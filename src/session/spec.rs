@@ -63,6 +63,8 @@ pub struct RunSpec {
     pub encoder: bool,
     /// Whether the static calibration is estimated (`calibrate=off` clears it).
     pub calibrate: bool,
+    /// Whether the offsets of the clocks of cameras and encoders are estimated (`timeshift=on` sets it).
+    pub timeshift: bool,
     /// Number of keyframes in the window (`window=10`).
     pub window: usize,
     /// Camera to watch (`camera=cam1`); `None` is the gimballed one, or the first rigid one for `static` and for rigs
@@ -77,6 +79,7 @@ impl Default for RunSpec {
             parameterization: ParameterizationChoice::Auto,
             encoder: true,
             calibrate: true,
+            timeshift: false,
             window: DEFAULT_WINDOW,
             camera_key: None,
         }
@@ -123,6 +126,9 @@ impl FromStr for RunSpec {
                 "calibrate" => {
                     run.calibrate = on_or_off(value).map_err(|problem| bad(format!("calibrate: {problem}")))?;
                 }
+                "timeshift" => {
+                    run.timeshift = on_or_off(value).map_err(|problem| bad(format!("timeshift: {problem}")))?;
+                }
                 "window" => {
                     run.window =
                         value.parse().ok().filter(|window| WINDOW_RANGE.contains(window)).ok_or_else(|| {
@@ -136,10 +142,13 @@ impl FromStr for RunSpec {
                     return Err(bad(format!("name is '{value}', expected letters, digits, '-', '_' and '.' only")));
                 }
                 _ => {
-                    let known = "encoder, calibrate, window, camera, name";
+                    let known = "encoder, calibrate, timeshift, window, camera, name";
                     return Err(bad(format!("unknown key '{key}', expected one of {known}")));
                 }
             }
+        }
+        if run.timeshift && !run.calibrate {
+            return Err(bad("timeshift=on estimates part of the calibration; leave calibrate=off out".to_owned()));
         }
         Ok(run)
     }
@@ -154,6 +163,9 @@ impl fmt::Display for RunSpec {
         }
         if !self.calibrate {
             options.push("calibrate=off".to_owned());
+        }
+        if self.timeshift {
+            options.push("timeshift=on".to_owned());
         }
         if self.window != standard.window {
             options.push(format!("window={}", self.window));

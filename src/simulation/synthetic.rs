@@ -64,6 +64,8 @@ pub struct SyntheticOptions {
     pub imu_noise_scale: f64,
     /// Noise of the encoders; `None` without encoders.
     pub encoder_sigma_rad: Option<f64>,
+    /// How long after their stamps the camera took its images and the encoders their readings, in seconds.
+    pub clock_offsets_s: [f64; 2],
     /// How wrong the given rig's chain is.
     pub start_error: ChainPrior,
     /// How far the gimbal looks around in yaw, in radians (pitch 0.4 and roll 0.15 of it); 0 stabilizes only.
@@ -87,6 +89,7 @@ impl Default for SyntheticOptions {
             features: 150,
             imu_noise_scale: 1.0,
             encoder_sigma_rad: Some(0.5_f64.to_radians()),
+            clock_offsets_s: [0.0; 2],
             start_error: Experiment::T1.start_error(),
             look_around_rad: 0.5,
             lens: Lens::Pinhole,
@@ -117,7 +120,9 @@ pub struct SyntheticFrame {
     pub true_bias: ImuBias,
     /// True joint angles, empty for a rigid camera.
     pub true_joint_angles_rad: Vec<f64>,
-    /// True pose of the camera in the world.
+    /// True rates of the joints in rad/s, empty for a rigid camera.
+    pub true_joint_rates_rad_per_s: Vec<f64>,
+    /// True pose of the camera in the world when it took the image.
     pub true_world_from_camera: RigidTransform,
 }
 
@@ -136,6 +141,8 @@ pub struct SyntheticFlight {
 
 /// Stamp of the first frame.
 const FIRST_FRAME_S: f64 = 0.003;
+/// Half the time over which the rate of a joint is taken.
+const RATE_STEP_S: f64 = 0.005;
 
 /// Flies a synthetic flight.
 pub fn synthetic_tracks(options: &SyntheticOptions) -> SyntheticFlight {
@@ -182,22 +189,28 @@ pub fn synthetic_tracks(options: &SyntheticOptions) -> SyntheticFlight {
         let time_s = FIRST_FRAME_S + index as f64 / options.frame_rate_hz;
         let stamp_ns = ns_from_seconds(time_s);
         let truth = scenario.trajectory.at(time_s);
-        let true_world_from_camera = scenario.world_from_camera(camera, time_s);
-        let true_joint_angles_rad = scenario.joint_angles_rad(time_s).unwrap_or_default();
-        let joint_angles_rad = options
-            .encoder_sigma_rad
-            .filter(|_| gimbal)
-            .map(|sigma| true_joint_angles_rad.iter().map(|angle| angle + sigma * encoders.normal()).collect());
+        let [camera_offset_s, encoder_offset_s] = options.clock_offsets_s;
+        let true_world_from_camera = scenario.world_from_camera(camera, time_s + camera_offset_s);
+        let joint_angles_rad = |time_s: f64| scenario.joint_angles_rad(time_s).unwrap_or_default();
+        let true_joint_angles_rad = joint_angles_rad(time_s);
+        let (before, after) = (joint_angles_rad(time_s - RATE_STEP_S), joint_angles_rad(time_s + RATE_STEP_S));
+        let true_joint_rates_rad_per_s =
+            before.iter().zip(&after).map(|(before, after)| (after - before) / (2.0 * RATE_STEP_S)).collect();
+        let read_angles_rad = options.encoder_sigma_rad.filter(|_| gimbal).map(|sigma| {
+            let read = joint_angles_rad(time_s + encoder_offset_s);
+            read.iter().map(|angle| angle + sigma * encoders.normal()).collect()
+        });
         frames.push(SyntheticFrame {
             index,
             stamp_ns,
             imu: scenario.inertial.between(previous_ns, stamp_ns),
-            joint_angles_rad,
+            joint_angles_rad: read_angles_rad,
             tracks: tracker.track(stamp_ns, &true_world_from_camera),
             true_world_from_imu: truth.world_from_imu,
             true_velocity_m_per_s: truth.velocity_m_per_s,
             true_bias: scenario.inertial.bias_at(stamp_ns),
             true_joint_angles_rad,
+            true_joint_rates_rad_per_s,
             true_world_from_camera,
         });
         previous_ns = stamp_ns;

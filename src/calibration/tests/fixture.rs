@@ -49,6 +49,7 @@ fn views(flight: &SyntheticFlight, encoder_sigma_rad: f64) -> Vec<TrackedView> {
             joint_angles: frame.joint_angles_rad.clone().map(|angles_rad| JointAngles {
                 sigmas_rad: vec![encoder_sigma_rad; angles_rad.len()],
                 lasting_sigmas_rad: vec![0.0; angles_rad.len()],
+                rates_rad_per_s: vec![0.0; angles_rad.len()],
                 angles_rad,
             }),
             tracks: Arc::new(frame.tracks.clone()),
@@ -93,6 +94,8 @@ pub(super) fn flight(options: &SyntheticOptions) -> Flight {
             encoder_sigma_rad: None,
             use_encoder: false,
             calibrate: true,
+            estimate_timeshift: false,
+            timeshift_s: 0.0,
             chain_prior: Some((0.0017, 0.005)),
             rigid_cameras: Vec::new(),
             options: EstimatorOptions::default(),

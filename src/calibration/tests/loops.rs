@@ -84,6 +84,7 @@ fn example(seed: u64, encoder_sigma_rad: f64, noise: (f64, f64), still: bool) ->
                             angles_rad: readings,
                             sigmas_rad: vec![encoder_sigma_rad; 3],
                             lasting_sigmas_rad: vec![0.0; 3],
+                            rates_rad_per_s: vec![0.0; 3],
                         },
                     }
                 })

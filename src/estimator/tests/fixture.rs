@@ -8,7 +8,7 @@ use crate::estimator::calibrations::MAIN;
 use crate::estimator::layout::Layout;
 use crate::estimator::preintegration::{ImuBias, NavigationState, Preintegration};
 use crate::estimator::prior::StartPrior;
-use crate::estimator::window::{Frame, FrameState};
+use crate::estimator::window::{Frame, FrameState, Rates};
 use crate::estimator::{DEFAULT_CHAIN_PRIOR, Estimator, EstimatorConfig, EstimatorOptions, RigidCamera, features};
 use crate::flight_log::{JointAngles, Rig};
 use crate::gimbal::{Chain, Parameterization};
@@ -32,6 +32,8 @@ pub(super) fn config(rig: &Rig, parameterization: Parameterization, options: Est
         encoder_sigma_rad: rig.gimbal.as_ref().and_then(|gimbal| gimbal.encoder_sigma_rad),
         use_encoder: true,
         calibrate: true,
+        estimate_timeshift: false,
+        timeshift_s: 0.0,
         chain_prior: rig
             .gimbal
             .as_ref()
@@ -45,6 +47,7 @@ pub(super) fn config(rig: &Rig, parameterization: Parameterization, options: Est
 /// The camera of a rigid flight, as one that is watched beside another.
 pub(super) fn rigid_camera(flight: &SyntheticFlight) -> RigidCamera {
     RigidCamera {
+        timeshift_s: 0.0,
         key: "cam1".to_owned(),
         model: flight.given_rig.cameras[0].model.clone(),
         imu_from_camera: flight.given_rig.chain_of_camera("cam0").unwrap().imu_from_camera(&[]),
@@ -57,7 +60,12 @@ pub(super) fn encoder(frame: &SyntheticFrame, sigma_rad: Option<f64>) -> Option<
     let sigma_rad = sigma_rad?;
     let angles_rad = frame.joint_angles_rad.clone()?;
     let count = angles_rad.len();
-    Some(JointAngles { angles_rad, sigmas_rad: vec![sigma_rad; count], lasting_sigmas_rad: vec![0.0; count] })
+    Some(JointAngles {
+        angles_rad,
+        sigmas_rad: vec![sigma_rad; count],
+        lasting_sigmas_rad: vec![0.0; count],
+        rates_rad_per_s: frame.true_joint_rates_rad_per_s.clone(),
+    })
 }
 
 fn flight(gimbal: bool) -> SyntheticFlight {
@@ -74,12 +82,13 @@ pub(super) fn window(parameterization: Parameterization, gimbal: bool, options: 
     window_of(&flight(gimbal), None, config(&flight(gimbal).given_rig, parameterization, options))
 }
 
-/// The same with a rigid camera beside the gimballed one.
-pub(super) fn cluster_window(options: EstimatorOptions) -> Estimator {
+/// The same with a rigid camera beside the gimballed one, and with the offsets of all clocks.
+pub(super) fn cluster_window(options: EstimatorOptions, estimate_timeshift: bool) -> Estimator {
     let (main, rigid) = (flight(true), flight(false));
     assert_eq!(main.frames[7].imu, rigid.frames[7].imu, "one flight");
     let config = EstimatorConfig {
         rigid_cameras: vec![rigid_camera(&rigid)],
+        estimate_timeshift,
         ..config(&main.given_rig, Parameterization::Minimal, options)
     };
     window_of(&main, Some(&rigid), config)
@@ -119,6 +128,7 @@ fn window_of(flight: &SyntheticFlight, rigid: Option<&SyntheticFlight>, config: 
                     bias,
                 },
                 joints_rad: truth.true_joint_angles_rad.clone(),
+                rates: Rates::at(&truth.imu, encoder(truth, estimator.config.encoder_sigma_rad).as_ref()),
             },
             first_estimate: None,
             encoder: encoder(truth, estimator.config.encoder_sigma_rad),
@@ -151,7 +161,7 @@ pub(super) fn marginalize_once(estimator: &mut Estimator) {
     assert!(estimator.prior.is_some());
 }
 
-/// Moves every unknown at random; `scale` 1 is 2 cm and 1° of pose, 0.1 m/s, 2 mm and 0.2° of calibration.
+/// Moves every unknown but the clocks at random; `scale` 1 is 2 cm and 1° of pose, 0.1 m/s, 2 mm and 0.2° of calibration.
 pub(super) fn shake(estimator: &mut Estimator, scale: f64) {
     let mut random = Noise::new(11);
     let layout = Layout {
@@ -171,10 +181,11 @@ pub(super) fn shake(estimator: &mut Estimator, scale: f64) {
             delta[column] = random.normal() * [0.1, 0.003, 0.05][offset / 3];
         }
     }
-    let units = (0..estimator.calibration.cameras())
-        .flat_map(|camera| estimator.calibration.of(camera).chain().parameter_units());
+    let units = (0..estimator.calibration.cameras()).flat_map(|camera| estimator.calibration.of(camera).units());
     for (unit, column) in units.zip(layout.calibration()) {
-        delta[column] = random.normal() * if unit == "rad" { 0.0035 } else { 0.002 };
+        // Derivatives by speed and bias, which an offset of the clocks multiplies, are left out.
+        let scale = [("rad", 0.0035), ("m", 0.002)].into_iter().find_map(|(of, scale)| (of == unit).then_some(scale));
+        delta[column] = scale.map_or(0.0, |scale| scale * random.normal());
     }
     delta *= scale;
     for (slot, frame) in estimator.frames.iter_mut().enumerate() {

@@ -1,5 +1,6 @@
 //! Tests of the estimator.
 
+mod clocks;
 mod cluster;
 mod fixture;
 mod flight;

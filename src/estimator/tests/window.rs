@@ -21,7 +21,7 @@ fn quadratic() -> EstimatorOptions {
     EstimatorOptions { loss: RobustLoss::None, ..EstimatorOptions::default() }
 }
 
-/// A gimbal's window in each form, a rigid camera's, and one of both cameras.
+/// A gimbal's window in each form, a rigid camera's, and one of both cameras, also with the offsets of their clocks.
 fn windows() -> Vec<(&'static str, Estimator)> {
     let gimbal = |parameterization| fixture::window(parameterization, true, quadratic());
     vec![
@@ -30,7 +30,8 @@ fn windows() -> Vec<(&'static str, Estimator)> {
         ("classical", gimbal(Parameterization::Classical)),
         ("poe", gimbal(Parameterization::Poe)),
         ("rigid", fixture::window(Parameterization::Minimal, false, quadratic())),
-        ("cluster", fixture::cluster_window(quadratic())),
+        ("cluster", fixture::cluster_window(quadratic(), false)),
+        ("cluster with clocks", fixture::cluster_window(quadratic(), true)),
     ]
 }
 

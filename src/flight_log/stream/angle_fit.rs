@@ -9,6 +9,7 @@ pub(in crate::flight_log) type Reading = (f64, f64);
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::flight_log) struct FittedAngle {
     pub(in crate::flight_log) angle_rad: f64,
+    pub(in crate::flight_log) rate_rad_per_s: f64,
     /// From white noise on the readings, and from what the motion between them may have done.
     pub(in crate::flight_log) variance_rad2: f64,
 }
@@ -30,7 +31,11 @@ pub(in crate::flight_log) fn fit(readings: &[Reading], white_variance_rad2: f64)
         return None;
     }
     let parabola = Parabola::fit(readings, white_variance_rad2, Some(0.5 * ACCELERATION_RAD_PER_S2))?;
-    Some(FittedAngle { angle_rad: parabola.coefficients[0], variance_rad2: parabola.variance })
+    Some(FittedAngle {
+        angle_rad: parabola.coefficients[0],
+        rate_rad_per_s: parabola.coefficients[1] / parabola.span_s,
+        variance_rad2: parabola.variance,
+    })
 }
 
 /// Squared distances from the plain parabola through the readings, summed, and the degrees of freedom left for them.

@@ -102,30 +102,32 @@ impl EncoderAverage {
         let joints = nearest.angles_rad.len();
         let given = self.sigma_rad * self.sigma_rad;
         let (mut angles_rad, mut sigmas_rad, mut lasting_sigmas_rad) = (Vec::new(), Vec::new(), Vec::new());
+        let mut rates_rad_per_s = Vec::new();
         for joint in 0..joints {
             let near = |samples: &[&JointSample]| readings_of(samples, joint, nearest.angles_rad[joint], stamp_ns);
             let averaged = self.noise.at(stamp_ns, joint).filter(|_| batch.len() >= LEAST_BATCH).and_then(|noise| {
                 let fitted = angle_fit::fit(&near(&batch), noise.variance.max(1e-6 * given))?;
                 let lasting = (given - noise.upper_bound()).max(0.0);
                 let variance = fitted.variance_rad2 + lasting;
-                (variance < given).then_some((fitted.angle_rad, variance, lasting))
+                (variance < given).then_some((fitted.angle_rad, fitted.rate_rad_per_s, variance, lasting))
             });
             // Two readings that the neighbouring images may use as well: nothing is averaged.
             let interpolated = || {
                 let fitted = angle_fit::fit(&near(&pair), given)?;
                 let apart_ns = (pair[1].stamp_ns - stamp_ns).max(stamp_ns - pair[0].stamp_ns);
                 let between = pair[0].stamp_ns <= stamp_ns && apart_ns <= NEAREST_NS;
-                between.then(|| (fitted.angle_rad, fitted.variance_rad2.max(given), given))
+                between.then(|| (fitted.angle_rad, fitted.rate_rad_per_s, fitted.variance_rad2.max(given), given))
             };
-            let (angle, variance, lasting) = averaged.or_else(interpolated).unwrap_or_else(|| {
+            let (angle, rate, variance, lasting) = averaged.or_else(interpolated).unwrap_or_else(|| {
                 let turned = UNKNOWN_RATE_RAD_PER_S * seconds_from_ns(nearest.stamp_ns - stamp_ns);
-                (nearest.angles_rad[joint], given + turned * turned, given)
+                (nearest.angles_rad[joint], 0.0, given + turned * turned, given)
             });
             angles_rad.push(angle);
+            rates_rad_per_s.push(rate);
             sigmas_rad.push(variance.sqrt());
             lasting_sigmas_rad.push(lasting.sqrt());
         }
-        Some(JointAngles { angles_rad, sigmas_rad, lasting_sigmas_rad })
+        Some(JointAngles { angles_rad, sigmas_rad, lasting_sigmas_rad, rates_rad_per_s })
     }
 
     /// Forgets readings that no later stamp needs, but keeps the last one before the time.

@@ -24,6 +24,7 @@ pub struct AddRunDialog {
     choice: usize,
     encoder: bool,
     calibrate: bool,
+    timeshift: bool,
     window: usize,
     name: String,
 }
@@ -36,6 +37,7 @@ impl Default for AddRunDialog {
             choice: 3,
             encoder: standard.encoder,
             calibrate: standard.calibrate,
+            timeshift: standard.timeshift,
             window: standard.window,
             name: String::new(),
         }
@@ -61,6 +63,9 @@ impl AddRunDialog {
         }
         if !self.calibrate {
             options.push("calibrate=off".to_owned());
+        }
+        if self.timeshift && self.calibrate {
+            options.push("timeshift=on".to_owned());
         }
         if self.window != RunSpec::default().window {
             options.push(format!("window={}", self.window));
@@ -130,6 +135,9 @@ impl AddRunDialog {
             ui.end_row();
             ui.label("Estimate");
             ui.checkbox(&mut self.calibrate, "Static calibration");
+            ui.end_row();
+            ui.label("");
+            ui.add_enabled_ui(self.calibrate, |ui| ui.checkbox(&mut self.timeshift, "Offsets of the clocks"));
             ui.end_row();
             let name = ui.label("Keyframes in the window");
             ui.add(egui::DragValue::new(&mut self.window).range(4..=30)).labelled_by(name.id);

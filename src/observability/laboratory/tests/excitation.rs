@@ -44,6 +44,8 @@ fn estimator(rig: &Rig) -> Estimator {
         encoder_sigma_rad: gimbal.encoder_sigma_rad,
         use_encoder: true,
         calibrate: true,
+        estimate_timeshift: false,
+        timeshift_s: 0.0,
         chain_prior: Some((gimbal.prior.translation_bound_m / root, gimbal.prior.rotation_bound_rad / root)),
         options: EstimatorOptions { keep_linearization: true, ..EstimatorOptions::default() },
         clock_ms: || 0.0,
@@ -54,7 +56,12 @@ fn step(estimator: &mut Estimator, frame: &SyntheticFrame) -> (StepReport, Optio
     let sigma = estimator.config().encoder_sigma_rad.unwrap();
     let angles_rad = frame.joint_angles_rad.clone().unwrap();
     let count = angles_rad.len();
-    let joints = JointAngles { angles_rad, sigmas_rad: vec![sigma; count], lasting_sigmas_rad: vec![0.0; count] };
+    let joints = JointAngles {
+        angles_rad,
+        sigmas_rad: vec![sigma; count],
+        lasting_sigmas_rad: vec![0.0; count],
+        rates_rad_per_s: vec![0.0; count],
+    };
     let report = estimator.step(&StepInput {
         frame_index: frame.index,
         stamp_ns: frame.stamp_ns,

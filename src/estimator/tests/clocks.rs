@@ -1,0 +1,69 @@
+//! Cameras and encoders whose clocks are off.
+
+use super::fixture;
+use super::flight::{fly, trajectory_error_m};
+use crate::estimator::{EstimatorConfig, EstimatorOptions, StepReport};
+use crate::gimbal::Parameterization;
+use crate::simulation::{SyntheticFlight, SyntheticMount, SyntheticOptions, synthetic_tracks};
+
+fn flight(mount: SyntheticMount, seed: u64, clock_offsets_s: [f64; 2]) -> SyntheticFlight {
+    synthetic_tracks(&SyntheticOptions {
+        mount,
+        seed,
+        duration_s: 12.0,
+        clock_offsets_s,
+        ..SyntheticOptions::default()
+    })
+}
+
+/// Error in metres, and the last report.
+fn flown(flight: &SyntheticFlight, estimate_timeshift: bool) -> (f64, StepReport) {
+    let options = EstimatorOptions::default();
+    let config = EstimatorConfig {
+        estimate_timeshift,
+        ..fixture::config(&flight.given_rig, Parameterization::Minimal, options)
+    };
+    let (_, mut reports) = fly(&flight.frames, config);
+    let (error_m, _) = trajectory_error_m(&flight.frames, &reports);
+    (error_m, reports.pop().expect("a flight has frames"))
+}
+
+/// Value and standard deviation of a parameter, in seconds.
+fn clock(report: &StepReport, name: &str) -> (f64, f64) {
+    let calibration = &report.calibration;
+    let index = calibration.names.iter().position(|known| known == name).expect("the offset has a column");
+    assert_eq!(calibration.units[index], "s");
+    (calibration.values[index], calibration.sigmas[index])
+}
+
+#[test]
+fn the_offset_of_a_rigid_camera_is_found() {
+    for (seed, offset_s) in [(1, 0.01), (2, -0.015), (3, 0.0)] {
+        let flight = flight(SyntheticMount::Static, seed, [offset_s, 0.0]);
+        let (ignored_m, report) = flown(&flight, false);
+        assert!(report.calibration.names.iter().all(|name| !name.contains("timeshift")));
+        let (error_m, report) = flown(&flight, true);
+        let (found_s, sigma_s) = clock(&report, "timeshift");
+        assert!((found_s - offset_s).abs() < 0.001, "seed {seed}: {found_s} of {offset_s} s");
+        assert!(sigma_s > 0.0 && sigma_s < 0.001, "seed {seed}: {sigma_s} s");
+        assert!(
+            offset_s == 0.0 || error_m < 0.7 * ignored_m,
+            "seed {seed}: {ignored_m} m, {error_m} m with the offset"
+        );
+    }
+}
+
+#[test]
+fn offsets_of_a_gimbals_camera_and_of_its_encoders_are_told_apart() {
+    for (seed, offsets_s) in [(1, [0.01, -0.02]), (2, [-0.01, 0.01])] {
+        let flight = flight(SyntheticMount::Gimbal, seed, offsets_s);
+        let (ignored_m, _) = flown(&flight, false);
+        let (error_m, report) = flown(&flight, true);
+        for (name, offset_s) in ["timeshift", "encoder.timeshift"].into_iter().zip(offsets_s) {
+            let (found_s, sigma_s) = clock(&report, name);
+            assert!((found_s - offset_s).abs() < 4.0 * sigma_s, "seed {seed}: {name} {found_s} ± {sigma_s} s");
+            assert!((found_s - offset_s).abs() < 0.002, "seed {seed}: {name} {found_s} of {offset_s} s");
+        }
+        assert!(error_m < 0.7 * ignored_m, "seed {seed}: {ignored_m} m, {error_m} m with the offsets");
+    }
+}
