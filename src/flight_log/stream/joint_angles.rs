@@ -12,6 +12,9 @@ use crate::geometry::{seconds_from_ns, wrap_angle};
 const NEAREST_NS: i64 = 100_000_000;
 /// A batch reaches no further than this to either side: beyond, a stabilized joint is no parabola any more.
 const LONGEST_HALF_BATCH_NS: i64 = 25_000_000;
+/// The rate is taken from so many times the batch to either side, neighbours' readings among them: its noise falls with the
+/// third power of the root of that length, and noise on a rate looks like a smaller offset of the clocks.
+const RATE_BATCHES: i64 = 2;
 /// Fewest readings of a batch: with two there is nothing to average.
 const LEAST_BATCH: usize = 3;
 /// How fast a joint may be turning where a single reading cannot tell, as a standard deviation.
@@ -74,7 +77,7 @@ impl EncoderAverage {
 
     /// Whether readings that belong to a stamp may still be missing.
     pub(super) fn wants_readings(&self, stamp_ns: i64) -> bool {
-        let end_ns = stamp_ns.saturating_add(self.half_batch_ns);
+        let end_ns = stamp_ns.saturating_add(RATE_BATCHES * self.half_batch_ns);
         self.readings.back().is_none_or(|last| last.stamp_ns <= end_ns)
     }
 
@@ -87,12 +90,15 @@ impl EncoderAverage {
     /// The angles at a stamp, and what they are worth.
     pub(super) fn at(&mut self, stamp_ns: i64, previous_ns: Option<i64>) -> Option<JointAngles> {
         let end_ns = stamp_ns.saturating_add(self.half_batch_ns);
-        self.forget_before(stamp_ns.saturating_sub(self.half_batch_ns));
+        let reach_ns = RATE_BATCHES * self.half_batch_ns;
+        self.forget_before(stamp_ns.saturating_sub(reach_ns));
         let begin_ns = previous_ns
             .map_or(i64::MIN, |previous| previous.saturating_add(self.half_batch_ns))
             .max(stamp_ns.saturating_sub(self.half_batch_ns));
         let batch: Vec<&JointSample> =
             self.readings.iter().filter(|sample| (begin_ns + 1..=end_ns).contains(&sample.stamp_ns)).collect();
+        let around: Vec<&JointSample> =
+            self.readings.iter().filter(|sample| (sample.stamp_ns - stamp_ns).abs() <= reach_ns).collect();
         let after = self.readings.iter().position(|sample| sample.stamp_ns > stamp_ns).unwrap_or(self.readings.len());
         let pair: Vec<&JointSample> = self.readings.range(after.saturating_sub(1)..).take(2).collect();
         let nearest = *pair.iter().min_by_key(|sample| (sample.stamp_ns - stamp_ns).abs())?;
@@ -109,18 +115,19 @@ impl EncoderAverage {
                 let fitted = angle_fit::fit(&near(&batch), noise.variance.max(1e-6 * given))?;
                 let lasting = (given - noise.upper_bound()).max(0.0);
                 let variance = fitted.variance_rad2 + lasting;
-                (variance < given).then_some((fitted.angle_rad, fitted.rate_rad_per_s, variance, lasting))
+                (variance < given).then_some((fitted.angle_rad, variance, lasting))
             });
             // Two readings that the neighbouring images may use as well: nothing is averaged.
             let interpolated = || {
                 let fitted = angle_fit::fit(&near(&pair), given)?;
                 let apart_ns = (pair[1].stamp_ns - stamp_ns).max(stamp_ns - pair[0].stamp_ns);
                 let between = pair[0].stamp_ns <= stamp_ns && apart_ns <= NEAREST_NS;
-                between.then(|| (fitted.angle_rad, fitted.rate_rad_per_s, fitted.variance_rad2.max(given), given))
+                between.then(|| (fitted.angle_rad, fitted.variance_rad2.max(given), given))
             };
-            let (angle, rate, variance, lasting) = averaged.or_else(interpolated).unwrap_or_else(|| {
+            let rate = angle_fit::fit(&near(&around), given).map_or(0.0, |fitted| fitted.rate_rad_per_s);
+            let (angle, variance, lasting) = averaged.or_else(interpolated).unwrap_or_else(|| {
                 let turned = UNKNOWN_RATE_RAD_PER_S * seconds_from_ns(nearest.stamp_ns - stamp_ns);
-                (nearest.angles_rad[joint], 0.0, given + turned * turned, given)
+                (nearest.angles_rad[joint], given + turned * turned, given)
             });
             angles_rad.push(angle);
             rates_rad_per_s.push(rate);
