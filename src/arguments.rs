@@ -35,6 +35,8 @@ pub(crate) enum Command {
     Simulate(SimulateArguments),
     /// Tell which calibration parameters a mechanism, its parameterization and a motion can identify, without a log.
     Degeneracy(DegeneracyArguments),
+    /// Turn a EuRoC/ASL folder, a ROS 1 bag or a ROS 2 bag into a log.
+    Convert(ConvertArguments),
     /// Compare a trajectory with a reference: absolute and relative errors, as evo computes them.
     Evaluate(EvaluateArguments),
 }
@@ -239,6 +241,19 @@ pub(crate) enum EncoderArgument {
     None,
     /// White noise of this standard deviation, in degrees.
     Sigma(f64),
+}
+
+/// `dcvins convert`.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct ConvertArguments {
+    /// A EuRoC/ASL folder (with mav0), a ROS 1 bag, or a ROS 2 bag: its folder, one .db3 or one .mcap.
+    pub source: PathBuf,
+    /// The log to write; the rig, where the source describes one, gets the same name with .rig.yaml.
+    #[arg(short, long, value_name = "LOG.mcap")]
+    pub output: PathBuf,
+    /// Print what was taken and what was left as JSON.
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// `dcvins evaluate`.

@@ -15,8 +15,8 @@ use dcvins::session::{self, CalibrationRequest, Recording, SessionPlan, Stopwatc
 use dcvins::simulation::{self, Experiment, SimulationOptions};
 
 use crate::arguments::{
-    CalibrateArguments, CheckArguments, EncoderArgument, EvaluateArguments, ExperimentArgument, RunArguments,
-    SimulateArguments, ViewArguments,
+    CalibrateArguments, CheckArguments, ConvertArguments, EncoderArgument, EvaluateArguments, ExperimentArgument,
+    RunArguments, SimulateArguments, ViewArguments,
 };
 
 /// Least time between two drawings of the progress bar.
@@ -91,7 +91,8 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<()> {
     let recording = compute(&plan, None)?;
     let mut summaries = Vec::new();
     for run in &recording.runs {
-        let options = RunFileOptions { timing: !arguments.no_timing };
+        let options =
+            RunFileOptions { timing: !arguments.no_timing };
         let (folder, summary) = export::write_run(&recording, run, &arguments.out, options)?;
         summaries.push((folder, summary));
     }
@@ -343,6 +344,21 @@ pub(crate) fn check(arguments: &CheckArguments) -> Result<()> {
     let rig = Rig::for_log(&log, arguments.rig.as_deref());
     let rotations = rig.as_ref().map_or_else(|_| Vec::new(), |rig| session::image_rotations(&log, rig));
     let report = flight_log::check::check(&log, rig.as_ref(), &rotations);
+    if arguments.json {
+        print(&format!("{}\n", serde_json::to_string_pretty(&report)?))
+    } else {
+        print(&report.to_string())
+    }
+}
+
+/// `dcvins convert`.
+pub(crate) fn convert(arguments: &ConvertArguments) -> Result<()> {
+    let mut progress = Progress::new();
+    let report = flight_log::convert::convert(&arguments.source, &arguments.output, &mut |share| {
+        progress.show(share, String::new);
+    });
+    progress.clear();
+    let report = report?;
     if arguments.json {
         print(&format!("{}\n", serde_json::to_string_pretty(&report)?))
     } else {

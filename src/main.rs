@@ -22,6 +22,7 @@ fn main() -> ExitCode {
         Command::Check(check) => commands::check(&check),
         Command::Simulate(simulate) => commands::simulate(&simulate),
         Command::Degeneracy(arguments) => degeneracy::degeneracy(&arguments),
+        Command::Convert(convert) => commands::convert(&convert),
         Command::Evaluate(evaluate) => commands::evaluate(&evaluate),
     };
     match result {

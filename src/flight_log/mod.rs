@@ -5,6 +5,7 @@
 mod cdr;
 pub mod check;
 mod container;
+pub mod convert;
 mod error;
 mod file;
 mod image_reader;
@@ -26,4 +27,4 @@ pub use messages::MessageKind;
 pub use rig::Rig;
 pub use samples::{GrayImage, ImuSample, JointAngles, JointSample, LogWarning, PoseSample, SensorFrame};
 pub use stream::FrameStream;
-pub use writer::{LogCompression, LogWriter, LogWriterOptions, MessageTimes};
+pub use writer::{LogCompression, LogWriter, LogWriterOptions, MessageTimes, MessageType};

@@ -57,6 +57,26 @@ pub struct MessageTimes {
     pub log_time_ns: i64,
 }
 
+/// A message type by its name and its definition.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MessageType<'a> {
+    /// `nav_msgs/msg/Path`.
+    pub name: &'a str,
+    /// What the definition is written in, `ros2msg` or `jsonschema`.
+    pub definition_encoding: &'static str,
+    /// The definition with all types that it needs.
+    pub definition: Cow<'a, str>,
+    /// How the messages are encoded, `cdr` or `json`.
+    pub message_encoding: &'static str,
+}
+
+impl<'a> MessageType<'a> {
+    /// A type of ROS 2, its messages in CDR.
+    pub fn ros2(name: &'a str, definition: impl Into<Cow<'a, str>>) -> Self {
+        Self { name, definition_encoding: "ros2msg", definition: definition.into(), message_encoding: "cdr" }
+    }
+}
+
 /// Writes a log, message by message in the order of log times.
 pub struct LogWriter {
     writer: Writer<BufWriter<File>>,
@@ -265,20 +285,42 @@ impl LogWriter {
         times: MessageTimes,
         message: &[u8],
     ) -> Result<(), LogError> {
-        let failed = |error: mcap::McapError| write_error(&self.path, &error);
         if !self.channels.contains_key(topic) {
-            let definition = schemas::definition(kind);
-            let schema =
-                self.writer.add_schema(kind.schema_name(), "ros2msg", definition.as_bytes()).map_err(failed)?;
-            let qos = BTreeMap::from([("offered_qos_profiles".to_owned(), QOS_PROFILE.to_owned())]);
-            let id = self.writer.add_channel(schema, topic, "cdr", &qos).map_err(failed)?;
-            self.channels.insert(topic.to_owned(), (id, 0));
+            self.add_channel(topic, &MessageType::ros2(kind.schema_name(), schemas::definition(kind)))?;
         }
+        self.write_to_channel(topic, times, message)
+    }
+
+    /// Writes a message of any type, encoded already. A topic keeps the type of its first message.
+    pub fn write_typed(
+        &mut self,
+        topic: &str,
+        message_type: &MessageType<'_>,
+        times: MessageTimes,
+        message: &[u8],
+    ) -> Result<(), LogError> {
+        if !self.channels.contains_key(topic) {
+            self.add_channel(topic, message_type)?;
+        }
+        self.write_to_channel(topic, times, message)
+    }
+
+    fn add_channel(&mut self, topic: &str, message_type: &MessageType<'_>) -> Result<(), LogError> {
+        let failed = |error: mcap::McapError| write_error(&self.path, &error);
+        let MessageType { name, definition_encoding, definition, message_encoding } = message_type;
+        let schema = self.writer.add_schema(name, definition_encoding, definition.as_bytes()).map_err(failed)?;
+        let qos = BTreeMap::from([("offered_qos_profiles".to_owned(), QOS_PROFILE.to_owned())]);
+        let id = self.writer.add_channel(schema, topic, message_encoding, &qos).map_err(failed)?;
+        self.channels.insert(topic.to_owned(), (id, 0));
+        Ok(())
+    }
+
+    fn write_to_channel(&mut self, topic: &str, times: MessageTimes, message: &[u8]) -> Result<(), LogError> {
         let (channel_id, sequence) = self.channels.entry(topic.to_owned()).or_default();
         let log_time = times.log_time_ns.max(0) as u64;
         let header = MessageHeader { channel_id: *channel_id, sequence: *sequence, log_time, publish_time: log_time };
         *sequence = sequence.wrapping_add(1);
-        self.writer.write_to_known_channel(&header, message).map_err(failed)
+        self.writer.write_to_known_channel(&header, message).map_err(|error| write_error(&self.path, &error))
     }
 }
 

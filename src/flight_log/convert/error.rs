@@ -1,0 +1,80 @@
+use std::io;
+use std::path::{Path, PathBuf};
+
+use thiserror::Error;
+
+use super::super::LogError;
+
+/// Why a source could not be converted; every message says what, where and what to do, the path last.
+#[derive(Debug, Error)]
+pub enum ConvertError {
+    /// The log or the rig could not be written, or a sensor's description is wrong.
+    #[error(transparent)]
+    Log(#[from] LogError),
+    /// The operating system refused.
+    #[error("cannot {action}: {source}: {}", path.display())]
+    Io {
+        /// What was tried.
+        action: &'static str,
+        /// The system's answer.
+        source: io::Error,
+        /// The file.
+        path: PathBuf,
+    },
+    /// Nothing that can be converted.
+    #[error(
+        "{found}; expected a EuRoC/ASL folder (with mav0), a ROS 1 bag, or a ROS 2 bag (its folder, .db3 or .mcap): {}",
+        path.display()
+    )]
+    UnknownSource {
+        /// What lies there.
+        found: String,
+        /// The source.
+        path: PathBuf,
+    },
+    /// A source of a known kind that cannot be read.
+    #[error("{problem}: {}", path.display())]
+    Unreadable {
+        /// What is wrong, and what to do.
+        problem: String,
+        /// The file.
+        path: PathBuf,
+    },
+    /// A line of a table is wrong.
+    #[error("line {line}: {problem}: {}", path.display())]
+    Line {
+        /// Number of the line from 1.
+        line: usize,
+        /// What it holds and what was expected.
+        problem: String,
+        /// The table.
+        path: PathBuf,
+    },
+    /// No topic could be used.
+    #[error("no message can be used ({}): {}", if topics.is_empty() { "it has no topics" } else { topics }, path.display())]
+    NothingUsable {
+        /// The topics with their types and why each was left.
+        topics: String,
+        /// The source.
+        path: PathBuf,
+    },
+    /// The log would overwrite its source.
+    #[error("the log would lie in or over its own source; give another -o: {}", path.display())]
+    OntoItself {
+        /// The log.
+        path: PathBuf,
+    },
+}
+
+impl ConvertError {
+    /// For `map_err` behind a call of the system.
+    pub(super) fn io(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
+        let path = path.to_owned();
+        move |source| Self::Io { action, source, path }
+    }
+
+    /// A source that cannot be read.
+    pub(super) fn unreadable(problem: impl Into<String>, path: &Path) -> Self {
+        Self::Unreadable { problem: problem.into(), path: path.to_owned() }
+    }
+}

@@ -1,0 +1,214 @@
+//! EuRoC/ASL folders: `mav0` with a folder per sensor, each with `data.csv` and `sensor.yaml`.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+
+use super::super::{MessageTimes, Rig};
+use super::ConvertError;
+use super::euroc_sensor::{CameraSensor, rig_of, sensor_pose};
+use super::sink::Sink;
+use crate::geometry::RigidTransform;
+
+/// Topic of the inertial sensor.
+pub(super) const IMU_TOPIC: &str = "/imu0";
+/// Where poses may be, the best truth first.
+const POSE_FOLDERS: [&str; 3] = ["state_groundtruth_estimate0", "mocap0", "vicon0"];
+/// Topic type that the report names for files.
+const IMAGE_TYPE: &str = "sensor_msgs/msg/CompressedImage";
+const IMU_TYPE: &str = "sensor_msgs/msg/Imu";
+const POSE_TYPE: &str = "geometry_msgs/msg/PoseStamped";
+
+/// The folder of the sensors: `mav0` in the source, or the source itself.
+pub(super) fn root(source: &Path) -> Option<PathBuf> {
+    let has_sensors = |folder: &Path| folder.join("imu0/data.csv").is_file() || folder.join("cam0/data.csv").is_file();
+    [source.join("mav0"), source.to_owned()].into_iter().find(|folder| has_sensors(folder))
+}
+
+/// One row of any sensor.
+enum Sample {
+    Imu { angular_velocity_rad_per_s: Vector3<f64>, specific_force_m_per_s2: Vector3<f64> },
+    Image { camera: usize, name: String },
+    Pose { source: usize, world_from_imu: RigidTransform },
+}
+
+/// Pours a folder into a log and returns its rig, when the sensors are described.
+pub(super) fn convert(source: &Path, sink: &mut Sink<'_>) -> Result<Option<Rig>, ConvertError> {
+    let Some(root) = root(source) else { return Ok(None) };
+    let mut folders = sensor_folders(&root)?;
+    let mut samples: Vec<(i64, Sample)> = Vec::new();
+    let mut cameras: Vec<CameraSensor> = Vec::new();
+    let mut poses: Vec<String> = Vec::new();
+    folders.retain(|name| {
+        root.join(name).join("data.csv").is_file() || {
+            sink.note(format!("{name} has no data.csv and is left out"));
+            false
+        }
+    });
+    for name in &folders {
+        let table = root.join(name).join("data.csv");
+        if name == "imu0" {
+            read_imu(&table, &mut samples)?;
+        } else if name.starts_with("cam") {
+            let camera = cameras.len();
+            let first = samples.len();
+            read_images(&table, camera, &mut samples)?;
+            let stamps_ns: Vec<i64> = samples[first..].iter().map(|(stamp_ns, _)| *stamp_ns).collect();
+            cameras.push(CameraSensor { key: name.clone(), folder: root.join(name), stamps_ns });
+        } else if POSE_FOLDERS.contains(&name.as_str()) {
+            let imu_from_sensor = sensor_pose(&root, name)?;
+            read_poses(&table, poses.len(), &imu_from_sensor.inverse(), &mut samples)?;
+            poses.push(name.clone());
+        } else {
+            let rows = rows(&table)?.len() as u64;
+            sink.leave(&format!("/{name}"), "data.csv", rows, "no sensor that the program reads");
+        }
+    }
+    // Stable: sensors with equal stamps stay in the order of their names.
+    samples.sort_by_key(|(stamp_ns, _)| *stamp_ns);
+    let count = samples.len();
+    for (index, (stamp_ns, sample)) in samples.into_iter().enumerate() {
+        write(stamp_ns, &sample, &cameras, &poses, sink)?;
+        sink.progress((index + 1) as f64 / count as f64);
+    }
+    let truth = POSE_FOLDERS.into_iter().find(|name| poses.iter().any(|present| present == name));
+    rig_of(source, &root, &cameras, truth.map(pose_topic), sink)
+}
+
+/// Topic of a camera's images.
+pub(super) fn image_topic(key: &str) -> String {
+    format!("/{key}/image_raw/compressed")
+}
+
+fn pose_topic(folder: &str) -> String {
+    format!("/{folder}/pose")
+}
+
+fn sensor_folders(root: &Path) -> Result<Vec<String>, ConvertError> {
+    let mut names = Vec::new();
+    for entry in fs::read_dir(root).map_err(ConvertError::io("open the folder", root))? {
+        let entry = entry.map_err(ConvertError::io("open the folder", root))?;
+        if entry.path().is_dir() {
+            names.push(entry.file_name().to_string_lossy().into_owned());
+        }
+    }
+    names.sort();
+    Ok(names)
+}
+
+fn write(
+    stamp_ns: i64,
+    sample: &Sample,
+    cameras: &[CameraSensor],
+    poses: &[String],
+    sink: &mut Sink<'_>,
+) -> Result<(), ConvertError> {
+    let times = MessageTimes { stamp_ns, log_time_ns: stamp_ns };
+    match sample {
+        Sample::Imu { angular_velocity_rad_per_s, specific_force_m_per_s2 } => {
+            sink.writer.write_imu(IMU_TOPIC, "imu0", times, angular_velocity_rad_per_s, specific_force_m_per_s2)?;
+            sink.taken(IMU_TOPIC, IMU_TYPE);
+        }
+        Sample::Image { camera, name } => {
+            let CameraSensor { key, folder, .. } = &cameras[*camera];
+            let (topic, path) = (image_topic(key), folder.join("data").join(name));
+            let format = match path.extension().and_then(|extension| extension.to_str()) {
+                Some("png" | "PNG") => "png",
+                Some("jpg" | "jpeg" | "JPG" | "JPEG") => "jpeg",
+                _ => {
+                    sink.leave(&topic, IMAGE_TYPE, 1, format!("{name} is neither PNG nor JPEG"));
+                    return Ok(());
+                }
+            };
+            match fs::read(&path) {
+                Ok(bytes) => {
+                    sink.writer.write_compressed_image(&topic, key, times, format, &bytes)?;
+                    sink.taken(&topic, IMAGE_TYPE);
+                }
+                Err(error) => sink.leave(&topic, IMAGE_TYPE, 1, format!("{name} cannot be read: {error}")),
+            }
+        }
+        Sample::Pose { source, world_from_imu } => {
+            let topic = pose_topic(&poses[*source]);
+            sink.writer.write_pose(&topic, "world", times, world_from_imu)?;
+            sink.taken(&topic, POSE_TYPE);
+        }
+    }
+    Ok(())
+}
+
+/// The rows of a table with their line numbers, without comments and empty lines.
+fn rows(table: &Path) -> Result<Vec<(usize, Vec<String>)>, ConvertError> {
+    let text = fs::read_to_string(table).map_err(ConvertError::io("read", table))?;
+    let cells = |line: &str| line.split(',').map(|cell| cell.trim().to_owned()).collect();
+    let lines = text.lines().enumerate().map(|(index, line)| (index + 1, line.trim()));
+    Ok(lines
+        .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
+        .map(|(at, line)| (at, cells(line)))
+        .collect())
+}
+
+fn bad_line(line: usize, problem: impl Into<String>, table: &Path) -> ConvertError {
+    ConvertError::Line { line, problem: problem.into(), path: table.to_owned() }
+}
+
+fn stamp_of(line: usize, row: &[String], table: &Path) -> Result<i64, ConvertError> {
+    let text = row.first().map_or("", String::as_str);
+    let stamp_ns = text.parse::<i64>().ok().filter(|stamp_ns| *stamp_ns >= 0);
+    stamp_ns.ok_or_else(|| bad_line(line, format!("the stamp is '{text}', expected whole nanoseconds"), table))
+}
+
+/// The first numbers after the stamp.
+fn numbers<const N: usize>(line: usize, row: &[String], table: &Path) -> Result<[f64; N], ConvertError> {
+    let cells = row.get(1..=N).ok_or_else(|| {
+        bad_line(line, format!("{} numbers after the stamp, expected {N}", row.len().saturating_sub(1)), table)
+    })?;
+    let mut numbers = [0.0; N];
+    for (number, cell) in numbers.iter_mut().zip(cells) {
+        let value = cell.parse::<f64>().ok().filter(|value| value.is_finite());
+        *number = value.ok_or_else(|| bad_line(line, format!("'{cell}' is not a finite number"), table))?;
+    }
+    Ok(numbers)
+}
+
+fn read_imu(table: &Path, samples: &mut Vec<(i64, Sample)>) -> Result<(), ConvertError> {
+    for (line, row) in rows(table)? {
+        let [wx, wy, wz, ax, ay, az] = numbers(line, &row, table)?;
+        let sample = Sample::Imu {
+            angular_velocity_rad_per_s: Vector3::new(wx, wy, wz),
+            specific_force_m_per_s2: Vector3::new(ax, ay, az),
+        };
+        samples.push((stamp_of(line, &row, table)?, sample));
+    }
+    Ok(())
+}
+
+fn read_images(table: &Path, camera: usize, samples: &mut Vec<(i64, Sample)>) -> Result<(), ConvertError> {
+    for (line, row) in rows(table)? {
+        let name = row.get(1).filter(|name| !name.is_empty());
+        let name = name.ok_or_else(|| bad_line(line, "no file name after the stamp", table))?;
+        samples.push((stamp_of(line, &row, table)?, Sample::Image { camera, name: name.clone() }));
+    }
+    Ok(())
+}
+
+/// Poses of a sensor in the world (`p x y z`, `q w x y z`), moved to the IMU.
+fn read_poses(
+    table: &Path,
+    source: usize,
+    sensor_from_imu: &RigidTransform,
+    samples: &mut Vec<(i64, Sample)>,
+) -> Result<(), ConvertError> {
+    for (line, row) in rows(table)? {
+        let [x, y, z, qw, qx, qy, qz] = numbers(line, &row, table)?;
+        let quaternion = Quaternion::new(qw, qx, qy, qz);
+        if (quaternion.norm() - 1.0).abs() > 0.1 {
+            return Err(bad_line(line, format!("a quaternion of norm {:.3}, expected 1", quaternion.norm()), table));
+        }
+        let world_from_sensor = RigidTransform::new(UnitQuaternion::new_normalize(quaternion), Vector3::new(x, y, z));
+        let sample = Sample::Pose { source, world_from_imu: world_from_sensor * *sensor_from_imu };
+        samples.push((stamp_of(line, &row, table)?, sample));
+    }
+    Ok(())
+}

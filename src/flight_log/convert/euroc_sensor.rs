@@ -1,0 +1,184 @@
+//! `sensor.yaml` of EuRoC's sensors as a rig in Kalibr's names.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use nalgebra::Matrix4;
+use serde_json::Value;
+
+use super::super::LogError;
+use super::super::rig::{CameraMount, CameraRig, ImuNoise, ImuRig, Rig};
+use super::ConvertError;
+use super::euroc::{IMU_TOPIC, image_topic};
+use super::sink::Sink;
+use crate::camera::CameraModel;
+use crate::geometry::{RigidTransform, seconds_from_ns};
+
+/// Gravity that the dataset's authors use.
+const GRAVITY_M_PER_S2: f64 = 9.81;
+/// A rotation block may be this far from orthonormal: people round.
+const ROTATION_TOLERANCE: f64 = 1e-3;
+
+/// A camera's folder.
+pub(super) struct CameraSensor {
+    /// `cam0`.
+    pub(super) key: String,
+    pub(super) folder: PathBuf,
+    /// Stamps of its images.
+    pub(super) stamps_ns: Vec<i64>,
+}
+
+/// A `sensor.yaml`.
+struct SensorFile {
+    document: Value,
+    path: PathBuf,
+}
+
+impl SensorFile {
+    /// `None` when there is no such file.
+    fn read(folder: &Path) -> Result<Option<Self>, ConvertError> {
+        let path = folder.join("sensor.yaml");
+        if !path.is_file() {
+            return Ok(None);
+        }
+        let text = fs::read_to_string(&path).map_err(ConvertError::io("read the sensor's description", &path))?;
+        // OpenCV's writers begin with `%YAML:1.0`, which is no YAML directive.
+        let text = if text.starts_with("%YAML:") { text.split_once('\n').map_or("", |(_, rest)| rest) } else { &text };
+        let document = serde_saphyr::from_str(text).map_err(|error| {
+            let problem = error.to_string();
+            LogError::RigSyntax { problem: problem.lines().next().unwrap_or_default().to_owned(), path: path.clone() }
+        })?;
+        Ok(Some(Self { document, path }))
+    }
+
+    fn wrong(&self, field: &str, expected: &str) -> ConvertError {
+        let problem = match self.document.get(field) {
+            None => format!("missing, expected {expected}"),
+            Some(value) => format!("holds {value}, expected {expected}"),
+        };
+        LogError::Rig { field: field.to_owned(), problem, path: self.path.clone() }.into()
+    }
+
+    fn positive(&self, field: &str, expected: &str) -> Result<f64, ConvertError> {
+        let number = self.document.get(field).and_then(Value::as_f64);
+        number.filter(|number| *number > 0.0 && number.is_finite()).ok_or_else(|| self.wrong(field, expected))
+    }
+
+    fn numbers(&self, field: &str, expected: &str) -> Result<Vec<f64>, ConvertError> {
+        let list = self.document.get(field).and_then(Value::as_array).ok_or_else(|| self.wrong(field, expected))?;
+        let number = |value: &Value| value.as_f64().filter(|number| number.is_finite());
+        list.iter().map(|value| number(value).ok_or_else(|| self.wrong(field, expected))).collect()
+    }
+
+    fn text(&self, field: &str, expected: &str) -> Result<&str, ConvertError> {
+        self.document.get(field).and_then(Value::as_str).ok_or_else(|| self.wrong(field, expected))
+    }
+
+    /// `T_BS`: maps points from the sensor to the body.
+    fn body_from_sensor(&self) -> Result<RigidTransform, ConvertError> {
+        const EXPECTED: &str = "a rigid transform as 4×4 matrix, data row by row";
+        let data = self.document.get("T_BS").and_then(|matrix| matrix.get("data").or(Some(matrix)));
+        let rows: Vec<f64> = data.and_then(Value::as_array).into_iter().flatten().filter_map(Value::as_f64).collect();
+        let transform = (rows.len() == 16).then(|| Matrix4::from_row_slice(&rows));
+        let transform = transform.and_then(|matrix| RigidTransform::from_matrix(&matrix, ROTATION_TOLERANCE));
+        transform.ok_or_else(|| self.wrong("T_BS", EXPECTED))
+    }
+}
+
+fn body_from_sensor(folder: &Path) -> Result<RigidTransform, ConvertError> {
+    SensorFile::read(folder)?.map_or_else(|| Ok(RigidTransform::identity()), |file| file.body_from_sensor())
+}
+
+/// `imu_from_sensor` of the sensor in a folder; one that is not described sits in the body's frame.
+pub(super) fn sensor_pose(root: &Path, name: &str) -> Result<RigidTransform, ConvertError> {
+    Ok(body_from_sensor(&root.join("imu0"))?.inverse() * body_from_sensor(&root.join(name))?)
+}
+
+/// The rig of a folder, `None` with a note when its sensors are not described.
+pub(super) fn rig_of(
+    source: &Path,
+    root: &Path,
+    cameras: &[CameraSensor],
+    ground_truth_topic: Option<String>,
+    sink: &mut Sink<'_>,
+) -> Result<Option<Rig>, ConvertError> {
+    let Some(imu_file) = SensorFile::read(&root.join("imu0"))? else {
+        sink.note("imu0/sensor.yaml is missing, so no rig was written");
+        return Ok(None);
+    };
+    let body_from_imu = imu_file.body_from_sensor()?;
+    let imu = ImuRig {
+        topic: IMU_TOPIC.to_owned(),
+        frame_id: "imu0".to_owned(),
+        rate_hz: imu_file.positive("rate_hz", "the rate in Hz")?,
+        noise: ImuNoise {
+            accelerometer_noise_density: imu_file.positive("accelerometer_noise_density", "m/s²/√Hz above 0")?,
+            accelerometer_random_walk: imu_file.positive("accelerometer_random_walk", "m/s³/√Hz above 0")?,
+            gyroscope_noise_density: imu_file.positive("gyroscope_noise_density", "rad/s/√Hz above 0")?,
+            gyroscope_random_walk: imu_file.positive("gyroscope_random_walk", "rad/s²/√Hz above 0")?,
+        },
+    };
+    let mut described = Vec::new();
+    for camera in cameras {
+        match SensorFile::read(&camera.folder)? {
+            Some(file) => described.push(camera_rig(camera, &file, &body_from_imu)?),
+            None => sink.note(format!("{}/sensor.yaml is missing, so the rig has no such camera", camera.key)),
+        }
+    }
+    if described.is_empty() {
+        sink.note("no camera is described, so no rig was written");
+        return Ok(None);
+    }
+    let absolute = fs::canonicalize(source).unwrap_or_else(|_| source.to_owned());
+    let name = absolute.file_name().map_or_else(|| "euroc".to_owned(), |name| name.to_string_lossy().into_owned());
+    Ok(Some(Rig {
+        name,
+        gravity_m_per_s2: GRAVITY_M_PER_S2,
+        imu,
+        cameras: described,
+        gimbal: None,
+        ground_truth_topic,
+    }))
+}
+
+fn camera_rig(
+    camera: &CameraSensor,
+    file: &SensorFile,
+    body_from_imu: &RigidTransform,
+) -> Result<CameraRig, ConvertError> {
+    const RESOLUTION: &str = "2 whole numbers, width and height";
+    let resolution = file.numbers("resolution", RESOLUTION)?;
+    let whole = |side: &f64| side.fract() == 0.0 && (1.0..=65_535.0).contains(side);
+    let &[width, height] = resolution.as_slice() else { return Err(file.wrong("resolution", RESOLUTION)) };
+    if !resolution.iter().all(whole) {
+        return Err(file.wrong("resolution", RESOLUTION));
+    }
+    let model = CameraModel::from_kalibr(
+        file.text("camera_model", "pinhole, omni, eucm or ds")?,
+        &file.numbers("intrinsics", "numbers, fu fv cu cv for pinhole")?,
+        file.text("distortion_model", "radial-tangential, equidistant or none")?,
+        &file.numbers("distortion_coefficients", "the coefficients of the lens")?,
+        [width as usize, height as usize],
+    )
+    .map_err(|error| LogError::Rig {
+        field: "intrinsics and distortion".to_owned(),
+        problem: error.to_string(),
+        path: file.path.clone(),
+    })?;
+    let span_s = match (camera.stamps_ns.first(), camera.stamps_ns.last()) {
+        (Some(first), Some(last)) => seconds_from_ns(last - first),
+        _ => 0.0,
+    };
+    let measured_hz = camera.stamps_ns.len().saturating_sub(1) as f64 / span_s;
+    Ok(CameraRig {
+        key: camera.key.clone(),
+        mount: CameraMount::Static { imu_from_camera: body_from_imu.inverse() * file.body_from_sensor()? },
+        topic: image_topic(&camera.key),
+        frame_id: camera.key.clone(),
+        rate_hz: file
+            .positive("rate_hz", "the rate in Hz")
+            .or_else(|error| if measured_hz.is_finite() && measured_hz > 0.0 { Ok(measured_hz) } else { Err(error) })?,
+        model,
+        timeshift_cam_imu_s: 0.0,
+    })
+}

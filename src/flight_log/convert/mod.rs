@@ -1,0 +1,154 @@
+//! Other people's logs as flight logs: EuRoC folders, ROS 1 bags and ROS 2 bags in, MCAP out.
+//!
+//! Messages are rewritten one after another, so that a bag of any size passes through little memory.
+//! Nothing is left out in silence: the report has a row for every topic.
+
+mod error;
+mod euroc;
+mod euroc_sensor;
+mod mcap_segment;
+mod report;
+mod ros1_bag;
+mod ros1_message;
+mod ros1_record;
+mod ros2_bag;
+mod sink;
+mod sqlite;
+
+use std::fs;
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+
+pub use error::ConvertError;
+pub use report::{ConversionReport, ConvertedTopic};
+
+use super::{FlightLog, LogWriter, LogWriterOptions, Rig};
+use crate::geometry::seconds_from_ns;
+use sink::Sink;
+
+/// What a source is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum SourceKind {
+    Euroc,
+    Ros1Bag,
+    Ros2Bag,
+    Sqlite,
+    Mcap,
+}
+
+impl SourceKind {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Euroc => "EuRoC folder",
+            Self::Ros1Bag => "ROS 1 bag",
+            Self::Ros2Bag => "ROS 2 bag",
+            Self::Sqlite => "ROS 2 bag (one SQLite file)",
+            Self::Mcap => "MCAP",
+        }
+    }
+}
+
+/// Converts `source` into the log `output`, with a rig beside it where the source says enough; `progress` hears the
+/// share that is done, from 0 to 1.
+///
+/// The log appears under its name only when it is complete.
+///
+/// # Errors
+/// When the source is of no known kind or damaged at its beginning, when nothing in it can be used, or when files cannot
+/// be read or written. A source that is damaged further on is converted up to there, and the report says so.
+pub fn convert(source: &Path, output: &Path, progress: &mut dyn FnMut(f64)) -> Result<ConversionReport, ConvertError> {
+    let kind = detect(source)?;
+    let same = |a: &Path, b: &Path| fs::canonicalize(a).ok().is_some_and(|path| fs::canonicalize(b).ok() == Some(path));
+    if same(source, output) || output.parent().is_some_and(|folder| kind == SourceKind::Ros2Bag && same(source, folder))
+    {
+        return Err(ConvertError::OntoItself { path: output.to_owned() });
+    }
+    let partial = with_suffix(output, ".partial");
+    let converted = write(kind, source, &partial, progress);
+    let (mut report, rig) = match converted {
+        Ok(converted) => converted,
+        Err(error) => {
+            // The error that led here is the one to tell.
+            drop(fs::remove_file(&partial));
+            return Err(error);
+        }
+    };
+    fs::rename(&partial, output).map_err(ConvertError::io("write the log", output))?;
+    let log = FlightLog::open(output)?;
+    report.duration_s = seconds_from_ns(log.duration_ns());
+    report.log = output.to_owned();
+    if let Some(rig) = rig {
+        let path = output.with_extension("rig.yaml");
+        rig.save(&path, "")?;
+        report.rig = Some(path);
+    } else if output.with_extension("rig.yaml").is_file() {
+        report.rig = Some(output.with_extension("rig.yaml"));
+    } else if log.attachment(".rig.yaml").is_none() {
+        report.notes.push(format!(
+            "the source has no rig: write {} (or a Kalibr camchain-imucam.yaml for --rig) before running on it",
+            output.with_extension("rig.yaml").display()
+        ));
+    }
+    Ok(report)
+}
+
+/// Writes the log and returns what became of each topic, with the rig where the source describes one.
+fn write(
+    kind: SourceKind,
+    source: &Path,
+    output: &Path,
+    progress: &mut dyn FnMut(f64),
+) -> Result<(ConversionReport, Option<Rig>), ConvertError> {
+    let writer = LogWriter::create(output, &LogWriterOptions::default())?;
+    let mut sink = Sink::new(writer, progress);
+    let rig = match kind {
+        SourceKind::Euroc => euroc::convert(source, &mut sink)?,
+        SourceKind::Ros1Bag => ros1_bag::convert(source, &mut sink).map(|()| None)?,
+        SourceKind::Ros2Bag => ros2_bag::convert(source, &mut sink).map(|()| None)?,
+        SourceKind::Sqlite => sqlite::convert(source, sqlite::BlobCompression::None, &mut sink).map(|()| None)?,
+        SourceKind::Mcap => mcap_segment::convert(source, &mut sink).map(|()| None)?,
+    };
+    let report = sink.finish(kind.name(), source)?;
+    Ok((report, rig))
+}
+
+/// `a/log.mcap` and `.partial` make `a/log.mcap.partial`.
+fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(suffix);
+    PathBuf::from(name)
+}
+
+/// What lies at a path.
+fn detect(source: &Path) -> Result<SourceKind, ConvertError> {
+    let metadata = fs::metadata(source).map_err(ConvertError::io("open the source", source))?;
+    if metadata.is_dir() {
+        return if euroc::root(source).is_some() {
+            Ok(SourceKind::Euroc)
+        } else if ros2_bag::is_bag(source) {
+            Ok(SourceKind::Ros2Bag)
+        } else {
+            let found = "a folder without mav0/imu0/data.csv and without metadata.yaml, .db3 or .mcap files".to_owned();
+            Err(ConvertError::UnknownSource { found, path: source.to_owned() })
+        };
+    }
+    let mut start = Vec::new();
+    let file = fs::File::open(source).map_err(ConvertError::io("open the source", source))?;
+    file.take(16).read_to_end(&mut start).map_err(ConvertError::io("read the source", source))?;
+    let unknown = |found: String| ConvertError::UnknownSource { found, path: source.to_owned() };
+    if start.starts_with(mcap::MAGIC) {
+        Ok(SourceKind::Mcap)
+    } else if start.starts_with(ros1_bag::MAGIC) {
+        Ok(SourceKind::Ros1Bag)
+    } else if start.starts_with(b"#ROSBAG") {
+        let version = String::from_utf8_lossy(&start[1..]).lines().next().unwrap_or_default().to_owned();
+        Err(unknown(format!("a bag of version '{version}'; only ROSBAG V2.0 is read ('rosbag fix' makes one)")))
+    } else if start.starts_with(b"SQLite format 3") {
+        Ok(SourceKind::Sqlite)
+    } else if start.is_empty() {
+        Err(unknown("an empty file".to_owned()))
+    } else {
+        let bytes: Vec<String> = start.iter().take(8).map(|byte| format!("{byte:02x}")).collect();
+        Err(unknown(format!("a file that begins with the bytes {}", bytes.join(" "))))
+    }
+}

@@ -1,0 +1,70 @@
+use std::fmt::{Display, Formatter, Result};
+use std::path::PathBuf;
+
+use serde::Serialize;
+
+/// What became of one topic of a source.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct ConvertedTopic {
+    /// Its name in the log.
+    pub topic: String,
+    /// Its type as the source names it, `sensor_msgs/Imu`.
+    pub message_type: String,
+    /// Messages that the log has.
+    pub taken: u64,
+    /// Messages that were left out.
+    pub left: u64,
+    /// Why messages were left out, of the first one; or what to know about those that were taken.
+    pub reason: Option<String>,
+}
+
+/// What came of a conversion.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ConversionReport {
+    /// What the source is, `ROS 1 bag`.
+    pub kind: String,
+    /// The source.
+    pub source: PathBuf,
+    /// The log that was written.
+    pub log: PathBuf,
+    /// The rig beside the log: written from the source's calibration, or found there.
+    pub rig: Option<PathBuf>,
+    /// Length of the log in seconds.
+    pub duration_s: f64,
+    /// Every topic of the source, taken or left, in the order of their names.
+    pub topics: Vec<ConvertedTopic>,
+    /// What else there is to know: damage, a missing rig.
+    pub notes: Vec<String>,
+}
+
+/// A table of the topics, then the notes and the files.
+impl Display for ConversionReport {
+    fn fmt(&self, out: &mut Formatter<'_>) -> Result {
+        writeln!(out, "{}: {}, {:.3} s", self.source.display(), self.kind, self.duration_s)?;
+        let header = ["topic", "type", "taken", "left", ""].map(str::to_owned);
+        let rows = self.topics.iter().map(|topic| {
+            [
+                topic.topic.clone(),
+                topic.message_type.clone(),
+                topic.taken.to_string(),
+                topic.left.to_string(),
+                topic.reason.clone().unwrap_or_default(),
+            ]
+        });
+        let rows: Vec<[String; 5]> = std::iter::once(header).chain(rows).collect();
+        let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
+        let widths = [width(0), width(1), width(2), width(3)];
+        for [topic, message_type, taken, left, reason] in &rows {
+            let line = format!(
+                "  {topic:0$}  {message_type:1$}  {taken:>2$}  {left:>3$}  {reason}",
+                widths[0], widths[1], widths[2], widths[3]
+            );
+            writeln!(out, "{}", line.trim_end())?;
+        }
+        for note in &self.notes {
+            writeln!(out, "  note: {note}")?;
+        }
+        writeln!(out, "{}", self.log.display())?;
+        self.rig.iter().try_for_each(|rig| writeln!(out, "{}", rig.display()))
+    }
+}

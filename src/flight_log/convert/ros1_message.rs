@@ -1,0 +1,127 @@
+//! Messages in ROS 1 serialization rewritten as CDR.
+//!
+//! ROS 1 packs little-endian fields without padding; strings carry no terminating zero, headers a sequence number, and
+//! stamps are unsigned. Apart from that the types that are read have the same fields in the same order in both.
+
+use super::super::MessageKind;
+use super::super::cdr::CdrWriter;
+
+/// A field, or some of a kind.
+#[derive(Clone, Copy, Debug)]
+enum Field {
+    Header,
+    U8,
+    U32,
+    Text,
+    Texts,
+    Bytes,
+    F64s(usize),
+    F64Sequence,
+}
+
+/// The fields of a type in order.
+fn layout(kind: MessageKind) -> &'static [Field] {
+    use Field::{Bytes, F64Sequence, F64s, Header, Text, Texts, U8, U32};
+    match kind {
+        // Orientation, angular velocity, specific force, each with its covariance.
+        MessageKind::Imu => &[Header, F64s(4 + 9 + 3 + 9 + 3 + 9)],
+        // Height, width, encoding, is_bigendian, step, data.
+        MessageKind::Image => &[Header, U32, U32, Text, U8, U32, Bytes],
+        MessageKind::CompressedImage => &[Header, Text, Bytes],
+        // Height, width, distortion, D, K R P, binning twice, region (x, y, height, width, rectify).
+        MessageKind::CameraInfo => {
+            &[Header, U32, U32, Text, F64Sequence, F64s(9 + 9 + 12), U32, U32, U32, U32, U32, U32, U8]
+        }
+        MessageKind::JointState => &[Header, Texts, F64Sequence, F64Sequence, F64Sequence],
+        // Child frame, pose with covariance, twist with covariance.
+        MessageKind::Odometry => &[Header, Text, F64s(7 + 36 + 6 + 36)],
+        MessageKind::PoseStamped => &[Header, F64s(7)],
+        MessageKind::TransformStamped => &[Header, Text, F64s(7)],
+    }
+}
+
+/// The CDR of a message in ROS 1 serialization, or what is wrong with it.
+pub(super) fn cdr_from_ros1(kind: MessageKind, message: &[u8]) -> Result<Vec<u8>, String> {
+    let mut reader = Ros1Reader { message, position: 0 };
+    let mut out = CdrWriter::new();
+    for field in layout(kind) {
+        match *field {
+            Field::Header => {
+                reader.u32()?; // sequence number, which ROS 2 has not
+                let seconds = reader.u32()?;
+                let seconds =
+                    i32::try_from(seconds).map_err(|_too_late| format!("a stamp of {seconds} s, after 2038"))?;
+                out.i32(seconds);
+                out.u32(reader.u32()?);
+                out.string(reader.text()?);
+            }
+            Field::U8 => out.u8(reader.take(1)?[0]),
+            Field::U32 => out.u32(reader.u32()?),
+            Field::Text => out.string(reader.text()?),
+            Field::Texts => {
+                let count = reader.length(4)?;
+                let texts: Vec<String> =
+                    (0..count).map(|_| reader.text().map(str::to_owned)).collect::<Result<_, _>>()?;
+                out.strings(&texts);
+            }
+            Field::Bytes => {
+                let count = reader.length(1)?;
+                out.bytes(reader.take(count)?);
+            }
+            Field::F64s(count) => out.f64s(&reader.f64s(count)?),
+            Field::F64Sequence => {
+                let count = reader.length(8)?;
+                out.f64_sequence(&reader.f64s(count)?);
+            }
+        }
+    }
+    let rest = message.len() - reader.position;
+    if rest > 0 {
+        return Err(format!("{rest} bytes more than a {} has", kind.schema_name()));
+    }
+    Ok(out.finish())
+}
+
+/// Reads fields one after another, never past the end.
+struct Ros1Reader<'a> {
+    message: &'a [u8],
+    position: usize,
+}
+
+impl<'a> Ros1Reader<'a> {
+    fn take(&mut self, count: usize) -> Result<&'a [u8], String> {
+        let end = self.position.checked_add(count);
+        let bytes = end.and_then(|end| self.message.get(self.position..end));
+        let bytes = bytes.ok_or_else(|| {
+            format!("the message ends at byte {} inside a field of {count} bytes", self.message.len())
+        })?;
+        self.position += count;
+        Ok(bytes)
+    }
+
+    fn u32(&mut self) -> Result<u32, String> {
+        let mut bytes = [0; 4];
+        bytes.copy_from_slice(self.take(4)?);
+        Ok(u32::from_le_bytes(bytes))
+    }
+
+    /// The length of a sequence, refused when the rest of the message cannot hold that many elements.
+    fn length(&mut self, element_size: usize) -> Result<usize, String> {
+        let count = self.u32()? as usize;
+        if count.saturating_mul(element_size) > self.message.len() - self.position {
+            return Err(format!("{count} elements in a message of {} bytes", self.message.len()));
+        }
+        Ok(count)
+    }
+
+    fn text(&mut self) -> Result<&'a str, String> {
+        let count = self.length(1)?;
+        std::str::from_utf8(self.take(count)?).map_err(|error| format!("a text is not UTF-8 ({error})"))
+    }
+
+    fn f64s(&mut self, count: usize) -> Result<Vec<f64>, String> {
+        let bytes = self.take(count.saturating_mul(8))?;
+        let number = |bytes: &[u8]| bytes.iter().rev().fold(0, |bits, byte| bits << 8 | u64::from(*byte));
+        Ok(bytes.chunks_exact(8).map(|bytes| f64::from_bits(number(bytes))).collect())
+    }
+}

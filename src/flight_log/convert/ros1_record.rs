@@ -1,0 +1,77 @@
+//! Records of a ROS 1 bag, format 2.0: a header of named fields, and data.
+
+/// One record.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct BagRecord<'a> {
+    header: &'a [u8],
+    pub(super) data: &'a [u8],
+    /// First byte after it.
+    pub(super) end: usize,
+}
+
+/// The bytes that follow a 4-byte length at `start`, and the first byte after them.
+fn sized(bytes: &[u8], start: usize) -> Option<(&[u8], usize)> {
+    let length = bytes.get(start..start.checked_add(4)?)?;
+    let length = u32::from_le_bytes([length[0], length[1], length[2], length[3]]) as usize;
+    let end = (start + 4).checked_add(length)?;
+    Some((bytes.get(start + 4..end)?, end))
+}
+
+/// The record that begins at a byte, or why there is none.
+pub(super) fn record_at(bytes: &[u8], start: usize) -> Result<BagRecord<'_>, String> {
+    let ends = || format!("a record ends after the last of {} bytes", bytes.len());
+    let (header, after_header) = sized(bytes, start).ok_or_else(ends)?;
+    let (data, end) = sized(bytes, after_header).ok_or_else(ends)?;
+    let record = BagRecord { header, data, end };
+    // Every record has an opcode; without one these bytes are something else.
+    record.opcode().map(|_| record).ok_or_else(|| "no record begins here".to_owned())
+}
+
+/// The value of a named field among `name=value` fields.
+pub(super) fn field<'a>(fields: &'a [u8], name: &str) -> Option<&'a [u8]> {
+    let mut at = 0;
+    while let Some((entry, end)) = sized(fields, at) {
+        let value = entry.strip_prefix(name.as_bytes()).and_then(|rest| rest.strip_prefix(b"="));
+        if value.is_some() {
+            return value;
+        }
+        at = end;
+    }
+    None
+}
+
+/// A field that is a text.
+pub(super) fn text_field<'a>(fields: &'a [u8], name: &str) -> Option<&'a str> {
+    field(fields, name).and_then(|value| std::str::from_utf8(value).ok())
+}
+
+impl<'a> BagRecord<'a> {
+    /// What kind of record it is.
+    pub(super) fn opcode(&self) -> Option<u8> {
+        field(self.header, "op").and_then(|value| value.first().copied())
+    }
+
+    /// A numeric field of the header.
+    pub(super) fn number(&self, name: &str) -> Option<u32> {
+        let value = field(self.header, name)?;
+        Some(u32::from_le_bytes(value.try_into().ok()?))
+    }
+
+    /// A large numeric field of the header.
+    pub(super) fn large_number(&self, name: &str) -> Option<u64> {
+        let value = field(self.header, name)?;
+        Some(u64::from_le_bytes(value.try_into().ok()?))
+    }
+
+    /// A text field of the header.
+    pub(super) fn text(&self, name: &str) -> Option<&'a str> {
+        text_field(self.header, name)
+    }
+
+    /// A time of the header in nanoseconds since the epoch.
+    pub(super) fn time_ns(&self, name: &str) -> Option<i64> {
+        let [s0, s1, s2, s3, n0, n1, n2, n3] = field(self.header, name)?.try_into().ok()?;
+        let (seconds, nanoseconds) = (u32::from_le_bytes([s0, s1, s2, s3]), u32::from_le_bytes([n0, n1, n2, n3]));
+        Some(i64::from(seconds) * 1_000_000_000 + i64::from(nanoseconds))
+    }
+}
