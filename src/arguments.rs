@@ -101,6 +101,13 @@ pub(crate) struct RunArguments {
     /// Leave the measured times out of frames.csv and summary.json, so that two runs give the same bytes in every file.
     #[arg(long)]
     pub no_timing: bool,
+    /// Also write results.mcap for Foxglove and Rerun: poses, frames of the chain, image annotations, landmarks,
+    /// calibration and rank over time.
+    #[arg(long)]
+    pub mcap: bool,
+    /// Also write trajectory.euroc.csv, a table like EuRoC's ground truth.
+    #[arg(long)]
+    pub euroc: bool,
     /// Print the summaries as JSON instead of a table.
     #[arg(long)]
     pub json: bool,

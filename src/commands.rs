@@ -92,7 +92,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<()> {
     let mut summaries = Vec::new();
     for run in &recording.runs {
         let options =
-            RunFileOptions { timing: !arguments.no_timing };
+            RunFileOptions { timing: !arguments.no_timing, mcap: arguments.mcap, euroc_trajectory: arguments.euroc };
         let (folder, summary) = export::write_run(&recording, run, &arguments.out, options)?;
         summaries.push((folder, summary));
     }
@@ -269,7 +269,7 @@ fn write_pictures(plan: &SessionPlan, out: Option<&Path>) -> Result<()> {
         print(&format!("{}\n", path.display()))?;
     }
     for run in &recording.runs {
-        let (folder, summary) = export::write_run(&recording, run, &folder, RunFileOptions { timing: true })?;
+        let (folder, summary) = export::write_run(&recording, run, &folder, RunFileOptions::default())?;
         print(&describe(&folder, &summary))?;
     }
     Ok(())

@@ -3,6 +3,8 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
+use crate::flight_log::LogError;
+
 /// Why something could not be written or evaluated.
 #[derive(Debug, Error)]
 pub enum ExportError {
@@ -22,6 +24,9 @@ pub enum ExportError {
         /// Which file.
         path: PathBuf,
     },
+    /// An MCAP file could not be written.
+    #[error(transparent)]
+    Log(#[from] LogError),
     /// A line of a trajectory is not `t x y z qx qy qz qw`.
     #[error("line {line} {problem}; expected 't x y z qx qy qz qw': {path}")]
     TrajectoryLine {

@@ -4,9 +4,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::error::ExportError;
+use super::results::write_results;
 use super::summary::{RunSummary, summarize, to_json};
 use super::tables::{calibration_csv, frames_csv, rank_csv};
-use super::trajectory::tum_of_run;
+use super::trajectory::{euroc_of_run, tum_of_run};
 use crate::flight_log::Rig;
 use crate::flight_log::rig::CameraMount;
 use crate::session::{Recording, RunRecord};
@@ -16,6 +17,17 @@ use crate::session::{Recording, RunRecord};
 pub struct RunFileOptions {
     /// Write measured times; without them two runs give the same bytes in every file.
     pub timing: bool,
+    /// Also write `results.mcap`, for Foxglove and Rerun.
+    pub mcap: bool,
+    /// Also write `trajectory.euroc.csv`.
+    pub euroc_trajectory: bool,
+}
+
+impl Default for RunFileOptions {
+    /// The files that every run leaves, with times.
+    fn default() -> Self {
+        Self { timing: true, mcap: false, euroc_trajectory: false }
+    }
 }
 
 /// Writes the files of one run into `folder/LABEL/` and returns that folder and the summary.
@@ -30,7 +42,7 @@ pub fn write_run(
     let summary = summarize(recording, run, options.timing);
     let json = to_json(&summary)
         .map_err(|source| ExportError::Write { source: source.into(), path: folder.join("summary.json") })?;
-    let files = [
+    let mut files = vec![
         ("trajectory.tum", tum_of_run(run, recording.epoch_ns)),
         ("calibration.csv", calibration_csv(run, &recording.rig)),
         ("rank.csv", rank_csv(run)),
@@ -38,9 +50,15 @@ pub fn write_run(
         ("rig.yaml", calibrated_rig(recording, run).to_yaml()),
         ("summary.json", json),
     ];
+    if options.euroc_trajectory {
+        files.push(("trajectory.euroc.csv", euroc_of_run(run, recording.epoch_ns)));
+    }
     for (name, text) in files {
         let path = folder.join(name);
         fs::write(&path, text).map_err(ExportError::write(&path))?;
+    }
+    if options.mcap {
+        write_results(recording, run, &folder.join("results.mcap"))?;
     }
     Ok((folder, summary))
 }

@@ -27,4 +27,7 @@ pub use messages::MessageKind;
 pub use rig::Rig;
 pub use samples::{GrayImage, ImuSample, JointAngles, JointSample, LogWarning, PoseSample, SensorFrame};
 pub use stream::FrameStream;
-pub use writer::{LogCompression, LogWriter, LogWriterOptions, MessageTimes, MessageType};
+pub use writer::{
+    CircleAnnotation, LinesAnnotation, LogCompression, LogLevel, LogWriter, LogWriterOptions, MessageTimes,
+    MessageType, NamedTransform, Rgba,
+};

@@ -7,5 +7,6 @@ mod degeneracy;
 mod evaluate;
 #[cfg(feature = "gui")]
 mod renderers;
+mod results;
 mod sample_log;
 mod time_travel;

@@ -7,7 +7,7 @@ use crate::camera::{CameraModel, Distortion};
 use crate::geometry::RigidTransform;
 
 /// A message with its header written.
-fn begin(stamp_ns: i64, frame_id: &str) -> CdrWriter {
+pub(super) fn begin(stamp_ns: i64, frame_id: &str) -> CdrWriter {
     let mut out = CdrWriter::new();
     out.i32(stamp_ns.div_euclid(1_000_000_000) as i32);
     out.u32(stamp_ns.rem_euclid(1_000_000_000) as u32);
@@ -15,7 +15,7 @@ fn begin(stamp_ns: i64, frame_id: &str) -> CdrWriter {
     out
 }
 
-fn put_rotation(out: &mut CdrWriter, rotation: &UnitQuaternion<f64>) {
+pub(super) fn put_rotation(out: &mut CdrWriter, rotation: &UnitQuaternion<f64>) {
     out.f64s(&[rotation.i, rotation.j, rotation.k, rotation.w]);
 }
 

@@ -1,7 +1,10 @@
 //! Writing a flight log: MCAP with CDR messages and their definitions, as ROS 2's recorder writes it.
 
 mod encode;
+mod results;
 mod schemas;
+
+pub use results::{CircleAnnotation, LinesAnnotation, LogLevel, NamedTransform, Rgba};
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;

@@ -14,6 +14,46 @@ const POSE_COVARIANCE: &str = "geometry_msgs/PoseWithCovariance";
 const TWIST: &str = "geometry_msgs/Twist";
 const TWIST_COVARIANCE: &str = "geometry_msgs/TwistWithCovariance";
 const REGION: &str = "sensor_msgs/RegionOfInterest";
+const STAMPED_POSE: &str = "geometry_msgs/PoseStamped";
+const STAMPED_TRANSFORM: &str = "geometry_msgs/TransformStamped";
+const POINT_FIELD: &str = "sensor_msgs/PointField";
+const CIRCLE: &str = "foxglove_msgs/CircleAnnotation";
+const POINTS: &str = "foxglove_msgs/PointsAnnotation";
+const TEXT: &str = "foxglove_msgs/TextAnnotation";
+const COLOR: &str = "foxglove_msgs/Color";
+const POINT2: &str = "foxglove_msgs/Point2";
+
+/// The fields of a type, and the types that they need.
+pub(super) type Definition<'a> = (&'a str, &'a [&'a str]);
+
+/// What a header needs.
+pub(super) const HEADER_NEEDS: &[&str] = &[HEADER, TIME];
+/// `nav_msgs/msg/Path`.
+pub(super) const PATH: Definition<'_> = (
+    "std_msgs/Header header\ngeometry_msgs/PoseStamped[] poses",
+    &[HEADER, TIME, STAMPED_POSE, POSE, POINT, QUATERNION],
+);
+/// `tf2_msgs/msg/TFMessage`.
+pub(super) const TRANSFORMS: Definition<'_> =
+    ("geometry_msgs/TransformStamped[] transforms", &[STAMPED_TRANSFORM, HEADER, TIME, TRANSFORM, VECTOR3, QUATERNION]);
+/// `sensor_msgs/msg/PointCloud2`.
+pub(super) const POINT_CLOUD: Definition<'_> = (
+    "std_msgs/Header header\nuint32 height\nuint32 width\nsensor_msgs/PointField[] fields\nbool is_bigendian\n\
+     uint32 point_step\nuint32 row_step\nuint8[] data\nbool is_dense",
+    &[HEADER, TIME, POINT_FIELD],
+);
+/// `foxglove_msgs/msg/ImageAnnotations`.
+pub(super) const IMAGE_ANNOTATIONS: Definition<'_> = (
+    "foxglove_msgs/CircleAnnotation[] circles\nfoxglove_msgs/PointsAnnotation[] points\n\
+     foxglove_msgs/TextAnnotation[] texts",
+    &[TIME, CIRCLE, POINTS, TEXT, COLOR, POINT2],
+);
+/// `rcl_interfaces/msg/Log`.
+pub(super) const LOG_LINE: Definition<'_> = (
+    "byte DEBUG=10\nbyte INFO=20\nbyte WARN=30\nbyte ERROR=40\nbyte FATAL=50\nbuiltin_interfaces/Time stamp\n\
+     uint8 level\nstring name\nstring msg\nstring file\nstring function\nuint32 line",
+    &[TIME],
+);
 
 /// The fields of a type that others need.
 fn dependency(name: &str) -> &'static str {
@@ -28,12 +68,34 @@ fn dependency(name: &str) -> &'static str {
         TWIST => "geometry_msgs/Vector3 linear\ngeometry_msgs/Vector3 angular",
         TWIST_COVARIANCE => "geometry_msgs/Twist twist\nfloat64[36] covariance",
         REGION => "uint32 x_offset\nuint32 y_offset\nuint32 height\nuint32 width\nbool do_rectify",
+        STAMPED_POSE => "std_msgs/Header header\ngeometry_msgs/Pose pose",
+        STAMPED_TRANSFORM => "std_msgs/Header header\nstring child_frame_id\ngeometry_msgs/Transform transform",
+        POINT_FIELD => {
+            "uint8 INT8=1\nuint8 UINT8=2\nuint8 INT16=3\nuint8 UINT16=4\nuint8 INT32=5\nuint8 UINT32=6\n\
+             uint8 FLOAT32=7\nuint8 FLOAT64=8\nstring name\nuint32 offset\nuint8 datatype\nuint32 count"
+        }
+        CIRCLE => {
+            "builtin_interfaces/Time timestamp\nfoxglove_msgs/Point2 position\nfloat64 diameter\nfloat64 thickness\n\
+             foxglove_msgs/Color fill_color\nfoxglove_msgs/Color outline_color"
+        }
+        POINTS => {
+            "uint8 UNKNOWN=0\nuint8 POINTS=1\nuint8 LINE_LOOP=2\nuint8 LINE_STRIP=3\nuint8 LINE_LIST=4\n\
+             builtin_interfaces/Time timestamp\nuint8 type\nfoxglove_msgs/Point2[] points\n\
+             foxglove_msgs/Color outline_color\nfoxglove_msgs/Color[] outline_colors\n\
+             foxglove_msgs/Color fill_color\nfloat64 thickness"
+        }
+        TEXT => {
+            "builtin_interfaces/Time timestamp\nfoxglove_msgs/Point2 position\nstring text\nfloat64 font_size\n\
+             foxglove_msgs/Color text_color\nfoxglove_msgs/Color background_color"
+        }
+        COLOR => "float64 r\nfloat64 g\nfloat64 b\nfloat64 a",
+        POINT2 => "float64 x\nfloat64 y",
         _ => "",
     }
 }
 
 /// The fields of a message, and the types they need.
-fn fields(kind: MessageKind) -> (&'static str, &'static [&'static str]) {
+fn fields(kind: MessageKind) -> Definition<'static> {
     match kind {
         MessageKind::Imu => (
             "std_msgs/Header header\ngeometry_msgs/Quaternion orientation\nfloat64[9] orientation_covariance\n\
@@ -73,9 +135,13 @@ fn fields(kind: MessageKind) -> (&'static str, &'static [&'static str]) {
 
 /// The whole definition of a message type.
 pub(super) fn definition(kind: MessageKind) -> String {
-    let (own, needed) = fields(kind);
+    compose(&fields(kind))
+}
+
+/// A type's own fields, then every type that it needs.
+pub(super) fn compose((own, needed): &Definition<'_>) -> String {
     let mut text = format!("{own}\n");
-    for name in needed {
+    for name in *needed {
         text.extend([&"=".repeat(80), "\nMSG: ", name, "\n", dependency(name), "\n"]);
     }
     text

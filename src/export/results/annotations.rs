@@ -1,0 +1,60 @@
+//! Tracks and residuals over the image of a step.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Vector2;
+
+use crate::flight_log::{CircleAnnotation, LinesAnnotation, LogError, LogWriter, MessageTimes, Rgba};
+use crate::frontend::FeatureId;
+use crate::session::StepRecord;
+
+/// Residuals are drawn so many times longer than they are.
+const RESIDUAL_MAGNIFICATION: f64 = 20.0;
+/// Diameter of the rings in pixels: larger for what takes part in the solve, so that colour alone tells nothing.
+const SOLVED_PX: f64 = 9.0;
+const TRACKED_PX: f64 = 5.0;
+/// Bluish green, orange, sky blue, vermilion of Okabe and Ito.
+const SOLVED: Rgba = [0.0, 0.62, 0.45, 1.0];
+const REJECTED: Rgba = [0.90, 0.62, 0.0, 1.0];
+const TRACKED: Rgba = [0.34, 0.71, 0.91, 1.0];
+const RESIDUAL: Rgba = [0.84, 0.37, 0.0, 1.0];
+
+/// What the solve made of a feature that the image sees.
+struct Solved {
+    rejected: bool,
+    /// From the measurement along the magnified residual.
+    residual_line_px: Option<[Vector2<f64>; 2]>,
+}
+
+/// Writes a ring for every track (large ones took part in the solve), where it came from, and its residual after the
+/// solve, predicted minus measured, magnified 20 times.
+pub(super) fn write(log: &mut LogWriter, topic: &str, times: MessageTimes, step: &StepRecord) -> Result<(), LogError> {
+    let frame_index = step.report.frame_index;
+    let mut solved: BTreeMap<FeatureId, Solved> = BTreeMap::new();
+    for feature in &step.report.features {
+        let observed = feature.observations.iter().find(|seen| seen.frame_index == frame_index);
+        let Some(observed) = observed else { continue };
+        let line = observed
+            .residual_after_px
+            .map(|residual| [observed.measured_px, observed.measured_px + RESIDUAL_MAGNIFICATION * residual]);
+        solved.insert(feature.id, Solved { rejected: feature.rejected, residual_line_px: line });
+    }
+    let mut circles = Vec::new();
+    let mut motions = Vec::new();
+    let mut residuals = Vec::new();
+    for track in &step.tracks.features {
+        let (diameter_px, color) = match solved.get(&track.id) {
+            Some(feature) if feature.rejected => (SOLVED_PX, REJECTED),
+            Some(_) => (SOLVED_PX, SOLVED),
+            None => (TRACKED_PX, TRACKED),
+        };
+        circles.push(CircleAnnotation { center_px: track.uv_px, diameter_px, color });
+        motions.extend(track.previous_uv_px.map(|previous| [previous, track.uv_px]));
+        residuals.extend(solved.get(&track.id).and_then(|feature| feature.residual_line_px));
+    }
+    let lines = [
+        LinesAnnotation { lines_px: motions, color: TRACKED },
+        LinesAnnotation { lines_px: residuals, color: RESIDUAL },
+    ];
+    log.write_annotations(topic, times, &circles, &lines)
+}

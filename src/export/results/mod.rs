@@ -1,0 +1,176 @@
+//! A run as an MCAP file that Foxglove, Rerun and RViz open beside the log: poses, the frames of the chain, landmarks,
+//! tracks and residuals over the image, calibration, rank and frame statistics as time series, and events.
+//!
+//! Topics and frames begin with the run's label, so that the files of several runs can be opened together. Log times are
+//! those of the images, so that they play in step with the log; stamps are the estimator's.
+
+mod annotations;
+mod series;
+
+use std::path::Path;
+
+use crate::flight_log::{LogError, LogLevel, LogWriter, LogWriterOptions, MessageTimes, NamedTransform};
+use crate::frontend::FeatureId;
+use crate::geometry::RigidTransform;
+use crate::gimbal::ClassicalChain;
+use crate::session::{Recording, RunRecord, StepRecord};
+use series::Series;
+
+/// The frame that all runs share: that of the truth where there is one.
+const WORLD: &str = "world";
+/// How often the path is written, in nanoseconds.
+const PATH_PERIOD_NS: i64 = 1_000_000_000;
+/// The path is thinned to at most so many poses.
+const PATH_POSES: usize = 300;
+
+/// Names of the topics and frames of one run.
+struct Names {
+    /// The label with what ROS allows in a topic.
+    label: String,
+}
+
+impl Names {
+    fn new(label: &str) -> Self {
+        let allowed = |letter: char| if letter.is_ascii_alphanumeric() { letter } else { '_' };
+        let label: String = label.chars().map(allowed).collect();
+        // A topic's name must not begin with a digit.
+        let digit = label.starts_with(|first: char| first.is_ascii_digit());
+        Self { label: if digit || label.is_empty() { format!("run_{label}") } else { label } }
+    }
+
+    fn topic(&self, name: &str) -> String {
+        format!("/{}/{name}", self.label)
+    }
+
+    fn frame(&self, name: &str) -> String {
+        format!("{}/{name}", self.label)
+    }
+}
+
+/// Writes one run of a recording.
+///
+/// # Errors
+/// When the file cannot be written.
+pub fn write_results(recording: &Recording, run: &RunRecord, path: &Path) -> Result<(), LogError> {
+    let mut results = Results {
+        log: LogWriter::create(path, &LogWriterOptions::default())?,
+        names: Names::new(&run.spec.label),
+        // Without a truth the run's world is the world.
+        world_from_run: run.alignment.unwrap_or_else(RigidTransform::identity),
+        trajectory: Vec::new(),
+        path_due_ns: i64::MIN,
+        series: Series::new(run, &recording.rig),
+        epoch_ns: recording.epoch_ns,
+    };
+    let last = run.steps.len().saturating_sub(1);
+    for (index, step) in run.steps.iter().enumerate() {
+        results.write_step(step, index == last)?;
+    }
+    results.log.finish()
+}
+
+struct Results {
+    log: LogWriter,
+    names: Names,
+    /// Lays the run's world on the truth's.
+    world_from_run: RigidTransform,
+    /// Absolute stamps and poses so far.
+    trajectory: Vec<(i64, RigidTransform)>,
+    /// Step stamp from which the path is written again.
+    path_due_ns: i64,
+    series: Series,
+    epoch_ns: i64,
+}
+
+impl Results {
+    fn write_step(&mut self, step: &StepRecord, last: bool) -> Result<(), LogError> {
+        let report = &step.report;
+        let times =
+            MessageTimes { stamp_ns: self.epoch_ns + report.stamp_ns, log_time_ns: self.epoch_ns + step.log_time_ns };
+        self.write_events(step, times)?;
+        annotations::write(&mut self.log, &self.names.topic("annotations"), times, step)?;
+        self.series.write(&mut self.log, &self.names, times, step)?;
+        if let Some(truth) = &step.truth {
+            self.log.write_pose(&self.names.topic("truth"), WORLD, times, truth)?;
+        }
+        let Some(newest) = report.newest() else { return Ok(()) };
+        let (run_world, imu) = (self.names.frame(WORLD), self.names.frame("imu"));
+        let transforms = self.transforms(&report.calibration.classical, step);
+        self.log.write_transforms("/tf", times, &transforms)?;
+        let pose = newest.world_from_imu;
+        let velocity = pose.rotation.inverse() * newest.velocity_m_per_s;
+        let turn = nalgebra::Vector3::zeros();
+        let odometry = self.names.topic("odometry");
+        self.log.write_odometry(&odometry, &run_world, &imu, times, &pose, &velocity, &turn)?;
+        let points: Vec<_> =
+            report.landmarks.iter().map(|landmark| (short_id(landmark.id), landmark.position_m)).collect();
+        self.log.write_points(&self.names.topic("landmarks"), &run_world, times, &points)?;
+        self.trajectory.push((times.stamp_ns, pose));
+        if last || report.stamp_ns >= self.path_due_ns {
+            self.path_due_ns = report.stamp_ns + PATH_PERIOD_NS;
+            let every = self.trajectory.len().div_ceil(PATH_POSES);
+            let newest_first = self.trajectory.iter().rev().step_by(every);
+            let mut poses: Vec<_> = newest_first.copied().collect();
+            poses.reverse();
+            self.log.write_path(&self.names.topic("path"), &run_world, times, &poses)?;
+        }
+        Ok(())
+    }
+
+    /// The frames from the world over the run's world and the IMU along the chain to the camera, and the rigid cameras.
+    fn transforms(&self, chain: &ClassicalChain, step: &StepRecord) -> Vec<NamedTransform> {
+        let Some(newest) = step.report.newest() else { return Vec::new() };
+        let named = |parent: &str, child: &str, pose| NamedTransform {
+            parent: if parent == WORLD { parent.to_owned() } else { self.names.frame(parent) },
+            child: self.names.frame(child),
+            pose,
+        };
+        let mut transforms = vec![named(WORLD, WORLD, self.world_from_run)];
+        let imu = NamedTransform {
+            parent: self.names.frame(WORLD),
+            child: self.names.frame("imu"),
+            pose: newest.world_from_imu,
+        };
+        transforms.push(imu);
+        let angles_rad = &newest.joint_angles_rad;
+        if chain.joint_count() == 0 || angles_rad.len() != chain.joint_count() {
+            transforms.push(named("imu", "camera", newest.imu_from_camera));
+        } else {
+            transforms.push(named("imu", "base", chain.imu_from_base));
+            let mut parent = "base".to_owned();
+            for (index, (link, angle_rad)) in chain.links.iter().zip(angles_rad).enumerate() {
+                let last = index + 1 == chain.joint_count();
+                let child = if last { "effector".to_owned() } else { format!("joint{}", index + 2) };
+                transforms.push(named(&parent, &child, link.transform(*angle_rad)));
+                parent = child;
+            }
+            transforms.push(named(&parent, "camera", chain.effector_from_camera));
+        }
+        for (key, imu_from_camera) in &step.report.calibration.rigid_cameras {
+            transforms.push(named("imu", key, *imu_from_camera));
+        }
+        transforms
+    }
+
+    fn write_events(&mut self, step: &StepRecord, times: MessageTimes) -> Result<(), LogError> {
+        use crate::estimator::EventKind;
+        let topic = self.names.topic("events");
+        for event in &step.report.events {
+            let level = match event.kind {
+                EventKind::Failure | EventKind::MeasurementMissing => LogLevel::Warning,
+                kind if kind.is_notable() => LogLevel::Info,
+                _ => LogLevel::Debug,
+            };
+            self.log.write_log_line(&topic, times, level, &format!("{:?}", event.kind), &event.message)?;
+        }
+        for warning in &step.report.warnings {
+            self.log.write_log_line(&topic, times, LogLevel::Warning, "warning", warning)?;
+        }
+        Ok(())
+    }
+}
+
+/// The number of a feature as a point's field can hold it: four bytes last for four thousand million features.
+fn short_id(id: FeatureId) -> u32 {
+    id.0 as u32
+}
