@@ -27,6 +27,8 @@ pub(crate) enum Command {
     /// Draw one panel at one instant into a PNG, without a display.
     #[cfg(feature = "gui")]
     Screenshot(ScreenshotArguments),
+    /// Write a report on a log: one HTML file with pictures and tables, with CSV and JSON beside it.
+    Report(ReportArguments),
     /// Calibrate static camera and gimbal offline from a flight with both, as the paper's baseline does.
     Calibrate(CalibrateArguments),
     /// Say what is in a log and what is wrong with it, before anyone trusts a result.
@@ -163,6 +165,22 @@ pub(crate) enum ThemeArgument {
     Dark,
     /// For paper.
     Print,
+}
+
+/// `dcvins report`.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct ReportArguments {
+    /// The log.
+    pub log: PathBuf,
+    /// Folder for report.html, report.json and the files of each run.
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// An instant to be pictured, in seconds since the first message of the log; may be given several times [default: the
+    /// end].
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    pub at: Vec<f64>,
+    #[command(flatten)]
+    pub estimation: EstimationArguments,
 }
 
 /// `dcvins calibrate`.

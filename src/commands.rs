@@ -71,7 +71,7 @@ impl Progress {
 }
 
 /// Computes a plan to its end (or to a time of the log) with a progress bar.
-fn compute(plan: &SessionPlan, until_ns: Option<i64>) -> Result<Recording> {
+pub(crate) fn compute(plan: &SessionPlan, until_ns: Option<i64>) -> Result<Recording> {
     let begin_s = plan.start_s;
     let log_end_s = seconds_from_ns(plan.log.duration_ns());
     let end_s = plan.duration_s.map_or(log_end_s, |duration_s| log_end_s.min(begin_s + duration_s));

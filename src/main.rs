@@ -3,6 +3,7 @@
 mod arguments;
 mod commands;
 mod degeneracy;
+mod report;
 
 use std::io::Write as _;
 use std::process::ExitCode;
@@ -18,6 +19,7 @@ fn main() -> ExitCode {
         Command::Run(run) => commands::run(&run),
         #[cfg(feature = "gui")]
         Command::Screenshot(screenshot) => commands::screenshot(&screenshot),
+        Command::Report(arguments) => report::report(&arguments),
         Command::Calibrate(calibrate) => commands::calibrate(&calibrate),
         Command::Check(check) => commands::check(&check),
         Command::Simulate(simulate) => commands::simulate(&simulate),

@@ -9,6 +9,7 @@ mod evaluation;
 #[cfg(feature = "gui")]
 mod picture;
 mod recent_files;
+mod report;
 mod results;
 mod run_files;
 mod structure;
@@ -25,6 +26,7 @@ pub use evaluation::{EvaluationOptions, EvaluationReport, evaluate};
 #[cfg(feature = "gui")]
 pub use picture::{PANEL_NAMES, PictureError, PictureOptions, Renderer, draw_panel, panel_names, png_bytes, write_png};
 pub use recent_files::RecentFiles;
+pub use report::{ReportOptions, ReportPicture, write_report};
 pub use results::write_results;
 pub use run_files::{RunFileOptions, write_run};
 pub use structure::KnownLossSummary;

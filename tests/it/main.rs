@@ -7,6 +7,7 @@ mod degeneracy;
 mod evaluate;
 #[cfg(feature = "gui")]
 mod renderers;
+mod report;
 mod results;
 mod sample_log;
 mod time_travel;

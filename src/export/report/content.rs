@@ -1,0 +1,147 @@
+//! Everything that a report says, as data: `report.json`, and what the page is made of.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::inputs::InputFile;
+use super::story::{RankSpell, rank_story};
+use crate::export::summary::{RunSummary, log_name};
+use crate::geometry::seconds_from_ns;
+use crate::session::{Recording, RunRecord};
+
+/// Something notable that happened.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(super) struct ReportEvent {
+    /// When, in seconds since the log began.
+    pub(super) time_s: f64,
+    /// What kind.
+    pub(super) kind: String,
+    /// Why, in one sentence.
+    pub(super) message: String,
+    /// How many frames in a row tell the same.
+    pub(super) times: usize,
+}
+
+/// One run.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(super) struct RunContent {
+    /// Its label.
+    pub(super) label: String,
+    /// As in `summary.json`.
+    pub(super) summary: RunSummary,
+    /// What the rank did over time.
+    pub(super) rank_story: Vec<RankSpell>,
+    /// What happened.
+    pub(super) events: Vec<ReportEvent>,
+    /// How often the frequent kinds of events occurred.
+    pub(super) frequent_events: BTreeMap<String, usize>,
+}
+
+/// The whole report.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(super) struct ReportContent {
+    /// Program and version.
+    pub(super) program: &'static str,
+    /// The command as typed.
+    pub(super) command: String,
+    /// File name of the log.
+    pub(super) log: String,
+    /// Name of the rig.
+    pub(super) rig: String,
+    /// Length of the log.
+    pub(super) duration_s: f64,
+    /// Files that went in.
+    pub(super) inputs: Vec<InputFile>,
+    /// The runs in the order of the command.
+    pub(super) runs: Vec<RunContent>,
+    /// What is wrong with the log.
+    pub(super) log_warnings: Vec<String>,
+}
+
+impl ReportContent {
+    /// Gathers what a recording says; `summaries` are those of its runs, in order.
+    pub(super) fn new(
+        recording: &Recording,
+        summaries: Vec<RunSummary>,
+        inputs: Vec<InputFile>,
+        command: &str,
+    ) -> Self {
+        let runs = recording.runs.iter().zip(summaries).map(|(run, summary)| {
+            let (events, frequent_events) = events(run);
+            RunContent {
+                label: run.spec.label.clone(),
+                summary,
+                rank_story: rank_story(run, &recording.rig),
+                events,
+                frequent_events,
+            }
+        });
+        let warnings = recording.warnings.iter();
+        Self {
+            program: concat!("dcvins ", env!("CARGO_PKG_VERSION")),
+            command: command.to_owned(),
+            log: log_name(&recording.log_path),
+            rig: recording.rig.name.clone(),
+            duration_s: seconds_from_ns(recording.duration_ns),
+            inputs,
+            runs: runs.collect(),
+            log_warnings: warnings
+                .map(|warning| format!("{:.3} s: {}", seconds_from_ns(warning.stamp_ns), warning.message))
+                .collect(),
+        }
+    }
+}
+
+/// The notable events, those told by several frames in a row once, and the counts of the others by kind.
+fn events(run: &RunRecord) -> (Vec<ReportEvent>, BTreeMap<String, usize>) {
+    let mut notable: Vec<ReportEvent> = Vec::new();
+    let mut frequent = BTreeMap::new();
+    // By kind the number of the frame that told it last, and its place in `notable`.
+    let mut latest: BTreeMap<String, (usize, usize)> = BTreeMap::new();
+    for (number, step) in run.steps.iter().enumerate() {
+        for event in &step.report.events {
+            let kind = words(&format!("{:?}", event.kind));
+            if !event.kind.is_notable() {
+                *frequent.entry(kind).or_default() += 1;
+                continue;
+            }
+            let before = latest.get(&kind).filter(|(frame, _)| frame + 1 >= number).map(|(_, place)| *place);
+            let place = before.unwrap_or(notable.len());
+            match notable.get_mut(place) {
+                Some(known) => known.times += 1,
+                None => notable.push(ReportEvent {
+                    time_s: seconds_from_ns(step.report.stamp_ns),
+                    kind: kind.clone(),
+                    message: event.message.clone(),
+                    times: 1,
+                }),
+            }
+            latest.insert(kind, (number, place));
+        }
+    }
+    (notable, frequent)
+}
+
+/// `InitializedFromMotion` as `initialized from motion`.
+fn words(name: &str) -> String {
+    let mut words = String::new();
+    for letter in name.chars() {
+        if letter.is_ascii_uppercase() && !words.is_empty() {
+            words.push(' ');
+        }
+        words.push(letter.to_ascii_lowercase());
+    }
+    words
+}
+
+#[cfg(test)]
+mod tests {
+    use super::words;
+
+    #[test]
+    fn kinds_of_events_are_written_as_words() {
+        assert_eq!(words("InitializedFromMotion"), "initialized from motion");
+        assert_eq!(words("Failure"), "failure");
+    }
+}

@@ -1,0 +1,65 @@
+//! `dcvins report`: one HTML file that holds everything, to be read, printed and sent, with CSV and JSON beside it.
+//!
+//! The same log, rig, runs and command give the same bytes: no dates, no measured times.
+
+mod content;
+mod html;
+mod inputs;
+mod page;
+mod story;
+mod tables;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use content::ReportContent;
+use inputs::InputFile;
+use story::RankSpell;
+
+use super::error::ExportError;
+use super::run_files::{RunFileOptions, write_run};
+use crate::session::Recording;
+
+/// A picture of a report.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ReportPicture {
+    /// Heading under which it stands; pictures with the same heading stand together.
+    pub heading: String,
+    /// What it shows.
+    pub caption: String,
+    /// The PNG.
+    pub png: Vec<u8>,
+}
+
+/// What a report is told beside the recording.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ReportOptions {
+    /// The command that makes it, as typed.
+    pub command: String,
+    /// Files that went in, to be named with their hashes.
+    pub inputs: Vec<PathBuf>,
+    /// Pictures in the order in which they are shown.
+    pub pictures: Vec<ReportPicture>,
+}
+
+/// Writes `report.html`, `report.json` and a folder for each run as `run --no-timing` does; returns the HTML's path.
+///
+/// # Errors
+/// When a file cannot be read or written.
+pub fn write_report(recording: &Recording, folder: &Path, options: &ReportOptions) -> Result<PathBuf, ExportError> {
+    fs::create_dir_all(folder).map_err(ExportError::write(folder))?;
+    let run_options = RunFileOptions { timing: false, ..RunFileOptions::default() };
+    let mut summaries = Vec::new();
+    for run in &recording.runs {
+        summaries.push(write_run(recording, run, folder, run_options)?.1);
+    }
+    let inputs = options.inputs.iter().map(|path| InputFile::read(path)).collect::<Result<Vec<_>, _>>()?;
+    let content = ReportContent::new(recording, summaries, inputs, &options.command);
+    let json_path = folder.join("report.json");
+    let json = serde_json::to_string_pretty(&content)
+        .map_err(|source| ExportError::Write { source: source.into(), path: json_path.clone() })?;
+    fs::write(&json_path, format!("{json}\n")).map_err(ExportError::write(&json_path))?;
+    let path = folder.join("report.html");
+    fs::write(&path, page::page(&content, &options.pictures)).map_err(ExportError::write(&path))?;
+    Ok(path)
+}

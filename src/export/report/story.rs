@@ -1,0 +1,141 @@
+//! What the rank did over time, in a few sentences.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use crate::export::tables::parameter_name;
+use crate::flight_log::Rig;
+use crate::geometry::seconds_from_ns;
+use crate::observability::RankReport;
+use crate::session::RunRecord;
+
+/// Ranks are told for stretches of at least this length, each by what was found most often in it: on a real flight the
+/// informed rank flickers from frame to frame.
+const STRETCH_NS: i64 = 1_000_000_000;
+
+/// A stretch of time in which the ranks stayed the same.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(super) struct RankSpell {
+    /// Its first second since the log began.
+    pub(super) from_s: f64,
+    /// Its last one.
+    pub(super) to_s: f64,
+    /// Calibration columns.
+    pub(super) columns: usize,
+    /// Structural rank.
+    pub(super) structural: usize,
+    /// Informed rank.
+    pub(super) informed: usize,
+    /// Lost to the parameterization, to joints that did not move, absorbed by free joint angles, to the vehicle's motion.
+    pub(super) lost: [usize; 4],
+    /// The parameter that is known least, most of the time.
+    pub(super) weakest: Option<String>,
+}
+
+impl RankSpell {
+    /// The spell in words: `rank 18 of 18 from 3.2 s to 8.5 s; …`.
+    pub(super) fn sentence(&self) -> String {
+        let causes =
+            ["the parameterization", "joints that did not move", "free joint angles", "the motion of the vehicle"];
+        let lost = self.lost.iter().zip(causes).filter(|(count, _)| **count > 0);
+        let lost: Vec<String> = lost.map(|(count, cause)| format!("{count} to {cause}")).collect();
+        let lost = if lost.is_empty() { String::new() } else { format!("; lost: {}", lost.join(", ")) };
+        let weakest = self.weakest.as_ref().map_or_else(String::new, |name| format!("; known least: {name}"));
+        format!(
+            "rank {} of {} from {:.1} s to {:.1} s{lost}; the window tells more than the rig about {} of {}{weakest}",
+            self.structural, self.columns, self.from_s, self.to_s, self.informed, self.columns
+        )
+    }
+}
+
+/// Columns, structural and informed rank, losses: what is told of a step.
+type Finding = (usize, usize, usize, [usize; 4]);
+
+fn finding(rank: &RankReport) -> Finding {
+    let lost = [rank.deficit_parameterization, rank.deficit_joints, rank.deficit_absorbed, rank.deficit_motion];
+    (rank.names.len(), rank.rank_structural, rank.rank_informed, lost)
+}
+
+/// What occurs most often; the smaller one of two.
+fn most_frequent<T: Ord + Clone>(items: impl Iterator<Item = T>) -> Option<T> {
+    let mut counts: BTreeMap<T, usize> = BTreeMap::new();
+    for item in items {
+        *counts.entry(item).or_default() += 1;
+    }
+    let largest = counts.values().copied().max()?;
+    counts.into_iter().find(|(_, count)| *count == largest).map(|(item, _)| item)
+}
+
+/// The spells of a run in time order.
+pub(super) fn rank_story(run: &RunRecord, rig: &Rig) -> Vec<RankSpell> {
+    let ranked: Vec<(i64, &RankReport)> =
+        run.steps.iter().filter_map(|step| Some((step.report.stamp_ns, step.rank.as_ref()?))).collect();
+    let mut spells: Vec<RankSpell> = Vec::new();
+    let mut weakest_of_spell: Vec<&str> = Vec::new();
+    let begin_ns = ranked.first().map_or(0, |(stamp_ns, _)| *stamp_ns);
+    let stretches = ranked.chunk_by(|(a, _), (b, _)| (a - begin_ns) / STRETCH_NS == (b - begin_ns) / STRETCH_NS);
+    for stretch in stretches {
+        let Some((columns, structural, informed, lost)) = most_frequent(stretch.iter().map(|(_, rank)| finding(rank)))
+        else {
+            continue;
+        };
+        let ends =
+            [stretch.first(), stretch.last()].map(|end| end.map_or(0.0, |(stamp_ns, _)| seconds_from_ns(*stamp_ns)));
+        let weakest = stretch.iter().filter_map(|(_, rank)| rank.weakest());
+        let same = |spell: &&mut RankSpell| {
+            (spell.columns, spell.structural, spell.informed, spell.lost) == (columns, structural, informed, lost)
+        };
+        if let Some(spell) = spells.last_mut().filter(same) {
+            spell.to_s = ends[1];
+            weakest_of_spell.extend(weakest);
+        } else {
+            weakest_of_spell = weakest.collect();
+            spells.push(RankSpell {
+                from_s: ends[0],
+                to_s: ends[1],
+                columns,
+                structural,
+                informed,
+                lost,
+                weakest: None,
+            });
+        }
+        if let Some(spell) = spells.last_mut() {
+            spell.weakest = most_frequent(weakest_of_spell.iter()).map(|name| parameter_name(name, rig));
+        }
+    }
+    spells
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn spells_read_as_sentences() {
+        let spell = RankSpell {
+            from_s: 3.2,
+            to_s: 8.5,
+            columns: 24,
+            structural: 15,
+            informed: 11,
+            lost: [6, 0, 0, 3],
+            weakest: Some("yaw.d".to_owned()),
+        };
+        assert_eq!(
+            spell.sentence(),
+            "rank 15 of 24 from 3.2 s to 8.5 s; lost: 6 to the parameterization, 3 to the motion of the vehicle; the window \
+             tells more than the rig about 11 of 24; known least: yaw.d"
+        );
+        let full = RankSpell { structural: 24, lost: [0; 4], weakest: None, ..spell };
+        assert!(!full.sentence().contains("lost"), "{}", full.sentence());
+    }
+
+    #[test]
+    fn the_most_frequent_is_told_and_of_two_the_smaller() {
+        assert_eq!(most_frequent([3, 1, 3, 2, 1, 3].into_iter()), Some(3));
+        assert_eq!(most_frequent([3, 1, 3, 1].into_iter()), Some(1));
+        assert_eq!(most_frequent(std::iter::empty::<u8>()), None);
+    }
+}

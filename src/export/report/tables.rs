@@ -1,0 +1,124 @@
+//! The tables of a report.
+
+use super::content::{ReportContent, RunContent};
+use super::html::{number, table};
+use crate::export::summary::ParameterSummary;
+
+/// Millimetres of a metre, for lengths that are shown.
+const MM_PER_M: f64 = 1e3;
+
+/// Frames of each run.
+pub(super) fn frames(content: &ReportContent) -> String {
+    let rows: Vec<Vec<String>> = content
+        .runs
+        .iter()
+        .map(|run| {
+            let frames = &run.summary.frames;
+            vec![
+                run.label.clone(),
+                run.summary.camera.clone(),
+                frames.total.to_string(),
+                frames.estimated.to_string(),
+                frames.keyframes.to_string(),
+                frames.initialized_at_s.map_or_else(|| "never".to_owned(), |time_s| number(time_s, 2)),
+                frames.restarts.to_string(),
+                number(run.summary.length_m, 1),
+            ]
+        })
+        .collect();
+    let header = ["run", "camera", "images", "estimated", "keyframes", "initialized at s", "restarts", "length m"];
+    table("Frames and length of the path", &header, &rows)
+}
+
+/// Trajectory errors of each run.
+pub(super) fn accuracy(content: &ReportContent) -> String {
+    let mut header = ["run", "ATE rmse m", "mean m", "median m", "max m", "% of length"].map(str::to_owned).to_vec();
+    // Every run has relative errors over the same lengths, as long as its path is long enough.
+    let mut lengths_m: Vec<f64> = Vec::new();
+    for relative in content.runs.iter().filter_map(|run| run.summary.accuracy.as_ref()).flat_map(|found| &found.rpe) {
+        if !lengths_m.contains(&relative.delta_m) {
+            lengths_m.push(relative.delta_m);
+        }
+    }
+    lengths_m.sort_by(f64::total_cmp);
+    header.extend(lengths_m.iter().map(|length_m| format!("over {length_m} m")));
+    let rows: Vec<Vec<String>> = content
+        .runs
+        .iter()
+        .map(|run| {
+            let Some(accuracy) = &run.summary.accuracy else {
+                let reason = run.summary.accuracy_missing.clone().unwrap_or_default();
+                return vec![run.label.clone(), reason];
+            };
+            let mut row = vec![
+                run.label.clone(),
+                number(accuracy.ate_rmse_m, 4),
+                number(accuracy.ate_mean_m, 4),
+                number(accuracy.ate_median_m, 4),
+                number(accuracy.ate_max_m, 4),
+                number(accuracy.ate_percent_of_length, 3),
+            ];
+            for length_m in &lengths_m {
+                let relative = accuracy.rpe.iter().find(|relative| relative.delta_m == *length_m);
+                row.push(relative.map_or_else(String::new, |relative| {
+                    format!("{} m, {}°", number(relative.translation_rmse_m, 3), number(relative.rotation_rmse_deg, 2))
+                }));
+            }
+            row
+        })
+        .collect();
+    let header: Vec<&str> = header.iter().map(String::as_str).collect();
+    table(
+        "Position error after alignment by yaw and position, and relative error (rmse) over stretches",
+        &header,
+        &rows,
+    )
+}
+
+/// Calibration of one run: degrees and millimetres.
+pub(super) fn calibration(run: &RunContent) -> String {
+    let parameters = &run.summary.calibration.parameters;
+    let with_truth = parameters.iter().any(|parameter| parameter.truth.is_some());
+    let mut header = vec!["parameter", "unit", "given", "at the end", "± σ"];
+    if with_truth {
+        header.extend(["truth", "error", "error / σ"]);
+    }
+    let rows: Vec<Vec<String>> = parameters.iter().map(|parameter| calibration_row(parameter, with_truth)).collect();
+    let caption = format!("Calibration of {}, {} form", run.label, run.summary.calibration.parameterization);
+    table(&caption, &header, &rows)
+}
+
+fn calibration_row(parameter: &ParameterSummary, with_truth: bool) -> Vec<String> {
+    let angle = parameter.unit == "rad";
+    let (unit, scale, decimals) = if angle { ("°", 1f64.to_degrees(), 3) } else { ("mm", MM_PER_M, 2) };
+    let shown = |value: f64| number(value * scale, decimals);
+    let sigma = parameter.sigma.map_or_else(String::new, |sigma| format!("±{}", number(sigma * scale, decimals)));
+    let mut row = vec![parameter.name.clone(), unit.to_owned(), shown(parameter.initial), shown(parameter.last), sigma];
+    if with_truth {
+        row.push(parameter.truth.map_or_else(String::new, shown));
+        row.push(parameter.error.map_or_else(String::new, shown));
+        let ratio = parameter.error.zip(parameter.sigma).filter(|(_, sigma)| *sigma > 0.0);
+        row.push(ratio.map_or_else(String::new, |(error, sigma)| number(error / sigma, 1)));
+    }
+    row
+}
+
+/// What happened in one run.
+pub(super) fn events(run: &RunContent) -> String {
+    let rows: Vec<Vec<String>> = run
+        .events
+        .iter()
+        .map(|event| {
+            let times = if event.times > 1 { format!("{} frames in a row", event.times) } else { String::new() };
+            vec![number(event.time_s, 2), event.kind.clone(), event.message.clone(), times]
+        })
+        .collect();
+    table(&format!("Events of {}", run.label), &["at s", "event", "why", ""], &rows)
+}
+
+/// What went in.
+pub(super) fn inputs(content: &ReportContent) -> String {
+    let row = |input: &super::InputFile| vec![input.name.clone(), input.bytes.to_string(), input.sha256.clone()];
+    let rows: Vec<Vec<String>> = content.inputs.iter().map(row).collect();
+    table("Files that went in", &["file", "bytes", "SHA-256"], &rows)
+}

@@ -1,0 +1,62 @@
+//! `report`: one page that holds everything, the same bytes twice.
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+use serde_json::Value;
+
+/// Makes a report on the begin of the sample log from a folder of its own, so that the command is the same.
+fn report(folder: &Path, threads: &str) -> (String, String) {
+    fs::create_dir_all(folder).expect("the folder can be made");
+    for name in ["garden.mcap", "garden.rig.yaml", "garden.truth.yaml"] {
+        let sample = Path::new(env!("CARGO_MANIFEST_DIR")).join("sample_logs").join(name);
+        fs::copy(sample, folder.join(name)).expect("the sample can be copied");
+    }
+    let mut command = Command::new(env!("CARGO_BIN_EXE_dcvins"));
+    command.current_dir(folder).env("RAYON_NUM_THREADS", threads);
+    command.args(["report", "garden.mcap", "-o", "out", "--duration", "5", "--at", "4.2"]);
+    command.args(["--run", "auto", "--run", "classical:name=old"]);
+    let output = command.output().expect("the program starts");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let text = |name: &str| fs::read_to_string(folder.join("out").join(name)).expect("the file was written");
+    (text("report.html"), text("report.json"))
+}
+
+#[test]
+fn a_report_holds_everything_and_has_the_same_bytes_twice() {
+    let folder = tempfile::tempdir().unwrap();
+    let (page, json) = report(&folder.path().join("first"), "2");
+    let again = report(&folder.path().join("second"), "1");
+    assert!(page == again.0 && json == again.1, "two reports differ");
+
+    // Everything is in the page: no address is asked for.
+    for reference in ["http:", "https:", "src=\"/", "<script", "<link"] {
+        assert!(!page.contains(reference), "the page holds '{reference}'");
+    }
+    let report: Value = serde_json::from_str(&json).unwrap();
+    for text in [
+        "dcvins report garden.mcap -o out --duration 5 --at 4.2 --run auto --run classical:name=old",
+        report["inputs"][0]["sha256"].as_str().unwrap(),
+        "garden.truth.yaml",
+        "initialized from motion",
+    ] {
+        assert!(page.contains(text), "'{text}' is missing");
+    }
+    let pictures = page.matches("src=\"data:image/png;base64,iVBOR").count();
+    assert_eq!(pictures, if cfg!(feature = "gui") { 6 } else { 0 });
+
+    // The numbers are those of the summaries, and the classical form is told to lose six columns.
+    for (run, columns, lost) in [(0, 18, 0), (1, 24, 6)] {
+        let run = &report["runs"][run];
+        let ate_m = run["summary"]["accuracy"]["ate_rmse_m"].as_f64().unwrap();
+        assert!(page.contains(&format!(">{ate_m:.4}<")), "the error {ate_m} is missing");
+        let last = run["rank_story"].as_array().unwrap().last().unwrap();
+        assert_eq!((last["columns"].as_u64(), last["lost"][0].as_u64()), (Some(columns), Some(lost)), "{last}");
+    }
+    assert!(page.contains("of 24 from") && page.contains("6 to the parameterization"));
+    let out = folder.path().join("first/out");
+    for name in ["auto/summary.json", "auto/calibration.csv", "auto/trajectory.tum"] {
+        assert!(out.join(name).is_file(), "{name} is missing");
+    }
+}
