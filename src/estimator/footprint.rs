@@ -1,7 +1,7 @@
 //! How much memory a report takes.
 
 use super::estimator::Estimator;
-use super::window::{Feature, FeatureMap, Frame, Observation};
+use super::window::{Feature, FeatureMap, Frame, Observation, Rates};
 use super::{CalibrationEstimate, FrameStateReport, StepReport};
 
 /// Bytes of a report by part.
@@ -97,6 +97,8 @@ fn of_window_frame(frame: &Frame) -> usize {
     size_of::<Frame>()
         + allocated_bytes(size_of_val(frame.motion.samples()))
         + states * of_vec(&frame.state.joints_rad)
+        + allocated_bytes(size_of::<Rates>())
+        + of_vec(&frame.state.rates.joints_rad_per_s)
         + encoder
 }
 

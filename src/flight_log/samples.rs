@@ -41,8 +41,8 @@ pub struct JointAngles {
 impl JointAngles {
     /// Bytes on the heap.
     pub fn heap_bytes(&self) -> usize {
-        let numbers = self.angles_rad.capacity() + self.sigmas_rad.capacity() + self.lasting_sigmas_rad.capacity();
-        numbers * size_of::<f64>()
+        let all = [&self.angles_rad, &self.sigmas_rad, &self.lasting_sigmas_rad, &self.rates_rad_per_s];
+        all.iter().map(|numbers| numbers.capacity() * size_of::<f64>()).sum()
     }
 }
 
