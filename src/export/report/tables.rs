@@ -6,6 +6,8 @@ use crate::export::summary::ParameterSummary;
 
 /// Millimetres of a metre, for lengths that are shown.
 const MM_PER_M: f64 = 1e3;
+/// Milliseconds of a second, for the offsets of clocks.
+const MS_PER_S: f64 = 1e3;
 
 /// Frames of each run.
 pub(super) fn frames(content: &ReportContent) -> String {
@@ -75,7 +77,7 @@ pub(super) fn accuracy(content: &ReportContent) -> String {
     )
 }
 
-/// Calibration of one run: degrees and millimetres.
+/// Calibration of one run: degrees, millimetres, milliseconds.
 pub(super) fn calibration(run: &RunContent) -> String {
     let parameters = &run.summary.calibration.parameters;
     let with_truth = parameters.iter().any(|parameter| parameter.truth.is_some());
@@ -89,8 +91,12 @@ pub(super) fn calibration(run: &RunContent) -> String {
 }
 
 fn calibration_row(parameter: &ParameterSummary, with_truth: bool) -> Vec<String> {
-    let angle = parameter.unit == "rad";
-    let (unit, scale, decimals) = if angle { ("°", 1f64.to_degrees(), 3) } else { ("mm", MM_PER_M, 2) };
+    let (unit, scale, decimals) = match parameter.unit {
+        "rad" => ("°", 1f64.to_degrees(), 3),
+        "m" => ("mm", MM_PER_M, 2),
+        "s" => ("ms", MS_PER_S, 3),
+        other => (other, 1.0, 6),
+    };
     let shown = |value: f64| number(value * scale, decimals);
     let sigma = parameter.sigma.map_or_else(String::new, |sigma| format!("±{}", number(sigma * scale, decimals)));
     let mut row = vec![parameter.name.clone(), unit.to_owned(), shown(parameter.initial), shown(parameter.last), sigma];
@@ -121,4 +127,23 @@ pub(super) fn inputs(content: &ReportContent) -> String {
     let row = |input: &super::InputFile| vec![input.name.clone(), input.bytes.to_string(), input.sha256.clone()];
     let rows: Vec<Vec<String>> = content.inputs.iter().map(row).collect();
     table("Files that went in", &["file", "bytes", "SHA-256"], &rows)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_unit_is_shown_as_people_read_it() {
+        let check = |unit: &'static str, expected: [&str; 8]| {
+            let name = "parameter".to_owned();
+            let (truth, error, sigma) = (Some(0.5), Some(-0.25), Some(0.125));
+            let parameter = ParameterSummary { name, unit, initial: 0.0, last: 0.25, sigma, truth, error };
+            assert_eq!(calibration_row(&parameter, true), expected);
+            assert_eq!(calibration_row(&parameter, false), expected[..5]);
+        };
+        check("rad", ["parameter", "°", "0.000", "14.324", "±7.162", "28.648", "−14.324", "−2.0"]);
+        check("m", ["parameter", "mm", "0.00", "250.00", "±125.00", "500.00", "−250.00", "−2.0"]);
+        check("s", ["parameter", "ms", "0.000", "250.000", "±125.000", "500.000", "−250.000", "−2.0"]);
+    }
 }
