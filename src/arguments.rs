@@ -121,9 +121,13 @@ pub(crate) struct RunArguments {
 pub(crate) struct ScreenshotArguments {
     /// The log.
     pub log: PathBuf,
-    /// Seconds since the first message of the log.
-    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
-    pub at: f64,
+    /// Seconds since the first message of the log; may be given several times. Several pictures get their time into their
+    /// names.
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, required_unless_present = "every")]
+    pub at: Vec<f64>,
+    /// A picture every so many seconds from the begin to the end (or from --start, for --duration).
+    #[arg(long, value_name = "SECONDS", value_parser = period)]
+    pub every: Option<f64>,
     /// Which panel; `all` is the whole window.
     #[arg(long, value_name = "NAME", default_value = "all")]
     pub panel: String,
@@ -329,6 +333,12 @@ impl From<AlignArgument> for Alignment {
 fn seconds(text: &str) -> Result<f64, String> {
     let value = text.parse::<f64>().ok().filter(|value| value.is_finite() && *value >= 0.0);
     value.ok_or_else(|| "expected seconds, a number from 0 up".to_owned())
+}
+
+#[cfg(feature = "gui")]
+fn period(text: &str) -> Result<f64, String> {
+    let value = text.parse::<f64>().ok().filter(|value| value.is_finite() && *value >= 1e-3);
+    value.ok_or_else(|| "expected seconds, a number from 0.001 up".to_owned())
 }
 
 #[cfg(feature = "gui")]

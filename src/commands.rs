@@ -35,7 +35,7 @@ pub(crate) fn print(text: &str) -> Result<()> {
 
 /// Says something to the person at the terminal.
 #[cfg(feature = "gui")]
-fn tell(text: &str) {
+pub(crate) fn tell(text: &str) {
     // With standard error gone there is nobody left to tell.
     drop(writeln!(io::stderr(), "{text}"));
 }
@@ -273,45 +273,6 @@ fn write_pictures(plan: &SessionPlan, out: Option<&Path>) -> Result<()> {
         print(&describe(&folder, &summary))?;
     }
     Ok(())
-}
-
-/// `dcvins screenshot`.
-#[cfg(feature = "gui")]
-pub(crate) fn screenshot(arguments: &crate::arguments::ScreenshotArguments) -> Result<()> {
-    use crate::arguments::{RendererArgument, ThemeArgument};
-    use dcvins::export::{PANEL_NAMES, PictureOptions, Renderer, draw_panel, write_png};
-    use dcvins::flight_log::ImageReader;
-    use dcvins::gui::theme::ThemeName;
-
-    if !PANEL_NAMES.contains(&arguments.panel.as_str()) {
-        bail!("no panel is called '{}': expected one of {}", arguments.panel, PANEL_NAMES.join(", "));
-    }
-    let at_ns = dcvins::geometry::ns_from_seconds(arguments.at);
-    let plan = SessionPlan::open(&arguments.estimation.request(arguments.log.clone()))?;
-    let recording = compute(&plan, Some(at_ns))?;
-    if at_ns > plan.log.duration_ns() {
-        tell(&format!(
-            "dcvins: the log ends at {:.3} s, which is what is drawn",
-            seconds_from_ns(plan.log.duration_ns())
-        ));
-    }
-    let at_ns = at_ns.min(plan.log.duration_ns());
-    let mut images = ImageReader::new(Arc::clone(&plan.log), &plan.rig);
-    let options = PictureOptions {
-        size_px: arguments.size.map(|side| side as u32),
-        pixels_per_point: arguments.scale,
-        theme: match arguments.theme {
-            ThemeArgument::Light => ThemeName::Light,
-            ThemeArgument::Dark => ThemeName::Dark,
-            ThemeArgument::Print => ThemeName::Print,
-        },
-        renderer: match arguments.renderer {
-            RendererArgument::Cpu => Renderer::Cpu,
-            RendererArgument::Wgpu => Renderer::Wgpu,
-        },
-    };
-    let picture = draw_panel(&arguments.panel, &recording, at_ns, &mut images, &options)?;
-    Ok(write_png(&picture, &arguments.output)?)
 }
 
 /// `dcvins calibrate`.

@@ -8,7 +8,7 @@
 //! | [`geometry`] | rotations, rigid transforms, the one perturbation rule, time units | cameras, logs |
 //! | [`camera`] | projection and back-projection with their Jacobians | gimbals, images |
 //! | [`gimbal`] | the actuated chain in each parameterization, its Jacobians, conversions and margins | measurements |
-//! | [`flight_log`] | MCAP in and out as typed events in time order; rigs | what the events are used for |
+//! | [`flight_log`] | MCAP in and out as typed events in time order; rigs; logs of other recorders | what the events are used for |
 //! | [`simulation`] | a synthetic flight with known truth, written as a flight log | the estimator |
 //! | [`frontend`] | image in, feature tracks out | the estimator, so that runs share tracks |
 //! | [`estimator`] | window state, residuals, solver, marginalization; each step leaves a `StepReport` | files, screens, the wall clock |

@@ -4,6 +4,8 @@ mod arguments;
 mod commands;
 mod degeneracy;
 mod report;
+#[cfg(feature = "gui")]
+mod screenshot;
 
 use std::io::Write as _;
 use std::process::ExitCode;
@@ -18,7 +20,7 @@ fn main() -> ExitCode {
         Command::View(view) => commands::view(&view),
         Command::Run(run) => commands::run(&run),
         #[cfg(feature = "gui")]
-        Command::Screenshot(screenshot) => commands::screenshot(&screenshot),
+        Command::Screenshot(screenshot) => screenshot::screenshot(&screenshot),
         Command::Report(arguments) => report::report(&arguments),
         Command::Calibrate(calibrate) => commands::calibrate(&calibrate),
         Command::Check(check) => commands::check(&check),

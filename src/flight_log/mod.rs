@@ -1,4 +1,5 @@
-//! Flight logs: MCAP in and out as typed events in time order, and the rigs that describe their sensors.
+//! Flight logs: MCAP in and out as typed events in time order, the rigs that describe their sensors, and the logs of other
+//! recorders.
 //!
 //! Time is nanoseconds since the first message of the log (its header stamp drives; the log time is kept beside it).
 

@@ -10,4 +10,6 @@ mod renderers;
 mod report;
 mod results;
 mod sample_log;
+#[cfg(feature = "gui")]
+mod screenshots;
 mod time_travel;

@@ -1,0 +1,91 @@
+//! `dcvins screenshot`: one panel at one instant, or at several of them.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use anyhow::{Result, bail};
+use dcvins::export::{PANEL_NAMES, PictureOptions, Renderer, draw_panel, write_png};
+use dcvins::flight_log::ImageReader;
+use dcvins::geometry::{ns_from_seconds, seconds_from_ns};
+use dcvins::gui::theme::ThemeName;
+use dcvins::session::SessionPlan;
+
+use crate::arguments::{RendererArgument, ScreenshotArguments, ThemeArgument};
+use crate::commands::{compute, print, tell};
+
+/// The most pictures of one command: more is a mistyped period.
+const MOST_PICTURES: usize = 100_000;
+
+/// `dcvins screenshot`.
+pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<()> {
+    if !PANEL_NAMES.contains(&arguments.panel.as_str()) {
+        bail!("no panel is called '{}': expected one of {}", arguments.panel, PANEL_NAMES.join(", "));
+    }
+    let plan = SessionPlan::open(&arguments.estimation.request(arguments.log.clone()))?;
+    let log_end_ns = plan.log.duration_ns();
+    let begin_ns = ns_from_seconds(plan.start_s).min(log_end_ns);
+    let end_ns =
+        plan.duration_s.map_or(log_end_ns, |duration_s| log_end_ns.min(begin_ns + ns_from_seconds(duration_s)));
+    if arguments.at.iter().any(|at_s| ns_from_seconds(*at_s) > log_end_ns) {
+        tell(&format!("dcvins: the log ends at {:.3} s, which is what is drawn", seconds_from_ns(log_end_ns)));
+    }
+    let mut instants: Vec<i64> = arguments.at.iter().map(|at_s| ns_from_seconds(*at_s).min(log_end_ns)).collect();
+    if let Some(period_s) = arguments.every {
+        let period_ns = ns_from_seconds(period_s).max(1);
+        let count = ((end_ns - begin_ns) / period_ns) as usize + 1;
+        if count > MOST_PICTURES {
+            bail!(
+                "--every {period_s} asks for {count} pictures, at most {MOST_PICTURES} are drawn: give a longer period"
+            );
+        }
+        instants.extend((0..count).map(|number| begin_ns + number as i64 * period_ns));
+    }
+    instants.sort_unstable();
+    instants.dedup();
+    let Some(last_ns) = instants.last().copied() else { bail!("no instant is asked for: give --at or --every") };
+    let recording = compute(&plan, Some(last_ns))?;
+    let mut images = ImageReader::new(Arc::clone(&plan.log), &plan.rig);
+    let options = PictureOptions {
+        size_px: arguments.size.map(|side| side as u32),
+        pixels_per_point: arguments.scale,
+        theme: match arguments.theme {
+            ThemeArgument::Light => ThemeName::Light,
+            ThemeArgument::Dark => ThemeName::Dark,
+            ThemeArgument::Print => ThemeName::Print,
+        },
+        renderer: match arguments.renderer {
+            RendererArgument::Cpu => Renderer::Cpu,
+            RendererArgument::Wgpu => Renderer::Wgpu,
+        },
+    };
+    let several = instants.len() > 1;
+    for cursor_ns in instants {
+        let picture = draw_panel(&arguments.panel, &recording, cursor_ns, &mut images, &options)?;
+        let path = if several { numbered(&arguments.output, cursor_ns) } else { arguments.output.clone() };
+        write_png(&picture, &path)?;
+        if several {
+            print(&format!("{}\n", path.display()))?;
+        }
+    }
+    Ok(())
+}
+
+/// `rank.png` at 12.5 s as `rank-0012.500.png`: names that sort by time.
+fn numbered(path: &Path, cursor_ns: i64) -> PathBuf {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let extension = path.extension().unwrap_or("png".as_ref()).to_string_lossy();
+    path.with_file_name(format!("{stem}-{:08.3}.{extension}", seconds_from_ns(cursor_ns)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_a_sequence_sort_by_time() {
+        let name = |cursor_ns| numbered(Path::new("out/rank.png"), cursor_ns).to_string_lossy().into_owned();
+        assert_eq!(name(12_500_000_000), "out/rank-0012.500.png");
+        assert_eq!(name(0), "out/rank-0000.000.png");
+        assert!(name(9_999_000_000) < name(10_000_000_000) && name(999_000_000_000) < name(1_000_000_000_000));
+    }
+}
