@@ -73,7 +73,7 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<()> {
 /// `rank.png` at 12.5 s as `rank-0012.500.png`: names that sort by time.
 fn numbered(path: &Path, cursor_ns: i64) -> PathBuf {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    let extension = path.extension().unwrap_or("png".as_ref()).to_string_lossy();
+    let extension = path.extension().unwrap_or_else(|| "png".as_ref()).to_string_lossy();
     path.with_file_name(format!("{stem}-{:08.3}.{extension}", seconds_from_ns(cursor_ns)))
 }
 
