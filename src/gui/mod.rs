@@ -41,6 +41,7 @@ use std::sync::Arc;
 use self::theme::Theme;
 use crate::flight_log::GrayImage;
 use crate::frontend::FeatureId;
+use crate::observability::ChainSlide;
 use crate::session::{Command, Recording, SolverPosition};
 
 /// Gives the images of the log's cameras, by camera key and number in the stream.
@@ -50,7 +51,7 @@ pub trait ImageSource {
 }
 
 /// What is selected, linked across all panels.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Selection {
     /// A feature.
     pub feature: Option<FeatureId>,
@@ -60,6 +61,8 @@ pub struct Selection {
     pub run: usize,
     /// The stretch of time that plots show, begin and end since the log began; `None` for the whole log.
     pub visible_ns: Option<(i64, i64)>,
+    /// The selected run's chain moved along a direction of the rank panel, at one step.
+    pub slide: Option<Arc<ChainSlide>>,
 }
 
 /// How the cursor moves.

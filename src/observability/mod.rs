@@ -15,6 +15,7 @@ mod factor;
 pub mod laboratory;
 mod persistence;
 mod report;
+mod slide;
 mod structure;
 #[cfg(test)]
 mod tests;
@@ -23,4 +24,5 @@ pub use analysis::{ScalingRule, analyse, analyse_with_scaling};
 pub use factor::PackedFactor;
 pub use persistence::steps_lost;
 pub use report::{CalibrationDirection, RankReport};
+pub use slide::{ChainSlide, chain_of_step, slide};
 pub use structure::{KnownDirection, KnownLoss, known_losses};

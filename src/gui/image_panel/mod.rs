@@ -170,6 +170,11 @@ impl ImagePanel {
         for mark in &model.marks {
             paint::feature(&painter, &place, mark, &options);
         }
+        if let Some(slide) = context.selection.slide.as_ref().filter(|slide| slide.stamp_ns == model.stamp_ns) {
+            for (_, [now, moved]) in &slide.predictions_px {
+                paint::moved_prediction(&painter, &place, now, moved);
+            }
+        }
         self.pick_ui(ui, &painter, &place, response, context, model);
     }
 

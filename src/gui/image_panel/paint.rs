@@ -112,6 +112,16 @@ pub(super) fn feature(painter: &Painter, place: &ImagePlacement, mark: &FeatureM
     }
 }
 
+/// Where a feature is predicted, and where with the chain moved along a direction: a line between two ticks.
+pub(super) fn moved_prediction(painter: &Painter, place: &ImagePlacement, now: &Vector2<f64>, moved: &Vector2<f64>) {
+    let (from, to) = (place.position(now), place.position(moved));
+    let color = ink().accent;
+    let reach = place.ring_radius();
+    painter.line_segment([from, to], Stroke::new(1.5, color));
+    painter.line_segment([to - vec2(reach, 0.0), to + vec2(reach, 0.0)], Stroke::new(1.5, color));
+    painter.line_segment([to - vec2(0.0, reach), to + vec2(0.0, reach)], Stroke::new(1.5, color));
+}
+
 /// From the measurement to the (magnified) prediction, which gets a small diamond.
 fn residual_arrow(painter: &Painter, from: Pos2, tip: Pos2) {
     let color = residual_color();

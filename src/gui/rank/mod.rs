@@ -2,12 +2,14 @@
 
 mod advice;
 mod heat_map;
+mod slider;
 mod spectrum;
 pub(crate) mod verdict;
 
 use egui::{RichText, ScrollArea, Sense, Ui, vec2};
 
 use self::advice::AdviceUi;
+use self::slider::SliderUi;
 use self::verdict::Level;
 use super::PanelContext;
 use super::convergence::empty_ui;
@@ -31,6 +33,7 @@ pub struct RankPanel {
     /// By run: informed, then structural rank.
     curves: Vec<[Curve; 2]>,
     advice: AdviceUi,
+    slider: SliderUi,
 }
 
 impl RankPanel {
@@ -55,6 +58,7 @@ impl RankPanel {
                 return;
             };
             self.advice.ui(ui, ctx, run, step);
+            self.slider.ui(ui, ctx, run, step);
             spectrum::ui(ui, ctx.theme, rank, (0.16 * height).clamp(60.0, 150.0));
             // The timeline has a lane for it too, so it yields to the heat map first.
             if height > LOWEST_WITH_TIME {

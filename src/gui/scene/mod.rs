@@ -248,7 +248,8 @@ fn legend_lines(views: &[RunView<'_>], theme: &super::theme::Theme) -> Vec<Legen
 fn chain_model(context: &PanelContext<'_>) -> Option<ChainModel> {
     let run = context.recording.runs.get(context.selection.run)?;
     let step = run.step_at(context.cursor_ns)?;
-    let chain = &step.report.calibration.classical;
+    let slide = context.selection.slide.as_ref().filter(|slide| slide.stamp_ns == step.report.stamp_ns);
+    let chain = slide.map_or(&step.report.calibration.classical, |slide| &slide.chain);
     let true_chain = context.recording.truth_rig.as_ref().and_then(|rig| rig.chain_of_camera(&run.camera_key));
     let true_chain = true_chain.filter(|truth| truth.links.len() == chain.links.len());
     let joints = context.recording.rig.gimbal.iter().flat_map(|gimbal| &gimbal.joints);

@@ -10,7 +10,7 @@ use crate::estimator::{JointKnowledge, NavigationState, PoseKnowledge, StepRepor
 use crate::flight_log::Rig;
 use crate::flight_log::rig::ImuNoise;
 use crate::gimbal::Chain;
-use crate::observability::{RankReport, analyse};
+use crate::observability::{RankReport, analyse, chain_of_step};
 
 /// A moment of a flight.
 #[derive(Clone, Debug)]
@@ -46,13 +46,7 @@ impl Situation {
     /// The moment after a step of a run with a rig's camera; `None` while there is no rank.
     pub fn of_step(report: &StepReport, rank: &RankReport, rig: &Rig, camera_key: &str) -> Option<Self> {
         let newest = report.newest()?;
-        let parameterization = report.calibration.parameterization.parse().ok()?;
-        let chain = Chain::from_classical(&report.calibration.classical, parameterization);
-        let whole = rank.names.starts_with(&chain.parameter_names());
-        let chain = if whole { chain } else { chain.without_joint_offsets() };
-        if !rank.names.starts_with(&chain.parameter_names()) || rank.posterior.columns() != rank.names.len() {
-            return None;
-        }
+        let chain = chain_of_step(report, rank).filter(|_| rank.posterior.columns() == rank.names.len())?;
         let information = marginal(rank.posterior.information(), chain.dof())?;
         let sigma_of_joints = newest.encoder_sigmas_rad.as_ref().and_then(|sigmas| mean(sigmas));
         let position_m = (newest.world_from_imu * newest.imu_from_camera).translation_m;

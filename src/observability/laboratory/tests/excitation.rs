@@ -6,7 +6,7 @@ use super::super::{
 use crate::estimator::{Estimator, EstimatorConfig, EstimatorOptions, StepInput, StepReport};
 use crate::flight_log::{JointAngles, Rig};
 use crate::gimbal::{Chain, Parameterization};
-use crate::observability::{RankReport, analyse};
+use crate::observability::{KnownLoss, RankReport, analyse, known_losses, slide};
 use crate::simulation::{
     Exercise, SyntheticFlight, SyntheticFrame, SyntheticMotion, SyntheticOptions, VehicleSwing, synthetic_tracks,
 };
@@ -175,4 +175,36 @@ fn information_is_put_down_to_the_motion_that_brought_it() {
     // What a link turns with its joint is told by that joint: without its motion the link merges with its neighbour.
     assert!(gain("L2.alpha", "joint 2") > 10.0 * gain("L2.alpha", "move x").abs(), "{told}");
     assert!(gain("L3.alpha", "joint 3") > gain("L3.alpha", "move z"), "{told}");
+}
+
+#[test]
+fn reprojections_stay_while_the_chain_slides_along_a_redundant_direction() {
+    let rest = Exercise { vehicle: VehicleSwing::Hover, joint: None };
+    let flight = flight(rest, 7);
+    let mut estimator = estimator(&flight.given_rig);
+    let (report, _) = fly(&mut estimator, &flight, -1.0, 4.0);
+    let camera = &flight.given_rig.cameras[0].model;
+    let classical = &report.calibration.classical;
+    let moved = |chain: &Chain, weights: &[f64]| slide(&report, camera, chain, weights, 1.0).unwrap();
+    // The six of the classical form: d and a leave all pixels for any size, turns to first order.
+    let whole = Chain::from_classical(classical, Parameterization::Classical);
+    let units = whole.parameter_units();
+    for (loss, direction) in known_losses(&whole, false) {
+        let scaled = DVector::from_fn(24, |row, _| {
+            direction[row] / if units[row] == "rad" { 10_f64.to_radians() } else { 0.03 }
+        });
+        let slid = moved(&whole, scaled.normalize().as_slice());
+        assert!(slid.largest_first_order_px < 0.01, "{loss:?}: {} px", slid.largest_first_order_px);
+        let shift = matches!(loss, KnownLoss::BaseD | KnownLoss::EndD | KnownLoss::EndA);
+        assert!(!shift || slid.largest_px < 1e-6, "{loss:?}: {} px", slid.largest_px);
+        assert!(slid.predictions_px.len() > 20 && slid.chain != *classical, "{loss:?}");
+    }
+    // A number that is seen moves them.
+    let minimal = Chain::from_classical(classical, Parameterization::Minimal);
+    let alone = |name: &str| -> Vec<f64> {
+        minimal.parameter_names().iter().map(|known| f64::from(u8::from(known == name))).collect()
+    };
+    let seen = moved(&minimal, &alone("L2.alpha"));
+    assert!(seen.largest_px > 1.0 && seen.largest_first_order_px > 1.0, "{}", seen.largest_px);
+    assert_eq!(slide(&report, camera, &minimal, &[1.0], 1.0), None);
 }

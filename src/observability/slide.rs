@@ -1,0 +1,178 @@
+//! The chain moved along a direction, and what that does to the reprojections of a step.
+
+use nalgebra::{DVector, Vector2, Vector3};
+
+use super::RankReport;
+use super::classification::{ROTATION_SCALE_RAD, TRANSLATION_SCALE_M};
+use crate::camera::CameraModel;
+use crate::estimator::{FeatureReport, StepReport};
+use crate::frontend::FeatureId;
+use crate::geometry::RigidTransform;
+use crate::gimbal::{Chain, ClassicalChain};
+
+/// A chain moved along a direction.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ChainSlide {
+    /// Stamp of the step whose chain was moved.
+    pub stamp_ns: i64,
+    /// How far, in units of 10° and 3 cm along the unit direction.
+    pub amount: f64,
+    /// The moved chain.
+    pub chain: ClassicalChain,
+    /// Largest change of a reprojection in the window, in pixels.
+    pub largest_px: f64,
+    /// The same to first order: what a small move of the chain does, scaled up.
+    pub largest_first_order_px: f64,
+    /// Where the features of the newest frame are predicted now, and with the moved chain.
+    pub predictions_px: Vec<(FeatureId, [Vector2<f64>; 2])>,
+}
+
+/// A move so small that only its first order counts.
+const SMALL: f64 = 1e-4;
+/// Steps of the search for a feature's depth.
+const DEPTH_STEPS: usize = 4;
+/// Least inverse depth, in 1/m.
+const FARTHEST_PER_M: f64 = 1e-5;
+
+/// The chain that a step's calibration columns belong to; `None` when the names say otherwise.
+pub fn chain_of_step(report: &StepReport, rank: &RankReport) -> Option<Chain> {
+    let parameterization = report.calibration.parameterization.parse().ok()?;
+    let chain = Chain::from_classical(&report.calibration.classical, parameterization);
+    let whole = rank.names.starts_with(&chain.parameter_names());
+    let chain = if whole { chain } else { chain.without_joint_offsets() };
+    rank.names.starts_with(&chain.parameter_names()).then_some(chain)
+}
+
+/// Moves the chain of a step along a scaled direction and predicts every feature of the window anew, poses and joint
+/// angles held; each feature takes the depth that suits its pixels best, as in the estimator.
+///
+/// Along a direction that the window cannot see the pixels stay, to first order or for any size, unless it needs the joint
+/// angles or poses to follow.
+pub fn slide(
+    report: &StepReport,
+    camera: &CameraModel,
+    chain: &Chain,
+    weights: &[f64],
+    amount: f64,
+) -> Option<ChainSlide> {
+    let units = chain.parameter_units();
+    let weights = weights.get(..units.len())?;
+    let step = DVector::from_iterator(
+        units.len(),
+        weights
+            .iter()
+            .zip(&units)
+            .map(|(weight, unit)| weight * if *unit == "rad" { ROTATION_SCALE_RAD } else { TRANSLATION_SCALE_M }),
+    );
+    let window = Window { report, camera, before: poses(report, chain) };
+    let moved = chain.plus(&(&step * amount));
+    let after = poses(report, &moved);
+    let nearby = poses(report, &chain.plus(&(&step * SMALL)));
+    let newest = report.window.len().checked_sub(1)?;
+    let mut slide = ChainSlide {
+        stamp_ns: report.stamp_ns,
+        amount,
+        chain: moved.to_classical(),
+        largest_px: 0.0,
+        largest_first_order_px: 0.0,
+        predictions_px: Vec::new(),
+    };
+    for feature in report.features.iter().filter(|feature| !feature.rejected && feature.id.camera() == 0) {
+        let Some(track) = window.track(feature) else { continue };
+        let Some(now) = track.pixels(&window.before, track.inverse_depth_per_m, camera) else { continue };
+        if let Some(small) = track.fitted(&nearby, &now, camera) {
+            slide.largest_first_order_px = slide.largest_first_order_px.max(largest(&now, &small));
+        }
+        let Some(then) = track.fitted(&after, &now, camera) else { continue };
+        slide.largest_px = slide.largest_px.max(largest(&now, &then));
+        if let Some(place) = track.observers.iter().position(|slot| *slot == newest) {
+            slide.predictions_px.push((feature.id, [now[place], then[place]]));
+        }
+    }
+    slide.largest_first_order_px *= amount.abs() / SMALL;
+    Some(slide)
+}
+
+/// Poses of the camera in the world, by slot.
+fn poses(report: &StepReport, chain: &Chain) -> Vec<RigidTransform> {
+    let joints = chain.joint_count();
+    let pose = |angles: &[f64]| (angles.len() == joints).then(|| chain.imu_from_camera(angles));
+    let frames = report.window.iter();
+    frames.map(|frame| frame.world_from_imu * pose(&frame.joint_angles_rad).unwrap_or(frame.imu_from_camera)).collect()
+}
+
+struct Window<'a> {
+    report: &'a StepReport,
+    camera: &'a CameraModel,
+    before: Vec<RigidTransform>,
+}
+
+/// One feature: its direction and depth in the anchor's camera, and who else sees it.
+struct Track {
+    anchor: usize,
+    /// `(x/z, y/z, 1)`.
+    ray: Vector3<f64>,
+    inverse_depth_per_m: f64,
+    observers: Vec<usize>,
+}
+
+impl Window<'_> {
+    fn track(&self, feature: &FeatureReport) -> Option<Track> {
+        let slot_of = |index: usize| self.report.window.iter().position(|frame| frame.frame_index == index);
+        let anchor = slot_of(feature.anchor_frame_index)?;
+        let bearing = self.camera.unproject(&feature.observations.iter().next()?.measured_px)?;
+        let seen = feature.observations.iter().skip(1);
+        let observers: Vec<usize> = seen.filter_map(|seen| slot_of(seen.frame_index)).collect();
+        (bearing.z > 0.0 && !observers.is_empty()).then(|| Track {
+            anchor,
+            ray: bearing / bearing.z,
+            inverse_depth_per_m: feature.inverse_depth_per_m.max(FARTHEST_PER_M),
+            observers,
+        })
+    }
+}
+
+impl Track {
+    /// Predicted pixels by observer.
+    fn pixels(
+        &self,
+        poses: &[RigidTransform],
+        inverse_depth_per_m: f64,
+        camera: &CameraModel,
+    ) -> Option<Vec<Vector2<f64>>> {
+        let point = poses[self.anchor].transform(&(self.ray / inverse_depth_per_m));
+        self.observers.iter().map(|slot| camera.project(&poses[*slot].inverse().transform(&point))).collect()
+    }
+
+    /// The pixels with the depth that brings them closest to the wanted ones.
+    fn fitted(
+        &self,
+        poses: &[RigidTransform],
+        wanted: &[Vector2<f64>],
+        camera: &CameraModel,
+    ) -> Option<Vec<Vector2<f64>>> {
+        let mut inverse_depth = self.inverse_depth_per_m;
+        let mut pixels = self.pixels(poses, inverse_depth, camera)?;
+        for _ in 0..DEPTH_STEPS {
+            let change = 1e-5 * inverse_depth;
+            let shifted = self.pixels(poses, inverse_depth + change, camera)?;
+            let (mut slope_squared, mut slope_by_error) = (0.0, 0.0);
+            for ((shifted, pixel), wanted) in shifted.iter().zip(&pixels).zip(wanted) {
+                let slope = (shifted - pixel) / change;
+                slope_squared += slope.norm_squared();
+                slope_by_error += slope.dot(&(pixel - wanted));
+            }
+            if slope_squared <= 0.0 {
+                break;
+            }
+            let better = (inverse_depth - slope_by_error / slope_squared).max(FARTHEST_PER_M);
+            let Some(moved) = self.pixels(poses, better, camera) else { break };
+            (inverse_depth, pixels) = (better, moved);
+        }
+        Some(pixels)
+    }
+}
+
+fn largest(before: &[Vector2<f64>], after: &[Vector2<f64>]) -> f64 {
+    before.iter().zip(after).map(|(before, after)| (after - before).norm()).fold(0.0, f64::max)
+}
