@@ -146,6 +146,11 @@ pub(crate) struct ScreenshotArguments {
     /// Who draws: cpu needs no driver and gives the same bytes everywhere, wgpu uses a graphics adapter.
     #[arg(long, value_enum, default_value_t = RendererArgument::Cpu)]
     pub renderer: RendererArgument,
+    /// Move the first run's chain along a direction: its number in the rank panel (1 is the weakest), a known one
+    /// (base-d, end-theta, …) or a parameter by name, and how far in units of 10° and 3 cm. Scene and image show what
+    /// comes of it.
+    #[arg(long, value_name = "DIRECTION=VALUE")]
+    pub slide: Option<dcvins::observability::SlidePosition>,
     #[command(flatten)]
     pub estimation: EstimationArguments,
 }

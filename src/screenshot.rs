@@ -57,6 +57,7 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<()> {
             RendererArgument::Cpu => Renderer::Cpu,
             RendererArgument::Wgpu => Renderer::Wgpu,
         },
+        slide: arguments.slide.clone(),
     };
     let several = instants.len() > 1;
     for cursor_ns in instants {

@@ -15,6 +15,7 @@ use crate::gui::offscreen::{Offscreen, OffscreenError};
 use crate::gui::theme::{Theme, ThemeName};
 use crate::gui::window::{PanelName, WindowState, alone_ui, window_ui};
 use crate::gui::{ImageSource, PanelContext, Playback, Selection};
+use crate::observability::SlidePosition;
 use crate::session::Recording;
 
 /// Panels by name; `all` is the whole window.
@@ -38,7 +39,7 @@ pub enum Renderer {
 }
 
 /// How a picture is drawn.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct PictureOptions {
     /// Width and height in pixels.
     pub size_px: [u32; 2],
@@ -48,11 +49,19 @@ pub struct PictureOptions {
     pub theme: ThemeName,
     /// Who draws it.
     pub renderer: Renderer,
+    /// Where the chain of the first run is moved to.
+    pub slide: Option<SlidePosition>,
 }
 
 impl Default for PictureOptions {
     fn default() -> Self {
-        Self { size_px: [1920, 1080], pixels_per_point: 1.0, theme: ThemeName::Light, renderer: Renderer::Cpu }
+        Self {
+            size_px: [1920, 1080],
+            pixels_per_point: 1.0,
+            theme: ThemeName::Light,
+            renderer: Renderer::Cpu,
+            slide: None,
+        }
     }
 }
 
@@ -113,7 +122,7 @@ pub fn draw_panel(
     check(options)?;
     let theme = Theme::of(options.theme);
     let mut state = WindowState::default();
-    let mut selection = Selection::default();
+    let mut selection = Selection { slide: options.slide.clone(), ..Selection::default() };
     let playback = Playback::default();
     let mut ui = |ui: &mut Ui| {
         // Nobody is there to carry out what a panel may ask for.
@@ -127,7 +136,7 @@ pub fn draw_panel(
             None => window_ui(ui, &mut state, context),
         }
     };
-    let PictureOptions { size_px, pixels_per_point, theme, renderer } = *options;
+    let PictureOptions { size_px, pixels_per_point, theme, renderer, .. } = *options;
     let options = HeadlessOptions { size_px, pixels_per_point, theme };
     match renderer {
         Renderer::Cpu => Ok(headless::draw(options, &mut ui)),

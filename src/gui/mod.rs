@@ -27,6 +27,7 @@ mod sample_images;
 pub(crate) mod sample_recording;
 pub mod scene;
 mod session_log;
+mod slide;
 mod software_window;
 #[cfg(test)]
 pub(crate) mod tests;
@@ -41,7 +42,7 @@ use std::sync::Arc;
 use self::theme::Theme;
 use crate::flight_log::GrayImage;
 use crate::frontend::FeatureId;
-use crate::observability::ChainSlide;
+use crate::observability::SlidePosition;
 use crate::session::{Command, Recording, SolverPosition};
 
 /// Gives the images of the log's cameras, by camera key and number in the stream.
@@ -61,8 +62,10 @@ pub struct Selection {
     pub run: usize,
     /// The stretch of time that plots show, begin and end since the log began; `None` for the whole log.
     pub visible_ns: Option<(i64, i64)>,
-    /// The selected run's chain moved along a direction of the rank panel, at one step.
-    pub slide: Option<Arc<ChainSlide>>,
+    /// Along which direction the selected run's chain is moved, and how far.
+    pub slide: Option<SlidePosition>,
+    /// What comes of it at the cursor.
+    pub(crate) moved: slide::MovedChain,
 }
 
 /// How the cursor moves.

@@ -16,6 +16,7 @@ pub mod laboratory;
 mod persistence;
 mod report;
 mod slide;
+mod slide_direction;
 mod structure;
 #[cfg(test)]
 mod tests;
@@ -25,4 +26,5 @@ pub use factor::PackedFactor;
 pub use persistence::steps_lost;
 pub use report::{CalibrationDirection, RankReport};
 pub use slide::{ChainSlide, chain_of_step, slide};
+pub use slide_direction::{InvalidSlide, SlideDirection, SlidePosition};
 pub use structure::{KnownDirection, KnownLoss, known_losses};

@@ -4,10 +4,11 @@ use nalgebra::{DVector, Vector2, Vector3};
 
 use super::RankReport;
 use super::classification::{ROTATION_SCALE_RAD, TRANSLATION_SCALE_M};
+use super::slide_direction::scale_of;
 use crate::camera::CameraModel;
-use crate::estimator::{FeatureReport, StepReport};
+use crate::estimator::{FeatureReport, FrameStateReport, StepReport};
 use crate::frontend::FeatureId;
-use crate::geometry::RigidTransform;
+use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::{Chain, ClassicalChain};
 
 /// A chain moved along a direction.
@@ -19,6 +20,10 @@ pub struct ChainSlide {
     pub amount: f64,
     /// The moved chain.
     pub chain: ClassicalChain,
+    /// How far the camera moves on the IMU at the newest frame, in metres and radians.
+    pub camera_moves: (f64, f64),
+    /// By how much each parameter of the chain was moved, in its unit (`rad` or `m`), in column order.
+    pub changes: Vec<f64>,
     /// Largest change of a reprojection in the window, in pixels.
     pub largest_px: f64,
     /// The same to first order: what a small move of the chain does, scaled up.
@@ -31,6 +36,8 @@ pub struct ChainSlide {
 const SMALL: f64 = 1e-4;
 /// Steps of the search for a feature's depth.
 const DEPTH_STEPS: usize = 4;
+/// Steps of the joint angles where they follow.
+const JOINT_STEPS: usize = 4;
 /// Least inverse depth, in 1/m.
 const FARTHEST_PER_M: f64 = 1e-5;
 
@@ -43,11 +50,12 @@ pub fn chain_of_step(report: &StepReport, rank: &RankReport) -> Option<Chain> {
     rank.names.starts_with(&chain.parameter_names()).then_some(chain)
 }
 
-/// Moves the chain of a step along a scaled direction and predicts every feature of the window anew, poses and joint
-/// angles held; each feature takes the depth that suits its pixels best, as in the estimator.
+/// Moves the chain of a step along a scaled direction and predicts every feature of the window anew, poses held; each
+/// feature takes the depth that suits its pixels best, as in the estimator, and joint angles without encoder readings
+/// follow.
 ///
-/// Along a direction that the window cannot see the pixels stay, to first order or for any size, unless it needs the joint
-/// angles or poses to follow.
+/// Along a direction that the window cannot see the pixels stay, to first order or for any size, unless it needs the
+/// poses to follow.
 pub fn slide(
     report: &StepReport,
     camera: &CameraModel,
@@ -57,22 +65,29 @@ pub fn slide(
 ) -> Option<ChainSlide> {
     let units = chain.parameter_units();
     let weights = weights.get(..units.len())?;
-    let step = DVector::from_iterator(
-        units.len(),
-        weights
-            .iter()
-            .zip(&units)
-            .map(|(weight, unit)| weight * if *unit == "rad" { ROTATION_SCALE_RAD } else { TRANSLATION_SCALE_M }),
-    );
-    let window = Window { report, camera, before: poses(report, chain) };
+    let entries = weights.iter().zip(&units).map(|(weight, unit)| weight * scale_of(unit));
+    let step = DVector::from_iterator(units.len(), entries);
+    let mounts = |chain: &Chain, like: Option<&[RigidTransform]>| -> Vec<RigidTransform> {
+        let frames = report.window.iter().enumerate();
+        frames.map(|(slot, frame)| mount(frame, chain, like.map(|like| &like[slot]))).collect()
+    };
+    let mounts_before = mounts(chain, None);
+    let poses = |mounts: &[RigidTransform]| -> Vec<RigidTransform> {
+        report.window.iter().zip(mounts).map(|(frame, mount)| frame.world_from_imu * *mount).collect()
+    };
+    let window = Window { report, camera, before: poses(&mounts_before) };
     let moved = chain.plus(&(&step * amount));
-    let after = poses(report, &moved);
-    let nearby = poses(report, &chain.plus(&(&step * SMALL)));
+    let mounts_after = mounts(&moved, Some(&mounts_before));
+    let after = poses(&mounts_after);
+    let nearby = poses(&mounts(&chain.plus(&(&step * SMALL)), Some(&mounts_before)));
     let newest = report.window.len().checked_sub(1)?;
+    let difference = mounts_before[newest].inverse() * mounts_after[newest];
     let mut slide = ChainSlide {
         stamp_ns: report.stamp_ns,
         amount,
         chain: moved.to_classical(),
+        camera_moves: (difference.translation_m.norm(), so3::log(&difference.rotation).norm()),
+        changes: (&step * amount).iter().copied().collect(),
         largest_px: 0.0,
         largest_first_order_px: 0.0,
         predictions_px: Vec::new(),
@@ -93,12 +108,39 @@ pub fn slide(
     Some(slide)
 }
 
-/// Poses of the camera in the world, by slot.
-fn poses(report: &StepReport, chain: &Chain) -> Vec<RigidTransform> {
-    let joints = chain.joint_count();
-    let pose = |angles: &[f64]| (angles.len() == joints).then(|| chain.imu_from_camera(angles));
-    let frames = report.window.iter();
-    frames.map(|frame| frame.world_from_imu * pose(&frame.joint_angles_rad).unwrap_or(frame.imu_from_camera)).collect()
+/// Pose of the camera on the IMU at a frame; where the joint angles were not read they follow, to stay as near as they can
+/// to the mount `like`.
+fn mount(frame: &FrameStateReport, chain: &Chain, like: Option<&RigidTransform>) -> RigidTransform {
+    if frame.joint_angles_rad.len() != chain.joint_count() {
+        return frame.imu_from_camera;
+    }
+    let mut angles = frame.joint_angles_rad.clone();
+    if let Some(like) = like.filter(|_| frame.encoder_angles_rad.is_none() && !angles.is_empty()) {
+        for _ in 0..JOINT_STEPS {
+            let Some(step) = towards(chain, &angles, like) else { break };
+            for (angle, step) in angles.iter_mut().zip(step.iter()) {
+                *angle += step;
+            }
+        }
+    }
+    chain.imu_from_camera(&angles)
+}
+
+/// The step of the joint angles that brings the mount nearest to another one, 10° counting as much as 3 cm.
+fn towards(chain: &Chain, angles_rad: &[f64], like: &RigidTransform) -> Option<DVector<f64>> {
+    let linearization = chain.linearize(angles_rad);
+    let mut wanted = like.minus(&linearization.imu_from_camera);
+    let mut slopes = linearization.by_joints.clone();
+    for (start, scale) in [(0, ROTATION_SCALE_RAD), (3, TRANSLATION_SCALE_M)] {
+        slopes.fixed_rows_mut::<3>(start).unscale_mut(scale);
+        wanted.fixed_rows_mut::<3>(start).unscale_mut(scale);
+    }
+    let mut normal = slopes.tr_mul(&slopes);
+    let floor = 1e-9 * normal.trace();
+    for joint in 0..normal.nrows() {
+        normal[(joint, joint)] += floor;
+    }
+    Some(normal.cholesky()?.solve(&slopes.tr_mul(&wanted)))
 }
 
 struct Window<'a> {

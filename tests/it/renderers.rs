@@ -86,7 +86,7 @@ fn a_graphics_adapter_draws_what_the_cpu_draws() {
     let mut pictures = Vec::new();
     for (panel, theme, size_px, pixels_per_point) in cases {
         let options = PictureOptions { size_px, pixels_per_point, theme, ..PictureOptions::default() };
-        let (cpu, wgpu) = (draw(panel, Renderer::Cpu, options), draw(panel, Renderer::Wgpu, options));
+        let (cpu, wgpu) = (draw(panel, Renderer::Cpu, options.clone()), draw(panel, Renderer::Wgpu, options));
         let difference = Difference::between(&cpu, &wgpu);
         say(&format!(
             "  {panel} {}×{}: {:.3} % of the pixels off by more than {NOTICEABLE}, mean {:.3} of 255",

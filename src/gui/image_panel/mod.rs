@@ -14,7 +14,9 @@ use self::model::ImageModel;
 pub use self::model::SolveSide;
 use self::paint::{ImagePlacement, MarkOptions};
 use super::PanelContext;
+use super::slide;
 use super::theme::Theme;
+use super::units::figure;
 use crate::flight_log::GrayImage;
 
 /// Furthest that the image can be magnified over its fitting size.
@@ -97,7 +99,8 @@ impl ImagePanel {
         let image = context.images.image(&run.camera_key, model.frame_index);
         self.image_ui(ui, area, &response, context, &model, image);
         let (legend, _) = ui.allocate_exact_size(vec2(ui.available_width(), LINE_HEIGHT), Sense::hover());
-        paint::legend(ui.painter(), legend, context.theme, &self.mark_options());
+        let moved = slide::of(context, model.stamp_ns).is_some();
+        paint::legend(ui.painter(), legend, context.theme, &self.mark_options(), moved);
         ui.add(egui::Label::new(model.caption()).truncate());
     }
 
@@ -170,10 +173,12 @@ impl ImagePanel {
         for mark in &model.marks {
             paint::feature(&painter, &place, mark, &options);
         }
-        if let Some(slide) = context.selection.slide.as_ref().filter(|slide| slide.stamp_ns == model.stamp_ns) {
+        if let Some(slide) = slide::of(context, model.stamp_ns) {
             for (_, [now, moved]) in &slide.predictions_px {
                 paint::moved_prediction(&painter, &place, now, moved);
             }
+            let text = format!("chain moved: reprojections change by up to {} px", figure(slide.largest_px));
+            paint::label(&painter, area.left_top() + vec2(8.0, 8.0), Align2::LEFT_TOP, &text);
         }
         self.pick_ui(ui, &painter, &place, response, context, model);
     }

@@ -112,14 +112,20 @@ pub(super) fn feature(painter: &Painter, place: &ImagePlacement, mark: &FeatureM
     }
 }
 
-/// Where a feature is predicted, and where with the chain moved along a direction: a line between two ticks.
+/// Where a feature is predicted with the chain moved along a direction: a cross, and a line from where it was predicted
+/// before.
 pub(super) fn moved_prediction(painter: &Painter, place: &ImagePlacement, now: &Vector2<f64>, moved: &Vector2<f64>) {
     let (from, to) = (place.position(now), place.position(moved));
-    let color = ink().accent;
-    let reach = place.ring_radius();
-    painter.line_segment([from, to], Stroke::new(1.5, color));
-    painter.line_segment([to - vec2(reach, 0.0), to + vec2(reach, 0.0)], Stroke::new(1.5, color));
-    painter.line_segment([to - vec2(0.0, reach), to + vec2(0.0, reach)], Stroke::new(1.5, color));
+    let reach = place.ring_radius() + 2.0;
+    for stroke in [Stroke::new(3.0, HALO), Stroke::new(1.5, ink().runs[3])] {
+        painter.line_segment([from, to], stroke);
+        upright_cross(painter, to, reach, stroke);
+    }
+}
+
+fn upright_cross(painter: &Painter, at: Pos2, reach: f32, stroke: Stroke) {
+    painter.line_segment([at - vec2(reach, 0.0), at + vec2(reach, 0.0)], stroke);
+    painter.line_segment([at - vec2(0.0, reach), at + vec2(0.0, reach)], stroke);
 }
 
 /// From the measurement to the (magnified) prediction, which gets a small diamond.
@@ -158,13 +164,19 @@ pub(super) fn label(painter: &Painter, at: Pos2, align: Align2, text: &str) -> R
 }
 
 /// The key to what the marks mean, in one line; what does not fit is left out from the right.
-pub(super) fn legend(painter: &Painter, rect: Rect, theme: &Theme, options: &MarkOptions) {
+///
+/// `moved` says that predictions with a moved chain are drawn.
+pub(super) fn legend(painter: &Painter, rect: Rect, theme: &Theme, options: &MarkOptions, moved: bool) {
     let painter = painter.with_clip_rect(rect);
     let mut pen = LegendPen { painter: &painter, theme, at: rect.left_center(), end: rect.right() };
     pen.text("age");
     pen.color_bar();
     pen.text("frames");
     pen.gap();
+    if moved {
+        let stroke = Stroke::new(1.5, theme.runs[3]);
+        pen.symbol("with the moved chain", |painter, at| upright_cross(painter, at, 5.0, stroke));
+    }
     pen.symbol("in the solve", |painter, at| {
         painter.circle_stroke(at, RING_RADIUS, Stroke::new(1.5, theme.text));
     });

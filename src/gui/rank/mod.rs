@@ -58,7 +58,7 @@ impl RankPanel {
                 return;
             };
             self.advice.ui(ui, ctx, run, step);
-            self.slider.ui(ui, ctx, run, step);
+            self.slider.ui(ui, ctx, step);
             spectrum::ui(ui, ctx.theme, rank, (0.16 * height).clamp(60.0, 150.0));
             // The timeline has a lane for it too, so it yields to the heat map first.
             if height > LOWEST_WITH_TIME {

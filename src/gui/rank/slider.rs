@@ -1,83 +1,137 @@
 //! A slider that moves the chain along a null or weak direction: the scene shows the chain slide, the image shows what
 //! becomes of the reprojections.
 
-use std::sync::Arc;
+use egui::{ComboBox, Label, RichText, Role, Slider, Ui, WidgetInfo};
 
-use egui::{RichText, Slider, Ui};
-
-use super::verdict::parameters_of;
+use super::verdict::parameters_of_weights;
 use crate::gui::PanelContext;
-use crate::gui::units::figure;
-use crate::observability::{RankReport, chain_of_step, slide};
-use crate::session::{RunRecord, StepRecord};
+use crate::gui::slide;
+use crate::gui::units::{Shown, figure, fixed};
+use crate::observability::{ChainSlide, RankReport, SlideDirection, SlidePosition, chain_of_step};
+use crate::session::StepRecord;
 
 /// Farthest move, in units of 10° and 3 cm along the unit direction.
 const FARTHEST: f64 = 2.0;
 /// Seconds that the play button takes from one end to the other and back.
 const PERIOD_S: f64 = 4.0;
+/// Changes of the reprojections up to here count as none, in pixels.
+const STAYS_PX: f64 = 0.1;
+/// Parameters whose changes are written out.
+const CHANGES_SHOWN: usize = 4;
 
 /// State of the slider.
 #[derive(Debug, Default)]
 pub(super) struct SliderUi {
-    /// Place among the step's directions.
-    direction: usize,
-    amount: f64,
     playing: bool,
 }
 
 impl SliderUi {
-    /// Draws the slider and leaves the moved chain in the selection.
-    pub(super) fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>, run: &RunRecord, step: &Arc<StepRecord>) {
-        let Some(rank) = step.rank.as_ref().filter(|rank| !rank.directions.is_empty()) else {
-            ctx.selection.slide = None;
-            return;
+    /// Draws the slider, which sets the position in the selection, and says what comes of it.
+    pub(super) fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>, step: &StepRecord) {
+        let Some(rank) = &step.rank else { return };
+        let Some(chain) = chain_of_step(&step.report, rank) else { return };
+        let mut directions = SlideDirection::of_step(rank);
+        let position = ctx.selection.slide.clone();
+        directions.extend(position.iter().map(|position| position.direction.clone()).filter(|it| is_other(it, rank)));
+        let selected = ctx.selection.parameter.iter().map(|name| SlideDirection::Named(name.clone()));
+        directions.extend(selected.filter(|it| is_other(it, rank)));
+        directions.dedup();
+        let Some(first) = directions.first().cloned() else { return };
+        let names = chain.parameter_names();
+        let label = |direction: &SlideDirection| {
+            let weights = direction.weights(rank, &chain).unwrap_or_default();
+            let kind = match direction {
+                SlideDirection::Measured(index) => {
+                    let structural = rank.directions.get(*index).is_some_and(|direction| direction.structural);
+                    format!("{} {}", if structural { "null" } else { "weak" }, index + 1)
+                }
+                SlideDirection::Named(name) if is_other(direction, rank) => return format!("{name} alone"),
+                SlideDirection::Named(_) => "known".to_owned(),
+            };
+            format!("{kind}: {}", parameters_of_weights(&names, &weights, 2))
         };
-        self.direction = self.direction.min(rank.directions.len() - 1);
+
+        let mut direction = position.as_ref().map_or(first, |position| position.direction.clone());
+        let mut amount = position.map_or(0.0, |position| position.amount);
         ui.horizontal(|ui| {
-            let play = if self.playing { "⏸" } else { "▶" };
-            if ui.small_button(play).on_hover_text("Move the chain to and fro along the direction").clicked() {
+            let (sign, name) = if self.playing { ("⏸", "Hold the chain") } else { ("▶", "Slide the chain") };
+            let play = ui.small_button(sign).on_hover_text("Move the chain to and fro along the direction");
+            play.widget_info(|| WidgetInfo::labeled(Role::Button, true, name));
+            if play.clicked() {
                 self.playing = !self.playing;
             }
-            let named = |index: usize| direction_name(rank, index);
-            egui::ComboBox::from_id_salt("direction of the slider")
-                .selected_text(named(self.direction))
-                .width(0.45 * ui.available_width())
+            let along = ui.label(RichText::new("Move along").color(ctx.theme.text_weak));
+            let chosen = ComboBox::from_id_salt("direction of the slider")
+                .selected_text(label(&direction))
+                .width(0.5 * ui.available_width())
+                .truncate()
                 .show_ui(ui, |ui| {
-                    for index in 0..rank.directions.len() {
-                        ui.selectable_value(&mut self.direction, index, named(index));
+                    for choice in directions {
+                        let text = label(&choice);
+                        ui.selectable_value(&mut direction, choice, text);
                     }
                 });
-            let slider = Slider::new(&mut self.amount, -FARTHEST..=FARTHEST).show_value(false);
-            let slider = ui.add(slider).on_hover_text("Move the chain along this direction, by up to 20° and 6 cm");
+            chosen.response.labelled_by(along.id);
+            ui.spacing_mut().slider_width = (ui.available_width() - 12.0).max(40.0);
+            let slider = Slider::new(&mut amount, -FARTHEST..=FARTHEST).show_value(false);
+            let slider = ui.add(slider).on_hover_text(
+                "Moves the chain along this direction, by up to 20° and 6 cm, the poses of the vehicle held; double click \
+                 for back",
+            );
+            let slider = slider.labelled_by(along.id);
             if slider.double_clicked() {
-                self.amount = 0.0;
+                amount = 0.0;
+            }
+            if slider.dragged() {
+                self.playing = false;
             }
         });
         if self.playing {
             let time_s = ui.input(|input| input.time);
-            self.amount = FARTHEST * (std::f64::consts::TAU * time_s / PERIOD_S).sin();
+            amount = FARTHEST * (std::f64::consts::TAU * time_s / PERIOD_S).sin();
             ui.ctx().request_repaint();
         }
-        let moved = (self.amount != 0.0).then(|| {
-            let chain = chain_of_step(&step.report, rank)?;
-            let camera = ctx.recording.rig.camera(&run.camera_key).ok()?;
-            slide(&step.report, &camera.model, &chain, &rank.directions[self.direction].weights, self.amount)
-        });
-        ctx.selection.slide = moved.flatten().map(Arc::new);
-        if let Some(slide) = &ctx.selection.slide {
-            let text = format!(
-                "moved by {:+.2}: reprojections change by up to {} px, {} px to first order",
-                slide.amount,
-                figure(slide.largest_px),
-                figure(slide.largest_first_order_px)
-            );
-            ui.add(egui::Label::new(RichText::new(text).small().color(ctx.theme.text)).truncate());
+        let untouched = ctx.selection.slide.is_none() && amount == 0.0 && !self.playing;
+        let unchosen = directions_first(rank).as_ref() == Some(&direction);
+        ctx.selection.slide = (!(untouched && unchosen)).then_some(SlidePosition { direction, amount });
+        if let Some(slide) = slide::of(ctx, step.report.stamp_ns) {
+            outcome_ui(ui, ctx, slide, &names, &chain.parameter_units());
         }
     }
 }
 
-fn direction_name(rank: &RankReport, index: usize) -> String {
-    let direction = &rank.directions[index];
-    let kind = if direction.structural { "null" } else { "weak" };
-    format!("{kind} {}", parameters_of(&rank.names, direction, 2))
+fn directions_first(rank: &RankReport) -> Option<SlideDirection> {
+    SlideDirection::of_step(rank).into_iter().next()
+}
+
+/// Whether it is not one of the step's own directions.
+fn is_other(direction: &SlideDirection, rank: &RankReport) -> bool {
+    !SlideDirection::of_step(rank).contains(direction)
+}
+
+/// What the move does to the reprojections, and what was moved.
+fn outcome_ui(ui: &mut Ui, ctx: &PanelContext<'_>, slide: &ChainSlide, names: &[String], units: &[&'static str]) {
+    let stays = slide.largest_px <= STAYS_PX;
+    let (mark, color) = if stays { ("✔", ctx.theme.ok) } else { ("✖", ctx.theme.warn) };
+    let (finite, first_order) = (figure(slide.largest_px), figure(slide.largest_first_order_px));
+    let verb = if stays { "stay" } else { "move" };
+    let text = format!("{mark} Reprojections {verb}: by up to {finite} px, {first_order} px to first order");
+    ui.add(Label::new(RichText::new(&text).color(color)).truncate()).on_hover_text(text);
+    let mut moved: Vec<usize> = (0..slide.changes.len().min(names.len())).collect();
+    let scaled = |column: &usize| {
+        let scale = if units[*column] == "rad" { 10_f64.to_radians() } else { 0.03 };
+        (slide.changes[*column] / scale).abs()
+    };
+    moved.sort_by(|a, b| scaled(b).total_cmp(&scaled(a)));
+    let changes = moved.iter().take(CHANGES_SHOWN).filter(|column| scaled(column) > 1e-3).map(|column| {
+        let shown = Shown::of(units[*column]);
+        format!("{} {}{}", names[*column], signed(slide.changes[*column] * shown.factor), shown.unit)
+    });
+    let text = changes.collect::<Vec<_>>().join(", ");
+    ui.add(Label::new(RichText::new(text).small().color(ctx.theme.text_weak)).truncate());
+}
+
+fn signed(value: f64) -> String {
+    let text = fixed(value.abs(), 1);
+    if value < 0.0 { format!("−{text}") } else { format!("+{text}") }
 }

@@ -98,8 +98,13 @@ const LOW_MARGIN: f64 = 0.3;
 
 /// The strongest parameters of a direction, `L1.d - I.tx`, at most `most`.
 pub(crate) fn parameters_of(names: &[String], direction: &CalibrationDirection, most: usize) -> String {
+    parameters_of_weights(names, &direction.weights, most)
+}
+
+/// The same of the bare weights.
+pub(crate) fn parameters_of_weights(names: &[String], weights: &[f64], most: usize) -> String {
     const SMALLEST_NAMED: f64 = 0.2;
-    let mut entries: Vec<(usize, f64)> = direction.weights.iter().copied().enumerate().collect();
+    let mut entries: Vec<(usize, f64)> = weights.iter().copied().enumerate().collect();
     entries.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
     entries.retain(|(_, weight)| weight.abs() >= SMALLEST_NAMED);
     let left_out = entries.len().saturating_sub(most);

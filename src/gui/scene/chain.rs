@@ -99,16 +99,30 @@ impl ChainPose {
     fn extent_m(&self) -> f64 {
         self.origins_m().map(|origin| origin.norm()).fold(0.0, f64::max)
     }
+
+    fn axis_length_m(&self) -> f64 {
+        (self.extent_m() * AXIS_SHARE).max(1e-4)
+    }
+
+    fn framing_points_m(&self) -> Vec<Vector3<f64>> {
+        let length_m = 0.7 * self.axis_length_m();
+        let tips = [Vector3::x(), Vector3::y(), Vector3::z()];
+        let poses = self.imu_from_frame.iter();
+        let ends = poses.flat_map(|pose| tips.map(|tip| pose.transform(&(tip * length_m))));
+        ends.chain(self.skeleton_m()).collect()
+    }
 }
 
 /// What is known of the chain at one frame.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct ChainModel {
     pub(super) estimate: ChainPose,
-    /// The true chain at the same joint angles.
+    /// The true chain at the same joint angles, or the estimate when `estimate` is moved away from it.
     pub(super) truth: Option<ChainPose>,
+    /// Whether `estimate` is moved along a direction, and `truth` the chain before that.
+    pub(super) moved: bool,
     pub(super) rows: Vec<LinkRow>,
-    /// Distance in metres and angle in radians between the camera's estimated and true pose on the IMU.
+    /// Distance in metres and angle in radians between the camera's poses on the IMU in `estimate` and `truth`.
     pub(super) camera_error: Option<(f64, f64)>,
 }
 
@@ -151,20 +165,23 @@ impl ChainModel {
                 alpha_rad: link.alpha_rad,
             })
             .collect();
-        Self { estimate, truth, rows, camera_error }
+        Self { estimate, truth, moved: false, rows, camera_error }
     }
 
     fn axis_length_m(&self) -> f64 {
-        (self.estimate.extent_m() * AXIS_SHARE).max(1e-4)
+        let sized = self.truth.as_ref().filter(|_| self.moved).unwrap_or(&self.estimate);
+        sized.axis_length_m()
     }
 
-    /// Places that a view of the chain must hold.
+    /// Places that a view of the chain must hold; a chain that is moved to and fro is seen from one place.
     pub(super) fn framing_points_m(&self) -> Vec<Vector3<f64>> {
-        let length_m = 0.7 * self.axis_length_m();
-        let tips = [Vector3::x(), Vector3::y(), Vector3::z()];
-        let poses = self.estimate.imu_from_frame.iter();
-        let ends = poses.flat_map(|pose| tips.map(|tip| pose.transform(&(tip * length_m))));
-        ends.chain(self.estimate.skeleton_m()).collect()
+        /// Room around a chain for its moves.
+        const ROOM: f64 = 1.35;
+        let held = self.truth.as_ref().filter(|_| self.moved);
+        let Some(held) = held else { return self.estimate.framing_points_m() };
+        let points = held.framing_points_m();
+        let middle = points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64;
+        points.into_iter().map(|point| middle + (point - middle) * ROOM).collect()
     }
 
     /// The close-up, in the frame of the IMU.

@@ -25,7 +25,7 @@ use self::chain::{ChainModel, ChainPose};
 use self::layout::lay_out;
 use self::overlay::LegendLine;
 use self::world::{RunView, WorldBuilder, WorldOptions, framing_points_m, ground_height_m};
-use super::PanelContext;
+use super::{PanelContext, slide};
 use crate::camera::CameraModel;
 use crate::flight_log::Rig;
 use crate::session::RunRecord;
@@ -211,6 +211,7 @@ impl ScenePanel {
         overlay::scale_bar(&painter, picture, scale, theme, &view, "");
         let label = context.recording.runs.get(context.selection.run).map_or("", |run| run.spec.label.as_str());
         let text = match &chain.truth {
+            Some(_) if chain.moved => format!("Gimbal chain, {label}, moved; estimate dashed"),
             Some(_) => format!("Gimbal chain, {label}; truth dashed"),
             None => format!("Gimbal chain, {label}"),
         };
@@ -248,14 +249,17 @@ fn legend_lines(views: &[RunView<'_>], theme: &super::theme::Theme) -> Vec<Legen
 fn chain_model(context: &PanelContext<'_>) -> Option<ChainModel> {
     let run = context.recording.runs.get(context.selection.run)?;
     let step = run.step_at(context.cursor_ns)?;
-    let slide = context.selection.slide.as_ref().filter(|slide| slide.stamp_ns == step.report.stamp_ns);
-    let chain = slide.map_or(&step.report.calibration.classical, |slide| &slide.chain);
-    let true_chain = context.recording.truth_rig.as_ref().and_then(|rig| rig.chain_of_camera(&run.camera_key));
-    let true_chain = true_chain.filter(|truth| truth.links.len() == chain.links.len());
+    let estimate = &step.report.calibration.classical;
     let joints = context.recording.rig.gimbal.iter().flat_map(|gimbal| &gimbal.joints);
     let joint_names: Vec<String> = joints.map(|joint| joint.name.clone()).collect();
     let angles_rad = step.report.newest().map_or(&[][..], |frame| &frame.joint_angles_rad);
-    Some(ChainModel::at(angles_rad, chain, true_chain.as_ref(), &joint_names))
+    if let Some(slide) = slide::of(context, step.report.stamp_ns) {
+        let model = ChainModel::at(angles_rad, &slide.chain, Some(estimate), &joint_names);
+        return Some(ChainModel { moved: true, camera_error: Some(slide.camera_moves), ..model });
+    }
+    let true_chain = context.recording.truth_rig.as_ref().and_then(|rig| rig.chain_of_camera(&run.camera_key));
+    let true_chain = true_chain.filter(|truth| truth.links.len() == estimate.links.len());
+    Some(ChainModel::at(angles_rad, estimate, true_chain.as_ref(), &joint_names))
 }
 
 /// From where the close-up looks: chosen for the chain that the rig gives, so that it does not depend on the cursor.

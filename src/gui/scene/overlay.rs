@@ -181,7 +181,8 @@ pub(super) fn chain_table(painter: &Painter, rect: Rect, theme: &Theme, chain: &
         );
     }
     if let Some((distance_m, angle_rad)) = chain.camera_error {
-        let text = format!("camera off the truth: {:.1} mm, {:.2}°", distance_m * 1e3, angle_rad.to_degrees());
+        let what = if chain.moved { "camera moved by" } else { "camera off the truth:" };
+        let text = format!("{what} {:.1} mm, {:.2}°", distance_m * 1e3, angle_rad.to_degrees());
         let at = pos2(inner.left(), y + 0.5 * LINE_HEIGHT);
         painter.text(at, Align2::LEFT_CENTER, text, theme::label_font(), theme.text_strong);
     }

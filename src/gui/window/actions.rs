@@ -148,7 +148,7 @@ pub(crate) fn perform(action: Action, state: &mut WindowState, ctx: &mut PanelCo
         Action::Marker => ctx.commands.push(Command::ToggleMarker),
         Action::WholeLog => ctx.selection.visible_ns = None,
         Action::Dismiss => {
-            (ctx.selection.feature, ctx.selection.parameter) = (None, None);
+            (ctx.selection.feature, ctx.selection.parameter, ctx.selection.slide) = (None, None, None);
             state.close_dialogs();
         }
         Action::NextRun => {

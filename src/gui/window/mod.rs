@@ -37,6 +37,7 @@ use super::open_dialog::OpenDialog;
 use super::rank::RankPanel;
 use super::residuals::ResidualsPanel;
 use super::scene::ScenePanel;
+use super::slide;
 use super::theme::Theme;
 use super::timeline::TimelinePanel;
 
@@ -193,6 +194,7 @@ impl WindowState {
 /// Draws all of the window's content over a session.
 pub fn window_ui(ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_>) {
     let theme = *ctx.theme;
+    slide::update(ctx);
     let mut actions: Vec<Action> = actions::pressed(ui);
     state.panels.inspector.show_times = state.show_times;
 

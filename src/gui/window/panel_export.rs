@@ -7,6 +7,7 @@ use super::panel_table::table_of;
 use super::{PanelName, WindowState};
 use crate::geometry::seconds_from_ns;
 use crate::gui::headless::{self, HeadlessOptions};
+use crate::gui::slide;
 use crate::gui::theme::PANEL_MARGIN;
 use crate::gui::{PanelContext, Playback};
 
@@ -65,6 +66,7 @@ pub(super) fn export(state: &WindowState, ctx: &mut PanelContext<'_>) -> PanelEx
 /// Draws a panel into all of `ui`.
 pub fn alone_ui(panel: PanelName, ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_>) {
     let frame = Frame::new().fill(ctx.theme.surface).inner_margin(PANEL_MARGIN);
+    slide::update(ctx);
     CentralPanel::no_frame().frame(frame).show(ui, |ui| match panel {
         PanelName::Image => state.panels.image.ui(ui, ctx),
         PanelName::Scene => state.panels.scene.ui(ui, ctx),

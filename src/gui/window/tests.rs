@@ -261,6 +261,35 @@ fn a_parameter_is_selected_everywhere() {
 }
 
 #[test]
+fn the_chain_slides_from_the_rank_panel() {
+    let mut harness = bench();
+    assert_eq!(harness.state().selection.slide, None);
+    harness.get_by_label("Slide the chain").click();
+    harness.run_steps(4);
+    let amount = |harness: &Harness<'static, Bench>| harness.state().selection.slide.clone().map(|slide| slide.amount);
+    let first = amount(&harness).expect("it slides");
+    harness.run_steps(3);
+    assert_ne!(amount(&harness), Some(first), "it goes on");
+    harness.get_by_label("Hold the chain").click();
+    harness.run_steps(2);
+    let held = amount(&harness);
+    harness.run_steps(2);
+    assert_eq!(amount(&harness), held);
+    // Along what is known to be lost the reprojections stay, along a parameter alone they move.
+    harness.state_mut().selection.run = 1;
+    for (position, said) in [("base-d=1", "Reprojections stay"), ("L2.alpha=1", "Reprojections move")] {
+        harness.state_mut().selection.slide = Some(position.parse().unwrap());
+        harness.run_steps(2);
+        assert!(harness.query_by_label_contains(said).is_some(), "{position}");
+    }
+    let chosen = |text: &str| harness.get_all_by_role(Role::ComboBox).any(|node| node.value().as_deref() == Some(text));
+    assert!(chosen("L2.alpha alone"));
+    harness.key_press(Key::Escape);
+    harness.run_steps(2);
+    assert_eq!(harness.state().selection.slide, None);
+}
+
+#[test]
 fn warnings_are_listed_and_lead_to_their_time() {
     let mut harness = bench();
     harness.get_by_label("⚠ 1 warning").click();

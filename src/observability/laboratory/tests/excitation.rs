@@ -6,7 +6,7 @@ use super::super::{
 use crate::estimator::{Estimator, EstimatorConfig, EstimatorOptions, StepInput, StepReport};
 use crate::flight_log::{JointAngles, Rig};
 use crate::gimbal::{Chain, Parameterization};
-use crate::observability::{KnownLoss, RankReport, analyse, known_losses, slide};
+use crate::observability::{RankReport, analyse};
 use crate::simulation::{
     Exercise, SyntheticFlight, SyntheticFrame, SyntheticMotion, SyntheticOptions, VehicleSwing, synthetic_tracks,
 };
@@ -18,7 +18,7 @@ const SHARED_S: f64 = START_S - 0.4;
 /// How long it is flown: as long as the advice supposes.
 const FLOWN_S: f64 = super::super::ADVICE_DURATION_S;
 
-fn flight(exercise: Exercise, seed: u64) -> SyntheticFlight {
+pub(super) fn flight(exercise: Exercise, seed: u64) -> SyntheticFlight {
     synthetic_tracks(&SyntheticOptions {
         seed,
         duration_s: START_S + FLOWN_S,
@@ -30,7 +30,7 @@ fn flight(exercise: Exercise, seed: u64) -> SyntheticFlight {
     })
 }
 
-fn estimator(rig: &Rig) -> Estimator {
+pub(super) fn estimator(rig: &Rig, parameterization: Parameterization, use_encoder: bool) -> Estimator {
     let root = 3.0_f64.sqrt();
     let gimbal = rig.gimbal.as_ref().unwrap();
     Estimator::new(EstimatorConfig {
@@ -39,10 +39,10 @@ fn estimator(rig: &Rig) -> Estimator {
         imu_noise: rig.imu.noise,
         gravity_m_per_s2: rig.gravity_m_per_s2,
         chain: rig.chain_of_camera("cam0").unwrap(),
-        parameterization: Parameterization::Minimal,
+        parameterization,
         auto_chart: false,
         encoder_sigma_rad: gimbal.encoder_sigma_rad,
-        use_encoder: true,
+        use_encoder,
         calibrate: true,
         estimate_timeshift: false,
         timeshift_s: 0.0,
@@ -66,20 +66,28 @@ fn step(estimator: &mut Estimator, frame: &SyntheticFrame) -> (StepReport, Optio
         frame_index: frame.index,
         stamp_ns: frame.stamp_ns,
         imu: &frame.imu,
-        joint_angles: Some(&joints),
+        joint_angles: estimator.config().use_encoder.then_some(&joints),
         tracks: &frame.tracks,
         rigid_tracks: &[],
     });
     let rank = report.linearization.as_ref().and_then(|linearization| {
         let angles: Vec<&[f64]> = report.window.iter().map(|frame| frame.joint_angles_rad.as_slice()).collect();
-        let chain = Chain::from_classical(&report.calibration.classical, Parameterization::Minimal);
-        analyse(linearization, &chain, &angles, false)
+        let calibration = &report.calibration;
+        let chain = Chain::from_classical(&calibration.classical, calibration.parameterization.parse().unwrap());
+        let free = !estimator.config().use_encoder;
+        let chain = if free { chain.without_joint_offsets() } else { chain };
+        analyse(linearization, &chain, &angles, free)
     });
     (report, rank)
 }
 
 /// Flies frames up to a time and returns what the last of them told.
-fn fly(estimator: &mut Estimator, flight: &SyntheticFlight, from_s: f64, to_s: f64) -> (StepReport, RankReport) {
+pub(super) fn fly(
+    estimator: &mut Estimator,
+    flight: &SyntheticFlight,
+    from_s: f64,
+    to_s: f64,
+) -> (StepReport, RankReport) {
     let mut last = None;
     for frame in &flight.frames {
         let time_s = frame.stamp_ns as f64 * 1e-9;
@@ -103,7 +111,7 @@ fn sigma(rank: &RankReport, direction: &[f64]) -> f64 {
 fn flown(seed: u64, every: usize) -> (Advice, Vec<(String, f64, f64)>) {
     let rest = Exercise { vehicle: VehicleSwing::Hover, joint: None };
     let warm_up = flight(rest, seed);
-    let mut start = estimator(&warm_up.given_rig);
+    let mut start = estimator(&warm_up.given_rig, Parameterization::Minimal, true);
     let (report, rank) = fly(&mut start, &warm_up, -1.0, SHARED_S);
     let situation = Situation::of_step(&report, &rank, &warm_up.given_rig, "cam0").unwrap();
     let advice = advise(&situation).unwrap();
@@ -175,36 +183,4 @@ fn information_is_put_down_to_the_motion_that_brought_it() {
     // What a link turns with its joint is told by that joint: without its motion the link merges with its neighbour.
     assert!(gain("L2.alpha", "joint 2") > 10.0 * gain("L2.alpha", "move x").abs(), "{told}");
     assert!(gain("L3.alpha", "joint 3") > gain("L3.alpha", "move z"), "{told}");
-}
-
-#[test]
-fn reprojections_stay_while_the_chain_slides_along_a_redundant_direction() {
-    let rest = Exercise { vehicle: VehicleSwing::Hover, joint: None };
-    let flight = flight(rest, 7);
-    let mut estimator = estimator(&flight.given_rig);
-    let (report, _) = fly(&mut estimator, &flight, -1.0, 4.0);
-    let camera = &flight.given_rig.cameras[0].model;
-    let classical = &report.calibration.classical;
-    let moved = |chain: &Chain, weights: &[f64]| slide(&report, camera, chain, weights, 1.0).unwrap();
-    // The six of the classical form: d and a leave all pixels for any size, turns to first order.
-    let whole = Chain::from_classical(classical, Parameterization::Classical);
-    let units = whole.parameter_units();
-    for (loss, direction) in known_losses(&whole, false) {
-        let scaled = DVector::from_fn(24, |row, _| {
-            direction[row] / if units[row] == "rad" { 10_f64.to_radians() } else { 0.03 }
-        });
-        let slid = moved(&whole, scaled.normalize().as_slice());
-        assert!(slid.largest_first_order_px < 0.01, "{loss:?}: {} px", slid.largest_first_order_px);
-        let shift = matches!(loss, KnownLoss::BaseD | KnownLoss::EndD | KnownLoss::EndA);
-        assert!(!shift || slid.largest_px < 1e-6, "{loss:?}: {} px", slid.largest_px);
-        assert!(slid.predictions_px.len() > 20 && slid.chain != *classical, "{loss:?}");
-    }
-    // A number that is seen moves them.
-    let minimal = Chain::from_classical(classical, Parameterization::Minimal);
-    let alone = |name: &str| -> Vec<f64> {
-        minimal.parameter_names().iter().map(|known| f64::from(u8::from(known == name))).collect()
-    };
-    let seen = moved(&minimal, &alone("L2.alpha"));
-    assert!(seen.largest_px > 1.0 && seen.largest_first_order_px > 1.0, "{}", seen.largest_px);
-    assert_eq!(slide(&report, camera, &minimal, &[1.0], 1.0), None);
 }

@@ -1,4 +1,5 @@
-//! The truth table, and advice that is flown.
+//! The truth table, advice that is flown, and chains that slide.
 
 mod excitation;
+mod slide;
 mod table;

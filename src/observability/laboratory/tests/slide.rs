@@ -1,0 +1,80 @@
+use super::excitation::{estimator, flight, fly};
+use crate::gimbal::{Chain, Parameterization};
+use crate::observability::{
+    ChainSlide, KnownLoss, RankReport, SlideDirection, SlidePosition, chain_of_step, known_losses, slide,
+};
+use crate::simulation::{Exercise, VehicleSwing};
+
+/// A flight in a parameterization up to 4 s, and what moving its last chain does.
+fn moves(parameterization: Parameterization, encoder: bool) -> (RankReport, impl Fn(&SlideDirection) -> ChainSlide) {
+    let flight = flight(Exercise { vehicle: VehicleSwing::Hover, joint: None }, 7);
+    let mut estimator = estimator(&flight.given_rig, parameterization, encoder);
+    let (report, rank) = fly(&mut estimator, &flight, -1.0, 4.0);
+    let chain = chain_of_step(&report, &rank).unwrap();
+    let told = rank.clone();
+    let moved = move |direction: &SlideDirection| {
+        let weights = direction.weights(&told, &chain).unwrap();
+        slide(&report, &flight.given_rig.cameras[0].model, &chain, &weights, 1.0).unwrap()
+    };
+    (rank, moved)
+}
+
+#[test]
+fn reprojections_stay_while_the_chain_slides_along_a_redundant_direction() {
+    let (rank, moved) = moves(Parameterization::Classical, true);
+    assert_eq!((rank.names.len(), rank.rank_structural, rank.known.len()), (24, 18, 6));
+    // As measured: to first order nothing moves.
+    let null: Vec<usize> = (0..rank.directions.len()).filter(|index| rank.directions[*index].structural).collect();
+    assert_eq!(null.len(), 6);
+    for index in null {
+        let slid = moved(&SlideDirection::Measured(index));
+        assert!(slid.largest_first_order_px < 0.01, "{index}: {} px", slid.largest_first_order_px);
+        assert!(slid.predictions_px.len() > 20 && slid.changes.iter().any(|change| change.abs() > 0.01), "{index}");
+    }
+    // As known: shifts along an axis leave all pixels and the camera for any size, turns too when nothing couples them.
+    for known in &rank.known {
+        let slid = moved(&SlideDirection::Named(known.loss.name()));
+        assert!(slid.largest_first_order_px < 0.01, "{:?}: {} px", known.loss, slid.largest_first_order_px);
+        if matches!(known.loss, KnownLoss::BaseD | KnownLoss::EndD | KnownLoss::EndA) {
+            assert!(slid.largest_px < 1e-6, "{:?}: {} px", known.loss, slid.largest_px);
+            assert!(slid.camera_moves.0 < 1e-12 && slid.camera_moves.1 < 1e-7, "{:?}", slid.camera_moves);
+        }
+    }
+    // A number that is seen moves them.
+    for name in ["L2.alpha", "EC.rx"] {
+        let seen = moved(&SlideDirection::Named(name.to_owned()));
+        assert!(seen.largest_px > 10.0 && seen.largest_first_order_px > 10.0, "{name}: {} px", seen.largest_px);
+        assert!(seen.camera_moves.1 > 0.1, "{name}: {:?}", seen.camera_moves);
+    }
+}
+
+#[test]
+fn free_joint_angles_follow_the_chain() {
+    let (rank, moved) = moves(Parameterization::Classical, false);
+    let absorbed = rank.names.iter().position(|name| name == "IB.rz");
+    assert!(absorbed.is_some(), "{:?}", rank.names);
+    let lost = rank.known.iter().find(|known| known.loss == KnownLoss::BaseTheta).expect("the offset is not a column");
+    let slid = moved(&SlideDirection::Named(lost.loss.name()));
+    assert!(slid.largest_px < 0.01, "{} px", slid.largest_px);
+}
+
+#[test]
+fn directions_have_names() {
+    let read = |text: &str| text.parse::<SlidePosition>();
+    let position = |direction, amount| Ok(SlidePosition { direction, amount });
+    assert_eq!(read("1=0.5"), position(SlideDirection::Measured(0), 0.5));
+    assert_eq!(read("L2.alpha=-1"), position(SlideDirection::Named("L2.alpha".to_owned()), -1.0));
+    assert_eq!(read("base-d = 1e-1"), position(SlideDirection::Named("base-d".to_owned()), 0.1));
+    for wrong in ["", "1", "0=1", "=1", "base-d=much", "2=inf"] {
+        let error = read(wrong).unwrap_err().to_string();
+        assert!(error.contains("expected DIRECTION=VALUE"), "{error}");
+    }
+    // No two losses share a name.
+    let chain = super::super::Mechanism::named("coaxial-axes").unwrap().chain;
+    let chain = Chain::from_classical(&chain, Parameterization::Classical);
+    let mut names: Vec<String> = known_losses(&chain, true).iter().map(|(loss, _)| loss.name()).collect();
+    let all = names.len();
+    names.sort();
+    names.dedup();
+    assert!(names.len() == all && all > 8, "{names:?}");
+}
