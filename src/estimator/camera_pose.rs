@@ -2,13 +2,14 @@
 
 use std::borrow::Cow;
 
-use nalgebra::{DMatrix, Matrix6xX};
+use nalgebra::{DMatrix, Matrix3, Matrix6xX};
 
 use super::calibration::Calibration;
 use super::layout::POSE;
 use super::reprojection::CameraPose;
 use super::window::FrameState;
 use crate::geometry::so3;
+use crate::gimbal::ChainLinearization;
 
 /// Pose of the camera at a state: the IMU's pose and the mount at the state's joint angles, when the camera's clock says
 /// the frame's stamp.
@@ -48,22 +49,7 @@ impl CameraMaps {
             let state = &*when_seen(stamped, calibration);
             let chain = calibration.linearize(&state.joints_rad);
             let world_from_imu = state.navigation.world_from_imu.rotation_matrix();
-            let camera_from_imu = chain.imu_from_camera.rotation_matrix().transpose();
-            let lever = chain.imu_from_camera.translation_m;
-            let joints = state.joints_rad.len();
-            let mut own = DMatrix::zeros(6, POSE + joints);
-            own.fixed_view_mut::<3, 3>(0, 0).copy_from(&camera_from_imu);
-            own.fixed_view_mut::<3, 3>(3, 0).copy_from(&(world_from_imu * so3::hat(&lever) * -1.0));
-            own.fixed_view_mut::<3, 3>(3, 3).fill_with_identity();
-            let carried = |part: &Matrix6xX<f64>| {
-                let mut carried = DMatrix::from_column_slice(6, part.ncols(), part.as_slice());
-                let shift = world_from_imu * part.fixed_rows::<3>(3);
-                carried.fixed_rows_mut::<3>(3).copy_from(&shift);
-                carried
-            };
-            // A rigid camera does not follow the joints.
-            own.columns_mut(POSE, chain.by_joints.ncols()).copy_from(&carried(&chain.by_joints));
-            let mut by_calibration = carried(&chain.by_parameters);
+            let (mut own, mut by_calibration) = camera_map(&world_from_imu, state.joints_rad.len(), &chain);
             if let Some(column) = calibration.camera_shift_column() {
                 by_calibration.set_column(column, &(&own * state.motion()));
             }
@@ -78,4 +64,28 @@ impl CameraMaps {
         }
         maps
     }
+}
+
+/// How the camera's pose follows pose and joints of its frame (6 × (6 + N)) and its calibration (6 × columns), at this
+/// rotation of the vehicle.
+pub(super) fn camera_map(
+    world_from_imu: &Matrix3<f64>,
+    joints: usize,
+    chain: &ChainLinearization,
+) -> (DMatrix<f64>, DMatrix<f64>) {
+    let camera_from_imu = chain.imu_from_camera.rotation_matrix().transpose();
+    let lever = chain.imu_from_camera.translation_m;
+    let mut own = DMatrix::zeros(6, POSE + joints);
+    own.fixed_view_mut::<3, 3>(0, 0).copy_from(&camera_from_imu);
+    own.fixed_view_mut::<3, 3>(3, 0).copy_from(&(world_from_imu * so3::hat(&lever) * -1.0));
+    own.fixed_view_mut::<3, 3>(3, 3).fill_with_identity();
+    let carried = |part: &Matrix6xX<f64>| {
+        let mut carried = DMatrix::from_column_slice(6, part.ncols(), part.as_slice());
+        let shift = world_from_imu * part.fixed_rows::<3>(3);
+        carried.fixed_rows_mut::<3>(3).copy_from(&shift);
+        carried
+    };
+    // A rigid camera does not follow the joints.
+    own.columns_mut(POSE, chain.by_joints.ncols()).copy_from(&carried(&chain.by_joints));
+    (own, carried(&chain.by_parameters))
 }

@@ -2,7 +2,7 @@
 
 use super::estimator::Estimator;
 use super::window::{Feature, FeatureMap, Frame, Observation, Rates};
-use super::{CalibrationEstimate, FrameStateReport, StepReport};
+use super::{CalibrationEstimate, FrameStateReport, JacobianSource, StepReport};
 
 /// Bytes of a report by part.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -19,6 +19,8 @@ pub struct ReportBytes {
     pub landmarks: usize,
     /// The linearization, where it was kept.
     pub linearization: usize,
+    /// What the blocks of the Jacobian are written out from.
+    pub jacobian: usize,
     /// The report itself, events, residuals, iterations and warnings.
     pub other: usize,
 }
@@ -32,6 +34,7 @@ impl ReportBytes {
             + self.observations
             + self.landmarks
             + self.linearization
+            + self.jacobian
             + self.other
     }
 }
@@ -69,6 +72,7 @@ impl StepReport {
             observations: self.features.iter().map(|feature| allocated_bytes(feature.observations.heap_bytes())).sum(),
             landmarks: of_vec(&self.landmarks),
             linearization,
+            jacobian: self.jacobian_source.as_ref().map_or(0, JacobianSource::heap_bytes),
             other: size_of::<Self>()
                 + of_vec(&self.events)
                 + of_vec(&self.residuals)

@@ -54,7 +54,7 @@ impl Problem<'_> {
 }
 
 /// What the columns of a linearization stand for; `names` are the calibration's.
-fn column_blocks(layout: &Layout, names: &[String], numbers: &[usize]) -> Vec<ColumnBlock> {
+pub(super) fn column_blocks(layout: &Layout, names: &[String], numbers: &[usize]) -> Vec<ColumnBlock> {
     let mut blocks = Vec::new();
     let mut start = 0;
     let mut push = |group: ColumnGroup, name: String, len: usize| {
@@ -81,7 +81,7 @@ fn column_blocks(layout: &Layout, names: &[String], numbers: &[usize]) -> Vec<Co
 }
 
 /// Columns of the layout in the order of the report: calibration, joints, poses, speeds and biases.
-fn column_order(layout: &Layout) -> Vec<usize> {
+pub(super) fn column_order(layout: &Layout) -> Vec<usize> {
     let mut order: Vec<usize> = layout.calibration().collect();
     order.extend((0..layout.frames).flat_map(|slot| layout.joints(slot)));
     order.extend((0..layout.frames).flat_map(|slot| layout.pose(slot)));

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, Vector2, Vector3};
 
-use super::Observations;
+use super::{JacobianSource, Observations};
 use crate::frontend::FeatureId;
 use crate::geometry::RigidTransform;
 use crate::gimbal::{Chain, ClassicalChain};
@@ -327,6 +327,9 @@ pub struct StepReport {
     pub iterations: Vec<IterationReport>,
     /// The linearization, when it was asked for and the estimator is tracking.
     pub linearization: Option<Linearization>,
+    /// What the blocks of the Jacobian can be written out from ([`StepReport::jacobian`]), when the linearization was asked
+    /// for and the estimator is tracking.
+    pub jacobian_source: Option<JacobianSource>,
     /// Whether the frame is a keyframe.
     pub keyframe: bool,
     /// Stage timings (the only part of a report that differs between replays).

@@ -33,6 +33,7 @@ impl Estimator {
             reprojection_rms_after_px: 0.0,
             iterations: Vec::new(),
             linearization: None,
+            jacobian_source: None,
             keyframe: false,
             times: StageTimes::default(),
             warnings: Vec::new(),
@@ -57,6 +58,7 @@ impl Estimator {
         let reported_ms = (self.config.clock_ms)();
         if self.config.options.keep_linearization {
             report.linearization = Some(self.linearization(solved));
+            report.jacobian_source = Some(self.jacobian_source(solved));
         }
         report.times.report_ms = reported_ms - begin_ms;
         report.times.linearize_ms = (self.config.clock_ms)() - reported_ms;
@@ -86,6 +88,12 @@ impl Estimator {
             .collect()
     }
 
+    /// Units of the calibration's columns, free or not.
+    pub(super) fn calibration_units(&self) -> Vec<&'static str> {
+        let cameras = (0..self.calibration.cameras()).map(|camera| self.calibration.of(camera));
+        cameras.flat_map(Calibration::units).collect()
+    }
+
     fn calibration_report(&self) -> CalibrationEstimate {
         let cameras = || (0..self.calibration.cameras()).map(|camera| self.calibration.of(camera));
         let count = cameras().map(|calibration| calibration.units().len()).sum();
@@ -100,7 +108,7 @@ impl Estimator {
         CalibrationEstimate {
             parameterization: chain.parameterization().name().to_owned(),
             names: self.calibration_names(),
-            units: cameras().flat_map(Calibration::units).collect(),
+            units: self.calibration_units(),
             values: cameras().flat_map(Calibration::values).collect(),
             sigmas,
             prior_sigmas: cameras().flat_map(Calibration::prior_sigmas).collect(),

@@ -19,8 +19,18 @@ use crate::observability::SlidePosition;
 use crate::session::Recording;
 
 /// Panels by name; `all` is the whole window.
-pub const PANEL_NAMES: [&str; 8] =
-    [WHOLE_WINDOW, "image", "scene", "convergence", "rank", "residuals", "inspector", "timeline"];
+pub const PANEL_NAMES: [&str; 10] = [
+    WHOLE_WINDOW,
+    "image",
+    "scene",
+    "convergence",
+    "rank",
+    "jacobian",
+    "residuals",
+    "inspector",
+    "laboratory",
+    "timeline",
+];
 
 /// The name that stands for all panels.
 const WHOLE_WINDOW: &str = "all";

@@ -10,6 +10,8 @@ pub mod headless;
 mod histogram;
 pub mod image_panel;
 pub mod inspector;
+pub mod jacobian;
+pub mod laboratory;
 pub mod offscreen;
 pub mod open_dialog;
 pub mod painter;
@@ -21,6 +23,8 @@ pub mod residuals;
 pub mod run_window;
 #[cfg(test)]
 mod sample_calibration;
+#[cfg(test)]
+mod sample_flight;
 #[cfg(test)]
 mod sample_images;
 #[cfg(test)]

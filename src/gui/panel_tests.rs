@@ -121,6 +121,11 @@ fn rank_is_drawn_in_every_case() {
 }
 
 #[test]
+fn the_jacobian_is_drawn_in_every_case() {
+    check("jacobian", [900, 520], super::jacobian::JacobianPanel::ui);
+}
+
+#[test]
 fn residuals_are_drawn_in_every_case() {
     check("residuals", [480, 420], super::residuals::ResidualsPanel::ui);
 }

@@ -399,6 +399,7 @@ fn waiting_report(index: usize, calibration: crate::estimator::CalibrationEstima
         reprojection_rms_after_px: f64::NAN,
         iterations: Vec::new(),
         linearization: None,
+        jacobian_source: None,
         keyframe: false,
         times: StageTimes { frontend_ms: 6.0, step_ms: 6.2, ..StageTimes::default() },
         warnings: Vec::new(),
@@ -492,6 +493,7 @@ fn tracking_report(
             })
             .collect(),
         linearization: None,
+        jacobian_source: None,
         keyframe,
         times: StageTimes {
             frontend_ms: 7.0 + dice.unit(),

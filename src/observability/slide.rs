@@ -54,6 +54,8 @@ pub fn chain_of_step(report: &StepReport, rank: &RankReport) -> Option<Chain> {
 /// feature takes the depth that suits its pixels best, as in the estimator, and joint angles without encoder readings
 /// follow.
 ///
+/// `None` where no feature can be predicted, since nothing could be said then.
+///
 /// Along a direction that the window cannot see the pixels stay, to first order or for any size, unless it needs the
 /// poses to follow.
 pub fn slide(
@@ -92,6 +94,7 @@ pub fn slide(
         largest_first_order_px: 0.0,
         predictions_px: Vec::new(),
     };
+    let mut predicted = false;
     for feature in report.features.iter().filter(|feature| !feature.rejected && feature.id.camera() == 0) {
         let Some(track) = window.track(feature) else { continue };
         let Some(now) = track.pixels(&window.before, track.inverse_depth_per_m, camera) else { continue };
@@ -99,13 +102,14 @@ pub fn slide(
             slide.largest_first_order_px = slide.largest_first_order_px.max(largest(&now, &small));
         }
         let Some(then) = track.fitted(&after, &now, camera) else { continue };
+        predicted = true;
         slide.largest_px = slide.largest_px.max(largest(&now, &then));
         if let Some(place) = track.observers.iter().position(|slot| *slot == newest) {
             slide.predictions_px.push((feature.id, [now[place], then[place]]));
         }
     }
     slide.largest_first_order_px *= amount.abs() / SMALL;
-    Some(slide)
+    predicted.then_some(slide)
 }
 
 /// Pose of the camera on the IMU at a frame; where the joint angles were not read they follow, to stay as near as they can

@@ -33,6 +33,8 @@ impl StepRecord {
                 reprojection_rms_after_px: report.reprojection_rms_after_px,
                 iterations: report.iterations.clone(),
                 linearization: report.linearization.clone(),
+                // Worth nothing without the features.
+                jacobian_source: None,
                 keyframe: report.keyframe,
                 times: report.times,
                 warnings: report.warnings.clone(),

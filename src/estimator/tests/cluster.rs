@@ -116,6 +116,8 @@ fn both_calibrations_are_columns_with_names_of_their_own() {
     assert!(calibration.sigmas.iter().zip(&calibration.prior_sigmas).all(|(after, before)| after < before));
     let linearization = last.linearization.as_ref().unwrap();
     assert_eq!(linearization.calibration_column_norms.len(), 24);
+    let cameras = [&estimator.config().camera, &estimator.config().rigid_cameras[0].model];
+    super::jacobian::check(last, &cameras);
     let names: Vec<&String> = linearization.columns[..24].iter().map(|column| &column.name).collect();
     assert!(names.iter().zip(&calibration.names).all(|(column, name)| *column == name), "{names:?}");
 

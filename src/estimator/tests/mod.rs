@@ -4,6 +4,7 @@ mod clocks;
 mod cluster;
 mod fixture;
 mod flight;
+mod jacobian;
 mod preintegration;
 mod rest;
 mod trouble;

@@ -75,6 +75,7 @@ impl App {
     pub fn new(open_log: OpenLog, desktop: Arc<dyn Desktop>, theme: ThemeName) -> Self {
         let mut state = WindowState::default();
         state.show_times = true;
+        state.panels.laboratory.in_background = true;
         state.open_dialog.set_desktop(Arc::clone(&desktop));
         state.saved_layouts = SavedLayouts::from_text(&desktop.kept_layouts().unwrap_or_default());
         Self {

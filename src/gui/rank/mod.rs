@@ -1,12 +1,16 @@
 //! The rank panel: what the window can say about the calibration, in words, as a spectrum and by parameter name.
 
 mod advice;
+pub(super) mod columns;
+mod compare;
 mod heat_map;
 mod slider;
 mod spectrum;
 pub(crate) mod verdict;
 
-use egui::{RichText, ScrollArea, Sense, Ui, vec2};
+use std::sync::Arc;
+
+use egui::{RichText, ScrollArea, Sense, Ui, UiBuilder, vec2};
 
 use self::advice::AdviceUi;
 use self::slider::SliderUi;
@@ -16,7 +20,7 @@ use super::convergence::empty_ui;
 use super::follow::RunTables;
 use super::plot::{Clicks, Curve, PlotArea, navigate, paint_cursor, paint_ground, paint_steps, visible_range};
 use super::theme::{CURVE_WIDTH, RunStyle, Theme};
-use crate::session::StepRecord;
+use crate::session::{RunRecord, StepRecord};
 
 /// Columns of the tables over time.
 const STRUCTURAL: usize = 0;
@@ -34,6 +38,8 @@ pub struct RankPanel {
     curves: Vec<[Curve; 2]>,
     advice: AdviceUi,
     slider: SliderUi,
+    /// Show all runs side by side where there is no room for both.
+    all_runs: bool,
 }
 
 impl RankPanel {
@@ -49,6 +55,35 @@ impl RankPanel {
             return;
         };
         let height = ui.available_height();
+        let count = compare::comparable(ctx);
+        if count > 1 && ui.available_width() >= compare::WIDTH_OF_A_RUN * (count + 1) as f32 {
+            let [own, all] = halves(ui.available_rect_before_wrap(), 1.0 / (count + 1) as f32);
+            ui.scope_builder(UiBuilder::new().max_rect(own), |ui| self.run_ui(ui, ctx, run, step, height));
+            ui.scope_builder(UiBuilder::new().max_rect(all), |ui| compare::ui(ui, ctx));
+            return;
+        }
+        if count > 1 {
+            ui.horizontal(|ui| {
+                ui.selectable_value(&mut self.all_runs, false, "This run");
+                ui.selectable_value(&mut self.all_runs, true, "All runs").on_hover_text("Side by side");
+            });
+            if self.all_runs {
+                compare::ui(ui, ctx);
+                return;
+            }
+        }
+        self.run_ui(ui, ctx, run, step, ui.available_height());
+    }
+
+    /// One run.
+    fn run_ui(
+        &mut self,
+        ui: &mut Ui,
+        ctx: &mut PanelContext<'_>,
+        run: &RunRecord,
+        step: &Arc<StepRecord>,
+        height: f32,
+    ) {
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
             ui.spacing_mut().item_spacing.y = 3.0;
             let top = ui.cursor().top();
@@ -108,6 +143,13 @@ fn rank_row(step: &StepRecord) -> [f64; 3] {
     step.rank.as_ref().filter(|rank| !rank.names.is_empty()).map_or([f64::NAN, f64::NAN, 0.0], |rank| {
         [rank.rank_structural as f64, rank.rank_informed as f64, rank.names.len() as f64]
     })
+}
+
+/// A rectangle cut upright at a share of its width, with some room between.
+fn halves(rect: egui::Rect, share: f32) -> [egui::Rect; 2] {
+    const GAP: f32 = 16.0;
+    let (left, right) = rect.split_left_right_at_fraction(share);
+    [left.with_max_x(left.right() - GAP), right]
 }
 
 /// The verdict: a mark, one line, and the reasons.

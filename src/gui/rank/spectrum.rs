@@ -11,10 +11,15 @@ use crate::observability::RankReport;
 /// Draws the spectrum in so many points of height.
 pub(super) fn ui(ui: &mut Ui, theme: &Theme, rank: &RankReport, height: f32) {
     let (_, rect) = ui.allocate_space(vec2(ui.available_width(), height));
+    paint(ui, theme, rank, &[rank], rect, 0);
+}
+
+/// Draws the spectrum into a rectangle, on an axis that holds those of all peers; `number` tells it apart from theirs.
+pub(super) fn paint(ui: &Ui, theme: &Theme, rank: &RankReport, peers: &[&RankReport], rect: Rect, number: usize) {
     let painter = ui.painter_at(rect);
     paint_ground(&painter, theme, rect);
     let plot = Rect::from_min_max(rect.min + vec2(30.0, 3.0), rect.max - vec2(4.0, 3.0));
-    let Some(axis) = LogAxis::of(rank, plot) else { return };
+    let Some(axis) = LogAxis::of(peers, plot).filter(|_| !rank.singular_values.is_empty()) else { return };
 
     // Decades: a line for each third, its power of ten beside it.
     let font = FontId::new(9.0, FontFamily::Monospace);
@@ -56,7 +61,7 @@ pub(super) fn ui(ui: &mut Ui, theme: &Theme, rank: &RankReport, height: f32) {
     threshold(&painter, theme, plot, axis.y(rank.informed_threshold), "informed");
     threshold(&painter, theme, plot, axis.y(rank.structural_threshold), "structural zero");
 
-    let response = ui.interact(rect, ui.unique_id().with("spectrum"), Sense::hover());
+    let response = ui.interact(rect, ui.unique_id().with(("spectrum", number)), Sense::hover());
     response.widget_info(|| WidgetInfo::labeled(Role::Image, true, "Singular values"));
     if let Some(pointer) = response.hover_pos() {
         let index = ((pointer.x - plot.left()) / pitch) as usize;
@@ -94,16 +99,16 @@ struct LogAxis {
 }
 
 impl LogAxis {
-    fn of(rank: &RankReport, plot: Rect) -> Option<Self> {
-        let largest = rank.singular_values.iter().chain(&rank.singular_values_with_priors).copied();
-        let largest = largest.filter(|value| value.is_finite()).fold(rank.informed_threshold, f64::max);
-        let smallest = if rank.structural_threshold > 0.0 { rank.structural_threshold } else { largest * 1e-12 };
-        let (low, high) = (smallest.log10() - 1.2, largest.log10() + 0.6);
-        (low.is_finite() && high.is_finite() && low < high && !rank.singular_values.is_empty()).then_some(Self {
-            plot,
-            low,
-            high,
-        })
+    /// The axis that holds the spectra of all reports.
+    fn of(reports: &[&RankReport], plot: Rect) -> Option<Self> {
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for rank in reports.iter().filter(|rank| !rank.singular_values.is_empty()) {
+            let largest = rank.singular_values.iter().chain(&rank.singular_values_with_priors).copied();
+            let largest = largest.filter(|value| value.is_finite()).fold(rank.informed_threshold, f64::max);
+            let smallest = if rank.structural_threshold > 0.0 { rank.structural_threshold } else { largest * 1e-12 };
+            (low, high) = (low.min(smallest.log10() - 1.2), high.max(largest.log10() + 0.6));
+        }
+        (low.is_finite() && high.is_finite() && low < high).then_some(Self { plot, low, high })
     }
 
     fn y_of_power(&self, power: f64) -> f32 {

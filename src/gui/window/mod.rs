@@ -33,6 +33,8 @@ use super::PanelContext;
 use super::convergence::ConvergencePanel;
 use super::image_panel::ImagePanel;
 use super::inspector::InspectorPanel;
+use super::jacobian::JacobianPanel;
+use super::laboratory::LaboratoryPanel;
 use super::open_dialog::OpenDialog;
 use super::rank::RankPanel;
 use super::residuals::ResidualsPanel;
@@ -65,18 +67,31 @@ pub enum PanelName {
     Convergence,
     /// Rank and null directions.
     Rank,
+    /// The linearization by blocks.
+    Jacobian,
     /// Residuals.
     Residuals,
     /// Numbers of what is selected.
     Inspector,
+    /// What a mechanism and a motion can identify.
+    Laboratory,
     /// The lanes over time.
     Timeline,
 }
 
 impl PanelName {
     /// All of them.
-    pub const ALL: [Self; 7] =
-        [Self::Image, Self::Scene, Self::Convergence, Self::Rank, Self::Residuals, Self::Inspector, Self::Timeline];
+    pub const ALL: [Self; 9] = [
+        Self::Image,
+        Self::Scene,
+        Self::Convergence,
+        Self::Rank,
+        Self::Jacobian,
+        Self::Residuals,
+        Self::Inspector,
+        Self::Laboratory,
+        Self::Timeline,
+    ];
 
     /// Its name.
     pub fn as_str(self) -> &'static str {
@@ -85,8 +100,10 @@ impl PanelName {
             Self::Scene => "scene",
             Self::Convergence => "convergence",
             Self::Rank => "rank",
+            Self::Jacobian => "jacobian",
             Self::Residuals => "residuals",
             Self::Inspector => "inspector",
+            Self::Laboratory => "laboratory",
             Self::Timeline => "timeline",
         }
     }
@@ -103,16 +120,25 @@ pub struct Panels {
     pub convergence: ConvergencePanel,
     /// Rank and null directions.
     pub rank: RankPanel,
+    /// The linearization by blocks.
+    pub jacobian: JacobianPanel,
     /// Residuals.
     pub residuals: ResidualsPanel,
     /// Numbers of what is selected.
     pub inspector: InspectorPanel,
+    /// What a mechanism and a motion can identify.
+    pub laboratory: LaboratoryPanel,
 }
 
 impl Panels {
     /// Panels that show the same and hold nothing of a window.
     fn views(&self) -> Self {
-        Self { image: self.image.view_copy(), scene: self.scene.view_copy(), ..Self::default() }
+        Self {
+            image: self.image.view_copy(),
+            scene: self.scene.view_copy(),
+            laboratory: self.laboratory.view_copy(),
+            ..Self::default()
+        }
     }
 
     fn pane_ui(&mut self, pane: Pane, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
@@ -121,8 +147,10 @@ impl Panels {
             Pane::Scene => self.scene.ui(ui, ctx),
             Pane::Convergence => self.convergence.ui(ui, ctx),
             Pane::Rank => self.rank.ui(ui, ctx),
+            Pane::Jacobian => self.jacobian.ui(ui, ctx),
             Pane::Residuals => self.residuals.ui(ui, ctx),
             Pane::Inspector => self.inspector.ui(ui, ctx),
+            Pane::Laboratory => self.laboratory.ui(ui, ctx),
         }
     }
 }

@@ -60,7 +60,7 @@ pub(super) fn export(state: &WindowState, ctx: &mut PanelContext<'_>) -> PanelEx
     });
     let log = recording.log_path.file_stem().map_or_else(|| "log".into(), |stem| stem.to_string_lossy().into_owned());
     let name = format!("{log}/{}-{:.3}s", panel.as_str(), seconds_from_ns(cursor_ns));
-    PanelExport { name, picture, table: table_of(panel, ctx) }
+    PanelExport { name, picture, table: table_of(panel, &mut copy.panels, ctx) }
 }
 
 /// Draws a panel into all of `ui`.
@@ -72,8 +72,10 @@ pub fn alone_ui(panel: PanelName, ui: &mut Ui, state: &mut WindowState, ctx: &mu
         PanelName::Scene => state.panels.scene.ui(ui, ctx),
         PanelName::Convergence => state.panels.convergence.ui(ui, ctx),
         PanelName::Rank => state.panels.rank.ui(ui, ctx),
+        PanelName::Jacobian => state.panels.jacobian.ui(ui, ctx),
         PanelName::Residuals => state.panels.residuals.ui(ui, ctx),
         PanelName::Inspector => state.panels.inspector.ui(ui, ctx),
+        PanelName::Laboratory => state.panels.laboratory.ui(ui, ctx),
         PanelName::Timeline => state.timeline.ui(ui, ctx),
     });
 }

@@ -2,12 +2,13 @@
 
 use std::fmt::Write as _;
 
-use super::PanelName;
+use super::{PanelName, Panels};
 use crate::geometry::seconds_from_ns;
 use crate::gui::PanelContext;
 use crate::gui::chain_values::true_values;
 use crate::gui::events::name_of;
 use crate::gui::residuals::rms_px;
+use crate::observability::RankReport;
 use crate::session::{RunRecord, StepRecord};
 
 /// A table that grows row by row.
@@ -47,15 +48,17 @@ fn seconds(stamp_ns: i64) -> String {
 }
 
 /// The table of a panel.
-pub(super) fn table_of(panel: PanelName, ctx: &PanelContext<'_>) -> String {
+pub(super) fn table_of(panel: PanelName, panels: &mut Panels, ctx: &PanelContext<'_>) -> String {
     let Some(run) = ctx.recording.runs.get(ctx.selection.run) else { return String::new() };
     match panel {
         PanelName::Image => features(run, ctx.cursor_ns),
         PanelName::Scene => trajectories(ctx),
         PanelName::Convergence => calibration(run, ctx),
         PanelName::Rank => directions(run, ctx.cursor_ns),
+        PanelName::Jacobian => jacobian(run, ctx),
         PanelName::Residuals => residuals(ctx),
         PanelName::Inspector => state(run, ctx.cursor_ns),
+        PanelName::Laboratory => spectra(panels.laboratory.ranks(ctx)),
         PanelName::Timeline => events(ctx),
     }
 }
@@ -169,6 +172,50 @@ fn directions(run: &RunRecord, cursor_ns: i64) -> String {
         });
         let heads = [(index + 1).to_string(), number(*value), number(with_priors), kind.to_owned()];
         table.row(heads.into_iter().chain(weights));
+    }
+    table.text
+}
+
+/// Each form's singular values and directions.
+fn spectra(forms: Vec<(String, RankReport)>) -> String {
+    let mut table = Table::new(&["form", "kind", "number", "singular_value", "parameter", "weight"]);
+    for (form, rank) in forms {
+        for (index, value) in rank.singular_values.iter().enumerate() {
+            let number = (index + 1).to_string();
+            let cells = [form.clone(), "singular value".to_owned(), number, self::number(*value)];
+            table.row(cells.into_iter().chain([String::new(), String::new()]));
+        }
+        for (index, direction) in rank.directions.iter().enumerate() {
+            let kind = if direction.structural { "null" } else { "weak" };
+            for (name, weight) in rank.names.iter().zip(&direction.weights).filter(|(_, weight)| **weight != 0.0) {
+                table.row([
+                    form.clone(),
+                    kind.to_owned(),
+                    (index + 1).to_string(),
+                    number(direction.singular_value),
+                    name.clone(),
+                    number(*weight),
+                ]);
+            }
+        }
+    }
+    table.text
+}
+
+/// Norms of the Jacobian's blocks, as the Jacobian panel counts them; zeros are left empty.
+fn jacobian(run: &RunRecord, ctx: &PanelContext<'_>) -> String {
+    let Some(step) = run.step_at(ctx.cursor_ns) else { return String::new() };
+    let cameras = crate::gui::jacobian::cameras(&ctx.recording.rig, run, step);
+    let Some(jacobian) = step.report.jacobian(&cameras) else { return String::new() };
+    let mut table = Table { text: String::new() };
+    let heads = ["residuals", "rows"].map(str::to_owned).into_iter();
+    table.row(heads.chain(jacobian.columns.iter().map(|block| block.name.clone())));
+    for row in &jacobian.rows {
+        let norm = |column: usize| row.norms.iter().find(|(known, _)| usize::from(*known) == column);
+        let cells =
+            (0..jacobian.columns.len()).map(|column| norm(column).map_or_else(String::new, |it| it.1.to_string()));
+        let heads = [crate::gui::jacobian::name_of(&row.factor), row.height.to_string()];
+        table.row(heads.into_iter().chain(cells));
     }
     table.text
 }

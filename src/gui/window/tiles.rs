@@ -22,16 +22,28 @@ pub(crate) enum Pane {
     Convergence,
     /// Rank and null directions.
     Rank,
+    /// The linearization by blocks.
+    Jacobian,
     /// Residuals.
     Residuals,
     /// Numbers of what is selected.
     Inspector,
+    /// What a mechanism and a motion can identify.
+    Laboratory,
 }
 
 impl Pane {
     /// All of them.
-    pub(crate) const ALL: [Self; 6] =
-        [Self::Image, Self::Scene, Self::Convergence, Self::Rank, Self::Residuals, Self::Inspector];
+    pub(crate) const ALL: [Self; 8] = [
+        Self::Image,
+        Self::Scene,
+        Self::Convergence,
+        Self::Rank,
+        Self::Jacobian,
+        Self::Residuals,
+        Self::Inspector,
+        Self::Laboratory,
+    ];
 
     /// Which panel it is.
     fn panel(self) -> PanelName {
@@ -40,8 +52,10 @@ impl Pane {
             Self::Scene => PanelName::Scene,
             Self::Convergence => PanelName::Convergence,
             Self::Rank => PanelName::Rank,
+            Self::Jacobian => PanelName::Jacobian,
             Self::Residuals => PanelName::Residuals,
             Self::Inspector => PanelName::Inspector,
+            Self::Laboratory => PanelName::Laboratory,
         }
     }
 
@@ -52,8 +66,10 @@ impl Pane {
             Self::Scene => "Scene",
             Self::Convergence => "Convergence",
             Self::Rank => "Rank",
+            Self::Jacobian => "Jacobian",
             Self::Residuals => "Residuals",
             Self::Inspector => "Inspector",
+            Self::Laboratory => "Laboratory",
         }
     }
 }
@@ -126,6 +142,13 @@ impl Layout {
 
     /// Shows or hides a panel.
     pub(crate) fn set_visible(&mut self, pane: Pane, visible: bool) {
+        if visible && self.tree.tiles.find_pane(&pane).is_none() {
+            // A layout of one's own may be older than the panel.
+            let tile = tabs(&mut self.tree.tiles, &[pane]);
+            let whole =
+                self.tree.root().map(|root| split(&mut self.tree.tiles, LinearDir::Horizontal, [root, tile], 0.7));
+            self.tree.root = whole.or(Some(tile));
+        }
         if let Some(tile) = self.tree.tiles.find_pane(&pane) {
             self.tree.set_visible(tile, visible);
             if visible {
@@ -155,24 +178,26 @@ fn tree_of(preset: Preset) -> Tree<Pane> {
     let (rank, inspector) = (tabs(tiles, &[Pane::Rank]), tabs(tiles, &[Pane::Inspector]));
     let (left, right) = match preset {
         Preset::Overview => {
-            let plots = tabs(tiles, &[Pane::Convergence, Pane::Residuals]);
+            let plots = tabs(tiles, &[Pane::Convergence, Pane::Residuals, Pane::Jacobian, Pane::Laboratory]);
             let above = split(tiles, Horizontal, [image, scene], 0.5);
             (split(tiles, Vertical, [above, plots], 0.54), split(tiles, Vertical, [rank, inspector], 0.56))
         }
         Preset::Calibration => {
-            let (convergence, residuals) = (tabs(tiles, &[Pane::Convergence]), tabs(tiles, &[Pane::Residuals]));
+            let (convergence, residuals) =
+                (tabs(tiles, &[Pane::Convergence]), tabs(tiles, &[Pane::Residuals, Pane::Jacobian, Pane::Laboratory]));
             let pictures = split(tiles, Horizontal, [image, scene], 0.5);
             let below = split(tiles, Horizontal, [pictures, residuals], 0.66);
             (split(tiles, Vertical, [convergence, below], 0.62), split(tiles, Vertical, [rank, inspector], 0.68))
         }
         Preset::FrontEnd => {
-            let (convergence, residuals) = (tabs(tiles, &[Pane::Convergence]), tabs(tiles, &[Pane::Residuals]));
+            let (convergence, residuals) =
+                (tabs(tiles, &[Pane::Convergence]), tabs(tiles, &[Pane::Residuals, Pane::Jacobian, Pane::Laboratory]));
             let above = split(tiles, Horizontal, [image, residuals], 0.6);
             let below = split(tiles, Horizontal, [convergence, scene], 0.7);
             (split(tiles, Vertical, [above, below], 0.64), split(tiles, Vertical, [inspector, rank], 0.6))
         }
         Preset::Scene => {
-            let plots = tabs(tiles, &[Pane::Convergence, Pane::Residuals]);
+            let plots = tabs(tiles, &[Pane::Convergence, Pane::Residuals, Pane::Jacobian, Pane::Laboratory]);
             let below = split(tiles, Horizontal, [image, plots], 0.32);
             (split(tiles, Vertical, [scene, below], 0.68), split(tiles, Vertical, [inspector, rank], 0.5))
         }

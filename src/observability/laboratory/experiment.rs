@@ -55,7 +55,7 @@ impl std::str::FromStr for LaboratoryForm {
 }
 
 /// What an experiment consists of.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct LaboratorySetup {
     /// The gimbal.
     pub mechanism: Mechanism,
@@ -123,16 +123,27 @@ impl LaboratorySetup {
 
     /// Runs the experiment in several forms, leaving out those whose numbers are not finite.
     pub fn run_all(&self, forms: &[LaboratoryForm]) -> Vec<LaboratoryResult> {
+        let mut results = Vec::new();
+        self.run_each(forms, |result| {
+            results.push(result);
+            true
+        });
+        results
+    }
+
+    /// [`Self::run_all`], handing over each result as it comes; it ends early when `each` says `false`.
+    pub fn run_each(&self, forms: &[LaboratoryForm], mut each: impl FnMut(LaboratoryResult) -> bool) {
         let window = self.window();
         let angles: Vec<&[f64]> = window.frames.iter().map(|frame| frame.joints_rad.as_slice()).collect();
         let free = self.joints == JointKnowledge::Unknown && self.mechanism.chain.joint_count() > 0;
-        let result = |form: &LaboratoryForm| {
+        for form in forms {
             let chain = form.chain(&self.mechanism);
             let linearization = window.linearize(&self.mechanism.chain, form.parameterization, form.joint_offsets);
-            let rank = analyse(&linearization, &chain, &angles, free)?;
-            Some(LaboratoryResult { form: *form, units: chain.parameter_units(), rank })
-        };
-        forms.iter().filter_map(result).collect()
+            let Some(rank) = analyse(&linearization, &chain, &angles, free) else { continue };
+            if !each(LaboratoryResult { form: *form, units: chain.parameter_units(), rank }) {
+                return;
+            }
+        }
     }
 
     /// The window of the experiment.

@@ -1,0 +1,180 @@
+//! The numbers of a block and the residuals that it comes from.
+
+use egui::{Grid, Label, RichText, ScrollArea, Ui, vec2};
+
+use super::model::{JacobianModel, cameras, name_of, scale_words};
+use crate::estimator::{ColumnBlock, ColumnGroup, FeatureRows, JacobianFactor};
+use crate::frontend::FeatureId;
+use crate::gui::PanelContext;
+use crate::gui::units::{Shown, figure, fixed};
+use crate::session::{RunRecord, StepRecord};
+
+/// A block in one line: what it is, its size and its norm.
+pub(super) fn headline(step: &StepRecord, model: &JacobianModel, row: usize, column: usize) -> String {
+    let (of_row, block) = (&model.jacobian.rows[row], &model.jacobian.columns[column]);
+    let unit = step.report.calibration.units.get(column).copied().unwrap_or_default();
+    let norm = model.norm(row, column);
+    let size = format!("{} × {}", of_row.height, block.len);
+    let name = format!("{} by {}", name_of(&of_row.factor), block.name);
+    if norm == 0.0 {
+        return format!("{name}: zero ({size})");
+    }
+    format!("{name}: {} {} ({size})", figure(f64::from(norm)), scale_words(block.group, unit))
+}
+
+/// What is known of the picked row, column or block.
+pub(super) fn ui(
+    ui: &mut Ui,
+    ctx: &PanelContext<'_>,
+    run: &RunRecord,
+    step: &StepRecord,
+    model: &JacobianModel,
+    picked: (Option<usize>, Option<usize>),
+) {
+    ScrollArea::vertical().id_salt("block").auto_shrink(false).show(ui, |ui| {
+        ui.spacing_mut().item_spacing = vec2(6.0, 2.0);
+        match picked {
+            (Some(row), Some(column)) => block_ui(ui, ctx, run, step, model, row, column),
+            (Some(row), None) => line_ui(ui, ctx, &strongest_columns(step, model, row)),
+            (None, Some(column)) => line_ui(ui, ctx, &strongest_rows(model, column)),
+            (None, None) => {}
+        }
+    });
+}
+
+fn line_ui(ui: &mut Ui, ctx: &PanelContext<'_>, text: &str) {
+    ui.add(Label::new(RichText::new(text).color(ctx.theme.text_strong)).wrap());
+}
+
+/// The parameters that a row speaks of most.
+fn strongest_columns(step: &StepRecord, model: &JacobianModel, row: usize) -> String {
+    const SHOWN: usize = 4;
+    let of_row = &model.jacobian.rows[row];
+    let mut norms: Vec<(usize, f32)> = of_row
+        .norms
+        .iter()
+        .map(|(column, norm)| (usize::from(*column), *norm))
+        .filter(|(column, _)| model.jacobian.columns[*column].group == ColumnGroup::Calibration)
+        .collect();
+    norms.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let units = &step.report.calibration.units;
+    let shown = norms.iter().take(SHOWN).map(|(column, norm)| {
+        let words = scale_words(ColumnGroup::Calibration, units.get(*column).copied().unwrap_or_default());
+        format!("{} {} {words}", model.jacobian.columns[*column].name, figure(f64::from(*norm)))
+    });
+    let shown = shown.collect::<Vec<_>>().join(", ");
+    let name = name_of(&of_row.factor);
+    if shown.is_empty() { format!("{name}: no parameter") } else { format!("{name}, strongest: {shown}") }
+}
+
+/// The rows that speak most of a column.
+fn strongest_rows(model: &JacobianModel, column: usize) -> String {
+    const SHOWN: usize = 4;
+    let rows = 0..model.jacobian.rows.len();
+    let mut norms: Vec<(usize, f32)> = rows.map(|row| (row, model.norm(row, column))).collect();
+    norms.retain(|(_, norm)| *norm > 0.0);
+    norms.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let count = norms.len();
+    let shown = norms.iter().take(SHOWN);
+    let shown = shown
+        .map(|(row, norm)| format!("{} ({})", name_of(&model.jacobian.rows[*row].factor), figure(f64::from(*norm))));
+    let shown = shown.collect::<Vec<_>>().join(", ");
+    format!("{}: in {count} rows of blocks, strongest: {shown}", model.jacobian.columns[column].name)
+}
+
+fn block_ui(
+    ui: &mut Ui,
+    ctx: &PanelContext<'_>,
+    run: &RunRecord,
+    step: &StepRecord,
+    model: &JacobianModel,
+    row: usize,
+    column: usize,
+) {
+    line_ui(ui, ctx, &headline(step, model, row, column));
+    match model.jacobian.rows[row].factor {
+        JacobianFactor::Feature(id) => {
+            let cameras = cameras(&ctx.recording.rig, run, step);
+            if let Some(rows) = step.report.feature_rows(&cameras, id) {
+                sightings_ui(ui, ctx, step, model, &rows, id, column);
+            }
+        }
+        factor => {
+            let kind = match factor {
+                JacobianFactor::Inertial { .. } => "imu",
+                JacobianFactor::Encoder(_) => "encoder",
+                JacobianFactor::Standstill => "standstill",
+                JacobianFactor::CalibrationPrior => "calibration prior",
+                _ => "marginalization prior",
+            };
+            if let Some(summary) = step.report.residuals.iter().find(|summary| summary.factor == kind) {
+                let (before, after) = (figure(summary.chi2_before), figure(summary.chi2_after));
+                let text =
+                    format!("all residuals of this kind: χ² {before} before, {after} after, {} rows", summary.count);
+                ui.label(RichText::new(text).color(ctx.theme.text));
+            }
+        }
+    }
+}
+
+/// A row for each sighting: its residual, and how the pixel moves with the unknown.
+fn sightings_ui(
+    ui: &mut Ui,
+    ctx: &PanelContext<'_>,
+    step: &StepRecord,
+    model: &JacobianModel,
+    rows: &FeatureRows,
+    id: FeatureId,
+    column: usize,
+) {
+    let theme = ctx.theme;
+    let block = &model.jacobian.columns[column];
+    let Some(feature) = step.report.features.iter().find(|feature| feature.id == id) else { return };
+    let Some(source) = &step.report.jacobian_source else { return };
+    let unit = step.report.calibration.units.get(column).copied().unwrap_or_default();
+    let parts = parts_of(block, unit);
+    let mut heads = ["frame", "u px", "v px", "residual u", "residual v", "weight"].map(str::to_owned).to_vec();
+    heads.extend(parts.iter().flat_map(|(name, _)| [format!("∂u{name}"), format!("∂v{name}")]));
+    Grid::new("block numbers").striped(true).spacing(vec2(9.0, 1.0)).min_row_height(14.0).show(ui, |ui| {
+        for head in &heads {
+            ui.label(RichText::new(head).small().color(theme.text_weak));
+        }
+        ui.end_row();
+        for (place, frame) in rows.frame_indices.iter().enumerate() {
+            let Some(seen) = feature.observations.iter().find(|seen| seen.frame_index == *frame) else { continue };
+            let residual = seen.residual_after_px.map_or([f64::NAN; 2], |residual| [residual.x, residual.y]);
+            let mut cells = vec![frame.to_string()];
+            cells.extend([seen.measured_px.x, seen.measured_px.y].map(|pixel| fixed(pixel, 1)));
+            cells.extend(residual.map(|pixel| fixed(pixel, 2)));
+            cells.push(fixed(seen.robust_weight, 2));
+            // Back from standard deviations to pixels.
+            let pixels = source.pixel_sigma_px() / seen.robust_weight.sqrt();
+            for (part, (_, factor)) in parts.iter().enumerate() {
+                let at = |axis: usize| rows.rows[(2 * place + axis, block.start + part)] * pixels / factor;
+                cells.extend([figure(at(0)), figure(at(1))]);
+            }
+            for cell in cells {
+                ui.label(RichText::new(cell).monospace().color(theme.text_strong));
+            }
+            ui.end_row();
+        }
+    });
+}
+
+/// The columns of a block: how they are shown, and how many shown units one stored unit is.
+fn parts_of(block: &ColumnBlock, unit: &str) -> Vec<(String, f64)> {
+    let shown = |name: &str, unit: &str| {
+        let shown = Shown::of(unit);
+        (format!("{name}, px/{}", shown.unit.trim()), shown.factor)
+    };
+    match block.group {
+        ColumnGroup::Calibration => vec![shown("", unit)],
+        ColumnGroup::Joints => (1..=block.len).map(|joint| shown(&format!(" q{joint}"), "rad")).collect(),
+        ColumnGroup::Pose => {
+            let parts = [" rx", " ry", " rz"].map(|part| shown(part, "rad")).into_iter();
+            parts.chain([" tx", " ty", " tz"].map(|part| shown(part, "m"))).collect()
+        }
+        ColumnGroup::SpeedBias => Vec::new(),
+        ColumnGroup::InverseDepth => vec![(", px·m".to_owned(), 1.0)],
+    }
+}

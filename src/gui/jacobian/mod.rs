@@ -1,0 +1,193 @@
+//! The Jacobian panel: the step's linearization by blocks, before anything is eliminated.
+//!
+//! Rows are the factors that residuals come from, columns the unknowns; a block is coloured by its norm.
+
+mod details;
+mod model;
+mod paint;
+#[cfg(test)]
+mod tests;
+
+use std::sync::Arc;
+
+use egui::{Pos2, Rect, Response, Role, Sense, Ui, Vec2, WidgetInfo, pos2, vec2};
+
+use self::model::JacobianModel;
+pub(super) use self::model::{cameras, name_of};
+use super::PanelContext;
+use super::convergence::empty_ui;
+use crate::estimator::{ColumnGroup, JacobianFactor};
+use crate::session::{RunRecord, StepRecord};
+
+/// Furthest that the picture can be magnified.
+const LARGEST_ZOOM: f32 = 40.0;
+/// Room for the names of rows on the left and of columns above, in points.
+const ROW_NAMES: f32 = 104.0;
+const COLUMN_NAMES: f32 = 68.0;
+/// Height of the legend under the picture.
+const LEGEND: f32 = 18.0;
+/// Height from which the numbers of the selected block have room, and what they take of it.
+const LOWEST_WITH_DETAILS: f32 = 300.0;
+const DETAILS_SHARE: f32 = 0.3;
+/// Height of a single line about a row or a column.
+const DETAILS_LINE: f32 = 34.0;
+
+/// State of the Jacobian panel.
+#[derive(Default)]
+pub struct JacobianPanel {
+    model: Option<JacobianModel>,
+    mesh: paint::CachedMesh,
+    view: View,
+    /// The picked row, when it is not a feature's (those are selected everywhere).
+    row: Option<JacobianFactor>,
+    /// Name of the picked column, when it is not a parameter's.
+    column: Option<String>,
+}
+
+/// Which part of the picture is seen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct View {
+    zoom: f32,
+    /// What lies in the middle, as shares of the picture.
+    centre: Vec2,
+}
+
+impl Default for View {
+    fn default() -> Self {
+        Self { zoom: 1.0, centre: Vec2::splat(0.5) }
+    }
+}
+
+impl View {
+    /// Where the whole picture lies, perhaps larger than what is seen of it.
+    fn place(self, area: Rect) -> Rect {
+        let size = area.size() * self.zoom;
+        Rect::from_min_size(area.center() - self.centre * size, size)
+    }
+}
+
+impl JacobianPanel {
+    /// Draws the panel.
+    pub fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
+        let run = ctx.recording.runs.get(ctx.selection.run.min(ctx.recording.runs.len().saturating_sub(1)));
+        let Some((run, step)) = run.and_then(|run| Some((run, run.step_at(ctx.cursor_ns)?))) else {
+            empty_ui(ui, "No step at the cursor yet");
+            return;
+        };
+        if !self.model.as_ref().is_some_and(|model| Arc::ptr_eq(&model.step, step)) {
+            self.model = JacobianModel::of_step(&ctx.recording.rig, run, step);
+        }
+        // Taken out while it is drawn, so that the rest of the panel can change.
+        let Some(model) = self.model.take() else {
+            empty_ui(ui, "No linearization in this step");
+            return;
+        };
+        self.model_ui(ui, ctx, run, step, &model);
+        self.model = Some(model);
+    }
+
+    fn model_ui(
+        &mut self,
+        ui: &mut Ui,
+        ctx: &mut PanelContext<'_>,
+        run: &RunRecord,
+        step: &StepRecord,
+        model: &JacobianModel,
+    ) {
+        let height = ui.available_height();
+        let picked = self.picked(ctx, model);
+        let with_details = height >= LOWEST_WITH_DETAILS && picked.is_some();
+        let below = match picked {
+            Some((Some(_), Some(_))) if with_details => DETAILS_SHARE * height,
+            Some(_) if with_details => DETAILS_LINE,
+            _ => 0.0,
+        };
+        let size = vec2(ui.available_width(), height - below - LEGEND - 2.0 * ui.spacing().item_spacing.y);
+        let (_, whole) = ui.allocate_space(size.max(Vec2::splat(8.0)));
+        let area = Rect::from_min_max(whole.min + vec2(ROW_NAMES, COLUMN_NAMES), whole.max);
+        if area.width() < 8.0 || area.height() < 8.0 {
+            return;
+        }
+        let response = ui.interact(area, ui.unique_id().with("blocks"), Sense::click_and_drag());
+        response.widget_info(|| WidgetInfo::labeled(Role::Image, true, "Jacobian blocks"));
+        self.navigate(ui, area, &response);
+        let place = self.view.place(area);
+        let hovered = response.hover_pos().and_then(|pointer| block_at(model, place, pointer));
+        self.mesh.paint(ui, ctx.theme, area, place, model);
+        paint::axes(ui, ctx.theme, whole, area, place, model, picked);
+        if response.clicked() {
+            self.pick(ctx, model, hovered);
+        }
+        if let Some((row, column)) = hovered {
+            paint::hover(ui, ctx.theme, area, place, model, (row, column));
+            response.on_hover_text_at_pointer(details::headline(step, model, row, column));
+        }
+        let (_, legend) = ui.allocate_space(vec2(ui.available_width(), LEGEND));
+        paint::legend(ui, ctx.theme, legend, model);
+        if let Some(picked) = picked.filter(|_| with_details) {
+            details::ui(ui, ctx, run, step, model, picked);
+        }
+    }
+
+    /// The block that is picked here or follows from what is selected everywhere: a row, or a column, or both.
+    fn picked(&self, ctx: &PanelContext<'_>, model: &JacobianModel) -> Option<(Option<usize>, Option<usize>)> {
+        let wanted = self.row.or_else(|| ctx.selection.feature.map(JacobianFactor::Feature));
+        let row = wanted.and_then(|wanted| model.jacobian.rows.iter().position(|row| row.factor == wanted));
+        let name = self.column.as_ref().or(ctx.selection.parameter.as_ref());
+        let column = name.and_then(|name| model.jacobian.columns.iter().position(|block| block.name == *name));
+        (row.is_some() || column.is_some()).then_some((row, column))
+    }
+
+    /// A click selects feature and parameter everywhere, the rest here.
+    fn pick(&mut self, ctx: &mut PanelContext<'_>, model: &JacobianModel, block: Option<(usize, usize)>) {
+        (self.row, self.column) = (None, None);
+        (ctx.selection.feature, ctx.selection.parameter) = (None, None);
+        let Some((row, column)) = block else { return };
+        match model.jacobian.rows[row].factor {
+            JacobianFactor::Feature(id) => ctx.selection.feature = Some(id),
+            factor => self.row = Some(factor),
+        }
+        let block = &model.jacobian.columns[column];
+        if block.group == ColumnGroup::Calibration {
+            ctx.selection.parameter = Some(block.name.clone());
+        } else {
+            self.column = Some(block.name.clone());
+        }
+    }
+
+    /// Wheel zooms about the pointer, dragging moves, a double click fits.
+    fn navigate(&mut self, ui: &Ui, area: Rect, response: &Response) {
+        if response.double_clicked() {
+            self.view = View::default();
+        }
+        let before = self.view.place(area);
+        if let Some(pointer) = response.hover_pos() {
+            let factor = ui.input(|input| input.zoom_delta() * (input.smooth_scroll_delta().y * 0.004).exp());
+            let zoom = (self.view.zoom * factor).clamp(1.0, LARGEST_ZOOM);
+            if zoom != self.view.zoom {
+                // The place under the pointer stays there.
+                let held = (pointer - before.min) / before.size();
+                self.view.centre = held + (self.view.centre - held) * (self.view.zoom / zoom);
+                self.view.zoom = zoom;
+            }
+        }
+        if response.dragged() {
+            self.view.centre -= response.drag_delta() / before.size();
+        }
+        let room = 0.5 / self.view.zoom;
+        self.view.centre = self.view.centre.clamp(Vec2::splat(room), Vec2::splat(1.0 - room));
+    }
+}
+
+/// The row and column under a place on the screen.
+fn block_at(model: &JacobianModel, place: Rect, pointer: Pos2) -> Option<(usize, usize)> {
+    let share = (pointer - place.min) / place.size();
+    Some((model.rows.at(share.y)?, model.columns.at(share.x)?))
+}
+
+/// Where a block lies on the screen.
+fn rect_of(model: &JacobianModel, place: Rect, row: usize, column: usize) -> Rect {
+    let (row, column) = (&model.rows.strips[row], &model.columns.strips[column]);
+    let at = |x: f32, y: f32| pos2(place.left() + x * place.width(), place.top() + y * place.height());
+    Rect::from_min_max(at(column.begin, row.begin), at(column.end, row.end))
+}

@@ -1,0 +1,174 @@
+//! The blocks of one step's Jacobian, and where each lies in the picture, as shares of its width and height.
+
+use std::sync::Arc;
+
+use crate::camera::CameraModel;
+use crate::estimator::{ColumnGroup, JacobianFactor, StepJacobian};
+use crate::flight_log::Rig;
+use crate::gui::units::counted;
+use crate::session::{RunRecord, StepRecord};
+
+/// Decades that the colours span at most.
+const MOST_DECADES: f64 = 6.0;
+
+/// A row or a column of blocks, or a group of them.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Strip {
+    pub(super) name: String,
+    /// Where it begins and ends, of 1.
+    pub(super) begin: f32,
+    pub(super) end: f32,
+}
+
+/// The strips of one axis.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Axis {
+    pub(super) strips: Vec<Strip>,
+    pub(super) groups: Vec<Strip>,
+}
+
+/// What is drawn of one step.
+#[derive(Clone, Debug)]
+pub(super) struct JacobianModel {
+    /// The step it belongs to; held, so that its address cannot come back as another step's.
+    pub(super) step: Arc<StepRecord>,
+    pub(super) jacobian: StepJacobian,
+    pub(super) rows: Axis,
+    pub(super) columns: Axis,
+    /// Powers of ten of the first and the last colour.
+    pub(super) decades: (f64, f64),
+}
+
+/// The cameras of a run in the order of its features, the main one first.
+pub(in crate::gui) fn cameras<'a>(rig: &'a Rig, run: &RunRecord, step: &StepRecord) -> Vec<&'a CameraModel> {
+    let rigid = step.report.calibration.rigid_cameras.iter().map(|(key, _)| key);
+    let keys = std::iter::once(&run.camera_key).chain(rigid);
+    keys.map_while(|key| rig.camera(key).ok()).map(|camera| &camera.model).collect()
+}
+
+impl JacobianModel {
+    /// The blocks of a step, `None` while it has none.
+    pub(super) fn of_step(rig: &Rig, run: &RunRecord, step: &Arc<StepRecord>) -> Option<Self> {
+        let jacobian = step.report.jacobian(&cameras(rig, run, step))?;
+        let norms = jacobian.rows.iter().flat_map(|row| &row.norms).map(|(_, norm)| f64::from(*norm).log10());
+        let (low, high) =
+            norms.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), power| (low.min(power), high.max(power)));
+        if !(low.is_finite() && high.is_finite()) {
+            return None;
+        }
+        let high = high.ceil();
+        let low = low.floor().max(high - MOST_DECADES).min(high - 1.0);
+        Some(Self {
+            step: Arc::clone(step),
+            rows: rows_of(&jacobian),
+            columns: columns_of(&jacobian),
+            jacobian,
+            decades: (low, high),
+        })
+    }
+
+    /// Share of the colours at a norm.
+    pub(super) fn fraction(&self, norm: f32) -> f64 {
+        let (low, high) = self.decades;
+        ((f64::from(norm).log10() - low) / (high - low)).clamp(0.0, 1.0)
+    }
+
+    /// The norm of a block, 0 where nothing is.
+    pub(super) fn norm(&self, row: usize, column: usize) -> f32 {
+        let row = self.jacobian.rows.get(row).map_or(&[][..], |row| &row.norms);
+        row.iter().find(|(known, _)| usize::from(*known) == column).map_or(0.0, |(_, norm)| *norm)
+    }
+}
+
+impl Axis {
+    /// The strip at a share.
+    pub(super) fn at(&self, share: f32) -> Option<usize> {
+        let after = self.strips.partition_point(|strip| strip.begin <= share);
+        after.checked_sub(1).filter(|index| share < self.strips[*index].end)
+    }
+
+    /// Lays strips side by side: each with the group that it belongs to and its weight.
+    fn lay_out(strips: impl Iterator<Item = (String, usize, f32)>, group_names: &[String]) -> Self {
+        let strips: Vec<_> = strips.collect();
+        let total: f32 = strips.iter().map(|(_, _, weight)| weight).sum();
+        let mut axis = Self::default();
+        let mut at = 0.0;
+        for (name, group, weight) in strips {
+            let (begin, end) = (at, at + weight / total);
+            at = end;
+            let group_name = group_names.get(group).cloned().unwrap_or_default();
+            match axis.groups.last_mut().filter(|last| last.name == group_name) {
+                Some(last) => last.end = end,
+                None => axis.groups.push(Strip { name: group_name, begin, end }),
+            }
+            axis.strips.push(Strip { name, begin, end });
+        }
+        axis
+    }
+}
+
+/// Name of a row of blocks.
+pub(in crate::gui) fn name_of(factor: &JacobianFactor) -> String {
+    match factor {
+        JacobianFactor::Feature(id) => format!("feature {}", id.0),
+        JacobianFactor::Inertial { from, to } => format!("IMU {from} to {to}"),
+        JacobianFactor::Encoder(frame) => format!("encoders {frame}"),
+        JacobianFactor::Standstill => "standstill".to_owned(),
+        JacobianFactor::CalibrationPrior => "rig prior".to_owned(),
+        JacobianFactor::MarginalizationPrior => "marginal prior".to_owned(),
+    }
+}
+
+/// Features above, the rest below, each group with a share of the height that lets it be seen.
+fn rows_of(jacobian: &StepJacobian) -> Axis {
+    /// Shares of visual, inertial, encoder rows and priors.
+    const SHARES: [f32; 4] = [0.62, 0.15, 0.13, 0.1];
+    let group_of = |factor: &JacobianFactor| match factor {
+        JacobianFactor::Feature(_) => 0,
+        JacobianFactor::Inertial { .. } => 1,
+        JacobianFactor::Encoder(_) => 2,
+        JacobianFactor::Standstill | JacobianFactor::CalibrationPrior | JacobianFactor::MarginalizationPrior => 3,
+    };
+    let mut counts = [0_usize; 4];
+    for row in &jacobian.rows {
+        counts[group_of(&row.factor)] += 1;
+    }
+    let names = [
+        counted(counts[0], "feature"),
+        counted(counts[1], "IMU interval"),
+        counted(counts[2], "encoder frame"),
+        "priors".to_owned(),
+    ];
+    let strips = jacobian.rows.iter().map(|row| {
+        let group = group_of(&row.factor);
+        (name_of(&row.factor), group, SHARES[group] / counts[group].max(1) as f32)
+    });
+    Axis::lay_out(strips, &names)
+}
+
+/// Calibration wide, since its columns are read one by one; the states of the frames narrow.
+fn columns_of(jacobian: &StepJacobian) -> Axis {
+    let names = ["calibration", "joints", "poses", "speeds, biases", "depth"].map(str::to_owned);
+    let strips = jacobian.columns.iter().map(|block| {
+        let (group, weight) = match block.group {
+            ColumnGroup::Calibration => (0, 3.0),
+            ColumnGroup::Joints => (1, 1.0),
+            ColumnGroup::Pose => (2, 1.2),
+            ColumnGroup::SpeedBias => (3, 1.2),
+            ColumnGroup::InverseDepth => (4, 4.0),
+        };
+        (block.name.clone(), group, weight)
+    });
+    Axis::lay_out(strips, &names)
+}
+
+/// What the norms of a block are counted by.
+pub(super) fn scale_words(group: ColumnGroup, unit: &str) -> &'static str {
+    match group {
+        ColumnGroup::Calibration if unit == "m" => "σ per 3 cm",
+        ColumnGroup::Calibration | ColumnGroup::Joints => "σ per 10°",
+        ColumnGroup::Pose => "σ per 10° and 3 cm",
+        ColumnGroup::SpeedBias => "σ per 0.1 m/s, 1 °/s and 0.1 m/s²",
+        ColumnGroup::InverseDepth => "σ per tenth of the inverse depth",
+    }
+}

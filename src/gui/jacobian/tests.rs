@@ -1,0 +1,127 @@
+use egui::{PointerButton, pos2};
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable as _;
+
+use super::model::JacobianModel;
+use super::{JacobianPanel, View, rect_of};
+use crate::estimator::JacobianFactor;
+use crate::gui::Selection;
+use crate::gui::headless::{HeadlessOptions, draw};
+use crate::gui::sample_flight::flown_recording;
+use crate::gui::sample_recording::{sample_images, sample_recording_of};
+use crate::gui::tests::{keep_picture, with_context};
+use crate::gui::theme::{Theme, ThemeName};
+use crate::session::Recording;
+
+type Shown = (JacobianPanel, Selection);
+
+fn show(ui: &mut egui::Ui, shown: &mut Shown, recording: &Recording, theme: ThemeName) {
+    let theme = Theme::of(theme);
+    theme.apply(ui.ctx());
+    let (panel, selection) = shown;
+    let end_ns = recording.last_stamp_ns();
+    with_context(recording, end_ns, &mut sample_images(), selection, &theme, |ctx| panel.ui(ui, ctx));
+}
+
+fn bench() -> Harness<'static, Shown> {
+    let mut harness = Harness::builder().with_size([1000.0, 700.0]).build_ui_state(
+        |ui, shown: &mut Shown| show(ui, shown, flown_recording(), ThemeName::Dark),
+        (JacobianPanel::default(), Selection::default()),
+    );
+    harness.run_steps(2);
+    harness
+}
+
+fn model() -> JacobianModel {
+    let recording = flown_recording();
+    let run = &recording.runs[0];
+    JacobianModel::of_step(&recording.rig, run, run.steps.last().unwrap()).unwrap()
+}
+
+fn click(harness: &mut Harness<'static, Shown>, at: egui::Pos2) {
+    harness.event(egui::Event::PointerMoved(at));
+    for pressed in [true, false] {
+        let modifiers = egui::Modifiers::NONE;
+        harness.event(egui::Event::PointerButton { pos: at, button: PointerButton::Primary, pressed, modifiers });
+    }
+    harness.run_steps(3);
+}
+
+/// Middle of a block on the screen, as the harness lays the panel out.
+fn middle(harness: &Harness<'static, Shown>, row: usize, column: usize) -> egui::Pos2 {
+    let area = harness.get_by_label("Jacobian blocks").rect();
+    rect_of(&model(), View::default().place(area), row, column).center()
+}
+
+#[test]
+fn axes_are_whole_and_in_order() {
+    let model = model();
+    for axis in [&model.rows, &model.columns] {
+        for strips in [&axis.strips, &axis.groups] {
+            assert!(strips[0].begin == 0.0 && (strips.last().unwrap().end - 1.0).abs() < 1e-5);
+            assert!(strips.windows(2).all(|two| two[0].end == two[1].begin));
+        }
+        for (index, strip) in axis.strips.iter().enumerate() {
+            assert_eq!(axis.at(0.5 * (strip.begin + strip.end)), Some(index));
+        }
+        assert_eq!((axis.at(-0.1), axis.at(1.1)), (None, None));
+    }
+    assert_eq!(model.rows.strips.len(), model.jacobian.rows.len());
+    assert_eq!(model.columns.strips.len(), model.jacobian.columns.len());
+    let names: Vec<&str> = model.columns.groups.iter().map(|group| group.name.as_str()).collect();
+    assert_eq!(names, ["calibration", "joints", "poses", "speeds, biases", "depth"]);
+}
+
+#[test]
+fn a_click_selects_feature_and_parameter_and_tells_their_numbers() {
+    let mut harness = bench();
+    let model = model();
+    let column = model.jacobian.columns.iter().position(|block| block.name == "L2.alpha").unwrap();
+    let JacobianFactor::Feature(id) = model.jacobian.rows[3].factor else { panic!("features come first") };
+    let at = middle(&harness, 3, column);
+    click(&mut harness, at);
+    let selection = &harness.state().1;
+    assert_eq!((selection.feature, selection.parameter.as_deref()), (Some(id), Some("L2.alpha")));
+    assert!(harness.query_by_label_contains(&format!("feature {} by L2.alpha: ", id.0)).is_some());
+    assert!(harness.query_by_label("∂u, px/°").is_some());
+    // What is selected elsewhere is shown here: a parameter alone, with the rows that speak of it most.
+    harness.state_mut().1 = Selection { parameter: Some("L1.alpha".to_owned()), ..Selection::default() };
+    harness.run_steps(2);
+    assert!(harness.query_by_label_contains("L1.alpha: in ").is_some());
+    // An inertial factor by a pose is nobody else's.
+    let is_inertial = |factor: &JacobianFactor| matches!(factor, JacobianFactor::Inertial { .. });
+    let row = model.jacobian.rows.iter().position(|row| is_inertial(&row.factor)).unwrap();
+    let pose = model.jacobian.columns.iter().position(|block| block.name.starts_with("pose ")).unwrap();
+    let at = middle(&harness, row, pose);
+    click(&mut harness, at);
+    let selection = &harness.state().1;
+    assert_eq!((selection.feature, selection.parameter.as_deref()), (None, None));
+    assert!(harness.query_by_label_contains("15 × 6").is_some());
+    assert!(harness.query_by_label_contains("all residuals of this kind").is_some());
+}
+
+#[test]
+fn pictures_zoom_and_steps_without_a_linearization_say_so() {
+    for theme in [ThemeName::Dark, ThemeName::Light] {
+        let selection = Selection { parameter: Some("L2.alpha".to_owned()), ..Selection::default() };
+        let mut shown = (JacobianPanel::default(), selection);
+        let options = HeadlessOptions { size_px: [1000, 640], pixels_per_point: 1.0, theme };
+        let whole = draw(options, |ui| show(ui, &mut shown, flown_recording(), theme));
+        keep_picture(&format!("jacobian-flown-{}", theme.as_str()), &whole);
+        shown.0.view = View { zoom: 6.0, centre: egui::vec2(0.15, 0.3) };
+        let near = draw(options, |ui| show(ui, &mut shown, flown_recording(), theme));
+        keep_picture(&format!("jacobian-near-{}", theme.as_str()), &near);
+        assert!(whole != near);
+    }
+    let place = View { zoom: 2.0, centre: egui::vec2(0.25, 0.5) }
+        .place(egui::Rect::from_min_max(pos2(0.0, 0.0), pos2(100.0, 50.0)));
+    assert_eq!(place, egui::Rect::from_min_max(pos2(0.0, -25.0), pos2(200.0, 75.0)));
+
+    let recording = sample_recording_of(70, &["auto"]);
+    let mut harness = Harness::builder().with_size([400.0, 300.0]).build_ui_state(
+        move |ui, shown: &mut Shown| show(ui, shown, &recording, ThemeName::Dark),
+        (JacobianPanel::default(), Selection::default()),
+    );
+    harness.run_steps(2);
+    assert!(harness.query_by_label("No linearization in this step").is_some());
+}

@@ -1,0 +1,188 @@
+//! What the experiment consists of, as chosen.
+
+use egui::{ComboBox, Ui};
+
+use super::worker::Experiment;
+use crate::estimator::{JointKnowledge, PoseKnowledge};
+use crate::gimbal::Parameterization;
+use crate::gui::PanelContext;
+use crate::observability::laboratory::{LABORATORY_IMU, LaboratoryForm, LaboratoryMotion, LaboratorySetup, Mechanism};
+
+/// Forms that can be compared.
+const FORMS: [Parameterization; 6] = Parameterization::ALL;
+
+/// What is known of the joint angles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Joints {
+    Known,
+    Encoder,
+    Unknown,
+}
+
+/// What is known of the poses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Poses {
+    Known,
+    Inertial,
+    InertialBiasKnown,
+}
+
+/// The choices.
+#[derive(Clone, Debug)]
+pub(super) struct Choices {
+    /// A mechanism's name, `None` for the rig's.
+    mechanism: Option<&'static str>,
+    motion: LaboratoryMotion,
+    forms: [bool; FORMS.len()],
+    joint_offsets: bool,
+    frozen: Vec<bool>,
+    joints: Joints,
+    encoder_sigma_deg: f64,
+    poses: Poses,
+}
+
+impl Default for Choices {
+    fn default() -> Self {
+        Self {
+            mechanism: None,
+            motion: LaboratoryMotion::Aggressive,
+            forms: FORMS.map(|form| {
+                use Parameterization::{Classical, Minimal, MinimalSwapped};
+                matches!(form, Classical | Minimal | MinimalSwapped)
+            }),
+            joint_offsets: true,
+            frozen: Vec::new(),
+            joints: Joints::Known,
+            encoder_sigma_deg: 0.5,
+            poses: Poses::Known,
+        }
+    }
+}
+
+impl Choices {
+    /// Draws them.
+    pub(super) fn ui(&mut self, ui: &mut Ui, ctx: &PanelContext<'_>) {
+        ui.horizontal_wrapped(|ui| {
+            self.mechanism_ui(ui, ctx);
+            self.motion_ui(ui);
+            self.knowledge_ui(ui);
+        });
+        ui.horizontal_wrapped(|ui| {
+            ui.label("Forms");
+            for (chosen, form) in self.forms.iter_mut().zip(FORMS) {
+                ui.checkbox(chosen, form.name());
+            }
+            ui.checkbox(&mut self.joint_offsets, "Joint offsets").on_hover_text("Whether they are among the columns");
+        });
+        let names = self.mechanism(ctx).map(|mechanism| mechanism.joints).unwrap_or_default();
+        self.frozen.resize(names.len(), false);
+        if !names.is_empty() {
+            ui.horizontal_wrapped(|ui| {
+                ui.label("Hold");
+                for (frozen, joint) in self.frozen.iter_mut().zip(&names) {
+                    ui.checkbox(frozen, &joint.name);
+                }
+            });
+        }
+    }
+
+    fn mechanism_ui(&mut self, ui: &mut Ui, ctx: &PanelContext<'_>) {
+        let rig = format!("rig {}", ctx.recording.rig.name);
+        let name = ui.label("Mechanism");
+        let text = self.mechanism.map_or_else(|| rig.clone(), str::to_owned);
+        let shown = ComboBox::from_id_salt("mechanism").width(150.0).selected_text(text).show_ui(ui, |ui| {
+            ui.selectable_value(&mut self.mechanism, None, rig);
+            for (known, meaning) in Mechanism::NAMES {
+                ui.selectable_value(&mut self.mechanism, Some(known), known).on_hover_text(meaning);
+            }
+        });
+        shown.response.labelled_by(name.id);
+    }
+
+    fn motion_ui(&mut self, ui: &mut Ui) {
+        let name = ui.label("Motion");
+        let combo = ComboBox::from_id_salt("motion").width(150.0).selected_text(self.motion.name());
+        let shown = combo.show_ui(ui, |ui| {
+            for motion in LaboratoryMotion::ALL {
+                ui.selectable_value(&mut self.motion, motion, motion.name()).on_hover_text(motion.meaning());
+            }
+        });
+        shown.response.labelled_by(name.id);
+    }
+
+    fn knowledge_ui(&mut self, ui: &mut Ui) {
+        let name = ui.label("Joint angles");
+        let words = |joints: Joints| match joints {
+            Joints::Known => "known",
+            Joints::Encoder => "encoders",
+            Joints::Unknown => "none",
+        };
+        let combo = ComboBox::from_id_salt("joint angles").width(80.0).selected_text(words(self.joints));
+        let shown = combo.show_ui(ui, |ui| {
+            for joints in [Joints::Known, Joints::Encoder, Joints::Unknown] {
+                ui.selectable_value(&mut self.joints, joints, words(joints));
+            }
+        });
+        shown.response.labelled_by(name.id);
+        if self.joints == Joints::Encoder {
+            let sigma = egui::DragValue::new(&mut self.encoder_sigma_deg).range(1e-3..=45.0).speed(0.01).suffix("°");
+            ui.add(sigma).labelled_by(name.id);
+        }
+        let name = ui.label("Poses");
+        let words = |poses: Poses| match poses {
+            Poses::Known => "known",
+            Poses::Inertial => "from the IMU",
+            Poses::InertialBiasKnown => "IMU, biases known",
+        };
+        let combo = ComboBox::from_id_salt("poses").width(110.0).selected_text(words(self.poses));
+        let shown = combo.show_ui(ui, |ui| {
+            for poses in [Poses::Known, Poses::Inertial, Poses::InertialBiasKnown] {
+                ui.selectable_value(&mut self.poses, poses, words(poses));
+            }
+        });
+        shown.response.labelled_by(name.id);
+    }
+
+    fn mechanism(&self, ctx: &PanelContext<'_>) -> Option<Mechanism> {
+        let run = ctx.recording.runs.get(ctx.selection.run);
+        let Some(name) = self.mechanism else {
+            let rig = &ctx.recording.rig;
+            let key = run.map(|run| &run.camera_key).or_else(|| rig.cameras.first().map(|camera| &camera.key))?;
+            return Mechanism::of_rig(rig, key);
+        };
+        Mechanism::named(name).ok()
+    }
+
+    /// The experiment that is chosen, or why there is none.
+    pub(super) fn experiment(&self, ctx: &PanelContext<'_>) -> Result<Experiment, String> {
+        let forms = FORMS.iter().zip(self.forms).filter(|(_, chosen)| *chosen);
+        let forms: Vec<LaboratoryForm> = forms
+            .map(|(form, _)| LaboratoryForm { parameterization: *form, joint_offsets: self.joint_offsets })
+            .collect();
+        if forms.is_empty() {
+            return Err("Choose a form".to_owned());
+        }
+        let mechanism = self.mechanism(ctx).ok_or("The rig has no mount for this run's camera")?;
+        let mut setup = LaboratorySetup::new(mechanism);
+        if self.mechanism.is_none() {
+            let run = ctx.recording.runs.get(ctx.selection.run);
+            let camera = run.and_then(|run| ctx.recording.rig.camera(&run.camera_key).ok());
+            setup.camera = camera.map_or(setup.camera, |camera| camera.model.clone());
+        }
+        let noise = if self.mechanism.is_none() { ctx.recording.rig.imu.noise } else { LABORATORY_IMU };
+        setup.motion = self.motion;
+        let joints = setup.mechanism.joints.len();
+        setup.frozen = (0..joints).filter(|joint| self.frozen.get(*joint).copied().unwrap_or(false)).collect();
+        setup.joints = match self.joints {
+            Joints::Known => JointKnowledge::Known,
+            Joints::Encoder => JointKnowledge::Encoder(self.encoder_sigma_deg.to_radians()),
+            Joints::Unknown => JointKnowledge::Unknown,
+        };
+        setup.poses = match self.poses {
+            Poses::Known => PoseKnowledge::Known,
+            Poses::Inertial => PoseKnowledge::Inertial { noise, biases_known: false },
+            Poses::InertialBiasKnown => PoseKnowledge::Inertial { noise, biases_known: true },
+        };
+        Ok(Experiment { setup, forms })
+    }
+}

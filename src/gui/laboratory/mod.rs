@@ -1,0 +1,102 @@
+//! The laboratory panel: what a mechanism, its forms and a motion can identify, without the log.
+//!
+//! The experiments are those of `dcvins degeneracy`.
+
+mod choices;
+#[cfg(test)]
+mod tests;
+mod worker;
+
+use egui::{Label, RichText, ScrollArea, Ui};
+
+use self::choices::Choices;
+use self::worker::Worker;
+use super::PanelContext;
+use super::rank::columns::{RankColumn, columns_ui};
+use crate::observability::RankReport;
+use crate::observability::laboratory::{LaboratoryReport, LaboratoryResult};
+
+/// State of the laboratory panel.
+#[derive(Default)]
+pub struct LaboratoryPanel {
+    /// Whether experiments run on a thread of their own, as in the window; pictures wait for them.
+    pub in_background: bool,
+    choices: Choices,
+    worker: Worker,
+}
+
+impl LaboratoryPanel {
+    /// A panel that shows the same, for a picture.
+    pub(in crate::gui) fn view_copy(&self) -> Self {
+        Self { in_background: false, choices: self.choices.clone(), worker: Worker::default() }
+    }
+
+    /// The forms that are chosen, each with its ranks; waits for what is not there yet.
+    pub(in crate::gui) fn ranks(&mut self, ctx: &PanelContext<'_>) -> Vec<(String, RankReport)> {
+        if let Ok(experiment) = self.choices.experiment(ctx) {
+            self.worker.ask(&experiment, self.in_background);
+        }
+        self.worker.results().0.iter().map(|result| (result.form.name(), result.rank.clone())).collect()
+    }
+
+    /// Draws the panel.
+    pub fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
+        ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+            ui.spacing_mut().item_spacing.y = 3.0;
+            self.choices.ui(ui, ctx);
+            let experiment = match self.choices.experiment(ctx) {
+                Ok(experiment) => experiment,
+                Err(problem) => {
+                    ui.label(RichText::new(problem).color(ctx.theme.warn));
+                    return;
+                }
+            };
+            self.worker.ask(&experiment, self.in_background);
+            let (results, asked) = self.worker.results();
+            if results.len() < asked && self.worker.is_busy() {
+                let text = format!("Experiment {} of {asked}…", results.len() + 1);
+                ui.horizontal(|ui| {
+                    ui.spinner();
+                    ui.label(RichText::new(text).color(ctx.theme.text_weak));
+                });
+                ui.ctx().request_repaint();
+            }
+            if let Some(setup) = self.worker.setup() {
+                let text = words(&LaboratoryReport::new(setup, &[]));
+                ui.add(Label::new(RichText::new(text).small().color(ctx.theme.text_weak)).wrap());
+            }
+            let theme = *ctx.theme;
+            let column = |(number, result): (usize, &LaboratoryResult)| (number, result.clone());
+            let results: Vec<_> = results.iter().enumerate().map(column).collect();
+            let columns: Vec<RankColumn<'_>> = results
+                .iter()
+                .map(|(number, result)| RankColumn {
+                    title: result.form.name(),
+                    color: theme.run(*number).color,
+                    rank: &result.rank,
+                })
+                .collect();
+            columns_ui(ui, ctx, &columns);
+        });
+    }
+}
+
+/// What is supposed, in one sentence.
+fn words(report: &LaboratoryReport) -> String {
+    let held = if report.frozen_joints.is_empty() {
+        String::new()
+    } else {
+        format!(", {} held", report.frozen_joints.join(", "))
+    };
+    format!(
+        "{}: {}{held}. Joint angles {}, poses {}; {} frames {} s apart, {} landmarks, {} px; columns by 10° and 3 cm.",
+        report.motion,
+        report.motion_meaning,
+        report.joint_angles,
+        report.poses,
+        report.frames,
+        report.frame_period_s,
+        report.landmarks,
+        report.pixel_sigma_px
+    )
+}

@@ -1,0 +1,90 @@
+use egui::Role;
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable as _;
+
+use super::LaboratoryPanel;
+use crate::gimbal::Parameterization;
+use crate::gui::Selection;
+use crate::gui::headless::{HeadlessOptions, draw};
+use crate::gui::sample_recording::{sample_images, sample_recording_of};
+use crate::gui::tests::{keep_picture, with_context};
+use crate::gui::theme::{Theme, ThemeName};
+use crate::observability::laboratory::{LaboratoryForm, LaboratoryMotion, LaboratorySetup, Mechanism};
+use crate::session::Recording;
+
+fn show(ui: &mut egui::Ui, panel: &mut LaboratoryPanel, recording: &Recording, theme: ThemeName) {
+    let theme = Theme::of(theme);
+    theme.apply(ui.ctx());
+    let (mut selection, end_ns) = (Selection::default(), recording.duration_ns);
+    with_context(recording, end_ns, &mut sample_images(), &mut selection, &theme, |ctx| panel.ui(ui, ctx));
+}
+
+fn bench(in_background: bool) -> Harness<'static, LaboratoryPanel> {
+    let recording = sample_recording_of(40, &["auto"]);
+    let panel = LaboratoryPanel { in_background, ..LaboratoryPanel::default() };
+    let mut harness = Harness::builder()
+        .with_size([1000.0, 800.0])
+        .with_max_steps(2000)
+        .build_ui_state(move |ui, panel: &mut LaboratoryPanel| show(ui, panel, &recording, ThemeName::Dark), panel);
+    harness.run_steps(2);
+    harness
+}
+
+/// Chooses an entry of a list by the list's label.
+fn choose(harness: &mut Harness<'static, LaboratoryPanel>, list: &str, entry: &str) {
+    harness.get_by_role_and_label(Role::ComboBox, list).click();
+    harness.run_steps(3);
+    harness.get_by_label(entry).click();
+    harness.run_steps(3);
+}
+
+#[test]
+fn experiments_tell_what_the_command_tells() {
+    let mut harness = bench(false);
+    // The rig's mechanism, flown aggressively: nothing but the form is lost.
+    assert!(harness.query_by_label("18 of 24").is_some());
+    assert_eq!(harness.query_all_by_label("18 of 18").count(), 2);
+    // Another mechanism and motion, as the command computes them.
+    choose(&mut harness, "Mechanism", "yaw-roll-pitch-ideal");
+    choose(&mut harness, "Motion", "hover");
+    let mechanism = Mechanism::named("yaw-roll-pitch-ideal").unwrap();
+    let setup = LaboratorySetup { motion: LaboratoryMotion::Hover, ..LaboratorySetup::new(mechanism) };
+    let classical = setup.run(LaboratoryForm::whole(Parameterization::Classical)).unwrap().rank;
+    assert!(classical.rank_structural < 18, "a hover tells less than every motion");
+    let told = format!("{} of 24", classical.rank_structural);
+    assert!(harness.query_by_label(&told).is_some(), "{told}");
+    assert!(harness.query_by_label_contains(LaboratoryMotion::Hover.meaning()).is_some());
+    harness.get_by_role_and_label(Role::CheckBox, "classical").click();
+    harness.run_steps(3);
+    assert!(harness.query_by_label(&told).is_none());
+    for form in ["minimal", "minimal-swapped"] {
+        harness.get_by_role_and_label(Role::CheckBox, form).click();
+        harness.run_steps(3);
+    }
+    assert!(harness.query_by_label("Choose a form").is_some());
+}
+
+#[test]
+fn in_the_window_the_experiments_come_one_by_one() {
+    let mut harness = bench(true);
+    while harness.state().worker.is_busy() {
+        harness.run_steps(1);
+        std::thread::yield_now();
+    }
+    harness.run_steps(1);
+    assert!(harness.query_by_label("18 of 24").is_some());
+    assert_eq!(harness.query_all_by_label("18 of 18").count(), 2);
+}
+
+#[test]
+fn pictures_wait_for_their_experiments() {
+    let recording = sample_recording_of(40, &["auto"]);
+    for theme in [ThemeName::Dark, ThemeName::Light] {
+        let mut panel = LaboratoryPanel::default();
+        let options = HeadlessOptions { size_px: [1200, 760], pixels_per_point: 1.0, theme };
+        let picture = draw(options, |ui| show(ui, &mut panel, &recording, theme));
+        keep_picture(&format!("laboratory-{}", theme.as_str()), &picture);
+        let mut copy = panel.view_copy();
+        assert!(picture == draw(options, |ui| show(ui, &mut copy, &recording, theme)));
+    }
+}

@@ -1,0 +1,202 @@
+//! Several rank reports side by side: what is lost to what, spectra over one axis, and null and weak directions in one heat
+//! map with one order of rows.
+
+use egui::{Align2, Color32, FontFamily, FontId, Grid, Label, Rect, RichText, Role, Sense, Stroke, Ui, WidgetInfo};
+use egui::{StrokeKind, pos2, vec2};
+
+use super::spectrum;
+use crate::gui::PanelContext;
+use crate::gui::convergence::names::{meaning_of, part_of};
+use crate::gui::theme::{self, Theme};
+use crate::gui::units::counted;
+use crate::observability::{CalibrationDirection, RankReport};
+
+/// One report with its name.
+pub(in crate::gui) struct RankColumn<'a> {
+    /// What it is of.
+    pub(in crate::gui) title: String,
+    /// Colour of the title.
+    pub(in crate::gui) color: Color32,
+    /// The report.
+    pub(in crate::gui) rank: &'a RankReport,
+}
+
+/// Room for names on the left, in points.
+const NAMES: f32 = 116.0;
+/// Room between two reports.
+const GAP: f32 = 10.0;
+/// Widest column of a direction.
+const WIDEST: f32 = 42.0;
+/// Narrowest column that holds a signed number.
+const NUMBER_WIDTH: f32 = 30.0;
+const LOWEST_ROW: f32 = 11.0;
+const HIGHEST_ROW: f32 = 20.0;
+
+/// Draws the reports side by side into what is left of `ui`.
+pub(in crate::gui) fn columns_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, columns: &[RankColumn<'_>]) {
+    if columns.is_empty() {
+        return;
+    }
+    let bottom = ui.max_rect().bottom();
+    let width = (ui.available_width() - NAMES) / columns.len() as f32;
+    table_ui(ui, ctx.theme, columns, width);
+    spectra_ui(ui, ctx.theme, columns, width);
+    heat_map_ui(ui, ctx, columns, width, bottom);
+}
+
+fn table_ui(ui: &mut Ui, theme: &Theme, columns: &[RankColumn<'_>], width: f32) {
+    type Cell = fn(&RankReport) -> (String, bool);
+    let rows: [(&str, Cell); 7] = [
+        ("structural rank", |rank| {
+            let whole = rank.rank_structural == rank.names.len();
+            (format!("{} of {}", rank.rank_structural, rank.names.len()), !whole)
+        }),
+        ("informed rank", |rank| (rank.rank_informed.to_string(), false)),
+        ("lost to the form", |rank| lost(rank.deficit_parameterization)),
+        ("to joints at rest", |rank| lost(rank.deficit_joints)),
+        ("to free angles", |rank| lost(rank.deficit_absorbed)),
+        ("to the motion", |rank| lost(rank.deficit_motion)),
+        ("nearest lock", |rank| {
+            let nearest = rank.margins.iter().min_by(|a, b| a.1.total_cmp(&b.1));
+            nearest.map_or_else(
+                || ("none".to_owned(), false),
+                |(lock, margin)| (format!("{margin:.2} ({lock})"), *margin < crate::gimbal::SWITCH_MARGIN),
+            )
+        }),
+    ];
+    Grid::new("ranks side by side").min_col_width(0.0).spacing(vec2(0.0, 1.0)).min_row_height(14.0).show(ui, |ui| {
+        let cell = |ui: &mut Ui, width: f32, text: RichText| {
+            ui.allocate_ui(vec2(width, 14.0), |ui| {
+                ui.set_width(width);
+                ui.add(Label::new(text).truncate());
+            });
+        };
+        cell(ui, NAMES, RichText::new(""));
+        for column in columns {
+            cell(ui, width, RichText::new(&column.title).strong().color(column.color));
+        }
+        ui.end_row();
+        for (name, of) in rows {
+            cell(ui, NAMES, RichText::new(name).color(theme.text_weak));
+            for column in columns {
+                let (text, bad) = of(column.rank);
+                cell(
+                    ui,
+                    width,
+                    RichText::new(text).monospace().color(if bad { theme.error } else { theme.text_strong }),
+                );
+            }
+            ui.end_row();
+        }
+    });
+}
+
+fn lost(count: usize) -> (String, bool) {
+    if count == 0 { ("–".to_owned(), false) } else { (count.to_string(), true) }
+}
+
+fn spectra_ui(ui: &mut Ui, theme: &Theme, columns: &[RankColumn<'_>], width: f32) {
+    let height = (0.16 * ui.available_height()).clamp(50.0, 130.0);
+    let (_, whole) = ui.allocate_space(vec2(ui.available_width(), height));
+    let caption = ["singular values", "by decades;", "marks: with priors"];
+    for (line, text) in caption.into_iter().enumerate() {
+        let at = whole.left_top() + vec2(0.0, 2.0 + 13.0 * line as f32);
+        ui.painter().text(at, Align2::LEFT_TOP, text, theme::label_font(), theme.text_weak);
+    }
+    let peers: Vec<&RankReport> = columns.iter().map(|column| column.rank).collect();
+    for (number, column) in columns.iter().enumerate() {
+        let left = whole.left() + NAMES + number as f32 * width;
+        let rect = Rect::from_min_size(pos2(left, whole.top()), vec2(width - GAP, height));
+        spectrum::paint(ui, theme, column.rank, &peers, rect, number);
+    }
+}
+
+fn heat_map_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, columns: &[RankColumn<'_>], width: f32, bottom: f32) {
+    const HEADER: f32 = 14.0;
+    let theme = *ctx.theme;
+    let names = names_of(columns);
+    let room = (bottom - ui.cursor().top() - HEADER - 4.0).max(0.0);
+    let row_height = (room / names.len().max(1) as f32).clamp(LOWEST_ROW, HIGHEST_ROW);
+    let size = vec2(ui.available_width(), HEADER + row_height * names.len() as f32);
+    let (_, whole) = ui.allocate_space(size);
+    let mut left_out = 0;
+    for (number, column) in columns.iter().enumerate() {
+        let left = whole.left() + NAMES + number as f32 * width;
+        let fitting = ((width - GAP) / 6.0).max(1.0) as usize;
+        let directions = &column.rank.directions[..column.rank.directions.len().min(fitting)];
+        left_out += column.rank.directions.len() - directions.len();
+        let pitch = ((width - GAP) / directions.len().max(1) as f32).min(WIDEST);
+        if directions.is_empty() {
+            let at = pos2(left, whole.top() + HEADER);
+            ui.painter().text(at, Align2::LEFT_TOP, "✔ nothing lost", theme::label_font(), theme.ok);
+        }
+        for (place, direction) in directions.iter().enumerate() {
+            let (mark, color) = if direction.structural { ("null", theme.error) } else { ("weak", theme.warn) };
+            let mark = if pitch < NUMBER_WIDTH - 6.0 { &mark[..1] } else { mark };
+            let at = pos2(left + (place as f32 + 0.5) * pitch, whole.top());
+            ui.painter().text(at, Align2::CENTER_TOP, mark, FontId::new(10.0, FontFamily::Proportional), color);
+        }
+        for (row, name) in names.iter().enumerate() {
+            let Some(entry) = column.rank.names.iter().position(|known| known == name) else { continue };
+            let top = whole.top() + HEADER + row as f32 * row_height;
+            for (place, direction) in directions.iter().enumerate() {
+                let cell = Rect::from_min_size(pos2(left + place as f32 * pitch, top), vec2(pitch, row_height));
+                cell_ui(ui, &theme, direction, entry, cell.shrink(0.5));
+            }
+        }
+    }
+    for (row, name) in names.iter().enumerate() {
+        let top = whole.top() + HEADER + row as f32 * row_height;
+        let line = Rect::from_min_size(pos2(whole.left(), top), vec2(whole.width(), row_height));
+        name_ui(ui, ctx, name, line);
+    }
+    if left_out > 0 {
+        let text = format!("Not shown: {}", counted(left_out, "stronger direction"));
+        ui.label(RichText::new(text).small().color(theme.text_weak));
+    }
+}
+
+/// The names of all reports in chain order, each once.
+fn names_of(columns: &[RankColumn<'_>]) -> Vec<String> {
+    let mut names: Vec<String> = Vec::new();
+    for name in columns.iter().flat_map(|column| &column.rank.names) {
+        if !names.contains(name) {
+            names.push(name.clone());
+        }
+    }
+    names.sort_by_key(|name| part_of(name));
+    names
+}
+
+fn cell_ui(ui: &Ui, theme: &Theme, direction: &CalibrationDirection, entry: usize, cell: Rect) {
+    let weight = direction.weights.get(entry).copied().unwrap_or(0.0);
+    let ground = theme.diverging(weight);
+    let painter = ui.painter();
+    painter.rect_filled(cell, 1.0, ground);
+    let font = FontId::new((cell.height() - 1.5).clamp(7.0, 11.0), FontFamily::Monospace);
+    let text = if weight.abs() >= 0.05 && cell.width() >= NUMBER_WIDTH {
+        format!("{weight:+.2}")
+    } else if weight.abs() >= 0.2 {
+        if weight < 0.0 { "−" } else { "+" }.to_owned()
+    } else {
+        return;
+    };
+    painter.text(cell.center(), Align2::CENTER_CENTER, text, font, Theme::text_on(ground));
+}
+
+fn name_ui(ui: &Ui, ctx: &mut PanelContext<'_>, name: &str, line: Rect) {
+    let theme = *ctx.theme;
+    let selected = ctx.selection.parameter.as_deref() == Some(name);
+    let color = if selected { theme.accent } else { theme.text };
+    ui.painter().text(line.left_center(), Align2::LEFT_CENTER, name, theme::label_font(), color);
+    let response = ui.interact(line, ui.unique_id().with(("side by side", name)), Sense::click());
+    response.widget_info(|| WidgetInfo::selected(Role::Button, true, selected, format!("{name} in all columns")));
+    if selected || response.hovered() {
+        let stroke = Stroke::new(1.0, if selected { theme.accent } else { theme.outline });
+        ui.painter().rect_stroke(line, 0.0, stroke, StrokeKind::Inside);
+    }
+    if response.clicked() {
+        ctx.selection.parameter = if selected { None } else { Some(name.to_owned()) };
+    }
+    response.on_hover_text(format!("{name}: {}", meaning_of(name, &ctx.recording.rig)));
+}

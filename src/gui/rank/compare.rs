@@ -1,0 +1,84 @@
+//! All runs at the cursor side by side, and the chart that would suit a minimal one better.
+
+use egui::{RichText, ScrollArea, Ui};
+
+use super::columns::{RankColumn, columns_ui};
+use crate::gimbal::{Chain, Parameterization, SWITCH_MARGIN};
+use crate::gui::PanelContext;
+use crate::observability::RankReport;
+use crate::session::{Command, MAX_RUNS, RunRecord, RunSpec, StepRecord};
+
+/// Width that a run needs, in points.
+pub(super) const WIDTH_OF_A_RUN: f32 = 300.0;
+
+/// How many runs have a rank at the cursor.
+pub(super) fn comparable(ctx: &PanelContext<'_>) -> usize {
+    ranked(ctx).count()
+}
+
+fn ranked<'a>(ctx: &PanelContext<'a>) -> impl Iterator<Item = (usize, &'a RunRecord, &'a StepRecord, &'a RankReport)> {
+    let cursor_ns = ctx.cursor_ns;
+    ctx.recording.runs.iter().enumerate().filter_map(move |(number, run)| {
+        let step = run.step_at(cursor_ns)?;
+        let rank = step.rank.as_ref().filter(|rank| !rank.names.is_empty())?;
+        Some((number, run, step.as_ref(), rank))
+    })
+}
+
+/// Draws all runs.
+pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>) {
+    let theme = *ctx.theme;
+    let ranked: Vec<_> = ranked(ctx).collect();
+    ScrollArea::vertical().id_salt("all runs").auto_shrink(false).show(ui, |ui| {
+        ui.spacing_mut().item_spacing.y = 3.0;
+        for (number, run, step, _) in &ranked {
+            lock_ui(ui, ctx, *number, run, step);
+        }
+        let columns: Vec<RankColumn<'_>> = ranked
+            .iter()
+            .map(|(number, run, _, rank)| RankColumn {
+                title: run.spec.label.clone(),
+                color: theme.run(*number).color,
+                rank,
+            })
+            .collect();
+        columns_ui(ui, ctx, &columns);
+    });
+}
+
+/// How far a minimal run is from its chart's lock, and the other chart for the end where there is no such run yet.
+fn lock_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, number: usize, run: &RunRecord, step: &StepRecord) {
+    let calibration = &step.report.calibration;
+    let own = calibration.parameterization.parse::<Parameterization>().ok();
+    let (own, other) = match own {
+        Some(own @ Parameterization::Minimal) => (own, Parameterization::MinimalSwapped),
+        Some(own @ Parameterization::MinimalSwapped) => (own, Parameterization::Minimal),
+        _ => return,
+    };
+    let margin_of = |form: Parameterization| {
+        let chain = Chain::from_classical(&calibration.classical, form);
+        chain.margins().into_iter().find(|(lock, _)| lock == "end").map(|(_, margin)| margin)
+    };
+    let (Some(here), Some(there)) = (margin_of(own), margin_of(other)) else { return };
+    ui.horizontal_wrapped(|ui| {
+        let color = if here < SWITCH_MARGIN { ctx.theme.error } else { ctx.theme.text };
+        let text = format!(
+            "{}: {here:.2} from its own lock at the end (0 locked, 1 far away); as {other} it would be {there:.2}",
+            run.spec.label
+        );
+        ui.label(RichText::new(text).color(color));
+        let is_there = ctx.recording.runs.iter().any(|run| {
+            let newest = run.step_at(ctx.cursor_ns);
+            newest.is_some_and(|step| step.report.calibration.parameterization == other.name())
+        });
+        let spec = other.name().parse::<RunSpec>().ok().filter(|_| !is_there && ctx.recording.runs.len() < MAX_RUNS);
+        if let Some(spec) = spec {
+            let spec = RunSpec { encoder: run.spec.encoder, calibrate: run.spec.calibrate, ..spec };
+            let button = ui.small_button(format!("Add run {other}"));
+            let button = button.on_hover_text(format!("Run {} of this log in the other chart", number + 1));
+            if button.clicked() {
+                ctx.commands.push(Command::AddRun(spec));
+            }
+        }
+    });
+}

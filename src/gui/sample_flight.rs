@@ -1,0 +1,90 @@
+//! A short synthetic flight through the real estimator, for panels that need a real linearization.
+
+use std::path::PathBuf;
+use std::sync::{Arc, OnceLock};
+
+use crate::estimator::{Estimator, EstimatorConfig, EstimatorOptions, StepInput};
+use crate::flight_log::JointAngles;
+use crate::gimbal::{Chain, Parameterization};
+use crate::observability::analyse;
+use crate::session::{Recording, RunRecord, StepRecord};
+use crate::simulation::{SyntheticOptions, synthetic_tracks};
+
+/// Five seconds in the classical, the minimal and the swapped form; made once.
+pub(crate) fn flown_recording() -> &'static Recording {
+    static FLOWN: OnceLock<Recording> = OnceLock::new();
+    FLOWN.get_or_init(fly)
+}
+
+fn fly() -> Recording {
+    let flight = synthetic_tracks(&SyntheticOptions { duration_s: 5.0, features: 80, ..SyntheticOptions::default() });
+    let rig = &flight.given_rig;
+    let gimbal = rig.gimbal.as_ref().expect("the synthetic rig has a gimbal");
+    let sigma_rad = gimbal.encoder_sigma_rad.expect("with encoders");
+    let root = 3.0_f64.sqrt();
+    let runs = [Parameterization::Classical, Parameterization::Minimal, Parameterization::MinimalSwapped];
+    let runs = runs.map(|parameterization| {
+        let mut estimator = Estimator::new(EstimatorConfig {
+            camera: rig.cameras[0].model.clone(),
+            rigid_cameras: Vec::new(),
+            imu_noise: rig.imu.noise,
+            gravity_m_per_s2: rig.gravity_m_per_s2,
+            chain: rig.chain_of_camera("cam0").expect("cam0"),
+            parameterization,
+            auto_chart: false,
+            encoder_sigma_rad: Some(sigma_rad),
+            use_encoder: true,
+            calibrate: true,
+            estimate_timeshift: false,
+            timeshift_s: 0.0,
+            chain_prior: Some((gimbal.prior.translation_bound_m / root, gimbal.prior.rotation_bound_rad / root)),
+            options: EstimatorOptions { keep_linearization: true, ..EstimatorOptions::default() },
+            clock_ms: || 0.0,
+        });
+        let spec = parameterization.name().parse().expect("runs are named after parameterizations");
+        let mut run = RunRecord::new(spec, "cam0".to_owned());
+        for frame in &flight.frames {
+            let angles_rad = frame.joint_angles_rad.clone().expect("encoder readings");
+            let count = angles_rad.len();
+            let joints = JointAngles {
+                angles_rad,
+                sigmas_rad: vec![sigma_rad; count],
+                lasting_sigmas_rad: vec![0.0; count],
+                rates_rad_per_s: vec![0.0; count],
+            };
+            let mut report = estimator.step(&StepInput {
+                frame_index: frame.index,
+                stamp_ns: frame.stamp_ns,
+                imu: &frame.imu,
+                joint_angles: Some(&joints),
+                tracks: &frame.tracks,
+                rigid_tracks: &[],
+            });
+            let rank = report.linearization.take().and_then(|linearization| {
+                let angles: Vec<&[f64]> = report.window.iter().map(|frame| frame.joint_angles_rad.as_slice()).collect();
+                let chain = Chain::from_classical(&report.calibration.classical, parameterization);
+                analyse(&linearization, &chain, &angles, false)
+            });
+            run.push(StepRecord {
+                report,
+                rank,
+                tracks: Arc::new(frame.tracks.clone()),
+                truth: Some(frame.true_world_from_imu),
+                log_time_ns: frame.stamp_ns,
+                outlined: false,
+            });
+        }
+        run.finished = true;
+        run
+    });
+    Recording {
+        log_path: PathBuf::from("sample/flight.mcap"),
+        rig: Arc::new(rig.clone()),
+        truth_rig: Some(Arc::new(flight.true_rig.clone())),
+        duration_ns: flight.frames.last().map_or(0, |frame| frame.stamp_ns),
+        epoch_ns: 0,
+        runs: runs.into(),
+        warnings: Vec::new(),
+        memory_budget_bytes: crate::session::DEFAULT_MEMORY_BUDGET_BYTES,
+    }
+}
