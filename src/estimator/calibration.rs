@@ -89,6 +89,8 @@ pub(super) struct Calibration {
     given_timeshift_s: f64,
     first_estimate: Option<Values>,
     free: bool,
+    /// Parameters that are held at their values, by name: charts may change.
+    frozen: Vec<String>,
 }
 
 impl Calibration {
@@ -102,7 +104,7 @@ impl Calibration {
     ) -> Self {
         let given = GivenChain::new(classical, parameterization, sigmas, joint_offsets);
         let values = Values { chain: given.chain.clone(), clocks_s: DVector::zeros(0) };
-        Self { values, given, clocks: FreeClocks::None, given_timeshift_s: 0.0, first_estimate: None, free }
+        Self { values, given, clocks: FreeClocks::None, given_timeshift_s: 0.0, first_estimate: None, free, frozen: Vec::new() }
     }
 
     /// The same with offsets of clocks beside the chain; a calibration that is held fixed has none.
@@ -153,6 +155,28 @@ impl Calibration {
         let given = [self.given_timeshift_s, 0.0];
         let clocks = self.values.clocks_s.iter().zip(given).map(|(shift_s, given_s)| given_s + shift_s);
         self.chain().values().iter().copied().chain(clocks).collect()
+    }
+
+    /// Holds a parameter at its value from now on.
+    pub(super) fn freeze(&mut self, column: usize) {
+        let name = self.names().swap_remove(column);
+        if !self.frozen.contains(&name) {
+            self.frozen.push(name);
+        }
+    }
+
+    /// Holds the same parameters as another one.
+    pub(super) fn freeze_as(&mut self, other: &Self) {
+        self.frozen.clone_from(&other.frozen);
+    }
+
+    /// Free columns that are held at their values.
+    pub(super) fn frozen_columns(&self) -> Vec<usize> {
+        if self.frozen.is_empty() || !self.free {
+            return Vec::new();
+        }
+        let names = self.names().into_iter().enumerate();
+        names.filter(|(_, name)| self.frozen.contains(name)).map(|(column, _)| column).collect()
     }
 
     /// Number of free columns.

@@ -50,6 +50,22 @@ impl Calibrations {
         start..start + self.0[camera].dof()
     }
 
+    /// Columns that are held at their values.
+    pub(super) fn frozen_columns(&self) -> Vec<usize> {
+        let of_camera = |camera: usize| {
+            let start = self.columns(camera).start;
+            self.0[camera].frozen_columns().into_iter().map(move |column| start + column)
+        };
+        (0..self.cameras()).flat_map(of_camera).collect()
+    }
+
+    /// Holds the same parameters as others.
+    pub(super) fn freeze_as(&mut self, others: &Self) {
+        for (one, other) in self.0.iter_mut().zip(&others.0) {
+            one.freeze_as(other);
+        }
+    }
+
     /// A step of the solver, counted from the first estimates where there are any.
     pub(super) fn stepped(&self, delta: &[f64]) -> Self {
         Self(self.0.iter().enumerate().map(|(camera, one)| one.stepped(&delta[self.columns(camera)])).collect())

@@ -260,7 +260,9 @@ impl Estimator {
         self.resume_at = good.map(|frame| frame.state.navigation.world_from_imu).or(self.resume_at);
         let resume_at = self.resume_at;
         let restarts = self.restarts + 1;
+        let frozen = self.calibration.clone();
         *self = Self::new(self.config.clone());
+        self.calibration.freeze_as(&frozen);
         self.resume_at = resume_at;
         self.restarts = restarts;
         self.wait(input, events)

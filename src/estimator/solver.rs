@@ -42,6 +42,10 @@ pub(super) fn solve(problem: &Problem<'_>, start: Estimate, limits: SolverLimits
         iterations: Vec::new(),
         calibration_covariance: DMatrix::zeros(0, 0),
     };
+    let held: Vec<usize> = {
+        let start = problem.layout.calibration().start;
+        solution.estimate.calibration.frozen_columns().into_iter().map(|column| start + column).collect()
+    };
     let mut damping = FIRST_DAMPING;
     let mut tries = 0;
     while tries < limits.iterations {
@@ -50,7 +54,8 @@ pub(super) fn solve(problem: &Problem<'_>, start: Estimate, limits: SolverLimits
         while tries < limits.iterations {
             tries += 1;
             let reduced = equations.eliminate(damping);
-            let (hessian, gradient) = equations.reduced(&problem.layout, &reduced);
+            let (mut hessian, mut gradient) = equations.reduced(&problem.layout, &reduced);
+            hold(&held, &mut hessian, &mut gradient);
             let Some(factor) = Cholesky::new(&damped(&hessian, damping)) else {
                 damping = (damping * 100.0).min(MOST_DAMPING);
                 continue;
@@ -70,6 +75,11 @@ pub(super) fn solve(problem: &Problem<'_>, start: Estimate, limits: SolverLimits
                 accepted,
             });
             solution.calibration_covariance = factor.trailing_covariance(problem.layout.calibration);
+            for column in &held {
+                let column = column - problem.layout.calibration().start;
+                solution.calibration_covariance.row_mut(column).fill(0.0);
+                solution.calibration_covariance.column_mut(column).fill(0.0);
+            }
             if accepted {
                 solution.estimate = candidate;
                 solution.costs_after = costs;
@@ -92,6 +102,16 @@ pub(super) fn solve(problem: &Problem<'_>, start: Estimate, limits: SolverLimits
         }
     }
     solution
+}
+
+/// Takes unknowns out of the normal equations: their steps become zero, whatever the factors say.
+fn hold(held: &[usize], hessian: &mut DMatrix<f64>, gradient: &mut DVector<f64>) {
+    for column in held {
+        hessian.row_mut(*column).fill(0.0);
+        hessian.column_mut(*column).fill(0.0);
+        hessian[(*column, *column)] = 1.0;
+        gradient[*column] = 0.0;
+    }
 }
 
 fn damped(hessian: &DMatrix<f64>, damping: f64) -> DMatrix<f64> {

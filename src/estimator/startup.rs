@@ -18,7 +18,7 @@ use super::prior::StartPrior;
 use super::window::{Frame, FrameState, Rates};
 use super::{Event, EventKind, Phase, StepInput, StepReport};
 use crate::flight_log::{ImuSample, JointAngles};
-use crate::frontend::TrackedFeature;
+use crate::frontend::{FeatureId, TrackedFeature};
 use crate::geometry::{RigidTransform, seconds_from_ns, so3};
 
 /// A frame kept until the initialization succeeds.
@@ -35,6 +35,13 @@ pub(super) struct WaitingFrame {
 }
 
 impl WaitingFrame {
+    /// Forgets what a camera saw of some features.
+    pub(super) fn forget_features(&mut self, camera: usize, gone: &impl Fn(FeatureId) -> bool) {
+        if let Some(seen) = self.features.get_mut(camera) {
+            seen.retain(|feature| !gone(feature.id));
+        }
+    }
+
     /// Bytes that it takes.
     pub(super) fn bytes(&self) -> usize {
         let features: usize = self.features.iter().map(|seen| seen.capacity() * size_of::<TrackedFeature>()).sum();
