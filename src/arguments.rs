@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use dcvins::session::accuracy::{Alignment, RelativeDelta};
+use dcvins::session::breakpoints::Condition;
 use dcvins::session::{RunSpec, SessionRequest};
 
 use crate::degeneracy::DegeneracyArguments;
@@ -100,6 +101,10 @@ pub(crate) struct RunArguments {
     pub out: PathBuf,
     #[command(flatten)]
     pub estimation: EstimationArguments,
+    /// Stop where this comes true in a run, as in "rank < 18 or features < 40", write what there is up to there and tell
+    /// the values; README.md lists what can be asked for.
+    #[arg(long = "break", value_name = "CONDITION", value_parser = condition)]
+    pub break_at: Option<Condition>,
     /// Leave the measured times out of frames.csv and summary.json, so that two runs give the same bytes in every file.
     #[arg(long)]
     pub no_timing: bool,
@@ -333,6 +338,10 @@ impl From<AlignArgument> for Alignment {
             AlignArgument::Sim3 => Self::Similarity,
         }
     }
+}
+
+fn condition(text: &str) -> Result<Condition, String> {
+    text.parse::<Condition>().map_err(|problem| problem.to_string())
 }
 
 fn seconds(text: &str) -> Result<f64, String> {

@@ -11,7 +11,8 @@ use dcvins::calibration::CalibrationOptions;
 use dcvins::export::{self, EvaluationOptions, RunFileOptions, RunSummary};
 use dcvins::flight_log::{self, FlightLog, Rig};
 use dcvins::geometry::seconds_from_ns;
-use dcvins::session::{self, CalibrationRequest, Recording, SessionPlan, Stopwatch};
+use dcvins::session::breakpoints::Condition;
+use dcvins::session::{self, BreakpointHit, CalibrationRequest, Recording, SessionPlan, Stopwatch};
 use dcvins::simulation::{self, Experiment, SimulationOptions};
 
 use crate::arguments::{
@@ -85,10 +86,52 @@ pub(crate) fn compute(plan: &SessionPlan, until_ns: Option<i64>) -> Result<Recor
     Ok(recording)
 }
 
+/// Computes a plan until a condition comes true, with a progress bar.
+fn compute_until(plan: &SessionPlan, condition: &Condition) -> Result<(Recording, Option<BreakpointHit>)> {
+    let known = plan.parameter_names();
+    let unknown = condition.unknown_names(&plan.rig, &known);
+    if !unknown.is_empty() {
+        bail!("no run has '{}' of '{condition}'; there are {}", unknown.join("', '"), known.join(", "));
+    }
+    let end_s = seconds_from_ns(plan.log.duration_ns());
+    let mut progress = Progress::new();
+    let result = session::compute_until(plan, condition, &mut |recording| {
+        let now_s = seconds_from_ns(recording.computed_ns());
+        progress.show(now_s / end_s.max(1e-3), || format!("{now_s:.1} s, looking for {condition}"));
+    })?;
+    progress.clear();
+    Ok(result)
+}
+
+/// What `--break` came to, in a line for people.
+fn describe_break(condition: &Condition, hit: Option<&BreakpointHit>) -> String {
+    hit.map_or_else(|| format!("break: '{condition}' never came true\n"), |hit| format!("break: {}\n", hit.description))
+}
+
+/// What `--break` came to, for programs.
+fn break_json(condition: &Condition, hit: Option<&BreakpointHit>, recording: &Recording) -> serde_json::Value {
+    let Some(found) = hit else { return serde_json::json!({ "condition": condition.text(), "hit": null }) };
+    let run = recording.runs.get(found.hit.run);
+    let values: serde_json::Map<String, serde_json::Value> =
+        found.values.iter().map(|value| (value.name.clone(), value.value.into())).collect();
+    serde_json::json!({
+        "condition": condition.text(),
+        "hit": {
+            "run": run.map(|run| run.spec.label.as_str()),
+            "time_s": seconds_from_ns(found.hit.stamp_ns),
+            "frame": run.and_then(|run| run.steps.get(found.hit.step)).map(|step| step.report.frame_index),
+            "values": values,
+        },
+    })
+}
+
 /// `dcvins run`.
 pub(crate) fn run(arguments: &RunArguments) -> Result<()> {
     let plan = SessionPlan::open(&arguments.estimation.request(arguments.log.clone()))?;
-    let recording = compute(&plan, None)?;
+    let (recording, hit) = match &arguments.break_at {
+        Some(condition) => compute_until(&plan, condition)?,
+        None => (compute(&plan, None)?, None),
+    };
     let mut summaries = Vec::new();
     for run in &recording.runs {
         let options =
@@ -98,10 +141,20 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<()> {
     }
     if arguments.json {
         let all: Vec<&RunSummary> = summaries.iter().map(|(_, summary)| summary).collect();
-        print(&format!("{}\n", serde_json::to_string_pretty(&all)?))?;
+        let text = match &arguments.break_at {
+            Some(condition) => serde_json::to_string_pretty(&serde_json::json!({
+                "break": break_json(condition, hit.as_ref(), &recording),
+                "runs": all,
+            })),
+            None => serde_json::to_string_pretty(&all),
+        };
+        print(&format!("{}\n", text?))?;
     } else {
         for (folder, summary) in &summaries {
             print(&describe(folder, summary))?;
+        }
+        if let Some(condition) = &arguments.break_at {
+            print(&describe_break(condition, hit.as_ref()))?;
         }
     }
     let failed: Vec<&str> = recording.runs.iter().filter_map(|run| run.error.as_deref()).collect();
@@ -212,7 +265,7 @@ pub(crate) fn evaluate(arguments: &EvaluateArguments) -> Result<()> {
 /// `dcvins view`: the window, or its pictures where there is no display.
 #[cfg(feature = "gui")]
 pub(crate) fn view(arguments: &ViewArguments) -> Result<()> {
-    use dcvins::export::Machine;
+    use dcvins::export::{Machine, is_session};
     use dcvins::gui::app::PlayingLog;
     use dcvins::gui::run_window::{WindowError, WindowOptions, run_window};
     use dcvins::gui::theme::ThemeName;
@@ -220,7 +273,11 @@ pub(crate) fn view(arguments: &ViewArguments) -> Result<()> {
 
     // What is wrong with the log or its rig is told here, before a window opens.
     let request = |log: &Path| arguments.estimation.request(log.to_owned());
-    let plan = arguments.log.as_deref().map(|log| SessionPlan::open(&request(log))).transpose()?;
+    let given = arguments.log.as_deref();
+    let plan = given.filter(|path| !is_session(path)).map(|log| SessionPlan::open(&request(log))).transpose()?;
+    if let Some(path) = given.filter(|path| is_session(path)) {
+        saved_session(path)?;
+    }
     let opened = Mutex::new(plan.clone());
     let estimation = arguments.estimation.clone();
     let open_log = move |path: &Path| {
@@ -228,6 +285,11 @@ pub(crate) fn view(arguments: &ViewArguments) -> Result<()> {
         // The log of the command line is open already; whatever comes later is opened here.
         let session = match opened.take().filter(|plan| plan.log_path == path) {
             Some(plan) => Session::start(plan),
+            None if is_session(path) => {
+                let session = saved_session(path).and_then(|saved| Ok(saved.open()?));
+                let session = session.map_err(|error| format!("{error:#}: {}", path.display()))?;
+                return Ok(Box::new(session) as Box<dyn PlayingLog>);
+            }
             None => Session::open(&estimation.request(path.to_owned())),
         };
         Ok(Box::new(session.map_err(|error| error.to_string())?) as Box<dyn PlayingLog>)
@@ -243,6 +305,13 @@ pub(crate) fn view(arguments: &ViewArguments) -> Result<()> {
         (Err(WindowError::NoDisplay), Some(plan)) => write_pictures(plan, arguments.out.as_deref()),
         (result, _) => Ok(result?),
     }
+}
+
+/// Reads a saved session.
+#[cfg(feature = "gui")]
+fn saved_session(path: &Path) -> Result<session::SavedSession> {
+    let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    session::SavedSession::from_text(&text).with_context(|| format!("cannot open {}", path.display()))
 }
 
 /// `dcvins view` of a program that was built without the window.

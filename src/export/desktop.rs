@@ -100,6 +100,14 @@ impl Desktop for Machine {
         Ok([picture, table].map(|path| fs::canonicalize(&path).unwrap_or(path)).to_vec())
     }
 
+    fn write_session(&self, name: &str, text: &str) -> Result<PathBuf, String> {
+        let folder = self.output.join(name);
+        fs::create_dir_all(&folder).map_err(|error| ExportError::write(&folder)(error).to_string())?;
+        let path = folder.join(format!("{name}.session.json"));
+        fs::write(&path, text).map_err(|error| ExportError::write(&path)(error).to_string())?;
+        Ok(fs::canonicalize(&path).unwrap_or(path))
+    }
+
     fn resident_bytes(&self) -> Option<u64> {
         let status = fs::read_to_string("/proc/self/status").ok()?;
         let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
@@ -109,7 +117,12 @@ impl Desktop for Machine {
 }
 
 fn is_log(path: &Path) -> bool {
-    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mcap"))
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mcap")) || is_session(path)
+}
+
+/// Whether a file is a saved session by its name.
+pub fn is_session(path: &Path) -> bool {
+    path.file_name().is_some_and(|name| name.to_string_lossy().ends_with(".session.json"))
 }
 
 fn logs_in(folder: &Path) -> Vec<PathBuf> {

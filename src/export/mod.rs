@@ -20,7 +20,7 @@ pub mod trajectory;
 pub use calibration_files::write_calibration;
 pub use calibration_report::{CalibrationReport, report_calibration};
 #[cfg(feature = "gui")]
-pub use desktop::Machine;
+pub use desktop::{Machine, is_session};
 pub use error::ExportError;
 pub use evaluation::{EvaluationOptions, EvaluationReport, evaluate};
 #[cfg(feature = "gui")]

@@ -19,7 +19,7 @@ use crate::observability::SlidePosition;
 use crate::session::Recording;
 
 /// Panels by name; `all` is the whole window.
-pub const PANEL_NAMES: [&str; 10] = [
+pub const PANEL_NAMES: [&str; 11] = [
     WHOLE_WINDOW,
     "image",
     "scene",
@@ -29,6 +29,7 @@ pub const PANEL_NAMES: [&str; 10] = [
     "residuals",
     "inspector",
     "laboratory",
+    "breakpoints",
     "timeline",
 ];
 

@@ -29,6 +29,8 @@ pub trait Desktop: Send + Sync {
     fn keep_layouts(&self, text: &str) -> Result<(), String>;
     /// Writes a panel as a picture and as a table, and says where.
     fn write_panel(&self, export: &PanelExport) -> Result<Vec<PathBuf>, String>;
+    /// Writes a session of a log of this name, and says where.
+    fn write_session(&self, name: &str, text: &str) -> Result<PathBuf, String>;
     /// Memory of this process in bytes.
     fn resident_bytes(&self) -> Option<u64>;
 }

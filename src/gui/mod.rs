@@ -1,6 +1,7 @@
 //! Panels, the 3D scene and the window: they read a recording at a cursor and push commands.
 
 pub mod app;
+pub mod breakpoints;
 mod chain_values;
 pub mod convergence;
 pub mod desktop;
@@ -47,6 +48,7 @@ use self::theme::Theme;
 use crate::flight_log::GrayImage;
 use crate::frontend::FeatureId;
 use crate::observability::SlidePosition;
+use crate::session::breakpoints::Breakpoints;
 use crate::session::{Command, Recording, SolverPosition};
 
 /// Gives the images of the log's cameras, by camera key and number in the stream.
@@ -87,12 +89,24 @@ pub struct Playback {
     pub solver: Option<SolverPosition>,
     /// Whether steps at the cursor are being taken again.
     pub retaking: bool,
+    /// The breakpoints with their hits so far.
+    pub breakpoints: Arc<Breakpoints>,
+    /// Whether the cursor is on its way to a hit that the estimators have not reached yet.
+    pub running_on: bool,
 }
 
 impl Default for Playback {
     fn default() -> Self {
-        let (loop_range_ns, markers_ns) = (None, Vec::new());
-        Self { playing: false, speed: 1.0, loop_range_ns, markers_ns, solver: None, retaking: false }
+        Self {
+            playing: false,
+            speed: 1.0,
+            loop_range_ns: None,
+            markers_ns: Vec::new(),
+            solver: None,
+            retaking: false,
+            breakpoints: Arc::default(),
+            running_on: false,
+        }
     }
 }
 

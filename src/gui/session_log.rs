@@ -28,6 +28,8 @@ impl PlayingLog for Session {
             markers_ns: self.markers_ns().to_vec(),
             solver: self.solver_position(),
             retaking: self.is_retaking(),
+            breakpoints: Arc::clone(self.breakpoints()),
+            running_on: self.is_running_on(),
         }
     }
 
@@ -45,6 +47,14 @@ impl PlayingLog for Session {
 
     fn take_notices(&mut self) -> Vec<String> {
         Self::take_notices(self)
+    }
+
+    fn saved(&self, layout: Option<serde_json::Value>) -> Option<String> {
+        Some(Self::saved(self, layout).to_text())
+    }
+
+    fn layout(&self) -> Option<&serde_json::Value> {
+        Self::layout(self)
     }
 }
 

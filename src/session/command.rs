@@ -1,4 +1,5 @@
-use super::RunSpec;
+use super::breakpoints::Condition;
+use super::{ForkChanges, RunSpec};
 
 /// How fast the cursor moves, in log seconds per second.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,6 +33,32 @@ pub enum Command {
         /// Direction.
         forward: bool,
     },
+    /// Set a breakpoint.
+    AddBreakpoint(Condition),
+    /// Give a breakpoint another condition.
+    ChangeBreakpoint {
+        /// Which one.
+        number: usize,
+        /// When it is to be hit.
+        condition: Condition,
+    },
+    /// Enable or disable a breakpoint.
+    EnableBreakpoint {
+        /// Which one.
+        number: usize,
+        /// Whether it stops the cursor from now on.
+        enabled: bool,
+    },
+    /// Take a breakpoint away, by its number.
+    RemoveBreakpoint(usize),
+    /// Set a breakpoint at the frame of the cursor, or take it away.
+    ToggleBreakpointHere,
+    /// Run to the next (`forward`) or the previous hit of a breakpoint; forward waits for the estimators where they have
+    /// not come there yet.
+    RunToBreakpoint {
+        /// Direction.
+        forward: bool,
+    },
     /// To the first frame.
     GoToStart,
     /// To the last computed frame.
@@ -42,6 +69,15 @@ pub enum Command {
     ToggleMarker,
     /// Add a run over the same log.
     AddRun(RunSpec),
+    /// Let a run go on from the step at the cursor in another way, beside what it did.
+    Fork {
+        /// Number of the run to leave.
+        run: usize,
+        /// What to do otherwise.
+        changes: ForkChanges,
+        /// The fork's name; `None` for one made of what changes and when.
+        label: Option<String>,
+    },
     /// Take a run away, by its number.
     RemoveRun(usize),
 }

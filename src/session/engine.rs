@@ -115,6 +115,21 @@ impl Engine {
         Ok(())
     }
 
+    /// Starts a fork from an engine as it is before the first step of its history.
+    pub(super) fn start_fork(
+        &mut self,
+        run: usize,
+        engine: RunEngine,
+        history: Arc<History>,
+    ) -> Result<(), SessionError> {
+        let Some(results) = self.sender.clone() else { return Ok(()) };
+        self.threads.push(spawn(format!("fork {run}"), move || {
+            let materials = (history.begin()..).map_while(|step| history.materials().wait_for(step));
+            run_steps(run, engine, materials.map(Ok), &history, &results);
+        })?);
+        Ok(())
+    }
+
     /// Lets go of the engine's own end of the channel: once all runs are done, [`Engine::receive`] returns `None`.
     pub(super) fn no_more_runs(&mut self) {
         self.sender = None;
@@ -173,36 +188,53 @@ fn track_thread(
     }
 }
 
-/// Steps one estimator over the instants that come, and reports each step.
+/// Steps one estimator over the instants that come, keeps what each brings, and reports each step.
 fn run_thread(
     run: usize,
-    mut engine: RunEngine,
+    engine: RunEngine,
     mut instants: Instants,
     history: &History,
     results: &SyncSender<EngineMessage>,
 ) {
+    let materials = std::iter::from_fn(|| match instants.next() {
+        Ok(instant) => instant.map(|instant| {
+            let material = Arc::new(Material::of(&instant));
+            history.materials().push(Arc::clone(&material));
+            Ok(material)
+        }),
+        Err(reason) => Some(Err(reason.to_string())),
+    });
+    run_steps(run, engine, materials, history, results);
+    history.materials().end();
+}
+
+/// Takes a step with all material that comes, and reports each.
+fn run_steps(
+    run: usize,
+    mut engine: RunEngine,
+    materials: impl Iterator<Item = Result<Arc<Material>, String>>,
+    history: &History,
+    results: &SyncSender<EngineMessage>,
+) {
     let mut error = None;
-    for step in 0.. {
-        let instant = match instants.next() {
-            Ok(Some(instant)) => instant,
-            Ok(None) => break,
+    for (step, material) in (history.begin()..).zip(materials) {
+        let material = match material {
+            Ok(material) => material,
             Err(reason) => {
-                error = Some(reason.to_string());
+                error = Some(reason);
                 break;
             }
         };
-        let material = Arc::new(Material::of(&instant));
         history.before_step(step, &engine, &material);
-        history.materials().push(Arc::clone(&material));
         let Ok(record) = catch_unwind(AssertUnwindSafe(|| engine.step(&material))) else {
             let time_s = crate::geometry::seconds_from_ns(material.stamp_ns);
             error = Some(format!("internal error in the estimator at {time_s:.3} s; please report it with the log"));
             break;
         };
         if results.send(EngineMessage::Step { run, record: Box::new(record) }).is_err() {
-            break;
+            // Nobody listens any more when the session was closed.
+            return;
         }
     }
-    // Nobody listens any more when the session was closed.
     drop(results.send(EngineMessage::Finished { run, error }));
 }

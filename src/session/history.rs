@@ -19,6 +19,8 @@ pub struct History {
     materials: Arc<Materials>,
     /// Number of the first step that is this run's own.
     begin: usize,
+    /// The run that a fork has left, whose steps come before `begin`.
+    parent: Option<Arc<Self>>,
     snapshots: Mutex<Snapshots>,
 }
 
@@ -33,11 +35,20 @@ struct Snapshots {
 }
 
 impl History {
-    /// A run whose first own step is `begin`; snapshots may take so many bytes together.
-    pub(super) fn new(materials: Arc<Materials>, begin: usize, budget_bytes: usize) -> Self {
+    /// A run from the begin of the log; snapshots may take so many bytes together.
+    pub(super) fn new(budget_bytes: usize) -> Self {
+        Self::with(Arc::default(), 0, None, budget_bytes)
+    }
+
+    /// A run that leaves another one before its step `begin`.
+    pub(super) fn fork(parent: &Arc<Self>, begin: usize, budget_bytes: usize) -> Self {
+        Self::with(Arc::clone(&parent.materials), begin, Some(Arc::clone(parent)), budget_bytes)
+    }
+
+    fn with(materials: Arc<Materials>, begin: usize, parent: Option<Arc<Self>>, budget_bytes: usize) -> Self {
         let snapshots =
             Snapshots { kept: BTreeMap::new(), spacing: CLOSEST_SPACING, bytes: 0, budget_bytes, material_bytes: 0 };
-        Self { materials, begin, snapshots: Mutex::new(snapshots) }
+        Self { materials, begin, parent, snapshots: Mutex::new(snapshots) }
     }
 
     /// What the steps were given.
@@ -58,7 +69,9 @@ impl History {
     /// Notes what the engine is about to do, and keeps a snapshot of it where one is due.
     pub(super) fn before_step(&self, step: usize, engine: &RunEngine, material: &Material) {
         let mut snapshots = self.lock();
-        snapshots.material_bytes += material.own_bytes();
+        if self.parent.is_none() {
+            snapshots.material_bytes += material.own_bytes();
+        }
         if step != self.begin && !step.is_multiple_of(snapshots.spacing) {
             return;
         }
@@ -86,8 +99,11 @@ impl History {
         snapshots.bytes + snapshots.material_bytes
     }
 
-    /// The engine as it was before a step, `None` for a step that this run has not taken itself.
+    /// The engine as it was before a step, `None` for a step that has not been taken.
     pub(super) fn engine_before(&self, step: usize) -> Option<RunEngine> {
+        if step < self.begin {
+            return self.parent.as_ref()?.engine_before(step);
+        }
         let (at, snapshot) = self.snapshot_before(step)?;
         let mut engine = RunEngine::clone(&snapshot);
         for number in at..step {
@@ -103,8 +119,11 @@ impl History {
     }
 
     /// Takes the steps up to `last` again from the snapshot before it, and returns the last `most` of them with their
-    /// numbers; empty for a step that this run has not taken itself.
+    /// numbers; empty for a step that has not been taken.
     pub(super) fn retake(&self, last: usize, most: usize) -> Vec<(usize, StepRecord)> {
+        if last < self.begin {
+            return self.parent.as_ref().map_or_else(Vec::new, |parent| parent.retake(last, most));
+        }
         let Some((at, _)) = self.snapshot_before(last) else { return Vec::new() };
         let first = (last + 1).saturating_sub(most.max(1)).max(at);
         let Some(mut engine) = self.engine_before(first) else { return Vec::new() };

@@ -1,6 +1,6 @@
 //! What a step is given, kept so that it can be taken again.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
 use super::instants::Instant;
 use crate::estimator::allocated_bytes;
@@ -72,22 +72,76 @@ pub(super) fn tracks_bytes(tracks: &TrackedFrame) -> usize {
 /// The material of a run's steps so far, which the runs that branch off from it share.
 #[derive(Debug, Default)]
 pub(super) struct Materials {
-    steps: Mutex<Vec<Arc<Material>>>,
+    state: Mutex<State>,
+    grown: Condvar,
+}
+
+#[derive(Debug, Default)]
+struct State {
+    steps: Vec<Arc<Material>>,
+    ended: bool,
 }
 
 impl Materials {
-    fn lock(&self) -> MutexGuard<'_, Vec<Arc<Material>>> {
+    fn lock(&self) -> MutexGuard<'_, State> {
         // Material is only ever pushed whole.
-        self.steps.lock().unwrap_or_else(PoisonError::into_inner)
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Adds the material of the next step.
     pub(super) fn push(&self, material: Arc<Material>) {
-        self.lock().push(material);
+        self.lock().steps.push(material);
+        self.grown.notify_all();
+    }
+
+    /// No more will come.
+    pub(super) fn end(&self) {
+        self.lock().ended = true;
+        self.grown.notify_all();
     }
 
     /// The material of a step that has been taken.
     pub(super) fn get(&self, step: usize) -> Option<Arc<Material>> {
-        self.lock().get(step).cloned()
+        self.lock().steps.get(step).cloned()
+    }
+
+    /// The material of a step; waits for it. `None` behind the last one.
+    pub(super) fn wait_for(&self, step: usize) -> Option<Arc<Material>> {
+        let waiting = self.grown.wait_while(self.lock(), |state| state.steps.len() <= step && !state.ended);
+        waiting.unwrap_or_else(PoisonError::into_inner).steps.get(step).cloned()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whoever_waits_for_material_gets_it_or_the_end() {
+        let materials = Arc::new(Materials::default());
+        let waiting = Arc::clone(&materials);
+        let reader = std::thread::Builder::new().spawn(move || {
+            let mut seen = Vec::new();
+            while let Some(material) = waiting.wait_for(seen.len()) {
+                seen.push(material.stamp_ns);
+            }
+            seen
+        });
+        let reader = reader.unwrap();
+        for stamp_ns in [10, 20, 30] {
+            materials.push(Arc::new(Material {
+                frame_index: 0,
+                stamp_ns,
+                log_time_ns: 0,
+                imu: Vec::new(),
+                joint_angles: None,
+                tracks: vec![Arc::default()],
+                truth: None,
+                frontend_ms: 0.0,
+            }));
+        }
+        materials.end();
+        assert_eq!(reader.join().unwrap(), [10, 20, 30]);
+        assert!(materials.get(3).is_none());
     }
 }

@@ -12,7 +12,7 @@ use crate::estimator::Phase;
 use crate::flight_log::{GrayImage, JointAngles, SensorFrame};
 use crate::simulation::{SyntheticFlight, SyntheticFrame, SyntheticOptions, synthetic_tracks};
 
-fn tracked(frame: &SyntheticFrame, encoder_sigma_rad: f64) -> TrackedSensorFrame {
+pub(super) fn tracked(frame: &SyntheticFrame, encoder_sigma_rad: f64) -> TrackedSensorFrame {
     let joint_angles = frame.joint_angles_rad.as_ref().map(|angles_rad| JointAngles {
         angles_rad: angles_rad.clone(),
         sigmas_rad: vec![encoder_sigma_rad; angles_rad.len()],
@@ -35,7 +35,7 @@ fn tracked(frame: &SyntheticFrame, encoder_sigma_rad: f64) -> TrackedSensorFrame
     }
 }
 
-fn recorded(flight: &SyntheticFlight, spec: &str) -> RunRecord {
+pub(super) fn recorded(flight: &SyntheticFlight, spec: &str) -> RunRecord {
     let spec: super::RunSpec = spec.parse().unwrap();
     let config = estimator_config(&flight.given_rig, &spec).unwrap();
     let sigma_rad = config.encoder_sigma_rad.unwrap();

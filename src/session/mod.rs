@@ -4,10 +4,14 @@
 //! [`compute`] fills one without a window; a [`Session`] plays one while it still grows.
 
 pub mod accuracy;
+pub mod breakpoints;
 mod calibrate;
 mod command;
 mod configuration;
 mod engine;
+#[cfg(test)]
+mod fork_tests;
+mod forks;
 mod history;
 mod image_rotations;
 mod instants;
@@ -20,8 +24,10 @@ mod playback;
 mod recording;
 mod retaking;
 mod run_engine;
+mod saved;
 mod solver_trace;
 mod spec;
+mod stopping;
 mod stopwatch;
 #[cfg(test)]
 mod tests;
@@ -30,16 +36,73 @@ mod tracker;
 pub use calibrate::{CalibrationRequest, CalibrationRun, CalibrationRunError, calibrate};
 pub use command::{Command, PlaybackSpeed};
 pub use engine::EngineMessage;
+pub use forks::{FORK_PARAMETERIZATIONS, ForkChanges, ForkError};
 pub use history::History;
 pub use image_rotations::image_rotations;
 pub use plan::{DEFAULT_MEMORY_BUDGET_BYTES, MAX_RUNS, SessionError, SessionPlan, SessionRequest};
 pub use playback::Session;
-pub use recording::{Recording, RunMemory, RunRecord, StepRecord};
+pub use recording::{ForkOrigin, Recording, RunMemory, RunRecord, StepRecord};
+pub use saved::{SavedBreakpoint, SavedFork, SavedLog, SavedSession, SavedSessionError};
 pub use solver_trace::{SolverPosition, SolverTrace};
 pub use spec::{ParameterizationChoice, RunSpec, RunSpecError};
 pub use stopwatch::Stopwatch;
 
+use breakpoints::{Breakpoints, Condition, Hit, NamedValue};
 use engine::Engine;
+
+/// Computes every run of the plan until a condition comes true in one of them, and says where that was.
+///
+/// All runs end at that instant, whatever the threads did: steps after it are taken back.
+pub fn compute_until(
+    plan: &SessionPlan,
+    condition: &Condition,
+    on_step: &mut dyn FnMut(&Recording),
+) -> Result<(Recording, Option<BreakpointHit>), SessionError> {
+    let mut recording = Recording::new(plan);
+    let mut engine = Engine::start(plan, &recording)?;
+    engine.no_more_runs();
+    let mut breakpoints = Breakpoints::default();
+    breakpoints.add(condition.clone());
+    let mut until_ns = i64::MAX;
+    while let Some(message) = engine.receive() {
+        match message {
+            EngineMessage::Step { run, record } if record.report.stamp_ns > until_ns => {
+                recording.take(EngineMessage::Finished { run, error: None });
+            }
+            message => recording.take(message),
+        }
+        breakpoints.read(&recording);
+        if let Some(hit) = breakpoints.next_after(&recording, i64::MIN).filter(|hit| hit.stamp_ns < until_ns) {
+            until_ns = hit.stamp_ns;
+            recording.end_at(until_ns);
+        }
+        on_step(&recording);
+        if recording.runs.iter().all(|run| run.finished || run.ends_at(until_ns)) {
+            break;
+        }
+    }
+    for run in &mut recording.runs {
+        run.finished = true;
+    }
+    // The threads read ahead by as much as they are let.
+    recording.warnings.retain(|warning| warning.stamp_ns <= until_ns);
+    let hit = breakpoints.next_after(&recording, i64::MIN).map(|hit| {
+        let values = breakpoints.values_at(&recording, hit);
+        BreakpointHit { hit, values, description: breakpoints.describe(&recording, hit) }
+    });
+    Ok((recording, hit))
+}
+
+/// Where [`compute_until`] ended, and what was true there.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BreakpointHit {
+    /// The step.
+    pub hit: Hit,
+    /// What the condition asks for, with the values of that step.
+    pub values: Vec<NamedValue>,
+    /// All of it in one line.
+    pub description: String,
+}
 
 /// Computes every run of the plan and returns all their reports; `on_step` is called after each step.
 ///

@@ -1,14 +1,16 @@
 //! What a session is to do: a log, its rigs, the stretch of time, and the runs with the camera that each watches.
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use thiserror::Error;
 
 use super::spec::{ParameterizationChoice, RunSpec, distinct_labels};
-use crate::estimator::EstimatorConfig;
+use crate::estimator::{EstimatorConfig, rigid_columns};
 use crate::flight_log::rig::{CameraMount, CameraRig};
 use crate::flight_log::{FlightLog, LogError, Rig};
+use crate::gimbal::{Chain, Parameterization};
 
 /// The most runs side by side.
 pub const MAX_RUNS: usize = 4;
@@ -69,6 +71,10 @@ pub struct SessionPlan {
     pub log: Arc<FlightLog>,
     /// Where it lies.
     pub log_path: PathBuf,
+    /// The rig's file, when it was named.
+    pub rig_path: Option<PathBuf>,
+    /// The file of the true values, when it was named.
+    pub truth_path: Option<PathBuf>,
     /// The rig that the runs are given.
     pub rig: Arc<Rig>,
     /// The rig with the true values.
@@ -112,6 +118,8 @@ impl SessionPlan {
         Ok(Self {
             log,
             log_path: request.log_path.clone(),
+            rig_path: request.rig_path.clone(),
+            truth_path: request.truth_path.clone(),
             rig: Arc::new(rig),
             truth_rig: truth_rig.map(Arc::new),
             runs,
@@ -121,6 +129,23 @@ impl SessionPlan {
             keep_linearization_every: None,
             memory_budget_bytes: DEFAULT_MEMORY_BUDGET_BYTES,
         })
+    }
+
+    /// Names of the calibration's columns that its runs may have, in whatever chart they come to be.
+    pub fn parameter_names(&self) -> Vec<String> {
+        let mut names: Vec<String> = Vec::new();
+        for (spec, camera_key) in &self.runs {
+            let chain = self.rig.chain_of_camera(camera_key).unwrap_or_default();
+            for parameterization in Parameterization::ALL {
+                names.extend(Chain::from_classical(&chain, parameterization).parameter_names());
+            }
+            let rigid = cameras_of_run(&self.rig, spec).ok().and_then(|cameras| cameras.rigid);
+            let pose = |key: &str| self.rig.chain_of_camera(key).unwrap_or_default().imu_from_camera(&[]);
+            names.extend(rigid.into_iter().flat_map(|it| rigid_columns(&it.key, &pose(&it.key))).map(|(name, _)| name));
+        }
+        let mut known = BTreeSet::new();
+        names.retain(|name| known.insert(name.clone()));
+        names
     }
 }
 

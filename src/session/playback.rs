@@ -5,15 +5,19 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{Builder, JoinHandle};
 
+use super::breakpoints::Breakpoints;
 use super::command::{Command, PlaybackSpeed};
 use super::engine::Engine;
+use super::forks::{ForkChanges, ForkError};
+use super::history::History;
 use super::plan::{MAX_RUNS, SessionError, SessionPlan, SessionRequest, cameras_of_run};
 use super::recording::{Recording, RunRecord};
 use super::retaking::{Detail, Retaking, Wish};
+use super::saved::Pending;
 use super::solver_trace::SolverPosition;
 use super::spec::{RunSpec, distinct_labels};
 use crate::flight_log::{GrayImage, ImageReader};
-use crate::geometry::ns_from_seconds;
+use crate::geometry::{ns_from_seconds, seconds_from_ns};
 
 /// A recording that grows while others look at it.
 #[derive(Debug)]
@@ -43,20 +47,27 @@ impl SharedRecording {
 /// Nothing here waits for the estimators: a picture shows what is there.
 #[derive(Debug)]
 pub struct Session {
-    plan: SessionPlan,
+    pub(super) plan: SessionPlan,
     shared: Arc<SharedRecording>,
     engine: Engine,
     collector: Option<JoinHandle<()>>,
     retaking: Retaking,
     /// Where in the solver's work the step at the cursor is looked at.
     solver: Arc<Mutex<Option<SolverPosition>>>,
+    pub(super) breakpoints: Arc<Breakpoints>,
+    /// The cursor runs to the next hit, as fast as the estimators come.
+    pub(super) running_on: bool,
     images: ImageReader,
-    cursor_ns: i64,
-    playing: bool,
+    pub(super) cursor_ns: i64,
+    pub(super) playing: bool,
     speed: PlaybackSpeed,
     loop_range_ns: Option<(i64, i64)>,
-    markers_ns: Vec<i64>,
-    notices: Vec<String>,
+    pub(super) markers_ns: Vec<i64>,
+    /// What is still to be done of a session that was opened from a file.
+    pub(super) pending: Pending,
+    /// Where the panels were when it was saved.
+    pub(super) layout: Option<serde_json::Value>,
+    pub(super) notices: Vec<String>,
 }
 
 impl Session {
@@ -96,6 +107,10 @@ impl Session {
             collector: Some(collector),
             retaking,
             solver,
+            breakpoints: Arc::default(),
+            running_on: false,
+            pending: Pending::default(),
+            layout: None,
             images,
             playing: false,
             speed: PlaybackSpeed(1.0),
@@ -150,6 +165,16 @@ impl Session {
         &self.markers_ns
     }
 
+    /// The breakpoints with their hits so far.
+    pub fn breakpoints(&self) -> &Arc<Breakpoints> {
+        &self.breakpoints
+    }
+
+    /// Whether the cursor is on its way to a breakpoint that the estimators have not reached yet.
+    pub fn is_running_on(&self) -> bool {
+        self.running_on
+    }
+
     /// What could not be done as asked, since the last call.
     pub fn take_notices(&mut self) -> Vec<String> {
         std::mem::take(&mut self.notices)
@@ -163,8 +188,17 @@ impl Session {
     /// Lets the cursor run for `elapsed_s` seconds of the wall; it waits where nothing is computed yet, goes round in a
     /// loop, and stops at the end.
     pub fn advance(&mut self, elapsed_s: f64) {
-        if self.playing {
+        self.evaluate_breakpoints();
+        self.resume();
+        let before_ns = self.cursor_ns;
+        if self.running_on {
+            self.run_on();
+        } else if self.playing {
             self.move_on(elapsed_s);
+            self.stop_at_breakpoint(before_ns);
+        }
+        if self.cursor_ns != before_ns {
+            *lock(&self.solver) = None;
         }
         self.look();
     }
@@ -192,6 +226,7 @@ impl Session {
     pub fn apply(&mut self, command: Command) {
         let cursor_ns = self.cursor_ns;
         let iterating = matches!(command, Command::StepIteration { .. });
+        self.running_on = false;
         self.perform(command);
         if self.cursor_ns != cursor_ns && !iterating {
             *lock(&self.solver) = None;
@@ -252,7 +287,7 @@ impl Session {
         }
     }
 
-    fn perform(&mut self, command: Command) {
+    pub(super) fn perform(&mut self, command: Command) {
         match command {
             Command::TogglePlay if self.playing => self.playing = false,
             Command::Play | Command::TogglePlay => self.play(),
@@ -261,6 +296,14 @@ impl Session {
             Command::SetSpeed(_) => self.notices.push("The speed must be a positive number".to_owned()),
             Command::Seek { stamp_ns } => self.seek(stamp_ns),
             Command::StepFrames(count) => self.step_frames(count),
+            Command::AddBreakpoint(condition) => self.change_breakpoints(|all| all.add(condition)),
+            Command::ChangeBreakpoint { number, condition } => {
+                self.change_breakpoints(|all| all.change(number, condition));
+            }
+            Command::EnableBreakpoint { number, enabled } => self.change_breakpoints(|all| all.enable(number, enabled)),
+            Command::RemoveBreakpoint(number) => self.change_breakpoints(|all| all.remove(number)),
+            Command::ToggleBreakpointHere => self.toggle_breakpoint_here(),
+            Command::RunToBreakpoint { forward } => self.run_to_breakpoint(forward),
             Command::StepIteration { forward } => self.step_iteration(forward),
             Command::JumpToEvent { forward } => self.jump_to_event(forward),
             Command::GoToStart => self.seek(self.first_stamp_ns()),
@@ -268,6 +311,11 @@ impl Session {
             Command::SetLoop(range) => self.loop_range_ns = range.filter(|(begin, end)| begin < end),
             Command::ToggleMarker => self.toggle_marker(),
             Command::AddRun(spec) => self.add_run(spec),
+            Command::Fork { run, changes, label } => {
+                if let Err(problem) = self.fork_at(run, self.cursor_ns, &changes, label) {
+                    self.notices.push(problem);
+                }
+            }
             Command::RemoveRun(run) => self.remove_run(run),
         }
     }
@@ -352,6 +400,39 @@ impl Session {
         if let Err(error) = result {
             self.notices.push(error.to_string());
         }
+    }
+
+    /// Makes a fork of a run at a time: the step there is its first own one.
+    pub(super) fn fork_at(
+        &mut self,
+        run: usize,
+        stamp_ns: i64,
+        changes: &ForkChanges,
+        label: Option<String>,
+    ) -> Result<(), String> {
+        if self.plan.runs.len() >= MAX_RUNS {
+            return Err(SessionError::TooManyRuns { count: self.plan.runs.len() + 1 }.to_string());
+        }
+        let recording = self.recording();
+        let none = |run: usize| ForkError::NoStep { run: run.to_string() }.to_string();
+        let parent = recording.runs.get(run).ok_or_else(|| none(run))?;
+        let no_step = || ForkError::NoStep { run: parent.spec.label.clone() }.to_string();
+        let step = parent.index_at(stamp_ns).ok_or_else(no_step)?;
+        let way = parent.history.as_ref().ok_or_else(no_step)?;
+        let mut engine = way.engine_before(step).ok_or_else(no_step)?;
+        changes.apply(&mut engine, &self.plan.rig).map_err(|error| error.to_string())?;
+        let mut spec = changes.spec(&parent.spec, seconds_from_ns(parent.steps[step].report.stamp_ns));
+        spec.label = label.unwrap_or(spec.label);
+        let mut specs: Vec<RunSpec> = self.plan.runs.iter().map(|(spec, _)| spec.clone()).chain([spec]).collect();
+        distinct_labels(&mut specs);
+        let Some(spec) = specs.pop() else { return Ok(()) };
+        let mut fork = RunRecord::fork(parent, spec.clone(), step, changes.clone());
+        let history = Arc::new(History::fork(way, step, self.plan.memory_budget_bytes));
+        fork.history = Some(Arc::clone(&history));
+        self.plan.runs.push((spec, fork.camera_key.clone()));
+        self.shared.change(|recording| recording.add_run(fork));
+        let number = self.plan.runs.len() - 1;
+        self.engine.start_fork(number, engine, history).map_err(|error| error.to_string())
     }
 
     /// Takes the last run away; an earlier one keeps its number, so only the last can go.

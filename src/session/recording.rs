@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use super::RunSpec;
 use super::accuracy::{Alignment, AlignmentSums};
 use super::engine::EngineMessage;
+use super::forks::ForkChanges;
 use super::history::History;
 use super::material::tracks_bytes;
 use super::outline::Thinning;
@@ -93,6 +94,8 @@ pub struct RunRecord {
     pub trace: Option<SolverTrace>,
     /// Tells the run apart from others, also from one that takes its place.
     pub id: u64,
+    /// Where it comes from, for a fork.
+    pub origin: Option<ForkOrigin>,
     thinning: Thinning,
 }
 
@@ -112,8 +115,21 @@ impl RunRecord {
             retaken: BTreeMap::new(),
             trace: None,
             id: NEXT_ID.fetch_add(1, Ordering::Relaxed),
+            origin: None,
             thinning: Thinning::default(),
         }
+    }
+
+    /// A fork of another run before its first own step: the steps up to there are the parent's.
+    pub(super) fn fork(parent: &Self, spec: RunSpec, step: usize, changes: ForkChanges) -> Self {
+        let stamp_ns = parent.steps.get(step).map_or(0, |step| step.report.stamp_ns);
+        let mut fork = Self::new(spec, parent.camera_key.clone());
+        fork.origin = Some(ForkOrigin { parent: parent.id, step, stamp_ns, changes });
+        fork.steps = parent.steps[..step].to_vec();
+        // The steps are the parent's, who counts them; tracks are counted once for all runs.
+        fork.memory.tracks = fork.steps.iter().map(|step| step.tracks_bytes()).sum();
+        fork.align();
+        fork
     }
 
     /// Adds a step behind the last one.
@@ -125,6 +141,36 @@ impl RunRecord {
         self.memory.own += record.own_bytes();
         self.memory.tracks += record.tracks_bytes();
         self.steps.push(Arc::new(record));
+    }
+
+    /// Takes back the steps after a time; there may be some that another run's speed let it take.
+    fn end_at(&mut self, stamp_ns: i64) {
+        let count = self.steps.partition_point(|step| step.report.stamp_ns <= stamp_ns);
+        if count == self.steps.len() {
+            return;
+        }
+        let steps = self.steps.split_off(count);
+        let back = |bytes: fn(&StepRecord) -> usize| steps.iter().map(|step| bytes(step)).sum::<usize>();
+        self.memory.own -= back(StepRecord::own_bytes);
+        self.memory.tracks -= back(StepRecord::tracks_bytes);
+        self.finished = true;
+        self.align();
+    }
+
+    /// Whether its last step is the one at a time, or none can come before that time any more.
+    pub(super) fn ends_at(&self, stamp_ns: i64) -> bool {
+        self.steps.last().is_some_and(|step| step.report.stamp_ns >= stamp_ns)
+    }
+
+    /// Lays the trajectory on the truth anew.
+    fn align(&mut self) {
+        self.alignment_sums = AlignmentSums::default();
+        for step in &self.steps {
+            if let (Some(newest), Some(truth)) = (step.report.newest(), &step.truth) {
+                self.alignment_sums.add(&newest.world_from_imu.translation_m, &truth.translation_m);
+            }
+        }
+        self.alignment = self.alignment_sums.solve(Alignment::YawPosition).map(|transform| transform.rigid);
     }
 
     /// Number of the last step at or before a time.
@@ -141,6 +187,13 @@ impl RunRecord {
     /// Whether the step is there in outline only.
     pub(super) fn lacks(&self, number: usize) -> bool {
         self.steps.get(number).is_some_and(|step| step.outlined) && !self.retaken.contains_key(&number)
+    }
+
+    /// Takes the steps at a time again where only their outlines are kept, so that pictures of that time show everything.
+    pub fn fill_in(&mut self, stamp_ns: i64) {
+        let Some(number) = self.index_at(stamp_ns).filter(|number| self.lacks(*number)) else { return };
+        let steps = self.retake(number, 1);
+        self.take_again(number, steps);
     }
 
     /// Takes over steps that were taken again around `number`; those farthest from it are forgotten.
@@ -235,6 +288,19 @@ const MOST_RETAKEN: usize = 96;
 /// Of the memory of a recording, the share that snapshots may take.
 const SNAPSHOT_SHARE: usize = 4;
 
+/// Where a fork has left its parent.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ForkOrigin {
+    /// [`RunRecord::id`] of the parent.
+    pub parent: u64,
+    /// Number of the first step that is the fork's own.
+    pub step: usize,
+    /// Its stamp since the log began.
+    pub stamp_ns: i64,
+    /// What the fork does otherwise.
+    pub changes: ForkChanges,
+}
+
 /// Everything computed so far about one log.
 #[derive(Clone, Debug)]
 pub struct Recording {
@@ -279,7 +345,7 @@ impl Recording {
     /// Adds a run that is to be computed.
     pub(super) fn add_run(&mut self, mut run: RunRecord) {
         if run.history.is_none() {
-            run.history = Some(Arc::new(History::new(Arc::default(), 0, self.memory_budget_bytes)));
+            run.history = Some(Arc::new(History::new(self.memory_budget_bytes)));
         }
         self.runs.push(run);
         self.share_out_memory();
@@ -330,6 +396,21 @@ impl Recording {
                 }
             }
         }
+    }
+
+    /// Takes the steps at a time again where only their outlines are kept; see [`RunRecord::fill_in`].
+    pub fn fill_in(&mut self, stamp_ns: i64) {
+        for run in &mut self.runs {
+            run.fill_in(stamp_ns);
+        }
+    }
+
+    /// Takes back everything after a time.
+    pub(super) fn end_at(&mut self, stamp_ns: i64) {
+        for run in &mut self.runs {
+            run.end_at(stamp_ns);
+        }
+        self.warnings.retain(|warning| warning.stamp_ns <= stamp_ns);
     }
 
     /// Takes over what was taken again of a run; the state of the solver is the one at a position.

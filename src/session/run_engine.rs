@@ -1,5 +1,7 @@
+use std::borrow::Cow;
 use std::sync::Arc;
 
+use super::forks::Alterations;
 use super::material::Material;
 use super::recording::StepRecord;
 use super::stopwatch::Stopwatch;
@@ -19,6 +21,8 @@ pub(super) struct RunEngine {
     joints_free: bool,
     /// One report in so many frames keeps its linearization.
     keep_linearization_every: Option<usize>,
+    /// What it makes of its measurements before it uses them.
+    alterations: Alterations,
 }
 
 impl RunEngine {
@@ -27,7 +31,22 @@ impl RunEngine {
         let has_joints = !config.chain.links.is_empty();
         let joints_free = has_joints && !config.use_encoder;
         let estimator = Estimator::new(config);
-        Self { estimator, has_joints, joints_free, keep_linearization_every }
+        Self { estimator, has_joints, joints_free, keep_linearization_every, alterations: Alterations::default() }
+    }
+
+    /// The estimator, to be changed between two steps.
+    pub(super) fn estimator_mut(&mut self) -> &mut Estimator {
+        &mut self.estimator
+    }
+
+    /// Number of cameras that it watches.
+    pub(super) fn cameras(&self) -> usize {
+        1 + self.estimator.config().rigid_cameras.len()
+    }
+
+    /// From now on it alters its measurements.
+    pub(super) fn alter(&mut self, alterations: Alterations) {
+        self.alterations.add(alterations);
     }
 
     /// The images of one instant through the estimator and the observability analysis.
@@ -68,13 +87,24 @@ impl RunEngine {
     }
 
     fn estimate(&mut self, material: &Material) -> StepReport {
-        let rigid: Vec<&TrackedFrame> = material.tracks.iter().skip(1).map(Arc::as_ref).collect();
+        let altered: Vec<Cow<'_, TrackedFrame>> = material
+            .tracks
+            .iter()
+            .enumerate()
+            .map(|(camera, tracks)| match self.alterations.tracks(camera, tracks) {
+                Some(altered) => Cow::Owned(altered),
+                None => Cow::Borrowed(&**tracks),
+            })
+            .collect();
+        let rigid: Vec<&TrackedFrame> = altered.iter().skip(1).map(Cow::as_ref).collect();
+        let angles = material.joint_angles.as_ref().filter(|_| self.has_joints);
+        let noisy = angles.and_then(|angles| self.alterations.joint_angles(angles, material.stamp_ns));
         self.estimator.step(&StepInput {
             frame_index: material.frame_index,
             stamp_ns: material.stamp_ns,
             imu: &material.imu,
-            joint_angles: material.joint_angles.as_ref().filter(|_| self.has_joints),
-            tracks: material.main_tracks(),
+            joint_angles: noisy.as_ref().or(angles),
+            tracks: &altered[0],
             rigid_tracks: &rigid,
         })
     }

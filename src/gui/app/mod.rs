@@ -35,6 +35,10 @@ pub trait PlayingLog: Send {
     fn image(&mut self, camera_key: &str, frame_index: usize) -> Option<Arc<GrayImage>>;
     /// What could not be done as asked, since the last call.
     fn take_notices(&mut self) -> Vec<String>;
+    /// The session as text, with where the panels are; `None` for a log that no session plays.
+    fn saved(&self, layout: Option<serde_json::Value>) -> Option<String>;
+    /// Where the panels were when the session was saved.
+    fn layout(&self) -> Option<&serde_json::Value>;
 }
 
 /// Opens a log; the message of an error says what was wrong and what to do.
@@ -111,6 +115,9 @@ impl App {
     /// Shows a session that is open already.
     pub fn show(&mut self, log: Box<dyn PlayingLog>) {
         self.desktop.remember_log(&log.recording().log_path);
+        if let Some(layout) = log.layout() {
+            self.state.take_layout(layout);
+        }
         self.log = Some(log);
         self.at_first_frame = false;
         self.selection = Selection::default();
@@ -149,12 +156,27 @@ impl App {
                         self.state.notices.say(NoticeLevel::Error, problem);
                     }
                 }
+                WindowRequest::SaveSession => self.save_session(),
                 WindowRequest::WritePanel(export) => self.write_panel(&export),
             }
         }
         self.update_title(ui);
         if self.opening.is_some() {
             ui.ctx().request_repaint_after(std::time::Duration::from_millis(LOOK_MS));
+        }
+    }
+
+    fn save_session(&mut self) {
+        let layout = self.state.layout_value();
+        let Some(log) = &self.log else { return };
+        let stem = log.recording().log_path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
+        let Some(text) = log.saved(layout) else { return };
+        match self.desktop.write_session(&stem.unwrap_or_else(|| "log".to_owned()), &text) {
+            Ok(path) => {
+                let text = format!("Session written, to be opened like a log:\n{}", path.display());
+                self.state.notices.say(NoticeLevel::Info, text);
+            }
+            Err(problem) => self.state.notices.say(NoticeLevel::Error, problem),
         }
     }
 
@@ -204,7 +226,7 @@ impl App {
         let computing = recording.runs.iter().any(|run| !run.finished && run.error.is_none());
         if commanded || playback.playing || log.generation() != generation {
             ui.ctx().request_repaint();
-        } else if computing || playback.retaking {
+        } else if computing || playback.retaking || playback.running_on {
             ui.ctx().request_repaint_after(std::time::Duration::from_millis(LOOK_MS));
         }
     }

@@ -74,6 +74,14 @@ impl PlayingLog for SampleLog {
     fn take_notices(&mut self) -> Vec<String> {
         Vec::new()
     }
+
+    fn saved(&self, layout: Option<serde_json::Value>) -> Option<String> {
+        layout.map(|layout| layout.to_string())
+    }
+
+    fn layout(&self) -> Option<&serde_json::Value> {
+        None
+    }
 }
 
 /// A machine with two sample logs.
@@ -82,6 +90,7 @@ struct TestDesktop {
     remembered: Mutex<Vec<PathBuf>>,
     layouts: Mutex<Option<String>>,
     written: Mutex<Vec<PanelExport>>,
+    sessions: Mutex<Vec<String>>,
 }
 
 impl Desktop for TestDesktop {
@@ -118,6 +127,11 @@ impl Desktop for TestDesktop {
     fn write_panel(&self, export: &PanelExport) -> Result<Vec<PathBuf>, String> {
         self.written.lock().unwrap().push(export.clone());
         Ok(vec![PathBuf::from(format!("/out/{}.png", export.name))])
+    }
+
+    fn write_session(&self, name: &str, text: &str) -> Result<PathBuf, String> {
+        self.sessions.lock().unwrap().push(text.to_owned());
+        Ok(PathBuf::from(format!("/out/{name}.session.json")))
     }
 
     fn resident_bytes(&self) -> Option<u64> {
@@ -292,6 +306,18 @@ fn a_layout_is_kept_for_the_next_start() {
     harness.get_by_label("Forget flight").click();
     harness.run_steps(2);
     assert_eq!(desktop.layouts.lock().unwrap().as_deref(), Some("{}"));
+}
+
+#[test]
+fn the_session_is_saved_at_a_key_with_its_layout() {
+    let (mut harness, desktop) = app();
+    harness.get_by_label("Open yard.mcap").click();
+    run_until(&mut harness, |harness| opened(harness).is_some());
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::S);
+    harness.run_steps(3);
+    assert!(harness.query_by_label_contains("/out/yard.session.json").is_some());
+    let sessions = desktop.sessions.lock().unwrap();
+    assert!(sessions.len() == 1 && sessions[0].contains("Breakpoints"), "{sessions:?}");
 }
 
 #[test]

@@ -19,6 +19,8 @@ const LOWEST_WITH_SCALE: f32 = 28.0;
 pub(crate) enum Lane {
     /// Phases and keyframes of a run.
     Run(usize),
+    /// Where breakpoints were hit.
+    Breakpoints,
     /// Rare events of all runs.
     Events,
     /// Informed rank.
@@ -38,6 +40,7 @@ impl Lane {
     pub(crate) fn name(self, ctx: &PanelContext<'_>) -> String {
         match self {
             Self::Run(run) => ctx.recording.runs.get(run).map_or_else(String::new, |run| run.spec.label.clone()),
+            Self::Breakpoints => "breakpoints".to_owned(),
             Self::Events => "events".to_owned(),
             Self::Rank => "informed rank".to_owned(),
             Self::Features => "features".to_owned(),
@@ -53,7 +56,7 @@ impl Lane {
             Self::Rank => lanes.at(INFORMED, cursor_ns).map(|value| fixed(value, 0)),
             Self::Features => lanes.at(FEATURES, cursor_ns).map(|value| fixed(value, 0)),
             Self::Reprojection => lanes.at(RMS, cursor_ns).map(|value| fixed(value, 2)),
-            Self::Run(_) | Self::Events | Self::Outliers | Self::Warnings => None,
+            Self::Run(_) | Self::Breakpoints | Self::Events | Self::Outliers | Self::Warnings => None,
         }
     }
 
@@ -63,7 +66,7 @@ impl Lane {
             Self::Rank => Some(INFORMED),
             Self::Features => Some(FEATURES),
             Self::Reprojection => Some(RMS),
-            Self::Run(_) | Self::Events | Self::Outliers | Self::Warnings => None,
+            Self::Run(_) | Self::Breakpoints | Self::Events | Self::Outliers | Self::Warnings => None,
         }
     }
 }
@@ -150,6 +153,26 @@ pub(super) fn figures(
             paint_curve(painter, &area, curve, style, 1.2);
         } else {
             paint_steps(painter, &area, curve, style, 1.2);
+        }
+    }
+}
+
+/// Hits of breakpoints: full for those that are enabled, in the colour of the run and in its part of the lane.
+pub(super) fn breakpoints(painter: &Painter, theme: &Theme, area: &PlotArea, ctx: &PanelContext<'_>) {
+    let runs = &ctx.recording.runs;
+    for (number, run) in runs.iter().enumerate() {
+        let share = (number as f32 + 0.5) / runs.len() as f32;
+        let y = egui::lerp(area.rect.y_range(), share);
+        let color = theme.run(number).color;
+        for breakpoint in ctx.playback.breakpoints.list() {
+            for stamp_ns in breakpoint.hits_ns(run).filter(|at| (area.begin_ns..=area.end_ns).contains(at)) {
+                let center = pos2(area.x(stamp_ns), y);
+                if breakpoint.enabled {
+                    painter.circle_filled(center, 3.5, color);
+                } else {
+                    painter.circle_stroke(center, 3.0, Stroke::new(1.0, color));
+                }
+            }
         }
     }
 }

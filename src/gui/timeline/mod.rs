@@ -63,8 +63,10 @@ impl TimelinePanel {
         let painter = ui.painter_at(rect);
         paint_ruler(&painter, &theme, &area);
 
+        let breaks = !ctx.playback.breakpoints.list().is_empty();
         let shown: Vec<Lane> = (0..self.runs.len())
             .map(Lane::Run)
+            .chain(breaks.then_some(Lane::Breakpoints))
             .chain([Lane::Events, Lane::Rank, Lane::Features, Lane::Reprojection, Lane::Outliers, Lane::Warnings])
             .collect();
         let lanes_height = plot.height() - RULER_HEIGHT;
@@ -78,6 +80,8 @@ impl TimelinePanel {
             let label_rect = Rect::from_min_max(pos2(rect.left(), top), pos2(plot.left(), top + height - 2.0));
             self.lane(ui, ctx, *lane, PlotArea { rect: lane_rect, ..area }, label_rect);
         }
+        let lane_y = |run: usize| plot.top() + RULER_HEIGHT + (run as f32 + 0.5) * height - 1.0;
+        paint_forks(&painter, ctx, &area, lane_y);
         paint_range(&painter, ctx, &area);
         paint_markers(&painter, &theme, &area, &ctx.playback.markers_ns);
         paint_cursor(&painter, &theme, &area, ctx.cursor_ns);
@@ -99,6 +103,7 @@ impl TimelinePanel {
                     lanes::run(&inner, &theme, &area, lanes, theme.run(run));
                 }
             }
+            Lane::Breakpoints => lanes::breakpoints(&inner, &theme, &area, ctx),
             Lane::Events => lanes::events(&inner, &theme, &area, &self.runs),
             Lane::Rank => lanes::figures(&inner, &theme, &area, lane, &self.runs, &mut self.curves[0]),
             Lane::Features => lanes::figures(&inner, &theme, &area, lane, &self.runs, &mut self.curves[1]),
@@ -203,6 +208,26 @@ fn paint_ruler(painter: &egui::Painter, theme: &Theme, area: &PlotArea) {
             Align2::CENTER_TOP
         };
         painter.text(pos2(x, area.rect.top()), align, text, font, theme.text_weak);
+    }
+}
+
+/// Where forks have left their parents: what they share with them is dimmed, and a line leads over.
+fn paint_forks(painter: &egui::Painter, ctx: &PanelContext<'_>, area: &PlotArea, lane_y: impl Fn(usize) -> f32) {
+    let runs = &ctx.recording.runs;
+    for (number, run) in runs.iter().enumerate() {
+        let Some(origin) = &run.origin else { continue };
+        let (x, y) = (area.x(origin.stamp_ns), lane_y(number));
+        let shared = Rect::from_min_max(pos2(area.rect.left(), y - 11.0), pos2(x, y + 11.0)).intersect(area.rect);
+        if shared.is_positive() {
+            painter.rect_filled(shared, 0.0, ctx.theme.surface.gamma_multiply(0.75));
+        }
+        let parent = runs.iter().position(|other| other.id == origin.parent);
+        if let Some(parent) = parent.filter(|_| area.rect.x_range().contains(x)) {
+            let stroke = Stroke::new(1.5, ctx.theme.run(number).color);
+            painter.line_segment([pos2(x, lane_y(parent)), pos2(x, y)], stroke);
+            painter.circle_filled(pos2(x, lane_y(parent)), 3.0, ctx.theme.run(parent).color);
+            painter.circle_filled(pos2(x, y), 3.5, ctx.theme.run(number).color);
+        }
     }
 }
 

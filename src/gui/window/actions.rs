@@ -27,6 +27,10 @@ pub(crate) enum Action {
     Loop,
     /// Set or clear a marker.
     Marker,
+    /// Set or clear a breakpoint at the frame of the cursor.
+    Breakpoint,
+    /// Run to the next or the previous hit of a breakpoint.
+    Hit(bool),
     /// Show the whole log in all plots.
     WholeLog,
     /// Forget the selection and close what is open.
@@ -37,12 +41,16 @@ pub(crate) enum Action {
     Open,
     /// Add a run.
     AddRun,
+    /// Fork the shown run at the cursor.
+    Fork,
     /// List all commands.
     Palette,
     /// List all shortcuts.
     Shortcuts,
     /// List the warnings.
     Warnings,
+    /// Write the session to a file.
+    Save,
     /// Write the panel with the focus to files.
     Export,
     /// Arrange the panels.
@@ -81,8 +89,10 @@ pub(crate) const TABLE: &[Entry] = &[
     entry(Action::Event(false), "Previous event", "Ctrl+Left", &[(CTRL, Key::ArrowLeft)]),
     entry(Action::Step(10), "Ten frames forward", "Shift+Right", &[(SHIFT, Key::ArrowRight)]),
     entry(Action::Step(-10), "Ten frames back", "Shift+Left", &[(SHIFT, Key::ArrowLeft)]),
+    entry(Action::Hit(false), "Run back to the previous hit of a breakpoint", "Shift+N", &[(SHIFT, Key::N)]),
     entry(Action::Open, "Open a log…", "Ctrl+O", &[(CTRL, Key::O)]),
     entry(Action::Export, "Export this panel (PNG, CSV)", "Ctrl+E", &[(CTRL, Key::E)]),
+    entry(Action::Save, "Save the session", "Ctrl+S", &[(CTRL, Key::S)]),
     entry(Action::Palette, "Command palette…", "Ctrl+P", &[(CTRL, Key::P)]),
     entry(Action::TogglePlay, "Play or pause", "Space", &[(NONE, Key::Space)]),
     entry(Action::Step(1), "One frame forward", "Right", &[(NONE, Key::ArrowRight)]),
@@ -93,8 +103,11 @@ pub(crate) const TABLE: &[Entry] = &[
     entry(Action::End, "Go to end", "End", &[(NONE, Key::End)]),
     entry(Action::Loop, "Loop over the visible range", "L", &[(NONE, Key::L)]),
     entry(Action::Marker, "Set or clear a marker", "M", &[(NONE, Key::M)]),
+    entry(Action::Breakpoint, "Set or clear a breakpoint at this frame", "B", &[(NONE, Key::B)]),
+    entry(Action::Hit(true), "Run to the next hit of a breakpoint", "N", &[(NONE, Key::N)]),
     entry(Action::WholeLog, "Show the whole log", "Z", &[(NONE, Key::Z)]),
     entry(Action::NextRun, "Show the next run", "R", &[(NONE, Key::R)]),
+    entry(Action::Fork, "Fork the shown run here…", "F", &[(NONE, Key::F)]),
     entry(Action::AddRun, "Add a run…", "A", &[(NONE, Key::A)]),
     entry(Action::Warnings, "List warnings", "W", &[(NONE, Key::W)]),
     entry(Action::Theme, "Dark or light theme", "T", &[(NONE, Key::T)]),
@@ -145,6 +158,8 @@ pub(crate) fn perform(action: Action, state: &mut WindowState, ctx: &mut PanelCo
         Action::Start => ctx.commands.push(Command::GoToStart),
         Action::End => ctx.commands.push(Command::GoToEnd),
         Action::Loop => ctx.commands.push(toggled_loop(ctx)),
+        Action::Breakpoint => ctx.commands.push(Command::ToggleBreakpointHere),
+        Action::Hit(forward) => ctx.commands.push(Command::RunToBreakpoint { forward }),
         Action::Marker => ctx.commands.push(Command::ToggleMarker),
         Action::WholeLog => ctx.selection.visible_ns = None,
         Action::Dismiss => {
@@ -156,6 +171,7 @@ pub(crate) fn perform(action: Action, state: &mut WindowState, ctx: &mut PanelCo
         }
         Action::Open => state.open_dialog.show(),
         Action::AddRun => state.add_run.show(),
+        Action::Fork => state.fork.show(),
         Action::Palette => state.palette.show(),
         Action::Shortcuts => state.shortcuts_open = !state.shortcuts_open,
         Action::Warnings => state.notices.list_open = !state.notices.list_open,
@@ -163,6 +179,7 @@ pub(crate) fn perform(action: Action, state: &mut WindowState, ctx: &mut PanelCo
             let export = super::panel_export::export(state, ctx);
             state.requests.push(super::WindowRequest::WritePanel(Box::new(export)));
         }
+        Action::Save => state.requests.push(super::WindowRequest::SaveSession),
         Action::Layout(preset) => state.layout.arrange(preset),
         Action::Theme => state.requests.push(super::WindowRequest::ToggleTheme),
     }

@@ -115,6 +115,10 @@ fn entry_ui(
 /// What the run is and how well it does.
 fn details(run: &RunRecord, statistics: Option<&ErrorStatistics>) -> String {
     let mut lines = vec![format!("--run {}", run.spec), format!("camera {}", run.camera_key)];
+    if let Some(origin) = &run.origin {
+        let time_s = crate::geometry::seconds_from_ns(origin.stamp_ns);
+        lines.push(format!("fork at {time_s:.3} s: {}", origin.changes));
+    }
     if let Some(last) = run.steps.last() {
         lines.push(format!("parameterization {}", last.report.calibration.parameterization));
         let tracked = run.steps.iter().filter(|step| !step.report.window.is_empty()).count();

@@ -4,6 +4,7 @@
 
 mod actions;
 mod add_run;
+mod fork;
 mod legend;
 mod notices;
 mod palette;
@@ -22,6 +23,7 @@ use egui::{CentralPanel, Frame, Margin, Panel, Rect, Ui, Vec2};
 
 use self::actions::Action;
 pub use self::add_run::AddRunDialog;
+pub use self::fork::ForkDialog;
 pub use self::legend::RunLegend;
 pub use self::notices::{NoticeLevel, Notices};
 pub use self::palette::CommandPalette;
@@ -30,6 +32,7 @@ pub use self::saved_layouts::SavedLayouts;
 pub use self::tiles::Preset;
 use self::tiles::{Layout, Pane};
 use super::PanelContext;
+use super::breakpoints::BreakpointsPanel;
 use super::convergence::ConvergencePanel;
 use super::image_panel::ImagePanel;
 use super::inspector::InspectorPanel;
@@ -52,6 +55,8 @@ pub enum WindowRequest {
     ToggleTheme,
     /// Keep the saved layouts, written as text.
     KeepLayouts(String),
+    /// Write the session to a file.
+    SaveSession,
     /// Write a panel to files.
     WritePanel(Box<PanelExport>),
 }
@@ -75,13 +80,15 @@ pub enum PanelName {
     Inspector,
     /// What a mechanism and a motion can identify.
     Laboratory,
+    /// Breakpoints.
+    Breakpoints,
     /// The lanes over time.
     Timeline,
 }
 
 impl PanelName {
     /// All of them.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Image,
         Self::Scene,
         Self::Convergence,
@@ -90,6 +97,7 @@ impl PanelName {
         Self::Residuals,
         Self::Inspector,
         Self::Laboratory,
+        Self::Breakpoints,
         Self::Timeline,
     ];
 
@@ -104,6 +112,7 @@ impl PanelName {
             Self::Residuals => "residuals",
             Self::Inspector => "inspector",
             Self::Laboratory => "laboratory",
+            Self::Breakpoints => "breakpoints",
             Self::Timeline => "timeline",
         }
     }
@@ -128,6 +137,8 @@ pub struct Panels {
     pub inspector: InspectorPanel,
     /// What a mechanism and a motion can identify.
     pub laboratory: LaboratoryPanel,
+    /// Breakpoints.
+    pub breakpoints: BreakpointsPanel,
 }
 
 impl Panels {
@@ -151,6 +162,7 @@ impl Panels {
             Pane::Residuals => self.residuals.ui(ui, ctx),
             Pane::Inspector => self.inspector.ui(ui, ctx),
             Pane::Laboratory => self.laboratory.ui(ui, ctx),
+            Pane::Breakpoints => self.breakpoints.ui(ui, ctx),
         }
     }
 }
@@ -168,6 +180,8 @@ pub struct WindowState {
     pub notices: Notices,
     /// Adds a run.
     pub add_run: AddRunDialog,
+    /// Forks a run.
+    pub fork: ForkDialog,
     /// Opens a log.
     pub open_dialog: OpenDialog,
     /// Lists commands.
@@ -192,6 +206,7 @@ pub struct WindowState {
 impl WindowState {
     fn close_dialogs(&mut self) {
         self.add_run.hide();
+        self.fork.hide();
         self.open_dialog.hide();
         self.palette.hide();
         self.shortcuts_open = false;
@@ -211,6 +226,16 @@ impl WindowState {
         let Some(pressed) = pressed.filter(|at| ui.ctx().layer_id_at(*at) == Some(ui.layer_id())) else { return };
         let place = self.places.iter().find(|(_, rect)| rect.contains(pressed));
         self.focus = place.map_or(self.focus, |(panel, _)| Some(*panel));
+    }
+
+    /// Where the panels are, for a saved session.
+    pub fn layout_value(&self) -> Option<serde_json::Value> {
+        saved_layouts::layout_value(&self.layout)
+    }
+
+    /// Arranges the panels as in a saved session.
+    pub fn take_layout(&mut self, value: &serde_json::Value) {
+        saved_layouts::take_layout(&mut self.layout, value);
     }
 
     /// Arranges the panels as in a preset.
@@ -253,6 +278,7 @@ pub fn window_ui(ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_
 
 fn dialogs_ui(ui: &Ui, state: &mut WindowState, ctx: &mut PanelContext<'_>, actions: &mut Vec<Action>) {
     state.add_run.ui(ui, ctx);
+    state.fork.ui(ui, ctx);
     if let Some(path) = state.open_dialog.ui(ui, ctx.theme) {
         state.requests.push(WindowRequest::OpenLog(path));
     }

@@ -37,7 +37,7 @@ pub(super) fn export(state: &WindowState, ctx: &mut PanelContext<'_>) -> PanelEx
     copy.panels.inspector.show_times = state.show_times;
     // A list that scrolls in a low panel is written whole, as far as it goes.
     let least = match panel {
-        PanelName::Rank | PanelName::Inspector => LEAST_SIZE_OF_LISTS,
+        PanelName::Rank | PanelName::Inspector | PanelName::Breakpoints => LEAST_SIZE_OF_LISTS,
         _ => Vec2::ZERO,
     };
     let size = size.max(least);
@@ -76,6 +76,7 @@ pub fn alone_ui(panel: PanelName, ui: &mut Ui, state: &mut WindowState, ctx: &mu
         PanelName::Residuals => state.panels.residuals.ui(ui, ctx),
         PanelName::Inspector => state.panels.inspector.ui(ui, ctx),
         PanelName::Laboratory => state.panels.laboratory.ui(ui, ctx),
+        PanelName::Breakpoints => state.panels.breakpoints.ui(ui, ctx),
         PanelName::Timeline => state.timeline.ui(ui, ctx),
     });
 }

@@ -59,6 +59,7 @@ pub(super) fn table_of(panel: PanelName, panels: &mut Panels, ctx: &PanelContext
         PanelName::Residuals => residuals(ctx),
         PanelName::Inspector => state(run, ctx.cursor_ns),
         PanelName::Laboratory => spectra(panels.laboratory.ranks(ctx)),
+        PanelName::Breakpoints => hits(ctx),
         PanelName::Timeline => events(ctx),
     }
 }
@@ -291,6 +292,20 @@ fn state(run: &RunRecord, cursor_ns: i64) -> String {
         let unit = calibration.units.get(index).copied().unwrap_or_default();
         say(name, unit, calibration.values.get(index).copied().unwrap_or(f64::NAN));
         say(&format!("{name} sigma"), unit, calibration.sigmas.get(index).copied().unwrap_or(f64::NAN));
+    }
+    table.text
+}
+
+/// Every hit of every breakpoint, by breakpoint and run.
+fn hits(ctx: &PanelContext<'_>) -> String {
+    let mut table = Table::new(&["condition", "enabled", "run", "t_s"]);
+    for breakpoint in ctx.playback.breakpoints.list() {
+        for run in &ctx.recording.runs {
+            for stamp_ns in breakpoint.hits_ns(run) {
+                let (text, enabled) = (breakpoint.condition.text().to_owned(), breakpoint.enabled.to_string());
+                table.row([text, enabled, run.spec.label.clone(), seconds(stamp_ns)]);
+            }
+        }
     }
     table.text
 }

@@ -69,6 +69,19 @@ impl SavedLayouts {
     }
 }
 
+/// The present layout, for a saved session.
+pub(super) fn layout_value(layout: &Layout) -> Option<serde_json::Value> {
+    serde_json::to_value(layout.tree()).ok()
+}
+
+/// Takes over the layout of a saved session; one of another version, which misses a panel, is left out.
+pub(super) fn take_layout(layout: &mut Layout, value: &serde_json::Value) {
+    let tree: Option<Tree<Pane>> = serde_json::from_value(value.clone()).ok();
+    if let Some(tree) = tree.filter(|tree| Pane::ALL.iter().all(|pane| tree.tiles.find_pane(pane).is_some())) {
+        layout.take(tree);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::tiles::Preset;

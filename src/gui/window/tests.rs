@@ -1,14 +1,18 @@
 //! The window, asked by the labels that a person and a screen reader see.
 
+use std::sync::Arc;
+
 use egui::{Key, Modifiers, Role};
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 
+use super::tiles::Pane;
 use super::{Preset, WindowRequest, WindowState, window_ui};
 use crate::gui::sample_recording::{sample_images, sample_recording_of};
 use crate::gui::theme::{Theme, ThemeName};
 use crate::gui::{PanelContext, Playback, Selection};
-use crate::session::{Command, PlaybackSpeed, Recording};
+use crate::session::breakpoints::Breakpoints;
+use crate::session::{Command, ForkChanges, ForkOrigin, PlaybackSpeed, Recording};
 
 const SECOND_NS: i64 = 1_000_000_000;
 
@@ -120,6 +124,9 @@ fn keys_push_the_same_commands() {
         (Modifiers::NONE, Key::Home, Command::GoToStart),
         (Modifiers::NONE, Key::End, Command::GoToEnd),
         (Modifiers::NONE, Key::M, Command::ToggleMarker),
+        (Modifiers::NONE, Key::B, Command::ToggleBreakpointHere),
+        (Modifiers::NONE, Key::N, Command::RunToBreakpoint { forward: true }),
+        (Modifiers::SHIFT, Key::N, Command::RunToBreakpoint { forward: false }),
         (Modifiers::NONE, Key::L, Command::SetLoop(Some((0, 4 * SECOND_NS)))),
     ] {
         let pushed = commands_of(&mut harness, |harness| harness.key_press_modifiers(modifiers, key));
@@ -188,6 +195,109 @@ fn a_run_is_added_through_the_dialog() {
     let Some(Command::AddRun(spec)) = pushed.first() else { panic!("{pushed:?}") };
     assert_eq!(spec.to_string(), "classical:encoder=off");
     assert!(harness.query_by_label("Encoder readings").is_none(), "the dialog closes");
+}
+
+/// A window with the breakpoints in front.
+fn breakpoints_bench(conditions: &[&str]) -> Harness<'static, Bench> {
+    let mut harness = bench();
+    let state = harness.state_mut();
+    state.window.layout.set_visible(Pane::Breakpoints, true);
+    let mut breakpoints = Breakpoints::default();
+    for condition in conditions {
+        breakpoints.add(condition.parse().unwrap());
+    }
+    breakpoints.read(&state.recording);
+    state.playback.breakpoints = Arc::new(breakpoints);
+    harness.run_steps(3);
+    harness
+}
+
+#[test]
+fn a_breakpoint_is_typed_and_its_mistakes_are_pointed_at() {
+    let mut harness = breakpoints_bench(&[]);
+    let type_text = |harness: &mut Harness<'static, Bench>, text: &str| {
+        harness.get_by_role_and_label(Role::TextInput, "Condition").focus();
+        harness.run_steps(1);
+        harness.get_by_role_and_label(Role::TextInput, "Condition").type_text(text);
+        harness.run_steps(2);
+    };
+    type_text(&mut harness, "rank < 18 or");
+    assert!(harness.query_by_label_contains("Column 13: the condition ends here").is_some());
+    assert!(harness.query_by_label("rank < 18 or\n            ^").is_some());
+    assert!(harness.get_by_label("Add breakpoint").accesskit_node().is_disabled());
+    type_text(&mut harness, " features < 40");
+    assert!(harness.query_by_label_contains("Column").is_none());
+    let pushed = commands_of(&mut harness, |harness| harness.get_by_label("Add breakpoint").click());
+    let [Command::AddBreakpoint(condition)] = pushed.as_slice() else { panic!("{pushed:?}") };
+    assert_eq!(condition.text(), "rank < 18 or features < 40");
+    // While somebody types, B and N are letters.
+    harness.get_by_role_and_label(Role::TextInput, "Condition").focus();
+    harness.run_steps(1);
+    let pushed = commands_of(&mut harness, |harness| harness.key_press(Key::N));
+    assert!(pushed.is_empty(), "{pushed:?}");
+}
+
+#[test]
+fn breakpoints_show_their_hits_and_can_be_changed() {
+    let mut harness = breakpoints_bench(&["tracking", "frame == 7"]);
+    assert_eq!(harness.query_all_by_label("auto 1 hit").count(), 2);
+    assert_eq!(harness.query_all_by_label("classical 1 hit").count(), 2);
+    for (label, command) in [
+        ("Next hit", Command::RunToBreakpoint { forward: true }),
+        ("Previous hit", Command::RunToBreakpoint { forward: false }),
+        ("tracking", Command::EnableBreakpoint { number: 0, enabled: false }),
+        ("Remove frame == 7", Command::RemoveBreakpoint(1)),
+    ] {
+        let pushed = commands_of(&mut harness, |harness| harness.get_by_label(label).click());
+        assert_eq!(pushed, [command], "{label}");
+    }
+    commands_of(&mut harness, |harness| harness.get_by_label("Edit tracking").click());
+    let pushed = commands_of(&mut harness, |harness| harness.get_by_label("Change breakpoint").click());
+    assert_eq!(pushed, [Command::ChangeBreakpoint { number: 0, condition: "tracking".parse().unwrap() }]);
+}
+
+#[test]
+fn a_fork_is_made_by_key_and_label_and_has_a_lane() {
+    let mut harness = bench();
+    harness.key_press(Key::F);
+    harness.run_steps(3);
+    assert!(harness.query_by_label("Fork auto at 3.000 s").is_some());
+    assert!(harness.query_by_label("nothing is changed").is_some());
+    commands_of(&mut harness, |harness| {
+        let combo = harness.get_all_by_role(Role::ComboBox).find(|node| node.value().as_deref() == Some("as before"));
+        combo.unwrap().click();
+    });
+    harness.get_by_label("classical").click();
+    harness.run_steps(2);
+    let type_text = |harness: &mut Harness<'static, Bench>, label: &str, text: &str| {
+        harness.get_by_role_and_label(Role::TextInput, label).focus();
+        harness.run_steps(1);
+        harness.get_by_role_and_label(Role::TextInput, label).type_text(text);
+        harness.run_steps(2);
+    };
+    type_text(&mut harness, "Freeze parameters", "yaw.d");
+    type_text(&mut harness, "Drop features", "twelve");
+    assert!(harness.query_by_label_contains("'twelve' is no number of a feature").is_some());
+    assert!(harness.get_by_label("Fork").accesskit_node().is_disabled());
+    harness.get_by_role_and_label(Role::TextInput, "Drop features").focus();
+    harness.run_steps(1);
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::A);
+    harness.run_steps(1);
+    type_text(&mut harness, "Drop features", "12");
+    assert!(harness.query_by_label("classical,freeze=yaw.d,drop=12").is_some());
+    let pushed = commands_of(&mut harness, |harness| harness.get_by_label("Fork").click());
+    let changes: ForkChanges = "classical,freeze=yaw.d,drop=12".parse().unwrap();
+    assert_eq!(pushed, [Command::Fork { run: 0, changes: changes.clone(), label: None }]);
+
+    // The lane says where it has left its parent.
+    let state = harness.state_mut();
+    let parent = state.recording.runs[0].id;
+    let origin = ForkOrigin { parent, step: 60, stamp_ns: 3 * SECOND_NS, changes };
+    state.recording.runs[1].origin = Some(origin);
+    harness.run_steps(2);
+    harness.get_by_label_contains("Run classical").hover();
+    harness.run_steps(8);
+    assert!(harness.query_by_label_contains("fork at 3.000 s: classical,freeze=yaw.d,drop=12").is_some());
 }
 
 #[test]

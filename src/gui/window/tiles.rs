@@ -30,11 +30,13 @@ pub(crate) enum Pane {
     Inspector,
     /// What a mechanism and a motion can identify.
     Laboratory,
+    /// Breakpoints.
+    Breakpoints,
 }
 
 impl Pane {
     /// All of them.
-    pub(crate) const ALL: [Self; 8] = [
+    pub(crate) const ALL: [Self; 9] = [
         Self::Image,
         Self::Scene,
         Self::Convergence,
@@ -43,6 +45,7 @@ impl Pane {
         Self::Residuals,
         Self::Inspector,
         Self::Laboratory,
+        Self::Breakpoints,
     ];
 
     /// Which panel it is.
@@ -56,6 +59,7 @@ impl Pane {
             Self::Residuals => PanelName::Residuals,
             Self::Inspector => PanelName::Inspector,
             Self::Laboratory => PanelName::Laboratory,
+            Self::Breakpoints => PanelName::Breakpoints,
         }
     }
 
@@ -70,6 +74,7 @@ impl Pane {
             Self::Residuals => "Residuals",
             Self::Inspector => "Inspector",
             Self::Laboratory => "Laboratory",
+            Self::Breakpoints => "Breakpoints",
         }
     }
 }
@@ -175,7 +180,7 @@ fn tree_of(preset: Preset) -> Tree<Pane> {
     let mut all = Tiles::default();
     let tiles = &mut all;
     let (image, scene) = (tabs(tiles, &[Pane::Image]), tabs(tiles, &[Pane::Scene]));
-    let (rank, inspector) = (tabs(tiles, &[Pane::Rank]), tabs(tiles, &[Pane::Inspector]));
+    let (rank, inspector) = (tabs(tiles, &[Pane::Rank]), tabs(tiles, &[Pane::Inspector, Pane::Breakpoints]));
     let (left, right) = match preset {
         Preset::Overview => {
             let plots = tabs(tiles, &[Pane::Convergence, Pane::Residuals, Pane::Jacobian, Pane::Laboratory]);

@@ -15,6 +15,7 @@ pub(super) fn ui(ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_
         action_button(ui, "Open…", Action::Open, true, actions);
         let room = ctx.recording.runs.len() < MAX_RUNS;
         action_button(ui, "Add run…", Action::AddRun, room, actions);
+        action_button(ui, "Fork…", Action::Fork, room, actions);
         ui.separator();
         ui.label(RichText::new(log_name(ctx.recording)).color(ctx.theme.text_strong));
         ui.label(RichText::new(format!("rig {}", ctx.recording.rig.name)).color(ctx.theme.text_weak));

@@ -1,0 +1,136 @@
+//! The breakpoints: conditions over the steps, how often each was hit, and the way to the next hit.
+
+use egui::{Button, CollapsingHeader, Grid, Key, RichText, ScrollArea, TextEdit, Ui, WidgetInfo};
+
+use super::PanelContext;
+use super::units::counted;
+use crate::session::Command;
+use crate::session::breakpoints::{Breakpoint, Condition, quantity_help};
+
+/// State of the panel.
+#[derive(Debug, Default)]
+pub struct BreakpointsPanel {
+    typed: String,
+    /// The breakpoint whose condition is being changed.
+    changing: Option<usize>,
+}
+
+impl BreakpointsPanel {
+    /// Draws the panel.
+    pub fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
+        buttons_ui(ui, ctx);
+        self.editor_ui(ui, ctx);
+        ui.add_space(4.0);
+        ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
+            let breakpoints = std::sync::Arc::clone(&ctx.playback.breakpoints);
+            for (number, breakpoint) in breakpoints.list().iter().enumerate() {
+                self.breakpoint_ui(ui, ctx, number, breakpoint);
+            }
+            if breakpoints.list().is_empty() {
+                let text = "No breakpoints yet: type a condition, or press B for one at this frame";
+                ui.add(egui::Label::new(RichText::new(text).color(ctx.theme.text_weak)).wrap());
+            }
+            help_ui(ui, ctx);
+        });
+    }
+
+    /// The line in which a condition is written, and what is wrong with it.
+    fn editor_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
+        let parsed: Result<Condition, _> = self.typed.parse();
+        ui.horizontal(|ui| {
+            let hint = "rank < 18 or features < 40";
+            let width = (ui.available_width() - 74.0).max(60.0);
+            let edit = TextEdit::singleline(&mut self.typed).hint_text(hint).desired_width(width).code_editor();
+            let edit = ui.add(edit);
+            edit.widget_info(|| WidgetInfo::labeled(egui::Role::TextInput, true, "Condition"));
+            let entered = edit.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
+            let text = if self.changing.is_some() { "Change" } else { "Add" };
+            let set = ui.add_enabled(parsed.is_ok(), Button::new(text));
+            set.widget_info(|| WidgetInfo::labeled(egui::Role::Button, parsed.is_ok(), format!("{text} breakpoint")));
+            if let (true, Ok(condition)) = (set.clicked() || entered, &parsed) {
+                let condition = condition.clone();
+                ctx.commands.push(match self.changing.take() {
+                    Some(number) => Command::ChangeBreakpoint { number, condition },
+                    None => Command::AddBreakpoint(condition),
+                });
+                self.typed.clear();
+            }
+        });
+        if let Err(problem) = parsed
+            && !self.typed.trim().is_empty()
+        {
+            // The text once more, with a sign under the mistake.
+            let pointed = format!("{}\n{}^", problem.text, " ".repeat(problem.column - 1));
+            ui.label(RichText::new(pointed).monospace().color(ctx.theme.text_weak));
+            let text = format!("Column {}: {}", problem.column, problem.message);
+            ui.add(egui::Label::new(RichText::new(text).color(ctx.theme.error)).wrap());
+        }
+    }
+
+    fn breakpoint_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>, number: usize, breakpoint: &Breakpoint) {
+        let theme = *ctx.theme;
+        let text = breakpoint.condition.text();
+        ui.horizontal(|ui| {
+            let mut enabled = breakpoint.enabled;
+            let name = RichText::new(text).monospace().color(theme.text_strong);
+            let check = ui.checkbox(&mut enabled, name);
+            if check.on_hover_text("Whether the cursor stops there").changed() {
+                ctx.commands.push(Command::EnableBreakpoint { number, enabled });
+            }
+            for (run, record) in ctx.recording.runs.iter().enumerate() {
+                let hits = counted(breakpoint.hit_count(record), "hit");
+                let text = RichText::new(format!("{} {hits}", record.spec.label)).small().color(theme.run(run).color);
+                ui.label(text).on_hover_text("How often the condition has become true in this run so far");
+            }
+            let small = |ui: &mut Ui, sign: &str, name: String| {
+                let button = ui.add(Button::new(sign).small());
+                button.widget_info(|| WidgetInfo::labeled(egui::Role::Button, true, &name));
+                button.on_hover_text(name.clone()).clicked()
+            };
+            if small(ui, "edit", format!("Edit {text}")) {
+                text.clone_into(&mut self.typed);
+                self.changing = Some(number);
+            }
+            if small(ui, "x", format!("Remove {text}")) {
+                ctx.commands.push(Command::RemoveBreakpoint(number));
+                self.changing = None;
+            }
+        });
+    }
+}
+
+/// The way to the hits before and after the cursor.
+fn buttons_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>) {
+    ui.horizontal(|ui| {
+        let any = ctx.playback.breakpoints.list().iter().any(|breakpoint| breakpoint.enabled);
+        for (text, keys, forward) in [("Previous hit", "Shift+N", false), ("Next hit", "N", true)] {
+            let button = ui.add_enabled(any, Button::new(text));
+            if button.on_hover_text(format!("Run there ({keys})")).clicked() {
+                ctx.commands.push(Command::RunToBreakpoint { forward });
+            }
+        }
+        if ctx.playback.running_on {
+            ui.label(RichText::new("running to the next hit…").color(ctx.theme.text_weak));
+        }
+    });
+}
+
+/// Everything that a condition can ask for.
+fn help_ui(ui: &mut Ui, ctx: &PanelContext<'_>) {
+    let theme = ctx.theme;
+    let header = CollapsingHeader::new("What can be asked for").id_salt("quantities");
+    header.show(ui, |ui| {
+        let text = "Compare with < <= > >= == !=, join with and, or, not; numbers may have deg, mrad, mm, cm, px, %. \
+                    A breakpoint is hit where its condition becomes true.";
+        ui.add(egui::Label::new(RichText::new(text).color(theme.text_weak)).wrap());
+        Grid::new("quantities").num_columns(2).show(ui, |ui| {
+            for (name, meaning) in quantity_help() {
+                let short = name.split('|').next().unwrap_or(&name);
+                let short = if short == name { name.clone() } else { format!("{short})") };
+                ui.label(RichText::new(short).monospace().color(theme.text_strong)).on_hover_text(&name);
+                ui.label(RichText::new(meaning).color(theme.text));
+                ui.end_row();
+            }
+        });
+    });
+}

@@ -1,0 +1,205 @@
+//! The dialog that lets a run go on from the frame at the cursor in another way.
+
+use egui::{ComboBox, DragValue, Grid, Id, Modal, RichText, TextEdit, Ui, vec2};
+
+use super::dialog_frame;
+use crate::gui::PanelContext;
+use crate::gui::units::seconds;
+use crate::session::{Command, FORK_PARAMETERIZATIONS, ForkChanges, RunSpec};
+
+/// What the list offers first: no other parameterization.
+const AS_BEFORE: &str = "as before";
+
+/// State of the dialog.
+#[derive(Debug)]
+pub struct ForkDialog {
+    open: bool,
+    /// Number in the list, 0 for the parent's own.
+    choice: usize,
+    frozen: String,
+    values: String,
+    dropped: String,
+    joint_noise_deg: f64,
+    imu_noise: f64,
+    pixel_noise: f64,
+    encoder_noise: f64,
+    name: String,
+}
+
+impl Default for ForkDialog {
+    fn default() -> Self {
+        Self {
+            open: false,
+            choice: 0,
+            frozen: String::new(),
+            values: String::new(),
+            dropped: String::new(),
+            joint_noise_deg: 0.0,
+            imu_noise: 1.0,
+            pixel_noise: 1.0,
+            encoder_noise: 1.0,
+            name: String::new(),
+        }
+    }
+}
+
+impl ForkDialog {
+    /// Opens it.
+    pub fn show(&mut self) {
+        self.open = true;
+    }
+
+    /// Closes it.
+    pub fn hide(&mut self) {
+        self.open = false;
+    }
+
+    /// The changes as text.
+    fn written(&self) -> String {
+        let mut parts = Vec::new();
+        if let Some(choice) = self.choice.checked_sub(1).and_then(|index| FORK_PARAMETERIZATIONS.get(index)) {
+            parts.push(choice.name().to_owned());
+        }
+        let list = |text: &str| text.split([',', ' ', '+']).filter(|it| !it.is_empty()).collect::<Vec<_>>().join("+");
+        for (key, text) in [("freeze", &self.frozen), ("drop", &self.dropped)] {
+            if !text.trim().is_empty() {
+                parts.push(format!("{key}={}", list(text)));
+            }
+        }
+        for value in self.values.split([',', ' ']).filter(|value| !value.is_empty()) {
+            // People write an equals sign there.
+            parts.push(format!("set={}", value.replacen('=', ":", 1)));
+        }
+        if self.joint_noise_deg != 0.0 {
+            parts.push(format!("joint-noise={}deg", self.joint_noise_deg));
+        }
+        let factors =
+            [("imu-noise", self.imu_noise), ("pixel-noise", self.pixel_noise), ("encoder-noise", self.encoder_noise)];
+        parts
+            .extend(factors.iter().filter(|(_, factor)| *factor != 1.0).map(|(key, factor)| format!("{key}={factor}")));
+        parts.join(",")
+    }
+
+    /// The fork's name, `None` for one of its own making; an error when it cannot be a folder's.
+    fn label(&self) -> Result<Option<String>, String> {
+        let name = self.name.trim();
+        if name.is_empty() {
+            return Ok(None);
+        }
+        let spec: Result<RunSpec, _> = format!("auto:name={name}").parse();
+        spec.map(|spec| Some(spec.label)).map_err(|error| error.to_string())
+    }
+
+    /// Draws it; the fork it makes joins the commands.
+    pub(crate) fn ui(&mut self, ui: &Ui, ctx: &mut PanelContext<'_>) {
+        if !self.open {
+            return;
+        }
+        let theme = *ctx.theme;
+        let run = ctx.selection.run.min(ctx.recording.runs.len().saturating_sub(1));
+        let parent = ctx.recording.runs.get(run).map_or_else(String::new, |run| run.spec.label.clone());
+        let modal = Modal::new(Id::unique("fork")).frame(dialog_frame(&theme));
+        let response = modal.show(ui.ctx(), |ui| {
+            ui.set_width(470.0);
+            let title = format!("Fork {parent} at {} s", seconds(ctx.cursor_ns));
+            ui.label(RichText::new(title).size(15.0).color(theme.text_strong));
+            ui.add_space(4.0);
+            self.fields_ui(ui, ctx);
+            let written = self.written();
+            let parsed: Result<ForkChanges, String> =
+                written.parse().map_err(|error: crate::session::ForkError| error.to_string());
+            let asked = parsed.and_then(|changes| Ok((changes, self.label()?)));
+            ui.add_space(6.0);
+            match &asked {
+                Ok(_) if written.is_empty() => ui.label(RichText::new("nothing is changed").color(theme.text_weak)),
+                Ok(_) => ui.label(RichText::new(&written).monospace().color(theme.text_weak)),
+                Err(problem) => ui.add(egui::Label::new(RichText::new(problem).color(theme.error)).wrap()),
+            };
+            ui.add_space(6.0);
+            let enter = ui.input(|input| input.key_pressed(egui::Key::Enter));
+            ui.horizontal(|ui| {
+                let fork = ui.add_enabled(asked.is_ok(), egui::Button::new("Fork")).clicked();
+                if let (true, Ok((changes, label))) = (fork || enter, asked) {
+                    ctx.commands.push(Command::Fork { run, changes, label });
+                    self.open = false;
+                }
+                if ui.button("Cancel").clicked() {
+                    self.open = false;
+                }
+            });
+        });
+        if response.should_close() {
+            self.open = false;
+        }
+    }
+
+    fn fields_ui(&mut self, ui: &mut Ui, ctx: &PanelContext<'_>) {
+        let selected = (&ctx.selection.parameter, ctx.selection.feature);
+        Grid::new("fork").num_columns(2).spacing(vec2(12.0, 6.0)).show(ui, |ui| {
+            let names: Vec<&str> =
+                std::iter::once(AS_BEFORE).chain(FORK_PARAMETERIZATIONS.iter().map(|choice| choice.name())).collect();
+            let name = ui.label("Parameterization");
+            let combo = ComboBox::from_id_salt("fork parameterization").width(260.0).selected_text(names[self.choice]);
+            let shown = combo.show_ui(ui, |ui| {
+                for (number, name) in names.iter().enumerate() {
+                    ui.selectable_value(&mut self.choice, number, *name);
+                }
+            });
+            shown.response.labelled_by(name.id);
+            ui.end_row();
+            let parameter = selected.0.clone().unwrap_or_else(|| "yaw.alpha".to_owned());
+            let feature = selected.1.map_or_else(|| "12 15".to_owned(), |id| id.0.to_string());
+            let value = format!("{parameter}=1deg");
+            for (label, text, hint) in [
+                ("Freeze parameters", &mut self.frozen, &parameter),
+                ("Set parameters", &mut self.values, &value),
+                ("Drop features", &mut self.dropped, &feature),
+                ("Name", &mut self.name, &"as it is changed".to_owned()),
+            ] {
+                let name = ui.label(label);
+                ui.add(TextEdit::singleline(text).hint_text(hint).desired_width(260.0)).labelled_by(name.id);
+                ui.end_row();
+            }
+            let name = ui.label("Noise on joint angles");
+            ui.add(DragValue::new(&mut self.joint_noise_deg).range(0.0..=45.0).speed(0.05).suffix("°"))
+                .labelled_by(name.id);
+            ui.end_row();
+            for (label, factor) in [
+                ("Inertial noise", &mut self.imu_noise),
+                ("Pixel noise", &mut self.pixel_noise),
+                ("Encoder noise", &mut self.encoder_noise),
+            ] {
+                let name = ui.label(label);
+                let drag = DragValue::new(factor).range(0.001..=1000.0).speed(0.02).prefix("× ");
+                ui.add(drag).labelled_by(name.id);
+                ui.end_row();
+            }
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_filled_in_is_understood() {
+        let dialog = ForkDialog {
+            choice: 4,
+            frozen: "yaw.alpha, yaw.d".to_owned(),
+            values: "pitch.a=30mm roll.a:1deg".to_owned(),
+            dropped: "12 15".to_owned(),
+            joint_noise_deg: 0.5,
+            imu_noise: 2.0,
+            ..ForkDialog::default()
+        };
+        let changes: ForkChanges = dialog.written().parse().unwrap();
+        let expected = "classical,freeze=yaw.alpha+yaw.d,set=pitch.a:30mm,set=roll.a:1deg,drop=12+15,joint-noise=0.5deg,imu-noise=2";
+        assert_eq!(changes, expected.parse().unwrap());
+        assert_eq!(ForkDialog::default().written(), "");
+        let named = |name: &str| ForkDialog { name: name.to_owned(), ..ForkDialog::default() }.label();
+        assert_eq!(named(" "), Ok(None));
+        assert_eq!(named("mine"), Ok(Some("mine".to_owned())));
+        assert!(named("a/b").unwrap_err().contains("name"));
+    }
+}

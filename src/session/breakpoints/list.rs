@@ -1,0 +1,202 @@
+//! The breakpoints of a session, and where they were hit.
+
+use std::collections::BTreeMap;
+
+use super::evaluate::{Moment, NamedValue};
+use super::expression::Condition;
+use crate::flight_log::Rig;
+use crate::session::{Recording, RunRecord};
+
+/// A step in which a breakpoint was hit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Hit {
+    /// When, since the log began.
+    pub stamp_ns: i64,
+    /// Number of the run.
+    pub run: usize,
+    /// Number of the step in the run.
+    pub step: usize,
+    /// Number of the breakpoint.
+    pub breakpoint: usize,
+}
+
+/// How far a breakpoint has been evaluated over a run, and where it was hit.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Track {
+    read: usize,
+    held: bool,
+    /// Stamp and number of the steps in which the condition became true.
+    hits: Vec<(i64, usize)>,
+}
+
+/// A condition at which the cursor stops.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Breakpoint {
+    /// When it is hit.
+    pub condition: Condition,
+    /// Whether it stops anything.
+    pub enabled: bool,
+    /// By run.
+    tracks: BTreeMap<u64, Track>,
+}
+
+impl Breakpoint {
+    /// One that is enabled and has not been evaluated.
+    pub fn new(condition: Condition) -> Self {
+        Self { condition, enabled: true, tracks: BTreeMap::new() }
+    }
+
+    /// How often it was hit in a run so far.
+    pub fn hit_count(&self, run: &RunRecord) -> usize {
+        self.tracks.get(&run.id).map_or(0, |track| track.hits.len())
+    }
+
+    /// Stamps at which it was hit in a run so far, in order.
+    pub fn hits_ns(&self, run: &RunRecord) -> impl Iterator<Item = i64> {
+        self.tracks.get(&run.id).into_iter().flat_map(|track| track.hits.iter().map(|(stamp_ns, _)| *stamp_ns))
+    }
+
+    fn read(&mut self, runs: &[RunRecord], rig: &Rig) {
+        self.tracks.retain(|id, _| runs.iter().any(|run| run.id == *id));
+        for run in runs {
+            let track = self.tracks.entry(run.id).or_default();
+            for number in track.read..run.steps.len() {
+                let held = moment(run, number, rig).and_then(|moment| self.condition.holds(&moment)) == Some(true);
+                if held && !track.held {
+                    track.hits.push((run.steps[number].report.stamp_ns, number));
+                }
+                track.held = held;
+            }
+            track.read = run.steps.len();
+        }
+    }
+}
+
+/// A step of a run with the one before it.
+fn moment<'a>(run: &'a RunRecord, number: usize, rig: &'a Rig) -> Option<Moment<'a>> {
+    let previous = number.checked_sub(1).and_then(|before| run.steps.get(before));
+    Some(Moment { step: run.steps.get(number)?, previous: previous.map(|step| &**step), rig })
+}
+
+/// All breakpoints, evaluated as far as the runs have come.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Breakpoints {
+    list: Vec<Breakpoint>,
+}
+
+impl Breakpoints {
+    /// The breakpoints in the order in which they were set.
+    pub fn list(&self) -> &[Breakpoint] {
+        &self.list
+    }
+
+    /// Adds one.
+    pub fn add(&mut self, condition: Condition) {
+        self.list.push(Breakpoint::new(condition));
+    }
+
+    /// Takes one away.
+    pub fn remove(&mut self, number: usize) {
+        if number < self.list.len() {
+            self.list.remove(number);
+        }
+    }
+
+    /// Sets one, or takes it away where there is one with the same text.
+    pub fn toggle(&mut self, condition: Condition) {
+        match self.list.iter().position(|known| known.condition.text() == condition.text()) {
+            Some(number) => self.remove(number),
+            None => self.add(condition),
+        }
+    }
+
+    /// Gives one another condition.
+    pub fn change(&mut self, number: usize, condition: Condition) {
+        if let Some(breakpoint) = self.list.get_mut(number) {
+            *breakpoint = Breakpoint { enabled: breakpoint.enabled, ..Breakpoint::new(condition) };
+        }
+    }
+
+    /// Enables one, or disables it.
+    pub fn enable(&mut self, number: usize, enabled: bool) {
+        if let Some(breakpoint) = self.list.get_mut(number) {
+            breakpoint.enabled = enabled;
+        }
+    }
+
+    /// Evaluates all of them over the steps that are new.
+    pub fn read(&mut self, recording: &Recording) {
+        for breakpoint in &mut self.list {
+            breakpoint.read(&recording.runs, &recording.rig);
+        }
+    }
+
+    /// Whether steps have come that have not been evaluated.
+    pub fn is_behind(&self, recording: &Recording) -> bool {
+        let read = |breakpoint: &Breakpoint, run: &RunRecord| breakpoint.tracks.get(&run.id).map(|track| track.read);
+        self.list.iter().any(|breakpoint| {
+            breakpoint.tracks.len() != recording.runs.len()
+                || recording.runs.iter().any(|run| read(breakpoint, run) != Some(run.steps.len()))
+        })
+    }
+
+    /// The hits of enabled breakpoints in all runs, in no order.
+    fn hits<'a>(&'a self, recording: &'a Recording) -> impl Iterator<Item = Hit> + 'a {
+        let enabled = self.list.iter().enumerate().filter(|(_, breakpoint)| breakpoint.enabled);
+        enabled.flat_map(|(number, breakpoint)| {
+            recording.runs.iter().enumerate().flat_map(move |(run, record)| {
+                let hits = breakpoint.tracks.get(&record.id).map_or(&[][..], |track| &track.hits);
+                hits.iter().map(move |(stamp_ns, step)| Hit {
+                    stamp_ns: *stamp_ns,
+                    run,
+                    step: *step,
+                    breakpoint: number,
+                })
+            })
+        })
+    }
+
+    /// The first hit of an enabled breakpoint after a time.
+    pub fn next_after(&self, recording: &Recording, stamp_ns: i64) -> Option<Hit> {
+        let after = self.hits(recording).filter(|hit| hit.stamp_ns > stamp_ns);
+        after.min_by_key(|hit| (hit.stamp_ns, hit.run, hit.breakpoint))
+    }
+
+    /// The last hit of an enabled breakpoint before a time.
+    pub fn last_before(&self, recording: &Recording, stamp_ns: i64) -> Option<Hit> {
+        let before = self.hits(recording).filter(|hit| hit.stamp_ns < stamp_ns);
+        before.min_by_key(|hit| (std::cmp::Reverse(hit.stamp_ns), hit.run, hit.breakpoint))
+    }
+
+    /// What a breakpoint asks for, with the values of a step.
+    pub fn values_at(&self, recording: &Recording, hit: Hit) -> Vec<NamedValue> {
+        let run = recording.runs.get(hit.run);
+        let moment = run.and_then(|run| moment(run, hit.step, &recording.rig));
+        let breakpoint = self.list.get(hit.breakpoint);
+        breakpoint.zip(moment).map_or_else(Vec::new, |(breakpoint, moment)| breakpoint.condition.values(&moment))
+    }
+
+    /// A hit in one line: `rank < 18 in auto at 4.250 s, frame 85: rank = 17`.
+    pub fn describe(&self, recording: &Recording, hit: Hit) -> String {
+        let Some((breakpoint, run)) = self.list.get(hit.breakpoint).zip(recording.runs.get(hit.run)) else {
+            return String::new();
+        };
+        let frame = run.steps.get(hit.step).map_or(0, |step| step.report.frame_index);
+        let time_s = crate::geometry::seconds_from_ns(hit.stamp_ns);
+        let values = self.values_at(recording, hit);
+        let values: Vec<String> = values.iter().map(NamedValue::to_string).collect();
+        let values = if values.is_empty() { String::new() } else { format!(": {}", values.join(", ")) };
+        format!("{} in {} at {time_s:.3} s, frame {frame}{values}", breakpoint.condition, run.spec.label)
+    }
+}
+
+impl std::fmt::Display for NamedValue {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self.value {
+            Some(value) if value.fract() == 0.0 && value.abs() < 1e9 => write!(formatter, "{} = {value}", self.name),
+            Some(value) if (1e-3..1e6).contains(&value.abs()) => write!(formatter, "{} = {value:.4}", self.name),
+            Some(value) => write!(formatter, "{} = {value:.3e}", self.name),
+            None => write!(formatter, "{} is missing", self.name),
+        }
+    }
+}

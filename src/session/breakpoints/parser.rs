@@ -1,0 +1,387 @@
+//! From words to a condition, with a message for every mistake.
+
+use super::expression::{Arithmetic, Condition, ConditionProblem, Number, Span, Truth};
+use super::lexer::{Token, words};
+use super::quantities::{CAUSES, EVENTS, FACTORS, FLAGS, NAMED, NUMBERS, NamedNumber};
+
+/// Brackets and signs within each other; more is a mistake and would take too much of the stack.
+const DEEPEST: usize = 60;
+/// Units behind a number, and what they are in radians, metres, seconds or pixels.
+const UNITS: [(&str, f64); 11] = [
+    ("deg", std::f64::consts::PI / 180.0),
+    ("°", std::f64::consts::PI / 180.0),
+    ("mrad", 1e-3),
+    ("rad", 1.0),
+    ("um", 1e-6),
+    ("mm", 1e-3),
+    ("cm", 1e-2),
+    ("m", 1.0),
+    ("ms", 1e-3),
+    ("s", 1.0),
+    ("px", 1.0),
+];
+/// Functions of numbers.
+const FUNCTIONS: [&str; 5] = ["singular", "rise", "abs", "min", "max"];
+
+/// A part of which it is not yet known what it must be.
+enum Part {
+    Number(Number),
+    Truth(Truth),
+}
+
+struct Parser<'a> {
+    text: &'a str,
+    words: Vec<(Token, Span)>,
+    at: usize,
+    depth: usize,
+}
+
+type Result<T> = std::result::Result<T, ConditionProblem>;
+
+/// Reads a condition.
+pub(super) fn parse(text: &str) -> Result<Condition> {
+    let mut parser = Parser { text, words: words(text)?, at: 0, depth: 0 };
+    if matches!(parser.peek(), Token::End) {
+        return Err(parser.problem_at(0, "a condition is missing, such as 'rank < 18 or features < 40'"));
+    }
+    let begin = parser.begin();
+    let part = parser.alternatives()?;
+    match parser.peek() {
+        Token::End => {}
+        Token::Close => return Err(parser.problem("this bracket closes nothing")),
+        Token::Compare(_) => return Err(parser.problem("comparisons do not chain: write 'a < b and b < c'")),
+        _ => return Err(parser.problem("expected 'and', 'or' or the end of the condition")),
+    }
+    let truth = parser.truth(part, begin)?;
+    Ok(Condition { text: text.to_owned(), truth })
+}
+
+impl Parser<'_> {
+    fn peek(&self) -> &Token {
+        &self.words[self.at.min(self.words.len() - 1)].0
+    }
+
+    fn span(&self) -> Span {
+        self.words[self.at.min(self.words.len() - 1)].1
+    }
+
+    fn begin(&self) -> usize {
+        self.span().begin
+    }
+
+    /// Where the word before ends.
+    fn end(&self) -> usize {
+        self.words[self.at.saturating_sub(1)].1.end
+    }
+
+    fn next(&mut self) -> Token {
+        let token = self.peek().clone();
+        self.at += 1;
+        token
+    }
+
+    fn take(&mut self, wanted: &Token) -> bool {
+        let found = self.peek() == wanted;
+        self.at += usize::from(found);
+        found
+    }
+
+    fn problem(&self, message: impl Into<String>) -> ConditionProblem {
+        self.problem_at(self.begin(), message)
+    }
+
+    fn problem_at(&self, at: usize, message: impl Into<String>) -> ConditionProblem {
+        ConditionProblem { text: self.text.to_owned(), column: at + 1, message: message.into() }
+    }
+
+    fn truth(&self, part: Part, begin: usize) -> Result<Truth> {
+        match part {
+            Part::Truth(truth) => Ok(truth),
+            Part::Number(_) => Err(self.problem_at(begin, "this is a number; compare it, as in 'rank < 18'")),
+        }
+    }
+
+    fn number(&self, part: Part, begin: usize) -> Result<Number> {
+        match part {
+            Part::Number(number) => Ok(number),
+            Part::Truth(_) => Err(self.problem_at(begin, "this is true or false, where a number is needed")),
+        }
+    }
+
+    fn alternatives(&mut self) -> Result<Part> {
+        self.joined(&Token::Or, Self::conjunction, Truth::Or)
+    }
+
+    fn conjunction(&mut self) -> Result<Part> {
+        self.joined(&Token::And, Self::negation, Truth::And)
+    }
+
+    fn joined(
+        &mut self,
+        sign: &Token,
+        part: fn(&mut Self) -> Result<Part>,
+        join: fn(Box<Truth>, Box<Truth>) -> Truth,
+    ) -> Result<Part> {
+        let begin = self.begin();
+        let mut left = part(self)?;
+        while self.take(sign) {
+            let right_begin = self.begin();
+            let right = part(self)?;
+            let (first, second) = (self.truth(left, begin)?, self.truth(right, right_begin)?);
+            left = Part::Truth(join(Box::new(first), Box::new(second)));
+        }
+        Ok(left)
+    }
+
+    fn negation(&mut self) -> Result<Part> {
+        if !self.take(&Token::Not) {
+            return self.comparison();
+        }
+        let begin = self.begin();
+        let inner = self.deeper(Self::negation)?;
+        Ok(Part::Truth(Truth::Not(Box::new(self.truth(inner, begin)?))))
+    }
+
+    fn comparison(&mut self) -> Result<Part> {
+        let begin = self.begin();
+        let left = self.sum()?;
+        let Token::Compare(comparison) = *self.peek() else { return Ok(left) };
+        self.at += 1;
+        let right_begin = self.begin();
+        let right = self.sum()?;
+        let (left, right) = (self.number(left, begin)?, self.number(right, right_begin)?);
+        Ok(Part::Truth(Truth::Compared(comparison, left, right)))
+    }
+
+    fn sum(&mut self) -> Result<Part> {
+        self.combined(Self::product, |token| match token {
+            Token::Plus => Some(Arithmetic::Sum),
+            Token::Minus => Some(Arithmetic::Difference),
+            _ => None,
+        })
+    }
+
+    fn product(&mut self) -> Result<Part> {
+        self.combined(Self::signed, |token| match token {
+            Token::Times => Some(Arithmetic::Product),
+            Token::Over => Some(Arithmetic::Quotient),
+            _ => None,
+        })
+    }
+
+    fn combined(
+        &mut self,
+        part: fn(&mut Self) -> Result<Part>,
+        sign: fn(&Token) -> Option<Arithmetic>,
+    ) -> Result<Part> {
+        let begin = self.begin();
+        let mut left = part(self)?;
+        while let Some(arithmetic) = sign(self.peek()) {
+            self.at += 1;
+            let right_begin = self.begin();
+            let right = part(self)?;
+            let (first, second) = (self.number(left, begin)?, self.number(right, right_begin)?);
+            left = Part::Number(Number::Combined(arithmetic, Box::new(first), Box::new(second)));
+        }
+        Ok(left)
+    }
+
+    fn signed(&mut self) -> Result<Part> {
+        if !self.take(&Token::Minus) {
+            return self.primary();
+        }
+        let begin = self.begin();
+        let inner = self.deeper(Self::signed)?;
+        Ok(Part::Number(Number::Negated(Box::new(self.number(inner, begin)?))))
+    }
+
+    fn deeper(&mut self, part: fn(&mut Self) -> Result<Part>) -> Result<Part> {
+        if self.depth == DEEPEST {
+            return Err(self.problem(format!("more than {DEEPEST} brackets and signs within each other")));
+        }
+        self.depth += 1;
+        let result = part(self);
+        self.depth -= 1;
+        result
+    }
+
+    fn primary(&mut self) -> Result<Part> {
+        let begin = self.begin();
+        match self.next() {
+            Token::Number(value) => Ok(Part::Number(Number::Literal(value * self.unit()?))),
+            Token::Open => {
+                let inner = self.deeper(Self::alternatives)?;
+                if !self.take(&Token::Close) {
+                    let message = format!("expected ')' for the bracket at column {}", begin + 1);
+                    return Err(self.problem(message));
+                }
+                Ok(inner)
+            }
+            Token::Name(name) if *self.peek() == Token::Open => self.call(&name, begin),
+            Token::Name(name) => self.plain(&name, begin),
+            Token::End => Err(self.problem_at(begin, "the condition ends here: expected a quantity, a number or '('")),
+            _ => Err(self.problem_at(begin, "expected a quantity such as 'rank', a number or '('")),
+        }
+    }
+
+    /// The unit behind a number, as a factor.
+    fn unit(&mut self) -> Result<f64> {
+        if self.take(&Token::Percent) {
+            return Ok(0.01);
+        }
+        let Token::Name(name) = self.peek() else { return Ok(1.0) };
+        let unit = UNITS.iter().find(|(unit, _)| unit == name).map(|(_, factor)| *factor);
+        let unit = unit.ok_or_else(|| {
+            let known: Vec<&str> = UNITS.iter().map(|(unit, _)| *unit).collect();
+            self.problem(format!("expected 'and', 'or' or a unit ({} or %) in place of '{name}'", known.join(", ")))
+        })?;
+        self.at += 1;
+        Ok(unit)
+    }
+
+    fn plain(&self, name: &str, begin: usize) -> Result<Part> {
+        let span = Span { begin, end: self.end() };
+        if let Some(number) = NUMBERS.iter().find(|known| known.name == name) {
+            return Ok(Part::Number(Number::Quantity(*number, span)));
+        }
+        if let Some(flag) = FLAGS.iter().find(|known| known.name == name) {
+            return Ok(Part::Truth(Truth::Flag(*flag)));
+        }
+        match name {
+            "true" => return Ok(Part::Truth(Truth::Literal(true))),
+            "false" => return Ok(Part::Truth(Truth::Literal(false))),
+            _ => {}
+        }
+        if let Some((name, _, example, _)) = NAMED.iter().find(|(known, ..)| *known == name) {
+            return Err(self.problem_at(begin, format!("'{name}' needs a name in brackets: {name}({example})")));
+        }
+        if name == "event" {
+            return Err(self.problem_at(begin, "'event' needs a kind in brackets: event(marginalized)"));
+        }
+        if FUNCTIONS.contains(&name) {
+            return Err(self.problem_at(begin, format!("'{name}' needs brackets: {name}(…)")));
+        }
+        let known = NUMBERS.iter().map(|known| known.name).chain(FLAGS.iter().map(|known| known.name));
+        let known = known.chain(NAMED.iter().map(|(name, ..)| *name)).chain(FUNCTIONS).chain(["event"]);
+        Err(self.problem_at(begin, unknown("quantity", name, known)))
+    }
+
+    /// A name with brackets behind it.
+    fn call(&mut self, name: &str, begin: usize) -> Result<Part> {
+        self.at += 1;
+        let inside = self.begin();
+        let part = match name {
+            "event" => {
+                let kind = self.name("a kind of event")?;
+                let kinds = EVENTS.iter().find(|(known, _)| *known == kind).map(|(_, kinds)| kinds.to_vec());
+                let known = EVENTS.iter().map(|(known, _)| *known);
+                let kinds = kinds.ok_or_else(|| self.problem_at(inside, unknown("kind of event", &kind, known)))?;
+                self.close(begin)?;
+                Part::Truth(Truth::Event(kinds, Span { begin, end: self.end() }))
+            }
+            "singular" => {
+                let Token::Number(number) = self.next() else {
+                    return Err(self.problem_at(inside, "expected the number of a singular value, 1 for the largest"));
+                };
+                if number < 1.0 || number.fract() != 0.0 || number > 1e6 {
+                    return Err(self.problem_at(inside, "singular values are counted from 1, the largest first"));
+                }
+                self.close(begin)?;
+                Part::Number(Number::Singular(number as usize, Span { begin, end: self.end() }))
+            }
+            "rise" => {
+                let inner = self.argument()?;
+                self.close(begin)?;
+                Part::Number(Number::Rise(Box::new(inner), Span { begin, end: self.end() }))
+            }
+            "abs" => {
+                let inner = self.argument()?;
+                self.close(begin)?;
+                Part::Number(Number::Absolute(Box::new(inner)))
+            }
+            "min" | "max" => {
+                let first = self.argument()?;
+                if !self.take(&Token::Comma) {
+                    return Err(self.problem(format!("expected ',' and a second number: {name}(x, y)")));
+                }
+                let second = self.argument()?;
+                self.close(begin)?;
+                let arithmetic = if name == "min" { Arithmetic::Least } else { Arithmetic::Greatest };
+                Part::Number(Number::Combined(arithmetic, Box::new(first), Box::new(second)))
+            }
+            _ => Part::Number(self.named(name, begin)?),
+        };
+        Ok(part)
+    }
+
+    fn named(&mut self, function: &str, begin: usize) -> Result<Number> {
+        let inside = self.begin();
+        let Some((_, kind, example, _)) = NAMED.iter().find(|(known, ..)| *known == function) else {
+            let plain =
+                NUMBERS.iter().any(|known| known.name == function) || FLAGS.iter().any(|known| known.name == function);
+            if plain {
+                return Err(self.problem_at(inside - 1, format!("'{function}' takes no brackets")));
+            }
+            let known = NAMED.iter().map(|(name, ..)| *name).chain(FUNCTIONS).chain(["event"]);
+            return Err(self.problem_at(begin, unknown("function", function, known)));
+        };
+        let name = self.name(&format!("a name, as in {function}({example})"))?;
+        let choices: &[&str] = match kind {
+            NamedNumber::Lost => &CAUSES,
+            NamedNumber::Chi2 | NamedNumber::Nis => &FACTORS,
+            _ => &[],
+        };
+        if !choices.is_empty() && !choices.contains(&name.as_str()) {
+            let what = if *kind == NamedNumber::Lost { "cause" } else { "factor" };
+            return Err(self.problem_at(inside, unknown(what, &name, choices.iter().copied())));
+        }
+        self.close(begin)?;
+        Ok(Number::Named(*kind, name, Span { begin, end: self.end() }))
+    }
+
+    fn argument(&mut self) -> Result<Number> {
+        let begin = self.begin();
+        let part = self.deeper(Self::sum)?;
+        self.number(part, begin)
+    }
+
+    fn name(&mut self, expected: &str) -> Result<String> {
+        let begin = self.begin();
+        match self.next() {
+            Token::Name(name) | Token::Quoted(name) => Ok(name),
+            _ => Err(self.problem_at(begin, format!("expected {expected}"))),
+        }
+    }
+
+    fn close(&mut self, begin: usize) -> Result<()> {
+        if self.take(&Token::Close) {
+            return Ok(());
+        }
+        Err(self.problem(format!("expected ')' for what begins at column {}", begin + 1)))
+    }
+}
+
+/// Says that a name is not known, and which are; the nearest one first where there is one.
+fn unknown<'a>(what: &str, name: &str, known: impl Iterator<Item = &'a str>) -> String {
+    let known: Vec<&str> = known.collect();
+    let near = known.iter().map(|known| (distance(name, known), *known)).min().filter(|(far, _)| *far <= 2);
+    match near {
+        Some((_, near)) => format!("there is no {what} '{name}'; do you mean '{near}'?"),
+        None => format!("there is no {what} '{name}'; expected one of {}", known.join(", ")),
+    }
+}
+
+/// How many letters have to be changed, put in or taken out.
+fn distance(from: &str, to: &str) -> usize {
+    let to: Vec<char> = to.chars().collect();
+    let mut row: Vec<usize> = (0..=to.len()).collect();
+    for (index, letter) in from.chars().enumerate() {
+        let mut diagonal = std::mem::replace(&mut row[0], index + 1);
+        for (place, other) in to.iter().enumerate() {
+            let changed = diagonal + usize::from(letter != *other);
+            diagonal = row[place + 1];
+            row[place + 1] = changed.min(diagonal + 1).min(row[place] + 1);
+        }
+    }
+    row[to.len()]
+}

@@ -1,0 +1,185 @@
+//! What a condition can ask of a step: the names, and where the values come from.
+
+use crate::estimator::{EventKind, Phase};
+use crate::geometry::seconds_from_ns;
+use crate::session::StepRecord;
+
+/// A number that every step may have.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct NumberName {
+    pub(super) name: &'static str,
+    meaning: &'static str,
+    value: fn(&StepRecord) -> Option<f64>,
+}
+
+impl NumberName {
+    pub(super) fn of(self, step: &StepRecord) -> Option<f64> {
+        (self.value)(step).filter(|value| value.is_finite())
+    }
+}
+
+impl PartialEq for NumberName {
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name
+    }
+}
+
+const fn number(name: &'static str, meaning: &'static str, value: fn(&StepRecord) -> Option<f64>) -> NumberName {
+    NumberName { name, meaning, value }
+}
+
+/// All of them.
+pub(super) const NUMBERS: &[NumberName] = &[
+    number("rank", "structural rank of the calibration", |step| Some(step.rank.as_ref()?.rank_structural as f64)),
+    number("rank_informed", "informed rank", |step| Some(step.rank.as_ref()?.rank_informed as f64)),
+    number("columns", "calibration columns", |step| Some(step.rank.as_ref()?.names.len() as f64)),
+    number("singular_min", "smallest singular value", |step| step.rank.as_ref()?.singular_values.last().copied()),
+    number("margin", "least margin to a lock of the chart", |step| {
+        step.report.calibration.margins.iter().map(|(_, margin)| *margin).reduce(f64::min)
+    }),
+    number("features", "features in the image", |step| Some(step.tracks.features.len() as f64)),
+    number("solved", "features that took part in the solve", |step| {
+        tracking(step).then_some(step.report.counts.solved as f64)
+    }),
+    number("inliers", "of them not rejected", |step| tracking(step).then_some(step.report.counts.inliers() as f64)),
+    number("outliers", "of them rejected", |step| tracking(step).then_some(step.report.counts.rejected as f64)),
+    number("rms", "reprojection RMS after the solve, px", |step| {
+        tracking(step).then_some(step.report.reprojection_rms_after_px)
+    }),
+    number("rms_before", "the same before the solve, px", |step| {
+        tracking(step).then_some(step.report.reprojection_rms_before_px)
+    }),
+    number("chi2", "χ² of all factors after the solve", |step| {
+        let summaries = &step.report.residuals;
+        (!summaries.is_empty()).then(|| summaries.iter().map(|summary| summary.chi2_after).sum())
+    }),
+    number("nis", "χ² over the number of residuals", |step| {
+        let summaries = &step.report.residuals;
+        let count: usize = summaries.iter().map(|summary| summary.count).sum();
+        (count > 0).then(|| summaries.iter().map(|summary| summary.chi2_after).sum::<f64>() / count as f64)
+    }),
+    number("cost", "cost after the last iteration", |step| Some(step.report.iterations.last()?.cost_after)),
+    number("cost_before", "cost before the first iteration", |step| Some(step.report.iterations.first()?.cost_before)),
+    number("cost_rise", "largest share by which an iteration raised the cost", |step| {
+        let rises = step.report.iterations.iter().map(|it| it.cost_after / it.cost_before - 1.0);
+        rises.map(|rise| rise.max(0.0)).reduce(f64::max)
+    }),
+    number("iterations", "iterations of the solver", |step| Some(step.report.iterations.len() as f64)),
+    number("rejected_iterations", "iterations that were not taken", |step| {
+        Some(step.report.iterations.iter().filter(|iteration| !iteration.accepted).count() as f64)
+    }),
+    number("speed", "speed, m/s", |step| Some(step.report.newest()?.velocity_m_per_s.norm())),
+    number("gyro_bias", "norm of the gyroscope's bias, rad/s", |step| {
+        Some(step.report.newest()?.gyroscope_bias_rad_per_s.norm())
+    }),
+    number("accel_bias", "norm of the accelerometer's bias, m/s²", |step| {
+        Some(step.report.newest()?.accelerometer_bias_m_per_s2.norm())
+    }),
+    number("restarts", "restarts so far", |step| Some(step.report.restarts as f64)),
+    number("frame", "number of the image", |step| Some(step.report.frame_index as f64)),
+    number("time", "seconds since the log began", |step| Some(seconds_from_ns(step.report.stamp_ns))),
+];
+
+fn tracking(step: &StepRecord) -> bool {
+    step.report.phase == Phase::Tracking
+}
+
+/// A number that goes by a name in brackets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum NamedNumber {
+    Sigma,
+    PriorSigma,
+    Value,
+    Joint,
+    Margin,
+    Lost,
+    Chi2,
+    Nis,
+}
+
+/// All of them: what they are called, what goes into the brackets, what they mean.
+pub(super) const NAMED: [(&str, NamedNumber, &str, &str); 8] = [
+    ("sigma", NamedNumber::Sigma, "yaw.alpha", "standard deviation of a parameter, rad or m"),
+    ("prior_sigma", NamedNumber::PriorSigma, "yaw.alpha", "its prior standard deviation"),
+    ("value", NamedNumber::Value, "yaw.alpha", "value of a parameter, rad or m"),
+    ("joint", NamedNumber::Joint, "yaw", "estimated joint angle, rad"),
+    ("margin", NamedNumber::Margin, "end", "margin to one lock of the chart"),
+    ("lost", NamedNumber::Lost, "motion", "columns lost to parameterization, joints, absorbed or motion"),
+    ("chi2", NamedNumber::Chi2, "visual", "χ² of a factor after the solve"),
+    ("nis", NamedNumber::Nis, "imu", "χ² of a factor over its number of residuals"),
+];
+
+/// Causes of lost rank.
+pub(super) const CAUSES: [&str; 4] = ["parameterization", "joints", "absorbed", "motion"];
+
+/// Factors, spaces written as underscores.
+pub(super) const FACTORS: [&str; 6] =
+    ["visual", "imu", "encoder", "calibration_prior", "marginalization_prior", "standstill"];
+
+/// Something that a step is or is not.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct FlagName {
+    pub(super) name: &'static str,
+    meaning: &'static str,
+    value: fn(&StepRecord) -> bool,
+}
+
+impl PartialEq for FlagName {
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name
+    }
+}
+
+impl FlagName {
+    pub(super) fn of(self, step: &StepRecord) -> bool {
+        (self.value)(step)
+    }
+}
+
+/// All of them.
+pub(super) const FLAGS: &[FlagName] = &[
+    FlagName { name: "tracking", meaning: "the window runs", value: tracking },
+    FlagName { name: "initializing", meaning: "it waits for a window", value: |step| !tracking(step) },
+    FlagName { name: "keyframe", meaning: "the frame is a keyframe", value: |step| step.report.keyframe },
+    FlagName {
+        name: "warning",
+        meaning: "the step warns of something",
+        value: |step| !step.report.warnings.is_empty(),
+    },
+];
+
+/// Names of kinds of events.
+pub(super) const EVENTS: [(&str, &[EventKind]); 10] = [
+    ("waits", &[EventKind::InitializationWaits]),
+    ("initialized", &[EventKind::InitializedFromMotion, EventKind::InitializedFromStandstill]),
+    ("keyframe_decided", &[EventKind::KeyframeChosen]),
+    ("marginalized", &[EventKind::OldestMarginalized]),
+    ("dropped", &[EventKind::SecondNewestMarginalized]),
+    ("outliers", &[EventKind::OutliersRejected]),
+    ("standstill", &[EventKind::Standstill]),
+    ("failure", &[EventKind::Failure]),
+    ("chart_switched", &[EventKind::ChartSwitched]),
+    ("missing", &[EventKind::MeasurementMissing]),
+];
+
+/// Everything that a condition can ask for, how it is written and what it means.
+pub fn quantity_help() -> Vec<(String, &'static str)> {
+    let numbers = NUMBERS.iter().map(|it| (it.name.to_owned(), it.meaning));
+    let named = NAMED.iter().map(|(name, _, example, meaning)| (format!("{name}({example})"), *meaning));
+    let functions = [
+        ("singular(1)", "a singular value, the largest first"),
+        ("rise(x)", "change since the step before"),
+        ("abs(x)", "magnitude"),
+        ("min(x, y)", "the lesser"),
+        ("max(x, y)", "the greater"),
+    ];
+    let flags = FLAGS.iter().map(|it| (it.name.to_owned(), it.meaning));
+    let events: Vec<&str> = EVENTS.iter().map(|(name, _)| *name).collect();
+    let events = (format!("event({})", events.join("|")), "something of this kind happened");
+    numbers
+        .chain(named)
+        .chain(functions.map(|(name, meaning)| (name.to_owned(), meaning)))
+        .chain(flags)
+        .chain(std::iter::once(events))
+        .collect()
+}

@@ -1,0 +1,232 @@
+//! Forks over a synthetic flight, and a session that stops at breakpoints and forks there.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use super::breakpoints::Condition;
+use super::configuration::estimator_config;
+use super::forks::ForkChanges;
+use super::history::History;
+use super::instants::Instant;
+use super::material::Material;
+use super::memory_tests::tracked;
+use super::run_engine::RunEngine;
+use super::{Command, RunSpec, Session, SessionPlan, SessionRequest, StepRecord};
+use crate::estimator::{Phase, StageTimes};
+use crate::simulation::{SyntheticFlight, SyntheticOptions, synthetic_tracks};
+
+/// A run over a synthetic flight and the way that it took.
+struct Flown {
+    flight: SyntheticFlight,
+    history: Arc<History>,
+    steps: Vec<StepRecord>,
+}
+
+fn flown(spec: &str) -> Flown {
+    let flight = synthetic_tracks(&SyntheticOptions { duration_s: 6.0, ..SyntheticOptions::default() });
+    let spec: RunSpec = spec.parse().unwrap();
+    let config = estimator_config(&flight.given_rig, &spec).unwrap();
+    let sigma_rad = config.encoder_sigma_rad.unwrap();
+    let mut engine = RunEngine::new(config, None);
+    let history = Arc::new(History::new(usize::MAX));
+    let steps = flight.frames.iter().enumerate().map(|(step, frame)| {
+        let material = Arc::new(Material::of(&Instant::of_one(Arc::new(tracked(frame, sigma_rad)))));
+        history.materials().push(Arc::clone(&material));
+        history.before_step(step, &engine, &material);
+        engine.step(&material)
+    });
+    let steps = steps.collect();
+    Flown { flight, history, steps }
+}
+
+impl Flown {
+    /// Steps of a fork from a step on.
+    fn forked(&self, begin: usize, changes: &str) -> Result<Vec<StepRecord>, String> {
+        let changes: ForkChanges = changes.parse().map_err(|error: super::ForkError| error.to_string())?;
+        let mut engine = self.history.engine_before(begin).unwrap();
+        changes.apply(&mut engine, &self.flight.given_rig).map_err(|error| error.to_string())?;
+        let materials = (begin..self.steps.len()).map(|step| self.history.materials().get(step).unwrap());
+        Ok(materials.map(|material| engine.step(&material)).collect())
+    }
+}
+
+fn bits(record: &StepRecord) -> String {
+    let mut record = record.clone();
+    record.report.times = StageTimes::default();
+    format!("{record:?}")
+}
+
+/// Distance of the newest positions, in metres.
+fn apart_m(one: &StepRecord, other: &StepRecord) -> f64 {
+    let at = |record: &StepRecord| record.report.newest().unwrap().world_from_imu.translation_m;
+    (at(one) - at(other)).norm()
+}
+
+fn parameter(record: &StepRecord, name: &str) -> (f64, f64) {
+    let calibration = &record.report.calibration;
+    let index = calibration.names.iter().position(|known| known == name).unwrap();
+    (calibration.values[index], calibration.sigmas[index])
+}
+
+const FORK_AT: usize = 90;
+
+#[test]
+fn a_fork_without_changes_is_its_parent() {
+    let parent = flown("auto");
+    for (again, step) in parent.forked(FORK_AT, "").unwrap().iter().zip(&parent.steps[FORK_AT..]) {
+        assert_eq!(bits(again), bits(step));
+    }
+}
+
+#[test]
+fn a_fork_goes_on_in_another_parameterization() {
+    let parent = flown("minimal");
+    let tracking = |step: &StepRecord| step.report.phase == Phase::Tracking && step.report.restarts == 0;
+    for (changes, columns) in [("classical", 24), ("poe", 18), ("minimal-swapped", 18), ("auto", 18)] {
+        let fork = parent.forked(FORK_AT, changes).unwrap();
+        for (fork, parent) in fork.iter().zip(&parent.steps[FORK_AT..]) {
+            assert!(tracking(fork) && fork.report.calibration.names.len() == columns, "{changes}");
+            let apart_m = apart_m(fork, parent);
+            assert!(apart_m < 0.01, "{changes}: {apart_m} m from the parent");
+        }
+    }
+    // The other way round the redundant columns go.
+    let parent = flown("classical");
+    for (fork, parent) in parent.forked(FORK_AT, "minimal").unwrap().iter().zip(&parent.steps[FORK_AT..]) {
+        assert!(tracking(fork) && fork.rank.as_ref().unwrap().deficit_parameterization == 0);
+        assert!(apart_m(fork, parent) < 0.01, "{} m from the parent", apart_m(fork, parent));
+    }
+}
+
+#[test]
+fn frozen_parameters_stay_and_changed_ones_start_elsewhere() {
+    let parent = flown("auto");
+    let before = &parent.steps[FORK_AT - 1];
+    let (held, _) = parameter(before, "L2.alpha");
+    let fork = parent.forked(FORK_AT, "freeze=L2.alpha").unwrap();
+    for step in &fork {
+        let (value, sigma) = parameter(step, "L2.alpha");
+        assert!((value - held).abs() < 1e-12 && sigma == 0.0, "{value} {sigma}");
+    }
+    let moved = |name: &str| (parameter(&fork[20], name).0 - parameter(before, name).0).abs();
+    assert!(moved("L2.a") > 1e-9 && parameter(&fork[20], "L2.a").1 > 0.0);
+
+    let elsewhere = format!("freeze=L2.alpha,set=L2.alpha:{}", held + 0.05);
+    let fork = parent.forked(FORK_AT, &elsewhere).unwrap();
+    assert!((parameter(&fork[0], "L2.alpha").0 - held - 0.05).abs() < 1e-12);
+    // A parameter that is only set is found again.
+    let fork = parent.forked(FORK_AT, &format!("set=L2.alpha:{}", held + 0.05)).unwrap();
+    let found = parameter(fork.last().unwrap(), "L2.alpha").0;
+    assert!((found - held).abs() < 0.01, "{found} after {held}");
+}
+
+#[test]
+fn measurements_can_be_dropped_and_disturbed() {
+    let parent = flown("auto");
+    let ids: Vec<String> = parent.steps[FORK_AT].report.features[..8].iter().map(|it| it.id.0.to_string()).collect();
+    let fork = parent.forked(FORK_AT, &format!("drop={}", ids.join("+"))).unwrap();
+    let used = |steps: &[StepRecord], id: &String| {
+        steps.iter().flat_map(|step| &step.report.features).any(|feature| feature.id.0.to_string() == *id)
+    };
+    assert!(ids.iter().all(|id| used(&parent.steps[FORK_AT..], id) && !used(&fork, id)));
+
+    let chi2 = |steps: &[StepRecord], factor: &str| -> f64 {
+        let of = |step: &StepRecord| step.report.residuals.iter().find(|it| it.factor == factor).unwrap().chi2_after;
+        steps.iter().map(of).sum()
+    };
+    let usual = chi2(&parent.steps[FORK_AT..], "encoder");
+    let noisy = parent.forked(FORK_AT, "joint-noise=2deg").unwrap();
+    assert!(chi2(&noisy, "encoder") > 2.0 * usual, "{} after {usual}", chi2(&noisy, "encoder"));
+    assert_eq!(noisy.iter().map(bits).collect::<Vec<_>>(), {
+        let again = parent.forked(FORK_AT, "joint-noise=2deg").unwrap();
+        again.iter().map(bits).collect::<Vec<_>>()
+    });
+    let lax = parent.forked(FORK_AT, "encoder-noise=10").unwrap();
+    // Frames that were in the window already keep what they were told.
+    assert!(chi2(&lax, "encoder") < 0.8 * usual, "{} after {usual}", chi2(&lax, "encoder"));
+    let visual = chi2(&parent.steps[FORK_AT..], "visual");
+    let lax = parent.forked(FORK_AT, "pixel-noise=3").unwrap();
+    assert!(chi2(&lax, "visual") < 0.5 * visual);
+    // Intervals in the window keep their noise, so that only the result tells: the new ones pull less.
+    let lax = parent.forked(FORK_AT, "imu-noise=10").unwrap();
+    assert!(apart_m(lax.last().unwrap(), parent.steps.last().unwrap()) > 1e-6);
+}
+
+#[test]
+fn what_cannot_be_changed_is_told() {
+    let problem = flown("auto").forked(FORK_AT, "freeze=L2.alfa").unwrap_err();
+    assert!(problem.contains("'L2.alfa'") && problem.contains("L2.alpha"), "{problem}");
+    let problem = flown("auto:calibrate=off").forked(FORK_AT, "freeze=L2.alpha").unwrap_err();
+    assert!(problem.contains("calibrate=off"), "{problem}");
+}
+
+#[test]
+fn a_run_that_waits_can_be_forked_too() {
+    let parent = flown("minimal");
+    let first = parent.steps.iter().position(|step| step.report.phase == Phase::Tracking).unwrap();
+    let fork = parent.forked(first - 2, "classical").unwrap();
+    let begun = fork.iter().find(|step| step.report.phase == Phase::Tracking).unwrap();
+    assert_eq!(begun.report.calibration.names.len(), 24);
+    assert_eq!(begun.report.stamp_ns, parent.steps[first].report.stamp_ns);
+}
+
+#[test]
+fn a_session_stops_at_breakpoints_and_forks_there() {
+    let request = SessionRequest {
+        log_path: PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("sample_logs/garden.mcap"),
+        duration_s: Some(4.0),
+        ..SessionRequest::default()
+    };
+    let mut session = Session::start(SessionPlan::open(&request).unwrap()).unwrap();
+    let finished = |session: &mut Session| {
+        while session.recording().runs.iter().any(|run| !run.finished) || session.is_running_on() {
+            session.advance(0.0);
+            std::thread::sleep(std::time::Duration::from_millis(10));
+        }
+    };
+    session.apply(Command::GoToStart);
+    session.apply(Command::RunToBreakpoint { forward: true });
+    assert!(session.take_notices().pop().unwrap().contains("There is no breakpoint"));
+    let condition: Condition = "tracking and features > 20".parse().unwrap();
+    session.apply(Command::AddBreakpoint(condition));
+    session.apply(Command::RunToBreakpoint { forward: true });
+    finished(&mut session);
+    let stop_ns = session.cursor_ns();
+    let recording = session.recording();
+    let parent = &recording.runs[0];
+    let first = parent.steps.iter().position(|step| step.report.phase == Phase::Tracking).unwrap();
+    assert_eq!(stop_ns, parent.steps[first].report.stamp_ns);
+    let notice = session.take_notices().pop().unwrap();
+    assert!(notice.contains("tracking and features > 20 in auto at") && notice.contains("features = "), "{notice}");
+    // Playing over it stops there as well, and back from the end.
+    session.apply(Command::GoToStart);
+    session.apply(Command::Play);
+    session.advance(100.0);
+    assert_eq!((session.cursor_ns(), session.is_playing()), (stop_ns, false));
+    session.apply(Command::GoToEnd);
+    session.apply(Command::RunToBreakpoint { forward: false });
+    assert_eq!(session.cursor_ns(), stop_ns);
+
+    let at = first + 5;
+    session.apply(Command::Seek { stamp_ns: parent.steps[at].report.stamp_ns });
+    session.apply(Command::Fork { run: 0, changes: ForkChanges::default(), label: Some("twin".to_owned()) });
+    session.apply(Command::Fork { run: 0, changes: "classical".parse().unwrap(), label: None });
+    session.apply(Command::Fork { run: 0, changes: "freeze=nothing".parse().unwrap(), label: None });
+    assert!(session.take_notices().pop().unwrap().contains("'nothing'"));
+    finished(&mut session);
+    let recording = session.recording();
+    let [parent, twin, classical] = recording.runs.as_slice() else { panic!("{} runs", recording.runs.len()) };
+    assert_eq!((twin.spec.label.as_str(), twin.origin.as_ref().unwrap().step), ("twin", at));
+    assert!(classical.spec.label.starts_with("classical-"), "{}", classical.spec.label);
+    for number in 0..parent.steps.len() {
+        let (original, twin, other) = (&parent.steps[number], &twin.steps[number], &classical.steps[number]);
+        assert_eq!((Arc::ptr_eq(original, twin), Arc::ptr_eq(original, other)), (number < at, number < at));
+        assert_eq!(bits(original), bits(twin), "step {number}");
+        assert_eq!(other.report.calibration.names.len(), if number < at { 18 } else { 24 });
+    }
+    // A fork's steps can be taken again as well, those of its parent too.
+    for number in [at - 3, at, parent.steps.len() - 1] {
+        let (_, again) = classical.retake(number, 1).pop().unwrap();
+        assert_eq!(bits(&again), bits(&classical.steps[number]));
+    }
+}
