@@ -91,7 +91,8 @@ mod tests {
         assert_eq!(Shown::of("m").value(-0.0123, 0.0004), "-12.30 mm");
         assert_eq!(Shown::of("m").value(0.05, f64::NAN), "50.00 mm");
         assert_eq!(angle.sigma(f64::NAN), "–");
-        assert_eq!(Shown::of("s").value(0.25, 0.01), "0.250");
+        assert_eq!(Shown::of("s").value(-0.01, 0.0002), "-10.00 ms");
+        assert_eq!(Shown::of("px").value(0.25, 0.01), "0.250");
     }
 
     #[test]

@@ -264,11 +264,13 @@ impl RunRecord {
         let main = rig.chain_of_camera(&self.camera_key)?;
         let chain = Chain::from_classical(&main, estimate.parameterization.parse().ok()?);
         let mut values: Vec<_> = chain.parameter_names().into_iter().zip(chain.values().iter().copied()).collect();
-        let timeshift = |key: &str| rig.camera(key).map(|camera| camera.timeshift_cam_imu_s).ok();
-        values.push(("timeshift".to_owned(), timeshift(&self.camera_key)?));
+        let mut clocks = vec![("timeshift".to_owned(), self.camera_key.as_str())];
         for (key, _) in &estimate.rigid_cameras {
             values.extend(rigid_columns(key, &rig.chain_of_camera(key)?.imu_from_camera(&[])));
-            values.push((format!("{key}.timeshift"), timeshift(key)?));
+            clocks.push((format!("{key}.timeshift"), key));
+        }
+        for (name, key) in clocks.into_iter().filter(|(name, _)| estimate.names.contains(name)) {
+            values.push((name, rig.camera(key).ok()?.timeshift_cam_imu_s));
         }
         Some(values)
     }

@@ -104,6 +104,7 @@ fn outlines_hold_everything_that_is_plotted_over_time() {
         if outlined.outlined {
             report.window.drain(..report.window.len().saturating_sub(1));
             report.features.clear();
+            report.jacobian_source = None;
             assert!(outlined.report.landmarks.is_empty() || outlined.report.landmarks == report.landmarks);
             report.landmarks = outlined.report.landmarks.clone();
         }
