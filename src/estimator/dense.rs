@@ -73,3 +73,55 @@ fn triangularized(view: MatRef<'_, f64>) -> DMatrix<f64> {
     qr_in_place(factors.as_mut(), coefficients.as_mut(), Par::Seq, stack, Default::default());
     DMatrix::from_fn(height, columns, |row, column| if row <= column { factors[(row, column)] } else { 0.0 })
 }
+
+/// A column of a factor belongs to those before it when no more than this share of it is new.
+const DEPENDENT: f64 = 1e-9;
+
+/// `[A | b]` by orthogonal rows, without those that hold nothing of `A`.
+pub(super) struct Echelon {
+    /// The rows `[R | Qᵀb]`, as many as `A` has rank: each begins at a column that those above do not make up.
+    pub(super) rows: DMatrix<f64>,
+    /// How many of the rows the leading columns take up.
+    pub(super) leading_rank: usize,
+}
+
+/// Triangularizes `[A | b]` so that a column which depends on those before it takes up no row.
+///
+/// A plain triangle gives every column a row, also a dependent one. That row then holds, under a pivot of rounding errors,
+/// what belongs to later columns, or a share of `b` that nothing in `A` can change. `leading` is the number of columns
+/// whose rank is told apart.
+pub(super) fn echelon(matrix: &DMatrix<f64>, leading: usize) -> Echelon {
+    let norms: Vec<f64> = matrix.column_iter().map(|column| column.norm()).collect();
+    let mut upper = triangularize(matrix);
+    let (height, last) = (upper.nrows(), upper.ncols() - 1);
+    let (mut rank, mut leading_rank) = (0, 0);
+    for column in 0..last {
+        // Below this the triangle is empty, and dependent columns have left it one row deeper each.
+        let end = (column + 1).min(height);
+        if rank == end {
+            break;
+        }
+        let mut axis = upper.view((rank, column), (end - rank, 1)).column(0).into_owned();
+        let norm = axis.norm();
+        upper.view_mut((rank, column), (end - rank, 1)).fill(0.0);
+        if norm <= DEPENDENT * norms[column] {
+            continue;
+        }
+        // A reflection onto the first row; a row alone needs none.
+        let pivot = if end - rank == 1 { axis[0] } else { -norm.copysign(axis[0]) };
+        axis[0] -= pivot;
+        if axis[0] != 0.0 {
+            let scale = 2.0 / axis.norm_squared();
+            for mut later in upper.view_mut((rank, column + 1), (end - rank, last - column)).column_iter_mut() {
+                let along = scale * axis.dot(&later);
+                later.axpy(-along, &axis, 1.0);
+            }
+        }
+        upper[(rank, column)] = pivot;
+        rank += 1;
+        if column < leading {
+            leading_rank = rank;
+        }
+    }
+    Echelon { rows: upper.rows(0, rank).into_owned(), leading_rank }
+}

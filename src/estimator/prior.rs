@@ -64,17 +64,15 @@ impl Prior {
             return None;
         }
         let ordered: Vec<usize> = eliminated.iter().chain(&kept).copied().chain([total]).collect();
-        let upper = dense::triangularize(&rows.select_columns(&ordered));
-        let gone_columns = eliminated.len();
-        let first_kept = (0..upper.nrows()).find(|row| (0..gone_columns).all(|column| upper[(*row, column)] == 0.0))?;
-        // The last row of a full triangle holds nothing but the residual that no step can change.
-        let last = upper.nrows().min(upper.ncols() - 1);
-        if first_kept >= last {
+        // A residual that no unknown can change is no part of the prior: it would pile up over a flight, to a cost beside
+        // which no step seems to gain anything.
+        let echelon = dense::echelon(&rows.select_columns(&ordered), eliminated.len());
+        let (first, height) = (echelon.leading_rank, echelon.rows.nrows() - echelon.leading_rank);
+        if height == 0 {
             return None;
         }
-        let height = last - first_kept;
-        let jacobian = upper.view((first_kept, gone_columns), (height, kept.len())).into_owned();
-        let residual = upper.view((first_kept, upper.ncols() - 1), (height, 1)).column(0).into_owned();
+        let jacobian = echelon.rows.view((first, eliminated.len()), (height, kept.len())).into_owned();
+        let residual = echelon.rows.view((first, eliminated.len() + kept.len()), (height, 1)).column(0).into_owned();
         let columns = kept.iter().map(|index| PriorColumn::from_index(*index, layout)).collect();
         Some(Self::new(columns, jacobian, residual))
     }

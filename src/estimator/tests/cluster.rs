@@ -2,7 +2,7 @@
 
 use super::fixture;
 use super::flight::{chain_error, fly, trajectory_error_m};
-use crate::estimator::{Estimator, EstimatorConfig, EstimatorOptions, Phase, StepInput, StepReport};
+use crate::estimator::{Estimator, EstimatorConfig, EstimatorOptions, Phase, StepReport};
 use crate::flight_log::rig::ChainPrior;
 use crate::frontend::TrackedFrame;
 use crate::geometry::so3;
@@ -44,16 +44,10 @@ impl BothFlights {
     /// One step; a camera whose image is missing has seen nothing.
     fn step(&self, estimator: &mut Estimator, index: usize, [gimbal, rigid]: [bool; 2]) -> StepReport {
         let nothing = TrackedFrame::default();
-        let frame = &self.gimbal.frames[index];
-        let joint_angles = fixture::encoder(frame, estimator.config().encoder_sigma_rad);
-        estimator.step(&StepInput {
-            frame_index: frame.index,
-            stamp_ns: frame.stamp_ns,
-            imu: &frame.imu,
-            joint_angles: joint_angles.as_ref(),
-            tracks: if gimbal { &frame.tracks } else { &nothing },
-            rigid_tracks: &[if rigid { &self.rigid.frames[index].tracks } else { &nothing }],
-        })
+        let [frame, beside] = [&self.gimbal, &self.rigid].map(|flight| &flight.frames[index]);
+        let (tracks, rigid_tracks) =
+            (if gimbal { &frame.tracks } else { &nothing }, if rigid { &beside.tracks } else { &nothing });
+        fixture::step(estimator, frame, tracks, &[rigid_tracks])
     }
 
     fn fly(&self, config: EstimatorConfig, seen: impl Fn(usize) -> [bool; 2]) -> (Estimator, Vec<StepReport>) {

@@ -9,8 +9,11 @@ use crate::estimator::layout::Layout;
 use crate::estimator::preintegration::{ImuBias, NavigationState, Preintegration};
 use crate::estimator::prior::StartPrior;
 use crate::estimator::window::{Frame, FrameState, Rates};
-use crate::estimator::{DEFAULT_CHAIN_PRIOR, Estimator, EstimatorConfig, EstimatorOptions, RigidCamera, features};
+use crate::estimator::{
+    DEFAULT_CHAIN_PRIOR, Estimator, EstimatorConfig, EstimatorOptions, RigidCamera, StepInput, StepReport, features,
+};
 use crate::flight_log::{JointAngles, Rig};
+use crate::frontend::TrackedFrame;
 use crate::gimbal::{Chain, Parameterization};
 use crate::simulation::{Lens, SyntheticFlight, SyntheticFrame, SyntheticMount, SyntheticOptions, synthetic_tracks};
 
@@ -56,7 +59,7 @@ pub(super) fn rigid_camera(flight: &SyntheticFlight) -> RigidCamera {
 }
 
 /// What the encoders of a synthetic frame say.
-pub(super) fn encoder(frame: &SyntheticFrame, sigma_rad: Option<f64>) -> Option<JointAngles> {
+fn encoder(frame: &SyntheticFrame, sigma_rad: Option<f64>) -> Option<JointAngles> {
     let sigma_rad = sigma_rad?;
     let angles_rad = frame.joint_angles_rad.clone()?;
     let count = angles_rad.len();
@@ -65,6 +68,24 @@ pub(super) fn encoder(frame: &SyntheticFrame, sigma_rad: Option<f64>) -> Option<
         sigmas_rad: vec![sigma_rad; count],
         lasting_sigmas_rad: vec![0.0; count],
         rates_rad_per_s: frame.true_joint_rates_rad_per_s.clone(),
+    })
+}
+
+/// One step on a synthetic frame, with what its cameras have tracked.
+pub(super) fn step(
+    estimator: &mut Estimator,
+    frame: &SyntheticFrame,
+    tracks: &TrackedFrame,
+    rigid_tracks: &[&TrackedFrame],
+) -> StepReport {
+    let joint_angles = encoder(frame, estimator.config.encoder_sigma_rad);
+    estimator.step(&StepInput {
+        frame_index: frame.index,
+        stamp_ns: frame.stamp_ns,
+        imu: &frame.imu,
+        joint_angles: joint_angles.as_ref(),
+        tracks,
+        rigid_tracks,
     })
 }
 

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::fixture;
-use crate::estimator::{Estimator, EstimatorConfig, EstimatorOptions, EventKind, Phase, StepInput, StepReport};
+use crate::estimator::{Estimator, EstimatorConfig, EstimatorOptions, EventKind, Phase, StepReport};
 use crate::geometry::so3;
 use crate::gimbal::Parameterization;
 use crate::simulation::{SyntheticFlight, SyntheticFrame, SyntheticMount, SyntheticOptions, synthetic_tracks};
@@ -24,15 +24,7 @@ fn options(mount: SyntheticMount) -> SyntheticOptions {
 }
 
 pub(super) fn step(estimator: &mut Estimator, frame: &SyntheticFrame) -> StepReport {
-    let joint_angles = fixture::encoder(frame, estimator.config().encoder_sigma_rad);
-    estimator.step(&StepInput {
-        frame_index: frame.index,
-        stamp_ns: frame.stamp_ns,
-        imu: &frame.imu,
-        joint_angles: joint_angles.as_ref(),
-        tracks: &frame.tracks,
-        rigid_tracks: &[],
-    })
+    fixture::step(estimator, frame, &frame.tracks, &[])
 }
 
 pub(super) fn fly(frames: &[SyntheticFrame], config: EstimatorConfig) -> (Estimator, Vec<StepReport>) {

@@ -221,6 +221,51 @@ fn dropping_a_frame_from_the_prior_keeps_what_it_said_about_the_others() {
     assert!(difference < 1e-7, "{difference}");
 }
 
+/// What a dependent column says is what those before it say: rows below belong to the others, none to the residual alone.
+#[test]
+fn an_echelon_gives_dependent_columns_no_row() {
+    // Columns 1 and 3 are combinations of those before them; the residual has a part outside all of them.
+    let free = DMatrix::from_fn(9, 4, |row, column| (((row + 1) * (column + 1)) as f64).sin());
+    let (one, three) = (free.column(0) * -2.0, free.column(0) * 0.5 + free.column(1) * 1e3);
+    let columns =
+        [free.column(0).into(), one, free.column(1).into(), three, free.column(2).into(), free.column(3).into()];
+    let matrix = DMatrix::from_columns(&columns);
+    let echelon = dense::echelon(&matrix, 2);
+    assert_eq!((echelon.leading_rank, echelon.rows.nrows()), (1, 3));
+    let jacobian = echelon.rows.columns(0, 5);
+    let expected = matrix.columns(0, 5).tr_mul(&matrix);
+    let found = jacobian.tr_mul(&echelon.rows);
+    assert!((found - &expected).amax() < 1e-12 * expected.amax());
+    assert_eq!(echelon.rows.view((1, 0), (2, 2)).amax(), 0.0);
+}
+
+/// A residual that no step can change would count in every cost from then on, and pile up over a flight.
+#[test]
+fn a_prior_holds_nothing_that_no_step_can_change() {
+    for (name, mut estimator) in windows() {
+        for left in (3..6).rev() {
+            fixture::shake(&mut estimator, 0.2);
+            estimator.config.options.window = left - 1;
+            estimator.config.options.first_window_factor = 1;
+            estimator.make_room(&mut Vec::new());
+            let problem = estimator.problem(&[]);
+            let estimate = estimate_of(&estimator, &[]);
+            let total = problem.layout.total();
+            let rows = problem.prior.unwrap().rows(&problem.layout, &problem.deviation(&estimate));
+            let residual = rows.column(total).into_owned();
+            // Columns of one length, since units differ.
+            let mut jacobian = rows.columns(0, total).into_owned();
+            for mut column in jacobian.column_iter_mut() {
+                column /= column.norm().max(f64::MIN_POSITIVE);
+            }
+            let step = jacobian.clone().svd(true, true).solve(&residual, 1e-9).unwrap();
+            let unchanged = &residual - jacobian * step;
+            let (floor, cost) = (unchanged.norm_squared(), residual.norm_squared());
+            assert!(floor < 1e-6 * cost.max(1.0), "{name}, {left} frames left: {floor} of {cost}");
+        }
+    }
+}
+
 /// Along the six directions that the classical chain cannot tell apart nothing that is measured changes.
 #[test]
 fn the_classical_chain_keeps_its_null_directions_with_first_estimates() {
