@@ -69,7 +69,8 @@ pub(crate) fn fly(
             Err(_) if !archive.render => continue,
             Err(error) => return Err(error),
         };
-        pieces.push(drive(&log, None, &variants)?);
+        let name = format!("{}-{seed}-ablation", experiment.name());
+        pieces.push(archive.kept(&name, &log, || drive(&log, None, &variants))?);
         progress(&table(experiment, &variants, &pieces))?;
     }
     Ok(table(experiment, &variants, &pieces))
@@ -91,13 +92,13 @@ fn table(experiment: Experiment, variants: &[Variant], pieces: &[Vec<Driven>]) -
             pieces.iter().filter_map(|runs| Some(value(&runs[index])? / value(&runs[0])?)).collect()
         };
         let errors: Vec<f64> = pieces.iter().filter_map(|runs| runs[index].ate_m()).collect();
-        let restarts: usize = pieces.iter().map(|runs| runs[index].summary.frames.restarts).sum();
+        let restarts: usize = pieces.iter().map(|runs| runs[index].restarts).sum();
         table.row([
             variant.name.to_owned(),
             written(errors.clone(), 3),
             ratios(&against(Driven::ate_m)),
-            ratios(&against(|run| run.chain_error().map(|(metres, _)| metres))),
-            ratios(&against(|run| run.chain_error().map(|(_, degrees)| degrees))),
+            ratios(&against(Driven::chain_mm)),
+            ratios(&against(Driven::chain_deg)),
             restarts.to_string(),
             (pieces.len() - errors.len()).to_string(),
         ]);

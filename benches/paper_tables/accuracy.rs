@@ -1,9 +1,9 @@
 //! Tables 1 to 3 beside the paper's and beside what is aimed at.
 
-use dcvins::export::{CalibrationReport, CalibrationSummary};
 use dcvins::simulation::Experiment;
 
-use crate::flights::{CLUSTER, FIXED, Flight, ONLINE, Offline, RUNS, STATIC};
+use crate::drive::Driven;
+use crate::flights::{CLUSTER, FIXED, Flight, ONLINE, Offline, OfflineErrors, RUNS, STATIC};
 use crate::table::{Table, median, number, written};
 
 /// RMSE of the paper's Tables 2 and 3: the gimballed camera (T4: with online calibration) and the static one.
@@ -46,13 +46,12 @@ pub(crate) fn cameras(flights: &[Flight]) -> Table {
         &["flight", "length m", "run", "paper", "aim", "ours", "", "% of the length", "seeds", "lost", "restarts"],
     );
     for (experiment, run, name) in Flight::experiments_and_runs(flights) {
-        let errors: Vec<f64> = Flight::of(flights, experiment).filter_map(|flight| flight.runs[run].ate_m()).collect();
+        let errors: Vec<f64> = Flight::of(flights, experiment).filter_map(|flight| flight.run(run).ate_m()).collect();
         let count = Flight::of(flights, experiment).count();
         let percent = Flight::of(flights, experiment)
-            .filter_map(|flight| Some(flight.runs[run].summary.accuracy.as_ref()?.ate_percent_of_length));
-        let restarts: usize =
-            Flight::of(flights, experiment).map(|flight| flight.runs[run].summary.frames.restarts).sum();
-        let length = Flight::of(flights, experiment).map(|flight| flight.path_length_m).fold(0.0, f64::max);
+            .filter_map(|flight| Some(flight.run(run).accuracy.as_ref()?.ate_percent_of_length));
+        let restarts: usize = Flight::of(flights, experiment).map(|flight| flight.run(run).restarts).sum();
+        let length = Flight::of(flights, experiment).map(|flight| flight.path_length_m()).fold(0.0, f64::max);
         let aim = aim_rmse_m(experiment, run);
         table.row([
             experiment.name().to_owned(),
@@ -72,7 +71,7 @@ pub(crate) fn cameras(flights: &[Flight]) -> Table {
         let medians: Vec<f64> = Flight::experiments(flights)
             .filter(|experiment| *experiment != Experiment::T4)
             .filter_map(|experiment| {
-                median(Flight::of(flights, experiment).filter_map(|flight| flight.runs[run].ate_m()).collect())
+                median(Flight::of(flights, experiment).filter_map(|flight| flight.run(run).ate_m()).collect())
             })
             .collect();
         medians.iter().sum::<f64>() / medians.len() as f64
@@ -105,7 +104,7 @@ pub(crate) fn online_and_offline(flights: &[Flight]) -> Table {
     if flown.is_empty() {
         return table;
     }
-    let of_run = |run: usize| -> Vec<f64> { flown.iter().filter_map(|flight| flight.runs[run].ate_m()).collect() };
+    let of_run = |run: usize| -> Vec<f64> { flown.iter().filter_map(|flight| flight.run(run).ate_m()).collect() };
     let offline: Vec<f64> = done(flights).filter_map(|offline| offline.run.ate_m()).collect();
     let rows = [
         ("online", Some(0.740), Some(0.37), of_run(ONLINE)),
@@ -131,17 +130,12 @@ pub(crate) fn chains(flights: &[Flight]) -> Table {
     );
     for experiment in Flight::experiments(flights) {
         for run in [ONLINE, CLUSTER, STATIC] {
-            let given = |pick: fn(&CalibrationSummary) -> Option<f64>| -> Vec<f64> {
-                Flight::of(flights, experiment)
-                    .filter_map(|flight| pick(&flight.runs[run].summary.calibration))
-                    .collect()
+            let column = |pick: fn(&Driven) -> Option<f64>| -> Vec<f64> {
+                Flight::of(flights, experiment).filter_map(|flight| pick(flight.run(run))).collect()
             };
-            let given_mm = given(|chain| Some(chain.chain_error_initial.as_ref()?.translation_mean_m * 1e3));
-            let given_deg = given(|chain| Some(chain.chain_error_initial.as_ref()?.rotation_mean_rad.to_degrees()));
-            let after = |pick: fn((f64, f64)) -> f64| -> Vec<f64> {
-                Flight::of(flights, experiment).filter_map(|flight| flight.runs[run].chain_error().map(pick)).collect()
-            };
-            let (millimetres, degrees) = (after(|(metres, _)| metres * 1e3), after(|(_, degrees)| degrees));
+            let given_mm = column(|run| Some(run.chain_error_initial?.metres * 1e3));
+            let given_deg = column(|run| Some(run.chain_error_initial?.degrees));
+            let (millimetres, degrees) = (column(Driven::chain_mm), column(Driven::chain_deg));
             let aimed = experiment == Experiment::T4 && run == ONLINE;
             let met = median(millimetres.clone()).is_some_and(|value| value <= 5.0)
                 && median(degrees.clone()).is_some_and(|value| value <= 0.3);
@@ -166,13 +160,13 @@ pub(crate) fn chains(flights: &[Flight]) -> Table {
 }
 
 fn done(flights: &[Flight]) -> impl Iterator<Item = &Offline> {
-    flights.iter().filter_map(|flight| flight.offline.as_ref()?.as_ref().ok())
+    flights.iter().filter_map(Flight::offline)
 }
 
 /// Table 1: the offline calibration.
 pub(crate) fn offline(flights: &[Flight]) -> Table {
-    type Value = fn(&CalibrationReport) -> Option<f64>;
-    let tried = flights.iter().filter(|flight| flight.offline.is_some()).count();
+    type Value = fn(&OfflineErrors) -> Option<f64>;
+    let tried = flights.iter().filter(|flight| flight.estimated.offline.is_some()).count();
     let mut table = Table::new(
         "table1",
         format!(
@@ -183,25 +177,15 @@ pub(crate) fn offline(flights: &[Flight]) -> Table {
         &["what", "paper", "aim", "ours", ""],
     );
     let rows: [(&str, f64, usize, Value); 7] = [
-        ("static camera alone, reprojection px (Cam.-IMU)", 0.36, 2, |report| {
-            Some(report.camera_imu_reprojection.error_px.mean)
+        ("static camera alone, reprojection px (Cam.-IMU)", 0.36, 2, |left| Some(left.static_alone_px)),
+        ("static camera on the IMU, mm (Cam.-IMU)", 12.30, 2, |left| Some(left.static_mount?.metres * 1e3)),
+        ("static camera on the IMU, ° (Cam.-IMU)", 0.35, 3, |left| Some(left.static_mount?.degrees)),
+        ("static camera in the cluster, reprojection px (DCC static)", 1.35, 2, |left| {
+            left.cluster_px.first().copied()
         }),
-        ("static camera on the IMU, mm (Cam.-IMU)", 12.30, 2, |report| {
-            Some(report.truth.as_ref()?.static_camera_imu.translation_mean_m * 1e3)
-        }),
-        ("static camera on the IMU, ° (Cam.-IMU)", 0.35, 3, |report| {
-            Some(report.truth.as_ref()?.static_camera_imu.rotation_mean_rad.to_degrees())
-        }),
-        ("static camera in the cluster, reprojection px (DCC static)", 1.35, 2, |report| {
-            Some(report.reprojection.first()?.error_px.mean)
-        }),
-        ("gimbal camera in the cluster, reprojection px (DCC calib.)", 1.54, 2, |report| {
-            Some(report.reprojection.get(1)?.error_px.mean)
-        }),
-        ("chain, mm (DCC calib.)", 7.78, 2, |report| Some(report.truth.as_ref()?.chain_final.translation_mean_m * 1e3)),
-        ("chain, ° (DCC calib.; 0.31 with better excitation)", 4.23, 3, |report| {
-            Some(report.truth.as_ref()?.chain_final.rotation_mean_rad.to_degrees())
-        }),
+        ("gimbal camera in the cluster, reprojection px (DCC calib.)", 1.54, 2, |left| left.cluster_px.get(1).copied()),
+        ("chain, mm (DCC calib.)", 7.78, 2, |left| Some(left.chain?.metres * 1e3)),
+        ("chain, ° (DCC calib.; 0.31 with better excitation)", 4.23, 3, |left| Some(left.chain?.degrees)),
     ];
     for (what, paper, digits, value) in rows {
         let values: Vec<f64> = done(flights).filter_map(|offline| value(&offline.calibration)).collect();
@@ -217,7 +201,7 @@ pub(crate) fn offline(flights: &[Flight]) -> Table {
     let seconds = done(flights).map(|offline| offline.calibrated_in_s).collect();
     table.notes.push(format!("Seconds for the calibration: {}", written(seconds, 0)));
     for flight in flights {
-        if let Some(Err(error)) = &flight.offline {
+        if let Some(Err(error)) = &flight.estimated.offline {
             table.notes.push(format!("Seed {}: {error}", flight.seed));
         }
     }
@@ -253,31 +237,29 @@ pub(crate) fn every_flight(flights: &[Flight]) -> Table {
         ],
     );
     for flight in flights {
-        let offline = flight.offline.iter().filter_map(|offline| Some(("offline", &offline.as_ref().ok()?.run)));
-        for (name, run) in RUNS.iter().map(|(name, _)| *name).zip(&flight.runs).chain(offline) {
-            let (summary, accuracy) = (&run.summary, run.summary.accuracy.as_ref());
-            let first = summary.calibration.chain_error_initial.as_ref();
-            let timing = summary.timing_ms.as_ref();
+        let offline = flight.offline().map(|offline| ("offline", &offline.run));
+        for (name, run) in RUNS.iter().map(|(name, _)| *name).zip(&flight.estimated.runs).chain(offline) {
+            let accuracy = run.accuracy.as_ref();
             table.row([
                 flight.experiment.name().to_owned(),
                 flight.seed.to_string(),
                 format!("{:.2}", flight.duration_s),
-                format!("{:.2}", flight.path_length_m),
+                format!("{:.2}", flight.path_length_m()),
                 name.to_owned(),
-                number(summary.frames.initialized_at_s, 2),
-                summary.frames.restarts.to_string(),
+                number(run.initialized_at_s, 2),
+                run.restarts.to_string(),
                 format!("{:.1}", run.lost_s),
                 number(run.ate_m(), 4),
                 number(accuracy.map(|accuracy| accuracy.ate_max_m), 4),
                 number(accuracy.map(|accuracy| accuracy.ate_percent_of_length), 4),
-                number(first.map(|error| error.translation_mean_m), 5),
-                number(first.map(|error| error.rotation_mean_rad.to_degrees()), 4),
-                number(run.chain_error().map(|(metres, _)| metres), 5),
-                number(run.chain_error().map(|(_, degrees)| degrees), 4),
-                number(timing.map(|timing| timing.step.p50), 1),
-                number(timing.map(|timing| timing.step.p95), 1),
+                number(run.chain_error_initial.map(|distance| distance.metres), 5),
+                number(run.chain_error_initial.map(|distance| distance.degrees), 4),
+                number(run.chain_error.map(|distance| distance.metres), 5),
+                number(run.chain_error.map(|distance| distance.degrees), 4),
+                number(run.step_ms.map(|[median, _]| median), 1),
+                number(run.step_ms.map(|[_, high]| high), 1),
                 number(flight.simulated_in_s, 0),
-                format!("{:.0}", flight.estimated_in_s),
+                format!("{:.0}", flight.estimated.in_s),
                 run.failures.join("; "),
             ]);
         }

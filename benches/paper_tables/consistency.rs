@@ -9,6 +9,7 @@ use dcvins::estimator::{ColumnGroup, Linearization, StepReport};
 use dcvins::geometry::{RigidTransform, so3};
 use dcvins::gimbal::{Chain, ClassicalChain};
 use nalgebra::{DMatrix, Matrix3, Matrix6, SMatrix};
+use serde::{Deserialize, Serialize};
 
 use crate::flights::Flight;
 use crate::table::{Table, chi2_quantile, number};
@@ -26,9 +27,10 @@ pub(crate) struct PoseSample {
     stamps_ns: [i64; 2],
     oldest_from_newest: RigidTransform,
     covariance: Matrix6<f64>,
-    /// Squared error over the covariance, of all six components, of the rotation and of the translation.
-    pub(crate) squares: [f64; 3],
 }
+
+/// Squared error of a pose over its covariance, of all six components, of the rotation and of the translation.
+pub(crate) type PoseSquares = [f64; 3];
 
 /// The calibration at one step with its covariance.
 pub(crate) struct CalibrationSample {
@@ -38,10 +40,17 @@ pub(crate) struct CalibrationSample {
     /// Columns of the chain of the camera in question, without those of a rigid camera beside it.
     chain_columns: usize,
     covariance: DMatrix<f64>,
+}
+
+/// A calibration held against the truth.
+#[derive(Serialize, Deserialize)]
+pub(crate) struct CalibrationErrors {
+    names: Vec<String>,
     /// Estimate minus truth.
     errors: Vec<f64>,
+    sigmas: Vec<f64>,
     /// Squared error over the covariance.
-    pub(crate) square: f64,
+    square: f64,
 }
 
 /// Inverse of all columns' covariance, of the measurements and the priors.
@@ -83,29 +92,20 @@ pub(crate) fn pose_sample(report: &StepReport) -> Option<PoseSample> {
     let solved = information.cholesky()?.solve(&right);
     let covariance = Matrix6::from_iterator((right.transpose() * solved).iter().copied());
     let stamps_ns = [oldest.stamp_ns, newest.stamp_ns];
-    Some(PoseSample { stamps_ns, oldest_from_newest: relative, covariance, squares: [f64::NAN; 3] })
+    Some(PoseSample { stamps_ns, oldest_from_newest: relative, covariance })
 }
 
 impl PoseSample {
-    /// Holds the sample against the true poses; false when they are not known.
-    pub(crate) fn judge(&mut self, truths: &BTreeMap<i64, RigidTransform>) -> bool {
-        let [Some(oldest), Some(newest)] = self.stamps_ns.map(|stamp_ns| truths.get(&stamp_ns)) else { return false };
+    /// The sample held against the true poses; `None` when they are not known.
+    pub(crate) fn judged(&self, truths: &BTreeMap<i64, RigidTransform>) -> Option<PoseSquares> {
+        let [Some(oldest), Some(newest)] = self.stamps_ns.map(|stamp_ns| truths.get(&stamp_ns)) else { return None };
         let error = self.oldest_from_newest.minus(&(oldest.inverse() * *newest));
-        let squares = || {
-            let whole = error.dot(&self.covariance.cholesky()?.solve(&error));
-            let part = |start: usize| {
-                let error = error.fixed_rows::<3>(start).into_owned();
-                Some(
-                    error.dot(&self.covariance.fixed_view::<3, 3>(start, start).into_owned().cholesky()?.solve(&error)),
-                )
-            };
-            Some([whole, part(0)?, part(3)?])
+        let whole = error.dot(&self.covariance.cholesky()?.solve(&error));
+        let part = |start: usize| {
+            let error = error.fixed_rows::<3>(start).into_owned();
+            Some(error.dot(&self.covariance.fixed_view::<3, 3>(start, start).into_owned().cholesky()?.solve(&error)))
         };
-        match squares() {
-            Some(squares) => self.squares = squares,
-            None => return false,
-        }
-        true
+        Some([whole, part(0)?, part(3)?])
     }
 }
 
@@ -125,33 +125,37 @@ pub(crate) fn calibration_sample(report: &StepReport) -> Option<CalibrationSampl
         names: report.calibration.names.clone(),
         chain_columns: report.calibration.names.len() - 6 * report.calibration.rigid_cameras.len(),
         covariance,
-        errors: Vec::new(),
-        square: f64::NAN,
     })
 }
 
 impl CalibrationSample {
     /// The sample held against the true chain; `None` when the two have other columns.
-    pub(crate) fn judged(mut self, truth: &ClassicalChain) -> Option<Self> {
+    pub(crate) fn judged(&self, truth: &ClassicalChain) -> Option<CalibrationErrors> {
         let parameterization = self.parameterization.parse().ok()?;
         let chain = |classical: &ClassicalChain| {
             let chain = Chain::from_classical(classical, parameterization);
             if chain.dof() == self.chain_columns { chain } else { chain.without_joint_offsets() }
         };
         let error = chain(&self.chain).minus(&chain(truth));
-        if error.len() > self.covariance.nrows() {
+        let columns = error.len();
+        if columns > self.covariance.nrows() {
             return None;
         }
         // A rigid camera's columns stand behind the chain's.
-        self.covariance = self.covariance.view((0, 0), (error.len(), error.len())).into_owned();
-        self.square = error.dot(&self.covariance.clone().cholesky()?.solve(&error));
-        self.errors = error.iter().copied().collect();
-        Some(self)
+        let covariance = self.covariance.view((0, 0), (columns, columns)).into_owned();
+        Some(CalibrationErrors {
+            names: self.names[..columns].to_vec(),
+            errors: error.iter().copied().collect(),
+            sigmas: covariance.diagonal().map(f64::sqrt).iter().copied().collect(),
+            square: error.dot(&covariance.cholesky()?.solve(&error)),
+        })
     }
+}
 
+impl CalibrationErrors {
     /// |error| over σ of every parameter.
     fn ratios(&self) -> impl Iterator<Item = f64> {
-        self.errors.iter().enumerate().map(|(k, error)| error.abs() / self.covariance[(k, k)].sqrt())
+        self.errors.iter().zip(&self.sigmas).map(|(error, sigma)| error.abs() / sigma)
     }
 }
 
@@ -180,17 +184,17 @@ pub(crate) fn poses(flights: &[Flight]) -> Table {
         ],
     );
     for (experiment, run, name) in Flight::experiments_and_runs(flights) {
-        let samples: Vec<&PoseSample> =
-            Flight::of(flights, experiment).flat_map(|flight| &flight.runs[run].poses).collect();
+        let samples: Vec<&PoseSquares> =
+            Flight::of(flights, experiment).flat_map(|flight| &flight.run(run).poses).collect();
         if samples.is_empty() {
             continue;
         }
         let count = samples.len();
-        let mean = |part: usize| samples.iter().map(|sample| sample.squares[part]).sum::<f64>() / count as f64;
+        let mean = |part: usize| samples.iter().map(|sample| sample[part]).sum::<f64>() / count as f64;
         let bound = chi2_quantile(6.0, ONE_SIDED_95);
-        let within = samples.iter().filter(|sample| sample.squares[0] <= bound).count();
+        let within = samples.iter().filter(|sample| sample[0] <= bound).count();
         let [low, high] = mean_bounds(6.0, count);
-        let median = crate::table::median(samples.iter().map(|sample| sample.squares[0]).collect());
+        let median = crate::table::median(samples.iter().map(|sample| sample[0]).collect());
         table.row([
             experiment.name().to_owned(),
             name.to_owned(),
@@ -226,8 +230,8 @@ pub(crate) fn calibration(flights: &[Flight]) -> Table {
         ],
     );
     for (experiment, run, name) in Flight::experiments_and_runs(flights) {
-        let samples: Vec<&CalibrationSample> =
-            Flight::of(flights, experiment).filter_map(|flight| flight.runs[run].calibration.as_ref()).collect();
+        let samples: Vec<&CalibrationErrors> =
+            Flight::of(flights, experiment).filter_map(|flight| flight.run(run).calibration.as_ref()).collect();
         let Some(first) = samples.first() else { continue };
         let columns: usize = samples.iter().map(|sample| sample.errors.len()).sum();
         let mean = samples.iter().map(|sample| sample.square).sum::<f64>() / columns as f64;
@@ -263,8 +267,7 @@ pub(crate) fn residuals(flights: &[Flight]) -> Table {
     );
     for (experiment, run, name) in Flight::experiments_and_runs(flights) {
         let column = |factor: &str| {
-            let values =
-                Flight::of(flights, experiment).filter_map(|flight| flight.runs[run].chi2.get(factor).copied());
+            let values = Flight::of(flights, experiment).filter_map(|flight| flight.run(run).chi2.get(factor).copied());
             crate::table::written(values.collect(), 2)
         };
         table.row([
@@ -288,9 +291,8 @@ pub(crate) fn parameters(flights: &[Flight]) -> Table {
     );
     for (experiment, run, name) in Flight::experiments_and_runs(flights) {
         for flight in Flight::of(flights, experiment) {
-            let Some(sample) = &flight.runs[run].calibration else { continue };
-            for (k, (parameter, error)) in sample.names.iter().zip(&sample.errors).enumerate() {
-                let sigma = sample.covariance[(k, k)].sqrt();
+            let Some(sample) = &flight.run(run).calibration else { continue };
+            for ((parameter, error), sigma) in sample.names.iter().zip(&sample.errors).zip(&sample.sigmas) {
                 table.row([
                     experiment.name().to_owned(),
                     flight.seed.to_string(),

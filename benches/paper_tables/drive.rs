@@ -8,8 +8,9 @@ use dcvins::estimator::{EstimatorConfig, EventKind};
 use dcvins::export::{RunSummary, summarize};
 use dcvins::geometry::RigidTransform;
 use dcvins::session::{self, Recording, RunRecord, SessionPlan, SessionRequest};
+use serde::{Deserialize, Serialize};
 
-use crate::consistency::{CalibrationSample, PoseSample, calibration_sample, pose_sample};
+use crate::consistency::{CalibrationErrors, PoseSquares, calibration_sample, pose_sample};
 use crate::logs::Log;
 
 /// Frames between two looks at the covariances: about as long as a window, so that samples hardly share measurements.
@@ -32,18 +33,68 @@ impl Variant {
     }
 }
 
-/// What came of one estimator.
+/// What the tables need of one estimator's flight.
+#[derive(Serialize, Deserialize)]
 pub(crate) struct Driven {
-    pub(crate) summary: RunSummary,
-    pub(crate) poses: Vec<PoseSample>,
+    /// Length of the path over the estimated frames.
+    pub(crate) length_m: f64,
+    pub(crate) initialized_at_s: Option<f64>,
+    pub(crate) restarts: usize,
+    /// Against the truth, where it is known.
+    pub(crate) accuracy: Option<Accuracy>,
+    pub(crate) chain_error_initial: Option<ChainDistance>,
+    /// At the end.
+    pub(crate) chain_error: Option<ChainDistance>,
+    /// Median and 95th percentile of the time of a step.
+    pub(crate) step_ms: Option<[f64; 2]>,
+    pub(crate) poses: Vec<PoseSquares>,
     /// The last one.
-    pub(crate) calibration: Option<CalibrationSample>,
+    pub(crate) calibration: Option<CalibrationErrors>,
     /// Mean over the steps of χ² per residual after the solve, by factor.
-    pub(crate) chi2: BTreeMap<&'static str, f64>,
+    pub(crate) chi2: BTreeMap<String, f64>,
     /// Seconds without a pose after the first one.
     pub(crate) lost_s: f64,
     /// Messages of the failures.
     pub(crate) failures: Vec<String>,
+    pub(crate) warnings: Vec<String>,
+}
+
+/// Errors of a trajectory after alignment by yaw and position.
+#[derive(Serialize, Deserialize)]
+pub(crate) struct Accuracy {
+    pub(crate) ate_rmse_m: f64,
+    pub(crate) ate_max_m: f64,
+    pub(crate) ate_percent_of_length: f64,
+}
+
+/// Mean distance of a chain from the truth over the joint angles visited.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+pub(crate) struct ChainDistance {
+    pub(crate) metres: f64,
+    pub(crate) degrees: f64,
+}
+
+impl ChainDistance {
+    pub(crate) fn new(metres: f64, radians: f64) -> Self {
+        Self { metres, degrees: radians.to_degrees() }
+    }
+}
+
+impl Driven {
+    /// Root mean square of the position error, as far as there is one.
+    pub(crate) fn ate_m(&self) -> Option<f64> {
+        Some(self.accuracy.as_ref()?.ate_rmse_m)
+    }
+
+    /// The chain's distance from the truth at the end, in millimetres.
+    pub(crate) fn chain_mm(&self) -> Option<f64> {
+        Some(self.chain_error?.metres * 1e3)
+    }
+
+    /// The same in degrees.
+    pub(crate) fn chain_deg(&self) -> Option<f64> {
+        Some(self.chain_error?.degrees)
+    }
 }
 
 /// Flies the variants over a log, with another rig than the log's if one is given; the results in the variants' order.
@@ -77,8 +128,8 @@ fn plan(log: &Log, rig_path: Option<&Path>, variants: &[Variant]) -> Result<Sess
 fn driven(recording: &Recording, run: &RunRecord) -> Driven {
     let truths: BTreeMap<i64, RigidTransform> =
         run.steps.iter().filter_map(|step| Some((step.report.stamp_ns, step.truth?))).collect();
-    let mut poses: Vec<PoseSample> = run.steps.iter().filter_map(|step| pose_sample(&step.report)).collect();
-    poses.retain_mut(|sample| sample.judge(&truths));
+    let samples = run.steps.iter().filter_map(|step| pose_sample(&step.report));
+    let poses = samples.filter_map(|sample| sample.judged(&truths)).collect();
     let truth = recording.truth_rig.as_ref().and_then(|rig| rig.chain_of_camera(&run.camera_key));
     let last = run.steps.iter().rev().find_map(|step| calibration_sample(&step.report));
 
@@ -102,12 +153,29 @@ fn driven(recording: &Recording, run: &RunRecord) -> Driven {
             before_ns = Some(report.stamp_ns);
         }
     }
+    let RunSummary { length_m, frames, accuracy, calibration, timing_ms, warnings, .. } =
+        summarize(recording, run, true);
     Driven {
-        summary: summarize(recording, run, true),
+        length_m,
+        initialized_at_s: frames.initialized_at_s,
+        restarts: frames.restarts,
+        accuracy: accuracy.map(|accuracy| Accuracy {
+            ate_rmse_m: accuracy.ate_rmse_m,
+            ate_max_m: accuracy.ate_max_m,
+            ate_percent_of_length: accuracy.ate_percent_of_length,
+        }),
+        chain_error_initial: calibration
+            .chain_error_initial
+            .map(|error| ChainDistance::new(error.translation_mean_m, error.rotation_mean_rad)),
+        chain_error: calibration
+            .chain_error
+            .map(|error| ChainDistance::new(error.translation_mean_m, error.rotation_mean_rad)),
+        step_ms: timing_ms.map(|timing| [timing.step.p50, timing.step.p95]),
         poses,
         calibration: last.zip(truth).and_then(|(sample, truth)| sample.judged(&truth)),
-        chi2: sums.into_iter().map(|(factor, (sum, count))| (factor, sum / count as f64)).collect(),
+        chi2: sums.into_iter().map(|(factor, (sum, count))| (factor.to_owned(), sum / count as f64)).collect(),
         lost_s: lost_ns as f64 * 1e-9,
         failures,
+        warnings,
     }
 }

@@ -37,7 +37,9 @@ pub(crate) fn fly(archive: &Archive, seeds: &[u64], progress: &mut dyn FnMut(&Ta
                 Err(_) if !archive.render => continue,
                 Err(error) => return Err(error),
             };
-            runs.append(&mut drive(&log, None, &[Variant::plain("encoders", spec)])?);
+            let kept = format!("{name}-{}", spec.replace([':', '='], "-"));
+            let fly = || drive(&log, None, &[Variant::plain("encoders", spec)]);
+            runs.append(&mut archive.kept(&kept, &log, fly)?);
         }
         progress(&table(&kinds.map(|(name, ..)| name), &flown))?;
     }
@@ -55,14 +57,14 @@ fn table(names: &[&str], flown: &[Vec<Driven>]) -> Table {
     for (name, runs) in names.iter().zip(flown) {
         let column =
             |value: fn(&Driven) -> Option<f64>, digits: usize| written(runs.iter().filter_map(value).collect(), digits);
-        let restarts: usize = runs.iter().map(|run| run.summary.frames.restarts).sum();
+        let restarts: usize = runs.iter().map(|run| run.restarts).sum();
         table.row([
             (*name).to_owned(),
             runs.len().to_string(),
             column(Driven::ate_m, 3),
-            column(|run| run.chain_error().map(|(metres, _)| metres * 1e3), 1),
-            column(|run| run.chain_error().map(|(_, degrees)| degrees), 2),
-            column(|run| run.summary.frames.initialized_at_s, 1),
+            column(Driven::chain_mm, 1),
+            column(Driven::chain_deg, 2),
+            column(|run| run.initialized_at_s, 1),
             restarts.to_string(),
             runs.iter().filter(|run| run.ate_m().is_none()).count().to_string(),
         ]);

@@ -14,6 +14,8 @@ pub(crate) struct Archive {
     pub(crate) forget: bool,
     /// Simulate what is missing.
     pub(crate) render: bool,
+    /// Hash of the program, whose earlier results are used again.
+    pub(crate) program: String,
 }
 
 /// A log ready to be estimated.

@@ -15,7 +15,9 @@
 //! | `--forget` | delete a log that was simulated once it is used |
 //!
 //! A log is simulated once: what lies complete in the folder with the same options is used again, also logs that
-//! `dcvins simulate T4 --seed 1 -o DIR/T4-1.mcap` wrote. Tables are written as CSV as flights come in.
+//! `dcvins simulate T4 --seed 1 -o DIR/T4-1.mcap` wrote. What was estimated is kept there as well, and used again as long
+//! as the program is the same to the byte: a bench that was stopped goes on where it was. Tables are written as CSV as
+//! flights come in.
 
 #![expect(
     clippy::print_stdout,
@@ -30,6 +32,7 @@ mod consistency;
 mod drive;
 mod encoders;
 mod flights;
+mod kept;
 mod logs;
 mod robustness;
 mod speed;
@@ -70,6 +73,7 @@ impl BenchOptions {
                 folder: PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("target/paper_tables"),
                 forget: false,
                 render: true,
+                program: kept::program()?,
             },
         };
         let mut arguments = arguments;

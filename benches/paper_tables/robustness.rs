@@ -48,7 +48,9 @@ pub(crate) fn fly(archive: &Archive, seeds: &[u64], progress: &mut dyn FnMut(&Ta
                 Err(_) if !archive.render => continue,
                 Err(error) => return Err(error),
             };
-            runs.append(&mut drive(&log, None, &[Variant::plain("disturbed", spec)])?);
+            let kept = format!("{name}-{}", spec.replace([':', '='], "-"));
+            let fly = || drive(&log, None, &[Variant::plain("disturbed", spec)]);
+            runs.append(&mut archive.kept(&kept, &log, fly)?);
         }
         progress(&table(&flown))?;
     }
@@ -75,14 +77,14 @@ fn table(flown: &[Vec<Driven>]) -> Table {
     for ((name, ..), runs) in ROWS.iter().zip(flown) {
         let against = runs.iter().zip(&flown[0]).filter_map(|(run, plain)| Some(run.ate_m()? / plain.ate_m()?));
         let mut said: Vec<&String> = runs.iter().flat_map(|run| &run.failures).collect();
-        said.extend(runs.iter().flat_map(|run| &run.summary.warnings));
+        said.extend(runs.iter().flat_map(|run| &run.warnings));
         let first = said.first().map_or_else(String::new, |text| format!("{text} ({} in all)", said.len()));
         table.row([
             (*name).to_owned(),
             runs.len().to_string(),
             written(runs.iter().filter_map(Driven::ate_m).collect(), 3),
             ratios(&against.collect::<Vec<_>>()),
-            runs.iter().map(|run| run.summary.frames.restarts).sum::<usize>().to_string(),
+            runs.iter().map(|run| run.restarts).sum::<usize>().to_string(),
             written(runs.iter().map(|run| run.lost_s).collect(), 1),
             runs.iter().filter(|run| run.ate_m().is_none()).count().to_string(),
             first.replace('|', "/"),
