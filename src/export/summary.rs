@@ -8,15 +8,10 @@ use super::evaluation::alignment_name;
 use super::structure::{KnownLossSummary, known_losses};
 use super::tables::parameter_name;
 use crate::estimator::{EventKind, Phase, StageTimes};
-use crate::geometry::{seconds_from_ns, so3, wrap_angle};
+use crate::geometry::{seconds_from_ns, wrap_angle};
 use crate::gimbal::ClassicalChain;
-use crate::session::accuracy::{
-    Alignment, ErrorStatistics, RelativeDelta, StampedPose, absolute_errors_m, align, path_length_m, relative_errors,
-};
-use crate::session::{Recording, RunRecord};
-
-/// Stretches over which the relative error is given, in metres.
-const RELATIVE_LENGTHS_M: [f64; 3] = [5.0, 10.0, 25.0];
+use crate::session::accuracy::{Alignment, path_length_m};
+use crate::session::{Recording, RunRecord, TrajectoryAccuracy};
 
 /// Frames of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -219,14 +214,14 @@ pub struct RunSummary {
 /// Sums up one run of a recording.
 pub fn summarize(recording: &Recording, run: &RunRecord, timing: bool) -> RunSummary {
     let estimated: Vec<_> = run.steps.iter().filter(|step| step.report.newest().is_some()).collect();
-    let pairs = pairs_with_truth(run);
+    let pairs = run.pairs_with_truth();
     let positions: Vec<_> = estimated.iter().filter_map(|step| step.report.newest()).collect();
     let length_m = if pairs.is_empty() {
         path_length_m(positions.iter().map(|frame| &frame.world_from_imu.translation_m))
     } else {
         path_length_m(pairs.iter().map(|(_, truth)| &truth.pose.translation_m))
     };
-    let accuracy = accuracy(&pairs, length_m);
+    let accuracy = TrajectoryAccuracy::of(&pairs).map(|accuracy| accuracy_summary(&accuracy));
     let accuracy_missing = match (&accuracy, estimated.is_empty(), pairs.is_empty()) {
         (Some(_), _, _) => None,
         (None, true, _) => Some(never_initialized(run)),
@@ -279,44 +274,24 @@ fn never_initialized(run: &RunRecord) -> String {
     )
 }
 
-fn pairs_with_truth(run: &RunRecord) -> Vec<(StampedPose, StampedPose)> {
-    run.steps
-        .iter()
-        .filter_map(|step| {
-            let newest = step.report.newest()?;
-            let stamp_s = seconds_from_ns(newest.stamp_ns);
-            Some((StampedPose { stamp_s, pose: newest.world_from_imu }, StampedPose { stamp_s, pose: step.truth? }))
-        })
-        .collect()
-}
-
-fn accuracy(pairs: &[(StampedPose, StampedPose)], length_m: f64) -> Option<Accuracy> {
-    let transform = align(pairs, Alignment::YawPosition)?;
-    let errors = ErrorStatistics::of(&absolute_errors_m(pairs, &transform))?;
-    let rpe = RELATIVE_LENGTHS_M
-        .into_iter()
-        .filter_map(|delta_m| {
-            let (translations, rotations) = relative_errors(pairs, &transform, RelativeDelta::Metres(delta_m));
-            let translation = ErrorStatistics::of(&translations)?;
-            let rotation = ErrorStatistics::of(&rotations)?;
-            Some(RelativeError {
-                delta_m,
-                pairs: translation.count,
-                translation_rmse_m: translation.rmse,
-                rotation_rmse_deg: rotation.rmse.to_degrees(),
-            })
-        })
-        .collect();
-    Some(Accuracy {
+fn accuracy_summary(accuracy: &TrajectoryAccuracy) -> Accuracy {
+    let TrajectoryAccuracy { length_m, absolute_m: errors, relative } = accuracy;
+    let rpe = relative.iter().map(|over| RelativeError {
+        delta_m: over.delta_m,
+        pairs: over.translation_m.count,
+        translation_rmse_m: over.translation_m.rmse,
+        rotation_rmse_deg: over.rotation_rad.rmse.to_degrees(),
+    });
+    Accuracy {
         alignment: alignment_name(Alignment::YawPosition),
         ate_rmse_m: errors.rmse,
         ate_mean_m: errors.mean,
         ate_std_m: errors.std,
         ate_median_m: errors.median,
         ate_max_m: errors.max,
-        ate_percent_of_length: if length_m > 0.0 { 100.0 * errors.rmse / length_m } else { 0.0 },
-        rpe,
-    })
+        ate_percent_of_length: if *length_m > 0.0 { 100.0 * errors.rmse / length_m } else { 0.0 },
+        rpe: rpe.collect(),
+    }
 }
 
 fn calibration(recording: &Recording, run: &RunRecord) -> CalibrationSummary {
@@ -365,21 +340,12 @@ fn calibration(recording: &Recording, run: &RunRecord) -> CalibrationSummary {
 }
 
 fn chain_error(run: &RunRecord, chain: &ClassicalChain, truth: &ClassicalChain) -> Option<ChainError> {
-    let mut translations = Vec::new();
-    let mut rotations = Vec::new();
-    for newest in run.steps.iter().filter_map(|step| step.report.newest()) {
-        let estimate = chain.imu_from_camera(&newest.joint_angles_rad);
-        let reference = truth.imu_from_camera(&newest.joint_angles_rad);
-        translations.push((estimate.translation_m - reference.translation_m).norm());
-        rotations.push(so3::log(&(reference.rotation.inverse() * estimate.rotation)).norm());
-    }
-    let translation = ErrorStatistics::of(&translations)?;
-    let rotation = ErrorStatistics::of(&rotations)?;
+    let distance = run.chain_distance(chain, truth)?;
     Some(ChainError {
-        translation_mean_m: translation.mean,
-        translation_std_m: translation.std,
-        rotation_mean_rad: rotation.mean,
-        rotation_std_rad: rotation.std,
+        translation_mean_m: distance.translation_m.mean,
+        translation_std_m: distance.translation_m.std,
+        rotation_mean_rad: distance.rotation_rad.mean,
+        rotation_std_rad: distance.rotation_rad.std,
     })
 }
 

@@ -1,0 +1,373 @@
+//! Two runs over the same log, frame by frame: how far they are apart, and where they part.
+
+use std::collections::BTreeSet;
+
+use nalgebra::UnitQuaternion;
+
+use super::recording::{RunRecord, StepRecord};
+use crate::estimator::{FrameStateReport, Phase};
+use crate::geometry::{RigidTransform, so3, wrap_angle};
+
+/// What two runs are compared in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Quantity {
+    /// Whether they initialize or track; 1 where they differ.
+    Phase,
+    /// Features that only one of them was given.
+    Tracks,
+    /// Whether the frame is a keyframe; 1 where they differ.
+    Keyframe,
+    /// Position of the newest frame.
+    Position,
+    /// Attitude of the newest frame.
+    Attitude,
+    /// Velocity of the newest frame.
+    Velocity,
+    /// Accelerometer bias.
+    AccelerometerBias,
+    /// Gyroscope bias.
+    GyroscopeBias,
+    /// Joint angles of the newest frame.
+    JointAngles,
+    /// Position of the camera on the IMU at the newest frame.
+    ChainTranslation,
+    /// Attitude of the camera on the IMU at the newest frame.
+    ChainRotation,
+    /// Reprojection RMS.
+    Reprojection,
+    /// Structural rank.
+    RankStructural,
+    /// Informed rank.
+    RankInformed,
+}
+
+impl Quantity {
+    /// All of them, in the order in which a difference usually spreads.
+    pub const ALL: [Self; 14] = [
+        Self::Phase,
+        Self::Tracks,
+        Self::Keyframe,
+        Self::Position,
+        Self::Attitude,
+        Self::Velocity,
+        Self::AccelerometerBias,
+        Self::GyroscopeBias,
+        Self::JointAngles,
+        Self::ChainTranslation,
+        Self::ChainRotation,
+        Self::Reprojection,
+        Self::RankStructural,
+        Self::RankInformed,
+    ];
+
+    /// Its name, its unit as stored, and from where on a difference is worth a look: a centimetre and a tenth of a degree
+    /// show in a flight, a millimetre and the same angle in a calibration, and biases by what they move in a second.
+    const fn facts(self) -> (&'static str, &'static str, f64) {
+        match self {
+            Self::Phase => ("phase", "", 1.0),
+            Self::Tracks => ("tracks", "", 1.0),
+            Self::Keyframe => ("keyframes", "", 1.0),
+            Self::Position => ("position", "m", 0.01),
+            Self::Attitude => ("attitude", "rad", 0.001_745),
+            Self::Velocity => ("velocity", "m/s", 0.01),
+            Self::AccelerometerBias => ("accelerometer bias", "m/s²", 0.01),
+            Self::GyroscopeBias => ("gyroscope bias", "rad/s", 0.000_1),
+            Self::JointAngles => ("joint angles", "rad", 0.001_745),
+            Self::ChainTranslation => ("camera on IMU, position", "m", 0.001),
+            Self::ChainRotation => ("camera on IMU, attitude", "rad", 0.001_745),
+            Self::Reprojection => ("reprojection RMS", "px", 0.05),
+            Self::RankStructural => ("structural rank", "", 1.0),
+            Self::RankInformed => ("informed rank", "", 1.0),
+        }
+    }
+
+    /// Its name.
+    pub const fn name(self) -> &'static str {
+        self.facts().0
+    }
+
+    /// Its unit, as stored; empty for counts.
+    pub const fn unit(self) -> &'static str {
+        self.facts().1
+    }
+
+    /// From where on a difference is worth a look, in its unit.
+    pub const fn notable(self) -> f64 {
+        self.facts().2
+    }
+
+    /// How far two steps of the same instant are apart, the second one's world turned and shifted by `gauge`; `None` where
+    /// one of them does not have it.
+    pub fn difference(self, a: &StepRecord, b: &StepRecord, gauge: &RigidTransform) -> Option<f64> {
+        let frames = || Some((a.report.newest()?, b.report.newest()?));
+        let flag = |differ: bool| Some(f64::from(u8::from(differ)));
+        let count = |a: usize, b: usize| Some(a.abs_diff(b) as f64);
+        let ranks = || Some((a.rank.as_ref()?, b.rank.as_ref()?));
+        match self {
+            Self::Phase => flag((a.report.phase == Phase::Tracking) != (b.report.phase == Phase::Tracking)),
+            Self::Tracks => Some(tracks_apart(a, b)),
+            Self::Keyframe => frames().and_then(|_| flag(a.report.keyframe != b.report.keyframe)),
+            Self::Position => {
+                let (a, b) = frames()?;
+                Some((gauge.transform(&b.world_from_imu.translation_m) - a.world_from_imu.translation_m).norm())
+            }
+            Self::Attitude => {
+                let (a, b) = frames()?;
+                Some(angle(&a.world_from_imu.rotation, &(gauge.rotation * b.world_from_imu.rotation)))
+            }
+            Self::Velocity => {
+                let (a, b) = frames()?;
+                Some((gauge.rotation * b.velocity_m_per_s - a.velocity_m_per_s).norm())
+            }
+            Self::AccelerometerBias => {
+                let (a, b) = frames()?;
+                Some((b.accelerometer_bias_m_per_s2 - a.accelerometer_bias_m_per_s2).norm())
+            }
+            Self::GyroscopeBias => {
+                let (a, b) = frames()?;
+                Some((b.gyroscope_bias_rad_per_s - a.gyroscope_bias_rad_per_s).norm())
+            }
+            Self::JointAngles => frames().and_then(|(a, b)| joints_apart(a, b)),
+            Self::ChainTranslation => {
+                let (a, b) = frames()?;
+                Some((b.imu_from_camera.translation_m - a.imu_from_camera.translation_m).norm())
+            }
+            Self::ChainRotation => {
+                let (a, b) = frames()?;
+                Some(angle(&a.imu_from_camera.rotation, &b.imu_from_camera.rotation))
+            }
+            Self::Reprojection => {
+                frames()?;
+                let [a, b] = [a, b].map(|step| step.report.reprojection_rms_after_px);
+                Some((b - a).abs()).filter(|apart| apart.is_finite())
+            }
+            Self::RankStructural => ranks().and_then(|(a, b)| count(a.rank_structural, b.rank_structural)),
+            Self::RankInformed => ranks().and_then(|(a, b)| count(a.rank_informed, b.rank_informed)),
+        }
+    }
+
+    /// Whether it can be compared between runs that watch other cameras.
+    const fn is_of_the_vehicle(self) -> bool {
+        !matches!(
+            self,
+            Self::Tracks | Self::JointAngles | Self::ChainTranslation | Self::ChainRotation | Self::Reprojection
+        )
+    }
+}
+
+/// Angle between two attitudes; exactly nothing between equal ones.
+fn angle(a: &UnitQuaternion<f64>, b: &UnitQuaternion<f64>) -> f64 {
+    if a == b { 0.0 } else { so3::log(&(a.inverse() * b)).norm() }
+}
+
+fn joints_apart(a: &FrameStateReport, b: &FrameStateReport) -> Option<f64> {
+    let (a, b) = (&a.joint_angles_rad, &b.joint_angles_rad);
+    let apart = a.iter().zip(b).map(|(a, b)| wrap_angle(b - a).abs()).fold(0.0, f64::max);
+    (!a.is_empty() && a.len() == b.len()).then_some(apart)
+}
+
+fn tracks_apart(a: &StepRecord, b: &StepRecord) -> f64 {
+    if std::sync::Arc::ptr_eq(&a.tracks, &b.tracks) {
+        return 0.0;
+    }
+    let ids = |step: &StepRecord| step.tracks.features.iter().map(|feature| feature.id).collect::<BTreeSet<_>>();
+    ids(a).symmetric_difference(&ids(b)).count() as f64
+}
+
+/// Where two runs part in one quantity.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Parting {
+    /// The first instant at which it is not the same number.
+    pub exact_ns: Option<i64>,
+    /// The first instant at which the difference is worth a look.
+    pub notable_ns: Option<i64>,
+    /// The largest difference and its instant.
+    pub largest: Option<(f64, i64)>,
+}
+
+/// A run held against a reference, growing as they grow.
+///
+/// Where both have a pose for the first time, the run's world is laid on the reference's by yaw and position, the freedom
+/// that odometry has; a fork has its parent's world as it is.
+#[derive(Clone, Debug, Default)]
+pub struct Comparison {
+    runs: Option<(u64, u64)>,
+    read: (usize, usize),
+    gauge: Option<RigidTransform>,
+    same_camera: bool,
+    /// Stamps of the instants that both have, since the log began.
+    pub stamps_ns: Vec<i64>,
+    /// Differences by the number of the quantity and the row; not-a-number where one run does not have it.
+    pub columns: [Vec<f64>; Quantity::ALL.len()],
+    /// Where they part, by the number of the quantity.
+    pub partings: [Parting; Quantity::ALL.len()],
+    /// Changes when rows were forgotten.
+    pub epoch: u64,
+}
+
+impl Comparison {
+    /// Reads the steps that have come since the last call; begins anew with other runs.
+    pub fn read(&mut self, reference: &RunRecord, run: &RunRecord) {
+        let shrunk = self.read.0 > reference.steps.len() || self.read.1 > run.steps.len();
+        if self.runs != Some((reference.id, run.id)) || shrunk {
+            let same_camera = reference.camera_key == run.camera_key;
+            let epoch = self.epoch + 1;
+            *self = Self { runs: Some((reference.id, run.id)), same_camera, epoch, ..Self::default() };
+        }
+        while let (Some(a), Some(b)) = (reference.steps.get(self.read.0), run.steps.get(self.read.1)) {
+            let (at, other) = (a.report.stamp_ns, b.report.stamp_ns);
+            self.read.0 += usize::from(at <= other);
+            self.read.1 += usize::from(other <= at);
+            if at == other {
+                self.push(a, b);
+            }
+        }
+    }
+
+    fn push(&mut self, a: &StepRecord, b: &StepRecord) {
+        let stamp_ns = a.report.stamp_ns;
+        self.stamps_ns.push(stamp_ns);
+        if self.gauge.is_none()
+            && let (Some(a), Some(b)) = (a.report.newest(), b.report.newest())
+        {
+            self.gauge = Some(yaw_and_position(&a.world_from_imu, &b.world_from_imu));
+        }
+        let gauge = self.gauge.unwrap_or_default();
+        for (index, quantity) in Quantity::ALL.into_iter().enumerate() {
+            let comparable = self.same_camera || quantity.is_of_the_vehicle();
+            let apart = quantity.difference(a, b, &gauge).filter(|_| comparable);
+            self.columns[index].push(apart.unwrap_or(f64::NAN));
+            let Some(apart) = apart else { continue };
+            let parting = &mut self.partings[index];
+            // As they are, without the gauge: its own rounding is no difference.
+            let as_they_are = quantity.difference(a, b, &RigidTransform::default());
+            if as_they_are.is_some_and(|apart| apart != 0.0) {
+                parting.exact_ns.get_or_insert(stamp_ns);
+            }
+            if apart >= quantity.notable() {
+                parting.notable_ns.get_or_insert(stamp_ns);
+            }
+            if parting.largest.is_none_or(|(largest, _)| apart > largest) {
+                parting.largest = Some((apart, stamp_ns));
+            }
+        }
+    }
+
+    /// The difference at the last common instant at or before a time.
+    pub fn at(&self, quantity: Quantity, stamp_ns: i64) -> Option<f64> {
+        let row = self.stamps_ns.partition_point(|stamp| *stamp <= stamp_ns).checked_sub(1)?;
+        self.column(quantity).get(row).copied().filter(|apart| apart.is_finite())
+    }
+
+    /// The differences of a quantity by row.
+    pub fn column(&self, quantity: Quantity) -> &[f64] {
+        let index = Quantity::ALL.iter().position(|known| *known == quantity);
+        index.map_or(&[], |index| &self.columns[index])
+    }
+
+    /// The first instant at which anything is not the same number, with what it is.
+    pub fn first_exact(&self) -> Option<(i64, Quantity)> {
+        self.first(|parting| parting.exact_ns)
+    }
+
+    /// The first instant at which a difference is worth a look, with what differs.
+    pub fn first_notable(&self) -> Option<(i64, Quantity)> {
+        self.first(|parting| parting.notable_ns)
+    }
+
+    fn first(&self, of: impl Fn(&Parting) -> Option<i64>) -> Option<(i64, Quantity)> {
+        let known = self.partings.iter().zip(Quantity::ALL);
+        known.filter_map(|(parting, quantity)| Some((of(parting)?, quantity))).min_by_key(|(stamp_ns, _)| *stamp_ns)
+    }
+}
+
+/// The turn about the vertical and the shift that lay one pose on another; the identity for equal ones.
+fn yaw_and_position(onto: &RigidTransform, from: &RigidTransform) -> RigidTransform {
+    if onto == from {
+        return RigidTransform::default();
+    }
+    let turn = onto.rotation * from.rotation.inverse();
+    let yaw = 2.0 * turn.k.atan2(turn.w);
+    let rotation = UnitQuaternion::from_axis_angle(&nalgebra::Vector3::z_axis(), yaw);
+    RigidTransform::new(rotation, onto.translation_m - rotation * from.translation_m)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::memory_tests::recorded;
+    use super::*;
+    use crate::simulation::{SyntheticFlight, SyntheticOptions, synthetic_tracks};
+
+    fn flight() -> SyntheticFlight {
+        synthetic_tracks(&SyntheticOptions { duration_s: 5.0, ..SyntheticOptions::default() })
+    }
+
+    #[test]
+    fn a_run_against_itself_never_parts() {
+        let run = recorded(&flight(), "auto");
+        let mut comparison = Comparison::default();
+        comparison.read(&run, &run);
+        assert_eq!(comparison.stamps_ns.len(), run.steps.len());
+        assert_eq!((comparison.first_exact(), comparison.first_notable()), (None, None));
+        let end_ns = run.steps.last().unwrap().report.stamp_ns;
+        assert_eq!(comparison.at(Quantity::Position, end_ns), Some(0.0));
+        assert_eq!(comparison.at(Quantity::Position, -1), None);
+    }
+
+    #[test]
+    fn what_is_changed_parts_at_its_frame_and_the_rest_stays() {
+        let run = recorded(&flight(), "auto");
+        let mut other = run.clone();
+        let at = run.steps.len() - 20;
+        for (number, step) in other.steps.iter_mut().enumerate().skip(at) {
+            let newest = std::sync::Arc::make_mut(step).report.window.last_mut().unwrap();
+            newest.world_from_imu.translation_m.x += 0.004 * (number - at + 1) as f64;
+        }
+        other.id += 1;
+        let mut comparison = Comparison::default();
+        // Read as they grow, the result is the same.
+        let mut growing = other.clone();
+        growing.steps.truncate(at + 3);
+        comparison.read(&run, &growing);
+        comparison.read(&run, &other);
+        let stamp_ns = |number: usize| run.steps[number].report.stamp_ns;
+        assert_eq!(comparison.first_exact(), Some((stamp_ns(at), Quantity::Position)));
+        assert_eq!(comparison.first_notable(), Some((stamp_ns(at + 2), Quantity::Position)));
+        let parting = comparison.partings[Quantity::ALL.iter().position(|it| *it == Quantity::Position).unwrap()];
+        let (largest, largest_ns) = parting.largest.unwrap();
+        assert!((largest - 0.08).abs() < 1e-9 && largest_ns == stamp_ns(at + 19), "{parting:?}");
+        assert_eq!(comparison.at(Quantity::Velocity, stamp_ns(at + 19)), Some(0.0));
+        let epoch = comparison.epoch;
+        comparison.read(&run, &run);
+        assert!(comparison.epoch > epoch && comparison.first_exact().is_none());
+    }
+
+    #[test]
+    fn another_world_is_no_difference_and_another_form_is_a_small_one() {
+        let flight = flight();
+        let run = recorded(&flight, "auto");
+        let mut turned = run.clone();
+        let world = RigidTransform::new(
+            UnitQuaternion::from_axis_angle(&nalgebra::Vector3::z_axis(), 1.0),
+            nalgebra::Vector3::new(3.0, -2.0, 1.0),
+        );
+        for step in &mut turned.steps {
+            for frame in &mut std::sync::Arc::make_mut(step).report.window {
+                frame.world_from_imu = world * frame.world_from_imu;
+                frame.velocity_m_per_s = world.rotation * frame.velocity_m_per_s;
+            }
+        }
+        turned.id += 1;
+        let mut comparison = Comparison::default();
+        comparison.read(&run, &turned);
+        assert_eq!(comparison.first_notable(), None);
+        assert!(comparison.column(Quantity::Position).iter().all(|apart| apart.is_nan() || *apart < 1e-9));
+
+        let classical = recorded(&flight, "classical");
+        comparison.read(&run, &classical);
+        let (_, first) = comparison.first_exact().unwrap();
+        assert!(!matches!(first, Quantity::Phase | Quantity::Tracks), "{first:?}: they begin alike");
+        let end_ns = run.steps.last().unwrap().report.stamp_ns;
+        assert!(comparison.at(Quantity::Position, end_ns).unwrap() < 0.02);
+    }
+}

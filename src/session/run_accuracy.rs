@@ -1,0 +1,93 @@
+//! How well a run did against the truth: its trajectory and its chain.
+
+use super::accuracy::{
+    Alignment, ErrorStatistics, RelativeDelta, StampedPose, absolute_errors_m, align, path_length_m, relative_errors,
+};
+use super::recording::RunRecord;
+use crate::geometry::{seconds_from_ns, so3};
+use crate::gimbal::ClassicalChain;
+
+/// Stretches over which the relative error is given, in metres.
+pub const RELATIVE_LENGTHS_M: [f64; 3] = [5.0, 10.0, 25.0];
+
+/// Errors of a trajectory, laid on the truth by yaw and position.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrajectoryAccuracy {
+    /// Length of the true path over the estimated frames, in metres.
+    pub length_m: f64,
+    /// Position errors in metres.
+    pub absolute_m: ErrorStatistics,
+    /// Relative errors by the length of their stretches; lengths that the path does not have are left out.
+    pub relative: Vec<RelativeAccuracy>,
+}
+
+/// Relative errors over stretches of one length.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RelativeAccuracy {
+    /// Path length of a stretch in metres.
+    pub delta_m: f64,
+    /// Translation errors in metres.
+    pub translation_m: ErrorStatistics,
+    /// Rotation errors in radians.
+    pub rotation_rad: ErrorStatistics,
+}
+
+/// How far a chain is from another one over the joint angles that a run has visited.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ChainDistance {
+    /// Distances of the camera's positions in metres.
+    pub translation_m: ErrorStatistics,
+    /// Angles between its attitudes in radians.
+    pub rotation_rad: ErrorStatistics,
+}
+
+impl TrajectoryAccuracy {
+    /// Errors of estimated poses against true ones, `None` with too few pairs to lay one on the other.
+    pub fn of(pairs: &[(StampedPose, StampedPose)]) -> Option<Self> {
+        let transform = align(pairs, Alignment::YawPosition)?;
+        let relative = RELATIVE_LENGTHS_M.into_iter().filter_map(|delta_m| {
+            let (translations, rotations) = relative_errors(pairs, &transform, RelativeDelta::Metres(delta_m));
+            Some(RelativeAccuracy {
+                delta_m,
+                translation_m: ErrorStatistics::of(&translations)?,
+                rotation_rad: ErrorStatistics::of(&rotations)?,
+            })
+        });
+        Some(Self {
+            length_m: path_length_m(pairs.iter().map(|(_, truth)| &truth.pose.translation_m)),
+            absolute_m: ErrorStatistics::of(&absolute_errors_m(pairs, &transform))?,
+            relative: relative.collect(),
+        })
+    }
+}
+
+impl RunRecord {
+    /// The estimated pose of each frame and the true one, where both are known.
+    pub fn pairs_with_truth(&self) -> Vec<(StampedPose, StampedPose)> {
+        self.steps
+            .iter()
+            .filter_map(|step| {
+                let newest = step.report.newest()?;
+                let stamp_s = seconds_from_ns(newest.stamp_ns);
+                Some((StampedPose { stamp_s, pose: newest.world_from_imu }, StampedPose { stamp_s, pose: step.truth? }))
+            })
+            .collect()
+    }
+
+    /// How far one chain is from another over the joint angles of the run's frames, `None` before the first pose.
+    pub fn chain_distance(&self, chain: &ClassicalChain, reference: &ClassicalChain) -> Option<ChainDistance> {
+        let newest = self.steps.iter().filter_map(|step| step.report.newest());
+        let (translations, rotations): (Vec<f64>, Vec<f64>) = newest
+            .map(|newest| {
+                let estimate = chain.imu_from_camera(&newest.joint_angles_rad);
+                let reference = reference.imu_from_camera(&newest.joint_angles_rad);
+                let turn = reference.rotation.inverse() * estimate.rotation;
+                ((estimate.translation_m - reference.translation_m).norm(), so3::log(&turn).norm())
+            })
+            .unzip();
+        Some(ChainDistance {
+            translation_m: ErrorStatistics::of(&translations)?,
+            rotation_rad: ErrorStatistics::of(&rotations)?,
+        })
+    }
+}
