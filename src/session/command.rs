@@ -80,4 +80,6 @@ pub enum Command {
     },
     /// Take a run away, by its number.
     RemoveRun(usize),
+    /// How much memory what is recorded may take from now on, in bytes.
+    SetMemoryBudget(usize),
 }

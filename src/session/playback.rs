@@ -317,6 +317,10 @@ impl Session {
                 }
             }
             Command::RemoveRun(run) => self.remove_run(run),
+            Command::SetMemoryBudget(bytes) => {
+                self.plan.memory_budget_bytes = bytes;
+                self.shared.change(|recording| recording.set_memory_budget(bytes));
+            }
         }
     }
 

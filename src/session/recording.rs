@@ -353,6 +353,13 @@ impl Recording {
         self.share_out_memory();
     }
 
+    /// From now on it may take so many bytes; steps that do not fit any more are kept in outline.
+    pub(super) fn set_memory_budget(&mut self, bytes: usize) {
+        self.memory_budget_bytes = bytes;
+        self.share_out_memory();
+        self.keep_within_budget();
+    }
+
     /// Divides what snapshots may take among the runs.
     fn share_out_memory(&self) {
         let each = self.memory_budget_bytes / SNAPSHOT_SHARE / self.runs.len().max(1);
