@@ -12,7 +12,7 @@ use super::material::Material;
 use super::memory_tests::tracked;
 use super::run_engine::RunEngine;
 use super::{Command, RunSpec, Session, SessionPlan, SessionRequest, StepRecord};
-use crate::estimator::{Phase, StageTimes};
+use crate::estimator::{JacobianFactor, Phase, StageTimes};
 use crate::simulation::{SyntheticFlight, SyntheticOptions, synthetic_tracks};
 
 /// A run over a synthetic flight and the way that it took.
@@ -44,7 +44,7 @@ impl Flown {
     fn forked(&self, begin: usize, changes: &str) -> Result<Vec<StepRecord>, String> {
         let changes: ForkChanges = changes.parse().map_err(|error: super::ForkError| error.to_string())?;
         let mut engine = self.history.engine_before(begin).unwrap();
-        changes.apply(&mut engine, &self.flight.given_rig).map_err(|error| error.to_string())?;
+        changes.apply(&mut engine, &self.flight.given_rig, "cam0").map_err(|error| error.to_string())?;
         let materials = (begin..self.steps.len()).map(|step| self.history.materials().get(step).unwrap());
         Ok(materials.map(|material| engine.step(&material)).collect())
     }
@@ -147,9 +147,117 @@ fn measurements_can_be_dropped_and_disturbed() {
     let visual = chi2(&parent.steps[FORK_AT..], "visual");
     let lax = parent.forked(FORK_AT, "pixel-noise=3").unwrap();
     assert!(chi2(&lax, "visual") < 0.5 * visual);
-    // Intervals in the window keep their noise, so that only the result tells: the new ones pull less.
-    let lax = parent.forked(FORK_AT, "imu-noise=10").unwrap();
-    assert!(apart_m(lax.last().unwrap(), parent.steps.last().unwrap()) > 1e-6);
+}
+
+/// Norm of the inertial rows between two frames in the columns of the later one's pose, in standard deviations.
+fn inertial_weight(flight: &SyntheticFlight, step: &StepRecord, slot: usize) -> f64 {
+    let model = &flight.given_rig.cameras[0].model;
+    let jacobian = step.report.jacobian(&[model]).unwrap();
+    let (from, to) = (step.report.window[slot - 1].frame_index, step.report.window[slot].frame_index);
+    let row = jacobian.rows.iter().find(|row| row.factor == JacobianFactor::Inertial { from, to }).unwrap();
+    let norm = |(_, norm): &(u16, f32)| f64::from(*norm).powi(2);
+    row.norms.iter().map(norm).sum::<f64>().sqrt()
+}
+
+#[test]
+fn inertial_noise_weakens_the_intervals_to_come_by_just_that_much() {
+    let parent = flown("auto");
+    for factor in [2.0, 0.25] {
+        let fork = parent.forked(FORK_AT, &format!("imu-noise={factor}")).unwrap();
+        let (fork, parent_step) = (&fork[0], &parent.steps[FORK_AT]);
+        let newest = fork.report.window.len() - 1;
+        for slot in 1..=newest {
+            let share =
+                inertial_weight(&parent.flight, parent_step, slot) / inertial_weight(&parent.flight, fork, slot);
+            // Only the newest interval has come since; the others move a little with the state.
+            let expected = if slot == newest { factor } else { 1.0 };
+            assert!((share / expected - 1.0).abs() < 0.01, "imu-noise={factor}, slot {slot} of {newest}: {share}");
+        }
+    }
+}
+
+#[test]
+fn a_fork_with_other_inertial_noise_from_the_start_is_a_run_of_such_a_rig() {
+    // A power of two, so that no order of multiplications rounds otherwise.
+    const FACTOR: f64 = 4.0;
+    let parent = flown("auto");
+    let fork = parent.forked(0, &format!("imu-noise={FACTOR}")).unwrap();
+    let mut rig = parent.flight.given_rig.clone();
+    let noise = &mut rig.imu.noise;
+    noise.accelerometer_noise_density *= FACTOR;
+    noise.accelerometer_random_walk *= FACTOR;
+    noise.gyroscope_noise_density *= FACTOR;
+    noise.gyroscope_random_walk *= FACTOR;
+    let mut engine = RunEngine::new(estimator_config(&rig, &"auto".parse().unwrap()).unwrap(), None);
+    for (step, forked) in fork.iter().enumerate() {
+        let material = parent.history.materials().get(step).unwrap();
+        assert_eq!(bits(forked), bits(&engine.step(&material)), "step {step}");
+    }
+    // Less is known by inertia, so less is known of the calibration; never more, but for where the linearization moved.
+    let sigmas = |steps: &[StepRecord]| steps.last().unwrap().report.calibration.sigmas.clone();
+    let ratios: Vec<f64> = sigmas(&fork).iter().zip(sigmas(&parent.steps)).map(|(more, usual)| more / usual).collect();
+    assert!(ratios.iter().all(|ratio| (0.97..FACTOR * 1.03).contains(ratio)), "{ratios:?}");
+    assert!(ratios.iter().any(|ratio| *ratio > 1.1), "{ratios:?}");
+}
+
+#[test]
+fn encoder_readings_can_be_left_out_from_there_on() {
+    let parent = flown("auto");
+    let fork = parent.forked(FORK_AT, "encoder=off").unwrap();
+    for (number, step) in fork.iter().enumerate() {
+        let read = |index: usize| step.report.window[index].encoder_angles_rad.is_some();
+        let own = |index: usize| step.report.window[index].frame_index >= parent.steps[FORK_AT].report.frame_index;
+        // Frames from before keep what they were told, those to come are told nothing.
+        assert!((0..step.report.window.len()).all(|index| read(index) != own(index)), "step {number}");
+        assert_eq!(step.report.calibration.names, parent.steps[FORK_AT].report.calibration.names);
+    }
+    let last = fork.last().unwrap();
+    let tracking = last.report.phase == Phase::Tracking && last.report.restarts == 0;
+    assert!(tracking && apart_m(last, parent.steps.last().unwrap()) < 0.05);
+    // Angles that nobody reads are known by the picture alone.
+    let joint_sigma = |step: &StepRecord| step.report.calibration.sigmas.iter().sum::<f64>();
+    assert!(joint_sigma(last) > joint_sigma(parent.steps.last().unwrap()));
+}
+
+#[test]
+fn one_camera_of_two_can_be_left_out() {
+    let request = SessionRequest {
+        log_path: PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("sample_logs/garden.mcap"),
+        specs: vec!["cluster".parse().unwrap()],
+        duration_s: Some(3.5),
+        ..SessionRequest::default()
+    };
+    let mut session = Session::start(SessionPlan::open(&request).unwrap()).unwrap();
+    let finished = |session: &mut Session| {
+        while session.recording().runs.iter().any(|run| !run.finished) {
+            session.advance(0.0);
+            std::thread::sleep(std::time::Duration::from_millis(10));
+        }
+    };
+    finished(&mut session);
+    let recording = session.recording();
+    let steps = &recording.runs[0].steps;
+    let at = steps.iter().rposition(|step| step.report.phase == Phase::Tracking).unwrap() - 8;
+    session.apply(Command::Seek { stamp_ns: steps[at].report.stamp_ns });
+    let [main, rigid] = [recording.runs[0].camera_key.clone(), steps[at].report.calibration.rigid_cameras[0].0.clone()];
+    for (key, left) in [(&rigid, 0), (&main, 1)] {
+        let changes: ForkChanges = format!("without={key}").parse().unwrap();
+        session.apply(Command::Fork { run: 0, changes, label: None });
+        assert_eq!(session.take_notices(), Vec::<String>::new());
+        finished(&mut session);
+        let recording = session.recording();
+        for step in &recording.runs.last().unwrap().steps[at..] {
+            assert_eq!(step.report.phase, Phase::Tracking);
+            let seen = step.report.features.iter().map(|feature| feature.id.camera());
+            assert!(seen.clone().all(|camera| camera == left) && seen.count() > 5, "without={key}");
+        }
+    }
+    let refused = |session: &mut Session, text: &str| {
+        session.apply(Command::Fork { run: 0, changes: text.parse().unwrap(), label: None });
+        session.take_notices().pop().unwrap()
+    };
+    assert!(refused(&mut session, "without=cam7").contains("'cam7'"));
+    assert!(refused(&mut session, &format!("without={main}+{rigid}")).contains("one of its cameras"));
 }
 
 #[test]

@@ -28,6 +28,10 @@ pub struct ForkChanges {
     pub values: Vec<(String, f64)>,
     /// Features that are not used any more.
     pub dropped: BTreeSet<u64>,
+    /// Keys of cameras that are not looked through any more, of a run that watches two.
+    pub without: BTreeSet<String>,
+    /// Encoder readings are not used any more.
+    pub encoder_off: bool,
     /// Standard deviation of noise that is added to every joint angle, in radians; the estimator is not told.
     pub joint_noise_rad: f64,
     /// The inertial noise densities are multiplied by this.
@@ -45,6 +49,8 @@ impl Default for ForkChanges {
             frozen: Vec::new(),
             values: Vec::new(),
             dropped: BTreeSet::new(),
+            without: BTreeSet::new(),
+            encoder_off: false,
             joint_noise_rad: 0.0,
             imu_noise: 1.0,
             pixel_noise: 1.0,
@@ -64,6 +70,20 @@ pub enum ForkError {
         /// What is wrong with it, and what was expected.
         problem: String,
     },
+    /// The run does not watch such a camera.
+    #[error("the run watches no camera '{camera}', only {present}")]
+    NoCamera {
+        /// What was asked for.
+        camera: String,
+        /// The cameras that it watches.
+        present: String,
+    },
+    /// Nothing would be left to see with.
+    #[error("without {without} the run would see nothing: leave it one of its cameras")]
+    Blind {
+        /// What was to be left out.
+        without: String,
+    },
     /// The estimator refuses.
     #[error("this run cannot be forked so: {0}")]
     Estimator(#[from] InterventionError),
@@ -74,6 +94,10 @@ pub enum ForkError {
         run: String,
     },
 }
+
+/// Why a fork cannot watch another camera.
+const OTHER_CAMERA: &str = "the window of the run holds features that only its own cameras have seen, so that a fork can \
+                            leave a camera of two out (without=cam1) but not take another one in";
 
 /// Parameterizations that a fork may go over to: another camera would have other tracks.
 pub const FORK_PARAMETERIZATIONS: [ParameterizationChoice; 5] = [
@@ -94,7 +118,13 @@ impl FromStr for ForkChanges {
             let Some((key, value)) = part.split_once('=') else {
                 let choice = FORK_PARAMETERIZATIONS.into_iter().find(|choice| choice.name() == part);
                 let known = FORK_PARAMETERIZATIONS.map(ParameterizationChoice::name).join(", ");
-                let expected = || bad(format!("'{part}' is no parameterization that a fork can have ({known})"));
+                let expected = || {
+                    if ParameterizationChoice::all().any(|(name, _)| name == part) {
+                        bad(format!("'{part}' watches other cameras: {OTHER_CAMERA}; run {part} beside it instead"))
+                    } else {
+                        bad(format!("'{part}' is no parameterization that a fork can have ({known})"))
+                    }
+                };
                 changes.parameterization = Some(choice.ok_or_else(expected)?);
                 continue;
             };
@@ -123,6 +153,17 @@ impl FromStr for ForkChanges {
                         changes.dropped.insert(id.parse().ok().ok_or_else(expected)?);
                     }
                 }
+                "without" => changes.without.extend(several().map(str::to_owned)),
+                "camera" => return Err(bad(format!("{OTHER_CAMERA}; a run with camera={value} can be added instead"))),
+                "encoder" => {
+                    if value.trim() != "off" {
+                        return Err(bad(format!(
+                            "encoder is '{value}', a fork can only turn it off: a calibration that has begun without \
+                             readings has no joint offsets, which they need; add a run with encoder=on instead"
+                        )));
+                    }
+                    changes.encoder_off = true;
+                }
                 "joint-noise" => {
                     changes.joint_noise_rad = quantity(value)?;
                     if changes.joint_noise_rad < 0.0 {
@@ -133,7 +174,8 @@ impl FromStr for ForkChanges {
                 "pixel-noise" => changes.pixel_noise = factor(value)?,
                 "encoder-noise" => changes.encoder_noise = factor(value)?,
                 _ => {
-                    let known = "freeze, set, drop, joint-noise, imu-noise, pixel-noise, encoder-noise";
+                    let known =
+                        "freeze, set, drop, without, encoder, joint-noise, imu-noise, pixel-noise, encoder-noise";
                     return Err(bad(format!("unknown key '{key}', expected one of {known}")));
                 }
             }
@@ -179,6 +221,12 @@ impl fmt::Display for ForkChanges {
             let dropped: Vec<String> = self.dropped.iter().map(u64::to_string).collect();
             parts.push(format!("drop={}", dropped.join("+")));
         }
+        if !self.without.is_empty() {
+            parts.push(format!("without={}", self.without.iter().cloned().collect::<Vec<_>>().join("+")));
+        }
+        if self.encoder_off {
+            parts.push("encoder=off".to_owned());
+        }
         let figures = [
             ("joint-noise", self.joint_noise_rad, standard.joint_noise_rad),
             ("imu-noise", self.imu_noise, standard.imu_noise),
@@ -197,11 +245,13 @@ impl ForkChanges {
     pub(super) fn spec(&self, parent: &RunSpec, time_s: f64) -> RunSpec {
         let parameterization = self.parameterization.unwrap_or(parent.parameterization);
         let name = self.parameterization.map_or(&*parent.label, |choice| choice.name());
-        RunSpec { label: format!("{name}-{time_s:.2}s"), parameterization, ..parent.clone() }
+        let encoder = parent.encoder && !self.encoder_off;
+        RunSpec { label: format!("{name}-{time_s:.2}s"), parameterization, encoder, ..parent.clone() }
     }
 
-    /// Changes the engine of the parent, as it is before the fork's first step.
-    pub(super) fn apply(&self, engine: &mut RunEngine, rig: &Rig) -> Result<(), ForkError> {
+    /// Changes the engine of the parent, as it is before the fork's first step; `camera_key` is its main camera's.
+    pub(super) fn apply(&self, engine: &mut RunEngine, rig: &Rig, camera_key: &str) -> Result<(), ForkError> {
+        let blind = self.blind(&engine.camera_keys(camera_key))?;
         let estimator = engine.estimator_mut();
         if let Some(choice) = self.parameterization {
             let (form, auto_chart) = match choice {
@@ -223,14 +273,29 @@ impl ForkChanges {
         estimator.scale_pixel_noise(self.pixel_noise);
         let dropped = self.dropped.clone();
         for camera in 0..engine.cameras() {
-            engine.estimator_mut().forget_features(camera, |id| dropped.contains(&id.of_camera(camera).0));
+            let all = blind.contains(&camera);
+            engine.estimator_mut().forget_features(camera, |id| all || dropped.contains(&id.of_camera(camera).0));
         }
         engine.alter(Alterations {
             dropped: self.dropped.clone(),
+            blind,
+            encoder_off: self.encoder_off,
             joint_noise_rad: self.joint_noise_rad,
             encoder_noise: self.encoder_noise,
         });
         Ok(())
+    }
+
+    /// Numbers of the cameras that are left out, of those with the given keys.
+    fn blind(&self, keys: &[String]) -> Result<BTreeSet<usize>, ForkError> {
+        let number = |key: &String| keys.iter().position(|known| known == key);
+        let missing = |key: &String| ForkError::NoCamera { camera: key.clone(), present: keys.join(", ") };
+        let blind: BTreeSet<usize> =
+            self.without.iter().map(|key| number(key).ok_or_else(|| missing(key))).collect::<Result<_, _>>()?;
+        if blind.len() == keys.len() {
+            return Err(ForkError::Blind { without: keys.join(", ") });
+        }
+        Ok(blind)
     }
 }
 
@@ -238,13 +303,22 @@ impl ForkChanges {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Alterations {
     dropped: BTreeSet<u64>,
+    /// Numbers of cameras whose tracks are not used.
+    blind: BTreeSet<usize>,
+    encoder_off: bool,
     joint_noise_rad: f64,
     encoder_noise: f64,
 }
 
 impl Default for Alterations {
     fn default() -> Self {
-        Self { dropped: BTreeSet::new(), joint_noise_rad: 0.0, encoder_noise: 1.0 }
+        Self {
+            dropped: BTreeSet::new(),
+            blind: BTreeSet::new(),
+            encoder_off: false,
+            joint_noise_rad: 0.0,
+            encoder_noise: 1.0,
+        }
     }
 }
 
@@ -252,13 +326,21 @@ impl Alterations {
     /// Adds others, as a fork of a fork has them.
     pub(super) fn add(&mut self, other: Self) {
         self.dropped.extend(other.dropped);
+        self.blind.extend(other.blind);
+        self.encoder_off |= other.encoder_off;
         self.joint_noise_rad = self.joint_noise_rad.hypot(other.joint_noise_rad);
         self.encoder_noise *= other.encoder_noise;
     }
 
+    /// Whether encoder readings are left out.
+    pub(super) fn encoder_off(&self) -> bool {
+        self.encoder_off
+    }
+
     /// The tracks of a camera without what is dropped, `None` where nothing is.
     pub(super) fn tracks(&self, camera: usize, tracks: &TrackedFrame) -> Option<TrackedFrame> {
-        let gone = |id: FeatureId| self.dropped.contains(&id.of_camera(camera).0);
+        let blind = self.blind.contains(&camera);
+        let gone = |id: FeatureId| blind || self.dropped.contains(&id.of_camera(camera).0);
         tracks.features.iter().any(|feature| gone(feature.id)).then(|| {
             let mut kept = tracks.clone();
             kept.features.retain(|feature| !gone(feature.id));
@@ -303,7 +385,7 @@ mod tests {
         assert_eq!(read.dropped.iter().copied().collect::<Vec<_>>(), [12, 15]);
         assert!((read.joint_noise_rad - 0.5_f64.to_radians()).abs() < 1e-15);
         assert_eq!((read.imu_noise, read.pixel_noise), (2.0, 1.0));
-        for text in [text, "", "poe", "pixel-noise=0.5,encoder-noise=3", "set=L1.d:-0.25"] {
+        for text in [text, "", "poe", "without=cam1,encoder=off", "pixel-noise=0.5,encoder-noise=3", "set=L1.d:-0.25"] {
             assert_eq!(changes(&changes(text).to_string()), changes(text), "{text}");
         }
     }
@@ -314,7 +396,10 @@ mod tests {
             let message = text.parse::<ForkChanges>().unwrap_err().to_string();
             assert!(words.iter().all(|word| message.contains(word)), "{text}: {message}");
         };
-        check("static", &["'static'", "minimal-swapped"]);
+        check("statik", &["'statik'", "minimal-swapped"]);
+        check("static", &["'static'", "features that only its own cameras have seen", "run static beside it"]);
+        check("camera=cam1", &["without=cam1", "a run with camera=cam1"]);
+        check("encoder=on", &["'on'", "joint offsets", "add a run with encoder=on"]);
         check("set=yaw.alpha", &["no value", "set=yaw.alpha:1deg"]);
         check("set=yaw.alpha:far", &["'far'", "number"]);
         check("drop=some", &["'some'", "feature"]);

@@ -424,7 +424,7 @@ impl Session {
         let step = parent.index_at(stamp_ns).ok_or_else(no_step)?;
         let way = parent.history.as_ref().ok_or_else(no_step)?;
         let mut engine = way.engine_before(step).ok_or_else(no_step)?;
-        changes.apply(&mut engine, &self.plan.rig).map_err(|error| error.to_string())?;
+        changes.apply(&mut engine, &self.plan.rig, &parent.camera_key).map_err(|error| error.to_string())?;
         let mut spec = changes.spec(&parent.spec, seconds_from_ns(parent.steps[step].report.stamp_ns));
         spec.label = label.unwrap_or(spec.label);
         let mut specs: Vec<RunSpec> = self.plan.runs.iter().map(|(spec, _)| spec.clone()).chain([spec]).collect();

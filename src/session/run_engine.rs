@@ -44,6 +44,12 @@ impl RunEngine {
         1 + self.estimator.config().rigid_cameras.len()
     }
 
+    /// Keys of the cameras that it watches, the main one's given.
+    pub(super) fn camera_keys(&self, main: &str) -> Vec<String> {
+        let rigid = self.estimator.config().rigid_cameras.iter().map(|camera| camera.key.clone());
+        std::iter::once(main.to_owned()).chain(rigid).collect()
+    }
+
     /// From now on it alters its measurements.
     pub(super) fn alter(&mut self, alterations: Alterations) {
         self.alterations.add(alterations);
@@ -97,7 +103,8 @@ impl RunEngine {
             })
             .collect();
         let rigid: Vec<&TrackedFrame> = altered.iter().skip(1).map(Cow::as_ref).collect();
-        let angles = material.joint_angles.as_ref().filter(|_| self.has_joints);
+        let read = self.has_joints && !self.alterations.encoder_off();
+        let angles = material.joint_angles.as_ref().filter(|_| read);
         let noisy = angles.and_then(|angles| self.alterations.joint_angles(angles, material.stamp_ns));
         self.estimator.step(&StepInput {
             frame_index: material.frame_index,
@@ -120,7 +127,10 @@ impl RunEngine {
         let clocks = calibration.units.iter().filter(|unit| **unit == "s").count();
         let mounts = calibration.names.len() - clocks;
         let chain = if chain.dof() + rigid == mounts { chain } else { chain.without_joint_offsets() };
-        let rank = analyse(&linearization, &chain, &angles, self.joints_free);
+        // Readings that a fork leaves out stay with the frames that have them already.
+        let unread = || report.window.iter().all(|frame| frame.encoder_angles_rad.is_none());
+        let joints_free = self.joints_free || self.has_joints && self.alterations.encoder_off() && unread();
+        let rank = analyse(&linearization, &chain, &angles, joints_free);
         let kept = self.keep_linearization_every.is_some_and(|every| report.frame_index.is_multiple_of(every));
         report.linearization = kept.then_some(linearization);
         rank

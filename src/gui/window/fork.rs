@@ -19,6 +19,8 @@ pub struct ForkDialog {
     frozen: String,
     values: String,
     dropped: String,
+    without: String,
+    encoder: bool,
     joint_noise_deg: f64,
     imu_noise: f64,
     pixel_noise: f64,
@@ -34,6 +36,8 @@ impl Default for ForkDialog {
             frozen: String::new(),
             values: String::new(),
             dropped: String::new(),
+            without: String::new(),
+            encoder: true,
             joint_noise_deg: 0.0,
             imu_noise: 1.0,
             pixel_noise: 1.0,
@@ -61,7 +65,7 @@ impl ForkDialog {
             parts.push(choice.name().to_owned());
         }
         let list = |text: &str| text.split([',', ' ', '+']).filter(|it| !it.is_empty()).collect::<Vec<_>>().join("+");
-        for (key, text) in [("freeze", &self.frozen), ("drop", &self.dropped)] {
+        for (key, text) in [("freeze", &self.frozen), ("drop", &self.dropped), ("without", &self.without)] {
             if !text.trim().is_empty() {
                 parts.push(format!("{key}={}", list(text)));
             }
@@ -69,6 +73,9 @@ impl ForkDialog {
         for value in self.values.split([',', ' ']).filter(|value| !value.is_empty()) {
             // People write an equals sign there.
             parts.push(format!("set={}", value.replacen('=', ":", 1)));
+        }
+        if !self.encoder {
+            parts.push("encoder=off".to_owned());
         }
         if self.joint_noise_deg != 0.0 {
             parts.push(format!("joint-noise={}deg", self.joint_noise_deg));
@@ -150,16 +157,21 @@ impl ForkDialog {
             let parameter = selected.0.clone().unwrap_or_else(|| "yaw.alpha".to_owned());
             let feature = selected.1.map_or_else(|| "12 15".to_owned(), |id| id.0.to_string());
             let value = format!("{parameter}=1deg");
+            let camera = second_camera(ctx).unwrap_or_else(|| "of a cluster, one of its two".to_owned());
             for (label, text, hint) in [
                 ("Freeze parameters", &mut self.frozen, &parameter),
                 ("Set parameters", &mut self.values, &value),
                 ("Drop features", &mut self.dropped, &feature),
+                ("Leave out camera", &mut self.without, &camera),
                 ("Name", &mut self.name, &"as it is changed".to_owned()),
             ] {
                 let name = ui.label(label);
                 ui.add(TextEdit::singleline(text).hint_text(hint).desired_width(260.0)).labelled_by(name.id);
                 ui.end_row();
             }
+            ui.label("From here on use");
+            ui.checkbox(&mut self.encoder, "Encoder readings");
+            ui.end_row();
             let name = ui.label("Noise on joint angles");
             ui.add(DragValue::new(&mut self.joint_noise_deg).range(0.0..=45.0).speed(0.05).suffix("°"))
                 .labelled_by(name.id);
@@ -178,6 +190,13 @@ impl ForkDialog {
     }
 }
 
+/// The camera beside the main one of the shown run.
+fn second_camera(ctx: &PanelContext<'_>) -> Option<String> {
+    let run = ctx.recording.runs.get(ctx.selection.run)?;
+    let step = run.step_at(ctx.cursor_ns)?;
+    step.report.calibration.rigid_cameras.first().map(|(key, _)| key.clone())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -189,12 +208,15 @@ mod tests {
             frozen: "yaw.alpha, yaw.d".to_owned(),
             values: "pitch.a=30mm roll.a:1deg".to_owned(),
             dropped: "12 15".to_owned(),
+            without: "cam1".to_owned(),
+            encoder: false,
             joint_noise_deg: 0.5,
             imu_noise: 2.0,
             ..ForkDialog::default()
         };
         let changes: ForkChanges = dialog.written().parse().unwrap();
-        let expected = "classical,freeze=yaw.alpha+yaw.d,set=pitch.a:30mm,set=roll.a:1deg,drop=12+15,joint-noise=0.5deg,imu-noise=2";
+        let expected = "classical,freeze=yaw.alpha+yaw.d,set=pitch.a:30mm,set=roll.a:1deg,drop=12+15,without=cam1,encoder=off,\
+                        joint-noise=0.5deg,imu-noise=2";
         assert_eq!(changes, expected.parse().unwrap());
         assert_eq!(ForkDialog::default().written(), "");
         let named = |name: &str| ForkDialog { name: name.to_owned(), ..ForkDialog::default() }.label();
