@@ -14,12 +14,17 @@ const MOST_READ: usize = 5000;
 /// How far above the program sample logs are looked for: `target/release/dcvins` lies three folders deep.
 const LEVELS_ABOVE: usize = 4;
 
+/// File of the saved layouts in the user's state folder.
+const LAYOUTS: &str = "layouts.json";
+/// File of the settings there.
+const SETTINGS: &str = "settings.json";
+
 /// The machine as it is.
 #[derive(Clone, Debug)]
 pub struct Machine {
     recent: RecentFiles,
-    /// The file of saved layouts, when the user has a place for it.
-    layouts: Option<PathBuf>,
+    /// Where layouts and settings are kept, when the user has a place for them.
+    state: Option<PathBuf>,
     /// Where exported panels go.
     output: PathBuf,
 }
@@ -27,8 +32,19 @@ pub struct Machine {
 impl Machine {
     /// The machine with the user's list of recent logs.
     pub fn new() -> Self {
-        let layouts = state_folder().map(|folder| folder.join("layouts.json"));
-        Self { recent: RecentFiles::of_user(), layouts, output: PathBuf::from("dcvins-output") }
+        Self { recent: RecentFiles::of_user(), state: state_folder(), output: PathBuf::from("dcvins-output") }
+    }
+
+    fn kept(&self, name: &str) -> Option<String> {
+        fs::read_to_string(self.state.as_ref()?.join(name)).ok()
+    }
+
+    fn keep(&self, name: &str, text: &str) -> Result<(), String> {
+        let folder =
+            self.state.as_ref().ok_or_else(|| format!("there is no home folder to keep {name} in: set HOME"))?;
+        let file = folder.join(name);
+        let written = fs::create_dir_all(folder).and_then(|()| fs::write(&file, text));
+        written.map_err(|error| ExportError::write(&file)(error).to_string())
     }
 }
 
@@ -84,13 +100,19 @@ impl Desktop for Machine {
     }
 
     fn kept_layouts(&self) -> Option<String> {
-        fs::read_to_string(self.layouts.as_ref()?).ok()
+        self.kept(LAYOUTS)
     }
 
     fn keep_layouts(&self, text: &str) -> Result<(), String> {
-        let file = self.layouts.as_ref().ok_or("there is no home folder to keep layouts in: set HOME")?;
-        let folder = file.parent().map_or(Ok(()), fs::create_dir_all);
-        folder.and_then(|()| fs::write(file, text)).map_err(|error| ExportError::write(file)(error).to_string())
+        self.keep(LAYOUTS, text)
+    }
+
+    fn kept_settings(&self) -> Option<String> {
+        self.kept(SETTINGS)
+    }
+
+    fn keep_settings(&self, text: &str) -> Result<(), String> {
+        self.keep(SETTINGS, text)
     }
 
     fn write_panel(&self, export: &PanelExport) -> Result<Vec<PathBuf>, String> {
@@ -139,7 +161,7 @@ mod tests {
     fn machine_in(folder: &Path) -> Machine {
         Machine {
             recent: RecentFiles::in_file(folder.join("recent")),
-            layouts: Some(folder.join("state/layouts.json")),
+            state: Some(folder.join("state")),
             output: folder.join("output"),
         }
     }
@@ -150,7 +172,9 @@ mod tests {
         let machine = machine_in(folder.path());
         assert_eq!(machine.kept_layouts(), None);
         machine.keep_layouts("{}").unwrap();
-        assert_eq!(machine.kept_layouts().as_deref(), Some("{}"));
+        assert_eq!((machine.kept_layouts().as_deref(), machine.kept_settings()), (Some("{}"), None));
+        machine.keep_settings("{\"scale\": 2}").unwrap();
+        assert_eq!(machine.kept_settings().as_deref(), Some("{\"scale\": 2}"));
         let picture = image::RgbaImage::from_pixel(20, 10, image::Rgba([9, 8, 7, 255]));
         let export = PanelExport { name: "yard/rank-1.500s".to_owned(), picture, table: "a,b\n1,2\n".to_owned() };
         let written = machine.write_panel(&export).unwrap();

@@ -18,23 +18,19 @@ use crate::gui::{ImageSource, PanelContext, Playback, Selection};
 use crate::observability::SlidePosition;
 use crate::session::Recording;
 
-/// Panels by name; `all` is the whole window.
-pub const PANEL_NAMES: [&str; 11] = [
-    WHOLE_WINDOW,
-    "image",
-    "scene",
-    "convergence",
-    "rank",
-    "jacobian",
-    "residuals",
-    "inspector",
-    "laboratory",
-    "breakpoints",
-    "timeline",
-];
-
 /// The name that stands for all panels.
 const WHOLE_WINDOW: &str = "all";
+
+/// Panels by name; `all` is the whole window.
+pub const PANEL_NAMES: [&str; PanelName::ALL.len() + 1] = {
+    let mut names = [WHOLE_WINDOW; PanelName::ALL.len() + 1];
+    let mut index = 0;
+    while index < PanelName::ALL.len() {
+        names[index + 1] = PanelName::ALL[index].as_str();
+        index += 1;
+    }
+    names
+};
 
 /// Largest side of a picture in pixels.
 const LARGEST_SIDE_PX: u32 = 16_384;
@@ -62,6 +58,8 @@ pub struct PictureOptions {
     pub renderer: Renderer,
     /// Where the chain of the first run is moved to.
     pub slide: Option<SlidePosition>,
+    /// Markers, breakpoints and the like, of a session that was saved.
+    pub playback: Playback,
 }
 
 impl Default for PictureOptions {
@@ -72,6 +70,7 @@ impl Default for PictureOptions {
             theme: ThemeName::Light,
             renderer: Renderer::Cpu,
             slide: None,
+            playback: Playback::default(),
         }
     }
 }
@@ -134,7 +133,7 @@ pub fn draw_panel(
     let theme = Theme::of(options.theme);
     let mut state = WindowState::default();
     let mut selection = Selection { slide: options.slide.clone(), ..Selection::default() };
-    let playback = Playback::default();
+    let playback = Playback { playing: false, ..options.playback.clone() };
     let mut ui = |ui: &mut Ui| {
         // Nobody is there to carry out what a panel may ask for.
         let commands = &mut Vec::new();

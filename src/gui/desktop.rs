@@ -27,6 +27,10 @@ pub trait Desktop: Send + Sync {
     fn kept_layouts(&self) -> Option<String>;
     /// Keeps the saved layouts for the next start.
     fn keep_layouts(&self, text: &str) -> Result<(), String>;
+    /// What [`Desktop::keep_settings`] kept last.
+    fn kept_settings(&self) -> Option<String>;
+    /// Keeps the settings for the next start.
+    fn keep_settings(&self, text: &str) -> Result<(), String>;
     /// Writes a panel as a picture and as a table, and says where.
     fn write_panel(&self, export: &PanelExport) -> Result<Vec<PathBuf>, String>;
     /// Writes a session of a log of this name, and says where.

@@ -3,6 +3,7 @@
 pub mod app;
 pub mod breakpoints;
 mod chain_values;
+pub mod comparison;
 pub mod convergence;
 pub mod desktop;
 mod events;

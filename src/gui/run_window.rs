@@ -70,7 +70,7 @@ pub fn run_window(options: WindowOptions) -> Result<(), WindowError> {
                 arrange_drawing(creation.wgpu_render_state.as_ref(), &creation.egui_ctx);
                 let mut app = App::new(options.open_log, options.desktop, options.theme);
                 if let Some(log) = options.log {
-                    app.show(log);
+                    app.show(log, None);
                 }
                 if let Some(path) = options.log_path {
                     app.open(path);

@@ -58,6 +58,12 @@ impl PlayingLog for Session {
     }
 }
 
+impl ImageSource for Session {
+    fn image(&mut self, camera_key: &str, frame_index: usize) -> Option<Arc<GrayImage>> {
+        Self::image(self, camera_key, frame_index)
+    }
+}
+
 impl ImageSource for ImageReader {
     fn image(&mut self, camera_key: &str, frame_index: usize) -> Option<Arc<GrayImage>> {
         Self::image(self, camera_key, frame_index).ok()

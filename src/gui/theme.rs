@@ -6,9 +6,11 @@ use std::collections::BTreeMap;
 use std::str::FromStr;
 
 use egui::{Color32, CornerRadius, FontFamily, FontId, Stroke, TextStyle, vec2};
+use serde::{Deserialize, Serialize};
 
 /// Which theme.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum ThemeName {
     /// Dark ground, for the screen.
     #[default]

@@ -12,10 +12,13 @@ use egui::{CentralPanel, Frame, Ui, ViewportCommand};
 use crate::flight_log::GrayImage;
 use crate::gui::desktop::Desktop;
 use crate::gui::theme::{Theme, ThemeName};
+use crate::gui::units::counted;
 use crate::gui::welcome::Welcome;
-use crate::gui::window::{NoticeLevel, PanelExport, SavedLayouts, WindowRequest, WindowState, window_ui};
+use crate::gui::window::{
+    NoticeLevel, PanelExport, ProgressMeter, SCALES, SavedLayouts, Settings, WindowRequest, WindowState, window_ui,
+};
 use crate::gui::{ImageSource, PanelContext, Playback, Selection};
-use crate::session::{Command, Recording};
+use crate::session::{Command, PlaybackSpeed, Recording};
 
 /// A log that plays: what the window needs of a session.
 pub trait PlayingLog: Send {
@@ -69,19 +72,27 @@ pub struct App {
     state: WindowState,
     selection: Selection,
     theme: Theme,
-    themed: bool,
+    /// The settings as they have been put into effect, `None` before the first picture.
+    applied: Option<Settings>,
+    progress: ProgressMeter,
+    /// Warnings of the log that a notice has told.
+    warnings_told: usize,
     title: String,
     memory_read_s: Option<f64>,
 }
 
 impl App {
-    /// A window without a log.
+    /// A window without a log; `theme` holds until a person chooses another one.
     pub fn new(open_log: OpenLog, desktop: Arc<dyn Desktop>, theme: ThemeName) -> Self {
         let mut state = WindowState::default();
         state.show_times = true;
         state.panels.laboratory.in_background = true;
         state.open_dialog.set_desktop(Arc::clone(&desktop));
         state.saved_layouts = SavedLayouts::from_text(&desktop.kept_layouts().unwrap_or_default());
+        state.settings = Settings::from_text(&desktop.kept_settings().unwrap_or_default(), theme);
+        let layout = state.settings.layout.clone();
+        state.arrange_by_name(&layout);
+        let theme = Theme::of(state.settings.theme);
         Self {
             welcome: Welcome::new(Arc::clone(&desktop)),
             open_log,
@@ -91,8 +102,10 @@ impl App {
             opening: None,
             state,
             selection: Selection::default(),
-            theme: Theme::of(theme),
-            themed: false,
+            theme,
+            applied: None,
+            progress: ProgressMeter::default(),
+            warnings_told: 0,
             title: String::new(),
             memory_read_s: None,
         }
@@ -112,15 +125,20 @@ impl App {
         }
     }
 
-    /// Shows a session that is open already.
-    pub fn show(&mut self, log: Box<dyn PlayingLog>) {
-        self.desktop.remember_log(&log.recording().log_path);
+    /// Shows a session that is open already; `path` is what was opened, where it is not the log itself.
+    pub fn show(&mut self, log: Box<dyn PlayingLog>, path: Option<&Path>) {
+        let mut log = log;
+        self.desktop.remember_log(path.unwrap_or(&log.recording().log_path));
+        log.apply(Command::SetMemoryBudget(self.state.settings.memory_bytes()));
+        log.apply(Command::SetSpeed(PlaybackSpeed(self.state.settings.speed)));
         if let Some(layout) = log.layout() {
             self.state.take_layout(layout);
         }
         self.log = Some(log);
         self.at_first_frame = false;
         self.selection = Selection::default();
+        self.progress = ProgressMeter::default();
+        self.warnings_told = 0;
     }
 
     /// The session, when a log is open.
@@ -130,10 +148,7 @@ impl App {
 
     /// Draws one picture and does what was asked for in it.
     pub fn ui(&mut self, ui: &mut Ui) {
-        if !self.themed {
-            self.theme.apply(ui.ctx());
-            self.themed = true;
-        }
+        self.apply_settings(ui);
         self.take_opened();
         self.take_dropped(ui);
         self.read_memory(ui);
@@ -147,10 +162,6 @@ impl App {
             ui.ctx().request_repaint();
             match request {
                 WindowRequest::OpenLog(path) => self.open(path),
-                WindowRequest::ToggleTheme => {
-                    self.theme = Theme::of(if self.theme.is_dark() { ThemeName::Light } else { ThemeName::Dark });
-                    self.theme.apply(ui.ctx());
-                }
                 WindowRequest::KeepLayouts(text) => {
                     if let Err(problem) = self.desktop.keep_layouts(&text) {
                         self.state.notices.say(NoticeLevel::Error, problem);
@@ -164,6 +175,50 @@ impl App {
         if self.opening.is_some() {
             ui.ctx().request_repaint_after(std::time::Duration::from_millis(LOOK_MS));
         }
+    }
+
+    /// Puts settings that were changed into effect, and keeps them.
+    fn apply_settings(&mut self, ui: &Ui) {
+        let first = self.applied.is_none();
+        // Ctrl and +, − or 0 are egui's own keys.
+        let zoom = ui.ctx().zoom_factor();
+        if self
+            .applied
+            .as_ref()
+            .is_some_and(|applied| applied.scale != zoom && applied.scale == self.state.settings.scale)
+        {
+            self.state.settings.scale = zoom.clamp(*SCALES.start(), *SCALES.end());
+        }
+        if self.applied.as_ref() == Some(&self.state.settings) {
+            return;
+        }
+        let settings = self.state.settings.clone();
+        if self.applied.as_ref().is_none_or(|applied| applied.theme != settings.theme) {
+            self.theme = Theme::of(settings.theme);
+            self.theme.apply(ui.ctx());
+        }
+        ui.ctx().set_zoom_factor(settings.scale);
+        if let Some(log) = &mut self.log
+            && self.applied.as_ref().is_none_or(|applied| applied.memory_mib != settings.memory_mib)
+        {
+            log.apply(Command::SetMemoryBudget(settings.memory_bytes()));
+        }
+        if !first && let Err(problem) = self.desktop.keep_settings(&settings.to_text()) {
+            self.state.notices.say(NoticeLevel::Error, problem);
+        }
+        self.applied = Some(settings);
+        ui.ctx().request_repaint();
+    }
+
+    /// Says once that the log has warnings; the list has them all.
+    fn tell_warnings(&mut self, recording: &Recording) {
+        let count = recording.warnings.len();
+        if count > 0 && self.warnings_told == 0 {
+            let first = &recording.warnings[0].message;
+            let text = format!("{} about the log, the first: {first}\nW lists them all", counted(count, "warning"));
+            self.state.notices.say(NoticeLevel::Warning, text);
+        }
+        self.warnings_told = count;
     }
 
     fn save_session(&mut self) {
@@ -207,7 +262,9 @@ impl App {
             self.at_first_frame = go_to_first_frame(log.as_mut());
         }
         let (recording, playback, generation) = (log.recording(), log.playback(), log.generation());
-        self.state.timeline.pace.picture(playback.playing, now_s, log.cursor_ns());
+        self.state.progress = self.progress.read(&recording, Some(now_s));
+        self.state.opening = self.opening.as_ref().map(|opening| opening.path.clone());
+        self.state.panels.timeline.pace.picture(playback.playing, now_s, log.cursor_ns());
         let mut commands = Vec::new();
         let mut context = PanelContext {
             recording: &recording,
@@ -229,6 +286,7 @@ impl App {
         } else if computing || playback.retaking || playback.running_on {
             ui.ctx().request_repaint_after(std::time::Duration::from_millis(LOOK_MS));
         }
+        self.tell_warnings(&recording);
     }
 
     fn welcome_ui(&mut self, ui: &mut Ui) {
@@ -246,8 +304,8 @@ impl App {
         let Some(opening) = &self.opening else { return };
         match opening.result.try_recv() {
             Ok(Ok(log)) => {
-                self.opening = None;
-                self.show(log);
+                let path = self.opening.take().map(|opening| opening.path);
+                self.show(log, path.as_deref());
             }
             Ok(Err(message)) => {
                 self.opening = None;

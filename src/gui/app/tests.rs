@@ -91,6 +91,7 @@ struct TestDesktop {
     layouts: Mutex<Option<String>>,
     written: Mutex<Vec<PanelExport>>,
     sessions: Mutex<Vec<String>>,
+    settings: Mutex<Option<String>>,
 }
 
 impl Desktop for TestDesktop {
@@ -121,6 +122,15 @@ impl Desktop for TestDesktop {
 
     fn keep_layouts(&self, text: &str) -> Result<(), String> {
         *self.layouts.lock().unwrap() = Some(text.to_owned());
+        Ok(())
+    }
+
+    fn kept_settings(&self) -> Option<String> {
+        self.settings.lock().unwrap().clone()
+    }
+
+    fn keep_settings(&self, text: &str) -> Result<(), String> {
+        *self.settings.lock().unwrap() = Some(text.to_owned());
         Ok(())
     }
 
@@ -269,8 +279,10 @@ fn the_panel_clicked_last_is_written_as_picture_and_table() {
     assert!(image.table.starts_with("id,age_frames,u_px") && image.table.lines().count() > 60, "{}", image.table);
     assert!(harness.query_by_label_contains("/out/yard/image-").is_some(), "it says where");
 
-    harness.get_by_label("Dismiss notice").click();
-    harness.run_steps(2);
+    for _ in 0..harness.query_all_by_label("Dismiss notice").count() {
+        harness.query_all_by_label("Dismiss notice").next().unwrap().click();
+        harness.run_steps(2);
+    }
     let verdict = harness.get_by_label_contains("Rank 18 of 18").rect().center();
     harness.event(egui::Event::PointerMoved(verdict));
     for pressed in [true, false] {
@@ -321,6 +333,45 @@ fn the_session_is_saved_at_a_key_with_its_layout() {
 }
 
 #[test]
+fn settings_hold_at_once_and_are_kept() {
+    let (mut harness, desktop) = app();
+    harness.get_by_label("Open yard.mcap").click();
+    run_until(&mut harness, |harness| opened(harness).is_some());
+    assert_eq!(desktop.settings.lock().unwrap().as_deref(), None, "nothing was set yet");
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::Comma);
+    harness.run_steps(3);
+    let theme = harness.get_by_role_and_label(egui::Role::ComboBox, "Theme");
+    theme.click();
+    harness.run_steps(3);
+    harness.get_by_label("print").click();
+    harness.run_steps(3);
+    assert_eq!(harness.ctx.theme(), egui::Theme::Light, "paper is light");
+    let kept = desktop.settings.lock().unwrap().clone().unwrap();
+    assert!(kept.contains("\"theme\": \"print\""), "{kept}");
+    harness.get_by_label("Undo").click();
+    harness.run_steps(3);
+    assert_eq!(harness.ctx.theme(), egui::Theme::Dark);
+    // The next start has them.
+    *desktop.settings.lock().unwrap() = Some("{\"theme\": \"light\", \"layout\": \"Scene\"}".to_owned());
+    let open: OpenLog = Arc::new(|path: &Path| Ok(Box::new(SampleLog::new(path)) as Box<dyn PlayingLog>));
+    let again = App::new(open, desktop as Arc<dyn Desktop>, ThemeName::Dark);
+    assert_eq!(again.state.settings.theme, ThemeName::Light);
+    assert_eq!(again.theme.name, ThemeName::Light);
+}
+
+#[test]
+fn a_log_with_warnings_says_so_once() {
+    let (mut harness, _) = app();
+    harness.get_by_label("Open yard.mcap").click();
+    run_until(&mut harness, |harness| opened(harness).is_some());
+    harness.run_steps(2);
+    assert!(harness.query_by_label_contains("1 warning about the log, the first:").is_some());
+    harness.get_by_label("Dismiss notice").click();
+    harness.run_steps(5);
+    assert!(harness.query_by_label_contains("about the log, the first:").is_none());
+}
+
+#[test]
 fn the_theme_changes_at_a_key() {
     let (mut harness, _) = app();
     harness.get_by_label("Open yard.mcap").click();
@@ -353,7 +404,7 @@ fn dialogs_can_be_looked_at() {
         let (mut headless, mut painter) = (Headless::new(options), Painter::new());
         let log_is_shown = event.is_some();
         if log_is_shown {
-            app.show(Box::new(SampleLog::new(Path::new("/logs/city.mcap"))));
+            app.show(Box::new(SampleLog::new(Path::new("/logs/city.mcap"))), None);
         }
         let events = event.map(|event| {
             let modifiers = if let egui::Event::Key { modifiers, .. } = &event { *modifiers } else { Modifiers::NONE };

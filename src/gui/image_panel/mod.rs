@@ -83,6 +83,22 @@ impl ImagePanel {
         Self { side, magnification, residuals, tails, ids, view, texture: None }
     }
 
+    /// Shows its own image as another panel shows its.
+    pub(in crate::gui) fn follow(&mut self, other: &Self) {
+        let Self { side, magnification, residuals, tails, ids, view, .. } = *other;
+        let texture = self.texture.take();
+        *self = Self { side, magnification, residuals, tails, ids, view, texture };
+    }
+
+    /// Whether it shows its image as another panel does.
+    pub(in crate::gui) fn looks_like(&self, other: &Self) -> bool {
+        let look = |panel: &Self| {
+            let Self { side, magnification, residuals, tails, ids, view, .. } = *panel;
+            (side, magnification, residuals, tails, ids, view)
+        };
+        look(self) == look(other)
+    }
+
     /// Draws the panel into what is left of `ui`.
     pub fn ui(&mut self, ui: &mut Ui, context: &mut PanelContext<'_>) {
         let Some(run) = context.recording.runs.get(context.selection.run) else {
@@ -96,6 +112,8 @@ impl ImagePanel {
         };
         let size = ui.available_size() - vec2(0.0, 2.0 * LINE_HEIGHT + 2.0 * ui.spacing().item_spacing.y);
         let (area, response) = ui.allocate_exact_size(size.max(Vec2::splat(16.0)), Sense::click_and_drag());
+        let name = format!("Image of {}", run.spec.label);
+        response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &name));
         let image = context.images.image(&run.camera_key, model.frame_index);
         self.image_ui(ui, area, &response, context, &model, image);
         let (legend, _) = ui.allocate_exact_size(vec2(ui.available_width(), LINE_HEIGHT), Sense::hover());

@@ -26,7 +26,7 @@ fn ranked<'a>(ctx: &PanelContext<'a>) -> impl Iterator<Item = (usize, &'a RunRec
 }
 
 /// Draws all runs.
-pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>) {
+pub(in crate::gui) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>) {
     let theme = *ctx.theme;
     let ranked: Vec<_> = ranked(ctx).collect();
     ScrollArea::vertical().id_salt("all runs").auto_shrink(false).show(ui, |ui| {

@@ -8,6 +8,8 @@ mod slider;
 mod spectrum;
 pub(crate) mod verdict;
 
+pub(super) use self::compare::ui as all_runs_ui;
+
 use std::sync::Arc;
 
 use egui::{RichText, ScrollArea, Sense, Ui, UiBuilder, vec2};

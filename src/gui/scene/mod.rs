@@ -15,7 +15,7 @@ mod overlay;
 mod tests;
 mod world;
 
-use egui::{Rect, Response, Sense, Ui, Vec2, pos2, vec2};
+use egui::{Rect, Response, Role, Sense, Ui, Vec2, WidgetInfo, pos2, vec2};
 use nalgebra::Vector3;
 
 use self::camera::{Orbit, OrbitCamera, View, Viewport, frame};
@@ -95,11 +95,28 @@ impl ScenePanel {
         Self { follow, landmarks, keyframes, image, chain, world, close_up, ..Self::default() }
     }
 
+    /// Shows the same from the same place as another panel.
+    pub(in crate::gui) fn follow(&mut self, other: &Self) {
+        let Self { follow, landmarks, keyframes, image, chain, world, close_up, .. } = *other;
+        (self.follow, self.world, self.close_up) = (follow, world, close_up);
+        (self.landmarks, self.keyframes, self.image, self.chain) = (landmarks, keyframes, image, chain);
+    }
+
+    /// Whether it shows the same from the same place as another panel.
+    pub(in crate::gui) fn looks_like(&self, other: &Self) -> bool {
+        let look = |panel: &Self| {
+            let Self { follow, landmarks, keyframes, image, chain, world, close_up, .. } = *panel;
+            (follow, landmarks, keyframes, image, chain, world, close_up)
+        };
+        look(self) == look(other)
+    }
+
     /// Draws the panel into what is left of `ui`.
     pub fn ui(&mut self, ui: &mut Ui, context: &mut PanelContext<'_>) {
         self.controls_ui(ui);
         let (area, response) =
             ui.allocate_exact_size(ui.available_size().max(Vec2::splat(16.0)), Sense::click_and_drag());
+        response.widget_info(|| WidgetInfo::labeled(Role::Image, true, "View of the scene"));
         let area = on_pixels(area, ui.pixels_per_point());
         let has_room = area.width() >= CLOSE_UP_FROM.x && area.height() >= CLOSE_UP_FROM.y;
         let chain = (self.chain && has_room).then(|| chain_model(context)).flatten();
@@ -191,6 +208,7 @@ impl ScenePanel {
         let theme = context.theme;
         let scale = ui.pixels_per_point();
         let response = ui.interact(rect, ui.scope_id().with("close-up"), Sense::click_and_drag());
+        response.widget_info(|| WidgetInfo::labeled(Role::Image, true, "View of the gimbal's chain"));
         let painter = ui.painter_at(rect.expand(1.0));
         painter.rect_filled(rect, 0.0, theme.surface);
         let table_height = overlay::chain_table_height(chain);

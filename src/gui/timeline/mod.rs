@@ -6,7 +6,7 @@ mod pace;
 mod transport;
 
 pub use pace::{Pace, Reading};
-pub(crate) use transport::toggled_loop;
+pub(crate) use transport::{SPEEDS, toggled_loop};
 
 use egui::{Align2, FontFamily, FontId, PointerButton, Rect, Response, Stroke, Ui, pos2, vec2};
 

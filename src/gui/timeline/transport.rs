@@ -11,7 +11,7 @@ use crate::session::{Command, PlaybackSpeed, RunRecord};
 pub(super) const HEIGHT: f32 = 26.0;
 
 /// Speeds to choose from, in log seconds per second.
-const SPEEDS: [f64; 7] = [0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 10.0];
+pub(crate) const SPEEDS: [f64; 7] = [0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 10.0];
 
 /// Draws the buttons, the time, and how far the estimation has come.
 pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, pace: Option<Reading>) {

@@ -2,14 +2,16 @@
 
 use egui::{Key, KeyboardShortcut, Modifiers, Popup, Ui};
 
-use super::WindowState;
 use super::tiles::Preset;
+use super::{NoticeLevel, PanelName, WindowState};
+use crate::frontend::FeatureId;
 use crate::gui::PanelContext;
+use crate::gui::theme::ThemeName;
 use crate::gui::timeline::toggled_loop;
-use crate::session::Command;
+use crate::session::{Command, PlaybackSpeed};
 
 /// Something that a person can ask the window to do.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Action {
     /// Play or pause.
     TogglePlay,
@@ -55,8 +57,30 @@ pub(crate) enum Action {
     Export,
     /// Arrange the panels.
     Layout(Preset),
+    /// Arrange the panels as in a layout of one's own, by its number in the list.
+    SavedLayout(usize),
+    /// Give the next panel on the screen the focus, or the previous one.
+    NextPanel(bool),
     /// Dark or light.
     Theme,
+    /// Change the settings.
+    Settings,
+    /// A theme by name.
+    SetTheme(ThemeName),
+    /// Put the cursor at a time since the log began, in nanoseconds.
+    GoTo(i64),
+    /// Select a feature.
+    Feature(FeatureId),
+    /// Show a run in the panels that show one.
+    Run(usize),
+    /// Take the last run away.
+    RemoveRun(usize),
+    /// Show a panel and give it the focus.
+    Show(PanelName),
+    /// Hide a panel.
+    Hide(PanelName),
+    /// Play so fast, in log seconds per second.
+    Speed(f64),
 }
 
 /// One row of the table.
@@ -90,7 +114,9 @@ pub(crate) const TABLE: &[Entry] = &[
     entry(Action::Step(10), "Ten frames forward", "Shift+Right", &[(SHIFT, Key::ArrowRight)]),
     entry(Action::Step(-10), "Ten frames back", "Shift+Left", &[(SHIFT, Key::ArrowLeft)]),
     entry(Action::Hit(false), "Run back to the previous hit of a breakpoint", "Shift+N", &[(SHIFT, Key::N)]),
-    entry(Action::Open, "Open a log…", "Ctrl+O", &[(CTRL, Key::O)]),
+    entry(Action::NextPanel(false), "Focus the previous panel", "Shift+F6", &[(SHIFT, Key::F6)]),
+    entry(Action::Settings, "Settings…", "Ctrl+,", &[(CTRL, Key::Comma)]),
+    entry(Action::Open, "Open a log or a session…", "Ctrl+O", &[(CTRL, Key::O)]),
     entry(Action::Export, "Export this panel (PNG, CSV)", "Ctrl+E", &[(CTRL, Key::E)]),
     entry(Action::Save, "Save the session", "Ctrl+S", &[(CTRL, Key::S)]),
     entry(Action::Palette, "Command palette…", "Ctrl+P", &[(CTRL, Key::P)]),
@@ -115,9 +141,16 @@ pub(crate) const TABLE: &[Entry] = &[
     entry(Action::Layout(Preset::Calibration), "Layout: calibration", "2", &[(NONE, Key::Num2)]),
     entry(Action::Layout(Preset::FrontEnd), "Layout: front end", "3", &[(NONE, Key::Num3)]),
     entry(Action::Layout(Preset::Scene), "Layout: scene", "4", &[(NONE, Key::Num4)]),
+    entry(Action::Layout(Preset::Comparison), "Layout: comparison", "5", &[(NONE, Key::Num5)]),
+    entry(Action::SavedLayout(0), "Layout: the first of one's own, and so on", "Ctrl+1 to 9", &[]),
+    entry(Action::NextPanel(true), "Focus the next panel", "F6", &[(NONE, Key::F6)]),
     entry(Action::Shortcuts, "Shortcuts", "F1", &[(NONE, Key::F1)]),
     entry(Action::Dismiss, "Clear the selection", "Escape", &[(NONE, Key::Escape)]),
 ];
+
+/// Keys of the layouts of one's own, in order, with Ctrl.
+const LAYOUT_KEYS: [Key; 9] =
+    [Key::Num1, Key::Num2, Key::Num3, Key::Num4, Key::Num5, Key::Num6, Key::Num7, Key::Num8, Key::Num9];
 
 /// Takes the actions whose keys were pressed; none while somebody types, and no bare keys while a widget has the focus.
 pub(crate) fn pressed(ui: &Ui) -> Vec<Action> {
@@ -128,6 +161,11 @@ pub(crate) fn pressed(ui: &Ui) -> Vec<Action> {
     let menu_open = Popup::is_any_open(ui.ctx());
     let mut actions = Vec::new();
     ui.input_mut(|input| {
+        for (number, key) in LAYOUT_KEYS.into_iter().enumerate() {
+            if input.consume_shortcut(&KeyboardShortcut::new(CTRL, key)) {
+                actions.push(Action::SavedLayout(number));
+            }
+        }
         for entry in TABLE {
             for (modifiers, key) in entry.shortcuts {
                 // Space and the arrows belong to a focused widget; letters and the rest stay ours.
@@ -181,6 +219,29 @@ pub(crate) fn perform(action: Action, state: &mut WindowState, ctx: &mut PanelCo
         }
         Action::Save => state.requests.push(super::WindowRequest::SaveSession),
         Action::Layout(preset) => state.layout.arrange(preset),
-        Action::Theme => state.requests.push(super::WindowRequest::ToggleTheme),
+        Action::SavedLayout(number) => {
+            if !state.saved_layouts.take(number, &mut state.layout) {
+                let text = "No layout of your own has that number yet: save one under \"Panels\"";
+                state.notices.say(NoticeLevel::Info, text);
+            }
+        }
+        Action::NextPanel(forward) => state.focus_neighbour(forward),
+        Action::Theme => {
+            state.settings.theme = if ctx.theme.is_dark() { ThemeName::Light } else { ThemeName::Dark };
+        }
+        Action::Settings => state.settings_dialog.show(),
+        Action::SetTheme(theme) => state.settings.theme = theme,
+        Action::GoTo(stamp_ns) => ctx.commands.push(Command::Seek { stamp_ns }),
+        Action::Feature(feature) => ctx.selection.feature = Some(feature),
+        Action::Run(run) => ctx.selection.run = run,
+        Action::RemoveRun(run) => ctx.commands.push(Command::RemoveRun(run)),
+        Action::Show(panel) => {
+            if panel != PanelName::Timeline {
+                state.layout.set_visible(panel, true);
+            }
+            state.focus = Some(panel);
+        }
+        Action::Hide(panel) => state.layout.set_visible(panel, false),
+        Action::Speed(speed) => ctx.commands.push(Command::SetSpeed(PlaybackSpeed(speed))),
     }
 }

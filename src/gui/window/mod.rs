@@ -4,44 +4,50 @@
 
 mod actions;
 mod add_run;
+mod comparison_table;
+mod focus_ring;
 mod fork;
+mod fuzzy;
+#[cfg(test)]
+mod keyboard_tests;
 mod legend;
 mod notices;
 mod palette;
+mod palette_items;
 mod panel_export;
 mod panel_table;
+mod panels;
+mod progress;
 mod saved_layouts;
+mod settings;
+mod shortcuts;
 mod status_bar;
 #[cfg(test)]
 mod tests;
 mod tiles;
 mod top_bar;
 
+use std::cmp::Ordering;
 use std::path::PathBuf;
 
 use egui::{CentralPanel, Frame, Margin, Panel, Rect, Ui, Vec2};
 
 use self::actions::Action;
 pub use self::add_run::AddRunDialog;
+use self::focus_ring::FocusRing;
 pub use self::fork::ForkDialog;
 pub use self::legend::RunLegend;
 pub use self::notices::{NoticeLevel, Notices};
 pub use self::palette::CommandPalette;
 pub use self::panel_export::{PanelExport, alone_ui};
+pub use self::panels::{PanelName, Panels};
+pub use self::progress::{Progress, ProgressMeter};
 pub use self::saved_layouts::SavedLayouts;
+pub use self::settings::{SCALES, Settings, SettingsDialog};
+use self::tiles::Layout;
 pub use self::tiles::Preset;
-use self::tiles::{Layout, Pane};
 use super::PanelContext;
-use super::breakpoints::BreakpointsPanel;
-use super::convergence::ConvergencePanel;
-use super::image_panel::ImagePanel;
-use super::inspector::InspectorPanel;
-use super::jacobian::JacobianPanel;
-use super::laboratory::LaboratoryPanel;
 use super::open_dialog::OpenDialog;
-use super::rank::RankPanel;
-use super::residuals::ResidualsPanel;
-use super::scene::ScenePanel;
 use super::slide;
 use super::theme::Theme;
 use super::timeline::TimelinePanel;
@@ -51,8 +57,6 @@ use super::timeline::TimelinePanel;
 pub enum WindowRequest {
     /// Open a log.
     OpenLog(PathBuf),
-    /// Dark when light, light when dark.
-    ToggleTheme,
     /// Keep the saved layouts, written as text.
     KeepLayouts(String),
     /// Write the session to a file.
@@ -61,119 +65,11 @@ pub enum WindowRequest {
     WritePanel(Box<PanelExport>),
 }
 
-/// A panel by its name on the command line and in the names of files.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum PanelName {
-    /// The camera's image.
-    Image,
-    /// The scene in three dimensions.
-    Scene,
-    /// Calibration over time.
-    Convergence,
-    /// Rank and null directions.
-    Rank,
-    /// The linearization by blocks.
-    Jacobian,
-    /// Residuals.
-    Residuals,
-    /// Numbers of what is selected.
-    Inspector,
-    /// What a mechanism and a motion can identify.
-    Laboratory,
-    /// Breakpoints.
-    Breakpoints,
-    /// The lanes over time.
-    Timeline,
-}
-
-impl PanelName {
-    /// All of them.
-    pub const ALL: [Self; 10] = [
-        Self::Image,
-        Self::Scene,
-        Self::Convergence,
-        Self::Rank,
-        Self::Jacobian,
-        Self::Residuals,
-        Self::Inspector,
-        Self::Laboratory,
-        Self::Breakpoints,
-        Self::Timeline,
-    ];
-
-    /// Its name.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Image => "image",
-            Self::Scene => "scene",
-            Self::Convergence => "convergence",
-            Self::Rank => "rank",
-            Self::Jacobian => "jacobian",
-            Self::Residuals => "residuals",
-            Self::Inspector => "inspector",
-            Self::Laboratory => "laboratory",
-            Self::Breakpoints => "breakpoints",
-            Self::Timeline => "timeline",
-        }
-    }
-}
-
-/// The panels' own state.
-#[derive(Default)]
-pub struct Panels {
-    /// The camera's image.
-    pub image: ImagePanel,
-    /// The scene in three dimensions.
-    pub scene: ScenePanel,
-    /// Calibration over time.
-    pub convergence: ConvergencePanel,
-    /// Rank and null directions.
-    pub rank: RankPanel,
-    /// The linearization by blocks.
-    pub jacobian: JacobianPanel,
-    /// Residuals.
-    pub residuals: ResidualsPanel,
-    /// Numbers of what is selected.
-    pub inspector: InspectorPanel,
-    /// What a mechanism and a motion can identify.
-    pub laboratory: LaboratoryPanel,
-    /// Breakpoints.
-    pub breakpoints: BreakpointsPanel,
-}
-
-impl Panels {
-    /// Panels that show the same and hold nothing of a window.
-    fn views(&self) -> Self {
-        Self {
-            image: self.image.view_copy(),
-            scene: self.scene.view_copy(),
-            laboratory: self.laboratory.view_copy(),
-            ..Self::default()
-        }
-    }
-
-    fn pane_ui(&mut self, pane: Pane, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
-        match pane {
-            Pane::Image => self.image.ui(ui, ctx),
-            Pane::Scene => self.scene.ui(ui, ctx),
-            Pane::Convergence => self.convergence.ui(ui, ctx),
-            Pane::Rank => self.rank.ui(ui, ctx),
-            Pane::Jacobian => self.jacobian.ui(ui, ctx),
-            Pane::Residuals => self.residuals.ui(ui, ctx),
-            Pane::Inspector => self.inspector.ui(ui, ctx),
-            Pane::Laboratory => self.laboratory.ui(ui, ctx),
-            Pane::Breakpoints => self.breakpoints.ui(ui, ctx),
-        }
-    }
-}
-
 /// State of everything in the window that is not the session's.
 #[derive(Default)]
 pub struct WindowState {
     /// The panels.
     pub panels: Panels,
-    /// The timeline.
-    pub timeline: TimelinePanel,
     /// Runs with their accuracy.
     pub legend: RunLegend,
     /// What went wrong, for people to see.
@@ -196,6 +92,15 @@ pub struct WindowState {
     pub requests: Vec<WindowRequest>,
     /// Layouts that a person has made.
     pub saved_layouts: SavedLayouts,
+    /// What a person has set; the program applies it.
+    pub settings: Settings,
+    /// Changes the settings.
+    pub settings_dialog: SettingsDialog,
+    /// How far the estimation has come, `None` when all is computed.
+    pub progress: Option<Progress>,
+    /// A log that is being opened while another one is shown.
+    pub opening: Option<PathBuf>,
+    ring: FocusRing,
     layout: Layout,
     /// The panel that was clicked last.
     focus: Option<PanelName>,
@@ -209,6 +114,7 @@ impl WindowState {
         self.fork.hide();
         self.open_dialog.hide();
         self.palette.hide();
+        self.settings_dialog.hide();
         self.shortcuts_open = false;
         self.notices.list_open = false;
     }
@@ -218,6 +124,17 @@ impl WindowState {
         let panel = self.focus.unwrap_or(PanelName::Image);
         let place = self.places.iter().find(|(known, _)| *known == panel);
         (panel, place.map_or(panel_export::HIDDEN_PANEL_SIZE, |(_, rect)| rect.size()))
+    }
+
+    /// Gives the panel after the one with the focus the focus, or the one before it, in the order on the screen.
+    fn focus_neighbour(&mut self, forward: bool) {
+        let mut shown = self.places.clone();
+        shown
+            .sort_by(|(_, a), (_, b)| (a.top(), a.left()).partial_cmp(&(b.top(), b.left())).unwrap_or(Ordering::Equal));
+        let count = shown.len();
+        let at = shown.iter().position(|(panel, _)| Some(*panel) == self.focus);
+        let next = at.map_or(0, |at| if forward { at + 1 } else { at + count - 1 } % count.max(1));
+        self.focus = shown.get(next).map(|(panel, _)| *panel).or(self.focus);
     }
 
     /// A click into a panel gives it the focus.
@@ -242,6 +159,15 @@ impl WindowState {
     pub fn arrange(&mut self, preset: Preset) {
         self.layout.arrange(preset);
     }
+
+    /// Arranges the panels as in a preset or a layout of one's own, by name; the layout stays when there is none.
+    pub fn arrange_by_name(&mut self, name: &str) {
+        if let Some(preset) = Preset::ALL.into_iter().find(|preset| preset.name() == name) {
+            self.layout.arrange(preset);
+        } else if let Some(number) = self.saved_layouts.names().position(|known| known == name) {
+            self.saved_layouts.take(number, &mut self.layout);
+        }
+    }
 }
 
 /// Draws all of the window's content over a session.
@@ -260,7 +186,7 @@ pub fn window_ui(ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_
     let wanted = TimelinePanel::height_for(ctx.recording.runs.len()).min(0.22 * ui.available_height());
     let frame = Frame::new().fill(theme.surface).inner_margin(Margin::symmetric(6, 4));
     let timeline = Panel::bottom("timeline").resizable(true).default_size(wanted).min_size(60.0).frame(frame);
-    let timeline = timeline.show(ui, |ui| state.timeline.ui(ui, ctx));
+    let timeline = timeline.show(ui, |ui| state.panels.timeline.ui(ui, ctx));
     state.places.clear();
     state.places.push((PanelName::Timeline, timeline.response.rect));
 
@@ -271,6 +197,7 @@ pub fn window_ui(ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_
     state.follow_focus(ui);
 
     dialogs_ui(ui, state, ctx, &mut actions);
+    state.ring.ui(ui, &theme);
     for action in actions {
         actions::perform(action, state, ctx);
     }
@@ -282,8 +209,9 @@ fn dialogs_ui(ui: &Ui, state: &mut WindowState, ctx: &mut PanelContext<'_>, acti
     if let Some(path) = state.open_dialog.ui(ui, ctx.theme) {
         state.requests.push(WindowRequest::OpenLog(path));
     }
-    state.palette.ui(ui, ctx.theme, actions);
-    palette::shortcuts_ui(ui, ctx.theme, &mut state.shortcuts_open);
+    state.palette.ui(ui, ctx, &state.saved_layouts, &state.layout, actions);
+    state.settings_dialog.ui(ui, ctx.theme, &mut state.settings, state.saved_layouts.names());
+    shortcuts::ui(ui, ctx.theme, &mut state.shortcuts_open);
     state.notices.list_ui(ui, ctx);
     state.notices.toasts_ui(ui, ctx.theme);
 }

@@ -1,10 +1,16 @@
-//! The command palette and the sheet of shortcuts: two views of one table.
+//! The command palette: everything that the window can do, found by typing.
 
-use egui::{Align2, Grid, Id, Key, Modal, RichText, ScrollArea, TextEdit, Ui, vec2};
+use egui::{Align, Id, Key, Layout as UiLayout, Modal, Modifiers, RichText, ScrollArea, TextEdit, Ui, WidgetInfo};
 
 use super::actions::{Action, TABLE};
-use super::dialog_frame;
-use crate::gui::theme::Theme;
+use super::palette_items::{Choice, Item, found};
+use super::{SavedLayouts, dialog_frame, tiles::Layout};
+use crate::gui::PanelContext;
+
+/// Height of the list in points.
+const LIST_HEIGHT: f32 = 360.0;
+/// Rows that Page up and Page down go.
+const PAGE: usize = 10;
 
 /// State of the command palette.
 #[derive(Debug, Default)]
@@ -25,96 +31,98 @@ impl CommandPalette {
         self.open = false;
     }
 
-    /// Draws it; what is chosen joins the actions.
-    pub(crate) fn ui(&mut self, ui: &Ui, theme: &Theme, actions: &mut Vec<Action>) {
+    /// Draws it; what is chosen joins the actions, or is done at once where it is no action.
+    pub(super) fn ui(
+        &mut self,
+        ui: &Ui,
+        ctx: &mut PanelContext<'_>,
+        layouts: &SavedLayouts,
+        layout: &Layout,
+        actions: &mut Vec<Action>,
+    ) {
         if !self.open {
             return;
         }
-        let typed = self.typed.to_lowercase();
-        let found: Vec<_> = TABLE
-            .iter()
-            .filter(|entry| !matches!(entry.action, Action::Palette | Action::Dismiss))
-            .filter(|entry| typed.split_whitespace().all(|word| entry.name.to_lowercase().contains(word)))
-            .collect();
-        self.chosen = self.chosen.min(found.len().saturating_sub(1));
-        let mut taken = None;
-        let modal = Modal::new(Id::unique("command palette")).frame(dialog_frame(theme));
+        let theme = *ctx.theme;
+        let modal = Modal::new(Id::unique("command palette")).frame(dialog_frame(&theme));
         let response = modal.show(ui.ctx(), |ui| {
-            ui.set_width(380.0);
-            let (up, down, enter) = ui.input_mut(|input| {
-                let mut key = |key| input.consume_key(egui::Modifiers::NONE, key);
-                (key(Key::ArrowUp), key(Key::ArrowDown), key(Key::Enter))
-            });
-            let edit = TextEdit::singleline(&mut self.typed).hint_text("Type a command").desired_width(f32::INFINITY);
+            ui.set_width(480.0_f32.min(ui.ctx().content_rect().width() - 60.0));
+            let moved = moves(ui);
+            let hint = "Type a command, a time (12.5), a frame, a feature, a parameter";
+            let edit = TextEdit::singleline(&mut self.typed).hint_text(hint).desired_width(f32::INFINITY);
             let edit = ui.add(edit);
-            edit.widget_info(|| egui::WidgetInfo::labeled(egui::Role::TextInput, true, "Command"));
+            edit.widget_info(|| WidgetInfo::labeled(egui::Role::TextInput, true, "Command"));
             edit.request_focus();
             if edit.changed() {
                 self.chosen = 0;
             }
-            let last = found.len().saturating_sub(1);
-            if down {
-                self.chosen = (self.chosen + 1).min(last);
+            let items = found(&self.typed, ctx, layouts, layout);
+            let last = items.len().saturating_sub(1);
+            let before = self.chosen;
+            self.chosen = match moved {
+                Some(Move::By(rows)) => self.chosen.saturating_add_signed(rows).min(last),
+                Some(Move::Enter) | None => self.chosen.min(last),
+            };
+            if items.is_empty() {
+                ui.label(RichText::new("Nothing is called so").color(theme.text_weak));
             }
-            if up {
-                self.chosen = self.chosen.saturating_sub(1);
-            }
-            ScrollArea::vertical().max_height(360.0).show(ui, |ui| {
-                for (number, entry) in found.iter().enumerate() {
-                    ui.horizontal(|ui| {
-                        let row = ui.selectable_label(number == self.chosen, entry.name);
-                        if row.clicked() {
-                            taken = Some(entry.action);
-                        }
-                        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                            ui.label(RichText::new(entry.keys).small().color(theme.text_weak));
-                        });
-                    });
-                }
-            });
-            if enter {
-                taken = found.get(self.chosen).map(|entry| entry.action);
-            }
+            let clicked = list_ui(ui, ctx, &items, self.chosen, self.chosen != before || edit.changed());
+            let entered = matches!(moved, Some(Move::Enter)).then_some(self.chosen);
+            clicked.or(entered).and_then(|number| items.into_iter().nth(number)).map(|item| item.choice)
         });
-        if taken.is_some() || response.should_close() {
-            self.open = false;
+        let close = response.should_close();
+        match response.inner {
+            Some(Choice::Action(action)) => actions.push(action),
+            Some(Choice::Parameter(name)) => ctx.selection.parameter = Some(name),
+            None if !close => return,
+            None => {}
         }
-        actions.extend(taken);
+        self.open = false;
     }
 }
 
-/// The sheet of shortcuts.
-pub(super) fn shortcuts_ui(ui: &Ui, theme: &Theme, open: &mut bool) {
-    let window = egui::Window::new("Shortcuts").open(open).collapsible(false).resizable(false);
-    window.anchor(Align2::CENTER_CENTER, vec2(0.0, 0.0)).show(ui.ctx(), |ui| {
-        ui.horizontal_top(|ui| {
-            let half = TABLE.len().div_ceil(2);
-            for (column, entries) in TABLE.chunks(half).enumerate() {
-                Grid::new(("shortcuts", column)).spacing(vec2(16.0, 4.0)).show(ui, |ui| {
-                    for entry in entries {
-                        ui.label(RichText::new(entry.keys).monospace().color(theme.text_strong));
-                        ui.label(RichText::new(entry.name).color(theme.text));
-                        ui.end_row();
-                    }
+/// What a key does in the list.
+#[derive(Clone, Copy, Debug)]
+enum Move {
+    By(isize),
+    Enter,
+}
+
+fn moves(ui: &Ui) -> Option<Move> {
+    let page = PAGE as isize;
+    let keys = [
+        (Key::ArrowUp, Move::By(-1)),
+        (Key::ArrowDown, Move::By(1)),
+        (Key::PageUp, Move::By(-page)),
+        (Key::PageDown, Move::By(page)),
+        (Key::Enter, Move::Enter),
+    ];
+    ui.input_mut(|input| keys.into_iter().find(|(key, _)| input.consume_key(Modifiers::NONE, *key)).map(|(_, it)| it))
+}
+
+/// The items, the chosen one marked and in view; returns the one that was clicked.
+fn list_ui(ui: &mut Ui, ctx: &PanelContext<'_>, items: &[Item], chosen: usize, bring: bool) -> Option<usize> {
+    let mut clicked = None;
+    ScrollArea::vertical().max_height(LIST_HEIGHT).auto_shrink([false, true]).show(ui, |ui| {
+        for (number, item) in items.iter().enumerate() {
+            ui.horizontal(|ui| {
+                let row = ui.selectable_label(number == chosen, &item.name);
+                if row.clicked() {
+                    clicked = Some(number);
+                }
+                if bring && number == chosen {
+                    row.scroll_to_me(None);
+                }
+                ui.with_layout(UiLayout::right_to_left(Align::Center), |ui| {
+                    ui.label(RichText::new(item.keys).small().color(ctx.theme.text_weak));
                 });
-                ui.add_space(24.0);
-            }
-        });
-        ui.separator();
-        ui.label(RichText::new("With the pointer over a plot").color(theme.text_weak));
-        Grid::new("pointer").spacing(vec2(16.0, 4.0)).show(ui, |ui| {
-            for (how, what) in [
-                ("Drag", "move the cursor"),
-                ("Ctrl+scroll", "zoom in time, in all plots at once; over the timeline scrolling is enough"),
-                ("Middle drag", "move through time"),
-                ("Double click", "show the whole log"),
-                ("Shift+drag on the timeline", "set the range that is played over and over"),
-                ("Click a parameter or a feature", "select it in all panels"),
-            ] {
-                ui.label(RichText::new(how).monospace().color(theme.text_strong));
-                ui.label(RichText::new(what).color(theme.text));
-                ui.end_row();
-            }
-        });
+            });
+        }
     });
+    clicked
+}
+
+/// The keys of an action, for who looks for it.
+pub(super) fn keys_of(action: Action) -> &'static str {
+    TABLE.iter().find(|entry| entry.action == action).map_or("", |entry| entry.keys)
 }

@@ -67,18 +67,7 @@ pub(super) fn export(state: &WindowState, ctx: &mut PanelContext<'_>) -> PanelEx
 pub fn alone_ui(panel: PanelName, ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_>) {
     let frame = Frame::new().fill(ctx.theme.surface).inner_margin(PANEL_MARGIN);
     slide::update(ctx);
-    CentralPanel::no_frame().frame(frame).show(ui, |ui| match panel {
-        PanelName::Image => state.panels.image.ui(ui, ctx),
-        PanelName::Scene => state.panels.scene.ui(ui, ctx),
-        PanelName::Convergence => state.panels.convergence.ui(ui, ctx),
-        PanelName::Rank => state.panels.rank.ui(ui, ctx),
-        PanelName::Jacobian => state.panels.jacobian.ui(ui, ctx),
-        PanelName::Residuals => state.panels.residuals.ui(ui, ctx),
-        PanelName::Inspector => state.panels.inspector.ui(ui, ctx),
-        PanelName::Laboratory => state.panels.laboratory.ui(ui, ctx),
-        PanelName::Breakpoints => state.panels.breakpoints.ui(ui, ctx),
-        PanelName::Timeline => state.timeline.ui(ui, ctx),
-    });
+    CentralPanel::no_frame().frame(frame).show(ui, |ui| state.panels.ui(panel, ui, ctx));
 }
 
 /// Size of a panel that is not on the screen, in points.

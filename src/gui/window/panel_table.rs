@@ -12,18 +12,18 @@ use crate::observability::RankReport;
 use crate::session::{RunRecord, StepRecord};
 
 /// A table that grows row by row.
-struct Table {
-    text: String,
+pub(super) struct Table {
+    pub(super) text: String,
 }
 
 impl Table {
-    fn new(columns: &[&str]) -> Self {
+    pub(super) fn new(columns: &[&str]) -> Self {
         let mut table = Self { text: String::new() };
         table.row(columns.iter().map(|name| (*name).to_owned()));
         table
     }
 
-    fn row(&mut self, cells: impl IntoIterator<Item = String>) {
+    pub(super) fn row(&mut self, cells: impl IntoIterator<Item = String>) {
         for (number, cell) in cells.into_iter().enumerate() {
             if number > 0 {
                 self.text.push(',');
@@ -39,11 +39,11 @@ impl Table {
 }
 
 /// A number with all its digits, nothing when it is not finite.
-fn number(value: f64) -> String {
+pub(super) fn number(value: f64) -> String {
     if value.is_finite() { value.to_string() } else { String::new() }
 }
 
-fn seconds(stamp_ns: i64) -> String {
+pub(super) fn seconds(stamp_ns: i64) -> String {
     format!("{:.9}", seconds_from_ns(stamp_ns))
 }
 
@@ -59,6 +59,7 @@ pub(super) fn table_of(panel: PanelName, panels: &mut Panels, ctx: &PanelContext
         PanelName::Residuals => residuals(ctx),
         PanelName::Inspector => state(run, ctx.cursor_ns),
         PanelName::Laboratory => spectra(panels.laboratory.ranks(ctx)),
+        PanelName::Comparison => super::comparison_table::table_of(&mut panels.comparison, ctx),
         PanelName::Breakpoints => hits(ctx),
         PanelName::Timeline => events(ctx),
     }

@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use egui::{Button, RichText, TextEdit, Ui};
 use egui_tiles::Tree;
 
-use super::tiles::{Layout, Pane};
+use super::PanelName;
+use super::tiles::Layout;
 use crate::gui::theme::Theme;
 
 /// Most layouts that are kept.
@@ -14,16 +15,30 @@ const MOST_KEPT: usize = 12;
 /// The layouts by name, and the name that is being typed.
 #[derive(Debug, Default)]
 pub struct SavedLayouts {
-    layouts: BTreeMap<String, Tree<Pane>>,
+    layouts: BTreeMap<String, Tree<PanelName>>,
     typed: String,
 }
 
 impl SavedLayouts {
-    /// Reads what [`SavedLayouts::to_text`] wrote; layouts that miss a panel (of another version) are left out.
+    /// Reads what [`SavedLayouts::to_text`] wrote; those of a later program that has other panels are left out.
     pub fn from_text(text: &str) -> Self {
-        let mut layouts: BTreeMap<String, Tree<Pane>> = serde_json::from_str(text).unwrap_or_default();
-        layouts.retain(|_, tree| Pane::ALL.iter().all(|pane| tree.tiles.find_pane(pane).is_some()));
+        let values: BTreeMap<String, serde_json::Value> = serde_json::from_str(text).unwrap_or_default();
+        let layouts = values.into_iter().filter_map(|(name, value)| Some((name, tree_of(value)?))).collect();
         Self { layouts, typed: String::new() }
+    }
+
+    /// Their names in order.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.layouts.keys().map(String::as_str)
+    }
+
+    /// Arranges the panels as in the layout of a number, in the order of the names; whether there is one.
+    pub(super) fn take(&self, number: usize, layout: &mut Layout) -> bool {
+        let tree = self.layouts.values().nth(number);
+        if let Some(tree) = tree {
+            layout.take(tree.clone());
+        }
+        tree.is_some()
     }
 
     /// The layouts as JSON.
@@ -74,12 +89,18 @@ pub(super) fn layout_value(layout: &Layout) -> Option<serde_json::Value> {
     serde_json::to_value(layout.tree()).ok()
 }
 
-/// Takes over the layout of a saved session; one of another version, which misses a panel, is left out.
+/// Takes over the layout of a saved session, if this program has its panels.
 pub(super) fn take_layout(layout: &mut Layout, value: &serde_json::Value) {
-    let tree: Option<Tree<Pane>> = serde_json::from_value(value.clone()).ok();
-    if let Some(tree) = tree.filter(|tree| Pane::ALL.iter().all(|pane| tree.tiles.find_pane(pane).is_some())) {
+    if let Some(tree) = tree_of(value.clone()) {
         layout.take(tree);
     }
+}
+
+/// A layout that shows something. It may miss panels that have come since: they can be brought in.
+fn tree_of(value: serde_json::Value) -> Option<Tree<PanelName>> {
+    let tree: Tree<PanelName> = serde_json::from_value(value).ok()?;
+    let shows = tree.root().is_some() && PanelName::movable().any(|panel| tree.tiles.find_pane(&panel).is_some());
+    shows.then_some(tree)
 }
 
 #[cfg(test)]
@@ -91,17 +112,23 @@ mod tests {
     fn layouts_survive_writing_and_foreign_ones_are_left_out() {
         let mut layout = Layout::default();
         layout.arrange(Preset::Scene);
-        layout.set_visible(Pane::Rank, false);
+        layout.set_visible(PanelName::Rank, false);
         let mut saved = SavedLayouts::default();
         saved.layouts.insert("mine".to_owned(), layout.tree().clone());
         let back = SavedLayouts::from_text(&saved.to_text());
         assert!(back.layouts["mine"] == *layout.tree());
         assert!(SavedLayouts::from_text("no json").layouts.is_empty());
-        let mut lacking = layout.tree().clone();
-        let rank = lacking.tiles.find_pane(&Pane::Rank).unwrap();
-        lacking.remove_recursively(rank);
-        saved.layouts.insert("lacking".to_owned(), lacking);
-        let names: Vec<String> = SavedLayouts::from_text(&saved.to_text()).layouts.into_keys().collect();
-        assert_eq!(names, ["mine"]);
+        // An older layout knows fewer panels, and a panel can be brought into it; a later one may know others.
+        let mut older = layout.tree().clone();
+        let rank = older.tiles.find_pane(&PanelName::Rank).unwrap();
+        older.remove_recursively(rank);
+        saved.layouts.insert("older".to_owned(), older);
+        let later = saved.to_text().replace("\"Scene\"", "\"Hologram\"");
+        assert!(SavedLayouts::from_text(&later).layouts.is_empty());
+        let back = SavedLayouts::from_text(&saved.to_text());
+        assert_eq!(back.names().collect::<Vec<_>>(), ["mine", "older"]);
+        assert!(back.take(1, &mut layout) && !layout.is_visible(PanelName::Rank));
+        layout.set_visible(PanelName::Rank, true);
+        assert!(layout.is_visible(PanelName::Rank) && !back.take(2, &mut layout));
     }
 }

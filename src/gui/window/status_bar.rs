@@ -1,8 +1,10 @@
 //! The bar at the bottom: step time, real-time factor, memory, clock, warnings.
 
-use egui::{Align, Button, Layout as UiLayout, RichText, Ui};
+use std::path::Path;
 
-use super::WindowState;
+use egui::{Align, Button, Layout as UiLayout, ProgressBar, RichText, Ui};
+
+use super::{Progress, WindowState};
 use crate::gui::PanelContext;
 use crate::gui::units::{bytes, counted, fixed};
 use crate::session::{Recording, RunRecord, StepRecord};
@@ -54,8 +56,32 @@ pub(super) fn ui(ui: &mut Ui, state: &mut WindowState, ctx: &PanelContext<'_>) {
             if ui.add(button).on_hover_text("What is wrong with the log (W)").clicked() {
                 state.notices.list_open = !state.notices.list_open;
             }
+            if let Some(progress) = &state.progress {
+                progress_ui(ui, progress);
+            }
+            if let Some(path) = &state.opening {
+                opening_ui(ui, path);
+            }
         });
     });
+}
+
+/// How far the estimation has come.
+fn progress_ui(ui: &mut Ui, progress: &Progress) {
+    let left = progress.left_s.map_or_else(String::new, |left_s| format!(", {} s left", fixed(left_s.ceil(), 0)));
+    let text = format!("{} {} %{left}", counted(progress.runs, "run"), fixed(100.0 * progress.share, 0));
+    let bar = ProgressBar::new(progress.share as f32).desired_width(150.0).text(RichText::new(&text).small());
+    let response = ui.add(bar);
+    response
+        .widget_info(|| egui::WidgetInfo::labeled(egui::Role::ProgressIndicator, true, format!("Computing {text}")));
+    response.on_hover_text("How far the estimators have come");
+}
+
+/// Another log is on its way.
+fn opening_ui(ui: &mut Ui, path: &Path) {
+    let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    ui.label(RichText::new(format!("opening {name}…")).small());
+    ui.add(egui::Spinner::new().size(12.0));
 }
 
 /// How much memory the recording takes of what it may, and what that means for its steps.

@@ -6,23 +6,22 @@ use egui::{Key, Modifiers, Role};
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 
-use super::tiles::Pane;
-use super::{Preset, WindowRequest, WindowState, window_ui};
+use super::{PanelName, Preset, WindowState, window_ui};
 use crate::gui::sample_recording::{sample_images, sample_recording_of};
 use crate::gui::theme::{Theme, ThemeName};
 use crate::gui::{PanelContext, Playback, Selection};
 use crate::session::breakpoints::Breakpoints;
 use crate::session::{Command, ForkChanges, ForkOrigin, PlaybackSpeed, Recording};
 
-const SECOND_NS: i64 = 1_000_000_000;
+pub(super) const SECOND_NS: i64 = 1_000_000_000;
 
 /// A window over the sample, with the commands it pushed.
-struct Bench {
-    recording: Recording,
-    cursor_ns: i64,
+pub(super) struct Bench {
+    pub(super) recording: Recording,
+    pub(super) cursor_ns: i64,
     playback: Playback,
-    selection: Selection,
-    window: WindowState,
+    pub(super) selection: Selection,
+    pub(super) window: WindowState,
     commands: Vec<Command>,
 }
 
@@ -48,7 +47,7 @@ fn sample() -> Recording {
     SAMPLE.get_or_init(|| sample_recording_of(80, &["auto", "classical"])).clone()
 }
 
-fn bench() -> Harness<'static, Bench> {
+pub(super) fn bench() -> Harness<'static, Bench> {
     let bench = Bench {
         recording: sample(),
         cursor_ns: 3 * SECOND_NS,
@@ -67,7 +66,10 @@ fn bench() -> Harness<'static, Bench> {
 }
 
 /// Does something and gives the commands that came of it.
-fn commands_of(harness: &mut Harness<'static, Bench>, act: impl FnOnce(&Harness<'static, Bench>)) -> Vec<Command> {
+pub(super) fn commands_of(
+    harness: &mut Harness<'static, Bench>,
+    act: impl FnOnce(&Harness<'static, Bench>),
+) -> Vec<Command> {
     harness.state_mut().commands.clear();
     act(harness);
     harness.run_steps(3);
@@ -137,7 +139,7 @@ fn keys_push_the_same_commands() {
     assert_eq!(harness.state().window.layout.preset, Some(Preset::FrontEnd));
     harness.key_press(Key::T);
     harness.run_steps(2);
-    assert_eq!(harness.state().window.requests, [WindowRequest::ToggleTheme]);
+    assert_eq!(harness.state().window.settings.theme, ThemeName::Light);
 }
 
 #[test]
@@ -201,7 +203,7 @@ fn a_run_is_added_through_the_dialog() {
 fn breakpoints_bench(conditions: &[&str]) -> Harness<'static, Bench> {
     let mut harness = bench();
     let state = harness.state_mut();
-    state.window.layout.set_visible(Pane::Breakpoints, true);
+    state.window.layout.set_visible(PanelName::Breakpoints, true);
     let mut breakpoints = Breakpoints::default();
     for condition in conditions {
         breakpoints.add(condition.parse().unwrap());

@@ -5,79 +5,9 @@ use egui_tiles::{
     Behavior, Container, Linear, LinearDir, SimplificationOptions, Tile, TileId, Tiles, Tree, UiResponse,
 };
 
-use serde::{Deserialize, Serialize};
-
 use super::{PanelName, Panels};
 use crate::gui::PanelContext;
 use crate::gui::theme::{PANEL_MARGIN, Theme};
-
-/// A panel that can be moved.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize)]
-pub(crate) enum Pane {
-    /// The camera's image.
-    Image,
-    /// The scene in three dimensions.
-    Scene,
-    /// Calibration over time.
-    Convergence,
-    /// Rank and null directions.
-    Rank,
-    /// The linearization by blocks.
-    Jacobian,
-    /// Residuals.
-    Residuals,
-    /// Numbers of what is selected.
-    Inspector,
-    /// What a mechanism and a motion can identify.
-    Laboratory,
-    /// Breakpoints.
-    Breakpoints,
-}
-
-impl Pane {
-    /// All of them.
-    pub(crate) const ALL: [Self; 9] = [
-        Self::Image,
-        Self::Scene,
-        Self::Convergence,
-        Self::Rank,
-        Self::Jacobian,
-        Self::Residuals,
-        Self::Inspector,
-        Self::Laboratory,
-        Self::Breakpoints,
-    ];
-
-    /// Which panel it is.
-    fn panel(self) -> PanelName {
-        match self {
-            Self::Image => PanelName::Image,
-            Self::Scene => PanelName::Scene,
-            Self::Convergence => PanelName::Convergence,
-            Self::Rank => PanelName::Rank,
-            Self::Jacobian => PanelName::Jacobian,
-            Self::Residuals => PanelName::Residuals,
-            Self::Inspector => PanelName::Inspector,
-            Self::Laboratory => PanelName::Laboratory,
-            Self::Breakpoints => PanelName::Breakpoints,
-        }
-    }
-
-    /// Its name.
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Self::Image => "Image",
-            Self::Scene => "Scene",
-            Self::Convergence => "Convergence",
-            Self::Rank => "Rank",
-            Self::Jacobian => "Jacobian",
-            Self::Residuals => "Residuals",
-            Self::Inspector => "Inspector",
-            Self::Laboratory => "Laboratory",
-            Self::Breakpoints => "Breakpoints",
-        }
-    }
-}
 
 /// A ready-made layout.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -91,11 +21,14 @@ pub enum Preset {
     FrontEnd,
     /// Scene large.
     Scene,
+    /// All runs held against each other.
+    Comparison,
 }
 
 impl Preset {
-    /// All of them, in the order of their keys 1 to 4.
-    pub(crate) const ALL: [Self; 4] = [Self::Overview, Self::Calibration, Self::FrontEnd, Self::Scene];
+    /// All of them, in the order of their keys 1 to 5.
+    pub(crate) const ALL: [Self; 5] =
+        [Self::Overview, Self::Calibration, Self::FrontEnd, Self::Scene, Self::Comparison];
 
     /// Its name.
     pub(crate) fn name(self) -> &'static str {
@@ -104,6 +37,7 @@ impl Preset {
             Self::Calibration => "Calibration",
             Self::FrontEnd => "Front end",
             Self::Scene => "Scene",
+            Self::Comparison => "Comparison",
         }
     }
 }
@@ -111,7 +45,7 @@ impl Preset {
 /// Where the panels are.
 #[derive(Debug)]
 pub(crate) struct Layout {
-    tree: Tree<Pane>,
+    tree: Tree<PanelName>,
     /// The preset that was chosen last, `None` for a layout of one's own.
     pub(crate) preset: Option<Preset>,
 }
@@ -130,23 +64,23 @@ impl Layout {
     }
 
     /// Arranges the panels as in a layout of one's own.
-    pub(crate) fn take(&mut self, tree: Tree<Pane>) {
+    pub(crate) fn take(&mut self, tree: Tree<PanelName>) {
         self.tree = tree;
         self.preset = None;
     }
 
     /// Where the panels are, for keeping.
-    pub(crate) fn tree(&self) -> &Tree<Pane> {
+    pub(crate) fn tree(&self) -> &Tree<PanelName> {
         &self.tree
     }
 
     /// Whether a panel is shown.
-    pub(crate) fn is_visible(&self, pane: Pane) -> bool {
+    pub(crate) fn is_visible(&self, pane: PanelName) -> bool {
         self.tree.tiles.find_pane(&pane).is_some_and(|tile| self.tree.is_visible(tile))
     }
 
     /// Shows or hides a panel.
-    pub(crate) fn set_visible(&mut self, pane: Pane, visible: bool) {
+    pub(crate) fn set_visible(&mut self, pane: PanelName, visible: bool) {
         if visible && self.tree.tiles.find_pane(&pane).is_none() {
             // A layout of one's own may be older than the panel.
             let tile = tabs(&mut self.tree.tiles, &[pane]);
@@ -175,34 +109,44 @@ impl Layout {
     }
 }
 
-fn tree_of(preset: Preset) -> Tree<Pane> {
+fn tree_of(preset: Preset) -> Tree<PanelName> {
     use LinearDir::{Horizontal, Vertical};
+    use PanelName::{
+        Breakpoints, Comparison, Convergence, Image, Inspector, Jacobian, Laboratory, Rank, Residuals, Scene,
+    };
     let mut all = Tiles::default();
     let tiles = &mut all;
-    let (image, scene) = (tabs(tiles, &[Pane::Image]), tabs(tiles, &[Pane::Scene]));
-    let (rank, inspector) = (tabs(tiles, &[Pane::Rank]), tabs(tiles, &[Pane::Inspector, Pane::Breakpoints]));
+    if preset == Preset::Comparison {
+        let left = tabs(tiles, &[Comparison, Convergence, Residuals, Image, Scene, Jacobian, Laboratory]);
+        let (rank, inspector) = (tabs(tiles, &[Rank]), tabs(tiles, &[Inspector, Breakpoints]));
+        let right = split(tiles, Vertical, [rank, inspector], 0.56);
+        let root = split(tiles, Horizontal, [left, right], 0.8);
+        return Tree::new(egui::Id::unique(("panels", preset.name())), root, all);
+    }
+    let (image, scene) = (tabs(tiles, &[Image]), tabs(tiles, &[Scene]));
+    let (rank, inspector) = (tabs(tiles, &[Rank]), tabs(tiles, &[Inspector, Breakpoints]));
     let (left, right) = match preset {
-        Preset::Overview => {
-            let plots = tabs(tiles, &[Pane::Convergence, Pane::Residuals, Pane::Jacobian, Pane::Laboratory]);
+        Preset::Overview | Preset::Comparison => {
+            let plots = tabs(tiles, &[Convergence, Residuals, Jacobian, Laboratory, Comparison]);
             let above = split(tiles, Horizontal, [image, scene], 0.5);
             (split(tiles, Vertical, [above, plots], 0.54), split(tiles, Vertical, [rank, inspector], 0.56))
         }
         Preset::Calibration => {
-            let (convergence, residuals) =
-                (tabs(tiles, &[Pane::Convergence]), tabs(tiles, &[Pane::Residuals, Pane::Jacobian, Pane::Laboratory]));
+            let convergence = tabs(tiles, &[Convergence, Comparison]);
+            let residuals = tabs(tiles, &[Residuals, Jacobian, Laboratory]);
             let pictures = split(tiles, Horizontal, [image, scene], 0.5);
             let below = split(tiles, Horizontal, [pictures, residuals], 0.66);
             (split(tiles, Vertical, [convergence, below], 0.62), split(tiles, Vertical, [rank, inspector], 0.68))
         }
         Preset::FrontEnd => {
-            let (convergence, residuals) =
-                (tabs(tiles, &[Pane::Convergence]), tabs(tiles, &[Pane::Residuals, Pane::Jacobian, Pane::Laboratory]));
+            let convergence = tabs(tiles, &[Convergence, Comparison]);
+            let residuals = tabs(tiles, &[Residuals, Jacobian, Laboratory]);
             let above = split(tiles, Horizontal, [image, residuals], 0.6);
             let below = split(tiles, Horizontal, [convergence, scene], 0.7);
             (split(tiles, Vertical, [above, below], 0.64), split(tiles, Vertical, [inspector, rank], 0.6))
         }
         Preset::Scene => {
-            let plots = tabs(tiles, &[Pane::Convergence, Pane::Residuals, Pane::Jacobian, Pane::Laboratory]);
+            let plots = tabs(tiles, &[Convergence, Residuals, Jacobian, Laboratory, Comparison]);
             let below = split(tiles, Horizontal, [image, plots], 0.32);
             (split(tiles, Vertical, [scene, below], 0.68), split(tiles, Vertical, [inspector, rank], 0.5))
         }
@@ -211,13 +155,13 @@ fn tree_of(preset: Preset) -> Tree<Pane> {
     Tree::new(egui::Id::unique(("panels", preset.name())), root, all)
 }
 
-fn tabs(tiles: &mut Tiles<Pane>, panes: &[Pane]) -> TileId {
+fn tabs(tiles: &mut Tiles<PanelName>, panes: &[PanelName]) -> TileId {
     let children = panes.iter().map(|pane| tiles.insert_pane(*pane)).collect();
     tiles.insert_tab_tile(children)
 }
 
 /// Two tiles side by side or one above the other; the first takes `fraction` of the room.
-fn split(tiles: &mut Tiles<Pane>, direction: LinearDir, children: [TileId; 2], fraction: f32) -> TileId {
+fn split(tiles: &mut Tiles<PanelName>, direction: LinearDir, children: [TileId; 2], fraction: f32) -> TileId {
     tiles.insert_container(Container::Linear(Linear::new_binary(direction, children, fraction)))
 }
 
@@ -229,31 +173,36 @@ struct Shown<'a, 'b> {
     places: &'a mut Vec<(PanelName, Rect)>,
 }
 
-impl Behavior<Pane> for Shown<'_, '_> {
-    fn pane_ui(&mut self, ui: &mut Ui, _tile: TileId, pane: &mut Pane) -> UiResponse {
+impl Behavior<PanelName> for Shown<'_, '_> {
+    fn pane_ui(&mut self, ui: &mut Ui, _tile: TileId, pane: &mut PanelName) -> UiResponse {
         let theme: &Theme = self.ctx.theme;
         let place = ui.max_rect();
-        self.places.push((pane.panel(), place));
+        self.places.push((*pane, place));
         egui::Frame::new().fill(theme.surface).inner_margin(PANEL_MARGIN).show(ui, |ui| {
             ui.set_min_size(ui.available_size());
-            self.panels.pane_ui(*pane, ui, self.ctx);
+            self.panels.ui(*pane, ui, self.ctx);
         });
-        if self.focus == Some(pane.panel()) {
+        if self.focus == Some(*pane) {
             ui.painter().hline(place.x_range(), place.top() + 1.0, Stroke::new(2.0, theme.accent));
         }
         UiResponse::None
     }
 
-    fn tab_title_for_pane(&mut self, pane: &Pane) -> WidgetText {
-        pane.name().into()
+    fn tab_title_for_pane(&mut self, pane: &PanelName) -> WidgetText {
+        pane.title().into()
     }
 
-    fn is_tab_closable(&self, tiles: &Tiles<Pane>, tile: TileId) -> bool {
+    fn is_tab_closable(&self, tiles: &Tiles<PanelName>, tile: TileId) -> bool {
+        matches!(tiles.get(tile), Some(Tile::Pane(_)))
+    }
+
+    /// Panels are dragged by their tabs. A bar that drags all of its tabs would be one more nameless stop for the keyboard.
+    fn is_tile_draggable(&self, tiles: &Tiles<PanelName>, tile: TileId) -> bool {
         matches!(tiles.get(tile), Some(Tile::Pane(_)))
     }
 
     /// A closed panel is hidden, so that the menu can bring it back.
-    fn on_tab_close(&mut self, tiles: &mut Tiles<Pane>, tile: TileId) -> bool {
+    fn on_tab_close(&mut self, tiles: &mut Tiles<PanelName>, tile: TileId) -> bool {
         tiles.set_visible(tile, false);
         false
     }
@@ -281,7 +230,7 @@ impl Behavior<Pane> for Shown<'_, '_> {
     fn tab_bg_color(
         &self,
         _visuals: &Visuals,
-        _tiles: &Tiles<Pane>,
+        _tiles: &Tiles<PanelName>,
         _tile: TileId,
         state: &egui_tiles::TabState,
     ) -> Color32 {
@@ -291,7 +240,7 @@ impl Behavior<Pane> for Shown<'_, '_> {
     fn tab_text_color(
         &self,
         _visuals: &Visuals,
-        _tiles: &Tiles<Pane>,
+        _tiles: &Tiles<PanelName>,
         _tile: TileId,
         state: &egui_tiles::TabState,
     ) -> Color32 {
@@ -301,7 +250,7 @@ impl Behavior<Pane> for Shown<'_, '_> {
     fn tab_outline_stroke(
         &self,
         _visuals: &Visuals,
-        _tiles: &Tiles<Pane>,
+        _tiles: &Tiles<PanelName>,
         _tile: TileId,
         _state: &egui_tiles::TabState,
     ) -> Stroke {

@@ -4,8 +4,8 @@ use egui::containers::menu::{MenuButton, MenuConfig};
 use egui::{Align, Button, Layout as UiLayout, PopupCloseBehavior, RichText, Ui, vec2};
 
 use super::actions::{Action, TABLE};
-use super::tiles::{Pane, Preset};
-use super::{WindowRequest, WindowState};
+use super::tiles::Preset;
+use super::{PanelName, WindowRequest, WindowState};
 use crate::gui::PanelContext;
 use crate::gui::theme::{MAX_RUNS, Theme};
 use crate::session::Recording;
@@ -64,10 +64,10 @@ fn layout_button(ui: &mut Ui, state: &WindowState, preset: Preset, number: usize
 fn panels_menu(ui: &mut Ui, state: &mut WindowState, theme: &Theme) {
     let config = MenuConfig::new().close_behavior(PopupCloseBehavior::CloseOnClickOutside);
     MenuButton::new("Panels").config(config).ui(ui, |ui| {
-        for pane in Pane::ALL {
-            let mut visible = state.layout.is_visible(pane);
-            if ui.checkbox(&mut visible, pane.name()).changed() {
-                state.layout.set_visible(pane, visible);
+        for panel in PanelName::movable() {
+            let mut visible = state.layout.is_visible(panel);
+            if ui.checkbox(&mut visible, panel.title()).changed() {
+                state.layout.set_visible(panel, visible);
             }
         }
         ui.separator();

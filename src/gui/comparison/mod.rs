@@ -1,0 +1,174 @@
+//! The comparison panel: up to four runs over one cursor, in numbers, as differences over time, and side by side.
+
+mod numbers;
+mod over_time;
+pub(crate) mod scores;
+mod side_by_side;
+#[cfg(test)]
+mod tests;
+
+use egui::{ComboBox, Rect, RichText, ScrollArea, Ui, UiBuilder, Vec2, vec2};
+
+use self::over_time::OverTime;
+use self::scores::Scores;
+use self::side_by_side::{Images, Scenes};
+use super::PanelContext;
+use super::convergence::empty_ui;
+use super::rank;
+use crate::session::Comparison;
+
+/// From this size on everything is shown at once.
+const ROOM_FOR_ALL: Vec2 = vec2(1000.0, 520.0);
+/// From this height on scenes are shown beside images.
+const ROOM_FOR_SCENES: f32 = 760.0;
+
+/// What is shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum View {
+    All,
+    Numbers,
+    OverTime,
+    Images,
+    Scenes,
+    Directions,
+}
+
+impl View {
+    const ALL: [(Self, &'static str, &'static str); 6] = [
+        (Self::All, "All", "As much as there is room for"),
+        (Self::Numbers, "Numbers", "Accuracy of all runs, and where they part"),
+        (Self::OverTime, "Differences", "Differences from the reference over time"),
+        (Self::Images, "Images", "The image of each run"),
+        (Self::Scenes, "Scenes", "The scene of each run"),
+        (Self::Directions, "Directions", "Ranks, spectra and lost directions with one order of rows"),
+    ];
+}
+
+/// State of the comparison panel.
+#[derive(Default)]
+pub struct ComparisonPanel {
+    /// Number of the run that the others are held against.
+    pub reference: usize,
+    /// What is shown, `None` while nobody has chosen.
+    view: Option<View>,
+    scores: Scores,
+    comparisons: Vec<Comparison>,
+    over_time: OverTime,
+    images: Images,
+    scenes: Scenes,
+}
+
+impl ComparisonPanel {
+    /// A panel that shows the same and holds no texture of a window.
+    pub(in crate::gui) fn view_copy(&self) -> Self {
+        let (images, scenes) = (self.images.view_copy(), self.scenes.view_copy());
+        Self { reference: self.reference, view: self.view, images, scenes, ..Self::default() }
+    }
+
+    /// Draws the panel.
+    pub fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
+        let runs = &ctx.recording.runs;
+        if runs.is_empty() {
+            empty_ui(ui, "No run yet");
+            return;
+        }
+        self.read(ctx);
+        let view = self.controls_ui(ui, ctx);
+        let room = ui.available_size();
+        match view {
+            View::All if room.x >= ROOM_FOR_ALL.x && room.y >= ROOM_FOR_ALL.y => self.all_ui(ui, ctx),
+            View::All | View::Numbers => self.numbers_ui(ui, ctx),
+            View::OverTime => self.over_time_ui(ui, ctx),
+            View::Images => self.images.ui(ui, ctx),
+            View::Scenes => self.scenes.ui(ui, ctx),
+            View::Directions => rank::all_runs_ui(ui, ctx),
+        }
+    }
+
+    /// The runs held against the reference, by number; the reference's own is empty of differences.
+    pub(in crate::gui) fn comparisons(&mut self, ctx: &PanelContext<'_>) -> &[Comparison] {
+        self.read(ctx);
+        &self.comparisons
+    }
+
+    fn read(&mut self, ctx: &PanelContext<'_>) {
+        let runs = &ctx.recording.runs;
+        self.reference = self.reference.min(runs.len().saturating_sub(1));
+        self.comparisons.resize_with(runs.len(), Comparison::default);
+        if let Some(reference) = runs.get(self.reference) {
+            for (comparison, run) in self.comparisons.iter_mut().zip(runs) {
+                comparison.read(reference, run);
+            }
+        }
+        self.scores.read(ctx.recording);
+    }
+
+    /// The reference and the choice of what is shown.
+    fn controls_ui(&mut self, ui: &mut Ui, ctx: &PanelContext<'_>) -> View {
+        let mut view = self.view.unwrap_or(View::All);
+        ui.horizontal_wrapped(|ui| {
+            let name = ui.label(RichText::new("Reference").color(ctx.theme.text_weak));
+            let label = |run: usize| ctx.recording.runs.get(run).map_or("", |run| run.spec.label.as_str());
+            let combo = ComboBox::from_id_salt("reference run").width(110.0).selected_text(label(self.reference));
+            let shown = combo.show_ui(ui, |ui| {
+                for run in 0..ctx.recording.runs.len() {
+                    ui.selectable_value(&mut self.reference, run, label(run));
+                }
+            });
+            shown.response.labelled_by(name.id).on_hover_text("The run that the others are held against");
+            ui.separator();
+            for (choice, name, hover) in View::ALL {
+                let response = ui.selectable_label(view == choice, name);
+                if response.on_hover_text(hover).clicked() {
+                    self.view = Some(choice);
+                    view = choice;
+                }
+            }
+        });
+        view
+    }
+
+    fn numbers_ui(&self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
+        ScrollArea::both().id_salt("numbers").auto_shrink(false).show(ui, |ui| {
+            numbers::accuracy_ui(ui, ctx, &self.scores);
+            ui.add_space(6.0);
+            numbers::partings_ui(ui, ctx, self.reference, &self.comparisons);
+        });
+    }
+
+    fn over_time_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
+        if ctx.recording.runs.len() < 2 {
+            empty_ui(ui, "One run alone differs from nothing: add one, or fork it");
+        } else {
+            self.over_time.ui(ui, ctx, self.reference, &self.comparisons);
+        }
+    }
+
+    /// Numbers on the left; differences above pictures on the right.
+    fn all_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
+        const GAP: f32 = 10.0;
+        let all = ui.available_rect_before_wrap();
+        ui.advance_cursor_after_rect(all);
+        let (left, right) = all.split_left_right_at_fraction(0.44);
+        let (above, below) = right.split_top_bottom_at_fraction(0.42);
+        let scenes = all.height() >= ROOM_FOR_SCENES;
+        let (images, scene) = below.split_top_bottom_at_fraction(if scenes { 0.5 } else { 1.0 });
+        let mut at = |rect: Rect, draw: &mut dyn FnMut(&mut Ui, &mut PanelContext<'_>)| {
+            ui.scope_builder(UiBuilder::new().max_rect(rect.shrink2(vec2(0.0, 2.0))), |ui| {
+                ui.set_clip_rect(ui.clip_rect().intersect(rect));
+                draw(ui, ctx);
+            });
+        };
+        at(left.with_max_x(left.right() - GAP), &mut |ui, ctx| self.numbers_ui(ui, ctx));
+        at(above, &mut |ui, ctx| self.over_time_ui(ui, ctx));
+        at(images, &mut |ui, ctx| self.images.ui(ui, ctx));
+        if scenes {
+            at(scene, &mut |ui, ctx| self.scenes.ui(ui, ctx));
+        }
+    }
+
+    /// The accuracy of all runs.
+    pub(in crate::gui) fn scores(&self) -> &Scores {
+        &self.scores
+    }
+}

@@ -1,0 +1,146 @@
+//! The tables: accuracy of all runs, and where each parts from the reference.
+
+use egui::{Button, Grid, RichText, Ui, WidgetInfo, vec2};
+
+use super::scores::Scores;
+use crate::gui::PanelContext;
+use crate::gui::units::{figure, seconds};
+use crate::session::{Command, Comparison, Parting, Quantity};
+
+/// How a quantity is shown: the factor on the stored number, and the unit.
+pub(super) fn shown(quantity: Quantity) -> (f64, &'static str) {
+    match (quantity, quantity.unit()) {
+        (Quantity::ChainTranslation, _) => (1e3, "mm"),
+        (_, "rad") => (180.0 / std::f64::consts::PI, "°"),
+        (_, "rad/s") => (180.0 / std::f64::consts::PI, "°/s"),
+        (_, unit) => (1.0, unit),
+    }
+}
+
+/// A difference with its unit.
+pub(super) fn difference_text(quantity: Quantity, apart: f64) -> String {
+    let (factor, unit) = shown(quantity);
+    let space = if unit.is_empty() || unit.starts_with('°') { "" } else { " " };
+    format!("{}{space}{unit}", figure(apart * factor))
+}
+
+/// Accuracy of all runs; the best of a row is marked.
+pub(super) fn accuracy_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, scores: &Scores) {
+    let theme = *ctx.theme;
+    let runs = &ctx.recording.runs;
+    ui.label(RichText::new("Accuracy over the whole flight so far").color(theme.text_strong));
+    Grid::new("accuracy").striped(true).spacing(vec2(14.0, 2.0)).show(ui, |ui| {
+        ui.label("");
+        ui.label("");
+        for (number, run) in runs.iter().enumerate() {
+            let text = RichText::new(&run.spec.label).strong().color(theme.run(number).color);
+            let chosen = ctx.selection.run == number;
+            let button = ui.add(Button::new(text).frame(false).selected(chosen));
+            button.widget_info(|| {
+                let name = format!("Show run {} in all panels", run.spec.label);
+                WidgetInfo::selected(egui::Role::Button, true, chosen, name)
+            });
+            if button.on_hover_text("Show this run in all panels").clicked() {
+                ctx.selection.run = number;
+            }
+        }
+        ui.end_row();
+        for row in scores.rows() {
+            let best = row.best();
+            ui.label(RichText::new(&row.name).color(theme.text));
+            ui.label(RichText::new(row.unit).color(theme.text_weak));
+            for run in 0..runs.len() {
+                let text = row.text(run);
+                let text = if best == Some(run) { format!("{text} ✔") } else { text };
+                let color = if best == Some(run) { theme.ok } else { theme.text_strong };
+                ui.label(RichText::new(text).monospace().color(color));
+            }
+            ui.end_row();
+        }
+    });
+    if !ctx.recording.runs.iter().any(|run| run.alignment.is_some()) {
+        let text = "No errors of the trajectory: the log holds no truth, or no run has enough frames with it yet";
+        ui.label(RichText::new(text).color(theme.text_weak));
+    }
+}
+
+/// Where each run parts from the reference, with ways to go there.
+pub(super) fn partings_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, reference: usize, comparisons: &[Comparison]) {
+    let theme = *ctx.theme;
+    let Some(base) = ctx.recording.runs.get(reference) else { return };
+    for (number, (run, comparison)) in ctx.recording.runs.iter().zip(comparisons).enumerate() {
+        if number == reference {
+            continue;
+        }
+        let (own, other) = (&run.spec.label, &base.spec.label);
+        ui.horizontal_wrapped(|ui| {
+            let text = RichText::new(format!("{own} against {other}")).strong();
+            ui.label(text.color(theme.run(number).color));
+            if comparison.stamps_ns.is_empty() {
+                ui.label(RichText::new("no frame that both have").color(theme.text_weak));
+            } else if comparison.first_exact().is_none() {
+                ui.label(RichText::new("the same numbers in every frame so far").color(theme.ok));
+            }
+        });
+        for (what, first) in
+            [("First different number", comparison.first_exact()), ("First part notably", comparison.first_notable())]
+        {
+            let Some((stamp_ns, quantity)) = first else { continue };
+            ui.horizontal(|ui| {
+                ui.label(RichText::new(format!("{what}: {} at", quantity.name())).color(theme.text));
+                let name = format!("{what} of {own} from {other}, go there");
+                time_button(ui, ctx, Some(stamp_ns), &name);
+                if let Some(frame) = run.index_at(stamp_ns).and_then(|step| run.steps.get(step)) {
+                    let text = format!("frame {}", frame.report.frame_index);
+                    ui.label(RichText::new(text).color(theme.text_weak));
+                }
+            });
+        }
+        if comparison.first_exact().is_some() {
+            table_ui(ui, ctx, number, own, comparison);
+        }
+        ui.add_space(6.0);
+    }
+}
+
+fn table_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, number: usize, own: &str, comparison: &Comparison) {
+    let theme = *ctx.theme;
+    Grid::new(("partings", number)).striped(true).spacing(vec2(12.0, 2.0)).show(ui, |ui| {
+        for heading in ["", "differs from", "notable", "from", "now", "largest", "at"] {
+            ui.label(RichText::new(heading).small().color(theme.text_weak));
+        }
+        ui.end_row();
+        for (quantity, parting) in Quantity::ALL.into_iter().zip(&comparison.partings) {
+            let Parting { exact_ns, notable_ns, largest } = *parting;
+            let Some((largest, largest_ns)) = largest else { continue };
+            let name = |what: &str| format!("{own}, {}: {what}", quantity.name());
+            let apart = comparison.at(quantity, ctx.cursor_ns);
+            ui.label(RichText::new(quantity.name()).color(theme.text));
+            time_button(ui, ctx, exact_ns, &name("first different number"));
+            let tolerance = format!("≥ {}", difference_text(quantity, quantity.notable()));
+            ui.label(RichText::new(tolerance).small().color(theme.text_weak));
+            time_button(ui, ctx, notable_ns, &name("first notable difference"));
+            let now = apart.map_or_else(|| "–".to_owned(), |apart| difference_text(quantity, apart));
+            let is_notable = apart.is_some_and(|apart| apart >= quantity.notable());
+            let color = if is_notable { theme.warn } else { theme.text_strong };
+            ui.label(RichText::new(now).monospace().color(color));
+            ui.label(RichText::new(difference_text(quantity, largest)).monospace().color(theme.text_strong));
+            time_button(ui, ctx, (largest > 0.0).then_some(largest_ns), &name("largest difference"));
+            ui.end_row();
+        }
+    });
+}
+
+/// A time that leads there; a dash where there is none.
+fn time_button(ui: &mut Ui, ctx: &mut PanelContext<'_>, stamp_ns: Option<i64>, name: &str) {
+    let Some(stamp_ns) = stamp_ns else {
+        ui.label(RichText::new("–").color(ctx.theme.text_weak));
+        return;
+    };
+    let text = format!("{} s", seconds(stamp_ns));
+    let button = ui.add(Button::new(RichText::new(&text).small().monospace()).small());
+    button.widget_info(|| WidgetInfo::labeled(egui::Role::Button, true, format!("{name}: {text}")));
+    if button.on_hover_text(format!("{name}; go there")).clicked() {
+        ctx.commands.push(Command::Seek { stamp_ns });
+    }
+}

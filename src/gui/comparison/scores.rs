@@ -1,0 +1,146 @@
+//! How well each run does, as rows of one table with a column per run.
+
+use crate::estimator::Phase;
+use crate::geometry::seconds_from_ns;
+use crate::gui::units::{figure, fixed};
+use crate::session::{ChainDistance, RELATIVE_LENGTHS_M, Recording, RunRecord, TrajectoryAccuracy};
+
+/// Steps that a run may grow by before its accuracy is computed anew.
+const STEPS_BETWEEN: usize = 20;
+
+/// One run's figures over its whole way so far.
+#[derive(Debug, Default)]
+struct RunScore {
+    id: u64,
+    count: usize,
+    finished: bool,
+    accuracy: Option<TrajectoryAccuracy>,
+    chain: Option<ChainDistance>,
+    estimated: usize,
+    initialized_s: Option<f64>,
+    restarts: usize,
+    columns: usize,
+    informed: Option<usize>,
+}
+
+/// The figures of all runs, kept until a run has grown.
+#[derive(Debug, Default)]
+pub(crate) struct Scores {
+    runs: Vec<RunScore>,
+}
+
+/// A row of the table.
+#[derive(Debug)]
+pub(crate) struct ScoreRow {
+    /// What it tells.
+    pub(crate) name: String,
+    /// Its unit, empty for counts.
+    pub(crate) unit: &'static str,
+    /// By run, in that unit.
+    pub(crate) values: Vec<Option<f64>>,
+    /// Whether less is better; `None` where neither is.
+    less_is_better: Option<bool>,
+    decimals: Option<usize>,
+}
+
+impl ScoreRow {
+    /// A value as it is shown.
+    pub(crate) fn text(&self, run: usize) -> String {
+        let value = self.values.get(run).copied().flatten();
+        value.map_or_else(|| "–".to_owned(), |value| self.decimals.map_or_else(|| figure(value), |it| fixed(value, it)))
+    }
+
+    /// The run that does best, where runs differ in it.
+    pub(crate) fn best(&self) -> Option<usize> {
+        let less = self.less_is_better?;
+        let known = || self.values.iter().enumerate().filter_map(|(run, value)| Some((run, (*value)?)));
+        let better = |a: &f64, b: &f64| if less { a.total_cmp(b) } else { b.total_cmp(a) };
+        let (best, value) = known().min_by(|(_, a), (_, b)| better(a, b))?;
+        let alone = known().count() > 1 && known().all(|(run, other)| run == best || other != value);
+        alone.then_some(best)
+    }
+}
+
+impl Scores {
+    /// Brings the figures up to date.
+    pub(super) fn read(&mut self, recording: &Recording) {
+        self.runs.resize_with(recording.runs.len(), RunScore::default);
+        for (score, run) in self.runs.iter_mut().zip(&recording.runs) {
+            let count = run.steps.len();
+            let grown = count < score.count || count >= score.count + STEPS_BETWEEN;
+            if score.id != run.id || grown || run.finished && !(score.finished && score.count == count) {
+                *score = RunScore::of(recording, run);
+            }
+        }
+    }
+
+    /// The table.
+    pub(crate) fn rows(&self) -> Vec<ScoreRow> {
+        let row = |name: &str, unit: &'static str, less, decimals, of: &dyn Fn(&RunScore) -> Option<f64>| ScoreRow {
+            name: name.to_owned(),
+            unit,
+            values: self.runs.iter().map(of).collect(),
+            less_is_better: less,
+            decimals,
+        };
+        let less = Some(true);
+        let absolute = |score: &RunScore| score.accuracy.as_ref().map(|accuracy| accuracy.absolute_m);
+        let mut rows = vec![
+            row("ATE RMS", "m", less, None, &|score| Some(absolute(score)?.rmse)),
+            row("ATE mean", "m", less, None, &|score| Some(absolute(score)?.mean)),
+            row("ATE median", "m", less, None, &|score| Some(absolute(score)?.median)),
+            row("ATE max", "m", less, None, &|score| Some(absolute(score)?.max)),
+            row("ATE RMS of the path", "%", less, Some(2), &|score| {
+                let accuracy = score.accuracy.as_ref().filter(|accuracy| accuracy.length_m > 0.0)?;
+                Some(100.0 * accuracy.absolute_m.rmse / accuracy.length_m)
+            }),
+        ];
+        for delta_m in RELATIVE_LENGTHS_M {
+            let over = |score: &RunScore| {
+                score.accuracy.as_ref()?.relative.iter().find(|over| over.delta_m == delta_m).copied()
+            };
+            let name = format!("RPE {delta_m:.0} m RMS");
+            rows.push(row(&name, "m", less, None, &|score| Some(over(score)?.translation_m.rmse)));
+            rows.push(row(&name, "°", less, None, &|score| Some(over(score)?.rotation_rad.rmse.to_degrees())));
+        }
+        let chain = |score: &RunScore| score.chain;
+        rows.extend([
+            row("camera on IMU, mean", "mm", less, Some(2), &|score| Some(1e3 * chain(score)?.translation_m.mean)),
+            row("camera on IMU, mean", "°", less, Some(3), &|score| {
+                Some(chain(score)?.rotation_rad.mean.to_degrees())
+            }),
+            row("length of the path", "m", None, Some(1), &|score| Some(score.accuracy.as_ref()?.length_m)),
+            row("frames", "", None, Some(0), &|score| Some(score.count as f64)),
+            row("estimated", "", Some(false), Some(0), &|score| Some(score.estimated as f64)),
+            row("initialized at", "s", less, Some(2), &|score| score.initialized_s),
+            row("restarts", "", less, Some(0), &|score| Some(score.restarts as f64)),
+            row("calibration columns", "", None, Some(0), &|score| Some(score.columns as f64)),
+            row("informed rank at the end", "", None, Some(0), &|score| score.informed.map(|rank| rank as f64)),
+        ]);
+        rows.retain(|row| row.values.iter().any(Option::is_some));
+        rows
+    }
+}
+
+impl RunScore {
+    fn of(recording: &Recording, run: &RunRecord) -> Self {
+        let tracking = |step: &&std::sync::Arc<crate::session::StepRecord>| step.report.phase == Phase::Tracking;
+        let last = run.steps.last();
+        let truth = recording.truth_rig.as_ref().and_then(|rig| rig.chain_of_camera(&run.camera_key));
+        let chain =
+            truth.zip(last).and_then(|(truth, last)| run.chain_distance(&last.report.calibration.classical, &truth));
+        let first = run.steps.iter().find(tracking);
+        Self {
+            id: run.id,
+            count: run.steps.len(),
+            finished: run.finished,
+            accuracy: TrajectoryAccuracy::of(&run.pairs_with_truth()),
+            chain,
+            estimated: run.steps.iter().filter(tracking).count(),
+            initialized_s: first.map(|step| seconds_from_ns(step.report.stamp_ns)),
+            restarts: last.map_or(0, |last| last.report.restarts),
+            columns: last.map_or(0, |last| last.report.calibration.names.len()),
+            informed: run.steps.iter().rev().find_map(|step| step.rank.as_ref()).map(|rank| rank.rank_informed),
+        }
+    }
+}

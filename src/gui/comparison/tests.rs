@@ -1,0 +1,140 @@
+//! The comparison panel, asked by labels.
+
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable as _;
+
+use super::ComparisonPanel;
+use crate::gui::sample_recording::{sample_images, sample_recording_of};
+use crate::gui::theme::{Theme, ThemeName};
+use crate::gui::{PanelContext, Playback, Selection};
+use crate::session::{Command, Quantity, Recording};
+
+struct Bench {
+    recording: Recording,
+    cursor_ns: i64,
+    selection: Selection,
+    panel: ComparisonPanel,
+    commands: Vec<Command>,
+}
+
+impl Bench {
+    fn ui(&mut self, ui: &mut egui::Ui) {
+        let theme = Theme::of(ThemeName::Dark);
+        let mut context = PanelContext {
+            recording: &self.recording,
+            cursor_ns: self.cursor_ns,
+            playback: &Playback::default(),
+            images: &mut sample_images(),
+            selection: &mut self.selection,
+            theme: &theme,
+            commands: &mut self.commands,
+        };
+        self.panel.ui(ui, &mut context);
+    }
+}
+
+fn bench(runs: &[&str], size: [f32; 2]) -> Harness<'static, Bench> {
+    let recording = sample_recording_of(120, runs);
+    let cursor_ns = recording.last_stamp_ns();
+    let (selection, panel) = (Selection::default(), ComparisonPanel::default());
+    let bench = Bench { recording, cursor_ns, selection, panel, commands: Vec::new() };
+    let mut harness = Harness::builder()
+        .with_size(size)
+        .with_context_setup(|ctx| Theme::of(ThemeName::Dark).apply(ctx))
+        .build_ui_state(|ui, bench: &mut Bench| bench.ui(ui), bench);
+    harness.run_steps(3);
+    harness
+}
+
+#[test]
+fn numbers_tell_accuracy_and_lead_to_where_runs_part() {
+    let mut harness = bench(&["auto", "classical"], [900.0, 900.0]);
+    let rows = harness.state().panel.scores.rows();
+    let rms = rows.iter().find(|row| row.name == "ATE RMS").unwrap();
+    let [auto, classical] = [rms.values[0].unwrap(), rms.values[1].unwrap()];
+    assert_eq!(rms.best(), (auto != classical).then_some(usize::from(classical < auto)));
+    assert!(harness.query_all_by_label_contains(&rms.text(0)).next().is_some());
+    let (first_ns, quantity) = harness.state().panel.comparisons[1].first_notable().unwrap();
+    let time = format!("{} s", crate::gui::units::seconds(first_ns));
+    let label = format!("First part notably of classical from auto, go there: {time}");
+    assert!(harness.query_by_label(&format!("First part notably: {} at", quantity.name())).is_some());
+    harness.get_by_label(&label).click();
+    harness.run_steps(2);
+    assert_eq!(harness.state().commands, [Command::Seek { stamp_ns: first_ns }]);
+    // The other way round they part at the same frame.
+    harness.state_mut().panel.reference = 1;
+    harness.run_steps(2);
+    assert!(harness.query_by_label("auto against classical").is_some());
+    assert_eq!(harness.state().panel.comparisons[0].first_notable().map(|(stamp_ns, _)| stamp_ns), Some(first_ns));
+    harness.get_by_label("Show run classical in all panels").click();
+    harness.run_steps(2);
+    assert_eq!(harness.state().selection.run, 1);
+}
+
+#[test]
+fn a_run_alone_and_a_twin_are_told_as_such() {
+    let mut harness = bench(&["auto"], [900.0, 700.0]);
+    assert!(harness.query_by_label("Accuracy over the whole flight so far").is_some());
+    harness.get_by_label("Differences").click();
+    harness.run_steps(2);
+    assert!(harness.query_by_label_contains("One run alone").is_some());
+    let mut twin = harness.state().recording.runs[0].clone();
+    (twin.id, twin.spec.label) = (u64::MAX, "twin".to_owned());
+    harness.state_mut().recording.runs.push(twin);
+    harness.get_by_label("Numbers").click();
+    harness.run_steps(3);
+    assert!(harness.query_by_label("the same numbers in every frame so far").is_some());
+}
+
+#[test]
+fn every_view_has_its_parts_and_differences_seek() {
+    let mut harness = bench(&["auto", "classical"], [1500.0, 900.0]);
+    for label in ["Accuracy over the whole flight so far", "Difference in position over time", "classical against auto"]
+    {
+        assert!(harness.query_by_label(label).is_some(), "{label} in the view of all");
+    }
+    assert_eq!(harness.query_all_by_label("Landmarks").count(), 2, "a scene for each run");
+    for (view, label, count) in [
+        ("Differences", "Difference in informed rank over time", 1),
+        ("Images", "Before", 2),
+        ("Scenes", "Landmarks", 2),
+        ("Directions", "structural rank", 1),
+    ] {
+        harness.get_by_label(view).click();
+        harness.run_steps(3);
+        assert_eq!(harness.query_all_by_label(label).count(), count, "{label}");
+    }
+    harness.get_by_label("Differences").click();
+    harness.run_steps(2);
+    let plot = harness.get_by_label("Difference in position over time").rect();
+    harness.state_mut().commands.clear();
+    let at = plot.center();
+    harness.event(egui::Event::PointerMoved(at));
+    for pressed in [true, false] {
+        let (button, modifiers) = (egui::PointerButton::Primary, egui::Modifiers::NONE);
+        harness.event(egui::Event::PointerButton { pos: at, button, pressed, modifiers });
+    }
+    harness.run_steps(2);
+    let Some(Command::Seek { stamp_ns }) = harness.state().commands.last() else { panic!("no seek") };
+    let middle_ns = harness.state().recording.duration_ns / 2;
+    assert!((stamp_ns - middle_ns).abs() < middle_ns / 20);
+}
+
+#[test]
+fn sides_of_the_solve_and_selection_are_shared_by_all_images() {
+    use egui_kittest::kittest::NodeT as _;
+    let mut harness = bench(&["auto", "classical"], [1200.0, 700.0]);
+    harness.get_by_label("Images").click();
+    harness.run_steps(3);
+    let chosen = |harness: &Harness<'static, Bench>| -> Vec<bool> {
+        let nodes = harness.query_all_by_label("Before");
+        nodes.map(|node| node.accesskit_node().toggled() == Some(egui::accesskit::Toggled::True)).collect()
+    };
+    assert_eq!(chosen(&harness), [false, false]);
+    let second = harness.query_all_by_label("Before").nth(1).unwrap();
+    second.click();
+    harness.run_steps(4);
+    assert_eq!(chosen(&harness), [true, true], "what one image shows the others show");
+    let at = harness.state().cursor_ns;
+    assert_eq!(harness.state().panel.comparisons[1].at(Quantity::Tracks, at), Some(0.0));
+}

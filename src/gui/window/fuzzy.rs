@@ -1,0 +1,61 @@
+//! How well a text answers what somebody has typed so far.
+
+/// How well a text answers typed words, in any order and with letters left out; higher is better, `None` when a word is not
+/// in it. Nothing typed is answered by everything alike.
+pub(super) fn score(typed: &str, text: &str) -> Option<i32> {
+    let text = text.to_lowercase();
+    typed.to_lowercase().split_whitespace().map(|word| word_score(word, &text)).sum()
+}
+
+/// Best of: at the begin of a word, within a word, as letters in order.
+fn word_score(word: &str, text: &str) -> Option<i32> {
+    /// A match far behind is worth this much less at most.
+    const FARTHEST: usize = 20;
+    let begins = |at: usize| !text[..at].chars().next_back().is_some_and(char::is_alphanumeric);
+    let places = text.match_indices(word).map(|(at, _)| at);
+    let near = |at: usize| i32::try_from(at.min(FARTHEST)).unwrap_or(0);
+    let whole = places.map(|at| if begins(at) { 100 - near(at) } else { 60 - near(at) }).max();
+    whole.or_else(|| scattered(word, text))
+}
+
+/// Letters in order with others between: begins of words count for them, holes against.
+fn scattered(word: &str, text: &str) -> Option<i32> {
+    /// Letters that may be left out between the first and the last one.
+    const MOST_HOLES: i32 = 16;
+    let mut wanted = word.chars().peekable();
+    let (mut begins, mut holes, mut begun, mut before) = (0, 0, false, ' ');
+    for letter in text.chars() {
+        let Some(next) = wanted.peek() else { break };
+        if letter == *next {
+            begins += i32::from(!before.is_alphanumeric());
+            begun = true;
+            wanted.next();
+        } else if begun {
+            holes += 1;
+        }
+        before = letter;
+    }
+    (wanted.peek().is_none() && holes <= MOST_HOLES).then(|| 20 + 4 * begins - holes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn begins_of_words_come_before_middles_before_scattered_letters() {
+        let of = |text: &str| score("br", text).unwrap();
+        assert!(of("Breakpoint") > of("Set a breakpoint") && of("Set a breakpoint") > of("Abroad"));
+        assert!(of("Abroad") > of("Back to the rank"));
+        assert_eq!(score("xq", "Back to the rank"), None);
+    }
+
+    #[test]
+    fn words_may_come_in_any_order_and_all_must_be_there() {
+        assert!(score("layout cal", "Layout: calibration").is_some());
+        assert!(score("cal LAY", "Layout: calibration").is_some());
+        assert_eq!(score("cal scene", "Layout: calibration"), None);
+        assert_eq!(score("", "anything"), Some(0));
+        assert!(score("°", "5° and more").is_some());
+    }
+}

@@ -1,0 +1,182 @@
+//! The window by keyboard alone, and what a screen reader is told.
+
+use egui::accesskit::Action;
+use egui::{Key, Modifiers, Role};
+use egui_kittest::Harness;
+use egui_kittest::kittest::{By, NodeT as _, Queryable as _};
+
+use super::tests::{Bench, SECOND_NS, bench, commands_of};
+use super::{PanelName, Preset};
+use crate::frontend::FeatureId;
+use crate::gui::theme::ThemeName;
+use crate::session::Command;
+
+/// Opens the palette, types, and presses Enter.
+fn choose(harness: &mut Harness<'static, Bench>, typed: &str) -> Vec<Command> {
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::P);
+    harness.run_steps(3);
+    harness.event(egui::Event::Text(typed.to_owned()));
+    harness.run_steps(3);
+    commands_of(harness, |harness| harness.key_press(Key::Enter))
+}
+
+#[test]
+fn the_palette_goes_to_times_and_frames_and_selects() {
+    let mut harness = bench();
+    assert_eq!(choose(&mut harness, "1.5"), [Command::Seek { stamp_ns: 3 * SECOND_NS / 2 }]);
+    let step = harness.state().recording.runs[0].steps[40].clone();
+    let (frame, stamp_ns) = (step.report.frame_index, step.report.stamp_ns);
+    assert_eq!(choose(&mut harness, &format!("frame {frame}")), [Command::Seek { stamp_ns }]);
+    let cursor_ns = harness.state().cursor_ns;
+    let id = harness.state().recording.runs[0].step_at(cursor_ns).unwrap().tracks.features[5].id;
+    choose(&mut harness, &format!("feature {}", id.0));
+    assert_eq!(harness.state().selection.feature, Some(id));
+    assert_ne!(id, FeatureId(u64::MAX));
+    choose(&mut harness, "parameter L2.alpha");
+    assert_eq!(harness.state().selection.parameter.as_deref(), Some("L2.alpha"));
+    choose(&mut harness, "run classical");
+    assert_eq!(harness.state().selection.run, 1);
+    choose(&mut harness, "theme print");
+    assert_eq!(harness.state().window.settings.theme, ThemeName::Print);
+    choose(&mut harness, "hide residuals");
+    assert!(!harness.state().window.layout.is_visible(PanelName::Residuals));
+    choose(&mut harness, "show residuals");
+    assert!(harness.state().window.layout.is_visible(PanelName::Residuals));
+    choose(&mut harness, "compar layout");
+    assert_eq!(harness.state().window.layout.preset, Some(Preset::Comparison));
+}
+
+#[test]
+fn the_palette_has_every_action_with_its_keys_and_moves_by_key() {
+    let mut harness = bench();
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::P);
+    harness.run_steps(3);
+    for entry in super::actions::TABLE {
+        use super::actions::Action;
+        if matches!(entry.action, Action::Palette | Action::Dismiss | Action::SavedLayout(_)) {
+            continue;
+        }
+        assert!(harness.query_all_by_label(entry.name).next().is_some(), "{}", entry.name);
+        assert!(harness.query_all_by_label(entry.keys).next().is_some(), "{}", entry.keys);
+    }
+    let chosen = |harness: &Harness<'static, Bench>| {
+        let rows = harness.query_all_by_role(Role::Button);
+        let marked = rows.filter(|node| node.accesskit_node().toggled() == Some(egui::accesskit::Toggled::True));
+        let names = |name: &str| super::actions::TABLE.iter().any(|entry| entry.name == name);
+        marked.filter_map(|node| node.accesskit_node().label()).find(|name| names(name))
+    };
+    let first = chosen(&harness);
+    for key in [Key::ArrowDown, Key::PageDown] {
+        harness.key_press(key);
+        harness.run_steps(2);
+    }
+    assert!(first.is_some() && chosen(&harness).is_some() && chosen(&harness) != first);
+    harness.event(egui::Event::Text("qqqq".to_owned()));
+    harness.run_steps(2);
+    assert!(harness.query_by_label("Nothing is called so").is_some());
+    assert!(commands_of(&mut harness, |harness| harness.key_press(Key::Escape)).is_empty());
+    assert!(harness.query_by_label("Nothing is called so").is_none(), "Escape closes it");
+}
+
+#[test]
+fn panels_get_the_focus_by_key_in_the_order_on_the_screen() {
+    let mut harness = bench();
+    let mut seen = Vec::new();
+    for _ in 0..harness.state().window.places.len() {
+        harness.key_press(Key::F6);
+        harness.run_steps(2);
+        seen.push(harness.state().window.focus.unwrap());
+    }
+    assert_eq!(seen.first(), Some(&PanelName::Image));
+    assert_eq!(seen.last(), Some(&PanelName::Timeline));
+    harness.key_press_modifiers(Modifiers::SHIFT, Key::F6);
+    harness.run_steps(2);
+    assert_eq!(harness.state().window.focus, seen.iter().rev().nth(1).copied());
+    // A layout of one's own by key, and what is said when there is none.
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::Num3);
+    harness.run_steps(3);
+    assert!(harness.query_by_label_contains("No layout of your own has that number").is_some());
+}
+
+/// Every node that can be clicked or focused has a name, in every preset and with every dialog open.
+#[test]
+fn everything_that_can_be_used_has_a_name() {
+    let mut harness = bench();
+    let check = |harness: &Harness<'static, Bench>, place: &str| {
+        let usable = By::new().predicate(|node| {
+            let acts = |action| node.data().supports_action(action);
+            let container = matches!(node.role(), Role::GenericContainer | Role::Window | Role::ScrollView);
+            // The lines between panels, by which they are resized, are the libraries' and have no place for a name.
+            let line = node.bounding_box().is_some_and(|at| at.width().min(at.height()) < 14.0);
+            (acts(Action::Click) || acts(Action::Focus)) && !container && !(line && node.role() == Role::Unknown)
+        });
+        let mut count = 0;
+        for node in harness.query_all(usable) {
+            let node = node.accesskit_node();
+            let name = node.label().unwrap_or_default();
+            assert!(
+                !name.trim().is_empty(),
+                "{place}: a {:?} without a name at {:?}",
+                node.role(),
+                node.bounding_box()
+            );
+            count += 1;
+        }
+        assert!(count > 20, "{place}: {count} nodes");
+    };
+    for (number, key) in [Key::Num1, Key::Num2, Key::Num3, Key::Num4, Key::Num5].into_iter().enumerate() {
+        harness.key_press(key);
+        harness.run_steps(4);
+        check(&harness, Preset::ALL[number].name());
+    }
+    harness.key_press(Key::Num1);
+    for panel in PanelName::movable() {
+        harness.state_mut().window.layout.set_visible(panel, true);
+        harness.run_steps(4);
+        check(&harness, panel.title());
+    }
+    for (modifiers, key) in [
+        (Modifiers::NONE, Key::A),
+        (Modifiers::NONE, Key::F),
+        (Modifiers::NONE, Key::W),
+        (Modifiers::NONE, Key::F1),
+        (Modifiers::COMMAND, Key::O),
+        (Modifiers::COMMAND, Key::P),
+        (Modifiers::COMMAND, Key::Comma),
+    ] {
+        harness.key_press_modifiers(modifiers, key);
+        harness.run_steps(4);
+        check(&harness, &format!("{key:?}"));
+        harness.state_mut().window.close_dialogs();
+        harness.run_steps(2);
+    }
+}
+
+#[test]
+fn tab_reaches_everything_and_shows_where_it_is() {
+    let mut harness = bench();
+    let mut reached: Vec<Option<egui::Id>> = Vec::new();
+    let mut before = None;
+    for _ in 0..150 {
+        harness.key_press(Key::Tab);
+        harness.run_steps(1);
+        let focused = harness.ctx.memory(egui::Memory::focused);
+        assert!(focused.is_some() && focused != before, "Tab moves the focus");
+        before = focused;
+        if !reached.contains(&focused) {
+            reached.push(focused);
+        }
+    }
+    for name in ["Open…", "Play", "Go to end", "Timeline", "Panels"] {
+        let node = harness.get_by_label(name);
+        node.focus();
+        harness.run_steps(1);
+        let focused = harness.ctx.memory(egui::Memory::focused);
+        assert!(reached.contains(&focused), "{name} is reached by Tab");
+    }
+    // Enter presses what has the focus.
+    harness.get_by_label("Go to end").focus();
+    harness.run_steps(1);
+    let pushed = commands_of(&mut harness, |harness| harness.key_press(Key::Enter));
+    assert_eq!(pushed, [Command::GoToEnd]);
+}

@@ -1,0 +1,165 @@
+//! What the command palette offers: all actions, and what the recording at the cursor has.
+
+use super::actions::{Action, TABLE};
+use super::fuzzy;
+use super::palette::keys_of;
+use super::tiles::Layout;
+use super::{PanelName, SavedLayouts};
+use crate::frontend::FeatureId;
+use crate::geometry::ns_from_seconds;
+use crate::gui::PanelContext;
+use crate::gui::convergence::names::meaning_of;
+use crate::gui::theme::ThemeName;
+use crate::gui::timeline::SPEEDS;
+use crate::gui::units::seconds;
+use crate::session::RunRecord;
+
+/// What comes of choosing an item.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Choice {
+    /// An action.
+    Action(Action),
+    /// A parameter is selected.
+    Parameter(String),
+}
+
+/// A row of the palette.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Item {
+    /// What it is called.
+    pub(super) name: String,
+    /// Its keys, empty where it has none.
+    pub(super) keys: &'static str,
+    /// What it does.
+    pub(super) choice: Choice,
+}
+
+fn item(name: impl Into<String>, action: Action) -> Item {
+    Item { name: name.into(), keys: keys_of(action), choice: Choice::Action(action) }
+}
+
+/// What answers the typed text, best first; all commands in their own order when nothing is typed.
+pub(super) fn found(typed: &str, ctx: &PanelContext<'_>, layouts: &SavedLayouts, layout: &Layout) -> Vec<Item> {
+    let places = places(typed, ctx);
+    let mut items = commands(ctx, layouts, layout);
+    if !typed.trim().is_empty() {
+        items.extend(parameters(ctx));
+    }
+    let mut scored: Vec<(i32, Item)> =
+        items.into_iter().filter_map(|item| Some((fuzzy::score(typed, &item.name)?, item))).collect();
+    // Equally good ones stay in their order.
+    scored.sort_by_key(|(score, _)| std::cmp::Reverse(*score));
+    places.into_iter().chain(scored.into_iter().map(|(_, item)| item)).collect()
+}
+
+fn commands(ctx: &PanelContext<'_>, layouts: &SavedLayouts, layout: &Layout) -> Vec<Item> {
+    let listed = TABLE.iter().filter(|entry| {
+        // What they stand for is listed below, or open already.
+        !matches!(entry.action, Action::Palette | Action::Dismiss | Action::SavedLayout(_))
+    });
+    let mut items: Vec<Item> = listed.map(|entry| item(entry.name, entry.action)).collect();
+    items.push(item("Clear the selection", Action::Dismiss));
+    items.extend(layouts.names().enumerate().map(|(number, name)| {
+        const KEYS: [&str; 9] =
+            ["Ctrl+1", "Ctrl+2", "Ctrl+3", "Ctrl+4", "Ctrl+5", "Ctrl+6", "Ctrl+7", "Ctrl+8", "Ctrl+9"];
+        let keys = KEYS.get(number).copied().unwrap_or_default();
+        Item { keys, ..item(format!("Layout: {name}"), Action::SavedLayout(number)) }
+    }));
+    for panel in PanelName::ALL {
+        items.push(item(format!("Panel: show {}", panel.as_str()), Action::Show(panel)));
+    }
+    for panel in PanelName::movable().filter(|panel| layout.is_visible(*panel)) {
+        items.push(item(format!("Panel: hide {}", panel.as_str()), Action::Hide(panel)));
+    }
+    let runs = &ctx.recording.runs;
+    for (number, run) in runs.iter().enumerate() {
+        items.push(item(format!("Run: show {}", run.spec.label), Action::Run(number)));
+    }
+    if let Some(last) = runs.last().filter(|_| runs.len() > 1) {
+        items.push(item(format!("Run: remove {}", last.spec.label), Action::RemoveRun(runs.len() - 1)));
+    }
+    for stamp_ns in &ctx.playback.markers_ns {
+        items.push(item(format!("Marker: go to {} s", seconds(*stamp_ns)), Action::GoTo(*stamp_ns)));
+    }
+    items.extend(SPEEDS.map(|speed| item(format!("Speed: {speed}×"), Action::Speed(speed))));
+    for theme in [ThemeName::Light, ThemeName::Dark, ThemeName::Print] {
+        items.push(item(format!("Theme: {}", theme.as_str()), Action::SetTheme(theme)));
+    }
+    items
+}
+
+fn shown<'a>(ctx: &PanelContext<'a>) -> Option<&'a RunRecord> {
+    ctx.recording.runs.get(ctx.selection.run.min(ctx.recording.runs.len().saturating_sub(1)))
+}
+
+/// The parameters of the shown run at the cursor.
+fn parameters(ctx: &PanelContext<'_>) -> Vec<Item> {
+    let step = shown(ctx).and_then(|run| run.step_at(ctx.cursor_ns).or_else(|| run.steps.first()));
+    let names = step.into_iter().flat_map(|step| &step.report.calibration.names);
+    names
+        .map(|name| Item {
+            name: format!("Parameter {name}: {}", meaning_of(name, &ctx.recording.rig)),
+            keys: "",
+            choice: Choice::Parameter(name.clone()),
+        })
+        .collect()
+}
+
+/// Times, frames and features that a typed number could mean.
+fn places(typed: &str, ctx: &PanelContext<'_>) -> Vec<Item> {
+    let text = typed.trim().to_lowercase();
+    let text = text.strip_prefix("go to").map_or(text.as_str(), str::trim_start);
+    // `frame 12`, `time 3`, `feature 40`; `12.5 s` begins with the number itself.
+    let word = text.split_whitespace().next().filter(|word| word.chars().all(char::is_alphabetic)).unwrap_or_default();
+    let number = text[word.len()..].trim_start();
+    let is = |kind: &str| kind.starts_with(word);
+    let mut items = Vec::new();
+    if let Some(time_s) = seconds_of(number).filter(|_| is("time")) {
+        let stamp_ns = ns_from_seconds(time_s);
+        if (0..=ctx.recording.duration_ns).contains(&stamp_ns) {
+            items.push(item(format!("Go to {} s", seconds(stamp_ns)), Action::GoTo(stamp_ns)));
+        }
+    }
+    let Some(number) = number.trim_start_matches('#').parse::<u64>().ok() else { return items };
+    let frame = |run: &RunRecord| {
+        let step = run.steps.iter().find(|step| step.report.frame_index as u64 == number)?;
+        Some(step.report.stamp_ns)
+    };
+    if let Some(stamp_ns) = shown(ctx).filter(|_| is("frame")).and_then(frame) {
+        items.push(item(format!("Go to frame {number} ({} s)", seconds(stamp_ns)), Action::GoTo(stamp_ns)));
+    }
+    let step = shown(ctx).and_then(|run| run.step_at(ctx.cursor_ns));
+    let known = |id: FeatureId| {
+        step.is_some_and(|step| {
+            step.tracks.features.iter().any(|feature| feature.id == id)
+                || step.report.features.iter().any(|feature| feature.id == id)
+        })
+    };
+    if is("feature") && known(FeatureId(number)) {
+        items.push(item(format!("Select feature {number}"), Action::Feature(FeatureId(number))));
+    }
+    items
+}
+
+/// `12.5`, `12.5 s` or `1:05.2` as seconds.
+fn seconds_of(text: &str) -> Option<f64> {
+    let text = text.trim().strip_suffix('s').unwrap_or(text).trim();
+    let (minutes, rest) = text.split_once(':').unwrap_or(("0", text));
+    let time_s = 60.0 * minutes.parse::<u32>().ok().map(f64::from)? + rest.parse::<f64>().ok()?;
+    (time_s.is_finite() && time_s >= 0.0).then_some(time_s)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_read_as_people_write_them() {
+        for (text, time_s) in [("12.5", 12.5), ("12.5 s", 12.5), ("3s", 3.0), ("1:05.2", 65.2), ("0", 0.0)] {
+            assert_eq!(seconds_of(text), Some(time_s), "{text}");
+        }
+        for text in ["", "s", "-3", "1:", "nan", "inf", "frame"] {
+            assert_eq!(seconds_of(text), None, "{text}");
+        }
+    }
+}

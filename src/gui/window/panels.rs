@@ -1,0 +1,150 @@
+//! The panels by name, and their own state.
+
+use egui::Ui;
+use serde::{Deserialize, Serialize};
+
+use crate::gui::PanelContext;
+use crate::gui::breakpoints::BreakpointsPanel;
+use crate::gui::comparison::ComparisonPanel;
+use crate::gui::convergence::ConvergencePanel;
+use crate::gui::image_panel::ImagePanel;
+use crate::gui::inspector::InspectorPanel;
+use crate::gui::jacobian::JacobianPanel;
+use crate::gui::laboratory::LaboratoryPanel;
+use crate::gui::rank::RankPanel;
+use crate::gui::residuals::ResidualsPanel;
+use crate::gui::scene::ScenePanel;
+use crate::gui::timeline::TimelinePanel;
+
+/// A panel by its name on the command line, in the names of files and in saved layouts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize)]
+pub enum PanelName {
+    /// The camera's image.
+    Image,
+    /// The scene in three dimensions.
+    Scene,
+    /// Calibration over time.
+    Convergence,
+    /// Rank and null directions.
+    Rank,
+    /// The linearization by blocks.
+    Jacobian,
+    /// Residuals.
+    Residuals,
+    /// Numbers of what is selected.
+    Inspector,
+    /// What a mechanism and a motion can identify.
+    Laboratory,
+    /// All runs held against each other.
+    Comparison,
+    /// Breakpoints.
+    Breakpoints,
+    /// The lanes over time, across the bottom of the window.
+    Timeline,
+}
+
+impl PanelName {
+    /// All of them.
+    pub const ALL: [Self; 11] = [
+        Self::Image,
+        Self::Scene,
+        Self::Convergence,
+        Self::Rank,
+        Self::Jacobian,
+        Self::Residuals,
+        Self::Inspector,
+        Self::Laboratory,
+        Self::Comparison,
+        Self::Breakpoints,
+        Self::Timeline,
+    ];
+
+    /// Those that can be moved and hidden.
+    pub fn movable() -> impl Iterator<Item = Self> {
+        Self::ALL.into_iter().filter(|panel| *panel != Self::Timeline)
+    }
+
+    /// Its name on the command line and its title.
+    const fn names(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Image => ("image", "Image"),
+            Self::Scene => ("scene", "Scene"),
+            Self::Convergence => ("convergence", "Convergence"),
+            Self::Rank => ("rank", "Rank"),
+            Self::Jacobian => ("jacobian", "Jacobian"),
+            Self::Residuals => ("residuals", "Residuals"),
+            Self::Inspector => ("inspector", "Inspector"),
+            Self::Laboratory => ("laboratory", "Laboratory"),
+            Self::Comparison => ("comparison", "Comparison"),
+            Self::Breakpoints => ("breakpoints", "Breakpoints"),
+            Self::Timeline => ("timeline", "Timeline"),
+        }
+    }
+
+    /// Its name on the command line.
+    pub const fn as_str(self) -> &'static str {
+        self.names().0
+    }
+
+    /// Its title on screen.
+    pub const fn title(self) -> &'static str {
+        self.names().1
+    }
+}
+
+/// The panels' own state.
+#[derive(Default)]
+pub struct Panels {
+    /// The camera's image.
+    pub image: ImagePanel,
+    /// The scene in three dimensions.
+    pub scene: ScenePanel,
+    /// Calibration over time.
+    pub convergence: ConvergencePanel,
+    /// Rank and null directions.
+    pub rank: RankPanel,
+    /// The linearization by blocks.
+    pub jacobian: JacobianPanel,
+    /// Residuals.
+    pub residuals: ResidualsPanel,
+    /// Numbers of what is selected.
+    pub inspector: InspectorPanel,
+    /// What a mechanism and a motion can identify.
+    pub laboratory: LaboratoryPanel,
+    /// All runs held against each other.
+    pub comparison: ComparisonPanel,
+    /// Breakpoints.
+    pub breakpoints: BreakpointsPanel,
+    /// The lanes over time.
+    pub timeline: TimelinePanel,
+}
+
+impl Panels {
+    /// Panels that show the same and hold nothing of a window.
+    pub(super) fn views(&self) -> Self {
+        Self {
+            image: self.image.view_copy(),
+            scene: self.scene.view_copy(),
+            laboratory: self.laboratory.view_copy(),
+            comparison: self.comparison.view_copy(),
+            ..Self::default()
+        }
+    }
+
+    /// Draws a panel into what is left of `ui`.
+    pub(super) fn ui(&mut self, panel: PanelName, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
+        match panel {
+            PanelName::Image => self.image.ui(ui, ctx),
+            PanelName::Scene => self.scene.ui(ui, ctx),
+            PanelName::Convergence => self.convergence.ui(ui, ctx),
+            PanelName::Rank => self.rank.ui(ui, ctx),
+            PanelName::Jacobian => self.jacobian.ui(ui, ctx),
+            PanelName::Residuals => self.residuals.ui(ui, ctx),
+            PanelName::Inspector => self.inspector.ui(ui, ctx),
+            PanelName::Laboratory => self.laboratory.ui(ui, ctx),
+            PanelName::Comparison => self.comparison.ui(ui, ctx),
+            PanelName::Breakpoints => self.breakpoints.ui(ui, ctx),
+            PanelName::Timeline => self.timeline.ui(ui, ctx),
+        }
+    }
+}

@@ -1,0 +1,80 @@
+//! How far the estimation of all runs has come, and how long it will still take.
+
+use crate::session::Recording;
+
+/// Seconds of computing before a remaining time is told.
+const SHORTEST_S: f64 = 1.5;
+
+/// Watches the estimation.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ProgressMeter {
+    /// Seconds of the wall, and the share that was computed then.
+    begun: Option<(f64, f64)>,
+    /// The share at the last reading.
+    last: f64,
+}
+
+/// How far it has come.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Progress {
+    /// Runs that are not done.
+    pub runs: usize,
+    /// Share of the log that they have behind them.
+    pub share: f64,
+    /// Seconds that it will still take at the present pace.
+    pub left_s: Option<f64>,
+}
+
+impl ProgressMeter {
+    /// Reads a recording at a time of the wall; `None` when everything is computed.
+    pub fn read(&mut self, recording: &Recording, now_s: Option<f64>) -> Option<Progress> {
+        let open = recording.runs.iter().filter(|run| !run.finished && run.error.is_none());
+        let duration_ns = recording.duration_ns.max(1) as f64;
+        let shares: Vec<f64> = open
+            .map(|run| run.steps.last().map_or(0.0, |step| (step.report.stamp_ns as f64 / duration_ns).clamp(0.0, 1.0)))
+            .collect();
+        if shares.is_empty() {
+            *self = Self::default();
+            return None;
+        }
+        let share = shares.iter().sum::<f64>() / shares.len() as f64;
+        // Another run makes the share fall: the pace is taken anew.
+        if share < self.last {
+            self.begun = None;
+        }
+        self.last = share;
+        let left_s = now_s.and_then(|now_s| {
+            let (begun_s, begun_share) = *self.begun.get_or_insert((now_s, share));
+            let (elapsed_s, done) = (now_s - begun_s, share - begun_share);
+            (elapsed_s >= SHORTEST_S && done > 0.0).then(|| elapsed_s * (1.0 - share) / done)
+        });
+        Some(Progress { runs: shares.len(), share, left_s })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gui::sample_recording::sample_recording_of;
+
+    #[test]
+    fn the_remaining_time_follows_the_pace() {
+        let mut recording = sample_recording_of(60, &["auto", "classical"]);
+        let whole = recording.runs.clone();
+        let mut meter = ProgressMeter::default();
+        assert_eq!(meter.read(&recording, Some(0.0)), None, "all is computed");
+        let mut at = |frames: usize, now_s: Option<f64>| {
+            for (run, whole) in recording.runs.iter_mut().zip(&whole) {
+                run.finished = false;
+                run.steps = whole.steps[..frames].to_vec();
+            }
+            recording.duration_ns = whole[0].steps[50].report.stamp_ns;
+            meter.read(&recording, now_s).unwrap()
+        };
+        assert_eq!(at(1, Some(10.0)), Progress { runs: 2, share: 0.0, left_s: None });
+        let half = at(26, Some(20.0));
+        assert!((half.share - 0.5).abs() < 1e-9 && (half.left_s.unwrap() - 10.0).abs() < 1e-6, "{half:?}");
+        assert_eq!(at(11, Some(30.0)).left_s, None, "another run has come");
+        assert_eq!(at(26, None).left_s, None, "pictures tell no times");
+    }
+}
