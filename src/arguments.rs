@@ -124,7 +124,7 @@ pub(crate) struct RunArguments {
 #[cfg(feature = "gui")]
 #[derive(Args, Clone, Debug)]
 pub(crate) struct ScreenshotArguments {
-    /// The log.
+    /// The log, or a saved session (LOG.session.json) with its forks and breakpoints.
     pub log: PathBuf,
     /// Seconds since the first message of the log; may be given several times. Several pictures get their time into their
     /// names.

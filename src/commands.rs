@@ -309,7 +309,7 @@ pub(crate) fn view(arguments: &ViewArguments) -> Result<()> {
 
 /// Reads a saved session.
 #[cfg(feature = "gui")]
-fn saved_session(path: &Path) -> Result<session::SavedSession> {
+pub(crate) fn saved_session(path: &Path) -> Result<session::SavedSession> {
     let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
     session::SavedSession::from_text(&text).with_context(|| format!("cannot open {}", path.display()))
 }

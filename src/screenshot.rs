@@ -4,14 +4,16 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::{Result, bail};
-use dcvins::export::{PANEL_NAMES, PictureOptions, Renderer, draw_panel, write_png};
+use dcvins::export::{PANEL_NAMES, PictureOptions, Renderer, draw_panel, is_session, write_png};
 use dcvins::flight_log::ImageReader;
 use dcvins::geometry::{ns_from_seconds, seconds_from_ns};
+use dcvins::gui::app::PlayingLog;
 use dcvins::gui::theme::ThemeName;
-use dcvins::session::SessionPlan;
+use dcvins::gui::{ImageSource, Playback};
+use dcvins::session::{Recording, Session, SessionPlan};
 
 use crate::arguments::{RendererArgument, ScreenshotArguments, ThemeArgument};
-use crate::commands::{compute, print, tell};
+use crate::commands::{compute, print, saved_session, tell};
 
 /// The most pictures of one command: more is a mistyped period.
 const MOST_PICTURES: usize = 100_000;
@@ -21,11 +23,11 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<()> {
     if !PANEL_NAMES.contains(&arguments.panel.as_str()) {
         bail!("no panel is called '{}': expected one of {}", arguments.panel, PANEL_NAMES.join(", "));
     }
-    let plan = SessionPlan::open(&arguments.estimation.request(arguments.log.clone()))?;
-    let log_end_ns = plan.log.duration_ns();
-    let begin_ns = ns_from_seconds(plan.start_s).min(log_end_ns);
+    let mut shown = Shown::open(arguments)?;
+    let log_end_ns = shown.log_end_ns;
+    let begin_ns = ns_from_seconds(shown.start_s).min(log_end_ns);
     let end_ns =
-        plan.duration_s.map_or(log_end_ns, |duration_s| log_end_ns.min(begin_ns + ns_from_seconds(duration_s)));
+        shown.duration_s.map_or(log_end_ns, |duration_s| log_end_ns.min(begin_ns + ns_from_seconds(duration_s)));
     if arguments.at.iter().any(|at_s| ns_from_seconds(*at_s) > log_end_ns) {
         tell(&format!("dcvins: the log ends at {:.3} s, which is what is drawn", seconds_from_ns(log_end_ns)));
     }
@@ -43,8 +45,7 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<()> {
     instants.sort_unstable();
     instants.dedup();
     let Some(last_ns) = instants.last().copied() else { bail!("no instant is asked for: give --at or --every") };
-    let recording = compute(&plan, Some(last_ns))?;
-    let mut images = ImageReader::new(Arc::clone(&plan.log), &plan.rig);
+    let recording = shown.compute(last_ns)?;
     let options = PictureOptions {
         size_px: arguments.size.map(|side| side as u32),
         pixels_per_point: arguments.scale,
@@ -58,10 +59,11 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<()> {
             RendererArgument::Wgpu => Renderer::Wgpu,
         },
         slide: arguments.slide.clone(),
+        playback: shown.playback(),
     };
     let several = instants.len() > 1;
     for cursor_ns in instants {
-        let picture = draw_panel(&arguments.panel, &recording, cursor_ns, &mut images, &options)?;
+        let picture = draw_panel(&arguments.panel, &recording, cursor_ns, shown.images(), &options)?;
         let path = if several { numbered(&arguments.output, cursor_ns) } else { arguments.output.clone() };
         write_png(&picture, &path)?;
         if several {
@@ -69,6 +71,68 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// What is drawn: a log that is computed for it, or a saved session with its forks and breakpoints.
+struct Shown {
+    source: Source,
+    log_end_ns: i64,
+    start_s: f64,
+    duration_s: Option<f64>,
+}
+
+enum Source {
+    Log(Box<SessionPlan>, ImageReader),
+    Saved(Box<Session>),
+}
+
+impl Shown {
+    fn open(arguments: &ScreenshotArguments) -> Result<Self> {
+        let (source, start_s, duration_s) = if is_session(&arguments.log) {
+            if !arguments.estimation.runs.is_empty() {
+                bail!("a saved session has its own runs: leave --run out");
+            }
+            let saved = saved_session(&arguments.log)?;
+            let (start_s, duration_s) = (saved.start_s, saved.duration_s);
+            (Source::Saved(Box::new(saved.open()?)), start_s, duration_s)
+        } else {
+            let plan = SessionPlan::open(&arguments.estimation.request(arguments.log.clone()))?;
+            let images = ImageReader::new(Arc::clone(&plan.log), &plan.rig);
+            let (start_s, duration_s) = (plan.start_s, plan.duration_s);
+            (Source::Log(Box::new(plan), images), start_s, duration_s)
+        };
+        let log_end_ns = match &source {
+            Source::Log(plan, _) => plan.log.duration_ns(),
+            Source::Saved(session) => session.recording().duration_ns,
+        };
+        Ok(Self { source, log_end_ns, start_s, duration_s })
+    }
+
+    /// Everything up to a time; of a saved session, to its end.
+    fn compute(&mut self, until_ns: i64) -> Result<Arc<Recording>> {
+        match &mut self.source {
+            Source::Log(plan, _) => compute(plan, Some(until_ns)).map(Arc::new),
+            Source::Saved(session) => {
+                session.finish();
+                session.take_notices().iter().for_each(|notice| tell(&format!("dcvins: {notice}")));
+                Ok(session.recording())
+            }
+        }
+    }
+
+    fn images(&mut self) -> &mut dyn ImageSource {
+        match &mut self.source {
+            Source::Log(_, images) => images,
+            Source::Saved(session) => &mut **session,
+        }
+    }
+
+    fn playback(&self) -> Playback {
+        match &self.source {
+            Source::Log(..) => Playback::default(),
+            Source::Saved(session) => PlayingLog::playback(&**session),
+        }
+    }
 }
 
 /// `rank.png` at 12.5 s as `rank-0012.500.png`: names that sort by time.

@@ -216,6 +216,21 @@ impl Session {
         }
     }
 
+    /// Waits until all runs are computed and all that a file asked for is done: forks made, the cursor where it was.
+    pub fn finish(&mut self) {
+        /// Between two looks, in milliseconds.
+        const LOOK_MS: u64 = 5;
+        let open = |session: &Self| {
+            let pending = !session.pending.forks.is_empty() || session.pending.cursor_ns.is_some();
+            pending || session.recording().runs.iter().any(|run| !run.finished)
+        };
+        while open(self) {
+            self.advance(0.0);
+            std::thread::sleep(std::time::Duration::from_millis(LOOK_MS));
+        }
+        self.advance(0.0);
+    }
+
     /// Where the panels were when the session was saved.
     pub fn layout(&self) -> Option<&serde_json::Value> {
         self.layout.as_ref()
@@ -301,6 +316,12 @@ mod tests {
         assert_eq!(again.saved(Some(layout)), saved);
         let (before, after) = (session.recording(), again.recording());
         assert_eq!(before.runs.len(), after.runs.len());
+        // With less memory older steps are kept in outline, at once and told.
+        assert!(after.runs.iter().all(|run| run.memory.outlined == 0));
+        again.apply(Command::SetMemoryBudget(1 << 20));
+        let thin = again.recording();
+        assert!(thin.memory_budget_bytes == 1 << 20 && thin.memory_bytes() < after.memory_bytes());
+        assert!(thin.runs[0].memory.outlined > 0);
         for (before, after) in before.runs.iter().zip(&after.runs) {
             let newest = |run: &super::super::RunRecord| run.steps.last().unwrap().report.window.clone();
             assert_eq!(newest(before), newest(after));
