@@ -1,5 +1,6 @@
 //! The command line: one spelling and one set of defaults for all sub-commands.
 
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -253,6 +254,15 @@ pub(crate) struct SimulateArguments {
     /// Standard deviation of the encoders in degrees, or none [default: the experiment's].
     #[arg(long, value_name = "D|none", value_parser = encoder_sigma)]
     pub encoder_sigma_deg: Option<EncoderArgument>,
+    /// Size of the images in pixels; the field of view stays the same.
+    #[arg(long, value_name = "WxH", default_value = "640x480", value_parser = image_size)]
+    pub size: [usize; 2],
+    /// Images per second.
+    #[arg(long, value_name = "HZ", default_value_t = 20.0)]
+    pub rate: f64,
+    /// Record the camera on the gimbal alone: half the work and half the bytes of a long flight.
+    #[arg(long)]
+    pub no_static_camera: bool,
     /// Something that goes wrong, in seconds and SI units; may be given several times: camera-offset=S, joint-lag=S,
     /// joint-start=S, image-gap=START,LENGTH, exposure=S, gyroscope-range=RAD/S, accelerometer-range=M/S²,
     /// light=START,FACTOR, blank=START,LENGTH, slew=START,LENGTH, spin=START,LENGTH,RAD/S.
@@ -363,9 +373,16 @@ fn scale(text: &str) -> Result<f32, String> {
 
 #[cfg(feature = "gui")]
 fn size(text: &str) -> Result<[usize; 2], String> {
-    let parse = |side: &str| side.parse::<usize>().ok().filter(|side| (64..=8192).contains(side));
-    let sides = text.split_once('x').and_then(|(width, height)| Some([parse(width)?, parse(height)?]));
-    sides.ok_or_else(|| "expected WIDTHxHEIGHT, each from 64 to 8192, as in 1920x1080".to_owned())
+    sides(text, 64..=8192).ok_or_else(|| "expected WIDTHxHEIGHT, each from 64 to 8192, as in 1920x1080".to_owned())
+}
+
+fn image_size(text: &str) -> Result<[usize; 2], String> {
+    sides(text, 32..=4096).ok_or_else(|| "expected WIDTHxHEIGHT, each from 32 to 4096, as in 640x480".to_owned())
+}
+
+fn sides(text: &str, range: RangeInclusive<usize>) -> Option<[usize; 2]> {
+    let parse = |side: &str| side.parse::<usize>().ok().filter(|side| range.contains(side));
+    text.split_once('x').and_then(|(width, height)| Some([parse(width)?, parse(height)?]))
 }
 
 fn encoder_sigma(text: &str) -> Result<EncoderArgument, String> {

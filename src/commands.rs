@@ -407,6 +407,9 @@ pub(crate) fn simulate(arguments: &SimulateArguments) -> Result<()> {
     let mut options = SimulationOptions::new(experiment);
     options.seed = arguments.seed;
     options.duration_s = arguments.duration;
+    options.resolution_px = arguments.size;
+    options.camera_rate_hz = arguments.rate;
+    options.static_camera = !arguments.no_static_camera;
     match arguments.encoder_sigma_deg {
         Some(EncoderArgument::None) => options.encoder_sigma_rad = None,
         Some(EncoderArgument::Sigma(sigma_deg)) => options.encoder_sigma_rad = Some(sigma_deg.to_radians()),
