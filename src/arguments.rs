@@ -137,9 +137,15 @@ pub(crate) struct ScreenshotArguments {
     /// Which panel; `all` is the whole window.
     #[arg(long, value_name = "NAME", default_value = "all")]
     pub panel: String,
-    /// The PNG to write.
+    /// The picture to write: a PNG, or with .svg a drawing of lines and texts.
     #[arg(short, long, value_name = "FILE.png")]
     pub output: PathBuf,
+    /// What is written, when the file's name does not say it.
+    #[arg(long, value_enum)]
+    pub format: Option<FormatArgument>,
+    /// Also write what the panel shows as a table of comma-separated values, beside the picture.
+    #[arg(long)]
+    pub csv: bool,
     /// Size of the picture in pixels.
     #[arg(long, value_name = "WxH", default_value = "1920x1080", value_parser = size)]
     pub size: [usize; 2],
@@ -159,6 +165,16 @@ pub(crate) struct ScreenshotArguments {
     pub slide: Option<dcvins::observability::SlidePosition>,
     #[command(flatten)]
     pub estimation: EstimationArguments,
+}
+
+/// What `--format` may say.
+#[cfg(feature = "gui")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum FormatArgument {
+    /// Pixels.
+    Png,
+    /// Lines and texts.
+    Svg,
 }
 
 /// Names of the renderers.

@@ -329,7 +329,8 @@ fn write_pictures(plan: &SessionPlan, out: Option<&Path>) -> Result<()> {
     let stem = plan.log_path.file_stem().unwrap_or(plan.log_path.as_os_str());
     let folder = out.map_or_else(|| Path::new("dcvins-output").join(stem), Path::to_path_buf);
     tell(&format!("dcvins: there is no display, so the pictures are written to {}", folder.display()));
-    let recording = compute(plan, None)?;
+    let mut recording = compute(plan, None)?;
+    recording.fill_in(recording.last_stamp_ns());
     let mut images = ImageReader::new(Arc::clone(&plan.log), &plan.rig);
     let options = PictureOptions::default();
     for name in PANEL_NAMES {

@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use dcvins::export::{ReportOptions, write_report};
-use dcvins::session::SessionPlan;
+use dcvins::flight_log::{self, check::CheckReport};
+use dcvins::session::{SessionPlan, image_rotations};
 
 use crate::arguments::ReportArguments;
 use crate::commands::{compute, print};
@@ -12,12 +13,14 @@ use crate::commands::{compute, print};
 /// `dcvins report`.
 pub(crate) fn report(arguments: &ReportArguments) -> Result<()> {
     let plan = SessionPlan::open(&arguments.estimation.request(arguments.log.clone()))?;
-    let recording = compute(&plan, None)?;
+    #[cfg_attr(not(feature = "gui"), expect(unused_mut, reason = "only pictures need what a long log lets go"))]
+    let mut recording = compute(&plan, None)?;
     let options = ReportOptions {
         command: command_line(std::env::args()),
+        check: Some(check(&plan)),
         inputs: inputs(arguments),
         #[cfg(feature = "gui")]
-        pictures: pictures::draw(arguments, &plan, &recording)?,
+        pictures: pictures::draw(arguments, &plan, &mut recording)?,
         #[cfg(not(feature = "gui"))]
         pictures: Vec::new(),
     };
@@ -25,6 +28,12 @@ pub(crate) fn report(arguments: &ReportArguments) -> Result<()> {
     print(&format!("{}\n", page.display()))?;
     let failed: Vec<&str> = recording.runs.iter().filter_map(|run| run.error.as_deref()).collect();
     if failed.is_empty() { Ok(()) } else { anyhow::bail!("{}", failed.join("; ")) }
+}
+
+/// What there is to know about the log and its rig beforehand.
+fn check(plan: &SessionPlan) -> CheckReport {
+    let rotations = image_rotations(&plan.log, &plan.rig);
+    flight_log::check::check(&plan.log, Ok(&plan.rig), &rotations)
 }
 
 /// The log, and the rig and the truth where they are files of their own.
@@ -54,7 +63,7 @@ mod pictures {
     use std::sync::Arc;
 
     use anyhow::Result;
-    use dcvins::export::{PictureOptions, ReportPicture, draw_panel, png_bytes};
+    use dcvins::export::{PictureOptions, ReportDrawing, ReportPicture, draw_panel, draw_panel_svg, png_bytes};
     use dcvins::flight_log::ImageReader;
     use dcvins::geometry::{ns_from_seconds, seconds_from_ns};
     use dcvins::gui::theme::ThemeName;
@@ -62,35 +71,56 @@ mod pictures {
 
     use crate::arguments::ReportArguments;
 
-    /// Panels that show one instant, with their sizes in pixels and what they show.
-    const INSTANT: [(&str, [u32; 2], &str); 3] = [
-        ("image", [1280, 900], "Tracks and residuals in the image"),
-        ("scene", [1280, 900], "Trajectory, landmarks and the chain"),
-        ("rank", [1280, 900], "Ranks, singular values and the directions that are lost"),
+    /// A panel of the report.
+    struct Shown {
+        panel: &'static str,
+        size_px: [u32; 2],
+        caption: &'static str,
+        /// Plots are drawn as lines and texts, images and the scene as pixels.
+        plot: bool,
+    }
+
+    const fn shown(panel: &'static str, size_px: [u32; 2], caption: &'static str, plot: bool) -> Shown {
+        Shown { panel, size_px, caption, plot }
+    }
+
+    /// Panels that show one instant.
+    const INSTANT: [Shown; 3] = [
+        shown("image", [1280, 900], "Tracks and residuals in the image", false),
+        shown("scene", [1280, 900], "Trajectory, landmarks and the chain", false),
+        shown("rank", [1280, 900], "Ranks, singular values and the directions that are lost", true),
     ];
     /// Panels that show the whole flight.
-    const WHOLE: [(&str, [u32; 2], &str); 3] = [
-        ("convergence", [1680, 1200], "Every calibration parameter with three sigmas and the truth"),
-        ("residuals", [1280, 800], "Residuals"),
-        ("timeline", [1680, 480], "Events, ranks, features and gaps"),
+    const WHOLE: [Shown; 3] = [
+        shown("convergence", [1680, 1200], "Every calibration parameter with three sigmas and the truth", true),
+        shown("residuals", [1280, 800], "Residuals", true),
+        shown("timeline", [1680, 480], "Events, ranks, features and gaps", true),
     ];
 
     /// The pictures of a report: the whole flight, then each instant (without one, the end).
     pub(super) fn draw(
         arguments: &ReportArguments,
         plan: &SessionPlan,
-        recording: &Recording,
+        recording: &mut Recording,
     ) -> Result<Vec<ReportPicture>> {
         let mut images = ImageReader::new(Arc::clone(&plan.log), &plan.rig);
         let mut pictures = Vec::new();
         let end_ns = recording.last_stamp_ns();
-        let mut draw = |heading: &str, panels: &[(&str, [u32; 2], &str)], cursor_ns| -> Result<()> {
-            for (panel, size_px, caption) in panels {
+        let mut draw = |heading: &str, panels: &[Shown], cursor_ns| -> Result<()> {
+            recording.fill_in(cursor_ns);
+            for Shown { panel, size_px, caption, plot } in panels {
                 let options =
                     PictureOptions { size_px: *size_px, theme: ThemeName::Print, ..PictureOptions::default() };
-                let picture = draw_panel(panel, recording, cursor_ns, &mut images, &options)?;
                 let caption = format!("{caption}, at {:.2} s", seconds_from_ns(cursor_ns));
-                pictures.push(ReportPicture { heading: heading.to_owned(), caption, png: png_bytes(&picture)? });
+                let drawing = if *plot {
+                    let prefix = format!("clip{}-", pictures.len());
+                    let names = [prefix.as_str(), caption.as_str()];
+                    ReportDrawing::Svg(draw_panel_svg(panel, recording, cursor_ns, &mut images, &options, names)?)
+                } else {
+                    let picture = draw_panel(panel, recording, cursor_ns, &mut images, &options)?;
+                    ReportDrawing::Png(png_bytes(&picture)?)
+                };
+                pictures.push(ReportPicture { heading: heading.to_owned(), caption, drawing });
             }
             Ok(())
         };

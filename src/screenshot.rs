@@ -4,7 +4,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::{Result, bail};
-use dcvins::export::{PANEL_NAMES, PictureOptions, Renderer, draw_panel, is_session, write_png};
+use dcvins::export::{
+    PANEL_NAMES, PictureOptions, Renderer, draw_panel, draw_panel_svg, is_session, log_name, panel_csv, write_csv,
+    write_png, write_svg,
+};
 use dcvins::flight_log::ImageReader;
 use dcvins::geometry::{ns_from_seconds, seconds_from_ns};
 use dcvins::gui::app::PlayingLog;
@@ -12,7 +15,7 @@ use dcvins::gui::theme::ThemeName;
 use dcvins::gui::{ImageSource, Playback};
 use dcvins::session::{Recording, Session, SessionPlan};
 
-use crate::arguments::{RendererArgument, ScreenshotArguments, ThemeArgument};
+use crate::arguments::{FormatArgument, RendererArgument, ScreenshotArguments, ThemeArgument};
 use crate::commands::{compute, print, saved_session, tell};
 
 /// The most pictures of one command: more is a mistyped period.
@@ -23,6 +26,10 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<()> {
     if !PANEL_NAMES.contains(&arguments.panel.as_str()) {
         bail!("no panel is called '{}': expected one of {}", arguments.panel, PANEL_NAMES.join(", "));
     }
+    if arguments.csv && arguments.panel == "all" {
+        bail!("--csv writes the table of one panel: name it with --panel");
+    }
+    let format = format_of(arguments)?;
     let mut shown = Shown::open(arguments)?;
     let log_end_ns = shown.log_end_ns;
     let begin_ns = ns_from_seconds(shown.start_s).min(log_end_ns);
@@ -45,7 +52,7 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<()> {
     instants.sort_unstable();
     instants.dedup();
     let Some(last_ns) = instants.last().copied() else { bail!("no instant is asked for: give --at or --every") };
-    let recording = shown.compute(last_ns)?;
+    let mut recording = shown.compute(last_ns)?;
     let options = PictureOptions {
         size_px: arguments.size.map(|side| side as u32),
         pixels_per_point: arguments.scale,
@@ -63,14 +70,45 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<()> {
     };
     let several = instants.len() > 1;
     for cursor_ns in instants {
-        let picture = draw_panel(&arguments.panel, &recording, cursor_ns, shown.images(), &options)?;
+        Arc::make_mut(&mut recording).fill_in(cursor_ns);
         let path = if several { numbered(&arguments.output, cursor_ns) } else { arguments.output.clone() };
-        write_png(&picture, &path)?;
+        let panel = &arguments.panel;
+        match format {
+            FormatArgument::Png => {
+                write_png(&draw_panel(panel, &recording, cursor_ns, shown.images(), &options)?, &path)?;
+            }
+            FormatArgument::Svg => {
+                let title = format!("{panel} of {} at {:.3} s", log_name(&recording.log_path), seconds_from_ns(cursor_ns));
+                let naming = ["clip", &title];
+                write_svg(&draw_panel_svg(panel, &recording, cursor_ns, shown.images(), &options, naming)?, &path)?;
+            }
+        }
+        if arguments.csv {
+            write_csv(&panel_csv(panel, &recording, cursor_ns, shown.images(), &options)?, &path.with_extension("csv"))?;
+        }
         if several {
             print(&format!("{}\n", path.display()))?;
         }
     }
     Ok(())
+}
+
+/// PNG unless something else is asked for, or the file's name says so.
+fn format_of(arguments: &ScreenshotArguments) -> Result<FormatArgument> {
+    let extension = arguments.output.extension().map(|extension| extension.to_string_lossy().to_lowercase());
+    let named = match extension.as_deref() {
+        Some("svg") => Some(FormatArgument::Svg),
+        Some("png") => Some(FormatArgument::Png),
+        _ => None,
+    };
+    let format = arguments.format.or(named).unwrap_or(FormatArgument::Png);
+    if named.is_some_and(|named| named != format) {
+        bail!("--format and the name of {} contradict each other: leave one out", arguments.output.display());
+    }
+    if format == FormatArgument::Svg && arguments.renderer == RendererArgument::Wgpu {
+        bail!("an SVG is written without a graphics adapter: leave out --renderer wgpu");
+    }
+    Ok(format)
 }
 
 /// What is drawn: a log that is computed for it, or a saved session with its forks and breakpoints.

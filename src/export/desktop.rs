@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::error::ExportError;
-use super::picture::write_png;
+use super::picture::{write_csv, write_png, write_svg};
 use super::recent_files::{RecentFiles, state_folder};
 use crate::gui::desktop::{Desktop, PathEntry};
 use crate::gui::window::PanelExport;
@@ -116,10 +116,13 @@ impl Desktop for Machine {
     }
 
     fn write_panel(&self, export: &PanelExport) -> Result<Vec<PathBuf>, String> {
-        let [picture, table] = ["png", "csv"].map(|kind| self.output.join(format!("{}.{kind}", export.name)));
-        write_png(&export.picture, &picture).map_err(|error| error.to_string())?;
-        fs::write(&table, &export.table).map_err(|error| ExportError::write(&table)(error).to_string())?;
-        Ok([picture, table].map(|path| fs::canonicalize(&path).unwrap_or(path)).to_vec())
+        let paths = ["png", "svg", "csv"].map(|kind| self.output.join(format!("{}.{kind}", export.name)));
+        let [picture, drawing, table] = &paths;
+        let written = write_png(&export.picture, picture)
+            .and_then(|()| write_svg(&export.drawing, drawing))
+            .and_then(|()| write_csv(&export.table, table));
+        written.map_err(|error| error.to_string())?;
+        Ok(paths.map(|path| fs::canonicalize(&path).unwrap_or(path)).to_vec())
     }
 
     fn write_session(&self, name: &str, text: &str) -> Result<PathBuf, String> {
@@ -176,11 +179,13 @@ mod tests {
         machine.keep_settings("{\"scale\": 2}").unwrap();
         assert_eq!(machine.kept_settings().as_deref(), Some("{\"scale\": 2}"));
         let picture = image::RgbaImage::from_pixel(20, 10, image::Rgba([9, 8, 7, 255]));
-        let export = PanelExport { name: "yard/rank-1.500s".to_owned(), picture, table: "a,b\n1,2\n".to_owned() };
+        let (drawing, table) = ("<svg/>\n".to_owned(), "a,b\n1,2\n".to_owned());
+        let export = PanelExport { name: "yard/rank-1.500s".to_owned(), picture, drawing, table };
         let written = machine.write_panel(&export).unwrap();
         assert!(written[0].ends_with("output/yard/rank-1.500s.png"), "{written:?}");
         assert_eq!(image::open(&written[0]).unwrap().to_rgba8(), export.picture);
-        assert_eq!(fs::read_to_string(&written[1]).unwrap(), export.table);
+        assert_eq!(fs::read_to_string(&written[1]).unwrap(), export.drawing);
+        assert_eq!(fs::read_to_string(&written[2]).unwrap(), export.table);
         fs::write(folder.path().join("blocked"), "").unwrap();
         let blocked = Machine { output: folder.path().join("blocked"), ..machine };
         assert!(blocked.write_panel(&export).unwrap_err().starts_with("cannot write"));

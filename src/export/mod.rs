@@ -24,9 +24,12 @@ pub use desktop::{Machine, is_session};
 pub use error::ExportError;
 pub use evaluation::{EvaluationOptions, EvaluationReport, evaluate};
 #[cfg(feature = "gui")]
-pub use picture::{PANEL_NAMES, PictureError, PictureOptions, Renderer, draw_panel, panel_names, png_bytes, write_png};
+pub use picture::{
+    PANEL_NAMES, PictureError, PictureOptions, Renderer, draw_panel, draw_panel_svg, panel_csv, panel_names, png_bytes,
+    write_csv, write_png, write_svg,
+};
 pub use recent_files::RecentFiles;
-pub use report::{ReportOptions, ReportPicture, write_report};
+pub use report::{ReportDrawing, ReportOptions, ReportPicture, write_report};
 pub use results::write_results;
 pub use run_files::{RunFileOptions, write_run};
 pub use structure::KnownLossSummary;

@@ -13,7 +13,7 @@ use super::error::ExportError;
 use crate::gui::headless::{self, HeadlessOptions};
 use crate::gui::offscreen::{Offscreen, OffscreenError};
 use crate::gui::theme::{Theme, ThemeName};
-use crate::gui::window::{PanelName, WindowState, alone_ui, window_ui};
+use crate::gui::window::{PanelName, WindowState, alone_ui, panel_table, window_ui};
 use crate::gui::{ImageSource, PanelContext, Playback, Selection};
 use crate::observability::SlidePosition;
 use crate::session::Recording;
@@ -125,6 +125,59 @@ pub fn draw_panel(
     images: &mut dyn ImageSource,
     options: &PictureOptions,
 ) -> Result<RgbaImage, PictureError> {
+    with_panel(name, recording, cursor_ns, images, options, |headless, ui| match options.renderer {
+        Renderer::Cpu => Ok(headless::draw(headless, ui)),
+        Renderer::Wgpu => Ok(Offscreen::open()?.draw(headless, ui)?),
+    })
+}
+
+/// The same panel as a drawing of lines and texts (SVG); images and the scene are embedded as they are painted.
+///
+/// `prefix` begins the names of its parts, so that several drawings can stand in one page; `title` says what it shows.
+pub fn draw_panel_svg(
+    name: &str,
+    recording: &Recording,
+    cursor_ns: i64,
+    images: &mut dyn ImageSource,
+    options: &PictureOptions,
+    [prefix, title]: [&str; 2],
+) -> Result<String, PictureError> {
+    with_panel(name, recording, cursor_ns, images, options, |headless, ui| {
+        Ok(headless::svg_of(headless, prefix, title, ui))
+    })
+}
+
+/// The numbers behind what a panel shows, comma separated; of the options only the slide matters.
+///
+/// # Errors
+/// For a name that no single panel has.
+pub fn panel_csv(
+    name: &str,
+    recording: &Recording,
+    cursor_ns: i64,
+    images: &mut dyn ImageSource,
+    options: &PictureOptions,
+) -> Result<String, PictureError> {
+    let panel = PanelName::ALL.into_iter().find(|known| known.as_str() == name);
+    let panel = panel.ok_or_else(|| PictureError::UnknownPanel { name: name.to_owned() })?;
+    let theme = Theme::of(options.theme);
+    let mut selection = Selection { slide: options.slide.clone(), ..Selection::default() };
+    let playback = Playback { playing: false, ..options.playback.clone() };
+    let (selection, commands) = (&mut selection, &mut Vec::new());
+    let ctx =
+        &mut PanelContext { recording, cursor_ns, playback: &playback, images, selection, theme: &theme, commands };
+    Ok(panel_table(panel, &mut WindowState::default(), ctx))
+}
+
+/// Hands the panel's interface to whoever draws it.
+fn with_panel<T>(
+    name: &str,
+    recording: &Recording,
+    cursor_ns: i64,
+    images: &mut dyn ImageSource,
+    options: &PictureOptions,
+    draw: impl FnOnce(HeadlessOptions, &mut dyn FnMut(&mut Ui)) -> Result<T, PictureError>,
+) -> Result<T, PictureError> {
     let panel = PanelName::ALL.into_iter().find(|known| known.as_str() == name);
     if panel.is_none() && name != WHOLE_WINDOW {
         return Err(PictureError::UnknownPanel { name: name.to_owned() });
@@ -146,12 +199,8 @@ pub fn draw_panel(
             None => window_ui(ui, &mut state, context),
         }
     };
-    let PictureOptions { size_px, pixels_per_point, theme, renderer, .. } = *options;
-    let options = HeadlessOptions { size_px, pixels_per_point, theme };
-    match renderer {
-        Renderer::Cpu => Ok(headless::draw(options, &mut ui)),
-        Renderer::Wgpu => Ok(Offscreen::open()?.draw(options, &mut ui)?),
-    }
+    let PictureOptions { size_px, pixels_per_point, theme, .. } = *options;
+    draw(HeadlessOptions { size_px, pixels_per_point, theme }, &mut ui)
 }
 
 fn check(options: &PictureOptions) -> Result<(), PictureError> {
@@ -176,7 +225,20 @@ pub fn png_bytes(picture: &RgbaImage) -> Result<Vec<u8>, PictureError> {
 
 /// Writes a picture as PNG, making its folder when it is missing.
 pub fn write_png(picture: &RgbaImage, path: &Path) -> Result<(), PictureError> {
-    let bytes = png_bytes(picture)?;
+    write_bytes(&png_bytes(picture)?, path)
+}
+
+/// Writes a drawing as SVG, making its folder when it is missing.
+pub fn write_svg(drawing: &str, path: &Path) -> Result<(), PictureError> {
+    write_bytes(drawing.as_bytes(), path)
+}
+
+/// Writes a table of comma-separated values, making its folder when it is missing.
+pub fn write_csv(table: &str, path: &Path) -> Result<(), PictureError> {
+    write_bytes(table.as_bytes(), path)
+}
+
+fn write_bytes(bytes: &[u8], path: &Path) -> Result<(), PictureError> {
     if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
         fs::create_dir_all(folder).map_err(ExportError::write(folder))?;
     }
@@ -206,6 +268,38 @@ mod tests {
             let back = image::load_from_memory(&bytes).unwrap().to_rgba8();
             assert_eq!([back.width(), back.height()], options.size_px);
             seen.push(bytes);
+        }
+    }
+
+    #[test]
+    fn every_panel_is_drawn_as_lines_and_texts_twice_alike() {
+        let recording = sample_recording();
+        let words = [
+            ("all", "Convergence"),
+            ("image", "tracked"),
+            ("scene", "Trajectory"),
+            ("convergence", "±3σ"),
+            ("rank", "informed rank over time"),
+            ("residuals", "reprojection RMS over time, px"),
+            ("timeline", "features"),
+        ];
+        for name in panel_names() {
+            for (theme, ground) in [(ThemeName::Light, "light"), (ThemeName::Dark, "dark"), (ThemeName::Print, "print")]
+            {
+                let options = PictureOptions { size_px: [1200, 800], theme, ..PictureOptions::default() };
+                let draw = || {
+                    let images = &mut sample_images();
+                    draw_panel_svg(name, &recording, 9_000_000_000, images, &options, ["p", "a & b"]).unwrap()
+                };
+                let svg = draw();
+                assert!(svg == draw(), "two drawings of '{name}' differ");
+                assert!(svg.starts_with("<svg xmlns") && svg.ends_with("</svg>\n"), "{name}, {ground}");
+                assert!(svg.contains("<title>a &amp; b</title>") && svg.contains("<text"), "{name}, {ground}");
+                assert!(svg.contains(r#"width="1200" height="800" viewBox="0 0 1200 800""#), "{name}, {ground}");
+                for (_, word) in words.iter().filter(|(panel, _)| panel == name) {
+                    assert!(svg.contains(word), "'{name}' does not say '{word}' as text");
+                }
+            }
         }
     }
 

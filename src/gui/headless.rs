@@ -2,10 +2,11 @@
 
 use std::convert::Infallible;
 
-use egui::{ClippedPrimitive, Color32, RawInput, Rect, TexturesDelta, Ui, Vec2, ViewportId, ViewportInfo};
+use egui::{ClippedPrimitive, Color32, FullOutput, RawInput, Rect, TexturesDelta, Ui, Vec2, ViewportId, ViewportInfo};
 use image::RgbaImage;
 
 use super::painter::Painter;
+use super::svg::{self, Textures};
 use super::theme::{Theme, ThemeName};
 
 /// Frames that run before the picture: layouts, scroll areas and plot bounds settle.
@@ -97,6 +98,12 @@ impl Headless {
 
     /// Runs one frame with input events.
     pub fn frame(&mut self, events: Vec<egui::Event>, ui: impl FnMut(&mut Ui)) -> Frame {
+        let output = self.run(events, ui);
+        let primitives = self.context.tessellate(output.shapes, output.pixels_per_point);
+        Frame { primitives, textures: output.textures_delta }
+    }
+
+    fn run(&mut self, events: Vec<egui::Event>, ui: impl FnMut(&mut Ui)) -> FullOutput {
         let scale = self.options.pixels_per_point;
         let size = Vec2::new(self.options.size_px[0] as f32, self.options.size_px[1] as f32) / scale;
         let viewport = ViewportInfo { native_pixels_per_point: Some(scale), ..ViewportInfo::default() };
@@ -110,9 +117,24 @@ impl Headless {
             ..RawInput::default()
         };
         self.frame_count += 1;
-        let output = self.context.run_ui(input, ui);
-        let primitives = self.context.tessellate(output.shapes, output.pixels_per_point);
-        Frame { primitives, textures: output.textures_delta }
+        self.context.run_ui(input, ui)
+    }
+
+    /// Runs the interface until it has settled and writes it as a drawing of lines and texts (SVG); see
+    /// [`svg_of`] for the words.
+    pub fn drawing(&mut self, prefix: &str, title: &str, mut ui: impl FnMut(&mut Ui)) -> String {
+        let mut textures = Textures::default();
+        let mut shapes = Vec::new();
+        for _ in 0..SETTLING_FRAMES {
+            let mut output = self.run(Vec::new(), &mut ui);
+            textures.set(&output.textures_delta);
+            textures.free(&output.textures_delta);
+            output.textures_delta.clear();
+            shapes = output.shapes;
+        }
+        let HeadlessOptions { size_px, pixels_per_point, theme } = self.options;
+        let size = Vec2::new(size_px[0] as f32, size_px[1] as f32) / pixels_per_point;
+        svg::document(&shapes, &textures, size, size_px, Theme::of(theme).background, prefix, title)
     }
 
     /// Runs the interface until it has settled and paints it over the theme's ground.
@@ -141,6 +163,13 @@ impl Headless {
 pub fn draw(options: HeadlessOptions, ui: impl FnMut(&mut Ui)) -> RgbaImage {
     let Ok(picture) = Headless::new(options).picture(&mut Painter::new(), ui);
     picture
+}
+
+/// A piece of user interface as a drawing of lines and texts (SVG).
+///
+/// `title` says what it shows; `prefix` begins the names of its parts, so that several drawings can stand in one page.
+pub fn svg_of(options: HeadlessOptions, prefix: &str, title: &str, ui: impl FnMut(&mut Ui)) -> String {
+    Headless::new(options).drawing(prefix, title, ui)
 }
 
 #[cfg(test)]

@@ -43,8 +43,16 @@ fn a_report_holds_everything_and_has_the_same_bytes_twice() {
     ] {
         assert!(page.contains(text), "'{text}' is missing");
     }
-    let pictures = page.matches("src=\"data:image/png;base64,iVBOR").count();
-    assert_eq!(pictures, if cfg!(feature = "gui") { 6 } else { 0 });
+    // Images and the scene are pixels, plots are lines and texts.
+    let pictures = [page.matches("src=\"data:image/png;base64,iVBOR").count(), page.matches("<figure><svg").count()];
+    assert_eq!(pictures, if cfg!(feature = "gui") { [2, 4] } else { [0, 0] });
+    assert_eq!(page.contains("informed rank over time, of 24"), cfg!(feature = "gui"), "plots hold their texts");
+    // What `check` finds about the log stands in it.
+    let findings = report["check"]["findings"].as_array().unwrap();
+    assert!(findings.len() > 5 && page.contains("The log and its rig"), "{findings:?}");
+    for finding in findings {
+        assert!(page.contains(finding["title"].as_str().unwrap()), "{finding}");
+    }
 
     // The numbers are those of the summaries, and the classical form is told to lose six columns.
     for (run, columns, lost) in [(0, 18, 0), (1, 24, 6)] {

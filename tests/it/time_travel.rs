@@ -156,3 +156,34 @@ fn the_solver_can_be_followed_through_a_step() {
     let state = recording.runs[0].step_at(session.cursor_ns()).expect("a step is shown");
     assert_eq!(bits(state), bits(&states[0]));
 }
+
+/// `screenshot` and `report` draw any instant of a long log, whose steps are kept in outline.
+#[cfg(feature = "gui")]
+#[test]
+fn pictures_of_any_instant_have_the_same_bytes_with_little_memory() {
+    use dcvins::export::{PANEL_NAMES, PictureOptions, draw_panel, panel_csv, png_bytes};
+    use dcvins::flight_log::ImageReader;
+
+    let whole = straight(&["auto", "classical"]);
+    let plan = plan(&["auto", "classical"], 0);
+    let mut little = session::compute(&plan, None, &mut |_| {}).expect("the runs start");
+    let stamps_ns: Vec<i64> = [16, 81, 100].map(|step| whole.runs[0].steps[step].report.stamp_ns).to_vec();
+    let outlined =
+        |stamp_ns: i64| little.runs.iter().all(|run| run.step_at(stamp_ns).is_some_and(|step| step.outlined));
+    assert!(stamps_ns.iter().all(|stamp_ns| outlined(*stamp_ns)));
+    let mut images = ImageReader::new(Arc::clone(&plan.log), &plan.rig);
+    let options = PictureOptions { size_px: [960, 720], ..PictureOptions::default() };
+    for stamp_ns in stamps_ns {
+        little.fill_in(stamp_ns);
+        for panel in PANEL_NAMES {
+            let mut drawn = |recording: &Recording| {
+                let picture = draw_panel(panel, recording, stamp_ns, &mut images, &options).expect("it is drawn");
+                let table = panel_csv(panel, recording, stamp_ns, &mut images, &options).ok();
+                (png_bytes(&picture).expect("it is encoded"), table)
+            };
+            let (whole, little) = (drawn(&whole), drawn(&little));
+            assert!(whole.0 == little.0, "'{panel}' at {stamp_ns} ns looks different with little memory");
+            assert_eq!(whole.1, little.1, "'{panel}' at {stamp_ns} ns");
+        }
+    }
+}

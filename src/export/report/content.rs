@@ -4,9 +4,11 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use super::ReportOptions;
 use super::inputs::InputFile;
 use super::story::{RankSpell, rank_story};
 use crate::export::summary::{RunSummary, log_name};
+use crate::flight_log::check::CheckReport;
 use crate::geometry::seconds_from_ns;
 use crate::session::{Recording, RunRecord};
 
@@ -55,6 +57,8 @@ pub(super) struct ReportContent {
     pub(super) inputs: Vec<InputFile>,
     /// The runs in the order of the command.
     pub(super) runs: Vec<RunContent>,
+    /// What was found about the whole log and its rig, as `check --json` prints it.
+    pub(super) check: Option<CheckReport>,
     /// What is wrong with the log.
     pub(super) log_warnings: Vec<String>,
 }
@@ -65,7 +69,7 @@ impl ReportContent {
         recording: &Recording,
         summaries: Vec<RunSummary>,
         inputs: Vec<InputFile>,
-        command: &str,
+        options: &ReportOptions,
     ) -> Self {
         let runs = recording.runs.iter().zip(summaries).map(|(run, summary)| {
             let (events, frequent_events) = events(run);
@@ -80,12 +84,13 @@ impl ReportContent {
         let warnings = recording.warnings.iter();
         Self {
             program: concat!("dcvins ", env!("CARGO_PKG_VERSION")),
-            command: command.to_owned(),
+            command: options.command.clone(),
             log: log_name(&recording.log_path),
             rig: recording.rig.name.clone(),
             duration_s: seconds_from_ns(recording.duration_ns),
             inputs,
             runs: runs.collect(),
+            check: options.check.clone(),
             log_warnings: warnings
                 .map(|warning| format!("{:.3} s: {}", seconds_from_ns(warning.stamp_ns), warning.message))
                 .collect(),

@@ -3,6 +3,8 @@
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 
+use super::ReportDrawing;
+
 /// Text as HTML.
 pub(super) fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
@@ -59,12 +61,16 @@ pub(super) fn table(caption: &str, header: &[&str], rows: &[Vec<String>]) -> Str
 }
 
 /// A picture within the page.
-pub(super) fn picture(caption: &str, png: &[u8]) -> String {
+pub(super) fn picture(caption: &str, drawing: &ReportDrawing) -> String {
     let caption = escape(caption);
-    format!(
-        "<figure><img alt=\"{caption}\" src=\"data:image/png;base64,{}\"><figcaption>{caption}</figcaption></figure>\n",
-        STANDARD.encode(png)
-    )
+    let shown = match drawing {
+        ReportDrawing::Png(png) => {
+            format!("<img alt=\"{caption}\" src=\"data:image/png;base64,{}\">", STANDARD.encode(png))
+        }
+        // Within HTML a drawing needs no name space, and then nothing in the page looks like an address.
+        ReportDrawing::Svg(svg) => svg.trim_end().replacen(" xmlns=\"http://www.w3.org/2000/svg\"", "", 1),
+    };
+    format!("<figure>{shown}<figcaption>{caption}</figcaption></figure>\n")
 }
 
 /// A number of the table with a true minus sign.
@@ -87,7 +93,10 @@ mod tests {
         assert!(!text.contains("<script>") && text.contains("&lt;script&gt;"), "{text}");
         assert!(text.contains("a &amp; b") && text.contains("&lt;name&gt;"), "{text}");
         assert!(text.contains("<td class=\"number\">-1</td>"), "{text}");
-        assert_eq!(picture("p", b"abc").matches("base64,YWJj").count(), 1);
+        assert_eq!(picture("p", &ReportDrawing::Png(b"abc".to_vec())).matches("base64,YWJj").count(), 1);
+        let svg = "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"1\"></svg>\n".to_owned();
+        let figure = picture("<p>", &ReportDrawing::Svg(svg));
+        assert_eq!(figure, "<figure><svg width=\"1\"></svg><figcaption>&lt;p&gt;</figcaption></figure>\n");
     }
 
     #[test]

@@ -18,6 +18,7 @@ use story::RankSpell;
 
 use super::error::ExportError;
 use super::run_files::{RunFileOptions, write_run};
+use crate::flight_log::check::CheckReport;
 use crate::session::Recording;
 
 /// A picture of a report.
@@ -27,12 +28,21 @@ pub struct ReportPicture {
     pub heading: String,
     /// What it shows.
     pub caption: String,
-    /// The PNG.
-    pub png: Vec<u8>,
+    /// What is shown.
+    pub drawing: ReportDrawing,
+}
+
+/// How a picture of a report is kept.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum ReportDrawing {
+    /// Pixels, for images and the scene.
+    Png(Vec<u8>),
+    /// Lines and texts, for plots; its names begin differently from those of the other pictures.
+    Svg(String),
 }
 
 /// What a report is told beside the recording.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct ReportOptions {
     /// The command that makes it, as typed.
     pub command: String,
@@ -40,6 +50,8 @@ pub struct ReportOptions {
     pub inputs: Vec<PathBuf>,
     /// Pictures in the order in which they are shown.
     pub pictures: Vec<ReportPicture>,
+    /// What `check` found about the whole log and its rig.
+    pub check: Option<CheckReport>,
 }
 
 /// Writes `report.html`, `report.json` and a folder for each run as `run --no-timing` does; returns the HTML's path.
@@ -54,7 +66,7 @@ pub fn write_report(recording: &Recording, folder: &Path, options: &ReportOption
         summaries.push(write_run(recording, run, folder, run_options)?.1);
     }
     let inputs = options.inputs.iter().map(|path| InputFile::read(path)).collect::<Result<Vec<_>, _>>()?;
-    let content = ReportContent::new(recording, summaries, inputs, &options.command);
+    let content = ReportContent::new(recording, summaries, inputs, options);
     let json_path = folder.join("report.json");
     let json = serde_json::to_string_pretty(&content)
         .map_err(|source| ExportError::Write { source: source.into(), path: json_path.clone() })?;

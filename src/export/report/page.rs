@@ -21,7 +21,7 @@ thead th { border-bottom: 1px solid #888; white-space: nowrap; }
 tbody th { font-weight: 600; }
 td.number { font-variant-numeric: tabular-nums; white-space: nowrap; }
 figure { margin: 0.8rem 0 1.4rem; }
-figure img { max-width: 100%; height: auto; border: 1px solid #ddd; }
+figure img, figure svg { display: block; max-width: 100%; height: auto; border: 1px solid #ddd; }
 figcaption { color: #444; font-size: 0.92em; }
 nav li { display: inline; margin-right: 1.2rem; }
 nav ul { padding: 0; }
@@ -31,7 +31,8 @@ nav ul { padding: 0; }
   nav { display: none; }
   h2, h3, caption { break-after: avoid; }
   figure, tr, pre { break-inside: avoid; }
-  figure img { max-height: 120mm; }
+  figure img, figure svg { max-height: 120mm; width: auto; }
+  thead { display: table-header-group; }
 }
 ";
 
@@ -48,8 +49,15 @@ pub(super) fn page(content: &ReportContent, pictures: &[ReportPicture]) -> Strin
     for (index, run) in content.runs.iter().enumerate() {
         body.push_str(&run_section(index, run));
     }
+    if content.check.is_some() || !content.log_warnings.is_empty() {
+        body.push_str("<h2 id=\"log\">The log and its rig</h2>\n");
+    }
+    if let Some(check) = &content.check {
+        body.push_str(&tables::findings(check));
+        body.push_str(&tables::topics(check));
+    }
     if !content.log_warnings.is_empty() {
-        body.push_str("<h2 id=\"log\">Warnings about the log</h2>\n");
+        body.push_str(&element("h3", "Warnings while it was read"));
         body.push_str(&list(&content.log_warnings));
     }
     body.push_str("<h2 id=\"origin\">Origin</h2>\n<p>This report was made by</p>\n");
@@ -90,6 +98,9 @@ fn contents(content: &ReportContent) -> String {
     for (index, run) in content.runs.iter().enumerate() {
         links.push(format!("<li><a href=\"#run-{index}\">{}</a></li>", escape(&run.label)));
     }
+    if content.check.is_some() || !content.log_warnings.is_empty() {
+        links.push("<li><a href=\"#log\">The log and its rig</a></li>".to_owned());
+    }
     links.push("<li><a href=\"#origin\">Origin</a></li>".to_owned());
     format!("<nav><ul>\n{}\n</ul></nav>\n", links.join("\n"))
 }
@@ -102,7 +113,7 @@ fn pictures_of(pictures: &[ReportPicture]) -> String {
             heading = &shown.heading;
             text.push_str(&element("h2", heading));
         }
-        text.push_str(&picture(&shown.caption, &shown.png));
+        text.push_str(&picture(&shown.caption, &shown.drawing));
     }
     text
 }

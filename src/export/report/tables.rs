@@ -1,8 +1,9 @@
 //! The tables of a report.
 
 use super::content::{ReportContent, RunContent};
-use super::html::{number, table};
+use super::html::{element, list, number, table};
 use crate::export::summary::ParameterSummary;
+use crate::flight_log::check::{CheckReport, Severity};
 
 /// Millimetres of a metre, for lengths that are shown.
 const MM_PER_M: f64 = 1e3;
@@ -120,6 +121,50 @@ pub(super) fn events(run: &RunContent) -> String {
         })
         .collect();
     table(&format!("Events of {}", run.label), &["at s", "event", "why", ""], &rows)
+}
+
+/// What `check` found about the log and its rig, worst first; what is in order is told in a sentence.
+pub(super) fn findings(check: &CheckReport) -> String {
+    let (good, others): (Vec<_>, Vec<_>) = check.findings.iter().partition(|found| found.severity == Severity::Good);
+    let rows: Vec<Vec<String>> = others
+        .iter()
+        .map(|found| {
+            let what = format!("{}: {}", found.title, found.evidence);
+            vec![found.severity.label().to_owned(), found.area.label().to_owned(), what, found.remedy.clone()]
+        })
+        .collect();
+    let mut text = String::new();
+    if rows.is_empty() {
+        text.push_str(&element("p", "Nothing is wrong with the log and its rig, as far as can be told beforehand."));
+    } else {
+        text.push_str(&table("Found in the whole log, before any estimation", &["", "about", "what", "remedy"], &rows));
+    }
+    let good: Vec<String> = good.iter().map(|found| format!("{}: {}", found.title, found.evidence)).collect();
+    if !good.is_empty() {
+        text.push_str(&element("p", "In order:"));
+        text.push_str(&list(&good));
+    }
+    text
+}
+
+/// What is in the log.
+pub(super) fn topics(check: &CheckReport) -> String {
+    let rows: Vec<Vec<String>> = check
+        .topics
+        .iter()
+        .map(|topic| {
+            vec![
+                topic.topic.clone(),
+                topic.schema.clone(),
+                topic.role.clone(),
+                topic.count.to_string(),
+                number(topic.rate_hz, 1),
+                format!("{} to {}", number(topic.first_s, 2), number(topic.last_s, 2)),
+                topic.latency_s.map_or_else(String::new, |latency_s| number(latency_s * MS_PER_S, 1)),
+            ]
+        })
+        .collect();
+    table("Topics", &["topic", "type", "used as", "messages", "Hz", "s", "late ms"], &rows)
 }
 
 /// What went in.

@@ -39,7 +39,7 @@ pub use self::fork::ForkDialog;
 pub use self::legend::RunLegend;
 pub use self::notices::{NoticeLevel, Notices};
 pub use self::palette::CommandPalette;
-pub use self::panel_export::{PanelExport, alone_ui};
+pub use self::panel_export::{PanelExport, alone_ui, panel_table};
 pub use self::panels::{PanelName, Panels};
 pub use self::progress::{Progress, ProgressMeter};
 pub use self::saved_layouts::SavedLayouts;

@@ -26,6 +26,8 @@ pub struct PanelExport {
     pub name: String,
     /// What the panel shows, drawn anew at twice the size.
     pub picture: RgbaImage,
+    /// The same as a drawing of lines and texts (SVG).
+    pub drawing: String,
     /// The numbers behind it, comma separated.
     pub table: String,
 }
@@ -51,16 +53,24 @@ pub(super) fn export(state: &WindowState, ctx: &mut PanelContext<'_>) -> PanelEx
     let mut selection = ctx.selection.clone();
     let images = &mut *ctx.images;
     let playback = Playback { playing: false, ..ctx.playback.clone() };
-    let picture = headless::draw(options, |ui| {
+    let mut draw_ui = |ui: &mut Ui| {
         // Nobody is there to carry out what a panel may ask for.
         let commands = &mut Vec::new();
         let (images, selection, playback) = (&mut *images, &mut selection, &playback);
         let context = &mut PanelContext { recording, cursor_ns, playback, images, selection, theme, commands };
         alone_ui(panel, ui, &mut copy, context);
-    });
+    };
+    let picture = headless::draw(options, &mut draw_ui);
+    let drawing = headless::svg_of(options, "clip", panel.as_str(), &mut draw_ui);
     let log = recording.log_path.file_stem().map_or_else(|| "log".into(), |stem| stem.to_string_lossy().into_owned());
     let name = format!("{log}/{}-{:.3}s", panel.as_str(), seconds_from_ns(cursor_ns));
-    PanelExport { name, picture, table: table_of(panel, &mut copy.panels, ctx) }
+    PanelExport { name, picture, drawing, table: table_of(panel, &mut copy.panels, ctx) }
+}
+
+/// The numbers behind what a panel shows, comma separated.
+pub fn panel_table(panel: PanelName, state: &mut WindowState, ctx: &mut PanelContext<'_>) -> String {
+    slide::update(ctx);
+    table_of(panel, &mut state.panels, ctx)
 }
 
 /// Draws a panel into all of `ui`.

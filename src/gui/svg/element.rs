@@ -1,0 +1,71 @@
+//! Small pieces of SVG.
+
+use std::fmt::Write as _;
+
+use egui::{Color32, Pos2, Stroke};
+
+/// A number with two decimals, without those that are zero.
+pub(super) fn number(value: f32) -> String {
+    if !value.is_finite() {
+        return "0".to_owned();
+    }
+    let text = format!("{value:.2}");
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if text == "-0" { "0".to_owned() } else { text.to_owned() }
+}
+
+/// An attribute with a number.
+pub(super) fn attribute(name: &str, value: f32) -> String {
+    format!(" {name}=\"{}\"", number(value))
+}
+
+/// A paint (`fill` or `stroke`) with its opacity.
+pub(super) fn paint(name: &str, color: Color32) -> String {
+    if color.a() == 0 {
+        return format!(" {name}=\"none\"");
+    }
+    let [red, green, blue, alpha] = color.to_srgba_unmultiplied();
+    let mut text = format!(" {name}=\"#{red:02x}{green:02x}{blue:02x}\"");
+    if alpha < u8::MAX {
+        let opacity = (f32::from(alpha) / 255.0 * 1e3).round() / 1e3;
+        write!(text, " {name}-opacity=\"{opacity}\"").expect("writing into a string cannot fail");
+    }
+    text
+}
+
+/// A stroke with its width, nothing when it is empty.
+pub(super) fn stroke(stroke: Stroke) -> String {
+    if stroke.is_empty() {
+        return String::new();
+    }
+    paint("stroke", stroke.color) + &attribute("stroke-width", stroke.width)
+}
+
+/// Moves to the first point and draws lines to the others.
+pub(super) fn lines_through(path: &mut String, points: &[Pos2], closed: bool) {
+    for (index, point) in points.iter().enumerate() {
+        path.push(if index == 0 { 'M' } else { 'L' });
+        path.push_str(&number(point.x));
+        path.push(' ');
+        path.push_str(&number(point.y));
+    }
+    if closed {
+        path.push('Z');
+    }
+}
+
+/// Text as XML; what XML cannot hold is left out.
+pub(super) fn escape(text: &str) -> String {
+    let mut escaped = String::with_capacity(text.len());
+    for letter in text.chars() {
+        match letter {
+            '&' => escaped.push_str("&amp;"),
+            '<' => escaped.push_str("&lt;"),
+            '>' => escaped.push_str("&gt;"),
+            '"' => escaped.push_str("&quot;"),
+            control if control < ' ' => {}
+            other => escaped.push(other),
+        }
+    }
+    escaped
+}

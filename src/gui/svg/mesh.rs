@@ -1,0 +1,74 @@
+//! Triangle meshes as areas of one colour each.
+
+use std::collections::BTreeSet;
+
+use egui::epaint::{Mesh, Vertex};
+use egui::{Color32, Pos2, Rect};
+
+use super::element::{lines_through, number, paint};
+
+/// A mesh without a texture; triangles in a row with the same colour become one path, so that no seams show.
+///
+/// A triangle whose corners differ in colour gets their mean.
+pub(super) fn mesh(text: &mut String, mesh: &Mesh) {
+    let mut color = Color32::TRANSPARENT;
+    let mut path = String::new();
+    let mut finish = |path: &mut String, color: Color32| {
+        if !path.is_empty() && color.a() > 0 {
+            text.push_str(&format!("<path d=\"{path}\"{}/>\n", paint("fill", color)));
+        }
+        path.clear();
+    };
+    let corner = |index: &u32| mesh.vertices.get(*index as usize);
+    let mut indices = mesh.indices.as_slice();
+    while let [first, second, third, rest @ ..] = indices {
+        indices = rest;
+        let [Some(a), Some(b), Some(c)] = [corner(first), corner(second), corner(third)] else { continue };
+        let shown = mean_color([a, b, c]);
+        if shown != color {
+            finish(&mut path, color);
+            color = shown;
+        }
+        let next = rest.first_chunk::<3>().filter(|next| {
+            let corners = next.iter().filter_map(corner);
+            corners.filter(|vertex| vertex.color == shown).count() == 3
+        });
+        if let Some(rect) = next.and_then(|next| quad(mesh, &[*first, *second, *third], next)) {
+            indices = &rest[3..];
+            let [left, top, right, bottom] = [rect.left(), rect.top(), rect.right(), rect.bottom()].map(number);
+            path.push_str(&format!("M{left} {top}H{right}V{bottom}H{left}Z"));
+        } else {
+            triangle(&mut path, [a.pos, b.pos, c.pos]);
+        }
+    }
+    finish(&mut path, color);
+}
+
+/// A triangle with its corners clockwise on the screen, so that triangles of one path never cancel each other.
+fn triangle(path: &mut String, [a, b, c]: [Pos2; 3]) {
+    let turns_right = (b - a).x * (c - a).y - (b - a).y * (c - a).x >= 0.0;
+    let corners = if turns_right { [a, b, c] } else { [a, c, b] };
+    lines_through(path, &corners, true);
+}
+
+fn mean_color(corners: [&Vertex; 3]) -> Color32 {
+    let channel = |of: fn(&Color32) -> u8| {
+        let sum: u32 = corners.iter().map(|vertex| u32::from(of(&vertex.color))).sum();
+        ((sum + 1) / 3) as u8
+    };
+    Color32::from_rgba_premultiplied(channel(Color32::r), channel(Color32::g), channel(Color32::b), channel(Color32::a))
+}
+
+/// The upright rectangle that two triangles make together.
+pub(super) fn quad(mesh: &Mesh, one: &[u32; 3], other: &[u32; 3]) -> Option<Rect> {
+    let corners: BTreeSet<u32> = one.iter().chain(other).copied().collect();
+    let shared = one.iter().filter(|index| other.contains(index)).count();
+    if corners.len() != 4 || shared != 2 {
+        return None;
+    }
+    let places: Vec<Pos2> =
+        corners.iter().map(|index| mesh.vertices.get(*index as usize).map(|it| it.pos)).collect::<Option<_>>()?;
+    let rect = Rect::from_points(&places);
+    let all = [rect.left_top(), rect.right_top(), rect.left_bottom(), rect.right_bottom()];
+    all.iter().all(|corner| places.contains(corner)).then_some(rect)
+}

@@ -1,0 +1,98 @@
+//! Laid-out text as text: every run of one colour and font on a row at its place, as wide as it was laid out.
+
+use egui::epaint::TextShape;
+use egui::epaint::text::{Glyph, LayoutSection};
+use egui::{Color32, FontFamily, Rect, pos2, vec2};
+
+use super::element::{attribute, escape, number, paint, stroke};
+
+/// One text with all its rows.
+pub(super) fn text(svg: &mut String, shape: &TextShape) {
+    let turned = shape.angle != 0.0;
+    if turned {
+        let [x, y] = [number(shape.pos.x), number(shape.pos.y)];
+        svg.push_str(&format!("<g transform=\"rotate({} {x} {y})\">\n", number(shape.angle.to_degrees())));
+    }
+    let job = &shape.galley.job;
+    let mut letters = job.text.char_indices().peekable();
+    for row in &shape.galley.rows {
+        let mut run: Vec<&Glyph> = Vec::new();
+        let mut section_of_run = None;
+        for glyph in &row.row.glyphs {
+            // Line breaks have no glyph; what stands for text that was cut off is in no section.
+            while letters.peek().is_some_and(|(_, letter)| *letter == '\n') {
+                letters.next();
+            }
+            let at = letters.next_if(|(_, letter)| *letter == glyph.chr).map(|(at, _)| at);
+            let section = at.and_then(|at| section_at(&job.sections, at)).or(section_of_run);
+            if section != section_of_run {
+                write_run(svg, shape, row.pos.to_vec2(), &run, section_of_run);
+                run.clear();
+                section_of_run = section;
+            }
+            run.push(glyph);
+        }
+        write_run(svg, shape, row.pos.to_vec2(), &run, section_of_run);
+    }
+    if turned {
+        svg.push_str("</g>\n");
+    }
+}
+
+fn section_at(sections: &[LayoutSection], at: usize) -> Option<&LayoutSection> {
+    sections.iter().rfind(|section| section.byte_range.start.0 <= at)
+}
+
+fn write_run(svg: &mut String, shape: &TextShape, row: egui::Vec2, run: &[&Glyph], section: Option<&LayoutSection>) {
+    let Some(format) = section.or_else(|| shape.galley.job.sections.first()).map(|section| &section.format) else {
+        return;
+    };
+    let offset = shape.pos.to_vec2() + row;
+    let opaque = |color: Color32| color.gamma_multiply(shape.opacity_factor);
+    if let (true, Some(first), Some(last)) = (format.background.a() > 0, run.first(), run.last()) {
+        let top = first.pos.y - first.font_ascent;
+        let corner = pos2(first.pos.x, top) + offset;
+        let size = vec2(last.pos.x + last.advance_width - first.pos.x, first.line_height);
+        let ground = Rect::from_min_size(corner, size);
+        let [x, y, width, height] = [ground.left(), ground.top(), ground.width(), ground.height()].map(number);
+        let fill = paint("fill", opaque(format.background));
+        svg.push_str(&format!("<rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\"{fill}/>\n"));
+    }
+    // Spaces at both ends only shift the text.
+    let begin = run.iter().position(|glyph| !glyph.chr.is_whitespace());
+    let end = run.iter().rposition(|glyph| !glyph.chr.is_whitespace());
+    let (Some(begin), Some(end)) = (begin, end) else { return };
+    let run = &run[begin..=end];
+    let [Some(first), Some(last)] = [run.first(), run.last()] else { return };
+    let color = match shape.override_text_color {
+        Some(color) => color,
+        None if format.color == Color32::PLACEHOLDER => shape.fallback_color,
+        None => format.color,
+    };
+    let family = match format.font_id.family {
+        FontFamily::Monospace => "Hack, 'DejaVu Sans Mono', Menlo, Consolas, monospace",
+        FontFamily::Proportional | FontFamily::Name(_) => "Ubuntu, 'DejaVu Sans', 'Segoe UI', sans-serif",
+    };
+    let at = first.pos + offset;
+    let width = last.pos.x + last.advance_width - first.pos.x;
+    svg.push_str("<text");
+    svg.push_str(&(attribute("x", at.x) + &attribute("y", at.y)));
+    svg.push_str(&format!(" font-family=\"{family}\""));
+    svg.push_str(&attribute("font-size", format.font_id.size));
+    if run.len() > 1 {
+        svg.push_str(&attribute("textLength", width));
+        svg.push_str(" lengthAdjust=\"spacingAndGlyphs\"");
+    }
+    if format.italics {
+        svg.push_str(" font-style=\"italic\"");
+    }
+    svg.push_str(&paint("fill", opaque(color)));
+    let letters: String = run.iter().map(|glyph| glyph.chr).collect();
+    svg.push_str(&format!(" xml:space=\"preserve\">{}</text>\n", escape(&letters)));
+    for (line, y) in [(format.underline, at.y + 2.0), (format.strikethrough, at.y - 0.3 * format.font_id.size)] {
+        if !line.is_empty() {
+            let [left, right, y] = [at.x, at.x + width, y].map(number);
+            svg.push_str(&format!("<path d=\"M{left} {y}H{right}\" fill=\"none\"{}/>\n", stroke(line)));
+        }
+    }
+}

@@ -1,0 +1,99 @@
+//! The pictures that shapes refer to.
+
+use std::collections::BTreeMap;
+use std::io::Cursor;
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use egui::epaint::{ImageData, ImageDelta};
+use egui::{Rect, TextureId, TexturesDelta};
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{ExtendedColorType, ImageEncoder as _};
+
+use super::element::number;
+
+/// Pixels of a texture, red, green, blue and alpha, not premultiplied.
+#[derive(Clone, Debug, Default)]
+struct Picture {
+    size: [usize; 2],
+    rgba: Vec<u8>,
+}
+
+/// All textures but the one with the letters.
+#[derive(Clone, Debug, Default)]
+pub(in crate::gui) struct Textures {
+    pictures: BTreeMap<TextureId, Picture>,
+}
+
+impl Textures {
+    /// Takes over new and changed textures.
+    pub(in crate::gui) fn set(&mut self, delta: &TexturesDelta) {
+        for (id, changes) in delta.set.iter().filter(|(id, _)| **id != TextureId::default()) {
+            let picture = self.pictures.entry(*id).or_default();
+            for change in changes {
+                picture.change(change);
+            }
+        }
+    }
+
+    /// Forgets the textures that the output frees.
+    pub(in crate::gui) fn free(&mut self, delta: &TexturesDelta) {
+        self.pictures.retain(|id, _| !delta.free.contains(id));
+    }
+
+    /// The part `uv` of a texture within a rectangle, nothing for an unknown texture.
+    pub(super) fn element(&self, id: TextureId, rect: Rect, uv: Rect) -> String {
+        let Some(picture) = self.pictures.get(&id).filter(|picture| !picture.rgba.is_empty()) else {
+            return String::new();
+        };
+        let Some(png) = picture.png() else { return String::new() };
+        let [width, height] = picture.size.map(|side| side as f32);
+        let view = [uv.left() * width, uv.top() * height, uv.width() * width, uv.height() * height].map(number);
+        let place = [rect.left(), rect.top(), rect.width(), rect.height()].map(number);
+        let [x, y, shown_width, shown_height] = place;
+        format!(
+            "<svg x=\"{x}\" y=\"{y}\" width=\"{shown_width}\" height=\"{shown_height}\" viewBox=\"{}\" \
+             preserveAspectRatio=\"none\"><image width=\"{width}\" height=\"{height}\" preserveAspectRatio=\"none\" \
+             href=\"data:image/png;base64,{}\"/></svg>\n",
+            view.join(" "),
+            STANDARD.encode(png)
+        )
+    }
+}
+
+impl Picture {
+    fn change(&mut self, delta: &ImageDelta) {
+        let ImageData::Color(image) = &delta.image;
+        let rgba: Vec<u8> = image.pixels.iter().flat_map(|pixel| pixel.to_srgba_unmultiplied()).collect();
+        let Some([left, top]) = delta.pos else {
+            *self = Self { size: image.size, rgba };
+            return;
+        };
+        let width = image.size[0].min(self.size[0].saturating_sub(left)) * 4;
+        for (row, pixels) in rgba.chunks_exact(image.size[0].max(1) * 4).enumerate() {
+            let begin = ((top + row) * self.size[0] + left) * 4;
+            if let Some(target) = self.rgba.get_mut(begin..begin + width) {
+                target.copy_from_slice(&pixels[..width]);
+            }
+        }
+    }
+
+    fn png(&self) -> Option<Vec<u8>> {
+        let mut bytes = Cursor::new(Vec::new());
+        let encoder = PngEncoder::new_with_quality(&mut bytes, CompressionType::Default, FilterType::Adaptive);
+        let [width, height] = self.size.map(|side| side as u32);
+        // Camera images and the scene are opaque.
+        let rgb: Vec<u8> = self.rgba.chunks_exact(4).flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
+        let opaque = self.rgba.chunks_exact(4).all(|pixel| pixel[3] == u8::MAX);
+        let gray = opaque && rgb.chunks_exact(3).all(|pixel| pixel[0] == pixel[1] && pixel[1] == pixel[2]);
+        let written = if gray {
+            let gray: Vec<u8> = rgb.iter().step_by(3).copied().collect();
+            encoder.write_image(&gray, width, height, ExtendedColorType::L8)
+        } else if opaque {
+            encoder.write_image(&rgb, width, height, ExtendedColorType::Rgb8)
+        } else {
+            encoder.write_image(&self.rgba, width, height, ExtendedColorType::Rgba8)
+        };
+        written.ok().map(|()| bytes.into_inner())
+    }
+}
