@@ -24,7 +24,7 @@ pub use self::canvas::SceneBackend;
 use self::chain::{ChainModel, ChainPose};
 use self::layout::lay_out;
 use self::overlay::LegendLine;
-use self::world::{RunView, WorldBuilder, WorldOptions, framing_points_m, ground_height_m};
+use self::world::{RunView, Trajectories, WorldBuilder, WorldOptions, framing_points_m, ground_height_m};
 use super::{PanelContext, slide};
 use crate::camera::CameraModel;
 use crate::flight_log::Rig;
@@ -66,6 +66,7 @@ pub struct ScenePanel {
     close_up: Option<Orbit>,
     world_canvas: Canvas,
     close_up_canvas: Canvas,
+    trajectories: Trajectories,
 }
 
 impl Default for ScenePanel {
@@ -80,6 +81,7 @@ impl Default for ScenePanel {
             close_up: None,
             world_canvas: Canvas::new("world"),
             close_up_canvas: Canvas::new("close-up"),
+            trajectories: Trajectories::default(),
         }
     }
 }
@@ -157,14 +159,11 @@ impl ScenePanel {
     ) {
         let theme = context.theme;
         let scale = ui.pixels_per_point();
-        let views: Vec<RunView<'_>> = context
-            .recording
-            .runs
-            .iter()
-            .enumerate()
-            .map(|(number, run)| RunView::new(number, run, context.cursor_ns))
-            .collect();
-        let points = framing_points_m(context.recording);
+        let places = self.trajectories.read(context.recording);
+        let runs = context.recording.runs.iter().zip(places).enumerate();
+        let views: Vec<RunView<'_>> =
+            runs.map(|(number, (run, places))| RunView::new(number, run, places, context.cursor_ns)).collect();
+        let points = framing_points_m(&views);
         // The key in the upper left corner: a line per run, the truth's, the landmarks'.
         let key = overlay::LINE_HEIGHT * (views.len() + 2) as f32;
         let viewport = world_viewport(area, close_up, key.min(0.22 * area.height()), scale);

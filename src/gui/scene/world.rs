@@ -12,6 +12,7 @@ use crate::camera::CameraModel;
 use crate::estimator::{FrameStateReport, LandmarkReport};
 use crate::flight_log::GrayImage;
 use crate::geometry::RigidTransform;
+use crate::gui::follow::{RunTables, StepTable};
 use crate::gui::theme::{Theme, mix};
 use crate::session::{Recording, RunRecord};
 
@@ -30,19 +31,50 @@ pub(super) struct WorldOptions {
     pub(super) image: bool,
 }
 
+/// Columns of a run's table: where the estimate is, then where the truth is; not-a-number where there is none.
+const PLACES: usize = 6;
+const ESTIMATE: usize = 0;
+const TRUTH: usize = 3;
+
+/// Where each run was and where the truth says it was, read step by step: a long recording is not gone through again for
+/// every picture.
+#[derive(Debug, Default)]
+pub(super) struct Trajectories {
+    tables: RunTables,
+}
+
+impl Trajectories {
+    /// Reads what is new; one table per run.
+    pub(super) fn read(&mut self, recording: &Recording) -> &[StepTable] {
+        self.tables.read::<PLACES>(&recording.runs, |step| {
+            let estimate = step.report.newest().map(|frame| frame.world_from_imu.translation_m);
+            let truth = step.truth.map(|pose| pose.translation_m);
+            let [estimate, truth] = [estimate, truth].map(|at| at.unwrap_or(Vector3::repeat(f64::NAN)));
+            [estimate.x, estimate.y, estimate.z, truth.x, truth.y, truth.z]
+        })
+    }
+}
+
 /// A run of the recording up to the cursor, laid on the truth.
 pub(super) struct RunView<'a> {
     pub(super) number: usize,
     pub(super) run: &'a RunRecord,
+    /// Of all its steps.
+    places: &'a StepTable,
     /// Steps at or before the cursor.
     shown: usize,
     aligned: RigidTransform,
 }
 
 impl<'a> RunView<'a> {
-    pub(super) fn new(number: usize, run: &'a RunRecord, cursor_ns: i64) -> Self {
-        let shown = run.steps.partition_point(|step| step.report.stamp_ns <= cursor_ns);
-        Self { number, run, shown, aligned: run.alignment.unwrap_or_default() }
+    pub(super) fn new(number: usize, run: &'a RunRecord, places: &'a StepTable, cursor_ns: i64) -> Self {
+        let shown = places.stamps_ns.partition_point(|stamp_ns| *stamp_ns <= cursor_ns);
+        Self { number, run, places, shown, aligned: run.alignment.unwrap_or_default() }
+    }
+
+    /// The same run with all its steps.
+    fn whole(&self) -> Self {
+        Self { shown: self.places.stamps_ns.len(), ..*self }
     }
 
     /// The step at the cursor.
@@ -69,41 +101,41 @@ impl<'a> RunView<'a> {
 
     /// Whether the log has a truth for this run up to the cursor.
     pub(super) fn has_truth(&self) -> bool {
-        self.run.steps[..self.shown].iter().any(|step| step.truth.is_some())
+        self.places.columns[TRUTH][..self.shown].iter().any(|x| x.is_finite())
     }
 
     /// Aligned positions, broken where the run did not track.
     fn trajectory_m(&self) -> Vec<Vec<Vector3<f64>>> {
-        let positions = |step: &Arc<crate::session::StepRecord>| {
-            step.report.newest().map(|frame| self.aligned.transform(&frame.world_from_imu.translation_m))
-        };
-        broken_line(&self.run.steps[..self.shown], positions)
+        broken_line(self.shown, |step| self.aligned.transform(&self.place(ESTIMATE, step)))
     }
 
     fn truth_m(&self) -> Vec<Vec<Vector3<f64>>> {
-        broken_line(&self.run.steps[..self.shown], |step| step.truth.map(|pose| pose.translation_m))
+        broken_line(self.shown, |step| self.place(TRUTH, step))
+    }
+
+    fn place(&self, column: usize, step: usize) -> Vector3<f64> {
+        let [x, y, z] = [0, 1, 2].map(|axis| self.places.columns[column + axis][step]);
+        Vector3::new(x, y, z)
     }
 }
 
-/// Positions of steps as lines; long ones are thinned by a power of two, so that what is drawn does not flicker.
-fn broken_line<T>(steps: &[T], position: impl Fn(&T) -> Option<Vector3<f64>>) -> Vec<Vec<Vector3<f64>>> {
+/// Positions of so many steps as lines, broken where they are not finite; long ones are thinned by a power of two, so that
+/// what is drawn does not flicker.
+fn broken_line(steps: usize, position: impl Fn(usize) -> Vector3<f64>) -> Vec<Vec<Vector3<f64>>> {
     let mut stride = 1;
-    while steps.len() / stride > MOST_TRAJECTORY_POINTS {
+    while steps / stride > MOST_TRAJECTORY_POINTS {
         stride *= 2;
     }
     let mut lines = vec![Vec::new()];
-    for (index, step) in steps.iter().enumerate() {
-        if !index.is_multiple_of(stride) && index + 1 != steps.len() {
-            continue;
-        }
-        match position(step).filter(|point| point.iter().all(|coordinate| coordinate.is_finite())) {
-            Some(point) => {
-                if let Some(line) = lines.last_mut() {
-                    line.push(point);
-                }
+    let last = steps.checked_sub(1).filter(|last| !last.is_multiple_of(stride));
+    for step in (0..steps).step_by(stride).chain(last) {
+        let point = position(step);
+        if !point.iter().all(|coordinate| coordinate.is_finite()) {
+            if lines.last().is_some_and(|line| !line.is_empty()) {
+                lines.push(Vec::new());
             }
-            None if lines.last().is_some_and(|line| !line.is_empty()) => lines.push(Vec::new()),
-            None => {}
+        } else if let Some(line) = lines.last_mut() {
+            line.push(point);
         }
     }
     lines.retain(|line| !line.is_empty());
@@ -111,17 +143,10 @@ fn broken_line<T>(steps: &[T], position: impl Fn(&T) -> Option<Vector3<f64>>) ->
 }
 
 /// Everything that a view of the flight must hold: all trajectories over the whole recording.
-pub(super) fn framing_points_m(recording: &Recording) -> Vec<Vector3<f64>> {
-    let mut points: Vec<Vector3<f64>> = recording
-        .runs
-        .iter()
-        .enumerate()
-        .flat_map(|(number, run)| {
-            let whole = RunView::new(number, run, i64::MAX);
-            whole.trajectory_m().into_iter().chain(whole.truth_m())
-        })
-        .flatten()
-        .collect();
+pub(super) fn framing_points_m(views: &[RunView<'_>]) -> Vec<Vector3<f64>> {
+    let whole = views.iter().map(RunView::whole);
+    let lines = whole.flat_map(|run| run.trajectory_m().into_iter().chain(run.truth_m()));
+    let mut points: Vec<Vector3<f64>> = lines.flatten().collect();
     if let Some((low, high)) = bounds(&points) {
         // Hover and a first second still get a view of some metres.
         let room = Vector3::new(1.0, 1.0, 0.5) * (1.5 - (high - low).norm()).max(0.0);

@@ -1,6 +1,8 @@
 //! Painting one lane after the other.
 
-use egui::{Align2, Color32, FontFamily, FontId, Painter, Rect, Stroke, pos2, vec2};
+use std::collections::BTreeSet;
+
+use egui::{Align2, Color32, FontFamily, FontId, Painter, Pos2, Rect, Stroke, pos2, vec2};
 
 use super::model::{FEATURES, INFORMED, RMS, RunLanes, STRUCTURAL};
 use crate::gui::PanelContext;
@@ -110,15 +112,31 @@ fn each_pixel(area: &PlotArea, stamps_ns: impl Iterator<Item = i64>, mut paint: 
     }
 }
 
+/// Where signs were painted already: of several that would cover each other to the pixel one is enough.
+#[derive(Default)]
+struct Covered {
+    places: BTreeSet<(i32, i32, u8)>,
+}
+
+impl Covered {
+    /// Whether a place is new; `kind` tells signs apart that must all be seen.
+    fn is_new(&mut self, place: Pos2, kind: u8) -> bool {
+        self.places.insert((place.x.round() as i32, place.y.round() as i32, kind))
+    }
+}
+
 /// Rare events as signs.
 pub(super) fn events(painter: &Painter, theme: &Theme, area: &PlotArea, runs: &[RunLanes]) {
+    let mut covered = Covered::default();
     for (number, lanes) in runs.iter().enumerate() {
         let rise = if runs.len() > 1 { number as f32 / (runs.len() - 1) as f32 - 0.5 } else { 0.0 };
         for event in &lanes.events {
             if (area.begin_ns..=area.end_ns).contains(&event.stamp_ns) {
                 let (mark, color) = look_of(event.kind, theme);
                 let center = pos2(area.x(event.stamp_ns), area.rect.center().y + rise * (area.rect.height() - 9.0));
-                paint_mark(painter, mark, center, 9.0, color);
+                if covered.is_new(center, event.kind as u8) {
+                    paint_mark(painter, mark, center, 9.0, color);
+                }
             }
         }
     }
@@ -181,23 +199,40 @@ pub(super) fn breakpoints(painter: &Painter, theme: &Theme, area: &PlotArea, ctx
 pub(super) fn outliers(painter: &Painter, theme: &Theme, area: &PlotArea, runs: &[RunLanes]) {
     let most = runs.iter().flat_map(|lanes| &lanes.rejected).map(|(_, count)| *count).max().unwrap_or(1);
     for (run, lanes) in runs.iter().enumerate() {
-        let color = theme.run(run).color;
-        for (stamp_ns, count) in &lanes.rejected {
-            if (area.begin_ns..=area.end_ns).contains(stamp_ns) {
-                let height = (area.rect.height() - 3.0) * *count as f32 / most as f32;
-                let (x, foot) = (area.x(*stamp_ns), area.rect.bottom() - 1.0);
-                painter.vline(x, foot - height..=foot, Stroke::new(1.0, color));
-            }
+        let line = Stroke::new(1.0, theme.run(run).color);
+        let foot = area.rect.bottom() - 1.0;
+        for (x, count) in highest_by_column(area, &lanes.rejected) {
+            let height = (area.rect.height() - 3.0) * count as f32 / most as f32;
+            painter.vline(x, foot - height..=foot, line);
         }
     }
+}
+
+/// The highest count of each pixel column in range, with where it is; stamps ascend.
+fn highest_by_column(area: &PlotArea, counts: &[(i64, usize)]) -> Vec<(f32, usize)> {
+    let mut columns: Vec<(f32, usize)> = Vec::new();
+    for (stamp_ns, count) in counts.iter().filter(|(at, _)| (area.begin_ns..=area.end_ns).contains(at)) {
+        let x = area.x(*stamp_ns);
+        match columns.last_mut() {
+            Some((open, most)) if open.floor() == x.floor() => {
+                if count > most {
+                    (*open, *most) = (x, *count);
+                }
+            }
+            _ => columns.push((x, *count)),
+        }
+    }
+    columns
 }
 
 /// Warnings of the log and of the steps.
 pub(super) fn warnings(painter: &Painter, theme: &Theme, area: &PlotArea, log_ns: &[i64], runs: &[RunLanes]) {
     let step_ns = runs.iter().flat_map(|lanes| &lanes.warnings).map(|(stamp_ns, _)| *stamp_ns);
-    let place = |stamp_ns: i64, mark: Mark, color: Color32| {
-        if (area.begin_ns..=area.end_ns).contains(&stamp_ns) {
-            paint_mark(painter, mark, pos2(area.x(stamp_ns), area.rect.center().y), 9.0, color);
+    let mut covered = Covered::default();
+    let mut place = |stamp_ns: i64, mark: Mark, color: Color32| {
+        let center = pos2(area.x(stamp_ns), area.rect.center().y);
+        if (area.begin_ns..=area.end_ns).contains(&stamp_ns) && covered.is_new(center, mark as u8) {
+            paint_mark(painter, mark, center, 9.0, color);
         }
     };
     for stamp_ns in step_ns {
@@ -221,4 +256,22 @@ pub(super) fn label(painter: &Painter, theme: &Theme, rect: Rect, name: &str, va
     let room = Rect::from_min_max(rect.min, pos2(right, rect.bottom()));
     let place = pos2(rect.left() + 2.0, rect.center().y - galley.size().y / 2.0);
     painter.with_clip_rect(room.intersect(painter.clip_rect())).galley(place, galley, color);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_lane_paints_no_more_signs_than_it_has_columns() {
+        let rect = Rect::from_min_max(pos2(0.0, 0.0), pos2(100.0, 20.0));
+        let area = PlotArea { rect, begin_ns: 0, end_ns: 12_000, low: 0.0, high: 1.0 };
+        let counts: Vec<(i64, usize)> = (0..12_000).map(|row| (row, if row == 4321 { 40 } else { 3 })).collect();
+        let columns = highest_by_column(&area, &counts);
+        assert!(columns.len() <= 101 && columns.is_sorted_by(|a, b| a.0.floor() < b.0.floor()));
+        assert_eq!(columns.iter().filter(|(x, count)| *count == 40 && (*x - 36.008).abs() < 0.01).count(), 1);
+        let mut covered = Covered::default();
+        assert!(covered.is_new(pos2(3.1, 5.0), 0) && covered.is_new(pos2(3.1, 5.0), 1));
+        assert!(!covered.is_new(pos2(3.2, 5.0), 0) && covered.is_new(pos2(4.0, 5.0), 0));
+    }
 }
