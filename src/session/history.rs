@@ -13,6 +13,17 @@ use super::run_engine::RunEngine;
 /// Steps between two snapshots while there is room for all of them.
 const CLOSEST_SPACING: usize = 16;
 
+/// How many snapshots of an estimator are kept.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SnapshotFigures {
+    /// Their number.
+    pub count: usize,
+    /// Bytes of all of them.
+    pub bytes: usize,
+    /// Steps from one to the next.
+    pub spacing: usize,
+}
+
 /// The way of one run; the recording and the threads share it.
 #[derive(Debug)]
 pub struct History {
@@ -91,6 +102,12 @@ impl History {
     /// Steps between two snapshots.
     pub(super) fn spacing(&self) -> usize {
         self.lock().spacing
+    }
+
+    /// The snapshots that are kept of this run's own steps.
+    pub fn snapshots(&self) -> SnapshotFigures {
+        let snapshots = self.lock();
+        SnapshotFigures { count: snapshots.kept.len(), bytes: snapshots.bytes, spacing: snapshots.spacing }
     }
 
     /// Bytes of snapshots and material.

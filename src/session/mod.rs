@@ -40,7 +40,7 @@ pub use command::{Command, PlaybackSpeed};
 pub use comparison::{Comparison, Parting, Quantity};
 pub use engine::EngineMessage;
 pub use forks::{FORK_PARAMETERIZATIONS, ForkChanges, ForkError};
-pub use history::History;
+pub use history::{History, SnapshotFigures};
 pub use image_rotations::image_rotations;
 pub use plan::{DEFAULT_MEMORY_BUDGET_BYTES, MAX_RUNS, SessionError, SessionPlan, SessionRequest};
 pub use playback::Session;

@@ -27,11 +27,11 @@ pub enum Preset {
 
 impl Preset {
     /// All of them, in the order of their keys 1 to 5.
-    pub(crate) const ALL: [Self; 5] =
+    pub const ALL: [Self; 5] =
         [Self::Overview, Self::Calibration, Self::FrontEnd, Self::Scene, Self::Comparison];
 
     /// Its name.
-    pub(crate) fn name(self) -> &'static str {
+    pub fn name(self) -> &'static str {
         match self {
             Self::Overview => "Overview",
             Self::Calibration => "Calibration",

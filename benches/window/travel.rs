@@ -1,0 +1,94 @@
+//! What is remembered of a log, and what it takes to go back in it.
+
+use std::time::Instant;
+
+use dcvins::export::Machine;
+use dcvins::geometry::SplitMix64;
+use dcvins::gui::desktop::Desktop as _;
+use dcvins::session::{Command, Session};
+
+use super::Table;
+use super::figures::{Times, kib, mib};
+use super::frames::Player;
+
+/// Steps back from each place.
+const STEPS_BACK: usize = 200;
+/// Jumps to any frame.
+const JUMPS: usize = 100;
+/// Steps of a run that are taken again from the snapshot before them.
+const RETAKEN: usize = 100;
+
+/// What the recording holds.
+pub(crate) fn memory(session: &Session) -> Table {
+    let recording = session.recording();
+    let budget = mib(recording.memory_budget_bytes);
+    let mut table = Table::new(format!("Memory, of {budget} that a recording may take"), &["what", "figure"]);
+    table.row("recording", [mib(recording.memory_bytes())]);
+    let process = Machine::new().resident_bytes();
+    table.row("whole process", [process.map_or_else(|| "not known".to_owned(), |bytes| mib(bytes as usize))]);
+    for run in &recording.runs {
+        let label = &run.spec.label;
+        let steps = run.steps.len().max(1);
+        let outlined = run.memory.outlined;
+        table.row(format!("{label}: steps, of them in outline"), [format!("{}, {outlined}", run.steps.len())]);
+        let whole: Vec<usize> = run.steps.iter().filter(|step| !step.outlined).map(|step| step.own_bytes()).collect();
+        let outlines: Vec<usize> = run.steps.iter().filter(|step| step.outlined).map(|step| step.own_bytes()).collect();
+        let mean = |bytes: &[usize]| kib(bytes.iter().sum::<usize>() / bytes.len().max(1));
+        table.row(format!("{label}: a whole step, an outline"), [format!("{}, {}", mean(&whole), mean(&outlines))]);
+        table.row(format!("{label}: tracks of a step"), [kib(run.memory.tracks / steps)]);
+        if let Some(history) = &run.history {
+            let snapshots = history.snapshots();
+            let each = kib(snapshots.bytes / snapshots.count.max(1));
+            let text = format!("{} of {each}, every {} steps", snapshots.count, snapshots.spacing);
+            table.row(format!("{label}: snapshots"), [text]);
+        }
+    }
+    table
+}
+
+/// Steps back and jumps, each until everything of the step is there, and until the window shows it.
+pub(crate) fn measure(session: &mut Session, player: &mut Player) -> Table {
+    let mut table = Table::new(
+        "Going back, in ms: until the whole step is there, until the window shows it",
+        &["what", "step p50", "p95", "largest", "picture p50", "p95", "largest"],
+    );
+    let recording = session.recording();
+    let Some(run) = recording.runs.first() else { return table };
+    let stamps_ns: Vec<i64> = run.steps.iter().map(|step| step.report.stamp_ns).collect();
+    if stamps_ns.is_empty() {
+        return table;
+    }
+    let mut go = |times: &mut [Times; 2], command: Command| {
+        let begin = Instant::now();
+        session.apply(command);
+        session.settle();
+        times[0].add(begin);
+        player.picture(&session.recording(), session.cursor_ns());
+        times[1].add(begin);
+    };
+    let cells = |times: &[Times; 2]| times.iter().flat_map(Times::cells).collect::<Vec<_>>();
+    for (name, place) in [("a frame back, from the end", stamps_ns.len() - 1), ("from the middle", stamps_ns.len() / 2)]
+    {
+        // How long it takes to get there is not asked here, and panels read a long recording once.
+        go(&mut <[Times; 2]>::default(), Command::Seek { stamp_ns: stamps_ns[place] });
+        let mut times = <[Times; 2]>::default();
+        for _ in 0..STEPS_BACK.min(place) {
+            go(&mut times, Command::StepFrames(-1));
+        }
+        table.row(name, cells(&times));
+    }
+    let mut random = SplitMix64::new(5);
+    let mut any = || (random.next_u64() % stamps_ns.len() as u64) as usize;
+    let mut times = <[Times; 2]>::default();
+    for _ in 0..JUMPS {
+        go(&mut times, Command::Seek { stamp_ns: stamps_ns[any()] });
+    }
+    table.row("a jump to any frame", cells(&times));
+    let mut times = Times::default();
+    for _ in 0..RETAKEN {
+        let step = any();
+        times.take(|| run.retake(step, 1));
+    }
+    table.row("a step taken again, whatever is kept of it", times.cells());
+    table
+}
