@@ -138,14 +138,35 @@ impl History {
     /// Takes the steps up to `last` again from the snapshot before it, and returns the last `most` of them with their
     /// numbers; empty for a step that has not been taken.
     pub(super) fn retake(&self, last: usize, most: usize) -> Vec<(usize, StepRecord)> {
+        self.retake_while(last, most, &|| true).unwrap_or_default()
+    }
+
+    /// The same as long as somebody wants it, else `None`.
+    pub(super) fn retake_while(
+        &self,
+        last: usize,
+        most: usize,
+        wanted: &dyn Fn() -> bool,
+    ) -> Option<Vec<(usize, StepRecord)>> {
         if last < self.begin {
-            return self.parent.as_ref().map_or_else(Vec::new, |parent| parent.retake(last, most));
+            return self.parent.as_ref().map_or_else(|| Some(Vec::new()), |it| it.retake_while(last, most, wanted));
         }
-        let Some((at, _)) = self.snapshot_before(last) else { return Vec::new() };
+        let Some((at, snapshot)) = self.snapshot_before(last) else { return Some(Vec::new()) };
         let first = (last + 1).saturating_sub(most.max(1)).max(at);
-        let Some(mut engine) = self.engine_before(first) else { return Vec::new() };
-        let materials = (first..=last).map_while(|step| Some((step, self.materials.get(step)?)));
-        materials.map(|(step, material)| (step, engine.step(&material))).collect()
+        let mut engine = RunEngine::clone(&snapshot);
+        let mut steps = Vec::new();
+        for number in at..=last {
+            let Some(material) = self.materials.get(number) else { break };
+            if !wanted() {
+                return None;
+            }
+            if number < first {
+                engine.pass(&material);
+            } else {
+                steps.push((number, engine.step(&material)));
+            }
+        }
+        Some(steps)
     }
 
     /// The states that the solver went through in a step, as reports of their own: before its first iteration, after it,

@@ -12,7 +12,7 @@ use super::forks::{ForkChanges, ForkError};
 use super::history::History;
 use super::plan::{MAX_RUNS, SessionError, SessionPlan, SessionRequest, cameras_of_run};
 use super::recording::{Recording, RunRecord};
-use super::retaking::{Detail, Retaking, Wish};
+use super::retaking::{Detail, Retaking, STEPS_AT_ONCE, Wish};
 use super::saved::Pending;
 use super::solver_trace::SolverPosition;
 use super::spec::{RunSpec, distinct_labels};
@@ -254,17 +254,26 @@ impl Session {
     fn look(&self) {
         let recording = self.recording();
         let solver = self.solver_position();
-        let mut wishes = Vec::new();
+        let (mut wishes, mut ahead) = (Vec::new(), Vec::new());
         for run in &recording.runs {
             let (Some(step), Some(history)) = (run.index_at(self.cursor_ns), &run.history) else { continue };
-            let wish = |detail| Wish { run: run.id, history: Arc::clone(history), step, detail };
+            let wish = |step, detail, ahead| Wish { run: run.id, history: Arc::clone(history), step, detail, ahead };
             if run.lacks(step) {
-                wishes.push(wish(Detail::Whole));
+                // Whoever plays needs the next steps too, and all of them take no longer than the last.
+                let end = step + if self.playing { STEPS_AT_ONCE } else { 1 };
+                let last = (step..end).take_while(|step| run.lacks(*step)).last().unwrap_or(step);
+                wishes.push(wish(last, Detail::Whole, false));
             }
             if solver.is_some() && run.trace.as_ref().is_none_or(|trace| trace.step != step) {
-                wishes.push(wish(Detail::Iterations));
+                wishes.push(wish(step, Detail::Iterations, false));
+            }
+            // People step back: what lies before is made ready while they look.
+            let before = (step.saturating_sub(STEPS_AT_ONCE)..step).rev().find(|step| run.lacks(*step));
+            if let Some(before) = before.filter(|_| !self.playing) {
+                ahead.push(wish(before, Detail::Whole, true));
             }
         }
+        wishes.extend(ahead);
         self.retaking.want(wishes);
         let stale = |run: &RunRecord| match (&run.trace, solver) {
             (None, _) => false,

@@ -8,8 +8,8 @@ use super::history::History;
 use super::plan::SessionError;
 use super::recording::StepRecord;
 
-/// Steps before a wanted one that are taken again with it, because people step back.
-const STEPS_AT_ONCE: usize = 32;
+/// Steps up to a wanted one that are taken again with it, because people step back.
+pub(super) const STEPS_AT_ONCE: usize = 32;
 
 /// What of a step is wanted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,6 +31,8 @@ pub(super) struct Wish {
     pub(super) step: usize,
     /// What of it.
     pub(super) detail: Detail,
+    /// Whether nobody looks at it yet: it is left when something else is wanted.
+    pub(super) ahead: bool,
 }
 
 impl PartialEq for Wish {
@@ -52,7 +54,22 @@ pub(super) enum Retaken {
 struct Queue {
     waiting: VecDeque<Wish>,
     working: Option<Wish>,
+    /// Whether what is being worked on is still wanted.
+    working_wanted: bool,
     closed: bool,
+}
+
+impl Queue {
+    /// Whether a wish that is being worked on is still wanted, and nobody waits for anything else.
+    fn is_wanted(&self, wish: &Wish) -> bool {
+        let looked_at = self.working.as_ref().is_some_and(|working| working == wish && !working.ahead);
+        let others = self.waiting.iter().any(|waiting| !waiting.ahead);
+        !self.closed && (looked_at || self.working_wanted && !others)
+    }
+
+    fn is_looked_for(&self) -> bool {
+        self.working.iter().chain(&self.waiting).any(|wish| !wish.ahead)
+    }
 }
 
 #[derive(Debug, Default)]
@@ -88,13 +105,19 @@ impl Retaking {
                     return;
                 }
                 queue.working = queue.waiting.pop_front();
+                queue.working_wanted = true;
                 let Some(wish) = queue.working.clone() else { continue };
                 drop(queue);
                 let retaken = match wish.detail {
-                    Detail::Whole => Retaken::Whole(wish.history.retake(wish.step, STEPS_AT_ONCE)),
-                    Detail::Iterations => Retaken::Iterations(wish.history.iterations(wish.step)),
+                    Detail::Whole => {
+                        let still_wanted = || !wish.ahead || seen.lock().is_wanted(&wish);
+                        wish.history.retake_while(wish.step, STEPS_AT_ONCE, &still_wanted).map(Retaken::Whole)
+                    }
+                    Detail::Iterations => Some(Retaken::Iterations(wish.history.iterations(wish.step))),
                 };
-                deliver(&wish, retaken);
+                if let Some(retaken) = retaken {
+                    deliver(&wish, retaken);
+                }
                 seen.lock().working = None;
                 seen.changed.notify_all();
             }
@@ -103,24 +126,34 @@ impl Retaking {
         Ok(Self { shared, thread: Some(thread.map_err(|source| SessionError::Thread { source })?) })
     }
 
-    /// From now on these are wanted, and nothing else.
+    /// From now on these are wanted, in this order, and nothing else.
     pub(super) fn want(&self, wishes: Vec<Wish>) {
         let mut queue = self.shared.lock();
-        queue.waiting = wishes.into_iter().filter(|wish| queue.working.as_ref() != Some(wish)).collect();
+        queue.waiting.clear();
+        let mut working_wanted = false;
+        for wish in wishes {
+            match &mut queue.working {
+                // What is made ready beforehand may have come to be looked at meanwhile.
+                Some(working) if *working == wish => {
+                    working.ahead = wish.ahead;
+                    working_wanted = true;
+                }
+                _ => queue.waiting.push_back(wish),
+            }
+        }
+        queue.working_wanted = working_wanted;
         drop(queue);
         self.shared.changed.notify_all();
     }
 
-    /// Waits until everything that was wanted has been handed over.
+    /// Waits until everything that somebody looks at has been handed over.
     pub(super) fn settle(&self) {
-        let busy = |queue: &mut Queue| !queue.closed && (queue.working.is_some() || !queue.waiting.is_empty());
-        drop(self.shared.changed.wait_while(self.shared.lock(), busy));
+        drop(self.shared.changed.wait_while(self.shared.lock(), |queue| !queue.closed && queue.is_looked_for()));
     }
 
-    /// Whether something is being taken again.
+    /// Whether something is being taken again that somebody looks at.
     pub(super) fn is_busy(&self) -> bool {
-        let queue = self.shared.lock();
-        queue.working.is_some() || !queue.waiting.is_empty()
+        self.shared.lock().is_looked_for()
     }
 }
 
@@ -131,5 +164,28 @@ impl Drop for Retaking {
         if let Some(thread) = self.thread.take() {
             drop(thread.join());
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_nobody_looks_at_yet_keeps_nobody_waiting() {
+        let history = Arc::new(History::new(0));
+        let wish = |step, ahead| Wish { run: 1, history: Arc::clone(&history), step, detail: Detail::Whole, ahead };
+        let mut queue = Queue { working: Some(wish(7, true)), working_wanted: true, ..Queue::default() };
+        assert!(!queue.is_looked_for() && queue.is_wanted(&wish(7, true)));
+        // Something else is looked at: the work ahead is left.
+        queue.waiting.push_back(wish(90, false));
+        assert!(queue.is_looked_for() && !queue.is_wanted(&wish(7, true)));
+        // The work ahead itself has come to be looked at.
+        let retaking =
+            Retaking { shared: Arc::new(Shared { queue: Mutex::new(queue), ..Shared::default() }), thread: None };
+        retaking.want(vec![wish(7, false), wish(3, true)]);
+        let queue = retaking.shared.lock();
+        assert!(queue.is_wanted(&wish(7, true)) && queue.is_looked_for());
+        assert_eq!(queue.waiting.iter().map(|wish| wish.step).collect::<Vec<_>>(), [3]);
     }
 }
