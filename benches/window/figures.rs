@@ -1,7 +1,8 @@
 //! Measured times as rows of a table.
 
 use std::fmt;
-use std::time::Instant;
+
+use dcvins::session::Stopwatch;
 
 /// Milliseconds of many goes at the same thing.
 #[derive(Default)]
@@ -12,15 +13,15 @@ pub(crate) struct Times {
 impl Times {
     /// Measures one go.
     pub(crate) fn take<T>(&mut self, work: impl FnOnce() -> T) -> T {
-        let begin = Instant::now();
+        let watch = Stopwatch::start();
         let result = work();
-        self.add(begin);
+        self.add(&watch);
         result
     }
 
-    /// Adds the time since an instant.
-    pub(crate) fn add(&mut self, begin: Instant) {
-        self.ms.push(begin.elapsed().as_secs_f64() * 1e3);
+    /// Adds what a stopwatch shows.
+    pub(crate) fn add(&mut self, watch: &Stopwatch) {
+        self.ms.push(watch.elapsed_ms());
     }
 
     /// Median, 95th percentile and largest, as cells.

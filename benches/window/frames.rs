@@ -43,7 +43,7 @@ impl Player {
     }
 
     /// The first image of a camera.
-    pub(crate) fn first_image(&mut self, camera_key: &str) -> Option<Arc<GrayImage>> {
+    pub(crate) fn first_image(&self, camera_key: &str) -> Option<Arc<GrayImage>> {
         self.images.image(camera_key, 0).ok()
     }
 

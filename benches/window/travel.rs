@@ -1,11 +1,9 @@
 //! What is remembered of a log, and what it takes to go back in it.
 
-use std::time::Instant;
-
 use dcvins::export::Machine;
 use dcvins::geometry::SplitMix64;
 use dcvins::gui::desktop::Desktop as _;
-use dcvins::session::{Command, Session};
+use dcvins::session::{Command, Session, Stopwatch};
 
 use super::Table;
 use super::figures::{Times, kib, mib};
@@ -59,12 +57,12 @@ pub(crate) fn measure(session: &mut Session, player: &mut Player) -> Table {
         return table;
     }
     let mut go = |times: &mut [Times; 2], command: Command| {
-        let begin = Instant::now();
+        let watch = Stopwatch::start();
         session.apply(command);
         session.settle();
-        times[0].add(begin);
+        times[0].add(&watch);
         player.picture(&session.recording(), session.cursor_ns());
-        times[1].add(begin);
+        times[1].add(&watch);
     };
     let cells = |times: &[Times; 2]| times.iter().flat_map(Times::cells).collect::<Vec<_>>();
     for (name, place) in [("a frame back, from the end", stamps_ns.len() - 1), ("from the middle", stamps_ns.len() / 2)]

@@ -49,7 +49,7 @@ impl Trajectories {
         self.tables.read::<PLACES>(&recording.runs, |step| {
             let estimate = step.report.newest().map(|frame| frame.world_from_imu.translation_m);
             let truth = step.truth.map(|pose| pose.translation_m);
-            let [estimate, truth] = [estimate, truth].map(|at| at.unwrap_or(Vector3::repeat(f64::NAN)));
+            let [estimate, truth] = [estimate, truth].map(|at| at.unwrap_or_else(|| Vector3::repeat(f64::NAN)));
             [estimate.x, estimate.y, estimate.z, truth.x, truth.y, truth.z]
         })
     }

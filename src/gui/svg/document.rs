@@ -3,7 +3,7 @@
 use egui::epaint::{BandShape, ClippedShape, ColorMode, PathShape, RectShape, Shape};
 use egui::{Color32, Pos2, Rect, Stroke, StrokeKind, TextureId, Vec2};
 
-use super::element::{attribute, escape, lines_through, number, paint, stroke};
+use super::element::{attribute, escape, lines_through, number, paint, put, stroke};
 use super::textures::Textures;
 use super::{mesh, text};
 
@@ -81,10 +81,13 @@ impl Writer<'_> {
         let mut text = "<defs>\n".to_owned();
         for (index, rect) in self.clips.iter().enumerate() {
             let [x, y, width, height] = [rect.left(), rect.top(), rect.width(), rect.height()].map(number);
-            text.push_str(&format!(
-                "<clipPath id=\"{}{index}\"><rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\"/></clipPath>\n",
-                self.prefix
-            ));
+            put(
+                &mut text,
+                format_args!(
+                    "<clipPath id=\"{}{index}\"><rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\"/></clipPath>\n",
+                    self.prefix
+                ),
+            );
         }
         text.push_str("</defs>\n");
         text
@@ -96,12 +99,12 @@ impl Writer<'_> {
         if known.is_none() {
             self.clips.push(rect);
         }
-        self.body.push_str(&format!("<g clip-path=\"url(#{}{index})\">\n", self.prefix));
+        put(&mut self.body, format_args!("<g clip-path=\"url(#{}{index})\">\n", self.prefix));
     }
 
     fn finish_lines(&mut self) {
         if let Some((line, path)) = self.lines.take() {
-            self.body.push_str(&format!("<path d=\"{path}\" fill=\"none\"{}/>\n", stroke(line)));
+            put(&mut self.body, format_args!("<path d=\"{path}\" fill=\"none\"{}/>\n", stroke(line)));
         }
     }
 
@@ -132,15 +135,15 @@ impl Writer<'_> {
         }
         match shape {
             Shape::Circle(circle) => {
-                let place = attribute("cx", circle.center.x) + &attribute("cy", circle.center.y);
-                let look = paint("fill", circle.fill) + &stroke(circle.stroke);
+                let place = [attribute("cx", circle.center.x), attribute("cy", circle.center.y)].concat();
+                let look = [paint("fill", circle.fill), stroke(circle.stroke)].concat();
                 self.element("circle", &format!("{place}{}{look}", attribute("r", circle.radius)));
             }
             Shape::Ellipse(ellipse) => {
                 let [x, y] = [number(ellipse.center.x), number(ellipse.center.y)];
-                let radii = attribute("rx", ellipse.radius.x) + &attribute("ry", ellipse.radius.y);
+                let radii = [attribute("rx", ellipse.radius.x), attribute("ry", ellipse.radius.y)].concat();
                 let turn = number(ellipse.angle.to_degrees());
-                let look = paint("fill", ellipse.fill) + &stroke(ellipse.stroke);
+                let look = [paint("fill", ellipse.fill), stroke(ellipse.stroke)].concat();
                 let rest = format!(" cx=\"{x}\" cy=\"{y}\"{radii} transform=\"rotate({turn} {x} {y})\"{look}");
                 self.element("ellipse", &rest);
             }
@@ -168,7 +171,7 @@ impl Writer<'_> {
     }
 
     fn element(&mut self, name: &str, attributes: &str) {
-        self.body.push_str(&format!("<{name}{attributes}/>\n"));
+        put(&mut self.body, format_args!("<{name}{attributes}/>\n"));
     }
 
     fn curve(&mut self, points: &[Pos2], closed: bool, fill: Color32, color: Color32, width: f32) {
@@ -219,7 +222,7 @@ impl Writer<'_> {
         attributes.push_str(&stroke(shape.stroke));
         if shape.angle != 0.0 {
             let [x, y] = [number(outline.center().x), number(outline.center().y)];
-            attributes.push_str(&format!(" transform=\"rotate({} {x} {y})\"", number(shape.angle.to_degrees())));
+            put(&mut attributes, format_args!(" transform=\"rotate({} {x} {y})\"", number(shape.angle.to_degrees())));
         }
         self.element("rect", &attributes);
     }

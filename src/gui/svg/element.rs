@@ -1,8 +1,13 @@
 //! Small pieces of SVG.
 
-use std::fmt::Write as _;
+use std::fmt::{Arguments, Write as _};
 
 use egui::{Color32, Pos2, Stroke};
+
+/// Writes behind what there is.
+pub(super) fn put(text: &mut String, piece: Arguments<'_>) {
+    text.write_fmt(piece).expect("writing into a string cannot fail");
+}
 
 /// A number with two decimals, without those that are zero.
 pub(super) fn number(value: f32) -> String {
@@ -28,7 +33,7 @@ pub(super) fn paint(name: &str, color: Color32) -> String {
     let mut text = format!(" {name}=\"#{red:02x}{green:02x}{blue:02x}\"");
     if alpha < u8::MAX {
         let opacity = (f32::from(alpha) / 255.0 * 1e3).round() / 1e3;
-        write!(text, " {name}-opacity=\"{opacity}\"").expect("writing into a string cannot fail");
+        put(&mut text, format_args!(" {name}-opacity=\"{opacity}\""));
     }
     text
 }
@@ -38,7 +43,7 @@ pub(super) fn stroke(stroke: Stroke) -> String {
     if stroke.is_empty() {
         return String::new();
     }
-    paint("stroke", stroke.color) + &attribute("stroke-width", stroke.width)
+    [paint("stroke", stroke.color), attribute("stroke-width", stroke.width)].concat()
 }
 
 /// Moves to the first point and draws lines to the others.

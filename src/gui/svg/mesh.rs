@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use egui::epaint::{Mesh, Vertex};
 use egui::{Color32, Pos2, Rect};
 
-use super::element::{lines_through, number, paint};
+use super::element::{lines_through, number, paint, put};
 
 /// A mesh without a texture; triangles in a row with the same colour become one path, so that no seams show.
 ///
@@ -15,7 +15,7 @@ pub(super) fn mesh(text: &mut String, mesh: &Mesh) {
     let mut path = String::new();
     let mut finish = |path: &mut String, color: Color32| {
         if !path.is_empty() && color.a() > 0 {
-            text.push_str(&format!("<path d=\"{path}\"{}/>\n", paint("fill", color)));
+            put(text, format_args!("<path d=\"{path}\"{}/>\n", paint("fill", color)));
         }
         path.clear();
     };
@@ -36,7 +36,7 @@ pub(super) fn mesh(text: &mut String, mesh: &Mesh) {
         if let Some(rect) = next.and_then(|next| quad(mesh, &[*first, *second, *third], next)) {
             indices = &rest[3..];
             let [left, top, right, bottom] = [rect.left(), rect.top(), rect.right(), rect.bottom()].map(number);
-            path.push_str(&format!("M{left} {top}H{right}V{bottom}H{left}Z"));
+            put(&mut path, format_args!("M{left} {top}H{right}V{bottom}H{left}Z"));
         } else {
             triangle(&mut path, [a.pos, b.pos, c.pos]);
         }

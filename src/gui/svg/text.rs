@@ -4,14 +4,14 @@ use egui::epaint::TextShape;
 use egui::epaint::text::{Glyph, LayoutSection};
 use egui::{Color32, FontFamily, Rect, pos2, vec2};
 
-use super::element::{attribute, escape, number, paint, stroke};
+use super::element::{attribute, escape, number, paint, put, stroke};
 
 /// One text with all its rows.
 pub(super) fn text(svg: &mut String, shape: &TextShape) {
     let turned = shape.angle != 0.0;
     if turned {
         let [x, y] = [number(shape.pos.x), number(shape.pos.y)];
-        svg.push_str(&format!("<g transform=\"rotate({} {x} {y})\">\n", number(shape.angle.to_degrees())));
+        put(svg, format_args!("<g transform=\"rotate({} {x} {y})\">\n", number(shape.angle.to_degrees())));
     }
     let job = &shape.galley.job;
     let mut letters = job.text.char_indices().peekable();
@@ -56,7 +56,7 @@ fn write_run(svg: &mut String, shape: &TextShape, row: egui::Vec2, run: &[&Glyph
         let ground = Rect::from_min_size(corner, size);
         let [x, y, width, height] = [ground.left(), ground.top(), ground.width(), ground.height()].map(number);
         let fill = paint("fill", opaque(format.background));
-        svg.push_str(&format!("<rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\"{fill}/>\n"));
+        put(svg, format_args!("<rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\"{fill}/>\n"));
     }
     // Spaces at both ends only shift the text.
     let begin = run.iter().position(|glyph| !glyph.chr.is_whitespace());
@@ -76,8 +76,9 @@ fn write_run(svg: &mut String, shape: &TextShape, row: egui::Vec2, run: &[&Glyph
     let at = first.pos + offset;
     let width = last.pos.x + last.advance_width - first.pos.x;
     svg.push_str("<text");
-    svg.push_str(&(attribute("x", at.x) + &attribute("y", at.y)));
-    svg.push_str(&format!(" font-family=\"{family}\""));
+    svg.push_str(&attribute("x", at.x));
+    svg.push_str(&attribute("y", at.y));
+    put(svg, format_args!(" font-family=\"{family}\""));
     svg.push_str(&attribute("font-size", format.font_id.size));
     if run.len() > 1 {
         svg.push_str(&attribute("textLength", width));
@@ -88,11 +89,11 @@ fn write_run(svg: &mut String, shape: &TextShape, row: egui::Vec2, run: &[&Glyph
     }
     svg.push_str(&paint("fill", opaque(color)));
     let letters: String = run.iter().map(|glyph| glyph.chr).collect();
-    svg.push_str(&format!(" xml:space=\"preserve\">{}</text>\n", escape(&letters)));
+    put(svg, format_args!(" xml:space=\"preserve\">{}</text>\n", escape(&letters)));
     for (line, y) in [(format.underline, at.y + 2.0), (format.strikethrough, at.y - 0.3 * format.font_id.size)] {
         if !line.is_empty() {
             let [left, right, y] = [at.x, at.x + width, y].map(number);
-            svg.push_str(&format!("<path d=\"M{left} {y}H{right}\" fill=\"none\"{}/>\n", stroke(line)));
+            put(svg, format_args!("<path d=\"M{left} {y}H{right}\" fill=\"none\"{}/>\n", stroke(line)));
         }
     }
 }
