@@ -4,9 +4,7 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use crate::geometry::{RigidTransform, so3};
-use crate::gimbal::{
-    Chain, ChainLinearization, ClassicalChain, Parameterization, generic_joint_angles, stacked_jacobian, transport,
-};
+use crate::gimbal::{Chain, ChainLinearization, ClassicalChain, NearestForm, Parameterization, transport};
 
 /// How wrong the given chain may be, as standard deviations of every number of its classical form.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,13 +27,6 @@ struct GivenChain {
 /// Standard deviation of a clock's offset beyond what the rig says, in seconds: transport and exposure delay an image by
 /// a frame's length at most.
 const CLOCK_SIGMA_S: f64 = 0.02;
-
-/// Joint angles per joint at which two forms of a mechanism are held against each other.
-const ANGLES_PER_JOINT: usize = 4;
-/// Rounds in which the nearest numbers of a mechanism are looked for; each squares what is missing.
-const NEAREST_ROUNDS: usize = 20;
-/// Forms that differ by less, in radians and metres, are the same mechanism.
-const NEAREST_GAP: f64 = 1e-11;
 
 /// Which clocks are compared with the inertial sensor's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -330,31 +321,7 @@ impl GivenChain {
     /// The classical form can say the same mechanism in many ways. Of them it takes the one nearest to the given numbers,
     /// in units of their deviations: at any other the rig's prior would pull.
     fn form_of(&self, mechanism: &Chain) -> Chain {
-        let exact = mechanism.in_parameterization(self.chain.parameterization());
-        if self.chain.parameterization() != Parameterization::Classical {
-            return exact;
-        }
-        let angles = generic_joint_angles(self.chain.joint_count(), ANGLES_PER_JOINT * (self.chain.joint_count() + 1));
-        let mut chain = self.chain.clone();
-        for _ in 0..NEAREST_ROUNDS {
-            let mut gap = DVector::zeros(6 * angles.len());
-            for (index, angles) in angles.iter().enumerate() {
-                let step = mechanism.imu_from_camera(angles).minus(&chain.imu_from_camera(angles));
-                gap.rows_mut(6 * index, 6).copy_from(&step);
-            }
-            if gap.amax() < NEAREST_GAP {
-                return chain;
-            }
-            let mut jacobian = stacked_jacobian(&chain, &angles);
-            for (mut column, sigma) in jacobian.column_iter_mut().zip(self.prior_sigmas.iter()) {
-                column *= *sigma;
-            }
-            let svd = jacobian.svd(true, true);
-            let least = 1e-9 * svd.singular_values.max();
-            let Ok(step) = svd.solve(&gap, least) else { return exact };
-            chain = chain.plus(&step.component_mul(&self.prior_sigmas));
-        }
-        exact
+        NearestForm::new(self.chain.clone(), &self.prior_sigmas).of(mechanism)
     }
 
     fn new(

@@ -13,6 +13,7 @@ mod covariance;
 mod frame;
 mod linearize;
 mod manifold;
+mod nearest;
 mod parameterization;
 mod redundancy;
 #[cfg(test)]
@@ -23,5 +24,6 @@ pub use chart::{SWITCH_MARGIN, auto_parameterization};
 pub use classical::{ClassicalChain, DhLink};
 pub use covariance::{generic_joint_angles, stacked_jacobian, transport, transport_covariance};
 pub use linearize::ChainLinearization;
+pub use nearest::NearestForm;
 pub use parameterization::{Parameterization, UnknownParameterization};
 pub use redundancy::redundant_directions;

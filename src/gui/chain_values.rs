@@ -3,15 +3,15 @@
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 
-use crate::gimbal::{Chain, ClassicalChain, Parameterization};
+use crate::gimbal::{Chain, ClassicalChain, NearestForm, Parameterization};
 use crate::session::{Recording, RunRecord};
 
 /// Values by parameter name.
 pub(crate) type NamedValues = BTreeMap<String, f64>;
 
-/// The values of a chain in a parameterization.
-pub(crate) fn named_values(classical: &ClassicalChain, parameterization: Parameterization) -> NamedValues {
-    let chain = Chain::from_classical(classical, parameterization);
+/// The values of a chain in a form.
+pub(crate) fn named_values(classical: &ClassicalChain, form: &NearestForm) -> NamedValues {
+    let chain = form.of(&Chain::from_classical(classical, Parameterization::Classical));
     chain.parameter_names().into_iter().zip(chain.values().iter().copied()).collect()
 }
 
@@ -20,7 +20,8 @@ pub(crate) fn named_values(classical: &ClassicalChain, parameterization: Paramet
 /// `None` when the truth is not known.
 pub(crate) fn true_values(recording: &Recording, run: &RunRecord, stamp_ns: i64) -> Option<NamedValues> {
     let calibration = &run.step_at(stamp_ns).or_else(|| run.steps.first())?.report.calibration;
-    let mut values: NamedValues = run.values_in(recording.truth_rig.as_ref()?, calibration)?.into_iter().collect();
+    let truth = recording.truth_rig.as_ref()?;
+    let mut values: NamedValues = run.values_in(truth, &recording.rig, calibration)?.into_iter().collect();
     let estimate: NamedValues = calibration.names.iter().cloned().zip(calibration.values.iter().copied()).collect();
     turn_towards(&mut values, &estimate);
     Some(values)

@@ -17,7 +17,7 @@ use crate::estimator::{CalibrationEstimate, StepReport, allocated_bytes, rigid_c
 use crate::flight_log::{LogWarning, Rig};
 use crate::frontend::TrackedFrame;
 use crate::geometry::RigidTransform;
-use crate::gimbal::Chain;
+use crate::gimbal::{Chain, NearestForm, Parameterization};
 use crate::observability::RankReport;
 
 /// One step of one run with what it was computed from.
@@ -260,9 +260,14 @@ impl RunRecord {
 
     /// What a rig says about the columns of the run's calibration, by name, in the parameterization of an estimate; `None`
     /// when the rig does not have the cameras.
-    pub fn values_in(&self, rig: &Rig, estimate: &CalibrationEstimate) -> Option<Vec<(String, f64)>> {
+    ///
+    /// Of the equivalent numbers of the classical form it takes those nearest to what `given` says, the rig that the run
+    /// began with: in those the run counts.
+    pub fn values_in(&self, rig: &Rig, given: &Rig, estimate: &CalibrationEstimate) -> Option<Vec<(String, f64)>> {
         let main = rig.chain_of_camera(&self.camera_key)?;
-        let chain = Chain::from_classical(&main, estimate.parameterization.parse().ok()?);
+        let parameterization = estimate.parameterization.parse().ok()?;
+        let form = self.form_in(given, estimate, parameterization)?;
+        let chain = form.of(&Chain::from_classical(&main, Parameterization::Classical));
         let mut values: Vec<_> = chain.parameter_names().into_iter().zip(chain.values().iter().copied()).collect();
         let mut clocks = vec![("timeshift".to_owned(), self.camera_key.as_str())];
         for (key, _) in &estimate.rigid_cameras {
@@ -273,6 +278,27 @@ impl RunRecord {
             values.push((name, rig.camera(key).ok()?.timeshift_cam_imu_s));
         }
         Some(values)
+    }
+
+    /// How mechanisms are said in a parameterization, with the numbers nearest to the rig's where there is a choice; the
+    /// prior deviations of the estimate weigh them where it is of that parameterization. `None` when the rig does not have
+    /// the camera.
+    pub fn form_in(
+        &self,
+        given: &Rig,
+        estimate: &CalibrationEstimate,
+        parameterization: Parameterization,
+    ) -> Option<NearestForm> {
+        let near = Chain::from_classical(&given.chain_of_camera(&self.camera_key)?, parameterization);
+        let names = near.parameter_names();
+        let scales = if estimate.names.starts_with(&names) {
+            estimate.prior_sigmas[..names.len()].to_vec()
+        } else {
+            // As in the rank rule: 10° weigh as much as 3 cm.
+            let scale = |unit: &str| if unit == "rad" { 10_f64.to_radians() } else { 0.03 };
+            near.parameter_units().into_iter().map(scale).collect()
+        };
+        Some(NearestForm::new(near, &scales.into()))
     }
 
     /// The last step at or before a time, as a cursor shows it.

@@ -94,7 +94,9 @@ impl ConvergencePanel {
         self.converted.resize_with(runs.len(), ConvertedHistory::default);
         for (run, converted) in self.converted.iter_mut().enumerate() {
             match target {
-                Some(target) if run != shown && chart(run) != chart(shown) => converted.read(&runs[run], target),
+                Some(target) if run != shown && chart(run) != chart(shown) => {
+                    converted.read(&runs[run], &ctx.recording.rig, target);
+                }
                 _ => *converted = ConvertedHistory::default(),
             }
         }

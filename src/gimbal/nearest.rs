@@ -1,0 +1,122 @@
+//! Of the many classical numbers that say the same mechanism, those nearest to given ones.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::geometry::dense;
+
+use super::{Chain, Parameterization, generic_joint_angles, stacked_jacobian};
+
+/// Joint angles per joint at which two forms of a mechanism are held against each other.
+const ANGLES_PER_JOINT: usize = 4;
+/// Rounds in which the nearest numbers are looked for; each leaves a share of what was missing as large as the mechanism
+/// is far from the given one, in radians.
+const ROUNDS: usize = 60;
+/// Forms that differ by less, in radians and metres, are the same mechanism.
+const GAP: f64 = 1e-11;
+/// Singular values below this share of the largest one belong to directions that move nothing.
+const REDUNDANT: f64 = 1e-9;
+
+/// Says mechanisms in one form, in its classical one with the numbers nearest to given ones.
+///
+/// The classical form can say the same mechanism in many ways (six directions of its columns move nothing), and a
+/// conversion picks one of them that has nothing to do with how the rig is written. The other forms say it in one way.
+#[derive(Clone, Debug)]
+pub struct NearestForm {
+    near: Chain,
+    angles: Vec<Vec<f64>>,
+    /// The shortest step of the columns, in units of their scales, for a gap of the poses; empty for other forms.
+    inverse: DMatrix<f64>,
+}
+
+impl NearestForm {
+    /// For mechanisms near `near`; `scales` are what 1 means in each of its columns, such as prior deviations.
+    pub fn new(near: Chain, scales: &DVector<f64>) -> Self {
+        let joints = near.joint_count();
+        let angles = generic_joint_angles(joints, ANGLES_PER_JOINT * (joints + 1));
+        let classical = near.parameterization() == Parameterization::Classical && scales.len() == near.dof();
+        let inverse = if classical { shortest(&near, &angles, scales) } else { DMatrix::zeros(0, 0) };
+        Self { near, angles, inverse }
+    }
+
+    /// A mechanism in the form; where no numbers are found near the given ones, as the conversion picks them.
+    pub fn of(&self, mechanism: &Chain) -> Chain {
+        let exact = mechanism.in_parameterization(self.near.parameterization());
+        if self.inverse.is_empty() {
+            return exact;
+        }
+        let wanted: Vec<_> = self.angles.iter().map(|angles| mechanism.imu_from_camera(angles)).collect();
+        let mut chain = self.near.clone();
+        for _ in 0..ROUNDS {
+            let mut gap = DVector::zeros(6 * self.angles.len());
+            for (index, (angles, wanted)) in self.angles.iter().zip(&wanted).enumerate() {
+                gap.rows_mut(6 * index, 6).copy_from(&wanted.minus(&chain.imu_from_camera(angles)));
+            }
+            let largest = gap.amax();
+            if largest < GAP {
+                return chain;
+            }
+            if !largest.is_finite() {
+                break;
+            }
+            chain = chain.plus(&(&self.inverse * gap));
+        }
+        exact
+    }
+}
+
+/// The pseudo-inverse of the chain's Jacobian with its columns scaled, back in the columns' units.
+fn shortest(chain: &Chain, angles: &[Vec<f64>], scales: &DVector<f64>) -> DMatrix<f64> {
+    let mut jacobian = stacked_jacobian(chain, angles);
+    for (mut column, scale) in jacobian.column_iter_mut().zip(scales) {
+        column *= *scale;
+    }
+    let Some(svd) = dense::thin_svd(&jacobian) else { return DMatrix::zeros(0, 0) };
+    let least = REDUNDANT * svd.singular_values.max();
+    let mut v = svd.v;
+    for (mut column, value) in v.column_iter_mut().zip(&svd.singular_values) {
+        column *= if *value > least { value.recip() } else { 0.0 };
+    }
+    let mut inverse = v * svd.u.transpose();
+    for (mut row, scale) in inverse.row_iter_mut().zip(scales) {
+        row *= *scale;
+    }
+    inverse
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gimbal::redundant_directions;
+    use crate::gimbal::tests::random::Random;
+
+    #[test]
+    fn the_nearest_numbers_say_the_same_mechanism_and_leave_out_what_moves_nothing() {
+        let mut random = Random::new(5);
+        for joints in 0..4 {
+            let near = Chain::from_classical(&random.chain(joints), Parameterization::Classical);
+            let scales = DVector::from_iterator(
+                near.dof(),
+                near.parameter_units().into_iter().map(|unit| if unit == "rad" { 0.17 } else { 0.03 }),
+            );
+            let form = NearestForm::new(near.clone(), &scales);
+            assert_eq!(form.of(&near), near);
+            let step = DVector::from_fn(near.dof(), |_, _| random.within(0.1)).component_mul(&scales);
+            let mechanism = near.plus(&step);
+            let nearest = form.of(&mechanism.in_parameterization(Parameterization::Minimal));
+            for angles in generic_joint_angles(joints, 5) {
+                let gap = nearest.imu_from_camera(&angles).minus(&mechanism.imu_from_camera(&angles));
+                assert!(gap.amax() < 1e-9, "{joints} joints: {gap}");
+            }
+            // Nothing of the way there is along a redundant direction, in units of the scales.
+            let way = nearest.minus(&near).component_div(&scales);
+            assert!(
+                way.norm() <= step.component_div(&scales).norm() * 1.02,
+                "{joints} joints: no longer than another way"
+            );
+            for direction in redundant_directions(&near.to_classical()).column_iter() {
+                let direction = direction.component_div(&scales).normalize();
+                assert!(direction.dot(&way).abs() < 0.05 * way.norm(), "{joints} joints: {}", direction.dot(&way));
+            }
+        }
+    }
+}
