@@ -29,6 +29,12 @@ pub struct Disturbances {
     /// From when and for how long the operator swings the gimbal's heading to and fro, 60° to each side, as fast as the
     /// motors follow (200°/s).
     pub gimbal_slew_s: Option<[f64; 2]>,
+    /// Which joint (from 1) is held where it is, from when and for how long.
+    pub held_joint: Option<[f64; 3]>,
+    /// From when and for how long the vehicle hovers, swaying by a centimetre, before it flies on.
+    pub hover_s: Option<[f64; 2]>,
+    /// From when and for how long the camera keeps its orientation in the world exactly, as far as the stops let it.
+    pub stabilized_s: Option<[f64; 2]>,
     /// From when and for how long the vehicle turns about the vertical, and how fast (in rad/s), beyond the limits that
     /// experiments keep to.
     pub spin: Option<[f64; 3]>,
@@ -42,7 +48,8 @@ pub(crate) const BLANK_GREY: f32 = 150.0;
 /// What [`Disturbances::set`] reads, for messages and help.
 const KEYS: &str = "camera-offset=S, joint-lag=S, joint-start=S, image-gap=START,LENGTH, exposure=S, \
                     gyroscope-range=RAD/S, accelerometer-range=M/S², light=START,FACTOR, blank=START,LENGTH, \
-                    slew=START,LENGTH or spin=START,LENGTH,RAD/S";
+                    slew=START,LENGTH, spin=START,LENGTH,RAD/S, hold-joint=NUMBER,START,LENGTH, hover=START,LENGTH or \
+                    stabilize=START,LENGTH";
 
 impl Disturbances {
     /// Adds one disturbance written as `KEY=VALUE[,VALUE…]`, in seconds and SI units, as on the command line.
@@ -61,6 +68,7 @@ impl Disturbances {
         let wants = |count: usize| bad(format!("'{key}' wants {count} numbers between commas, not {}", values.len()));
         let one = || <[f64; 1]>::try_from(values.as_slice()).map(|[value]| value).map_err(|_length| wants(1));
         let two = || <[f64; 2]>::try_from(values.as_slice()).map_err(|_length| wants(2));
+        let three = || <[f64; 3]>::try_from(values.as_slice()).map_err(|_length| wants(3));
         match key {
             "camera-offset" => self.camera_time_offset_s = one()?,
             "joint-lag" => self.joint_lag_s = one()?,
@@ -72,7 +80,10 @@ impl Disturbances {
             "light" => self.light_change = Some(two()?),
             "blank" => self.blank_s = Some(two()?),
             "slew" => self.gimbal_slew_s = Some(two()?),
-            "spin" => self.spin = Some(<[f64; 3]>::try_from(values.as_slice()).map_err(|_length| wants(3))?),
+            "spin" => self.spin = Some(three()?),
+            "hold-joint" => self.held_joint = Some(three()?),
+            "hover" => self.hover_s = Some(two()?),
+            "stabilize" => self.stabilized_s = Some(two()?),
             _ => return Err(unknown()),
         }
         Ok(())
@@ -91,6 +102,8 @@ impl Disturbances {
         within("range of the gyroscope in rad/s", self.gyroscope_range_rad_per_s.unwrap_or(1.0), 1e-3, 1e3)?;
         within("range of the accelerometer in m/s²", self.accelerometer_range_m_per_s2.unwrap_or(1.0), 1e-3, 1e4)?;
         within("factor of the light", self.light_change.map_or(1.0, |[_, factor]| factor), 0.01, 100.0)?;
+        within("number of the held joint", self.held_joint.map_or(1.0, |[joint, _, _]| joint), 1.0, 3.0)?;
+        within("length of the hover in seconds", self.hover_s.map_or(0.0, |[_, length]| length), 0.0, 3600.0)?;
         within("rate of the spin in rad/s", self.spin.map_or(0.0, |[_, _, rate]| rate), -6.0, 6.0)
     }
 

@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
+use super::disturbances::during;
 use super::exercise::Exercise;
 use super::random::RandomStream;
 use super::route::Wave;
@@ -59,6 +60,10 @@ pub(crate) struct LookAround {
     pub(crate) roll_rad: f64,
     /// From when and for how long the heading is swung to and fro as fast as the motors follow.
     pub(crate) slew_s: Option<[f64; 2]>,
+    /// Which joint is held where it is, from when and for how long.
+    pub(crate) held_joint: Option<(usize, [f64; 2])>,
+    /// From when and for how long the camera keeps its orientation in the world exactly.
+    pub(crate) stabilized_s: Option<[f64; 2]>,
     waves: [Wave; 3],
 }
 
@@ -70,6 +75,8 @@ impl LookAround {
             pitch_rad: pitch_deg.map(f64::to_radians),
             roll_rad: roll_deg.to_radians(),
             slew_s: None,
+            held_joint: None,
+            stabilized_s: None,
             waves: [Wave::new(random, 11.3), Wave::new(random, 9.1), Wave::new(random, 7.3)],
         }
     }
@@ -146,17 +153,30 @@ impl JointMotion {
         let mut angles = start_angles(trajectory, chain, look, followed_rad);
         let mut rates = [0.0; 3];
         let mut states = Vec::with_capacity(steps);
+        let mut kept: Option<UnitQuaternion<f64>> = None;
         for step in 0..steps {
             let time_s = step as f64 * CONTROL_STEP_S;
-            states.push((angles, rates));
             let vehicle = trajectory.at(time_s);
+            if during(look.stabilized_s, time_s) {
+                let rotation = vehicle.world_from_imu.rotation;
+                let wanted = kept.get_or_insert_with(|| rotation * chain.imu_from_camera(&angles).rotation);
+                let before = angles;
+                keep(&rotation, chain, joints, wanted, &mut angles);
+                rates = std::array::from_fn(|k| (angles[k] - before[k]) / CONTROL_STEP_S);
+            }
+            states.push((angles, rates));
             followed_rad += (vehicle.heading_rad - followed_rad) * (CONTROL_STEP_S / stabilizer.follow_s);
             let wanted = look.orientation(followed_rad, time_s);
             let asked = turn_towards(&vehicle.world_from_imu.rotation, chain, &angles, &wanted) * stabilizer.gain_per_s;
             let limit = stabilizer.rate_rad_per_s;
+            let held = look.held_joint.filter(|(_, stretch_s)| during(Some(*stretch_s), time_s));
+            if during(look.stabilized_s, time_s) {
+                continue;
+            }
             for k in 0..3 {
                 let (low, high) = joints[k].limits_rad;
-                rates[k] += (asked[k].clamp(-limit, limit) - rates[k]) * (CONTROL_STEP_S / stabilizer.motor_s);
+                let asked = if held.is_some_and(|(joint, _)| joint == k) { 0.0 } else { asked[k] };
+                rates[k] += (asked.clamp(-limit, limit) - rates[k]) * (CONTROL_STEP_S / stabilizer.motor_s);
                 // Braking ahead of a stop keeps the motion smooth up to it.
                 let brake_per_s = 20.0;
                 rates[k] = rates[k].clamp((low - angles[k]) * brake_per_s, (high - angles[k]) * brake_per_s);
@@ -218,6 +238,24 @@ fn turn_towards(
     // Damped, so that parallel axes ask for no infinite rate.
     let normal = axes.transpose() * axes + Matrix3::identity() * 1e-3;
     normal.try_inverse().map_or_else(Vector3::zeros, |inverse| inverse * (axes.transpose() * error))
+}
+
+/// Turns the joints so that the camera has an orientation in the world, as far as the stops let them.
+fn keep(
+    world_from_imu: &UnitQuaternion<f64>,
+    chain: &ClassicalChain,
+    joints: &[Joint],
+    wanted: &UnitQuaternion<f64>,
+    angles_rad: &mut [f64; 3],
+) {
+    const ROUNDS: usize = 8;
+    for _ in 0..ROUNDS {
+        let step = turn_towards(world_from_imu, chain, angles_rad, wanted);
+        for k in 0..3 {
+            let (low, high) = joints[k].limits_rad;
+            angles_rad[k] = (angles_rad[k] + step[k]).clamp(low, high);
+        }
+    }
 }
 
 /// The angles at which the gimbal already holds what is wanted when the log begins.

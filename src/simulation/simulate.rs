@@ -94,12 +94,20 @@ fn fly(options: &SimulationOptions, name: &str) -> Scenario {
         planned_s,
         gravity_m_per_s2(),
     );
+    if let Some(stretch_s) = options.disturbances.hover_s {
+        trajectory.hover(stretch_s);
+    }
     let end_s = options.duration_s.unwrap_or_else(|| trajectory.time_of_length(experiment.length_m()));
     if let Some([start_s, length_s, rate_rad_per_s]) = options.disturbances.spin {
         trajectory.spin([start_s, length_s], rate_rad_per_s);
     }
     let mut look = experiment.look_around(&mut random(stream::LOOK));
     look.slew_s = options.disturbances.gimbal_slew_s;
+    look.stabilized_s = options.disturbances.stabilized_s;
+    look.held_joint = options.disturbances.held_joint.map(|[joint, start_s, length_s]| {
+        // Checked to be 1 to 3.
+        (joint.round() as usize - 1, [start_s, length_s])
+    });
     let mut scenario = Scenario::new(
         trajectory.cut(end_s),
         &look,

@@ -137,6 +137,30 @@ impl Trajectory {
         }
     }
 
+    /// Hovers for a stretch of start and length in seconds, swaying by a centimetre; what comes later is flown later.
+    ///
+    /// A spline reaches three knots to either side of its points, so the vehicle slows down before and is at rest after.
+    pub(crate) fn hover(&mut self, [start_s, length_s]: [f64; 2]) {
+        const SWAY_M: f64 = 0.01;
+        const REACH: usize = 6;
+        let count = self.position_m.points.len();
+        let first = (0..count).find(|index| self.position_m.time_of_point(*index) >= start_s).unwrap_or(count);
+        let inserted = (length_s / self.position_m.knot_s).ceil() as usize + REACH;
+        let (Some(place), Some(heading)) =
+            (self.position_m.points.get(first).copied(), self.heading_rad.points.get(first).copied())
+        else {
+            return;
+        };
+        let sway = |index: usize| {
+            let phase = index as f64;
+            Vector3::new((2.1 * phase).sin(), (3.7 * phase + 1.0).sin(), (2.9 * phase + 2.0).sin()) * SWAY_M
+        };
+        self.position_m.points.splice(first..first, (0..inserted).map(|index| place + sway(index)));
+        self.heading_rad.points.splice(first..first, (0..inserted).map(|_| heading));
+        self.position_m.points.truncate(count);
+        self.heading_rad.points.truncate(count);
+    }
+
     /// How long the flight is.
     pub fn duration_s(&self) -> f64 {
         self.duration_s

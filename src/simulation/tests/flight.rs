@@ -16,6 +16,47 @@ pub(super) fn experiment_trajectory(experiment: Experiment, seed: u64, duration_
 }
 
 #[test]
+fn stretches_of_hover_of_a_held_joint_and_of_a_kept_camera_begin_and_end_when_told() {
+    let mut trajectory = experiment_trajectory(Experiment::T1, 3, 40.0);
+    let before = trajectory.clone();
+    trajectory.hover([10.0, 6.0]);
+    let speed = |time_s: f64| trajectory.at(time_s).velocity_m_per_s.norm();
+    assert_eq!(trajectory.at(5.0), before.at(5.0));
+    assert!((0..60).all(|tenth| speed(12.5 + 0.06 * f64::from(tenth)) < 0.1), "it hovers");
+    assert!((200..300).any(|tenth| speed(0.1 * f64::from(tenth)) > 1.5), "and flies on");
+
+    let chain = true_chain(&mut RandomStream::new(3, stream::RIG));
+    let mut look = Experiment::T1.look_around(&mut RandomStream::new(3, stream::LOOK));
+    look.held_joint = Some((1, [5.0, 4.0]));
+    let motion = JointMotion::fly(&before, &chain, &joints(), &look, &Stabilizer::default());
+    let spread = |joint: usize, from_s: f64, to_s: f64| {
+        let angles = (0..100).map(|step| motion.at(from_s + (to_s - from_s) * f64::from(step) / 100.0)[joint]);
+        let angles: Vec<f64> = angles.collect();
+        angles.iter().copied().fold(f64::MIN, f64::max) - angles.iter().copied().fold(f64::MAX, f64::min)
+    };
+    assert!(spread(1, 5.5, 9.0) < 1e-6 && spread(0, 5.5, 9.0) > 0.02 && spread(2, 5.5, 9.0) > 0.02);
+    assert!(spread(1, 9.0, 13.0) > 0.02);
+
+    look.held_joint = None;
+    look.stabilized_s = Some([5.0, 4.0]);
+    let motion = JointMotion::fly(&before, &chain, &joints(), &look, &Stabilizer::default());
+    let looks =
+        |time_s: f64| before.at(time_s).world_from_imu.rotation * chain.imu_from_camera(&motion.at(time_s)).rotation;
+    let turned = |time_s: f64| so3::log(&(looks(5.001).inverse() * looks(time_s))).norm();
+    let within = |time_s: f64| {
+        let angles = motion.at(time_s);
+        joints()
+            .iter()
+            .zip(angles)
+            .all(|(joint, angle)| angle > joint.limits_rad.0 + 1e-9 && angle < joint.limits_rad.1 - 1e-9)
+    };
+    let kept: Vec<f64> = (51..90).map(|tenth| 0.1 * f64::from(tenth)).filter(|time_s| within(*time_s)).collect();
+    assert!(kept.len() > 20, "{} instants clear of the stops", kept.len());
+    assert!(kept.iter().all(|time_s| turned(*time_s) < 1e-5), "the camera keeps its orientation");
+    assert!((95..130).any(|tenth| turned(0.1 * f64::from(tenth)) > 0.02), "and follows again");
+}
+
+#[test]
 fn spline_derivatives_meet_central_differences() {
     let mut random = RandomStream::new(4, 0);
     let points = (0..20).map(|_| SVector::<f64, 2>::new(random.normal(), random.normal())).collect();

@@ -105,7 +105,17 @@ fn impossible_options_are_refused_by_name() {
 #[test]
 fn disturbances_are_read_as_they_are_written_on_the_command_line() {
     let mut disturbances = Disturbances::default();
-    for text in ["camera-offset=0.01", "image-gap=3,0.5", "light=4,0.5", "blank=5,1.5", "slew=6,2", "spin=7,1,3.5"] {
+    for text in [
+        "camera-offset=0.01",
+        "image-gap=3,0.5",
+        "light=4,0.5",
+        "blank=5,1.5",
+        "slew=6,2",
+        "spin=7,1,3.5",
+        "hold-joint=2,8,1",
+        "hover=9,2",
+        "stabilize=12,2",
+    ] {
         disturbances.set(text).unwrap();
     }
     let expected = Disturbances {
@@ -115,6 +125,9 @@ fn disturbances_are_read_as_they_are_written_on_the_command_line() {
         blank_s: Some([5.0, 1.5]),
         gimbal_slew_s: Some([6.0, 2.0]),
         spin: Some([7.0, 1.0, 3.5]),
+        held_joint: Some([2.0, 8.0, 1.0]),
+        hover_s: Some([9.0, 2.0]),
+        stabilized_s: Some([12.0, 2.0]),
         ..Disturbances::default()
     };
     assert_eq!(disturbances, expected);
