@@ -102,6 +102,8 @@ pub struct GimbalRig {
     pub encoder_sigma_rad: Option<f64>,
     /// How wrong `chain` may be.
     pub prior: ChainPrior,
+    /// Whether runs in a minimal form go over to its other chart near a lock (`parameterization: auto`).
+    pub switches_chart: bool,
     /// The chain in the classical form (Eqs. 5–6), links in order.
     pub chain: ClassicalChain,
     /// The joints, one per link of `chain`.

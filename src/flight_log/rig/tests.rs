@@ -21,6 +21,7 @@ fn a_rig_survives_being_written() {
     odd.cameras[0].frame_id = "a \"frame\": #1".into();
     odd.gimbal.as_mut().unwrap().topic = None;
     odd.gimbal.as_mut().unwrap().encoder_sigma_rad = None;
+    odd.gimbal.as_mut().unwrap().switches_chart = true;
     let yaml = odd.to_yaml();
     assert!(yaml.contains("1.0e+22") && !yaml.contains("1e22"), "{yaml}");
     check_same(&odd, &parse(&yaml).unwrap());
@@ -87,6 +88,11 @@ fn a_wrong_field_is_named_with_what_it_holds() {
         ),
         ("rig_version: 1", "rig_version: 2", "rig_version: holds 2, expected the number 1"),
         ("encoder_sigma: 0.0087", "encoder_sigma: -1", "gimbal.encoder_sigma: holds -1, expected a standard deviation"),
+        (
+            "encoder_sigma: 0.0087",
+            "parameterization: classical",
+            "gimbal.parameterization: holds 'classical', expected auto, or nothing",
+        ),
         (
             "T_I_B: [[1, 0, 0, 0.1]",
             "T_I_B: [[1.1, 0, 0, 0.1]",

@@ -6,7 +6,7 @@ use super::columns::{RankColumn, columns_ui};
 use crate::gimbal::{Chain, Parameterization, SWITCH_MARGIN};
 use crate::gui::PanelContext;
 use crate::observability::RankReport;
-use crate::session::{Command, MAX_RUNS, RunRecord, RunSpec, StepRecord};
+use crate::session::{Command, MAX_RUNS, ParameterizationChoice, RunRecord, RunSpec, StepRecord};
 
 /// Width that a run needs, in points.
 pub(super) const WIDTH_OF_A_RUN: f32 = 300.0;
@@ -47,7 +47,7 @@ pub(in crate::gui) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>) {
 }
 
 /// How far a minimal run is from its chart's lock, and the other chart for the end where there is no such run yet.
-fn lock_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, number: usize, run: &RunRecord, step: &StepRecord) {
+pub(super) fn lock_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, number: usize, run: &RunRecord, step: &StepRecord) {
     let calibration = &step.report.calibration;
     let own = calibration.parameterization.parse::<Parameterization>().ok();
     let (own, other) = match own {
@@ -60,18 +60,23 @@ fn lock_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, number: usize, run: &RunReco
         chain.margins().into_iter().find(|(lock, _)| lock == "end").map(|(_, margin)| margin)
     };
     let (Some(here), Some(there)) = (margin_of(own), margin_of(other)) else { return };
+    let taken = ctx.recording.rig.gimbal.as_ref().is_some_and(|gimbal| gimbal.switches_chart);
+    let taken =
+        taken || matches!(run.spec.parameterization, ParameterizationChoice::Auto | ParameterizationChoice::Cluster);
     ui.horizontal_wrapped(|ui| {
         let color = if here < SWITCH_MARGIN { ctx.theme.error } else { ctx.theme.text };
         let text = format!(
-            "{}: {here:.2} from its own lock at the end (0 locked, 1 far away); as {other} it would be {there:.2}",
-            run.spec.label
+            "{}: {here:.2} from its own lock at the end (0 locked, 1 far away); as {other} it would be {there:.2}{}",
+            run.spec.label,
+            if taken { format!("; it goes over below {SWITCH_MARGIN:.2}") } else { String::new() }
         );
         ui.label(RichText::new(text).color(color));
         let is_there = ctx.recording.runs.iter().any(|run| {
             let newest = run.step_at(ctx.cursor_ns);
             newest.is_some_and(|step| step.report.calibration.parameterization == other.name())
         });
-        let spec = other.name().parse::<RunSpec>().ok().filter(|_| !is_there && ctx.recording.runs.len() < MAX_RUNS);
+        let spec =
+            other.name().parse::<RunSpec>().ok().filter(|_| !taken && !is_there && ctx.recording.runs.len() < MAX_RUNS);
         if let Some(spec) = spec {
             let spec = RunSpec { encoder: run.spec.encoder, calibrate: run.spec.calibrate, ..spec };
             let button = ui.small_button(format!("Add run {other}"));
