@@ -321,6 +321,7 @@ fn rank(result: &StageResult, visited_rad: &[Vec<f64>]) -> Option<RankReport> {
             .enumerate()
             .map(|(start, name)| ColumnBlock { group: ColumnGroup::Calibration, name, start, len: 1 })
             .collect(),
+        held: Vec::new(),
         calibration_column_norms: DVector::from_fn(count, |k, _| measured[(k, k)].max(0.0).sqrt()),
         jacobian: square_root(measured),
         prior_jacobian: square_root(priors),

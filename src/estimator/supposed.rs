@@ -132,7 +132,7 @@ impl SupposedWindow {
         let names = calibration.chain().parameter_names();
         let calibration = Calibrations::new(calibration, []);
         let estimate = Estimate { frames: states, calibration, landmarks: vec![landmarks] };
-        let whole = problem.linearization(&estimate, &names, &numbers);
+        let whole = problem.linearization(&estimate, &names, &numbers, None);
         keeping(&whole, |group| match (group, &self.poses, &self.joints) {
             (ColumnGroup::Joints, _, JointKnowledge::Known)
             | (ColumnGroup::Pose | ColumnGroup::SpeedBias, PoseKnowledge::Known, _) => 0,
@@ -224,6 +224,7 @@ fn keeping(whole: &Linearization, count: impl Fn(ColumnGroup) -> usize) -> Linea
     let select = |matrix: &DMatrix<f64>| matrix.select_columns(&kept);
     Linearization {
         columns,
+        held: whole.held.clone(),
         jacobian: select(&whole.jacobian),
         prior_jacobian: select(&whole.prior_jacobian),
         calibration_column_norms: whole.calibration_column_norms.clone(),

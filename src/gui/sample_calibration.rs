@@ -81,6 +81,7 @@ pub(crate) fn rank_at(names: &[String], index: usize) -> RankReport {
         .collect();
     RankReport {
         names: names.to_vec(),
+        held: Vec::new(),
         singular_values_with_priors: singular_values.iter().map(|value| (value * value + 1.0).sqrt()).collect(),
         singular_values,
         reference,

@@ -89,13 +89,16 @@ pub fn analyse_with_scaling<A: AsRef<[f64]>>(
         .map(|angles| angles.as_ref().to_vec())
         .filter(|angles| angles.len() == chain.joint_count())
         .collect();
-    let deficits = classify(chain, &angles, joints_free, columns, rank_structural);
+    let held = &linearization.held;
+    let deficits = classify(chain, &kept_columns(chain, held), &angles, joints_free, columns, rank_structural);
     let null_space = svd.v.columns(rank_structural, columns - rank_structural);
     let losses = known_losses(&linearization.chain, joints_free);
-    let known = compare(losses, &scale, &block, &null_space, reference, structural_threshold);
+    let kept = kept_columns(&linearization.chain, held);
+    let known = compare(losses, &kept, &scale, &block, &null_space, reference, structural_threshold);
     Some(RankReport {
         directions: weak_directions(&block, &svd.v, &singular_values, rank_structural, INFORMED_THRESHOLD),
         names,
+        held: held.clone(),
         singular_values,
         singular_values_with_priors: dense::singular_values(&with_priors)?,
         posterior: PackedFactor::new(&with_priors),
@@ -112,6 +115,12 @@ pub fn analyse_with_scaling<A: AsRef<[f64]>>(
         known,
         joint_count: chain.joint_count(),
     })
+}
+
+/// Places of the chain's columns that are not held.
+fn kept_columns(chain: &Chain, held: &[String]) -> Vec<usize> {
+    let names = chain.parameter_names().into_iter().enumerate();
+    names.filter(|(_, name)| !held.contains(name)).map(|(column, _)| column).collect()
 }
 
 /// What the measurements alone tell about the calibration, as the information of its columns in units of 10° and 3 cm;

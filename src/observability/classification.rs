@@ -24,9 +24,11 @@ pub(super) struct Deficits {
     pub(super) motion: usize,
 }
 
-/// Splits what `rank` lacks of `columns` into its causes, as differences of ranks of the chain's Jacobians.
+/// Splits what `rank` lacks of `columns` into its causes, as differences of ranks of the chain's Jacobians, of whose
+/// columns those at `kept` are unknown.
 pub(super) fn classify(
     chain: &Chain,
+    kept: &[usize],
     joint_angles_rad: &[Vec<f64>],
     joints_free: bool,
     columns: usize,
@@ -34,16 +36,16 @@ pub(super) fn classify(
 ) -> Deficits {
     let deficit = columns.saturating_sub(rank);
     let generic = generic_joint_angles(chain.joint_count(), 4 * (chain.joint_count() + 1));
-    let anywhere = scaled_stack(chain, &generic);
+    let anywhere = scaled_stack(chain, &generic).select_columns(kept);
     let values = singular_values(&anywhere);
     let anywhere = rank_above(&anywhere, &values, largest(&values));
     // Columns of other cameras are as many motions of their own.
-    let others = columns.saturating_sub(chain.dof());
+    let others = columns.saturating_sub(kept.len());
     let parameterization = columns.saturating_sub(anywhere + others).min(deficit);
     if joint_angles_rad.is_empty() {
         return Deficits { parameterization, joints: 0, absorbed: 0, motion: deficit - parameterization };
     }
-    let mut stack = scaled_stack(chain, joint_angles_rad);
+    let mut stack = scaled_stack(chain, joint_angles_rad).select_columns(kept);
     let values = singular_values(&stack);
     let reference = largest(&values);
     let here = rank_above(&stack, &values, reference).min(anywhere);

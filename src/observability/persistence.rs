@@ -42,6 +42,7 @@ mod tests {
     fn report(directions: &[[f64; 3]]) -> RankReport {
         RankReport {
             names: ["a", "b", "c"].map(str::to_owned).into(),
+            held: Vec::new(),
             singular_values: vec![3.0, 2.0, 0.1],
             singular_values_with_priors: vec![3.0, 2.0, 1.0],
             reference: 1.0,

@@ -6,6 +6,8 @@ use crate::estimator::allocated_bytes;
 pub struct RankReport {
     /// Names of the calibration columns.
     pub names: Vec<String>,
+    /// Names of the parameters that are held at their values: they are known, and take no part.
+    pub held: Vec<String>,
     /// Singular values of the prior-scaled, projected calibration columns, largest first, one per column.
     pub singular_values: Vec<f64>,
     /// Singular values with the priors kept in.
@@ -71,12 +73,13 @@ impl RankReport {
 
     /// Bytes that it takes on the heap.
     pub fn heap_bytes(&self) -> usize {
-        let texts = self.names.iter().chain(self.margins.iter().map(|(name, _)| name));
+        let texts = self.names.iter().chain(&self.held).chain(self.margins.iter().map(|(name, _)| name));
         let texts: usize = texts.map(|text| allocated_bytes(text.capacity())).sum();
         let weights = self.directions.iter().map(|direction| of_vec(&direction.weights)).sum::<usize>();
         texts
             + weights
             + of_vec(&self.names)
+            + of_vec(&self.held)
             + of_vec(&self.margins)
             + of_vec(&self.singular_values)
             + of_vec(&self.singular_values_with_priors)

@@ -45,9 +45,12 @@ const FARTHEST_PER_M: f64 = 1e-5;
 pub fn chain_of_step(report: &StepReport, rank: &RankReport) -> Option<Chain> {
     let parameterization = report.calibration.parameterization.parse().ok()?;
     let chain = Chain::from_classical(&report.calibration.classical, parameterization);
-    let whole = rank.names.starts_with(&chain.parameter_names());
-    let chain = if whole { chain } else { chain.without_joint_offsets() };
-    rank.names.starts_with(&chain.parameter_names()).then_some(chain)
+    let has = |chain: &Chain| {
+        let free: Vec<String> = chain.parameter_names().into_iter().filter(|name| !rank.held.contains(name)).collect();
+        rank.names.starts_with(&free)
+    };
+    let chain = if has(&chain) { chain } else { chain.without_joint_offsets() };
+    has(&chain).then_some(chain)
 }
 
 /// Moves the chain of a step along a scaled direction and predicts every feature of the window anew, poses held; each

@@ -69,7 +69,12 @@ impl SlideDirection {
     pub fn weights(&self, rank: &RankReport, chain: &Chain) -> Option<Vec<f64>> {
         let units = chain.parameter_units();
         match self {
-            Self::Measured(index) => rank.directions.get(*index)?.weights.get(..units.len()).map(<[f64]>::to_vec),
+            Self::Measured(index) => {
+                let weights = &rank.directions.get(*index)?.weights;
+                // A parameter that is held stays.
+                let weight = |name: &String| rank.names.iter().position(|known| known == name).map(|it| weights[it]);
+                Some(chain.parameter_names().iter().map(|name| weight(name).unwrap_or(0.0)).collect())
+            }
             Self::Named(name) => {
                 let mut known = known_losses(chain, true).into_iter();
                 if let Some((_, direction)) = known.find(|(loss, _)| loss.name() == *name) {

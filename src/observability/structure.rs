@@ -141,8 +141,11 @@ fn links(chain: &Chain, joints_free: bool, losses: &mut Vec<(KnownLoss, DVector<
 }
 
 /// Holds the known losses against the scaled, projected calibration block and the basis of its null space.
+///
+/// A direction that moves a parameter outside of `kept` is none: that one is held at its value.
 pub(super) fn compare(
     losses: Vec<(KnownLoss, DVector<f64>)>,
+    kept: &[usize],
     scale: &DVector<f64>,
     block: &DMatrix<f64>,
     null_space: &nalgebra::DMatrixView<'_, f64>,
@@ -151,8 +154,12 @@ pub(super) fn compare(
 ) -> Vec<KnownDirection> {
     losses
         .into_iter()
-        .filter(|(_, direction)| direction.len() <= scale.len())
+        .filter(|(_, direction)| {
+            let moves_held = (0..direction.len()).any(|column| direction[column] != 0.0 && !kept.contains(&column));
+            kept.len() <= scale.len() && !moves_held
+        })
         .map(|(loss, direction)| {
+            let direction = direction.select_rows(kept);
             // The chain's columns come first, those of other cameras behind them take no part.
             let direction = direction.resize_vertically(scale.len(), 0.0).component_div(scale).normalize();
             let response = (block * &direction).norm();

@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 
 use crate::estimator::rigid_columns;
-use crate::gimbal::Parameterization;
+use crate::flight_log::Rig;
+use crate::gimbal::{NearestForm, Parameterization};
 use crate::gui::chain_values::{NamedValues, named_values, turn_towards};
 use crate::gui::follow::Follower;
 use crate::observability::RankReport;
@@ -17,6 +18,8 @@ const LOST_SHARE: f64 = 0.25;
 pub(crate) enum Knowledge {
     /// The window informs it beyond the prior.
     Informed,
+    /// Held at its value.
+    Held,
     /// Too weakly seen in the window to beat the prior.
     Weak,
     /// Not seen at all: it lies in a structural null direction.
@@ -30,6 +33,7 @@ impl Knowledge {
     pub(crate) fn tag(self) -> &'static str {
         match self {
             Self::Informed => "",
+            Self::Held => "held",
             Self::Weak => "weak",
             Self::Unobservable => "unobservable",
             Self::Waiting => "waiting",
@@ -132,7 +136,7 @@ impl CalibrationHistory {
 #[derive(Debug, Default)]
 pub(crate) struct ConvertedHistory {
     follower: Follower,
-    target: Option<Parameterization>,
+    target: Option<(Parameterization, NearestForm)>,
     /// Stamps of the steps.
     pub(crate) stamps_ns: Vec<i64>,
     /// Values of the steps by parameter name.
@@ -145,14 +149,19 @@ pub(crate) struct ConvertedHistory {
 impl ConvertedHistory {
     /// Reads the steps that have come since the last call, or all when the parameterization is another one.
     ///
-    /// Before the estimator tracks, its calibration is the rig's: nothing to compare.
-    pub(crate) fn read(&mut self, run: &RunRecord, target: Parameterization) {
+    /// Before the estimator tracks, its calibration is the rig's: nothing to compare. Of the equivalent numbers of the
+    /// classical form those nearest to the rig's are told, as a classical run counts.
+    pub(crate) fn read(&mut self, run: &RunRecord, rig: &Rig, target: Parameterization) {
         const APART: u64 = 1 << 63;
-        if self.target != Some(target) {
+        if self.target.as_ref().is_none_or(|(known, _)| *known != target) {
             self.follower = Follower::default();
-            self.target = Some(target);
+            let estimate = run.steps.first().map(|first| &first.report.calibration);
+            let form = estimate.and_then(|estimate| run.form_in(rig, estimate, target));
+            self.target = form.map(|form| (target, form));
             self.forget();
         }
+        let Some((_, form)) = &self.target else { return };
+        let form = form.clone();
         let news = self.follower.news(run);
         if news.restarted {
             self.forget();
@@ -162,7 +171,7 @@ impl ConvertedHistory {
             let row = self.stamps_ns.len();
             self.stamps_ns.push(step.report.stamp_ns);
             let calibration = &step.report.calibration;
-            let mut values = named_values(&calibration.classical, target);
+            let mut values = named_values(&calibration.classical, &form);
             values.extend(calibration.rigid_cameras.iter().flat_map(|(key, pose)| rigid_columns(key, pose)));
             turn_towards(&mut values, &self.last);
             for (name, value) in &values {
@@ -207,7 +216,8 @@ pub(crate) fn knowledge(rank: Option<&RankReport>) -> Option<BTreeMap<&str, Know
             Knowledge::Informed
         }
     };
-    Some(rank.names.iter().enumerate().map(|(column, name)| (name.as_str(), verdict(column))).collect())
+    let held = rank.held.iter().map(|name| (name.as_str(), Knowledge::Held));
+    Some(rank.names.iter().enumerate().map(|(column, name)| (name.as_str(), verdict(column))).chain(held).collect())
 }
 
 #[cfg(test)]
@@ -237,7 +247,7 @@ mod tests {
     fn another_run_is_told_in_the_same_columns() {
         let recording = sample_recording_of(FIRST_TRACKED_FRAME + 30, &["auto", "classical"]);
         let mut converted = ConvertedHistory::default();
-        converted.read(&recording.runs[1], Parameterization::Minimal);
+        converted.read(&recording.runs[1], &recording.rig, Parameterization::Minimal);
         let mut own = CalibrationHistory::default();
         own.read(&recording.runs[0]);
         for (name, parameter) in &own.parameters {
@@ -245,7 +255,7 @@ mod tests {
             assert!((theirs - ours).abs() < 0.02, "{name}: {theirs} and {ours}");
         }
         let epoch = converted.epoch;
-        converted.read(&recording.runs[1], Parameterization::Classical);
+        converted.read(&recording.runs[1], &recording.rig, Parameterization::Classical);
         assert_ne!(converted.epoch, epoch);
         assert!(converted.values.contains_key("IB.rz"));
     }

@@ -252,7 +252,7 @@ fn state_color(theme: &theme::Theme, state: Knowledge) -> Color32 {
         Knowledge::Informed => theme.ok,
         Knowledge::Weak => theme.warn,
         Knowledge::Unobservable => theme.error,
-        Knowledge::Waiting => theme.text_weak,
+        Knowledge::Held | Knowledge::Waiting => theme.text_weak,
     }
 }
 

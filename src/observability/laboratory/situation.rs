@@ -39,6 +39,9 @@ pub struct Situation {
     pub distances_m: Vec<f64>,
 }
 
+/// Information about a parameter that is held, in units of 10° and 3 cm: a millionth of them.
+const KNOWN: f64 = 1e12;
+
 /// Where a scene is taken to be that has no landmarks yet, in metres.
 const UNKNOWN_DISTANCE_M: [f64; 3] = [4.0, 7.0, 12.0];
 
@@ -47,7 +50,9 @@ impl Situation {
     pub fn of_step(report: &StepReport, rank: &RankReport, rig: &Rig, camera_key: &str) -> Option<Self> {
         let newest = report.newest()?;
         let chain = chain_of_step(report, rank).filter(|_| rank.posterior.columns() == rank.names.len())?;
-        let information = marginal(rank.posterior.information(), chain.dof())?;
+        let free: Vec<bool> = chain.parameter_names().iter().map(|name| !rank.held.contains(name)).collect();
+        let count = free.iter().filter(|free| **free).count();
+        let information = spread(&marginal(rank.posterior.information(), count)?, &free);
         let sigma_of_joints = newest.encoder_sigmas_rad.as_ref().and_then(|sigmas| mean(sigmas));
         let position_m = (newest.world_from_imu * newest.imu_from_camera).translation_m;
         let mut distances_m: Vec<f64> =
@@ -131,6 +136,19 @@ fn marginal(information: DMatrix<f64>, count: usize) -> Option<DMatrix<f64>> {
     }
     let covariance = information.cholesky()?.inverse();
     Some(covariance.view((0, 0), (count, count)).into_owned().cholesky()?.inverse())
+}
+
+/// The information of all columns when only those marked were unknown: the others are known for good.
+fn spread(information: &DMatrix<f64>, free: &[bool]) -> DMatrix<f64> {
+    let mut places = vec![None; free.len()];
+    for (place, column) in (0..free.len()).filter(|column| free[*column]).enumerate() {
+        places[column] = Some(place);
+    }
+    DMatrix::from_fn(free.len(), free.len(), |row, column| match (places[row], places[column]) {
+        (Some(row), Some(column)) => information[(row, column)],
+        (None, None) if row == column => KNOWN,
+        _ => 0.0,
+    })
 }
 
 fn mean(values: &[f64]) -> Option<f64> {

@@ -49,6 +49,39 @@ fn reprojections_stay_while_the_chain_slides_along_a_redundant_direction() {
 }
 
 #[test]
+fn parameters_that_are_held_count_as_known() {
+    let flight = flight(Exercise { vehicle: VehicleSwing::Hover, joint: None }, 7);
+    let mut estimator = estimator(&flight.given_rig, Parameterization::Classical, true);
+    let (_, before) = fly(&mut estimator, &flight, -1.0, 4.0);
+    assert_eq!((before.names.len(), before.rank_structural, before.deficit_parameterization), (24, 18, 6));
+    let mut from_s = 4.0;
+    // Each takes one of the six redundant directions away; the columns that Eqs. 18–20 drop leave nothing to be lost.
+    let dropped = ["L1.d", "L1.theta", "L3.theta", "L3.d", "L3.a", "L3.alpha"];
+    for (count, name) in dropped.into_iter().enumerate() {
+        estimator.freeze(name).unwrap();
+        let (report, rank) = fly(&mut estimator, &flight, from_s, from_s + 0.2);
+        from_s += 0.2;
+        let lost = 5 - count;
+        assert_eq!((rank.names.len(), rank.rank_structural), (18 + lost, 18), "{name}");
+        assert_eq!(
+            (rank.deficit_parameterization, rank.known.len(), rank.known_agreeing()),
+            (lost, lost, lost),
+            "{name}"
+        );
+        assert!(rank.held.contains(&name.to_owned()) && !rank.names.contains(&name.to_owned()), "{name}");
+        assert_eq!(report.gain.as_ref().unwrap().columns(), rank.names.len(), "{name}");
+        // The chain still has all its columns; a held one does not slide.
+        let chain = chain_of_step(&report, &rank).unwrap();
+        assert_eq!(chain.dof(), 24, "{name}");
+        let place = chain.parameter_names().iter().position(|known| known == name).unwrap();
+        for direction in 0..rank.directions.len() {
+            let weights = SlideDirection::Measured(direction).weights(&rank, &chain).unwrap();
+            assert!(weights.len() == 24 && weights[place] == 0.0, "{name}");
+        }
+    }
+}
+
+#[test]
 fn free_joint_angles_follow_the_chain() {
     let (rank, moved) = moves(Parameterization::Classical, false);
     let absorbed = rank.names.iter().position(|name| name == "IB.rz");
