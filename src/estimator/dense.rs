@@ -3,6 +3,7 @@
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::qr::no_pivoting::factor::{qr_in_place, qr_in_place_scratch, recommended_block_size};
 use faer::linalg::solvers::Solve as _;
+use faer::linalg::triangular_solve::solve_upper_triangular_in_place;
 use faer::{Mat, MatMut, MatRef, Par, Side};
 use nalgebra::{DMatrix, DVector};
 
@@ -25,6 +26,19 @@ impl Cholesky {
         let rows = solution.len();
         self.0.solve_in_place(MatMut::from_column_major_slice_mut(solution.as_mut_slice(), rows, 1));
         solution
+    }
+
+    /// How the leading unknowns follow the last `count` ones, each of those moved by 1: `−A₁₁⁻¹ A₁₂`.
+    pub(super) fn leading_response(&self, count: usize) -> DMatrix<f64> {
+        let lower = self.0.L();
+        let first = lower.nrows() - count;
+        let mut response = DMatrix::from_fn(first, count, |row, column| -lower[(first + column, row)]);
+        solve_upper_triangular_in_place(
+            lower.submatrix(0, 0, first, first).transpose(),
+            MatMut::from_column_major_slice_mut(response.as_mut_slice(), first, count),
+            Par::Seq,
+        );
+        response
     }
 
     /// Covariance of the last `count` unknowns: `(L₂₂ L₂₂ᵀ)⁻¹`, the others marginalized.

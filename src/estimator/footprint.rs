@@ -72,7 +72,8 @@ impl StepReport {
             observations: self.features.iter().map(|feature| allocated_bytes(feature.observations.heap_bytes())).sum(),
             landmarks: of_vec(&self.landmarks),
             linearization,
-            jacobian: self.jacobian_source.as_ref().map_or(0, JacobianSource::heap_bytes),
+            jacobian: self.jacobian_source.as_ref().map_or(0, JacobianSource::heap_bytes)
+                + self.gain.as_ref().map_or(0, super::InformationGain::heap_bytes),
             other: size_of::<Self>()
                 + of_vec(&self.events)
                 + of_vec(&self.residuals)

@@ -5,25 +5,37 @@ use nalgebra::DVector;
 use super::calibrations::MAIN;
 use super::camera_pose::{self, CameraMaps};
 use super::estimator::Estimator;
+use super::gain::CameraInformation;
 use super::layout::Layout;
 use super::problem::{Estimate, Problem};
+use super::projection::NewestRows;
 use super::rows::stack_columns;
 use super::tracking::SolvedWindow;
-use super::{ColumnBlock, ColumnGroup, Linearization};
+use super::{ColumnBlock, ColumnGroup, InformationGain, Linearization};
 
 impl Estimator {
-    /// The linearization at the final estimate: the measurements' rows, and those of the priors.
-    pub(super) fn linearization(&self, solved: &SolvedWindow) -> Linearization {
+    /// The linearization at the final estimate: the measurements' rows, and those of the priors; and what the newest image
+    /// tells.
+    pub(super) fn linearization(&self, solved: &SolvedWindow) -> (Linearization, Option<InformationGain>) {
         let problem = self.problem(&solved.cameras);
         let numbers: Vec<usize> = self.frames.iter().map(|frame| frame.index).collect();
-        problem.linearization(&solved.solution.estimate, &self.calibration_names(), &numbers)
+        let estimate = &solved.solution.estimate;
+        let mut cameras = Vec::new();
+        let linearization = problem.linearization(estimate, &self.calibration_names(), &numbers, Some(&mut cameras));
+        (linearization, problem.information_gain(estimate, &cameras))
     }
 }
 
 impl Problem<'_> {
     /// The linearization of the whole window at an estimate; `names` are those of the calibration's columns, `numbers`
-    /// those of the frames.
-    pub(super) fn linearization(&self, estimate: &Estimate, names: &[String], numbers: &[usize]) -> Linearization {
+    /// those of the frames. What each camera has seen goes to `seen`, where that is asked for.
+    pub(super) fn linearization(
+        &self,
+        estimate: &Estimate,
+        names: &[String],
+        numbers: &[usize],
+        mut seen: Option<&mut Vec<CameraInformation>>,
+    ) -> Linearization {
         let layout = self.layout;
         let frames = self.linearization_frames(estimate);
         let calibration = self.linearization_calibration(&estimate.calibration);
@@ -32,19 +44,34 @@ impl Problem<'_> {
         for camera in 0..self.cameras.len() {
             let maps = CameraMaps::new(&frames, calibration.of(camera));
             let poses = camera_pose::by_slot(&frames, calibration.of(camera));
-            let projected = self.projected_rows(camera, estimate, &poses);
+            let apart = if seen.is_some() { NewestRows::Apart } else { NewestRows::Among };
+            let projected = self.projected_rows(camera, estimate, &poses, apart);
             measured.push(self.carried_rows(camera, &projected, &maps));
             let squared = projected.squared_column_norms(&maps.calibration);
             norms.extend(squared.iter().map(|squared| squared.max(0.0).sqrt()));
+            if let Some(seen) = &mut seen {
+                seen.push(CameraInformation::new(&projected, maps));
+            }
         }
         measured.extend((1..layout.frames).map(|slot| self.inertial_rows_at(slot, estimate, &frames)));
         measured.extend((0..layout.frames).map(|slot| self.encoder_rows(slot, estimate)));
         let rest: Vec<_> = self.rest_terms(&estimate.frames).collect();
         measured.push(self.rest_rows(&rest));
         let priors = [self.calibration_prior_rows(estimate), self.prior_rows(estimate)];
-        let order = column_order(&layout);
+        let frozen = estimate.calibration.frozen_columns();
+        let is_held = |column: usize| frozen.contains(&column);
+        let first = layout.calibration().start;
+        let order: Vec<usize> =
+            column_order(&layout).into_iter().filter(|column| *column < first || !is_held(column - first)).collect();
+        let of = |held: bool| {
+            let names = names.iter().enumerate().filter(move |(column, _)| is_held(*column) == held);
+            names.map(|(_, name)| name.clone()).collect::<Vec<_>>()
+        };
+        let free = |column: &usize| !is_held(*column);
+        let norms: Vec<f64> = (0..norms.len()).filter(free).map(|column| norms[column]).collect();
         Linearization {
-            columns: column_blocks(&layout, names, numbers),
+            columns: column_blocks(&layout, &of(false), numbers),
+            held: of(true),
             jacobian: stack_columns(&measured, order.iter().copied()),
             prior_jacobian: stack_columns(&priors, order.iter().copied()),
             calibration_column_norms: DVector::from_vec(norms),

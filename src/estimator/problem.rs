@@ -176,7 +176,12 @@ impl Problem<'_> {
 
     /// What standing still says about all frames.
     pub(super) fn rest_terms<'s>(&'s self, states: &'s [FrameState]) -> impl Iterator<Item = RestTerm> + 's {
-        self.frames.iter().enumerate().flat_map(move |(slot, frame)| {
+        self.rest_terms_of(states, self.frames.len())
+    }
+
+    /// What standing still says about the frames before `slots`.
+    fn rest_terms_of<'s>(&'s self, states: &'s [FrameState], slots: usize) -> impl Iterator<Item = RestTerm> + 's {
+        self.frames.iter().enumerate().take(slots).flat_map(move |(slot, frame)| {
             let mut terms = standstill::speed_terms(self.layout, frame, slot, &states[slot]);
             terms.extend(standstill::place_terms(self.layout, self.frames, slot, states));
             terms
@@ -207,17 +212,28 @@ impl Problem<'_> {
                 }
             })
             .collect();
+        let (hessian, gradient) = self.other_equations(estimate, &frames, self.frames.len());
+        NormalEquations { cameras, hessian, gradient }
+    }
 
+    /// The normal equations of everything that is not seen: of what was measured up to the frame before `slots`, and of the
+    /// priors; the derivatives by the frames are taken at `linearized`.
+    pub(super) fn other_equations(
+        &self,
+        estimate: &Estimate,
+        linearized: &[FrameState],
+        slots: usize,
+    ) -> (DMatrix<f64>, DVector<f64>) {
         let total = self.layout.total();
         let mut hessian = DMatrix::zeros(total, total);
         let mut gradient = DVector::zeros(total);
-        for slot in 1..self.frames.len() {
-            if let Some((by_from, by_to, residual)) = self.imu_rows(slot, estimate, &frames) {
+        for slot in 1..slots {
+            if let Some((by_from, by_to, residual)) = self.imu_rows(slot, estimate, linearized) {
                 self.add_imu(slot, &by_from, &by_to, &residual, &mut hessian, &mut gradient);
             }
         }
         let clock = self.encoder_clock_column(estimate);
-        for slot in 0..self.frames.len() {
+        for slot in 0..slots {
             let start = self.layout.joints(slot).start;
             for (joint, residual, slope) in self.encoder_residuals(slot, estimate) {
                 hessian[(start + joint, start + joint)] += slope * slope;
@@ -230,7 +246,7 @@ impl Problem<'_> {
                 }
             }
         }
-        for term in self.rest_terms(&estimate.frames) {
+        for term in self.rest_terms_of(&estimate.frames, slots) {
             let square = term.slope * term.slope;
             hessian[(term.column, term.column)] += square;
             gradient[term.column] += term.slope * term.residual;
@@ -261,7 +277,7 @@ impl Problem<'_> {
             let mut part = gradient.rows_range_mut(place);
             part += rows.tr_mul(&residual);
         }
-        NormalEquations { cameras, hessian, gradient }
+        (hessian, gradient)
     }
 
     /// Whitened Jacobians and residual of the inertial factor that ends at `slot`.

@@ -18,6 +18,9 @@ const POSE: usize = 6;
 pub(super) struct ProjectedRows {
     /// `[camera poses 6·frames | residual]`, compressed to its upper echelon factor.
     pub(super) rows: DMatrix<f64>,
+    /// What the sightings of the newest frame add to those of the others, of the same columns: their rows when the
+    /// landmarks were known from the others as far as those tell them. They are among `rows` already.
+    pub(super) newest_rows: DMatrix<f64>,
     /// `JᵀJ` of the camera poses before the landmarks were projected out.
     blocks: PoseBlocks,
 }
@@ -30,13 +33,16 @@ impl ProjectedRows {
         linearized: &[CameraPose],
         tracks: &[Track],
         landmarks: &[Landmark],
+        apart: NewestRows,
     ) -> Self {
         let frames = current.len();
+        let newest = frames.saturating_sub(1);
         let relative = RelativePoses::new(current);
         let relative_linearized = RelativePoses::new(linearized);
         let mut blocks = PoseBlocks::new(frames);
         let columns = POSE * frames + 1;
         let mut rows = Vec::new();
+        let mut newest_rows = Vec::new();
         let mut local = TrackRows::default();
         for (track, landmark) in tracks.iter().zip(landmarks) {
             let Some(anchor) = track.sightings.first().map(|first| first.slot) else { continue };
@@ -49,19 +55,35 @@ impl ProjectedRows {
                 }
                 local.push(sighting.slot, &term);
             }
-            local.project_out_landmark();
-            local.append_to(&mut rows, columns);
+            let seen_last = anchor != newest && local.slots.last() == Some(&newest);
+            if apart == NewestRows::Apart && seen_last {
+                local.project_out_landmark_apart();
+                local.append_to(&mut newest_rows, columns, local.used..local.used + local.added);
+            } else {
+                local.project_out_landmark(local.height());
+            }
+            local.append_to(&mut rows, columns, local.used..local.height());
         }
         let upper = dense::triangularize_rows(&rows, columns);
         // The last row of a full triangle holds nothing but the residual that no camera pose can change.
         let height = upper.nrows().min(POSE * frames);
-        Self { rows: upper.resize_vertically(height, 0.0), blocks }
+        let newest_rows = DMatrix::from_row_slice(newest_rows.len() / columns, columns, &newest_rows);
+        Self { rows: upper.resize_vertically(height, 0.0), newest_rows, blocks }
     }
 
     /// Sum of squares of the columns that move the cameras by `columns` (per slot 6 × n), before the projection.
     pub(super) fn squared_column_norms(&self, columns: &[DMatrix<f64>]) -> DVector<f64> {
         self.blocks.squared_norms(columns)
     }
+}
+
+/// Whether the rows that the newest frame adds are told apart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum NewestRows {
+    /// They are not asked for.
+    Among,
+    /// They are kept beside the others, too.
+    Apart,
 }
 
 /// The rows of one track, `[landmark 3 | anchor 6 | observers 6 each | residual]`: of the camera poses only those that
@@ -75,6 +97,8 @@ struct TrackRows {
     slots: Vec<usize>,
     /// Rows that the landmark still fills after the projection.
     used: usize,
+    /// Rows behind them that the last sighting adds to the others.
+    added: usize,
     reflector: Vec<f64>,
     products: Vec<f64>,
 }
@@ -86,7 +110,7 @@ impl TrackRows {
         self.slots.push(anchor);
         self.entries.clear();
         self.width = LANDMARK + POSE * sightings.max(1) + 1;
-        self.used = 0;
+        (self.used, self.added) = (0, 0);
     }
 
     fn height(&self) -> usize {
@@ -116,9 +140,24 @@ impl TrackRows {
         }
     }
 
-    /// Householder reflections that clear the landmark's columns below as many rows (fewer for dependent columns).
-    fn project_out_landmark(&mut self) {
-        let (height, width) = (self.height(), self.width);
+    /// Projects the landmark out of the rows before the last sighting first, and then out of what is left of it there
+    /// together with the last sighting.
+    fn project_out_landmark_apart(&mut self) {
+        const SIGHTING: usize = 2;
+        let older = self.height() - SIGHTING;
+        self.project_out_landmark(older);
+        let landmark = self.used;
+        // The last sighting goes right behind what is left of the landmark.
+        self.entries[landmark * self.width..].rotate_right(SIGHTING * self.width);
+        self.used = 0;
+        self.project_out_landmark(landmark + SIGHTING);
+        self.added = landmark + SIGHTING - self.used;
+    }
+
+    /// Householder reflections of the first `height` rows that clear the landmark's columns below as many rows (fewer for
+    /// dependent columns).
+    fn project_out_landmark(&mut self, height: usize) {
+        let width = self.width;
         for column in 0..LANDMARK {
             if self.used >= height {
                 break;
@@ -133,14 +172,14 @@ impl TrackRows {
             self.reflector.extend((self.used..height).map(entry));
             self.reflector[0] += if self.reflector[0] > 0.0 { tail } else { -tail };
             let factor = 2.0 / self.reflector.iter().map(|entry| entry * entry).sum::<f64>();
-            self.reflect(factor);
+            self.reflect(factor, height);
             self.used += 1;
         }
     }
 
-    /// `A ← A − factor·v·(vᵀA)` on the rows from `used` on.
-    fn reflect(&mut self, factor: f64) {
-        let rows = &mut self.entries[self.used * self.width..];
+    /// `A ← A − factor·v·(vᵀA)` on the rows from `used` to `height`.
+    fn reflect(&mut self, factor: f64, height: usize) {
+        let rows = &mut self.entries[self.used * self.width..height * self.width];
         self.products.clear();
         self.products.resize(self.width, 0.0);
         for (row, weight) in rows.chunks_exact(self.width).zip(&self.reflector) {
@@ -156,9 +195,9 @@ impl TrackRows {
         }
     }
 
-    /// The rows that the landmark does not fill, with all camera poses of the window.
-    fn append_to(&self, rows: &mut Vec<f64>, columns: usize) {
-        for row in self.entries.chunks_exact(self.width).skip(self.used) {
+    /// Some rows, with all camera poses of the window.
+    fn append_to(&self, rows: &mut Vec<f64>, columns: usize, range: std::ops::Range<usize>) {
+        for row in self.entries.chunks_exact(self.width).skip(range.start).take(range.len()) {
             let begin = rows.len();
             rows.resize(begin + columns, 0.0);
             let target = &mut rows[begin..];

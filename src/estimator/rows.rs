@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 use super::camera_pose::{self, CameraMaps};
 use super::layout::{POSE, SPEED_BIAS};
 use super::problem::{Estimate, Problem};
-use super::projection::ProjectedRows;
+use super::projection::{NewestRows, ProjectedRows};
 use super::reprojection::CameraPose;
 use super::standstill::RestTerm;
 use super::window::FrameState;
@@ -20,7 +20,8 @@ impl Problem<'_> {
             .map(|camera| {
                 let maps = CameraMaps::new(&frames, calibration.of(camera));
                 let poses = camera_pose::by_slot(&frames, calibration.of(camera));
-                self.carried_rows(camera, &self.projected_rows(camera, estimate, &poses), &maps)
+                let projected = self.projected_rows(camera, estimate, &poses, NewestRows::Among);
+                self.carried_rows(camera, &projected, &maps)
             })
             .collect();
         stack(&rows, self.layout.total() + 1)
@@ -32,10 +33,12 @@ impl Problem<'_> {
         camera: usize,
         estimate: &Estimate,
         linearized: &[CameraPose],
+        apart: NewestRows,
     ) -> ProjectedRows {
         let factors = &self.cameras[camera];
         let current = camera_pose::by_slot(&estimate.frames, estimate.calibration.of(camera));
-        ProjectedRows::new(&factors.visual, &current, linearized, factors.tracks, &estimate.landmarks[camera])
+        let landmarks = &estimate.landmarks[camera];
+        ProjectedRows::new(&factors.visual, &current, linearized, factors.tracks, landmarks, apart)
     }
 
     /// Rows by the poses of a camera carried on to the unknowns.

@@ -12,6 +12,7 @@ mod classification;
 mod directions;
 mod elimination;
 mod factor;
+mod information;
 pub mod laboratory;
 mod persistence;
 mod report;
@@ -23,6 +24,7 @@ mod tests;
 
 pub use analysis::{ScalingRule, analyse, analyse_with_scaling};
 pub use factor::PackedFactor;
+pub use information::{InformationRate, ParameterRate, information_rate};
 pub use persistence::steps_lost;
 pub use report::{CalibrationDirection, RankReport};
 pub use slide::{ChainSlide, chain_of_step, slide};

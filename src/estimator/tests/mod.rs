@@ -4,6 +4,7 @@ mod clocks;
 mod cluster;
 mod fixture;
 mod flight;
+mod gain;
 mod jacobian;
 mod preintegration;
 mod rest;

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::super::analysis::measured_information;
-use crate::estimator::{SupposedFrame, SupposedLandmark, SupposedWindow};
+use crate::estimator::{Motion, SupposedFrame, SupposedLandmark, SupposedWindow};
 use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::Chain;
 
@@ -33,14 +33,6 @@ pub struct ParameterExcitation {
     pub by_motion: Vec<f64>,
 }
 
-/// A motion that can be taken out of a window.
-#[derive(Clone, Copy, Debug)]
-enum Motion {
-    Translation(usize),
-    Rotation(usize),
-    Joint(usize),
-}
-
 /// How much a window tells about each parameter per second beyond a prior of 10° and 3 cm, and how much of it would be
 /// missing if one motion had not been flown: the same window is linearized again with that motion taken out of its states,
 /// the landmarks where they are and seen by the same frames. `None` for windows without length or finite numbers.
@@ -53,8 +45,7 @@ pub fn excitation(window: &SupposedWindow, chain: &Chain, joint_names: &[String]
         return None;
     }
     let joints = chain.joint_count();
-    let mut motions: Vec<Motion> = (0..3).map(Motion::Translation).chain((0..3).map(Motion::Rotation)).collect();
-    motions.extend((0..joints).map(Motion::Joint));
+    let motions: Vec<Motion> = Motion::all(joints).collect();
     let whole = variances(window, chain)?;
     let without: Vec<Option<Vec<f64>>> =
         motions.par_iter().map(|motion| variances(&without(window, chain, *motion), chain)).collect();
@@ -124,16 +115,6 @@ fn without(window: &SupposedWindow, chain: &Chain, motion: Motion) -> SupposedWi
         })
     });
     SupposedWindow { landmarks: landmarks.collect(), frames, ..window.clone() }
-}
-
-impl Motion {
-    fn name(self, joint_names: &[String]) -> String {
-        match self {
-            Self::Translation(axis) => format!("move {}", ["x", "y", "z"][axis]),
-            Self::Rotation(axis) => ["roll", "pitch", "yaw"][axis].to_owned(),
-            Self::Joint(joint) => joint_names.get(joint).cloned().unwrap_or_else(|| format!("joint {}", joint + 1)),
-        }
-    }
 }
 
 impl fmt::Display for Excitation {

@@ -1,0 +1,179 @@
+//! What the newest image tells, by motion.
+
+use nalgebra::DMatrix;
+
+use super::fixture;
+use super::flight::fly;
+use crate::estimator::camera_pose::{self, CameraMaps};
+use crate::estimator::gain::CameraInformation;
+use crate::estimator::motion_parts::motion_parts;
+use crate::estimator::options::{EstimatorOptions, RobustLoss};
+use crate::estimator::problem::{Estimate, Problem};
+use crate::estimator::projection::NewestRows;
+use crate::estimator::tracking::ActiveTracks;
+use crate::estimator::{ColumnGroup, Estimator, InformationGain, Motion};
+use crate::gimbal::Parameterization;
+use crate::simulation::{Exercise, JointSwing, SyntheticMotion, SyntheticOptions, VehicleSwing, synthetic_tracks};
+
+/// Windows with a prior, away from the truth.
+fn windows() -> Vec<(&'static str, Estimator)> {
+    let options = EstimatorOptions { loss: RobustLoss::None, ..EstimatorOptions::default() };
+    let gimbal = |parameterization| fixture::window(parameterization, true, options.clone());
+    let mut windows = vec![
+        ("minimal", gimbal(Parameterization::Minimal)),
+        ("classical", gimbal(Parameterization::Classical)),
+        ("poe", gimbal(Parameterization::Poe)),
+        ("rigid", fixture::window(Parameterization::Minimal, false, options.clone())),
+        ("cluster", fixture::cluster_window(options.clone(), false)),
+        ("cluster with clocks", fixture::cluster_window(options.clone(), true)),
+    ];
+    let mut frozen = gimbal(Parameterization::Classical);
+    for name in ["EC.tx", "L1.d"] {
+        frozen.freeze(name).unwrap();
+    }
+    windows.push(("frozen", frozen));
+    for (_, estimator) in &mut windows {
+        fixture::shake(estimator, 0.2);
+        fixture::marginalize_once(estimator);
+    }
+    windows
+}
+
+fn estimate_of(estimator: &Estimator, active: &[ActiveTracks]) -> Estimate {
+    Estimate {
+        frames: estimator.frames.iter().map(|frame| frame.state.clone()).collect(),
+        calibration: estimator.calibration.clone(),
+        landmarks: active.iter().map(|active| active.landmarks.clone()).collect(),
+    }
+}
+
+#[test]
+fn the_parts_of_the_motions_make_up_what_the_calibration_does_to_the_pictures() {
+    for (name, estimator) in windows() {
+        let active = estimator.active_tracks();
+        let problem = estimator.problem(&active);
+        let estimate = estimate_of(&estimator, &active);
+        let frames = problem.linearization_frames(&estimate);
+        let calibrations = problem.linearization_calibration(&estimate.calibration);
+        for camera in 0..problem.cameras.len() {
+            let calibration = calibrations.of(camera);
+            let maps = CameraMaps::new(&frames, calibration);
+            let poses = camera_pose::by_slot(&frames, calibration);
+            let seen: Vec<_> =
+                frames.iter().map(|state| camera_pose::when_seen(state, calibration.camera_shift_s())).collect();
+            let parts = motion_parts(&seen, calibration, &maps, problem.layout.joints);
+            let sum = parts.iter().fold(DMatrix::zeros(6 * frames.len(), calibration.dof()), |sum, part| sum + part);
+            let mut whole = DMatrix::zeros(6 * frames.len(), calibration.dof());
+            for (slot, map) in maps.calibration.iter().enumerate() {
+                whole.rows_mut(6 * slot, 6).copy_from(map);
+            }
+            let projected = problem.projected_rows(camera, &estimate, &poses, NewestRows::Among);
+            let by_camera = projected.rows.columns(0, 6 * frames.len());
+            let (left, all) = (by_camera * (&whole - sum), by_camera * whole);
+            assert!(left.norm() < 1e-9 * all.norm(), "{name}, camera {camera}: {} of {}", left.norm(), all.norm());
+        }
+    }
+}
+
+/// Bits by column, from explicit inverses of two windows, of which one has nothing of the newest image.
+fn bits_by_definition(problem: &Problem<'_>, estimate: &Estimate, active: &[ActiveTracks]) -> Vec<f64> {
+    let names: Vec<String> = (0..problem.layout.calibration).map(|column| column.to_string()).collect();
+    let numbers: Vec<usize> = (0..problem.layout.frames).collect();
+    let newest = problem.layout.frames - 1;
+    let cut: Vec<ActiveTracks> = active
+        .iter()
+        .map(|active| {
+            let mut active = active.clone();
+            for track in &mut active.tracks {
+                track.sightings.retain(|sighting| sighting.slot != newest);
+            }
+            active
+        })
+        .collect();
+    let mut without = problem.clone();
+    for (camera, cut) in without.cameras.iter_mut().zip(&cut) {
+        camera.tracks = &cut.tracks;
+    }
+    let variances = |problem: &Problem<'_>, whole: bool| {
+        let linearization = problem.linearization(estimate, &names, &numbers, None);
+        let blocks = &linearization.columns;
+        let of_newest = |name: &str| ["pose", "joints", "speed-bias"].iter().any(|it| name == format!("{it} {newest}"));
+        let gone: Vec<usize> = blocks
+            .iter()
+            .filter(|block| !whole && of_newest(&block.name))
+            .flat_map(|block| block.start..block.start + block.len)
+            .collect();
+        let clean = |row: &usize| gone.iter().all(|column| linearization.jacobian[(*row, *column)] == 0.0);
+        let rows: Vec<usize> = (0..linearization.jacobian.nrows()).filter(clean).collect();
+        let measured = linearization.jacobian.select_rows(&rows);
+        let priors = &linearization.prior_jacobian;
+        let mut information = measured.tr_mul(&measured) + priors.tr_mul(&priors);
+        for index in 0..information.nrows() {
+            information[(index, index)] += 1e-6;
+        }
+        let count = blocks.iter().filter(|block| block.group == ColumnGroup::Calibration).count();
+        let covariance = information.cholesky().unwrap().inverse();
+        (0..count).map(|column| covariance[(column, column)]).collect::<Vec<f64>>()
+    };
+    let (with, without) = (variances(problem, true), variances(&without, false));
+    with.iter().zip(&without).map(|(with, without)| 0.5 * (without / with).log2()).collect()
+}
+
+fn gain_of(problem: &Problem<'_>, estimate: &Estimate) -> InformationGain {
+    let names: Vec<String> = (0..problem.layout.calibration).map(|column| column.to_string()).collect();
+    let numbers: Vec<usize> = (0..problem.layout.frames).collect();
+    let mut cameras: Vec<CameraInformation> = Vec::new();
+    problem.linearization(estimate, &names, &numbers, Some(&mut cameras));
+    problem.information_gain(estimate, &cameras).unwrap()
+}
+
+#[test]
+fn the_gain_is_that_of_two_windows_of_which_one_lacks_the_newest_image() {
+    for (name, estimator) in windows() {
+        let active = estimator.active_tracks();
+        let problem = estimator.problem(&active);
+        let estimate = estimate_of(&estimator, &active);
+        let gain = gain_of(&problem, &estimate);
+        let expected = bits_by_definition(&problem, &estimate, &active);
+        assert_eq!(gain.columns(), expected.len(), "{name}");
+        for (column, bits) in expected.iter().enumerate() {
+            let told = gain.bits_per_s(column) * gain.interval_s;
+            assert!((told - bits).abs() < 1e-4 * (0.01 + bits), "{name}, column {column}: {told} for {bits}");
+            let parts = gain.by_motion_per_s(column).sum::<f64>() + gain.earlier_per_s(column);
+            assert!((parts - gain.bits_per_s(column)).abs() < 1e-9 + 1e-6 * parts.abs(), "{name}, column {column}");
+        }
+        assert!(expected.iter().any(|bits| *bits > 0.01), "{name}: {expected:?}");
+    }
+}
+
+#[test]
+fn what_a_swinging_joint_tells_is_put_down_to_it() {
+    for joint in 0..3 {
+        let swing = JointSwing { joint, amplitude_rad: 15_f64.to_radians() };
+        let flight = synthetic_tracks(&SyntheticOptions {
+            duration_s: 10.5,
+            features: 80,
+            motion: SyntheticMotion::Hover,
+            look_around_rad: 0.3,
+            exercise: Some((4.5, Exercise { vehicle: VehicleSwing::Hover, joint: Some(swing) })),
+            ..SyntheticOptions::default()
+        });
+        let options = EstimatorOptions { keep_linearization: true, ..EstimatorOptions::default() };
+        let (_, reports) = fly(&flight.frames, fixture::config(&flight.given_rig, Parameterization::Minimal, options));
+        // All information of the last second by motion: by then no frame of the window is from before the exercise.
+        let mut sums = [0.0; 9];
+        for report in reports.iter().filter(|report| report.stamp_ns > 9_500_000_000) {
+            let gain = report.gain.as_ref().unwrap();
+            for column in 0..gain.columns() {
+                for (sum, part) in sums.iter_mut().zip(gain.by_motion_per_s(column)) {
+                    *sum += part * gain.interval_s;
+                }
+            }
+        }
+        let swung = sums[6 + joint];
+        let others = (0..3).filter(|other| *other != joint).map(|other| sums[6 + other].abs()).fold(0.0, f64::max);
+        assert!(swung > 0.0 && swung > 3.0 * others, "joint {joint}: {sums:?}");
+        let leading = Motion::all(3).zip(sums).max_by(|a, b| a.1.total_cmp(&b.1)).unwrap().0;
+        assert_eq!(leading, Motion::Joint(joint), "{sums:?}");
+    }
+}
