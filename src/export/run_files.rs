@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::error::ExportError;
 use super::results::write_results;
 use super::summary::{RunSummary, summarize, to_json};
-use super::tables::{calibration_csv, frames_csv, rank_csv};
+use super::tables::{calibration_csv, frames_csv, information_csv, rank_csv};
 use super::trajectory::{euroc_of_run, tum_of_run};
 use crate::flight_log::Rig;
 use crate::flight_log::rig::CameraMount;
@@ -46,6 +46,7 @@ pub fn write_run(
         ("trajectory.tum", tum_of_run(run, recording.epoch_ns)),
         ("calibration.csv", calibration_csv(run, &recording.rig)),
         ("rank.csv", rank_csv(run)),
+        ("information.csv", information_csv(run, &recording.rig)),
         ("frames.csv", frames_csv(run, options.timing)),
         ("rig.yaml", calibrated_rig(recording, run).to_yaml()),
         ("summary.json", json),

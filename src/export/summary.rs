@@ -8,8 +8,10 @@ use super::evaluation::alignment_name;
 use super::structure::{KnownLossSummary, known_losses};
 use super::tables::parameter_name;
 use crate::estimator::{EventKind, Phase, StageTimes};
+use crate::flight_log::Rig;
 use crate::geometry::{seconds_from_ns, wrap_angle};
 use crate::gimbal::ClassicalChain;
+use crate::observability::{ParameterRate, information_rate};
 use crate::session::accuracy::{Alignment, path_length_m};
 use crate::session::{Recording, RunRecord, TrajectoryAccuracy};
 
@@ -149,6 +151,19 @@ pub struct RankSummary {
     pub null_directions: Vec<Vec<DirectionWeight>>,
     /// What the form of the chain is known to lose, held against every step.
     pub known: Vec<KnownLossSummary>,
+    /// How fast the images of all steps narrowed each parameter, and which motions that is owed to.
+    pub information: Option<InformationSummary>,
+}
+
+/// Information gained over the steps.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct InformationSummary {
+    /// Length of the steps together.
+    pub duration_s: f64,
+    /// The motions of each parameter's `by_motion`.
+    pub motions: Vec<String>,
+    /// Bits per second: one bit halves the standard deviation.
+    pub parameters: Vec<ParameterRate>,
 }
 
 /// Percentiles of one stage's time.
@@ -306,8 +321,9 @@ fn calibration(recording: &Recording, run: &RunRecord) -> CalibrationSummary {
     };
     let truth = recording.truth_rig.as_ref().and_then(|rig| rig.chain_of_camera(&run.camera_key));
     let given = recording.rig.chain_of_camera(&run.camera_key);
-    let initial_values = run.values_in(&recording.rig, last).unwrap_or_default();
-    let true_values = recording.truth_rig.as_ref().and_then(|rig| run.values_in(rig, last)).unwrap_or_default();
+    let values_in = |rig: &Rig| run.values_in(rig, &recording.rig, last);
+    let initial_values = values_in(&recording.rig).unwrap_or_default();
+    let true_values = recording.truth_rig.as_deref().and_then(values_in).unwrap_or_default();
     let value_of =
         |values: &[(String, f64)], name: &str| values.iter().find(|(known, _)| known == name).map(|(_, value)| *value);
     let parameters = last
@@ -375,6 +391,22 @@ fn rank(recording: &Recording, run: &RunRecord) -> Option<RankSummary> {
         },
         null_directions,
         known: known_losses(run),
+        information: information(recording, run),
+    })
+}
+
+fn information(recording: &Recording, run: &RunRecord) -> Option<InformationSummary> {
+    let steps = run.steps.iter().filter_map(|step| Some((step.rank.as_ref()?, step.report.gain.as_ref()?)));
+    let rate = information_rate(steps)?;
+    let rig = &recording.rig;
+    let joints: Vec<String> =
+        rig.gimbal.iter().flat_map(|gimbal| &gimbal.joints).map(|joint| joint.name.clone()).collect();
+    let named =
+        |parameter: &ParameterRate| ParameterRate { name: parameter_name(&parameter.name, rig), ..parameter.clone() };
+    Some(InformationSummary {
+        duration_s: rate.duration_s,
+        motions: rate.motions.iter().map(|motion| motion.name(&joints)).collect(),
+        parameters: rate.parameters.iter().map(named).collect(),
     })
 }
 

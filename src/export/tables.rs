@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use crate::estimator::{Event, Phase};
+use crate::estimator::{Event, Motion, Phase};
 use crate::flight_log::Rig;
 use crate::geometry::seconds_from_ns;
 use crate::session::{RunRecord, StepRecord};
@@ -146,6 +146,35 @@ pub(super) fn rank_csv(run: &RunRecord) -> String {
             }
         }
         text.push('\n');
+    }
+    text
+}
+
+/// `information.csv`: for each step and parameter how fast the image narrows it, and which motion that is owed to, in bits
+/// per second.
+pub(super) fn information_csv(run: &RunRecord, rig: &Rig) -> String {
+    let joints: Vec<String> =
+        rig.gimbal.iter().flat_map(|gimbal| &gimbal.joints).map(|joint| joint.name.clone()).collect();
+    let told = || run.steps.iter().filter_map(|step| Some((step, step.rank.as_ref()?, step.report.gain.as_ref()?)));
+    let count = told().map(|(_, _, gain)| gain.joints).max().unwrap_or(0);
+    let mut text = "t_s,interval_s,parameter,bits_per_s".to_owned();
+    for motion in Motion::all(count) {
+        write!(text, ",{}", motion.name(&joints).replace(' ', "_")).expect(INTO_STRING);
+    }
+    text.push_str(",earlier\n");
+    for (step, rank, gain) in told().filter(|(_, rank, gain)| rank.names.len() == gain.columns()) {
+        for (column, name) in rank.names.iter().enumerate() {
+            text.push_str(&seconds_text(step.report.stamp_ns));
+            push_number(&mut text, gain.interval_s);
+            write!(text, ",{}", parameter_name(name, rig)).expect(INTO_STRING);
+            push_number(&mut text, gain.bits_per_s(column));
+            let parts: Vec<f64> = gain.by_motion_per_s(column).collect();
+            for motion in 0..6 + count {
+                push_number(&mut text, parts.get(motion).copied().unwrap_or(f64::NAN));
+            }
+            push_number(&mut text, gain.earlier_per_s(column));
+            text.push('\n');
+        }
     }
     text
 }

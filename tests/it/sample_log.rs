@@ -6,7 +6,8 @@ use std::process::{Command, Output};
 
 use serde_json::Value;
 
-const FILES: [&str; 6] = ["trajectory.tum", "calibration.csv", "rank.csv", "frames.csv", "rig.yaml", "summary.json"];
+const FILES: [&str; 7] =
+    ["trajectory.tum", "calibration.csv", "rank.csv", "information.csv", "frames.csv", "rig.yaml", "summary.json"];
 
 fn sample(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("sample_logs").join(name)

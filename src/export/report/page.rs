@@ -65,7 +65,7 @@ pub(super) fn page(content: &ReportContent, pictures: &[ReportPicture]) -> Strin
     body.push_str(&tables::inputs(content));
     let origin = format!(
         "Made with {}. The same files, command and version give the same bytes. Beside this page lie report.json and, \
-         for each run, trajectory.tum, calibration.csv, rank.csv, frames.csv, rig.yaml and summary.json.",
+         for each run, trajectory.tum, calibration.csv, rank.csv, information.csv, frames.csv, rig.yaml and summary.json.",
         content.program
     );
     body.push_str(&element("p", &origin));

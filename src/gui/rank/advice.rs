@@ -1,6 +1,9 @@
 //! Since when the weakest direction has been lost, and what to fly against it.
 
 use std::sync::Arc;
+use std::sync::mpsc::{Receiver, TryRecvError, channel};
+use std::thread::Builder;
+use std::time::Duration;
 
 use egui::{RichText, Ui};
 
@@ -13,17 +16,28 @@ use crate::session::{RunRecord, StepRecord};
 
 /// Candidates shown behind the best one.
 const OTHERS_SHOWN: usize = 3;
+/// How often it is looked whether the advice has come.
+const REPAINT: Duration = Duration::from_millis(50);
 
 /// What was found out about one step; another step is asked anew.
 #[derive(Debug, Default)]
 pub(super) struct AdviceUi {
     since: Option<(Arc<StepRecord>, Option<String>)>,
     advice: Option<(Arc<StepRecord>, Option<Advice>)>,
+    coming: Option<(Arc<StepRecord>, Receiver<Option<Advice>>)>,
 }
 
 impl AdviceUi {
-    /// Draws the line and the button, or the advice once it was asked for.
-    pub(super) fn ui(&mut self, ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, step: &Arc<StepRecord>) {
+    /// Draws how long the weakest direction has been lost, and what to fly against it: worked out once the cursor rests,
+    /// in the background or while the caller waits.
+    pub(super) fn ui(
+        &mut self,
+        ui: &mut Ui,
+        ctx: &PanelContext<'_>,
+        run: &RunRecord,
+        step: &Arc<StepRecord>,
+        in_background: bool,
+    ) {
         let fresh = |known: &Arc<StepRecord>| Arc::ptr_eq(known, step);
         if !self.since.as_ref().is_some_and(|(known, _)| fresh(known)) {
             self.since = Some((Arc::clone(step), since(run, step)));
@@ -32,25 +46,34 @@ impl AdviceUi {
             ui.add(egui::Label::new(RichText::new(text).color(ctx.theme.text)).truncate()).on_hover_text(text);
         }
         let Some(rank) = &step.rank else { return };
-        let asked = self.advice.as_ref().is_some_and(|(known, _)| fresh(known));
-        if !asked {
-            let button = ui.small_button("What to fly next").on_hover_text(
-                "Linearizes candidate motions of vehicle and joints from here, and orders them by what they would leave of \
-                 the direction that is known least",
-            );
-            if button.clicked() {
-                let situation = Situation::of_step(&step.report, rank, &ctx.recording.rig, &run.camera_key);
-                self.advice = Some((Arc::clone(step), situation.as_ref().and_then(advise)));
+        if !self.advice.as_ref().is_some_and(|(known, _)| fresh(known)) {
+            if ctx.playback.playing {
+                return;
             }
-            return;
+            if !self.coming.as_ref().is_some_and(|(known, _)| fresh(known)) {
+                let situation = Situation::of_step(&step.report, rank, &ctx.recording.rig, &run.camera_key);
+                self.coming = Some((Arc::clone(step), asked(situation, in_background)));
+            }
+            let told = self.coming.as_ref().map(|(_, coming)| coming.try_recv());
+            if let Some(Err(TryRecvError::Empty)) = told {
+                ui.label(RichText::new("Linearizing candidate motions…").color(ctx.theme.text_weak));
+                ui.ctx().request_repaint_after(REPAINT);
+                return;
+            }
+            self.advice = Some((Arc::clone(step), told.and_then(Result::ok).flatten()));
+            self.coming = None;
         }
         match self.advice.as_ref().and_then(|(_, advice)| advice.as_ref()) {
             None => {
                 ui.label(RichText::new("No motion can tell more about this calibration").color(ctx.theme.text_weak));
             }
             Some(advice) => {
-                let sentence = advice.sentence().unwrap_or_default();
-                ui.add(egui::Label::new(RichText::new(sentence).color(ctx.theme.text_strong)).wrap());
+                let sentence = format!("Fly next: {}", advice.sentence().unwrap_or_default());
+                let response = ui.add(egui::Label::new(RichText::new(sentence).color(ctx.theme.text_strong)).wrap());
+                response.on_hover_text(
+                    "Candidate motions of vehicle and joints, linearized from here and ordered by what they would leave \
+                     of the direction that is known least of all that some motion can tell",
+                );
                 for candidate in advice.candidates.iter().skip(1).take(OTHERS_SHOWN) {
                     let text = format!("{:.0} % left: {}", 100.0 * candidate.remaining, candidate.words);
                     ui.add(egui::Label::new(RichText::new(text).small().color(ctx.theme.text_weak)).truncate());
@@ -58,6 +81,20 @@ impl AdviceUi {
             }
         }
     }
+}
+
+/// The advice for a situation, as soon as it is there.
+fn asked(situation: Option<Situation>, in_background: bool) -> Receiver<Option<Advice>> {
+    let (sender, receiver) = channel();
+    let later = sender.clone();
+    let given = situation.clone();
+    let work = move || drop(later.send(given.as_ref().and_then(advise)));
+    let started = in_background && Builder::new().name("advice".to_owned()).spawn(work).is_ok();
+    if !started {
+        // Nobody else has the receiver.
+        drop(sender.send(situation.as_ref().and_then(advise)));
+    }
+    receiver
 }
 
 /// The weakest direction and the first second from which on it was null or weak without interruption.

@@ -4,6 +4,7 @@ mod advice;
 pub(super) mod columns;
 mod compare;
 mod heat_map;
+mod information;
 mod slider;
 mod spectrum;
 pub(crate) mod verdict;
@@ -15,6 +16,7 @@ use std::sync::Arc;
 use egui::{RichText, ScrollArea, Sense, Ui, UiBuilder, vec2};
 
 use self::advice::AdviceUi;
+use self::information::InformationUi;
 use self::slider::SliderUi;
 use self::verdict::Level;
 use super::PanelContext;
@@ -32,13 +34,19 @@ const PARAMETERS: usize = 2;
 /// Height from which the ranks over time have room, in points.
 const LOWEST_WITH_TIME: f32 = 340.0;
 
+/// Height from which the table of the information has room beside the heat map, in points.
+const TALL: f32 = 1000.0;
+
 /// State of the rank panel.
 #[derive(Debug, Default)]
 pub struct RankPanel {
     tables: RunTables,
     /// By run: informed, then structural rank.
     curves: Vec<[Curve; 2]>,
+    /// Whether advice is worked out on a thread of its own, as in the window; pictures wait for it.
+    pub in_background: bool,
     advice: AdviceUi,
+    information: InformationUi,
     slider: SliderUi,
     /// Show all runs side by side where there is no room for both.
     all_runs: bool,
@@ -94,7 +102,10 @@ impl RankPanel {
                 self.over_time_ui(ui, ctx);
                 return;
             };
-            self.advice.ui(ui, ctx, run, step);
+            self.advice.ui(ui, ctx, run, step, self.in_background);
+            self.information.ui(ui, ctx, run, step, height > TALL);
+            let number = ctx.selection.run.min(ctx.recording.runs.len().saturating_sub(1));
+            compare::lock_ui(ui, ctx, number, run, step);
             self.slider.ui(ui, ctx, step);
             spectrum::ui(ui, ctx.theme, rank, (0.16 * height).clamp(60.0, 150.0));
             // The timeline has a lane for it too, so it yields to the heat map first.

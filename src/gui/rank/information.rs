@@ -1,0 +1,137 @@
+//! What the last second of images told: bits per second by parameter and by motion.
+
+use std::sync::Arc;
+
+use egui::{CollapsingHeader, Grid, Label, RichText, Ui, vec2};
+
+use crate::estimator::Motion;
+use crate::gui::PanelContext;
+use crate::gui::convergence::names::{meaning_of, part_of};
+use crate::gui::theme::Theme;
+use crate::gui::units::fixed;
+use crate::observability::{InformationRate, information_rate};
+use crate::session::{RunRecord, StepRecord};
+
+/// So much of the flight before the cursor is summed up.
+const STRETCH_NS: i64 = 1_000_000_000;
+/// Parts below this, in bits per second, are not worth a number.
+const LEAST_SHOWN: f64 = 0.005;
+
+/// What was summed up for one step; another step is summed up anew.
+#[derive(Debug, Default)]
+pub(super) struct InformationUi {
+    told: Option<(Arc<StepRecord>, Option<InformationRate>)>,
+}
+
+impl InformationUi {
+    /// Draws one line, and the table where it is opened (as it is from the start where there is `room`).
+    pub(super) fn ui(
+        &mut self,
+        ui: &mut Ui,
+        ctx: &mut PanelContext<'_>,
+        run: &RunRecord,
+        step: &Arc<StepRecord>,
+        room: bool,
+    ) {
+        if !self.told.as_ref().is_some_and(|(known, _)| Arc::ptr_eq(known, step)) {
+            self.told = Some((Arc::clone(step), rate_before(run, step)));
+        }
+        let Some((_, Some(rate))) = &self.told else { return };
+        let joints: Vec<String> = joint_names(ctx);
+        let title = RichText::new(headline(rate, &joints)).color(ctx.theme.text);
+        let header = CollapsingHeader::new(title).id_salt("information").default_open(room);
+        header.show(ui, |ui| table_ui(ui, ctx, rate, &joints));
+    }
+}
+
+/// The steps of the last second up to this one.
+fn rate_before(run: &RunRecord, step: &StepRecord) -> Option<InformationRate> {
+    let stamp_ns = step.report.stamp_ns;
+    let steps = run.steps.iter().filter(|other| {
+        let age_ns = stamp_ns - other.report.stamp_ns;
+        (0..STRETCH_NS).contains(&age_ns)
+    });
+    information_rate(steps.filter_map(|step| Some((step.rank.as_ref()?, step.report.gain.as_ref()?))))
+}
+
+fn joint_names(ctx: &PanelContext<'_>) -> Vec<String> {
+    ctx.recording.rig.gimbal.iter().flat_map(|gimbal| &gimbal.joints).map(|joint| joint.name.clone()).collect()
+}
+
+/// All in one line.
+fn headline(rate: &InformationRate, joints: &[String]) -> String {
+    let mut text = format!("Told in the last {:.1} s: {:.2} bit/s", rate.duration_s, rate.total());
+    if let Some((motion, part)) = rate.leading(None) {
+        text += &format!(", most by {} ({part:.2})", motion.name(joints));
+    }
+    let fastest = (0..rate.parameters.len())
+        .max_by(|a, b| rate.parameters[*a].bits_per_s.total_cmp(&rate.parameters[*b].bits_per_s));
+    if let Some(fastest) = fastest.filter(|fastest| rate.parameters[*fastest].bits_per_s > 0.0) {
+        let parameter = &rate.parameters[fastest];
+        let by = rate.leading(Some(fastest)).map(|(motion, _)| format!(" by {}", motion.name(joints)));
+        text += &format!("; fastest {} {:.2}{}", parameter.name, parameter.bits_per_s, by.unwrap_or_default());
+    }
+    text
+}
+
+fn table_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, rate: &InformationRate, joints: &[String]) {
+    let theme = *ctx.theme;
+    ui.label(
+        RichText::new("bit/s (one bit halves σ) of each parameter, and which motion they are owed to")
+            .small()
+            .color(theme.text_weak),
+    );
+    let mut order: Vec<usize> = (0..rate.parameters.len()).collect();
+    order.sort_by_key(|index| part_of(&rate.parameters[*index].name));
+    let parts = rate.parameters.iter().flat_map(|parameter| &parameter.by_motion);
+    let largest = parts.fold(0.0_f64, |largest, part| largest.max(part.abs()));
+    Grid::new("information by motion").spacing(vec2(4.0, 0.0)).min_col_width(0.0).min_row_height(13.0).show(ui, |ui| {
+        for head in ["", "all"] {
+            ui.label(RichText::new(head).small().color(theme.text_weak));
+        }
+        for motion in &rate.motions {
+            ui.label(RichText::new(motion.name(joints)).small().color(theme.text_weak))
+                .on_hover_text(meaning_of_motion(*motion, joints));
+        }
+        let earlier = ui.label(RichText::new("before").small().color(theme.text_weak));
+        earlier.on_hover_text("What the images add by confirming earlier ones that have left the window");
+        ui.end_row();
+        for index in order {
+            let parameter = &rate.parameters[index];
+            let name = &parameter.name;
+            let selected = ctx.selection.parameter.as_deref() == Some(name);
+            let color = if selected { theme.accent } else { theme.text };
+            let label = Label::new(RichText::new(name).small().color(color)).sense(egui::Sense::click());
+            let response = ui.add(label).on_hover_text(meaning_of(name, &ctx.recording.rig));
+            if response.clicked() {
+                ctx.selection.parameter = if selected { None } else { Some(name.clone()) };
+            }
+            number_ui(ui, &theme, parameter.bits_per_s, 0.0);
+            for part in parameter.by_motion.iter().chain([&parameter.earlier]) {
+                number_ui(ui, &theme, *part, if largest > 0.0 { part / largest } else { 0.0 });
+            }
+            ui.end_row();
+        }
+    });
+}
+
+/// A number on a ground that tells its sign and size.
+fn number_ui(ui: &mut Ui, theme: &Theme, number: f64, share: f64) {
+    let text = if number.abs() < LEAST_SHOWN { "·".to_owned() } else { fixed(number, 2) };
+    // Right-aligned, so that signs and points stand under one another.
+    let mut text = RichText::new(format!("{text:>5}")).monospace().size(10.5).color(theme.text_strong);
+    if share.abs() >= 0.05 {
+        let ground = theme.diverging(share);
+        text = text.color(Theme::text_on(ground)).background_color(ground);
+    }
+    ui.add(Label::new(text));
+}
+
+fn meaning_of_motion(motion: Motion, joints: &[String]) -> String {
+    let axis = |axis: usize| ["x", "y", "z"].get(axis).copied().unwrap_or("?");
+    match motion {
+        Motion::Translation(along) => format!("The vehicle's translation along the {} axis of the IMU", axis(along)),
+        Motion::Rotation(about) => format!("The vehicle's rotation about the {} axis of the IMU", axis(about)),
+        Motion::Joint(_) => format!("The gimbal's joint {}", motion.name(joints)),
+    }
+}
