@@ -133,12 +133,21 @@ fn flown(seed: u64, every: usize) -> (Advice, Vec<(String, f64, f64)>) {
 
 #[test]
 fn flying_the_advised_motion_lowers_the_weakest_sigma_more_than_the_alternatives() {
-    let (advice, outcomes) = flown(3, 5);
+    for seed in [3, 5, 8] {
+        check_flown(seed);
+    }
+}
+
+/// Flies the advised motion and every fifth of the others.
+fn check_flown(seed: u64) {
+    let (advice, outcomes) = flown(seed, 5);
     let table: Vec<String> = outcomes
         .iter()
         .map(|(words, foretold, left)| format!("{foretold:.3} foretold, {left:.3} left: {words}"))
         .collect();
-    let table = format!("{}\n{}", advice.weakest, table.join("\n"));
+    let table = format!("seed {seed}: {}\n{}", advice.weakest, table.join("\n"));
+    // With `--nocapture` the test tells its figures.
+    eprintln!("{table}");
     assert_eq!(advice.candidates.len(), 28, "seven swings of the vehicle with none or one of three joints");
     let (_, _, best) = &outcomes[0];
     assert!(*best < 0.97, "{table}");
