@@ -9,19 +9,62 @@ use super::layout::POSE;
 use super::reprojection::CameraPose;
 use super::window::FrameState;
 use crate::geometry::so3;
-use crate::gimbal::ChainLinearization;
+use crate::gimbal::{Chain, ChainLinearization};
+
+/// A camera's place on the vehicle and how its clock is off.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Mount<'a> {
+    pub(super) chain: &'a Chain,
+    /// Columns of the calibration, those of clocks behind the chain's; none when it is held fixed.
+    pub(super) columns: usize,
+    /// The camera saw an image so many seconds after its stamp.
+    pub(super) shift_s: f64,
+    /// Column of that offset.
+    pub(super) shift_column: Option<usize>,
+}
+
+impl Mount<'_> {
+    /// A rigid camera does not follow the joints.
+    fn own<'j>(&self, joints_rad: &'j [f64]) -> &'j [f64] {
+        &joints_rad[..self.chain.joint_count().min(joints_rad.len())]
+    }
+
+    fn linearize(&self, joints_rad: &[f64]) -> ChainLinearization {
+        let mut linearization = self.chain.linearize(self.own(joints_rad));
+        if linearization.by_parameters.ncols() != self.columns {
+            linearization.by_parameters = linearization.by_parameters.resize_horizontally(self.columns, 0.0);
+        }
+        linearization
+    }
+}
+
+impl Calibration {
+    /// The camera's place on the vehicle.
+    pub(super) fn mount(&self) -> Mount<'_> {
+        Mount {
+            chain: self.chain(),
+            columns: self.dof(),
+            shift_s: self.camera_shift_s(),
+            shift_column: self.camera_shift_column(),
+        }
+    }
+}
 
 /// Pose of the camera at a state: the IMU's pose and the mount at the state's joint angles, when the camera's clock says
 /// the frame's stamp.
 pub(super) fn at(state: &FrameState, calibration: &Calibration) -> CameraPose {
-    let state = &*when_seen(state, calibration);
-    let pose = state.navigation.world_from_imu * calibration.imu_from_camera(&state.joints_rad);
+    at_mount(state, &calibration.mount())
+}
+
+/// [`at`] for a mount.
+pub(super) fn at_mount(state: &FrameState, mount: &Mount<'_>) -> CameraPose {
+    let state = &*when_seen(state, mount.shift_s);
+    let pose = state.navigation.world_from_imu * mount.chain.imu_from_camera(mount.own(&state.joints_rad));
     CameraPose { rotation: pose.rotation_matrix(), position_m: pose.translation_m }
 }
 
 /// The state at which the camera took its picture, since its clock may be off.
-fn when_seen<'a>(state: &'a FrameState, calibration: &Calibration) -> Cow<'a, FrameState> {
-    let shift_s = calibration.camera_shift_s();
+pub(super) fn when_seen(state: &FrameState, shift_s: f64) -> Cow<'_, FrameState> {
     if shift_s == 0.0 { Cow::Borrowed(state) } else { Cow::Owned(state.later(shift_s)) }
 }
 
@@ -41,19 +84,24 @@ pub(super) struct CameraMaps {
 
 impl CameraMaps {
     /// The maps at these states and this calibration.
+    pub(super) fn new(frames: &[FrameState], calibration: &Calibration) -> Self {
+        Self::of_mount(frames, &calibration.mount())
+    }
+
+    /// [`Self::new`] for a mount.
     ///
     /// That a clock's offset multiplies speed and gyroscope bias is left out: a centisecond of a bias' change moves nothing.
-    pub(super) fn new(frames: &[FrameState], calibration: &Calibration) -> Self {
+    pub(super) fn of_mount(frames: &[FrameState], mount: &Mount<'_>) -> Self {
         let mut maps = Self { own: Vec::new(), calibration: Vec::new() };
         for stamped in frames {
-            let state = &*when_seen(stamped, calibration);
-            let chain = calibration.linearize(&state.joints_rad);
+            let state = &*when_seen(stamped, mount.shift_s);
+            let chain = mount.linearize(&state.joints_rad);
             let world_from_imu = state.navigation.world_from_imu.rotation_matrix();
             let (mut own, mut by_calibration) = camera_map(&world_from_imu, state.joints_rad.len(), &chain);
-            if let Some(column) = calibration.camera_shift_column() {
+            if let Some(column) = mount.shift_column {
                 by_calibration.set_column(column, &(&own * state.motion()));
             }
-            if calibration.camera_shift_s() != 0.0 {
+            if mount.shift_s != 0.0 {
                 // The attitude that is unknown is the one at the stamp.
                 let at_stamp = stamped.navigation.world_from_imu.rotation_matrix();
                 let by_turn = own.fixed_columns::<3>(0) * world_from_imu.tr_mul(&at_stamp);

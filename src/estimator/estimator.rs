@@ -111,6 +111,12 @@ impl Estimator {
         self.config.options.keep_linearization = keep;
     }
 
+    /// Asks for the linearization with [`StepReport::factor_rows`] from the next step on.
+    pub fn set_keep_factor_rows(&mut self) {
+        self.config.options.keep_linearization = true;
+        self.config.options.keep_factor_rows = true;
+    }
+
     /// Most steps that the solver tries from the next image on: with fewer than a step took, that step ends as it was in
     /// between.
     pub fn set_iterations(&mut self, iterations: usize) {

@@ -4,16 +4,16 @@ use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, Matrix2x6, Vector3};
 
-use super::camera_pose::camera_map;
+use super::camera_pose::{self, CameraMaps, Mount};
 use super::jacobian_source::{column_scale, scales_of};
 use super::layout::{Layout, POSE};
 use super::linearization::column_blocks;
 use super::reprojection::{CameraPose, Landmark, Reprojection};
 use super::visual::{RelativePoses, Sighting, VisualModel, whitened};
+use super::window::FrameState;
 use super::{ColumnBlock, ColumnGroup, FeatureReport, JacobianFactor, JacobianRow, JacobianSource, StepReport};
 use crate::camera::CameraModel;
 use crate::frontend::FeatureId;
-use crate::geometry::RigidTransform;
 use crate::gimbal::Chain;
 
 /// The Jacobian of a step by blocks.
@@ -37,7 +37,7 @@ pub struct FeatureRows {
 }
 
 impl StepReport {
-    /// The blocks of the Jacobian, `None` where the report does not keep its source or the offsets of clocks are estimated; `cameras` are the main one and the
+    /// The blocks of the Jacobian, `None` where the report does not keep its source; `cameras` are the main one and the
     /// rigid ones beside it.
     pub fn jacobian(&self, cameras: &[&CameraModel]) -> Option<StepJacobian> {
         let writer = Writer::new(self, cameras)?;
@@ -76,6 +76,7 @@ struct Writer<'a> {
     source: &'a JacobianSource,
     layout: Layout,
     columns: Vec<ColumnBlock>,
+    states: Vec<FrameState>,
     cameras: Vec<WindowCamera<'a>>,
     /// The landmarks in the world.
     places_m: BTreeMap<FeatureId, Vector3<f64>>,
@@ -87,8 +88,8 @@ impl<'a> Writer<'a> {
         let frames = report.window.len();
         let joints = report.window.first().map_or(0, |frame| frame.joint_angles_rad.len());
         let states = source.frames(joints);
-        // Columns of the clocks' offsets are not written out.
-        let columns: usize = source.chains.iter().map(Chain::dof).sum();
+        let clocks: usize = source.clocks.iter().map(|clocks| clocks.count).sum();
+        let columns = source.chains.iter().map(Chain::dof).sum::<usize>() + clocks;
         let known = columns == report.calibration.names.len();
         if !known || states.len() != frames || cameras.len() < source.chains.len() {
             return None;
@@ -112,7 +113,7 @@ impl<'a> Writer<'a> {
             })
             .collect();
         let places_m = report.landmarks.iter().map(|landmark| (landmark.id, landmark.position_m)).collect();
-        Some(Self { report, source, layout, columns, cameras, places_m })
+        Some(Self { report, source, layout, columns, states, cameras, places_m })
     }
 
     /// The rows of a feature; `None` where its camera is unknown.
@@ -161,14 +162,30 @@ impl<'a> Writer<'a> {
             let name = format!("joints {}", frame.frame_index);
             let column = self.columns.iter().position(|block| block.name == name)?;
             let scale = column_scale(ColumnGroup::Joints, "", 0);
-            let squared: f64 = sigmas.iter().take(self.layout.joints).map(|sigma| (scale / sigma).powi(2)).sum();
+            let sigmas = || sigmas.iter().take(self.layout.joints).enumerate();
+            let squared: f64 = sigmas().map(|(_, sigma)| (scale / sigma).powi(2)).sum();
             let factor = JacobianFactor::Encoder(numbers[slot]);
-            let norms = vec![(column as u16, squared.sqrt() as f32)];
-            Some(JacobianRow { factor, height: sigmas.len().min(self.layout.joints), norms })
+            let mut norms = vec![(column as u16, squared.sqrt() as f32)];
+            if let Some((clock, block)) = self.encoder_clock() {
+                let scale = column_scale(block.group, "s", 0);
+                let rate = |joint: usize| self.states[slot].rates.joint_rad_per_s(joint);
+                let squared: f64 = sigmas().map(|(joint, sigma)| (scale * rate(joint) / sigma).powi(2)).sum();
+                if squared > 0.0 {
+                    norms.insert(0, (clock as u16, squared.sqrt() as f32));
+                }
+            }
+            Some(JacobianRow { factor, height: sigmas().count(), norms })
         });
         let encoders: Vec<JacobianRow> = encoders.collect();
         rows.splice(place..place, encoders);
         rows
+    }
+
+    /// The column of the encoders' clock and its number, where that is estimated.
+    fn encoder_clock(&self) -> Option<(usize, &ColumnBlock)> {
+        let main = self.source.clocks.first().filter(|clocks| clocks.count > 1 && self.source.calibrated)?;
+        let number = self.source.chains.first()?.dof() + main.count - 1;
+        Some((number, self.columns.get(number)?))
     }
 
     fn write(
@@ -218,35 +235,45 @@ impl<'a> Writer<'a> {
 fn window_camera<'a>(
     report: &StepReport,
     source: &JacobianSource,
-    states: &[(RigidTransform, Vec<f64>)],
+    states: &[FrameState],
     camera: usize,
     model: &'a CameraModel,
     start: usize,
 ) -> WindowCamera<'a> {
     let chain = &source.chains[camera];
-    let own = |joints: &[f64]| joints[..chain.joint_count().min(joints.len())].to_vec();
-    let pose_of =
-        |pose: RigidTransform| CameraPose { rotation: pose.rotation_matrix(), position_m: pose.translation_m };
+    let clocks = source.clocks.get(camera).copied().unwrap_or_default();
+    let [then_s, now_s] = clocks.shifts_s;
+    let mount = Mount {
+        chain,
+        columns: if source.calibrated { chain.dof() + clocks.count } else { 0 },
+        shift_s: then_s,
+        shift_column: (source.calibrated && clocks.count > 0).then(|| chain.dof()),
+    };
+    let linearized: Vec<CameraPose> = states.iter().map(|state| camera_pose::at_mount(state, &mount)).collect();
+    let maps = CameraMaps::of_mount(states, &mount);
+    let maps = maps.own.into_iter().zip(maps.calibration).collect();
     let rigid = camera.checked_sub(1).and_then(|rigid| report.calibration.rigid_cameras.get(rigid));
-    let current: Vec<CameraPose> = report
-        .window
-        .iter()
-        .map(|frame| pose_of(frame.world_from_imu * rigid.map_or(frame.imu_from_camera, |(_, mount)| *mount)))
-        .collect();
-    let linearized: Vec<CameraPose> = states
-        .iter()
-        .map(|(world_from_imu, joints)| pose_of(*world_from_imu * chain.imu_from_camera(&own(joints))))
-        .collect();
-    let maps = states
-        .iter()
-        .map(|(world_from_imu, joints)| {
-            let mut linearization = chain.linearize(&own(joints));
-            if !source.calibrated {
-                linearization.by_parameters = linearization.by_parameters.columns(0, 0).into_owned();
+    let now = report.window.iter().zip(states).map(|(frame, state)| {
+        let mut state = state.clone();
+        state.navigation.world_from_imu = frame.world_from_imu;
+        state.navigation.velocity_m_per_s = frame.velocity_m_per_s;
+        state.joints_rad.clone_from(&frame.joint_angles_rad);
+        let seen = camera_pose::when_seen(&state, now_s);
+        let mounted = match rigid {
+            Some((_, mount)) => *mount,
+            // With its clock right the camera is where the report has it.
+            None if now_s == 0.0 => frame.imu_from_camera,
+            None => {
+                // The joints moved on meanwhile; how far is hardly another thing at the first estimate.
+                let moved =
+                    chain.imu_from_camera(&state.joints_rad).inverse() * chain.imu_from_camera(&seen.joints_rad);
+                frame.imu_from_camera * moved
             }
-            camera_map(&world_from_imu.rotation_matrix(), joints.len(), &linearization)
-        })
-        .collect();
+        };
+        let pose = seen.navigation.world_from_imu * mounted;
+        CameraPose { rotation: pose.rotation_matrix(), position_m: pose.translation_m }
+    });
+    let current: Vec<CameraPose> = now.collect();
     let (sigma_px, loss, landmark_model) = (source.pixel_sigma_px, source.loss, source.landmark_model);
     WindowCamera {
         model: VisualModel { camera: model, sigma_px, loss, landmark_model },

@@ -1,14 +1,19 @@
 //! What a report keeps of the step's Jacobian, so that any of its blocks can be written out again.
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, Quaternion, UnitQuaternion, Vector3};
 
+use super::calibrations::Calibrations;
 use super::estimator::Estimator;
+use super::layout::POSE;
 use super::linearization::{column_blocks, column_order};
 use super::options::{LandmarkModel, RobustLoss};
 use super::rows::stack_columns;
 use super::tracking::SolvedWindow;
-use super::window::FrameState;
+use super::window::{FrameState, Rates};
 use super::{ColumnBlock, ColumnGroup, allocated_bytes};
+use super::{ImuBias, NavigationState};
 use crate::geometry::RigidTransform;
 use crate::gimbal::Chain;
 
@@ -22,6 +27,10 @@ pub struct JacobianSource {
     frames: Box<[f32]>,
     /// The chains at which derivatives are taken, by camera.
     pub(super) chains: Box<[Chain]>,
+    /// By camera, the offsets of the clocks that are estimated; empty where none is.
+    pub(super) clocks: Box<[ClockColumns]>,
+    /// By slot, where clocks are estimated: rates of the body's rotation and of its position, then those of the joints.
+    rates: Box<[f32]>,
     /// Whether the calibration has columns.
     pub(super) calibrated: bool,
     /// Places among the report's features of the rejected ones, which have no landmark there, and their unit directions in
@@ -34,6 +43,15 @@ pub struct JacobianSource {
     pub(super) pixel_sigma_px: f64,
     pub(super) loss: RobustLoss,
     pub(super) landmark_model: LandmarkModel,
+}
+
+/// Offsets of clocks that are estimated with a camera.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct ClockColumns {
+    /// How many: the camera's, then the encoders'.
+    pub(super) count: usize,
+    /// The camera's where derivatives are taken, and as it is estimated, beyond what the rig says.
+    pub(super) shifts_s: [f64; 2],
 }
 
 /// Rows that are neither of features nor of encoders.
@@ -52,6 +70,32 @@ enum PackedKind {
     Standstill,
     CalibrationPrior,
     MarginalizationPrior,
+}
+
+impl PackedKind {
+    /// What it stands for, with frames of these numbers.
+    fn factor(self, numbers: &[usize]) -> Option<JacobianFactor> {
+        Some(match self {
+            Self::Inertial(slot) => {
+                let slot = usize::from(slot);
+                let from = numbers.get(slot.checked_sub(1)?)?;
+                JacobianFactor::Inertial { from: *from, to: *numbers.get(slot)? }
+            }
+            Self::Standstill => JacobianFactor::Standstill,
+            Self::CalibrationPrior => JacobianFactor::CalibrationPrior,
+            Self::MarginalizationPrior => JacobianFactor::MarginalizationPrior,
+        })
+    }
+}
+
+/// The rows of a factor that is not a feature's.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FactorRows {
+    /// Whose they are.
+    pub factor: JacobianFactor,
+    /// By the columns of the step (calibration, joints, poses, speeds and biases), whitened; the residual last, at the final
+    /// estimate.
+    pub rows: DMatrix<f64>,
 }
 
 /// Where residuals come from.
@@ -98,6 +142,8 @@ impl JacobianSource {
     pub(super) fn heap_bytes(&self) -> usize {
         allocated_bytes(size_of_val(&*self.frames))
             + allocated_bytes(size_of_val(&*self.chains))
+            + allocated_bytes(size_of_val(&*self.clocks))
+            + allocated_bytes(size_of_val(&*self.rates))
             + self.chains.iter().map(|chain| allocated_bytes(chain.dof() * size_of::<f64>())).sum::<usize>()
             + allocated_bytes(size_of_val(&*self.rejected))
             + allocated_bytes(size_of_val(&*self.rows))
@@ -105,8 +151,25 @@ impl JacobianSource {
             + allocated_bytes(size_of_val(&*self.norms))
     }
 
-    /// Pose of the IMU and joint angles by slot, for frames of so many joints.
-    pub(super) fn frames(&self, joints: usize) -> Vec<(RigidTransform, Vec<f64>)> {
+    /// States by slot, for frames of so many joints; speeds and rates only where clocks are estimated, biases taken off.
+    pub(super) fn frames(&self, joints: usize) -> Vec<FrameState> {
+        let mut rates = self.rates.chunks_exact(POSE + joints);
+        let states = self.poses(joints).into_iter().map(|(world_from_imu, joints_rad)| {
+            let rates: Vec<f64> = rates.next().unwrap_or_default().iter().map(|rate| f64::from(*rate)).collect();
+            let three = |from: usize| rates.get(from..from + 3).map_or_else(Vector3::zeros, Vector3::from_column_slice);
+            FrameState {
+                navigation: NavigationState { world_from_imu, velocity_m_per_s: three(3), bias: ImuBias::default() },
+                joints_rad,
+                rates: Arc::new(Rates {
+                    gyroscope_rad_per_s: three(0),
+                    joints_rad_per_s: rates.get(POSE..).unwrap_or_default().to_vec(),
+                }),
+            }
+        });
+        states.collect()
+    }
+
+    fn poses(&self, joints: usize) -> Vec<(RigidTransform, Vec<f64>)> {
         let unpacked = |numbers: &[f32]| {
             let number = |place: usize| f64::from(numbers[place]);
             let rotation = Quaternion::new(number(3), number(0), number(1), number(2));
@@ -123,16 +186,7 @@ impl JacobianSource {
         self.rows.iter().filter_map(move |row| {
             let range = begin..begin + usize::from(row.count);
             begin = range.end;
-            let factor = match row.kind {
-                PackedKind::Inertial(slot) => {
-                    let slot = usize::from(slot);
-                    let from = numbers.get(slot.checked_sub(1)?)?;
-                    JacobianFactor::Inertial { from: *from, to: *numbers.get(slot)? }
-                }
-                PackedKind::Standstill => JacobianFactor::Standstill,
-                PackedKind::CalibrationPrior => JacobianFactor::CalibrationPrior,
-                PackedKind::MarginalizationPrior => JacobianFactor::MarginalizationPrior,
-            };
+            let factor = row.kind.factor(numbers)?;
             let norms = self.columns[range.clone()].iter().copied().zip(self.norms[range].iter().copied());
             Some(JacobianRow { factor, height: usize::from(row.height), norms: norms.collect() })
         })
@@ -143,8 +197,8 @@ impl JacobianSource {
 const POSE_NUMBERS: usize = 7;
 
 impl Estimator {
-    /// The source of the Jacobian at the final estimate.
-    pub(super) fn jacobian_source(&self, solved: &SolvedWindow) -> JacobianSource {
+    /// The source of the Jacobian at the final estimate, and the rows that are not of features where they are to be kept.
+    pub(super) fn jacobian_source(&self, solved: &SolvedWindow) -> (JacobianSource, Vec<FactorRows>) {
         let problem = self.problem(&solved.cameras);
         let estimate = &solved.solution.estimate;
         let layout = problem.layout;
@@ -156,10 +210,17 @@ impl Estimator {
         let order = column_order(&layout);
         let mut packed = Vec::new();
         let mut norms: Vec<(u16, f32)> = Vec::new();
+        let mut kept = Vec::new();
         let mut push = |kind: PackedKind, rows: &DMatrix<f64>| {
             if rows.nrows() > 0 {
                 let jacobian = stack_columns(std::slice::from_ref(rows), order.iter().copied());
                 let own = norms_of(&jacobian, &columns, &scales);
+                if let Some(factor) = kind.factor(&numbers).filter(|_| self.config.options.keep_factor_rows) {
+                    let last = jacobian.ncols();
+                    let mut rows_with_residual = jacobian.resize_horizontally(last + 1, 0.0);
+                    rows_with_residual.set_column(last, &rows.column(layout.total()));
+                    kept.push(FactorRows { factor, rows: rows_with_residual });
+                }
                 packed.push(PackedRow { kind, height: rows.nrows() as u16, count: own.len() as u16 });
                 norms.extend(own);
             }
@@ -181,7 +242,21 @@ impl Estimator {
         });
         let rejected = rejected.enumerate().filter(|(_, (rejected, _))| *rejected);
         let options = &self.config.options;
-        JacobianSource {
+        let clocked = |calibrations: &Calibrations, camera: usize| {
+            let calibration = calibrations.of(camera);
+            (calibration.dof().saturating_sub(calibration.chain().dof()), calibration.camera_shift_s())
+        };
+        let clocks: Vec<ClockColumns> = (0..calibration.cameras())
+            .map(|camera| {
+                let ((count, then), (_, now)) = (clocked(&calibration, camera), clocked(&estimate.calibration, camera));
+                ClockColumns { count, shifts_s: [then, now] }
+            })
+            .collect();
+        let any = clocks.iter().any(|clocks| clocks.count > 0);
+        let rates = |state: &FrameState| state.motion().iter().map(|rate| *rate as f32).collect::<Vec<f32>>();
+        let source = JacobianSource {
+            rates: if any { frames.iter().flat_map(rates).collect() } else { Box::default() },
+            clocks: if any { clocks.into() } else { Box::default() },
             frames: frames.iter().flat_map(packed_frame).collect(),
             chains: (0..calibration.cameras()).map(|camera| calibration.of(camera).chain().clone()).collect(),
             calibrated: layout.calibration > 0,
@@ -192,15 +267,17 @@ impl Estimator {
             pixel_sigma_px: options.pixel_sigma_px,
             loss: options.loss,
             landmark_model: options.landmark_model,
-        }
+        };
+        (source, kept)
     }
 }
 
-/// What 1 means in a column of a group, so that columns compare: 10° for angles, 3 cm for lengths, 0.1 m/s, 1 °/s,
-/// 0.1 m/s² and a tenth of the inverse depth.
+/// What 1 means in a column of a group, so that columns compare: 10° for angles, 3 cm for lengths, 20 ms for clocks,
+/// 0.1 m/s, 1 °/s, 0.1 m/s² and a tenth of the inverse depth.
 ///
 /// `unit` is that of a calibration parameter, `place` the column's place in its block.
 pub fn column_scale(group: ColumnGroup, unit: &str, place: usize) -> f64 {
+    const TIME_S: f64 = 0.02;
     const ANGLE_RAD: f64 = 10.0 * std::f64::consts::PI / 180.0;
     const LENGTH_M: f64 = 0.03;
     const SPEED_M_PER_S: f64 = 0.1;
@@ -209,6 +286,7 @@ pub fn column_scale(group: ColumnGroup, unit: &str, place: usize) -> f64 {
     const INVERSE_DEPTH: f64 = 0.1;
     match (group, place) {
         (ColumnGroup::Calibration, _) if unit == "rad" => ANGLE_RAD,
+        (ColumnGroup::Calibration, _) if unit == "s" => TIME_S,
         (ColumnGroup::Joints, _) | (ColumnGroup::Pose, 0..3) => ANGLE_RAD,
         (ColumnGroup::Calibration | ColumnGroup::Pose, _) => LENGTH_M,
         (ColumnGroup::SpeedBias, 0..3) => SPEED_M_PER_S,

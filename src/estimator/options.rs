@@ -121,6 +121,8 @@ pub struct EstimatorOptions {
     pub min_landmarks: usize,
     /// Fill [`super::StepReport::linearization`].
     pub keep_linearization: bool,
+    /// Keep the rows of the factors that are not of features in every report, too: [`super::StepReport::factor_rows`].
+    pub keep_factor_rows: bool,
 }
 
 impl Default for EstimatorOptions {
@@ -157,6 +159,7 @@ impl Default for EstimatorOptions {
             max_blind_frames: 20,
             min_landmarks: 6,
             keep_linearization: false,
+            keep_factor_rows: false,
         }
     }
 }

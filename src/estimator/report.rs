@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, Vector2, Vector3};
 
-use super::{JacobianSource, Observations};
+use super::{FactorRows, InformationGain, JacobianSource, Observations};
 use crate::frontend::FeatureId;
 use crate::geometry::RigidTransform;
 use crate::gimbal::{Chain, ClassicalChain};
@@ -265,6 +265,8 @@ pub struct ColumnBlock {
 pub struct Linearization {
     /// Column blocks in order: calibration, joints, poses, speed-biases.
     pub columns: Vec<ColumnBlock>,
+    /// Names of calibration parameters that are held at their values: they are known, and have no columns.
+    pub held: Vec<String>,
     /// Jacobian of the measurements, rows whitened.
     pub jacobian: DMatrix<f64>,
     /// Jacobian of the priors (rig prior on the calibration, marginalization prior), same columns, whitened.
@@ -330,6 +332,10 @@ pub struct StepReport {
     /// What the blocks of the Jacobian can be written out from ([`StepReport::jacobian`]), when the linearization was asked
     /// for and the estimator is tracking.
     pub jacobian_source: Option<JacobianSource>,
+    /// The rows of the factors that are not of features, when they were asked for and the estimator is tracking.
+    pub factor_rows: Option<Vec<FactorRows>>,
+    /// What the newest image tells about the calibration, when the linearization was asked for and the estimator is tracking.
+    pub gain: Option<InformationGain>,
     /// Whether the frame is a keyframe.
     pub keyframe: bool,
     /// Stage timings (the only part of a report that differs between replays).

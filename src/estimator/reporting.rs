@@ -34,6 +34,8 @@ impl Estimator {
             iterations: Vec::new(),
             linearization: None,
             jacobian_source: None,
+            factor_rows: None,
+            gain: None,
             keyframe: false,
             times: StageTimes::default(),
             warnings: Vec::new(),
@@ -57,8 +59,11 @@ impl Estimator {
         report.iterations = std::mem::take(&mut solved.solution.iterations);
         let reported_ms = (self.config.clock_ms)();
         if self.config.options.keep_linearization {
-            report.linearization = Some(self.linearization(solved));
-            report.jacobian_source = Some(self.jacobian_source(solved));
+            let (linearization, gain) = self.linearization(solved);
+            (report.linearization, report.gain) = (Some(linearization), gain);
+            let (source, rows) = self.jacobian_source(solved);
+            report.jacobian_source = Some(source);
+            report.factor_rows = self.config.options.keep_factor_rows.then_some(rows);
         }
         report.times.report_ms = reported_ms - begin_ms;
         report.times.linearize_ms = (self.config.clock_ms)() - reported_ms;

@@ -9,6 +9,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use super::material::{Material, Materials};
 use super::recording::StepRecord;
 use super::run_engine::RunEngine;
+use crate::estimator::FactorRows;
 
 /// Steps between two snapshots while there is room for all of them.
 const CLOSEST_SPACING: usize = 16;
@@ -167,6 +168,14 @@ impl History {
             }
         }
         Some(steps)
+    }
+
+    /// The rows of a step's factors that are not of features, taken again; `None` for a step that has not been taken or has
+    /// none.
+    pub fn factor_rows(&self, step: usize) -> Option<Vec<FactorRows>> {
+        let (mut engine, material) = (self.engine_before(step)?, self.materials.get(step)?);
+        engine.estimator_mut().set_keep_factor_rows();
+        engine.step(&material).report.factor_rows
     }
 
     /// The states that the solver went through in a step, as reports of their own: before its first iteration, after it,

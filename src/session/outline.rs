@@ -35,6 +35,8 @@ impl StepRecord {
                 linearization: report.linearization.clone(),
                 // Worth nothing without the features.
                 jacobian_source: None,
+                factor_rows: None,
+                gain: report.gain.clone(),
                 keyframe: report.keyframe,
                 times: report.times,
                 warnings: report.warnings.clone(),

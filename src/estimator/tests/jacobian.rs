@@ -3,7 +3,9 @@
 use super::fixture;
 use super::flight::fly;
 use crate::camera::CameraModel;
-use crate::estimator::{ColumnGroup, EstimatorOptions, JacobianFactor, Linearization, StepJacobian, StepReport};
+use crate::estimator::{
+    ColumnGroup, EstimatorOptions, FactorRows, JacobianFactor, Linearization, StepJacobian, StepReport,
+};
 use crate::gimbal::Parameterization;
 use crate::simulation::{SyntheticOptions, synthetic_tracks};
 
@@ -51,22 +53,62 @@ pub(super) fn check(report: &StepReport, cameras: &[&CameraModel]) -> StepJacobi
     jacobian
 }
 
+/// Holds the rows of the other factors against the norms of their blocks and the χ² of their kind.
+fn check_factor_rows(report: &StepReport, jacobian: &StepJacobian) {
+    let all = report.factor_rows.as_ref().expect("they were asked for");
+    let units = &report.calibration.units;
+    for FactorRows { factor, rows } in all {
+        let row = jacobian.rows.iter().find(|row| row.factor == *factor).expect("its norms are kept");
+        assert_eq!(row.height, rows.nrows());
+        let blocks = &jacobian.columns[..jacobian.columns.len() - 1];
+        assert_eq!(rows.ncols(), blocks.iter().map(|block| block.len).sum::<usize>() + 1);
+        for (number, block) in blocks.iter().enumerate() {
+            let unit = units.get(number).copied().unwrap_or_default();
+            let scale = |place: usize| crate::estimator::column_scale(block.group, unit, place);
+            let column = |place: usize| rows.column(block.start + place) * scale(place);
+            let squared: f64 = (0..block.len).map(|place| column(place).norm_squared()).sum();
+            let kept = row.norms.iter().find(|(known, _)| usize::from(*known) == number);
+            let kept = kept.map_or(0.0, |(_, norm)| f64::from(*norm));
+            assert!((squared.sqrt() - kept).abs() <= 1e-5 * kept, "{factor:?}, {}: {kept}", block.name);
+        }
+    }
+    let chi2 = |wanted: fn(&JacobianFactor) -> bool| -> f64 {
+        let of = all.iter().filter(|rows| wanted(&rows.factor));
+        of.map(|rows| rows.rows.column(rows.rows.ncols() - 1).norm_squared()).sum()
+    };
+    for (kind, measured) in [
+        ("imu", chi2(|factor| matches!(factor, JacobianFactor::Inertial { .. }))),
+        ("calibration prior", chi2(|factor| *factor == JacobianFactor::CalibrationPrior)),
+        ("marginalization prior", chi2(|factor| *factor == JacobianFactor::MarginalizationPrior)),
+    ] {
+        let told = report.residuals.iter().find(|summary| summary.factor == kind).expect("every kind is told");
+        assert!((told.chi2_after - measured).abs() < 1e-9 + 1e-6 * measured, "{kind}: {measured} for {told:?}");
+    }
+}
+
 #[test]
 fn blocks_are_those_of_the_linearization() {
-    for (parameterization, calibrate) in
-        [(Parameterization::Classical, true), (Parameterization::Minimal, true), (Parameterization::Minimal, false)]
-    {
+    for (parameterization, calibrate, clocks) in [
+        (Parameterization::Classical, true, false),
+        (Parameterization::Minimal, true, false),
+        (Parameterization::Minimal, false, false),
+        (Parameterization::Minimal, true, true),
+    ] {
         let flight =
             synthetic_tracks(&SyntheticOptions { duration_s: 5.0, features: 60, ..SyntheticOptions::default() });
-        let options = EstimatorOptions { keep_linearization: true, ..EstimatorOptions::default() };
+        let options =
+            EstimatorOptions { keep_linearization: true, keep_factor_rows: true, ..EstimatorOptions::default() };
         let mut config = fixture::config(&flight.given_rig, parameterization, options);
-        config.calibrate = calibrate;
+        (config.calibrate, config.estimate_timeshift) = (calibrate, clocks);
         let camera = config.camera.clone();
         let (_, reports) = fly(&flight.frames, config);
         let report = reports.last().unwrap();
         let jacobian = check(report, &[&camera]);
         let of = |wanted: fn(&JacobianFactor) -> bool| jacobian.rows.iter().filter(|row| wanted(&row.factor)).count();
         let frames = report.window.len();
+        let timed = jacobian.columns.iter().filter(|block| block.name.ends_with("timeshift")).count();
+        assert_eq!(timed, if clocks { 2 } else { 0 });
+        check_factor_rows(report, &jacobian);
         assert_eq!(of(|factor| matches!(factor, JacobianFactor::Feature(_))), report.features.len());
         assert_eq!(of(|factor| matches!(factor, JacobianFactor::Inertial { .. })), frames - 1);
         assert_eq!(of(|factor| matches!(factor, JacobianFactor::Encoder(_))), frames);

@@ -1,11 +1,15 @@
 //! The inspector: all numbers of what is selected, and of the step at the cursor.
 
 mod feature;
+mod links;
 mod parameter;
 mod step;
 
+use std::sync::Arc;
+
 use egui::{CollapsingHeader, Grid, RichText, ScrollArea, Ui, vec2};
 
+use self::links::Links;
 use super::PanelContext;
 use super::convergence::empty_ui;
 use super::theme::Theme;
@@ -16,11 +20,11 @@ use crate::session::{RunRecord, StepRecord};
 pub struct InspectorPanel {
     /// Whether stage timings are shown: they differ from run to run, and pictures must not.
     pub show_times: bool,
+    links: Links,
 }
 
 impl InspectorPanel {
     /// Draws the panel.
-    #[expect(clippy::needless_pass_by_ref_mut, reason = "all panels are called alike")]
     pub fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
         let recording = ctx.recording;
         let run = ctx.selection.run.min(recording.runs.len().saturating_sub(1));
@@ -34,7 +38,7 @@ impl InspectorPanel {
         });
     }
 
-    fn sections_ui(&self, ui: &mut Ui, ctx: &mut PanelContext<'_>, run: &RunRecord, step: &StepRecord) {
+    fn sections_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>, run: &RunRecord, step: &Arc<StepRecord>) {
         if ctx.selection.parameter.is_some() || ctx.selection.feature.is_some() {
             let clear = ui.small_button("Clear selection").on_hover_text("Escape");
             if clear.clicked() {
@@ -42,10 +46,21 @@ impl InspectorPanel {
             }
         }
         if let Some(name) = ctx.selection.parameter.clone() {
-            section_ui(ui, ctx.theme, &format!("Parameter {name}"), |ui| parameter::ui(ui, ctx, run, step, &name));
+            let title = format!("Parameter {name}");
+            section_ui(ui, ctx.theme, &title, |ui| {
+                parameter::ui(ui, ctx, run, step, &name);
+                self.links.of_parameter_ui(ui, ctx, run, step, &name);
+            });
         }
         if let Some(id) = ctx.selection.feature {
-            section_ui(ui, ctx.theme, &format!("Feature {}", id.0), |ui| feature::ui(ui, ctx, step, id));
+            section_ui(ui, ctx.theme, &format!("Feature {}", id.0), |ui| {
+                feature::ui(ui, ctx, step, id);
+                self.links.of_feature_ui(ui, ctx, run, step, id);
+            });
+        }
+        if let (Some(id), Some(name)) = (ctx.selection.feature, ctx.selection.parameter.clone()) {
+            let title = format!("Block feature {} by {name}", id.0);
+            section_ui(ui, ctx.theme, &title, |ui| links::block_ui(ui, ctx, run, step, id, &name));
         }
         let title = format!("Frame {}", step.report.frame_index);
         section_ui(ui, ctx.theme, &title, |ui| step::frame_ui(ui, ctx, run, step));

@@ -2,6 +2,7 @@
 
 use egui::{Grid, Label, RichText, ScrollArea, Ui, vec2};
 
+use super::factors::FactorsUi;
 use super::model::{JacobianModel, cameras, name_of, scale_words};
 use crate::estimator::{ColumnBlock, ColumnGroup, FeatureRows, JacobianFactor};
 use crate::frontend::FeatureId;
@@ -30,11 +31,12 @@ pub(super) fn ui(
     step: &StepRecord,
     model: &JacobianModel,
     picked: (Option<usize>, Option<usize>),
+    factors: &FactorsUi,
 ) {
     ScrollArea::vertical().id_salt("block").auto_shrink(false).show(ui, |ui| {
         ui.spacing_mut().item_spacing = vec2(6.0, 2.0);
         match picked {
-            (Some(row), Some(column)) => block_ui(ui, ctx, run, step, model, row, column),
+            (Some(row), Some(column)) => block_ui(ui, ctx, run, step, model, (row, column), factors),
             (Some(row), None) => line_ui(ui, ctx, &strongest_columns(step, model, row)),
             (None, Some(column)) => line_ui(ui, ctx, &strongest_rows(model, column)),
             (None, None) => {}
@@ -88,8 +90,8 @@ fn block_ui(
     run: &RunRecord,
     step: &StepRecord,
     model: &JacobianModel,
-    row: usize,
-    column: usize,
+    (row, column): (usize, usize),
+    factors: &FactorsUi,
 ) {
     line_ui(ui, ctx, &headline(step, model, row, column));
     match model.jacobian.rows[row].factor {
@@ -112,6 +114,11 @@ fn block_ui(
                 let text =
                     format!("all residuals of this kind: χ² {before} before, {after} after, {} rows", summary.count);
                 ui.label(RichText::new(text).color(ctx.theme.text));
+            }
+            if let JacobianFactor::Encoder(frame) = factor {
+                readings_ui(ui, ctx, step, model, frame, column);
+            } else {
+                factors.block_ui(ui, ctx, step, model, factor, column);
             }
         }
     }
@@ -155,6 +162,56 @@ fn sightings_ui(
             }
             for cell in cells {
                 ui.label(RichText::new(cell).monospace().color(theme.text_strong));
+            }
+            ui.end_row();
+        }
+    });
+}
+
+/// A row for each encoder: its reading, its residual, and how that follows the unknown.
+fn readings_ui(
+    ui: &mut Ui,
+    ctx: &PanelContext<'_>,
+    step: &StepRecord,
+    model: &JacobianModel,
+    frame: usize,
+    column: usize,
+) {
+    let block = &model.jacobian.columns[column];
+    let Some(frame) = step.report.window.iter().find(|state| state.frame_index == frame) else { return };
+    let (Some(readings), Some(sigmas)) = (&frame.encoder_angles_rad, &frame.encoder_sigmas_rad) else { return };
+    let own = block.group == ColumnGroup::Joints && block.name.ends_with(&format!(" {}", frame.frame_index));
+    let lines = readings.iter().zip(sigmas).zip(&frame.joint_angles_rad).enumerate();
+    let lines = lines.map(|(joint, ((reading, sigma), angle))| {
+        let slope =
+            if own { format!("{} in q{}", figure(sigma.recip().to_radians()), joint + 1) } else { "–".to_owned() };
+        vec![
+            (joint + 1).to_string(),
+            fixed(reading.to_degrees(), 3),
+            fixed(angle.to_degrees(), 3),
+            fixed(sigma.to_degrees(), 3),
+            fixed(crate::geometry::wrap_angle(angle - reading) / sigma, 2),
+            slope,
+        ]
+    });
+    numbers_ui(ui, ctx, &["joint", "reading °", "estimate °", "σ °", "residual σ", "∂ σ/°"].map(str::to_owned), lines);
+}
+
+/// A table of numbers with headings.
+pub(super) fn numbers_ui(
+    ui: &mut Ui,
+    ctx: &PanelContext<'_>,
+    heads: &[String],
+    lines: impl Iterator<Item = Vec<String>>,
+) {
+    Grid::new("block numbers").striped(true).spacing(vec2(9.0, 1.0)).min_row_height(14.0).show(ui, |ui| {
+        for head in heads {
+            ui.label(RichText::new(head).small().color(ctx.theme.text_weak));
+        }
+        ui.end_row();
+        for cells in lines {
+            for cell in cells {
+                ui.label(RichText::new(cell).monospace().color(ctx.theme.text_strong));
             }
             ui.end_row();
         }

@@ -3,6 +3,7 @@
 //! Rows are the factors that residuals come from, columns the unknowns; a block is coloured by its norm.
 
 mod details;
+mod factors;
 mod model;
 mod paint;
 #[cfg(test)]
@@ -12,6 +13,7 @@ use std::sync::Arc;
 
 use egui::{Pos2, Rect, Response, Role, Sense, Ui, Vec2, WidgetInfo, pos2, vec2};
 
+use self::factors::FactorsUi;
 use self::model::JacobianModel;
 pub(super) use self::model::{cameras, name_of};
 use super::PanelContext;
@@ -35,7 +37,10 @@ const DETAILS_LINE: f32 = 34.0;
 /// State of the Jacobian panel.
 #[derive(Default)]
 pub struct JacobianPanel {
+    /// Whether steps are taken again on a thread of their own, as in the window; pictures wait for them.
+    pub in_background: bool,
     model: Option<JacobianModel>,
+    factors: FactorsUi,
     mesh: paint::CachedMesh,
     view: View,
     /// The picked row, when it is not a feature's (those are selected everywhere).
@@ -79,7 +84,9 @@ impl JacobianPanel {
         }
         // Taken out while it is drawn, so that the rest of the panel can change.
         let Some(model) = self.model.take() else {
-            empty_ui(ui, "No linearization in this step");
+            let again = run.index_at(ctx.cursor_ns).is_some_and(|number| run.steps[number].outlined);
+            let why = if again { "Taking this step again…" } else { "No linearization in this step" };
+            empty_ui(ui, why);
             return;
         };
         self.model_ui(ui, ctx, run, step, &model);
@@ -91,7 +98,7 @@ impl JacobianPanel {
         ui: &mut Ui,
         ctx: &mut PanelContext<'_>,
         run: &RunRecord,
-        step: &StepRecord,
+        step: &Arc<StepRecord>,
         model: &JacobianModel,
     ) {
         let height = ui.available_height();
@@ -125,7 +132,10 @@ impl JacobianPanel {
         let (_, legend) = ui.allocate_space(vec2(ui.available_width(), LEGEND));
         paint::legend(ui, ctx.theme, legend, model);
         if let Some(picked) = picked.filter(|_| with_details) {
-            details::ui(ui, ctx, run, step, model, picked);
+            let step_number = run.index_at(ctx.cursor_ns);
+            let factor = picked.0.map(|row| model.jacobian.rows[row].factor);
+            self.factors.look(run, step, step_number, factor, self.in_background);
+            details::ui(ui, ctx, run, step, model, picked, &self.factors);
         }
     }
 

@@ -166,6 +166,7 @@ fn columns_of(jacobian: &StepJacobian) -> Axis {
 pub(super) fn scale_words(group: ColumnGroup, unit: &str) -> &'static str {
     match group {
         ColumnGroup::Calibration if unit == "m" => "σ per 3 cm",
+        ColumnGroup::Calibration if unit == "s" => "σ per 20 ms",
         ColumnGroup::Calibration | ColumnGroup::Joints => "σ per 10°",
         ColumnGroup::Pose => "σ per 10° and 3 cm",
         ColumnGroup::SpeedBias => "σ per 0.1 m/s, 1 °/s and 0.1 m/s²",

@@ -1,0 +1,148 @@
+//! What is linked through the step's Jacobian: residuals, the features that they are of, and the parameters that move them.
+
+use std::sync::Arc;
+
+use egui::{RichText, Ui};
+
+use super::table_ui;
+use crate::estimator::{JacobianFactor, StepJacobian};
+use crate::frontend::FeatureId;
+use crate::gui::PanelContext;
+use crate::gui::jacobian::cameras;
+use crate::gui::units::{Shown, figure, fixed};
+use crate::session::{RunRecord, StepRecord};
+
+/// Links shown of one thing.
+const SHOWN: usize = 6;
+
+/// The Jacobian of the step that was asked for last.
+#[derive(Debug, Default)]
+pub(super) struct Links {
+    of: Option<(Arc<StepRecord>, Option<StepJacobian>)>,
+}
+
+impl Links {
+    fn jacobian(&mut self, ctx: &PanelContext<'_>, run: &RunRecord, step: &Arc<StepRecord>) -> Option<&StepJacobian> {
+        if !self.of.as_ref().is_some_and(|(known, _)| Arc::ptr_eq(known, step)) {
+            let cameras = cameras(&ctx.recording.rig, run, step);
+            self.of = Some((Arc::clone(step), step.report.jacobian(&cameras)));
+        }
+        self.of.as_ref()?.1.as_ref()
+    }
+
+    /// The features whose residuals follow a parameter most; a click selects one.
+    pub(super) fn of_parameter_ui(
+        &mut self,
+        ui: &mut Ui,
+        ctx: &mut PanelContext<'_>,
+        run: &RunRecord,
+        step: &Arc<StepRecord>,
+        name: &str,
+    ) {
+        let Some(jacobian) = self.jacobian(ctx, run, step) else { return };
+        let Some(column) = jacobian.columns.iter().position(|block| block.name == name) else { return };
+        let mut links: Vec<(FeatureId, f32)> = Vec::new();
+        for row in &jacobian.rows {
+            let norm = row.norms.iter().find(|(known, _)| usize::from(*known) == column);
+            if let (JacobianFactor::Feature(id), Some((_, norm))) = (row.factor, norm) {
+                links.push((id, *norm));
+            }
+        }
+        links.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let selected = ctx.selection.feature;
+        let names =
+            links.iter().take(SHOWN).map(|(id, norm)| (format!("feature {}", id.0), *norm, selected == Some(*id)));
+        if let Some(index) = links_ui(ui, ctx, "residuals that follow it most", names) {
+            let id = links[index].0;
+            ctx.selection.feature = (selected != Some(id)).then_some(id);
+        }
+    }
+
+    /// The parameters that a feature's residuals follow most; a click selects one.
+    pub(super) fn of_feature_ui(
+        &mut self,
+        ui: &mut Ui,
+        ctx: &mut PanelContext<'_>,
+        run: &RunRecord,
+        step: &Arc<StepRecord>,
+        id: FeatureId,
+    ) {
+        let parameters = step.report.calibration.names.len();
+        let Some(jacobian) = self.jacobian(ctx, run, step) else { return };
+        let Some(row) = jacobian.rows.iter().find(|row| row.factor == JacobianFactor::Feature(id)) else { return };
+        let mut links: Vec<(String, f32)> = Vec::new();
+        for (column, norm) in &row.norms {
+            let column = usize::from(*column);
+            if column < parameters {
+                links.push((jacobian.columns[column].name.clone(), *norm));
+            }
+        }
+        links.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let selected = ctx.selection.parameter.clone();
+        let names = links.iter().take(SHOWN);
+        let names = names.map(|(name, norm)| (name.clone(), *norm, selected.as_ref() == Some(name)));
+        if let Some(index) = links_ui(ui, ctx, "parameters that they follow most", names) {
+            let name = links.swap_remove(index).0;
+            ctx.selection.parameter = (selected.as_ref() != Some(&name)).then_some(name);
+        }
+    }
+}
+
+/// Links with the norms of their blocks; returns the one that was clicked.
+fn links_ui(
+    ui: &mut Ui,
+    ctx: &PanelContext<'_>,
+    title: &str,
+    links: impl Iterator<Item = (String, f32, bool)>,
+) -> Option<usize> {
+    let mut clicked = None;
+    ui.horizontal_wrapped(|ui| {
+        ui.label(RichText::new(title).color(ctx.theme.text_weak));
+        for (index, (name, norm, selected)) in links.enumerate() {
+            let text = RichText::new(format!("{name} ({})", figure(f64::from(norm)))).small();
+            let link = ui.selectable_label(selected, text);
+            if link.on_hover_text("Norm of the block in σ by 10° or 3 cm; a click selects it everywhere").clicked() {
+                clicked = Some(index);
+            }
+        }
+    });
+    clicked
+}
+
+/// Each residual of a feature with its derivative by a parameter.
+pub(super) fn block_ui(
+    ui: &mut Ui,
+    ctx: &PanelContext<'_>,
+    run: &RunRecord,
+    step: &StepRecord,
+    id: FeatureId,
+    name: &str,
+) {
+    let report = &step.report;
+    let cameras = cameras(&ctx.recording.rig, run, step);
+    let column = report.calibration.names.iter().position(|known| known == name);
+    let feature = report.features.iter().find(|feature| feature.id == id);
+    let written = report.feature_rows(&cameras, id).zip(report.jacobian_source.as_ref());
+    let (Some(column), Some(feature), Some((rows, source))) = (column, feature, written) else {
+        ui.label(RichText::new("No such block in this step").color(ctx.theme.text_weak));
+        return;
+    };
+    let shown = Shown::of(report.calibration.units.get(column).copied().unwrap_or_default());
+    let unit = shown.unit.trim();
+    let heads = ["frame", "residual u", "residual v", "χ²", &format!("∂u px/{unit}"), &format!("∂v px/{unit}")]
+        .map(str::to_owned);
+    let lines = rows.frame_indices.iter().enumerate().filter_map(|(place, frame)| {
+        let seen = feature.observations.iter().find(|seen| seen.frame_index == *frame)?;
+        let residual = seen.residual_after_px.map_or([f64::NAN; 2], |residual| [residual.x, residual.y]);
+        // Back from standard deviations to pixels.
+        let pixels = source.pixel_sigma_px() / seen.robust_weight.sqrt() / shown.factor;
+        let slopes = [0, 1].map(|axis| figure(rows.rows[(2 * place + axis, column)] * pixels));
+        let mut cells = vec![frame.to_string()];
+        cells.extend(residual.map(|pixel| fixed(pixel, 2)));
+        cells.push(figure(seen.chi2));
+        cells.extend(slopes);
+        Some(cells)
+    });
+    let heads: Vec<&str> = heads.iter().map(String::as_str).collect();
+    table_ui(ui, ctx.theme, "block", &heads, lines);
+}
