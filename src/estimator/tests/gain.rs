@@ -18,14 +18,14 @@ use crate::simulation::{Exercise, JointSwing, SyntheticMotion, SyntheticOptions,
 /// Windows with a prior, away from the truth.
 fn windows() -> Vec<(&'static str, Estimator)> {
     let options = EstimatorOptions { loss: RobustLoss::None, ..EstimatorOptions::default() };
-    let gimbal = |parameterization| fixture::window(parameterization, true, options.clone());
+    let gimbal = |parameterization| fixture::window(parameterization, true, options);
     let mut windows = vec![
         ("minimal", gimbal(Parameterization::Minimal)),
         ("classical", gimbal(Parameterization::Classical)),
         ("poe", gimbal(Parameterization::Poe)),
-        ("rigid", fixture::window(Parameterization::Minimal, false, options.clone())),
-        ("cluster", fixture::cluster_window(options.clone(), false)),
-        ("cluster with clocks", fixture::cluster_window(options.clone(), true)),
+        ("rigid", fixture::window(Parameterization::Minimal, false, options)),
+        ("cluster", fixture::cluster_window(options, false)),
+        ("cluster with clocks", fixture::cluster_window(options, true)),
     ];
     let mut frozen = gimbal(Parameterization::Classical);
     for name in ["EC.tx", "L1.d"] {
@@ -107,7 +107,7 @@ fn bits_by_definition(problem: &Problem<'_>, estimate: &Estimate, active: &[Acti
         let rows: Vec<usize> = (0..linearization.jacobian.nrows()).filter(clean).collect();
         let measured = linearization.jacobian.select_rows(&rows);
         let priors = &linearization.prior_jacobian;
-        let mut information = measured.tr_mul(&measured) + priors.tr_mul(&priors);
+        let mut information = measured.tr_mul(&measured) + priors.tr_mul(priors);
         for index in 0..information.nrows() {
             information[(index, index)] += 1e-6;
         }

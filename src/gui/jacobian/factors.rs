@@ -50,7 +50,7 @@ impl FactorsUi {
                 self.known = Some((Arc::clone(step), None));
                 return;
             };
-            self.coming = Some((Arc::clone(step), taken_again(Arc::clone(history), number, in_background)));
+            self.coming = Some((Arc::clone(step), taken_again(history, number, in_background)));
         }
         let told = self.coming.as_ref().map(|(_, coming)| coming.try_recv());
         if let Some(Err(TryRecvError::Empty)) = told {
@@ -78,7 +78,7 @@ impl FactorsUi {
             ui.ctx().request_repaint_after(REPAINT);
             return;
         }
-        let rows = self.known.as_ref().filter(|(known, _)| std::ptr::eq(&**known, step));
+        let rows = self.known.as_ref().filter(|(known, _)| std::ptr::eq(Arc::as_ptr(known), step));
         let rows = rows.and_then(|(_, rows)| rows.as_ref()?.iter().find(|rows| rows.factor == factor));
         let Some(FactorRows { rows, .. }) = rows else {
             note(ui, "Only the norms of this block were kept");
@@ -114,9 +114,9 @@ impl FactorsUi {
 }
 
 /// The rows of a step, as soon as it has been taken again.
-fn taken_again(history: Arc<History>, number: usize, in_background: bool) -> Receiver<Rows> {
+fn taken_again(history: &Arc<History>, number: usize, in_background: bool) -> Receiver<Rows> {
     let (sender, receiver) = channel();
-    let (later, given) = (sender.clone(), Arc::clone(&history));
+    let (later, given) = (sender.clone(), Arc::clone(history));
     let work = move || drop(later.send(given.factor_rows(number)));
     if !(in_background && Builder::new().name("factor rows".to_owned()).spawn(work).is_ok()) {
         // Nobody else has the receiver.

@@ -52,7 +52,7 @@ impl AdviceUi {
             }
             if !self.coming.as_ref().is_some_and(|(known, _)| fresh(known)) {
                 let situation = Situation::of_step(&step.report, rank, &ctx.recording.rig, &run.camera_key);
-                self.coming = Some((Arc::clone(step), asked(situation, in_background)));
+                self.coming = Some((Arc::clone(step), asked(situation.as_ref(), in_background)));
             }
             let told = self.coming.as_ref().map(|(_, coming)| coming.try_recv());
             if let Some(Err(TryRecvError::Empty)) = told {
@@ -84,15 +84,15 @@ impl AdviceUi {
 }
 
 /// The advice for a situation, as soon as it is there.
-fn asked(situation: Option<Situation>, in_background: bool) -> Receiver<Option<Advice>> {
+fn asked(situation: Option<&Situation>, in_background: bool) -> Receiver<Option<Advice>> {
     let (sender, receiver) = channel();
     let later = sender.clone();
-    let given = situation.clone();
+    let given = situation.cloned();
     let work = move || drop(later.send(given.as_ref().and_then(advise)));
     let started = in_background && Builder::new().name("advice".to_owned()).spawn(work).is_ok();
     if !started {
         // Nobody else has the receiver.
-        drop(sender.send(situation.as_ref().and_then(advise)));
+        drop(sender.send(situation.and_then(advise)));
     }
     receiver
 }

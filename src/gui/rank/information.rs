@@ -60,18 +60,19 @@ fn joint_names(ctx: &PanelContext<'_>) -> Vec<String> {
 
 /// All in one line.
 fn headline(rate: &InformationRate, joints: &[String]) -> String {
-    let mut text = format!("Told in the last {:.1} s: {:.2} bit/s", rate.duration_s, rate.total());
-    if let Some((motion, part)) = rate.leading(None) {
-        text += &format!(", most by {} ({part:.2})", motion.name(joints));
-    }
+    let most = rate
+        .leading(None)
+        .map_or_else(String::new, |(motion, part)| format!(", most by {} ({part:.2})", motion.name(joints)));
     let fastest = (0..rate.parameters.len())
-        .max_by(|a, b| rate.parameters[*a].bits_per_s.total_cmp(&rate.parameters[*b].bits_per_s));
-    if let Some(fastest) = fastest.filter(|fastest| rate.parameters[*fastest].bits_per_s > 0.0) {
+        .max_by(|a, b| rate.parameters[*a].bits_per_s.total_cmp(&rate.parameters[*b].bits_per_s))
+        .filter(|fastest| rate.parameters[*fastest].bits_per_s > 0.0);
+    let fastest = fastest.map_or_else(String::new, |fastest| {
         let parameter = &rate.parameters[fastest];
-        let by = rate.leading(Some(fastest)).map(|(motion, _)| format!(" by {}", motion.name(joints)));
-        text += &format!("; fastest {} {:.2}{}", parameter.name, parameter.bits_per_s, by.unwrap_or_default());
-    }
-    text
+        let by =
+            rate.leading(Some(fastest)).map_or_else(String::new, |(motion, _)| format!(" by {}", motion.name(joints)));
+        format!("; fastest {} {:.2}{by}", parameter.name, parameter.bits_per_s)
+    });
+    format!("Told in the last {:.1} s: {:.2} bit/s{most}{fastest}", rate.duration_s, rate.total())
 }
 
 fn table_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, rate: &InformationRate, joints: &[String]) {
