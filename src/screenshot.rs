@@ -78,13 +78,17 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<()> {
                 write_png(&draw_panel(panel, &recording, cursor_ns, shown.images(), &options)?, &path)?;
             }
             FormatArgument::Svg => {
-                let title = format!("{panel} of {} at {:.3} s", log_name(&recording.log_path), seconds_from_ns(cursor_ns));
+                let title =
+                    format!("{panel} of {} at {:.3} s", log_name(&recording.log_path), seconds_from_ns(cursor_ns));
                 let naming = ["clip", &title];
                 write_svg(&draw_panel_svg(panel, &recording, cursor_ns, shown.images(), &options, naming)?, &path)?;
             }
         }
         if arguments.csv {
-            write_csv(&panel_csv(panel, &recording, cursor_ns, shown.images(), &options)?, &path.with_extension("csv"))?;
+            write_csv(
+                &panel_csv(panel, &recording, cursor_ns, shown.images(), &options)?,
+                &path.with_extension("csv"),
+            )?;
         }
         if several {
             print(&format!("{}\n", path.display()))?;

@@ -396,7 +396,10 @@ fn rank(recording: &Recording, run: &RunRecord) -> Option<RankSummary> {
 }
 
 fn information(recording: &Recording, run: &RunRecord) -> Option<InformationSummary> {
-    let steps = run.steps.iter().filter_map(|step| Some((step.rank.as_ref()?, step.report.gain.as_ref()?)));
+    let steps = run
+        .steps
+        .iter()
+        .filter_map(|step| Some((step.rank.as_ref()?, step.report.gain.as_ref()?, step.report.keyframe)));
     let rate = information_rate(steps)?;
     let rig = &recording.rig;
     let joints: Vec<String> =

@@ -157,7 +157,7 @@ pub(super) fn information_csv(run: &RunRecord, rig: &Rig) -> String {
         rig.gimbal.iter().flat_map(|gimbal| &gimbal.joints).map(|joint| joint.name.clone()).collect();
     let told = || run.steps.iter().filter_map(|step| Some((step, step.rank.as_ref()?, step.report.gain.as_ref()?)));
     let count = told().map(|(_, _, gain)| gain.joints).max().unwrap_or(0);
-    let mut text = "t_s,interval_s,parameter,bits_per_s".to_owned();
+    let mut text = "t_s,keyframe,interval_s,parameter,bits_per_s".to_owned();
     for motion in Motion::all(count) {
         write!(text, ",{}", motion.name(&joints).replace(' ', "_")).expect(INTO_STRING);
     }
@@ -165,6 +165,7 @@ pub(super) fn information_csv(run: &RunRecord, rig: &Rig) -> String {
     for (step, rank, gain) in told().filter(|(_, rank, gain)| rank.names.len() == gain.columns()) {
         for (column, name) in rank.names.iter().enumerate() {
             text.push_str(&seconds_text(step.report.stamp_ns));
+            write!(text, ",{}", u8::from(step.report.keyframe)).expect(INTO_STRING);
             push_number(&mut text, gain.interval_s);
             write!(text, ",{}", parameter_name(name, rig)).expect(INTO_STRING);
             push_number(&mut text, gain.bits_per_s(column));

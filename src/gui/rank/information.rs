@@ -51,7 +51,9 @@ fn rate_before(run: &RunRecord, step: &StepRecord) -> Option<InformationRate> {
         let age_ns = stamp_ns - other.report.stamp_ns;
         (0..STRETCH_NS).contains(&age_ns)
     });
-    information_rate(steps.filter_map(|step| Some((step.rank.as_ref()?, step.report.gain.as_ref()?))))
+    information_rate(
+        steps.filter_map(|step| Some((step.rank.as_ref()?, step.report.gain.as_ref()?, step.report.keyframe))),
+    )
 }
 
 fn joint_names(ctx: &PanelContext<'_>) -> Vec<String> {
@@ -78,9 +80,11 @@ fn headline(rate: &InformationRate, joints: &[String]) -> String {
 fn table_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, rate: &InformationRate, joints: &[String]) {
     let theme = *ctx.theme;
     ui.label(
-        RichText::new("bit/s (one bit halves σ) of each parameter, and which motion they are owed to")
-            .small()
-            .color(theme.text_weak),
+        RichText::new(
+            "bit/s (one bit halves σ) that keyframes told of each parameter, and which motion they are owed to",
+        )
+        .small()
+        .color(theme.text_weak),
     );
     let mut order: Vec<usize> = (0..rate.parameters.len()).collect();
     order.sort_by_key(|index| part_of(&rate.parameters[*index].name));

@@ -27,8 +27,7 @@ pub enum Preset {
 
 impl Preset {
     /// All of them, in the order of their keys 1 to 5.
-    pub const ALL: [Self; 5] =
-        [Self::Overview, Self::Calibration, Self::FrontEnd, Self::Scene, Self::Comparison];
+    pub const ALL: [Self; 5] = [Self::Overview, Self::Calibration, Self::FrontEnd, Self::Scene, Self::Comparison];
 
     /// Its name.
     pub fn name(self) -> &'static str {
