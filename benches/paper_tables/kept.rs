@@ -46,5 +46,6 @@ impl Archive {
 /// Hash of the program that runs.
 pub(crate) fn program() -> Result<String> {
     let content = fs::read(std::env::current_exe()?)?;
-    Ok(Sha256::digest(content).iter().map(|byte| format!("{byte:02x}")).collect())
+    let bytes: Vec<String> = Sha256::digest(content).iter().map(|byte| format!("{byte:02x}")).collect();
+    Ok(bytes.concat())
 }
