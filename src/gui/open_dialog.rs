@@ -30,6 +30,11 @@ impl OpenDialog {
         self.open = true;
     }
 
+    /// Whether it is open.
+    pub fn is_open(&self) -> bool {
+        self.open
+    }
+
     /// Closes it.
     pub fn hide(&mut self) {
         self.open = false;
@@ -43,8 +48,8 @@ impl OpenDialog {
         let modal = Modal::new(Id::unique("open log")).frame(dialog_frame(theme));
         let response = modal.show(ui.ctx(), |ui| {
             ui.set_width(560.0);
-            ui.label(RichText::new("Open a flight log").size(15.0).color(theme.text_strong));
-            ui.label(RichText::new("A log can also be dropped onto the window").color(theme.text_weak));
+            ui.label(RichText::new("Open a flight log or a saved session").size(15.0).color(theme.text_strong));
+            ui.label(RichText::new("Either can also be dropped onto the window").color(theme.text_weak));
             ui.add_space(4.0);
             let chosen = self.path_box.ui(ui, theme, true, 300.0);
             ui.add_space(4.0);

@@ -70,7 +70,13 @@ fn drop_target_ui(ui: &mut Ui, theme: &Theme) {
     let center = rect.center();
     let font = egui::FontId::proportional(14.0);
     let above = center - vec2(0.0, 10.0);
-    ui.painter().text(above, egui::Align2::CENTER_CENTER, "Drop a flight log (.mcap) here", font, theme.text_strong);
+    ui.painter().text(
+        above,
+        egui::Align2::CENTER_CENTER,
+        "Drop a flight log (.mcap) or a session (.session.json) here",
+        font,
+        theme.text_strong,
+    );
     let below = center + vec2(0.0, 12.0);
     let font = egui::FontId::proportional(12.0);
     let text = "its rig lies beside it (.rig.yaml) or in it";

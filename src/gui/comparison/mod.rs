@@ -18,7 +18,9 @@ use super::rank;
 use crate::session::Comparison;
 
 /// From this size on everything is shown at once.
-const ROOM_FOR_ALL: Vec2 = vec2(1000.0, 520.0);
+const ROOM_FOR_ALL: Vec2 = vec2(960.0, 430.0);
+/// From this width on the two tables stand beside each other.
+const ROOM_FOR_BOTH_TABLES: f32 = 860.0;
 /// From this height on scenes are shown beside images.
 const ROOM_FOR_SCENES: f32 = 760.0;
 
@@ -129,10 +131,25 @@ impl ComparisonPanel {
     }
 
     fn numbers_ui(&self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
+        let wide = ui.available_width() >= ROOM_FOR_BOTH_TABLES;
         ScrollArea::both().id_salt("numbers").auto_shrink(false).show(ui, |ui| {
-            numbers::accuracy_ui(ui, ctx, &self.scores);
-            ui.add_space(6.0);
-            numbers::partings_ui(ui, ctx, self.reference, &self.comparisons);
+            let accuracy = |ui: &mut Ui, ctx: &mut PanelContext<'_>| {
+                ui.vertical(|ui| numbers::accuracy_ui(ui, ctx, &self.scores));
+            };
+            let partings = |ui: &mut Ui, ctx: &mut PanelContext<'_>| {
+                ui.vertical(|ui| numbers::partings_ui(ui, ctx, self.reference, &self.comparisons));
+            };
+            if wide {
+                ui.horizontal_top(|ui| {
+                    accuracy(ui, ctx);
+                    ui.add_space(24.0);
+                    partings(ui, ctx);
+                });
+            } else {
+                accuracy(ui, ctx);
+                ui.add_space(6.0);
+                partings(ui, ctx);
+            }
         });
     }
 

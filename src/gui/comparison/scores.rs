@@ -39,8 +39,9 @@ pub(crate) struct ScoreRow {
     /// By run, in that unit.
     pub(crate) values: Vec<Option<f64>>,
     /// Whether less is better; `None` where neither is.
-    less_is_better: Option<bool>,
-    decimals: Option<usize>,
+    pub(super) less_is_better: Option<bool>,
+    /// Digits behind the point, `None` for three significant ones.
+    pub(super) decimals: Option<usize>,
 }
 
 impl ScoreRow {
@@ -56,7 +57,9 @@ impl ScoreRow {
         let known = || self.values.iter().enumerate().filter_map(|(run, value)| Some((run, (*value)?)));
         let better = |a: &f64, b: &f64| if less { a.total_cmp(b) } else { b.total_cmp(a) };
         let (best, value) = known().min_by(|(_, a), (_, b)| better(a, b))?;
-        let alone = known().count() > 1 && known().all(|(run, other)| run == best || other != value);
+        // What looks the same is no better.
+        let differs = |run: usize, other: f64| other != value && self.text(run) != self.text(best);
+        let alone = known().count() > 1 && known().all(|(run, other)| run == best || differs(run, other));
         alone.then_some(best)
     }
 }

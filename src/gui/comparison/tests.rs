@@ -4,6 +4,7 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 
 use super::ComparisonPanel;
+use super::scores::ScoreRow;
 use crate::gui::sample_recording::{sample_images, sample_recording_of};
 use crate::gui::theme::{Theme, ThemeName};
 use crate::gui::{PanelContext, Playback, Selection};
@@ -52,7 +53,15 @@ fn numbers_tell_accuracy_and_lead_to_where_runs_part() {
     let rows = harness.state().panel.scores.rows();
     let rms = rows.iter().find(|row| row.name == "ATE RMS").unwrap();
     let [auto, classical] = [rms.values[0].unwrap(), rms.values[1].unwrap()];
-    assert_eq!(rms.best(), (auto != classical).then_some(usize::from(classical < auto)));
+    assert_eq!(rms.best(), (rms.text(0) != rms.text(1)).then_some(usize::from(classical < auto)));
+    let row = |values: [f64; 2]| {
+        let (name, values) = ("ATE RMS".to_owned(), values.map(Some).to_vec());
+        ScoreRow { name, unit: "m", values, less_is_better: Some(true), decimals: None }
+    };
+    assert_eq!(
+        [row([0.12, 0.11]), row([0.11, 0.12]), row([0.11, 0.110_000_1])].map(|row| row.best()),
+        [Some(1), Some(0), None]
+    );
     assert!(harness.query_all_by_label_contains(&rms.text(0)).next().is_some());
     let (first_ns, quantity) = harness.state().panel.comparisons[1].first_notable().unwrap();
     let time = format!("{} s", crate::gui::units::seconds(first_ns));

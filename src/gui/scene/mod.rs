@@ -130,7 +130,7 @@ impl ScenePanel {
     }
 
     fn controls_ui(&mut self, ui: &mut Ui) {
-        ui.horizontal(|ui| {
+        ui.horizontal_wrapped(|ui| {
             ui.selectable_value(&mut self.follow, Follow::Trajectory, "Trajectory")
                 .on_hover_text("Keep all trajectories in view");
             ui.selectable_value(&mut self.follow, Follow::Vehicle, "Vehicle").on_hover_text("Stay with the vehicle");

@@ -39,7 +39,7 @@ pub struct TimelinePanel {
 impl TimelinePanel {
     /// Height that shows the transport and all lanes of so many runs.
     pub fn height_for(runs: usize) -> f32 {
-        transport::HEIGHT + RULER_HEIGHT + LANE_HEIGHT * (runs + 6) as f32 + 10.0
+        transport::HEIGHT + RULER_HEIGHT + LANE_HEIGHT * (runs + 7) as f32 + 10.0
     }
 
     /// Draws the panel.

@@ -83,6 +83,13 @@ pub(crate) enum Action {
     Speed(f64),
 }
 
+impl Action {
+    /// Whether a dialog comes of it that takes all keys.
+    pub(crate) fn opens_dialog(self) -> bool {
+        matches!(self, Self::Palette | Self::Settings | Self::Open | Self::AddRun | Self::Fork)
+    }
+}
+
 /// One row of the table.
 pub(crate) struct Entry {
     /// What it does.

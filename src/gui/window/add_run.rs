@@ -50,6 +50,11 @@ impl AddRunDialog {
         self.open = true;
     }
 
+    /// Whether it is open.
+    pub fn is_open(&self) -> bool {
+        self.open
+    }
+
     /// Closes it.
     pub fn hide(&mut self) {
         self.open = false;

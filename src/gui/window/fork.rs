@@ -53,6 +53,11 @@ impl ForkDialog {
         self.open = true;
     }
 
+    /// Whether it is open.
+    pub fn is_open(&self) -> bool {
+        self.open
+    }
+
     /// Closes it.
     pub fn hide(&mut self) {
         self.open = false;

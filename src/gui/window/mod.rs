@@ -109,6 +109,15 @@ pub struct WindowState {
 }
 
 impl WindowState {
+    /// Whether a dialog is open that everything else waits for.
+    fn is_modal(&self) -> bool {
+        self.palette.is_open()
+            || self.settings_dialog.is_open()
+            || self.fork.is_open()
+            || self.add_run.is_open()
+            || self.open_dialog.is_open()
+    }
+
     fn close_dialogs(&mut self) {
         self.add_run.hide();
         self.fork.hide();
@@ -174,7 +183,13 @@ impl WindowState {
 pub fn window_ui(ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_>) {
     let theme = *ctx.theme;
     slide::update(ctx);
-    let mut actions: Vec<Action> = actions::pressed(ui);
+    // Behind a dialog keys mean nothing.
+    let mut actions: Vec<Action> = if state.is_modal() { Vec::new() } else { actions::pressed(ui) };
+    // A dialog takes the keys that come after the one that opens it, even in the same picture.
+    if let Some(opening) = actions.iter().copied().find(|action| action.opens_dialog()) {
+        actions.clear();
+        actions::perform(opening, state, ctx);
+    }
     state.panels.inspector.show_times = state.show_times;
 
     let bar = Frame::new().fill(theme.surface).inner_margin(Margin::symmetric(8, 3));
@@ -183,7 +198,7 @@ pub fn window_ui(ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_
     Panel::bottom("status bar").exact_size(22.0).frame(status).show(ui, |ui| status_bar::ui(ui, state, ctx));
     notices::banner_ui(ui, ctx);
 
-    let wanted = TimelinePanel::height_for(ctx.recording.runs.len()).min(0.22 * ui.available_height());
+    let wanted = TimelinePanel::height_for(ctx.recording.runs.len()).min(0.25 * ui.available_height());
     let frame = Frame::new().fill(theme.surface).inner_margin(Margin::symmetric(6, 4));
     let timeline = Panel::bottom("timeline").resizable(true).default_size(wanted).min_size(60.0).frame(frame);
     let timeline = timeline.show(ui, |ui| state.panels.timeline.ui(ui, ctx));

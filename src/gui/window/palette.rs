@@ -26,6 +26,11 @@ impl CommandPalette {
         *self = Self { open: true, ..Self::default() };
     }
 
+    /// Whether it is open.
+    pub fn is_open(&self) -> bool {
+        self.open
+    }
+
     /// Closes it.
     pub fn hide(&mut self) {
         self.open = false;
@@ -49,10 +54,12 @@ impl CommandPalette {
             ui.set_width(480.0_f32.min(ui.ctx().content_rect().width() - 60.0));
             let moved = moves(ui);
             let hint = "Type a command, a time (12.5), a frame, a feature, a parameter";
-            let edit = TextEdit::singleline(&mut self.typed).hint_text(hint).desired_width(f32::INFINITY);
+            // It has the focus before it is drawn, so that nothing typed at once is lost.
+            let id = ui.unique_id().with("command");
+            ui.memory_mut(|memory| memory.request_focus(id));
+            let edit = TextEdit::singleline(&mut self.typed).id(id).hint_text(hint).desired_width(f32::INFINITY);
             let edit = ui.add(edit);
             edit.widget_info(|| WidgetInfo::labeled(egui::Role::TextInput, true, "Command"));
-            edit.request_focus();
             if edit.changed() {
                 self.chosen = 0;
             }

@@ -119,7 +119,7 @@ fn tree_of(preset: Preset) -> Tree<PanelName> {
         let left = tabs(tiles, &[Comparison, Convergence, Residuals, Image, Scene, Jacobian, Laboratory]);
         let (rank, inspector) = (tabs(tiles, &[Rank]), tabs(tiles, &[Inspector, Breakpoints]));
         let right = split(tiles, Vertical, [rank, inspector], 0.56);
-        let root = split(tiles, Horizontal, [left, right], 0.8);
+        let root = split(tiles, Horizontal, [left, right], 0.76);
         return Tree::new(egui::Id::unique(("panels", preset.name())), root, all);
     }
     let (image, scene) = (tabs(tiles, &[Image]), tabs(tiles, &[Scene]));
