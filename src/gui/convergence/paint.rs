@@ -11,7 +11,7 @@ use crate::gui::PanelContext;
 use crate::gui::chain_values::NamedValues;
 use crate::gui::plot::{
     Clicks, PlotArea, navigate, paint_band, paint_cursor, paint_curve, paint_ground, paint_hatch, paint_line,
-    paint_value_grid, stretches_where, visible_range,
+    paint_value_grid, visible_range, visible_stretches,
 };
 use crate::gui::theme::{self, CURVE_WIDTH};
 use crate::gui::units::{Shown, fixed};
@@ -232,12 +232,8 @@ fn paint_knowledge(
     parameter: &ParameterHistory,
 ) {
     for state in [Knowledge::Weak, Knowledge::Unobservable, Knowledge::Waiting] {
-        for (begin_ns, end_ns) in stretches_where(&history.stamps_ns, |row| parameter.knowledge[row] == state) {
-            let stretch = Rect::from_x_y_ranges(area.x(begin_ns)..=area.x(end_ns), area.rect.y_range());
-            let stretch = stretch.intersect(area.rect);
-            if stretch.width() <= 0.0 {
-                continue;
-            }
+        for stretch in visible_stretches(area, &history.stamps_ns, |row| parameter.knowledge[row] == state) {
+            let stretch = Rect::from_x_y_ranges(stretch, area.rect.y_range());
             if state != Knowledge::Weak {
                 paint_hatch(painter, stretch, theme.hatch);
             }

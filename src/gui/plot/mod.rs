@@ -7,7 +7,7 @@ mod navigate;
 mod ticks;
 
 use egui::epaint::{Mesh, Vertex, WHITE_UV};
-use egui::{Align2, Color32, Painter, Pos2, Rect, Shape, Stroke, pos2};
+use egui::{Align2, Color32, Painter, Pos2, Rangef, Rect, Shape, Stroke, pos2};
 
 pub(crate) use curve::{BandCurve, Curve};
 pub(crate) use navigate::{Clicks, navigate, visible_range};
@@ -188,7 +188,7 @@ pub(crate) fn paint_hatch(painter: &Painter, rect: Rect, color: Color32) {
 }
 
 /// Stretches of rows for which something holds, as times: begin of the first row to begin of the row after the last.
-pub(crate) fn stretches_where(stamps_ns: &[i64], holds: impl Fn(usize) -> bool) -> Vec<(i64, i64)> {
+fn stretches_where(stamps_ns: &[i64], holds: impl Fn(usize) -> bool) -> Vec<(i64, i64)> {
     let mut stretches = Vec::new();
     let mut begin = None;
     for (row, stamp_ns) in stamps_ns.iter().enumerate() {
@@ -205,6 +205,23 @@ pub(crate) fn stretches_where(stamps_ns: &[i64], holds: impl Fn(usize) -> bool) 
         stretches.push((since, *last));
     }
     stretches
+}
+
+/// The same stretches on the screen, from left to right; those with less than a pixel between them are one, so that a state
+/// that flickers over a long flight gives no more than a plot has columns.
+pub(crate) fn visible_stretches(area: &PlotArea, stamps_ns: &[i64], holds: impl Fn(usize) -> bool) -> Vec<Rangef> {
+    let mut visible: Vec<Rangef> = Vec::new();
+    for (begin_ns, end_ns) in stretches_where(stamps_ns, holds) {
+        let stretch = Rangef::new(area.x(begin_ns), area.x(end_ns)).intersection(area.rect.x_range());
+        if stretch.max < stretch.min {
+            continue;
+        }
+        match visible.last_mut() {
+            Some(last) if stretch.min < last.max + 1.0 => last.max = stretch.max.max(last.max),
+            _ => visible.push(stretch),
+        }
+    }
+    visible
 }
 
 #[cfg(test)]
@@ -226,6 +243,21 @@ mod tests {
         let holds = [true, true, false, true, true];
         assert_eq!(stretches_where(&stamps, |row| holds[row]), [(0, 20), (30, 40)]);
         assert!(stretches_where(&[], |_| true).is_empty());
+    }
+
+    #[test]
+    fn a_state_that_flickers_gives_few_stretches() {
+        let rect = Rect::from_min_max(pos2(0.0, 0.0), pos2(100.0, 10.0));
+        let area = PlotArea { rect, begin_ns: 0, end_ns: 12_000, low: 0.0, high: 1.0 };
+        let stamps: Vec<i64> = (0..12_000).collect();
+        let flickers = visible_stretches(&area, &stamps, |row| row % 2 == 0);
+        assert!(flickers.len() == 1 && flickers[0].max > 99.0, "{flickers:?}");
+        let apart = visible_stretches(&area, &stamps, |row| row < 600 || row >= 6000 && row < 12_000);
+        assert_eq!(apart.len(), 2);
+        assert!((apart[0].max - 5.0).abs() < 0.02 && (apart[1].min - 50.0).abs() < 0.02, "{apart:?}");
+        // Beyond the edges there is nothing.
+        let later = PlotArea { begin_ns: 20_000, end_ns: 30_000, ..area };
+        assert!(visible_stretches(&later, &stamps, |_| true).is_empty());
     }
 
     #[test]

@@ -7,7 +7,7 @@ use egui::{Align2, Color32, FontFamily, FontId, Painter, Pos2, Rect, Stroke, pos
 use super::model::{FEATURES, INFORMED, RMS, RunLanes, STRUCTURAL};
 use crate::gui::PanelContext;
 use crate::gui::events::{Mark, look_of, paint_mark};
-use crate::gui::plot::{Curve, PlotArea, paint_curve, paint_hatch, paint_steps, paint_value_grid, stretches_where};
+use crate::gui::plot::{Curve, PlotArea, paint_curve, paint_hatch, paint_steps, paint_value_grid, visible_stretches};
 use crate::gui::theme::{self, RunStyle, Theme};
 use crate::gui::units::fixed;
 
@@ -76,10 +76,8 @@ impl Lane {
 /// The phases of a run as a bar, keyframes as ticks in it; what is not computed yet stays empty.
 pub(super) fn run(painter: &Painter, theme: &Theme, area: &PlotArea, lanes: &RunLanes, style: RunStyle) {
     let bar = area.rect.shrink2(vec2(0.0, (0.5 * (area.rect.height() - HIGHEST_BAR)).max(4.0)));
-    let stretch =
-        |begin_ns, end_ns| Rect::from_x_y_ranges(area.x(begin_ns)..=area.x(end_ns), bar.y_range()).intersect(bar);
-    for (begin_ns, end_ns) in stretches_where(&lanes.stamps_ns, |row| !lanes.tracking[row]) {
-        let rect = stretch(begin_ns, end_ns);
+    for stretch in visible_stretches(area, &lanes.stamps_ns, |row| !lanes.tracking[row]) {
+        let rect = Rect::from_x_y_ranges(stretch, bar.y_range());
         painter.rect_filled(rect, 0.0, style.color.gamma_multiply(0.12));
         paint_hatch(painter, rect, style.color.gamma_multiply(0.5));
         if rect.width() > 64.0 {
@@ -91,8 +89,9 @@ pub(super) fn run(painter: &Painter, theme: &Theme, area: &PlotArea, lanes: &Run
             painter.galley(place, galley, theme.text_strong);
         }
     }
-    for (begin_ns, end_ns) in stretches_where(&lanes.stamps_ns, |row| lanes.tracking[row]) {
-        painter.rect_filled(stretch(begin_ns, end_ns), 0.0, style.color.gamma_multiply(0.4));
+    for stretch in visible_stretches(area, &lanes.stamps_ns, |row| lanes.tracking[row]) {
+        let rect = Rect::from_x_y_ranges(stretch, bar.y_range());
+        painter.rect_filled(rect, 0.0, style.color.gamma_multiply(0.4));
     }
     let tick = Stroke::new(1.0, style.color);
     each_pixel(area, lanes.keyframes_ns.iter().copied(), |x| {

@@ -109,7 +109,10 @@ fn entry_ui(
             ui.close();
         }
     });
-    response.on_hover_text(details(run, statistics));
+    // Going through all steps is only worth it for whoever asks.
+    response.on_hover_ui(|ui| {
+        ui.label(details(run, statistics));
+    });
 }
 
 /// What the run is and how well it does.
