@@ -84,8 +84,7 @@ impl JacobianPanel {
         }
         // Taken out while it is drawn, so that the rest of the panel can change.
         let Some(model) = self.model.take() else {
-            let again = run.index_at(ctx.cursor_ns).is_some_and(|number| run.steps[number].outlined);
-            let why = if again { "Taking this step again…" } else { "No linearization in this step" };
+            let why = if step.outlined { "Taking this step again…" } else { "No linearization in this step" };
             empty_ui(ui, why);
             return;
         };
