@@ -193,11 +193,10 @@ fn a_fork_with_other_inertial_noise_from_the_start_is_a_run_of_such_a_rig() {
         let material = parent.history.materials().get(step).unwrap();
         assert_eq!(bits(forked), bits(&engine.step(&material)), "step {step}");
     }
-    // Less is known by inertia, so less is known of the calibration; never more, but for where the linearization moved.
+    // Less is known by inertia, so less is known of every parameter, though pictures and encoders say the most.
     let sigmas = |steps: &[StepRecord]| steps.last().unwrap().report.calibration.sigmas.clone();
     let ratios: Vec<f64> = sigmas(&fork).iter().zip(sigmas(&parent.steps)).map(|(more, usual)| more / usual).collect();
-    assert!(ratios.iter().all(|ratio| (0.97..FACTOR * 1.03).contains(ratio)), "{ratios:?}");
-    assert!(ratios.iter().any(|ratio| *ratio > 1.1), "{ratios:?}");
+    assert!(ratios.iter().all(|ratio| *ratio > 1.0 && *ratio < FACTOR), "{ratios:?}");
 }
 
 #[test]

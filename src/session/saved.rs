@@ -270,10 +270,10 @@ impl Session {
 mod tests {
     use super::*;
 
-    fn garden() -> SessionPlan {
+    fn garden(duration_s: f64) -> SessionPlan {
         let request = SessionRequest {
             log_path: PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("sample_logs/garden.mcap"),
-            duration_s: Some(3.0),
+            duration_s: Some(duration_s),
             ..SessionRequest::default()
         };
         SessionPlan::open(&request).unwrap()
@@ -292,7 +292,8 @@ mod tests {
     #[test]
     fn a_session_comes_back_as_it_was_saved() {
         use super::super::Command;
-        let mut session = Session::start(garden()).unwrap();
+        // More steps than are spared when memory runs short.
+        let mut session = Session::start(garden(4.5)).unwrap();
         settled(&mut session);
         session.apply(Command::AddBreakpoint("features < 40".parse().unwrap()));
         session.apply(Command::AddBreakpoint("rank < 18 and tracking".parse().unwrap()));
@@ -330,7 +331,7 @@ mod tests {
 
     #[test]
     fn what_is_no_session_is_refused() {
-        let saved = Session::start(garden()).unwrap().saved(None);
+        let saved = Session::start(garden(3.0)).unwrap().saved(None);
         let refused = |text: &str| SavedSession::from_text(text).unwrap_err().to_string();
         assert!(refused("hello").contains("no saved session"));
         assert!(refused("{}").contains("session_version"));
