@@ -396,14 +396,9 @@ fn rank(recording: &Recording, run: &RunRecord) -> Option<RankSummary> {
 }
 
 fn information(recording: &Recording, run: &RunRecord) -> Option<InformationSummary> {
-    let steps = run
-        .steps
-        .iter()
-        .filter_map(|step| Some((step.rank.as_ref()?, step.report.gain.as_ref()?, step.report.keyframe)));
-    let rate = information_rate(steps)?;
+    let rate = information_rate(run.steps.iter().filter_map(|step| step.gain()))?;
     let rig = &recording.rig;
-    let joints: Vec<String> =
-        rig.gimbal.iter().flat_map(|gimbal| &gimbal.joints).map(|joint| joint.name.clone()).collect();
+    let joints = rig.joint_names();
     let named =
         |parameter: &ParameterRate| ParameterRate { name: parameter_name(&parameter.name, rig), ..parameter.clone() };
     Some(InformationSummary {

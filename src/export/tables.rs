@@ -88,8 +88,9 @@ pub(super) fn calibration_csv(run: &RunRecord, rig: &Rig) -> String {
 fn joint_names(run: &RunRecord, rig: &Rig) -> Vec<String> {
     let count =
         run.steps.iter().filter_map(|step| step.report.newest()).map(|newest| newest.joint_angles_rad.len()).max();
-    let named = rig.gimbal.iter().flat_map(|gimbal| gimbal.joints.iter().map(|joint| joint.name.clone()));
-    named.take(count.unwrap_or(0)).collect()
+    let mut names = rig.joint_names();
+    names.truncate(count.unwrap_or(0));
+    names
 }
 
 /// `rank.csv`: ranks, deficit by cause, thresholds, margins and singular values.
@@ -153,19 +154,18 @@ pub(super) fn rank_csv(run: &RunRecord) -> String {
 /// `information.csv`: for each step and parameter how fast the image narrows it, and which motion that is owed to, in bits
 /// per second.
 pub(super) fn information_csv(run: &RunRecord, rig: &Rig) -> String {
-    let joints: Vec<String> =
-        rig.gimbal.iter().flat_map(|gimbal| &gimbal.joints).map(|joint| joint.name.clone()).collect();
-    let told = || run.steps.iter().filter_map(|step| Some((step, step.rank.as_ref()?, step.report.gain.as_ref()?)));
-    let count = told().map(|(_, _, gain)| gain.joints).max().unwrap_or(0);
+    let joints = rig.joint_names();
+    let told = || run.steps.iter().filter_map(|step| Some((step, step.gain()?)));
+    let count = told().map(|(_, (_, gain, _))| gain.joints).max().unwrap_or(0);
     let mut text = "t_s,keyframe,interval_s,parameter,bits_per_s".to_owned();
     for motion in Motion::all(count) {
         write!(text, ",{}", motion.name(&joints).replace(' ', "_")).expect(INTO_STRING);
     }
     text.push_str(",earlier\n");
-    for (step, rank, gain) in told().filter(|(_, rank, gain)| rank.names.len() == gain.columns()) {
+    for (step, (rank, gain, keyframe)) in told().filter(|(_, (rank, gain, _))| rank.names.len() == gain.columns()) {
         for (column, name) in rank.names.iter().enumerate() {
             text.push_str(&seconds_text(step.report.stamp_ns));
-            write!(text, ",{}", u8::from(step.report.keyframe)).expect(INTO_STRING);
+            write!(text, ",{}", u8::from(keyframe)).expect(INTO_STRING);
             push_number(&mut text, gain.interval_s);
             write!(text, ",{}", parameter_name(name, rig)).expect(INTO_STRING);
             push_number(&mut text, gain.bits_per_s(column));

@@ -136,6 +136,11 @@ impl Rig {
         })
     }
 
+    /// Names of the gimbal's joints, from the base on; none without a gimbal.
+    pub fn joint_names(&self) -> Vec<String> {
+        self.gimbal.iter().flat_map(|gimbal| &gimbal.joints).map(|joint| joint.name.clone()).collect()
+    }
+
     /// The chain that carries the camera with a key: the gimbal's, or one without links for a rigid camera. `None` for an
     /// unknown key, or for a camera on a gimbal that the rig does not describe.
     pub fn chain_of_camera(&self, key: &str) -> Option<ClassicalChain> {

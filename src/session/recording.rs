@@ -13,7 +13,7 @@ use super::outline::Thinning;
 use super::plan::SessionPlan;
 use super::retaking::{Retaken, Wish};
 use super::solver_trace::{SolverPosition, SolverTrace};
-use crate::estimator::{CalibrationEstimate, StepReport, allocated_bytes, rigid_columns};
+use crate::estimator::{CalibrationEstimate, InformationGain, StepReport, allocated_bytes, rigid_columns};
 use crate::flight_log::{LogWarning, Rig};
 use crate::frontend::TrackedFrame;
 use crate::geometry::RigidTransform;
@@ -39,6 +39,12 @@ pub struct StepRecord {
 }
 
 impl StepRecord {
+    /// The columns of the calibration, what the image told about them, and whether it became a keyframe; `None` before the
+    /// estimator tracks.
+    pub fn gain(&self) -> Option<(&RankReport, &InformationGain, bool)> {
+        Some((self.rank.as_ref()?, self.report.gain.as_ref()?, self.report.keyframe))
+    }
+
     /// Bytes that it takes, without the tracks, which the runs that watch the same camera share.
     pub fn own_bytes(&self) -> usize {
         let reference_counts = 2 * size_of::<usize>();

@@ -175,8 +175,7 @@ fn write_messages(
     let world = world::build(options.experiment.environment(), options.seed);
     let studio = Studio::new(options, scenario, &world);
     let rig = &scenario.true_rig;
-    let joint_names: Vec<String> =
-        rig.gimbal.iter().flat_map(|gimbal| &gimbal.joints).map(|joint| joint.name.clone()).collect();
+    let joint_names = rig.joint_names();
     let total = recordings.shots.len();
     let mut ready: VecDeque<Vec<u8>> = VecDeque::new();
     let mut done = 0;

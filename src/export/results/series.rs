@@ -23,8 +23,7 @@ impl Series {
                 }
             }
         }
-        let joints = rig.gimbal.iter().flat_map(|gimbal| gimbal.joints.iter().map(|joint| joint.name.clone()));
-        Self { parameters, joints: joints.collect() }
+        Self { parameters, joints: rig.joint_names() }
     }
 
     pub(super) fn write(

@@ -37,7 +37,7 @@ impl InformationUi {
             self.told = Some((Arc::clone(step), rate_before(run, step)));
         }
         let Some((_, Some(rate))) = &self.told else { return };
-        let joints: Vec<String> = joint_names(ctx);
+        let joints = ctx.recording.rig.joint_names();
         let title = RichText::new(headline(rate, &joints)).color(ctx.theme.text);
         let header = CollapsingHeader::new(title).id_salt("information").default_open(room);
         header.show(ui, |ui| table_ui(ui, ctx, rate, &joints));
@@ -47,17 +47,9 @@ impl InformationUi {
 /// The steps of the last second up to this one.
 fn rate_before(run: &RunRecord, step: &StepRecord) -> Option<InformationRate> {
     let stamp_ns = step.report.stamp_ns;
-    let steps = run.steps.iter().filter(|other| {
-        let age_ns = stamp_ns - other.report.stamp_ns;
-        (0..STRETCH_NS).contains(&age_ns)
-    });
-    information_rate(
-        steps.filter_map(|step| Some((step.rank.as_ref()?, step.report.gain.as_ref()?, step.report.keyframe))),
-    )
-}
-
-fn joint_names(ctx: &PanelContext<'_>) -> Vec<String> {
-    ctx.recording.rig.gimbal.iter().flat_map(|gimbal| &gimbal.joints).map(|joint| joint.name.clone()).collect()
+    let begin = run.index_at(stamp_ns - STRETCH_NS).map_or(0, |before| before + 1);
+    let end = run.index_at(stamp_ns).map_or(0, |last| last + 1);
+    information_rate(run.steps[begin..end].iter().filter_map(|step| step.gain()))
 }
 
 /// All in one line.

@@ -267,8 +267,7 @@ fn chain_model(context: &PanelContext<'_>) -> Option<ChainModel> {
     let run = context.recording.runs.get(context.selection.run)?;
     let step = run.step_at(context.cursor_ns)?;
     let estimate = &step.report.calibration.classical;
-    let joints = context.recording.rig.gimbal.iter().flat_map(|gimbal| &gimbal.joints);
-    let joint_names: Vec<String> = joints.map(|joint| joint.name.clone()).collect();
+    let joint_names = context.recording.rig.joint_names();
     let angles_rad = step.report.newest().map_or(&[][..], |frame| &frame.joint_angles_rad);
     if let Some(slide) = slide::of(context, step.report.stamp_ns) {
         let model = ChainModel::at(angles_rad, &slide.chain, Some(estimate), &joint_names);
