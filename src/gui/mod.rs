@@ -35,6 +35,7 @@ pub mod scene;
 mod session_log;
 mod slide;
 mod software_window;
+mod step_work;
 mod svg;
 #[cfg(test)]
 pub(crate) mod tests;

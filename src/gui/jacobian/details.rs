@@ -134,7 +134,6 @@ fn sightings_ui(
     id: FeatureId,
     column: usize,
 ) {
-    let theme = ctx.theme;
     let block = &model.jacobian.columns[column];
     let Some(feature) = step.report.features.iter().find(|feature| feature.id == id) else { return };
     let Some(source) = &step.report.jacobian_source else { return };
@@ -142,30 +141,22 @@ fn sightings_ui(
     let parts = parts_of(block, unit);
     let mut heads = ["frame", "u px", "v px", "residual u", "residual v", "weight"].map(str::to_owned).to_vec();
     heads.extend(parts.iter().flat_map(|(name, _)| [format!("∂u{name}"), format!("∂v{name}")]));
-    Grid::new("block numbers").striped(true).spacing(vec2(9.0, 1.0)).min_row_height(14.0).show(ui, |ui| {
-        for head in &heads {
-            ui.label(RichText::new(head).small().color(theme.text_weak));
+    let lines = rows.frame_indices.iter().enumerate().filter_map(|(place, frame)| {
+        let seen = feature.observations.iter().find(|seen| seen.frame_index == *frame)?;
+        let residual = seen.residual_after_px.map_or([f64::NAN; 2], |residual| [residual.x, residual.y]);
+        let mut cells = vec![frame.to_string()];
+        cells.extend([seen.measured_px.x, seen.measured_px.y].map(|pixel| fixed(pixel, 1)));
+        cells.extend(residual.map(|pixel| fixed(pixel, 2)));
+        cells.push(fixed(seen.robust_weight, 2));
+        // Back from standard deviations to pixels.
+        let pixels = source.pixel_sigma_px() / seen.robust_weight.sqrt();
+        for (part, (_, factor)) in parts.iter().enumerate() {
+            let at = |axis: usize| rows.rows[(2 * place + axis, block.start + part)] * pixels / factor;
+            cells.extend([figure(at(0)), figure(at(1))]);
         }
-        ui.end_row();
-        for (place, frame) in rows.frame_indices.iter().enumerate() {
-            let Some(seen) = feature.observations.iter().find(|seen| seen.frame_index == *frame) else { continue };
-            let residual = seen.residual_after_px.map_or([f64::NAN; 2], |residual| [residual.x, residual.y]);
-            let mut cells = vec![frame.to_string()];
-            cells.extend([seen.measured_px.x, seen.measured_px.y].map(|pixel| fixed(pixel, 1)));
-            cells.extend(residual.map(|pixel| fixed(pixel, 2)));
-            cells.push(fixed(seen.robust_weight, 2));
-            // Back from standard deviations to pixels.
-            let pixels = source.pixel_sigma_px() / seen.robust_weight.sqrt();
-            for (part, (_, factor)) in parts.iter().enumerate() {
-                let at = |axis: usize| rows.rows[(2 * place + axis, block.start + part)] * pixels / factor;
-                cells.extend([figure(at(0)), figure(at(1))]);
-            }
-            for cell in cells {
-                ui.label(RichText::new(cell).monospace().color(theme.text_strong));
-            }
-            ui.end_row();
-        }
+        Some(cells)
     });
+    numbers_ui(ui, ctx, &heads, lines);
 }
 
 /// A row for each encoder: its reading, its residual, and how that follows the unknown.

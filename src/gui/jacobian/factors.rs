@@ -2,9 +2,6 @@
 //! somebody looks at one.
 
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, TryRecvError, channel};
-use std::thread::Builder;
-use std::time::Duration;
 
 use egui::{RichText, Ui};
 
@@ -12,21 +9,17 @@ use super::details::numbers_ui;
 use super::model::JacobianModel;
 use crate::estimator::{ColumnBlock, ColumnGroup, FactorRows, JacobianFactor};
 use crate::gui::PanelContext;
+use crate::gui::step_work::{REPAINT, StepWork};
 use crate::gui::units::{Shown, figure, fixed};
-use crate::session::{History, RunRecord, StepRecord};
+use crate::session::{RunRecord, StepRecord};
 
-/// How often it is looked whether the step has been taken again.
-const REPAINT: Duration = Duration::from_millis(50);
 /// Rows of a block that are shown; a marginalization prior has over a hundred, the strongest come first.
 const MOST_ROWS: usize = 40;
-
-type Rows = Option<Vec<FactorRows>>;
 
 /// The rows of one step.
 #[derive(Debug, Default)]
 pub(super) struct FactorsUi {
-    known: Option<(Arc<StepRecord>, Rows)>,
-    coming: Option<(Arc<StepRecord>, Receiver<Rows>)>,
+    rows: StepWork<Vec<FactorRows>>,
 }
 
 impl FactorsUi {
@@ -39,25 +32,15 @@ impl FactorsUi {
         picked: Option<JacobianFactor>,
         in_background: bool,
     ) {
-        let fresh = |known: &Arc<StepRecord>| Arc::ptr_eq(known, step);
         let wanted =
             picked.is_some_and(|factor| !matches!(factor, JacobianFactor::Feature(_) | JacobianFactor::Encoder(_)));
-        if !wanted || self.known.as_ref().is_some_and(|(known, _)| fresh(known)) {
-            return;
+        if wanted {
+            let can_be_taken = run.history.is_some() && number.is_some();
+            self.rows.ask(step, "factor rows", in_background && can_be_taken, || {
+                let history = run.history.clone();
+                move || history.as_ref()?.factor_rows(number?)
+            });
         }
-        if !self.coming.as_ref().is_some_and(|(known, _)| fresh(known)) {
-            let (Some(history), Some(number)) = (&run.history, number) else {
-                self.known = Some((Arc::clone(step), None));
-                return;
-            };
-            self.coming = Some((Arc::clone(step), taken_again(history, number, in_background)));
-        }
-        let told = self.coming.as_ref().map(|(_, coming)| coming.try_recv());
-        if let Some(Err(TryRecvError::Empty)) = told {
-            return;
-        }
-        self.known = Some((Arc::clone(step), told.and_then(Result::ok).flatten()));
-        self.coming = None;
     }
 
     /// A row for each residual of the factor that the block is in: the residual, and how it follows the unknowns.
@@ -73,13 +56,12 @@ impl FactorsUi {
         let note = |ui: &mut Ui, text: &str| {
             ui.label(RichText::new(text).color(ctx.theme.text_weak));
         };
-        if self.coming.is_some() {
+        if self.rows.is_busy() {
             note(ui, "Taking the step again for the numbers…");
             ui.ctx().request_repaint_after(REPAINT);
             return;
         }
-        let rows = self.known.as_ref().filter(|(known, _)| std::ptr::eq(Arc::as_ptr(known), step));
-        let rows = rows.and_then(|(_, rows)| rows.as_ref()?.iter().find(|rows| rows.factor == factor));
+        let rows = self.rows.of(step).and_then(|rows| rows.iter().find(|rows| rows.factor == factor));
         let Some(FactorRows { rows, .. }) = rows else {
             note(ui, "Only the norms of this block were kept");
             return;
@@ -111,18 +93,6 @@ impl FactorsUi {
         });
         numbers_ui(ui, ctx, &heads, lines);
     }
-}
-
-/// The rows of a step, as soon as it has been taken again.
-fn taken_again(history: &Arc<History>, number: usize, in_background: bool) -> Receiver<Rows> {
-    let (sender, receiver) = channel();
-    let (later, given) = (sender.clone(), Arc::clone(history));
-    let work = move || drop(later.send(given.factor_rows(number)));
-    if !(in_background && Builder::new().name("factor rows".to_owned()).spawn(work).is_ok()) {
-        // Nobody else has the receiver.
-        drop(sender.send(history.factor_rows(number)));
-    }
-    receiver
 }
 
 /// The columns of a block: what a residual's slope by them is called, and how many shown units one stored unit is.

@@ -1,30 +1,25 @@
 //! Since when the weakest direction has been lost, and what to fly against it.
 
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, TryRecvError, channel};
-use std::thread::Builder;
-use std::time::Duration;
 
 use egui::{RichText, Ui};
 
 use super::verdict::parameters_of;
 use crate::geometry::seconds_from_ns;
 use crate::gui::PanelContext;
+use crate::gui::step_work::{REPAINT, StepWork};
 use crate::observability::laboratory::{Advice, Situation, advise};
 use crate::observability::steps_lost;
 use crate::session::{RunRecord, StepRecord};
 
 /// Candidates shown behind the best one.
 const OTHERS_SHOWN: usize = 3;
-/// How often it is looked whether the advice has come.
-const REPAINT: Duration = Duration::from_millis(50);
 
 /// What was found out about one step; another step is asked anew.
 #[derive(Debug, Default)]
 pub(super) struct AdviceUi {
     since: Option<(Arc<StepRecord>, Option<String>)>,
-    advice: Option<(Arc<StepRecord>, Option<Advice>)>,
-    coming: Option<(Arc<StepRecord>, Receiver<Option<Advice>>)>,
+    advice: StepWork<Advice>,
 }
 
 impl AdviceUi {
@@ -46,24 +41,21 @@ impl AdviceUi {
             ui.add(egui::Label::new(RichText::new(text).color(ctx.theme.text)).truncate()).on_hover_text(text);
         }
         let Some(rank) = &step.rank else { return };
-        if !self.advice.as_ref().is_some_and(|(known, _)| fresh(known)) {
+        if !self.advice.is_known(step) {
             if ctx.playback.playing {
                 return;
             }
-            if !self.coming.as_ref().is_some_and(|(known, _)| fresh(known)) {
+            self.advice.ask(step, "advice", in_background, || {
                 let situation = Situation::of_step(&step.report, rank, &ctx.recording.rig, &run.camera_key);
-                self.coming = Some((Arc::clone(step), asked(situation.as_ref(), in_background)));
-            }
-            let told = self.coming.as_ref().map(|(_, coming)| coming.try_recv());
-            if let Some(Err(TryRecvError::Empty)) = told {
-                ui.label(RichText::new("Linearizing candidate motions…").color(ctx.theme.text_weak));
-                ui.ctx().request_repaint_after(REPAINT);
-                return;
-            }
-            self.advice = Some((Arc::clone(step), told.and_then(Result::ok).flatten()));
-            self.coming = None;
+                move || situation.as_ref().and_then(advise)
+            });
         }
-        match self.advice.as_ref().and_then(|(_, advice)| advice.as_ref()) {
+        if !self.advice.is_known(step) {
+            ui.label(RichText::new("Linearizing candidate motions…").color(ctx.theme.text_weak));
+            ui.ctx().request_repaint_after(REPAINT);
+            return;
+        }
+        match self.advice.of(step) {
             None => {
                 ui.label(RichText::new("No motion can tell more about this calibration").color(ctx.theme.text_weak));
             }
@@ -81,20 +73,6 @@ impl AdviceUi {
             }
         }
     }
-}
-
-/// The advice for a situation, as soon as it is there.
-fn asked(situation: Option<&Situation>, in_background: bool) -> Receiver<Option<Advice>> {
-    let (sender, receiver) = channel();
-    let later = sender.clone();
-    let given = situation.cloned();
-    let work = move || drop(later.send(given.as_ref().and_then(advise)));
-    let started = in_background && Builder::new().name("advice".to_owned()).spawn(work).is_ok();
-    if !started {
-        // Nobody else has the receiver.
-        drop(sender.send(situation.and_then(advise)));
-    }
-    receiver
 }
 
 /// The weakest direction and the first second from which on it was null or weak without interruption.
