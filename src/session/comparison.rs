@@ -42,7 +42,7 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    /// All of them, in the order in which a difference usually spreads.
+    /// All of them, in their order, in which a difference usually spreads.
     pub const ALL: [Self; 14] = [
         Self::Phase,
         Self::Tracks,
@@ -240,9 +240,9 @@ impl Comparison {
             let Some(apart) = apart else { continue };
             let parting = &mut self.partings[index];
             // As they are, without the gauge: its own rounding is no difference.
-            let as_they_are = quantity.difference(a, b, &RigidTransform::default());
-            if as_they_are.is_some_and(|apart| apart != 0.0) {
-                parting.exact_ns.get_or_insert(stamp_ns);
+            if parting.exact_ns.is_none() {
+                let as_they_are = quantity.difference(a, b, &RigidTransform::default());
+                parting.exact_ns = as_they_are.filter(|apart| *apart != 0.0).map(|_| stamp_ns);
             }
             if apart >= quantity.notable() {
                 parting.notable_ns.get_or_insert(stamp_ns);
@@ -261,8 +261,12 @@ impl Comparison {
 
     /// The differences of a quantity by row.
     pub fn column(&self, quantity: Quantity) -> &[f64] {
-        let index = Quantity::ALL.iter().position(|known| *known == quantity);
-        index.map_or(&[], |index| &self.columns[index])
+        &self.columns[quantity as usize]
+    }
+
+    /// Where the runs part in a quantity.
+    pub fn parting(&self, quantity: Quantity) -> &Parting {
+        &self.partings[quantity as usize]
     }
 
     /// The first instant at which anything is not the same number, with what it is.
@@ -312,6 +316,7 @@ mod tests {
         let end_ns = run.steps.last().unwrap().report.stamp_ns;
         assert_eq!(comparison.at(Quantity::Position, end_ns), Some(0.0));
         assert_eq!(comparison.at(Quantity::Position, -1), None);
+        assert!(Quantity::ALL.into_iter().enumerate().all(|(index, quantity)| index == quantity as usize));
     }
 
     #[test]
@@ -333,7 +338,7 @@ mod tests {
         let stamp_ns = |number: usize| run.steps[number].report.stamp_ns;
         assert_eq!(comparison.first_exact(), Some((stamp_ns(at), Quantity::Position)));
         assert_eq!(comparison.first_notable(), Some((stamp_ns(at + 2), Quantity::Position)));
-        let parting = comparison.partings[Quantity::ALL.iter().position(|it| *it == Quantity::Position).unwrap()];
+        let parting = comparison.parting(Quantity::Position);
         let (largest, largest_ns) = parting.largest.unwrap();
         assert!((largest - 0.08).abs() < 1e-9 && largest_ns == stamp_ns(at + 19), "{parting:?}");
         assert_eq!(comparison.at(Quantity::Velocity, stamp_ns(at + 19)), Some(0.0));

@@ -106,9 +106,7 @@ impl OverTime {
             } else {
                 paint_curve(&painter.with_clip_rect(rect), &area, curve, style, CURVE_WIDTH);
             }
-            let place = Quantity::ALL.iter().position(|known| *known == quantity);
-            let parting = place.map(|place| comparison.partings[place]);
-            if let Some(stamp_ns) = parting.and_then(|parting| parting.notable_ns) {
+            if let Some(stamp_ns) = comparison.parting(quantity).notable_ns {
                 let x = area.x(stamp_ns);
                 if rect.x_range().contains(x) {
                     let foot = vec![pos2(x - 4.0, rect.top()), pos2(x + 4.0, rect.top()), pos2(x, rect.top() + 7.0)];
