@@ -86,13 +86,6 @@ impl InformationGain {
         self.bits_per_s(column) - self.by_motion_per_s(column).sum::<f64>()
     }
 
-    /// The motion with the largest part in a column, and that part in bits per second; `None` where no motion brings
-    /// anything.
-    pub fn leading(&self, column: usize) -> Option<(Motion, f64)> {
-        let parts = Motion::all(self.joints).zip(self.by_motion_per_s(column));
-        parts.filter(|(_, part)| *part > 0.0).max_by(|a, b| a.1.total_cmp(&b.1))
-    }
-
     /// Bytes on the heap.
     pub(super) fn heap_bytes(&self) -> usize {
         allocated_bytes(size_of_val(&*self.bits)) + allocated_bytes(size_of_val(&*self.by_motion))

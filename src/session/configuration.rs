@@ -45,21 +45,13 @@ pub(super) fn estimator_config(rig: &Rig, spec: &RunSpec) -> Result<EstimatorCon
     let encoders = gimbal.filter(|gimbal| gimbal.topic.is_some());
     let encoder_sigma_rad = encoders.and_then(|gimbal| gimbal.encoder_sigma_rad);
     let has_joints = !chain.links.is_empty();
-    let switches_chart = match spec.parameterization {
-        ParameterizationChoice::Auto | ParameterizationChoice::Cluster => true,
-        // A rig may ask for it in any minimal run.
-        ParameterizationChoice::Minimal | ParameterizationChoice::MinimalSwapped => {
-            gimbal.is_some_and(|gimbal| gimbal.switches_chart)
-        }
-        _ => false,
-    };
     Ok(EstimatorConfig {
         camera: camera.model.clone(),
         imu_noise: rig.imu.noise,
         gravity_m_per_s2: rig.gravity_m_per_s2,
         chain,
         parameterization,
-        auto_chart: has_joints && switches_chart,
+        auto_chart: has_joints && spec.parameterization.switches_chart(rig),
         encoder_sigma_rad,
         use_encoder: spec.encoder && encoder_sigma_rad.is_some(),
         calibrate: spec.calibrate,

@@ -3,6 +3,8 @@ use std::str::FromStr;
 
 use thiserror::Error;
 
+use crate::flight_log::Rig;
+
 /// Which parameterization a run estimates in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ParameterizationChoice {
@@ -44,6 +46,15 @@ impl ParameterizationChoice {
     /// The name on the command line.
     pub fn name(self) -> &'static str {
         NAMES.iter().find(|(_, choice)| *choice == self).map_or("auto", |(name, _)| name)
+    }
+
+    /// Whether its runs go over to the other chart near a lock; a rig may ask for it in any minimal run.
+    pub fn switches_chart(self, rig: &Rig) -> bool {
+        match self {
+            Self::Auto | Self::Cluster => true,
+            Self::Minimal | Self::MinimalSwapped => rig.gimbal.as_ref().is_some_and(|gimbal| gimbal.switches_chart),
+            Self::Classical | Self::Poe | Self::Static => false,
+        }
     }
 
     /// Every choice with its name, in the order in which they are offered.

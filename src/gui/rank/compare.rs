@@ -6,7 +6,7 @@ use super::columns::{RankColumn, columns_ui};
 use crate::gimbal::{Chain, Parameterization, SWITCH_MARGIN};
 use crate::gui::PanelContext;
 use crate::observability::RankReport;
-use crate::session::{Command, MAX_RUNS, ParameterizationChoice, RunRecord, RunSpec, StepRecord};
+use crate::session::{Command, MAX_RUNS, RunRecord, RunSpec, StepRecord};
 
 /// Width that a run needs, in points.
 pub(super) const WIDTH_OF_A_RUN: f32 = 300.0;
@@ -60,9 +60,7 @@ pub(super) fn lock_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, number: usize, ru
         chain.margins().into_iter().find(|(lock, _)| lock == "end").map(|(_, margin)| margin)
     };
     let (Some(here), Some(there)) = (margin_of(own), margin_of(other)) else { return };
-    let taken = ctx.recording.rig.gimbal.as_ref().is_some_and(|gimbal| gimbal.switches_chart);
-    let taken =
-        taken || matches!(run.spec.parameterization, ParameterizationChoice::Auto | ParameterizationChoice::Cluster);
+    let taken = run.spec.parameterization.switches_chart(&ctx.recording.rig);
     ui.horizontal_wrapped(|ui| {
         let color = if here < SWITCH_MARGIN { ctx.theme.error } else { ctx.theme.text };
         let text = format!(
