@@ -156,14 +156,8 @@ impl Problem<'_> {
         cameras: &[CameraInformation],
     ) -> Option<InformationGain> {
         let layout = self.layout;
-        let newest = layout.frames.checked_sub(1).filter(|newest| *newest > 0)?;
-        let interval_s = seconds_from_ns(self.frames[newest].stamp_ns - self.frames[newest - 1].stamp_ns);
-        let first = layout.calibration().start;
-        let frozen = estimate.calibration.frozen_columns();
-        let free: Vec<usize> = layout.calibration().filter(|column| !frozen.contains(&(column - first))).collect();
-        if free.is_empty() || interval_s <= 0.0 {
-            return None;
-        }
+        let (interval_s, free) = self.newest_interval(estimate)?;
+        let (newest, first) = (layout.frames - 1, layout.calibration().start);
         let frames = self.linearization_frames(estimate);
         let answer = |slots: usize| {
             let (mut hessian, _) = self.other_equations(estimate, &frames, slots);
@@ -192,6 +186,29 @@ impl Problem<'_> {
             by_motion.extend((0..motions).map(|motion| (share * parts[(motion, column)]) as f32));
         }
         Some(InformationGain { interval_s, joints: layout.joints, bits: bits.into(), by_motion: by_motion.into() })
+    }
+
+    /// What an image tells that is forgotten again; `None` as in [`Self::information_gain`].
+    pub(super) fn no_information_gain(&self, estimate: &Estimate) -> Option<InformationGain> {
+        let (interval_s, free) = self.newest_interval(estimate)?;
+        let joints = self.layout.joints;
+        let nothing = |count: usize| vec![0.0; count].into();
+        Some(InformationGain {
+            interval_s,
+            joints,
+            bits: nothing(free.len()),
+            by_motion: nothing(free.len() * (6 + joints)),
+        })
+    }
+
+    /// Seconds since the image before the newest one, and the calibration's free columns; `None` where there are none.
+    fn newest_interval(&self, estimate: &Estimate) -> Option<(f64, Vec<usize>)> {
+        let newest = self.layout.frames.checked_sub(1).filter(|newest| *newest > 0)?;
+        let interval_s = seconds_from_ns(self.frames[newest].stamp_ns - self.frames[newest - 1].stamp_ns);
+        let first = self.layout.calibration().start;
+        let frozen = estimate.calibration.frozen_columns();
+        let free: Vec<usize> = self.layout.calibration().filter(|column| !frozen.contains(&(column - first))).collect();
+        (!free.is_empty() && interval_s > 0.0).then_some((interval_s, free))
     }
 
     /// Carries what is known about a camera's poses on to the unknowns; the lower triangle counts.

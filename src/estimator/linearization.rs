@@ -20,6 +20,11 @@ impl Estimator {
         let problem = self.problem(&solved.cameras);
         let numbers: Vec<usize> = self.frames.iter().map(|frame| frame.index).collect();
         let estimate = &solved.solution.estimate;
+        // An image that does not become a keyframe is forgotten again: it tells nothing that stays.
+        if !self.frames.last().is_some_and(|frame| frame.keyframe) {
+            let linearization = problem.linearization(estimate, &self.calibration_names(), &numbers, None);
+            return (linearization, problem.no_information_gain(estimate));
+        }
         let mut cameras = Vec::new();
         let linearization = problem.linearization(estimate, &self.calibration_names(), &numbers, Some(&mut cameras));
         (linearization, problem.information_gain(estimate, &cameras))

@@ -334,7 +334,8 @@ pub struct StepReport {
     pub jacobian_source: Option<JacobianSource>,
     /// The rows of the factors that are not of features, when they were asked for and the estimator is tracking.
     pub factor_rows: Option<Vec<FactorRows>>,
-    /// What the newest image tells about the calibration, when the linearization was asked for and the estimator is tracking.
+    /// What the newest image tells about the calibration, when the linearization was asked for and the estimator is tracking:
+    /// nothing unless it becomes a keyframe, since another image is forgotten again.
     pub gain: Option<InformationGain>,
     /// Whether the frame is a keyframe.
     pub keyframe: bool,

@@ -152,20 +152,20 @@ pub(super) fn rank_csv(run: &RunRecord) -> String {
 }
 
 /// `information.csv`: for each step and parameter how fast the image narrows it, and which motion that is owed to, in bits
-/// per second.
+/// per second; zeros where the image does not become a keyframe.
 pub(super) fn information_csv(run: &RunRecord, rig: &Rig) -> String {
     let joints = rig.joint_names();
     let told = || run.steps.iter().filter_map(|step| Some((step, step.gain()?)));
-    let count = told().map(|(_, (_, gain, _))| gain.joints).max().unwrap_or(0);
+    let count = told().map(|(_, (_, gain))| gain.joints).max().unwrap_or(0);
     let mut text = "t_s,keyframe,interval_s,parameter,bits_per_s".to_owned();
     for motion in Motion::all(count) {
         write!(text, ",{}", motion.name(&joints).replace(' ', "_")).expect(INTO_STRING);
     }
     text.push_str(",earlier\n");
-    for (step, (rank, gain, keyframe)) in told().filter(|(_, (rank, gain, _))| rank.names.len() == gain.columns()) {
+    for (step, (rank, gain)) in told().filter(|(_, (rank, gain))| rank.names.len() == gain.columns()) {
         for (column, name) in rank.names.iter().enumerate() {
             text.push_str(&seconds_text(step.report.stamp_ns));
-            write!(text, ",{}", u8::from(keyframe)).expect(INTO_STRING);
+            write!(text, ",{}", u8::from(step.report.keyframe)).expect(INTO_STRING);
             push_number(&mut text, gain.interval_s);
             write!(text, ",{}", parameter_name(name, rig)).expect(INTO_STRING);
             push_number(&mut text, gain.bits_per_s(column));

@@ -29,16 +29,12 @@ pub struct ParameterRate {
     pub earlier: f64,
 }
 
-/// Sums up the gains of steps, each with the columns that it is of and whether its image became a keyframe; `None` where
-/// there are none.
-///
-/// An image that does not become a keyframe is forgotten again, and the next one tells the same anew: only keyframes count,
-/// over the time of all images.
+/// Sums up the gains of steps, each with the columns that it is of; `None` where there are none.
 pub fn information_rate<'a>(
-    steps: impl IntoIterator<Item = (&'a RankReport, &'a InformationGain, bool)>,
+    steps: impl IntoIterator<Item = (&'a RankReport, &'a InformationGain)>,
 ) -> Option<InformationRate> {
     let mut rate: Option<InformationRate> = None;
-    for (rank, gain, keyframe) in steps {
+    for (rank, gain) in steps {
         let rate = rate.get_or_insert_with(|| InformationRate {
             duration_s: 0.0,
             motions: Motion::all(gain.joints).collect(),
@@ -48,7 +44,6 @@ pub fn information_rate<'a>(
             continue;
         }
         rate.duration_s += gain.interval_s;
-        let counted_s = if keyframe { gain.interval_s } else { 0.0 };
         for (column, name) in rank.names.iter().enumerate() {
             let place = rate.parameters.iter().position(|known| known.name == *name).unwrap_or_else(|| {
                 let by_motion = vec![0.0; rate.motions.len()];
@@ -56,10 +51,10 @@ pub fn information_rate<'a>(
                 rate.parameters.len() - 1
             });
             let sum = &mut rate.parameters[place];
-            sum.bits_per_s += gain.bits_per_s(column) * counted_s;
-            sum.earlier += gain.earlier_per_s(column) * counted_s;
+            sum.bits_per_s += gain.bits_per_s(column) * gain.interval_s;
+            sum.earlier += gain.earlier_per_s(column) * gain.interval_s;
             for (sum, part) in sum.by_motion.iter_mut().zip(gain.by_motion_per_s(column)) {
-                *sum += part * counted_s;
+                *sum += part * gain.interval_s;
             }
         }
     }

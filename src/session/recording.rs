@@ -39,10 +39,9 @@ pub struct StepRecord {
 }
 
 impl StepRecord {
-    /// The columns of the calibration, what the image told about them, and whether it became a keyframe; `None` before the
-    /// estimator tracks.
-    pub fn gain(&self) -> Option<(&RankReport, &InformationGain, bool)> {
-        Some((self.rank.as_ref()?, self.report.gain.as_ref()?, self.report.keyframe))
+    /// The columns of the calibration and what the image told about them; `None` before the estimator tracks.
+    pub fn gain(&self) -> Option<(&RankReport, &InformationGain)> {
+        Some((self.rank.as_ref()?, self.report.gain.as_ref()?))
     }
 
     /// Bytes that it takes, without the tracks, which the runs that watch the same camera share.
