@@ -64,20 +64,40 @@ impl Cholesky {
 ///
 /// Dependent columns leave explicit zeros, so that a row's first non-zero entry tells which column it belongs to.
 pub(super) fn triangularize(matrix: &DMatrix<f64>) -> DMatrix<f64> {
-    triangularized(as_faer(matrix))
+    triangularized(as_faer(matrix).to_owned())
 }
 
-/// [`triangularize`] of rows of so many entries, one after another.
-pub(super) fn triangularize_rows(entries: &[f64], columns: usize) -> DMatrix<f64> {
-    triangularized(MatRef::from_row_major_slice(entries, entries.len() / columns.max(1), columns))
+/// [`triangularize`] of rows that begin with zeros, without the rows that would begin behind the columns of the groups.
+///
+/// Of the rows in `groups[k]` the first `k` times `stride` entries are zero and left out; they are row-major. Each group
+/// joins when its first column is at hand, so that the zeros are not worked on.
+pub(super) fn triangularize_groups(groups: &[Vec<f64>], stride: usize, columns: usize) -> DMatrix<f64> {
+    let mut upper = DMatrix::zeros(groups.len() * stride, columns);
+    let mut height = 0;
+    // What is left below the rows that are done.
+    let mut left = DMatrix::zeros(0, columns);
+    for (index, group) in groups.iter().enumerate() {
+        let first = index * stride;
+        let width = columns - first;
+        let (above, joining) = (left.nrows(), group.len() / width);
+        let mut matrix = Mat::zeros(above + joining, width);
+        let (mut top, mut bottom) = matrix.as_mut().split_at_row_mut(above);
+        top.copy_from(as_faer(&left));
+        bottom.copy_from(MatRef::from_row_major_slice(group, joining, width));
+        let factor = triangularized(matrix);
+        let done = factor.nrows().min(stride);
+        upper.view_mut((height, first), (done, width)).copy_from(&factor.rows(0, done));
+        height += done;
+        left = factor.view((done, stride), (factor.nrows() - done, width - stride)).into_owned();
+    }
+    upper.resize_vertically(height, 0.0)
 }
 
-fn triangularized(view: MatRef<'_, f64>) -> DMatrix<f64> {
-    let (rows, columns) = view.shape();
+fn triangularized(mut factors: Mat<f64>) -> DMatrix<f64> {
+    let (rows, columns) = factors.shape();
     if rows == 0 || columns == 0 {
         return DMatrix::zeros(0, columns);
     }
-    let mut factors = view.to_owned();
     let height = rows.min(columns);
     let block = recommended_block_size::<f64>(rows, columns);
     let mut coefficients = Mat::zeros(block, height);

@@ -41,7 +41,9 @@ impl ProjectedRows {
         let relative_linearized = RelativePoses::new(linearized);
         let mut blocks = PoseBlocks::new(frames);
         let columns = POSE * frames + 1;
-        let mut rows = Vec::new();
+        // By the first slot that sees the feature, from its columns on.
+        let mut rows: Vec<Vec<f64>> =
+            (0..frames).map(|slot| Vec::with_capacity(height_of(tracks, slot) * (columns - POSE * slot))).collect();
         let mut newest_rows = Vec::new();
         let mut local = TrackRows::default();
         for (track, landmark) in tracks.iter().zip(landmarks) {
@@ -58,23 +60,34 @@ impl ProjectedRows {
             let seen_last = anchor != newest && local.slots.last() == Some(&newest);
             if apart == NewestRows::Apart && seen_last {
                 local.project_out_landmark_apart();
-                local.append_to(&mut newest_rows, columns, local.used..local.used + local.added);
+                local.append_to(&mut newest_rows, columns, 0, local.used..local.used + local.added);
             } else {
                 local.project_out_landmark(local.height());
             }
-            local.append_to(&mut rows, columns, local.used..local.height());
+            let first = first_slot(track).unwrap_or(anchor);
+            local.append_to(&mut rows[first], columns, first, local.used..local.height());
         }
-        let upper = dense::triangularize_rows(&rows, columns);
-        // The last row of a full triangle holds nothing but the residual that no camera pose can change.
-        let height = upper.nrows().min(POSE * frames);
+        // Without a row that holds nothing but the residual that no camera pose can change.
+        let rows = dense::triangularize_groups(&rows, POSE, columns);
         let newest_rows = DMatrix::from_row_slice(newest_rows.len() / columns, columns, &newest_rows);
-        Self { rows: upper.resize_vertically(height, 0.0), newest_rows, blocks }
+        Self { rows, newest_rows, blocks }
     }
 
     /// Sum of squares of the columns that move the cameras by `columns` (per slot 6 × n), before the projection.
     pub(super) fn squared_column_norms(&self, columns: &[DMatrix<f64>]) -> DVector<f64> {
         self.blocks.squared_norms(columns)
     }
+}
+
+/// The anchor need not be the first to see a feature.
+fn first_slot(track: &Track) -> Option<usize> {
+    track.sightings.iter().map(|sighting| sighting.slot).min()
+}
+
+/// Most rows that the tracks leave which begin in a slot.
+fn height_of(tracks: &[Track], slot: usize) -> usize {
+    let beginning = tracks.iter().filter(|track| first_slot(track) == Some(slot));
+    beginning.map(|track| (2 * track.sightings.len()).saturating_sub(LANDMARK)).sum()
 }
 
 /// Whether the rows that the newest frame adds are told apart.
@@ -195,17 +208,18 @@ impl TrackRows {
         }
     }
 
-    /// Some rows, with all camera poses of the window.
-    fn append_to(&self, rows: &mut Vec<f64>, columns: usize, range: std::ops::Range<usize>) {
+    /// Some rows, with the camera poses of the window from the slot `first` on.
+    fn append_to(&self, rows: &mut Vec<f64>, columns: usize, first: usize, range: std::ops::Range<usize>) {
+        let width = columns - POSE * first;
         for row in self.entries.chunks_exact(self.width).skip(range.start).take(range.len()) {
             let begin = rows.len();
-            rows.resize(begin + columns, 0.0);
+            rows.resize(begin + width, 0.0);
             let target = &mut rows[begin..];
-            for (index, slot) in self.slots.iter().enumerate() {
-                let from = LANDMARK + POSE * index;
-                target[POSE * slot..POSE * (slot + 1)].copy_from_slice(&row[from..from + POSE]);
+            for (slot, block) in self.slots.iter().zip(row[LANDMARK..].chunks_exact(POSE)) {
+                let place = POSE * (slot - first);
+                target[place..place + POSE].copy_from_slice(block);
             }
-            target[columns - 1] = row[self.width - 1];
+            target[width - 1] = row[self.width - 1];
         }
     }
 }
