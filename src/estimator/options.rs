@@ -135,7 +135,7 @@ impl Default for EstimatorOptions {
             landmark_model: LandmarkModel::BearingAndInverseDistance,
             track_continuation: TrackContinuation::Reuse,
             iterations: 6,
-            relative_cost_tolerance: 1e-4,
+            relative_cost_tolerance: 1e-3,
             min_observations: 3,
             min_triangulation_angle_rad: 0.01,
             distance_range_m: (0.1, 300.0),
