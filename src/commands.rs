@@ -11,6 +11,7 @@ use dcvins::calibration::CalibrationOptions;
 use dcvins::export::{self, EvaluationOptions, RunFileOptions, RunSummary};
 use dcvins::flight_log::{self, FlightLog, Rig};
 use dcvins::geometry::seconds_from_ns;
+use dcvins::observability::LEAST_FALSE_GAIN;
 use dcvins::session::breakpoints::Condition;
 use dcvins::session::{self, BreakpointHit, CalibrationRequest, Recording, SessionPlan, Stopwatch};
 use dcvins::simulation::{self, Experiment, SimulationOptions};
@@ -219,8 +220,9 @@ fn describe(folder: &Path, summary: &RunSummary) -> String {
         if !rank.known.is_empty() {
             let agreeing = rank.known.iter().filter(|known| held(known)).count();
             lines.push(format!(
-                "  structure    {agreeing} of {} known losses measured as null in every step\n",
-                rank.known.len()
+                "  structure    {agreeing} of {} known losses measured as null in every step; {}\n",
+                rank.known.len(),
+                falsely_known(&rank.known)
             ));
         }
         lines.extend(rank.known.iter().filter(|known| !held(known)).map(|known| {
@@ -245,6 +247,15 @@ fn describe(folder: &Path, summary: &RunSummary) -> String {
     }
     lines.push(format!("  files        {}\n", folder.display()));
     lines.concat()
+}
+
+/// How much priors claim of what nobody can measure.
+fn falsely_known(known: &[export::KnownLossSummary]) -> String {
+    let claimed = known.iter().map(|known| known.largest_false_gain).filter(|gain| *gain > LEAST_FALSE_GAIN);
+    match (claimed.clone().count(), claimed.fold(0.0, f64::max)) {
+        (0, _) => "no prior claims to know them".to_owned(),
+        (count, most) => format!("priors falsely claim {count}, up to {most:.2} (1: as much as 10° or 3 cm)"),
+    }
 }
 
 /// `dcvins evaluate`.

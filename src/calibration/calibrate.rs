@@ -325,6 +325,7 @@ fn rank(result: &StageResult, visited_rad: &[Vec<f64>]) -> Option<RankReport> {
         calibration_column_norms: DVector::from_fn(count, |k, _| measured[(k, k)].max(0.0).sqrt()),
         jacobian: square_root(measured),
         prior_jacobian: square_root(priors),
+        rig_prior_rows: count,
         chain: chain.clone(),
     };
     analyse(&linearization, chain, visited_rad, false)

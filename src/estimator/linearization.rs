@@ -79,6 +79,7 @@ impl Problem<'_> {
             held: of(true),
             jacobian: stack_columns(&measured, order.iter().copied()),
             prior_jacobian: stack_columns(&priors, order.iter().copied()),
+            rig_prior_rows: priors[0].nrows(),
             calibration_column_norms: DVector::from_vec(norms),
             chain: calibration.of(MAIN).chain().clone(),
         }

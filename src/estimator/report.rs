@@ -271,6 +271,8 @@ pub struct Linearization {
     pub jacobian: DMatrix<f64>,
     /// Jacobian of the priors (rig prior on the calibration, marginalization prior), same columns, whitened.
     pub prior_jacobian: DMatrix<f64>,
+    /// How many rows of these, the first ones, are the rig's prior.
+    pub rig_prior_rows: usize,
     /// Norm of each calibration column before the depths were projected out, for the reference of the rank rule.
     pub calibration_column_norms: DVector<f64>,
     /// The chain at which the calibration's columns were taken (with first estimates not the present one).

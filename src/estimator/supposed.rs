@@ -227,6 +227,7 @@ fn keeping(whole: &Linearization, count: impl Fn(ColumnGroup) -> usize) -> Linea
         held: whole.held.clone(),
         jacobian: select(&whole.jacobian),
         prior_jacobian: select(&whole.prior_jacobian),
+        rig_prior_rows: whole.rig_prior_rows,
         calibration_column_norms: whole.calibration_column_norms.clone(),
         chain: whole.chain.clone(),
     }

@@ -16,6 +16,8 @@ pub struct KnownLossSummary {
     pub agreeing: usize,
     /// The window's largest response to it, relative to the reference of the rank rule.
     pub largest_response: f64,
+    /// The largest part of it that a prior claims to know, 1 as much as 10° or 3 cm: false, and zero with first estimates.
+    pub largest_false_gain: f64,
 }
 
 /// The known losses of a run in the order in which they first appeared.
@@ -25,13 +27,16 @@ pub(super) fn known_losses(run: &RunRecord) -> Vec<KnownLossSummary> {
         for known in &rank.known {
             let place = found.iter().position(|(loss, _)| *loss == known.loss).unwrap_or_else(|| {
                 let reason = known.loss.reason(rank.joint_count);
-                found.push((known.loss, KnownLossSummary { reason, steps: 0, agreeing: 0, largest_response: 0.0 }));
+                let (largest_response, largest_false_gain) = (0.0, 0.0);
+                let summary = KnownLossSummary { reason, steps: 0, agreeing: 0, largest_response, largest_false_gain };
+                found.push((known.loss, summary));
                 found.len() - 1
             });
             let summary = &mut found[place].1;
             summary.steps += 1;
             summary.agreeing += usize::from(known.agrees);
             summary.largest_response = summary.largest_response.max(known.response);
+            summary.largest_false_gain = summary.largest_false_gain.max(known.false_gain);
         }
     }
     found.into_iter().map(|(_, summary)| summary).collect()

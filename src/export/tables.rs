@@ -106,7 +106,7 @@ pub(super) fn rank_csv(run: &RunRecord) -> String {
     }
     let mut text =
         "t_s,columns,rank_structural,rank_informed,deficit_parameterization,deficit_joints,deficit_absorbed,\
-                    deficit_motion,known_directions,known_agreeing,reference,structural_threshold,informed_threshold"
+                    deficit_motion,known_directions,known_agreeing,false_gain,reference,structural_threshold,informed_threshold"
             .to_owned();
     for name in &margins {
         write!(text, ",margin_{}", name.replace([' ', ','], "_")).expect(INTO_STRING);
@@ -134,7 +134,7 @@ pub(super) fn rank_csv(run: &RunRecord) -> String {
         for count in counts {
             write!(text, ",{count}").expect(INTO_STRING);
         }
-        for number in [rank.reference, rank.structural_threshold, rank.informed_threshold] {
+        for number in [rank.false_gain(), rank.reference, rank.structural_threshold, rank.informed_threshold] {
             push_number(&mut text, number);
         }
         for name in &margins {

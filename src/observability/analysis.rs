@@ -9,7 +9,7 @@ use crate::gimbal::Chain;
 use super::classification::{ROTATION_SCALE_RAD, TIME_SCALE_S, TRANSLATION_SCALE_M, classify, tolerance};
 use super::directions::weak_directions;
 use super::elimination::{Rows, column_norms};
-use super::structure::{compare, known_losses};
+use super::structure::{Measured, known_losses};
 use super::{PackedFactor, RankReport};
 
 /// Below this scaled singular value a direction is uninformed: the window leaves it over 0.71 of its scale.
@@ -77,10 +77,8 @@ pub fn analyse_with_scaling<A: AsRef<[f64]>>(
     let with_priors = if columns == 0 { with_priors } else { with_priors.qr().unpack_r() };
     let singular_values: Vec<f64> = svd.singular_values.iter().copied().collect();
 
-    // The Frobenius norm stands in for the spectral one, which the column norms alone do not give; it is larger by at
-    // most the root of the number of columns.
-    let reference = linearization.calibration_column_norms.component_mul(&scale).norm();
-    let structural_threshold = tolerance(linearization.jacobian.nrows(), columns) * reference;
+    let reference = reference(linearization, &scale);
+    let structural_threshold = structural_threshold(linearization, &scale);
     let count_above = |threshold: f64| singular_values.iter().filter(|value| **value > threshold).count();
     let rank_structural = count_above(structural_threshold);
     let rank_informed = singular_values.iter().filter(|value| **value >= INFORMED_THRESHOLD).count();
@@ -94,7 +92,17 @@ pub fn analyse_with_scaling<A: AsRef<[f64]>>(
     let null_space = svd.v.columns(rank_structural, columns - rank_structural);
     let losses = known_losses(&linearization.chain, joints_free);
     let kept = kept_columns(&linearization.chain, held);
-    let known = compare(losses, &kept, &scale, &block, &null_space, reference, structural_threshold);
+    let rig_prior = linearization.prior_jacobian.view((0, 0), (linearization.rig_prior_rows, columns));
+    let measured = Measured {
+        scale: &scale,
+        block: &block,
+        null_space,
+        with_priors: &with_priors,
+        rig_prior: &scaled(rig_prior.into_owned(), &scale),
+        reference,
+        structural_threshold,
+    };
+    let known = measured.compare(losses, &kept);
     Some(RankReport {
         directions: weak_directions(&block, &svd.v, &singular_values, rank_structural, INFORMED_THRESHOLD),
         names,
@@ -126,9 +134,32 @@ fn kept_columns(chain: &Chain, held: &[String]) -> Vec<usize> {
 /// What the measurements alone tell about the calibration, as the information of its columns in units of 10° and 3 cm;
 /// `None` when the linearization is not finite.
 pub(super) fn measured_information(linearization: &Linearization) -> Option<DMatrix<f64>> {
+    let block = measured_block(linearization)?.block;
+    Some(block.tr_mul(&block))
+}
+
+/// The calibration columns in units of 10° and 3 cm with everything else projected out, by measurements alone.
+pub(super) struct MeasuredBlock {
+    pub(super) block: DMatrix<f64>,
+    /// At or below this a singular value is a structural zero.
+    pub(super) structural_threshold: f64,
+}
+
+/// `None` when the linearization is not finite.
+pub(super) fn measured_block(linearization: &Linearization) -> Option<MeasuredBlock> {
     let scale = ScalingRule::Fixed.scale(&calibration_names(linearization));
     let block = scaled(Projected::new(linearization)?.measurements, &scale);
-    Some(block.tr_mul(&block))
+    Some(MeasuredBlock { structural_threshold: structural_threshold(linearization, &scale), block })
+}
+
+/// The Frobenius norm of the columns before projection stands in for the spectral one, which the column norms alone do not
+/// give; it is larger by at most the root of the number of columns.
+fn reference(linearization: &Linearization, scale: &DVector<f64>) -> f64 {
+    linearization.calibration_column_norms.component_mul(scale).norm()
+}
+
+fn structural_threshold(linearization: &Linearization, scale: &DVector<f64>) -> f64 {
+    tolerance(linearization.jacobian.nrows(), scale.len()) * reference(linearization, scale)
 }
 
 fn calibration_names(linearization: &Linearization) -> Vec<String> {

@@ -93,6 +93,11 @@ impl RankReport {
         self.known.iter().filter(|known| known.agrees).count()
     }
 
+    /// The largest [`KnownDirection::false_gain`].
+    pub fn false_gain(&self) -> f64 {
+        self.known.iter().map(|known| known.false_gain).fold(0.0, f64::max)
+    }
+
     /// The parameter with the largest share in the weakest direction that is not a structural zero.
     pub fn weakest(&self) -> Option<&str> {
         let direction = self.directions.iter().find(|direction| !direction.structural)?;

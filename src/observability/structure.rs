@@ -10,7 +10,7 @@
 //! [`crate::gimbal::Parameterization::MinimalSwapped`].
 //! The paper has its proof in the left convention of rotations; the directions here are in the right one, as all else.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DMatrixView, DVector};
 
 use crate::gimbal::{Chain, Parameterization, redundant_directions};
 
@@ -53,6 +53,22 @@ pub struct KnownDirection {
     pub share_in_null_space: f64,
     /// Whether the measurement agrees.
     pub agrees: bool,
+    /// What is taken to be known of the direction beyond the rig's prior, 1 as much as the scale.
+    ///
+    /// Nobody can measure it, so anything but zero is false: the marginalization prior and the window were linearized at
+    /// different values of the calibration. First estimates keep it at zero. Offsets of free joint angles are left out
+    /// (zero): readings from before a fork may tell them.
+    pub false_gain: f64,
+}
+
+/// A smaller [`KnownDirection::false_gain`] than this is not worth a word.
+pub const LEAST_FALSE_GAIN: f64 = 0.01;
+
+impl KnownDirection {
+    /// Whether a prior claims a part of it that counts.
+    pub fn is_claimed(&self) -> bool {
+        self.false_gain > LEAST_FALSE_GAIN
+    }
 }
 
 /// Sine of a twist under which axes count as parallel, and length of a link under which parallel axes count as one line,
@@ -140,38 +156,54 @@ fn links(chain: &Chain, joints_free: bool, losses: &mut Vec<(KnownLoss, DVector<
     }
 }
 
-/// Holds the known losses against the scaled, projected calibration block and the basis of its null space.
-///
-/// A direction that moves a parameter outside of `kept` is none: that one is held at its value.
-pub(super) fn compare(
-    losses: Vec<(KnownLoss, DVector<f64>)>,
-    kept: &[usize],
-    scale: &DVector<f64>,
-    block: &DMatrix<f64>,
-    null_space: &nalgebra::DMatrixView<'_, f64>,
-    reference: f64,
-    structural_threshold: f64,
-) -> Vec<KnownDirection> {
-    losses
-        .into_iter()
-        .filter(|(_, direction)| {
-            let moves_held = (0..direction.len()).any(|column| direction[column] != 0.0 && !kept.contains(&column));
-            kept.len() <= scale.len() && !moves_held
-        })
-        .map(|(loss, direction)| {
-            let direction = direction.select_rows(kept);
-            // The chain's columns come first, those of other cameras behind them take no part.
-            let direction = direction.resize_vertically(scale.len(), 0.0).component_div(scale).normalize();
-            let response = (block * &direction).norm();
-            let share_in_null_space = null_space.tr_mul(&direction).norm();
-            KnownDirection {
-                loss,
-                response: if reference > 0.0 { response / reference } else { 0.0 },
-                share_in_null_space,
-                agrees: response <= structural_threshold && share_in_null_space >= INSIDE,
-            }
-        })
-        .collect()
+/// What is known of the calibration, its columns scaled and everything else projected out.
+pub(super) struct Measured<'a> {
+    pub(super) scale: &'a DVector<f64>,
+    /// By the measurements.
+    pub(super) block: &'a DMatrix<f64>,
+    /// Basis of the null space of that block.
+    pub(super) null_space: DMatrixView<'a, f64>,
+    /// By measurements and priors.
+    pub(super) with_priors: &'a DMatrix<f64>,
+    /// By the rig's prior alone.
+    pub(super) rig_prior: &'a DMatrix<f64>,
+    pub(super) reference: f64,
+    pub(super) structural_threshold: f64,
+}
+
+impl Measured<'_> {
+    /// Holds the known losses against the measurement.
+    ///
+    /// A direction that moves a parameter outside of `kept` is none: that one is held at its value.
+    pub(super) fn compare(&self, losses: Vec<(KnownLoss, DVector<f64>)>, kept: &[usize]) -> Vec<KnownDirection> {
+        let scale = self.scale;
+        losses
+            .into_iter()
+            .filter(|(_, direction)| {
+                let moves_held = (0..direction.len()).any(|column| direction[column] != 0.0 && !kept.contains(&column));
+                kept.len() <= scale.len() && !moves_held
+            })
+            .map(|(loss, direction)| {
+                let direction = direction.select_rows(kept);
+                // The chain's columns come first, those of other cameras behind them take no part.
+                let direction = direction.resize_vertically(scale.len(), 0.0).component_div(scale).normalize();
+                let response = (self.block * &direction).norm();
+                let share_in_null_space = self.null_space.tr_mul(&direction).norm();
+                KnownDirection {
+                    loss,
+                    response: if self.reference > 0.0 { response / self.reference } else { 0.0 },
+                    share_in_null_space,
+                    agrees: response <= self.structural_threshold && share_in_null_space >= INSIDE,
+                    false_gain: if matches!(loss, KnownLoss::FreeAngle(_)) { 0.0 } else { self.false_gain(&direction) },
+                }
+            })
+            .collect()
+    }
+
+    fn false_gain(&self, direction: &DVector<f64>) -> f64 {
+        let known = (self.with_priors * direction).norm_squared();
+        (known - (self.rig_prior * direction).norm_squared()).max(0.0).sqrt()
+    }
 }
 
 impl KnownLoss {

@@ -45,6 +45,14 @@ pub(super) fn estimator_config(rig: &Rig, spec: &RunSpec) -> Result<EstimatorCon
     let encoders = gimbal.filter(|gimbal| gimbal.topic.is_some());
     let encoder_sigma_rad = encoders.and_then(|gimbal| gimbal.encoder_sigma_rad);
     let has_joints = !chain.links.is_empty();
+    let standard = EstimatorOptions::default();
+    let options = EstimatorOptions {
+        window: spec.window,
+        keep_linearization: true,
+        calibration_first_estimates: spec.first_estimates,
+        first_estimate_reach_rad: if spec.first_estimates { standard.first_estimate_reach_rad } else { 0.0 },
+        ..standard
+    };
     Ok(EstimatorConfig {
         camera: camera.model.clone(),
         imu_noise: rig.imu.noise,
@@ -59,7 +67,7 @@ pub(super) fn estimator_config(rig: &Rig, spec: &RunSpec) -> Result<EstimatorCon
         timeshift_s: camera.timeshift_cam_imu_s,
         chain_prior: Some(sigmas(prior)),
         rigid_cameras: rigid.into_iter().filter_map(|camera| rigid_camera(rig, camera)).collect(),
-        options: EstimatorOptions { window: spec.window, keep_linearization: true, ..EstimatorOptions::default() },
+        options,
         clock_ms,
     })
 }

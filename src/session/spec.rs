@@ -76,6 +76,9 @@ pub struct RunSpec {
     pub calibrate: bool,
     /// Whether the offsets of the clocks of cameras and encoders are estimated (`timeshift=on` sets it).
     pub timeshift: bool,
+    /// Whether derivatives are taken at first estimates (`first-estimates=off` clears it): without, priors come to claim what
+    /// nobody can measure.
+    pub first_estimates: bool,
     /// Number of keyframes in the window (`window=10`).
     pub window: usize,
     /// Camera to watch (`camera=cam1`); `None` is the gimballed one, or the first rigid one for `static` and for rigs
@@ -91,6 +94,7 @@ impl Default for RunSpec {
             encoder: true,
             calibrate: true,
             timeshift: false,
+            first_estimates: true,
             window: DEFAULT_WINDOW,
             camera_key: None,
         }
@@ -140,6 +144,10 @@ impl FromStr for RunSpec {
                 "timeshift" => {
                     run.timeshift = on_or_off(value).map_err(|problem| bad(format!("timeshift: {problem}")))?;
                 }
+                "first-estimates" => {
+                    run.first_estimates =
+                        on_or_off(value).map_err(|problem| bad(format!("first-estimates: {problem}")))?;
+                }
                 "window" => {
                     run.window =
                         value.parse().ok().filter(|window| WINDOW_RANGE.contains(window)).ok_or_else(|| {
@@ -153,7 +161,7 @@ impl FromStr for RunSpec {
                     return Err(bad(format!("name is '{value}', expected letters, digits, '-', '_' and '.' only")));
                 }
                 _ => {
-                    let known = "encoder, calibrate, timeshift, window, camera, name";
+                    let known = "encoder, calibrate, timeshift, first-estimates, window, camera, name";
                     return Err(bad(format!("unknown key '{key}', expected one of {known}")));
                 }
             }
@@ -177,6 +185,9 @@ impl fmt::Display for RunSpec {
         }
         if self.timeshift {
             options.push("timeshift=on".to_owned());
+        }
+        if !self.first_estimates {
+            options.push("first-estimates=off".to_owned());
         }
         if self.window != standard.window {
             options.push(format!("window={}", self.window));

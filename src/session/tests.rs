@@ -26,6 +26,7 @@ fn run_specifications_are_read_and_written() {
         "minimal:calibrate=off",
         "classical:encoder=off,window=8,name=left",
         "poe:camera=cam1",
+        "auto:timeshift=on,first-estimates=off",
     ] {
         let run = parse(text).unwrap();
         assert_eq!(parse(&run.to_string()).unwrap(), run, "{text} is written as {run}");

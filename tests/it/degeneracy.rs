@@ -39,6 +39,13 @@ fn the_whole_table_agrees_with_the_notes_on_any_number_of_threads() {
     let (compared, agreeing) = (table["compared"].as_u64(), table["agreeing"].as_u64());
     assert!(compared >= Some(250), "{compared:?} figures");
     assert_eq!(compared, agreeing, "{}", printed(&["--table"]));
+    // Two values of the calibration claim what neither window sees, as much as the notes say within a factor of two.
+    for row in table["spurious"].as_array().expect("the claims are a list") {
+        let number = |name: &str| row[name].as_f64().unwrap_or_else(|| row[name][1].as_f64().expect("a number"));
+        let (most, expected) = (number("without"), number("without_expected"));
+        assert!(number("with_first_estimates") < 1e-9, "{row}");
+        assert!(most <= 2.0 * expected && expected <= 2.0 * most || most.max(expected) < 1e-9, "{row}");
+    }
     let (first, second) = (dcvins(&["--table"], "1"), dcvins(&[], "2"));
     assert!(first.stdout == second.stdout, "the table has the same bytes on one thread and on two");
     let text = String::from_utf8(second.stdout).unwrap();

@@ -36,7 +36,8 @@ fn three_runs_leave_the_same_bytes_twice_and_stay_near_the_truth() {
     let log = sample("garden.mcap");
     let run = |name: &str, threads: &str| {
         let out = folder.path().join(name);
-        let specs = ["--run", "auto", "--run", "classical", "--run", "static"];
+        let off = "classical:first-estimates=off,name=off";
+        let specs = ["--run", "auto", "--run", "classical", "--run", "static", "--run", off];
         let mut arguments = vec!["run", text_of(&log), "--out", text_of(&out), "--no-timing"];
         arguments.extend(specs);
         succeed(&arguments, threads);
@@ -69,6 +70,12 @@ fn three_runs_leave_the_same_bytes_twice_and_stay_near_the_truth() {
         arguments.extend(short);
         succeed(&arguments, "2");
     }
+    // Priors that were linearized at other values of the calibration claim what nobody can measure.
+    let text = fs::read_to_string(first.join("off/summary.json")).unwrap();
+    let summary: Value = serde_json::from_str(&text).unwrap();
+    let known = summary["rank"]["known"].as_array().expect("the known losses are a list");
+    let claimed = known.iter().filter(|loss| loss["largest_false_gain"].as_f64() > Some(0.1)).count();
+    assert!(known.len() == 6 && claimed >= 2, "{known:?}");
 }
 
 /// What the form of the chain is known to lose is what every step measured, and nothing else is lost to the form.
@@ -79,6 +86,7 @@ fn check_structure(summary: &Value, rank_csv: &Path, (columns, structural): (u64
         assert!(loss["steps"].as_u64() > Some(50) && loss["agreeing"] == loss["steps"], "{loss}");
         assert!(loss["reason"].as_str().is_some_and(|reason| reason.contains("same motion (")), "{loss}");
         assert!(loss["largest_response"].as_f64().is_some_and(|response| response < 1e-11), "{loss}");
+        assert!(loss["largest_false_gain"].as_f64().is_some_and(|gain| gain < 1e-3), "{loss}");
     }
     let text = fs::read_to_string(rank_csv).expect("the run wrote its ranks");
     let mut lines = text.lines();

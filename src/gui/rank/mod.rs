@@ -180,9 +180,21 @@ fn verdict_ui(ui: &mut Ui, theme: &Theme, step: &StepRecord) {
         response.on_hover_text(reason);
     }
     let Some(rank) = step.rank.as_ref().filter(|rank| !rank.known.is_empty()) else { return };
-    let title = format!("Known structure: {} of {} measured as null", rank.known_agreeing(), rank.known.len());
-    let title =
-        RichText::new(title).color(if rank.known_agreeing() == rank.known.len() { theme.text } else { theme.error });
+    let claimed = rank.known.iter().filter(|known| known.is_claimed()).count();
+    let falsely = match claimed {
+        0 => String::new(),
+        _ => format!("; {claimed} falsely known by the prior, up to {:.2}", rank.false_gain()),
+    };
+    let title = format!("Known structure: {} of {} measured as null{falsely}", rank.known_agreeing(), rank.known.len());
+    let agrees = rank.known_agreeing() == rank.known.len();
+    let color = if !agrees {
+        theme.error
+    } else if claimed > 0 {
+        theme.warn
+    } else {
+        theme.text
+    };
+    let title = RichText::new(title).color(color);
     egui::CollapsingHeader::new(title).id_salt("known structure").show(ui, |ui| {
         for line in verdict::structure_lines(rank) {
             ui.add(egui::Label::new(RichText::new(line).small().color(theme.text)).wrap());

@@ -88,7 +88,9 @@ fn of_rank(rank: &RankReport) -> Verdict {
 pub(crate) fn structure_lines(rank: &RankReport) -> Vec<String> {
     let line = |known: &KnownDirection| {
         let mark = if known.agrees { "✔" } else { "✖" };
-        format!("{mark} {}", known.loss.reason(rank.joint_count))
+        let claimed =
+            if known.is_claimed() { format!("; falsely known: {:.2}", known.false_gain) } else { String::new() };
+        format!("{mark} {}{claimed}", known.loss.reason(rank.joint_count))
     };
     rank.known.iter().map(line).collect()
 }

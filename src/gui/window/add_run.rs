@@ -25,6 +25,7 @@ pub struct AddRunDialog {
     encoder: bool,
     calibrate: bool,
     timeshift: bool,
+    first_estimates: bool,
     window: usize,
     name: String,
 }
@@ -38,6 +39,7 @@ impl Default for AddRunDialog {
             encoder: standard.encoder,
             calibrate: standard.calibrate,
             timeshift: standard.timeshift,
+            first_estimates: standard.first_estimates,
             window: standard.window,
             name: String::new(),
         }
@@ -71,6 +73,9 @@ impl AddRunDialog {
         }
         if self.timeshift && self.calibrate {
             options.push("timeshift=on".to_owned());
+        }
+        if !self.first_estimates {
+            options.push("first-estimates=off".to_owned());
         }
         if self.window != RunSpec::default().window {
             options.push(format!("window={}", self.window));
@@ -143,6 +148,10 @@ impl AddRunDialog {
             ui.end_row();
             ui.label("");
             ui.add_enabled_ui(self.calibrate, |ui| ui.checkbox(&mut self.timeshift, "Offsets of the clocks"));
+            ui.end_row();
+            ui.label("Linearize");
+            ui.checkbox(&mut self.first_estimates, "At first estimates")
+                .on_hover_text("Without, priors come to claim what nobody can measure");
             ui.end_row();
             let name = ui.label("Keyframes in the window");
             ui.add(egui::DragValue::new(&mut self.window).range(4..=30)).labelled_by(name.id);

@@ -148,10 +148,15 @@ impl LaboratorySetup {
 
     /// The window of the experiment.
     pub fn window(&self) -> SupposedWindow {
+        self.window_from(0)
+    }
+
+    /// The window that begins so many frames after the begin of the motion.
+    pub(super) fn window_from(&self, first: usize) -> SupposedWindow {
         let gravity_in_world = gravity_in_world(GRAVITY_M_PER_S2);
         let flight = Flight { mechanism: &self.mechanism, motion: self.motion, frozen: &self.frozen, gravity_in_world };
         let inertial = matches!(self.poses, PoseKnowledge::Inertial { .. });
-        let time_of = |slot: usize| slot as f64 * FRAME_PERIOD_S;
+        let time_of = |slot: usize| (first + slot) as f64 * FRAME_PERIOD_S;
         let frames: Vec<SupposedFrame> = (0..self.frames)
             .map(|slot| SupposedFrame {
                 time_s: time_of(slot),

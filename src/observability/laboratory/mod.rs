@@ -11,6 +11,7 @@ mod mechanism;
 mod motion;
 mod report;
 mod situation;
+mod spurious;
 mod table;
 #[cfg(test)]
 mod tests;
@@ -25,4 +26,5 @@ pub use mechanism::{LaboratoryJoint, Mechanism, UnknownMechanism};
 pub use motion::{LaboratoryMotion, UnknownMotion};
 pub use report::LaboratoryReport;
 pub use situation::Situation;
+pub use spurious::SpuriousRow;
 pub use table::{TableEntry, TableRow, TableSection, TruthTable, truth_table};

@@ -5,6 +5,7 @@ use std::fmt;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::spurious::{self, SpuriousRow};
 use super::truth::{Column, Joints, LEAST_FRAMES, LeastFrames, Poses, SECTIONS, Truth};
 use super::{Deficit, LABORATORY_IMU, LaboratoryForm, LaboratoryResult, LaboratorySetup, Mechanism};
 use crate::estimator::{JointKnowledge, PoseKnowledge};
@@ -16,11 +17,13 @@ const MOST_FRAMES: usize = 16;
 const LANDMARKS_WITHOUT_ENCODER: usize = 130;
 
 /// The table, measured.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TruthTable {
     /// Its parts.
     pub sections: Vec<TableSection>,
-    /// How many ranks, causes and sets of null directions were compared.
+    /// What two windows claim together that are linearized at different values of the calibration.
+    pub spurious: Vec<SpuriousRow>,
+    /// How many ranks, causes, sets of null directions and claims were compared.
     pub compared: usize,
     /// How many of them agree with the notes.
     pub agreeing: usize,
@@ -87,12 +90,13 @@ pub fn truth_table() -> TruthTable {
         rows: LEAST_FRAMES.par_iter().filter_map(least_frames).collect(),
     });
     let rows = || sections.iter().flat_map(|section| &section.rows);
-    let compared = rows().map(TableRow::compared).sum();
-    let agreeing = rows().map(TableRow::agreeing).sum();
-    TruthTable { sections, compared, agreeing }
+    let spurious = spurious::measure();
+    let compared = rows().map(TableRow::compared).sum::<usize>() + spurious.len();
+    let agreeing = rows().map(TableRow::agreeing).sum::<usize>() + spurious.iter().filter(|row| row.agrees).count();
+    TruthTable { sections, spurious, compared, agreeing }
 }
 
-fn setup(mechanism: &str, joints: Joints, poses: Poses, frames: usize) -> Option<LaboratorySetup> {
+pub(super) fn setup(mechanism: &str, joints: Joints, poses: Poses, frames: usize) -> Option<LaboratorySetup> {
     let mut setup = LaboratorySetup::new(Mechanism::named(mechanism).ok()?);
     setup.joints = match joints {
         Joints::Known => JointKnowledge::Known,
@@ -262,6 +266,10 @@ impl fmt::Display for TruthTable {
             for row in &section.rows {
                 row.write(out)?;
             }
+        }
+        writeln!(out, "\n{}", spurious::TITLE)?;
+        for row in &self.spurious {
+            writeln!(out, "{row}")?;
         }
         writeln!(out, "\n{} of {} figures agree with the notes", self.agreeing, self.compared)
     }

@@ -71,7 +71,15 @@ fn window(random: &mut Random, names: &[String]) -> Linearization {
         }));
     }
     let calibration_column_norms = nalgebra::DVector::from_fn(CALIBRATION, |column, _| jacobian.column(column).norm());
-    Linearization { columns, held: Vec::new(), jacobian, prior_jacobian, calibration_column_norms, chain: chain() }
+    Linearization {
+        columns,
+        held: Vec::new(),
+        jacobian,
+        prior_jacobian,
+        rig_prior_rows: 0,
+        calibration_column_norms,
+        chain: chain(),
+    }
 }
 
 /// Singular values by the definition: the calibration minus its part in the column space of the nuisance.

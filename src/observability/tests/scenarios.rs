@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector, UnitQuaternion, Vector3};
 
 use super::window::{Landmark, Window};
 use crate::camera::CameraModel;
+use crate::estimator::Linearization;
 use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::tests::random::{Random, special_chains};
 use crate::gimbal::{Chain, ClassicalChain, Parameterization};
@@ -234,6 +235,17 @@ fn known_and_measured_redundancy_agree() {
     assert!(report.rank_structural > 18, "{}", report.verdict());
     let wrong: Vec<_> = report.known.iter().filter(|known| !known.agrees).collect();
     assert!(!wrong.is_empty() && wrong.iter().any(|known| known.response > 1e-6), "{:?}", report.known);
+    // A prior that was linearized there claims it; the rig's prior may, and one from here claims nothing.
+    let claimed = |prior_jacobian: &DMatrix<f64>, rig_prior_rows: usize| {
+        let with_prior =
+            Linearization { prior_jacobian: prior_jacobian.clone(), rig_prior_rows, ..linearization.clone() };
+        analyse(&with_prior, &chain, &window.joint_angles_rad, false).unwrap().known
+    };
+    assert!(claimed(&linearization.jacobian, 0).iter().all(|known| known.false_gain < 1e-3));
+    let false_gains = claimed(&mixed.jacobian, 0);
+    assert!(false_gains.iter().filter(|known| known.is_claimed()).count() >= 3, "{false_gains:?}");
+    let rig_prior = DMatrix::identity(24, mixed.jacobian.ncols()) * 100.0;
+    assert!(claimed(&rig_prior, 24).iter().all(|known| known.false_gain < 1e-3));
     // The minimal form has lost nothing by itself, and without encoders its offsets.
     let minimal = Chain::from_classical(&classical, Parameterization::Minimal);
     let known = |joints_free: bool| {

@@ -1,0 +1,184 @@
+//! Information that nobody measured: an old window and a new one, linearized at different values of the calibration,
+//! together claim directions that each of them cannot see (section 3 of the mathematics notes).
+//!
+//! That is what a marginalization prior does beside the window when the calibration has moved meanwhile. With first
+//! estimates both are linearized at the old value.
+
+use std::fmt;
+
+use nalgebra::DVector;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::LaboratoryForm;
+use super::table::setup;
+use super::truth::{Joints, Poses};
+use crate::estimator::SupposedWindow;
+use crate::geometry::{SplitMix64, dense};
+use crate::gimbal::{Chain, ClassicalChain, Parameterization};
+use crate::observability::analysis::measured_block;
+
+/// Frames of each of the two windows.
+const FRAMES: usize = 10;
+/// Changes of the calibration that are drawn for each row.
+const DRAWS: u64 = 8;
+/// A direction that is claimed this much counts as known: as much as its scale of 10° or 3 cm.
+const KNOWN: f64 = 1.0;
+/// With first estimates nothing above this is claimed.
+const ROUNDING: f64 = 1e-9;
+
+/// Heading of the rows.
+pub(super) const TITLE: &str = "Two windows, the calibration changed between them: the most that they claim together of \
+    what neither sees\n  (1: as much as 10° or 3 cm), and how many such directions are claimed over 1; 8 draws";
+
+/// What is claimed of a form's null directions by two windows together.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SpuriousRow {
+    /// Name of the form.
+    pub form: String,
+    /// Whether the joint angles are known.
+    pub encoder: bool,
+    /// How far the calibration moved between the windows, each angle and each length up to this either way: in degrees and
+    /// in millimetres.
+    pub change: (f64, f64),
+    /// Number of directions that neither window sees.
+    pub null: usize,
+    /// The largest singular value of these, both windows linearized at the first value.
+    pub with_first_estimates: f64,
+    /// The same with each window linearized at its own value: least and most over the draws.
+    pub without: (f64, f64),
+    /// How many of them are then over 1: least and most over the draws.
+    pub known: (usize, usize),
+    /// The most singular value that the notes give.
+    pub without_expected: f64,
+    /// The numbers over 1 that the notes give, from and to.
+    pub known_expected: (usize, usize),
+    /// Whether what was measured overlaps with what the notes give, and first estimates claim nothing.
+    pub agrees: bool,
+}
+
+struct Case {
+    parameterization: Parameterization,
+    joints: Joints,
+    change: (f64, f64),
+    without: f64,
+    known: (usize, usize),
+}
+
+const CASES: [Case; 6] = [
+    case(Parameterization::Classical, Joints::Known, (0.1, 1.0), 0.7, (0, 0)),
+    case(Parameterization::Classical, Joints::Known, (1.0, 10.0), 5.7, (1, 2)),
+    case(Parameterization::Classical, Joints::Known, (10.0, 30.0), 7.3, (2, 3)),
+    case(Parameterization::Minimal, Joints::Known, (10.0, 30.0), 0.0, (0, 0)),
+    case(Parameterization::Minimal, Joints::Free, (10.0, 30.0), 0.0, (0, 0)),
+    case(Parameterization::Poe, Joints::Free, (10.0, 30.0), 0.48, (0, 0)),
+];
+
+const fn case(
+    parameterization: Parameterization,
+    joints: Joints,
+    change: (f64, f64),
+    without: f64,
+    known: (usize, usize),
+) -> Case {
+    Case { parameterization, joints, change, without, known }
+}
+
+/// Every case of the notes.
+pub(super) fn measure() -> Vec<SpuriousRow> {
+    CASES.par_iter().filter_map(Case::measure).collect()
+}
+
+impl Case {
+    fn measure(&self) -> Option<SpuriousRow> {
+        let setup = setup("generic", self.joints, Poses::Known, FRAMES)?;
+        let (old, new) = (setup.window_from(0), setup.window_from(FRAMES));
+        let form = LaboratoryForm::whole(self.parameterization);
+        let chain = &setup.mechanism.chain;
+        let consistent = stacked_singular_values(form, [(&old, chain), (&new, chain)])?;
+        let rank = consistent.rank;
+        let mut without = (f64::INFINITY, 0.0_f64);
+        let mut known = (usize::MAX, 0);
+        for draw in 1..=DRAWS {
+            let changed = changed(chain, self.change, draw);
+            let values = stacked_singular_values(form, [(&old, chain), (&new, &changed)])?.values;
+            let spurious = &values[rank..];
+            let most = spurious.first().copied().unwrap_or(0.0);
+            let count = spurious.iter().filter(|value| **value > KNOWN).count();
+            without = (without.0.min(most), without.1.max(most));
+            known = (known.0.min(count), known.1.max(count));
+        }
+        let with_first_estimates = consistent.values.get(rank).copied().unwrap_or(0.0);
+        let overlaps = known.0 <= self.known.1 && self.known.0 <= known.1;
+        let none = self.without > 0.0 || without.1 <= ROUNDING;
+        Some(SpuriousRow {
+            form: form.name(),
+            encoder: self.joints == Joints::Known,
+            change: self.change,
+            null: consistent.values.len() - rank,
+            with_first_estimates,
+            without,
+            known,
+            without_expected: self.without,
+            known_expected: self.known,
+            agrees: overlaps && none && with_first_estimates <= ROUNDING,
+        })
+    }
+}
+
+/// Two windows together.
+struct Stacked {
+    values: Vec<f64>,
+    /// Of the two windows linearized at the first one's chain.
+    rank: usize,
+}
+
+fn stacked_singular_values(form: LaboratoryForm, windows: [(&SupposedWindow, &ClassicalChain); 2]) -> Option<Stacked> {
+    let blocks = windows
+        .map(|(window, chain)| measured_block(&window.linearize(chain, form.parameterization, form.joint_offsets)));
+    let [Some(old), Some(new)] = blocks else { return None };
+    let mut both = old.block.clone().resize_vertically(old.block.nrows() + new.block.nrows(), 0.0);
+    both.rows_mut(old.block.nrows(), new.block.nrows()).copy_from(&new.block);
+    let values = dense::singular_values(&both)?;
+    let threshold = old.structural_threshold.max(new.structural_threshold);
+    let rank = values.iter().filter(|value| **value > threshold).count();
+    Some(Stacked { values, rank })
+}
+
+/// The chain with each angle moved by up to so many degrees and each length by up to so many millimetres.
+fn changed(chain: &ClassicalChain, (degrees, millimetres): (f64, f64), seed: u64) -> ClassicalChain {
+    let chain = Chain::from_classical(chain, Parameterization::Classical);
+    let mut random = SplitMix64::new(seed);
+    let units = chain.parameter_units();
+    let change = DVector::from_fn(units.len(), |column, _| {
+        let most = if units[column] == "rad" { degrees.to_radians() } else { millimetres * 1e-3 };
+        most * (2.0 * random.next_unit() - 1.0)
+    });
+    chain.plus(&change).to_classical()
+}
+
+impl fmt::Display for SpuriousRow {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mark = if self.agrees { ' ' } else { '!' };
+        let (degrees, millimetres) = self.change;
+        let encoder = if self.encoder { "" } else { ", no encoder" };
+        let scenario = format!("{}{encoder}, change {degrees}° {millimetres} mm", self.form);
+        write!(out, "{mark} {scenario:<42}")?;
+        if self.null == 0 {
+            return write!(out, "nothing is lost, so that nothing can be claimed");
+        }
+        let (least, most) = self.without;
+        let range = |(least, most): (usize, usize)| {
+            if least == most { least.to_string() } else { format!("{least} to {most}") }
+        };
+        write!(
+            out,
+            "first estimates {:.0e}, without {least:.2} to {most:.2} (notes {}); over 1: {}/{} of {}",
+            self.with_first_estimates,
+            self.without_expected,
+            range(self.known),
+            range(self.known_expected),
+            self.null
+        )
+    }
+}
