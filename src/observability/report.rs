@@ -93,6 +93,11 @@ impl RankReport {
         self.known.iter().filter(|known| known.agrees).count()
     }
 
+    /// How many of the known directions a prior claims to know.
+    pub fn claimed(&self) -> usize {
+        self.known.iter().filter(|known| known.is_claimed()).count()
+    }
+
     /// The largest [`KnownDirection::false_gain`].
     pub fn false_gain(&self) -> f64 {
         self.known.iter().map(|known| known.false_gain).fold(0.0, f64::max)

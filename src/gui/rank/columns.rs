@@ -46,7 +46,7 @@ pub(in crate::gui) fn columns_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, column
 
 fn table_ui(ui: &mut Ui, theme: &Theme, columns: &[RankColumn<'_>], width: f32) {
     type Cell = fn(&RankReport) -> (String, bool);
-    let rows: [(&str, Cell); 7] = [
+    let rows: [(&str, Cell); 8] = [
         ("structural rank", |rank| {
             let whole = rank.rank_structural == rank.names.len();
             (format!("{} of {}", rank.rank_structural, rank.names.len()), !whole)
@@ -56,6 +56,10 @@ fn table_ui(ui: &mut Ui, theme: &Theme, columns: &[RankColumn<'_>], width: f32) 
         ("to joints at rest", |rank| lost(rank.deficit_joints)),
         ("to free angles", |rank| lost(rank.deficit_absorbed)),
         ("to the motion", |rank| lost(rank.deficit_motion)),
+        ("falsely known", |rank| {
+            let claimed = rank.claimed();
+            (if claimed == 0 { lost(0).0 } else { format!("{claimed}, up to {:.2}", rank.false_gain()) }, claimed > 0)
+        }),
         ("nearest lock", |rank| {
             let nearest = rank.margins.iter().min_by(|a, b| a.1.total_cmp(&b.1));
             nearest.map_or_else(

@@ -31,6 +31,9 @@ const STRUCTURAL: usize = 0;
 const INFORMED: usize = 1;
 const PARAMETERS: usize = 2;
 
+/// Width that the lines about one run need, in points.
+const OWN_WIDTH: f32 = 480.0;
+
 /// Height from which the ranks over time have room, in points.
 const LOWEST_WITH_TIME: f32 = 340.0;
 
@@ -66,8 +69,10 @@ impl RankPanel {
         };
         let height = ui.available_height();
         let count = compare::comparable(ctx);
-        if count > 1 && ui.available_width() >= compare::WIDTH_OF_A_RUN * (count + 1) as f32 {
-            let [own, all] = halves(ui.available_rect_before_wrap(), 1.0 / (count + 1) as f32);
+        let width = ui.available_width();
+        if count > 1 && width >= OWN_WIDTH + compare::WIDTH_OF_A_RUN * count as f32 {
+            let share = (OWN_WIDTH / width).max(1.0 / (count + 1) as f32);
+            let [own, all] = halves(ui.available_rect_before_wrap(), share);
             ui.scope_builder(UiBuilder::new().max_rect(own), |ui| self.run_ui(ui, ctx, run, step, height));
             ui.scope_builder(UiBuilder::new().max_rect(all), |ui| compare::ui(ui, ctx));
             return;
@@ -180,21 +185,9 @@ fn verdict_ui(ui: &mut Ui, theme: &Theme, step: &StepRecord) {
         response.on_hover_text(reason);
     }
     let Some(rank) = step.rank.as_ref().filter(|rank| !rank.known.is_empty()) else { return };
-    let claimed = rank.known.iter().filter(|known| known.is_claimed()).count();
-    let falsely = match claimed {
-        0 => String::new(),
-        _ => format!("; {claimed} falsely known by the prior, up to {:.2}", rank.false_gain()),
-    };
-    let title = format!("Known structure: {} of {} measured as null{falsely}", rank.known_agreeing(), rank.known.len());
-    let agrees = rank.known_agreeing() == rank.known.len();
-    let color = if !agrees {
-        theme.error
-    } else if claimed > 0 {
-        theme.warn
-    } else {
-        theme.text
-    };
-    let title = RichText::new(title).color(color);
+    let title = format!("Known structure: {} of {} measured as null", rank.known_agreeing(), rank.known.len());
+    let title =
+        RichText::new(title).color(if rank.known_agreeing() == rank.known.len() { theme.text } else { theme.error });
     egui::CollapsingHeader::new(title).id_salt("known structure").show(ui, |ui| {
         for line in verdict::structure_lines(rank) {
             ui.add(egui::Label::new(RichText::new(line).small().color(theme.text)).wrap());

@@ -71,6 +71,13 @@ fn of_rank(rank: &RankReport) -> Verdict {
     if !causes.is_empty() {
         reasons.push(format!("Lost to: {}", causes.join(", ")));
     }
+    if rank.claimed() > 0 {
+        reasons.push(format!(
+            "The prior falsely claims {} of what cannot be told, up to {:.2} of 10° or 3 cm",
+            rank.claimed(),
+            rank.false_gain()
+        ));
+    }
     if let Some(direction) = rank.directions.iter().find(|direction| !direction.structural) {
         reasons.push(format!("Weakest: {}", parameters_of(&rank.names, direction, 3)));
     } else if let Some(direction) = rank.directions.first() {
