@@ -11,7 +11,7 @@ use dcvins::gui::{PanelContext, Playback, Selection};
 use dcvins::session::{Recording, SessionPlan};
 
 use super::Table;
-use super::figures::Times;
+use super::figures::{Times, cpu_s};
 
 const OPTIONS: HeadlessOptions =
     HeadlessOptions { size_px: [1920, 1080], pixels_per_point: 1.0, theme: ThemeName::Dark };
@@ -22,7 +22,10 @@ const PAUSED: usize = 30;
 /// Pictures that are drawn first, until everything has found its place.
 const SETTLING: usize = 4;
 
-/// A window without a screen.
+/// Seconds from picture to picture: one for each image of the camera.
+const FRAME_TIME_S: f64 = 0.05;
+
+/// A window without a screen, which leaves advice to a thread as the real one does.
 pub(crate) struct Player {
     images: ImageReader,
     headless: Headless,
@@ -33,11 +36,16 @@ pub(crate) struct Player {
 
 impl Player {
     pub(crate) fn new(plan: &SessionPlan) -> Self {
+        let mut headless = Headless::new(OPTIONS);
+        headless.set_frame_time_s(FRAME_TIME_S);
+        let mut state = WindowState::default();
+        state.panels.rank.in_background = true;
+        state.panels.jacobian.in_background = true;
         Self {
             images: ImageReader::new(Arc::clone(&plan.log), &plan.rig),
-            headless: Headless::new(OPTIONS),
+            headless,
             painter: Painter::new(),
-            state: WindowState::default(),
+            state,
             selection: Selection::default(),
         }
     }
@@ -64,7 +72,7 @@ impl Player {
         frame
     }
 
-    fn paint(&self, frame: &Frame) {
+    fn paint(&mut self, frame: &Frame) {
         let background = Theme::of(OPTIONS.theme).background;
         drop(self.painter.paint(&frame.primitives, OPTIONS.size_px, OPTIONS.pixels_per_point, background));
     }
@@ -89,7 +97,7 @@ impl Player {
 pub(crate) fn measure(recording: &Recording, player: &mut Player) -> Table {
     let mut table = Table::new(
         "A picture of the window at 1920×1080, drawn on the CPU: ms at the median / 95 % / largest",
-        &["preset", "cursor", "laying out", "painting", "together"],
+        &["preset", "cursor", "laying out", "painting", "together", "processor time, mean"],
     );
     let steps = recording.runs.first().map_or(&[][..], |run| &run.steps);
     let stamps_ns: Vec<i64> = steps.iter().map(|step| step.report.stamp_ns).collect();
@@ -105,11 +113,14 @@ pub(crate) fn measure(recording: &Recording, player: &mut Player) -> Table {
             // The first picture at another place belongs to the running cursor.
             player.picture(recording, cursors_ns[0]);
             let mut times = [Times::default(), Times::default(), Times::default()];
+            let before_s = cpu_s();
             for cursor_ns in cursors_ns {
                 player.measured(recording, *cursor_ns, &mut times);
             }
+            let cpu_ms = cpu_s().zip(before_s).map(|(after, before)| 1e3 * (after - before) / cursors_ns.len() as f64);
             let cells = times.iter().map(|times| times.cells().join(" / "));
-            table.row(preset.name(), std::iter::once(what.to_owned()).chain(cells));
+            let cpu = cpu_ms.map_or_else(String::new, |ms| format!("{ms:.1}"));
+            table.row(preset.name(), std::iter::once(what.to_owned()).chain(cells).chain([cpu]));
         }
     }
     table

@@ -11,7 +11,7 @@ use super::theme::{Theme, ThemeName};
 
 /// Frames that run before the picture: layouts, scroll areas and plot bounds settle.
 const SETTLING_FRAMES: usize = 3;
-/// Seconds between two frames, long enough for every animation to end.
+/// Seconds between two frames where nobody says otherwise, long enough for every animation to end.
 const FRAME_TIME_S: f64 = 1.0;
 
 /// How large and in which theme.
@@ -80,7 +80,9 @@ impl FramePainter for Painter {
 pub struct Headless {
     context: egui::Context,
     options: HeadlessOptions,
-    frame_count: usize,
+    /// Seconds that pass from frame to frame, and that have passed.
+    frame_time_s: f64,
+    time_s: f64,
 }
 
 impl Headless {
@@ -88,12 +90,17 @@ impl Headless {
     pub fn new(options: HeadlessOptions) -> Self {
         let context = egui::Context::default();
         Theme::of(options.theme).apply(&context);
-        Self { context, options, frame_count: 0 }
+        Self { context, options, frame_time_s: FRAME_TIME_S, time_s: 0.0 }
     }
 
     /// The context, for setting it up before the first frame.
     pub fn context(&self) -> &egui::Context {
         &self.context
+    }
+
+    /// Lets so many seconds pass from frame to frame, as in a window; at first every animation ends between two frames.
+    pub fn set_frame_time_s(&mut self, frame_time_s: f64) {
+        self.frame_time_s = frame_time_s;
     }
 
     /// Runs one frame with input events.
@@ -111,12 +118,12 @@ impl Headless {
             screen_rect: Some(Rect::from_min_size(egui::Pos2::ZERO, size)),
             viewports: std::iter::once((ViewportId::ROOT, viewport)).collect(),
             max_texture_side: Some(8192),
-            time: Some(self.frame_count as f64 * FRAME_TIME_S),
+            time: Some(self.time_s),
             focused: true,
             events,
             ..RawInput::default()
         };
-        self.frame_count += 1;
+        self.time_s += self.frame_time_s;
         self.context.run_ui(input, ui)
     }
 

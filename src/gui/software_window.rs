@@ -3,11 +3,8 @@
 //! A software Vulkan takes several times as long for egui's meshes as [`Painter`] does, so the window's meshes are
 //! painted here and the adapter is left one textured rectangle.
 
-use std::sync::Arc;
-
 use egui::epaint::{ClippedShape, ImageDelta, Mesh};
-use egui::{Color32, ColorImage, Context, FullOutput, Plugin, Pos2, Rect, Shape, TextureId, TextureOptions, pos2};
-use image::RgbaImage;
+use egui::{Color32, Context, FullOutput, Plugin, Pos2, Rect, Shape, TextureId, TextureOptions, pos2};
 
 use super::painter::Painter;
 
@@ -18,7 +15,8 @@ const PICTURE: TextureId = TextureId::Managed(u64::MAX);
 #[derive(Default)]
 pub(super) struct SoftwareWindow {
     painter: Painter,
-    shown: Option<RgbaImage>,
+    /// Size of the picture that the adapter has.
+    shown_px: [u32; 2],
 }
 
 impl Plugin for SoftwareWindow {
@@ -33,17 +31,20 @@ impl Plugin for SoftwareWindow {
         let shapes = std::mem::take(&mut output.shapes);
         let primitives = ctx.tessellate(shapes, scale);
         self.painter.set_textures(&output.textures_delta);
-        let picture = self.painter.paint(&primitives, size_px, scale, Color32::BLACK);
+        self.painter.update(&primitives, size_px, scale, Color32::BLACK);
         self.painter.free_textures(&output.textures_delta);
         output.textures_delta.clear();
-        if picture.is_empty() {
+        if size_px.contains(&0) {
             return;
         }
-        if self.shown.as_ref() != Some(&picture) {
-            let size = size_px.map(|side| side as usize);
-            let image = Arc::new(ColorImage::from_rgba_premultiplied(size, &picture));
-            output.textures_delta.push(PICTURE, ImageDelta::full(image, TextureOptions::NEAREST));
-            self.shown = Some(picture);
+        let options = TextureOptions::NEAREST;
+        if self.shown_px == size_px {
+            for (part, colors) in self.painter.changes() {
+                output.textures_delta.push(PICTURE, ImageDelta::partial(part.at, colors, options));
+            }
+        } else {
+            self.shown_px = size_px;
+            output.textures_delta.push(PICTURE, ImageDelta::full(self.painter.whole(), options));
         }
         let rect = Rect::from_min_size(Pos2::ZERO, egui::vec2(size_px[0] as f32, size_px[1] as f32) / scale);
         let mut mesh = Mesh::with_texture(PICTURE);
@@ -83,6 +84,17 @@ mod tests {
             assert_eq!(again.primitives.len(), 1, "one rectangle is left to the adapter");
             assert!(again.textures.is_empty(), "what did not change is not handed over again");
             again.textures.clear();
+
+            // Of another picture only the parts that differ are handed over.
+            let changed = |ui: &mut egui::Ui| {
+                egui::CentralPanel::default().show(ui, |ui| {
+                    sample_ui(ui);
+                    ui.label("more");
+                });
+            };
+            let Ok(expected) = plain.picture(&mut painter, changed);
+            let Ok(seen) = window.picture(&mut adapter, changed);
+            assert!(seen == expected, "changed at {scale}");
         }
     }
 }

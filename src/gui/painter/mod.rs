@@ -7,26 +7,26 @@
 //! Paint callbacks are not drawn: on the CPU the scene comes as a texture.
 
 pub(in crate::gui) mod blend;
+mod canvas;
 pub(in crate::gui) mod raster;
 #[cfg(test)]
 mod tests;
 mod texture;
 
 use egui::epaint::{ClippedPrimitive, Primitive};
-use egui::{Color32, TexturesDelta};
+use egui::{Color32, ColorImage, TexturesDelta};
 use image::RgbaImage;
 use rayon::prelude::*;
 
-use self::raster::{Band, PreparedMesh};
+use self::canvas::{Canvas, PixelRect};
+use self::raster::PreparedMesh;
 use self::texture::TextureStore;
 
-/// Rows that one worker paints at a time.
-const BAND_ROWS: usize = 32;
-
-/// Paints egui's meshes and keeps their textures between pictures.
+/// Paints egui's meshes; it keeps their textures and the last picture, of which only what changes is painted again.
 #[derive(Default)]
 pub struct Painter {
     textures: TextureStore,
+    canvas: Canvas,
 }
 
 impl Painter {
@@ -48,20 +48,30 @@ impl Painter {
 
     /// Paints primitives, whose positions are in points, over an opaque ground.
     ///
-    /// Primitives with an unknown texture are left out, as are triangles with positions that are not finite.
+    /// Primitives with an unknown texture are left out, as are triangles with positions that are not finite. What is the same
+    /// as in the picture before is not painted again.
     pub fn paint(
-        &self,
+        &mut self,
         primitives: &[ClippedPrimitive],
         size_px: [u32; 2],
         pixels_per_point: f32,
         background: Color32,
     ) -> RgbaImage {
-        let [width, height] = size_px.map(|side| side as usize);
-        let mut bytes = vec![0; width * height * 4];
+        self.update(primitives, size_px, pixels_per_point, background);
+        self.canvas.picture()
+    }
+
+    /// Paints as [`Painter::paint`] does and leaves the picture where it is.
+    pub fn update(
+        &mut self,
+        primitives: &[ClippedPrimitive],
+        size_px: [u32; 2],
+        pixels_per_point: f32,
+        background: Color32,
+    ) {
         let ground = Color32::from_rgb(background.r(), background.g(), background.b());
-        let mut pixels = vec![blend::pack(ground.to_array()); width * height];
         let meshes: Vec<PreparedMesh<'_>> = primitives
-            .iter()
+            .par_iter()
             .filter_map(|clipped| match &clipped.primitive {
                 Primitive::Mesh(mesh) => {
                     let texture = self.textures.get(mesh.texture_id)?;
@@ -70,44 +80,16 @@ impl Painter {
                 Primitive::Callback(_) => None,
             })
             .collect();
-        if width > 0 {
-            let bands = sort_into_bands(&meshes, height.div_ceil(BAND_ROWS));
-            let rows = pixels.par_chunks_mut(width * BAND_ROWS).zip(bytes.par_chunks_mut(width * BAND_ROWS * 4));
-            rows.zip(bands).enumerate().for_each(|(number, ((rows, bytes), pieces))| {
-                let mut band = Band::new(rows, width, (number * BAND_ROWS) as i32);
-                for Piece { mesh, triangle } in pieces {
-                    meshes[mesh as usize].paint(triangle as usize, &mut band);
-                }
-                for (bytes, pixel) in bytes.chunks_exact_mut(4).zip(rows) {
-                    bytes.copy_from_slice(&blend::unpack(*pixel));
-                }
-            });
-        }
-        RgbaImage::from_raw(size_px[0], size_px[1], bytes).expect("four bytes were written per pixel")
+        self.canvas.update(&meshes, size_px.map(|side| side as usize), blend::pack(ground.to_array()));
     }
-}
 
-/// A triangle of a mesh, by their numbers.
-#[derive(Clone, Copy)]
-struct Piece {
-    mesh: u32,
-    triangle: u32,
-}
-
-/// The triangles that touch each band, in the order in which they are painted.
-fn sort_into_bands(meshes: &[PreparedMesh<'_>], bands: usize) -> Vec<Vec<Piece>> {
-    let mut sorted = vec![Vec::new(); bands];
-    for (mesh, prepared) in meshes.iter().enumerate() {
-        for triangle in 0..prepared.triangles() {
-            let rows = prepared.rows(triangle);
-            if rows.is_empty() {
-                continue;
-            }
-            let (first, last) = (rows.start as usize / BAND_ROWS, (rows.end as usize - 1) / BAND_ROWS);
-            for band in &mut sorted[first..=last] {
-                band.push(Piece { mesh: mesh as u32, triangle: triangle as u32 });
-            }
-        }
+    /// The last picture, as colours.
+    pub(super) fn whole(&self) -> ColorImage {
+        self.canvas.part(PixelRect { at: [0; 2], size: self.canvas.size_px() })
     }
-    sorted
+
+    /// The parts of the picture that differ from the one before it, as colours.
+    pub(super) fn changes(&self) -> impl Iterator<Item = (PixelRect, ColorImage)> {
+        self.canvas.changed().into_iter().map(|rect| (rect, self.canvas.part(rect)))
+    }
 }

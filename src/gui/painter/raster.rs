@@ -1,7 +1,5 @@
 //! Triangles to spans of pixels, and spans to colours.
 
-use std::ops::Range;
-
 use egui::Rect;
 use egui::epaint::{Mesh, Vertex};
 
@@ -13,23 +11,24 @@ pub(in crate::gui) const SUBPIXELS: i32 = 256;
 /// Furthest coordinate in subpixels (32 768 pixels), so that products fit 64 bits.
 const FURTHEST: f32 = (1 << 23) as f32;
 
-/// A band of rows that one worker owns.
-pub(super) struct Band<'a> {
-    pixels: &'a mut [u32],
-    width: usize,
-    first_row: i32,
-    end_row: i32,
+/// A rectangle of the picture that one worker owns.
+pub(super) struct Target<'a> {
+    /// Row by row, each as wide as `clip`.
+    pub(super) pixels: &'a mut [u32],
+    pub(super) clip: Clip,
 }
 
-impl<'a> Band<'a> {
-    pub(super) fn new(pixels: &'a mut [u32], width: usize, first_row: i32) -> Self {
-        let end_row = first_row + (pixels.len() / width) as i32;
-        Self { pixels, width, first_row, end_row }
-    }
-
-    fn span(&mut self, row: i32, left: i32, right: i32) -> &mut [u32] {
-        let start = (row - self.first_row) as usize * self.width;
-        &mut self.pixels[start + left as usize..start + right as usize]
+impl Target<'_> {
+    /// What of a span lies here, and how many pixels of it lie left of that.
+    #[inline]
+    fn span(&mut self, row: i32, left: i32, right: i32) -> (i32, &mut [u32]) {
+        let Clip { left: first, right: end, top, .. } = self.clip;
+        let (begin, end) = (left.max(first), right.min(end));
+        if begin >= end {
+            return (0, &mut []);
+        }
+        let start = (row - top) as usize * (self.clip.right - first) as usize;
+        (begin - left, &mut self.pixels[start + (begin - first) as usize..start + (end - first) as usize])
     }
 }
 
@@ -66,6 +65,8 @@ pub(super) struct PreparedMesh<'a> {
     clip: Clip,
     /// Position of each vertex, `None` when it is not finite.
     points: Vec<Option<[i32; 2]>>,
+    /// Tells each vertex from others: its position, its place in the texture and its colour.
+    marks: Vec<u64>,
 }
 
 impl<'a> PreparedMesh<'a> {
@@ -85,12 +86,13 @@ impl<'a> PreparedMesh<'a> {
             let subpixels = (coordinate * pixels_per_point * SUBPIXELS as f32).round();
             subpixels.clamp(-FURTHEST, FURTHEST) as i32
         };
-        let points = mesh
+        let points: Vec<Option<[i32; 2]>> = mesh
             .vertices
             .iter()
             .map(|vertex| vertex.pos.is_finite().then(|| [snap(vertex.pos.x), snap(vertex.pos.y)]))
             .collect();
-        Some(Self { mesh, texture, clip, points })
+        let marks = mesh.vertices.iter().zip(&points).map(|(vertex, point)| mark_of(vertex, *point)).collect();
+        Some(Self { mesh, texture, clip, points, marks })
     }
 
     /// How many triangles it has.
@@ -99,39 +101,63 @@ impl<'a> PreparedMesh<'a> {
     }
 
     /// Numbers of the corners of a triangle.
+    #[inline]
     fn corners(&self, triangle: usize) -> [usize; 3] {
         [0, 1, 2].map(|corner| self.mesh.indices[3 * triangle + corner] as usize)
     }
 
     /// Places of the corners of a triangle, `None` when one is not finite.
+    #[inline]
     fn points(&self, triangle: usize) -> Option<[[i32; 2]; 3]> {
         let [a, b, c] = self.corners(triangle).map(|corner| self.points.get(corner).copied().flatten());
         Some([a?, b?, c?])
     }
 
-    /// Rows of the picture that a triangle may touch; empty when nothing of it can be seen.
-    pub(super) fn rows(&self, triangle: usize) -> Range<i32> {
-        let Some(points) = self.points(triangle) else { return 0..0 };
+    /// Pixels of the picture that a triangle may touch, `None` when nothing of it can be seen.
+    pub(super) fn reach(&self, triangle: usize) -> Option<Clip> {
+        let points = self.points(triangle)?;
         let [across, down] = [0, 1].map(|axis| points.map(|point| point[axis]));
         let first = |values: [i32; 3]| first_centre(values[0].min(values[1]).min(values[2]));
         let end = |values: [i32; 3]| first_centre(values[0].max(values[1]).max(values[2]));
         let clip = &self.clip;
-        let is_seen = first(across) < clip.right && end(across) > clip.left;
+        let reach = Clip {
+            left: first(across).max(clip.left),
+            top: first(down).max(clip.top),
+            right: end(across).min(clip.right),
+            bottom: end(down).min(clip.bottom),
+        };
         let is_inked =
             || self.corners(triangle).iter().any(|corner| self.mesh.vertices[*corner].color.to_array() != [0; 4]);
-        if is_seen && is_inked() { first(down).max(clip.top)..end(down).min(clip.bottom) } else { 0..0 }
+        (reach.left < reach.right && reach.top < reach.bottom && is_inked()).then_some(reach)
     }
 
-    /// Paints what of a triangle lies in a band.
-    pub(super) fn paint(&self, triangle: usize, band: &mut Band<'_>) {
-        let clip =
-            Clip { top: self.clip.top.max(band.first_row), bottom: self.clip.bottom.min(band.end_row), ..self.clip };
+    /// Tells what a triangle looks like: two with the same mark leave the same pixels.
+    pub(super) fn mark(&self, triangle: usize) -> u64 {
+        let corners = self.corners(triangle);
+        let [a, b, c] = corners.map(|corner| self.marks[corner]);
+        let Clip { left, top, right, bottom } = self.clip;
+        let pair = |a: i32, b: i32| (a as u64) << 32 | u64::from(b as u32);
+        let clip = mixed(pair(left, top), pair(right, bottom));
+        let uvs = corners.map(|corner| self.mesh.vertices[corner].uv);
+        let texels = if uvs[0] == uvs[1] && uvs[1] == uvs[2] {
+            u64::from(self.texel_at(uvs[0]))
+        } else {
+            // Above every texel, which has 32 bits.
+            self.texture.version(uvs.map(|uv| uv.y)) | 1 << 63
+        };
+        mixed(mixed(mixed(a, b), c), mixed(clip, texels))
+    }
+
+    /// Paints what of a triangle lies in a rectangle.
+    pub(super) fn paint(&self, triangle: usize, target: &mut Target<'_>) {
+        let rows = &target.clip;
+        let clip = Clip { top: self.clip.top.max(rows.top), bottom: self.clip.bottom.min(rows.bottom), ..self.clip };
         let Some(points) = self.points(triangle) else { return };
         let vertices = self.corners(triangle).map(|corner| &self.mesh.vertices[corner]);
-        self.paint_triangle(points, vertices, clip, band);
+        self.paint_triangle(points, vertices, clip, target);
     }
 
-    fn paint_triangle(&self, points: [[i32; 2]; 3], vertices: [&Vertex; 3], clip: Clip, band: &mut Band<'_>) {
+    fn paint_triangle(&self, points: [[i32; 2]; 3], vertices: [&Vertex; 3], clip: Clip, target: &mut Target<'_>) {
         let colors = vertices.map(|vertex| blend::pack(vertex.color.to_array()));
         let one_color = colors[0] == colors[1] && colors[1] == colors[2];
         let uvs = vertices.map(|vertex| vertex.uv);
@@ -140,15 +166,19 @@ impl<'a> PreparedMesh<'a> {
             (true, true) => {
                 let texel = self.texel_at(uvs[0]);
                 let color = if texel == u32::MAX { colors[0] } else { blend::multiply(texel, colors[0]) };
-                spans(points, clip, |row, left, right| fill(band.span(row, left, right), color));
+                spans(points, clip, |row, left, right| fill(target.span(row, left, right).1, color));
             }
             (true, false) => {
                 let texel = self.texel_at(uvs[0]);
                 let colors = colors.map(|color| if texel == u32::MAX { color } else { blend::multiply(texel, color) });
                 let Some(gradient) = Gradient::of_colors(points, colors) else { return };
                 spans(points, clip, |row, left, right| {
-                    let (mut color, step) = gradient.start(left, row);
-                    for pixel in band.span(row, left, right) {
+                    let (skipped, pixels) = target.span(row, left, right);
+                    if pixels.is_empty() {
+                        return;
+                    }
+                    let (mut color, step) = gradient.start(left, row, skipped);
+                    for pixel in pixels {
                         *pixel = blend::over(*pixel, pack_fixed(color));
                         for channel in 0..4 {
                             color[channel] = color[channel].wrapping_add(step[channel]);
@@ -160,14 +190,21 @@ impl<'a> PreparedMesh<'a> {
                 let Some(place) = Place::new(points, uvs, self.texture) else { return };
                 if one_color {
                     spans(points, clip, |row, left, right| {
-                        self.texture_span(&place, colors[0], row, left, band.span(row, left, right));
+                        let (skipped, pixels) = target.span(row, left, right);
+                        if !pixels.is_empty() {
+                            self.texture_span(place.at(left, row, skipped), place.step, colors[0], pixels);
+                        }
                     });
                 } else {
                     let Some(gradient) = Gradient::of_colors(points, colors) else { return };
                     spans(points, clip, |row, left, right| {
-                        let (mut color, step) = gradient.start(left, row);
-                        let [mut u, mut v] = place.at(left, row);
-                        for pixel in band.span(row, left, right) {
+                        let (skipped, pixels) = target.span(row, left, right);
+                        if pixels.is_empty() {
+                            return;
+                        }
+                        let (mut color, step) = gradient.start(left, row, skipped);
+                        let [mut u, mut v] = place.at(left, row, skipped);
+                        for pixel in pixels {
                             let source = blend::multiply(self.texture.sample(u, v), pack_fixed(color));
                             *pixel = blend::over(*pixel, source);
                             (u, v) = (u.wrapping_add(place.step[0]), v.wrapping_add(place.step[1]));
@@ -189,29 +226,52 @@ impl<'a> PreparedMesh<'a> {
         self.texture.sample(coordinate(uv.x, self.texture.width), coordinate(uv.y, self.texture.height))
     }
 
-    /// A span of one colour times the texture.
-    fn texture_span(&self, place: &Place, color: u32, row: i32, left: i32, pixels: &mut [u32]) {
+    /// A span of one colour times the texture, from a place in it on.
+    fn texture_span(&self, [mut u, mut v]: [i64; 2], [step_u, step_v]: [i64; 2], color: u32, pixels: &mut [u32]) {
+        const ONE: i64 = 1 << TEXEL_BITS;
+        const HALF: i64 = ONE / 2;
         let texture = self.texture;
-        let [mut u, mut v] = place.at(left, row);
-        let [step_u, step_v] = place.step;
-        if step_v != 0 || texture.is_nearest() {
+        let put = |pixel: &mut u32, texel: u32| {
+            if texel != 0 {
+                *pixel = blend::over(*pixel, tinted(texture.kind, texel, color));
+            }
+        };
+        if step_v != 0 {
             for pixel in pixels {
-                let source = tinted(texture.kind, texture.sample(u, v), color);
-                *pixel = blend::over(*pixel, source);
+                put(pixel, texture.sample(u, v));
                 (u, v) = (u.wrapping_add(step_u), v.wrapping_add(step_v));
             }
             return;
         }
+        if texture.is_nearest() {
+            let row = texture.row(v >> TEXEL_BITS);
+            for pixel in pixels {
+                put(pixel, row[texture.column(u >> TEXEL_BITS)]);
+                u = u.wrapping_add(step_u);
+            }
+            return;
+        }
         // The texture lies upright, as glyphs and images do: two rows of texels serve the whole span.
-        let half = 1 << (TEXEL_BITS - 1);
-        (u, v) = (u - half, v - half);
+        (u, v) = (u - HALF, v - HALF);
         let (upper, lower) = (texture.row(v >> TEXEL_BITS), texture.row((v >> TEXEL_BITS) + 1));
         let down = weight(v);
-        for pixel in pixels {
-            let texel = texture.between(upper, lower, u, down);
-            if texel != 0 {
-                *pixel = blend::over(*pixel, tinted(texture.kind, texel, color));
+        // Texel on pixel, as glyphs lie: so near to a texel's centre that every weight is all or nothing.
+        let nearest = (u + HALF) >> TEXEL_BITS;
+        let off = (u - (nearest << TEXEL_BITS)).abs() + (step_u - ONE).abs().saturating_mul(pixels.len() as i64);
+        if off < ONE / 512 && (down == 0 || down == 256) {
+            let row = if down == 0 { upper } else { lower };
+            let inside = usize::try_from(nearest).ok().and_then(|first| row.get(first..first + pixels.len()));
+            if let Some(texels) = inside {
+                pixels.iter_mut().zip(texels).for_each(|(pixel, texel)| put(pixel, *texel));
+            } else {
+                for (pixel, column) in pixels.iter_mut().zip(nearest..) {
+                    put(pixel, row[texture.column(column)]);
+                }
             }
+            return;
+        }
+        for pixel in pixels {
+            put(pixel, texture.between(upper, lower, u, down));
             u = u.wrapping_add(step_u);
         }
     }
@@ -237,6 +297,21 @@ fn fill(pixels: &mut [u32], color: u32) {
             *pixel = blend::over(*pixel, color);
         }
     }
+}
+
+/// Two numbers stirred into one, so that different ones give different results but once in 2⁶⁴ (wyhash's mixing step).
+#[inline]
+pub(super) fn mixed(a: u64, b: u64) -> u64 {
+    let product = u128::from(a ^ 0xa076_1d64_78bd_642f) * u128::from(b ^ 0xe703_7ed1_a0b4_28db);
+    product as u64 ^ (product >> 64) as u64
+}
+
+/// Tells a vertex from others.
+fn mark_of(vertex: &Vertex, point: Option<[i32; 2]>) -> u64 {
+    let [x, y] = point.unwrap_or([i32::MIN; 2]);
+    let pair = |a: u32, b: u32| u64::from(a) << 32 | u64::from(b);
+    let place = mixed(pair(x as u32, y as u32), pair(vertex.uv.x.to_bits(), vertex.uv.y.to_bits()));
+    mixed(place, u64::from(u32::from_le_bytes(vertex.color.to_array())))
 }
 
 /// The first pixel whose centre lies at or behind a subpixel coordinate.
@@ -321,6 +396,36 @@ impl Edge {
     }
 }
 
+/// What all planes over one triangle share.
+struct Slopes {
+    /// First corner, and from there to the others, in subpixels.
+    corner: [f64; 2],
+    second: [f64; 2],
+    third: [f64; 2],
+    scale: f64,
+}
+
+impl Slopes {
+    /// `None` for a triangle without area.
+    fn of(points: [[i32; 2]; 3]) -> Option<Self> {
+        let area = cross(points[0], points[1], points[2]);
+        let [a, b, c] = points.map(|point| point.map(f64::from));
+        let from_a = |corner: [f64; 2]| [corner[0] - a[0], corner[1] - a[1]];
+        let scale = f64::from(SUBPIXELS) / area as f64;
+        (area != 0).then(|| Self { corner: a, second: from_a(b), third: from_a(c), scale })
+    }
+
+    /// The plane through values at the corners.
+    #[inline]
+    fn plane(&self, values: [f64; 3]) -> Plane {
+        let (db, dc) = (values[1] - values[0], values[2] - values[0]);
+        let per_column = (db * self.third[1] - dc * self.second[1]) * self.scale;
+        let per_row = (dc * self.second[0] - db * self.third[0]) * self.scale;
+        let [x, y] = self.corner.map(|coordinate| coordinate / f64::from(SUBPIXELS));
+        Plane { at_corner: values[0] - per_column * x - per_row * y, per_column, per_row }
+    }
+}
+
 /// A value that changes linearly over the picture, by pixels.
 #[derive(Clone, Copy)]
 pub(in crate::gui) struct Plane {
@@ -337,17 +442,7 @@ impl Plane {
 
     /// Through values at three corners; `None` for a triangle without area.
     pub(in crate::gui) fn through(points: [[i32; 2]; 3], values: [f64; 3]) -> Option<Self> {
-        let area = cross(points[0], points[1], points[2]);
-        if area == 0 {
-            return None;
-        }
-        let [a, b, c] = points.map(|point| point.map(f64::from));
-        let (db, dc) = (values[1] - values[0], values[2] - values[0]);
-        let scale = f64::from(SUBPIXELS) / area as f64;
-        let per_column = (db * (c[1] - a[1]) - dc * (b[1] - a[1])) * scale;
-        let per_row = (dc * (b[0] - a[0]) - db * (c[0] - a[0])) * scale;
-        let [x, y] = a.map(|coordinate| coordinate / f64::from(SUBPIXELS));
-        Some(Self { at_corner: values[0] - per_column * x - per_row * y, per_column, per_row })
+        Slopes::of(points).map(|slopes| slopes.plane(values))
     }
 
     /// The value at a place in pixels from the picture's corner.
@@ -371,15 +466,19 @@ const CHANNEL_BITS: u32 = 16;
 impl Gradient {
     fn of_colors(points: [[i32; 2]; 3], colors: [u32; 3]) -> Option<Self> {
         let colors = colors.map(blend::unpack);
-        let plane = |channel: usize| Plane::through(points, colors.map(|color| f64::from(color[channel])));
-        Some(Self([plane(0)?, plane(1)?, plane(2)?, plane(3)?]))
+        let slopes = Slopes::of(points)?;
+        Some(Self([0, 1, 2, 3].map(|channel| slopes.plane(colors.map(|color| f64::from(color[channel]))))))
     }
 
-    /// Value at the first pixel and step to the next, in fixed point.
-    fn start(&self, column: i32, row: i32) -> ([i32; 4], [i32; 4]) {
+    /// Value at the pixel so many steps right of a span's first one, and step to the next, in fixed point.
+    #[inline]
+    fn start(&self, column: i32, row: i32, steps: i32) -> ([i32; 4], [i32; 4]) {
         const ONE: f64 = (1 << CHANNEL_BITS) as f64;
-        let start = self.0.map(|plane| ((plane.at(column, row).clamp(0.0, 255.0) + 0.5) * ONE) as i32);
         let step = self.0.map(|plane| (plane.per_column.clamp(-255.0, 255.0) * ONE) as i32);
+        let mut start = self.0.map(|plane| ((plane.at(column, row).clamp(0.0, 255.0) + 0.5) * ONE) as i32);
+        for channel in 0..4 {
+            start[channel] = start[channel].wrapping_add(step[channel].wrapping_mul(steps));
+        }
         (start, step)
     }
 }
@@ -400,12 +499,17 @@ impl Place {
     fn new(points: [[i32; 2]; 3], uvs: [egui::Pos2; 3], texture: &Texture) -> Option<Self> {
         let us = uvs.map(|uv| f64::from(uv.x) * texture.width as f64);
         let vs = uvs.map(|uv| f64::from(uv.y) * texture.height as f64);
-        let planes = [Plane::through(points, us)?, Plane::through(points, vs)?];
+        let slopes = Slopes::of(points)?;
+        let planes = [slopes.plane(us), slopes.plane(vs)];
         Some(Self { planes, step: planes.map(|plane| to_texels(plane.per_column)) })
     }
 
-    fn at(&self, column: i32, row: i32) -> [i64; 2] {
-        self.planes.map(|plane| to_texels(plane.at(column, row)))
+    /// At the pixel so many steps right of a span's first one.
+    #[inline]
+    fn at(&self, column: i32, row: i32, steps: i32) -> [i64; 2] {
+        let [u, v] = self.planes.map(|plane| to_texels(plane.at(column, row)));
+        let skipped = |step: i64| step.wrapping_mul(i64::from(steps));
+        [u.wrapping_add(skipped(self.step[0])), v.wrapping_add(skipped(self.step[1]))]
     }
 }
 

@@ -25,14 +25,14 @@ fn everything() -> Rect {
     Rect::from_min_max(pos2(-1e4, -1e4), pos2(1e4, 1e4))
 }
 
-fn paint_mesh(painter: &Painter, mesh: Mesh, clip_rect: Rect, size_px: [u32; 2], scale: f32) -> RgbaImage {
+fn paint_mesh(painter: &mut Painter, mesh: Mesh, clip_rect: Rect, size_px: [u32; 2], scale: f32) -> RgbaImage {
     painter.paint(&[ClippedPrimitive { clip_rect, primitive: Primitive::Mesh(mesh) }], size_px, scale, GROUND)
 }
 
 fn paint_shape(shape: impl Into<Shape>, size_px: [u32; 2]) -> RgbaImage {
     let mut mesh = Mesh::default();
     Tessellator::new(1.0, Default::default(), [2, 2], Vec::new()).tessellate_shape(shape.into(), &mut mesh);
-    paint_mesh(&painter_with(None), mesh, everything(), size_px, 1.0)
+    paint_mesh(&mut painter_with(None), mesh, everything(), size_px, 1.0)
 }
 
 fn triangles(corners: &[(f32, f32)], color: Color32) -> Mesh {
@@ -64,7 +64,7 @@ fn a_rectangle_covers_the_pixels_whose_centres_it_holds() {
     let check = |left: f32, top: f32, right: f32, bottom: f32, expected: [u32; 4]| {
         let mut mesh = Mesh::default();
         mesh.add_colored_rect(Rect::from_min_max(pos2(left, top), pos2(right, bottom)), Color32::RED);
-        let image = paint_mesh(&painter_with(None), mesh, everything(), [12, 10], 1.0);
+        let image = paint_mesh(&mut painter_with(None), mesh, everything(), [12, 10], 1.0);
         let [x0, y0, x1, y1] = expected;
         let inside: Vec<_> = (y0..y1).flat_map(|y| (x0..x1).map(move |x| (x, y))).collect();
         assert_eq!(touched(&image), inside, "{left} {top} {right} {bottom}");
@@ -82,7 +82,7 @@ fn pixels_per_point_scales_and_clips_are_rounded() {
     let mut mesh = Mesh::default();
     mesh.add_colored_rect(everything(), Color32::WHITE);
     let clip = Rect::from_min_max(pos2(1.2, 2.0), pos2(3.3, 4.0));
-    let image = paint_mesh(&painter_with(None), mesh, clip, [20, 20], 2.0);
+    let image = paint_mesh(&mut painter_with(None), mesh, clip, [20, 20], 2.0);
     let inside: Vec<_> = (4..8).flat_map(|y| (2..7).map(move |x| (x, y))).collect();
     assert_eq!(touched(&image), inside);
 }
@@ -93,7 +93,7 @@ fn triangles_that_share_edges_paint_each_pixel_once() {
     let once = {
         let mut mesh = Mesh::default();
         mesh.add_colored_rect(everything(), veil);
-        rgb(&paint_mesh(&painter_with(None), mesh, everything(), [4, 4], 1.0), 1, 1)
+        rgb(&paint_mesh(&mut painter_with(None), mesh, everything(), [4, 4], 1.0), 1, 1)
     };
     // A fan around odd places that covers the whole picture.
     for step in 0..40 {
@@ -105,7 +105,7 @@ fn triangles_that_share_edges_paint_each_pixel_once() {
             })
             .collect();
         let corners: Vec<_> = (0..23).flat_map(|spoke| [centre, rim[spoke], rim[(spoke + 1) % 23]]).collect();
-        let image = paint_mesh(&painter_with(None), triangles(&corners, veil), everything(), [64, 64], 1.0);
+        let image = paint_mesh(&mut painter_with(None), triangles(&corners, veil), everything(), [64, 64], 1.0);
         for (column, row, _) in image.enumerate_pixels() {
             assert_eq!(rgb(&image, column, row), once, "pixel {column} {row} of fan {step}");
         }
@@ -116,7 +116,7 @@ fn triangles_that_share_edges_paint_each_pixel_once() {
 fn colours_blend_premultiplied_in_gamma_space() {
     let half_red = Color32::from_rgba_premultiplied(128, 0, 0, 128);
     let image = paint_mesh(
-        &painter_with(None),
+        &mut painter_with(None),
         triangles(&[(0.0, 0.0), (8.0, 0.0), (0.0, 8.0)], half_red),
         everything(),
         [8, 8],
@@ -132,7 +132,7 @@ fn corner_colours_change_linearly() {
     for vertex in &mut mesh.vertices {
         vertex.color = Color32::from_gray(if vertex.pos.x > 0.0 { 255 } else { 0 });
     }
-    let image = paint_mesh(&painter_with(None), mesh, everything(), [256, 16], 1.0);
+    let image = paint_mesh(&mut painter_with(None), mesh, everything(), [256, 16], 1.0);
     for column in 0..256 {
         let expected = (f64::from(column) + 0.5) * 255.0 / 256.0;
         for row in 0..16 {
@@ -174,7 +174,7 @@ fn textures_are_filtered_between_their_centres() {
         let mut mesh = Mesh::with_texture(TextureId::Managed(1));
         let uv = Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0));
         mesh.add_rect_with_uv(Rect::from_min_size(Pos2::ZERO, vec2(80.0, 4.0)), uv, Color32::WHITE);
-        paint_mesh(&painter_with(Some((two.clone(), options))), mesh, everything(), [80, 4], 1.0)
+        paint_mesh(&mut painter_with(Some((two.clone(), options))), mesh, everything(), [80, 4], 1.0)
     };
     let nearest = paint(TextureOptions::NEAREST);
     assert_eq!(rgb(&nearest, 39, 1), [0, 100, 200]);
@@ -197,7 +197,8 @@ fn a_texture_that_lies_texel_on_pixel_is_copied() {
     let mut mesh = Mesh::with_texture(TextureId::Managed(1));
     let uv = Rect::from_min_max(pos2(0.25, 0.25), pos2(0.75, 0.75));
     mesh.add_rect_with_uv(Rect::from_min_size(pos2(3.0, 5.0), vec2(4.0, 4.0)), uv, Color32::WHITE);
-    let painted = paint_mesh(&painter_with(Some((image, TextureOptions::LINEAR))), mesh, everything(), [16, 16], 1.0);
+    let painted =
+        paint_mesh(&mut painter_with(Some((image, TextureOptions::LINEAR))), mesh, everything(), [16, 16], 1.0);
     for row in 0..4 {
         for column in 0..4 {
             let expected = texels[(row + 2) * 8 + column + 2];
@@ -216,7 +217,8 @@ fn a_turned_texture_follows_its_corners() {
         mesh.vertices.push(Vertex { pos: pos2(x, y), uv: pos2(u, v), color: Color32::WHITE });
     }
     mesh.indices = vec![0, 1, 2, 0, 2, 3];
-    let painted = paint_mesh(&painter_with(Some((image, TextureOptions::NEAREST))), mesh, everything(), [8, 8], 1.0);
+    let painted =
+        paint_mesh(&mut painter_with(Some((image, TextureOptions::NEAREST))), mesh, everything(), [8, 8], 1.0);
     for (column, row, pixel) in painted.enumerate_pixels() {
         let (u, v) = (row / 2, 3 - column / 2);
         assert_eq!(pixel.0[0], texels[(v * 4 + u) as usize].r(), "{column} {row}");
@@ -234,7 +236,7 @@ fn part_of_a_texture_can_change_and_a_freed_one_is_gone() {
     let mut mesh = Mesh::with_texture(TextureId::Managed(1));
     let uv = Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0));
     mesh.add_rect_with_uv(Rect::from_min_size(Pos2::ZERO, vec2(4.0, 4.0)), uv, Color32::WHITE);
-    let image = paint_mesh(&painter, mesh.clone(), everything(), [4, 4], 1.0);
+    let image = paint_mesh(&mut painter, mesh.clone(), everything(), [4, 4], 1.0);
     for (column, row, _) in image.enumerate_pixels() {
         let blue = (1..3).contains(&column) && row >= 2;
         assert_eq!(rgb(&image, column, row), if blue { [0, 0, 255] } else { [255, 0, 0] });
@@ -242,7 +244,7 @@ fn part_of_a_texture_can_change_and_a_freed_one_is_gone() {
     delta.free(TextureId::Managed(1));
     painter.free_textures(&delta);
     delta.clear();
-    assert!(touched(&paint_mesh(&painter, mesh, everything(), [4, 4], 1.0)).is_empty());
+    assert!(touched(&paint_mesh(&mut painter, mesh, everything(), [4, 4], 1.0)).is_empty());
 }
 
 #[test]
@@ -251,10 +253,10 @@ fn nonsense_is_left_out() {
     mesh.append(triangles(&[(0.0, 0.0), (f32::INFINITY, 0.0), (0.0, 8.0)], Color32::WHITE));
     mesh.append(triangles(&[(3.0, 3.0), (3.0, 3.0), (3.0, 3.0)], Color32::WHITE));
     mesh.indices.extend([700, 701, 702]);
-    assert!(touched(&paint_mesh(&painter_with(None), mesh, everything(), [8, 8], 1.0)).is_empty());
+    assert!(touched(&paint_mesh(&mut painter_with(None), mesh, everything(), [8, 8], 1.0)).is_empty());
     // Huge but finite: covers everything.
     let mesh = triangles(&[(-1e9, -1e9), (1e9, -1e9), (0.0, 1e9)], Color32::WHITE);
-    assert_eq!(touched(&paint_mesh(&painter_with(None), mesh, everything(), [8, 8], 1.0)).len(), 64);
+    assert_eq!(touched(&paint_mesh(&mut painter_with(None), mesh, everything(), [8, 8], 1.0)).len(), 64);
 }
 
 #[test]
@@ -270,4 +272,68 @@ fn bytes_do_not_depend_on_the_number_of_threads() {
     let many = rayon::ThreadPoolBuilder::new().num_threads(7).build().unwrap().install(paint);
     assert!(!touched(&alone).is_empty());
     assert_eq!(alone, many);
+}
+
+/// Shapes, a glyph-like texture and a gradient, moved by a number.
+fn moving_primitives(moved: f32) -> Vec<ClippedPrimitive> {
+    let mut mesh = Mesh::default();
+    let mut tessellator = Tessellator::new(1.0, Default::default(), [2, 2], Vec::new());
+    let stroke = Stroke::new(1.5, Color32::from_rgba_unmultiplied(250, 120, 30, 180));
+    tessellator.tessellate_shape(Shape::circle_filled(pos2(150.0, 90.0), 70.0, Color32::DARK_GREEN), &mut mesh);
+    for line in 0..30 {
+        let from = pos2(7.0 * line as f32, 3.0);
+        tessellator.tessellate_shape(Shape::line_segment([from, from + vec2(90.0, 140.0)], stroke), &mut mesh);
+    }
+    let cursor = [pos2(40.0 + moved, 0.0), pos2(40.0 + moved, 180.0)];
+    tessellator.tessellate_shape(Shape::line_segment(cursor, Stroke::new(1.0, Color32::WHITE)), &mut mesh);
+    let mut picture = Mesh::with_texture(TextureId::Managed(1));
+    let uv = Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0));
+    picture.add_rect_with_uv(Rect::from_min_size(pos2(60.0, 20.0), vec2(170.0, 130.0)), uv, Color32::from_gray(200));
+    let clip_rect = Rect::from_min_max(pos2(5.0, 5.0), pos2(235.0, 170.0));
+    [mesh, picture].map(|mesh| ClippedPrimitive { clip_rect, primitive: Primitive::Mesh(mesh) }).to_vec()
+}
+
+#[test]
+fn a_picture_brought_up_to_date_is_a_picture_painted_anew() {
+    const SIZE: [u32; 2] = [241, 187];
+    let texels = |shade: u8| ColorImage::new([3, 40], vec![Color32::from_rgb(shade, 90, 10); 120]);
+    let mut kept = painter_with(Some((texels(30), TextureOptions::LINEAR)));
+    kept.update(&moving_primitives(0.0), SIZE, 1.0, GROUND);
+    assert_eq!(kept.changes().count(), 6, "at first every row of tiles is new");
+    kept.update(&moving_primitives(0.0), SIZE, 1.0, GROUND);
+    assert_eq!(kept.changes().count(), 0, "nothing changed");
+    let mut shown = kept.paint(&moving_primitives(0.0), SIZE, 1.0, GROUND);
+    for moved in 0_u8..40 {
+        let primitives = moving_primitives(f32::from(moved) * 3.7);
+        let mut delta = TexturesDelta::default();
+        if moved == 20 {
+            delta.push(
+                TextureId::Managed(1),
+                ImageDelta::partial([0, 39], ColorImage::filled([3, 1], Color32::WHITE), TextureOptions::LINEAR),
+            );
+        } else if moved == 30 {
+            delta.push(TextureId::Managed(1), ImageDelta::full(texels(moved), TextureOptions::NEAREST));
+        }
+        kept.set_textures(&delta);
+        let picture = kept.paint(&primitives, SIZE, 1.0, GROUND);
+        let mut fresh = painter_with(Some((texels(30), TextureOptions::LINEAR)));
+        if moved >= 20 {
+            let patch = ColorImage::filled([3, 1], Color32::WHITE);
+            delta.push(TextureId::Managed(1), ImageDelta::partial([0, 39], patch, TextureOptions::LINEAR));
+        }
+        if moved >= 30 {
+            delta.push(TextureId::Managed(1), ImageDelta::full(texels(30), TextureOptions::NEAREST));
+        }
+        fresh.set_textures(&delta);
+        delta.clear();
+        assert!(picture == fresh.paint(&primitives, SIZE, 1.0, GROUND), "picture {moved}");
+        // The parts that are told are all that differs.
+        for (rect, part) in kept.changes() {
+            for (index, color) in part.pixels.iter().enumerate() {
+                let (column, row) = (rect.at[0] + index % rect.size[0], rect.at[1] + index / rect.size[0]);
+                shown.put_pixel(column as u32, row as u32, Rgba(color.to_array()));
+            }
+        }
+        assert!(shown == picture, "changes of picture {moved}");
+    }
 }

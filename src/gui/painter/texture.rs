@@ -15,7 +15,12 @@ pub(super) const TEXEL_BITS: u32 = 32;
 #[derive(Default)]
 pub(super) struct TextureStore {
     textures: BTreeMap<TextureId, Texture>,
+    /// Counts changes.
+    version: u64,
 }
+
+/// Rows of texels whose changes are told together.
+const BLOCK_ROWS: usize = 32;
 
 impl TextureStore {
     pub(super) fn get(&self, id: TextureId) -> Option<&Texture> {
@@ -39,12 +44,13 @@ impl TextureStore {
 
     fn change(&mut self, id: TextureId, delta: &ImageDelta) {
         let ImageData::Color(image) = &delta.image;
+        self.version += 1;
         let Some([left, top]) = delta.pos else {
-            self.textures.insert(id, Texture::new(image.size, &image.pixels, delta.options));
+            self.textures.insert(id, Texture::new(image.size, &image.pixels, delta.options, self.version));
             return;
         };
         let Some(texture) = self.textures.get_mut(&id) else { return };
-        texture.options = delta.options;
+        texture.change_rows(top, image.height(), delta.options, self.version);
         let width = image.width().min(texture.width.saturating_sub(left));
         for (row, texels) in image.pixels.chunks_exact(image.width().max(1)).enumerate() {
             if top + row >= texture.height {
@@ -54,7 +60,11 @@ impl TextureStore {
             for (texel, color) in texture.texels[start..start + width].iter_mut().zip(texels) {
                 *texel = blend::pack(color.to_array());
             }
-            texture.kind = texture.kind.joined(TexelKind::of(&texels[..width]));
+            let kind = texture.kind.joined(TexelKind::of(&texels[..width]));
+            if kind != texture.kind {
+                texture.kind = kind;
+                texture.versions.fill(self.version);
+            }
         }
     }
 }
@@ -94,12 +104,43 @@ pub(super) struct Texture {
     pub(super) kind: TexelKind,
     options: TextureOptions,
     texels: Vec<u32>,
+    /// When each block of [`BLOCK_ROWS`] rows was changed last.
+    versions: Vec<u64>,
 }
 
 impl Texture {
-    fn new(size: [usize; 2], pixels: &[Color32], options: TextureOptions) -> Self {
+    fn new(size: [usize; 2], pixels: &[Color32], options: TextureOptions, version: u64) -> Self {
         let texels = pixels.iter().map(|color| blend::pack(color.to_array())).collect();
-        Self { width: size[0], height: size[1], kind: TexelKind::of(pixels), options, texels }
+        let versions = vec![version; size[1].div_ceil(BLOCK_ROWS)];
+        Self { width: size[0], height: size[1], kind: TexelKind::of(pixels), options, texels, versions }
+    }
+
+    /// Notes that rows change, and perhaps how they are read.
+    fn change_rows(&mut self, top: usize, rows: usize, options: TextureOptions, version: u64) {
+        let all = self.versions.len();
+        let blocks = if self.options == options {
+            (top / BLOCK_ROWS).min(all)..(top + rows).div_ceil(BLOCK_ROWS).min(all)
+        } else {
+            0..all
+        };
+        self.options = options;
+        self.versions[blocks].fill(version);
+    }
+
+    /// When the rows that a triangle with such heights in the texture can show were changed last: another one after every
+    /// change.
+    pub(super) fn version(&self, vs: [f32; 3]) -> u64 {
+        let (low, high) = (vs[0].min(vs[1]).min(vs[2]), vs[0].max(vs[1]).max(vs[2]));
+        let all = self.versions.len();
+        let blocks = if low >= 0.0 && high <= 1.0 && self.options.wrap_mode == TextureWrapMode::ClampToEdge {
+            // Filtering reads the rows beside.
+            let row = |v: f32| (v * self.height as f32) as usize;
+            let (first, last) = (row(low).saturating_sub(2), row(high) + 2);
+            first / BLOCK_ROWS..(last / BLOCK_ROWS + 1).min(all)
+        } else {
+            0..all
+        };
+        self.versions.get(blocks).unwrap_or(&self.versions).iter().copied().max().unwrap_or(0)
     }
 
     /// The texel at the very corner, which egui uses for everything that has no texture.
