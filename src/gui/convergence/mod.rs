@@ -4,6 +4,7 @@ mod layout;
 mod model;
 pub(crate) mod names;
 mod paint;
+mod range;
 
 use std::collections::BTreeMap;
 
@@ -13,13 +14,15 @@ use self::model::{CalibrationHistory, ConvertedHistory};
 pub(crate) use self::model::{Knowledge, knowledge};
 use super::PanelContext;
 use super::chain_values::{NamedValues, true_values};
-use super::plot::{BandCurve, Curve};
+use super::plot::{BandCurve, Curve, StateCurve};
 
 /// The curves of one parameter of one run.
 #[derive(Debug, Default)]
 struct ParameterCurves {
     value: Curve,
     band: BandCurve,
+    /// Where it is weak, unobservable, or not estimated yet.
+    states: [StateCurve; paint::MARKED.len()],
 }
 
 /// State of the convergence panel.

@@ -5,13 +5,14 @@ use std::collections::BTreeMap;
 use egui::{Align2, Color32, FontFamily, FontId, Pos2, Rect, Stroke, StrokeKind, Ui, pos2, vec2};
 
 use super::ParameterCurves;
-use super::model::{CalibrationHistory, ConvertedHistory, Knowledge, ParameterHistory};
+use super::model::{CalibrationHistory, ConvertedHistory, Knowledge};
 use super::names::{ChainPart, heading_of, meaning_of};
+use super::range::{paint_outside, value_range};
 use crate::gui::PanelContext;
 use crate::gui::chain_values::NamedValues;
 use crate::gui::plot::{
     Clicks, PlotArea, navigate, paint_band, paint_cursor, paint_curve, paint_ground, paint_hatch, paint_line,
-    paint_value_grid, visible_range, visible_stretches,
+    paint_value_grid, visible_range,
 };
 use crate::gui::theme::{self, CURVE_WIDTH};
 use crate::gui::units::{Shown, fixed};
@@ -20,6 +21,9 @@ use crate::gui::units::{Shown, fixed};
 const STRIP_HEIGHT: f32 = 3.0;
 /// Height of the line with name and value.
 const TITLE_HEIGHT: f32 = 15.0;
+
+/// States that are marked in the plots.
+pub(super) const MARKED: [Knowledge; 3] = [Knowledge::Weak, Knowledge::Unobservable, Knowledge::Waiting];
 
 /// The name of a part of the chain beside its row.
 pub(super) fn heading(ui: &Ui, ctx: &PanelContext<'_>, part: ChainPart, rect: Rect) {
@@ -64,11 +68,7 @@ pub(super) fn legend(ui: &Ui, ctx: &PanelContext<'_>, rect: Rect) {
             paint_line(&painter, &[place.left_center(), place.right_center()], theme.truth_style(), CURVE_WIDTH);
         });
     }
-    for (state, text) in [
-        (Knowledge::Weak, "weak: no better than the prior"),
-        (Knowledge::Unobservable, "unobservable"),
-        (Knowledge::Waiting, "initializing"),
-    ] {
+    for (state, text) in MARKED.into_iter().zip(["weak: no better than the prior", "unobservable", "initializing"]) {
         say(text, &|place| {
             if state != Knowledge::Weak {
                 paint_hatch(&painter, place, theme.hatch);
@@ -102,6 +102,26 @@ impl<'a> Told<'a> {
         let history = self.histories.get(run)?;
         Some((history.epoch, &history.stamps_ns, &history.parameter(name)?.values))
     }
+
+    /// What the other runs say at the cursor, and whether the axis reaches that far.
+    fn others_lines(
+        &self,
+        ctx: &PanelContext<'_>,
+        runs: &[usize],
+        name: &str,
+        shown: Shown,
+        area: &PlotArea,
+    ) -> Vec<String> {
+        let line = |run: usize| {
+            let (_, stamps_ns, values) = self.values(run, name)?;
+            let row = stamps_ns.partition_point(|stamp_ns| *stamp_ns <= ctx.cursor_ns).checked_sub(1)?;
+            let value = values.get(row).copied().filter(|value| value.is_finite())?;
+            let outside = if (area.low..=area.high).contains(&value) { "" } else { ", outside this axis" };
+            let label = &ctx.recording.runs.get(run)?.spec.label;
+            Some(format!("{label}: {}{outside}", shown.value(value, f64::NAN)))
+        };
+        runs.iter().filter(|run| **run != self.shown).filter_map(|run| line(*run)).collect()
+    }
 }
 
 /// Draws the plot of one parameter and lets the pointer select it.
@@ -129,18 +149,24 @@ pub(super) fn cell_ui(
         curves.value.update(&area, epoch, stamps_ns, values);
         if *run == shown_run {
             curves.band.update(&area, epoch, stamps_ns, &parameter.lower, &parameter.upper);
+            for (stretches, state) in curves.states.iter_mut().zip(MARKED) {
+                stretches.update(&area, epoch, stamps_ns, |row| parameter.knowledge[row] == state);
+            }
         }
     }
     let curve_of = |run: usize| curves.get(&(run, name.to_owned()));
     let truth = told.truth.get(name).copied();
-    let extents = overlaid.iter().filter_map(|run| curve_of(*run)?.value.extent);
-    let (low, high) = value_range(extents.chain(truth.map(|truth| (truth, truth))), parameter);
+    let extent_of = |run: usize| curve_of(run)?.value.extent;
+    let others = overlaid.iter().filter(|run| **run != shown_run).filter_map(|run| extent_of(*run));
+    let (low, high) = value_range(extent_of(shown_run), truth, others, parameter);
     area = area.with_values(low, high);
 
     let painter = ui.painter_at(rect.expand(1.0));
     let inner = painter.with_clip_rect(plot);
     paint_ground(&painter, &theme, plot);
-    paint_knowledge(&inner, &theme, &area, history, parameter);
+    if let Some(curves) = curve_of(shown_run) {
+        paint_knowledge(&inner, &theme, &area, curves);
+    }
     paint_value_grid(&inner, &theme, &area, shown.factor, (plot.height() / 22.0) as usize + 1);
     if let Some(curves) = curve_of(shown_run) {
         let fill = theme.run(shown_run).color.gamma_multiply(0.22);
@@ -155,6 +181,11 @@ pub(super) fn cell_ui(
     for run in overlaid.iter().filter(|run| **run != shown_run).chain([&shown_run]) {
         if let Some(curves) = curve_of(*run) {
             paint_curve(&inner, &area, &curves.value, theme.run(*run), CURVE_WIDTH);
+        }
+    }
+    for (level, run) in overlaid.iter().filter(|run| **run != shown_run).enumerate() {
+        if let Some(curves) = curve_of(*run) {
+            paint_outside(&inner, &area, &curves.value, theme.run(*run), level);
         }
     }
     paint_cursor(&inner, &theme, &area, ctx.cursor_ns);
@@ -193,7 +224,11 @@ pub(super) fn cell_ui(
         ctx.selection.parameter = if selected { None } else { Some(name.to_owned()) };
     }
     let meaning = meaning_of(name, &ctx.recording.rig);
-    response.on_hover_text_at_pointer(format!("{name}: {meaning}\n{text}"));
+    response.on_hover_ui_at_pointer(|ui| {
+        let mut lines = vec![format!("{name}: {meaning}"), text];
+        lines.extend(told.others_lines(ctx, &overlaid, name, shown, &area));
+        ui.label(lines.join("\n"));
+    });
 }
 
 /// The distance from the truth, with its sign, and in standard deviations.
@@ -204,35 +239,10 @@ fn error_text(shown: Shown, error: f64, sigma: f64) -> String {
     if times.is_finite() { format!("{text} ({times:.1}σ) off") } else { format!("{text} off") }
 }
 
-/// The values to show: all curves, and three standard deviations around the last one, which keeps the wide bands of the
-/// beginning from flattening everything.
-fn value_range(extents: impl Iterator<Item = (f64, f64)>, parameter: &ParameterHistory) -> (f64, f64) {
-    let (mut low, mut high) =
-        extents.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (least, most)| (low.min(least), high.max(most)));
-    let last = parameter
-        .values
-        .iter()
-        .zip(&parameter.sigmas)
-        .rev()
-        .find(|(value, sigma)| value.is_finite() && sigma.is_finite());
-    if let Some((value, sigma)) = last {
-        low = low.min(value - 4.5 * sigma);
-        high = high.max(value + 4.5 * sigma);
-    }
-    let margin = 0.06 * (high - low);
-    (low - margin, high + margin)
-}
-
 /// Hatched where nothing informs the parameter; a strip at the foot tells why.
-fn paint_knowledge(
-    painter: &egui::Painter,
-    theme: &theme::Theme,
-    area: &PlotArea,
-    history: &CalibrationHistory,
-    parameter: &ParameterHistory,
-) {
-    for state in [Knowledge::Weak, Knowledge::Unobservable, Knowledge::Waiting] {
-        for stretch in visible_stretches(area, &history.stamps_ns, |row| parameter.knowledge[row] == state) {
+fn paint_knowledge(painter: &egui::Painter, theme: &theme::Theme, area: &PlotArea, curves: &ParameterCurves) {
+    for (stretches, state) in curves.states.iter().zip(MARKED) {
+        for stretch in stretches.on_screen(area) {
             let stretch = Rect::from_x_y_ranges(stretch, area.rect.y_range());
             if state != Knowledge::Weak {
                 paint_hatch(painter, stretch, theme.hatch);

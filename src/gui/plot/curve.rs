@@ -1,6 +1,8 @@
 //! Curves over time, reduced to what the pixel columns of a plot can show.
 
-use super::PlotArea;
+use egui::{Rangef, vec2};
+
+use super::{PlotArea, visible_stretches};
 
 /// What a reduced curve was made from; the same key gives the same curve.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -65,6 +67,32 @@ impl BandCurve {
             self.key = Some(key);
             self.stretches = reduce_band(area, &stamps_ns[..count], lower, upper);
         }
+    }
+}
+
+/// Where a state holds over time; remade only as a [`Curve`] is.
+#[derive(Debug, Default)]
+pub(crate) struct StateCurve {
+    key: Option<CurveKey>,
+    /// In points right of the plot's left edge.
+    stretches: Vec<Rangef>,
+}
+
+impl StateCurve {
+    /// Brings the stretches up to date, as [`Curve::update`] does.
+    pub(crate) fn update(&mut self, area: &PlotArea, epoch: u64, stamps_ns: &[i64], holds: impl Fn(usize) -> bool) {
+        let key = CurveKey::of(area, epoch, stamps_ns.len());
+        if self.key != Some(key) {
+            self.key = Some(key);
+            let at_zero = PlotArea { rect: area.rect.translate(vec2(-area.rect.left(), 0.0)), ..*area };
+            self.stretches = visible_stretches(&at_zero, stamps_ns, holds);
+        }
+    }
+
+    /// The stretches on the screen.
+    pub(crate) fn on_screen(&self, area: &PlotArea) -> impl Iterator<Item = Rangef> {
+        let left = area.rect.left();
+        self.stretches.iter().map(move |stretch| Rangef::new(left + stretch.min, left + stretch.max))
     }
 }
 

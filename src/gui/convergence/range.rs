@@ -1,0 +1,135 @@
+//! Which values a small plot spans, and where another run's curve leaves it.
+
+use egui::{Painter, Rangef, Shape, Stroke, pos2};
+
+use super::model::ParameterHistory;
+use crate::gui::plot::{Curve, PlotArea};
+use crate::gui::theme::RunStyle;
+
+/// Other runs widen a plot on either side by at most this much of what the run on screen spans itself.
+const WIDENING: f64 = 0.5;
+
+/// Least and greatest value, `None` while there is none.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Extent(Option<(f64, f64)>);
+
+impl Extent {
+    fn of(values: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        Self(values.into_iter().reduce(|(low, high), (least, most)| (low.min(least), high.max(most))))
+    }
+}
+
+/// The values to show.
+///
+/// The axis follows the run on screen: its curve (`own`), the truth, and its band around the last value, which keeps the wide
+/// bands of the beginning from flattening everything. A run that was converted from another form can lie far away, where only
+/// the direction is told: the others widen the axis a little and no more.
+pub(super) fn value_range(
+    own: Option<(f64, f64)>,
+    truth: Option<f64>,
+    others: impl Iterator<Item = (f64, f64)>,
+    parameter: &ParameterHistory,
+) -> (f64, f64) {
+    let last = parameter
+        .values
+        .iter()
+        .zip(&parameter.sigmas)
+        .rev()
+        .find(|(value, sigma)| value.is_finite() && sigma.is_finite())
+        .map(|(value, sigma)| (value - 4.5 * sigma, value + 4.5 * sigma));
+    let truth = truth.filter(|truth| truth.is_finite()).map(|truth| (truth, truth));
+    let own = Extent::of(own.into_iter().chain(truth).chain(last));
+    let (mut low, mut high) = own.0.unwrap_or((f64::INFINITY, f64::NEG_INFINITY));
+    let span = high - low;
+    // A held value alone spans nothing: then the others decide.
+    let room = if span > 0.0 { WIDENING * span } else { f64::INFINITY };
+    let (least, most) = (low - room, high + room);
+    if let Extent(Some((others_low, others_high))) = Extent::of(others) {
+        low = low.min(others_low.max(least));
+        high = high.max(others_high.min(most));
+    }
+    let margin = 0.06 * (high - low);
+    (low - margin, high + margin)
+}
+
+/// Stretches of the screen in which a curve lies above the plot, and in which it lies below.
+fn outside(area: &PlotArea, curve: &Curve) -> [Vec<Rangef>; 2] {
+    let mut found = [Vec::new(), Vec::new()];
+    for stretch in &curve.stretches {
+        let mut open: [Option<Rangef>; 2] = [None, None];
+        for (offset, value) in stretch {
+            let x = (area.rect.left() + offset).clamp(area.rect.left(), area.rect.right());
+            for (side, is_out) in [*value > area.high, *value < area.low].into_iter().enumerate() {
+                if is_out {
+                    open[side].get_or_insert_with(|| Rangef::point(x)).max = x;
+                } else {
+                    found[side].extend(open[side].take());
+                }
+            }
+        }
+        for (side, open) in open.into_iter().enumerate() {
+            found[side].extend(open);
+        }
+    }
+    found
+}
+
+/// Marks where a curve lies outside the plot: a line along that edge with an arrowhead, `level` lines from it.
+pub(super) fn paint_outside(painter: &Painter, area: &PlotArea, curve: &Curve, style: RunStyle, level: usize) {
+    /// Distance between the lines of two runs, and half the width of an arrowhead.
+    const PITCH: f32 = 2.5;
+    const HALF: f32 = 3.5;
+    let inset = 1.5 + level as f32 * PITCH;
+    let edges = [(area.rect.top() + inset, 1.0), (area.rect.bottom() - inset, -1.0)];
+    for (stretches, (y, inwards)) in outside(area, curve).into_iter().zip(edges) {
+        for stretch in stretches {
+            painter.hline(stretch, y, Stroke::new(1.5, style.color));
+            let x = stretch.center().clamp(area.rect.left() + HALF, area.rect.right() - HALF);
+            let foot = y + inwards * 1.5 * HALF;
+            let head = vec![pos2(x, y), pos2(x + inwards * HALF, foot), pos2(x - inwards * HALF, foot)];
+            painter.add(Shape::convex_polygon(head, style.color, Stroke::NONE));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use egui::Rect;
+
+    use super::*;
+
+    fn history(values: &[f64], sigma: f64) -> ParameterHistory {
+        ParameterHistory { values: values.to_vec(), sigmas: vec![sigma; values.len()], ..ParameterHistory::default() }
+    }
+
+    #[test]
+    fn the_axis_follows_the_run_on_screen() {
+        let own = history(&[0.0, 1.0, 1.0], 0.1);
+        let range = |others: &[(f64, f64)], truth| value_range(Some((0.0, 1.0)), truth, others.iter().copied(), &own);
+        let (low, high) = range(&[], None);
+        assert!(low < 0.0 && low > -0.2 && high > 1.45 && high < 1.6, "{low} {high}");
+        // A run near by is seen whole, one far away moves the axis by half its height at most.
+        assert!(range(&[(-0.2, 1.0)], None).0 < -0.2);
+        let (least, most) = range(&[(-90.0, 400.0)], None);
+        assert!(least > -1.0 && most < 2.5, "{least} {most}");
+        // The truth is always seen.
+        assert!(range(&[], Some(-9.0)).0 < -9.0);
+        // What is held spans nothing by itself.
+        let held = history(&[2.0, 2.0], f64::NAN);
+        let (low, high) = value_range(Some((2.0, 2.0)), None, [(1.0, 3.0)].into_iter(), &held);
+        assert!(low < 1.0 && high > 3.0);
+    }
+
+    #[test]
+    fn what_lies_outside_is_found() {
+        let rect = Rect::from_min_max(pos2(10.0, 0.0), pos2(110.0, 20.0));
+        let area = PlotArea { rect, begin_ns: 0, end_ns: 100, low: 0.0, high: 1.0 };
+        let stamps: Vec<i64> = (0..=10).map(|row| row * 10).collect();
+        let values = [0.5, 3.0, 3.0, 0.5, -1.0, -1.0, -1.0, 0.5, 0.5, f64::NAN, 7.0];
+        let mut curve = Curve::default();
+        curve.update(&area, 0, &stamps, &values);
+        let [above, below] = outside(&area, &curve);
+        assert_eq!(above, [Rangef::new(20.0, 30.0), Rangef::point(110.0)]);
+        assert_eq!(below, [Rangef::new(50.0, 70.0)]);
+    }
+}
