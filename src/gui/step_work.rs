@@ -57,13 +57,22 @@ impl<T: Send + 'static> StepWork<T> {
         if !self.coming.as_ref().is_some_and(|(asked, _)| Arc::ptr_eq(asked, step)) {
             self.coming = Some((Arc::clone(step), begun(thread_name, in_background, work())));
         }
+        self.receive();
+    }
+
+    /// Takes what has come of the step that was asked for last.
+    pub(super) fn receive(&mut self) {
         let Some((_, coming)) = &self.coming else { return };
         let result = match coming.try_recv() {
             Err(TryRecvError::Empty) => return,
             told => told.ok().flatten(),
         };
-        self.known = Some((Arc::clone(step), result));
-        self.coming = None;
+        self.known = self.coming.take().map(|(step, _)| (step, result));
+    }
+
+    /// The step that was worked out last, with what came of it.
+    pub(super) fn last(&self) -> Option<(&Arc<StepRecord>, Option<&T>)> {
+        self.known.as_ref().map(|(step, result)| (step, result.as_ref()))
     }
 }
 

@@ -15,16 +15,38 @@ use crate::session::{RunRecord, StepRecord};
 /// Candidates shown behind the best one.
 const OTHERS_SHOWN: usize = 3;
 
+/// Seconds that the cursor must have rested before advice is asked for in the background.
+const REST_S: f64 = 0.15;
+/// Seconds between two questions while the cursor moves: nobody can read what changes with every image.
+const PERIOD_S: f64 = 1.0;
+
+/// What is told about one step.
+#[derive(Debug)]
+struct Told {
+    /// Since when the weakest direction has been lost.
+    since: Option<String>,
+    /// What to fly against it.
+    advice: Option<Advice>,
+}
+
 /// What was found out about one step; another step is asked anew.
 #[derive(Debug, Default)]
 pub(super) struct AdviceUi {
-    since: Option<(Arc<StepRecord>, Option<String>)>,
-    advice: StepWork<Advice>,
+    /// The run that all of this is about.
+    run: Option<u64>,
+    told: StepWork<Told>,
+    /// The step at the cursor, and since when, in the seconds of the window.
+    seen: Option<(Arc<StepRecord>, f64)>,
+    /// When something was asked last, in the seconds of the window.
+    asked_s: f64,
 }
 
 impl AdviceUi {
-    /// Draws how long the weakest direction has been lost, and what to fly against it: worked out once the cursor rests,
-    /// in the background or while the caller waits.
+    /// Draws how long the weakest direction has been lost, and what to fly against it.
+    ///
+    /// Worked out while the caller waits, or in the background: then for the step where the cursor rests, and once a second
+    /// while it moves. What is told of an earlier step stays until then, with its time. Without `room` only the best motion
+    /// is told, the next ones where the pointer rests.
     pub(super) fn ui(
         &mut self,
         ui: &mut Ui,
@@ -32,59 +54,99 @@ impl AdviceUi {
         run: &RunRecord,
         step: &Arc<StepRecord>,
         in_background: bool,
+        room: bool,
     ) {
-        let fresh = |known: &Arc<StepRecord>| Arc::ptr_eq(known, step);
-        if !self.since.as_ref().is_some_and(|(known, _)| fresh(known)) {
-            self.since = Some((Arc::clone(step), since(run, step)));
+        if self.run != Some(run.id) {
+            *self = Self { run: Some(run.id), ..Self::default() };
         }
-        if let Some((_, Some(text))) = &self.since {
+        let now_s = ui.input(|input| input.time);
+        if !self.seen.as_ref().is_some_and(|(seen, _)| Arc::ptr_eq(seen, step)) {
+            self.seen = Some((Arc::clone(step), now_s));
+        }
+        self.told.receive();
+        if !self.told.is_known(step) {
+            if !in_background || self.is_due(now_s) {
+                self.asked_s = now_s;
+                self.ask(ctx, run, step, in_background);
+            }
+            if !self.told.is_known(step) {
+                ui.ctx().request_repaint_after(REPAINT);
+            }
+        }
+        let Some((of, told)) = self.told.last() else {
+            if step.rank.is_some() {
+                ui.label(RichText::new("Linearizing candidate motions…").color(ctx.theme.text_weak));
+            }
+            return;
+        };
+        let time = if Arc::ptr_eq(of, step) {
+            String::new()
+        } else {
+            format!(" at {:.2} s", seconds_from_ns(of.report.stamp_ns))
+        };
+        if let Some(text) = told.and_then(|told| told.since.as_ref()) {
             ui.add(egui::Label::new(RichText::new(text).color(ctx.theme.text)).truncate()).on_hover_text(text);
         }
-        let Some(rank) = &step.rank else { return };
-        if !self.advice.is_known(step) {
-            if ctx.playback.playing {
-                return;
-            }
-            self.advice.ask(step, "advice", in_background, || {
-                let situation = Situation::of_step(&step.report, rank, &ctx.recording.rig, &run.camera_key);
-                move || situation.as_ref().and_then(advise)
-            });
+        if of.rank.is_some() {
+            advice_ui(ui, ctx, told.and_then(|told| told.advice.as_ref()), &time, room);
         }
-        if !self.advice.is_known(step) {
-            ui.label(RichText::new("Linearizing candidate motions…").color(ctx.theme.text_weak));
-            ui.ctx().request_repaint_after(REPAINT);
-            return;
-        }
-        match self.advice.of(step) {
-            None => {
-                ui.label(RichText::new("No motion can tell more about this calibration").color(ctx.theme.text_weak));
-            }
-            Some(advice) => {
-                let sentence = format!("Fly next: {}", advice.sentence().unwrap_or_default());
-                let response = ui.add(egui::Label::new(RichText::new(sentence).color(ctx.theme.text_strong)).wrap());
-                response.on_hover_text(
-                    "Candidate motions of vehicle and joints, linearized from here and ordered by what they would leave \
-                     of the direction that is known least of all that some motion can tell",
-                );
-                for candidate in advice.candidates.iter().skip(1).take(OTHERS_SHOWN) {
-                    let text = format!("{:.0} % left: {}", 100.0 * candidate.remaining, candidate.words);
-                    ui.add(egui::Label::new(RichText::new(text).small().color(ctx.theme.text_weak)).truncate());
-                }
-            }
-        }
+    }
+
+    /// Whether it is time for a question in the background.
+    fn is_due(&self, now_s: f64) -> bool {
+        let rests = self.seen.as_ref().is_some_and(|(_, since_s)| now_s - since_s >= REST_S);
+        let first = self.told.last().is_none();
+        !self.told.is_busy() && (first || rests || now_s - self.asked_s >= PERIOD_S)
+    }
+
+    fn ask(&mut self, ctx: &PanelContext<'_>, run: &RunRecord, step: &Arc<StepRecord>, in_background: bool) {
+        self.told.ask(step, "advice", in_background, || {
+            let before = run.steps.partition_point(|other| other.report.stamp_ns < step.report.stamp_ns);
+            let earlier: Arc<[Arc<StepRecord>]> = run.steps[..before].into();
+            let situation = step
+                .rank
+                .as_ref()
+                .and_then(|rank| Situation::of_step(&step.report, rank, &ctx.recording.rig, &run.camera_key));
+            let step = Arc::clone(step);
+            move || Some(Told { since: since(&earlier, &step), advice: situation.as_ref().and_then(advise) })
+        });
     }
 }
 
-/// The weakest direction and the first second from which on it was null or weak without interruption.
-fn since(run: &RunRecord, step: &Arc<StepRecord>) -> Option<String> {
+/// What to fly; `time` says of when, where that is not the cursor's.
+fn advice_ui(ui: &mut Ui, ctx: &PanelContext<'_>, advice: Option<&Advice>, time: &str, room: bool) {
+    let Some(advice) = advice else {
+        ui.label(RichText::new("No motion can tell more about this calibration").color(ctx.theme.text_weak));
+        return;
+    };
+    let sentence = format!("Fly next{time}: {}", advice.sentence().unwrap_or_default());
+    let response = ui.add(egui::Label::new(RichText::new(sentence).color(ctx.theme.text_strong)).wrap());
+    let others: Vec<String> = advice
+        .candidates
+        .iter()
+        .skip(1)
+        .take(OTHERS_SHOWN)
+        .map(|candidate| format!("{:.0} % left: {}", 100.0 * candidate.remaining, candidate.words))
+        .collect();
+    let listed = if room { String::new() } else { format!("\n{}", others.join("\n")) };
+    response.on_hover_text(format!(
+        "Candidate motions of vehicle and joints, linearized from here and ordered by what they would leave of the \
+         direction that is known least of all that some motion can tell{listed}"
+    ));
+    for text in others.into_iter().filter(|_| room) {
+        ui.add(egui::Label::new(RichText::new(text).small().color(ctx.theme.text_weak)).truncate());
+    }
+}
+
+/// The weakest direction and the first second from which on it was null or weak without interruption; `before` are the run's
+/// earlier steps.
+fn since(before: &[Arc<StepRecord>], step: &StepRecord) -> Option<String> {
     let rank = step.rank.as_ref()?;
     let weak = rank.directions.iter().find(|direction| !direction.structural);
     let direction = weak.or_else(|| rank.directions.first())?;
-    let before = run.steps.partition_point(|other| other.report.stamp_ns < step.report.stamp_ns);
-    let earlier = run.steps[..before].iter().rev();
-    let lost = steps_lost(&rank.names, &direction.weights, earlier.map(|step| step.rank.as_ref()));
-    let first = run.steps.get(before - lost)?;
+    let lost = steps_lost(&rank.names, &direction.weights, before.iter().rev().map(|step| step.rank.as_ref()));
+    let first_ns = before.get(before.len() - lost).map_or(step.report.stamp_ns, |first| first.report.stamp_ns);
     let kind = if direction.structural { "null" } else { "weak" };
     let named = parameters_of(&rank.names, direction, 2);
-    Some(format!("{named}: {kind} without interruption since {:.2} s", seconds_from_ns(first.report.stamp_ns)))
+    Some(format!("{named}: {kind} without interruption since {:.2} s", seconds_from_ns(first_ns)))
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use egui::{CollapsingHeader, Grid, Label, RichText, Ui, vec2};
+use egui::{CollapsingHeader, Color32, Grid, Label, RichText, TextStyle, Ui, vec2};
 
 use crate::estimator::Motion;
 use crate::gui::PanelContext;
@@ -38,9 +38,11 @@ impl InformationUi {
         }
         let Some((_, Some(rate))) = &self.told else { return };
         let joints = ctx.recording.rig.joint_names();
-        let title = RichText::new(headline(rate, &joints)).color(ctx.theme.text);
+        let headlines = headlines(rate, &joints);
+        let title = RichText::new(fitting(ui, &headlines)).color(ctx.theme.text);
         let header = CollapsingHeader::new(title).id_salt("information").default_open(room);
-        header.show(ui, |ui| table_ui(ui, ctx, rate, &joints));
+        let shown = header.show(ui, |ui| table_ui(ui, ctx, rate, &joints));
+        shown.header_response.on_hover_text(&headlines[0]);
     }
 }
 
@@ -52,8 +54,17 @@ fn rate_before(run: &RunRecord, step: &StepRecord) -> Option<InformationRate> {
     information_rate(run.steps[begin..end].iter().filter_map(|step| step.gain()))
 }
 
-/// All in one line.
-fn headline(rate: &InformationRate, joints: &[String]) -> String {
+/// The longest headline that has room beside the arrow, else the shortest: one that runs over the edge would widen
+/// everything below it.
+fn fitting<'a>(ui: &Ui, headlines: &'a [String; 3]) -> &'a str {
+    let font = TextStyle::Button.resolve(ui.style());
+    let room = ui.available_width() - ui.spacing().indent - 2.0 * ui.spacing().button_padding.x;
+    let width = |text: &String| ui.painter().layout_no_wrap(text.clone(), font.clone(), Color32::WHITE).size().x;
+    headlines.iter().find(|text| width(text) <= room).unwrap_or(&headlines[2])
+}
+
+/// All in one line: everything, without the parameter that gains most, and the sum alone.
+fn headlines(rate: &InformationRate, joints: &[String]) -> [String; 3] {
     let most = rate
         .leading(None)
         .map_or_else(String::new, |(motion, part)| format!(", most by {} ({part:.2})", motion.name(joints)));
@@ -66,7 +77,8 @@ fn headline(rate: &InformationRate, joints: &[String]) -> String {
             rate.leading(Some(fastest)).map_or_else(String::new, |(motion, _)| format!(" by {}", motion.name(joints)));
         format!("; fastest {} {:.2}{by}", parameter.name, parameter.bits_per_s)
     });
-    format!("Told in the last {:.1} s: {:.2} bit/s{most}{fastest}", rate.duration_s, rate.total())
+    let total = format!("Told in the last {:.1} s: {:.2} bit/s", rate.duration_s, rate.total());
+    [format!("{total}{most}{fastest}"), format!("{total}{most}"), total]
 }
 
 fn table_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, rate: &InformationRate, joints: &[String]) {

@@ -37,6 +37,9 @@ const OWN_WIDTH: f32 = 480.0;
 /// Height from which the ranks over time have room, in points.
 const LOWEST_WITH_TIME: f32 = 340.0;
 
+/// Height from which more than the best motion to fly next has room, in points.
+const LOWEST_WITH_OTHERS: f32 = 300.0;
+
 /// Height from which the table of the information has room beside the heat map, in points.
 const TALL: f32 = 1000.0;
 
@@ -107,7 +110,7 @@ impl RankPanel {
                 self.over_time_ui(ui, ctx);
                 return;
             };
-            self.advice.ui(ui, ctx, run, step, self.in_background);
+            self.advice.ui(ui, ctx, run, step, self.in_background, height > LOWEST_WITH_OTHERS);
             self.information.ui(ui, ctx, run, step, height > TALL);
             let number = ctx.selection.run.min(ctx.recording.runs.len().saturating_sub(1));
             compare::lock_ui(ui, ctx, number, run, step);
