@@ -162,11 +162,20 @@ fn histogram_ui(ui: &mut Ui, theme: &Theme, histogram: &ResidualHistogram, heigh
     let key = rect.left_top() + vec2(5.0, 2.0);
     let end = painter.text(key, Align2::LEFT_TOP, "■ after", label_font(), theme.accent);
     let next = pos2(end.right() + 8.0, key.y);
-    painter.text(next, Align2::LEFT_TOP, "— before the solve", label_font(), theme.warn);
+    let end = painter.text(next, Align2::LEFT_TOP, "— before the solve", label_font(), theme.warn);
     let unit = "prediction − measurement, px";
-    let outside =
-        if histogram.outside > 0 { format!("{} outside · {unit}", histogram.outside) } else { unit.to_owned() };
-    painter.text(rect.right_top() + vec2(-5.0, 2.0), Align2::RIGHT_TOP, outside, label_font(), theme.text_weak);
+    let outside = histogram.outside;
+    let texts = if outside > 0 {
+        [format!("{outside} outside · {unit}"), format!("{outside} outside")]
+    } else {
+        [unit.to_owned(), "px".to_owned()]
+    };
+    // What would run into the key is said shorter.
+    let galleys = texts.map(|text| painter.layout_no_wrap(text, label_font(), theme.text_weak));
+    let right = rect.right_top() + vec2(-5.0, 2.0);
+    if let Some(galley) = galleys.into_iter().find(|galley| end.right() + 10.0 + galley.size().x < right.x) {
+        painter.galley(right - vec2(galley.size().x, 0.0), galley, theme.text_weak);
+    }
     let response = ui.interact(rect, ui.unique_id().with("histogram"), Sense::hover());
     response.widget_info(|| WidgetInfo::labeled(Role::Image, true, "Histogram of reprojection residuals"));
 }

@@ -46,6 +46,8 @@ const VEHICLE_SHARE: f64 = 0.3;
 const TURN_PER_POINT: f64 = 0.008;
 /// Width that the table of the chain's links needs.
 const TABLE_WIDTH: f32 = 256.0;
+/// Height that the axes and the scale below them take under the legend.
+const GIZMO_ROOM: f32 = 105.0;
 /// Smallest panel that has room for the close-up.
 const CLOSE_UP_FROM: Vec2 = vec2(440.0, 230.0);
 
@@ -200,7 +202,10 @@ impl ScenePanel {
         overlay::labels(&painter, area, scale, &drawing.labels, theme.plot_background);
         overlay::legend(&painter, area, theme, &legend_lines(&views, theme), builder.height_range_m);
         overlay::scale_bar(&painter, area, scale, theme, &view, &format!(", grid {spacing_m} m"));
-        overlay::gizmo(&painter, area.left_bottom() + vec2(34.0, -62.0), theme, &view);
+        // In a low panel the legend is where the axes would be.
+        if area.height() > key + GIZMO_ROOM {
+            overlay::gizmo(&painter, area.left_bottom() + vec2(34.0, -62.0), theme, &view);
+        }
     }
 
     fn close_up_ui(&mut self, ui: &Ui, rect: Rect, chain: &ChainModel, context: &PanelContext<'_>) {
