@@ -138,6 +138,9 @@ pub(crate) struct ScreenshotArguments {
     /// Which panel; `all` is the whole window.
     #[arg(long, value_name = "NAME", default_value = "all")]
     pub panel: String,
+    /// Layout of the whole window, as its keys 1 to 5: overview, calibration, front end, scene, comparison.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=5))]
+    pub layout: u8,
     /// The picture to write: a PNG, or with .svg a drawing of lines and texts.
     #[arg(short, long, value_name = "FILE.png")]
     pub output: PathBuf,

@@ -12,6 +12,7 @@ use dcvins::flight_log::ImageReader;
 use dcvins::geometry::{ns_from_seconds, seconds_from_ns};
 use dcvins::gui::app::PlayingLog;
 use dcvins::gui::theme::ThemeName;
+use dcvins::gui::window::Preset;
 use dcvins::gui::{ImageSource, Playback};
 use dcvins::session::{Recording, Session, SessionPlan};
 
@@ -66,6 +67,7 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<()> {
             RendererArgument::Wgpu => Renderer::Wgpu,
         },
         slide: arguments.slide.clone(),
+        layout: Preset::ALL.get(usize::from(arguments.layout) - 1).copied().unwrap_or_default(),
         playback: shown.playback(),
     };
     let several = instants.len() > 1;

@@ -13,7 +13,7 @@ use super::error::ExportError;
 use crate::gui::headless::{self, HeadlessOptions};
 use crate::gui::offscreen::{Offscreen, OffscreenError};
 use crate::gui::theme::{Theme, ThemeName};
-use crate::gui::window::{PanelName, WindowState, alone_ui, panel_table, window_ui};
+use crate::gui::window::{PanelName, Preset, WindowState, alone_ui, panel_table, window_ui};
 use crate::gui::{ImageSource, PanelContext, Playback, Selection};
 use crate::observability::SlidePosition;
 use crate::session::Recording;
@@ -58,6 +58,8 @@ pub struct PictureOptions {
     pub renderer: Renderer,
     /// Where the chain of the first run is moved to.
     pub slide: Option<SlidePosition>,
+    /// Where the panels of the whole window are.
+    pub layout: Preset,
     /// Markers, breakpoints and the like, of a session that was saved.
     pub playback: Playback,
 }
@@ -70,6 +72,7 @@ impl Default for PictureOptions {
             theme: ThemeName::Light,
             renderer: Renderer::Cpu,
             slide: None,
+            layout: Preset::default(),
             playback: Playback::default(),
         }
     }
@@ -185,6 +188,7 @@ fn with_panel<T>(
     check(options)?;
     let theme = Theme::of(options.theme);
     let mut state = WindowState::default();
+    state.arrange(options.layout);
     let mut selection = Selection { slide: options.slide.clone(), ..Selection::default() };
     let playback = Playback { playing: false, ..options.playback.clone() };
     let mut ui = |ui: &mut Ui| {
