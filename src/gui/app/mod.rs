@@ -1,6 +1,8 @@
 //! The window's program: it owns the session, feeds it time and commands, and draws what it has computed.
 
 #[cfg(test)]
+mod session_tests;
+#[cfg(test)]
 mod tests;
 
 use std::path::{Path, PathBuf};

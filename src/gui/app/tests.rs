@@ -86,7 +86,7 @@ impl PlayingLog for SampleLog {
 
 /// A machine with two sample logs.
 #[derive(Default)]
-struct TestDesktop {
+pub(super) struct TestDesktop {
     remembered: Mutex<Vec<PathBuf>>,
     layouts: Mutex<Option<String>>,
     written: Mutex<Vec<PanelExport>>,
@@ -178,7 +178,7 @@ fn app() -> (Harness<'static, App>, Arc<TestDesktop>) {
 }
 
 /// Runs until something holds; opening happens on a thread of its own.
-fn run_until(harness: &mut Harness<'static, App>, holds: impl Fn(&Harness<'static, App>) -> bool) {
+pub(super) fn run_until(harness: &mut Harness<'static, App>, holds: impl Fn(&Harness<'static, App>) -> bool) {
     for _ in 0..2000 {
         harness.run_steps(1);
         if holds(harness) {

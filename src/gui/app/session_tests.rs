@@ -1,0 +1,138 @@
+//! The program of the window over a session that estimates a sample log.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use egui::{Key, Modifiers, Rect, Role, Shape};
+use egui_kittest::Harness;
+use egui_kittest::kittest::{NodeT as _, Queryable as _};
+
+use super::tests::{TestDesktop, run_until};
+use super::{App, OpenLog};
+use crate::gui::desktop::Desktop;
+use crate::gui::theme::ThemeName;
+use crate::session::{RunRecord, Session, SessionPlan, SessionRequest};
+
+/// The window over the first seconds of the sample log, estimated by one run.
+fn window_over_garden(spec: &str, duration_s: f64) -> Harness<'static, App> {
+    let log_path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("sample_logs/garden.mcap");
+    let specs = vec![spec.parse().unwrap()];
+    let request = SessionRequest { log_path, specs, duration_s: Some(duration_s), ..SessionRequest::default() };
+    let session = Session::start(SessionPlan::open(&request).unwrap()).unwrap();
+    let open: OpenLog = Arc::new(|_: &Path| Err("no other log is opened here".to_owned()));
+    let mut app = App::new(open, Arc::new(TestDesktop::default()) as Arc<dyn Desktop>, ThemeName::Dark);
+    app.show(Box::new(session), None);
+    let mut harness = Harness::builder().with_size([1500.0, 900.0]).build_ui_state(|ui, app: &mut App| app.ui(ui), app);
+    harness.run_steps(2);
+    harness
+}
+
+fn runs(harness: &Harness<'static, App>) -> Vec<RunRecord> {
+    harness.state().log().unwrap().recording().runs.clone()
+}
+
+fn all_finished(harness: &Harness<'static, App>) -> bool {
+    harness.state().log().unwrap().recording().runs.iter().all(|run| run.finished)
+}
+
+/// Informed rank of a step, `None` while the run initializes.
+fn informed(run: &RunRecord, step: usize) -> Option<usize> {
+    run.steps[step].rank.as_ref().map(|rank| rank.rank_informed)
+}
+
+/// Texts on the screen with their places.
+fn painted_texts(harness: &Harness<'static, App>) -> Vec<(String, Rect)> {
+    fn collect(shape: &Shape, texts: &mut Vec<(String, Rect)>) {
+        match shape {
+            Shape::Text(text) => texts.push((text.galley.text().to_owned(), text.visual_bounding_rect())),
+            Shape::Vec(shapes) => shapes.iter().for_each(|shape| collect(shape, texts)),
+            _ => {}
+        }
+    }
+    let mut texts = Vec::new();
+    harness.output().shapes.iter().for_each(|clipped| collect(&clipped.shape, &mut texts));
+    texts
+}
+
+#[test]
+fn a_classical_run_goes_on_as_minimal_from_where_its_rank_drops() {
+    let mut harness = window_over_garden("classical", 6.6);
+    run_until(&mut harness, all_finished);
+    let parent = runs(&harness).remove(0);
+    let drops = |step: &usize| informed(&parent, step - 1).zip(informed(&parent, *step)).is_some_and(|(a, b)| b < a);
+    let at = (1..parent.steps.len()).rfind(drops).expect("the informed rank drops somewhere");
+    let step = &parent.steps[at];
+
+    // There by key: the palette goes to a frame.
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::P);
+    harness.run_steps(3);
+    harness.event(egui::Event::Text(format!("frame {}", step.report.frame_index)));
+    harness.run_steps(3);
+    harness.key_press(Key::Enter);
+    harness.run_steps(3);
+    assert_eq!(harness.state().log().unwrap().cursor_ns(), step.report.stamp_ns);
+    let rank = step.rank.as_ref().unwrap();
+    assert_eq!((rank.names.len(), rank.rank_structural, rank.deficit_parameterization), (24, 18, 6));
+
+    // The fork by key and label.
+    harness.key_press(Key::F);
+    harness.run_steps(3);
+    assert!(harness.query_by_label_contains("Fork classical at ").is_some());
+    let combo = harness.get_all_by_role(Role::ComboBox).find(|node| node.value().as_deref() == Some("as before"));
+    combo.unwrap().click();
+    harness.run_steps(3);
+    harness.get_by_label("minimal").click();
+    harness.run_steps(3);
+    harness.get_by_label("Fork").click();
+    run_until(&mut harness, |harness| runs(harness).len() == 2 && all_finished(harness));
+
+    let [parent, fork] = <[RunRecord; 2]>::try_from(runs(&harness)).unwrap();
+    let origin = fork.origin.as_ref().unwrap();
+    assert_eq!((origin.parent, origin.step, origin.stamp_ns), (parent.id, at, step.report.stamp_ns));
+    assert_eq!(fork.steps.len(), parent.steps.len());
+    for (number, (own, other)) in fork.steps.iter().zip(&parent.steps).enumerate() {
+        assert_eq!(Arc::ptr_eq(own, other), number < at, "step {number}");
+        assert_eq!(
+            own.report.calibration.names.len(),
+            if number < at { other.report.calibration.names.len() } else { 18 }
+        );
+    }
+    let forked = fork.steps[at].rank.as_ref().unwrap();
+    assert_eq!((forked.names.len(), forked.rank_structural, forked.deficit_parameterization), (18, 18, 0));
+
+    // Both lanes, by their names beside the timeline, and where the fork left its parent.
+    harness.run_steps(4);
+    let timeline = harness.get_by_label("Timeline").rect();
+    let lanes: Vec<String> = painted_texts(&harness)
+        .into_iter()
+        .filter(|(_, rect)| rect.right() <= timeline.left() + 1.0 && timeline.y_range().contains(rect.center().y))
+        .map(|(text, _)| text)
+        .collect();
+    for run in [&parent, &fork] {
+        assert!(lanes.contains(&run.spec.label), "{} in {lanes:?}", run.spec.label);
+    }
+    harness.get_by_label_contains(&format!("Run {}", fork.spec.label)).hover();
+    harness.run_steps(8);
+    assert!(harness.query_by_label_contains("s: minimal").is_some(), "the legend says where it was forked");
+
+    // The comparison: both in the table, and they part at the very frame of the fork.
+    harness.key_press(Key::Num5);
+    harness.run_steps(6);
+    for run in [&parent, &fork] {
+        let name = format!("Show run {} in all panels", run.spec.label);
+        assert!(harness.query_by_label(&name).is_some(), "{name}");
+    }
+    let parting = format!("First different number of {} from {}, go there", fork.spec.label, parent.spec.label);
+    let time = format!("{parting}: {:.3} s", step.report.stamp_ns as f64 * 1e-9);
+    assert!(harness.query_by_label(&time).is_some(), "{time}");
+
+    // And the rank of the fork in the panel beside it.
+    harness.get_by_label(&format!("Show run {} in all panels", fork.spec.label)).click();
+    harness.run_steps(4);
+    assert_eq!(harness.state().selection.run, 1);
+    let verdicts = painted_texts(&harness);
+    assert!(verdicts.iter().any(|(text, _)| text.contains("of 18")), "the rank panel tells the fork's rank");
+    let buttons = harness.query_all_by_role(Role::Button);
+    let unnamed = buttons.filter(|node| node.accesskit_node().label().is_none_or(|name| name.is_empty())).count();
+    assert_eq!(unnamed, 0, "every button has a name");
+}
