@@ -276,6 +276,31 @@ mod tests {
     }
 
     #[test]
+    fn the_table_of_the_timeline_holds_every_step_and_every_event() {
+        let recording = sample_recording();
+        let images = &mut sample_images();
+        let table = panel_csv("timeline", &recording, 9_000_000_000, images, &PictureOptions::default()).unwrap();
+        let rows: Vec<Vec<&str>> = table.lines().map(|line| line.split(',').collect()).collect();
+        let column = |name: &str| rows[0].iter().position(|head| *head == name).unwrap();
+        let (run, phase, event) = (column("run"), column("phase"), column("event"));
+        let (informed, features) = (column("rank_informed"), column("features"));
+        for record in &recording.runs {
+            let of_run: Vec<_> = rows.iter().filter(|row| row[run] == record.spec.label).collect();
+            let steps: Vec<_> = of_run.iter().filter(|row| !row[phase].is_empty()).collect();
+            assert_eq!(steps.len(), record.steps.len(), "{}", record.spec.label);
+            for (row, step) in steps.iter().zip(&record.steps) {
+                assert_eq!(row[features], step.tracks.features.len().to_string());
+                let rank = step.rank.as_ref().filter(|rank| !rank.names.is_empty());
+                assert_eq!(row[informed], rank.map_or_else(String::new, |rank| rank.rank_informed.to_string()));
+            }
+            let events = record.steps.iter().flat_map(|step| &step.report.events);
+            let notable = events.filter(|event| event.kind.is_notable()).count();
+            assert_eq!(of_run.iter().filter(|row| !row[event].is_empty()).count(), notable);
+        }
+        assert!(rows.iter().skip(1).any(|row| !row[event].is_empty()), "{table}");
+    }
+
+    #[test]
     fn every_panel_is_drawn_as_lines_and_texts_twice_alike() {
         let recording = sample_recording();
         let words = [

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use super::{PanelName, Panels};
+use crate::estimator::Phase;
 use crate::geometry::seconds_from_ns;
 use crate::gui::PanelContext;
 use crate::gui::chain_values::true_values;
@@ -61,7 +62,7 @@ pub(super) fn table_of(panel: PanelName, panels: &mut Panels, ctx: &PanelContext
         PanelName::Laboratory => spectra(panels.laboratory.ranks(ctx)),
         PanelName::Comparison => super::comparison_table::table_of(&mut panels.comparison, ctx),
         PanelName::Breakpoints => hits(ctx),
-        PanelName::Timeline => events(ctx),
+        PanelName::Timeline => lanes(ctx),
     }
 }
 
@@ -311,27 +312,51 @@ fn hits(ctx: &PanelContext<'_>) -> String {
     table.text
 }
 
-/// Rare events of all runs and the warnings of the log, in time order.
-fn events(ctx: &PanelContext<'_>) -> String {
-    let mut rows: Vec<(i64, [String; 5])> = Vec::new();
+/// The lanes: a row for every step of every run, and below it one for each of its notable events and of the log's warnings.
+fn lanes(ctx: &PanelContext<'_>) -> String {
+    const FIGURES: [&str; 7] =
+        ["phase", "keyframe", "features", "reprojection_rms_px", "rank_informed", "rank_structural", "rejected"];
+    const EVENT: [&str; 4] = ["event", "value", "threshold", "message"];
+    let mut rows: Vec<(i64, Vec<String>)> = Vec::new();
+    let event_row = |run: &str, event: [String; EVENT.len()]| -> Vec<String> {
+        std::iter::once(run.to_owned()).chain(FIGURES.map(|_| String::new())).chain(event).collect()
+    };
+    for warning in &ctx.recording.warnings {
+        let cells = ["warning".to_owned(), String::new(), String::new(), warning.message.clone()];
+        rows.push((warning.stamp_ns, event_row("", cells)));
+    }
     for run in &ctx.recording.runs {
         for step in &run.steps {
-            for event in step.report.events.iter().filter(|event| event.kind.is_notable()) {
+            let (report, label) = (&step.report, &run.spec.label);
+            let rank = step.rank.as_ref().filter(|rank| !rank.names.is_empty());
+            let phase = if report.phase == Phase::Tracking { "tracking" } else { "initializing" };
+            let figures = [
+                phase.to_owned(),
+                report.keyframe.to_string(),
+                step.tracks.features.len().to_string(),
+                number(rms_px(report)),
+                rank.map_or_else(String::new, |rank| rank.rank_informed.to_string()),
+                rank.map_or_else(String::new, |rank| rank.rank_structural.to_string()),
+                report.counts.rejected.to_string(),
+            ];
+            let nothing = EVENT.map(|_| String::new());
+            let cells = std::iter::once(label.clone()).chain(figures).chain(nothing);
+            rows.push((report.stamp_ns, cells.collect()));
+            for event in report.events.iter().filter(|event| event.kind.is_notable()) {
                 let figure = |value: Option<f64>| number(value.unwrap_or(f64::NAN));
-                let label = run.spec.label.clone();
-                let (value, threshold) = (figure(event.value), figure(event.threshold));
-                let cells = [label, name_of(event.kind).to_owned(), value, threshold, event.message.clone()];
-                rows.push((step.report.stamp_ns, cells));
+                let told = [
+                    name_of(event.kind).to_owned(),
+                    figure(event.value),
+                    figure(event.threshold),
+                    event.message.clone(),
+                ];
+                rows.push((report.stamp_ns, event_row(label, told)));
             }
         }
     }
-    for warning in &ctx.recording.warnings {
-        let cells = ["", "warning", "", ""].map(str::to_owned);
-        let [run, kind, value, threshold] = cells;
-        rows.push((warning.stamp_ns, [run, kind, value, threshold, warning.message.clone()]));
-    }
     rows.sort_by_key(|(stamp_ns, _)| *stamp_ns);
-    let mut table = Table::new(&["t_s", "run", "event", "value", "threshold", "message"]);
+    let heads: Vec<&str> = ["t_s", "run"].into_iter().chain(FIGURES).chain(EVENT).collect();
+    let mut table = Table::new(&heads);
     for (stamp_ns, cells) in rows {
         table.row(std::iter::once(seconds(stamp_ns)).chain(cells));
     }
