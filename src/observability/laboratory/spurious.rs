@@ -6,7 +6,7 @@
 
 use std::fmt;
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -95,27 +95,32 @@ impl Case {
         let (old, new) = (setup.window_from(0), setup.window_from(FRAMES));
         let form = LaboratoryForm::whole(self.parameterization);
         let chain = &setup.mechanism.chain;
-        let consistent = stacked_singular_values(form, [(&old, chain), (&new, chain)])?;
-        let rank = consistent.rank;
+        let seen = |window: &SupposedWindow, chain: &ClassicalChain| {
+            measured_block(&window.linearize(chain, form.parameterization, form.joint_offsets))
+        };
+        let (before, after) = (seen(&old, chain)?, seen(&new, chain)?);
+        let consistent = stacked_singular_values(&before.block, &after.block)?;
+        let threshold = before.structural_threshold.max(after.structural_threshold);
+        let rank = consistent.iter().filter(|value| **value > threshold).count();
         let mut without = (f64::INFINITY, 0.0_f64);
         let mut known = (usize::MAX, 0);
         for draw in 1..=DRAWS {
-            let changed = changed(chain, self.change, draw);
-            let values = stacked_singular_values(form, [(&old, chain), (&new, &changed)])?.values;
+            let moved = seen(&new, &changed(chain, self.change, draw))?;
+            let values = stacked_singular_values(&before.block, &moved.block)?;
             let spurious = &values[rank..];
             let most = spurious.first().copied().unwrap_or(0.0);
             let count = spurious.iter().filter(|value| **value > KNOWN).count();
             without = (without.0.min(most), without.1.max(most));
             known = (known.0.min(count), known.1.max(count));
         }
-        let with_first_estimates = consistent.values.get(rank).copied().unwrap_or(0.0);
+        let with_first_estimates = consistent.get(rank).copied().unwrap_or(0.0);
         let overlaps = known.0 <= self.known.1 && self.known.0 <= known.1;
         let none = self.without > 0.0 || without.1 <= ROUNDING;
         Some(SpuriousRow {
             form: form.name(),
             encoder: self.joints == Joints::Known,
             change: self.change,
-            null: consistent.values.len() - rank,
+            null: consistent.len() - rank,
             with_first_estimates,
             without,
             known,
@@ -126,23 +131,11 @@ impl Case {
     }
 }
 
-/// Two windows together.
-struct Stacked {
-    values: Vec<f64>,
-    /// Of the two windows linearized at the first one's chain.
-    rank: usize,
-}
-
-fn stacked_singular_values(form: LaboratoryForm, windows: [(&SupposedWindow, &ClassicalChain); 2]) -> Option<Stacked> {
-    let blocks = windows
-        .map(|(window, chain)| measured_block(&window.linearize(chain, form.parameterization, form.joint_offsets)));
-    let [Some(old), Some(new)] = blocks else { return None };
-    let mut both = old.block.clone().resize_vertically(old.block.nrows() + new.block.nrows(), 0.0);
-    both.rows_mut(old.block.nrows(), new.block.nrows()).copy_from(&new.block);
-    let values = dense::singular_values(&both)?;
-    let threshold = old.structural_threshold.max(new.structural_threshold);
-    let rank = values.iter().filter(|value| **value > threshold).count();
-    Some(Stacked { values, rank })
+/// Singular values of two windows together.
+fn stacked_singular_values(old: &DMatrix<f64>, new: &DMatrix<f64>) -> Option<Vec<f64>> {
+    let mut both = old.clone().resize_vertically(old.nrows() + new.nrows(), 0.0);
+    both.rows_mut(old.nrows(), new.nrows()).copy_from(new);
+    dense::singular_values(&both)
 }
 
 /// The chain with each angle moved by up to so many degrees and each length by up to so many millimetres.
