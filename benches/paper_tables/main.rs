@@ -35,6 +35,8 @@ mod flights;
 mod kept;
 mod logs;
 mod robustness;
+#[path = "../shared/mod.rs"]
+mod shared;
 mod speed;
 mod table;
 
@@ -46,6 +48,7 @@ use dcvins::simulation::Experiment;
 
 use flights::Flight;
 use logs::Archive;
+use shared::process;
 use table::Table;
 
 /// All tables, in the order in which they are made: speed first, while the process is small.
@@ -160,7 +163,7 @@ fn main() -> Result<()> {
             }
         }
     }
-    let cpu = speed::cpu_s().map_or_else(String::new, |cpu_s| format!(", {:.0} min of processor time", cpu_s / 60.0));
+    let cpu = process::cpu_s().map_or_else(String::new, |cpu_s| format!(", {:.0} min of processor time", cpu_s / 60.0));
     println!("All of this took {:.0} min{cpu}.", begin.elapsed().as_secs_f64() / 60.0);
     Ok(())
 }

@@ -9,10 +9,8 @@ use dcvins::session::{self, SessionPlan, SessionRequest};
 use dcvins::simulation::Experiment;
 
 use crate::logs::Archive;
+use crate::shared::process::cpu_s;
 use crate::table::{Table, number};
-
-/// Clock ticks a second in `/proc`, which Linux fixes at a hundred for everything that reads it.
-const TICKS_PER_S: f64 = 100.0;
 
 /// One run alone over a flight.
 struct Timed {
@@ -96,15 +94,6 @@ fn table(timed: &[Timed]) -> Table {
         .notes
         .push("The largest memory is that of the process so far, with all steps of the flights kept.".to_owned());
     table
-}
-
-/// Processor time of all threads so far, where the system tells it.
-pub(crate) fn cpu_s() -> Option<f64> {
-    let status = fs::read_to_string("/proc/self/stat").ok()?;
-    // The name in brackets may hold spaces; user and system time are the 14th and 15th field.
-    let fields: Vec<&str> = status.rsplit_once(')')?.1.split_whitespace().collect();
-    let ticks = fields.get(11)?.parse::<f64>().ok()? + fields.get(12)?.parse::<f64>().ok()?;
-    Some(ticks / TICKS_PER_S)
 }
 
 /// Largest resident memory so far, where the system tells it.

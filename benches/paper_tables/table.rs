@@ -6,6 +6,8 @@ use std::path::Path;
 
 use anyhow::Result;
 
+use crate::shared::markdown::write_table;
+
 /// Rows of cells under a header.
 pub(crate) struct Table {
     /// Name of its CSV file.
@@ -42,12 +44,7 @@ impl Table {
 
 impl fmt::Display for Table {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(formatter, "{}\n", self.title)?;
-        writeln!(formatter, "| {} |", self.header.join(" | "))?;
-        writeln!(formatter, "| {} |", vec!["---"; self.header.len()].join(" | "))?;
-        for row in &self.rows {
-            writeln!(formatter, "| {} |", row.join(" | "))?;
-        }
+        write_table(formatter, &self.title, &self.header, &self.rows)?;
         for note in &self.notes {
             writeln!(formatter, "\n{note}")?;
         }

@@ -1,8 +1,10 @@
 //! Measured times as rows of a table.
 
-use std::{fmt, fs};
+use std::fmt;
 
 use dcvins::session::Stopwatch;
+
+use crate::shared::markdown::write_table;
 
 /// Milliseconds of many goes at the same thing.
 #[derive(Default)]
@@ -53,25 +55,8 @@ impl Table {
 
 impl fmt::Display for Table {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(formatter, "{}\n", self.title)?;
-        writeln!(formatter, "| {} |", self.header.join(" | "))?;
-        writeln!(formatter, "| {} |", vec!["---"; self.header.len()].join(" | "))?;
-        for row in &self.rows {
-            writeln!(formatter, "| {} |", row.join(" | "))?;
-        }
-        Ok(())
+        write_table(formatter, &self.title, &self.header, &self.rows)
     }
-}
-
-/// Processor time of all threads so far, in seconds; only Linux tells.
-pub(crate) fn cpu_s() -> Option<f64> {
-    /// Clock ticks per second, the same on every Linux that Rust's standard library runs on.
-    const TICKS_PER_S: f64 = 100.0;
-    let status = fs::read_to_string("/proc/self/stat").ok()?;
-    // Behind the name, which may hold spaces, `utime` and `stime` are the twelfth and thirteenth word.
-    let words: Vec<&str> = status.rsplit(')').next()?.split_whitespace().collect();
-    let ticks = words.get(11)?.parse::<f64>().ok()? + words.get(12)?.parse::<f64>().ok()?;
-    Some(ticks / TICKS_PER_S)
 }
 
 /// Bytes in MiB.

@@ -11,7 +11,8 @@ use dcvins::gui::{PanelContext, Playback, Selection};
 use dcvins::session::{Recording, SessionPlan};
 
 use super::Table;
-use super::figures::{Times, cpu_s};
+use super::figures::Times;
+use super::shared::process::cpu_s;
 
 const OPTIONS: HeadlessOptions =
     HeadlessOptions { size_px: [1920, 1080], pixels_per_point: 1.0, theme: ThemeName::Dark };

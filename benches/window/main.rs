@@ -12,6 +12,8 @@ mod figures;
 mod frames;
 mod long;
 mod opening;
+#[path = "../shared/mod.rs"]
+mod shared;
 mod travel;
 
 use std::path::PathBuf;

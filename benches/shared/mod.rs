@@ -1,0 +1,4 @@
+//! What several benches need.
+
+pub(crate) mod markdown;
+pub(crate) mod process;
