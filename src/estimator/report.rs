@@ -16,6 +16,16 @@ pub enum Phase {
     Tracking,
 }
 
+impl Phase {
+    /// One word for panels and tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Initializing => "initializing",
+            Self::Tracking => "tracking",
+        }
+    }
+}
+
 /// What kind of event a step reports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum EventKind {

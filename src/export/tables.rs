@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use crate::estimator::{Event, Motion, Phase};
+use crate::estimator::{Event, Motion};
 use crate::flight_log::Rig;
 use crate::geometry::seconds_from_ns;
 use crate::session::{RunRecord, StepRecord};
@@ -191,10 +191,7 @@ pub(super) fn frames_csv(run: &RunRecord, timing: bool) -> String {
         let report = &step.report;
         let statistics = &step.tracks.statistics;
         text.push_str(&seconds_text(report.stamp_ns));
-        let phase = match report.phase {
-            Phase::Initializing => "initializing",
-            Phase::Tracking => "tracking",
-        };
+        let phase = report.phase.name();
         let inliers = report.counts.inliers();
         write!(
             text,

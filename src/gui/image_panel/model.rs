@@ -133,7 +133,7 @@ impl ImageModel {
         let FrontEndStatistics { tracked, detected, lost, rejected, .. } = self.statistics;
         parts.push(format!("{tracked} tracked, {detected} new, {lost} lost, {} rejected", rejected + self.rejected));
         parts.push(match self.phase {
-            Phase::Initializing => "initializing".to_owned(),
+            Phase::Initializing => self.phase.name().to_owned(),
             Phase::Tracking => {
                 format!("RMS {:.2} px before, {:.2} px after the solve", self.rms_before_px, self.rms_after_px)
             }

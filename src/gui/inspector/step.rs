@@ -3,7 +3,7 @@
 use egui::{RichText, Sense, Ui, vec2};
 
 use super::{rows_ui, table_ui};
-use crate::estimator::{Phase, StepReport};
+use crate::estimator::StepReport;
 use crate::geometry::so3;
 use crate::gui::PanelContext;
 use crate::gui::events::{look_of, name_of, paint_mark};
@@ -15,14 +15,10 @@ use crate::session::{RunRecord, StepRecord};
 pub(super) fn frame_ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, step: &StepRecord) {
     let report = &step.report;
     let delay_ms = (step.log_time_ns - report.stamp_ns) as f64 * 1e-6;
-    let phase = match report.phase {
-        Phase::Initializing => "initializing",
-        Phase::Tracking if report.keyframe => "tracking, keyframe",
-        Phase::Tracking => "tracking",
-    };
+    let keyframe = if report.keyframe { ", keyframe" } else { "" };
     let mut rows = vec![
         ("time".to_owned(), vec![format!("{} s, logged {delay_ms:+.1} ms", seconds(report.stamp_ns))]),
-        ("phase".to_owned(), vec![phase.to_owned()]),
+        ("phase".to_owned(), vec![format!("{}{keyframe}", report.phase.name())]),
     ];
     if report.restarts > 0 {
         rows.push(("restarts".to_owned(), vec![report.restarts.to_string()]));

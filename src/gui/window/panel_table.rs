@@ -3,7 +3,6 @@
 use std::fmt::Write as _;
 
 use super::{PanelName, Panels};
-use crate::estimator::Phase;
 use crate::geometry::seconds_from_ns;
 use crate::gui::PanelContext;
 use crate::gui::chain_values::true_values;
@@ -329,9 +328,8 @@ fn lanes(ctx: &PanelContext<'_>) -> String {
         for step in &run.steps {
             let (report, label) = (&step.report, &run.spec.label);
             let rank = step.rank.as_ref().filter(|rank| !rank.names.is_empty());
-            let phase = if report.phase == Phase::Tracking { "tracking" } else { "initializing" };
             let figures = [
-                phase.to_owned(),
+                report.phase.name().to_owned(),
                 report.keyframe.to_string(),
                 step.tracks.features.len().to_string(),
                 number(rms_px(report)),

@@ -28,8 +28,12 @@ const KNOWN: f64 = 1.0;
 const ROUNDING: f64 = 1e-9;
 
 /// Heading of the rows.
-pub(super) const TITLE: &str = "Two windows, the calibration changed between them: the most that they claim together of \
-    what neither sees\n  (1: as much as 10° or 3 cm), and how many such directions are claimed over 1; 8 draws";
+pub(super) fn title() -> String {
+    format!(
+        "Two windows, the calibration changed between them: the most that they claim together of what neither sees\n  \
+         (1: as much as 10° or 3 cm), and how many such directions are claimed over 1; {DRAWS} draws"
+    )
+}
 
 /// What is claimed of a form's null directions by two windows together.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -267,7 +267,7 @@ impl fmt::Display for TruthTable {
                 row.write(out)?;
             }
         }
-        writeln!(out, "\n{}", spurious::TITLE)?;
+        writeln!(out, "\n{}", spurious::title())?;
         for row in &self.spurious {
             writeln!(out, "{row}")?;
         }
