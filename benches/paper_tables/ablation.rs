@@ -16,8 +16,8 @@ fn variants() -> Vec<Variant> {
     let changed = |name, change: fn(&mut EstimatorConfig)| Variant { change, ..Variant::plain(name, "auto") };
     vec![
         Variant::plain("as it is", "auto"),
-        changed("pixel σ 0.5 px", |config| config.options.pixel_sigma_px = 0.5),
-        changed("pixel σ 2 px", |config| config.options.pixel_sigma_px = 2.0),
+        changed("pixel σ 0.25 px", |config| config.options.pixel_sigma_px = 0.25),
+        changed("pixel σ 1 px", |config| config.options.pixel_sigma_px = 1.0),
         changed("no robust loss", |config| config.options.loss = RobustLoss::None),
         changed("Huber at 1 σ", |config| config.options.loss = RobustLoss::Huber(1.0)),
         changed("Huber at 3 σ", |config| config.options.loss = RobustLoss::Huber(3.0)),
@@ -33,8 +33,12 @@ fn variants() -> Vec<Variant> {
         changed("anchor's measurement exact", |config| {
             config.options.landmark_model = LandmarkModel::InverseDistance;
         }),
-        changed("every measurement used once", |config| {
-            config.options.track_continuation = TrackContinuation::UseOnce;
+        changed("measurements used again", |config| {
+            config.options.track_continuation = TrackContinuation::Reuse;
+        }),
+        changed("measurements used again, pixel σ 1 px", |config| {
+            config.options.track_continuation = TrackContinuation::Reuse;
+            config.options.pixel_sigma_px = 1.0;
         }),
         changed("anchor's measurement forgotten", |config| {
             config.options.track_continuation = TrackContinuation::ForgetAnchor;

@@ -49,9 +49,10 @@ pub enum LandmarkModel {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TrackContinuation {
     /// Its measurements go into the marginalization prior and stay in the window as well, as in VINS-Fusion: they count
-    /// twice, which stiffens the window.
+    /// twice, which stiffens the window and asks for a pixel sigma that is too large.
     Reuse,
-    /// Every measurement is used once: those that went into the prior leave the window.
+    /// Every measurement is used once, as in Basalt: those that went into the prior leave the window, and the feature begins
+    /// anew with the images to come.
     UseOnce,
     /// The anchor's measurement is forgotten and the others stay.
     ForgetAnchor,
@@ -64,7 +65,7 @@ pub struct EstimatorOptions {
     pub window: usize,
     /// The first window grows to this many times `window` before anything is marginalized.
     pub first_window_factor: usize,
-    /// Standard deviation of a tracked pixel, per coordinate.
+    /// Standard deviation of a tracked pixel, per coordinate: what solved windows leave is 0.25 px to 0.55 px.
     pub pixel_sigma_px: f64,
     /// Loss on the visual residuals.
     pub loss: RobustLoss,
@@ -130,10 +131,10 @@ impl Default for EstimatorOptions {
         Self {
             window: 10,
             first_window_factor: 2,
-            pixel_sigma_px: 1.0,
+            pixel_sigma_px: 0.5,
             loss: RobustLoss::Huber(1.5),
             landmark_model: LandmarkModel::BearingAndInverseDistance,
-            track_continuation: TrackContinuation::Reuse,
+            track_continuation: TrackContinuation::UseOnce,
             iterations: 6,
             relative_cost_tolerance: 1e-3,
             min_observations: 3,
