@@ -319,6 +319,8 @@ pub struct StepReport {
     pub phase: Phase,
     /// How often it has restarted so far.
     pub restarts: usize,
+    /// Standard deviation of a tracked pixel that it counts with, per coordinate.
+    pub pixel_sigma_px: f64,
     /// What happened.
     pub events: Vec<Event>,
     /// The frames of the window after the solve, oldest first; empty while initializing.

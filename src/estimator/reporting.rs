@@ -22,6 +22,7 @@ impl Estimator {
             stamp_ns: input.stamp_ns,
             phase,
             restarts: self.restarts,
+            pixel_sigma_px: self.config.options.pixel_sigma_px,
             events: Vec::new(),
             window: Vec::new(),
             calibration: self.calibration_report(),

@@ -384,6 +384,7 @@ fn waiting_report(index: usize, calibration: crate::estimator::CalibrationEstima
         stamp_ns: index as i64 * FRAME_PERIOD_NS,
         phase: Phase::Initializing,
         restarts: 0,
+        pixel_sigma_px: 0.5,
         events: vec![Event {
             kind: EventKind::InitializationWaits,
             message: format!("waits for motion: parallax {:.1} px of 10 px", motion * 50.0),
@@ -465,6 +466,7 @@ fn tracking_report(
         stamp_ns: index as i64 * FRAME_PERIOD_NS,
         phase: Phase::Tracking,
         restarts: 0,
+        pixel_sigma_px: 0.5,
         events: sample_events(index, keyframe, rejected),
         reprojection_rms_before_px: rms(|observation| observation.residual_before_px),
         reprojection_rms_after_px: rms(|observation| observation.residual_after_px),

@@ -22,6 +22,7 @@ impl StepRecord {
                 stamp_ns: report.stamp_ns,
                 phase: report.phase,
                 restarts: report.restarts,
+                pixel_sigma_px: report.pixel_sigma_px,
                 events: report.events.clone(),
                 window: report.window.last().cloned().into_iter().collect(),
                 calibration: report.calibration.clone(),

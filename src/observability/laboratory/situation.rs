@@ -77,7 +77,7 @@ impl Situation {
             encoders: sigma_of_joints.map_or(JointKnowledge::Unknown, JointKnowledge::Encoder),
             imu_noise: rig.imu.noise,
             gravity_in_world: gravity_in_world(rig.gravity_m_per_s2),
-            pixel_sigma_px: 1.0,
+            pixel_sigma_px: report.pixel_sigma_px,
             distances_m,
             chain,
         })
