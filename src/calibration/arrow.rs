@@ -1,28 +1,155 @@
 //! Symmetric positive definite systems of a band with a border: states in time order, then what all of them share.
 
-use nalgebra::{DMatrix, DVector};
+use std::ops::Range;
 
-/// Lower triangle of `[band Cᵀ; C corner]`, the band of `len` unknowns stored row by row.
+use faer::linalg::matmul::matmul;
+use faer::{Accum, MatMut, MatRef, Par};
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+/// Rows and columns of the blocks that the band is factored by.
+const BLOCK: usize = 64;
+
+/// Lower triangle of `[band Cᵀ; C corner]`.
 #[derive(Clone, Debug)]
 pub(super) struct ArrowMatrix {
-    len: usize,
-    /// Entries left of the diagonal that are stored.
-    half_width: usize,
-    /// Row `i` holds the columns `i − half_width ..= i`.
-    band: Vec<f64>,
+    band: Band,
     /// One row of the band's length per border unknown.
     border: Vec<Vec<f64>>,
     corner: DMatrix<f64>,
 }
 
+/// Lower triangle of a band, row by row.
+///
+/// The rows of a block of [`BLOCK`] all begin so many blocks before it, so that blocks of rows are matrices; what lies
+/// before the first column or within the last block behind the last row stays zero.
+#[derive(Clone, Debug)]
+struct Band {
+    len: usize,
+    /// Blocks left of the diagonal that are stored.
+    reach: usize,
+    entries: Vec<f64>,
+}
+
+impl Band {
+    fn zeros(len: usize, half_width: usize) -> Self {
+        let reach = half_width.min(len.saturating_sub(1)).div_ceil(BLOCK);
+        let blocks = len.div_ceil(BLOCK);
+        Self { len, reach, entries: vec![0.0; blocks * BLOCK * (reach + 1) * BLOCK] }
+    }
+
+    /// Entries of a row.
+    fn width(&self) -> usize {
+        (self.reach + 1) * BLOCK
+    }
+
+    /// The columns of a row that are stored up to its diagonal, and where they are.
+    fn stored(&self, row: usize) -> (Range<usize>, Range<usize>) {
+        let first = (row / BLOCK * BLOCK).saturating_sub(self.reach * BLOCK);
+        (first..row, self.index(row, first)..self.index(row, row))
+    }
+
+    /// Where an entry of the lower triangle is.
+    fn index(&self, row: usize, column: usize) -> usize {
+        row * self.width() + self.reach * BLOCK + column - row / BLOCK * BLOCK
+    }
+
+    fn diagonal(&mut self, row: usize) -> &mut f64 {
+        let index = self.index(row, row);
+        &mut self.entries[index]
+    }
+
+    /// The Cholesky factor in place, `false` when the matrix is not positive definite.
+    ///
+    /// Right-looking by blocks: a block column is finished, then taken off all that it reaches. Every sum has its order
+    /// whatever the number of threads.
+    fn factor(&mut self) -> bool {
+        let (width, reach) = (self.width(), self.reach);
+        // Rows that only fill up the last block.
+        for row in self.len..self.entries.len() / width.max(1) {
+            *self.diagonal(row) = 1.0;
+        }
+        let mut rows: Vec<&mut [f64]> = self.entries.chunks_exact_mut(BLOCK * width).collect();
+        let mut panel = vec![0.0; reach * BLOCK * BLOCK];
+        for first in 0..rows.len() {
+            let end = rows.len().min(first + reach + 1);
+            let [own, below @ ..] = &mut rows[first..end] else { break };
+            let Some(pivot) = factored_block(own, width) else { return false };
+            let panel = &mut panel[..below.len() * BLOCK * BLOCK];
+            below.par_iter_mut().zip(panel.par_chunks_exact_mut(BLOCK * BLOCK)).enumerate().for_each(
+                |(place, (rows, panel))| {
+                    let column = (reach - 1 - place) * BLOCK;
+                    for (row, copy) in rows.chunks_exact_mut(width).zip(panel.chunks_exact_mut(BLOCK)) {
+                        let row = &mut row[column..column + BLOCK];
+                        substitute(&pivot, row);
+                        copy.copy_from_slice(row);
+                    }
+                },
+            );
+            below.par_iter_mut().enumerate().for_each(|(place, rows)| {
+                let count = (place + 1) * BLOCK;
+                let own = MatRef::from_row_major_slice(&panel[place * BLOCK * BLOCK..][..BLOCK * BLOCK], BLOCK, BLOCK);
+                let others = MatRef::from_row_major_slice(&panel[..count * BLOCK], count, BLOCK);
+                let target = MatMut::from_row_major_slice_mut(rows, BLOCK, width);
+                let target = target.subcols_mut((reach - place) * BLOCK, count);
+                matmul(target, Accum::Add, own, others.transpose(), -1.0, Par::Seq);
+            });
+        }
+        true
+    }
+
+    /// `L⁻¹ x`, in place.
+    fn forward(&self, vector: &mut [f64]) {
+        for row in 0..self.len {
+            let (columns, places) = self.stored(row);
+            let product = dot(&self.entries[places.clone()], &vector[columns]);
+            vector[row] = (vector[row] - product) / self.entries[places.end];
+        }
+    }
+
+    /// `L⁻ᵀ x`, in place.
+    fn backward(&self, vector: &mut [f64]) {
+        for row in (0..self.len).rev() {
+            let (columns, places) = self.stored(row);
+            vector[row] /= self.entries[places.end];
+            let value = vector[row];
+            for (entry, coupling) in vector[columns].iter_mut().zip(&self.entries[places]) {
+                *entry -= value * coupling;
+            }
+        }
+    }
+}
+
+/// Factors the block on the diagonal at the end of its rows and returns a copy of it.
+fn factored_block(rows: &mut [f64], width: usize) -> Option<Vec<f64>> {
+    let mut block: Vec<f64> = Vec::with_capacity(BLOCK * BLOCK);
+    for (place, row) in rows.chunks_exact_mut(width).enumerate() {
+        let row = &mut row[width - BLOCK..];
+        substitute(&block, &mut row[..place]);
+        let pivot = row[place] - dot(&row[..place], &row[..place]);
+        if !(pivot > 0.0 && pivot.is_finite()) {
+            return None;
+        }
+        row[place] = pivot.sqrt();
+        row[place + 1..].fill(0.0);
+        block.extend_from_slice(row);
+    }
+    Some(block)
+}
+
+/// `x L⁻ᵀ` in place, of a triangle of rows of [`BLOCK`] entries as many as `x` has.
+fn substitute(lower: &[f64], x: &mut [f64]) {
+    for place in 0..x.len() {
+        let row = &lower[place * BLOCK..][..=place];
+        x[place] = (x[place] - dot(&row[..place], &x[..place])) / row[place];
+    }
+}
+
 impl ArrowMatrix {
-    /// All zero.
+    /// All zero, for a band of `len` unknowns.
     pub(super) fn zeros(len: usize, half_width: usize, borders: usize) -> Self {
-        let half_width = half_width.min(len.saturating_sub(1));
         Self {
-            len,
-            half_width,
-            band: vec![0.0; len * (half_width + 1)],
+            band: Band::zeros(len, half_width),
             border: vec![vec![0.0; len]; borders],
             corner: DMatrix::zeros(borders, borders),
         }
@@ -31,8 +158,9 @@ impl ArrowMatrix {
     /// Adds to an entry of the lower triangle of the band; what lies above the diagonal is passed over.
     pub(super) fn add(&mut self, row: usize, column: usize, value: f64) {
         if column <= row {
-            debug_assert!(row - column <= self.half_width, "within the band");
-            self.band[row * (self.half_width + 1) + column + self.half_width - row] += value;
+            debug_assert!(column >= self.band.stored(row).0.start, "within the band");
+            let index = self.band.index(row, column);
+            self.band.entries[index] += value;
         }
     }
 
@@ -48,9 +176,9 @@ impl ArrowMatrix {
 
     /// Multiplies the diagonal by `1 + factor` and adds `floor` to it.
     pub(super) fn damp(&mut self, factor: f64, floor: f64) {
-        for row in 0..self.len {
-            let index = row * (self.half_width + 1) + self.half_width;
-            self.band[index] += factor * self.band[index] + floor;
+        for row in 0..self.band.len {
+            let entry = self.band.diagonal(row);
+            *entry += factor * *entry + floor;
         }
         for border in 0..self.corner.nrows() {
             self.corner[(border, border)] += factor * self.corner[(border, border)] + floor;
@@ -58,42 +186,12 @@ impl ArrowMatrix {
     }
 
     /// The Cholesky factor, `None` when the matrix is not positive definite.
-    pub(super) fn factor(mut self) -> Option<ArrowFactor> {
-        let (width, half) = (self.half_width + 1, self.half_width);
-        for row in 0..self.len {
-            let first = row.saturating_sub(half);
-            let (above, this) = self.band.split_at_mut(row * width);
-            for column in first..=row {
-                let this_at = |k: usize| k + half - row;
-                if column == row {
-                    let squares = dot(&this[this_at(first)..half], &this[this_at(first)..half]);
-                    let pivot = this[half] - squares;
-                    if !(pivot > 0.0 && pivot.is_finite()) {
-                        return None;
-                    }
-                    this[half] = pivot.sqrt();
-                } else {
-                    let begin = first.max(column.saturating_sub(half));
-                    let other = &above[column * width..(column + 1) * width];
-                    let at = |k: usize| k + half - column;
-                    let product = dot(&this[this_at(begin)..this_at(column)], &other[at(begin)..half]);
-                    let index = this_at(column);
-                    this[index] = (this[index] - product) / other[half];
-                }
-            }
+    pub(super) fn factor(self) -> Option<ArrowFactor> {
+        let Self { mut band, mut border, mut corner } = self;
+        if !band.factor() {
+            return None;
         }
-        let mut factor = ArrowFactor {
-            len: self.len,
-            half_width: half,
-            band: self.band,
-            border: self.border,
-            corner: DMatrix::zeros(0, 0),
-        };
-        let mut border = std::mem::take(&mut factor.border);
-        for row in &mut border {
-            factor.forward(row);
-        }
-        let mut corner = self.corner;
+        border.par_iter_mut().for_each(|row| band.forward(row));
         for row in 0..border.len() {
             for column in 0..=row {
                 let product = dot(&border[row], &border[column]);
@@ -101,18 +199,14 @@ impl ArrowMatrix {
                 corner[(column, row)] = corner[(row, column)];
             }
         }
-        factor.border = border;
-        factor.corner = corner;
-        Some(factor)
+        Some(ArrowFactor { band, border, corner })
     }
 }
 
 /// The factor `L` of the band, `L⁻¹Cᵀ`, and the border's Schur complement.
 #[derive(Clone, Debug)]
 pub(super) struct ArrowFactor {
-    len: usize,
-    half_width: usize,
-    band: Vec<f64>,
+    band: Band,
     border: Vec<Vec<f64>>,
     corner: DMatrix<f64>,
 }
@@ -126,7 +220,7 @@ impl ArrowFactor {
     /// Solves for the band's and the border's unknowns, `None` when the border is not positive definite.
     pub(super) fn solve(&self, band: &[f64], border: &DVector<f64>) -> Option<(Vec<f64>, DVector<f64>)> {
         let mut solution = band.to_vec();
-        self.forward(&mut solution);
+        self.band.forward(&mut solution);
         let mut reduced = border.clone();
         for (entry, row) in reduced.iter_mut().zip(&self.border) {
             *entry -= dot(row, &solution);
@@ -137,33 +231,8 @@ impl ArrowFactor {
                 *entry -= value * coupling;
             }
         }
-        self.backward(&mut solution);
+        self.band.backward(&mut solution);
         Some((solution, shared))
-    }
-
-    /// `L⁻¹ x`, in place.
-    fn forward(&self, vector: &mut [f64]) {
-        let (width, half) = (self.half_width + 1, self.half_width);
-        for row in 0..self.len {
-            let first = row.saturating_sub(half);
-            let entries = &self.band[row * width..(row + 1) * width];
-            let product = dot(&entries[first + half - row..half], &vector[first..row]);
-            vector[row] = (vector[row] - product) / entries[half];
-        }
-    }
-
-    /// `L⁻ᵀ x`, in place.
-    fn backward(&self, vector: &mut [f64]) {
-        let (width, half) = (self.half_width + 1, self.half_width);
-        for row in (0..self.len).rev() {
-            let first = row.saturating_sub(half);
-            let entries = &self.band[row * width..(row + 1) * width];
-            vector[row] /= entries[half];
-            let value = vector[row];
-            for (entry, coupling) in vector[first..row].iter_mut().zip(&entries[first + half - row..half]) {
-                *entry -= value * coupling;
-            }
-        }
     }
 }
 
