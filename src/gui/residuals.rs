@@ -69,6 +69,9 @@ impl ResidualsPanel {
     /// Root mean square of the reprojection residuals after the solve, all runs.
     fn over_time_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>, height: f32) {
         let theme = *ctx.theme;
+        let top = ui.cursor().top();
+        ui.label(RichText::new("reprojection RMS over time, px").small().color(theme.text_weak));
+        let height = height - (ui.cursor().top() - top);
         let (_, rect) = ui.allocate_space(vec2(ui.available_width(), height));
         let (begin_ns, end_ns) = visible_range(ctx);
         let mut area = PlotArea { rect, begin_ns, end_ns, low: 0.0, high: 1.0 };
@@ -86,8 +89,6 @@ impl ResidualsPanel {
             paint_curve(&painter, &area, curve, theme.run(run), CURVE_WIDTH);
         }
         paint_cursor(&painter, &theme, &area, ctx.cursor_ns);
-        let place = rect.right_top() + vec2(-3.0, 1.0);
-        painter.text(place, Align2::RIGHT_TOP, "reprojection RMS over time, px", label_font(), theme.text_weak);
         let id = ui.unique_id().with("rms over time");
         navigate(ui, ctx, &area, id, "Reprojection RMS over time", Clicks::Seek, false);
     }
