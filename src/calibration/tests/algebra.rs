@@ -53,7 +53,10 @@ fn check(len: usize, half_width: usize, borders: usize) {
 
 #[test]
 fn a_bordered_band_is_solved_as_a_dense_matrix() {
-    for (len, half_width, borders) in [(1, 0, 0), (5, 4, 0), (40, 7, 3), (33, 16, 1), (20, 100, 4)] {
+    let small = [(1, 0, 0), (5, 4, 0), (40, 7, 3), (33, 16, 1), (20, 100, 4)];
+    // Of several blocks, whole ones and not.
+    let large = [(130, 0, 1), (128, 64, 2), (200, 70, 3), (321, 130, 2), (150, 149, 1)];
+    for (len, half_width, borders) in small.into_iter().chain(large) {
         check(len, half_width, borders);
     }
 }
