@@ -3,6 +3,8 @@
 use std::ops::Range;
 
 use faer::linalg::matmul::matmul;
+use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
+use faer::prelude::ReborrowMut as _;
 use faer::{Accum, MatMut, MatRef, Par};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -22,7 +24,7 @@ pub(super) struct ArrowMatrix {
 /// Lower triangle of a band, row by row.
 ///
 /// The rows of a block of [`BLOCK`] all begin so many blocks before it, so that blocks of rows are matrices; what lies
-/// before the first column or within the last block behind the last row stays zero.
+/// before the first column or behind the last row holds nothing.
 #[derive(Clone, Debug)]
 struct Band {
     len: usize,
@@ -78,12 +80,11 @@ impl Band {
             let panel = &mut panel[..below.len() * BLOCK * BLOCK];
             below.par_iter_mut().zip(panel.par_chunks_exact_mut(BLOCK * BLOCK)).enumerate().for_each(
                 |(place, (rows, panel))| {
-                    let column = (reach - 1 - place) * BLOCK;
-                    for (row, copy) in rows.chunks_exact_mut(width).zip(panel.chunks_exact_mut(BLOCK)) {
-                        let row = &mut row[column..column + BLOCK];
-                        substitute(&pivot, row);
-                        copy.copy_from_slice(row);
-                    }
+                    let target = MatMut::from_row_major_slice_mut(rows, BLOCK, width);
+                    let mut target = target.subcols_mut((reach - 1 - place) * BLOCK, BLOCK);
+                    let pivot = MatRef::from_row_major_slice(&pivot, BLOCK, BLOCK);
+                    solve_lower_triangular_in_place(pivot, target.rb_mut().transpose_mut(), Par::Seq);
+                    MatMut::from_row_major_slice_mut(panel, BLOCK, BLOCK).copy_from(target);
                 },
             );
             below.par_iter_mut().enumerate().for_each(|(place, rows)| {
