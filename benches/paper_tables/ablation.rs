@@ -45,9 +45,6 @@ fn variants() -> Vec<Variant> {
         }),
         changed("12 iterations", |config| config.options.iterations = 12),
         changed("inertial noise × 2", |config| config.options.imu_noise_factor = 2.0),
-        changed("encoders believed twice as good", |config| {
-            config.encoder_sigma_rad = config.encoder_sigma_rad.map(|sigma| 0.5 * sigma);
-        }),
         Variant::plain("without encoders", "auto:encoder=off"),
         Variant::plain("calibration held fixed", "auto:calibrate=off"),
         Variant::plain("window of 15", "auto:window=15"),
