@@ -18,6 +18,8 @@ const HIGHEST_ROW: f32 = 26.0;
 const LOWEST_ROW: f32 = 12.0;
 /// Narrowest column that still holds a signed number.
 const NUMBER_WIDTH: f32 = 30.0;
+/// Narrowest column whose singular value has room beside its neighbours'.
+const HEAD_WIDTH: f32 = 40.0;
 const WIDEST_COLUMN: f32 = 84.0;
 const NARROWEST_COLUMN: f32 = 15.0;
 /// Weights below this may be left out when room is short.
@@ -39,7 +41,7 @@ pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, rank: &RankReport, hei
     let mut rows: Vec<usize> = (0..rank.names.len()).collect();
     rows.sort_by_key(|row| part_of(&rank.names[*row]));
     let all = rows.len();
-    let header_height = if pitch >= NUMBER_WIDTH { HEADER_HEIGHT } else { UPRIGHT_HEADER_HEIGHT };
+    let header_height = if pitch >= HEAD_WIDTH { HEADER_HEIGHT } else { UPRIGHT_HEADER_HEIGHT };
     if (height - header_height) / (rows.len() as f32) < LOWEST_ROW {
         rows.retain(|row| {
             let weight = |direction: &CalibrationDirection| direction.weights.get(*row).copied().unwrap_or(0.0);
@@ -79,7 +81,7 @@ fn header(ui: &Ui, theme: &Theme, rank: &RankReport, direction: &CalibrationDire
     let mark = if direction.structural { "null" } else { "weak" };
     let value = if direction.structural { "0".to_owned() } else { figure(direction.singular_value) };
     let small = FontId::new(9.5, FontFamily::Monospace);
-    if cell.width() >= NUMBER_WIDTH {
+    if cell.width() >= HEAD_WIDTH {
         let top = cell.center_top();
         painter.text(top, Align2::CENTER_TOP, mark, FontId::new(10.0, FontFamily::Proportional), color);
         painter.text(top + vec2(0.0, 13.0), Align2::CENTER_TOP, value, small, theme.text_weak);
