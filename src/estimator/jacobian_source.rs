@@ -133,11 +133,6 @@ pub struct JacobianRow {
 }
 
 impl JacobianSource {
-    /// Standard deviation of a pixel by which the residuals of features are whitened.
-    pub fn pixel_sigma_px(&self) -> f64 {
-        self.pixel_sigma_px
-    }
-
     /// Bytes on the heap.
     pub(super) fn heap_bytes(&self) -> usize {
         allocated_bytes(size_of_val(&*self.frames))

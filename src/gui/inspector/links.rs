@@ -122,8 +122,7 @@ pub(super) fn block_ui(
     let cameras = cameras(&ctx.recording.rig, run, step);
     let column = report.calibration.names.iter().position(|known| known == name);
     let feature = report.features.iter().find(|feature| feature.id == id);
-    let written = report.feature_rows(&cameras, id).zip(report.jacobian_source.as_ref());
-    let (Some(column), Some(feature), Some((rows, source))) = (column, feature, written) else {
+    let (Some(column), Some(feature), Some(rows)) = (column, feature, report.feature_rows(&cameras, id)) else {
         ui.label(RichText::new("No such block in this step").color(ctx.theme.text_weak));
         return;
     };
@@ -135,7 +134,7 @@ pub(super) fn block_ui(
         let seen = feature.observations.iter().find(|seen| seen.frame_index == *frame)?;
         let residual = seen.residual_after_px.map_or([f64::NAN; 2], |residual| [residual.x, residual.y]);
         // Back from standard deviations to pixels.
-        let pixels = source.pixel_sigma_px() / seen.robust_weight.sqrt() / shown.factor;
+        let pixels = report.pixel_sigma_px / seen.robust_weight.sqrt() / shown.factor;
         let slopes = [0, 1].map(|axis| figure(rows.rows[(2 * place + axis, column)] * pixels));
         let mut cells = vec![frame.to_string()];
         cells.extend(residual.map(|pixel| fixed(pixel, 2)));

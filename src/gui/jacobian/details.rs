@@ -136,7 +136,6 @@ fn sightings_ui(
 ) {
     let block = &model.jacobian.columns[column];
     let Some(feature) = step.report.features.iter().find(|feature| feature.id == id) else { return };
-    let Some(source) = &step.report.jacobian_source else { return };
     let unit = step.report.calibration.units.get(column).copied().unwrap_or_default();
     let parts = parts_of(block, unit);
     let mut heads = ["frame", "u px", "v px", "residual u", "residual v", "weight"].map(str::to_owned).to_vec();
@@ -149,7 +148,7 @@ fn sightings_ui(
         cells.extend(residual.map(|pixel| fixed(pixel, 2)));
         cells.push(fixed(seen.robust_weight, 2));
         // Back from standard deviations to pixels.
-        let pixels = source.pixel_sigma_px() / seen.robust_weight.sqrt();
+        let pixels = step.report.pixel_sigma_px / seen.robust_weight.sqrt();
         for (part, (_, factor)) in parts.iter().enumerate() {
             let at = |axis: usize| rows.rows[(2 * place + axis, block.start + part)] * pixels / factor;
             cells.extend([figure(at(0)), figure(at(1))]);
