@@ -3,9 +3,10 @@
 use std::ops::Range;
 
 use faer::linalg::matmul::matmul;
+use faer::linalg::solvers::Llt;
 use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
-use faer::prelude::ReborrowMut as _;
-use faer::{Accum, MatMut, MatRef, Par};
+use faer::prelude::{Reborrow as _, ReborrowMut as _};
+use faer::{Accum, MatMut, MatRef, Par, Side};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -82,8 +83,7 @@ impl Band {
                 |(place, (rows, panel))| {
                     let target = MatMut::from_row_major_slice_mut(rows, BLOCK, width);
                     let mut target = target.subcols_mut((reach - 1 - place) * BLOCK, BLOCK);
-                    let pivot = MatRef::from_row_major_slice(&pivot, BLOCK, BLOCK);
-                    solve_lower_triangular_in_place(pivot, target.rb_mut().transpose_mut(), Par::Seq);
+                    solve_lower_triangular_in_place(pivot.L(), target.rb_mut().transpose_mut(), Par::Seq);
                     MatMut::from_row_major_slice_mut(panel, BLOCK, BLOCK).copy_from(target);
                 },
             );
@@ -121,29 +121,12 @@ impl Band {
     }
 }
 
-/// Factors the block on the diagonal at the end of its rows and returns a copy of it.
-fn factored_block(rows: &mut [f64], width: usize) -> Option<Vec<f64>> {
-    let mut block: Vec<f64> = Vec::with_capacity(BLOCK * BLOCK);
-    for (place, row) in rows.chunks_exact_mut(width).enumerate() {
-        let row = &mut row[width - BLOCK..];
-        substitute(&block, &mut row[..place]);
-        let pivot = row[place] - dot(&row[..place], &row[..place]);
-        if !(pivot > 0.0 && pivot.is_finite()) {
-            return None;
-        }
-        row[place] = pivot.sqrt();
-        row[place + 1..].fill(0.0);
-        block.extend_from_slice(row);
-    }
-    Some(block)
-}
-
-/// `x L⁻ᵀ` in place, of a triangle of rows of [`BLOCK`] entries as many as `x` has.
-fn substitute(lower: &[f64], x: &mut [f64]) {
-    for place in 0..x.len() {
-        let row = &lower[place * BLOCK..][..=place];
-        x[place] = (x[place] - dot(&row[..place], &x[..place])) / row[place];
-    }
+/// Factors the block on the diagonal at the end of its rows and returns the factor.
+fn factored_block(rows: &mut [f64], width: usize) -> Option<Llt<f64>> {
+    let mut block = MatMut::from_row_major_slice_mut(rows, BLOCK, width).subcols_mut(width - BLOCK, BLOCK);
+    let factor = block.rb().llt(Side::Lower).ok()?;
+    block.copy_from(factor.L());
+    (0..BLOCK).all(|place| block[(place, place)].is_finite()).then_some(factor)
 }
 
 impl ArrowMatrix {
