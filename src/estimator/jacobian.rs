@@ -129,7 +129,9 @@ impl<'a> Writer<'a> {
             let Some(slot) = slot_of(seen.frame_index) else { continue };
             let sighting = Sighting { slot, uv_px: seen.measured_px };
             let (now, then) = (&camera.relative, &camera.linearized);
-            let Some(term) = whitened(&camera.model, now, then, anchor, &landmark, &sighting) else { continue };
+            // The report's residuals are rounded; the weight that the step counted with is not taken from them again.
+            let weight = seen.residual_after_px.map(|_| seen.robust_weight);
+            let Some(term) = whitened(&camera.model, now, then, anchor, &landmark, &sighting, weight) else { continue };
             let mut target = rows.rows_mut(2 * frame_indices.len(), 2);
             self.write(&mut target, camera, anchor, slot, &term);
             frame_indices.push(seen.frame_index);

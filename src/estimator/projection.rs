@@ -50,7 +50,7 @@ impl ProjectedRows {
             let Some(anchor) = track.sightings.first().map(|first| first.slot) else { continue };
             local.begin(anchor, track.sightings.len());
             for sighting in &track.sightings {
-                let term = whitened(model, &relative, &relative_linearized, anchor, landmark, sighting);
+                let term = whitened(model, &relative, &relative_linearized, anchor, landmark, sighting, None);
                 let Some(term) = term else { continue };
                 if sighting.slot != anchor {
                     blocks.add(anchor, sighting.slot, &term);

@@ -164,7 +164,7 @@ impl VisualSystem {
         let mut anchor_gradient = Vector6::zeros();
         let mut anchor_coupling = Matrix6x3::zeros();
         for sighting in &track.sightings {
-            let Some(term) = whitened(model, relative, linearized, anchor, landmark, sighting) else { continue };
+            let Some(term) = whitened(model, relative, linearized, anchor, landmark, sighting, None) else { continue };
             block.hessian += term.by_landmark.tr_mul(&term.by_landmark);
             block.gradient += term.by_landmark.tr_mul(&term.residual_px);
             if sighting.slot == anchor {
@@ -246,7 +246,8 @@ impl ReducedVisualSystem {
     }
 }
 
-/// One sighting linearized, divided by sigma and by the root of its robust weight.
+/// One sighting linearized, divided by sigma and times the root of its robust weight: the one of its residual, unless it is
+/// known.
 pub(super) fn whitened(
     model: &VisualModel<'_>,
     relative: &RelativePoses,
@@ -254,6 +255,7 @@ pub(super) fn whitened(
     anchor: usize,
     landmark: &Landmark,
     sighting: &Sighting,
+    known_weight: Option<f64>,
 ) -> Option<Reprojection> {
     let term = if sighting.slot == anchor {
         if !model.measures_in_anchor() {
@@ -270,7 +272,8 @@ pub(super) fn whitened(
         )?
     };
     let squared = term.residual_px.norm_squared() / (model.sigma_px * model.sigma_px);
-    let scale = model.loss.cost_and_weight(squared).1.sqrt() / model.sigma_px;
+    let weight = known_weight.unwrap_or_else(|| model.loss.cost_and_weight(squared).1);
+    let scale = weight.sqrt() / model.sigma_px;
     let mut by_landmark: Matrix2x3<f64> = term.by_landmark * scale;
     if !model.measures_in_anchor() {
         by_landmark.fixed_view_mut::<2, 2>(0, 0).fill(0.0);
