@@ -319,8 +319,10 @@ pub struct StepReport {
     pub phase: Phase,
     /// How often it has restarted so far.
     pub restarts: usize,
-    /// Standard deviation of a tracked pixel that it counts with, per coordinate.
+    /// Standard deviation of a well tracked pixel that it counts with, per coordinate.
     pub pixel_sigma_px: f64,
+    /// The same with the robust weights of this step: the one that tells as much as its pixels do on average.
+    pub effective_pixel_sigma_px: f64,
     /// What happened.
     pub events: Vec<Event>,
     /// The frames of the window after the solve, oldest first; empty while initializing.

@@ -23,6 +23,7 @@ impl Estimator {
             phase,
             restarts: self.restarts,
             pixel_sigma_px: self.config.options.pixel_sigma_px,
+            effective_pixel_sigma_px: self.config.options.pixel_sigma_px,
             events: Vec::new(),
             window: Vec::new(),
             calibration: self.calibration_report(),
@@ -52,6 +53,7 @@ impl Estimator {
         report.keyframe = self.frames.last().is_some_and(|frame| frame.keyframe);
         report.features = self.feature_reports(solved);
         report.counts = FeatureCounts::of(&report.features);
+        report.effective_pixel_sigma_px = effective_sigma(report.pixel_sigma_px, &report.features);
         report.landmarks = self.landmark_reports(solved);
         report.residuals = self.residual_summaries(solved);
         report.reprojection_rms_before_px =
@@ -227,6 +229,18 @@ impl Estimator {
         }
         summaries
     }
+}
+
+/// The standard deviation that tells as much as these pixels do with their robust weights.
+fn effective_sigma(sigma_px: f64, features: &[FeatureReport]) -> f64 {
+    let weights = || {
+        let kept = features.iter().filter(|feature| !feature.rejected);
+        kept.flat_map(|feature| feature.observations.iter())
+            .map(|seen| seen.robust_weight)
+            .filter(|weight| *weight > 0.0)
+    };
+    let count = weights().count();
+    if count == 0 { sigma_px } else { sigma_px / (weights().sum::<f64>() / count as f64).sqrt() }
 }
 
 fn root_mean_square<'a>(residuals: impl Iterator<Item = &'a TrackResiduals>) -> f64 {

@@ -385,6 +385,7 @@ fn waiting_report(index: usize, calibration: crate::estimator::CalibrationEstima
         phase: Phase::Initializing,
         restarts: 0,
         pixel_sigma_px: 0.5,
+        effective_pixel_sigma_px: 0.5,
         events: vec![Event {
             kind: EventKind::InitializationWaits,
             message: format!("waits for motion: parallax {:.1} px of 10 px", motion * 50.0),
@@ -467,6 +468,7 @@ fn tracking_report(
         phase: Phase::Tracking,
         restarts: 0,
         pixel_sigma_px: 0.5,
+        effective_pixel_sigma_px: 0.5,
         events: sample_events(index, keyframe, rejected),
         reprojection_rms_before_px: rms(|observation| observation.residual_before_px),
         reprojection_rms_after_px: rms(|observation| observation.residual_after_px),

@@ -23,6 +23,7 @@ impl StepRecord {
                 phase: report.phase,
                 restarts: report.restarts,
                 pixel_sigma_px: report.pixel_sigma_px,
+                effective_pixel_sigma_px: report.effective_pixel_sigma_px,
                 events: report.events.clone(),
                 window: report.window.last().cloned().into_iter().collect(),
                 calibration: report.calibration.clone(),

@@ -1,6 +1,7 @@
 //! What to fly next: candidate motions from here, linearized, and what each would leave of the weakest direction.
 
 use std::fmt;
+use std::ops::RangeInclusive;
 
 use nalgebra::{DMatrix, DVector, UnitQuaternion, Vector2, Vector3};
 use rayon::prelude::*;
@@ -11,7 +12,7 @@ use super::super::classification::excitable_directions;
 use super::Situation;
 use super::mechanism::LaboratoryJoint;
 use crate::estimator::{
-    LandmarkModel, NavigationState, PoseKnowledge, SupposedFrame, SupposedLandmark, SupposedWindow,
+    EstimatorOptions, LandmarkModel, NavigationState, PoseKnowledge, SupposedFrame, SupposedLandmark, SupposedWindow,
 };
 use crate::flight_log::ImuSample;
 use crate::geometry::{RigidTransform, ns_from_seconds, so3};
@@ -19,8 +20,8 @@ use crate::simulation::{Exercise, JOINT_PERIOD_S, JointSwing, SWING_M, VehicleSw
 
 /// How long a candidate is flown, in seconds.
 pub const ADVICE_DURATION_S: f64 = 4.0;
-/// Frames of a candidate's window.
-const FRAMES: usize = 11;
+/// Frames of a candidate's window: about as many keyframes as the estimator makes of one.
+const FRAMES: usize = 16;
 /// Landmarks drawn in each frame's view.
 const LANDMARKS_PER_FRAME: usize = 12;
 /// A landmark takes part from so many sightings on, as in the estimator.
@@ -164,23 +165,32 @@ fn information_of(situation: &Situation, exercise: &Exercise) -> Option<DMatrix<
             (time_s, navigation_at(situation, exercise, time_s), joints_at(situation, exercise, time_s))
         })
         .collect();
+    let poses: Vec<RigidTransform> = states
+        .iter()
+        .map(|(_, navigation, joints_rad)| navigation.world_from_imu * situation.chain.imu_from_camera(joints_rad))
+        .collect();
+    let points = points(situation, &poses);
+    let kept = kept_slots(&points, &poses);
     let gravity = situation.gravity_in_world;
-    let frames: Vec<SupposedFrame> = states
+    let frames: Vec<SupposedFrame> = kept
         .iter()
         .enumerate()
-        .map(|(slot, (time_s, navigation, joints_rad))| SupposedFrame {
-            time_s: *time_s,
-            navigation: *navigation,
-            joints_rad: joints_rad.clone(),
-            imu: slot.checked_sub(1).map_or_else(Vec::new, |before| {
-                let motion = |time_s: f64| navigation_at(situation, exercise, time_s);
-                samples(&motion, states[before].0, *time_s, &gravity)
-            }),
+        .map(|(place, slot)| {
+            let (time_s, navigation, joints_rad) = &states[*slot];
+            SupposedFrame {
+                time_s: *time_s,
+                navigation: *navigation,
+                joints_rad: joints_rad.clone(),
+                imu: place.checked_sub(1).map_or_else(Vec::new, |before| {
+                    let motion = |time_s: f64| navigation_at(situation, exercise, time_s);
+                    samples(&motion, states[kept[before]].0, *time_s, &gravity)
+                }),
+            }
         })
         .collect();
     let window = SupposedWindow {
         camera: situation.camera.clone(),
-        landmarks: landmarks(situation, &frames),
+        landmarks: points.iter().filter_map(|point| point.landmark(&kept, &poses)).collect(),
         frames,
         poses: PoseKnowledge::Inertial { noise: situation.imu_noise, biases_known: false },
         joints: situation.encoders,
@@ -262,18 +272,36 @@ fn samples(
         .collect()
 }
 
-/// Landmarks in every frame's view at the scene's distances, each followed while it stays in sight.
-fn landmarks(situation: &Situation, frames: &[SupposedFrame]) -> Vec<SupposedLandmark> {
+/// A point of the scene and the frames that follow it.
+struct ScenePoint {
+    position_m: Vector3<f64>,
+    /// First and last slot that see it, and all in between.
+    seen: RangeInclusive<usize>,
+}
+
+impl ScenePoint {
+    /// The landmark that it is in a window of these slots; `None` where it is seen too seldom.
+    fn landmark(&self, kept: &[usize], poses: &[RigidTransform]) -> Option<SupposedLandmark> {
+        let observers: Vec<usize> = (0..kept.len()).filter(|place| self.seen.contains(&kept[*place])).collect();
+        let (anchor, others) = observers.split_first()?;
+        let in_anchor = poses[kept[*anchor]].inverse().transform(&self.position_m);
+        (observers.len() >= LEAST_SIGHTINGS).then(|| SupposedLandmark {
+            anchor: *anchor,
+            bearing: in_anchor.normalize(),
+            inverse_distance_per_m: in_anchor.norm().recip(),
+            observers: others.to_vec(),
+        })
+    }
+}
+
+/// Points in every frame's view at the scene's distances, each followed while it stays in sight.
+fn points(situation: &Situation, poses: &[RigidTransform]) -> Vec<ScenePoint> {
     let camera = &situation.camera;
-    let poses: Vec<RigidTransform> = frames
-        .iter()
-        .map(|frame| frame.navigation.world_from_imu * situation.chain.imu_from_camera(&frame.joints_rad))
-        .collect();
     let scene_m = situation.scene_m();
     let [width, height] = camera.resolution_px.map(|size| size as f64);
-    let mut landmarks = Vec::new();
-    for index in 0..LANDMARKS_PER_FRAME * frames.len() {
-        let home = index % frames.len();
+    let mut points = Vec::new();
+    for index in 0..LANDMARKS_PER_FRAME * poses.len() {
+        let home = index % poses.len();
         // A low-discrepancy sequence over the picture and over the distances (Roberts' R3).
         let fraction = |factor: f64| (0.5 + factor * (index + 1) as f64).fract();
         let (across, down, far) = (fraction(0.819_172_513_4), fraction(0.671_043_606_7), fraction(0.549_700_477_9));
@@ -281,26 +309,39 @@ fn landmarks(situation: &Situation, frames: &[SupposedFrame]) -> Vec<SupposedLan
         let uv_px = Vector2::new(inside(across, width), inside(down, height));
         let distance_m = scene_m[((far * scene_m.len() as f64) as usize).min(scene_m.len() - 1)];
         let Some(ray) = camera.unproject(&uv_px) else { continue };
-        let point = poses[home].transform(&(ray.normalize() * distance_m));
+        let position_m = poses[home].transform(&(ray.normalize() * distance_m));
         let seen = |slot: &usize| {
-            let in_camera = poses[*slot].inverse().transform(&point);
+            let in_camera = poses[*slot].inverse().transform(&position_m);
             let seen = camera.project(&in_camera).filter(|_| in_camera.z > 0.0);
             *slot == home || seen.is_some_and(|uv_px| camera.contains(&uv_px, 0.0))
         };
         let first = (0..=home).rev().take_while(seen).last().unwrap_or(home);
-        let last = (home..frames.len()).take_while(seen).last().unwrap_or(home);
-        if last + 1 - first < LEAST_SIGHTINGS {
-            continue;
+        let last = (home..poses.len()).take_while(seen).last().unwrap_or(home);
+        if last + 1 - first >= LEAST_SIGHTINGS {
+            points.push(ScenePoint { position_m, seen: first..=last });
         }
-        let in_anchor = poses[first].inverse().transform(&point);
-        landmarks.push(SupposedLandmark {
-            anchor: first,
-            bearing: in_anchor.normalize(),
-            inverse_distance_per_m: in_anchor.norm().recip(),
-            observers: (first + 1..=last).collect(),
-        });
     }
-    landmarks
+    points
+}
+
+/// The slots whose sightings the estimator keeps: all, unless none of them is a keyframe beside the first by parallax or by
+/// what is new. A camera that hardly moves makes no keyframes, whatever its gimbal does, and what it saw is forgotten.
+fn kept_slots(points: &[ScenePoint], poses: &[RigidTransform]) -> Vec<usize> {
+    let options = EstimatorOptions::default();
+    let is_keyframe = |slot: usize| {
+        let seen = || points.iter().filter(|point| point.seen.contains(&slot));
+        let parallaxes = || {
+            let ray = |point: &ScenePoint, slot: usize| point.position_m - poses[slot].translation_m;
+            let common = seen().filter(|point| point.seen.contains(&0));
+            common.map(move |point| ray(point, 0).angle(&ray(point, slot)))
+        };
+        let common = parallaxes().count() as f64;
+        let new_share = 1.0 - common / seen().count().max(1) as f64;
+        let parallax_rad = parallaxes().sum::<f64>() / common.max(1.0);
+        parallax_rad >= options.keyframe_parallax_rad || new_share > options.keyframe_new_share
+    };
+    let last = poses.len() - 1;
+    if (1..=last).any(is_keyframe) { (0..=last).collect() } else { vec![0, last] }
 }
 
 /// What a candidate asks for.

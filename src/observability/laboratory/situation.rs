@@ -33,7 +33,7 @@ pub struct Situation {
     pub imu_noise: ImuNoise,
     /// Gravity in the world, in m/s².
     pub gravity_in_world: Vector3<f64>,
-    /// Standard deviation of a pixel.
+    /// Standard deviation of a pixel: what it tells on average.
     pub pixel_sigma_px: f64,
     /// Distances at which the scene has landmarks, in metres.
     pub distances_m: Vec<f64>,
@@ -77,7 +77,7 @@ impl Situation {
             encoders: sigma_of_joints.map_or(JointKnowledge::Unknown, JointKnowledge::Encoder),
             imu_noise: rig.imu.noise,
             gravity_in_world: gravity_in_world(rig.gravity_m_per_s2),
-            pixel_sigma_px: report.pixel_sigma_px,
+            pixel_sigma_px: report.effective_pixel_sigma_px,
             distances_m,
             chain,
         })
