@@ -16,11 +16,16 @@ fn variants() -> Vec<Variant> {
     let changed = |name, change: fn(&mut EstimatorConfig)| Variant { change, ..Variant::plain(name, "auto") };
     vec![
         Variant::plain("as it is", "auto"),
-        changed("pixel σ 0.25 px", |config| config.options.pixel_sigma_px = 0.25),
-        changed("pixel σ 1 px", |config| config.options.pixel_sigma_px = 1.0),
+        changed("pixel σ 0.18 px", |config| config.options.pixel_sigma_px = 0.18),
+        changed("pixel σ 0.35 px", |config| config.options.pixel_sigma_px = 0.35),
+        changed("pixel σ 0.5 px", |config| config.options.pixel_sigma_px = 0.5),
         changed("no robust loss", |config| config.options.loss = RobustLoss::None),
         changed("Huber at 1 σ", |config| config.options.loss = RobustLoss::Huber(1.0)),
-        changed("Huber at 3 σ", |config| config.options.loss = RobustLoss::Huber(3.0)),
+        changed("Huber at 1.5 σ, pixel σ 0.5 px", |config| {
+            config.options.loss = RobustLoss::Huber(1.5);
+            config.options.pixel_sigma_px = 0.5;
+        }),
+        changed("Cauchy at 0.7 σ", |config| config.options.loss = RobustLoss::Cauchy(0.7)),
         changed("Cauchy at 2 σ", |config| config.options.loss = RobustLoss::Cauchy(2.0)),
         changed("no first estimates", |config| {
             config.options.first_estimate_reach_rad = 0.0;
@@ -36,16 +41,13 @@ fn variants() -> Vec<Variant> {
         changed("measurements used again", |config| {
             config.options.track_continuation = TrackContinuation::Reuse;
         }),
-        changed("measurements used again, pixel σ 1 px", |config| {
-            config.options.track_continuation = TrackContinuation::Reuse;
-            config.options.pixel_sigma_px = 1.0;
-        }),
         changed("anchor's measurement forgotten", |config| {
             config.options.track_continuation = TrackContinuation::ForgetAnchor;
         }),
         changed("12 iterations", |config| config.options.iterations = 12),
         changed("inertial noise × 2", |config| config.options.imu_noise_factor = 2.0),
         Variant::plain("without encoders", "auto:encoder=off"),
+        Variant::plain("clocks estimated", "auto:timeshift=on"),
         Variant::plain("calibration held fixed", "auto:calibrate=off"),
         Variant::plain("window of 15", "auto:window=15"),
         Variant::plain("classical", "classical"),

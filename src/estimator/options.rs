@@ -65,7 +65,8 @@ pub struct EstimatorOptions {
     pub window: usize,
     /// The first window grows to this many times `window` before anything is marginalized.
     pub first_window_factor: usize,
-    /// Standard deviation of a tracked pixel, per coordinate: what solved windows leave is 0.25 px to 0.55 px.
+    /// Standard deviation of a well tracked pixel, per coordinate. Tracks differ: most are better than this, some are off by
+    /// a pixel, and what those count for is up to `loss`.
     pub pixel_sigma_px: f64,
     /// Loss on the visual residuals.
     pub loss: RobustLoss,
@@ -131,8 +132,8 @@ impl Default for EstimatorOptions {
         Self {
             window: 10,
             first_window_factor: 2,
-            pixel_sigma_px: 0.5,
-            loss: RobustLoss::Huber(1.5),
+            pixel_sigma_px: 0.25,
+            loss: RobustLoss::Cauchy(1.0),
             landmark_model: LandmarkModel::BearingAndInverseDistance,
             track_continuation: TrackContinuation::UseOnce,
             iterations: 6,

@@ -22,7 +22,7 @@ impl BothFlights {
             mount,
             seed,
             duration_s,
-            pixel_sigma_px: 0.5,
+            pixel_sigma_px: EstimatorOptions::default().pixel_sigma_px,
             outlier_share: 0.02,
             features: 80,
             ..SyntheticOptions::default()
