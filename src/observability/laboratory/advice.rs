@@ -1,7 +1,6 @@
 //! What to fly next: candidate motions from here, linearized, and what each would leave of the weakest direction.
 
 use std::fmt;
-use std::ops::RangeInclusive;
 
 use nalgebra::{DMatrix, DVector, UnitQuaternion, Vector2, Vector3};
 use rayon::prelude::*;
@@ -165,32 +164,31 @@ fn information_of(situation: &Situation, exercise: &Exercise) -> Option<DMatrix<
             (time_s, navigation_at(situation, exercise, time_s), joints_at(situation, exercise, time_s))
         })
         .collect();
-    let poses: Vec<RigidTransform> = states
-        .iter()
-        .map(|(_, navigation, joints_rad)| navigation.world_from_imu * situation.chain.imu_from_camera(joints_rad))
-        .collect();
-    let points = points(situation, &poses);
-    let kept = kept_slots(&points, &poses);
     let gravity = situation.gravity_in_world;
-    let frames: Vec<SupposedFrame> = kept
+    let frames: Vec<SupposedFrame> = states
         .iter()
         .enumerate()
-        .map(|(place, slot)| {
-            let (time_s, navigation, joints_rad) = &states[*slot];
-            SupposedFrame {
-                time_s: *time_s,
-                navigation: *navigation,
-                joints_rad: joints_rad.clone(),
-                imu: place.checked_sub(1).map_or_else(Vec::new, |before| {
-                    let motion = |time_s: f64| navigation_at(situation, exercise, time_s);
-                    samples(&motion, states[kept[before]].0, *time_s, &gravity)
-                }),
-            }
+        .map(|(slot, (time_s, navigation, joints_rad))| SupposedFrame {
+            time_s: *time_s,
+            navigation: *navigation,
+            joints_rad: joints_rad.clone(),
+            imu: slot.checked_sub(1).map_or_else(Vec::new, |before| {
+                let motion = |time_s: f64| navigation_at(situation, exercise, time_s);
+                samples(&motion, states[before].0, *time_s, &gravity)
+            }),
         })
         .collect();
+    let poses: Vec<RigidTransform> = frames
+        .iter()
+        .map(|frame| frame.navigation.world_from_imu * situation.chain.imu_from_camera(&frame.joints_rad))
+        .collect();
+    let mut landmarks = landmarks(situation, &poses);
+    if !makes_keyframes(&landmarks, &poses) {
+        landmarks.clear();
+    }
     let window = SupposedWindow {
         camera: situation.camera.clone(),
-        landmarks: points.iter().filter_map(|point| point.landmark(&kept, &poses)).collect(),
+        landmarks,
         frames,
         poses: PoseKnowledge::Inertial { noise: situation.imu_noise, biases_known: false },
         joints: situation.encoders,
@@ -272,34 +270,12 @@ fn samples(
         .collect()
 }
 
-/// A point of the scene and the frames that follow it.
-struct ScenePoint {
-    position_m: Vector3<f64>,
-    /// First and last slot that see it, and all in between.
-    seen: RangeInclusive<usize>,
-}
-
-impl ScenePoint {
-    /// The landmark that it is in a window of these slots; `None` where it is seen too seldom.
-    fn landmark(&self, kept: &[usize], poses: &[RigidTransform]) -> Option<SupposedLandmark> {
-        let observers: Vec<usize> = (0..kept.len()).filter(|place| self.seen.contains(&kept[*place])).collect();
-        let (anchor, others) = observers.split_first()?;
-        let in_anchor = poses[kept[*anchor]].inverse().transform(&self.position_m);
-        (observers.len() >= LEAST_SIGHTINGS).then(|| SupposedLandmark {
-            anchor: *anchor,
-            bearing: in_anchor.normalize(),
-            inverse_distance_per_m: in_anchor.norm().recip(),
-            observers: others.to_vec(),
-        })
-    }
-}
-
-/// Points in every frame's view at the scene's distances, each followed while it stays in sight.
-fn points(situation: &Situation, poses: &[RigidTransform]) -> Vec<ScenePoint> {
+/// Landmarks in every frame's view at the scene's distances, each followed while it stays in sight.
+fn landmarks(situation: &Situation, poses: &[RigidTransform]) -> Vec<SupposedLandmark> {
     let camera = &situation.camera;
     let scene_m = situation.scene_m();
     let [width, height] = camera.resolution_px.map(|size| size as f64);
-    let mut points = Vec::new();
+    let mut landmarks = Vec::new();
     for index in 0..LANDMARKS_PER_FRAME * poses.len() {
         let home = index % poses.len();
         // A low-discrepancy sequence over the picture and over the distances (Roberts' R3).
@@ -309,39 +285,46 @@ fn points(situation: &Situation, poses: &[RigidTransform]) -> Vec<ScenePoint> {
         let uv_px = Vector2::new(inside(across, width), inside(down, height));
         let distance_m = scene_m[((far * scene_m.len() as f64) as usize).min(scene_m.len() - 1)];
         let Some(ray) = camera.unproject(&uv_px) else { continue };
-        let position_m = poses[home].transform(&(ray.normalize() * distance_m));
+        let point = poses[home].transform(&(ray.normalize() * distance_m));
         let seen = |slot: &usize| {
-            let in_camera = poses[*slot].inverse().transform(&position_m);
+            let in_camera = poses[*slot].inverse().transform(&point);
             let seen = camera.project(&in_camera).filter(|_| in_camera.z > 0.0);
             *slot == home || seen.is_some_and(|uv_px| camera.contains(&uv_px, 0.0))
         };
         let first = (0..=home).rev().take_while(seen).last().unwrap_or(home);
         let last = (home..poses.len()).take_while(seen).last().unwrap_or(home);
-        if last + 1 - first >= LEAST_SIGHTINGS {
-            points.push(ScenePoint { position_m, seen: first..=last });
+        if last + 1 - first < LEAST_SIGHTINGS {
+            continue;
         }
+        let in_anchor = poses[first].inverse().transform(&point);
+        landmarks.push(SupposedLandmark {
+            anchor: first,
+            bearing: in_anchor.normalize(),
+            inverse_distance_per_m: in_anchor.norm().recip(),
+            observers: (first + 1..=last).collect(),
+        });
     }
-    points
+    landmarks
 }
 
-/// The slots whose sightings the estimator keeps: all, unless none of them is a keyframe beside the first by parallax or by
-/// what is new. A camera that hardly moves makes no keyframes, whatever its gimbal does, and what it saw is forgotten.
-fn kept_slots(points: &[ScenePoint], poses: &[RigidTransform]) -> Vec<usize> {
+/// Whether the estimator makes a keyframe of any frame beside the first, by parallax or by what is new. A camera that hardly
+/// moves makes none, whatever its gimbal does, and what it saw is forgotten.
+fn makes_keyframes(landmarks: &[SupposedLandmark], poses: &[RigidTransform]) -> bool {
     let options = EstimatorOptions::default();
     let is_keyframe = |slot: usize| {
-        let seen = || points.iter().filter(|point| point.seen.contains(&slot));
+        let seen = || landmarks.iter().filter(|landmark| landmark.anchor == slot || landmark.observers.contains(&slot));
         let parallaxes = || {
-            let ray = |point: &ScenePoint, slot: usize| point.position_m - poses[slot].translation_m;
-            let common = seen().filter(|point| point.seen.contains(&0));
-            common.map(move |point| ray(point, 0).angle(&ray(point, slot)))
+            seen().filter(|landmark| landmark.anchor == 0).map(|landmark| {
+                let point = poses[0].transform(&(landmark.bearing / landmark.inverse_distance_per_m));
+                (point - poses[0].translation_m).angle(&(point - poses[slot].translation_m))
+            })
         };
         let common = parallaxes().count() as f64;
         let new_share = 1.0 - common / seen().count().max(1) as f64;
         let parallax_rad = parallaxes().sum::<f64>() / common.max(1.0);
         parallax_rad >= options.keyframe_parallax_rad || new_share > options.keyframe_new_share
     };
-    let last = poses.len() - 1;
-    if (1..=last).any(is_keyframe) { (0..=last).collect() } else { vec![0, last] }
+    (1..poses.len()).any(is_keyframe)
 }
 
 /// What a candidate asks for.
