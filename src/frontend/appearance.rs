@@ -1,6 +1,9 @@
 //! What a feature's window looks like, prepared to be compared with other windows.
 
+#![expect(clippy::inline_always, reason = "what is not inlined is not compiled for the registers of its caller")]
+
 use nalgebra::{Matrix6, Vector6};
+use pulp::{Arch, NullaryFnOnce};
 
 use super::keyed::{CENTRE, LANES, Rows, SIDE, WINDOW};
 
@@ -103,7 +106,7 @@ impl Appearance {
     /// and change of shape of this one that would make it more alike: `[dx, dy]`, then the derivatives of dx and of dy by
     /// x and y; `None` when nothing in them is alike.
     pub(super) fn compare(&self, window: &Rows) -> Option<(f64, Vector6<f64>)> {
-        let moments = self.moments(window);
+        let moments = Arch::new().dispatch(Comparison { appearance: self, window });
         let area = (WINDOW * WINDOW) as f32;
         let square = moments.square - moments.sum * moments.sum / area;
         let correlation = f64::from(moments.common) / (f64::from(self.square) * f64::from(square)).sqrt();
@@ -117,12 +120,25 @@ impl Appearance {
         });
         Some((correlation, self.inverse * right / gain))
     }
+}
 
-    fn moments(&self, window: &Rows) -> Moments {
+/// The sums that comparing a window needs, compiled for every width of vector registers.
+struct Comparison<'a> {
+    appearance: &'a Appearance,
+    window: &'a Rows,
+}
+
+impl NullaryFnOnce for Comparison<'_> {
+    type Output = Moments;
+
+    #[inline(always)]
+    fn call(self) -> Moments {
+        let Self { appearance, window } = self;
         let [mut sum, mut square, mut common] = [[0.0_f32; LANES]; 3];
         let [mut x, mut x_down, mut y, mut y_down] = [[0.0_f32; LANES]; 4];
         for row in 0..WINDOW {
-            let (value, along_x, along_y) = (&self.value[row], &self.along_x[row], &self.along_y[row]);
+            let (value, along_x, along_y) =
+                (&appearance.value[row], &appearance.along_x[row], &appearance.along_y[row]);
             let grey = &window[row];
             let down = row as f32 - CENTRE as f32;
             for c in 0..LANES {

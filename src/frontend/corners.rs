@@ -2,8 +2,7 @@
 
 use nalgebra::Vector2;
 
-use super::lucas_kanade::smaller_eigenvalue;
-use super::pyramid::cut_out;
+use super::responses::{Responses, TILE};
 use crate::flight_log::GrayImage;
 
 /// Which corners are taken.
@@ -25,21 +24,8 @@ impl Default for CornerOptions {
     }
 }
 
-/// Side of the squares that are searched one by one, in pixels.
-const TILE: usize = 32;
-/// The structure tensor is the mean over a square that reaches this far about a pixel.
-const BLOCK_RADIUS: usize = 2;
-const BLOCK: usize = 2 * BLOCK_RADIUS + 1;
-/// Scharr's weights add up to 32, and the mean is over the block.
-const UNIT: f32 = 1.0 / (32.0 * 32.0 * (BLOCK * BLOCK) as f32);
-/// Eigenvalues are needed one pixel beyond the tile, to know whether a pixel of its rim is a maximum.
-const RESPONSES: usize = TILE + 2;
-const GRADIENTS: usize = RESPONSES + 2 * BLOCK_RADIUS;
-const PIXELS: usize = GRADIENTS + 2;
 /// No more corners than this come from one tile.
 const CORNERS_PER_TILE: usize = 3;
-
-type Responses = [[f32; RESPONSES]; RESPONSES];
 
 /// A possible new feature.
 #[derive(Clone, Copy, Debug)]
@@ -62,6 +48,7 @@ struct Tile {
 pub struct CornerDetector {
     candidates: Vec<Candidate>,
     in_tile: Vec<Candidate>,
+    responses: Responses,
     /// What of the image has not been searched yet.
     tiles: Vec<Tile>,
     taken: PointGrid,
@@ -146,19 +133,13 @@ impl CornerDetector {
 
     /// Adds the best corners of a tile to the candidates.
     fn search(&mut self, image: &GrayImage, tile: &Tile, options: &CornerOptions) {
-        let mut responses = [[0.0; RESPONSES]; RESPONSES];
-        structure_responses(image, tile.left, tile.top, &mut responses);
+        self.responses.compute(image, [tile.left, tile.top], options.min_eigenvalue as f32);
         self.in_tile.clear();
-        for y in 0..tile.height {
-            for x in 0..tile.width {
-                let response = responses[y + 1][x + 1];
-                if response >= options.min_eigenvalue as f32 && is_maximum(&responses, x + 1, y + 1) {
-                    let shift = peak_shift(&responses, x + 1, y + 1);
-                    let uv_px = Vector2::new((tile.left + x) as f64, (tile.top + y) as f64) + shift;
-                    if self.taken.is_free(&uv_px) {
-                        self.in_tile.push(Candidate { uv_px, response });
-                    }
-                }
+        for peak in self.responses.peaks(tile.width, tile.height) {
+            let [x, y] = peak.pixel;
+            let uv_px = Vector2::new((tile.left + x) as f64, (tile.top + y) as f64) + peak.shift;
+            if self.taken.is_free(&uv_px) {
+                self.in_tile.push(Candidate { uv_px, response: peak.response });
             }
         }
         self.in_tile.sort_by(|a, b| b.response.total_cmp(&a.response));
@@ -280,67 +261,5 @@ impl PointGrid {
                 .flatten()
                 .all(|other| (other - uv_px).norm_squared() >= self.distance_px * self.distance_px)
         })
-    }
-}
-
-fn is_maximum(responses: &Responses, x: usize, y: usize) -> bool {
-    let here = responses[y][x];
-    // Of equal neighbours the first one counts.
-    let before = [(x - 1, y - 1), (x, y - 1), (x + 1, y - 1), (x - 1, y)];
-    let after = [(x + 1, y), (x - 1, y + 1), (x, y + 1), (x + 1, y + 1)];
-    before.into_iter().all(|(i, j)| here > responses[j][i]) && after.into_iter().all(|(i, j)| here >= responses[j][i])
-}
-
-/// From a maximum to the top of the parabolas through it and its neighbours, in pixels.
-fn peak_shift(responses: &Responses, x: usize, y: usize) -> Vector2<f64> {
-    let top = |before: f32, here: f32, after: f32| {
-        let curvature = before - 2.0 * here + after;
-        if curvature < 0.0 { f64::from(0.5 * (before - after) / curvature).clamp(-0.5, 0.5) } else { 0.0 }
-    };
-    let here = responses[y][x];
-    Vector2::new(
-        top(responses[y][x - 1], here, responses[y][x + 1]),
-        top(responses[y - 1][x], here, responses[y + 1][x]),
-    )
-}
-
-/// The smaller eigenvalue of the mean structure tensor at every pixel of the tile at `(left, top)` and one around it.
-#[expect(clippy::large_stack_arrays, reason = "18 KiB that stay in the nearest cache")]
-fn structure_responses(image: &GrayImage, left: usize, top: usize, responses: &mut Responses) {
-    let reach = (BLOCK_RADIUS + 2) as i32;
-    let mut pixels = [[0.0_f32; PIXELS]; PIXELS];
-    cut_out(image, [left as i32 - reach, top as i32 - reach], &mut pixels, f32::from);
-    let mut products = [[[0.0_f32; GRADIENTS]; GRADIENTS]; 3];
-    for y in 0..GRADIENTS {
-        let (above, here, below) = (&pixels[y], &pixels[y + 1], &pixels[y + 2]);
-        for x in 0..GRADIENTS {
-            // Scharr's derivative.
-            let along = 3.0 * (above[x + 2] - above[x] + below[x + 2] - below[x]) + 10.0 * (here[x + 2] - here[x]);
-            let down = 3.0 * (below[x] - above[x] + below[x + 2] - above[x + 2]) + 10.0 * (below[x + 1] - above[x + 1]);
-            products[0][y][x] = along * along;
-            products[1][y][x] = along * down;
-            products[2][y][x] = down * down;
-        }
-    }
-    let mut sums = [[[0.0_f32; RESPONSES]; RESPONSES]; 3];
-    for (product, sums) in products.iter().zip(&mut sums) {
-        for y in 0..RESPONSES {
-            let mut column_sums = [0.0_f32; GRADIENTS];
-            for line in &product[y..y + BLOCK] {
-                for x in 0..GRADIENTS {
-                    column_sums[x] += line[x];
-                }
-            }
-            for offset in 0..BLOCK {
-                for x in 0..RESPONSES {
-                    sums[y][x] += column_sums[x + offset] * UNIT;
-                }
-            }
-        }
-    }
-    for y in 0..RESPONSES {
-        for x in 0..RESPONSES {
-            responses[y][x] = smaller_eigenvalue([sums[0][y][x], sums[1][y][x], sums[2][y][x]]);
-        }
     }
 }

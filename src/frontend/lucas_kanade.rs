@@ -1,8 +1,11 @@
 //! Following points from one image to the next: pyramidal Lucas–Kanade.
 
+#![expect(clippy::inline_always, reason = "what is not inlined is not compiled for the registers of its caller")]
+
 use std::ops::Range;
 
 use nalgebra::Vector2;
+use pulp::{Arch, NullaryFnOnce};
 
 use super::pyramid::{Pyramid, cut_out};
 use crate::flight_log::GrayImage;
@@ -97,17 +100,20 @@ impl Buffers {
 }
 
 /// A symmetric 2 × 2 matrix `[xx, xy, yy]` has this smaller eigenvalue.
+#[inline(always)]
 pub(super) fn smaller_eigenvalue([xx, xy, yy]: [f32; 3]) -> f32 {
     0.5 * (xx + yy) - length([0.5 * (xx - yy), xy])
 }
 
 /// Length of a vector.
 #[expect(clippy::imprecise_flops, reason = "`hypot` is a call into the C library, this a vector instruction")]
+#[inline(always)]
 fn length([x, y]: [f32; 2]) -> f32 {
     (x * x + y * y).sqrt()
 }
 
 /// Weights of the four pixels about a point that lies `t` after the second one, by Keys' cubic convolution.
+#[inline(always)]
 fn cubic_weights(t: f32) -> [f32; 4] {
     [
         ((2.0 - t) * t - 1.0) * t * 0.5,
@@ -146,7 +152,26 @@ impl Buffers {
     /// Makes the template of the window of `image` about `at`, without what lies outside it or would lie outside when moved
     /// to `guess`. Returns whether there is enough of it to be found again.
     fn fill(&mut self, image: &GrayImage, at: [f32; 2], guess: [f32; 2], options: &LucasKanadeOptions) -> bool {
-        let Self { template, patch, gradient, .. } = self;
+        Arch::new().dispatch(Filling { buffers: self, image, at, guess, options })
+    }
+}
+
+/// [`Buffers::fill`], compiled for every width of vector registers.
+struct Filling<'a> {
+    buffers: &'a mut Buffers,
+    image: &'a GrayImage,
+    at: [f32; 2],
+    guess: [f32; 2],
+    options: &'a LucasKanadeOptions,
+}
+
+impl NullaryFnOnce for Filling<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn call(self) -> bool {
+        let Self { buffers, image, at, guess, options } = self;
+        let Buffers { template, patch, gradient, .. } = buffers;
         let columns = [visible(at[0], image.width, 1.0), visible(guess[0], image.width, 0.0)];
         let rows = [visible(at[1], image.height, 1.0), visible(guess[1], image.height, 0.0)];
         let (first_column, last_column) = (columns[0].0.max(columns[1].0), columns[0].1.min(columns[1].1));
@@ -190,6 +215,7 @@ type Gradient = [[[f32; LANES]; 2]; WINDOW];
 /// Puts the gradient of some rows of a window, times `mask` along each, into `gradient`, the others being zero.
 ///
 /// Returns the sums over the window of `T, T², gx, gy, gx·T, gy·T`.
+#[inline(always)]
 fn differentiate(patch: &Patch, rows: Range<usize>, mask: &[f32; LANES], gradient: &mut Gradient) -> [f32; 6] {
     for row in (0..rows.start).chain(rows.end..WINDOW) {
         gradient[row] = [[0.0; LANES]; 2];
@@ -220,6 +246,7 @@ fn differentiate(patch: &Patch, rows: Range<usize>, mask: &[f32; LANES], gradien
 }
 
 /// Takes `offsets + slopes·T` off the gradient; returns its sums of products `xx, xy, yy` and its largest part.
+#[inline(always)]
 fn free_of_brightness(
     patch: &Patch,
     rows: Range<usize>,
@@ -283,6 +310,7 @@ fn dot(weights: &Weights, pixels: &Weights) -> i32 {
 
 /// The nearest integer of a value far below 2²²: adding 1.5·2²³ leaves it in the low bits, where vector units reach it
 /// faster than through a checked conversion.
+#[inline(always)]
 fn rounded(value: f32) -> i16 {
     (value + 12_582_912.0).to_bits() as i16
 }
@@ -294,6 +322,7 @@ fn floor(value: f32) -> i32 {
 }
 
 /// The pixels about `at` by cubic convolution, one more on every side than the window.
+#[inline(always)]
 fn interpolate(image: &GrayImage, at: [f32; 2], patch: &mut Patch) {
     let corner = at.map(floor);
     let reach = (WINDOW / 2 + 2) as i32;

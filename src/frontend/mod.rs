@@ -18,6 +18,7 @@ pub mod outliers;
 mod prediction;
 mod pyramid;
 mod resample;
+mod responses;
 #[cfg(test)]
 mod tests;
 mod tracks;
