@@ -73,7 +73,7 @@ pub(crate) fn pose_sample(report: &StepReport) -> Option<PoseSample> {
     let linearization = report.linearization.as_ref()?;
     let poses = || linearization.columns.iter().filter(|block| block.group == ColumnGroup::Pose);
     let (first, last) = (poses().next()?.start, poses().next_back()?.start);
-    let (oldest, newest) = (report.window.first()?, report.window.last()?);
+    let [oldest, .., newest] = report.window.as_slice() else { return None };
     let relative = oldest.world_from_imu.inverse() * newest.world_from_imu;
     // From the perturbation rule: rotation on the right, translation added.
     let mut change: SMatrix<f64, 6, 12> = SMatrix::zeros();

@@ -8,7 +8,7 @@ use super::instants::Instant;
 use super::material::Material;
 use super::run_engine::RunEngine;
 use super::tracker::TrackedSensorFrame;
-use crate::estimator::Phase;
+use crate::estimator::{ColumnGroup, Phase};
 use crate::flight_log::{GrayImage, JointAngles, SensorFrame};
 use crate::simulation::{SyntheticFlight, SyntheticFrame, SyntheticOptions, synthetic_tracks};
 
@@ -36,10 +36,15 @@ pub(super) fn tracked(frame: &SyntheticFrame, encoder_sigma_rad: f64) -> Tracked
 }
 
 pub(super) fn recorded(flight: &SyntheticFlight, spec: &str) -> RunRecord {
+    recorded_with(flight, spec, None)
+}
+
+/// Keeps the linearization of one report in so many frames.
+fn recorded_with(flight: &SyntheticFlight, spec: &str, keep_linearization_every: Option<usize>) -> RunRecord {
     let spec: super::RunSpec = spec.parse().unwrap();
     let config = estimator_config(&flight.given_rig, &spec).unwrap();
     let sigma_rad = config.encoder_sigma_rad.unwrap();
-    let mut engine = RunEngine::new(config, None);
+    let mut engine = RunEngine::new(config, keep_linearization_every);
     let mut run = RunRecord::new(spec, "cam0".to_owned());
     for frame in &flight.frames {
         run.push(engine.step(&Material::of(&Instant::of_one(Arc::new(tracked(frame, sigma_rad))))));
@@ -63,4 +68,21 @@ fn a_recorded_frame_stays_small() {
     // The running sum says the same.
     let summed: usize = run.steps.iter().map(|step| step.own_bytes() + step.tracks_bytes()).sum();
     assert_eq!(run.memory.own + run.memory.tracks, summed);
+}
+
+/// A covariance is that of the frames of the window: whoever asked for it finds both in an outline.
+#[test]
+fn an_outline_with_a_linearization_keeps_the_frames_of_its_columns() {
+    let flight = synthetic_tracks(&SyntheticOptions { duration_s: 6.0, ..SyntheticOptions::default() });
+    let run = recorded_with(&flight, "auto", Some(10));
+    let outlines: Vec<_> = run.steps.iter().enumerate().map(|(number, step)| step.outline(number)).collect();
+    let tracking = outlines.iter().filter(|outline| outline.report.phase == Phase::Tracking);
+    let (kept, plain): (Vec<_>, Vec<_>) = tracking.partition(|outline| outline.report.linearization.is_some());
+    assert!(kept.len() >= 5 && plain.len() >= 40, "{} with, {} without", kept.len(), plain.len());
+    for outline in &kept {
+        let columns = &outline.report.linearization.as_ref().unwrap().columns;
+        let poses = columns.iter().filter(|block| block.group == ColumnGroup::Pose).count();
+        assert!(poses > 1 && poses == outline.report.window.len(), "{poses} poses");
+    }
+    assert!(plain.iter().all(|outline| outline.report.window.len() == 1));
 }

@@ -10,12 +10,15 @@ const SPARED: usize = 64;
 
 impl StepRecord {
     /// The step without what only the pictures of this very instant need: features, older frames of the window, and
-    /// points of the map but in every fourth step.
+    /// points of the map but in every fourth step. A linearization that was asked for keeps its window, whose frames its
+    /// columns belong to.
     ///
     /// Everything that is plotted over time or written into tables stays; events, χ², iterations, calibration, ranks.
     pub(super) fn outline(&self, number: usize) -> Self {
         let report = &self.report;
         let keeps_landmarks = number.is_multiple_of(LANDMARKS_EVERY);
+        let keeps_window = report.linearization.is_some();
+        let first_frame = if keeps_window { 0 } else { report.window.len().saturating_sub(1) };
         Self {
             report: StepReport {
                 frame_index: report.frame_index,
@@ -25,7 +28,7 @@ impl StepRecord {
                 pixel_sigma_px: report.pixel_sigma_px,
                 effective_pixel_sigma_px: report.effective_pixel_sigma_px,
                 events: report.events.clone(),
-                window: report.window.last().cloned().into_iter().collect(),
+                window: report.window[first_frame..].to_vec(),
                 calibration: report.calibration.clone(),
                 features: Vec::new(),
                 counts: report.counts,
