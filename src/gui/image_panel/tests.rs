@@ -31,13 +31,18 @@ fn the_caption_tells_the_step_at_or_before_the_cursor() {
     let step = &recording.runs[0].steps[70];
     let statistics = step.tracks.statistics;
     let rejected = statistics.rejected + step.report.features.iter().filter(|feature| feature.rejected).count();
+    let observations = step.report.features.iter().flat_map(|feature| feature.observations.iter());
+    let mut lengths: Vec<f64> = observations.filter_map(|seen| Some(seen.residual_after_px?.norm())).collect();
+    lengths.sort_by(f64::total_cmp);
     let expected = format!(
-        "frame 70 · 3.500 s · {} tracked, {} new, {} lost, {rejected} rejected · RMS {:.2} px before, {:.2} px after the solve",
+        "frame 70 · 3.500 s · {} tracked, {} new, {} lost, {rejected} rejected · RMS {:.2} px before, {:.2} px after the \
+         solve, median {:.2} px",
         statistics.tracked,
         statistics.detected,
         statistics.lost,
         step.report.reprojection_rms_before_px,
         step.report.reprojection_rms_after_px,
+        lengths[lengths.len() / 2],
     );
     assert_eq!(model.caption(), expected);
     let waiting = ImageModel::at(&recording.runs[0], (FIRST_TRACKED_FRAME as i64 - 1) * FRAME_PERIOD_NS).unwrap();
