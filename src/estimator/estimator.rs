@@ -14,7 +14,7 @@ use super::startup::WaitingFrame;
 use super::window::{FeatureMap, Frame};
 use super::{Event, EventKind, Phase, StepInput, StepReport, gravity_in_world};
 use crate::flight_log::rig::ImuNoise;
-use crate::geometry::RigidTransform;
+use crate::geometry::{RigidTransform, seconds_from_ns};
 use crate::gimbal::{ClassicalChain, Parameterization};
 
 /// A sliding-window visual-inertial estimator for a camera on a gimbal, or on a rigid mount, and for rigid cameras beside it.
@@ -41,8 +41,8 @@ pub struct Estimator {
     pub(super) calibration_sigmas: Vec<f64>,
     /// Watches for rest while the window runs.
     pub(super) rest_watch: RestWatch,
-    /// How many frames in a row saw too few landmarks.
-    pub(super) blind_frames: usize,
+    /// Since when too few landmarks have been in view.
+    pub(super) blind_since_ns: Option<i64>,
     /// Where a restarted window should begin: the last pose before the failure.
     pub(super) resume_at: Option<RigidTransform>,
 }
@@ -95,7 +95,7 @@ impl Estimator {
             start: None,
             calibration_sigmas: Vec::new(),
             rest_watch: RestWatch::default(),
-            blind_frames: 0,
+            blind_since_ns: None,
             resume_at: None,
             config,
         }
@@ -152,6 +152,7 @@ impl Estimator {
         events.extend(self.watch_for_rest(input));
         let predicted = self.newest_state().navigation;
         let mut solved = self.solve_window(self.config.options.iterations);
+        events.extend(self.watch_landmarks());
         if let Some(failure) = self.failure(&predicted) {
             events.push(failure);
             return self.restart(input, events);
@@ -210,9 +211,9 @@ impl Estimator {
         })
     }
 
-    /// What says that the window has failed, against the newest state's prediction.
-    fn failure(&mut self, predicted: &super::NavigationState) -> Option<Event> {
-        let options = &self.config.options;
+    /// Says when the landmarks in view become too few.
+    fn watch_landmarks(&mut self) -> Option<Event> {
+        let least = self.config.options.min_landmarks;
         let slot = self.frames.len() - 1;
         let seen = self
             .features
@@ -220,9 +221,32 @@ impl Estimator {
             .flat_map(FeatureMap::values)
             .filter(|feature| feature.landmark.is_some() && feature.observation(slot).is_some())
             .count();
+        let newest = &self.frames[slot];
         // A vehicle at rest needs no landmarks to know where it is.
-        let blind = seen < options.min_landmarks && self.frames[slot].rest.is_none();
-        self.blind_frames = if blind { self.blind_frames + 1 } else { 0 };
+        if seen >= least || newest.rest.is_some() {
+            self.blind_since_ns = None;
+            return None;
+        }
+        if self.blind_since_ns.is_some() {
+            return None;
+        }
+        self.blind_since_ns = Some(newest.stamp_ns);
+        Some(Event {
+            kind: EventKind::MeasurementMissing,
+            message: format!(
+                "{seen} landmarks in view, at least {least} are needed: until there are more, the inertial sensor alone \
+                 tells the motion"
+            ),
+            value: Some(seen as f64),
+            threshold: Some(least as f64),
+        })
+    }
+
+    /// What says that the window has failed, against the newest state's prediction.
+    fn failure(&self, predicted: &super::NavigationState) -> Option<Event> {
+        let options = &self.config.options;
+        let newest_ns = self.frames.last()?.stamp_ns;
+        let blind_s = self.blind_since_ns.map_or(0.0, |since_ns| seconds_from_ns(newest_ns - since_ns));
         let state = self.newest_state().navigation;
         let checks = [
             (
@@ -241,11 +265,7 @@ impl Estimator {
                 (state.world_from_imu.translation_m - predicted.world_from_imu.translation_m).norm(),
                 options.max_position_correction_m,
             ),
-            (
-                "too many frames in a row saw too few landmarks",
-                self.blind_frames as f64,
-                options.max_blind_frames as f64,
-            ),
+            ("too few landmarks have been in view for too long, s", blind_s, options.max_blind_s),
         ];
         checks.into_iter().find(|(_, value, limit)| !value.is_finite() || value > limit).map(
             |(reason, value, limit)| Event {

@@ -117,8 +117,9 @@ pub struct EstimatorOptions {
     pub max_speed: f64,
     /// Failure: correction of the newest position against its prediction, in metres.
     pub max_position_correction_m: f64,
-    /// Failure: so many frames in a row with fewer than `min_landmarks` landmarks in view.
-    pub max_blind_frames: usize,
+    /// Failure: fewer than `min_landmarks` landmarks in view for so long, in seconds. Until then the inertial sensor carries
+    /// the window on, which costs less than to begin anew.
+    pub max_blind_s: f64,
     /// Fewer landmarks in view than this count as blind.
     pub min_landmarks: usize,
     /// Fill [`super::StepReport::linearization`].
@@ -158,7 +159,7 @@ impl Default for EstimatorOptions {
             max_gyroscope_bias: 0.5,
             max_speed: 50.0,
             max_position_correction_m: 5.0,
-            max_blind_frames: 20,
+            max_blind_s: 5.0,
             min_landmarks: 6,
             keep_linearization: false,
             keep_factor_rows: false,
