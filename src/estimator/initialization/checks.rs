@@ -32,6 +32,8 @@ pub(super) enum Shown {
 
 impl Shown {
     fn text(self, value: f64) -> String {
+        // An empty sum is -0.
+        let value = value + 0.0;
         match self {
             Self::Plain(unit) if value.fract() == 0.0 => format!("{value:.0}{unit}"),
             Self::Plain(unit) => format!("{value:.3}{unit}"),
