@@ -13,7 +13,7 @@ use crate::geometry::{seconds_from_ns, wrap_angle};
 use crate::gimbal::ClassicalChain;
 use crate::observability::{ParameterRate, information_rate};
 use crate::session::accuracy::{Alignment, path_length_m};
-use crate::session::{Recording, RunRecord, TrajectoryAccuracy};
+use crate::session::{Recording, RunRecord, RunWarning, TrajectoryAccuracy};
 
 /// Frames of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -445,18 +445,9 @@ fn warnings(recording: &Recording, run: &RunRecord) -> Vec<String> {
         .iter()
         .map(|warning| format!("{:.3} s: {}", seconds_from_ns(warning.stamp_ns), warning.message))
         .collect();
-    let mut seen: Vec<(&String, f64, usize)> = Vec::new();
-    for step in &run.steps {
-        for warning in &step.report.warnings {
-            match seen.iter_mut().find(|(known, _, _)| *known == warning) {
-                Some((_, _, count)) => *count += 1,
-                None => seen.push((warning, seconds_from_ns(step.report.stamp_ns), 1)),
-            }
-        }
-    }
-    for (warning, first_s, count) in seen {
-        let times = if count > 1 { format!(" ({count} times)") } else { String::new() };
-        texts.push(format!("{first_s:.3} s: {warning}{times}"));
+    for RunWarning { message, first_ns, steps } in &run.warnings {
+        let times = if *steps > 1 { format!(" ({steps} times)") } else { String::new() };
+        texts.push(format!("{:.3} s: {message}{times}", seconds_from_ns(*first_ns)));
     }
     texts.extend(run.error.iter().cloned());
     texts

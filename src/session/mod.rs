@@ -26,6 +26,9 @@ mod recording;
 mod retaking;
 mod run_accuracy;
 mod run_engine;
+mod run_warnings;
+#[cfg(test)]
+mod run_warnings_tests;
 mod saved;
 mod solver_trace;
 mod spec;
@@ -46,6 +49,7 @@ pub use plan::{DEFAULT_MEMORY_BUDGET_BYTES, MAX_RUNS, SessionError, SessionPlan,
 pub use playback::Session;
 pub use recording::{ForkOrigin, Recording, RunMemory, RunRecord, StepRecord};
 pub use run_accuracy::{ChainDistance, RELATIVE_LENGTHS_M, RelativeAccuracy, TrajectoryAccuracy};
+pub use run_warnings::RunWarning;
 pub use saved::{SavedBreakpoint, SavedFork, SavedLog, SavedSession, SavedSessionError};
 pub use solver_trace::{SolverPosition, SolverTrace};
 pub use spec::{ParameterizationChoice, RunSpec, RunSpecError};

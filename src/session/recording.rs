@@ -12,6 +12,7 @@ use super::material::tracks_bytes;
 use super::outline::Thinning;
 use super::plan::SessionPlan;
 use super::retaking::{Retaken, Wish};
+use super::run_warnings::{RunWarning, add_warnings, warnings_of};
 use super::solver_trace::{SolverPosition, SolverTrace};
 use crate::estimator::{CalibrationEstimate, InformationGain, StepReport, allocated_bytes, rigid_columns};
 use crate::flight_log::{LogWarning, Rig};
@@ -89,6 +90,8 @@ pub struct RunRecord {
     pub alignment: Option<RigidTransform>,
     /// Sums over the frames with truth so far, from which `alignment` follows.
     pub alignment_sums: AlignmentSums,
+    /// What its steps warned of.
+    pub warnings: Vec<RunWarning>,
     /// How much memory its steps take.
     pub memory: RunMemory,
     /// How its steps came to be, so that any of them can be taken again; `None` for a run that was not computed here.
@@ -115,6 +118,7 @@ impl RunRecord {
             error: None,
             alignment: None,
             alignment_sums: AlignmentSums::default(),
+            warnings: Vec::new(),
             memory: RunMemory::default(),
             history: None,
             retaken: BTreeMap::new(),
@@ -133,6 +137,7 @@ impl RunRecord {
         fork.steps = parent.steps[..step].to_vec();
         // The steps are the parent's, who counts them; tracks are counted once for all runs.
         fork.memory.tracks = fork.steps.iter().map(|step| step.tracks_bytes()).sum();
+        fork.warnings = warnings_of(&fork.steps);
         fork.align();
         fork
     }
@@ -145,11 +150,12 @@ impl RunRecord {
         }
         self.memory.own += record.own_bytes();
         self.memory.tracks += record.tracks_bytes();
+        add_warnings(&mut self.warnings, &record.report);
         self.steps.push(Arc::new(record));
     }
 
     /// Takes back the steps after a time; there may be some that another run's speed let it take.
-    fn end_at(&mut self, stamp_ns: i64) {
+    pub(super) fn end_at(&mut self, stamp_ns: i64) {
         let count = self.steps.partition_point(|step| step.report.stamp_ns <= stamp_ns);
         if count == self.steps.len() {
             return;
@@ -159,6 +165,7 @@ impl RunRecord {
         self.memory.own -= back(StepRecord::own_bytes);
         self.memory.tracks -= back(StepRecord::tracks_bytes);
         self.finished = true;
+        self.warnings = warnings_of(&self.steps);
         self.align();
     }
 

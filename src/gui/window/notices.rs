@@ -5,8 +5,8 @@ use egui::{Align2, Area, Button, Frame, Id, Margin, Order, Panel, RichText, Scro
 use super::dialog_frame;
 use crate::gui::PanelContext;
 use crate::gui::theme::Theme;
-use crate::gui::units::seconds;
-use crate::session::Command;
+use crate::gui::units::{counted, seconds};
+use crate::session::{Command, RunWarning};
 
 /// How bad it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -90,23 +90,31 @@ impl Notices {
         }
     }
 
-    /// Draws the list of everything that is wrong with the log; a click on a time goes there.
+    /// Draws the list of everything that is wrong with the log and its runs; a click on a time goes there.
     pub(crate) fn list_ui(&mut self, ui: &Ui, ctx: &mut PanelContext<'_>) {
         let theme = *ctx.theme;
         let mut open = self.list_open;
         let window = egui::Window::new("Warnings").open(&mut open).collapsible(false).default_size(vec2(520.0, 260.0));
         window.anchor(Align2::RIGHT_BOTTOM, vec2(-16.0, -40.0)).show(ui.ctx(), |ui| {
-            if ctx.recording.warnings.is_empty() {
-                ui.label(RichText::new("Nothing is wrong with the log so far").color(theme.text_weak));
+            let of_log = ctx.recording.warnings.iter().map(|warning| (warning.stamp_ns, warning.message.clone()));
+            let of_runs = ctx.recording.runs.iter().flat_map(|run| {
+                run.warnings.iter().map(|warning| {
+                    let RunWarning { message, first_ns, steps } = warning;
+                    (*first_ns, format!("{}, {}: {message}", run.spec.label, counted(*steps, "step")))
+                })
+            });
+            let warnings: Vec<(i64, String)> = of_log.chain(of_runs).collect();
+            if warnings.is_empty() {
+                ui.label(RichText::new("Nothing is wrong so far").color(theme.text_weak));
             }
             ScrollArea::vertical().auto_shrink([false, true]).show(ui, |ui| {
-                for warning in &ctx.recording.warnings {
+                for (stamp_ns, message) in warnings {
                     ui.horizontal_top(|ui| {
-                        let time = Button::new(RichText::new(format!("{} s", seconds(warning.stamp_ns))).monospace());
+                        let time = Button::new(RichText::new(format!("{} s", seconds(stamp_ns))).monospace());
                         if ui.add(time).on_hover_text("Go there").clicked() {
-                            ctx.commands.push(Command::Seek { stamp_ns: warning.stamp_ns });
+                            ctx.commands.push(Command::Seek { stamp_ns });
                         }
-                        ui.add(egui::Label::new(RichText::new(&warning.message).color(theme.text)).wrap());
+                        ui.add(egui::Label::new(RichText::new(message).color(theme.text)).wrap());
                     });
                 }
             });

@@ -46,14 +46,15 @@ pub(super) fn ui(ui: &mut Ui, state: &mut WindowState, ctx: &PanelContext<'_>) {
             pair(ui, "stamp", text, "Absolute header stamp of the frame, in seconds since the epoch");
         }
         ui.with_layout(UiLayout::right_to_left(Align::Center), |ui| {
-            let count = ctx.recording.warnings.len();
+            let of_runs: usize = ctx.recording.runs.iter().map(|run| run.warnings.len()).sum();
+            let count = ctx.recording.warnings.len() + of_runs;
             let (text, color) = if count == 0 {
                 ("No warnings".to_owned(), theme.text_weak)
             } else {
                 (format!("⚠ {}", counted(count, "warning")), theme.warn)
             };
             let button = Button::new(RichText::new(text).small().color(color)).frame(count > 0);
-            if ui.add(button).on_hover_text("What is wrong with the log (W)").clicked() {
+            if ui.add(button).on_hover_text("What is wrong with the log and its runs (W)").clicked() {
                 state.notices.list_open = !state.notices.list_open;
             }
             if let Some(progress) = &state.progress {

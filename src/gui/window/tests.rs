@@ -11,7 +11,7 @@ use crate::gui::sample_recording::{sample_images, sample_recording_of};
 use crate::gui::theme::{Theme, ThemeName};
 use crate::gui::{PanelContext, Playback, Selection};
 use crate::session::breakpoints::Breakpoints;
-use crate::session::{Command, ForkChanges, ForkOrigin, PlaybackSpeed, Recording};
+use crate::session::{Command, ForkChanges, ForkOrigin, PlaybackSpeed, Recording, RunWarning};
 
 pub(super) const SECOND_NS: i64 = 1_000_000_000;
 
@@ -409,6 +409,13 @@ fn warnings_are_listed_and_lead_to_their_time() {
     assert!(harness.query_by_label_contains("no IMU sample for 0.034 s").is_some());
     let pushed = commands_of(&mut harness, |harness| harness.get_by_label("6.000 s").click());
     assert_eq!(pushed, [Command::Seek { stamp_ns: 6 * SECOND_NS }]);
+    let warning = RunWarning { message: "joint angles contradict".to_owned(), first_ns: 4 * SECOND_NS, steps: 80 };
+    harness.state_mut().recording.runs[1].warnings.push(warning);
+    harness.run_steps(2);
+    assert!(harness.query_by_label("⚠ 2 warnings").is_some());
+    assert!(harness.query_by_label("classical, 80 steps: joint angles contradict").is_some());
+    let pushed = commands_of(&mut harness, |harness| harness.get_by_label("4.000 s").click());
+    assert_eq!(pushed, [Command::Seek { stamp_ns: 4 * SECOND_NS }]);
 }
 
 #[test]

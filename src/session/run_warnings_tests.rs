@@ -1,0 +1,29 @@
+//! The warnings of a run, over all its steps.
+
+use super::RunRecord;
+use super::forks::ForkChanges;
+use super::memory_tests::recorded;
+use super::run_warnings::warnings_of;
+use crate::simulation::{SyntheticOptions, synthetic_tracks};
+
+/// A camera's clock that is 15 ms off is told from some step on, and only in what holds that step.
+#[test]
+fn a_warning_is_kept_once_with_its_first_time_and_its_count() {
+    let flight = synthetic_tracks(&SyntheticOptions { clock_offsets_s: [0.015, 0.0], ..SyntheticOptions::default() });
+    let mut run = recorded(&flight, "auto");
+    let warns = |step: &&std::sync::Arc<super::StepRecord>, message: &String| step.report.warnings.contains(message);
+    assert!(!run.warnings.is_empty());
+    for warning in &run.warnings {
+        let steps: Vec<_> = run.steps.iter().filter(|step| warns(step, &warning.message)).collect();
+        assert_eq!((warning.first_ns, warning.steps), (steps[0].report.stamp_ns, steps.len()), "{}", warning.message);
+    }
+    let first_ns = run.warnings.iter().map(|warning| warning.first_ns).min().unwrap();
+    let first = run.steps.iter().position(|step| step.report.stamp_ns == first_ns).unwrap();
+    let fork = |step| RunRecord::fork(&run, run.spec.clone(), step, ForkChanges::default());
+    assert!(fork(first).warnings.is_empty() && !fork(first + 1).warnings.is_empty());
+    run.end_at(first_ns);
+    assert_eq!(run.warnings, warnings_of(&run.steps));
+    assert!(run.warnings.iter().all(|warning| warning.first_ns == first_ns && warning.steps == 1));
+    run.end_at(first_ns - 1);
+    assert!(run.warnings.is_empty());
+}
