@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 use super::calibration::{Calibration, FreeClocks, GivenSigmas};
 use super::calibrations::{Calibrations, MAIN};
 use super::config::{EstimatorConfig, rigid_mount};
+use super::contradictions::Contradictions;
 use super::initialization::StandstillEstimate;
 use super::prior::{Prior, StartPrior};
 use super::standstill::RestWatch;
@@ -41,6 +42,8 @@ pub struct Estimator {
     pub(super) calibration_sigmas: Vec<f64>,
     /// Watches for rest while the window runs.
     pub(super) rest_watch: RestWatch,
+    /// Watches whether residuals stay too large.
+    contradictions: Contradictions,
     /// Since when too few landmarks have been in view.
     pub(super) blind_since_ns: Option<i64>,
     /// Where a restarted window should begin: the last pose before the failure.
@@ -95,6 +98,7 @@ impl Estimator {
             start: None,
             calibration_sigmas: Vec::new(),
             rest_watch: RestWatch::default(),
+            contradictions: Contradictions::default(),
             blind_since_ns: None,
             resume_at: None,
             config,
@@ -172,6 +176,7 @@ impl Estimator {
         report.times.optimize_ms = optimized_ms - begin_ms;
         report.times.marginalize_ms = (self.config.clock_ms)() - marginalizing_ms;
         report.events.extend(events);
+        report.warnings = self.contradictions.watch(report.stamp_ns, &report.residuals, &self.config);
         report
     }
 

@@ -6,6 +6,7 @@ mod calibration;
 mod calibrations;
 mod camera_pose;
 mod config;
+mod contradictions;
 mod dense;
 #[expect(clippy::module_inception, reason = "the type that the folder is about")]
 mod estimator;

@@ -42,7 +42,9 @@ fn the_offset_of_a_rigid_camera_is_found() {
         let flight = flight(SyntheticMount::Static, seed, [offset_s, 0.0]);
         let (ignored_m, report) = flown(&flight, false);
         assert!(report.calibration.names.iter().all(|name| !name.contains("timeshift")));
+        assert_eq!(report.warnings.is_empty(), offset_s == 0.0, "seed {seed}: {:?}", report.warnings);
         let (error_m, report) = flown(&flight, true);
+        assert!(report.warnings.is_empty(), "seed {seed}: {:?}", report.warnings);
         let (found_s, sigma_s) = clock(&report, "timeshift");
         assert!((found_s - offset_s).abs() < 0.001, "seed {seed}: {found_s} of {offset_s} s");
         assert!(sigma_s > 0.0 && sigma_s < 0.001, "seed {seed}: {sigma_s} s");
@@ -57,8 +59,10 @@ fn the_offset_of_a_rigid_camera_is_found() {
 fn offsets_of_a_gimbals_camera_and_of_its_encoders_are_told_apart() {
     for (seed, offsets_s) in [(1, [0.01, -0.02]), (2, [-0.01, 0.01])] {
         let flight = flight(SyntheticMount::Gimbal, seed, offsets_s);
-        let (ignored_m, _) = flown(&flight, false);
+        let (ignored_m, report) = flown(&flight, false);
+        assert!(!report.warnings.is_empty(), "seed {seed}: {:?}", report.residuals);
         let (error_m, report) = flown(&flight, true);
+        assert!(report.warnings.is_empty(), "seed {seed}: {:?}", report.warnings);
         for (name, offset_s) in ["timeshift", "encoder.timeshift"].into_iter().zip(offsets_s) {
             let (found_s, sigma_s) = clock(&report, name);
             assert!((found_s - offset_s).abs() < 4.0 * sigma_s, "seed {seed}: {name} {found_s} ± {sigma_s} s");

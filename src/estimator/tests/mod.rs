@@ -2,6 +2,7 @@
 
 mod clocks;
 mod cluster;
+mod contradictions;
 mod fixture;
 mod flight;
 mod gain;

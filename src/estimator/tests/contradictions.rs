@@ -1,0 +1,62 @@
+//! When residuals that stay too large are told, and when no longer.
+
+use super::fixture;
+use crate::estimator::contradictions::Contradictions;
+use crate::estimator::{EstimatorConfig, EstimatorOptions, ResidualSummary};
+use crate::gimbal::Parameterization;
+use crate::simulation::{SyntheticOptions, synthetic_tracks};
+
+fn encoder(mean_square: f64) -> [ResidualSummary; 1] {
+    [ResidualSummary { factor: "encoder", count: 33, chi2_before: 900.0, chi2_after: 33.0 * mean_square }]
+}
+
+fn config() -> EstimatorConfig {
+    let flight = synthetic_tracks(&SyntheticOptions { duration_s: 1.0, ..SyntheticOptions::default() });
+    fixture::config(&flight.given_rig, Parameterization::Minimal, EstimatorOptions::default())
+}
+
+/// Steps, at 20 Hz, in which something is told.
+fn told(mean_squares: impl IntoIterator<Item = f64>) -> Vec<usize> {
+    let config = config();
+    let mut watch = Contradictions::default();
+    let mut told = Vec::new();
+    for (step, value) in mean_squares.into_iter().enumerate() {
+        let warnings = watch.watch(step as i64 * 50_000_000, &encoder(value), &config);
+        if let [warning] = warnings.as_slice() {
+            assert!(warning.contains("joint angles") && warning.ends_with("try timeshift=on"), "{warning}");
+            told.push(step);
+        }
+    }
+    told
+}
+
+#[test]
+fn residuals_as_large_as_their_noise_say_nothing() {
+    assert_eq!(told((0..400).map(|step| if step % 2 == 0 { 0.6 } else { 1.8 })), [0_usize; 0]);
+}
+
+#[test]
+fn a_jolt_says_nothing() {
+    assert_eq!(told((0..400).map(|step| if (200..206).contains(&step) { 6.0 } else { 0.9 })), [0_usize; 0]);
+}
+
+#[test]
+fn what_stays_too_large_is_told_after_four_seconds_until_it_is_over() {
+    let steps = told((0..400).map(|step| if step < 200 { 3.0 } else { 0.9 }));
+    assert_eq!(steps.first(), Some(&80));
+    assert_eq!(steps.len(), steps.last().unwrap() - 79, "without a pause");
+    // The mean falls from 3 towards 0.9 with a time constant of four seconds: below 0.8 of 1.6 after some 135 steps.
+    assert!((330..340).contains(steps.last().unwrap()), "{:?}", steps.last());
+}
+
+#[test]
+fn only_what_is_held_is_offered_for_a_try() {
+    let mut config = EstimatorConfig { estimate_timeshift: true, calibrate: false, ..config() };
+    let said = |config: &EstimatorConfig| {
+        let mut watch = Contradictions::default();
+        (0..100).find_map(|step| watch.watch(step * 50_000_000, &encoder(5.0), config).pop()).unwrap()
+    };
+    assert!(said(&config).ends_with("try calibrate=on"));
+    config.calibrate = true;
+    assert!(said(&config).ends_with("as the rig says"));
+}
