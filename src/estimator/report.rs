@@ -341,6 +341,8 @@ pub struct StepReport {
     pub reprojection_rms_before_px: f64,
     /// The same after the solve.
     pub reprojection_rms_after_px: f64,
+    /// Median length of those after the solve, which a few bad tracks do not lead; not-a-number without any.
+    pub reprojection_median_after_px: f64,
     /// The solver's iterations.
     pub iterations: Vec<IterationReport>,
     /// The linearization, when it was asked for and the estimator is tracking.

@@ -33,6 +33,7 @@ impl Estimator {
             residuals: Vec::new(),
             reprojection_rms_before_px: 0.0,
             reprojection_rms_after_px: 0.0,
+            reprojection_median_after_px: f64::NAN,
             iterations: Vec::new(),
             linearization: None,
             jacobian_source: None,
@@ -58,7 +59,9 @@ impl Estimator {
         report.residuals = self.residual_summaries(solved);
         report.reprojection_rms_before_px =
             root_mean_square(solved.checks.iter().map(|checks| &checks.residuals_before));
-        report.reprojection_rms_after_px = root_mean_square(solved.checks.iter().map(|checks| &checks.residuals_after));
+        let residuals_after = || solved.checks.iter().map(|checks| &checks.residuals_after);
+        report.reprojection_rms_after_px = root_mean_square(residuals_after());
+        report.reprojection_median_after_px = median_length(residuals_after());
         report.iterations = std::mem::take(&mut solved.solution.iterations);
         let reported_ms = (self.config.clock_ms)();
         if self.config.options.keep_linearization {
@@ -250,4 +253,10 @@ fn root_mean_square<'a>(residuals: impl Iterator<Item = &'a TrackResiduals>) -> 
         .flatten()
         .fold((0.0, 0_usize), |(sum, count), residual| (sum + residual.norm_squared(), count + 1));
     (sum / count.max(1) as f64).sqrt()
+}
+
+fn median_length<'a>(residuals: impl Iterator<Item = &'a TrackResiduals>) -> f64 {
+    let mut lengths: Vec<f64> = residuals.flatten().flatten().flatten().map(|residual| residual.norm()).collect();
+    let middle = lengths.len() / 2;
+    if lengths.is_empty() { f64::NAN } else { *lengths.select_nth_unstable_by(middle, f64::total_cmp).1 }
 }

@@ -400,6 +400,7 @@ fn waiting_report(index: usize, calibration: crate::estimator::CalibrationEstima
         residuals: Vec::new(),
         reprojection_rms_before_px: f64::NAN,
         reprojection_rms_after_px: f64::NAN,
+        reprojection_median_after_px: f64::NAN,
         iterations: Vec::new(),
         linearization: None,
         jacobian_source: None,
@@ -460,6 +461,9 @@ fn tracking_report(
             .collect();
         (squares.iter().sum::<f64>() / (2.0 * squares.len().max(1) as f64)).sqrt()
     };
+    let observations = features.iter().flat_map(|feature| feature.observations.iter());
+    let mut lengths: Vec<f64> = observations.filter_map(|seen| Some(seen.residual_after_px?.norm())).collect();
+    lengths.sort_by(f64::total_cmp);
     let visual_count: usize = features.iter().map(|feature| 2 * (feature.observations.len() - 1)).sum();
     let rejected = features.iter().filter(|feature| feature.rejected).count();
     StepReport {
@@ -472,6 +476,7 @@ fn tracking_report(
         events: sample_events(index, keyframe, rejected),
         reprojection_rms_before_px: rms(|observation| observation.residual_before_px),
         reprojection_rms_after_px: rms(|observation| observation.residual_after_px),
+        reprojection_median_after_px: lengths[lengths.len() / 2],
         window,
         calibration,
         counts: FeatureCounts::of(&features),

@@ -36,6 +36,7 @@ impl StepRecord {
                 residuals: report.residuals.clone(),
                 reprojection_rms_before_px: report.reprojection_rms_before_px,
                 reprojection_rms_after_px: report.reprojection_rms_after_px,
+                reprojection_median_after_px: report.reprojection_median_after_px,
                 iterations: report.iterations.clone(),
                 linearization: report.linearization.clone(),
                 // Worth nothing without the features.

@@ -5,7 +5,6 @@ use nalgebra::Vector2;
 use crate::estimator::Phase;
 use crate::frontend::{FeatureId, FrontEndStatistics};
 use crate::geometry::seconds_from_ns;
-use crate::gui::histogram::ResidualHistogram;
 use crate::session::RunRecord;
 
 /// How many images a track's tail reaches back.
@@ -123,7 +122,7 @@ impl ImageModel {
             rejected: report.features.iter().filter(|feature| feature.rejected).count(),
             rms_before_px: report.reprojection_rms_before_px,
             rms_after_px: report.reprojection_rms_after_px,
-            median_after_px: ResidualHistogram::of(report).median_px,
+            median_after_px: report.reprojection_median_after_px,
             marks,
         })
     }
