@@ -137,9 +137,10 @@ fn driven(recording: &Recording, run: &RunRecord) -> Driven {
     let mut failures = Vec::new();
     let (mut before_ns, mut lost_ns) = (None, 0);
     for report in run.steps.iter().map(|step| &step.report) {
-        for part in report.residuals.iter().filter(|part| part.count > 0) {
+        for part in &report.residuals {
+            let Some(mean_square) = part.mean_square() else { continue };
             let sum = sums.entry(part.factor).or_default();
-            *sum = (sum.0 + part.chi2_after / part.count as f64, sum.1 + 1);
+            *sum = (sum.0 + mean_square, sum.1 + 1);
         }
         let failed = report.events.iter().filter(|event| event.kind == EventKind::Failure);
         failures.extend(failed.map(|event| format!("{:.1} s: {}", report.stamp_ns as f64 * 1e-9, event.message)));

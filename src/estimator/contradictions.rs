@@ -12,11 +12,29 @@ const AVERAGED_NS: i64 = 4_000_000_000;
 /// Once said, it is said until the mean has come down to this share of its limit.
 const RELEASE: f64 = 0.8;
 
-/// What is watched: a kind of factor, and the largest mean of its squared whitened residuals.
-///
+/// A kind of factor whose residuals are watched.
+struct Watched {
+    factor: &'static str,
+    /// Largest mean of its squared whitened residuals.
+    limit: f64,
+    /// What a larger one means.
+    contradiction: &'static str,
+}
+
 /// Encoder readings that agree leave 1. Most of the prior's rows are fitted, so that it leaves 0.1 to 0.45 (simulated and
 /// real logs) where the model holds; a camera's clock that is 10 ms off makes that 2, encoders 20 ms late 1.2.
-const WATCHED: [(&str, f64); 2] = [("encoder", 1.6), ("marginalization prior", 0.7)];
+const WATCHED: [Watched; 2] = [
+    Watched {
+        factor: "encoder",
+        limit: 1.6,
+        contradiction: "joint angles contradict images and inertial sensor by more than the encoders' noise allows",
+    },
+    Watched {
+        factor: "marginalization prior",
+        limit: 0.7,
+        contradiction: "what earlier images told contradicts the images in the window by more than their noise allows",
+    },
+];
 
 /// The running means, one for each of [`WATCHED`].
 #[derive(Clone, Debug, Default)]
@@ -51,15 +69,14 @@ impl Contradictions {
     ) -> Vec<String> {
         let Some(last_ns) = self.last_ns.replace(stamp_ns) else { return Vec::new() };
         let mut warnings = Vec::new();
-        for ((factor, limit), mean) in WATCHED.into_iter().zip(&mut self.means) {
-            let Some(summary) = residuals.iter().find(|summary| summary.factor == factor && summary.count > 0) else {
-                continue;
-            };
-            mean.take(summary.chi2_after / summary.count as f64, stamp_ns - last_ns);
-            let limit = if mean.told { RELEASE * limit } else { limit };
+        for (watched, mean) in WATCHED.iter().zip(&mut self.means) {
+            let summary = residuals.iter().find(|summary| summary.factor == watched.factor);
+            let Some(mean_square) = summary.and_then(ResidualSummary::mean_square) else { continue };
+            mean.take(mean_square, stamp_ns - last_ns);
+            let limit = if mean.told { RELEASE * watched.limit } else { watched.limit };
             mean.told = mean.over_ns >= AVERAGED_NS && mean.value > limit;
             if mean.told {
-                warnings.push(said(factor, config));
+                warnings.push(said(watched, config));
             }
         }
         warnings
@@ -67,13 +84,9 @@ impl Contradictions {
 }
 
 /// What contradicts what, and what to try.
-fn said(factor: &str, config: &EstimatorConfig) -> String {
-    let what = match factor {
-        "encoder" => "joint angles contradict images and inertial sensor by more than the encoders' noise allows",
-        _ => "what earlier images told contradicts the images in the window by more than their noise allows",
-    };
+fn said(watched: &Watched, config: &EstimatorConfig) -> String {
     let held = [("calibrate=on", config.calibrate), ("timeshift=on", config.estimate_timeshift)];
     let tries: Vec<&str> = held.into_iter().filter(|(_, on)| !on).map(|(option, _)| option).collect();
     let tries = if tries.is_empty() { String::new() } else { format!("; try {}", tries.join(" and ")) };
-    format!("{what}: clocks, calibration or noise are not as the rig says{tries}")
+    format!("{}: clocks, calibration or noise are not as the rig says{tries}", watched.contradiction)
 }

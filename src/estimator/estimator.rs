@@ -45,7 +45,7 @@ pub struct Estimator {
     /// Watches whether residuals stay too large.
     contradictions: Contradictions,
     /// Since when too few landmarks have been in view.
-    pub(super) blind_since_ns: Option<i64>,
+    blind_since_ns: Option<i64>,
     /// Where a restarted window should begin: the last pose before the failure.
     pub(super) resume_at: Option<RigidTransform>,
 }

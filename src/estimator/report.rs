@@ -239,6 +239,13 @@ pub struct ResidualSummary {
     pub chi2_after: f64,
 }
 
+impl ResidualSummary {
+    /// Mean of the squared whitened residuals after the solve; `None` without residuals.
+    pub fn mean_square(&self) -> Option<f64> {
+        (self.count > 0).then(|| self.chi2_after / self.count as f64)
+    }
+}
+
 /// What a block of columns stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum ColumnGroup {

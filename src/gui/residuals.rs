@@ -198,7 +198,7 @@ fn factors_ui(ui: &mut Ui, theme: &Theme, residuals: &[ResidualSummary]) {
             ui.label(number(summary.count.to_string()));
             ui.label(number(figure(summary.chi2_before)));
             ui.label(number(figure(summary.chi2_after)));
-            ratio_ui(ui, theme, summary.chi2_after / summary.count as f64);
+            ratio_ui(ui, theme, summary.mean_square().unwrap_or(f64::NAN));
             ui.end_row();
         }
     });

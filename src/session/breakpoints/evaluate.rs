@@ -2,6 +2,7 @@
 
 use super::expression::{Arithmetic, Condition, Number, Span, Truth};
 use super::quantities::NamedNumber;
+use crate::estimator::ResidualSummary;
 use crate::flight_log::Rig;
 use crate::session::StepRecord;
 
@@ -178,7 +179,7 @@ fn named(kind: NamedNumber, name: &str, moment: &Moment<'_>) -> Option<f64> {
             Some(count as f64)
         }
         NamedNumber::Chi2 => factor().map(|summary| summary.chi2_after),
-        NamedNumber::Nis => factor().filter(|it| it.count > 0).map(|it| it.chi2_after / it.count as f64),
+        NamedNumber::Nis => factor().and_then(ResidualSummary::mean_square),
     }
 }
 
