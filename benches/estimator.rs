@@ -14,9 +14,9 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use dcvins::estimator::{
     Estimator, EstimatorConfig, EstimatorOptions, EventKind, Phase, StageTimes, StepInput, StepReport,
 };
-use dcvins::flight_log::JointAngles;
 use dcvins::gimbal::{Chain, Parameterization};
 use dcvins::observability::analyse;
+use dcvins::sensors::JointAngles;
 use dcvins::simulation::{SyntheticFlight, SyntheticFrame, SyntheticOptions, synthetic_tracks};
 
 /// The window is full long before this frame.

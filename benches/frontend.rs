@@ -15,9 +15,9 @@ use std::fmt::Write as _;
 use std::time::Instant;
 
 use dcvins::camera::CameraModel;
-use dcvins::flight_log::GrayImage;
 use dcvins::frontend::lucas_kanade::{LucasKanadeOptions, track};
 use dcvins::frontend::{FeatureId, FrontEnd, FrontEndOptions, KeyOptions, Pyramid};
+use dcvins::sensors::GrayImage;
 use homography::{Dice, Scene, Texture};
 use nalgebra::Vector2;
 

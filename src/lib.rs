@@ -32,6 +32,8 @@ pub mod geometry;
 pub mod gimbal;
 #[cfg(feature = "gui")]
 pub mod gui;
+pub mod log_check;
 pub mod observability;
+pub mod sensors;
 pub mod session;
 pub mod simulation;

@@ -2,12 +2,13 @@
 
 use std::sync::Arc;
 
-use dcvins::flight_log::{GrayImage, ImageReader};
+use dcvins::flight_log::ImageReader;
 use dcvins::gui::headless::{Frame, Headless, HeadlessOptions};
 use dcvins::gui::painter::Painter;
 use dcvins::gui::theme::{Theme, ThemeName};
 use dcvins::gui::window::{Preset, WindowState, window_ui};
 use dcvins::gui::{PanelContext, Playback, Selection};
+use dcvins::sensors::GrayImage;
 use dcvins::session::{Recording, SessionPlan};
 
 use super::Table;

@@ -15,10 +15,10 @@ use super::statistics::Statistics;
 use super::timeline::{Instant, instants};
 use super::{CalibrationError, CalibrationInput, CalibrationOptions, observations, trajectory};
 use crate::estimator::{ColumnBlock, ColumnGroup, Linearization, gravity_in_world, imu_factor};
-use crate::flight_log::JointAngles;
 use crate::geometry::seconds_from_ns;
 use crate::gimbal::Chain;
 use crate::observability::{RankReport, analyse};
+use crate::sensors::JointAngles;
 
 /// Names of the steps, for messages.
 const ALONE: &str = "camera-IMU calibration";

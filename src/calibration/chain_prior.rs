@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::flight_log::rig::ChainPrior;
 use crate::gimbal::{Chain, ClassicalChain, auto_parameterization};
+use crate::sensors::ChainPrior;
 
 /// Standard deviation of a uniform error within ±1.
 const SIGMA_PER_BOUND: f64 = 0.577_350_269_189_625_8;

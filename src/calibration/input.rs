@@ -4,11 +4,10 @@ use std::sync::Arc;
 
 use crate::camera::CameraModel;
 use crate::estimator::EstimatorConfig;
-use crate::flight_log::rig::{ChainPrior, ImuNoise};
-use crate::flight_log::{ImuSample, JointAngles};
 use crate::frontend::TrackedFrame;
 use crate::geometry::RigidTransform;
 use crate::gimbal::ClassicalChain;
+use crate::sensors::{ChainPrior, ImuNoise, ImuSample, JointAngles};
 
 /// One image of a camera without its pixels.
 #[derive(Clone, Debug)]

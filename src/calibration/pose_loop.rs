@@ -10,9 +10,9 @@ use super::chain_prior::ChainTerm;
 use super::rounds::median;
 use super::segments::Segment;
 use crate::estimator::RobustLoss;
-use crate::flight_log::JointAngles;
 use crate::geometry::{RigidTransform, so3, wrap_angle};
 use crate::gimbal::Chain;
+use crate::sensors::JointAngles;
 
 /// Standard deviation of the rotations of a measured pose, in radians: a pixel over the root of the features.
 const ROTATION_SIGMA_RAD: f64 = 1e-3;

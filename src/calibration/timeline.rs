@@ -6,9 +6,8 @@ use super::input::TrackedView;
 use super::{CalibrationInput, CalibrationOptions};
 use crate::estimator::preintegration::Matrix15;
 use crate::estimator::{ImuBias, NavigationState, Preintegration};
-use crate::flight_log::rig::ImuNoise;
-use crate::flight_log::{ImuSample, JointAngles};
 use crate::geometry::{ns_from_seconds, seconds_from_ns, wrap_angle};
+use crate::sensors::{ImuNoise, ImuSample, JointAngles};
 
 /// An image of the gimbal camera belongs to an instant when it was taken at most this long after it.
 const LONGEST_HOP_NS: i64 = 60_000_000;

@@ -2,9 +2,9 @@
 
 use super::options::EstimatorOptions;
 use crate::camera::CameraModel;
-use crate::flight_log::rig::ImuNoise;
 use crate::geometry::RigidTransform;
 use crate::gimbal::{Chain, ClassicalChain, Parameterization};
+use crate::sensors::ImuNoise;
 
 /// What an estimator is told once.
 #[derive(Clone, Debug)]

@@ -14,9 +14,9 @@ use super::standstill::RestWatch;
 use super::startup::WaitingFrame;
 use super::window::{FeatureMap, Frame};
 use super::{Event, EventKind, Phase, StepInput, StepReport, gravity_in_world};
-use crate::flight_log::rig::ImuNoise;
 use crate::geometry::{RigidTransform, seconds_from_ns};
 use crate::gimbal::{ClassicalChain, Parameterization};
+use crate::sensors::ImuNoise;
 
 /// A sliding-window visual-inertial estimator for a camera on a gimbal, or on a rigid mount, and for rigid cameras beside it.
 ///

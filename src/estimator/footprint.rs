@@ -97,7 +97,7 @@ impl Estimator {
 }
 
 fn of_window_frame(frame: &Frame) -> usize {
-    let encoder = frame.encoder.as_ref().map_or(0, crate::flight_log::JointAngles::heap_bytes);
+    let encoder = frame.encoder.as_ref().map_or(0, crate::sensors::JointAngles::heap_bytes);
     let states = 1 + usize::from(frame.first_estimate.is_some());
     size_of::<Frame>()
         + allocated_bytes(size_of_val(frame.motion.samples()))

@@ -7,8 +7,8 @@ use super::calibrations::MAIN;
 use super::camera_pose::{self, CameraMaps};
 use super::estimator::Estimator;
 use super::reprojection::{self, CameraPose, RelativePose};
-use crate::flight_log::JointAngles;
 use crate::geometry::wrap_angle;
+use crate::sensors::JointAngles;
 
 /// How far a joint may have turned since the frame before where no encoder tells it, as a standard deviation.
 pub(super) const UNKNOWN_TURN_RAD: f64 = 1.0;

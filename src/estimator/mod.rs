@@ -64,8 +64,8 @@ pub use report::{
 
 use nalgebra::Vector3;
 
-use crate::flight_log::{ImuSample, JointAngles};
 use crate::frontend::{TrackedFeature, TrackedFrame};
+use crate::sensors::{ImuSample, JointAngles};
 
 /// What one image brings to the estimator.
 #[derive(Clone, Debug)]

@@ -6,8 +6,8 @@
 
 use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
 
-use crate::flight_log::{ImuSample, rig::ImuNoise};
 use crate::geometry::{RigidTransform, seconds_from_ns, so3};
+use crate::sensors::{ImuNoise, ImuSample};
 
 /// 15 × 15, ordered `[φ, p, v, b_g, b_a]`.
 pub type Matrix15 = SMatrix<f64, 15, 15>;

@@ -16,9 +16,9 @@ use super::layout::Layout;
 use super::preintegration::ImuBias;
 use super::window::{Frame, FrameState};
 use super::{Event, EventKind, StepInput};
-use crate::flight_log::rig::ImuNoise;
 use crate::frontend::{FeatureId, TrackedFeature};
 use crate::geometry::seconds_from_ns;
+use crate::sensors::ImuNoise;
 
 /// Both witnesses must have been quiet for this long.
 const QUIET_NS: i64 = 1_000_000_000;

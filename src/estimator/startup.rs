@@ -7,7 +7,6 @@ use nalgebra::{DMatrix, DVector, UnitQuaternion, Vector3};
 use super::calibration::Calibration;
 use super::calibrations::MAIN;
 use super::estimator::Estimator;
-use super::features;
 use super::initialization::{
     InitializationFrame, InitializationInput, InitializationOptions, InitializationOrigin, InitializationOutcome,
     InitializationSolution, WaitReason, try_initialize,
@@ -16,10 +15,10 @@ use super::joints::UNKNOWN_TURN_RAD;
 use super::preintegration::{NavigationState, Preintegration};
 use super::prior::StartPrior;
 use super::window::{Frame, FrameState, Rates};
-use super::{Event, EventKind, Phase, StepInput, StepReport};
-use crate::flight_log::{ImuSample, JointAngles};
+use super::{Event, EventKind, Phase, StepInput, StepReport, features};
 use crate::frontend::{FeatureId, TrackedFeature};
 use crate::geometry::{RigidTransform, seconds_from_ns, so3};
+use crate::sensors::{ImuSample, JointAngles};
 
 /// A frame kept until the initialization succeeds.
 #[derive(Clone, Debug)]
@@ -145,7 +144,7 @@ impl Estimator {
             return base.for_rigid_mount(rotation_rad, translation_m);
         }
         // The rig's bounds are those of uniform errors.
-        let bounds = crate::flight_log::rig::ChainPrior {
+        let bounds = crate::sensors::ChainPrior {
             translation_bound_m: translation_m * 3.0_f64.sqrt(),
             rotation_bound_rad: rotation_rad * 3.0_f64.sqrt(),
         };

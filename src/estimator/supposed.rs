@@ -7,19 +7,17 @@ use nalgebra::{DMatrix, Vector3};
 
 use super::calibration::{Calibration, GivenSigmas};
 use super::calibrations::Calibrations;
-use super::camera_pose;
 use super::options::{LandmarkModel, RobustLoss};
 use super::preintegration::{NavigationState, Preintegration};
 use super::problem::{CameraFactors, Estimate, Problem};
 use super::reprojection::{Landmark, RelativePose};
 use super::visual::{Sighting, Track, VisualModel};
 use super::window::{Frame, FrameState, Rates, layout};
-use super::{ColumnBlock, ColumnGroup, Linearization};
+use super::{ColumnBlock, ColumnGroup, Linearization, camera_pose};
 use crate::camera::CameraModel;
-use crate::flight_log::rig::ImuNoise;
-use crate::flight_log::{ImuSample, JointAngles};
 use crate::geometry::ns_from_seconds;
 use crate::gimbal::{ClassicalChain, Parameterization};
+use crate::sensors::{ImuNoise, ImuSample, JointAngles};
 
 /// What is known of the poses of a supposed window.
 #[derive(Clone, Copy, Debug, PartialEq)]

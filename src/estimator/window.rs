@@ -9,9 +9,9 @@ use super::layout::{Layout, POSE, SPEED_BIAS};
 use super::preintegration::{Matrix15, NavigationState, Preintegration, Vector15};
 use super::reprojection::Landmark;
 use super::standstill::Rest;
-use crate::flight_log::{ImuSample, JointAngles};
 use crate::frontend::FeatureId;
 use crate::geometry::{so3, wrap_angle};
+use crate::sensors::{ImuSample, JointAngles};
 
 /// The unknowns of one frame (Eq. 7).
 #[derive(Clone, Debug, PartialEq)]

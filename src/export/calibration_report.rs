@@ -10,10 +10,9 @@ use super::tables::parameter_name;
 use crate::calibration::{
     CalibrationOutcome, MountReport, PixelReport, Statistics, chain_distance, transform_distance,
 };
-use crate::flight_log::Rig;
-use crate::flight_log::rig::CameraMount;
 use crate::geometry::{RigidTransform, seconds_from_ns, so3, wrap_angle};
 use crate::gimbal::{Chain, ClassicalChain};
+use crate::sensors::{CameraMount, Rig};
 use crate::session::CalibrationRun;
 
 /// Statistics of a series of lengths, in the unit that the field's name says.

@@ -8,8 +8,7 @@ use super::results::write_results;
 use super::summary::{RunSummary, summarize, to_json};
 use super::tables::{calibration_csv, frames_csv, information_csv, rank_csv};
 use super::trajectory::{euroc_of_run, tum_of_run};
-use crate::flight_log::Rig;
-use crate::flight_log::rig::CameraMount;
+use crate::sensors::{CameraMount, Rig};
 use crate::session::{Recording, RunRecord};
 
 /// What goes into the files.

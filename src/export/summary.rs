@@ -8,10 +8,10 @@ use super::evaluation::alignment_name;
 use super::structure::{KnownLossSummary, known_losses};
 use super::tables::parameter_name;
 use crate::estimator::{EventKind, Phase, StageTimes};
-use crate::flight_log::Rig;
 use crate::geometry::{seconds_from_ns, wrap_angle};
 use crate::gimbal::ClassicalChain;
 use crate::observability::{ParameterRate, information_rate};
+use crate::sensors::Rig;
 use crate::session::accuracy::{Alignment, path_length_m};
 use crate::session::{Recording, RunRecord, RunWarning, TrajectoryAccuracy};
 

@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 
 use crate::estimator::{Event, Motion};
-use crate::flight_log::Rig;
 use crate::geometry::seconds_from_ns;
+use crate::sensors::Rig;
 use crate::session::{RunRecord, StepRecord};
 
 /// Why writing into a text needs no error of its own.

@@ -6,11 +6,11 @@ use thiserror::Error;
 /// Why a message could not be decoded.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("{what} at byte {offset} of the message")]
-pub(super) struct CdrError {
+pub(crate) struct CdrError {
     /// What is wrong.
-    pub(super) what: String,
+    pub(crate) what: String,
     /// Where, counted from the encapsulation header.
-    pub(super) offset: usize,
+    pub(crate) offset: usize,
 }
 
 /// Size of the encapsulation header; alignment counts from its end.
@@ -18,7 +18,7 @@ const ENCAPSULATION: usize = 4;
 
 /// Reads fields one after another, never past the end.
 #[derive(Clone, Debug)]
-pub(super) struct CdrReader<'a> {
+pub(crate) struct CdrReader<'a> {
     message: &'a [u8],
     /// Next byte, from the beginning of the message.
     position: usize,
@@ -28,7 +28,7 @@ pub(super) struct CdrReader<'a> {
 macro_rules! read_number {
     ($name:ident, $type:ty) => {
         #[doc = concat!("The next `", stringify!($type), "`.")]
-        pub(super) fn $name(&mut self) -> Result<$type, CdrError> {
+        pub(crate) fn $name(&mut self) -> Result<$type, CdrError> {
             const SIZE: usize = size_of::<$type>();
             self.align(SIZE);
             let bytes = self.take(SIZE, stringify!($type))?;
@@ -41,7 +41,7 @@ macro_rules! read_number {
 
 impl<'a> CdrReader<'a> {
     /// Reads the encapsulation header.
-    pub(super) fn new(message: &'a [u8]) -> Result<Self, CdrError> {
+    pub(crate) fn new(message: &'a [u8]) -> Result<Self, CdrError> {
         let big_endian = match message {
             [0, 0, _, _, ..] => true,
             [0, 1, _, _, ..] => false,
@@ -79,7 +79,7 @@ impl<'a> CdrReader<'a> {
     read_number!(read_f64, f64);
 
     /// A fixed number of doubles.
-    pub(super) fn read_f64s<const N: usize>(&mut self) -> Result<[f64; N], CdrError> {
+    pub(crate) fn read_f64s<const N: usize>(&mut self) -> Result<[f64; N], CdrError> {
         let mut values = [0.0; N];
         for value in &mut values {
             *value = self.read_f64()?;
@@ -99,7 +99,7 @@ impl<'a> CdrReader<'a> {
     }
 
     /// A string without its terminating zero.
-    pub(super) fn read_string(&mut self) -> Result<&'a str, CdrError> {
+    pub(crate) fn read_string(&mut self) -> Result<&'a str, CdrError> {
         let count = self.read_length(1, "string")?;
         let offset = self.position;
         let bytes = self.take(count, "string")?;
@@ -108,19 +108,19 @@ impl<'a> CdrReader<'a> {
     }
 
     /// A sequence of bytes, borrowed.
-    pub(super) fn read_bytes(&mut self) -> Result<&'a [u8], CdrError> {
+    pub(crate) fn read_bytes(&mut self) -> Result<&'a [u8], CdrError> {
         let count = self.read_length(1, "byte sequence")?;
         self.take(count, "byte sequence")
     }
 
     /// A sequence of strings.
-    pub(super) fn read_strings(&mut self) -> Result<Vec<&'a str>, CdrError> {
+    pub(crate) fn read_strings(&mut self) -> Result<Vec<&'a str>, CdrError> {
         let count = self.read_length(4, "string sequence")?;
         (0..count).map(|_| self.read_string()).collect()
     }
 
     /// A sequence of doubles.
-    pub(super) fn read_f64_sequence(&mut self) -> Result<Vec<f64>, CdrError> {
+    pub(crate) fn read_f64_sequence(&mut self) -> Result<Vec<f64>, CdrError> {
         let count = self.read_length(8, "number sequence")?;
         (0..count).map(|_| self.read_f64()).collect()
     }
@@ -128,13 +128,13 @@ impl<'a> CdrReader<'a> {
 
 /// Writes fields one after another, little-endian.
 #[derive(Clone, Debug)]
-pub(super) struct CdrWriter {
+pub(crate) struct CdrWriter {
     message: Vec<u8>,
 }
 
 impl CdrWriter {
     /// Begins with the encapsulation header.
-    pub(super) fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self { message: vec![0, 1, 0, 0] }
     }
 
@@ -143,52 +143,52 @@ impl CdrWriter {
         self.message.resize(ENCAPSULATION + offset.next_multiple_of(size), 0);
     }
 
-    pub(super) fn u8(&mut self, value: u8) {
+    pub(crate) fn u8(&mut self, value: u8) {
         self.message.push(value);
     }
 
-    pub(super) fn u32(&mut self, value: u32) {
+    pub(crate) fn u32(&mut self, value: u32) {
         self.align(4);
         self.message.extend_from_slice(&value.to_le_bytes());
     }
 
-    pub(super) fn i32(&mut self, value: i32) {
+    pub(crate) fn i32(&mut self, value: i32) {
         self.align(4);
         self.message.extend_from_slice(&value.to_le_bytes());
     }
 
-    pub(super) fn f64s(&mut self, values: &[f64]) {
+    pub(crate) fn f64s(&mut self, values: &[f64]) {
         for value in values {
             self.align(8);
             self.message.extend_from_slice(&value.to_le_bytes());
         }
     }
 
-    pub(super) fn string(&mut self, text: &str) {
+    pub(crate) fn string(&mut self, text: &str) {
         self.u32(text.len() as u32 + 1);
         self.message.extend_from_slice(text.as_bytes());
         self.message.push(0);
     }
 
-    pub(super) fn bytes(&mut self, bytes: &[u8]) {
+    pub(crate) fn bytes(&mut self, bytes: &[u8]) {
         self.u32(bytes.len() as u32);
         self.message.extend_from_slice(bytes);
     }
 
-    pub(super) fn strings(&mut self, texts: &[String]) {
+    pub(crate) fn strings(&mut self, texts: &[String]) {
         self.u32(texts.len() as u32);
         for text in texts {
             self.string(text);
         }
     }
 
-    pub(super) fn f64_sequence(&mut self, values: &[f64]) {
+    pub(crate) fn f64_sequence(&mut self, values: &[f64]) {
         self.u32(values.len() as u32);
         self.f64s(values);
     }
 
     /// The whole message.
-    pub(super) fn finish(self) -> Vec<u8> {
+    pub(crate) fn finish(self) -> Vec<u8> {
         self.message
     }
 }

@@ -2,6 +2,8 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
+use crate::sensors::UnknownCamera;
+
 /// Why a log or a rig could not be read or written; every message says what, where and what to do, the path last.
 #[derive(Debug, Error)]
 pub enum LogError {
@@ -53,13 +55,8 @@ pub enum LogError {
         path: PathBuf,
     },
     /// The rig has no such camera.
-    #[error("the rig has no camera '{key}'; it has {}", list(available))]
-    UnknownCamera {
-        /// What was asked for.
-        key: String,
-        /// What there is.
-        available: Vec<String>,
-    },
+    #[error(transparent)]
+    UnknownCamera(#[from] UnknownCamera),
     /// A joint of the rig does not occur in the joint messages.
     #[error(
         "gimbal.links[{link}].joint is '{joint}', but the messages on '{topic}' name {}; use those names in the rig: {}",

@@ -8,7 +8,7 @@ use super::LogError;
 
 /// The bytes of a log, behind a memory map.
 #[derive(Debug)]
-pub(super) struct LogFile {
+pub(crate) struct LogFile {
     map: Mmap,
 }
 

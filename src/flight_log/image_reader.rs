@@ -3,8 +3,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use super::container::{BlockCache, TopicIndex};
 use super::messages::MessageKind;
 use super::picture::{BitDepth, decode_picture};
-use super::{FlightLog, GrayImage, LogError, Rig};
+use super::{FlightLog, LogError};
 use crate::geometry::seconds_from_ns;
+use crate::sensors::{GrayImage, Rig, UnknownCamera};
 
 /// Decompressed blocks kept, so that neighbouring images do not decompress their chunk again.
 const BLOCKS: usize = 2;
@@ -65,7 +66,7 @@ impl ImageReader {
     pub fn image(&self, camera_key: &str, index: usize) -> Result<Arc<GrayImage>, LogError> {
         let number = self.cameras.iter().position(|camera| camera.key == camera_key).ok_or_else(|| {
             let available = self.cameras.iter().map(|camera| camera.key.clone()).collect();
-            LogError::UnknownCamera { key: camera_key.to_owned(), available }
+            UnknownCamera { key: camera_key.to_owned(), available }
         })?;
         let camera = &self.cameras[number];
         // A panic of another reader leaves the cache whole: entries are only pushed when complete.

@@ -3,24 +3,24 @@
 
 use std::collections::VecDeque;
 
-use super::JointSample;
 use crate::geometry::wrap_angle;
+use crate::sensors::JointSample;
 
 /// Readings of a joint further apart than this are not interpolated.
 const LONGEST_HOLE_NS: i64 = 200_000_000;
 
 /// What one message says: an angle in radians for each of the rig's joints that it names.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct JointReading {
-    pub(super) stamp_ns: i64,
-    pub(super) angles_rad: Vec<Option<f64>>,
+pub(crate) struct JointReading {
+    pub(crate) stamp_ns: i64,
+    pub(crate) angles_rad: Vec<Option<f64>>,
 }
 
 /// Brings the readings of all joints to the stamps of the first one, by name; those of the others are interpolated.
 ///
 /// Messages that name all joints come out as they went in.
 #[derive(Clone, Debug)]
-pub(super) struct JointMerge {
+pub(crate) struct JointMerge {
     /// By joint: readings from the last one at or before the next sample on.
     readings: Vec<VecDeque<(i64, f64)>>,
     /// Stamp of the last reading that came.
@@ -29,12 +29,12 @@ pub(super) struct JointMerge {
 }
 
 impl JointMerge {
-    pub(super) fn new(joints: usize) -> Self {
+    pub(crate) fn new(joints: usize) -> Self {
         Self { readings: vec![VecDeque::new(); joints], newest_ns: i64::MIN, ended: false }
     }
 
     /// The next reading; stamps must not decrease. Whether it was taken: a joint's second reading of one stamp is not.
-    pub(super) fn push(&mut self, reading: &JointReading) -> bool {
+    pub(crate) fn push(&mut self, reading: &JointReading) -> bool {
         self.newest_ns = reading.stamp_ns;
         let mut taken = true;
         for (queue, angle) in self.readings.iter_mut().zip(&reading.angles_rad) {
@@ -49,12 +49,12 @@ impl JointMerge {
     }
 
     /// No reading will follow.
-    pub(super) fn finish(&mut self) {
+    pub(crate) fn finish(&mut self) {
         self.ended = true;
     }
 
     /// The next sample whose joints are all known, `None` while later readings are awaited.
-    pub(super) fn pop(&mut self) -> Option<JointSample> {
+    pub(crate) fn pop(&mut self) -> Option<JointSample> {
         loop {
             let (stamp_ns, _) = *self.readings.first()?.front()?;
             for queue in &mut self.readings {

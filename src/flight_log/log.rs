@@ -131,7 +131,7 @@ impl FlightLog {
     }
 
     /// The topic that a field of the rig names, when the log has it with a fitting type.
-    pub(super) fn require_topic(
+    pub(crate) fn require_topic(
         &self,
         field: &str,
         topic: &str,
@@ -153,17 +153,17 @@ impl FlightLog {
     }
 
     /// The whole file.
-    pub(super) fn file(&self) -> &LogFile {
+    pub(crate) fn file(&self) -> &LogFile {
         &self.file
     }
 
     /// What lies where.
-    pub(super) fn index(&self) -> &ContainerIndex {
+    pub(crate) fn index(&self) -> &ContainerIndex {
         &self.index
     }
 
     /// A log time since the log began.
-    pub(super) fn since_begin(&self, log_time_ns: u64) -> i64 {
+    pub(crate) fn since_begin(&self, log_time_ns: u64) -> i64 {
         i64::try_from(log_time_ns).unwrap_or(i64::MAX).saturating_sub(self.epoch_ns)
     }
 

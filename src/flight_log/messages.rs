@@ -74,10 +74,10 @@ impl MessageKind {
 
 /// `std_msgs/msg/Header`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Header<'a> {
+pub(crate) struct Header<'a> {
     /// Nanoseconds since the epoch.
-    pub(super) stamp_ns: i64,
-    pub(super) frame_id: &'a str,
+    pub(crate) stamp_ns: i64,
+    pub(crate) frame_id: &'a str,
 }
 
 fn read_header<'a>(reader: &mut CdrReader<'a>) -> Result<Header<'a>, CdrError> {
@@ -88,19 +88,19 @@ fn read_header<'a>(reader: &mut CdrReader<'a>) -> Result<Header<'a>, CdrError> {
 }
 
 /// The header stamp of any message that begins with a header, in nanoseconds since the epoch.
-pub(super) fn header_stamp_ns(message: &[u8]) -> Result<i64, CdrError> {
+pub(crate) fn header_stamp_ns(message: &[u8]) -> Result<i64, CdrError> {
     Ok(read_header(&mut CdrReader::new(message)?)?.stamp_ns)
 }
 
 /// `sensor_msgs/msg/Imu` without its orientation and covariances.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct ImuMessage {
-    pub(super) stamp_ns: i64,
-    pub(super) angular_velocity_rad_per_s: Vector3<f64>,
-    pub(super) specific_force_m_per_s2: Vector3<f64>,
+pub(crate) struct ImuMessage {
+    pub(crate) stamp_ns: i64,
+    pub(crate) angular_velocity_rad_per_s: Vector3<f64>,
+    pub(crate) specific_force_m_per_s2: Vector3<f64>,
 }
 
-pub(super) fn read_imu(message: &[u8]) -> Result<ImuMessage, CdrError> {
+pub(crate) fn read_imu(message: &[u8]) -> Result<ImuMessage, CdrError> {
     let mut reader = CdrReader::new(message)?;
     let header = read_header(&mut reader)?;
     reader.read_f64s::<4>()?; // orientation
@@ -117,17 +117,17 @@ pub(super) fn read_imu(message: &[u8]) -> Result<ImuMessage, CdrError> {
 
 /// `sensor_msgs/msg/Image`, its pixels borrowed.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct ImageMessage<'a> {
-    pub(super) width: usize,
-    pub(super) height: usize,
-    pub(super) encoding: &'a str,
-    pub(super) big_endian: bool,
+pub(crate) struct ImageMessage<'a> {
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+    pub(crate) encoding: &'a str,
+    pub(crate) big_endian: bool,
     /// Bytes per row.
-    pub(super) step: usize,
-    pub(super) data: &'a [u8],
+    pub(crate) step: usize,
+    pub(crate) data: &'a [u8],
 }
 
-pub(super) fn read_image(message: &[u8]) -> Result<ImageMessage<'_>, CdrError> {
+pub(crate) fn read_image(message: &[u8]) -> Result<ImageMessage<'_>, CdrError> {
     let mut reader = CdrReader::new(message)?;
     read_header(&mut reader)?;
     let height = reader.read_u32()? as usize;
@@ -140,7 +140,7 @@ pub(super) fn read_image(message: &[u8]) -> Result<ImageMessage<'_>, CdrError> {
 }
 
 /// `sensor_msgs/msg/CompressedImage`: its format and its bytes, borrowed.
-pub(super) fn read_compressed_image(message: &[u8]) -> Result<(&str, &[u8]), CdrError> {
+pub(crate) fn read_compressed_image(message: &[u8]) -> Result<(&str, &[u8]), CdrError> {
     let mut reader = CdrReader::new(message)?;
     read_header(&mut reader)?;
     let format = reader.read_string()?;
@@ -149,17 +149,17 @@ pub(super) fn read_compressed_image(message: &[u8]) -> Result<(&str, &[u8]), Cdr
 
 /// `sensor_msgs/msg/CameraInfo`, the part that calibrates.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct CameraInfoMessage {
-    pub(super) width: usize,
-    pub(super) height: usize,
+pub(crate) struct CameraInfoMessage {
+    pub(crate) width: usize,
+    pub(crate) height: usize,
     /// `plumb_bob`, `equidistant`, ….
-    pub(super) distortion_model: String,
-    pub(super) distortion: Vec<f64>,
+    pub(crate) distortion_model: String,
+    pub(crate) distortion: Vec<f64>,
     /// `K`, row by row.
-    pub(super) intrinsic_matrix: [f64; 9],
+    pub(crate) intrinsic_matrix: [f64; 9],
 }
 
-pub(super) fn read_camera_info(message: &[u8]) -> Result<CameraInfoMessage, CdrError> {
+pub(crate) fn read_camera_info(message: &[u8]) -> Result<CameraInfoMessage, CdrError> {
     let mut reader = CdrReader::new(message)?;
     read_header(&mut reader)?;
     let height = reader.read_u32()? as usize;
@@ -172,13 +172,13 @@ pub(super) fn read_camera_info(message: &[u8]) -> Result<CameraInfoMessage, CdrE
 
 /// `sensor_msgs/msg/JointState` without velocities and efforts.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct JointMessage<'a> {
-    pub(super) stamp_ns: i64,
-    pub(super) names: Vec<&'a str>,
-    pub(super) positions_rad: Vec<f64>,
+pub(crate) struct JointMessage<'a> {
+    pub(crate) stamp_ns: i64,
+    pub(crate) names: Vec<&'a str>,
+    pub(crate) positions_rad: Vec<f64>,
 }
 
-pub(super) fn read_joint_state(message: &[u8]) -> Result<JointMessage<'_>, CdrError> {
+pub(crate) fn read_joint_state(message: &[u8]) -> Result<JointMessage<'_>, CdrError> {
     let mut reader = CdrReader::new(message)?;
     let header = read_header(&mut reader)?;
     let names = reader.read_strings()?;
@@ -188,12 +188,12 @@ pub(super) fn read_joint_state(message: &[u8]) -> Result<JointMessage<'_>, CdrEr
 
 /// The pose in any of the pose messages, `None` when its numbers are no pose (not finite, or a zero quaternion).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct PoseMessage {
-    pub(super) stamp_ns: i64,
-    pub(super) pose: Option<RigidTransform>,
+pub(crate) struct PoseMessage {
+    pub(crate) stamp_ns: i64,
+    pub(crate) pose: Option<RigidTransform>,
 }
 
-pub(super) fn read_pose(kind: MessageKind, message: &[u8]) -> Result<PoseMessage, CdrError> {
+pub(crate) fn read_pose(kind: MessageKind, message: &[u8]) -> Result<PoseMessage, CdrError> {
     let mut reader = CdrReader::new(message)?;
     let header = read_header(&mut reader)?;
     if matches!(kind, MessageKind::Odometry | MessageKind::TransformStamped) {

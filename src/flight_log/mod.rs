@@ -4,19 +4,18 @@
 //! Time is nanoseconds since the first message of the log (its header stamp drives; the log time is kept beside it).
 
 mod cdr;
-pub mod check;
-mod container;
+pub(crate) mod container;
 pub mod convert;
 mod error;
 mod file;
 mod image_reader;
-mod joint_merge;
+pub(crate) mod joint_merge;
 mod log;
-mod messages;
-mod picture;
-pub mod rig;
-mod samples;
-mod stream;
+pub(crate) mod messages;
+pub(crate) mod picture;
+pub(crate) mod rig;
+mod sensor_frame;
+pub(crate) mod stream;
 #[cfg(test)]
 mod tests;
 mod writer;
@@ -25,8 +24,7 @@ pub use error::LogError;
 pub use image_reader::ImageReader;
 pub use log::{FlightLog, TopicInfo};
 pub use messages::MessageKind;
-pub use rig::Rig;
-pub use samples::{GrayImage, ImuSample, JointAngles, JointSample, LogWarning, PoseSample, SensorFrame};
+pub use sensor_frame::{LogWarning, SensorFrame};
 pub use stream::FrameStream;
 pub use writer::{
     CircleAnnotation, LinesAnnotation, LogCompression, LogLevel, LogWriter, LogWriterOptions, MessageTimes,

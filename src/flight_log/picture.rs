@@ -4,8 +4,9 @@ use std::io::Cursor;
 
 use image::{DynamicImage, ImageFormat, ImageReader as CodecReader, Limits};
 
+use super::FlightLog;
 use super::messages::{ImageMessage, MessageKind, read_compressed_image, read_image};
-use super::{FlightLog, GrayImage};
+use crate::sensors::GrayImage;
 
 /// Images wider or higher than this are refused: no such camera flies, so it is a damaged header.
 const LARGEST_SIDE_PX: usize = 16_384;
@@ -18,7 +19,7 @@ const PNG: [u8; 4] = [0x89, b'P', b'N', b'G'];
 /// the eight bits below the highest one in use are taken, by the brightest pixel of the topic's first image: the same for
 /// all images of a log, wherever reading begins. What is brighter later on is white.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct BitDepth(u32);
+pub(crate) struct BitDepth(u32);
 
 impl Default for BitDepth {
     fn default() -> Self {
@@ -28,12 +29,12 @@ impl Default for BitDepth {
 
 impl BitDepth {
     /// By the first image of a topic that can be decoded; all bits where there is none.
-    pub(super) fn of_topic(log: &FlightLog, topic: &str, kind: MessageKind) -> Self {
+    pub(crate) fn of_topic(log: &FlightLog, topic: &str, kind: MessageKind) -> Self {
         log.find_message(topic, |message| Self::of(kind, message)).unwrap_or_default()
     }
 
     /// By one image message, `None` when it cannot be decoded or is all black. Images of 8 bits use all that they have.
-    pub(super) fn of(kind: MessageKind, message: &[u8]) -> Option<Self> {
+    pub(crate) fn of(kind: MessageKind, message: &[u8]) -> Option<Self> {
         let brightest = if kind == MessageKind::Image {
             let raw = read_image(message).ok()?;
             if !matches!(raw.encoding, "mono16" | "16UC1") {
@@ -56,7 +57,7 @@ impl BitDepth {
     }
 
     /// Number of bits.
-    pub(super) fn bits(self) -> u32 {
+    pub(crate) fn bits(self) -> u32 {
         self.0
     }
 
@@ -70,7 +71,7 @@ fn wide_value(pair: [u8; 2], big_endian: bool) -> u16 {
 }
 
 /// Decodes an image message of either kind; the error says what is wrong with it.
-pub(super) fn decode_picture(kind: MessageKind, message: &[u8], depth: BitDepth) -> Result<GrayImage, String> {
+pub(crate) fn decode_picture(kind: MessageKind, message: &[u8], depth: BitDepth) -> Result<GrayImage, String> {
     if kind == MessageKind::Image {
         return gray_from_raw(&read_image(message).map_err(|error| error.to_string())?, depth);
     }

@@ -12,8 +12,8 @@ use nalgebra::{Matrix2x3, Matrix3, Matrix5, RowVector2, UnitQuaternion, Vector2,
 use super::prediction::PredictedRotation;
 use super::pyramid::Pyramid;
 use crate::camera::CameraModel;
-use crate::flight_log::GrayImage;
 use crate::geometry::so3;
+use crate::sensors::GrayImage;
 
 /// Levels that the coarse image needs beyond those of the tracker: at 640 pixels it is then 40 pixels wide.
 pub(super) const EXTRA_LEVELS: usize = 1;

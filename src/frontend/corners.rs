@@ -3,7 +3,7 @@
 use nalgebra::Vector2;
 
 use super::responses::{Responses, TILE};
-use crate::flight_log::GrayImage;
+use crate::sensors::GrayImage;
 
 /// Which corners are taken.
 #[derive(Clone, Copy, Debug, PartialEq)]

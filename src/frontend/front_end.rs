@@ -10,7 +10,7 @@ use super::prediction::PredictedRotation;
 use super::pyramid::Pyramid;
 use super::tracks::{FeatureId, FrontEndStatistics, TrackedFeature, TrackedFrame};
 use crate::camera::CameraModel;
-use crate::flight_log::GrayImage;
+use crate::sensors::GrayImage;
 
 /// What a front end can be told.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -13,7 +13,7 @@ use nalgebra::{Matrix2, Vector2};
 use super::appearance::Appearance;
 use super::pyramid::cut_out;
 use super::resample::Patch;
-use crate::flight_log::GrayImage;
+use crate::sensors::GrayImage;
 
 /// Side of the window in pixels.
 pub(super) const WINDOW: usize = 21;

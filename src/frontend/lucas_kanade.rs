@@ -8,7 +8,7 @@ use nalgebra::Vector2;
 use pulp::{Arch, NullaryFnOnce};
 
 use super::pyramid::{Pyramid, cut_out};
-use crate::flight_log::GrayImage;
+use crate::sensors::GrayImage;
 
 /// Side of the tracked square in pixels, on every level.
 const WINDOW: usize = 21;

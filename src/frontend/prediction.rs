@@ -1,8 +1,8 @@
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
-use crate::flight_log::ImuSample;
 use crate::geometry::{seconds_from_ns, so3};
 use crate::gimbal::ClassicalChain;
+use crate::sensors::ImuSample;
 
 /// A rotation between two images that is expected, and how well it is known.
 #[derive(Clone, Copy, Debug, PartialEq)]

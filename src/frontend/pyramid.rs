@@ -1,4 +1,4 @@
-use crate::flight_log::GrayImage;
+use crate::sensors::GrayImage;
 
 /// Pixels of mirror picture that the smoothing needs on either side.
 const FILTER_RADIUS: usize = 2;

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2, Vector2};
 
 use super::keyed::{CENTRE, LANES, Rows, WINDOW};
-use crate::flight_log::GrayImage;
+use crate::sensors::GrayImage;
 
 /// Elements from one row of a patch to the next, and its rows: what a window of twice the area needs at any turn.
 const STRIDE: usize = 64;

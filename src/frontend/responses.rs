@@ -8,7 +8,7 @@ use pulp::{Arch, NullaryFnOnce};
 
 use super::lucas_kanade::smaller_eigenvalue;
 use super::pyramid::cut_out;
-use crate::flight_log::GrayImage;
+use crate::sensors::GrayImage;
 
 /// Side of the squares of an image that are looked at one by one, in pixels.
 pub(super) const TILE: usize = 32;

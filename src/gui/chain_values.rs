@@ -76,7 +76,7 @@ mod tests {
     #[test]
     fn the_truth_has_the_names_of_the_run_and_lies_near_its_end() {
         let recording = sample_recording_of(240, &["auto", "classical"]);
-        let raw = |rig: &crate::flight_log::Rig, name: &str| {
+        let raw = |rig: &crate::sensors::Rig, name: &str| {
             let chain = Chain::from_classical(&rig.chain_of_camera("cam0").unwrap(), Parameterization::Classical);
             let place = chain.parameter_names().iter().position(|known| known == name).unwrap();
             (chain.values()[place], if chain.parameter_units()[place] == "rad" { 0.17 } else { 0.03 })

@@ -48,9 +48,9 @@ pub mod window;
 use std::sync::Arc;
 
 use self::theme::Theme;
-use crate::flight_log::GrayImage;
 use crate::frontend::FeatureId;
 use crate::observability::SlidePosition;
+use crate::sensors::GrayImage;
 use crate::session::breakpoints::Breakpoints;
 use crate::session::{Command, Recording, SolverPosition};
 

@@ -4,9 +4,9 @@ use std::path::PathBuf;
 use std::sync::{Arc, OnceLock};
 
 use crate::estimator::{Estimator, EstimatorConfig, EstimatorOptions, StepInput};
-use crate::flight_log::JointAngles;
 use crate::gimbal::{Chain, Parameterization};
 use crate::observability::analyse;
+use crate::sensors::JointAngles;
 use crate::session::{Recording, RunRecord, StepRecord};
 use crate::simulation::{SyntheticOptions, synthetic_tracks};
 

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 
 use super::ImageSource;
 use super::sample_recording::{INTRINSICS_PX, Instant, RESOLUTION_PX, WALL_HEIGHT_M, YARD_HALF_SIDE_M, true_chain};
-use crate::flight_log::GrayImage;
+use crate::sensors::GrayImage;
 
 /// Gives the image of `cam0` at any frame.
 pub(crate) struct SampleImages;

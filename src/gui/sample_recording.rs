@@ -17,11 +17,11 @@ use crate::estimator::{
     Event, EventKind, FeatureCounts, FeatureReport, FrameStateReport, IterationReport, LandmarkReport,
     ObservationReport, Phase, ResidualSummary, StageTimes, StepReport,
 };
-use crate::flight_log::rig::{CameraMount, CameraRig, ChainPrior, GimbalRig, ImuNoise, ImuRig, Joint};
-use crate::flight_log::{LogWarning, Rig};
+use crate::flight_log::LogWarning;
 use crate::frontend::{FeatureId, FrontEndStatistics, TrackedFeature, TrackedFrame};
 use crate::geometry::{RigidTransform, SplitMix64, so3};
 use crate::gimbal::{ClassicalChain, DhLink};
+use crate::sensors::{CameraMount, CameraRig, ChainPrior, GimbalRig, ImuNoise, ImuRig, Joint, Rig};
 use crate::session::{Recording, RunRecord, StepRecord};
 
 /// Nanoseconds between two images (20 Hz).

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use super::app::PlayingLog;
 use super::{ImageSource, Playback};
-use crate::flight_log::{GrayImage, ImageReader};
+use crate::flight_log::ImageReader;
+use crate::sensors::GrayImage;
 use crate::session::{Command, Recording, Session};
 
 impl PlayingLog for Session {

@@ -13,9 +13,9 @@ use crate::calibration::{
     self, CalibrationError, CalibrationInput, CalibrationOptions, CalibrationOutcome, CalibrationProgress,
     GimbalCamera, StaticCamera, TrackedView,
 };
-use crate::flight_log::rig::{CameraMount, CameraRig, ChainPrior, GimbalRig};
-use crate::flight_log::{FlightLog, LogError, LogWarning, Rig};
+use crate::flight_log::{FlightLog, LogError, LogWarning};
 use crate::geometry::{RigidTransform, ns_from_seconds, seconds_from_ns};
+use crate::sensors::{CameraMount, CameraRig, ChainPrior, GimbalRig, Rig};
 
 /// Share of the whole work that tracking takes.
 const TRACKING_SHARE: f64 = 0.6;

@@ -4,9 +4,8 @@ use super::plan::{SessionError, WatchedCameras, cameras_of_run};
 use super::spec::{ParameterizationChoice, RunSpec};
 use super::stopwatch::clock_ms;
 use crate::estimator::{EstimatorConfig, EstimatorOptions, RigidCamera};
-use crate::flight_log::Rig;
-use crate::flight_log::rig::{CameraMount, CameraRig, ChainPrior};
 use crate::gimbal::{Parameterization, auto_parameterization};
+use crate::sensors::{CameraMount, CameraRig, ChainPrior, Rig};
 
 /// How wrong a rigid camera's pose on the IMU may be when the rig has no prior: a target calibration is better than this.
 const RIGID_CAMERA_PRIOR: ChainPrior = ChainPrior { translation_bound_m: 0.01, rotation_bound_rad: 0.0175 };

@@ -10,10 +10,10 @@ use super::breakpoints::joint_column_name;
 use super::run_engine::RunEngine;
 use super::spec::{ParameterizationChoice, RunSpec};
 use crate::estimator::InterventionError;
-use crate::flight_log::{JointAngles, Rig};
 use crate::frontend::{FeatureId, TrackedFrame};
 use crate::geometry::SplitMix64;
 use crate::gimbal::Parameterization;
+use crate::sensors::{JointAngles, Rig};
 
 /// What a fork does otherwise than the run that it leaves.
 ///

@@ -7,11 +7,11 @@ use nalgebra::{UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
 use crate::estimator::initialization::relative_pose::{RotationPrior, relative_poses};
-use crate::flight_log::check::ImageRotation;
-use crate::flight_log::rig::CameraRig;
-use crate::flight_log::{FlightLog, FrameStream, Rig};
+use crate::flight_log::{FlightLog, FrameStream};
 use crate::frontend::{FeatureId, FrontEnd, FrontEndOptions, TrackedFrame};
 use crate::geometry::seconds_from_ns;
+use crate::log_check::ImageRotation;
+use crate::sensors::{CameraRig, Rig};
 
 /// Stretches of the log that are looked at, spread evenly.
 const STRETCHES: usize = 3;

@@ -7,9 +7,9 @@ use std::sync::mpsc::Receiver;
 use thiserror::Error;
 
 use super::tracker::TrackedSensorFrame;
-use crate::flight_log::{ImuSample, JointAngles};
 use crate::frontend::TrackedFrame;
 use crate::geometry::RigidTransform;
+use crate::sensors::{ImuSample, JointAngles};
 
 /// Images further apart were not taken together. A vehicle that turns by 3 rad/s turns by 0.1° meanwhile, a pixel.
 const TOGETHER_NS: i64 = 500_000;
@@ -217,7 +217,8 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
-    use crate::flight_log::{GrayImage, SensorFrame};
+    use crate::flight_log::SensorFrame;
+    use crate::sensors::GrayImage;
 
     const PERIOD_NS: i64 = 50_000_000;
 

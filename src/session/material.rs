@@ -4,9 +4,9 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
 use super::instants::Instant;
 use crate::estimator::allocated_bytes;
-use crate::flight_log::{ImuSample, JointAngles};
 use crate::frontend::{TrackedFeature, TrackedFrame};
 use crate::geometry::RigidTransform;
+use crate::sensors::{ImuSample, JointAngles};
 
 /// Everything that one step of a run was given.
 ///

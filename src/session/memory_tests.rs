@@ -9,7 +9,8 @@ use super::material::Material;
 use super::run_engine::RunEngine;
 use super::tracker::TrackedSensorFrame;
 use crate::estimator::{ColumnGroup, Phase};
-use crate::flight_log::{GrayImage, JointAngles, SensorFrame};
+use crate::flight_log::SensorFrame;
+use crate::sensors::{GrayImage, JointAngles};
 use crate::simulation::{SyntheticFlight, SyntheticFrame, SyntheticOptions, synthetic_tracks};
 
 pub(super) fn tracked(frame: &SyntheticFrame, encoder_sigma_rad: f64) -> TrackedSensorFrame {

@@ -8,9 +8,9 @@ use thiserror::Error;
 
 use super::spec::{ParameterizationChoice, RunSpec, distinct_labels};
 use crate::estimator::{EstimatorConfig, rigid_columns};
-use crate::flight_log::rig::{CameraMount, CameraRig};
-use crate::flight_log::{FlightLog, LogError, Rig};
+use crate::flight_log::{FlightLog, LogError};
 use crate::gimbal::{Chain, Parameterization};
+use crate::sensors::{CameraMount, CameraRig, Rig};
 
 /// The most runs side by side.
 pub const MAX_RUNS: usize = 4;

@@ -16,8 +16,9 @@ use super::retaking::{Detail, Retaking, STEPS_AT_ONCE, Wish};
 use super::saved::Pending;
 use super::solver_trace::SolverPosition;
 use super::spec::{RunSpec, distinct_labels};
-use crate::flight_log::{GrayImage, ImageReader};
+use crate::flight_log::ImageReader;
 use crate::geometry::{ns_from_seconds, seconds_from_ns};
+use crate::sensors::GrayImage;
 
 /// A recording that grows while others look at it.
 #[derive(Debug)]

@@ -15,11 +15,12 @@ use super::retaking::{Retaken, Wish};
 use super::run_warnings::{RunWarning, add_warnings, warnings_of};
 use super::solver_trace::{SolverPosition, SolverTrace};
 use crate::estimator::{CalibrationEstimate, InformationGain, StepReport, allocated_bytes, rigid_columns};
-use crate::flight_log::{LogWarning, Rig};
+use crate::flight_log::LogWarning;
 use crate::frontend::TrackedFrame;
 use crate::geometry::RigidTransform;
 use crate::gimbal::{Chain, NearestForm, Parameterization};
 use crate::observability::RankReport;
+use crate::sensors::Rig;
 
 /// One step of one run with what it was computed from.
 #[derive(Clone, Debug)]

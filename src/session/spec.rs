@@ -3,7 +3,7 @@ use std::str::FromStr;
 
 use thiserror::Error;
 
-use crate::flight_log::Rig;
+use crate::sensors::Rig;
 
 /// Which parameterization a run estimates in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -5,8 +5,7 @@ use super::configuration::estimator_config;
 use super::plan::cameras_of_run;
 use super::spec::distinct_labels;
 use super::{ParameterizationChoice, RunSpec, RunSpecError};
-use crate::flight_log::Rig;
-use crate::flight_log::rig::CameraRig;
+use crate::sensors::{CameraRig, Rig};
 use crate::simulation::{SyntheticMount, SyntheticOptions, synthetic_tracks};
 
 /// The specification, and its message when it is refused.

@@ -6,12 +6,12 @@ use nalgebra::Vector3;
 
 use super::plan::SessionError;
 use super::stopwatch::Stopwatch;
-use crate::flight_log::rig::{CameraMount, Rig};
-use crate::flight_log::{FlightLog, FrameStream, LogWarning, SensorFrame};
+use crate::flight_log::{FlightLog, FrameStream, LogError, LogWarning, SensorFrame};
 use crate::frontend::{
     FrontEnd, FrontEndOptions, MountOrientation, PredictionNoise, TrackedFrame, predict_camera_rotation,
 };
 use crate::gimbal::ClassicalChain;
+use crate::sensors::{CameraMount, Rig};
 
 /// An image with its tracks.
 #[derive(Clone, Debug)]
@@ -48,7 +48,7 @@ impl CameraTracker {
         duration_s: Option<f64>,
     ) -> Result<Self, SessionError> {
         let stream = FrameStream::new(log, rig, camera_key, start_s, duration_s)?;
-        let camera = rig.camera(camera_key)?;
+        let camera = rig.camera(camera_key).map_err(LogError::from)?;
         Ok(Self {
             stream,
             front_end: FrontEnd::new(camera.model.clone(), FrontEndOptions::default()),

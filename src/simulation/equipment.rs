@@ -6,10 +6,9 @@ use super::gimbal::{joints, true_chain};
 use super::inertial::FIREFLY_IMU;
 use super::random::RandomStream;
 use crate::camera::{CameraModel, Distortion, Projection};
-use crate::flight_log::Rig;
-use crate::flight_log::rig::{CameraMount, CameraRig, ChainPrior, GimbalRig, ImuRig};
 use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::ClassicalChain;
+use crate::sensors::{CameraMount, CameraRig, ChainPrior, GimbalRig, ImuRig, Rig};
 
 /// Gravity in the simulated worlds, in m/s².
 pub(crate) const GRAVITY_M_PER_S2: f64 = 9.81;

@@ -5,7 +5,7 @@ use nalgebra::{Vector2, Vector3};
 use super::gimbal::LookAround;
 use super::random::RandomStream;
 use super::route::{Cruise, Flight, Pace, Path, Shuttle};
-use crate::flight_log::rig::ChainPrior;
+use crate::sensors::ChainPrior;
 
 /// One of the paper's experiments.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -7,9 +7,9 @@ use super::exercise::Exercise;
 use super::random::RandomStream;
 use super::route::Wave;
 use super::trajectory::Trajectory;
-use crate::flight_log::rig::Joint;
 use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::{ClassicalChain, DhLink};
+use crate::sensors::Joint;
 
 /// The joints of the paper's gimbal (§5.1): yaw ±180°, roll ±25°, pitch −120° to 30°.
 pub(crate) fn joints() -> Vec<Joint> {

@@ -4,9 +4,8 @@ use nalgebra::Vector3;
 
 use super::random::RandomStream;
 use super::trajectory::Trajectory;
-use crate::flight_log::ImuSample;
-use crate::flight_log::rig::ImuNoise;
 use crate::geometry::ns_from_seconds;
+use crate::sensors::{ImuNoise, ImuSample};
 
 /// Noise of the ADIS16448 as `RotorS` gives it, which the paper flew.
 pub(crate) const FIREFLY_IMU: ImuNoise = ImuNoise {

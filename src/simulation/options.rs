@@ -6,7 +6,7 @@ use super::disturbances::Disturbances;
 use super::equipment::Lens;
 use super::experiment::Experiment;
 use crate::flight_log::LogError;
-use crate::flight_log::rig::ChainPrior;
+use crate::sensors::ChainPrior;
 
 /// What `simulate` is to fly and record; [`SimulationOptions::new`] gives an experiment as the paper flew it.
 #[derive(Clone, Debug, PartialEq)]

@@ -5,9 +5,8 @@ use super::gimbal::{JointMotion, LookAround, Stabilizer};
 use super::inertial::{FIREFLY_IMU, InertialRecord};
 use super::random::RandomStream;
 use super::trajectory::Trajectory;
-use crate::flight_log::rig::{CameraMount, CameraRig, ChainPrior};
-use crate::flight_log::{JointSample, Rig};
 use crate::geometry::{RigidTransform, ns_from_seconds, seconds_from_ns};
+use crate::sensors::{CameraMount, CameraRig, ChainPrior, JointSample, Rig};
 
 /// Streams of random numbers, one per purpose, so that they do not disturb each other.
 pub(crate) mod stream {

@@ -17,9 +17,9 @@ use super::render::{Renderer, Sensor, SensorOptions, View, Workspace};
 use super::scenario::{Scenario, ScenarioOptions, gravity_m_per_s2, stream};
 use super::trajectory::{AIR_DRAG_PER_S, Trajectory, VehicleLimits};
 use super::world;
-use crate::flight_log::rig::CameraRig;
-use crate::flight_log::{ImuSample, JointSample, LogWriter, LogWriterOptions, MessageTimes};
+use crate::flight_log::{LogWriter, LogWriterOptions, MessageTimes};
 use crate::geometry::{ns_from_seconds, seconds_from_ns, so3};
+use crate::sensors::{CameraRig, ImuSample, JointSample};
 
 /// When simulated logs begin: 15 June 2025, 15:06:40 UTC.
 const EPOCH_NS: i64 = 1_750_000_000_000_000_000;

@@ -14,10 +14,9 @@ use super::route::{Drill, Flight, Pace, Station};
 use super::scenario::{Scenario, ScenarioOptions, gravity_m_per_s2, stream};
 use super::trajectory::{Trajectory, VehicleLimits};
 use crate::camera::CameraModel;
-use crate::flight_log::rig::ChainPrior;
-use crate::flight_log::{ImuSample, Rig};
 use crate::frontend::{FeatureId, FrontEndStatistics, TrackedFeature, TrackedFrame};
 use crate::geometry::{RigidTransform, ns_from_seconds};
+use crate::sensors::{ChainPrior, ImuSample, Rig};
 
 /// What carries the camera of a synthetic flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

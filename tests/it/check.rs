@@ -3,9 +3,9 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use dcvins::flight_log::check::{CheckReport, Finding, ImageRotation, Severity, check};
-use dcvins::flight_log::rig::CameraMount;
-use dcvins::flight_log::{FlightLog, Rig};
+use dcvins::flight_log::FlightLog;
+use dcvins::log_check::{CheckReport, Finding, ImageRotation, Severity, check};
+use dcvins::sensors::{CameraMount, Rig};
 use dcvins::session::image_rotations;
 use dcvins::simulation::{Experiment, SimulationOptions, simulate};
 use tempfile::TempDir;

@@ -4,10 +4,9 @@ use std::sync::Arc;
 
 use crate::calibration::{CalibrationInput, GimbalCamera, StaticCamera, TrackedView};
 use crate::estimator::{EstimatorConfig, EstimatorOptions, ImuBias, NavigationState};
-use crate::flight_log::rig::{CameraMount, ChainPrior};
-use crate::flight_log::{JointAngles, Rig};
 use crate::geometry::RigidTransform;
 use crate::gimbal::{ClassicalChain, Parameterization};
+use crate::sensors::{CameraMount, ChainPrior, JointAngles, Rig};
 use crate::simulation::{SyntheticFlight, SyntheticFrame, SyntheticMount, SyntheticOptions, synthetic_tracks};
 
 /// A flight seen by both cameras, and the truth.

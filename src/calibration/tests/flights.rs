@@ -2,9 +2,9 @@
 
 use super::fixture::flight;
 use crate::calibration::{CalibrationError, CalibrationOptions, calibrate, chain_distance, transform_distance};
-use crate::flight_log::rig::ChainPrior;
 use crate::geometry::wrap_angle;
 use crate::gimbal::{Chain, ClassicalChain, Parameterization};
+use crate::sensors::ChainPrior;
 use crate::simulation::SyntheticOptions;
 
 fn options(seed: u64) -> SyntheticOptions {

@@ -6,10 +6,9 @@ use crate::calibration::chain_distance;
 use crate::calibration::chain_prior::ChainTerm;
 use crate::calibration::pose_loop::{LoopNoise, LoopState, PairedSegment, PoseLoops, PosePair, SegmentFrame};
 use crate::estimator::RobustLoss;
-use crate::flight_log::JointAngles;
-use crate::flight_log::rig::ChainPrior;
 use crate::geometry::{RigidTransform, SplitMix64, so3, wrap_angle};
 use crate::gimbal::{Chain, ClassicalChain, Parameterization};
+use crate::sensors::{ChainPrior, JointAngles};
 use crate::simulation::{SyntheticOptions, synthetic_tracks};
 
 struct Random(SplitMix64);

@@ -50,9 +50,9 @@ pub use standstill::StandstillEstimate;
 use nalgebra::Vector3;
 
 use crate::estimator::ImuBias;
-use crate::flight_log::{ImuSample, rig::ImuNoise};
 use crate::frontend::{FeatureId, TrackedFeature};
 use crate::geometry::RigidTransform;
+use crate::sensors::{ImuNoise, ImuSample};
 
 /// One frame that the initialization may use.
 #[derive(Clone, Copy, Debug)]

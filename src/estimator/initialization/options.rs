@@ -1,4 +1,4 @@
-use crate::flight_log::rig::ChainPrior;
+use crate::sensors::ChainPrior;
 
 /// What to do while the vehicle stands still.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -4,9 +4,9 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::bearing::fit_rotation;
 use super::{InitializationFrame, InitializationOptions};
-use crate::flight_log::ImuSample;
 use crate::frontend::TrackedFeature;
 use crate::geometry::{seconds_from_ns, so3};
+use crate::sensors::ImuSample;
 
 /// Rotation of the camera of every frame, `first_imu_from_camera`, by gyroscope (bias taken off) and mount.
 pub(super) fn guessed_rotations(

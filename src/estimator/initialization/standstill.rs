@@ -6,7 +6,7 @@ use super::bearing::fit_rotation;
 use super::checks::{Checklist, Shown};
 use super::selection::shared_bearings;
 use super::{InitializationFrame, InitializationInput};
-use crate::flight_log::ImuSample;
+use crate::sensors::ImuSample;
 
 /// Length of the quiet stretch that counts as a standstill.
 const QUIET_S: f64 = 1.0;

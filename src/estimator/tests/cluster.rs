@@ -3,10 +3,10 @@
 use super::fixture;
 use super::flight::{chain_error, fly, trajectory_error_m};
 use crate::estimator::{Estimator, EstimatorConfig, EstimatorOptions, Phase, StepReport};
-use crate::flight_log::rig::ChainPrior;
 use crate::frontend::TrackedFrame;
 use crate::geometry::so3;
 use crate::gimbal::Parameterization;
+use crate::sensors::ChainPrior;
 use crate::simulation::{SyntheticFlight, SyntheticMount, SyntheticOptions, synthetic_tracks};
 
 /// One flight seen by both cameras.

@@ -12,9 +12,9 @@ use crate::estimator::window::{Frame, FrameState, Rates};
 use crate::estimator::{
     DEFAULT_CHAIN_PRIOR, Estimator, EstimatorConfig, EstimatorOptions, RigidCamera, StepInput, StepReport, features,
 };
-use crate::flight_log::{JointAngles, Rig};
 use crate::frontend::TrackedFrame;
 use crate::gimbal::{Chain, Parameterization};
+use crate::sensors::{JointAngles, Rig};
 use crate::simulation::{Lens, SyntheticFlight, SyntheticFrame, SyntheticMount, SyntheticOptions, synthetic_tracks};
 
 pub(super) fn camera(lens: Lens) -> CameraModel {

@@ -2,8 +2,8 @@ use nalgebra::{SVector, UnitQuaternion, Vector3};
 
 use crate::estimator::imu_factor;
 use crate::estimator::preintegration::{ImuBias, Matrix15, NavigationState, Preintegration, Vector15};
-use crate::flight_log::{ImuSample, rig::ImuNoise};
 use crate::geometry::{RigidTransform, ns_from_seconds, so3};
+use crate::sensors::{ImuNoise, ImuSample};
 
 const NOISE: ImuNoise = ImuNoise {
     accelerometer_noise_density: 0.004,

@@ -7,10 +7,10 @@ use nalgebra::Vector3;
 use super::flight::{fly, trajectory_error_m};
 use super::{Noise, fixture};
 use crate::estimator::{EstimatorOptions, EventKind, Phase, StepReport};
-use crate::flight_log::ImuSample;
 use crate::frontend::{FeatureId, TrackedFeature, TrackedFrame};
 use crate::geometry::seconds_from_ns;
 use crate::gimbal::Parameterization;
+use crate::sensors::ImuSample;
 use crate::simulation::{
     SyntheticFlight, SyntheticFrame, SyntheticMotion, SyntheticMount, SyntheticOptions, synthetic_tracks,
 };

@@ -8,9 +8,9 @@ use crate::estimator::calibrations::MAIN;
 use crate::estimator::dense::Cholesky;
 use crate::estimator::problem::Estimate;
 use crate::estimator::{Estimator, EstimatorConfig, EstimatorOptions, EventKind, Phase, StepReport};
-use crate::flight_log::ImuSample;
 use crate::frontend::FeatureId;
 use crate::gimbal::{Parameterization, transport_covariance};
+use crate::sensors::ImuSample;
 use crate::simulation::{
     Experiment, SyntheticFlight, SyntheticFrame, SyntheticMount, SyntheticOptions, synthetic_tracks,
 };

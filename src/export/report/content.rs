@@ -8,8 +8,8 @@ use super::ReportOptions;
 use super::inputs::InputFile;
 use super::story::{RankSpell, rank_story};
 use crate::export::summary::{RunSummary, log_name};
-use crate::flight_log::check::CheckReport;
 use crate::geometry::seconds_from_ns;
+use crate::log_check::CheckReport;
 use crate::session::{Recording, RunRecord};
 
 /// Something notable that happened.

@@ -18,7 +18,7 @@ use story::RankSpell;
 
 use super::error::ExportError;
 use super::run_files::{RunFileOptions, write_run};
-use crate::flight_log::check::CheckReport;
+use crate::log_check::CheckReport;
 use crate::session::Recording;
 
 /// A picture of a report.

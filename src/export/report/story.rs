@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use crate::export::tables::parameter_name;
-use crate::flight_log::Rig;
 use crate::geometry::seconds_from_ns;
 use crate::observability::RankReport;
+use crate::sensors::Rig;
 use crate::session::RunRecord;
 
 /// Ranks are told for stretches of at least this length, each by what was found most often in it: on a real flight the

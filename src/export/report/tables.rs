@@ -3,7 +3,7 @@
 use super::content::{ReportContent, RunContent};
 use super::html::{element, list, number, table};
 use crate::export::summary::ParameterSummary;
-use crate::flight_log::check::{CheckReport, Severity};
+use crate::log_check::{CheckReport, Severity};
 
 /// Millimetres of a metre, for lengths that are shown.
 const MM_PER_M: f64 = 1e3;

@@ -2,7 +2,8 @@
 
 use super::Names;
 use crate::export::tables::parameter_name;
-use crate::flight_log::{LogError, LogWriter, MessageTimes, Rig};
+use crate::flight_log::{LogError, LogWriter, MessageTimes};
+use crate::sensors::Rig;
 use crate::session::{RunRecord, StepRecord};
 
 /// What has to be the same in all rows.

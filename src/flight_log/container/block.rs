@@ -9,36 +9,36 @@ use super::{RECORD_HEADER, record_at};
 
 /// A stretch of the file that holds messages: one chunk record, or message records outside of chunks.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(in super::super) struct Block {
+pub(crate) struct Block {
     /// Its bytes in the file; the end lies beyond the file's when the log was cut inside it.
-    pub(in super::super) bytes: Range<usize>,
+    pub(crate) bytes: Range<usize>,
     /// Whether it is a chunk record.
-    pub(in super::super) is_chunk: bool,
+    pub(crate) is_chunk: bool,
     /// Smallest and largest log time of its messages.
-    pub(in super::super) log_time_ns: (u64, u64),
+    pub(crate) log_time_ns: (u64, u64),
 }
 
 /// One message in a decoded block.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(in super::super) struct MessageSpan {
-    pub(in super::super) channel_id: u16,
-    pub(in super::super) log_time_ns: u64,
+pub(crate) struct MessageSpan {
+    pub(crate) channel_id: u16,
+    pub(crate) log_time_ns: u64,
     /// Where its record begins in the block's records.
-    pub(in super::super) offset: usize,
+    pub(crate) offset: usize,
     /// Where its data lie in the block's records.
-    pub(in super::super) data: Range<usize>,
+    pub(crate) data: Range<usize>,
 }
 
 /// The records of a block, decompressed and checked.
 #[derive(Debug)]
-pub(in super::super) struct DecodedBlock {
+pub(crate) struct DecodedBlock {
     records: BlockBytes,
     /// In the order of the file.
-    pub(in super::super) messages: Vec<MessageSpan>,
+    pub(crate) messages: Vec<MessageSpan>,
     /// Schema and channel records, as opcode and body.
-    pub(in super::super) definitions: Vec<(u8, Range<usize>)>,
+    pub(crate) definitions: Vec<(u8, Range<usize>)>,
     /// What is wrong with the block; its readable messages, if any, are those before the damage.
-    pub(in super::super) damage: Option<String>,
+    pub(crate) damage: Option<String>,
 }
 
 #[derive(Debug)]
@@ -52,7 +52,7 @@ enum BlockBytes {
 impl DecodedBlock {
     /// Decodes one block of a file. A chunk whose checksum fails yields no message; one that the file's end cuts off
     /// yields those before the cut.
-    pub(in super::super) fn decode(file: &[u8], block: &Block) -> Self {
+    pub(crate) fn decode(file: &[u8], block: &Block) -> Self {
         if !block.is_chunk {
             let bytes = block.bytes.start..block.bytes.end.min(file.len());
             return Self::from_records(file, BlockBytes::Mapped(bytes), None);
@@ -102,12 +102,12 @@ impl DecodedBlock {
     }
 
     /// The bytes at a range of a [`MessageSpan`] or a definition.
-    pub(in super::super) fn bytes<'a>(&'a self, file: &'a [u8], range: &Range<usize>) -> &'a [u8] {
+    pub(crate) fn bytes<'a>(&'a self, file: &'a [u8], range: &Range<usize>) -> &'a [u8] {
         &self.records.of(file)[range.clone()]
     }
 
     /// The message whose record begins at an offset, as an index names it.
-    pub(in super::super) fn message_at(&self, offset: u64) -> Option<&MessageSpan> {
+    pub(crate) fn message_at(&self, offset: u64) -> Option<&MessageSpan> {
         let index = self.messages.binary_search_by_key(&offset, |message| message.offset as u64).ok()?;
         self.messages.get(index)
     }
@@ -123,10 +123,10 @@ impl BlockBytes {
 }
 
 /// Channel (2 bytes), sequence (4), log time (8), publish time (8).
-pub(super) const MESSAGE_HEADER: usize = 22;
+pub(crate) const MESSAGE_HEADER: usize = 22;
 
 /// Channel and log time of a message record's body.
-pub(super) fn message_header(body: &[u8]) -> Option<(u16, u64)> {
+pub(crate) fn message_header(body: &[u8]) -> Option<(u16, u64)> {
     let header = body.get(..MESSAGE_HEADER)?;
     let channel_id = u16::from_le_bytes([header[0], header[1]]);
     let log_time = u64::from_le_bytes([
@@ -136,7 +136,7 @@ pub(super) fn message_header(body: &[u8]) -> Option<(u16, u64)> {
 }
 
 /// The header of the chunk record at a block, with the range of its data in the file (cut at the file's end).
-pub(super) fn chunk_header(file: &[u8], block: &Block) -> Result<(ChunkHeader, Range<usize>), String> {
+pub(crate) fn chunk_header(file: &[u8], block: &Block) -> Result<(ChunkHeader, Range<usize>), String> {
     let body_start = block.bytes.start + RECORD_HEADER;
     let body = file.get(body_start..block.bytes.end.min(file.len())).ok_or("the file ends inside a chunk's header")?;
     if file[block.bytes.start] != op::CHUNK {
@@ -265,7 +265,7 @@ fn for_each_part(first: &[u8], second: &[u8], start: usize, count: usize, mut co
 
 /// The blocks decoded last.
 #[derive(Debug)]
-pub(in super::super) struct BlockCache {
+pub(crate) struct BlockCache {
     /// Most recently used last.
     entries: Vec<(usize, Arc<DecodedBlock>)>,
     capacity: usize,
@@ -273,17 +273,12 @@ pub(in super::super) struct BlockCache {
 
 impl BlockCache {
     /// A cache that keeps `capacity` blocks.
-    pub(in super::super) fn new(capacity: usize) -> Self {
+    pub(crate) fn new(capacity: usize) -> Self {
         Self { entries: Vec::with_capacity(capacity + 1), capacity }
     }
 
     /// The block with a number, decoded now or before. The file's bytes of the one that has to make room are released.
-    pub(in super::super) fn get(
-        &mut self,
-        file: &LogFile,
-        blocks: &[Block],
-        number: usize,
-    ) -> Option<Arc<DecodedBlock>> {
+    pub(crate) fn get(&mut self, file: &LogFile, blocks: &[Block], number: usize) -> Option<Arc<DecodedBlock>> {
         if let Some(found) = self.entries.iter().position(|(held, _)| *held == number) {
             let entry = self.entries.remove(found);
             let block = Arc::clone(&entry.1);
@@ -303,6 +298,6 @@ impl BlockCache {
 }
 
 /// Reads a chunk's schema and channel records by parsing them as MCAP records.
-pub(super) fn parse_definition(opcode: u8, body: &[u8]) -> Option<Record<'_>> {
+pub(crate) fn parse_definition(opcode: u8, body: &[u8]) -> Option<Record<'_>> {
     mcap::parse_record(opcode, body).ok()
 }

@@ -12,41 +12,41 @@ const PLAIN_BLOCK_BYTES: usize = 1 << 20;
 
 /// A channel of the log.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(in super::super) struct ChannelRecord {
-    pub(in super::super) topic: String,
+pub(crate) struct ChannelRecord {
+    pub(crate) topic: String,
     /// `sensor_msgs/msg/Imu`; empty without a schema.
-    pub(in super::super) schema_name: String,
+    pub(crate) schema_name: String,
     /// `cdr`.
-    pub(in super::super) encoding: String,
+    pub(crate) encoding: String,
 }
 
 /// Where one message lies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(in super::super) struct MessagePosition {
+pub(crate) struct MessagePosition {
     /// Nanoseconds since the epoch.
-    pub(in super::super) log_time_ns: u64,
+    pub(crate) log_time_ns: u64,
     /// Number of its block.
-    pub(in super::super) block: usize,
+    pub(crate) block: usize,
     /// Where its record begins in the block's records.
-    pub(in super::super) offset: u64,
+    pub(crate) offset: u64,
 }
 
 /// A file attached to the log.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(in super::super) struct AttachmentRef {
-    pub(in super::super) name: String,
+pub(crate) struct AttachmentRef {
+    pub(crate) name: String,
     /// Its record in the file.
-    pub(in super::super) bytes: Range<usize>,
+    pub(crate) bytes: Range<usize>,
 }
 
 /// Damage found while indexing.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(in super::super) struct Damage {
+pub(crate) struct Damage {
     /// First byte in the file that cannot be read.
-    pub(in super::super) byte: usize,
+    pub(crate) byte: usize,
     /// Largest log time read before it, 0 when there is none.
-    pub(in super::super) after_log_time_ns: u64,
-    pub(in super::super) problem: String,
+    pub(crate) after_log_time_ns: u64,
+    pub(crate) problem: String,
 }
 
 /// Where the messages of one channel lie in one block.
@@ -60,24 +60,24 @@ enum Entries {
 
 /// What lies where in an MCAP file.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(in super::super) struct ContainerIndex {
-    pub(in super::super) profile: String,
-    pub(in super::super) channels: BTreeMap<u16, ChannelRecord>,
+pub(crate) struct ContainerIndex {
+    pub(crate) profile: String,
+    pub(crate) channels: BTreeMap<u16, ChannelRecord>,
     /// In the order of the file.
-    pub(in super::super) blocks: Vec<Block>,
+    pub(crate) blocks: Vec<Block>,
     entries: Vec<BTreeMap<u16, Entries>>,
-    pub(in super::super) attachments: Vec<AttachmentRef>,
+    pub(crate) attachments: Vec<AttachmentRef>,
     /// Messages by channel, as the file's statistics count them.
-    pub(in super::super) statistics: Option<BTreeMap<u16, u64>>,
+    pub(crate) statistics: Option<BTreeMap<u16, u64>>,
     /// What was wrong, in the order of the file.
-    pub(in super::super) damages: Vec<Damage>,
+    pub(crate) damages: Vec<Damage>,
     /// Whether the file's own index was used.
-    pub(in super::super) from_summary: bool,
+    pub(crate) from_summary: bool,
 }
 
 impl ContainerIndex {
     /// Reads the file's index, or builds one when the file has none that can be trusted.
-    pub(in super::super) fn read(file: &[u8]) -> Self {
+    pub(crate) fn read(file: &[u8]) -> Self {
         match Self::from_summary(file) {
             Ok(index) => index,
             Err(reason) => {
@@ -302,7 +302,7 @@ impl ContainerIndex {
     }
 
     /// The content of an attachment, `None` when it is damaged.
-    pub(in super::super) fn attachment<'a>(file: &'a [u8], place: &AttachmentRef) -> Option<&'a [u8]> {
+    pub(crate) fn attachment<'a>(file: &'a [u8], place: &AttachmentRef) -> Option<&'a [u8]> {
         let record = record_at(file, place.bytes.start).ok().filter(|record| record.opcode == op::ATTACHMENT)?;
         attachment(record.body).map(|(_, content)| content)
     }

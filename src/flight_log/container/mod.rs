@@ -4,7 +4,7 @@ mod block;
 mod index;
 mod topic;
 
-pub(super) use block::{BlockCache, DecodedBlock, MessageSpan};
+pub(crate) use block::{BlockCache, DecodedBlock, MessageSpan};
 pub(super) use index::{ContainerIndex, MessagePosition};
 pub(super) use topic::TopicIndex;
 

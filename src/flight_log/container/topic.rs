@@ -3,7 +3,7 @@ use super::index::{ContainerIndex, MessagePosition};
 /// The messages of one topic in the order of their log times, found group by group as far as they are asked for: in a
 /// log of gigabytes the message indexes lie far apart.
 #[derive(Clone, Debug)]
-pub(in super::super) struct TopicIndex {
+pub(crate) struct TopicIndex {
     channel_ids: Vec<u16>,
     /// Blocks whose log times overlap, group after group in time order.
     groups: Vec<Vec<usize>>,
@@ -13,7 +13,7 @@ pub(in super::super) struct TopicIndex {
 }
 
 impl TopicIndex {
-    pub(in super::super) fn new(index: &ContainerIndex, channel_ids: &[u16]) -> Self {
+    pub(crate) fn new(index: &ContainerIndex, channel_ids: &[u16]) -> Self {
         let mut blocks = index.blocks_with(channel_ids);
         blocks.sort_by_key(|number| (index.blocks[*number].log_time_ns.0, *number));
         let mut groups: Vec<Vec<usize>> = Vec::new();
@@ -30,24 +30,19 @@ impl TopicIndex {
     }
 
     /// The position of a message, counted from the first one (or from where [`TopicIndex::skip_to`] went).
-    pub(in super::super) fn get(
-        &mut self,
-        index: &ContainerIndex,
-        file: &[u8],
-        number: usize,
-    ) -> Option<MessagePosition> {
+    pub(crate) fn get(&mut self, index: &ContainerIndex, file: &[u8], number: usize) -> Option<MessagePosition> {
         while self.loaded.len() <= number && self.load_group(index, file) {}
         self.loaded.get(number).copied()
     }
 
     /// Number of the first message at or after a log time.
-    pub(in super::super) fn first_at(&mut self, index: &ContainerIndex, file: &[u8], log_time_ns: u64) -> usize {
+    pub(crate) fn first_at(&mut self, index: &ContainerIndex, file: &[u8], log_time_ns: u64) -> usize {
         while self.loaded.last().is_none_or(|last| last.log_time_ns < log_time_ns) && self.load_group(index, file) {}
         self.loaded.partition_point(|position| position.log_time_ns < log_time_ns)
     }
 
     /// Leaves out the groups that end before a log time: messages are then counted from the first group that is left.
-    pub(in super::super) fn skip_to(&mut self, index: &ContainerIndex, log_time_ns: u64) {
+    pub(crate) fn skip_to(&mut self, index: &ContainerIndex, log_time_ns: u64) {
         let ends_before =
             |group: &&Vec<usize>| group.iter().all(|block| index.blocks[*block].log_time_ns.1 < log_time_ns);
         let count = self.groups.iter().take_while(ends_before).count();
@@ -55,13 +50,13 @@ impl TopicIndex {
     }
 
     /// The positions in the first group and in the last one.
-    pub(in super::super) fn ends(&self, index: &ContainerIndex, file: &[u8]) -> [Vec<MessagePosition>; 2] {
+    pub(crate) fn ends(&self, index: &ContainerIndex, file: &[u8]) -> [Vec<MessagePosition>; 2] {
         [self.groups.first(), self.groups.last()]
             .map(|group| group.map(|group| index.positions(file, group, &self.channel_ids)).unwrap_or_default())
     }
 
     /// How many messages there are, all counted.
-    pub(in super::super) fn count(&mut self, index: &ContainerIndex, file: &[u8]) -> usize {
+    pub(crate) fn count(&mut self, index: &ContainerIndex, file: &[u8]) -> usize {
         while self.load_group(index, file) {}
         self.loaded.len()
     }

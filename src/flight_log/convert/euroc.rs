@@ -5,11 +5,12 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-use super::super::{MessageTimes, Rig};
+use super::super::MessageTimes;
 use super::ConvertError;
 use super::euroc_sensor::{CameraSensor, rig_of, sensor_pose};
 use super::sink::Sink;
 use crate::geometry::RigidTransform;
+use crate::sensors::Rig;
 
 /// Topic of the inertial sensor.
 pub(super) const IMU_TOPIC: &str = "/imu0";

@@ -7,12 +7,12 @@ use nalgebra::Matrix4;
 use serde_json::Value;
 
 use super::super::LogError;
-use super::super::rig::{CameraMount, CameraRig, ImuNoise, ImuRig, Rig};
 use super::ConvertError;
 use super::euroc::{IMU_TOPIC, image_topic};
 use super::sink::Sink;
 use crate::camera::CameraModel;
 use crate::geometry::{RigidTransform, seconds_from_ns};
+use crate::sensors::{CameraMount, CameraRig, ImuNoise, ImuRig, Rig};
 
 /// Gravity that the dataset's authors use.
 const GRAVITY_M_PER_S2: f64 = 9.81;

@@ -22,8 +22,9 @@ use std::path::{Path, PathBuf};
 pub use error::ConvertError;
 pub use report::{ConversionReport, ConvertedTopic};
 
-use super::{FlightLog, LogWriter, LogWriterOptions, Rig};
+use super::{FlightLog, LogWriter, LogWriterOptions};
 use crate::geometry::seconds_from_ns;
+use crate::sensors::Rig;
 use sink::Sink;
 
 /// What a source is.

@@ -4,11 +4,11 @@ use serde_json::Value;
 
 use super::super::messages::{self, CameraInfoMessage, MessageKind};
 use super::super::{FlightLog, LogError};
-use super::Rig;
 use super::fields::Field;
 use super::kalibr;
 use super::read::{self, CameraFacts, NoFacts};
 use crate::camera::CameraModel;
+use crate::sensors::Rig;
 
 impl Rig {
     /// Reads a rig file: our own schema, or Kalibr's `camchain-imucam.yaml` with `imu.yaml` beside it.

@@ -7,7 +7,7 @@ use serde_json::Value;
 use super::super::LogError;
 use super::fields::Field;
 use super::read::{self, CameraFacts};
-use super::{CameraMount, Rig};
+use crate::sensors::{CameraMount, Rig};
 
 /// Names that Kalibr and its users give to the IMU's file.
 const IMU_FILES: [&str; 3] = ["imu.yaml", "imu0.yaml", "imu-calib.yaml"];

@@ -4,9 +4,9 @@ use serde_json::Value;
 
 use super::super::LogError;
 use super::fields::Field;
-use super::{CameraMount, CameraRig, ChainPrior, GimbalRig, ImuNoise, ImuRig, Joint, Rig};
 use crate::camera::{CameraError, CameraModel};
 use crate::gimbal::{ClassicalChain, DhLink};
+use crate::sensors::{CameraMount, CameraRig, ChainPrior, GimbalRig, ImuNoise, ImuRig, Joint, Rig};
 
 /// The version of the schema that is read and written.
 const RIG_VERSION: u64 = 1;
@@ -14,7 +14,7 @@ const RIG_VERSION: u64 = 1;
 pub(super) const STANDARD_GRAVITY_M_PER_S2: f64 = 9.81;
 
 /// What a log can add to a rig that leaves it open, by image topic.
-pub(in super::super) trait CameraFacts {
+pub(crate) trait CameraFacts {
     /// The lens from the camera's `CameraInfo`, or why there is none.
     fn camera_model(&self, image_topic: &str) -> Result<CameraModel, String>;
     /// Mean rate of the images.

@@ -1,7 +1,7 @@
 use std::path::Path;
 
-use super::Rig;
 use crate::flight_log::LogError;
+use crate::sensors::Rig;
 
 impl Rig {
     /// Writes the rig as YAML, with `appended` (further top-level entries, or nothing) at its end.

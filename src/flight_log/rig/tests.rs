@@ -1,8 +1,8 @@
 use std::fs;
 use std::path::Path;
 
-use super::Rig;
 use crate::flight_log::tests::RIG;
+use crate::sensors::{CameraMount, Rig};
 
 fn parse(text: &str) -> Result<Rig, String> {
     Rig::from_yaml(text, Path::new("some.rig.yaml")).map_err(|error| error.to_string())
@@ -35,7 +35,7 @@ fn check_same(a: &Rig, b: &Rig) {
         *b = *a;
     };
     for (a, b) in a.cameras.iter().zip(&mut b.cameras) {
-        if let (super::CameraMount::Static { imu_from_camera: a }, super::CameraMount::Static { imu_from_camera: b }) =
+        if let (CameraMount::Static { imu_from_camera: a }, CameraMount::Static { imu_from_camera: b }) =
             (&a.mount, &mut b.mount)
         {
             settle(a, b);
@@ -158,7 +158,7 @@ fn kalibrs_files_are_a_rig() {
     assert_eq!((rig.imu.topic.as_str(), rig.imu.rate_hz, rig.cameras.len()), ("/imu0", 200.0, 1));
     let camera = &rig.cameras[0];
     assert_eq!(camera.timeshift_cam_imu_s, 0.0012);
-    let super::CameraMount::Static { imu_from_camera } = &camera.mount else { panic!("static") };
+    let CameraMount::Static { imu_from_camera } = &camera.mount else { panic!("static") };
     assert!((imu_from_camera.inverse().translation_m.x - 0.065).abs() < 1e-15);
     check_same(&rig, &parse(&rig.to_yaml()).unwrap());
 

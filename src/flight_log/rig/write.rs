@@ -1,7 +1,7 @@
 use std::fmt::Write as _;
 
-use super::{CameraMount, CameraRig, GimbalRig, Rig};
 use crate::geometry::RigidTransform;
+use crate::sensors::{CameraMount, CameraRig, GimbalRig, Rig};
 
 impl Rig {
     /// The rig as a YAML file in the classical form. Numbers are written so that they read back exactly; rotation

@@ -3,15 +3,15 @@
 use nalgebra::{Matrix3, Vector3};
 
 /// A reading: seconds after the instant, and the angle there in radians, not wrapped.
-pub(in crate::flight_log) type Reading = (f64, f64);
+pub(crate) type Reading = (f64, f64);
 
 /// The angle at the instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::flight_log) struct FittedAngle {
-    pub(in crate::flight_log) angle_rad: f64,
-    pub(in crate::flight_log) rate_rad_per_s: f64,
+pub(crate) struct FittedAngle {
+    pub(crate) angle_rad: f64,
+    pub(crate) rate_rad_per_s: f64,
     /// From white noise on the readings, and from what the motion between them may have done.
-    pub(in crate::flight_log) variance_rad2: f64,
+    pub(crate) variance_rad2: f64,
 }
 
 /// How strongly a gimbal accelerates its joints, as a standard deviation.
@@ -26,7 +26,7 @@ const ACCELERATION_RAD_PER_S2: f64 = 10.0;
 ///
 /// It is the linear estimate with the least mean square error for such a motion, exact for a constant rate.
 /// `None` for fewer than two instants.
-pub(in crate::flight_log) fn fit(readings: &[Reading], white_variance_rad2: f64) -> Option<FittedAngle> {
+pub(crate) fn fit(readings: &[Reading], white_variance_rad2: f64) -> Option<FittedAngle> {
     if readings.len() < 2 {
         return None;
     }
@@ -39,7 +39,7 @@ pub(in crate::flight_log) fn fit(readings: &[Reading], white_variance_rad2: f64)
 }
 
 /// Squared distances from the plain parabola through the readings, summed, and the degrees of freedom left for them.
-pub(super) fn scatter(readings: &[Reading]) -> Option<(f64, usize)> {
+pub(crate) fn scatter(readings: &[Reading]) -> Option<(f64, usize)> {
     let freedom = readings.len().checked_sub(3).filter(|freedom| *freedom > 0)?;
     let parabola = Parabola::fit(readings, 1.0, None)?;
     Some((readings.iter().map(|reading| parabola.distance(reading).powi(2)).sum(), freedom))

@@ -3,11 +3,12 @@ use std::sync::Arc;
 
 use super::super::messages::{self, MessageKind};
 use super::super::picture::{BitDepth, decode_picture};
-use super::super::{FlightLog, GrayImage, ImuSample, LogError, LogWarning, PoseSample, Rig, SensorFrame};
+use super::super::{FlightLog, LogError, LogWarning, SensorFrame};
 use super::joint_angles::JointAngleStream;
 use super::joint_topic::JointSamples;
 use super::ordered::{Decoder, MessageSource, OrderedSamples, ReadContext, Refusal};
 use crate::geometry::{RigidTransform, ns_from_seconds, seconds_from_ns};
+use crate::sensors::{GrayImage, ImuSample, PoseSample, Rig};
 
 /// How far back the first frame's IMU samples go.
 const FIRST_FRAME_IMU_NS: i64 = 2_000_000_000;

@@ -2,11 +2,11 @@
 
 use std::collections::VecDeque;
 
-use super::super::{JointAngles, JointSample};
 use super::angle_fit::{self, Reading};
 use super::joint_topic::JointSamples;
 use super::ordered::ReadContext;
 use crate::geometry::{seconds_from_ns, wrap_angle};
+use crate::sensors::{JointAngles, JointSample};
 
 /// A reading further than this from the stamp tells nothing about the angle there.
 const NEAREST_NS: i64 = 100_000_000;

@@ -2,10 +2,10 @@
 
 use super::super::joint_merge::{JointMerge, JointReading};
 use super::super::messages::{self, JointMessage, MessageKind};
-use super::super::rig::GimbalRig;
-use super::super::{FlightLog, JointSample, LogError};
+use super::super::{FlightLog, LogError};
 use super::frames::not_decodable;
 use super::ordered::{Decoder, MessageSource, OrderedSamples, ReadContext, Refusal};
+use crate::sensors::{GimbalRig, JointSample};
 
 /// So many messages may pass before every joint of the rig has been named once.
 const MESSAGES_LOOKED_AT: usize = 1000;

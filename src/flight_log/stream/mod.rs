@@ -1,6 +1,6 @@
 //! The log as one camera's frames, each with the samples of the other sensors that belong to it.
 
-pub(super) mod angle_fit;
+pub(crate) mod angle_fit;
 mod frames;
 mod joint_angles;
 mod joint_topic;
@@ -13,7 +13,8 @@ use std::sync::mpsc::{Receiver, sync_channel};
 use std::thread::JoinHandle;
 
 use self::frames::FrameSource;
-use super::{FlightLog, LogError, LogWarning, Rig, SensorFrame};
+use super::{FlightLog, LogError, LogWarning, SensorFrame};
+use crate::sensors::Rig;
 
 /// Frames made ahead of the reader; one takes about half a megabyte.
 const FRAMES_AHEAD: usize = 6;

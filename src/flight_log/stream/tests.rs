@@ -1,8 +1,8 @@
 //! What batches of encoder readings give, over many draws of their noise.
 
 use super::joint_angles::EncoderAverage;
-use crate::flight_log::{JointAngles, JointSample};
 use crate::geometry::{SplitMix64, ns_from_seconds, seconds_from_ns};
+use crate::sensors::{JointAngles, JointSample};
 
 const IMAGE_NS: i64 = 50_000_000;
 const READING_NS: i64 = 5_000_000;

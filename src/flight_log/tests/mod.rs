@@ -12,10 +12,10 @@ use nalgebra::Vector3;
 use tempfile::TempDir;
 
 use super::{
-    FlightLog, FrameStream, GrayImage, LogCompression, LogWarning, LogWriter, LogWriterOptions, MessageTimes, Rig,
-    SensorFrame,
+    FlightLog, FrameStream, LogCompression, LogWarning, LogWriter, LogWriterOptions, MessageTimes, SensorFrame,
 };
 use crate::geometry::{RigidTransform, so3};
+use crate::sensors::{GrayImage, Rig};
 
 /// Absolute header stamp of the first message.
 const EPOCH_NS: i64 = 1_700_000_000_250_000_000;

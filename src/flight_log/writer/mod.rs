@@ -18,9 +18,10 @@ use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, Compression, WriteOptions, Writer};
 use nalgebra::Vector3;
 
-use super::{GrayImage, LogError, MessageKind};
+use super::{LogError, MessageKind};
 use crate::camera::CameraModel;
 use crate::geometry::RigidTransform;
+use crate::sensors::GrayImage;
 
 /// How the chunks of a log are compressed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

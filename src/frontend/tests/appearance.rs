@@ -3,11 +3,11 @@
 use nalgebra::{Matrix2, Vector2};
 
 use super::{scene, texture};
-use crate::flight_log::GrayImage;
 use crate::frontend::appearance::Appearance;
 use crate::frontend::keyed::{CENTRE, LANES, Rows, SIDE, WINDOW};
 use crate::frontend::pyramid::cut_out;
 use crate::frontend::resample::Patch;
+use crate::sensors::GrayImage;
 
 fn read(image: &GrayImage, warp: &Matrix2<f64>, middle: &Vector2<f64>) -> Option<Rows> {
     let mut window = [[0.0; LANES]; WINDOW];

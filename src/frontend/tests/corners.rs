@@ -3,8 +3,8 @@
 use nalgebra::Vector2;
 
 use super::{blank, scene, texture};
-use crate::flight_log::GrayImage;
 use crate::frontend::corners::{CornerDetector, CornerOptions};
+use crate::sensors::GrayImage;
 
 fn detect(image: &GrayImage, existing: &[Vector2<f64>], options: &CornerOptions) -> Vec<Vector2<f64>> {
     let mut found = Vec::new();

@@ -4,9 +4,9 @@ use nalgebra::Vector2;
 
 use super::homography::Scene;
 use super::{blank, median, scene, texture};
-use crate::flight_log::GrayImage;
 use crate::frontend::Pyramid;
 use crate::frontend::lucas_kanade::{LucasKanadeOptions, track};
+use crate::sensors::GrayImage;
 
 fn pyramid(image: &GrayImage) -> Pyramid {
     let mut pyramid = Pyramid::default();

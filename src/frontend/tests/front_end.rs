@@ -4,10 +4,10 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::homography::{Scene, Texture};
 use super::{blank, camera_of, median, scene, texture};
-use crate::flight_log::GrayImage;
 use crate::frontend::corners::CornerOptions;
 use crate::frontend::{FeatureId, FrontEnd, FrontEndError, FrontEndOptions, PredictedRotation, TrackedFrame};
 use crate::geometry::so3;
+use crate::sensors::GrayImage;
 
 fn front_end(scene: &Scene) -> FrontEnd {
     let corners = CornerOptions { max_features: 60, min_distance_px: 18.0, ..Default::default() };

@@ -4,9 +4,9 @@ use nalgebra::Vector2;
 
 use super::homography::Scene;
 use super::{blank, camera_of, median, scene, texture};
-use crate::flight_log::GrayImage;
 use crate::frontend::keyed::{Key, KeyFinder, KeyOptions, Sighting};
 use crate::frontend::{FeatureId, FrontEnd, FrontEndOptions};
+use crate::sensors::GrayImage;
 
 /// Whole-pixel and fractional places well inside the image.
 fn places() -> Vec<Vector2<f64>> {

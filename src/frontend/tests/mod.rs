@@ -7,7 +7,7 @@ mod keyed;
 mod motion;
 
 use crate::camera::CameraModel;
-use crate::flight_log::GrayImage;
+use crate::sensors::GrayImage;
 use homography::{Scene, Texture};
 
 /// A plane of rich texture before a small camera.

@@ -3,11 +3,11 @@
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use super::homography::Dice;
-use crate::flight_log::ImuSample;
 use crate::frontend::outliers::{BearingPair, OutlierOptions, fit_rotation, judge};
 use crate::frontend::{MountOrientation, PredictedRotation, PredictionNoise, predict_camera_rotation};
 use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::{ClassicalChain, DhLink};
+use crate::sensors::ImuSample;
 
 const FOCAL_PX: f64 = 450.0;
 

@@ -11,7 +11,6 @@ use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
 use egui::{CentralPanel, Frame, Ui, ViewportCommand};
 
-use crate::flight_log::GrayImage;
 use crate::gui::desktop::Desktop;
 use crate::gui::theme::{Theme, ThemeName};
 use crate::gui::units::counted;
@@ -20,6 +19,7 @@ use crate::gui::window::{
     NoticeLevel, PanelExport, ProgressMeter, SCALES, SavedLayouts, Settings, WindowRequest, WindowState, window_ui,
 };
 use crate::gui::{ImageSource, PanelContext, Playback, Selection};
+use crate::sensors::GrayImage;
 use crate::session::{Command, PlaybackSpeed, Recording};
 
 /// A log that plays: what the window needs of a session.

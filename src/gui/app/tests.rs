@@ -8,12 +8,12 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 
 use super::{App, OpenLog, PlayingLog};
-use crate::flight_log::GrayImage;
 use crate::gui::desktop::{Desktop, PathEntry};
 use crate::gui::sample_recording::{FRAME_PERIOD_NS, sample_images, sample_recording_of};
 use crate::gui::theme::ThemeName;
 use crate::gui::window::PanelExport;
 use crate::gui::{ImageSource as _, Playback};
+use crate::sensors::GrayImage;
 use crate::session::{Command, Recording};
 
 /// A log that is computed already.

@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 
 use crate::estimator::rigid_columns;
-use crate::flight_log::Rig;
 use crate::gimbal::{NearestForm, Parameterization};
 use crate::gui::chain_values::{NamedValues, named_values, turn_towards};
 use crate::gui::follow::Follower;
 use crate::observability::RankReport;
+use crate::sensors::Rig;
 use crate::session::{RunRecord, StepRecord};
 
 /// A parameter counts as lost to a set of directions when this much of its squared unit vector lies in them.

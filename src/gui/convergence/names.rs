@@ -1,6 +1,6 @@
 //! Parameter names: their order along the chain and what they mean.
 
-use crate::flight_log::Rig;
+use crate::sensors::Rig;
 
 /// Where a parameter belongs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

@@ -13,11 +13,10 @@ use egui::{Align2, ColorImage, PopupCloseBehavior, Rect, Sense, TextureHandle, T
 use self::model::ImageModel;
 pub use self::model::SolveSide;
 use self::paint::{ImagePlacement, MarkOptions};
-use super::PanelContext;
-use super::slide;
 use super::theme::Theme;
 use super::units::figure;
-use crate::flight_log::GrayImage;
+use super::{PanelContext, slide};
+use crate::sensors::GrayImage;
 
 /// Furthest that the image can be magnified over its fitting size.
 const LARGEST_ZOOM: f32 = 16.0;

@@ -139,7 +139,7 @@ fn a_click_selects_the_feature_under_it() {
 fn missing_runs_frames_and_images_are_said() {
     struct NoImages;
     impl ImageSource for NoImages {
-        fn image(&mut self, _: &str, _: usize) -> Option<std::sync::Arc<crate::flight_log::GrayImage>> {
+        fn image(&mut self, _: &str, _: usize) -> Option<std::sync::Arc<crate::sensors::GrayImage>> {
             None
         }
     }

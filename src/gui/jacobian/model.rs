@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use crate::camera::CameraModel;
 use crate::estimator::{ColumnGroup, JacobianFactor, StepJacobian};
-use crate::flight_log::Rig;
 use crate::gui::units::counted;
+use crate::sensors::Rig;
 use crate::session::{RunRecord, StepRecord};
 
 /// Decades that the colours span at most.

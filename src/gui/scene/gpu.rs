@@ -10,7 +10,7 @@ use egui::PaintCallbackInfo;
 use wgpu::util::DeviceExt as _;
 
 use super::layout::{Corner, Disc, Drawing, PictureCorner, Segment};
-use crate::flight_log::GrayImage;
+use crate::sensors::GrayImage;
 
 /// Samples per pixel, as on the CPU.
 const SAMPLES: u32 = 4;

@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 
 use super::camera::{ScreenPoint, View, length};
 use super::model::{Line, Picture, SceneModel};
-use crate::flight_log::GrayImage;
+use crate::sensors::GrayImage;
 
 /// Lines lie this much nearer than what they are drawn on.
 const LINE_LIFT: f64 = 1.004;

@@ -27,7 +27,7 @@ use self::overlay::LegendLine;
 use self::world::{RunView, Trajectories, WorldBuilder, WorldOptions, framing_points_m, ground_height_m};
 use super::{PanelContext, slide};
 use crate::camera::CameraModel;
-use crate::flight_log::Rig;
+use crate::sensors::Rig;
 use crate::session::RunRecord;
 
 /// What the view of the world keeps in its middle.

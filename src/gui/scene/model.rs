@@ -5,8 +5,8 @@ use std::sync::Arc;
 use egui::Color32;
 use nalgebra::Vector3;
 
-use crate::flight_log::GrayImage;
 use crate::geometry::RigidTransform;
+use crate::sensors::GrayImage;
 
 /// A line through several points.
 #[derive(Clone, Debug, PartialEq)]

@@ -10,7 +10,6 @@ use super::chain::{ChainModel, ChainPose};
 use super::layout::{Drawing, lay_out};
 use super::model::{Dot, Face, Line, Picture, SceneModel};
 use super::{Follow, ScenePanel, cpu};
-use crate::flight_log::GrayImage;
 use crate::gui::Selection;
 use crate::gui::headless::{HeadlessOptions, draw};
 use crate::gui::sample_recording::{
@@ -18,6 +17,7 @@ use crate::gui::sample_recording::{
 };
 use crate::gui::tests::{keep_picture, with_context};
 use crate::gui::theme::{Theme, ThemeName};
+use crate::sensors::GrayImage;
 use crate::session::Recording;
 
 const GROUND: Color32 = Color32::from_rgb(1, 2, 3);

@@ -10,10 +10,10 @@ use super::chain::axis_colors;
 use super::model::{Dot, Picture, SceneModel};
 use crate::camera::CameraModel;
 use crate::estimator::{FrameStateReport, LandmarkReport};
-use crate::flight_log::GrayImage;
 use crate::geometry::RigidTransform;
 use crate::gui::follow::{RunTables, StepTable};
 use crate::gui::theme::{Theme, mix};
+use crate::sensors::GrayImage;
 use crate::session::{Recording, RunRecord};
 
 /// Most points that one trajectory is drawn with.

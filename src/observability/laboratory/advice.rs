@@ -13,8 +13,8 @@ use super::mechanism::LaboratoryJoint;
 use crate::estimator::{
     EstimatorOptions, LandmarkModel, NavigationState, PoseKnowledge, SupposedFrame, SupposedLandmark, SupposedWindow,
 };
-use crate::flight_log::ImuSample;
 use crate::geometry::{RigidTransform, ns_from_seconds, so3};
+use crate::sensors::ImuSample;
 use crate::simulation::{Exercise, JOINT_PERIOD_S, JointSwing, SWING_M, VehicleSwing, YAW_SWING_RAD};
 
 /// How long a candidate is flown, in seconds.

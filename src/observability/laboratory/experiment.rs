@@ -9,10 +9,10 @@ use crate::camera::CameraModel;
 use crate::estimator::{
     JointKnowledge, LandmarkModel, PoseKnowledge, SupposedFrame, SupposedLandmark, SupposedWindow, gravity_in_world,
 };
-use crate::flight_log::rig::ImuNoise;
 use crate::geometry::SplitMix64;
 use crate::gimbal::{Chain, Parameterization};
 use crate::observability::{RankReport, analyse};
+use crate::sensors::ImuNoise;
 
 /// A parameterization of the mechanism, with or without its joint offsets as columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

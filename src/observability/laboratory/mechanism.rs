@@ -5,9 +5,9 @@ use std::f64::consts::PI;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use thiserror::Error;
 
-use crate::flight_log::Rig;
 use crate::geometry::{RigidTransform, SplitMix64, so3};
 use crate::gimbal::{ClassicalChain, DhLink};
+use crate::sensors::Rig;
 
 /// A joint of a mechanism.
 #[derive(Clone, Debug, PartialEq)]

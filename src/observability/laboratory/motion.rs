@@ -7,8 +7,8 @@ use thiserror::Error;
 
 use super::mechanism::Mechanism;
 use crate::estimator::{ImuBias, NavigationState};
-use crate::flight_log::ImuSample;
 use crate::geometry::{RigidTransform, ns_from_seconds, so3};
+use crate::sensors::ImuSample;
 
 /// How the vehicle moves, or what the camera is to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -7,10 +7,9 @@ use super::mechanism::LaboratoryJoint;
 use super::{LaboratoryForm, LaboratorySetup};
 use crate::camera::CameraModel;
 use crate::estimator::{JointKnowledge, NavigationState, PoseKnowledge, StepReport, gravity_in_world};
-use crate::flight_log::Rig;
-use crate::flight_log::rig::ImuNoise;
 use crate::gimbal::Chain;
 use crate::observability::{RankReport, analyse, chain_of_step};
+use crate::sensors::{ImuNoise, Rig};
 
 /// A moment of a flight.
 #[derive(Clone, Debug)]

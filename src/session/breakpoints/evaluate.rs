@@ -3,7 +3,7 @@
 use super::expression::{Arithmetic, Condition, Number, Span, Truth};
 use super::quantities::NamedNumber;
 use crate::estimator::ResidualSummary;
-use crate::flight_log::Rig;
+use crate::sensors::Rig;
 use crate::session::StepRecord;
 
 /// A step as a condition sees it.

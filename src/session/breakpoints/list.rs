@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::evaluate::{Moment, NamedValue};
 use super::expression::Condition;
-use crate::flight_log::Rig;
+use crate::sensors::Rig;
 use crate::session::{Recording, RunRecord};
 
 /// A step in which a breakpoint was hit.

@@ -2,8 +2,8 @@ use std::sync::Arc;
 
 use super::{Breakpoints, Condition, Moment};
 use crate::estimator::{Event, EventKind, IterationReport, ResidualSummary};
-use crate::flight_log::Rig;
 use crate::observability::RankReport;
+use crate::sensors::Rig;
 use crate::session::memory_tests::recorded;
 use crate::session::{Recording, RunRecord, StepRecord};
 use crate::simulation::{SyntheticOptions, synthetic_tracks};

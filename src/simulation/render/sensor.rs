@@ -1,5 +1,5 @@
 use super::view::View;
-use crate::flight_log::GrayImage;
+use crate::sensors::GrayImage;
 use crate::simulation::random::mix;
 
 /// What a camera's sensor does to the light.

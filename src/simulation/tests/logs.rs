@@ -2,7 +2,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::super::{Disturbances, Experiment, SimulationError, SimulationOptions, SimulationSummary, simulate};
-use crate::flight_log::{FlightLog, FrameStream, Rig};
+use crate::flight_log::{FlightLog, FrameStream};
+use crate::sensors::Rig;
 
 fn small(experiment: Experiment) -> SimulationOptions {
     SimulationOptions { duration_s: Some(1.0), resolution_px: [96, 72], ..SimulationOptions::new(experiment) }

@@ -6,8 +6,8 @@ use super::super::random::RandomStream;
 use super::super::render::{Renderer, Sensor, SensorOptions, View, Workspace};
 use super::super::world::{self, World};
 use super::flight::experiment_trajectory;
-use crate::flight_log::GrayImage;
 use crate::geometry::{RigidTransform, so3};
+use crate::sensors::GrayImage;
 
 /// A picture from a place, looking along a heading, 8° down.
 fn picture(world: &World, lens: Lens, place_m: [f64; 3], heading_deg: f64) -> GrayImage {

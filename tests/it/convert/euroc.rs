@@ -5,8 +5,8 @@ use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 
-use dcvins::flight_log::rig::CameraMount;
-use dcvins::flight_log::{FlightLog, FrameStream, Rig, SensorFrame};
+use dcvins::flight_log::{FlightLog, FrameStream, SensorFrame};
+use dcvins::sensors::{CameraMount, Rig};
 use image::{GrayImage, Luma};
 use nalgebra::Vector3;
 

@@ -7,9 +7,9 @@ use crate::estimator::initialization::VectorPrior;
 use crate::estimator::initialization::refinement::{RefinedState, Refinement, RefinementInput};
 use crate::estimator::initialization::visual_problem::{Landmark, Sighting};
 use crate::estimator::{ImuBias, Preintegration};
-use crate::flight_log::ImuSample;
 use crate::frontend::FeatureId;
 use crate::geometry::{RigidTransform, so3};
+use crate::sensors::ImuSample;
 
 fn increments(count: usize, random: &mut Random) -> Vec<Preintegration> {
     (0..count)

@@ -2,9 +2,9 @@
 
 use nalgebra::{UnitQuaternion, Vector2, Vector3};
 
-use crate::flight_log::{ImuSample, rig::ImuNoise};
 use crate::frontend::{FeatureId, TrackedFeature};
 use crate::geometry::{RigidTransform, SplitMix64, so3};
+use crate::sensors::{ImuNoise, ImuSample};
 
 pub(super) const GRAVITY: f64 = 9.81;
 pub(super) const FOCAL_PX: f64 = 352.0;

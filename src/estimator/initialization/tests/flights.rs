@@ -8,7 +8,7 @@ use crate::estimator::initialization::{
     InitializationFrame, InitializationInput, InitializationOptions, InitializationOrigin, InitializationOutcome,
     InitializationSolution, StandstillEstimate, StandstillPolicy, WaitReason, try_initialize,
 };
-use crate::flight_log::rig::ChainPrior;
+use crate::sensors::ChainPrior;
 
 fn options_for(flight: &FlightOptions) -> InitializationOptions {
     let options = InitializationOptions::default().for_camera(FOCAL_PX, 1.0);

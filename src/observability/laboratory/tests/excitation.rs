@@ -4,9 +4,9 @@ use super::super::{
     Advice, LABORATORY_IMU, LaboratoryForm, LaboratoryMotion, LaboratorySetup, Mechanism, Situation, advise, excitation,
 };
 use crate::estimator::{Estimator, EstimatorConfig, EstimatorOptions, StepInput, StepReport};
-use crate::flight_log::{JointAngles, Rig};
 use crate::gimbal::{Chain, Parameterization};
 use crate::observability::{RankReport, analyse};
+use crate::sensors::{JointAngles, Rig};
 use crate::simulation::{
     Exercise, SyntheticFlight, SyntheticFrame, SyntheticMotion, SyntheticOptions, VehicleSwing, synthetic_tracks,
 };

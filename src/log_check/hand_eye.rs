@@ -4,14 +4,13 @@
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
-use super::super::Rig;
-use super::super::rig::{CameraMount, CameraRig};
 use super::inertial::InertialFacts;
 use super::statistics::median;
 use super::survey::Survey;
 use super::{Area, Findings, ImageRotation, Severity};
 use crate::geometry::{ns_from_seconds, so3};
 use crate::gimbal::ClassicalChain;
+use crate::sensors::{CameraMount, CameraRig, Rig};
 
 /// Fewer image rotations than this say nothing.
 const FEWEST_ROTATIONS: usize = 20;

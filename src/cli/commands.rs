@@ -9,14 +9,16 @@ use std::sync::{Mutex, PoisonError};
 use anyhow::{Context as _, Result, bail};
 use dcvins::calibration::CalibrationOptions;
 use dcvins::export::{self, EvaluationOptions, RunFileOptions, RunSummary};
-use dcvins::flight_log::{self, FlightLog, Rig};
+use dcvins::flight_log::{self, FlightLog};
 use dcvins::geometry::seconds_from_ns;
+use dcvins::log_check;
 use dcvins::observability::LEAST_FALSE_GAIN;
+use dcvins::sensors::Rig;
 use dcvins::session::breakpoints::Condition;
 use dcvins::session::{self, BreakpointHit, CalibrationRequest, Recording, SessionPlan, Stopwatch};
 use dcvins::simulation::{self, Experiment, SimulationOptions};
 
-use crate::arguments::{
+use crate::cli::arguments::{
     CalibrateArguments, CheckArguments, ConvertArguments, EncoderArgument, EvaluateArguments, ExperimentArgument,
     RunArguments, SimulateArguments, ViewArguments,
 };
@@ -385,7 +387,7 @@ pub(crate) fn check(arguments: &CheckArguments) -> Result<()> {
     let log = Arc::new(FlightLog::open(&arguments.log)?);
     let rig = Rig::for_log(&log, arguments.rig.as_deref());
     let rotations = rig.as_ref().map_or_else(|_| Vec::new(), |rig| session::image_rotations(&log, rig));
-    let report = flight_log::check::check(&log, rig.as_ref(), &rotations);
+    let report = log_check::check(&log, rig.as_ref(), &rotations);
     if arguments.json {
         print(&format!("{}\n", serde_json::to_string_pretty(&report)?))
     } else {

@@ -1,10 +1,10 @@
 use nalgebra::Vector3;
 
-use super::super::{ImuSample, Rig};
 use super::statistics::{deviation, mean, median, percentile, white_deviation};
 use super::survey::Survey;
 use super::{Area, Findings, Severity};
 use crate::geometry::seconds_from_ns;
+use crate::sensors::{ImuSample, Rig};
 
 /// Length of the windows in which stillness is judged.
 const WINDOW_NS: i64 = 500_000_000;

@@ -18,8 +18,9 @@ use nalgebra::UnitQuaternion;
 use serde::Serialize;
 
 use self::survey::Survey;
-use super::{FlightLog, LogError, MessageKind, Rig};
+use crate::flight_log::{FlightLog, LogError, MessageKind, TopicInfo};
 use crate::geometry::seconds_from_ns;
+use crate::sensors::Rig;
 
 /// How bad a finding is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -275,7 +276,7 @@ fn role_of(topic: &str, kind: Option<MessageKind>, rig: Option<&Rig>) -> String 
 }
 
 fn topic_reports(log: &FlightLog, survey: &Survey, rig: Option<&Rig>) -> Vec<TopicReport> {
-    let report = |info: &super::TopicInfo| {
+    let report = |info: &TopicInfo| {
         let times = survey.topics.get(&info.topic).filter(|topic| !topic.times.is_empty());
         let stamps = times.map(|topic| topic.stamp_range());
         let (first_ns, last_ns) = stamps.unwrap_or((info.first_ns, info.last_ns));

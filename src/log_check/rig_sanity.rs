@@ -1,9 +1,9 @@
 use nalgebra::Vector2;
 
-use super::super::rig::{CameraRig, ChainPrior, GimbalRig};
-use super::super::{FlightLog, Rig};
 use super::{Area, Findings, Severity};
 use crate::camera::{CameraModel, Projection};
+use crate::flight_log::FlightLog;
+use crate::sensors::{CameraRig, ChainPrior, GimbalRig, Rig};
 
 /// A camera further from the IMU than this is unusual on a drone.
 const LONGEST_LEVER_M: f64 = 1.0;
@@ -89,7 +89,7 @@ fn field_of_view_deg(model: &CameraModel) -> Option<f64> {
 }
 
 fn check_camera_info(log: &FlightLog, camera: &CameraRig, findings: &mut Findings) {
-    use super::super::rig::CameraFacts as _;
+    use crate::flight_log::rig::CameraFacts as _;
     let Ok(told) = log.camera_model(&camera.topic) else { return };
     let (rig, log) = (camera.model.intrinsics_px, told.intrinsics_px);
     let scale = camera.model.focal_length_px();

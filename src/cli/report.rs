@@ -4,11 +4,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use dcvins::export::{ReportOptions, write_report};
-use dcvins::flight_log::{self, check::CheckReport};
+
+use dcvins::log_check::{self, CheckReport};
 use dcvins::session::{SessionPlan, image_rotations};
 
-use crate::arguments::ReportArguments;
-use crate::commands::{compute, print};
+use crate::cli::arguments::ReportArguments;
+use crate::cli::commands::{compute, print};
 
 /// `dcvins report`.
 pub(crate) fn report(arguments: &ReportArguments) -> Result<()> {
@@ -33,7 +34,7 @@ pub(crate) fn report(arguments: &ReportArguments) -> Result<()> {
 /// What there is to know about the log and its rig beforehand.
 fn check(plan: &SessionPlan) -> CheckReport {
     let rotations = image_rotations(&plan.log, &plan.rig);
-    flight_log::check::check(&plan.log, Ok(&plan.rig), &rotations)
+    log_check::check(&plan.log, Ok(&plan.rig), &rotations)
 }
 
 /// The log, and the rig and the truth where they are files of their own.
@@ -69,7 +70,7 @@ mod pictures {
     use dcvins::gui::theme::ThemeName;
     use dcvins::session::{Recording, SessionPlan};
 
-    use crate::arguments::ReportArguments;
+    use crate::cli::arguments::ReportArguments;
 
     /// A panel of the report.
     struct Shown {

@@ -1,32 +1,19 @@
-//! The rig: what sensors a log holds and how they sit, in Kalibr's names.
+//! The rig: which sensors a log holds and where they are mounted, in Kalibr's names.
 
-mod fields;
-mod find;
-mod kalibr;
-mod read;
-mod save;
-#[cfg(test)]
-mod tests;
-mod write;
-
-pub(super) use read::CameraFacts;
-
-use super::LogError;
 use crate::camera::CameraModel;
 use crate::geometry::RigidTransform;
 use crate::gimbal::ClassicalChain;
 
-/// Noise of the inertial sensor, continuous-time densities as Kalibr gives them.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ImuNoise {
-    /// m/s²/√Hz.
-    pub accelerometer_noise_density: f64,
-    /// m/s³/√Hz.
-    pub accelerometer_random_walk: f64,
-    /// rad/s/√Hz.
-    pub gyroscope_noise_density: f64,
-    /// rad/s²/√Hz.
-    pub gyroscope_random_walk: f64,
+use super::ImuNoise;
+
+/// The rig has no camera with this key.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the rig has no camera '{key}'; it has {}", available.join(", "))]
+pub struct UnknownCamera {
+    /// What was asked for.
+    pub key: String,
+    /// The keys that the rig has.
+    pub available: Vec<String>,
 }
 
 /// The inertial sensor.
@@ -129,8 +116,8 @@ pub struct Rig {
 
 impl Rig {
     /// The camera with a key such as `cam0`.
-    pub fn camera(&self, key: &str) -> Result<&CameraRig, LogError> {
-        self.cameras.iter().find(|camera| camera.key == key).ok_or_else(|| LogError::UnknownCamera {
+    pub fn camera(&self, key: &str) -> Result<&CameraRig, UnknownCamera> {
+        self.cameras.iter().find(|camera| camera.key == key).ok_or_else(|| UnknownCamera {
             key: key.to_owned(),
             available: self.cameras.iter().map(|camera| camera.key.clone()).collect(),
         })

@@ -8,7 +8,7 @@ use dcvins::session::accuracy::{Alignment, RelativeDelta};
 use dcvins::session::breakpoints::Condition;
 use dcvins::session::{RunSpec, SessionRequest};
 
-use crate::degeneracy::DegeneracyArguments;
+use crate::cli::degeneracy::DegeneracyArguments;
 
 /// Debugger for visual-inertial navigation with a camera on a gimbal.
 #[derive(Debug, Parser)]

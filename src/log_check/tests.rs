@@ -4,10 +4,11 @@ use std::path::Path;
 use nalgebra::{UnitQuaternion, Vector3};
 use tempfile::TempDir;
 
-use super::super::{FlightLog, GrayImage, LogWriter, LogWriterOptions, MessageTimes, Rig};
 use super::{CheckReport, ImageRotation, Severity, check};
 use crate::camera::CameraModel;
+use crate::flight_log::{FlightLog, LogWriter, LogWriterOptions, MessageTimes};
 use crate::geometry::so3;
+use crate::sensors::{GrayImage, Rig};
 
 const EPOCH_NS: i64 = 1_700_000_000_000_000_000;
 const MS: i64 = 1_000_000;

@@ -1,10 +1,9 @@
-use super::super::rig::{CameraMount, CameraRig};
-use super::super::{GrayImage, Rig};
 use super::inertial::InertialFacts;
 use super::statistics::{median, percentile};
 use super::survey::{ImageLook, Survey};
 use super::{Area, Findings, Severity};
 use crate::geometry::seconds_from_ns;
+use crate::sensors::{CameraMount, CameraRig, GrayImage, Rig};
 
 /// A pixel with a steeper grey slope (per pixel) counts as texture.
 const TEXTURE_SLOPE: usize = 12;

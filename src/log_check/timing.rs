@@ -1,8 +1,8 @@
-use super::super::Rig;
 use super::statistics::{median, percentile, slope};
 use super::survey::{Survey, TopicSurvey};
 use super::{Area, Findings, Severity};
 use crate::geometry::seconds_from_ns;
+use crate::sensors::Rig;
 
 /// Rates further than this share from the rig's are told.
 const RATE_TOLERANCE: f64 = 0.05;

@@ -2,12 +2,11 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use super::super::Rig;
-use super::super::rig::{CameraMount, CameraRig};
 use super::inertial::InertialFacts;
 use super::survey::Survey;
 use super::{Area, Findings, ImageRotation, Severity, hand_eye};
 use crate::geometry::{RigidTransform, seconds_from_ns};
+use crate::sensors::{CameraMount, CameraRig, Rig};
 
 /// Checks every camera's orientation.
 pub(super) fn check_rotations(

@@ -1,14 +1,14 @@
 use std::collections::BTreeMap;
 
-use super::super::container::DecodedBlock;
-use super::super::joint_merge::{JointMerge, JointReading};
-use super::super::messages::{self, MessageKind};
-use super::super::picture::{BitDepth, decode_picture};
-use super::super::stream::angle_fit;
-use super::super::{FlightLog, ImuSample, JointSample, Rig};
 use super::images::{ImageMeasure, measure};
 use super::statistics::median;
+use crate::flight_log::container::DecodedBlock;
+use crate::flight_log::joint_merge::{JointMerge, JointReading};
+use crate::flight_log::picture::{BitDepth, decode_picture};
+use crate::flight_log::stream::angle_fit;
+use crate::flight_log::{FlightLog, messages, messages::MessageKind};
 use crate::geometry::{seconds_from_ns, wrap_angle};
+use crate::sensors::{ImuSample, JointSample, Rig};
 
 /// So many images of each camera are decoded, spread evenly over the log.
 const IMAGES_LOOKED_AT: u64 = 60;

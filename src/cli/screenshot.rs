@@ -16,8 +16,8 @@ use dcvins::gui::window::Preset;
 use dcvins::gui::{ImageSource, Playback};
 use dcvins::session::{Recording, Session, SessionPlan};
 
-use crate::arguments::{FormatArgument, RendererArgument, ScreenshotArguments, ThemeArgument};
-use crate::commands::{compute, print, saved_session, tell};
+use crate::cli::arguments::{FormatArgument, RendererArgument, ScreenshotArguments, ThemeArgument};
+use crate::cli::commands::{compute, print, saved_session, tell};
 
 /// The most pictures of one command: more is a mistyped period.
 const MOST_PICTURES: usize = 100_000;

@@ -1,9 +1,8 @@
-use super::super::Rig;
-use super::super::rig::{GimbalRig, Joint};
 use super::statistics::percentile;
 use super::survey::Survey;
 use super::{Area, Findings, Severity};
 use crate::geometry::{seconds_from_ns, wrap_angle};
+use crate::sensors::{GimbalRig, Joint, Rig};
 
 /// A joint that moves less than this over the log tells nothing about its parameters.
 const SMALLEST_RANGE_RAD: f64 = 0.05;

@@ -5,14 +5,14 @@ use std::path::PathBuf;
 use anyhow::{Context as _, Result, bail};
 use clap::{Args, ValueEnum};
 use dcvins::estimator::{JointKnowledge, PoseKnowledge};
-use dcvins::flight_log::Rig;
 use dcvins::gimbal::Parameterization;
 use dcvins::observability::laboratory::{
     Advice, Excitation, LABORATORY_IMU, LaboratoryForm, LaboratoryMotion, LaboratoryReport, LaboratorySetup, Mechanism,
     Situation, advise, excitation, truth_table,
 };
+use dcvins::sensors::Rig;
 
-use crate::commands::print;
+use crate::cli::commands::print;
 
 /// `dcvins degeneracy`.
 #[derive(Args, Clone, Debug)]
@@ -216,7 +216,7 @@ impl DegeneracyArguments {
     }
 
     fn camera_key(&self, rig: &Rig) -> Result<String> {
-        use dcvins::flight_log::rig::CameraMount;
+        use dcvins::sensors::CameraMount;
         if let Some(key) = &self.camera {
             return Ok(key.clone());
         }

@@ -1,0 +1,12 @@
+//! Rig files: our own schema and Kalibr's, read and written.
+
+mod fields;
+mod find;
+mod kalibr;
+mod read;
+mod save;
+#[cfg(test)]
+mod tests;
+mod write;
+
+pub(crate) use read::CameraFacts;

@@ -1,0 +1,32 @@
+/// The joint angles of one instant, in the order of the rig's links, without the static offsets.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JointSample {
+    /// Header stamp in nanoseconds since the log began.
+    pub stamp_ns: i64,
+    /// One angle per joint in radians.
+    pub angles_rad: Vec<f64>,
+}
+
+/// The joint angles at an image's stamp as the encoders measure them, in the order of the rig's links, without the static
+/// offsets.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct JointAngles {
+    /// One angle per joint in radians.
+    pub angles_rad: Vec<f64>,
+    /// Standard deviation of each angle in radians: less than the rig's value for one reading where several could be
+    /// averaged.
+    pub sigmas_rad: Vec<f64>,
+    /// The part of each standard deviation that consecutive images share, in radians, so that no average reduces it (zero
+    /// for white noise).
+    pub lasting_sigmas_rad: Vec<f64>,
+    /// Angular rate of each joint in rad/s from the readings around the stamp; zero where they do not constrain it.
+    pub rates_rad_per_s: Vec<f64>,
+}
+
+impl JointAngles {
+    /// Bytes on the heap.
+    pub fn heap_bytes(&self) -> usize {
+        let all = [&self.angles_rad, &self.sigmas_rad, &self.lasting_sigmas_rad, &self.rates_rad_per_s];
+        all.iter().map(|numbers| numbers.capacity() * size_of::<f64>()).sum()
+    }
+}
