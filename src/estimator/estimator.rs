@@ -4,16 +4,16 @@ use std::collections::VecDeque;
 
 use nalgebra::Vector3;
 
-use super::calibration::{Calibration, FreeClocks, GivenSigmas};
-use super::calibrations::{Calibrations, MAIN};
 use super::config::{EstimatorConfig, rigid_mount};
-use super::contradictions::Contradictions;
 use super::initialization::StandstillEstimate;
-use super::prior::{Prior, StartPrior};
-use super::standstill::RestWatch;
-use super::startup::WaitingFrame;
-use super::window::{FeatureMap, Frame};
 use super::{Event, EventKind, Phase, StepInput, StepReport, gravity_in_world};
+use crate::estimator::factors::prior::{Prior, StartPrior};
+use crate::estimator::initialization::startup::WaitingFrame;
+use crate::estimator::state::calibration::{Calibration, FreeClocks, GivenSigmas};
+use crate::estimator::state::calibrations::{Calibrations, MAIN};
+use crate::estimator::window::contradictions::Contradictions;
+use crate::estimator::window::frames::{FeatureMap, Frame};
+use crate::estimator::window::standstill::RestWatch;
 use crate::geometry::{RigidTransform, seconds_from_ns};
 use crate::gimbal::{ClassicalChain, Parameterization};
 use crate::sensors::ImuNoise;
@@ -197,7 +197,7 @@ impl Estimator {
         report
     }
 
-    pub(super) fn newest_state(&self) -> &super::window::FrameState {
+    pub(super) fn newest_state(&self) -> &super::window::frames::FrameState {
         &self.frames.last().expect("a running window has frames").state
     }
 
@@ -317,7 +317,7 @@ impl Estimator {
 
     /// Goes over to another chart: the calibration is the same, and the prior says the same about it.
     pub(super) fn switch_chart(&mut self, parameterization: Parameterization) {
-        let layout = super::window::layout(&self.frames, self.calibration.dof());
+        let layout = super::window::frames::layout(&self.frames, self.calibration.dof());
         let before = self.calibration.deviation();
         let old_from_new = self.calibration.switch_chart(parameterization);
         if let Some(prior) = &mut self.prior {

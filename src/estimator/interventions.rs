@@ -3,9 +3,9 @@
 use nalgebra::DVector;
 use thiserror::Error;
 
-use super::calibrations::MAIN;
 use super::estimator::Estimator;
-use super::window::FeatureMap;
+use crate::estimator::state::calibrations::MAIN;
+use crate::estimator::window::frames::FeatureMap;
 use crate::frontend::FeatureId;
 use crate::gimbal::Parameterization;
 

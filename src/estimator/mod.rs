@@ -2,65 +2,34 @@
 //!
 //! It takes a [`StepInput`] per image and leaves a [`StepReport`] behind; nobody reaches in between.
 
-mod calibration;
-mod calibrations;
-mod camera_pose;
 mod config;
-mod contradictions;
-mod dense;
 #[expect(clippy::module_inception, reason = "the type that the folder is about")]
 mod estimator;
-mod features;
-mod footprint;
-mod gain;
-pub mod imu_factor;
+mod factors;
 pub mod initialization;
 mod interventions;
-mod jacobian;
-mod jacobian_source;
-mod joints;
-mod layout;
-mod linearization;
-mod marginalization;
-mod motion_parts;
-mod observations;
 mod options;
-mod pose_blocks;
-pub mod preintegration;
-mod prior;
-mod problem;
-mod projection;
 mod report;
-mod reporting;
-mod reprojection;
-mod rows;
-mod solver;
-mod standstill;
-mod startup;
+mod state;
 mod supposed;
 #[cfg(test)]
 mod tests;
-mod tracking;
-mod visual;
 mod window;
 
 pub use config::{DEFAULT_CHAIN_PRIOR, EstimatorConfig, RigidCamera, rigid_columns};
 pub use estimator::Estimator;
-pub use footprint::{ReportBytes, allocated_bytes};
-pub use gain::{InformationGain, Motion};
+pub(crate) use factors::visual::damped_inverse;
+pub use factors::{imu_factor, preintegration};
 pub use interventions::InterventionError;
-pub use jacobian::{FeatureRows, StepJacobian};
-pub use jacobian_source::{FactorRows, JacobianFactor, JacobianRow, JacobianSource, column_scale};
-pub use observations::Observations;
 pub use options::{EstimatorOptions, LandmarkModel, RobustLoss, TrackContinuation};
 pub use preintegration::{ImuBias, MotionIncrement, NavigationState, Preintegration};
-pub use supposed::{JointKnowledge, PoseKnowledge, SupposedFrame, SupposedLandmark, SupposedWindow};
-pub(crate) use visual::damped_inverse;
-
 pub use report::{
-    CalibrationEstimate, ColumnBlock, ColumnGroup, Event, EventKind, FeatureCounts, FeatureReport, FrameStateReport,
-    IterationReport, LandmarkReport, Linearization, ObservationReport, Phase, ResidualSummary, StageTimes, StepReport,
+    CalibrationEstimate, ColumnBlock, ColumnGroup, Event, EventKind, FactorRows, FeatureCounts, FeatureReport,
+    FeatureRows, FrameStateReport, InformationGain, IterationReport, JacobianFactor, JacobianRow, JacobianSource,
+    LandmarkReport, Linearization, Motion, ObservationReport, Observations, Phase, ReportBytes, ResidualSummary,
+    StageTimes, StepJacobian, StepReport, allocated_bytes, column_scale,
 };
+pub use supposed::{JointKnowledge, PoseKnowledge, SupposedFrame, SupposedLandmark, SupposedWindow};
 
 use nalgebra::Vector3;
 

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::preintegration::ImuBias;
+use crate::estimator::factors::preintegration::ImuBias;
 
 /// How the squared whitened residuals of the visual factors grow.
 #[derive(Clone, Copy, Debug, PartialEq)]

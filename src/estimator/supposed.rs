@@ -5,16 +5,17 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, Vector3};
 
-use super::calibration::{Calibration, GivenSigmas};
-use super::calibrations::Calibrations;
 use super::options::{LandmarkModel, RobustLoss};
-use super::preintegration::{NavigationState, Preintegration};
-use super::problem::{CameraFactors, Estimate, Problem};
-use super::reprojection::{Landmark, RelativePose};
-use super::visual::{Sighting, Track, VisualModel};
-use super::window::{Frame, FrameState, Rates, layout};
-use super::{ColumnBlock, ColumnGroup, Linearization, camera_pose};
+use super::{ColumnBlock, ColumnGroup, Linearization};
 use crate::camera::CameraModel;
+use crate::estimator::factors::preintegration::{NavigationState, Preintegration};
+use crate::estimator::factors::reprojection::{Landmark, RelativePose};
+use crate::estimator::factors::visual::{Sighting, Track, VisualModel};
+use crate::estimator::state::calibration::{Calibration, GivenSigmas};
+use crate::estimator::state::calibrations::Calibrations;
+use crate::estimator::state::camera_pose;
+use crate::estimator::window::frames::{Frame, FrameState, Rates, layout};
+use crate::estimator::window::problem::{CameraFactors, Estimate, Problem};
 use crate::geometry::ns_from_seconds;
 use crate::gimbal::{ClassicalChain, Parameterization};
 use crate::sensors::{ImuNoise, ImuSample, JointAngles};

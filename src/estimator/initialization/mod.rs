@@ -33,6 +33,7 @@ mod refinement;
 pub mod relative_pose;
 mod selection;
 mod standstill;
+pub(crate) mod startup;
 mod structure;
 mod visual_problem;
 

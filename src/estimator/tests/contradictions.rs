@@ -1,7 +1,7 @@
 //! When residuals that stay too large are told, and when no longer.
 
 use super::fixture;
-use crate::estimator::contradictions::Contradictions;
+use crate::estimator::window::contradictions::Contradictions;
 use crate::estimator::{EstimatorConfig, EstimatorOptions, ResidualSummary};
 use crate::gimbal::Parameterization;
 use crate::simulation::{SyntheticOptions, synthetic_tracks};

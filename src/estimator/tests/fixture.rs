@@ -4,13 +4,14 @@ use nalgebra::DVector;
 
 use super::Noise;
 use crate::camera::CameraModel;
-use crate::estimator::calibrations::MAIN;
-use crate::estimator::layout::Layout;
-use crate::estimator::preintegration::{ImuBias, NavigationState, Preintegration};
-use crate::estimator::prior::StartPrior;
-use crate::estimator::window::{Frame, FrameState, Rates};
+use crate::estimator::factors::preintegration::{ImuBias, NavigationState, Preintegration};
+use crate::estimator::factors::prior::StartPrior;
+use crate::estimator::state::calibrations::MAIN;
+use crate::estimator::state::layout::Layout;
+use crate::estimator::window::features;
+use crate::estimator::window::frames::{Frame, FrameState, Rates};
 use crate::estimator::{
-    DEFAULT_CHAIN_PRIOR, Estimator, EstimatorConfig, EstimatorOptions, RigidCamera, StepInput, StepReport, features,
+    DEFAULT_CHAIN_PRIOR, Estimator, EstimatorConfig, EstimatorOptions, RigidCamera, StepInput, StepReport,
 };
 use crate::frontend::TrackedFrame;
 use crate::gimbal::{Chain, Parameterization};

@@ -4,9 +4,9 @@ use nalgebra::DMatrix;
 
 use super::fixture;
 use super::flight::{chain_error, fly, step, trajectory_error_m};
-use crate::estimator::calibrations::MAIN;
-use crate::estimator::dense::Cholesky;
-use crate::estimator::problem::Estimate;
+use crate::estimator::factors::dense::Cholesky;
+use crate::estimator::state::calibrations::MAIN;
+use crate::estimator::window::problem::Estimate;
 use crate::estimator::{Estimator, EstimatorConfig, EstimatorOptions, EventKind, Phase, StepReport};
 use crate::frontend::FeatureId;
 use crate::gimbal::{Parameterization, transport_covariance};

@@ -1,0 +1,12 @@
+//! The residuals of the window (Eqs. 8–10) with their Jacobians: reprojection, IMU preintegration, priors.
+//!
+//! A factor takes states and measurements and returns whitened residuals and derivatives; it does not know the window.
+
+pub(crate) mod dense;
+pub mod imu_factor;
+pub(crate) mod pose_blocks;
+pub mod preintegration;
+pub(crate) mod prior;
+pub(crate) mod projection;
+pub(crate) mod reprojection;
+pub(crate) mod visual;

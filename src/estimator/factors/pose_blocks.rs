@@ -1,0 +1,63 @@
+//! A symmetric matrix over the camera poses of a window, by 6 × 6 blocks.
+
+use nalgebra::{DMatrix, DVector, Matrix6};
+
+use super::reprojection::Reprojection;
+
+/// Upper blocks, row-wise: `(0,0) (0,1) … (1,1) …`.
+#[derive(Clone, Debug)]
+pub(crate) struct PoseBlocks {
+    frames: usize,
+    blocks: Vec<Matrix6<f64>>,
+}
+
+impl PoseBlocks {
+    /// Zeros.
+    pub(crate) fn new(frames: usize) -> Self {
+        Self { frames, blocks: vec![Matrix6::zeros(); frames * (frames + 1) / 2] }
+    }
+
+    fn index(&self, row: usize, column: usize) -> usize {
+        debug_assert!(row <= column && column < self.frames, "upper blocks only");
+        row * (2 * self.frames + 1 - row) / 2 + column - row
+    }
+
+    /// The block of two camera poses, `row ≤ column`.
+    pub(crate) fn block(&self, row: usize, column: usize) -> &Matrix6<f64> {
+        &self.blocks[self.index(row, column)]
+    }
+
+    /// The same to be changed.
+    pub(crate) fn block_mut(&mut self, row: usize, column: usize) -> &mut Matrix6<f64> {
+        let index = self.index(row, column);
+        &mut self.blocks[index]
+    }
+
+    /// Adds the `JᵀJ` of one sighting from another frame than the anchor.
+    pub(crate) fn add(&mut self, anchor: usize, observer: usize, term: &Reprojection) {
+        *self.block_mut(observer, observer) += term.by_observer.tr_mul(&term.by_observer);
+        if anchor < observer {
+            *self.block_mut(anchor, observer) += term.by_anchor.tr_mul(&term.by_observer);
+        } else {
+            *self.block_mut(observer, anchor) += term.by_observer.tr_mul(&term.by_anchor);
+        }
+        *self.block_mut(anchor, anchor) += term.by_anchor.tr_mul(&term.by_anchor);
+    }
+
+    /// The diagonal of `CᵀAC` for the columns `C` that move the camera poses, per slot 6 × n.
+    pub(crate) fn squared_norms(&self, columns: &[DMatrix<f64>]) -> DVector<f64> {
+        let count = columns.first().map_or(0, DMatrix::ncols);
+        let mut norms = DVector::zeros(count);
+        for row in 0..self.frames {
+            for column in row..self.frames {
+                let block = self.block(row, column);
+                let factor = if row == column { 1.0 } else { 2.0 };
+                for k in 0..count {
+                    let right = block * columns[column].fixed_view::<6, 1>(0, k);
+                    norms[k] += factor * columns[row].fixed_view::<6, 1>(0, k).dot(&right);
+                }
+            }
+        }
+        norms
+    }
+}

@@ -1,0 +1,238 @@
+//! The marginalization prior, in square-root form around fixed linearization points.
+
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector, Vector3};
+
+use super::dense;
+use super::preintegration::ImuBias;
+use crate::estimator::state::layout::{Layout, POSE};
+use crate::estimator::window::frames::FrameState;
+
+/// Which unknown a column of the prior stands for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum PriorColumn {
+    /// Entry `offset` of the frame at `slot`, in the order of [`Layout`].
+    Frame {
+        /// Slot of the frame.
+        slot: usize,
+        /// Offset within its block.
+        offset: usize,
+    },
+    /// A calibration parameter.
+    Calibration(usize),
+}
+
+impl PriorColumn {
+    /// The column of the whole window that this one is.
+    pub(crate) fn index(self, layout: &Layout) -> usize {
+        match self {
+            Self::Frame { slot, offset } => layout.frame(slot).start + offset,
+            Self::Calibration(parameter) => layout.calibration().start + parameter,
+        }
+    }
+
+    fn from_index(index: usize, layout: &Layout) -> Self {
+        if index >= layout.calibration().start {
+            return Self::Calibration(index - layout.calibration().start);
+        }
+        Self::Frame { slot: index / layout.frame_len(), offset: index % layout.frame_len() }
+    }
+}
+
+/// `½‖r + J (x ⊟ x₀)‖²` with `x₀` the first estimates of the frames and of the calibration.
+#[derive(Clone, Debug)]
+pub(crate) struct Prior {
+    columns: Vec<PriorColumn>,
+    jacobian: DMatrix<f64>,
+    residual: DVector<f64>,
+    /// `JᵀJ` and `Jᵀr`, which no iteration changes.
+    hessian: DMatrix<f64>,
+    gradient: DVector<f64>,
+}
+
+impl Prior {
+    /// From whitened rows `[columns of the layout | residual]` whose residuals are taken at `x₀`, after the columns of the
+    /// frame at `gone` have been eliminated; `None` when nothing remains.
+    pub(crate) fn eliminating(rows: &DMatrix<f64>, layout: &Layout, gone: usize) -> Option<Self> {
+        let total = layout.total();
+        let leaving = layout.frame(gone);
+        let active = |column: &usize| rows.column(*column).iter().any(|entry| *entry != 0.0);
+        let eliminated: Vec<usize> = leaving.clone().filter(active).collect();
+        let kept: Vec<usize> = (0..total).filter(|column| !leaving.contains(column)).filter(active).collect();
+        if kept.is_empty() {
+            return None;
+        }
+        let ordered: Vec<usize> = eliminated.iter().chain(&kept).copied().chain([total]).collect();
+        // A residual that no unknown can change is no part of the prior: it would pile up over a flight, to a cost beside
+        // which no step seems to gain anything.
+        let echelon = dense::echelon(&rows.select_columns(&ordered), eliminated.len());
+        let (first, height) = (echelon.leading_rank, echelon.rows.nrows() - echelon.leading_rank);
+        if height == 0 {
+            return None;
+        }
+        let jacobian = echelon.rows.view((first, eliminated.len()), (height, kept.len())).into_owned();
+        let residual = echelon.rows.view((first, eliminated.len() + kept.len()), (height, 1)).column(0).into_owned();
+        let columns = kept.iter().map(|index| PriorColumn::from_index(*index, layout)).collect();
+        Some(Self::new(columns, jacobian, residual))
+    }
+
+    fn new(columns: Vec<PriorColumn>, jacobian: DMatrix<f64>, residual: DVector<f64>) -> Self {
+        let hessian = jacobian.tr_mul(&jacobian);
+        let gradient = jacobian.tr_mul(&residual);
+        Self { columns, jacobian, residual, hessian, gradient }
+    }
+
+    /// The frame at `gone` has left the window and those after it moved up; the prior must not hold it.
+    pub(crate) fn renumber(&mut self, gone: usize) {
+        for column in &mut self.columns {
+            if let PriorColumn::Frame { slot, .. } = column {
+                debug_assert!(*slot != gone, "the frame was eliminated before it left");
+                if *slot > gone {
+                    *slot -= 1;
+                }
+            }
+        }
+    }
+
+    /// Whether it holds unknowns of the frame at `slot`.
+    pub(crate) fn holds_frame(&self, slot: usize) -> bool {
+        self.columns.iter().any(|column| matches!(column, PriorColumn::Frame { slot: held, .. } if *held == slot))
+    }
+
+    /// Whether it holds some of these calibration parameters.
+    pub(crate) fn holds_calibration(&self, parameters: &Range<usize>) -> bool {
+        let held = |column: &PriorColumn| matches!(column, PriorColumn::Calibration(held) if parameters.contains(held));
+        self.columns.iter().any(held)
+    }
+
+    /// Number of scalar residuals.
+    pub(crate) fn len(&self) -> usize {
+        self.residual.len()
+    }
+
+    /// Bytes on the heap.
+    pub(crate) fn heap_bytes(&self) -> usize {
+        let numbers = self.jacobian.len() + self.residual.len() + self.hessian.len() + self.gradient.len();
+        self.columns.capacity() * size_of::<PriorColumn>() + numbers * size_of::<f64>()
+    }
+
+    /// The residuals at an estimate; `deviation` is `x ⊟ x₀` in the window's layout.
+    pub(crate) fn residual(&self, layout: &Layout, deviation: &DVector<f64>) -> DVector<f64> {
+        &self.residual + &self.jacobian * self.gather(layout, deviation)
+    }
+
+    /// Adds `JᵀJ` (lower triangle at least) and `Jᵀ(r + J δ)` to the normal equations.
+    pub(crate) fn add_to(
+        &self,
+        layout: &Layout,
+        deviation: &DVector<f64>,
+        hessian: &mut DMatrix<f64>,
+        gradient: &mut DVector<f64>,
+    ) {
+        let local = &self.gradient + &self.hessian * self.gather(layout, deviation);
+        let indices: Vec<usize> = self.columns.iter().map(|column| column.index(layout)).collect();
+        for (column, global_column) in indices.iter().enumerate() {
+            gradient[*global_column] += local[column];
+            for (row, global_row) in indices.iter().enumerate() {
+                hessian[(*global_row, *global_column)] += self.hessian[(row, column)];
+            }
+        }
+    }
+
+    /// Whitened rows `[columns of the layout | residual]`, residuals at `deviation` from `x₀`.
+    pub(crate) fn rows(&self, layout: &Layout, deviation: &DVector<f64>) -> DMatrix<f64> {
+        let mut rows = DMatrix::zeros(self.len(), layout.total() + 1);
+        for (column, place) in self.columns.iter().enumerate() {
+            rows.set_column(place.index(layout), &self.jacobian.column(column));
+        }
+        rows.set_column(layout.total(), &self.residual(layout, deviation));
+        rows
+    }
+
+    /// Its calibration columns carried to another chart: `old = by_new · new` to first order.
+    ///
+    /// `deviations` are the calibration's from its first estimate in the old and in the new chart. Where the two differ by
+    /// more than the first order, the residual takes the difference up, so that cost and gradient stay what they are at
+    /// the present estimate.
+    pub(crate) fn transport_calibration(
+        &mut self,
+        old_from_new: &DMatrix<f64>,
+        deviations: Option<&(DVector<f64>, DVector<f64>)>,
+        layout: &Layout,
+    ) {
+        let zero = DVector::zeros(layout.total());
+        let rows = self.rows(layout, &zero);
+        let calibration = layout.calibration();
+        let moved = rows.columns_range(calibration.clone()) * old_from_new;
+        let mut columns: Vec<PriorColumn> =
+            self.columns.iter().copied().filter(|column| matches!(column, PriorColumn::Frame { .. })).collect();
+        let mut jacobian = DMatrix::zeros(self.len(), columns.len() + moved.ncols());
+        for (local, column) in columns.iter().enumerate() {
+            jacobian.set_column(local, &rows.column(column.index(layout)));
+        }
+        jacobian.columns_mut(columns.len(), moved.ncols()).copy_from(&moved);
+        columns.extend((0..moved.ncols()).map(PriorColumn::Calibration));
+        let mut residual = self.residual.clone();
+        if let Some((old, new)) = deviations {
+            residual += rows.columns_range(calibration) * (old - old_from_new * new);
+        }
+        *self = Self::new(columns, jacobian, residual);
+    }
+
+    fn gather(&self, layout: &Layout, deviation: &DVector<f64>) -> DVector<f64> {
+        DVector::from_iterator(self.columns.len(), self.columns.iter().map(|column| deviation[column.index(layout)]))
+    }
+}
+
+/// What is known when the window begins: position and yaw of the first frame by choice of the world, and how large the
+/// biases may be.
+#[derive(Clone, Debug)]
+pub(crate) struct StartPrior {
+    /// The state it was set at.
+    pub(crate) reference: FrameState,
+    /// Most likely biases.
+    pub(crate) bias: ImuBias,
+    /// Standard deviation of each accelerometer bias, in m/s².
+    pub(crate) accelerometer_bias_sigma: f64,
+    /// Standard deviation of each gyroscope bias, in rad/s.
+    pub(crate) gyroscope_bias_sigma: f64,
+}
+
+/// Standard deviation of the first position, in metres: it only fixes the origin.
+const ORIGIN_SIGMA_M: f64 = 1e-3;
+/// Standard deviation of the first yaw, in radians: it only fixes the direction of the axes.
+const YAW_SIGMA_RAD: f64 = 1e-4;
+
+impl StartPrior {
+    /// Number of scalar residuals.
+    pub(crate) const LEN: usize = 10;
+
+    /// Whitened rows on the first frame's block `[pose | joints | speed and biases]` and their residuals.
+    pub(crate) fn rows(&self, state: &FrameState) -> (DMatrix<f64>, DVector<f64>) {
+        let joints = state.joints_rad.len();
+        let mut jacobian = DMatrix::zeros(Self::LEN, 15 + joints);
+        let mut residual = DVector::zeros(Self::LEN);
+        let pose = &state.navigation.world_from_imu;
+        let reference = &self.reference.navigation.world_from_imu;
+        let turn = crate::geometry::so3::log(&(pose.rotation * reference.rotation.inverse()));
+        let vertical = pose.rotation.inverse() * Vector3::z();
+        residual[0] = turn.z / YAW_SIGMA_RAD;
+        for axis in 0..3 {
+            jacobian[(0, axis)] = vertical[axis] / YAW_SIGMA_RAD;
+            jacobian[(1 + axis, 3 + axis)] = 1.0 / ORIGIN_SIGMA_M;
+            residual[1 + axis] = (pose.translation_m[axis] - reference.translation_m[axis]) / ORIGIN_SIGMA_M;
+            let gyroscope = POSE + joints + 3 + axis;
+            jacobian[(4 + axis, gyroscope)] = 1.0 / self.gyroscope_bias_sigma;
+            residual[4 + axis] = (state.navigation.bias.gyroscope_rad_per_s[axis]
+                - self.bias.gyroscope_rad_per_s[axis])
+                / self.gyroscope_bias_sigma;
+            let accelerometer = POSE + joints + 6 + axis;
+            jacobian[(7 + axis, accelerometer)] = 1.0 / self.accelerometer_bias_sigma;
+            residual[7 + axis] = (state.navigation.bias.accelerometer_m_per_s2[axis]
+                - self.bias.accelerometer_m_per_s2[axis])
+                / self.accelerometer_bias_sigma;
+        }
+        (jacobian, residual)
+    }
+}

@@ -1,0 +1,139 @@
+//! How much memory a report takes.
+
+use crate::estimator::estimator::Estimator;
+use crate::estimator::window::frames::{Feature, FeatureMap, Frame, Observation, Rates};
+use crate::estimator::{CalibrationEstimate, FrameStateReport, JacobianSource, StepReport};
+
+/// Bytes of a report by part.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ReportBytes {
+    /// The frames of the window.
+    pub window: usize,
+    /// The calibration.
+    pub calibration: usize,
+    /// Features without their observations.
+    pub features: usize,
+    /// Observations of the features.
+    pub observations: usize,
+    /// Points of the map.
+    pub landmarks: usize,
+    /// The linearization, where it was kept.
+    pub linearization: usize,
+    /// What the blocks of the Jacobian are written out from.
+    pub jacobian: usize,
+    /// The report itself, events, residuals, iterations and warnings.
+    pub other: usize,
+}
+
+impl ReportBytes {
+    /// All parts together.
+    pub fn total(&self) -> usize {
+        self.window
+            + self.calibration
+            + self.features
+            + self.observations
+            + self.landmarks
+            + self.linearization
+            + self.jacobian
+            + self.other
+    }
+}
+
+/// What the allocator sets aside for so many bytes: 8 of its own, in steps of 16, at least 32 (glibc's rule on 64 bits).
+pub fn allocated_bytes(bytes: usize) -> usize {
+    if bytes == 0 { 0 } else { (bytes + 8).next_multiple_of(16).max(32) }
+}
+
+fn of_vec<T>(vec: &Vec<T>) -> usize {
+    allocated_bytes(vec.capacity() * size_of::<T>())
+}
+
+fn of_text(text: &String) -> usize {
+    allocated_bytes(text.capacity())
+}
+
+impl StepReport {
+    /// How much memory it takes.
+    pub fn bytes(&self) -> ReportBytes {
+        let messages = self.events.iter().map(|event| of_text(&event.message)).sum::<usize>()
+            + self.warnings.iter().map(of_text).sum::<usize>();
+        let linearization = self.linearization.as_ref().map_or(0, |linearization| {
+            let numbers = linearization.jacobian.len()
+                + linearization.prior_jacobian.len()
+                + linearization.calibration_column_norms.len();
+            of_vec(&linearization.columns)
+                + linearization.columns.iter().map(|block| of_text(&block.name)).sum::<usize>()
+                + numbers * size_of::<f64>()
+        });
+        ReportBytes {
+            window: of_vec(&self.window) + self.window.iter().map(of_frame).sum::<usize>(),
+            calibration: of_calibration(&self.calibration),
+            features: of_vec(&self.features),
+            observations: self.features.iter().map(|feature| allocated_bytes(feature.observations.heap_bytes())).sum(),
+            landmarks: of_vec(&self.landmarks),
+            linearization,
+            jacobian: self.jacobian_source.as_ref().map_or(0, JacobianSource::heap_bytes)
+                + self.gain.as_ref().map_or(0, crate::estimator::InformationGain::heap_bytes),
+            other: size_of::<Self>()
+                + of_vec(&self.events)
+                + of_vec(&self.residuals)
+                + of_vec(&self.iterations)
+                + of_vec(&self.warnings)
+                + messages,
+        }
+    }
+}
+
+impl Estimator {
+    /// How much memory a snapshot of it takes, in bytes: frames with their inertial samples, features, the prior and the
+    /// frames that wait; what is the same in every snapshot counts with its own size.
+    pub fn bytes(&self) -> usize {
+        let frames: usize = self.frames.iter().map(of_window_frame).sum();
+        let features: usize = self.features.iter().map(of_feature_map).sum();
+        let waiting: usize =
+            self.waiting.iter().map(crate::estimator::initialization::startup::WaitingFrame::bytes).sum();
+        let prior = self.prior.as_ref().map_or(0, crate::estimator::factors::prior::Prior::heap_bytes);
+        size_of::<Self>() + frames + features + waiting + prior
+    }
+}
+
+fn of_window_frame(frame: &Frame) -> usize {
+    let encoder = frame.encoder.as_ref().map_or(0, crate::sensors::JointAngles::heap_bytes);
+    let states = 1 + usize::from(frame.first_estimate.is_some());
+    size_of::<Frame>()
+        + allocated_bytes(size_of_val(frame.motion.samples()))
+        + states * of_vec(&frame.state.joints_rad)
+        + allocated_bytes(size_of::<Rates>())
+        + of_vec(&frame.state.rates.joints_rad_per_s)
+        + encoder
+}
+
+/// A node of the tree holds up to eleven entries and is two thirds full on average.
+fn of_feature_map(features: &FeatureMap) -> usize {
+    const ENTRY_SHARE: f64 = 1.5;
+    let entry = size_of::<crate::frontend::FeatureId>() + size_of::<Feature>();
+    let observations =
+        features.values().map(|feature| allocated_bytes(feature.observations.capacity() * size_of::<Observation>()));
+    (features.len() as f64 * entry as f64 * ENTRY_SHARE) as usize + observations.sum::<usize>()
+}
+
+fn of_frame(frame: &FrameStateReport) -> usize {
+    of_vec(&frame.joint_angles_rad)
+        + frame.encoder_angles_rad.as_ref().map_or(0, of_vec)
+        + frame.encoder_sigmas_rad.as_ref().map_or(0, of_vec)
+}
+
+fn of_calibration(calibration: &CalibrationEstimate) -> usize {
+    of_text(&calibration.parameterization)
+        + of_vec(&calibration.names)
+        + calibration.names.iter().map(of_text).sum::<usize>()
+        + of_vec(&calibration.units)
+        + of_vec(&calibration.values)
+        + of_vec(&calibration.sigmas)
+        + of_vec(&calibration.prior_sigmas)
+        + of_vec(&calibration.classical.links)
+        + of_vec(&calibration.margins)
+        + calibration.margins.iter().map(|(name, _)| of_text(name)).sum::<usize>()
+        + of_vec(&calibration.rigid_cameras)
+        + calibration.rigid_cameras.iter().map(|(key, _)| of_text(key)).sum::<usize>()
+}

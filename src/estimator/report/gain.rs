@@ -1,0 +1,308 @@
+//! What the newest image tells about the calibration, and which motion that is owed to.
+//!
+//! The window's information about the calibration, everything else eliminated, is held against the same window without the
+//! factors of the newest image: its sightings, its inertial interval, its encoder readings, its rest.
+//! What they add is `G = JcᵀU·UᵀJc`, with `U` an orthonormal basis of what the new rows say beyond all states. The
+//! calibration's columns of the sightings are zero, up to a rigid move of the whole scene, where nothing moved within the
+//! window; with motion they are a sum over the motions ([`super::motion_parts`]), and so is `G`: each motion's part is the
+//! symmetric `½(JmᵀU·UᵀJc + JcᵀU·UᵀJm)`, which is also its Shapley value. What is left over comes with the marginalization
+//! prior: images that have left the window.
+
+use nalgebra::DMatrix;
+
+use super::motion_parts::motion_parts;
+use crate::estimator::allocated_bytes;
+use crate::estimator::factors::dense::Cholesky;
+use crate::estimator::factors::projection::ProjectedRows;
+use crate::estimator::state::camera_pose::{self, CameraMaps};
+use crate::estimator::state::layout::Layout;
+use crate::estimator::window::frames::FrameState;
+use crate::estimator::window::problem::{Estimate, Problem};
+use crate::geometry::seconds_from_ns;
+
+/// Something that moves: the body along or about an axis of the IMU, or a joint.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Motion {
+    /// A translation along an axis of the IMU, 0 to 2.
+    Translation(usize),
+    /// A rotation about an axis of the IMU, 0 to 2.
+    Rotation(usize),
+    /// A joint, from 0.
+    Joint(usize),
+}
+
+impl Motion {
+    /// All motions of a body with so many joints, in the order of the tables.
+    pub fn all(joints: usize) -> impl Iterator<Item = Self> {
+        (0..3).map(Self::Translation).chain((0..3).map(Self::Rotation)).chain((0..joints).map(Self::Joint))
+    }
+
+    /// What it is called; joints by their names, where these are known.
+    pub fn name(self, joint_names: &[String]) -> String {
+        let axis = |axis: usize, names: [&str; 3]| names.get(axis).copied().unwrap_or("?").to_owned();
+        match self {
+            Self::Translation(along) => axis(along, ["move x", "move y", "move z"]),
+            Self::Rotation(about) => axis(about, ["turn x", "turn y", "turn z"]),
+            Self::Joint(joint) => joint_names.get(joint).cloned().unwrap_or_else(|| format!("joint {}", joint + 1)),
+        }
+    }
+}
+
+/// How much the newest image tells about each parameter beyond what was known without it, and which motion of the window
+/// that is owed to.
+#[derive(Clone, Debug, PartialEq)]
+pub struct InformationGain {
+    /// Time since the image before, in seconds.
+    pub interval_s: f64,
+    /// Number of joints.
+    pub joints: usize,
+    /// By free calibration column: `log₂` of the deviation without the image over that with it.
+    bits: Box<[f32]>,
+    /// Of these, by column: the part of each motion in the order of [`Motion::all`].
+    by_motion: Box<[f32]>,
+}
+
+impl InformationGain {
+    /// Number of columns.
+    pub fn columns(&self) -> usize {
+        self.bits.len()
+    }
+
+    /// How fast the images narrow a parameter now, in bits per second: one bit halves the standard deviation.
+    pub fn bits_per_s(&self, column: usize) -> f64 {
+        f64::from(self.bits[column]) / self.interval_s
+    }
+
+    /// The part of each motion in [`Self::bits_per_s`]. A negative one takes away what others bring, as the joints of a
+    /// stabilized gimbal do.
+    pub fn by_motion_per_s(&self, column: usize) -> impl Iterator<Item = f64> + '_ {
+        let motions = 6 + self.joints;
+        let parts = self.by_motion.get(motions * column..motions * (column + 1)).unwrap_or_default();
+        parts.iter().map(|part| f64::from(*part) / self.interval_s)
+    }
+
+    /// The rest: what the image adds by confirming images that have left the window.
+    pub fn earlier_per_s(&self, column: usize) -> f64 {
+        self.bits_per_s(column) - self.by_motion_per_s(column).sum::<f64>()
+    }
+
+    /// Bytes on the heap.
+    pub(crate) fn heap_bytes(&self) -> usize {
+        allocated_bytes(size_of_val(&*self.bits)) + allocated_bytes(size_of_val(&*self.by_motion))
+    }
+}
+
+/// Added to the diagonals, as the solver does: an unknown without any factor stays where it is.
+const FLOOR: f64 = 1e-6;
+/// A gain below this share of the variance is rounding.
+const ROUNDING: f64 = 1e-10;
+
+/// The sightings of one camera at the final estimate, with and without the newest image.
+#[derive(Debug)]
+pub(crate) struct CameraInformation {
+    maps: CameraMaps,
+    /// Information of the camera's poses, 6 each, landmarks eliminated.
+    with: DMatrix<f64>,
+    without: DMatrix<f64>,
+}
+
+impl CameraInformation {
+    pub(crate) fn new(projected: &ProjectedRows, maps: CameraMaps) -> Self {
+        let poses = 6 * maps.own.len();
+        let squared = |rows: &DMatrix<f64>| {
+            let rows = rows.columns(0, poses);
+            rows.tr_mul(&rows)
+        };
+        let with = squared(&projected.rows);
+        let without = &with - squared(&projected.newest_rows);
+        Self { maps, with, without }
+    }
+}
+
+/// How the unknowns answer to the calibration, with or without the factors of the newest frame.
+struct Answer {
+    /// Covariance of the free calibration.
+    covariance: DMatrix<f64>,
+    /// By column of the layout (states and calibration) and free calibration column: how the states follow, least squares,
+    /// when a parameter is moved.
+    response: DMatrix<f64>,
+}
+
+impl Answer {
+    /// The first `states` unknowns are those of the frames.
+    fn new(hessian: &DMatrix<f64>, states: usize, free: &[usize]) -> Option<Self> {
+        let kept: Vec<usize> = (0..states).chain(free.iter().copied()).collect();
+        let mut matrix = hessian.select_columns(&kept).select_rows(&kept);
+        for index in 0..matrix.nrows() {
+            matrix[(index, index)] += FLOOR;
+        }
+        let factor = Cholesky::new(&matrix)?;
+        let follows = factor.leading_response(free.len());
+        let mut response = DMatrix::zeros(hessian.nrows(), free.len());
+        response.rows_mut(0, states).copy_from(&follows);
+        for (index, column) in free.iter().enumerate() {
+            response[(*column, index)] = 1.0;
+        }
+        Some(Self { covariance: factor.trailing_covariance(free.len()), response })
+    }
+}
+
+impl Problem<'_> {
+    /// What the newest image tells; `None` without a calibration to tell about, in a window of one frame, or when a matrix
+    /// is not positive definite.
+    pub(crate) fn information_gain(
+        &self,
+        estimate: &Estimate,
+        cameras: &[CameraInformation],
+    ) -> Option<InformationGain> {
+        let layout = self.layout;
+        let (interval_s, free) = self.newest_interval(estimate)?;
+        let (newest, first) = (layout.frames - 1, layout.calibration().start);
+        let frames = self.linearization_frames(estimate);
+        let answer = |slots: usize| {
+            let (mut hessian, _) = self.other_equations(estimate, &frames, slots);
+            for (camera, information) in cameras.iter().enumerate() {
+                let poses = if slots == layout.frames { &information.with } else { &information.without };
+                self.carry(camera, &information.maps, poses, &mut hessian);
+            }
+            Answer::new(&hessian, first, &free)
+        };
+        let (with, without) = (answer(layout.frames)?, answer(newest)?);
+        let covariance = &with.covariance;
+        let parts = self.parts(estimate, &frames, cameras, [&with, &without], &free);
+        // `P·G·P` on the diagonal.
+        let before = without.covariance.clone().cholesky()?;
+        let kept = covariance * before.solve(covariance);
+        let motions = 6 + layout.joints;
+        let mut bits = Vec::with_capacity(free.len());
+        let mut by_motion = Vec::with_capacity(free.len() * motions);
+        for column in 0..free.len() {
+            let variance = covariance[(column, column)];
+            let gained = variance - kept[(column, column)];
+            let told = 0.5 * (without.covariance[(column, column)] / variance).log2();
+            let counts = told.is_finite() && told > 0.0 && gained > ROUNDING * variance;
+            let share = if counts { told / gained } else { 0.0 };
+            bits.push(if counts { told as f32 } else { 0.0 });
+            by_motion.extend((0..motions).map(|motion| (share * parts[(motion, column)]) as f32));
+        }
+        Some(InformationGain { interval_s, joints: layout.joints, bits: bits.into(), by_motion: by_motion.into() })
+    }
+
+    /// What an image tells that is forgotten again; `None` as in [`Self::information_gain`].
+    pub(crate) fn no_information_gain(&self, estimate: &Estimate) -> Option<InformationGain> {
+        let (interval_s, free) = self.newest_interval(estimate)?;
+        let joints = self.layout.joints;
+        let nothing = |count: usize| vec![0.0; count].into();
+        Some(InformationGain {
+            interval_s,
+            joints,
+            bits: nothing(free.len()),
+            by_motion: nothing(free.len() * (6 + joints)),
+        })
+    }
+
+    /// Seconds since the image before the newest one, and the calibration's free columns; `None` where there are none.
+    fn newest_interval(&self, estimate: &Estimate) -> Option<(f64, Vec<usize>)> {
+        let newest = self.layout.frames.checked_sub(1).filter(|newest| *newest > 0)?;
+        let interval_s = seconds_from_ns(self.frames[newest].stamp_ns - self.frames[newest - 1].stamp_ns);
+        let first = self.layout.calibration().start;
+        let frozen = estimate.calibration.frozen_columns();
+        let free: Vec<usize> = self.layout.calibration().filter(|column| !frozen.contains(&(column - first))).collect();
+        (!free.is_empty() && interval_s > 0.0).then_some((interval_s, free))
+    }
+
+    /// Carries what is known about a camera's poses on to the unknowns; the lower triangle counts.
+    fn carry(&self, camera: usize, maps: &CameraMaps, poses: &DMatrix<f64>, hessian: &mut DMatrix<f64>) {
+        let layout = self.layout;
+        let calibration = self.cameras[camera].columns.clone();
+        for row in 0..layout.frames {
+            let mut by_calibration = DMatrix::zeros(6, calibration.len());
+            for column in 0..layout.frames {
+                let block = poses.fixed_view::<6, 6>(6 * row, 6 * column);
+                by_calibration += block * &maps.calibration[column];
+                if column <= row {
+                    let carried = maps.own[row].tr_mul(&(block * &maps.own[column]));
+                    let mut place = hessian.view_range_mut(layout.camera(row), layout.camera(column));
+                    place += carried;
+                }
+            }
+            let mut coupling = hessian.view_range_mut(calibration.clone(), layout.camera(row));
+            coupling += by_calibration.tr_mul(&maps.own[row]);
+            let mut corner = hessian.view_range_mut(calibration.clone(), calibration.clone());
+            corner += maps.calibration[row].tr_mul(&by_calibration);
+        }
+    }
+
+    /// The diagonals of `P·Gm·P`: a row for each motion, a column for each free parameter.
+    fn parts(
+        &self,
+        estimate: &Estimate,
+        frames: &[FrameState],
+        cameras: &[CameraInformation],
+        [with, without]: [&Answer; 2],
+        free: &[usize],
+    ) -> DMatrix<f64> {
+        let layout = self.layout;
+        let calibration = self.linearization_calibration(&estimate.calibration);
+        let mut parts = DMatrix::zeros(6 + layout.joints, free.len());
+        // Everything by the motion of all parameters that a deviation of one of them goes with.
+        let (with_p, without_p) = (&with.response * &with.covariance, &without.response * &with.covariance);
+        for (camera, information) in cameras.iter().enumerate() {
+            let maps = &information.maps;
+            let columns = self.cameras[camera].columns.clone();
+            let moved = |answer: &DMatrix<f64>| camera_moves(layout, maps, &columns, answer);
+            let force = &information.with * moved(&with_p) - &information.without * moved(&without_p);
+            let own = with_p.rows_range(columns.clone());
+            let of_camera = calibration.of(camera);
+            let seen: Vec<_> =
+                frames.iter().map(|state| camera_pose::when_seen(state, of_camera.camera_shift_s())).collect();
+            for (motion, moves) in motion_parts(&seen, of_camera, maps, layout.joints).into_iter().enumerate() {
+                let moves = moves * own;
+                for column in 0..free.len() {
+                    parts[(motion, column)] += moves.column(column).dot(&force.column(column));
+                }
+            }
+        }
+        self.encoder_clock_parts(estimate, &with_p, &without_p, &mut parts);
+        parts
+    }
+
+    /// What the readings of moving joints tell about the encoders' clock.
+    fn encoder_clock_parts(
+        &self,
+        estimate: &Estimate,
+        with: &DMatrix<f64>,
+        without: &DMatrix<f64>,
+        parts: &mut DMatrix<f64>,
+    ) {
+        let Some(clock) = self.encoder_clock_column(estimate) else { return };
+        let newest = self.layout.frames - 1;
+        for slot in 0..self.layout.frames {
+            let joints = self.layout.joints(slot).start;
+            for (joint, _, slope) in self.encoder_residuals(slot, estimate) {
+                let by_clock = slope * estimate.frames[slot].rates.joint_rad_per_s(joint);
+                let row = |answer: &DMatrix<f64>| answer.row(joints + joint) * slope + answer.row(clock) * by_clock;
+                let force = if slot == newest { row(with) } else { row(with) - row(without) };
+                for column in 0..force.len() {
+                    parts[(6 + joint, column)] += by_clock * with[(clock, column)] * force[column];
+                }
+            }
+        }
+    }
+}
+
+/// How the camera's poses move, 6 rows each, when the unknowns do.
+fn camera_moves(
+    layout: Layout,
+    maps: &CameraMaps,
+    calibration: &std::ops::Range<usize>,
+    unknowns: &DMatrix<f64>,
+) -> DMatrix<f64> {
+    let mut moves = DMatrix::zeros(6 * layout.frames, unknowns.ncols());
+    for slot in 0..layout.frames {
+        let moved = &maps.own[slot] * unknowns.rows_range(layout.camera(slot))
+            + &maps.calibration[slot] * unknowns.rows_range(calibration.clone());
+        moves.rows_mut(6 * slot, 6).copy_from(&moved);
+    }
+    moves
+}

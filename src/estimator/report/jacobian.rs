@@ -1,0 +1,290 @@
+//! The Jacobian of a step before anything is eliminated, by blocks: rows by the factor that they come from, columns by name.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{DMatrix, Matrix2x6, Vector3};
+
+use super::jacobian_source::{column_scale, scales_of};
+use super::linearization::column_blocks;
+use crate::camera::CameraModel;
+use crate::estimator::factors::reprojection::{CameraPose, Landmark, Reprojection};
+use crate::estimator::factors::visual::{RelativePoses, Sighting, VisualModel, whitened};
+use crate::estimator::state::camera_pose::{self, CameraMaps, Mount};
+use crate::estimator::state::layout::{Layout, POSE};
+use crate::estimator::window::frames::FrameState;
+use crate::estimator::{
+    ColumnBlock, ColumnGroup, FeatureReport, JacobianFactor, JacobianRow, JacobianSource, StepReport,
+};
+use crate::frontend::FeatureId;
+use crate::gimbal::Chain;
+
+/// The Jacobian of a step by blocks.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StepJacobian {
+    /// Calibration, joint angles, poses, speeds and biases, and last the inverse depths as one block: every feature has its
+    /// own, and no other row touches it.
+    pub columns: Vec<ColumnBlock>,
+    /// The features in the report's order, then the rest.
+    pub rows: Vec<JacobianRow>,
+}
+
+/// The rows of one feature in some columns, two a sighting.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FeatureRows {
+    /// Number of the observing frame of each sighting.
+    pub frame_indices: Vec<usize>,
+    /// By the columns of the step, those of the feature's inverse depth last; whitened: residuals by their standard
+    /// deviations with robust weights, per radian, metre, and 1/m.
+    pub rows: DMatrix<f64>,
+}
+
+impl StepReport {
+    /// The blocks of the Jacobian, `None` where the report does not keep its source; `cameras` are the main one and the
+    /// rigid ones beside it.
+    pub fn jacobian(&self, cameras: &[&CameraModel]) -> Option<StepJacobian> {
+        let writer = Writer::new(self, cameras)?;
+        let mut rows = Vec::with_capacity(self.features.len());
+        for (index, feature) in self.features.iter().enumerate() {
+            let Some(written) = writer.feature(index, feature) else { continue };
+            rows.push(writer.row_of(feature, &written));
+        }
+        rows.extend(writer.other_rows());
+        Some(StepJacobian { columns: writer.columns, rows })
+    }
+
+    /// The rows of one feature; `cameras` as for [`Self::jacobian`].
+    pub fn feature_rows(&self, cameras: &[&CameraModel], id: FeatureId) -> Option<FeatureRows> {
+        let writer = Writer::new(self, cameras)?;
+        let index = self.features.iter().position(|feature| feature.id == id)?;
+        writer.feature(index, &self.features[index])
+    }
+}
+
+/// One camera at the states of the window.
+struct WindowCamera<'a> {
+    model: VisualModel<'a>,
+    /// Its poses by slot.
+    current: Vec<CameraPose>,
+    relative: RelativePoses,
+    linearized: RelativePoses,
+    /// By slot: how the camera's pose follows pose and joints, and the calibration.
+    maps: Vec<(DMatrix<f64>, DMatrix<f64>)>,
+    /// First column of its calibration.
+    start: usize,
+}
+
+struct Writer<'a> {
+    report: &'a StepReport,
+    source: &'a JacobianSource,
+    layout: Layout,
+    columns: Vec<ColumnBlock>,
+    states: Vec<FrameState>,
+    cameras: Vec<WindowCamera<'a>>,
+    /// The landmarks in the world.
+    places_m: BTreeMap<FeatureId, Vector3<f64>>,
+}
+
+impl<'a> Writer<'a> {
+    fn new(report: &'a StepReport, cameras: &[&'a CameraModel]) -> Option<Self> {
+        let source = report.jacobian_source.as_ref()?;
+        let frames = report.window.len();
+        let joints = report.window.first().map_or(0, |frame| frame.joint_angles_rad.len());
+        let states = source.frames(joints);
+        let clocks: usize = source.clocks.iter().map(|clocks| clocks.count).sum();
+        let columns = source.chains.iter().map(Chain::dof).sum::<usize>() + clocks;
+        let known = columns == report.calibration.names.len();
+        if !known || states.len() != frames || cameras.len() < source.chains.len() {
+            return None;
+        }
+        let calibration = if source.calibrated { report.calibration.names.len() } else { 0 };
+        let layout = Layout { frames, joints, calibration };
+        let numbers: Vec<usize> = report.window.iter().map(|frame| frame.frame_index).collect();
+        let mut columns = column_blocks(&layout, &report.calibration.names, &numbers);
+        let start = columns.last().map_or(0, |last| last.start + last.len);
+        columns.push(ColumnBlock { group: ColumnGroup::InverseDepth, name: "own depth".to_owned(), start, len: 1 });
+        let mut start = 0;
+        let cameras = source
+            .chains
+            .iter()
+            .zip(cameras)
+            .enumerate()
+            .map(|(camera, (_, model))| {
+                let camera = window_camera(report, source, &states, camera, model, start);
+                start += camera.maps.first().map_or(0, |(_, calibration)| calibration.ncols());
+                camera
+            })
+            .collect();
+        let places_m = report.landmarks.iter().map(|landmark| (landmark.id, landmark.position_m)).collect();
+        Some(Self { report, source, layout, columns, states, cameras, places_m })
+    }
+
+    /// The rows of a feature; `None` where its camera is unknown.
+    fn feature(&self, index: usize, feature: &FeatureReport) -> Option<FeatureRows> {
+        let camera = self.cameras.get(feature.id.camera())?;
+        let slot_of = |number: usize| self.report.window.iter().position(|frame| frame.frame_index == number);
+        let anchor = slot_of(feature.anchor_frame_index)?;
+        let landmark = self.landmark(index, feature, &camera.current[anchor])?;
+        let width = self.columns.last().map_or(0, |last| last.start + last.len);
+        let mut rows = DMatrix::zeros(2 * feature.observations.len(), width);
+        let mut frame_indices = Vec::new();
+        for seen in feature.observations.iter() {
+            let Some(slot) = slot_of(seen.frame_index) else { continue };
+            let sighting = Sighting { slot, uv_px: seen.measured_px };
+            let (now, then) = (&camera.relative, &camera.linearized);
+            // The report's residuals are rounded; the weight that the step counted with is not taken from them again.
+            let weight = seen.residual_after_px.map(|_| seen.robust_weight);
+            let Some(term) = whitened(&camera.model, now, then, anchor, &landmark, &sighting, weight) else { continue };
+            let mut target = rows.rows_mut(2 * frame_indices.len(), 2);
+            self.write(&mut target, camera, anchor, slot, &term);
+            frame_indices.push(seen.frame_index);
+        }
+        let height = 2 * frame_indices.len();
+        Some(FeatureRows { frame_indices, rows: rows.resize_vertically(height, 0.0) })
+    }
+
+    /// The landmark of a feature in its anchor's camera: from its place in the world, for a rejected one as it was kept.
+    fn landmark(&self, index: usize, feature: &FeatureReport, anchor: &CameraPose) -> Option<Landmark> {
+        let rejected = self.source.rejected.iter().find(|(place, _)| *place as usize == index);
+        if let Some((_, bearing)) = rejected {
+            let bearing = Vector3::from(*bearing).cast::<f64>().normalize();
+            return Some(Landmark { bearing, inverse_distance: feature.inverse_depth_per_m * bearing.z });
+        }
+        let position_m = self.places_m.get(&feature.id)?;
+        let point = anchor.rotation.tr_mul(&(position_m - anchor.position_m));
+        Some(Landmark { bearing: point.normalize(), inverse_distance: point.norm().recip() })
+    }
+
+    /// The rows that are not of features.
+    fn other_rows(&self) -> Vec<JacobianRow> {
+        let numbers: Vec<usize> = self.report.window.iter().map(|frame| frame.frame_index).collect();
+        let mut rows: Vec<JacobianRow> = self.source.rows(&numbers).collect();
+        let is_inertial = |row: &JacobianRow| matches!(row.factor, JacobianFactor::Inertial { .. });
+        let place = rows.iter().position(|row| !is_inertial(row)).unwrap_or(rows.len());
+        // The readings of a frame touch its joint angles alone, each with the inverse of its deviation.
+        let encoders = self.report.window.iter().enumerate().filter_map(|(slot, frame)| {
+            let sigmas = frame.encoder_sigmas_rad.as_ref().filter(|sigmas| !sigmas.is_empty())?;
+            let name = format!("joints {}", frame.frame_index);
+            let column = self.columns.iter().position(|block| block.name == name)?;
+            let scale = column_scale(ColumnGroup::Joints, "", 0);
+            let sigmas = || sigmas.iter().take(self.layout.joints).enumerate();
+            let squared: f64 = sigmas().map(|(_, sigma)| (scale / sigma).powi(2)).sum();
+            let factor = JacobianFactor::Encoder(numbers[slot]);
+            let mut norms = vec![(column as u16, squared.sqrt() as f32)];
+            if let Some((clock, block)) = self.encoder_clock() {
+                let scale = column_scale(block.group, "s", 0);
+                let rate = |joint: usize| self.states[slot].rates.joint_rad_per_s(joint);
+                let squared: f64 = sigmas().map(|(joint, sigma)| (scale * rate(joint) / sigma).powi(2)).sum();
+                if squared > 0.0 {
+                    norms.insert(0, (clock as u16, squared.sqrt() as f32));
+                }
+            }
+            Some(JacobianRow { factor, height: sigmas().count(), norms })
+        });
+        let encoders: Vec<JacobianRow> = encoders.collect();
+        rows.splice(place..place, encoders);
+        rows
+    }
+
+    /// The column of the encoders' clock and its number, where that is estimated.
+    fn encoder_clock(&self) -> Option<(usize, &ColumnBlock)> {
+        let main = self.source.clocks.first().filter(|clocks| clocks.count > 1 && self.source.calibrated)?;
+        let number = self.source.chains.first()?.dof() + main.count - 1;
+        Some((number, self.columns.get(number)?))
+    }
+
+    fn write(
+        &self,
+        rows: &mut nalgebra::DMatrixViewMut<'_, f64>,
+        camera: &WindowCamera<'_>,
+        anchor: usize,
+        slot: usize,
+        term: &Reprojection,
+    ) {
+        rows.column_mut(rows.ncols() - 1).copy_from(&term.by_landmark.column(2));
+        if slot == anchor {
+            return;
+        }
+        let joints = self.layout.calibration;
+        let poses = joints + self.layout.joints * self.layout.frames;
+        for (slot, by_camera) in [(anchor, &term.by_anchor), (slot, &term.by_observer)] {
+            let by_camera: &Matrix2x6<f64> = by_camera;
+            let (own, calibration) = &camera.maps[slot];
+            let by_frame = by_camera * own;
+            rows.columns_mut(poses + POSE * slot, POSE).copy_from(&by_frame.columns(0, POSE));
+            let count = self.layout.joints;
+            rows.columns_mut(joints + count * slot, count).copy_from(&by_frame.columns(POSE, count));
+            let mut by_calibration = rows.columns_mut(camera.start, calibration.ncols());
+            by_calibration += by_camera * calibration;
+        }
+    }
+
+    fn row_of(&self, feature: &FeatureReport, written: &FeatureRows) -> JacobianRow {
+        let mut scales = scales_of(&self.columns, &self.report.calibration.units);
+        if let Some(last) = scales.last_mut() {
+            // A tenth of the inverse distance.
+            *last = column_scale(ColumnGroup::InverseDepth, "", 0) * feature.inverse_depth_per_m.abs();
+        }
+        let mut norms = Vec::new();
+        for (number, block) in self.columns.iter().enumerate() {
+            let range = block.start..block.start + block.len;
+            let squared: f64 = range.map(|column| (written.rows.column(column) * scales[column]).norm_squared()).sum();
+            if squared > 0.0 {
+                norms.push((number as u16, squared.sqrt() as f32));
+            }
+        }
+        JacobianRow { factor: JacobianFactor::Feature(feature.id), height: written.rows.nrows(), norms }
+    }
+}
+
+fn window_camera<'a>(
+    report: &StepReport,
+    source: &JacobianSource,
+    states: &[FrameState],
+    camera: usize,
+    model: &'a CameraModel,
+    start: usize,
+) -> WindowCamera<'a> {
+    let chain = &source.chains[camera];
+    let clocks = source.clocks.get(camera).copied().unwrap_or_default();
+    let [then_s, now_s] = clocks.shifts_s;
+    let mount = Mount {
+        chain,
+        columns: if source.calibrated { chain.dof() + clocks.count } else { 0 },
+        shift_s: then_s,
+        shift_column: (source.calibrated && clocks.count > 0).then(|| chain.dof()),
+    };
+    let linearized: Vec<CameraPose> = states.iter().map(|state| camera_pose::at_mount(state, &mount)).collect();
+    let maps = CameraMaps::of_mount(states, &mount);
+    let maps = maps.own.into_iter().zip(maps.calibration).collect();
+    let rigid = camera.checked_sub(1).and_then(|rigid| report.calibration.rigid_cameras.get(rigid));
+    let now = report.window.iter().zip(states).map(|(frame, state)| {
+        let mut state = state.clone();
+        state.navigation.world_from_imu = frame.world_from_imu;
+        state.navigation.velocity_m_per_s = frame.velocity_m_per_s;
+        state.joints_rad.clone_from(&frame.joint_angles_rad);
+        let seen = camera_pose::when_seen(&state, now_s);
+        let mounted = match rigid {
+            Some((_, mount)) => *mount,
+            // With its clock right the camera is where the report has it.
+            None if now_s == 0.0 => frame.imu_from_camera,
+            None => {
+                // The joints moved on meanwhile; how far is hardly another thing at the first estimate.
+                let moved =
+                    chain.imu_from_camera(&state.joints_rad).inverse() * chain.imu_from_camera(&seen.joints_rad);
+                frame.imu_from_camera * moved
+            }
+        };
+        let pose = seen.navigation.world_from_imu * mounted;
+        CameraPose { rotation: pose.rotation_matrix(), position_m: pose.translation_m }
+    });
+    let current: Vec<CameraPose> = now.collect();
+    let (sigma_px, loss, landmark_model) = (source.pixel_sigma_px, source.loss, source.landmark_model);
+    WindowCamera {
+        model: VisualModel { camera: model, sigma_px, loss, landmark_model },
+        relative: RelativePoses::new(&current),
+        current,
+        linearized: RelativePoses::new(&linearized),
+        maps,
+        start,
+    }
+}

@@ -1,0 +1,313 @@
+//! What a report keeps of the step's Jacobian, so that any of its blocks can be written out again.
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, Quaternion, UnitQuaternion, Vector3};
+
+use super::linearization::{column_blocks, column_order};
+use crate::estimator::estimator::Estimator;
+use crate::estimator::options::{LandmarkModel, RobustLoss};
+use crate::estimator::state::calibrations::Calibrations;
+use crate::estimator::state::layout::POSE;
+use crate::estimator::window::frames::{FrameState, Rates};
+use crate::estimator::window::rows::stack_columns;
+use crate::estimator::window::tracking::SolvedWindow;
+use crate::estimator::{ColumnBlock, ColumnGroup, ImuBias, NavigationState, allocated_bytes};
+use crate::geometry::RigidTransform;
+use crate::gimbal::Chain;
+
+/// Where the step's Jacobian was taken, and the blocks that a report could not write out again.
+///
+/// The rows of the features are by far the most: they follow from the rest of the report, these states and the bearings.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JacobianSource {
+    /// By slot, where derivatives are taken (first estimates): `world_from_imu` as quaternion x, y, z, w and position, then
+    /// the joint angles; in single precision, which is far finer than what is drawn.
+    frames: Box<[f32]>,
+    /// The chains at which derivatives are taken, by camera.
+    pub(crate) chains: Box<[Chain]>,
+    /// By camera, the offsets of the clocks that are estimated; empty where none is.
+    pub(crate) clocks: Box<[ClockColumns]>,
+    /// By slot, where clocks are estimated: rates of the body's rotation and of its position, then those of the joints.
+    rates: Box<[f32]>,
+    /// Whether the calibration has columns.
+    pub(crate) calibrated: bool,
+    /// Places among the report's features of the rejected ones, which have no landmark there, and their unit directions in
+    /// their anchors' cameras.
+    pub(crate) rejected: Box<[(u32, [f32; 3])]>,
+    rows: Box<[PackedRow]>,
+    /// Of all packed rows, one after the other: numbers of blocks of columns, and the norms there.
+    columns: Box<[u16]>,
+    norms: Box<[f32]>,
+    pub(crate) pixel_sigma_px: f64,
+    pub(crate) loss: RobustLoss,
+    pub(crate) landmark_model: LandmarkModel,
+}
+
+/// Offsets of clocks that are estimated with a camera.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct ClockColumns {
+    /// How many: the camera's, then the encoders'.
+    pub(crate) count: usize,
+    /// The camera's where derivatives are taken, and as it is estimated, beyond what the rig says.
+    pub(crate) shifts_s: [f64; 2],
+}
+
+/// Rows that are neither of features nor of encoders.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct PackedRow {
+    kind: PackedKind,
+    height: u16,
+    /// How many of the norms are its own.
+    count: u16,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum PackedKind {
+    /// The inertial samples that end at this slot.
+    Inertial(u8),
+    Standstill,
+    CalibrationPrior,
+    MarginalizationPrior,
+}
+
+impl PackedKind {
+    /// What it stands for, with frames of these numbers.
+    fn factor(self, numbers: &[usize]) -> Option<JacobianFactor> {
+        Some(match self {
+            Self::Inertial(slot) => {
+                let slot = usize::from(slot);
+                let from = numbers.get(slot.checked_sub(1)?)?;
+                JacobianFactor::Inertial { from: *from, to: *numbers.get(slot)? }
+            }
+            Self::Standstill => JacobianFactor::Standstill,
+            Self::CalibrationPrior => JacobianFactor::CalibrationPrior,
+            Self::MarginalizationPrior => JacobianFactor::MarginalizationPrior,
+        })
+    }
+}
+
+/// The rows of a factor that is not a feature's.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FactorRows {
+    /// Whose they are.
+    pub factor: JacobianFactor,
+    /// By the columns of the step (calibration, joints, poses, speeds and biases), whitened; the residual last, at the final
+    /// estimate.
+    pub rows: DMatrix<f64>,
+}
+
+/// Where residuals come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum JacobianFactor {
+    /// The reprojections of a feature, two rows a sighting.
+    Feature(crate::frontend::FeatureId),
+    /// The inertial samples between two frames, by the frames' numbers.
+    Inertial {
+        /// The earlier one.
+        from: usize,
+        /// The later one.
+        to: usize,
+    },
+    /// The encoder readings of a frame.
+    Encoder(usize),
+    /// What standing still says.
+    Standstill,
+    /// The rig's prior on the calibration.
+    CalibrationPrior,
+    /// The marginalization prior, and what was known at the start.
+    MarginalizationPrior,
+}
+
+/// Rows of the Jacobian that belong together.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JacobianRow {
+    /// Where they come from.
+    pub factor: JacobianFactor,
+    /// How many they are.
+    pub height: usize,
+    /// Number of a block of columns and the Frobenius norm of the rows there, in standard deviations of the residuals by
+    /// the column's scale (see [`crate::estimator::column_scale`]); blocks that are zero are left out.
+    pub norms: Vec<(u16, f32)>,
+}
+
+impl JacobianSource {
+    /// Bytes on the heap.
+    pub(crate) fn heap_bytes(&self) -> usize {
+        allocated_bytes(size_of_val(&*self.frames))
+            + allocated_bytes(size_of_val(&*self.chains))
+            + allocated_bytes(size_of_val(&*self.clocks))
+            + allocated_bytes(size_of_val(&*self.rates))
+            + self.chains.iter().map(|chain| allocated_bytes(chain.dof() * size_of::<f64>())).sum::<usize>()
+            + allocated_bytes(size_of_val(&*self.rejected))
+            + allocated_bytes(size_of_val(&*self.rows))
+            + allocated_bytes(size_of_val(&*self.columns))
+            + allocated_bytes(size_of_val(&*self.norms))
+    }
+
+    /// States by slot, for frames of so many joints; speeds and rates only where clocks are estimated, biases taken off.
+    pub(crate) fn frames(&self, joints: usize) -> Vec<FrameState> {
+        let mut rates = self.rates.chunks_exact(POSE + joints);
+        let states = self.poses(joints).into_iter().map(|(world_from_imu, joints_rad)| {
+            let rates: Vec<f64> = rates.next().unwrap_or_default().iter().map(|rate| f64::from(*rate)).collect();
+            let three = |from: usize| rates.get(from..from + 3).map_or_else(Vector3::zeros, Vector3::from_column_slice);
+            FrameState {
+                navigation: NavigationState { world_from_imu, velocity_m_per_s: three(3), bias: ImuBias::default() },
+                joints_rad,
+                rates: Arc::new(Rates {
+                    gyroscope_rad_per_s: three(0),
+                    joints_rad_per_s: rates.get(POSE..).unwrap_or_default().to_vec(),
+                }),
+            }
+        });
+        states.collect()
+    }
+
+    fn poses(&self, joints: usize) -> Vec<(RigidTransform, Vec<f64>)> {
+        let unpacked = |numbers: &[f32]| {
+            let number = |place: usize| f64::from(numbers[place]);
+            let rotation = Quaternion::new(number(3), number(0), number(1), number(2));
+            let position_m = Vector3::new(number(4), number(5), number(6));
+            let pose = RigidTransform::new(UnitQuaternion::new_normalize(rotation), position_m);
+            (pose, numbers[POSE_NUMBERS..].iter().map(|angle| f64::from(*angle)).collect())
+        };
+        self.frames.chunks_exact(POSE_NUMBERS + joints).map(unpacked).collect()
+    }
+
+    /// The packed rows, for frames of these numbers.
+    pub(crate) fn rows<'a>(&'a self, numbers: &'a [usize]) -> impl Iterator<Item = JacobianRow> + 'a {
+        let mut begin = 0;
+        self.rows.iter().filter_map(move |row| {
+            let range = begin..begin + usize::from(row.count);
+            begin = range.end;
+            let factor = row.kind.factor(numbers)?;
+            let norms = self.columns[range.clone()].iter().copied().zip(self.norms[range].iter().copied());
+            Some(JacobianRow { factor, height: usize::from(row.height), norms: norms.collect() })
+        })
+    }
+}
+
+/// Numbers of a pose among those of a frame.
+const POSE_NUMBERS: usize = 7;
+
+impl Estimator {
+    /// The source of the Jacobian at the final estimate, and the rows that are not of features where they are to be kept.
+    pub(crate) fn jacobian_source(&self, solved: &SolvedWindow) -> (JacobianSource, Vec<FactorRows>) {
+        let problem = self.problem(&solved.cameras);
+        let estimate = &solved.solution.estimate;
+        let layout = problem.layout;
+        let frames = problem.linearization_frames(estimate);
+        let calibration = problem.linearization_calibration(&estimate.calibration);
+        let numbers: Vec<usize> = self.frames.iter().map(|frame| frame.index).collect();
+        let columns = column_blocks(&layout, &self.calibration_names(), &numbers);
+        let scales = scales_of(&columns, &self.calibration_units());
+        let order = column_order(&layout);
+        let mut packed = Vec::new();
+        let mut norms: Vec<(u16, f32)> = Vec::new();
+        let mut kept = Vec::new();
+        let mut push = |kind: PackedKind, rows: &DMatrix<f64>| {
+            if rows.nrows() > 0 {
+                let jacobian = stack_columns(std::slice::from_ref(rows), order.iter().copied());
+                let own = norms_of(&jacobian, &columns, &scales);
+                if let Some(factor) = kind.factor(&numbers).filter(|_| self.config.options.keep_factor_rows) {
+                    let last = jacobian.ncols();
+                    let mut rows_with_residual = jacobian.resize_horizontally(last + 1, 0.0);
+                    rows_with_residual.set_column(last, &rows.column(layout.total()));
+                    kept.push(FactorRows { factor, rows: rows_with_residual });
+                }
+                packed.push(PackedRow { kind, height: rows.nrows() as u16, count: own.len() as u16 });
+                norms.extend(own);
+            }
+        };
+        for slot in 1..layout.frames {
+            push(PackedKind::Inertial(slot as u8), &problem.inertial_rows_at(slot, estimate, &frames));
+        }
+        let rest: Vec<_> = problem.rest_terms(&estimate.frames).collect();
+        push(PackedKind::Standstill, &problem.rest_rows(&rest));
+        push(PackedKind::CalibrationPrior, &problem.calibration_prior_rows(estimate));
+        push(PackedKind::MarginalizationPrior, &problem.prior_rows(estimate));
+        let packed_frame = |state: &FrameState| {
+            let pose = state.navigation.world_from_imu;
+            let numbers = pose.rotation.coords.iter().chain(pose.translation_m.iter()).chain(&state.joints_rad);
+            numbers.map(|number| *number as f32).collect::<Vec<f32>>()
+        };
+        let rejected = solved.checks.iter().zip(&estimate.landmarks).flat_map(|(checks, landmarks)| {
+            checks.rejected.iter().zip(landmarks).map(|(rejected, landmark)| (*rejected, landmark.bearing))
+        });
+        let rejected = rejected.enumerate().filter(|(_, (rejected, _))| *rejected);
+        let options = &self.config.options;
+        let clocked = |calibrations: &Calibrations, camera: usize| {
+            let calibration = calibrations.of(camera);
+            (calibration.dof().saturating_sub(calibration.chain().dof()), calibration.camera_shift_s())
+        };
+        let clocks: Vec<ClockColumns> = (0..calibration.cameras())
+            .map(|camera| {
+                let ((count, then), (_, now)) = (clocked(&calibration, camera), clocked(&estimate.calibration, camera));
+                ClockColumns { count, shifts_s: [then, now] }
+            })
+            .collect();
+        let any = clocks.iter().any(|clocks| clocks.count > 0);
+        let rates = |state: &FrameState| state.motion().iter().map(|rate| *rate as f32).collect::<Vec<f32>>();
+        let source = JacobianSource {
+            rates: if any { frames.iter().flat_map(rates).collect() } else { Box::default() },
+            clocks: if any { clocks.into() } else { Box::default() },
+            frames: frames.iter().flat_map(packed_frame).collect(),
+            chains: (0..calibration.cameras()).map(|camera| calibration.of(camera).chain().clone()).collect(),
+            calibrated: layout.calibration > 0,
+            rejected: rejected.map(|(place, (_, bearing))| (place as u32, bearing.cast::<f32>().into())).collect(),
+            rows: packed.into(),
+            columns: norms.iter().map(|(column, _)| *column).collect(),
+            norms: norms.iter().map(|(_, norm)| *norm).collect(),
+            pixel_sigma_px: options.pixel_sigma_px,
+            loss: options.loss,
+            landmark_model: options.landmark_model,
+        };
+        (source, kept)
+    }
+}
+
+/// What 1 means in a column of a group, so that columns compare: 10° for angles, 3 cm for lengths, 20 ms for clocks,
+/// 0.1 m/s, 1 °/s, 0.1 m/s² and a tenth of the inverse depth.
+///
+/// `unit` is that of a calibration parameter, `place` the column's place in its block.
+pub fn column_scale(group: ColumnGroup, unit: &str, place: usize) -> f64 {
+    const TIME_S: f64 = 0.02;
+    const ANGLE_RAD: f64 = 10.0 * std::f64::consts::PI / 180.0;
+    const LENGTH_M: f64 = 0.03;
+    const SPEED_M_PER_S: f64 = 0.1;
+    const GYROSCOPE_BIAS_RAD_PER_S: f64 = std::f64::consts::PI / 180.0;
+    const ACCELEROMETER_BIAS_M_PER_S2: f64 = 0.1;
+    const INVERSE_DEPTH: f64 = 0.1;
+    match (group, place) {
+        (ColumnGroup::Calibration, _) if unit == "rad" => ANGLE_RAD,
+        (ColumnGroup::Calibration, _) if unit == "s" => TIME_S,
+        (ColumnGroup::Joints, _) | (ColumnGroup::Pose, 0..3) => ANGLE_RAD,
+        (ColumnGroup::Calibration | ColumnGroup::Pose, _) => LENGTH_M,
+        (ColumnGroup::SpeedBias, 0..3) => SPEED_M_PER_S,
+        (ColumnGroup::SpeedBias, 3..6) => GYROSCOPE_BIAS_RAD_PER_S,
+        (ColumnGroup::SpeedBias, _) => ACCELEROMETER_BIAS_M_PER_S2,
+        (ColumnGroup::InverseDepth, _) => INVERSE_DEPTH,
+    }
+}
+
+/// The scales of all columns; the calibration's blocks come first, a column each.
+pub(crate) fn scales_of(columns: &[ColumnBlock], units: &[&'static str]) -> Vec<f64> {
+    let of_block = |(number, block): (usize, &ColumnBlock)| {
+        let (group, unit) = (block.group, units.get(number).copied().unwrap_or_default());
+        (0..block.len).map(move |place| column_scale(group, unit, place))
+    };
+    columns.iter().enumerate().flat_map(of_block).collect()
+}
+
+/// Norms of the blocks of some rows that are not zero.
+fn norms_of(jacobian: &DMatrix<f64>, columns: &[ColumnBlock], scales: &[f64]) -> Vec<(u16, f32)> {
+    let mut norms: Vec<(u16, f32)> = Vec::new();
+    for (number, block) in columns.iter().enumerate() {
+        let range = block.start..block.start + block.len;
+        let squared: f64 = range.map(|column| (jacobian.column(column) * scales[column]).norm_squared()).sum();
+        if squared > 0.0 {
+            norms.push((number as u16, squared.sqrt() as f32));
+        }
+    }
+    norms
+}

@@ -1,0 +1,128 @@
+//! How a parameter of the mount moves the camera's poses against each other, put down to what moved within the window.
+//!
+//! Let `D(q)` be what the parameters do to the mount at joint angles `q`, as a twist in the IMU frame, and `M` the motion
+//! from the body's pose at a frame to that at the newest one. When the whole scene moves along with the newest camera, the
+//! frame's camera moves by `D(q) − Ad(M)·D(q')`, with `q'` the newest angles: nothing, where nothing moved.
+//! The difference is a sum. `I − Ad(M)` splits by the axes of the body's rotation vector and translation, exactly, since
+//! `exp([w]) − I = [w]·Jl(w)`; `D(q) − D(q')` telescopes over the joints, as the mean of both orders.
+
+use std::borrow::Cow;
+
+use nalgebra::{DMatrix, Matrix3, Matrix3xX, Vector3};
+
+use crate::estimator::state::calibration::Calibration;
+use crate::estimator::state::camera_pose::CameraMaps;
+use crate::estimator::state::layout::POSE;
+use crate::estimator::window::frames::FrameState;
+use crate::geometry::{RigidTransform, so3};
+
+/// A twist by each column of the calibration: turns, then shifts, in the IMU frame.
+#[derive(Clone, Debug)]
+struct Twists {
+    turn: Matrix3xX<f64>,
+    shift: Matrix3xX<f64>,
+}
+
+/// For each motion (translations along and rotations about the IMU's axes, then the joints) how the calibration moves the
+/// camera's poses because of it: 6 rows a frame, a column for each of the calibration's.
+///
+/// Their sum is the camera's map of the calibration, up to a rigid move of all its poses.
+pub(crate) fn motion_parts(
+    frames: &[Cow<'_, FrameState>],
+    calibration: &Calibration,
+    maps: &CameraMaps,
+    joints: usize,
+) -> Vec<DMatrix<f64>> {
+    let columns = calibration.dof();
+    let mut parts = vec![DMatrix::zeros(6 * frames.len(), columns); 6 + joints];
+    let Some(newest) = frames.last() else { return parts };
+    let there = twists(calibration, &newest.joints_rad);
+    for (slot, frame) in frames.iter().enumerate() {
+        let pose = &frame.navigation.world_from_imu;
+        let mount = calibration.imu_from_camera(&frame.joints_rad);
+        let to_newest = pose.inverse() * newest.navigation.world_from_imu;
+        let mut put = |motion: usize, twists: &Twists| {
+            let moved = camera_moves(twists, &mount, &pose.rotation_matrix());
+            let mut place = parts[motion].view_mut((6 * slot, 0), (6, columns));
+            place += moved;
+        };
+        body_parts(&to_newest, &there, &mut put);
+        joint_parts(calibration, &newest.joints_rad, &frame.joints_rad, &mut put);
+    }
+    if let Some(clock) = calibration.camera_shift_column() {
+        clock_parts(frames, maps, clock, &mut parts);
+    }
+    parts
+}
+
+/// What the parameters of the mount do to it; a clock does nothing to it.
+fn twists(calibration: &Calibration, joints_rad: &[f64]) -> Twists {
+    let linearization = calibration.linearize(joints_rad);
+    let mount = linearization.imu_from_camera;
+    let by_parameters = linearization.by_parameters;
+    let turn = mount.rotation_matrix() * by_parameters.fixed_rows::<3>(0);
+    let shift = by_parameters.fixed_rows::<3>(3) + so3::hat(&mount.translation_m) * &turn;
+    Twists { turn, shift }
+}
+
+/// `(I − Ad(M))·D` by the axes of the translation and of the rotation.
+fn body_parts(to_newest: &RigidTransform, there: &Twists, put: &mut impl FnMut(usize, &Twists)) {
+    let angle = so3::log(&to_newest.rotation);
+    // The left Jacobian is the right one of the opposite turn.
+    let mean = so3::right_jacobian(&-angle);
+    let rotation = to_newest.rotation_matrix();
+    for axis in 0..3 {
+        let unit: Vector3<f64> = Vector3::ith(axis, 1.0);
+        let along: Matrix3<f64> = so3::hat(&(unit * -to_newest.translation_m[axis])) * rotation;
+        put(axis, &Twists { turn: &there.turn * 0.0, shift: along * &there.turn });
+        let about: Matrix3<f64> = so3::hat(&(unit * -angle[axis])) * mean;
+        put(3 + axis, &Twists { turn: about * &there.turn, shift: about * &there.shift });
+    }
+}
+
+/// `D(q) − D(q')` joint by joint, from the first to the last and from the last to the first.
+fn joint_parts(calibration: &Calibration, from_rad: &[f64], to_rad: &[f64], put: &mut impl FnMut(usize, &Twists)) {
+    let joints = calibration.joint_count().min(to_rad.len());
+    if from_rad[..joints] == to_rad[..joints] {
+        return;
+    }
+    let orders: [Vec<usize>; 2] = [(0..joints).collect(), (0..joints).rev().collect()];
+    for order in orders {
+        let mut angles = from_rad.to_vec();
+        let mut before = twists(calibration, &angles);
+        for joint in order {
+            angles[joint] = to_rad[joint];
+            let after = twists(calibration, &angles);
+            let half = |after: &Matrix3xX<f64>, before: &Matrix3xX<f64>| (after - before) * 0.5;
+            let change = Twists { turn: half(&after.turn, &before.turn), shift: half(&after.shift, &before.shift) };
+            put(6 + joint, &change);
+            before = after;
+        }
+    }
+}
+
+/// An offset of the camera's clock moves the camera by what moves.
+fn clock_parts(frames: &[Cow<'_, FrameState>], maps: &CameraMaps, clock: usize, parts: &mut [DMatrix<f64>]) {
+    for (slot, frame) in frames.iter().enumerate() {
+        let (own, rates) = (&maps.own[slot], frame.motion());
+        let body_from_world = frame.navigation.world_from_imu.rotation_matrix().transpose();
+        let velocity = body_from_world * rates.fixed_rows::<3>(3);
+        for (motion, part) in parts.iter_mut().enumerate() {
+            let moved = match motion {
+                0..3 => own.columns(3, 3) * body_from_world.row(motion).transpose() * velocity[motion],
+                3..6 => own.column(motion - 3) * rates[motion - 3],
+                joint => own.column(POSE + joint - 6) * rates[joint],
+            };
+            part.view_mut((6 * slot, clock), (6, 1)).copy_from(&moved);
+        }
+    }
+}
+
+/// Twists in the IMU frame as moves `[φ; δt]` of the camera's pose in the world.
+fn camera_moves(twists: &Twists, mount: &RigidTransform, world_from_imu: &Matrix3<f64>) -> DMatrix<f64> {
+    let mut moves = DMatrix::zeros(6, twists.turn.ncols());
+    moves.rows_mut(0, 3).copy_from(&(mount.rotation_matrix().transpose() * &twists.turn));
+    let shift = &twists.shift - so3::hat(&mount.translation_m) * &twists.turn;
+    moves.rows_mut(3, 3).copy_from(&(world_from_imu * shift));
+    moves
+}

@@ -1,0 +1,262 @@
+//! From the window to the report of a step.
+
+use nalgebra::Vector2;
+
+use crate::estimator::config::rigid_column;
+use crate::estimator::estimator::Estimator;
+use crate::estimator::state::calibration::Calibration;
+use crate::estimator::state::calibrations::MAIN;
+use crate::estimator::window::problem::Costs;
+use crate::estimator::window::solver;
+use crate::estimator::window::tracking::{SolvedWindow, TrackResiduals};
+use crate::estimator::{
+    CalibrationEstimate, FeatureCounts, FeatureReport, FrameStateReport, LandmarkReport, ObservationReport, Phase,
+    ResidualSummary, StageTimes, StepInput, StepReport,
+};
+
+impl Estimator {
+    /// A report that holds nothing but the calibration.
+    pub(crate) fn empty_report(&self, input: &StepInput<'_>, phase: Phase) -> StepReport {
+        StepReport {
+            frame_index: input.frame_index,
+            stamp_ns: input.stamp_ns,
+            phase,
+            restarts: self.restarts,
+            pixel_sigma_px: self.config.options.pixel_sigma_px,
+            effective_pixel_sigma_px: self.config.options.pixel_sigma_px,
+            events: Vec::new(),
+            window: Vec::new(),
+            calibration: self.calibration_report(),
+            features: Vec::new(),
+            counts: FeatureCounts::default(),
+            landmarks: Vec::new(),
+            residuals: Vec::new(),
+            reprojection_rms_before_px: 0.0,
+            reprojection_rms_after_px: 0.0,
+            reprojection_median_after_px: f64::NAN,
+            iterations: Vec::new(),
+            linearization: None,
+            jacobian_source: None,
+            factor_rows: None,
+            gain: None,
+            keyframe: false,
+            times: StageTimes::default(),
+            warnings: Vec::new(),
+        }
+    }
+
+    /// The report of a solved window.
+    pub(crate) fn tracking_report(&mut self, input: &StepInput<'_>, solved: &mut SolvedWindow) -> StepReport {
+        let begin_ms = (self.config.clock_ms)();
+        self.calibration_sigmas = solver::sigmas(&solved.solution.calibration_covariance).iter().copied().collect();
+        let mut report = self.empty_report(input, Phase::Tracking);
+        report.window = self.window_report();
+        report.keyframe = self.frames.last().is_some_and(|frame| frame.keyframe);
+        report.features = self.feature_reports(solved);
+        report.counts = FeatureCounts::of(&report.features);
+        report.effective_pixel_sigma_px = effective_sigma(report.pixel_sigma_px, &report.features);
+        report.landmarks = self.landmark_reports(solved);
+        report.residuals = self.residual_summaries(solved);
+        report.reprojection_rms_before_px =
+            root_mean_square(solved.checks.iter().map(|checks| &checks.residuals_before));
+        let residuals_after = || solved.checks.iter().map(|checks| &checks.residuals_after);
+        report.reprojection_rms_after_px = root_mean_square(residuals_after());
+        report.reprojection_median_after_px = median_length(residuals_after());
+        report.iterations = std::mem::take(&mut solved.solution.iterations);
+        let reported_ms = (self.config.clock_ms)();
+        if self.config.options.keep_linearization {
+            let (linearization, gain) = self.linearization(solved);
+            (report.linearization, report.gain) = (Some(linearization), gain);
+            let (source, rows) = self.jacobian_source(solved);
+            report.jacobian_source = Some(source);
+            report.factor_rows = self.config.options.keep_factor_rows.then_some(rows);
+        }
+        report.times.report_ms = reported_ms - begin_ms;
+        report.times.linearize_ms = (self.config.clock_ms)() - reported_ms;
+        report
+    }
+
+    /// The frames of the window.
+    pub(crate) fn window_report(&self) -> Vec<FrameStateReport> {
+        self.frames
+            .iter()
+            .map(|frame| {
+                let navigation = &frame.state.navigation;
+                FrameStateReport {
+                    frame_index: frame.index,
+                    stamp_ns: frame.stamp_ns,
+                    world_from_imu: navigation.world_from_imu,
+                    velocity_m_per_s: navigation.velocity_m_per_s,
+                    accelerometer_bias_m_per_s2: navigation.bias.accelerometer_m_per_s2,
+                    gyroscope_bias_rad_per_s: navigation.bias.gyroscope_rad_per_s,
+                    joint_angles_rad: frame.state.joints_rad.clone(),
+                    encoder_angles_rad: frame.encoder.as_ref().map(|encoder| encoder.angles_rad.clone()),
+                    encoder_sigmas_rad: frame.encoder.as_ref().map(|encoder| encoder.sigmas_rad.clone()),
+                    imu_from_camera: self.calibration.of(MAIN).imu_from_camera(&frame.state.joints_rad),
+                    keyframe: frame.keyframe,
+                }
+            })
+            .collect()
+    }
+
+    /// Units of the calibration's columns, free or not.
+    pub(crate) fn calibration_units(&self) -> Vec<&'static str> {
+        let cameras = (0..self.calibration.cameras()).map(|camera| self.calibration.of(camera));
+        cameras.flat_map(Calibration::units).collect()
+    }
+
+    fn calibration_report(&self) -> CalibrationEstimate {
+        let cameras = || (0..self.calibration.cameras()).map(|camera| self.calibration.of(camera));
+        let count = cameras().map(|calibration| calibration.units().len()).sum();
+        let chain = self.calibration.of(MAIN).chain();
+        let sigmas = if self.calibration.dof() == 0 {
+            vec![0.0; count]
+        } else if self.calibration_sigmas.len() == count {
+            self.calibration_sigmas.clone()
+        } else {
+            vec![f64::NAN; count]
+        };
+        CalibrationEstimate {
+            parameterization: chain.parameterization().name().to_owned(),
+            names: self.calibration_names(),
+            units: self.calibration_units(),
+            values: cameras().flat_map(Calibration::values).collect(),
+            sigmas,
+            prior_sigmas: cameras().flat_map(Calibration::prior_sigmas).collect(),
+            classical: chain.to_classical(),
+            margins: chain.margins(),
+            rigid_cameras: self
+                .config
+                .rigid_cameras
+                .iter()
+                .zip(cameras().skip(1))
+                .map(|(camera, calibration)| (camera.key.clone(), calibration.imu_from_camera(&[])))
+                .collect(),
+        }
+    }
+
+    /// Names of the calibration's columns, free or not: the chain's, then those of the rigid cameras behind their keys.
+    pub(crate) fn calibration_names(&self) -> Vec<String> {
+        let mut names = self.calibration.of(MAIN).names();
+        for (index, camera) in self.config.rigid_cameras.iter().enumerate() {
+            names.extend(self.calibration.of(index + 1).names().iter().map(|name| rigid_column(&camera.key, name)));
+        }
+        names
+    }
+
+    fn feature_reports(&self, solved: &SolvedWindow) -> Vec<FeatureReport> {
+        let sigma = self.config.options.pixel_sigma_px;
+        let loss = self.config.options.loss;
+        let observation =
+            |slot: usize, uv_px: Vector2<f64>, before: Option<Vector2<f64>>, after: Option<Vector2<f64>>| {
+                let chi2 = after.map_or(0.0, |residual| residual.norm_squared() / (sigma * sigma));
+                ObservationReport {
+                    frame_index: self.frames[slot].index,
+                    measured_px: uv_px,
+                    residual_before_px: before,
+                    residual_after_px: after,
+                    chi2,
+                    robust_weight: after.map_or(0.0, |_| loss.cost_and_weight(chi2).1),
+                }
+            };
+        let mut reports = Vec::new();
+        for (camera, of_camera) in solved.cameras.iter().enumerate() {
+            let checks = &solved.checks[camera];
+            reports.extend((0..of_camera.ids.len()).map(|index| {
+                let sightings = &of_camera.tracks[index].sightings;
+                let landmark = &solved.solution.estimate.landmarks[camera][index];
+                let (before, after) = (&checks.residuals_before[index], &checks.residuals_after[index]);
+                FeatureReport {
+                    id: of_camera.ids[index].of_camera(camera),
+                    anchor_frame_index: self.frames[sightings[0].slot].index,
+                    inverse_depth_per_m: landmark.inverse_distance / landmark.bearing.z,
+                    observations: sightings
+                        .iter()
+                        .zip(before.iter().zip(after))
+                        .map(|(sighting, (before, after))| observation(sighting.slot, sighting.uv_px, *before, *after))
+                        .collect(),
+                    rejected: checks.rejected[index],
+                }
+            }));
+        }
+        // Reports are kept: what growing left over is given back.
+        reports.shrink_to_fit();
+        reports
+    }
+
+    fn landmark_reports(&self, solved: &SolvedWindow) -> Vec<LandmarkReport> {
+        let mut landmarks = Vec::new();
+        for (camera, of_camera) in solved.cameras.iter().enumerate() {
+            let poses = self.camera_poses(camera);
+            let kept = (0..of_camera.ids.len()).filter(|index| !solved.checks[camera].rejected[*index]);
+            landmarks.extend(kept.map(|index| {
+                let pose = &poses[of_camera.tracks[index].sightings[0].slot];
+                let point = solved.solution.estimate.landmarks[camera][index].point_in_anchor();
+                LandmarkReport {
+                    id: of_camera.ids[index].of_camera(camera),
+                    position_m: pose.rotation * point + pose.position_m,
+                }
+            }));
+        }
+        // Reports are kept: what growing left over is given back.
+        landmarks.shrink_to_fit();
+        landmarks
+    }
+
+    fn residual_summaries(&self, solved: &SolvedWindow) -> Vec<ResidualSummary> {
+        let problem = self.problem(&solved.cameras);
+        let joints = problem.layout.joints;
+        let tracks = solved.cameras.iter().flat_map(|of_camera| &of_camera.tracks);
+        let sightings: usize = tracks.map(|track| track.sightings.len()).sum();
+        let read = self.frames.iter().filter(|frame| frame.encoder.is_some()).count();
+        let resting = problem.rest_terms(&solved.solution.estimate.frames).count();
+        let intervals = self.frames.iter().skip(1).filter(|frame| frame.motion_information.is_some()).count();
+        let held = self.prior.as_ref().map_or(0, crate::estimator::factors::prior::Prior::len)
+            + if self.start.is_some() { crate::estimator::factors::prior::StartPrior::LEN } else { 0 };
+        let (before, after) = (&solved.solution.costs_before, &solved.solution.costs_after);
+        let summary = |factor: &'static str, count: usize, part: fn(&Costs) -> f64| ResidualSummary {
+            factor,
+            count,
+            chi2_before: part(before),
+            chi2_after: part(after),
+        };
+        let mut summaries = vec![
+            summary("visual", 2 * sightings, |costs| costs.visual),
+            summary("imu", 15 * intervals, |costs| costs.imu),
+            summary("encoder", joints * read, |costs| costs.encoder),
+            summary("calibration prior", problem.layout.calibration, |costs| costs.calibration),
+            summary("marginalization prior", held, |costs| costs.prior),
+        ];
+        if resting > 0 {
+            summaries.push(summary("standstill", resting, |costs| costs.rest));
+        }
+        summaries
+    }
+}
+
+/// The standard deviation that tells as much as these pixels do with their robust weights.
+fn effective_sigma(sigma_px: f64, features: &[FeatureReport]) -> f64 {
+    let weights = || {
+        let kept = features.iter().filter(|feature| !feature.rejected);
+        kept.flat_map(|feature| feature.observations.iter())
+            .map(|seen| seen.robust_weight)
+            .filter(|weight| *weight > 0.0)
+    };
+    let count = weights().count();
+    if count == 0 { sigma_px } else { sigma_px / (weights().sum::<f64>() / count as f64).sqrt() }
+}
+
+fn root_mean_square<'a>(residuals: impl Iterator<Item = &'a TrackResiduals>) -> f64 {
+    let (sum, count) = residuals
+        .flatten()
+        .flatten()
+        .flatten()
+        .fold((0.0, 0_usize), |(sum, count), residual| (sum + residual.norm_squared(), count + 1));
+    (sum / count.max(1) as f64).sqrt()
+}
+
+fn median_length<'a>(residuals: impl Iterator<Item = &'a TrackResiduals>) -> f64 {
+    let mut lengths: Vec<f64> = residuals.flatten().flatten().flatten().map(|residual| residual.norm()).collect();
+    let middle = lengths.len() / 2;
+    if lengths.is_empty() { f64::NAN } else { *lengths.select_nth_unstable_by(middle, f64::total_cmp).1 }
+}

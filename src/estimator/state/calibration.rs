@@ -1,0 +1,350 @@
+//! The static calibration as the window estimates it: the gimbal's chain, how wrong it may be, and where the
+//! marginalization prior was linearized.
+
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+
+use crate::geometry::{RigidTransform, so3};
+use crate::gimbal::{Chain, ChainLinearization, ClassicalChain, NearestForm, Parameterization, transport};
+
+/// How wrong the given chain may be, as standard deviations of every number of its classical form.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct GivenSigmas {
+    pub(crate) translation_m: f64,
+    pub(crate) rotation_rad: f64,
+}
+
+/// What the rig says about the chain.
+#[derive(Clone, Debug)]
+struct GivenChain {
+    classical: ClassicalChain,
+    chain: Chain,
+    sigmas: GivenSigmas,
+    prior_sigmas: DVector<f64>,
+    /// `W` with `WᵀW` the inverse of the prior covariance.
+    square_root_information: DMatrix<f64>,
+}
+
+/// Standard deviation of a clock's offset beyond what the rig says, in seconds: transport and exposure delay an image by
+/// a frame's length at most.
+const CLOCK_SIGMA_S: f64 = 0.02;
+
+/// Which clocks are compared with the inertial sensor's.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum FreeClocks {
+    /// All are taken to agree.
+    None,
+    /// The camera's.
+    Camera,
+    /// The camera's and the encoders'.
+    CameraAndEncoders,
+}
+
+impl FreeClocks {
+    /// Names of the offsets, in the order of their columns behind the chain's.
+    fn names(self) -> &'static [&'static str] {
+        let all = &["timeshift", "encoder.timeshift"];
+        match self {
+            Self::None => &[],
+            Self::Camera => &all[..1],
+            Self::CameraAndEncoders => all,
+        }
+    }
+}
+
+/// The numbers that are estimated.
+#[derive(Clone, Debug)]
+struct Values {
+    chain: Chain,
+    /// Offsets of the clocks beyond what the rig says, in seconds: the inertial sensor's time is the stamp plus this. The
+    /// camera's, then the encoders'; as many as are estimated.
+    clocks_s: DVector<f64>,
+}
+
+impl Values {
+    fn dof(&self) -> usize {
+        self.chain.dof() + self.clocks_s.len()
+    }
+
+    fn plus(&self, delta: &[f64]) -> Self {
+        let (chain, clocks) = delta.split_at(self.chain.dof());
+        Self { chain: self.chain.plus_slice(chain), clocks_s: &self.clocks_s + DVector::from_column_slice(clocks) }
+    }
+
+    fn minus(&self, origin: &Self) -> DVector<f64> {
+        let mut difference = DVector::zeros(self.dof());
+        let chain = self.chain.dof();
+        difference.rows_mut(0, chain).copy_from(&self.chain.minus(&origin.chain));
+        difference.rows_mut(chain, self.clocks_s.len()).copy_from(&(&self.clocks_s - &origin.clocks_s));
+        difference
+    }
+}
+
+/// The chain and the offsets of the clocks, free or fixed.
+#[derive(Clone, Debug)]
+pub(crate) struct Calibration {
+    values: Values,
+    given: GivenChain,
+    clocks: FreeClocks,
+    /// What the rig says the camera's clock is off by: stamps have it in them already.
+    given_timeshift_s: f64,
+    first_estimate: Option<Values>,
+    free: bool,
+    /// Parameters that are held at their values, by name: charts may change.
+    frozen: Vec<String>,
+}
+
+impl Calibration {
+    /// The given chain in a parameterization; without encoders its joint offsets are held fixed.
+    pub(crate) fn new(
+        classical: &ClassicalChain,
+        parameterization: Parameterization,
+        sigmas: GivenSigmas,
+        free: bool,
+        joint_offsets: bool,
+    ) -> Self {
+        let given = GivenChain::new(classical, parameterization, sigmas, joint_offsets);
+        let values = Values { chain: given.chain.clone(), clocks_s: DVector::zeros(0) };
+        Self {
+            values,
+            given,
+            clocks: FreeClocks::None,
+            given_timeshift_s: 0.0,
+            first_estimate: None,
+            free,
+            frozen: Vec::new(),
+        }
+    }
+
+    /// The same with offsets of clocks beside the chain; a calibration that is held fixed has none.
+    pub(crate) fn with_clocks(self, clocks: FreeClocks, given_timeshift_s: f64) -> Self {
+        let clocks = if self.free { clocks } else { FreeClocks::None };
+        let clocks_s = DVector::zeros(clocks.names().len());
+        Self { values: Values { clocks_s, ..self.values }, clocks, given_timeshift_s, ..self }
+    }
+
+    pub(crate) fn chain(&self) -> &Chain {
+        &self.values.chain
+    }
+
+    /// Offset of the camera's clock beyond what the rig says: it saw an image so many seconds after its stamp.
+    pub(crate) fn camera_shift_s(&self) -> f64 {
+        self.values.clocks_s.get(0).copied().unwrap_or(0.0)
+    }
+
+    /// Its column among the calibration's.
+    pub(crate) fn camera_shift_column(&self) -> Option<usize> {
+        (self.clocks != FreeClocks::None).then(|| self.chain().dof())
+    }
+
+    /// Offset of the encoders' clock: their readings belong to so many seconds after their stamps.
+    pub(crate) fn encoder_shift_s(&self) -> f64 {
+        self.values.clocks_s.get(1).copied().unwrap_or(0.0)
+    }
+
+    /// Its column among the calibration's.
+    pub(crate) fn encoder_shift_column(&self) -> Option<usize> {
+        (self.clocks == FreeClocks::CameraAndEncoders).then(|| self.chain().dof() + 1)
+    }
+
+    /// Names of all columns, free or not.
+    pub(crate) fn names(&self) -> Vec<String> {
+        let clocks = self.clocks.names().iter().map(|name| (*name).to_owned());
+        self.chain().parameter_names().into_iter().chain(clocks).collect()
+    }
+
+    /// Units of all columns.
+    pub(crate) fn units(&self) -> Vec<&'static str> {
+        let clocks = self.clocks.names().iter().map(|_| "s");
+        self.chain().parameter_units().into_iter().chain(clocks).collect()
+    }
+
+    /// Values of all columns; the camera's clock as Kalibr's `timeshift_cam_imu`.
+    pub(crate) fn values(&self) -> Vec<f64> {
+        let given = [self.given_timeshift_s, 0.0];
+        let clocks = self.values.clocks_s.iter().zip(given).map(|(shift_s, given_s)| given_s + shift_s);
+        self.chain().values().iter().copied().chain(clocks).collect()
+    }
+
+    /// Holds a parameter at its value from now on.
+    pub(crate) fn freeze(&mut self, column: usize) {
+        let name = self.names().swap_remove(column);
+        if !self.frozen.contains(&name) {
+            self.frozen.push(name);
+        }
+    }
+
+    /// Holds the same parameters as another one.
+    pub(crate) fn freeze_as(&mut self, other: &Self) {
+        self.frozen.clone_from(&other.frozen);
+    }
+
+    /// Free columns that are held at their values.
+    pub(crate) fn frozen_columns(&self) -> Vec<usize> {
+        if self.frozen.is_empty() || !self.free {
+            return Vec::new();
+        }
+        let names = self.names().into_iter().enumerate();
+        names.filter(|(_, name)| self.frozen.contains(name)).map(|(column, _)| column).collect()
+    }
+
+    /// Number of free columns.
+    pub(crate) fn dof(&self) -> usize {
+        if self.free { self.values.dof() } else { 0 }
+    }
+
+    pub(crate) fn joint_count(&self) -> usize {
+        self.chain().joint_count()
+    }
+
+    /// Pose of the camera at a frame's joint angles, which a rigid mount does not follow.
+    pub(crate) fn imu_from_camera(&self, joints_rad: &[f64]) -> RigidTransform {
+        self.chain().imu_from_camera(self.own(joints_rad))
+    }
+
+    fn own<'a>(&self, joints_rad: &'a [f64]) -> &'a [f64] {
+        &joints_rad[..self.joint_count().min(joints_rad.len())]
+    }
+
+    /// Pose of the camera with its derivatives by the free columns and by the joints; clocks do not move the mount.
+    pub(crate) fn linearize(&self, joints_rad: &[f64]) -> ChainLinearization {
+        let mut linearization = self.chain().linearize(self.own(joints_rad));
+        if linearization.by_parameters.ncols() != self.dof() {
+            linearization.by_parameters = linearization.by_parameters.resize_horizontally(self.dof(), 0.0);
+        }
+        linearization
+    }
+
+    /// A step of the solver, counted from the first estimate where there is one.
+    pub(crate) fn stepped(&self, delta: &[f64]) -> Self {
+        if !self.free {
+            return self.clone();
+        }
+        let values = match &self.first_estimate {
+            None => self.values.plus(delta),
+            Some(first) => first.plus((self.values.minus(first) + DVector::from_column_slice(delta)).as_slice()),
+        };
+        Self { values, ..self.clone() }
+    }
+
+    /// `x ⊟ x₀`, `None` without a first estimate.
+    pub(crate) fn deviation(&self) -> Option<DVector<f64>> {
+        self.first_estimate.as_ref().map(|first| self.values.minus(first))
+    }
+
+    /// The calibration at the first estimate, or as it is.
+    pub(crate) fn at_first_estimate(&self) -> Self {
+        let values = self.first_estimate.as_ref().unwrap_or(&self.values).clone();
+        Self { values, ..self.clone() }
+    }
+
+    /// The prior holds the calibration (keep the first estimate, or take the present one), or holds it no more.
+    pub(crate) fn keep_first_estimate(&mut self, held: bool) {
+        self.first_estimate = match self.first_estimate.take() {
+            Some(first) if held => Some(first),
+            None if held => Some(self.values.clone()),
+            _ => None,
+        };
+    }
+
+    /// Whitened deviation from the given chain and from clocks that agree.
+    pub(crate) fn prior_residual(&self) -> DVector<f64> {
+        let chain = &self.given.square_root_information * self.chain().minus(&self.given.chain);
+        let clocks = self.values.clocks_s.iter().map(|shift_s| shift_s / CLOCK_SIGMA_S);
+        DVector::from_iterator(self.values.dof(), chain.iter().copied().chain(clocks))
+    }
+
+    /// Its derivative by a step.
+    ///
+    /// For rotation blocks the logarithm of the deviation turns with the deviation itself, and a step counts from the first
+    /// estimate; the inner blocks of `poe` are taken as flat.
+    pub(crate) fn prior_jacobian(&self) -> DMatrix<f64> {
+        let (all, chain) = (self.values.dof(), self.chain().dof());
+        let mut jacobian = self.given.square_root_information.clone().resize(all, all, 0.0);
+        (chain..all).for_each(|clock| jacobian[(clock, clock)] = CLOCK_SIGMA_S.recip());
+        let starts: &[usize] = match self.chain().parameterization() {
+            Parameterization::Classical => &[0, chain - 6],
+            Parameterization::Poe => &[chain - 6],
+            _ if self.joint_count() == 0 => &[0],
+            _ => &[],
+        };
+        if starts.is_empty() {
+            return jacobian;
+        }
+        let from_given = self.chain().minus(&self.given.chain);
+        let from_first = self.deviation();
+        for start in starts {
+            let turn: Vector3<f64> = from_given.fixed_rows::<3>(*start).into_owned();
+            let mut by_step: Matrix3<f64> = so3::right_jacobian_inverse(&turn);
+            if let Some(deviation) = &from_first {
+                by_step *= so3::right_jacobian(&deviation.fixed_rows::<3>(*start).into_owned());
+            }
+            let turned = jacobian.fixed_columns::<3>(*start) * by_step;
+            jacobian.fixed_columns_mut::<3>(*start).copy_from(&turned);
+        }
+        jacobian
+    }
+
+    /// Prior standard deviation of each column.
+    pub(crate) fn prior_sigmas(&self) -> impl Iterator<Item = f64> + '_ {
+        let clocks = std::iter::repeat_n(CLOCK_SIGMA_S, self.values.clocks_s.len());
+        self.given.prior_sigmas.iter().copied().chain(clocks)
+    }
+
+    /// Moves to the truth of a test.
+    #[cfg(test)]
+    pub(crate) fn set_chain(&mut self, chain: Chain) {
+        self.values.chain = chain;
+    }
+
+    /// Goes over to another chart; returns how the old columns follow the new ones at the first estimate.
+    pub(crate) fn switch_chart(&mut self, parameterization: Parameterization) -> DMatrix<f64> {
+        let offsets = !self.chain().hides_joint_offsets();
+        let old = &self.first_estimate.as_ref().unwrap_or(&self.values).chain;
+        let given = GivenChain::new(&self.given.classical, parameterization, self.given.sigmas, offsets);
+        let new = given.form_of(old);
+        let chain = transport(&new, old);
+        let clocks = self.values.clocks_s.len();
+        let mut old_from_new = DMatrix::identity(chain.nrows() + clocks, chain.ncols() + clocks);
+        old_from_new.view_mut((0, 0), chain.shape()).copy_from(&chain);
+        if let Some(first) = &mut self.first_estimate {
+            first.chain = new;
+        }
+        self.values.chain = given.form_of(&self.values.chain);
+        self.given = given;
+        old_from_new
+    }
+}
+
+impl GivenChain {
+    /// A mechanism in the given chain's form.
+    ///
+    /// The classical form can say the same mechanism in many ways. Of them it takes the one nearest to the given numbers,
+    /// in units of their deviations: at any other the rig's prior would pull.
+    fn form_of(&self, mechanism: &Chain) -> Chain {
+        NearestForm::new(self.chain.clone(), &self.prior_sigmas).of(mechanism)
+    }
+
+    fn new(
+        classical: &ClassicalChain,
+        parameterization: Parameterization,
+        sigmas: GivenSigmas,
+        joint_offsets: bool,
+    ) -> Self {
+        let whole = Chain::from_classical(classical, parameterization);
+        let chain = if joint_offsets { whole } else { whole.without_joint_offsets() };
+        let covariance = chain.prior_covariance(classical, sigmas.translation_m, sigmas.rotation_rad);
+        let prior_sigmas = covariance.diagonal().map(|variance| variance.max(0.0).sqrt());
+        // A column that the prior fixes entirely would make the covariance singular.
+        let floor = 1e-12;
+        let mut regular = covariance;
+        for k in 0..regular.nrows() {
+            regular[(k, k)] += floor;
+        }
+        let dof = chain.dof();
+        let square_root_information = regular
+            .cholesky()
+            .and_then(|factor| factor.l().solve_lower_triangular(&DMatrix::identity(dof, dof)))
+            .unwrap_or_else(|| DMatrix::from_diagonal(&prior_sigmas.map(|sigma| 1.0 / sigma.max(1e-6))));
+        Self { classical: classical.clone(), chain, sigmas, prior_sigmas, square_root_information }
+    }
+}

@@ -1,0 +1,134 @@
+//! The static calibrations of all cameras that are watched, their free columns side by side.
+
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::calibration::Calibration;
+use crate::estimator::factors::prior::Prior;
+use crate::gimbal::Parameterization;
+
+/// The camera whose mount may have joints: the first one. Its image is shown, its calibration has the first columns.
+pub(crate) const MAIN: usize = 0;
+
+/// The calibrations by camera, the main camera's first.
+#[derive(Clone, Debug)]
+pub(crate) struct Calibrations(Vec<Calibration>);
+
+impl Calibrations {
+    /// The main camera's calibration and those of the rigid cameras beside it.
+    pub(crate) fn new(main: Calibration, rigid: impl IntoIterator<Item = Calibration>) -> Self {
+        Self(std::iter::once(main).chain(rigid).collect())
+    }
+
+    /// Number of cameras.
+    pub(crate) fn cameras(&self) -> usize {
+        self.0.len()
+    }
+
+    pub(crate) fn of(&self, camera: usize) -> &Calibration {
+        &self.0[camera]
+    }
+
+    pub(crate) fn of_mut(&mut self, camera: usize) -> &mut Calibration {
+        &mut self.0[camera]
+    }
+
+    /// The camera that the window begins with: a rigid one where there is one, since its mount is known best.
+    pub(crate) fn leading(&self) -> usize {
+        self.0.iter().position(|calibration| calibration.joint_count() == 0).unwrap_or(MAIN)
+    }
+
+    /// Number of free columns.
+    pub(crate) fn dof(&self) -> usize {
+        self.0.iter().map(Calibration::dof).sum()
+    }
+
+    /// Columns of one camera among those of all.
+    pub(crate) fn columns(&self, camera: usize) -> Range<usize> {
+        let start = self.0[..camera].iter().map(Calibration::dof).sum();
+        start..start + self.0[camera].dof()
+    }
+
+    /// Columns that are held at their values.
+    pub(crate) fn frozen_columns(&self) -> Vec<usize> {
+        let of_camera = |camera: usize| {
+            let start = self.columns(camera).start;
+            self.0[camera].frozen_columns().into_iter().map(move |column| start + column)
+        };
+        (0..self.cameras()).flat_map(of_camera).collect()
+    }
+
+    /// Holds the same parameters as others.
+    pub(crate) fn freeze_as(&mut self, others: &Self) {
+        for (one, other) in self.0.iter_mut().zip(&others.0) {
+            one.freeze_as(other);
+        }
+    }
+
+    /// A step of the solver, counted from the first estimates where there are any.
+    pub(crate) fn stepped(&self, delta: &[f64]) -> Self {
+        Self(self.0.iter().enumerate().map(|(camera, one)| one.stepped(&delta[self.columns(camera)])).collect())
+    }
+
+    /// `x ⊟ x₀`, zero for a camera without a first estimate; `None` when no camera has one.
+    pub(crate) fn deviation(&self) -> Option<DVector<f64>> {
+        let parts: Vec<_> = self.0.iter().map(Calibration::deviation).collect();
+        if parts.iter().all(Option::is_none) {
+            return None;
+        }
+        let mut deviation = DVector::zeros(self.dof());
+        for (camera, part) in parts.iter().enumerate() {
+            let columns = self.columns(camera);
+            if let Some(part) = part.as_ref().filter(|part| part.len() == columns.len()) {
+                deviation.rows_range_mut(columns).copy_from(part);
+            }
+        }
+        Some(deviation)
+    }
+
+    /// The calibrations at their first estimates, or as they are.
+    pub(crate) fn at_first_estimate(&self) -> Self {
+        Self(self.0.iter().map(Calibration::at_first_estimate).collect())
+    }
+
+    /// Cameras that the prior holds keep their first estimate, or take the present one; the others have none.
+    pub(crate) fn keep_first_estimates(&mut self, prior: Option<&Prior>) {
+        for camera in 0..self.cameras() {
+            let columns = self.columns(camera);
+            let held = prior.is_some_and(|prior| prior.holds_calibration(&columns));
+            self.0[camera].keep_first_estimate(held);
+        }
+    }
+
+    /// Whitened deviations from what the rig says.
+    pub(crate) fn prior_residual(&self) -> DVector<f64> {
+        let parts: Vec<DVector<f64>> = self.free().map(|(_, one)| one.prior_residual()).collect();
+        DVector::from_iterator(self.dof(), parts.iter().flat_map(DVector::iter).copied())
+    }
+
+    /// Their derivative by a step.
+    pub(crate) fn prior_jacobian(&self) -> DMatrix<f64> {
+        let mut jacobian = DMatrix::zeros(self.dof(), self.dof());
+        for (camera, one) in self.free() {
+            let columns = self.columns(camera);
+            jacobian.view_range_mut(columns.clone(), columns).copy_from(&one.prior_jacobian());
+        }
+        jacobian
+    }
+
+    fn free(&self) -> impl Iterator<Item = (usize, &Calibration)> {
+        self.0.iter().enumerate().filter(|(_, one)| one.dof() > 0)
+    }
+
+    /// The main camera's chain goes over to another chart; returns how the old columns follow the new ones at the first
+    /// estimate.
+    pub(crate) fn switch_chart(&mut self, parameterization: Parameterization) -> DMatrix<f64> {
+        let old_from_new = self.0[MAIN].switch_chart(parameterization);
+        let (old, main) = (old_from_new.nrows(), old_from_new.ncols());
+        let others = self.dof() - self.0[MAIN].dof();
+        let mut all = DMatrix::identity(old + others, main + others);
+        all.view_mut((0, 0), (old, main)).copy_from(&old_from_new);
+        all
+    }
+}

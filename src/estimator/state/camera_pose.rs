@@ -1,0 +1,139 @@
+//! Where the cameras are, and how that follows the unknowns of the window.
+
+use std::borrow::Cow;
+
+use nalgebra::{DMatrix, Matrix3, Matrix6xX};
+
+use super::calibration::Calibration;
+use super::layout::POSE;
+use crate::estimator::factors::reprojection::CameraPose;
+use crate::estimator::window::frames::FrameState;
+use crate::geometry::so3;
+use crate::gimbal::{Chain, ChainLinearization};
+
+/// A camera's place on the vehicle and how its clock is off.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Mount<'a> {
+    pub(crate) chain: &'a Chain,
+    /// Columns of the calibration, those of clocks behind the chain's; none when it is held fixed.
+    pub(crate) columns: usize,
+    /// The camera saw an image so many seconds after its stamp.
+    pub(crate) shift_s: f64,
+    /// Column of that offset.
+    pub(crate) shift_column: Option<usize>,
+}
+
+impl Mount<'_> {
+    /// A rigid camera does not follow the joints.
+    fn own<'j>(&self, joints_rad: &'j [f64]) -> &'j [f64] {
+        &joints_rad[..self.chain.joint_count().min(joints_rad.len())]
+    }
+
+    fn linearize(&self, joints_rad: &[f64]) -> ChainLinearization {
+        let mut linearization = self.chain.linearize(self.own(joints_rad));
+        if linearization.by_parameters.ncols() != self.columns {
+            linearization.by_parameters = linearization.by_parameters.resize_horizontally(self.columns, 0.0);
+        }
+        linearization
+    }
+}
+
+impl Calibration {
+    /// The camera's place on the vehicle.
+    pub(crate) fn mount(&self) -> Mount<'_> {
+        Mount {
+            chain: self.chain(),
+            columns: self.dof(),
+            shift_s: self.camera_shift_s(),
+            shift_column: self.camera_shift_column(),
+        }
+    }
+}
+
+/// Pose of the camera at a state: the IMU's pose and the mount at the state's joint angles, when the camera's clock says
+/// the frame's stamp.
+pub(crate) fn at(state: &FrameState, calibration: &Calibration) -> CameraPose {
+    at_mount(state, &calibration.mount())
+}
+
+/// [`at`] for a mount.
+pub(crate) fn at_mount(state: &FrameState, mount: &Mount<'_>) -> CameraPose {
+    let state = &*when_seen(state, mount.shift_s);
+    let pose = state.navigation.world_from_imu * mount.chain.imu_from_camera(mount.own(&state.joints_rad));
+    CameraPose { rotation: pose.rotation_matrix(), position_m: pose.translation_m }
+}
+
+/// The state at which the camera took its picture, since its clock may be off.
+pub(crate) fn when_seen(state: &FrameState, shift_s: f64) -> Cow<'_, FrameState> {
+    if shift_s == 0.0 { Cow::Borrowed(state) } else { Cow::Owned(state.later(shift_s)) }
+}
+
+/// Poses of the camera by slot.
+pub(crate) fn by_slot(frames: &[FrameState], calibration: &Calibration) -> Vec<CameraPose> {
+    frames.iter().map(|state| at(state, calibration)).collect()
+}
+
+/// How the camera poses follow the unknowns, by slot: `[φ; δt]` of `world_from_camera`.
+#[derive(Clone, Debug)]
+pub(crate) struct CameraMaps {
+    /// 6 × (6 + N), by pose and joints of the frame.
+    pub(crate) own: Vec<DMatrix<f64>>,
+    /// 6 × the camera's own calibration.
+    pub(crate) calibration: Vec<DMatrix<f64>>,
+}
+
+impl CameraMaps {
+    /// The maps at these states and this calibration.
+    pub(crate) fn new(frames: &[FrameState], calibration: &Calibration) -> Self {
+        Self::of_mount(frames, &calibration.mount())
+    }
+
+    /// [`Self::new`] for a mount.
+    ///
+    /// That a clock's offset multiplies speed and gyroscope bias is left out: a centisecond of a bias' change moves nothing.
+    pub(crate) fn of_mount(frames: &[FrameState], mount: &Mount<'_>) -> Self {
+        let mut maps = Self { own: Vec::new(), calibration: Vec::new() };
+        for stamped in frames {
+            let state = &*when_seen(stamped, mount.shift_s);
+            let chain = mount.linearize(&state.joints_rad);
+            let world_from_imu = state.navigation.world_from_imu.rotation_matrix();
+            let (mut own, mut by_calibration) = camera_map(&world_from_imu, state.joints_rad.len(), &chain);
+            if let Some(column) = mount.shift_column {
+                by_calibration.set_column(column, &(&own * state.motion()));
+            }
+            if mount.shift_s != 0.0 {
+                // The attitude that is unknown is the one at the stamp.
+                let at_stamp = stamped.navigation.world_from_imu.rotation_matrix();
+                let by_turn = own.fixed_columns::<3>(0) * world_from_imu.tr_mul(&at_stamp);
+                own.fixed_columns_mut::<3>(0).copy_from(&by_turn);
+            }
+            maps.own.push(own);
+            maps.calibration.push(by_calibration);
+        }
+        maps
+    }
+}
+
+/// How the camera's pose follows pose and joints of its frame (6 × (6 + N)) and its calibration (6 × columns), at this
+/// rotation of the vehicle.
+pub(crate) fn camera_map(
+    world_from_imu: &Matrix3<f64>,
+    joints: usize,
+    chain: &ChainLinearization,
+) -> (DMatrix<f64>, DMatrix<f64>) {
+    let camera_from_imu = chain.imu_from_camera.rotation_matrix().transpose();
+    let lever = chain.imu_from_camera.translation_m;
+    let mut own = DMatrix::zeros(6, POSE + joints);
+    own.fixed_view_mut::<3, 3>(0, 0).copy_from(&camera_from_imu);
+    own.fixed_view_mut::<3, 3>(3, 0).copy_from(&(world_from_imu * so3::hat(&lever) * -1.0));
+    own.fixed_view_mut::<3, 3>(3, 3).fill_with_identity();
+    let carried = |part: &Matrix6xX<f64>| {
+        let mut carried = DMatrix::from_column_slice(6, part.ncols(), part.as_slice());
+        let shift = world_from_imu * part.fixed_rows::<3>(3);
+        carried.fixed_rows_mut::<3>(3).copy_from(&shift);
+        carried
+    };
+    // A rigid camera does not follow the joints.
+    own.columns_mut(POSE, chain.by_joints.ncols()).copy_from(&carried(&chain.by_joints));
+    (own, carried(&chain.by_parameters))
+}

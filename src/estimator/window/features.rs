@@ -1,0 +1,124 @@
+//! Bookkeeping of features: sightings come in, frames leave, points are triangulated.
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::estimator::factors::reprojection::{CameraPose, Landmark};
+use crate::estimator::options::EstimatorOptions;
+use crate::estimator::window::frames::{Feature, FeatureMap, Observation};
+use crate::frontend::TrackedFeature;
+
+/// Takes in what a camera saw at a frame.
+pub(crate) fn observe(features: &mut FeatureMap, slot: usize, seen: &[TrackedFeature]) {
+    for tracked in seen {
+        let finite = tracked.bearing.iter().chain(tracked.uv_px.iter()).all(|x| x.is_finite());
+        if !finite {
+            continue;
+        }
+        let feature = features.entry(tracked.id).or_default();
+        feature.observations.push(Observation { slot, uv_px: tracked.uv_px, bearing: tracked.bearing });
+    }
+}
+
+/// Takes a frame out: its sightings go, later slots move up, and landmarks that were anchored there move to the next
+/// frame that saw them. `cameras` are the poses before the frame goes.
+pub(crate) fn forget_frame(features: &mut FeatureMap, gone: usize, cameras: &[CameraPose]) {
+    for feature in features.values_mut() {
+        let anchored = feature.anchor() == Some(gone);
+        feature.observations.retain(|observation| observation.slot != gone);
+        if anchored {
+            feature.landmark = feature
+                .observations
+                .first()
+                .and_then(|next| moved(feature.landmark.as_ref()?, &cameras[gone], &cameras[next.slot]));
+        }
+        for observation in &mut feature.observations {
+            if observation.slot > gone {
+                observation.slot -= 1;
+            }
+        }
+    }
+    features.retain(|_, feature| !feature.observations.is_empty());
+}
+
+/// A landmark in another camera, `None` when it lies in its centre.
+fn moved(landmark: &Landmark, from: &CameraPose, to: &CameraPose) -> Option<Landmark> {
+    let direction_in_world =
+        from.rotation * landmark.bearing + (from.position_m - to.position_m) * landmark.inverse_distance;
+    let length = direction_in_world.norm();
+    (length > 1e-6).then(|| Landmark {
+        bearing: to.rotation.transpose() * direction_in_world / length,
+        inverse_distance: landmark.inverse_distance / length,
+    })
+}
+
+/// The landmark of a feature from all its sightings: the point with the least summed squared distance from the rays,
+/// measured across the bearings, refined once by its depth weights. `None` while the rays open too little, or when the
+/// point is out of range or behind a camera.
+pub(crate) fn triangulate(feature: &Feature, cameras: &[CameraPose], options: &EstimatorOptions) -> Option<Landmark> {
+    let anchor = feature.observations.first()?;
+    if feature.observations.len() < options.min_observations {
+        return None;
+    }
+    let in_world = |observation: &Observation| {
+        (cameras[observation.slot].rotation * observation.bearing, cameras[observation.slot].position_m)
+    };
+    let (first_ray, _) = in_world(anchor);
+    let opening = feature
+        .observations
+        .iter()
+        .map(|observation| first_ray.cross(&in_world(observation).0).norm())
+        .fold(0.0, f64::max);
+    if opening < options.min_triangulation_angle_rad {
+        return None;
+    }
+    let mut point: Option<Vector3<f64>> = None;
+    for _ in 0..2 {
+        let mut normal = Matrix3::zeros();
+        let mut right = Vector3::zeros();
+        for observation in &feature.observations {
+            let (ray, centre) = in_world(observation);
+            let distance = point.map_or(1.0, |known| (known - centre).norm().max(1e-3));
+            let across = (Matrix3::identity() - ray * ray.transpose()) / (distance * distance);
+            normal += across;
+            right += across * centre;
+        }
+        point = Some(normal.cholesky()?.solve(&right));
+    }
+    let point = point?;
+    let visible = feature.observations.iter().all(|observation| {
+        let (ray, centre) = in_world(observation);
+        (point - centre).dot(&ray) > 0.0
+    });
+    let camera = &cameras[anchor.slot];
+    let in_anchor = camera.rotation.transpose() * (point - camera.position_m);
+    let distance = in_anchor.norm();
+    let (nearest, farthest) = options.distance_range_m;
+    (visible && distance >= nearest && distance <= farthest).then(|| {
+        let bearing = match options.landmark_model {
+            crate::estimator::LandmarkModel::InverseDistance => anchor.bearing,
+            crate::estimator::LandmarkModel::BearingAndInverseDistance => in_anchor / distance,
+        };
+        Landmark { bearing, inverse_distance: 1.0 / distance }
+    })
+}
+
+/// Mean angle between the sightings of two frames that is left once the rotation between them is taken out, with the
+/// number of features in common.
+pub(crate) fn compensated_parallax(
+    features: &FeatureMap,
+    cameras: &[CameraPose],
+    from: usize,
+    to: usize,
+) -> (f64, usize) {
+    let to_from_from = cameras[to].rotation.transpose() * cameras[from].rotation;
+    let angles: Vec<f64> = features
+        .values()
+        .filter_map(|feature| {
+            let first = to_from_from * feature.observation(from)?.bearing;
+            let second = feature.observation(to)?.bearing;
+            Some(first.cross(&second).norm().atan2(first.dot(&second)))
+        })
+        .collect();
+    let mean = if angles.is_empty() { 0.0 } else { angles.iter().sum::<f64>() / angles.len() as f64 };
+    (mean, angles.len())
+}

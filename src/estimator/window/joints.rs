@@ -1,0 +1,159 @@
+//! Joint angles of the window's frames: where they start, and what becomes of the encoders' angles.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::estimator::StepInput;
+use crate::estimator::estimator::Estimator;
+use crate::estimator::factors::reprojection::{self, CameraPose, RelativePose};
+use crate::estimator::state::calibrations::MAIN;
+use crate::estimator::state::camera_pose::{self, CameraMaps};
+use crate::geometry::wrap_angle;
+use crate::sensors::JointAngles;
+
+/// How far a joint may have turned since the frame before where no encoder tells it, as a standard deviation.
+pub(crate) const UNKNOWN_TURN_RAD: f64 = 1.0;
+/// Fewest landmarks by which the picture tells the joint angles of a frame.
+const LEAST_LANDMARKS: usize = 15;
+/// The picture must tell an angle better than the encoder by this factor before it may carry the encoder's angle on: then
+/// what the picture says about the turn in between owes nothing to the encoder.
+const SHARPER: f64 = 3.0;
+
+impl Estimator {
+    /// Encoder angles that can be used.
+    pub(crate) fn encoder_reading(&self, input: &StepInput<'_>) -> Option<JointAngles> {
+        self.config.encoder_in_use()?;
+        let angles = input.joint_angles?;
+        let count = self.calibration.of(MAIN).joint_count();
+        let usable = angles.angles_rad.len() == count
+            && angles.sigmas_rad.len() == count
+            && angles.lasting_sigmas_rad.len() == count
+            && angles.angles_rad.iter().all(|angle| angle.is_finite())
+            && angles.sigmas_rad.iter().all(|sigma| sigma.is_finite() && *sigma > 0.0);
+        usable.then(|| angles.clone())
+    }
+
+    /// Turns the newest frame's joints so that the known landmarks meet their measurements, pose held: an encoder may be
+    /// off by many degrees, and without one there is nothing else to start from.
+    pub(crate) fn align_newest_joints(&mut self) {
+        let joints = self.calibration.of(MAIN).joint_count();
+        if joints == 0 {
+            return;
+        }
+        let slot = self.frames.len() - 1;
+        let cameras = self.camera_poses(MAIN);
+        let known = self.frames[slot].encoder.as_ref().map(|encoder| encoder.sigmas_rad.as_slice());
+        let prior =
+            DVector::from_fn(joints, |joint, _| known.map_or(UNKNOWN_TURN_RAD, |sigmas| sigmas[joint]).powi(-2));
+        let start = self.frames[slot].state.joints_rad.clone();
+        let mut angles = start.clone();
+        for _ in 0..5 {
+            let (hessian, gradient, _) = self.joints_by_landmarks(slot, &angles, &cameras);
+            let hessian = hessian + DMatrix::from_diagonal(&prior);
+            let gradient =
+                gradient + DVector::from_fn(joints, |joint, _| (angles[joint] - start[joint]) * prior[joint]);
+            let Some(factor) = hessian.cholesky() else { return };
+            let step = factor.solve(&gradient);
+            for (angle, change) in angles.iter_mut().zip(step.iter()) {
+                *angle -= change;
+            }
+            if step.amax() < 1e-5 {
+                break;
+            }
+        }
+        if angles.iter().all(|angle| angle.is_finite()) {
+            self.frames[slot].state.joints_rad = angles;
+        }
+    }
+
+    /// Normal equations of a frame's joint angles from the landmarks that other frames anchor, everything else held, and
+    /// the number of those landmarks.
+    fn joints_by_landmarks(
+        &self,
+        slot: usize,
+        angles_rad: &[f64],
+        cameras: &[CameraPose],
+    ) -> (DMatrix<f64>, DVector<f64>, usize) {
+        let joints = angles_rad.len();
+        let sigma = self.config.options.pixel_sigma_px;
+        let mut state = self.frames[slot].state.clone();
+        state.joints_rad = angles_rad.to_vec();
+        let calibration = self.calibration.of(MAIN);
+        let camera = camera_pose::at(&state, calibration);
+        let own = CameraMaps::new(std::slice::from_ref(&state), calibration).own.remove(0);
+        let by_joints = own.columns(6, joints).into_owned();
+        let mut hessian = DMatrix::zeros(joints, joints);
+        let mut gradient = DVector::zeros(joints);
+        let mut count = 0;
+        for feature in self.features[MAIN].values() {
+            let (Some(anchor), Some(landmark), Some(seen)) =
+                (feature.anchor(), feature.landmark.as_ref(), feature.observation(slot))
+            else {
+                continue;
+            };
+            if anchor == slot {
+                continue;
+            }
+            let relative = RelativePose::new(&cameras[anchor], &camera);
+            let Some(term) = reprojection::linearize(&self.config.camera, &relative, &relative, landmark, &seen.uv_px)
+            else {
+                continue;
+            };
+            let squared = term.residual_px.norm_squared() / (sigma * sigma);
+            let weight = 1.0 / (sigma * sigma * squared.sqrt().max(1.0));
+            let rows = term.by_observer * &by_joints;
+            hessian += rows.tr_mul(&rows) * weight;
+            gradient += rows.tr_mul(&term.residual_px) * weight;
+            count += 1;
+        }
+        (hessian, gradient, count)
+    }
+
+    /// Variances of a frame's joint angles as the picture tells them, `None` with too few landmarks.
+    fn visual_variances(&self, slot: usize, cameras: &[CameraPose]) -> Option<DVector<f64>> {
+        let (hessian, _, count) = self.joints_by_landmarks(slot, &self.frames[slot].state.joints_rad, cameras);
+        let inverse = hessian.cholesky()?.inverse();
+        (count >= LEAST_LANDMARKS).then(|| inverse.diagonal())
+    }
+
+    /// A frame is about to leave, and its encoder angles with it, although they are as good as any: the next frame takes
+    /// them over, turned on by what the picture says about the joints in between.
+    ///
+    /// Only the independent part of their errors is averaged; what the picture may have got wrong is added.
+    pub(crate) fn carry_encoder(&mut self, from: usize, to: usize) {
+        let (Some(leaving), Some(own)) = (&self.frames[from].encoder, &self.frames[to].encoder) else { return };
+        let cameras = self.camera_poses(MAIN);
+        let (Some(variance_from), Some(variance_to)) =
+            (self.visual_variances(from, &cameras), self.visual_variances(to, &cameras))
+        else {
+            return;
+        };
+        let mut combined = own.clone();
+        for joint in 0..own.angles_rad.len() {
+            let turned = self.frames[to].state.joints_rad[joint] - self.frames[from].state.joints_rad[joint];
+            let between = variance_from[joint] + variance_to[joint];
+            let (own_part, own_lasting) = parts(own, joint);
+            let (leaving_part, leaving_lasting) = parts(leaving, joint);
+            if between * SHARPER * SHARPER > own_part.min(leaving_part) {
+                continue;
+            }
+            let leaving_part = leaving_part + between;
+            let share = own_part / (own_part + leaving_part);
+            // A reading that is late by the clocks' offset is late at either frame's rate.
+            let faster = self.frames[to].state.rates.joint_rad_per_s(joint)
+                - self.frames[from].state.rates.joint_rad_per_s(joint);
+            let turned = turned + faster * self.calibration.of(MAIN).encoder_shift_s();
+            let change = wrap_angle(leaving.angles_rad[joint] + turned - own.angles_rad[joint]);
+            let lasting = own_lasting.max(leaving_lasting);
+            combined.angles_rad[joint] = own.angles_rad[joint] + share * change;
+            combined.sigmas_rad[joint] = (own_part * leaving_part / (own_part + leaving_part) + lasting).sqrt();
+            combined.lasting_sigmas_rad[joint] = lasting.sqrt();
+        }
+        self.frames[to].encoder = Some(combined);
+    }
+}
+
+/// Variance of an encoder angle: the part of its own, and the part that neighbouring frames share.
+fn parts(encoder: &JointAngles, joint: usize) -> (f64, f64) {
+    let lasting = encoder.lasting_sigmas_rad[joint].powi(2);
+    ((encoder.sigmas_rad[joint].powi(2) - lasting).max(0.0), lasting)
+}

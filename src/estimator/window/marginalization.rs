@@ -1,0 +1,59 @@
+//! Taking a frame out of the window: what is known about the others because of it becomes their prior.
+
+use nalgebra::DMatrix;
+
+use super::problem::{Estimate, Problem};
+use super::rows::stack;
+use super::standstill;
+use crate::estimator::factors::prior::Prior;
+use crate::estimator::window::frames::Frame;
+
+/// The prior that is left when the oldest frame goes, together with the features of the problem's tracks (all that it saw
+/// and that leave with it).
+///
+/// Its residuals refer to the first estimates: of frames that the old prior held those stay, all others take the present
+/// estimate as theirs.
+pub(crate) fn oldest(problem: &Problem<'_>, estimate: &Estimate) -> Option<Prior> {
+    let mut parts = vec![problem.prior_rows(estimate), problem.encoder_rows(0, estimate)];
+    parts.push(problem.rest_rows(&standstill::speed_terms(problem.layout, &problem.frames[0], 0, &estimate.frames[0])));
+    if problem.frames.len() > 1 {
+        parts.push(problem.inertial_rows(1, estimate));
+        parts.push(problem.rest_rows(&standstill::place_terms(problem.layout, problem.frames, 1, &estimate.frames)));
+    }
+    parts.push(problem.visual_rows(estimate));
+    eliminated(problem, estimate, &parts, 0)
+}
+
+/// The prior without the frame at `slot`, whose encoder readings go into it while its sightings are forgotten and its
+/// inertial samples pass to the next frame; `None` when there is no prior.
+pub(crate) fn dropped(problem: &Problem<'_>, estimate: &Estimate, slot: usize) -> Option<Prior> {
+    let prior = problem.prior?;
+    if !prior.holds_frame(slot) {
+        return Some(prior.clone());
+    }
+    let held = prior.rows(&problem.layout, &problem.deviation(estimate));
+    eliminated(problem, estimate, &[held, problem.encoder_rows(slot, estimate)], slot)
+}
+
+/// Rows with residuals at the present estimate become a prior that keeps them at the first estimates.
+fn eliminated(problem: &Problem<'_>, estimate: &Estimate, parts: &[DMatrix<f64>], slot: usize) -> Option<Prior> {
+    let total = problem.layout.total();
+    let mut rows = stack(parts, total + 1);
+    let shift = rows.columns(0, total) * problem.deviation(estimate);
+    let mut residual = rows.column_mut(total);
+    residual -= shift;
+    Prior::eliminating(&rows, &problem.layout, slot)
+}
+
+/// Frames that a new prior holds keep their present state as their first estimate.
+pub(crate) fn keep_first_estimates(prior: &Prior, frames: &mut [Frame]) {
+    for (slot, frame) in frames.iter_mut().enumerate() {
+        if prior.holds_frame(slot) {
+            if frame.first_estimate.is_none() {
+                frame.first_estimate = Some(frame.state.clone());
+            }
+        } else {
+            frame.first_estimate = None;
+        }
+    }
+}

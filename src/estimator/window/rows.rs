@@ -1,0 +1,153 @@
+//! Factors as whitened rows `[columns of the layout | residual]`, for the marginalization and for the report.
+
+use nalgebra::DMatrix;
+
+use super::problem::{Estimate, Problem};
+use super::standstill::RestTerm;
+use crate::estimator::factors::projection::{NewestRows, ProjectedRows};
+use crate::estimator::factors::reprojection::CameraPose;
+use crate::estimator::state::camera_pose::{self, CameraMaps};
+use crate::estimator::state::layout::{POSE, SPEED_BIAS};
+use crate::estimator::window::frames::FrameState;
+
+impl Problem<'_> {
+    /// The reprojection factors, landmarks projected out; at most `6·frames` rows a camera.
+    pub(crate) fn visual_rows(&self, estimate: &Estimate) -> DMatrix<f64> {
+        let frames = self.linearization_frames(estimate);
+        let calibration = self.linearization_calibration(&estimate.calibration);
+        let seeing = (0..self.cameras.len()).filter(|camera| !self.cameras[*camera].tracks.is_empty());
+        let rows: Vec<DMatrix<f64>> = seeing
+            .map(|camera| {
+                let maps = CameraMaps::new(&frames, calibration.of(camera));
+                let poses = camera_pose::by_slot(&frames, calibration.of(camera));
+                let projected = self.projected_rows(camera, estimate, &poses, NewestRows::Among);
+                self.carried_rows(camera, &projected, &maps)
+            })
+            .collect();
+        stack(&rows, self.layout.total() + 1)
+    }
+
+    /// The reprojection factors of one camera by its poses; derivatives at `linearized`.
+    pub(crate) fn projected_rows(
+        &self,
+        camera: usize,
+        estimate: &Estimate,
+        linearized: &[CameraPose],
+        apart: NewestRows,
+    ) -> ProjectedRows {
+        let factors = &self.cameras[camera];
+        let current = camera_pose::by_slot(&estimate.frames, estimate.calibration.of(camera));
+        let landmarks = &estimate.landmarks[camera];
+        ProjectedRows::new(&factors.visual, &current, linearized, factors.tracks, landmarks, apart)
+    }
+
+    /// Rows by the poses of a camera carried on to the unknowns.
+    pub(crate) fn carried_rows(&self, camera: usize, projected: &ProjectedRows, maps: &CameraMaps) -> DMatrix<f64> {
+        let by_camera = &projected.rows;
+        let total = self.layout.total();
+        let height = by_camera.nrows();
+        let calibration = &self.cameras[camera].columns;
+        let mut rows = DMatrix::zeros(height, total + 1);
+        for slot in 0..self.layout.frames {
+            let columns = by_camera.view((0, 6 * slot), (height, 6));
+            rows.columns_range_mut(self.layout.camera(slot)).gemm(1.0, &columns, &maps.own[slot], 0.0);
+            rows.columns_range_mut(calibration.clone()).gemm(1.0, &columns, &maps.calibration[slot], 1.0);
+        }
+        rows.set_column(total, &by_camera.view((0, 6 * self.layout.frames), (height, 1)).column(0));
+        rows
+    }
+
+    /// The inertial factor that ends at `slot`, 15 rows, or none.
+    pub(crate) fn inertial_rows(&self, slot: usize, estimate: &Estimate) -> DMatrix<f64> {
+        self.inertial_rows_at(slot, estimate, &self.linearization_frames(estimate))
+    }
+
+    /// [`Self::inertial_rows`] with the states at which derivatives are taken.
+    pub(crate) fn inertial_rows_at(&self, slot: usize, estimate: &Estimate, linearized: &[FrameState]) -> DMatrix<f64> {
+        let total = self.layout.total();
+        let Some((by_from, by_to, residual)) = self.imu_rows(slot, estimate, linearized) else {
+            return DMatrix::zeros(0, total + 1);
+        };
+        let mut rows = DMatrix::zeros(15, total + 1);
+        for (slot, part) in [(slot - 1, &by_from), (slot, &by_to)] {
+            rows.columns_range_mut(self.layout.pose(slot)).copy_from(&part.fixed_columns::<POSE>(0));
+            rows.columns_range_mut(self.layout.speed_bias(slot)).copy_from(&part.fixed_columns::<SPEED_BIAS>(POSE));
+        }
+        rows.set_column(total, &residual);
+        rows
+    }
+
+    /// The encoder readings of a frame, a row each.
+    pub(crate) fn encoder_rows(&self, slot: usize, estimate: &Estimate) -> DMatrix<f64> {
+        let readings: Vec<_> = self.encoder_residuals(slot, estimate).collect();
+        let clock = self.encoder_clock_column(estimate);
+        let mut rows = DMatrix::zeros(readings.len(), self.layout.total() + 1);
+        for (row, (joint, residual, slope)) in readings.into_iter().enumerate() {
+            rows[(row, self.layout.joints(slot).start + joint)] = slope;
+            if let Some(clock) = clock {
+                rows[(row, clock)] = slope * estimate.frames[slot].rates.joint_rad_per_s(joint);
+            }
+            rows[(row, self.layout.total())] = residual;
+        }
+        rows
+    }
+
+    /// What standing still says, a row for each term.
+    pub(crate) fn rest_rows(&self, terms: &[RestTerm]) -> DMatrix<f64> {
+        let mut rows = DMatrix::zeros(terms.len(), self.layout.total() + 1);
+        for (row, term) in terms.iter().enumerate() {
+            rows[(row, term.column)] = term.slope;
+            if let Some(against) = term.against {
+                rows[(row, against)] = -term.slope;
+            }
+            rows[(row, self.layout.total())] = term.residual;
+        }
+        rows
+    }
+
+    /// The marginalization prior and what was known at the start.
+    pub(crate) fn prior_rows(&self, estimate: &Estimate) -> DMatrix<f64> {
+        let total = self.layout.total();
+        let held = self
+            .prior
+            .map_or_else(|| DMatrix::zeros(0, total + 1), |prior| prior.rows(&self.layout, &self.deviation(estimate)));
+        let (Some(start), Some(first)) = (self.start, estimate.frames.first()) else { return held };
+        let (jacobian, residual) = start.rows(first);
+        let mut rows = DMatrix::zeros(jacobian.nrows(), total + 1);
+        rows.columns_range_mut(self.layout.frame(0)).copy_from(&jacobian);
+        rows.set_column(total, &residual);
+        stack(&[held, rows], total + 1)
+    }
+
+    /// The rig's prior on the calibration.
+    pub(crate) fn calibration_prior_rows(&self, estimate: &Estimate) -> DMatrix<f64> {
+        let total = self.layout.total();
+        if self.layout.calibration == 0 {
+            return DMatrix::zeros(0, total + 1);
+        }
+        let jacobian = estimate.calibration.prior_jacobian();
+        let mut rows = DMatrix::zeros(jacobian.nrows(), total + 1);
+        rows.columns_range_mut(self.layout.calibration()).copy_from(&jacobian);
+        rows.set_column(total, &estimate.calibration.prior_residual());
+        rows
+    }
+}
+
+/// One matrix above the other.
+pub(crate) fn stack(parts: &[DMatrix<f64>], columns: usize) -> DMatrix<f64> {
+    stack_columns(parts, 0..columns)
+}
+
+/// These columns of the matrices, one above the other.
+pub(crate) fn stack_columns(parts: &[DMatrix<f64>], columns: impl ExactSizeIterator<Item = usize>) -> DMatrix<f64> {
+    let height = parts.iter().map(DMatrix::nrows).sum();
+    let mut stacked = DMatrix::zeros(height, columns.len());
+    for (target, source) in columns.enumerate() {
+        let mut start = 0;
+        for part in parts {
+            stacked.view_mut((start, target), (part.nrows(), 1)).copy_from(&part.column(source));
+            start += part.nrows();
+        }
+    }
+    stacked
+}

@@ -1,0 +1,296 @@
+//! Standing still while the window runs: how it is noticed, and what it says about the unknowns.
+//!
+//! A landed vehicle sees no parallax, so that new features get no depth and the old ones are lost one by one; without more
+//! the inertial sensor alone would carry it away. Two witnesses must agree: quiet inertial samples (a hovering multirotor
+//! turns by more), and a picture that stays as it is once rotation is taken out (a gimbal may look around on the ground).
+//!
+//! What follows is soft, as soft as the witnesses are sharp: the place is the same as in the frame before and the velocity is
+//! zero, up to the motion that the picture could not have shown at the distance of the scene.
+
+use std::collections::VecDeque;
+
+use nalgebra::{UnitQuaternion, Vector3};
+
+use crate::estimator::factors::preintegration::ImuBias;
+use crate::estimator::initialization::bearing::fit_rotation;
+use crate::estimator::state::layout::Layout;
+use crate::estimator::window::frames::{Frame, FrameState};
+use crate::estimator::{Event, EventKind, StepInput};
+use crate::frontend::{FeatureId, TrackedFeature};
+use crate::geometry::seconds_from_ns;
+use crate::sensors::ImuNoise;
+
+/// Both witnesses must have been quiet for this long.
+const QUIET_NS: i64 = 1_000_000_000;
+/// Largest standard deviation of the angular velocity (worst axis, averaged from image to image), beyond the sensor's own.
+const MOST_TURN_SPREAD_RAD_PER_S: f64 = 0.002;
+/// Largest mean angular velocity once the known bias is taken off (worst axis).
+const MOST_TURN_RAD_PER_S: f64 = 0.01;
+/// Largest standard deviation of the specific force (worst axis, averaged from image to image), beyond the sensor's own.
+const MOST_FORCE_SPREAD_M_PER_S2: f64 = 0.03;
+/// Largest rotation-compensated motion of the picture since the vehicle stands.
+const MOST_PARALLAX_RAD: f64 = 0.004;
+/// Estimated speed above which the window is asked no more: something fast over a far scene shows no parallax either.
+const MOST_SPEED_M_PER_S: f64 = 0.5;
+/// Fewest features that the picture is compared by.
+const LEAST_COMMON: usize = 12;
+/// The sharpest that a picture's rest is believed: a tenth of a pixel at usual focal lengths.
+const LEAST_PARALLAX_RAD: f64 = 2e-4;
+
+/// What is known of a frame's rest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Rest {
+    /// Since when the vehicle stands where it is.
+    pub(crate) since_ns: i64,
+    /// Motion that the picture could not have shown.
+    pub(crate) position_sigma_m: f64,
+    /// The same as a speed.
+    pub(crate) speed_sigma_m_per_s: f64,
+}
+
+/// Angular velocity and specific force from one image to the next.
+#[derive(Clone, Copy, Debug)]
+struct Interval {
+    end_ns: i64,
+    duration_s: f64,
+    angular_velocity_rad_per_s: Vector3<f64>,
+    specific_force_m_per_s2: Vector3<f64>,
+}
+
+/// The picture that later ones are compared with.
+#[derive(Clone, Debug)]
+struct Reference {
+    bearings: Vec<(FeatureId, Vector3<f64>)>,
+    imu_from_camera: UnitQuaternion<f64>,
+}
+
+/// Watches for rest, image by image.
+#[derive(Clone, Debug)]
+pub(crate) struct RestWatch {
+    /// Of the last second and a little more.
+    intervals: VecDeque<Interval>,
+    reference: Option<Reference>,
+    /// Since when the picture has not moved.
+    unmoved_since_ns: i64,
+    /// Since when the vehicle stands, once that is known.
+    resting_since_ns: Option<i64>,
+    /// How long the picture must have been unmoved. Where it moved although the inertial samples were quiet, something
+    /// creeps: then it must stay unmoved for twice as long as that took.
+    asked_ns: i64,
+}
+
+impl Default for RestWatch {
+    fn default() -> Self {
+        Self {
+            intervals: VecDeque::new(),
+            reference: None,
+            unmoved_since_ns: 0,
+            resting_since_ns: None,
+            asked_ns: QUIET_NS,
+        }
+    }
+}
+
+/// What the window knows when a new image comes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Known<'a> {
+    /// What the camera that is asked has seen.
+    pub(crate) features: &'a [TrackedFeature],
+    pub(crate) noise: &'a ImuNoise,
+    pub(crate) bias: &'a ImuBias,
+    pub(crate) speed_m_per_s: f64,
+    pub(crate) imu_from_camera: UnitQuaternion<f64>,
+    /// How far the scene usually is.
+    pub(crate) distance_m: f64,
+}
+
+impl RestWatch {
+    /// Takes in an image; when the vehicle stands still there, what that says, and the event that tells of it.
+    pub(crate) fn observe(&mut self, input: &StepInput<'_>, known: &Known<'_>) -> Option<(Rest, Event)> {
+        self.take_interval(input);
+        let before_ns = self.unmoved_since_ns;
+        let parallax_rad = self.compare_picture(input.stamp_ns, known);
+        let spread = self.spread(input.stamp_ns, known);
+        let quiet = spread.as_ref().is_some_and(Spread::is_quiet) && known.speed_m_per_s <= MOST_SPEED_M_PER_S;
+        let unmoved_ns = input.stamp_ns - self.unmoved_since_ns;
+        if !quiet {
+            self.asked_ns = QUIET_NS;
+        } else if self.unmoved_since_ns > before_ns {
+            self.asked_ns = self.asked_ns.max(2 * (input.stamp_ns - before_ns));
+        }
+        let resting = quiet && unmoved_ns >= self.asked_ns;
+        let (Some(spread), Some(parallax_rad), true) = (spread, parallax_rad, resting) else {
+            self.resting_since_ns = None;
+            return None;
+        };
+        let quiet_since_ns = self.unmoved_since_ns.max(input.stamp_ns - QUIET_NS);
+        let since_ns = *self.resting_since_ns.get_or_insert(quiet_since_ns);
+        let position_sigma_m = parallax_rad.max(LEAST_PARALLAX_RAD) * known.distance_m;
+        let event = Event {
+            kind: EventKind::Standstill,
+            message: format!(
+                "standing still for {:.1} s: the picture moved by {:.2}° of {:.2}°, rotation taken out; the angular velocity \
+                 spreads by {:.4} of {:.4} rad/s, the specific force by {:.3} of {:.3} m/s²",
+                seconds_from_ns(input.stamp_ns - since_ns),
+                parallax_rad.to_degrees(),
+                MOST_PARALLAX_RAD.to_degrees(),
+                spread.turn,
+                spread.turn_limit,
+                spread.force,
+                spread.force_limit
+            ),
+            value: Some(parallax_rad),
+            threshold: Some(MOST_PARALLAX_RAD),
+        };
+        let speed_sigma_m_per_s = position_sigma_m / seconds_from_ns(QUIET_NS);
+        Some((Rest { since_ns, position_sigma_m, speed_sigma_m_per_s }, event))
+    }
+
+    fn take_interval(&mut self, input: &StepInput<'_>) {
+        let finite = |vector: &Vector3<f64>| vector.iter().all(|x| x.is_finite());
+        let samples: Vec<_> = input
+            .imu
+            .iter()
+            .filter(|sample| finite(&sample.angular_velocity_rad_per_s) && finite(&sample.specific_force_m_per_s2))
+            .collect();
+        let (Some(first), Some(last)) = (samples.first(), samples.last()) else {
+            self.intervals.clear();
+            return;
+        };
+        let count = samples.len() as f64;
+        self.intervals.push_back(Interval {
+            end_ns: last.stamp_ns,
+            duration_s: seconds_from_ns(last.stamp_ns - first.stamp_ns),
+            angular_velocity_rad_per_s: samples
+                .iter()
+                .map(|sample| sample.angular_velocity_rad_per_s)
+                .sum::<Vector3<f64>>()
+                / count,
+            specific_force_m_per_s2: samples.iter().map(|sample| sample.specific_force_m_per_s2).sum::<Vector3<f64>>()
+                / count,
+        });
+        while self.intervals.get(1).is_some_and(|second| second.end_ns <= input.stamp_ns - QUIET_NS) {
+            self.intervals.pop_front();
+        }
+    }
+
+    /// How far the picture has moved since the vehicle may be standing; a picture that has moved too far begins anew.
+    fn compare_picture(&mut self, stamp_ns: i64, known: &Known<'_>) -> Option<f64> {
+        let (features, imu_from_camera) = (known.features, known.imu_from_camera);
+        let parallax_rad = self.reference.as_ref().and_then(|reference| {
+            let pairs: Vec<(Vector3<f64>, Vector3<f64>)> = reference
+                .bearings
+                .iter()
+                .filter_map(|(id, before)| {
+                    let place = features.binary_search_by_key(id, |feature| feature.id).ok()?;
+                    Some((*before, features[place].bearing)).filter(|(_, now)| now.iter().all(|x| x.is_finite()))
+                })
+                .collect();
+            if pairs.len() < LEAST_COMMON {
+                return None;
+            }
+            // The vehicle's own turn is left to the gyroscope: at rest there is none.
+            let guess = imu_from_camera.inverse() * reference.imu_from_camera;
+            Some(fit_rotation(&pairs, &guess)?.median_parallax_rad)
+        });
+        let moved = parallax_rad.is_none_or(|parallax_rad| parallax_rad > MOST_PARALLAX_RAD);
+        // Tracks end in a picture at rest, too: the rest goes on from the newest picture before too few are left.
+        let fading = self.reference.is_some() && parallax_rad.is_none() && self.resting_since_ns.is_some();
+        if moved {
+            let bearings = features.iter().map(|feature| (feature.id, feature.bearing)).collect();
+            self.reference = Some(Reference { bearings, imu_from_camera });
+            if !fading {
+                self.unmoved_since_ns = stamp_ns;
+            }
+        }
+        if fading && features.len() >= LEAST_COMMON { Some(MOST_PARALLAX_RAD) } else { parallax_rad }
+    }
+
+    /// Spread of the last second's samples, `None` while that much is not there.
+    fn spread(&self, stamp_ns: i64, known: &Known<'_>) -> Option<Spread> {
+        let first = self.intervals.front()?;
+        let begin_ns = first.end_ns - (first.duration_s * 1e9) as i64;
+        if begin_ns > stamp_ns - QUIET_NS || self.intervals.len() < 4 {
+            return None;
+        }
+        let covered_s: f64 = self.intervals.iter().map(|interval| interval.duration_s).sum();
+        let averaged_s = covered_s / self.intervals.len() as f64;
+        let own = |density: f64| 1.5 * density / averaged_s.max(1e-3).sqrt();
+        let (turn_mean, turn) = mean_and_spread(self.intervals.iter().map(|i| i.angular_velocity_rad_per_s));
+        let (_, force) = mean_and_spread(self.intervals.iter().map(|i| i.specific_force_m_per_s2));
+        Some(Spread {
+            turn,
+            turn_limit: MOST_TURN_SPREAD_RAD_PER_S.hypot(own(known.noise.gyroscope_noise_density)),
+            mean_turn: (turn_mean - known.bias.gyroscope_rad_per_s).amax(),
+            force,
+            force_limit: MOST_FORCE_SPREAD_M_PER_S2.hypot(own(known.noise.accelerometer_noise_density)),
+        })
+    }
+}
+
+/// How much the inertial samples vary, with the limits.
+#[derive(Clone, Copy, Debug)]
+struct Spread {
+    turn: f64,
+    turn_limit: f64,
+    mean_turn: f64,
+    force: f64,
+    force_limit: f64,
+}
+
+impl Spread {
+    fn is_quiet(&self) -> bool {
+        self.turn <= self.turn_limit && self.mean_turn <= MOST_TURN_RAD_PER_S && self.force <= self.force_limit
+    }
+}
+
+/// Mean, and the largest standard deviation of the components.
+fn mean_and_spread(values: impl Iterator<Item = Vector3<f64>> + Clone) -> (Vector3<f64>, f64) {
+    let count = values.clone().count().max(1) as f64;
+    let mean = values.clone().sum::<Vector3<f64>>() / count;
+    let squares: Vector3<f64> = values.map(|value| (value - mean).component_mul(&(value - mean))).sum();
+    (mean, (squares / count).max().sqrt())
+}
+
+/// A scalar that rest says is zero: an unknown, or its difference from the one of the frame before.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct RestTerm {
+    /// Column that it rises with.
+    pub(crate) column: usize,
+    /// Column that it falls with.
+    pub(crate) against: Option<usize>,
+    /// Divided by its standard deviation.
+    pub(crate) residual: f64,
+    /// One over the standard deviation.
+    pub(crate) slope: f64,
+}
+
+/// The velocity of a resting frame is zero.
+pub(crate) fn speed_terms(layout: Layout, frame: &Frame, slot: usize, state: &FrameState) -> Vec<RestTerm> {
+    let Some(rest) = &frame.rest else { return Vec::new() };
+    let slope = 1.0 / rest.speed_sigma_m_per_s;
+    let velocity = state.navigation.velocity_m_per_s;
+    let column = layout.speed_bias(slot).start;
+    (0..3)
+        .map(|axis| RestTerm { column: column + axis, against: None, residual: velocity[axis] * slope, slope })
+        .collect()
+}
+
+/// A resting frame is where the frame before it in the window is, if that one belongs to the same rest.
+pub(crate) fn place_terms(layout: Layout, frames: &[Frame], slot: usize, states: &[FrameState]) -> Vec<RestTerm> {
+    let Some(rest) = frames[slot].rest.filter(|rest| slot > 0 && frames[slot - 1].stamp_ns >= rest.since_ns) else {
+        return Vec::new();
+    };
+    let slope = 1.0 / rest.position_sigma_m;
+    let place = |slot: usize| states[slot].navigation.world_from_imu.translation_m;
+    let moved = place(slot) - place(slot - 1);
+    let column = |slot: usize, axis: usize| layout.pose(slot).start + 3 + axis;
+    (0..3)
+        .map(|axis| RestTerm {
+            column: column(slot, axis),
+            against: Some(column(slot - 1, axis)),
+            residual: moved[axis] * slope,
+            slope,
+        })
+        .collect()
+}
