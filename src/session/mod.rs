@@ -5,55 +5,28 @@
 
 pub mod accuracy;
 pub mod breakpoints;
-mod calibrate;
-mod command;
-mod comparison;
-mod configuration;
 mod engine;
-#[cfg(test)]
-mod fork_tests;
-mod forks;
-mod history;
-mod image_rotations;
-mod instants;
-mod material;
-#[cfg(test)]
-mod memory_tests;
-mod outline;
 mod plan;
 mod playback;
-mod recording;
-mod retaking;
-mod run_accuracy;
-mod run_engine;
-mod run_warnings;
-#[cfg(test)]
-mod run_warnings_tests;
-mod saved;
-mod solver_trace;
-mod spec;
-mod stopping;
-mod stopwatch;
+mod record;
 #[cfg(test)]
 mod tests;
-mod tracker;
 
-pub use calibrate::{CalibrationRequest, CalibrationRun, CalibrationRunError, calibrate};
-pub use command::{Command, PlaybackSpeed};
-pub use comparison::{Comparison, Parting, Quantity};
-pub use engine::EngineMessage;
-pub use forks::{FORK_PARAMETERIZATIONS, ForkChanges, ForkError};
-pub use history::{History, SnapshotFigures};
-pub use image_rotations::image_rotations;
-pub use plan::{DEFAULT_MEMORY_BUDGET_BYTES, MAX_RUNS, SessionError, SessionPlan, SessionRequest};
-pub use playback::Session;
-pub use recording::{ForkOrigin, Recording, RunMemory, RunRecord, StepRecord};
-pub use run_accuracy::{ChainDistance, RELATIVE_LENGTHS_M, RelativeAccuracy, TrajectoryAccuracy};
-pub use run_warnings::RunWarning;
-pub use saved::{SavedBreakpoint, SavedFork, SavedLog, SavedSession, SavedSessionError};
-pub use solver_trace::{SolverPosition, SolverTrace};
-pub use spec::{ParameterizationChoice, RunSpec, RunSpecError};
-pub use stopwatch::Stopwatch;
+pub use engine::{
+    CalibrationRequest, CalibrationRun, CalibrationRunError, EngineMessage, History, SnapshotFigures, Stopwatch,
+    calibrate, image_rotations,
+};
+pub use plan::{
+    DEFAULT_MEMORY_BUDGET_BYTES, FORK_PARAMETERIZATIONS, ForkChanges, ForkError, MAX_RUNS, ParameterizationChoice,
+    RunSpec, RunSpecError, SessionError, SessionPlan, SessionRequest,
+};
+pub use playback::{
+    Command, PlaybackSpeed, SavedBreakpoint, SavedFork, SavedLog, SavedSession, SavedSessionError, Session,
+};
+pub use record::{
+    ChainDistance, Comparison, ForkOrigin, Parting, Quantity, RELATIVE_LENGTHS_M, Recording, RelativeAccuracy,
+    RunMemory, RunRecord, RunWarning, SolverPosition, SolverTrace, StepRecord, TrajectoryAccuracy,
+};
 
 use breakpoints::{Breakpoints, Condition, Hit, NamedValue};
 use engine::Engine;

@@ -4,7 +4,7 @@ use super::expression::{Arithmetic, Condition, Number, Span, Truth};
 use super::quantities::NamedNumber;
 use crate::estimator::ResidualSummary;
 use crate::sensors::Rig;
-use crate::session::StepRecord;
+use crate::session::record::StepRecord;
 
 /// A step as a condition sees it.
 #[derive(Clone, Copy, Debug)]

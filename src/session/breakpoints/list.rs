@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::evaluate::{Moment, NamedValue};
 use super::expression::Condition;
 use crate::sensors::Rig;
-use crate::session::{Recording, RunRecord};
+use crate::session::record::{Recording, RunRecord};
 
 /// A step in which a breakpoint was hit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,7 +2,7 @@
 
 use crate::estimator::{EventKind, Phase};
 use crate::geometry::seconds_from_ns;
-use crate::session::StepRecord;
+use crate::session::record::StepRecord;
 
 /// A number that every step may have.
 #[derive(Clone, Copy, Debug)]

@@ -4,8 +4,8 @@ use super::{Breakpoints, Condition, Moment};
 use crate::estimator::{Event, EventKind, IterationReport, ResidualSummary};
 use crate::observability::RankReport;
 use crate::sensors::Rig;
-use crate::session::memory_tests::recorded;
-use crate::session::{Recording, RunRecord, StepRecord};
+use crate::session::record::{Recording, RunRecord, StepRecord};
+use crate::session::tests::memory::recorded;
 use crate::simulation::{SyntheticOptions, synthetic_tracks};
 
 /// A run over a synthetic flight with its rig.

@@ -5,20 +5,18 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{Builder, JoinHandle};
 
-use super::breakpoints::Breakpoints;
 use super::command::{Command, PlaybackSpeed};
-use super::engine::Engine;
-use super::forks::{ForkChanges, ForkError};
-use super::history::History;
-use super::plan::{MAX_RUNS, SessionError, SessionPlan, SessionRequest, cameras_of_run};
-use super::recording::{Recording, RunRecord};
-use super::retaking::{Detail, Retaking, STEPS_AT_ONCE, Wish};
 use super::saved::Pending;
-use super::solver_trace::SolverPosition;
-use super::spec::{RunSpec, distinct_labels};
 use crate::flight_log::ImageReader;
 use crate::geometry::{ns_from_seconds, seconds_from_ns};
 use crate::sensors::GrayImage;
+use crate::session::breakpoints::Breakpoints;
+use crate::session::engine::{Detail, Engine, History, Retaking, STEPS_AT_ONCE, Wish};
+use crate::session::plan::{
+    ForkChanges, ForkError, MAX_RUNS, RunSpec, SessionError, SessionPlan, SessionRequest, cameras_of_run,
+    distinct_labels,
+};
+use crate::session::record::{Recording, RunRecord, SolverPosition};
 
 /// A recording that grows while others look at it.
 #[derive(Debug)]
@@ -48,27 +46,27 @@ impl SharedRecording {
 /// Nothing here waits for the estimators: a picture shows what is there.
 #[derive(Debug)]
 pub struct Session {
-    pub(super) plan: SessionPlan,
+    pub(in crate::session) plan: SessionPlan,
     shared: Arc<SharedRecording>,
     engine: Engine,
     collector: Option<JoinHandle<()>>,
     retaking: Retaking,
     /// Where in the solver's work the step at the cursor is looked at.
     solver: Arc<Mutex<Option<SolverPosition>>>,
-    pub(super) breakpoints: Arc<Breakpoints>,
+    pub(in crate::session) breakpoints: Arc<Breakpoints>,
     /// The cursor runs to the next hit, as fast as the estimators come.
-    pub(super) running_on: bool,
+    pub(in crate::session) running_on: bool,
     images: ImageReader,
-    pub(super) cursor_ns: i64,
-    pub(super) playing: bool,
+    pub(in crate::session) cursor_ns: i64,
+    pub(in crate::session) playing: bool,
     speed: PlaybackSpeed,
     loop_range_ns: Option<(i64, i64)>,
-    pub(super) markers_ns: Vec<i64>,
+    pub(in crate::session) markers_ns: Vec<i64>,
     /// What is still to be done of a session that was opened from a file.
-    pub(super) pending: Pending,
+    pub(in crate::session) pending: Pending,
     /// Where the panels were when it was saved.
-    pub(super) layout: Option<serde_json::Value>,
-    pub(super) notices: Vec<String>,
+    pub(in crate::session) layout: Option<serde_json::Value>,
+    pub(in crate::session) notices: Vec<String>,
 }
 
 impl Session {
@@ -297,7 +295,7 @@ impl Session {
         }
     }
 
-    pub(super) fn perform(&mut self, command: Command) {
+    pub(in crate::session) fn perform(&mut self, command: Command) {
         match command {
             Command::TogglePlay if self.playing => self.playing = false,
             Command::Play | Command::TogglePlay => self.play(),
@@ -417,7 +415,7 @@ impl Session {
     }
 
     /// Makes a fork of a run at a time: the step there is its first own one.
-    pub(super) fn fork_at(
+    pub(in crate::session) fn fork_at(
         &mut self,
         run: usize,
         stamp_ns: i64,
@@ -475,7 +473,7 @@ impl Drop for Session {
 }
 
 /// Stamps of the steps of all runs that pass the filter, in order, each once.
-fn instants_ns(recording: &Recording, wanted: impl Fn(&super::StepRecord) -> bool) -> Vec<i64> {
+fn instants_ns(recording: &Recording, wanted: impl Fn(&crate::session::StepRecord) -> bool) -> Vec<i64> {
     let mut stamps_ns: Vec<i64> = recording
         .runs
         .iter()

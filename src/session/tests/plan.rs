@@ -1,11 +1,9 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
-use super::accuracy::{Alignment, AlignmentSums};
-use super::configuration::estimator_config;
-use super::plan::cameras_of_run;
-use super::spec::distinct_labels;
-use super::{ParameterizationChoice, RunSpec, RunSpecError};
 use crate::sensors::{CameraRig, Rig};
+use crate::session::accuracy::{Alignment, AlignmentSums};
+use crate::session::engine::estimator_config;
+use crate::session::plan::{ParameterizationChoice, RunSpec, RunSpecError, cameras_of_run, distinct_labels};
 use crate::simulation::{SyntheticMount, SyntheticOptions, synthetic_tracks};
 
 /// The specification, and its message when it is refused.

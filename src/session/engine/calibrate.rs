@@ -6,8 +6,6 @@ use std::sync::Arc;
 use thiserror::Error;
 
 use super::configuration::{estimator_config, mount_prior};
-use super::plan::SessionError;
-use super::spec::{ParameterizationChoice, RunSpec};
 use super::tracker::CameraTracker;
 use crate::calibration::{
     self, CalibrationError, CalibrationInput, CalibrationOptions, CalibrationOutcome, CalibrationProgress,
@@ -16,6 +14,7 @@ use crate::calibration::{
 use crate::flight_log::{FlightLog, LogError, LogWarning};
 use crate::geometry::{RigidTransform, ns_from_seconds, seconds_from_ns};
 use crate::sensors::{CameraMount, CameraRig, ChainPrior, GimbalRig, Rig};
+use crate::session::plan::{ParameterizationChoice, RunSpec, SessionError};
 
 /// Share of the whole work that tracking takes.
 const TRACKING_SHARE: f64 = 0.6;

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
-use super::instants::Instant;
+use super::synchronized_frames::Instant;
 use crate::estimator::allocated_bytes;
 use crate::frontend::{TrackedFeature, TrackedFrame};
 use crate::geometry::RigidTransform;
@@ -13,28 +13,28 @@ use crate::sensors::{ImuSample, JointAngles};
 /// The front end does not know the estimator, so its tracks are the same whatever the run does with them: they are kept,
 /// and no image has to be tracked again.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Material {
+pub(in crate::session) struct Material {
     /// Number of the main camera's image; where it is missing, one that no image has.
-    pub(super) frame_index: usize,
+    pub(in crate::session) frame_index: usize,
     /// Header stamp since the log began, on the main camera's clock.
-    pub(super) stamp_ns: i64,
+    pub(in crate::session) stamp_ns: i64,
     /// Log time since the log began.
-    pub(super) log_time_ns: i64,
+    pub(in crate::session) log_time_ns: i64,
     /// Inertial samples since the instant before.
-    pub(super) imu: Vec<ImuSample>,
+    pub(in crate::session) imu: Vec<ImuSample>,
     /// Encoder angles at the stamp.
-    pub(super) joint_angles: Option<JointAngles>,
+    pub(in crate::session) joint_angles: Option<JointAngles>,
     /// Tracks by camera of the run, the main one's first; empty ones where an image is missing.
-    pub(super) tracks: Vec<Arc<TrackedFrame>>,
+    pub(in crate::session) tracks: Vec<Arc<TrackedFrame>>,
     /// True pose of the IMU.
-    pub(super) truth: Option<RigidTransform>,
+    pub(in crate::session) truth: Option<RigidTransform>,
     /// What the front ends took.
-    pub(super) frontend_ms: f64,
+    pub(in crate::session) frontend_ms: f64,
 }
 
 impl Material {
     /// What an instant brings to the estimator, without its images.
-    pub(super) fn of(instant: &Instant) -> Self {
+    pub(in crate::session) fn of(instant: &Instant) -> Self {
         let tracks = |camera: usize| instant.tracks(camera).map_or_else(Arc::default, Arc::clone);
         Self {
             frame_index: instant.frame_index(),
@@ -49,12 +49,12 @@ impl Material {
     }
 
     /// The main camera's tracks.
-    pub(super) fn main_tracks(&self) -> &Arc<TrackedFrame> {
+    pub(in crate::session) fn main_tracks(&self) -> &Arc<TrackedFrame> {
         &self.tracks[0]
     }
 
     /// Bytes that it takes, without the main camera's tracks, which the step's record counts.
-    pub(super) fn own_bytes(&self) -> usize {
+    pub(in crate::session) fn own_bytes(&self) -> usize {
         let rigid: usize = self.tracks.iter().skip(1).map(|tracks| tracks_bytes(tracks)).sum();
         allocated_bytes(size_of::<Self>() + 2 * size_of::<usize>())
             + allocated_bytes(self.imu.capacity() * size_of::<ImuSample>())
@@ -64,14 +64,14 @@ impl Material {
 }
 
 /// Bytes of tracks.
-pub(super) fn tracks_bytes(tracks: &TrackedFrame) -> usize {
+pub(in crate::session) fn tracks_bytes(tracks: &TrackedFrame) -> usize {
     allocated_bytes(size_of::<TrackedFrame>() + 2 * size_of::<usize>())
         + allocated_bytes(tracks.features.capacity() * size_of::<TrackedFeature>())
 }
 
 /// The material of a run's steps so far, which the runs that branch off from it share.
 #[derive(Debug, Default)]
-pub(super) struct Materials {
+pub(in crate::session) struct Materials {
     state: Mutex<State>,
     grown: Condvar,
 }
@@ -89,24 +89,24 @@ impl Materials {
     }
 
     /// Adds the material of the next step.
-    pub(super) fn push(&self, material: Arc<Material>) {
+    pub(in crate::session) fn push(&self, material: Arc<Material>) {
         self.lock().steps.push(material);
         self.grown.notify_all();
     }
 
     /// No more will come.
-    pub(super) fn end(&self) {
+    pub(in crate::session) fn end(&self) {
         self.lock().ended = true;
         self.grown.notify_all();
     }
 
     /// The material of a step that has been taken.
-    pub(super) fn get(&self, step: usize) -> Option<Arc<Material>> {
+    pub(in crate::session) fn get(&self, step: usize) -> Option<Arc<Material>> {
         self.lock().steps.get(step).cloned()
     }
 
     /// The material of a step; waits for it. `None` behind the last one.
-    pub(super) fn wait_for(&self, step: usize) -> Option<Arc<Material>> {
+    pub(in crate::session) fn wait_for(&self, step: usize) -> Option<Arc<Material>> {
         let waiting = self.grown.wait_while(self.lock(), |state| state.steps.len() <= step && !state.ended);
         waiting.unwrap_or_else(PoisonError::into_inner).steps.get(step).cloned()
     }

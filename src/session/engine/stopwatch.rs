@@ -2,7 +2,7 @@ use std::sync::LazyLock;
 use std::time::Instant;
 
 /// Milliseconds of a clock that only runs forward, for the stage times of reports.
-pub(super) fn clock_ms() -> f64 {
+pub(in crate::session) fn clock_ms() -> f64 {
     static BEGIN: LazyLock<Stopwatch> = LazyLock::new(Stopwatch::start);
     BEGIN.elapsed_ms()
 }

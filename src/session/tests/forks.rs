@@ -3,16 +3,13 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::breakpoints::Condition;
-use super::configuration::estimator_config;
-use super::forks::ForkChanges;
-use super::history::History;
-use super::instants::Instant;
-use super::material::Material;
-use super::memory_tests::tracked;
-use super::run_engine::RunEngine;
-use super::{Command, RunSpec, Session, SessionPlan, SessionRequest, StepRecord};
 use crate::estimator::{JacobianFactor, Phase, StageTimes};
+use crate::session::breakpoints::Condition;
+use crate::session::engine::{History, Instant, Material, RunEngine, estimator_config};
+use crate::session::plan::{ForkChanges, RunSpec, SessionPlan, SessionRequest};
+use crate::session::playback::{Command, Session};
+use crate::session::record::StepRecord;
+use crate::session::tests::memory::tracked;
 use crate::simulation::{SyntheticFlight, SyntheticOptions, synthetic_tracks};
 
 /// A run over a synthetic flight and the way that it took.
@@ -42,7 +39,7 @@ fn flown(spec: &str) -> Flown {
 impl Flown {
     /// Steps of a fork from a step on.
     fn forked(&self, begin: usize, changes: &str) -> Result<Vec<StepRecord>, String> {
-        let changes: ForkChanges = changes.parse().map_err(|error: super::ForkError| error.to_string())?;
+        let changes: ForkChanges = changes.parse().map_err(|error: crate::session::ForkError| error.to_string())?;
         let mut engine = self.history.engine_before(begin).unwrap();
         changes.apply(&mut engine, &self.flight.given_rig, "cam0").map_err(|error| error.to_string())?;
         let materials = (begin..self.steps.len()).map(|step| self.history.materials().get(step).unwrap());

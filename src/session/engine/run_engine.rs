@@ -1,21 +1,21 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use super::forks::Alterations;
-use super::material::Material;
-use super::recording::StepRecord;
+use super::step_inputs::Material;
 use super::stopwatch::Stopwatch;
 use crate::estimator::{Estimator, EstimatorConfig, StepInput, StepReport};
 use crate::frontend::TrackedFrame;
 use crate::gimbal::Chain;
 use crate::observability::{RankReport, analyse};
+use crate::session::plan::Alterations;
+use crate::session::record::StepRecord;
 
 /// Columns of a rigid camera beside the main one: its pose on the IMU.
 const RIGID_COLUMNS: usize = 6;
 
 /// One estimator and the analysis of each of its steps.
 #[derive(Clone, Debug)]
-pub(super) struct RunEngine {
+pub(in crate::session) struct RunEngine {
     estimator: Estimator,
     has_joints: bool,
     joints_free: bool,
@@ -27,7 +27,7 @@ pub(super) struct RunEngine {
 
 impl RunEngine {
     /// A fresh estimator.
-    pub(super) fn new(config: EstimatorConfig, keep_linearization_every: Option<usize>) -> Self {
+    pub(in crate::session) fn new(config: EstimatorConfig, keep_linearization_every: Option<usize>) -> Self {
         let has_joints = !config.chain.links.is_empty();
         let joints_free = has_joints && !config.use_encoder;
         let estimator = Estimator::new(config);
@@ -35,28 +35,28 @@ impl RunEngine {
     }
 
     /// The estimator, to be changed between two steps.
-    pub(super) fn estimator_mut(&mut self) -> &mut Estimator {
+    pub(in crate::session) fn estimator_mut(&mut self) -> &mut Estimator {
         &mut self.estimator
     }
 
     /// Number of cameras that it watches.
-    pub(super) fn cameras(&self) -> usize {
+    pub(in crate::session) fn cameras(&self) -> usize {
         1 + self.estimator.config().rigid_cameras.len()
     }
 
     /// Keys of the cameras that it watches, the main one's given.
-    pub(super) fn camera_keys(&self, main: &str) -> Vec<String> {
+    pub(in crate::session) fn camera_keys(&self, main: &str) -> Vec<String> {
         let rigid = self.estimator.config().rigid_cameras.iter().map(|camera| camera.key.clone());
         std::iter::once(main.to_owned()).chain(rigid).collect()
     }
 
     /// From now on it alters its measurements.
-    pub(super) fn alter(&mut self, alterations: Alterations) {
+    pub(in crate::session) fn alter(&mut self, alterations: Alterations) {
         self.alterations.add(alterations);
     }
 
     /// The images of one instant through the estimator and the observability analysis.
-    pub(super) fn step(&mut self, material: &Material) -> StepRecord {
+    pub(in crate::session) fn step(&mut self, material: &Material) -> StepRecord {
         let watch = Stopwatch::start();
         let mut report = self.estimate(material);
         let estimated_ms = watch.elapsed_ms();
@@ -75,7 +75,7 @@ impl RunEngine {
     }
 
     /// The same step without a look at its observability: the estimator ends in the same state.
-    pub(super) fn pass(&mut self, material: &Material) {
+    pub(in crate::session) fn pass(&mut self, material: &Material) {
         let keep = self.estimator.config().options.keep_linearization;
         self.estimator.set_keep_linearization(false);
         drop(self.estimate(material));
@@ -83,12 +83,12 @@ impl RunEngine {
     }
 
     /// Most steps that the solver tries from the next image on.
-    pub(super) fn set_iterations(&mut self, iterations: usize) {
+    pub(in crate::session) fn set_iterations(&mut self, iterations: usize) {
         self.estimator.set_iterations(iterations);
     }
 
     /// How much memory a snapshot of it takes.
-    pub(super) fn bytes(&self) -> usize {
+    pub(in crate::session) fn bytes(&self) -> usize {
         size_of::<Self>() - size_of::<Estimator>() + self.estimator.bytes()
     }
 

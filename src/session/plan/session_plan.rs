@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use thiserror::Error;
 
-use super::spec::{ParameterizationChoice, RunSpec, distinct_labels};
+use super::run_spec::{ParameterizationChoice, RunSpec, distinct_labels};
 use crate::estimator::{EstimatorConfig, rigid_columns};
 use crate::flight_log::{FlightLog, LogError};
 use crate::gimbal::{Chain, Parameterization};
@@ -151,22 +151,25 @@ impl SessionPlan {
 
 /// The cameras that a run watches.
 #[derive(Clone, Debug)]
-pub(super) struct WatchedCameras<'rig> {
+pub(in crate::session) struct WatchedCameras<'rig> {
     /// The one whose image is shown.
-    pub(super) main: &'rig CameraRig,
+    pub(in crate::session) main: &'rig CameraRig,
     /// The rigid one beside it.
-    pub(super) rigid: Option<&'rig CameraRig>,
+    pub(in crate::session) rigid: Option<&'rig CameraRig>,
 }
 
 impl<'rig> WatchedCameras<'rig> {
     /// The main camera, then the other.
-    pub(super) fn iter(&self) -> impl Iterator<Item = &'rig CameraRig> {
+    pub(in crate::session) fn iter(&self) -> impl Iterator<Item = &'rig CameraRig> {
         std::iter::once(self.main).chain(self.rigid)
     }
 }
 
 /// Finds the cameras that a run watches.
-pub(super) fn cameras_of_run<'rig>(rig: &'rig Rig, spec: &RunSpec) -> Result<WatchedCameras<'rig>, SessionError> {
+pub(in crate::session) fn cameras_of_run<'rig>(
+    rig: &'rig Rig,
+    spec: &RunSpec,
+) -> Result<WatchedCameras<'rig>, SessionError> {
     let is_gimballed = |camera: &&CameraRig| camera.mount == CameraMount::Gimbal;
     let gimballed = || "a camera with mount: gimbal".to_owned();
     let rigid = || (rig.cameras.iter().find(|camera| !is_gimballed(camera)), "a camera with mount: static".to_owned());

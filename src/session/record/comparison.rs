@@ -298,8 +298,8 @@ fn yaw_and_position(onto: &RigidTransform, from: &RigidTransform) -> RigidTransf
 
 #[cfg(test)]
 mod tests {
-    use super::super::memory_tests::recorded;
     use super::*;
+    use crate::session::tests::memory::recorded;
     use crate::simulation::{SyntheticFlight, SyntheticOptions, synthetic_tracks};
 
     fn flight() -> SyntheticFlight {

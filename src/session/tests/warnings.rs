@@ -1,9 +1,8 @@
 //! The warnings of a run, over all its steps.
 
-use super::RunRecord;
-use super::forks::ForkChanges;
-use super::memory_tests::recorded;
-use super::run_warnings::warnings_of;
+use crate::session::plan::ForkChanges;
+use crate::session::record::{RunRecord, warnings_of};
+use crate::session::tests::memory::recorded;
 use crate::simulation::{SyntheticOptions, synthetic_tracks};
 
 /// A camera's clock that is 15 ms off is told from some step on, and only in what holds that step.
@@ -11,7 +10,8 @@ use crate::simulation::{SyntheticOptions, synthetic_tracks};
 fn a_warning_is_kept_once_with_its_first_time_and_its_count() {
     let flight = synthetic_tracks(&SyntheticOptions { clock_offsets_s: [0.015, 0.0], ..SyntheticOptions::default() });
     let mut run = recorded(&flight, "auto");
-    let warns = |step: &&std::sync::Arc<super::StepRecord>, message: &String| step.report.warnings.contains(message);
+    let warns =
+        |step: &&std::sync::Arc<crate::session::StepRecord>, message: &String| step.report.warnings.contains(message);
     assert!(!run.warnings.is_empty());
     for warning in &run.warnings {
         let steps: Vec<_> = run.steps.iter().filter(|step| warns(step, &warning.message)).collect();

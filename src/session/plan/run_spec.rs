@@ -220,7 +220,7 @@ fn on_or_off(value: &str) -> Result<bool, String> {
 }
 
 /// Makes the labels of several runs differ, by a number behind the later ones.
-pub(super) fn distinct_labels(specs: &mut [RunSpec]) {
+pub(in crate::session) fn distinct_labels(specs: &mut [RunSpec]) {
     for index in 1..specs.len() {
         let wanted = specs[index].label.clone();
         let mut number = 2;

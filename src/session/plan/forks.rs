@@ -6,14 +6,14 @@ use std::str::FromStr;
 
 use thiserror::Error;
 
-use super::breakpoints::joint_column_name;
-use super::run_engine::RunEngine;
-use super::spec::{ParameterizationChoice, RunSpec};
+use super::run_spec::{ParameterizationChoice, RunSpec};
 use crate::estimator::InterventionError;
 use crate::frontend::{FeatureId, TrackedFrame};
 use crate::geometry::SplitMix64;
 use crate::gimbal::Parameterization;
 use crate::sensors::{JointAngles, Rig};
+use crate::session::breakpoints::joint_column_name;
+use crate::session::engine::RunEngine;
 
 /// What a fork does otherwise than the run that it leaves.
 ///
@@ -242,7 +242,7 @@ impl fmt::Display for ForkChanges {
 
 impl ForkChanges {
     /// The specification of the fork: the parent's with what can be said there.
-    pub(super) fn spec(&self, parent: &RunSpec, time_s: f64) -> RunSpec {
+    pub(in crate::session) fn spec(&self, parent: &RunSpec, time_s: f64) -> RunSpec {
         let parameterization = self.parameterization.unwrap_or(parent.parameterization);
         let name = self.parameterization.map_or(&*parent.label, |choice| choice.name());
         let encoder = parent.encoder && !self.encoder_off;
@@ -250,7 +250,12 @@ impl ForkChanges {
     }
 
     /// Changes the engine of the parent, as it is before the fork's first step; `camera_key` is its main camera's.
-    pub(super) fn apply(&self, engine: &mut RunEngine, rig: &Rig, camera_key: &str) -> Result<(), ForkError> {
+    pub(in crate::session) fn apply(
+        &self,
+        engine: &mut RunEngine,
+        rig: &Rig,
+        camera_key: &str,
+    ) -> Result<(), ForkError> {
         let blind = self.blind(&engine.camera_keys(camera_key))?;
         let estimator = engine.estimator_mut();
         if let Some(choice) = self.parameterization {
@@ -301,7 +306,7 @@ impl ForkChanges {
 
 /// What a run makes of its measurements before it uses them.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Alterations {
+pub(in crate::session) struct Alterations {
     dropped: BTreeSet<u64>,
     /// Numbers of cameras whose tracks are not used.
     blind: BTreeSet<usize>,
@@ -324,7 +329,7 @@ impl Default for Alterations {
 
 impl Alterations {
     /// Adds others, as a fork of a fork has them.
-    pub(super) fn add(&mut self, other: Self) {
+    pub(in crate::session) fn add(&mut self, other: Self) {
         self.dropped.extend(other.dropped);
         self.blind.extend(other.blind);
         self.encoder_off |= other.encoder_off;
@@ -333,12 +338,12 @@ impl Alterations {
     }
 
     /// Whether encoder readings are left out.
-    pub(super) fn encoder_off(&self) -> bool {
+    pub(in crate::session) fn encoder_off(&self) -> bool {
         self.encoder_off
     }
 
     /// The tracks of a camera without what is dropped, `None` where nothing is.
-    pub(super) fn tracks(&self, camera: usize, tracks: &TrackedFrame) -> Option<TrackedFrame> {
+    pub(in crate::session) fn tracks(&self, camera: usize, tracks: &TrackedFrame) -> Option<TrackedFrame> {
         let blind = self.blind.contains(&camera);
         let gone = |id: FeatureId| blind || self.dropped.contains(&id.of_camera(camera).0);
         tracks.features.iter().any(|feature| gone(feature.id)).then(|| {
@@ -349,7 +354,7 @@ impl Alterations {
     }
 
     /// Joint angles with noise, which depends on nothing but the instant and the joint.
-    pub(super) fn joint_angles(&self, angles: &JointAngles, stamp_ns: i64) -> Option<JointAngles> {
+    pub(in crate::session) fn joint_angles(&self, angles: &JointAngles, stamp_ns: i64) -> Option<JointAngles> {
         if self.joint_noise_rad == 0.0 && self.encoder_noise == 1.0 {
             return None;
         }

@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use super::plan::SessionError;
 use super::stopwatch::Stopwatch;
 use crate::flight_log::{FlightLog, FrameStream, LogError, LogWarning, SensorFrame};
 use crate::frontend::{
@@ -12,10 +11,11 @@ use crate::frontend::{
 };
 use crate::gimbal::ClassicalChain;
 use crate::sensors::{CameraMount, Rig};
+use crate::session::plan::SessionError;
 
 /// An image with its tracks.
 #[derive(Clone, Debug)]
-pub(super) struct TrackedSensorFrame {
+pub(in crate::session) struct TrackedSensorFrame {
     /// The sensors' part.
     pub frame: SensorFrame,
     /// The front end's part.
@@ -25,7 +25,7 @@ pub(super) struct TrackedSensorFrame {
 }
 
 /// Reads a camera's stream and tracks its features.
-pub(super) struct CameraTracker {
+pub(in crate::session) struct CameraTracker {
     stream: FrameStream,
     front_end: FrontEnd,
     chain: ClassicalChain,
@@ -40,7 +40,7 @@ const RIGID_MOUNT_SIGMA_RAD: f64 = 0.01;
 
 impl CameraTracker {
     /// Starts at a time of the log.
-    pub(super) fn new(
+    pub(in crate::session) fn new(
         log: Arc<FlightLog>,
         rig: &Rig,
         camera_key: &str,
@@ -60,7 +60,7 @@ impl CameraTracker {
 
     /// The next image with its tracks, `None` at the end of the stream; an image that the front end refuses is left out
     /// with a warning.
-    pub(super) fn next_frame(&mut self) -> Option<TrackedSensorFrame> {
+    pub(in crate::session) fn next_frame(&mut self) -> Option<TrackedSensorFrame> {
         let mut refused = Vec::new();
         loop {
             let mut frame = self.stream.next_frame()?;
@@ -92,7 +92,7 @@ impl CameraTracker {
     }
 
     /// What was wrong with the log behind the last frame.
-    pub(super) fn remaining_warnings(&self) -> &[LogWarning] {
+    pub(in crate::session) fn remaining_warnings(&self) -> &[LogWarning] {
         self.stream.remaining_warnings()
     }
 

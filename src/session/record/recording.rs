@@ -3,17 +3,9 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::RunSpec;
-use super::accuracy::{Alignment, AlignmentSums};
-use super::engine::EngineMessage;
-use super::forks::ForkChanges;
-use super::history::History;
-use super::material::tracks_bytes;
-use super::outline::Thinning;
-use super::plan::SessionPlan;
-use super::retaking::{Retaken, Wish};
-use super::run_warnings::{RunWarning, add_warnings, warnings_of};
 use super::solver_trace::{SolverPosition, SolverTrace};
+use super::summary::Thinning;
+use super::warnings::{RunWarning, add_warnings, warnings_of};
 use crate::estimator::{CalibrationEstimate, InformationGain, StepReport, allocated_bytes, rigid_columns};
 use crate::flight_log::LogWarning;
 use crate::frontend::TrackedFrame;
@@ -21,6 +13,9 @@ use crate::geometry::RigidTransform;
 use crate::gimbal::{Chain, NearestForm, Parameterization};
 use crate::observability::RankReport;
 use crate::sensors::Rig;
+use crate::session::accuracy::{Alignment, AlignmentSums};
+use crate::session::engine::{EngineMessage, History, Retaken, Wish, tracks_bytes};
+use crate::session::plan::{ForkChanges, RunSpec, SessionPlan};
 
 /// One step of one run with what it was computed from.
 #[derive(Clone, Debug)]
@@ -131,7 +126,7 @@ impl RunRecord {
     }
 
     /// A fork of another run before its first own step: the steps up to there are the parent's.
-    pub(super) fn fork(parent: &Self, spec: RunSpec, step: usize, changes: ForkChanges) -> Self {
+    pub(in crate::session) fn fork(parent: &Self, spec: RunSpec, step: usize, changes: ForkChanges) -> Self {
         let stamp_ns = parent.steps.get(step).map_or(0, |step| step.report.stamp_ns);
         let mut fork = Self::new(spec, parent.camera_key.clone());
         fork.origin = Some(ForkOrigin { parent: parent.id, step, stamp_ns, changes });
@@ -156,7 +151,7 @@ impl RunRecord {
     }
 
     /// Takes back the steps after a time; there may be some that another run's speed let it take.
-    pub(super) fn end_at(&mut self, stamp_ns: i64) {
+    pub(in crate::session) fn end_at(&mut self, stamp_ns: i64) {
         let count = self.steps.partition_point(|step| step.report.stamp_ns <= stamp_ns);
         if count == self.steps.len() {
             return;
@@ -171,7 +166,7 @@ impl RunRecord {
     }
 
     /// Whether its last step is the one at a time, or none can come before that time any more.
-    pub(super) fn ends_at(&self, stamp_ns: i64) -> bool {
+    pub(in crate::session) fn ends_at(&self, stamp_ns: i64) -> bool {
         self.steps.last().is_some_and(|step| step.report.stamp_ns >= stamp_ns)
     }
 
@@ -198,7 +193,7 @@ impl RunRecord {
     }
 
     /// Whether the step is there in outline only.
-    pub(super) fn lacks(&self, number: usize) -> bool {
+    pub(in crate::session) fn lacks(&self, number: usize) -> bool {
         self.steps.get(number).is_some_and(|step| step.outlined) && !self.retaken.contains_key(&number)
     }
 
@@ -384,7 +379,7 @@ impl Recording {
     }
 
     /// Adds a run that is to be computed.
-    pub(super) fn add_run(&mut self, mut run: RunRecord) {
+    pub(in crate::session) fn add_run(&mut self, mut run: RunRecord) {
         if run.history.is_none() {
             run.history = Some(Arc::new(History::new(self.memory_budget_bytes)));
         }
@@ -393,7 +388,7 @@ impl Recording {
     }
 
     /// From now on it may take so many bytes; steps that do not fit any more are kept in outline.
-    pub(super) fn set_memory_budget(&mut self, bytes: usize) {
+    pub(in crate::session) fn set_memory_budget(&mut self, bytes: usize) {
         self.memory_budget_bytes = bytes;
         self.share_out_memory();
         self.keep_within_budget();
@@ -454,7 +449,7 @@ impl Recording {
     }
 
     /// Takes back everything after a time.
-    pub(super) fn end_at(&mut self, stamp_ns: i64) {
+    pub(in crate::session) fn end_at(&mut self, stamp_ns: i64) {
         for run in &mut self.runs {
             run.end_at(stamp_ns);
         }
@@ -462,7 +457,7 @@ impl Recording {
     }
 
     /// Takes over what was taken again of a run; the state of the solver is the one at a position.
-    pub(super) fn take_retaken(&mut self, wish: &Wish, retaken: Retaken, position: SolverPosition) {
+    pub(in crate::session) fn take_retaken(&mut self, wish: &Wish, retaken: Retaken, position: SolverPosition) {
         let Some(run) = self.runs.iter_mut().find(|run| run.id == wish.run) else { return };
         match retaken {
             Retaken::Whole(steps) => run.take_again(wish.step, steps),

@@ -1,5 +1,5 @@
-use super::breakpoints::Condition;
-use super::{ForkChanges, RunSpec};
+use crate::session::breakpoints::Condition;
+use crate::session::plan::{ForkChanges, RunSpec};
 
 /// How fast the cursor moves, in log seconds per second.
 #[derive(Clone, Copy, Debug, PartialEq)]

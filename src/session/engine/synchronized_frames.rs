@@ -26,7 +26,7 @@ const BESIDE_MAIN: usize = 1 << 30;
      timeshift_cam_imu in the rig if a clock is off, or let two runs watch one camera each",
     TOGETHER_NS as f64 * 1e-6
 )]
-pub(super) struct NotSynchronized {
+pub(in crate::session) struct NotSynchronized {
     first: String,
     second: String,
     offset_ms: f64,
@@ -35,7 +35,7 @@ pub(super) struct NotSynchronized {
 
 /// What a run is given for one step.
 #[derive(Clone, Debug)]
-pub(super) struct Instant {
+pub(in crate::session) struct Instant {
     /// By camera of the run, the main one's first; at least one is there.
     frames: Vec<Option<Arc<TrackedSensorFrame>>>,
     /// Header stamp since the log began, on the main camera's clock.
@@ -47,7 +47,7 @@ pub(super) struct Instant {
 impl Instant {
     /// An instant of a run that watches one camera.
     #[cfg(test)]
-    pub(super) fn of_one(frame: Arc<TrackedSensorFrame>) -> Self {
+    pub(in crate::session) fn of_one(frame: Arc<TrackedSensorFrame>) -> Self {
         Self { stamp_ns: frame.frame.stamp_ns, frames: vec![Some(frame)], motion: None }
     }
 
@@ -57,48 +57,48 @@ impl Instant {
     }
 
     /// Number of the main camera's image; where it is missing, one that no image has.
-    pub(super) fn frame_index(&self) -> usize {
+    pub(in crate::session) fn frame_index(&self) -> usize {
         let index = self.any().frame.index;
         if self.frames[0].is_some() { index } else { BESIDE_MAIN + index }
     }
 
     /// Header stamp since the log began, on the main camera's clock.
-    pub(super) fn stamp_ns(&self) -> i64 {
+    pub(in crate::session) fn stamp_ns(&self) -> i64 {
         self.stamp_ns
     }
 
     /// Log time since the log began.
-    pub(super) fn log_time_ns(&self) -> i64 {
+    pub(in crate::session) fn log_time_ns(&self) -> i64 {
         self.any().frame.log_time_ns
     }
 
     /// Inertial samples since the instant before.
-    pub(super) fn imu(&self) -> &[ImuSample] {
+    pub(in crate::session) fn imu(&self) -> &[ImuSample] {
         self.motion.as_deref().unwrap_or(&self.any().frame.imu)
     }
 
     /// Encoder angles at the stamp.
-    pub(super) fn joint_angles(&self) -> Option<&JointAngles> {
+    pub(in crate::session) fn joint_angles(&self) -> Option<&JointAngles> {
         self.any().frame.joint_angles.as_ref()
     }
 
     /// True pose of the IMU.
-    pub(super) fn truth(&self) -> Option<RigidTransform> {
+    pub(in crate::session) fn truth(&self) -> Option<RigidTransform> {
         self.any().frame.truth
     }
 
     /// Tracks of a camera of the run, `None` without an image.
-    pub(super) fn tracks(&self, camera: usize) -> Option<&Arc<TrackedFrame>> {
+    pub(in crate::session) fn tracks(&self, camera: usize) -> Option<&Arc<TrackedFrame>> {
         self.frames.get(camera)?.as_ref().map(|tracked| &tracked.tracks)
     }
 
     /// Number of cameras that the run watches.
-    pub(super) fn cameras(&self) -> usize {
+    pub(in crate::session) fn cameras(&self) -> usize {
         self.frames.len()
     }
 
     /// What the front ends of all its images took.
-    pub(super) fn frontend_ms(&self) -> f64 {
+    pub(in crate::session) fn frontend_ms(&self) -> f64 {
         self.frames.iter().flatten().map(|tracked| tracked.frontend_ms).sum()
     }
 }
@@ -130,7 +130,7 @@ impl CameraImages {
 
 /// The instants of a run in time order.
 #[derive(Debug)]
-pub(super) struct Instants {
+pub(in crate::session) struct Instants {
     cameras: Vec<CameraImages>,
     /// Inertial sample at the end of the last instant.
     end: Option<ImuSample>,
@@ -140,7 +140,9 @@ pub(super) struct Instants {
 
 impl Instants {
     /// From the images of the run's cameras by their keys, the main camera's first.
-    pub(super) fn new(cameras: impl IntoIterator<Item = (String, Receiver<Arc<TrackedSensorFrame>>)>) -> Self {
+    pub(in crate::session) fn new(
+        cameras: impl IntoIterator<Item = (String, Receiver<Arc<TrackedSensorFrame>>)>,
+    ) -> Self {
         let cameras = cameras
             .into_iter()
             .map(|(key, images)| CameraImages { key, images, next: None, ended: false, lone_ns: Vec::new() })
@@ -149,7 +151,7 @@ impl Instants {
     }
 
     /// Waits for the next instant, `None` at the end of all streams.
-    pub(super) fn next(&mut self) -> Result<Option<Instant>, NotSynchronized> {
+    pub(in crate::session) fn next(&mut self) -> Result<Option<Instant>, NotSynchronized> {
         self.cameras.iter_mut().for_each(CameraImages::wait);
         let Some(first_ns) = self.cameras.iter().filter_map(CameraImages::next_ns).min() else { return Ok(None) };
         let mut frames = Vec::with_capacity(self.cameras.len());

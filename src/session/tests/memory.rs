@@ -2,18 +2,14 @@
 
 use std::sync::Arc;
 
-use super::RunRecord;
-use super::configuration::estimator_config;
-use super::instants::Instant;
-use super::material::Material;
-use super::run_engine::RunEngine;
-use super::tracker::TrackedSensorFrame;
 use crate::estimator::{ColumnGroup, Phase};
 use crate::flight_log::SensorFrame;
 use crate::sensors::{GrayImage, JointAngles};
+use crate::session::engine::{Instant, Material, RunEngine, TrackedSensorFrame, estimator_config};
+use crate::session::record::RunRecord;
 use crate::simulation::{SyntheticFlight, SyntheticFrame, SyntheticOptions, synthetic_tracks};
 
-pub(super) fn tracked(frame: &SyntheticFrame, encoder_sigma_rad: f64) -> TrackedSensorFrame {
+pub(in crate::session) fn tracked(frame: &SyntheticFrame, encoder_sigma_rad: f64) -> TrackedSensorFrame {
     let joint_angles = frame.joint_angles_rad.as_ref().map(|angles_rad| JointAngles {
         angles_rad: angles_rad.clone(),
         sigmas_rad: vec![encoder_sigma_rad; angles_rad.len()],
@@ -36,13 +32,13 @@ pub(super) fn tracked(frame: &SyntheticFrame, encoder_sigma_rad: f64) -> Tracked
     }
 }
 
-pub(super) fn recorded(flight: &SyntheticFlight, spec: &str) -> RunRecord {
+pub(in crate::session) fn recorded(flight: &SyntheticFlight, spec: &str) -> RunRecord {
     recorded_with(flight, spec, None)
 }
 
 /// Keeps the linearization of one report in so many frames.
 fn recorded_with(flight: &SyntheticFlight, spec: &str, keep_linearization_every: Option<usize>) -> RunRecord {
-    let spec: super::RunSpec = spec.parse().unwrap();
+    let spec: crate::session::RunSpec = spec.parse().unwrap();
     let config = estimator_config(&flight.given_rig, &spec).unwrap();
     let sigma_rad = config.encoder_sigma_rad.unwrap();
     let mut engine = RunEngine::new(config, keep_linearization_every);

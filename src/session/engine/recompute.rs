@@ -5,15 +5,15 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{Builder, JoinHandle};
 
 use super::history::History;
-use super::plan::SessionError;
-use super::recording::StepRecord;
+use crate::session::plan::SessionError;
+use crate::session::record::StepRecord;
 
 /// Steps up to a wanted one that are taken again with it, because people step back.
-pub(super) const STEPS_AT_ONCE: usize = 32;
+pub(in crate::session) const STEPS_AT_ONCE: usize = 32;
 
 /// What of a step is wanted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Detail {
+pub(in crate::session) enum Detail {
     /// Everything that it left.
     Whole,
     /// The states that the solver went through.
@@ -22,17 +22,17 @@ pub(super) enum Detail {
 
 /// A step to be taken again.
 #[derive(Clone, Debug)]
-pub(super) struct Wish {
-    /// [`RunRecord::id`](super::RunRecord::id).
-    pub(super) run: u64,
+pub(in crate::session) struct Wish {
+    /// [`RunRecord::id`](crate::session::RunRecord::id).
+    pub(in crate::session) run: u64,
     /// How the run came there.
-    pub(super) history: Arc<History>,
+    pub(in crate::session) history: Arc<History>,
     /// Number of the step.
-    pub(super) step: usize,
+    pub(in crate::session) step: usize,
     /// What of it.
-    pub(super) detail: Detail,
+    pub(in crate::session) detail: Detail,
     /// Whether nobody looks at it yet: it is left when something else is wanted.
-    pub(super) ahead: bool,
+    pub(in crate::session) ahead: bool,
 }
 
 impl PartialEq for Wish {
@@ -43,7 +43,7 @@ impl PartialEq for Wish {
 
 /// What has been taken again.
 #[derive(Debug)]
-pub(super) enum Retaken {
+pub(in crate::session) enum Retaken {
     /// Steps with their numbers.
     Whole(Vec<(usize, StepRecord)>),
     /// The states of one step.
@@ -87,14 +87,16 @@ impl Shared {
 
 /// The thread; dropping it ends it after the wish that it works on.
 #[derive(Debug)]
-pub(super) struct Retaking {
+pub(in crate::session) struct Retaking {
     shared: Arc<Shared>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Retaking {
     /// Starts the thread, which hands over what it has taken again.
-    pub(super) fn start(mut deliver: impl FnMut(&Wish, Retaken) + Send + 'static) -> Result<Self, SessionError> {
+    pub(in crate::session) fn start(
+        mut deliver: impl FnMut(&Wish, Retaken) + Send + 'static,
+    ) -> Result<Self, SessionError> {
         let shared = Arc::new(Shared::default());
         let seen = Arc::clone(&shared);
         let work = move || {
@@ -127,7 +129,7 @@ impl Retaking {
     }
 
     /// From now on these are wanted, in this order, and nothing else.
-    pub(super) fn want(&self, wishes: Vec<Wish>) {
+    pub(in crate::session) fn want(&self, wishes: Vec<Wish>) {
         let mut queue = self.shared.lock();
         queue.waiting.clear();
         let mut working_wanted = false;
@@ -147,12 +149,12 @@ impl Retaking {
     }
 
     /// Waits until everything that somebody looks at has been handed over.
-    pub(super) fn settle(&self) {
+    pub(in crate::session) fn settle(&self) {
         drop(self.shared.changed.wait_while(self.shared.lock(), |queue| !queue.closed && queue.is_looked_for()));
     }
 
     /// Whether something is being taken again that somebody looks at.
-    pub(super) fn is_busy(&self) -> bool {
+    pub(in crate::session) fn is_busy(&self) -> bool {
         self.shared.lock().is_looked_for()
     }
 }

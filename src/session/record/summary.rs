@@ -14,7 +14,7 @@ impl StepRecord {
     /// columns belong to.
     ///
     /// Everything that is plotted over time or written into tables stays; events, χ², iterations, calibration, ranks.
-    pub(super) fn outline(&self, number: usize) -> Self {
+    pub(in crate::session) fn outline(&self, number: usize) -> Self {
         let report = &self.report;
         let keeps_landmarks = number.is_multiple_of(LANDMARKS_EVERY);
         let keeps_window = report.linearization.is_some();
@@ -59,7 +59,7 @@ impl StepRecord {
 /// Which steps of a run are kept in outline: those that are the quickest to take again first, right behind a snapshot,
 /// all over the run.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Thinning {
+pub(in crate::session) struct Thinning {
     /// Steps between two snapshots when the order was made.
     spacing: usize,
     /// By distance from the snapshot, the next step to be outlined.
@@ -68,7 +68,7 @@ pub(super) struct Thinning {
 
 impl Thinning {
     /// The step that is to be outlined next, `None` when only spared ones are left.
-    pub(super) fn next_victim(&mut self, begin: usize, steps: usize, spacing: usize) -> Option<usize> {
+    pub(in crate::session) fn next_victim(&mut self, begin: usize, steps: usize, spacing: usize) -> Option<usize> {
         if self.spacing != spacing {
             self.spacing = spacing;
             let first = begin - begin % spacing;

@@ -6,10 +6,10 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use super::material::{Material, Materials};
-use super::recording::StepRecord;
 use super::run_engine::RunEngine;
+use super::step_inputs::{Material, Materials};
 use crate::estimator::FactorRows;
+use crate::session::record::StepRecord;
 
 /// Steps between two snapshots while there is room for all of them.
 const CLOSEST_SPACING: usize = 16;
@@ -48,12 +48,12 @@ struct Snapshots {
 
 impl History {
     /// A run from the begin of the log; snapshots may take so many bytes together.
-    pub(super) fn new(budget_bytes: usize) -> Self {
+    pub(in crate::session) fn new(budget_bytes: usize) -> Self {
         Self::with(Arc::default(), 0, None, budget_bytes)
     }
 
     /// A run that leaves another one before its step `begin`.
-    pub(super) fn fork(parent: &Arc<Self>, begin: usize, budget_bytes: usize) -> Self {
+    pub(in crate::session) fn fork(parent: &Arc<Self>, begin: usize, budget_bytes: usize) -> Self {
         Self::with(Arc::clone(&parent.materials), begin, Some(Arc::clone(parent)), budget_bytes)
     }
 
@@ -64,12 +64,12 @@ impl History {
     }
 
     /// What the steps were given.
-    pub(super) fn materials(&self) -> &Arc<Materials> {
+    pub(in crate::session) fn materials(&self) -> &Arc<Materials> {
         &self.materials
     }
 
     /// Number of the first step that is this run's own.
-    pub(super) fn begin(&self) -> usize {
+    pub(in crate::session) fn begin(&self) -> usize {
         self.begin
     }
 
@@ -79,7 +79,7 @@ impl History {
     }
 
     /// Notes what the engine is about to do, and keeps a snapshot of it where one is due.
-    pub(super) fn before_step(&self, step: usize, engine: &RunEngine, material: &Material) {
+    pub(in crate::session) fn before_step(&self, step: usize, engine: &RunEngine, material: &Material) {
         let mut snapshots = self.lock();
         if self.parent.is_none() {
             snapshots.material_bytes += material.own_bytes();
@@ -94,14 +94,14 @@ impl History {
     }
 
     /// From now on snapshots may take so many bytes together.
-    pub(super) fn set_budget(&self, budget_bytes: usize) {
+    pub(in crate::session) fn set_budget(&self, budget_bytes: usize) {
         let mut snapshots = self.lock();
         snapshots.budget_bytes = budget_bytes;
         snapshots.keep_within_budget(self.begin);
     }
 
     /// Steps between two snapshots.
-    pub(super) fn spacing(&self) -> usize {
+    pub(in crate::session) fn spacing(&self) -> usize {
         self.lock().spacing
     }
 
@@ -112,13 +112,13 @@ impl History {
     }
 
     /// Bytes of snapshots and material.
-    pub(super) fn bytes(&self) -> usize {
+    pub(in crate::session) fn bytes(&self) -> usize {
         let snapshots = self.lock();
         snapshots.bytes + snapshots.material_bytes
     }
 
     /// The engine as it was before a step, `None` for a step that has not been taken.
-    pub(super) fn engine_before(&self, step: usize) -> Option<RunEngine> {
+    pub(in crate::session) fn engine_before(&self, step: usize) -> Option<RunEngine> {
         if step < self.begin {
             return self.parent.as_ref()?.engine_before(step);
         }
@@ -138,12 +138,12 @@ impl History {
 
     /// Takes the steps up to `last` again from the snapshot before it, and returns the last `most` of them with their
     /// numbers; empty for a step that has not been taken.
-    pub(super) fn retake(&self, last: usize, most: usize) -> Vec<(usize, StepRecord)> {
+    pub(in crate::session) fn retake(&self, last: usize, most: usize) -> Vec<(usize, StepRecord)> {
         self.retake_while(last, most, &|| true).unwrap_or_default()
     }
 
     /// The same as long as somebody wants it, else `None`.
-    pub(super) fn retake_while(
+    pub(in crate::session) fn retake_while(
         &self,
         last: usize,
         most: usize,
@@ -180,7 +180,7 @@ impl History {
 
     /// The states that the solver went through in a step, as reports of their own: before its first iteration, after it,
     /// after the second, and so on to the last, which is the step itself.
-    pub(super) fn iterations(&self, step: usize) -> Vec<StepRecord> {
+    pub(in crate::session) fn iterations(&self, step: usize) -> Vec<StepRecord> {
         let (Some(engine), Some(material)) = (self.engine_before(step), self.materials.get(step)) else {
             return Vec::new();
         };

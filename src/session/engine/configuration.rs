@@ -1,11 +1,10 @@
 //! From a rig and a run specification to an estimator's configuration.
 
-use super::plan::{SessionError, WatchedCameras, cameras_of_run};
-use super::spec::{ParameterizationChoice, RunSpec};
 use super::stopwatch::clock_ms;
 use crate::estimator::{EstimatorConfig, EstimatorOptions, RigidCamera};
 use crate::gimbal::{Parameterization, auto_parameterization};
 use crate::sensors::{CameraMount, CameraRig, ChainPrior, Rig};
+use crate::session::plan::{ParameterizationChoice, RunSpec, SessionError, WatchedCameras, cameras_of_run};
 
 /// How wrong a rigid camera's pose on the IMU may be when the rig has no prior: a target calibration is better than this.
 const RIGID_CAMERA_PRIOR: ChainPrior = ChainPrior { translation_bound_m: 0.01, rotation_bound_rad: 0.0175 };
@@ -14,7 +13,7 @@ const RIGID_CAMERA_PRIOR: ChainPrior = ChainPrior { translation_bound_m: 0.01, r
 const SIGMA_PER_BOUND: f64 = 0.577_350_269_189_625_8;
 
 /// How wrong the rig may be about how a camera is carried.
-pub(super) fn mount_prior(rig: &Rig, camera: &CameraRig) -> ChainPrior {
+pub(in crate::session) fn mount_prior(rig: &Rig, camera: &CameraRig) -> ChainPrior {
     match (&rig.gimbal, &camera.mount) {
         (Some(gimbal), CameraMount::Gimbal) => gimbal.prior,
         // The rigid camera of a gimbal rig was calibrated with the same care as its gimbal, but never better than a
@@ -28,7 +27,7 @@ pub(super) fn mount_prior(rig: &Rig, camera: &CameraRig) -> ChainPrior {
 }
 
 /// The estimator that a run asks for.
-pub(super) fn estimator_config(rig: &Rig, spec: &RunSpec) -> Result<EstimatorConfig, SessionError> {
+pub(in crate::session) fn estimator_config(rig: &Rig, spec: &RunSpec) -> Result<EstimatorConfig, SessionError> {
     let WatchedCameras { main: camera, rigid } = cameras_of_run(rig, spec)?;
     let chain = rig.chain_of_camera(&camera.key).unwrap_or_default();
     let gimbal = rig.gimbal.as_ref().filter(|_| camera.mount == CameraMount::Gimbal);

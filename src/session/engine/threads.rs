@@ -12,13 +12,13 @@ use std::thread::{Builder, JoinHandle};
 
 use super::configuration::estimator_config;
 use super::history::History;
-use super::instants::Instants;
-use super::material::Material;
-use super::plan::{SessionError, SessionPlan, cameras_of_run};
-use super::recording::{Recording, StepRecord};
 use super::run_engine::RunEngine;
+use super::step_inputs::Material;
+use super::synchronized_frames::Instants;
 use super::tracker::{CameraTracker, TrackedSensorFrame};
 use crate::flight_log::LogWarning;
+use crate::session::plan::{SessionError, SessionPlan, cameras_of_run};
+use crate::session::record::{Recording, StepRecord};
 
 /// Frames that may wait between the tracker and an estimator.
 const QUEUED_FRAMES: usize = 8;
@@ -48,7 +48,7 @@ pub enum EngineMessage {
 
 /// Running threads; dropping it stops them.
 #[derive(Debug)]
-pub(super) struct Engine {
+pub(in crate::session) struct Engine {
     sender: Option<SyncSender<EngineMessage>>,
     receiver: Option<Receiver<EngineMessage>>,
     cancelled: Arc<AtomicBool>,
@@ -69,14 +69,14 @@ impl Default for Engine {
 
 impl Engine {
     /// Starts every run of the plan; each keeps its way in the history of its record.
-    pub(super) fn start(plan: &SessionPlan, recording: &Recording) -> Result<Self, SessionError> {
+    pub(in crate::session) fn start(plan: &SessionPlan, recording: &Recording) -> Result<Self, SessionError> {
         let mut engine = Self::default();
         engine.start_runs(plan, recording, &(0..plan.runs.len()).collect::<Vec<_>>())?;
         Ok(engine)
     }
 
     /// Starts the given runs of the plan from the begin of the log; runs that watch the same camera share one tracker.
-    pub(super) fn start_runs(
+    pub(in crate::session) fn start_runs(
         &mut self,
         plan: &SessionPlan,
         recording: &Recording,
@@ -116,7 +116,7 @@ impl Engine {
     }
 
     /// Starts a fork from an engine as it is before the first step of its history.
-    pub(super) fn start_fork(
+    pub(in crate::session) fn start_fork(
         &mut self,
         run: usize,
         engine: RunEngine,
@@ -131,17 +131,17 @@ impl Engine {
     }
 
     /// Lets go of the engine's own end of the channel: once all runs are done, [`Engine::receive`] returns `None`.
-    pub(super) fn no_more_runs(&mut self) {
+    pub(in crate::session) fn no_more_runs(&mut self) {
         self.sender = None;
     }
 
     /// Takes the receiving end, for a collecting thread of one's own.
-    pub(super) fn take_receiver(&mut self) -> Option<Receiver<EngineMessage>> {
+    pub(in crate::session) fn take_receiver(&mut self) -> Option<Receiver<EngineMessage>> {
         self.receiver.take()
     }
 
     /// The next message; waits for it. `None` when every thread has ended.
-    pub(super) fn receive(&self) -> Option<EngineMessage> {
+    pub(in crate::session) fn receive(&self) -> Option<EngineMessage> {
         self.receiver.as_ref().and_then(|receiver| receiver.recv().ok())
     }
 }

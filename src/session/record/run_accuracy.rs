@@ -1,11 +1,11 @@
 //! How well a run did against the truth: its trajectory and its chain.
 
-use super::accuracy::{
-    Alignment, ErrorStatistics, RelativeDelta, StampedPose, absolute_errors_m, align, path_length_m, relative_errors,
-};
 use super::recording::RunRecord;
 use crate::geometry::{seconds_from_ns, so3};
 use crate::gimbal::ClassicalChain;
+use crate::session::accuracy::{
+    Alignment, ErrorStatistics, RelativeDelta, StampedPose, absolute_errors_m, align, path_length_m, relative_errors,
+};
 
 /// Stretches over which the relative error is given, in metres.
 pub const RELATIVE_LENGTHS_M: [f64; 3] = [5.0, 10.0, 25.0];

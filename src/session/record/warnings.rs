@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::StepRecord;
+use super::recording::StepRecord;
 use crate::estimator::StepReport;
 
 /// A warning in one wording, over all the steps that gave it.
@@ -17,7 +17,7 @@ pub struct RunWarning {
 }
 
 /// The warnings of a run's steps in the order in which they first came.
-pub(super) fn warnings_of(steps: &[Arc<StepRecord>]) -> Vec<RunWarning> {
+pub(in crate::session) fn warnings_of(steps: &[Arc<StepRecord>]) -> Vec<RunWarning> {
     let mut warnings = Vec::new();
     for step in steps {
         add_warnings(&mut warnings, &step.report);
@@ -26,7 +26,7 @@ pub(super) fn warnings_of(steps: &[Arc<StepRecord>]) -> Vec<RunWarning> {
 }
 
 /// Adds what one more step warns of.
-pub(super) fn add_warnings(warnings: &mut Vec<RunWarning>, report: &StepReport) {
+pub(in crate::session) fn add_warnings(warnings: &mut Vec<RunWarning>, report: &StepReport) {
     for message in &report.warnings {
         match warnings.iter_mut().find(|known| known.message == *message) {
             Some(known) => known.steps += 1,

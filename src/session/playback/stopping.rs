@@ -2,26 +2,26 @@
 
 use std::sync::Arc;
 
-use super::breakpoints::{Breakpoints, Condition, Hit};
-use super::playback::Session;
-use super::recording::Recording;
+use super::session::Session;
+use crate::session::breakpoints::{Breakpoints, Condition, Hit};
+use crate::session::record::Recording;
 
 impl Session {
     /// Evaluates the breakpoints over the steps that are new.
-    pub(super) fn evaluate_breakpoints(&mut self) {
+    pub(in crate::session) fn evaluate_breakpoints(&mut self) {
         let recording = self.recording();
         if self.breakpoints.is_behind(&recording) {
             Arc::make_mut(&mut self.breakpoints).read(&recording);
         }
     }
 
-    pub(super) fn change_breakpoints(&mut self, change: impl FnOnce(&mut Breakpoints)) {
+    pub(in crate::session) fn change_breakpoints(&mut self, change: impl FnOnce(&mut Breakpoints)) {
         change(Arc::make_mut(&mut self.breakpoints));
         self.evaluate_breakpoints();
     }
 
     /// A breakpoint at the frame of the cursor, or none there any more.
-    pub(super) fn toggle_breakpoint_here(&mut self) {
+    pub(in crate::session) fn toggle_breakpoint_here(&mut self) {
         let recording = self.recording();
         let here = recording.runs.iter().find_map(|run| run.step_at(self.cursor_ns));
         let text = here.map(|step| format!("frame == {}", step.report.frame_index));
@@ -31,7 +31,7 @@ impl Session {
     }
 
     /// To the next or the previous hit.
-    pub(super) fn run_to_breakpoint(&mut self, forward: bool) {
+    pub(in crate::session) fn run_to_breakpoint(&mut self, forward: bool) {
         self.playing = false;
         self.evaluate_breakpoints();
         let recording = self.recording();
@@ -56,7 +56,7 @@ impl Session {
     }
 
     /// Goes on to where the estimators are, until a breakpoint is hit or the log ends.
-    pub(super) fn run_on(&mut self) {
+    pub(in crate::session) fn run_on(&mut self) {
         let recording = self.recording();
         if let Some(hit) = self.breakpoints.next_after(&recording, self.cursor_ns) {
             self.stop_at(&recording, hit);
@@ -70,7 +70,7 @@ impl Session {
     }
 
     /// A cursor that played over a hit stops there.
-    pub(super) fn stop_at_breakpoint(&mut self, before_ns: i64) {
+    pub(in crate::session) fn stop_at_breakpoint(&mut self, before_ns: i64) {
         let recording = self.recording();
         let hit = self.breakpoints.next_after(&recording, before_ns);
         if let Some(hit) = hit.filter(|hit| hit.stamp_ns <= self.cursor_ns) {

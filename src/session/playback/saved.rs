@@ -7,11 +7,10 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::breakpoints::Condition;
-use super::forks::ForkChanges;
-use super::plan::{SessionError, SessionPlan, SessionRequest};
-use super::playback::Session;
-use super::spec::RunSpec;
+use super::command::Command;
+use super::session::Session;
+use crate::session::breakpoints::Condition;
+use crate::session::plan::{ForkChanges, RunSpec, SessionError, SessionPlan, SessionRequest};
 
 /// The format that this program writes.
 const VERSION: u32 = 1;
@@ -174,9 +173,9 @@ fn part(error: impl ToString) -> SavedSessionError {
 
 /// What a session that was opened from a file still has to do, once the runs have come there.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Pending {
-    pub(super) forks: Vec<(SavedFork, ForkChanges)>,
-    pub(super) cursor_ns: Option<i64>,
+pub(in crate::session) struct Pending {
+    pub(in crate::session) forks: Vec<(SavedFork, ForkChanges)>,
+    pub(in crate::session) cursor_ns: Option<i64>,
 }
 
 impl Session {
@@ -237,7 +236,7 @@ impl Session {
     }
 
     /// Makes the forks whose parents have come to where they left them, and puts the cursor where it was.
-    pub(super) fn resume(&mut self) {
+    pub(in crate::session) fn resume(&mut self) {
         let recording = self.recording();
         if let Some((fork, changes)) = self.pending.forks.first().cloned() {
             let parent = recording.runs.iter().position(|run| run.spec.label == fork.parent);
@@ -261,7 +260,7 @@ impl Session {
             && (recording.computed_ns() >= cursor_ns || recording.runs.iter().all(|run| run.finished))
         {
             self.pending.cursor_ns = None;
-            self.perform(super::Command::Seek { stamp_ns: cursor_ns });
+            self.perform(Command::Seek { stamp_ns: cursor_ns });
         }
     }
 }
@@ -291,7 +290,6 @@ mod tests {
 
     #[test]
     fn a_session_comes_back_as_it_was_saved() {
-        use super::super::Command;
         // More steps than are spared when memory runs short.
         let mut session = Session::start(garden(4.5)).unwrap();
         settled(&mut session);
@@ -324,7 +322,7 @@ mod tests {
         assert!(thin.memory_budget_bytes == 1 << 20 && thin.memory_bytes() < after.memory_bytes());
         assert!(thin.runs[0].memory.outlined > 0);
         for (before, after) in before.runs.iter().zip(&after.runs) {
-            let newest = |run: &super::super::RunRecord| run.steps.last().unwrap().report.window.clone();
+            let newest = |run: &crate::session::RunRecord| run.steps.last().unwrap().report.window.clone();
             assert_eq!(newest(before), newest(after));
         }
     }

@@ -1,0 +1,4 @@
+mod forks;
+pub(super) mod memory;
+mod plan;
+mod warnings;
