@@ -12,7 +12,8 @@ use crate::estimator::initialization::startup::WaitingFrame;
 use crate::estimator::state::calibration::{Calibration, FreeClocks, GivenSigmas};
 use crate::estimator::state::calibrations::{Calibrations, MAIN};
 use crate::estimator::window::contradictions::Contradictions;
-use crate::estimator::window::frames::{FeatureMap, Frame};
+use crate::estimator::window::features::FeatureMap;
+use crate::estimator::window::frames::Frame;
 use crate::estimator::window::standstill::RestWatch;
 use crate::geometry::{RigidTransform, seconds_from_ns};
 use crate::gimbal::{ClassicalChain, Parameterization};
@@ -197,7 +198,7 @@ impl Estimator {
         report
     }
 
-    pub(super) fn newest_state(&self) -> &super::window::frames::FrameState {
+    pub(super) fn newest_state(&self) -> &super::state::frame_state::FrameState {
         &self.frames.last().expect("a running window has frames").state
     }
 

@@ -5,7 +5,7 @@ use thiserror::Error;
 
 use super::estimator::Estimator;
 use crate::estimator::state::calibrations::MAIN;
-use crate::estimator::window::frames::FeatureMap;
+use crate::estimator::window::features::FeatureMap;
 use crate::frontend::FeatureId;
 use crate::gimbal::Parameterization;
 

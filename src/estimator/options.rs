@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use crate::estimator::factors::preintegration::ImuBias;
+use crate::estimator::state::navigation::ImuBias;
 
 /// How the squared whitened residuals of the visual factors grow.
 #[derive(Clone, Copy, Debug, PartialEq)]

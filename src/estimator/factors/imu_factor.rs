@@ -2,7 +2,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::preintegration::{Matrix15, NavigationState, Preintegration, Vector15};
+use super::preintegration::Preintegration;
+use crate::estimator::state::navigation::{Matrix15, NavigationState, Vector15};
 use crate::geometry::so3;
 
 /// Residual `[φ, p, v, b_g, b_a]` of two states against the samples between them (Eq. 8's inertial term), not whitened.

@@ -6,62 +6,12 @@
 
 use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
 
+pub use crate::estimator::state::navigation::{ImuBias, Matrix15, NavigationState, Vector15};
 use crate::geometry::{RigidTransform, seconds_from_ns, so3};
 use crate::sensors::{ImuNoise, ImuSample};
 
-/// 15 × 15, ordered `[φ, p, v, b_g, b_a]`.
-pub type Matrix15 = SMatrix<f64, 15, 15>;
-/// 15, ordered `[φ, p, v, b_g, b_a]`.
-pub type Vector15 = SVector<f64, 15>;
 /// Derivative of `[φ, p, v]` by `[b_g, b_a]`.
 pub type BiasJacobian = SMatrix<f64, 9, 6>;
-
-/// Biases of the inertial sensor: what it shows beyond the truth.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ImuBias {
-    /// Of the gyroscope, in rad/s.
-    pub gyroscope_rad_per_s: Vector3<f64>,
-    /// Of the accelerometer, in m/s².
-    pub accelerometer_m_per_s2: Vector3<f64>,
-}
-
-/// Where the vehicle is, how it moves and what its inertial sensor adds.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct NavigationState {
-    /// Pose.
-    pub world_from_imu: RigidTransform,
-    /// Velocity in the world, in m/s.
-    pub velocity_m_per_s: Vector3<f64>,
-    /// Biases.
-    pub bias: ImuBias,
-}
-
-impl NavigationState {
-    /// `x ⊞ [φ, p, v, b_g, b_a]`.
-    #[must_use]
-    pub fn plus(&self, delta: &Vector15) -> Self {
-        Self {
-            world_from_imu: self.world_from_imu.plus(&delta.fixed_rows::<6>(0).into_owned()),
-            velocity_m_per_s: self.velocity_m_per_s + delta.fixed_rows::<3>(6),
-            bias: ImuBias {
-                gyroscope_rad_per_s: self.bias.gyroscope_rad_per_s + delta.fixed_rows::<3>(9),
-                accelerometer_m_per_s2: self.bias.accelerometer_m_per_s2 + delta.fixed_rows::<3>(12),
-            },
-        }
-    }
-
-    /// `self ⊟ origin`.
-    pub fn minus(&self, origin: &Self) -> Vector15 {
-        let mut delta = Vector15::zeros();
-        delta.fixed_rows_mut::<6>(0).copy_from(&self.world_from_imu.minus(&origin.world_from_imu));
-        delta.fixed_rows_mut::<3>(6).copy_from(&(self.velocity_m_per_s - origin.velocity_m_per_s));
-        delta.fixed_rows_mut::<3>(9).copy_from(&(self.bias.gyroscope_rad_per_s - origin.bias.gyroscope_rad_per_s));
-        delta
-            .fixed_rows_mut::<3>(12)
-            .copy_from(&(self.bias.accelerometer_m_per_s2 - origin.bias.accelerometer_m_per_s2));
-        delta
-    }
-}
 
 /// Motion of the IMU over an interval, seen in its frame at the beginning, gravity and the first velocity left out.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,10 +27,13 @@ pub struct MotionIncrement {
 /// An axis that shows the same value so often, and one as large as [`LEAST_SATURATED_RAD_PER_S`] or
 /// [`LEAST_SATURATED_M_PER_S2`], is at the end of its range: noise never repeats a value of full resolution.
 const SATURATED_REPEATS: u8 = 3;
+
 /// Slower turns are in every sensor's range.
 const LEAST_SATURATED_RAD_PER_S: f64 = 0.5;
+
 /// Every sensor's range reaches beyond gravity.
 const LEAST_SATURATED_M_PER_S2: f64 = 12.0;
+
 /// Noise density of an axis at the end of its range, as a share of what it shows, in √s: the truth lies beyond by about
 /// half of it (standard deviation) for about a tenth of a second.
 const SATURATED_DENSITY: f64 = 0.16;

@@ -5,9 +5,9 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::dense;
-use super::preintegration::ImuBias;
+use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::state::layout::{Layout, POSE};
-use crate::estimator::window::frames::FrameState;
+use crate::estimator::state::navigation::ImuBias;
 
 /// Which unknown a column of the prior stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

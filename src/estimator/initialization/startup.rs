@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use nalgebra::{DMatrix, DVector, UnitQuaternion, Vector3};
 
 use crate::estimator::estimator::Estimator;
-use crate::estimator::factors::preintegration::{NavigationState, Preintegration};
+use crate::estimator::factors::preintegration::Preintegration;
 use crate::estimator::factors::prior::StartPrior;
 use crate::estimator::initialization::{
     InitializationFrame, InitializationInput, InitializationOptions, InitializationOrigin, InitializationOutcome,
@@ -13,7 +13,9 @@ use crate::estimator::initialization::{
 };
 use crate::estimator::state::calibration::Calibration;
 use crate::estimator::state::calibrations::MAIN;
-use crate::estimator::window::frames::{Frame, FrameState, Rates};
+use crate::estimator::state::frame_state::{FrameState, Rates};
+use crate::estimator::state::navigation::NavigationState;
+use crate::estimator::window::frames::Frame;
 use crate::estimator::window::joints::UNKNOWN_TURN_RAD;
 use crate::estimator::{Event, EventKind, Phase, StepInput, StepReport, window::features};
 use crate::frontend::{FeatureId, TrackedFeature};

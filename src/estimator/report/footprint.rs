@@ -1,8 +1,12 @@
 //! How much memory a report takes.
 
 use crate::estimator::estimator::Estimator;
-use crate::estimator::window::frames::{Feature, FeatureMap, Frame, Observation, Rates};
-use crate::estimator::{CalibrationEstimate, FrameStateReport, JacobianSource, StepReport};
+use crate::estimator::window::frames::Frame;
+use crate::estimator::{
+    CalibrationEstimate, FrameStateReport, JacobianSource, StepReport,
+    state::frame_state::Rates,
+    window::features::{Feature, FeatureMap, Observation},
+};
 
 /// Bytes of a report by part.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -10,8 +10,8 @@ use crate::camera::CameraModel;
 use crate::estimator::factors::reprojection::{CameraPose, Landmark, Reprojection};
 use crate::estimator::factors::visual::{RelativePoses, Sighting, VisualModel, whitened};
 use crate::estimator::state::camera_pose::{self, CameraMaps, Mount};
+use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::state::layout::{Layout, POSE};
-use crate::estimator::window::frames::FrameState;
 use crate::estimator::{
     ColumnBlock, ColumnGroup, FeatureReport, JacobianFactor, JacobianRow, JacobianSource, StepReport,
 };

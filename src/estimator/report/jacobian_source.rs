@@ -4,14 +4,9 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, Quaternion, UnitQuaternion, Vector3};
 
-use super::linearization::{column_blocks, column_order};
-use crate::estimator::estimator::Estimator;
 use crate::estimator::options::{LandmarkModel, RobustLoss};
-use crate::estimator::state::calibrations::Calibrations;
+use crate::estimator::state::frame_state::{FrameState, Rates};
 use crate::estimator::state::layout::POSE;
-use crate::estimator::window::frames::{FrameState, Rates};
-use crate::estimator::window::rows::stack_columns;
-use crate::estimator::window::tracking::SolvedWindow;
 use crate::estimator::{ColumnBlock, ColumnGroup, ImuBias, NavigationState, allocated_bytes};
 use crate::geometry::RigidTransform;
 use crate::gimbal::Chain;
@@ -23,22 +18,22 @@ use crate::gimbal::Chain;
 pub struct JacobianSource {
     /// By slot, where derivatives are taken (first estimates): `world_from_imu` as quaternion x, y, z, w and position, then
     /// the joint angles; in single precision, which is far finer than what is drawn.
-    frames: Box<[f32]>,
+    pub(crate) frames: Box<[f32]>,
     /// The chains at which derivatives are taken, by camera.
     pub(crate) chains: Box<[Chain]>,
     /// By camera, the offsets of the clocks that are estimated; empty where none is.
     pub(crate) clocks: Box<[ClockColumns]>,
     /// By slot, where clocks are estimated: rates of the body's rotation and of its position, then those of the joints.
-    rates: Box<[f32]>,
+    pub(crate) rates: Box<[f32]>,
     /// Whether the calibration has columns.
     pub(crate) calibrated: bool,
     /// Places among the report's features of the rejected ones, which have no landmark there, and their unit directions in
     /// their anchors' cameras.
     pub(crate) rejected: Box<[(u32, [f32; 3])]>,
-    rows: Box<[PackedRow]>,
+    pub(crate) rows: Box<[PackedRow]>,
     /// Of all packed rows, one after the other: numbers of blocks of columns, and the norms there.
-    columns: Box<[u16]>,
-    norms: Box<[f32]>,
+    pub(crate) columns: Box<[u16]>,
+    pub(crate) norms: Box<[f32]>,
     pub(crate) pixel_sigma_px: f64,
     pub(crate) loss: RobustLoss,
     pub(crate) landmark_model: LandmarkModel,
@@ -55,15 +50,15 @@ pub(crate) struct ClockColumns {
 
 /// Rows that are neither of features nor of encoders.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct PackedRow {
-    kind: PackedKind,
-    height: u16,
+pub(crate) struct PackedRow {
+    pub(crate) kind: PackedKind,
+    pub(crate) height: u16,
     /// How many of the norms are its own.
-    count: u16,
+    pub(crate) count: u16,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum PackedKind {
+pub(crate) enum PackedKind {
     /// The inertial samples that end at this slot.
     Inertial(u8),
     Standstill,
@@ -73,7 +68,7 @@ enum PackedKind {
 
 impl PackedKind {
     /// What it stands for, with frames of these numbers.
-    fn factor(self, numbers: &[usize]) -> Option<JacobianFactor> {
+    pub(crate) fn factor(self, numbers: &[usize]) -> Option<JacobianFactor> {
         Some(match self {
             Self::Inertial(slot) => {
                 let slot = usize::from(slot);
@@ -190,82 +185,6 @@ impl JacobianSource {
 /// Numbers of a pose among those of a frame.
 const POSE_NUMBERS: usize = 7;
 
-impl Estimator {
-    /// The source of the Jacobian at the final estimate, and the rows that are not of features where they are to be kept.
-    pub(crate) fn jacobian_source(&self, solved: &SolvedWindow) -> (JacobianSource, Vec<FactorRows>) {
-        let problem = self.problem(&solved.cameras);
-        let estimate = &solved.solution.estimate;
-        let layout = problem.layout;
-        let frames = problem.linearization_frames(estimate);
-        let calibration = problem.linearization_calibration(&estimate.calibration);
-        let numbers: Vec<usize> = self.frames.iter().map(|frame| frame.index).collect();
-        let columns = column_blocks(&layout, &self.calibration_names(), &numbers);
-        let scales = scales_of(&columns, &self.calibration_units());
-        let order = column_order(&layout);
-        let mut packed = Vec::new();
-        let mut norms: Vec<(u16, f32)> = Vec::new();
-        let mut kept = Vec::new();
-        let mut push = |kind: PackedKind, rows: &DMatrix<f64>| {
-            if rows.nrows() > 0 {
-                let jacobian = stack_columns(std::slice::from_ref(rows), order.iter().copied());
-                let own = norms_of(&jacobian, &columns, &scales);
-                if let Some(factor) = kind.factor(&numbers).filter(|_| self.config.options.keep_factor_rows) {
-                    let last = jacobian.ncols();
-                    let mut rows_with_residual = jacobian.resize_horizontally(last + 1, 0.0);
-                    rows_with_residual.set_column(last, &rows.column(layout.total()));
-                    kept.push(FactorRows { factor, rows: rows_with_residual });
-                }
-                packed.push(PackedRow { kind, height: rows.nrows() as u16, count: own.len() as u16 });
-                norms.extend(own);
-            }
-        };
-        for slot in 1..layout.frames {
-            push(PackedKind::Inertial(slot as u8), &problem.inertial_rows_at(slot, estimate, &frames));
-        }
-        let rest: Vec<_> = problem.rest_terms(&estimate.frames).collect();
-        push(PackedKind::Standstill, &problem.rest_rows(&rest));
-        push(PackedKind::CalibrationPrior, &problem.calibration_prior_rows(estimate));
-        push(PackedKind::MarginalizationPrior, &problem.prior_rows(estimate));
-        let packed_frame = |state: &FrameState| {
-            let pose = state.navigation.world_from_imu;
-            let numbers = pose.rotation.coords.iter().chain(pose.translation_m.iter()).chain(&state.joints_rad);
-            numbers.map(|number| *number as f32).collect::<Vec<f32>>()
-        };
-        let rejected = solved.checks.iter().zip(&estimate.landmarks).flat_map(|(checks, landmarks)| {
-            checks.rejected.iter().zip(landmarks).map(|(rejected, landmark)| (*rejected, landmark.bearing))
-        });
-        let rejected = rejected.enumerate().filter(|(_, (rejected, _))| *rejected);
-        let options = &self.config.options;
-        let clocked = |calibrations: &Calibrations, camera: usize| {
-            let calibration = calibrations.of(camera);
-            (calibration.dof().saturating_sub(calibration.chain().dof()), calibration.camera_shift_s())
-        };
-        let clocks: Vec<ClockColumns> = (0..calibration.cameras())
-            .map(|camera| {
-                let ((count, then), (_, now)) = (clocked(&calibration, camera), clocked(&estimate.calibration, camera));
-                ClockColumns { count, shifts_s: [then, now] }
-            })
-            .collect();
-        let any = clocks.iter().any(|clocks| clocks.count > 0);
-        let rates = |state: &FrameState| state.motion().iter().map(|rate| *rate as f32).collect::<Vec<f32>>();
-        let source = JacobianSource {
-            rates: if any { frames.iter().flat_map(rates).collect() } else { Box::default() },
-            clocks: if any { clocks.into() } else { Box::default() },
-            frames: frames.iter().flat_map(packed_frame).collect(),
-            chains: (0..calibration.cameras()).map(|camera| calibration.of(camera).chain().clone()).collect(),
-            calibrated: layout.calibration > 0,
-            rejected: rejected.map(|(place, (_, bearing))| (place as u32, bearing.cast::<f32>().into())).collect(),
-            rows: packed.into(),
-            columns: norms.iter().map(|(column, _)| *column).collect(),
-            norms: norms.iter().map(|(_, norm)| *norm).collect(),
-            pixel_sigma_px: options.pixel_sigma_px,
-            loss: options.loss,
-            landmark_model: options.landmark_model,
-        };
-        (source, kept)
-    }
-}
-
 /// What 1 means in a column of a group, so that columns compare: 10° for angles, 3 cm for lengths, 20 ms for clocks,
 /// 0.1 m/s, 1 °/s, 0.1 m/s² and a tenth of the inverse depth.
 ///
@@ -297,17 +216,4 @@ pub(crate) fn scales_of(columns: &[ColumnBlock], units: &[&'static str]) -> Vec<
         (0..block.len).map(move |place| column_scale(group, unit, place))
     };
     columns.iter().enumerate().flat_map(of_block).collect()
-}
-
-/// Norms of the blocks of some rows that are not zero.
-fn norms_of(jacobian: &DMatrix<f64>, columns: &[ColumnBlock], scales: &[f64]) -> Vec<(u16, f32)> {
-    let mut norms: Vec<(u16, f32)> = Vec::new();
-    for (number, block) in columns.iter().enumerate() {
-        let range = block.start..block.start + block.len;
-        let squared: f64 = range.map(|column| (jacobian.column(column) * scales[column]).norm_squared()).sum();
-        if squared > 0.0 {
-            norms.push((number as u16, squared.sqrt() as f32));
-        }
-    }
-    norms
 }

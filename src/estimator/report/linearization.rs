@@ -1,89 +1,58 @@
-//! The linearization of a solved window, for the analysis of its observability and for looking at.
+//! The linearization of a step with typed columns, for the analysis of its observability.
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
-use super::gain::CameraInformation;
-use crate::estimator::estimator::Estimator;
-use crate::estimator::factors::projection::NewestRows;
-use crate::estimator::state::calibrations::MAIN;
-use crate::estimator::state::camera_pose::{self, CameraMaps};
-use crate::estimator::state::layout::Layout;
-use crate::estimator::window::problem::{Estimate, Problem};
-use crate::estimator::window::rows::stack_columns;
-use crate::estimator::window::tracking::SolvedWindow;
-use crate::estimator::{ColumnBlock, ColumnGroup, InformationGain, Linearization};
+use crate::estimator::state::layout::{Layout, POSE, SPEED_BIAS};
+use crate::gimbal::Chain;
 
-impl Estimator {
-    /// The linearization at the final estimate: the measurements' rows, and those of the priors; and what the newest image
-    /// tells.
-    pub(crate) fn linearization(&self, solved: &SolvedWindow) -> (Linearization, Option<InformationGain>) {
-        let problem = self.problem(&solved.cameras);
-        let numbers: Vec<usize> = self.frames.iter().map(|frame| frame.index).collect();
-        let estimate = &solved.solution.estimate;
-        // An image that does not become a keyframe is forgotten again: it tells nothing that stays.
-        if !self.frames.last().is_some_and(|frame| frame.keyframe) {
-            let linearization = problem.linearization(estimate, &self.calibration_names(), &numbers, None);
-            return (linearization, problem.no_information_gain(estimate));
-        }
-        let mut cameras = Vec::new();
-        let linearization = problem.linearization(estimate, &self.calibration_names(), &numbers, Some(&mut cameras));
-        (linearization, problem.information_gain(estimate, &cameras))
-    }
+/// What a block of columns stands for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum ColumnGroup {
+    /// Static calibration.
+    Calibration,
+    /// Joint angles of a frame.
+    Joints,
+    /// Pose of a frame (rotation, translation).
+    Pose,
+    /// Velocity and biases of a frame.
+    SpeedBias,
+    /// Inverse depth of a feature.
+    InverseDepth,
 }
 
-impl Problem<'_> {
-    /// The linearization of the whole window at an estimate; `names` are those of the calibration's columns, `numbers`
-    /// those of the frames. What each camera has seen goes to `seen`, where that is asked for.
-    pub(crate) fn linearization(
-        &self,
-        estimate: &Estimate,
-        names: &[String],
-        numbers: &[usize],
-        mut seen: Option<&mut Vec<CameraInformation>>,
-    ) -> Linearization {
-        let layout = self.layout;
-        let frames = self.linearization_frames(estimate);
-        let calibration = self.linearization_calibration(&estimate.calibration);
-        let mut measured = Vec::new();
-        let mut norms = Vec::new();
-        for camera in 0..self.cameras.len() {
-            let maps = CameraMaps::new(&frames, calibration.of(camera));
-            let poses = camera_pose::by_slot(&frames, calibration.of(camera));
-            let apart = if seen.is_some() { NewestRows::Apart } else { NewestRows::Among };
-            let projected = self.projected_rows(camera, estimate, &poses, apart);
-            measured.push(self.carried_rows(camera, &projected, &maps));
-            let squared = projected.squared_column_norms(&maps.calibration);
-            norms.extend(squared.iter().map(|squared| squared.max(0.0).sqrt()));
-            if let Some(seen) = &mut seen {
-                seen.push(CameraInformation::new(&projected, maps));
-            }
-        }
-        measured.extend((1..layout.frames).map(|slot| self.inertial_rows_at(slot, estimate, &frames)));
-        measured.extend((0..layout.frames).map(|slot| self.encoder_rows(slot, estimate)));
-        let rest: Vec<_> = self.rest_terms(&estimate.frames).collect();
-        measured.push(self.rest_rows(&rest));
-        let priors = [self.calibration_prior_rows(estimate), self.prior_rows(estimate)];
-        let frozen = estimate.calibration.frozen_columns();
-        let is_held = |column: usize| frozen.contains(&column);
-        let first = layout.calibration().start;
-        let order: Vec<usize> =
-            column_order(&layout).into_iter().filter(|column| *column < first || !is_held(column - first)).collect();
-        let of = |held: bool| {
-            let names = names.iter().enumerate().filter(move |(column, _)| is_held(*column) == held);
-            names.map(|(_, name)| name.clone()).collect::<Vec<_>>()
-        };
-        let free = |column: &usize| !is_held(*column);
-        let norms: Vec<f64> = (0..norms.len()).filter(free).map(|column| norms[column]).collect();
-        Linearization {
-            columns: column_blocks(&layout, &of(false), numbers),
-            held: of(true),
-            jacobian: stack_columns(&measured, order.iter().copied()),
-            prior_jacobian: stack_columns(&priors, order.iter().copied()),
-            rig_prior_rows: priors[0].nrows(),
-            calibration_column_norms: DVector::from_vec(norms),
-            chain: calibration.of(MAIN).chain().clone(),
-        }
-    }
+/// A run of columns that belong together.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ColumnBlock {
+    /// What kind.
+    pub group: ColumnGroup,
+    /// For the calibration the parameter's name, else `pose 12`, `joints 12`, `depth 345`.
+    pub name: String,
+    /// First column.
+    pub start: usize,
+    /// Number of columns.
+    pub len: usize,
+}
+
+/// The whitened linearization of the step at its final estimate, without the priors on the calibration.
+///
+/// The inverse depths are already projected out by orthogonal projection (each feature's own rows rotated and its first
+/// row dropped), so that the rows stay whitened residuals and no normal equations were formed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Linearization {
+    /// Column blocks in order: calibration, joints, poses, speed-biases.
+    pub columns: Vec<ColumnBlock>,
+    /// Names of calibration parameters that are held at their values: they are known, and have no columns.
+    pub held: Vec<String>,
+    /// Jacobian of the measurements, rows whitened.
+    pub jacobian: DMatrix<f64>,
+    /// Jacobian of the priors (rig prior on the calibration, marginalization prior), same columns, whitened.
+    pub prior_jacobian: DMatrix<f64>,
+    /// How many rows of these, the first ones, are the rig's prior.
+    pub rig_prior_rows: usize,
+    /// Norm of each calibration column before the depths were projected out, for the reference of the rank rule.
+    pub calibration_column_norms: DVector<f64>,
+    /// The chain at which the calibration's columns were taken (with first estimates not the present one).
+    pub chain: Chain,
 }
 
 /// What the columns of a linearization stand for; `names` are the calibration's.
@@ -103,8 +72,8 @@ pub(crate) fn column_blocks(layout: &Layout, names: &[String], numbers: &[usize]
     }
     for (group, kind, len) in [
         (ColumnGroup::Joints, "joints", layout.joints),
-        (ColumnGroup::Pose, "pose", crate::estimator::state::layout::POSE),
-        (ColumnGroup::SpeedBias, "speed-bias", crate::estimator::state::layout::SPEED_BIAS),
+        (ColumnGroup::Pose, "pose", POSE),
+        (ColumnGroup::SpeedBias, "speed-bias", SPEED_BIAS),
     ] {
         for number in numbers {
             push(group, format!("{kind} {number}"), len);

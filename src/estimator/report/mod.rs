@@ -1,21 +1,25 @@
-//! The immutable report that every step leaves behind, and how it is made from a solved window.
+//! The immutable report that every step leaves behind: plain values with public fields, by subject.
+//!
+//! A report holds everything that panels, tables and the observability analysis ask for; making one is the window's business.
 
+mod events;
+mod features;
 mod footprint;
-pub(crate) mod gain;
+mod information_gain;
 mod jacobian;
-mod jacobian_source;
-mod linearization;
-pub(crate) mod motion_parts;
+pub(crate) mod jacobian_source;
+pub(crate) mod linearization;
 mod observations;
-mod reporting;
+mod residuals;
 mod step;
 
+pub use events::{Event, EventKind};
+pub use features::{FeatureCounts, FeatureReport, LandmarkReport, ObservationReport};
 pub use footprint::{ReportBytes, allocated_bytes};
-pub use gain::{InformationGain, Motion};
+pub use information_gain::{InformationGain, Motion};
 pub use jacobian::{FeatureRows, StepJacobian};
 pub use jacobian_source::{FactorRows, JacobianFactor, JacobianRow, JacobianSource, column_scale};
+pub use linearization::{ColumnBlock, ColumnGroup, Linearization};
 pub use observations::Observations;
-pub use step::{
-    CalibrationEstimate, ColumnBlock, ColumnGroup, Event, EventKind, FeatureCounts, FeatureReport, FrameStateReport,
-    IterationReport, LandmarkReport, Linearization, ObservationReport, Phase, ResidualSummary, StageTimes, StepReport,
-};
+pub use residuals::{IterationReport, ResidualSummary};
+pub use step::{CalibrationEstimate, FrameStateReport, Phase, StageTimes, StepReport};

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, Matrix3, Matrix6xX};
 use super::calibration::Calibration;
 use super::layout::POSE;
 use crate::estimator::factors::reprojection::CameraPose;
-use crate::estimator::window::frames::FrameState;
+use crate::estimator::state::frame_state::FrameState;
 use crate::geometry::so3;
 use crate::gimbal::{Chain, ChainLinearization};
 

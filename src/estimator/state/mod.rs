@@ -5,4 +5,6 @@
 pub(crate) mod calibration;
 pub(crate) mod calibrations;
 pub(crate) mod camera_pose;
+pub(crate) mod frame_state;
 pub(crate) mod layout;
+pub(crate) mod navigation;

@@ -4,12 +4,14 @@ use nalgebra::DVector;
 
 use super::Noise;
 use crate::camera::CameraModel;
-use crate::estimator::factors::preintegration::{ImuBias, NavigationState, Preintegration};
+use crate::estimator::factors::preintegration::Preintegration;
 use crate::estimator::factors::prior::StartPrior;
 use crate::estimator::state::calibrations::MAIN;
+use crate::estimator::state::frame_state::{FrameState, Rates};
 use crate::estimator::state::layout::Layout;
+use crate::estimator::state::navigation::{ImuBias, NavigationState};
 use crate::estimator::window::features;
-use crate::estimator::window::frames::{Frame, FrameState, Rates};
+use crate::estimator::window::frames::Frame;
 use crate::estimator::{
     DEFAULT_CHAIN_PRIOR, Estimator, EstimatorConfig, EstimatorOptions, RigidCamera, StepInput, StepReport,
 };

@@ -1,7 +1,8 @@
 use nalgebra::{SVector, UnitQuaternion, Vector3};
 
 use crate::estimator::factors::imu_factor;
-use crate::estimator::factors::preintegration::{ImuBias, Matrix15, NavigationState, Preintegration, Vector15};
+use crate::estimator::factors::preintegration::Preintegration;
+use crate::estimator::state::navigation::{ImuBias, Matrix15, NavigationState, Vector15};
 use crate::geometry::{RigidTransform, ns_from_seconds, so3};
 use crate::sensors::{ImuNoise, ImuSample};
 

@@ -1,11 +1,46 @@
-//! Bookkeeping of features: sightings come in, frames leave, points are triangulated.
+//! The features of the window: observations come in, frames leave, points are triangulated.
 
-use nalgebra::{Matrix3, Vector3};
+use std::collections::BTreeMap;
+
+use nalgebra::{Matrix3, Vector2, Vector3};
 
 use crate::estimator::factors::reprojection::{CameraPose, Landmark};
 use crate::estimator::options::EstimatorOptions;
-use crate::estimator::window::frames::{Feature, FeatureMap, Observation};
-use crate::frontend::TrackedFeature;
+use crate::frontend::{FeatureId, TrackedFeature};
+
+/// One sighting of a feature.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Observation {
+    /// Slot of the frame.
+    pub(crate) slot: usize,
+    /// Measured pixel.
+    pub(crate) uv_px: Vector2<f64>,
+    /// Measured unit direction.
+    pub(crate) bearing: Vector3<f64>,
+}
+
+/// One feature with everything that the window saw of it.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Feature {
+    /// In the order of the slots; the first one's frame is the anchor.
+    pub(crate) observations: Vec<Observation>,
+    /// Its estimate in the anchor's camera, once triangulated.
+    pub(crate) landmark: Option<Landmark>,
+}
+
+impl Feature {
+    /// Slot of the anchor.
+    pub(crate) fn anchor(&self) -> Option<usize> {
+        self.observations.first().map(|first| first.slot)
+    }
+
+    pub(crate) fn observation(&self, slot: usize) -> Option<&Observation> {
+        self.observations.iter().find(|observation| observation.slot == slot)
+    }
+}
+
+/// All features by their identity.
+pub(crate) type FeatureMap = BTreeMap<FeatureId, Feature>;
 
 /// Takes in what a camera saw at a frame.
 pub(crate) fn observe(features: &mut FeatureMap, slot: usize, seen: &[TrackedFeature]) {

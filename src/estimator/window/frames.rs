@@ -1,126 +1,11 @@
-//! The frames of the window and the features that they see.
-
-use std::collections::BTreeMap;
-use std::sync::Arc;
-
-use nalgebra::{DVector, Vector2, Vector3};
+//! The frames of the window.
 
 use super::standstill::Rest;
-use crate::estimator::factors::preintegration::{Matrix15, NavigationState, Preintegration, Vector15};
-use crate::estimator::factors::reprojection::Landmark;
-use crate::estimator::state::layout::{Layout, POSE, SPEED_BIAS};
-use crate::frontend::FeatureId;
-use crate::geometry::{so3, wrap_angle};
-use crate::sensors::{ImuSample, JointAngles};
-
-/// The unknowns of one frame (Eq. 7).
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct FrameState {
-    /// Pose, velocity, biases.
-    pub(crate) navigation: NavigationState,
-    /// Joint angles without the static offsets, in radians.
-    pub(crate) joints_rad: Vec<f64>,
-    /// How fast it all turned, as measured.
-    pub(crate) rates: Arc<Rates>,
-}
-
-/// What the sensors measured of the motion at a frame's stamp: where a camera was a moment earlier or later.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Rates {
-    /// What the gyroscope showed, in rad/s.
-    pub(crate) gyroscope_rad_per_s: Vector3<f64>,
-    /// What the encoders say about each joint, in rad/s; empty without readings.
-    pub(crate) joints_rad_per_s: Vec<f64>,
-}
-
-impl Rates {
-    /// The rates at the last of these samples, whose stamp is the frame's.
-    pub(crate) fn at(imu: &[ImuSample], encoder: Option<&JointAngles>) -> Arc<Self> {
-        let gyroscope_rad_per_s = imu.last().map_or_else(Vector3::zeros, |sample| sample.angular_velocity_rad_per_s);
-        let finite = gyroscope_rad_per_s.iter().all(|rate| rate.is_finite());
-        let joints = encoder.map_or_else(Vec::new, |encoder| encoder.rates_rad_per_s.clone());
-        Arc::new(Self {
-            gyroscope_rad_per_s: if finite { gyroscope_rad_per_s } else { Vector3::zeros() },
-            joints_rad_per_s: if joints.iter().all(|rate| rate.is_finite()) { joints } else { Vec::new() },
-        })
-    }
-
-    /// Of one joint, in rad/s; zero where nothing tells it.
-    pub(crate) fn joint_rad_per_s(&self, joint: usize) -> f64 {
-        self.joints_rad_per_s.get(joint).copied().unwrap_or(0.0)
-    }
-}
-
-impl FrameState {
-    /// The state so many seconds later, at the rates of this moment.
-    pub(crate) fn later(&self, seconds: f64) -> Self {
-        let mut later = self.clone();
-        let turned = self.turn_rate_rad_per_s() * seconds;
-        let pose = &mut later.navigation.world_from_imu;
-        pose.rotation *= so3::exp(&turned);
-        pose.translation_m += self.navigation.velocity_m_per_s * seconds;
-        for (joint, angle) in later.joints_rad.iter_mut().enumerate() {
-            *angle += self.rates.joint_rad_per_s(joint) * seconds;
-        }
-        later
-    }
-
-    /// Derivative of pose and joints, as [`Layout::camera`] orders them, by time.
-    pub(crate) fn motion(&self) -> DVector<f64> {
-        let joints = (0..self.joints_rad.len()).map(|joint| self.rates.joint_rad_per_s(joint));
-        let (turn, shift) = (self.turn_rate_rad_per_s(), self.navigation.velocity_m_per_s);
-        let all: Vec<f64> = turn.iter().chain(shift.iter()).copied().chain(joints).collect();
-        DVector::from_vec(all)
-    }
-
-    fn turn_rate_rad_per_s(&self) -> Vector3<f64> {
-        self.rates.gyroscope_rad_per_s - self.navigation.bias.gyroscope_rad_per_s
-    }
-
-    /// `x ⊞ δ` with `δ` in the order of [`Layout`]: pose, joints, speed and biases.
-    pub(crate) fn plus(&self, delta: &[f64]) -> Self {
-        let joints = self.joints_rad.len();
-        let mut navigation = Vector15::zeros();
-        navigation.as_mut_slice()[..POSE].copy_from_slice(&delta[..POSE]);
-        navigation.as_mut_slice()[POSE..].copy_from_slice(&delta[POSE + joints..POSE + joints + SPEED_BIAS]);
-        Self {
-            navigation: self.navigation.plus(&navigation),
-            joints_rad: self.joints_rad.iter().zip(&delta[POSE..]).map(|(angle, step)| angle + step).collect(),
-            rates: Arc::clone(&self.rates),
-        }
-    }
-
-    /// `self ⊟ origin` in the order of [`Layout`].
-    pub(crate) fn minus(&self, origin: &Self) -> DVector<f64> {
-        let joints = self.joints_rad.len();
-        let navigation = self.navigation.minus(&origin.navigation);
-        let mut delta = DVector::zeros(POSE + joints + SPEED_BIAS);
-        delta.rows_mut(0, POSE).copy_from(&navigation.fixed_rows::<POSE>(0));
-        delta.rows_mut(POSE + joints, SPEED_BIAS).copy_from(&navigation.fixed_rows::<SPEED_BIAS>(POSE));
-        for (joint, (angle, start)) in self.joints_rad.iter().zip(&origin.joints_rad).enumerate() {
-            delta[POSE + joint] = angle - start;
-        }
-        delta
-    }
-
-    /// The largest of the turn of the vehicle and those of the joints from another state, in radians.
-    fn turn_from_rad(&self, other: &Self) -> f64 {
-        let vehicle = self.navigation.world_from_imu.rotation.angle_to(&other.navigation.world_from_imu.rotation);
-        let joints = self.joints_rad.iter().zip(&other.joints_rad);
-        joints.map(|(angle, start)| wrap_angle(angle - start).abs()).fold(vehicle, f64::max)
-    }
-
-    /// A step of the solver: states that the prior holds count their step from its linearization point, so that the
-    /// prior stays exactly linear.
-    pub(crate) fn stepped(&self, first_estimate: Option<&Self>, delta: &[f64]) -> Self {
-        let Some(first) = first_estimate else { return self.plus(delta) };
-        let mut sum = self.minus(first);
-        for (entry, step) in sum.iter_mut().zip(delta) {
-            *entry += step;
-        }
-        first.plus(sum.as_slice())
-    }
-}
+use crate::estimator::factors::preintegration::Preintegration;
+use crate::estimator::state::frame_state::FrameState;
+use crate::estimator::state::layout::Layout;
+use crate::estimator::state::navigation::Matrix15;
+use crate::sensors::JointAngles;
 
 /// One frame of the window.
 #[derive(Clone, Debug)]
@@ -152,40 +37,6 @@ impl Frame {
         self.first_estimate.as_ref().filter(|first| current.turn_from_rad(first) <= reach_rad).unwrap_or(current)
     }
 }
-
-/// One sighting of a feature.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Observation {
-    /// Slot of the frame.
-    pub(crate) slot: usize,
-    /// Measured pixel.
-    pub(crate) uv_px: Vector2<f64>,
-    /// Measured unit direction.
-    pub(crate) bearing: Vector3<f64>,
-}
-
-/// One feature with everything that the window saw of it.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Feature {
-    /// In the order of the slots; the first one's frame is the anchor.
-    pub(crate) observations: Vec<Observation>,
-    /// Its estimate in the anchor's camera, once triangulated.
-    pub(crate) landmark: Option<Landmark>,
-}
-
-impl Feature {
-    /// Slot of the anchor.
-    pub(crate) fn anchor(&self) -> Option<usize> {
-        self.observations.first().map(|first| first.slot)
-    }
-
-    pub(crate) fn observation(&self, slot: usize) -> Option<&Observation> {
-        self.observations.iter().find(|observation| observation.slot == slot)
-    }
-}
-
-/// All features by their identity.
-pub(crate) type FeatureMap = BTreeMap<FeatureId, Feature>;
 
 /// The layout of a window of these frames.
 pub(crate) fn layout(frames: &[Frame], calibration: usize) -> Layout {

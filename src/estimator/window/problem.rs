@@ -6,14 +6,15 @@ use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, Vector3, Vector6};
 
 use super::standstill::{self, RestTerm};
 use crate::estimator::factors::imu_factor;
-use crate::estimator::factors::preintegration::{Matrix15, Vector15};
 use crate::estimator::factors::prior::{Prior, StartPrior};
 use crate::estimator::factors::reprojection::Landmark;
 use crate::estimator::factors::visual::{self, ReducedVisualSystem, Track, VisualModel, VisualSystem};
 use crate::estimator::state::calibrations::{Calibrations, MAIN};
 use crate::estimator::state::camera_pose::{self, CameraMaps};
+use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::state::layout::{Layout, POSE, SPEED_BIAS};
-use crate::estimator::window::frames::{Frame, FrameState};
+use crate::estimator::state::navigation::{Matrix15, Vector15};
+use crate::estimator::window::frames::Frame;
 use crate::geometry::wrap_angle;
 
 /// Values of all unknowns.

@@ -7,8 +7,8 @@ use super::standstill::RestTerm;
 use crate::estimator::factors::projection::{NewestRows, ProjectedRows};
 use crate::estimator::factors::reprojection::CameraPose;
 use crate::estimator::state::camera_pose::{self, CameraMaps};
+use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::state::layout::{POSE, SPEED_BIAS};
-use crate::estimator::window::frames::FrameState;
 
 impl Problem<'_> {
     /// The reprojection factors, landmarks projected out; at most `6·frames` rows a camera.

@@ -11,10 +11,11 @@ use std::collections::VecDeque;
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use crate::estimator::factors::preintegration::ImuBias;
 use crate::estimator::initialization::bearing::fit_rotation;
+use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::state::layout::Layout;
-use crate::estimator::window::frames::{Frame, FrameState};
+use crate::estimator::state::navigation::ImuBias;
+use crate::estimator::window::frames::Frame;
 use crate::estimator::{Event, EventKind, StepInput};
 use crate::frontend::{FeatureId, TrackedFeature};
 use crate::geometry::seconds_from_ns;

@@ -12,8 +12,12 @@ use crate::estimator::factors::visual::{self, RelativePoses, Sighting, Track, Vi
 use crate::estimator::options::{LandmarkModel, TrackContinuation};
 use crate::estimator::state::calibrations::MAIN;
 use crate::estimator::state::camera_pose;
-use crate::estimator::window::frames::{self, FeatureMap, Frame, FrameState, Rates};
-use crate::estimator::{Event, EventKind, StepInput};
+use crate::estimator::window::frames::{self, Frame};
+use crate::estimator::{
+    Event, EventKind, StepInput,
+    state::frame_state::{FrameState, Rates},
+    window::features::FeatureMap,
+};
 use crate::frontend::FeatureId;
 use crate::geometry::seconds_from_ns;
 
@@ -469,7 +473,7 @@ fn active_tracks(features: &FeatureMap) -> ActiveTracks {
             continue;
         }
         let sighting =
-            |observation: &frames::Observation| Sighting { slot: observation.slot, uv_px: observation.uv_px };
+            |observation: &features::Observation| Sighting { slot: observation.slot, uv_px: observation.uv_px };
         active.ids.push(*id);
         active.tracks.push(Track { sightings: feature.observations.iter().map(sighting).collect() });
         active.landmarks.push(landmark);

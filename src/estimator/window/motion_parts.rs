@@ -12,8 +12,8 @@ use nalgebra::{DMatrix, Matrix3, Matrix3xX, Vector3};
 
 use crate::estimator::state::calibration::Calibration;
 use crate::estimator::state::camera_pose::CameraMaps;
+use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::state::layout::POSE;
-use crate::estimator::window::frames::FrameState;
 use crate::geometry::{RigidTransform, so3};
 
 /// A twist by each column of the calibration: turns, then shifts, in the IMU frame.

@@ -1,0 +1,66 @@
+//! What happened in a step: events with the value and the threshold that decided.
+
+/// What kind of event a step reports.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum EventKind {
+    /// An attempt to initialize that has to wait; the message says for what.
+    InitializationWaits,
+    /// The window was initialized from motion.
+    InitializedFromMotion,
+    /// The window was initialized from standstill.
+    InitializedFromStandstill,
+    /// The frame became a keyframe (or did not); the value is the deciding figure.
+    KeyframeChosen,
+    /// The oldest frame was marginalized.
+    OldestMarginalized,
+    /// The second-newest frame was dropped.
+    SecondNewestMarginalized,
+    /// Features were rejected as outliers after the solve.
+    OutliersRejected,
+    /// The vehicle stands still.
+    Standstill,
+    /// The estimator failed and starts again.
+    Failure,
+    /// The chart of the parameterization was switched.
+    ChartSwitched,
+    /// Measurements were missing or unusable.
+    MeasurementMissing,
+}
+
+impl EventKind {
+    /// Whether it tells that the step made the first window.
+    pub fn begins_window(self) -> bool {
+        matches!(self, Self::InitializedFromMotion | Self::InitializedFromStandstill)
+    }
+
+    /// Whether it is rare enough to jump to, and for the lane of events; nearly every frame has one of the others, which
+    /// have lanes of their own or none.
+    pub fn is_notable(self) -> bool {
+        match self {
+            Self::InitializedFromMotion
+            | Self::InitializedFromStandstill
+            | Self::Standstill
+            | Self::Failure
+            | Self::ChartSwitched
+            | Self::MeasurementMissing => true,
+            Self::InitializationWaits
+            | Self::KeyframeChosen
+            | Self::OldestMarginalized
+            | Self::SecondNewestMarginalized
+            | Self::OutliersRejected => false,
+        }
+    }
+}
+
+/// Something that happened in a step, with the figure that decided it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Event {
+    /// What kind.
+    pub kind: EventKind,
+    /// Why, in one sentence, with units.
+    pub message: String,
+    /// The measured value, when one decided.
+    pub value: Option<f64>,
+    /// The threshold it was held against.
+    pub threshold: Option<f64>,
+}

@@ -1,0 +1,103 @@
+//! From a solved window to what its report keeps of the step's Jacobian.
+
+use nalgebra::DMatrix;
+
+use crate::estimator::ColumnBlock;
+use crate::estimator::estimator::Estimator;
+use crate::estimator::report::jacobian_source::{
+    ClockColumns, FactorRows, JacobianSource, PackedKind, PackedRow, scales_of,
+};
+use crate::estimator::report::linearization::{column_blocks, column_order};
+use crate::estimator::state::calibrations::Calibrations;
+use crate::estimator::state::frame_state::FrameState;
+use crate::estimator::window::rows::stack_columns;
+use crate::estimator::window::tracking::SolvedWindow;
+
+impl Estimator {
+    /// The source of the Jacobian at the final estimate, and the rows that are not of features where they are to be kept.
+    pub(crate) fn jacobian_source(&self, solved: &SolvedWindow) -> (JacobianSource, Vec<FactorRows>) {
+        let problem = self.problem(&solved.cameras);
+        let estimate = &solved.solution.estimate;
+        let layout = problem.layout;
+        let frames = problem.linearization_frames(estimate);
+        let calibration = problem.linearization_calibration(&estimate.calibration);
+        let numbers: Vec<usize> = self.frames.iter().map(|frame| frame.index).collect();
+        let columns = column_blocks(&layout, &self.calibration_names(), &numbers);
+        let scales = scales_of(&columns, &self.calibration_units());
+        let order = column_order(&layout);
+        let mut packed = Vec::new();
+        let mut norms: Vec<(u16, f32)> = Vec::new();
+        let mut kept = Vec::new();
+        let mut push = |kind: PackedKind, rows: &DMatrix<f64>| {
+            if rows.nrows() > 0 {
+                let jacobian = stack_columns(std::slice::from_ref(rows), order.iter().copied());
+                let own = norms_of(&jacobian, &columns, &scales);
+                if let Some(factor) = kind.factor(&numbers).filter(|_| self.config.options.keep_factor_rows) {
+                    let last = jacobian.ncols();
+                    let mut rows_with_residual = jacobian.resize_horizontally(last + 1, 0.0);
+                    rows_with_residual.set_column(last, &rows.column(layout.total()));
+                    kept.push(FactorRows { factor, rows: rows_with_residual });
+                }
+                packed.push(PackedRow { kind, height: rows.nrows() as u16, count: own.len() as u16 });
+                norms.extend(own);
+            }
+        };
+        for slot in 1..layout.frames {
+            push(PackedKind::Inertial(slot as u8), &problem.inertial_rows_at(slot, estimate, &frames));
+        }
+        let rest: Vec<_> = problem.rest_terms(&estimate.frames).collect();
+        push(PackedKind::Standstill, &problem.rest_rows(&rest));
+        push(PackedKind::CalibrationPrior, &problem.calibration_prior_rows(estimate));
+        push(PackedKind::MarginalizationPrior, &problem.prior_rows(estimate));
+        let packed_frame = |state: &FrameState| {
+            let pose = state.navigation.world_from_imu;
+            let numbers = pose.rotation.coords.iter().chain(pose.translation_m.iter()).chain(&state.joints_rad);
+            numbers.map(|number| *number as f32).collect::<Vec<f32>>()
+        };
+        let rejected = solved.checks.iter().zip(&estimate.landmarks).flat_map(|(checks, landmarks)| {
+            checks.rejected.iter().zip(landmarks).map(|(rejected, landmark)| (*rejected, landmark.bearing))
+        });
+        let rejected = rejected.enumerate().filter(|(_, (rejected, _))| *rejected);
+        let options = &self.config.options;
+        let clocked = |calibrations: &Calibrations, camera: usize| {
+            let calibration = calibrations.of(camera);
+            (calibration.dof().saturating_sub(calibration.chain().dof()), calibration.camera_shift_s())
+        };
+        let clocks: Vec<ClockColumns> = (0..calibration.cameras())
+            .map(|camera| {
+                let ((count, then), (_, now)) = (clocked(&calibration, camera), clocked(&estimate.calibration, camera));
+                ClockColumns { count, shifts_s: [then, now] }
+            })
+            .collect();
+        let any = clocks.iter().any(|clocks| clocks.count > 0);
+        let rates = |state: &FrameState| state.motion().iter().map(|rate| *rate as f32).collect::<Vec<f32>>();
+        let source = JacobianSource {
+            rates: if any { frames.iter().flat_map(rates).collect() } else { Box::default() },
+            clocks: if any { clocks.into() } else { Box::default() },
+            frames: frames.iter().flat_map(packed_frame).collect(),
+            chains: (0..calibration.cameras()).map(|camera| calibration.of(camera).chain().clone()).collect(),
+            calibrated: layout.calibration > 0,
+            rejected: rejected.map(|(place, (_, bearing))| (place as u32, bearing.cast::<f32>().into())).collect(),
+            rows: packed.into(),
+            columns: norms.iter().map(|(column, _)| *column).collect(),
+            norms: norms.iter().map(|(_, norm)| *norm).collect(),
+            pixel_sigma_px: options.pixel_sigma_px,
+            loss: options.loss,
+            landmark_model: options.landmark_model,
+        };
+        (source, kept)
+    }
+}
+
+/// Norms of the blocks of some rows that are not zero.
+fn norms_of(jacobian: &DMatrix<f64>, columns: &[ColumnBlock], scales: &[f64]) -> Vec<(u16, f32)> {
+    let mut norms: Vec<(u16, f32)> = Vec::new();
+    for (number, block) in columns.iter().enumerate() {
+        let range = block.start..block.start + block.len;
+        let squared: f64 = range.map(|column| (jacobian.column(column) * scales[column]).norm_squared()).sum();
+        if squared > 0.0 {
+            norms.push((number as u16, squared.sqrt() as f32));
+        }
+    }
+    norms
+}

@@ -1,0 +1,87 @@
+//! The linearization of a solved window, for the analysis of its observability and for looking at.
+
+use nalgebra::DVector;
+
+use crate::estimator::estimator::Estimator;
+use crate::estimator::factors::projection::NewestRows;
+use crate::estimator::report::linearization::{column_blocks, column_order};
+use crate::estimator::state::calibrations::MAIN;
+use crate::estimator::state::camera_pose::{self, CameraMaps};
+use crate::estimator::window::information_gain::CameraInformation;
+use crate::estimator::window::problem::{Estimate, Problem};
+use crate::estimator::window::rows::stack_columns;
+use crate::estimator::window::tracking::SolvedWindow;
+use crate::estimator::{InformationGain, Linearization};
+
+impl Estimator {
+    /// The linearization at the final estimate: the measurements' rows, and those of the priors; and what the newest image
+    /// tells.
+    pub(crate) fn linearization(&self, solved: &SolvedWindow) -> (Linearization, Option<InformationGain>) {
+        let problem = self.problem(&solved.cameras);
+        let numbers: Vec<usize> = self.frames.iter().map(|frame| frame.index).collect();
+        let estimate = &solved.solution.estimate;
+        // An image that does not become a keyframe is forgotten again: it tells nothing that stays.
+        if !self.frames.last().is_some_and(|frame| frame.keyframe) {
+            let linearization = problem.linearization(estimate, &self.calibration_names(), &numbers, None);
+            return (linearization, problem.no_information_gain(estimate));
+        }
+        let mut cameras = Vec::new();
+        let linearization = problem.linearization(estimate, &self.calibration_names(), &numbers, Some(&mut cameras));
+        (linearization, problem.information_gain(estimate, &cameras))
+    }
+}
+
+impl Problem<'_> {
+    /// The linearization of the whole window at an estimate; `names` are those of the calibration's columns, `numbers`
+    /// those of the frames. What each camera has seen goes to `seen`, where that is asked for.
+    pub(crate) fn linearization(
+        &self,
+        estimate: &Estimate,
+        names: &[String],
+        numbers: &[usize],
+        mut seen: Option<&mut Vec<CameraInformation>>,
+    ) -> Linearization {
+        let layout = self.layout;
+        let frames = self.linearization_frames(estimate);
+        let calibration = self.linearization_calibration(&estimate.calibration);
+        let mut measured = Vec::new();
+        let mut norms = Vec::new();
+        for camera in 0..self.cameras.len() {
+            let maps = CameraMaps::new(&frames, calibration.of(camera));
+            let poses = camera_pose::by_slot(&frames, calibration.of(camera));
+            let apart = if seen.is_some() { NewestRows::Apart } else { NewestRows::Among };
+            let projected = self.projected_rows(camera, estimate, &poses, apart);
+            measured.push(self.carried_rows(camera, &projected, &maps));
+            let squared = projected.squared_column_norms(&maps.calibration);
+            norms.extend(squared.iter().map(|squared| squared.max(0.0).sqrt()));
+            if let Some(seen) = &mut seen {
+                seen.push(CameraInformation::new(&projected, maps));
+            }
+        }
+        measured.extend((1..layout.frames).map(|slot| self.inertial_rows_at(slot, estimate, &frames)));
+        measured.extend((0..layout.frames).map(|slot| self.encoder_rows(slot, estimate)));
+        let rest: Vec<_> = self.rest_terms(&estimate.frames).collect();
+        measured.push(self.rest_rows(&rest));
+        let priors = [self.calibration_prior_rows(estimate), self.prior_rows(estimate)];
+        let frozen = estimate.calibration.frozen_columns();
+        let is_held = |column: usize| frozen.contains(&column);
+        let first = layout.calibration().start;
+        let order: Vec<usize> =
+            column_order(&layout).into_iter().filter(|column| *column < first || !is_held(column - first)).collect();
+        let of = |held: bool| {
+            let names = names.iter().enumerate().filter(move |(column, _)| is_held(*column) == held);
+            names.map(|(_, name)| name.clone()).collect::<Vec<_>>()
+        };
+        let free = |column: &usize| !is_held(*column);
+        let norms: Vec<f64> = (0..norms.len()).filter(free).map(|column| norms[column]).collect();
+        Linearization {
+            columns: column_blocks(&layout, &of(false), numbers),
+            held: of(true),
+            jacobian: stack_columns(&measured, order.iter().copied()),
+            prior_jacobian: stack_columns(&priors, order.iter().copied()),
+            rig_prior_rows: priors[0].nrows(),
+            calibration_column_norms: DVector::from_vec(norms),
+            chain: calibration.of(MAIN).chain().clone(),
+        }
+    }
+}
