@@ -1,39 +1,90 @@
 //! A debugger for visual-inertial navigation with a camera on a gimbal.
 //!
-//! A flight log goes in at one end and a picture comes out at the other.
-//! A folder may use the folders above it in this list and none below it.
+//! A flight log goes in at one end and a screenshot comes out at the other.
+//! A folder may use the folders above it in this list and none below it; `tests/it/layering.rs` reads the imports and
+//! fails on one that points the wrong way.
 //!
 //! | folder | promises | does not know of |
 //! | --- | --- | --- |
 //! | [`geometry`] | rotations, rigid transforms, the one perturbation rule, time units | cameras, logs |
 //! | [`camera`] | projection and back-projection with their Jacobians | gimbals, images |
-//! | [`gimbal`] | the actuated chain in each parameterization, its Jacobians, conversions and margins | measurements |
-//! | [`flight_log`] | MCAP in and out as typed events in time order; rigs; logs of other recorders | what the events are used for |
-//! | [`simulation`] | a synthetic flight with known truth, written as a flight log | the estimator |
+//! | [`gimbal`] | the actuated chain in each parameterization, its Jacobians, conversions and singularity margins | measurements |
+//! | [`sensors`] | plain types of what sensors deliver and of the rig that describes them | where they come from |
+//! | `flight_log` | MCAP in and out as typed events in time order; rig files; logs of other recorders | what the events are used for |
 //! | [`frontend`] | image in, feature tracks out | the estimator, so that runs share tracks |
-//! | [`estimator`] | window state, residuals, solver, marginalization; each step leaves a `StepReport` | files, screens, the wall clock |
-//! | [`observability`] | a linearization with named columns in, ranks and null directions out | how it was made |
-//! | [`calibration`] | a whole flight of both cameras in, the offline calibration of mount and gimbal out | logs, files |
-//! | [`session`] | a cursor over a log, runs side by side, stored reports | pixels on a screen |
+//! | [`simulation`] | a synthetic flight with ground truth, as tracks or written as a flight log | the estimator |
+//! | [`estimator`] | window state, residuals, solver, marginalization; each step returns a `StepReport` | logs, screens, the wall clock |
+//! | [`observability`] | a linearization with typed columns in, ranks and null directions out | how it was made |
+//! | [`calibration`] | a whole flight of both cameras in, the offline calibration of extrinsics and gimbal out | logs, files |
+//! | `log_check` | what is wrong with a log, with evidence and remedy | the estimator |
+//! | `session` | a cursor over a log, runs side by side, stored reports | pixels on a screen |
 //! | `gui` | panels, 3D scene, theme: reads reports, sends commands | the inside of the estimator |
-//! | [`export`] | the same tables and panels without a window | windows |
+//! | `export` | the same tables and panels without a window | windows |
 //!
-//! Three absences hold the shape: nothing above `gui` names egui or wgpu; [`frontend`] does not know the estimator; only
-//! [`flight_log`], [`export`] and `main.rs` touch the file system, and only `gui` asks the wall clock for anything but
-//! the stage timings of a report.
+//! Two places differ from the way of the data, each for a reason: `simulation` stands below `frontend`, whose track types
+//! it writes for flights without images; `calibration` stands below `observability`, by which it says what its flight
+//! could not constrain.
+//!
+//! Four absences hold the shape: nothing above `gui` names egui or wgpu; [`frontend`], [`estimator`] and [`calibration`]
+//! do not know `flight_log`; [`frontend`] does not know the estimator; only `flight_log`, `export` and the command line
+//! touch the file system, and only `gui` asks the wall clock for anything but the stage timings of a report.
+//!
+//! # The estimator as a library
+//!
+//! Without default features the crate holds what an estimator needs, and builds without MCAP, SQLite, clap and egui.
+//! This estimates eight seconds of a simulated flight with a gimballed camera and compares its end with the ground truth:
+//!
+//! ```
+//! use dcvins::estimator::{Estimator, EstimatorConfig, Phase, StepInput};
+//! use dcvins::gimbal::Parameterization;
+//! use dcvins::simulation::{SyntheticOptions, synthetic_tracks};
+//!
+//! let flight = synthetic_tracks(&SyntheticOptions { duration_s: 8.0, ..SyntheticOptions::default() });
+//! let config = EstimatorConfig::for_camera(&flight.given_rig, "cam0", Parameterization::Minimal)?;
+//! let encoder_sigma_rad = config.encoder_sigma_rad.expect("the simulated gimbal has encoders");
+//! let mut estimator = Estimator::new(config);
+//!
+//! // The estimated and the true pose at the start of the estimate: between them lies the unobservable position and yaw.
+//! let mut aligned = None;
+//! let mut error_m = f64::NAN;
+//! for frame in &flight.frames {
+//!     let report = estimator.step(&StepInput {
+//!         frame_index: frame.index,
+//!         stamp_ns: frame.stamp_ns,
+//!         imu: &frame.imu,
+//!         joint_angles: frame.encoder_angles(encoder_sigma_rad).as_ref(),
+//!         tracks: &frame.tracks,
+//!         rigid_tracks: &[],
+//!     });
+//!     if report.phase == Phase::Tracking {
+//!         let estimated = report.newest().expect("a tracking step has a window").world_from_imu;
+//!         let (estimated_start, true_start) = *aligned.get_or_insert((estimated, frame.true_world_from_imu));
+//!         let estimated_motion = estimated_start.inverse() * estimated;
+//!         let true_motion = true_start.inverse() * frame.true_world_from_imu;
+//!         error_m = (estimated_motion.translation_m - true_motion.translation_m).norm();
+//!     }
+//! }
+//! println!("position error at the end: {error_m:.3} m");
+//! assert!(error_m < 0.3);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod calibration;
 pub mod camera;
 pub mod estimator;
+#[cfg(feature = "logs")]
 pub mod export;
+#[cfg(feature = "logs")]
 pub mod flight_log;
 pub mod frontend;
 pub mod geometry;
 pub mod gimbal;
 #[cfg(feature = "gui")]
 pub mod gui;
+#[cfg(feature = "logs")]
 pub mod log_check;
 pub mod observability;
 pub mod sensors;
+#[cfg(feature = "logs")]
 pub mod session;
 pub mod simulation;

@@ -1,5 +1,6 @@
 //! What goes wrong on a flight, on purpose.
 
+use super::interval::during;
 use super::options::SimulationError;
 
 /// What may go wrong on a flight; by default nothing.
@@ -119,9 +120,4 @@ impl Disturbances {
     pub(crate) fn blank_at(&self, time_s: f64) -> bool {
         during(self.blank_s, time_s)
     }
-}
-
-/// Whether a time lies in a stretch of start and length.
-pub(crate) fn during(stretch_s: Option<[f64; 2]>, time_s: f64) -> bool {
-    stretch_s.is_some_and(|[start_s, length_s]| time_s >= start_s && time_s < start_s + length_s)
 }

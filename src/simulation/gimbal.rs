@@ -2,8 +2,8 @@
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
-use super::disturbances::during;
 use super::exercise::Exercise;
+use super::interval::during;
 use super::random::RandomStream;
 use super::route::Wave;
 use super::trajectory::Trajectory;

@@ -4,32 +4,43 @@
 //! the picture with lag, and sensors measure with noise.
 //! Everything follows from a seed; the same options give the same bits whatever the thread count.
 
+#![cfg_attr(not(feature = "logs"), expect(dead_code, reason = "recorded flights use more than tracks do"))]
+
+#[cfg(feature = "logs")]
 mod disturbances;
 mod equipment;
 mod exercise;
 mod experiment;
 mod gimbal;
 mod inertial;
+mod interval;
+#[cfg(feature = "logs")]
 mod options;
 mod random;
+#[cfg(feature = "logs")]
 mod render;
 mod route;
 mod scenario;
+#[cfg(feature = "logs")]
 mod simulate;
 mod spline;
 mod synthetic;
 #[cfg(test)]
 mod tests;
 mod trajectory;
+#[cfg(feature = "logs")]
 mod world;
 
+#[cfg(feature = "logs")]
 pub use disturbances::Disturbances;
 pub use equipment::Lens;
 pub use exercise::{Exercise, JOINT_PERIOD_S, JointSwing, SWING_M, VehicleSwing, YAW_SWING_RAD};
 pub use experiment::{Environment, Experiment};
 pub use gimbal::JointMotion;
 pub use inertial::ImuBias;
+#[cfg(feature = "logs")]
 pub use options::{SimulationError, SimulationOptions, SimulationProgress, SimulationSummary};
+#[cfg(feature = "logs")]
 pub use simulate::simulate;
 pub use synthetic::{
     SyntheticFlight, SyntheticFrame, SyntheticMotion, SyntheticMount, SyntheticOptions, synthetic_tracks,

@@ -8,9 +8,10 @@ use image::codecs::jpeg::JpegEncoder;
 use image::{ExtendedColorType, ImageEncoder as _};
 use rayon::prelude::*;
 
-use super::disturbances::{BLANK_GREY, during};
+use super::disturbances::BLANK_GREY;
 use super::equipment::Equipment;
 use super::experiment::Experiment;
+use super::interval::during;
 use super::options::{SimulationError, SimulationOptions, SimulationProgress, SimulationSummary};
 use super::random::RandomStream;
 use super::render::{Renderer, Sensor, SensorOptions, View, Workspace};
