@@ -5,6 +5,7 @@ mod command_line;
 mod convert;
 mod degeneracy;
 mod evaluate;
+mod layering;
 #[cfg(feature = "gui")]
 mod renderers;
 mod report;
