@@ -16,7 +16,6 @@ use dcvins::estimator::{
 };
 use dcvins::gimbal::{Chain, Parameterization};
 use dcvins::observability::analyse;
-use dcvins::sensors::JointAngles;
 use dcvins::simulation::{SyntheticFlight, SyntheticFrame, SyntheticOptions, synthetic_tracks};
 
 /// The window is full long before this frame.
@@ -63,37 +62,16 @@ fn encoder_sigma_rad(flight: &SyntheticFlight) -> f64 {
 }
 
 fn config(flight: &SyntheticFlight) -> EstimatorConfig {
-    let rig = &flight.given_rig;
-    let root = 3.0_f64.sqrt();
     EstimatorConfig {
-        camera: rig.cameras[0].model.clone(),
-        imu_noise: rig.imu.noise,
-        gravity_m_per_s2: rig.gravity_m_per_s2,
-        chain: rig.chain_of_camera("cam0").expect("the synthetic camera is cam0"),
-        parameterization: Parameterization::Minimal,
-        auto_chart: false,
-        encoder_sigma_rad: Some(encoder_sigma_rad(flight)),
-        use_encoder: true,
-        calibrate: true,
-        estimate_timeshift: false,
-        timeshift_s: 0.0,
-        chain_prior: rig
-            .gimbal
-            .as_ref()
-            .map(|gimbal| (gimbal.prior.translation_bound_m / root, gimbal.prior.rotation_bound_rad / root)),
-        rigid_cameras: Vec::new(),
         options: EstimatorOptions { keep_linearization: true, ..EstimatorOptions::default() },
         clock_ms,
+        ..EstimatorConfig::for_camera(&flight.given_rig, "cam0", Parameterization::Minimal)
+            .expect("the synthetic camera is cam0")
     }
 }
 
 fn step(estimator: &mut Estimator, frame: &SyntheticFrame, encoder_sigma_rad: f64) -> StepReport {
-    let joint_angles = frame.joint_angles_rad.as_ref().map(|angles_rad| JointAngles {
-        angles_rad: angles_rad.clone(),
-        sigmas_rad: vec![encoder_sigma_rad; angles_rad.len()],
-        lasting_sigmas_rad: vec![0.0; angles_rad.len()],
-        rates_rad_per_s: vec![0.0; angles_rad.len()],
-    });
+    let joint_angles = frame.encoder_angles(encoder_sigma_rad);
     estimator.step(&StepInput {
         frame_index: frame.index,
         stamp_ns: frame.stamp_ns,

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::bundle::{Priors, gimbal_view};
-use super::chain_prior::{self, ChainTerm};
+use super::chain_prior::ChainTerm;
 use super::outcome::{
     CalibratedParameter, CalibrationOutcome, InertialReport, MountReport, PixelReport, PoseLoopReport,
 };
@@ -215,7 +215,7 @@ fn priors(
     Priors {
         chain: ChainTerm::new(&input.gimbal_camera.chain, &input.gimbal_camera.prior),
         mount: input.static_camera.imu_from_camera,
-        mount_sigmas: chain_prior::sigmas(&input.static_camera.prior),
+        mount_sigmas: input.static_camera.prior.sigmas(),
         time_shift_sigma_s: options.time_shift_sigma_s,
         bias_sigmas: options.bias_sigmas,
         first: navigation.first().copied().unwrap_or_default(),

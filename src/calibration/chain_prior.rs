@@ -5,15 +5,8 @@ use nalgebra::{DMatrix, DVector};
 use crate::gimbal::{Chain, ClassicalChain, auto_parameterization};
 use crate::sensors::ChainPrior;
 
-/// Standard deviation of a uniform error within ±1.
-const SIGMA_PER_BOUND: f64 = 0.577_350_269_189_625_8;
 /// Variance added to every column, so that one that the prior fixes entirely leaves the covariance regular.
 const LEAST_VARIANCE: f64 = 1e-12;
-
-/// Standard deviations (m, rad) of errors that are uniform within bounds.
-pub(super) fn sigmas(prior: &ChainPrior) -> (f64, f64) {
-    (prior.translation_bound_m * SIGMA_PER_BOUND, prior.rotation_bound_rad * SIGMA_PER_BOUND)
-}
 
 /// The given chain in the minimal chart that suits it, and how wrong it may be.
 #[derive(Clone, Debug)]
@@ -28,7 +21,7 @@ pub(super) struct ChainTerm {
 impl ChainTerm {
     pub(super) fn new(classical: &ClassicalChain, prior: &ChainPrior) -> Self {
         let given = Chain::from_classical(classical, auto_parameterization(classical));
-        let (translation_m, rotation_rad) = sigmas(prior);
+        let (translation_m, rotation_rad) = prior.sigmas();
         let mut covariance = given.prior_covariance(classical, translation_m, rotation_rad);
         for k in 0..covariance.nrows() {
             covariance[(k, k)] += LEAST_VARIANCE;

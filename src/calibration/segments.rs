@@ -49,7 +49,7 @@ pub(super) fn reconstruct(
     let gimbal = &input.gimbal_camera;
     // Guesses of the turns between views: two readings on each joint, and the part of the chain's error that turns along.
     let joints = gimbal.chain.joint_count() as f64;
-    let chain_rad = super::chain_prior::sigmas(&gimbal.prior).1;
+    let chain_rad = gimbal.prior.sigmas().1;
     let sigma_rad =
         (encoder_sigma_rad(instants) * (2.0 * joints).sqrt()).hypot(chain_rad * (joints + 2.0).sqrt()).max(0.02);
     let limits = InitializationOptions { least_views: LEAST_VIEWS, ..InitializationOptions::default() };

@@ -4,7 +4,7 @@ use super::options::EstimatorOptions;
 use crate::camera::CameraModel;
 use crate::geometry::RigidTransform;
 use crate::gimbal::{Chain, ClassicalChain, Parameterization};
-use crate::sensors::ImuNoise;
+use crate::sensors::{CameraMount, CameraRig, ImuNoise, Rig, UnknownCamera};
 
 /// What an estimator is told once.
 #[derive(Clone, Debug)]
@@ -78,7 +78,50 @@ pub(super) fn rigid_mount(imu_from_camera: &RigidTransform) -> ClassicalChain {
 /// What a calibration that says nothing about its quality is taken to be worth, per number: 5 mm and 0.5°.
 pub const DEFAULT_CHAIN_PRIOR: (f64, f64) = (0.005, 0.0087);
 
+impl RigidCamera {
+    /// A rigid camera of a rig; `None` for a camera on the gimbal.
+    pub fn of_rig(rig: &Rig, camera: &CameraRig) -> Option<Self> {
+        let CameraMount::Static { imu_from_camera } = &camera.mount else { return None };
+        Some(Self {
+            key: camera.key.clone(),
+            model: camera.model.clone(),
+            imu_from_camera: *imu_from_camera,
+            prior: rig.extrinsics_prior(camera).sigmas(),
+            timeshift_s: camera.timeshift_cam_imu_s,
+        })
+    }
+}
+
 impl EstimatorConfig {
+    /// Configuration for one camera of a rig (`cam0`), estimated alone: encoders are used where the rig has them, the
+    /// calibration is estimated from the rig's prior, clocks are not; default options, no clock for the stage times.
+    ///
+    /// # Errors
+    /// When the rig has no camera with this key.
+    pub fn for_camera(rig: &Rig, camera_key: &str, parameterization: Parameterization) -> Result<Self, UnknownCamera> {
+        let camera = rig.camera(camera_key)?;
+        let gimbal = rig.gimbal.as_ref().filter(|_| camera.mount == CameraMount::Gimbal);
+        // Without a topic there are no readings, whatever their noise would be.
+        let encoder_sigma_rad = gimbal.filter(|gimbal| gimbal.topic.is_some()).and_then(|it| it.encoder_sigma_rad);
+        Ok(Self {
+            camera: camera.model.clone(),
+            imu_noise: rig.imu.noise,
+            gravity_m_per_s2: rig.gravity_m_per_s2,
+            chain: rig.chain_of_camera(camera_key).unwrap_or_default(),
+            parameterization,
+            auto_chart: false,
+            encoder_sigma_rad,
+            use_encoder: encoder_sigma_rad.is_some(),
+            calibrate: true,
+            chain_prior: Some(rig.extrinsics_prior(camera).sigmas()),
+            estimate_timeshift: false,
+            timeshift_s: camera.timeshift_cam_imu_s,
+            rigid_cameras: Vec::new(),
+            options: EstimatorOptions::default(),
+            clock_ms: || 0.0,
+        })
+    }
+
     /// Model of a camera by its number, the main one's first.
     pub(super) fn model(&self, camera: usize) -> &CameraModel {
         camera.checked_sub(1).map_or(&self.camera, |rigid| &self.rigid_cameras[rigid].model)

@@ -6,7 +6,6 @@ use std::sync::{Arc, OnceLock};
 use crate::estimator::{Estimator, EstimatorConfig, EstimatorOptions, StepInput};
 use crate::gimbal::{Chain, Parameterization};
 use crate::observability::analyse;
-use crate::sensors::JointAngles;
 use crate::session::{Recording, RunRecord, StepRecord};
 use crate::simulation::{SyntheticOptions, synthetic_tracks};
 
@@ -21,42 +20,22 @@ fn fly() -> Recording {
     let rig = &flight.given_rig;
     let gimbal = rig.gimbal.as_ref().expect("the synthetic rig has a gimbal");
     let sigma_rad = gimbal.encoder_sigma_rad.expect("with encoders");
-    let root = 3.0_f64.sqrt();
     let runs = [Parameterization::Classical, Parameterization::Minimal, Parameterization::MinimalSwapped];
     let runs = runs.map(|parameterization| {
+        let configuration = EstimatorConfig::for_camera(rig, "cam0", parameterization).expect("cam0");
         let mut estimator = Estimator::new(EstimatorConfig {
-            camera: rig.cameras[0].model.clone(),
-            rigid_cameras: Vec::new(),
-            imu_noise: rig.imu.noise,
-            gravity_m_per_s2: rig.gravity_m_per_s2,
-            chain: rig.chain_of_camera("cam0").expect("cam0"),
-            parameterization,
-            auto_chart: false,
-            encoder_sigma_rad: Some(sigma_rad),
-            use_encoder: true,
-            calibrate: true,
-            estimate_timeshift: false,
-            timeshift_s: 0.0,
-            chain_prior: Some((gimbal.prior.translation_bound_m / root, gimbal.prior.rotation_bound_rad / root)),
             options: EstimatorOptions { keep_linearization: true, ..EstimatorOptions::default() },
-            clock_ms: || 0.0,
+            ..configuration
         });
         let spec = parameterization.name().parse().expect("runs are named after parameterizations");
         let mut run = RunRecord::new(spec, "cam0".to_owned());
         for frame in &flight.frames {
-            let angles_rad = frame.joint_angles_rad.clone().expect("encoder readings");
-            let count = angles_rad.len();
-            let joints = JointAngles {
-                angles_rad,
-                sigmas_rad: vec![sigma_rad; count],
-                lasting_sigmas_rad: vec![0.0; count],
-                rates_rad_per_s: vec![0.0; count],
-            };
+            let joints = frame.encoder_angles(sigma_rad);
             let mut report = estimator.step(&StepInput {
                 frame_index: frame.index,
                 stamp_ns: frame.stamp_ns,
                 imu: &frame.imu,
-                joint_angles: Some(&joints),
+                joint_angles: joints.as_ref(),
                 tracks: &frame.tracks,
                 rigid_tracks: &[],
             });

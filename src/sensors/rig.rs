@@ -69,6 +69,18 @@ pub struct ChainPrior {
     pub rotation_bound_rad: f64,
 }
 
+impl ChainPrior {
+    /// Prior on a rigid camera's extrinsics when the rig has none: calibrations with a target are better than this.
+    const RIGID_CAMERA: Self = Self { translation_bound_m: 0.01, rotation_bound_rad: 0.0175 };
+
+    /// Standard deviations of the uniform errors, `bound / √3`: of every translation in metres and of every angle in
+    /// radians.
+    pub fn sigmas(self) -> (f64, f64) {
+        const SIGMA_PER_BOUND: f64 = 0.577_350_269_189_625_8;
+        (self.translation_bound_m * SIGMA_PER_BOUND, self.rotation_bound_rad * SIGMA_PER_BOUND)
+    }
+}
+
 /// One joint's name and range.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Joint {
@@ -137,6 +149,20 @@ impl Rig {
             CameraMount::Static { imu_from_camera } => {
                 Some(ClassicalChain { imu_from_base: *imu_from_camera, ..ClassicalChain::default() })
             }
+        }
+    }
+
+    /// How wrong the rig's extrinsics of one of its cameras may be.
+    pub fn extrinsics_prior(&self, camera: &CameraRig) -> ChainPrior {
+        match (&self.gimbal, &camera.mount) {
+            (Some(gimbal), CameraMount::Gimbal) => gimbal.prior,
+            // The rigid camera of a gimbal rig was calibrated with the same care as the gimbal, but never worse than a
+            // rigid camera usually is.
+            (Some(gimbal), CameraMount::Static { .. }) => ChainPrior {
+                translation_bound_m: gimbal.prior.translation_bound_m.min(ChainPrior::RIGID_CAMERA.translation_bound_m),
+                rotation_bound_rad: gimbal.prior.rotation_bound_rad.min(ChainPrior::RIGID_CAMERA.rotation_bound_rad),
+            },
+            (None, _) => ChainPrior::RIGID_CAMERA,
         }
     }
 }

@@ -16,7 +16,7 @@ use super::trajectory::{Trajectory, VehicleLimits};
 use crate::camera::CameraModel;
 use crate::frontend::{FeatureId, FrontEndStatistics, TrackedFeature, TrackedFrame};
 use crate::geometry::{RigidTransform, ns_from_seconds};
-use crate::sensors::{ChainPrior, ImuSample, Rig};
+use crate::sensors::{ChainPrior, ImuSample, JointAngles, Rig};
 
 /// What carries the camera of a synthetic flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -123,6 +123,21 @@ pub struct SyntheticFrame {
     pub true_joint_rates_rad_per_s: Vec<f64>,
     /// True pose of the camera in the world when it took the image.
     pub true_world_from_camera: RigidTransform,
+}
+
+impl SyntheticFrame {
+    /// The encoder readings as an estimator takes them, white with a standard deviation of `sigma_rad`; `None` without
+    /// encoders.
+    pub fn encoder_angles(&self, sigma_rad: f64) -> Option<JointAngles> {
+        let angles_rad = self.joint_angles_rad.clone()?;
+        let count = angles_rad.len();
+        Some(JointAngles {
+            angles_rad,
+            sigmas_rad: vec![sigma_rad; count],
+            lasting_sigmas_rad: vec![0.0; count],
+            rates_rad_per_s: self.true_joint_rates_rad_per_s.clone(),
+        })
+    }
 }
 
 /// A whole flight.

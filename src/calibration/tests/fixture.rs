@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use crate::calibration::{CalibrationInput, GimbalCamera, StaticCamera, TrackedView};
-use crate::estimator::{EstimatorConfig, EstimatorOptions, ImuBias, NavigationState};
+use crate::estimator::{EstimatorConfig, ImuBias, NavigationState};
 use crate::geometry::RigidTransform;
 use crate::gimbal::{ClassicalChain, Parameterization};
-use crate::sensors::{CameraMount, ChainPrior, JointAngles, Rig};
+use crate::sensors::{CameraMount, ChainPrior, Rig};
 use crate::simulation::{SyntheticFlight, SyntheticFrame, SyntheticMount, SyntheticOptions, synthetic_tracks};
 
 /// A flight seen by both cameras, and the truth.
@@ -45,12 +45,7 @@ fn views(flight: &SyntheticFlight, encoder_sigma_rad: f64) -> Vec<TrackedView> {
             frame_index: frame.index,
             stamp_ns: frame.stamp_ns,
             imu: frame.imu.clone(),
-            joint_angles: frame.joint_angles_rad.clone().map(|angles_rad| JointAngles {
-                sigmas_rad: vec![encoder_sigma_rad; angles_rad.len()],
-                lasting_sigmas_rad: vec![0.0; angles_rad.len()],
-                rates_rad_per_s: vec![0.0; angles_rad.len()],
-                angles_rad,
-            }),
+            joint_angles: frame.encoder_angles(encoder_sigma_rad),
             tracks: Arc::new(frame.tracks.clone()),
         })
         .collect()
@@ -84,21 +79,9 @@ pub(super) fn flight(options: &SyntheticOptions) -> Flight {
         imu_noise: rigid.given_rig.imu.noise,
         gravity_m_per_s2: rigid.given_rig.gravity_m_per_s2,
         estimator: EstimatorConfig {
-            camera: rigid.given_rig.cameras[0].model.clone(),
-            imu_noise: rigid.given_rig.imu.noise,
-            gravity_m_per_s2: rigid.given_rig.gravity_m_per_s2,
             chain: ClassicalChain { imu_from_base: given_mount, ..ClassicalChain::default() },
-            parameterization: Parameterization::Minimal,
-            auto_chart: false,
-            encoder_sigma_rad: None,
-            use_encoder: false,
-            calibrate: true,
-            estimate_timeshift: false,
-            timeshift_s: 0.0,
             chain_prior: Some((0.0017, 0.005)),
-            rigid_cameras: Vec::new(),
-            options: EstimatorOptions::default(),
-            clock_ms: || 0.0,
+            ..EstimatorConfig::for_camera(&rigid.given_rig, "cam0", Parameterization::Minimal).unwrap()
         },
     };
     Flight { input, true_mount: mount(&rigid.true_rig), true_chain: gimbal.true_rig.gimbal.unwrap().chain, rigid }

@@ -17,7 +17,7 @@ use crate::estimator::{
 };
 use crate::frontend::TrackedFrame;
 use crate::gimbal::{Chain, Parameterization};
-use crate::sensors::{JointAngles, Rig};
+use crate::sensors::Rig;
 use crate::simulation::{Lens, SyntheticFlight, SyntheticFrame, SyntheticMount, SyntheticOptions, synthetic_tracks};
 
 pub(super) fn camera(lens: Lens) -> CameraModel {
@@ -27,26 +27,11 @@ pub(super) fn camera(lens: Lens) -> CameraModel {
 
 /// An estimator for a rig's `cam0`.
 pub(super) fn config(rig: &Rig, parameterization: Parameterization, options: EstimatorOptions) -> EstimatorConfig {
-    let root = 3.0_f64.sqrt();
+    let gimbal_prior = rig.gimbal.as_ref().map(|gimbal| gimbal.prior.sigmas());
     EstimatorConfig {
-        camera: rig.cameras[0].model.clone(),
-        imu_noise: rig.imu.noise,
-        gravity_m_per_s2: rig.gravity_m_per_s2,
-        chain: rig.chain_of_camera("cam0").unwrap(),
-        parameterization,
-        auto_chart: false,
-        encoder_sigma_rad: rig.gimbal.as_ref().and_then(|gimbal| gimbal.encoder_sigma_rad),
-        use_encoder: true,
-        calibrate: true,
-        estimate_timeshift: false,
-        timeshift_s: 0.0,
-        chain_prior: rig
-            .gimbal
-            .as_ref()
-            .map(|gimbal| (gimbal.prior.translation_bound_m / root, gimbal.prior.rotation_bound_rad / root)),
-        rigid_cameras: Vec::new(),
+        chain_prior: gimbal_prior,
         options,
-        clock_ms: || 0.0,
+        ..EstimatorConfig::for_camera(rig, "cam0", parameterization).unwrap()
     }
 }
 
@@ -61,19 +46,6 @@ pub(super) fn rigid_camera(flight: &SyntheticFlight) -> RigidCamera {
     }
 }
 
-/// What the encoders of a synthetic frame say.
-fn encoder(frame: &SyntheticFrame, sigma_rad: Option<f64>) -> Option<JointAngles> {
-    let sigma_rad = sigma_rad?;
-    let angles_rad = frame.joint_angles_rad.clone()?;
-    let count = angles_rad.len();
-    Some(JointAngles {
-        angles_rad,
-        sigmas_rad: vec![sigma_rad; count],
-        lasting_sigmas_rad: vec![0.0; count],
-        rates_rad_per_s: frame.true_joint_rates_rad_per_s.clone(),
-    })
-}
-
 /// One step on a synthetic frame, with what its cameras have tracked.
 pub(super) fn step(
     estimator: &mut Estimator,
@@ -81,7 +53,7 @@ pub(super) fn step(
     tracks: &TrackedFrame,
     rigid_tracks: &[&TrackedFrame],
 ) -> StepReport {
-    let joint_angles = encoder(frame, estimator.config.encoder_sigma_rad);
+    let joint_angles = estimator.config.encoder_sigma_rad.and_then(|sigma_rad| frame.encoder_angles(sigma_rad));
     estimator.step(&StepInput {
         frame_index: frame.index,
         stamp_ns: frame.stamp_ns,
@@ -132,6 +104,7 @@ fn window_of(flight: &SyntheticFlight, rigid: Option<&SyntheticFlight>, config: 
     for slot in 0..6 {
         let index = first + slot * spacing;
         let truth = &flight.frames[index];
+        let encoder = estimator.config.encoder_sigma_rad.and_then(|sigma_rad| truth.encoder_angles(sigma_rad));
         let bias = ImuBias {
             gyroscope_rad_per_s: truth.true_bias.gyroscope_rad_per_s,
             accelerometer_m_per_s2: truth.true_bias.accelerometer_m_per_s2,
@@ -152,10 +125,10 @@ fn window_of(flight: &SyntheticFlight, rigid: Option<&SyntheticFlight>, config: 
                     bias,
                 },
                 joints_rad: truth.true_joint_angles_rad.clone(),
-                rates: Rates::at(&truth.imu, encoder(truth, estimator.config.encoder_sigma_rad).as_ref()),
+                rates: Rates::at(&truth.imu, encoder.as_ref()),
             },
             first_estimate: None,
-            encoder: encoder(truth, estimator.config.encoder_sigma_rad),
+            encoder,
             rest: None,
             keyframe: true,
             motion_information: motion.square_root_information(),

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use thiserror::Error;
 
-use super::configuration::{estimator_config, mount_prior};
+use super::configuration::estimator_config;
 use super::tracker::CameraTracker;
 use crate::calibration::{
     self, CalibrationError, CalibrationInput, CalibrationOptions, CalibrationOutcome, CalibrationProgress,
@@ -217,7 +217,7 @@ fn track(
             key: parts.static_camera.key.clone(),
             model: parts.static_camera.model.clone(),
             imu_from_camera: parts.imu_from_camera,
-            prior: mount_prior(rig, &parts.static_camera),
+            prior: rig.extrinsics_prior(&parts.static_camera),
             views: static_views,
         },
         gimbal_camera: GimbalCamera {
@@ -225,7 +225,7 @@ fn track(
             model: parts.gimbal_camera.model.clone(),
             chain: parts.gimbal.chain.clone(),
             joints: parts.gimbal.joints.iter().map(|joint| joint.name.clone()).collect(),
-            prior: mount_prior(rig, &parts.gimbal_camera),
+            prior: rig.extrinsics_prior(&parts.gimbal_camera),
             views: gimbal_views,
         },
         imu_noise: rig.imu.noise,

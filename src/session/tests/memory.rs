@@ -4,18 +4,12 @@ use std::sync::Arc;
 
 use crate::estimator::{ColumnGroup, Phase};
 use crate::flight_log::SensorFrame;
-use crate::sensors::{GrayImage, JointAngles};
+use crate::sensors::GrayImage;
 use crate::session::engine::{Instant, Material, RunEngine, TrackedSensorFrame, estimator_config};
 use crate::session::record::RunRecord;
 use crate::simulation::{SyntheticFlight, SyntheticFrame, SyntheticOptions, synthetic_tracks};
 
 pub(in crate::session) fn tracked(frame: &SyntheticFrame, encoder_sigma_rad: f64) -> TrackedSensorFrame {
-    let joint_angles = frame.joint_angles_rad.as_ref().map(|angles_rad| JointAngles {
-        angles_rad: angles_rad.clone(),
-        sigmas_rad: vec![encoder_sigma_rad; angles_rad.len()],
-        lasting_sigmas_rad: vec![0.0; angles_rad.len()],
-        rates_rad_per_s: vec![0.0; angles_rad.len()],
-    });
     TrackedSensorFrame {
         frame: SensorFrame {
             index: frame.index,
@@ -23,7 +17,7 @@ pub(in crate::session) fn tracked(frame: &SyntheticFrame, encoder_sigma_rad: f64
             log_time_ns: frame.stamp_ns,
             image: Arc::new(GrayImage { width: 0, height: 0, pixels: Vec::new() }),
             imu: frame.imu.clone(),
-            joint_angles,
+            joint_angles: frame.encoder_angles(encoder_sigma_rad),
             truth: Some(frame.true_world_from_imu),
             warnings: Vec::new(),
         },

@@ -6,7 +6,7 @@ use super::super::{
 use crate::estimator::{Estimator, EstimatorConfig, EstimatorOptions, StepInput, StepReport};
 use crate::gimbal::{Chain, Parameterization};
 use crate::observability::{RankReport, analyse};
-use crate::sensors::{JointAngles, Rig};
+use crate::sensors::Rig;
 use crate::simulation::{
     Exercise, SyntheticFlight, SyntheticFrame, SyntheticMotion, SyntheticOptions, VehicleSwing, synthetic_tracks,
 };
@@ -31,42 +31,21 @@ pub(super) fn flight(exercise: Exercise, seed: u64) -> SyntheticFlight {
 }
 
 pub(super) fn estimator(rig: &Rig, parameterization: Parameterization, use_encoder: bool) -> Estimator {
-    let root = 3.0_f64.sqrt();
-    let gimbal = rig.gimbal.as_ref().unwrap();
     Estimator::new(EstimatorConfig {
-        camera: rig.cameras[0].model.clone(),
-        rigid_cameras: Vec::new(),
-        imu_noise: rig.imu.noise,
-        gravity_m_per_s2: rig.gravity_m_per_s2,
-        chain: rig.chain_of_camera("cam0").unwrap(),
-        parameterization,
-        auto_chart: false,
-        encoder_sigma_rad: gimbal.encoder_sigma_rad,
         use_encoder,
-        calibrate: true,
-        estimate_timeshift: false,
-        timeshift_s: 0.0,
-        chain_prior: Some((gimbal.prior.translation_bound_m / root, gimbal.prior.rotation_bound_rad / root)),
         options: EstimatorOptions { keep_linearization: true, ..EstimatorOptions::default() },
-        clock_ms: || 0.0,
+        ..EstimatorConfig::for_camera(rig, "cam0", parameterization).unwrap()
     })
 }
 
 fn step(estimator: &mut Estimator, frame: &SyntheticFrame) -> (StepReport, Option<RankReport>) {
     let sigma = estimator.config().encoder_sigma_rad.unwrap();
-    let angles_rad = frame.joint_angles_rad.clone().unwrap();
-    let count = angles_rad.len();
-    let joints = JointAngles {
-        angles_rad,
-        sigmas_rad: vec![sigma; count],
-        lasting_sigmas_rad: vec![0.0; count],
-        rates_rad_per_s: vec![0.0; count],
-    };
+    let joints = frame.encoder_angles(sigma).filter(|_| estimator.config().use_encoder);
     let report = estimator.step(&StepInput {
         frame_index: frame.index,
         stamp_ns: frame.stamp_ns,
         imu: &frame.imu,
-        joint_angles: estimator.config().use_encoder.then_some(&joints),
+        joint_angles: joints.as_ref(),
         tracks: &frame.tracks,
         rigid_tracks: &[],
     });
