@@ -1,4 +1,4 @@
-//! Decompositions of dense matrices: nalgebra keeps them, faer factors them.
+//! Decompositions of dense matrices, stored by nalgebra and factored by faer.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::{Conj, Mat, MatMut, MatRef, Par};
@@ -15,7 +15,8 @@ pub struct ThinSvd {
     pub v: DMatrix<f64>,
 }
 
-/// The thin singular value decomposition, `None` for a matrix that is not finite.
+/// The thin singular value decomposition of an m × n matrix: `u` is m × k, `v` is n × k with k = min(m, n). `None` for a
+/// matrix that is not finite.
 pub fn thin_svd(matrix: &DMatrix<f64>) -> Option<ThinSvd> {
     let (rows, columns) = matrix.shape();
     if rows == 0 || columns == 0 {
@@ -67,11 +68,12 @@ pub fn to_faer(matrix: &DMatrix<f64>) -> Mat<f64> {
     as_faer(matrix).to_owned()
 }
 
-/// Turns the rows of `rest` by the orthogonal factor of `spanning`, so that the first rows, as many as returned, are the
-/// part within the column space of `spanning` and the others the part outside of it.
+/// Multiplies `rest` (m × n) in place by `Qᵀ` of `spanning` (m × k) `= Q·R·Pᵀ` and returns the rank r of `spanning`: the
+/// first r rows of the product are the part of `rest` within the column space of `spanning`, the other m − r rows the part
+/// orthogonal to it.
 ///
-/// Column-pivoted Householder QR, hence also right for dependent columns: a pivot counts when it exceeds `tolerance`, so
-/// the columns of `spanning` should have norms around 1. Both matrices have as many rows; both must be finite.
+/// Column-pivoted Householder QR, hence also correct for dependent columns: a pivot counts when it exceeds `tolerance`, so
+/// the columns of `spanning` should have norms around 1. Both matrices must be finite.
 pub fn split_by_column_space(spanning: MatRef<'_, f64>, rest: MatMut<'_, f64>, tolerance: f64) -> usize {
     use faer::linalg::householder::{
         apply_block_householder_sequence_transpose_on_the_left_in_place_scratch as scratch,
