@@ -2,8 +2,8 @@
 //!
 //! `cargo bench --bench frontend` prints the table of the motion tracker from one image to the next, and of the whole front
 //! end over all images: how far features have drifted from their first sighting, by age, with and without keys.
-//! With `FRONTEND_BENCH_EXPORT=DIR` the frames (PGM) and the points with their true motion (CSV) are written there, to run
-//! other trackers on the same.
+//! With `-- --export DIR` the frames (PGM) and the points with their true motion (CSV) are written there, to run other
+//! trackers on the same; `-- --flicker RATIO` sets the change of brightness from image to image.
 
 #![expect(clippy::print_stdout, clippy::disallowed_methods, reason = "a bench measures time and prints it")]
 
@@ -12,8 +12,10 @@ mod homography;
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use clap::Parser;
 use dcvins::camera::CameraModel;
 use dcvins::frontend::lucas_kanade::{LucasKanadeOptions, track};
 use dcvins::frontend::{FeatureId, FrontEnd, FrontEndOptions, KeyOptions, Pyramid};
@@ -23,6 +25,19 @@ use nalgebra::Vector2;
 
 const FRAMES: usize = 30;
 const REPETITIONS: usize = 5;
+
+#[derive(Parser)]
+struct Arguments {
+    /// Writes the frames and the true motion into this folder.
+    #[arg(long, value_name = "DIR")]
+    export: Option<PathBuf>,
+    /// Change of brightness from image to image, a ratio.
+    #[arg(long, value_name = "RATIO", default_value_t = 0.02)]
+    flicker: f64,
+    /// Cargo passes it to every bench.
+    #[arg(long, hide = true)]
+    bench: bool,
+}
 
 fn median(values: &mut [f64]) -> f64 {
     values.sort_by(f64::total_cmp);
@@ -55,8 +70,7 @@ impl Sequence {
         Self { name, scene, frames, points }
     }
 
-    fn export(&self, folder: &str) {
-        let folder = std::path::Path::new(folder);
+    fn export(&self, folder: &Path) {
         for (index, frame) in self.frames.iter().enumerate() {
             let mut bytes = format!("P5\n{} {}\n255\n", frame.width, frame.height).into_bytes();
             bytes.extend_from_slice(&frame.pixels);
@@ -161,20 +175,13 @@ fn bench_front_end(sequence: &Sequence, label: &str, options: &FrontEndOptions) 
 }
 
 fn main() {
+    let arguments = Arguments::parse();
     let texture = Texture::new(2048, 1);
-    let scene = Scene {
-        width: 752,
-        height: 480,
-        focal_px: 458.0,
-        speed: 1.0,
-        noise: 2.0,
-        flicker: std::env::var("FLICKER").ok().and_then(|t| t.parse().ok()).unwrap_or(0.02),
-    };
+    let scene = Scene { width: 752, height: 480, focal_px: 458.0, speed: 1.0, noise: 2.0, flicker: arguments.flicker };
     let slow = Sequence::new("slow", Scene { speed: 0.27, ..scene }, &texture);
     let fast = Sequence::new("fast", scene, &texture);
-    let export = std::env::var("FRONTEND_BENCH_EXPORT").ok();
     for sequence in [&slow, &fast] {
-        if let Some(folder) = &export {
+        if let Some(folder) = &arguments.export {
             sequence.export(folder);
         }
         let forward = LucasKanadeOptions { forward_backward_px: None, ..Default::default() };

@@ -1,4 +1,4 @@
-//! Agreement with evo 1.38.1 on `data/estimate.tum` and `data/reference.tum`.
+//! Agreement with evo 1.38.1 on `tests/data/estimate.tum` and `tests/data/reference.tum`.
 //!
 //! The expected numbers were printed by evo's `metrics.APE` and `metrics.RPE` (translation part, rotation angle in
 //! degrees, consecutive pairs) after `sync.associate_trajectories(reference, estimate, max_diff=0.01)`.
@@ -11,7 +11,7 @@ use dcvins::session::accuracy::{Alignment, RelativeDelta};
 const TOLERANCE: f64 = 1e-6;
 
 fn data(name: &str) -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/it/data").join(name)
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name)
 }
 
 fn compare(alignment: Alignment, delta: RelativeDelta) -> EvaluationReport {

@@ -1,4 +1,4 @@
-//! The golden vectors of the project, where their folder lies beside the checkout.
+//! The chains against independently computed poses, Jacobians and ranks.
 
 use std::path::Path;
 
@@ -11,17 +11,11 @@ use crate::gimbal::{
     Chain, ClassicalChain, DhLink, Parameterization, generic_joint_angles, redundant_directions, stacked_jacobian,
 };
 
-/// The golden file, or `None` with a word on the terminal about what is not tested.
-#[expect(clippy::print_stderr, reason = "a skipped test has to say so")]
-pub(crate) fn golden(skipping: &str) -> Option<Value> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/golden/public.json");
-    match std::fs::read_to_string(&path) {
-        Ok(text) => Some(serde_json::from_str(&text).unwrap()),
-        Err(error) => {
-            eprintln!("SKIPPED {skipping}: {}: {error}", path.display());
-            None
-        }
-    }
+/// `tests/data/golden.json`, described in `tests/data/README.md`.
+pub(crate) fn golden() -> Value {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/golden.json");
+    let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{error} ({})", path.display()));
+    serde_json::from_str(&text).unwrap()
 }
 
 pub(crate) const GOLDEN_FORMS: [(&str, Parameterization); 6] = [
@@ -95,7 +89,7 @@ fn amax_difference(found: &Matrix6xX<f64>, expected: &DMatrix<f64>) -> f64 {
 
 #[test]
 fn golden_chains() {
-    let Some(file) = golden("golden_chains") else { return };
+    let file = golden();
     let mut compared = 0;
     for golden in array(&file["chains"]) {
         let id = golden["id"].as_str().unwrap();
@@ -157,8 +151,9 @@ fn golden_chains() {
 /// The derivatives of one reprojection (Eqs. 9–17) through the chain, the rule of perturbation and the camera.
 #[test]
 fn golden_visual_residuals() {
-    let Some(file) = golden("golden_visual_residuals") else { return };
+    let file = golden();
     let camera = CameraModel::pinhole([460.0, 460.0, 0.0, 0.0], [640, 480]).unwrap();
+    let mut compared = 0;
     for golden in array(&file["chains"]) {
         let visual = &golden["visual"];
         if visual.is_null() {
@@ -184,8 +179,10 @@ fn golden_visual_residuals() {
             check(found.by_inverse_depth, "inverse_depth");
             check(found.by_pose_i, "pose_i");
             check(found.by_pose_j, "pose_j");
+            compared += 1;
         }
     }
+    assert!(compared >= 18, "only {compared} reprojections were compared");
 }
 
 /// One prediction of a feature's pixel with all its derivatives.

@@ -44,7 +44,7 @@ fn null_projector(report: &RankReport) -> DMatrix<f64> {
 
 #[test]
 fn golden_windows() {
-    let Some(file) = golden("golden_windows") else { return };
+    let file = golden();
     let mut compared = 0;
     for golden in array(&file["windows"]) {
         let window = window(golden);
