@@ -29,6 +29,8 @@
 //! do not know `flight_log`; [`frontend`] does not know the estimator; only `flight_log`, `export` and the command line
 //! touch the file system, and only `gui` asks the wall clock for anything but the stage timings of a report.
 //!
+//! Equations and parameterizations: docs/mathematics.md, sections 2 and 3; rank rule: docs/mathematics.md, section 8.
+//!
 //! # The estimator as a library
 //!
 //! Without default features the crate holds what an estimator needs, and builds without MCAP, SQLite, clap and egui.

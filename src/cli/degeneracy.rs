@@ -17,7 +17,8 @@ use crate::cli::commands::print;
 /// `dcvins degeneracy`.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct DegeneracyArguments {
-    /// Measure the whole truth table of the mathematics notes and hold it against them; what happens without arguments.
+    /// Measure every scenario of docs/mathematics.md, section 7, and compare with the expected results; the default without
+    /// arguments.
     #[arg(long, conflicts_with_all = ["mechanism", "rig", "forms", "motion", "freeze", "encoder_sigma_deg", "poses"])]
     pub table: bool,
     /// A mechanism by name; `--list` tells them all [default: yaw-roll-pitch-offset].

@@ -1,4 +1,5 @@
-//! From the classical form to the others and back; closed forms that exist for every chain.
+//! From the classical form to the others and back; closed forms that exist for every chain (docs/mathematics.md,
+//! section 5).
 
 use std::f64::consts::PI;
 

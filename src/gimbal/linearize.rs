@@ -1,7 +1,8 @@
 //! Forward kinematics and its closed-form derivatives, one walk along the chain for all forms.
 //!
 //! Every column is an elementary motion: a turn about an axis `w` through a point `p`, whose column is
-//! `[Rᵀ·w; w × (t − p)]`, or a slide along `w`, whose column is `[0; w]`; `R`, `t` are the camera's.
+//! `[Rᵀ·w; w × (t − p)]`, or a slide along `w`, whose column is `[0; w]`; `R`, `t` are the camera's
+//! (docs/mathematics.md, section 6).
 
 use nalgebra::{Matrix6xX, Vector3};
 

@@ -4,6 +4,7 @@
 //! [`Parameterization`] and knows its columns: their names, values, derivatives, update rule and margins to the chart's
 //! locks.
 //! A joint's angle is the encoder's reading plus the static offset of its link.
+//! Parameterizations and their singularities: docs/mathematics.md, sections 3 and 4.
 
 mod chain;
 mod chart;

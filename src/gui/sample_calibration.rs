@@ -136,7 +136,7 @@ fn classical_values(chain: &ClassicalChain) -> (Vec<String>, Vec<f64>) {
     entries.into_iter().unzip()
 }
 
-/// Names and values of the minimal form by section 6 of the mathematics notes (three links, away from its locks).
+/// Names and values of the minimal parameterization (docs/mathematics.md, section 5), three links, away from singularities.
 fn minimal_values(chain: &ClassicalChain) -> (Vec<String>, Vec<f64>) {
     let base = chain.imu_from_base.rotation_matrix();
     let (rx, ry) = ((-base[(1, 2)]).atan2(base[(2, 2)]), base[(0, 2)].atan2(base[(1, 2)].hypot(base[(2, 2)])));

@@ -1,7 +1,7 @@
 use super::{KnownDirection, PackedFactor};
 use crate::estimator::allocated_bytes;
 
-/// Ranks of the calibration block at one step, by the rule of section 3 of the mathematics notes.
+/// Ranks of the calibration block at one step, by the rule of docs/mathematics.md, section 8.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RankReport {
     /// Names of the calibration columns.

@@ -1,4 +1,4 @@
-//! `dcvins degeneracy`: the truth table of the mathematics notes out of one command, and single experiments.
+//! `dcvins degeneracy`: the table of docs/mathematics.md, section 7, by one command, and single experiments.
 
 use std::path::PathBuf;
 use std::process::{Command, Output};
@@ -34,12 +34,12 @@ fn check(arguments: &[&str], rank: u64, words: &[&str]) {
 }
 
 #[test]
-fn the_whole_table_agrees_with_the_notes_on_any_number_of_threads() {
+fn the_whole_table_agrees_with_the_expected_ranks_on_any_number_of_threads() {
     let table = json(&["--json"]);
     let (compared, agreeing) = (table["compared"].as_u64(), table["agreeing"].as_u64());
     assert!(compared >= Some(250), "{compared:?} figures");
     assert_eq!(compared, agreeing, "{}", printed(&["--table"]));
-    // Two values of the calibration claim what neither window sees, as much as the notes say within a factor of two.
+    // Spurious information of two windows, within a factor of two of docs/mathematics.md, section 9.
     for row in table["spurious"].as_array().expect("the claims are a list") {
         let number = |name: &str| row[name].as_f64().unwrap_or_else(|| row[name][1].as_f64().expect("a number"));
         let (most, expected) = (number("without"), number("without_expected"));
@@ -49,7 +49,7 @@ fn the_whole_table_agrees_with_the_notes_on_any_number_of_threads() {
     let (first, second) = (dcvins(&["--table"], "1"), dcvins(&[], "2"));
     assert!(first.stdout == second.stdout, "the table has the same bytes on one thread and on two");
     let text = String::from_utf8(second.stdout).unwrap();
-    assert!(text.ends_with("figures agree with the notes\n"), "{text}");
+    assert!(text.ends_with("results agree with docs/mathematics.md, sections 7 and 9\n"), "{text}");
     assert!(!text.lines().any(|line| line.starts_with('!')), "{text}");
 }
 

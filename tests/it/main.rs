@@ -4,6 +4,7 @@ mod check;
 mod command_line;
 mod convert;
 mod degeneracy;
+mod documentation;
 mod evaluate;
 mod layering;
 #[cfg(feature = "gui")]

@@ -102,7 +102,7 @@ pub(crate) fn structure_lines(rank: &RankReport) -> Vec<String> {
     rank.known.iter().map(line).collect()
 }
 
-/// Below this margin a chart is switched (section 6 of the mathematics notes).
+/// Below this singularity margin the parameterization is switched (docs/mathematics.md, section 4).
 const LOW_MARGIN: f64 = 0.3;
 
 /// The strongest parameters of a direction, `L1.d - I.tx`, at most `most`.

@@ -2,7 +2,7 @@
 //!
 //! An experiment supposes a window, linearizes it with the estimator's own factors
 //! ([`crate::estimator::SupposedWindow`]) and analyses it as every step is analysed.
-//! [`truth_table`] runs all experiments of the mathematics notes and holds the ranks against theirs.
+//! [`truth_table`] runs all scenarios of docs/mathematics.md, section 7, and compares the ranks with the expected ones.
 
 mod advice;
 mod excitation;

@@ -1,5 +1,5 @@
-//! Information that nobody measured: an old window and a new one, linearized at different values of the calibration,
-//! together claim directions that each of them cannot see (section 3 of the mathematics notes).
+//! Spurious information: an old window and a new one, linearized at different values of the calibration, together
+//! constrain directions that neither observes (docs/mathematics.md, section 9).
 //!
 //! That is what a marginalization prior does beside the window when the calibration has moved meanwhile. With first
 //! estimates both are linearized at the old value.
@@ -53,11 +53,11 @@ pub struct SpuriousRow {
     pub without: (f64, f64),
     /// How many of them are then over 1: least and most over the draws.
     pub known: (usize, usize),
-    /// The most singular value that the notes give.
+    /// The largest singular value in docs/mathematics.md, section 9.
     pub without_expected: f64,
-    /// The numbers over 1 that the notes give, from and to.
+    /// The numbers above 1 in docs/mathematics.md, section 9: least and most.
     pub known_expected: (usize, usize),
-    /// Whether what was measured overlaps with what the notes give, and first estimates claim nothing.
+    /// Whether the measured range overlaps the expected one, and first estimates add no information.
     pub agrees: bool,
 }
 
@@ -88,7 +88,7 @@ const fn case(
     Case { parameterization, joints, change, without, known }
 }
 
-/// Every case of the notes.
+/// Every case of docs/mathematics.md, section 9.
 pub(super) fn measure() -> Vec<SpuriousRow> {
     CASES.par_iter().filter_map(Case::measure).collect()
 }
@@ -170,7 +170,7 @@ impl fmt::Display for SpuriousRow {
         };
         write!(
             out,
-            "first estimates {:.0e}, without {least:.2} to {most:.2} (notes {}); over 1: {}/{} of {}",
+            "first estimates {:.0e}, without {least:.2} to {most:.2} (expected {}); over 1: {}/{} of {}",
             self.with_first_estimates,
             self.without_expected,
             range(self.known),

@@ -1,4 +1,4 @@
-//! All experiments of the truth table, measured, each beside what the mathematics notes say.
+//! All scenarios of the degeneracy table, measured, each beside the expected result (docs/mathematics.md, section 7).
 
 use std::fmt;
 
@@ -25,7 +25,7 @@ pub struct TruthTable {
     pub spurious: Vec<SpuriousRow>,
     /// How many ranks, causes, sets of null directions and claims were compared.
     pub compared: usize,
-    /// How many of them agree with the notes.
+    /// How many of them agree with the expected ones.
     pub agreeing: usize,
 }
 
@@ -47,17 +47,17 @@ pub struct TableRow {
     pub mechanism: String,
     /// Name of the motion.
     pub motion: String,
-    /// Ranks in the forms that the notes compare.
+    /// Ranks in the parameterizations that the table compares.
     pub entries: Vec<TableEntry>,
     /// What the first form lacks, by cause.
     pub deficit: Option<Deficit>,
-    /// The same as the notes give it.
+    /// The expected deficit.
     pub deficit_expected: Option<Deficit>,
     /// Parameters of the null directions of the minimal form.
     pub null_of_minimal: Vec<String>,
-    /// The same as the notes give them, where they name them all.
+    /// The expected parameters, where the table names them all.
     pub null_of_minimal_expected: Option<Vec<String>>,
-    /// Whether everything that the notes say of it was measured.
+    /// Whether every expected result was measured.
     pub agrees: bool,
 }
 
@@ -66,17 +66,17 @@ pub struct TableRow {
 pub struct TableEntry {
     /// Name of the form.
     pub form: String,
-    /// Its short name in the notes.
+    /// Its letter (docs/mathematics.md, section 3).
     pub column: String,
     /// Number of columns.
     pub columns: usize,
     /// The structural rank measured here.
     pub measured: usize,
-    /// The rank of the notes.
+    /// The expected rank.
     pub expected: usize,
 }
 
-/// Runs every experiment of the mathematics notes' truth table.
+/// Runs every scenario of docs/mathematics.md, section 7, and every case of docs/mathematics.md, section 9.
 pub fn truth_table() -> TruthTable {
     let mut sections: Vec<TableSection> = SECTIONS
         .par_iter()
@@ -257,7 +257,7 @@ impl fmt::Display for TruthTable {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             out,
-            "Structural ranks, measured/expected by the mathematics notes (! where they differ).\n\
+            "Structural ranks, measured/expected by docs/mathematics.md, section 7 (! where they differ).\n\
              C classical, M minimal, B minimal-swapped, Mb minimal-yx, P poe, - without joint offsets; lost to the\n\
              parameterization (G), joints that do not move (F), free joint angles (E), motion (M), of the first form."
         )?;
@@ -271,7 +271,11 @@ impl fmt::Display for TruthTable {
         for row in &self.spurious {
             writeln!(out, "{row}")?;
         }
-        writeln!(out, "\n{} of {} figures agree with the notes", self.agreeing, self.compared)
+        writeln!(
+            out,
+            "\n{} of {} results agree with docs/mathematics.md, sections 7 and 9",
+            self.agreeing, self.compared
+        )
     }
 }
 

@@ -1,5 +1,4 @@
-//! The truth table of the mathematics notes (section 2): what was measured there, for holding against what is measured
-//! here.
+//! The degeneracy table (docs/mathematics.md, section 7): the expected results of its scenarios.
 //!
 //! Its column A, the paper's swap taken literally, is left out: that form cannot represent every mechanism and is not one
 //! of the program's.
@@ -41,7 +40,7 @@ pub(super) enum Poses {
     BiasFree,
 }
 
-/// One row: the experiment, and the ranks that the notes give.
+/// One row: the scenario, and the expected ranks.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Truth {
     pub(super) scenario: &'static str,
@@ -56,11 +55,11 @@ pub(super) struct Truth {
     pub(super) ranks: &'static [(Column, usize)],
     /// Deficit of the first column by its four causes: parameterization, joints, absorbed, motion.
     pub(super) causes: Option<[usize; 4]>,
-    /// Parameters of the null directions of the minimal form, where the notes name them all.
+    /// Parameters of the null directions of the minimal parameterization, where the table names them all.
     pub(super) null_of_minimal: Option<&'static [&'static str]>,
 }
 
-/// A table of the notes.
+/// A table of docs/mathematics.md, section 7.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Section {
     pub(super) title: &'static str,
@@ -129,7 +128,7 @@ const TWO_11: &[(Column, usize)] = &[(C, 11), (M, 11)];
 const TWO_10: &[(Column, usize)] = &[(C, 10), (M, 10)];
 const WITHOUT_15: &[(Column, usize)] = &[(CWithout, 15), (MWithout, 15)];
 
-/// The tables of the notes.
+/// The tables of docs/mathematics.md, section 7.
 pub(super) const SECTIONS: [Section; 6] = [
     Section {
         title: "Joint angles and poses (exciting motion)",
@@ -485,7 +484,7 @@ pub(super) struct LeastFrames {
     pub(super) poses: Poses,
     /// The rank to be reached in the minimal form.
     pub(super) rank: usize,
-    /// How many frames the notes give, from and to where they leave it open.
+    /// Expected number of frames: least and most, where the table leaves it open.
     pub(super) frames: (usize, usize),
 }
 

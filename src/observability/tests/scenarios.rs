@@ -1,4 +1,4 @@
-//! The causes of rank loss in windows made here, as in the truth table of the mathematics notes.
+//! The causes of rank loss in simulated windows (docs/mathematics.md, section 7).
 
 use nalgebra::{DMatrix, DVector, UnitQuaternion, Vector3};
 

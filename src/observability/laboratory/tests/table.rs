@@ -2,7 +2,7 @@ use super::super::{LaboratoryForm, LaboratoryMotion, LaboratorySetup, Mechanism,
 use crate::gimbal::Parameterization;
 
 #[test]
-fn everything_measured_agrees_with_the_notes() {
+fn everything_measured_agrees_with_the_expected_results() {
     let table = truth_table();
     let rows = table.sections.iter().flat_map(|section| &section.rows);
     let wrong: Vec<_> = rows.filter(|row| !row.agrees).collect();
