@@ -1,4 +1,4 @@
-use nalgebra::{Matrix4, Vector3, Vector6};
+use nalgebra::{Matrix3, Matrix4, Vector3, Vector6};
 
 use super::{RigidTransform, so3};
 
@@ -38,7 +38,45 @@ fn right_jacobian_meets_central_differences() {
             assert!((analytic.column(axis) - numeric).norm() < 1e-9, "{phi:?} column {axis}");
         }
         let product = analytic * so3::right_jacobian_inverse(&phi);
-        assert!((product - nalgebra::Matrix3::identity()).amax() < 1e-9, "{phi:?}");
+        assert!((product - Matrix3::identity()).amax() < 1e-9, "{phi:?}");
+    }
+}
+
+/// Power series of the right Jacobian, `Σ (−[φ]^)ⁿ/(n + 1)!`, and of its inverse with Bernoulli numbers, both accurate to
+/// rounding up to 0.4 rad.
+fn right_jacobian_series(phi: &Vector3<f64>) -> (Matrix3<f64>, Matrix3<f64>) {
+    let k = so3::hat(phi);
+    let mut term = Matrix3::identity();
+    let mut sum = term;
+    for n in 1..20 {
+        term = term * -k / f64::from(n + 1);
+        sum += term;
+    }
+    const COEFFICIENTS: [f64; 6] =
+        [1.0 / 12.0, 1.0 / 720.0, 1.0 / 30_240.0, 1.0 / 1_209_600.0, 1.0 / 47_900_160.0, 691.0 / 1_307_674_368_000.0];
+    let factor = COEFFICIENTS.iter().rev().fold(0.0, |sum, coefficient| coefficient + sum * phi.norm_squared());
+    (sum, Matrix3::identity() + k * 0.5 + k * k * factor)
+}
+
+#[test]
+fn right_jacobians_are_as_accurate_as_they_state() {
+    let axes =
+        [Vector3::x(), Vector3::new(0.3, -0.5, 0.8), Vector3::new(-0.7, 0.1, -0.2), Vector3::new(0.0, 1.0, -1.0)];
+    for step in 0..=760 {
+        let angle_rad = 1e-8 * 10.0_f64.powf(f64::from(step) / 100.0);
+        for axis in &axes {
+            let phi = axis.normalize() * angle_rad;
+            let (jacobian, inverse) = right_jacobian_series(&phi);
+            let error = (so3::right_jacobian(&phi) - jacobian).amax();
+            let bound = match angle_rad {
+                small if small < 1e-4 => 4.2e-14,
+                large if large > 0.01 => 1e-14,
+                _ => 1e-12,
+            };
+            assert!(error <= bound, "{angle_rad} rad: {error} over {bound}");
+            let error = (so3::right_jacobian_inverse(&phi) - inverse).amax();
+            assert!(error <= 1e-15, "{angle_rad} rad: {error} in the inverse");
+        }
     }
 }
 
