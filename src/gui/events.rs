@@ -30,7 +30,7 @@ pub(crate) fn name_of(kind: EventKind) -> &'static str {
         EventKind::InitializedFromStandstill => "initialized from standstill",
         EventKind::KeyframeChosen => "keyframe",
         EventKind::OldestMarginalized => "oldest frame marginalized",
-        EventKind::SecondNewestMarginalized => "second-newest frame dropped",
+        EventKind::SecondNewestDropped => "second-newest frame dropped",
         EventKind::OutliersRejected => "outliers rejected",
         EventKind::Standstill => "standstill",
         EventKind::Failure => "failure",
@@ -48,7 +48,7 @@ pub(crate) fn look_of(kind: EventKind, theme: &Theme) -> (Mark, Color32) {
         EventKind::MeasurementMissing => (Mark::Square, theme.warn),
         EventKind::Standstill | EventKind::InitializationWaits => (Mark::Disc, theme.text_weak),
         EventKind::OutliersRejected => (Mark::Cross, theme.warn),
-        EventKind::KeyframeChosen | EventKind::OldestMarginalized | EventKind::SecondNewestMarginalized => {
+        EventKind::KeyframeChosen | EventKind::OldestMarginalized | EventKind::SecondNewestDropped => {
             (Mark::Line, theme.text_weak)
         }
     }

@@ -537,7 +537,7 @@ fn sample_events(index: usize, keyframe: bool, rejected: usize) -> Vec<Event> {
         events.push(event(EventKind::KeyframeChosen, "keyframe: parallax 11.0 px".into(), Some(11.0), Some(10.0)));
         events.push(event(EventKind::OldestMarginalized, "oldest frame marginalized".into(), None, None));
     } else {
-        events.push(event(EventKind::SecondNewestMarginalized, "second-newest frame dropped".into(), None, None));
+        events.push(event(EventKind::SecondNewestDropped, "second-newest frame dropped".into(), None, None));
     }
     if rejected > 0 {
         let message = format!("{rejected} features rejected: χ² over 9.21");

@@ -13,8 +13,10 @@ pub enum EventKind {
     KeyframeChosen,
     /// The oldest frame was marginalized.
     OldestMarginalized,
-    /// The second-newest frame was dropped.
-    SecondNewestMarginalized,
+    /// The second-newest frame, no keyframe, was dropped: its visual observations are discarded, its IMU samples continue
+    /// in the preintegration of the newest frame, and its encoder readings go into the prior where that holds the frame,
+    /// else into the readings of the newest frame.
+    SecondNewestDropped,
     /// Features were rejected as outliers after the solve.
     OutliersRejected,
     /// The vehicle stands still.
@@ -46,7 +48,7 @@ impl EventKind {
             Self::InitializationWaits
             | Self::KeyframeChosen
             | Self::OldestMarginalized
-            | Self::SecondNewestMarginalized
+            | Self::SecondNewestDropped
             | Self::OutliersRejected => false,
         }
     }

@@ -329,7 +329,7 @@ impl Estimator {
         let newest = self.frames.len() - 1;
         if newest >= 2 && !self.frames[newest - 1].keyframe {
             events.push(Event {
-                kind: EventKind::SecondNewestMarginalized,
+                kind: EventKind::SecondNewestDropped,
                 message: format!("image {} dropped: no keyframe", self.frames[newest - 1].index),
                 value: None,
                 threshold: None,

@@ -154,7 +154,7 @@ pub(super) const EVENTS: [(&str, &[EventKind]); 10] = [
     ("initialized", &[EventKind::InitializedFromMotion, EventKind::InitializedFromStandstill]),
     ("keyframe_decided", &[EventKind::KeyframeChosen]),
     ("marginalized", &[EventKind::OldestMarginalized]),
-    ("dropped", &[EventKind::SecondNewestMarginalized]),
+    ("dropped", &[EventKind::SecondNewestDropped]),
     ("outliers", &[EventKind::OutliersRejected]),
     ("standstill", &[EventKind::Standstill]),
     ("failure", &[EventKind::Failure]),
