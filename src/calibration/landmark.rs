@@ -1,9 +1,9 @@
 //! Landmarks of the bundle and what one camera sees of them.
 
-use nalgebra::{Matrix2x3, Matrix2x6, Matrix3, Matrix3x2, Vector2, Vector3};
+use nalgebra::{Matrix2x3, Matrix2x6, Matrix3, Vector2, Vector3};
 
 use crate::camera::CameraModel;
-use crate::geometry::so3;
+use crate::geometry::{so3, tangent_basis};
 
 /// Least inverse distance, in 1/m: beyond it a landmark counts as infinitely far.
 const MIN_INVERSE_DISTANCE: f64 = 1e-5;
@@ -43,13 +43,6 @@ impl Landmark {
     fn in_camera(&self, view: &ViewPose) -> Vector3<f64> {
         view.rotation.tr_mul(&(self.direction + (self.reference_m - view.position_m) * self.inverse_distance))
     }
-}
-
-/// Two unit vectors that span the plane across a unit direction.
-fn tangent_basis(direction: &Vector3<f64>) -> Matrix3x2<f64> {
-    let helper = if direction.z.abs() < 0.9 { Vector3::z() } else { Vector3::x() };
-    let first = direction.cross(&helper).normalize();
-    Matrix3x2::from_columns(&[first, direction.cross(&first)])
 }
 
 /// Where a camera was when it took an image.

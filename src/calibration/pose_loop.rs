@@ -7,10 +7,9 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6xX, UnitQuaternion, Vector3, Vector6};
 
 use super::chain_prior::ChainTerm;
-use super::rounds::median;
 use super::segments::Segment;
 use crate::estimator::RobustLoss;
-use crate::geometry::{RigidTransform, so3, wrap_angle};
+use crate::geometry::{RigidTransform, median, so3, wrap_angle};
 use crate::gimbal::Chain;
 use crate::sensors::JointAngles;
 
@@ -167,7 +166,7 @@ impl PoseLoops<'_> {
             (state, covariance) = (next, found);
             iterations += used;
             let lengths = self.each_pair().map(|(segment, pair)| self.position_error(&state, segment, pair).norm());
-            let spread_m = median(lengths.collect())? / MEDIAN_LENGTH;
+            let spread_m = median(lengths)? / MEDIAN_LENGTH;
             noise = LoopNoise {
                 rotation_rad: ROTATION_SIGMA_RAD,
                 position_m: (spread_m * self.lost_freedom()).max(LEAST_POSITION_SIGMA_M),

@@ -11,6 +11,7 @@ use super::visual::{PixelModel, Track};
 use super::{CalibrationError, CalibrationOptions};
 use crate::camera::CameraModel;
 use crate::estimator::RobustLoss;
+use crate::geometry::median;
 
 /// What a tracked pixel is worth before the residuals say, per coordinate.
 const FIRST_SIGMA_PX: f64 = 1.0;
@@ -137,13 +138,4 @@ impl Stage<'_> {
             instants[index].reintegrate(before.as_ref(), &estimate.navigation[index].bias);
         }
     }
-}
-
-/// The median (upper one for an even count), `None` of none.
-pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
-    if values.is_empty() {
-        return None;
-    }
-    let middle = values.len() / 2;
-    Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }

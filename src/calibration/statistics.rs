@@ -1,3 +1,5 @@
+use crate::geometry::median;
+
 /// Statistics of a series of lengths.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Statistics {
@@ -20,7 +22,7 @@ impl Statistics {
         let mean = values.iter().sum::<f64>() / count;
         let mean_square = values.iter().map(|value| value * value).sum::<f64>() / count;
         let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / count;
-        let median = super::rounds::median(values.to_vec())?;
+        let median = median(values.iter().copied())?;
         Some(Self { count: values.len(), mean, median, std: variance.sqrt(), rms: mean_square.sqrt() })
     }
 }

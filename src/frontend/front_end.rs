@@ -10,6 +10,7 @@ use super::prediction::PredictedRotation;
 use super::pyramid::Pyramid;
 use super::tracks::{FeatureId, FrontEndStatistics, TrackedFeature, TrackedFrame};
 use crate::camera::CameraModel;
+use crate::geometry::median;
 use crate::sensors::GrayImage;
 
 /// What a front end can be told.
@@ -154,7 +155,7 @@ impl FrontEnd {
         statistics.tracked = steps.len();
         statistics.rejected = before - statistics.lost - steps.len();
         statistics.median_flow_px =
-            median(steps.iter().map(|step| (step.uv_px - step.previous_uv_px).norm()).collect());
+            median(steps.iter().map(|step| (step.uv_px - step.previous_uv_px).norm())).unwrap_or(0.0);
         statistics.mean_parallax_px = self.mean_parallax_px(&steps, &motion.rotation);
 
         let mut features: Vec<TrackedFeature> = steps
@@ -318,10 +319,4 @@ impl FrontEnd {
 
 fn pair_of(step: &Step) -> BearingPair {
     BearingPair { previous: step.previous_bearing, now: step.bearing }
-}
-
-/// The upper median, zero of nothing.
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }

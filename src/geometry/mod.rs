@@ -1,4 +1,4 @@
-//! Rotations, rigid transforms and the perturbation rule.
+//! Rotations, rigid transforms and the perturbation rule; tangent plane of a direction, median.
 //!
 //! The rule is written here once: a perturbation is `[φ; δt]`, rotation first, with `R ← R·Exp(φ)` (right, local) and
 //! `t ← t + δt` (a vector in the outer frame).
@@ -6,15 +6,19 @@
 
 mod angle;
 pub mod dense;
+mod median;
 mod rigid_transform;
 pub mod so3;
 mod split_mix;
+mod tangent;
 #[cfg(test)]
 mod tests;
 
 pub use angle::wrap_angle;
+pub use median::median;
 pub use rigid_transform::RigidTransform;
 pub use split_mix::SplitMix64;
+pub use tangent::tangent_basis;
 
 /// Seconds of a time stamp or duration in nanoseconds.
 pub fn seconds_from_ns(time_ns: i64) -> f64 {

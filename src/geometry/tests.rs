@@ -1,6 +1,6 @@
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector6};
 
-use super::{RigidTransform, so3};
+use super::{RigidTransform, SplitMix64, median, so3, tangent_basis};
 
 /// Rotation vectors from tiny to just under a half turn.
 fn rotation_vectors() -> Vec<Vector3<f64>> {
@@ -143,4 +143,24 @@ fn angles_are_wrapped_to_one_turn_and_left_alone_within_it() {
             assert!((wrap_angle(angle + f64::from(turns) * TAU) - angle).abs() < 1e-14, "{angle} and {turns} turns");
         }
     }
+}
+
+#[test]
+fn tangent_basis_is_orthonormal_and_right_handed() {
+    let mut random = SplitMix64::new(6);
+    for _ in 0..100 {
+        let direction = Vector3::from_fn(|_, _| random.next_unit() - 0.5).normalize();
+        let basis = tangent_basis(&direction);
+        assert!((basis.tr_mul(&basis) - nalgebra::Matrix2::identity()).amax() < 1e-14);
+        assert!(basis.tr_mul(&direction).norm() < 1e-14);
+        assert!((basis.column(0).cross(&basis.column(1)) - direction).norm() < 1e-14);
+    }
+}
+
+#[test]
+fn median_of_an_even_count_is_the_upper_one() {
+    assert_eq!(median([]), None);
+    assert_eq!(median([3.0]), Some(3.0));
+    assert_eq!(median([4.0, 1.0, 3.0, 2.0]), Some(3.0));
+    assert_eq!(median([5.0, -1.0, 2.0]), Some(2.0));
 }

@@ -2,6 +2,8 @@
 
 use nalgebra::Vector3;
 
+use crate::geometry;
+
 /// The value below which the share `fraction` of the numbers lies; 0 for none.
 pub(super) fn percentile(values: &[f64], fraction: f64) -> f64 {
     let mut sorted = values.to_vec();
@@ -10,8 +12,9 @@ pub(super) fn percentile(values: &[f64], fraction: f64) -> f64 {
     sorted.get((fraction * last as f64).round() as usize).copied().unwrap_or(0.0)
 }
 
+/// The median; 0 for none.
 pub(super) fn median(values: &[f64]) -> f64 {
-    percentile(values, 0.5)
+    geometry::median(values.iter().copied()).unwrap_or(0.0)
 }
 
 /// Mean of vectors; zero for none.

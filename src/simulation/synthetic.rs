@@ -15,7 +15,7 @@ use super::scenario::{Scenario, ScenarioOptions, gravity_m_per_s2, stream};
 use super::trajectory::{Trajectory, VehicleLimits};
 use crate::camera::CameraModel;
 use crate::frontend::{FeatureId, FrontEndStatistics, TrackedFeature, TrackedFrame};
-use crate::geometry::{RigidTransform, ns_from_seconds};
+use crate::geometry::{RigidTransform, median, ns_from_seconds};
 use crate::sensors::{ChainPrior, ImuSample, JointAngles, Rig};
 
 /// What carries the camera of a synthetic flight.
@@ -404,8 +404,7 @@ impl Tracker {
                 counted += 1;
             }
         }
-        flows.sort_by(f64::total_cmp);
-        statistics.median_flow_px = flows.get(flows.len() / 2).copied().unwrap_or(0.0);
+        statistics.median_flow_px = median(flows).unwrap_or(0.0);
         statistics.mean_parallax_px = parallax_px / counted.max(1) as f64;
     }
 }

@@ -3,10 +3,10 @@
 //! Calibration and joint angles move a residual only through the poses of the two cameras, so that is where it is
 //! linearized; [`crate::estimator::state::camera_pose`] carries it on to the states.
 
-use nalgebra::{Matrix2x3, Matrix2x6, Matrix3, Matrix3x2, Vector2, Vector3};
+use nalgebra::{Matrix2x3, Matrix2x6, Matrix3, Vector2, Vector3};
 
 use crate::camera::CameraModel;
-use crate::geometry::so3;
+use crate::geometry::{so3, tangent_basis};
 
 /// A feature in the frame of its anchor camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,14 +34,6 @@ impl Landmark {
     pub(crate) fn point_in_anchor(&self) -> Vector3<f64> {
         self.bearing / self.inverse_distance.max(MIN_INVERSE_DISTANCE)
     }
-}
-
-/// Two unit vectors that span the plane across a unit direction.
-pub(crate) fn tangent_basis(direction: &Vector3<f64>) -> Matrix3x2<f64> {
-    let helper = if direction.z.abs() < 0.9 { Vector3::z() } else { Vector3::x() };
-    let first = direction.cross(&helper).normalize();
-    let second = direction.cross(&first);
-    Matrix3x2::from_columns(&[first, second])
 }
 
 /// Where a camera is in the world.

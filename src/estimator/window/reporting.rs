@@ -13,6 +13,7 @@ use crate::estimator::{
     CalibrationEstimate, FeatureCounts, FeatureReport, FrameStateReport, LandmarkReport, ObservationReport, Phase,
     ResidualSummary, StageTimes, StepInput, StepReport,
 };
+use crate::geometry::median;
 
 impl Estimator {
     /// A report that holds nothing but the calibration.
@@ -256,7 +257,5 @@ fn root_mean_square<'a>(residuals: impl Iterator<Item = &'a TrackResiduals>) -> 
 }
 
 fn median_length<'a>(residuals: impl Iterator<Item = &'a TrackResiduals>) -> f64 {
-    let mut lengths: Vec<f64> = residuals.flatten().flatten().flatten().map(|residual| residual.norm()).collect();
-    let middle = lengths.len() / 2;
-    if lengths.is_empty() { f64::NAN } else { *lengths.select_nth_unstable_by(middle, f64::total_cmp).1 }
+    median(residuals.flatten().flatten().flatten().map(|residual| residual.norm())).unwrap_or(f64::NAN)
 }

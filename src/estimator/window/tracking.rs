@@ -19,7 +19,7 @@ use crate::estimator::{
     window::features::FeatureMap,
 };
 use crate::frontend::FeatureId;
-use crate::geometry::seconds_from_ns;
+use crate::geometry::{median, seconds_from_ns};
 
 /// Distance of a scene of which no landmark is known.
 const UNKNOWN_DISTANCE_M: f64 = 10.0;
@@ -120,12 +120,8 @@ impl Estimator {
     /// Median distance of the landmarks from where they are anchored.
     fn usual_distance_m(&self) -> f64 {
         let features = self.features.iter().flat_map(FeatureMap::values);
-        let mut inverse: Vec<f64> = features.filter_map(|feature| Some(feature.landmark?.inverse_distance)).collect();
-        if inverse.is_empty() {
-            return UNKNOWN_DISTANCE_M;
-        }
-        let middle = inverse.len() / 2;
-        1.0 / (*inverse.select_nth_unstable_by(middle, f64::total_cmp).1).max(1.0 / FARTHEST_USUAL_M)
+        median(features.filter_map(|feature| Some(feature.landmark?.inverse_distance)))
+            .map_or(UNKNOWN_DISTANCE_M, |inverse_distance| 1.0 / inverse_distance.max(1.0 / FARTHEST_USUAL_M))
     }
 
     /// Poses of a camera by slot.

@@ -3,9 +3,10 @@
 use nalgebra::Vector2;
 
 use super::homography::Scene;
-use super::{blank, camera_of, median, scene, texture};
+use super::{blank, camera_of, scene, texture};
 use crate::frontend::keyed::{Key, KeyFinder, KeyOptions, Sighting};
 use crate::frontend::{FeatureId, FrontEnd, FrontEndOptions};
+use crate::geometry::median;
 use crate::sensors::GrayImage;
 
 /// Whole-pixel and fractional places well inside the image.
@@ -39,7 +40,7 @@ fn a_key_is_found_again_turned_and_grown() {
     for (to, speed, flicker) in [(5, 0.3, 0.0), (7, 0.8, 0.0), (7, 0.8, 0.3)] {
         let (errors, count) = find_all(&Scene { flicker, ..scene(speed) }, to);
         assert!(count > 50 && errors.len() * 20 >= count * 19, "{} of {count} in image {to}", errors.len());
-        let median_px = median(errors);
+        let median_px = median(errors).unwrap();
         assert!(median_px < 0.06, "median error {median_px} px in image {to}");
     }
 }
@@ -91,6 +92,6 @@ fn long_tracks_do_not_drift() {
         }
     }
     assert!(errors.len() > 200, "{}", errors.len());
-    let median_px = median(errors);
+    let median_px = median(errors).unwrap();
     assert!(median_px < 0.07, "{median_px} px");
 }

@@ -28,8 +28,3 @@ fn camera_of(scene: &Scene) -> CameraModel {
 fn blank(scene: &Scene) -> GrayImage {
     GrayImage { width: scene.width, height: scene.height, pixels: vec![90; scene.width * scene.height] }
 }
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
-}
