@@ -6,7 +6,7 @@
 use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
 
 use super::prediction::PredictedRotation;
-use crate::geometry::so3;
+use crate::geometry::{so3, tangent_basis};
 
 /// How outliers are told.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -402,14 +402,8 @@ fn step_towards(
         let ratio = gap * gap / (spread * scale * scale);
         let weight = 1.0 / (spread * scale * scale * (1.0 + ratio) * (1.0 + ratio));
         let by_turn = turned.cross(&other_plane);
-        let by_direction = turned.cross(&pair.now);
-        let row = SVector::<f64, 5>::new(
-            by_turn.x,
-            by_turn.y,
-            by_turn.z,
-            by_direction.dot(&basis[0]),
-            by_direction.dot(&basis[1]),
-        );
+        let by_direction = basis.tr_mul(&turned.cross(&pair.now));
+        let row = SVector::<f64, 5>::new(by_turn.x, by_turn.y, by_turn.z, by_direction.x, by_direction.y);
         normal += row * row.transpose() * weight;
         right -= row * (gap * weight);
     }
@@ -424,15 +418,8 @@ fn step_towards(
     let step = normal.cholesky()?.solve(&right);
     let turn = so3::exp(&Vector3::new(step[0], step[1], step[2]));
     let rotation = UnitQuaternion::new_normalize((turn * at.rotation).into_inner());
-    let direction = (at.direction + basis[0] * step[3] + basis[1] * step[4]).try_normalize(1e-9)?;
+    let direction = (at.direction + basis * step.fixed_rows::<2>(3)).try_normalize(1e-9)?;
     Some((rotation, direction))
-}
-
-/// Two unit vectors that make a right-handed frame with `direction`.
-fn tangent_basis(direction: &Vector3<f64>) -> [Vector3<f64>; 2] {
-    let other = if direction.x.abs() < 0.6 { Vector3::x() } else { Vector3::y() };
-    let first = direction.cross(&other).normalize();
-    [first, direction.cross(&first)]
 }
 
 /// A small random number generator (xorshift64*), the same everywhere.

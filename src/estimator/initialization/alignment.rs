@@ -6,9 +6,8 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
-use super::bearing::median;
 use crate::estimator::{ImuBias, Preintegration};
-use crate::geometry::{RigidTransform, so3};
+use crate::geometry::{RigidTransform, median, so3};
 
 /// Noise of a visual rotation between two views, added to the mount's.
 const VISUAL_ROTATION_SIGMA_RAD: f64 = 0.002;
@@ -358,5 +357,5 @@ pub(super) fn quadratic_on_sphere(a: &Matrix3<f64>, b: &Vector3<f64>, norm: f64)
 
 /// Median distance of landmarks from their anchors, in their own unit.
 pub(super) fn median_distance(inverse_distances: impl Iterator<Item = f64>) -> f64 {
-    1.0 / median(inverse_distances.collect()).max(1e-9)
+    1.0 / median(inverse_distances).unwrap_or(0.0).max(1e-9)
 }

@@ -1,18 +1,8 @@
 //! Geometry of unit bearings: tangent planes, rotation between two sets, triangulation, pose from known points.
 
-use nalgebra::{Matrix2x3, Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
-use crate::geometry::{RigidTransform, so3};
-
-/// Two unit vectors that span the plane orthogonal to a unit bearing, as rows (2 × 3).
-///
-/// `basis · direction` is the small angle in radians between `direction` and the bearing, in that plane.
-pub fn tangent_basis(bearing: &Vector3<f64>) -> Matrix2x3<f64> {
-    let seed = if bearing.z.abs() < 0.7 { Vector3::z() } else { Vector3::x() };
-    let first = bearing.cross(&seed).normalize();
-    let second = bearing.cross(&first);
-    Matrix2x3::from_rows(&[first.transpose(), second.transpose()])
-}
+use crate::geometry::{RigidTransform, median, so3, tangent_basis};
 
 /// Weight of Huber's loss for a residual of `ratio` standard deviations.
 pub(super) fn huber_weight(ratio: f64, threshold: f64) -> f64 {
@@ -63,21 +53,12 @@ pub fn fit_rotation(
 
 /// Median angle between `rotation · first` and `second`, in radians.
 fn median_angle(pairs: &[(Vector3<f64>, Vector3<f64>)], rotation: &UnitQuaternion<f64>) -> f64 {
-    median(pairs.iter().map(|(first, second)| angle_between(&(rotation * first), second)).collect())
+    median(pairs.iter().map(|(first, second)| angle_between(&(rotation * first), second))).unwrap_or(0.0)
 }
 
 /// Angle between two unit vectors in radians, exact for small angles too.
 pub fn angle_between(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
     a.cross(b).norm().atan2(a.dot(b))
-}
-
-/// The median (upper one for an even count), 0 for none.
-pub(super) fn median(mut values: Vec<f64>) -> f64 {
-    let middle = values.len() / 2;
-    if values.is_empty() {
-        return 0.0;
-    }
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 /// A point found from several bearings.
@@ -207,7 +188,7 @@ fn pose_residual(
         return None;
     }
     let direction = in_camera / distance;
-    let basis = tangent_basis(bearing);
+    let basis = tangent_basis(bearing).transpose();
     let by_point = basis * (Matrix3::identity() - direction * direction.transpose()) / distance;
     let mut jacobian = nalgebra::Matrix2x6::zeros();
     jacobian.fixed_view_mut::<2, 3>(0, 0).copy_from(&(by_point * so3::hat(&in_camera)));

@@ -8,10 +8,9 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix3x2, SMatrix, SVector, UnitQuaternion, Vector3};
 
 use super::alignment::{Alignment, VectorPrior};
-use super::bearing::tangent_basis;
 use super::visual_problem::{Landmark, VisualNormal, visual_cost};
 use crate::estimator::{ImuBias, Preintegration};
-use crate::geometry::{RigidTransform, so3};
+use crate::geometry::{RigidTransform, so3, tangent_basis};
 
 /// Tightest standard deviation that a prior on the mount may have, so that "exactly known" stays solvable.
 const LEAST_SIGMA: f64 = 1e-5;
@@ -154,7 +153,7 @@ impl RefinedState {
 
     fn gravity_basis(&self) -> Matrix3x2<f64> {
         let norm = self.gravity.norm();
-        tangent_basis(&(self.gravity / norm)).transpose() * norm
+        tangent_basis(&(self.gravity / norm)) * norm
     }
 
     pub(super) fn moved(&self, step: &DVector<f64>, layout: &Layout, landmarks: Vec<Landmark>) -> Self {

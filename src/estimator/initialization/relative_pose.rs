@@ -2,9 +2,9 @@
 
 use nalgebra::{Matrix3, Matrix5, UnitQuaternion, Vector3, Vector5};
 
-use super::bearing::{angle_between, tangent_basis};
+use super::bearing::angle_between;
 use super::essential::{decompose, five_point};
-use crate::geometry::{RigidTransform, SplitMix64, so3};
+use crate::geometry::{RigidTransform, SplitMix64, so3, tangent_basis};
 
 /// Largest number of five-point samples drawn.
 const MAX_SAMPLES: usize = 160;
@@ -231,7 +231,7 @@ fn refine(pairs: &[(Vector3<f64>, Vector3<f64>)], start: &RigidTransform, sigma_
             }
             let residual = bearing_j.dot(&(essential * bearing_i)) / gradient;
             let by_rotation = -(bearing_j.transpose() * so3::hat(&pose.translation_m) * rotation * so3::hat(bearing_i));
-            let by_direction = basis * (rotation * bearing_i).cross(bearing_j);
+            let by_direction = basis.tr_mul(&(rotation * bearing_i).cross(bearing_j));
             let row =
                 Vector5::new(by_rotation.x, by_rotation.y, by_rotation.z, by_direction.x, by_direction.y) / gradient;
             let weight = 1.0 / (1.0 + (residual / (2.0 * sigma_rad)).powi(2)).powi(2);
@@ -245,7 +245,7 @@ fn refine(pairs: &[(Vector3<f64>, Vector3<f64>)], start: &RigidTransform, sigma_
         let Some(factor) = damped.cholesky() else { break };
         let step = factor.solve(&rhs);
         let turn = so3::exp(&Vector3::new(step[0], step[1], step[2]));
-        let direction = pose.translation_m + basis.transpose() * nalgebra::Vector2::new(step[3], step[4]);
+        let direction = pose.translation_m + basis * nalgebra::Vector2::new(step[3], step[4]);
         let next = RigidTransform::new(
             UnitQuaternion::new_normalize((pose.rotation * turn).into_inner()),
             direction.normalize(),

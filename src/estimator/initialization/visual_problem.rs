@@ -7,9 +7,9 @@
 
 use nalgebra::{DMatrix, DVector, Matrix2x3, Matrix2x6, Matrix3, Matrix6, Matrix6x3, Vector2, Vector3, Vector6};
 
-use super::bearing::{huber_weight, tangent_basis};
+use super::bearing::huber_weight;
 use crate::frontend::FeatureId;
-use crate::geometry::{RigidTransform, so3};
+use crate::geometry::{RigidTransform, so3, tangent_basis};
 
 /// Huber's threshold in standard deviations.
 pub(super) const HUBER_SIGMAS: f64 = 1.5;
@@ -28,7 +28,7 @@ pub(super) struct Sighting {
 
 impl Sighting {
     pub(super) fn new(view: usize, bearing: Vector3<f64>) -> Self {
-        Self { view, bearing, basis: tangent_basis(&bearing) }
+        Self { view, bearing, basis: tangent_basis(&bearing).transpose() }
     }
 }
 
@@ -55,7 +55,7 @@ impl Landmark {
 
     /// Moved by `[α (2, in the tangent plane of the direction); inverse distance]`.
     fn plus(&mut self, step: &Vector3<f64>) {
-        let shift = tangent_basis(&self.direction).tr_mul(&step.fixed_rows::<2>(0));
+        let shift = tangent_basis(&self.direction) * step.fixed_rows::<2>(0);
         self.direction = (self.direction + shift).normalize();
         self.inverse_distance += step.z;
     }
@@ -174,7 +174,7 @@ impl VisualNormal {
         damping: f64,
     ) -> EliminatedLandmark {
         let anchor = &world_from_camera[landmark.anchor];
-        let tangent = tangent_basis(&landmark.direction);
+        let tangent = tangent_basis(&landmark.direction).transpose();
         let (mut curvature, mut gradient) = (Matrix3::zeros(), Vector3::zeros());
         let mut anchor_hessian = Matrix6::zeros();
         let mut anchor_gradient = Vector6::zeros();

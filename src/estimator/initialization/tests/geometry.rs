@@ -4,9 +4,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, UnitQuaternion, Vector3};
 
 use super::flight::Random;
 use crate::estimator::initialization::alignment::{quadratic_on_sphere, solve_with_gravity_norm};
-use crate::estimator::initialization::bearing::{
-    angle_between, fit_rotation, refine_camera_pose, tangent_basis, triangulate,
-};
+use crate::estimator::initialization::bearing::{angle_between, fit_rotation, refine_camera_pose, triangulate};
 use crate::estimator::initialization::essential::{decompose, five_point};
 use crate::estimator::initialization::polynomial::{evaluate, real_roots};
 use crate::estimator::initialization::relative_pose::{RelativePose, RotationPrior, relative_poses};
@@ -190,17 +188,6 @@ fn camera_pose_is_refined_from_far_off_with_outliers() {
         assert!((found.world_from_camera.rotation.inverse() * pose.rotation).angle() < 0.003);
         assert!((found.world_from_camera.translation_m - pose.translation_m).norm() < 0.02);
         assert!(found.inliers.iter().filter(|inlier| **inlier).count() >= 32);
-    }
-}
-
-#[test]
-fn tangent_basis_is_orthonormal() {
-    let mut random = Random::new(6);
-    for _ in 0..100 {
-        let bearing = random.normal_vector().normalize();
-        let basis = tangent_basis(&bearing);
-        assert!((basis * basis.transpose() - nalgebra::Matrix2::identity()).amax() < 1e-14);
-        assert!((basis * bearing).norm() < 1e-14);
     }
 }
 
