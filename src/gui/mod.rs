@@ -5,6 +5,7 @@ pub mod breakpoints;
 mod chain_values;
 pub mod comparison;
 pub mod convergence;
+pub mod csv_table;
 pub mod desktop;
 mod events;
 mod follow;
@@ -52,7 +53,7 @@ use crate::frontend::FeatureId;
 use crate::observability::SlidePosition;
 use crate::sensors::GrayImage;
 use crate::session::breakpoints::Breakpoints;
-use crate::session::{Command, Recording, SolverPosition};
+use crate::session::{Command, Recording, RunRecord, SolverPosition};
 
 /// Gives the images of the log's cameras, by camera key and number in the stream.
 pub trait ImageSource {
@@ -129,4 +130,11 @@ pub struct PanelContext<'a> {
     pub theme: &'a Theme,
     /// Commands that the panel wants applied after this picture.
     pub commands: &'a mut Vec<Command>,
+}
+
+impl<'a> PanelContext<'a> {
+    /// The run that single-run panels show, `None` before the first run has started.
+    pub fn selected_run(&self) -> Option<&'a RunRecord> {
+        self.recording.runs.get(self.selection.run)
+    }
 }

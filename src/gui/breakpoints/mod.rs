@@ -1,5 +1,7 @@
 //! The breakpoints: conditions over the steps, how often each was hit, and the way to the next hit.
 
+mod csv;
+
 use egui::{Button, CollapsingHeader, Grid, Key, RichText, ScrollArea, TextEdit, Ui, WidgetInfo};
 
 use super::PanelContext;

@@ -1,5 +1,6 @@
 //! The comparison panel: up to four runs over one cursor, in numbers, as differences over time, and side by side.
 
+mod csv;
 mod numbers;
 mod over_time;
 pub(crate) mod scores;

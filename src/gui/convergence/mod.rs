@@ -1,5 +1,6 @@
 //! The convergence panel: one small plot per calibration parameter, along the chain.
 
+mod csv;
 mod layout;
 mod model;
 pub(crate) mod names;

@@ -1,5 +1,6 @@
 //! The camera image with its tracks and residuals.
 
+mod csv;
 mod model;
 mod paint;
 #[cfg(test)]

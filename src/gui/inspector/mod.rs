@@ -1,5 +1,6 @@
 //! The inspector: all numbers of what is selected, and of the step at the cursor.
 
+mod csv;
 mod feature;
 mod links;
 mod parameter;

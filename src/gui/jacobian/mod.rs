@@ -2,6 +2,7 @@
 //!
 //! Rows are the factors that residuals come from, columns the unknowns; a block is coloured by its norm.
 
+mod csv;
 mod details;
 mod factors;
 mod model;

@@ -3,6 +3,7 @@
 //! The experiments are those of `dcvins degeneracy`.
 
 mod choices;
+mod csv;
 #[cfg(test)]
 mod tests;
 mod worker;

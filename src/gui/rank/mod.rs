@@ -3,6 +3,7 @@
 mod advice;
 pub(super) mod columns;
 mod compare;
+mod csv;
 mod heat_map;
 mod information;
 mod slider;

@@ -7,6 +7,7 @@ mod camera;
 mod canvas;
 mod chain;
 mod cpu;
+mod csv;
 mod gpu;
 mod layout;
 mod model;

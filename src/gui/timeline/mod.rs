@@ -1,5 +1,6 @@
 //! The timeline: lanes over the whole log, and the cursor that all panels follow.
 
+mod csv;
 mod lanes;
 mod model;
 mod pace;

@@ -4,7 +4,6 @@
 
 mod actions;
 mod add_run;
-mod comparison_table;
 mod focus_ring;
 mod fork;
 mod fuzzy;
@@ -15,7 +14,6 @@ mod notices;
 mod palette;
 mod palette_items;
 mod panel_export;
-mod panel_table;
 mod panels;
 mod progress;
 mod saved_layouts;

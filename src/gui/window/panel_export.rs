@@ -3,7 +3,6 @@
 use egui::{CentralPanel, Frame, Ui, Vec2};
 use image::RgbaImage;
 
-use super::panel_table::table_of;
 use super::{PanelName, WindowState};
 use crate::geometry::seconds_from_ns;
 use crate::gui::headless::{self, HeadlessOptions};
@@ -64,13 +63,13 @@ pub(super) fn export(state: &WindowState, ctx: &mut PanelContext<'_>) -> PanelEx
     let drawing = headless::svg_of(options, "clip", panel.as_str(), &mut draw_ui);
     let log = recording.log_path.file_stem().map_or_else(|| "log".into(), |stem| stem.to_string_lossy().into_owned());
     let name = format!("{log}/{}-{:.3}s", panel.as_str(), seconds_from_ns(cursor_ns));
-    PanelExport { name, picture, drawing, table: table_of(panel, &mut copy.panels, ctx) }
+    PanelExport { name, picture, drawing, table: copy.panels.csv_table(panel, ctx) }
 }
 
 /// The numbers behind what a panel shows, comma separated.
 pub fn panel_table(panel: PanelName, state: &mut WindowState, ctx: &mut PanelContext<'_>) -> String {
     slide::update(ctx);
-    table_of(panel, &mut state.panels, ctx)
+    state.panels.csv_table(panel, ctx)
 }
 
 /// Draws a panel into all of `ui`.

@@ -7,6 +7,7 @@ use crate::gui::PanelContext;
 use crate::gui::breakpoints::BreakpointsPanel;
 use crate::gui::comparison::ComparisonPanel;
 use crate::gui::convergence::ConvergencePanel;
+use crate::gui::csv_table::CsvTable;
 use crate::gui::image_panel::ImagePanel;
 use crate::gui::inspector::InspectorPanel;
 use crate::gui::jacobian::JacobianPanel;
@@ -146,5 +147,26 @@ impl Panels {
             PanelName::Breakpoints => self.breakpoints.ui(ui, ctx),
             PanelName::Timeline => self.timeline.ui(ui, ctx),
         }
+    }
+
+    /// The numbers behind a panel as a CSV table, empty while there is no run.
+    pub(super) fn csv_table(&mut self, panel: PanelName, ctx: &PanelContext<'_>) -> String {
+        if ctx.selected_run().is_none() {
+            return String::new();
+        }
+        let source: &mut dyn CsvTable = match panel {
+            PanelName::Image => &mut self.image,
+            PanelName::Scene => &mut self.scene,
+            PanelName::Convergence => &mut self.convergence,
+            PanelName::Rank => &mut self.rank,
+            PanelName::Jacobian => &mut self.jacobian,
+            PanelName::Residuals => &mut self.residuals,
+            PanelName::Inspector => &mut self.inspector,
+            PanelName::Laboratory => &mut self.laboratory,
+            PanelName::Comparison => &mut self.comparison,
+            PanelName::Breakpoints => &mut self.breakpoints,
+            PanelName::Timeline => &mut self.timeline,
+        };
+        source.csv_table(ctx)
     }
 }

@@ -1,5 +1,7 @@
 //! The residuals panel: how well the window fits, as a histogram, over time, and by kind of factor.
 
+mod csv;
+
 use std::sync::Arc;
 
 use egui::{

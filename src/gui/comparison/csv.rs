@@ -1,0 +1,64 @@
+//! The comparison of all runs as a long table, one number a row.
+
+use super::ComparisonPanel;
+use crate::gui::PanelContext;
+use crate::gui::csv_table::{CsvTable, Table, number, seconds};
+use crate::session::Quantity;
+
+impl CsvTable for ComparisonPanel {
+    /// Accuracy of all runs, where each parts from the reference, and the differences of every common frame; differences in the
+    /// stored units (radians, metres), accuracy in the units of the panel.
+    fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {
+        let runs = &ctx.recording.runs;
+        let mut table = Table::new(["kind", "run", "reference", "quantity", "unit", "t_s", "value"]);
+        let label = |run: usize| runs.get(run).map_or_else(String::new, |run| run.spec.label.clone());
+        let comparisons = self.comparisons(ctx).to_vec();
+        for row in self.scores().rows() {
+            for (run, value) in row.values.iter().enumerate() {
+                let value = number(value.unwrap_or(f64::NAN));
+                let unit = row.unit.to_owned();
+                table.row([
+                    "accuracy".to_owned(),
+                    label(run),
+                    String::new(),
+                    row.name.clone(),
+                    unit,
+                    String::new(),
+                    value,
+                ]);
+            }
+        }
+        let reference = label(self.reference);
+        for (run, comparison) in comparisons.iter().enumerate().filter(|(run, _)| *run != self.reference) {
+            let mut say = |kind: &str, quantity: Quantity, stamp_ns: i64, value: f64| {
+                table.row([
+                    kind.to_owned(),
+                    label(run),
+                    reference.clone(),
+                    quantity.name().to_owned(),
+                    quantity.unit().to_owned(),
+                    seconds(stamp_ns),
+                    number(value),
+                ]);
+            };
+            for (quantity, parting) in Quantity::ALL.into_iter().zip(&comparison.partings) {
+                let at = |stamp_ns: i64| comparison.at(quantity, stamp_ns).unwrap_or(f64::NAN);
+                for (kind, stamp_ns) in [("first different", parting.exact_ns), ("first notable", parting.notable_ns)] {
+                    if let Some(stamp_ns) = stamp_ns {
+                        say(kind, quantity, stamp_ns, at(stamp_ns));
+                    }
+                }
+                if let Some((largest, stamp_ns)) = parting.largest {
+                    say("largest", quantity, stamp_ns, largest);
+                }
+            }
+            for quantity in Quantity::ALL {
+                let known = comparison.stamps_ns.iter().zip(comparison.column(quantity));
+                for (stamp_ns, apart) in known.filter(|(_, apart)| apart.is_finite()) {
+                    say("difference", quantity, *stamp_ns, *apart);
+                }
+            }
+        }
+        table.into_text()
+    }
+}

@@ -1,0 +1,47 @@
+//! The state at the cursor, one quantity a row.
+
+use super::InspectorPanel;
+use crate::geometry::seconds_from_ns;
+use crate::gui::PanelContext;
+use crate::gui::csv_table::{CsvTable, Table, number};
+
+impl CsvTable for InspectorPanel {
+    /// The state of the newest frame at the cursor.
+    fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {
+        let Some(run) = ctx.selected_run() else { return String::new() };
+        let mut table = Table::new(["quantity", "unit", "value"]);
+        let Some(step) = run.step_at(ctx.cursor_ns) else { return table.into_text() };
+        let mut say = |quantity: &str, unit: &str, value: f64| {
+            table.row([quantity.to_owned(), unit.to_owned(), number(value)]);
+        };
+        say("time", "s", seconds_from_ns(step.report.stamp_ns));
+        say("frame", "", step.report.frame_index as f64);
+        if let Some(newest) = step.report.newest() {
+            let rotation = newest.world_from_imu.rotation;
+            let vectors = [
+                ("position", "m", newest.world_from_imu.translation_m),
+                ("velocity", "m/s", newest.velocity_m_per_s),
+                ("accelerometer bias", "m/s2", newest.accelerometer_bias_m_per_s2),
+                ("gyroscope bias", "rad/s", newest.gyroscope_bias_rad_per_s),
+            ];
+            for (name, unit, vector) in vectors {
+                for (axis, value) in ["x", "y", "z"].into_iter().zip(vector.iter()) {
+                    say(&format!("{name} {axis}"), unit, *value);
+                }
+            }
+            for (name, value) in ["x", "y", "z", "w"].into_iter().zip(rotation.coords.iter()) {
+                say(&format!("attitude q{name}"), "", *value);
+            }
+            for (joint, angle) in newest.joint_angles_rad.iter().enumerate() {
+                say(&format!("joint {}", joint + 1), "rad", *angle);
+            }
+        }
+        let calibration = &step.report.calibration;
+        for (index, name) in calibration.names.iter().enumerate() {
+            let unit = calibration.units.get(index).copied().unwrap_or_default();
+            say(name, unit, calibration.values.get(index).copied().unwrap_or(f64::NAN));
+            say(&format!("{name} sigma"), unit, calibration.sigmas.get(index).copied().unwrap_or(f64::NAN));
+        }
+        table.into_text()
+    }
+}

@@ -1,0 +1,33 @@
+//! The spectra of the compared parameterizations, one singular value or one weight of a direction a row.
+
+use super::LaboratoryPanel;
+use crate::gui::PanelContext;
+use crate::gui::csv_table::{CsvTable, Table, number};
+
+impl CsvTable for LaboratoryPanel {
+    /// Each form's singular values and directions.
+    fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {
+        let mut table = Table::new(["form", "kind", "number", "singular_value", "parameter", "weight"]);
+        for (form, rank) in self.ranks(ctx) {
+            for (index, value) in rank.singular_values.iter().enumerate() {
+                let place = (index + 1).to_string();
+                let cells = [form.clone(), "singular value".to_owned(), place, number(*value)];
+                table.row(cells.into_iter().chain([String::new(), String::new()]));
+            }
+            for (index, direction) in rank.directions.iter().enumerate() {
+                let kind = if direction.structural { "null" } else { "weak" };
+                for (name, weight) in rank.names.iter().zip(&direction.weights).filter(|(_, weight)| **weight != 0.0) {
+                    table.row([
+                        form.clone(),
+                        kind.to_owned(),
+                        (index + 1).to_string(),
+                        number(direction.singular_value),
+                        name.clone(),
+                        number(*weight),
+                    ]);
+                }
+            }
+        }
+        table.into_text()
+    }
+}

@@ -1,0 +1,28 @@
+//! The singular values and directions at the cursor, one singular value a row.
+
+use super::RankPanel;
+use crate::gui::PanelContext;
+use crate::gui::csv_table::{CsvTable, Table, number};
+
+impl CsvTable for RankPanel {
+    /// Singular values of the step at the cursor, and each null or weak direction as weights by parameter name.
+    fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {
+        let Some(run) = ctx.selected_run() else { return String::new() };
+        let Some(rank) = run.step_at(ctx.cursor_ns).and_then(|step| step.rank.as_ref()) else { return String::new() };
+        let heads = ["number", "singular_value", "singular_value_with_priors", "kind"].map(str::to_owned);
+        let mut table = Table::new(heads.into_iter().chain(rank.names.iter().cloned()));
+        for (index, value) in rank.singular_values.iter().enumerate() {
+            // Directions come weakest first, singular values largest first.
+            let direction = rank.directions.get(rank.singular_values.len() - 1 - index);
+            let kind = direction.map_or("informed", |direction| if direction.structural { "null" } else { "weak" });
+            let with_priors = rank.singular_values_with_priors.get(index).copied().unwrap_or(f64::NAN);
+            let weights = (0..rank.names.len()).map(|column| {
+                let weight = direction.and_then(|direction| direction.weights.get(column));
+                number(weight.copied().unwrap_or(f64::NAN))
+            });
+            let heads = [(index + 1).to_string(), number(*value), number(with_priors), kind.to_owned()];
+            table.row(heads.into_iter().chain(weights));
+        }
+        table.into_text()
+    }
+}

@@ -1,0 +1,44 @@
+//! The residuals over time, one step of one run a row.
+
+use super::{ResidualsPanel, rms_px};
+use crate::gui::PanelContext;
+use crate::gui::csv_table::{CsvTable, Table, number, seconds};
+use crate::session::StepRecord;
+
+impl CsvTable for ResidualsPanel {
+    /// Reprojection RMS and χ² by kind of factor, for every step of every run.
+    fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {
+        let solved = |step: &&std::sync::Arc<StepRecord>| !step.report.window.is_empty();
+        let mut factors: Vec<&'static str> = Vec::new();
+        for summary in ctx.recording.runs.iter().flat_map(|run| &run.steps).flat_map(|step| &step.report.residuals) {
+            if !factors.contains(&summary.factor) {
+                factors.push(summary.factor);
+            }
+        }
+        let mut columns = ["t_s", "run", "rms_before_px", "rms_after_px"].map(str::to_owned).to_vec();
+        for factor in &factors {
+            let factor = factor.replace(' ', "_");
+            columns.extend(["count", "chi2_before", "chi2_after"].map(|part| format!("{factor}_{part}")));
+        }
+        let mut table = Table::new(columns);
+        for run in &ctx.recording.runs {
+            for step in run.steps.iter().filter(solved) {
+                let report = &step.report;
+                let heads = [
+                    seconds(report.stamp_ns),
+                    run.spec.label.clone(),
+                    number(report.reprojection_rms_before_px),
+                    number(rms_px(report)),
+                ];
+                let cells = factors.iter().flat_map(|factor| {
+                    let summary = report.residuals.iter().find(|summary| summary.factor == *factor);
+                    summary.map_or_else(Default::default, |summary| {
+                        [summary.count.to_string(), number(summary.chi2_before), number(summary.chi2_after)]
+                    })
+                });
+                table.row(heads.into_iter().chain(cells));
+            }
+        }
+        table.into_text()
+    }
+}

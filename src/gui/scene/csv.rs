@@ -1,0 +1,24 @@
+//! The trajectories of the scene, one step of one run a row.
+
+use super::ScenePanel;
+use crate::gui::PanelContext;
+use crate::gui::csv_table::{CsvTable, Table, number, seconds};
+
+impl CsvTable for ScenePanel {
+    /// Positions of all runs up to the cursor, laid on the truth as in the scene, and the truth.
+    fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {
+        let mut table = Table::new(["t_s", "run", "x_m", "y_m", "z_m", "truth_x_m", "truth_y_m", "truth_z_m"]);
+        for run in &ctx.recording.runs {
+            let aligned = run.alignment.unwrap_or_default();
+            for step in run.steps.iter().take_while(|step| step.report.stamp_ns <= ctx.cursor_ns) {
+                let estimate = step.report.newest().map(|frame| aligned.transform(&frame.world_from_imu.translation_m));
+                let truth = step.truth.map(|pose| pose.translation_m);
+                let places = [estimate, truth];
+                let coordinates =
+                    places.iter().flat_map(|at| at.map_or([f64::NAN; 3], |at| [at.x, at.y, at.z]).map(number));
+                table.row([seconds(step.report.stamp_ns), run.spec.label.clone()].into_iter().chain(coordinates));
+            }
+        }
+        table.into_text()
+    }
+}

@@ -1,0 +1,59 @@
+//! The lanes of the timeline, one step or one event a row.
+
+use super::TimelinePanel;
+use crate::gui::PanelContext;
+use crate::gui::csv_table::{CsvTable, Table, number, seconds};
+use crate::gui::events::name_of;
+use crate::gui::residuals::rms_px;
+
+impl CsvTable for TimelinePanel {
+    /// The lanes: a row for every step of every run, and below it one for each of its notable events and of the log's warnings.
+    fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {
+        const FIGURES: [&str; 7] =
+            ["phase", "keyframe", "features", "reprojection_rms_px", "rank_informed", "rank_structural", "rejected"];
+        const EVENT: [&str; 4] = ["event", "value", "threshold", "message"];
+        let mut rows: Vec<(i64, Vec<String>)> = Vec::new();
+        let event_row = |run: &str, event: [String; EVENT.len()]| -> Vec<String> {
+            std::iter::once(run.to_owned()).chain(FIGURES.map(|_| String::new())).chain(event).collect()
+        };
+        for warning in &ctx.recording.warnings {
+            let cells = ["warning".to_owned(), String::new(), String::new(), warning.message.clone()];
+            rows.push((warning.stamp_ns, event_row("", cells)));
+        }
+        for run in &ctx.recording.runs {
+            for step in &run.steps {
+                let (report, label) = (&step.report, &run.spec.label);
+                let rank = step.rank.as_ref().filter(|rank| !rank.names.is_empty());
+                let figures = [
+                    report.phase.name().to_owned(),
+                    report.keyframe.to_string(),
+                    step.tracks.features.len().to_string(),
+                    number(rms_px(report)),
+                    rank.map_or_else(String::new, |rank| rank.rank_informed.to_string()),
+                    rank.map_or_else(String::new, |rank| rank.rank_structural.to_string()),
+                    report.counts.rejected.to_string(),
+                ];
+                let nothing = EVENT.map(|_| String::new());
+                let cells = std::iter::once(label.clone()).chain(figures).chain(nothing);
+                rows.push((report.stamp_ns, cells.collect()));
+                for event in report.events.iter().filter(|event| event.kind.is_notable()) {
+                    let figure = |value: Option<f64>| number(value.unwrap_or(f64::NAN));
+                    let told = [
+                        name_of(event.kind).to_owned(),
+                        figure(event.value),
+                        figure(event.threshold),
+                        event.message.clone(),
+                    ];
+                    rows.push((report.stamp_ns, event_row(label, told)));
+                }
+            }
+        }
+        rows.sort_by_key(|(stamp_ns, _)| *stamp_ns);
+        let heads: Vec<&str> = ["t_s", "run"].into_iter().chain(FIGURES).chain(EVENT).collect();
+        let mut table = Table::new(heads);
+        for (stamp_ns, cells) in rows {
+            table.row(std::iter::once(seconds(stamp_ns)).chain(cells));
+        }
+        table.into_text()
+    }
+}
