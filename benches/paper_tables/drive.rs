@@ -10,8 +10,8 @@ use dcvins::geometry::RigidTransform;
 use dcvins::session::{self, Recording, RunRecord, SessionPlan, SessionRequest};
 use serde::{Deserialize, Serialize};
 
-use crate::consistency::{CalibrationErrors, PoseSquares, calibration_sample, pose_sample};
 use crate::logs::Log;
+use crate::samples::{CalibrationErrors, PoseSquares, calibration_sample, pose_sample};
 
 /// Frames between two looks at the covariances: about as long as a window, so that samples hardly share measurements.
 const SAMPLED_FRAMES: usize = 60;

@@ -35,6 +35,7 @@ mod flights;
 mod kept;
 mod logs;
 mod robustness;
+mod samples;
 #[path = "../shared/mod.rs"]
 mod shared;
 mod speed;

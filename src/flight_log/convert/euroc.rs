@@ -7,13 +7,11 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use super::super::MessageTimes;
 use super::ConvertError;
-use super::euroc_sensor::{CameraSensor, rig_of, sensor_pose};
+use super::euroc_sensor::{CameraSensor, IMU_TOPIC, image_topic, rig_of, sensor_pose};
 use super::sink::Sink;
 use crate::geometry::RigidTransform;
 use crate::sensors::Rig;
 
-/// Topic of the inertial sensor.
-pub(super) const IMU_TOPIC: &str = "/imu0";
 /// Where poses may be, the best truth first.
 const POSE_FOLDERS: [&str; 3] = ["state_groundtruth_estimate0", "mocap0", "vicon0"];
 /// Topic type that the report names for files.
@@ -75,11 +73,6 @@ pub(super) fn convert(source: &Path, sink: &mut Sink<'_>) -> Result<Option<Rig>,
     }
     let truth = POSE_FOLDERS.into_iter().find(|name| poses.iter().any(|present| present == name));
     rig_of(source, &root, &cameras, truth.map(pose_topic), sink)
-}
-
-/// Topic of a camera's images.
-pub(super) fn image_topic(key: &str) -> String {
-    format!("/{key}/image_raw/compressed")
 }
 
 fn pose_topic(folder: &str) -> String {

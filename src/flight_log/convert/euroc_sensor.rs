@@ -8,11 +8,18 @@ use serde_json::Value;
 
 use super::super::LogError;
 use super::ConvertError;
-use super::euroc::{IMU_TOPIC, image_topic};
 use super::sink::Sink;
 use crate::camera::CameraModel;
 use crate::geometry::{RigidTransform, seconds_from_ns};
 use crate::sensors::{CameraMount, CameraRig, ImuNoise, ImuRig, Rig};
+
+/// Topic of the inertial sensor.
+pub(super) const IMU_TOPIC: &str = "/imu0";
+
+/// Topic of a camera's images.
+pub(super) fn image_topic(key: &str) -> String {
+    format!("/{key}/image_raw/compressed")
+}
 
 /// Gravity that the dataset's authors use.
 const GRAVITY_M_PER_S2: f64 = 9.81;

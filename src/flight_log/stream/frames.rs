@@ -362,13 +362,9 @@ fn interpolate_pose(from: &RigidTransform, to: &RigidTransform, share: f64) -> R
     RigidTransform::new(rotation, from.translation_m.lerp(&to.translation_m, share))
 }
 
-pub(super) fn not_decodable(error: &impl ToString) -> Refusal {
-    Refusal { reason: "it cannot be decoded", detail: error.to_string() }
-}
-
 fn image_decoder(epoch_ns: i64) -> Decoder<PendingImage> {
     Box::new(move |source: MessageSource<'_>| {
-        let stamp_ns = messages::header_stamp_ns(source.data).map_err(|error| not_decodable(&error))?;
+        let stamp_ns = messages::header_stamp_ns(source.data).map_err(|error| Refusal::not_decodable(&error))?;
         let log_time_ns = i64::try_from(source.position.log_time_ns).unwrap_or(i64::MAX).saturating_sub(epoch_ns);
         Ok((stamp_ns, PendingImage { number: source.number, log_time_ns, message: source.data.to_vec() }))
     })
@@ -376,7 +372,7 @@ fn image_decoder(epoch_ns: i64) -> Decoder<PendingImage> {
 
 fn imu_decoder(epoch_ns: i64) -> Decoder<ImuSample> {
     Box::new(move |source: MessageSource<'_>| {
-        let imu = messages::read_imu(source.data).map_err(|error| not_decodable(&error))?;
+        let imu = messages::read_imu(source.data).map_err(|error| Refusal::not_decodable(&error))?;
         let numbers = imu.angular_velocity_rad_per_s.iter().chain(&imu.specific_force_m_per_s2);
         if !numbers.clone().all(|number| number.is_finite()) {
             let detail = format!(
@@ -426,7 +422,7 @@ fn truth_samples(
     };
     let epoch_ns = log.epoch_ns();
     let decode: Decoder<PoseSample> = Box::new(move |source: MessageSource<'_>| {
-        let message = messages::read_pose(kind, source.data).map_err(|error| not_decodable(&error))?;
+        let message = messages::read_pose(kind, source.data).map_err(|error| Refusal::not_decodable(&error))?;
         let refusal = || Refusal { reason: "it is no pose", detail: "not finite, or a zero quaternion".into() };
         let world_from_imu = message.pose.ok_or_else(refusal)?;
         let sample = PoseSample { stamp_ns: message.stamp_ns.saturating_sub(epoch_ns), world_from_imu };

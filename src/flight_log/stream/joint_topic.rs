@@ -3,7 +3,6 @@
 use super::super::joint_merge::{JointMerge, JointReading};
 use super::super::messages::{self, JointMessage, MessageKind};
 use super::super::{FlightLog, LogError};
-use super::frames::not_decodable;
 use super::ordered::{Decoder, MessageSource, OrderedSamples, ReadContext, Refusal};
 use crate::sensors::{GimbalRig, JointSample};
 
@@ -93,7 +92,7 @@ fn named_together(log: &FlightLog, topic: &str, names: &[String]) -> Result<bool
 
 fn reading_decoder(names: Vec<String>, epoch_ns: i64) -> Decoder<JointReading> {
     Box::new(move |source: MessageSource<'_>| {
-        let message = messages::read_joint_state(source.data).map_err(|error| not_decodable(&error))?;
+        let message = messages::read_joint_state(source.data).map_err(|error| Refusal::not_decodable(&error))?;
         let angles_rad: Vec<Option<f64>> = names.iter().map(|name| angle_of(&message, name)).collect();
         if let Some(joint) = angles_rad.iter().position(|angle| angle.is_some_and(|angle| !angle.is_finite())) {
             let detail = format!("{}: {}", names[joint], angles_rad[joint].unwrap_or(f64::NAN));

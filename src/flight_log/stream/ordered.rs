@@ -54,6 +54,13 @@ pub(super) struct Refusal {
     pub(super) detail: String,
 }
 
+impl Refusal {
+    /// Of a message whose bytes do not follow its schema.
+    pub(super) fn not_decodable(error: &impl ToString) -> Self {
+        Self { reason: "it cannot be decoded", detail: error.to_string() }
+    }
+}
+
 /// Turns a message into its absolute header stamp and a sample.
 pub(super) type Decoder<T> = Box<dyn FnMut(MessageSource<'_>) -> Result<(i64, T), Refusal> + Send>;
 
