@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use anyhow::Result;
-use dcvins::estimator::{EstimatorConfig, EventKind};
+use dcvins::estimator::{EstimatorConfig, EventKind, FactorKind};
 use dcvins::export::{RunSummary, summarize};
 use dcvins::geometry::RigidTransform;
 use dcvins::session::{self, Recording, RunRecord, SessionPlan, SessionRequest};
@@ -133,7 +133,7 @@ fn driven(recording: &Recording, run: &RunRecord) -> Driven {
     let truth = recording.truth_rig.as_ref().and_then(|rig| rig.chain_of_camera(&run.camera_key));
     let last = run.steps.iter().rev().find_map(|step| calibration_sample(&step.report));
 
-    let mut sums: BTreeMap<&'static str, (f64, usize)> = BTreeMap::new();
+    let mut sums: BTreeMap<FactorKind, (f64, usize)> = BTreeMap::new();
     let mut failures = Vec::new();
     let (mut before_ns, mut lost_ns) = (None, 0);
     for report in run.steps.iter().map(|step| &step.report) {
@@ -174,7 +174,7 @@ fn driven(recording: &Recording, run: &RunRecord) -> Driven {
         step_ms: timing_ms.map(|timing| [timing.step.p50, timing.step.p95]),
         poses,
         calibration: last.zip(truth).and_then(|(sample, truth)| sample.judged(&truth)),
-        chi2: sums.into_iter().map(|(factor, (sum, count))| (factor.to_owned(), sum / count as f64)).collect(),
+        chi2: sums.into_iter().map(|(factor, (sum, count))| (factor.name().to_owned(), sum / count as f64)).collect(),
         lost_s: lost_ns as f64 * 1e-9,
         failures,
         warnings,

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use dcvins::estimator::{ColumnGroup, Linearization, StepReport};
 use dcvins::geometry::{RigidTransform, so3};
-use dcvins::gimbal::{Chain, ClassicalChain};
+use dcvins::gimbal::{Chain, ClassicalChain, ParameterNames};
 use nalgebra::{DMatrix, Matrix3, Matrix6, SMatrix};
 use serde::{Deserialize, Serialize};
 
@@ -53,7 +53,7 @@ fn information(linearization: &Linearization) -> DMatrix<f64> {
     if prior.nrows() > 0 {
         information += prior.tr_mul(prior);
     }
-    for block in linearization.columns.iter().filter(|block| block.group == ColumnGroup::Pose) {
+    for block in linearization.columns.iter().filter(|block| block.id.group() == ColumnGroup::Pose) {
         for column in block.start..block.start + block.len {
             information[(column, column)] += WEAK_INFORMATION;
         }
@@ -64,7 +64,7 @@ fn information(linearization: &Linearization) -> DMatrix<f64> {
 /// The relative pose of a step's window; `None` before the window is there.
 pub(crate) fn pose_sample(report: &StepReport) -> Option<PoseSample> {
     let linearization = report.linearization.as_ref()?;
-    let poses = || linearization.columns.iter().filter(|block| block.group == ColumnGroup::Pose);
+    let poses = || linearization.columns.iter().filter(|block| block.id.group() == ColumnGroup::Pose);
     let (first, last) = (poses().next()?.start, poses().next_back()?.start);
     let [oldest, .., newest] = report.window.as_slice() else { return None };
     let relative = oldest.world_from_imu.inverse() * newest.world_from_imu;
@@ -105,7 +105,7 @@ impl PoseSample {
 /// The calibration of a step with its covariance; `None` when nothing is calibrated.
 pub(crate) fn calibration_sample(report: &StepReport) -> Option<CalibrationSample> {
     let linearization = report.linearization.as_ref()?;
-    let columns = linearization.columns.iter().filter(|block| block.group == ColumnGroup::Calibration).count();
+    let columns = linearization.columns.iter().filter(|block| block.id.group() == ColumnGroup::Calibration).count();
     if columns == 0 {
         return None;
     }
@@ -115,8 +115,8 @@ pub(crate) fn calibration_sample(report: &StepReport) -> Option<CalibrationSampl
     Some(CalibrationSample {
         chain: report.calibration.classical.clone(),
         parameterization: report.calibration.parameterization.clone(),
-        names: report.calibration.names.clone(),
-        chain_columns: report.calibration.names.len() - 6 * report.calibration.rigid_cameras.len(),
+        names: report.calibration.parameters.iter().map(|it| ParameterNames::default().name(*it)).collect(),
+        chain_columns: report.calibration.parameters.len() - 6 * report.calibration.rigid_cameras.len(),
         covariance,
     })
 }

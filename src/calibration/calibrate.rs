@@ -14,7 +14,7 @@ use super::state::{Camera, Columns, Estimate};
 use super::statistics::Statistics;
 use super::timeline::{Instant, instants};
 use super::{CalibrationError, CalibrationInput, CalibrationOptions, observations, trajectory};
-use crate::estimator::{ColumnBlock, ColumnGroup, Linearization, gravity_in_world, imu_factor};
+use crate::estimator::{ColumnBlock, ColumnId, Linearization, gravity_in_world, imu_factor};
 use crate::geometry::seconds_from_ns;
 use crate::gimbal::Chain;
 use crate::observability::{RankReport, analyse};
@@ -254,14 +254,12 @@ fn mount_report(input: &CalibrationInput, result: &StageResult) -> MountReport {
 
 fn parameters(prior: &ChainTerm, chain: &Chain, sigma: &dyn Fn(usize) -> f64) -> Vec<CalibratedParameter> {
     let (initial, values) = (prior.given.values(), chain.values());
-    let units = chain.parameter_units();
     chain
-        .parameter_names()
+        .parameters()
         .into_iter()
         .enumerate()
-        .map(|(place, name)| CalibratedParameter {
-            name,
-            unit: units[place],
+        .map(|(place, parameter)| CalibratedParameter {
+            parameter,
             initial: initial[place],
             value: values[place],
             sigma: sigma(place),
@@ -314,12 +312,12 @@ fn rank(result: &StageResult, visited_rad: &[Vec<f64>]) -> Option<RankReport> {
         let roots = eigen.eigenvalues.map(|value| value.max(0.0).sqrt());
         DMatrix::from_diagonal(&roots) * eigen.eigenvectors.transpose()
     };
-    let names = chain.parameter_names();
     let linearization = Linearization {
-        columns: names
+        columns: chain
+            .parameters()
             .into_iter()
             .enumerate()
-            .map(|(start, name)| ColumnBlock { group: ColumnGroup::Calibration, name, start, len: 1 })
+            .map(|(start, parameter)| ColumnBlock { id: ColumnId::Calibration(parameter), start, len: 1 })
             .collect(),
         held: Vec::new(),
         calibration_column_norms: DVector::from_fn(count, |k, _| measured[(k, k)].max(0.0).sqrt()),

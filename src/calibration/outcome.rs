@@ -2,16 +2,14 @@
 
 use super::statistics::Statistics;
 use crate::geometry::{RigidTransform, so3};
-use crate::gimbal::ClassicalChain;
+use crate::gimbal::{ClassicalChain, ParameterId};
 use crate::observability::RankReport;
 
 /// One calibrated number.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CalibratedParameter {
-    /// As in the golden files: `L1.alpha`; the static camera's pose has `cam1.rx`, …, its time offset `cam1.shift`.
-    pub name: String,
-    /// `rad`, `m` or `s`.
-    pub unit: &'static str,
+    /// Which of the chain's.
+    pub parameter: ParameterId,
     /// What the rig gave.
     pub initial: f64,
     /// What the calibration found.

@@ -166,7 +166,7 @@ pub(crate) struct ScreenshotArguments {
     /// (base-d, end-theta, …) or a parameter by name, and how far in units of 10° and 3 cm. Scene and image show what
     /// comes of it.
     #[arg(long, value_name = "DIRECTION=VALUE")]
-    pub slide: Option<dcvins::observability::SlidePosition>,
+    pub slide: Option<dcvins::observability::SlideRequest>,
     #[command(flatten)]
     pub estimation: EstimationArguments,
 }

@@ -91,9 +91,10 @@ pub(crate) fn compute(plan: &SessionPlan, until_ns: Option<i64>) -> Result<Recor
 
 /// Computes a plan until a condition comes true, with a progress bar.
 fn compute_until(plan: &SessionPlan, condition: &Condition) -> Result<(Recording, Option<BreakpointHit>)> {
-    let known = plan.parameter_names();
-    let unknown = condition.unknown_names(&plan.rig, &known);
+    let (names, parameters) = (plan.rig.parameter_names(), plan.parameters());
+    let unknown = condition.unknown_names(&names, &parameters);
     if !unknown.is_empty() {
+        let known: Vec<String> = parameters.iter().map(|parameter| names.name(*parameter)).collect();
         bail!("no run has '{}' of '{condition}'; there are {}", unknown.join("', '"), known.join(", "));
     }
     let end_s = seconds_from_ns(plan.log.duration_ns());

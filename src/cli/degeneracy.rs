@@ -132,7 +132,7 @@ impl Advised {
         Ok(Self {
             experiment,
             form: form.name(),
-            excitation: excitation(&setup.window(), &form.chain(&setup.mechanism), &names),
+            excitation: excitation(&setup.window(), &form.chain(&setup.mechanism), &names, &setup.mechanism.names),
             advice: advice.context("no motion can tell anything about this mechanism")?,
         })
     }

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use anyhow::{Result, bail};
+use anyhow::{Context as _, Result, bail};
 use dcvins::export::{
     PANEL_NAMES, PictureOptions, Renderer, draw_panel, draw_panel_svg, is_session, log_name, panel_csv, write_csv,
     write_png, write_svg,
@@ -54,6 +54,19 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<()> {
     instants.dedup();
     let Some(last_ns) = instants.last().copied() else { bail!("no instant is asked for: give --at or --every") };
     let mut recording = shown.compute(last_ns)?;
+    let names = recording.rig.parameter_names();
+    let slide = match &arguments.slide {
+        Some(request) => {
+            let known = || {
+                format!(
+                    "'{}' is no direction: expected a number, one such as base-d, or a parameter",
+                    request.direction
+                )
+            };
+            Some(request.position(&names).with_context(known)?)
+        }
+        None => None,
+    };
     let options = PictureOptions {
         size_px: arguments.size.map(|side| side as u32),
         pixels_per_point: arguments.scale,
@@ -66,7 +79,7 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<()> {
             RendererArgument::Cpu => Renderer::Cpu,
             RendererArgument::Wgpu => Renderer::Wgpu,
         },
-        slide: arguments.slide.clone(),
+        slide,
         layout: Preset::ALL.get(usize::from(arguments.layout) - 1).copied().unwrap_or_default(),
         playback: shown.playback(),
     };

@@ -3,7 +3,7 @@
 use super::options::EstimatorOptions;
 use crate::camera::CameraModel;
 use crate::geometry::RigidTransform;
-use crate::gimbal::{Chain, ClassicalChain, Parameterization};
+use crate::gimbal::{Chain, ClassicalChain, ParameterId, Parameterization};
 use crate::sensors::{CameraMount, CameraRig, ImuNoise, Rig, UnknownCamera};
 
 /// What an estimator is told once.
@@ -57,17 +57,12 @@ pub struct RigidCamera {
     pub timeshift_s: f64,
 }
 
-/// Names and values of the six columns of a rigid camera that is watched beside the main one: rotation vector and
-/// translation of its pose on the IMU, behind its key.
-pub fn rigid_columns(key: &str, imu_from_camera: &RigidTransform) -> Vec<(String, f64)> {
+/// Parameters and values of the six columns of a rigid camera that is watched beside the main one, by the camera's number:
+/// rotation vector and translation of its pose on the IMU.
+pub fn rigid_columns(camera: u8, imu_from_camera: &RigidTransform) -> Vec<(ParameterId, f64)> {
     let chain = Chain::from_classical(&rigid_mount(imu_from_camera), Parameterization::Minimal);
-    let names = chain.parameter_names();
-    names.iter().map(|name| rigid_column(key, name)).zip(chain.values().iter().copied()).collect()
-}
-
-/// What a column of a rigid camera's mount is called when the camera is watched beside the main one.
-pub(super) fn rigid_column(key: &str, name: &str) -> String {
-    format!("{key}.{}", name.rsplit('.').next().unwrap_or(name))
+    let parameters = chain.parameters().into_iter().map(|parameter| parameter.of_camera(camera));
+    parameters.zip(chain.values().iter().copied()).collect()
 }
 
 /// A mount without joints.

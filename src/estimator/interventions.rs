@@ -7,19 +7,14 @@ use super::estimator::Estimator;
 use crate::estimator::state::calibrations::MAIN;
 use crate::estimator::window::features::FeatureMap;
 use crate::frontend::FeatureId;
-use crate::gimbal::Parameterization;
+use crate::gimbal::{ParameterId, Parameterization};
 
 /// Why an estimator cannot be changed as asked.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum InterventionError {
     /// No such parameter.
-    #[error("there is no parameter '{name}' in this parameterization; there are {}", known.join(", "))]
-    UnknownParameter {
-        /// What was asked for.
-        name: String,
-        /// The parameters that there are.
-        known: Vec<String>,
-    },
+    #[error("there is no parameter {0:?} in this parameterization")]
+    UnknownParameter(ParameterId),
     /// The calibration is not estimated.
     #[error("the calibration of this run is fixed (calibrate=off)")]
     FixedCalibration,
@@ -41,16 +36,21 @@ impl Estimator {
         }
     }
 
+    /// The parameters of the calibration, estimated or not, in the order of their columns.
+    pub fn parameters(&self) -> Vec<ParameterId> {
+        self.calibration.parameters()
+    }
+
     /// Holds a parameter at its present value from the next solve on.
-    pub fn freeze(&mut self, name: &str) -> Result<(), InterventionError> {
-        let (camera, index) = self.free_column(name)?;
+    pub fn freeze(&mut self, parameter: ParameterId) -> Result<(), InterventionError> {
+        let (camera, index) = self.free_column(parameter)?;
         self.calibration.of_mut(camera).freeze(index);
         Ok(())
     }
 
     /// Sets a parameter to another value; what the window and its priors know stays, and pulls it back.
-    pub fn set_value(&mut self, name: &str, value: f64) -> Result<(), InterventionError> {
-        let (camera, index) = self.free_column(name)?;
+    pub fn set_value(&mut self, parameter: ParameterId, value: f64) -> Result<(), InterventionError> {
+        let (camera, index) = self.free_column(parameter)?;
         let mut step = DVector::zeros(self.calibration.dof());
         let before = self.calibration.of(camera).values()[index];
         step[self.calibration.columns(camera).start + index] = value - before;
@@ -84,21 +84,21 @@ impl Estimator {
     }
 
     /// The camera and the number within it of a parameter that is estimated.
-    fn free_column(&self, name: &str) -> Result<(usize, usize), InterventionError> {
-        let known = self.calibration_names();
-        let Some(mut index) = known.iter().position(|known| known == name) else {
-            return Err(InterventionError::UnknownParameter { name: name.to_owned(), known });
+    fn free_column(&self, parameter: ParameterId) -> Result<(usize, usize), InterventionError> {
+        let known = self.calibration.parameters();
+        let Some(mut index) = known.iter().position(|known| *known == parameter) else {
+            return Err(InterventionError::UnknownParameter(parameter));
         };
         if self.calibration.dof() == 0 {
             return Err(InterventionError::FixedCalibration);
         }
         for camera in 0..self.calibration.cameras() {
-            let columns = self.calibration.of(camera).names().len();
+            let columns = self.calibration.of(camera).parameters().len();
             if index < columns {
                 return Ok((camera, index));
             }
             index -= columns;
         }
-        Err(InterventionError::UnknownParameter { name: name.to_owned(), known })
+        Err(InterventionError::UnknownParameter(parameter))
     }
 }

@@ -24,10 +24,10 @@ pub use interventions::InterventionError;
 pub use options::{EstimatorOptions, LandmarkModel, RobustLoss, TrackContinuation};
 pub use preintegration::{ImuBias, MotionIncrement, NavigationState, Preintegration};
 pub use report::{
-    CalibrationEstimate, ColumnBlock, ColumnGroup, Event, EventKind, FactorRows, FeatureCounts, FeatureReport,
-    FeatureRows, FrameStateReport, InformationGain, IterationReport, JacobianFactor, JacobianRow, JacobianSource,
-    LandmarkReport, Linearization, Motion, ObservationReport, Observations, Phase, ReportBytes, ResidualSummary,
-    StageTimes, StepJacobian, StepReport, allocated_bytes, column_scale,
+    CalibrationEstimate, ColumnBlock, ColumnGroup, ColumnId, Event, EventKind, FactorKind, FactorRows, FeatureCounts,
+    FeatureReport, FeatureRows, FrameId, FrameStateReport, InformationGain, IterationReport, JacobianFactor,
+    JacobianRow, JacobianSource, LandmarkReport, Linearization, Motion, ObservationReport, Observations, Phase,
+    ReportBytes, ResidualSummary, StageTimes, StepJacobian, StepReport, allocated_bytes,
 };
 pub use supposed::{JointKnowledge, PoseKnowledge, SupposedFrame, SupposedLandmark, SupposedWindow};
 

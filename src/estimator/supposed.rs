@@ -6,7 +6,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, Vector3};
 
 use super::options::{LandmarkModel, RobustLoss};
-use super::{ColumnBlock, ColumnGroup, Linearization};
+use super::{ColumnBlock, ColumnGroup, FrameId, Linearization};
 use crate::camera::CameraModel;
 use crate::estimator::factors::preintegration::Preintegration;
 use crate::estimator::factors::reprojection::{Landmark, RelativePose};
@@ -129,16 +129,16 @@ impl SupposedWindow {
             first_estimate_reach_rad: 0.0,
             calibration_first_estimates: false,
         };
-        let numbers: Vec<usize> = (0..frames.len()).collect();
-        let names = calibration.chain().parameter_names();
+        let numbers: Vec<FrameId> = (0..frames.len()).map(FrameId).collect();
+        let parameters = calibration.parameters();
         let calibration = Calibrations::new(calibration, []);
         let estimate = Estimate { frames: states, calibration, landmarks: vec![landmarks] };
-        let whole = problem.linearization(&estimate, &names, &numbers, None);
+        let whole = problem.linearization(&estimate, &parameters, &numbers, None);
         keeping(&whole, |group| match (group, &self.poses, &self.joints) {
             (ColumnGroup::Joints, _, JointKnowledge::Known)
-            | (ColumnGroup::Pose | ColumnGroup::SpeedBias, PoseKnowledge::Known, _) => 0,
+            | (ColumnGroup::Pose | ColumnGroup::VelocityBias, PoseKnowledge::Known, _) => 0,
             // The biases come after the velocity.
-            (ColumnGroup::SpeedBias, PoseKnowledge::Inertial { biases_known: true, .. }, _) => 3,
+            (ColumnGroup::VelocityBias, PoseKnowledge::Inertial { biases_known: true, .. }, _) => 3,
             _ => usize::MAX,
         })
     }
@@ -216,9 +216,9 @@ fn keeping(whole: &Linearization, count: impl Fn(ColumnGroup) -> usize) -> Linea
     let mut kept = Vec::new();
     let mut columns = Vec::new();
     for block in &whole.columns {
-        let len = block.len.min(count(block.group));
+        let len = block.len.min(count(block.id.group()));
         if len > 0 {
-            columns.push(ColumnBlock { start: kept.len(), len, ..block.clone() });
+            columns.push(ColumnBlock { start: kept.len(), len, ..*block });
             kept.extend(block.start..block.start + len);
         }
     }

@@ -34,7 +34,8 @@ fn sigmas_yaml(report: &CalibrationReport) -> String {
     let mut text = "# Standard deviations of the calibrated parameters, in the form named here.\n".to_owned();
     writeln!(text, "calibration:\n  parameterization: {}\n  sigmas:", report.parameterization).expect(INTO_STRING);
     for parameter in &report.parameters {
-        writeln!(text, "    {}_{}: {:?}", parameter.name, parameter.unit, parameter.sigma).expect(INTO_STRING);
+        writeln!(text, "    {}_{}: {:?}", parameter.name, parameter.dimension.unit(), parameter.sigma)
+            .expect(INTO_STRING);
     }
     text
 }

@@ -5,13 +5,12 @@ use std::fmt;
 use nalgebra::Matrix4;
 use serde::Serialize;
 
-use super::summary::log_name;
-use super::tables::parameter_name;
+use super::summary::{difference, log_name};
 use crate::calibration::{
     CalibrationOutcome, MountReport, PixelReport, Statistics, chain_distance, transform_distance,
 };
-use crate::geometry::{RigidTransform, seconds_from_ns, so3, wrap_angle};
-use crate::gimbal::{Chain, ClassicalChain};
+use crate::geometry::{Dimension, RigidTransform, seconds_from_ns, so3};
+use crate::gimbal::{Chain, ClassicalChain, ParameterNames, Quantity};
 use crate::sensors::{CameraMount, Rig};
 use crate::session::CalibrationRun;
 
@@ -42,8 +41,9 @@ impl From<Statistics> for StatisticsReport {
 pub struct ParameterReport {
     /// Its name, joints and cameras by name.
     pub name: String,
-    /// `rad`, `m` or `s`.
-    pub unit: &'static str,
+    /// Its dimension, written as its unit.
+    #[serde(rename = "unit")]
+    pub dimension: Dimension,
     /// What the rig gave.
     pub initial: f64,
     /// What was found.
@@ -196,10 +196,10 @@ pub fn report_calibration(run: &CalibrationRun) -> CalibrationReport {
         static_t_cam_imu: rows(&outcome.mount.imu_from_camera.inverse()),
         gimbal_t_imu_cam_at_zero: rows(&outcome.chain.imu_from_camera(&zero)),
         rank: outcome.rank.as_ref().map(|rank| CalibrationRank {
-            columns: rank.names.len(),
+            columns: rank.parameters.len(),
             rank_structural: rank.rank_structural,
             rank_informed: rank.rank_informed,
-            verdict: rank.verdict(),
+            verdict: rank.verdict(&ParameterNames::default()),
         }),
         truth: run.truth_rig.as_ref().and_then(|truth| truth_report(run, truth)),
         warnings,
@@ -267,12 +267,12 @@ fn mount_parameters(run: &CalibrationRun, mount: &MountReport) -> Vec<ParameterR
     let (initial, last) = (values(&mount.initial), values(&mount.imu_from_camera));
     let truth_values = truth.as_ref().map(values);
     let error = truth.map(|truth| mount.imu_from_camera.minus(&truth));
-    ["rx", "ry", "rz", "tx", "ty", "tz"]
+    Quantity::TRANSFORM
         .into_iter()
         .enumerate()
-        .map(|(axis, name)| ParameterReport {
-            name: format!("{}.{name}", run.static_camera),
-            unit: if axis < 3 { "rad" } else { "m" },
+        .map(|(axis, quantity)| ParameterReport {
+            name: format!("{}.{}", run.static_camera, quantity.name()),
+            dimension: quantity.dimension(),
             initial: initial[axis],
             last: last[axis],
             sigma: mount.sigmas[axis],
@@ -289,7 +289,7 @@ fn time_shift(run: &CalibrationRun, key: &str, (change_s, sigma_s): (f64, f64)) 
     let truth = run.truth_rig.as_ref().and_then(of);
     ParameterReport {
         name: format!("{key}.timeshift_cam_imu"),
-        unit: "s",
+        dimension: Dimension::Time,
         initial,
         last: initial + change_s,
         sigma: sigma_s,
@@ -305,6 +305,7 @@ fn chain_parameters(run: &CalibrationRun, outcome: &CalibrationOutcome) -> Vec<P
         let chain = Chain::from_classical(&rig.gimbal.as_ref()?.chain, parameterization);
         (chain.dof() == outcome.parameters.len()).then(|| chain.values())
     });
+    let names = run.given_rig.parameter_names();
     outcome
         .parameters
         .iter()
@@ -312,17 +313,14 @@ fn chain_parameters(run: &CalibrationRun, outcome: &CalibrationOutcome) -> Vec<P
         .map(|(place, parameter)| {
             let truth = truth.as_ref().map(|values| values[place]);
             ParameterReport {
-                name: parameter_name(&parameter.name, &run.given_rig),
-                unit: parameter.unit,
+                name: names.name(parameter.parameter),
+                dimension: parameter.parameter.dimension(),
                 initial: parameter.initial,
                 last: parameter.value,
                 sigma: parameter.sigma,
                 prior_sigma: Some(parameter.prior_sigma),
                 truth,
-                error: truth.map(|truth| {
-                    let difference = parameter.value - truth;
-                    if parameter.unit == "rad" { wrap_angle(difference) } else { difference }
-                }),
+                error: truth.map(|truth| difference(parameter.parameter.dimension(), parameter.value, truth)),
             }
         })
         .collect()
@@ -369,10 +367,11 @@ impl fmt::Display for CalibrationReport {
         }
         writeln!(f, "\nParameters                        initial       final     ± sigma")?;
         for parameter in &self.parameters {
-            let (factor, unit) = match parameter.unit {
-                "rad" => (180.0 / std::f64::consts::PI, "°"),
-                "m" => (1e3, "mm"),
-                _ => (1e3, "ms"),
+            let (factor, unit) = match parameter.dimension {
+                Dimension::Angle => (180.0 / std::f64::consts::PI, "°"),
+                Dimension::Length => (1e3, "mm"),
+                Dimension::Time => (1e3, "ms"),
+                Dimension::Ratio => (1.0, ""),
             };
             write!(
                 f,

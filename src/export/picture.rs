@@ -164,7 +164,7 @@ pub fn panel_csv(
     let panel = PanelName::ALL.into_iter().find(|known| known.as_str() == name);
     let panel = panel.ok_or_else(|| PictureError::UnknownPanel { name: name.to_owned() })?;
     let theme = Theme::of(options.theme);
-    let mut selection = Selection { slide: options.slide.clone(), ..Selection::default() };
+    let mut selection = Selection { slide: options.slide, ..Selection::default() };
     let playback = Playback { playing: false, ..options.playback.clone() };
     let (selection, commands) = (&mut selection, &mut Vec::new());
     let ctx =
@@ -189,7 +189,7 @@ fn with_panel<T>(
     let theme = Theme::of(options.theme);
     let mut state = WindowState::default();
     state.arrange(options.layout);
-    let mut selection = Selection { slide: options.slide.clone(), ..Selection::default() };
+    let mut selection = Selection { slide: options.slide, ..Selection::default() };
     let playback = Playback { playing: false, ..options.playback.clone() };
     let mut ui = |ui: &mut Ui| {
         // Nobody is there to carry out what a panel may ask for.
@@ -290,7 +290,7 @@ mod tests {
             assert_eq!(steps.len(), record.steps.len(), "{}", record.spec.label);
             for (row, step) in steps.iter().zip(&record.steps) {
                 assert_eq!(row[features], step.tracks.features.len().to_string());
-                let rank = step.rank.as_ref().filter(|rank| !rank.names.is_empty());
+                let rank = step.rank.as_ref().filter(|rank| !rank.parameters.is_empty());
                 assert_eq!(row[informed], rank.map_or_else(String::new, |rank| rank.rank_informed.to_string()));
             }
             let events = record.steps.iter().flat_map(|step| &step.report.events);

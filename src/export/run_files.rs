@@ -8,6 +8,7 @@ use super::results::write_results;
 use super::summary::{RunSummary, summarize, to_json};
 use super::tables::{calibration_csv, frames_csv, information_csv, rank_csv};
 use super::trajectory::{euroc_of_run, tum_of_run};
+use crate::gimbal::{ParameterNames, ParameterPart};
 use crate::sensors::{CameraMount, Rig};
 use crate::session::{Recording, RunRecord};
 
@@ -44,7 +45,7 @@ pub fn write_run(
     let mut files = vec![
         ("trajectory.tum", tum_of_run(run, recording.epoch_ns)),
         ("calibration.csv", calibration_csv(run, &recording.rig)),
-        ("rank.csv", rank_csv(run)),
+        ("rank.csv", rank_csv(run, &ParameterNames::default())),
         ("information.csv", information_csv(run, &recording.rig)),
         ("frames.csv", frames_csv(run, options.timing)),
         ("rig.yaml", calibrated_rig(recording, run).to_yaml()),
@@ -74,13 +75,12 @@ fn calibrated_rig(recording: &Recording, run: &RunRecord) -> Rig {
             *imu_from_camera = *pose;
         }
     }
-    for (name, shift_s) in calibration.names.iter().zip(&calibration.values) {
-        let key = match name.strip_suffix("timeshift") {
-            Some("") => run.camera_key.as_str(),
-            Some(owner) => owner.trim_end_matches('.'),
-            None => continue,
-        };
-        if let Some(camera) = rig.cameras.iter_mut().find(|camera| camera.key == key) {
+    let keys: Vec<&String> =
+        std::iter::once(&run.camera_key).chain(calibration.rigid_cameras.iter().map(|(key, _)| key)).collect();
+    for (parameter, shift_s) in calibration.parameters.iter().zip(&calibration.values) {
+        let ParameterPart::Camera(camera) = parameter.part else { continue };
+        let key = keys.get(usize::from(camera));
+        if let Some(camera) = rig.cameras.iter_mut().find(|camera| Some(&&camera.key) == key) {
             camera.timeshift_cam_imu_s = *shift_s;
         }
     }

@@ -6,10 +6,9 @@ use serde::Serialize;
 
 use super::evaluation::alignment_name;
 use super::structure::{KnownLossSummary, known_losses};
-use super::tables::parameter_name;
 use crate::estimator::{EventKind, Phase, StageTimes};
-use crate::geometry::{seconds_from_ns, wrap_angle};
-use crate::gimbal::ClassicalChain;
+use crate::geometry::{Dimension, seconds_from_ns, wrap_angle};
+use crate::gimbal::{ClassicalChain, ParameterId};
 use crate::observability::{ParameterRate, information_rate};
 use crate::sensors::Rig;
 use crate::session::accuracy::{Alignment, path_length_m};
@@ -69,8 +68,9 @@ pub struct Accuracy {
 pub struct ParameterSummary {
     /// Its name, joints by name.
     pub name: String,
-    /// `rad` or `m`.
-    pub unit: &'static str,
+    /// Its dimension, written as its unit.
+    #[serde(rename = "unit")]
+    pub dimension: Dimension,
     /// What the rig gave.
     pub initial: f64,
     /// What the run ended with.
@@ -163,7 +163,20 @@ pub struct InformationSummary {
     /// The motions of each parameter's `by_motion`.
     pub motions: Vec<String>,
     /// Bits per second: one bit halves the standard deviation.
-    pub parameters: Vec<ParameterRate>,
+    pub parameters: Vec<ParameterInformation>,
+}
+
+/// How fast the images narrowed one parameter.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ParameterInformation {
+    /// Its name.
+    pub name: String,
+    /// In bits per second.
+    pub bits_per_s: f64,
+    /// Of these, the part of each motion; a negative one takes away what others bring.
+    pub by_motion: Vec<f64>,
+    /// The rest: what images add by confirming earlier ones that have left the window.
+    pub earlier: f64,
 }
 
 /// Percentiles of one stage's time.
@@ -324,34 +337,45 @@ fn calibration(recording: &Recording, run: &RunRecord) -> CalibrationSummary {
     let values_in = |rig: &Rig| run.values_in(rig, &recording.rig, last);
     let initial_values = values_in(&recording.rig).unwrap_or_default();
     let true_values = recording.truth_rig.as_deref().and_then(values_in).unwrap_or_default();
-    let value_of =
-        |values: &[(String, f64)], name: &str| values.iter().find(|(known, _)| known == name).map(|(_, value)| *value);
+    let value_of = |values: &[(ParameterId, f64)], parameter: ParameterId| {
+        values.iter().find(|(known, _)| *known == parameter).map(|(_, value)| *value)
+    };
+    let names = recording.rig.parameter_names();
     let parameters = last
-        .names
+        .parameters
         .iter()
         .enumerate()
-        .map(|(index, name)| {
-            let unit = last.units[index];
+        .map(|(index, parameter)| {
+            let parameter = *parameter;
+            let dimension = parameter.dimension();
             let value = last.values[index];
-            let truth = value_of(&true_values, name);
+            let truth = value_of(&true_values, parameter);
             ParameterSummary {
-                name: parameter_name(name, &recording.rig),
-                unit,
-                initial: value_of(&initial_values, name).unwrap_or(value),
+                name: names.name(parameter),
+                dimension,
+                initial: value_of(&initial_values, parameter).unwrap_or(value),
                 last: value,
                 sigma: last.sigmas.get(index).copied().filter(|sigma| sigma.is_finite()),
                 truth,
-                error: truth.map(|truth| if unit == "rad" { wrap_angle(value - truth) } else { value - truth }),
+                error: truth.map(|truth| difference(dimension, value, truth)),
             }
         })
         .collect();
     let chain_error = |chain: &ClassicalChain| truth.as_ref().and_then(|truth| chain_error(run, chain, truth));
     CalibrationSummary {
         parameterization: last.parameterization.clone(),
-        columns: last.names.len(),
+        columns: last.parameters.len(),
         parameters,
         chain_error: chain_error(&last.classical),
         chain_error_initial: given.as_ref().and_then(chain_error),
+    }
+}
+
+/// Difference of two values of a parameter, of an angle the shorter way round.
+pub(super) fn difference(dimension: Dimension, value: f64, reference: f64) -> f64 {
+    match dimension {
+        Dimension::Angle => wrap_angle(value - reference),
+        _ => value - reference,
     }
 }
 
@@ -367,20 +391,21 @@ fn chain_error(run: &RunRecord, chain: &ClassicalChain, truth: &ClassicalChain) 
 
 fn rank(recording: &Recording, run: &RunRecord) -> Option<RankSummary> {
     let rank = run.steps.iter().rev().find_map(|step| step.rank.as_ref())?;
+    let names = recording.rig.parameter_names();
     let null_directions = rank
         .directions
         .iter()
         .filter(|direction| direction.structural)
         .map(|direction| {
-            let weights = rank.names.iter().zip(&direction.weights);
+            let weights = rank.parameters.iter().zip(&direction.weights);
             weights
                 .filter(|(_, weight)| weight.abs() > 0.01)
-                .map(|(name, weight)| DirectionWeight { name: parameter_name(name, &recording.rig), weight: *weight })
+                .map(|(parameter, weight)| DirectionWeight { name: names.name(*parameter), weight: *weight })
                 .collect()
         })
         .collect();
     Some(RankSummary {
-        columns: rank.names.len(),
+        columns: rank.parameters.len(),
         rank_structural: rank.rank_structural,
         rank_informed: rank.rank_informed,
         deficit: DeficitSummary {
@@ -397,10 +422,13 @@ fn rank(recording: &Recording, run: &RunRecord) -> Option<RankSummary> {
 
 fn information(recording: &Recording, run: &RunRecord) -> Option<InformationSummary> {
     let rate = information_rate(run.steps.iter().filter_map(|step| step.gain()))?;
-    let rig = &recording.rig;
-    let joints = rig.joint_names();
-    let named =
-        |parameter: &ParameterRate| ParameterRate { name: parameter_name(&parameter.name, rig), ..parameter.clone() };
+    let (names, joints) = (recording.rig.parameter_names(), recording.rig.joint_names());
+    let named = |rate: &ParameterRate| ParameterInformation {
+        name: names.name(rate.parameter),
+        bits_per_s: rate.bits_per_s,
+        by_motion: rate.by_motion.clone(),
+        earlier: rate.earlier,
+    };
     Some(InformationSummary {
         duration_s: rate.duration_s,
         motions: rate.motions.iter().map(|motion| motion.name(&joints)).collect(),

@@ -4,22 +4,12 @@ use std::fmt::Write as _;
 
 use crate::estimator::{Event, Motion};
 use crate::geometry::seconds_from_ns;
+use crate::gimbal::{ParameterId, ParameterNames, Singularity};
 use crate::sensors::Rig;
 use crate::session::{RunRecord, StepRecord};
 
 /// Why writing into a text needs no error of its own.
 pub(super) const INTO_STRING: &str = "writing into a string cannot fail";
-
-/// A golden parameter name with its joint's name in place of the link's number: `L1.alpha` becomes `yaw.alpha`.
-pub(super) fn parameter_name(name: &str, rig: &Rig) -> String {
-    let joint_name = |rest: &str| {
-        let (number, quantity) = rest.split_once('.')?;
-        let index = number.parse::<usize>().ok()?.checked_sub(1)?;
-        let joint = rig.gimbal.as_ref()?.joints.get(index)?;
-        Some(format!("{}.{quantity}", joint.name))
-    };
-    name.strip_prefix('L').and_then(joint_name).unwrap_or_else(|| name.to_owned())
-}
 
 /// Seconds since the log began with all their nanoseconds.
 fn seconds_text(stamp_ns: i64) -> String {
@@ -48,19 +38,20 @@ fn push_number(text: &mut String, number: f64) {
 /// `calibration.csv`: each parameter and its sigma, then the joint angles. A chart switch changes the parameters, so
 /// the columns are those of all charts, and a cell is empty while another chart is in use.
 pub(super) fn calibration_csv(run: &RunRecord, rig: &Rig) -> String {
-    let mut columns: Vec<(String, &'static str)> = Vec::new();
+    let names = rig.parameter_names();
+    let mut columns: Vec<ParameterId> = Vec::new();
     for step in &run.steps {
         let calibration = &step.report.calibration;
-        for (name, unit) in calibration.names.iter().zip(&calibration.units) {
-            if !columns.iter().any(|(known, _)| known == name) {
-                columns.push((name.clone(), unit));
+        for parameter in &calibration.parameters {
+            if !columns.contains(parameter) {
+                columns.push(*parameter);
             }
         }
     }
     let joints = joint_names(run, rig);
     let mut text = "t_s".to_owned();
-    for (name, unit) in &columns {
-        let name = parameter_name(name, rig);
+    for parameter in &columns {
+        let (name, unit) = (names.name(*parameter), parameter.dimension().unit());
         write!(text, ",{name}_{unit},{name}_sigma_{unit}").expect(INTO_STRING);
     }
     for joint in &joints {
@@ -70,8 +61,8 @@ pub(super) fn calibration_csv(run: &RunRecord, rig: &Rig) -> String {
     for step in run.steps.iter().filter(|step| step.report.newest().is_some()) {
         let calibration = &step.report.calibration;
         text.push_str(&seconds_text(step.report.stamp_ns));
-        for (name, _) in &columns {
-            let index = calibration.names.iter().position(|known| known == name);
+        for parameter in &columns {
+            let index = calibration.parameters.iter().position(|known| known == parameter);
             for series in [&calibration.values, &calibration.sigmas] {
                 push_number(&mut text, index.and_then(|index| series.get(index)).copied().unwrap_or(f64::NAN));
             }
@@ -94,21 +85,22 @@ fn joint_names(run: &RunRecord, rig: &Rig) -> Vec<String> {
 }
 
 /// `rank.csv`: ranks, deficit by cause, thresholds, margins and singular values.
-pub(super) fn rank_csv(run: &RunRecord) -> String {
+pub(super) fn rank_csv(run: &RunRecord, names: &ParameterNames) -> String {
     let ranked: Vec<(&StepRecord, _)> =
         run.steps.iter().filter_map(|step| step.rank.as_ref().map(|rank| (step.as_ref(), rank))).collect();
-    let columns = ranked.iter().map(|(_, rank)| rank.names.len()).max().unwrap_or(0);
-    let mut margins: Vec<&String> = Vec::new();
-    for (name, _) in ranked.iter().flat_map(|(_, rank)| &rank.margins) {
-        if !margins.contains(&name) {
-            margins.push(name);
+    let columns = ranked.iter().map(|(_, rank)| rank.parameters.len()).max().unwrap_or(0);
+    let mut margins: Vec<Singularity> = Vec::new();
+    for (singularity, _) in ranked.iter().flat_map(|(_, rank)| &rank.margins) {
+        if !margins.contains(singularity) {
+            margins.push(*singularity);
         }
     }
     let mut text =
         "t_s,columns,rank_structural,rank_informed,deficit_parameterization,deficit_joints,deficit_absorbed,\
                     deficit_motion,known_directions,known_agreeing,false_gain,reference,structural_threshold,informed_threshold"
             .to_owned();
-    for name in &margins {
+    for singularity in &margins {
+        let name = names.singularity(*singularity);
         write!(text, ",margin_{}", name.replace([' ', ','], "_")).expect(INTO_STRING);
     }
     for index in 1..=columns {
@@ -121,7 +113,7 @@ pub(super) fn rank_csv(run: &RunRecord) -> String {
     for (step, rank) in ranked {
         text.push_str(&seconds_text(step.report.stamp_ns));
         let counts = [
-            rank.names.len(),
+            rank.parameters.len(),
             rank.rank_structural,
             rank.rank_informed,
             rank.deficit_parameterization,
@@ -137,8 +129,8 @@ pub(super) fn rank_csv(run: &RunRecord) -> String {
         for number in [rank.false_gain(), rank.reference, rank.structural_threshold, rank.informed_threshold] {
             push_number(&mut text, number);
         }
-        for name in &margins {
-            let margin = rank.margins.iter().find(|(known, _)| known == *name);
+        for singularity in &margins {
+            let margin = rank.margins.iter().find(|(known, _)| known == singularity);
             push_number(&mut text, margin.map_or(f64::NAN, |(_, margin)| *margin));
         }
         for series in [&rank.singular_values, &rank.singular_values_with_priors] {
@@ -154,7 +146,7 @@ pub(super) fn rank_csv(run: &RunRecord) -> String {
 /// `information.csv`: for each step and parameter how fast the image narrows it, and which motion that is owed to, in bits
 /// per second; zeros where the image does not become a keyframe.
 pub(super) fn information_csv(run: &RunRecord, rig: &Rig) -> String {
-    let joints = rig.joint_names();
+    let (names, joints) = (rig.parameter_names(), rig.joint_names());
     let told = || run.steps.iter().filter_map(|step| Some((step, step.gain()?)));
     let count = told().map(|(_, (_, gain))| gain.joints).max().unwrap_or(0);
     let mut text = "t_s,keyframe,interval_s,parameter,bits_per_s".to_owned();
@@ -162,12 +154,12 @@ pub(super) fn information_csv(run: &RunRecord, rig: &Rig) -> String {
         write!(text, ",{}", motion.name(&joints).replace(' ', "_")).expect(INTO_STRING);
     }
     text.push_str(",earlier\n");
-    for (step, (rank, gain)) in told().filter(|(_, (rank, gain))| rank.names.len() == gain.columns()) {
-        for (column, name) in rank.names.iter().enumerate() {
+    for (step, (rank, gain)) in told().filter(|(_, (rank, gain))| rank.parameters.len() == gain.columns()) {
+        for (column, parameter) in rank.parameters.iter().enumerate() {
             text.push_str(&seconds_text(step.report.stamp_ns));
             write!(text, ",{}", u8::from(step.report.keyframe)).expect(INTO_STRING);
             push_number(&mut text, gain.interval_s);
-            write!(text, ",{}", parameter_name(name, rig)).expect(INTO_STRING);
+            write!(text, ",{}", names.name(*parameter)).expect(INTO_STRING);
             push_number(&mut text, gain.bits_per_s(column));
             let parts: Vec<f64> = gain.by_motion_per_s(column).collect();
             for motion in 0..6 + count {

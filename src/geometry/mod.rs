@@ -6,6 +6,7 @@
 
 mod angle;
 pub mod dense;
+mod dimension;
 mod median;
 mod rigid_transform;
 pub mod so3;
@@ -15,6 +16,7 @@ mod tangent;
 mod tests;
 
 pub use angle::wrap_angle;
+pub use dimension::Dimension;
 pub use median::median;
 pub use rigid_transform::RigidTransform;
 pub use split_mix::SplitMix64;

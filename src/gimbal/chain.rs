@@ -2,16 +2,7 @@ use nalgebra::{DVector, Vector6};
 
 use crate::geometry::{RigidTransform, so3};
 
-use super::conversion;
-use super::{ClassicalChain, DhLink, Parameterization};
-
-const RADIANS: &str = "rad";
-const METRES: &str = "m";
-/// Names and units of a rigid transform's six columns.
-const BLOCK_COLUMNS: [(&str, &str); 6] =
-    [("rx", RADIANS), ("ry", RADIANS), ("rz", RADIANS), ("tx", METRES), ("ty", METRES), ("tz", METRES)];
-/// Names and units of a link's four columns.
-const LINK_COLUMNS: [(&str, &str); 4] = [("theta", RADIANS), ("d", METRES), ("a", METRES), ("alpha", RADIANS)];
+use super::{ClassicalChain, DhLink, ParameterId, ParameterPart, Parameterization, Quantity, conversion};
 
 /// The numbers of a chain of at least one joint in a minimal form.
 #[derive(Clone, Debug, PartialEq)]
@@ -136,30 +127,35 @@ impl Chain {
 
     /// Columns of the chain with its offsets that the chain without them keeps.
     pub(super) fn kept_columns(&self) -> Vec<usize> {
-        let columns = self.all_columns();
-        (0..columns.len()).filter(|&index| !self.hides(&columns[index].0)).collect()
+        let columns = self.all_parameters();
+        (0..columns.len()).filter(|&index| !self.hides(columns[index])).collect()
     }
 
-    fn hides(&self, name: &str) -> bool {
-        self.offsets_hidden && name.split_once('.').is_some_and(|(_, name)| name == "theta")
+    fn hides(&self, parameter: ParameterId) -> bool {
+        self.offsets_hidden && parameter.is_joint_offset()
     }
 
-    /// Names and units of all columns, hidden ones included.
-    fn all_columns(&self) -> Vec<(String, &'static str)> {
-        let block = |prefix: &str| BLOCK_COLUMNS.map(|(name, unit)| (format!("{prefix}.{name}"), unit));
-        let link = |index: usize| LINK_COLUMNS.map(|(name, unit)| (format!("L{}.{name}", index + 1), unit));
+    /// The parameters of all columns, hidden ones included.
+    fn all_parameters(&self) -> Vec<ParameterId> {
+        let of = |part: ParameterPart| move |quantity: Quantity| ParameterId { part, quantity };
+        let link = |index: usize| Quantity::LINK.map(of(ParameterPart::Link(index as u8)));
         match &self.form {
             Form::Classical(chain) => {
                 let links = (0..chain.links.len()).flat_map(link);
-                block("IB").into_iter().chain(links).chain(block("EC")).collect()
+                let base = Quantity::TRANSFORM.map(of(ParameterPart::ImuFromBase));
+                let effector = Quantity::TRANSFORM.map(of(ParameterPart::EffectorFromCamera));
+                base.into_iter().chain(links).chain(effector).collect()
             }
             Form::Minimal(chain) => {
-                let base = if self.parameterization.base_yx() { ["ry", "rx"] } else { ["rx", "ry"] };
-                let mut columns: Vec<_> = base.map(|name| (format!("I.{name}"), RADIANS)).into();
-                columns.extend(["tx", "ty"].map(|name| (format!("I.{name}"), METRES)));
-                columns.extend((0..chain.links.len()).flat_map(link));
-                let beta = (format!("L{}.beta", chain.links.len()), RADIANS);
-                let y = (format!("L{}.y", chain.links.len()), METRES);
+                let rotations = if self.parameterization.base_yx() {
+                    [Quantity::Ry, Quantity::Rx]
+                } else {
+                    [Quantity::Rx, Quantity::Ry]
+                };
+                let base = rotations.into_iter().chain([Quantity::Tx, Quantity::Ty]).map(of(ParameterPart::Base));
+                let mut columns: Vec<_> = base.chain((0..chain.links.len()).flat_map(link)).collect();
+                let last = ParameterPart::Link(chain.links.len().saturating_sub(1) as u8);
+                let [beta, y] = [Quantity::Beta, Quantity::Y].map(of(last));
                 if self.parameterization.end_swapped() {
                     let alpha = columns.pop();
                     columns.extend([y, beta]);
@@ -171,22 +167,19 @@ impl Chain {
             }
             Form::Poe(blocks) => {
                 let last = blocks.len() - 1;
-                let local = [("wx", RADIANS), ("wy", RADIANS), ("vx", METRES), ("vy", METRES)];
-                let inner = (0..last).flat_map(|index| local.map(|(name, unit)| (format!("X{index}.{name}"), unit)));
-                inner.chain(block(&format!("X{last}"))).collect()
+                let block = |index: usize| ParameterPart::Exponential(index as u8);
+                let inner = (0..last).flat_map(|index| Quantity::EXPONENTIAL.map(of(block(index))));
+                inner.chain(Quantity::TRANSFORM.map(of(block(last)))).collect()
             }
-            Form::Rigid(_) => block("IC").into(),
+            Form::Rigid(_) => Quantity::TRANSFORM.map(of(ParameterPart::ImuFromCamera(0))).into(),
         }
     }
 
-    /// Names in column order: `IB.rx`, `L1.theta`, …, as in the golden vectors.
-    pub fn parameter_names(&self) -> Vec<String> {
-        self.all_columns().into_iter().map(|(name, _)| name).filter(|name| !self.hides(name)).collect()
-    }
-
-    /// Unit of each column, `rad` or `m`.
-    pub fn parameter_units(&self) -> Vec<&'static str> {
-        self.all_columns().into_iter().filter(|(name, _)| !self.hides(name)).map(|(_, unit)| unit).collect()
+    /// The parameters of its columns, in their order; those of a rigid chain are the main camera's.
+    pub fn parameters(&self) -> Vec<ParameterId> {
+        let mut parameters = self.all_parameters();
+        parameters.retain(|parameter| !self.hides(*parameter));
+        parameters
     }
 
     /// Value of each column: scalars as they are, rigid transforms as rotation vector and translation, inner blocks of

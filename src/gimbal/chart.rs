@@ -25,15 +25,26 @@ pub fn auto_parameterization(classical: &ClassicalChain) -> Parameterization {
     Parameterization::minimal(margin_yx > margin_xy + TIE, margin_swapped > margin_printed + TIE)
 }
 
+/// Where a chart is singular.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Singularity {
+    /// In the base block of a minimal form.
+    Base,
+    /// In the end block of a minimal form.
+    End,
+    /// Where the joint axes at both ends of this link, counted from 0, are parallel.
+    ParallelAxes(u8),
+}
+
 impl Chain {
-    /// Margins to what its chart cannot represent smoothly, 1 far away and 0 at the lock: `base`, `end`, and
-    /// `Ll.alpha`, the sine of each middle link's twist, 0 for parallel neighbouring axes.
+    /// Margins to the singularities of its chart, 1 far away and 0 when singular; of parallel axes the absolute sine of
+    /// the link's twist.
     ///
-    /// The classical form has only the latter, `poe` and a rigid camera none.
-    pub fn margins(&self) -> Vec<(String, f64)> {
-        let twists = |links: &[super::DhLink]| -> Vec<(String, f64)> {
+    /// The classical form has only those of parallel axes, `poe` and a rigid camera none.
+    pub fn margins(&self) -> Vec<(Singularity, f64)> {
+        let twists = |links: &[super::DhLink]| -> Vec<(Singularity, f64)> {
             let middle = links.len().saturating_sub(1);
-            let margin = |index: usize| (format!("L{}.alpha", index + 1), links[index].alpha_rad.sin().abs());
+            let margin = |index: usize| (Singularity::ParallelAxes(index as u8), links[index].alpha_rad.sin().abs());
             (0..middle).map(margin).collect()
         };
         match &self.form {
@@ -45,8 +56,8 @@ impl Chain {
                     chain.links.last().map_or(0.0, |link| link.alpha_rad)
                 };
                 let mut margins = vec![
-                    ("base".to_owned(), chain.base_angles_rad[1].cos().abs()),
-                    ("end".to_owned(), end_angle_rad.cos().abs()),
+                    (Singularity::Base, chain.base_angles_rad[1].cos().abs()),
+                    (Singularity::End, end_angle_rad.cos().abs()),
                 ];
                 margins.extend(twists(&chain.links));
                 margins

@@ -4,14 +4,11 @@ use std::f64::consts::PI;
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::geometry::Dimension;
 use crate::geometry::dense::thin_svd;
 
 use super::{Chain, ClassicalChain, Parameterization};
 
-/// Scale that makes a radian and a metre comparable in the least-squares fits: 10°.
-const ROTATION_SCALE_RAD: f64 = 10.0 * PI / 180.0;
-/// The same for lengths: 3 cm.
-const TRANSLATION_SCALE_M: f64 = 0.03;
 /// Singular values of the scaled, stacked chain Jacobian below this fraction of the largest are zero; regular
 /// mechanisms stay above 2e-4, redundant columns below 1e-15.
 const RANK_TOLERANCE: f64 = 1e-10;
@@ -62,7 +59,7 @@ pub fn transport(from: &Chain, to: &Chain) -> DMatrix<f64> {
     let whole = |chain: &Chain| Chain { offsets_hidden: false, ..chain.clone() };
     let angles = generic_joint_angles(to.joint_count(), 12 * (to.joint_count() + 1));
     let (whole_from, whole_to) = (whole(from), whole(to));
-    let scale = column_scale(&whole_to, ROTATION_SCALE_RAD, TRANSLATION_SCALE_M);
+    let scale = by_column(&whole_to, Dimension::scale);
     let mut target = stacked_jacobian(&whole_to, &angles);
     scale_columns(&mut target, &scale);
     let source = stacked_jacobian(&whole_from, &angles);
@@ -94,21 +91,12 @@ pub fn transport(from: &Chain, to: &Chain) -> DMatrix<f64> {
 /// # Panics
 /// When the numbers of joints differ, or the covariance does not belong to `from`.
 pub fn transport_covariance(from: &Chain, covariance: &DMatrix<f64>, to: &Chain) -> DMatrix<f64> {
-    transported(from, covariance, to, ROTATION_SCALE_RAD, TRANSLATION_SCALE_M)
+    transported(from, covariance, to, Dimension::scale)
 }
 
-fn transported(
-    from: &Chain,
-    covariance: &DMatrix<f64>,
-    to: &Chain,
-    rotation_sigma_rad: f64,
-    translation_sigma_m: f64,
-) -> DMatrix<f64> {
+fn transported(from: &Chain, covariance: &DMatrix<f64>, to: &Chain, sigma: impl Fn(Dimension) -> f64) -> DMatrix<f64> {
     let motion = transport(from, to);
-    let (from_scale, to_scale) = (
-        column_scale(from, ROTATION_SCALE_RAD, TRANSLATION_SCALE_M),
-        column_scale(to, ROTATION_SCALE_RAD, TRANSLATION_SCALE_M),
-    );
+    let (from_scale, to_scale) = (by_column(from, Dimension::scale), by_column(to, Dimension::scale));
     let scaled = DMatrix::from_fn(motion.nrows(), motion.ncols(), |row, column| {
         motion[(row, column)] * from_scale[column] / to_scale[row]
     });
@@ -121,17 +109,17 @@ fn transported(
             column.fill(0.0);
         }
     }
-    let sigma = column_scale(to, rotation_sigma_rad, translation_sigma_m);
+    let sigma = by_column(to, sigma);
     let free = DMatrix::identity(to.dof(), to.dof()) - &reached * reached.transpose();
     let free = DMatrix::from_fn(to.dof(), to.dof(), |row, column| free[(row, column)] * sigma[row] * sigma[column]);
     let result = &motion * covariance * motion.transpose() + free;
     (&result + result.transpose()) * 0.5
 }
 
-/// The scale of each column by its unit.
-fn column_scale(chain: &Chain, rotation: f64, translation: f64) -> DVector<f64> {
-    let units = chain.parameter_units();
-    DVector::from_iterator(units.len(), units.iter().map(|unit| if *unit == "rad" { rotation } else { translation }))
+/// A value for each column by its dimension.
+fn by_column(chain: &Chain, value: impl Fn(Dimension) -> f64) -> DVector<f64> {
+    let parameters = chain.parameters();
+    DVector::from_iterator(parameters.len(), parameters.iter().map(|parameter| value(parameter.dimension())))
 }
 
 fn scale_columns(matrix: &mut DMatrix<f64>, scale: &DVector<f64>) {
@@ -155,13 +143,17 @@ impl Chain {
         rotation_sigma_rad: f64,
     ) -> DMatrix<f64> {
         let given = Self::from_classical(classical, Parameterization::Classical);
+        let sigma = |dimension| match dimension {
+            Dimension::Angle => rotation_sigma_rad,
+            _ => translation_sigma_m,
+        };
         let variances = |chain: &Self| {
-            let sigma = column_scale(chain, rotation_sigma_rad, translation_sigma_m);
+            let sigma = by_column(chain, sigma);
             DMatrix::from_diagonal(&sigma.component_mul(&sigma))
         };
         if self.parameterization == Parameterization::Classical {
             return variances(self);
         }
-        transported(&given, &variances(&given), self, rotation_sigma_rad, translation_sigma_m)
+        transported(&given, &variances(&given), self, sigma)
     }
 }

@@ -96,7 +96,7 @@ mod tests {
             let near = Chain::from_classical(&random.chain(joints), Parameterization::Classical);
             let scales = DVector::from_iterator(
                 near.dof(),
-                near.parameter_units().into_iter().map(|unit| if unit == "rad" { 0.17 } else { 0.03 }),
+                near.parameters().into_iter().map(|parameter| parameter.dimension().scale()),
             );
             let form = NearestForm::new(near.clone(), &scales);
             assert_eq!(form.of(&near), near);

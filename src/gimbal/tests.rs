@@ -3,3 +3,10 @@ mod derivatives;
 pub(crate) mod golden;
 mod priors;
 pub(crate) mod random;
+
+use super::{ParameterId, ParameterNames};
+
+/// The parameter of a name, links by number: `L1.alpha`.
+pub(crate) fn parameter(name: &str) -> ParameterId {
+    ParameterNames::default().parse(name).unwrap_or_else(|| panic!("'{name}' is no parameter"))
+}

@@ -50,6 +50,7 @@ use std::sync::Arc;
 
 use self::theme::Theme;
 use crate::frontend::FeatureId;
+use crate::gimbal::{ParameterId, ParameterNames};
 use crate::observability::SlidePosition;
 use crate::sensors::GrayImage;
 use crate::session::breakpoints::Breakpoints;
@@ -66,8 +67,8 @@ pub trait ImageSource {
 pub struct Selection {
     /// A feature.
     pub feature: Option<FeatureId>,
-    /// A calibration parameter by name.
-    pub parameter: Option<String>,
+    /// A calibration parameter.
+    pub parameter: Option<ParameterId>,
     /// The run that single-run panels show.
     pub run: usize,
     /// The stretch of time that plots show, begin and end since the log began; `None` for the whole log.
@@ -136,5 +137,10 @@ impl<'a> PanelContext<'a> {
     /// The run that single-run panels show, `None` before the first run has started.
     pub fn selected_run(&self) -> Option<&'a RunRecord> {
         self.recording.runs.get(self.selection.run)
+    }
+
+    /// What calibration parameters are called.
+    pub(crate) fn names(&self) -> ParameterNames {
+        ParameterNames { joints: Vec::new(), ..self.recording.rig.parameter_names() }
     }
 }

@@ -7,6 +7,7 @@ use super::sample_recording::{sample_images, sample_recording, sample_recording_
 use super::tests::{keep_picture, with_context};
 use super::theme::{Theme, ThemeName};
 use super::{PanelContext, Selection};
+use crate::gimbal::tests::parameter;
 use crate::session::Recording;
 
 const SECOND_NS: i64 = 1_000_000_000;
@@ -56,8 +57,7 @@ fn trying_cases() -> Vec<(&'static str, Recording, i64)> {
     for step in rigid.runs.iter_mut().flat_map(|run| &mut run.steps) {
         let step = std::sync::Arc::make_mut(step);
         let calibration = &mut step.report.calibration;
-        calibration.names.clear();
-        calibration.units.clear();
+        calibration.parameters.clear();
         calibration.values.clear();
         calibration.sigmas.clear();
         calibration.prior_sigmas.clear();
@@ -88,7 +88,7 @@ fn trying_cases() -> Vec<(&'static str, Recording, i64)> {
 /// Draws a panel as it is meant to be seen, then in every trying case, large and tiny.
 fn check<P: Default>(name: &str, size_px: [u32; 2], mut ui: impl FnMut(&mut P, &mut Ui, &mut PanelContext<'_>)) {
     let recording = sample_recording();
-    let selection = Selection { parameter: Some("L2.alpha".to_owned()), ..Selection::default() };
+    let selection = Selection { parameter: Some(parameter("L2.alpha")), ..Selection::default() };
     let second = Selection { run: 1, ..Selection::default() };
     let mut shown = |file: &str, cursor_ns: i64, size_px: [u32; 2], theme: ThemeName, selection: &Selection| {
         let mut panel = P::default();

@@ -2,9 +2,13 @@
 
 use super::sample_recording::{Dice, FIRST_TRACKED_FRAME};
 use crate::estimator::CalibrationEstimate;
-use crate::geometry::{RigidTransform, so3};
-use crate::gimbal::{ClassicalChain, DhLink};
+use crate::geometry::{Dimension, RigidTransform, so3};
+use crate::gimbal::{ClassicalChain, DhLink, ParameterId, ParameterPart, Quantity, Singularity};
 use crate::observability::{CalibrationDirection, RankReport};
+
+/// Margins of the made-up calibration.
+const MARGINS: [(Singularity, f64); 3] =
+    [(Singularity::Base, 0.98), (Singularity::End, 0.93), (Singularity::ParallelAxes(1), 0.99)];
 
 /// The calibration at a frame: the given chain at first, then ever nearer to the truth, faster for angles than for
 /// lengths, with a shrinking σ.
@@ -16,16 +20,18 @@ pub(crate) fn calibration_at(
 ) -> CalibrationEstimate {
     let age_s = index.saturating_sub(FIRST_TRACKED_FRAME) as f64 * 0.05;
     let mixed = mix(given, truth, (-age_s / 2.0).exp());
-    let (names, values) = if name == "classical" { classical_values(&mixed) } else { minimal_values(&mixed) };
-    let units: Vec<&'static str> = names.iter().map(|name| unit_of(name)).collect();
-    let prior_sigmas: Vec<f64> = units.iter().map(|unit| if *unit == "rad" { 0.015 } else { 0.0035 }).collect();
+    let (parameters, values): (Vec<ParameterId>, Vec<f64>) =
+        if name == "classical" { classical_values(&mixed) } else { minimal_values(&mixed) }.into_iter().unzip();
+    let is_angle = |parameter: &ParameterId| parameter.dimension() == Dimension::Angle;
+    let prior_sigmas: Vec<f64> =
+        parameters.iter().map(|parameter| if is_angle(parameter) { 0.015 } else { 0.0035 }).collect();
     let mut dice = Dice::new(index as u64 + 100);
     let waiting = index < FIRST_TRACKED_FRAME;
     let sigmas: Vec<f64> = prior_sigmas
         .iter()
-        .zip(&units)
-        .map(|(prior, unit)| {
-            let speed = if *unit == "rad" { 2.5 } else { 0.5 };
+        .zip(&parameters)
+        .map(|(prior, parameter)| {
+            let speed = if is_angle(parameter) { 2.5 } else { 0.5 };
             if waiting { f64::NAN } else { prior / (1.0 + speed * age_s).sqrt() }
         })
         .collect();
@@ -36,20 +42,19 @@ pub(crate) fn calibration_at(
         .collect();
     CalibrationEstimate {
         parameterization: if name == "auto" { "minimal".to_owned() } else { name.to_owned() },
-        names,
-        units,
+        parameters,
         values,
         sigmas,
         prior_sigmas,
         classical: mixed,
-        margins: vec![("base".to_owned(), 0.98), ("end".to_owned(), 0.93), ("L2".to_owned(), 0.99)],
+        margins: MARGINS.to_vec(),
         rigid_cameras: Vec::new(),
     }
 }
 
 /// The rank at a frame: everything structural at once, informed directions one after the other.
-pub(crate) fn rank_at(names: &[String], index: usize) -> RankReport {
-    let columns = names.len();
+pub(crate) fn rank_at(parameters: &[ParameterId], index: usize) -> RankReport {
+    let columns = parameters.len();
     let redundant = if columns == 24 { 6 } else { 0 };
     let structural = columns - redundant;
     let age_s = index.saturating_sub(FIRST_TRACKED_FRAME) as f64 * 0.05;
@@ -80,7 +85,7 @@ pub(crate) fn rank_at(names: &[String], index: usize) -> RankReport {
         })
         .collect();
     RankReport {
-        names: names.to_vec(),
+        parameters: parameters.to_vec(),
         held: Vec::new(),
         singular_values_with_priors: singular_values.iter().map(|value| (value * value + 1.0).sqrt()).collect(),
         singular_values,
@@ -96,8 +101,8 @@ pub(crate) fn rank_at(names: &[String], index: usize) -> RankReport {
         directions,
         known: Vec::new(),
         posterior: crate::observability::PackedFactor::default(),
-        joint_count: names.iter().filter(|name| name.split_once('.').is_some_and(|(_, number)| number == "a")).count(),
-        margins: vec![("base".to_owned(), 0.98), ("end".to_owned(), 0.93), ("L2".to_owned(), 0.99)],
+        joint_count: parameters.iter().filter(|parameter| parameter.quantity == Quantity::A).count(),
+        margins: MARGINS.to_vec(),
     }
 }
 
@@ -121,23 +126,19 @@ fn mix(given: &ClassicalChain, truth: &ClassicalChain, weight_of_given: f64) -> 
     }
 }
 
-fn unit_of(name: &str) -> &'static str {
-    let last = name.rsplit('.').next().unwrap_or(name);
-    if matches!(last, "tx" | "ty" | "tz" | "d" | "a" | "y") { "m" } else { "rad" }
-}
-
-/// Names and values of the classical form, as in the golden files.
-fn classical_values(chain: &ClassicalChain) -> (Vec<String>, Vec<f64>) {
-    let mut entries = pose_entries("IB", &chain.imu_from_base);
-    for (number, link) in chain.links.iter().enumerate() {
-        entries.extend(link_entries(number + 1, link));
+/// Parameters and values of the classical form.
+fn classical_values(chain: &ClassicalChain) -> Vec<(ParameterId, f64)> {
+    let mut entries = pose_entries(ParameterPart::ImuFromBase, &chain.imu_from_base);
+    for (number, link) in (0..).zip(&chain.links) {
+        entries.extend(link_entries(number, link));
     }
-    entries.extend(pose_entries("EC", &chain.effector_from_camera));
-    entries.into_iter().unzip()
+    entries.extend(pose_entries(ParameterPart::EffectorFromCamera, &chain.effector_from_camera));
+    entries
 }
 
-/// Names and values of the minimal parameterization (docs/mathematics.md, section 5), three links, away from singularities.
-fn minimal_values(chain: &ClassicalChain) -> (Vec<String>, Vec<f64>) {
+/// Parameters and values of the minimal parameterization (docs/mathematics.md, section 5), three links, away from
+/// singularities.
+fn minimal_values(chain: &ClassicalChain) -> Vec<(ParameterId, f64)> {
     let base = chain.imu_from_base.rotation_matrix();
     let (rx, ry) = ((-base[(1, 2)]).atan2(base[(2, 2)]), base[(0, 2)].atan2(base[(1, 2)].hypot(base[(2, 2)])));
     let psi = (-base[(0, 1)]).atan2(base[(0, 0)]);
@@ -164,26 +165,26 @@ fn minimal_values(chain: &ClassicalChain) -> (Vec<String>, Vec<f64>) {
     let lengths = so3::exp(&nalgebra::Vector3::new(0.0, 0.0, -theta)) * last.translation_m;
     let y = lengths.y / cosine;
     links[2] = DhLink { theta_offset_rad: theta, d_m: lengths.z - y * alpha.sin(), a_m: lengths.x, alpha_rad: alpha };
-    let mut entries: Vec<(String, f64)> = [("I.rx", rx), ("I.ry", ry), ("I.tx", shift.x), ("I.ty", shift.y)]
-        .map(|(name, value)| (name.into(), value))
-        .into();
-    for (number, link) in links.iter().enumerate() {
-        entries.extend(link_entries(number + 1, link));
+    let base = [(Quantity::Rx, rx), (Quantity::Ry, ry), (Quantity::Tx, shift.x), (Quantity::Ty, shift.y)];
+    let mut entries: Vec<_> =
+        base.map(|(quantity, value)| (ParameterId { part: ParameterPart::Base, quantity }, value)).into();
+    for (number, link) in (0..).zip(&links) {
+        entries.extend(link_entries(number, link));
     }
-    entries.push(("L3.beta".to_owned(), beta));
-    entries.push(("L3.y".to_owned(), y));
-    entries.into_iter().unzip()
+    for (quantity, value) in [(Quantity::Beta, beta), (Quantity::Y, y)] {
+        entries.push((ParameterId { part: ParameterPart::Link(2), quantity }, value));
+    }
+    entries
 }
 
-fn link_entries(number: usize, link: &DhLink) -> [(String, f64); 4] {
-    [("theta", link.theta_offset_rad), ("d", link.d_m), ("a", link.a_m), ("alpha", link.alpha_rad)]
-        .map(|(name, value)| (format!("L{number}.{name}"), value))
+fn link_entries(number: u8, link: &DhLink) -> impl Iterator<Item = (ParameterId, f64)> {
+    let part = ParameterPart::Link(number);
+    let values = [link.theta_offset_rad, link.d_m, link.a_m, link.alpha_rad];
+    Quantity::LINK.map(|quantity| ParameterId { part, quantity }).into_iter().zip(values)
 }
 
-fn pose_entries(name: &str, pose: &RigidTransform) -> Vec<(String, f64)> {
-    let turn = so3::log(&pose.rotation);
-    let shift = pose.translation_m;
-    [("rx", turn.x), ("ry", turn.y), ("rz", turn.z), ("tx", shift.x), ("ty", shift.y), ("tz", shift.z)]
-        .map(|(entry, value)| (format!("{name}.{entry}"), value))
-        .into()
+fn pose_entries(part: ParameterPart, pose: &RigidTransform) -> Vec<(ParameterId, f64)> {
+    let (turn, shift) = (so3::log(&pose.rotation), pose.translation_m);
+    let values = [turn.x, turn.y, turn.z, shift.x, shift.y, shift.z];
+    Quantity::TRANSFORM.map(|quantity| ParameterId { part, quantity }).into_iter().zip(values).collect()
 }

@@ -14,7 +14,7 @@ use super::sample_calibration::{calibration_at, rank_at};
 use super::sample_images::SampleImages;
 use crate::camera::{CameraModel, Distortion, Projection};
 use crate::estimator::{
-    Event, EventKind, FeatureCounts, FeatureReport, FrameStateReport, IterationReport, LandmarkReport,
+    Event, EventKind, FactorKind, FeatureCounts, FeatureReport, FrameStateReport, IterationReport, LandmarkReport,
     ObservationReport, Phase, ResidualSummary, StageTimes, StepReport,
 };
 use crate::flight_log::LogWarning;
@@ -341,7 +341,7 @@ fn sample_run(
             } else {
                 tracking_report(index, &estimate, calibration, tracks, &points, &mut dice)
             };
-            let rank = (index >= FIRST_TRACKED_FRAME).then(|| rank_at(&report.calibration.names, index));
+            let rank = (index >= FIRST_TRACKED_FRAME).then(|| rank_at(&report.calibration.parameters, index));
             Arc::new(StepRecord {
                 report,
                 rank,
@@ -483,10 +483,10 @@ fn tracking_report(
         features,
         landmarks,
         residuals: [
-            ("visual", visual_count, 1.02),
-            ("imu", 150, 0.95),
-            ("encoder", 33, 1.1),
-            ("calibration prior", 18, 0.6),
+            (FactorKind::Visual, visual_count, 1.02),
+            (FactorKind::Imu, 150, 0.95),
+            (FactorKind::Encoder, 33, 1.1),
+            (FactorKind::CalibrationPrior, 18, 0.6),
         ]
         .map(|(factor, count, ratio)| ResidualSummary {
             factor,

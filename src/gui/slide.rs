@@ -33,7 +33,7 @@ pub(crate) fn update(ctx: &mut PanelContext<'_>) {
         return;
     }
     let slide = moved(ctx, run, step, position);
-    let answered = Some((position.clone(), Arc::clone(step)));
+    let answered = Some((*position, Arc::clone(step)));
     ctx.selection.moved = MovedChain { answered, slide: slide.map(Arc::new) };
 }
 

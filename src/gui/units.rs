@@ -1,5 +1,7 @@
 //! How numbers are shown: degrees and millimetres on screen, radians and metres underneath.
 
+use crate::geometry::Dimension;
+
 /// What a stored unit becomes on screen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Shown {
@@ -10,13 +12,13 @@ pub(crate) struct Shown {
 }
 
 impl Shown {
-    /// How a stored unit (`rad`, `m`, `s`) is shown; others stay as they are, without a unit.
-    pub(crate) fn of(stored_unit: &str) -> Self {
-        match stored_unit {
-            "rad" => Self { factor: 180.0 / std::f64::consts::PI, unit: "°" },
-            "m" => Self { factor: 1000.0, unit: " mm" },
-            "s" => Self { factor: 1000.0, unit: " ms" },
-            _ => Self { factor: 1.0, unit: "" },
+    /// How values of a dimension are shown: in degrees, millimetres, milliseconds.
+    pub(crate) const fn of(dimension: Dimension) -> Self {
+        match dimension {
+            Dimension::Angle => Self { factor: 180.0 / std::f64::consts::PI, unit: "°" },
+            Dimension::Length => Self { factor: 1000.0, unit: " mm" },
+            Dimension::Time => Self { factor: 1000.0, unit: " ms" },
+            Dimension::Ratio => Self { factor: 1.0, unit: "" },
         }
     }
 
@@ -85,14 +87,14 @@ mod tests {
 
     #[test]
     fn values_are_as_precise_as_their_sigma() {
-        let angle = Shown::of("rad");
+        let angle = Shown::of(Dimension::Angle);
         assert_eq!(angle.value(1.0, 0.0002), "57.296°");
         assert_eq!(angle.sigma(0.0002), "0.011°");
-        assert_eq!(Shown::of("m").value(-0.0123, 0.0004), "-12.30 mm");
-        assert_eq!(Shown::of("m").value(0.05, f64::NAN), "50.00 mm");
+        assert_eq!(Shown::of(Dimension::Length).value(-0.0123, 0.0004), "-12.30 mm");
+        assert_eq!(Shown::of(Dimension::Length).value(0.05, f64::NAN), "50.00 mm");
         assert_eq!(angle.sigma(f64::NAN), "–");
-        assert_eq!(Shown::of("s").value(-0.01, 0.0002), "-10.00 ms");
-        assert_eq!(Shown::of("px").value(0.25, 0.01), "0.250");
+        assert_eq!(Shown::of(Dimension::Time).value(-0.01, 0.0002), "-10.00 ms");
+        assert_eq!(Shown::of(Dimension::Ratio).value(0.25, 0.01), "0.250");
     }
 
     #[test]

@@ -4,9 +4,9 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::estimator::{ColumnGroup, Linearization};
 use crate::geometry::dense;
-use crate::gimbal::Chain;
+use crate::gimbal::{Chain, ParameterId};
 
-use super::classification::{ROTATION_SCALE_RAD, TIME_SCALE_S, TRANSLATION_SCALE_M, classify, tolerance};
+use super::classification::{classify, tolerance};
 use super::directions::weak_directions;
 use super::elimination::{Rows, column_norms};
 use super::structure::{Measured, known_losses};
@@ -22,7 +22,7 @@ const BANDED_COLUMNS: usize = 27;
 /// What the calibration columns are multiplied by, so that angles and lengths compare and 1 means as much as the scale.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum ScalingRule {
-    /// 10° for angles, 3 cm for lengths and 20 ms for clocks, the same for every rig.
+    /// That of the dimension, the same for every rig: see [`Dimension::scale`](crate::geometry::Dimension::scale).
     #[default]
     Fixed,
     /// A standard deviation for each column, such as the rig's prior: 1 then means as much as was known before.
@@ -30,19 +30,11 @@ pub enum ScalingRule {
 }
 
 impl ScalingRule {
-    fn scale(&self, columns: &[String]) -> DVector<f64> {
-        let given = match self {
-            Self::PriorSigmas(sigmas) if sigmas.len() == columns.len() => Some(sigmas),
-            _ => None,
-        };
-        DVector::from_fn(columns.len(), |index, _| match given {
-            Some(sigmas) => sigmas[index],
-            None => match columns[index].rsplit('.').next() {
-                Some("tx" | "ty" | "tz" | "d" | "a" | "y" | "vx" | "vy") => TRANSLATION_SCALE_M,
-                Some("timeshift") => TIME_SCALE_S,
-                _ => ROTATION_SCALE_RAD,
-            },
-        })
+    fn scale(&self, columns: &[ParameterId]) -> DVector<f64> {
+        match self {
+            Self::PriorSigmas(sigmas) if sigmas.len() == columns.len() => DVector::from_column_slice(sigmas),
+            _ => DVector::from_iterator(columns.len(), columns.iter().map(|column| column.dimension().scale())),
+        }
     }
 }
 
@@ -67,9 +59,9 @@ pub fn analyse_with_scaling<A: AsRef<[f64]>>(
     joints_free: bool,
     scaling: &ScalingRule,
 ) -> Option<RankReport> {
-    let names = calibration_names(linearization);
-    let scale = scaling.scale(&names);
-    let columns = names.len();
+    let parameters = calibration_parameters(linearization);
+    let scale = scaling.scale(&parameters);
+    let columns = parameters.len();
     let projected = Projected::new(linearization)?;
     let block = scaled(projected.measurements, &scale);
     let svd = dense::thin_svd(&block)?;
@@ -105,7 +97,7 @@ pub fn analyse_with_scaling<A: AsRef<[f64]>>(
     let known = measured.compare(losses, &kept);
     Some(RankReport {
         directions: weak_directions(&block, &svd.v, &singular_values, rank_structural, INFORMED_THRESHOLD),
-        names,
+        parameters,
         held: held.clone(),
         singular_values,
         singular_values_with_priors: dense::singular_values(&with_priors)?,
@@ -126,9 +118,9 @@ pub fn analyse_with_scaling<A: AsRef<[f64]>>(
 }
 
 /// Places of the chain's columns that are not held.
-fn kept_columns(chain: &Chain, held: &[String]) -> Vec<usize> {
-    let names = chain.parameter_names().into_iter().enumerate();
-    names.filter(|(_, name)| !held.contains(name)).map(|(column, _)| column).collect()
+fn kept_columns(chain: &Chain, held: &[ParameterId]) -> Vec<usize> {
+    let parameters = chain.parameters().into_iter().enumerate();
+    parameters.filter(|(_, parameter)| !held.contains(parameter)).map(|(column, _)| column).collect()
 }
 
 /// What the measurements alone tell about the calibration, as the information of its columns in units of 10° and 3 cm;
@@ -147,7 +139,7 @@ pub(super) struct MeasuredBlock {
 
 /// `None` when the linearization is not finite.
 pub(super) fn measured_block(linearization: &Linearization) -> Option<MeasuredBlock> {
-    let scale = ScalingRule::Fixed.scale(&calibration_names(linearization));
+    let scale = ScalingRule::Fixed.scale(&calibration_parameters(linearization));
     let block = scaled(Projected::new(linearization)?.measurements, &scale);
     Some(MeasuredBlock { structural_threshold: structural_threshold(linearization, &scale), block })
 }
@@ -162,15 +154,8 @@ fn structural_threshold(linearization: &Linearization, scale: &DVector<f64>) -> 
     tolerance(linearization.jacobian.nrows(), scale.len()) * reference(linearization, scale)
 }
 
-fn calibration_names(linearization: &Linearization) -> Vec<String> {
-    let blocks = linearization.columns.iter().filter(|block| block.group == ColumnGroup::Calibration);
-    blocks
-        .flat_map(|block| {
-            let single = (block.len == 1).then(|| block.name.clone());
-            let numbered = |index| single.clone().unwrap_or_else(|| format!("{} {index}", block.name));
-            (0..block.len).map(numbered).collect::<Vec<_>>()
-        })
-        .collect()
+fn calibration_parameters(linearization: &Linearization) -> Vec<ParameterId> {
+    linearization.columns.iter().filter_map(|block| block.id.parameter()).collect()
 }
 
 /// The calibration columns with everything else projected out, at least as many rows as columns.
@@ -185,7 +170,7 @@ impl Projected {
         if !measurements.iter().chain(priors.iter()).all(|entry| entry.is_finite()) {
             return None;
         }
-        let columns = calibration_names(linearization).len();
+        let columns = calibration_parameters(linearization).len();
         let norms = column_norms(measurements, priors);
         // Blocks that no prior touches are projected out once for both readings.
         let held = |block: &Range<usize>| {
@@ -216,10 +201,10 @@ impl Projected {
 /// which are coupled to their neighbours only, then depths and joints, then poses, which are coupled to everything.
 fn nuisance_blocks(linearization: &Linearization) -> Vec<Range<usize>> {
     let of = |group: ColumnGroup| {
-        let blocks = linearization.columns.iter().filter(move |block| block.group == group);
+        let blocks = linearization.columns.iter().filter(move |block| block.id.group() == group);
         blocks.map(|block| block.start..block.start + block.len)
     };
-    let mut blocks: Vec<_> = of(ColumnGroup::SpeedBias).collect();
+    let mut blocks: Vec<_> = of(ColumnGroup::VelocityBias).collect();
     blocks.reverse();
     blocks.extend(of(ColumnGroup::InverseDepth));
     blocks.extend(of(ColumnGroup::Joints));

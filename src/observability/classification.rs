@@ -2,14 +2,8 @@
 
 use nalgebra::DMatrix;
 
-use crate::geometry::dense;
+use crate::geometry::{Dimension, dense};
 use crate::gimbal::{Chain, generic_joint_angles, stacked_jacobian};
-
-/// Scales that make a radian and a metre comparable: 10° and 3 cm.
-pub(super) const ROTATION_SCALE_RAD: f64 = 10.0 * std::f64::consts::PI / 180.0;
-pub(super) const TRANSLATION_SCALE_M: f64 = 0.03;
-/// Unit of the columns of clocks.
-pub(super) const TIME_SCALE_S: f64 = 0.02;
 
 /// How many columns are lost to what.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -76,8 +70,8 @@ pub(super) fn excitable_directions(chain: &Chain, joints_free: bool) -> DMatrix<
 /// The chain's Jacobians under one another, rows and columns in units of the two scales.
 fn scaled_stack(chain: &Chain, joint_angles_rad: &[Vec<f64>]) -> DMatrix<f64> {
     let mut stack = stacked_jacobian(chain, joint_angles_rad);
-    for (mut column, unit) in stack.column_iter_mut().zip(chain.parameter_units()) {
-        let column_scale = if unit == "rad" { ROTATION_SCALE_RAD } else { TRANSLATION_SCALE_M };
+    for (mut column, parameter) in stack.column_iter_mut().zip(chain.parameters()) {
+        let column_scale = parameter.dimension().scale();
         for (row, entry) in column.iter_mut().enumerate() {
             *entry *= column_scale / row_scale(row);
         }
@@ -86,7 +80,8 @@ fn scaled_stack(chain: &Chain, joint_angles_rad: &[Vec<f64>]) -> DMatrix<f64> {
 }
 
 fn row_scale(row: usize) -> f64 {
-    if row % 6 < 3 { ROTATION_SCALE_RAD } else { TRANSLATION_SCALE_M }
+    let dimension = if row % 6 < 3 { Dimension::Angle } else { Dimension::Length };
+    dimension.scale()
 }
 
 /// Takes from each frame's six rows what its joints can do.

@@ -1,9 +1,8 @@
 //! How fast images narrow the calibration, over a stretch of a flight.
 
-use serde::Serialize;
-
 use super::RankReport;
 use crate::estimator::{InformationGain, Motion};
+use crate::gimbal::ParameterId;
 
 /// The gain of information over some steps.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,10 +16,10 @@ pub struct InformationRate {
 }
 
 /// One parameter's gain.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct ParameterRate {
-    /// Its name.
-    pub name: String,
+    /// Which.
+    pub parameter: ParameterId,
     /// In bits per second: one bit halves the standard deviation.
     pub bits_per_s: f64,
     /// Of these, the part of each motion; a negative one takes away what others bring.
@@ -40,14 +39,14 @@ pub fn information_rate<'a>(
             motions: Motion::all(gain.joints).collect(),
             parameters: Vec::new(),
         });
-        if rate.motions.len() != 6 + gain.joints || rank.names.len() != gain.columns() {
+        if rate.motions.len() != 6 + gain.joints || rank.parameters.len() != gain.columns() {
             continue;
         }
         rate.duration_s += gain.interval_s;
-        for (column, name) in rank.names.iter().enumerate() {
-            let place = rate.parameters.iter().position(|known| known.name == *name).unwrap_or_else(|| {
+        for (column, parameter) in rank.parameters.iter().enumerate() {
+            let place = rate.parameters.iter().position(|known| known.parameter == *parameter).unwrap_or_else(|| {
                 let by_motion = vec![0.0; rate.motions.len()];
-                rate.parameters.push(ParameterRate { name: name.clone(), bits_per_s: 0.0, by_motion, earlier: 0.0 });
+                rate.parameters.push(ParameterRate { parameter: *parameter, bits_per_s: 0.0, by_motion, earlier: 0.0 });
                 rate.parameters.len() - 1
             });
             let sum = &mut rate.parameters[place];

@@ -28,5 +28,5 @@ pub use information::{InformationRate, ParameterRate, information_rate};
 pub use persistence::steps_lost;
 pub use report::{CalibrationDirection, RankReport};
 pub use slide::{ChainSlide, chain_of_step, slide};
-pub use slide_direction::{InvalidSlide, SlideDirection, SlidePosition};
+pub use slide_direction::{InvalidSlide, SlideDirection, SlidePosition, SlideRequest};
 pub use structure::{KnownDirection, KnownLoss, LEAST_FALSE_GAIN, known_losses};

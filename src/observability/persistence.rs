@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::RankReport;
+use crate::gimbal::ParameterId;
 
 /// A direction counts as lost in another step when this share of it lies among that step's null and weak directions.
 const SAME_SHARE: f64 = 0.9;
@@ -11,12 +12,12 @@ const SAME_SHARE: f64 = 0.9;
 ///
 /// The iteration ends at the first step that sees the direction, or has other columns.
 pub fn steps_lost<'a>(
-    names: &[String],
+    parameters: &[ParameterId],
     direction: &[f64],
     earlier: impl IntoIterator<Item = Option<&'a RankReport>>,
 ) -> usize {
     let direction = DVector::from_column_slice(direction);
-    let loses = |rank: &RankReport| rank.names == names && rank.loses(&direction);
+    let loses = |rank: &RankReport| rank.parameters == parameters && rank.loses(&direction);
     earlier.into_iter().take_while(|rank| rank.is_some_and(loses)).count()
 }
 
@@ -37,11 +38,17 @@ impl RankReport {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gimbal::{ParameterPart, Quantity};
     use crate::observability::{CalibrationDirection, PackedFactor};
+
+    fn parameters() -> [ParameterId; 3] {
+        [Quantity::Rx, Quantity::Ry, Quantity::Rz]
+            .map(|quantity| ParameterId { part: ParameterPart::ImuFromCamera(0), quantity })
+    }
 
     fn report(directions: &[[f64; 3]]) -> RankReport {
         RankReport {
-            names: ["a", "b", "c"].map(str::to_owned).into(),
+            parameters: parameters().into(),
             held: Vec::new(),
             singular_values: vec![3.0, 2.0, 0.1],
             singular_values_with_priors: vec![3.0, 2.0, 1.0],
@@ -71,7 +78,7 @@ mod tests {
 
     #[test]
     fn a_direction_is_lost_until_a_step_sees_it() {
-        let names: Vec<String> = ["a", "b", "c"].map(str::to_owned).into();
+        let names = parameters();
         let (first, mixed) = ([1.0, 0.0, 0.0], [0.6, 0.8, 0.0]);
         let (lost, seen) = (report(&[[0.0, 1.0, 0.0], first]), report(&[[0.0, 0.0, 1.0]]));
         let count =

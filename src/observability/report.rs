@@ -1,13 +1,14 @@
 use super::{KnownDirection, PackedFactor};
 use crate::estimator::allocated_bytes;
+use crate::gimbal::{ParameterId, ParameterNames, Singularity};
 
 /// Ranks of the calibration block at one step, by the rule of docs/mathematics.md, section 8.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RankReport {
-    /// Names of the calibration columns.
-    pub names: Vec<String>,
-    /// Names of the parameters that are held at their values: they are known, and take no part.
-    pub held: Vec<String>,
+    /// Parameters of the calibration columns.
+    pub parameters: Vec<ParameterId>,
+    /// Parameters that are fixed at their values: they are known, and take no part.
+    pub held: Vec<ParameterId>,
     /// Singular values of the prior-scaled, projected calibration columns, largest first, one per column.
     pub singular_values: Vec<f64>,
     /// Singular values with the priors kept in.
@@ -33,7 +34,7 @@ pub struct RankReport {
     /// Null and weak directions, weakest first.
     pub directions: Vec<CalibrationDirection>,
     /// Margins to the chart's locks.
-    pub margins: Vec<(String, f64)>,
+    pub margins: Vec<(Singularity, f64)>,
     /// What is known to be lost from the form of the chain, held against this measurement.
     pub known: Vec<KnownDirection>,
     /// Number of joints of the chain.
@@ -54,31 +55,28 @@ pub struct CalibrationDirection {
 }
 
 impl RankReport {
-    /// The report in one line: `18 of 24 structural; 6 redundant in the parameterization; 15 informed; weakest L3.d`.
-    pub fn verdict(&self) -> String {
+    /// The report in one line: `18 of 24 structural; 6 redundant in the parameterization; 15 informed; weakest yaw.d`.
+    pub fn verdict(&self, names: &ParameterNames) -> String {
         let causes = [
             (self.deficit_parameterization, "redundant in the parameterization"),
             (self.deficit_joints, "lost to joints that did not move"),
             (self.deficit_absorbed, "absorbed by free joint angles"),
             (self.deficit_motion, "lost to the motion of the vehicle"),
         ];
-        let mut parts = vec![format!("{} of {} structural", self.rank_structural, self.names.len())];
+        let mut parts = vec![format!("{} of {} structural", self.rank_structural, self.parameters.len())];
         parts.extend(causes.iter().filter(|(count, _)| *count > 0).map(|(count, cause)| format!("{count} {cause}")));
         parts.push(format!("{} informed", self.rank_informed));
-        if let Some(name) = self.weakest() {
-            parts.push(format!("weakest {name}"));
+        if let Some(parameter) = self.weakest() {
+            parts.push(format!("weakest {}", names.name(parameter)));
         }
         parts.join("; ")
     }
 
     /// Bytes that it takes on the heap.
     pub fn heap_bytes(&self) -> usize {
-        let texts = self.names.iter().chain(&self.held).chain(self.margins.iter().map(|(name, _)| name));
-        let texts: usize = texts.map(|text| allocated_bytes(text.capacity())).sum();
         let weights = self.directions.iter().map(|direction| of_vec(&direction.weights)).sum::<usize>();
-        texts
-            + weights
-            + of_vec(&self.names)
+        weights
+            + of_vec(&self.parameters)
             + of_vec(&self.held)
             + of_vec(&self.margins)
             + of_vec(&self.singular_values)
@@ -104,20 +102,20 @@ impl RankReport {
     }
 
     /// The parameter with the largest share in the weakest direction that is not a structural zero.
-    pub fn weakest(&self) -> Option<&str> {
+    pub fn weakest(&self) -> Option<ParameterId> {
         let direction = self.directions.iter().find(|direction| !direction.structural)?;
-        direction.leading(&self.names)
+        direction.leading(&self.parameters)
     }
 }
 
 impl CalibrationDirection {
     /// The parameter with the largest share.
-    pub fn leading<'a>(&self, names: &'a [String]) -> Option<&'a str> {
+    pub fn leading(&self, parameters: &[ParameterId]) -> Option<ParameterId> {
         let mut leading = None;
         let mut largest = 0.0;
-        for (name, weight) in names.iter().zip(&self.weights) {
+        for (parameter, weight) in parameters.iter().zip(&self.weights) {
             if weight.abs() > largest {
-                (leading, largest) = (Some(name.as_str()), weight.abs());
+                (leading, largest) = (Some(*parameter), weight.abs());
             }
         }
         leading

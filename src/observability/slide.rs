@@ -3,12 +3,10 @@
 use nalgebra::{DVector, Vector2, Vector3};
 
 use super::RankReport;
-use super::classification::{ROTATION_SCALE_RAD, TRANSLATION_SCALE_M};
-use super::slide_direction::scale_of;
 use crate::camera::CameraModel;
 use crate::estimator::{FeatureReport, FrameStateReport, StepReport};
 use crate::frontend::FeatureId;
-use crate::geometry::{RigidTransform, so3};
+use crate::geometry::{Dimension, RigidTransform, so3};
 use crate::gimbal::{Chain, ClassicalChain};
 
 /// A chain moved along a direction.
@@ -22,7 +20,7 @@ pub struct ChainSlide {
     pub chain: ClassicalChain,
     /// How far the camera moves on the IMU at the newest frame, in metres and radians.
     pub camera_moves: (f64, f64),
-    /// By how much each parameter of the chain was moved, in its unit (`rad` or `m`), in column order.
+    /// By how much each parameter of the chain was moved, in its SI unit, in column order.
     pub changes: Vec<f64>,
     /// Largest change of a reprojection in the window, in pixels.
     pub largest_px: f64,
@@ -41,13 +39,14 @@ const JOINT_STEPS: usize = 4;
 /// Least inverse depth, in 1/m.
 const FARTHEST_PER_M: f64 = 1e-5;
 
-/// The chain that a step's calibration columns belong to; `None` when the names say otherwise.
+/// The chain that a step's calibration columns belong to; `None` when the parameters are others.
 pub fn chain_of_step(report: &StepReport, rank: &RankReport) -> Option<Chain> {
     let parameterization = report.calibration.parameterization.parse().ok()?;
     let chain = Chain::from_classical(&report.calibration.classical, parameterization);
     let has = |chain: &Chain| {
-        let free: Vec<String> = chain.parameter_names().into_iter().filter(|name| !rank.held.contains(name)).collect();
-        rank.names.starts_with(&free)
+        let mut free = chain.parameters();
+        free.retain(|parameter| !rank.held.contains(parameter));
+        rank.parameters.starts_with(&free)
     };
     let chain = if has(&chain) { chain } else { chain.without_joint_offsets() };
     has(&chain).then_some(chain)
@@ -68,10 +67,10 @@ pub fn slide(
     weights: &[f64],
     amount: f64,
 ) -> Option<ChainSlide> {
-    let units = chain.parameter_units();
-    let weights = weights.get(..units.len())?;
-    let entries = weights.iter().zip(&units).map(|(weight, unit)| weight * scale_of(unit));
-    let step = DVector::from_iterator(units.len(), entries);
+    let parameters = chain.parameters();
+    let weights = weights.get(..parameters.len())?;
+    let entries = weights.iter().zip(&parameters).map(|(weight, parameter)| weight * parameter.dimension().scale());
+    let step = DVector::from_iterator(parameters.len(), entries);
     let mounts = |chain: &Chain, like: Option<&[RigidTransform]>| -> Vec<RigidTransform> {
         let frames = report.window.iter().enumerate();
         frames.map(|(slot, frame)| mount(frame, chain, like.map(|like| &like[slot]))).collect()
@@ -138,7 +137,7 @@ fn towards(chain: &Chain, angles_rad: &[f64], like: &RigidTransform) -> Option<D
     let linearization = chain.linearize(angles_rad);
     let mut wanted = like.minus(&linearization.imu_from_camera);
     let mut slopes = linearization.by_joints.clone();
-    for (start, scale) in [(0, ROTATION_SCALE_RAD), (3, TRANSLATION_SCALE_M)] {
+    for (start, scale) in [(0, Dimension::Angle.scale()), (3, Dimension::Length.scale())] {
         slopes.fixed_rows_mut::<3>(start).unscale_mut(scale);
         wanted.fixed_rows_mut::<3>(start).unscale_mut(scale);
     }

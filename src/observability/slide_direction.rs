@@ -5,25 +5,35 @@ use std::str::FromStr;
 use nalgebra::DVector;
 use thiserror::Error;
 
-use super::classification::{ROTATION_SCALE_RAD, TRANSLATION_SCALE_M};
 use super::structure::known_losses;
 use super::{KnownLoss, RankReport};
-use crate::gimbal::Chain;
+use crate::gimbal::{Chain, ParameterId, ParameterNames};
 
 /// Which way a chain is moved.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SlideDirection {
     /// A null or weak direction of the step, weakest first, counted from 0.
     Measured(usize),
-    /// One that is known to be lost (`base-d`), or a parameter alone (`L2.alpha`).
-    Named(String),
+    /// One that is known to be lost.
+    Known(KnownLoss),
+    /// A parameter alone.
+    Parameter(ParameterId),
 }
 
 /// Which way a chain is moved, and how far.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SlidePosition {
     /// Which way.
     pub direction: SlideDirection,
+    /// How far, in units of 10° and 3 cm along the unit direction.
+    pub amount: f64,
+}
+
+/// A position as a person writes it: `1=0.5`, `base-d=1`, `yaw.alpha=-1`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SlideRequest {
+    /// Number of a measured direction, counted from 1, a known one or a parameter.
+    pub direction: String,
     /// How far, in units of 10° and 3 cm along the unit direction.
     pub amount: f64,
 }
@@ -32,29 +42,35 @@ pub struct SlidePosition {
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error(
     "'{given}' is no direction with a value: expected DIRECTION=VALUE, as in 1=0.5 (the weakest direction by half of 10° \
-     and 3 cm), base-d=1 or L2.alpha=-1"
+     and 3 cm), base-d=1 or yaw.alpha=-1"
 )]
 pub struct InvalidSlide {
     /// What was given.
     pub given: String,
 }
 
-impl FromStr for SlidePosition {
+impl FromStr for SlideRequest {
     type Err = InvalidSlide;
 
     fn from_str(text: &str) -> Result<Self, InvalidSlide> {
         let invalid = || InvalidSlide { given: text.to_owned() };
         let (direction, amount) = text.split_once('=').ok_or_else(invalid)?;
         let amount: f64 = amount.trim().parse().ok().filter(|amount: &f64| amount.is_finite()).ok_or_else(invalid)?;
-        let direction = match direction.trim() {
-            "" => return Err(invalid()),
-            name => match name.parse::<usize>() {
-                Ok(0) => return Err(invalid()),
-                Ok(number) => SlideDirection::Measured(number - 1),
-                Err(_) => SlideDirection::Named(name.to_owned()),
-            },
-        };
-        Ok(Self { direction, amount })
+        let direction = direction.trim();
+        let valid = !direction.is_empty() && direction.parse::<usize>() != Ok(0);
+        valid.then(|| Self { direction: direction.to_owned(), amount }).ok_or_else(invalid)
+    }
+}
+
+impl SlideRequest {
+    /// The position that it means on a rig whose parameters have these names; `None` when there is no such direction.
+    pub fn position(&self, names: &ParameterNames) -> Option<SlidePosition> {
+        let measured = self.direction.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
+        let direction = measured
+            .map(SlideDirection::Measured)
+            .or_else(|| KnownLoss::parse(&self.direction).map(SlideDirection::Known))
+            .or_else(|| names.parse(&self.direction).map(SlideDirection::Parameter))?;
+        Some(SlidePosition { direction, amount: self.amount })
     }
 }
 
@@ -62,39 +78,46 @@ impl SlideDirection {
     /// All that a step offers: the measured ones, then the known ones.
     pub fn of_step(rank: &RankReport) -> Vec<Self> {
         let measured = (0..rank.directions.len()).map(Self::Measured);
-        measured.chain(rank.known.iter().map(|known| Self::Named(known.loss.name()))).collect()
+        measured.chain(rank.known.iter().map(|known| Self::Known(known.loss))).collect()
     }
 
     /// The unit direction in the columns of the chain, in units of 10° and 3 cm; `None` when the step has no such direction.
     pub fn weights(&self, rank: &RankReport, chain: &Chain) -> Option<Vec<f64>> {
-        let units = chain.parameter_units();
+        let parameters = chain.parameters();
+        let unit_vector =
+            |column: usize| (0..parameters.len()).map(|other| f64::from(u8::from(other == column))).collect();
         match self {
             Self::Measured(index) => {
                 let weights = &rank.directions.get(*index)?.weights;
                 // A parameter that is held stays.
-                let weight = |name: &String| rank.names.iter().position(|known| known == name).map(|it| weights[it]);
-                Some(chain.parameter_names().iter().map(|name| weight(name).unwrap_or(0.0)).collect())
+                let weight =
+                    |parameter| rank.parameters.iter().position(|known| known == parameter).map(|it| weights[it]);
+                Some(parameters.iter().map(|parameter| weight(parameter).unwrap_or(0.0)).collect())
             }
-            Self::Named(name) => {
-                let mut known = known_losses(chain, true).into_iter();
-                if let Some((_, direction)) = known.find(|(loss, _)| loss.name() == *name) {
-                    let scale = |column: usize| scale_of(units[column]);
-                    let scaled = DVector::from_fn(units.len(), |column, _| direction[column] / scale(column));
-                    return Some(scaled.normalize().iter().copied().collect());
-                }
-                let column = chain.parameter_names().iter().position(|known| known == name)?;
-                Some((0..units.len()).map(|other| f64::from(u8::from(other == column))).collect())
+            Self::Known(loss) => {
+                let known = known_losses(chain, true).into_iter();
+                let (_, direction) = known.into_iter().find(|(known, _)| known == loss)?;
+                let scaled = DVector::from_fn(parameters.len(), |column, _| {
+                    direction[column] / parameters[column].dimension().scale()
+                });
+                Some(scaled.normalize().iter().copied().collect())
             }
+            Self::Parameter(parameter) => parameters.iter().position(|known| known == parameter).map(unit_vector),
         }
     }
 }
 
-/// What 1 means in a column of this unit.
-pub(super) fn scale_of(unit: &str) -> f64 {
-    if unit == "rad" { ROTATION_SCALE_RAD } else { TRANSLATION_SCALE_M }
-}
-
 impl KnownLoss {
+    /// The loss of a name on the command line.
+    fn parse(name: &str) -> Option<Self> {
+        const MOST_JOINTS: usize = u8::MAX as usize;
+        let ends = [Self::BaseTheta, Self::BaseD, Self::EndTheta, Self::EndD, Self::EndA, Self::EndAlpha].into_iter();
+        let rigid = (0..3).flat_map(|axis| [Self::RigidTurn(axis), Self::RigidShift(axis)]);
+        let joints = (0..MOST_JOINTS)
+            .flat_map(|joint| [Self::FreeAngle(joint), Self::ParallelD(joint), Self::CoaxialTheta(joint)]);
+        ends.chain(rigid).chain(joints).find(|loss| loss.name() == name)
+    }
+
     /// Its name on the command line: `base-d`, `free-angle-2`.
     pub fn name(self) -> String {
         let axis = |axis: usize| ["x", "y", "z"].get(axis).copied().unwrap_or("?");

@@ -12,7 +12,7 @@
 
 use nalgebra::{DMatrix, DMatrixView, DVector};
 
-use crate::gimbal::{Chain, Parameterization, redundant_directions};
+use crate::gimbal::{Chain, ParameterId, ParameterPart, Parameterization, Quantity, redundant_directions};
 
 /// Something that no measurement can tell, known from the form of the chain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -104,14 +104,14 @@ fn redundant(chain: &Chain, joints_free: bool, losses: &mut Vec<(KnownLoss, DVec
     let names: Vec<KnownLoss> = if classical.links.is_empty() { rigid.collect() } else { jointed.into() };
     let hidden = chain.hides_joint_offsets();
     // Where the offsets have no columns, unknown joint angles take their part; known ones do not.
-    let whole = chain.parameter_names();
+    let whole = chain.dof();
     let kept: Vec<usize> = if hidden {
         let link = |row: usize| row.checked_sub(6).filter(|row| *row < 4 * classical.links.len());
         (0..directions.nrows()).filter(|row| link(*row).is_none_or(|row| row % 4 != 0)).collect()
     } else {
         (0..directions.nrows()).collect()
     };
-    debug_assert_eq!(kept.len(), whole.len(), "a row per column");
+    debug_assert_eq!(kept.len(), whole, "a row per column");
     for (loss, direction) in names.into_iter().zip(directions.column_iter()) {
         let by_offset = matches!(loss, KnownLoss::BaseTheta | KnownLoss::EndTheta);
         if !hidden || joints_free || !by_offset {
@@ -122,10 +122,13 @@ fn redundant(chain: &Chain, joints_free: bool, losses: &mut Vec<(KnownLoss, DVec
 
 /// What links lose: offsets to free angles, and neighbours on parallel axes to each other.
 fn links(chain: &Chain, joints_free: bool, losses: &mut Vec<(KnownLoss, DVector<f64>)>) {
-    let names = chain.parameter_names();
-    let column = |link: usize, number: &str| names.iter().position(|name| *name == format!("L{}.{number}", link + 1));
+    let parameters = chain.parameters();
+    let column = |link: usize, quantity: Quantity| {
+        let wanted = ParameterId { part: ParameterPart::Link(link as u8), quantity };
+        parameters.iter().position(|parameter| *parameter == wanted)
+    };
     let direction = |entries: &[(usize, f64)]| {
-        let mut direction = DVector::zeros(names.len());
+        let mut direction = DVector::zeros(parameters.len());
         for (column, weight) in entries {
             direction[*column] = *weight;
         }
@@ -133,7 +136,7 @@ fn links(chain: &Chain, joints_free: bool, losses: &mut Vec<(KnownLoss, DVector<
     };
     if joints_free {
         for joint in 0..chain.joint_count() {
-            if let Some(theta) = column(joint, "theta") {
+            if let Some(theta) = column(joint, Quantity::Theta) {
                 losses.push((KnownLoss::FreeAngle(joint), direction(&[(theta, 1.0)])));
             }
         }
@@ -148,10 +151,10 @@ fn links(chain: &Chain, joints_free: bool, losses: &mut Vec<(KnownLoss, DVector<
             continue;
         }
         let pair =
-            |number: &str| Some(direction(&[(column(link, number)?, 1.0), (column(link + 1, number)?, -cosine)]));
-        losses.extend(pair("d").map(|direction| (KnownLoss::ParallelD(link), direction)));
+            |quantity| Some(direction(&[(column(link, quantity)?, 1.0), (column(link + 1, quantity)?, -cosine)]));
+        losses.extend(pair(Quantity::D).map(|direction| (KnownLoss::ParallelD(link), direction)));
         if classical.links[link].a_m.abs() <= PARALLEL {
-            losses.extend(pair("theta").map(|direction| (KnownLoss::CoaxialTheta(link), direction)));
+            losses.extend(pair(Quantity::Theta).map(|direction| (KnownLoss::CoaxialTheta(link), direction)));
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::camera::CameraModel;
 use crate::geometry::RigidTransform;
-use crate::gimbal::ClassicalChain;
+use crate::gimbal::{ClassicalChain, ParameterNames};
 
 use super::ImuNoise;
 
@@ -138,6 +138,12 @@ impl Rig {
     /// Names of the gimbal's joints, from the base on; none without a gimbal.
     pub fn joint_names(&self) -> Vec<String> {
         self.gimbal.iter().flat_map(|gimbal| &gimbal.joints).map(|joint| joint.name.clone()).collect()
+    }
+
+    /// What calibration parameters are called: links by the joints, rigid cameras beside a gimballed one by their keys.
+    pub fn parameter_names(&self) -> ParameterNames {
+        let rigid = self.cameras.iter().filter(|camera| camera.mount != CameraMount::Gimbal);
+        ParameterNames { joints: self.joint_names(), cameras: rigid.map(|camera| camera.key.clone()).collect() }
     }
 
     /// The chain that carries the camera with a key: the gimbal's, or one without links for a rigid camera. `None` for an

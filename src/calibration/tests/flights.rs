@@ -2,7 +2,7 @@
 
 use super::fixture::flight;
 use crate::calibration::{CalibrationError, CalibrationOptions, calibrate, chain_distance, transform_distance};
-use crate::geometry::wrap_angle;
+use crate::geometry::{Dimension, wrap_angle};
 use crate::gimbal::{Chain, ClassicalChain, Parameterization};
 use crate::sensors::ChainPrior;
 use crate::simulation::SyntheticOptions;
@@ -24,9 +24,10 @@ fn options(seed: u64) -> SyntheticOptions {
 fn normalized_square(chain: &ClassicalChain, sigmas: &[f64], truth: &ClassicalChain, form: Parameterization) -> f64 {
     let chain = Chain::from_classical(chain, form);
     let error = chain.minus(&Chain::from_classical(truth, form));
-    let units = chain.parameter_units();
+    let parameters = chain.parameters();
     let square = |k: usize| {
-        let error = if units[k] == "rad" { wrap_angle(error[k]) } else { error[k] };
+        let is_angle = parameters[k].dimension() == Dimension::Angle;
+        let error = if is_angle { wrap_angle(error[k]) } else { error[k] };
         (error / sigmas[k]).powi(2)
     };
     (0..sigmas.len()).map(square).sum::<f64>() / sigmas.len() as f64

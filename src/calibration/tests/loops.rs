@@ -43,8 +43,8 @@ fn example(seed: u64, encoder_sigma_rad: f64, noise: (f64, f64), still: bool) ->
     let truth = flight.true_rig.gimbal.unwrap().chain;
     let mut random = Random(SplitMix64::new(seed));
     let minimal = Chain::from_classical(&truth, Parameterization::MinimalYx);
-    let units = minimal.parameter_units();
-    let error = DVector::from_fn(minimal.dof(), |k, _| random.next() * if units[k] == "rad" { 0.17 } else { 0.03 });
+    let parameters = minimal.parameters();
+    let error = DVector::from_fn(minimal.dof(), |k, _| random.next() * parameters[k].dimension().scale());
     let given = minimal.plus(&error).to_classical();
     let mut visited = Vec::new();
     let segments = (0..8)

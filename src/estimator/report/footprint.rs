@@ -65,9 +65,7 @@ impl StepReport {
             let numbers = linearization.jacobian.len()
                 + linearization.prior_jacobian.len()
                 + linearization.calibration_column_norms.len();
-            of_vec(&linearization.columns)
-                + linearization.columns.iter().map(|block| of_text(&block.name)).sum::<usize>()
-                + numbers * size_of::<f64>()
+            of_vec(&linearization.columns) + numbers * size_of::<f64>()
         });
         ReportBytes {
             window: of_vec(&self.window) + self.window.iter().map(of_frame).sum::<usize>(),
@@ -129,15 +127,12 @@ fn of_frame(frame: &FrameStateReport) -> usize {
 
 fn of_calibration(calibration: &CalibrationEstimate) -> usize {
     of_text(&calibration.parameterization)
-        + of_vec(&calibration.names)
-        + calibration.names.iter().map(of_text).sum::<usize>()
-        + of_vec(&calibration.units)
+        + of_vec(&calibration.parameters)
         + of_vec(&calibration.values)
         + of_vec(&calibration.sigmas)
         + of_vec(&calibration.prior_sigmas)
         + of_vec(&calibration.classical.links)
         + of_vec(&calibration.margins)
-        + calibration.margins.iter().map(|(name, _)| of_text(name)).sum::<usize>()
         + of_vec(&calibration.rigid_cameras)
         + calibration.rigid_cameras.iter().map(|(key, _)| of_text(key)).sum::<usize>()
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, Matrix2x6, Vector3};
 
-use super::jacobian_source::{column_scale, scales_of};
+use super::columns::scales_of;
 use super::linearization::column_blocks;
 use crate::camera::CameraModel;
 use crate::estimator::factors::reprojection::{CameraPose, Landmark, Reprojection};
@@ -13,7 +13,7 @@ use crate::estimator::state::camera_pose::{self, CameraMaps, Mount};
 use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::state::layout::{Layout, POSE};
 use crate::estimator::{
-    ColumnBlock, ColumnGroup, FeatureReport, JacobianFactor, JacobianRow, JacobianSource, StepReport,
+    ColumnBlock, ColumnId, FeatureReport, FrameId, JacobianFactor, JacobianRow, JacobianSource, StepReport,
 };
 use crate::frontend::FeatureId;
 use crate::gimbal::Chain;
@@ -92,16 +92,16 @@ impl<'a> Writer<'a> {
         let states = source.frames(joints);
         let clocks: usize = source.clocks.iter().map(|clocks| clocks.count).sum();
         let columns = source.chains.iter().map(Chain::dof).sum::<usize>() + clocks;
-        let known = columns == report.calibration.names.len();
+        let known = columns == report.calibration.parameters.len();
         if !known || states.len() != frames || cameras.len() < source.chains.len() {
             return None;
         }
-        let calibration = if source.calibrated { report.calibration.names.len() } else { 0 };
+        let calibration = if source.calibrated { report.calibration.parameters.len() } else { 0 };
         let layout = Layout { frames, joints, calibration };
-        let numbers: Vec<usize> = report.window.iter().map(|frame| frame.frame_index).collect();
-        let mut columns = column_blocks(&layout, &report.calibration.names, &numbers);
+        let numbers: Vec<FrameId> = report.window.iter().map(|frame| FrameId(frame.frame_index)).collect();
+        let mut columns = column_blocks(&layout, &report.calibration.parameters, &numbers);
         let start = columns.last().map_or(0, |last| last.start + last.len);
-        columns.push(ColumnBlock { group: ColumnGroup::InverseDepth, name: "own depth".to_owned(), start, len: 1 });
+        columns.push(ColumnBlock { id: ColumnId::InverseDepth, start, len: 1 });
         let mut start = 0;
         let cameras = source
             .chains
@@ -156,22 +156,22 @@ impl<'a> Writer<'a> {
 
     /// The rows that are not of features.
     fn other_rows(&self) -> Vec<JacobianRow> {
-        let numbers: Vec<usize> = self.report.window.iter().map(|frame| frame.frame_index).collect();
+        let numbers: Vec<FrameId> = self.report.window.iter().map(|frame| FrameId(frame.frame_index)).collect();
         let mut rows: Vec<JacobianRow> = self.source.rows(&numbers).collect();
         let is_inertial = |row: &JacobianRow| matches!(row.factor, JacobianFactor::Inertial { .. });
         let place = rows.iter().position(|row| !is_inertial(row)).unwrap_or(rows.len());
         // The readings of a frame touch its joint angles alone, each with the inverse of its deviation.
         let encoders = self.report.window.iter().enumerate().filter_map(|(slot, frame)| {
             let sigmas = frame.encoder_sigmas_rad.as_ref().filter(|sigmas| !sigmas.is_empty())?;
-            let name = format!("joints {}", frame.frame_index);
-            let column = self.columns.iter().position(|block| block.name == name)?;
-            let scale = column_scale(ColumnGroup::Joints, "", 0);
+            let id = ColumnId::Joints(numbers[slot]);
+            let column = self.columns.iter().position(|block| block.id == id)?;
+            let scale = id.scale(0);
             let sigmas = || sigmas.iter().take(self.layout.joints).enumerate();
             let squared: f64 = sigmas().map(|(_, sigma)| (scale / sigma).powi(2)).sum();
             let factor = JacobianFactor::Encoder(numbers[slot]);
             let mut norms = vec![(column as u16, squared.sqrt() as f32)];
             if let Some((clock, block)) = self.encoder_clock() {
-                let scale = column_scale(block.group, "s", 0);
+                let scale = block.id.scale(0);
                 let rate = |joint: usize| self.states[slot].rates.joint_rad_per_s(joint);
                 let squared: f64 = sigmas().map(|(joint, sigma)| (scale * rate(joint) / sigma).powi(2)).sum();
                 if squared > 0.0 {
@@ -219,10 +219,10 @@ impl<'a> Writer<'a> {
     }
 
     fn row_of(&self, feature: &FeatureReport, written: &FeatureRows) -> JacobianRow {
-        let mut scales = scales_of(&self.columns, &self.report.calibration.units);
+        let mut scales = scales_of(&self.columns);
         if let Some(last) = scales.last_mut() {
             // A tenth of the inverse distance.
-            *last = column_scale(ColumnGroup::InverseDepth, "", 0) * feature.inverse_depth_per_m.abs();
+            *last = ColumnId::InverseDepth.scale(0) * feature.inverse_depth_per_m.abs();
         }
         let mut norms = Vec::new();
         for (number, block) in self.columns.iter().enumerate() {

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, Quaternion, UnitQuaternion, Vector3};
 use crate::estimator::options::{LandmarkModel, RobustLoss};
 use crate::estimator::state::frame_state::{FrameState, Rates};
 use crate::estimator::state::layout::POSE;
-use crate::estimator::{ColumnBlock, ColumnGroup, ImuBias, NavigationState, allocated_bytes};
+use crate::estimator::{FactorKind, FrameId, ImuBias, NavigationState, allocated_bytes};
 use crate::geometry::RigidTransform;
 use crate::gimbal::Chain;
 
@@ -68,7 +68,7 @@ pub(crate) enum PackedKind {
 
 impl PackedKind {
     /// What it stands for, with frames of these numbers.
-    pub(crate) fn factor(self, numbers: &[usize]) -> Option<JacobianFactor> {
+    pub(crate) fn factor(self, numbers: &[FrameId]) -> Option<JacobianFactor> {
         Some(match self {
             Self::Inertial(slot) => {
                 let slot = usize::from(slot);
@@ -100,18 +100,32 @@ pub enum JacobianFactor {
     /// The inertial samples between two frames, by the frames' numbers.
     Inertial {
         /// The earlier one.
-        from: usize,
+        from: FrameId,
         /// The later one.
-        to: usize,
+        to: FrameId,
     },
     /// The encoder readings of a frame.
-    Encoder(usize),
+    Encoder(FrameId),
     /// What standing still says.
     Standstill,
     /// The rig's prior on the calibration.
     CalibrationPrior,
     /// The marginalization prior, and what was known at the start.
     MarginalizationPrior,
+}
+
+impl JacobianFactor {
+    /// Its kind.
+    pub const fn kind(self) -> FactorKind {
+        match self {
+            Self::Feature(_) => FactorKind::Visual,
+            Self::Inertial { .. } => FactorKind::Imu,
+            Self::Encoder(_) => FactorKind::Encoder,
+            Self::Standstill => FactorKind::Standstill,
+            Self::CalibrationPrior => FactorKind::CalibrationPrior,
+            Self::MarginalizationPrior => FactorKind::MarginalizationPrior,
+        }
+    }
 }
 
 /// Rows of the Jacobian that belong together.
@@ -122,7 +136,7 @@ pub struct JacobianRow {
     /// How many they are.
     pub height: usize,
     /// Number of a block of columns and the Frobenius norm of the rows there, in standard deviations of the residuals by
-    /// the column's scale (see [`crate::estimator::column_scale`]); blocks that are zero are left out.
+    /// the column's scale (see [`crate::estimator::ColumnId::scale`]); blocks that are zero are left out.
     pub norms: Vec<(u16, f32)>,
 }
 
@@ -170,7 +184,7 @@ impl JacobianSource {
     }
 
     /// The packed rows, for frames of these numbers.
-    pub(crate) fn rows<'a>(&'a self, numbers: &'a [usize]) -> impl Iterator<Item = JacobianRow> + 'a {
+    pub(crate) fn rows<'a>(&'a self, numbers: &'a [FrameId]) -> impl Iterator<Item = JacobianRow> + 'a {
         let mut begin = 0;
         self.rows.iter().filter_map(move |row| {
             let range = begin..begin + usize::from(row.count);
@@ -184,36 +198,3 @@ impl JacobianSource {
 
 /// Numbers of a pose among those of a frame.
 const POSE_NUMBERS: usize = 7;
-
-/// What 1 means in a column of a group, so that columns compare: 10° for angles, 3 cm for lengths, 20 ms for clocks,
-/// 0.1 m/s, 1 °/s, 0.1 m/s² and a tenth of the inverse depth.
-///
-/// `unit` is that of a calibration parameter, `place` the column's place in its block.
-pub fn column_scale(group: ColumnGroup, unit: &str, place: usize) -> f64 {
-    const TIME_S: f64 = 0.02;
-    const ANGLE_RAD: f64 = 10.0 * std::f64::consts::PI / 180.0;
-    const LENGTH_M: f64 = 0.03;
-    const SPEED_M_PER_S: f64 = 0.1;
-    const GYROSCOPE_BIAS_RAD_PER_S: f64 = std::f64::consts::PI / 180.0;
-    const ACCELEROMETER_BIAS_M_PER_S2: f64 = 0.1;
-    const INVERSE_DEPTH: f64 = 0.1;
-    match (group, place) {
-        (ColumnGroup::Calibration, _) if unit == "rad" => ANGLE_RAD,
-        (ColumnGroup::Calibration, _) if unit == "s" => TIME_S,
-        (ColumnGroup::Joints, _) | (ColumnGroup::Pose, 0..3) => ANGLE_RAD,
-        (ColumnGroup::Calibration | ColumnGroup::Pose, _) => LENGTH_M,
-        (ColumnGroup::SpeedBias, 0..3) => SPEED_M_PER_S,
-        (ColumnGroup::SpeedBias, 3..6) => GYROSCOPE_BIAS_RAD_PER_S,
-        (ColumnGroup::SpeedBias, _) => ACCELEROMETER_BIAS_M_PER_S2,
-        (ColumnGroup::InverseDepth, _) => INVERSE_DEPTH,
-    }
-}
-
-/// The scales of all columns; the calibration's blocks come first, a column each.
-pub(crate) fn scales_of(columns: &[ColumnBlock], units: &[&'static str]) -> Vec<f64> {
-    let of_block = |(number, block): (usize, &ColumnBlock)| {
-        let (group, unit) = (block.group, units.get(number).copied().unwrap_or_default());
-        (0..block.len).map(move |place| column_scale(group, unit, place))
-    };
-    columns.iter().enumerate().flat_map(of_block).collect()
-}

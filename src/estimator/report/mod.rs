@@ -2,6 +2,7 @@
 //!
 //! A report holds everything that panels, tables and the observability analysis ask for; making one is the window's business.
 
+pub(crate) mod columns;
 mod events;
 mod features;
 mod footprint;
@@ -13,13 +14,14 @@ mod observations;
 mod residuals;
 mod step;
 
+pub use columns::{ColumnBlock, ColumnGroup, ColumnId, FrameId};
 pub use events::{Event, EventKind};
 pub use features::{FeatureCounts, FeatureReport, LandmarkReport, ObservationReport};
 pub use footprint::{ReportBytes, allocated_bytes};
 pub use information_gain::{InformationGain, Motion};
 pub use jacobian::{FeatureRows, StepJacobian};
-pub use jacobian_source::{FactorRows, JacobianFactor, JacobianRow, JacobianSource, column_scale};
-pub use linearization::{ColumnBlock, ColumnGroup, Linearization};
+pub use jacobian_source::{FactorRows, JacobianFactor, JacobianRow, JacobianSource};
+pub use linearization::Linearization;
 pub use observations::Observations;
-pub use residuals::{IterationReport, ResidualSummary};
+pub use residuals::{FactorKind, IterationReport, ResidualSummary};
 pub use step::{CalibrationEstimate, FrameStateReport, Phase, StageTimes, StepReport};

@@ -1,10 +1,54 @@
 //! Residuals by kind of factor, and the iterations of the solver that lowered them.
 
+/// A kind of factor of the window.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum FactorKind {
+    /// Reprojections of features.
+    Visual,
+    /// Preintegrated IMU samples between two frames.
+    Imu,
+    /// Encoder readings of the joint angles.
+    Encoder,
+    /// The rig's prior on the calibration.
+    CalibrationPrior,
+    /// The marginalization prior, or the prior at the start.
+    MarginalizationPrior,
+    /// Zero-velocity update of a stationary vehicle.
+    Standstill,
+}
+
+impl FactorKind {
+    /// All of them.
+    pub const ALL: [Self; 6] =
+        [Self::Visual, Self::Imu, Self::Encoder, Self::CalibrationPrior, Self::MarginalizationPrior, Self::Standstill];
+
+    /// Name for people.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Visual => "visual",
+            Self::Imu => "imu",
+            Self::Encoder => "encoder",
+            Self::CalibrationPrior => "calibration prior",
+            Self::MarginalizationPrior => "marginalization prior",
+            Self::Standstill => "standstill",
+        }
+    }
+
+    /// Name in tables and conditions, without spaces.
+    pub const fn key(self) -> &'static str {
+        match self {
+            Self::CalibrationPrior => "calibration_prior",
+            Self::MarginalizationPrior => "marginalization_prior",
+            _ => self.name(),
+        }
+    }
+}
+
 /// Sum of squared whitened residuals of one kind of factor, and how many there are.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ResidualSummary {
-    /// `visual`, `imu`, `encoder`, `calibration prior`, `marginalization prior`, and `standstill` where there is one.
-    pub factor: &'static str,
+    /// Kind of factor.
+    pub factor: FactorKind,
     /// Number of scalar residuals.
     pub count: usize,
     /// χ² before the solve.

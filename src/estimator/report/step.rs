@@ -9,7 +9,7 @@ use super::jacobian_source::{FactorRows, JacobianSource};
 use super::linearization::Linearization;
 use super::residuals::{IterationReport, ResidualSummary};
 use crate::geometry::RigidTransform;
-use crate::gimbal::ClassicalChain;
+use crate::gimbal::{ClassicalChain, ParameterId, Singularity};
 
 /// Where the estimator is in its life.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,12 +62,9 @@ pub struct FrameStateReport {
 pub struct CalibrationEstimate {
     /// Name of the parameterization in use, as on the command line.
     pub parameterization: String,
-    /// Parameter names in column order, as in the golden files (`IB.rx`, `L1.theta`, …); those of a rigid camera beside
-    /// the main one begin with its key (`cam1.rx`).
-    pub names: Vec<String>,
-    /// Unit of each: `rad` or `m`.
-    pub units: Vec<&'static str>,
-    /// Value of each (rotation blocks as rotation vectors relative to the rig's value, plus that value's own log).
+    /// The parameters in column order: those of the chain, then those of the rigid cameras beside the main one.
+    pub parameters: Vec<ParameterId>,
+    /// Value of each in its SI unit (rotation blocks as rotation vectors relative to the rig's value, plus that value's own log).
     pub values: Vec<f64>,
     /// Posterior standard deviation of each (NaN before the first solve).
     pub sigmas: Vec<f64>,
@@ -76,7 +73,7 @@ pub struct CalibrationEstimate {
     /// The whole chain in the classical form.
     pub classical: ClassicalChain,
     /// Margins to the chart's locks: base, end, then |sin alpha| of each middle link.
-    pub margins: Vec<(String, f64)>,
+    pub margins: Vec<(Singularity, f64)>,
     /// The rigid cameras that are watched beside the main one, with their poses on the IMU; their columns follow the
     /// chain's.
     pub rigid_cameras: Vec<(String, RigidTransform)>,

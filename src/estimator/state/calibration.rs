@@ -4,7 +4,7 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use crate::geometry::{RigidTransform, so3};
-use crate::gimbal::{Chain, ChainLinearization, ClassicalChain, NearestForm, Parameterization, transport};
+use crate::gimbal::{Chain, ChainLinearization, ClassicalChain, NearestForm, ParameterId, Parameterization, transport};
 
 /// How wrong the given chain may be, as standard deviations of every number of its classical form.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,13 +40,13 @@ pub(crate) enum FreeClocks {
 }
 
 impl FreeClocks {
-    /// Names of the offsets, in the order of their columns behind the chain's.
-    fn names(self) -> &'static [&'static str] {
-        let all = &["timeshift", "encoder.timeshift"];
+    /// The offsets, in the order of their columns behind the chain's; the camera is taken for the main one.
+    fn parameters(self) -> &'static [ParameterId] {
+        const ALL: [ParameterId; 2] = [ParameterId::timeshift(0), ParameterId::ENCODER_TIMESHIFT];
         match self {
             Self::None => &[],
-            Self::Camera => &all[..1],
-            Self::CameraAndEncoders => all,
+            Self::Camera => &ALL[..1],
+            Self::CameraAndEncoders => &ALL,
         }
     }
 }
@@ -89,8 +89,8 @@ pub(crate) struct Calibration {
     given_timeshift_s: f64,
     first_estimate: Option<Values>,
     free: bool,
-    /// Parameters that are held at their values, by name: charts may change.
-    frozen: Vec<String>,
+    /// Parameters that are fixed at their values; the parameterization may change.
+    frozen: Vec<ParameterId>,
 }
 
 impl Calibration {
@@ -118,7 +118,7 @@ impl Calibration {
     /// The same with offsets of clocks beside the chain; a calibration that is held fixed has none.
     pub(crate) fn with_clocks(self, clocks: FreeClocks, given_timeshift_s: f64) -> Self {
         let clocks = if self.free { clocks } else { FreeClocks::None };
-        let clocks_s = DVector::zeros(clocks.names().len());
+        let clocks_s = DVector::zeros(clocks.parameters().len());
         Self { values: Values { clocks_s, ..self.values }, clocks, given_timeshift_s, ..self }
     }
 
@@ -146,16 +146,11 @@ impl Calibration {
         (self.clocks == FreeClocks::CameraAndEncoders).then(|| self.chain().dof() + 1)
     }
 
-    /// Names of all columns, free or not.
-    pub(crate) fn names(&self) -> Vec<String> {
-        let clocks = self.clocks.names().iter().map(|name| (*name).to_owned());
-        self.chain().parameter_names().into_iter().chain(clocks).collect()
-    }
-
-    /// Units of all columns.
-    pub(crate) fn units(&self) -> Vec<&'static str> {
-        let clocks = self.clocks.names().iter().map(|_| "s");
-        self.chain().parameter_units().into_iter().chain(clocks).collect()
+    /// The parameters of all columns, free or not, as those of the main camera.
+    pub(crate) fn parameters(&self) -> Vec<ParameterId> {
+        let mut parameters = self.chain().parameters();
+        parameters.extend(self.clocks.parameters());
+        parameters
     }
 
     /// Values of all columns; the camera's clock as Kalibr's `timeshift_cam_imu`.
@@ -167,9 +162,9 @@ impl Calibration {
 
     /// Holds a parameter at its value from now on.
     pub(crate) fn freeze(&mut self, column: usize) {
-        let name = self.names().swap_remove(column);
-        if !self.frozen.contains(&name) {
-            self.frozen.push(name);
+        let parameter = self.parameters()[column];
+        if !self.frozen.contains(&parameter) {
+            self.frozen.push(parameter);
         }
     }
 
@@ -183,8 +178,8 @@ impl Calibration {
         if self.frozen.is_empty() || !self.free {
             return Vec::new();
         }
-        let names = self.names().into_iter().enumerate();
-        names.filter(|(_, name)| self.frozen.contains(name)).map(|(column, _)| column).collect()
+        let parameters = self.parameters().into_iter().enumerate();
+        parameters.filter(|(_, parameter)| self.frozen.contains(parameter)).map(|(column, _)| column).collect()
     }
 
     /// Number of free columns.

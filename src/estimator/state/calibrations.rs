@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::calibration::Calibration;
 use crate::estimator::factors::prior::Prior;
-use crate::gimbal::Parameterization;
+use crate::gimbal::{ParameterId, Parameterization};
 
 /// The camera whose mount may have joints: the first one. Its image is shown, its calibration has the first columns.
 pub(crate) const MAIN: usize = 0;
@@ -37,6 +37,14 @@ impl Calibrations {
     /// The camera that the window begins with: a rigid one where there is one, since its mount is known best.
     pub(crate) fn leading(&self) -> usize {
         self.0.iter().position(|calibration| calibration.joint_count() == 0).unwrap_or(MAIN)
+    }
+
+    /// The parameters of all columns, free or not: the main camera's chain and clocks, then those of the rigid cameras.
+    pub(crate) fn parameters(&self) -> Vec<ParameterId> {
+        let of = |(camera, one): (usize, &Calibration)| {
+            one.parameters().into_iter().map(move |parameter| parameter.of_camera(camera as u8))
+        };
+        self.0.iter().enumerate().flat_map(of).collect()
     }
 
     /// Number of free columns.

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{DVector, Vector3};
 
-use super::layout::{POSE, SPEED_BIAS};
+use super::layout::{POSE, VELOCITY_BIAS};
 use super::navigation::{NavigationState, Vector15};
 use crate::geometry::{so3, wrap_angle};
 use crate::sensors::{ImuSample, JointAngles};
@@ -78,7 +78,7 @@ impl FrameState {
         let joints = self.joints_rad.len();
         let mut navigation = Vector15::zeros();
         navigation.as_mut_slice()[..POSE].copy_from_slice(&delta[..POSE]);
-        navigation.as_mut_slice()[POSE..].copy_from_slice(&delta[POSE + joints..POSE + joints + SPEED_BIAS]);
+        navigation.as_mut_slice()[POSE..].copy_from_slice(&delta[POSE + joints..POSE + joints + VELOCITY_BIAS]);
         Self {
             navigation: self.navigation.plus(&navigation),
             joints_rad: self.joints_rad.iter().zip(&delta[POSE..]).map(|(angle, step)| angle + step).collect(),
@@ -90,9 +90,9 @@ impl FrameState {
     pub(crate) fn minus(&self, origin: &Self) -> DVector<f64> {
         let joints = self.joints_rad.len();
         let navigation = self.navigation.minus(&origin.navigation);
-        let mut delta = DVector::zeros(POSE + joints + SPEED_BIAS);
+        let mut delta = DVector::zeros(POSE + joints + VELOCITY_BIAS);
         delta.rows_mut(0, POSE).copy_from(&navigation.fixed_rows::<POSE>(0));
-        delta.rows_mut(POSE + joints, SPEED_BIAS).copy_from(&navigation.fixed_rows::<SPEED_BIAS>(POSE));
+        delta.rows_mut(POSE + joints, VELOCITY_BIAS).copy_from(&navigation.fixed_rows::<VELOCITY_BIAS>(POSE));
         for (joint, (angle, start)) in self.joints_rad.iter().zip(&origin.joints_rad).enumerate() {
             delta[POSE + joint] = angle - start;
         }

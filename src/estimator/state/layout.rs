@@ -4,10 +4,10 @@ use std::ops::Range;
 
 /// Length of a pose's block, `[φ, p]`.
 pub(crate) const POSE: usize = 6;
-/// Length of a speed-bias block, `[v, b_g, b_a]`.
-pub(crate) const SPEED_BIAS: usize = 9;
+/// Length of a velocity-bias block, `[v, b_g, b_a]`.
+pub(crate) const VELOCITY_BIAS: usize = 9;
 
-/// Columns of the window: frame by frame `[pose 6 | joints N | speed and biases 9]`, then the static calibration.
+/// Columns of the window: frame by frame `[pose 6 | joints N | velocity and biases 9]`, then the static calibration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Layout {
     /// Number of frames.
@@ -20,7 +20,7 @@ pub(crate) struct Layout {
 
 impl Layout {
     pub(crate) fn frame_len(&self) -> usize {
-        POSE + self.joints + SPEED_BIAS
+        POSE + self.joints + VELOCITY_BIAS
     }
 
     pub(crate) fn frame(&self, slot: usize) -> Range<usize> {
@@ -43,9 +43,9 @@ impl Layout {
         start..start + self.joints
     }
 
-    pub(crate) fn speed_bias(&self, slot: usize) -> Range<usize> {
+    pub(crate) fn velocity_bias(&self, slot: usize) -> Range<usize> {
         let start = slot * self.frame_len() + POSE + self.joints;
-        start..start + SPEED_BIAS
+        start..start + VELOCITY_BIAS
     }
 
     pub(crate) fn calibration(&self) -> Range<usize> {

@@ -3,7 +3,8 @@
 use super::fixture;
 use super::flight::{fly, trajectory_error_m};
 use crate::estimator::{EstimatorConfig, EstimatorOptions, StepReport};
-use crate::gimbal::Parameterization;
+use crate::geometry::Dimension;
+use crate::gimbal::{ParameterId, Parameterization, Quantity};
 use crate::simulation::{SyntheticFlight, SyntheticMount, SyntheticOptions, synthetic_tracks};
 
 fn flight(mount: SyntheticMount, seed: u64, clock_offsets_s: [f64; 2]) -> SyntheticFlight {
@@ -29,10 +30,10 @@ fn flown(flight: &SyntheticFlight, estimate_timeshift: bool) -> (f64, StepReport
 }
 
 /// Value and standard deviation of a parameter, in seconds.
-fn clock(report: &StepReport, name: &str) -> (f64, f64) {
+fn clock(report: &StepReport, clock: ParameterId) -> (f64, f64) {
     let calibration = &report.calibration;
-    let index = calibration.names.iter().position(|known| known == name).expect("the offset has a column");
-    assert_eq!(calibration.units[index], "s");
+    let index = calibration.parameters.iter().position(|known| *known == clock).expect("the offset has a column");
+    assert_eq!(calibration.parameters[index].dimension(), Dimension::Time);
     (calibration.values[index], calibration.sigmas[index])
 }
 
@@ -41,11 +42,11 @@ fn the_offset_of_a_rigid_camera_is_found() {
     for (seed, offset_s) in [(1, 0.01), (2, -0.015), (3, 0.0)] {
         let flight = flight(SyntheticMount::Static, seed, [offset_s, 0.0]);
         let (ignored_m, report) = flown(&flight, false);
-        assert!(report.calibration.names.iter().all(|name| !name.contains("timeshift")));
+        assert!(report.calibration.parameters.iter().all(|parameter| parameter.quantity != Quantity::Timeshift));
         assert_eq!(report.warnings.is_empty(), offset_s == 0.0, "seed {seed}: {:?}", report.warnings);
         let (error_m, report) = flown(&flight, true);
         assert!(report.warnings.is_empty(), "seed {seed}: {:?}", report.warnings);
-        let (found_s, sigma_s) = clock(&report, "timeshift");
+        let (found_s, sigma_s) = clock(&report, ParameterId::timeshift(0));
         assert!((found_s - offset_s).abs() < 0.001, "seed {seed}: {found_s} of {offset_s} s");
         assert!(sigma_s > 0.0 && sigma_s < 0.001, "seed {seed}: {sigma_s} s");
         assert!(
@@ -63,10 +64,10 @@ fn offsets_of_a_gimbals_camera_and_of_its_encoders_are_told_apart() {
         assert!(!report.warnings.is_empty(), "seed {seed}: {:?}", report.residuals);
         let (error_m, report) = flown(&flight, true);
         assert!(report.warnings.is_empty(), "seed {seed}: {:?}", report.warnings);
-        for (name, offset_s) in ["timeshift", "encoder.timeshift"].into_iter().zip(offsets_s) {
-            let (found_s, sigma_s) = clock(&report, name);
-            assert!((found_s - offset_s).abs() < 4.0 * sigma_s, "seed {seed}: {name} {found_s} ± {sigma_s} s");
-            assert!((found_s - offset_s).abs() < 0.002, "seed {seed}: {name} {found_s} of {offset_s} s");
+        for (id, offset_s) in [ParameterId::timeshift(0), ParameterId::ENCODER_TIMESHIFT].into_iter().zip(offsets_s) {
+            let (found_s, sigma_s) = clock(&report, id);
+            assert!((found_s - offset_s).abs() < 4.0 * sigma_s, "seed {seed}: {id:?} {found_s} ± {sigma_s} s");
+            assert!((found_s - offset_s).abs() < 0.002, "seed {seed}: {id:?} {found_s} of {offset_s} s");
         }
         assert!(error_m < 0.7 * ignored_m, "seed {seed}: {ignored_m} m, {error_m} m with the offsets");
     }

@@ -6,6 +6,7 @@ use crate::estimator::{Estimator, EstimatorConfig, EstimatorOptions, Phase, Step
 use crate::frontend::TrackedFrame;
 use crate::geometry::so3;
 use crate::gimbal::Parameterization;
+use crate::gimbal::tests::parameter;
 use crate::sensors::ChainPrior;
 use crate::simulation::{SyntheticFlight, SyntheticMount, SyntheticOptions, synthetic_tracks};
 
@@ -98,12 +99,13 @@ fn both_calibrations_are_columns_with_names_of_their_own() {
     let (estimator, reports) = flights.fly(config, both);
     let last = reports.last().unwrap();
     let calibration = &last.calibration;
-    assert_eq!(calibration.names.len(), 24);
-    let mut names = calibration.names.clone();
-    names.sort();
-    names.dedup();
-    assert_eq!(names.len(), 24, "{names:?}");
-    assert_eq!(calibration.names[18..], ["rx", "ry", "rz", "tx", "ty", "tz"].map(|tail| format!("cam1.{tail}")));
+    assert_eq!(calibration.parameters.len(), 24);
+    let mut parameters = calibration.parameters.clone();
+    parameters.sort();
+    parameters.dedup();
+    assert_eq!(parameters.len(), 24, "{parameters:?}");
+    let rigid = ["rx", "ry", "rz", "tx", "ty", "tz"].map(|tail| parameter(&format!("cam1.{tail}")));
+    assert_eq!(calibration.parameters[18..], rigid);
     for of_column in [&calibration.values, &calibration.sigmas, &calibration.prior_sigmas] {
         assert!(of_column.len() == 24 && of_column.iter().all(|number| number.is_finite()));
     }
@@ -112,8 +114,8 @@ fn both_calibrations_are_columns_with_names_of_their_own() {
     assert_eq!(linearization.calibration_column_norms.len(), 24);
     let cameras = [&estimator.config().camera, &estimator.config().rigid_cameras[0].model];
     super::jacobian::check(last, &cameras);
-    let names: Vec<&String> = linearization.columns[..24].iter().map(|column| &column.name).collect();
-    assert!(names.iter().zip(&calibration.names).all(|(column, name)| *column == name), "{names:?}");
+    let columns: Vec<_> = linearization.columns[..24].iter().filter_map(|column| column.id.parameter()).collect();
+    assert_eq!(columns, calibration.parameters);
 
     // The rigid mount is found as well.
     let truth = flights.rigid.true_rig.chain_of_camera("cam0").unwrap().imu_from_camera(&[]);

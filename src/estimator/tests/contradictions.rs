@@ -2,12 +2,12 @@
 
 use super::fixture;
 use crate::estimator::window::contradictions::Contradictions;
-use crate::estimator::{EstimatorConfig, EstimatorOptions, ResidualSummary};
+use crate::estimator::{EstimatorConfig, EstimatorOptions, FactorKind, ResidualSummary};
 use crate::gimbal::Parameterization;
 use crate::simulation::{SyntheticOptions, synthetic_tracks};
 
 fn encoder(mean_square: f64) -> [ResidualSummary; 1] {
-    [ResidualSummary { factor: "encoder", count: 33, chi2_before: 900.0, chi2_after: 33.0 * mean_square }]
+    [ResidualSummary { factor: FactorKind::Encoder, count: 33, chi2_before: 900.0, chi2_after: 33.0 * mean_square }]
 }
 
 fn config() -> EstimatorConfig {

@@ -16,6 +16,7 @@ use crate::estimator::{
     DEFAULT_CHAIN_PRIOR, Estimator, EstimatorConfig, EstimatorOptions, RigidCamera, StepInput, StepReport,
 };
 use crate::frontend::TrackedFrame;
+use crate::geometry::Dimension;
 use crate::gimbal::{Chain, Parameterization};
 use crate::sensors::Rig;
 use crate::simulation::{Lens, SyntheticFlight, SyntheticFrame, SyntheticMount, SyntheticOptions, synthetic_tracks};
@@ -174,15 +175,17 @@ pub(super) fn shake(estimator: &mut Estimator, scale: f64) {
         for column in layout.joints(slot) {
             delta[column] = random.normal() * 0.01;
         }
-        for (offset, column) in layout.speed_bias(slot).enumerate() {
+        for (offset, column) in layout.velocity_bias(slot).enumerate() {
             delta[column] = random.normal() * [0.1, 0.003, 0.05][offset / 3];
         }
     }
-    let units = (0..estimator.calibration.cameras()).flat_map(|camera| estimator.calibration.of(camera).units());
-    for (unit, column) in units.zip(layout.calibration()) {
-        // Derivatives by speed and bias, which an offset of the clocks multiplies, are left out.
-        let scale = [("rad", 0.0035), ("m", 0.002)].into_iter().find_map(|(of, scale)| (of == unit).then_some(scale));
-        delta[column] = scale.map_or(0.0, |scale| scale * random.normal());
+    for (parameter, column) in estimator.calibration.parameters().into_iter().zip(layout.calibration()) {
+        delta[column] = match parameter.dimension() {
+            Dimension::Angle => 0.0035 * random.normal(),
+            Dimension::Length => 0.002 * random.normal(),
+            // Derivatives by velocity and bias, which an offset of the clocks multiplies, are left out.
+            Dimension::Time | Dimension::Ratio => 0.0,
+        };
     }
     delta *= scale;
     for (slot, frame) in estimator.frames.iter_mut().enumerate() {

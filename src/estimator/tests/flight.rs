@@ -77,7 +77,7 @@ fn a_rigid_camera_follows_the_flight() {
     assert!(error < 0.003 * length, "{error} m over {length} m");
     assert_eq!(estimator.restarts, 0);
     let last = reports.last().unwrap();
-    assert_eq!(last.calibration.names.len(), 6);
+    assert_eq!(last.calibration.parameters.len(), 6);
     assert!(last.calibration.sigmas.iter().zip(&last.calibration.prior_sigmas).all(|(after, before)| after < before));
     assert!(last.window.iter().all(|frame| frame.joint_angles_rad.is_empty()));
 }
@@ -94,7 +94,7 @@ fn a_gimbal_camera_follows_the_flight_and_calibrates_its_chain() {
         let after = chain_error(&flight, &estimator);
         assert!(after.1 < 0.5 * before.1, "{parameterization}: {before:?} to {after:?}");
         let last = reports.last().unwrap();
-        assert_eq!(last.calibration.names.len(), estimator.calibration.dof());
+        assert_eq!(last.calibration.parameters.len(), estimator.calibration.dof());
     }
 }
 

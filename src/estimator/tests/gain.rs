@@ -11,8 +11,9 @@ use crate::estimator::window::information_gain::CameraInformation;
 use crate::estimator::window::motion_parts::motion_parts;
 use crate::estimator::window::problem::{Estimate, Problem};
 use crate::estimator::window::tracking::ActiveTracks;
-use crate::estimator::{ColumnGroup, Estimator, InformationGain, Motion};
+use crate::estimator::{ColumnGroup, ColumnId, Estimator, FrameId, InformationGain, Motion};
 use crate::gimbal::Parameterization;
+use crate::gimbal::tests::parameter;
 use crate::simulation::{Exercise, JointSwing, SyntheticMotion, SyntheticOptions, VehicleSwing, synthetic_tracks};
 
 /// Windows with a prior, away from the truth.
@@ -29,7 +30,7 @@ fn windows() -> Vec<(&'static str, Estimator)> {
     ];
     let mut frozen = gimbal(Parameterization::Classical);
     for name in ["EC.tx", "L1.d"] {
-        frozen.freeze(name).unwrap();
+        frozen.freeze(parameter(name)).unwrap();
     }
     windows.push(("frozen", frozen));
     for (_, estimator) in &mut windows {
@@ -77,8 +78,8 @@ fn the_parts_of_the_motions_make_up_what_the_calibration_does_to_the_pictures() 
 
 /// Bits by column, from explicit inverses of two windows, of which one has nothing of the newest image.
 fn bits_by_definition(problem: &Problem<'_>, estimate: &Estimate, active: &[ActiveTracks]) -> Vec<f64> {
-    let names: Vec<String> = (0..problem.layout.calibration).map(|column| column.to_string()).collect();
-    let numbers: Vec<usize> = (0..problem.layout.frames).collect();
+    let parameters = estimate.calibration.parameters();
+    let numbers: Vec<FrameId> = (0..problem.layout.frames).map(FrameId).collect();
     let newest = problem.layout.frames - 1;
     let cut: Vec<ActiveTracks> = active
         .iter()
@@ -95,12 +96,15 @@ fn bits_by_definition(problem: &Problem<'_>, estimate: &Estimate, active: &[Acti
         camera.tracks = &cut.tracks;
     }
     let variances = |problem: &Problem<'_>, whole: bool| {
-        let linearization = problem.linearization(estimate, &names, &numbers, None);
+        let linearization = problem.linearization(estimate, &parameters, &numbers, None);
         let blocks = &linearization.columns;
-        let of_newest = |name: &str| ["pose", "joints", "speed-bias"].iter().any(|it| name == format!("{it} {newest}"));
+        let of_newest = |id: ColumnId| {
+            let frame = FrameId(newest);
+            [ColumnId::Pose(frame), ColumnId::Joints(frame), ColumnId::VelocityBias(frame)].contains(&id)
+        };
         let gone: Vec<usize> = blocks
             .iter()
-            .filter(|block| !whole && of_newest(&block.name))
+            .filter(|block| !whole && of_newest(block.id))
             .flat_map(|block| block.start..block.start + block.len)
             .collect();
         let clean = |row: &usize| gone.iter().all(|column| linearization.jacobian[(*row, *column)] == 0.0);
@@ -111,7 +115,7 @@ fn bits_by_definition(problem: &Problem<'_>, estimate: &Estimate, active: &[Acti
         for index in 0..information.nrows() {
             information[(index, index)] += 1e-6;
         }
-        let count = blocks.iter().filter(|block| block.group == ColumnGroup::Calibration).count();
+        let count = blocks.iter().filter(|block| block.id.group() == ColumnGroup::Calibration).count();
         let covariance = information.cholesky().unwrap().inverse();
         (0..count).map(|column| covariance[(column, column)]).collect::<Vec<f64>>()
     };
@@ -120,10 +124,10 @@ fn bits_by_definition(problem: &Problem<'_>, estimate: &Estimate, active: &[Acti
 }
 
 fn gain_of(problem: &Problem<'_>, estimate: &Estimate) -> InformationGain {
-    let names: Vec<String> = (0..problem.layout.calibration).map(|column| column.to_string()).collect();
-    let numbers: Vec<usize> = (0..problem.layout.frames).collect();
+    let parameters = estimate.calibration.parameters();
+    let numbers: Vec<FrameId> = (0..problem.layout.frames).map(FrameId).collect();
     let mut cameras: Vec<CameraInformation> = Vec::new();
-    problem.linearization(estimate, &names, &numbers, Some(&mut cameras));
+    problem.linearization(estimate, &parameters, &numbers, Some(&mut cameras));
     problem.information_gain(estimate, &cameras).unwrap()
 }
 

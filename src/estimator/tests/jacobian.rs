@@ -4,8 +4,10 @@ use super::fixture;
 use super::flight::fly;
 use crate::camera::CameraModel;
 use crate::estimator::{
-    ColumnGroup, EstimatorOptions, FactorRows, JacobianFactor, Linearization, StepJacobian, StepReport,
+    ColumnGroup, ColumnId, EstimatorOptions, FactorKind, FactorRows, FrameId, JacobianFactor, Linearization,
+    StepJacobian, StepReport,
 };
+use crate::geometry::Dimension;
 use crate::gimbal::Parameterization;
 use crate::simulation::{SyntheticOptions, synthetic_tracks};
 
@@ -16,7 +18,7 @@ pub(super) fn check(report: &StepReport, cameras: &[&CameraModel]) -> StepJacobi
     let jacobian = report.jacobian(cameras).expect("its source is kept");
     let blocks = jacobian.columns.len() - 1;
     assert_eq!(jacobian.columns[..blocks], linearization.columns);
-    assert_eq!(jacobian.columns[blocks].group, ColumnGroup::InverseDepth);
+    assert_eq!(jacobian.columns[blocks].id, ColumnId::InverseDepth);
 
     let count = linearization.calibration_column_norms.len();
     let mut squared = vec![0.0; count];
@@ -35,7 +37,7 @@ pub(super) fn check(report: &StepReport, cameras: &[&CameraModel]) -> StepJacobi
     }
     // Speeds and biases are in inertial factors and in standing still alone.
     for (number, block) in
-        jacobian.columns.iter().enumerate().filter(|(_, block)| block.group == ColumnGroup::SpeedBias)
+        jacobian.columns.iter().enumerate().filter(|(_, block)| block.id.group() == ColumnGroup::VelocityBias)
     {
         let inertial = jacobian
             .rows
@@ -43,12 +45,11 @@ pub(super) fn check(report: &StepReport, cameras: &[&CameraModel]) -> StepJacobi
             .filter(|row| matches!(row.factor, JacobianFactor::Inertial { .. } | JacobianFactor::Standstill));
         let norms = inertial.flat_map(|row| &row.norms).filter(|(column, _)| usize::from(*column) == number);
         let written = norms.map(|(_, norm)| f64::from(*norm).powi(2)).sum::<f64>().sqrt();
-        let scale = |place: usize| crate::estimator::column_scale(ColumnGroup::SpeedBias, "", place);
         let held = (0..block.len)
-            .map(|place| (linearization.jacobian.column(block.start + place) * scale(place)).norm_squared())
+            .map(|place| (linearization.jacobian.column(block.start + place) * block.id.scale(place)).norm_squared())
             .sum::<f64>()
             .sqrt();
-        assert!((written - held).abs() <= 1e-4 * held, "{}: {written} for {held}", block.name);
+        assert!((written - held).abs() <= 1e-4 * held, "{block:?}: {written} for {held}");
     }
     jacobian
 }
@@ -56,20 +57,17 @@ pub(super) fn check(report: &StepReport, cameras: &[&CameraModel]) -> StepJacobi
 /// Holds the rows of the other factors against the norms of their blocks and the χ² of their kind.
 fn check_factor_rows(report: &StepReport, jacobian: &StepJacobian) {
     let all = report.factor_rows.as_ref().expect("they were asked for");
-    let units = &report.calibration.units;
     for FactorRows { factor, rows } in all {
         let row = jacobian.rows.iter().find(|row| row.factor == *factor).expect("its norms are kept");
         assert_eq!(row.height, rows.nrows());
         let blocks = &jacobian.columns[..jacobian.columns.len() - 1];
         assert_eq!(rows.ncols(), blocks.iter().map(|block| block.len).sum::<usize>() + 1);
         for (number, block) in blocks.iter().enumerate() {
-            let unit = units.get(number).copied().unwrap_or_default();
-            let scale = |place: usize| crate::estimator::column_scale(block.group, unit, place);
-            let column = |place: usize| rows.column(block.start + place) * scale(place);
+            let column = |place: usize| rows.column(block.start + place) * block.id.scale(place);
             let squared: f64 = (0..block.len).map(|place| column(place).norm_squared()).sum();
             let kept = row.norms.iter().find(|(known, _)| usize::from(*known) == number);
             let kept = kept.map_or(0.0, |(_, norm)| f64::from(*norm));
-            assert!((squared.sqrt() - kept).abs() <= 1e-5 * kept, "{factor:?}, {}: {kept}", block.name);
+            assert!((squared.sqrt() - kept).abs() <= 1e-5 * kept, "{factor:?}, {block:?}: {kept}");
         }
     }
     let chi2 = |wanted: fn(&JacobianFactor) -> bool| -> f64 {
@@ -77,12 +75,12 @@ fn check_factor_rows(report: &StepReport, jacobian: &StepJacobian) {
         of.map(|rows| rows.rows.column(rows.rows.ncols() - 1).norm_squared()).sum()
     };
     for (kind, measured) in [
-        ("imu", chi2(|factor| matches!(factor, JacobianFactor::Inertial { .. }))),
-        ("calibration prior", chi2(|factor| *factor == JacobianFactor::CalibrationPrior)),
-        ("marginalization prior", chi2(|factor| *factor == JacobianFactor::MarginalizationPrior)),
+        (FactorKind::Imu, chi2(|factor| matches!(factor, JacobianFactor::Inertial { .. }))),
+        (FactorKind::CalibrationPrior, chi2(|factor| *factor == JacobianFactor::CalibrationPrior)),
+        (FactorKind::MarginalizationPrior, chi2(|factor| *factor == JacobianFactor::MarginalizationPrior)),
     ] {
         let told = report.residuals.iter().find(|summary| summary.factor == kind).expect("every kind is told");
-        assert!((told.chi2_after - measured).abs() < 1e-9 + 1e-6 * measured, "{kind}: {measured} for {told:?}");
+        assert!((told.chi2_after - measured).abs() < 1e-9 + 1e-6 * measured, "{kind:?}: {measured} for {told:?}");
     }
 }
 
@@ -106,7 +104,11 @@ fn blocks_are_those_of_the_linearization() {
         let jacobian = check(report, &[&camera]);
         let of = |wanted: fn(&JacobianFactor) -> bool| jacobian.rows.iter().filter(|row| wanted(&row.factor)).count();
         let frames = report.window.len();
-        let timed = jacobian.columns.iter().filter(|block| block.name.ends_with("timeshift")).count();
+        let timed = jacobian
+            .columns
+            .iter()
+            .filter(|block| block.id.parameter().is_some_and(|it| it.dimension() == Dimension::Time))
+            .count();
         assert_eq!(timed, if clocks { 2 } else { 0 });
         check_factor_rows(report, &jacobian);
         assert_eq!(of(|factor| matches!(factor, JacobianFactor::Feature(_))), report.features.len());
@@ -117,17 +119,16 @@ fn blocks_are_those_of_the_linearization() {
         // A feature touches nothing but the calibration, the frames that see it, and its depth.
         for (row, feature) in jacobian.rows.iter().zip(&report.features) {
             assert_eq!(row.factor, JacobianFactor::Feature(feature.id));
-            let frames: Vec<String> = feature.observations.iter().map(|seen| seen.frame_index.to_string()).collect();
+            let sees = |frame: FrameId| feature.observations.iter().any(|seen| seen.frame_index == frame.0);
             for (column, norm) in &row.norms {
                 let block = &jacobian.columns[usize::from(*column)];
                 assert!(*norm > 0.0 && norm.is_finite());
-                let number = block.name.rsplit(' ').next().unwrap().to_owned();
-                let framed = matches!(block.group, ColumnGroup::Joints | ColumnGroup::Pose);
-                assert!(
-                    block.group != ColumnGroup::SpeedBias && (!framed || frames.contains(&number)),
-                    "{}",
-                    block.name
-                );
+                let touched = match block.id {
+                    ColumnId::Calibration(_) | ColumnId::InverseDepth => true,
+                    ColumnId::Joints(frame) | ColumnId::Pose(frame) => sees(frame),
+                    ColumnId::VelocityBias(_) => false,
+                };
+                assert!(touched, "{block:?}");
             }
         }
         // Without the right cameras or the source there is none.

@@ -55,7 +55,7 @@ fn without_encoders_the_flight_is_followed_and_the_calibration_stays_weak() {
         assert!(error < 0.01 * length, "seed {seed}: {error} m over {length} m");
         let last = &reports.last().unwrap().calibration;
         // 18 columns without the three offsets, which free joint angles would take up.
-        assert_eq!(last.names.len(), 15);
+        assert_eq!(last.parameters.len(), 15);
         let learnt: Vec<f64> =
             last.sigmas.iter().zip(&last.prior_sigmas).map(|(after, before)| after / before).collect();
         assert!(learnt.iter().all(|share| *share > 0.05 && *share < 1.01), "seed {seed}: {learnt:?}");

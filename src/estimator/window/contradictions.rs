@@ -4,7 +4,7 @@
 //! trajectory and calibration to make the best of it. What it cannot hide is that encoder readings, and what earlier images
 //! told, then disagree with the images in the window.
 
-use crate::estimator::{EstimatorConfig, ResidualSummary};
+use crate::estimator::{EstimatorConfig, FactorKind, ResidualSummary};
 
 /// Residuals are averaged over this time, in nanoseconds, before anything is said: an image, a stop or a jolt by itself
 /// contradicts nothing, and the first window's values are wrong by right.
@@ -14,7 +14,7 @@ const RELEASE: f64 = 0.8;
 
 /// A kind of factor whose residuals are watched.
 struct Watched {
-    factor: &'static str,
+    factor: FactorKind,
     /// Largest mean of its squared whitened residuals.
     limit: f64,
     /// What a larger one means.
@@ -25,12 +25,12 @@ struct Watched {
 /// real logs) where the model holds; a camera's clock that is 10 ms off makes that 2, encoders 20 ms late 1.2.
 const WATCHED: [Watched; 2] = [
     Watched {
-        factor: "encoder",
+        factor: FactorKind::Encoder,
         limit: 1.6,
         contradiction: "joint angles contradict images and inertial sensor by more than the encoders' noise allows",
     },
     Watched {
-        factor: "marginalization prior",
+        factor: FactorKind::MarginalizationPrior,
         limit: 0.7,
         contradiction: "what earlier images told contradicts the images in the window by more than their noise allows",
     },

@@ -2,16 +2,15 @@
 
 use nalgebra::DMatrix;
 
-use crate::estimator::ColumnBlock;
 use crate::estimator::estimator::Estimator;
-use crate::estimator::report::jacobian_source::{
-    ClockColumns, FactorRows, JacobianSource, PackedKind, PackedRow, scales_of,
-};
+use crate::estimator::report::columns::scales_of;
+use crate::estimator::report::jacobian_source::{ClockColumns, FactorRows, JacobianSource, PackedKind, PackedRow};
 use crate::estimator::report::linearization::{column_blocks, column_order};
 use crate::estimator::state::calibrations::Calibrations;
 use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::window::rows::stack_columns;
 use crate::estimator::window::tracking::SolvedWindow;
+use crate::estimator::{ColumnBlock, FrameId};
 
 impl Estimator {
     /// The source of the Jacobian at the final estimate, and the rows that are not of features where they are to be kept.
@@ -21,9 +20,9 @@ impl Estimator {
         let layout = problem.layout;
         let frames = problem.linearization_frames(estimate);
         let calibration = problem.linearization_calibration(&estimate.calibration);
-        let numbers: Vec<usize> = self.frames.iter().map(|frame| frame.index).collect();
-        let columns = column_blocks(&layout, &self.calibration_names(), &numbers);
-        let scales = scales_of(&columns, &self.calibration_units());
+        let numbers: Vec<FrameId> = self.frames.iter().map(|frame| FrameId(frame.index)).collect();
+        let columns = column_blocks(&layout, &self.calibration.parameters(), &numbers);
+        let scales = scales_of(&columns);
         let order = column_order(&layout);
         let mut packed = Vec::new();
         let mut norms: Vec<(u16, f32)> = Vec::new();

@@ -11,34 +11,36 @@ use crate::estimator::window::information_gain::CameraInformation;
 use crate::estimator::window::problem::{Estimate, Problem};
 use crate::estimator::window::rows::stack_columns;
 use crate::estimator::window::tracking::SolvedWindow;
-use crate::estimator::{InformationGain, Linearization};
+use crate::estimator::{FrameId, InformationGain, Linearization};
+use crate::gimbal::ParameterId;
 
 impl Estimator {
     /// The linearization at the final estimate: the measurements' rows, and those of the priors; and what the newest image
     /// tells.
     pub(crate) fn linearization(&self, solved: &SolvedWindow) -> (Linearization, Option<InformationGain>) {
         let problem = self.problem(&solved.cameras);
-        let numbers: Vec<usize> = self.frames.iter().map(|frame| frame.index).collect();
+        let frames: Vec<FrameId> = self.frames.iter().map(|frame| FrameId(frame.index)).collect();
+        let parameters = self.calibration.parameters();
         let estimate = &solved.solution.estimate;
         // An image that does not become a keyframe is forgotten again: it tells nothing that stays.
         if !self.frames.last().is_some_and(|frame| frame.keyframe) {
-            let linearization = problem.linearization(estimate, &self.calibration_names(), &numbers, None);
+            let linearization = problem.linearization(estimate, &parameters, &frames, None);
             return (linearization, problem.no_information_gain(estimate));
         }
         let mut cameras = Vec::new();
-        let linearization = problem.linearization(estimate, &self.calibration_names(), &numbers, Some(&mut cameras));
+        let linearization = problem.linearization(estimate, &parameters, &frames, Some(&mut cameras));
         (linearization, problem.information_gain(estimate, &cameras))
     }
 }
 
 impl Problem<'_> {
-    /// The linearization of the whole window at an estimate; `names` are those of the calibration's columns, `numbers`
-    /// those of the frames. What each camera has seen goes to `seen`, where that is asked for.
+    /// The linearization of the whole window at an estimate; `parameters` are those of the calibration's columns, free
+    /// or fixed. What each camera has seen goes to `seen`, where that is asked for.
     pub(crate) fn linearization(
         &self,
         estimate: &Estimate,
-        names: &[String],
-        numbers: &[usize],
+        parameters: &[ParameterId],
+        numbers: &[FrameId],
         mut seen: Option<&mut Vec<CameraInformation>>,
     ) -> Linearization {
         let layout = self.layout;
@@ -69,8 +71,8 @@ impl Problem<'_> {
         let order: Vec<usize> =
             column_order(&layout).into_iter().filter(|column| *column < first || !is_held(column - first)).collect();
         let of = |held: bool| {
-            let names = names.iter().enumerate().filter(move |(column, _)| is_held(*column) == held);
-            names.map(|(_, name)| name.clone()).collect::<Vec<_>>()
+            let parameters = parameters.iter().enumerate().filter(move |(column, _)| is_held(*column) == held);
+            parameters.map(|(_, parameter)| *parameter).collect::<Vec<_>>()
         };
         let free = |column: &usize| !is_held(*column);
         let norms: Vec<f64> = (0..norms.len()).filter(free).map(|column| norms[column]).collect();

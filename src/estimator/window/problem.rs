@@ -12,7 +12,7 @@ use crate::estimator::factors::visual::{self, ReducedVisualSystem, Track, Visual
 use crate::estimator::state::calibrations::{Calibrations, MAIN};
 use crate::estimator::state::camera_pose::{self, CameraMaps};
 use crate::estimator::state::frame_state::FrameState;
-use crate::estimator::state::layout::{Layout, POSE, SPEED_BIAS};
+use crate::estimator::state::layout::{Layout, POSE, VELOCITY_BIAS};
 use crate::estimator::state::navigation::{Matrix15, Vector15};
 use crate::estimator::window::frames::Frame;
 use crate::geometry::wrap_angle;
@@ -313,8 +313,8 @@ impl Problem<'_> {
             (self.layout.pose(slot).start, by_to.fixed_columns::<POSE>(0).into_owned()),
         ];
         let speeds = [
-            (self.layout.speed_bias(slot - 1).start, by_from.fixed_columns::<SPEED_BIAS>(POSE).into_owned()),
-            (self.layout.speed_bias(slot).start, by_to.fixed_columns::<SPEED_BIAS>(POSE).into_owned()),
+            (self.layout.velocity_bias(slot - 1).start, by_from.fixed_columns::<VELOCITY_BIAS>(POSE).into_owned()),
+            (self.layout.velocity_bias(slot).start, by_to.fixed_columns::<VELOCITY_BIAS>(POSE).into_owned()),
         ];
         for (row, left) in &places {
             add_vector(gradient, *row, &left.tr_mul(residual));
@@ -322,7 +322,7 @@ impl Problem<'_> {
                 add_block(hessian, *row, *column, &left.tr_mul(right));
             }
             for (column, right) in &speeds {
-                let block: SMatrix<f64, POSE, SPEED_BIAS> = left.tr_mul(right);
+                let block: SMatrix<f64, POSE, VELOCITY_BIAS> = left.tr_mul(right);
                 add_block(hessian, *row, *column, &block);
                 add_block(hessian, *column, *row, &block.transpose());
             }

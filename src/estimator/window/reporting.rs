@@ -2,7 +2,6 @@
 
 use nalgebra::Vector2;
 
-use crate::estimator::config::rigid_column;
 use crate::estimator::estimator::Estimator;
 use crate::estimator::state::calibration::Calibration;
 use crate::estimator::state::calibrations::MAIN;
@@ -10,8 +9,8 @@ use crate::estimator::window::problem::Costs;
 use crate::estimator::window::solver;
 use crate::estimator::window::tracking::{SolvedWindow, TrackResiduals};
 use crate::estimator::{
-    CalibrationEstimate, FeatureCounts, FeatureReport, FrameStateReport, LandmarkReport, ObservationReport, Phase,
-    ResidualSummary, StageTimes, StepInput, StepReport,
+    CalibrationEstimate, FactorKind, FeatureCounts, FeatureReport, FrameStateReport, LandmarkReport, ObservationReport,
+    Phase, ResidualSummary, StageTimes, StepInput, StepReport,
 };
 use crate::geometry::median;
 
@@ -100,15 +99,10 @@ impl Estimator {
             .collect()
     }
 
-    /// Units of the calibration's columns, free or not.
-    pub(crate) fn calibration_units(&self) -> Vec<&'static str> {
-        let cameras = (0..self.calibration.cameras()).map(|camera| self.calibration.of(camera));
-        cameras.flat_map(Calibration::units).collect()
-    }
-
     fn calibration_report(&self) -> CalibrationEstimate {
         let cameras = || (0..self.calibration.cameras()).map(|camera| self.calibration.of(camera));
-        let count = cameras().map(|calibration| calibration.units().len()).sum();
+        let parameters = self.calibration.parameters();
+        let count = parameters.len();
         let chain = self.calibration.of(MAIN).chain();
         let sigmas = if self.calibration.dof() == 0 {
             vec![0.0; count]
@@ -119,8 +113,7 @@ impl Estimator {
         };
         CalibrationEstimate {
             parameterization: chain.parameterization().name().to_owned(),
-            names: self.calibration_names(),
-            units: self.calibration_units(),
+            parameters,
             values: cameras().flat_map(Calibration::values).collect(),
             sigmas,
             prior_sigmas: cameras().flat_map(Calibration::prior_sigmas).collect(),
@@ -134,15 +127,6 @@ impl Estimator {
                 .map(|(camera, calibration)| (camera.key.clone(), calibration.imu_from_camera(&[])))
                 .collect(),
         }
-    }
-
-    /// Names of the calibration's columns, free or not: the chain's, then those of the rigid cameras behind their keys.
-    pub(crate) fn calibration_names(&self) -> Vec<String> {
-        let mut names = self.calibration.of(MAIN).names();
-        for (index, camera) in self.config.rigid_cameras.iter().enumerate() {
-            names.extend(self.calibration.of(index + 1).names().iter().map(|name| rigid_column(&camera.key, name)));
-        }
-        names
     }
 
     fn feature_reports(&self, solved: &SolvedWindow) -> Vec<FeatureReport> {
@@ -215,21 +199,21 @@ impl Estimator {
         let held = self.prior.as_ref().map_or(0, crate::estimator::factors::prior::Prior::len)
             + if self.start.is_some() { crate::estimator::factors::prior::StartPrior::LEN } else { 0 };
         let (before, after) = (&solved.solution.costs_before, &solved.solution.costs_after);
-        let summary = |factor: &'static str, count: usize, part: fn(&Costs) -> f64| ResidualSummary {
+        let summary = |factor: FactorKind, count: usize, part: fn(&Costs) -> f64| ResidualSummary {
             factor,
             count,
             chi2_before: part(before),
             chi2_after: part(after),
         };
         let mut summaries = vec![
-            summary("visual", 2 * sightings, |costs| costs.visual),
-            summary("imu", 15 * intervals, |costs| costs.imu),
-            summary("encoder", joints * read, |costs| costs.encoder),
-            summary("calibration prior", problem.layout.calibration, |costs| costs.calibration),
-            summary("marginalization prior", held, |costs| costs.prior),
+            summary(FactorKind::Visual, 2 * sightings, |costs| costs.visual),
+            summary(FactorKind::Imu, 15 * intervals, |costs| costs.imu),
+            summary(FactorKind::Encoder, joints * read, |costs| costs.encoder),
+            summary(FactorKind::CalibrationPrior, problem.layout.calibration, |costs| costs.calibration),
+            summary(FactorKind::MarginalizationPrior, held, |costs| costs.prior),
         ];
         if resting > 0 {
-            summaries.push(summary("standstill", resting, |costs| costs.rest));
+            summaries.push(summary(FactorKind::Standstill, resting, |costs| costs.rest));
         }
         summaries
     }

@@ -8,7 +8,7 @@ use crate::estimator::factors::projection::{NewestRows, ProjectedRows};
 use crate::estimator::factors::reprojection::CameraPose;
 use crate::estimator::state::camera_pose::{self, CameraMaps};
 use crate::estimator::state::frame_state::FrameState;
-use crate::estimator::state::layout::{POSE, SPEED_BIAS};
+use crate::estimator::state::layout::{POSE, VELOCITY_BIAS};
 
 impl Problem<'_> {
     /// The reprojection factors, landmarks projected out; at most `6·frames` rows a camera.
@@ -71,7 +71,8 @@ impl Problem<'_> {
         let mut rows = DMatrix::zeros(15, total + 1);
         for (slot, part) in [(slot - 1, &by_from), (slot, &by_to)] {
             rows.columns_range_mut(self.layout.pose(slot)).copy_from(&part.fixed_columns::<POSE>(0));
-            rows.columns_range_mut(self.layout.speed_bias(slot)).copy_from(&part.fixed_columns::<SPEED_BIAS>(POSE));
+            rows.columns_range_mut(self.layout.velocity_bias(slot))
+                .copy_from(&part.fixed_columns::<VELOCITY_BIAS>(POSE));
         }
         rows.set_column(total, &residual);
         rows

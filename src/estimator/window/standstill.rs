@@ -271,7 +271,7 @@ pub(crate) fn speed_terms(layout: Layout, frame: &Frame, slot: usize, state: &Fr
     let Some(rest) = &frame.rest else { return Vec::new() };
     let slope = 1.0 / rest.speed_sigma_m_per_s;
     let velocity = state.navigation.velocity_m_per_s;
-    let column = layout.speed_bias(slot).start;
+    let column = layout.velocity_bias(slot).start;
     (0..3)
         .map(|axis| RestTerm { column: column + axis, against: None, residual: velocity[axis] * slope, slope })
         .collect()

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::export::tables::parameter_name;
 use crate::geometry::seconds_from_ns;
+use crate::gimbal::ParameterId;
 use crate::observability::RankReport;
 use crate::sensors::Rig;
 use crate::session::RunRecord;
@@ -54,7 +54,7 @@ type Finding = (usize, usize, usize, [usize; 4]);
 
 fn finding(rank: &RankReport) -> Finding {
     let lost = [rank.deficit_parameterization, rank.deficit_joints, rank.deficit_absorbed, rank.deficit_motion];
-    (rank.names.len(), rank.rank_structural, rank.rank_informed, lost)
+    (rank.parameters.len(), rank.rank_structural, rank.rank_informed, lost)
 }
 
 /// What occurs most often; the smaller one of two.
@@ -71,8 +71,9 @@ fn most_frequent<T: Ord + Clone>(items: impl Iterator<Item = T>) -> Option<T> {
 pub(super) fn rank_story(run: &RunRecord, rig: &Rig) -> Vec<RankSpell> {
     let ranked: Vec<(i64, &RankReport)> =
         run.steps.iter().filter_map(|step| Some((step.report.stamp_ns, step.rank.as_ref()?))).collect();
+    let names = rig.parameter_names();
     let mut spells: Vec<RankSpell> = Vec::new();
-    let mut weakest_of_spell: Vec<&str> = Vec::new();
+    let mut weakest_of_spell: Vec<ParameterId> = Vec::new();
     let begin_ns = ranked.first().map_or(0, |(stamp_ns, _)| *stamp_ns);
     let stretches = ranked.chunk_by(|(a, _), (b, _)| (a - begin_ns) / STRETCH_NS == (b - begin_ns) / STRETCH_NS);
     for stretch in stretches {
@@ -102,7 +103,7 @@ pub(super) fn rank_story(run: &RunRecord, rig: &Rig) -> Vec<RankSpell> {
             });
         }
         if let Some(spell) = spells.last_mut() {
-            spell.weakest = most_frequent(weakest_of_spell.iter()).map(|name| parameter_name(name, rig));
+            spell.weakest = most_frequent(weakest_of_spell.iter()).map(|parameter| names.name(*parameter));
         }
     }
     spells

@@ -3,6 +3,7 @@
 use super::content::{ReportContent, RunContent};
 use super::html::{element, list, number, table};
 use crate::export::summary::ParameterSummary;
+use crate::geometry::Dimension;
 use crate::log_check::{CheckReport, Severity};
 
 /// Millimetres of a metre, for lengths that are shown.
@@ -92,11 +93,11 @@ pub(super) fn calibration(run: &RunContent) -> String {
 }
 
 fn calibration_row(parameter: &ParameterSummary, with_truth: bool) -> Vec<String> {
-    let (unit, scale, decimals) = match parameter.unit {
-        "rad" => ("°", 1f64.to_degrees(), 3),
-        "m" => ("mm", MM_PER_M, 2),
-        "s" => ("ms", MS_PER_S, 3),
-        other => (other, 1.0, 6),
+    let (unit, scale, decimals) = match parameter.dimension {
+        Dimension::Angle => ("°", 1f64.to_degrees(), 3),
+        Dimension::Length => ("mm", MM_PER_M, 2),
+        Dimension::Time => ("ms", MS_PER_S, 3),
+        Dimension::Ratio => ("", 1.0, 6),
     };
     let shown = |value: f64| number(value * scale, decimals);
     let sigma = parameter.sigma.map_or_else(String::new, |sigma| format!("±{}", number(sigma * scale, decimals)));
@@ -180,15 +181,15 @@ mod tests {
 
     #[test]
     fn every_unit_is_shown_as_people_read_it() {
-        let check = |unit: &'static str, expected: [&str; 8]| {
+        let check = |dimension: Dimension, expected: [&str; 8]| {
             let name = "parameter".to_owned();
             let (truth, error, sigma) = (Some(0.5), Some(-0.25), Some(0.125));
-            let parameter = ParameterSummary { name, unit, initial: 0.0, last: 0.25, sigma, truth, error };
+            let parameter = ParameterSummary { name, dimension, initial: 0.0, last: 0.25, sigma, truth, error };
             assert_eq!(calibration_row(&parameter, true), expected);
             assert_eq!(calibration_row(&parameter, false), expected[..5]);
         };
-        check("rad", ["parameter", "°", "0.000", "14.324", "±7.162", "28.648", "−14.324", "−2.0"]);
-        check("m", ["parameter", "mm", "0.00", "250.00", "±125.00", "500.00", "−250.00", "−2.0"]);
-        check("s", ["parameter", "ms", "0.000", "250.000", "±125.000", "500.000", "−250.000", "−2.0"]);
+        check(Dimension::Angle, ["parameter", "°", "0.000", "14.324", "±7.162", "28.648", "−14.324", "−2.0"]);
+        check(Dimension::Length, ["parameter", "mm", "0.00", "250.00", "±125.00", "500.00", "−250.00", "−2.0"]);
+        check(Dimension::Time, ["parameter", "ms", "0.000", "250.000", "±125.000", "500.000", "−250.000", "−2.0"]);
     }
 }

@@ -1,26 +1,27 @@
 //! Rows of named numbers over time: calibration with sigmas, joint angles, rank, frame statistics.
 
 use super::Names;
-use crate::export::tables::parameter_name;
 use crate::flight_log::{LogError, LogWriter, MessageTimes};
+use crate::gimbal::ParameterId;
 use crate::sensors::Rig;
 use crate::session::{RunRecord, StepRecord};
 
 /// What has to be the same in all rows.
 pub(super) struct Series {
     /// Parameters of all charts that the run used, with the names of their two fields.
-    parameters: Vec<(String, String, String)>,
+    parameters: Vec<(ParameterId, String, String)>,
     joints: Vec<String>,
 }
 
 impl Series {
     pub(super) fn new(run: &RunRecord, rig: &Rig) -> Self {
-        let mut parameters: Vec<(String, String, String)> = Vec::new();
+        let names = rig.parameter_names();
+        let mut parameters: Vec<(ParameterId, String, String)> = Vec::new();
         for calibration in run.steps.iter().map(|step| &step.report.calibration) {
-            for (name, unit) in calibration.names.iter().zip(&calibration.units) {
-                if !parameters.iter().any(|(known, _, _)| known == name) {
-                    let long = parameter_name(name, rig);
-                    parameters.push((name.clone(), format!("{long}_{unit}"), format!("{long}_sigma_{unit}")));
+            for parameter in &calibration.parameters {
+                if !parameters.iter().any(|(known, _, _)| known == parameter) {
+                    let (name, unit) = (names.name(*parameter), parameter.dimension().unit());
+                    parameters.push((*parameter, format!("{name}_{unit}"), format!("{name}_sigma_{unit}")));
                 }
             }
         }
@@ -39,9 +40,9 @@ impl Series {
         let Some(newest) = step.report.newest() else { return Ok(()) };
         let calibration = &step.report.calibration;
         let mut row: Vec<(&str, f64)> = Vec::new();
-        for (name, value_field, sigma_field) in &self.parameters {
+        for (parameter, value_field, sigma_field) in &self.parameters {
             // A chart that is not in use has no value now.
-            let index = calibration.names.iter().position(|known| known == name);
+            let index = calibration.parameters.iter().position(|known| known == parameter);
             let of = |series: &[f64]| index.and_then(|index| series.get(index)).copied().unwrap_or(f64::NAN);
             row.push((value_field, of(&calibration.values)));
             row.push((sigma_field, of(&calibration.sigmas)));
@@ -82,7 +83,7 @@ impl Series {
     fn write_rank(log: &mut LogWriter, names: &Names, times: MessageTimes, step: &StepRecord) -> Result<(), LogError> {
         let Some(rank) = &step.rank else { return Ok(()) };
         let row = [
-            ("columns", rank.names.len() as f64),
+            ("columns", rank.parameters.len() as f64),
             ("rank_structural", rank.rank_structural as f64),
             ("rank_informed", rank.rank_informed as f64),
             ("deficit_parameterization", rank.deficit_parameterization as f64),

@@ -2,7 +2,10 @@ use std::f64::consts::FRAC_PI_2;
 
 use super::random::{Random, all_chains, special_chains};
 use crate::geometry::RigidTransform;
-use crate::gimbal::{Chain, ClassicalChain, DhLink, Parameterization, auto_parameterization};
+use crate::gimbal::{
+    Chain, ClassicalChain, DhLink, ParameterId, ParameterNames, ParameterPart, Parameterization, Quantity, Singularity,
+    auto_parameterization,
+};
 
 fn distance(a: &RigidTransform, b: &RigidTransform) -> f64 {
     (a.to_matrix() - b.to_matrix()).amax()
@@ -100,8 +103,7 @@ fn columns_are_as_many_as_stated() {
             let thetas = if parameterization == Parameterization::Poe { 0 } else { joints };
             for (chain, columns) in [(chain.clone(), columns), (chain.without_joint_offsets(), columns - thetas)] {
                 assert_eq!(chain.dof(), columns, "{parameterization}");
-                assert_eq!(chain.parameter_names().len(), columns);
-                assert_eq!(chain.parameter_units().len(), columns);
+                assert_eq!(chain.parameters().len(), columns);
                 assert_eq!(chain.values().len(), columns);
                 let linearization = chain.linearize(&random.angles(joints));
                 assert_eq!(linearization.by_parameters.ncols(), columns);
@@ -134,7 +136,8 @@ fn margins_show_the_locks_and_auto_avoids_them() {
         let classical = &chains.iter().find(|(other, _)| *other == name).unwrap().1;
         let minimal = Chain::from_classical(classical, Parameterization::Minimal);
         let found = minimal.margins();
-        let names: Vec<_> = found.iter().map(|(name, _)| name.as_str()).collect();
+        let names: Vec<_> =
+            found.iter().map(|(singularity, _)| ParameterNames::default().singularity(*singularity)).collect();
         assert_eq!(names, ["base", "end", "L1.alpha", "L2.alpha"], "{name}");
         for (index, margin) in margins.into_iter().chain([1.0, 1.0]).enumerate() {
             assert!((found[index].1 - margin).abs() < 1e-12, "{name}: {found:?}");
@@ -145,7 +148,7 @@ fn margins_show_the_locks_and_auto_avoids_them() {
     }
     let parallel = &chains.iter().find(|(name, _)| *name == "parallel axes").unwrap().1;
     let margins = Chain::from_classical(parallel, Parameterization::Classical).margins();
-    assert_eq!(margins[0], ("L1.alpha".to_owned(), 0.0));
+    assert_eq!(margins[0], (Singularity::ParallelAxes(0), 0.0));
     assert!(Chain::from_classical(parallel, Parameterization::Poe).margins().is_empty());
 }
 
@@ -166,9 +169,10 @@ fn auto_never_starts_near_a_lock_and_switches_late() {
     for step in 0..90 {
         let alpha = f64::from(step).to_radians();
         let mut tilted = kept.clone();
-        let names = tilted.parameter_names();
-        let mut delta = nalgebra::DVector::zeros(names.len());
-        delta[names.iter().position(|name| name == "L3.alpha").unwrap()] = alpha;
+        let parameters = tilted.parameters();
+        let mut delta = nalgebra::DVector::zeros(parameters.len());
+        let twist = ParameterId { part: ParameterPart::Link(2), quantity: Quantity::Alpha };
+        delta[parameters.iter().position(|parameter| *parameter == twist).unwrap()] = alpha;
         tilted = tilted.plus(&delta);
         if let Some(other) = tilted.should_switch() {
             assert_eq!(other, Parameterization::MinimalSwapped);

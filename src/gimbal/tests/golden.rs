@@ -6,9 +6,10 @@ use nalgebra::{DMatrix, Matrix2x3, Matrix4, Matrix6xX, SMatrix, Vector2, Vector3
 use serde_json::Value;
 
 use crate::camera::CameraModel;
-use crate::geometry::{RigidTransform, so3};
+use crate::geometry::{Dimension, RigidTransform, so3};
 use crate::gimbal::{
-    Chain, ClassicalChain, DhLink, Parameterization, generic_joint_angles, redundant_directions, stacked_jacobian,
+    Chain, ClassicalChain, DhLink, ParameterNames, Parameterization, generic_joint_angles, redundant_directions,
+    stacked_jacobian,
 };
 
 /// `tests/data/golden.json`, described in `tests/data/README.md`.
@@ -61,15 +62,21 @@ pub(crate) fn classical(values: &Value, joints: usize) -> ClassicalChain {
     }
 }
 
+/// Names of its columns, links by number.
+fn names_of(chain: &Chain) -> Vec<String> {
+    chain.parameters().into_iter().map(|parameter| ParameterNames::default().name(parameter)).collect()
+}
+
 /// The values of a chain against those of the file: by name, rigid transforms as matrices.
 pub(crate) fn check_values(chain: &Chain, values: &Value, tolerance: f64, context: &str) {
     let found = chain.values();
-    let names = chain.parameter_names();
+    let parameters = chain.parameters();
+    let names = names_of(chain);
     for (name, expected) in values.as_object().unwrap() {
         if let Some(expected) = expected.as_f64() {
             let index = names.iter().position(|other| other == name).unwrap();
             let turns = (found[index] - expected) / std::f64::consts::TAU;
-            let angle = chain.parameter_units()[index] == "rad";
+            let angle = parameters[index].dimension() == Dimension::Angle;
             let error = if angle { (turns - turns.round()) * std::f64::consts::TAU } else { found[index] - expected };
             assert!(error.abs() < tolerance, "{context} {name}: {} for {expected}", found[index]);
         } else if let Some(first) = names.iter().position(|other| *other == format!("{}.rx", &name[2..])) {
@@ -101,8 +108,9 @@ fn golden_chains() {
             let Some(form) = forms.get(name) else { continue };
             let context = format!("{id} {name}");
             let chain = Chain::from_classical(&given, parameterization);
-            assert_eq!(chain.parameter_names(), names(&form["names"]), "{context}");
-            assert_eq!(chain.parameter_units(), names(&form["units"]), "{context}");
+            assert_eq!(names_of(&chain), names(&form["names"]), "{context}");
+            let units: Vec<_> = chain.parameters().into_iter().map(|parameter| parameter.dimension().unit()).collect();
+            assert_eq!(units, names(&form["units"]), "{context}");
             let canonical = chain.canonical();
             let locked = chain.margins().iter().any(|(_, margin)| *margin < 1e-9);
             check_values(&canonical, &form["values"], 1e-11, &context);

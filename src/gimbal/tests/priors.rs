@@ -1,6 +1,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::random::{Random, all_chains, special_chains};
+use crate::geometry::Dimension;
 use crate::gimbal::{Chain, Parameterization, transport, transport_covariance};
 
 const TRANSLATION_SIGMA_M: f64 = 0.003;
@@ -37,10 +38,10 @@ fn the_prior_covers_what_the_rig_may_be_wrong_by() {
     let given = Chain::from_classical(&classical, Parameterization::Classical);
     let sigma = DVector::from_iterator(
         24,
-        given
-            .parameter_units()
-            .iter()
-            .map(|unit| if *unit == "rad" { ROTATION_SIGMA_RAD } else { TRANSLATION_SIGMA_M }),
+        given.parameters().iter().map(|parameter| match parameter.dimension() {
+            Dimension::Angle => ROTATION_SIGMA_RAD,
+            _ => TRANSLATION_SIGMA_M,
+        }),
     );
     for parameterization in [Parameterization::Classical, Parameterization::Minimal, Parameterization::Poe] {
         let chain = Chain::from_classical(&classical, parameterization);

@@ -72,7 +72,7 @@ fn a_classical_run_goes_on_as_minimal_from_where_its_rank_drops() {
     harness.run_steps(3);
     assert_eq!(harness.state().log().unwrap().cursor_ns(), step.report.stamp_ns);
     let rank = step.rank.as_ref().unwrap();
-    assert_eq!((rank.names.len(), rank.rank_structural, rank.deficit_parameterization), (24, 18, 6));
+    assert_eq!((rank.parameters.len(), rank.rank_structural, rank.deficit_parameterization), (24, 18, 6));
 
     // The fork by key and label.
     harness.key_press(Key::F);
@@ -93,12 +93,12 @@ fn a_classical_run_goes_on_as_minimal_from_where_its_rank_drops() {
     for (number, (own, other)) in fork.steps.iter().zip(&parent.steps).enumerate() {
         assert_eq!(Arc::ptr_eq(own, other), number < at, "step {number}");
         assert_eq!(
-            own.report.calibration.names.len(),
-            if number < at { other.report.calibration.names.len() } else { 18 }
+            own.report.calibration.parameters.len(),
+            if number < at { other.report.calibration.parameters.len() } else { 18 }
         );
     }
     let forked = fork.steps[at].rank.as_ref().unwrap();
-    assert_eq!((forked.names.len(), forked.rank_structural, forked.deficit_parameterization), (18, 18, 0));
+    assert_eq!((forked.parameters.len(), forked.rank_structural, forked.deficit_parameterization), (18, 18, 0));
 
     // Both lanes, by their names beside the timeline, and where the fork left its parent.
     harness.run_steps(4);

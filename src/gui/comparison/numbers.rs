@@ -9,11 +9,11 @@ use crate::session::{Command, Comparison, Parting, Quantity};
 
 /// How a quantity is shown: the factor on the stored number, and the unit.
 pub(super) fn shown(quantity: Quantity) -> (f64, &'static str) {
-    match (quantity, quantity.unit()) {
-        (Quantity::ChainTranslation, _) => (1e3, "mm"),
-        (_, "rad") => (180.0 / std::f64::consts::PI, "°"),
-        (_, "rad/s") => (180.0 / std::f64::consts::PI, "°/s"),
-        (_, unit) => (1.0, unit),
+    match quantity {
+        Quantity::ChainTranslation => (1e3, "mm"),
+        Quantity::Attitude | Quantity::JointAngles | Quantity::ChainRotation => (180.0 / std::f64::consts::PI, "°"),
+        Quantity::GyroscopeBias => (180.0 / std::f64::consts::PI, "°/s"),
+        other => (1.0, other.unit()),
     }
 }
 

@@ -142,7 +142,7 @@ impl RunScore {
             estimated: run.steps.iter().filter(tracking).count(),
             initialized_s: first.map(|step| seconds_from_ns(step.report.stamp_ns)),
             restarts: last.map_or(0, |last| last.report.restarts),
-            columns: last.map_or(0, |last| last.report.calibration.names.len()),
+            columns: last.map_or(0, |last| last.report.calibration.parameters.len()),
             informed: run.steps.iter().rev().find_map(|step| step.rank.as_ref()).map(|rank| rank.rank_informed),
         }
     }

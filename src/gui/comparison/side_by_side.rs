@@ -77,7 +77,7 @@ fn each_run(ui: &mut Ui, ctx: &mut PanelContext<'_>, mut draw: impl FnMut(&mut U
         let kin = camera_of(run) == camera_of(shown);
         let feature = ctx.selection.feature.filter(|_| kin);
         // Only the shown run's chain can be moved.
-        let slide = ctx.selection.slide.clone().filter(|_| run == shown);
+        let slide = ctx.selection.slide.filter(|_| run == shown);
         let before = Selection { feature, run, slide, ..ctx.selection.clone() };
         let mut selection = before.clone();
         let PanelContext { recording, cursor_ns, playback, theme, .. } = *ctx;

@@ -1,6 +1,7 @@
 //! The calibration over time, one step a row.
 
 use super::ConvergencePanel;
+use crate::gimbal::ParameterId;
 use crate::gui::PanelContext;
 use crate::gui::chain_values::true_values;
 use crate::gui::csv_table::{CsvTable, Table, number, seconds};
@@ -10,25 +11,27 @@ impl CsvTable for ConvergencePanel {
     fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {
         let Some(run) = ctx.selected_run() else { return String::new() };
         let truth = true_values(ctx.recording, run, ctx.cursor_ns).unwrap_or_default();
-        let mut names: Vec<(&String, &str)> = Vec::new();
+        let mut parameters: Vec<ParameterId> = Vec::new();
         for calibration in run.steps.iter().map(|step| &step.report.calibration) {
-            for (name, unit) in calibration.names.iter().zip(&calibration.units) {
-                if !names.iter().any(|(known, _)| *known == name) {
-                    names.push((name, unit));
+            for parameter in &calibration.parameters {
+                if !parameters.contains(parameter) {
+                    parameters.push(*parameter);
                 }
             }
         }
+        let names = ctx.names();
         let mut columns = vec!["t_s".to_owned()];
-        for (name, unit) in &names {
+        for parameter in &parameters {
+            let (name, unit) = (names.name(*parameter), parameter.dimension().unit());
             columns.extend(["", "_sigma", "_truth"].map(|part| format!("{name}{part}_{unit}")));
         }
         let mut table = Table::new(columns);
         for step in run.steps.iter().filter(|step| step.report.newest().is_some()) {
             let calibration = &step.report.calibration;
-            let cells = names.iter().flat_map(|(name, _)| {
-                let index = calibration.names.iter().position(|known| known == *name);
+            let cells = parameters.iter().flat_map(|parameter| {
+                let index = calibration.parameters.iter().position(|known| known == parameter);
                 let entry = |values: &[f64]| index.and_then(|index| values.get(index)).copied().unwrap_or(f64::NAN);
-                let truth = truth.get(*name).copied().unwrap_or(f64::NAN);
+                let truth = truth.get(parameter).copied().unwrap_or(f64::NAN);
                 [entry(&calibration.values), entry(&calibration.sigmas), truth].map(number)
             });
             table.row(std::iter::once(seconds(step.report.stamp_ns)).chain(cells));

@@ -3,6 +3,7 @@
 use egui::{Rect, pos2, vec2};
 
 use super::names::{ChainPart, part_of};
+use crate::gimbal::ParameterId;
 
 /// The lowest plot that can still be read, in points, its heading included.
 const LOWEST_CELL: f32 = 52.0;
@@ -26,15 +27,15 @@ pub(crate) struct Layout {
     pub(crate) height: f32,
 }
 
-/// Lays out one cell per name (sorted along the chain): a row per part of the chain when that fits, else flowing.
-pub(crate) fn lay_out(names: &[String], available: Rect) -> Layout {
-    by_part(names, available).unwrap_or_else(|| flowing(names.len(), available))
+/// Lays out one cell per parameter (sorted along the chain): a row per part of the chain when that fits, else flowing.
+pub(crate) fn lay_out(parameters: &[ParameterId], available: Rect) -> Layout {
+    by_part(parameters, available).unwrap_or_else(|| flowing(parameters.len(), available))
 }
 
-fn by_part(names: &[String], available: Rect) -> Option<Layout> {
+fn by_part(parameters: &[ParameterId], available: Rect) -> Option<Layout> {
     let mut rows: Vec<(ChainPart, usize)> = Vec::new();
-    for name in names {
-        let part = part_of(name);
+    for parameter in parameters {
+        let part = part_of(*parameter);
         match rows.last_mut() {
             Some((last, count)) if *last == part => *count += 1,
             _ => rows.push((part, 1)),
@@ -44,8 +45,12 @@ fn by_part(names: &[String], available: Rect) -> Option<Layout> {
     let width = (available.width() - HEADING_WIDTH - GAP * columns as f32) / columns as f32;
     let height = (available.height() - GAP * (rows.len() as f32 - 1.0)) / rows.len() as f32;
     // Rows by part leave holes: only worth it when plots stay well legible and few places are empty.
-    let empty = rows.len() * columns - names.len();
-    if rows.len() < 2 || width < NARROWEST_CELL * 1.15 || height < LOWEST_CELL * 1.35 || 3 * empty > names.len() + 2 {
+    let empty = rows.len() * columns - parameters.len();
+    if rows.len() < 2
+        || width < NARROWEST_CELL * 1.15
+        || height < LOWEST_CELL * 1.35
+        || 3 * empty > parameters.len() + 2
+    {
         return None;
     }
     let counts: Vec<usize> = rows.iter().map(|(_, count)| *count).collect();
@@ -112,12 +117,16 @@ fn flowing(count: usize, available: Rect) -> Layout {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gimbal::{ParameterPart, Quantity};
 
-    fn names(counts: &[(&str, usize)]) -> Vec<String> {
-        counts.iter().flat_map(|(head, count)| (0..*count).map(move |n| format!("{head}.{n}"))).collect()
+    fn parameters(counts: &[(ParameterPart, usize)]) -> Vec<ParameterId> {
+        let of = |part: ParameterPart, count| {
+            Quantity::TRANSFORM.into_iter().take(count).map(move |quantity| ParameterId { part, quantity })
+        };
+        counts.iter().flat_map(|(part, count)| of(*part, *count)).collect()
     }
 
-    fn check(names: &[String], width: f32, height: f32) -> Layout {
+    fn check(names: &[ParameterId], width: f32, height: f32) -> Layout {
         let available = Rect::from_min_size(pos2(20.0, 30.0), vec2(width, height));
         let layout = lay_out(names, available);
         assert_eq!(layout.cells.len(), names.len());
@@ -131,8 +140,10 @@ mod tests {
 
     #[test]
     fn plots_never_overlap_and_scroll_rather_than_shrink() {
-        let minimal = names(&[("I", 4), ("L1", 4), ("L2", 4), ("L3", 6)]);
-        let classical = names(&[("IB", 6), ("L1", 4), ("L2", 4), ("L3", 4), ("EC", 6)]);
+        let links = [0, 1, 2].map(ParameterPart::Link);
+        let minimal = parameters(&[(ParameterPart::Base, 4), (links[0], 4), (links[1], 4), (links[2], 6)]);
+        let (base, end) = (ParameterPart::ImuFromBase, ParameterPart::EffectorFromCamera);
+        let classical = parameters(&[(base, 6), (links[0], 4), (links[1], 4), (links[2], 4), (end, 6)]);
         assert!(!check(&minimal, 1400.0, 420.0).headings.is_empty());
         assert!(check(&minimal, 900.0, 260.0).height <= 260.5);
         assert!(check(&classical, 1000.0, 330.0).height <= 330.5);

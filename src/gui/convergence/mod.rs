@@ -14,8 +14,9 @@ use egui::{Rect, RichText, ScrollArea, Ui, vec2};
 use self::model::{CalibrationHistory, ConvertedHistory};
 pub(crate) use self::model::{Knowledge, knowledge};
 use super::PanelContext;
-use super::chain_values::{NamedValues, true_values};
+use super::chain_values::{ParameterValues, true_values};
 use super::plot::{BandCurve, Curve, StateCurve};
+use crate::gimbal::ParameterId;
 
 /// The curves of one parameter of one run.
 #[derive(Debug, Default)]
@@ -32,8 +33,8 @@ pub struct ConvergencePanel {
     histories: Vec<CalibrationHistory>,
     /// The other runs in the parameterization of the one on screen.
     converted: Vec<ConvertedHistory>,
-    /// By run and parameter name.
-    curves: BTreeMap<(usize, String), ParameterCurves>,
+    /// By run and parameter.
+    curves: BTreeMap<(usize, ParameterId), ParameterCurves>,
 }
 
 impl ConvergencePanel {
@@ -57,33 +58,33 @@ impl ConvergencePanel {
         }
         // Only what the chart in use at the cursor estimates: after a switch the old chart's names are gone.
         let row = history.row_at(ctx.cursor_ns).unwrap_or(0);
-        let mut names: Vec<String> = history
+        let mut parameters: Vec<ParameterId> = history
             .parameters
             .iter()
             .filter(|(_, parameter)| parameter.values[row].is_finite())
-            .map(|(name, _)| name.clone())
+            .map(|(parameter, _)| *parameter)
             .collect();
-        if names.is_empty() {
+        if parameters.is_empty() {
             let label = &ctx.recording.runs[shown].spec.label;
             empty_ui(ui, &format!("Run {label} estimates no calibration"));
             return;
         }
-        names.sort_by_key(|name| names::part_of(name));
+        parameters.sort_by_key(|parameter| names::part_of(*parameter));
         self.read_converted(ctx, shown);
         let truth = true_values(ctx.recording, &ctx.recording.runs[shown], ctx.cursor_ns).unwrap_or_default();
 
         let available = ui.available_rect_before_wrap();
-        let layout = layout::lay_out(&names, available);
+        let layout = layout::lay_out(&parameters, available);
         if layout.height > available.height() + 1.0 {
             ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
                 let top = ui.available_rect_before_wrap().min;
                 let narrow = Rect::from_min_size(top, vec2(available.width() - 10.0, available.height()));
-                let layout = layout::lay_out(&names, narrow);
+                let layout = layout::lay_out(&parameters, narrow);
                 ui.allocate_space(vec2(1.0, layout.height));
-                self.cells_ui(ui, ctx, shown, &names, &truth, &layout);
+                self.cells_ui(ui, ctx, shown, &parameters, &truth, &layout);
             });
         } else {
-            self.cells_ui(ui, ctx, shown, &names, &truth, &layout);
+            self.cells_ui(ui, ctx, shown, &parameters, &truth, &layout);
         }
     }
 
@@ -111,8 +112,8 @@ impl ConvergencePanel {
         ui: &Ui,
         ctx: &mut PanelContext<'_>,
         shown: usize,
-        names: &[String],
-        truth: &NamedValues,
+        parameters: &[ParameterId],
+        truth: &ParameterValues,
         layout: &layout::Layout,
     ) {
         for (part, rect) in &layout.headings {
@@ -121,10 +122,10 @@ impl ConvergencePanel {
         if let Some(rect) = layout.legend {
             paint::legend(ui, ctx, rect);
         }
-        for (name, rect) in names.iter().zip(&layout.cells) {
+        for (parameter, rect) in parameters.iter().zip(&layout.cells) {
             if ui.is_rect_visible(*rect) {
                 let told = paint::Told { histories: &self.histories, converted: &self.converted, truth, shown };
-                paint::cell_ui(ui, ctx, &told, &mut self.curves, name, *rect);
+                paint::cell_ui(ui, ctx, &told, &mut self.curves, *parameter, *rect);
             }
         }
     }

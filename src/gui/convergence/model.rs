@@ -1,10 +1,10 @@
-//! The calibration of each run over time, by parameter name.
+//! The calibration of each run over time, by parameter.
 
 use std::collections::BTreeMap;
 
 use crate::estimator::rigid_columns;
-use crate::gimbal::{NearestForm, Parameterization};
-use crate::gui::chain_values::{NamedValues, named_values, turn_towards};
+use crate::gimbal::{NearestForm, ParameterId, Parameterization};
+use crate::gui::chain_values::{ParameterValues, parameter_values, turn_towards};
 use crate::gui::follow::Follower;
 use crate::observability::RankReport;
 use crate::sensors::Rig;
@@ -44,8 +44,6 @@ impl Knowledge {
 /// One parameter over time.
 #[derive(Debug, Default)]
 pub(crate) struct ParameterHistory {
-    /// `rad` or `m`.
-    pub(crate) unit: &'static str,
     /// Value of each step; not-a-number where the chart has no such parameter.
     pub(crate) values: Vec<f64>,
     /// Value minus three standard deviations.
@@ -65,11 +63,11 @@ pub(crate) struct CalibrationHistory {
     /// Stamps of the steps.
     pub(crate) stamps_ns: Vec<i64>,
     /// The parameters in order of their first appearance.
-    pub(crate) parameters: Vec<(String, ParameterHistory)>,
+    pub(crate) parameters: Vec<(ParameterId, ParameterHistory)>,
     /// Changes when steps were forgotten.
     pub(crate) epoch: u64,
     /// The values of the last step, so that angles go on where they were.
-    last: NamedValues,
+    last: ParameterValues,
 }
 
 impl CalibrationHistory {
@@ -92,26 +90,25 @@ impl CalibrationHistory {
         let row = self.stamps_ns.len();
         self.stamps_ns.push(step.report.stamp_ns);
         let known = knowledge(step.rank.as_ref());
-        let mut values: NamedValues =
-            calibration.names.iter().cloned().zip(calibration.values.iter().copied()).collect();
+        let mut values: ParameterValues =
+            calibration.parameters.iter().copied().zip(calibration.values.iter().copied()).collect();
         turn_towards(&mut values, &self.last);
-        for (index, name) in calibration.names.iter().enumerate() {
-            let known_place = self.parameters.iter().position(|(known, _)| known == name);
+        for (index, parameter) in calibration.parameters.iter().enumerate() {
+            let known_place = self.parameters.iter().position(|(known, _)| known == parameter);
             let place = known_place.unwrap_or(self.parameters.len());
             if known_place.is_none() {
-                self.parameters.push((name.clone(), ParameterHistory::default()));
+                self.parameters.push((*parameter, ParameterHistory::default()));
             }
             let history = &mut self.parameters[place].1;
-            history.unit = calibration.units.get(index).copied().unwrap_or("");
             history.pad(row);
             let entry = |values: &[f64]| values.get(index).copied().unwrap_or(f64::NAN);
-            let (value, sigma) = (values.get(name).copied().unwrap_or(f64::NAN), entry(&calibration.sigmas));
+            let (value, sigma) = (values.get(parameter).copied().unwrap_or(f64::NAN), entry(&calibration.sigmas));
             history.values.push(value);
             history.sigmas.push(sigma);
             history.lower.push(value - 3.0 * sigma);
             history.upper.push(value + 3.0 * sigma);
             history.knowledge.push(match &known {
-                Some(known) => known.get(name.as_str()).copied().unwrap_or(Knowledge::Informed),
+                Some(known) => known.get(parameter).copied().unwrap_or(Knowledge::Informed),
                 None => Knowledge::Waiting,
             });
         }
@@ -121,9 +118,9 @@ impl CalibrationHistory {
         self.last = values;
     }
 
-    /// The parameter of a name.
-    pub(crate) fn parameter(&self, name: &str) -> Option<&ParameterHistory> {
-        self.parameters.iter().find(|(known, _)| known == name).map(|(_, history)| history)
+    /// One parameter.
+    pub(crate) fn parameter(&self, parameter: ParameterId) -> Option<&ParameterHistory> {
+        self.parameters.iter().find(|(known, _)| *known == parameter).map(|(_, history)| history)
     }
 
     /// The row at or before a time.
@@ -139,11 +136,11 @@ pub(crate) struct ConvertedHistory {
     target: Option<(Parameterization, NearestForm)>,
     /// Stamps of the steps.
     pub(crate) stamps_ns: Vec<i64>,
-    /// Values of the steps by parameter name.
-    pub(crate) values: BTreeMap<String, Vec<f64>>,
+    /// Values of the steps by parameter.
+    pub(crate) values: BTreeMap<ParameterId, Vec<f64>>,
     /// Changes when steps were forgotten; differs from every epoch of a [`CalibrationHistory`].
     pub(crate) epoch: u64,
-    last: NamedValues,
+    last: ParameterValues,
 }
 
 impl ConvertedHistory {
@@ -171,11 +168,12 @@ impl ConvertedHistory {
             let row = self.stamps_ns.len();
             self.stamps_ns.push(step.report.stamp_ns);
             let calibration = &step.report.calibration;
-            let mut values = named_values(&calibration.classical, &form);
-            values.extend(calibration.rigid_cameras.iter().flat_map(|(key, pose)| rigid_columns(key, pose)));
+            let mut values = parameter_values(&calibration.classical, &form);
+            let rigid = (1..).zip(&calibration.rigid_cameras);
+            values.extend(rigid.flat_map(|(camera, (_, pose))| rigid_columns(camera, pose)));
             turn_towards(&mut values, &self.last);
-            for (name, value) in &values {
-                let column = self.values.entry(name.clone()).or_default();
+            for (parameter, value) in &values {
+                let column = self.values.entry(*parameter).or_default();
                 column.resize(row, f64::NAN);
                 column.push(*value);
             }
@@ -201,7 +199,7 @@ impl ParameterHistory {
 }
 
 /// What a step could say about each parameter, `None` while initializing.
-pub(crate) fn knowledge(rank: Option<&RankReport>) -> Option<BTreeMap<&str, Knowledge>> {
+pub(crate) fn knowledge(rank: Option<&RankReport>) -> Option<BTreeMap<ParameterId, Knowledge>> {
     let rank = rank?;
     let share = |column: usize, structural_only: bool| -> f64 {
         let directions = rank.directions.iter().filter(|direction| direction.structural || !structural_only);
@@ -216,14 +214,20 @@ pub(crate) fn knowledge(rank: Option<&RankReport>) -> Option<BTreeMap<&str, Know
             Knowledge::Informed
         }
     };
-    let held = rank.held.iter().map(|name| (name.as_str(), Knowledge::Held));
-    Some(rank.names.iter().enumerate().map(|(column, name)| (name.as_str(), verdict(column))).chain(held).collect())
+    let held = rank.held.iter().map(|parameter| (*parameter, Knowledge::Held));
+    let columns = rank.parameters.iter().enumerate().map(|(column, parameter)| (*parameter, verdict(column)));
+    Some(columns.chain(held).collect())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gimbal::ParameterNames;
     use crate::gui::sample_recording::{FIRST_TRACKED_FRAME, sample_recording_of};
+
+    fn id(name: &str) -> ParameterId {
+        ParameterNames::default().parse(name).unwrap()
+    }
 
     #[test]
     fn columns_stay_aligned_when_names_come_and_go() {
@@ -231,15 +235,15 @@ mod tests {
         let run = &mut recording.runs[0];
         for step in &mut run.steps[55..] {
             let step = std::sync::Arc::make_mut(step);
-            step.report.calibration.names[0] = "L3.gamma".to_owned();
+            step.report.calibration.parameters[0] = id("EC.rx");
         }
         let mut history = CalibrationHistory::default();
         history.read(run);
         assert_eq!(history.parameters.len(), 19);
         assert!(history.parameters.iter().all(|(_, parameter)| parameter.values.len() == 60));
-        let renamed = history.parameter("L3.gamma").unwrap();
+        let renamed = history.parameter(id("EC.rx")).unwrap();
         assert!(renamed.values[54].is_nan() && renamed.values[55].is_finite());
-        assert!(history.parameter("I.rx").unwrap().values[59].is_nan());
+        assert!(history.parameter(id("I.rx")).unwrap().values[59].is_nan());
         assert_eq!(history.row_at(-1), None);
     }
 
@@ -252,12 +256,12 @@ mod tests {
         own.read(&recording.runs[0]);
         for (name, parameter) in &own.parameters {
             let (theirs, ours) = (converted.values[name].last().unwrap(), parameter.values.last().unwrap());
-            assert!((theirs - ours).abs() < 0.02, "{name}: {theirs} and {ours}");
+            assert!((theirs - ours).abs() < 0.02, "{name:?}: {theirs} and {ours}");
         }
         let epoch = converted.epoch;
         converted.read(&recording.runs[1], &recording.rig, Parameterization::Classical);
         assert_ne!(converted.epoch, epoch);
-        assert!(converted.values.contains_key("IB.rz"));
+        assert!(converted.values.contains_key(&id("IB.rz")));
     }
 
     #[test]

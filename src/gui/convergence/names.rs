@@ -1,5 +1,6 @@
-//! Parameter names: their order along the chain and what they mean.
+//! Parameters: their order along the chain and what they mean.
 
+use crate::gimbal::{ParameterId, ParameterPart, Quantity};
 use crate::sensors::Rig;
 
 /// Where a parameter belongs.
@@ -15,16 +16,13 @@ pub(crate) enum ChainPart {
     Rigid,
 }
 
-/// The part of the chain that a parameter's name (`I.rx`, `L2.alpha`, `EC.tz`) speaks of.
-pub(crate) fn part_of(name: &str) -> ChainPart {
-    let head = name.split('.').next().unwrap_or(name);
-    match head {
-        "I" | "IB" => ChainPart::Base,
-        _ if head.starts_with("cam") => ChainPart::Rigid,
-        _ => match head.strip_prefix('L').and_then(|number| number.parse().ok()) {
-            Some(number) => ChainPart::Link(number),
-            None => ChainPart::End,
-        },
+/// The part of the chain that a parameter belongs to.
+pub(crate) fn part_of(parameter: ParameterId) -> ChainPart {
+    match parameter.part {
+        ParameterPart::ImuFromBase | ParameterPart::Base => ChainPart::Base,
+        ParameterPart::Link(link) => ChainPart::Link(usize::from(link) + 1),
+        part if part.camera() > 0 => ChainPart::Rigid,
+        _ => ChainPart::End,
     }
 }
 
@@ -44,25 +42,24 @@ fn joint_name(number: usize, rig: &Rig) -> Option<&str> {
 }
 
 /// What a parameter means, in words.
-pub(crate) fn meaning_of(name: &str, rig: &Rig) -> String {
-    let (head, tail) = name.split_once('.').unwrap_or((name, ""));
-    let part = part_of(name);
-    let kind = match (part, tail) {
-        (ChainPart::Link(_), "theta") => "constant added to the encoder's angle",
-        (ChainPart::Link(_), "d") => "shift along the joint's axis",
-        (ChainPart::Link(_), "a") => "shift along the link",
-        (ChainPart::Link(_), "alpha") => "twist about the link, towards the next axis",
-        (_, "beta") => "turn about the camera's y axis at the end of the chain",
-        (_, "y") => "shift along the camera's y axis at the end of the chain",
-        (_, "rx") => "rotation about x",
-        (_, "ry") => "rotation about y",
-        (_, "rz") => "rotation about z",
-        (_, "tx") => "translation along x",
-        (_, "ty") => "translation along y",
-        (_, "tz") => "translation along z",
-        (_, "wx" | "wy" | "wz") => "small rotation of the chart-free form",
-        (_, "vx" | "vy" | "vz") => "small translation of the chart-free form",
-        _ => "calibration parameter",
+pub(crate) fn meaning_of(parameter: ParameterId, rig: &Rig) -> String {
+    let part = part_of(parameter);
+    let kind = match parameter.quantity {
+        Quantity::Theta => "constant added to the encoder's angle",
+        Quantity::D => "shift along the joint's axis",
+        Quantity::A => "shift along the link",
+        Quantity::Alpha => "twist about the link, towards the next axis",
+        Quantity::Beta => "turn about the camera's y axis at the end of the chain",
+        Quantity::Y => "shift along the camera's y axis at the end of the chain",
+        Quantity::Rx => "rotation about x",
+        Quantity::Ry => "rotation about y",
+        Quantity::Rz => "rotation about z",
+        Quantity::Tx => "translation along x",
+        Quantity::Ty => "translation along y",
+        Quantity::Tz => "translation along z",
+        Quantity::Wx | Quantity::Wy => "small rotation of the chart-free form",
+        Quantity::Vx | Quantity::Vy => "small translation of the chart-free form",
+        Quantity::Timeshift => "calibration parameter",
     };
     let place = match part {
         ChainPart::Base => "IMU to gimbal base".to_owned(),
@@ -70,9 +67,9 @@ pub(crate) fn meaning_of(name: &str, rig: &Rig) -> String {
             Some(joint) => format!("link {number}, joint {joint}"),
             None => format!("link {number}"),
         },
-        ChainPart::End if head == "EC" => "effector to camera".to_owned(),
+        ChainPart::End if parameter.part == ParameterPart::EffectorFromCamera => "effector to camera".to_owned(),
         ChainPart::End => "end of the chain".to_owned(),
-        ChainPart::Rigid => format!("IMU to the rigid {head}"),
+        ChainPart::Rigid => format!("IMU to the rigid {}", rig.parameter_names().part(parameter.part)),
     };
     format!("{kind} ({place})")
 }
@@ -80,21 +77,29 @@ pub(crate) fn meaning_of(name: &str, rig: &Rig) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gimbal::ParameterNames;
     use crate::gui::sample_recording::sample_recording_of;
+
+    fn id(name: &str) -> ParameterId {
+        ParameterNames::default().parse(name).unwrap()
+    }
 
     #[test]
     fn names_sort_along_the_chain() {
         let mut names = ["EC.rx", "L2.a", "L10.d", "IB.tx", "L3.beta"];
-        names.sort_by_key(|name| part_of(name));
+        names.sort_by_key(|name| part_of(id(name)));
         assert_eq!(names, ["IB.tx", "L2.a", "L3.beta", "L10.d", "EC.rx"]);
     }
 
     #[test]
     fn meanings_name_the_joint() {
         let rig = sample_recording_of(1, &["auto"]).rig;
-        assert_eq!(meaning_of("L2.alpha", &rig), "twist about the link, towards the next axis (link 2, joint roll)");
-        assert_eq!(meaning_of("L7.d", &rig), "shift along the joint's axis (link 7)");
-        assert_eq!(heading_of(part_of("I.rx"), &rig), "base");
-        assert_eq!(meaning_of("odd", &rig), "calibration parameter (end of the chain)");
+        assert_eq!(
+            meaning_of(id("L2.alpha"), &rig),
+            "twist about the link, towards the next axis (link 2, joint roll)"
+        );
+        assert_eq!(meaning_of(id("L7.d"), &rig), "shift along the joint's axis (link 7)");
+        assert_eq!(heading_of(part_of(id("I.rx")), &rig), "base");
+        assert_eq!(meaning_of(id("timeshift"), &rig), "calibration parameter (end of the chain)");
     }
 }

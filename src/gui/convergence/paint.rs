@@ -8,8 +8,9 @@ use super::ParameterCurves;
 use super::model::{CalibrationHistory, ConvertedHistory, Knowledge};
 use super::names::{ChainPart, heading_of, meaning_of};
 use super::range::{paint_outside, value_range};
+use crate::gimbal::ParameterId;
 use crate::gui::PanelContext;
-use crate::gui::chain_values::NamedValues;
+use crate::gui::chain_values::ParameterValues;
 use crate::gui::plot::{
     Clicks, PlotArea, navigate, paint_band, paint_cursor, paint_curve, paint_ground, paint_hatch, paint_line,
     paint_value_grid, visible_range,
@@ -86,21 +87,21 @@ pub(super) struct Told<'a> {
     /// The runs that have another parameterization than the shown one, told in that.
     pub(super) converted: &'a [ConvertedHistory],
     /// True values in the shown run's parameterization.
-    pub(super) truth: &'a NamedValues,
+    pub(super) truth: &'a ParameterValues,
     /// The run on screen.
     pub(super) shown: usize,
 }
 
 impl<'a> Told<'a> {
     /// Epoch, stamps and values of a run's parameter.
-    fn values(&self, run: usize, name: &str) -> Option<(u64, &'a [i64], &'a [f64])> {
+    fn values(&self, run: usize, parameter: ParameterId) -> Option<(u64, &'a [i64], &'a [f64])> {
         let converted = self.converted.get(run).filter(|converted| !converted.stamps_ns.is_empty());
         if let Some(converted) = converted {
-            let values = converted.values.get(name)?;
+            let values = converted.values.get(&parameter)?;
             return Some((converted.epoch, &converted.stamps_ns, values));
         }
         let history = self.histories.get(run)?;
-        Some((history.epoch, &history.stamps_ns, &history.parameter(name)?.values))
+        Some((history.epoch, &history.stamps_ns, &history.parameter(parameter)?.values))
     }
 
     /// What the other runs say at the cursor, and whether the axis reaches that far.
@@ -108,12 +109,12 @@ impl<'a> Told<'a> {
         &self,
         ctx: &PanelContext<'_>,
         runs: &[usize],
-        name: &str,
+        parameter: ParameterId,
         shown: Shown,
         area: &PlotArea,
     ) -> Vec<String> {
         let line = |run: usize| {
-            let (_, stamps_ns, values) = self.values(run, name)?;
+            let (_, stamps_ns, values) = self.values(run, parameter)?;
             let row = stamps_ns.partition_point(|stamp_ns| *stamp_ns <= ctx.cursor_ns).checked_sub(1)?;
             let value = values.get(row).copied().filter(|value| value.is_finite())?;
             let outside = if (area.low..=area.high).contains(&value) { "" } else { ", outside this axis" };
@@ -129,23 +130,24 @@ pub(super) fn cell_ui(
     ui: &Ui,
     ctx: &mut PanelContext<'_>,
     told: &Told<'_>,
-    curves: &mut BTreeMap<(usize, String), ParameterCurves>,
-    name: &str,
+    curves: &mut BTreeMap<(usize, ParameterId), ParameterCurves>,
+    id: ParameterId,
     rect: Rect,
 ) {
     let shown_run = told.shown;
     let Some(history) = told.histories.get(shown_run) else { return };
-    let Some(parameter) = history.parameter(name) else { return };
-    let shown = Shown::of(parameter.unit);
+    let Some(parameter) = history.parameter(id) else { return };
+    let shown = Shown::of(id.dimension());
+    let name = &ctx.names().name(id);
     let theme = *ctx.theme;
     let (begin_ns, end_ns) = visible_range(ctx);
     let plot = Rect::from_min_max(pos2(rect.left(), rect.top() + TITLE_HEIGHT), rect.max);
     let mut area = PlotArea { rect: plot, begin_ns, end_ns, low: 0.0, high: 1.0 };
 
-    let overlaid: Vec<usize> = (0..told.histories.len()).filter(|run| told.values(*run, name).is_some()).collect();
+    let overlaid: Vec<usize> = (0..told.histories.len()).filter(|run| told.values(*run, id).is_some()).collect();
     for run in &overlaid {
-        let Some((epoch, stamps_ns, values)) = told.values(*run, name) else { continue };
-        let curves = curves.entry((*run, name.to_owned())).or_default();
+        let Some((epoch, stamps_ns, values)) = told.values(*run, id) else { continue };
+        let curves = curves.entry((*run, id)).or_default();
         curves.value.update(&area, epoch, stamps_ns, values);
         if *run == shown_run {
             curves.band.update(&area, epoch, stamps_ns, &parameter.lower, &parameter.upper);
@@ -154,8 +156,8 @@ pub(super) fn cell_ui(
             }
         }
     }
-    let curve_of = |run: usize| curves.get(&(run, name.to_owned()));
-    let truth = told.truth.get(name).copied();
+    let curve_of = |run: usize| curves.get(&(run, id));
+    let truth = told.truth.get(&id).copied();
     let extent_of = |run: usize| curve_of(run)?.value.extent;
     let others = overlaid.iter().filter(|run| **run != shown_run).filter_map(|run| extent_of(*run));
     let (low, high) = value_range(extent_of(shown_run), truth, others, parameter);
@@ -190,7 +192,7 @@ pub(super) fn cell_ui(
     }
     paint_cursor(&inner, &theme, &area, ctx.cursor_ns);
 
-    let selected = ctx.selection.parameter.as_deref() == Some(name);
+    let selected = ctx.selection.parameter == Some(id);
     let border = if selected { Stroke::new(2.0, theme.accent) } else { Stroke::new(1.0, theme.outline) };
     painter.rect_stroke(plot, 0.0, border, StrokeKind::Inside);
 
@@ -218,15 +220,15 @@ pub(super) fn cell_ui(
         text.push_str(&error_text(shown, error, sigma));
     }
     let label = format!("{name} {text} {}", state.tag());
-    let id = ui.unique_id().with(("parameter", name));
-    let response = navigate(ui, ctx, &area, id, label.trim_end(), Clicks::Select, false);
+    let widget = ui.unique_id().with(("parameter", name));
+    let response = navigate(ui, ctx, &area, widget, label.trim_end(), Clicks::Select, false);
     if response.clicked() {
-        ctx.selection.parameter = if selected { None } else { Some(name.to_owned()) };
+        ctx.selection.parameter = if selected { None } else { Some(id) };
     }
-    let meaning = meaning_of(name, &ctx.recording.rig);
+    let meaning = meaning_of(id, &ctx.recording.rig);
     response.on_hover_ui_at_pointer(|ui| {
         let mut lines = vec![format!("{name}: {meaning}"), text];
-        lines.extend(told.others_lines(ctx, &overlaid, name, shown, &area));
+        lines.extend(told.others_lines(ctx, &overlaid, id, shown, &area));
         ui.label(lines.join("\n"));
     });
 }

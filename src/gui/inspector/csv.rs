@@ -37,9 +37,10 @@ impl CsvTable for InspectorPanel {
             }
         }
         let calibration = &step.report.calibration;
-        for (index, name) in calibration.names.iter().enumerate() {
-            let unit = calibration.units.get(index).copied().unwrap_or_default();
-            say(name, unit, calibration.values.get(index).copied().unwrap_or(f64::NAN));
+        let names = ctx.names();
+        for (index, parameter) in calibration.parameters.iter().enumerate() {
+            let (name, unit) = (names.name(*parameter), parameter.dimension().unit());
+            say(&name, unit, calibration.values.get(index).copied().unwrap_or(f64::NAN));
             say(&format!("{name} sigma"), unit, calibration.sigmas.get(index).copied().unwrap_or(f64::NAN));
         }
         table.into_text()

@@ -7,6 +7,7 @@ use egui::{RichText, Ui};
 use super::table_ui;
 use crate::estimator::{JacobianFactor, StepJacobian};
 use crate::frontend::FeatureId;
+use crate::gimbal::ParameterId;
 use crate::gui::PanelContext;
 use crate::gui::jacobian::cameras;
 use crate::gui::units::{Shown, figure, fixed};
@@ -37,10 +38,12 @@ impl Links {
         ctx: &mut PanelContext<'_>,
         run: &RunRecord,
         step: &Arc<StepRecord>,
-        name: &str,
+        parameter: ParameterId,
     ) {
         let Some(jacobian) = self.jacobian(ctx, run, step) else { return };
-        let Some(column) = jacobian.columns.iter().position(|block| block.name == name) else { return };
+        let Some(column) = jacobian.columns.iter().position(|block| block.id.parameter() == Some(parameter)) else {
+            return;
+        };
         let mut links: Vec<(FeatureId, f32)> = Vec::new();
         for row in &jacobian.rows {
             let norm = row.norms.iter().find(|(known, _)| usize::from(*known) == column);
@@ -67,23 +70,21 @@ impl Links {
         step: &Arc<StepRecord>,
         id: FeatureId,
     ) {
-        let parameters = step.report.calibration.names.len();
         let Some(jacobian) = self.jacobian(ctx, run, step) else { return };
         let Some(row) = jacobian.rows.iter().find(|row| row.factor == JacobianFactor::Feature(id)) else { return };
-        let mut links: Vec<(String, f32)> = Vec::new();
+        let mut links: Vec<(ParameterId, f32)> = Vec::new();
         for (column, norm) in &row.norms {
-            let column = usize::from(*column);
-            if column < parameters {
-                links.push((jacobian.columns[column].name.clone(), *norm));
+            if let Some(parameter) = jacobian.columns[usize::from(*column)].id.parameter() {
+                links.push((parameter, *norm));
             }
         }
         links.sort_by(|a, b| b.1.total_cmp(&a.1));
-        let selected = ctx.selection.parameter.clone();
-        let names = links.iter().take(SHOWN);
-        let names = names.map(|(name, norm)| (name.clone(), *norm, selected.as_ref() == Some(name)));
-        if let Some(index) = links_ui(ui, ctx, "parameters that they follow most", names) {
-            let name = links.swap_remove(index).0;
-            ctx.selection.parameter = (selected.as_ref() != Some(&name)).then_some(name);
+        let (selected, names) = (ctx.selection.parameter, ctx.names());
+        let shown = links.iter().take(SHOWN);
+        let shown = shown.map(|(parameter, norm)| (names.name(*parameter), *norm, selected == Some(*parameter)));
+        if let Some(index) = links_ui(ui, ctx, "parameters that they follow most", shown) {
+            let parameter = links[index].0;
+            ctx.selection.parameter = (selected != Some(parameter)).then_some(parameter);
         }
     }
 }
@@ -116,17 +117,17 @@ pub(super) fn block_ui(
     run: &RunRecord,
     step: &StepRecord,
     id: FeatureId,
-    name: &str,
+    parameter: ParameterId,
 ) {
     let report = &step.report;
     let cameras = cameras(&ctx.recording.rig, run, step);
-    let column = report.calibration.names.iter().position(|known| known == name);
+    let column = report.calibration.parameters.iter().position(|known| *known == parameter);
     let feature = report.features.iter().find(|feature| feature.id == id);
     let (Some(column), Some(feature), Some(rows)) = (column, feature, report.feature_rows(&cameras, id)) else {
         ui.label(RichText::new("No such block in this step").color(ctx.theme.text_weak));
         return;
     };
-    let shown = Shown::of(report.calibration.units.get(column).copied().unwrap_or_default());
+    let shown = Shown::of(parameter.dimension());
     let unit = shown.unit.trim();
     let heads = ["frame", "residual u", "residual v", "χ²", &format!("∂u px/{unit}"), &format!("∂v px/{unit}")]
         .map(str::to_owned);

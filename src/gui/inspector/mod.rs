@@ -46,11 +46,11 @@ impl InspectorPanel {
                 (ctx.selection.parameter, ctx.selection.feature) = (None, None);
             }
         }
-        if let Some(name) = ctx.selection.parameter.clone() {
-            let title = format!("Parameter {name}");
+        if let Some(parameter) = ctx.selection.parameter {
+            let title = format!("Parameter {}", ctx.names().name(parameter));
             section_ui(ui, ctx.theme, &title, |ui| {
-                parameter::ui(ui, ctx, run, step, &name);
-                self.links.of_parameter_ui(ui, ctx, run, step, &name);
+                parameter::ui(ui, ctx, run, step, parameter);
+                self.links.of_parameter_ui(ui, ctx, run, step, parameter);
             });
         }
         if let Some(id) = ctx.selection.feature {
@@ -59,9 +59,9 @@ impl InspectorPanel {
                 self.links.of_feature_ui(ui, ctx, run, step, id);
             });
         }
-        if let (Some(id), Some(name)) = (ctx.selection.feature, ctx.selection.parameter.clone()) {
-            let title = format!("Block feature {} by {name}", id.0);
-            section_ui(ui, ctx.theme, &title, |ui| links::block_ui(ui, ctx, run, step, id, &name));
+        if let (Some(id), Some(parameter)) = (ctx.selection.feature, ctx.selection.parameter) {
+            let title = format!("Block feature {} by {}", id.0, ctx.names().name(parameter));
+            section_ui(ui, ctx.theme, &title, |ui| links::block_ui(ui, ctx, run, step, id, parameter));
         }
         let title = format!("Frame {}", step.report.frame_index);
         section_ui(ui, ctx.theme, &title, |ui| step::frame_ui(ui, ctx, run, step));

@@ -3,6 +3,7 @@
 use egui::{RichText, Ui};
 
 use super::rows_ui;
+use crate::gimbal::ParameterId;
 use crate::gui::PanelContext;
 use crate::gui::chain_values::true_values;
 use crate::gui::convergence::names::meaning_of;
@@ -10,17 +11,17 @@ use crate::gui::convergence::{Knowledge, knowledge};
 use crate::gui::units::{Shown, fixed};
 use crate::session::{RunRecord, StepRecord};
 
-pub(super) fn ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, step: &StepRecord, name: &str) {
+pub(super) fn ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, step: &StepRecord, parameter: ParameterId) {
     let theme = ctx.theme;
-    ui.add(egui::Label::new(RichText::new(meaning_of(name, &ctx.recording.rig)).color(theme.text)).wrap());
+    ui.add(egui::Label::new(RichText::new(meaning_of(parameter, &ctx.recording.rig)).color(theme.text)).wrap());
     let calibration = &step.report.calibration;
-    let Some(index) = calibration.names.iter().position(|known| known == name) else {
+    let Some(index) = calibration.parameters.iter().position(|known| *known == parameter) else {
         let text = format!("Run {} has no such parameter here", run.spec.label);
         ui.label(RichText::new(text).color(theme.text_weak));
         return;
     };
     let entry = |values: &[f64]| values.get(index).copied().unwrap_or(f64::NAN);
-    let shown = Shown::of(calibration.units.get(index).copied().unwrap_or(""));
+    let shown = Shown::of(parameter.dimension());
     let (value, sigma, prior) =
         (entry(&calibration.values), entry(&calibration.sigmas), entry(&calibration.prior_sigmas));
     let mut rows = vec![
@@ -30,19 +31,20 @@ pub(super) fn ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, step: &St
         ("σ / prior σ".to_owned(), vec![fixed(sigma / prior, 3)]),
     ];
     let begin = run.steps.first().map(|first| &first.report.calibration);
-    let begin = begin.and_then(|first| first.values.get(first.names.iter().position(|known| known == name)?));
+    let begin =
+        begin.and_then(|first| first.values.get(first.parameters.iter().position(|known| *known == parameter)?));
     if let Some(begin) = begin {
         rows.push(("at the start".to_owned(), vec![shown.value(*begin, sigma)]));
         rows.push(("moved by".to_owned(), vec![shown.value(value - begin, sigma)]));
     }
-    let truth = true_values(ctx.recording, run, ctx.cursor_ns).and_then(|truth| truth.get(name).copied());
+    let truth = true_values(ctx.recording, run, ctx.cursor_ns).and_then(|truth| truth.get(&parameter).copied());
     if let Some(truth) = truth {
         rows.push(("truth".to_owned(), vec![shown.value(truth, sigma)]));
         let times = fixed((value - truth).abs() / sigma, 1);
         rows.push(("error".to_owned(), vec![format!("{} ({times}σ)", shown.value(value - truth, sigma))]));
     }
     let state = knowledge(step.rank.as_ref())
-        .map_or(Knowledge::Waiting, |known| known.get(name).copied().unwrap_or(Knowledge::Informed));
+        .map_or(Knowledge::Waiting, |known| known.get(&parameter).copied().unwrap_or(Knowledge::Informed));
     let state = if state == Knowledge::Informed { "informed" } else { state.tag() };
     rows.push(("in this window".to_owned(), vec![state.to_owned()]));
     rows_ui(ui, theme, "parameter", &rows);

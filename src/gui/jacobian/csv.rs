@@ -1,7 +1,7 @@
 //! The norms of the Jacobian's blocks, one factor a row.
 
 use super::JacobianPanel;
-use super::{cameras, name_of};
+use super::{cameras, column_name, name_of};
 use crate::gui::PanelContext;
 use crate::gui::csv_table::{CsvTable, Table};
 
@@ -12,8 +12,9 @@ impl CsvTable for JacobianPanel {
         let Some(step) = run.step_at(ctx.cursor_ns) else { return String::new() };
         let cameras = cameras(&ctx.recording.rig, run, step);
         let Some(jacobian) = step.report.jacobian(&cameras) else { return String::new() };
+        let names = ctx.names();
         let heads = ["residuals", "rows"].map(str::to_owned).into_iter();
-        let mut table = Table::new(heads.chain(jacobian.columns.iter().map(|block| block.name.clone())));
+        let mut table = Table::new(heads.chain(jacobian.columns.iter().map(|block| column_name(block.id, &names))));
         for row in &jacobian.rows {
             let norm = |column: usize| row.norms.iter().find(|(known, _)| usize::from(*known) == column);
             let cells =

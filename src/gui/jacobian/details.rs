@@ -4,23 +4,23 @@ use egui::{Grid, Label, RichText, ScrollArea, Ui, vec2};
 
 use super::factors::FactorsUi;
 use super::model::{JacobianModel, cameras, name_of, scale_words};
-use crate::estimator::{ColumnBlock, ColumnGroup, FeatureRows, JacobianFactor};
+use crate::estimator::{ColumnBlock, ColumnId, FeatureRows, FrameId, JacobianFactor};
 use crate::frontend::FeatureId;
+use crate::geometry::Dimension;
 use crate::gui::PanelContext;
 use crate::gui::units::{Shown, figure, fixed};
 use crate::session::{RunRecord, StepRecord};
 
 /// A block in one line: what it is, its size and its norm.
-pub(super) fn headline(step: &StepRecord, model: &JacobianModel, row: usize, column: usize) -> String {
+pub(super) fn headline(model: &JacobianModel, row: usize, column: usize) -> String {
     let (of_row, block) = (&model.jacobian.rows[row], &model.jacobian.columns[column]);
-    let unit = step.report.calibration.units.get(column).copied().unwrap_or_default();
     let norm = model.norm(row, column);
     let size = format!("{} × {}", of_row.height, block.len);
-    let name = format!("{} by {}", name_of(&of_row.factor), block.name);
+    let name = format!("{} by {}", name_of(&of_row.factor), model.columns.strips[column].name);
     if norm == 0.0 {
         return format!("{name}: zero ({size})");
     }
-    format!("{name}: {} {} ({size})", figure(f64::from(norm)), scale_words(block.group, unit))
+    format!("{name}: {} {} ({size})", figure(f64::from(norm)), scale_words(block.id))
 }
 
 /// What is known of the picked row, column or block.
@@ -37,7 +37,7 @@ pub(super) fn ui(
         ui.spacing_mut().item_spacing = vec2(6.0, 2.0);
         match picked {
             (Some(row), Some(column)) => block_ui(ui, ctx, run, step, model, (row, column), factors),
-            (Some(row), None) => line_ui(ui, ctx, &strongest_columns(step, model, row)),
+            (Some(row), None) => line_ui(ui, ctx, &strongest_columns(model, row)),
             (None, Some(column)) => line_ui(ui, ctx, &strongest_rows(model, column)),
             (None, None) => {}
         }
@@ -49,20 +49,19 @@ fn line_ui(ui: &mut Ui, ctx: &PanelContext<'_>, text: &str) {
 }
 
 /// The parameters that a row speaks of most.
-fn strongest_columns(step: &StepRecord, model: &JacobianModel, row: usize) -> String {
+fn strongest_columns(model: &JacobianModel, row: usize) -> String {
     const SHOWN: usize = 4;
     let of_row = &model.jacobian.rows[row];
     let mut norms: Vec<(usize, f32)> = of_row
         .norms
         .iter()
         .map(|(column, norm)| (usize::from(*column), *norm))
-        .filter(|(column, _)| model.jacobian.columns[*column].group == ColumnGroup::Calibration)
+        .filter(|(column, _)| model.jacobian.columns[*column].id.parameter().is_some())
         .collect();
     norms.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let units = &step.report.calibration.units;
     let shown = norms.iter().take(SHOWN).map(|(column, norm)| {
-        let words = scale_words(ColumnGroup::Calibration, units.get(*column).copied().unwrap_or_default());
-        format!("{} {} {words}", model.jacobian.columns[*column].name, figure(f64::from(*norm)))
+        let words = scale_words(model.jacobian.columns[*column].id);
+        format!("{} {} {words}", model.columns.strips[*column].name, figure(f64::from(*norm)))
     });
     let shown = shown.collect::<Vec<_>>().join(", ");
     let name = name_of(&of_row.factor);
@@ -81,7 +80,7 @@ fn strongest_rows(model: &JacobianModel, column: usize) -> String {
     let shown = shown
         .map(|(row, norm)| format!("{} ({})", name_of(&model.jacobian.rows[*row].factor), figure(f64::from(*norm))));
     let shown = shown.collect::<Vec<_>>().join(", ");
-    format!("{}: in {count} rows of blocks, strongest: {shown}", model.jacobian.columns[column].name)
+    format!("{}: in {count} rows of blocks, strongest: {shown}", model.columns.strips[column].name)
 }
 
 fn block_ui(
@@ -93,7 +92,7 @@ fn block_ui(
     (row, column): (usize, usize),
     factors: &FactorsUi,
 ) {
-    line_ui(ui, ctx, &headline(step, model, row, column));
+    line_ui(ui, ctx, &headline(model, row, column));
     match model.jacobian.rows[row].factor {
         JacobianFactor::Feature(id) => {
             let cameras = cameras(&ctx.recording.rig, run, step);
@@ -102,13 +101,7 @@ fn block_ui(
             }
         }
         factor => {
-            let kind = match factor {
-                JacobianFactor::Inertial { .. } => "imu",
-                JacobianFactor::Encoder(_) => "encoder",
-                JacobianFactor::Standstill => "standstill",
-                JacobianFactor::CalibrationPrior => "calibration prior",
-                _ => "marginalization prior",
-            };
+            let kind = factor.kind();
             if let Some(summary) = step.report.residuals.iter().find(|summary| summary.factor == kind) {
                 let (before, after) = (figure(summary.chi2_before), figure(summary.chi2_after));
                 let text =
@@ -136,8 +129,7 @@ fn sightings_ui(
 ) {
     let block = &model.jacobian.columns[column];
     let Some(feature) = step.report.features.iter().find(|feature| feature.id == id) else { return };
-    let unit = step.report.calibration.units.get(column).copied().unwrap_or_default();
-    let parts = parts_of(block, unit);
+    let parts = parts_of(block);
     let mut heads = ["frame", "u px", "v px", "residual u", "residual v", "weight"].map(str::to_owned).to_vec();
     heads.extend(parts.iter().flat_map(|(name, _)| [format!("∂u{name}"), format!("∂v{name}")]));
     let lines = rows.frame_indices.iter().enumerate().filter_map(|(place, frame)| {
@@ -164,13 +156,13 @@ fn readings_ui(
     ctx: &PanelContext<'_>,
     step: &StepRecord,
     model: &JacobianModel,
-    frame: usize,
+    frame: FrameId,
     column: usize,
 ) {
     let block = &model.jacobian.columns[column];
-    let Some(frame) = step.report.window.iter().find(|state| state.frame_index == frame) else { return };
+    let Some(frame) = step.report.window.iter().find(|state| state.frame_index == frame.0) else { return };
     let (Some(readings), Some(sigmas)) = (&frame.encoder_angles_rad, &frame.encoder_sigmas_rad) else { return };
-    let own = block.group == ColumnGroup::Joints && block.name.ends_with(&format!(" {}", frame.frame_index));
+    let own = block.id == ColumnId::Joints(FrameId(frame.frame_index));
     let lines = readings.iter().zip(sigmas).zip(&frame.joint_angles_rad).enumerate();
     let lines = lines.map(|(joint, ((reading, sigma), angle))| {
         let slope =
@@ -209,19 +201,19 @@ pub(super) fn numbers_ui(
 }
 
 /// The columns of a block: how they are shown, and how many shown units one stored unit is.
-fn parts_of(block: &ColumnBlock, unit: &str) -> Vec<(String, f64)> {
-    let shown = |name: &str, unit: &str| {
-        let shown = Shown::of(unit);
+fn parts_of(block: &ColumnBlock) -> Vec<(String, f64)> {
+    let shown = |name: &str, dimension: Dimension| {
+        let shown = Shown::of(dimension);
         (format!("{name}, px/{}", shown.unit.trim()), shown.factor)
     };
-    match block.group {
-        ColumnGroup::Calibration => vec![shown("", unit)],
-        ColumnGroup::Joints => (1..=block.len).map(|joint| shown(&format!(" q{joint}"), "rad")).collect(),
-        ColumnGroup::Pose => {
-            let parts = [" rx", " ry", " rz"].map(|part| shown(part, "rad")).into_iter();
-            parts.chain([" tx", " ty", " tz"].map(|part| shown(part, "m"))).collect()
+    match block.id {
+        ColumnId::Calibration(parameter) => vec![shown("", parameter.dimension())],
+        ColumnId::Joints(_) => (1..=block.len).map(|joint| shown(&format!(" q{joint}"), Dimension::Angle)).collect(),
+        ColumnId::Pose(_) => {
+            let parts = [" rx", " ry", " rz"].map(|part| shown(part, Dimension::Angle)).into_iter();
+            parts.chain([" tx", " ty", " tz"].map(|part| shown(part, Dimension::Length))).collect()
         }
-        ColumnGroup::SpeedBias => Vec::new(),
-        ColumnGroup::InverseDepth => vec![(", px·m".to_owned(), 1.0)],
+        ColumnId::VelocityBias(_) => Vec::new(),
+        ColumnId::InverseDepth => vec![(", px·m".to_owned(), 1.0)],
     }
 }

@@ -7,7 +7,8 @@ use egui::{RichText, Ui};
 
 use super::details::numbers_ui;
 use super::model::JacobianModel;
-use crate::estimator::{ColumnBlock, ColumnGroup, FactorRows, JacobianFactor};
+use crate::estimator::{ColumnBlock, ColumnId, FactorRows, JacobianFactor};
+use crate::geometry::Dimension;
 use crate::gui::PanelContext;
 use crate::gui::step_work::{REPAINT, StepWork};
 use crate::gui::units::{Shown, figure, fixed};
@@ -71,8 +72,7 @@ impl FactorsUi {
         if block.start + block.len > residuals {
             return;
         }
-        let unit = step.report.calibration.units.get(column).copied().unwrap_or_default();
-        let parts = parts_of(block, unit);
+        let parts = parts_of(block);
         let own = rows.columns(block.start, block.len);
         let mut order: Vec<usize> = (0..rows.nrows()).filter(|row| own.row(*row).amax() > 0.0).collect();
         let count = order.len();
@@ -96,26 +96,26 @@ impl FactorsUi {
 }
 
 /// The columns of a block: what a residual's slope by them is called, and how many shown units one stored unit is.
-fn parts_of(block: &ColumnBlock, unit: &str) -> Vec<(String, f64)> {
-    let shown = |name: &str, unit: &str| {
-        let shown = Shown::of(unit);
+fn parts_of(block: &ColumnBlock) -> Vec<(String, f64)> {
+    let shown = |name: &str, dimension: Dimension| {
+        let shown = Shown::of(dimension);
         (format!("∂{name} σ/{}", shown.unit.trim()), shown.factor)
     };
     let three =
         |names: [&str; 3], unit: &'static str, factor: f64| names.map(|name| (format!("∂{name} σ/{unit}"), factor));
     let degrees = 1_f64.to_degrees();
-    match block.group {
-        ColumnGroup::Calibration => vec![shown("", unit)],
-        ColumnGroup::Joints => (1..=block.len).map(|joint| shown(&format!("q{joint}"), "rad")).collect(),
-        ColumnGroup::Pose => {
-            let turns = ["rx", "ry", "rz"].map(|part| shown(part, "rad")).into_iter();
-            turns.chain(["tx", "ty", "tz"].map(|part| shown(part, "m"))).collect()
+    match block.id {
+        ColumnId::Calibration(parameter) => vec![shown("", parameter.dimension())],
+        ColumnId::Joints(_) => (1..=block.len).map(|joint| shown(&format!("q{joint}"), Dimension::Angle)).collect(),
+        ColumnId::Pose(_) => {
+            let turns = ["rx", "ry", "rz"].map(|part| shown(part, Dimension::Angle)).into_iter();
+            turns.chain(["tx", "ty", "tz"].map(|part| shown(part, Dimension::Length))).collect()
         }
-        ColumnGroup::SpeedBias => {
+        ColumnId::VelocityBias(_) => {
             let speeds = three(["vx", "vy", "vz"], "(m/s)", 1.0).into_iter();
             let turns = three(["gx", "gy", "gz"], "(°/s)", degrees);
             speeds.chain(turns).chain(three(["ax", "ay", "az"], "(m/s²)", 1.0)).collect()
         }
-        ColumnGroup::InverseDepth => Vec::new(),
+        ColumnId::InverseDepth => Vec::new(),
     }
 }

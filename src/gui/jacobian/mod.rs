@@ -16,10 +16,10 @@ use egui::{Pos2, Rect, Response, Role, Sense, Ui, Vec2, WidgetInfo, pos2, vec2};
 
 use self::factors::FactorsUi;
 use self::model::JacobianModel;
-pub(super) use self::model::{cameras, name_of};
+pub(super) use self::model::{cameras, column_name, name_of};
 use super::PanelContext;
 use super::convergence::empty_ui;
-use crate::estimator::{ColumnGroup, JacobianFactor};
+use crate::estimator::{ColumnId, JacobianFactor};
 use crate::session::{RunRecord, StepRecord};
 
 /// Furthest that the picture can be magnified.
@@ -46,8 +46,8 @@ pub struct JacobianPanel {
     view: View,
     /// The picked row, when it is not a feature's (those are selected everywhere).
     row: Option<JacobianFactor>,
-    /// Name of the picked column, when it is not a parameter's.
-    column: Option<String>,
+    /// The picked column, when it is not a parameter's.
+    column: Option<ColumnId>,
 }
 
 /// Which part of the picture is seen.
@@ -81,7 +81,7 @@ impl JacobianPanel {
             return;
         };
         if !self.model.as_ref().is_some_and(|model| Arc::ptr_eq(&model.step, step)) {
-            self.model = JacobianModel::of_step(&ctx.recording.rig, run, step);
+            self.model = JacobianModel::of_step(&ctx.recording.rig, &ctx.names(), run, step);
         }
         // Taken out while it is drawn, so that the rest of the panel can change.
         let Some(model) = self.model.take() else {
@@ -127,7 +127,7 @@ impl JacobianPanel {
         }
         if let Some((row, column)) = hovered {
             paint::hover(ui, ctx.theme, area, place, model, (row, column));
-            response.on_hover_text_at_pointer(details::headline(step, model, row, column));
+            response.on_hover_text_at_pointer(details::headline(model, row, column));
         }
         let (_, legend) = ui.allocate_space(vec2(ui.available_width(), LEGEND));
         paint::legend(ui, ctx.theme, legend, model);
@@ -143,8 +143,8 @@ impl JacobianPanel {
     fn picked(&self, ctx: &PanelContext<'_>, model: &JacobianModel) -> Option<(Option<usize>, Option<usize>)> {
         let wanted = self.row.or_else(|| ctx.selection.feature.map(JacobianFactor::Feature));
         let row = wanted.and_then(|wanted| model.jacobian.rows.iter().position(|row| row.factor == wanted));
-        let name = self.column.as_ref().or(ctx.selection.parameter.as_ref());
-        let column = name.and_then(|name| model.jacobian.columns.iter().position(|block| block.name == *name));
+        let wanted = self.column.or_else(|| ctx.selection.parameter.map(ColumnId::Calibration));
+        let column = wanted.and_then(|wanted| model.jacobian.columns.iter().position(|block| block.id == wanted));
         (row.is_some() || column.is_some()).then_some((row, column))
     }
 
@@ -157,11 +157,9 @@ impl JacobianPanel {
             JacobianFactor::Feature(id) => ctx.selection.feature = Some(id),
             factor => self.row = Some(factor),
         }
-        let block = &model.jacobian.columns[column];
-        if block.group == ColumnGroup::Calibration {
-            ctx.selection.parameter = Some(block.name.clone());
-        } else {
-            self.column = Some(block.name.clone());
+        match model.jacobian.columns[column].id {
+            ColumnId::Calibration(parameter) => ctx.selection.parameter = Some(parameter),
+            other => self.column = Some(other),
         }
     }
 

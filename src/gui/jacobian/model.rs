@@ -3,7 +3,9 @@
 use std::sync::Arc;
 
 use crate::camera::CameraModel;
-use crate::estimator::{ColumnGroup, JacobianFactor, StepJacobian};
+use crate::estimator::{ColumnId, JacobianFactor, StepJacobian};
+use crate::geometry::Dimension;
+use crate::gimbal::ParameterNames;
 use crate::gui::units::counted;
 use crate::sensors::Rig;
 use crate::session::{RunRecord, StepRecord};
@@ -48,7 +50,7 @@ pub(in crate::gui) fn cameras<'a>(rig: &'a Rig, run: &RunRecord, step: &StepReco
 
 impl JacobianModel {
     /// The blocks of a step, `None` while it has none.
-    pub(super) fn of_step(rig: &Rig, run: &RunRecord, step: &Arc<StepRecord>) -> Option<Self> {
+    pub(super) fn of_step(rig: &Rig, names: &ParameterNames, run: &RunRecord, step: &Arc<StepRecord>) -> Option<Self> {
         let jacobian = step.report.jacobian(&cameras(rig, run, step))?;
         let norms = jacobian.rows.iter().flat_map(|row| &row.norms).map(|(_, norm)| f64::from(*norm).log10());
         let (low, high) =
@@ -61,7 +63,7 @@ impl JacobianModel {
         Some(Self {
             step: Arc::clone(step),
             rows: rows_of(&jacobian),
-            columns: columns_of(&jacobian),
+            columns: columns_of(&jacobian, names),
             jacobian,
             decades: (low, high),
         })
@@ -147,29 +149,44 @@ fn rows_of(jacobian: &StepJacobian) -> Axis {
 }
 
 /// Calibration wide, since its columns are read one by one; the states of the frames narrow.
-fn columns_of(jacobian: &StepJacobian) -> Axis {
-    let names = ["calibration", "joints", "poses", "speeds, biases", "depth"].map(str::to_owned);
+fn columns_of(jacobian: &StepJacobian, names: &ParameterNames) -> Axis {
+    let groups = ["calibration", "joints", "poses", "speeds, biases", "depth"].map(str::to_owned);
     let strips = jacobian.columns.iter().map(|block| {
-        let (group, weight) = match block.group {
-            ColumnGroup::Calibration => (0, 3.0),
-            ColumnGroup::Joints => (1, 1.0),
-            ColumnGroup::Pose => (2, 1.2),
-            ColumnGroup::SpeedBias => (3, 1.2),
-            ColumnGroup::InverseDepth => (4, 4.0),
+        let (group, weight) = match block.id {
+            ColumnId::Calibration(_) => (0, 3.0),
+            ColumnId::Joints(_) => (1, 1.0),
+            ColumnId::Pose(_) => (2, 1.2),
+            ColumnId::VelocityBias(_) => (3, 1.2),
+            ColumnId::InverseDepth => (4, 4.0),
         };
-        (block.name.clone(), group, weight)
+        (column_name(block.id, names), group, weight)
     });
-    Axis::lay_out(strips, &names)
+    Axis::lay_out(strips, &groups)
+}
+
+/// Name of a column of blocks.
+pub(in crate::gui) fn column_name(id: ColumnId, names: &ParameterNames) -> String {
+    match id {
+        ColumnId::Calibration(parameter) => names.name(parameter),
+        ColumnId::Joints(frame) => format!("joints {frame}"),
+        ColumnId::Pose(frame) => format!("pose {frame}"),
+        ColumnId::VelocityBias(frame) => format!("velocity-bias {frame}"),
+        ColumnId::InverseDepth => "own depth".to_owned(),
+    }
 }
 
 /// What the norms of a block are counted by.
-pub(super) fn scale_words(group: ColumnGroup, unit: &str) -> &'static str {
-    match group {
-        ColumnGroup::Calibration if unit == "m" => "σ per 3 cm",
-        ColumnGroup::Calibration if unit == "s" => "σ per 20 ms",
-        ColumnGroup::Calibration | ColumnGroup::Joints => "σ per 10°",
-        ColumnGroup::Pose => "σ per 10° and 3 cm",
-        ColumnGroup::SpeedBias => "σ per 0.1 m/s, 1 °/s and 0.1 m/s²",
-        ColumnGroup::InverseDepth => "σ per tenth of the inverse depth",
+pub(super) fn scale_words(id: ColumnId) -> &'static str {
+    match id {
+        ColumnId::Calibration(parameter) => match parameter.dimension() {
+            Dimension::Angle => "σ per 10°",
+            Dimension::Length => "σ per 3 cm",
+            Dimension::Time => "σ per 20 ms",
+            Dimension::Ratio => "σ per tenth",
+        },
+        ColumnId::Joints(_) => "σ per 10°",
+        ColumnId::Pose(_) => "σ per 10° and 3 cm",
+        ColumnId::VelocityBias(_) => "σ per 0.1 m/s, 1 °/s and 0.1 m/s²",
+        ColumnId::InverseDepth => "σ per tenth of the inverse depth",
     }
 }

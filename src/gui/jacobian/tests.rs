@@ -4,7 +4,9 @@ use egui_kittest::kittest::Queryable as _;
 
 use super::model::JacobianModel;
 use super::{JacobianPanel, View, rect_of};
-use crate::estimator::JacobianFactor;
+use crate::estimator::{ColumnGroup, JacobianFactor};
+use crate::gimbal::ParameterNames;
+use crate::gimbal::tests::parameter;
 use crate::gui::Selection;
 use crate::gui::headless::{HeadlessOptions, draw};
 use crate::gui::sample_flight::flown_recording;
@@ -35,7 +37,7 @@ fn bench() -> Harness<'static, Shown> {
 fn model() -> JacobianModel {
     let recording = flown_recording();
     let run = &recording.runs[0];
-    JacobianModel::of_step(&recording.rig, run, run.steps.last().unwrap()).unwrap()
+    JacobianModel::of_step(&recording.rig, &ParameterNames::default(), run, run.steps.last().unwrap()).unwrap()
 }
 
 fn click(harness: &mut Harness<'static, Shown>, at: egui::Pos2) {
@@ -76,26 +78,27 @@ fn axes_are_whole_and_in_order() {
 fn a_click_selects_feature_and_parameter_and_tells_their_numbers() {
     let mut harness = bench();
     let model = model();
-    let column = model.jacobian.columns.iter().position(|block| block.name == "L2.alpha").unwrap();
+    let column =
+        model.jacobian.columns.iter().position(|block| block.id.parameter() == Some(parameter("L2.alpha"))).unwrap();
     let JacobianFactor::Feature(id) = model.jacobian.rows[3].factor else { panic!("features come first") };
     let at = middle(&harness, 3, column);
     click(&mut harness, at);
     let selection = &harness.state().1;
-    assert_eq!((selection.feature, selection.parameter.as_deref()), (Some(id), Some("L2.alpha")));
+    assert_eq!((selection.feature, selection.parameter), (Some(id), Some(parameter("L2.alpha"))));
     assert!(harness.query_by_label_contains(&format!("feature {} by L2.alpha: ", id.0)).is_some());
     assert!(harness.query_by_label("∂u, px/°").is_some());
     // What is selected elsewhere is shown here: a parameter alone, with the rows that speak of it most.
-    harness.state_mut().1 = Selection { parameter: Some("L1.alpha".to_owned()), ..Selection::default() };
+    harness.state_mut().1 = Selection { parameter: Some(parameter("L1.alpha")), ..Selection::default() };
     harness.run_steps(2);
     assert!(harness.query_by_label_contains("L1.alpha: in ").is_some());
     // An inertial factor by a pose is nobody else's.
     let is_inertial = |factor: &JacobianFactor| matches!(factor, JacobianFactor::Inertial { .. });
     let row = model.jacobian.rows.iter().position(|row| is_inertial(&row.factor)).unwrap();
-    let pose = model.jacobian.columns.iter().position(|block| block.name.starts_with("pose ")).unwrap();
+    let pose = model.jacobian.columns.iter().position(|block| block.id.group() == ColumnGroup::Pose).unwrap();
     let at = middle(&harness, row, pose);
     click(&mut harness, at);
     let selection = &harness.state().1;
-    assert_eq!((selection.feature, selection.parameter.as_deref()), (None, None));
+    assert_eq!((selection.feature, selection.parameter), (None, None));
     assert!(harness.query_by_label_contains("15 × 6").is_some());
     assert!(harness.query_by_label_contains("all residuals of this kind").is_some());
 }
@@ -103,7 +106,7 @@ fn a_click_selects_feature_and_parameter_and_tells_their_numbers() {
 #[test]
 fn pictures_zoom_and_steps_without_a_linearization_say_so() {
     for theme in [ThemeName::Dark, ThemeName::Light] {
-        let selection = Selection { parameter: Some("L2.alpha".to_owned()), ..Selection::default() };
+        let selection = Selection { parameter: Some(parameter("L2.alpha")), ..Selection::default() };
         let mut shown = (JacobianPanel::default(), selection);
         let options = HeadlessOptions { size_px: [1000, 640], pixels_per_point: 1.0, theme };
         let whole = draw(options, |ui| show(ui, &mut shown, flown_recording(), theme));

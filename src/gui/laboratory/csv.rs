@@ -8,6 +8,7 @@ impl CsvTable for LaboratoryPanel {
     /// Each form's singular values and directions.
     fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {
         let mut table = Table::new(["form", "kind", "number", "singular_value", "parameter", "weight"]);
+        let names = ctx.names();
         for (form, rank) in self.ranks(ctx) {
             for (index, value) in rank.singular_values.iter().enumerate() {
                 let place = (index + 1).to_string();
@@ -16,13 +17,14 @@ impl CsvTable for LaboratoryPanel {
             }
             for (index, direction) in rank.directions.iter().enumerate() {
                 let kind = if direction.structural { "null" } else { "weak" };
-                for (name, weight) in rank.names.iter().zip(&direction.weights).filter(|(_, weight)| **weight != 0.0) {
+                let weights = rank.parameters.iter().zip(&direction.weights);
+                for (parameter, weight) in weights.filter(|(_, weight)| **weight != 0.0) {
                     table.row([
                         form.clone(),
                         kind.to_owned(),
                         (index + 1).to_string(),
                         number(direction.singular_value),
-                        name.clone(),
+                        names.name(*parameter),
                         number(*weight),
                     ]);
                 }

@@ -5,6 +5,7 @@ use egui::{Align2, Color32, FontFamily, FontId, Grid, Label, Rect, RichText, Rol
 use egui::{StrokeKind, pos2, vec2};
 
 use super::spectrum;
+use crate::gimbal::{ParameterId, ParameterNames};
 use crate::gui::PanelContext;
 use crate::gui::convergence::names::{meaning_of, part_of};
 use crate::gui::theme::{self, Theme};
@@ -39,32 +40,34 @@ pub(in crate::gui) fn columns_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, column
     }
     let bottom = ui.max_rect().bottom();
     let width = (ui.available_width() - NAMES) / columns.len() as f32;
-    table_ui(ui, ctx.theme, columns, width);
-    spectra_ui(ui, ctx.theme, columns, width);
+    table_ui(ui, ctx.theme, &ctx.names(), columns, width);
+    spectra_ui(ui, ctx.theme, &ctx.names(), columns, width);
     heat_map_ui(ui, ctx, columns, width, bottom);
 }
 
-fn table_ui(ui: &mut Ui, theme: &Theme, columns: &[RankColumn<'_>], width: f32) {
-    type Cell = fn(&RankReport) -> (String, bool);
+fn table_ui(ui: &mut Ui, theme: &Theme, names: &ParameterNames, columns: &[RankColumn<'_>], width: f32) {
+    type Cell = fn(&RankReport, &ParameterNames) -> (String, bool);
     let rows: [(&str, Cell); 8] = [
-        ("structural rank", |rank| {
-            let whole = rank.rank_structural == rank.names.len();
-            (format!("{} of {}", rank.rank_structural, rank.names.len()), !whole)
+        ("structural rank", |rank, _| {
+            let whole = rank.rank_structural == rank.parameters.len();
+            (format!("{} of {}", rank.rank_structural, rank.parameters.len()), !whole)
         }),
-        ("informed rank", |rank| (rank.rank_informed.to_string(), false)),
-        ("lost to the form", |rank| lost(rank.deficit_parameterization)),
-        ("to joints at rest", |rank| lost(rank.deficit_joints)),
-        ("to free angles", |rank| lost(rank.deficit_absorbed)),
-        ("to the motion", |rank| lost(rank.deficit_motion)),
-        ("falsely known", |rank| {
+        ("informed rank", |rank, _| (rank.rank_informed.to_string(), false)),
+        ("lost to the form", |rank, _| lost(rank.deficit_parameterization)),
+        ("to joints at rest", |rank, _| lost(rank.deficit_joints)),
+        ("to free angles", |rank, _| lost(rank.deficit_absorbed)),
+        ("to the motion", |rank, _| lost(rank.deficit_motion)),
+        ("falsely known", |rank, _| {
             let claimed = rank.claimed();
             (if claimed == 0 { lost(0).0 } else { format!("{claimed}, up to {:.2}", rank.false_gain()) }, claimed > 0)
         }),
-        ("nearest lock", |rank| {
+        ("nearest lock", |rank, names| {
             let nearest = rank.margins.iter().min_by(|a, b| a.1.total_cmp(&b.1));
             nearest.map_or_else(
                 || ("none".to_owned(), false),
-                |(lock, margin)| (format!("{margin:.2} ({lock})"), *margin < crate::gimbal::SWITCH_MARGIN),
+                |(lock, margin)| {
+                    (format!("{margin:.2} ({})", names.singularity(*lock)), *margin < crate::gimbal::SWITCH_MARGIN)
+                },
             )
         }),
     ];
@@ -83,7 +86,7 @@ fn table_ui(ui: &mut Ui, theme: &Theme, columns: &[RankColumn<'_>], width: f32) 
         for (name, of) in rows {
             cell(ui, NAMES, RichText::new(name).color(theme.text_weak));
             for column in columns {
-                let (text, bad) = of(column.rank);
+                let (text, bad) = of(column.rank, names);
                 cell(
                     ui,
                     width,
@@ -99,7 +102,7 @@ fn lost(count: usize) -> (String, bool) {
     if count == 0 { ("–".to_owned(), false) } else { (count.to_string(), true) }
 }
 
-fn spectra_ui(ui: &mut Ui, theme: &Theme, columns: &[RankColumn<'_>], width: f32) {
+fn spectra_ui(ui: &mut Ui, theme: &Theme, names: &ParameterNames, columns: &[RankColumn<'_>], width: f32) {
     let height = (0.16 * ui.available_height()).clamp(50.0, 130.0);
     let (_, whole) = ui.allocate_space(vec2(ui.available_width(), height));
     let caption = ["singular values", "by decades;", "marks: with priors"];
@@ -111,17 +114,17 @@ fn spectra_ui(ui: &mut Ui, theme: &Theme, columns: &[RankColumn<'_>], width: f32
     for (number, column) in columns.iter().enumerate() {
         let left = whole.left() + NAMES + number as f32 * width;
         let rect = Rect::from_min_size(pos2(left, whole.top()), vec2(width - GAP, height));
-        spectrum::paint(ui, theme, column.rank, &peers, rect, number);
+        spectrum::paint(ui, theme, names, column.rank, &peers, rect, number);
     }
 }
 
 fn heat_map_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, columns: &[RankColumn<'_>], width: f32, bottom: f32) {
     const HEADER: f32 = 14.0;
     let theme = *ctx.theme;
-    let names = names_of(columns);
+    let parameters = parameters_of(columns);
     let room = (bottom - ui.cursor().top() - HEADER - 4.0).max(0.0);
-    let row_height = (room / names.len().max(1) as f32).clamp(LOWEST_ROW, HIGHEST_ROW);
-    let size = vec2(ui.available_width(), HEADER + row_height * names.len() as f32);
+    let row_height = (room / parameters.len().max(1) as f32).clamp(LOWEST_ROW, HIGHEST_ROW);
+    let size = vec2(ui.available_width(), HEADER + row_height * parameters.len() as f32);
     let (_, whole) = ui.allocate_space(size);
     let mut left_out = 0;
     for (number, column) in columns.iter().enumerate() {
@@ -140,8 +143,8 @@ fn heat_map_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, columns: &[RankColumn<'_
             let at = pos2(left + (place as f32 + 0.5) * pitch, whole.top());
             ui.painter().text(at, Align2::CENTER_TOP, mark, FontId::new(10.0, FontFamily::Proportional), color);
         }
-        for (row, name) in names.iter().enumerate() {
-            let Some(entry) = column.rank.names.iter().position(|known| known == name) else { continue };
+        for (row, parameter) in parameters.iter().enumerate() {
+            let Some(entry) = column.rank.parameters.iter().position(|known| known == parameter) else { continue };
             let top = whole.top() + HEADER + row as f32 * row_height;
             for (place, direction) in directions.iter().enumerate() {
                 let cell = Rect::from_min_size(pos2(left + place as f32 * pitch, top), vec2(pitch, row_height));
@@ -149,10 +152,10 @@ fn heat_map_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, columns: &[RankColumn<'_
             }
         }
     }
-    for (row, name) in names.iter().enumerate() {
+    for (row, parameter) in parameters.iter().enumerate() {
         let top = whole.top() + HEADER + row as f32 * row_height;
         let line = Rect::from_min_size(pos2(whole.left(), top), vec2(whole.width(), row_height));
-        name_ui(ui, ctx, name, line);
+        name_ui(ui, ctx, *parameter, line);
     }
     if left_out > 0 {
         let text = format!("Not shown: {}", counted(left_out, "stronger direction"));
@@ -160,16 +163,16 @@ fn heat_map_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, columns: &[RankColumn<'_
     }
 }
 
-/// The names of all reports in chain order, each once.
-fn names_of(columns: &[RankColumn<'_>]) -> Vec<String> {
-    let mut names: Vec<String> = Vec::new();
-    for name in columns.iter().flat_map(|column| &column.rank.names) {
-        if !names.contains(name) {
-            names.push(name.clone());
+/// The parameters of all reports in chain order, each once.
+fn parameters_of(columns: &[RankColumn<'_>]) -> Vec<ParameterId> {
+    let mut parameters: Vec<ParameterId> = Vec::new();
+    for parameter in columns.iter().flat_map(|column| &column.rank.parameters) {
+        if !parameters.contains(parameter) {
+            parameters.push(*parameter);
         }
     }
-    names.sort_by_key(|name| part_of(name));
-    names
+    parameters.sort_by_key(|parameter| part_of(*parameter));
+    parameters
 }
 
 fn cell_ui(ui: &Ui, theme: &Theme, direction: &CalibrationDirection, entry: usize, cell: Rect) {
@@ -188,19 +191,20 @@ fn cell_ui(ui: &Ui, theme: &Theme, direction: &CalibrationDirection, entry: usiz
     painter.text(cell.center(), Align2::CENTER_CENTER, text, font, Theme::text_on(ground));
 }
 
-fn name_ui(ui: &Ui, ctx: &mut PanelContext<'_>, name: &str, line: Rect) {
+fn name_ui(ui: &Ui, ctx: &mut PanelContext<'_>, parameter: ParameterId, line: Rect) {
+    let name = ctx.names().name(parameter);
     let theme = *ctx.theme;
-    let selected = ctx.selection.parameter.as_deref() == Some(name);
+    let selected = ctx.selection.parameter == Some(parameter);
     let color = if selected { theme.accent } else { theme.text };
-    ui.painter().text(line.left_center(), Align2::LEFT_CENTER, name, theme::label_font(), color);
-    let response = ui.interact(line, ui.unique_id().with(("side by side", name)), Sense::click());
+    ui.painter().text(line.left_center(), Align2::LEFT_CENTER, &name, theme::label_font(), color);
+    let response = ui.interact(line, ui.unique_id().with(("side by side", &name)), Sense::click());
     response.widget_info(|| WidgetInfo::selected(Role::Button, true, selected, format!("{name} in all columns")));
     if selected || response.hovered() {
         let stroke = Stroke::new(1.0, if selected { theme.accent } else { theme.outline });
         ui.painter().rect_stroke(line, 0.0, stroke, StrokeKind::Inside);
     }
     if response.clicked() {
-        ctx.selection.parameter = if selected { None } else { Some(name.to_owned()) };
+        ctx.selection.parameter = if selected { None } else { Some(parameter) };
     }
-    response.on_hover_text(format!("{name}: {}", meaning_of(name, &ctx.recording.rig)));
+    response.on_hover_text(format!("{name}: {}", meaning_of(parameter, &ctx.recording.rig)));
 }

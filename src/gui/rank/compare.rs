@@ -3,7 +3,7 @@
 use egui::{RichText, ScrollArea, Ui};
 
 use super::columns::{RankColumn, columns_ui};
-use crate::gimbal::{Chain, Parameterization, SWITCH_MARGIN};
+use crate::gimbal::{Chain, Parameterization, SWITCH_MARGIN, Singularity};
 use crate::gui::PanelContext;
 use crate::observability::RankReport;
 use crate::session::{Command, MAX_RUNS, RunRecord, RunSpec, StepRecord};
@@ -20,7 +20,7 @@ fn ranked<'a>(ctx: &PanelContext<'a>) -> impl Iterator<Item = (usize, &'a RunRec
     let cursor_ns = ctx.cursor_ns;
     ctx.recording.runs.iter().enumerate().filter_map(move |(number, run)| {
         let step = run.step_at(cursor_ns)?;
-        let rank = step.rank.as_ref().filter(|rank| !rank.names.is_empty())?;
+        let rank = step.rank.as_ref().filter(|rank| !rank.parameters.is_empty())?;
         Some((number, run, step.as_ref(), rank))
     })
 }
@@ -57,7 +57,7 @@ pub(super) fn lock_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, number: usize, ru
     };
     let margin_of = |form: Parameterization| {
         let chain = Chain::from_classical(&calibration.classical, form);
-        chain.margins().into_iter().find(|(lock, _)| lock == "end").map(|(_, margin)| margin)
+        chain.margins().into_iter().find(|(lock, _)| *lock == Singularity::End).map(|(_, margin)| margin)
     };
     let (Some(here), Some(there)) = (margin_of(own), margin_of(other)) else { return };
     let taken = run.spec.parameterization.switches_chart(&ctx.recording.rig);

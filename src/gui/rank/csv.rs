@@ -9,14 +9,16 @@ impl CsvTable for RankPanel {
     fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {
         let Some(run) = ctx.selected_run() else { return String::new() };
         let Some(rank) = run.step_at(ctx.cursor_ns).and_then(|step| step.rank.as_ref()) else { return String::new() };
+        let names = ctx.names();
         let heads = ["number", "singular_value", "singular_value_with_priors", "kind"].map(str::to_owned);
-        let mut table = Table::new(heads.into_iter().chain(rank.names.iter().cloned()));
+        let mut table =
+            Table::new(heads.into_iter().chain(rank.parameters.iter().map(|parameter| names.name(*parameter))));
         for (index, value) in rank.singular_values.iter().enumerate() {
             // Directions come weakest first, singular values largest first.
             let direction = rank.directions.get(rank.singular_values.len() - 1 - index);
             let kind = direction.map_or("informed", |direction| if direction.structural { "null" } else { "weak" });
             let with_priors = rank.singular_values_with_priors.get(index).copied().unwrap_or(f64::NAN);
-            let weights = (0..rank.names.len()).map(|column| {
+            let weights = (0..rank.parameters.len()).map(|column| {
                 let weight = direction.and_then(|direction| direction.weights.get(column));
                 number(weight.copied().unwrap_or(f64::NAN))
             });

@@ -4,6 +4,7 @@ use egui::epaint::TextShape;
 use egui::{Align2, FontFamily, FontId, Rect, RichText, Role, Sense, Stroke, StrokeKind, Ui, WidgetInfo, pos2, vec2};
 
 use super::verdict::parameters_of;
+use crate::gimbal::ParameterId;
 use crate::gui::PanelContext;
 use crate::gui::convergence::names::{meaning_of, part_of};
 use crate::gui::theme::{self, Theme};
@@ -38,8 +39,8 @@ pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, rank: &RankReport, hei
     let pitch = (room / count as f32).min(WIDEST_COLUMN);
     let directions = &rank.directions[..count];
 
-    let mut rows: Vec<usize> = (0..rank.names.len()).collect();
-    rows.sort_by_key(|row| part_of(&rank.names[*row]));
+    let mut rows: Vec<usize> = (0..rank.parameters.len()).collect();
+    rows.sort_by_key(|row| part_of(rank.parameters[*row]));
     let all = rows.len();
     let header_height = if pitch >= HEAD_WIDTH { HEADER_HEIGHT } else { UPRIGHT_HEADER_HEIGHT };
     if (height - header_height) / (rows.len() as f32) < LOWEST_ROW {
@@ -55,12 +56,12 @@ pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, rank: &RankReport, hei
     for (column, direction) in directions.iter().enumerate() {
         let left = rect.left() + NAME_WIDTH + column as f32 * pitch;
         let cell = Rect::from_min_size(pos2(left, rect.top()), vec2(pitch, header_height));
-        header(ui, &theme, rank, direction, column, cell);
+        header(ui, ctx, rank, direction, column, cell);
     }
     for (place, row) in rows.iter().enumerate() {
         let top = rect.top() + header_height + place as f32 * row_height;
         let line = Rect::from_min_size(pos2(rect.left(), top), vec2(NAME_WIDTH + pitch * count as f32, row_height));
-        row_ui(ui, ctx, &rank.names[*row], *row, directions, line, pitch);
+        row_ui(ui, ctx, rank.parameters[*row], *row, directions, line, pitch);
     }
     if left_out > 0 || count < rank.directions.len() {
         let mut notes = Vec::new();
@@ -75,7 +76,15 @@ pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, rank: &RankReport, hei
 }
 
 /// Number and singular value of a direction.
-fn header(ui: &Ui, theme: &Theme, rank: &RankReport, direction: &CalibrationDirection, column: usize, cell: Rect) {
+fn header(
+    ui: &Ui,
+    ctx: &PanelContext<'_>,
+    rank: &RankReport,
+    direction: &CalibrationDirection,
+    column: usize,
+    cell: Rect,
+) {
+    let theme = ctx.theme;
     let color = if direction.structural { theme.error } else { theme.warn };
     let painter = ui.painter();
     let mark = if direction.structural { "null" } else { "weak" };
@@ -91,7 +100,7 @@ fn header(ui: &Ui, theme: &Theme, rank: &RankReport, direction: &CalibrationDire
         painter.add(TextShape::new(foot, galley, color).with_angle(-std::f32::consts::FRAC_PI_2));
     }
     let response = ui.interact(cell, ui.unique_id().with(("direction", column)), Sense::hover());
-    let named = parameters_of(&rank.names, direction, 6);
+    let named = parameters_of(&ctx.names(), &rank.parameters, direction, 6);
     response.widget_info(|| WidgetInfo::labeled(Role::Label, true, format!("{mark} direction {named}")));
     response.on_hover_text(format!("{mark} direction, singular value {}\n{named}", figure(direction.singular_value)));
 }
@@ -99,17 +108,18 @@ fn header(ui: &Ui, theme: &Theme, rank: &RankReport, direction: &CalibrationDire
 fn row_ui(
     ui: &Ui,
     ctx: &mut PanelContext<'_>,
-    name: &str,
+    parameter: ParameterId,
     row: usize,
     directions: &[CalibrationDirection],
     line: Rect,
     pitch: f32,
 ) {
     let theme = *ctx.theme;
+    let name = ctx.names().name(parameter);
     let painter = ui.painter();
-    let selected = ctx.selection.parameter.as_deref() == Some(name);
+    let selected = ctx.selection.parameter == Some(parameter);
     let color = if selected { theme.accent } else { theme.text };
-    painter.text(line.left_center(), Align2::LEFT_CENTER, name, theme::label_font(), color);
+    painter.text(line.left_center(), Align2::LEFT_CENTER, &name, theme::label_font(), color);
     for (column, direction) in directions.iter().enumerate() {
         let weight = direction.weights.get(row).copied().unwrap_or(0.0);
         let left = line.left() + NAME_WIDTH + column as f32 * pitch;
@@ -126,14 +136,14 @@ fn row_ui(
             painter.text(cell.center(), Align2::CENTER_CENTER, sign, font, Theme::text_on(ground));
         }
     }
-    let response = ui.interact(line, ui.unique_id().with(("row", name)), Sense::click());
+    let response = ui.interact(line, ui.unique_id().with(("row", &name)), Sense::click());
     response.widget_info(|| WidgetInfo::selected(Role::Button, true, selected, format!("{name} weights")));
     if selected || response.hovered() {
         let stroke = Stroke::new(1.0, if selected { theme.accent } else { theme.outline });
         painter.rect_stroke(line, 0.0, stroke, StrokeKind::Inside);
     }
     if response.clicked() {
-        ctx.selection.parameter = if selected { None } else { Some(name.to_owned()) };
+        ctx.selection.parameter = if selected { None } else { Some(parameter) };
     }
-    response.on_hover_text(format!("{name}: {}", meaning_of(name, &ctx.recording.rig)));
+    response.on_hover_text(format!("{name}: {}", meaning_of(parameter, &ctx.recording.rig)));
 }

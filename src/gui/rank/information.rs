@@ -5,6 +5,7 @@ use std::sync::Arc;
 use egui::{CollapsingHeader, Color32, Grid, Label, RichText, TextStyle, Ui, vec2};
 
 use crate::estimator::Motion;
+use crate::gimbal::ParameterNames;
 use crate::gui::PanelContext;
 use crate::gui::convergence::names::{meaning_of, part_of};
 use crate::gui::theme::Theme;
@@ -38,7 +39,7 @@ impl InformationUi {
         }
         let Some((_, Some(rate))) = &self.told else { return };
         let joints = ctx.recording.rig.joint_names();
-        let headlines = headlines(rate, &joints);
+        let headlines = headlines(rate, &ctx.names(), &joints);
         let title = RichText::new(fitting(ui, &headlines)).color(ctx.theme.text);
         let header = CollapsingHeader::new(title).id_salt("information").default_open(room);
         let shown = header.show(ui, |ui| table_ui(ui, ctx, rate, &joints));
@@ -64,7 +65,7 @@ fn fitting<'a>(ui: &Ui, headlines: &'a [String; 3]) -> &'a str {
 }
 
 /// All in one line: everything, without the parameter that gains most, and the sum alone.
-fn headlines(rate: &InformationRate, joints: &[String]) -> [String; 3] {
+fn headlines(rate: &InformationRate, names: &ParameterNames, joints: &[String]) -> [String; 3] {
     let most = rate
         .leading(None)
         .map_or_else(String::new, |(motion, part)| format!(", most by {} ({part:.2})", motion.name(joints)));
@@ -75,14 +76,14 @@ fn headlines(rate: &InformationRate, joints: &[String]) -> [String; 3] {
         let parameter = &rate.parameters[fastest];
         let by =
             rate.leading(Some(fastest)).map_or_else(String::new, |(motion, _)| format!(" by {}", motion.name(joints)));
-        format!("; fastest {} {:.2}{by}", parameter.name, parameter.bits_per_s)
+        format!("; fastest {} {:.2}{by}", names.name(parameter.parameter), parameter.bits_per_s)
     });
     let total = format!("Told in the last {:.1} s: {:.2} bit/s", rate.duration_s, rate.total());
     [format!("{total}{most}{fastest}"), format!("{total}{most}"), total]
 }
 
 fn table_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, rate: &InformationRate, joints: &[String]) {
-    let theme = *ctx.theme;
+    let (theme, names) = (*ctx.theme, ctx.names());
     ui.label(
         RichText::new(
             "bit/s (one bit halves σ) that keyframes told of each parameter, and which motion they are owed to",
@@ -91,7 +92,7 @@ fn table_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, rate: &InformationRate, joi
         .color(theme.text_weak),
     );
     let mut order: Vec<usize> = (0..rate.parameters.len()).collect();
-    order.sort_by_key(|index| part_of(&rate.parameters[*index].name));
+    order.sort_by_key(|index| part_of(rate.parameters[*index].parameter));
     let parts = rate.parameters.iter().flat_map(|parameter| &parameter.by_motion);
     let largest = parts.fold(0.0_f64, |largest, part| largest.max(part.abs()));
     Grid::new("information by motion").spacing(vec2(4.0, 0.0)).min_col_width(0.0).min_row_height(13.0).show(ui, |ui| {
@@ -107,13 +108,13 @@ fn table_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, rate: &InformationRate, joi
         ui.end_row();
         for index in order {
             let parameter = &rate.parameters[index];
-            let name = &parameter.name;
-            let selected = ctx.selection.parameter.as_deref() == Some(name);
+            let name = names.name(parameter.parameter);
+            let selected = ctx.selection.parameter == Some(parameter.parameter);
             let color = if selected { theme.accent } else { theme.text };
             let label = Label::new(RichText::new(name).small().color(color)).sense(egui::Sense::click());
-            let response = ui.add(label).on_hover_text(meaning_of(name, &ctx.recording.rig));
+            let response = ui.add(label).on_hover_text(meaning_of(parameter.parameter, &ctx.recording.rig));
             if response.clicked() {
-                ctx.selection.parameter = if selected { None } else { Some(name.clone()) };
+                ctx.selection.parameter = if selected { None } else { Some(parameter.parameter) };
             }
             number_ui(ui, &theme, parameter.bits_per_s, 0.0);
             for part in parameter.by_motion.iter().chain([&parameter.earlier]) {

@@ -25,6 +25,7 @@ use super::convergence::empty_ui;
 use super::follow::RunTables;
 use super::plot::{Clicks, Curve, PlotArea, navigate, paint_cursor, paint_ground, paint_steps, visible_range};
 use super::theme::{CURVE_WIDTH, RunStyle, Theme};
+use crate::gimbal::ParameterNames;
 use crate::session::{RunRecord, StepRecord};
 
 /// Columns of the tables over time.
@@ -106,8 +107,8 @@ impl RankPanel {
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
             ui.spacing_mut().item_spacing.y = 3.0;
             let top = ui.cursor().top();
-            verdict_ui(ui, ctx.theme, step);
-            let Some(rank) = step.rank.as_ref().filter(|rank| !rank.names.is_empty()) else {
+            verdict_ui(ui, ctx.theme, &ctx.names(), step);
+            let Some(rank) = step.rank.as_ref().filter(|rank| !rank.parameters.is_empty()) else {
                 self.over_time_ui(ui, ctx);
                 return;
             };
@@ -116,7 +117,7 @@ impl RankPanel {
             let number = ctx.selection.run.min(ctx.recording.runs.len().saturating_sub(1));
             compare::lock_ui(ui, ctx, number, run, step);
             self.slider.ui(ui, ctx, step);
-            spectrum::ui(ui, ctx.theme, rank, (0.16 * height).clamp(60.0, 150.0));
+            spectrum::ui(ui, ctx.theme, &ctx.names(), rank, (0.16 * height).clamp(60.0, 150.0));
             // The timeline has a lane for it too, so it yields to the heat map first.
             if height > LOWEST_WITH_TIME {
                 self.over_time_ui(ui, ctx);
@@ -162,8 +163,8 @@ impl RankPanel {
 }
 
 fn rank_row(step: &StepRecord) -> [f64; 3] {
-    step.rank.as_ref().filter(|rank| !rank.names.is_empty()).map_or([f64::NAN, f64::NAN, 0.0], |rank| {
-        [rank.rank_structural as f64, rank.rank_informed as f64, rank.names.len() as f64]
+    step.rank.as_ref().filter(|rank| !rank.parameters.is_empty()).map_or([f64::NAN, f64::NAN, 0.0], |rank| {
+        [rank.rank_structural as f64, rank.rank_informed as f64, rank.parameters.len() as f64]
     })
 }
 
@@ -175,8 +176,8 @@ fn halves(rect: egui::Rect, share: f32) -> [egui::Rect; 2] {
 }
 
 /// The verdict: a mark, one line, and the reasons.
-fn verdict_ui(ui: &mut Ui, theme: &Theme, step: &StepRecord) {
-    let verdict = verdict::verdict(step);
+fn verdict_ui(ui: &mut Ui, theme: &Theme, names: &ParameterNames, step: &StepRecord) {
+    let verdict = verdict::verdict(step, names);
     let (mark, color) = mark_of(verdict.level, theme);
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 5.0;

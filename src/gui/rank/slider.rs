@@ -4,9 +4,9 @@
 use egui::{ComboBox, Label, RichText, Role, Slider, Ui, WidgetInfo};
 
 use super::verdict::parameters_of_weights;
-use crate::gui::PanelContext;
-use crate::gui::slide;
+use crate::gimbal::ParameterId;
 use crate::gui::units::{Shown, figure, fixed};
+use crate::gui::{PanelContext, slide};
 use crate::observability::{ChainSlide, RankReport, SlideDirection, SlidePosition, chain_of_step};
 use crate::session::StepRecord;
 
@@ -31,13 +31,13 @@ impl SliderUi {
         let Some(rank) = &step.rank else { return };
         let Some(chain) = chain_of_step(&step.report, rank) else { return };
         let mut directions = SlideDirection::of_step(rank);
-        let position = ctx.selection.slide.clone();
-        directions.extend(position.iter().map(|position| position.direction.clone()).filter(|it| is_other(it, rank)));
-        let selected = ctx.selection.parameter.iter().map(|name| SlideDirection::Named(name.clone()));
+        let position = ctx.selection.slide;
+        directions.extend(position.iter().map(|position| position.direction).filter(|it| is_other(it, rank)));
+        let selected = ctx.selection.parameter.map(SlideDirection::Parameter).into_iter();
         directions.extend(selected.filter(|it| is_other(it, rank)));
         directions.dedup();
-        let Some(first) = directions.first().cloned() else { return };
-        let names = chain.parameter_names();
+        let Some(first) = directions.first().copied() else { return };
+        let (names, parameters) = (ctx.names(), chain.parameters());
         let label = |direction: &SlideDirection| {
             let weights = direction.weights(rank, &chain).unwrap_or_default();
             let kind = match direction {
@@ -45,13 +45,14 @@ impl SliderUi {
                     let structural = rank.directions.get(*index).is_some_and(|direction| direction.structural);
                     format!("{} {}", if structural { "null" } else { "weak" }, index + 1)
                 }
-                SlideDirection::Named(name) if is_other(direction, rank) => return format!("{name} alone"),
-                SlideDirection::Named(_) => "known".to_owned(),
+                SlideDirection::Parameter(parameter) => return format!("{} alone", names.name(*parameter)),
+                SlideDirection::Known(loss) if is_other(direction, rank) => return format!("{} alone", loss.name()),
+                SlideDirection::Known(_) => "known".to_owned(),
             };
-            format!("{kind}: {}", parameters_of_weights(&names, &weights, 2))
+            format!("{kind}: {}", parameters_of_weights(&names, &parameters, &weights, 2))
         };
 
-        let mut direction = position.as_ref().map_or(first, |position| position.direction.clone());
+        let mut direction = position.as_ref().map_or(first, |position| position.direction);
         let mut amount = position.map_or(0.0, |position| position.amount);
         ui.horizontal(|ui| {
             let (sign, name) = if self.playing { ("⏸", "Hold the chain") } else { ("▶", "Slide the chain") };
@@ -95,7 +96,7 @@ impl SliderUi {
         let unchosen = directions_first(rank).as_ref() == Some(&direction);
         ctx.selection.slide = (!(untouched && unchosen)).then_some(SlidePosition { direction, amount });
         if let Some(slide) = slide::of(ctx, step.report.stamp_ns) {
-            outcome_ui(ui, ctx, slide, &names, &chain.parameter_units());
+            outcome_ui(ui, ctx, slide, &parameters);
         }
     }
 }
@@ -110,22 +111,20 @@ fn is_other(direction: &SlideDirection, rank: &RankReport) -> bool {
 }
 
 /// What the move does to the reprojections, and what was moved.
-fn outcome_ui(ui: &mut Ui, ctx: &PanelContext<'_>, slide: &ChainSlide, names: &[String], units: &[&'static str]) {
+fn outcome_ui(ui: &mut Ui, ctx: &PanelContext<'_>, slide: &ChainSlide, parameters: &[ParameterId]) {
+    let names = ctx.names();
     let stays = slide.largest_px <= STAYS_PX;
     let (mark, color) = if stays { ("✔", ctx.theme.ok) } else { ("✖", ctx.theme.warn) };
     let (finite, first_order) = (figure(slide.largest_px), figure(slide.largest_first_order_px));
     let verb = if stays { "stay" } else { "move" };
     let text = format!("{mark} Reprojections {verb}: by up to {finite} px, {first_order} px to first order");
     ui.add(Label::new(RichText::new(&text).color(color)).truncate()).on_hover_text(text);
-    let mut moved: Vec<usize> = (0..slide.changes.len().min(names.len())).collect();
-    let scaled = |column: &usize| {
-        let scale = if units[*column] == "rad" { 10_f64.to_radians() } else { 0.03 };
-        (slide.changes[*column] / scale).abs()
-    };
+    let mut moved: Vec<usize> = (0..slide.changes.len().min(parameters.len())).collect();
+    let scaled = |column: &usize| (slide.changes[*column] / parameters[*column].dimension().scale()).abs();
     moved.sort_by(|a, b| scaled(b).total_cmp(&scaled(a)));
     let changes = moved.iter().take(CHANGES_SHOWN).filter(|column| scaled(column) > 1e-3).map(|column| {
-        let shown = Shown::of(units[*column]);
-        format!("{} {}{}", names[*column], signed(slide.changes[*column] * shown.factor), shown.unit)
+        let shown = Shown::of(parameters[*column].dimension());
+        format!("{} {}{}", names.name(parameters[*column]), signed(slide.changes[*column] * shown.factor), shown.unit)
     });
     let text = changes.collect::<Vec<_>>().join(", ");
     ui.add(Label::new(RichText::new(text).small().color(ctx.theme.text_weak)).truncate());

@@ -3,19 +3,28 @@
 use egui::{Align2, FontFamily, FontId, Rect, Role, Sense, Stroke, StrokeKind, Ui, WidgetInfo, pos2, vec2};
 
 use super::verdict::parameters_of;
+use crate::gimbal::ParameterNames;
 use crate::gui::plot::paint_ground;
 use crate::gui::theme::Theme;
 use crate::gui::units::figure;
 use crate::observability::RankReport;
 
 /// Draws the spectrum in so many points of height.
-pub(super) fn ui(ui: &mut Ui, theme: &Theme, rank: &RankReport, height: f32) {
+pub(super) fn ui(ui: &mut Ui, theme: &Theme, names: &ParameterNames, rank: &RankReport, height: f32) {
     let (_, rect) = ui.allocate_space(vec2(ui.available_width(), height));
-    paint(ui, theme, rank, &[rank], rect, 0);
+    paint(ui, theme, names, rank, &[rank], rect, 0);
 }
 
 /// Draws the spectrum into a rectangle, on an axis that holds those of all peers; `number` tells it apart from theirs.
-pub(super) fn paint(ui: &Ui, theme: &Theme, rank: &RankReport, peers: &[&RankReport], rect: Rect, number: usize) {
+pub(super) fn paint(
+    ui: &Ui,
+    theme: &Theme,
+    names: &ParameterNames,
+    rank: &RankReport,
+    peers: &[&RankReport],
+    rect: Rect,
+    number: usize,
+) {
     let painter = ui.painter_at(rect);
     paint_ground(&painter, theme, rect);
     let plot = Rect::from_min_max(rect.min + vec2(30.0, 3.0), rect.max - vec2(4.0, 3.0));
@@ -73,7 +82,7 @@ pub(super) fn paint(ui: &Ui, theme: &Theme, rank: &RankReport, peers: &[&RankRep
             // Directions come weakest first, singular values largest first.
             let direction = (rank.singular_values.len() - 1).checked_sub(index).and_then(|d| rank.directions.get(d));
             if let Some(direction) = direction {
-                lines.push(parameters_of(&rank.names, direction, 4));
+                lines.push(parameters_of(names, &rank.parameters, direction, 4));
             }
             response.on_hover_text_at_pointer(lines.join("\n"));
         }

@@ -1,6 +1,7 @@
 //! The rank of a step in words.
 
 use crate::estimator::{EventKind, Phase};
+use crate::gimbal::{ParameterId, ParameterNames};
 use crate::gui::units::counted;
 use crate::observability::{CalibrationDirection, KnownDirection, RankReport};
 use crate::session::StepRecord;
@@ -30,13 +31,13 @@ pub(crate) struct Verdict {
 }
 
 /// What a step says about the calibration's observability.
-pub(crate) fn verdict(step: &StepRecord) -> Verdict {
+pub(crate) fn verdict(step: &StepRecord, names: &ParameterNames) -> Verdict {
     match &step.rank {
-        Some(rank) if rank.names.is_empty() => {
+        Some(rank) if rank.parameters.is_empty() => {
             let headline = "This run estimates no calibration".to_owned();
             Verdict { level: Level::None, headline, reasons: Vec::new() }
         }
-        Some(rank) => of_rank(rank),
+        Some(rank) => of_rank(rank, names),
         None => {
             let initializing = step.report.phase == Phase::Initializing;
             let headline = if initializing { "Initializing, no rank yet" } else { "No rank for this step" };
@@ -47,8 +48,8 @@ pub(crate) fn verdict(step: &StepRecord) -> Verdict {
     }
 }
 
-fn of_rank(rank: &RankReport) -> Verdict {
-    let columns = rank.names.len();
+fn of_rank(rank: &RankReport, names: &ParameterNames) -> Verdict {
+    let columns = rank.parameters.len();
     let null = columns.saturating_sub(rank.rank_structural);
     let weak = rank.rank_structural.saturating_sub(rank.rank_informed);
     let (level, headline) = match (null, weak) {
@@ -79,14 +80,14 @@ fn of_rank(rank: &RankReport) -> Verdict {
         ));
     }
     if let Some(direction) = rank.directions.iter().find(|direction| !direction.structural) {
-        reasons.push(format!("Weakest: {}", parameters_of(&rank.names, direction, 3)));
+        reasons.push(format!("Weakest: {}", parameters_of(names, &rank.parameters, direction, 3)));
     } else if let Some(direction) = rank.directions.first() {
-        reasons.push(format!("Unobservable: {}", parameters_of(&rank.names, direction, 3)));
+        reasons.push(format!("Unobservable: {}", parameters_of(names, &rank.parameters, direction, 3)));
     }
     if let Some((lock, margin)) =
         rank.margins.iter().min_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, m)| *m < LOW_MARGIN)
     {
-        reasons.push(format!("Chart near its lock: {lock} margin {margin:.2}"));
+        reasons.push(format!("Chart near its lock: {} margin {margin:.2}", names.singularity(*lock)));
     }
     Verdict { level, headline, reasons }
 }
@@ -106,12 +107,22 @@ pub(crate) fn structure_lines(rank: &RankReport) -> Vec<String> {
 const LOW_MARGIN: f64 = 0.3;
 
 /// The strongest parameters of a direction, `L1.d - I.tx`, at most `most`.
-pub(crate) fn parameters_of(names: &[String], direction: &CalibrationDirection, most: usize) -> String {
-    parameters_of_weights(names, &direction.weights, most)
+pub(crate) fn parameters_of(
+    names: &ParameterNames,
+    parameters: &[ParameterId],
+    direction: &CalibrationDirection,
+    most: usize,
+) -> String {
+    parameters_of_weights(names, parameters, &direction.weights, most)
 }
 
 /// The same of the bare weights.
-pub(crate) fn parameters_of_weights(names: &[String], weights: &[f64], most: usize) -> String {
+pub(crate) fn parameters_of_weights(
+    names: &ParameterNames,
+    parameters: &[ParameterId],
+    weights: &[f64],
+    most: usize,
+) -> String {
     const SMALLEST_NAMED: f64 = 0.2;
     let mut entries: Vec<(usize, f64)> = weights.iter().copied().enumerate().collect();
     entries.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
@@ -125,7 +136,8 @@ pub(crate) fn parameters_of_weights(names: &[String], weights: &[f64], most: usi
         if place > 0 {
             text.push_str(sign);
         }
-        text.push_str(names.get(*column).map_or("?", String::as_str));
+        let name = parameters.get(*column).map_or_else(|| "?".to_owned(), |parameter| names.name(*parameter));
+        text.push_str(&name);
     }
     if left_out > 0 {
         text.push_str(" and ");
@@ -137,12 +149,13 @@ pub(crate) fn parameters_of_weights(names: &[String], weights: &[f64], most: usi
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gimbal::{ParameterPart, Quantity};
     use crate::gui::sample_recording::{FIRST_TRACKED_FRAME, sample_recording_of};
 
     #[test]
     fn the_verdict_says_what_is_lost_and_to_what() {
         let recording = sample_recording_of(FIRST_TRACKED_FRAME + 10, &["auto", "classical"]);
-        let said = |run: usize, step: usize| verdict(&recording.runs[run].steps[step]);
+        let said = |run: usize, step: usize| verdict(&recording.runs[run].steps[step], &ParameterNames::default());
         let waiting = said(0, 3);
         assert_eq!((waiting.level, waiting.headline.as_str()), (Level::None, "Initializing, no rank yet"));
         assert_eq!(said(0, FIRST_TRACKED_FRAME + 5).level, Level::Weak);
@@ -154,11 +167,15 @@ mod tests {
 
     #[test]
     fn directions_are_named_by_their_strongest_parameters() {
-        let names: Vec<String> = ["a", "b", "c", "d"].map(str::to_owned).into();
+        let names = ParameterNames::default();
+        let parameters = Quantity::LINK.map(|quantity| ParameterId { part: ParameterPart::Link(0), quantity });
         let direction =
             |weights: &[f64]| CalibrationDirection { singular_value: 0.0, structural: true, weights: weights.to_vec() };
-        assert_eq!(parameters_of(&names, &direction(&[-0.7, 0.7, 0.0, 0.1]), 3), "a − b");
-        assert_eq!(parameters_of(&names, &direction(&[0.5, 0.5, 0.5, 0.5]), 2), "a + b and 2 others");
-        assert_eq!(parameters_of(&names, &direction(&[0.0; 4]), 2), "");
+        assert_eq!(parameters_of(&names, &parameters, &direction(&[-0.7, 0.7, 0.0, 0.1]), 3), "L1.theta − L1.d");
+        assert_eq!(
+            parameters_of(&names, &parameters, &direction(&[0.5, 0.5, 0.5, 0.5]), 2),
+            "L1.theta + L1.d and 2 others"
+        );
+        assert_eq!(parameters_of(&names, &parameters, &direction(&[0.0; 4]), 2), "");
     }
 }

@@ -1,6 +1,7 @@
 //! The residuals over time, one step of one run a row.
 
 use super::{ResidualsPanel, rms_px};
+use crate::estimator::FactorKind;
 use crate::gui::PanelContext;
 use crate::gui::csv_table::{CsvTable, Table, number, seconds};
 use crate::session::StepRecord;
@@ -9,7 +10,7 @@ impl CsvTable for ResidualsPanel {
     /// Reprojection RMS and χ² by kind of factor, for every step of every run.
     fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {
         let solved = |step: &&std::sync::Arc<StepRecord>| !step.report.window.is_empty();
-        let mut factors: Vec<&'static str> = Vec::new();
+        let mut factors: Vec<FactorKind> = Vec::new();
         for summary in ctx.recording.runs.iter().flat_map(|run| &run.steps).flat_map(|step| &step.report.residuals) {
             if !factors.contains(&summary.factor) {
                 factors.push(summary.factor);
@@ -17,7 +18,7 @@ impl CsvTable for ResidualsPanel {
         }
         let mut columns = ["t_s", "run", "rms_before_px", "rms_after_px"].map(str::to_owned).to_vec();
         for factor in &factors {
-            let factor = factor.replace(' ', "_");
+            let factor = factor.key();
             columns.extend(["count", "chi2_before", "chi2_after"].map(|part| format!("{factor}_{part}")));
         }
         let mut table = Table::new(columns);

@@ -195,7 +195,7 @@ fn factors_ui(ui: &mut Ui, theme: &Theme, residuals: &[ResidualSummary]) {
         }
         ui.end_row();
         for summary in residuals {
-            ui.label(RichText::new(summary.factor).color(theme.text));
+            ui.label(RichText::new(summary.factor.name()).color(theme.text));
             let number = |text: String| RichText::new(text).monospace().color(theme.text_strong);
             ui.label(number(summary.count.to_string()));
             ui.label(number(figure(summary.chi2_before)));

@@ -23,7 +23,7 @@ impl CsvTable for TimelinePanel {
         for run in &ctx.recording.runs {
             for step in &run.steps {
                 let (report, label) = (&step.report, &run.spec.label);
-                let rank = step.rank.as_ref().filter(|rank| !rank.names.is_empty());
+                let rank = step.rank.as_ref().filter(|rank| !rank.parameters.is_empty());
                 let figures = [
                     report.phase.name().to_owned(),
                     report.keyframe.to_string(),

@@ -61,7 +61,7 @@ impl RunLanes {
             let (stamp_ns, number) = (report.stamp_ns, self.stamps_ns.len());
             self.stamps_ns.push(stamp_ns);
             self.tracking.push(report.phase == Phase::Tracking);
-            let rank = step.rank.as_ref().filter(|rank| !rank.names.is_empty());
+            let rank = step.rank.as_ref().filter(|rank| !rank.parameters.is_empty());
             let row = [
                 step.tracks.features.len() as f64,
                 rms_px(report),

@@ -146,7 +146,7 @@ impl ForkDialog {
     }
 
     fn fields_ui(&mut self, ui: &mut Ui, ctx: &PanelContext<'_>) {
-        let selected = (&ctx.selection.parameter, ctx.selection.feature);
+        let selected = (ctx.selection.parameter, ctx.selection.feature);
         Grid::new("fork").num_columns(2).spacing(vec2(12.0, 6.0)).show(ui, |ui| {
             let names: Vec<&str> =
                 std::iter::once(AS_BEFORE).chain(FORK_PARAMETERIZATIONS.iter().map(|choice| choice.name())).collect();
@@ -159,7 +159,7 @@ impl ForkDialog {
             });
             shown.response.labelled_by(name.id);
             ui.end_row();
-            let parameter = selected.0.clone().unwrap_or_else(|| "yaw.alpha".to_owned());
+            let parameter = selected.0.map_or_else(|| "yaw.alpha".to_owned(), |parameter| ctx.names().name(parameter));
             let feature = selected.1.map_or_else(|| "12 15".to_owned(), |id| id.0.to_string());
             let value = format!("{parameter}=1deg");
             let camera = second_camera(ctx).unwrap_or_else(|| "of a cluster, one of its two".to_owned());

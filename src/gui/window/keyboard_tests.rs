@@ -8,6 +8,7 @@ use egui_kittest::kittest::{By, NodeT as _, Queryable as _};
 use super::tests::{Bench, SECOND_NS, bench, commands_of};
 use super::{PanelName, Preset};
 use crate::frontend::FeatureId;
+use crate::gimbal::tests::parameter;
 use crate::gui::theme::ThemeName;
 use crate::session::Command;
 
@@ -33,7 +34,7 @@ fn the_palette_goes_to_times_and_frames_and_selects() {
     assert_eq!(harness.state().selection.feature, Some(id));
     assert_ne!(id, FeatureId(u64::MAX));
     choose(&mut harness, "parameter L2.alpha");
-    assert_eq!(harness.state().selection.parameter.as_deref(), Some("L2.alpha"));
+    assert_eq!(harness.state().selection.parameter, Some(parameter("L2.alpha")));
     choose(&mut harness, "run classical");
     assert_eq!(harness.state().selection.run, 1);
     choose(&mut harness, "theme print");

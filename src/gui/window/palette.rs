@@ -80,7 +80,7 @@ impl CommandPalette {
         let close = response.should_close();
         match response.inner {
             Some(Choice::Action(action)) => actions.push(action),
-            Some(Choice::Parameter(name)) => ctx.selection.parameter = Some(name),
+            Some(Choice::Parameter(parameter)) => ctx.selection.parameter = Some(parameter),
             None if !close => return,
             None => {}
         }

@@ -1,12 +1,12 @@
 //! What the command palette offers: all actions, and what the recording at the cursor has.
 
 use super::actions::{Action, TABLE};
-use super::fuzzy;
 use super::palette::keys_of;
 use super::tiles::Layout;
-use super::{PanelName, SavedLayouts};
+use super::{PanelName, SavedLayouts, fuzzy};
 use crate::frontend::FeatureId;
 use crate::geometry::ns_from_seconds;
+use crate::gimbal::ParameterId;
 use crate::gui::PanelContext;
 use crate::gui::convergence::names::meaning_of;
 use crate::gui::theme::ThemeName;
@@ -20,7 +20,7 @@ pub(super) enum Choice {
     /// An action.
     Action(Action),
     /// A parameter is selected.
-    Parameter(String),
+    Parameter(ParameterId),
 }
 
 /// A row of the palette.
@@ -95,12 +95,13 @@ fn shown<'a>(ctx: &PanelContext<'a>) -> Option<&'a RunRecord> {
 /// The parameters of the shown run at the cursor.
 fn parameters(ctx: &PanelContext<'_>) -> Vec<Item> {
     let step = shown(ctx).and_then(|run| run.step_at(ctx.cursor_ns).or_else(|| run.steps.first()));
-    let names = step.into_iter().flat_map(|step| &step.report.calibration.names);
-    names
-        .map(|name| Item {
-            name: format!("Parameter {name}: {}", meaning_of(name, &ctx.recording.rig)),
+    let names = ctx.names();
+    let parameters = step.into_iter().flat_map(|step| &step.report.calibration.parameters);
+    parameters
+        .map(|parameter| Item {
+            name: format!("Parameter {}: {}", names.name(*parameter), meaning_of(*parameter, &ctx.recording.rig)),
             keys: "",
-            choice: Choice::Parameter(name.clone()),
+            choice: Choice::Parameter(*parameter),
         })
         .collect()
 }

@@ -7,9 +7,12 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 
 use super::{PanelName, Preset, WindowState, window_ui};
+use crate::gimbal::ParameterNames;
+use crate::gimbal::tests::parameter;
 use crate::gui::sample_recording::{sample_images, sample_recording_of};
 use crate::gui::theme::{Theme, ThemeName};
 use crate::gui::{PanelContext, Playback, Selection};
+use crate::observability::SlideRequest;
 use crate::session::breakpoints::Breakpoints;
 use crate::session::{Command, ForkChanges, ForkOrigin, PlaybackSpeed, Recording, RunWarning};
 
@@ -336,7 +339,8 @@ fn while_somebody_types_keys_are_letters() {
 fn panels_show_names_and_values() {
     let mut harness = bench();
     let step = harness.state().recording.runs[0].step_at(3 * SECOND_NS).unwrap().clone();
-    for name in &step.report.calibration.names {
+    for parameter in &step.report.calibration.parameters {
+        let name = ParameterNames::default().name(*parameter);
         assert!(harness.query_all_by_label_contains(&format!("{name} ")).next().is_some(), "{name}");
     }
     let rank = step.rank.as_ref().unwrap();
@@ -365,7 +369,7 @@ fn a_parameter_is_selected_everywhere() {
     let text = label(&harness);
     harness.get_by_label(&text).click();
     harness.run_steps(3);
-    assert_eq!(harness.state().selection.parameter.as_deref(), Some("L2.alpha"));
+    assert_eq!(harness.state().selection.parameter, Some(parameter("L2.alpha")));
     assert!(harness.query_by_label("Parameter L2.alpha").is_some());
     harness.get_by_label("Clear selection").click();
     harness.run_steps(2);
@@ -378,7 +382,7 @@ fn the_chain_slides_from_the_rank_panel() {
     assert_eq!(harness.state().selection.slide, None);
     harness.get_by_label("Slide the chain").click();
     harness.run_steps(4);
-    let amount = |harness: &Harness<'static, Bench>| harness.state().selection.slide.clone().map(|slide| slide.amount);
+    let amount = |harness: &Harness<'static, Bench>| harness.state().selection.slide.map(|slide| slide.amount);
     let first = amount(&harness).expect("it slides");
     harness.run_steps(3);
     assert_ne!(amount(&harness), Some(first), "it goes on");
@@ -390,7 +394,8 @@ fn the_chain_slides_from_the_rank_panel() {
     // Along what is known to be lost the reprojections stay, along a parameter alone they move.
     harness.state_mut().selection.run = 1;
     for (position, said) in [("base-d=1", "Reprojections stay"), ("L2.alpha=1", "Reprojections move")] {
-        harness.state_mut().selection.slide = Some(position.parse().unwrap());
+        harness.state_mut().selection.slide =
+            position.parse::<SlideRequest>().unwrap().position(&ParameterNames::default());
         harness.run_steps(2);
         assert!(harness.query_by_label_contains(said).is_some(), "{position}");
     }

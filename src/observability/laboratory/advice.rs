@@ -13,7 +13,7 @@ use super::mechanism::LaboratoryJoint;
 use crate::estimator::{
     EstimatorOptions, LandmarkModel, NavigationState, PoseKnowledge, SupposedFrame, SupposedLandmark, SupposedWindow,
 };
-use crate::geometry::{RigidTransform, ns_from_seconds, so3};
+use crate::geometry::{Dimension, RigidTransform, ns_from_seconds, so3};
 use crate::sensors::ImuSample;
 use crate::simulation::{Exercise, JOINT_PERIOD_S, JointSwing, SWING_M, VehicleSwing, YAW_SWING_RAD};
 
@@ -62,8 +62,9 @@ pub struct WeakDirection {
     pub leading: String,
     /// The deviation of the leading parameter that belongs to one sigma along the direction, in radians or metres.
     pub leading_sigma: f64,
-    /// Unit of the leading parameter.
-    pub unit: &'static str,
+    /// Dimension of the leading parameter.
+    #[serde(rename = "unit")]
+    pub dimension: Dimension,
 }
 
 /// A candidate and what it would leave.
@@ -128,11 +129,12 @@ impl WeakDirection {
     fn new(situation: &Situation, direction: &DVector<f64>, sigma: f64) -> Self {
         let leading = direction.iamax();
         let flip = direction[leading].signum();
-        let names = situation.chain.parameter_names();
+        let parameters = situation.chain.parameters();
+        let names: Vec<String> = parameters.iter().map(|parameter| situation.names.name(*parameter)).collect();
         Self {
             leading: names[leading].clone(),
             leading_sigma: sigma * direction[leading].abs() * situation.scale()[leading],
-            unit: situation.chain.parameter_units()[leading],
+            dimension: parameters[leading].dimension(),
             weights: direction.iter().map(|weight| weight * flip).collect(),
             names,
             sigma,
@@ -375,10 +377,9 @@ impl Advice {
 
 impl fmt::Display for WeakDirection {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (size, unit) = if self.unit == "rad" {
-            (self.leading_sigma.to_degrees(), "°")
-        } else {
-            (self.leading_sigma * 1e3, " mm")
+        let (size, unit) = match self.dimension {
+            Dimension::Angle => (self.leading_sigma.to_degrees(), "°"),
+            _ => (self.leading_sigma * 1e3, " mm"),
         };
         write!(out, "{} (±{size:.2}{unit}", self.leading)?;
         let others =

@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::super::analysis::measured_information;
 use crate::estimator::{Motion, SupposedFrame, SupposedLandmark, SupposedWindow};
 use crate::geometry::{RigidTransform, so3};
-use crate::gimbal::Chain;
+use crate::gimbal::{Chain, ParameterNames};
 
 /// The gain of information by parameter and by motion over a window.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -38,7 +38,12 @@ pub struct ParameterExcitation {
 /// the landmarks where they are and seen by the same frames. `None` for windows without length or finite numbers.
 ///
 /// What is missing without each motion need not add up to the whole: two motions may tell the same, or only together.
-pub fn excitation(window: &SupposedWindow, chain: &Chain, joint_names: &[String]) -> Option<Excitation> {
+pub fn excitation(
+    window: &SupposedWindow,
+    chain: &Chain,
+    joint_names: &[String],
+    names: &ParameterNames,
+) -> Option<Excitation> {
     let (first, last) = (window.frames.first()?, window.frames.last()?);
     let duration_s = last.time_s - first.time_s;
     if duration_s <= 0.0 {
@@ -51,8 +56,8 @@ pub fn excitation(window: &SupposedWindow, chain: &Chain, joint_names: &[String]
         motions.par_iter().map(|motion| variances(&without(window, chain, *motion), chain)).collect();
     let without = without.into_iter().collect::<Option<Vec<_>>>()?;
     let bits = |more: f64, less: f64| 0.5 * (more / less).log2() / duration_s;
-    let parameters = chain.parameter_names().into_iter().enumerate().map(|(column, name)| ParameterExcitation {
-        name,
+    let parameters = chain.parameters().into_iter().enumerate().map(|(column, parameter)| ParameterExcitation {
+        name: names.name(parameter),
         // In units of the prior the variance begins at 1.
         bits_per_s: bits(1.0, whole[column]),
         by_motion: without.iter().map(|variances| bits(variances[column], whole[column])).collect(),

@@ -9,8 +9,8 @@ use crate::camera::CameraModel;
 use crate::estimator::{
     JointKnowledge, LandmarkModel, PoseKnowledge, SupposedFrame, SupposedLandmark, SupposedWindow, gravity_in_world,
 };
-use crate::geometry::SplitMix64;
-use crate::gimbal::{Chain, Parameterization};
+use crate::geometry::{Dimension, SplitMix64};
+use crate::gimbal::{Chain, ParameterId, Parameterization};
 use crate::observability::{RankReport, analyse};
 use crate::sensors::ImuNoise;
 
@@ -90,7 +90,7 @@ const VIEW: [f64; 2] = [0.6, 0.45];
 /// A landmark is seen by every camera that has it this far in front of it.
 const LEAST_DEPTH_M: f64 = 1.0;
 /// Standard deviations of the chain's numbers with the priors kept in: 3 cm and 10°, the scale of the columns.
-const CHAIN_PRIOR: (f64, f64) = (0.03, 10.0 * std::f64::consts::PI / 180.0);
+const CHAIN_PRIOR: (f64, f64) = (Dimension::Length.scale(), Dimension::Angle.scale());
 
 /// The inertial sensor of an experiment without a rig: the ADIS16448 that the paper flew, as `RotorS` gives it.
 pub const LABORATORY_IMU: ImuNoise = ImuNoise {
@@ -140,7 +140,7 @@ impl LaboratorySetup {
             let chain = form.chain(&self.mechanism);
             let linearization = window.linearize(&self.mechanism.chain, form.parameterization, form.joint_offsets);
             let Some(rank) = analyse(&linearization, &chain, &angles, free) else { continue };
-            if !each(LaboratoryResult { form: *form, units: chain.parameter_units(), rank }) {
+            if !each(LaboratoryResult { form: *form, rank }) {
                 return;
             }
         }
@@ -215,8 +215,6 @@ impl LaboratorySetup {
 pub struct LaboratoryResult {
     /// The form.
     pub form: LaboratoryForm,
-    /// Unit of each column, `rad` or `m`.
-    pub units: Vec<&'static str>,
     /// Its ranks and directions.
     pub rank: RankReport,
 }
@@ -245,12 +243,12 @@ impl LaboratoryResult {
         }
     }
 
-    /// Names of the parameters that take part in null directions, in column order.
-    pub fn null_names(&self) -> Vec<&str> {
+    /// The parameters that take part in null directions, in column order.
+    pub fn null_parameters(&self) -> Vec<ParameterId> {
         let null: Vec<_> = self.rank.directions.iter().filter(|direction| direction.structural).collect();
         let takes_part = |column: usize| null.iter().any(|direction| direction.weights[column].abs() > TAKES_PART);
-        let named = self.rank.names.iter().enumerate().filter(|(column, _)| takes_part(*column));
-        named.map(|(_, name)| name.as_str()).collect()
+        let named = self.rank.parameters.iter().enumerate().filter(|(column, _)| takes_part(*column));
+        named.map(|(_, parameter)| *parameter).collect()
     }
 }
 

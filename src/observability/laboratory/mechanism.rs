@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use thiserror::Error;
 
 use crate::geometry::{RigidTransform, SplitMix64, so3};
-use crate::gimbal::{ClassicalChain, DhLink};
+use crate::gimbal::{ClassicalChain, DhLink, ParameterNames};
 use crate::sensors::Rig;
 
 /// A joint of a mechanism.
@@ -27,6 +27,8 @@ pub struct Mechanism {
     pub chain: ClassicalChain,
     /// Its joints.
     pub joints: Vec<LaboratoryJoint>,
+    /// What its parameters are called.
+    pub names: ParameterNames,
 }
 
 /// A name that no mechanism has.
@@ -127,7 +129,7 @@ impl Mechanism {
         let joints = (1..=chain.joint_count())
             .map(|joint| LaboratoryJoint { name: format!("joint {joint}"), limits_rad: (-PI, PI) })
             .collect();
-        Ok(Self { name: name.to_owned(), chain, joints })
+        Ok(Self { name: name.to_owned(), chain, joints, names: ParameterNames::default() })
     }
 
     /// The mechanism that carries a rig's camera; `None` when the rig has no such camera.
@@ -136,7 +138,7 @@ impl Mechanism {
         let joints = rig.gimbal.iter().flat_map(|gimbal| &gimbal.joints).take(chain.joint_count());
         let joints =
             joints.map(|joint| LaboratoryJoint { name: joint.name.clone(), limits_rad: joint.limits_rad }).collect();
-        Some(Self { name: rig.name.clone(), chain, joints })
+        Some(Self { name: rig.name.clone(), chain, joints, names: ParameterNames::default() })
     }
 }
 

@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::{Deficit, FRAME_PERIOD_S, LaboratoryResult, LaboratorySetup, PIXEL_SIGMA_PX};
 use crate::estimator::{JointKnowledge, PoseKnowledge};
+use crate::gimbal::ParameterNames;
 use crate::observability::CalibrationDirection;
 
 /// What came of an experiment in several forms.
@@ -135,25 +136,30 @@ impl LaboratoryReport {
             frame_period_s: FRAME_PERIOD_S,
             landmarks: setup.landmarks,
             pixel_sigma_px: PIXEL_SIGMA_PX,
-            forms: results.iter().map(FormReport::new).collect(),
+            forms: results.iter().map(|result| FormReport::new(result, &setup.mechanism.names)).collect(),
         }
     }
 }
 
 impl FormReport {
-    fn new(result: &LaboratoryResult) -> Self {
+    fn new(result: &LaboratoryResult, names: &ParameterNames) -> Self {
         let rank = &result.rank;
+        let columns: Vec<String> = rank.parameters.iter().map(|parameter| names.name(*parameter)).collect();
         Self {
             form: result.form.name(),
-            names: rank.names.clone(),
+            directions: rank.directions.iter().map(|it| DirectionReport::new(it, &columns)).collect(),
+            names: columns,
             rank_structural: rank.rank_structural,
             rank_informed: rank.rank_informed,
             deficit: result.deficit(),
             singular_values: rank.singular_values.clone(),
             structural_threshold: rank.structural_threshold,
             informed_threshold: rank.informed_threshold,
-            margins: rank.margins.iter().map(|(lock, margin)| Margin { lock: lock.clone(), margin: *margin }).collect(),
-            directions: rank.directions.iter().map(|it| DirectionReport::new(it, &rank.names)).collect(),
+            margins: rank
+                .margins
+                .iter()
+                .map(|(singularity, margin)| Margin { lock: names.singularity(*singularity), margin: *margin })
+                .collect(),
             known: rank
                 .known
                 .iter()

@@ -2,12 +2,11 @@
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use super::super::classification::{ROTATION_SCALE_RAD, TRANSLATION_SCALE_M};
 use super::mechanism::LaboratoryJoint;
 use super::{LaboratoryForm, LaboratorySetup};
 use crate::camera::CameraModel;
 use crate::estimator::{JointKnowledge, NavigationState, PoseKnowledge, StepReport, gravity_in_world};
-use crate::gimbal::Chain;
+use crate::gimbal::{Chain, ParameterNames};
 use crate::observability::{RankReport, analyse, chain_of_step};
 use crate::sensors::{ImuNoise, Rig};
 
@@ -20,6 +19,8 @@ pub struct Situation {
     pub chain: Chain,
     /// Its joints.
     pub joints: Vec<LaboratoryJoint>,
+    /// What its parameters are called.
+    pub names: ParameterNames,
     /// What is known of the calibration, as information of its columns in units of 10° and 3 cm.
     pub information: DMatrix<f64>,
     /// Pose, velocity and biases.
@@ -48,8 +49,8 @@ impl Situation {
     /// The moment after a step of a run with a rig's camera; `None` while there is no rank.
     pub fn of_step(report: &StepReport, rank: &RankReport, rig: &Rig, camera_key: &str) -> Option<Self> {
         let newest = report.newest()?;
-        let chain = chain_of_step(report, rank).filter(|_| rank.posterior.columns() == rank.names.len())?;
-        let free: Vec<bool> = chain.parameter_names().iter().map(|name| !rank.held.contains(name)).collect();
+        let chain = chain_of_step(report, rank).filter(|_| rank.posterior.columns() == rank.parameters.len())?;
+        let free: Vec<bool> = chain.parameters().iter().map(|parameter| !rank.held.contains(parameter)).collect();
         let count = free.iter().filter(|free| **free).count();
         let information = spread(&marginal(rank.posterior.information(), count)?, &free);
         let sigma_of_joints = newest.encoder_sigmas_rad.as_ref().and_then(|sigmas| mean(sigmas));
@@ -63,6 +64,7 @@ impl Situation {
             joints: joints
                 .map(|joint| LaboratoryJoint { name: joint.name.clone(), limits_rad: joint.limits_rad })
                 .collect(),
+            names: ParameterNames::default(),
             information,
             navigation: NavigationState {
                 world_from_imu: newest.world_from_imu,
@@ -98,6 +100,7 @@ impl Situation {
         Some(Self {
             camera: setup.camera.clone(),
             joints: setup.mechanism.joints.clone(),
+            names: setup.mechanism.names.clone(),
             information: rank.posterior.information(),
             navigation: last.navigation,
             joints_rad: last.joints_rad.clone(),
@@ -122,9 +125,8 @@ impl Situation {
 
     /// One unit of each column: 10° or 3 cm.
     pub(super) fn scale(&self) -> DVector<f64> {
-        let units = self.chain.parameter_units();
-        let scale = |unit: &&str| if *unit == "rad" { ROTATION_SCALE_RAD } else { TRANSLATION_SCALE_M };
-        DVector::from_iterator(units.len(), units.iter().map(scale))
+        let parameters = self.chain.parameters();
+        DVector::from_iterator(parameters.len(), parameters.iter().map(|parameter| parameter.dimension().scale()))
     }
 }
 

@@ -14,7 +14,7 @@ use super::LaboratoryForm;
 use super::table::setup;
 use super::truth::{Joints, Poses};
 use crate::estimator::SupposedWindow;
-use crate::geometry::{SplitMix64, dense};
+use crate::geometry::{Dimension, SplitMix64, dense};
 use crate::gimbal::{Chain, ClassicalChain, Parameterization};
 use crate::observability::analysis::measured_block;
 
@@ -146,9 +146,12 @@ fn stacked_singular_values(old: &DMatrix<f64>, new: &DMatrix<f64>) -> Option<Vec
 fn changed(chain: &ClassicalChain, (degrees, millimetres): (f64, f64), seed: u64) -> ClassicalChain {
     let chain = Chain::from_classical(chain, Parameterization::Classical);
     let mut random = SplitMix64::new(seed);
-    let units = chain.parameter_units();
-    let change = DVector::from_fn(units.len(), |column, _| {
-        let most = if units[column] == "rad" { degrees.to_radians() } else { millimetres * 1e-3 };
+    let parameters = chain.parameters();
+    let change = DVector::from_fn(parameters.len(), |column, _| {
+        let most = match parameters[column].dimension() {
+            Dimension::Angle => degrees.to_radians(),
+            _ => millimetres * 1e-3,
+        };
         most * (2.0 * random.next_unit() - 1.0)
     });
     chain.plus(&change).to_classical()

@@ -9,7 +9,7 @@ use super::spurious::{self, SpuriousRow};
 use super::truth::{Column, Joints, LEAST_FRAMES, LeastFrames, Poses, SECTIONS, Truth};
 use super::{Deficit, LABORATORY_IMU, LaboratoryForm, LaboratoryResult, LaboratorySetup, Mechanism};
 use crate::estimator::{JointKnowledge, PoseKnowledge};
-use crate::gimbal::Parameterization;
+use crate::gimbal::{ParameterNames, Parameterization};
 
 /// The least numbers of frames are looked for up to here.
 const MOST_FRAMES: usize = 16;
@@ -132,7 +132,7 @@ fn measure(truth: &Truth) -> Option<TableRow> {
         .map(|((column, expected), result)| TableEntry {
             form: result.form.name(),
             column: column.name().to_owned(),
-            columns: result.rank.names.len(),
+            columns: result.rank.parameters.len(),
             measured: result.rank.rank_structural,
             expected: *expected,
         })
@@ -141,7 +141,10 @@ fn measure(truth: &Truth) -> Option<TableRow> {
     let null_of_minimal = results
         .iter()
         .find(|result| result.form == minimal)
-        .map_or_else(Vec::new, |result| result.null_names().into_iter().map(str::to_owned).collect::<Vec<_>>());
+        .map_or_else(Vec::new, |result| result.null_parameters())
+        .into_iter()
+        .map(|parameter| ParameterNames::default().name(parameter))
+        .collect::<Vec<_>>();
     let expected = truth.causes.map(|[parameterization, joints, absorbed, motion]| Deficit {
         parameterization,
         joints,
@@ -187,7 +190,7 @@ fn least_frames(truth: &LeastFrames) -> Option<TableRow> {
             entries: vec![TableEntry {
                 form: form.name(),
                 column: "frames".to_owned(),
-                columns: result.rank.names.len(),
+                columns: result.rank.parameters.len(),
                 measured: frames,
                 expected: frames.clamp(least, most),
             }],

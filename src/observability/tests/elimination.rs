@@ -1,8 +1,8 @@
 use nalgebra::DMatrix;
 
-use crate::estimator::{ColumnBlock, ColumnGroup, Linearization};
+use crate::estimator::{ColumnBlock, ColumnGroup, ColumnId, FrameId, Linearization};
 use crate::gimbal::tests::random::Random;
-use crate::gimbal::{Chain, Parameterization};
+use crate::gimbal::{Chain, ParameterId, ParameterNames, Parameterization};
 use crate::observability::analyse;
 
 const FRAMES: usize = 11;
@@ -16,7 +16,7 @@ const COLUMNS: usize = SPEEDS_START + 9 * FRAMES;
 
 /// A random linearization with the sparsity of a real one, in which the poses' columns depend on each other as in a
 /// visual-inertial window: four directions of all poses and speeds move nothing.
-fn window(random: &mut Random, names: &[String]) -> Linearization {
+fn window(random: &mut Random, parameters: &[ParameterId]) -> Linearization {
     let mut jacobian = DMatrix::zeros(66 + 15 * (FRAMES - 1) + JOINTS * FRAMES, COLUMNS);
     let mut fill =
         |jacobian: &mut DMatrix<f64>, rows: std::ops::Range<usize>, columns: std::ops::Range<usize>, size: f64| {
@@ -52,24 +52,17 @@ fn window(random: &mut Random, names: &[String]) -> Linearization {
         fill(&mut prior_jacobian, row..row + 1, row.min(after)..after, 10.0);
         fill(&mut prior_jacobian, row..row + 1, SPEEDS_START..SPEEDS_START + 9, 10.0);
     }
-    let mut columns: Vec<_> = names
+    let mut columns: Vec<_> = parameters
         .iter()
         .enumerate()
-        .map(|(start, name)| ColumnBlock { group: ColumnGroup::Calibration, name: name.clone(), start, len: 1 })
+        .map(|(start, parameter)| ColumnBlock { id: ColumnId::Calibration(*parameter), start, len: 1 })
         .collect();
-    let groups = [
-        (ColumnGroup::Joints, JOINTS_START, JOINTS),
-        (ColumnGroup::Pose, POSES_START, 6),
-        (ColumnGroup::SpeedBias, SPEEDS_START, 9),
-    ];
-    for (group, start, len) in groups {
-        columns.extend((0..FRAMES).map(|slot| ColumnBlock {
-            group,
-            name: format!("{slot}"),
-            start: start + len * slot,
-            len,
-        }));
-    }
+    let blocks = |id: fn(FrameId) -> ColumnId, start: usize, len: usize| {
+        (0..FRAMES).map(move |slot| ColumnBlock { id: id(FrameId(slot)), start: start + len * slot, len })
+    };
+    columns.extend(blocks(ColumnId::Joints, JOINTS_START, JOINTS));
+    columns.extend(blocks(ColumnId::Pose, POSES_START, 6));
+    columns.extend(blocks(ColumnId::VelocityBias, SPEEDS_START, 9));
     let calibration_column_norms = nalgebra::DVector::from_fn(CALIBRATION, |column, _| jacobian.column(column).norm());
     Linearization {
         columns,
@@ -107,10 +100,9 @@ fn chain() -> Chain {
 fn elimination_by_blocks_is_the_projection() {
     let mut random = Random::new(32);
     let chain = chain();
-    let units = chain.parameter_units();
-    let scale: Vec<f64> = units.iter().map(|unit| if *unit == "rad" { 10_f64.to_radians() } else { 0.03 }).collect();
+    let scale: Vec<f64> = chain.parameters().iter().map(|parameter| parameter.dimension().scale()).collect();
     for _ in 0..3 {
-        let linearization = window(&mut random, &chain.parameter_names());
+        let linearization = window(&mut random, &chain.parameters());
         let angles: Vec<_> = (0..FRAMES).map(|_| random.angles(JOINTS)).collect();
         let report = analyse(&linearization, &chain, &angles, false).unwrap();
         let jacobian = &linearization.jacobian;
@@ -130,7 +122,7 @@ fn elimination_by_blocks_is_the_projection() {
 #[test]
 fn a_linearization_that_is_not_finite_has_no_ranks() {
     let chain = chain();
-    let mut linearization = window(&mut Random::new(33), &chain.parameter_names());
+    let mut linearization = window(&mut Random::new(33), &chain.parameters());
     linearization.jacobian[(3, 5)] = f64::NAN;
     assert_eq!(analyse::<Vec<f64>>(&linearization, &chain, &[], false), None);
 }
@@ -138,7 +130,7 @@ fn a_linearization_that_is_not_finite_has_no_ranks() {
 #[test]
 fn empty_linearizations_are_analysed() {
     let chain = chain();
-    let mut linearization = window(&mut Random::new(34), &chain.parameter_names());
+    let mut linearization = window(&mut Random::new(34), &chain.parameters());
     linearization.jacobian = DMatrix::zeros(0, COLUMNS);
     linearization.prior_jacobian = DMatrix::zeros(0, COLUMNS);
     linearization.calibration_column_norms.fill(0.0);
@@ -147,9 +139,9 @@ fn empty_linearizations_are_analysed() {
     assert_eq!(report.singular_values, vec![0.0; CALIBRATION]);
     assert_eq!(report.directions.len(), CALIBRATION);
     // Nothing to calibrate at all, as in a run with a given calibration.
-    linearization.columns.retain(|block| block.group != ColumnGroup::Calibration);
+    linearization.columns.retain(|block| block.id.group() != ColumnGroup::Calibration);
     linearization.calibration_column_norms = nalgebra::DVector::zeros(0);
     let report = analyse(&linearization, &chain, &[vec![0.0; JOINTS]], false).unwrap();
-    assert!(report.names.is_empty() && report.singular_values.is_empty());
-    assert_eq!(report.verdict(), "0 of 0 structural; 0 informed");
+    assert!(report.parameters.is_empty() && report.singular_values.is_empty());
+    assert_eq!(report.verdict(&ParameterNames::default()), "0 of 0 structural; 0 informed");
 }

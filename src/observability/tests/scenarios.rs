@@ -5,9 +5,9 @@ use nalgebra::{DMatrix, DVector, UnitQuaternion, Vector3};
 use super::window::{Landmark, Window};
 use crate::camera::CameraModel;
 use crate::estimator::Linearization;
-use crate::geometry::{RigidTransform, so3};
+use crate::geometry::{Dimension, RigidTransform, so3};
 use crate::gimbal::tests::random::{Random, special_chains};
-use crate::gimbal::{Chain, ClassicalChain, Parameterization};
+use crate::gimbal::{Chain, ClassicalChain, ParameterId, ParameterNames, Parameterization};
 use crate::observability::{KnownLoss, RankReport, ScalingRule, analyse, analyse_with_scaling};
 
 const FRAMES: usize = 10;
@@ -133,8 +133,10 @@ fn every_loss_is_put_down_to_its_cause() {
         for parameterization in [Parameterization::Minimal, Parameterization::Poe, Parameterization::Classical] {
             let Case { report, chain } = case(offsets, motion, joints_free, parameterization);
             let redundant = chain.dof() - 18;
-            let context =
-                format!("{motion:?}, free {joints_free}, offsets {offsets}, {parameterization}: {}", report.verdict());
+            let context = format!(
+                "{motion:?}, free {joints_free}, offsets {offsets}, {parameterization}: {}",
+                report.verdict(&ParameterNames::default())
+            );
             assert_eq!(deficits(&report), [redundant, expected[1], expected[2], expected[3]], "{context}");
             assert_eq!(report.rank_structural, 18 - expected.iter().sum::<usize>(), "{context}");
             let structural = report.directions.iter().filter(|direction| direction.structural).count();
@@ -152,11 +154,11 @@ fn every_loss_is_put_down_to_its_cause() {
 #[test]
 fn known_parameters_carry_the_null_directions() {
     let null_names = |case: &Case| -> Vec<String> {
-        let names = &case.report.names;
+        let parameters = &case.report.parameters;
         let structural = case.report.directions.iter().filter(|direction| direction.structural);
         let mut found: Vec<String> = structural
-            .flat_map(|direction| names.iter().zip(&direction.weights).filter(|(_, weight)| weight.abs() > 1e-6))
-            .map(|(name, _)| name.clone())
+            .flat_map(|direction| parameters.iter().zip(&direction.weights).filter(|(_, weight)| weight.abs() > 1e-6))
+            .map(|(parameter, _)| ParameterNames::default().name(*parameter))
             .collect();
         found.sort();
         found.dedup();
@@ -171,7 +173,9 @@ fn known_parameters_carry_the_null_directions() {
     assert_eq!(null_names(&case(true, Motion::NeverRotates, false, minimal)), ["I.tx", "I.ty", "L1.d"]);
     assert_eq!(null_names(&case(true, Motion::CameraNeverRotates, false, minimal)), ["L3.a", "L3.d", "L3.y"]);
     // An informed window is told in a line, a weak one names its weakest parameter.
-    let verdict = case(true, Motion::Exciting, false, Parameterization::Classical).report.verdict();
+    let verdict = case(true, Motion::Exciting, false, Parameterization::Classical).report;
+    let names = ParameterNames::default();
+    let verdict = verdict.verdict(&names);
     assert_eq!(verdict, "18 of 24 structural; 6 redundant in the parameterization; 18 informed");
     let hover = case(true, Motion::Hover, true, minimal).report;
     let weak = hover.rank_structural - hover.rank_informed;
@@ -180,21 +184,19 @@ fn known_parameters_carry_the_null_directions() {
         hover.rank_structural, hover.deficit_motion, hover.rank_informed
     );
     let expected = match hover.weakest() {
-        Some(name) if weak > 0 => format!("{expected}; weakest {name}"),
+        Some(parameter) if weak > 0 => format!("{expected}; weakest {}", names.name(parameter)),
         _ => expected,
     };
-    assert_eq!(hover.verdict(), expected);
+    assert_eq!(hover.verdict(&names), expected);
 }
 
 #[test]
 fn moving_along_a_redundant_direction_leaves_the_camera_where_it_was() {
     let Case { report, chain } = case(true, Motion::Exciting, false, Parameterization::Classical);
-    let units = chain.parameter_units();
+    let parameters = chain.parameters();
     let mut random = Random::new(43);
     for direction in report.directions.iter().filter(|direction| direction.structural) {
-        let step = DVector::from_fn(24, |index, _| {
-            direction.weights[index] * if units[index] == "rad" { 10_f64.to_radians() } else { 0.03 }
-        });
+        let step = DVector::from_fn(24, |index, _| direction.weights[index] * parameters[index].dimension().scale());
         let angles = random.angles(3);
         let shift = |scale: f64| {
             let moved = chain.plus(&(&step * scale)).imu_from_camera(&angles);
@@ -202,12 +204,12 @@ fn moving_along_a_redundant_direction_leaves_the_camera_where_it_was() {
         };
         assert!(shift(1e-4) < 1e-8, "{}", shift(1e-4));
         // Any single parameter of it moves the camera by far more.
-        let leading = direction.leading(&report.names).unwrap();
-        let index = report.names.iter().position(|name| name == leading).unwrap();
+        let leading = direction.leading(&report.parameters).unwrap();
+        let index = report.parameters.iter().position(|parameter| *parameter == leading).unwrap();
         let mut alone = DVector::zeros(24);
         alone[index] = step[index] * 1e-4;
         let moved = chain.plus(&alone).imu_from_camera(&angles).minus(&chain.imu_from_camera(&angles)).norm();
-        assert!(moved > 1e-7, "{leading}: {moved}");
+        assert!(moved > 1e-7, "{leading:?}: {moved}");
     }
 }
 
@@ -232,7 +234,7 @@ fn known_and_measured_redundancy_agree() {
     let half = inconsistent.jacobian.nrows() / 2;
     inconsistent.jacobian.rows_mut(0, half).copy_from(&mixed.jacobian.rows(0, half));
     let report = analyse(&inconsistent, &chain, &window.joint_angles_rad, false).unwrap();
-    assert!(report.rank_structural > 18, "{}", report.verdict());
+    assert!(report.rank_structural > 18, "{}", report.verdict(&ParameterNames::default()));
     let wrong: Vec<_> = report.known.iter().filter(|known| !known.agrees).collect();
     assert!(!wrong.is_empty() && wrong.iter().any(|known| known.response > 1e-6), "{:?}", report.known);
     // A prior that was linearized there claims it; the rig's prior may, and one from here claims nothing.
@@ -280,7 +282,12 @@ fn neighbours_on_parallel_axes_lose_what_is_said() {
         let losses: Vec<_> = report.known.iter().map(|known| known.loss).collect();
         assert_eq!(losses, expected, "{name}");
         assert_eq!(report.known_agreeing(), losses.len(), "{name}: {:?}", report.known);
-        assert_eq!(report.deficit_parameterization, losses.len(), "{name}: {}", report.verdict());
+        assert_eq!(
+            report.deficit_parameterization,
+            losses.len(),
+            "{name}: {}",
+            report.verdict(&ParameterNames::default())
+        );
     }
 }
 
@@ -290,8 +297,8 @@ fn priors_and_scales_add_up() {
     let window = window(&classical, Motion::Hover);
     let chain = Chain::from_classical(&classical, Parameterization::Minimal);
     let mut linearization = window.linearize(&chain, false);
-    let units = chain.parameter_units();
-    let sigmas: Vec<f64> = units.iter().map(|unit| if *unit == "rad" { 0.01 } else { 0.003 }).collect();
+    let sigma = |parameter: &ParameterId| if parameter.dimension() == Dimension::Angle { 0.01 } else { 0.003 };
+    let sigmas: Vec<f64> = chain.parameters().iter().map(sigma).collect();
     linearization.prior_jacobian =
         DMatrix::from_diagonal(&DVector::from_iterator(18, sigmas.iter().map(|sigma| 1.0 / sigma)));
     let scaling = ScalingRule::PriorSigmas(sigmas);

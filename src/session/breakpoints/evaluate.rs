@@ -3,7 +3,7 @@
 use super::expression::{Arithmetic, Condition, Number, Span, Truth};
 use super::quantities::NamedNumber;
 use crate::estimator::ResidualSummary;
-use crate::sensors::Rig;
+use crate::gimbal::{ParameterId, ParameterNames};
 use crate::session::record::StepRecord;
 
 /// A step as a condition sees it.
@@ -13,8 +13,8 @@ pub struct Moment<'a> {
     pub step: &'a StepRecord,
     /// The step before it.
     pub previous: Option<&'a StepRecord>,
-    /// The rig, which names the joints.
-    pub rig: &'a Rig,
+    /// What parameters and joints are called.
+    pub names: &'a ParameterNames,
 }
 
 /// A quantity of a condition with its value in a step.
@@ -47,15 +47,15 @@ impl Condition {
     }
 
     /// Parameters and joints that it names and that are not among these; a name of neither kind can never be found.
-    pub fn unknown_names(&self, rig: &Rig, parameters: &[String]) -> Vec<String> {
+    pub fn unknown_names(&self, names: &ParameterNames, parameters: &[ParameterId]) -> Vec<String> {
         let mut unknown = Vec::new();
         self.truth.visit(&mut |_, number| {
             if let Number::Named(kind, name, _) = number {
                 let known = match kind {
                     NamedNumber::Sigma | NamedNumber::PriorSigma | NamedNumber::Value => {
-                        parameters.contains(&column_name(name, rig))
+                        names.parse(name).is_some_and(|parameter| parameters.contains(&parameter))
                     }
-                    NamedNumber::Joint => joint_index(name, rig).is_some(),
+                    NamedNumber::Joint => joint_index(name, names).is_some(),
                     NamedNumber::Margin | NamedNumber::Lost | NamedNumber::Chi2 | NamedNumber::Nis => true,
                 };
                 if !known && !unknown.contains(name) {
@@ -116,7 +116,7 @@ impl Number {
             Self::Named(kind, name, _) => named(*kind, name, moment)?,
             Self::Singular(index, _) => *moment.step.rank.as_ref()?.singular_values.get(index.checked_sub(1)?)?,
             Self::Rise(inner, _) => {
-                let before = Moment { step: moment.previous?, previous: None, rig: moment.rig };
+                let before = Moment { step: moment.previous?, previous: None, names: moment.names };
                 inner.value(moment)? - inner.value(&before)?
             }
             Self::Negated(inner) => -inner.value(moment)?,
@@ -157,16 +157,19 @@ fn named(kind: NamedNumber, name: &str, moment: &Moment<'_>) -> Option<f64> {
     let report = &moment.step.report;
     let calibration = &report.calibration;
     let parameter = |values: &[f64]| {
-        let column = column_name(name, moment.rig);
-        values.get(calibration.names.iter().position(|known| *known == column)?).copied()
+        let parameter = moment.names.parse(name)?;
+        values.get(calibration.parameters.iter().position(|known| *known == parameter)?).copied()
     };
-    let factor = || report.residuals.iter().find(|summary| summary.factor.replace(' ', "_") == name);
+    let factor = || report.residuals.iter().find(|summary| summary.factor.key() == name);
     match kind {
         NamedNumber::Sigma => parameter(&calibration.sigmas),
         NamedNumber::PriorSigma => parameter(&calibration.prior_sigmas),
         NamedNumber::Value => parameter(&calibration.values),
-        NamedNumber::Joint => report.newest()?.joint_angles_rad.get(joint_index(name, moment.rig)?).copied(),
-        NamedNumber::Margin => calibration.margins.iter().find(|(known, _)| known == name).map(|(_, margin)| *margin),
+        NamedNumber::Joint => report.newest()?.joint_angles_rad.get(joint_index(name, moment.names)?).copied(),
+        NamedNumber::Margin => {
+            let singularity = moment.names.parse_singularity(name)?;
+            calibration.margins.iter().find(|(known, _)| *known == singularity).map(|(_, margin)| *margin)
+        }
         NamedNumber::Lost => {
             let rank = moment.step.rank.as_ref()?;
             let count = match name {
@@ -183,15 +186,6 @@ fn named(kind: NamedNumber, name: &str, moment: &Moment<'_>) -> Option<f64> {
     }
 }
 
-/// The column that a parameter is called by in the reports: `yaw.alpha` is `L1.alpha` where yaw is the first joint.
-pub(in crate::session) fn column_name(name: &str, rig: &Rig) -> String {
-    let of_joint = name.rsplit_once('.').and_then(|(joint, quantity)| {
-        let number = joint_index(joint, rig)? + 1;
-        Some(format!("L{number}.{quantity}"))
-    });
-    of_joint.unwrap_or_else(|| name.to_owned())
-}
-
-fn joint_index(name: &str, rig: &Rig) -> Option<usize> {
-    rig.gimbal.as_ref()?.joints.iter().position(|joint| joint.name == name)
+fn joint_index(name: &str, names: &ParameterNames) -> Option<usize> {
+    names.joints.iter().position(|joint| joint == name)
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::evaluate::{Moment, NamedValue};
 use super::expression::Condition;
-use crate::sensors::Rig;
+use crate::gimbal::ParameterNames;
 use crate::session::record::{Recording, RunRecord};
 
 /// A step in which a breakpoint was hit.
@@ -56,12 +56,12 @@ impl Breakpoint {
         self.tracks.get(&run.id).into_iter().flat_map(|track| track.hits.iter().map(|(stamp_ns, _)| *stamp_ns))
     }
 
-    fn read(&mut self, runs: &[RunRecord], rig: &Rig) {
+    fn read(&mut self, runs: &[RunRecord], names: &ParameterNames) {
         self.tracks.retain(|id, _| runs.iter().any(|run| run.id == *id));
         for run in runs {
             let track = self.tracks.entry(run.id).or_default();
             for number in track.read..run.steps.len() {
-                let held = moment(run, number, rig).and_then(|moment| self.condition.holds(&moment)) == Some(true);
+                let held = moment(run, number, names).and_then(|moment| self.condition.holds(&moment)) == Some(true);
                 if held && !track.held {
                     track.hits.push((run.steps[number].report.stamp_ns, number));
                 }
@@ -73,9 +73,9 @@ impl Breakpoint {
 }
 
 /// A step of a run with the one before it.
-fn moment<'a>(run: &'a RunRecord, number: usize, rig: &'a Rig) -> Option<Moment<'a>> {
+fn moment<'a>(run: &'a RunRecord, number: usize, names: &'a ParameterNames) -> Option<Moment<'a>> {
     let previous = number.checked_sub(1).and_then(|before| run.steps.get(before));
-    Some(Moment { step: run.steps.get(number)?, previous: previous.map(|step| &**step), rig })
+    Some(Moment { step: run.steps.get(number)?, previous: previous.map(|step| &**step), names })
 }
 
 /// All breakpoints, evaluated as far as the runs have come.
@@ -126,8 +126,9 @@ impl Breakpoints {
 
     /// Evaluates all of them over the steps that are new.
     pub fn read(&mut self, recording: &Recording) {
+        let names = recording.rig.parameter_names();
         for breakpoint in &mut self.list {
-            breakpoint.read(&recording.runs, &recording.rig);
+            breakpoint.read(&recording.runs, &names);
         }
     }
 
@@ -171,7 +172,8 @@ impl Breakpoints {
     /// What a breakpoint asks for, with the values of a step.
     pub fn values_at(&self, recording: &Recording, hit: Hit) -> Vec<NamedValue> {
         let run = recording.runs.get(hit.run);
-        let moment = run.and_then(|run| moment(run, hit.step, &recording.rig));
+        let names = recording.rig.parameter_names();
+        let moment = run.and_then(|run| moment(run, hit.step, &names));
         let breakpoint = self.list.get(hit.breakpoint);
         breakpoint.zip(moment).map_or_else(Vec::new, |(breakpoint, moment)| breakpoint.condition.values(&moment))
     }

@@ -13,7 +13,6 @@ mod quantities;
 #[cfg(test)]
 mod tests;
 
-pub(super) use evaluate::column_name as joint_column_name;
 pub use evaluate::{Moment, NamedValue};
 pub use expression::{Condition, ConditionProblem};
 pub use list::{Breakpoint, Breakpoints, Hit};

@@ -2,7 +2,8 @@
 
 use super::expression::{Arithmetic, Condition, ConditionProblem, Number, Span, Truth};
 use super::lexer::{Token, words};
-use super::quantities::{CAUSES, EVENTS, FACTORS, FLAGS, NAMED, NUMBERS, NamedNumber};
+use super::quantities::{CAUSES, EVENTS, FLAGS, NAMED, NUMBERS, NamedNumber};
+use crate::estimator::FactorKind;
 
 /// Brackets and signs within each other; more is a mistake and would take too much of the stack.
 const DEEPEST: usize = 60;
@@ -326,10 +327,10 @@ impl Parser<'_> {
             return Err(self.problem_at(begin, unknown("function", function, known)));
         };
         let name = self.name(&format!("a name, as in {function}({example})"))?;
-        let choices: &[&str] = match kind {
-            NamedNumber::Lost => &CAUSES,
-            NamedNumber::Chi2 | NamedNumber::Nis => &FACTORS,
-            _ => &[],
+        let choices: Vec<&str> = match kind {
+            NamedNumber::Lost => CAUSES.into(),
+            NamedNumber::Chi2 | NamedNumber::Nis => FactorKind::ALL.map(FactorKind::key).into(),
+            _ => Vec::new(),
         };
         if !choices.is_empty() && !choices.contains(&name.as_str()) {
             let what = if *kind == NamedNumber::Lost { "cause" } else { "factor" };

@@ -32,7 +32,7 @@ const fn number(name: &'static str, meaning: &'static str, value: fn(&StepRecord
 pub(super) const NUMBERS: &[NumberName] = &[
     number("rank", "structural rank of the calibration", |step| Some(step.rank.as_ref()?.rank_structural as f64)),
     number("rank_informed", "informed rank", |step| Some(step.rank.as_ref()?.rank_informed as f64)),
-    number("columns", "calibration columns", |step| Some(step.rank.as_ref()?.names.len() as f64)),
+    number("columns", "calibration columns", |step| Some(step.rank.as_ref()?.parameters.len() as f64)),
     number("singular_min", "smallest singular value", |step| step.rank.as_ref()?.singular_values.last().copied()),
     number("margin", "least margin to a lock of the chart", |step| {
         step.report.calibration.margins.iter().map(|(_, margin)| *margin).reduce(f64::min)
@@ -111,10 +111,6 @@ pub(super) const NAMED: [(&str, NamedNumber, &str, &str); 8] = [
 
 /// Causes of lost rank.
 pub(super) const CAUSES: [&str; 4] = ["parameterization", "joints", "absorbed", "motion"];
-
-/// Factors, spaces written as underscores.
-pub(super) const FACTORS: [&str; 6] =
-    ["visual", "imu", "encoder", "calibration_prior", "marginalization_prior", "standstill"];
 
 /// Something that a step is or is not.
 #[derive(Clone, Copy, Debug)]

@@ -1,7 +1,8 @@
 use std::sync::Arc;
 
 use super::{Breakpoints, Condition, Moment};
-use crate::estimator::{Event, EventKind, IterationReport, ResidualSummary};
+use crate::estimator::{Event, EventKind, FactorKind, IterationReport, ResidualSummary};
+use crate::gimbal::tests::parameter;
 use crate::observability::RankReport;
 use crate::sensors::Rig;
 use crate::session::record::{Recording, RunRecord, StepRecord};
@@ -29,8 +30,8 @@ fn steps() -> [StepRecord; 2] {
     let report = &mut step.report;
     report.reprojection_rms_after_px = 0.4;
     report.residuals = vec![
-        ResidualSummary { factor: "visual", count: 200, chi2_before: 900.0, chi2_after: 100.0 },
-        ResidualSummary { factor: "calibration prior", count: 18, chi2_before: 9.0, chi2_after: 9.0 },
+        ResidualSummary { factor: FactorKind::Visual, count: 200, chi2_before: 900.0, chi2_after: 100.0 },
+        ResidualSummary { factor: FactorKind::CalibrationPrior, count: 18, chi2_before: 9.0, chi2_after: 9.0 },
     ];
     let iteration = |cost_before, cost_after, accepted| IterationReport {
         cost_before,
@@ -42,7 +43,7 @@ fn steps() -> [StepRecord; 2] {
     report.iterations = vec![iteration(100.0, 60.0, true), iteration(60.0, 75.0, false), iteration(60.0, 50.0, true)];
     report.events =
         vec![Event { kind: EventKind::OldestMarginalized, message: String::new(), value: None, threshold: None }];
-    let sigma = report.calibration.names.iter().position(|name| name == "L1.alpha").unwrap();
+    let sigma = report.calibration.parameters.iter().position(|known| *known == parameter("L1.alpha")).unwrap();
     report.calibration.sigmas[sigma] = 0.01;
     let rank: &mut RankReport = step.rank.as_mut().unwrap();
     (rank.rank_structural, rank.rank_informed) = (17, 12);
@@ -56,7 +57,7 @@ fn steps() -> [StepRecord; 2] {
 fn holds(text: &str) -> Option<bool> {
     let (rig, _) = sample();
     let [before, step] = steps();
-    condition(text).holds(&Moment { step: &step, previous: Some(&before), rig })
+    condition(text).holds(&Moment { step: &step, previous: Some(&before), names: &rig.parameter_names() })
 }
 
 #[test]
@@ -94,7 +95,7 @@ fn what_is_missing_decides_nothing() {
     let [_, mut step] = steps();
     step.rank = None;
     let check = |text: &str, expected: Option<bool>| {
-        let found = condition(text).holds(&Moment { step: &step, previous: None, rig });
+        let found = condition(text).holds(&Moment { step: &step, previous: None, names: &rig.parameter_names() });
         assert_eq!(found, expected, "{text}");
     };
     check("rank < 18", None);
@@ -154,10 +155,13 @@ fn mistakes_are_told_with_their_column() {
 #[test]
 fn names_that_no_run_has_are_found() {
     let (rig, run) = sample();
-    let names = &run.steps.last().unwrap().report.calibration.names;
-    let unknown = |text: &str| condition(text).unknown_names(rig, names);
+    let (names, parameters) = (rig.parameter_names(), &run.steps.last().unwrap().report.calibration.parameters);
+    let unknown = |text: &str| condition(text).unknown_names(&names, parameters);
     let joint = &rig.gimbal.as_ref().unwrap().joints[0].name;
-    assert_eq!(unknown(&format!("sigma(L1.alpha) > 1 and value({}) > 0", names[0])), Vec::<String>::new());
+    assert_eq!(
+        unknown(&format!("sigma(L1.alpha) > 1 and value({}) > 0", names.name(parameters[0]))),
+        Vec::<String>::new()
+    );
     assert_eq!(unknown(&format!("sigma({joint}.alpha) > 1 and joint({joint}) > 0")), Vec::<String>::new());
     assert_eq!(unknown("sigma(L1.alfa) > 1 and joint(wheel) > 0 or sigma(L1.alfa) < 0"), ["L1.alfa", "wheel"]);
 }
@@ -166,7 +170,8 @@ fn names_that_no_run_has_are_found() {
 fn the_values_of_a_condition_are_told_as_written() {
     let (rig, _) = sample();
     let [before, step] = steps();
-    let moment = Moment { step: &step, previous: Some(&before), rig };
+    let names = rig.parameter_names();
+    let moment = Moment { step: &step, previous: Some(&before), names: &names };
     let told: Vec<String> = condition("rank < 18 or rise(rms) > 0.1 and rank > chi2(imu) + 2")
         .values(&moment)
         .iter()

@@ -12,7 +12,7 @@ use crate::calibration::{
     GimbalCamera, StaticCamera, TrackedView,
 };
 use crate::flight_log::{FlightLog, LogError, LogWarning};
-use crate::geometry::{RigidTransform, ns_from_seconds, seconds_from_ns};
+use crate::geometry::{Dimension, RigidTransform, ns_from_seconds, seconds_from_ns};
 use crate::sensors::{CameraMount, CameraRig, ChainPrior, GimbalRig, Rig};
 use crate::session::plan::{ParameterizationChoice, RunSpec, SessionError};
 
@@ -260,8 +260,8 @@ fn views(
 /// The rig with what was found; its prior is the largest uncertainty of a parameter, as bounds of a uniform error.
 fn calibrated(rig: &Rig, parts: &RigParts, outcome: &CalibrationOutcome) -> Rig {
     let mut calibrated = rig.clone();
-    let largest = |unit: &str| {
-        let sigmas = outcome.parameters.iter().filter(|parameter| parameter.unit == unit);
+    let largest = |dimension: Dimension| {
+        let sigmas = outcome.parameters.iter().filter(|found| found.parameter.dimension() == dimension);
         BOUND_PER_SIGMA * sigmas.map(|parameter| parameter.sigma).fold(0.0, f64::max)
     };
     for camera in &mut calibrated.cameras {
@@ -274,7 +274,10 @@ fn calibrated(rig: &Rig, parts: &RigParts, outcome: &CalibrationOutcome) -> Rig 
     }
     if let Some(gimbal) = &mut calibrated.gimbal {
         gimbal.chain = outcome.chain.clone();
-        gimbal.prior = ChainPrior { translation_bound_m: largest("m"), rotation_bound_rad: largest("rad") };
+        gimbal.prior = ChainPrior {
+            translation_bound_m: largest(Dimension::Length),
+            rotation_bound_rad: largest(Dimension::Angle),
+        };
     }
     calibrated
 }

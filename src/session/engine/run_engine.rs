@@ -5,7 +5,8 @@ use super::step_inputs::Material;
 use super::stopwatch::Stopwatch;
 use crate::estimator::{Estimator, EstimatorConfig, StepInput, StepReport};
 use crate::frontend::TrackedFrame;
-use crate::gimbal::Chain;
+use crate::geometry::Dimension;
+use crate::gimbal::{Chain, ParameterId};
 use crate::observability::{RankReport, analyse};
 use crate::session::plan::Alterations;
 use crate::session::record::StepRecord;
@@ -124,8 +125,9 @@ impl RunEngine {
         let parameterization = calibration.parameterization.parse().ok()?;
         let chain = Chain::from_classical(&calibration.classical, parameterization);
         let rigid = RIGID_COLUMNS * calibration.rigid_cameras.len();
-        let clocks = calibration.units.iter().filter(|unit| **unit == "s").count();
-        let mounts = calibration.names.len() - clocks;
+        let is_clock = |parameter: &&ParameterId| parameter.dimension() == Dimension::Time;
+        let clocks = calibration.parameters.iter().filter(is_clock).count();
+        let mounts = calibration.parameters.len() - clocks;
         let chain = if chain.dof() + rigid == mounts { chain } else { chain.without_joint_offsets() };
         // Readings that a fork leaves out stay with the frames that have them already.
         let unread = || report.window.iter().all(|frame| frame.encoder_angles_rad.is_none());

@@ -12,7 +12,6 @@ use crate::frontend::{FeatureId, TrackedFrame};
 use crate::geometry::SplitMix64;
 use crate::gimbal::Parameterization;
 use crate::sensors::{JointAngles, Rig};
-use crate::session::breakpoints::joint_column_name;
 use crate::session::engine::RunEngine;
 
 /// What a fork does otherwise than the run that it leaves.
@@ -83,6 +82,17 @@ pub enum ForkError {
     Blind {
         /// What was to be left out.
         without: String,
+    },
+    /// The run has no such parameter.
+    #[error(
+        "this run cannot be forked so: there is no parameter '{name}' in this parameterization; there are {}",
+        known.join(", ")
+    )]
+    UnknownParameter {
+        /// What was asked for.
+        name: String,
+        /// The parameters that there are.
+        known: Vec<String>,
     },
     /// The estimator refuses.
     #[error("this run cannot be forked so: {0}")]
@@ -268,11 +278,20 @@ impl ForkChanges {
             };
             estimator.use_parameterization(form, auto_chart);
         }
+        let names = rig.parameter_names();
+        let known = estimator.parameters();
+        let parameter = |name: &String| {
+            let parameter = names.parse(name).filter(|parameter| known.contains(parameter));
+            parameter.ok_or_else(|| ForkError::UnknownParameter {
+                name: name.clone(),
+                known: known.iter().map(|parameter| names.name(*parameter)).collect(),
+            })
+        };
         for (name, value) in &self.values {
-            estimator.set_value(&joint_column_name(name, rig), *value)?;
+            estimator.set_value(parameter(name)?, *value)?;
         }
         for name in &self.frozen {
-            estimator.freeze(&joint_column_name(name, rig))?;
+            estimator.freeze(parameter(name)?)?;
         }
         estimator.scale_imu_noise(self.imu_noise);
         estimator.scale_pixel_noise(self.pixel_noise);

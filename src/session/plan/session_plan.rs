@@ -9,7 +9,7 @@ use thiserror::Error;
 use super::run_spec::{ParameterizationChoice, RunSpec, distinct_labels};
 use crate::estimator::{EstimatorConfig, rigid_columns};
 use crate::flight_log::{FlightLog, LogError};
-use crate::gimbal::{Chain, Parameterization};
+use crate::gimbal::{Chain, ParameterId, Parameterization};
 use crate::sensors::{CameraMount, CameraRig, Rig};
 
 /// The most runs side by side.
@@ -131,21 +131,21 @@ impl SessionPlan {
         })
     }
 
-    /// Names of the calibration's columns that its runs may have, in whatever chart they come to be.
-    pub fn parameter_names(&self) -> Vec<String> {
-        let mut names: Vec<String> = Vec::new();
+    /// The calibration parameters that its runs may have, in whatever parameterization they come to be.
+    pub fn parameters(&self) -> Vec<ParameterId> {
+        let mut parameters: Vec<ParameterId> = Vec::new();
         for (spec, camera_key) in &self.runs {
             let chain = self.rig.chain_of_camera(camera_key).unwrap_or_default();
             for parameterization in Parameterization::ALL {
-                names.extend(Chain::from_classical(&chain, parameterization).parameter_names());
+                parameters.extend(Chain::from_classical(&chain, parameterization).parameters());
             }
             let rigid = cameras_of_run(&self.rig, spec).ok().and_then(|cameras| cameras.rigid);
             let pose = |key: &str| self.rig.chain_of_camera(key).unwrap_or_default().imu_from_camera(&[]);
-            names.extend(rigid.into_iter().flat_map(|it| rigid_columns(&it.key, &pose(&it.key))).map(|(name, _)| name));
+            parameters.extend(rigid.into_iter().flat_map(|it| rigid_columns(1, &pose(&it.key))).map(|(id, _)| id));
         }
         let mut known = BTreeSet::new();
-        names.retain(|name| known.insert(name.clone()));
-        names
+        parameters.retain(|parameter| known.insert(*parameter));
+        parameters
     }
 }
 

@@ -10,7 +10,7 @@ use crate::estimator::{CalibrationEstimate, InformationGain, StepReport, allocat
 use crate::flight_log::LogWarning;
 use crate::frontend::TrackedFrame;
 use crate::geometry::RigidTransform;
-use crate::gimbal::{Chain, NearestForm, Parameterization};
+use crate::gimbal::{Chain, NearestForm, ParameterId, Parameterization};
 use crate::observability::RankReport;
 use crate::sensors::Rig;
 use crate::session::accuracy::{Alignment, AlignmentSums};
@@ -266,24 +266,24 @@ impl RunRecord {
         false
     }
 
-    /// What a rig says about the columns of the run's calibration, by name, in the parameterization of an estimate; `None`
+    /// What a rig says about the columns of the run's calibration in the parameterization of an estimate; `None`
     /// when the rig does not have the cameras.
     ///
     /// Of the equivalent numbers of the classical form it takes those nearest to what `given` says, the rig that the run
     /// began with: in those the run counts.
-    pub fn values_in(&self, rig: &Rig, given: &Rig, estimate: &CalibrationEstimate) -> Option<Vec<(String, f64)>> {
+    pub fn values_in(&self, rig: &Rig, given: &Rig, estimate: &CalibrationEstimate) -> Option<Vec<(ParameterId, f64)>> {
         let main = rig.chain_of_camera(&self.camera_key)?;
         let parameterization = estimate.parameterization.parse().ok()?;
         let form = self.form_in(given, estimate, parameterization)?;
         let chain = form.of(&Chain::from_classical(&main, Parameterization::Classical));
-        let mut values: Vec<_> = chain.parameter_names().into_iter().zip(chain.values().iter().copied()).collect();
-        let mut clocks = vec![("timeshift".to_owned(), self.camera_key.as_str())];
-        for (key, _) in &estimate.rigid_cameras {
-            values.extend(rigid_columns(key, &rig.chain_of_camera(key)?.imu_from_camera(&[])));
-            clocks.push((format!("{key}.timeshift"), key));
+        let mut values: Vec<_> = chain.parameters().into_iter().zip(chain.values().iter().copied()).collect();
+        let mut clocks = vec![(ParameterId::timeshift(0), self.camera_key.as_str())];
+        for (camera, (key, _)) in (1..).zip(&estimate.rigid_cameras) {
+            values.extend(rigid_columns(camera, &rig.chain_of_camera(key)?.imu_from_camera(&[])));
+            clocks.push((ParameterId::timeshift(camera), key));
         }
-        for (name, key) in clocks.into_iter().filter(|(name, _)| estimate.names.contains(name)) {
-            values.push((name, rig.camera(key).ok()?.timeshift_cam_imu_s));
+        for (clock, key) in clocks.into_iter().filter(|(clock, _)| estimate.parameters.contains(clock)) {
+            values.push((clock, rig.camera(key).ok()?.timeshift_cam_imu_s));
         }
         Some(values)
     }
@@ -298,13 +298,11 @@ impl RunRecord {
         parameterization: Parameterization,
     ) -> Option<NearestForm> {
         let near = Chain::from_classical(&given.chain_of_camera(&self.camera_key)?, parameterization);
-        let names = near.parameter_names();
-        let scales = if estimate.names.starts_with(&names) {
-            estimate.prior_sigmas[..names.len()].to_vec()
+        let parameters = near.parameters();
+        let scales = if estimate.parameters.starts_with(&parameters) {
+            estimate.prior_sigmas[..parameters.len()].to_vec()
         } else {
-            // As in the rank rule: 10° weigh as much as 3 cm.
-            let scale = |unit: &str| if unit == "rad" { 10_f64.to_radians() } else { 0.03 };
-            near.parameter_units().into_iter().map(scale).collect()
+            parameters.iter().map(|parameter| parameter.dimension().scale()).collect()
         };
         Some(NearestForm::new(near, &scales.into()))
     }

@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use crate::estimator::{JacobianFactor, Phase, StageTimes};
+use crate::estimator::{FactorKind, FrameId, JacobianFactor, Phase, StageTimes};
+use crate::gimbal;
 use crate::session::breakpoints::Condition;
 use crate::session::engine::{History, Instant, Material, RunEngine, estimator_config};
 use crate::session::plan::{ForkChanges, RunSpec, SessionPlan, SessionRequest};
@@ -61,7 +62,7 @@ fn apart_m(one: &StepRecord, other: &StepRecord) -> f64 {
 
 fn parameter(record: &StepRecord, name: &str) -> (f64, f64) {
     let calibration = &record.report.calibration;
-    let index = calibration.names.iter().position(|known| known == name).unwrap();
+    let index = calibration.parameters.iter().position(|known| *known == gimbal::tests::parameter(name)).unwrap();
     (calibration.values[index], calibration.sigmas[index])
 }
 
@@ -82,7 +83,7 @@ fn a_fork_goes_on_in_another_parameterization() {
     for (changes, columns) in [("classical", 24), ("poe", 18), ("minimal-swapped", 18), ("auto", 18)] {
         let fork = parent.forked(FORK_AT, changes).unwrap();
         for (fork, parent) in fork.iter().zip(&parent.steps[FORK_AT..]) {
-            assert!(tracking(fork) && fork.report.calibration.names.len() == columns, "{changes}");
+            assert!(tracking(fork) && fork.report.calibration.parameters.len() == columns, "{changes}");
             let apart_m = apart_m(fork, parent);
             assert!(apart_m < 0.01, "{changes}: {apart_m} m from the parent");
         }
@@ -127,30 +128,30 @@ fn measurements_can_be_dropped_and_disturbed() {
     };
     assert!(ids.iter().all(|id| used(&parent.steps[FORK_AT..], id) && !used(&fork, id)));
 
-    let chi2 = |steps: &[StepRecord], factor: &str| -> f64 {
+    let chi2 = |steps: &[StepRecord], factor: FactorKind| -> f64 {
         let of = |step: &StepRecord| step.report.residuals.iter().find(|it| it.factor == factor).unwrap().chi2_after;
         steps.iter().map(of).sum()
     };
-    let usual = chi2(&parent.steps[FORK_AT..], "encoder");
+    let usual = chi2(&parent.steps[FORK_AT..], FactorKind::Encoder);
     let noisy = parent.forked(FORK_AT, "joint-noise=2deg").unwrap();
-    assert!(chi2(&noisy, "encoder") > 2.0 * usual, "{} after {usual}", chi2(&noisy, "encoder"));
+    assert!(chi2(&noisy, FactorKind::Encoder) > 2.0 * usual, "{} after {usual}", chi2(&noisy, FactorKind::Encoder));
     assert_eq!(noisy.iter().map(bits).collect::<Vec<_>>(), {
         let again = parent.forked(FORK_AT, "joint-noise=2deg").unwrap();
         again.iter().map(bits).collect::<Vec<_>>()
     });
     let lax = parent.forked(FORK_AT, "encoder-noise=10").unwrap();
     // Frames that were in the window already keep what they were told.
-    assert!(chi2(&lax, "encoder") < 0.8 * usual, "{} after {usual}", chi2(&lax, "encoder"));
-    let visual = chi2(&parent.steps[FORK_AT..], "visual");
+    assert!(chi2(&lax, FactorKind::Encoder) < 0.8 * usual, "{} after {usual}", chi2(&lax, FactorKind::Encoder));
+    let visual = chi2(&parent.steps[FORK_AT..], FactorKind::Visual);
     let lax = parent.forked(FORK_AT, "pixel-noise=3").unwrap();
-    assert!(chi2(&lax, "visual") < 0.5 * visual);
+    assert!(chi2(&lax, FactorKind::Visual) < 0.5 * visual);
 }
 
 /// Norm of the inertial rows between two frames in the columns of the later one's pose, in standard deviations.
 fn inertial_weight(flight: &SyntheticFlight, step: &StepRecord, slot: usize) -> f64 {
     let model = &flight.given_rig.cameras[0].model;
     let jacobian = step.report.jacobian(&[model]).unwrap();
-    let (from, to) = (step.report.window[slot - 1].frame_index, step.report.window[slot].frame_index);
+    let (from, to) = (FrameId(step.report.window[slot - 1].frame_index), FrameId(step.report.window[slot].frame_index));
     let row = jacobian.rows.iter().find(|row| row.factor == JacobianFactor::Inertial { from, to }).unwrap();
     let norm = |(_, norm): &(u16, f32)| f64::from(*norm).powi(2);
     row.norms.iter().map(norm).sum::<f64>().sqrt()
@@ -205,7 +206,7 @@ fn encoder_readings_can_be_left_out_from_there_on() {
         let own = |index: usize| step.report.window[index].frame_index >= parent.steps[FORK_AT].report.frame_index;
         // Frames from before keep what they were told, those to come are told nothing.
         assert!((0..step.report.window.len()).all(|index| read(index) != own(index)), "step {number}");
-        assert_eq!(step.report.calibration.names, parent.steps[FORK_AT].report.calibration.names);
+        assert_eq!(step.report.calibration.parameters, parent.steps[FORK_AT].report.calibration.parameters);
     }
     let last = fork.last().unwrap();
     let tracking = last.report.phase == Phase::Tracking && last.report.restarts == 0;
@@ -270,7 +271,7 @@ fn a_run_that_waits_can_be_forked_too() {
     let first = parent.steps.iter().position(|step| step.report.phase == Phase::Tracking).unwrap();
     let fork = parent.forked(first - 2, "classical").unwrap();
     let begun = fork.iter().find(|step| step.report.phase == Phase::Tracking).unwrap();
-    assert_eq!(begun.report.calibration.names.len(), 24);
+    assert_eq!(begun.report.calibration.parameters.len(), 24);
     assert_eq!(begun.report.stamp_ns, parent.steps[first].report.stamp_ns);
 }
 
@@ -326,7 +327,7 @@ fn a_session_stops_at_breakpoints_and_forks_there() {
         let (original, twin, other) = (&parent.steps[number], &twin.steps[number], &classical.steps[number]);
         assert_eq!((Arc::ptr_eq(original, twin), Arc::ptr_eq(original, other)), (number < at, number < at));
         assert_eq!(bits(original), bits(twin), "step {number}");
-        assert_eq!(other.report.calibration.names.len(), if number < at { 18 } else { 24 });
+        assert_eq!(other.report.calibration.parameters.len(), if number < at { 18 } else { 24 });
     }
     // A fork's steps can be taken again as well, those of its parent too.
     for number in [at - 3, at, parent.steps.len() - 1] {

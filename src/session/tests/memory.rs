@@ -72,7 +72,7 @@ fn an_outline_with_a_linearization_keeps_the_frames_of_its_columns() {
     assert!(kept.len() >= 5 && plain.len() >= 40, "{} with, {} without", kept.len(), plain.len());
     for outline in &kept {
         let columns = &outline.report.linearization.as_ref().unwrap().columns;
-        let poses = columns.iter().filter(|block| block.group == ColumnGroup::Pose).count();
+        let poses = columns.iter().filter(|block| block.id.group() == ColumnGroup::Pose).count();
         assert!(poses > 1 && poses == outline.report.window.len(), "{poses} poses");
     }
     assert!(plain.iter().all(|outline| outline.report.window.len() == 1));

@@ -164,7 +164,7 @@ fn information_is_put_down_to_the_motion_that_brought_it() {
     let setup = LaboratorySetup::new(Mechanism::named("yaw-roll-pitch-offset").unwrap());
     let form = LaboratoryForm::whole(Parameterization::Minimal);
     let chain = form.chain(&setup.mechanism);
-    let told = excitation(&setup.window(), &chain, &[]).unwrap();
+    let told = excitation(&setup.window(), &chain, &[], &setup.mechanism.names).unwrap();
     let gain = |parameter: &str, motion: &str| {
         let parameter = told.parameters.iter().find(|it| it.name == parameter).unwrap();
         parameter.by_motion[told.motions.iter().position(|name| name == motion).unwrap()]

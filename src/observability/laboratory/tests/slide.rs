@@ -1,8 +1,9 @@
 use super::excitation::{estimator, flight, fly};
 use crate::estimator::Estimator;
-use crate::gimbal::{Chain, Parameterization};
+use crate::gimbal::tests::parameter;
+use crate::gimbal::{Chain, ParameterNames, Parameterization};
 use crate::observability::{
-    ChainSlide, KnownLoss, RankReport, SlideDirection, SlidePosition, chain_of_step, known_losses, slide,
+    ChainSlide, KnownLoss, RankReport, SlideDirection, SlidePosition, SlideRequest, chain_of_step, known_losses, slide,
 };
 use crate::simulation::{Exercise, VehicleSwing};
 
@@ -28,7 +29,7 @@ fn moves(parameterization: Parameterization, encoder: bool) -> (RankReport, impl
 #[test]
 fn reprojections_stay_while_the_chain_slides_along_a_redundant_direction() {
     let (rank, moved) = moves(Parameterization::Classical, true);
-    assert_eq!((rank.names.len(), rank.rank_structural, rank.known.len()), (24, 18, 6));
+    assert_eq!((rank.parameters.len(), rank.rank_structural, rank.known.len()), (24, 18, 6));
     // As measured: to first order nothing moves.
     let null: Vec<usize> = (0..rank.directions.len()).filter(|index| rank.directions[*index].structural).collect();
     assert_eq!(null.len(), 6);
@@ -39,7 +40,7 @@ fn reprojections_stay_while_the_chain_slides_along_a_redundant_direction() {
     }
     // As known: shifts along an axis leave all pixels and the camera for any size, turns too when nothing couples them.
     for known in &rank.known {
-        let slid = moved(&SlideDirection::Named(known.loss.name()));
+        let slid = moved(&SlideDirection::Known(known.loss));
         assert!(slid.largest_first_order_px < 1e-5, "{:?}: {} px", known.loss, slid.largest_first_order_px);
         if matches!(known.loss, KnownLoss::BaseD | KnownLoss::EndD | KnownLoss::EndA) {
             assert!(slid.largest_px < 1e-6, "{:?}: {} px", known.loss, slid.largest_px);
@@ -48,7 +49,7 @@ fn reprojections_stay_while_the_chain_slides_along_a_redundant_direction() {
     }
     // A number that is seen moves them.
     for name in ["L2.alpha", "EC.rx"] {
-        let seen = moved(&SlideDirection::Named(name.to_owned()));
+        let seen = moved(&SlideDirection::Parameter(parameter(name)));
         assert!(seen.largest_px > 10.0 && seen.largest_first_order_px > 10.0, "{name}: {} px", seen.largest_px);
         assert!(seen.camera_moves.1 > 0.1, "{name}: {:?}", seen.camera_moves);
     }
@@ -59,27 +60,28 @@ fn parameters_that_are_held_count_as_known() {
     let flight = flight(Exercise { vehicle: VehicleSwing::Hover, joint: None }, 7);
     let mut estimator = estimator(&flight.given_rig, Parameterization::Classical, true);
     let (_, before) = fly(&mut estimator, &flight, -1.0, 4.0);
-    assert_eq!((before.names.len(), before.rank_structural, before.deficit_parameterization), (24, 18, 6));
+    assert_eq!((before.parameters.len(), before.rank_structural, before.deficit_parameterization), (24, 18, 6));
     let mut from_s = 4.0;
     // Each takes one of the six redundant directions away; the columns that Eqs. 18–20 drop leave nothing to be lost.
     let dropped = ["L1.d", "L1.theta", "L3.theta", "L3.d", "L3.a", "L3.alpha"];
     for (count, name) in dropped.into_iter().enumerate() {
-        estimator.freeze(name).unwrap();
+        let held = parameter(name);
+        estimator.freeze(held).unwrap();
         let (report, rank) = fly(&mut estimator, &flight, from_s, from_s + 0.2);
         from_s += 0.2;
         let lost = 5 - count;
-        assert_eq!((rank.names.len(), rank.rank_structural), (18 + lost, 18), "{name}");
+        assert_eq!((rank.parameters.len(), rank.rank_structural), (18 + lost, 18), "{name}");
         assert_eq!(
             (rank.deficit_parameterization, rank.known.len(), rank.known_agreeing()),
             (lost, lost, lost),
             "{name}"
         );
-        assert!(rank.held.contains(&name.to_owned()) && !rank.names.contains(&name.to_owned()), "{name}");
-        assert_eq!(report.gain.as_ref().unwrap().columns(), rank.names.len(), "{name}");
+        assert!(rank.held.contains(&held) && !rank.parameters.contains(&held), "{name}");
+        assert_eq!(report.gain.as_ref().unwrap().columns(), rank.parameters.len(), "{name}");
         // The chain still has all its columns; a held one does not slide.
         let chain = chain_of_step(&report, &rank).unwrap();
         assert_eq!(chain.dof(), 24, "{name}");
-        let place = chain.parameter_names().iter().position(|known| known == name).unwrap();
+        let place = chain.parameters().iter().position(|known| *known == held).unwrap();
         for direction in 0..rank.directions.len() {
             let weights = SlideDirection::Measured(direction).weights(&rank, &chain).unwrap();
             assert!(weights.len() == 24 && weights[place] == 0.0, "{name}");
@@ -90,20 +92,23 @@ fn parameters_that_are_held_count_as_known() {
 #[test]
 fn free_joint_angles_follow_the_chain() {
     let (rank, moved) = moves(Parameterization::Classical, false);
-    let absorbed = rank.names.iter().position(|name| name == "IB.rz");
-    assert!(absorbed.is_some(), "{:?}", rank.names);
+    assert!(rank.parameters.contains(&parameter("IB.rz")), "{:?}", rank.parameters);
     let lost = rank.known.iter().find(|known| known.loss == KnownLoss::BaseTheta).expect("the offset is not a column");
-    let slid = moved(&SlideDirection::Named(lost.loss.name()));
+    let slid = moved(&SlideDirection::Known(lost.loss));
     assert!(slid.largest_px < 0.01, "{} px", slid.largest_px);
 }
 
 #[test]
 fn directions_have_names() {
-    let read = |text: &str| text.parse::<SlidePosition>();
-    let position = |direction, amount| Ok(SlidePosition { direction, amount });
+    let names = ParameterNames { joints: vec!["yaw".to_owned(), "roll".to_owned()], cameras: Vec::new() };
+    let read = |text: &str| text.parse::<SlideRequest>().map(|request| request.position(&names));
+    let position = |direction, amount| Ok(Some(SlidePosition { direction, amount }));
     assert_eq!(read("1=0.5"), position(SlideDirection::Measured(0), 0.5));
-    assert_eq!(read("L2.alpha=-1"), position(SlideDirection::Named("L2.alpha".to_owned()), -1.0));
-    assert_eq!(read("base-d = 1e-1"), position(SlideDirection::Named("base-d".to_owned()), 0.1));
+    assert_eq!(read("L2.alpha=-1"), position(SlideDirection::Parameter(parameter("L2.alpha")), -1.0));
+    assert_eq!(read("roll.alpha=-1"), read("L2.alpha=-1"));
+    assert_eq!(read("parallel-d-2=1"), position(SlideDirection::Known(KnownLoss::ParallelD(1)), 1.0));
+    assert_eq!(read("wheel.alpha=1"), Ok(None));
+    assert_eq!(read("base-d = 1e-1"), position(SlideDirection::Known(KnownLoss::BaseD), 0.1));
     for wrong in ["", "1", "0=1", "=1", "base-d=much", "2=inf"] {
         let error = read(wrong).unwrap_err().to_string();
         assert!(error.contains("expected DIRECTION=VALUE"), "{error}");

@@ -1,0 +1,43 @@
+use serde::Serialize;
+
+/// Physical dimension of a parameter; written to files as the symbol of its SI unit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+pub enum Dimension {
+    /// Radians.
+    #[serde(rename = "rad")]
+    Angle,
+    /// Metres.
+    #[serde(rename = "m")]
+    Length,
+    /// Seconds.
+    #[serde(rename = "s")]
+    Time,
+    /// A number without a unit.
+    #[serde(rename = "")]
+    Ratio,
+}
+
+impl Dimension {
+    /// Symbol of the SI unit, empty for a ratio.
+    pub const fn unit(self) -> &'static str {
+        match self {
+            Self::Angle => "rad",
+            Self::Length => "m",
+            Self::Time => "s",
+            Self::Ratio => "",
+        }
+    }
+
+    /// Scale of the observability analysis, in the SI unit: 10°, 3 cm, 20 ms, one tenth.
+    ///
+    /// Columns of a Jacobian are multiplied by the scale of their parameter, so that columns of different dimensions
+    /// compare: about what a calibration is uncertain by before the first flight.
+    pub const fn scale(self) -> f64 {
+        match self {
+            Self::Angle => 10.0 * std::f64::consts::PI / 180.0,
+            Self::Length => 0.03,
+            Self::Time => 0.02,
+            Self::Ratio => 0.1,
+        }
+    }
+}

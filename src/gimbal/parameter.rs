@@ -1,0 +1,350 @@
+//! Identity of a calibration parameter, and its name for people and files.
+
+use crate::geometry::Dimension;
+
+use super::Singularity;
+
+/// A scalar parameter of the static calibration: one column of its Jacobian.
+///
+/// Cameras are numbered as the estimator has them: 0 is the main camera, whose chain may have joints, the rigid cameras
+/// beside it follow from 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct ParameterId {
+    /// Transform, link or sensor that it belongs to.
+    pub part: ParameterPart,
+    /// What it is of that part.
+    pub quantity: Quantity,
+}
+
+/// What a calibration parameter belongs to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum ParameterPart {
+    /// `imu_from_base` of the classical form.
+    ImuFromBase,
+    /// The base block of the minimal forms, rotation about and translation along x and y of the IMU.
+    Base,
+    /// Denavit–Hartenberg link, counted from 0; with the end block of the minimal forms in the last one.
+    Link(u8),
+    /// `effector_from_camera` of the classical form.
+    EffectorFromCamera,
+    /// Transform between joint axes of the product of exponentials, counted from 0.
+    Exponential(u8),
+    /// `imu_from_camera` of a rigid camera.
+    ImuFromCamera(u8),
+    /// A camera itself: its clock.
+    Camera(u8),
+    /// The joint encoders: their clock.
+    Encoder,
+}
+
+/// What a calibration parameter is of its part.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Quantity {
+    /// Rotation about x: of a rotation vector, or an angle of the minimal base block.
+    Rx,
+    /// Rotation about y.
+    Ry,
+    /// Rotation about z.
+    Rz,
+    /// Translation along x.
+    Tx,
+    /// Translation along y.
+    Ty,
+    /// Translation along z.
+    Tz,
+    /// Joint offset θ of a link.
+    Theta,
+    /// Offset d of a link along its joint axis.
+    D,
+    /// Length a of a link.
+    A,
+    /// Twist α of a link.
+    Alpha,
+    /// Rotation β about y in the end block of the minimal forms.
+    Beta,
+    /// Translation along y in the end block of the minimal forms.
+    Y,
+    /// Local rotation about x of a block of the product of exponentials.
+    Wx,
+    /// Local rotation about y.
+    Wy,
+    /// Local translation along x.
+    Vx,
+    /// Local translation along y.
+    Vy,
+    /// Time offset to the IMU: `t_imu = t_sensor + timeshift`.
+    Timeshift,
+}
+
+impl ParameterId {
+    /// Time offset of a camera.
+    pub const fn timeshift(camera: u8) -> Self {
+        Self { part: ParameterPart::Camera(camera), quantity: Quantity::Timeshift }
+    }
+
+    /// Time offset of the joint encoders.
+    pub const ENCODER_TIMESHIFT: Self = Self { part: ParameterPart::Encoder, quantity: Quantity::Timeshift };
+
+    /// Physical dimension, which gives unit and scale.
+    pub const fn dimension(self) -> Dimension {
+        self.quantity.dimension()
+    }
+
+    /// Whether it is the offset of a joint angle.
+    pub const fn is_joint_offset(self) -> bool {
+        matches!(self.quantity, Quantity::Theta)
+    }
+
+    /// The link that it belongs to, counted from 0.
+    pub const fn link(self) -> Option<usize> {
+        match self.part {
+            ParameterPart::Link(link) => Some(link as usize),
+            _ => None,
+        }
+    }
+
+    /// The parameter of the main camera as the same one of another camera.
+    #[must_use]
+    pub const fn of_camera(self, camera: u8) -> Self {
+        let part = match self.part {
+            ParameterPart::ImuFromCamera(_) => ParameterPart::ImuFromCamera(camera),
+            ParameterPart::Camera(_) => ParameterPart::Camera(camera),
+            part => part,
+        };
+        Self { part, quantity: self.quantity }
+    }
+}
+
+impl ParameterPart {
+    /// Number of the camera whose chain, extrinsics or clock it is.
+    pub const fn camera(self) -> usize {
+        match self {
+            Self::ImuFromCamera(camera) | Self::Camera(camera) => camera as usize,
+            _ => 0,
+        }
+    }
+
+    /// Whether the part can have the quantity in any parameterization.
+    fn has(self, quantity: Quantity) -> bool {
+        use Quantity::{A, Alpha, Beta, D, Rx, Ry, Rz, Theta, Timeshift, Tx, Ty, Tz, Vx, Vy, Wx, Wy, Y};
+        match self {
+            Self::ImuFromBase | Self::EffectorFromCamera | Self::ImuFromCamera(_) => {
+                matches!(quantity, Rx | Ry | Rz | Tx | Ty | Tz)
+            }
+            Self::Base => matches!(quantity, Rx | Ry | Tx | Ty),
+            Self::Link(_) => matches!(quantity, Theta | D | A | Alpha | Beta | Y),
+            Self::Exponential(_) => matches!(quantity, Wx | Wy | Vx | Vy | Rx | Ry | Rz | Tx | Ty | Tz),
+            Self::Camera(_) | Self::Encoder => matches!(quantity, Timeshift),
+        }
+    }
+}
+
+impl Quantity {
+    /// The six of a rigid transform: rotation vector, then translation.
+    pub const TRANSFORM: [Self; 6] = [Self::Rx, Self::Ry, Self::Rz, Self::Tx, Self::Ty, Self::Tz];
+    /// The four of a Denavit–Hartenberg link.
+    pub const LINK: [Self; 4] = [Self::Theta, Self::D, Self::A, Self::Alpha];
+    /// The four of an inner block of the product of exponentials.
+    pub const EXPONENTIAL: [Self; 4] = [Self::Wx, Self::Wy, Self::Vx, Self::Vy];
+
+    const ALL: [Self; 17] = [
+        Self::Rx,
+        Self::Ry,
+        Self::Rz,
+        Self::Tx,
+        Self::Ty,
+        Self::Tz,
+        Self::Theta,
+        Self::D,
+        Self::A,
+        Self::Alpha,
+        Self::Beta,
+        Self::Y,
+        Self::Wx,
+        Self::Wy,
+        Self::Vx,
+        Self::Vy,
+        Self::Timeshift,
+    ];
+
+    /// Name behind the dot of a parameter's name.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Rx => "rx",
+            Self::Ry => "ry",
+            Self::Rz => "rz",
+            Self::Tx => "tx",
+            Self::Ty => "ty",
+            Self::Tz => "tz",
+            Self::Theta => "theta",
+            Self::D => "d",
+            Self::A => "a",
+            Self::Alpha => "alpha",
+            Self::Beta => "beta",
+            Self::Y => "y",
+            Self::Wx => "wx",
+            Self::Wy => "wy",
+            Self::Vx => "vx",
+            Self::Vy => "vy",
+            Self::Timeshift => "timeshift",
+        }
+    }
+
+    /// Physical dimension.
+    pub const fn dimension(self) -> Dimension {
+        match self {
+            Self::Rx | Self::Ry | Self::Rz | Self::Theta | Self::Alpha | Self::Beta | Self::Wx | Self::Wy => {
+                Dimension::Angle
+            }
+            Self::Tx | Self::Ty | Self::Tz | Self::D | Self::A | Self::Y | Self::Vx | Self::Vy => Dimension::Length,
+            Self::Timeshift => Dimension::Time,
+        }
+    }
+}
+
+/// What calibration parameters are called: by the names of joints and cameras where there are any.
+///
+/// Without them links are `L1`, `L2`, … and rigid cameras beside the main one `cam1`, `cam2`, ….
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ParameterNames {
+    /// Names of the joints by link.
+    pub joints: Vec<String>,
+    /// Keys of the rigid cameras beside the main one, camera 1 first.
+    pub cameras: Vec<String>,
+}
+
+impl ParameterNames {
+    /// Name of a parameter: `IB.rx`, `yaw.alpha`, `cam1.tx`, `timeshift`.
+    pub fn name(&self, id: ParameterId) -> String {
+        match id.part {
+            ParameterPart::Camera(0) => id.quantity.name().to_owned(),
+            part => format!("{}.{}", self.part(part), id.quantity.name()),
+        }
+    }
+
+    /// Name of a part, which stands before the dot.
+    pub fn part(&self, part: ParameterPart) -> String {
+        let numbered = |names: &[String], index: usize, prefix: &str| {
+            names.get(index).cloned().unwrap_or_else(|| format!("{prefix}{}", index + 1))
+        };
+        match part {
+            ParameterPart::ImuFromBase => "IB".to_owned(),
+            ParameterPart::Base => "I".to_owned(),
+            ParameterPart::Link(link) => numbered(&self.joints, usize::from(link), "L"),
+            ParameterPart::EffectorFromCamera => "EC".to_owned(),
+            ParameterPart::Exponential(index) => format!("X{index}"),
+            ParameterPart::ImuFromCamera(0) => "IC".to_owned(),
+            ParameterPart::Camera(0) => "camera".to_owned(),
+            ParameterPart::ImuFromCamera(camera) | ParameterPart::Camera(camera) => {
+                numbered(&self.cameras, usize::from(camera) - 1, "cam")
+            }
+            ParameterPart::Encoder => "encoder".to_owned(),
+        }
+    }
+
+    /// Name of a singularity: `base`, `end`, or the twist of a middle link, `pitch.alpha`.
+    pub fn singularity(&self, singularity: Singularity) -> String {
+        match singularity {
+            Singularity::Base => "base".to_owned(),
+            Singularity::End => "end".to_owned(),
+            Singularity::ParallelAxes(link) => {
+                self.name(ParameterId { part: ParameterPart::Link(link), quantity: Quantity::Alpha })
+            }
+        }
+    }
+
+    /// The singularity that a person or a file calls so.
+    pub fn parse_singularity(&self, name: &str) -> Option<Singularity> {
+        match name {
+            "base" => Some(Singularity::Base),
+            "end" => Some(Singularity::End),
+            _ => match self.parse(name)? {
+                ParameterId { part: ParameterPart::Link(link), quantity: Quantity::Alpha } => {
+                    Some(Singularity::ParallelAxes(link))
+                }
+                _ => None,
+            },
+        }
+    }
+
+    /// The parameter that a person or a file calls so; a link by its joint's name or as `L1`.
+    pub fn parse(&self, name: &str) -> Option<ParameterId> {
+        let (part, quantity) = name.rsplit_once('.').unwrap_or(("", name));
+        let quantity = Quantity::ALL.into_iter().find(|known| known.name() == quantity)?;
+        let index_of = |names: &[String]| names.iter().position(|known| known == part);
+        let number = |prefix: &str| part.strip_prefix(prefix)?.parse::<u8>().ok();
+        let camera = index_of(&self.cameras).and_then(|index| u8::try_from(index + 1).ok());
+        let part = if let Some(link) = index_of(&self.joints) {
+            ParameterPart::Link(u8::try_from(link).ok()?)
+        } else if let Some(camera) = camera.or_else(|| number("cam").filter(|camera| *camera > 0)) {
+            match quantity {
+                Quantity::Timeshift => ParameterPart::Camera(camera),
+                _ => ParameterPart::ImuFromCamera(camera),
+            }
+        } else {
+            match part {
+                "" => ParameterPart::Camera(0),
+                "IB" => ParameterPart::ImuFromBase,
+                "I" => ParameterPart::Base,
+                "EC" => ParameterPart::EffectorFromCamera,
+                "IC" => ParameterPart::ImuFromCamera(0),
+                "encoder" => ParameterPart::Encoder,
+                _ => match number("L") {
+                    Some(link) => ParameterPart::Link(link.checked_sub(1)?),
+                    None => ParameterPart::Exponential(number("X")?),
+                },
+            }
+        };
+        part.has(quantity).then_some(ParameterId { part, quantity })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gimbal::tests::random::Random;
+    use crate::gimbal::{Chain, Parameterization};
+
+    #[test]
+    fn every_name_is_read_as_the_parameter_that_it_names() {
+        let named = ParameterNames {
+            joints: ["yaw", "roll", "pitch"].map(str::to_owned).into(),
+            cameras: vec!["cam4".to_owned()],
+        };
+        let mut random = Random::new(31);
+        for joints in [0, 1, 3] {
+            let classical = random.chain(joints);
+            for parameterization in Parameterization::ALL {
+                let mut parameters = Chain::from_classical(&classical, parameterization).parameters();
+                parameters.extend([
+                    ParameterId::timeshift(0),
+                    ParameterId::timeshift(1),
+                    ParameterId::ENCODER_TIMESHIFT,
+                ]);
+                parameters.extend(
+                    Quantity::TRANSFORM.map(|quantity| ParameterId { part: ParameterPart::ImuFromCamera(1), quantity }),
+                );
+                for names in [&named, &ParameterNames::default()] {
+                    for id in &parameters {
+                        assert_eq!(names.parse(&names.name(*id)), Some(*id));
+                    }
+                }
+            }
+        }
+        let id = named.parse("roll.alpha").unwrap();
+        assert_eq!(
+            (named.name(id), ParameterNames::default().name(id)),
+            ("roll.alpha".to_owned(), "L2.alpha".to_owned())
+        );
+        assert_eq!(named.parse("L2.alpha"), Some(id));
+        assert_eq!(named.name(ParameterId::timeshift(1)), "cam4.timeshift");
+    }
+
+    #[test]
+    fn what_no_part_has_is_no_parameter() {
+        let names = ParameterNames { joints: vec!["yaw".to_owned()], cameras: Vec::new() };
+        for name in ["", "yaw", "yaw.rx", "L0.d", "IB.theta", "encoder.rx", "rx", "X.wx", "pan.alpha", "cam0.rx"] {
+            assert_eq!(names.parse(name), None, "{name}");
+        }
+    }
+}
