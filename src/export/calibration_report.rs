@@ -10,7 +10,7 @@ use crate::calibration::{
     CalibrationOutcome, MountReport, PixelReport, Statistics, chain_distance, transform_distance,
 };
 use crate::geometry::{Dimension, RigidTransform, seconds_from_ns, so3};
-use crate::gimbal::{Chain, ClassicalChain, ParameterNames, Quantity};
+use crate::gimbal::{Chain, ClassicalChain, Quantity};
 use crate::sensors::{CameraMount, Rig};
 use crate::session::CalibrationRun;
 
@@ -199,7 +199,7 @@ pub fn report_calibration(run: &CalibrationRun) -> CalibrationReport {
             columns: rank.parameters.len(),
             rank_structural: rank.rank_structural,
             rank_informed: rank.rank_informed,
-            verdict: rank.verdict(&ParameterNames::default()),
+            verdict: rank.verdict(&run.given_rig.parameter_names()),
         }),
         truth: run.truth_rig.as_ref().and_then(|truth| truth_report(run, truth)),
         warnings,

@@ -8,7 +8,7 @@ use super::results::write_results;
 use super::summary::{RunSummary, summarize, to_json};
 use super::tables::{calibration_csv, frames_csv, information_csv, rank_csv};
 use super::trajectory::{euroc_of_run, tum_of_run};
-use crate::gimbal::{ParameterNames, ParameterPart};
+use crate::gimbal::ParameterPart;
 use crate::sensors::{CameraMount, Rig};
 use crate::session::{Recording, RunRecord};
 
@@ -45,7 +45,7 @@ pub fn write_run(
     let mut files = vec![
         ("trajectory.tum", tum_of_run(run, recording.epoch_ns)),
         ("calibration.csv", calibration_csv(run, &recording.rig)),
-        ("rank.csv", rank_csv(run, &ParameterNames::default())),
+        ("rank.csv", rank_csv(run, &recording.rig.parameter_names())),
         ("information.csv", information_csv(run, &recording.rig)),
         ("frames.csv", frames_csv(run, options.timing)),
         ("rig.yaml", calibrated_rig(recording, run).to_yaml()),

@@ -141,6 +141,6 @@ impl<'a> PanelContext<'a> {
 
     /// What calibration parameters are called.
     pub(crate) fn names(&self) -> ParameterNames {
-        ParameterNames { joints: Vec::new(), ..self.recording.rig.parameter_names() }
+        self.recording.rig.parameter_names()
     }
 }

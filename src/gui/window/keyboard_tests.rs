@@ -33,7 +33,7 @@ fn the_palette_goes_to_times_and_frames_and_selects() {
     choose(&mut harness, &format!("feature {}", id.0));
     assert_eq!(harness.state().selection.feature, Some(id));
     assert_ne!(id, FeatureId(u64::MAX));
-    choose(&mut harness, "parameter L2.alpha");
+    choose(&mut harness, "parameter roll.alpha");
     assert_eq!(harness.state().selection.parameter, Some(parameter("L2.alpha")));
     choose(&mut harness, "run classical");
     assert_eq!(harness.state().selection.run, 1);

@@ -7,7 +7,6 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 
 use super::{PanelName, Preset, WindowState, window_ui};
-use crate::gimbal::ParameterNames;
 use crate::gimbal::tests::parameter;
 use crate::gui::sample_recording::{sample_images, sample_recording_of};
 use crate::gui::theme::{Theme, ThemeName};
@@ -339,8 +338,9 @@ fn while_somebody_types_keys_are_letters() {
 fn panels_show_names_and_values() {
     let mut harness = bench();
     let step = harness.state().recording.runs[0].step_at(3 * SECOND_NS).unwrap().clone();
+    let names = harness.state().recording.rig.parameter_names();
     for parameter in &step.report.calibration.parameters {
-        let name = ParameterNames::default().name(*parameter);
+        let name = names.name(*parameter);
         assert!(harness.query_all_by_label_contains(&format!("{name} ")).next().is_some(), "{name}");
     }
     let rank = step.rank.as_ref().unwrap();
@@ -363,14 +363,14 @@ fn panels_show_names_and_values() {
 fn a_parameter_is_selected_everywhere() {
     let mut harness = bench();
     let label = |harness: &Harness<'static, Bench>| {
-        let mut nodes = harness.query_all_by_label_contains("L2.alpha -");
+        let mut nodes = harness.query_all_by_label_contains("roll.alpha -");
         nodes.next().and_then(|node| node.accesskit_node().label()).unwrap()
     };
     let text = label(&harness);
     harness.get_by_label(&text).click();
     harness.run_steps(3);
     assert_eq!(harness.state().selection.parameter, Some(parameter("L2.alpha")));
-    assert!(harness.query_by_label("Parameter L2.alpha").is_some());
+    assert!(harness.query_by_label("Parameter roll.alpha").is_some());
     harness.get_by_label("Clear selection").click();
     harness.run_steps(2);
     assert_eq!(harness.state().selection, Selection::default());
@@ -391,16 +391,16 @@ fn the_chain_slides_from_the_rank_panel() {
     let held = amount(&harness);
     harness.run_steps(2);
     assert_eq!(amount(&harness), held);
+    let names = harness.state().recording.rig.parameter_names();
     // Along what is known to be lost the reprojections stay, along a parameter alone they move.
     harness.state_mut().selection.run = 1;
-    for (position, said) in [("base-d=1", "Reprojections stay"), ("L2.alpha=1", "Reprojections move")] {
-        harness.state_mut().selection.slide =
-            position.parse::<SlideRequest>().unwrap().position(&ParameterNames::default());
+    for (position, said) in [("base-d=1", "Reprojections stay"), ("roll.alpha=1", "Reprojections move")] {
+        harness.state_mut().selection.slide = position.parse::<SlideRequest>().unwrap().position(&names);
         harness.run_steps(2);
         assert!(harness.query_by_label_contains(said).is_some(), "{position}");
     }
     let chosen = |text: &str| harness.get_all_by_role(Role::ComboBox).any(|node| node.value().as_deref() == Some(text));
-    assert!(chosen("L2.alpha alone"));
+    assert!(chosen("roll.alpha alone"));
     harness.key_press(Key::Escape);
     harness.run_steps(2);
     assert_eq!(harness.state().selection.slide, None);

@@ -138,7 +138,7 @@ impl Mechanism {
         let joints = rig.gimbal.iter().flat_map(|gimbal| &gimbal.joints).take(chain.joint_count());
         let joints =
             joints.map(|joint| LaboratoryJoint { name: joint.name.clone(), limits_rad: joint.limits_rad }).collect();
-        Some(Self { name: rig.name.clone(), chain, joints, names: ParameterNames::default() })
+        Some(Self { name: rig.name.clone(), chain, joints, names: rig.parameter_names() })
     }
 }
 

@@ -64,7 +64,7 @@ impl Situation {
             joints: joints
                 .map(|joint| LaboratoryJoint { name: joint.name.clone(), limits_rad: joint.limits_rad })
                 .collect(),
-            names: ParameterNames::default(),
+            names: rig.parameter_names(),
             information,
             navigation: NavigationState {
                 world_from_imu: newest.world_from_imu,
