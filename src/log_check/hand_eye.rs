@@ -1,6 +1,5 @@
-//! Cameras against the gyroscope: the rotations that somebody measured from the pictures alone, against those that the
-//! gyroscope, the encoders and the rig predict. What differs by a constant rotation is the extrinsics' fault, what
-//! differs by a delay that of the clocks.
+//! Cameras against the gyroscope: rotations measured from the images alone, compared with those that gyroscope, encoders
+//! and rig predict. A constant rotation between them is an error of the extrinsics, a delay a time offset.
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
@@ -12,33 +11,34 @@ use crate::geometry::{ns_from_seconds, so3};
 use crate::gimbal::ClassicalChain;
 use crate::sensors::{CameraMount, CameraRig, Rig};
 
-/// Fewer image rotations than this say nothing.
+/// Minimum number of image rotations.
 const FEWEST_ROTATIONS: usize = 20;
-/// Turns smaller than this in the median say nothing.
-const LEAST_TURN_RAD: f64 = 0.003;
-/// Time offsets are searched so far to both sides.
+/// Minimum median rotation between two images.
+const LEAST_ROTATION_RAD: f64 = 0.003;
+/// Largest time offset that is searched, either sign.
 const LARGEST_OFFSET_S: f64 = 0.15;
 /// Step of that search.
 const OFFSET_STEP_S: f64 = 0.005;
-/// Offsets from this size on are told: an image interval of 20 Hz holds twelve of them, and rolling shutters and
-/// exposures shift stamps by less.
+/// Time offset that is reported: a twelfth of the image interval at 20 Hz; rolling shutter and exposure shift stamps by
+/// less.
 const OFFSET_TOLERANCE_S: f64 = 0.004;
-/// An offset counts when it takes at least this share off the mean square of the misfit.
+/// Minimum relative decrease of the squared misfit by a time offset.
 const LEAST_GAIN: f64 = 0.2;
-/// A camera may be this far from where the rotations say it points.
+/// Error of a camera's orientation that is tolerated.
 const ROTATION_TOLERANCE_RAD: f64 = 0.07;
-/// From here on the error is no inaccuracy but a wrong matrix.
+/// A larger error is a wrong matrix and not an inaccuracy.
 const WRONG_ROTATION_RAD: f64 = 0.35;
-/// Where turns are predicted no better than by this share of them (noisy encoders under a stabilized camera), they tell
-/// nothing.
+/// Largest ratio of misfit to rotation at which the prediction is usable; noisy encoders under a stabilized camera exceed
+/// it.
 const MOST_NOISE: f64 = 0.5;
-/// Turns about less than this share of the strongest axis leave the rotation about that axis open.
+/// Smallest ratio of the second singular value to the first; below it all rotations are about one axis, and the rotation
+/// about that axis is unobservable.
 const LEAST_SPREAD: f64 = 0.02;
 
-/// Rotation vectors: predicted and measured.
+/// Predicted and measured rotation vector in the camera frame, in radians.
 type Pair = (Vector3<f64>, Vector3<f64>);
 
-/// One camera's rotations beside what predicts them.
+/// Measured rotations of one camera and the data that predict them.
 struct HandEye<'a> {
     survey: &'a Survey,
     inertial: &'a InertialFacts,
@@ -46,7 +46,7 @@ struct HandEye<'a> {
     rotations: Vec<&'a ImageRotation>,
 }
 
-/// Checks a camera's orientation and clock by its image rotations, if there are any.
+/// Checks a camera's orientation and time offset by its image rotations, if there are any.
 pub(super) fn check_against_gyroscope(
     survey: &Survey,
     rig: &Rig,
@@ -59,37 +59,39 @@ pub(super) fn check_against_gyroscope(
     let Some(chain) = rig.chain_of_camera(&camera.key).filter(|_| rotations.len() >= FEWEST_ROTATIONS) else { return };
     let hand_eye = HandEye { survey, inertial, camera, rotations };
     let given = hand_eye.pairs(&chain, 0.0);
-    let turns: Vec<f64> = given.iter().map(|(_, measured)| measured.norm()).collect();
-    if given.len() < FEWEST_ROTATIONS || median(&turns) < LEAST_TURN_RAD {
-        let title = format!("{} turns too little to check its extrinsics", camera.key);
-        let evidence = format!("{} image rotations, {:.2}° in the median", given.len(), median(&turns).to_degrees());
-        return findings.add(Severity::Note, Area::Extrinsics, title, evidence, "fly turns about all axes");
+    let angles_rad: Vec<f64> = given.iter().map(|(_, measured)| measured.norm()).collect();
+    if given.len() < FEWEST_ROTATIONS || median(&angles_rad) < LEAST_ROTATION_RAD {
+        let title = format!("{} rotates too little to check its extrinsics", camera.key);
+        let evidence =
+            format!("{} image rotations, {:.2}° in the median", given.len(), median(&angles_rad).to_degrees());
+        return findings.add(Severity::Note, Area::Extrinsics, title, evidence, "rotate about all axes");
     }
-    let turn_rad = median(&turns);
-    let offset_s = hand_eye.check_clock(&chain, turn_rad, findings);
-    hand_eye.check_orientation(&chain, turn_rad, offset_s, findings);
+    let rotation_rad = median(&angles_rad);
+    let offset_s = hand_eye.check_time_offset(&chain, rotation_rad, findings);
+    hand_eye.check_orientation(&chain, rotation_rad, offset_s, findings);
 }
 
 impl HandEye<'_> {
-    /// Predicted and measured rotation vectors, for a chain and an offset of the clocks.
+    /// Predicted and measured rotation vectors, for a chain and an additional time offset.
     fn pairs(&self, chain: &ClassicalChain, offset_s: f64) -> Vec<Pair> {
         let shift = ns_from_seconds(self.camera.timeshift_cam_imu_s + offset_s);
-        let mount = |stamp_ns: i64| {
+        let imu_from_camera = |stamp_ns: i64| {
             let angles_rad = if chain.links.is_empty() { Vec::new() } else { self.survey.joint_angles_at(stamp_ns)? };
             Some(chain.imu_from_camera(&angles_rad).rotation)
         };
         let pair = |rotation: &&ImageRotation| {
             let (from_ns, to_ns) = (rotation.from_ns + shift, rotation.to_ns + shift);
-            let turn = imu_turn(self.inertial, from_ns, to_ns)?;
-            let predicted = so3::log(&(mount(to_ns)?.inverse() * turn * mount(from_ns)?));
+            let rotation_of_imu = imu_rotation(self.inertial, from_ns, to_ns)?;
+            let predicted =
+                so3::log(&(imu_from_camera(to_ns)?.inverse() * rotation_of_imu * imu_from_camera(from_ns)?));
             Some((predicted, so3::log(&rotation.second_from_first)))
         };
         self.rotations.iter().filter_map(pair).collect()
     }
 
-    /// The offset that brings image and gyroscope rotations together, whatever constant rotation lies between them;
-    /// 0 when there is none worth telling.
-    fn check_clock(&self, chain: &ClassicalChain, turn_rad: f64, findings: &mut Findings) -> f64 {
+    /// The time offset in seconds, `t_imu = t_cam + offset` beyond the rig's, that minimizes the misfit under any constant
+    /// rotation; 0 when it is too small or unobservable.
+    fn check_time_offset(&self, chain: &ClassicalChain, rotation_rad: f64, findings: &mut Findings) -> f64 {
         let key = &self.camera.key;
         let cost = |offset_s: f64| {
             let pairs = self.pairs(chain, offset_s);
@@ -102,37 +104,37 @@ impl HandEye<'_> {
         let unshifted = costs[steps as usize].1;
         let (offset_s, least) = (vertex(&costs, best), costs[best].1);
         let evidence = format!(
-            "turns of {:.3}° in the median differ by {:.3}°, by {:.3}° with the images {:+.1} ms later",
-            turn_rad.to_degrees(),
+            "rotations of {:.3}° in the median differ by {:.3}°, by {:.3}° with the images {:+.1} ms later",
+            rotation_rad.to_degrees(),
             unshifted.to_degrees(),
             least.to_degrees(),
             offset_s * 1e3
         );
         let far = costs.iter().filter(|(offset, _)| (offset - offset_s).abs() > 0.05).map(|(_, cost)| *cost);
         let gain = |from: f64| 1.0 - (least / from.max(f64::MIN_POSITIVE)).powi(2);
-        if least > MOST_NOISE * turn_rad || gain(far.fold(f64::INFINITY, f64::min)) < LEAST_GAIN {
-            let title = format!("the clock of {key} cannot be told from its turns");
-            let remedy = "fly faster turns, or trust a calibration such as Kalibr's timeshift_cam_imu";
+        if least > MOST_NOISE * rotation_rad || gain(far.fold(f64::INFINITY, f64::min)) < LEAST_GAIN {
+            let title = format!("the time offset of {key} is unobservable from its rotations");
+            let remedy = "rotate faster, or use a calibration such as Kalibr's timeshift_cam_imu";
             findings.add(Severity::Note, Area::Time, title, evidence, remedy);
             return 0.0;
         }
         if offset_s.abs() < OFFSET_TOLERANCE_S || gain(unshifted) < LEAST_GAIN {
-            findings.good(Area::Time, format!("{key} and the gyroscope turn at the same time"), evidence);
+            findings.good(Area::Time, format!("{key} and the gyroscope are synchronized"), evidence);
             return 0.0;
         }
-        let title = format!("{key} and the gyroscope are {:+.0} ms apart", offset_s * 1e3);
+        let title = format!("time offset of {key} to the gyroscope: {:+.0} ms", offset_s * 1e3);
         let remedy = format!("set {key}.timeshift_cam_imu to {:+.3}", self.camera.timeshift_cam_imu_s + offset_s);
         findings.add(Severity::Warning, Area::Time, title, evidence, remedy);
         offset_s
     }
 
-    fn check_orientation(&self, chain: &ClassicalChain, turn_rad: f64, offset_s: f64, findings: &mut Findings) {
+    fn check_orientation(&self, chain: &ClassicalChain, rotation_rad: f64, offset_s: f64, findings: &mut Findings) {
         let key = &self.camera.key;
         let pairs = self.pairs(chain, offset_s);
         let Some((error, spread)) = best_rotation(&pairs) else { return };
         let (given, corrected) = (misfit_rad(&pairs, &UnitQuaternion::identity()), misfit_rad(&pairs, &error));
         let evidence = format!(
-            "image rotations differ from the gyroscope's by {:.3}° in the median, by {:.3}° with the camera turned by {:.1}°; \
+            "image rotations differ from the gyroscope's by {:.3}° in the median, by {:.3}° with the camera rotated by {:.1}°; \
              {} pairs, second axis {:.0} % of the first",
             given.to_degrees(),
             corrected.to_degrees(),
@@ -142,36 +144,36 @@ impl HandEye<'_> {
         );
         let inverted = self.inverted(chain, offset_s, given);
         if let Some((field, misfit)) = inverted {
-            let title = format!("{field} is inverted, by the turns of {key}");
-            let evidence = format!("{evidence}; by {:.3}° with {field} the other way round", misfit.to_degrees());
+            let title = format!("{field} is inverted, according to the rotations of {key}");
+            let evidence = format!("{evidence}; by {:.3}° with {field} inverted", misfit.to_degrees());
             let remedy = format!(
                 "write the inverse of {field}: T_a_b maps points from b to a (Kalibr: T_cam_imu from the IMU to the camera)"
             );
             findings.add(Severity::Error, Area::Extrinsics, title, evidence, remedy);
-        } else if corrected > MOST_NOISE * turn_rad {
-            let title = format!("the turns of {key} are predicted too badly to check where it points");
+        } else if corrected > MOST_NOISE * rotation_rad {
+            let title = format!("the rotations of {key} are predicted too inaccurately to check its orientation");
             let remedy = if self.camera.mount == CameraMount::Gimbal {
-                "the encoders' noise is as large as the turns: fly with the gimbal held, or look at its other findings"
+                "encoder noise is as large as the rotations: record with the gimbal fixed, or see the findings on encoders"
             } else {
-                "images and gyroscope contradict each other: look at the findings on time and intrinsics"
+                "images and gyroscope are inconsistent: see the findings on time and intrinsics"
             };
             findings.add(Severity::Note, Area::Extrinsics, title, evidence, remedy);
         } else if spread < LEAST_SPREAD {
-            let title = format!("{key} turned about one axis only: its rotation cannot be checked");
-            findings.add(Severity::Note, Area::Extrinsics, title, evidence, "fly turns about all axes");
+            let title = format!("{key} rotated about one axis only: its orientation cannot be checked");
+            findings.add(Severity::Note, Area::Extrinsics, title, evidence, "rotate about all axes");
         } else if error.angle() > ROTATION_TOLERANCE_RAD && corrected < 0.8 * given {
             let severity = if error.angle() > WRONG_ROTATION_RAD { Severity::Error } else { Severity::Warning };
-            let title = format!("{key} does not point where the rig says");
+            let title = format!("the orientation of {key} differs from the rig");
             let remedy =
                 "check direction and axes of the extrinsics (T_cam_imu maps from the IMU to the camera), or calibrate";
             findings.add(severity, Area::Extrinsics, title, evidence, remedy);
         } else {
-            findings.good(Area::Extrinsics, format!("{key} points where the rig says"), evidence);
+            findings.good(Area::Extrinsics, format!("the orientation of {key} agrees with the rig"), evidence);
         }
     }
 
-    /// The transform of the rig whose inverse explains the rotations much better than itself and leaves the camera no
-    /// more than inaccurate, with the misfit then.
+    /// The transform of the rig whose inverse predicts the rotations much better, up to an error within tolerance, with the
+    /// misfit in radians.
     fn inverted(&self, chain: &ClassicalChain, offset_s: f64, given_rad: f64) -> Option<(String, f64)> {
         let key = &self.camera.key;
         let base = ClassicalChain { imu_from_base: chain.imu_from_base.inverse(), ..chain.clone() };
@@ -196,17 +198,18 @@ impl HandEye<'_> {
     }
 }
 
-/// The IMU's turn between two times by its gyroscope, bias removed: rotates vectors of its first frame into its second.
-fn imu_turn(inertial: &InertialFacts, from_ns: i64, to_ns: i64) -> Option<UnitQuaternion<f64>> {
+/// Rotation of the IMU between two times by its gyroscope, bias removed: `second_from_first`, which rotates vectors from
+/// the first IMU frame to the second.
+fn imu_rotation(inertial: &InertialFacts, from_ns: i64, to_ns: i64) -> Option<UnitQuaternion<f64>> {
     let samples = &inertial.samples;
     let (first, last) = (samples.first()?.stamp_ns, samples.last()?.stamp_ns);
     if from_ns < first || to_ns > last || to_ns <= from_ns {
         return None;
     }
-    let bias = inertial.rest_rate_rad_per_s.unwrap_or_default();
+    let bias = inertial.gyroscope_bias_rad_per_s.unwrap_or_default();
     let mut first_from_now = UnitQuaternion::identity();
-    let begin = samples.partition_point(|sample| sample.stamp_ns <= from_ns).saturating_sub(1);
-    for pair in samples[begin..].windows(2) {
+    let first_sample = samples.partition_point(|sample| sample.stamp_ns <= from_ns).saturating_sub(1);
+    for pair in samples[first_sample..].windows(2) {
         let (start, end) = (pair[0].stamp_ns.max(from_ns), pair[1].stamp_ns.min(to_ns));
         if start >= to_ns {
             break;
@@ -217,8 +220,8 @@ fn imu_turn(inertial: &InertialFacts, from_ns: i64, to_ns: i64) -> Option<UnitQu
     Some(first_from_now.inverse())
 }
 
-/// The rotation that brings the predicted rotation vectors closest to the measured ones (Wahba's problem), with the
-/// second singular value over the first: near zero when all turns were about one axis.
+/// The rotation that minimizes `Σ |measured − R·predicted|²` (Wahba's problem, by SVD), with the ratio of the second
+/// singular value to the first, which is near zero when all rotations are about one axis.
 fn best_rotation(pairs: &[Pair]) -> Option<(UnitQuaternion<f64>, f64)> {
     let sum: Matrix3<f64> = pairs.iter().map(|(predicted, measured)| measured * predicted.transpose()).sum();
     let svd = sum.svd(true, true);
@@ -229,13 +232,13 @@ fn best_rotation(pairs: &[Pair]) -> Option<(UnitQuaternion<f64>, f64)> {
     Some((UnitQuaternion::from_rotation_matrix(&rotation), svd.singular_values[1] / svd.singular_values[0].max(1e-12)))
 }
 
-/// Median angle between the measured rotation vectors and the predicted ones after a constant rotation.
+/// Median of `|error·predicted − measured|` in radians.
 fn misfit_rad(pairs: &[Pair], error: &UnitQuaternion<f64>) -> f64 {
     median(&pairs.iter().map(|(predicted, measured)| (error * predicted - measured).norm()).collect::<Vec<_>>())
 }
 
-/// Where the parabola through the squared costs around the best offset has its least value; the offset itself at the
-/// end of the range.
+/// Minimum of the parabola through the squared costs around the best offset, in seconds; the offset itself at the end of
+/// the range.
 fn vertex(costs: &[(f64, f64)], best: usize) -> f64 {
     let square = |index: usize| costs[index].1 * costs[index].1;
     let offset_s = costs[best].0;

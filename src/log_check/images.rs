@@ -1,36 +1,36 @@
 use super::inertial::InertialFacts;
 use super::statistics::{median, percentile};
-use super::survey::{ImageLook, Survey};
+use super::survey::{SampledImage, Survey};
 use super::{Area, Findings, Severity};
 use crate::geometry::seconds_from_ns;
 use crate::sensors::{CameraMount, CameraRig, GrayImage, Rig};
 
-/// A pixel with a steeper grey slope (per pixel) counts as texture.
+/// A pixel with a larger gradient, in grey levels per pixel, has texture.
 const TEXTURE_SLOPE: usize = 12;
-/// An image with edges less steep than this share of the usual is blurred.
+/// An image is blurred when the ratio of its edge gradient to the median is below this.
 const BLURRED: f64 = 0.5;
-/// Images with less texture than this share of their pixels give few features.
+/// Ratio of pixels with texture below which an image gives few features.
 const LEAST_TEXTURE: f64 = 0.01;
-/// Pixels at least this bright are taken for overexposed.
+/// Pixels at least this bright count as overexposed.
 const BRIGHT: u8 = 250;
-/// Pixels at most this bright are taken for underexposed.
+/// Pixels at most this bright count as underexposed.
 const DARK: u8 = 5;
 
-/// What one image looks like, in numbers.
+/// Brightness, texture and sharpness of one image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ImageMeasure {
     pub(super) resolution_px: [usize; 2],
     pub(super) mean_grey: f64,
-    /// Share of the pixels that are black, and that are white.
+    /// Ratio of black pixels, and of white pixels.
     pub(super) dark: f64,
     pub(super) bright: f64,
-    /// Share of the pixels with texture.
+    /// Ratio of pixels with texture.
     pub(super) texture: f64,
-    /// Slope of the steepest hundredth of the pixels, in grey values per pixel.
+    /// Gradient that 1 % of the pixels exceed, in grey levels per pixel.
     pub(super) edge: f64,
 }
 
-/// Looks at every second pixel of every second row.
+/// Measures every second pixel of every second row.
 pub(super) fn measure(image: &GrayImage) -> ImageMeasure {
     let (width, height) = (image.width, image.height);
     let mut slopes = [0_usize; 256];
@@ -49,7 +49,7 @@ pub(super) fn measure(image: &GrayImage) -> ImageMeasure {
             bright += usize::from(value >= BRIGHT);
         }
     }
-    let share = |part: usize| part as f64 / count.max(1) as f64;
+    let mean = |sum: usize| sum as f64 / count.max(1) as f64;
     let mut steeper = 0;
     let edge = (0..256).rev().find(|slope| {
         steeper += slopes[*slope];
@@ -57,77 +57,83 @@ pub(super) fn measure(image: &GrayImage) -> ImageMeasure {
     });
     ImageMeasure {
         resolution_px: [width, height],
-        mean_grey: share(sum),
-        dark: share(dark),
-        bright: share(bright),
-        texture: share(slopes[TEXTURE_SLOPE..].iter().sum()),
+        mean_grey: mean(sum),
+        dark: mean(dark),
+        bright: mean(bright),
+        texture: mean(slopes[TEXTURE_SLOPE..].iter().sum()),
         edge: edge.unwrap_or(0) as f64,
     }
 }
 
-/// Size, blur, exposure and texture of each camera's images, and how fast they move.
+/// Size, blur, exposure and texture of each camera's images, and their motion by rotation.
 pub(super) fn check_images(survey: &Survey, rig: &Rig, inertial: &InertialFacts, findings: &mut Findings) {
     for camera in &rig.cameras {
-        let Some(looks) = survey.images.get(&camera.key).filter(|looks| !looks.is_empty()) else { continue };
-        check_size(camera, looks, findings);
+        let Some(images) = survey.images.get(&camera.key).filter(|images| !images.is_empty()) else { continue };
+        check_size(camera, images, findings);
         if let Some(bits) = survey.depths.get(&camera.key).map(|depth| depth.bits()).filter(|bits| *bits < 16) {
             let title = format!("{} has grey values of {bits} bits in 16", camera.key);
             let evidence = format!("by the brightest pixel of its first image; bits {} to {bits} are used", bits - 7);
             findings.add(Severity::Note, Area::Images, title, evidence, "");
         }
-        check_blur(camera, looks, findings);
-        check_exposure(camera, looks, findings);
-        check_texture(camera, looks, findings);
+        check_blur(camera, images, findings);
+        check_exposure(camera, images, findings);
+        check_texture(camera, images, findings);
         check_motion(camera, inertial, findings);
     }
 }
 
-fn check_size(camera: &CameraRig, looks: &[ImageLook], findings: &mut Findings) {
+fn check_size(camera: &CameraRig, images: &[SampledImage], findings: &mut Findings) {
     let [width, height] = camera.model.resolution_px;
-    let Some(other) = looks.iter().find(|look| look.measure.resolution_px != camera.model.resolution_px) else {
-        let evidence = format!("{width}×{height} in {} images", looks.len());
-        return findings.good(Area::Images, format!("{} has the size that the rig says", camera.key), evidence);
+    let Some(other) = images.iter().find(|image| image.measure.resolution_px != camera.model.resolution_px) else {
+        let evidence = format!("{width}×{height} in {} images", images.len());
+        return findings.good(Area::Images, format!("{} has the size given in the rig", camera.key), evidence);
     };
-    let [seen_width, seen_height] = other.measure.resolution_px;
-    let wrong = looks.iter().filter(|look| look.measure.resolution_px != camera.model.resolution_px).count();
+    let [image_width, image_height] = other.measure.resolution_px;
+    let wrong = images.iter().filter(|image| image.measure.resolution_px != camera.model.resolution_px).count();
     let evidence =
-        format!("{seen_width}×{seen_height} in {wrong} of {} images, {width}×{height} in the rig", looks.len());
-    let scale = seen_width as f64 / width as f64;
-    let remedy = if (seen_height as f64 / height as f64 - scale).abs() < 0.01 {
+        format!("{image_width}×{image_height} in {wrong} of {} images, {width}×{height} in the rig", images.len());
+    let scale = image_width as f64 / width as f64;
+    let remedy = if (image_height as f64 / height as f64 - scale).abs() < 0.01 {
         format!("the images are scaled by {scale:.3}: scale fx fy cx cy with them, or record the calibrated size")
     } else {
-        "set resolution and the intrinsics that belong to it; images of another size are left out".to_owned()
+        "set resolution with its intrinsics; images of another size are skipped".to_owned()
     };
-    findings.add(Severity::Error, Area::Images, format!("{} has another size", camera.key), evidence, remedy);
+    findings.add(
+        Severity::Error,
+        Area::Images,
+        format!("{} differs in size from the rig", camera.key),
+        evidence,
+        remedy,
+    );
 }
 
-fn check_blur(camera: &CameraRig, looks: &[ImageLook], findings: &mut Findings) {
-    let edges: Vec<f64> = looks.iter().map(|look| look.measure.edge).collect();
+fn check_blur(camera: &CameraRig, images: &[SampledImage], findings: &mut Findings) {
+    let edges: Vec<f64> = images.iter().map(|image| image.measure.edge).collect();
     let usual = median(&edges);
-    let blurred: Vec<&ImageLook> = looks.iter().filter(|look| look.measure.edge < BLURRED * usual).collect();
+    let blurred: Vec<&SampledImage> = images.iter().filter(|image| image.measure.edge < BLURRED * usual).collect();
     let evidence = format!(
-        "steepest edges {usual:.0} grey values per pixel in the middle, {:.0} in the softest of {} images",
+        "edge gradient {usual:.0} grey levels per pixel in the median, {:.0} in the most blurred of {} images",
         percentile(&edges, 0.0),
-        looks.len()
+        images.len()
     );
     if usual < 8.0 {
-        let title = format!("the images of {} are soft throughout", camera.key);
+        let title = format!("all images of {} are blurred", camera.key);
         let remedy = "check focus, compression and lens; features need edges";
         findings.add(Severity::Warning, Area::Images, title, evidence, remedy);
-    } else if blurred.len() * 20 >= looks.len() {
+    } else if blurred.len() * 20 >= images.len() {
         let times: Vec<String> =
-            blurred.iter().take(5).map(|look| format!("{:.1} s", seconds_from_ns(look.stamp_ns))).collect();
+            blurred.iter().take(5).map(|image| format!("{:.1} s", seconds_from_ns(image.stamp_ns))).collect();
         let title = format!("some images of {} are blurred", camera.key);
-        let evidence = format!("{} of {} looked at, at {}; {evidence}", blurred.len(), looks.len(), times.join(", "));
-        let remedy = "shorten the exposure, add light or turn slower; tracks are lost there";
+        let evidence = format!("{} of {} images, at {}; {evidence}", blurred.len(), images.len(), times.join(", "));
+        let remedy = "shorten the exposure, add light or rotate slower; tracks are lost there";
         findings.add(Severity::Warning, Area::Images, title, evidence, remedy);
     } else {
         findings.good(Area::Images, format!("the images of {} are sharp", camera.key), evidence);
     }
 }
 
-fn check_exposure(camera: &CameraRig, looks: &[ImageLook], findings: &mut Findings) {
-    let of = |pick: fn(&ImageMeasure) -> f64| looks.iter().map(|look| pick(&look.measure)).collect::<Vec<_>>();
+fn check_exposure(camera: &CameraRig, images: &[SampledImage], findings: &mut Findings) {
+    let of = |pick: fn(&ImageMeasure) -> f64| images.iter().map(|image| pick(&image.measure)).collect::<Vec<_>>();
     let (grey, dark, bright) = (of(|m| m.mean_grey), of(|m| m.dark), of(|m| m.bright));
     let evidence = format!(
         "mean grey {:.0} (from {:.0} to {:.0}), {:.0} % black and {:.0} % white pixels in the median image",
@@ -137,7 +143,7 @@ fn check_exposure(camera: &CameraRig, looks: &[ImageLook], findings: &mut Findin
         median(&dark) * 100.0,
         median(&bright) * 100.0
     );
-    let jumps = looks.windows(2).filter(|pair| (pair[0].measure.mean_grey - pair[1].measure.mean_grey).abs() > 40.0);
+    let jumps = images.windows(2).filter(|pair| (pair[0].measure.mean_grey - pair[1].measure.mean_grey).abs() > 40.0);
     let jumps = jumps.count();
     if median(&grey) < 25.0 || median(&dark) > 0.5 {
         let title = format!("{} is underexposed", camera.key);
@@ -145,42 +151,42 @@ fn check_exposure(camera: &CameraRig, looks: &[ImageLook], findings: &mut Findin
     } else if median(&grey) > 230.0 || median(&bright) > 0.3 {
         let title = format!("{} is overexposed", camera.key);
         findings.add(Severity::Warning, Area::Images, title, evidence, "expose shorter");
-    } else if jumps * 10 > looks.len() {
+    } else if jumps * 10 > images.len() {
         let title = format!("the exposure of {} jumps", camera.key);
         let evidence = format!("{jumps} changes by more than 40 grey values; {evidence}");
-        let remedy = "fix the exposure, or limit its speed: trackers take brightness as constant";
+        let remedy = "fix the exposure, or limit its rate of change: the tracker assumes constant brightness";
         findings.add(Severity::Note, Area::Images, title, evidence, remedy);
     } else {
         findings.good(Area::Images, format!("{} is well exposed", camera.key), evidence);
     }
 }
 
-fn check_texture(camera: &CameraRig, looks: &[ImageLook], findings: &mut Findings) {
-    let shares: Vec<f64> = looks.iter().map(|look| look.measure.texture).collect();
-    let poor = shares.iter().filter(|share| **share < LEAST_TEXTURE).count();
+fn check_texture(camera: &CameraRig, images: &[SampledImage], findings: &mut Findings) {
+    let ratios: Vec<f64> = images.iter().map(|image| image.measure.texture).collect();
+    let poor = ratios.iter().filter(|ratio| **ratio < LEAST_TEXTURE).count();
     let evidence = format!(
         "{:.1} % of the pixels have texture in the median image, {:.1} % in the poorest",
-        median(&shares) * 100.0,
-        percentile(&shares, 0.0) * 100.0
+        median(&ratios) * 100.0,
+        percentile(&ratios, 0.0) * 100.0
     );
-    if poor * 20 >= looks.len() {
-        let title = format!("{} sees little texture at times", camera.key);
-        let evidence = format!("{poor} of {} images looked at; {evidence}", looks.len());
+    if poor * 20 >= images.len() {
+        let title = format!("some images of {} have little texture", camera.key);
+        let evidence = format!("{poor} of {} images; {evidence}", images.len());
         let remedy = "white walls, sky and fog give few features: expect the estimate to drift there";
         findings.add(Severity::Warning, Area::Images, title, evidence, remedy);
     } else {
-        findings.good(Area::Images, format!("{} sees enough texture", camera.key), evidence);
+        findings.good(Area::Images, format!("the images of {} have enough texture", camera.key), evidence);
     }
 }
 
-/// How far the image moves from frame to frame by the rotation alone; a gimbal takes that out.
+/// Image motion between images by the vehicle's rotation alone, in pixels; a gimbal compensates it.
 fn check_motion(camera: &CameraRig, inertial: &InertialFacts, findings: &mut Findings) {
     if camera.mount == CameraMount::Gimbal || camera.rate_hz <= 0.0 || inertial.samples.is_empty() {
         return;
     }
-    let rest = inertial.rest_rate_rad_per_s.unwrap_or_default();
+    let bias = inertial.gyroscope_bias_rad_per_s.unwrap_or_default();
     let rates: Vec<f64> =
-        inertial.samples.iter().map(|sample| (sample.angular_velocity_rad_per_s - rest).norm()).collect();
+        inertial.samples.iter().map(|sample| (sample.angular_velocity_rad_per_s - bias).norm()).collect();
     let pixels = |rate: f64| rate / camera.rate_hz * camera.model.focal_length_px();
     let (usual, fast) = (pixels(median(&rates)), pixels(percentile(&rates, 0.99)));
     let evidence = format!(
@@ -188,10 +194,10 @@ fn check_motion(camera: &CameraRig, inertial: &InertialFacts, findings: &mut Fin
         percentile(&rates, 0.99)
     );
     if fast > 0.15 * camera.model.resolution_px[0] as f64 {
-        let title = format!("{} turns fast", camera.key);
-        let remedy = "tracking then rests on the gyroscope's prediction: extrinsics and time offset must be right";
+        let title = format!("{} rotates fast", camera.key);
+        let remedy = "tracking then depends on the gyroscope's prediction: extrinsics and time offset must be correct";
         findings.add(Severity::Note, Area::Motion, title, evidence, remedy);
     } else {
-        findings.good(Area::Motion, format!("{} turns slowly enough to track", camera.key), evidence);
+        findings.good(Area::Motion, format!("{} rotates slowly enough for tracking", camera.key), evidence);
     }
 }

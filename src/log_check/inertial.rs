@@ -1,49 +1,49 @@
 use nalgebra::Vector3;
 
-use super::statistics::{deviation, mean, median, percentile, white_deviation};
+use super::statistics::{mean, median, percentile, standard_deviation, white_standard_deviation};
 use super::survey::Survey;
 use super::{Area, Findings, Severity};
 use crate::geometry::seconds_from_ns;
 use crate::sensors::{ImuSample, Rig};
 
-/// Length of the windows in which stillness is judged.
+/// Length of the windows that are classified as stationary or not.
 const WINDOW_NS: i64 = 500_000_000;
-/// Still: beyond the sensor's white noise the gyroscope varies less than this.
-const STILL_RATE_RAD_PER_S: f64 = 0.012;
-/// Still: beyond the sensor's white noise the accelerometer varies less than this.
-const STILL_FORCE_M_PER_S2: f64 = 0.06;
-/// Still: the mean rate is below this (a bias counts too).
-const STILL_MEAN_RAD_PER_S: f64 = 0.08;
-/// Noise is told when it is this many times what the rig says.
+/// Stationary: the standard deviation of the angular rate, white noise removed, is below this.
+const STATIONARY_RATE_RAD_PER_S: f64 = 0.012;
+/// Stationary: the standard deviation of the specific force, white noise removed, is below this.
+const STATIONARY_FORCE_M_PER_S2: f64 = 0.06;
+/// Stationary: the mean angular rate, bias included, is below this.
+const STATIONARY_MEAN_RAD_PER_S: f64 = 0.08;
+/// Measured noise above this many times the rig's is reported.
 const NOISE_TOO_SMALL: f64 = 3.0;
-/// Noise is told when it is this many times below what the rig says.
+/// Measured noise this many times below the rig's is reported.
 const NOISE_TOO_LARGE: f64 = 30.0;
 
 /// Half a second of IMU samples.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Window {
-    pub(super) begin_ns: i64,
+    pub(super) start_ns: i64,
     pub(super) end_ns: i64,
-    pub(super) still: bool,
+    pub(super) stationary: bool,
     mean_rate: Vector3<f64>,
     mean_force: Vector3<f64>,
     white_rate: Vector3<f64>,
     white_force: Vector3<f64>,
 }
 
-/// What later checks need to know about the motion.
+/// IMU samples and what they measure of the motion, for later checks.
 #[derive(Clone, Debug, Default)]
 pub(super) struct InertialFacts {
     /// Finite samples in the order of their stamps.
     pub(super) samples: Vec<ImuSample>,
-    /// Mean angular velocity while still; `None` when the vehicle never was.
-    pub(super) rest_rate_rad_per_s: Option<Vector3<f64>>,
-    /// A time at which the accelerometer shows where up is, with its reading around that time: at rest, or, for a
-    /// vehicle that never rests, the middle of the log with the mean over all of it.
+    /// Mean angular rate while stationary, in the IMU frame; `None` when the vehicle never was.
+    pub(super) gyroscope_bias_rad_per_s: Option<Vector3<f64>>,
+    /// Time and mean specific force (IMU frame, m/s²) of a stationary window; without one, the middle of the log and the
+    /// mean over all of it. Its direction is up.
     pub(super) up: Option<(i64, Vector3<f64>)>,
 }
 
-/// Units, gravity, biases, noise, saturation and stillness of the IMU.
+/// Units, gravity, biases, noise and saturation of the IMU, and stationary periods.
 pub(super) fn check_inertial(survey: &Survey, rig: Option<&Rig>, findings: &mut Findings) -> InertialFacts {
     let finite = |sample: &&ImuSample| {
         let numbers = sample.angular_velocity_rad_per_s.iter().chain(&sample.specific_force_m_per_s2);
@@ -54,8 +54,8 @@ pub(super) fn check_inertial(survey: &Survey, rig: Option<&Rig>, findings: &mut 
     if lost > 0 {
         let first = survey.imu.iter().find(|sample| !finite(sample)).map_or(0, |sample| sample.stamp_ns);
         let evidence = format!("{lost} of {} samples, the first at {:.3} s", survey.imu.len(), seconds_from_ns(first));
-        let remedy = "look at the driver; these samples are dropped";
-        findings.add(Severity::Warning, Area::Inertial, "the IMU sends numbers that are not finite", evidence, remedy);
+        let remedy = "check the driver; these samples are dropped";
+        findings.add(Severity::Warning, Area::Inertial, "IMU samples are not finite", evidence, remedy);
     }
     samples.sort_by_key(|sample| sample.stamp_ns);
     samples.dedup_by_key(|sample| sample.stamp_ns);
@@ -63,16 +63,17 @@ pub(super) fn check_inertial(survey: &Survey, rig: Option<&Rig>, findings: &mut 
         return InertialFacts { samples, ..InertialFacts::default() };
     }
     let windows = windows_of(&samples);
-    let still: Vec<Window> = windows.iter().filter(|window| window.still).copied().collect();
-    check_gravity(&samples, &still, rig, findings);
-    let rest_rate = check_rest_rate(&still, findings);
-    check_noise(&samples, &windows, &still, rig, findings);
+    let stationary: Vec<Window> = windows.iter().filter(|window| window.stationary).copied().collect();
+    check_gravity(&samples, &stationary, rig, findings);
+    let gyroscope_bias = check_gyroscope_bias(&stationary, findings);
+    check_noise(&samples, &windows, &stationary, rig, findings);
     check_clipping(&samples, findings);
-    check_stillness(&windows, findings);
+    check_stationary(&windows, findings);
     let forces = || samples.iter().map(|sample| sample.specific_force_m_per_s2).collect::<Vec<_>>();
-    let at_rest = still.get(still.len() / 2).map(|window| (window.begin_ns.midpoint(window.end_ns), window.mean_force));
-    let up = at_rest.unwrap_or_else(|| (samples[samples.len() / 2].stamp_ns, mean(&forces())));
-    InertialFacts { samples, rest_rate_rad_per_s: rest_rate, up: Some(up) }
+    let stationary_up =
+        stationary.get(stationary.len() / 2).map(|window| (window.start_ns.midpoint(window.end_ns), window.mean_force));
+    let up = stationary_up.unwrap_or_else(|| (samples[samples.len() / 2].stamp_ns, mean(&forces())));
+    InertialFacts { samples, gyroscope_bias_rad_per_s: gyroscope_bias, up: Some(up) }
 }
 
 fn windows_of(samples: &[ImuSample]) -> Vec<Window> {
@@ -85,16 +86,16 @@ fn windows_of(samples: &[ImuSample]) -> Vec<Window> {
         if part.len() >= 20 && samples.len() > end {
             let rates: Vec<Vector3<f64>> = part.iter().map(|sample| sample.angular_velocity_rad_per_s).collect();
             let forces: Vec<Vector3<f64>> = part.iter().map(|sample| sample.specific_force_m_per_s2).collect();
-            let (white_rate, white_force) = (white_deviation(&rates), white_deviation(&forces));
+            let (white_rate, white_force) = (white_standard_deviation(&rates), white_standard_deviation(&forces));
             let beyond =
                 |all: Vector3<f64>, white: Vector3<f64>| (all.norm_squared() - white.norm_squared()).max(0.0).sqrt();
             let mean_rate = mean(&rates);
             windows.push(Window {
-                begin_ns: samples[begin].stamp_ns,
+                start_ns: samples[begin].stamp_ns,
                 end_ns,
-                still: beyond(deviation(&rates), white_rate) < STILL_RATE_RAD_PER_S
-                    && beyond(deviation(&forces), white_force) < STILL_FORCE_M_PER_S2
-                    && mean_rate.norm() < STILL_MEAN_RAD_PER_S,
+                stationary: beyond(standard_deviation(&rates), white_rate) < STATIONARY_RATE_RAD_PER_S
+                    && beyond(standard_deviation(&forces), white_force) < STATIONARY_FORCE_M_PER_S2
+                    && mean_rate.norm() < STATIONARY_MEAN_RAD_PER_S,
                 mean_rate,
                 mean_force: mean(&forces),
                 white_rate,
@@ -106,7 +107,7 @@ fn windows_of(samples: &[ImuSample]) -> Vec<Window> {
     windows
 }
 
-fn check_gravity(samples: &[ImuSample], still: &[Window], rig: Option<&Rig>, findings: &mut Findings) {
+fn check_gravity(samples: &[ImuSample], stationary: &[Window], rig: Option<&Rig>, findings: &mut Findings) {
     let gravity = rig.map_or(9.81, |rig| rig.gravity_m_per_s2);
     if !(9.75..=9.85).contains(&gravity) {
         let evidence = format!("{gravity} m/s²; on the ground it lies between 9.78 and 9.83");
@@ -118,13 +119,13 @@ fn check_gravity(samples: &[ImuSample], still: &[Window], rig: Option<&Rig>, fin
             "set gravity for the place of the flight",
         );
     }
-    let (measured, when) = if still.is_empty() {
-        // Over a flight that ends where it began in speed, the mean specific force is gravity, seen from a tilting frame.
+    let (measured, when) = if stationary.is_empty() {
+        // Where start and end velocity are equal, the mean specific force is gravity, measured in a tilting frame.
         let norms: Vec<f64> = samples.iter().map(|sample| sample.specific_force_m_per_s2.norm()).collect();
         (median(&norms), "median over the flight")
     } else {
-        let norms: Vec<f64> = still.iter().map(|window| window.mean_force.norm()).collect();
-        (median(&norms), "while still")
+        let norms: Vec<f64> = stationary.iter().map(|window| window.mean_force.norm()).collect();
+        (median(&norms), "while stationary")
     };
     let difference = measured - gravity;
     let evidence = format!("|a| is {measured:.3} m/s² {when}, gravity {gravity:.3}: {difference:+.3} m/s²");
@@ -132,15 +133,15 @@ fn check_gravity(samples: &[ImuSample], still: &[Window], rig: Option<&Rig>, fin
         (
             Severity::Error,
             "accelerations are in g, not m/s²",
-            "multiply by 9.80665 in the driver: sensor_msgs/Imu wants m/s²",
+            "multiply by 9.80665 in the driver: sensor_msgs/Imu requires m/s²",
         )
     } else if difference.abs() > 2.0 {
         (
             Severity::Error,
-            "accelerations do not measure gravity",
-            "check units, scale and IMU intrinsics in the driver: at rest the norm must be gravity",
+            "the accelerometer does not measure gravity",
+            "check units, scale and IMU intrinsics in the driver: while stationary the norm must be gravity",
         )
-    } else if difference.abs() > 0.2 && !still.is_empty() {
+    } else if difference.abs() > 0.2 && !stationary.is_empty() {
         (
             if difference.abs() > 1.0 { Severity::Warning } else { Severity::Note },
             "the accelerometer has a large bias or scale error along gravity",
@@ -152,29 +153,29 @@ fn check_gravity(samples: &[ImuSample], still: &[Window], rig: Option<&Rig>, fin
     findings.add(severity, Area::Inertial, title, evidence, remedy);
 }
 
-fn check_rest_rate(still: &[Window], findings: &mut Findings) -> Option<Vector3<f64>> {
-    if still.is_empty() {
+fn check_gyroscope_bias(stationary: &[Window], findings: &mut Findings) -> Option<Vector3<f64>> {
+    if stationary.is_empty() {
         return None;
     }
-    let rates: Vec<Vector3<f64>> = still.iter().map(|window| window.mean_rate).collect();
-    // Per axis the median: slow turning in some of the windows does not count.
+    let rates: Vec<Vector3<f64>> = stationary.iter().map(|window| window.mean_rate).collect();
+    // The median of each axis is insensitive to slow rotation in some of the windows.
     let axis = |index: usize| median(&rates.iter().map(|rate| rate[index]).collect::<Vec<_>>());
-    let rest = Vector3::new(axis(0), axis(1), axis(2));
-    let evidence = format!("({:+.4}, {:+.4}, {:+.4}) rad/s while still or hovering", rest.x, rest.y, rest.z);
-    if rest.norm() > 0.03 {
-        let remedy = "let the gyroscope calibrate itself before the flight; or the vehicle turned slowly all the time";
+    let bias = Vector3::new(axis(0), axis(1), axis(2));
+    let evidence = format!("({:+.4}, {:+.4}, {:+.4}) rad/s while stationary or hovering", bias.x, bias.y, bias.z);
+    if bias.norm() > 0.03 {
+        let remedy = "calibrate the gyroscope before the flight, unless the vehicle rotated slowly all the time";
         findings.add(Severity::Note, Area::Inertial, "the gyroscope's bias is large", evidence, remedy);
     } else {
         findings.good(Area::Inertial, "the gyroscope's bias is small", evidence);
     }
-    Some(rest)
+    Some(bias)
 }
 
 /// White noise against the rig's densities, and vibration.
 fn check_noise(
     samples: &[ImuSample],
     windows: &[Window],
-    still: &[Window],
+    stationary: &[Window],
     rig: Option<&Rig>,
     findings: &mut Findings,
 ) {
@@ -184,28 +185,34 @@ fn check_noise(
         let white = if gyroscope { window.white_rate } else { window.white_force };
         (white.norm_squared() / 3.0).sqrt() / rate_hz.sqrt()
     };
-    let quiet_when = if still.is_empty() { "in the quietest tenth of the flight" } else { "while still" };
+    let quiet_when = if stationary.is_empty() { "in the quietest tenth of the flight" } else { "while stationary" };
     let sensors = [
         ("gyroscope", true, rig.map(|rig| rig.imu.noise.gyroscope_noise_density), "rad/s/√Hz"),
         ("accelerometer", false, rig.map(|rig| rig.imu.noise.accelerometer_noise_density), "m/s²/√Hz"),
     ];
     for (name, gyroscope, given, unit) in sensors {
         let all: Vec<f64> = windows.iter().map(|window| average(window, gyroscope)).collect();
-        let resting: Vec<f64> = still.iter().map(|window| average(window, gyroscope)).collect();
-        let quiet = if resting.is_empty() { percentile(&all, 0.1) } else { median(&resting) };
+        let stationary_noise: Vec<f64> = stationary.iter().map(|window| average(window, gyroscope)).collect();
+        let quiet = if stationary_noise.is_empty() { percentile(&all, 0.1) } else { median(&stationary_noise) };
         let flight = percentile(&all, 0.9);
         if quiet > 0.0 && flight > 10.0 * quiet {
             let evidence =
-                format!("{flight:.2e} {unit} in the liveliest tenth of the windows, {quiet:.2e} {quiet_when}");
-            let remedy = "damp the IMU's mount, or raise the noise density to what it is in flight";
-            findings.add(Severity::Note, Area::Inertial, format!("the {name} vibrates in flight"), evidence, remedy);
+                format!("{flight:.2e} {unit} in the noisiest tenth of the windows, {quiet:.2e} {quiet_when}");
+            let remedy = "isolate the IMU from vibration, or raise the noise density to the value in flight";
+            findings.add(
+                Severity::Note,
+                Area::Inertial,
+                format!("vibration on the {name} in flight"),
+                evidence,
+                remedy,
+            );
         }
         let Some(given) = given else { continue };
-        judge_density(name, (quiet, quiet_when), given, unit, rate_hz, findings);
+        compare_density(name, (quiet, quiet_when), given, unit, rate_hz, findings);
     }
 }
 
-fn judge_density(
+fn compare_density(
     name: &str,
     (measured, when): (f64, &str),
     given: f64,
@@ -215,23 +222,23 @@ fn judge_density(
 ) {
     let ratio = measured / given;
     let evidence = format!("{measured:.2e} {unit} measured {when} at {rate_hz:.0} Hz, {given:.2e} in the rig");
-    // A density taken for the noise of one sample (or the other way round) is off by √rate.
+    // A density confused with the noise of one sample differs by √rate.
     let discrete = |ratio: f64| (ratio.ln() - 0.5 * rate_hz.ln()).abs() < 0.3;
     let field = format!("imu0.{name}_noise_density");
     if ratio > NOISE_TOO_SMALL {
-        let hint = if discrete(ratio) { " (it looks as if it had been divided by √rate once too often)" } else { "" };
+        let hint = if discrete(ratio) { " (it appears to have been divided by √rate twice)" } else { "" };
         let remedy =
-            format!("raise {field} to {:.1e}{hint}; filters want it 2 to 10 times the measured value", 2.0 * measured);
-        let title = format!("the {name}'s noise is too small in the rig by {ratio:.1}");
+            format!("raise {field} to {:.1e}{hint}; estimators need 2 to 10 times the measured value", 2.0 * measured);
+        let title = format!("{name} noise in the rig is {ratio:.1} times too small");
         findings.add(Severity::Warning, Area::Inertial, title, evidence, remedy);
     } else if ratio < 1.0 / NOISE_TOO_LARGE || (measured > 0.0 && discrete(1.0 / ratio)) {
         let hint =
-            if discrete(1.0 / ratio) { ": it looks like the noise of one sample; divide it by √rate" } else { "" };
+            if discrete(1.0 / ratio) { ": it appears to be the noise of one sample; divide it by √rate" } else { "" };
         let remedy = format!("{field} is a continuous-time density in {unit}{hint}");
-        let title = format!("the {name}'s noise is {:.0} times too large in the rig", 1.0 / ratio);
+        let title = format!("{name} noise in the rig is {:.0} times too large", 1.0 / ratio);
         findings.add(Severity::Note, Area::Inertial, title, evidence, remedy);
     } else {
-        findings.good(Area::Inertial, format!("the {name}'s noise fits the rig"), evidence);
+        findings.good(Area::Inertial, format!("{name} noise agrees with the rig"), evidence);
     }
 }
 
@@ -255,15 +262,15 @@ fn check_clipping(samples: &[ImuSample], findings: &mut Findings) {
                 let title = format!("the {name} saturates on {}", ["x", "y", "z"][axis]);
                 let evidence = format!("{hits} samples at exactly ±{limit:.4} {unit}");
                 let remedy =
-                    "set a wider range in the sensor, or damp the mount: clipped samples break the integration";
+                    "set a wider range in the sensor, or reduce vibration: clipped samples bias the preintegration";
                 findings.add(Severity::Warning, Area::Inertial, title, evidence, remedy);
             }
         }
     }
     let evidence = format!("largest values {:.2} rad/s and {:.1} m/s²", largest[0], largest[1]);
     if largest[0] > 35.0 {
-        let remedy = "check the unit: sensor_msgs/Imu wants rad/s, and 35 rad/s is 2000 °/s";
-        findings.add(Severity::Error, Area::Inertial, "angular velocities look like degrees", evidence, remedy);
+        let remedy = "check the unit: sensor_msgs/Imu requires rad/s, and 35 rad/s is 2000 °/s";
+        findings.add(Severity::Error, Area::Inertial, "angular velocities appear to be in degrees", evidence, remedy);
     } else if !clipped {
         findings.good(Area::Inertial, "the IMU does not saturate", evidence);
     }
@@ -273,42 +280,42 @@ fn check_clipping(samples: &[ImuSample], findings: &mut Findings) {
     });
     let repeated = same.count();
     if repeated * 100 > samples.len() {
-        let evidence = format!("{repeated} of {} samples equal the one before in all six numbers", samples.len());
+        let evidence = format!("{repeated} of {} samples equal the previous one in all six values", samples.len());
         let remedy = "the driver sends faster than the sensor measures, or fills gaps: send each measurement once";
         findings.add(Severity::Warning, Area::Inertial, "IMU samples repeat", evidence, remedy);
     }
 }
 
-/// When the vehicle stands still or hovers: nothing can be initialized or calibrated from motion there.
-fn check_stillness(windows: &[Window], findings: &mut Findings) {
-    let total_s: f64 = windows.iter().map(|window| seconds_from_ns(window.end_ns - window.begin_ns)).sum();
-    let mut stretches: Vec<(i64, i64)> = Vec::new();
-    for window in windows.iter().filter(|window| window.still) {
-        match stretches.last_mut().filter(|last| window.begin_ns - last.1 < WINDOW_NS / 2) {
+/// Periods in which the vehicle is stationary or hovers, where motion neither initializes nor calibrates anything.
+fn check_stationary(windows: &[Window], findings: &mut Findings) {
+    let total_s: f64 = windows.iter().map(|window| seconds_from_ns(window.end_ns - window.start_ns)).sum();
+    let mut periods: Vec<(i64, i64)> = Vec::new();
+    for window in windows.iter().filter(|window| window.stationary) {
+        match periods.last_mut().filter(|last| window.start_ns - last.1 < WINDOW_NS / 2) {
             Some(last) => last.1 = window.end_ns,
-            None => stretches.push((window.begin_ns, window.end_ns)),
+            None => periods.push((window.start_ns, window.end_ns)),
         }
     }
-    stretches.retain(|(begin, end)| end - begin >= 2 * WINDOW_NS);
-    let still_s: f64 = stretches.iter().map(|(begin, end)| seconds_from_ns(end - begin)).sum();
-    if stretches.is_empty() {
-        let title = "the vehicle is never still";
-        let remedy = "initialization has to come from motion; biases cannot be read off at rest";
+    periods.retain(|(begin, end)| end - begin >= 2 * WINDOW_NS);
+    let stationary_s: f64 = periods.iter().map(|(begin, end)| seconds_from_ns(end - begin)).sum();
+    if periods.is_empty() {
+        let title = "the vehicle is never stationary";
+        let remedy = "initialization needs motion; biases cannot be measured directly";
         return findings.add(
             Severity::Note,
             Area::Motion,
             title,
-            format!("no second of rest in {total_s:.0} s"),
+            format!("no stationary second in {total_s:.0} s"),
             remedy,
         );
     }
-    let listed: Vec<String> = stretches
+    let listed: Vec<String> = periods
         .iter()
         .take(6)
         .map(|(begin, end)| format!("{:.1}–{:.1} s", seconds_from_ns(*begin), seconds_from_ns(*end)))
         .collect();
-    let evidence = format!("{still_s:.1} of {total_s:.1} s: {}", listed.join(", "));
-    let remedy = "scale and calibration cannot be seen there; a camera needs motion to initialize";
-    let severity = if still_s > 0.5 * total_s { Severity::Warning } else { Severity::Note };
-    findings.add(severity, Area::Motion, "the vehicle stands still or hovers", evidence, remedy);
+    let evidence = format!("{stationary_s:.1} of {total_s:.1} s: {}", listed.join(", "));
+    let remedy = "scale and calibration are unobservable there; initialization needs motion";
+    let severity = if stationary_s > 0.5 * total_s { Severity::Warning } else { Severity::Note };
+    findings.add(severity, Area::Motion, "the vehicle is stationary or hovers", evidence, remedy);
 }

@@ -4,12 +4,12 @@ use super::{Area, Findings, Severity};
 use crate::geometry::{seconds_from_ns, wrap_angle};
 use crate::sensors::{GimbalRig, Joint, Rig};
 
-/// A joint that moves less than this over the log tells nothing about its parameters.
+/// With a smaller range of motion over the log the parameters of a joint are unobservable.
 const SMALLEST_RANGE_RAD: f64 = 0.05;
-/// A reading this close to a stop counts as being there.
-const AT_STOP_RAD: f64 = 0.01;
+/// A reading this close to a limit counts as at the limit.
+const AT_LIMIT_RAD: f64 = 0.01;
 
-/// Names, coverage, stops and noise of the encoders.
+/// Names, range, limits and noise of the encoders.
 pub(super) fn check_joints(survey: &Survey, rig: &Rig, findings: &mut Findings) {
     let Some(gimbal) = &rig.gimbal else { return };
     if gimbal.topic.is_none() || gimbal.encoder_sigma_rad.is_none() {
@@ -18,7 +18,7 @@ pub(super) fn check_joints(survey: &Survey, rig: &Rig, findings: &mut Findings) 
             (Some(_), _) => "gimbal.encoder_sigma is null",
         };
         let title = "the gimbal's encoders are not used";
-        let remedy = "joint angles are then unknowns of every frame; more has to be seen before they settle";
+        let remedy = "joint angles are then estimated in every frame and need more observations to converge";
         return findings.add(Severity::Note, Area::Encoders, title, evidence, remedy);
     }
     if survey.joints.is_empty() {
@@ -34,22 +34,22 @@ fn check_joint(survey: &Survey, gimbal: &GimbalRig, number: usize, joint: &Joint
     let readings = || survey.joints.iter().filter_map(|message| Some((message.stamp_ns, message.angles_rad[number]?)));
     let missing = survey.joints.len() - readings().count();
     let all = survey.joints.len();
-    // A message that names another joint may come from that joint's driver; one that names none of the rig's is amiss.
+    // A message that names another joint may come from that joint's driver; one that names none of the rig's joints is an error.
     let silent = survey.joints.iter().filter(|message| message.angles_rad.iter().all(Option::is_none)).count();
     if missing == all || silent > 0 {
         let evidence = format!("missing in {missing} of {all} messages, which name {}", survey.joint_names.join(", "));
         let severity = if missing == all { Severity::Error } else { Severity::Warning };
-        let remedy = format!("write the messages' name into gimbal.links[{number}].joint");
+        let remedy = format!("set the messages' name in gimbal.links[{number}].joint");
         findings.add(severity, Area::Encoders, format!("joint '{name}' is not in the messages"), evidence, remedy);
     } else if missing > 0 {
-        let title = format!("'{name}' comes in messages of its own");
+        let title = format!("'{name}' has messages of its own");
         let evidence = format!("it is in {} of {all} messages; the joints are merged by name", all - missing);
         findings.add(Severity::Note, Area::Encoders, title, evidence, "");
     }
     let bad = readings().filter(|(_, angle)| !angle.is_finite()).count();
     if bad > 0 {
         let evidence = format!("{bad} readings");
-        let remedy = "look at the driver; these messages are dropped";
+        let remedy = "check the driver; these messages are dropped";
         findings.add(
             Severity::Warning,
             Area::Encoders,
@@ -68,7 +68,7 @@ fn check_joint(survey: &Survey, gimbal: &GimbalRig, number: usize, joint: &Joint
     let sigma = gimbal.encoder_sigma_rad.unwrap_or(0.0);
     let degrees = f64::to_degrees;
     let range = format!(
-        "{:+.1}° to {:+.1}°, stops at {:+.1}° and {:+.1}°",
+        "{:+.1}° to {:+.1}°, limits {:+.1}° and {:+.1}°",
         degrees(low),
         degrees(high),
         degrees(lower),
@@ -76,70 +76,70 @@ fn check_joint(survey: &Survey, gimbal: &GimbalRig, number: usize, joint: &Joint
     );
     if high.abs().max(low.abs()) > 2.0 * std::f64::consts::TAU {
         let evidence = format!("readings from {low:.1} to {high:.1}");
-        let remedy = "sensor_msgs/JointState wants radians";
-        return findings.add(Severity::Error, Area::Encoders, format!("'{name}' looks like degrees"), evidence, remedy);
+        let remedy = "sensor_msgs/JointState requires radians";
+        return findings.add(
+            Severity::Error,
+            Area::Encoders,
+            format!("'{name}' appears to be in degrees"),
+            evidence,
+            remedy,
+        );
     }
     let margin = 0.03 + 4.0 * sigma;
     if low < lower - margin || high > upper + margin {
         let remedy = format!("correct gimbal.links[{number}].limits, or the encoder's zero");
-        findings.add(
-            Severity::Warning,
-            Area::Encoders,
-            format!("'{name}' goes beyond its stops"),
-            range.clone(),
-            remedy,
-        );
+        findings.add(Severity::Warning, Area::Encoders, format!("'{name}' exceeds its limits"), range.clone(), remedy);
     }
     let white = white_sigma(&values);
     // The range without the noise of single readings.
     let moved = percentile(&values, 0.98) - percentile(&values, 0.02) - 4.0 * white;
     if moved < SMALLEST_RANGE_RAD {
         let title = format!("'{name}' hardly moves");
-        let remedy =
-            "its static parameters cannot be told apart without motion; fly with the joint moving, or keep them fixed";
+        let remedy = "its static parameters are unobservable without joint motion: record with the joint moving, or keep them fixed";
         findings.add(Severity::Warning, Area::Encoders, title, range, remedy);
     } else {
         findings.good(Area::Encoders, format!("'{name}' moves"), range);
     }
-    let at_stop =
-        angles.iter().filter(|(_, angle)| *angle < lower + AT_STOP_RAD || *angle > upper - AT_STOP_RAD).count();
-    let share = at_stop as f64 / angles.len() as f64;
-    if share > 0.01 && upper - lower < std::f64::consts::TAU - 0.1 {
-        let first = angles.iter().find(|(_, angle)| *angle < lower + AT_STOP_RAD || *angle > upper - AT_STOP_RAD);
+    let at_limit =
+        angles.iter().filter(|(_, angle)| *angle < lower + AT_LIMIT_RAD || *angle > upper - AT_LIMIT_RAD).count();
+    let ratio = at_limit as f64 / angles.len() as f64;
+    if ratio > 0.01 && upper - lower < std::f64::consts::TAU - 0.1 {
+        let first = angles.iter().find(|(_, angle)| *angle < lower + AT_LIMIT_RAD || *angle > upper - AT_LIMIT_RAD);
         let evidence = format!(
             "{:.0} % of the readings, the first at {:.1} s",
-            share * 100.0,
+            ratio * 100.0,
             first.map_or(0.0, |(at, _)| seconds_from_ns(*at))
         );
         let remedy = "the camera is not stabilized there: expect faster image motion";
-        findings.add(Severity::Note, Area::Encoders, format!("'{name}' meets its stop"), evidence, remedy);
+        findings.add(Severity::Note, Area::Encoders, format!("'{name}' reaches its limit"), evidence, remedy);
     }
-    judge_sigma(name, white, sigma, findings);
+    compare_sigma(name, white, sigma, findings);
 }
 
-/// Standard deviation of the white part of the readings, from second differences with wraps taken out. The middle of
-/// them counts, so that jumps do not.
+/// Standard deviation of the white part of the readings, from second differences of the unwrapped angles, in
+/// radians. Their median is insensitive to jumps.
 fn white_sigma(values: &[f64]) -> f64 {
-    let turn = |from: f64, to: f64| wrap_angle(to - from);
-    let second: Vec<f64> =
-        values.windows(3).map(|three| (turn(three[1], three[2]) - turn(three[0], three[1])).abs()).collect();
-    // The median of |x| for a normal x is 0.6745 of its deviation.
+    let difference = |from: f64, to: f64| wrap_angle(to - from);
+    let second: Vec<f64> = values
+        .windows(3)
+        .map(|three| (difference(three[1], three[2]) - difference(three[0], three[1])).abs())
+        .collect();
+    // The median of |x| for a normal x is 0.6745 of its standard deviation.
     percentile(&second, 0.5) / 0.6745 / 6.0_f64.sqrt()
 }
 
-fn judge_sigma(name: &str, measured: f64, given: f64, findings: &mut Findings) {
+fn compare_sigma(name: &str, measured: f64, given: f64, findings: &mut Findings) {
     let ratio = measured / given;
-    let evidence =
-        format!("{:.3}° from reading to reading, {:.3}° in the rig", measured.to_degrees(), given.to_degrees());
+    let evidence = format!("white noise {:.3}°, {:.3}° in the rig", measured.to_degrees(), given.to_degrees());
     if ratio > 2.0 {
         let remedy = format!("raise gimbal.encoder_sigma to {measured:.4}");
-        let title = format!("the encoder of '{name}' is noisier than the rig says by {ratio:.1}");
+        let title = format!("encoder noise of '{name}' is {ratio:.1} times the rig's");
         findings.add(Severity::Warning, Area::Encoders, title, evidence, remedy);
     } else if ratio < 0.2 {
-        let title = format!("the encoder of '{name}' scatters less than the rig says");
-        let remedy = "the rig's value may stand for slow errors such as backlash; else lower gimbal.encoder_sigma";
+        let title = format!("encoder noise of '{name}' is below the rig's");
+        let remedy = "the rig's value may cover slow errors such as backlash; otherwise lower gimbal.encoder_sigma";
         findings.add(Severity::Note, Area::Encoders, title, evidence, remedy);
     } else {
-        findings.good(Area::Encoders, format!("the encoder of '{name}' is as noisy as the rig says"), evidence);
+        findings.good(Area::Encoders, format!("encoder noise of '{name}' agrees with the rig"), evidence);
     }
 }

@@ -1,5 +1,5 @@
-//! What is in a log and what is wrong with it, before anyone trusts a result: everything that can be known without the
-//! estimator, each finding with its evidence and its remedy.
+//! Checks of a log and its rig that need no estimator: topics, timing, IMU, encoders, images, intrinsics and extrinsics,
+//! each finding with its evidence and its remedy.
 
 mod hand_eye;
 mod images;
@@ -26,13 +26,13 @@ use crate::sensors::Rig;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
-    /// It was looked at and is in order.
+    /// Checked without a problem.
     Good,
-    /// Worth knowing.
+    /// For information.
     Note,
-    /// It makes results worse or harder to get.
+    /// Degrades results or delays initialization.
     Warning,
-    /// No result can be trusted before it is put right.
+    /// Makes results invalid until it is corrected.
     Error,
 }
 
@@ -42,11 +42,11 @@ pub enum Severity {
 pub enum Area {
     /// The file and its topics.
     Log,
-    /// Clocks, rates, gaps and order.
+    /// Time bases, rates, gaps and order of stamps.
     Time,
     /// Units, gravity, biases, noise and saturation of the IMU.
     Inertial,
-    /// Standstill, hover and fast turns.
+    /// Stationary and hovering periods, fast rotation.
     Motion,
     /// Joint angles and their limits.
     Encoders,
@@ -54,11 +54,11 @@ pub enum Area {
     Images,
     /// Camera models and lenses.
     Intrinsics,
-    /// Where the cameras sit.
+    /// Poses of the cameras relative to the IMU.
     Extrinsics,
 }
 
-/// One thing that was looked at.
+/// One result of the check.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Finding {
     /// How bad it is.
@@ -67,34 +67,34 @@ pub struct Finding {
     pub area: Area,
     /// The finding in one sentence.
     pub title: String,
-    /// The numbers it rests on.
+    /// The measured values, with units.
     pub evidence: String,
-    /// What to do about it; empty when nothing is to be done.
+    /// What to do; empty when nothing needs to be done.
     pub remedy: String,
 }
 
 /// One topic of the log.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TopicReport {
-    /// Its name.
+    /// Topic name.
     pub topic: String,
-    /// Name of its schema.
+    /// Message type, such as `sensor_msgs/msg/Imu`.
     pub schema: String,
-    /// What it is used as: `imu0`, `cam0`, `gimbal`, `ground truth`, `not in the rig`, or `ignored`.
+    /// Its use: `imu0`, `cam0`, `gimbal`, `ground truth`, `not in the rig`, or `ignored`.
     pub role: String,
-    /// How many messages it has.
+    /// Number of messages.
     pub count: u64,
-    /// Mean rate over its log times.
+    /// Mean rate over its log times, in Hz.
     pub rate_hz: f64,
     /// First header stamp since the log began, in seconds; log time for an ignored topic.
     pub first_s: f64,
-    /// Last one.
+    /// Last header stamp, likewise.
     pub last_s: f64,
     /// Median of log time minus header stamp in seconds, `None` for an ignored topic.
     pub latency_s: Option<f64>,
 }
 
-/// The rotation between two images of one camera, as somebody measured it from the pictures alone.
+/// Rotation between two images of one camera, measured from the images alone.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImageRotation {
     /// Key of the camera.
@@ -103,30 +103,30 @@ pub struct ImageRotation {
     pub from_ns: i64,
     /// Header stamp of the second image.
     pub to_ns: i64,
-    /// Rotates vectors of the first image's camera frame into the second one's.
+    /// Rotates vectors from the camera frame of the first image to that of the second.
     pub second_from_first: UnitQuaternion<f64>,
 }
 
-/// What `check` found.
+/// Result of [`check`].
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CheckReport {
     /// Path of the log.
     pub log: String,
-    /// Name of the rig, `None` when there is none that can be read.
+    /// Name of the rig, `None` without a readable one.
     pub rig: Option<String>,
-    /// Absolute header stamp of the log's begin in nanoseconds.
+    /// Absolute header stamp of the log's start, in nanoseconds.
     pub epoch_ns: i64,
     /// Length of the log.
     pub duration_s: f64,
     /// All topics in the order of their names.
     pub topics: Vec<TopicReport>,
-    /// What was found, worst first, then by area.
+    /// Most severe first, then by area.
     pub findings: Vec<Finding>,
 }
 
-/// Looks through a whole log.
+/// Checks an entire log against its rig.
 ///
-/// `rig` may be the error that reading it gave: that becomes a finding, and the rest is checked without it.
+/// An error of reading the rig becomes a finding, and the checks that need no rig are run.
 /// `image_rotations` are optional: with them the extrinsic rotations and the time offset of the cameras are checked
 /// against the gyroscope.
 pub fn check(log: &FlightLog, rig: Result<&Rig, &LogError>, image_rotations: &[ImageRotation]) -> CheckReport {
@@ -141,7 +141,7 @@ pub fn check(log: &FlightLog, rig: Result<&Rig, &LogError>, image_rotations: &[I
         Err(error) => findings.add(
             Severity::Error,
             Area::Log,
-            "there is no rig that can be used",
+            "no usable rig",
             error.to_string(),
             "put the rig beside the log as NAME.rig.yaml, or name one with --rig",
         ),
@@ -172,7 +172,7 @@ impl CheckReport {
     }
 }
 
-/// Findings as they come.
+/// Findings in the order of the checks.
 #[derive(Debug, Default)]
 struct Findings {
     list: Vec<Finding>,
@@ -196,15 +196,15 @@ impl Findings {
     }
 }
 
-/// Damage to the file, unreadable messages, and topics nobody reads.
+/// Damage to the file, unreadable messages, and topics of other types.
 fn check_file(log: &FlightLog, survey: &Survey, findings: &mut Findings) {
     for warning in log.warnings() {
         let evidence = warning.message.clone();
-        let remedy = "copy the file again from where it was recorded; what lies after the damage is not used";
-        findings.add(Severity::Warning, Area::Log, "the file is not whole", evidence, remedy);
+        let remedy = "copy the file again from the recorder; data after the damage are not used";
+        findings.add(Severity::Warning, Area::Log, "the file is truncated or damaged", evidence, remedy);
     }
     for damage in &survey.damages {
-        let remedy = "copy the file again; the chunk is left out and reading goes on after it";
+        let remedy = "copy the file again; the chunk is skipped and reading continues after it";
         findings.add(Severity::Warning, Area::Log, "a chunk is damaged", damage.clone(), remedy);
     }
     for topic in survey.topics.values().filter(|topic| topic.unreadable > 0) {
@@ -215,7 +215,7 @@ fn check_file(log: &FlightLog, survey: &Survey, findings: &mut Findings) {
     let ignored: Vec<&str> =
         log.topics().iter().filter(|info| info.kind.is_none()).map(|info| info.topic.as_str()).collect();
     if !ignored.is_empty() {
-        let title = "some topics have messages that nothing reads";
+        let title = "topics of types that are not read";
         findings.add(Severity::Note, Area::Log, title, ignored.join(", "), "");
     }
 }
@@ -223,7 +223,7 @@ fn check_file(log: &FlightLog, survey: &Survey, findings: &mut Findings) {
 const IMAGES: [MessageKind; 2] = [MessageKind::Image, MessageKind::CompressedImage];
 const POSES: [MessageKind; 3] = [MessageKind::Odometry, MessageKind::PoseStamped, MessageKind::TransformStamped];
 
-/// Whether the topics that the rig names are there.
+/// Whether the log has the topics that the rig names.
 fn check_topics(log: &FlightLog, rig: &Rig, findings: &mut Findings) {
     let mut named = 0;
     let mut require = |field: String, topic: &str, kinds: &[MessageKind], severity| {
@@ -233,7 +233,7 @@ fn check_topics(log: &FlightLog, rig: &Rig, findings: &mut Findings) {
             findings.add(
                 severity,
                 Area::Log,
-                format!("{field} names a topic that the log lacks"),
+                format!("{field} names a topic that is not in the log"),
                 error.to_string(),
                 remedy,
             );
@@ -255,7 +255,7 @@ fn check_topics(log: &FlightLog, rig: &Rig, findings: &mut Findings) {
     }
 }
 
-/// What a topic is to the rig.
+/// Use of a topic by the rig.
 fn role_of(topic: &str, kind: Option<MessageKind>, rig: Option<&Rig>) -> String {
     let Some(kind) = kind else { return "ignored".into() };
     if let Some(rig) = rig {

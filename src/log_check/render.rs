@@ -3,7 +3,7 @@ use std::fmt::{Display, Formatter, Result, Write as _};
 use super::{Area, CheckReport, Severity};
 
 impl Severity {
-    /// Its name as it stands before a finding.
+    /// Lowercase name, printed before a finding.
     pub fn label(self) -> &'static str {
         match self {
             Self::Good => "good",
@@ -15,7 +15,7 @@ impl Severity {
 }
 
 impl Area {
-    /// Its name.
+    /// Name in reports.
     pub fn label(self) -> &'static str {
         match self {
             Self::Log => "log",

@@ -7,10 +7,10 @@ use crate::sensors::{CameraRig, ChainPrior, GimbalRig, Rig};
 
 /// A camera further from the IMU than this is unusual on a drone.
 const LONGEST_LEVER_M: f64 = 1.0;
-/// Intrinsics in the log that differ from the rig's by more than this share are told.
+/// Difference of the log's intrinsics from the rig's that is reported, as a ratio of the focal length.
 const INTRINSICS_TOLERANCE: f64 = 0.02;
 
-/// Whether the rig's numbers can be what they claim to be.
+/// Plausibility of the rig's intrinsics, time offsets and chain.
 pub(super) fn check_rig(log: &FlightLog, rig: &Rig, findings: &mut Findings) {
     for camera in &rig.cameras {
         check_lens(camera, findings);
@@ -18,7 +18,7 @@ pub(super) fn check_rig(log: &FlightLog, rig: &Rig, findings: &mut Findings) {
         if camera.timeshift_cam_imu_s.abs() > 0.1 {
             let evidence = format!("{:+.4} s, t_imu = t_cam + shift", camera.timeshift_cam_imu_s);
             let title = format!("{}.timeshift_cam_imu is large", camera.key);
-            let remedy = "check its sign and unit (seconds); better stamp the images at mid-exposure";
+            let remedy = "check its sign and unit (seconds); preferably stamp images at mid-exposure";
             findings.add(Severity::Warning, Area::Time, title, evidence, remedy);
         }
     }
@@ -38,9 +38,7 @@ fn check_lens(camera: &CameraRig, findings: &mut Findings) {
     if off[0].max(off[1]) > 0.25 {
         let scale = 0.5 * (centre[0] + centre[1]);
         let remedy = if (centre[0] - centre[1]).abs() < 0.1 * scale {
-            format!(
-                "the intrinsics look like those of an image {scale:.2} times as large: scale them, or set resolution"
-            )
+            format!("the intrinsics fit an image {scale:.2} times as large: scale them, or set resolution")
         } else {
             "check the order fx fy cx cy, and that resolution is [width, height]".to_owned()
         };
@@ -55,9 +53,8 @@ fn check_lens(camera: &CameraRig, findings: &mut Findings) {
     }
     let Some(fov_deg) = field_of_view_deg(model) else {
         let title = format!("the lens of {} does not cover its image", camera.key);
-        let evidence = format!("a pixel at the image's edge has no direction; {numbers}");
-        let remedy =
-            "the distortion folds inside the image: calibrate with points near the edge, or take another model";
+        let evidence = format!("a pixel at the image border cannot be unprojected; {numbers}");
+        let remedy = "the distortion folds inside the image: calibrate with points near the edge, or use another model";
         findings.add(Severity::Warning, Area::Intrinsics, title, evidence, remedy);
         return;
     };
@@ -73,8 +70,8 @@ fn check_lens(camera: &CameraRig, findings: &mut Findings) {
     }
 }
 
-/// Angle between the directions of the middle pixels at the left and right edge, `None` when the model has none there
-/// or in a corner's neighbourhood.
+/// Horizontal field of view in degrees: angle between the bearings of the middle pixels at the left and right border,
+/// `None` when the model cannot unproject these or a pixel near a corner.
 fn field_of_view_deg(model: &CameraModel) -> Option<f64> {
     let [width, height] = model.resolution_px.map(|side| side as f64);
     let direction = |u: f64, v: f64| model.unproject(&Vector2::new(u, v));
@@ -90,51 +87,47 @@ fn field_of_view_deg(model: &CameraModel) -> Option<f64> {
 
 fn check_camera_info(log: &FlightLog, camera: &CameraRig, findings: &mut Findings) {
     use crate::flight_log::rig::CameraFacts as _;
-    let Ok(told) = log.camera_model(&camera.topic) else { return };
-    let (rig, log) = (camera.model.intrinsics_px, told.intrinsics_px);
+    let Ok(from_log) = log.camera_model(&camera.topic) else { return };
+    let (rig, log) = (camera.model.intrinsics_px, from_log.intrinsics_px);
     let scale = camera.model.focal_length_px();
     let worst = rig.iter().zip(&log).map(|(a, b)| (a - b).abs() / scale).fold(0.0, f64::max);
     let evidence = format!("the rig has {rig:?}, the log's CameraInfo {log:?}");
-    if worst > INTRINSICS_TOLERANCE || told.resolution_px != camera.model.resolution_px {
-        let title = format!("the log's CameraInfo contradicts the rig for {}", camera.key);
-        let remedy = "find out which calibration belongs to this flight; the rig is used";
+    if worst > INTRINSICS_TOLERANCE || from_log.resolution_px != camera.model.resolution_px {
+        let title = format!("CameraInfo differs from the rig for {}", camera.key);
+        let remedy = "check which calibration applies to this flight; the rig's is used";
         findings.add(Severity::Warning, Area::Intrinsics, title, evidence, remedy);
     } else {
-        findings.good(
-            Area::Intrinsics,
-            format!("the log's CameraInfo agrees with the rig for {}", camera.key),
-            evidence,
-        );
+        findings.good(Area::Intrinsics, format!("CameraInfo agrees with the rig for {}", camera.key), evidence);
     }
 }
 
 fn check_chain(gimbal: &GimbalRig, findings: &mut Findings) {
-    // The camera's place over a grid of joint angles within the stops.
+    // The camera's position over joint angles within the limits.
     let middle: Vec<f64> = gimbal.joints.iter().map(|joint| 0.5 * (joint.limits_rad.0 + joint.limits_rad.1)).collect();
     let mut farthest = 0.0_f64;
     for (number, joint) in gimbal.joints.iter().enumerate() {
-        for share in [0.0, 0.5, 1.0] {
+        for fraction in [0.0, 0.5, 1.0] {
             let mut angles = middle.clone();
-            angles[number] = joint.limits_rad.0 + share * (joint.limits_rad.1 - joint.limits_rad.0);
+            angles[number] = joint.limits_rad.0 + fraction * (joint.limits_rad.1 - joint.limits_rad.0);
             farthest = farthest.max(gimbal.chain.imu_from_camera(&angles).translation_m.norm());
         }
     }
-    let evidence = format!("the gimbal's camera comes up to {farthest:.3} m from the IMU");
+    let evidence = format!("the gimbal camera is up to {farthest:.3} m from the IMU");
     if farthest > LONGEST_LEVER_M {
         let remedy = "lengths are in metres: check d, a and the translations of T_I_B and T_E_C";
-        findings.add(Severity::Warning, Area::Extrinsics, "the gimbal's chain is long", evidence, remedy);
+        findings.add(Severity::Warning, Area::Extrinsics, "the gimbal chain is unusually long", evidence, remedy);
     } else {
-        findings.good(Area::Extrinsics, "the gimbal's chain has a plausible length", evidence);
+        findings.good(Area::Extrinsics, "the gimbal chain has a plausible length", evidence);
     }
     let ChainPrior { translation_bound_m, rotation_bound_rad } = gimbal.prior;
     let evidence = format!("±{:.1} mm and ±{:.2}°", translation_bound_m * 1e3, rotation_bound_rad.to_degrees());
     if translation_bound_m == 0.0 || rotation_bound_rad == 0.0 {
-        let remedy = "give gimbal.prior the errors that the chain may have; zero holds it fixed";
-        findings.add(Severity::Note, Area::Extrinsics, "the chain's prior leaves it no room", evidence, remedy);
+        let remedy = "set gimbal.prior to the errors that the chain may have; zero keeps it fixed";
+        findings.add(Severity::Note, Area::Extrinsics, "the prior of the chain is zero: it is fixed", evidence, remedy);
     } else if translation_bound_m > 0.1 || rotation_bound_rad > 0.35 {
-        let remedy = "measure the gimbal better: a loose prior lets the first seconds carry the chain away";
-        findings.add(Severity::Note, Area::Extrinsics, "the chain's prior is loose", evidence, remedy);
+        let remedy = "measure the gimbal better: with a wide prior the chain can diverge in the first seconds";
+        findings.add(Severity::Note, Area::Extrinsics, "the prior of the chain is wide", evidence, remedy);
     } else {
-        findings.good(Area::Extrinsics, "the chain has a prior of usual width", evidence);
+        findings.good(Area::Extrinsics, "the prior of the chain has a usual width", evidence);
     }
 }

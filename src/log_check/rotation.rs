@@ -1,4 +1,4 @@
-//! Where the cameras sit: extrinsics against gravity, and what their numbers look like.
+//! Extrinsics of the cameras against gravity and the gyroscope, and the plausibility of their values.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -23,18 +23,18 @@ pub(super) fn check_rotations(
     }
 }
 
-/// Pose of a camera on the IMU at a time.
+/// `imu_from_camera` at a time, with the measured joint angles for a gimbal camera.
 fn imu_from_camera(survey: &Survey, rig: &Rig, camera: &CameraRig, stamp_ns: i64) -> Option<RigidTransform> {
     let chain = rig.chain_of_camera(&camera.key)?;
     let angles_rad = if chain.links.is_empty() { Vec::new() } else { survey.joint_angles_at(stamp_ns)? };
     Some(chain.imu_from_camera(&angles_rad))
 }
 
-/// Roll of the image about the optical axis and elevation of that axis, in whole degrees, seen against gravity. Both are zero
-/// for an upright camera that looks at the horizon.
+/// Roll about the optical axis and elevation of that axis against gravity, in whole degrees; both are zero for an upright
+/// camera with a horizontal axis.
 fn attitude_deg(camera_from_imu: &UnitQuaternion<f64>, up_in_imu: &Vector3<f64>) -> (f64, f64) {
     let up = camera_from_imu * up_in_imu;
-    // Whole degrees, and no minus before a zero.
+    // Adding zero turns −0 into 0.
     let degrees = |angle_rad: f64| angle_rad.to_degrees().round() + 0.0;
     (degrees(up.x.atan2(-up.y)), degrees(up.z.clamp(-1.0, 1.0).asin()))
 }
@@ -56,16 +56,16 @@ fn check_against_gravity(
          with the inverse matrix {inverse_elevation:+.0}° and {inverse_roll:+.0}°",
         seconds_from_ns(stamp_ns)
     );
-    // Roll means nothing for a camera that looks straight up or down.
+    // Roll is undefined for a vertical optical axis.
     if elevation.abs() > 70.0 || roll.abs() < 45.0 {
         return findings.good(Area::Extrinsics, format!("{} is upright", camera.key), evidence);
     }
     let inverted = inverse_roll.abs() < 30.0 && inverse_elevation.abs() < 70.0;
     let field = if camera.mount == CameraMount::Gimbal { "gimbal.T_I_B and T_E_C" } else { "T_cam_imu" };
     let (severity, title) = if inverted {
-        (Severity::Error, format!("the extrinsics of {} look inverted", camera.key))
+        (Severity::Error, format!("the extrinsics of {} appear inverted", camera.key))
     } else {
-        (Severity::Note, format!("{} is mounted on its side or upside down", camera.key))
+        (Severity::Note, format!("{} is rotated sideways or upside down", camera.key))
     };
     let remedy = format!("check {field}: T_a_b maps points from b to a (Kalibr: T_cam_imu from the IMU to the camera)");
     findings.add(severity, Area::Extrinsics, title, evidence, remedy);
@@ -76,13 +76,13 @@ fn check_lever(camera: &CameraRig, findings: &mut Findings) {
     let lever_m = imu_from_camera.translation_m.norm();
     if lever_m > 1.0 {
         let evidence = format!("{lever_m:.3} m from the IMU");
-        let title = format!("{} sits far from the IMU", camera.key);
+        let title = format!("{} is far from the IMU", camera.key);
         findings.add(Severity::Warning, Area::Extrinsics, title, evidence, "the translation of T_cam_imu is in metres");
     }
     if imu_from_camera.rotation.angle() == 0.0 {
         let title = format!("the rotation of {} is the identity", camera.key);
         let evidence = "T_cam_imu has the axes of camera and IMU coincide: z forward, x right, y down";
-        let remedy = "this is mostly a value that was never filled in; calibrate it, with Kalibr for one";
+        let remedy = "this is usually a default value: calibrate it, for example with Kalibr";
         findings.add(Severity::Warning, Area::Extrinsics, title, evidence, remedy);
     }
 }

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use crate::geometry;
 
-/// The value below which the share `fraction` of the numbers lies; 0 for none.
+/// Quantile at `fraction` (0 to 1) of the values, the nearest one; 0 for none.
 pub(super) fn percentile(values: &[f64], fraction: f64) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -24,7 +24,7 @@ pub(super) fn mean(vectors: &[Vector3<f64>]) -> Vector3<f64> {
 }
 
 /// Standard deviation of each component.
-pub(super) fn deviation(vectors: &[Vector3<f64>]) -> Vector3<f64> {
+pub(super) fn standard_deviation(vectors: &[Vector3<f64>]) -> Vector3<f64> {
     let centre = mean(vectors);
     let squares: Vec<Vector3<f64>> =
         vectors.iter().map(|vector| (vector - centre).map(|entry| entry * entry)).collect();
@@ -33,7 +33,7 @@ pub(super) fn deviation(vectors: &[Vector3<f64>]) -> Vector3<f64> {
 
 /// Standard deviation of the white part of each component, from second differences: motion that is smooth over three
 /// samples drops out. `var(x₋ − 2x + x₊) = 6σ²`.
-pub(super) fn white_deviation(vectors: &[Vector3<f64>]) -> Vector3<f64> {
+pub(super) fn white_standard_deviation(vectors: &[Vector3<f64>]) -> Vector3<f64> {
     let second: Vec<Vector3<f64>> =
         vectors.windows(3).map(|three| (three[0] - three[1] * 2.0 + three[2]).map(|entry| entry * entry)).collect();
     (mean(&second) / 6.0).map(f64::sqrt)

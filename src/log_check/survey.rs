@@ -10,18 +10,18 @@ use crate::flight_log::{FlightLog, messages, messages::MessageKind};
 use crate::geometry::{seconds_from_ns, wrap_angle};
 use crate::sensors::{ImuSample, JointSample, Rig};
 
-/// So many images of each camera are decoded, spread evenly over the log.
-const IMAGES_LOOKED_AT: u64 = 60;
+/// Number of images of each camera that are decoded, evenly over the log.
+const IMAGES_PER_CAMERA: u64 = 60;
 
-/// Joint readings so far to both sides of a time are averaged: beyond, a stabilized joint is no parabola any more.
+/// Half length of the encoder readings that a parabola is fitted to; over longer spans a stabilized joint is none.
 const HALF_BATCH_NS: i64 = 25_000_000;
 /// Joint readings further apart than this are not interpolated.
-const LONGEST_HOLE_NS: i64 = 200_000_000;
+const LONGEST_GAP_NS: i64 = 200_000_000;
 
-/// No encoder is taken to be better than this.
+/// Lower bound of an encoder's standard deviation.
 const LEAST_SIGMA_RAD: f64 = 1e-5;
 
-/// Both times of a message since the log began.
+/// Log time and header stamp of a message since the log began.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Times {
     pub(super) log_time_ns: i64,
@@ -58,40 +58,40 @@ impl TopicSurvey {
     }
 }
 
-/// One image that was looked at.
+/// Measures of one decoded image.
 #[derive(Clone, Debug)]
-pub(super) struct ImageLook {
+pub(super) struct SampledImage {
     pub(super) stamp_ns: i64,
     pub(super) measure: ImageMeasure,
 }
 
-/// What one pass through the log collects.
+/// Data of one pass through the log.
 #[derive(Debug, Default)]
 pub(super) struct Survey {
     /// Topics that are read, by name.
     pub(super) topics: BTreeMap<String, TopicSurvey>,
     /// Topic of the IMU: the rig's, or the only one.
     pub(super) imu_topic: Option<String>,
-    /// Its samples in the order of log times, numbers as they are.
+    /// Its samples in the order of log times, not-finite ones included.
     pub(super) imu: Vec<ImuSample>,
     /// The encoders' messages in the order of log times.
     pub(super) joints: Vec<JointReading>,
-    /// All joints at once, in the order of the stamps, from the finite readings.
+    /// Angles of all joints at common stamps, in the order of the stamps, from the finite readings.
     pub(super) joint_samples: Vec<JointSample>,
-    /// Variance of a reading by the rig.
+    /// Variance of a reading from the rig.
     encoder_variance_rad2: f64,
     /// Names that the joint messages use.
     pub(super) joint_names: Vec<String>,
     /// Images by camera key.
-    pub(super) images: BTreeMap<String, Vec<ImageLook>>,
+    pub(super) images: BTreeMap<String, Vec<SampledImage>>,
     /// Bits of a grey value by camera key.
     pub(super) depths: BTreeMap<String, BitDepth>,
-    /// Damaged chunks, in words.
+    /// Position and damage of each damaged chunk.
     pub(super) damages: Vec<String>,
 }
 
 impl Survey {
-    /// Goes through the whole log once.
+    /// Reads the entire log once.
     pub(super) fn of(log: &FlightLog, rig: Option<&Rig>) -> Self {
         let mut survey = Self::default();
         let imu_topics = log.topics_of(&[MessageKind::Imu]);
@@ -116,11 +116,11 @@ impl Survey {
                 let Some(info) = log.topic(&channel.topic) else { continue };
                 let Some(kind) = info.kind else { continue };
                 let number = counts.entry(info.topic.clone()).or_default();
-                let stride = info.count.div_ceil(IMAGES_LOOKED_AT).max(1);
-                let looked_at = number.is_multiple_of(stride);
+                let stride = info.count.div_ceil(IMAGES_PER_CAMERA).max(1);
+                let sampled = number.is_multiple_of(stride);
                 *number += 1;
                 let data = decoded.bytes(log.file(), &message.data);
-                survey.take(log, rig, &info.topic, kind, log.since_begin(message.log_time_ns), data, looked_at);
+                survey.take(log, rig, &info.topic, kind, log.since_begin(message.log_time_ns), data, sampled);
             }
         }
         for topic in survey.topics.values_mut() {
@@ -130,21 +130,21 @@ impl Survey {
         survey
     }
 
-    /// All joint angles at a time, from the readings around it; `None` where there are none on both sides.
+    /// All joint angles in radians at a time, by a fit to the readings around it; `None` without readings on both sides.
     pub(super) fn joint_angles_at(&self, stamp_ns: i64) -> Option<Vec<f64>> {
         let before = |time_ns: i64| self.joint_samples.partition_point(|sample| sample.stamp_ns < time_ns);
         let after = before(stamp_ns);
-        let begin = before(stamp_ns - HALF_BATCH_NS).min(after.checked_sub(1)?);
+        let start = before(stamp_ns - HALF_BATCH_NS).min(after.checked_sub(1)?);
         let end = before(stamp_ns + HALF_BATCH_NS).max(after + 1);
-        let batch = self.joint_samples.get(begin..end)?;
-        if batch.last()?.stamp_ns - batch.first()?.stamp_ns > LONGEST_HOLE_NS {
+        let batch = self.joint_samples.get(start..end)?;
+        if batch.last()?.stamp_ns - batch.first()?.stamp_ns > LONGEST_GAP_NS {
             return None;
         }
         let around = &self.joint_samples.get(after)?.angles_rad;
         let angle = |joint: usize| {
             let reading = |sample: &JointSample| {
-                let turned = wrap_angle(sample.angles_rad[joint] - around[joint]);
-                (seconds_from_ns(sample.stamp_ns - stamp_ns), around[joint] + turned)
+                let change = wrap_angle(sample.angles_rad[joint] - around[joint]);
+                (seconds_from_ns(sample.stamp_ns - stamp_ns), around[joint] + change)
             };
             let readings: Vec<_> = batch.iter().map(reading).collect();
             angle_fit::fit(&readings, self.encoder_variance_rad2).map(|fitted| fitted.angle_rad)
@@ -152,7 +152,7 @@ impl Survey {
         (0..around.len()).map(angle).collect()
     }
 
-    #[expect(clippy::too_many_arguments, reason = "what is known about one message, each once")]
+    #[expect(clippy::too_many_arguments, reason = "the fields of one message")]
     fn take(
         &mut self,
         log: &FlightLog,
@@ -161,7 +161,7 @@ impl Survey {
         kind: MessageKind,
         log_time_ns: i64,
         data: &[u8],
-        looked_at: bool,
+        sampled: bool,
     ) {
         let entry = self
             .topics
@@ -201,15 +201,15 @@ impl Survey {
                 Err(error) => entry.refuse(error.to_string()),
             }
         }
-        if looked_at && let Some(camera) = rig.cameras.iter().find(|camera| camera.topic == topic && kind.is_image()) {
+        if sampled && let Some(camera) = rig.cameras.iter().find(|camera| camera.topic == topic && kind.is_image()) {
             let known = self.depths.get(&camera.key).copied().or_else(|| BitDepth::of(kind, data));
             if let Some(depth) = known {
                 self.depths.insert(camera.key.clone(), depth);
             }
             match decode_picture(kind, data, known.unwrap_or_default()) {
                 Ok(image) => {
-                    let look = ImageLook { stamp_ns, measure: measure(&image) };
-                    self.images.entry(camera.key.clone()).or_default().push(look);
+                    let image = SampledImage { stamp_ns, measure: measure(&image) };
+                    self.images.entry(camera.key.clone()).or_default().push(image);
                 }
                 Err(problem) => entry.refuse(problem),
             }

@@ -4,38 +4,38 @@ use super::{Area, Findings, Severity};
 use crate::geometry::seconds_from_ns;
 use crate::sensors::Rig;
 
-/// Rates further than this share from the rig's are told.
+/// Relative difference from the rig's rate that is reported.
 const RATE_TOLERANCE: f64 = 0.05;
-/// Stamps that scatter more than this share of the period are told.
+/// Jitter of the stamps that is reported, as a ratio of the period.
 const JITTER_TOLERANCE: f64 = 0.2;
-/// Header stamps of different topics whose distance from the log times differs by more come from different clocks.
+/// Topics whose latencies (log time minus header stamp) differ by more are stamped by different clocks.
 const CLOCK_TOLERANCE_S: f64 = 0.2;
-/// Clock drift is told from this much over the log.
+/// Clock drift over the log that is reported.
 const DRIFT_TOLERANCE_S: f64 = 0.005;
-/// A stream that begins later or ends earlier than the IMU by more is told.
+/// A topic that starts later or ends earlier than the IMU by more is reported.
 const OVERLAP_TOLERANCE_S: f64 = 1.0;
 
-/// Rates, gaps, order and clocks of every topic that is used.
+/// Rates, gaps, order and time bases of every topic that the rig names.
 pub(super) fn check_timing(survey: &Survey, rig: Option<&Rig>, findings: &mut Findings) {
     let used = used_topics(survey, rig);
-    let mut sound = Vec::new();
+    let mut regular = Vec::new();
     for (role, topic, nominal_hz, sparse) in &used {
         let before = findings.list.len();
         check_order_and_gaps(role, topic, *sparse, findings);
         check_rate(role, topic, *nominal_hz, findings);
         check_latency(role, topic, findings);
         if findings.list.len() == before {
-            sound.push(format!("{role} {:.1} Hz", 1.0 / period_s(topic).max(f64::MIN_POSITIVE)));
+            regular.push(format!("{role} {:.1} Hz", 1.0 / period_s(topic).max(f64::MIN_POSITIVE)));
         }
     }
-    if !sound.is_empty() {
-        findings.good(Area::Time, "stamps come in order, without gaps, at the rate of the rig", sound.join(", "));
+    if !regular.is_empty() {
+        findings.good(Area::Time, "stamps are in order, without gaps, at the rate of the rig", regular.join(", "));
     }
     check_clocks(&used, findings);
     check_overlap(&used, findings);
 }
 
-/// Role, times, the rig's rate, and whether one lost message counts as a gap (images).
+/// Role, times, the rig's rate in Hz, and whether one lost message counts as a gap (images).
 type Used<'a> = (String, &'a TopicSurvey, Option<f64>, bool);
 
 fn used_topics<'a>(survey: &'a Survey, rig: Option<&Rig>) -> Vec<Used<'a>> {
@@ -57,7 +57,7 @@ fn used_topics<'a>(survey: &'a Survey, rig: Option<&Rig>) -> Vec<Used<'a>> {
     used
 }
 
-/// Median distance of neighbouring header stamps.
+/// Median difference of consecutive header stamps, in seconds.
 fn period_s(topic: &TopicSurvey) -> f64 {
     median(&steps_s(topic))
 }
@@ -74,7 +74,7 @@ fn check_order_and_gaps(role: &str, topic: &TopicSurvey, sparse: bool, findings:
     if let Some(first) = backwards.first() {
         let deepest = steps.iter().copied().fold(0.0, f64::min);
         let evidence = format!(
-            "{} of {} steps go back, the first after {:.3} s, the deepest by {:.3} s",
+            "{} of {} steps are negative, the first after {:.3} s, the largest {:.3} s",
             backwards.len(),
             steps.len(),
             at(*first),
@@ -82,12 +82,12 @@ fn check_order_and_gaps(role: &str, topic: &TopicSurvey, sparse: bool, findings:
         );
         let severity =
             if deepest < -0.1 || backwards.len() * 100 > steps.len() { Severity::Error } else { Severity::Warning };
-        let remedy = "look at how the driver stamps; samples up to 0.1 s late are put in order, others are dropped";
+        let remedy = "check how the driver stamps; samples up to 0.1 s late are sorted, others are dropped";
         findings.add(severity, Area::Time, format!("stamps of {role} run backwards"), evidence, remedy);
     }
     let repeats = steps.iter().filter(|step| **step == 0.0).count();
     if repeats > 0 {
-        let evidence = format!("{repeats} of {} stamps equal the one before", steps.len());
+        let evidence = format!("{repeats} of {} stamps equal the previous one", steps.len());
         let remedy = "the driver or a relay sends messages twice; repeats are dropped";
         findings.add(Severity::Warning, Area::Time, format!("stamps of {role} repeat"), evidence, remedy);
     }
@@ -117,8 +117,8 @@ fn check_order_and_gaps(role: &str, topic: &TopicSurvey, sparse: bool, findings:
         let evidence =
             format!("5 % of the steps differ from {:.3} ms by more than {:.3} ms", period * 1e3, jitter * 1e3);
         let severity = if jitter > 0.5 * period { Severity::Warning } else { Severity::Note };
-        let remedy = "these look like times of arrival; stamp in the driver, from the sensor's own clock or trigger";
-        findings.add(severity, Area::Time, format!("stamps of {role} scatter"), evidence, remedy);
+        let remedy = "these appear to be arrival times: stamp in the driver, from the sensor's own clock or trigger";
+        findings.add(severity, Area::Time, format!("stamps of {role} jitter"), evidence, remedy);
     }
 }
 
@@ -128,11 +128,11 @@ fn check_rate(role: &str, topic: &TopicSurvey, nominal_hz: Option<f64>, findings
         && (measured_hz / nominal_hz - 1.0).abs() > RATE_TOLERANCE
     {
         let evidence = format!("{measured_hz:.1} Hz measured, {nominal_hz:.1} Hz in the rig");
-        let remedy = format!("set {role}.update_rate; where noise was given per sample, convert it with the true rate");
+        let remedy = format!("set {role}.update_rate; where noise is given per sample, convert it with the true rate");
         findings.add(
             Severity::Warning,
             Area::Time,
-            format!("{role} runs at another rate than the rig says"),
+            format!("the rate of {role} differs from the rig"),
             evidence,
             remedy,
         );
@@ -144,7 +144,7 @@ fn check_rate(role: &str, topic: &TopicSurvey, nominal_hz: Option<f64>, findings
     };
     if measured_hz < 0.95 * slowest_hz {
         let evidence = format!("{measured_hz:.1} Hz, usually at least {slowest_hz:.0} Hz");
-        let remedy = "record faster; between samples the motion is taken as smooth";
+        let remedy = "record faster: motion between samples is assumed smooth";
         findings.add(Severity::Warning, Area::Time, format!("{role} is slow"), evidence, remedy);
     }
 }
@@ -165,7 +165,7 @@ fn check_latency(role: &str, topic: &TopicSurvey, findings: &mut Findings) {
         );
         let remedy =
             "the sensor's clock runs ahead of the recorder's: synchronize them (PTP, chrony), or expect a time offset";
-        findings.add(Severity::Warning, Area::Time, format!("stamps of {role} lie in the future"), evidence, remedy);
+        findings.add(Severity::Warning, Area::Time, format!("stamps of {role} are in the future"), evidence, remedy);
     }
     let (drift, error) = slope(&points);
     let length_s = points.last().map_or(0.0, |last| last.0) - points.first().map_or(0.0, |first| first.0);
@@ -176,7 +176,7 @@ fn check_latency(role: &str, topic: &TopicSurvey, findings: &mut Findings) {
             drift * 1e6,
             error * 1e6
         );
-        let remedy = "two clocks are at work: synchronize them, or stamp all sensors with one";
+        let remedy = "two clocks are involved: synchronize them, or stamp all sensors with one";
         findings.add(Severity::Warning, Area::Time, format!("the clock of {role} drifts"), evidence, remedy);
     }
 }
@@ -195,17 +195,17 @@ fn check_clocks(used: &[Used<'_>], findings: &mut Findings) {
         .collect();
     if !apart.is_empty() {
         let title = format!("{} and imu0 are stamped by different clocks", apart.join(", "));
-        let remedy = "stamp all sensors with one clock, or give timeshift_cam_imu";
+        let remedy = "stamp all sensors with one clock, or set timeshift_cam_imu";
         return findings.add(Severity::Error, Area::Time, title, evidence, remedy);
     }
     let arrival =
         |topic: &TopicSurvey| topic.times.iter().all(|times| (times.log_time_ns - times.stamp_ns).abs() < 1000);
     if used.len() > 1 && used.iter().all(|(_, topic, _, _)| arrival(topic)) {
         let remedy = "if the driver stamps on arrival, calibrate timeshift_cam_imu; a converted log is fine";
-        let title = "log times equal the header stamps: nothing tells when messages arrived";
+        let title = "log times equal the header stamps: arrival times are unknown";
         return findings.add(Severity::Note, Area::Time, title, evidence, remedy);
     }
-    findings.good(Area::Time, "all sensors seem to be stamped by one clock", evidence);
+    findings.good(Area::Time, "all sensors appear to be stamped by one clock", evidence);
 }
 
 fn check_overlap(used: &[Used<'_>], findings: &mut Findings) {
@@ -223,7 +223,7 @@ fn check_overlap(used: &[Used<'_>], findings: &mut Findings) {
             seconds_from_ns(imu_last)
         );
         if outside_s > OVERLAP_TOLERANCE_S && role.starts_with("cam") {
-            let title = format!("{role} reaches beyond the IMU");
+            let title = format!("{role} extends beyond the IMU samples");
             findings.add(Severity::Warning, Area::Time, title, evidence, "images without IMU samples are not used");
         } else if late_s.max(early_s) > OVERLAP_TOLERANCE_S {
             let title = format!("{role} covers only part of the log");

@@ -44,35 +44,35 @@ fn shifted(rig: &mut Rig, shift_s: f64) {
     }
 }
 
-/// Exactly one finding with these words in its title, as severe as said.
+/// Exactly one finding with these words in its title, of this severity.
 fn expect<'a>(report: &'a CheckReport, severity: Severity, title: &str) -> &'a Finding {
     let found: Vec<&Finding> = report.findings.iter().filter(|finding| finding.title.contains(title)).collect();
     assert!(found.len() == 1 && found[0].severity == severity, "{severity:?} '{title}' in\n{report}");
     found[0]
 }
 
-/// The milliseconds of a title such as `cam1 and the gyroscope are +30 ms apart`.
-fn milliseconds_apart(report: &CheckReport, camera: &str) -> i32 {
-    let finding = expect(report, Severity::Warning, &format!("{camera} and the gyroscope are"));
+/// The milliseconds of a title such as `time offset of cam1 to the gyroscope: +30 ms`.
+fn time_offset_ms(report: &CheckReport, camera: &str) -> i32 {
+    let finding = expect(report, Severity::Warning, &format!("time offset of {camera} to the gyroscope"));
     let number = finding.title.split_whitespace().find_map(|word| word.parse().ok());
     number.expect("the title names the milliseconds")
 }
 
 #[test]
-fn turns_of_the_sample_log_tell_a_wrong_rig() {
+fn rotations_of_the_sample_log_detect_a_wrong_rig() {
     let sample = Measured::of(&Path::new(env!("CARGO_MANIFEST_DIR")).join("sample_logs/garden.mcap"));
     let camera = sample.static_camera();
-    let sound = sample.check(|_| {});
-    expect(&sound, Severity::Good, &format!("{camera} points where the rig says"));
-    expect(&sound, Severity::Good, &format!("{camera} and the gyroscope turn at the same time"));
-    assert!(sound.worst() < Severity::Error, "{sound}");
-    assert!(!sound.findings.iter().any(|finding| finding.title.contains("ms apart")), "{sound}");
+    let correct = sample.check(|_| {});
+    expect(&correct, Severity::Good, &format!("the orientation of {camera} agrees with the rig"));
+    expect(&correct, Severity::Good, &format!("{camera} and the gyroscope are synchronized"));
+    assert!(correct.worst() < Severity::Error, "{correct}");
+    assert!(!correct.findings.iter().any(|finding| finding.title.contains("to the gyroscope:")), "{correct}");
 
-    // The rig says that the images are earlier than they are.
+    // The rig's time offset is too small.
     for shift_ms in [10, 30] {
         let report = sample.check(|rig| shifted(rig, -1e-3 * f64::from(shift_ms)));
-        let apart_ms = milliseconds_apart(&report, camera);
-        assert!((apart_ms - shift_ms).abs() <= 2, "{apart_ms} ms for {shift_ms} ms in\n{report}");
+        let offset_ms = time_offset_ms(&report, camera);
+        assert!((offset_ms - shift_ms).abs() <= 2, "{offset_ms} ms for {shift_ms} ms in\n{report}");
     }
 
     let inverted = sample.check(|rig| {
@@ -104,10 +104,10 @@ fn a_simulated_time_offset_is_found() {
     let late = Measured::of(&path);
     let camera = late.static_camera();
     let report = late.check(|_| {});
-    assert!((milliseconds_apart(&report, camera) - 30).abs() <= 2, "{report}");
-    // A rig that knows of 20 ms leaves 10.
+    assert!((time_offset_ms(&report, camera) - 30).abs() <= 2, "{report}");
+    // A rig with 20 of the 30 ms leaves 10.
     let report = late.check(|rig| shifted(rig, 0.02));
-    assert!((milliseconds_apart(&report, camera) - 10).abs() <= 2, "{report}");
+    assert!((time_offset_ms(&report, camera) - 10).abs() <= 2, "{report}");
     let report = late.check(|rig| shifted(rig, 0.03));
-    expect(&report, Severity::Good, &format!("{camera} and the gyroscope turn at the same time"));
+    expect(&report, Severity::Good, &format!("{camera} and the gyroscope are synchronized"));
 }
