@@ -16,11 +16,11 @@ pub(crate) struct CdrError {
 /// Size of the encapsulation header; alignment counts from its end.
 const ENCAPSULATION: usize = 4;
 
-/// Reads fields one after another, never past the end.
+/// Reads fields in order, with bounds checks.
 #[derive(Clone, Debug)]
 pub(crate) struct CdrReader<'a> {
     message: &'a [u8],
-    /// Next byte, from the beginning of the message.
+    /// Next byte, from the start of the message.
     position: usize,
     big_endian: bool,
 }
@@ -87,7 +87,7 @@ impl<'a> CdrReader<'a> {
         Ok(values)
     }
 
-    /// A sequence's length, refused when the rest of the message cannot hold that many elements.
+    /// The length of a sequence; an error when the remaining message is too short for it.
     fn read_length(&mut self, element_size: usize, what: &str) -> Result<usize, CdrError> {
         let offset = self.position;
         let count = self.read_u32()? as usize;
@@ -126,14 +126,14 @@ impl<'a> CdrReader<'a> {
     }
 }
 
-/// Writes fields one after another, little-endian.
+/// Writes fields in order, little-endian.
 #[derive(Clone, Debug)]
 pub(crate) struct CdrWriter {
     message: Vec<u8>,
 }
 
 impl CdrWriter {
-    /// Begins with the encapsulation header.
+    /// Starts with the encapsulation header.
     pub(crate) fn new() -> Self {
         Self { message: vec![0, 1, 0, 0] }
     }

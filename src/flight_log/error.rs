@@ -4,15 +4,16 @@ use thiserror::Error;
 
 use crate::sensors::UnknownCamera;
 
-/// Why a log or a rig could not be read or written; every message says what, where and what to do, the path last.
+/// Why a log or a rig could not be read or written; every message names the problem, its place and the remedy, the path
+/// last.
 #[derive(Debug, Error)]
 pub enum LogError {
-    /// The operating system refused.
+    /// An error of the operating system.
     #[error("cannot {action}: {source}: {}", path.display())]
     Io {
         /// What was tried: `open the log`, `write the log`, ….
         action: &'static str,
-        /// The system's answer.
+        /// The error of the system.
         source: std::io::Error,
         /// The file.
         path: PathBuf,
@@ -35,9 +36,9 @@ pub enum LogError {
         /// The log.
         path: PathBuf,
     },
-    /// The rig names a topic that the log has not.
+    /// The rig names a topic that is not in the log.
     #[error(
-        "{field} names the topic '{topic}', which the log lacks; its topics of type {expected} are {}; name one of them in \
+        "{field} names the topic '{topic}', which is not in the log; its topics of type {expected} are {}; name one of them in \
          the rig: {}",
         list(available),
         path.display()
@@ -45,9 +46,9 @@ pub enum LogError {
     MissingTopic {
         /// Field of the rig, `cam0.rostopic`.
         field: String,
-        /// What it holds.
+        /// The topic that it names.
         topic: String,
-        /// The message types that would do.
+        /// The message types that are accepted.
         expected: String,
         /// Topics of those types in the log.
         available: Vec<String>,
@@ -66,11 +67,11 @@ pub enum LogError {
     UnknownJoint {
         /// Number of the link.
         link: usize,
-        /// What the rig calls the joint.
+        /// Name of the joint in the rig.
         joint: String,
         /// Where joint angles come from.
         topic: String,
-        /// What the messages call their joints.
+        /// Names of the joints in the messages.
         available: Vec<String>,
         /// The log.
         path: PathBuf,
@@ -80,7 +81,7 @@ pub enum LogError {
     Rig {
         /// Path of the field, `cam0.intrinsics`.
         field: String,
-        /// What it holds and what was expected.
+        /// Its value and the expected one.
         problem: String,
         /// The rig.
         path: PathBuf,
@@ -88,7 +89,7 @@ pub enum LogError {
     /// A rig that is no YAML.
     #[error("the rig is not valid YAML: {problem}: {}", path.display())]
     RigSyntax {
-        /// The parser's complaint with line and column.
+        /// The parser's error with line and column.
         problem: String,
         /// The rig.
         path: PathBuf,
@@ -97,7 +98,7 @@ pub enum LogError {
     #[error("no rig for the log: neither {} nor an attachment named *.rig.yaml exists; give one with --rig FILE: {}",
         beside.display(), path.display())]
     NoRig {
-        /// Where it was looked for.
+        /// The file that was looked for.
         beside: PathBuf,
         /// The log.
         path: PathBuf,
@@ -116,14 +117,14 @@ pub enum LogError {
         /// The log.
         path: PathBuf,
     },
-    /// An image was asked for that the log does not have.
+    /// The requested image is not in the log.
     #[error("'{topic}' has {count} images, none with number {index}: {}", path.display())]
     NoSuchImage {
         /// Topic of the camera.
         topic: String,
-        /// What was asked for.
+        /// The requested number.
         index: usize,
-        /// How many there are.
+        /// Number of its images.
         count: usize,
         /// The log.
         path: PathBuf,

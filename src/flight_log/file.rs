@@ -28,27 +28,27 @@ impl LogFile {
             return Err(not_a_log("the file is empty (0 bytes)", "copy or record it again"));
         }
         #[expect(unsafe_code, reason = "a memory map is the only way to open a log of gigabytes at once")]
-        // SAFETY: the map is only read. Another process that shortens or rewrites the file while we hold it could break the
+        // SAFETY: the map is only read. Another process that shortens or rewrites the file while it is mapped could break the
         // map's promise of immutable bytes; a flight log is finished when it is opened, and every length read from it is
         // checked before use.
         let map = unsafe { Mmap::map(&file) };
         Ok(Self { map: map.map_err(failed)? })
     }
 
-    /// Tells the system that some bytes are not needed for now: what was read once would else count as this program's memory
-    /// until the log is closed. They can be read again at any time.
+    /// Advises the system that a range of bytes is not needed for now: pages that were read otherwise count as resident
+    /// memory of the process until the log is closed. They can be read again at any time.
     #[cfg(unix)]
     pub(super) fn release(&self, bytes: &Range<usize>) {
         let (start, end) = (bytes.start.min(self.map.len()), bytes.end.min(self.map.len()));
         if start >= end {
             return;
         }
-        #[expect(unsafe_code, reason = "there is no other way to give mapped pages back")]
+        #[expect(unsafe_code, reason = "there is no other way to release mapped pages")]
         // SAFETY: the map is shared with the file and never written to, so a page that is dropped comes back from the file
         // with the same bytes when it is touched again, also while somebody else is reading it.
         let advised =
             unsafe { self.map.unchecked_advise_range(memmap2::UncheckedAdvice::DontNeed, start, end - start) };
-        // Advice that is not taken costs memory, nothing else.
+        // Advice that the system ignores costs memory, nothing else.
         drop(advised);
     }
 

@@ -1,8 +1,8 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::container::{BlockCache, TopicIndex};
+use super::image_decoding::{BitDepth, decode_image};
 use super::messages::MessageKind;
-use super::picture::{BitDepth, decode_picture};
 use super::{FlightLog, LogError};
 use crate::geometry::seconds_from_ns;
 use crate::sensors::{GrayImage, Rig, UnknownCamera};
@@ -12,7 +12,7 @@ const BLOCKS: usize = 2;
 /// Decoded images kept.
 const IMAGES: usize = 8;
 
-/// Any image of a log by its number, in any order.
+/// Random access to the images of a log by camera and number.
 #[derive(Debug)]
 pub struct ImageReader {
     log: Arc<FlightLog>,
@@ -57,7 +57,7 @@ impl ImageReader {
         Self { log, cameras, cache: Mutex::new(cache) }
     }
 
-    /// How many images a camera has in the log, damaged ones included; 0 for a camera that is not there.
+    /// Number of images of a camera in the log, damaged ones included; 0 for a camera that is not in the log.
     pub fn count(&self, camera_key: &str) -> usize {
         self.cameras.iter().find(|camera| camera.key == camera_key).map_or(0, |camera| camera.count)
     }
@@ -69,7 +69,7 @@ impl ImageReader {
             UnknownCamera { key: camera_key.to_owned(), available }
         })?;
         let camera = &self.cameras[number];
-        // A panic of another reader leaves the cache whole: entries are only pushed when complete.
+        // A panic of another reader leaves the cache valid: entries are only pushed when complete.
         let mut cache = self.cache.lock().unwrap_or_else(PoisonError::into_inner);
         let position = cache.topics[number].get(self.log.index(), self.log.file(), index);
         let position = position.ok_or_else(|| LogError::NoSuchImage {
@@ -87,7 +87,7 @@ impl ImageReader {
         }
         let bad = |problem: String| LogError::BadMessage {
             topic: camera.topic.clone(),
-            second: seconds_from_ns(self.log.since_begin(position.log_time_ns)),
+            second: seconds_from_ns(self.log.since_start(position.log_time_ns)),
             byte: self.log.index().blocks[position.block].bytes.start,
             problem,
             path: self.log.path().to_owned(),
@@ -98,7 +98,7 @@ impl ImageReader {
             return Err(bad(damage.unwrap_or_else(|| "the index points to no message".into())));
         };
         let data = block.bytes(self.log.file(), &message.data);
-        let image = Arc::new(decode_picture(camera.kind, data, camera.depth).map_err(bad)?);
+        let image = Arc::new(decode_image(camera.kind, data, camera.depth).map_err(bad)?);
         if cache.images.len() == IMAGES {
             cache.images.remove(0);
         }

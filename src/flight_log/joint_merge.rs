@@ -1,5 +1,5 @@
-//! One sample of all joints out of messages that may each name only some of them: several drivers can publish on one
-//! topic, a joint each.
+//! Samples of all joints from messages that may each name only some of them: several drivers can publish on one topic, a
+//! joint each.
 
 use std::collections::VecDeque;
 
@@ -7,23 +7,23 @@ use crate::geometry::wrap_angle;
 use crate::sensors::JointSample;
 
 /// Readings of a joint further apart than this are not interpolated.
-const LONGEST_HOLE_NS: i64 = 200_000_000;
+const LONGEST_GAP_NS: i64 = 200_000_000;
 
-/// What one message says: an angle in radians for each of the rig's joints that it names.
+/// One message: an angle in radians for each of the rig's joints that it names.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct JointReading {
     pub(crate) stamp_ns: i64,
     pub(crate) angles_rad: Vec<Option<f64>>,
 }
 
-/// Brings the readings of all joints to the stamps of the first one, by name; those of the others are interpolated.
+/// Merges readings by joint name at the stamps of the first joint; those of the others are interpolated.
 ///
-/// Messages that name all joints come out as they went in.
+/// Messages that name all joints pass unchanged.
 #[derive(Clone, Debug)]
 pub(crate) struct JointMerge {
     /// By joint: readings from the last one at or before the next sample on.
     readings: Vec<VecDeque<(i64, f64)>>,
-    /// Stamp of the last reading that came.
+    /// Stamp of the last reading.
     newest_ns: i64,
     ended: bool,
 }
@@ -33,7 +33,8 @@ impl JointMerge {
         Self { readings: vec![VecDeque::new(); joints], newest_ns: i64::MIN, ended: false }
     }
 
-    /// The next reading; stamps must not decrease. Whether it was taken: a joint's second reading of one stamp is not.
+    /// Takes the next reading; stamps must not decrease. Returns `false` for a joint's second reading of one stamp, which is
+    /// ignored.
     pub(crate) fn push(&mut self, reading: &JointReading) -> bool {
         self.newest_ns = reading.stamp_ns;
         let mut taken = true;
@@ -53,7 +54,7 @@ impl JointMerge {
         self.ended = true;
     }
 
-    /// The next sample whose joints are all known, `None` while later readings are awaited.
+    /// The next sample with an angle for every joint, `None` while later readings are needed.
     pub(crate) fn pop(&mut self) -> Option<JointSample> {
         loop {
             let (stamp_ns, _) = *self.readings.first()?.front()?;
@@ -62,7 +63,7 @@ impl JointMerge {
                     queue.pop_front();
                 }
             }
-            let late = self.ended || self.newest_ns - stamp_ns > LONGEST_HOLE_NS;
+            let late = self.ended || self.newest_ns - stamp_ns > LONGEST_GAP_NS;
             let known = |queue: &VecDeque<(i64, f64)>| queue.back().is_some_and(|(last_ns, _)| *last_ns >= stamp_ns);
             if !late && !self.readings.iter().all(known) {
                 return None;
@@ -83,9 +84,9 @@ fn angle_at(readings: &VecDeque<(i64, f64)>, stamp_ns: i64) -> Option<f64> {
         return Some(before);
     }
     let (after_ns, after) = *readings.get(1)?;
-    let hole_ns = after_ns - before_ns;
-    let share = (stamp_ns - before_ns) as f64 / hole_ns as f64;
-    (hole_ns <= LONGEST_HOLE_NS).then(|| before + share * wrap_angle(after - before))
+    let gap_ns = after_ns - before_ns;
+    let fraction = (stamp_ns - before_ns) as f64 / gap_ns as f64;
+    (gap_ns <= LONGEST_GAP_NS).then(|| before + fraction * wrap_angle(after - before))
 }
 
 #[cfg(test)]
@@ -107,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn whole_messages_pass_as_they_are() {
+    fn messages_of_all_joints_pass_unchanged() {
         let readings = [(0, [Some(0.1), Some(-0.3)]), (5, [Some(0.2), Some(3.0)]), (10, [Some(0.7), Some(-3.1)])];
         let expected: Vec<_> = readings.iter().map(|(at, angles)| (*at, angles.map(Option::unwrap).to_vec())).collect();
         assert_eq!(merged(&readings), expected);
@@ -131,24 +132,24 @@ mod tests {
     }
 
     #[test]
-    fn equal_stamps_are_merged_and_holes_are_not_bridged() {
+    fn equal_stamps_are_merged_and_gaps_are_not_interpolated() {
         let at_once =
             [(0, [Some(1.0), None]), (0, [None, Some(2.0)]), (10, [None, Some(4.0)]), (10, [Some(3.0), None])];
         assert_eq!(merged(&at_once), [(0, vec![1.0, 2.0]), (10, vec![3.0, 4.0])]);
-        let hole = [
+        let gap = [
             (0, [Some(0.0), Some(0.0)]),
             (100, [Some(0.1), None]),
             (300, [Some(0.3), None]),
             (400, [Some(0.4), Some(4.0)]),
         ];
-        assert_eq!(merged(&hole), [(0, vec![0.0, 0.0]), (400, vec![0.4, 4.0])]);
-        let turned = [(0, [Some(0.0), Some(3.1)]), (5, [Some(0.5), None]), (10, [Some(1.0), Some(-3.1)])];
-        let between = merged(&turned)[1].1[1];
+        assert_eq!(merged(&gap), [(0, vec![0.0, 0.0]), (400, vec![0.4, 4.0])]);
+        let wrapped = [(0, [Some(0.0), Some(3.1)]), (5, [Some(0.5), None]), (10, [Some(1.0), Some(-3.1)])];
+        let between = merged(&wrapped)[1].1[1];
         assert!((between - std::f64::consts::PI).abs() < 1e-12, "{between}");
     }
 
     #[test]
-    fn a_reading_that_repeats_is_refused() {
+    fn a_repeated_reading_is_refused() {
         let mut merge = JointMerge::new(2);
         let reading = JointReading { stamp_ns: 7, angles_rad: vec![None, Some(0.5)] };
         assert!(merge.push(&reading));

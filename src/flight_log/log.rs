@@ -7,25 +7,25 @@ use super::messages::{self, MessageKind};
 use super::{LogError, LogWarning};
 use crate::geometry::seconds_from_ns;
 
-/// First stamps further than this before the IMU's first one do not count for the log's begin: another clock made them.
+/// First stamps further than this before the IMU's first one do not count for the log's start: they are of another clock.
 const CLOCK_TOLERANCE_NS: i64 = 60_000_000_000;
 
 /// One topic of a log.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TopicInfo {
-    /// Its name.
+    /// Topic name.
     pub topic: String,
     /// Name of its schema, `sensor_msgs/msg/Imu`.
     pub schema: String,
-    /// What its messages are read as, `None` when they are ignored.
+    /// Kind of its messages, `None` when they are ignored.
     pub kind: Option<MessageKind>,
-    /// How many messages it has, as far as the log's index says.
+    /// Number of messages, from the log's index.
     pub count: u64,
     /// Log time of the first message since the log began.
     pub first_ns: i64,
     /// Log time of the last message since the log began.
     pub last_ns: i64,
-    /// Mean rate over its log times, 0 for fewer than two messages.
+    /// Mean rate over its log times in Hz, 0 for fewer than two messages.
     pub rate_hz: f64,
 }
 
@@ -45,10 +45,10 @@ pub struct FlightLog {
 
 impl FlightLog {
     /// Opens a log. An indexed log is not read, only its index, its first and its last messages; one without an index
-    /// (or cut off) is gone through once.
+    /// (or truncated) is scanned once.
     ///
-    /// The log begins (time zero) with the smallest header stamp among the first messages of all topics that are read,
-    /// those left out that lie more than a minute before the first IMU message (another clock made them).
+    /// The log starts (time zero) at the smallest header stamp among the first messages of all topics that are read, except
+    /// stamps more than a minute before the first IMU message, which are of another clock.
     pub fn open(path: &Path) -> Result<Self, LogError> {
         let file = LogFile::open(path)?;
         check_magic(&file, path)?;
@@ -74,17 +74,17 @@ impl FlightLog {
         Ok(log)
     }
 
-    /// Where it lies.
+    /// Path of the file.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Size of the file.
+    /// Size of the file in bytes.
     pub fn size_bytes(&self) -> u64 {
         self.file.len() as u64
     }
 
-    /// Checksum (CRC-32) of its first and its last mebibyte: tells another log apart without reading all of it.
+    /// Checksum (CRC-32) of its first and its last mebibyte, which identifies the log without reading all of it.
     pub fn checksum(&self) -> u32 {
         const PART_BYTES: usize = 1 << 20;
         let mut hasher = crc32fast::Hasher::new();
@@ -103,17 +103,17 @@ impl FlightLog {
         self.topics.iter().find(|info| info.topic == name)
     }
 
-    /// Absolute header stamp of the log's begin (time zero), in nanoseconds since the epoch.
+    /// Absolute header stamp of the log's start (time zero), in nanoseconds since the epoch.
     pub fn epoch_ns(&self) -> i64 {
         self.epoch_ns
     }
 
-    /// From the log's begin to the latest header stamp among the last messages of its topics.
+    /// From the log's start to the latest header stamp among the last messages of its topics, in nanoseconds.
     pub fn duration_ns(&self) -> i64 {
         self.duration_ns
     }
 
-    /// What opening the log found wrong. Every [`FrameStream`](super::FrameStream) tells it again at its time.
+    /// Problems found when opening the log. Every [`FrameStream`](super::FrameStream) reports them again at their time.
     pub fn warnings(&self) -> &[LogWarning] {
         &self.warnings
     }
@@ -130,7 +130,7 @@ impl FlightLog {
         of_kind.map(|info| info.topic.clone()).collect()
     }
 
-    /// The topic that a field of the rig names, when the log has it with a fitting type.
+    /// The topic that a field of the rig names, when the log has it with one of these types.
     pub(crate) fn require_topic(
         &self,
         field: &str,
@@ -147,7 +147,7 @@ impl FlightLog {
         })
     }
 
-    /// Where the messages of a topic lie.
+    /// Positions of the messages of a topic.
     pub(super) fn topic_index(&self, topic: &str) -> TopicIndex {
         TopicIndex::new(&self.index, self.channel_ids.get(topic).map_or(&[], |ids| ids))
     }
@@ -157,13 +157,13 @@ impl FlightLog {
         &self.file
     }
 
-    /// What lies where.
+    /// Index of the container.
     pub(crate) fn index(&self) -> &ContainerIndex {
         &self.index
     }
 
     /// A log time since the log began.
-    pub(crate) fn since_begin(&self, log_time_ns: u64) -> i64 {
+    pub(crate) fn since_start(&self, log_time_ns: u64) -> i64 {
         i64::try_from(log_time_ns).unwrap_or(i64::MAX).saturating_sub(self.epoch_ns)
     }
 
@@ -177,7 +177,7 @@ impl FlightLog {
             number += 1;
             if let Some((block, message)) = self.message(&mut cache, position) {
                 let data = block.bytes(&self.file, &message.data);
-                if !visit(self.since_begin(position.log_time_ns), data) {
+                if !visit(self.since_start(position.log_time_ns), data) {
                     return;
                 }
             }
@@ -239,11 +239,11 @@ impl FlightLog {
             };
             return Err(LogError::NothingReadable { problem, path: self.path.clone() });
         }
-        self.set_begin(&stamps, infos.iter().map(|info| info.4.log_time_ns).min().unwrap_or(0));
+        self.set_start(&stamps, infos.iter().map(|info| info.4.log_time_ns).min().unwrap_or(0));
         self.topics = infos
             .into_iter()
             .map(|(topic, schema, kind, count, first, last)| {
-                let (first_ns, last_ns) = (self.since_begin(first.log_time_ns), self.since_begin(last.log_time_ns));
+                let (first_ns, last_ns) = (self.since_start(first.log_time_ns), self.since_start(last.log_time_ns));
                 let span_s = seconds_from_ns(last_ns - first_ns);
                 let rate_hz = if span_s > 0.0 { count.saturating_sub(1) as f64 / span_s } else { 0.0 };
                 TopicInfo { topic, schema, kind, count, first_ns, last_ns, rate_hz }
@@ -252,18 +252,18 @@ impl FlightLog {
         Ok(())
     }
 
-    fn set_begin(&mut self, stamps: &[(bool, String, i64, i64)], first_log_time_ns: u64) {
+    fn set_start(&mut self, stamps: &[(bool, String, i64, i64)], first_log_time_ns: u64) {
         let imu_first = stamps.iter().filter(|entry| entry.0).map(|entry| entry.2).min();
         let earliest_ns = imu_first.map_or(i64::MIN, |first| first.saturating_sub(CLOCK_TOLERANCE_NS));
         let counted = || stamps.iter().filter(|entry| entry.2 >= earliest_ns && entry.2 > 0);
-        let log_begin_ns = i64::try_from(first_log_time_ns).unwrap_or(0);
-        self.epoch_ns = counted().map(|entry| entry.2).min().unwrap_or(log_begin_ns);
+        let log_start_ns = i64::try_from(first_log_time_ns).unwrap_or(0);
+        self.epoch_ns = counted().map(|entry| entry.2).min().unwrap_or(log_start_ns);
         self.duration_ns = counted().map(|entry| entry.3 - self.epoch_ns).max().unwrap_or(0).max(0);
         for (_, topic, first_ns, _) in stamps {
             if *first_ns < earliest_ns || *first_ns <= 0 {
                 let message = format!(
-                    "{topic}: its first header stamp is {:.3} s before the log's begin: another clock made it, or the \
-                     stamp was never set; the topic does not count for the log's begin",
+                    "{topic}: its first header stamp is {:.3} s before the log's start: it is of another clock, or the \
+                     stamp was never set; the topic does not count for the log's start",
                     seconds_from_ns(self.epoch_ns.saturating_sub(*first_ns))
                 );
                 self.warnings.push(LogWarning { stamp_ns: 0, message });
@@ -276,7 +276,7 @@ impl FlightLog {
             let after = if damage.after_log_time_ns == 0 { self.epoch_ns } else { damage.after_log_time_ns as i64 };
             let stamp_ns = (after - self.epoch_ns).max(0);
             let message = format!(
-                "the log is damaged after second {:.3}, at byte {} of {}: {}; everything before is used",
+                "the log is damaged after second {:.3}, at byte {} of {}: {}; everything before it is used",
                 seconds_from_ns(stamp_ns),
                 damage.byte,
                 self.file.len(),

@@ -1,4 +1,4 @@
-//! The ROS messages that a flight log is made of, decoded from CDR.
+//! ROS messages of a flight log, decoded from CDR.
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
@@ -53,7 +53,7 @@ impl MessageKind {
         }
     }
 
-    /// The kind of a schema's name; `sensor_msgs/Imu` is taken for `sensor_msgs/msg/Imu`.
+    /// The kind with this schema name; `sensor_msgs/Imu` equals `sensor_msgs/msg/Imu`.
     pub fn from_schema_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| {
             let full = kind.schema_name();
@@ -87,7 +87,7 @@ fn read_header<'a>(reader: &mut CdrReader<'a>) -> Result<Header<'a>, CdrError> {
     Ok(Header { stamp_ns: seconds * 1_000_000_000 + nanoseconds, frame_id })
 }
 
-/// The header stamp of any message that begins with a header, in nanoseconds since the epoch.
+/// The header stamp of any message that starts with a header, in nanoseconds since the epoch.
 pub(crate) fn header_stamp_ns(message: &[u8]) -> Result<i64, CdrError> {
     Ok(read_header(&mut CdrReader::new(message)?)?.stamp_ns)
 }
@@ -147,7 +147,7 @@ pub(crate) fn read_compressed_image(message: &[u8]) -> Result<(&str, &[u8]), Cdr
     Ok((format, reader.read_bytes()?))
 }
 
-/// `sensor_msgs/msg/CameraInfo`, the part that calibrates.
+/// `sensor_msgs/msg/CameraInfo`: resolution, distortion and intrinsics.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct CameraInfoMessage {
     pub(crate) width: usize,

@@ -1,18 +1,18 @@
 //! Flight logs: MCAP in and out as typed events in time order, the rigs that describe their sensors, and the logs of other
 //! recorders.
 //!
-//! Time is nanoseconds since the first message of the log (its header stamp drives; the log time is kept beside it).
+//! Time is nanoseconds since the first message of the log (header stamps; the log time is kept beside them).
 
 mod cdr;
 pub(crate) mod container;
 pub mod convert;
 mod error;
 mod file;
+pub(crate) mod image_decoding;
 mod image_reader;
 pub(crate) mod joint_merge;
 mod log;
 pub(crate) mod messages;
-pub(crate) mod picture;
 pub(crate) mod rig;
 mod sensor_frame;
 pub(crate) mod stream;

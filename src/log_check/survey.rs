@@ -3,8 +3,8 @@ use std::collections::BTreeMap;
 use super::images::{ImageMeasure, measure};
 use super::statistics::median;
 use crate::flight_log::container::DecodedBlock;
+use crate::flight_log::image_decoding::{BitDepth, decode_image};
 use crate::flight_log::joint_merge::{JointMerge, JointReading};
-use crate::flight_log::picture::{BitDepth, decode_picture};
 use crate::flight_log::stream::angle_fit;
 use crate::flight_log::{FlightLog, messages, messages::MessageKind};
 use crate::geometry::{seconds_from_ns, wrap_angle};
@@ -107,8 +107,8 @@ impl Survey {
                 survey.damages.push(format!(
                     "chunk at byte {}, from second {:.3} to {:.3}: {damage}",
                     block.bytes.start,
-                    seconds_from_ns(log.since_begin(first)),
-                    seconds_from_ns(log.since_begin(last))
+                    seconds_from_ns(log.since_start(first)),
+                    seconds_from_ns(log.since_start(last))
                 ));
             }
             for message in &decoded.messages {
@@ -120,7 +120,7 @@ impl Survey {
                 let sampled = number.is_multiple_of(stride);
                 *number += 1;
                 let data = decoded.bytes(log.file(), &message.data);
-                survey.take(log, rig, &info.topic, kind, log.since_begin(message.log_time_ns), data, sampled);
+                survey.take(log, rig, &info.topic, kind, log.since_start(message.log_time_ns), data, sampled);
             }
         }
         for topic in survey.topics.values_mut() {
@@ -206,7 +206,7 @@ impl Survey {
             if let Some(depth) = known {
                 self.depths.insert(camera.key.clone(), depth);
             }
-            match decode_picture(kind, data, known.unwrap_or_default()) {
+            match decode_image(kind, data, known.unwrap_or_default()) {
                 Ok(image) => {
                     let image = SampledImage { stamp_ns, measure: measure(&image) };
                     self.images.entry(camera.key.clone()).or_default().push(image);

@@ -7,7 +7,7 @@ use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use super::super::file::LogFile;
 use super::{RECORD_HEADER, record_at};
 
-/// A stretch of the file that holds messages: one chunk record, or message records outside of chunks.
+/// A range of the file with messages: one chunk record, or message records outside of chunks.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Block {
     /// Its bytes in the file; the end lies beyond the file's when the log was cut inside it.
@@ -23,9 +23,9 @@ pub(crate) struct Block {
 pub(crate) struct MessageSpan {
     pub(crate) channel_id: u16,
     pub(crate) log_time_ns: u64,
-    /// Where its record begins in the block's records.
+    /// Start of its record in the block's records.
     pub(crate) offset: usize,
-    /// Where its data lie in the block's records.
+    /// Range of its data in the block's records.
     pub(crate) data: Range<usize>,
 }
 
@@ -37,7 +37,7 @@ pub(crate) struct DecodedBlock {
     pub(crate) messages: Vec<MessageSpan>,
     /// Schema and channel records, as opcode and body.
     pub(crate) definitions: Vec<(u8, Range<usize>)>,
-    /// What is wrong with the block; its readable messages, if any, are those before the damage.
+    /// Damage of the block; its readable messages, if any, are those before it.
     pub(crate) damage: Option<String>,
 }
 
@@ -50,8 +50,8 @@ enum BlockBytes {
 }
 
 impl DecodedBlock {
-    /// Decodes one block of a file. A chunk whose checksum fails yields no message; one that the file's end cuts off
-    /// yields those before the cut.
+    /// Decodes one block of a file. A chunk whose checksum fails has no message; one truncated by the file's end has
+    /// those before the end.
     pub(crate) fn decode(file: &[u8], block: &Block) -> Self {
         if !block.is_chunk {
             let bytes = block.bytes.start..block.bytes.end.min(file.len());
@@ -106,7 +106,7 @@ impl DecodedBlock {
         &self.records.of(file)[range.clone()]
     }
 
-    /// The message whose record begins at an offset, as an index names it.
+    /// The message whose record starts at an offset given by an index.
     pub(crate) fn message_at(&self, offset: u64) -> Option<&MessageSpan> {
         let index = self.messages.binary_search_by_key(&offset, |message| message.offset as u64).ok()?;
         self.messages.get(index)
@@ -148,7 +148,7 @@ pub(crate) fn chunk_header(file: &[u8], block: &Block) -> Result<(ChunkHeader, R
     let header_length = name_length.filter(|length| *length < 64).map(|length| NAME_AT + 4 + length + 8);
     let header = header_length.and_then(|length| body.get(..length)).ok_or("a damaged chunk header")?;
     // An empty chunk's record with this header is a chunk header that `parse_record` accepts only with its data, so the
-    // fields are taken one by one.
+    // fields are read one by one.
     let number = |at: usize| {
         let mut bytes = [0; 8];
         bytes.copy_from_slice(&header[at..at + 8]);
@@ -174,7 +174,7 @@ pub(crate) fn chunk_header(file: &[u8], block: &Block) -> Result<(ChunkHeader, R
     Ok((parsed, data_start..promised_end.min(file.len())))
 }
 
-/// Decompresses a chunk and checks it: its records, and the damage when the file's end cuts it off.
+/// Decompresses a chunk and checks it: its records, and the damage when it is truncated.
 fn unpack_chunk(file: &[u8], block: &Block) -> Result<(BlockBytes, Option<String>), String> {
     let (header, data) = chunk_header(file, block)?;
     let cut = (data.len() as u64) < header.compressed_size;
@@ -201,7 +201,7 @@ fn unpack_chunk(file: &[u8], block: &Block) -> Result<(BlockBytes, Option<String
     Ok((records, None))
 }
 
-/// Decompresses as far as possible; the second value says what stopped it early.
+/// Decompresses as far as possible; the second value is the error that stopped it early.
 fn decompress(file: &[u8], header: &ChunkHeader, data: &Range<usize>) -> (Vec<u8>, Option<String>) {
     let mut reader = LinearReader::new_with_options(
         LinearReaderOptions::default()

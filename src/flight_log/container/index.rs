@@ -20,14 +20,14 @@ pub(crate) struct ChannelRecord {
     pub(crate) encoding: String,
 }
 
-/// Where one message lies.
+/// Position of one message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct MessagePosition {
     /// Nanoseconds since the epoch.
     pub(crate) log_time_ns: u64,
     /// Number of its block.
     pub(crate) block: usize,
-    /// Where its record begins in the block's records.
+    /// Start of its record in the block's records.
     pub(crate) offset: u64,
 }
 
@@ -49,16 +49,16 @@ pub(crate) struct Damage {
     pub(crate) problem: String,
 }
 
-/// Where the messages of one channel lie in one block.
+/// Positions of the messages of one channel in one block.
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Entries {
     /// In the message index record at this byte of the file.
     Record(usize),
-    /// Log time and offset, found by ourselves.
+    /// Log time and offset, from scanning the file.
     Own(Vec<(u64, u64)>),
 }
 
-/// What lies where in an MCAP file.
+/// Blocks, channels and messages of an MCAP file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct ContainerIndex {
     pub(crate) profile: String,
@@ -69,14 +69,14 @@ pub(crate) struct ContainerIndex {
     pub(crate) attachments: Vec<AttachmentRef>,
     /// Messages by channel, as the file's statistics count them.
     pub(crate) statistics: Option<BTreeMap<u16, u64>>,
-    /// What was wrong, in the order of the file.
+    /// Damage, in the order of the file.
     pub(crate) damages: Vec<Damage>,
     /// Whether the file's own index was used.
     pub(crate) from_summary: bool,
 }
 
 impl ContainerIndex {
-    /// Reads the file's index, or builds one when the file has none that can be trusted.
+    /// Reads the file's index, or builds one when the file has no valid one.
     pub(crate) fn read(file: &[u8]) -> Self {
         match Self::from_summary(file) {
             Ok(index) => index,
@@ -84,7 +84,7 @@ impl ContainerIndex {
                 let mut index = Self::from_scan(file);
                 if let Some(problem) = reason {
                     let after_log_time_ns = index.blocks.iter().map(|block| block.log_time_ns.1).max().unwrap_or(0);
-                    // A file that is cut has no index either: the cut says it all.
+                    // A truncated file has no index either: the truncation is reported alone.
                     if index.damages.is_empty() {
                         index.damages.push(Damage { byte: file.len(), after_log_time_ns, problem });
                     }
@@ -100,7 +100,7 @@ impl ContainerIndex {
         const FOOTER: usize = RECORD_HEADER + 20;
         let footer_start = file.len().checked_sub(FOOTER + MAGIC.len()).filter(|start| *start >= MAGIC.len());
         let Some(footer_start) = footer_start.filter(|_| file.ends_with(MAGIC)) else {
-            return Err(Some("the file does not end as an MCAP file does".into()));
+            return Err(Some("the file does not end with the MCAP magic".into()));
         };
         let footer =
             record_at(file, footer_start).ok().and_then(|record| mcap::parse_record(record.opcode, record.body).ok());
@@ -176,7 +176,7 @@ impl ContainerIndex {
         Ok(index)
     }
 
-    /// Goes through all records once.
+    /// Scans all records once.
     fn from_scan(file: &[u8]) -> Self {
         let mut index = Self::default();
         let mut schemas = BTreeMap::new();
@@ -249,7 +249,7 @@ impl ContainerIndex {
         self.entries.push(entries);
     }
 
-    /// Takes what is readable of a chunk that the file's end cuts off.
+    /// Indexes the readable messages of a truncated chunk.
     fn scan_cut_chunk(&mut self, file: &[u8], position: usize, schemas: &mut BTreeMap<u16, String>) {
         if file.get(position) != Some(&op::CHUNK) || file.len() < position + RECORD_HEADER {
             return;
@@ -307,7 +307,7 @@ impl ContainerIndex {
         attachment(record.body).map(|(_, content)| content)
     }
 
-    /// Numbers of the blocks that hold messages of some channels.
+    /// Numbers of the blocks with messages of some channels.
     pub(super) fn blocks_with(&self, channel_ids: &[u16]) -> Vec<usize> {
         let has = |entries: &BTreeMap<u16, Entries>| channel_ids.iter().any(|id| entries.contains_key(id));
         self.entries.iter().enumerate().filter(|(_, entries)| has(entries)).map(|(number, _)| number).collect()
@@ -323,7 +323,7 @@ impl ContainerIndex {
                     Entries::Record(at) => message_index(file, *at, *channel_id, &self.blocks[number]),
                 };
                 let list = indexed.unwrap_or_else(|| {
-                    // The index record is damaged; the block itself tells.
+                    // The index record is damaged; the block itself is read.
                     let decoded = DecodedBlock::decode(file, &self.blocks[number]);
                     let own = decoded.messages.iter().filter(|message| message.channel_id == *channel_id);
                     own.map(|message| (message.log_time_ns, message.offset as u64)).collect()
@@ -360,8 +360,8 @@ fn chunk_bytes(offset: u64, length: u64) -> Option<Range<usize>> {
     Some(start..start.checked_add(usize::try_from(length).ok()?)?)
 }
 
-/// Log times and offsets in the message index record at a byte, `None` when there is no such record or it contradicts
-/// the block: message indexes have no checksum.
+/// Log times and offsets in the message index record at a byte, `None` when there is no such record or it is
+/// inconsistent with the block: message indexes have no checksum.
 fn message_index(file: &[u8], at: usize, channel_id: u16, block: &Block) -> Option<Vec<(u64, u64)>> {
     let record = record_at(file, at).ok().filter(|record| record.opcode == op::MESSAGE_INDEX)?;
     // Channel (2 bytes), size of the list (4), then log time and offset (8 each) of every message.

@@ -1,4 +1,4 @@
-//! The MCAP container: where the messages of each channel lie, and the bytes of one block of them at a time.
+//! The MCAP container: positions of the messages of each channel, and the bytes of one block of them at a time.
 
 mod block;
 mod index;
@@ -8,7 +8,7 @@ pub(crate) use block::{BlockCache, DecodedBlock, MessageSpan};
 pub(super) use index::{ContainerIndex, MessagePosition};
 pub(super) use topic::TopicIndex;
 
-/// Every record begins with its opcode (1 byte) and the length of its body (8 bytes).
+/// Every record starts with its opcode (1 byte) and the length of its body (8 bytes).
 const RECORD_HEADER: usize = 9;
 
 /// One record of the file.
@@ -20,7 +20,7 @@ struct RawRecord<'a> {
     end: usize,
 }
 
-/// The record that begins at a byte, or why there is none.
+/// The record that starts at a byte, or why there is none.
 fn record_at(bytes: &[u8], start: usize) -> Result<RawRecord<'_>, String> {
     let header = start.checked_add(RECORD_HEADER).and_then(|end| bytes.get(start..end));
     let Some(header) = header else {

@@ -1,7 +1,7 @@
 use super::index::{ContainerIndex, MessagePosition};
 
-/// The messages of one topic in the order of their log times, found group by group as far as they are asked for: in a
-/// log of gigabytes the message indexes lie far apart.
+/// The messages of one topic in the order of their log times, read group by group on demand: in a log of gigabytes the
+/// message indexes are far apart.
 #[derive(Clone, Debug)]
 pub(crate) struct TopicIndex {
     channel_ids: Vec<u16>,
@@ -29,7 +29,7 @@ impl TopicIndex {
         Self { channel_ids: channel_ids.to_vec(), groups, next_group: 0, loaded: Vec::new() }
     }
 
-    /// The position of a message, counted from the first one (or from where [`TopicIndex::skip_to`] went).
+    /// The position of a message, counted from the first one (or from the position of [`TopicIndex::skip_to`]).
     pub(crate) fn get(&mut self, index: &ContainerIndex, file: &[u8], number: usize) -> Option<MessagePosition> {
         while self.loaded.len() <= number && self.load_group(index, file) {}
         self.loaded.get(number).copied()
@@ -41,7 +41,7 @@ impl TopicIndex {
         self.loaded.partition_point(|position| position.log_time_ns < log_time_ns)
     }
 
-    /// Leaves out the groups that end before a log time: messages are then counted from the first group that is left.
+    /// Skips the groups that end before a log time: messages are then counted from the first remaining group.
     pub(crate) fn skip_to(&mut self, index: &ContainerIndex, log_time_ns: u64) {
         let ends_before =
             |group: &&Vec<usize>| group.iter().all(|block| index.blocks[*block].log_time_ns.1 < log_time_ns);
@@ -55,7 +55,7 @@ impl TopicIndex {
             .map(|group| group.map(|group| index.positions(file, group, &self.channel_ids)).unwrap_or_default())
     }
 
-    /// How many messages there are, all counted.
+    /// Number of messages.
     pub(crate) fn count(&mut self, index: &ContainerIndex, file: &[u8]) -> usize {
         while self.load_group(index, file) {}
         self.loaded.len()

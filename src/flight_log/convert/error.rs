@@ -5,18 +5,18 @@ use thiserror::Error;
 
 use super::super::LogError;
 
-/// Why a source could not be converted; every message says what, where and what to do, the path last.
+/// Why a source could not be converted; every message names the problem, its place and the remedy, the path last.
 #[derive(Debug, Error)]
 pub enum ConvertError {
     /// The log or the rig could not be written, or a sensor's description is wrong.
     #[error(transparent)]
     Log(#[from] LogError),
-    /// The operating system refused.
+    /// An error of the operating system.
     #[error("cannot {action}: {source}: {}", path.display())]
     Io {
         /// What was tried.
         action: &'static str,
-        /// The system's answer.
+        /// The error of the system.
         source: io::Error,
         /// The file.
         path: PathBuf,
@@ -27,7 +27,7 @@ pub enum ConvertError {
         path.display()
     )]
     UnknownSource {
-        /// What lies there.
+        /// What was found instead.
         found: String,
         /// The source.
         path: PathBuf,
@@ -45,7 +45,7 @@ pub enum ConvertError {
     Line {
         /// Number of the line from 1.
         line: usize,
-        /// What it holds and what was expected.
+        /// Its value and the expected one.
         problem: String,
         /// The table.
         path: PathBuf,
@@ -53,13 +53,13 @@ pub enum ConvertError {
     /// No topic could be used.
     #[error("no message can be used ({}): {}", if topics.is_empty() { "it has no topics" } else { topics }, path.display())]
     NothingUsable {
-        /// The topics with their types and why each was left.
+        /// The topics with their types and why each was skipped.
         topics: String,
         /// The source.
         path: PathBuf,
     },
     /// The log would overwrite its source.
-    #[error("the log would lie in or over its own source; give another -o: {}", path.display())]
+    #[error("the log would be inside or overwrite its own source; give another -o: {}", path.display())]
     OntoItself {
         /// The log.
         path: PathBuf,

@@ -12,7 +12,7 @@ use super::sink::Sink;
 use crate::geometry::RigidTransform;
 use crate::sensors::Rig;
 
-/// Where poses may be, the best truth first.
+/// Sensors with poses, the best ground truth first.
 const POSE_FOLDERS: [&str; 3] = ["state_groundtruth_estimate0", "mocap0", "vicon0"];
 /// Topic type that the report names for files.
 const IMAGE_TYPE: &str = "sensor_msgs/msg/CompressedImage";
@@ -32,7 +32,7 @@ enum Sample {
     Pose { source: usize, world_from_imu: RigidTransform },
 }
 
-/// Pours a folder into a log and returns its rig, when the sensors are described.
+/// Converts a folder into a log and returns its rig, when the sensors are described.
 pub(super) fn convert(source: &Path, sink: &mut Sink<'_>) -> Result<Option<Rig>, ConvertError> {
     let Some(root) = root(source) else { return Ok(None) };
     let mut folders = sensor_folders(&root)?;

@@ -13,7 +13,7 @@ use crate::camera::CameraModel;
 use crate::geometry::{RigidTransform, seconds_from_ns};
 use crate::sensors::{CameraMount, CameraRig, ImuNoise, ImuRig, Rig};
 
-/// Topic of the inertial sensor.
+/// Topic of the IMU.
 pub(super) const IMU_TOPIC: &str = "/imu0";
 
 /// Topic of a camera's images.
@@ -23,7 +23,7 @@ pub(super) fn image_topic(key: &str) -> String {
 
 /// Gravity that the dataset's authors use.
 const GRAVITY_M_PER_S2: f64 = 9.81;
-/// A rotation block may be this far from orthonormal: people round.
+/// A rotation block may be this far from orthonormal, by rounding.
 const ROTATION_TOLERANCE: f64 = 1e-3;
 
 /// A camera's folder.
@@ -49,7 +49,7 @@ impl SensorFile {
             return Ok(None);
         }
         let text = fs::read_to_string(&path).map_err(ConvertError::io("read the sensor's description", &path))?;
-        // OpenCV's writers begin with `%YAML:1.0`, which is no YAML directive.
+        // OpenCV's files start with `%YAML:1.0`, which is not a YAML directive.
         let text = if text.starts_with("%YAML:") { text.split_once('\n').map_or("", |(_, rest)| rest) } else { &text };
         let document = serde_saphyr::from_str(text).map_err(|error| {
             let problem = error.to_string();
@@ -96,7 +96,7 @@ fn body_from_sensor(folder: &Path) -> Result<RigidTransform, ConvertError> {
     SensorFile::read(folder)?.map_or_else(|| Ok(RigidTransform::identity()), |file| file.body_from_sensor())
 }
 
-/// `imu_from_sensor` of the sensor in a folder; one that is not described sits in the body's frame.
+/// `imu_from_sensor` of the sensor in a folder; the identity for one that is not described.
 pub(super) fn sensor_pose(root: &Path, name: &str) -> Result<RigidTransform, ConvertError> {
     Ok(body_from_sensor(&root.join("imu0"))?.inverse() * body_from_sensor(&root.join(name))?)
 }

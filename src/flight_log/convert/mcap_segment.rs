@@ -10,7 +10,7 @@ use super::super::file::LogFile;
 use super::ConvertError;
 use super::sink::{Payload, Sink, SourceMessage};
 
-/// Pours one file into a log, its attachments with it. An unfinished file is converted up to its end.
+/// Converts one file with its attachments. An unfinished file is converted up to its end.
 pub(super) fn convert(path: &Path, sink: &mut Sink<'_>) -> Result<(), ConvertError> {
     let file = LogFile::open(path)?;
     let failed = |error: mcap::McapError| ConvertError::unreadable(format!("not an MCAP log: {error}"), path);

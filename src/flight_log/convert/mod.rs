@@ -1,7 +1,7 @@
-//! Other people's logs as flight logs: EuRoC folders, ROS 1 bags and ROS 2 bags in, MCAP out.
+//! Logs of other recorders as flight logs: EuRoC folders, ROS 1 bags and ROS 2 bags in, MCAP out.
 //!
-//! Messages are rewritten one after another, so that a bag of any size passes through little memory.
-//! Nothing is left out in silence: the report has a row for every topic.
+//! Messages are rewritten one after another, so that a bag of any size needs little memory.
+//! The report has a row for every topic, with the number of skipped messages and the reason.
 
 mod error;
 mod euroc;
@@ -27,7 +27,7 @@ use crate::geometry::seconds_from_ns;
 use crate::sensors::Rig;
 use sink::Sink;
 
-/// What a source is.
+/// Kind of a source.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum SourceKind {
     Euroc,
@@ -49,14 +49,14 @@ impl SourceKind {
     }
 }
 
-/// Converts `source` into the log `output`, with a rig beside it where the source says enough; `progress` hears the
-/// share that is done, from 0 to 1.
+/// Converts `source` into the log `output`, with a rig beside it where the source has a calibration; `progress` is called
+/// with the fraction that is done, from 0 to 1.
 ///
 /// The log appears under its name only when it is complete.
 ///
 /// # Errors
-/// When the source is of no known kind or damaged at its beginning, when nothing in it can be used, or when files cannot
-/// be read or written. A source that is damaged further on is converted up to there, and the report says so.
+/// When the source is of no known kind or damaged at its start, when it has no usable message, or when files cannot be
+/// read or written. A source that is damaged later is converted up to the damage, with a note in the report.
 pub fn convert(source: &Path, output: &Path, progress: &mut dyn FnMut(f64)) -> Result<ConversionReport, ConvertError> {
     let kind = detect(source)?;
     let same = |a: &Path, b: &Path| fs::canonicalize(a).ok().is_some_and(|path| fs::canonicalize(b).ok() == Some(path));
@@ -69,7 +69,7 @@ pub fn convert(source: &Path, output: &Path, progress: &mut dyn FnMut(f64)) -> R
     let (mut report, rig) = match converted {
         Ok(converted) => converted,
         Err(error) => {
-            // The error that led here is the one to tell.
+            // The first error is the one to report.
             drop(fs::remove_file(&partial));
             return Err(error);
         }
@@ -93,7 +93,7 @@ pub fn convert(source: &Path, output: &Path, progress: &mut dyn FnMut(f64)) -> R
     Ok(report)
 }
 
-/// Writes the log and returns what became of each topic, with the rig where the source describes one.
+/// Writes the log and returns the result of each topic, with the rig where the source describes one.
 fn write(
     kind: SourceKind,
     source: &Path,
@@ -120,7 +120,7 @@ fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
     PathBuf::from(name)
 }
 
-/// What lies at a path.
+/// Kind of the source at a path.
 fn detect(source: &Path) -> Result<SourceKind, ConvertError> {
     let metadata = fs::metadata(source).map_err(ConvertError::io("open the source", source))?;
     if metadata.is_dir() {

@@ -3,22 +3,22 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-/// What became of one topic of a source.
+/// Result of one topic of a source.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct ConvertedTopic {
     /// Its name in the log.
     pub topic: String,
     /// Its type as the source names it, `sensor_msgs/Imu`.
     pub message_type: String,
-    /// Messages that the log has.
+    /// Number of messages written to the log.
     pub taken: u64,
-    /// Messages that were left out.
+    /// Number of messages skipped.
     pub left: u64,
-    /// Why messages were left out, of the first one; or what to know about those that were taken.
+    /// Why the first skipped message was skipped, or a remark on those that were written.
     pub reason: Option<String>,
 }
 
-/// What came of a conversion.
+/// Result of a conversion.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ConversionReport {
     /// What the source is, `ROS 1 bag`.
@@ -31,9 +31,9 @@ pub struct ConversionReport {
     pub rig: Option<PathBuf>,
     /// Length of the log in seconds.
     pub duration_s: f64,
-    /// Every topic of the source, taken or left, in the order of their names.
+    /// Every topic of the source, in the order of their names.
     pub topics: Vec<ConvertedTopic>,
-    /// What else there is to know: damage, a missing rig.
+    /// Remarks, such as damage or a missing rig.
     pub notes: Vec<String>,
 }
 

@@ -1,5 +1,5 @@
-//! ROS 1 bags, format 2.0, read from the first chunk to the last without their index, so that an unindexed bag or one
-//! that was cut off converts as well.
+//! ROS 1 bags, format 2.0, read from the first chunk to the last without their index, so that an unindexed or truncated
+//! bag is converted as well.
 
 use std::collections::BTreeMap;
 use std::io::{self, Read};
@@ -10,9 +10,9 @@ use super::ConvertError;
 use super::ros1_record::{BagRecord, record_at, text_field};
 use super::sink::{Payload, Sink, SourceMessage};
 
-/// How a bag of version 2.0 begins.
+/// First bytes of a bag of version 2.0.
 pub(super) const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
-/// Room that is made for a chunk before it is decompressed; a larger one grows.
+/// Initial capacity for a decompressed chunk, in bytes.
 const CHUNK_CAPACITY: u32 = 64 << 20;
 
 /// Opcodes of the records that matter.
@@ -34,7 +34,7 @@ struct Connection {
 
 type Connections = BTreeMap<u32, Connection>;
 
-/// Pours a bag into a log.
+/// Converts a bag into a log.
 pub(super) fn convert(path: &Path, sink: &mut Sink<'_>) -> Result<(), ConvertError> {
     let bag = LogFile::open(path)?;
     let mut connections = Connections::new();
@@ -92,9 +92,7 @@ fn read_bag_header(
     }
     let mut at = record.large_number("index_pos").and_then(|at| usize::try_from(at).ok()).unwrap_or(0);
     if at == 0 {
-        sink.note(
-            "the bag has no index (its recording was not ended properly); it was read from its beginning to its end",
-        );
+        sink.note("the bag has no index (its recording was not closed properly); it was read from start to end");
         return Ok(());
     }
     while let Ok(record) = record_at(bag, at) {
@@ -117,7 +115,7 @@ fn read_connection(record: &BagRecord<'_>, connections: &mut Connections, sink: 
     connections.insert(id, Connection { topic: topic.to_owned(), message_type: message_type.to_owned() });
 }
 
-/// The messages of a chunk; the inner error says where it is damaged.
+/// The messages of a chunk; the inner error is its damage.
 fn take_chunk(
     chunk: &[u8],
     connections: &mut Connections,
@@ -162,7 +160,7 @@ fn take_message(
 
 /// The records of a chunk.
 fn decompress<'a>(record: &BagRecord<'a>) -> Result<std::borrow::Cow<'a, [u8]>, String> {
-    let size = record.number("size").ok_or_else(|| "it does not say how large it is".to_owned())?;
+    let size = record.number("size").ok_or_else(|| "its size is missing".to_owned())?;
     match record.text("compression") {
         Some("none") => Ok(record.data.into()),
         Some("bz2") => read_all(bzip2::read::MultiBzDecoder::new(record.data), size).map(Into::into),
@@ -174,14 +172,14 @@ fn decompress<'a>(record: &BagRecord<'a>) -> Result<std::borrow::Cow<'a, [u8]>, 
     }
 }
 
-/// Everything that a decompressor gives, held against the size that was promised.
+/// The decompressed bytes, when they have the expected size.
 fn read_all(decoder: impl Read, size: u32) -> Result<Vec<u8>, String> {
     let mut bytes = Vec::with_capacity(size.min(CHUNK_CAPACITY) as usize);
     let limit = u64::from(size) + 1;
     let read: io::Result<usize> = decoder.take(limit).read_to_end(&mut bytes);
     read.map_err(|error| format!("it cannot be decompressed: {error}"))?;
     if bytes.len() != size as usize {
-        return Err(format!("it decompresses to {} bytes, {size} were promised", bytes.len()));
+        return Err(format!("it decompresses to {} bytes, expected {size}", bytes.len()));
     }
     Ok(bytes)
 }

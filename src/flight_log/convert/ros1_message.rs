@@ -105,7 +105,7 @@ impl<'a> Ros1Reader<'a> {
         Ok(u32::from_le_bytes(bytes))
     }
 
-    /// The length of a sequence, refused when the rest of the message cannot hold that many elements.
+    /// The length of a sequence; an error when the remaining message is too short for it.
     fn length(&mut self, element_size: usize) -> Result<usize, String> {
         let count = self.u32()? as usize;
         if count.saturating_mul(element_size) > self.message.len() - self.position {

@@ -17,14 +17,14 @@ fn sized(bytes: &[u8], start: usize) -> Option<(&[u8], usize)> {
     Some((bytes.get(start + 4..end)?, end))
 }
 
-/// The record that begins at a byte, or why there is none.
+/// The record that starts at a byte, or why there is none.
 pub(super) fn record_at(bytes: &[u8], start: usize) -> Result<BagRecord<'_>, String> {
     let ends = || format!("a record ends after the last of {} bytes", bytes.len());
     let (header, after_header) = sized(bytes, start).ok_or_else(ends)?;
     let (data, end) = sized(bytes, after_header).ok_or_else(ends)?;
     let record = BagRecord { header, data, end };
     // Every record has an opcode; without one these bytes are something else.
-    record.opcode().map(|_| record).ok_or_else(|| "no record begins here".to_owned())
+    record.opcode().map(|_| record).ok_or_else(|| "no record starts here".to_owned())
 }
 
 /// The value of a named field among `name=value` fields.

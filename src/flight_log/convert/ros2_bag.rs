@@ -41,7 +41,7 @@ fn segments(folder: &Path) -> Result<Vec<PathBuf>, ConvertError> {
     Ok(paths)
 }
 
-/// What `metadata.yaml` says.
+/// Content of `metadata.yaml`.
 struct BagMetadata {
     segments: Vec<PathBuf>,
     blob_compression: BlobCompression,
@@ -74,7 +74,7 @@ fn read_metadata(folder: &Path) -> Result<BagMetadata, ConvertError> {
     Ok(BagMetadata { segments, blob_compression })
 }
 
-/// Where a file of the bag lies: old recorders wrote the folder's name before it, and some leave `.zstd` out.
+/// Path of a file of the bag: old recorders wrote the folder's name before it, and some omit `.zstd`.
 fn find(folder: &Path, name: &str) -> PathBuf {
     let in_folder = folder.join(name);
     let beside = folder.join(Path::new(name).file_name().unwrap_or_default());
@@ -84,7 +84,7 @@ fn find(folder: &Path, name: &str) -> PathBuf {
     candidates.find(|path| path.is_file()).unwrap_or_else(|| beside.clone())
 }
 
-/// Pours a bag into a log.
+/// Converts a bag into a log.
 pub(super) fn convert(folder: &Path, sink: &mut Sink<'_>) -> Result<(), ConvertError> {
     let metadata = read_metadata(folder)?;
     if !folder.join("metadata.yaml").is_file() {

@@ -1,4 +1,4 @@
-//! Where all sources pour their messages: the log, and the tally of what was taken and left.
+//! The output of every conversion: the log, and the number of messages written and skipped by topic.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -8,7 +8,7 @@ use super::super::{LogWriter, MessageKind, MessageTimes};
 use super::ros1_message::cdr_from_ros1;
 use super::{ConversionReport, ConvertError, ConvertedTopic};
 
-/// Bytes of a message as its source holds them.
+/// Bytes of a message in the encoding of its source.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Payload<'a> {
     /// ROS 1 serialization.
@@ -32,7 +32,7 @@ pub(super) struct SourceMessage<'a> {
     pub(super) payload: Payload<'a>,
 }
 
-/// What became of the messages of one topic.
+/// Number of messages written and skipped of one topic.
 #[derive(Debug, Default)]
 pub(super) struct Tally {
     taken: u64,
@@ -55,22 +55,22 @@ impl<'a> Sink<'a> {
         Self { writer, tallies: BTreeMap::new(), types: BTreeMap::new(), notes: Vec::new(), progress }
     }
 
-    /// How much of the source is done, from 0 to 1.
-    pub(super) fn progress(&mut self, share: f64) {
-        (self.progress)(share);
+    /// Reports the fraction of the source that is done, from 0 to 1.
+    pub(super) fn progress(&mut self, fraction: f64) {
+        (self.progress)(fraction);
     }
 
-    /// Something to tell in the report.
+    /// Adds a remark to the report.
     pub(super) fn note(&mut self, note: impl Into<String>) {
         self.notes.push(note.into());
     }
 
-    /// Names a topic, so that it stands in the report though it may have no messages.
+    /// Adds a topic to the report, even without messages.
     pub(super) fn announce(&mut self, topic: &str, message_type: &str) {
         self.tallies.entry((topic.to_owned(), message_type.to_owned())).or_default();
     }
 
-    /// Counts messages that were left out.
+    /// Counts messages that were skipped.
     pub(super) fn leave(&mut self, topic: &str, message_type: &str, count: u64, reason: impl Into<String>) {
         let tally = self.tallies.entry((topic.to_owned(), message_type.to_owned())).or_default();
         tally.left += count;
@@ -143,13 +143,13 @@ impl<'a> Sink<'a> {
         let usable =
             |topic: &ConvertedTopic| topic.taken > 0 && MessageKind::from_schema_name(&topic.message_type).is_some();
         if !topics.iter().any(usable) {
-            let told = topics.iter().map(|topic| {
+            let descriptions = topics.iter().map(|topic| {
                 let reason = topic.reason.as_deref().unwrap_or("not read");
                 format!("{} of type {}: {reason}", topic.topic, topic.message_type)
             });
-            let mut told: Vec<String> = told.collect();
-            told.extend(self.notes);
-            return Err(ConvertError::NothingUsable { topics: told.join("; "), path: source.to_owned() });
+            let mut reasons: Vec<String> = descriptions.collect();
+            reasons.extend(self.notes);
+            return Err(ConvertError::NothingUsable { topics: reasons.join("; "), path: source.to_owned() });
         }
         self.writer.finish()?;
         Ok(ConversionReport {

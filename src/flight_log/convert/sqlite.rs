@@ -12,7 +12,7 @@ use super::sink::{Payload, Sink, SourceMessage};
 /// Whether every message is compressed on its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum BlobCompression {
-    /// Not at all.
+    /// Uncompressed.
     None,
     /// Zstandard.
     Zstd,
@@ -29,7 +29,7 @@ struct Topic {
     definition: Option<String>,
 }
 
-/// Pours one file into a log, in the order of log times.
+/// Converts one file into a log, in the order of log times.
 pub(super) fn convert(path: &Path, compression: BlobCompression, sink: &mut Sink<'_>) -> Result<(), ConvertError> {
     let failed = |error: rusqlite::Error| ConvertError::unreadable(format!("not a readable ROS 2 bag: {error}"), path);
     let database = Connection::open_with_flags(path, OpenFlags::SQLITE_OPEN_READ_ONLY).map_err(failed)?;

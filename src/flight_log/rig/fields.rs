@@ -1,4 +1,4 @@
-//! Reading a YAML tree field by field, so that every complaint names the field, what it holds and what was expected.
+//! Reading a YAML tree field by field, so that every error names the field, its value and the expected one.
 
 use std::path::Path;
 
@@ -8,7 +8,8 @@ use serde_json::Value;
 use super::super::LogError;
 use crate::geometry::RigidTransform;
 
-/// A rotation block may be this far from orthonormal (largest entry of `RᵀR − I`); Kalibr writes 1e-16, people round.
+/// A rotation block may be this far from orthonormal (largest entry of `RᵀR − I`); Kalibr writes 1e-16, hand-written files
+/// are rounded.
 const ROTATION_TOLERANCE: f64 = 1e-3;
 
 /// One field of a rig, present or not.
@@ -25,7 +26,7 @@ impl<'a> Field<'a> {
         Self { path: String::new(), value: Some(value), file }
     }
 
-    /// A field of this mapping; whether it is there shows when it is read.
+    /// A field of this mapping, present or not; reading it reports a missing one.
     pub(super) fn field(&self, key: &str) -> Self {
         let path = if self.path.is_empty() { key.to_owned() } else { format!("{}.{key}", self.path) };
         let value = self.value.and_then(|value| value.get(key)).filter(|value| !value.is_null());
@@ -131,7 +132,7 @@ impl<'a> Field<'a> {
     }
 }
 
-/// What a value is, in a few words.
+/// Short description of a value.
 fn describe(value: &Value) -> String {
     match value {
         Value::Null => "nothing".into(),

@@ -11,12 +11,12 @@ use crate::camera::CameraModel;
 use crate::sensors::Rig;
 
 impl Rig {
-    /// Reads a rig file: our own schema, or Kalibr's `camchain-imucam.yaml` with `imu.yaml` beside it.
+    /// Reads a rig file: the schema of this program, or Kalibr's `camchain-imucam.yaml` with `imu.yaml` beside it.
     pub fn from_file(path: &Path) -> Result<Self, LogError> {
         from_file(path, &NoFacts)
     }
 
-    /// Parses the text of a rig in our own schema; `file` is named in errors.
+    /// Parses the text of a rig in the schema of this program; `file` is named in errors.
     pub fn from_yaml(text: &str, file: &Path) -> Result<Self, LogError> {
         from_document(&read::parse_yaml(text, file)?, file, &NoFacts)
     }
@@ -28,14 +28,14 @@ impl Rig {
     }
 
     /// The rig to use with a log: the file named by the user, else the one beside the log, else the one attached to it.
-    /// What it leaves open (intrinsics, image rates) comes from the log.
+    /// Intrinsics and image rates that it does not contain are taken from the log.
     pub fn for_log(log: &FlightLog, explicit: Option<&Path>) -> Result<Self, LogError> {
         let beside = log.path().with_extension("rig.yaml");
         find(log, explicit, &beside, ".rig.yaml")?
             .ok_or_else(|| LogError::NoRig { beside, path: log.path().to_owned() })
     }
 
-    /// The rig with the true values, found in the same way (`NAME.truth.yaml`, or attached); `None` when there is none.
+    /// The ground-truth rig, found in the same way (`NAME.truth.yaml`, or attached); `None` when there is none.
     pub fn truth_for_log(log: &FlightLog, explicit: Option<&Path>) -> Result<Option<Self>, LogError> {
         find(log, explicit, &log.path().with_extension("truth.yaml"), ".truth.yaml")
     }
@@ -93,7 +93,7 @@ fn from_document(document: &Value, file: &Path, facts: &dyn CameraFacts) -> Resu
 
 impl CameraFacts for FlightLog {
     fn camera_model(&self, image_topic: &str) -> Result<CameraModel, String> {
-        // By convention `camera_info` lies beside the images: `/ns/image_raw/compressed` → `/ns/camera_info`.
+        // By convention `camera_info` is published beside the images: `/ns/image_raw/compressed` → `/ns/camera_info`.
         let mut parent = image_topic;
         let mut tried = Vec::new();
         while let Some((upper, _)) = parent.rsplit_once('/') {
@@ -114,12 +114,12 @@ impl CameraFacts for FlightLog {
     }
 }
 
-/// The lens of a `CameraInfo`.
+/// Camera model of a `CameraInfo`.
 fn model_of(info: &CameraInfoMessage) -> Result<CameraModel, String> {
     let k = &info.intrinsic_matrix;
     let intrinsics_px = [k[0], k[4], k[2], k[5]];
     if !(intrinsics_px.iter().all(|value| value.is_finite()) && k[0] > 0.0 && k[4] > 0.0) {
-        return Err("its matrix K is not set".into());
+        return Err("matrix K is not set".into());
     }
     if info.width == 0 || info.height == 0 {
         return Err("its width and height are not set".into());
@@ -128,7 +128,7 @@ fn model_of(info: &CameraInfoMessage) -> Result<CameraModel, String> {
     let coefficients = info.distortion.as_slice();
     let (name, coefficients) = match (info.distortion_model.as_str(), coefficients) {
         (_, coefficients) if coefficients.iter().all(|value| *value == 0.0) => ("none", &[][..]),
-        // ROS writes a third radial coefficient, which our model has not.
+        // ROS writes a third radial coefficient, which the radtan model does not have.
         ("plumb_bob" | "radtan", [_, _, _, _, third]) if *third == 0.0 => ("radtan", &coefficients[..4]),
         ("plumb_bob" | "radtan", [_, _, _, _]) => ("radtan", coefficients),
         ("equidistant", [_, _, _, _]) => ("equidistant", coefficients),

@@ -9,7 +9,7 @@ use super::fields::Field;
 use super::read::{self, CameraFacts};
 use crate::sensors::{CameraMount, Rig};
 
-/// Names that Kalibr and its users give to the IMU's file.
+/// Usual file names of Kalibr's IMU file.
 const IMU_FILES: [&str; 3] = ["imu.yaml", "imu0.yaml", "imu-calib.yaml"];
 
 /// Whether a document is Kalibr's camera chain.
@@ -20,7 +20,7 @@ pub(super) fn is_camera_chain(document: &Value) -> bool {
             .is_some_and(|camera| camera.get("mount").is_none() && camera.get("camera_model").is_some())
 }
 
-/// Where the IMU of a camera chain may be written, most likely first: `imu-RUN.yaml` beside `camchain-imucam-RUN.yaml`,
+/// Candidate files for the IMU of a camera chain, most likely first: `imu-RUN.yaml` beside `camchain-imucam-RUN.yaml`,
 /// then the plain names.
 pub(super) fn imu_files(camera_chain: &Path) -> Vec<PathBuf> {
     let name = camera_chain.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();

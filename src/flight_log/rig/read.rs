@@ -10,23 +10,23 @@ use crate::sensors::{CameraMount, CameraRig, ChainPrior, GimbalRig, ImuNoise, Im
 
 /// The version of the schema that is read and written.
 const RIG_VERSION: u64 = 1;
-/// Gravity where a rig of Kalibr's does not say.
+/// Gravity for Kalibr's files, which do not contain it, in m/s².
 pub(super) const STANDARD_GRAVITY_M_PER_S2: f64 = 9.81;
 
-/// What a log can add to a rig that leaves it open, by image topic.
+/// Values of a log for a rig that does not contain them, by image topic.
 pub(crate) trait CameraFacts {
-    /// The lens from the camera's `CameraInfo`, or why there is none.
+    /// Camera model from `CameraInfo`, or why there is none.
     fn camera_model(&self, image_topic: &str) -> Result<CameraModel, String>;
     /// Mean rate of the images.
     fn rate_hz(&self, image_topic: &str) -> Option<f64>;
 }
 
-/// No log at hand.
+/// Without a log.
 pub(super) struct NoFacts;
 
 impl CameraFacts for NoFacts {
     fn camera_model(&self, _image_topic: &str) -> Result<CameraModel, String> {
-        Err("no log is at hand to take them from".into())
+        Err("there is no log to take them from".into())
     }
 
     fn rate_hz(&self, _image_topic: &str) -> Option<f64> {
@@ -43,7 +43,7 @@ pub(super) fn parse_yaml(text: &str, file: &Path) -> Result<Value, LogError> {
     })
 }
 
-/// Reads a rig in our own schema.
+/// Reads a rig in the schema of this program.
 pub(super) fn read_rig(root: &Field<'_>, default_name: &str, facts: &dyn CameraFacts) -> Result<Rig, LogError> {
     let version = root.field("rig_version").number("the number 1")?;
     if version.total_cmp(&(RIG_VERSION as f64)).is_ne() {
@@ -80,7 +80,7 @@ pub(super) fn camera_keys(root: &Field<'_>) -> Result<Vec<String>, LogError> {
     Ok(keys.into_iter().map(str::to_owned).collect())
 }
 
-/// The inertial sensor; Kalibr's `imu.yaml` has the same fields without a frame name.
+/// The IMU; Kalibr's `imu.yaml` has the same fields without a frame name.
 pub(super) fn read_imu(imu: &Field<'_>, default_topic: Option<&str>) -> Result<ImuRig, LogError> {
     if !imu.is_present() {
         return Err(imu.unexpected("the IMU with its topic and noise densities"));
@@ -113,7 +113,7 @@ fn read_camera(camera: &Field<'_>, key: &str, facts: &dyn CameraFacts) -> Result
     read_camera_as(camera, key, mount, facts)
 }
 
-/// The fields that our rigs and Kalibr's share.
+/// The fields common to rigs of this program and Kalibr's files.
 pub(super) fn read_camera_as(
     camera: &Field<'_>,
     key: &str,
@@ -169,13 +169,13 @@ fn read_camera_model(camera: &Field<'_>) -> Result<CameraModel, LogError> {
 const CAMERA_MODELS: &str = "pinhole, omni, eucm or ds";
 const DISTORTION_MODELS: &str = "none, radtan, equidistant or fov";
 
-/// A camera's complaint with the field of the rig that it is about.
+/// An error of a camera model with the field of the rig that it concerns.
 fn name_the_field(camera: &Field<'_>, error: &CameraError) -> LogError {
     match error {
         CameraError::UnknownModel { .. } => camera.field("camera_model").unexpected(CAMERA_MODELS),
         CameraError::UnknownDistortion { .. } => camera.field("distortion_model").unexpected(DISTORTION_MODELS),
         CameraError::Combination { model, distortion, expected } => {
-            let problem = format!("'{distortion}' does not go with camera_model '{model}', expected {expected}");
+            let problem = format!("'{distortion}' is not supported with camera_model '{model}', expected {expected}");
             camera.field("distortion_model").error(problem)
         }
         CameraError::Count { field, found, expected, meaning, .. } => {
@@ -233,7 +233,7 @@ fn read_gimbal(gimbal: &Field<'_>) -> Result<GimbalRig, LogError> {
             None => [-std::f64::consts::PI, std::f64::consts::PI],
         };
         if limits[0] >= limits[1] {
-            let problem = format!("lower stop {} not below upper stop {}", limits[0], limits[1]);
+            let problem = format!("lower limit {} not below upper limit {}", limits[0], limits[1]);
             return Err(link.field("limits").error(problem));
         }
         joints.push(Joint { name, limits_rad: (limits[0], limits[1]) });

@@ -9,7 +9,7 @@ fn parse(text: &str) -> Result<Rig, String> {
 }
 
 #[test]
-fn a_rig_survives_being_written() {
+fn a_rig_reads_back_as_written() {
     let rig = parse(RIG).unwrap();
     let yaml = rig.to_yaml();
     let again = parse(&yaml).unwrap();
@@ -50,7 +50,7 @@ fn check_same(a: &Rig, b: &Rig) {
 }
 
 #[test]
-fn a_wrong_field_is_named_with_what_it_holds() {
+fn a_wrong_field_is_named_with_its_value() {
     let cases = [
         (
             "intrinsics: [50.0, 50.0, 31.5, 23.5]",
@@ -103,7 +103,7 @@ fn a_wrong_field_is_named_with_what_it_holds() {
         (
             "limits: [-3.14, 3.14]",
             "limits: [3.14, -3.14]",
-            "gimbal.links[0].limits: lower stop 3.14 not below upper stop -3.14",
+            "gimbal.links[0].limits: lower limit 3.14 not below upper limit -3.14",
         ),
         ("alpha: -1.55, ", "", "gimbal.links[0].alpha: missing, expected an angle in rad"),
         ("cam0:", "camera:", "cam0: missing, expected at least one camera"),

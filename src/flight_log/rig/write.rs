@@ -4,8 +4,8 @@ use crate::geometry::RigidTransform;
 use crate::sensors::{CameraMount, CameraRig, GimbalRig, Rig};
 
 impl Rig {
-    /// The rig as a YAML file in the classical form. Numbers are written so that they read back exactly; rotation
-    /// matrices come back to within rounding.
+    /// The rig as a YAML file, its chain in the classical parameterization. Numbers are written so that they read back
+    /// exactly; rotation matrices read back to within rounding.
     pub fn to_yaml(&self) -> String {
         let mut out = String::from("# T_a_b maps points from b to a; metres, radians, seconds.\n");
         line(&mut out, 0, "rig_version", "1");
@@ -95,8 +95,8 @@ fn line(out: &mut String, depth: usize, key: &str, value: &str) {
     let _infallible = writeln!(out, "{:width$}{key}:{space}{value}", "", width = 2 * depth);
 }
 
-/// The shortest decimal that reads back as the same number, in a form that YAML 1.1 readers (`PyYAML`) take for a number
-/// too: they want a point before an exponent, and a sign in it.
+/// The shortest decimal that reads back as the same number, in the notation of YAML 1.1 (`PyYAML`), which requires a
+/// point before an exponent, and a sign in it.
 fn number(value: f64) -> String {
     let written = format!("{value:?}");
     let Some((mantissa, exponent)) = written.split_once('e') else { return written };
@@ -109,7 +109,7 @@ fn numbers(values: &[f64]) -> String {
     format!("[{}]", values.iter().map(|value| number(*value)).collect::<Vec<_>>().join(", "))
 }
 
-/// A plain scalar where YAML takes it for a text, else a quoted one.
+/// A plain scalar where YAML reads it as a string, else a quoted one.
 fn text(value: &str) -> String {
     let plain = value.starts_with(|first: char| first.is_ascii_alphabetic() || first == '/')
         && value.chars().all(|letter| letter.is_ascii_alphanumeric() || "/_-.".contains(letter))

@@ -1,4 +1,4 @@
-//! One joint's angle at an instant, from encoder readings around it, and how well it is known.
+//! One joint's angle at an instant, from encoder readings around it, and its variance.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -10,19 +10,19 @@ pub(crate) type Reading = (f64, f64);
 pub(crate) struct FittedAngle {
     pub(crate) angle_rad: f64,
     pub(crate) rate_rad_per_s: f64,
-    /// From white noise on the readings, and from what the motion between them may have done.
+    /// From white noise on the readings and the prior on the acceleration between them.
     pub(crate) variance_rad2: f64,
 }
 
-/// How strongly a gimbal accelerates its joints, as a standard deviation.
+/// Standard deviation of a joint's acceleration.
 ///
-/// A stabilized joint turns back what the vehicle turns: an agile multirotor reaches 20 rad/s² and has about half of that
-/// at ordinary times. Over ±25 ms this bends the angle by 0.06° on average, so that readings noisier than about 1° are in
-/// effect fitted with a line (least variance), those finer than about 0.1° with a parabola (least bias).
+/// A stabilized joint compensates the vehicle's rotation: an agile multirotor reaches 20 rad/s² and usually has about half
+/// of that. Over ±25 ms this curves the angle by 0.06° on average, so that readings noisier than about 1° are in effect
+/// fitted with a line (least variance), those finer than about 0.1° with a parabola (least bias).
 const ACCELERATION_RAD_PER_S2: f64 = 10.0;
 
-/// The parabola through the readings whose bend is expected to be small: least squares with white noise of the given
-/// variance on every reading and a prior on the acceleration, evaluated at the instant.
+/// A parabola through the readings with a prior on its curvature: least squares with white noise of the given variance on
+/// every reading and a prior of [`ACCELERATION_RAD_PER_S2`] on the acceleration, evaluated at the instant.
 ///
 /// It is the linear estimate with the least mean square error for such a motion, exact for a constant rate.
 /// `None` for fewer than two instants.
@@ -38,7 +38,7 @@ pub(crate) fn fit(readings: &[Reading], white_variance_rad2: f64) -> Option<Fitt
     })
 }
 
-/// Squared distances from the plain parabola through the readings, summed, and the degrees of freedom left for them.
+/// Sum of squared residuals of the unregularized parabola through the readings in rad², and its degrees of freedom.
 pub(crate) fn scatter(readings: &[Reading]) -> Option<(f64, usize)> {
     let freedom = readings.len().checked_sub(3).filter(|freedom| *freedom > 0)?;
     let parabola = Parabola::fit(readings, 1.0, None)?;
@@ -54,8 +54,8 @@ struct Parabola {
 }
 
 impl Parabola {
-    /// `bend_sigma` is the prior standard deviation of the second-order coefficient, in rad/s².
-    fn fit(readings: &[Reading], variance: f64, bend_sigma: Option<f64>) -> Option<Self> {
+    /// `curvature_sigma` is the prior standard deviation of the second-order coefficient, in rad/s².
+    fn fit(readings: &[Reading], variance: f64, curvature_sigma: Option<f64>) -> Option<Self> {
         let span_s = readings.iter().map(|(time_s, _)| time_s.abs()).fold(0.0, f64::max);
         if span_s <= 0.0 || variance <= 0.0 {
             return None;
@@ -68,7 +68,7 @@ impl Parabola {
             normal += row * row.transpose();
             right += row * *angle_rad;
         }
-        if let Some(sigma) = bend_sigma {
+        if let Some(sigma) = curvature_sigma {
             normal[(2, 2)] += variance / (sigma * span_s * span_s).powi(2);
         }
         let inverse = normal.cholesky()?.inverse();

@@ -1,8 +1,8 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
+use super::super::image_decoding::{BitDepth, decode_image};
 use super::super::messages::{self, MessageKind};
-use super::super::picture::{BitDepth, decode_picture};
 use super::super::{FlightLog, LogError, LogWarning, SensorFrame};
 use super::joint_angles::JointAngleStream;
 use super::joint_topic::JointSamples;
@@ -10,15 +10,15 @@ use super::ordered::{Decoder, MessageSource, OrderedSamples, ReadContext, Refusa
 use crate::geometry::{RigidTransform, ns_from_seconds, seconds_from_ns};
 use crate::sensors::{GrayImage, ImuSample, PoseSample, Rig};
 
-/// How far back the first frame's IMU samples go.
+/// Length of the IMU samples before the first frame.
 const FIRST_FRAME_IMU_NS: i64 = 2_000_000_000;
-/// Log times may lag behind header stamps by this much; reading begins so much earlier.
+/// Largest delay of log times after header stamps; reading starts that much earlier.
 const SEEK_MARGIN_NS: i64 = 1_000_000_000;
-/// A true pose further than this from the image's stamp does not count.
+/// Largest distance of a ground-truth pose from the image's stamp.
 const NEAREST_NS: i64 = 100_000_000;
-/// Longer pauses between IMU samples, in periods, are told.
+/// Longer gaps between IMU samples, in periods, are reported.
 const IMU_GAP_PERIODS: f64 = 3.5;
-/// Longer pauses between images, in periods, are told.
+/// Longer gaps between images, in periods, are reported.
 const IMAGE_GAP_PERIODS: f64 = 1.75;
 
 /// An image message, not decoded yet.
@@ -28,7 +28,7 @@ struct PendingImage {
     message: Vec<u8>,
 }
 
-/// A topic whose samples are looked up by time: those before the stamp, and the first one after it.
+/// Samples of a topic around a time: those before it, and the first one after it.
 struct Lookup<T> {
     samples: OrderedSamples<T>,
     before: Option<(i64, T)>,
@@ -54,7 +54,7 @@ impl<T> Lookup<T> {
     }
 }
 
-/// Makes the frames of one camera, one after another.
+/// Assembles the frames of one camera, in order.
 pub(super) struct FrameSource {
     context: ReadContext,
     camera: CameraStream,
@@ -70,16 +70,16 @@ pub(super) struct FrameSource {
     previous_end: Option<ImuSample>,
     start_ns: i64,
     end_ns: i64,
-    /// Warnings of the log itself that are still to be told.
+    /// Warnings of the log itself that are not reported yet.
     log_warnings: VecDeque<LogWarning>,
     /// Images before the first IMU sample.
     skipped: usize,
 }
 
-/// The camera's topic and what is expected of it.
+/// A camera's topic and its expected rate and size.
 struct CameraStream {
     images: OrderedSamples<PendingImage>,
-    /// How many images the log has.
+    /// Number of images in the log.
     count: usize,
     topic: String,
     kind: MessageKind,
@@ -115,7 +115,7 @@ impl FrameSource {
         let from_ns = start_ns.saturating_sub(FIRST_FRAME_IMU_NS + SEEK_MARGIN_NS + shift_ns.abs());
         let half_interval_ns = gap_ns(0.5, camera.rate_hz, images.rate_hz);
         let joints = joint_angles(log, rig, from_ns, half_interval_ns)?;
-        let truth = truth_samples(log, rig, from_ns, &mut context).map(Lookup::new);
+        let truth = ground_truth_samples(log, rig, from_ns, &mut context).map(Lookup::new);
         let log_warnings = log.warnings().iter().cloned().collect();
         let stream = CameraStream {
             images: OrderedSamples::new(log, &camera.topic, from_ns, true, image_decoder(log.epoch_ns())),
@@ -147,7 +147,7 @@ impl FrameSource {
         })
     }
 
-    /// The next frame, `None` at the end of the log or of the time asked for.
+    /// The next frame, `None` at the end of the log or of the requested duration.
     pub(super) fn next_frame(&mut self) -> Option<SensorFrame> {
         loop {
             let (stamp_ns, pending) = self.camera.images.next(&mut self.context)?;
@@ -159,7 +159,7 @@ impl FrameSource {
             let imu_stamp_ns = stamp_ns + self.camera.shift_ns;
             self.read_imu_until(imu_stamp_ns);
             let Some(last) = self.samples.back().filter(|last| last.stamp_ns >= imu_stamp_ns).copied() else {
-                self.tell_end_of_imu(stamp_ns, pending.number);
+                self.warn_of_imu_end(stamp_ns, pending.number);
                 return None;
             };
             let first_known = self.samples.front().map_or(last.stamp_ns, |first| first.stamp_ns);
@@ -172,11 +172,11 @@ impl FrameSource {
                 continue;
             }
             let Some(image) = self.camera.decode(&mut self.context, stamp_ns, &pending) else { continue };
-            self.tell_skipped();
+            self.warn_of_skipped_images();
             let imu = self.take_imu(imu_stamp_ns);
             let context = &mut self.context;
             let joint_angles = self.joints.as_mut().and_then(|joints| joints.at(context, imu_stamp_ns, previous_ns));
-            let truth = self.truth_at(imu_stamp_ns);
+            let truth = self.ground_truth_at(imu_stamp_ns);
             while self.log_warnings.front().is_some_and(|warning| warning.stamp_ns <= stamp_ns) {
                 self.context.warnings.extend(self.log_warnings.pop_front());
             }
@@ -195,7 +195,7 @@ impl FrameSource {
 
     /// Warnings after the last frame.
     pub(super) fn finish(&mut self) -> Vec<LogWarning> {
-        self.tell_skipped();
+        self.warn_of_skipped_images();
         self.imu.finish(&mut self.context);
         if self.end_ns == i64::MAX {
             self.context.warnings.extend(self.log_warnings.drain(..));
@@ -213,7 +213,7 @@ impl FrameSource {
                 && sample.stamp_ns - last.stamp_ns > self.imu_gap_ns
             {
                 let message = format!(
-                    "{}: no samples for {:.3} s from {:.3} s on; the IMU is interpolated over the gap",
+                    "{}: no samples for {:.3} s from {:.3} s on; IMU samples are interpolated over the gap",
                     self.imu_topic,
                     seconds_from_ns(sample.stamp_ns - last.stamp_ns),
                     seconds_from_ns(last.stamp_ns)
@@ -224,7 +224,7 @@ impl FrameSource {
         }
     }
 
-    /// Drops samples that no later frame needs, but keeps the last one before the time.
+    /// Drops samples that no later frame needs, except the last one before the time.
     fn forget_samples_before(&mut self, stamp_ns: i64) {
         while self.samples.get(1).is_some_and(|second| second.stamp_ns <= stamp_ns) {
             self.samples.pop_front();
@@ -233,11 +233,11 @@ impl FrameSource {
 
     /// The samples from the previous frame's end to `end_ns`, both ends interpolated.
     fn take_imu(&mut self, end_ns: i64) -> Vec<ImuSample> {
-        let begin_ns = self.previous_end.map_or(end_ns - FIRST_FRAME_IMU_NS, |previous| previous.stamp_ns);
+        let start_ns = self.previous_end.map_or(end_ns - FIRST_FRAME_IMU_NS, |previous| previous.stamp_ns);
         let mut imu: Vec<ImuSample> = self.previous_end.into_iter().collect();
-        let begins_with_sample = imu.is_empty();
+        let includes_start = imu.is_empty();
         let inside =
-            |stamp_ns: i64| (stamp_ns > begin_ns || (begins_with_sample && stamp_ns == begin_ns)) && stamp_ns < end_ns;
+            |stamp_ns: i64| (stamp_ns > start_ns || (includes_start && stamp_ns == start_ns)) && stamp_ns < end_ns;
         imu.extend(self.samples.iter().filter(|sample| inside(sample.stamp_ns)));
         let after = self.samples.iter().position(|sample| sample.stamp_ns >= end_ns);
         if let Some(after) = after {
@@ -252,7 +252,7 @@ impl FrameSource {
         imu
     }
 
-    fn truth_at(&mut self, stamp_ns: i64) -> Option<RigidTransform> {
+    fn ground_truth_at(&mut self, stamp_ns: i64) -> Option<RigidTransform> {
         let [before, after] = self.truth.as_mut()?.around(&mut self.context, stamp_ns);
         let (from_ns, from) = before?;
         if *from_ns == stamp_ns {
@@ -262,10 +262,10 @@ impl FrameSource {
         if (stamp_ns - from_ns).min(to_ns - stamp_ns) > NEAREST_NS {
             return None;
         }
-        Some(interpolate_pose(&from.world_from_imu, &to.world_from_imu, share_of(*from_ns, *to_ns, stamp_ns)))
+        Some(interpolate_pose(&from.world_from_imu, &to.world_from_imu, fraction_at(*from_ns, *to_ns, stamp_ns)))
     }
 
-    fn tell_skipped(&mut self) {
+    fn warn_of_skipped_images(&mut self) {
         let count = std::mem::take(&mut self.skipped);
         if count > 0 {
             let message = format!(
@@ -277,14 +277,14 @@ impl FrameSource {
         }
     }
 
-    fn tell_end_of_imu(&mut self, stamp_ns: i64, number: usize) {
+    fn warn_of_imu_end(&mut self, stamp_ns: i64, number: usize) {
         let left = self.camera.count.saturating_sub(number);
         let Some(last) = self.samples.back() else {
             let message = format!("{}: no IMU sample for the images of {}", self.imu_topic, self.camera.key);
             self.context.warn(stamp_ns, message);
             return;
         };
-        // The streams of a log seldom end together; the last image or two may have no IMU sample after them.
+        // The topics of a log seldom end together; the last one or two images may have no IMU sample after them.
         if left > 2 {
             let message = format!(
                 "{}: the IMU ends at {:.3} s; the last {left} images of {} are not used",
@@ -313,18 +313,18 @@ impl CameraStream {
         self.previous_stamp_ns = Some(stamp_ns);
     }
 
-    /// The image, or a warning why it is left out.
+    /// The image, or `None` with a warning why it is skipped.
     fn decode(&self, context: &mut ReadContext, stamp_ns: i64, pending: &PendingImage) -> Option<GrayImage> {
-        let problem = match decode_picture(self.kind, &pending.message, self.depth) {
+        let problem = match decode_image(self.kind, &pending.message, self.depth) {
             Ok(image) if [image.width, image.height] == self.resolution_px => return Some(image),
             Ok(image) => format!(
-                "it has {}×{} pixels, the rig says {}×{} for {}",
+                "it has {}×{} pixels, {}×{} in the rig for {}",
                 image.width, image.height, self.resolution_px[0], self.resolution_px[1], self.key
             ),
             Err(problem) => problem,
         };
         let message = format!(
-            "{}: image {} at {:.3} s left out: {problem}",
+            "{}: image {} at {:.3} s skipped: {problem}",
             self.topic,
             pending.number,
             seconds_from_ns(stamp_ns)
@@ -334,32 +334,32 @@ impl CameraStream {
     }
 }
 
-/// The longest pause that is not told: so many periods of the slower of the rig's rate and the log's mean rate.
+/// The longest gap that is not reported: so many periods of the slower of the rig's rate and the log's mean rate.
 fn gap_ns(periods: f64, rig_rate_hz: f64, log_rate_hz: f64) -> i64 {
     let slower = [rig_rate_hz, log_rate_hz].into_iter().filter(|rate| *rate > 0.0).fold(f64::INFINITY, f64::min);
     if slower.is_finite() { ns_from_seconds(periods / slower) } else { i64::MAX }
 }
 
-fn share_of(from_ns: i64, to_ns: i64, stamp_ns: i64) -> f64 {
+fn fraction_at(from_ns: i64, to_ns: i64, stamp_ns: i64) -> f64 {
     if to_ns > from_ns { (stamp_ns - from_ns) as f64 / (to_ns - from_ns) as f64 } else { 0.0 }
 }
 
 fn interpolate_imu(from: &ImuSample, to: &ImuSample, stamp_ns: i64) -> ImuSample {
-    let share = share_of(from.stamp_ns, to.stamp_ns, stamp_ns);
-    if share >= 1.0 {
+    let fraction = fraction_at(from.stamp_ns, to.stamp_ns, stamp_ns);
+    if fraction >= 1.0 {
         return ImuSample { stamp_ns, ..*to };
     }
     ImuSample {
         stamp_ns,
-        angular_velocity_rad_per_s: from.angular_velocity_rad_per_s.lerp(&to.angular_velocity_rad_per_s, share),
-        specific_force_m_per_s2: from.specific_force_m_per_s2.lerp(&to.specific_force_m_per_s2, share),
+        angular_velocity_rad_per_s: from.angular_velocity_rad_per_s.lerp(&to.angular_velocity_rad_per_s, fraction),
+        specific_force_m_per_s2: from.specific_force_m_per_s2.lerp(&to.specific_force_m_per_s2, fraction),
     }
 }
 
-fn interpolate_pose(from: &RigidTransform, to: &RigidTransform, share: f64) -> RigidTransform {
-    // A half turn between two samples has no shortest way; then the earlier one stays.
-    let rotation = from.rotation.try_slerp(&to.rotation, share, 1e-9).unwrap_or(from.rotation);
-    RigidTransform::new(rotation, from.translation_m.lerp(&to.translation_m, share))
+fn interpolate_pose(from: &RigidTransform, to: &RigidTransform, fraction: f64) -> RigidTransform {
+    // Two samples 180° apart have no shortest rotation between them; the earlier one is kept.
+    let rotation = from.rotation.try_slerp(&to.rotation, fraction, 1e-9).unwrap_or(from.rotation);
+    RigidTransform::new(rotation, from.translation_m.lerp(&to.translation_m, fraction))
 }
 
 fn image_decoder(epoch_ns: i64) -> Decoder<PendingImage> {
@@ -380,7 +380,7 @@ fn imu_decoder(epoch_ns: i64) -> Decoder<ImuSample> {
                 imu.angular_velocity_rad_per_s.as_slice(),
                 imu.specific_force_m_per_s2.as_slice()
             );
-            return Err(Refusal { reason: "numbers that are not finite", detail });
+            return Err(Refusal { reason: "values are not finite", detail });
         }
         let sample = ImuSample {
             stamp_ns: imu.stamp_ns.saturating_sub(epoch_ns),
@@ -404,8 +404,8 @@ fn joint_angles(
     Ok(Some(JointAngleStream::new(samples, sigma_rad, half_interval_ns)))
 }
 
-/// The true poses, `None` when the rig names none or the log has none.
-fn truth_samples(
+/// Ground-truth poses `world_from_imu`, `None` when the rig names no topic or the log has none.
+fn ground_truth_samples(
     log: &FlightLog,
     rig: &Rig,
     from_ns: i64,
@@ -423,7 +423,7 @@ fn truth_samples(
     let epoch_ns = log.epoch_ns();
     let decode: Decoder<PoseSample> = Box::new(move |source: MessageSource<'_>| {
         let message = messages::read_pose(kind, source.data).map_err(|error| Refusal::not_decodable(&error))?;
-        let refusal = || Refusal { reason: "it is no pose", detail: "not finite, or a zero quaternion".into() };
+        let refusal = || Refusal { reason: "not a pose", detail: "not finite, or a zero quaternion".into() };
         let world_from_imu = message.pose.ok_or_else(refusal)?;
         let sample = PoseSample { stamp_ns: message.stamp_ns.saturating_sub(epoch_ns), world_from_imu };
         Ok((message.stamp_ns, sample))

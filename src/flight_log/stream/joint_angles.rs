@@ -8,19 +8,19 @@ use super::ordered::ReadContext;
 use crate::geometry::{seconds_from_ns, wrap_angle};
 use crate::sensors::{JointAngles, JointSample};
 
-/// A reading further than this from the stamp tells nothing about the angle there.
+/// Largest distance of a reading from the stamp at which it is used.
 const NEAREST_NS: i64 = 100_000_000;
-/// A batch reaches no further than this to either side: beyond, a stabilized joint is no parabola any more.
+/// Largest half length of a batch; over longer spans a stabilized joint does not follow a parabola.
 const LONGEST_HALF_BATCH_NS: i64 = 25_000_000;
-/// The rate is taken from so many times the batch to either side, neighbours' readings among them: its noise falls with the
-/// third power of the root of that length, and noise on a rate looks like a smaller offset of the clocks.
+/// The rate is fitted to this many times the batch on either side, neighbouring batches included: its noise falls with the
+/// length to the power of −3/2, and noise on a rate biases an estimated time offset towards zero.
 const RATE_BATCHES: i64 = 2;
 /// Fewest readings of a batch: with two there is nothing to average.
 const LEAST_BATCH: usize = 3;
-/// How fast a joint may be turning where a single reading cannot tell, as a standard deviation.
+/// Standard deviation of a joint's rate where a single reading does not constrain it.
 const UNKNOWN_RATE_RAD_PER_S: f64 = 1.0;
 
-/// Encoder readings of a log, looked up image by image.
+/// Joint angles of a log at the stamps of images.
 pub(super) struct JointAngleStream {
     samples: JointSamples,
     ended: bool,
@@ -33,15 +33,15 @@ impl JointAngleStream {
         Self { samples, ended: false, average: EncoderAverage::new(sigma_rad, half_interval_ns) }
     }
 
-    /// The angles at a stamp, `None` when no reading is near; stamps must not decrease, and `previous_ns` is the image
-    /// before.
+    /// The angles in radians at a stamp, `None` without a reading near it; stamps must not decrease, and `previous_ns` is
+    /// the stamp of the previous image.
     pub(super) fn at(
         &mut self,
         context: &mut ReadContext,
         stamp_ns: i64,
         previous_ns: Option<i64>,
     ) -> Option<JointAngles> {
-        while !self.ended && self.average.wants_readings(stamp_ns) {
+        while !self.ended && self.average.needs_readings(stamp_ns) {
             match self.samples.next(context) {
                 Some(sample) => self.average.push(sample),
                 None => self.ended = true,
@@ -51,14 +51,14 @@ impl JointAngleStream {
     }
 }
 
-/// Makes one angle per image and joint from the readings that come in between.
+/// Estimates one angle per image and joint from the encoder readings between images.
 ///
-/// The readings of half an image interval to either side of a stamp give the angle there by a local fit. Batches of
-/// consecutive images share no reading, so that their errors are independent. Only the part of the rig's variance that is
-/// seen to scatter from reading to reading is averaged down; the rest (a slow error, a quantization) stays as it is.
+/// A parabola is fitted to the readings within half an image interval of a stamp. Batches of consecutive images share no
+/// reading, so that their errors are independent. Only the part of the rig's variance that is measured as white noise is
+/// reduced by averaging; the remainder (slow errors, quantization) is kept.
 #[derive(Debug)]
 pub(super) struct EncoderAverage {
-    /// Those near the last stamp, and the first one behind its batch.
+    /// Readings near the last stamp, and the first one after its batch.
     readings: VecDeque<JointSample>,
     noise: WhiteNoise,
     sigma_rad: f64,
@@ -76,7 +76,7 @@ impl EncoderAverage {
     }
 
     /// Whether readings that belong to a stamp may still be missing.
-    pub(super) fn wants_readings(&self, stamp_ns: i64) -> bool {
+    pub(super) fn needs_readings(&self, stamp_ns: i64) -> bool {
         let end_ns = stamp_ns.saturating_add(RATE_BATCHES * self.half_batch_ns);
         self.readings.back().is_none_or(|last| last.stamp_ns <= end_ns)
     }
@@ -87,16 +87,16 @@ impl EncoderAverage {
         self.readings.push_back(sample);
     }
 
-    /// The angles at a stamp, and what they are worth.
+    /// The angles in radians at a stamp, with their standard deviations and rates.
     pub(super) fn at(&mut self, stamp_ns: i64, previous_ns: Option<i64>) -> Option<JointAngles> {
         let end_ns = stamp_ns.saturating_add(self.half_batch_ns);
         let reach_ns = RATE_BATCHES * self.half_batch_ns;
         self.forget_before(stamp_ns.saturating_sub(reach_ns));
-        let begin_ns = previous_ns
+        let start_ns = previous_ns
             .map_or(i64::MIN, |previous| previous.saturating_add(self.half_batch_ns))
             .max(stamp_ns.saturating_sub(self.half_batch_ns));
         let batch: Vec<&JointSample> =
-            self.readings.iter().filter(|sample| (begin_ns + 1..=end_ns).contains(&sample.stamp_ns)).collect();
+            self.readings.iter().filter(|sample| (start_ns + 1..=end_ns).contains(&sample.stamp_ns)).collect();
         let around: Vec<&JointSample> =
             self.readings.iter().filter(|sample| (sample.stamp_ns - stamp_ns).abs() <= reach_ns).collect();
         let after = self.readings.iter().position(|sample| sample.stamp_ns > stamp_ns).unwrap_or(self.readings.len());
@@ -117,7 +117,7 @@ impl EncoderAverage {
                 let variance = fitted.variance_rad2 + lasting;
                 (variance < given).then_some((fitted.angle_rad, variance, lasting))
             });
-            // Two readings that the neighbouring images may use as well: nothing is averaged.
+            // Two readings that neighbouring images may use as well: interpolated without averaging.
             let interpolated = || {
                 let fitted = angle_fit::fit(&near(&pair), given)?;
                 let apart_ns = (pair[1].stamp_ns - stamp_ns).max(stamp_ns - pair[0].stamp_ns);
@@ -137,7 +137,7 @@ impl EncoderAverage {
         Some(JointAngles { angles_rad, sigmas_rad, lasting_sigmas_rad, rates_rad_per_s })
     }
 
-    /// Forgets readings that no later stamp needs, but keeps the last one before the time.
+    /// Drops readings that no later stamp needs, except the last one before the time.
     fn forget_before(&mut self, time_ns: i64) {
         while self.readings.get(1).is_some_and(|second| second.stamp_ns <= time_ns) {
             self.readings.pop_front();
@@ -145,7 +145,7 @@ impl EncoderAverage {
     }
 }
 
-/// One joint's readings against a stamp, brought to the turn of `around_rad`.
+/// One joint's readings relative to a stamp, unwrapped around `around_rad`.
 fn readings_of(samples: &[&JointSample], joint: usize, around_rad: f64, stamp_ns: i64) -> Vec<Reading> {
     samples
         .iter()
@@ -164,21 +164,21 @@ struct MeasuredNoise {
 }
 
 impl MeasuredNoise {
-    /// The variance that it may have, two standard deviations of the measurement above it.
+    /// Two standard deviations of the measurement above the measured variance.
     fn upper_bound(&self) -> f64 {
         self.variance * (1.0 + 2.0 * (2.0 / self.freedom as f64).sqrt())
     }
 }
 
-/// Length of the blocks within which the scatter of the readings is measured, and from whose multiples on the log's clock
-/// they begin: what is found must not depend on where a replay starts.
+/// Length of the blocks within which the white noise is measured. They start at multiples of it since the log began: the
+/// result must not depend on where a replay starts.
 const BLOCK_NS: i64 = 50_000_000;
-/// Blocks that are pooled; a replay begins to read further back than that.
+/// Number of blocks that are pooled; a replay starts to read before them.
 const BLOCKS: i64 = 40;
-/// Fewest degrees of freedom from which the noise counts as measured.
+/// Minimum degrees of freedom of a noise measurement.
 const LEAST_FREEDOM: usize = 50;
 
-/// Measures how much the readings of each joint scatter about a smooth motion.
+/// Measures the white noise of each joint's readings about a smooth motion.
 #[derive(Debug, Default)]
 struct WhiteNoise {
     /// The block that is still being filled.
@@ -197,7 +197,7 @@ impl WhiteNoise {
             }
         }
         self.open.push(sample.clone());
-        // One more than is pooled: reading runs ahead of the stamps that are asked for.
+        // One more than is pooled: reading is ahead of the requested stamps.
         while self.blocks.front().is_some_and(|(block, _)| *block < number - 2 * BLOCKS) {
             self.blocks.pop_front();
         }
@@ -214,7 +214,7 @@ impl WhiteNoise {
         self.blocks.push_back((number, (0..first.angles_rad.len()).map(scatter).collect()));
     }
 
-    /// From the blocks before the one of a stamp, `None` while there are too few readings.
+    /// From the blocks before that of a stamp, `None` with too few readings.
     fn at(&self, stamp_ns: i64, joint: usize) -> Option<MeasuredNoise> {
         let number = stamp_ns.div_euclid(BLOCK_NS);
         let (squares, freedom) = self

@@ -6,16 +6,16 @@ use super::super::{FlightLog, LogError};
 use super::ordered::{Decoder, MessageSource, OrderedSamples, ReadContext, Refusal};
 use crate::sensors::{GimbalRig, JointSample};
 
-/// So many messages may pass before every joint of the rig has been named once.
-const MESSAGES_LOOKED_AT: usize = 1000;
+/// Number of messages within which every joint of the rig must be named once.
+const MESSAGES_SEARCHED: usize = 1000;
 
-/// The joints' samples in time order; joints that come in messages of their own are merged by name.
+/// Samples of all joints in time order; joints with messages of their own are merged by name.
 pub(super) struct JointSamples {
     topic: String,
     readings: OrderedSamples<JointReading>,
     merge: JointMerge,
     ended: bool,
-    told_of_repeats: bool,
+    repeats_reported: bool,
 }
 
 impl JointSamples {
@@ -31,7 +31,7 @@ impl JointSamples {
             readings: if together { readings } else { readings.with_equal_stamps() },
             merge: JointMerge::new(joints),
             ended: false,
-            told_of_repeats: false,
+            repeats_reported: false,
         })
     }
 
@@ -49,21 +49,21 @@ impl JointSamples {
                 self.merge.finish();
                 continue;
             };
-            if !self.merge.push(&reading) && !std::mem::replace(&mut self.told_of_repeats, true) {
-                let message = format!("{}: a joint has two readings of one stamp; the first one counts", self.topic);
+            if !self.merge.push(&reading) && !std::mem::replace(&mut self.repeats_reported, true) {
+                let message = format!("{}: a joint has two readings with one stamp; the first one is used", self.topic);
                 context.warn(stamp_ns, message);
             }
         }
     }
 }
 
-/// Whether the messages name all joints at once; refuses a rig with a joint that none of the first ones names.
+/// Whether every message names all joints; an error for a rig with a joint that none of the first messages names.
 fn named_together(log: &FlightLog, topic: &str, names: &[String]) -> Result<bool, LogError> {
     let mut known: Vec<String> = Vec::new();
     let mut together = true;
-    let mut looked_at = 0;
+    let mut searched = 0;
     let complete = log.find_message(topic, |data| {
-        looked_at += 1;
+        searched += 1;
         if let Ok(message) = messages::read_joint_state(data) {
             for name in &message.names {
                 if !known.iter().any(|other| other == name) {
@@ -75,7 +75,7 @@ fn named_together(log: &FlightLog, topic: &str, names: &[String]) -> Result<bool
                 return Some(true);
             }
         }
-        (looked_at >= MESSAGES_LOOKED_AT).then_some(false)
+        (searched >= MESSAGES_SEARCHED).then_some(false)
     });
     let missing = names.iter().position(|name| !known.contains(name));
     match missing.filter(|_| complete != Some(true) && !known.is_empty()) {
@@ -96,7 +96,7 @@ fn reading_decoder(names: Vec<String>, epoch_ns: i64) -> Decoder<JointReading> {
         let angles_rad: Vec<Option<f64>> = names.iter().map(|name| angle_of(&message, name)).collect();
         if let Some(joint) = angles_rad.iter().position(|angle| angle.is_some_and(|angle| !angle.is_finite())) {
             let detail = format!("{}: {}", names[joint], angles_rad[joint].unwrap_or(f64::NAN));
-            return Err(Refusal { reason: "numbers that are not finite", detail });
+            return Err(Refusal { reason: "values are not finite", detail });
         }
         if angles_rad.iter().all(Option::is_none) {
             return Err(Refusal { reason: "it names no joint of the rig", detail: message.names.join(", ") });

@@ -1,4 +1,4 @@
-//! The log as one camera's frames, each with the samples of the other sensors that belong to it.
+//! The frames of one camera, each with the samples of the other sensors that belong to it.
 
 pub(crate) mod angle_fit;
 mod frames;
@@ -19,7 +19,7 @@ use crate::sensors::Rig;
 /// Frames made ahead of the reader; one takes about half a megabyte.
 const FRAMES_AHEAD: usize = 6;
 
-/// What the reading thread hands over.
+/// Messages of the reading thread.
 enum Delivery {
     Frame(Box<SensorFrame>),
     /// The log's end, with the warnings after the last frame.
@@ -28,8 +28,8 @@ enum Delivery {
 
 /// The frames of one camera in the order of their stamps.
 ///
-/// Reads the log chunk by chunk on a thread of its own, a few frames ahead; what comes out does not depend on how fast
-/// it is taken.
+/// Reads the log chunk by chunk on a thread of its own, a few frames ahead; the frames do not depend on how fast they
+/// are taken.
 #[derive(Debug)]
 pub struct FrameStream {
     /// `None` once the end has been reached.
@@ -39,8 +39,8 @@ pub struct FrameStream {
 }
 
 impl FrameStream {
-    /// Begins with the camera's first frame at or after `start_s` (seconds since the log began) and ends `duration_s`
-    /// later, or with the log. Fails when the rig and the log do not fit; a missing ground truth only warns.
+    /// Starts with the camera's first frame at or after `start_s` (seconds since the log began) and ends `duration_s`
+    /// later, or with the log. Fails when the rig does not match the log; a missing ground truth is a warning.
     pub fn new(
         log: Arc<FlightLog>,
         rig: &Rig,
@@ -54,10 +54,10 @@ impl FrameStream {
         let read_ahead = move || {
             while let Some(frame) = source.next_frame() {
                 if sender.send(Delivery::Frame(Box::new(frame))).is_err() {
-                    return; // nobody wants the rest
+                    return; // the receiver was dropped
                 }
             }
-            // A reader that has gone away needs no warnings either.
+            // A dropped receiver needs no warnings either.
             drop(sender.send(Delivery::End(source.finish())));
         };
         let thread = std::thread::Builder::new().name("log-reader".into()).spawn(read_ahead);
@@ -80,7 +80,7 @@ impl FrameStream {
         None
     }
 
-    /// What was wrong with the log after the last frame; complete once `next_frame` has returned `None`.
+    /// Problems of the log after the last frame; complete once `next_frame` has returned `None`.
     pub fn remaining_warnings(&self) -> &[LogWarning] {
         &self.remaining_warnings
     }
@@ -98,7 +98,7 @@ impl Drop for FrameStream {
     fn drop(&mut self) {
         self.receiver = None; // lets the thread's next send fail, so that it ends
         if let Some(thread) = self.thread.take() {
-            // Its panic, if any, has been told as a missing end.
+            // Its panic, if any, has been reported as a missing end.
             drop(thread.join());
         }
     }

@@ -5,17 +5,17 @@ use super::super::container::{BlockCache, MessagePosition, TopicIndex};
 use super::super::{FlightLog, LogWarning};
 use crate::geometry::seconds_from_ns;
 
-/// Messages may come out of order by so much; later ones are dropped.
+/// Messages out of order by up to this are sorted; later ones are dropped.
 const HORIZON_NS: i64 = 100_000_000;
-/// Blocks kept: one for each topic, and one ahead for those whose messages lie in the next block already.
+/// Blocks kept: one for each topic, and one ahead for those whose messages are in the next block already.
 const BLOCKS: usize = 8;
 
-/// What all topics of a stream read from and complain to.
+/// The log and the warnings that all topics of a stream share.
 #[derive(Debug)]
 pub(super) struct ReadContext {
     pub(super) log: Arc<FlightLog>,
     cache: BlockCache,
-    /// Damaged blocks that have been told of.
+    /// Damaged blocks that have been reported.
     reported: BTreeSet<usize>,
     /// Since they were last taken.
     pub(super) warnings: Vec<LogWarning>,
@@ -32,13 +32,13 @@ impl ReadContext {
 
     fn report_block(&mut self, position: MessagePosition, damage: Option<&str>) {
         let block = &self.log.index().blocks[position.block];
-        // A block beyond the file's end was told of when the log was opened.
+        // A block beyond the file's end was reported when the log was opened.
         if !self.reported.insert(position.block) || block.bytes.end > self.log.file().len() {
             return;
         }
-        let (first, last) = (self.log.since_begin(block.log_time_ns.0), self.log.since_begin(block.log_time_ns.1));
+        let (first, last) = (self.log.since_start(block.log_time_ns.0), self.log.since_start(block.log_time_ns.1));
         let message = format!(
-            "damaged chunk at byte {}, from second {:.3} to {:.3}: {}; reading goes on after it",
+            "damaged chunk at byte {}, from second {:.3} to {:.3}: {}; reading continues after it",
             block.bytes.start,
             seconds_from_ns(first),
             seconds_from_ns(last),
@@ -61,10 +61,10 @@ impl Refusal {
     }
 }
 
-/// Turns a message into its absolute header stamp and a sample.
+/// Decodes a message into its absolute header stamp and a sample.
 pub(super) type Decoder<T> = Box<dyn FnMut(MessageSource<'_>) -> Result<(i64, T), Refusal> + Send>;
 
-/// A message as a decoder gets it.
+/// The input of a decoder.
 pub(super) struct MessageSource<'a> {
     pub(super) data: &'a [u8],
     /// Its number among the messages of its topic.
@@ -72,7 +72,7 @@ pub(super) struct MessageSource<'a> {
     pub(super) position: MessagePosition,
 }
 
-/// Dropped messages of one reason, one after another.
+/// Consecutive messages that were dropped for one reason.
 #[derive(Debug)]
 struct DroppedRun {
     reason: &'static str,
@@ -101,7 +101,7 @@ pub(super) struct OrderedSamples<T> {
 
 impl<T> OrderedSamples<T> {
     /// The messages of a topic whose log time is at or after `from_ns` since the log began. The numbers that the decoder
-    /// gets count from the log's begin when `numbered`; that takes the index of everything before.
+    /// gets count from the log's start when `numbered`; that reads the index of everything before.
     pub(super) fn new(log: &FlightLog, topic: &str, from_ns: i64, numbered: bool, decode: Decoder<T>) -> Self {
         let mut messages = log.topic_index(topic);
         let log_time_ns = u64::try_from(log.epoch_ns().saturating_add(from_ns)).unwrap_or(0);
@@ -114,7 +114,7 @@ impl<T> OrderedSamples<T> {
         Self { topic, messages, next, exhausted: false, decode, pending, released_ns, equal_stamps, dropped }
     }
 
-    /// Several messages may carry one stamp: they come from different senders.
+    /// Accepts several messages with one stamp, from different senders.
     pub(super) fn with_equal_stamps(self) -> Self {
         Self { equal_stamps: true, ..self }
     }
@@ -146,7 +146,7 @@ impl<T> OrderedSamples<T> {
             return;
         };
         self.next += 1;
-        let log_time_ns = log.since_begin(position.log_time_ns);
+        let log_time_ns = log.since_start(position.log_time_ns);
         let Some((block, message)) = log.message(&mut context.cache, position) else {
             let block = context.cache.get(log.file(), &log.index().blocks, position.block);
             context.report_block(position, block.as_ref().and_then(|block| block.damage.as_deref()));
@@ -188,7 +188,7 @@ impl<T> OrderedSamples<T> {
         self.dropped = Some(DroppedRun { reason, detail, first_ns: log_time_ns, last_ns: log_time_ns, count: 1 });
     }
 
-    /// Tells of the messages dropped one after another, once a good one comes or the log ends.
+    /// Reports consecutive dropped messages, at the next valid one or the log's end.
     fn end_run(&mut self, context: &mut ReadContext) {
         let Some(run) = self.dropped.take() else { return };
         let (first, last) = (seconds_from_ns(run.first_ns), seconds_from_ns(run.last_ns));

@@ -1,4 +1,4 @@
-//! What batches of encoder readings give, over many draws of their noise.
+//! Joint angles from batches of encoder readings, over many draws of their noise.
 
 use super::joint_angles::EncoderAverage;
 use crate::geometry::{SplitMix64, ns_from_seconds, seconds_from_ns};
@@ -30,7 +30,7 @@ fn play(seconds: i64, sigma_rad: f64, mut read: impl FnMut(i64) -> Option<f64>) 
     (0..seconds * 20 - 1)
         .map(|number| {
             let stamp_ns = 13_000_000 + number * IMAGE_NS;
-            while average.wants_readings(stamp_ns) {
+            while average.needs_readings(stamp_ns) {
                 let Some(at) = readings.next() else { break };
                 if let Some(angle) = read(at) {
                     average.push(JointSample { stamp_ns: at, angles_rad: vec![angle] });
@@ -66,16 +66,16 @@ fn white_noise_is_averaged_down_as_predicted() {
         let mut noise = Noise::new(3);
         let played = play(120, sigma, |at| Some(swing(seconds_from_ns(at)) + sigma * noise.normal()));
         let (error, stated) = errors(&played, swing);
-        // Ten readings, and a little more for the bend that they leave open.
+        // Ten readings, and a little more for the curvature that they do not constrain.
         let (least, most) = (sigma / 10_f64.sqrt(), sigma * (9.0 / 40.0_f64).sqrt());
         assert!(stated > 0.99 * least && stated < 1.15 * most, "{sigma}: {stated} of {least} to {most}");
-        // 2000 errors tell their size to 2 %; the prior on the bend may state a little more than there is.
+        // 2000 errors determine σ to 2 %; the prior on the curvature may overstate it a little.
         assert!(error < 1.06 * stated && error > 0.8 * stated, "{sigma}: {error} against {stated}");
     }
 }
 
 #[test]
-fn a_slow_error_is_not_believed() {
+fn a_slow_error_keeps_its_variance() {
     // Half of the variance is an error that keeps its value for seconds.
     let mut noise = Noise::new(5);
     let mut slow = 0.0;
@@ -92,8 +92,8 @@ fn a_slow_error_is_not_believed() {
 }
 
 #[test]
-fn noise_that_outlasts_a_reading_is_not_taken_for_white() {
-    // First-order low-pass noise of 25 ms: neighbouring readings share most of it.
+fn correlated_noise_does_not_count_as_white() {
+    // First-order low-pass noise of 25 ms: consecutive readings are correlated.
     let mut noise = Noise::new(6);
     let keep = (-5.0_f64 / 25.0).exp();
     let mut level = 0.0;
@@ -119,7 +119,7 @@ fn steps_of_a_coarse_encoder_keep_their_variance() {
 
 #[test]
 fn a_slew_and_a_reversal_are_followed() {
-    // 200°/s back and forth, reversed with 60 rad/s²: six times what a parabola is expected to bend.
+    // 200°/s back and forth, reversed with 60 rad/s²: six times the prior on the curvature.
     const ACCELERATION: f64 = 60.0;
     let mut angles = vec![0.0];
     for millisecond in 0..120_000 {
@@ -139,14 +139,14 @@ fn a_slew_and_a_reversal_are_followed() {
             let error = (angles.angles_rad[0] - truth(seconds_from_ns(*stamp_ns))).abs();
             assert!(error < bend + 4.5 * angles.sigmas_rad[0], "{error} at {stamp_ns}");
         }
-        // On average over turns and straight ways nothing is left of it.
+        // On average over reversals and constant rates the bias vanishes.
         let (error, stated) = errors(&played, truth);
         assert!(error < 1.3 * stated, "{sigma}: {error} against {stated}");
     }
 }
 
 #[test]
-fn angles_beyond_a_turn_are_averaged_as_neighbours() {
+fn wrapped_angles_are_averaged_unwrapped() {
     let truth = |time_s: f64| std::f64::consts::PI + 0.05 * (3.0 * time_s).sin();
     let mut noise = Noise::new(8);
     let played = play(30, SIGMA_RAD, |at| {
@@ -161,7 +161,7 @@ fn angles_beyond_a_turn_are_averaged_as_neighbours() {
 }
 
 #[test]
-fn gaps_a_late_start_and_an_early_end_are_told_by_the_sigmas() {
+fn the_sigmas_reflect_gaps_a_late_start_and_an_early_end() {
     let mut noise = Noise::new(9);
     let played = play(30, SIGMA_RAD, |at| {
         let time_s = seconds_from_ns(at);
@@ -176,7 +176,7 @@ fn gaps_a_late_start_and_an_early_end_are_told_by_the_sigmas() {
         assert!(error < 5.0 * angles.sigmas_rad[0], "{error} of {:?} at {time_s}", angles.sigmas_rad);
     }
     assert!(at(4.0).1.is_none() && at(20.5).1.is_none() && at(29.0).1.is_none());
-    // Before anything is known of the noise a reading is worth what the rig says, later more, next to a gap less.
+    // Before the noise is measured the rig's σ holds, later a smaller one, next to a gap a larger one.
     assert!(at(5.05).1.as_ref().unwrap().sigmas_rad[0] >= SIGMA_RAD);
     assert!(at(8.0).1.as_ref().unwrap().sigmas_rad[0] < 0.5 * SIGMA_RAD);
     assert!(at(12.03).1.as_ref().unwrap().sigmas_rad[0] >= SIGMA_RAD);

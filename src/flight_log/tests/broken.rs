@@ -13,14 +13,14 @@ fn open_error(content: &[u8]) -> String {
 }
 
 #[test]
-fn files_that_are_no_logs_are_told_apart() {
+fn files_that_are_not_logs_are_identified() {
     let cases: [(&[u8], &str); 6] = [
         (b"", "the file is empty (0 bytes)"),
         (b"time,x,y\n0.1,2,3\n", "a text file that begins with \"time,x,y"),
         (b"#ROSBAG V2.0\n", "a ROS 1 bag; convert it with `dcvins convert`"),
         (b"SQLite format 3\0\0\0", "a ROS 2 bag in SQLite"),
         (b"\x89PNG\r\n\x1a\n\0\0\0", "begins with 89 50 4e 47"),
-        (b"\x89MCAP0\r\n", "does not end as an MCAP file does at byte 8"),
+        (b"\x89MCAP0\r\n", "does not end with the MCAP magic at byte 8"),
     ];
     for (content, expected) in cases {
         let message = open_error(content);
@@ -46,7 +46,7 @@ fn a_log_cut_off_anywhere_plays_to_the_damage() {
                 fs::write(&path, &whole[..kept]).unwrap();
                 let (frames, warnings) = play_file(&path, RIG, 0.0);
                 assert!(frames.len() < previous || percent == 97, "{percent} %");
-                // The log grows evenly, so the frames are about as many as the bytes say, less one chunk.
+                // The log grows evenly, so the number of frames is proportional to the bytes, less one chunk.
                 assert!(
                     frames.len() + 6 >= 60 * percent / 100,
                     "{} frames of {percent} % in {compression:?}",
@@ -101,7 +101,7 @@ fn flipped_bytes_in_a_message_index_cost_nothing() {
 }
 
 #[test]
-fn flipped_bytes_cost_one_chunk_and_are_told() {
+fn flipped_bytes_cost_one_chunk_and_are_reported() {
     for compression in [LogCompression::None, LogCompression::Lz4, LogCompression::Zstd] {
         for indexed in [true, false] {
             let folder = TempDir::new().unwrap();
@@ -111,15 +111,15 @@ fn flipped_bytes_cost_one_chunk_and_are_told() {
             let chunk = &blocks[blocks.len() / 2].bytes;
             flip(&path, chunk.start + chunk.len() / 2);
             let (frames, warnings) = play_file(&path, RIG, 0.0);
-            let told = warnings.iter().any(|warning| {
+            let reported = warnings.iter().any(|warning| {
                 (warning.message.contains("damaged chunk at byte") || warning.message.contains("the log is damaged"))
                     && warning.stamp_ns > 500 * MS
                     && warning.stamp_ns < 2_500 * MS
             });
-            assert!(told, "{compression:?} indexed {indexed}: {warnings:?}");
+            assert!(reported, "{compression:?} indexed {indexed}: {warnings:?}");
             assert!(frames.len() < 60 && frames.len() > 30, "{} frames", frames.len());
-            assert!(frames.last().unwrap().stamp_ns > 2_900 * MS, "reading goes on after the damage");
-            // Without an index nobody knows how many images the damaged chunk held.
+            assert!(frames.last().unwrap().stamp_ns > 2_900 * MS, "reading continues after the damage");
+            // Without an index the number of images in the damaged chunk is unknown.
             assert!(frames.last().unwrap().index == 59 || !indexed);
         }
     }
@@ -175,7 +175,7 @@ fn numbers_that_are_not_finite_never_pass() {
 }
 
 #[test]
-fn images_of_another_size_are_left_out_with_both_sizes() {
+fn images_of_another_size_are_skipped_with_both_sizes() {
     let flight = Flight {
         image: |stamp_ns, size| {
             if *stamp_ns == 527 * MS {
@@ -186,10 +186,10 @@ fn images_of_another_size_are_left_out_with_both_sizes() {
         ..Flight::default()
     };
     let (frames, warnings) = play(&flight, RIG, 0.0);
-    warning_with(&warnings, &["/camera: image 10 at 0.527 s left out", "32×24 pixels", "64×48 for cam0"]);
+    warning_with(&warnings, &["/camera: image 10 at 0.527 s skipped", "32×24 pixels", "64×48 in the rig for cam0"]);
     let numbers: Vec<usize> = frames.iter().map(|frame| frame.index).collect();
     assert_eq!(numbers, (0..60).filter(|number| *number != 10).collect::<Vec<_>>());
-    assert_eq!(frames[10].imu[0].stamp_ns, 477 * MS, "the IMU samples of the image left out are not lost");
+    assert_eq!(frames[10].imu[0].stamp_ns, 477 * MS, "the IMU samples of the skipped image are kept");
 }
 
 #[test]
@@ -222,7 +222,7 @@ fn stamps_that_run_backwards_or_repeat_are_dropped() {
 }
 
 #[test]
-fn a_little_disorder_is_put_in_order() {
+fn small_disorder_is_sorted() {
     let flight = Flight {
         // Each second sample is written 30 ms late: neighbours change places.
         imu: |stamp_ns, rate, force| {
@@ -242,7 +242,7 @@ fn a_little_disorder_is_put_in_order() {
 }
 
 #[test]
-fn gaps_are_told() {
+fn gaps_are_reported() {
     let flight = Flight {
         imu: |stamp_ns, _, _| !(2000 * MS..2040 * MS).contains(stamp_ns),
         image: |stamp_ns, _| !(500 * MS..2500 * MS).contains(stamp_ns),
@@ -256,7 +256,7 @@ fn gaps_are_told() {
 }
 
 #[test]
-fn images_without_imu_are_not_used_and_told() {
+fn images_without_imu_are_not_used_and_reported() {
     let flight = Flight { imu: |stamp_ns, _, _| (500 * MS..2500 * MS).contains(stamp_ns), ..Flight::default() };
     let (frames, warnings) = play(&flight, RIG, 0.0);
     assert_eq!((frames[0].index, frames.last().unwrap().index), (10, 49));
@@ -271,9 +271,9 @@ fn stream_error(rig: &str) -> String {
 }
 
 #[test]
-fn a_rig_that_does_not_fit_the_log_is_refused() {
+fn a_rig_that_does_not_match_the_log_is_refused() {
     let message = stream_error(&RIG.replace("rostopic: /camera", "rostopic: /front"));
-    assert!(message.contains("cam0.rostopic names the topic '/front', which the log lacks"), "{message}");
+    assert!(message.contains("cam0.rostopic names the topic '/front', which is not in the log"), "{message}");
     assert!(
         message.contains("of type sensor_msgs/msg/Image or sensor_msgs/msg/CompressedImage are '/camera'"),
         "{message}"
@@ -288,7 +288,7 @@ fn a_rig_that_does_not_fit_the_log_is_refused() {
 }
 
 #[test]
-fn a_log_without_a_rig_says_where_it_looked() {
+fn a_log_without_a_rig_names_the_files_looked_for() {
     let folder = TempDir::new().unwrap();
     let log = FlightLog::open(&Flight::default().write(folder.path())).unwrap();
     let error = Rig::for_log(&log, None).unwrap_err();

@@ -1,10 +1,10 @@
 use super::super::cdr::{CdrReader, CdrWriter};
+use super::super::image_decoding::{BitDepth, decode_image};
 use super::super::messages::{self, MessageKind};
-use super::super::picture::{BitDepth, decode_picture};
 use super::*;
 use crate::flight_log::writer::testing as encode;
 
-/// The little-endian bytes of a message made of 4- and 8-byte numbers after a header, turned into big-endian ones.
+/// The little-endian bytes of a message made of 4- and 8-byte numbers after a header, converted to big-endian.
 fn imu_big_endian(stamp: (i32, u32), frame: &str, numbers: &[f64]) -> Vec<u8> {
     let mut out = vec![0, 0, 0, 0];
     out.extend(stamp.0.to_be_bytes());
@@ -64,7 +64,7 @@ fn foreign_encapsulations_and_absurd_lengths_are_refused() {
 fn raw_images_of_every_encoding_become_grey() {
     let decode = |encoding: &str, data: &[u8]| {
         let message = encode::image(0, "camera", [2, 2], encoding, data);
-        decode_picture(MessageKind::Image, &message, BitDepth::default())
+        decode_image(MessageKind::Image, &message, BitDepth::default())
     };
     for encoding in ["mono8", "8UC1"] {
         assert_eq!(decode(encoding, &[1, 2, 3, 4]).unwrap().pixels, [1, 2, 3, 4]);
@@ -87,7 +87,7 @@ fn wide_grey_values_keep_the_bits_that_are_in_use() {
     let check = |values: [u16; 4], bits: u32, expected: [u8; 4]| {
         let depth = depth_of(values).unwrap();
         assert_eq!(depth.bits(), bits, "{values:?}");
-        let decoded = decode_picture(MessageKind::Image, &message(values), depth).unwrap();
+        let decoded = decode_image(MessageKind::Image, &message(values), depth).unwrap();
         assert_eq!(decoded.pixels, expected, "{values:?}");
     };
     check([0, 1, 100, 255], 8, [0, 1, 100, 255]);
@@ -96,10 +96,10 @@ fn wide_grey_values_keep_the_bits_that_are_in_use() {
     // Eleven bits are part of twelve.
     check([0, 16, 160, 1500], 12, [0, 1, 10, 93]);
     check([0, 256, 2560, 65_535], 16, [0, 1, 10, 255]);
-    assert_eq!(depth_of([0; 4]), None, "a black image tells nothing");
+    assert_eq!(depth_of([0; 4]), None, "a black image has no bit depth");
     // The first image decides: a brighter one later is white.
     let first = depth_of([0, 0, 600, 1023]).unwrap();
-    let later = decode_picture(MessageKind::Image, &message([4, 1023, 1024, 4000]), first).unwrap();
+    let later = decode_image(MessageKind::Image, &message([4, 1023, 1024, 4000]), first).unwrap();
     assert_eq!(later.pixels, [1, 255, 255, 255]);
     let narrow = encode::image(0, "camera", [2, 2], "mono8", &[1, 2, 3, 4]);
     assert_eq!(BitDepth::of(MessageKind::Image, &narrow).unwrap().bits(), 16);
@@ -108,24 +108,24 @@ fn wide_grey_values_keep_the_bits_that_are_in_use() {
 #[test]
 fn compressed_images_are_known_by_their_bytes() {
     let folder = TempDir::new().unwrap();
-    let original = picture(0, [WIDTH, HEIGHT]);
+    let original = image_at(0, [WIDTH, HEIGHT]);
     let gray = image::GrayImage::from_raw(WIDTH as u32, HEIGHT as u32, original.pixels.clone()).unwrap();
     for (format, bound) in [("jpeg", 6), ("png", 0)] {
-        let path = folder.path().join(format!("picture.{format}"));
+        let path = folder.path().join(format!("image.{format}"));
         gray.save(&path).unwrap();
         let data = std::fs::read(&path).unwrap();
         let message = encode::compressed_image(0, "camera", "mono8; compressed", &data);
-        let decoded = decode_picture(MessageKind::CompressedImage, &message, BitDepth::default()).unwrap();
+        let decoded = decode_image(MessageKind::CompressedImage, &message, BitDepth::default()).unwrap();
         assert_eq!((decoded.width, decoded.height), (WIDTH, HEIGHT));
         let worst = decoded.pixels.iter().zip(&original.pixels).map(|(a, b)| a.abs_diff(*b)).max().unwrap();
         assert!(worst <= bound, "{format}: {worst}");
         let cut = encode::compressed_image(0, "camera", format, &data[..data.len() / 3]);
-        let cut = decode_picture(MessageKind::CompressedImage, &cut, BitDepth::default());
+        let cut = decode_image(MessageKind::CompressedImage, &cut, BitDepth::default());
         assert!(cut.is_err() || format == "jpeg", "a JPEG may be completed in grey");
     }
-    let text = encode::compressed_image(0, "camera", "jpeg", b"no picture");
+    let text = encode::compressed_image(0, "camera", "jpeg", b"not an image");
     assert!(
-        decode_picture(MessageKind::CompressedImage, &text, BitDepth::default())
+        decode_image(MessageKind::CompressedImage, &text, BitDepth::default())
             .unwrap_err()
             .contains("neither JPEG nor PNG")
     );

@@ -1,4 +1,4 @@
-//! Small logs written by [`LogWriter`], sound and broken, and what comes out of them.
+//! Small logs written by [`LogWriter`], intact and damaged, and the frames and warnings read from them.
 
 mod broken;
 mod messages;
@@ -23,7 +23,7 @@ const MS: i64 = 1_000_000;
 const WIDTH: usize = 64;
 const HEIGHT: usize = 48;
 
-/// A flight of which every part can be left out or spoiled.
+/// A flight of which every part can be omitted or damaged.
 struct Flight {
     duration_ms: i64,
     options: LogWriterOptions,
@@ -52,8 +52,8 @@ fn true_pose(stamp_ns: i64) -> RigidTransform {
     RigidTransform::new(so3::exp(&Vector3::new(0.0, 0.0, 0.4 * time_s)), Vector3::new(time_s, -2.0 * time_s, 1.0))
 }
 
-/// The grey values of the image with a stamp: distinct for each.
-fn picture(stamp_ns: i64, [width, height]: [usize; 2]) -> GrayImage {
+/// The image with a stamp, different for each.
+fn image_at(stamp_ns: i64, [width, height]: [usize; 2]) -> GrayImage {
     let shade = (stamp_ns / (50 * MS)) as usize;
     let pixels = (0..width * height).map(|index| ((index % width) * 2 + shade) as u8).collect();
     GrayImage { width, height, pixels }
@@ -89,7 +89,7 @@ impl Flight {
             if millisecond % 50 == 27 {
                 let (mut at, mut size) = (stamp_ns, [WIDTH, HEIGHT]);
                 if (self.image)(&mut at, &mut size) {
-                    let image = picture(stamp_ns, size);
+                    let image = image_at(stamp_ns, size);
                     writer.write_raw_image("/camera", "camera", times(at, 18), size, "mono8", &image.pixels).unwrap();
                 }
             }
@@ -132,7 +132,7 @@ fn rig_from(text: &str) -> Rig {
     Rig::from_yaml(text, Path::new("test.rig.yaml")).unwrap()
 }
 
-/// All frames of a flight and all warnings told with them.
+/// All frames of a flight and all their warnings.
 fn play(flight: &Flight, rig: &str, start_s: f64) -> (Vec<SensorFrame>, Vec<LogWarning>) {
     let folder = TempDir::new().unwrap();
     play_file(&flight.write(folder.path()), rig, start_s)

@@ -1,12 +1,12 @@
 use super::*;
 use crate::camera::{CameraModel, Distortion, Projection};
 
-/// A log with one message of each kind that a rig may lean on, and attachments.
+/// A log with one message of each kind that a rig needs, and attachments.
 fn write_log(path: &Path, attachments: &[(&str, &str)], camera_info: Option<&CameraModel>) {
     let mut writer = LogWriter::create(path, &LogWriterOptions::default()).unwrap();
     for number in 0..5 {
         let times = MessageTimes { stamp_ns: EPOCH_NS + number * 40 * MS, log_time_ns: EPOCH_NS + number * 40 * MS };
-        let image = picture(number, [WIDTH, HEIGHT]);
+        let image = image_at(number, [WIDTH, HEIGHT]);
         writer.write_jpeg("/camera", "camera", times, &image, 90).unwrap();
         writer.write_imu("/imu", "imu", times, &Vector3::zeros(), &Vector3::z()).unwrap();
         if let Some(model) = camera_info {
@@ -55,7 +55,7 @@ fn a_broken_attachment_is_named() {
 }
 
 #[test]
-fn intrinsics_that_the_rig_leaves_open_come_from_the_log() {
+fn intrinsics_missing_in_the_rig_come_from_the_log() {
     let folder = TempDir::new().unwrap();
     let path = folder.path().join("flight.mcap");
     let open_rig = RIG.replace("  intrinsics: [50.0, 50.0, 31.5, 23.5]\n", "").replace("  update_rate: 20.0\n", "");

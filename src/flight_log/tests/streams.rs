@@ -39,17 +39,17 @@ fn frames_are_the_same_whatever_the_container() {
 }
 
 #[test]
-fn a_frame_holds_what_belongs_to_it() {
+fn a_frame_has_its_measurements() {
     let (frames, warnings) = play(&Flight::default(), RIG, 0.0);
     assert_eq!(warnings, []);
     for (number, frame) in frames.iter().enumerate() {
         let stamp_ns = (27 + 50 * number as i64) * MS;
         assert_eq!((frame.index, frame.stamp_ns, frame.log_time_ns), (number, stamp_ns, stamp_ns + 18 * MS));
-        assert_eq!(*frame.image, picture(stamp_ns, [WIDTH, HEIGHT]));
+        assert_eq!(*frame.image, image_at(stamp_ns, [WIDTH, HEIGHT]));
 
         // The IMU's signals are linear in time, so interpolation is exact.
-        let begin_ns = if number == 0 { 0 } else { stamp_ns - 50 * MS };
-        assert_eq!((frame.imu[0].stamp_ns, frame.imu[frame.imu.len() - 1].stamp_ns), (begin_ns, stamp_ns));
+        let start_ns = if number == 0 { 0 } else { stamp_ns - 50 * MS };
+        assert_eq!((frame.imu[0].stamp_ns, frame.imu[frame.imu.len() - 1].stamp_ns), (start_ns, stamp_ns));
         assert!(frame.imu.windows(2).all(|pair| pair[0].stamp_ns < pair[1].stamp_ns));
         for sample in &frame.imu {
             let time_s = seconds_from_ns(sample.stamp_ns);
@@ -87,7 +87,7 @@ fn a_replay_from_the_middle_continues_the_numbers() {
 }
 
 #[test]
-fn the_time_shift_moves_everything_but_the_image() {
+fn the_time_offset_shifts_everything_but_the_image() {
     let rig = RIG.replace("timeshift_cam_imu: 0.0", "timeshift_cam_imu: 0.012");
     let (frames, _) = play(&Flight::default(), &rig, 0.0);
     let frame = &frames[10];
@@ -118,7 +118,7 @@ fn images_are_found_by_number_in_any_order() {
         assert_eq!(reader.count("cam0"), 60);
         for number in [59, 0, 31, 30, 31, 58] {
             let stamp_ns = (27 + 50 * number as i64) * MS;
-            assert_eq!(*reader.image("cam0", number).unwrap(), picture(stamp_ns, [WIDTH, HEIGHT]));
+            assert_eq!(*reader.image("cam0", number).unwrap(), image_at(stamp_ns, [WIDTH, HEIGHT]));
         }
         assert!(reader.image("cam0", 60).unwrap_err().to_string().contains("60 images, none with number 60"));
         assert!(reader.image("cam1", 0).unwrap_err().to_string().contains("no camera 'cam1'; it has 'cam0'"));
@@ -126,7 +126,7 @@ fn images_are_found_by_number_in_any_order() {
 }
 
 #[test]
-fn a_log_tells_its_topics_and_times() {
+fn a_log_lists_its_topics_and_times() {
     let folder = TempDir::new().unwrap();
     let log = FlightLog::open(&Flight::default().write(folder.path())).unwrap();
     let names: Vec<&str> = log.topics().iter().map(|info| info.topic.as_str()).collect();
@@ -138,7 +138,7 @@ fn a_log_tells_its_topics_and_times() {
 }
 
 #[test]
-fn a_stream_can_be_left_early_and_ends_after_its_duration() {
+fn a_stream_can_be_dropped_early_and_ends_after_its_duration() {
     let folder = TempDir::new().unwrap();
     let log = Arc::new(FlightLog::open(&Flight::default().write(folder.path())).unwrap());
     let rig = rig_from(RIG);

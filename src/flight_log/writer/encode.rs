@@ -6,8 +6,8 @@ use super::super::cdr::CdrWriter;
 use crate::camera::{CameraModel, Distortion};
 use crate::geometry::RigidTransform;
 
-/// A message with its header written.
-pub(super) fn begin(stamp_ns: i64, frame_id: &str) -> CdrWriter {
+/// A message that starts with a header.
+pub(super) fn with_header(stamp_ns: i64, frame_id: &str) -> CdrWriter {
     let mut out = CdrWriter::new();
     out.i32(stamp_ns.div_euclid(1_000_000_000) as i32);
     out.u32(stamp_ns.rem_euclid(1_000_000_000) as u32);
@@ -19,14 +19,14 @@ pub(super) fn put_rotation(out: &mut CdrWriter, rotation: &UnitQuaternion<f64>) 
     out.f64s(&[rotation.i, rotation.j, rotation.k, rotation.w]);
 }
 
-/// `sensor_msgs/msg/Imu` that says nothing about the orientation (its covariance begins with −1).
+/// `sensor_msgs/msg/Imu` without an orientation (the first entry of its covariance is −1).
 pub(in super::super) fn imu(
     stamp_ns: i64,
     frame_id: &str,
     angular_velocity_rad_per_s: &Vector3<f64>,
     specific_force_m_per_s2: &Vector3<f64>,
 ) -> Vec<u8> {
-    let mut out = begin(stamp_ns, frame_id);
+    let mut out = with_header(stamp_ns, frame_id);
     put_rotation(&mut out, &UnitQuaternion::identity());
     out.f64s(&[-1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
     out.f64s(angular_velocity_rad_per_s.as_slice());
@@ -44,7 +44,7 @@ pub(in super::super) fn image(
     encoding: &str,
     data: &[u8],
 ) -> Vec<u8> {
-    let mut out = begin(stamp_ns, frame_id);
+    let mut out = with_header(stamp_ns, frame_id);
     out.u32(height as u32);
     out.u32(width as u32);
     out.string(encoding);
@@ -56,7 +56,7 @@ pub(in super::super) fn image(
 
 /// `sensor_msgs/msg/CompressedImage`.
 pub(in super::super) fn compressed_image(stamp_ns: i64, frame_id: &str, format: &str, data: &[u8]) -> Vec<u8> {
-    let mut out = begin(stamp_ns, frame_id);
+    let mut out = with_header(stamp_ns, frame_id);
     out.string(format);
     out.bytes(data);
     out.finish()
@@ -64,7 +64,7 @@ pub(in super::super) fn compressed_image(stamp_ns: i64, frame_id: &str, format: 
 
 /// `sensor_msgs/msg/CameraInfo` of a pinhole camera (for other projections K alone does not describe it).
 pub(in super::super) fn camera_info(stamp_ns: i64, frame_id: &str, model: &CameraModel) -> Vec<u8> {
-    let mut out = begin(stamp_ns, frame_id);
+    let mut out = with_header(stamp_ns, frame_id);
     let [width, height] = model.resolution_px;
     out.u32(height as u32);
     out.u32(width as u32);
@@ -85,7 +85,7 @@ pub(in super::super) fn camera_info(stamp_ns: i64, frame_id: &str, model: &Camer
     out.finish()
 }
 
-/// ROS's name of a lens distortion and its coefficients.
+/// ROS name of a distortion model and its coefficients.
 fn distortion(distortion: &Distortion) -> (&'static str, Vec<f64>) {
     match distortion {
         Distortion::None => ("plumb_bob", vec![0.0; 5]),
@@ -97,7 +97,7 @@ fn distortion(distortion: &Distortion) -> (&'static str, Vec<f64>) {
 
 /// `sensor_msgs/msg/JointState` with positions only.
 pub(in super::super) fn joint_state(stamp_ns: i64, names: &[String], positions_rad: &[f64]) -> Vec<u8> {
-    let mut out = begin(stamp_ns, "");
+    let mut out = with_header(stamp_ns, "");
     out.strings(names);
     out.f64_sequence(positions_rad);
     out.f64_sequence(&[]);
@@ -114,7 +114,7 @@ pub(in super::super) fn odometry(
     linear_m_per_s: &Vector3<f64>,
     angular_rad_per_s: &Vector3<f64>,
 ) -> Vec<u8> {
-    let mut out = begin(stamp_ns, frame_id);
+    let mut out = with_header(stamp_ns, frame_id);
     out.string(child_frame_id);
     out.f64s(pose.translation_m.as_slice());
     put_rotation(&mut out, &pose.rotation);
@@ -127,7 +127,7 @@ pub(in super::super) fn odometry(
 
 /// `geometry_msgs/msg/PoseStamped`.
 pub(in super::super) fn pose_stamped(stamp_ns: i64, frame_id: &str, pose: &RigidTransform) -> Vec<u8> {
-    let mut out = begin(stamp_ns, frame_id);
+    let mut out = with_header(stamp_ns, frame_id);
     out.f64s(pose.translation_m.as_slice());
     put_rotation(&mut out, &pose.rotation);
     out.finish()
@@ -140,7 +140,7 @@ pub(in super::super) fn transform_stamped(
     child_frame_id: &str,
     pose: &RigidTransform,
 ) -> Vec<u8> {
-    let mut out = begin(stamp_ns, frame_id);
+    let mut out = with_header(stamp_ns, frame_id);
     out.string(child_frame_id);
     out.f64s(pose.translation_m.as_slice());
     put_rotation(&mut out, &pose.rotation);

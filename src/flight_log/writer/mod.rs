@@ -26,7 +26,7 @@ use crate::sensors::GrayImage;
 /// How the chunks of a log are compressed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LogCompression {
-    /// Not at all.
+    /// Uncompressed.
     None,
     /// LZ4.
     Lz4,
@@ -34,14 +34,14 @@ pub enum LogCompression {
     Zstd,
 }
 
-/// How a log is written.
+/// Options of writing a log.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LogWriterOptions {
     /// Compression of the chunks.
     pub compression: LogCompression,
-    /// A chunk is closed when it has grown to this size; `None` writes messages without chunks.
+    /// A chunk is closed when it exceeds this size in bytes; `None` writes messages without chunks.
     pub chunk_bytes: Option<u64>,
-    /// Whether the file ends with an index; without one every reader has to go through the whole file.
+    /// Whether the file ends with an index; without one every reader has to scan the entire file.
     pub indexed: bool,
 }
 
@@ -55,9 +55,9 @@ impl Default for LogWriterOptions {
 /// The two times of a message, both in nanoseconds since the epoch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MessageTimes {
-    /// When it was measured.
+    /// Header stamp, the time of measurement.
     pub stamp_ns: i64,
-    /// When it was recorded.
+    /// Log time, the time of recording.
     pub log_time_ns: i64,
 }
 
@@ -66,11 +66,11 @@ pub struct MessageTimes {
 pub struct MessageType<'a> {
     /// `nav_msgs/msg/Path`.
     pub name: &'a str,
-    /// What the definition is written in, `ros2msg` or `jsonschema`.
+    /// Language of the definition, `ros2msg` or `jsonschema`.
     pub definition_encoding: &'static str,
     /// The definition with all types that it needs.
     pub definition: Cow<'a, str>,
-    /// How the messages are encoded, `cdr` or `json`.
+    /// Encoding of the messages, `cdr` or `json`.
     pub message_encoding: &'static str,
 }
 
@@ -99,7 +99,7 @@ impl std::fmt::Debug for LogWriter {
     }
 }
 
-/// The quality of service that recorders note for sensor topics; players need it.
+/// The quality of service that ROS 2 recorders store for sensor topics; players need it.
 const QOS_PROFILE: &str = "\
 - history: 1
   depth: 10
@@ -136,7 +136,8 @@ impl LogWriter {
         Ok(Self { writer, channels: BTreeMap::new(), path: path.to_owned() })
     }
 
-    /// Writes an IMU sample: angular velocity, and specific force (+g upwards at rest).
+    /// Writes an IMU sample: angular velocity in rad/s and specific force in m/s² (+g upwards while stationary), both in the
+    /// IMU frame.
     pub fn write_imu(
         &mut self,
         topic: &str,
@@ -203,7 +204,7 @@ impl LogWriter {
         self.write(topic, MessageKind::CameraInfo, times, &encode::camera_info(times.stamp_ns, frame_id, model))
     }
 
-    /// Writes joint angles, one per name.
+    /// Writes joint angles in radians, one per name.
     pub fn write_joints(
         &mut self,
         topic: &str,
@@ -214,7 +215,7 @@ impl LogWriter {
         self.write(topic, MessageKind::JointState, times, &encode::joint_state(times.stamp_ns, names, positions_rad))
     }
 
-    /// Writes a pose of `child_frame_id` in `frame_id` with its velocities, both seen in the child frame.
+    /// Writes a pose of `child_frame_id` in `frame_id` with its linear and angular velocity in the child frame.
     #[expect(clippy::too_many_arguments, reason = "the fields of the message, each once")]
     pub fn write_odometry(
         &mut self,
@@ -267,7 +268,7 @@ impl LogWriter {
         self.writer.attach(&attachment).map_err(|error| write_error(&self.path, &error))
     }
 
-    /// Notes named texts about the log, such as the experiment and its seed.
+    /// Writes named texts about the log as metadata, such as the experiment and its seed.
     pub fn write_metadata(&mut self, name: &str, texts: BTreeMap<String, String>) -> Result<(), LogError> {
         let metadata = Metadata { name: name.to_owned(), metadata: texts };
         self.writer.write_metadata(&metadata).map_err(|error| write_error(&self.path, &error))
@@ -332,7 +333,7 @@ fn write_error(path: &Path, error: &impl ToString) -> LogError {
     LogError::Write { problem: error.to_string(), path: path.to_owned() }
 }
 
-/// The encoders, for tests of what reads them.
+/// The encoders, for tests of the decoders.
 #[cfg(test)]
 pub(super) mod testing {
     pub(in super::super) use super::encode::*;

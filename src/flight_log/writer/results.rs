@@ -12,9 +12,9 @@ use crate::geometry::RigidTransform;
 /// A frame in its parent's frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NamedTransform {
-    /// The frame in which the pose is given.
+    /// Parent frame.
     pub parent: String,
-    /// The frame whose pose it is.
+    /// Child frame.
     pub child: String,
     /// `parent_from_child`.
     pub pose: RigidTransform,
@@ -23,36 +23,36 @@ pub struct NamedTransform {
 /// Red, green, blue and opacity, each from 0 to 1.
 pub type Rgba = [f64; 4];
 
-/// A ring in an image.
+/// A keypoint marker in an image, a circle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CircleAnnotation {
-    /// Its centre, pixel centres at whole numbers.
+    /// Its centre in pixels, pixel centres at whole numbers.
     pub center_px: Vector2<f64>,
     /// Its diameter in pixels.
     pub diameter_px: f64,
-    /// Colour of the ring.
+    /// Colour of the circle.
     pub color: Rgba,
 }
 
 /// Separate straight lines in an image, in one colour.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinesAnnotation {
-    /// Both ends of each line, pixel centres at whole numbers.
+    /// Both ends of each line in pixels, pixel centres at whole numbers.
     pub lines_px: Vec<[Vector2<f64>; 2]>,
     /// Colour of the lines.
     pub color: Rgba,
 }
 
-/// How important a line of the log is, with the numbers of ROS 2.
+/// Severity of a log line, with the numbers of ROS 2.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LogLevel {
-    /// For whoever looks closely.
+    /// Details for debugging.
     Debug = 10,
-    /// What happened.
+    /// An event.
     Info = 20,
-    /// What went wrong without stopping the work.
+    /// A problem that did not stop the run.
     Warning = 30,
-    /// What stopped it.
+    /// A problem that stopped it.
     Error = 40,
 }
 
@@ -60,7 +60,7 @@ pub enum LogLevel {
 const THICKNESS_PX: f64 = 1.0;
 /// `LINE_LIST` of Foxglove's points annotation.
 const LINE_LIST: u8 = 4;
-/// Viewers count pixels from the corner of the first one, we from its centre.
+/// Offset of pixel coordinates: viewers count from the corner of the first pixel, this program from its centre.
 const PIXEL_CENTER: f64 = 0.5;
 /// `FLOAT32` and `UINT32` of `sensor_msgs/msg/PointField`.
 const FLOAT32: u8 = 7;
@@ -89,7 +89,7 @@ impl LogWriter {
         times: MessageTimes,
         poses: &[(i64, RigidTransform)],
     ) -> Result<(), LogError> {
-        let mut out = encode::begin(times.stamp_ns, frame_id);
+        let mut out = encode::with_header(times.stamp_ns, frame_id);
         out.u32(poses.len() as u32);
         for (stamp_ns, pose) in poses {
             put_time(&mut out, *stamp_ns);
@@ -128,7 +128,7 @@ impl LogWriter {
         points: &[(u32, Vector3<f64>)],
     ) -> Result<(), LogError> {
         const POINT_BYTES: u32 = 16;
-        let mut out = encode::begin(times.stamp_ns, frame_id);
+        let mut out = encode::with_header(times.stamp_ns, frame_id);
         out.u32(1); // height: not organized
         out.u32(points.len() as u32);
         let fields = [("x", FLOAT32), ("y", FLOAT32), ("z", FLOAT32), ("id", UINT32)];
@@ -153,7 +153,7 @@ impl LogWriter {
         self.write_typed(topic, &message_type, times, &out.finish())
     }
 
-    /// Writes rings and lines over the image with the same stamp as `foxglove_msgs/msg/ImageAnnotations`.
+    /// Writes circles and lines over the image with the same stamp as `foxglove_msgs/msg/ImageAnnotations`.
     pub fn write_annotations(
         &mut self,
         topic: &str,
@@ -188,7 +188,7 @@ impl LogWriter {
         self.write_typed(topic, &message_type, times, &out.finish())
     }
 
-    /// Writes a line of the log as `rcl_interfaces/msg/Log`.
+    /// Writes a log line as `rcl_interfaces/msg/Log`.
     pub fn write_log_line(
         &mut self,
         topic: &str,
@@ -218,7 +218,7 @@ impl LogWriter {
         times: MessageTimes,
         row: &[(&str, f64)],
     ) -> Result<(), LogError> {
-        let mut out = encode::begin(times.stamp_ns, "");
+        let mut out = encode::with_header(times.stamp_ns, "");
         for (_, value) in row {
             out.f64s(&[*value]);
         }

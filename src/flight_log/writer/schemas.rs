@@ -1,4 +1,4 @@
-//! The message definitions that are written into a log, in ROS 2's `ros2msg` form: the type itself, then every type it
+//! The message definitions that are written into a log, in ROS 2's `ros2msg` format: the type itself, then every type it
 //! needs after a line of 80 equals signs.
 
 use super::super::MessageKind;
@@ -26,7 +26,7 @@ const POINT2: &str = "foxglove_msgs/Point2";
 /// The fields of a type, and the types that they need.
 pub(super) type Definition<'a> = (&'a str, &'a [&'a str]);
 
-/// What a header needs.
+/// Types of a header.
 pub(super) const HEADER_NEEDS: &[&str] = &[HEADER, TIME];
 /// `nav_msgs/msg/Path`.
 pub(super) const PATH: Definition<'_> = (

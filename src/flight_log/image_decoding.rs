@@ -1,4 +1,4 @@
-//! Images of a log as grey values.
+//! Images of a log as grey levels.
 
 use std::io::Cursor;
 
@@ -8,16 +8,16 @@ use super::FlightLog;
 use super::messages::{ImageMessage, MessageKind, read_compressed_image, read_image};
 use crate::sensors::GrayImage;
 
-/// Images wider or higher than this are refused: no such camera flies, so it is a damaged header.
+/// Larger images are refused: no camera has them, so the header is damaged.
 const LARGEST_SIDE_PX: usize = 16_384;
-/// How every PNG begins.
+/// The first bytes of every PNG.
 const PNG: [u8; 4] = [0x89, b'P', b'N', b'G'];
 
-/// How many of the 16 bits of a grey value a camera uses: its sensor has 8, 10, 12, 14 or 16.
+/// Number of bits that a camera uses of a 16-bit grey level: its sensor has 8, 10, 12, 14 or 16.
 ///
-/// A 12-bit sensor leaves the upper four at zero, and the upper eight of its 16 bits would hold 16 grey values only. So
-/// the eight bits below the highest one in use are taken, by the brightest pixel of the topic's first image: the same for
-/// all images of a log, wherever reading begins. What is brighter later on is white.
+/// A 12-bit sensor leaves the upper four at zero, and the upper eight of its 16 bits have 16 grey levels only. So the
+/// eight bits below the highest one in use are taken, determined by the brightest pixel of the topic's first image: the
+/// same for all images of a log, wherever reading starts. Brighter pixels of later images saturate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct BitDepth(u32);
 
@@ -28,12 +28,12 @@ impl Default for BitDepth {
 }
 
 impl BitDepth {
-    /// By the first image of a topic that can be decoded; all bits where there is none.
+    /// From the first image of a topic that can be decoded; 16 without one.
     pub(crate) fn of_topic(log: &FlightLog, topic: &str, kind: MessageKind) -> Self {
         log.find_message(topic, |message| Self::of(kind, message)).unwrap_or_default()
     }
 
-    /// By one image message, `None` when it cannot be decoded or is all black. Images of 8 bits use all that they have.
+    /// From one image message; `None` when it cannot be decoded or is black. Images of 8 bits have the default.
     pub(crate) fn of(kind: MessageKind, message: &[u8]) -> Option<Self> {
         let brightest = if kind == MessageKind::Image {
             let raw = read_image(message).ok()?;
@@ -56,7 +56,7 @@ impl BitDepth {
         (used > 0).then(|| Self(used.next_multiple_of(2).max(8)))
     }
 
-    /// Number of bits.
+    /// Number of bits, 8 to 16.
     pub(crate) fn bits(self) -> u32 {
         self.0
     }
@@ -70,8 +70,8 @@ fn wide_value(pair: [u8; 2], big_endian: bool) -> u16 {
     if big_endian { u16::from_be_bytes(pair) } else { u16::from_le_bytes(pair) }
 }
 
-/// Decodes an image message of either kind; the error says what is wrong with it.
-pub(crate) fn decode_picture(kind: MessageKind, message: &[u8], depth: BitDepth) -> Result<GrayImage, String> {
+/// Decodes a raw or compressed image message into 8-bit grey levels; the error names the problem.
+pub(crate) fn decode_image(kind: MessageKind, message: &[u8], depth: BitDepth) -> Result<GrayImage, String> {
     if kind == MessageKind::Image {
         return gray_from_raw(&read_image(message).map_err(|error| error.to_string())?, depth);
     }
@@ -116,7 +116,7 @@ fn gray_from_raw(raw: &ImageMessage<'_>, depth: BitDepth) -> Result<GrayImage, S
     Ok(GrayImage { width, height, pixels })
 }
 
-/// Grey value of a colour (ITU-R BT.601, as JPEG has it), rounded.
+/// Grey level of a colour, rounded (ITU-R BT.601, as in JPEG).
 fn luma(red: u8, green: u8, blue: u8) -> u8 {
     ((u32::from(red) * 19_595 + u32::from(green) * 38_470 + u32::from(blue) * 7_471 + 32_768) >> 16) as u8
 }
@@ -137,11 +137,11 @@ fn gray_from_compressed(format: &str, data: &[u8], depth: BitDepth) -> Result<Gr
         _ if data.starts_with(&PNG) => ImageFormat::Png,
         _ => return Err(format!("{} bytes of format '{format}' that are neither JPEG nor PNG", data.len())),
     };
-    let picture = decoder(data, codec)
+    let image = decoder(data, codec)
         .decode()
         .map_err(|error| format!("damaged {codec:?} of {} bytes ({error})", data.len()))?;
-    let (width, height) = (picture.width() as usize, picture.height() as usize);
-    let pixels = match picture {
+    let (width, height) = (image.width() as usize, image.height() as usize);
+    let pixels = match image {
         DynamicImage::ImageLuma8(gray) => gray.into_raw(),
         DynamicImage::ImageLuma16(gray) => gray.into_raw().into_iter().map(|value| depth.narrowed(value)).collect(),
         other => other.into_rgb8().into_raw().chunks_exact(3).map(|rgb| luma(rgb[0], rgb[1], rgb[2])).collect(),
