@@ -1,7 +1,8 @@
 //! The front end on images whose true motion is known: time per image, tracked points, errors.
 //!
 //! `cargo bench --bench frontend` prints the table of the motion tracker from one image to the next, and of the whole front
-//! end over all images: how far features have drifted from their first sighting, by age, with and without keys.
+//! end over all images: how far features have drifted from their first observation, by age, with and without refinement
+//! against it.
 //! With `-- --export DIR` the frames (PGM) and the points with their true motion (CSV) are written there, to run other
 //! trackers on the same; `-- --flicker RATIO` sets the change of brightness from image to image.
 
@@ -18,7 +19,7 @@ use std::time::Instant;
 use clap::Parser;
 use dcvins::camera::CameraModel;
 use dcvins::frontend::lucas_kanade::{LucasKanadeOptions, track};
-use dcvins::frontend::{FeatureId, FrontEnd, FrontEndOptions, KeyOptions, Pyramid};
+use dcvins::frontend::{FeatureId, FrontEnd, FrontEndOptions, Pyramid, ReferenceOptions};
 use dcvins::sensors::GrayImage;
 use homography::{Dice, Scene, Texture};
 use nalgebra::Vector2;
@@ -188,8 +189,8 @@ fn main() {
         bench_tracker(sequence, "forward", &forward);
         bench_tracker(sequence, "forward and backward", &LucasKanadeOptions::default());
         // No window correlates better than perfectly.
-        let without = KeyOptions { min_correlation: 2.0, ..Default::default() };
-        bench_front_end(sequence, "without keys", &FrontEndOptions { keys: without, ..Default::default() });
-        bench_front_end(sequence, "with keys", &FrontEndOptions::default());
+        let without = ReferenceOptions { min_correlation: 2.0, ..Default::default() };
+        bench_front_end(sequence, "without reference", &FrontEndOptions { reference: without, ..Default::default() });
+        bench_front_end(sequence, "with reference", &FrontEndOptions::default());
     }
 }

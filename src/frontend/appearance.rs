@@ -1,23 +1,23 @@
-//! What a feature's window looks like, prepared to be compared with other windows.
+//! A feature's window, prepared for comparison with other windows.
 
 #![expect(clippy::inline_always, reason = "what is not inlined is not compiled for the registers of its caller")]
 
 use nalgebra::{Matrix6, Vector6};
 use pulp::{Arch, NullaryFnOnce};
 
-use super::keyed::{CENTRE, LANES, Rows, SIDE, WINDOW};
+use super::reference::{CENTRE, LANES, Rows, SIDE, WINDOW};
 
-/// A window with less variance than this has no appearance, in squared grey levels.
+/// Minimum variance of a window, in squared grey levels.
 const LEAST_VARIANCE: f32 = 4.0;
 
-/// A window with what is needed to compare another window with it.
+/// A window with its gradient and the normal matrix of the comparison.
 ///
 /// Surplus columns are zero.
 #[derive(Debug, PartialEq)]
 pub(super) struct Appearance {
-    /// Mean grey value.
+    /// Mean grey level.
     level: f32,
-    /// Grey values less their mean.
+    /// Grey levels less their mean.
     value: Rows,
     /// Gradient along a row.
     along_x: Rows,
@@ -25,16 +25,16 @@ pub(super) struct Appearance {
     along_y: Rows,
     /// Means of the gradient and of its first moments `[gx, gy, gx·x, gx·y, gy·x, gy·y]`.
     means: [f32; 6],
-    /// Their regressions on the grey values.
+    /// Their regressions on the grey levels.
     regressions: [f32; 6],
-    /// Inverse of the normal matrix of these six, freed of what brightness and contrast can do.
+    /// Inverse of the normal matrix (6 × 6) of these six, gain and offset eliminated.
     inverse: Matrix6<f64>,
     /// `Σ value²`.
     square: f32,
 }
 
 impl Appearance {
-    /// That of a window with one more pixel all around, row by row; `None` when it has no texture.
+    /// From a window with one more pixel on every side, row by row; `None` when it has no texture.
     pub(super) fn new(pixels: &[[f32; SIDE]; SIDE]) -> Option<Self> {
         let mut grey = [[0.0_f32; LANES + 2]; SIDE];
         for (row, source) in grey.iter_mut().zip(pixels) {
@@ -97,14 +97,14 @@ impl Appearance {
         Some(Self { level, value, along_x, along_y, means, regressions, inverse, square })
     }
 
-    /// The grey level to take off a window before it is compared.
+    /// The grey level to subtract from a window before the comparison.
     pub(super) fn level(&self) -> f32 {
         self.level
     }
 
-    /// How well a window, less [`Self::level`] and with surplus columns of zero, correlates with this one, and the shift
-    /// and change of shape of this one that would make it more alike: `[dx, dy]`, then the derivatives of dx and of dy by
-    /// x and y; `None` when nothing in them is alike.
+    /// Normalized correlation of a window, less [`Self::level`] and with surplus columns of zero, with this one, and the
+    /// Gauss–Newton step of this one towards it (6 × 1): `[dx, dy]` in pixels, then the derivatives of dx and of dy by x
+    /// and y; `None` without positive correlation.
     pub(super) fn compare(&self, window: &Rows) -> Option<(f64, Vector6<f64>)> {
         let moments = Arch::new().dispatch(Comparison { appearance: self, window });
         let area = (WINDOW * WINDOW) as f32;
@@ -166,7 +166,7 @@ impl NullaryFnOnce for Comparison<'_> {
 
 /// Sums over a window.
 struct Moments {
-    /// Of its grey values.
+    /// Of its grey levels.
     sum: f32,
     /// Of their squares.
     square: f32,

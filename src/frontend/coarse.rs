@@ -1,11 +1,10 @@
-//! How the camera turned, seen on the coarsest levels of the pyramid.
+//! Camera rotation between two images from the coarsest levels of the pyramid.
 //!
-//! Where the tracker looks for its features rests on a predicted rotation.
-//! That may be tens of pixels off where encoders are poor, so it has to earn its trust: its own covariance says how far it
-//! can be off, and the images say whether it is any better than no turn at all.
-//! Where either speaks against it, the turn is measured: the whole coarse image is laid over the other one by
-//! Gauss–Newton on the rotation with a gain and an offset, robustly, from the prediction and from no turn at all.
-//! The idea is the small blurry image of PTAM (Klein and Murray, "Improving the agility of keyframe-based SLAM").
+//! The tracker starts from a predicted rotation, whose error may be tens of pixels where encoders are poor.
+//! It is used when its covariance is small and the images fit better under it than under no rotation.
+//! Otherwise the rotation is measured: the coarse images are aligned by robust Gauss–Newton on the rotation, a gain and an
+//! offset, starting from the prediction and from no rotation.
+//! The method follows the small blurry image of PTAM (Klein and Murray, "Improving the agility of keyframe-based SLAM").
 
 use nalgebra::{Matrix2x3, Matrix3, Matrix5, RowVector2, UnitQuaternion, Vector2, Vector3, Vector5};
 
@@ -15,23 +14,23 @@ use crate::camera::CameraModel;
 use crate::geometry::so3;
 use crate::sensors::GrayImage;
 
-/// Levels that the coarse image needs beyond those of the tracker: at 640 pixels it is then 40 pixels wide.
+/// Pyramid levels beyond those of the tracker: an image of 640 pixels is then 40 pixels wide.
 pub(super) const EXTRA_LEVELS: usize = 1;
-/// A prediction that is known better than this is taken as it is, in pixels: the tracker finds a feature from as far.
-const TRUSTED_SIGMA_PX: f64 = 6.0;
-/// Samples on a level: more say no more.
+/// A prediction with a smaller standard deviation is used unchanged, in pixels: the tracker converges from that distance.
+const ACCURATE_SIGMA_PX: f64 = 6.0;
+/// Maximum number of samples on a level; more do not improve the result.
 const MOST_SAMPLES: usize = 1200;
-/// What the samples are worth together, in independent measurements of a grey value: neighbours see the same, and near
-/// things move otherwise than the rest.
-const WORTH: f64 = 100.0;
-/// Residuals count less beyond this share of the image's contrast (its standard deviation), and beyond this many levels.
-const SCALE_SHARE: f64 = 0.5;
+/// Number of independent grey-level measurements that all samples count as: neighbouring samples are correlated, and near
+/// objects move differently.
+const INDEPENDENT_SAMPLES: f64 = 100.0;
+/// Scale of the robust loss: this ratio of the image's contrast (its standard deviation), at least this many grey levels.
+const SCALE_RATIO: f64 = 0.5;
 const LEAST_SCALE: f64 = 4.0;
-/// An image with less contrast than this says nothing, in grey levels.
+/// Minimum contrast of an image, in grey levels.
 const LEAST_CONTRAST: f64 = 2.0;
-/// What a sample costs that falls out of the other image; one that fits costs nothing, a wrong one nearly one.
-const UNSEEN_COST: f64 = 0.5;
-/// A prediction is worse than none when the images fit worse by this under it.
+/// Cost of a sample outside of the other image; a matching one has cost 0, an outlier nearly 1.
+const OUTSIDE_COST: f64 = 0.5;
+/// A prediction is rejected when the cost under it is higher than under no rotation by this.
 const WORSE_BY: f64 = 0.02;
 /// Gauss–Newton steps on each level, coarsest first.
 const STEPS: [usize; 2] = [10, 5];
@@ -43,10 +42,10 @@ const SHORT_STEP_PX: f64 = 0.03;
 struct Sample {
     x: usize,
     y: usize,
-    /// Its direction in the camera.
+    /// Unit direction in the camera frame.
     bearing: Vector3<f64>,
-    /// How it moves on the level when its bearing is turned, in pixels of the level per radian.
-    by_turn: Matrix2x3<f64>,
+    /// Derivative of its position by a rotation of its bearing (2 × 3), in pixels of the level per radian.
+    by_rotation: Matrix2x3<f64>,
 }
 
 /// The samples of one level.
@@ -56,7 +55,7 @@ struct SampledLevel {
     samples: Vec<Sample>,
 }
 
-/// Finds the rotation between two images from their coarsest levels.
+/// Aligns two images on their coarsest levels by a rotation.
 #[derive(Clone, Debug)]
 pub(super) struct CoarseAligner {
     camera: CameraModel,
@@ -64,7 +63,7 @@ pub(super) struct CoarseAligner {
     levels: Vec<SampledLevel>,
 }
 
-/// A rotation with the brightness that goes with it.
+/// A rotation with gain and offset of the brightness, and the cost.
 #[derive(Clone, Copy)]
 struct Fit {
     /// `camera_now_from_camera_previous`.
@@ -79,8 +78,8 @@ impl CoarseAligner {
         Self { camera, levels: Vec::new() }
     }
 
-    /// The rotation `camera_now_from_camera_previous` from which features are looked for: the prediction where it is good,
-    /// what the images say where it is not, `None` where neither says anything.
+    /// The rotation `camera_now_from_camera_previous` to predict features with: the prediction where it is accurate, else the
+    /// one measured on the images; `None` without either.
     pub(super) fn search_rotation(
         &mut self,
         previous: &Pyramid,
@@ -92,17 +91,17 @@ impl CoarseAligner {
         let Some(coarsest) = self.levels.first() else { return fallback };
         let Some(view) = View::new(&self.camera, coarsest, previous, now, predicted) else { return fallback };
         let identity = UnitQuaternion::identity();
-        let still = view.fit_brightness(&identity);
-        let mut starts = vec![still];
+        let unrotated = view.fit_brightness(&identity);
+        let mut starts = vec![unrotated];
         let mut prior = predicted;
         if let Some(predicted) = predicted {
             let expected = view.fit_brightness(&predicted.rotation);
-            let sound = view.misfit(&expected) <= view.misfit(&still) + WORSE_BY;
-            if sound && predicted.sigma_rad() * self.camera.focal_length_px() <= TRUSTED_SIGMA_PX {
+            let consistent = view.misfit(&expected) <= view.misfit(&unrotated) + WORSE_BY;
+            if consistent && predicted.sigma_rad() * self.camera.focal_length_px() <= ACCURATE_SIGMA_PX {
                 return fallback;
             }
-            if !sound && predicted.sigma_rad() * self.camera.focal_length_px() <= TRUSTED_SIGMA_PX {
-                // It claims to be good and is not: its covariance is worth nothing.
+            if !consistent && predicted.sigma_rad() * self.camera.focal_length_px() <= ACCURATE_SIGMA_PX {
+                // The prediction is inconsistent with the images: its covariance is not used.
                 prior = None;
             }
             starts.push(expected);
@@ -119,7 +118,7 @@ impl CoarseAligner {
         best.map(|fit| fit.rotation).or(fallback)
     }
 
-    /// Chooses the samples once the size of the levels is known.
+    /// Selects the samples for the size of the levels.
     fn sample_levels(&mut self, pyramid: &Pyramid) {
         let count = pyramid.levels().len();
         let first = count.saturating_sub(STEPS.len()).max(1);
@@ -137,7 +136,7 @@ impl CoarseAligner {
                         continue;
                     };
                     if let Some((_, by_point)) = self.camera.project_with_jacobian(&bearing) {
-                        samples.push(Sample { x, y, bearing, by_turn: by_point * -so3::hat(&bearing) / scale });
+                        samples.push(Sample { x, y, bearing, by_rotation: by_point * -so3::hat(&bearing) / scale });
                     }
                 }
             }
@@ -146,7 +145,7 @@ impl CoarseAligner {
     }
 }
 
-/// One level of both images.
+/// Samples, images and prior on one level.
 struct View<'a> {
     camera: &'a CameraModel,
     samples: &'a [Sample],
@@ -154,14 +153,14 @@ struct View<'a> {
     now: &'a GrayImage,
     /// Pixels of the image per pixel of the level.
     scale_px: f64,
-    /// Residual at which a sample begins to count less, in grey levels.
+    /// Scale of the robust loss, in grey levels.
     scale: f64,
     /// Expected rotation and its information.
     prior: Option<(UnitQuaternion<f64>, Matrix3<f64>)>,
 }
 
 impl<'a> View<'a> {
-    /// `None` when there is nothing to see.
+    /// `None` when an image has too little contrast.
     fn new(
         camera: &'a CameraModel,
         sampled: &'a SampledLevel,
@@ -185,14 +184,14 @@ impl<'a> View<'a> {
             previous,
             now,
             scale_px: f64::from(1_u32 << sampled.level),
-            scale: (SCALE_SHARE * contrast).max(LEAST_SCALE),
+            scale: (SCALE_RATIO * contrast).max(LEAST_SCALE),
             prior: prior.map(|prior| (prior.rotation, prior.information())),
         };
         (contrast >= LEAST_CONTRAST).then_some(view)
     }
 
-    /// Grey value of now where a sample comes to lie, `None` outside the image.
-    fn seen(&self, sample: &Sample, rotation: &UnitQuaternion<f64>) -> Option<f64> {
+    /// Grey level of the current image at a sample's predicted position, `None` outside the image.
+    fn observed(&self, sample: &Sample, rotation: &UnitQuaternion<f64>) -> Option<f64> {
         let at = self.camera.project(&(rotation * sample.bearing))? / self.scale_px;
         let (width, height) = (self.now.width as f64, self.now.height as f64);
         if at.x < 0.0 || at.y < 0.0 || at.x >= width - 1.0 || at.y >= height - 1.0 {
@@ -204,11 +203,11 @@ impl<'a> View<'a> {
         Some((1.0 - down) * line(y) + down * line(y + 1))
     }
 
-    /// A rotation with the offset in brightness between the images, as a start.
+    /// Initial fit at a rotation: gain 1 and the mean offset of brightness.
     fn fit_brightness(&self, rotation: &UnitQuaternion<f64>) -> Fit {
         let (mut sum, mut count) = (0.0, 0.0);
         for sample in self.samples {
-            if let Some(value) = self.seen(sample, rotation) {
+            if let Some(value) = self.observed(sample, rotation) {
                 sum += value - grey(self.previous, sample.x, sample.y);
                 count += 1.0;
             }
@@ -222,7 +221,7 @@ impl<'a> View<'a> {
             .samples
             .iter()
             .map(|sample| {
-                let Some(value) = self.seen(sample, &fit.rotation) else { return UNSEEN_COST };
+                let Some(value) = self.observed(sample, &fit.rotation) else { return OUTSIDE_COST };
                 let residual = value - fit.gain * grey(self.previous, sample.x, sample.y) - fit.offset;
                 let ratio = (residual / self.scale).powi(2);
                 ratio / (1.0 + ratio)
@@ -231,7 +230,7 @@ impl<'a> View<'a> {
         sum / self.samples.len().max(1) as f64
     }
 
-    /// Gauss–Newton from a start; the best that was met.
+    /// Gauss–Newton from a start; returns the iterate with the lowest cost.
     fn descend(&self, start: &Fit, steps: usize) -> Fit {
         let mut best = Fit { cost: f64::INFINITY, ..*start };
         let mut at = *start;
@@ -241,10 +240,10 @@ impl<'a> View<'a> {
                 best = Fit { cost, ..at };
             }
             let Some(step) = step else { return best };
-            let turn: Vector3<f64> = step.fixed_rows::<3>(0).into_owned();
-            let rotation = UnitQuaternion::new_normalize((at.rotation * so3::exp(&-turn)).into_inner());
+            let rotation_vector: Vector3<f64> = step.fixed_rows::<3>(0).into_owned();
+            let rotation = UnitQuaternion::new_normalize((at.rotation * so3::exp(&-rotation_vector)).into_inner());
             at = Fit { rotation, gain: at.gain + step[3], offset: at.offset + step[4], cost };
-            if turn.norm() * self.camera.focal_length_px() < SHORT_STEP_PX * self.scale_px {
+            if rotation_vector.norm() * self.camera.focal_length_px() < SHORT_STEP_PX * self.scale_px {
                 break;
             }
         }
@@ -252,7 +251,7 @@ impl<'a> View<'a> {
         if cost < best.cost { Fit { cost, ..at } } else { best }
     }
 
-    /// Cost of a fit, and the step `[turn of the previous image's bearings, gain, offset]` that betters it.
+    /// Cost of a fit, and the step `[rotation of the previous image's bearings; gain; offset]` (5 × 1) that decreases it.
     ///
     /// The inverse compositional form: the gradient is that of the previous image, which does not depend on the rotation.
     fn linearize(&self, fit: &Fit) -> (f64, Option<Vector5<f64>>) {
@@ -260,8 +259,8 @@ impl<'a> View<'a> {
         let mut right = Vector5::zeros();
         let mut cost = 0.0;
         for sample in self.samples {
-            let Some(value) = self.seen(sample, &fit.rotation) else {
-                cost += UNSEEN_COST;
+            let Some(value) = self.observed(sample, &fit.rotation) else {
+                cost += OUTSIDE_COST;
                 continue;
             };
             let before = grey(self.previous, sample.x, sample.y);
@@ -269,12 +268,12 @@ impl<'a> View<'a> {
             let ratio = (residual / self.scale).powi(2);
             cost += ratio / (1.0 + ratio);
             let weight = 1.0 / ((1.0 + ratio) * (1.0 + ratio));
-            let by_turn = gradient(self.previous, sample.x, sample.y) * sample.by_turn * fit.gain;
-            let row = Vector5::new(by_turn[0], by_turn[1], by_turn[2], before, 1.0);
+            let by_rotation = gradient(self.previous, sample.x, sample.y) * sample.by_rotation * fit.gain;
+            let row = Vector5::new(by_rotation[0], by_rotation[1], by_rotation[2], before, 1.0);
             normal += row * row.transpose() * weight;
             right += row * (weight * residual);
         }
-        let worth = WORTH / self.samples.len().max(1) as f64;
+        let worth = INDEPENDENT_SAMPLES / self.samples.len().max(1) as f64;
         cost *= worth;
         let unit = worth / (self.scale * self.scale);
         normal *= unit;

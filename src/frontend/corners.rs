@@ -1,18 +1,18 @@
-//! Finding corners: Shi and Tomasi's smaller eigenvalue, spread over the image.
+//! Corner detection: Shi and Tomasi's smaller eigenvalue, distributed over the image.
 
 use nalgebra::Vector2;
 
 use super::responses::{Responses, TILE};
 use crate::sensors::GrayImage;
 
-/// Which corners are taken.
+/// Options of corner detection.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CornerOptions {
-    /// No more features than this in an image, old and new together.
+    /// Maximum number of features in an image, tracked and new.
     pub max_features: usize,
-    /// Least distance of a new feature from all others, in pixels.
+    /// Minimum distance of a new feature from all others, in pixels.
     pub min_distance_px: f64,
-    /// No corner is taken nearer to the border of the image, in pixels.
+    /// Minimum distance from the image border, in pixels.
     pub border_px: usize,
     /// Smaller eigenvalue of the mean structure tensor below which there is no corner, in (grey levels/px)².
     pub min_eigenvalue: f64,
@@ -24,17 +24,17 @@ impl Default for CornerOptions {
     }
 }
 
-/// No more corners than this come from one tile.
+/// Maximum number of corners from one tile.
 const CORNERS_PER_TILE: usize = 3;
 
-/// A possible new feature.
+/// A candidate for a new feature.
 #[derive(Clone, Copy, Debug)]
 struct Candidate {
     uv_px: Vector2<f64>,
     response: f32,
 }
 
-/// A square of the image that is searched by itself, smaller where the image ends.
+/// A square of the image that is searched separately, smaller at the image border.
 #[derive(Clone, Copy, Debug)]
 struct Tile {
     left: usize,
@@ -43,16 +43,16 @@ struct Tile {
     height: usize,
 }
 
-/// Finds new corners; holds buffers that live on from image to image.
+/// Detects corners; its buffers are reused from image to image.
 #[derive(Clone, Debug, Default)]
 pub struct CornerDetector {
     candidates: Vec<Candidate>,
     in_tile: Vec<Candidate>,
     responses: Responses,
-    /// What of the image has not been searched yet.
+    /// Tiles that have not been searched yet.
     tiles: Vec<Tile>,
     taken: PointGrid,
-    /// How many features lie in each cell of the image.
+    /// Number of features in each cell of the image.
     crowd: Vec<usize>,
 }
 
@@ -113,8 +113,7 @@ impl CornerDetector {
         self.crowd = crowd;
     }
 
-    /// Gathers the best corners of those tiles that are `wanted`, have not been searched and are not covered by features
-    /// already.
+    /// Collects the best corners of tiles that are `wanted`, not searched yet and not covered by features.
     fn collect(&mut self, image: &GrayImage, options: &CornerOptions, wanted: impl Fn(&Tile) -> bool) {
         let mut tiles = std::mem::take(&mut self.tiles);
         let before = self.candidates.len();
@@ -154,7 +153,7 @@ impl CornerDetector {
         }
     }
 
-    /// Whether no corner of a tile could be far enough from the features, as far as a coarse look tells.
+    /// Whether a coarse test finds no position in a tile far enough from the features.
     fn is_covered(&self, tile: &Tile) -> bool {
         const LOOK: usize = 4;
         (0..=LOOK).all(|j| {
@@ -168,7 +167,7 @@ impl CornerDetector {
 }
 
 impl Candidate {
-    /// The pixel it lies in, row first: what decides between equal ones.
+    /// Its pixel, row first, the order among equal responses.
     fn place(&self) -> (usize, usize) {
         (self.uv_px.y.round() as usize, self.uv_px.x.round() as usize)
     }
@@ -208,9 +207,9 @@ impl Cells {
         row * self.columns + column
     }
 
-    /// The cells in which a corner of a tile can lie.
+    /// The cells that may contain a corner of a tile.
     fn about(&self, tile: &Tile) -> impl Iterator<Item = usize> {
-        // A corner may lie half a pixel beside its pixel.
+        // A corner may be half a pixel beside its pixel.
         let range = |first: usize, length: usize, count: usize| {
             let at = |pixel: usize| ((pixel as f64 / self.side_px) as usize).min(count - 1);
             at(first.saturating_sub(1))..at(first + length) + 1
@@ -222,7 +221,7 @@ impl Cells {
     }
 }
 
-/// Points in squares of the least distance's side, so that only nine squares are asked whether a place is free.
+/// Points in squares of the minimum distance's side, so that a distance test visits only nine squares.
 #[derive(Clone, Debug, Default)]
 pub(super) struct PointGrid {
     distance_px: f64,
@@ -252,7 +251,7 @@ impl PointGrid {
         self.squares[row * self.columns + column].push(uv_px);
     }
 
-    /// Whether no point lies nearer than the least distance.
+    /// Whether no point is nearer than the minimum distance.
     pub(super) fn is_free(&self, uv_px: &Vector2<f64>) -> bool {
         let (column, row) = self.square(uv_px);
         (row - 1..=row + 1).all(|row| {

@@ -3,26 +3,26 @@ use thiserror::Error;
 
 use super::coarse::{self, CoarseAligner};
 use super::corners::{CornerDetector, CornerOptions, PointGrid};
-use super::keyed::{Key, KeyFinder, KeyOptions, Sighting};
 use super::lucas_kanade::{self, LucasKanadeOptions};
 use super::outliers::{self, BearingPair, Motion, OutlierOptions};
 use super::prediction::PredictedRotation;
 use super::pyramid::Pyramid;
+use super::reference::{ReferenceMatch, ReferenceOptions, ReferencePatch, ReferenceSearch};
 use super::tracks::{FeatureId, FrontEndStatistics, TrackedFeature, TrackedFrame};
 use crate::camera::CameraModel;
 use crate::geometry::median;
 use crate::sensors::GrayImage;
 
-/// What a front end can be told.
+/// Options of a front end, by stage.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FrontEndOptions {
-    /// Finding new features.
+    /// Detection of new features.
     pub corners: CornerOptions,
-    /// Following them from image to image.
+    /// Tracking from image to image.
     pub lucas_kanade: LucasKanadeOptions,
-    /// Holding them to their first sighting.
-    pub keys: KeyOptions,
-    /// Rejecting those that do not move with the scene.
+    /// Refinement against the first observation.
+    pub reference: ReferenceOptions,
+    /// Rejection of features that do not move with the scene.
     pub outliers: OutlierOptions,
 }
 
@@ -41,8 +41,8 @@ pub enum FrontEndError {
         /// Rows of the camera model.
         expected_height: usize,
     },
-    /// Its pixels are not as many as its size says.
-    #[error("the image of {width}×{height} holds {pixels} pixels")]
+    /// The number of its pixels does not match its size.
+    #[error("the image of {width}×{height} has {pixels} pixels")]
     PixelCount {
         /// Columns it should have.
         width: usize,
@@ -53,40 +53,40 @@ pub enum FrontEndError {
     },
 }
 
-/// A feature on its way.
+/// A tracked feature in the previous image.
 #[derive(Clone, Debug)]
 struct Track {
     id: FeatureId,
     age: u32,
     uv_px: Vector2<f64>,
     bearing: Vector3<f64>,
-    /// What it looked like at first, `None` when too near to the border or without texture then.
-    key: Option<Key>,
+    /// Its first observation, `None` when it was too near to the border or had no texture.
+    reference: Option<ReferencePatch>,
 }
 
-/// A feature that was found in the image of now.
+/// A feature found in the current image.
 #[derive(Clone, Debug)]
 struct Step {
-    /// What it was in the image before.
+    /// In the previous image.
     id: FeatureId,
     age: u32,
     previous_uv_px: Vector2<f64>,
     previous_bearing: Vector3<f64>,
-    /// What it is now.
+    /// In the current image.
     uv_px: Vector2<f64>,
     bearing: Vector3<f64>,
-    key: Option<Key>,
+    reference: Option<ReferencePatch>,
 }
 
-/// What following features works on.
+/// Buffers of tracking.
 struct Buffers {
     motion: Box<lucas_kanade::Buffers>,
-    keys: KeyFinder,
+    search: ReferenceSearch,
 }
 
-/// Follows features through one camera's images.
+/// Tracks features through the images of one camera.
 ///
-/// It is given images in the order of time and remembers the last one; a clone goes on exactly as the original would.
+/// It takes images in order of time and keeps the last one; a clone continues exactly as the original.
 #[derive(Clone, Debug)]
 pub struct FrontEnd {
     camera: CameraModel,
@@ -101,12 +101,12 @@ pub struct FrontEnd {
     found: Vec<Vector2<f64>>,
 }
 
-/// Two guesses of where a feature is are worth a try each when they differ by this much, in pixels.
+/// Two predictions of a feature's position are both tried when they differ by more than this, in pixels.
 const DIFFERENT_GUESS_PX: f64 = 2.0;
-/// Fewer tracks than this say nothing about where the others went.
+/// Minimum number of tracks from which the motion of lost ones is predicted.
 const MIN_TRACKS_FOR_GUESS: usize = 8;
-/// Features that came nearer to each other than this share of the least distance are thinned out.
-const CROWDED_SHARE: f64 = 0.5;
+/// Ratio of the minimum distance below which the younger of two features is dropped.
+const CROWDED_RATIO: f64 = 0.5;
 
 impl FrontEnd {
     /// A front end for one camera, before its first image.
@@ -125,18 +125,18 @@ impl FrontEnd {
         }
     }
 
-    /// The camera whose images it follows.
+    /// The camera model of its images.
     pub fn camera(&self) -> &CameraModel {
         &self.camera
     }
 
-    /// Takes in the next image.
+    /// Processes the next image and returns its features.
     ///
-    /// `predicted` is the rotation since the last image that was taken in, as from
-    /// [`predict_camera_rotation`](super::predict_camera_rotation); it may be wrong, and `None` when nothing is known.
+    /// `predicted` is the rotation since the last processed image, as from
+    /// [`predict_camera_rotation`](super::predict_camera_rotation); it may be wrong, and is `None` without a prediction.
     ///
     /// # Errors
-    /// When the image does not have the camera's size; the front end is then as before.
+    /// When the image does not have the camera's size; the front end is then unchanged.
     pub fn process(
         &mut self,
         image: &GrayImage,
@@ -170,14 +170,14 @@ impl FrontEnd {
             .collect();
         self.detect(image, &mut features);
         statistics.detected = features.len() - steps.len();
-        let keys = steps.into_iter().map(|step| step.key).chain(std::iter::repeat(None));
+        let references = steps.into_iter().map(|step| step.reference).chain(std::iter::repeat(None));
         self.tracks.clear();
-        self.tracks.extend(features.iter().zip(keys).map(|(feature, key)| Track {
+        self.tracks.extend(features.iter().zip(references).map(|(feature, reference)| Track {
             id: feature.id,
             age: feature.age,
             uv_px: feature.uv_px,
             bearing: feature.bearing,
-            key: key.or_else(|| Key::cut(image, &feature.uv_px)),
+            reference: reference.or_else(|| ReferencePatch::cut(image, &feature.uv_px)),
         }));
         std::mem::swap(&mut self.previous, &mut self.now);
         Ok(TrackedFrame { stamp_ns, features, statistics })
@@ -195,14 +195,14 @@ impl FrontEnd {
         Ok(())
     }
 
-    /// Looks for every feature where it should be now, then for the lost ones where the found ones say they should be.
+    /// Tracks every feature from its predicted position, then the lost ones from the motion of those found.
     fn follow(&self, expected: Option<&UnitQuaternion<f64>>) -> Vec<Step> {
         let guesses: Vec<Vector2<f64>> = self
             .tracks
             .iter()
-            .map(|track| expected.map_or(track.uv_px, |rotation| self.turned(track, rotation)))
+            .map(|track| expected.map_or(track.uv_px, |rotation| self.rotated(track, rotation)))
             .collect();
-        let mut buffers = Buffers { motion: lucas_kanade::Buffers::new(), keys: KeyFinder::new() };
+        let mut buffers = Buffers { motion: lucas_kanade::Buffers::new(), search: ReferenceSearch::new() };
         let mut results: Vec<Option<Step>> =
             self.tracks.iter().zip(&guesses).map(|(track, guess)| self.track(track, guess, &mut buffers)).collect();
         let found: Vec<BearingPair> = results.iter().flatten().map(pair_of).collect();
@@ -210,12 +210,14 @@ impl FrontEnd {
         if lost > 0 {
             let start = expected.copied().unwrap_or_else(UnitQuaternion::identity);
             let floor = self.options.outliers.threshold_px / self.camera.focal_length_px();
-            let seen = (found.len() >= MIN_TRACKS_FOR_GUESS).then(|| outliers::fit_rotation(&found, &start, floor));
-            // When most are lost, the expectation may be all wrong.
+            let observed = (found.len() >= MIN_TRACKS_FOR_GUESS).then(|| outliers::fit_rotation(&found, &start, floor));
+            // When most are lost, the prediction may be wrong altogether.
             let start_over = 2 * lost > results.len();
             for ((track, guess), result) in self.tracks.iter().zip(&guesses).zip(&mut results) {
-                let others =
-                    [seen.as_ref().map(|rotation| self.turned(track, rotation)), start_over.then_some(track.uv_px)];
+                let others = [
+                    observed.as_ref().map(|rotation| self.rotated(track, rotation)),
+                    start_over.then_some(track.uv_px),
+                ];
                 for other in others.into_iter().flatten() {
                     if result.is_none() && (other - guess).norm() > DIFFERENT_GUESS_PX {
                         *result = self.track(track, &other, &mut buffers);
@@ -228,17 +230,17 @@ impl FrontEnd {
 
     fn track(&self, track: &Track, guess_px: &Vector2<f64>, buffers: &mut Buffers) -> Option<Step> {
         let options = &self.options.lucas_kanade;
-        let Buffers { motion, keys } = buffers;
+        let Buffers { motion, search } = buffers;
         let near_px = lucas_kanade::approach(&self.previous, &self.now, &track.uv_px, guess_px, options, motion)?;
-        let mut key = track.key.clone();
-        let sighting = match &mut key {
-            Some(key) => key.find(self.now.levels().first()?, &near_px, &self.options.keys, keys),
-            None => Sighting::OutOfView,
+        let mut reference = track.reference.clone();
+        let matched = match &mut reference {
+            Some(reference) => reference.find(self.now.levels().first()?, &near_px, &self.options.reference, search),
+            None => ReferenceMatch::OutOfView,
         };
-        let uv_px = match sighting {
-            Sighting::Found(uv_px) => uv_px,
-            Sighting::Changed | Sighting::OutOfView => {
-                key = key.filter(|_| sighting == Sighting::OutOfView);
+        let uv_px = match matched {
+            ReferenceMatch::Found(uv_px) => uv_px,
+            ReferenceMatch::Changed | ReferenceMatch::OutOfView => {
+                reference = reference.filter(|_| matched == ReferenceMatch::OutOfView);
                 lucas_kanade::arrive(&self.previous, &self.now, &track.uv_px, &near_px, options, motion)?
             }
         };
@@ -250,19 +252,19 @@ impl FrontEnd {
             previous_bearing: track.bearing,
             uv_px,
             bearing,
-            key,
+            reference,
         })
     }
 
-    /// Where a feature comes to lie when the camera only turns; where it was when that is out of view.
-    fn turned(&self, track: &Track, rotation: &UnitQuaternion<f64>) -> Vector2<f64> {
+    /// Pixel of a feature under a rotation of the camera alone; its previous pixel when that is out of view.
+    fn rotated(&self, track: &Track, rotation: &UnitQuaternion<f64>) -> Vector2<f64> {
         self.camera
             .project(&(rotation * track.bearing))
             .filter(|uv_px| self.camera.contains(uv_px, 0.0))
             .unwrap_or(track.uv_px)
     }
 
-    /// Leaves out what does not move with the scene.
+    /// Rejects features that do not move with the scene.
     fn reject(
         &self,
         steps: Vec<Step>,
@@ -272,15 +274,15 @@ impl FrontEnd {
         let pairs: Vec<BearingPair> = steps.iter().map(pair_of).collect();
         let start = expected.copied().unwrap_or_else(UnitQuaternion::identity);
         let focal_px = self.camera.focal_length_px();
-        let motion = outliers::judge(&pairs, &start, predicted, focal_px, &self.options.outliers);
+        let motion = outliers::estimate_motion(&pairs, &start, predicted, focal_px, &self.options.outliers);
         let kept = steps.into_iter().zip(&motion.is_inlier).filter_map(|(step, inlier)| inlier.then_some(step));
         (kept.collect(), motion)
     }
 
-    /// Of features that ran into each other the one seen longest stays.
+    /// Keeps the longest track of features that are too near to each other.
     fn thin_out(&mut self, mut steps: Vec<Step>) -> Vec<Step> {
         let [width, height] = self.camera.resolution_px;
-        self.crowd.reset(width, height, CROWDED_SHARE * self.options.corners.min_distance_px);
+        self.crowd.reset(width, height, CROWDED_RATIO * self.options.corners.min_distance_px);
         steps.sort_by_key(|step| (std::cmp::Reverse(step.age), step.id));
         steps.retain(|step| {
             let free = self.crowd.is_free(&step.uv_px);
@@ -308,8 +310,8 @@ impl FrontEnd {
     fn mean_parallax_px(&self, steps: &[Step], rotation: &UnitQuaternion<f64>) -> f64 {
         let (mut sum, mut count) = (0.0, 0);
         for step in steps {
-            if let Some(turned) = self.camera.project(&(rotation * step.previous_bearing)) {
-                sum += (step.uv_px - turned).norm();
+            if let Some(rotated) = self.camera.project(&(rotation * step.previous_bearing)) {
+                sum += (step.uv_px - rotated).norm();
                 count += 1;
             }
         }

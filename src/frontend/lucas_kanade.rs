@@ -1,4 +1,4 @@
-//! Following points from one image to the next: pyramidal Lucas–Kanade.
+//! Tracking of points from one image to the next: pyramidal Lucas–Kanade.
 
 #![expect(clippy::inline_always, reason = "what is not inlined is not compiled for the registers of its caller")]
 
@@ -16,10 +16,10 @@ const WINDOW: usize = 21;
 const LANES: usize = 24;
 /// From the first column or row of the window to its centre.
 const CENTRE: f32 = (WINDOW / 2) as f32;
-/// Elements from one row to the next, of the weights and of what is cut out of the second image: with one stride for both,
-/// a sum over the window is a single loop.
+/// Elements from one row to the next, of the weights and of the region of the second image: with one stride for both, a sum
+/// over the window is a single loop.
 const STRIDE: usize = 32;
-/// Rows of what is cut out of the second image, so that the window can move within it.
+/// Rows of the region of the second image, so that the window can move within it.
 const SEARCH_HEIGHT: usize = 34;
 /// Largest first column and row of a window of which also the neighbours one and two further fit in.
 const LAST_COLUMN: i32 = (STRIDE - WINDOW - 2) as i32;
@@ -27,24 +27,24 @@ const LAST_ROW: i32 = (SEARCH_HEIGHT - WINDOW - 3) as i32;
 /// Largest weight; times 128 grey levels times the window's area it still fits into an `i32`.
 const LARGEST_WEIGHT: f32 = 16383.0;
 
-/// What is cut out of the second image, row by row, grey levels less 128.
+/// Region of the second image, row by row, grey levels less 128.
 type Search = [[i16; STRIDE]; SEARCH_HEIGHT];
 type Weights = [i16; STRIDE * WINDOW];
 
-/// How points are followed.
+/// Options of the tracker.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LucasKanadeOptions {
     /// Levels of the pyramid, the image itself included.
     pub levels: usize,
-    /// The search ends when a step gets shorter than this on the level at hand, in pixels.
+    /// Converged when a step is shorter than this, in pixels of the level.
     pub epsilon_px: f64,
     /// The search fails after this many moves to another pixel on one level.
     pub max_moves: usize,
     /// Smaller eigenvalue of the mean structure tensor below which a window has no texture, in (grey levels/px)².
     pub min_eigenvalue: f64,
-    /// Least share of the window that both images must show.
+    /// Minimum ratio of the window that is inside both images.
     pub min_visible: f64,
-    /// A point is lost when, followed back, it comes out further than this from where it was, in pixels; `None` for no check.
+    /// Largest distance from the start after tracking back, in pixels; `None` for no check.
     pub forward_backward_px: Option<f64>,
 }
 
@@ -61,10 +61,9 @@ impl Default for LucasKanadeOptions {
     }
 }
 
-/// What of the first image is compared with the second: the gradient of the window, freed of what brightness and contrast
-/// can do.
+/// The gradient of the window in the first image, with gain and offset of the brightness eliminated.
 ///
-/// With `T` the window of the first image, `g` its gradient and `J` the second image, the shift `d` is sought for which
+/// With `T` the window of the first image, `g` its gradient and `J` the second image, the shift `d` satisfies
 /// `Σ g'·J(x + d) = 0`, where `g'` is `g` less its projection on `1` and `T`.
 /// That is the least-squares solution for `d`, a gain and an offset at once, the latter two eliminated, and `Σ g'·T = 0`.
 /// As `J(x + d)` is interpolated, the sum is a polynomial in the fraction of `d` whose coefficients are sums
@@ -77,13 +76,13 @@ struct Template {
     hessian: [f32; 3],
 }
 
-/// What following a point works on; it holds nothing from one point to the next.
+/// Buffers of tracking one point, without state between points.
 #[derive(Clone, Debug)]
 pub(super) struct Buffers {
     template: Template,
     /// The first image about the window.
     patch: Patch,
-    /// Its gradient; surplus columns and rows that do not count are zero.
+    /// Its gradient; surplus columns and rows are zero.
     gradient: Gradient,
     search: Search,
 }
@@ -112,7 +111,7 @@ fn length([x, y]: [f32; 2]) -> f32 {
     (x * x + y * y).sqrt()
 }
 
-/// Weights of the four pixels about a point that lies `t` after the second one, by Keys' cubic convolution.
+/// Weights of the four pixels around a point at `t` after the second one, by Keys' cubic convolution.
 #[inline(always)]
 fn cubic_weights(t: f32) -> [f32; 4] {
     [
@@ -137,7 +136,7 @@ fn linear_weights(t: f32) -> [f32; 2] {
     [1.0 - t, t]
 }
 
-/// First and last column (or row) of a window about `centre` that shows pixels `margin` inside an image of `count`.
+/// First and last column (or row) of a window around `centre` whose pixels are `margin` inside an image of `count`.
 fn visible(centre: f32, count: usize, margin: f32) -> (f32, f32) {
     let first = (CENTRE - centre + margin).max(0.0).ceil();
     let last = (CENTRE - centre + count as f32 - 1.0 - margin).min(WINDOW as f32 - 1.0).floor();
@@ -149,8 +148,8 @@ const PATCH_HEIGHT: usize = WINDOW + 2;
 type Patch = [[f32; PATCH_WIDTH]; PATCH_HEIGHT];
 
 impl Buffers {
-    /// Makes the template of the window of `image` about `at`, without what lies outside it or would lie outside when moved
-    /// to `guess`. Returns whether there is enough of it to be found again.
+    /// Computes the template of the window of `image` around `at`, without the pixels outside it or outside when moved to
+    /// `guess`. Returns whether enough of it remains to be tracked.
     fn fill(&mut self, image: &GrayImage, at: [f32; 2], guess: [f32; 2], options: &LucasKanadeOptions) -> bool {
         Arch::new().dispatch(Filling { buffers: self, image, at, guess, options })
     }
@@ -187,7 +186,7 @@ impl NullaryFnOnce for Filling<'_> {
         let [value, square, x, y, x_value, y_value] =
             differentiate(patch, rows.clone(), &mask, gradient).map(|sum| sum / area);
         let variance = square - value * value;
-        // A flat window has no contrast to speak of.
+        // A flat window has hardly any contrast.
         let scale = if variance > 1e-3 { 1.0 / variance } else { 0.0 };
         let slopes = [(x_value - x * value) * scale, (y_value - y * value) * scale];
         let offsets = [x - slopes[0] * value, y - slopes[1] * value];
@@ -212,7 +211,7 @@ impl NullaryFnOnce for Filling<'_> {
 /// `[gx, gy]` of a window, row by row.
 type Gradient = [[[f32; LANES]; 2]; WINDOW];
 
-/// Puts the gradient of some rows of a window, times `mask` along each, into `gradient`, the others being zero.
+/// Writes the gradient of some rows of a window, times `mask` along each, into `gradient`; the others are zero.
 ///
 /// Returns the sums over the window of `T, T², gx, gy, gx·T, gy·T`.
 #[inline(always)]
@@ -245,7 +244,7 @@ fn differentiate(patch: &Patch, rows: Range<usize>, mask: &[f32; LANES], gradien
     sums.map(|lanes| lanes.iter().sum())
 }
 
-/// Takes `offsets + slopes·T` off the gradient; returns its sums of products `xx, xy, yy` and its largest part.
+/// Subtracts `offsets + slopes·T` from the gradient; returns its sums of products `xx, xy, yy` and its largest entry.
 #[inline(always)]
 fn free_of_brightness(
     patch: &Patch,
@@ -278,7 +277,7 @@ fn free_of_brightness(
 
 impl Template {
     /// Adds up `Σ g'·J` for the window whose first pixel is `(column, row)` of `search` and its neighbours to the right,
-    /// below and both; `[dy][dx]` holds the sums with the x and the y part of `g'`.
+    /// below and both; `[dy][dx]` are the sums with the x and the y component of `g'`.
     fn correlate(&self, search: &Search, column: usize, row: usize) -> [[[f32; 2]; 2]; 2] {
         const LENGTH: usize = STRIDE * WINDOW;
         let shifted = |offset: usize| -> &[i16; LENGTH] {
@@ -296,7 +295,7 @@ impl Template {
 
 /// A sum of products.
 ///
-/// A function of its own over eight partial sums: in this form the compiler multiplies and adds eight pairs at a time.
+/// A separate function over eight partial sums, which the compiler vectorizes.
 #[inline(never)]
 fn dot(weights: &Weights, pixels: &Weights) -> i32 {
     let mut sums = [0_i32; 8];
@@ -321,7 +320,7 @@ fn floor(value: f32) -> i32 {
     towards_zero - i32::from(towards_zero as f32 > value)
 }
 
-/// The pixels about `at` by cubic convolution, one more on every side than the window.
+/// The pixels around `at` by cubic convolution, one more on every side than the window.
 #[inline(always)]
 fn interpolate(image: &GrayImage, at: [f32; 2], patch: &mut Patch) {
     let corner = at.map(floor);
@@ -369,7 +368,7 @@ fn balance<const N: usize>(
     (value, slope)
 }
 
-/// The step that brings `value` to zero: Newton's, or where that cannot be trusted the Gauss–Newton one.
+/// The step towards `value` = 0: Newton's, or the Gauss–Newton one where the two matrices differ too much.
 fn step_to_balance(value: [f32; 2], slope: [[f32; 2]; 2], [xx, xy, yy]: [f32; 3]) -> [f32; 2] {
     let determinant = xx * yy - xy * xy;
     let newton = slope[0][0] * slope[1][1] - slope[0][1] * slope[1][0];
@@ -378,11 +377,11 @@ fn step_to_balance(value: [f32; 2], slope: [[f32; 2]; 2], [xx, xy, yy]: [f32; 3]
     [-(d * value[0] - b * value[1]) / determinant, -(a * value[1] - c * value[0]) / determinant]
 }
 
-/// How far a fraction may leave its pixel before the sums are taken anew; keeps a point on the border from going to and fro.
+/// Largest distance of a fraction outside its pixel before the sums are recomputed; avoids oscillation at a pixel border.
 const OVERHANG_PX: f32 = 0.02;
-/// Iterations within one pixel; more would only circle.
+/// Maximum iterations within one pixel.
 const MAX_ITERATIONS: usize = 8;
-/// Longest single step in pixels of the level at hand.
+/// Longest single step, in pixels of the level.
 const LONGEST_STEP_PX: f32 = 6.0;
 
 /// The weights of `N` pixels at a fraction, and their derivatives by it.
@@ -413,21 +412,21 @@ fn settle<const N: usize>(
     (fraction, true)
 }
 
-/// How the second image is interpolated.
+/// Interpolation of the second image.
 #[derive(Clone, Copy, PartialEq)]
 enum Kernel {
-    /// Between two pixels.
+    /// Linear, two pixels.
     Linear,
-    /// Between four: exact enough for the last step.
+    /// Cubic, four pixels, for the last stage.
     Cubic,
 }
 
-/// Whether a place is finite and so near that it has whole pixels.
+/// Whether a position is finite and small enough for integer pixels.
 fn is_sane(at: [f32; 2]) -> bool {
     at.iter().all(|t| t.abs() < 1e5)
 }
 
-/// Moves `at` until the window of `image` about it balances the template; `None` when it does not come to rest.
+/// Iterates `at` until `Σ g'·J` vanishes for the window of `image` around it; `None` when it does not converge.
 fn seek(
     template: &Template,
     search: &mut Search,
@@ -436,7 +435,7 @@ fn seek(
     kernel: Kernel,
     options: &LucasKanadeOptions,
 ) -> Option<[f32; 2]> {
-    // The first pixel of what was cut out.
+    // The first pixel of the region.
     let mut origin: Option<[i32; 2]> = None;
     let epsilon = options.epsilon_px as f32;
     for _ in 0..options.max_moves {
@@ -480,11 +479,11 @@ fn seek(
     None
 }
 
-/// Follows one point from one image to the next by pyramidal Lucas–Kanade with compensation of gain and offset.
+/// Tracks one point from one image to the next by pyramidal Lucas–Kanade with compensation of gain and offset.
 ///
-/// `from_px` is its place in `previous`, `guess_px` where it is looked for in `now`; both in pixels of the image.
-/// Returns where it is, or `None` when it left the image, has no texture, or does not come back (see
-/// [`LucasKanadeOptions::forward_backward_px`]).
+/// `from_px` is its position in `previous`, `guess_px` the initial one in `now`; both in pixels of the image.
+/// Returns its position in pixels, or `None` when it left the image, has no texture, or fails the forward–backward check
+/// ([`LucasKanadeOptions::forward_backward_px`]).
 pub fn track(
     previous: &Pyramid,
     now: &Pyramid,
@@ -497,10 +496,10 @@ pub fn track(
     arrive(previous, now, from_px, &near_px, options, &mut buffers)
 }
 
-/// The first stage of [`track`]: comes near on the halved images, to about half a pixel.
+/// The first stage of [`track`]: on the half-size levels, to about half a pixel.
 ///
-/// The window of a level is the one about the nearest whole pixel, which moves as the point does.
-/// Where a level shows nothing the guess is handed on; `None` only for places that make no sense.
+/// The window of a level is centred at the nearest whole pixel, which is assumed to move like the point.
+/// A level without texture passes the guess on; `None` only for positions that are not finite or too large.
 pub(super) fn approach(
     previous: &Pyramid,
     now: &Pyramid,

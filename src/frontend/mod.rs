@@ -1,22 +1,21 @@
 //! Image in, feature tracks out.
 //!
-//! The front end knows the camera and a predicted rotation, never the estimator: every run of a comparison sees the same
-//! tracks.
+//! The front end depends on the camera and a predicted rotation only, not on the estimator: all runs of a comparison use
+//! the same tracks.
 //!
-//! [`FrontEnd`] takes images one by one. It looks for the features it has where a [`PredictedRotation`] or, when that cannot
-//! be trusted, the coarse images say, follows them by [`lucas_kanade`] and holds them to what they looked like at first
-//! ([`KeyOptions`]), leaves out those that do not move with the scene ([`outliers`]), and fills the gaps with new
-//! [`corners`].
+//! [`FrontEnd`] processes images in order. It predicts features by a [`PredictedRotation`] or, when that is inconsistent with
+//! the images, by aligning coarse images, tracks them by [`lucas_kanade`], refines them against their first observation
+//! ([`ReferenceOptions`]), rejects those that do not move with the scene ([`outliers`]), and adds new [`corners`].
 
 mod appearance;
 mod coarse;
 pub mod corners;
 mod front_end;
-mod keyed;
 pub mod lucas_kanade;
 pub mod outliers;
 mod prediction;
 mod pyramid;
+mod reference;
 mod resample;
 mod responses;
 #[cfg(test)]
@@ -24,7 +23,7 @@ mod tests;
 mod tracks;
 
 pub use front_end::{FrontEnd, FrontEndError, FrontEndOptions};
-pub use keyed::KeyOptions;
-pub use prediction::{MountOrientation, PredictedRotation, PredictionNoise, predict_camera_rotation};
+pub use prediction::{ChainOrientation, PredictedRotation, PredictionNoise, predict_camera_rotation};
 pub use pyramid::Pyramid;
+pub use reference::ReferenceOptions;
 pub use tracks::{FeatureId, FrontEndStatistics, TrackedFeature, TrackedFrame};

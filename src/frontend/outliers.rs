@@ -1,25 +1,25 @@
-//! Telling features that move with the scene from those that do not, by the epipolar geometry of two images.
+//! Rejection of features that do not move with the scene, by the epipolar geometry of two images.
 //!
-//! A predicted rotation helps but is not trusted: a gyroscope has a bias, a gimbal's chain may be off by degrees.
-//! The rotation is refined from the tracks themselves, together with the direction of the translation.
+//! A predicted rotation is a prior only: a gyroscope has a bias, and a gimbal's chain may have an error of degrees.
+//! The rotation is estimated from the tracks, together with the direction of the translation.
 
 use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
 
 use super::prediction::PredictedRotation;
 use crate::geometry::{so3, tangent_basis};
 
-/// How outliers are told.
+/// Options of outlier rejection.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OutlierOptions {
     /// Largest distance of an inlier from its epipolar line, in pixels at the image centre.
     pub threshold_px: f64,
-    /// Random pairs of features whose direction of translation is tried, per stage and start.
+    /// Number of random pairs of features that propose a direction of translation, per stage and start.
     pub hypotheses: usize,
-    /// With fewer tracks than this none is rejected: too few to say which of them are right.
+    /// With fewer tracks none is rejected.
     pub min_tracks: usize,
-    /// When less than this share would stay, the geometry was not understood and none is rejected.
-    pub min_inlier_share: f64,
-    /// Standard deviation of a right track, in pixels: what a predicted rotation's own is weighed against.
+    /// With a smaller ratio of inliers the model is invalid and none is rejected.
+    pub min_inlier_ratio: f64,
+    /// Standard deviation of an inlier's track, in pixels; weights a predicted rotation against the tracks.
     pub track_sigma_px: f64,
     /// Seed of the random pairs; the same for every image.
     pub seed: u64,
@@ -31,34 +31,34 @@ impl Default for OutlierOptions {
             threshold_px: 1.5,
             hypotheses: 24,
             min_tracks: 8,
-            min_inlier_share: 0.4,
+            min_inlier_ratio: 0.4,
             track_sigma_px: 0.3,
             seed: 0x5eed,
         }
     }
 }
 
-/// What the tracks of two images say about the motion between them.
+/// Motion between two images, estimated from their tracks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Motion {
-    /// Rotation `camera_now_from_camera_previous`, refined from the tracks.
+    /// Rotation `camera_now_from_camera_previous`.
     pub rotation: UnitQuaternion<f64>,
     /// Unit direction of the translation of points from the previous camera frame to this one, where there is parallax.
     pub direction: Option<Vector3<f64>>,
-    /// Whether each track moves with the scene.
+    /// Whether each track is an inlier.
     pub is_inlier: Vec<bool>,
 }
 
-/// A direction seen in both images, unit lengths.
+/// Unit directions of one feature in two images.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BearingPair {
     /// In the previous camera frame.
     pub previous: Vector3<f64>,
-    /// In the camera frame of now.
+    /// In the current camera frame.
     pub now: Vector3<f64>,
 }
 
-/// A rotation with a direction of translation, and how badly they fit.
+/// A rotation with a direction of translation, and their cost.
 #[derive(Clone, Copy)]
 struct Hypothesis {
     rotation: UnitQuaternion<f64>,
@@ -66,11 +66,11 @@ struct Hypothesis {
     cost: f64,
 }
 
-/// Finds the motion of the scene and the tracks that obey it.
+/// Estimates the motion between two images and its inliers.
 ///
-/// `start` is the rotation from which the search begins; `predicted` is what is known of it without the tracks, and pulls
-/// as much as its covariance says; `focal_px` turns angles into pixels.
-pub fn judge(
+/// `start` is the initial rotation; `predicted` a prior on it, weighted by its covariance; `focal_px` converts angles to
+/// pixels.
+pub fn estimate_motion(
     pairs: &[BearingPair],
     start: &UnitQuaternion<f64>,
     predicted: Option<&PredictedRotation>,
@@ -83,7 +83,7 @@ pub fn judge(
         return Motion { rotation, direction: None, is_inlier: vec![true; pairs.len()] };
     }
     let prior = Prior::new(predicted, options.track_sigma_px / focal_px);
-    let mut search = Search { pairs, prior, options, dice: Dice(options.seed.max(1)), turned: Vec::new() };
+    let mut search = Search { pairs, prior, options, dice: Dice(options.seed.max(1)), rotated: Vec::new() };
     let epipolar = search.run(start, &rotation, threshold);
     let (rotation, direction) = choose_model(pairs, rotation, epipolar.as_ref(), threshold);
     let is_inlier: Vec<bool> = match &direction {
@@ -92,22 +92,22 @@ pub fn judge(
         }
         None => pairs.iter().map(|pair| (pair.now - rotation * pair.previous).norm() <= threshold).collect(),
     };
-    let share = is_inlier.iter().filter(|inlier| **inlier).count() as f64 / pairs.len() as f64;
-    if share < options.min_inlier_share {
+    let ratio = is_inlier.iter().filter(|inlier| **inlier).count() as f64 / pairs.len() as f64;
+    if ratio < options.min_inlier_ratio {
         return Motion { rotation, direction: None, is_inlier: vec![true; pairs.len()] };
     }
     Motion { rotation, direction, is_inlier }
 }
 
-/// Share of the tracks that a rotation alone does not explain which a direction of translation must explain to count.
-const MIN_SHARE_EXPLAINED: f64 = 0.5;
-/// With fewer such tracks a direction could be drawn through any of them.
+/// Ratio of the outliers of a pure rotation that a direction of translation must explain.
+const MIN_EXPLAINED_RATIO: f64 = 0.5;
+/// Minimum number of such tracks; fewer fit any direction.
 const MIN_MOVING_TRACKS: usize = 6;
 
 /// Decides between pure rotation and a motion with parallax.
 ///
-/// Without parallax any direction fits, and one that is drawn through two wrong tracks makes them look right.
-/// So a direction counts when it explains most of what the rotation alone leaves over.
+/// Without parallax any direction fits, and one through two outliers makes them inliers.
+/// A direction is therefore accepted when it explains most of the outliers of the pure rotation.
 fn choose_model(
     pairs: &[BearingPair],
     rotation: UnitQuaternion<f64>,
@@ -121,34 +121,34 @@ fn choose_model(
         left_over += 1;
         explained += usize::from(epipolar_distance(pair, &epipolar.rotation, &epipolar.direction) <= threshold);
     }
-    let counts = left_over >= MIN_MOVING_TRACKS && explained as f64 >= MIN_SHARE_EXPLAINED * left_over as f64;
+    let counts = left_over >= MIN_MOVING_TRACKS && explained as f64 >= MIN_EXPLAINED_RATIO * left_over as f64;
     if counts { (epipolar.rotation, Some(epipolar.direction)) } else { (rotation, None) }
 }
 
 /// Distance of a pair from the epipolar geometry as an angle, to first order (Sampson's), in radians.
 ///
-/// A point before both cameras moves towards `direction`; one that moves the other way is as far off as it moved.
+/// A point in front of both cameras moves towards `direction`; for one that moves the other way the distance is its motion.
 fn epipolar_distance(pair: &BearingPair, rotation: &UnitQuaternion<f64>, direction: &Vector3<f64>) -> f64 {
-    let turned = BearingPair { previous: rotation * pair.previous, now: pair.now };
-    epipolar_distances(&turned, direction)[0]
+    let rotated = BearingPair { previous: rotation * pair.previous, now: pair.now };
+    epipolar_distances(&rotated, direction)[0]
 }
 
-/// [`epipolar_distance`] of a pair whose previous bearing is turned already, for a direction and for the opposite one.
+/// [`epipolar_distance`] of a pair whose previous bearing is rotated already, for a direction and its opposite, in radians.
 fn epipolar_distances(pair: &BearingPair, direction: &Vector3<f64>) -> [f64; 2] {
-    let turned = pair.previous;
-    let normal = direction.cross(&turned);
+    let rotated = pair.previous;
+    let normal = direction.cross(&rotated);
     let other_normal = pair.now.cross(direction);
     let gap = pair.now.dot(&normal);
     let scale = normal.norm_squared() + other_normal.norm_squared() - 2.0 * gap * gap;
     let sampson = if scale > 1e-12 { gap.abs() / scale.sqrt() } else { 0.0 };
-    let along = (direction - turned * turned.dot(direction)).dot(&(pair.now - turned)) / normal.norm().max(1e-6);
+    let along = (direction - rotated * rotated.dot(direction)).dot(&(pair.now - rotated)) / normal.norm().max(1e-6);
     [sampson.max(-along), sampson.max(along)]
 }
 
-/// Angles on which a fit of the rotation is repeated until it rests.
+/// Maximum iterations of [`fit_rotation`].
 const ROTATION_ITERATIONS: usize = 12;
 
-/// The rotation that most of the pairs obey best, whatever the rest does, from a start that may be off.
+/// Robust fit of a rotation to pairs, from an initial one that may have a large error.
 ///
 /// Weights fall with the fourth power of the residual over a scale, which shrinks with the residuals' median to `floor`.
 pub fn fit_rotation(pairs: &[BearingPair], start: &UnitQuaternion<f64>, floor: f64) -> UnitQuaternion<f64> {
@@ -162,13 +162,13 @@ pub fn fit_rotation(pairs: &[BearingPair], start: &UnitQuaternion<f64>, floor: f
         let scale = (2.0 * median).max(floor);
         let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
         for pair in pairs {
-            let turned = rotation * pair.previous;
-            let ratio = (pair.now - turned).norm_squared() / (scale * scale);
+            let rotated = rotation * pair.previous;
+            let ratio = (pair.now - rotated).norm_squared() / (scale * scale);
             let weight = 1.0 / ((1.0 + ratio) * (1.0 + ratio));
-            normal += weight * (Matrix3::identity() - turned * turned.transpose());
-            right += weight * turned.cross(&pair.now);
+            normal += weight * (Matrix3::identity() - rotated * rotated.transpose());
+            right += weight * rotated.cross(&pair.now);
         }
-        // A few bearings close together say nothing about the turn about their middle; it then stays as it started.
+        // A few bearings close together do not constrain the rotation about their mean; it keeps its initial value.
         normal += Matrix3::identity() * (1e-6 * normal.trace() + f64::MIN_POSITIVE);
         let Some(step) = normal.cholesky().map(|factor| factor.solve(&right)) else { return rotation };
         rotation = UnitQuaternion::new_normalize((so3::exp(&step) * rotation).into_inner());
@@ -179,21 +179,21 @@ pub fn fit_rotation(pairs: &[BearingPair], start: &UnitQuaternion<f64>, floor: f
     rotation
 }
 
-/// The scales over which the search narrows down, in thresholds.
+/// Scales of the stages, in thresholds.
 const STAGES: [f64; 3] = [6.0, 2.0, 1.0];
 /// Steps of the refinement after each stage.
 const REFINEMENTS: usize = 6;
 
-/// With a larger share of outliers than this the search starts again with more freedom.
-const WORTH_A_SECOND_LOOK: f64 = 0.3;
-/// Random fives of tracks tried then, and Gauss–Newton steps for each.
+/// With a larger ratio of outliers motions with a free rotation are tried.
+const MOST_OUTLIERS_RATIO: f64 = 0.3;
+/// Number of random samples of five tracks, and Gauss–Newton steps for each.
 const FULL_HYPOTHESES: usize = 60;
 const MINIMAL_ITERATIONS: usize = 5;
 
-/// What is known of the rotation without the tracks, in units of a right track's variance.
+/// Prior on the rotation, in units of an inlier's variance.
 struct Prior {
     rotation: UnitQuaternion<f64>,
-    /// Information over that of a right track, without a unit.
+    /// Information relative to that of an inlier (3 × 3, no unit).
     information: Matrix3<f64>,
     track_sigma_rad: f64,
 }
@@ -207,12 +207,12 @@ impl Prior {
         }
     }
 
-    /// The information beside squared track residuals over `scale`, and how far a rotation is off.
+    /// Information (3 × 3) relative to squared track residuals over `scale`, and the error of a rotation, in radians.
     ///
-    /// Residuals are measured by a scale that is larger than their noise; the prior shrinks alike.
+    /// Where the scale is larger than the noise of the tracks, the prior is weakened alike.
     fn at(&self, rotation: &UnitQuaternion<f64>, scale: f64) -> (Matrix3<f64>, Vector3<f64>) {
-        let turn = so3::log(&(rotation * self.rotation.inverse()));
-        (self.information * (self.track_sigma_rad / scale).powi(2), turn)
+        let rotation_vector = so3::log(&(rotation * self.rotation.inverse()));
+        (self.information * (self.track_sigma_rad / scale).powi(2), rotation_vector)
     }
 }
 
@@ -222,12 +222,12 @@ struct Search<'a> {
     prior: Prior,
     options: &'a OutlierOptions,
     dice: Dice,
-    /// The pairs with the previous bearing turned by the rotation at hand.
-    turned: Vec<BearingPair>,
+    /// The pairs with the previous bearing rotated by the current rotation.
+    rotated: Vec<BearingPair>,
 }
 
 impl Search<'_> {
-    /// The best hypothesis from either start, `None` when there is no parallax at all to draw a direction from.
+    /// The best hypothesis from either start, `None` without parallax.
     fn run(
         &mut self,
         predicted: &UnitQuaternion<f64>,
@@ -244,7 +244,7 @@ impl Search<'_> {
             }
         }
         let outlier_share = |best: &Hypothesis| best.cost / self.pairs.len() as f64;
-        if best.as_ref().is_none_or(|best| outlier_share(best) > WORTH_A_SECOND_LOOK)
+        if best.as_ref().is_none_or(|best| outlier_share(best) > MOST_OUTLIERS_RATIO)
             && let Some(found) = self.draw_with_rotation(fitted, threshold)
             && best.is_none_or(|best| found.cost < best.cost)
         {
@@ -253,7 +253,7 @@ impl Search<'_> {
         best
     }
 
-    /// The best of many motions through five random tracks each, for when no start was near enough.
+    /// The best of many motions through five random tracks each, when no start converged.
     fn draw_with_rotation(&mut self, rotation: &UnitQuaternion<f64>, threshold: f64) -> Option<Hypothesis> {
         let mut best: Option<Hypothesis> = None;
         for _ in 0..FULL_HYPOTHESES {
@@ -262,7 +262,7 @@ impl Search<'_> {
             let Some(direction) = normals[0].cross(&normals[1]).try_normalize(1e-14) else { continue };
             let mut trial = Hypothesis { rotation: *rotation, direction, cost: f64::INFINITY };
             for _ in 0..MINIMAL_ITERATIONS {
-                // Hardly any damping and a scale so large that every one of the five counts.
+                // Little damping and a scale at which all five have full weight.
                 let barely = Matrix3::identity() * 1e-9;
                 let Some(step) = step_towards(&sample, &trial, 1.0, &barely, &Vector3::zeros()) else { break };
                 (trial.rotation, trial.direction) = step;
@@ -277,7 +277,7 @@ impl Search<'_> {
         best.map(|best| self.settle(best, threshold))
     }
 
-    /// The best of a few steps downhill.
+    /// The best of a few Gauss–Newton steps.
     fn settle(&self, start: Hypothesis, scale: f64) -> Hypothesis {
         let (mut best, mut at) = (start, start);
         for _ in 0..REFINEMENTS {
@@ -290,7 +290,7 @@ impl Search<'_> {
         best
     }
 
-    /// Draws directions and refines the best one, at ever smaller scales.
+    /// Proposes directions and refines the best one, at decreasing scales.
     fn descend(&mut self, rotation: &UnitQuaternion<f64>, threshold: f64) -> Option<Hypothesis> {
         let mut best = Hypothesis { rotation: *rotation, direction: Vector3::zeros(), cost: f64::INFINITY };
         for stage in STAGES {
@@ -310,17 +310,17 @@ impl Search<'_> {
         best.cost.is_finite().then_some(best)
     }
 
-    /// The best direction of those that random pairs of tracks give, the rotation held.
+    /// The best direction among those of random pairs of tracks, with a fixed rotation.
     fn draw(&mut self, rotation: &UnitQuaternion<f64>, scale: f64) -> Option<Hypothesis> {
-        self.turned.clear();
-        self.turned
+        self.rotated.clear();
+        self.rotated
             .extend(self.pairs.iter().map(|pair| BearingPair { previous: rotation * pair.previous, now: pair.now }));
         let pull = self.prior_cost(rotation, scale);
         let mut best: Option<Hypothesis> = None;
         for _ in 0..self.options.hypotheses {
-            // Normals of the epipolar planes if there were no more than the rotation at hand.
+            // Normals of the epipolar planes at the current rotation.
             let normals = [0, 1].map(|_| {
-                let pair = &self.turned[self.dice.below(self.turned.len())];
+                let pair = &self.rotated[self.dice.below(self.rotated.len())];
                 pair.previous.cross(&pair.now)
             });
             let Some(axis) = normals[0].cross(&normals[1]).try_normalize(1e-14) else { continue };
@@ -333,11 +333,11 @@ impl Search<'_> {
         best
     }
 
-    /// Sums of squared distances of the turned pairs for a direction and for the opposite one, each distance over `scale`
+    /// Sums of squared distances of the rotated pairs for a direction and for the opposite one, each distance over `scale`
     /// and no larger than one.
     fn costs(&self, direction: &Vector3<f64>, scale: f64) -> [f64; 2] {
         let mut sums = [0.0; 2];
-        for pair in &self.turned {
+        for pair in &self.rotated {
             let distances = epipolar_distances(pair, direction);
             for (sum, distance) in sums.iter_mut().zip(distances) {
                 *sum += (distance / scale).powi(2).min(1.0);
@@ -346,7 +346,7 @@ impl Search<'_> {
         sums
     }
 
-    /// Sum of squared distances over `scale`, each no larger than one, and what the prediction says of the rotation.
+    /// Sum of squared distances over `scale`, each truncated at one, plus the cost of the prior.
     fn cost(&self, rotation: &UnitQuaternion<f64>, direction: &Vector3<f64>, scale: f64) -> f64 {
         let sum: f64 = self
             .pairs
@@ -359,40 +359,41 @@ impl Search<'_> {
         sum + self.prior_cost(rotation, scale)
     }
 
-    /// What the prediction says of a rotation, in the unit of [`Self::cost`].
+    /// Cost of the prior at a rotation, in the unit of [`Self::cost`].
     fn prior_cost(&self, rotation: &UnitQuaternion<f64>, scale: f64) -> f64 {
-        let (information, turn) = self.prior.at(rotation, scale);
-        turn.dot(&(information * turn))
+        let (information, rotation_vector) = self.prior.at(rotation, scale);
+        rotation_vector.dot(&(information * rotation_vector))
     }
 
-    /// One Gauss–Newton step on the rotation and the direction, with weights that leave outliers out.
+    /// One Gauss–Newton step on rotation and direction, with weights that reject outliers.
     fn refine(&self, at: &Hypothesis, scale: f64) -> Option<Hypothesis> {
-        let (information, turn_so_far) = self.prior.at(&at.rotation, scale);
-        let (rotation, direction) = step_towards(self.pairs, at, scale, &information, &turn_so_far)?;
+        let (information, rotation_error) = self.prior.at(&at.rotation, scale);
+        let (rotation, direction) = step_towards(self.pairs, at, scale, &information, &rotation_error)?;
         let cost = self.cost(&rotation, &direction, scale);
         Some(Hypothesis { rotation, direction, cost })
     }
 }
 
-/// Holds what neither tracks nor prior determine, in the unit of [`step_towards`]'s normal matrix.
+/// Damping of directions that neither tracks nor prior constrain, in the unit of [`step_towards`]'s normal matrix.
 const LEAST_INFORMATION: f64 = 1e-9;
 
-/// A Gauss–Newton step on the epipolar distances of `pairs` in units of `scale`; each weighs less the further off it is.
+/// A Gauss–Newton step on the epipolar distances of `pairs` in units of `scale`, with weights that decrease with
+/// the distance.
 ///
-/// `prior` is the information about the rotation, which lies `turn_so_far` from what is expected, in radians.
+/// `prior` is the information of the prior rotation (3 × 3), `rotation_error` the deviation from it, in radians.
 fn step_towards(
     pairs: &[BearingPair],
     at: &Hypothesis,
     scale: f64,
     prior: &Matrix3<f64>,
-    turn_so_far: &Vector3<f64>,
+    rotation_error: &Vector3<f64>,
 ) -> Option<(UnitQuaternion<f64>, Vector3<f64>)> {
     let basis = tangent_basis(&at.direction);
     let mut normal = SMatrix::<f64, 5, 5>::zeros();
     let mut right = SVector::<f64, 5>::zeros();
     for pair in pairs {
-        let turned = at.rotation * pair.previous;
-        let plane = at.direction.cross(&turned);
+        let rotated = at.rotation * pair.previous;
+        let plane = at.direction.cross(&rotated);
         let other_plane = pair.now.cross(&at.direction);
         let gap = pair.now.dot(&plane);
         let spread = plane.norm_squared() + other_plane.norm_squared() - 2.0 * gap * gap;
@@ -401,23 +402,23 @@ fn step_towards(
         }
         let ratio = gap * gap / (spread * scale * scale);
         let weight = 1.0 / (spread * scale * scale * (1.0 + ratio) * (1.0 + ratio));
-        let by_turn = turned.cross(&other_plane);
-        let by_direction = basis.tr_mul(&turned.cross(&pair.now));
-        let row = SVector::<f64, 5>::new(by_turn.x, by_turn.y, by_turn.z, by_direction.x, by_direction.y);
+        let by_rotation = rotated.cross(&other_plane);
+        let by_direction = basis.tr_mul(&rotated.cross(&pair.now));
+        let row = SVector::<f64, 5>::new(by_rotation.x, by_rotation.y, by_rotation.z, by_direction.x, by_direction.y);
         normal += row * row.transpose() * weight;
         right -= row * (gap * weight);
     }
     let mut corner = normal.fixed_view_mut::<3, 3>(0, 0);
     corner += prior;
     let mut top = right.fixed_rows_mut::<3>(0);
-    top -= prior * turn_so_far;
+    top -= prior * rotation_error;
     for k in 0..5 {
-        // Without parallax the direction is free, and without a prior the turn about a single track.
+        // Without parallax the direction is unobservable, and without a prior the rotation about a single track.
         normal[(k, k)] += LEAST_INFORMATION;
     }
     let step = normal.cholesky()?.solve(&right);
-    let turn = so3::exp(&Vector3::new(step[0], step[1], step[2]));
-    let rotation = UnitQuaternion::new_normalize((turn * at.rotation).into_inner());
+    let rotation_vector = so3::exp(&Vector3::new(step[0], step[1], step[2]));
+    let rotation = UnitQuaternion::new_normalize((rotation_vector * at.rotation).into_inner());
     let direction = (at.direction + basis * step.fixed_rows::<2>(3)).try_normalize(1e-9)?;
     Some((rotation, direction))
 }

@@ -4,58 +4,58 @@ use crate::geometry::{seconds_from_ns, so3};
 use crate::gimbal::ClassicalChain;
 use crate::sensors::ImuSample;
 
-/// A rotation between two images that is expected, and how well it is known.
+/// Predicted rotation of a camera between two images, with its covariance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PredictedRotation {
     /// `camera_now_from_camera_previous`.
     pub rotation: UnitQuaternion<f64>,
-    /// Covariance of its error `δ` in the camera frame of now, true rotation = `Exp(δ)·rotation`, in rad².
+    /// Covariance (3 × 3, rad²) of its error `δ` in the current camera frame, true rotation = `Exp(δ)·rotation`.
     pub covariance_rad2: Matrix3<f64>,
 }
 
 impl PredictedRotation {
-    /// One that is known equally well about every axis.
+    /// A prediction with the same standard deviation about every axis.
     pub fn isotropic(rotation: UnitQuaternion<f64>, sigma_rad: f64) -> Self {
         Self { rotation, covariance_rad2: Matrix3::identity() * sigma_rad.powi(2) }
     }
 
-    /// Standard deviation about the axis that is known worst, in radians.
+    /// Largest standard deviation over all axes, in radians.
     pub fn sigma_rad(&self) -> f64 {
         self.covariance_rad2.symmetric_eigenvalues().max().max(0.0).sqrt()
     }
 
-    /// Inverse of the covariance; zero, which says nothing, where that does not exist.
+    /// Inverse of the covariance (3 × 3, 1/rad²); zero for a singular one.
     pub(super) fn information(&self) -> Matrix3<f64> {
         let floor = Matrix3::identity() * LEAST_SIGMA_RAD.powi(2);
         (self.covariance_rad2 + floor).try_inverse().unwrap_or_else(Matrix3::zeros)
     }
 }
 
-/// No prediction is taken to be better than this, a tenth of a pixel or less.
+/// Lower bound of a prediction's standard deviation, a tenth of a pixel or less.
 const LEAST_SIGMA_RAD: f64 = 2e-4;
 
-/// How wrong that may be of which a rotation is predicted, standard deviations per axis.
+/// Standard deviations, per axis, of the inputs of a predicted rotation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PredictionNoise {
-    /// The gyroscope's bias, beyond what is taken off.
+    /// Gyroscope bias after correction, in rad/s.
     pub gyroscope_bias_rad_per_s: f64,
-    /// The gyroscope's noise density, in rad/s/√Hz.
+    /// Gyroscope noise density, in rad/s/√Hz.
     pub gyroscope_noise_density: f64,
-    /// Every rotation of the chain as given.
+    /// Rotation of each link of the chain, in radians.
     pub chain_rotation_rad: f64,
 }
 
-/// How a camera sits on the IMU at one instant: the orientations of base, joints, effector and camera.
+/// Orientations of base, joints, end effector and camera relative to the IMU at one instant.
 #[derive(Clone, Debug, PartialEq)]
-pub struct MountOrientation {
+pub struct ChainOrientation {
     /// `imu_from_frame` of the base, of the frame after each joint, and last of the camera: N + 2 of them.
     imu_from_frame: Vec<UnitQuaternion<f64>>,
-    /// Standard deviations of the joint angles.
+    /// Standard deviations of the joint angles, in radians.
     joint_sigmas_rad: Vec<f64>,
 }
 
-impl MountOrientation {
-    /// That of a chain at its joint angles, each with its standard deviation; of a rigid camera when it has no links.
+impl ChainOrientation {
+    /// Orientations of a chain at joint angles with their standard deviations; a chain without links is a rigid camera.
     ///
     /// # Panics
     /// When the number of angles or of standard deviations is not the number of joints.
@@ -68,34 +68,34 @@ impl MountOrientation {
         }
     }
 
-    /// Orientation of the camera on the IMU.
+    /// Orientation `imu_from_camera`.
     fn imu_from_camera(&self) -> UnitQuaternion<f64> {
         self.imu_from_frame.last().copied().unwrap_or_else(UnitQuaternion::identity)
     }
 
-    /// What an error of one standard deviation turns the camera by, joint by joint, in the camera frame.
+    /// Rotation vector of the camera by an error of one standard deviation in each joint, in the camera frame, in radians.
     fn joint_errors_in_camera(&self) -> impl Iterator<Item = Vector3<f64>> {
         let camera_from_imu = self.imu_from_camera().inverse();
-        // Each joint turns about the z axis of the frame before it.
+        // Each joint rotates about the z axis of the frame before it.
         let joints = self.imu_from_frame.iter().zip(&self.joint_sigmas_rad);
         joints.map(move |(frame, sigma_rad)| camera_from_imu * (frame * (Vector3::z() * *sigma_rad)))
     }
 }
 
-/// How a camera turned between two images, from the gyroscope and from how the camera sat on the IMU at either image.
+/// Predicts the rotation of a camera between two images, from the gyroscope and the orientation on the IMU at both images.
 ///
 /// `imu` goes from the previous image's stamp to this one's (see [`SensorFrame::imu`](crate::flight_log::SensorFrame)); the
-/// angular velocity is taken as linear between its samples.
-/// `gyroscope_bias_rad_per_s` is taken off; zero where it is not known.
-/// The covariance holds the gyroscope's bias and noise, the joint angles at both images, and the chain's own error, of which
-/// only what changes between the images counts: `Rᵀ_now·(G·F_previous − F_now)` for a frame `F` of the chain and the
+/// angular velocity is interpolated linearly.
+/// `gyroscope_bias_rad_per_s` is subtracted; zero when it is unknown.
+/// The covariance consists of gyroscope bias and noise, joint angles at both images, and the error of the chain, of which
+/// only the change between the images counts: `Rᵀ_now·(G·F_previous − F_now)` for a frame `F` of the chain and the
 /// rotation `G` of the IMU.
-/// Returns `None` with fewer than two samples, when time does not run forwards, or when a number is not finite.
+/// Returns `None` with fewer than two samples, when stamps do not increase, or when a value is not finite.
 pub fn predict_camera_rotation(
     imu: &[ImuSample],
     gyroscope_bias_rad_per_s: &Vector3<f64>,
-    previous: &MountOrientation,
-    now: &MountOrientation,
+    previous: &ChainOrientation,
+    now: &ChainOrientation,
     noise: &PredictionNoise,
 ) -> Option<PredictedRotation> {
     let (first, last) = (imu.first()?, imu.last()?);
@@ -124,11 +124,11 @@ pub fn predict_camera_rotation(
     for error in now.joint_errors_in_camera().chain(of_previous) {
         covariance_rad2 += error * error.transpose();
     }
-    let turn = imu_now_from_imu_previous.to_rotation_matrix().into_inner();
+    let imu_rotation = imu_now_from_imu_previous.to_rotation_matrix().into_inner();
     let back = camera_now_from_imu.to_rotation_matrix().into_inner();
     for (before, after) in previous.imu_from_frame.iter().zip(&now.imu_from_frame) {
         let before = before.to_rotation_matrix().into_inner();
-        let by_error = back * (turn * before - after.to_rotation_matrix().into_inner());
+        let by_error = back * (imu_rotation * before - after.to_rotation_matrix().into_inner());
         covariance_rad2 += by_error * by_error.transpose() * noise.chain_rotation_rad.powi(2);
     }
     let finite = rotation.coords.iter().chain(covariance_rad2.iter()).all(|value| value.is_finite());

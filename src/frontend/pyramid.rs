@@ -1,14 +1,14 @@
 use crate::sensors::GrayImage;
 
-/// Pixels of mirror picture that the smoothing needs on either side.
+/// Mirrored pixels that the smoothing needs on either side.
 const FILTER_RADIUS: usize = 2;
 
-/// An image and its halvings, each smoothed by the binomial filter `1 4 6 4 1` before every second pixel is kept.
+/// An image and its half-size levels, each smoothed by the binomial filter `1 4 6 4 1` before every second pixel is kept.
 ///
 /// Pixel `(x, y)` of level `l` is pixel `(2ˡ·x, 2ˡ·y)` of the image.
-/// Beyond its borders an image goes on as its mirror picture about the outermost pixels (reflect-101), both in the
-/// smoothing and in the windows that the tracker cuts out, so no window is lost there.
-/// The buffers live on from image to image.
+/// Beyond its borders an image is mirrored about the outermost pixels (reflect-101), both in the smoothing and in the
+/// windows of the tracker, so that no window is lost there.
+/// The buffers are reused from image to image.
 #[derive(Clone, Debug, Default)]
 pub struct Pyramid {
     levels: Vec<GrayImage>,
@@ -17,10 +17,10 @@ pub struct Pyramid {
 }
 
 impl Pyramid {
-    /// No level is narrower than this, in pixels: nothing can be tracked there.
+    /// Minimum side of a level, in pixels; smaller ones cannot be tracked.
     pub const SMALLEST_LEVEL_PX: usize = 16;
 
-    /// Takes in an image and builds `levels` levels: the image itself, and fewer halvings when it is too small for all.
+    /// Builds up to `levels` levels of an image, the image itself first; fewer when it is too small for all.
     pub fn build(&mut self, image: &GrayImage, levels: usize) {
         let (mut width, mut height) = (image.width, image.height);
         let mut count = 0;
@@ -48,7 +48,7 @@ impl Pyramid {
     }
 }
 
-/// Index of the pixel that stands at `index` when a line of `count` pixels is mirrored about its ends.
+/// Index of the pixel at `index` of a line of `count` pixels that is mirrored about its ends.
 pub(super) fn mirrored(index: i32, count: usize) -> usize {
     let last = count as i32 - 1;
     let from_the_left = index.abs();
@@ -56,7 +56,7 @@ pub(super) fn mirrored(index: i32, count: usize) -> usize {
     from_the_right.clamp(0, last) as usize
 }
 
-/// Cuts out the pixels from `first` (column, row) on, which may lie outside the image.
+/// Copies the pixels from `first` (column, row) on, which may be outside the image.
 #[inline]
 pub(super) fn cut_out<T, const WIDTH: usize>(
     image: &GrayImage,
@@ -101,7 +101,7 @@ fn halve(source: &GrayImage, target: &mut GrayImage, column_sums: &mut Vec<u16>)
         let (pairs, _) = column_sums.as_chunks::<2>();
         for (pixel, taps) in target_row.iter_mut().zip(pairs.windows(3)) {
             let [[far_left, left], [middle, right], [far_right, _]] = *taps else { continue };
-            // At most 16 · 16 · 255 + 128, which a u16 holds.
+            // At most 16 · 16 · 255 + 128, which fits into a u16.
             *pixel = ((far_left + far_right + 4 * (left + right) + 6 * middle + 128) >> 8) as u8;
         }
     }

@@ -1,14 +1,14 @@
-//! Reading an image at the places of a window that is moved, turned, stretched and sheared.
+//! Resampling of an image at the pixels of an affinely warped window.
 
 use nalgebra::{Matrix2, Vector2};
 
-use super::keyed::{CENTRE, LANES, Rows, WINDOW};
+use super::reference::{CENTRE, LANES, Rows, WINDOW};
 use crate::sensors::GrayImage;
 
-/// Elements from one row of a patch to the next, and its rows: what a window of twice the area needs at any turn.
+/// Elements from one row of a patch to the next, and its rows: enough for a window of twice the area at any rotation.
 const STRIDE: usize = 64;
 const HEIGHT: usize = 64;
-/// Pixels beyond what is needed at first on every side, so that a window can move.
+/// Additional pixels on every side, so that a window can move.
 const MARGIN: usize = 2;
 
 /// Steps of a pixel between which the weights are the same.
@@ -33,14 +33,14 @@ const fn cubic_table() -> [[f32; 4]; FRACTIONS] {
     table
 }
 
-/// A part of an image in floating point, from which windows are read.
+/// A region of an image in floating point, from which windows are resampled.
 #[derive(Clone, Debug)]
 pub(super) struct Patch {
-    /// Row by row; with as much behind the last one that the four rows about any pixel are there.
+    /// Row by row, padded after the last one, so that the four rows around any pixel exist.
     pixels: Box<[f32; STRIDE * HEIGHT + SURPLUS]>,
     /// Column and row of its first pixel in the image.
     first: [usize; 2],
-    /// Columns and rows that it holds.
+    /// Its columns and rows.
     size: [usize; 2],
 }
 
@@ -52,14 +52,14 @@ impl Patch {
         Self { pixels: Box::new([0.0; STRIDE * HEIGHT + SURPLUS]), first: [0; 2], size: [0; 2] }
     }
 
-    /// Forgets the image.
+    /// Discards the image.
     pub(super) fn clear(&mut self) {
         self.size = [0; 2];
     }
 
     /// Reads the image at `middle + warp·step` for every step of the window, less `level`.
     ///
-    /// Returns whether all of that lies inside the image, and near enough together for a patch.
+    /// Returns whether all of that is inside the image and fits into a patch.
     /// `image` is the same until the patch is [cleared](Self::clear).
     pub(super) fn read(
         &mut self,
@@ -93,7 +93,7 @@ impl Patch {
         (0..2).all(|k| needed[k][0] >= self.first[k] && needed[k][1] < self.first[k] + self.size[k])
     }
 
-    /// Takes in what is needed and the margin; returns whether there is room for it.
+    /// Copies the needed region with the margin; returns whether it fits.
     fn cut_out(&mut self, image: &GrayImage, needed: [[usize; 2]; 2]) -> bool {
         let counts = [image.width, image.height];
         for k in 0..2 {

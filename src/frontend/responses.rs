@@ -1,4 +1,4 @@
-//! How much of a corner the pixels of a tile are: the smaller eigenvalue of the mean structure tensor about each.
+//! Corner response of the pixels of a tile: the smaller eigenvalue of the mean structure tensor around each.
 
 #![expect(clippy::inline_always, reason = "what is not inlined is not compiled for the registers of its caller")]
 #![expect(clippy::needless_bitwise_bool, reason = "without branches, many pixels are compared at once")]
@@ -10,19 +10,19 @@ use super::lucas_kanade::smaller_eigenvalue;
 use super::pyramid::cut_out;
 use crate::sensors::GrayImage;
 
-/// Side of the squares of an image that are looked at one by one, in pixels.
+/// Side of a tile, in pixels.
 pub(super) const TILE: usize = 32;
 /// The structure tensor is the mean over a square that reaches this far about a pixel.
 const BLOCK_RADIUS: usize = 2;
 const BLOCK: usize = 2 * BLOCK_RADIUS + 1;
 /// Scharr's weights add up to 32, and the mean is over the block.
 const UNIT: f32 = 1.0 / (32.0 * 32.0 * (BLOCK * BLOCK) as f32);
-/// Eigenvalues are needed one pixel beyond the tile, to know whether a pixel of its rim is a maximum.
+/// Eigenvalues are needed one pixel beyond the tile, to decide whether a pixel at its border is a maximum.
 const RESPONSES: usize = TILE + 2;
 const GRADIENTS: usize = RESPONSES + 2 * BLOCK_RADIUS;
 const PIXELS: usize = GRADIENTS + 2;
 
-/// The smaller eigenvalues of a tile and one pixel around it, and where they are largest.
+/// The smaller eigenvalues of a tile and one pixel around it, and their local maxima.
 #[derive(Clone, Debug)]
 pub(super) struct Responses {
     values: Box<[[f32; RESPONSES]; RESPONSES]>,
@@ -46,7 +46,7 @@ impl Default for Responses {
 }
 
 impl Responses {
-    /// Takes in the tile of `image` at `first` (column, row); responses below `least` are no peaks.
+    /// Computes the tile of `image` at `first` (column, row); responses below `least` are no peaks.
     pub(super) fn compute(&mut self, image: &GrayImage, first: [usize; 2], least: f32) {
         let mut pixels = [[0.0_f32; PIXELS]; PIXELS];
         cut_out(image, first.map(|t| t as i32 - (BLOCK_RADIUS + 2) as i32), &mut pixels, f32::from);

@@ -1,19 +1,19 @@
 use nalgebra::{Vector2, Vector3};
 
-/// Identity of a feature over its whole life in one camera's stream.
+/// Identity of a feature over its entire track.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct FeatureId(pub u64);
 
-/// More than a camera finds: the ids of the next camera begin there.
+/// Distance of the ids of two cameras, more than the features of one.
 const IDS_PER_CAMERA: u64 = 1_000_000_000;
 
 impl FeatureId {
-    /// The same feature told apart from those of other cameras; ids of camera 0 stay as they are.
+    /// The id made unique among cameras: `id + 10⁹·camera`.
     pub fn of_camera(self, camera: usize) -> Self {
         Self(self.0 + camera as u64 * IDS_PER_CAMERA)
     }
 
-    /// Number of the camera that [`Self::of_camera`] has named.
+    /// Number of the camera given to [`Self::of_camera`].
     pub fn camera(self) -> usize {
         (self.0 / IDS_PER_CAMERA) as usize
     }
@@ -22,32 +22,32 @@ impl FeatureId {
 /// One feature in one image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrackedFeature {
-    /// Who it is.
+    /// Its identity.
     pub id: FeatureId,
-    /// In how many images before this one it was seen without a gap; 0 for a new one.
+    /// Number of consecutive images before this one with an observation; 0 for a new feature.
     pub age: u32,
-    /// Where it is, in pixels of the distorted image.
+    /// Position in the distorted image, in pixels.
     pub uv_px: Vector2<f64>,
-    /// Where it was in the image before, `None` for a new one.
+    /// Position in the previous image, in pixels; `None` for a new feature.
     pub previous_uv_px: Option<Vector2<f64>>,
-    /// Its direction in the camera frame, unit length.
+    /// Direction in the camera frame, unit length.
     pub bearing: Vector3<f64>,
 }
 
-/// What the front end did with one image.
+/// Counts and motion of one image.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FrontEndStatistics {
-    /// Features tracked from the image before and kept.
+    /// Features tracked from the previous image and kept.
     pub tracked: usize,
-    /// Features newly found.
+    /// New features.
     pub detected: usize,
     /// Lost by the Lucas–Kanade tracker or its forward–backward check.
     pub lost: usize,
     /// Rejected as geometric outliers.
     pub rejected: usize,
-    /// Mean parallax of the tracked ones against the image before, their common rotation removed, in pixels.
+    /// Mean parallax of the tracked features to the previous image, camera rotation removed, in pixels.
     pub mean_parallax_px: f64,
-    /// Median length of the tracked ones' motion in the image, in pixels.
+    /// Median length of the tracked features' motion in the image, in pixels.
     pub median_flow_px: f64,
 }
 
@@ -58,6 +58,6 @@ pub struct TrackedFrame {
     pub stamp_ns: i64,
     /// The features, ordered by id.
     pub features: Vec<TrackedFeature>,
-    /// Counts.
+    /// Counts and motion.
     pub statistics: FrontEndStatistics,
 }

@@ -4,8 +4,8 @@ use nalgebra::{Matrix2, Vector2};
 
 use super::{scene, texture};
 use crate::frontend::appearance::Appearance;
-use crate::frontend::keyed::{CENTRE, LANES, Rows, SIDE, WINDOW};
 use crate::frontend::pyramid::cut_out;
+use crate::frontend::reference::{CENTRE, LANES, Rows, SIDE, WINDOW};
 use crate::frontend::resample::Patch;
 use crate::sensors::GrayImage;
 

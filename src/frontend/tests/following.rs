@@ -24,8 +24,8 @@ fn common_points(scene: &Scene, from: usize, to: usize) -> Vec<Vector2<f64>> {
         .collect()
 }
 
-/// Follows the lattice from image 4 to image 5 and demands a share of tracked points and a median error.
-fn check(scene: &Scene, least_share: f64, largest_median_px: f64) {
+/// Follows the lattice from image 4 to image 5 and demands a ratio of tracked points and a median error.
+fn check(scene: &Scene, least_ratio: f64, largest_median_px: f64) {
     let texture = texture();
     let (previous, now) = (pyramid(&scene.render(&texture, 4)), pyramid(&scene.render(&texture, 5)));
     let points = common_points(scene, 4, 5);
@@ -33,9 +33,9 @@ fn check(scene: &Scene, least_share: f64, largest_median_px: f64) {
     let found: Vec<_> = points.iter().map(|uv| (uv, track(&previous, &now, uv, uv, &options))).collect();
     let errors: Vec<f64> =
         found.iter().filter_map(|(uv, found)| Some((found.as_ref()? - scene.flow(4, 5, uv)).norm())).collect();
-    let share = errors.len() as f64 / points.len() as f64;
+    let ratio = errors.len() as f64 / points.len() as f64;
     assert!(points.len() > 150, "{} points", points.len());
-    assert!(share >= least_share, "only {share} of {} points are tracked", points.len());
+    assert!(ratio >= least_ratio, "only {ratio} of {} points are tracked", points.len());
     let wrong = errors.iter().filter(|error| **error > 1.0).count();
     assert!(wrong * 200 <= errors.len(), "{wrong} of {} are wrong", errors.len());
     let median_px = median(errors).unwrap();

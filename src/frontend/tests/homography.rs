@@ -1,4 +1,4 @@
-//! A textured plane seen through known homographies, for the tests and the bench: the true motion of every pixel is
+//! A textured plane observed through known homographies, for the tests and the bench: the true motion of every pixel is
 //! known.
 
 use nalgebra::{Matrix3, Rotation3, Vector2, Vector3};
@@ -196,8 +196,8 @@ impl Scene {
                     let at = texture_from_image * Vector3::new(x as f64 + dx, y as f64 + dy, 1.0);
                     sum += 0.25 * texture.at(at.x / at.z, at.y / at.z);
                 }
-                let seen = gain * sum + offset + self.noise * dice.normal();
-                pixels.push(seen.round().clamp(0.0, 255.0) as u8);
+                let observed = gain * sum + offset + self.noise * dice.normal();
+                pixels.push(observed.round().clamp(0.0, 255.0) as u8);
             }
         }
         GrayImage { width: self.width, height: self.height, pixels }

@@ -3,8 +3,8 @@ mod corners;
 mod following;
 mod front_end;
 mod homography;
-mod keyed;
 mod motion;
+mod reference;
 
 use crate::camera::CameraModel;
 use crate::sensors::GrayImage;

@@ -3,8 +3,8 @@
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use super::homography::Dice;
-use crate::frontend::outliers::{BearingPair, OutlierOptions, fit_rotation, judge};
-use crate::frontend::{MountOrientation, PredictedRotation, PredictionNoise, predict_camera_rotation};
+use crate::frontend::outliers::{BearingPair, OutlierOptions, estimate_motion, fit_rotation};
+use crate::frontend::{ChainOrientation, PredictedRotation, PredictionNoise, predict_camera_rotation};
 use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::{ClassicalChain, DhLink};
 use crate::sensors::ImuSample;
@@ -46,21 +46,21 @@ fn check(name: &str, view: &View, least_right: f64, most_wrong: f64) {
         while pairs.len() < 120 {
             let depth = view.depths.0 + (view.depths.1 - view.depths.0) * dice.uniform();
             let point = Vector3::new(1.4 * dice.uniform() - 0.7, dice.uniform() - 0.5, 1.0) * depth;
-            let mut seen = rotation * point + view.translation;
-            seen /= seen.z;
-            seen += Vector3::new(dice.normal(), dice.normal(), 0.0) * (0.15 / FOCAL_PX);
+            let mut observed = rotation * point + view.translation;
+            observed /= observed.z;
+            observed += Vector3::new(dice.normal(), dice.normal(), 0.0) * (0.15 / FOCAL_PX);
             let right = dice.uniform() >= view.outlier_share;
             if !right {
                 let angle = std::f64::consts::TAU * dice.uniform();
-                seen += Vector3::new(angle.cos(), angle.sin(), 0.0) * ((8.0 + 40.0 * dice.uniform()) / FOCAL_PX);
+                observed += Vector3::new(angle.cos(), angle.sin(), 0.0) * ((8.0 + 40.0 * dice.uniform()) / FOCAL_PX);
             }
             truth.push(right);
-            pairs.push(BearingPair { previous: point.normalize(), now: seen.normalize() });
+            pairs.push(BearingPair { previous: point.normalize(), now: observed.normalize() });
         }
         let predicted = PredictedRotation::isotropic(so3::exp(&view.prediction_error) * rotation, 0.05);
         let predicted = view.predicted.then_some(&predicted);
         let start = predicted.map_or_else(UnitQuaternion::identity, |predicted| predicted.rotation);
-        let motion = judge(&pairs, &start, predicted, FOCAL_PX, &OutlierOptions::default());
+        let motion = estimate_motion(&pairs, &start, predicted, FOCAL_PX, &OutlierOptions::default());
         let count = |kind: bool| truth.iter().filter(|right| **right == kind).count().max(1) as f64;
         let kept = |kind: bool| {
             truth.iter().zip(&motion.is_inlier).filter(|(right, inlier)| **right == kind && **inlier).count() as f64
@@ -109,11 +109,11 @@ fn nonsense_rejects_nothing_rather_than_everything() {
     let mut direction = || Vector3::new(dice.uniform() - 0.5, dice.uniform() - 0.5, 1.0).normalize();
     let pairs: Vec<_> = (0..60).map(|_| BearingPair { previous: direction(), now: direction() }).collect();
     let identity = UnitQuaternion::identity();
-    let motion = judge(&pairs, &identity, None, FOCAL_PX, &OutlierOptions::default());
+    let motion = estimate_motion(&pairs, &identity, None, FOCAL_PX, &OutlierOptions::default());
     let kept = motion.is_inlier.iter().filter(|inlier| **inlier).count();
     assert!(kept >= 24, "{kept}");
     for count in 0..8 {
-        let motion = judge(&pairs[..count], &identity, None, FOCAL_PX, &OutlierOptions::default());
+        let motion = estimate_motion(&pairs[..count], &identity, None, FOCAL_PX, &OutlierOptions::default());
         assert_eq!(motion.is_inlier, vec![true; count]);
     }
 }
@@ -140,17 +140,17 @@ const JOINT_SIGMA_RAD: f64 = 0.03;
 
 /// A gimbal of one joint with everything off the axes.
 fn chain() -> ClassicalChain {
-    let turn = |x, y, z| RigidTransform::new(so3::exp(&Vector3::new(x, y, z)), Vector3::new(0.1, 0.0, -0.1));
+    let pose = |x, y, z| RigidTransform::new(so3::exp(&Vector3::new(x, y, z)), Vector3::new(0.1, 0.0, -0.1));
     ClassicalChain {
-        imu_from_base: turn(3.0, 0.1, -0.2),
+        imu_from_base: pose(3.0, 0.1, -0.2),
         links: vec![DhLink { theta_offset_rad: -1.5, d_m: 0.03, a_m: 0.02, alpha_rad: 0.7 }],
-        effector_from_camera: turn(0.1, 1.5, 0.2),
+        effector_from_camera: pose(0.1, 1.5, 0.2),
     }
 }
 
-fn rigid(rotation: UnitQuaternion<f64>) -> MountOrientation {
+fn rigid(rotation: UnitQuaternion<f64>) -> ChainOrientation {
     let imu_from_base = RigidTransform::new(rotation, Vector3::zeros());
-    MountOrientation::new(&ClassicalChain { imu_from_base, ..ClassicalChain::default() }, &[], &[])
+    ChainOrientation::new(&ClassicalChain { imu_from_base, ..ClassicalChain::default() }, &[], &[])
 }
 
 #[test]
@@ -172,7 +172,7 @@ fn the_predicted_rotation_is_that_of_the_chain_of_frames() {
 fn the_covariance_is_that_of_predictions_from_wrong_numbers() {
     let imu: Vec<_> = (0..11).map(|k| sample(k * 5_000_000, Vector3::new(0.9, -1.6, 6.0))).collect();
     let predict = |chain: &ClassicalChain, bias: &Vector3<f64>, angles: [f64; 2]| {
-        let [previous, now] = angles.map(|angle| MountOrientation::new(chain, &[angle], &[JOINT_SIGMA_RAD]));
+        let [previous, now] = angles.map(|angle| ChainOrientation::new(chain, &[angle], &[JOINT_SIGMA_RAD]));
         predict_camera_rotation(&imu, bias, &previous, &now, &NOISE).unwrap()
     };
     let angles = [0.4, -0.1];
@@ -190,8 +190,8 @@ fn the_covariance_is_that_of_predictions_from_wrong_numbers() {
         wrong.effector_from_camera.rotation = effector * wrong.effector_from_camera.rotation * camera;
         let bias = vector(NOISE.gyroscope_bias_rad_per_s);
         let error = vector(JOINT_SIGMA_RAD);
-        let seen = predict(&wrong, &bias, [angles[0] + error.x, angles[1] + error.y]);
-        let error = so3::log(&(seen.rotation * given.rotation.inverse())) / shrink;
+        let observed = predict(&wrong, &bias, [angles[0] + error.x, angles[1] + error.y]);
+        let error = so3::log(&(observed.rotation * given.rotation.inverse())) / shrink;
         measured += error * error.transpose() / f64::from(count);
     }
     // The gyroscope's noise is no part of this, and negligible.

@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use super::stopwatch::Stopwatch;
 use crate::flight_log::{FlightLog, FrameStream, LogError, LogWarning, SensorFrame};
 use crate::frontend::{
-    FrontEnd, FrontEndOptions, MountOrientation, PredictionNoise, TrackedFrame, predict_camera_rotation,
+    ChainOrientation, FrontEnd, FrontEndOptions, PredictionNoise, TrackedFrame, predict_camera_rotation,
 };
 use crate::gimbal::ClassicalChain;
 use crate::sensors::{CameraMount, Rig};
@@ -30,7 +30,7 @@ pub(in crate::session) struct CameraTracker {
     front_end: FrontEnd,
     chain: ClassicalChain,
     noise: PredictionNoise,
-    previous_mount: Option<MountOrientation>,
+    previous_mount: Option<ChainOrientation>,
 }
 
 /// The turn-on bias of a gyroscope that nothing is known of, in rad/s (1.1°/s, of the small MEMS kind).
@@ -97,14 +97,14 @@ impl CameraTracker {
     }
 
     /// How the camera sits on the IMU by the rig and the encoders, `None` when a joint's angle is not known.
-    fn mount(&self, frame: &SensorFrame) -> Option<MountOrientation> {
+    fn mount(&self, frame: &SensorFrame) -> Option<ChainOrientation> {
         let (angles_rad, sigmas_rad) = match &frame.joint_angles {
             // A rigid camera of a gimbal rig has readings beside it that are not its own.
             _ if self.chain.links.is_empty() => (&[][..], &[][..]),
             Some(angles) => (angles.angles_rad.as_slice(), angles.sigmas_rad.as_slice()),
             None => return None,
         };
-        Some(MountOrientation::new(&self.chain, angles_rad, sigmas_rad))
+        Some(ChainOrientation::new(&self.chain, angles_rad, sigmas_rad))
     }
 }
 

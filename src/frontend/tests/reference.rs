@@ -1,10 +1,10 @@
-//! Features held to their first sighting.
+//! Reference patches matched in later images.
 
 use nalgebra::Vector2;
 
 use super::homography::Scene;
 use super::{blank, camera_of, scene, texture};
-use crate::frontend::keyed::{Key, KeyFinder, KeyOptions, Sighting};
+use crate::frontend::reference::{ReferenceMatch, ReferenceOptions, ReferencePatch, ReferenceSearch};
 use crate::frontend::{FeatureId, FrontEnd, FrontEndOptions};
 use crate::geometry::median;
 use crate::sensors::GrayImage;
@@ -15,28 +15,28 @@ fn places() -> Vec<Vector2<f64>> {
     lattice.map(|(x, y)| Vector2::new(f64::from(x) + 0.37, f64::from(y) - 0.21)).collect()
 }
 
-fn find(key: &mut Key, image: &GrayImage, rough_px: &Vector2<f64>) -> Sighting {
-    key.find(image, rough_px, &KeyOptions::default(), &mut KeyFinder::new())
+fn find(reference: &mut ReferencePatch, image: &GrayImage, rough_px: &Vector2<f64>) -> ReferenceMatch {
+    reference.find(image, rough_px, &ReferenceOptions::default(), &mut ReferenceSearch::new())
 }
 
-/// Looks for keys of image 4 in image `to`, from half a pixel beside; returns errors and how many were looked for.
+/// Matches references of image 4 in image `to`, from half a pixel beside; returns errors and the number of references.
 fn find_all(scene: &Scene, to: usize) -> (Vec<f64>, usize) {
     let texture = texture();
     let (first, later) = (scene.render(&texture, 4), scene.render(&texture, to));
-    let seen: Vec<_> = places().into_iter().filter(|uv| scene.sees(&scene.flow(4, to, uv))).collect();
+    let observed: Vec<_> = places().into_iter().filter(|uv| scene.sees(&scene.flow(4, to, uv))).collect();
     let mut errors = Vec::new();
-    for uv in &seen {
+    for uv in &observed {
         let truth = scene.flow(4, to, uv);
-        let mut key = Key::cut(&first, uv).unwrap();
-        if let Sighting::Found(found) = find(&mut key, &later, &(truth + Vector2::new(0.4, -0.3))) {
+        let mut reference = ReferencePatch::cut(&first, uv).unwrap();
+        if let ReferenceMatch::Found(found) = find(&mut reference, &later, &(truth + Vector2::new(0.4, -0.3))) {
             errors.push((found - truth).norm());
         }
     }
-    (errors, seen.len())
+    (errors, observed.len())
 }
 
 #[test]
-fn a_key_is_found_again_turned_and_grown() {
+fn a_reference_is_matched_rotated_and_scaled() {
     for (to, speed, flicker) in [(5, 0.3, 0.0), (7, 0.8, 0.0), (7, 0.8, 0.3)] {
         let (errors, count) = find_all(&Scene { flicker, ..scene(speed) }, to);
         assert!(count > 50 && errors.len() * 20 >= count * 19, "{} of {count} in image {to}", errors.len());
@@ -46,32 +46,32 @@ fn a_key_is_found_again_turned_and_grown() {
 }
 
 #[test]
-fn a_key_that_changed_is_not_found() {
+fn a_changed_window_does_not_match() {
     let scene = scene(0.3);
     let texture = texture();
     let image = scene.render(&texture, 4);
     let mut upside_down = image.clone();
     upside_down.pixels.reverse();
     for uv in places() {
-        let mut key = Key::cut(&image, &uv).unwrap();
-        let before = key.clone();
+        let mut reference = ReferencePatch::cut(&image, &uv).unwrap();
+        let before = reference.clone();
         for other in [&blank(&scene), &upside_down] {
-            assert_eq!(find(&mut key, other, &uv), Sighting::Changed, "{uv}");
+            assert_eq!(find(&mut reference, other, &uv), ReferenceMatch::Changed, "{uv}");
         }
-        assert_eq!(key, before, "a failure leaves the warp");
+        assert_eq!(reference, before, "a failure leaves the warp");
         let lost = Vector2::new(f64::NAN, 3.0);
-        assert!(!matches!(find(&mut key, &image, &lost), Sighting::Found(_)));
+        assert!(!matches!(find(&mut reference, &image, &lost), ReferenceMatch::Found(_)));
     }
 }
 
 #[test]
-fn at_the_border_a_key_says_nothing() {
+fn at_the_border_there_is_no_match() {
     let image = scene(0.3).render(&texture(), 4);
     for uv in [Vector2::new(5.0, 100.0), Vector2::new(100.0, 233.0), Vector2::new(f64::NAN, 1.0)] {
-        assert_eq!(Key::cut(&image, &uv), None);
+        assert_eq!(ReferencePatch::cut(&image, &uv), None);
     }
-    let mut key = Key::cut(&image, &Vector2::new(100.0, 100.0)).unwrap();
-    assert_eq!(find(&mut key, &image, &Vector2::new(5.0, 100.0)), Sighting::OutOfView);
+    let mut reference = ReferencePatch::cut(&image, &Vector2::new(100.0, 100.0)).unwrap();
+    assert_eq!(find(&mut reference, &image, &Vector2::new(5.0, 100.0)), ReferenceMatch::OutOfView);
 }
 
 #[test]

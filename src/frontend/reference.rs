@@ -1,10 +1,9 @@
-//! A feature's appearance at its first sighting, found again in later images.
+//! The reference patch of a feature: its window at the first observation, matched in later images.
 //!
-//! Following a feature from image to image adds up the errors of all the steps.
-//! So its window is kept as it was first seen, the key, and once the feature is roughly found its place is refined against
-//! that, under an affine warp with a gain and an offset (Shi and Tomasi, "Good features to track"; inverse compositional as
-//! Baker and Matthews put it).
-//! When the key does not fit any more, the feature goes on from image to image and gets a new key.
+//! Tracking from image to image accumulates the errors of all steps. The tracked position is therefore refined against the
+//! reference patch under an affine warp with a gain and an offset (Shi and Tomasi, "Good features to track"; inverse
+//! compositional as in Baker and Matthews).
+//! When the patch does not match any more, the feature is tracked from image to image and gets a new reference.
 
 use std::sync::Arc;
 
@@ -23,51 +22,51 @@ pub(super) const SIDE: usize = WINDOW + 2;
 /// Columns rounded up to whole vector registers; the surplus ones weigh nothing.
 pub(super) const LANES: usize = 24;
 
-/// How keys are used.
+/// Options of the refinement against reference patches.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct KeyOptions {
-    /// Least correlation of the window with the key.
+pub struct ReferenceOptions {
+    /// Minimum normalized correlation of the window with the reference.
     pub min_correlation: f64,
-    /// Farthest place from where the feature was roughly found, in pixels.
+    /// Largest distance from the tracked position, in pixels.
     pub max_correction_px: f64,
-    /// Steps of the refinement.
+    /// Maximum number of steps.
     pub max_steps: usize,
-    /// A key is worn out when the window has grown or shrunk by this factor in area.
+    /// Largest change of the window's area, as a factor; beyond, the reference is replaced.
     pub max_area_change: f64,
 }
 
-impl Default for KeyOptions {
+impl Default for ReferenceOptions {
     fn default() -> Self {
         Self { min_correlation: 0.85, max_correction_px: 2.0, max_steps: 6, max_area_change: 2.0 }
     }
 }
 
-/// A feature's window as it was first seen.
+/// Window of a feature at its first observation.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Key {
+pub(super) struct ReferencePatch {
     appearance: Arc<Appearance>,
-    /// From the window's middle, a whole pixel, to the feature.
+    /// From the window's centre, a whole pixel, to the feature.
     offset_px: Vector2<f64>,
-    /// Maps steps in the key to steps in the newest image.
+    /// Maps offsets in the reference to offsets in the newest image.
     warp: Matrix2<f64>,
 }
 
-/// What came of looking for a key.
+/// Result of matching a reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Sighting {
-    /// The feature is here.
+pub(super) enum ReferenceMatch {
+    /// Position of the feature, in pixels.
     Found(Vector2<f64>),
-    /// It does not look like its key any more.
+    /// The image does not match the reference.
     Changed,
-    /// Part of the window lies outside the image: nothing can be said.
+    /// Part of the window is outside the image.
     OutOfView,
 }
 
-/// A window, row by row.
+/// Grey levels of a window, row by row.
 pub(super) type Rows = [[f32; LANES]; WINDOW];
 
-impl Key {
-    /// The window about a feature, `None` when part of it lies outside the image or it has no texture.
+impl ReferencePatch {
+    /// The window about a feature, `None` when part of it is outside the image or it has no texture.
     pub(super) fn cut(image: &GrayImage, uv_px: &Vector2<f64>) -> Option<Self> {
         let middle = uv_px.map(f64::round);
         let reach = (SIDE / 2) as f64;
@@ -83,57 +82,57 @@ impl Key {
         Some(Self { appearance: Arc::new(appearance), offset_px: uv_px - middle, warp: Matrix2::identity() })
     }
 
-    /// Looks for the key about a rough place; when it is found, the warp is kept for the next image.
+    /// Matches the reference around a tracked position; a match keeps the warp for the next image.
     pub(super) fn find(
         &mut self,
         image: &GrayImage,
         rough_px: &Vector2<f64>,
-        options: &KeyOptions,
-        finder: &mut KeyFinder,
-    ) -> Sighting {
+        options: &ReferenceOptions,
+        finder: &mut ReferenceSearch,
+    ) -> ReferenceMatch {
         let appearance = &*self.appearance;
         let mut warp = self.warp;
         let mut middle = rough_px - warp * self.offset_px;
         finder.patch.clear();
         for _ in 0..options.max_steps {
             if !finder.patch.read(image, &warp, &middle, appearance.level(), &mut finder.window) {
-                return Sighting::OutOfView;
+                return ReferenceMatch::OutOfView;
             }
-            let Some((correlation, step)) = appearance.compare(&finder.window) else { return Sighting::Changed };
+            let Some((correlation, step)) = appearance.compare(&finder.window) else { return ReferenceMatch::Changed };
             let growth = Matrix2::new(1.0 + step[2], step[3], step[4], 1.0 + step[5]);
-            let Some(back) = growth.try_inverse() else { return Sighting::Changed };
+            let Some(back) = growth.try_inverse() else { return ReferenceMatch::Changed };
             warp *= back;
             let shift = warp * Vector2::new(step[0], step[1]);
             middle -= shift;
             let area = warp.determinant();
             let place = middle + warp * self.offset_px;
-            let sound = (place - rough_px).norm() <= options.max_correction_px
+            let plausible = (place - rough_px).norm() <= options.max_correction_px
                 && area < options.max_area_change
                 && area > 1.0 / options.max_area_change;
-            if !sound {
-                return Sighting::Changed;
+            if !plausible {
+                return ReferenceMatch::Changed;
             }
             if shift.norm() < SHORT_STEP_PX {
                 if correlation < options.min_correlation {
-                    return Sighting::Changed;
+                    return ReferenceMatch::Changed;
                 }
                 self.warp = warp;
-                return Sighting::Found(place);
+                return ReferenceMatch::Found(place);
             }
         }
-        Sighting::Changed
+        ReferenceMatch::Changed
     }
 }
 
-/// Buffers to look for keys with.
+/// Buffers for matching references.
 #[derive(Clone, Debug)]
-pub(super) struct KeyFinder {
+pub(super) struct ReferenceSearch {
     patch: Patch,
     /// Surplus columns are zero.
     window: Rows,
 }
 
-impl KeyFinder {
+impl ReferenceSearch {
     pub(super) fn new() -> Self {
         Self { patch: Patch::new(), window: [[0.0; LANES]; WINDOW] }
     }
