@@ -197,7 +197,7 @@ impl Projected {
     }
 }
 
-/// The blocks that are not calibration in a cheap order of elimination: speeds and biases from the newest frame back,
+/// The blocks that are not calibration in a cheap order of elimination: velocities and biases from the newest frame back,
 /// which are coupled to their neighbours only, then depths and joints, then poses, which are coupled to everything.
 fn nuisance_blocks(linearization: &Linearization) -> Vec<Range<usize>> {
     let of = |group: ColumnGroup| {
@@ -212,7 +212,7 @@ fn nuisance_blocks(linearization: &Linearization) -> Vec<Range<usize>> {
     blocks
 }
 
-/// Neighbouring blocks as one: going forward (joints, poses: dense in their rows) without limit, going back (speeds and
+/// Neighbouring blocks as one: going forward (joints, poses: dense in their rows) without limit, going back (velocities and
 /// biases: banded) until they hold [`BANDED_COLUMNS`].
 fn merged(blocks: impl IntoIterator<Item = Range<usize>>) -> Vec<Range<usize>> {
     let mut merged: Vec<Range<usize>> = Vec::new();

@@ -21,7 +21,7 @@ use crate::gimbal::Chain;
 /// The Jacobian of a step by blocks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StepJacobian {
-    /// Calibration, joint angles, poses, speeds and biases, and last the inverse depths as one block: every feature has its
+    /// Calibration, joint angles, poses, velocities and biases, and last the inverse depths as one block: every feature has its
     /// own, and no other row touches it.
     pub columns: Vec<ColumnBlock>,
     /// The features in the report's order, then the rest.
@@ -32,7 +32,7 @@ pub struct StepJacobian {
 #[derive(Clone, Debug, PartialEq)]
 pub struct FeatureRows {
     /// Number of the observing frame of each sighting.
-    pub frame_indices: Vec<usize>,
+    pub frames: Vec<FrameId>,
     /// By the columns of the step, those of the feature's inverse depth last; whitened: residuals by their standard
     /// deviations with robust weights, per radian, metre, and 1/m.
     pub rows: DMatrix<f64>,
@@ -126,7 +126,7 @@ impl<'a> Writer<'a> {
         let landmark = self.landmark(index, feature, &camera.current[anchor])?;
         let width = self.columns.last().map_or(0, |last| last.start + last.len);
         let mut rows = DMatrix::zeros(2 * feature.observations.len(), width);
-        let mut frame_indices = Vec::new();
+        let mut frames = Vec::new();
         for seen in feature.observations.iter() {
             let Some(slot) = slot_of(seen.frame_index) else { continue };
             let sighting = Sighting { slot, uv_px: seen.measured_px };
@@ -134,12 +134,12 @@ impl<'a> Writer<'a> {
             // The report's residuals are rounded; the weight that the step counted with is not taken from them again.
             let weight = seen.residual_after_px.map(|_| seen.robust_weight);
             let Some(term) = whitened(&camera.model, now, then, anchor, &landmark, &sighting, weight) else { continue };
-            let mut target = rows.rows_mut(2 * frame_indices.len(), 2);
+            let mut target = rows.rows_mut(2 * frames.len(), 2);
             self.write(&mut target, camera, anchor, slot, &term);
-            frame_indices.push(seen.frame_index);
+            frames.push(FrameId(seen.frame_index));
         }
-        let height = 2 * frame_indices.len();
-        Some(FeatureRows { frame_indices, rows: rows.resize_vertically(height, 0.0) })
+        let height = 2 * frames.len();
+        Some(FeatureRows { frames, rows: rows.resize_vertically(height, 0.0) })
     }
 
     /// The landmark of a feature in its anchor's camera: from its place in the world, for a rejected one as it was kept.

@@ -87,7 +87,7 @@ impl PackedKind {
 pub struct FactorRows {
     /// Whose they are.
     pub factor: JacobianFactor,
-    /// By the columns of the step (calibration, joints, poses, speeds and biases), whitened; the residual last, at the final
+    /// By the columns of the step (calibration, joints, poses, velocities and biases), whitened; the residual last, at the final
     /// estimate.
     pub rows: DMatrix<f64>,
 }

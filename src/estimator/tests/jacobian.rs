@@ -24,9 +24,7 @@ pub(super) fn check(report: &StepReport, cameras: &[&CameraModel]) -> StepJacobi
     let mut squared = vec![0.0; count];
     for feature in &report.features {
         let rows = report.feature_rows(cameras, feature.id).expect("a feature of the report");
-        assert!(
-            rows.frame_indices.len() <= feature.observations.len() && rows.rows.nrows() == 2 * rows.frame_indices.len()
-        );
+        assert!(rows.frames.len() <= feature.observations.len() && rows.rows.nrows() == 2 * rows.frames.len());
         for (column, squared) in squared.iter_mut().enumerate() {
             *squared += rows.rows.column(column).norm_squared();
         }

@@ -131,8 +131,8 @@ pub(super) fn block_ui(
     let unit = shown.unit.trim();
     let heads = ["frame", "residual u", "residual v", "χ²", &format!("∂u px/{unit}"), &format!("∂v px/{unit}")]
         .map(str::to_owned);
-    let lines = rows.frame_indices.iter().enumerate().filter_map(|(place, frame)| {
-        let seen = feature.observations.iter().find(|seen| seen.frame_index == *frame)?;
+    let lines = rows.frames.iter().enumerate().filter_map(|(place, frame)| {
+        let seen = feature.observations.iter().find(|seen| seen.frame_index == frame.0)?;
         let residual = seen.residual_after_px.map_or([f64::NAN; 2], |residual| [residual.x, residual.y]);
         // Back from standard deviations to pixels.
         let pixels = report.pixel_sigma_px / seen.robust_weight.sqrt() / shown.factor;

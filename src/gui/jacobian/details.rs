@@ -132,8 +132,8 @@ fn sightings_ui(
     let parts = parts_of(block);
     let mut heads = ["frame", "u px", "v px", "residual u", "residual v", "weight"].map(str::to_owned).to_vec();
     heads.extend(parts.iter().flat_map(|(name, _)| [format!("∂u{name}"), format!("∂v{name}")]));
-    let lines = rows.frame_indices.iter().enumerate().filter_map(|(place, frame)| {
-        let seen = feature.observations.iter().find(|seen| seen.frame_index == *frame)?;
+    let lines = rows.frames.iter().enumerate().filter_map(|(place, frame)| {
+        let seen = feature.observations.iter().find(|seen| seen.frame_index == frame.0)?;
         let residual = seen.residual_after_px.map_or([f64::NAN; 2], |residual| [residual.x, residual.y]);
         let mut cells = vec![frame.to_string()];
         cells.extend([seen.measured_px.x, seen.measured_px.y].map(|pixel| fixed(pixel, 1)));

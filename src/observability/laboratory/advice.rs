@@ -197,7 +197,7 @@ fn information_of(situation: &Situation, exercise: &Exercise) -> Option<DMatrix<
         pixel_sigma_px: situation.pixel_sigma_px,
         landmark_model: LandmarkModel::BearingAndInverseDistance,
         gravity_in_world: gravity,
-        chain_prior: (0.03, 10_f64.to_radians()),
+        chain_prior: (Dimension::Length.scale(), Dimension::Angle.scale()),
     };
     let chain = &situation.chain;
     let linearization = window.linearize(&chain.to_classical(), chain.parameterization(), !chain.hides_joint_offsets());

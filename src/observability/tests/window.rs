@@ -7,7 +7,7 @@ use crate::estimator::{
     ImuBias, JointKnowledge, LandmarkModel, Linearization, NavigationState, PoseKnowledge, SupposedFrame,
     SupposedLandmark, SupposedWindow,
 };
-use crate::geometry::RigidTransform;
+use crate::geometry::{Dimension, RigidTransform};
 use crate::gimbal::Chain;
 
 pub(super) struct Landmark {
@@ -59,7 +59,7 @@ impl Window {
             pixel_sigma_px: 1.0,
             landmark_model: LandmarkModel::InverseDistance,
             gravity_in_world: Vector3::new(0.0, 0.0, -9.81),
-            chain_prior: (0.03, 10_f64.to_radians()),
+            chain_prior: (Dimension::Length.scale(), Dimension::Angle.scale()),
         };
         supposed.linearize(&chain.to_classical(), chain.parameterization(), !chain.hides_joint_offsets())
     }

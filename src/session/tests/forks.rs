@@ -260,7 +260,7 @@ fn one_camera_of_two_can_be_left_out() {
 #[test]
 fn what_cannot_be_changed_is_told() {
     let problem = flown("auto").forked(FORK_AT, "freeze=L2.alfa").unwrap_err();
-    assert!(problem.contains("'L2.alfa'") && problem.contains("L2.alpha"), "{problem}");
+    assert!(problem.contains("'L2.alfa'") && problem.contains("roll.alpha"), "{problem}");
     let problem = flown("auto:calibrate=off").forked(FORK_AT, "freeze=L2.alpha").unwrap_err();
     assert!(problem.contains("calibrate=off"), "{problem}");
 }
