@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use crate::gimbal::ParameterNames;
 use crate::observability::KnownLoss;
 use crate::session::RunRecord;
 
@@ -21,12 +22,12 @@ pub struct KnownLossSummary {
 }
 
 /// The known losses of a run in the order in which they first appeared.
-pub(super) fn known_losses(run: &RunRecord) -> Vec<KnownLossSummary> {
+pub(super) fn known_losses(run: &RunRecord, names: &ParameterNames) -> Vec<KnownLossSummary> {
     let mut found: Vec<(KnownLoss, KnownLossSummary)> = Vec::new();
     for rank in run.steps.iter().filter_map(|step| step.rank.as_ref()) {
         for known in &rank.known {
             let place = found.iter().position(|(loss, _)| *loss == known.loss).unwrap_or_else(|| {
-                let reason = known.loss.reason(rank.joint_count);
+                let reason = known.loss.reason(rank.joint_count, names);
                 let (largest_response, largest_false_gain) = (0.0, 0.0);
                 let summary = KnownLossSummary { reason, steps: 0, agreeing: 0, largest_response, largest_false_gain };
                 found.push((known.loss, summary));

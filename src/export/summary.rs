@@ -415,7 +415,7 @@ fn rank(recording: &Recording, run: &RunRecord) -> Option<RankSummary> {
             motion: rank.deficit_motion,
         },
         null_directions,
-        known: known_losses(run),
+        known: known_losses(run, &names),
         information: information(recording, run),
     })
 }

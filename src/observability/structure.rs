@@ -12,7 +12,9 @@
 
 use nalgebra::{DMatrix, DMatrixView, DVector};
 
-use crate::gimbal::{Chain, ParameterId, ParameterPart, Parameterization, Quantity, redundant_directions};
+use crate::gimbal::{
+    Chain, ParameterId, ParameterNames, ParameterPart, Parameterization, Quantity, redundant_directions,
+};
 
 /// Something that no measurement can tell, known from the form of the chain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -222,9 +224,9 @@ impl KnownLoss {
     }
 
     /// Why it cannot be told, in one sentence, for a chain of so many joints.
-    pub fn reason(self, joints: usize) -> String {
-        let first = link_name(0, joints);
-        let last = link_name(joints.saturating_sub(1), joints);
+    pub fn reason(self, joints: usize, names: &ParameterNames) -> String {
+        let link = |link: usize| names.part(ParameterPart::Link(link as u8));
+        let (first, last) = (link(0), link(joints.saturating_sub(1)));
         let axis = |axis: usize| ["x", "y", "z"].get(axis).copied().unwrap_or("?");
         let what = match self {
             Self::BaseTheta => {
@@ -258,32 +260,25 @@ impl KnownLoss {
             Self::FreeAngle(joint) => {
                 format!(
                     "{}.theta and the unknown angles of joint {} are seen as their sum only",
-                    link_name(joint, joints),
+                    link(joint),
                     joint + 1
                 )
             }
-            Self::ParallelD(link) => format!(
+            Self::ParallelD(index) => format!(
                 "the axes of joints {} and {} are parallel, so that {}.d and {}.d are the same motion",
-                link + 1,
-                link + 2,
-                link_name(link, joints),
-                link_name(link + 1, joints)
+                index + 1,
+                index + 2,
+                link(index),
+                link(index + 1)
             ),
-            Self::CoaxialTheta(link) => format!(
+            Self::CoaxialTheta(index) => format!(
                 "the axes of joints {} and {} are one line, so that {}.theta and {}.theta are the same motion",
-                link + 1,
-                link + 2,
-                link_name(link, joints),
-                link_name(link + 1, joints)
+                index + 1,
+                index + 2,
+                link(index),
+                link(index + 1)
             ),
         };
         format!("{what} ({})", self.equations())
     }
-}
-
-/// The link from one joint's frame to the next: `base_from_joint2`, …, `joint3_from_effector`.
-fn link_name(link: usize, joints: usize) -> String {
-    let from = if link == 0 { "base".to_owned() } else { format!("joint{}", link + 1) };
-    let to = if link + 1 == joints { "effector".to_owned() } else { format!("joint{}", link + 2) };
-    format!("{from}_from_{to}")
 }

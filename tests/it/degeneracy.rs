@@ -63,7 +63,7 @@ fn experiments_name_what_is_lost_and_why() {
     check(
         &["--form", "classical"],
         18,
-        &["base_from_joint2.d and the translation of imu_from_base along that axis are the same motion (Eqs. 11–17)"],
+        &["L1.d and the translation of imu_from_base along that axis are the same motion (Eqs. 11–17)"],
     );
     check(&["--mechanism", "parallel-axes", "--form", "minimal"], 17, &["the axes of joints 1 and 2 are parallel"]);
     check(&["--encoder-sigma-deg", "none", "--frames", "16", "--form", "minimal"], 15, &["L2.theta", "unknown angles"]);

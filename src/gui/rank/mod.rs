@@ -194,7 +194,7 @@ fn verdict_ui(ui: &mut Ui, theme: &Theme, names: &ParameterNames, step: &StepRec
     let title =
         RichText::new(title).color(if rank.known_agreeing() == rank.known.len() { theme.text } else { theme.error });
     egui::CollapsingHeader::new(title).id_salt("known structure").show(ui, |ui| {
-        for line in verdict::structure_lines(rank) {
+        for line in verdict::structure_lines(rank, names) {
             ui.add(egui::Label::new(RichText::new(line).small().color(theme.text)).wrap());
         }
     });

@@ -93,12 +93,12 @@ fn of_rank(rank: &RankReport, names: &ParameterNames) -> Verdict {
 }
 
 /// Every known loss with its reason and what was measured, a line each.
-pub(crate) fn structure_lines(rank: &RankReport) -> Vec<String> {
+pub(crate) fn structure_lines(rank: &RankReport, names: &ParameterNames) -> Vec<String> {
     let line = |known: &KnownDirection| {
         let mark = if known.agrees { "✔" } else { "✖" };
         let claimed =
             if known.is_claimed() { format!("; falsely known: {:.2}", known.false_gain) } else { String::new() };
-        format!("{mark} {}{claimed}", known.loss.reason(rank.joint_count))
+        format!("{mark} {}{claimed}", known.loss.reason(rank.joint_count, names))
     };
     rank.known.iter().map(line).collect()
 }

@@ -164,7 +164,7 @@ impl FormReport {
                 .known
                 .iter()
                 .map(|known| KnownReport {
-                    reason: known.loss.reason(rank.joint_count),
+                    reason: known.loss.reason(rank.joint_count, names),
                     response: known.response,
                     agrees: known.agrees,
                 })
