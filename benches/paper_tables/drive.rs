@@ -99,7 +99,7 @@ impl Driven {
 
 /// Flies the variants over a log, with another rig than the log's if one is given; the results in the variants' order.
 pub(crate) fn drive(log: &Log, rig_path: Option<&Path>, variants: &[Variant]) -> Result<Vec<Driven>> {
-    let recording = session::compute(&plan(log, rig_path, variants)?, None, &mut |_| ())?;
+    let recording = session::compute(&plan(log, rig_path, variants)?, None, &mut |_| ())?.into_recording();
     Ok(recording.runs.iter().map(|run| driven(&recording, run)).collect())
 }
 

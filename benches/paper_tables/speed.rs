@@ -36,7 +36,7 @@ pub(crate) fn fly(archive: &Archive, seed: u64, duration_s: Option<f64>) -> Resu
         };
         let (begin, cpu_before_s) = (Instant::now(), cpu_s());
         let plan = SessionPlan::open(&request)?;
-        let recording = session::compute(&plan, None, &mut |_| ())?;
+        let recording = session::compute(&plan, None, &mut |_| ())?.into_recording();
         timed.push(Timed {
             spec,
             frames: recording.runs[0].steps.len(),

@@ -42,7 +42,6 @@ impl Player {
         headless.set_frame_time_s(FRAME_TIME_S);
         let mut state = WindowState::default();
         state.panels.rank.in_background = true;
-        state.panels.jacobian.in_background = true;
         Self {
             images: ImageReader::new(Arc::clone(&plan.log), &plan.rig),
             headless,

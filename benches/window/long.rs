@@ -4,29 +4,32 @@ use std::sync::Arc;
 
 use dcvins::export::Machine;
 use dcvins::gui::desktop::Desktop as _;
-use dcvins::session::{Recording, RunRecord, StepRecord};
+use dcvins::session::{Computation, Recording, RunRecord, StepRecord};
 
 use super::Table;
 use super::figures::{kib, mib};
 
 /// The recording with its steps repeated, one copy after the other, until every run has so many.
 ///
-/// Nothing is kept in outline: it is what a recording takes that remembers everything.
-pub(crate) fn lengthened(recording: &Recording, frames: usize) -> Recording {
-    let mut recording = recording.clone();
+/// No step is a summary: it is what a recording of all steps takes.
+pub(crate) fn lengthened(computation: &Computation, frames: usize) -> Recording {
+    let mut recording = Recording::clone(computation.recording());
     let period_ns = recording.duration_ns;
-    recording.runs = recording.runs.iter().map(|run| lengthened_run(run, period_ns, frames)).collect();
+    let runs = (0..recording.runs.len()).map(|run| lengthened_run(computation, run, period_ns, frames));
+    recording.runs = runs.collect();
     recording.duration_ns = recording.last_stamp_ns();
     recording
 }
 
-fn lengthened_run(run: &RunRecord, period_ns: i64, frames: usize) -> RunRecord {
+fn lengthened_run(computation: &Computation, number: usize, period_ns: i64, frames: usize) -> RunRecord {
+    let run = &computation.recording().runs[number];
     let mut long = RunRecord::new(run.spec.clone(), run.camera_key.clone());
     long.finished = true;
-    let whole: Vec<Arc<StepRecord>> = (0..run.steps.len()).filter_map(|step| run.whole_step(step)).collect();
-    for number in 0..frames {
-        let Some(step) = whole.get(number % whole.len().max(1)) else { break };
-        let later_ns = period_ns * (number / whole.len()) as i64;
+    let whole: Vec<Arc<StepRecord>> =
+        (0..run.steps.len()).filter_map(|step| computation.whole_step(number, step)).collect();
+    for frame in 0..frames {
+        let Some(step) = whole.get(frame % whole.len().max(1)) else { break };
+        let later_ns = period_ns * (frame / whole.len()) as i64;
         let mut copy = StepRecord::clone(step);
         copy.tracks = Arc::new((*step.tracks).clone());
         copy.report.stamp_ns += later_ns;

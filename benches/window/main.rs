@@ -95,7 +95,7 @@ fn main() -> Result<()> {
     println!("{}", travel::measure(&mut session, &mut player));
     let mut recording = session.recording();
     if let Some(frames) = arguments.frames {
-        recording = Arc::new(long::lengthened(&recording, frames));
+        recording = Arc::new(long::lengthened(&session.computation(), frames));
         println!("{}", long::memory(&recording));
     }
     println!("{}", frames::measure(&recording, &mut player));

@@ -13,29 +13,31 @@ use super::frames::Player;
 const STEPS_BACK: usize = 200;
 /// Jumps to any frame.
 const JUMPS: usize = 100;
-/// Steps of a run that are taken again from the snapshot before them.
-const RETAKEN: usize = 100;
+/// Steps of a run that are recomputed from the snapshot before them.
+const RECOMPUTED: usize = 100;
 
 /// What the recording holds.
 pub(crate) fn memory(session: &Session) -> Table {
-    let recording = session.recording();
+    let computation = session.computation();
+    let recording = computation.recording();
     let budget = mib(recording.memory_budget_bytes);
     let mut table = Table::new(format!("Memory, of {budget} that a recording may take"), &["what", "figure"]);
     table.row("recording", [mib(recording.memory_bytes())]);
     let process = Machine::new().resident_bytes();
     table.row("whole process", [process.map_or_else(|| "not known".to_owned(), |bytes| mib(bytes as usize))]);
-    for run in &recording.runs {
+    for (number, run) in recording.runs.iter().enumerate() {
         let label = &run.spec.label;
         let steps = run.steps.len().max(1);
-        let outlined = run.memory.outlined;
-        table.row(format!("{label}: steps, of them in outline"), [format!("{}, {outlined}", run.steps.len())]);
-        let whole: Vec<usize> = run.steps.iter().filter(|step| !step.outlined).map(|step| step.own_bytes()).collect();
-        let outlines: Vec<usize> = run.steps.iter().filter(|step| step.outlined).map(|step| step.own_bytes()).collect();
+        let summaries = run.memory.summaries;
+        table.row(format!("{label}: steps, of them summaries"), [format!("{}, {summaries}", run.steps.len())]);
+        let whole: Vec<usize> =
+            run.steps.iter().filter(|step| !step.summary_only).map(|step| step.own_bytes()).collect();
+        let of_summaries: Vec<usize> =
+            run.steps.iter().filter(|step| step.summary_only).map(|step| step.own_bytes()).collect();
         let mean = |bytes: &[usize]| kib(bytes.iter().sum::<usize>() / bytes.len().max(1));
-        table.row(format!("{label}: a whole step, an outline"), [format!("{}, {}", mean(&whole), mean(&outlines))]);
+        table.row(format!("{label}: a whole step, a summary"), [format!("{}, {}", mean(&whole), mean(&of_summaries))]);
         table.row(format!("{label}: tracks of a step"), [kib(run.memory.tracks / steps)]);
-        if let Some(history) = &run.history {
-            let snapshots = history.snapshots();
+        if let Some(snapshots) = computation.snapshots(number) {
             let each = kib(snapshots.bytes / snapshots.count.max(1));
             let text = format!("{} of {each}, every {} steps", snapshots.count, snapshots.spacing);
             table.row(format!("{label}: snapshots"), [text]);
@@ -82,11 +84,12 @@ pub(crate) fn measure(session: &mut Session, player: &mut Player) -> Table {
         go(&mut times, Command::Seek { stamp_ns: stamps_ns[any()] });
     }
     table.row("a jump to any frame", cells(&times));
+    let computation = session.computation();
     let mut times = Times::default();
-    for _ in 0..RETAKEN {
+    for _ in 0..RECOMPUTED {
         let step = any();
-        times.take(|| run.retake(step, 1));
+        times.take(|| computation.recompute(0, step, 1));
     }
-    table.row("a step taken again, whatever is kept of it", times.cells());
+    table.row("a recomputed step, whatever is kept of it", times.cells());
     table
 }

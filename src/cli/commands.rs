@@ -15,7 +15,7 @@ use dcvins::log_check;
 use dcvins::observability::LEAST_FALSE_GAIN;
 use dcvins::sensors::Rig;
 use dcvins::session::breakpoints::Condition;
-use dcvins::session::{self, BreakpointHit, CalibrationRequest, Recording, SessionPlan, Stopwatch};
+use dcvins::session::{self, BreakpointHit, CalibrationRequest, Computation, Recording, SessionPlan, Stopwatch};
 use dcvins::simulation::{self, Experiment, SimulationOptions};
 
 use crate::cli::arguments::{
@@ -75,18 +75,18 @@ impl Progress {
 }
 
 /// Computes a plan to its end (or to a time of the log) with a progress bar.
-pub(crate) fn compute(plan: &SessionPlan, until_ns: Option<i64>) -> Result<Recording> {
+pub(crate) fn compute(plan: &SessionPlan, until_ns: Option<i64>) -> Result<Computation> {
     let begin_s = plan.start_s;
     let log_end_s = seconds_from_ns(plan.log.duration_ns());
     let end_s = plan.duration_s.map_or(log_end_s, |duration_s| log_end_s.min(begin_s + duration_s));
     let end_s = until_ns.map_or(end_s, |until_ns| end_s.min(seconds_from_ns(until_ns)));
     let mut progress = Progress::new();
-    let recording = session::compute(plan, until_ns, &mut |recording| {
+    let computation = session::compute(plan, until_ns, &mut |recording| {
         let now_s = seconds_from_ns(recording.computed_ns());
         progress.show((now_s - begin_s) / (end_s - begin_s).max(1e-3), || format!("{now_s:.1} of {end_s:.1} s"));
     })?;
     progress.clear();
-    Ok(recording)
+    Ok(computation)
 }
 
 /// Computes a plan until a condition comes true, with a progress bar.
@@ -99,12 +99,12 @@ fn compute_until(plan: &SessionPlan, condition: &Condition) -> Result<(Recording
     }
     let end_s = seconds_from_ns(plan.log.duration_ns());
     let mut progress = Progress::new();
-    let result = session::compute_until(plan, condition, &mut |recording| {
+    let (computation, hit) = session::compute_until(plan, condition, &mut |recording| {
         let now_s = seconds_from_ns(recording.computed_ns());
         progress.show(now_s / end_s.max(1e-3), || format!("{now_s:.1} s, looking for {condition}"));
     })?;
     progress.clear();
-    Ok(result)
+    Ok((computation.into_recording(), hit))
 }
 
 /// What `--break` came to, in a line for people.
@@ -134,7 +134,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<()> {
     let plan = SessionPlan::open(&arguments.estimation.request(arguments.log.clone()))?;
     let (recording, hit) = match &arguments.break_at {
         Some(condition) => compute_until(&plan, condition)?,
-        None => (compute(&plan, None)?, None),
+        None => (compute(&plan, None)?.into_recording(), None),
     };
     let mut summaries = Vec::new();
     for run in &recording.runs {
@@ -343,8 +343,9 @@ fn write_pictures(plan: &SessionPlan, out: Option<&Path>) -> Result<()> {
     let stem = plan.log_path.file_stem().unwrap_or(plan.log_path.as_os_str());
     let folder = out.map_or_else(|| Path::new("dcvins-output").join(stem), Path::to_path_buf);
     tell(&format!("dcvins: there is no display, so the pictures are written to {}", folder.display()));
-    let mut recording = compute(plan, None)?;
-    recording.fill_in(recording.last_stamp_ns());
+    let mut computation = compute(plan, None)?;
+    computation.fill_in(computation.recording().last_stamp_ns());
+    let recording = computation.into_recording();
     let mut images = ImageReader::new(Arc::clone(&plan.log), &plan.rig);
     let options = PictureOptions::default();
     for name in PANEL_NAMES {

@@ -14,18 +14,19 @@ use crate::cli::commands::{compute, print};
 /// `dcvins report`.
 pub(crate) fn report(arguments: &ReportArguments) -> Result<()> {
     let plan = SessionPlan::open(&arguments.estimation.request(arguments.log.clone()))?;
-    #[cfg_attr(not(feature = "gui"), expect(unused_mut, reason = "only pictures need what a long log lets go"))]
-    let mut recording = compute(&plan, None)?;
+    #[cfg_attr(not(feature = "gui"), expect(unused_mut, reason = "only pictures need steps recomputed"))]
+    let mut computation = compute(&plan, None)?;
     let options = ReportOptions {
         command: command_line(std::env::args()),
         check: Some(check(&plan)),
         inputs: inputs(arguments),
         #[cfg(feature = "gui")]
-        pictures: pictures::draw(arguments, &plan, &mut recording)?,
+        pictures: pictures::draw(arguments, &plan, &mut computation)?,
         #[cfg(not(feature = "gui"))]
         pictures: Vec::new(),
     };
-    let page = write_report(&recording, &arguments.output, &options)?;
+    let recording = computation.recording();
+    let page = write_report(recording, &arguments.output, &options)?;
     print(&format!("{}\n", page.display()))?;
     let failed: Vec<&str> = recording.runs.iter().filter_map(|run| run.error.as_deref()).collect();
     if failed.is_empty() { Ok(()) } else { anyhow::bail!("{}", failed.join("; ")) }
@@ -68,7 +69,7 @@ mod pictures {
     use dcvins::flight_log::ImageReader;
     use dcvins::geometry::{ns_from_seconds, seconds_from_ns};
     use dcvins::gui::theme::ThemeName;
-    use dcvins::session::{Recording, SessionPlan};
+    use dcvins::session::{Computation, SessionPlan};
 
     use crate::cli::arguments::ReportArguments;
 
@@ -102,13 +103,14 @@ mod pictures {
     pub(super) fn draw(
         arguments: &ReportArguments,
         plan: &SessionPlan,
-        recording: &mut Recording,
+        computation: &mut Computation,
     ) -> Result<Vec<ReportPicture>> {
         let mut images = ImageReader::new(Arc::clone(&plan.log), &plan.rig);
         let mut pictures = Vec::new();
-        let end_ns = recording.last_stamp_ns();
+        let end_ns = computation.recording().last_stamp_ns();
         let mut draw = |heading: &str, panels: &[Shown], cursor_ns| -> Result<()> {
-            recording.fill_in(cursor_ns);
+            computation.fill_in(cursor_ns);
+            let recording = computation.recording();
             for Shown { panel, size_px, caption, plot } in panels {
                 let options =
                     PictureOptions { size_px: *size_px, theme: ThemeName::Print, ..PictureOptions::default() };

@@ -14,7 +14,7 @@ use dcvins::gui::app::PlayingLog;
 use dcvins::gui::theme::ThemeName;
 use dcvins::gui::window::Preset;
 use dcvins::gui::{ImageSource, Playback};
-use dcvins::session::{Recording, Session, SessionPlan};
+use dcvins::session::{Computation, Session, SessionPlan};
 
 use crate::cli::arguments::{FormatArgument, RendererArgument, ScreenshotArguments, ThemeArgument};
 use crate::cli::commands::{compute, print, saved_session, tell};
@@ -53,8 +53,8 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<()> {
     instants.sort_unstable();
     instants.dedup();
     let Some(last_ns) = instants.last().copied() else { bail!("no instant is asked for: give --at or --every") };
-    let mut recording = shown.compute(last_ns)?;
-    let names = recording.rig.parameter_names();
+    let mut computation = shown.compute(last_ns)?;
+    let names = computation.recording().rig.parameter_names();
     let slide = match &arguments.slide {
         Some(request) => {
             let known = || {
@@ -85,25 +85,23 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<()> {
     };
     let several = instants.len() > 1;
     for cursor_ns in instants {
-        Arc::make_mut(&mut recording).fill_in(cursor_ns);
+        computation.fill_in(cursor_ns);
+        let recording = computation.recording();
         let path = if several { numbered(&arguments.output, cursor_ns) } else { arguments.output.clone() };
         let panel = &arguments.panel;
         match format {
             FormatArgument::Png => {
-                write_png(&draw_panel(panel, &recording, cursor_ns, shown.images(), &options)?, &path)?;
+                write_png(&draw_panel(panel, recording, cursor_ns, shown.images(), &options)?, &path)?;
             }
             FormatArgument::Svg => {
                 let title =
                     format!("{panel} of {} at {:.3} s", log_name(&recording.log_path), seconds_from_ns(cursor_ns));
                 let naming = ["clip", &title];
-                write_svg(&draw_panel_svg(panel, &recording, cursor_ns, shown.images(), &options, naming)?, &path)?;
+                write_svg(&draw_panel_svg(panel, recording, cursor_ns, shown.images(), &options, naming)?, &path)?;
             }
         }
         if arguments.csv {
-            write_csv(
-                &panel_csv(panel, &recording, cursor_ns, shown.images(), &options)?,
-                &path.with_extension("csv"),
-            )?;
+            write_csv(&panel_csv(panel, recording, cursor_ns, shown.images(), &options)?, &path.with_extension("csv"))?;
         }
         if several {
             print(&format!("{}\n", path.display()))?;
@@ -166,13 +164,13 @@ impl Shown {
     }
 
     /// Everything up to a time; of a saved session, to its end.
-    fn compute(&mut self, until_ns: i64) -> Result<Arc<Recording>> {
+    fn compute(&mut self, until_ns: i64) -> Result<Computation> {
         match &mut self.source {
-            Source::Log(plan, _) => compute(plan, Some(until_ns)).map(Arc::new),
+            Source::Log(plan, _) => compute(plan, Some(until_ns)),
             Source::Saved(session) => {
                 session.finish();
                 session.take_notices().iter().for_each(|notice| tell(&format!("dcvins: {notice}")));
-                Ok(session.recording())
+                Ok(session.computation())
             }
         }
     }

@@ -92,8 +92,8 @@ pub struct Playback {
     pub markers_ns: Vec<i64>,
     /// Where in the solver's work the step at the cursor is shown, `None` at its end.
     pub solver: Option<SolverPosition>,
-    /// Whether steps at the cursor are being taken again.
-    pub retaking: bool,
+    /// Whether steps at the cursor are being recomputed.
+    pub recomputing: bool,
     /// The breakpoints with their hits so far.
     pub breakpoints: Arc<Breakpoints>,
     /// Whether the cursor is on its way to a hit that the estimators have not reached yet.
@@ -108,7 +108,7 @@ impl Default for Playback {
             loop_range_ns: None,
             markers_ns: Vec::new(),
             solver: None,
-            retaking: false,
+            recomputing: false,
             breakpoints: Arc::default(),
             running_on: false,
         }

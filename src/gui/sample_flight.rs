@@ -50,7 +50,7 @@ fn fly() -> Recording {
                 tracks: Arc::new(frame.tracks.clone()),
                 truth: Some(frame.true_world_from_imu),
                 log_time_ns: frame.stamp_ns,
-                outlined: false,
+                summary_only: false,
             });
         }
         run.finished = true;
@@ -61,6 +61,7 @@ fn fly() -> Recording {
         rig: Arc::new(rig.clone()),
         truth_rig: Some(Arc::new(flight.true_rig.clone())),
         duration_ns: flight.frames.last().map_or(0, |frame| frame.stamp_ns),
+        start_ns: 0,
         epoch_ns: 0,
         runs: runs.into(),
         warnings: Vec::new(),

@@ -82,6 +82,7 @@ pub(crate) fn sample_recording_of(frame_count: usize, run_names: &[&str]) -> Rec
         rig: Arc::new(rig_with(given_chain, "yard")),
         truth_rig: Some(Arc::new(rig_with(true_chain, "yard"))),
         duration_ns: frame_count as i64 * FRAME_PERIOD_NS,
+        start_ns: 0,
         epoch_ns: 1_718_451_937_250_000_000,
         runs,
         warnings: vec![LogWarning {
@@ -348,7 +349,7 @@ fn sample_run(
                 tracks: Arc::clone(&tracks[index]),
                 truth: Some(flight[index].world_from_imu),
                 log_time_ns: index as i64 * FRAME_PERIOD_NS + 19_000_000,
-                outlined: false,
+                summary_only: false,
             })
         })
         .collect();

@@ -28,7 +28,7 @@ impl PlayingLog for Session {
             loop_range_ns: self.loop_range_ns(),
             markers_ns: self.markers_ns().to_vec(),
             solver: self.solver_position(),
-            retaking: self.is_retaking(),
+            recomputing: self.is_recomputing(),
             breakpoints: Arc::clone(self.breakpoints()),
             running_on: self.is_running_on(),
         }

@@ -1,4 +1,5 @@
-//! Something about one step that takes a while to work out: on a thread of its own, or while the caller waits.
+//! Something about one step that takes a while to compute from its report: on a thread of its own, or while the caller
+//! waits. No estimator runs here: what needs one is requested from the session by a command.
 
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
@@ -27,12 +28,6 @@ impl<T: Send + 'static> StepWork<T> {
     /// Whether a step's has been worked out.
     pub(super) fn is_known(&self, step: &StepRecord) -> bool {
         self.known.as_ref().is_some_and(|(known, _)| std::ptr::eq(Arc::as_ptr(known), step))
-    }
-
-    /// What came of a step; `None` when nothing did, or it is not known.
-    pub(super) fn of(&self, step: &StepRecord) -> Option<&T> {
-        let (_, result) = self.known.as_ref().filter(|_| self.is_known(step))?;
-        result.as_ref()
     }
 
     /// Whether something is still to come.

@@ -1,10 +1,12 @@
-//! Going back in time on the sample log: every step taken again is the step that was recorded, whatever was kept of it.
+//! Going back in time on the sample log: every recomputed step is the step that was recorded, whatever was kept of it.
 
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use dcvins::estimator::StageTimes;
-use dcvins::session::{self, Command, Recording, RunRecord, Session, SessionPlan, SessionRequest, StepRecord};
+use dcvins::session::{
+    self, Command, Computation, Recording, RunRecord, Session, SessionPlan, SessionRequest, StepRecord,
+};
 
 fn plan(specs: &[&str], memory_budget_bytes: usize) -> SessionPlan {
     let specs = specs.iter().map(|spec| spec.parse().expect("the specifications of tests are valid"));
@@ -24,11 +26,11 @@ fn bits(record: &StepRecord) -> String {
     format!("{record:?}")
 }
 
-/// A recording with memory for everything, made straight from begin to end.
-fn straight(specs: &[&str]) -> Recording {
-    let recording = session::compute(&plan(specs, usize::MAX), None, &mut |_| {}).expect("the runs start");
-    assert!(recording.runs.iter().all(|run| run.error.is_none() && run.memory.outlined == 0));
-    recording
+/// Runs with memory for everything, computed from start to end.
+fn straight(specs: &[&str]) -> Computation {
+    let computation = session::compute(&plan(specs, usize::MAX), None, &mut |_| {}).expect("the runs start");
+    assert!(computation.recording().runs.iter().all(|run| run.error.is_none() && run.memory.summaries == 0));
+    computation
 }
 
 fn check_step(run: &RunRecord, number: usize, again: &StepRecord) {
@@ -36,14 +38,14 @@ fn check_step(run: &RunRecord, number: usize, again: &StepRecord) {
 }
 
 #[test]
-fn every_step_taken_again_is_the_step_that_was_recorded() {
+fn every_recomputed_step_is_the_step_that_was_recorded() {
     const AT_ONCE: usize = 20;
-    let recording = straight(&["auto", "cluster"]);
-    for run in &recording.runs {
+    let computation = straight(&["auto", "cluster"]);
+    for (index, run) in computation.recording().runs.iter().enumerate() {
         let mut end = run.steps.len();
         while end > 0 {
-            let steps = run.retake(end - 1, AT_ONCE);
-            let (first, _) = steps.first().expect("every step can be taken again");
+            let steps = computation.recompute(index, end - 1, AT_ONCE);
+            let (first, _) = steps.first().expect("every step can be recomputed");
             assert!((end.saturating_sub(AT_ONCE)..end).contains(first));
             let next = *first;
             for (number, again) in steps {
@@ -53,11 +55,11 @@ fn every_step_taken_again_is_the_step_that_was_recorded() {
         }
         // And in any order.
         for number in [3, 150, 77, 141, 16] {
-            let (last, again) = run.retake(number, 1).pop().expect("every step can be taken again");
+            let (last, again) = computation.recompute(index, number, 1).pop().expect("every step can be recomputed");
             assert_eq!(last, number);
             check_step(run, number, &again);
         }
-        assert!(run.retake(run.steps.len(), 1).is_empty());
+        assert!(computation.recompute(index, run.steps.len(), 1).is_empty());
     }
 }
 
@@ -72,17 +74,17 @@ fn played(session: &mut Session) {
 #[test]
 fn stepping_back_shows_what_was_seen_on_the_way_forward_with_little_memory() {
     let forwards = straight(&["auto"]);
-    let expected = &forwards.runs[0];
+    let expected = &forwards.recording().runs[0];
     let mut session = Session::start(plan(&["auto"], 0)).expect("the session starts");
     played(&mut session);
     let kept = Arc::clone(&session.recording());
-    assert!(kept.runs[0].memory.outlined > 90, "{:?}", kept.runs[0].memory);
-    assert!(kept.memory_bytes() < forwards.memory_bytes());
+    assert!(kept.runs[0].memory.summaries > 90, "{:?}", kept.runs[0].memory);
+    assert!(kept.memory_bytes() < forwards.recording().memory_bytes());
     for number in (0..expected.steps.len()).rev() {
         session.settle();
         let recording = session.recording();
         let shown = recording.runs[0].step_at(session.cursor_ns()).expect("a step is shown");
-        assert!(!shown.outlined);
+        assert!(!shown.summary_only);
         check_step(expected, number, shown);
         session.apply(Command::StepFrames(-1));
     }
@@ -95,31 +97,31 @@ fn stepping_back_shows_what_was_seen_on_the_way_forward_with_little_memory() {
 }
 
 #[test]
-fn outlines_hold_everything_that_is_plotted_over_time() {
-    let (whole, outlined) = (straight(&["auto"]), session::compute(&plan(&["auto"], 0), None, &mut |_| {}));
-    let outlined = outlined.expect("the runs start");
-    assert!(outlined.runs[0].memory.outlined > 90);
-    for (whole, outlined) in whole.runs[0].steps.iter().zip(&outlined.runs[0].steps) {
+fn summaries_hold_everything_that_is_plotted_over_time() {
+    let (whole, summaries) = (straight(&["auto"]), session::compute(&plan(&["auto"], 0), None, &mut |_| {}));
+    let (whole, summaries) = (whole.into_recording(), summaries.expect("the runs start").into_recording());
+    assert!(summaries.runs[0].memory.summaries > 90);
+    for (whole, kept) in whole.runs[0].steps.iter().zip(&summaries.runs[0].steps) {
         let mut report = whole.report.clone();
-        if outlined.outlined {
+        if kept.summary_only {
             report.window.drain(..report.window.len().saturating_sub(1));
             report.features.clear();
             report.jacobian_source = None;
-            assert!(outlined.report.landmarks.is_empty() || outlined.report.landmarks == report.landmarks);
-            report.landmarks = outlined.report.landmarks.clone();
+            assert!(kept.report.landmarks.is_empty() || kept.report.landmarks == report.landmarks);
+            report.landmarks = kept.report.landmarks.clone();
         }
-        let expected = StepRecord { report, outlined: outlined.outlined, ..StepRecord::clone(whole) };
-        assert_eq!(bits(outlined), bits(&expected));
+        let expected = StepRecord { report, summary_only: kept.summary_only, ..StepRecord::clone(whole) };
+        assert_eq!(bits(kept), bits(&expected));
     }
 }
 
 #[test]
 fn the_solver_can_be_followed_through_a_step() {
     let forwards = straight(&["auto"]);
-    let run = &forwards.runs[0];
+    let run = &forwards.recording().runs[0];
     let number = 150;
     let iterations = &run.steps[number].report.iterations;
-    let states = run.solver_states(number);
+    let states = forwards.solver_states(0, number);
     assert_eq!(states.len(), iterations.len() + 1);
     assert!(iterations.len() > 1, "a step with more than one iteration");
     check_step(run, number, states.last().expect("the last state is the step"));
@@ -157,20 +159,21 @@ fn the_solver_can_be_followed_through_a_step() {
     assert_eq!(bits(state), bits(&states[0]));
 }
 
-/// `screenshot` and `report` draw any instant of a long log, whose steps are kept in outline.
+/// `screenshot` and `report` draw any instant of a long log, of whose steps only summaries are kept.
 #[cfg(feature = "gui")]
 #[test]
 fn pictures_of_any_instant_have_the_same_bytes_with_little_memory() {
     use dcvins::export::{PANEL_NAMES, PictureOptions, draw_panel, panel_csv, png_bytes};
     use dcvins::flight_log::ImageReader;
 
-    let whole = straight(&["auto", "classical"]);
+    let whole = straight(&["auto", "classical"]).into_recording();
     let plan = plan(&["auto", "classical"], 0);
     let mut little = session::compute(&plan, None, &mut |_| {}).expect("the runs start");
     let stamps_ns: Vec<i64> = [16, 81, 100].map(|step| whole.runs[0].steps[step].report.stamp_ns).to_vec();
-    let outlined =
-        |stamp_ns: i64| little.runs.iter().all(|run| run.step_at(stamp_ns).is_some_and(|step| step.outlined));
-    assert!(stamps_ns.iter().all(|stamp_ns| outlined(*stamp_ns)));
+    let summary_only = |stamp_ns: i64| {
+        little.recording().runs.iter().all(|run| run.step_at(stamp_ns).is_some_and(|step| step.summary_only))
+    };
+    assert!(stamps_ns.iter().all(|stamp_ns| summary_only(*stamp_ns)));
     let mut images = ImageReader::new(Arc::clone(&plan.log), &plan.rig);
     let options = PictureOptions { size_px: [960, 720], ..PictureOptions::default() };
     for stamp_ns in stamps_ns {
@@ -181,7 +184,7 @@ fn pictures_of_any_instant_have_the_same_bytes_with_little_memory() {
                 let table = panel_csv(panel, recording, stamp_ns, &mut images, &options).ok();
                 (png_bytes(&picture).expect("it is encoded"), table)
             };
-            let (whole, little) = (drawn(&whole), drawn(&little));
+            let (whole, little) = (drawn(&whole), drawn(little.recording()));
             assert!(whole.0 == little.0, "'{panel}' at {stamp_ns} ns looks different with little memory");
             assert_eq!(whole.1, little.1, "'{panel}' at {stamp_ns} ns");
         }

@@ -90,7 +90,6 @@ impl App {
         state.show_times = true;
         state.panels.laboratory.in_background = true;
         state.panels.rank.in_background = true;
-        state.panels.jacobian.in_background = true;
         state.open_dialog.set_desktop(Arc::clone(&desktop));
         state.saved_layouts = SavedLayouts::from_text(&desktop.kept_layouts().unwrap_or_default());
         state.settings = Settings::from_text(&desktop.kept_settings().unwrap_or_default(), theme);
@@ -287,7 +286,7 @@ impl App {
         let computing = recording.runs.iter().any(|run| !run.finished && run.error.is_none());
         if commanded || playback.playing || log.generation() != generation {
             ui.ctx().request_repaint();
-        } else if computing || playback.retaking || playback.running_on {
+        } else if computing || playback.recomputing || playback.running_on {
             ui.ctx().request_repaint_after(std::time::Duration::from_millis(LOOK_MS));
         }
         self.tell_warnings(&recording);

@@ -2,7 +2,7 @@
 
 use egui::{Grid, Label, RichText, ScrollArea, Ui, vec2};
 
-use super::factors::FactorsUi;
+use super::factors;
 use super::model::{JacobianModel, cameras, name_of, scale_words};
 use crate::estimator::{ColumnBlock, ColumnId, FeatureRows, FrameId, JacobianFactor};
 use crate::frontend::FeatureId;
@@ -31,12 +31,11 @@ pub(super) fn ui(
     step: &StepRecord,
     model: &JacobianModel,
     picked: (Option<usize>, Option<usize>),
-    factors: &FactorsUi,
 ) {
     ScrollArea::vertical().id_salt("block").auto_shrink(false).show(ui, |ui| {
         ui.spacing_mut().item_spacing = vec2(6.0, 2.0);
         match picked {
-            (Some(row), Some(column)) => block_ui(ui, ctx, run, step, model, (row, column), factors),
+            (Some(row), Some(column)) => block_ui(ui, ctx, run, step, model, (row, column)),
             (Some(row), None) => line_ui(ui, ctx, &strongest_columns(model, row)),
             (None, Some(column)) => line_ui(ui, ctx, &strongest_rows(model, column)),
             (None, None) => {}
@@ -90,7 +89,6 @@ fn block_ui(
     step: &StepRecord,
     model: &JacobianModel,
     (row, column): (usize, usize),
-    factors: &FactorsUi,
 ) {
     line_ui(ui, ctx, &headline(model, row, column));
     match model.jacobian.rows[row].factor {
@@ -111,7 +109,7 @@ fn block_ui(
             if let JacobianFactor::Encoder(frame) = factor {
                 readings_ui(ui, ctx, step, model, frame, column);
             } else {
-                factors.block_ui(ui, ctx, step, model, factor, column);
+                factors::block_ui(ui, ctx, run, model, factor, column);
             }
         }
     }

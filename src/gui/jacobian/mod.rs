@@ -14,7 +14,6 @@ use std::sync::Arc;
 
 use egui::{Pos2, Rect, Response, Role, Sense, Ui, Vec2, WidgetInfo, pos2, vec2};
 
-use self::factors::FactorsUi;
 use self::model::JacobianModel;
 pub(super) use self::model::{cameras, column_name, name_of};
 use super::PanelContext;
@@ -38,10 +37,7 @@ const DETAILS_LINE: f32 = 34.0;
 /// State of the Jacobian panel.
 #[derive(Default)]
 pub struct JacobianPanel {
-    /// Whether steps are taken again on a thread of their own, as in the window; pictures wait for them.
-    pub in_background: bool,
     model: Option<JacobianModel>,
-    factors: FactorsUi,
     mesh: paint::CachedMesh,
     view: View,
     /// The picked row, when it is not a feature's (those are selected everywhere).
@@ -85,7 +81,7 @@ impl JacobianPanel {
         }
         // Taken out while it is drawn, so that the rest of the panel can change.
         let Some(model) = self.model.take() else {
-            let why = if step.outlined { "Taking this step again…" } else { "No linearization in this step" };
+            let why = if step.summary_only { "Recomputing this step…" } else { "No linearization in this step" };
             empty_ui(ui, why);
             return;
         };
@@ -132,10 +128,10 @@ impl JacobianPanel {
         let (_, legend) = ui.allocate_space(vec2(ui.available_width(), LEGEND));
         paint::legend(ui, ctx.theme, legend, model);
         if let Some(picked) = picked.filter(|_| with_details) {
-            let step_number = run.index_at(ctx.cursor_ns);
-            let factor = picked.0.map(|row| model.jacobian.rows[row].factor);
-            self.factors.look(run, step, step_number, factor, self.in_background);
-            details::ui(ui, ctx, run, step, model, picked, &self.factors);
+            if let Some(row) = picked.0 {
+                factors::request(ctx, run, run.index_at(ctx.cursor_ns), model.jacobian.rows[row].factor);
+            }
+            details::ui(ui, ctx, run, step, model, picked);
         }
     }
 

@@ -1,4 +1,7 @@
 //! Runs experiments, on a thread of its own or while the caller waits.
+//!
+//! An experiment is made up of a mechanism, motions and joint readings alone: it has no log, no run and no step, so that
+//! neither the session nor its record has a place for it, and the panel keeps its thread.
 
 use std::sync::mpsc::{Receiver, channel};
 use std::thread::Builder;

@@ -100,7 +100,7 @@ fn time_ui(ui: &mut Ui, ctx: &PanelContext<'_>) {
     {
         solver_ui(ui, ctx, run);
     }
-    if ctx.playback.retaking {
+    if ctx.playback.recomputing {
         ui.label(RichText::new("taken again…").color(theme.text_weak))
             .on_hover_text("What this step left is computed again from the nearest snapshot of the estimator");
     }

@@ -88,7 +88,7 @@ fn opening_ui(ui: &mut Ui, path: &Path) {
 /// How much memory the recording takes of what it may, and what that means for its steps.
 fn recorded(recording: &Recording) -> (String, String) {
     let steps: usize = recording.runs.iter().map(|run| run.steps.len()).sum();
-    let outlined: usize = recording.runs.iter().map(|run| run.memory.outlined).sum();
+    let outlined: usize = recording.runs.iter().map(|run| run.memory.summaries).sum();
     let share =
         format!("{} of {}", bytes(recording.memory_bytes() as u64), bytes(recording.memory_budget_bytes as u64));
     let text = if outlined > 0 { format!("{share}, {outlined} of {steps} steps in outline") } else { share };

@@ -197,6 +197,7 @@ fn recording_of(ranks: &[usize]) -> Recording {
         rig: Arc::new(rig.clone()),
         truth_rig: None,
         duration_ns: 1_000_000,
+        start_ns: 0,
         epoch_ns: 0,
         runs: vec![run],
         warnings: Vec::new(),

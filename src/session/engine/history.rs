@@ -1,7 +1,7 @@
-//! How a run came to where it is: what its steps were given, and snapshots of the estimator in between.
+//! What the steps of a run are recomputed from: their inputs, and snapshots of the estimator in between.
 //!
-//! An estimator is a plain value and its steps are exact, so that any step of a run can be taken again from the nearest
-//! snapshot before it, with the same bits.
+//! An estimator is a plain value and its steps are exact, so that any step of a run can be recomputed from the nearest
+//! snapshot before it, to the same bits.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -16,7 +16,7 @@ const CLOSEST_SPACING: usize = 16;
 
 /// How many snapshots of an estimator are kept.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct SnapshotFigures {
+pub struct SnapshotUse {
     /// Their number.
     pub count: usize,
     /// Bytes of all of them.
@@ -25,18 +25,18 @@ pub struct SnapshotFigures {
     pub spacing: usize,
 }
 
-/// The way of one run; the recording and the threads share it.
+/// The history of one run; the threads share it.
 #[derive(Debug)]
-pub struct History {
+pub(in crate::session) struct History {
     materials: Arc<Materials>,
     /// Number of the first step that is this run's own.
     begin: usize,
-    /// The run that a fork has left, whose steps come before `begin`.
+    /// The history of a fork's parent, whose steps come before `begin`.
     parent: Option<Arc<Self>>,
     snapshots: Mutex<Snapshots>,
 }
 
-/// Snapshots by the number of the step that they are ready to take.
+/// Snapshots by the number of the step before which they were taken.
 #[derive(Debug)]
 struct Snapshots {
     kept: BTreeMap<usize, (Arc<RunEngine>, usize)>,
@@ -47,12 +47,12 @@ struct Snapshots {
 }
 
 impl History {
-    /// A run from the begin of the log; snapshots may take so many bytes together.
+    /// Of a run from the start of the log; snapshots may take so many bytes together.
     pub(in crate::session) fn new(budget_bytes: usize) -> Self {
         Self::with(Arc::default(), 0, None, budget_bytes)
     }
 
-    /// A run that leaves another one before its step `begin`.
+    /// Of a fork whose first own step is `begin`.
     pub(in crate::session) fn fork(parent: &Arc<Self>, begin: usize, budget_bytes: usize) -> Self {
         Self::with(Arc::clone(&parent.materials), begin, Some(Arc::clone(parent)), budget_bytes)
     }
@@ -63,7 +63,7 @@ impl History {
         Self { materials, begin, parent, snapshots: Mutex::new(snapshots) }
     }
 
-    /// What the steps were given.
+    /// The inputs of the steps.
     pub(in crate::session) fn materials(&self) -> &Arc<Materials> {
         &self.materials
     }
@@ -78,7 +78,7 @@ impl History {
         self.snapshots.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Notes what the engine is about to do, and keeps a snapshot of it where one is due.
+    /// Counts the step's input, and keeps a snapshot of the engine where one is due.
     pub(in crate::session) fn before_step(&self, step: usize, engine: &RunEngine, material: &Material) {
         let mut snapshots = self.lock();
         if self.parent.is_none() {
@@ -93,7 +93,7 @@ impl History {
         snapshots.keep_within_budget(self.begin);
     }
 
-    /// From now on snapshots may take so many bytes together.
+    /// Sets how many bytes snapshots may take together.
     pub(in crate::session) fn set_budget(&self, budget_bytes: usize) {
         let mut snapshots = self.lock();
         snapshots.budget_bytes = budget_bytes;
@@ -106,18 +106,18 @@ impl History {
     }
 
     /// The snapshots that are kept of this run's own steps.
-    pub fn snapshots(&self) -> SnapshotFigures {
+    pub(super) fn snapshots(&self) -> SnapshotUse {
         let snapshots = self.lock();
-        SnapshotFigures { count: snapshots.kept.len(), bytes: snapshots.bytes, spacing: snapshots.spacing }
+        SnapshotUse { count: snapshots.kept.len(), bytes: snapshots.bytes, spacing: snapshots.spacing }
     }
 
-    /// Bytes of snapshots and material.
+    /// Bytes of snapshots and step inputs.
     pub(in crate::session) fn bytes(&self) -> usize {
         let snapshots = self.lock();
         snapshots.bytes + snapshots.material_bytes
     }
 
-    /// The engine as it was before a step, `None` for a step that has not been taken.
+    /// The engine as it was before a step, `None` for a step that has not been computed.
     pub(in crate::session) fn engine_before(&self, step: usize) -> Option<RunEngine> {
         if step < self.begin {
             return self.parent.as_ref()?.engine_before(step);
@@ -136,21 +136,21 @@ impl History {
         Some((*at, Arc::clone(engine)))
     }
 
-    /// Takes the steps up to `last` again from the snapshot before it, and returns the last `most` of them with their
-    /// numbers; empty for a step that has not been taken.
-    pub(in crate::session) fn retake(&self, last: usize, most: usize) -> Vec<(usize, StepRecord)> {
-        self.retake_while(last, most, &|| true).unwrap_or_default()
+    /// Recomputes the steps up to `last` from the snapshot before it, and returns the last `most` of them with their
+    /// numbers; empty for a step that has not been computed.
+    pub(in crate::session) fn recompute(&self, last: usize, most: usize) -> Vec<(usize, StepRecord)> {
+        self.recompute_while(last, most, &|| true).unwrap_or_default()
     }
 
-    /// The same as long as somebody wants it, else `None`.
-    pub(in crate::session) fn retake_while(
+    /// The same while `wanted` returns true, else `None`.
+    pub(in crate::session) fn recompute_while(
         &self,
         last: usize,
         most: usize,
         wanted: &dyn Fn() -> bool,
     ) -> Option<Vec<(usize, StepRecord)>> {
         if last < self.begin {
-            return self.parent.as_ref().map_or_else(|| Some(Vec::new()), |it| it.retake_while(last, most, wanted));
+            return self.parent.as_ref().map_or_else(|| Some(Vec::new()), |it| it.recompute_while(last, most, wanted));
         }
         let Some((at, snapshot)) = self.snapshot_before(last) else { return Some(Vec::new()) };
         let first = (last + 1).saturating_sub(most.max(1)).max(at);
@@ -170,17 +170,17 @@ impl History {
         Some(steps)
     }
 
-    /// The rows of a step's factors that are not of features, taken again; `None` for a step that has not been taken or has
-    /// none.
-    pub fn factor_rows(&self, step: usize) -> Option<Vec<FactorRows>> {
+    /// The linearized rows of a step's factors other than reprojection, recomputed; `None` for a step that has not been
+    /// computed or has none.
+    pub(in crate::session) fn factor_rows(&self, step: usize) -> Option<Vec<FactorRows>> {
         let (mut engine, material) = (self.engine_before(step)?, self.materials.get(step)?);
         engine.estimator_mut().set_keep_factor_rows();
         engine.step(&material).report.factor_rows
     }
 
-    /// The states that the solver went through in a step, as reports of their own: before its first iteration, after it,
-    /// after the second, and so on to the last, which is the step itself.
-    pub(in crate::session) fn iterations(&self, step: usize) -> Vec<StepRecord> {
+    /// The states of the solver in a step, as records of their own: before its first iteration, after it, after the
+    /// second, and so on to the last, which is the step itself.
+    pub(in crate::session) fn solver_states(&self, step: usize) -> Vec<StepRecord> {
         let (Some(engine), Some(material)) = (self.engine_before(step), self.materials.get(step)) else {
             return Vec::new();
         };
@@ -201,7 +201,7 @@ impl History {
 }
 
 impl Snapshots {
-    /// Every other snapshot goes until they fit; the first one stays, without which nothing could be taken again.
+    /// Evicts every other snapshot until they fit; the first one stays, without which nothing could be recomputed.
     fn keep_within_budget(&mut self, begin: usize) {
         while self.bytes > self.budget_bytes && self.kept.len() > 1 {
             self.spacing *= 2;

@@ -1,7 +1,15 @@
 //! Runs on threads, and the recomputation of their steps.
+//!
+//! [`Engine`] runs a tracker thread per camera and an estimator thread per run and reports over a channel; [`Computation`]
+//! is the one place where those messages enter the record. A [`RunEngine`] is one estimator as a plain value, a
+//! [`History`] its snapshots and step inputs, and the [`RecomputeThread`] answers requests of playback from them.
 
+mod altered_measurements;
 mod calibrate;
+mod computation;
+mod compute;
 mod configuration;
+mod fork;
 mod history;
 mod image_rotations;
 mod recompute;
@@ -13,19 +21,22 @@ mod threads;
 mod tracker;
 
 pub use calibrate::{CalibrationRequest, CalibrationRun, CalibrationRunError, calibrate};
+pub use computation::Computation;
+pub use compute::{BreakpointHit, compute, compute_until};
 #[cfg(test)]
 pub(in crate::session) use configuration::estimator_config;
-pub use history::{History, SnapshotFigures};
+pub(in crate::session) use fork::apply_fork;
+pub(in crate::session) use history::History;
+pub use history::SnapshotUse;
 pub use image_rotations::image_rotations;
-pub(in crate::session) use recompute::{Detail, Retaken, Retaking, STEPS_AT_ONCE, Wish};
+pub(in crate::session) use recompute::{Detail, RecomputeRequest, RecomputeThread, Recomputed, STEPS_AT_ONCE};
+#[cfg(test)]
 pub(in crate::session) use run_engine::RunEngine;
 #[cfg(test)]
 pub(in crate::session) use step_inputs::Material;
-pub(in crate::session) use step_inputs::tracks_bytes;
 pub use stopwatch::Stopwatch;
 #[cfg(test)]
 pub(in crate::session) use synchronized_frames::Instant;
-pub(in crate::session) use threads::Engine;
-pub use threads::EngineMessage;
+pub(in crate::session) use threads::{Engine, EngineMessage};
 #[cfg(test)]
 pub(in crate::session) use tracker::TrackedSensorFrame;

@@ -1,74 +1,81 @@
-//! A thread that takes steps again which somebody looks at: outlined ones, and what the solver went through in one.
+//! A thread that recomputes steps at the cursor: those of which only the summary is kept, and the solver's states.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{Builder, JoinHandle};
 
 use super::history::History;
+use crate::estimator::FactorRows;
 use crate::session::plan::SessionError;
-use crate::session::record::StepRecord;
+use crate::session::record::{SolverPosition, StepRecord};
 
-/// Steps up to a wanted one that are taken again with it, because people step back.
+/// Steps up to a requested one that are recomputed with it, because people step back.
 pub(in crate::session) const STEPS_AT_ONCE: usize = 32;
 
-/// What of a step is wanted.
+/// What of a step is requested.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::session) enum Detail {
-    /// Everything that it left.
-    Whole,
-    /// The states that the solver went through.
-    Iterations,
+    /// The whole record.
+    Step,
+    /// The states of the solver, of which one is shown.
+    SolverStates(SolverPosition),
+    /// The linearized rows of its factors other than reprojection.
+    FactorRows,
 }
 
-/// A step to be taken again.
+/// A step to be recomputed.
 #[derive(Clone, Debug)]
-pub(in crate::session) struct Wish {
+pub(in crate::session) struct RecomputeRequest {
     /// [`RunRecord::id`](crate::session::RunRecord::id).
     pub(in crate::session) run: u64,
-    /// How the run came there.
+    /// The run's history.
     pub(in crate::session) history: Arc<History>,
     /// Number of the step.
     pub(in crate::session) step: usize,
     /// What of it.
     pub(in crate::session) detail: Detail,
-    /// Whether nobody looks at it yet: it is left when something else is wanted.
-    pub(in crate::session) ahead: bool,
+    /// Whether it is prefetched: it is abandoned when something at the cursor is requested.
+    pub(in crate::session) prefetch: bool,
 }
 
-impl PartialEq for Wish {
+/// Requests are equal that ask for the same work, whatever is shown of its result.
+impl PartialEq for RecomputeRequest {
     fn eq(&self, other: &Self) -> bool {
-        (self.run, self.step, self.detail) == (other.run, other.step, other.detail)
+        let detail = std::mem::discriminant(&self.detail) == std::mem::discriminant(&other.detail);
+        (self.run, self.step) == (other.run, other.step) && detail
     }
 }
 
-/// What has been taken again.
+/// The answer to a request.
 #[derive(Debug)]
-pub(in crate::session) enum Retaken {
+pub(in crate::session) enum Recomputed {
     /// Steps with their numbers.
-    Whole(Vec<(usize, StepRecord)>),
-    /// The states of one step.
-    Iterations(Vec<StepRecord>),
+    Steps(Vec<(usize, StepRecord)>),
+    /// The solver's states of one step.
+    SolverStates(Vec<StepRecord>),
+    /// The factor rows of one step, `None` where it has none.
+    FactorRows(Option<Vec<FactorRows>>),
 }
 
 #[derive(Debug, Default)]
 struct Queue {
-    waiting: VecDeque<Wish>,
-    working: Option<Wish>,
-    /// Whether what is being worked on is still wanted.
+    waiting: VecDeque<RecomputeRequest>,
+    working: Option<RecomputeRequest>,
+    /// Whether the request being worked on is still there.
     working_wanted: bool,
     closed: bool,
 }
 
 impl Queue {
-    /// Whether a wish that is being worked on is still wanted, and nobody waits for anything else.
-    fn is_wanted(&self, wish: &Wish) -> bool {
-        let looked_at = self.working.as_ref().is_some_and(|working| working == wish && !working.ahead);
-        let others = self.waiting.iter().any(|waiting| !waiting.ahead);
-        !self.closed && (looked_at || self.working_wanted && !others)
+    /// Whether a request that is being worked on is still there, and none at the cursor waits behind a prefetched one.
+    fn is_wanted(&self, request: &RecomputeRequest) -> bool {
+        let at_cursor = self.working.as_ref().is_some_and(|working| working == request && !working.prefetch);
+        let others = self.waiting.iter().any(|waiting| !waiting.prefetch);
+        !self.closed && (at_cursor || self.working_wanted && !others)
     }
 
-    fn is_looked_for(&self) -> bool {
-        self.working.iter().chain(&self.waiting).any(|wish| !wish.ahead)
+    fn has_work_at_cursor(&self) -> bool {
+        self.working.iter().chain(&self.waiting).any(|request| !request.prefetch)
     }
 }
 
@@ -80,22 +87,22 @@ struct Shared {
 
 impl Shared {
     fn lock(&self) -> MutexGuard<'_, Queue> {
-        // Wishes are only ever put in and taken out whole.
+        // RecomputeRequestes are only ever put in and taken out whole.
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// The thread; dropping it ends it after the wish that it works on.
+/// The thread; dropping it ends it after the request that it works on.
 #[derive(Debug)]
-pub(in crate::session) struct Retaking {
+pub(in crate::session) struct RecomputeThread {
     shared: Arc<Shared>,
     thread: Option<JoinHandle<()>>,
 }
 
-impl Retaking {
-    /// Starts the thread, which hands over what it has taken again.
+impl RecomputeThread {
+    /// Starts the thread, which hands every answer to `deliver`.
     pub(in crate::session) fn start(
-        mut deliver: impl FnMut(&Wish, Retaken) + Send + 'static,
+        mut deliver: impl FnMut(&RecomputeRequest, Recomputed) + Send + 'static,
     ) -> Result<Self, SessionError> {
         let shared = Arc::new(Shared::default());
         let seen = Arc::clone(&shared);
@@ -108,39 +115,48 @@ impl Retaking {
                 }
                 queue.working = queue.waiting.pop_front();
                 queue.working_wanted = true;
-                let Some(wish) = queue.working.clone() else { continue };
+                let Some(request) = queue.working.clone() else { continue };
                 drop(queue);
-                let retaken = match wish.detail {
-                    Detail::Whole => {
-                        let still_wanted = || !wish.ahead || seen.lock().is_wanted(&wish);
-                        wish.history.retake_while(wish.step, STEPS_AT_ONCE, &still_wanted).map(Retaken::Whole)
+                let recomputed = match request.detail {
+                    Detail::Step => {
+                        let still_wanted = || !request.prefetch || seen.lock().is_wanted(&request);
+                        request
+                            .history
+                            .recompute_while(request.step, STEPS_AT_ONCE, &still_wanted)
+                            .map(Recomputed::Steps)
                     }
-                    Detail::Iterations => Some(Retaken::Iterations(wish.history.iterations(wish.step))),
+                    Detail::SolverStates(_) => {
+                        Some(Recomputed::SolverStates(request.history.solver_states(request.step)))
+                    }
+                    Detail::FactorRows => Some(Recomputed::FactorRows(request.history.factor_rows(request.step))),
                 };
-                if let Some(retaken) = retaken {
-                    deliver(&wish, retaken);
+                if let Some(recomputed) = recomputed {
+                    // Another state of the solver may be shown by now.
+                    let request = seen.lock().working.clone().unwrap_or(request);
+                    deliver(&request, recomputed);
                 }
                 seen.lock().working = None;
                 seen.changed.notify_all();
             }
         };
-        let thread = Builder::new().name("retaking".to_owned()).spawn(work);
+        let thread = Builder::new().name("recompute".to_owned()).spawn(work);
         Ok(Self { shared, thread: Some(thread.map_err(|source| SessionError::Thread { source })?) })
     }
 
-    /// From now on these are wanted, in this order, and nothing else.
-    pub(in crate::session) fn want(&self, wishes: Vec<Wish>) {
+    /// Replaces all requests by these, in this order.
+    pub(in crate::session) fn request(&self, requests: Vec<RecomputeRequest>) {
         let mut queue = self.shared.lock();
         queue.waiting.clear();
         let mut working_wanted = false;
-        for wish in wishes {
+        for request in requests {
             match &mut queue.working {
-                // What is made ready beforehand may have come to be looked at meanwhile.
-                Some(working) if *working == wish => {
-                    working.ahead = wish.ahead;
+                // The cursor may have come to a prefetched step meanwhile.
+                Some(working) if *working == request => {
+                    working.prefetch = request.prefetch;
+                    working.detail = request.detail;
                     working_wanted = true;
                 }
-                _ => queue.waiting.push_back(wish),
+                _ => queue.waiting.push_back(request),
             }
         }
         queue.working_wanted = working_wanted;
@@ -148,18 +164,18 @@ impl Retaking {
         self.shared.changed.notify_all();
     }
 
-    /// Waits until everything that somebody looks at has been handed over.
+    /// Waits until everything at the cursor has been delivered.
     pub(in crate::session) fn settle(&self) {
-        drop(self.shared.changed.wait_while(self.shared.lock(), |queue| !queue.closed && queue.is_looked_for()));
+        drop(self.shared.changed.wait_while(self.shared.lock(), |queue| !queue.closed && queue.has_work_at_cursor()));
     }
 
-    /// Whether something is being taken again that somebody looks at.
+    /// Whether something at the cursor is being recomputed.
     pub(in crate::session) fn is_busy(&self) -> bool {
-        self.shared.lock().is_looked_for()
+        self.shared.lock().has_work_at_cursor()
     }
 }
 
-impl Drop for Retaking {
+impl Drop for RecomputeThread {
     fn drop(&mut self) {
         self.shared.lock().closed = true;
         self.shared.changed.notify_all();
@@ -174,20 +190,28 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_nobody_looks_at_yet_keeps_nobody_waiting() {
+    fn prefetching_gives_way_to_requests_at_the_cursor() {
         let history = Arc::new(History::new(0));
-        let wish = |step, ahead| Wish { run: 1, history: Arc::clone(&history), step, detail: Detail::Whole, ahead };
-        let mut queue = Queue { working: Some(wish(7, true)), working_wanted: true, ..Queue::default() };
-        assert!(!queue.is_looked_for() && queue.is_wanted(&wish(7, true)));
-        // Something else is looked at: the work ahead is left.
-        queue.waiting.push_back(wish(90, false));
-        assert!(queue.is_looked_for() && !queue.is_wanted(&wish(7, true)));
-        // The work ahead itself has come to be looked at.
-        let retaking =
-            Retaking { shared: Arc::new(Shared { queue: Mutex::new(queue), ..Shared::default() }), thread: None };
-        retaking.want(vec![wish(7, false), wish(3, true)]);
-        let queue = retaking.shared.lock();
-        assert!(queue.is_wanted(&wish(7, true)) && queue.is_looked_for());
-        assert_eq!(queue.waiting.iter().map(|wish| wish.step).collect::<Vec<_>>(), [3]);
+        let request = |step, prefetch| RecomputeRequest {
+            run: 1,
+            history: Arc::clone(&history),
+            step,
+            detail: Detail::Step,
+            prefetch,
+        };
+        let mut queue = Queue { working: Some(request(7, true)), working_wanted: true, ..Queue::default() };
+        assert!(!queue.has_work_at_cursor() && queue.is_wanted(&request(7, true)));
+        // Something else is requested at the cursor: prefetching is abandoned.
+        queue.waiting.push_back(request(90, false));
+        assert!(queue.has_work_at_cursor() && !queue.is_wanted(&request(7, true)));
+        // The cursor has come to the prefetched step.
+        let thread = RecomputeThread {
+            shared: Arc::new(Shared { queue: Mutex::new(queue), ..Shared::default() }),
+            thread: None,
+        };
+        thread.request(vec![request(7, false), request(3, true)]);
+        let queue = thread.shared.lock();
+        assert!(queue.is_wanted(&request(7, true)) && queue.has_work_at_cursor());
+        assert_eq!(queue.waiting.iter().map(|request| request.step).collect::<Vec<_>>(), [3]);
     }
 }

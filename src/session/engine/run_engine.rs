@@ -1,6 +1,7 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
+use super::altered_measurements::AlteredMeasurements;
 use super::step_inputs::Material;
 use super::stopwatch::Stopwatch;
 use crate::estimator::{Estimator, EstimatorConfig, StepInput, StepReport};
@@ -8,7 +9,6 @@ use crate::frontend::TrackedFrame;
 use crate::geometry::Dimension;
 use crate::gimbal::{Chain, ParameterId};
 use crate::observability::{RankReport, analyse};
-use crate::session::plan::Alterations;
 use crate::session::record::StepRecord;
 
 /// Columns of a rigid camera beside the main one: its pose on the IMU.
@@ -22,8 +22,8 @@ pub(in crate::session) struct RunEngine {
     joints_free: bool,
     /// One report in so many frames keeps its linearization.
     keep_linearization_every: Option<usize>,
-    /// What it makes of its measurements before it uses them.
-    alterations: Alterations,
+    /// Changes of its measurements, in a fork.
+    altered_measurements: AlteredMeasurements,
 }
 
 impl RunEngine {
@@ -32,7 +32,13 @@ impl RunEngine {
         let has_joints = !config.chain.links.is_empty();
         let joints_free = has_joints && !config.use_encoder;
         let estimator = Estimator::new(config);
-        Self { estimator, has_joints, joints_free, keep_linearization_every, alterations: Alterations::default() }
+        Self {
+            estimator,
+            has_joints,
+            joints_free,
+            keep_linearization_every,
+            altered_measurements: AlteredMeasurements::default(),
+        }
     }
 
     /// The estimator, to be changed between two steps.
@@ -51,9 +57,9 @@ impl RunEngine {
         std::iter::once(main.to_owned()).chain(rigid).collect()
     }
 
-    /// From now on it alters its measurements.
-    pub(in crate::session) fn alter(&mut self, alterations: Alterations) {
-        self.alterations.add(alterations);
+    /// Adds changes of its measurements.
+    pub(super) fn alter(&mut self, changes: AlteredMeasurements) {
+        self.altered_measurements.add(changes);
     }
 
     /// The images of one instant through the estimator and the observability analysis.
@@ -71,7 +77,7 @@ impl RunEngine {
             tracks: Arc::clone(material.main_tracks()),
             truth: material.truth,
             log_time_ns: material.log_time_ns,
-            outlined: false,
+            summary_only: false,
         }
     }
 
@@ -98,15 +104,15 @@ impl RunEngine {
             .tracks
             .iter()
             .enumerate()
-            .map(|(camera, tracks)| match self.alterations.tracks(camera, tracks) {
+            .map(|(camera, tracks)| match self.altered_measurements.tracks(camera, tracks) {
                 Some(altered) => Cow::Owned(altered),
                 None => Cow::Borrowed(&**tracks),
             })
             .collect();
         let rigid: Vec<&TrackedFrame> = altered.iter().skip(1).map(Cow::as_ref).collect();
-        let read = self.has_joints && !self.alterations.encoder_off();
+        let read = self.has_joints && !self.altered_measurements.encoder_off();
         let angles = material.joint_angles.as_ref().filter(|_| read);
-        let noisy = angles.and_then(|angles| self.alterations.joint_angles(angles, material.stamp_ns));
+        let noisy = angles.and_then(|angles| self.altered_measurements.joint_angles(angles, material.stamp_ns));
         self.estimator.step(&StepInput {
             frame_index: material.frame_index,
             stamp_ns: material.stamp_ns,
@@ -131,7 +137,7 @@ impl RunEngine {
         let chain = if chain.dof() + rigid == mounts { chain } else { chain.without_joint_offsets() };
         // Readings that a fork leaves out stay with the frames that have them already.
         let unread = || report.window.iter().all(|frame| frame.encoder_angles_rad.is_none());
-        let joints_free = self.joints_free || self.has_joints && self.alterations.encoder_off() && unread();
+        let joints_free = self.joints_free || self.has_joints && self.altered_measurements.encoder_off() && unread();
         let rank = analyse(&linearization, &chain, &angles, joints_free);
         let kept = self.keep_linearization_every.is_some_and(|every| report.frame_index.is_multiple_of(every));
         report.linearization = kept.then_some(linearization);

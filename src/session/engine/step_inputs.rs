@@ -4,9 +4,10 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
 use super::synchronized_frames::Instant;
 use crate::estimator::allocated_bytes;
-use crate::frontend::{TrackedFeature, TrackedFrame};
+use crate::frontend::TrackedFrame;
 use crate::geometry::RigidTransform;
 use crate::sensors::{ImuSample, JointAngles};
+use crate::session::record::tracks_bytes;
 
 /// Everything that one step of a run was given.
 ///
@@ -61,12 +62,6 @@ impl Material {
             + self.joint_angles.as_ref().map_or(0, |angles| allocated_bytes(angles.heap_bytes()))
             + rigid
     }
-}
-
-/// Bytes of tracks.
-pub(in crate::session) fn tracks_bytes(tracks: &TrackedFrame) -> usize {
-    allocated_bytes(size_of::<TrackedFrame>() + 2 * size_of::<usize>())
-        + allocated_bytes(tracks.features.capacity() * size_of::<TrackedFeature>())
 }
 
 /// The material of a run's steps so far, which the runs that branch off from it share.

@@ -10,6 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::{Builder, JoinHandle};
 
+use super::computation::Computation;
 use super::configuration::estimator_config;
 use super::history::History;
 use super::run_engine::RunEngine;
@@ -18,7 +19,7 @@ use super::synchronized_frames::Instants;
 use super::tracker::{CameraTracker, TrackedSensorFrame};
 use crate::flight_log::LogWarning;
 use crate::session::plan::{SessionError, SessionPlan, cameras_of_run};
-use crate::session::record::{Recording, StepRecord};
+use crate::session::record::StepRecord;
 
 /// Frames that may wait between the tracker and an estimator.
 const QUEUED_FRAMES: usize = 8;
@@ -27,7 +28,7 @@ const QUEUED_STEPS: usize = 64;
 
 /// What the threads report.
 #[derive(Debug)]
-pub enum EngineMessage {
+pub(in crate::session) enum EngineMessage {
     /// A run has done a step.
     Step {
         /// Number of the run.
@@ -69,9 +70,9 @@ impl Default for Engine {
 
 impl Engine {
     /// Starts every run of the plan; each keeps its way in the history of its record.
-    pub(in crate::session) fn start(plan: &SessionPlan, recording: &Recording) -> Result<Self, SessionError> {
+    pub(in crate::session) fn start(plan: &SessionPlan, computation: &Computation) -> Result<Self, SessionError> {
         let mut engine = Self::default();
-        engine.start_runs(plan, recording, &(0..plan.runs.len()).collect::<Vec<_>>())?;
+        engine.start_runs(plan, computation, &(0..plan.runs.len()).collect::<Vec<_>>())?;
         Ok(engine)
     }
 
@@ -79,7 +80,7 @@ impl Engine {
     pub(in crate::session) fn start_runs(
         &mut self,
         plan: &SessionPlan,
-        recording: &Recording,
+        computation: &Computation,
         runs: &[usize],
     ) -> Result<(), SessionError> {
         let Some(sender) = self.sender.clone() else { return Ok(()) };
@@ -98,7 +99,7 @@ impl Engine {
             }
             let engine = RunEngine::new(config, plan.keep_linearization_every);
             let results = sender.clone();
-            let Some(history) = recording.runs.get(run).and_then(|record| record.history.clone()) else { continue };
+            let Some(history) = computation.history(run).cloned() else { continue };
             self.threads.push(spawn(format!("estimator {run}"), move || {
                 run_thread(run, engine, Instants::new(frames), &history, &results);
             })?);

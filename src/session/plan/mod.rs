@@ -1,11 +1,11 @@
 //! What a session is to do: the log with its rig, the runs over it, and what a fork changes. Data; nothing runs here.
 
-mod forks;
+mod fork_changes;
+mod fork_text;
 mod run_spec;
 mod session_plan;
 
-pub(in crate::session) use forks::Alterations;
-pub use forks::{FORK_PARAMETERIZATIONS, ForkChanges, ForkError};
+pub use fork_changes::{FORK_PARAMETERIZATIONS, ForkChanges, ForkError};
 pub(in crate::session) use run_spec::distinct_labels;
 pub use run_spec::{ParameterizationChoice, RunSpec, RunSpecError};
 pub use session_plan::{DEFAULT_MEMORY_BUDGET_BYTES, MAX_RUNS, SessionError, SessionPlan, SessionRequest};

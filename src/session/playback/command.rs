@@ -80,6 +80,14 @@ pub enum Command {
     },
     /// Take a run away, by its number.
     RemoveRun(usize),
-    /// How much memory what is recorded may take from now on, in bytes.
+    /// Recompute the linearized rows of a step's factors; they come into [`RunRecord::factor_rows`] and stay requested
+    /// while the cursor is at the step.
+    RequestFactorRows {
+        /// Number of the run.
+        run: usize,
+        /// Number of the step.
+        step: usize,
+    },
+    /// Set how much memory the recording may take, in bytes.
     SetMemoryBudget(usize),
 }

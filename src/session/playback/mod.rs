@@ -1,10 +1,14 @@
-//! A cursor over the record, and the commands that move it.
+//! A cursor over the record, the commands that move it, and the session that connects cursor, engine and record.
 
 mod command;
+mod cursor;
+mod recomputed_view;
+mod runs;
 mod saved;
 mod session;
-mod stopping;
+mod shared;
 
 pub use command::{Command, PlaybackSpeed};
+pub use cursor::{Cursor, MoveOutcome, Moved};
 pub use saved::{SavedBreakpoint, SavedFork, SavedLog, SavedSession, SavedSessionError};
 pub use session::Session;

@@ -7,7 +7,6 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::command::Command;
 use super::session::Session;
 use crate::session::breakpoints::Condition;
 use crate::session::plan::{ForkChanges, RunSpec, SessionError, SessionPlan, SessionRequest};
@@ -210,7 +209,7 @@ impl Session {
             forks: forks.chain(pending).collect(),
             breakpoints: breakpoints.collect(),
             markers_ns: self.markers_ns().to_vec(),
-            cursor_ns: self.pending.cursor_ns.unwrap_or(self.cursor_ns),
+            cursor_ns: self.pending.cursor_ns.unwrap_or(self.cursor.stamp_ns),
             layout,
         }
     }
@@ -260,7 +259,7 @@ impl Session {
             && (recording.computed_ns() >= cursor_ns || recording.runs.iter().all(|run| run.finished))
         {
             self.pending.cursor_ns = None;
-            self.perform(Command::Seek { stamp_ns: cursor_ns });
+            self.cursor = self.cursor.seek(&recording, cursor_ns);
         }
     }
 }
@@ -268,6 +267,7 @@ impl Session {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::session::playback::Command;
 
     fn garden(duration_s: f64) -> SessionPlan {
         let request = SessionRequest {
@@ -315,12 +315,12 @@ mod tests {
         assert_eq!(again.saved(Some(layout)), saved);
         let (before, after) = (session.recording(), again.recording());
         assert_eq!(before.runs.len(), after.runs.len());
-        // With less memory older steps are kept in outline, at once and told.
-        assert!(after.runs.iter().all(|run| run.memory.outlined == 0));
+        // With less memory older steps become summaries at once.
+        assert!(after.runs.iter().all(|run| run.memory.summaries == 0));
         again.apply(Command::SetMemoryBudget(1 << 20));
         let thin = again.recording();
         assert!(thin.memory_budget_bytes == 1 << 20 && thin.memory_bytes() < after.memory_bytes());
-        assert!(thin.runs[0].memory.outlined > 0);
+        assert!(thin.runs[0].memory.summaries > 0);
         for (before, after) in before.runs.iter().zip(&after.runs) {
             let newest = |run: &crate::session::RunRecord| run.steps.last().unwrap().report.window.clone();
             assert_eq!(newest(before), newest(after));

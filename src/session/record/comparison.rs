@@ -4,7 +4,8 @@ use std::collections::BTreeSet;
 
 use nalgebra::UnitQuaternion;
 
-use super::recording::{RunRecord, StepRecord};
+use super::run::RunRecord;
+use super::step::StepRecord;
 use crate::estimator::{FrameStateReport, Phase};
 use crate::geometry::{RigidTransform, so3, wrap_angle};
 

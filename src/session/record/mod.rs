@@ -1,16 +1,22 @@
-//! Stored reports: what every step of every run left, and what follows from it without running anything again.
+//! Stored reports of every step of every run, and what follows from them without running an estimator.
 
 mod comparison;
 mod recording;
+mod rig_values;
+mod run;
 mod run_accuracy;
 mod solver_trace;
+mod step;
 mod summary;
 mod warnings;
 
 pub use comparison::{Comparison, Parting, Quantity};
-pub use recording::{ForkOrigin, Recording, RunMemory, RunRecord, StepRecord};
+pub use recording::Recording;
+pub use run::{ForkOrigin, RunMemory, RunRecord};
 pub use run_accuracy::{ChainDistance, RELATIVE_LENGTHS_M, RelativeAccuracy, TrajectoryAccuracy};
 pub use solver_trace::{SolverPosition, SolverTrace};
+pub(in crate::session) use step::tracks_bytes;
+pub use step::{StepFactorRows, StepRecord};
 pub use warnings::RunWarning;
 #[cfg(test)]
 pub(in crate::session) use warnings::warnings_of;

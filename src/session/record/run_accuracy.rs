@@ -1,6 +1,6 @@
 //! How well a run did against the truth: its trajectory and its chain.
 
-use super::recording::RunRecord;
+use super::run::RunRecord;
 use crate::geometry::{seconds_from_ns, so3};
 use crate::gimbal::ClassicalChain;
 use crate::session::accuracy::{

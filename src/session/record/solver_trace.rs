@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::recording::StepRecord;
+use super::step::StepRecord;
 
 /// Where in the solver's work a step is looked at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

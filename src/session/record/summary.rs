@@ -1,20 +1,20 @@
-//! What is kept of a step when memory runs short, and which steps that befalls.
+//! The summary of a step, which is all that is kept of it when memory runs short, and the order in which steps are
+//! summarized.
 
-use super::recording::StepRecord;
+use super::step::StepRecord;
 use crate::estimator::StepReport;
 
-/// Every so many steps the points of the map stay, for the scene that draws those of earlier steps.
+/// One summary in so many keeps its landmarks, for the scene, which draws those of earlier steps.
 const LANDMARKS_EVERY: usize = 4;
-/// So many of the newest steps are left alone: people look at them.
-const SPARED: usize = 64;
+/// So many of the newest steps are not summarized: they are the ones looked at.
+const NEWEST_KEPT: usize = 64;
 
 impl StepRecord {
-    /// The step without what only the pictures of this very instant need: features, older frames of the window, and
-    /// points of the map but in every fourth step. A linearization that was asked for keeps its window, whose frames its
-    /// columns belong to.
+    /// The step without features, older frames of the window, and (but in every fourth step) landmarks: only drawings of
+    /// this very step need them. A linearization that is kept keeps the window, whose frames its columns belong to.
     ///
-    /// Everything that is plotted over time or written into tables stays; events, χ², iterations, calibration, ranks.
-    pub(in crate::session) fn outline(&self, number: usize) -> Self {
+    /// Everything that is plotted over time or written into tables stays: events, χ², iterations, calibration, ranks.
+    pub(in crate::session) fn summary(&self, number: usize) -> Self {
         let report = &self.report;
         let keeps_landmarks = number.is_multiple_of(LANDMARKS_EVERY);
         let keeps_window = report.linearization.is_some();
@@ -51,35 +51,35 @@ impl StepRecord {
             tracks: std::sync::Arc::clone(&self.tracks),
             truth: self.truth,
             log_time_ns: self.log_time_ns,
-            outlined: true,
+            summary_only: true,
         }
     }
 }
 
-/// Which steps of a run are kept in outline: those that are the quickest to take again first, right behind a snapshot,
-/// all over the run.
+/// The order in which a run's steps are summarized: those with the cheapest recomputation first, right behind a snapshot,
+/// over the whole run.
 #[derive(Clone, Debug, Default)]
-pub(in crate::session) struct Thinning {
+pub(super) struct SummaryOrder {
     /// Steps between two snapshots when the order was made.
     spacing: usize,
-    /// By distance from the snapshot, the next step to be outlined.
+    /// By distance from the snapshot, the next step to be summarized.
     next: Vec<usize>,
 }
 
-impl Thinning {
-    /// The step that is to be outlined next, `None` when only spared ones are left.
-    pub(in crate::session) fn next_victim(&mut self, begin: usize, steps: usize, spacing: usize) -> Option<usize> {
+impl SummaryOrder {
+    /// The step to be summarized next, `None` when only the newest ones are left.
+    pub(super) fn next(&mut self, begin: usize, steps: usize, spacing: usize) -> Option<usize> {
         if self.spacing != spacing {
             self.spacing = spacing;
             let first = begin - begin % spacing;
             let own = |step: usize| if step < begin { step + spacing } else { step };
             self.next = (first..first + spacing).map(own).collect();
         }
-        let end = steps.saturating_sub(SPARED);
+        let end = steps.saturating_sub(NEWEST_KEPT);
         let next = self.next.iter_mut().find(|next| **next < end)?;
-        let victim = *next;
+        let number = *next;
         *next += spacing;
-        Some(victim)
+        Some(number)
     }
 }
 
@@ -88,16 +88,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_quick_to_take_again_goes_first_and_the_newest_steps_stay() {
-        let mut thinning = Thinning::default();
-        let mut victims = |steps, spacing, count: usize| -> Vec<usize> {
-            (0..count).map_while(|_| thinning.next_victim(0, steps, spacing)).collect()
+    fn cheap_recomputations_go_first_and_the_newest_steps_stay() {
+        let mut order = SummaryOrder::default();
+        let mut numbers = |steps, spacing, count: usize| -> Vec<usize> {
+            (0..count).map_while(|_| order.next(0, steps, spacing)).collect()
         };
-        assert_eq!(victims(40 + SPARED, 16, 5), [0, 16, 32, 1, 17]);
-        assert_eq!(victims(50 + SPARED, 16, 2), [48, 33]);
-        // Fewer snapshots: the order begins anew, and steps that are outlined already come by again.
-        assert_eq!(victims(50 + SPARED, 32, 3), [0, 32, 1]);
-        assert_eq!(victims(50 + SPARED, 32, 1000).len(), 50 - 3);
-        assert!(victims(SPARED, 32, 1).is_empty());
+        assert_eq!(numbers(40 + NEWEST_KEPT, 16, 5), [0, 16, 32, 1, 17]);
+        assert_eq!(numbers(50 + NEWEST_KEPT, 16, 2), [48, 33]);
+        // Fewer snapshots: the order restarts, and steps that are summarized already come by again.
+        assert_eq!(numbers(50 + NEWEST_KEPT, 32, 3), [0, 32, 1]);
+        assert_eq!(numbers(50 + NEWEST_KEPT, 32, 1000).len(), 50 - 3);
+        assert!(numbers(NEWEST_KEPT, 32, 1).is_empty());
     }
 }

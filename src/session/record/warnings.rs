@@ -1,22 +1,22 @@
-//! What the steps of a run warned of, told once for all steps that say the same.
+//! The warnings of a run's steps, each message once.
 
 use std::sync::Arc;
 
-use super::recording::StepRecord;
+use super::step::StepRecord;
 use crate::estimator::StepReport;
 
-/// A warning in one wording, over all the steps that gave it.
+/// A warning message, over all the steps that gave it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RunWarning {
     /// What is wrong, and what to try.
     pub message: String,
-    /// Header stamp of the first step that said so.
+    /// Header stamp of the first step with it.
     pub first_ns: i64,
-    /// How many steps said so.
+    /// Number of steps with it.
     pub steps: usize,
 }
 
-/// The warnings of a run's steps in the order in which they first came.
+/// The warnings of a run's steps in the order of their first steps.
 pub(in crate::session) fn warnings_of(steps: &[Arc<StepRecord>]) -> Vec<RunWarning> {
     let mut warnings = Vec::new();
     for step in steps {
@@ -25,7 +25,7 @@ pub(in crate::session) fn warnings_of(steps: &[Arc<StepRecord>]) -> Vec<RunWarni
     warnings
 }
 
-/// Adds what one more step warns of.
+/// Adds the warnings of one more step.
 pub(in crate::session) fn add_warnings(warnings: &mut Vec<RunWarning>, report: &StepReport) {
     for message in &report.warnings {
         match warnings.iter_mut().find(|known| known.message == *message) {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::estimator::{FactorKind, FrameId, JacobianFactor, Phase, StageTimes};
 use crate::gimbal;
 use crate::session::breakpoints::Condition;
-use crate::session::engine::{History, Instant, Material, RunEngine, estimator_config};
+use crate::session::engine::{History, Instant, Material, RunEngine, apply_fork, estimator_config};
 use crate::session::plan::{ForkChanges, RunSpec, SessionPlan, SessionRequest};
 use crate::session::playback::{Command, Session};
 use crate::session::record::StepRecord;
@@ -42,7 +42,7 @@ impl Flown {
     fn forked(&self, begin: usize, changes: &str) -> Result<Vec<StepRecord>, String> {
         let changes: ForkChanges = changes.parse().map_err(|error: crate::session::ForkError| error.to_string())?;
         let mut engine = self.history.engine_before(begin).unwrap();
-        changes.apply(&mut engine, &self.flight.given_rig, "cam0").map_err(|error| error.to_string())?;
+        apply_fork(&changes, &mut engine, &self.flight.given_rig, "cam0").map_err(|error| error.to_string())?;
         let materials = (begin..self.steps.len()).map(|step| self.history.materials().get(step).unwrap());
         Ok(materials.map(|material| engine.step(&material)).collect())
     }
@@ -329,9 +329,9 @@ fn a_session_stops_at_breakpoints_and_forks_there() {
         assert_eq!(bits(original), bits(twin), "step {number}");
         assert_eq!(other.report.calibration.parameters.len(), if number < at { 18 } else { 24 });
     }
-    // A fork's steps can be taken again as well, those of its parent too.
+    // A fork's steps can be recomputed as well, those of its parent too.
     for number in [at - 3, at, parent.steps.len() - 1] {
-        let (_, again) = classical.retake(number, 1).pop().unwrap();
+        let (_, again) = session.computation().recompute(2, number, 1).pop().unwrap();
         assert_eq!(bits(&again), bits(&classical.steps[number]));
     }
 }

@@ -61,19 +61,19 @@ fn a_recorded_frame_stays_small() {
     assert_eq!(run.memory.own + run.memory.tracks, summed);
 }
 
-/// A covariance is that of the frames of the window: whoever asked for it finds both in an outline.
+/// A covariance is that of the frames of the window: whoever asked for it finds both in a summary.
 #[test]
-fn an_outline_with_a_linearization_keeps_the_frames_of_its_columns() {
+fn a_summary_with_a_linearization_keeps_the_frames_of_its_columns() {
     let flight = synthetic_tracks(&SyntheticOptions { duration_s: 6.0, ..SyntheticOptions::default() });
     let run = recorded_with(&flight, "auto", Some(10));
-    let outlines: Vec<_> = run.steps.iter().enumerate().map(|(number, step)| step.outline(number)).collect();
-    let tracking = outlines.iter().filter(|outline| outline.report.phase == Phase::Tracking);
-    let (kept, plain): (Vec<_>, Vec<_>) = tracking.partition(|outline| outline.report.linearization.is_some());
+    let summaries: Vec<_> = run.steps.iter().enumerate().map(|(number, step)| step.summary(number)).collect();
+    let tracking = summaries.iter().filter(|summary| summary.report.phase == Phase::Tracking);
+    let (kept, plain): (Vec<_>, Vec<_>) = tracking.partition(|summary| summary.report.linearization.is_some());
     assert!(kept.len() >= 5 && plain.len() >= 40, "{} with, {} without", kept.len(), plain.len());
-    for outline in &kept {
-        let columns = &outline.report.linearization.as_ref().unwrap().columns;
+    for summary in &kept {
+        let columns = &summary.report.linearization.as_ref().unwrap().columns;
         let poses = columns.iter().filter(|block| block.id.group() == ColumnGroup::Pose).count();
-        assert!(poses > 1 && poses == outline.report.window.len(), "{poses} poses");
+        assert!(poses > 1 && poses == summary.report.window.len(), "{poses} poses");
     }
-    assert!(plain.iter().all(|outline| outline.report.window.len() == 1));
+    assert!(plain.iter().all(|summary| summary.report.window.len() == 1));
 }

@@ -1,0 +1,105 @@
+//! Measurements as a fork changes them.
+
+use std::collections::BTreeSet;
+
+use crate::frontend::{FeatureId, TrackedFrame};
+use crate::geometry::SplitMix64;
+use crate::sensors::JointAngles;
+
+/// Changes of a run's measurements before the estimator uses them.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct AlteredMeasurements {
+    pub(super) dropped: BTreeSet<u64>,
+    /// Numbers of cameras whose tracks are not used.
+    pub(super) left_out: BTreeSet<usize>,
+    pub(super) encoder_off: bool,
+    pub(super) joint_noise_rad: f64,
+    pub(super) encoder_noise: f64,
+}
+
+impl Default for AlteredMeasurements {
+    fn default() -> Self {
+        Self {
+            dropped: BTreeSet::new(),
+            left_out: BTreeSet::new(),
+            encoder_off: false,
+            joint_noise_rad: 0.0,
+            encoder_noise: 1.0,
+        }
+    }
+}
+
+impl AlteredMeasurements {
+    /// Adds those of a fork to those of its parent.
+    pub(super) fn add(&mut self, other: Self) {
+        self.dropped.extend(other.dropped);
+        self.left_out.extend(other.left_out);
+        self.encoder_off |= other.encoder_off;
+        self.joint_noise_rad = self.joint_noise_rad.hypot(other.joint_noise_rad);
+        self.encoder_noise *= other.encoder_noise;
+    }
+
+    /// Whether encoder readings are not used.
+    pub(super) fn encoder_off(&self) -> bool {
+        self.encoder_off
+    }
+
+    /// The tracks of a camera without dropped features, `None` where none of them is dropped.
+    pub(super) fn tracks(&self, camera: usize, tracks: &TrackedFrame) -> Option<TrackedFrame> {
+        let left_out = self.left_out.contains(&camera);
+        let gone = |id: FeatureId| left_out || self.dropped.contains(&id.of_camera(camera).0);
+        tracks.features.iter().any(|feature| gone(feature.id)).then(|| {
+            let mut kept = tracks.clone();
+            kept.features.retain(|feature| !gone(feature.id));
+            kept
+        })
+    }
+
+    /// Joint angles with added noise, which depends on the stamp and the joint alone; `None` without a change.
+    pub(super) fn joint_angles(&self, angles: &JointAngles, stamp_ns: i64) -> Option<JointAngles> {
+        if self.joint_noise_rad == 0.0 && self.encoder_noise == 1.0 {
+            return None;
+        }
+        let mut altered = angles.clone();
+        let mut random = SplitMix64::new(stamp_ns.unsigned_abs());
+        for angle in &mut altered.angles_rad {
+            // Irwin–Hall distribution: the sum of twelve uniform numbers has variance one.
+            let normal = (0..12).map(|_| random.next_unit()).sum::<f64>() - 6.0;
+            *angle += self.joint_noise_rad * normal;
+        }
+        let sigmas = altered.sigmas_rad.iter_mut().chain(&mut altered.lasting_sigmas_rad);
+        sigmas.for_each(|sigma| *sigma *= self.encoder_noise);
+        Some(altered)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn measurements_are_altered_the_same_way_every_time() {
+        let mut altered_measurements = AlteredMeasurements::default();
+        let angles = JointAngles {
+            angles_rad: vec![0.1, 0.2],
+            sigmas_rad: vec![0.01, 0.01],
+            lasting_sigmas_rad: vec![0.0, 0.0],
+            ..JointAngles::default()
+        };
+        assert!(altered_measurements.joint_angles(&angles, 7).is_none());
+        altered_measurements.add(AlteredMeasurements { joint_noise_rad: 0.03, ..AlteredMeasurements::default() });
+        altered_measurements.add(AlteredMeasurements {
+            joint_noise_rad: 0.04,
+            encoder_noise: 2.0,
+            ..AlteredMeasurements::default()
+        });
+        let altered = altered_measurements.joint_angles(&angles, 7).unwrap();
+        assert_eq!(Some(&altered), altered_measurements.joint_angles(&angles, 7).as_ref());
+        assert_eq!(altered.sigmas_rad, [0.02, 0.02]);
+        let errors: Vec<f64> = (0..2000)
+            .map(|stamp_ns| altered_measurements.joint_angles(&angles, stamp_ns).unwrap().angles_rad[1] - 0.2)
+            .collect();
+        let deviation = (errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt();
+        assert!((deviation - 0.05).abs() < 0.003, "{deviation}");
+    }
+}

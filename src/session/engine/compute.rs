@@ -1,0 +1,93 @@
+//! Runs computed to their end, or to a time, while the caller waits.
+
+use super::computation::Computation;
+use super::threads::{Engine, EngineMessage};
+use crate::session::breakpoints::{Breakpoints, Condition, Hit, NamedValue};
+use crate::session::plan::{SessionError, SessionPlan};
+use crate::session::record::Recording;
+
+/// Where [`compute_until`] ended, and what was true there.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BreakpointHit {
+    /// The step.
+    pub hit: Hit,
+    /// The quantities of the condition with their values in that step.
+    pub values: Vec<NamedValue>,
+    /// All of it in one line.
+    pub description: String,
+}
+
+/// Computes every run of the plan until a condition becomes true in one of them, and returns where that was.
+///
+/// All runs end at that stamp, however far their threads were ahead: later steps are removed.
+pub fn compute_until(
+    plan: &SessionPlan,
+    condition: &Condition,
+    on_step: &mut dyn FnMut(&Recording),
+) -> Result<(Computation, Option<BreakpointHit>), SessionError> {
+    let mut computation = Computation::new(plan);
+    let mut engine = Engine::start(plan, &computation)?;
+    engine.no_more_runs();
+    let mut breakpoints = Breakpoints::default();
+    breakpoints.add(condition.clone());
+    let mut until_ns = i64::MAX;
+    while let Some(message) = engine.receive() {
+        computation.apply(ended_at(message, until_ns));
+        breakpoints.read(computation.recording());
+        let hit = breakpoints.next_after(computation.recording(), i64::MIN);
+        if let Some(hit) = hit.filter(|hit| hit.stamp_ns < until_ns) {
+            until_ns = hit.stamp_ns;
+            computation.recording_mut().end_at(until_ns);
+        }
+        on_step(computation.recording());
+        if computation.recording().runs.iter().all(|run| run.finished || run.ends_at(until_ns)) {
+            break;
+        }
+    }
+    let recording = computation.recording_mut();
+    for run in &mut recording.runs {
+        run.finished = true;
+    }
+    // The threads read ahead by as much as their queues hold.
+    recording.warnings.retain(|warning| warning.stamp_ns <= until_ns);
+    let hit = breakpoints.next_after(recording, i64::MIN).map(|hit| {
+        let values = breakpoints.values_at(recording, hit);
+        BreakpointHit { hit, values, description: breakpoints.describe(recording, hit) }
+    });
+    Ok((computation, hit))
+}
+
+/// Computes every run of the plan and returns all their reports; `on_step` is called after each step.
+///
+/// `until_ns` ends the work once every run has passed that time (for a screenshot of one instant).
+pub fn compute(
+    plan: &SessionPlan,
+    until_ns: Option<i64>,
+    on_step: &mut dyn FnMut(&Recording),
+) -> Result<Computation, SessionError> {
+    let mut computation = Computation::new(plan);
+    let mut engine = Engine::start(plan, &computation)?;
+    engine.no_more_runs();
+    while let Some(message) = engine.receive() {
+        computation.apply(ended_at(message, until_ns.unwrap_or(i64::MAX)));
+        on_step(computation.recording());
+        if computation.recording().runs.iter().all(|run| run.finished) {
+            break;
+        }
+    }
+    if let Some(until_ns) = until_ns {
+        // The threads read ahead by as much as their queues hold.
+        computation.recording_mut().warnings.retain(|warning| warning.stamp_ns <= until_ns);
+    }
+    Ok(computation)
+}
+
+/// The end of a run in place of a step after a time: such steps would depend on how the threads are scheduled.
+fn ended_at(message: EngineMessage, until_ns: i64) -> EngineMessage {
+    match message {
+        EngineMessage::Step { run, record } if record.report.stamp_ns > until_ns => {
+            EngineMessage::Finished { run, error: None }
+        }
+        message => message,
+    }
+}

@@ -1,0 +1,73 @@
+//! The changes of a fork, applied to the engine that it takes over from its parent.
+
+use std::collections::BTreeSet;
+
+use super::altered_measurements::AlteredMeasurements;
+use super::run_engine::RunEngine;
+use crate::gimbal::{Parameterization, auto_parameterization};
+use crate::sensors::Rig;
+use crate::session::plan::{ForkChanges, ForkError, ParameterizationChoice};
+
+/// Changes the parent's engine, as it is before the fork's first step, into the fork's; `camera_key` is that of the main
+/// camera.
+pub(in crate::session) fn apply_fork(
+    changes: &ForkChanges,
+    engine: &mut RunEngine,
+    rig: &Rig,
+    camera_key: &str,
+) -> Result<(), ForkError> {
+    let left_out = left_out(changes, &engine.camera_keys(camera_key))?;
+    let estimator = engine.estimator_mut();
+    if let Some(choice) = changes.parameterization {
+        let (parameterization, auto_chart) = match choice {
+            ParameterizationChoice::Minimal => (Parameterization::Minimal, false),
+            ParameterizationChoice::MinimalSwapped => (Parameterization::MinimalSwapped, false),
+            ParameterizationChoice::Classical => (Parameterization::Classical, false),
+            ParameterizationChoice::Poe => (Parameterization::Poe, false),
+            _ => (auto_parameterization(&estimator.classical_chain()), true),
+        };
+        estimator.use_parameterization(parameterization, auto_chart);
+    }
+    let names = rig.parameter_names();
+    let known = estimator.parameters();
+    let parameter = |name: &String| {
+        let parameter = names.parse(name).filter(|parameter| known.contains(parameter));
+        parameter.ok_or_else(|| ForkError::UnknownParameter {
+            name: name.clone(),
+            known: known.iter().map(|parameter| names.name(*parameter)).collect(),
+        })
+    };
+    for (name, value) in &changes.values {
+        estimator.set_value(parameter(name)?, *value)?;
+    }
+    for name in &changes.frozen {
+        estimator.freeze(parameter(name)?)?;
+    }
+    estimator.scale_imu_noise(changes.imu_noise);
+    estimator.scale_pixel_noise(changes.pixel_noise);
+    let dropped = changes.dropped.clone();
+    for camera in 0..engine.cameras() {
+        let all = left_out.contains(&camera);
+        engine.estimator_mut().forget_features(camera, |id| all || dropped.contains(&id.of_camera(camera).0));
+    }
+    engine.alter(AlteredMeasurements {
+        dropped: changes.dropped.clone(),
+        left_out,
+        encoder_off: changes.encoder_off,
+        joint_noise_rad: changes.joint_noise_rad,
+        encoder_noise: changes.encoder_noise,
+    });
+    Ok(())
+}
+
+/// Numbers of the cameras that are left out, of those with the given keys.
+fn left_out(changes: &ForkChanges, keys: &[String]) -> Result<BTreeSet<usize>, ForkError> {
+    let number = |key: &String| keys.iter().position(|known| known == key);
+    let missing = |key: &String| ForkError::NoCamera { camera: key.clone(), present: keys.join(", ") };
+    let left_out: BTreeSet<usize> =
+        changes.without.iter().map(|key| number(key).ok_or_else(|| missing(key))).collect::<Result<_, _>>()?;
+    if left_out.len() == keys.len() {
+        return Err(ForkError::Blind { without: keys.join(", ") });
+    }
+    Ok(left_out)
+}

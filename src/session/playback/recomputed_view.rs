@@ -1,0 +1,104 @@
+//! What the session has recomputed for the view at the cursor.
+
+use std::sync::Arc;
+
+use super::session::Session;
+use crate::session::engine::{Detail, RecomputeRequest, STEPS_AT_ONCE};
+use crate::session::record::RunRecord;
+
+/// A step whose factor rows are shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct FactorRowsView {
+    /// [`RunRecord::id`].
+    run: u64,
+    step: usize,
+}
+
+impl FactorRowsView {
+    /// Whether the rows are in the record.
+    fn is_in(self, run: &RunRecord) -> bool {
+        run.factor_rows.as_ref().is_some_and(|rows| rows.step == self.step)
+    }
+}
+
+impl Session {
+    /// Waits until everything that the view at the cursor needs is in the record.
+    pub fn settle(&self) {
+        self.request_recomputation();
+        self.recompute.settle();
+        // A state of the solver that has been requested meanwhile is shown from here on.
+        self.request_recomputation();
+    }
+
+    /// Whether steps at the cursor are being recomputed.
+    pub fn is_recomputing(&self) -> bool {
+        self.recompute.is_busy()
+    }
+
+    pub(super) fn request_factor_rows(&mut self, run: usize, step: usize) {
+        self.factor_rows = self.recording().runs.get(run).map(|run| FactorRowsView { run: run.id, step });
+    }
+
+    /// Requests what the view at the cursor needs and the record lacks, and removes solver states that are not shown any
+    /// more.
+    pub(super) fn request_recomputation(&self) {
+        let computation = self.computation();
+        let cursor = self.cursor;
+        let (mut requests, mut prefetched) = (Vec::new(), Vec::new());
+        for (number, run) in computation.recording().runs.iter().enumerate() {
+            let (Some(step), Some(history)) = (run.index_at(cursor.stamp_ns), computation.history(number)) else {
+                continue;
+            };
+            let request = |step, detail, prefetch| RecomputeRequest {
+                run: run.id,
+                history: Arc::clone(history),
+                step,
+                detail,
+                prefetch,
+            };
+            if run.lacks(step) {
+                // Playing needs the next steps too, and all of them take no longer than the last.
+                let end = step + if cursor.playing { STEPS_AT_ONCE } else { 1 };
+                let last = (step..end).take_while(|step| run.lacks(*step)).last().unwrap_or(step);
+                requests.push(request(last, Detail::Step, false));
+            }
+            if let Some(shown) = cursor.solver
+                && run.trace.as_ref().is_none_or(|trace| trace.step != step)
+            {
+                requests.push(request(step, Detail::SolverStates(shown), false));
+            }
+            let rows = self.factor_rows.filter(|view| view.run == run.id && view.step == step);
+            if rows.is_some_and(|view| !view.is_in(run)) {
+                requests.push(request(step, Detail::FactorRows, false));
+            }
+            // People step back: the steps before are recomputed while they look.
+            let before = (step.saturating_sub(STEPS_AT_ONCE)..step).rev().find(|step| run.lacks(*step));
+            if let Some(before) = before.filter(|_| !cursor.playing) {
+                prefetched.push(request(before, Detail::Step, true));
+            }
+        }
+        requests.extend(prefetched);
+        self.recompute.request(requests);
+        let is_stale = |run: &RunRecord| match (&run.trace, cursor.solver) {
+            (None, _) => false,
+            (Some(_), None) => true,
+            (Some(trace), Some(shown)) => {
+                run.index_at(cursor.stamp_ns) != Some(trace.step) || trace.at != shown.of(trace.iterations())
+            }
+        };
+        let stale = computation.recording().runs.iter().any(is_stale);
+        // Not held on to while the record changes, which would copy it.
+        drop(computation);
+        if stale {
+            self.shared.change(|computation| {
+                for run in &mut computation.recording_mut().runs {
+                    let here = run.index_at(cursor.stamp_ns);
+                    run.trace = run.trace.take().filter(|trace| Some(trace.step) == here).and_then(|mut trace| {
+                        trace.at = cursor.solver?.of(trace.iterations());
+                        Some(trace)
+                    });
+                }
+            });
+        }
+    }
+}

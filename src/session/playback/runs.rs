@@ -1,0 +1,81 @@
+//! Runs and forks that a session adds and removes while it plays.
+
+use std::sync::Arc;
+
+use super::session::Session;
+use crate::geometry::seconds_from_ns;
+use crate::session::engine::{Computation, History, apply_fork};
+use crate::session::plan::{ForkChanges, ForkError, MAX_RUNS, RunSpec, SessionError, cameras_of_run, distinct_labels};
+use crate::session::record::RunRecord;
+
+impl Session {
+    pub(super) fn add_run(&mut self, spec: RunSpec) {
+        if let Err(error) = self.try_add_run(spec) {
+            self.notices.push(error.to_string());
+        }
+    }
+
+    fn try_add_run(&mut self, spec: RunSpec) -> Result<(), SessionError> {
+        self.check_run_count()?;
+        let spec = self.distinct(spec);
+        let camera_key = cameras_of_run(&self.plan.rig, &spec)?.main.key.clone();
+        self.plan.runs.push((spec.clone(), camera_key.clone()));
+        let history = Arc::new(History::new(self.plan.memory_budget_bytes));
+        self.shared.change(|computation| computation.add_run(RunRecord::new(spec, camera_key), history));
+        self.engine.start_runs(&self.plan, &self.computation(), &[self.plan.runs.len() - 1])
+    }
+
+    /// Forks a run at a time: the step there is the fork's first own one.
+    pub(super) fn fork_at(
+        &mut self,
+        run: usize,
+        stamp_ns: i64,
+        changes: &ForkChanges,
+        label: Option<String>,
+    ) -> Result<(), String> {
+        self.check_run_count().map_err(|error| error.to_string())?;
+        let computation = self.computation();
+        let none = |run: usize| ForkError::NoStep { run: run.to_string() }.to_string();
+        let parent = computation.recording().runs.get(run).ok_or_else(|| none(run))?;
+        let no_step = || ForkError::NoStep { run: parent.spec.label.clone() }.to_string();
+        let step = parent.index_at(stamp_ns).ok_or_else(no_step)?;
+        let history = computation.history(run).ok_or_else(no_step)?;
+        let mut engine = history.engine_before(step).ok_or_else(no_step)?;
+        apply_fork(changes, &mut engine, &self.plan.rig, &parent.camera_key).map_err(|error| error.to_string())?;
+        let mut spec = changes.spec(&parent.spec, seconds_from_ns(parent.steps[step].report.stamp_ns));
+        spec.label = label.unwrap_or(spec.label);
+        let spec = self.distinct(spec);
+        let fork = RunRecord::fork(parent, spec.clone(), step, changes.clone());
+        let history = Arc::new(History::fork(history, step, self.plan.memory_budget_bytes));
+        self.plan.runs.push((spec, fork.camera_key.clone()));
+        // Not held on to while the record changes, which would copy it.
+        drop(computation);
+        self.shared.change(|computation| computation.add_run(fork, Arc::clone(&history)));
+        let number = self.plan.runs.len() - 1;
+        self.engine.start_fork(number, engine, history).map_err(|error| error.to_string())
+    }
+
+    fn check_run_count(&self) -> Result<(), SessionError> {
+        let count = self.plan.runs.len() + 1;
+        if count > MAX_RUNS { Err(SessionError::TooManyRuns { count }) } else { Ok(()) }
+    }
+
+    /// The specification with a label that differs from those of all runs.
+    fn distinct(&self, spec: RunSpec) -> RunSpec {
+        let mut specs: Vec<RunSpec> = self.plan.runs.iter().map(|(spec, _)| spec.clone()).chain([spec]).collect();
+        distinct_labels(&mut specs);
+        specs.swap_remove(specs.len() - 1)
+    }
+
+    /// Removes the last run; an earlier one keeps its number, so only the last can be removed.
+    pub(super) fn remove_run(&mut self, run: usize) {
+        let last = self.plan.runs.len().saturating_sub(1);
+        let finished = self.recording().runs.get(run).is_some_and(|run| run.finished);
+        if run == last && run > 0 && finished {
+            self.plan.runs.pop();
+            self.shared.change(Computation::remove_last_run);
+        } else {
+            self.notices.push("Only the last run can be removed, once it is computed".to_owned());
+        }
+    }
+}

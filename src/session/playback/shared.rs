@@ -1,0 +1,85 @@
+//! The computation of a session, which grows on a collecting thread while others look at it.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::Receiver;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::{Builder, JoinHandle};
+
+use crate::session::engine::{Computation, EngineMessage, RecomputeRequest, Recomputed};
+use crate::session::plan::SessionError;
+use crate::session::record::Recording;
+
+#[derive(Debug)]
+struct State {
+    computation: Mutex<Computation>,
+    generation: AtomicU64,
+}
+
+impl State {
+    fn lock(&self) -> MutexGuard<'_, Computation> {
+        // Every change adds or replaces something whole.
+        self.computation.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn change(&self, change: impl FnOnce(&mut Computation)) {
+        change(&mut self.lock());
+        self.generation.fetch_add(1, Ordering::Release);
+    }
+}
+
+/// A computation behind a lock that is only held for the moment of a change or a copy.
+#[derive(Debug)]
+pub(super) struct SharedComputation {
+    state: Arc<State>,
+    collector: Option<JoinHandle<()>>,
+}
+
+impl SharedComputation {
+    pub(super) fn new(computation: Computation) -> Self {
+        let state = State { computation: Mutex::new(computation), generation: AtomicU64::new(1) };
+        Self { state: Arc::new(state), collector: None }
+    }
+
+    /// Starts the thread that adds what the engine's threads report.
+    pub(super) fn collect(&mut self, messages: Option<Receiver<EngineMessage>>) -> Result<(), SessionError> {
+        let state = Arc::clone(&self.state);
+        let work = move || {
+            for message in messages.iter().flatten() {
+                state.change(|computation| computation.apply(message));
+            }
+        };
+        let collector = Builder::new().name("collector".to_owned()).spawn(work);
+        self.collector = Some(collector.map_err(|source| SessionError::Thread { source })?);
+        Ok(())
+    }
+
+    /// Adds what has been recomputed, for the thread that recomputes.
+    pub(super) fn receiver_of_recomputed(&self) -> impl FnMut(&RecomputeRequest, Recomputed) + Send + 'static {
+        let state = Arc::clone(&self.state);
+        move |request, recomputed| state.change(|computation| computation.add_recomputed(request, recomputed))
+    }
+
+    pub(super) fn recording(&self) -> Arc<Recording> {
+        Arc::clone(self.state.lock().recording())
+    }
+
+    pub(super) fn computation(&self) -> Computation {
+        self.state.lock().clone()
+    }
+
+    /// Changes with every change.
+    pub(super) fn generation(&self) -> u64 {
+        self.state.generation.load(Ordering::Acquire)
+    }
+
+    pub(super) fn change(&self, change: impl FnOnce(&mut Computation)) {
+        self.state.change(change);
+    }
+
+    /// Waits for the end of the collecting thread.
+    pub(super) fn join(&mut self) {
+        if let Some(collector) = self.collector.take() {
+            drop(collector.join());
+        }
+    }
+}

@@ -1,0 +1,49 @@
+//! A rig's values of the calibration parameters that a run estimates.
+
+use super::run::RunRecord;
+use crate::estimator::{CalibrationEstimate, rigid_columns};
+use crate::gimbal::{Chain, NearestForm, ParameterId, Parameterization};
+use crate::sensors::Rig;
+
+impl RunRecord {
+    /// What a rig says about the columns of the run's calibration, by name, in the parameterization of an estimate; `None`
+    /// when the rig does not have the cameras.
+    ///
+    /// Of the equivalent numbers of the classical form it takes those nearest to what `given` says, the rig that the run
+    /// began with: in those the run counts.
+    pub fn values_in(&self, rig: &Rig, given: &Rig, estimate: &CalibrationEstimate) -> Option<Vec<(ParameterId, f64)>> {
+        let main = rig.chain_of_camera(&self.camera_key)?;
+        let parameterization = estimate.parameterization.parse().ok()?;
+        let form = self.form_in(given, estimate, parameterization)?;
+        let chain = form.of(&Chain::from_classical(&main, Parameterization::Classical));
+        let mut values: Vec<_> = chain.parameters().into_iter().zip(chain.values().iter().copied()).collect();
+        let mut clocks = vec![(ParameterId::timeshift(0), self.camera_key.as_str())];
+        for (camera, (key, _)) in (1..).zip(&estimate.rigid_cameras) {
+            values.extend(rigid_columns(camera, &rig.chain_of_camera(key)?.imu_from_camera(&[])));
+            clocks.push((ParameterId::timeshift(camera), key));
+        }
+        for (clock, key) in clocks.into_iter().filter(|(clock, _)| estimate.parameters.contains(clock)) {
+            values.push((clock, rig.camera(key).ok()?.timeshift_cam_imu_s));
+        }
+        Some(values)
+    }
+
+    /// How mechanisms are said in a parameterization, with the numbers nearest to the rig's where there is a choice; the
+    /// prior deviations of the estimate weigh them where it is of that parameterization. `None` when the rig does not have
+    /// the camera.
+    pub fn form_in(
+        &self,
+        given: &Rig,
+        estimate: &CalibrationEstimate,
+        parameterization: Parameterization,
+    ) -> Option<NearestForm> {
+        let near = Chain::from_classical(&given.chain_of_camera(&self.camera_key)?, parameterization);
+        let parameters = near.parameters();
+        let scales = if estimate.parameters.starts_with(&parameters) {
+            estimate.prior_sigmas[..parameters.len()].to_vec()
+        } else {
+            parameters.iter().map(|parameter| parameter.dimension().scale()).collect()
+        };
+        Some(NearestForm::new(near, &scales.into()))
+    }
+}

@@ -1,0 +1,217 @@
+//! One run's record: its steps in time order and what follows from them.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use super::solver_trace::SolverTrace;
+use super::step::{StepFactorRows, StepRecord};
+use super::summary::SummaryOrder;
+use super::warnings::{RunWarning, add_warnings, warnings_of};
+use crate::geometry::RigidTransform;
+use crate::session::accuracy::{Alignment, AlignmentSums};
+use crate::session::plan::{ForkChanges, RunSpec};
+
+/// Recomputed steps of a run that are kept beside their summaries.
+const MOST_RECOMPUTED: usize = 96;
+
+/// Number of the next run.
+static NEXT_ID: AtomicU64 = AtomicU64::new(0);
+
+/// How much memory a run takes, in bytes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RunMemory {
+    /// The steps without their tracks.
+    pub own: usize,
+    /// The tracks, which runs on the same camera share.
+    pub tracks: usize,
+    /// The step inputs and estimator snapshots that its steps are recomputed from.
+    pub history: usize,
+    /// Number of steps of which only the summary is kept.
+    pub summaries: usize,
+}
+
+/// Where a fork has left its parent.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ForkOrigin {
+    /// [`RunRecord::id`] of the parent.
+    pub parent: u64,
+    /// Number of the first step that is the fork's own.
+    pub step: usize,
+    /// Its stamp since the log began.
+    pub stamp_ns: i64,
+    /// What the fork changes.
+    pub changes: ForkChanges,
+}
+
+/// One run: an estimator over the log, and all its steps so far in time order.
+#[derive(Clone, Debug)]
+pub struct RunRecord {
+    /// The specification; its `label` is the run's name on screen.
+    pub spec: RunSpec,
+    /// Key of the main camera (`cam0`): of two, the one whose image is shown.
+    pub camera_key: String,
+    /// Steps in time order.
+    pub steps: Vec<Arc<StepRecord>>,
+    /// Whether the log's end has been reached.
+    pub finished: bool,
+    /// Why it ended early.
+    pub error: Option<String>,
+    /// `true_from_estimate`: the yaw and translation that align the estimated trajectory with the ground truth, `None`
+    /// until enough frames have ground truth.
+    pub alignment: Option<RigidTransform>,
+    /// Sums over the frames with ground truth so far, from which `alignment` follows.
+    pub alignment_sums: AlignmentSums,
+    /// Warnings of its steps.
+    pub warnings: Vec<RunWarning>,
+    /// How much memory it takes.
+    pub memory: RunMemory,
+    /// By number, recomputed steps of which only the summary is kept otherwise.
+    pub recomputed: BTreeMap<usize, Arc<StepRecord>>,
+    /// The solver's states in the step at the cursor, while they are shown.
+    pub trace: Option<SolverTrace>,
+    /// The factor rows that were requested last, of any step.
+    pub factor_rows: Option<StepFactorRows>,
+    /// Differs between all runs of the process.
+    pub id: u64,
+    /// Where it comes from, for a fork.
+    pub origin: Option<ForkOrigin>,
+    summary_order: SummaryOrder,
+}
+
+impl RunRecord {
+    /// A run before its first step.
+    pub fn new(spec: RunSpec, camera_key: String) -> Self {
+        Self {
+            spec,
+            camera_key,
+            steps: Vec::new(),
+            finished: false,
+            error: None,
+            alignment: None,
+            alignment_sums: AlignmentSums::default(),
+            warnings: Vec::new(),
+            memory: RunMemory::default(),
+            recomputed: BTreeMap::new(),
+            trace: None,
+            factor_rows: None,
+            id: NEXT_ID.fetch_add(1, Ordering::Relaxed),
+            origin: None,
+            summary_order: SummaryOrder::default(),
+        }
+    }
+
+    /// A fork of another run before its first own step: the steps up to there are the parent's.
+    pub(in crate::session) fn fork(parent: &Self, spec: RunSpec, step: usize, changes: ForkChanges) -> Self {
+        let stamp_ns = parent.steps.get(step).map_or(0, |step| step.report.stamp_ns);
+        let mut fork = Self::new(spec, parent.camera_key.clone());
+        fork.origin = Some(ForkOrigin { parent: parent.id, step, stamp_ns, changes });
+        fork.steps = parent.steps[..step].to_vec();
+        // The parent counts the bytes of the shared steps; tracks are counted once for all runs.
+        fork.memory.tracks = fork.steps.iter().map(|step| step.tracks_bytes()).sum();
+        fork.warnings = warnings_of(&fork.steps);
+        fork.align();
+        fork
+    }
+
+    /// Appends a step.
+    pub fn push(&mut self, record: StepRecord) {
+        if let (Some(newest), Some(truth)) = (record.report.newest(), &record.truth) {
+            self.alignment_sums.add(&newest.world_from_imu.translation_m, &truth.translation_m);
+            self.alignment = self.alignment_sums.solve(Alignment::YawPosition).map(|transform| transform.rigid);
+        }
+        self.memory.own += record.own_bytes();
+        self.memory.tracks += record.tracks_bytes();
+        add_warnings(&mut self.warnings, &record.report);
+        self.steps.push(Arc::new(record));
+    }
+
+    /// Removes the steps after a time, however far the run's thread was ahead of others.
+    pub(in crate::session) fn end_at(&mut self, stamp_ns: i64) {
+        let count = self.steps.partition_point(|step| step.report.stamp_ns <= stamp_ns);
+        if count == self.steps.len() {
+            return;
+        }
+        let steps = self.steps.split_off(count);
+        let back = |bytes: fn(&StepRecord) -> usize| steps.iter().map(|step| bytes(step)).sum::<usize>();
+        self.memory.own -= back(StepRecord::own_bytes);
+        self.memory.tracks -= back(StepRecord::tracks_bytes);
+        self.finished = true;
+        self.warnings = warnings_of(&self.steps);
+        self.align();
+    }
+
+    /// Whether its last step is at a time or after it.
+    pub(in crate::session) fn ends_at(&self, stamp_ns: i64) -> bool {
+        self.steps.last().is_some_and(|step| step.report.stamp_ns >= stamp_ns)
+    }
+
+    /// Aligns the trajectory with the ground truth, from all steps.
+    fn align(&mut self) {
+        self.alignment_sums = AlignmentSums::default();
+        for step in &self.steps {
+            if let (Some(newest), Some(truth)) = (step.report.newest(), &step.truth) {
+                self.alignment_sums.add(&newest.world_from_imu.translation_m, &truth.translation_m);
+            }
+        }
+        self.alignment = self.alignment_sums.solve(Alignment::YawPosition).map(|transform| transform.rigid);
+    }
+
+    /// Number of the last step at or before a time.
+    pub fn index_at(&self, stamp_ns: i64) -> Option<usize> {
+        self.steps.partition_point(|step| step.report.stamp_ns <= stamp_ns).checked_sub(1)
+    }
+
+    /// The last step at or before a time, as it is shown; see [`RunRecord::step`].
+    pub fn step_at(&self, stamp_ns: i64) -> Option<&Arc<StepRecord>> {
+        self.step(self.index_at(stamp_ns)?)
+    }
+
+    /// A step as it is shown: a state of its solver while those are shown, recomputed where only the summary is kept and
+    /// it has been recomputed.
+    pub fn step(&self, number: usize) -> Option<&Arc<StepRecord>> {
+        let traced = self.trace.as_ref().filter(|trace| trace.step == number).and_then(SolverTrace::shown);
+        traced.or_else(|| self.recomputed.get(&number)).or_else(|| self.steps.get(number))
+    }
+
+    /// Whether only the summary of a step is there.
+    pub(in crate::session) fn lacks(&self, number: usize) -> bool {
+        self.steps.get(number).is_some_and(|step| step.summary_only) && !self.recomputed.contains_key(&number)
+    }
+
+    /// Stores recomputed steps around `number` beside their summaries; beyond 96, the farthest from it are evicted.
+    pub(in crate::session) fn add_recomputed(&mut self, number: usize, steps: Vec<(usize, StepRecord)>) {
+        let summary_only = |step: usize| self.steps.get(step).is_some_and(|step| step.summary_only);
+        let steps: Vec<_> = steps.into_iter().filter(|(step, _)| summary_only(*step)).collect();
+        self.recomputed.extend(steps.into_iter().map(|(step, record)| (step, Arc::new(record))));
+        while self.recomputed.len() > MOST_RECOMPUTED {
+            let (first, last) = (self.recomputed.first_key_value(), self.recomputed.last_key_value());
+            let (Some((first, _)), Some((last, _))) = (first, last) else { return };
+            let farthest = if number.abs_diff(*first) > number.abs_diff(*last) { *first } else { *last };
+            self.recomputed.remove(&farthest);
+        }
+    }
+
+    /// Bytes of its steps and of its history, without tracks that runs share.
+    pub fn own_bytes(&self) -> usize {
+        let recomputed = self.recomputed.values().chain(self.trace.iter().flat_map(|trace| &trace.records));
+        self.memory.own + recomputed.map(|step| step.own_bytes()).sum::<usize>() + self.memory.history
+    }
+
+    /// Replaces one more of its own steps, those from `begin` on, by its summary; `spacing` is the number of steps between
+    /// two estimator snapshots. Returns whether there was a step left.
+    pub(in crate::session) fn summarize_one(&mut self, begin: usize, spacing: usize) -> bool {
+        while let Some(number) = self.summary_order.next(begin, self.steps.len(), spacing) {
+            let step = &self.steps[number];
+            if step.summary_only {
+                continue;
+            }
+            let summary = step.summary(number);
+            self.memory.own -= step.own_bytes() - summary.own_bytes();
+            self.memory.summaries += 1;
+            self.steps[number] = Arc::new(summary);
+            return true;
+        }
+        false
+    }
+}
