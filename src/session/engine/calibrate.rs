@@ -242,15 +242,15 @@ fn views(
 ) -> (Vec<TrackedView>, Vec<LogWarning>) {
     let shift_ns = ns_from_seconds(camera.timeshift_cam_imu_s);
     let (mut views, mut warnings) = (Vec::new(), Vec::new());
-    while let Some(tracked) = tracker.next_frame() {
-        on_image(tracked.frame.stamp_ns);
-        warnings.extend(tracked.frame.warnings);
+    while let Some((input, of_input)) = tracker.next_input() {
+        on_image(input.stamp_ns);
+        warnings.extend(of_input);
         views.push(TrackedView {
-            frame_index: tracked.frame.index,
-            stamp_ns: tracked.frame.stamp_ns.saturating_add(shift_ns),
-            imu: tracked.frame.imu,
-            joint_angles: tracked.frame.joint_angles,
-            tracks: tracked.tracks,
+            frame_index: input.frame_index,
+            stamp_ns: input.stamp_ns.saturating_add(shift_ns),
+            tracks: Arc::clone(input.main_tracks()),
+            imu: input.imu,
+            joint_angles: input.joint_angles,
         });
     }
     warnings.extend_from_slice(tracker.remaining_warnings());

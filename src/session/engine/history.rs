@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::run_engine::RunEngine;
-use super::step_inputs::{Material, Materials};
+use super::step_inputs::{OwnedStepInput, StepInputs};
 use crate::estimator::FactorRows;
 use crate::session::record::StepRecord;
 
@@ -28,7 +28,7 @@ pub struct SnapshotUse {
 /// The history of one run; the threads share it.
 #[derive(Debug)]
 pub(in crate::session) struct History {
-    materials: Arc<Materials>,
+    inputs: Arc<StepInputs>,
     /// Number of the first step that is this run's own.
     begin: usize,
     /// The history of a fork's parent, whose steps come before `begin`.
@@ -43,7 +43,7 @@ struct Snapshots {
     spacing: usize,
     bytes: usize,
     budget_bytes: usize,
-    material_bytes: usize,
+    input_bytes: usize,
 }
 
 impl History {
@@ -54,18 +54,18 @@ impl History {
 
     /// Of a fork whose first own step is `begin`.
     pub(in crate::session) fn fork(parent: &Arc<Self>, begin: usize, budget_bytes: usize) -> Self {
-        Self::with(Arc::clone(&parent.materials), begin, Some(Arc::clone(parent)), budget_bytes)
+        Self::with(Arc::clone(&parent.inputs), begin, Some(Arc::clone(parent)), budget_bytes)
     }
 
-    fn with(materials: Arc<Materials>, begin: usize, parent: Option<Arc<Self>>, budget_bytes: usize) -> Self {
+    fn with(inputs: Arc<StepInputs>, begin: usize, parent: Option<Arc<Self>>, budget_bytes: usize) -> Self {
         let snapshots =
-            Snapshots { kept: BTreeMap::new(), spacing: CLOSEST_SPACING, bytes: 0, budget_bytes, material_bytes: 0 };
-        Self { materials, begin, parent, snapshots: Mutex::new(snapshots) }
+            Snapshots { kept: BTreeMap::new(), spacing: CLOSEST_SPACING, bytes: 0, budget_bytes, input_bytes: 0 };
+        Self { inputs, begin, parent, snapshots: Mutex::new(snapshots) }
     }
 
     /// The inputs of the steps.
-    pub(in crate::session) fn materials(&self) -> &Arc<Materials> {
-        &self.materials
+    pub(in crate::session) fn inputs(&self) -> &Arc<StepInputs> {
+        &self.inputs
     }
 
     /// Number of the first step that is this run's own.
@@ -79,10 +79,10 @@ impl History {
     }
 
     /// Counts the step's input, and keeps a snapshot of the engine where one is due.
-    pub(in crate::session) fn before_step(&self, step: usize, engine: &RunEngine, material: &Material) {
+    pub(in crate::session) fn before_step(&self, step: usize, engine: &RunEngine, input: &OwnedStepInput) {
         let mut snapshots = self.lock();
         if self.parent.is_none() {
-            snapshots.material_bytes += material.own_bytes();
+            snapshots.input_bytes += input.own_bytes();
         }
         if step != self.begin && !step.is_multiple_of(snapshots.spacing) {
             return;
@@ -114,7 +114,7 @@ impl History {
     /// Bytes of snapshots and step inputs.
     pub(in crate::session) fn bytes(&self) -> usize {
         let snapshots = self.lock();
-        snapshots.bytes + snapshots.material_bytes
+        snapshots.bytes + snapshots.input_bytes
     }
 
     /// The engine as it was before a step, `None` for a step that has not been computed.
@@ -125,7 +125,7 @@ impl History {
         let (at, snapshot) = self.snapshot_before(step)?;
         let mut engine = RunEngine::clone(&snapshot);
         for number in at..step {
-            engine.pass(&*self.materials.get(number)?);
+            engine.pass(&*self.inputs.get(number)?);
         }
         Some(engine)
     }
@@ -157,14 +157,14 @@ impl History {
         let mut engine = RunEngine::clone(&snapshot);
         let mut steps = Vec::new();
         for number in at..=last {
-            let Some(material) = self.materials.get(number) else { break };
+            let Some(input) = self.inputs.get(number) else { break };
             if !wanted() {
                 return None;
             }
             if number < first {
-                engine.pass(&material);
+                engine.pass(&input);
             } else {
-                steps.push((number, engine.step(&material)));
+                steps.push((number, engine.step(&input)));
             }
         }
         Some(steps)
@@ -173,18 +173,18 @@ impl History {
     /// The linearized rows of a step's factors other than reprojection, recomputed; `None` for a step that has not been
     /// computed or has none.
     pub(in crate::session) fn factor_rows(&self, step: usize) -> Option<Vec<FactorRows>> {
-        let (mut engine, material) = (self.engine_before(step)?, self.materials.get(step)?);
+        let (mut engine, input) = (self.engine_before(step)?, self.inputs.get(step)?);
         engine.estimator_mut().set_keep_factor_rows();
-        engine.step(&material).report.factor_rows
+        engine.step(&input).report.factor_rows
     }
 
     /// The states of the solver in a step, as records of their own: before its first iteration, after it, after the
     /// second, and so on to the last, which is the step itself.
     pub(in crate::session) fn solver_states(&self, step: usize) -> Vec<StepRecord> {
-        let (Some(engine), Some(material)) = (self.engine_before(step), self.materials.get(step)) else {
+        let (Some(engine), Some(input)) = (self.engine_before(step), self.inputs.get(step)) else {
             return Vec::new();
         };
-        let whole = engine.clone().step(&material);
+        let whole = engine.clone().step(&input);
         // The first window is solved several times over, outliers taken out in between.
         let begins = whole.report.events.iter().any(|event| event.kind.begins_window());
         let iterations = if begins { 0 } else { whole.report.iterations.len() };
@@ -192,7 +192,7 @@ impl History {
             .map(|count| {
                 let mut engine = engine.clone();
                 engine.set_iterations(count);
-                engine.step(&material)
+                engine.step(&input)
             })
             .collect();
         records.push(whole);

@@ -33,10 +33,6 @@ pub(in crate::session) use recompute::{Detail, RecomputeRequest, RecomputeThread
 #[cfg(test)]
 pub(in crate::session) use run_engine::RunEngine;
 #[cfg(test)]
-pub(in crate::session) use step_inputs::Material;
+pub(in crate::session) use step_inputs::OwnedStepInput;
 pub use stopwatch::Stopwatch;
-#[cfg(test)]
-pub(in crate::session) use synchronized_frames::Instant;
 pub(in crate::session) use threads::{Engine, EngineMessage};
-#[cfg(test)]
-pub(in crate::session) use tracker::TrackedSensorFrame;

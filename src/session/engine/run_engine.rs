@@ -2,7 +2,7 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use super::altered_measurements::AlteredMeasurements;
-use super::step_inputs::Material;
+use super::step_inputs::OwnedStepInput;
 use super::stopwatch::Stopwatch;
 use crate::estimator::{Estimator, EstimatorConfig, StepInput, StepReport};
 use crate::frontend::TrackedFrame;
@@ -46,12 +46,12 @@ impl RunEngine {
         &mut self.estimator
     }
 
-    /// Number of cameras that it watches.
+    /// Number of cameras that it uses.
     pub(in crate::session) fn cameras(&self) -> usize {
         1 + self.estimator.config().rigid_cameras.len()
     }
 
-    /// Keys of the cameras that it watches, the main one's given.
+    /// Keys of the cameras that it uses; the main one's is given.
     pub(in crate::session) fn camera_keys(&self, main: &str) -> Vec<String> {
         let rigid = self.estimator.config().rigid_cameras.iter().map(|camera| camera.key.clone());
         std::iter::once(main.to_owned()).chain(rigid).collect()
@@ -62,45 +62,45 @@ impl RunEngine {
         self.altered_measurements.add(changes);
     }
 
-    /// The images of one instant through the estimator and the observability analysis.
-    pub(in crate::session) fn step(&mut self, material: &Material) -> StepRecord {
+    /// One step through the estimator and the observability analysis.
+    pub(in crate::session) fn step(&mut self, input: &OwnedStepInput) -> StepRecord {
         let watch = Stopwatch::start();
-        let mut report = self.estimate(material);
+        let mut report = self.estimate(input);
         let estimated_ms = watch.elapsed_ms();
         let rank = self.rank(&mut report);
         report.times.observability_ms = watch.elapsed_ms() - estimated_ms;
-        report.times.frontend_ms = material.frontend_ms;
-        report.times.step_ms = material.frontend_ms + watch.elapsed_ms();
+        report.times.frontend_ms = input.frontend_ms;
+        report.times.step_ms = input.frontend_ms + watch.elapsed_ms();
         StepRecord {
             report,
             rank,
-            tracks: Arc::clone(material.main_tracks()),
-            truth: material.truth,
-            log_time_ns: material.log_time_ns,
+            tracks: Arc::clone(input.main_tracks()),
+            truth: input.truth,
+            log_time_ns: input.log_time_ns,
             summary_only: false,
         }
     }
 
-    /// The same step without a look at its observability: the estimator ends in the same state.
-    pub(in crate::session) fn pass(&mut self, material: &Material) {
+    /// The same step without the observability analysis: the estimator ends in the same state.
+    pub(in crate::session) fn pass(&mut self, input: &OwnedStepInput) {
         let keep = self.estimator.config().options.keep_linearization;
         self.estimator.set_keep_linearization(false);
-        drop(self.estimate(material));
+        drop(self.estimate(input));
         self.estimator.set_keep_linearization(keep);
     }
 
-    /// Most steps that the solver tries from the next image on.
+    /// Sets the most iterations of the solver, from the next step on.
     pub(in crate::session) fn set_iterations(&mut self, iterations: usize) {
         self.estimator.set_iterations(iterations);
     }
 
-    /// How much memory a snapshot of it takes.
+    /// Bytes of a snapshot of it.
     pub(in crate::session) fn bytes(&self) -> usize {
         size_of::<Self>() - size_of::<Estimator>() + self.estimator.bytes()
     }
 
-    fn estimate(&mut self, material: &Material) -> StepReport {
-        let altered: Vec<Cow<'_, TrackedFrame>> = material
+    fn estimate(&mut self, input: &OwnedStepInput) -> StepReport {
+        let altered: Vec<Cow<'_, TrackedFrame>> = input
             .tracks
             .iter()
             .enumerate()
@@ -111,19 +111,19 @@ impl RunEngine {
             .collect();
         let rigid: Vec<&TrackedFrame> = altered.iter().skip(1).map(Cow::as_ref).collect();
         let read = self.has_joints && !self.altered_measurements.encoder_off();
-        let angles = material.joint_angles.as_ref().filter(|_| read);
-        let noisy = angles.and_then(|angles| self.altered_measurements.joint_angles(angles, material.stamp_ns));
+        let angles = input.joint_angles.as_ref().filter(|_| read);
+        let noisy = angles.and_then(|angles| self.altered_measurements.joint_angles(angles, input.stamp_ns));
         self.estimator.step(&StepInput {
-            frame_index: material.frame_index,
-            stamp_ns: material.stamp_ns,
-            imu: &material.imu,
+            frame_index: input.frame_index,
+            stamp_ns: input.stamp_ns,
+            imu: &input.imu,
             joint_angles: noisy.as_ref().or(angles),
             tracks: &altered[0],
             rigid_tracks: &rigid,
         })
     }
 
-    /// Analyses the step's linearization and lets go of it unless it is to be kept: one a frame would fill the memory.
+    /// Analyses the step's linearization and drops it unless it is to be kept: one per frame would fill the memory.
     fn rank(&self, report: &mut StepReport) -> Option<RankReport> {
         let linearization = report.linearization.take()?;
         let angles: Vec<&[f64]> = report.window.iter().map(|frame| frame.joint_angles_rad.as_slice()).collect();
@@ -135,7 +135,7 @@ impl RunEngine {
         let clocks = calibration.parameters.iter().filter(is_clock).count();
         let mounts = calibration.parameters.len() - clocks;
         let chain = if chain.dof() + rigid == mounts { chain } else { chain.without_joint_offsets() };
-        // Readings that a fork leaves out stay with the frames that have them already.
+        // A fork's parent has used the readings of earlier frames, which stay in the window for a while.
         let unread = || report.window.iter().all(|frame| frame.encoder_angles_rad.is_none());
         let joints_free = self.joints_free || self.has_joints && self.altered_measurements.encoder_off() && unread();
         let rank = analyse(&linearization, &chain, &angles, joints_free);

@@ -1,51 +1,54 @@
-//! What a step is given, kept so that it can be taken again.
+//! The inputs of a run's steps, kept so that the steps can be recomputed.
 
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
-use super::synchronized_frames::Instant;
 use crate::estimator::allocated_bytes;
+use crate::flight_log::SensorFrame;
 use crate::frontend::TrackedFrame;
 use crate::geometry::RigidTransform;
 use crate::sensors::{ImuSample, JointAngles};
 use crate::session::record::tracks_bytes;
 
-/// Everything that one step of a run was given.
+/// The input of one step, of one camera or of all synchronized cameras of a run.
 ///
-/// The front end does not know the estimator, so its tracks are the same whatever the run does with them: they are kept,
-/// and no image has to be tracked again.
+/// It stands between the two other carriers on the way from the log to the estimator. A [`SensorFrame`] is what the log
+/// has of one camera's image: it holds the image, which nobody needs after the front end, and no tracks. The estimator's
+/// [`StepInput`](crate::estimator::StepInput) borrows its measurements for the call, because a fork changes some of them
+/// first. This one owns the same measurements: it goes from the trackers' threads to the runs', and stays in their
+/// histories, so that steps are recomputed without tracking an image again (the front end does not know the estimator, so
+/// that its tracks do not depend on the run). Runs on the same camera share it.
 #[derive(Clone, Debug, PartialEq)]
-pub(in crate::session) struct Material {
+pub(in crate::session) struct OwnedStepInput {
     /// Number of the main camera's image; where it is missing, one that no image has.
     pub(in crate::session) frame_index: usize,
     /// Header stamp since the log began, on the main camera's clock.
     pub(in crate::session) stamp_ns: i64,
     /// Log time since the log began.
     pub(in crate::session) log_time_ns: i64,
-    /// Inertial samples since the instant before.
+    /// IMU samples from the stamp of the input before to this one, both ends included.
     pub(in crate::session) imu: Vec<ImuSample>,
     /// Encoder angles at the stamp.
     pub(in crate::session) joint_angles: Option<JointAngles>,
     /// Tracks by camera of the run, the main one's first; empty ones where an image is missing.
     pub(in crate::session) tracks: Vec<Arc<TrackedFrame>>,
-    /// True pose of the IMU.
+    /// Ground truth of `world_from_imu`.
     pub(in crate::session) truth: Option<RigidTransform>,
-    /// What the front ends took.
+    /// Time that the front ends took.
     pub(in crate::session) frontend_ms: f64,
 }
 
-impl Material {
-    /// What an instant brings to the estimator, without its images.
-    pub(in crate::session) fn of(instant: &Instant) -> Self {
-        let tracks = |camera: usize| instant.tracks(camera).map_or_else(Arc::default, Arc::clone);
+impl OwnedStepInput {
+    /// The input from one camera alone.
+    pub(in crate::session) fn of_camera(frame: SensorFrame, tracks: TrackedFrame, frontend_ms: f64) -> Self {
         Self {
-            frame_index: instant.frame_index(),
-            stamp_ns: instant.stamp_ns(),
-            log_time_ns: instant.log_time_ns(),
-            imu: instant.imu().to_vec(),
-            joint_angles: instant.joint_angles().cloned(),
-            tracks: (0..instant.cameras()).map(tracks).collect(),
-            truth: instant.truth(),
-            frontend_ms: instant.frontend_ms(),
+            frame_index: frame.index,
+            stamp_ns: frame.stamp_ns,
+            log_time_ns: frame.log_time_ns,
+            imu: frame.imu,
+            joint_angles: frame.joint_angles,
+            tracks: vec![Arc::new(tracks)],
+            truth: frame.truth,
+            frontend_ms,
         }
     }
 
@@ -54,8 +57,13 @@ impl Material {
         &self.tracks[0]
     }
 
-    /// Bytes that it takes, without the main camera's tracks, which the step's record counts.
-    pub(in crate::session) fn own_bytes(&self) -> usize {
+    /// Stamp of the images on the clock of the IMU.
+    pub(super) fn imu_stamp_ns(&self) -> i64 {
+        self.imu.last().map_or(self.stamp_ns, |last| last.stamp_ns)
+    }
+
+    /// Bytes without the main camera's tracks, which the step's record counts; every run that shares it counts them.
+    pub(super) fn own_bytes(&self) -> usize {
         let rigid: usize = self.tracks.iter().skip(1).map(|tracks| tracks_bytes(tracks)).sum();
         allocated_bytes(size_of::<Self>() + 2 * size_of::<usize>())
             + allocated_bytes(self.imu.capacity() * size_of::<ImuSample>())
@@ -64,28 +72,28 @@ impl Material {
     }
 }
 
-/// The material of a run's steps so far, which the runs that branch off from it share.
+/// The inputs of a run's steps so far, which its forks share.
 #[derive(Debug, Default)]
-pub(in crate::session) struct Materials {
+pub(in crate::session) struct StepInputs {
     state: Mutex<State>,
     grown: Condvar,
 }
 
 #[derive(Debug, Default)]
 struct State {
-    steps: Vec<Arc<Material>>,
+    steps: Vec<Arc<OwnedStepInput>>,
     ended: bool,
 }
 
-impl Materials {
+impl StepInputs {
     fn lock(&self) -> MutexGuard<'_, State> {
-        // Material is only ever pushed whole.
+        // Inputs are only ever pushed whole.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Adds the material of the next step.
-    pub(in crate::session) fn push(&self, material: Arc<Material>) {
-        self.lock().steps.push(material);
+    /// Adds the input of the next step.
+    pub(in crate::session) fn push(&self, input: Arc<OwnedStepInput>) {
+        self.lock().steps.push(input);
         self.grown.notify_all();
     }
 
@@ -95,13 +103,13 @@ impl Materials {
         self.grown.notify_all();
     }
 
-    /// The material of a step that has been taken.
-    pub(in crate::session) fn get(&self, step: usize) -> Option<Arc<Material>> {
+    /// The input of a step that has been computed.
+    pub(in crate::session) fn get(&self, step: usize) -> Option<Arc<OwnedStepInput>> {
         self.lock().steps.get(step).cloned()
     }
 
-    /// The material of a step; waits for it. `None` behind the last one.
-    pub(in crate::session) fn wait_for(&self, step: usize) -> Option<Arc<Material>> {
+    /// The input of a step; waits for it. `None` behind the last one.
+    pub(in crate::session) fn wait_for(&self, step: usize) -> Option<Arc<OwnedStepInput>> {
         let waiting = self.grown.wait_while(self.lock(), |state| state.steps.len() <= step && !state.ended);
         waiting.unwrap_or_else(PoisonError::into_inner).steps.get(step).cloned()
     }
@@ -112,19 +120,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn whoever_waits_for_material_gets_it_or_the_end() {
-        let materials = Arc::new(Materials::default());
-        let waiting = Arc::clone(&materials);
+    fn whoever_waits_for_an_input_gets_it_or_the_end() {
+        let inputs = Arc::new(StepInputs::default());
+        let waiting = Arc::clone(&inputs);
         let reader = std::thread::Builder::new().spawn(move || {
             let mut seen = Vec::new();
-            while let Some(material) = waiting.wait_for(seen.len()) {
-                seen.push(material.stamp_ns);
+            while let Some(input) = waiting.wait_for(seen.len()) {
+                seen.push(input.stamp_ns);
             }
             seen
         });
         let reader = reader.unwrap();
         for stamp_ns in [10, 20, 30] {
-            materials.push(Arc::new(Material {
+            inputs.push(Arc::new(OwnedStepInput {
                 frame_index: 0,
                 stamp_ns,
                 log_time_ns: 0,
@@ -135,8 +143,8 @@ mod tests {
                 frontend_ms: 0.0,
             }));
         }
-        materials.end();
+        inputs.end();
         assert_eq!(reader.join().unwrap(), [10, 20, 30]);
-        assert!(materials.get(3).is_none());
+        assert!(inputs.get(3).is_none());
     }
 }

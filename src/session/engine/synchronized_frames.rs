@@ -1,29 +1,26 @@
-//! The instants at which a run takes a step: the images that its cameras took together, and the motion since the instant
-//! before.
+//! Synchronized frame sets: the images that the cameras of a run took together, with the IMU samples since the set before.
 
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 
 use thiserror::Error;
 
-use super::tracker::TrackedSensorFrame;
-use crate::frontend::TrackedFrame;
-use crate::geometry::RigidTransform;
-use crate::sensors::{ImuSample, JointAngles};
+use super::step_inputs::OwnedStepInput;
+use crate::sensors::ImuSample;
 
 /// Images further apart were not taken together. A vehicle that turns by 3 rad/s turns by 0.1° meanwhile, a pixel.
 const TOGETHER_NS: i64 = 500_000;
-/// So many images of each camera without any pair, and the cameras are not synchronized.
+/// After so many images of each camera without a pair, the cameras are not synchronized.
 const LONE_IMAGES: usize = 10;
-/// Images of other cameras are counted from here where the main one has none: no camera has taken so many.
+/// Images of other cameras are numbered from here where the main one has none: no camera has taken so many.
 const BESIDE_MAIN: usize = 1 << 30;
 
-/// Why a run cannot watch its cameras together.
+/// Why a run cannot use its cameras together.
 #[derive(Debug, Error, PartialEq)]
 #[error(
     "the images of {first} and {second} were not taken together: those of {second} are {offset_ms:+.2} ms from those of \
      {first} (median of {count}, at most {:.1} ms is allowed); trigger both cameras at once, or correct \
-     timeshift_cam_imu in the rig if a clock is off, or let two runs watch one camera each",
+     timeshift_cam_imu in the rig if there is a time offset, or use one camera each in two runs",
     TOGETHER_NS as f64 * 1e-6
 )]
 pub(in crate::session) struct NotSynchronized {
@@ -33,156 +30,99 @@ pub(in crate::session) struct NotSynchronized {
     count: usize,
 }
 
-/// What a run is given for one step.
-#[derive(Clone, Debug)]
-pub(in crate::session) struct Instant {
-    /// By camera of the run, the main one's first; at least one is there.
-    frames: Vec<Option<Arc<TrackedSensorFrame>>>,
-    /// Header stamp since the log began, on the main camera's clock.
-    stamp_ns: i64,
-    /// Since the instant before, where that is not what an image brings.
-    motion: Option<Vec<ImuSample>>,
-}
-
-impl Instant {
-    /// An instant of a run that watches one camera.
-    #[cfg(test)]
-    pub(in crate::session) fn of_one(frame: Arc<TrackedSensorFrame>) -> Self {
-        Self { stamp_ns: frame.frame.stamp_ns, frames: vec![Some(frame)], motion: None }
-    }
-
-    /// The image that tells what all cameras share: the main camera's where there is one.
-    fn any(&self) -> &TrackedSensorFrame {
-        self.frames.iter().flatten().next().expect("an instant has an image")
-    }
-
-    /// Number of the main camera's image; where it is missing, one that no image has.
-    pub(in crate::session) fn frame_index(&self) -> usize {
-        let index = self.any().frame.index;
-        if self.frames[0].is_some() { index } else { BESIDE_MAIN + index }
-    }
-
-    /// Header stamp since the log began, on the main camera's clock.
-    pub(in crate::session) fn stamp_ns(&self) -> i64 {
-        self.stamp_ns
-    }
-
-    /// Log time since the log began.
-    pub(in crate::session) fn log_time_ns(&self) -> i64 {
-        self.any().frame.log_time_ns
-    }
-
-    /// Inertial samples since the instant before.
-    pub(in crate::session) fn imu(&self) -> &[ImuSample] {
-        self.motion.as_deref().unwrap_or(&self.any().frame.imu)
-    }
-
-    /// Encoder angles at the stamp.
-    pub(in crate::session) fn joint_angles(&self) -> Option<&JointAngles> {
-        self.any().frame.joint_angles.as_ref()
-    }
-
-    /// True pose of the IMU.
-    pub(in crate::session) fn truth(&self) -> Option<RigidTransform> {
-        self.any().frame.truth
-    }
-
-    /// Tracks of a camera of the run, `None` without an image.
-    pub(in crate::session) fn tracks(&self, camera: usize) -> Option<&Arc<TrackedFrame>> {
-        self.frames.get(camera)?.as_ref().map(|tracked| &tracked.tracks)
-    }
-
-    /// Number of cameras that the run watches.
-    pub(in crate::session) fn cameras(&self) -> usize {
-        self.frames.len()
-    }
-
-    /// What the front ends of all its images took.
-    pub(in crate::session) fn frontend_ms(&self) -> f64 {
-        self.frames.iter().flatten().map(|tracked| tracked.frontend_ms).sum()
-    }
-}
-
-/// One camera's images on their way to a run.
+/// The inputs of one camera on their way to a run.
 #[derive(Debug)]
-struct CameraImages {
+struct CameraInputs {
     key: String,
-    images: Receiver<Arc<TrackedSensorFrame>>,
-    next: Option<Arc<TrackedSensorFrame>>,
+    inputs: Receiver<Arc<OwnedStepInput>>,
+    next: Option<Arc<OwnedStepInput>>,
     ended: bool,
-    /// When images were taken since the last that was taken together with another camera's.
+    /// Stamps of its images since the last set of several images.
     lone_ns: Vec<i64>,
 }
 
-impl CameraImages {
+impl CameraInputs {
     fn wait(&mut self) {
         if self.next.is_none() && !self.ended {
-            self.next = self.images.recv().ok();
+            self.next = self.inputs.recv().ok();
             self.ended = self.next.is_none();
         }
     }
 
-    /// When the next image was taken, on the clock of the IMU.
+    /// Stamp of the next image, on the clock of the IMU.
     fn next_ns(&self) -> Option<i64> {
-        self.next.as_deref().map(taken_ns)
+        self.next.as_deref().map(OwnedStepInput::imu_stamp_ns)
     }
 }
 
-/// The instants of a run in time order.
+/// The step inputs of a run in time order, one for each synchronized frame set of its cameras.
 #[derive(Debug)]
-pub(in crate::session) struct Instants {
-    cameras: Vec<CameraImages>,
-    /// Inertial sample at the end of the last instant.
+pub(super) struct SynchronizedFrames {
+    cameras: Vec<CameraInputs>,
+    /// IMU sample at the end of the last set.
     end: Option<ImuSample>,
-    /// How far the IMU's clock is ahead of the main camera's, once an image of it has told.
+    /// Offset of the IMU's clock from the main camera's, from its last image.
     main_shift_ns: Option<i64>,
 }
 
-impl Instants {
-    /// From the images of the run's cameras by their keys, the main camera's first.
-    pub(in crate::session) fn new(
-        cameras: impl IntoIterator<Item = (String, Receiver<Arc<TrackedSensorFrame>>)>,
-    ) -> Self {
+impl SynchronizedFrames {
+    /// From the inputs of the run's cameras by their keys, the main camera's first.
+    pub(super) fn new(cameras: impl IntoIterator<Item = (String, Receiver<Arc<OwnedStepInput>>)>) -> Self {
         let cameras = cameras
             .into_iter()
-            .map(|(key, images)| CameraImages { key, images, next: None, ended: false, lone_ns: Vec::new() })
+            .map(|(key, inputs)| CameraInputs { key, inputs, next: None, ended: false, lone_ns: Vec::new() })
             .collect();
         Self { cameras, end: None, main_shift_ns: None }
     }
 
-    /// Waits for the next instant, `None` at the end of all streams.
-    pub(in crate::session) fn next(&mut self) -> Result<Option<Instant>, NotSynchronized> {
-        self.cameras.iter_mut().for_each(CameraImages::wait);
-        let Some(first_ns) = self.cameras.iter().filter_map(CameraImages::next_ns).min() else { return Ok(None) };
+    /// Waits for the next set, `None` at the end of all streams.
+    pub(super) fn next(&mut self) -> Result<Option<Arc<OwnedStepInput>>, NotSynchronized> {
+        self.cameras.iter_mut().for_each(CameraInputs::wait);
+        if let [camera] = self.cameras.as_mut_slice() {
+            return Ok(camera.next.take());
+        }
+        let Some(first_ns) = self.cameras.iter().filter_map(CameraInputs::next_ns).min() else { return Ok(None) };
         let mut frames = Vec::with_capacity(self.cameras.len());
         for camera in &mut self.cameras {
-            let taken_ns = camera.next_ns().filter(|taken_ns| taken_ns - first_ns <= TOGETHER_NS);
-            frames.push(if taken_ns.is_some() { camera.next.take() } else { None });
-            camera.lone_ns.extend(taken_ns);
+            let stamp_ns = camera.next_ns().filter(|stamp_ns| stamp_ns - first_ns <= TOGETHER_NS);
+            frames.push(if stamp_ns.is_some() { camera.next.take() } else { None });
+            camera.lone_ns.extend(stamp_ns);
         }
         self.check_together(&frames)?;
-        if let Some(main) = &frames[0] {
-            self.main_shift_ns = Some(taken_ns(main) - main.frame.stamp_ns);
-        }
-        let mut instant = Instant { frames, stamp_ns: 0, motion: None };
-        let image = instant.any();
-        instant.stamp_ns = self.main_shift_ns.map_or(image.frame.stamp_ns, |shift_ns| taken_ns(image) - shift_ns);
-        if self.cameras.len() > 1 {
-            let motion = self.motion_to(&instant);
-            self.end = motion.last().copied().or(self.end);
-            instant.motion = Some(motion);
-        }
-        Ok(Some(instant))
+        Ok(self.combined(&frames).map(Arc::new))
     }
 
-    /// An image brings the samples since the image before it of the same camera, which another one may have followed.
-    fn motion_to(&self, instant: &Instant) -> Vec<ImuSample> {
-        let samples = &instant.any().frame.imu;
-        let Some(end) = self.end else { return samples.clone() };
-        std::iter::once(end).chain(samples.iter().filter(|sample| sample.stamp_ns > end.stamp_ns).copied()).collect()
+    /// One input from those of the cameras; what all of them have comes from the main camera's where there is one.
+    fn combined(&mut self, frames: &[Option<Arc<OwnedStepInput>>]) -> Option<OwnedStepInput> {
+        let main = frames.first()?.as_deref();
+        let any = main.or_else(|| frames.iter().flatten().map(|frame| &**frame).next())?;
+        if let Some(main) = main {
+            self.main_shift_ns = Some(main.imu_stamp_ns() - main.stamp_ns);
+        }
+        // An image brings the samples since the image before it of the same camera, which another one may have followed.
+        let imu: Vec<ImuSample> = match self.end {
+            None => any.imu.clone(),
+            Some(end) => std::iter::once(end)
+                .chain(any.imu.iter().filter(|sample| sample.stamp_ns > end.stamp_ns).copied())
+                .collect(),
+        };
+        self.end = imu.last().copied().or(self.end);
+        let tracks = |frame: &Option<Arc<OwnedStepInput>>| {
+            frame.as_ref().map_or_else(Arc::default, |frame| Arc::clone(frame.main_tracks()))
+        };
+        Some(OwnedStepInput {
+            frame_index: if main.is_some() { any.frame_index } else { BESIDE_MAIN + any.frame_index },
+            stamp_ns: self.main_shift_ns.map_or(any.stamp_ns, |shift_ns| any.imu_stamp_ns() - shift_ns),
+            log_time_ns: any.log_time_ns,
+            imu,
+            joint_angles: any.joint_angles.clone(),
+            tracks: frames.iter().map(tracks).collect(),
+            truth: any.truth,
+            frontend_ms: frames.iter().flatten().map(|frame| frame.frontend_ms).sum(),
+        })
     }
 
-    fn check_together(&mut self, frames: &[Option<Arc<TrackedSensorFrame>>]) -> Result<(), NotSynchronized> {
+    fn check_together(&mut self, frames: &[Option<Arc<OwnedStepInput>>]) -> Result<(), NotSynchronized> {
         if frames.iter().flatten().count() > 1 {
             self.cameras.iter_mut().for_each(|camera| camera.lone_ns.clear());
         }
@@ -202,12 +142,7 @@ impl Instants {
     }
 }
 
-/// When an image was taken, on the clock of the IMU.
-fn taken_ns(image: &TrackedSensorFrame) -> i64 {
-    image.frame.imu.last().map_or(image.frame.stamp_ns, |last| last.stamp_ns)
-}
-
-/// How much later an instant is than the nearest of others.
+/// How much later a stamp is than the nearest of others.
 fn nearest_offset(at_ns: i64, others_ns: &[i64]) -> Option<i64> {
     others_ns.iter().map(|other_ns| at_ns - other_ns).min_by_key(|offset_ns| offset_ns.abs())
 }
@@ -219,13 +154,12 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
-    use crate::flight_log::SensorFrame;
-    use crate::sensors::GrayImage;
+    use crate::frontend::TrackedFrame;
 
     const PERIOD_NS: i64 = 50_000_000;
 
     /// Images at these stamps, each with the samples since the one before at 200 Hz.
-    fn images(stamps_ns: &[i64]) -> Receiver<Arc<TrackedSensorFrame>> {
+    fn images(stamps_ns: &[i64]) -> Receiver<Arc<OwnedStepInput>> {
         let (sender, receiver) = sync_channel(stamps_ns.len());
         let mut before_ns = 0;
         for (index, stamp_ns) in stamps_ns.iter().enumerate() {
@@ -237,24 +171,24 @@ mod tests {
             let inside = (before_ns / 5_000_000 + 1..=(stamp_ns - 1) / 5_000_000).map(|number| number * 5_000_000);
             let imu = [before_ns].into_iter().chain(inside).chain([*stamp_ns]).map(sample).collect();
             before_ns = *stamp_ns;
-            let frame = SensorFrame {
-                index,
-                stamp_ns: *stamp_ns,
-                log_time_ns: *stamp_ns,
-                image: Arc::new(GrayImage { width: 0, height: 0, pixels: Vec::new() }),
-                imu,
-                joint_angles: None,
-                truth: None,
-                warnings: Vec::new(),
-            };
-            let tracks = Arc::new(TrackedFrame { stamp_ns: *stamp_ns, ..TrackedFrame::default() });
-            sender.send(Arc::new(TrackedSensorFrame { frame, tracks, frontend_ms: 1.0 })).unwrap();
+            sender
+                .send(Arc::new(OwnedStepInput {
+                    frame_index: index,
+                    stamp_ns: *stamp_ns,
+                    log_time_ns: *stamp_ns,
+                    imu,
+                    joint_angles: None,
+                    tracks: vec![Arc::new(TrackedFrame { stamp_ns: *stamp_ns, ..TrackedFrame::default() })],
+                    truth: None,
+                    frontend_ms: 1.0,
+                }))
+                .unwrap();
         }
         receiver
     }
 
-    fn instants(main_ns: &[i64], rigid_ns: &[i64]) -> Instants {
-        Instants::new([("cam0".to_owned(), images(main_ns)), ("cam1".to_owned(), images(rigid_ns))])
+    fn frame_sets(main_ns: &[i64], rigid_ns: &[i64]) -> SynchronizedFrames {
+        SynchronizedFrames::new([("cam0".to_owned(), images(main_ns)), ("cam1".to_owned(), images(rigid_ns))])
     }
 
     fn periods(count: i64, shift_ns: i64) -> Vec<i64> {
@@ -262,25 +196,27 @@ mod tests {
     }
 
     #[test]
-    fn images_of_one_stamp_are_one_instant_and_the_motion_between_instants_has_no_gap() {
+    fn images_of_one_stamp_are_one_set_and_the_imu_samples_between_sets_have_no_gap() {
         let mut main_ns = periods(12, 0);
         let mut rigid_ns = periods(12, 300_000);
         main_ns.remove(4);
         rigid_ns.remove(7);
         rigid_ns.remove(8);
-        let mut instants = instants(&main_ns, &rigid_ns);
+        let mut sets = frame_sets(&main_ns, &rigid_ns);
         let mut ends_ns = 0;
         let mut seen = Vec::new();
-        while let Some(instant) = instants.next().unwrap() {
-            let imu = instant.imu();
+        while let Some(input) = sets.next().unwrap() {
+            // Tracks of an image that is missing have no stamp.
+            let has = |camera: usize| input.tracks[camera].stamp_ns != 0;
+            let imu = &input.imu;
             assert_eq!(imu[0].stamp_ns, ends_ns);
             assert!(imu.windows(2).all(|pair| pair[0].stamp_ns < pair[1].stamp_ns), "{imu:?}");
             ends_ns = imu.last().unwrap().stamp_ns;
-            assert_eq!(ends_ns, instant.stamp_ns());
-            assert_eq!(instant.frontend_ms(), (0..2).filter(|camera| instant.tracks(*camera).is_some()).count() as f64);
-            seen.push([instant.tracks(0).is_some(), instant.tracks(1).is_some()]);
+            assert_eq!(ends_ns, input.stamp_ns);
+            assert_eq!(input.frontend_ms, (0..2).filter(|camera| has(*camera)).count() as f64);
+            seen.push([has(0), has(1)]);
             // The main camera's image where there is one, else a number that no image of it has.
-            assert_eq!(instant.frame_index() < BESIDE_MAIN, instant.tracks(0).is_some());
+            assert_eq!(input.frame_index < BESIDE_MAIN, has(0));
         }
         assert_eq!(seen.len(), 12);
         assert_eq!((seen[4], seen[7], seen[9]), ([false, true], [true, false], [true, false]));
@@ -289,10 +225,10 @@ mod tests {
 
     #[test]
     fn cameras_that_are_not_synchronized_are_refused_with_their_offset() {
-        let mut instants = instants(&periods(40, 0), &periods(40, -12_300_000));
+        let mut sets = frame_sets(&periods(40, 0), &periods(40, -12_300_000));
         let refused = loop {
-            match instants.next() {
-                Ok(instant) => assert!(instant.is_some(), "not refused"),
+            match sets.next() {
+                Ok(input) => assert!(input.is_some(), "not refused"),
                 Err(refused) => break refused.to_string(),
             }
         };
@@ -302,9 +238,9 @@ mod tests {
     #[test]
     fn a_camera_that_starts_later_or_ends_earlier_leaves_the_others_alone() {
         let rigid_ns: Vec<i64> = periods(40, 0)[15..25].to_vec();
-        let mut instants = instants(&periods(40, 0), &rigid_ns);
+        let mut sets = frame_sets(&periods(40, 0), &rigid_ns);
         let mut count = 0;
-        while instants.next().unwrap().is_some() {
+        while sets.next().unwrap().is_some() {
             count += 1;
         }
         assert_eq!(count, 40);

@@ -1,7 +1,7 @@
 //! The threads of a session: one tracker per camera, one estimator per run, results in order over one channel.
 //!
 //! Every run is computed on its own thread from its own copy of the tracks, so what comes out does not depend on how the
-//! threads are scheduled. A run that watches two cameras is fed by two trackers, each on its own thread.
+//! threads are scheduled. A run on two cameras is fed by two trackers, each on its own thread.
 
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -14,9 +14,9 @@ use super::computation::Computation;
 use super::configuration::estimator_config;
 use super::history::History;
 use super::run_engine::RunEngine;
-use super::step_inputs::Material;
-use super::synchronized_frames::Instants;
-use super::tracker::{CameraTracker, TrackedSensorFrame};
+use super::step_inputs::OwnedStepInput;
+use super::synchronized_frames::SynchronizedFrames;
+use super::tracker::CameraTracker;
 use crate::flight_log::LogWarning;
 use crate::session::plan::{SessionError, SessionPlan, cameras_of_run};
 use crate::session::record::StepRecord;
@@ -26,10 +26,10 @@ const QUEUED_FRAMES: usize = 8;
 /// Steps that may wait for whoever collects them.
 const QUEUED_STEPS: usize = 64;
 
-/// What the threads report.
+/// A message of a thread.
 #[derive(Debug)]
 pub(in crate::session) enum EngineMessage {
-    /// A run has done a step.
+    /// A run has computed a step.
     Step {
         /// Number of the run.
         run: usize,
@@ -69,14 +69,14 @@ impl Default for Engine {
 }
 
 impl Engine {
-    /// Starts every run of the plan; each keeps its way in the history of its record.
+    /// Starts every run of the plan.
     pub(in crate::session) fn start(plan: &SessionPlan, computation: &Computation) -> Result<Self, SessionError> {
         let mut engine = Self::default();
         engine.start_runs(plan, computation, &(0..plan.runs.len()).collect::<Vec<_>>())?;
         Ok(engine)
     }
 
-    /// Starts the given runs of the plan from the begin of the log; runs that watch the same camera share one tracker.
+    /// Starts the given runs of the plan from the start of the log; runs on the same camera share one tracker.
     pub(in crate::session) fn start_runs(
         &mut self,
         plan: &SessionPlan,
@@ -84,7 +84,7 @@ impl Engine {
         runs: &[usize],
     ) -> Result<(), SessionError> {
         let Some(sender) = self.sender.clone() else { return Ok(()) };
-        let mut queues: BTreeMap<&str, Vec<SyncSender<Arc<TrackedSensorFrame>>>> = BTreeMap::new();
+        let mut queues: BTreeMap<&str, Vec<SyncSender<Arc<OwnedStepInput>>>> = BTreeMap::new();
         for &run in runs {
             let (spec, _) = &plan.runs[run];
             let mut frames = Vec::new();
@@ -101,7 +101,7 @@ impl Engine {
             let results = sender.clone();
             let Some(history) = computation.history(run).cloned() else { continue };
             self.threads.push(spawn(format!("estimator {run}"), move || {
-                run_thread(run, engine, Instants::new(frames), &history, &results);
+                run_thread(run, engine, SynchronizedFrames::new(frames), &history, &results);
             })?);
         }
         for (camera_key, queues) in queues {
@@ -125,18 +125,18 @@ impl Engine {
     ) -> Result<(), SessionError> {
         let Some(results) = self.sender.clone() else { return Ok(()) };
         self.threads.push(spawn(format!("fork {run}"), move || {
-            let materials = (history.begin()..).map_while(|step| history.materials().wait_for(step));
-            run_steps(run, engine, materials.map(Ok), &history, &results);
+            let inputs = (history.begin()..).map_while(|step| history.inputs().wait_for(step));
+            run_steps(run, engine, inputs.map(Ok), &history, &results);
         })?);
         Ok(())
     }
 
-    /// Lets go of the engine's own end of the channel: once all runs are done, [`Engine::receive`] returns `None`.
+    /// Closes the engine's own end of the channel: once all runs are done, [`Engine::receive`] returns `None`.
     pub(in crate::session) fn no_more_runs(&mut self) {
         self.sender = None;
     }
 
-    /// Takes the receiving end, for a collecting thread of one's own.
+    /// Takes the receiving end, for a collecting thread.
     pub(in crate::session) fn take_receiver(&mut self) -> Option<Receiver<EngineMessage>> {
         self.receiver.take()
     }
@@ -163,72 +163,69 @@ fn spawn(name: String, work: impl FnOnce() + Send + 'static) -> Result<JoinHandl
     Builder::new().name(name).spawn(work).map_err(|source| SessionError::Thread { source })
 }
 
-/// Feeds the tracked frames to every estimator of the camera.
+/// Sends the camera's step inputs to every run on it.
 fn track_thread(
     mut tracker: CameraTracker,
-    mut queues: Vec<SyncSender<Arc<TrackedSensorFrame>>>,
+    mut queues: Vec<SyncSender<Arc<OwnedStepInput>>>,
     results: &SyncSender<EngineMessage>,
     cancelled: &AtomicBool,
 ) {
     while !cancelled.load(Ordering::Relaxed) {
-        let Some(tracked) = tracker.next_frame() else {
+        let Some((input, warnings)) = tracker.next_input() else {
             // Nobody listens any more when the session was closed.
             drop(results.send(EngineMessage::Warnings(tracker.remaining_warnings().to_vec())));
             return;
         };
-        if !tracked.frame.warnings.is_empty()
-            && results.send(EngineMessage::Warnings(tracked.frame.warnings.clone())).is_err()
-        {
+        if !warnings.is_empty() && results.send(EngineMessage::Warnings(warnings)).is_err() {
             return;
         }
-        let tracked = Arc::new(tracked);
-        queues.retain(|queue| queue.send(Arc::clone(&tracked)).is_ok());
+        let input = Arc::new(input);
+        queues.retain(|queue| queue.send(Arc::clone(&input)).is_ok());
         if queues.is_empty() {
             return;
         }
     }
 }
 
-/// Steps one estimator over the instants that come, keeps what each brings, and reports each step.
+/// Steps one estimator over the synchronized frame sets, keeps each in the history, and reports each step.
 fn run_thread(
     run: usize,
     engine: RunEngine,
-    mut instants: Instants,
+    mut frames: SynchronizedFrames,
     history: &History,
     results: &SyncSender<EngineMessage>,
 ) {
-    let materials = std::iter::from_fn(|| match instants.next() {
-        Ok(instant) => instant.map(|instant| {
-            let material = Arc::new(Material::of(&instant));
-            history.materials().push(Arc::clone(&material));
-            Ok(material)
+    let inputs = std::iter::from_fn(|| match frames.next() {
+        Ok(input) => input.map(|input| {
+            history.inputs().push(Arc::clone(&input));
+            Ok(input)
         }),
         Err(reason) => Some(Err(reason.to_string())),
     });
-    run_steps(run, engine, materials, history, results);
-    history.materials().end();
+    run_steps(run, engine, inputs, history, results);
+    history.inputs().end();
 }
 
-/// Takes a step with all material that comes, and reports each.
+/// Computes a step from each input, and reports it.
 fn run_steps(
     run: usize,
     mut engine: RunEngine,
-    materials: impl Iterator<Item = Result<Arc<Material>, String>>,
+    inputs: impl Iterator<Item = Result<Arc<OwnedStepInput>, String>>,
     history: &History,
     results: &SyncSender<EngineMessage>,
 ) {
     let mut error = None;
-    for (step, material) in (history.begin()..).zip(materials) {
-        let material = match material {
-            Ok(material) => material,
+    for (step, input) in (history.begin()..).zip(inputs) {
+        let input = match input {
+            Ok(input) => input,
             Err(reason) => {
                 error = Some(reason);
                 break;
             }
         };
-        history.before_step(step, &engine, &material);
-        let Ok(record) = catch_unwind(AssertUnwindSafe(|| engine.step(&material))) else {
-            let time_s = crate::geometry::seconds_from_ns(material.stamp_ns);
+        history.before_step(step, &engine, &input);
+        let Ok(record) = catch_unwind(AssertUnwindSafe(|| engine.step(&input))) else {
+            let time_s = crate::geometry::seconds_from_ns(input.stamp_ns);
             error = Some(format!("internal error in the estimator at {time_s:.3} s; please report it with the log"));
             break;
         };

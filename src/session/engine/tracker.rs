@@ -1,31 +1,19 @@
-//! One camera's stream through the front end; every run that watches the camera is given these tracks.
+//! One camera's stream through the front end; all runs on the camera share its tracks.
 
 use std::sync::Arc;
 
 use nalgebra::Vector3;
 
+use super::step_inputs::OwnedStepInput;
 use super::stopwatch::Stopwatch;
 use crate::flight_log::{FlightLog, FrameStream, LogError, LogWarning, SensorFrame};
-use crate::frontend::{
-    ChainOrientation, FrontEnd, FrontEndOptions, PredictionNoise, TrackedFrame, predict_camera_rotation,
-};
+use crate::frontend::{ChainOrientation, FrontEnd, FrontEndOptions, PredictionNoise, predict_camera_rotation};
 use crate::gimbal::ClassicalChain;
 use crate::sensors::{CameraMount, Rig};
 use crate::session::plan::SessionError;
 
-/// An image with its tracks.
-#[derive(Clone, Debug)]
-pub(in crate::session) struct TrackedSensorFrame {
-    /// The sensors' part.
-    pub frame: SensorFrame,
-    /// The front end's part.
-    pub tracks: Arc<TrackedFrame>,
-    /// What the front end took.
-    pub frontend_ms: f64,
-}
-
 /// Reads a camera's stream and tracks its features.
-pub(in crate::session) struct CameraTracker {
+pub(super) struct CameraTracker {
     stream: FrameStream,
     front_end: FrontEnd,
     chain: ClassicalChain,
@@ -33,14 +21,14 @@ pub(in crate::session) struct CameraTracker {
     previous_mount: Option<ChainOrientation>,
 }
 
-/// The turn-on bias of a gyroscope that nothing is known of, in rad/s (1.1°/s, of the small MEMS kind).
+/// Standard deviation of a gyroscope's turn-on bias, in rad/s (1.1°/s, a small MEMS IMU).
 const GYROSCOPE_BIAS_SIGMA_RAD_PER_S: f64 = 0.02;
-/// How wrong the orientation of a rigid camera on the IMU may be, in radians (0.6°).
+/// Standard deviation of the orientation of a rigid camera on the IMU, in radians (0.6°).
 const RIGID_MOUNT_SIGMA_RAD: f64 = 0.01;
 
 impl CameraTracker {
     /// Starts at a time of the log.
-    pub(in crate::session) fn new(
+    pub(super) fn new(
         log: Arc<FlightLog>,
         rig: &Rig,
         camera_key: &str,
@@ -58,16 +46,16 @@ impl CameraTracker {
         })
     }
 
-    /// The next image with its tracks, `None` at the end of the stream; an image that the front end refuses is left out
-    /// with a warning.
-    pub(in crate::session) fn next_frame(&mut self) -> Option<TrackedSensorFrame> {
+    /// The next step input of the camera alone and what is wrong with the log since the last one, `None` at the end of the
+    /// stream; an image that the front end refuses is left out with a warning.
+    pub(super) fn next_input(&mut self) -> Option<(OwnedStepInput, Vec<LogWarning>)> {
         let mut refused = Vec::new();
         loop {
             let mut frame = self.stream.next_frame()?;
             let watch = Stopwatch::start();
             let mount = self.mount(&frame);
             let predicted = match (&self.previous_mount, &mount) {
-                // The bias is the estimators' business; over one frame it turns the image by a pixel or two at most.
+                // The estimators know the bias; over one frame it rotates the image by a pixel or two at most.
                 (Some(previous), Some(now)) => {
                     predict_camera_rotation(&frame.imu, &Vector3::zeros(), previous, now, &self.noise)
                 }
@@ -77,11 +65,8 @@ impl CameraTracker {
             match self.front_end.process(&frame.image, frame.stamp_ns, predicted.as_ref()) {
                 Ok(tracks) => {
                     frame.warnings.append(&mut refused);
-                    return Some(TrackedSensorFrame {
-                        frame,
-                        tracks: Arc::new(tracks),
-                        frontend_ms: watch.elapsed_ms(),
-                    });
+                    let warnings = std::mem::take(&mut frame.warnings);
+                    return Some((OwnedStepInput::of_camera(frame, tracks, watch.elapsed_ms()), warnings));
                 }
                 Err(error) => {
                     refused.append(&mut frame.warnings);
@@ -91,12 +76,12 @@ impl CameraTracker {
         }
     }
 
-    /// What was wrong with the log behind the last frame.
-    pub(in crate::session) fn remaining_warnings(&self) -> &[LogWarning] {
+    /// What is wrong with the log behind the last image.
+    pub(super) fn remaining_warnings(&self) -> &[LogWarning] {
         self.stream.remaining_warnings()
     }
 
-    /// How the camera sits on the IMU by the rig and the encoders, `None` when a joint's angle is not known.
+    /// Orientation of the camera on the IMU by rig and encoders, `None` without a joint's angle.
     fn mount(&self, frame: &SensorFrame) -> Option<ChainOrientation> {
         let (angles_rad, sigmas_rad) = match &frame.joint_angles {
             // A rigid camera of a gimbal rig has readings beside it that are not its own.
@@ -108,7 +93,7 @@ impl CameraTracker {
     }
 }
 
-/// How wrong the rig says that may be of which a camera's rotation is predicted.
+/// Noise of what a camera's rotation is predicted from, by the rig.
 fn prediction_noise(rig: &Rig, mount: &CameraMount) -> PredictionNoise {
     let gimbal = rig.gimbal.as_ref().filter(|_| *mount == CameraMount::Gimbal);
     PredictionNoise {

@@ -244,7 +244,6 @@ fn stamps_ns(recording: &Recording, wanted: impl Fn(&StepRecord) -> bool) -> Vec
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::session::record::RunRecord;
     use crate::session::tests::memory::recorded;
     use crate::simulation::{SyntheticOptions, synthetic_tracks};
 
@@ -253,7 +252,8 @@ mod tests {
         static SAMPLE: std::sync::OnceLock<Recording> = std::sync::OnceLock::new();
         SAMPLE.get_or_init(|| {
             let flight = synthetic_tracks(&SyntheticOptions { duration_s: 4.0, ..SyntheticOptions::default() });
-            let run = RunRecord { finished: true, ..recorded(&flight, "auto") };
+            let mut run = recorded(&flight, "auto");
+            run.finished = true;
             Recording {
                 log_path: "synthetic.mcap".into(),
                 rig: std::sync::Arc::new(flight.given_rig),

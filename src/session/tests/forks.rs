@@ -6,11 +6,11 @@ use std::sync::Arc;
 use crate::estimator::{FactorKind, FrameId, JacobianFactor, Phase, StageTimes};
 use crate::gimbal;
 use crate::session::breakpoints::Condition;
-use crate::session::engine::{History, Instant, Material, RunEngine, apply_fork, estimator_config};
+use crate::session::engine::{History, RunEngine, apply_fork, estimator_config};
 use crate::session::plan::{ForkChanges, RunSpec, SessionPlan, SessionRequest};
 use crate::session::playback::{Command, Session};
 use crate::session::record::StepRecord;
-use crate::session::tests::memory::tracked;
+use crate::session::tests::memory::input_of;
 use crate::simulation::{SyntheticFlight, SyntheticOptions, synthetic_tracks};
 
 /// A run over a synthetic flight and the way that it took.
@@ -28,10 +28,10 @@ fn flown(spec: &str) -> Flown {
     let mut engine = RunEngine::new(config, None);
     let history = Arc::new(History::new(usize::MAX));
     let steps = flight.frames.iter().enumerate().map(|(step, frame)| {
-        let material = Arc::new(Material::of(&Instant::of_one(Arc::new(tracked(frame, sigma_rad)))));
-        history.materials().push(Arc::clone(&material));
-        history.before_step(step, &engine, &material);
-        engine.step(&material)
+        let input = Arc::new(input_of(frame, sigma_rad));
+        history.inputs().push(Arc::clone(&input));
+        history.before_step(step, &engine, &input);
+        engine.step(&input)
     });
     let steps = steps.collect();
     Flown { flight, history, steps }
@@ -43,8 +43,8 @@ impl Flown {
         let changes: ForkChanges = changes.parse().map_err(|error: crate::session::ForkError| error.to_string())?;
         let mut engine = self.history.engine_before(begin).unwrap();
         apply_fork(&changes, &mut engine, &self.flight.given_rig, "cam0").map_err(|error| error.to_string())?;
-        let materials = (begin..self.steps.len()).map(|step| self.history.materials().get(step).unwrap());
-        Ok(materials.map(|material| engine.step(&material)).collect())
+        let inputs = (begin..self.steps.len()).map(|step| self.history.inputs().get(step).unwrap());
+        Ok(inputs.map(|input| engine.step(&input)).collect())
     }
 }
 
@@ -188,8 +188,8 @@ fn a_fork_with_other_inertial_noise_from_the_start_is_a_run_of_such_a_rig() {
     noise.gyroscope_random_walk *= FACTOR;
     let mut engine = RunEngine::new(estimator_config(&rig, &"auto".parse().unwrap()).unwrap(), None);
     for (step, forked) in fork.iter().enumerate() {
-        let material = parent.history.materials().get(step).unwrap();
-        assert_eq!(bits(forked), bits(&engine.step(&material)), "step {step}");
+        let input = parent.history.inputs().get(step).unwrap();
+        assert_eq!(bits(forked), bits(&engine.step(&input)), "step {step}");
     }
     // Less is known by inertia, so less is known of every parameter, though pictures and encoders say the most.
     let sigmas = |steps: &[StepRecord]| steps.last().unwrap().report.calibration.sigmas.clone();

@@ -3,25 +3,20 @@
 use std::sync::Arc;
 
 use crate::estimator::{ColumnGroup, Phase};
-use crate::flight_log::SensorFrame;
-use crate::sensors::GrayImage;
-use crate::session::engine::{Instant, Material, RunEngine, TrackedSensorFrame, estimator_config};
+use crate::session::engine::{OwnedStepInput, RunEngine, estimator_config};
 use crate::session::record::RunRecord;
 use crate::simulation::{SyntheticFlight, SyntheticFrame, SyntheticOptions, synthetic_tracks};
 
-pub(in crate::session) fn tracked(frame: &SyntheticFrame, encoder_sigma_rad: f64) -> TrackedSensorFrame {
-    TrackedSensorFrame {
-        frame: SensorFrame {
-            index: frame.index,
-            stamp_ns: frame.stamp_ns,
-            log_time_ns: frame.stamp_ns,
-            image: Arc::new(GrayImage { width: 0, height: 0, pixels: Vec::new() }),
-            imu: frame.imu.clone(),
-            joint_angles: frame.encoder_angles(encoder_sigma_rad),
-            truth: Some(frame.true_world_from_imu),
-            warnings: Vec::new(),
-        },
-        tracks: Arc::new(frame.tracks.clone()),
+/// The step input of a synthetic frame.
+pub(in crate::session) fn input_of(frame: &SyntheticFrame, encoder_sigma_rad: f64) -> OwnedStepInput {
+    OwnedStepInput {
+        frame_index: frame.index,
+        stamp_ns: frame.stamp_ns,
+        log_time_ns: frame.stamp_ns,
+        imu: frame.imu.clone(),
+        joint_angles: frame.encoder_angles(encoder_sigma_rad),
+        tracks: vec![Arc::new(frame.tracks.clone())],
+        truth: Some(frame.true_world_from_imu),
         frontend_ms: 0.0,
     }
 }
@@ -38,7 +33,7 @@ fn recorded_with(flight: &SyntheticFlight, spec: &str, keep_linearization_every:
     let mut engine = RunEngine::new(config, keep_linearization_every);
     let mut run = RunRecord::new(spec, "cam0".to_owned());
     for frame in &flight.frames {
-        run.push(engine.step(&Material::of(&Instant::of_one(Arc::new(tracked(frame, sigma_rad))))));
+        run.push(engine.step(&input_of(frame, sigma_rad)));
     }
     run
 }
