@@ -171,7 +171,7 @@ impl SupposedWindow {
             },
             first_estimate: None,
             encoder,
-            rest: None,
+            stationary: None,
             keyframe: true,
             motion_information: motion.square_root_information(),
             motion,

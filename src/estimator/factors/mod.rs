@@ -1,4 +1,4 @@
-//! The residuals of the window (Eqs. 8–10) with their Jacobians: reprojection, IMU preintegration, priors.
+//! The residuals of the window (Eqs. 8–10) with their Jacobians: reprojection, IMU preintegration, zero velocity, priors.
 //!
 //! A factor takes states and measurements and returns whitened residuals and derivatives; it does not know the window.
 
@@ -10,3 +10,4 @@ pub(crate) mod prior;
 pub(crate) mod projection;
 pub(crate) mod reprojection;
 pub(crate) mod visual;
+pub(crate) mod zero_velocity;

@@ -26,6 +26,9 @@ mod alignment;
 pub mod bearing;
 mod checks;
 mod essential;
+mod first_window;
+pub(crate) mod initializer;
+mod mount_fit;
 mod options;
 mod polynomial;
 mod reconstruction;
@@ -33,7 +36,6 @@ mod refinement;
 pub mod relative_pose;
 mod selection;
 mod standstill;
-pub(crate) mod startup;
 mod structure;
 mod visual_problem;
 

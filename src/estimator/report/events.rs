@@ -66,3 +66,15 @@ pub struct Event {
     /// The threshold it was held against.
     pub threshold: Option<f64>,
 }
+
+impl Event {
+    /// An event that no value decided.
+    pub(crate) fn new(kind: EventKind, message: impl Into<String>) -> Self {
+        Self { kind, message: message.into(), value: None, threshold: None }
+    }
+
+    /// An event with the value that decided it and the threshold of that.
+    pub(crate) fn decided(kind: EventKind, message: impl Into<String>, value: f64, threshold: f64) -> Self {
+        Self { kind, message: message.into(), value: Some(value), threshold: Some(threshold) }
+    }
+}

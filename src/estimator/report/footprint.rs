@@ -1,12 +1,8 @@
 //! How much memory a report takes.
 
-use crate::estimator::estimator::Estimator;
-use crate::estimator::window::frames::Frame;
-use crate::estimator::{
-    CalibrationEstimate, FrameStateReport, JacobianSource, StepReport,
-    state::frame_state::Rates,
-    window::features::{Feature, FeatureMap, Observation},
-};
+use super::information_gain::InformationGain;
+use super::jacobian_source::JacobianSource;
+use super::step::{CalibrationEstimate, FrameStateReport, StepReport};
 
 /// Bytes of a report by part.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -75,7 +71,7 @@ impl StepReport {
             landmarks: of_vec(&self.landmarks),
             linearization,
             jacobian: self.jacobian_source.as_ref().map_or(0, JacobianSource::heap_bytes)
-                + self.gain.as_ref().map_or(0, crate::estimator::InformationGain::heap_bytes),
+                + self.gain.as_ref().map_or(0, InformationGain::heap_bytes),
             other: size_of::<Self>()
                 + of_vec(&self.events)
                 + of_vec(&self.residuals)
@@ -84,39 +80,6 @@ impl StepReport {
                 + messages,
         }
     }
-}
-
-impl Estimator {
-    /// How much memory a snapshot of it takes, in bytes: frames with their inertial samples, features, the prior and the
-    /// frames that wait; what is the same in every snapshot counts with its own size.
-    pub fn bytes(&self) -> usize {
-        let frames: usize = self.frames.iter().map(of_window_frame).sum();
-        let features: usize = self.features.iter().map(of_feature_map).sum();
-        let waiting: usize =
-            self.waiting.iter().map(crate::estimator::initialization::startup::WaitingFrame::bytes).sum();
-        let prior = self.prior.as_ref().map_or(0, crate::estimator::factors::prior::Prior::heap_bytes);
-        size_of::<Self>() + frames + features + waiting + prior
-    }
-}
-
-fn of_window_frame(frame: &Frame) -> usize {
-    let encoder = frame.encoder.as_ref().map_or(0, crate::sensors::JointAngles::heap_bytes);
-    let states = 1 + usize::from(frame.first_estimate.is_some());
-    size_of::<Frame>()
-        + allocated_bytes(size_of_val(frame.motion.samples()))
-        + states * of_vec(&frame.state.joints_rad)
-        + allocated_bytes(size_of::<Rates>())
-        + of_vec(&frame.state.rates.joints_rad_per_s)
-        + encoder
-}
-
-/// A node of the tree holds up to eleven entries and is two thirds full on average.
-fn of_feature_map(features: &FeatureMap) -> usize {
-    const ENTRY_SHARE: f64 = 1.5;
-    let entry = size_of::<crate::frontend::FeatureId>() + size_of::<Feature>();
-    let observations =
-        features.values().map(|feature| allocated_bytes(feature.observations.capacity() * size_of::<Observation>()));
-    (features.len() as f64 * entry as f64 * ENTRY_SHARE) as usize + observations.sum::<usize>()
 }
 
 fn of_frame(frame: &FrameStateReport) -> usize {

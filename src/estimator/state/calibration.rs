@@ -292,7 +292,7 @@ impl Calibration {
     }
 
     /// Goes over to another chart; returns how the old columns follow the new ones at the first estimate.
-    pub(crate) fn switch_chart(&mut self, parameterization: Parameterization) -> DMatrix<f64> {
+    pub(crate) fn switch_parameterization(&mut self, parameterization: Parameterization) -> DMatrix<f64> {
         let offsets = !self.chain().hides_joint_offsets();
         let old = &self.first_estimate.as_ref().unwrap_or(&self.values).chain;
         let given = GivenChain::new(&self.given.classical, parameterization, self.given.sigmas, offsets);

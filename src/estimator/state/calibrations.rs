@@ -5,7 +5,6 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 
 use super::calibration::Calibration;
-use crate::estimator::factors::prior::Prior;
 use crate::gimbal::{ParameterId, Parameterization};
 
 /// The camera whose mount may have joints: the first one. Its image is shown, its calibration has the first columns.
@@ -100,12 +99,12 @@ impl Calibrations {
         Self(self.0.iter().map(Calibration::at_first_estimate).collect())
     }
 
-    /// Cameras that the prior holds keep their first estimate, or take the present one; the others have none.
-    pub(crate) fn keep_first_estimates(&mut self, prior: Option<&Prior>) {
+    /// Cameras whose columns the marginalization prior holds keep their first estimate, or take the present one; the others
+    /// have none.
+    pub(crate) fn keep_first_estimates(&mut self, prior_holds: impl Fn(&Range<usize>) -> bool) {
         for camera in 0..self.cameras() {
             let columns = self.columns(camera);
-            let held = prior.is_some_and(|prior| prior.holds_calibration(&columns));
-            self.0[camera].keep_first_estimate(held);
+            self.0[camera].keep_first_estimate(prior_holds(&columns));
         }
     }
 
@@ -131,8 +130,8 @@ impl Calibrations {
 
     /// The main camera's chain goes over to another chart; returns how the old columns follow the new ones at the first
     /// estimate.
-    pub(crate) fn switch_chart(&mut self, parameterization: Parameterization) -> DMatrix<f64> {
-        let old_from_new = self.0[MAIN].switch_chart(parameterization);
+    pub(crate) fn switch_parameterization(&mut self, parameterization: Parameterization) -> DMatrix<f64> {
+        let old_from_new = self.0[MAIN].switch_parameterization(parameterization);
         let (old, main) = (old_from_new.nrows(), old_from_new.ncols());
         let others = self.dof() - self.0[MAIN].dof();
         let mut all = DMatrix::identity(old + others, main + others);

@@ -169,7 +169,7 @@ fn replays_and_clones_give_the_same_bits() {
     for (index, report) in reports[..half].iter().enumerate() {
         assert_eq!(format!("{:?}", flights.step(&mut estimator, index, both(index))), format!("{report:?}"));
     }
-    assert_eq!(estimator.phase, Phase::Tracking);
+    assert_eq!(estimator.phase(), Phase::Tracking);
     let mut copy = estimator.clone();
     for (index, report) in reports.iter().enumerate().skip(half) {
         assert_eq!(format!("{:?}", flights.step(&mut copy, index, both(index))), format!("{report:?}"));

@@ -4,26 +4,65 @@ use nalgebra::DVector;
 
 use super::Noise;
 use crate::camera::CameraModel;
+use crate::estimator::estimator::PhaseState;
 use crate::estimator::factors::preintegration::Preintegration;
 use crate::estimator::factors::prior::StartPrior;
+use crate::estimator::setup::Setup;
 use crate::estimator::state::calibrations::MAIN;
 use crate::estimator::state::frame_state::{FrameState, Rates};
 use crate::estimator::state::layout::Layout;
 use crate::estimator::state::navigation::{ImuBias, NavigationState};
-use crate::estimator::window::features;
-use crate::estimator::window::frames::Frame;
+use crate::estimator::window::active_tracks::ActiveTracks;
+use crate::estimator::window::features::{self, FeatureMap};
+use crate::estimator::window::frames::{Frame, Frames};
+use crate::estimator::window::problem::{Estimate, Problem};
+use crate::estimator::window::window_state::WindowState;
 use crate::estimator::{
     DEFAULT_CHAIN_PRIOR, Estimator, EstimatorConfig, EstimatorOptions, RigidCamera, StepInput, StepReport,
 };
 use crate::frontend::TrackedFrame;
 use crate::geometry::Dimension;
-use crate::gimbal::{Chain, Parameterization};
+use crate::gimbal::{Chain, ParameterId, Parameterization};
 use crate::sensors::Rig;
 use crate::simulation::{Lens, SyntheticFlight, SyntheticFrame, SyntheticMount, SyntheticOptions, synthetic_tracks};
 
 pub(super) fn camera(lens: Lens) -> CameraModel {
     let options = SyntheticOptions { duration_s: 0.1, lens, ..SyntheticOptions::default() };
     synthetic_tracks(&options).given_rig.cameras[0].model.clone()
+}
+
+/// A window, and the setup that it reads.
+pub(super) struct TestWindow {
+    pub(super) setup: Setup,
+    pub(super) window: WindowState,
+}
+
+impl TestWindow {
+    /// The window of a tracking estimator.
+    pub(super) fn of(estimator: &Estimator) -> Self {
+        let PhaseState::Tracking(window) = &estimator.phase else { panic!("the estimator has no window") };
+        Self { setup: estimator.setup.clone(), window: window.state.clone() }
+    }
+
+    /// Fixes a parameter of the main camera's chain.
+    pub(super) fn freeze(&mut self, parameter: ParameterId) {
+        let calibration = self.window.calibration.of_mut(MAIN);
+        let column = calibration.parameters().iter().position(|known| *known == parameter).unwrap();
+        calibration.freeze(column);
+    }
+
+    pub(super) fn active_tracks(&self) -> Vec<ActiveTracks> {
+        self.window.active_tracks()
+    }
+
+    pub(super) fn problem<'a>(&'a self, active: &'a [ActiveTracks]) -> Problem<'a> {
+        self.window.problem(&self.setup, active)
+    }
+
+    /// The present estimate, with the landmarks of these tracks.
+    pub(super) fn estimate(&self, active: &[ActiveTracks]) -> Estimate {
+        self.window.estimate(active.iter().map(|active| active.landmarks.clone()).collect())
+    }
 }
 
 /// An estimator for a rig's `cam0`.
@@ -54,7 +93,7 @@ pub(super) fn step(
     tracks: &TrackedFrame,
     rigid_tracks: &[&TrackedFrame],
 ) -> StepReport {
-    let joint_angles = estimator.config.encoder_sigma_rad.and_then(|sigma_rad| frame.encoder_angles(sigma_rad));
+    let joint_angles = estimator.config().encoder_sigma_rad.and_then(|sigma_rad| frame.encoder_angles(sigma_rad));
     estimator.step(&StepInput {
         frame_index: frame.index,
         stamp_ns: frame.stamp_ns,
@@ -75,12 +114,12 @@ fn flight(gimbal: bool) -> SyntheticFlight {
 }
 
 /// A window of six frames at the truth (landmarks from the noisy tracks), with the given chain.
-pub(super) fn window(parameterization: Parameterization, gimbal: bool, options: EstimatorOptions) -> Estimator {
+pub(super) fn window(parameterization: Parameterization, gimbal: bool, options: EstimatorOptions) -> TestWindow {
     window_of(&flight(gimbal), None, config(&flight(gimbal).given_rig, parameterization, options))
 }
 
 /// The same with a rigid camera beside the gimballed one, and with the offsets of all clocks.
-pub(super) fn cluster_window(options: EstimatorOptions, estimate_timeshift: bool) -> Estimator {
+pub(super) fn cluster_window(options: EstimatorOptions, estimate_timeshift: bool) -> TestWindow {
     let (main, rigid) = (flight(true), flight(false));
     assert_eq!(main.frames[7].imu, rigid.frames[7].imu, "one flight");
     let config = EstimatorConfig {
@@ -91,32 +130,35 @@ pub(super) fn cluster_window(options: EstimatorOptions, estimate_timeshift: bool
     window_of(&main, Some(&rigid), config)
 }
 
-fn window_of(flight: &SyntheticFlight, rigid: Option<&SyntheticFlight>, config: EstimatorConfig) -> Estimator {
+fn window_of(flight: &SyntheticFlight, rigid: Option<&SyntheticFlight>, config: EstimatorConfig) -> TestWindow {
     let parameterization = config.parameterization;
-    let mut estimator = Estimator::new(config);
+    let setup = Setup::new(config);
+    let mut calibration = setup.given_calibration();
     let true_chain = |flight: &SyntheticFlight| flight.true_rig.chain_of_camera("cam0").unwrap();
-    estimator.calibration.of_mut(MAIN).set_chain(Chain::from_classical(&true_chain(flight), parameterization));
+    calibration.of_mut(MAIN).set_chain(Chain::from_classical(&true_chain(flight), parameterization));
     if let Some(rigid) = rigid {
         let mount = Chain::from_classical(&true_chain(rigid), Parameterization::Minimal);
-        estimator.calibration.of_mut(1).set_chain(mount);
+        calibration.of_mut(1).set_chain(mount);
     }
+    let mut features = vec![FeatureMap::new(); calibration.cameras()];
+    let mut frames: Option<Frames> = None;
     let spacing = 4;
     let first = 100;
     for slot in 0..6 {
         let index = first + slot * spacing;
         let truth = &flight.frames[index];
-        let encoder = estimator.config.encoder_sigma_rad.and_then(|sigma_rad| truth.encoder_angles(sigma_rad));
+        let encoder = setup.config.encoder_sigma_rad.and_then(|sigma_rad| truth.encoder_angles(sigma_rad));
         let bias = ImuBias {
             gyroscope_rad_per_s: truth.true_bias.gyroscope_rad_per_s,
             accelerometer_m_per_s2: truth.true_bias.accelerometer_m_per_s2,
         };
-        let mut motion = Preintegration::new(estimator.noise, bias);
+        let mut motion = Preintegration::new(setup.imu_noise, bias);
         if slot > 0 {
             for frame in &flight.frames[index - spacing + 1..=index] {
                 motion.extend(&frame.imu);
             }
         }
-        estimator.frames.push(Frame {
+        let frame = Frame {
             index,
             stamp_ns: truth.stamp_ns,
             state: FrameState {
@@ -130,42 +172,48 @@ fn window_of(flight: &SyntheticFlight, rigid: Option<&SyntheticFlight>, config: 
             },
             first_estimate: None,
             encoder,
-            rest: None,
+            stationary: None,
             keyframe: true,
             motion_information: motion.square_root_information(),
             motion,
-        });
-        features::observe(&mut estimator.features[MAIN], slot, &truth.tracks.features);
+        };
+        match &mut frames {
+            None => frames = Some(Frames::new(frame)),
+            Some(frames) => frames.push(frame),
+        }
+        features::observe(&mut features[MAIN], slot, &truth.tracks.features);
         if let Some(rigid) = rigid {
-            features::observe(&mut estimator.features[1], slot, &rigid.frames[index].tracks.features);
+            features::observe(&mut features[1], slot, &rigid.frames[index].tracks.features);
         }
     }
-    estimator.start = Some(StartPrior {
-        reference: estimator.frames[0].state.clone(),
+    let frames = frames.expect("six frames");
+    let start = StartPrior {
+        reference: frames.oldest().state.clone(),
         bias: ImuBias::default(),
         accelerometer_bias_sigma: 0.5,
         gyroscope_bias_sigma: 0.02,
-    });
-    estimator.triangulate_new();
-    assert!(estimator.active_tracks().iter().all(|active| active.ids.len() > 20), "enough landmarks");
-    estimator
+    };
+    let mut window = WindowState { frames, features, calibration, prior: None, start: Some(start) };
+    window.triangulate_new(&setup.config.options);
+    assert!(window.active_tracks().iter().all(|active| active.ids.len() > 20), "enough landmarks");
+    TestWindow { setup, window }
 }
 
 /// Marginalizes the oldest frame, so that there is a prior and there are first estimates.
-pub(super) fn marginalize_once(estimator: &mut Estimator) {
-    estimator.config.options.window = estimator.frames.len() - 1;
-    estimator.config.options.first_window_factor = 1;
-    estimator.make_room(&mut Vec::new());
-    assert!(estimator.prior.is_some());
+pub(super) fn marginalize_once(test: &mut TestWindow) {
+    test.setup.config.options.window = test.window.frames.len() - 1;
+    test.setup.config.options.first_window_factor = 1;
+    test.window.make_room(&test.setup, &mut Vec::new());
+    assert!(test.window.prior.is_some());
 }
 
 /// Moves every unknown but the clocks at random; `scale` 1 is 2 cm and 1° of pose, 0.1 m/s, 2 mm and 0.2° of calibration.
-pub(super) fn shake(estimator: &mut Estimator, scale: f64) {
+pub(super) fn shake(test: &mut TestWindow, scale: f64) {
     let mut random = Noise::new(11);
     let layout = Layout {
-        frames: estimator.frames.len(),
-        joints: estimator.calibration.of(MAIN).joint_count(),
-        calibration: estimator.calibration.dof(),
+        frames: test.window.frames.len(),
+        joints: test.window.calibration.of(MAIN).joint_count(),
+        calibration: test.window.calibration.dof(),
     };
     let mut delta = DVector::zeros(layout.total());
     for slot in 0..layout.frames {
@@ -179,7 +227,7 @@ pub(super) fn shake(estimator: &mut Estimator, scale: f64) {
             delta[column] = random.normal() * [0.1, 0.003, 0.05][offset / 3];
         }
     }
-    for (parameter, column) in estimator.calibration.parameters().into_iter().zip(layout.calibration()) {
+    for (parameter, column) in test.window.calibration.parameters().into_iter().zip(layout.calibration()) {
         delta[column] = match parameter.dimension() {
             Dimension::Angle => 0.0035 * random.normal(),
             Dimension::Length => 0.002 * random.normal(),
@@ -188,8 +236,8 @@ pub(super) fn shake(estimator: &mut Estimator, scale: f64) {
         };
     }
     delta *= scale;
-    for (slot, frame) in estimator.frames.iter_mut().enumerate() {
+    for (slot, frame) in test.window.frames.iter_mut().enumerate() {
         frame.state = frame.state.stepped(frame.first_estimate.as_ref(), &delta.as_slice()[layout.frame(slot)]);
     }
-    estimator.calibration = estimator.calibration.stepped(&delta.as_slice()[layout.calibration()]);
+    test.window.calibration = test.window.calibration.stepped(&delta.as_slice()[layout.calibration()]);
 }

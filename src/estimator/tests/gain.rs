@@ -2,22 +2,22 @@
 
 use nalgebra::DMatrix;
 
-use super::fixture;
+use super::fixture::{self, TestWindow};
 use super::flight::step;
 use crate::estimator::factors::projection::NewestRows;
 use crate::estimator::options::{EstimatorOptions, RobustLoss};
 use crate::estimator::state::camera_pose::{self, CameraMaps};
+use crate::estimator::window::active_tracks::ActiveTracks;
 use crate::estimator::window::information_gain::CameraInformation;
 use crate::estimator::window::motion_parts::motion_parts;
 use crate::estimator::window::problem::{Estimate, Problem};
-use crate::estimator::window::tracking::ActiveTracks;
 use crate::estimator::{ColumnGroup, ColumnId, Estimator, FrameId, InformationGain, Motion};
 use crate::gimbal::Parameterization;
 use crate::gimbal::tests::parameter;
 use crate::simulation::{Exercise, JointSwing, SyntheticMotion, SyntheticOptions, VehicleSwing, synthetic_tracks};
 
 /// Windows with a prior, away from the truth.
-fn windows() -> Vec<(&'static str, Estimator)> {
+fn windows() -> Vec<(&'static str, TestWindow)> {
     let options = EstimatorOptions { loss: RobustLoss::None, ..EstimatorOptions::default() };
     let gimbal = |parameterization| fixture::window(parameterization, true, options);
     let mut windows = vec![
@@ -30,7 +30,7 @@ fn windows() -> Vec<(&'static str, Estimator)> {
     ];
     let mut frozen = gimbal(Parameterization::Classical);
     for name in ["EC.tx", "L1.d"] {
-        frozen.freeze(parameter(name)).unwrap();
+        frozen.freeze(parameter(name));
     }
     windows.push(("frozen", frozen));
     for (_, estimator) in &mut windows {
@@ -40,20 +40,12 @@ fn windows() -> Vec<(&'static str, Estimator)> {
     windows
 }
 
-fn estimate_of(estimator: &Estimator, active: &[ActiveTracks]) -> Estimate {
-    Estimate {
-        frames: estimator.frames.iter().map(|frame| frame.state.clone()).collect(),
-        calibration: estimator.calibration.clone(),
-        landmarks: active.iter().map(|active| active.landmarks.clone()).collect(),
-    }
-}
-
 #[test]
 fn the_parts_of_the_motions_make_up_what_the_calibration_does_to_the_pictures() {
     for (name, estimator) in windows() {
         let active = estimator.active_tracks();
         let problem = estimator.problem(&active);
-        let estimate = estimate_of(&estimator, &active);
+        let estimate = estimator.estimate(&active);
         let frames = problem.linearization_frames(&estimate);
         let calibrations = problem.linearization_calibration(&estimate.calibration);
         for camera in 0..problem.cameras.len() {
@@ -136,7 +128,7 @@ fn the_gain_is_that_of_two_windows_of_which_one_lacks_the_newest_image() {
     for (name, estimator) in windows() {
         let active = estimator.active_tracks();
         let problem = estimator.problem(&active);
-        let estimate = estimate_of(&estimator, &active);
+        let estimate = estimator.estimate(&active);
         let gain = gain_of(&problem, &estimate);
         let expected = bits_by_definition(&problem, &estimate, &active);
         assert_eq!(gain.columns(), expected.len(), "{name}");
@@ -172,8 +164,9 @@ fn what_a_swinging_joint_tells_is_put_down_to_it() {
             if frame.stamp_ns <= 15_500_000_000 {
                 continue;
             }
-            let active = estimator.active_tracks();
-            let gain = gain_of(&estimator.problem(&active), &estimate_of(&estimator, &active));
+            let window = TestWindow::of(&estimator);
+            let active = window.active_tracks();
+            let gain = gain_of(&window.problem(&active), &window.estimate(&active));
             for column in 0..gain.columns() {
                 for (sum, part) in sums.iter_mut().zip(gain.by_motion_per_s(column)) {
                     *sum += part * gain.interval_s;

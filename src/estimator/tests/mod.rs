@@ -2,13 +2,14 @@
 
 mod clocks;
 mod cluster;
-mod contradictions;
+mod consistency;
+
 mod fixture;
 mod flight;
 mod gain;
 mod jacobian;
 mod preintegration;
-mod rest;
+mod stationary;
 mod trouble;
 mod window;
 

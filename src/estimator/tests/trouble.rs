@@ -2,11 +2,11 @@
 
 use nalgebra::DMatrix;
 
-use super::fixture;
+use super::fixture::{self, TestWindow};
 use super::flight::{chain_error, fly, step, trajectory_error_m};
+use crate::estimator::estimator::PhaseState;
 use crate::estimator::factors::dense::Cholesky;
 use crate::estimator::state::calibrations::MAIN;
-use crate::estimator::window::problem::Estimate;
 use crate::estimator::{Estimator, EstimatorConfig, EstimatorOptions, EventKind, Phase, StepReport};
 use crate::frontend::FeatureId;
 use crate::gimbal::{Parameterization, transport_covariance};
@@ -194,16 +194,19 @@ fn a_saturated_inertial_sensor_does_not_throw_the_window_off() {
 
 /// Covariance of the calibration at the present estimate, all else marginalized.
 fn calibration_covariance(estimator: &Estimator) -> DMatrix<f64> {
-    let active = estimator.active_tracks();
-    let problem = estimator.problem(&active);
-    let estimate = Estimate {
-        frames: estimator.frames.iter().map(|frame| frame.state.clone()).collect(),
-        calibration: estimator.calibration.clone(),
-        landmarks: active.iter().map(|active| active.landmarks.clone()).collect(),
-    };
+    let window = TestWindow::of(estimator);
+    let active = window.active_tracks();
+    let problem = window.problem(&active);
+    let estimate = window.estimate(&active);
     let equations = problem.linearize(&estimate);
     let (hessian, _) = equations.reduced(&problem.layout, &equations.eliminate(0.0));
     Cholesky::new(&hessian).unwrap().trailing_covariance(problem.layout.calibration)
+}
+
+/// As near a singularity: the configured parameterization stays what it is.
+fn switch(estimator: &mut Estimator, parameterization: Parameterization) {
+    let PhaseState::Tracking(window) = &mut estimator.phase else { panic!("the estimator has no window") };
+    window.state.switch_parameterization(parameterization);
 }
 
 /// The same flight with and without a switch of the chart: the posterior is carried over, not only the values.
@@ -216,15 +219,15 @@ fn a_switch_of_charts_in_a_running_window_changes_nothing_else() {
     for frame in &flight.frames[..half] {
         step(&mut stays, frame);
     }
-    assert!(stays.prior.is_some() && stays.calibration.deviation().is_some());
+    assert!(TestWindow::of(&stays).window.prior.is_some() && stays.calibration().deviation().is_some());
     let mut switches = stays.clone();
-    switches.switch_chart(Parameterization::MinimalYx);
+    switch(&mut switches, Parameterization::MinimalYx);
     let angles = &flight.frames[half].true_joint_angles_rad;
-    let pose = |estimator: &Estimator| estimator.calibration.of(MAIN).imu_from_camera(angles);
+    let pose = |estimator: &Estimator| estimator.calibration().of(MAIN).imu_from_camera(angles);
     assert!(pose(&stays).minus(&pose(&switches)).norm() < 1e-12);
 
     // What is known about the chain is the same in either chart.
-    let chain = |estimator: &Estimator| estimator.calibration.of(MAIN).chain().clone();
+    let chain = |estimator: &Estimator| estimator.calibration().of(MAIN).chain().clone();
     let expected = transport_covariance(&chain(&stays), &calibration_covariance(&stays), &chain(&switches));
     let found = calibration_covariance(&switches);
     for row in 0..18 {
@@ -252,9 +255,9 @@ fn a_chart_near_its_lock_is_left_once_and_for_good() {
     let mut switched = 0;
     for frame in &flight.frames {
         if frame.index == 130 {
-            assert_eq!(estimator.phase, Phase::Tracking);
+            assert_eq!(estimator.phase(), Phase::Tracking);
             // As if the mechanism had come near: the swapped end block locks on this gimbal.
-            estimator.switch_chart(Parameterization::MinimalSwapped);
+            switch(&mut estimator, Parameterization::MinimalSwapped);
         }
         let report = step(&mut estimator, frame);
         for event in report.events.iter().filter(|event| event.kind == EventKind::ChartSwitched) {
@@ -264,7 +267,7 @@ fn a_chart_near_its_lock_is_left_once_and_for_good() {
         }
     }
     assert_eq!(switched, 1);
-    assert_eq!(estimator.calibration.of(MAIN).chain().parameterization(), Parameterization::Minimal);
+    assert_eq!(estimator.calibration().of(MAIN).chain().parameterization(), Parameterization::Minimal);
     assert_eq!(estimator.restarts, 0);
 }
 

@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, DVector, Vector2, Vector3, Vector6};
 
+use super::fixture::TestWindow;
 use super::{Noise, fixture};
-use crate::estimator::Estimator;
 use crate::estimator::factors::dense::{self, Cholesky};
 use crate::estimator::factors::reprojection::{self, CameraPose, Landmark, RelativePose};
 use crate::estimator::options::{EstimatorOptions, RobustLoss};
@@ -12,7 +12,6 @@ use crate::estimator::window::marginalization;
 use crate::estimator::window::problem::Estimate;
 use crate::estimator::window::rows::stack;
 use crate::estimator::window::solver::{self, SolverLimits};
-use crate::estimator::window::tracking::ActiveTracks;
 use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::Parameterization;
 use crate::simulation::Lens;
@@ -22,7 +21,7 @@ fn quadratic() -> EstimatorOptions {
 }
 
 /// A gimbal's window in each form, a rigid camera's, and one of both cameras, also with the offsets of their clocks.
-fn windows() -> Vec<(&'static str, Estimator)> {
+fn windows() -> Vec<(&'static str, TestWindow)> {
     let gimbal = |parameterization| fixture::window(parameterization, true, quadratic());
     vec![
         ("minimal", gimbal(Parameterization::Minimal)),
@@ -33,14 +32,6 @@ fn windows() -> Vec<(&'static str, Estimator)> {
         ("cluster", fixture::cluster_window(quadratic(), false)),
         ("cluster with clocks", fixture::cluster_window(quadratic(), true)),
     ]
-}
-
-fn estimate_of(estimator: &Estimator, active: &[ActiveTracks]) -> Estimate {
-    Estimate {
-        frames: estimator.frames.iter().map(|frame| frame.state.clone()).collect(),
-        calibration: estimator.calibration.clone(),
-        landmarks: active.iter().map(|active| active.landmarks.clone()).collect(),
-    }
 }
 
 fn moved(pose: &RigidTransform, delta: &Vector6<f64>) -> CameraPose {
@@ -99,7 +90,7 @@ fn the_gradient_of_every_factor_meets_central_differences() {
         let active = estimator.active_tracks();
         let problem = estimator.problem(&active);
         assert!(problem.prior.is_some(), "{name}: a prior takes part");
-        let estimate = estimate_of(&estimator, &active);
+        let estimate = estimator.estimate(&active);
         let equations = problem.linearize(&estimate);
         // Damped without end, the landmarks stay where they are.
         let held = equations.eliminate(1e14);
@@ -131,7 +122,7 @@ fn projecting_landmarks_out_equals_their_schur_complement() {
     for (name, estimator) in windows() {
         let active = estimator.active_tracks();
         let problem = estimator.problem(&active);
-        let estimate = estimate_of(&estimator, &active);
+        let estimate = estimator.estimate(&active);
         let rows = problem.visual_rows(&estimate);
         let total = problem.layout.total();
         let jacobian = rows.columns(0, total);
@@ -164,7 +155,7 @@ fn marginalizing_the_oldest_agrees_with_the_full_batch() {
         let active = estimator.active_tracks();
         let problem = estimator.problem(&active);
         let layout = problem.layout;
-        let estimate = estimate_of(&estimator, &active);
+        let estimate = estimator.estimate(&active);
         // Everything in one batch.
         let equations = problem.linearize(&estimate);
         let (hessian, gradient) = equations.reduced(&layout, &equations.eliminate(0.0));
@@ -195,7 +186,7 @@ fn dropping_a_frame_from_the_prior_keeps_what_it_said_about_the_others() {
     let mut estimator = fixture::window(Parameterization::Minimal, true, quadratic());
     fixture::marginalize_once(&mut estimator);
     let problem = estimator.problem(&[]);
-    let estimate = estimate_of(&estimator, &[]);
+    let estimate = estimator.estimate(&[]);
     let (prior, layout) = (problem.prior.unwrap(), problem.layout);
     let gone = 2;
     assert!(prior.holds_frame(gone));
@@ -245,11 +236,11 @@ fn a_prior_holds_nothing_that_no_step_can_change() {
     for (name, mut estimator) in windows() {
         for left in (3..6).rev() {
             fixture::shake(&mut estimator, 0.2);
-            estimator.config.options.window = left - 1;
-            estimator.config.options.first_window_factor = 1;
-            estimator.make_room(&mut Vec::new());
+            estimator.setup.config.options.window = left - 1;
+            estimator.setup.config.options.first_window_factor = 1;
+            estimator.window.make_room(&estimator.setup, &mut Vec::new());
             let problem = estimator.problem(&[]);
-            let estimate = estimate_of(&estimator, &[]);
+            let estimate = estimator.estimate(&[]);
             let total = problem.layout.total();
             let rows = problem.prior.unwrap().rows(&problem.layout, &problem.deviation(&estimate));
             let residual = rows.column(total).into_owned();
@@ -274,7 +265,7 @@ fn the_classical_chain_keeps_its_null_directions_with_first_estimates() {
     fixture::shake(&mut estimator, 0.5);
     let active = estimator.active_tracks();
     let problem = estimator.problem(&active);
-    let estimate = estimate_of(&estimator, &active);
+    let estimate = estimator.estimate(&active);
     let total = problem.layout.total();
     let mut parts =
         vec![problem.visual_rows(&estimate), problem.prior.unwrap().rows(&problem.layout, &DVector::zeros(total))];
@@ -295,11 +286,11 @@ fn solving_finds_the_truth_from_a_shaken_start() {
         let active = estimator.active_tracks();
         let problem = estimator.problem(&active);
         let limits = SolverLimits { iterations: 20, relative_cost_tolerance: 1e-9 };
-        let solution = solver::solve(&problem, estimate_of(&estimator, &active), limits);
+        let solution = solver::solve(&problem, estimator.estimate(&active), limits);
         let tracks = active.iter().flat_map(|active| &active.tracks);
         let residuals = 2 * tracks.map(|track| track.sightings.len()).sum::<usize>();
         // The tracks are off by 0.3 px (standard deviation).
-        let expected = residuals as f64 * (0.3 / estimator.config.options.pixel_sigma_px).powi(2);
+        let expected = residuals as f64 * (0.3 / estimator.setup.config.options.pixel_sigma_px).powi(2);
         assert!(solution.costs_after.visual < 1.5 * expected, "{name}: {:?} of {expected}", solution.costs_after);
         assert!(solution.costs_after.total() < 0.01 * solution.costs_before.total(), "{name}");
     }

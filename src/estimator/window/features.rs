@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Matrix3, Vector2, Vector3};
 
+use crate::estimator::allocated_bytes;
 use crate::estimator::factors::reprojection::{CameraPose, Landmark};
-use crate::estimator::options::EstimatorOptions;
+use crate::estimator::options::{EstimatorOptions, LandmarkModel};
 use crate::frontend::{FeatureId, TrackedFeature};
 
 /// One sighting of a feature.
@@ -56,7 +57,7 @@ pub(crate) fn observe(features: &mut FeatureMap, slot: usize, seen: &[TrackedFea
 
 /// Takes a frame out: its sightings go, later slots move up, and landmarks that were anchored there move to the next
 /// frame that saw them. `cameras` are the poses before the frame goes.
-pub(crate) fn forget_frame(features: &mut FeatureMap, gone: usize, cameras: &[CameraPose]) {
+pub(crate) fn drop_frame(features: &mut FeatureMap, gone: usize, cameras: &[CameraPose]) {
     for feature in features.values_mut() {
         let anchored = feature.anchor() == Some(gone);
         feature.observations.retain(|observation| observation.slot != gone);
@@ -130,8 +131,8 @@ pub(crate) fn triangulate(feature: &Feature, cameras: &[CameraPose], options: &E
     let (nearest, farthest) = options.distance_range_m;
     (visible && distance >= nearest && distance <= farthest).then(|| {
         let bearing = match options.landmark_model {
-            crate::estimator::LandmarkModel::InverseDistance => anchor.bearing,
-            crate::estimator::LandmarkModel::BearingAndInverseDistance => in_anchor / distance,
+            LandmarkModel::InverseDistance => anchor.bearing,
+            LandmarkModel::BearingAndInverseDistance => in_anchor / distance,
         };
         Landmark { bearing, inverse_distance: 1.0 / distance }
     })
@@ -156,4 +157,14 @@ pub(crate) fn compensated_parallax(
         .collect();
     let mean = if angles.is_empty() { 0.0 } else { angles.iter().sum::<f64>() / angles.len() as f64 };
     (mean, angles.len())
+}
+
+/// Bytes that the features of a camera take on the heap, estimated: a node of the tree holds up to eleven entries and is two
+/// thirds full on average.
+pub(crate) fn heap_bytes(features: &FeatureMap) -> usize {
+    const SLOTS_PER_ENTRY: f64 = 1.5;
+    let entry = size_of::<FeatureId>() + size_of::<Feature>();
+    let observations =
+        features.values().map(|feature| allocated_bytes(feature.observations.capacity() * size_of::<Observation>()));
+    (features.len() as f64 * entry as f64 * SLOTS_PER_ENTRY) as usize + observations.sum::<usize>()
 }

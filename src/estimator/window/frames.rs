@@ -1,8 +1,12 @@
 //! The frames of the window.
 
-use super::standstill::Rest;
+use std::ops::{Deref, DerefMut};
+
+use crate::estimator::allocated_bytes;
 use crate::estimator::factors::preintegration::Preintegration;
-use crate::estimator::state::frame_state::FrameState;
+use crate::estimator::factors::zero_velocity::Stationary;
+use crate::estimator::options::EstimatorOptions;
+use crate::estimator::state::frame_state::{FrameState, Rates};
 use crate::estimator::state::layout::Layout;
 use crate::estimator::state::navigation::Matrix15;
 use crate::sensors::JointAngles;
@@ -18,15 +22,15 @@ pub(crate) struct Frame {
     pub(crate) state: FrameState,
     /// Where the marginalization prior was linearized, for frames that it holds.
     pub(crate) first_estimate: Option<FrameState>,
-    /// What the encoders say.
+    /// Encoder angles at the stamp.
     pub(crate) encoder: Option<JointAngles>,
-    /// Whether the vehicle stands still there.
-    pub(crate) rest: Option<Rest>,
+    /// Present where the vehicle is stationary.
+    pub(crate) stationary: Option<Stationary>,
     /// Whether it is a keyframe.
     pub(crate) keyframe: bool,
-    /// Inertial samples from the frame before it in the window.
+    /// IMU samples since the frame before it in the window.
     pub(crate) motion: Preintegration,
-    /// Square-root information of `motion`, `None` when it is empty.
+    /// Square-root information of `motion` (15 × 15), `None` when it is empty.
     pub(crate) motion_information: Option<Matrix15>,
 }
 
@@ -35,6 +39,107 @@ impl Frame {
     /// and joint angles.
     pub(crate) fn linearization_point<'a>(&'a self, current: &'a FrameState, reach_rad: f64) -> &'a FrameState {
         self.first_estimate.as_ref().filter(|first| current.turn_from_rad(first) <= reach_rad).unwrap_or(current)
+    }
+
+    fn bytes(&self) -> usize {
+        let encoder = self.encoder.as_ref().map_or(0, JointAngles::heap_bytes);
+        let states = 1 + usize::from(self.first_estimate.is_some());
+        let of_vec = |numbers: &Vec<f64>| allocated_bytes(numbers.capacity() * size_of::<f64>());
+        size_of::<Self>()
+            + allocated_bytes(size_of_val(self.motion.samples()))
+            + states * of_vec(&self.state.joints_rad)
+            + allocated_bytes(size_of::<Rates>())
+            + of_vec(&self.state.rates.joints_rad_per_s)
+            + encoder
+    }
+}
+
+/// The frames of the window, oldest first; there is always one.
+#[derive(Clone, Debug)]
+pub(crate) struct Frames(Vec<Frame>);
+
+impl Frames {
+    /// A window of one frame.
+    pub(crate) fn new(first: Frame) -> Self {
+        Self(vec![first])
+    }
+
+    /// Adds a frame behind the newest one.
+    pub(crate) fn push(&mut self, newest: Frame) {
+        self.0.push(newest);
+    }
+
+    /// Slot of the newest frame.
+    pub(crate) fn newest_slot(&self) -> usize {
+        self.0.len() - 1
+    }
+
+    pub(crate) fn oldest(&self) -> &Frame {
+        &self.0[0]
+    }
+
+    pub(crate) fn newest(&self) -> &Frame {
+        &self.0[self.newest_slot()]
+    }
+
+    pub(crate) fn newest_mut(&mut self) -> &mut Frame {
+        let newest = self.newest_slot();
+        &mut self.0[newest]
+    }
+
+    /// Takes out the oldest frame; the last one stays.
+    pub(crate) fn remove_oldest(&mut self) {
+        if self.newest_slot() > 0 {
+            self.0.remove(0);
+        }
+    }
+
+    /// Takes out the frame at a slot before the newest one and hands its IMU samples on to the frame after it.
+    pub(crate) fn drop_before_newest(&mut self, slot: usize) {
+        if slot >= self.newest_slot() {
+            return;
+        }
+        let mut motion = self.0.remove(slot).motion;
+        let next = &mut self.0[slot];
+        motion.extend(next.motion.samples());
+        next.motion_information = motion.square_root_information();
+        next.motion = motion;
+    }
+
+    /// Integrates intervals again whose bias has moved by more than [`EstimatorOptions::reintegration_change`] from where they
+    /// were integrated.
+    pub(crate) fn reintegrate(&mut self, options: &EstimatorOptions) {
+        let limit = options.reintegration_change;
+        for slot in 1..self.0.len() {
+            let bias = self.0[slot - 1].state.navigation.bias;
+            let frame = &mut self.0[slot];
+            let change = frame.motion.bias_change(&bias);
+            let gyroscope = change.fixed_rows::<3>(0).abs() - limit.gyroscope_rad_per_s;
+            let accelerometer = change.fixed_rows::<3>(3).abs() - limit.accelerometer_m_per_s2;
+            if gyroscope.max() > 0.0 || accelerometer.max() > 0.0 {
+                frame.motion.reintegrate(bias);
+                frame.motion_information = frame.motion.square_root_information();
+            }
+        }
+    }
+
+    /// Bytes that the frames take, with what they hold on the heap.
+    pub(crate) fn bytes(&self) -> usize {
+        self.0.iter().map(Frame::bytes).sum()
+    }
+}
+
+impl Deref for Frames {
+    type Target = [Frame];
+
+    fn deref(&self) -> &[Frame] {
+        &self.0
+    }
+}
+
+impl DerefMut for Frames {
+    fn deref_mut(&mut self) -> &mut [Frame] {
+        &mut self.0
     }
 }
 

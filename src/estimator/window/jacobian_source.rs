@@ -2,20 +2,21 @@
 
 use nalgebra::DMatrix;
 
-use crate::estimator::estimator::Estimator;
+use super::window_state::WindowState;
 use crate::estimator::report::columns::scales_of;
 use crate::estimator::report::jacobian_source::{ClockColumns, FactorRows, JacobianSource, PackedKind, PackedRow};
 use crate::estimator::report::linearization::{column_blocks, column_order};
+use crate::estimator::setup::Setup;
 use crate::estimator::state::calibrations::Calibrations;
 use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::window::rows::stack_columns;
-use crate::estimator::window::tracking::SolvedWindow;
+use crate::estimator::window::solve::SolvedWindow;
 use crate::estimator::{ColumnBlock, FrameId};
 
-impl Estimator {
+impl WindowState {
     /// The source of the Jacobian at the final estimate, and the rows that are not of features where they are to be kept.
-    pub(crate) fn jacobian_source(&self, solved: &SolvedWindow) -> (JacobianSource, Vec<FactorRows>) {
-        let problem = self.problem(&solved.cameras);
+    pub(crate) fn jacobian_source(&self, setup: &Setup, solved: &SolvedWindow) -> (JacobianSource, Vec<FactorRows>) {
+        let problem = self.problem(setup, &solved.cameras);
         let estimate = &solved.solution.estimate;
         let layout = problem.layout;
         let frames = problem.linearization_frames(estimate);
@@ -31,7 +32,7 @@ impl Estimator {
             if rows.nrows() > 0 {
                 let jacobian = stack_columns(std::slice::from_ref(rows), order.iter().copied());
                 let own = norms_of(&jacobian, &columns, &scales);
-                if let Some(factor) = kind.factor(&numbers).filter(|_| self.config.options.keep_factor_rows) {
+                if let Some(factor) = kind.factor(&numbers).filter(|_| setup.config.options.keep_factor_rows) {
                     let last = jacobian.ncols();
                     let mut rows_with_residual = jacobian.resize_horizontally(last + 1, 0.0);
                     rows_with_residual.set_column(last, &rows.column(layout.total()));
@@ -44,8 +45,8 @@ impl Estimator {
         for slot in 1..layout.frames {
             push(PackedKind::Inertial(slot as u8), &problem.inertial_rows_at(slot, estimate, &frames));
         }
-        let rest: Vec<_> = problem.rest_terms(&estimate.frames).collect();
-        push(PackedKind::Standstill, &problem.rest_rows(&rest));
+        let stationary: Vec<_> = problem.zero_velocity_terms(&estimate.frames).collect();
+        push(PackedKind::Standstill, &problem.zero_velocity_rows(&stationary));
         push(PackedKind::CalibrationPrior, &problem.calibration_prior_rows(estimate));
         push(PackedKind::MarginalizationPrior, &problem.prior_rows(estimate));
         let packed_frame = |state: &FrameState| {
@@ -57,7 +58,7 @@ impl Estimator {
             checks.rejected.iter().zip(landmarks).map(|(rejected, landmark)| (*rejected, landmark.bearing))
         });
         let rejected = rejected.enumerate().filter(|(_, (rejected, _))| *rejected);
-        let options = &self.config.options;
+        let options = &setup.config.options;
         let clocked = |calibrations: &Calibrations, camera: usize| {
             let calibration = calibrations.of(camera);
             (calibration.dof().saturating_sub(calibration.chain().dof()), calibration.camera_shift_s())

@@ -2,52 +2,39 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::estimator::StepInput;
-use crate::estimator::estimator::Estimator;
+use super::window_state::WindowState;
 use crate::estimator::factors::reprojection::{self, CameraPose, RelativePose};
+use crate::estimator::setup::Setup;
 use crate::estimator::state::calibrations::MAIN;
 use crate::estimator::state::camera_pose::{self, CameraMaps};
 use crate::geometry::wrap_angle;
 use crate::sensors::JointAngles;
 
 /// How far a joint may have turned since the frame before where no encoder tells it, as a standard deviation.
-pub(crate) const UNKNOWN_TURN_RAD: f64 = 1.0;
+pub(crate) const UNKNOWN_JOINT_SIGMA_RAD: f64 = 1.0;
 /// Fewest landmarks by which the picture tells the joint angles of a frame.
 const LEAST_LANDMARKS: usize = 15;
 /// The picture must tell an angle better than the encoder by this factor before it may carry the encoder's angle on: then
 /// what the picture says about the turn in between owes nothing to the encoder.
 const SHARPER: f64 = 3.0;
 
-impl Estimator {
-    /// Encoder angles that can be used.
-    pub(crate) fn encoder_reading(&self, input: &StepInput<'_>) -> Option<JointAngles> {
-        self.config.encoder_in_use()?;
-        let angles = input.joint_angles?;
-        let count = self.calibration.of(MAIN).joint_count();
-        let usable = angles.angles_rad.len() == count
-            && angles.sigmas_rad.len() == count
-            && angles.lasting_sigmas_rad.len() == count
-            && angles.angles_rad.iter().all(|angle| angle.is_finite())
-            && angles.sigmas_rad.iter().all(|sigma| sigma.is_finite() && *sigma > 0.0);
-        usable.then(|| angles.clone())
-    }
-
-    /// Turns the newest frame's joints so that the known landmarks meet their measurements, pose held: an encoder may be
-    /// off by many degrees, and without one there is nothing else to start from.
-    pub(crate) fn align_newest_joints(&mut self) {
+impl WindowState {
+    /// Fits the newest frame's joint angles to the observations of triangulated landmarks with the pose fixed: an encoder may
+    /// be off by many degrees, and without one there is no other initial value.
+    pub(crate) fn align_newest_joints(&mut self, setup: &Setup) {
         let joints = self.calibration.of(MAIN).joint_count();
         if joints == 0 {
             return;
         }
-        let slot = self.frames.len() - 1;
+        let slot = self.frames.newest_slot();
         let cameras = self.camera_poses(MAIN);
         let known = self.frames[slot].encoder.as_ref().map(|encoder| encoder.sigmas_rad.as_slice());
         let prior =
-            DVector::from_fn(joints, |joint, _| known.map_or(UNKNOWN_TURN_RAD, |sigmas| sigmas[joint]).powi(-2));
+            DVector::from_fn(joints, |joint, _| known.map_or(UNKNOWN_JOINT_SIGMA_RAD, |sigmas| sigmas[joint]).powi(-2));
         let start = self.frames[slot].state.joints_rad.clone();
         let mut angles = start.clone();
         for _ in 0..5 {
-            let (hessian, gradient, _) = self.joints_by_landmarks(slot, &angles, &cameras);
+            let (hessian, gradient, _) = self.joints_by_landmarks(setup, slot, &angles, &cameras);
             let hessian = hessian + DMatrix::from_diagonal(&prior);
             let gradient =
                 gradient + DVector::from_fn(joints, |joint, _| (angles[joint] - start[joint]) * prior[joint]);
@@ -69,12 +56,13 @@ impl Estimator {
     /// the number of those landmarks.
     fn joints_by_landmarks(
         &self,
+        setup: &Setup,
         slot: usize,
         angles_rad: &[f64],
         cameras: &[CameraPose],
     ) -> (DMatrix<f64>, DVector<f64>, usize) {
         let joints = angles_rad.len();
-        let sigma = self.config.options.pixel_sigma_px;
+        let sigma = setup.config.options.pixel_sigma_px;
         let mut state = self.frames[slot].state.clone();
         state.joints_rad = angles_rad.to_vec();
         let calibration = self.calibration.of(MAIN);
@@ -94,7 +82,7 @@ impl Estimator {
                 continue;
             }
             let relative = RelativePose::new(&cameras[anchor], &camera);
-            let Some(term) = reprojection::linearize(&self.config.camera, &relative, &relative, landmark, &seen.uv_px)
+            let Some(term) = reprojection::linearize(&setup.config.camera, &relative, &relative, landmark, &seen.uv_px)
             else {
                 continue;
             };
@@ -109,8 +97,8 @@ impl Estimator {
     }
 
     /// Variances of a frame's joint angles as the picture tells them, `None` with too few landmarks.
-    fn visual_variances(&self, slot: usize, cameras: &[CameraPose]) -> Option<DVector<f64>> {
-        let (hessian, _, count) = self.joints_by_landmarks(slot, &self.frames[slot].state.joints_rad, cameras);
+    fn visual_variances(&self, setup: &Setup, slot: usize, cameras: &[CameraPose]) -> Option<DVector<f64>> {
+        let (hessian, _, count) = self.joints_by_landmarks(setup, slot, &self.frames[slot].state.joints_rad, cameras);
         let inverse = hessian.cholesky()?.inverse();
         (count >= LEAST_LANDMARKS).then(|| inverse.diagonal())
     }
@@ -119,11 +107,11 @@ impl Estimator {
     /// them over, turned on by what the picture says about the joints in between.
     ///
     /// Only the independent part of their errors is averaged; what the picture may have got wrong is added.
-    pub(crate) fn carry_encoder(&mut self, from: usize, to: usize) {
+    pub(crate) fn carry_encoder(&mut self, setup: &Setup, from: usize, to: usize) {
         let (Some(leaving), Some(own)) = (&self.frames[from].encoder, &self.frames[to].encoder) else { return };
         let cameras = self.camera_poses(MAIN);
         let (Some(variance_from), Some(variance_to)) =
-            (self.visual_variances(from, &cameras), self.visual_variances(to, &cameras))
+            (self.visual_variances(setup, from, &cameras), self.visual_variances(setup, to, &cameras))
         else {
             return;
         };

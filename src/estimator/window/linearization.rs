@@ -2,28 +2,33 @@
 
 use nalgebra::DVector;
 
-use crate::estimator::estimator::Estimator;
+use super::window_state::WindowState;
 use crate::estimator::factors::projection::NewestRows;
 use crate::estimator::report::linearization::{column_blocks, column_order};
+use crate::estimator::setup::Setup;
 use crate::estimator::state::calibrations::MAIN;
 use crate::estimator::state::camera_pose::{self, CameraMaps};
 use crate::estimator::window::information_gain::CameraInformation;
 use crate::estimator::window::problem::{Estimate, Problem};
 use crate::estimator::window::rows::stack_columns;
-use crate::estimator::window::tracking::SolvedWindow;
+use crate::estimator::window::solve::SolvedWindow;
 use crate::estimator::{FrameId, InformationGain, Linearization};
 use crate::gimbal::ParameterId;
 
-impl Estimator {
+impl WindowState {
     /// The linearization at the final estimate: the measurements' rows, and those of the priors; and what the newest image
     /// tells.
-    pub(crate) fn linearization(&self, solved: &SolvedWindow) -> (Linearization, Option<InformationGain>) {
-        let problem = self.problem(&solved.cameras);
+    pub(crate) fn linearization(
+        &self,
+        setup: &Setup,
+        solved: &SolvedWindow,
+    ) -> (Linearization, Option<InformationGain>) {
+        let problem = self.problem(setup, &solved.cameras);
         let frames: Vec<FrameId> = self.frames.iter().map(|frame| FrameId(frame.index)).collect();
         let parameters = self.calibration.parameters();
         let estimate = &solved.solution.estimate;
-        // An image that does not become a keyframe is forgotten again: it tells nothing that stays.
-        if !self.frames.last().is_some_and(|frame| frame.keyframe) {
+        // An image that does not become a keyframe is dropped again: it constrains nothing that stays.
+        if !self.frames.newest().keyframe {
             let linearization = problem.linearization(estimate, &parameters, &frames, None);
             return (linearization, problem.no_information_gain(estimate));
         }
@@ -62,8 +67,8 @@ impl Problem<'_> {
         }
         measured.extend((1..layout.frames).map(|slot| self.inertial_rows_at(slot, estimate, &frames)));
         measured.extend((0..layout.frames).map(|slot| self.encoder_rows(slot, estimate)));
-        let rest: Vec<_> = self.rest_terms(&estimate.frames).collect();
-        measured.push(self.rest_rows(&rest));
+        let stationary: Vec<_> = self.zero_velocity_terms(&estimate.frames).collect();
+        measured.push(self.zero_velocity_rows(&stationary));
         let priors = [self.calibration_prior_rows(estimate), self.prior_rows(estimate)];
         let frozen = estimate.calibration.frozen_columns();
         let is_held = |column: usize| frozen.contains(&column);

@@ -4,7 +4,6 @@ use nalgebra::DMatrix;
 
 use super::problem::{Estimate, Problem};
 use super::rows::stack;
-use super::standstill;
 use crate::estimator::factors::prior::Prior;
 use crate::estimator::window::frames::Frame;
 
@@ -15,10 +14,10 @@ use crate::estimator::window::frames::Frame;
 /// estimate as theirs.
 pub(crate) fn oldest(problem: &Problem<'_>, estimate: &Estimate) -> Option<Prior> {
     let mut parts = vec![problem.prior_rows(estimate), problem.encoder_rows(0, estimate)];
-    parts.push(problem.rest_rows(&standstill::speed_terms(problem.layout, &problem.frames[0], 0, &estimate.frames[0])));
+    parts.extend(problem.velocity_terms(0, &estimate.frames[0]).map(|terms| problem.zero_velocity_rows(&terms)));
     if problem.frames.len() > 1 {
         parts.push(problem.inertial_rows(1, estimate));
-        parts.push(problem.rest_rows(&standstill::place_terms(problem.layout, problem.frames, 1, &estimate.frames)));
+        parts.extend(problem.position_terms(1, &estimate.frames).map(|terms| problem.zero_velocity_rows(&terms)));
     }
     parts.push(problem.visual_rows(estimate));
     eliminated(problem, estimate, &parts, 0)

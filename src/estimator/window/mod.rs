@@ -1,17 +1,27 @@
 //! The sliding window: its frames and features, the least-squares problem that they make, solver and marginalization.
+//!
+//! [`SlidingWindow::step`](sliding_window::SlidingWindow::step) takes in an image and returns a report or a failure; a window
+//! always has a frame.
 
-pub(crate) mod contradictions;
+pub(crate) mod active_tracks;
+pub(crate) mod calibration_columns;
+pub(crate) mod consistency;
+pub(crate) mod failure;
 pub(crate) mod features;
 pub(crate) mod frames;
 pub(crate) mod information_gain;
 pub(crate) mod jacobian_source;
 pub(crate) mod joints;
+pub(crate) mod keyframes;
 pub(crate) mod linearization;
+pub(crate) mod make_room;
 pub(crate) mod marginalization;
 pub(crate) mod motion_parts;
 pub(crate) mod problem;
 pub(crate) mod reporting;
 pub(crate) mod rows;
+pub(crate) mod sliding_window;
+pub(crate) mod solve;
 pub(crate) mod solver;
-pub(crate) mod standstill;
-pub(crate) mod tracking;
+pub(crate) mod stationary;
+pub(crate) mod window_state;

@@ -4,11 +4,11 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, Vector3, Vector6};
 
-use super::standstill::{self, RestTerm};
 use crate::estimator::factors::imu_factor;
 use crate::estimator::factors::prior::{Prior, StartPrior};
 use crate::estimator::factors::reprojection::Landmark;
 use crate::estimator::factors::visual::{self, ReducedVisualSystem, Track, VisualModel, VisualSystem};
+use crate::estimator::factors::zero_velocity::ZeroVelocityTerm;
 use crate::estimator::state::calibrations::{Calibrations, MAIN};
 use crate::estimator::state::camera_pose::{self, CameraMaps};
 use crate::estimator::state::frame_state::FrameState;
@@ -57,7 +57,7 @@ pub(crate) struct Costs {
     pub(crate) visual: f64,
     pub(crate) imu: f64,
     pub(crate) encoder: f64,
-    pub(crate) rest: f64,
+    pub(crate) zero_velocity: f64,
     pub(crate) calibration: f64,
     pub(crate) prior: f64,
 }
@@ -65,7 +65,7 @@ pub(crate) struct Costs {
 impl Costs {
     /// The cost that the solver lowers.
     pub(crate) fn total(&self) -> f64 {
-        0.5 * (self.visual + self.imu + self.encoder + self.rest + self.calibration + self.prior)
+        0.5 * (self.visual + self.imu + self.encoder + self.zero_velocity + self.calibration + self.prior)
     }
 }
 
@@ -111,7 +111,8 @@ impl Problem<'_> {
         for slot in 0..self.frames.len() {
             costs.encoder += self.encoder_residuals(slot, estimate).map(|(_, r, _)| r * r).sum::<f64>();
         }
-        costs.rest = self.rest_terms(&estimate.frames).map(|term| term.residual * term.residual).sum();
+        costs.zero_velocity =
+            self.zero_velocity_terms(&estimate.frames).map(|term| term.residual * term.residual).sum();
         if self.layout.calibration > 0 {
             costs.calibration = estimate.calibration.prior_residual().norm_squared();
         }
@@ -175,18 +176,36 @@ impl Problem<'_> {
         Some(self.layout.calibration().start + calibration.columns(MAIN).start + column)
     }
 
-    /// What standing still says about all frames.
-    pub(crate) fn rest_terms<'s>(&'s self, states: &'s [FrameState]) -> impl Iterator<Item = RestTerm> + 's {
-        self.rest_terms_of(states, self.frames.len())
+    /// The zero-velocity updates of all frames, velocity before position in each.
+    pub(crate) fn zero_velocity_terms<'s>(
+        &'s self,
+        states: &'s [FrameState],
+    ) -> impl Iterator<Item = ZeroVelocityTerm> + 's {
+        self.zero_velocity_terms_of(states, self.frames.len())
     }
 
-    /// What standing still says about the frames before `slots`.
-    fn rest_terms_of<'s>(&'s self, states: &'s [FrameState], slots: usize) -> impl Iterator<Item = RestTerm> + 's {
-        self.frames.iter().enumerate().take(slots).flat_map(move |(slot, frame)| {
-            let mut terms = standstill::speed_terms(self.layout, frame, slot, &states[slot]);
-            terms.extend(standstill::place_terms(self.layout, self.frames, slot, states));
-            terms
+    /// The zero-velocity updates of the frames before `slots`.
+    fn zero_velocity_terms_of<'s>(
+        &'s self,
+        states: &'s [FrameState],
+        slots: usize,
+    ) -> impl Iterator<Item = ZeroVelocityTerm> + 's {
+        (0..slots).flat_map(move |slot| {
+            let velocity = self.velocity_terms(slot, &states[slot]);
+            velocity.into_iter().flatten().chain(self.position_terms(slot, states).into_iter().flatten())
         })
+    }
+
+    /// The velocity of the frame at `slot` is zero, if the vehicle is stationary there.
+    pub(crate) fn velocity_terms(&self, slot: usize, state: &FrameState) -> Option<[ZeroVelocityTerm; 3]> {
+        Some(self.frames[slot].stationary.as_ref()?.velocity_terms(self.layout, slot, state))
+    }
+
+    /// The position at `slot` is the one of the frame before, if the vehicle has been stationary since then.
+    pub(crate) fn position_terms(&self, slot: usize, states: &[FrameState]) -> Option<[ZeroVelocityTerm; 3]> {
+        let before = slot.checked_sub(1)?;
+        let stationary = self.frames[slot].stationary.filter(|it| self.frames[before].stamp_ns >= it.since_ns)?;
+        Some(stationary.position_terms(self.layout, slot, states))
     }
 
     /// Calibration at which derivatives are taken.
@@ -247,7 +266,7 @@ impl Problem<'_> {
                 }
             }
         }
-        for term in self.rest_terms_of(&estimate.frames, slots) {
+        for term in self.zero_velocity_terms_of(&estimate.frames, slots) {
             let square = term.slope * term.slope;
             hessian[(term.column, term.column)] += square;
             gradient[term.column] += term.slope * term.residual;

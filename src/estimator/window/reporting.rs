@@ -2,77 +2,88 @@
 
 use nalgebra::Vector2;
 
-use crate::estimator::estimator::Estimator;
-use crate::estimator::state::calibration::Calibration;
-use crate::estimator::state::calibrations::MAIN;
-use crate::estimator::window::problem::Costs;
-use crate::estimator::window::solver;
-use crate::estimator::window::tracking::{SolvedWindow, TrackResiduals};
-use crate::estimator::{
+use super::problem::Costs;
+use super::solve::{SolvedWindow, TrackResiduals};
+use super::window_state::WindowState;
+use crate::estimator::factors::prior::{Prior, StartPrior};
+use crate::estimator::report::{
     CalibrationEstimate, FactorKind, FeatureCounts, FeatureReport, FrameStateReport, LandmarkReport, ObservationReport,
-    Phase, ResidualSummary, StageTimes, StepInput, StepReport,
+    Phase, ResidualSummary, StageTimes, StepReport,
 };
+use crate::estimator::setup::Setup;
+use crate::estimator::state::calibrations::MAIN;
+use crate::estimator::step_input::StepInput;
 use crate::geometry::median;
 
-impl Estimator {
-    /// A report that holds nothing but the calibration.
-    pub(crate) fn empty_report(&self, input: &StepInput<'_>, phase: Phase) -> StepReport {
-        StepReport {
-            frame_index: input.frame_index,
-            stamp_ns: input.stamp_ns,
-            phase,
-            restarts: self.restarts,
-            pixel_sigma_px: self.config.options.pixel_sigma_px,
-            effective_pixel_sigma_px: self.config.options.pixel_sigma_px,
-            events: Vec::new(),
-            window: Vec::new(),
-            calibration: self.calibration_report(),
-            features: Vec::new(),
-            counts: FeatureCounts::default(),
-            landmarks: Vec::new(),
-            residuals: Vec::new(),
-            reprojection_rms_before_px: 0.0,
-            reprojection_rms_after_px: 0.0,
-            reprojection_median_after_px: f64::NAN,
-            iterations: Vec::new(),
-            linearization: None,
-            jacobian_source: None,
-            factor_rows: None,
-            gain: None,
-            keyframe: false,
-            times: StageTimes::default(),
-            warnings: Vec::new(),
-        }
+/// A report that holds nothing but the calibration.
+pub(crate) fn empty_report(
+    setup: &Setup,
+    input: &StepInput<'_>,
+    phase: Phase,
+    calibration: CalibrationEstimate,
+) -> StepReport {
+    StepReport {
+        frame_index: input.frame_index,
+        stamp_ns: input.stamp_ns,
+        phase,
+        restarts: 0,
+        pixel_sigma_px: setup.config.options.pixel_sigma_px,
+        effective_pixel_sigma_px: setup.config.options.pixel_sigma_px,
+        events: Vec::new(),
+        window: Vec::new(),
+        calibration,
+        features: Vec::new(),
+        counts: FeatureCounts::default(),
+        landmarks: Vec::new(),
+        residuals: Vec::new(),
+        reprojection_rms_before_px: 0.0,
+        reprojection_rms_after_px: 0.0,
+        reprojection_median_after_px: f64::NAN,
+        iterations: Vec::new(),
+        linearization: None,
+        jacobian_source: None,
+        factor_rows: None,
+        gain: None,
+        keyframe: false,
+        times: StageTimes::default(),
+        warnings: Vec::new(),
     }
+}
 
+impl WindowState {
     /// The report of a solved window.
-    pub(crate) fn tracking_report(&mut self, input: &StepInput<'_>, solved: &mut SolvedWindow) -> StepReport {
-        let begin_ms = (self.config.clock_ms)();
-        self.calibration_sigmas = solver::sigmas(&solved.solution.calibration_covariance).iter().copied().collect();
-        let mut report = self.empty_report(input, Phase::Tracking);
+    pub(crate) fn report(
+        &self,
+        setup: &Setup,
+        input: &StepInput<'_>,
+        solved: &mut SolvedWindow,
+        calibration: CalibrationEstimate,
+    ) -> StepReport {
+        let begin_ms = setup.clock_ms();
+        let mut report = empty_report(setup, input, Phase::Tracking, calibration);
         report.window = self.window_report();
-        report.keyframe = self.frames.last().is_some_and(|frame| frame.keyframe);
-        report.features = self.feature_reports(solved);
+        report.keyframe = self.frames.newest().keyframe;
+        report.features = self.feature_reports(setup, solved);
         report.counts = FeatureCounts::of(&report.features);
         report.effective_pixel_sigma_px = effective_sigma(report.pixel_sigma_px, &report.features);
         report.landmarks = self.landmark_reports(solved);
-        report.residuals = self.residual_summaries(solved);
+        report.residuals = self.residual_summaries(setup, solved);
         report.reprojection_rms_before_px =
             root_mean_square(solved.checks.iter().map(|checks| &checks.residuals_before));
         let residuals_after = || solved.checks.iter().map(|checks| &checks.residuals_after);
         report.reprojection_rms_after_px = root_mean_square(residuals_after());
         report.reprojection_median_after_px = median_length(residuals_after());
         report.iterations = std::mem::take(&mut solved.solution.iterations);
-        let reported_ms = (self.config.clock_ms)();
-        if self.config.options.keep_linearization {
-            let (linearization, gain) = self.linearization(solved);
+        let reported_ms = setup.clock_ms();
+        if setup.config.options.keep_linearization {
+            let (linearization, gain) = self.linearization(setup, solved);
             (report.linearization, report.gain) = (Some(linearization), gain);
-            let (source, rows) = self.jacobian_source(solved);
+            let (source, rows) = self.jacobian_source(setup, solved);
             report.jacobian_source = Some(source);
-            report.factor_rows = self.config.options.keep_factor_rows.then_some(rows);
+            report.factor_rows = setup.config.options.keep_factor_rows.then_some(rows);
         }
         report.times.report_ms = reported_ms - begin_ms;
-        report.times.linearize_ms = (self.config.clock_ms)() - reported_ms;
+        report.times.linearize_ms = setup.clock_ms() - reported_ms;
         report
     }
 
@@ -99,39 +110,9 @@ impl Estimator {
             .collect()
     }
 
-    fn calibration_report(&self) -> CalibrationEstimate {
-        let cameras = || (0..self.calibration.cameras()).map(|camera| self.calibration.of(camera));
-        let parameters = self.calibration.parameters();
-        let count = parameters.len();
-        let chain = self.calibration.of(MAIN).chain();
-        let sigmas = if self.calibration.dof() == 0 {
-            vec![0.0; count]
-        } else if self.calibration_sigmas.len() == count {
-            self.calibration_sigmas.clone()
-        } else {
-            vec![f64::NAN; count]
-        };
-        CalibrationEstimate {
-            parameterization: chain.parameterization().name().to_owned(),
-            parameters,
-            values: cameras().flat_map(Calibration::values).collect(),
-            sigmas,
-            prior_sigmas: cameras().flat_map(Calibration::prior_sigmas).collect(),
-            classical: chain.to_classical(),
-            margins: chain.margins(),
-            rigid_cameras: self
-                .config
-                .rigid_cameras
-                .iter()
-                .zip(cameras().skip(1))
-                .map(|(camera, calibration)| (camera.key.clone(), calibration.imu_from_camera(&[])))
-                .collect(),
-        }
-    }
-
-    fn feature_reports(&self, solved: &SolvedWindow) -> Vec<FeatureReport> {
-        let sigma = self.config.options.pixel_sigma_px;
-        let loss = self.config.options.loss;
+    fn feature_reports(&self, setup: &Setup, solved: &SolvedWindow) -> Vec<FeatureReport> {
+        let sigma = setup.config.options.pixel_sigma_px;
+        let loss = setup.config.options.loss;
         let observation =
             |slot: usize, uv_px: Vector2<f64>, before: Option<Vector2<f64>>, after: Option<Vector2<f64>>| {
                 let chi2 = after.map_or(0.0, |residual| residual.norm_squared() / (sigma * sigma));
@@ -188,16 +169,15 @@ impl Estimator {
         landmarks
     }
 
-    fn residual_summaries(&self, solved: &SolvedWindow) -> Vec<ResidualSummary> {
-        let problem = self.problem(&solved.cameras);
+    fn residual_summaries(&self, setup: &Setup, solved: &SolvedWindow) -> Vec<ResidualSummary> {
+        let problem = self.problem(setup, &solved.cameras);
         let joints = problem.layout.joints;
         let tracks = solved.cameras.iter().flat_map(|of_camera| &of_camera.tracks);
         let sightings: usize = tracks.map(|track| track.sightings.len()).sum();
         let read = self.frames.iter().filter(|frame| frame.encoder.is_some()).count();
-        let resting = problem.rest_terms(&solved.solution.estimate.frames).count();
+        let stationary = problem.zero_velocity_terms(&solved.solution.estimate.frames).count();
         let intervals = self.frames.iter().skip(1).filter(|frame| frame.motion_information.is_some()).count();
-        let held = self.prior.as_ref().map_or(0, crate::estimator::factors::prior::Prior::len)
-            + if self.start.is_some() { crate::estimator::factors::prior::StartPrior::LEN } else { 0 };
+        let held = self.prior.as_ref().map_or(0, Prior::len) + if self.start.is_some() { StartPrior::LEN } else { 0 };
         let (before, after) = (&solved.solution.costs_before, &solved.solution.costs_after);
         let summary = |factor: FactorKind, count: usize, part: fn(&Costs) -> f64| ResidualSummary {
             factor,
@@ -212,8 +192,8 @@ impl Estimator {
             summary(FactorKind::CalibrationPrior, problem.layout.calibration, |costs| costs.calibration),
             summary(FactorKind::MarginalizationPrior, held, |costs| costs.prior),
         ];
-        if resting > 0 {
-            summaries.push(summary(FactorKind::Standstill, resting, |costs| costs.rest));
+        if stationary > 0 {
+            summaries.push(summary(FactorKind::Standstill, stationary, |costs| costs.zero_velocity));
         }
         summaries
     }

@@ -3,9 +3,9 @@
 use nalgebra::DMatrix;
 
 use super::problem::{Estimate, Problem};
-use super::standstill::RestTerm;
 use crate::estimator::factors::projection::{NewestRows, ProjectedRows};
 use crate::estimator::factors::reprojection::CameraPose;
+use crate::estimator::factors::zero_velocity::ZeroVelocityTerm;
 use crate::estimator::state::camera_pose::{self, CameraMaps};
 use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::state::layout::{POSE, VELOCITY_BIAS};
@@ -93,8 +93,8 @@ impl Problem<'_> {
         rows
     }
 
-    /// What standing still says, a row for each term.
-    pub(crate) fn rest_rows(&self, terms: &[RestTerm]) -> DMatrix<f64> {
+    /// Zero-velocity updates, a row for each term.
+    pub(crate) fn zero_velocity_rows(&self, terms: &[ZeroVelocityTerm]) -> DMatrix<f64> {
         let mut rows = DMatrix::zeros(terms.len(), self.layout.total() + 1);
         for (row, term) in terms.iter().enumerate() {
             rows[(row, term.column)] = term.slope;

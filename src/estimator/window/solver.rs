@@ -26,6 +26,14 @@ pub(crate) struct Solution {
     pub(crate) calibration_covariance: DMatrix<f64>,
 }
 
+impl Solution {
+    /// Posterior standard deviations of the calibration's columns, empty without calibration.
+    pub(crate) fn calibration_sigmas(&self) -> Vec<f64> {
+        let variances = self.calibration_covariance.diagonal();
+        variances.iter().map(|variance| variance.max(0.0).sqrt()).collect()
+    }
+}
+
 const FIRST_DAMPING: f64 = 1e-6;
 const LEAST_DAMPING: f64 = 1e-9;
 const MOST_DAMPING: f64 = 1e8;
@@ -120,9 +128,4 @@ fn damped(hessian: &DMatrix<f64>, damping: f64) -> DMatrix<f64> {
         damped[(k, k)] += damping * hessian[(k, k)] + FLOOR;
     }
     damped
-}
-
-/// Standard deviations of the calibration, empty without it.
-pub(crate) fn sigmas(covariance: &DMatrix<f64>) -> DVector<f64> {
-    covariance.diagonal().map(|variance| variance.max(0.0).sqrt())
 }

@@ -1,7 +1,7 @@
 //! When residuals that stay too large are told, and when no longer.
 
 use super::fixture;
-use crate::estimator::window::contradictions::Contradictions;
+use crate::estimator::window::consistency::ConsistencyMonitor;
 use crate::estimator::{EstimatorConfig, EstimatorOptions, FactorKind, ResidualSummary};
 use crate::gimbal::Parameterization;
 use crate::simulation::{SyntheticOptions, synthetic_tracks};
@@ -18,10 +18,10 @@ fn config() -> EstimatorConfig {
 /// Steps, at 20 Hz, in which something is told.
 fn told(mean_squares: impl IntoIterator<Item = f64>) -> Vec<usize> {
     let config = config();
-    let mut watch = Contradictions::default();
+    let mut watch = ConsistencyMonitor::default();
     let mut told = Vec::new();
     for (step, value) in mean_squares.into_iter().enumerate() {
-        let warnings = watch.watch(step as i64 * 50_000_000, &encoder(value), &config);
+        let warnings = watch.observe(step as i64 * 50_000_000, &encoder(value), &config);
         if let [warning] = warnings.as_slice() {
             assert!(warning.contains("joint angles") && warning.ends_with("try timeshift=on"), "{warning}");
             told.push(step);
@@ -53,8 +53,8 @@ fn what_stays_too_large_is_told_after_four_seconds_until_it_is_over() {
 fn only_what_is_held_is_offered_for_a_try() {
     let mut config = EstimatorConfig { estimate_timeshift: true, calibrate: false, ..config() };
     let said = |config: &EstimatorConfig| {
-        let mut watch = Contradictions::default();
-        (0..100).find_map(|step| watch.watch(step * 50_000_000, &encoder(5.0), config).pop()).unwrap()
+        let mut watch = ConsistencyMonitor::default();
+        (0..100).find_map(|step| watch.observe(step * 50_000_000, &encoder(5.0), config).pop()).unwrap()
     };
     assert!(said(&config).ends_with("try calibrate=on"));
     config.calibrate = true;

@@ -1,53 +1,45 @@
-//! Standing still while the window runs: how it is noticed, and what it says about the unknowns.
+//! Detects a stationary vehicle while the window runs.
 //!
-//! A landed vehicle sees no parallax, so that new features get no depth and the old ones are lost one by one; without more
-//! the inertial sensor alone would carry it away. Two witnesses must agree: quiet inertial samples (a hovering multirotor
-//! turns by more), and a picture that stays as it is once rotation is taken out (a gimbal may look around on the ground).
-//!
-//! What follows is soft, as soft as the witnesses are sharp: the place is the same as in the frame before and the velocity is
-//! zero, up to the motion that the picture could not have shown at the distance of the scene.
+//! A landed vehicle sees no parallax, so that new features get no depth and the old ones are lost one by one; without
+//! zero-velocity updates IMU-only propagation would drift. Two criteria must agree: IMU samples of little variance (a hovering
+//! multirotor turns by more), and an image that stays the same once rotation is compensated (a gimbal may turn on the ground).
 
 use std::collections::VecDeque;
 
 use nalgebra::{UnitQuaternion, Vector3};
 
+use crate::estimator::factors::zero_velocity::Stationary;
 use crate::estimator::initialization::bearing::fit_rotation;
-use crate::estimator::state::frame_state::FrameState;
-use crate::estimator::state::layout::Layout;
+use crate::estimator::report::{Event, EventKind};
 use crate::estimator::state::navigation::ImuBias;
-use crate::estimator::window::frames::Frame;
-use crate::estimator::{Event, EventKind, StepInput};
+use crate::estimator::step_input::StepInput;
 use crate::frontend::{FeatureId, TrackedFeature};
 use crate::geometry::seconds_from_ns;
 use crate::sensors::ImuNoise;
 
-/// Both witnesses must have been quiet for this long.
+/// Both criteria must hold for this long.
 const QUIET_NS: i64 = 1_000_000_000;
+
 /// Largest standard deviation of the angular velocity (worst axis, averaged from image to image), beyond the sensor's own.
 const MOST_TURN_SPREAD_RAD_PER_S: f64 = 0.002;
+
 /// Largest mean angular velocity once the known bias is taken off (worst axis).
 const MOST_TURN_RAD_PER_S: f64 = 0.01;
+
 /// Largest standard deviation of the specific force (worst axis, averaged from image to image), beyond the sensor's own.
 const MOST_FORCE_SPREAD_M_PER_S2: f64 = 0.03;
-/// Largest rotation-compensated motion of the picture since the vehicle stands.
-const MOST_PARALLAX_RAD: f64 = 0.004;
-/// Estimated speed above which the window is asked no more: something fast over a far scene shows no parallax either.
-const MOST_SPEED_M_PER_S: f64 = 0.5;
-/// Fewest features that the picture is compared by.
-const LEAST_COMMON: usize = 12;
-/// The sharpest that a picture's rest is believed: a tenth of a pixel at usual focal lengths.
-const LEAST_PARALLAX_RAD: f64 = 2e-4;
 
-/// What is known of a frame's rest.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Rest {
-    /// Since when the vehicle stands where it is.
-    pub(crate) since_ns: i64,
-    /// Motion that the picture could not have shown.
-    pub(crate) position_sigma_m: f64,
-    /// The same as a speed.
-    pub(crate) speed_sigma_m_per_s: f64,
-}
+/// Largest rotation-compensated parallax since the vehicle became stationary.
+const MOST_PARALLAX_RAD: f64 = 0.004;
+
+/// Estimated speed above which nothing is detected: something fast over a far scene shows no parallax either.
+const MOST_SPEED_M_PER_S: f64 = 0.5;
+
+/// Fewest features in common with the reference image.
+const LEAST_COMMON: usize = 12;
+
+/// Smallest parallax that an image is believed to resolve: a tenth of a pixel at usual focal lengths.
+const LEAST_PARALLAX_RAD: f64 = 2e-4;
 
 /// Angular velocity and specific force from one image to the next.
 #[derive(Clone, Copy, Debug)]
@@ -58,75 +50,75 @@ struct Interval {
     specific_force_m_per_s2: Vector3<f64>,
 }
 
-/// The picture that later ones are compared with.
+/// The image that later ones are compared with.
 #[derive(Clone, Debug)]
 struct Reference {
     bearings: Vec<(FeatureId, Vector3<f64>)>,
     imu_from_camera: UnitQuaternion<f64>,
 }
 
-/// Watches for rest, image by image.
+/// Detects a stationary vehicle, image by image.
 #[derive(Clone, Debug)]
-pub(crate) struct RestWatch {
+pub(crate) struct StationaryDetector {
     /// Of the last second and a little more.
     intervals: VecDeque<Interval>,
     reference: Option<Reference>,
-    /// Since when the picture has not moved.
+    /// Since when the image has not moved.
     unmoved_since_ns: i64,
-    /// Since when the vehicle stands, once that is known.
-    resting_since_ns: Option<i64>,
-    /// How long the picture must have been unmoved. Where it moved although the inertial samples were quiet, something
-    /// creeps: then it must stay unmoved for twice as long as that took.
-    asked_ns: i64,
+    /// Since when the vehicle is stationary, once that is image.
+    stationary_since_ns: Option<i64>,
+    /// How long the image must have been unmoved. Where it moved although the IMU samples were quiet, the vehicle creeps:
+    /// then it must stay unmoved for twice as long as that took.
+    required_ns: i64,
 }
 
-impl Default for RestWatch {
+impl Default for StationaryDetector {
     fn default() -> Self {
         Self {
             intervals: VecDeque::new(),
             reference: None,
             unmoved_since_ns: 0,
-            resting_since_ns: None,
-            asked_ns: QUIET_NS,
+            stationary_since_ns: None,
+            required_ns: QUIET_NS,
         }
     }
 }
 
-/// What the window knows when a new image comes.
+/// A new image, and what the window has estimated before it.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Known<'a> {
-    /// What the camera that is asked has seen.
+pub(crate) struct Observed<'a> {
+    /// The features of the leading camera.
     pub(crate) features: &'a [TrackedFeature],
     pub(crate) noise: &'a ImuNoise,
     pub(crate) bias: &'a ImuBias,
     pub(crate) speed_m_per_s: f64,
     pub(crate) imu_from_camera: UnitQuaternion<f64>,
-    /// How far the scene usually is.
+    /// Usual distance of the scene.
     pub(crate) distance_m: f64,
 }
 
-impl RestWatch {
-    /// Takes in an image; when the vehicle stands still there, what that says, and the event that tells of it.
-    pub(crate) fn observe(&mut self, input: &StepInput<'_>, known: &Known<'_>) -> Option<(Rest, Event)> {
+impl StationaryDetector {
+    /// Takes in an image; a zero-velocity update and an event when the vehicle is stationary there.
+    pub(crate) fn observe(&mut self, input: &StepInput<'_>, image: &Observed<'_>) -> Option<(Stationary, Event)> {
         self.take_interval(input);
         let before_ns = self.unmoved_since_ns;
-        let parallax_rad = self.compare_picture(input.stamp_ns, known);
-        let spread = self.spread(input.stamp_ns, known);
-        let quiet = spread.as_ref().is_some_and(Spread::is_quiet) && known.speed_m_per_s <= MOST_SPEED_M_PER_S;
+        let parallax_rad = self.compare_image(input.stamp_ns, image);
+        let spread = self.spread(input.stamp_ns, image);
+        let quiet = spread.as_ref().is_some_and(Spread::is_quiet) && image.speed_m_per_s <= MOST_SPEED_M_PER_S;
         let unmoved_ns = input.stamp_ns - self.unmoved_since_ns;
         if !quiet {
-            self.asked_ns = QUIET_NS;
+            self.required_ns = QUIET_NS;
         } else if self.unmoved_since_ns > before_ns {
-            self.asked_ns = self.asked_ns.max(2 * (input.stamp_ns - before_ns));
+            self.required_ns = self.required_ns.max(2 * (input.stamp_ns - before_ns));
         }
-        let resting = quiet && unmoved_ns >= self.asked_ns;
-        let (Some(spread), Some(parallax_rad), true) = (spread, parallax_rad, resting) else {
-            self.resting_since_ns = None;
+        let stationary = quiet && unmoved_ns >= self.required_ns;
+        let (Some(spread), Some(parallax_rad), true) = (spread, parallax_rad, stationary) else {
+            self.stationary_since_ns = None;
             return None;
         };
         let quiet_since_ns = self.unmoved_since_ns.max(input.stamp_ns - QUIET_NS);
-        let since_ns = *self.resting_since_ns.get_or_insert(quiet_since_ns);
-        let position_sigma_m = parallax_rad.max(LEAST_PARALLAX_RAD) * known.distance_m;
+        let since_ns = *self.stationary_since_ns.get_or_insert(quiet_since_ns);
+        let position_sigma_m = parallax_rad.max(LEAST_PARALLAX_RAD) * image.distance_m;
         let event = Event {
             kind: EventKind::Standstill,
             message: format!(
@@ -143,8 +135,8 @@ impl RestWatch {
             value: Some(parallax_rad),
             threshold: Some(MOST_PARALLAX_RAD),
         };
-        let speed_sigma_m_per_s = position_sigma_m / seconds_from_ns(QUIET_NS);
-        Some((Rest { since_ns, position_sigma_m, speed_sigma_m_per_s }, event))
+        let velocity_sigma_m_per_s = position_sigma_m / seconds_from_ns(QUIET_NS);
+        Some((Stationary { since_ns, position_sigma_m, velocity_sigma_m_per_s }, event))
     }
 
     fn take_interval(&mut self, input: &StepInput<'_>) {
@@ -175,9 +167,9 @@ impl RestWatch {
         }
     }
 
-    /// How far the picture has moved since the vehicle may be standing; a picture that has moved too far begins anew.
-    fn compare_picture(&mut self, stamp_ns: i64, known: &Known<'_>) -> Option<f64> {
-        let (features, imu_from_camera) = (known.features, known.imu_from_camera);
+    /// Rotation-compensated parallax against the reference image; an image that has moved too far becomes the reference.
+    fn compare_image(&mut self, stamp_ns: i64, image: &Observed<'_>) -> Option<f64> {
+        let (features, imu_from_camera) = (image.features, image.imu_from_camera);
         let parallax_rad = self.reference.as_ref().and_then(|reference| {
             let pairs: Vec<(Vector3<f64>, Vector3<f64>)> = reference
                 .bearings
@@ -190,13 +182,13 @@ impl RestWatch {
             if pairs.len() < LEAST_COMMON {
                 return None;
             }
-            // The vehicle's own turn is left to the gyroscope: at rest there is none.
+            // The vehicle's own rotation is left to the gyroscope: a stationary vehicle has none.
             let guess = imu_from_camera.inverse() * reference.imu_from_camera;
             Some(fit_rotation(&pairs, &guess)?.median_parallax_rad)
         });
         let moved = parallax_rad.is_none_or(|parallax_rad| parallax_rad > MOST_PARALLAX_RAD);
-        // Tracks end in a picture at rest, too: the rest goes on from the newest picture before too few are left.
-        let fading = self.reference.is_some() && parallax_rad.is_none() && self.resting_since_ns.is_some();
+        // Tracks end in a stationary image, too: detection goes on from the newest image before too few are left.
+        let fading = self.reference.is_some() && parallax_rad.is_none() && self.stationary_since_ns.is_some();
         if moved {
             let bearings = features.iter().map(|feature| (feature.id, feature.bearing)).collect();
             self.reference = Some(Reference { bearings, imu_from_camera });
@@ -207,8 +199,8 @@ impl RestWatch {
         if fading && features.len() >= LEAST_COMMON { Some(MOST_PARALLAX_RAD) } else { parallax_rad }
     }
 
-    /// Spread of the last second's samples, `None` while that much is not there.
-    fn spread(&self, stamp_ns: i64, known: &Known<'_>) -> Option<Spread> {
+    /// Standard deviations of the last second's samples, `None` while that much is not there.
+    fn spread(&self, stamp_ns: i64, image: &Observed<'_>) -> Option<Spread> {
         let first = self.intervals.front()?;
         let begin_ns = first.end_ns - (first.duration_s * 1e9) as i64;
         if begin_ns > stamp_ns - QUIET_NS || self.intervals.len() < 4 {
@@ -221,10 +213,10 @@ impl RestWatch {
         let (_, force) = mean_and_spread(self.intervals.iter().map(|i| i.specific_force_m_per_s2));
         Some(Spread {
             turn,
-            turn_limit: MOST_TURN_SPREAD_RAD_PER_S.hypot(own(known.noise.gyroscope_noise_density)),
-            mean_turn: (turn_mean - known.bias.gyroscope_rad_per_s).amax(),
+            turn_limit: MOST_TURN_SPREAD_RAD_PER_S.hypot(own(image.noise.gyroscope_noise_density)),
+            mean_turn: (turn_mean - image.bias.gyroscope_rad_per_s).amax(),
             force,
-            force_limit: MOST_FORCE_SPREAD_M_PER_S2.hypot(own(known.noise.accelerometer_noise_density)),
+            force_limit: MOST_FORCE_SPREAD_M_PER_S2.hypot(own(image.noise.accelerometer_noise_density)),
         })
     }
 }
@@ -251,47 +243,4 @@ fn mean_and_spread(values: impl Iterator<Item = Vector3<f64>> + Clone) -> (Vecto
     let mean = values.clone().sum::<Vector3<f64>>() / count;
     let squares: Vector3<f64> = values.map(|value| (value - mean).component_mul(&(value - mean))).sum();
     (mean, (squares / count).max().sqrt())
-}
-
-/// A scalar that rest says is zero: an unknown, or its difference from the one of the frame before.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct RestTerm {
-    /// Column that it rises with.
-    pub(crate) column: usize,
-    /// Column that it falls with.
-    pub(crate) against: Option<usize>,
-    /// Divided by its standard deviation.
-    pub(crate) residual: f64,
-    /// One over the standard deviation.
-    pub(crate) slope: f64,
-}
-
-/// The velocity of a resting frame is zero.
-pub(crate) fn speed_terms(layout: Layout, frame: &Frame, slot: usize, state: &FrameState) -> Vec<RestTerm> {
-    let Some(rest) = &frame.rest else { return Vec::new() };
-    let slope = 1.0 / rest.speed_sigma_m_per_s;
-    let velocity = state.navigation.velocity_m_per_s;
-    let column = layout.velocity_bias(slot).start;
-    (0..3)
-        .map(|axis| RestTerm { column: column + axis, against: None, residual: velocity[axis] * slope, slope })
-        .collect()
-}
-
-/// A resting frame is where the frame before it in the window is, if that one belongs to the same rest.
-pub(crate) fn place_terms(layout: Layout, frames: &[Frame], slot: usize, states: &[FrameState]) -> Vec<RestTerm> {
-    let Some(rest) = frames[slot].rest.filter(|rest| slot > 0 && frames[slot - 1].stamp_ns >= rest.since_ns) else {
-        return Vec::new();
-    };
-    let slope = 1.0 / rest.position_sigma_m;
-    let place = |slot: usize| states[slot].navigation.world_from_imu.translation_m;
-    let moved = place(slot) - place(slot - 1);
-    let column = |slot: usize, axis: usize| layout.pose(slot).start + 3 + axis;
-    (0..3)
-        .map(|axis| RestTerm {
-            column: column(slot, axis),
-            against: Some(column(slot - 1, axis)),
-            residual: moved[axis] * slope,
-            slope,
-        })
-        .collect()
 }

@@ -38,7 +38,7 @@ const WATCHED: [Watched; 2] = [
 
 /// The running means, one for each of [`WATCHED`].
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Contradictions {
+pub(crate) struct ConsistencyMonitor {
     last_ns: Option<i64>,
     means: [Mean; WATCHED.len()],
 }
@@ -59,9 +59,9 @@ impl Mean {
     }
 }
 
-impl Contradictions {
+impl ConsistencyMonitor {
     /// Takes in the residuals of a solved window; what contradicts, in words, for as long as it does.
-    pub(crate) fn watch(
+    pub(crate) fn observe(
         &mut self,
         stamp_ns: i64,
         residuals: &[ResidualSummary],

@@ -1,0 +1,170 @@
+//! The first window: made from a solution of the initialization and solved several times, outliers taken out in between.
+
+use nalgebra::{UnitQuaternion, Vector3};
+
+use super::initializer::Initializer;
+use super::mount_fit::fit_mounts;
+use super::{InitializationOrigin, InitializationSolution};
+use crate::estimator::factors::preintegration::Preintegration;
+use crate::estimator::factors::prior::StartPrior;
+use crate::estimator::report::{Event, EventKind, StepReport};
+use crate::estimator::setup::Setup;
+use crate::estimator::state::calibrations::MAIN;
+use crate::estimator::state::frame_state::{FrameState, Rates};
+use crate::estimator::state::navigation::{ImuBias, NavigationState};
+use crate::estimator::step_input::StepInput;
+use crate::estimator::window::features::{self, FeatureMap};
+use crate::estimator::window::frames::{Frame, Frames};
+use crate::estimator::window::sliding_window::SlidingWindow;
+use crate::estimator::window::window_state::WindowState;
+use crate::frontend::TrackedFeature;
+use crate::geometry::{RigidTransform, so3};
+
+/// Most iterations of the solves of the first window: the first from far, the later ones after outliers have been taken out.
+const FIRST_SOLVES: [usize; 3] = [15, 10, 5];
+
+/// A window made from a solution, before its first solve.
+pub(super) struct FirstWindow<'a> {
+    solution: &'a InitializationSolution,
+    window: SlidingWindow,
+    /// By frame of the window and camera, the features of its image.
+    observed: Vec<Vec<Vec<TrackedFeature>>>,
+}
+
+impl<'a> FirstWindow<'a> {
+    /// The window of the newest views of a solution, with the features of the leading camera; `None` when none of them is a
+    /// kept frame. The initializer's frames are used up.
+    pub(super) fn new(
+        initializer: &mut Initializer,
+        setup: &Setup,
+        solution: &'a InitializationSolution,
+    ) -> Option<Self> {
+        let options = &setup.config.options;
+        let mut calibration = initializer.calibration.clone();
+        let leading = calibration.leading();
+        let joints = calibration.of(MAIN).joint_count();
+        let world = world_from_solution(solution, initializer.resume_at.as_ref());
+        let room = options.window * options.first_window_factor;
+        let views = &solution.frames[solution.frames.len().saturating_sub(room + 1)..];
+        let empty = || Preintegration::new(setup.imu_noise, solution.bias);
+        let mut imu = empty();
+        let mut mounts = Vec::new();
+        let mut observed = Vec::new();
+        let mut features = vec![FeatureMap::new(); calibration.cameras()];
+        let mut frames: Option<Frames> = None;
+        for waiting in std::mem::take(&mut initializer.waiting) {
+            imu.extend(&waiting.imu);
+            let Some(view) = views.iter().find(|view| view.frame_index == waiting.index) else { continue };
+            let since_last = std::mem::replace(&mut imu, empty());
+            let motion = if frames.is_some() { since_last } else { empty() };
+            let navigation = NavigationState {
+                world_from_imu: world * view.world_from_imu,
+                velocity_m_per_s: world.rotation * view.velocity_m_per_s,
+                bias: solution.bias,
+            };
+            let joints_rad = waiting.initial_joints_rad(joints);
+            let frame = Frame {
+                index: waiting.index,
+                stamp_ns: waiting.stamp_ns,
+                state: FrameState { navigation, joints_rad, rates: Rates::at(&waiting.imu, waiting.encoder.as_ref()) },
+                first_estimate: None,
+                encoder: waiting.encoder,
+                stationary: None,
+                keyframe: true,
+                motion_information: motion.square_root_information(),
+                motion,
+            };
+            match &mut frames {
+                None => frames = Some(Frames::new(frame)),
+                Some(frames) => frames.push(frame),
+            }
+            mounts.push(view.imu_from_camera);
+            features::observe(&mut features[leading], mounts.len() - 1, &waiting.features[leading]);
+            observed.push(waiting.features);
+        }
+        let mut frames = frames?;
+        frames.newest_mut().keyframe = false;
+        if leading == MAIN {
+            fit_mounts(calibration.of_mut(MAIN), &mut frames, &mounts);
+        }
+        let start = StartPrior {
+            reference: frames.oldest().state.clone(),
+            bias: ImuBias {
+                gyroscope_rad_per_s: solution.bias.gyroscope_rad_per_s,
+                accelerometer_m_per_s2: Vector3::zeros(),
+            },
+            accelerometer_bias_sigma: options.accelerometer_bias_sigma,
+            gyroscope_bias_sigma: options.gyroscope_bias_sigma,
+        };
+        let state = WindowState { frames, features, calibration, prior: None, start: Some(start) };
+        Some(Self { solution, window: SlidingWindow::new(state), observed })
+    }
+
+    /// Solves the window, outliers taken out in between; returns it with its report.
+    pub(super) fn solve(
+        mut self,
+        setup: &Setup,
+        input: &StepInput<'_>,
+        most_scale_sigma: f64,
+        events: &mut Vec<Event>,
+    ) -> (SlidingWindow, StepReport) {
+        let options = &setup.config.options;
+        let mut solved = self.window.state.solve(setup, FIRST_SOLVES[0]);
+        if self.add_other_cameras() {
+            self.window.state.drop_rejected(&solved, options, events);
+            solved = self.window.state.solve(setup, FIRST_SOLVES[0]);
+        }
+        for iterations in &FIRST_SOLVES[1..] {
+            self.window.state.drop_rejected(&solved, options, events);
+            solved = self.window.state.solve(setup, *iterations);
+        }
+        let window = &mut self.window.state;
+        if let Some(start) = &mut window.start {
+            start.reference = window.frames.oldest().state.clone();
+        }
+        let (kind, how) = match self.solution.origin {
+            InitializationOrigin::FromMotion => (EventKind::InitializedFromMotion, "motion"),
+            InitializationOrigin::FromStandstill => (EventKind::InitializedFromStandstill, "standstill"),
+        };
+        let scale_sigma = self.solution.diagnostics.scale_sigma;
+        let message = format!(
+            "initialized from {how}: {} frames, {} landmarks, scale known to {:.1} %",
+            self.solution.frames.len(),
+            self.solution.landmarks.len(),
+            100.0 * scale_sigma
+        );
+        events.push(Event::decided(kind, message, scale_sigma, most_scale_sigma));
+        events.push(window.choose_keyframe(options));
+        let report = self.window.report(setup, input, &mut solved);
+        self.window.state.drop_rejected(&solved, options, events);
+        self.window.state.make_room(setup, events);
+        (self.window, report)
+    }
+
+    /// Adds the features of the cameras beside the leading one, and says whether there are any such cameras: their given
+    /// extrinsics may be far off, so that they do not take part in the first solve.
+    fn add_other_cameras(&mut self) -> bool {
+        let window = &mut self.window.state;
+        let leading = window.calibration.leading();
+        for (slot, by_camera) in self.observed.iter().enumerate() {
+            for (camera, features) in by_camera.iter().enumerate().filter(|(camera, _)| *camera != leading) {
+                features::observe(&mut window.features[camera], slot, features);
+            }
+        }
+        window.calibration.cameras() > 1
+    }
+}
+
+/// Where the solution's world lies: at the origin, or with position and yaw of the window before a failure.
+fn world_from_solution(solution: &InitializationSolution, resume_at: Option<&RigidTransform>) -> RigidTransform {
+    let (Some(resume), Some(first)) = (resume_at, solution.frames.first()) else {
+        return RigidTransform::identity();
+    };
+    let yaw = |rotation: &UnitQuaternion<f64>| {
+        let forward = rotation * Vector3::x();
+        forward.y.atan2(forward.x)
+    };
+    let turn = yaw(&resume.rotation) - yaw(&first.world_from_imu.rotation);
+    let rotation = so3::exp(&Vector3::new(0.0, 0.0, turn));
+    RigidTransform::new(rotation, resume.translation_m - rotation * first.world_from_imu.translation_m)
+}

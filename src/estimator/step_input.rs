@@ -1,0 +1,43 @@
+//! What one image brings to the estimator.
+
+use crate::frontend::{TrackedFeature, TrackedFrame};
+use crate::sensors::{ImuSample, JointAngles};
+
+/// What one image brings to the estimator.
+#[derive(Clone, Debug)]
+pub struct StepInput<'a> {
+    /// Number of the image in its camera's stream.
+    pub frame_index: usize,
+    /// Header stamp of the image since the log began.
+    pub stamp_ns: i64,
+    /// IMU samples from the previous image's stamp to this one's, both ends included and interpolated.
+    pub imu: &'a [ImuSample],
+    /// Encoder angles at the stamp with their standard deviations, `None` without encoders.
+    pub joint_angles: Option<&'a JointAngles>,
+    /// The tracked features; none where the main camera has no image at this instant.
+    pub tracks: &'a TrackedFrame,
+    /// Those of [`crate::estimator::EstimatorConfig::rigid_cameras`] at the same instant, in their order; none where an image
+    /// is missing.
+    pub rigid_tracks: &'a [&'a TrackedFrame],
+}
+
+impl StepInput<'_> {
+    /// The features that a camera observes, the main camera being number 0.
+    pub(crate) fn features(&self, camera: usize) -> &[TrackedFeature] {
+        match camera.checked_sub(1) {
+            None => &self.tracks.features,
+            Some(rigid) => self.rigid_tracks.get(rigid).map_or(&[], |tracks| &tracks.features),
+        }
+    }
+
+    /// The encoder angles of so many joints, `None` where one is missing, not finite or without a standard deviation.
+    pub(crate) fn encoder_angles(&self, joints: usize) -> Option<&JointAngles> {
+        self.joint_angles.filter(|angles| {
+            angles.angles_rad.len() == joints
+                && angles.sigmas_rad.len() == joints
+                && angles.lasting_sigmas_rad.len() == joints
+                && angles.angles_rad.iter().all(|angle| angle.is_finite())
+                && angles.sigmas_rad.iter().all(|sigma| sigma.is_finite() && *sigma > 0.0)
+        })
+    }
+}

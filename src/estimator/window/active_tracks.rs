@@ -1,0 +1,45 @@
+//! The features that take part in a solve.
+
+use super::features::{FeatureMap, Observation};
+use crate::estimator::factors::reprojection::Landmark;
+use crate::estimator::factors::visual::{Sighting, Track};
+use crate::frontend::FeatureId;
+
+/// The features of one camera that take part, in the order of their ids.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct ActiveTracks {
+    pub(crate) ids: Vec<FeatureId>,
+    pub(crate) tracks: Vec<Track>,
+    pub(crate) landmarks: Vec<Landmark>,
+}
+
+impl ActiveTracks {
+    /// The triangulated features with at least two observations.
+    pub(crate) fn new(features: &FeatureMap) -> Self {
+        let mut active = Self::default();
+        for (id, feature) in features {
+            let Some(landmark) = feature.landmark else { continue };
+            if feature.observations.len() < 2 {
+                continue;
+            }
+            let sighting = |observation: &Observation| Sighting { slot: observation.slot, uv_px: observation.uv_px };
+            active.ids.push(*id);
+            active.tracks.push(Track { sightings: feature.observations.iter().map(sighting).collect() });
+            active.landmarks.push(landmark);
+        }
+        active
+    }
+
+    /// Those whose tracks are wanted.
+    pub(crate) fn filtered(self, wanted: impl Fn(&Track) -> bool) -> Self {
+        let mut kept = Self::default();
+        for ((id, track), landmark) in self.ids.into_iter().zip(self.tracks).zip(self.landmarks) {
+            if wanted(&track) {
+                kept.ids.push(id);
+                kept.tracks.push(track);
+                kept.landmarks.push(landmark);
+            }
+        }
+        kept
+    }
+}

@@ -1,0 +1,33 @@
+//! The static calibration as the report has it: parameters, values and standard deviations of its columns.
+
+use crate::estimator::report::CalibrationEstimate;
+use crate::estimator::setup::Setup;
+use crate::estimator::state::calibration::Calibration;
+use crate::estimator::state::calibrations::{Calibrations, MAIN};
+
+/// The static calibration with the standard deviations of its columns, not-a-number while there are none.
+pub(crate) fn calibration_estimate(setup: &Setup, calibration: &Calibrations, sigmas: &[f64]) -> CalibrationEstimate {
+    let cameras = || (0..calibration.cameras()).map(|camera| calibration.of(camera));
+    let parameters = calibration.parameters();
+    let chain = calibration.of(MAIN).chain();
+    let sigmas = if calibration.dof() == 0 {
+        vec![0.0; parameters.len()]
+    } else if sigmas.len() == parameters.len() {
+        sigmas.to_vec()
+    } else {
+        vec![f64::NAN; parameters.len()]
+    };
+    let rigid_cameras = setup.config.rigid_cameras.iter().zip(cameras().skip(1));
+    CalibrationEstimate {
+        parameterization: chain.parameterization().name().to_owned(),
+        parameters,
+        values: cameras().flat_map(Calibration::values).collect(),
+        sigmas,
+        prior_sigmas: cameras().flat_map(Calibration::prior_sigmas).collect(),
+        classical: chain.to_classical(),
+        margins: chain.margins(),
+        rigid_cameras: rigid_cameras
+            .map(|(camera, calibration)| (camera.key.clone(), calibration.imu_from_camera(&[])))
+            .collect(),
+    }
+}

@@ -1,0 +1,97 @@
+//! What tells that the window has failed, or soon may.
+
+use super::features::FeatureMap;
+use super::frames::Frame;
+use super::window_state::WindowState;
+use crate::estimator::options::EstimatorOptions;
+use crate::estimator::state::navigation::NavigationState;
+use crate::estimator::{Event, EventKind};
+use crate::geometry::seconds_from_ns;
+
+/// Watches whether enough landmarks are in view.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct LandmarkWatch {
+    /// Since when there have been too few.
+    blind_since_ns: Option<i64>,
+}
+
+impl LandmarkWatch {
+    /// Takes in a solved window; an event when the landmarks in view become too few.
+    pub(crate) fn observe(&mut self, window: &WindowState, options: &EstimatorOptions) -> Option<Event> {
+        let least = options.min_landmarks;
+        let slot = window.frames.newest_slot();
+        let observed = window
+            .features
+            .iter()
+            .flat_map(FeatureMap::values)
+            .filter(|feature| feature.landmark.is_some() && feature.observation(slot).is_some())
+            .count();
+        let newest = window.frames.newest();
+        // A stationary vehicle needs no landmarks to know where it is.
+        if observed >= least || newest.stationary.is_some() {
+            self.blind_since_ns = None;
+            return None;
+        }
+        if self.blind_since_ns.is_some() {
+            return None;
+        }
+        self.blind_since_ns = Some(newest.stamp_ns);
+        let message = format!(
+            "{observed} landmarks in view, at least {least} are needed: until there are more, the inertial sensor alone \
+             tells the motion"
+        );
+        Some(Event::decided(EventKind::MeasurementMissing, message, observed as f64, least as f64))
+    }
+
+    /// How long there have been too few, in seconds.
+    fn blind_s(&self, newest_ns: i64) -> f64 {
+        self.blind_since_ns.map_or(0.0, |since_ns| seconds_from_ns(newest_ns - since_ns))
+    }
+}
+
+/// Why the window has failed, against the prediction of the newest frame's state; `None` while it has not.
+pub(crate) fn failure(
+    newest: &Frame,
+    predicted: &NavigationState,
+    landmarks: &LandmarkWatch,
+    options: &EstimatorOptions,
+) -> Option<Event> {
+    let state = newest.state.navigation;
+    let checks = [
+        (
+            "the accelerometer's bias is out of bounds, m/s²",
+            state.bias.accelerometer_m_per_s2.norm(),
+            options.max_accelerometer_bias,
+        ),
+        (
+            "the gyroscope's bias is out of bounds, rad/s",
+            state.bias.gyroscope_rad_per_s.norm(),
+            options.max_gyroscope_bias,
+        ),
+        ("the speed is out of bounds, m/s", state.velocity_m_per_s.norm(), options.max_speed),
+        (
+            "the newest position was corrected by too much, m",
+            (state.world_from_imu.translation_m - predicted.world_from_imu.translation_m).norm(),
+            options.max_position_correction_m,
+        ),
+        (
+            "too few landmarks have been in view for too long, s",
+            landmarks.blind_s(newest.stamp_ns),
+            options.max_blind_s,
+        ),
+    ];
+    let (reason, value, limit) = checks.into_iter().find(|(_, value, limit)| !value.is_finite() || value > limit)?;
+    Some(Event::decided(EventKind::Failure, format!("{reason}: {value:.3} against {limit:.3}"), value, limit))
+}
+
+/// IMU samples of the newest interval that were at the end of the sensor's range.
+pub(crate) fn saturation(newest: &Frame) -> Option<Event> {
+    let (saturated, count) = (newest.motion.saturated_samples(), newest.motion.samples().len());
+    (saturated > 0).then(|| {
+        let message = format!(
+            "the inertial sensor is saturated in {saturated} of {count} samples: an axis repeats a large value; it \
+             counts for little there"
+        );
+        Event::decided(EventKind::MeasurementMissing, message, saturated as f64, 0.0)
+    })
+}

@@ -1,0 +1,91 @@
+//! Which frames become keyframes.
+
+use super::features;
+use super::window_state::WindowState;
+use crate::estimator::options::EstimatorOptions;
+use crate::estimator::state::calibrations::MAIN;
+use crate::estimator::{Event, EventKind};
+use crate::geometry::seconds_from_ns;
+
+/// A stationary vehicle gets a keyframe this often, so that IMU intervals stay short enough to be integrated again.
+const KEYFRAME_AT_REST_NS: i64 = 5_000_000_000;
+
+/// Whether the newest frame becomes a keyframe, with the value that decides.
+struct Decision {
+    keyframe: bool,
+    event: Event,
+}
+
+impl Decision {
+    fn new(keyframe: bool, message: impl Into<String>, value: f64, threshold: f64) -> Self {
+        Self { keyframe, event: Event::decided(EventKind::KeyframeChosen, message, value, threshold) }
+    }
+}
+
+impl WindowState {
+    /// Decides whether the newest frame becomes a keyframe.
+    pub(crate) fn choose_keyframe(&mut self, options: &EstimatorOptions) -> Event {
+        let decision = self.keyframe_decision(options);
+        self.frames.newest_mut().keyframe = decision.keyframe;
+        decision.event
+    }
+
+    fn keyframe_decision(&self, options: &EstimatorOptions) -> Decision {
+        let newest = self.frames.newest_slot();
+        let Some(last) = (0..newest).rev().find(|slot| self.frames[*slot].keyframe) else {
+            return Decision::new(true, "the first keyframe of the window", 0.0, 0.0);
+        };
+        if let Some(stationary) = &self.frames[newest].stationary {
+            let age_ns = self.frames[newest].stamp_ns - self.frames[last].stamp_ns;
+            let age_s = seconds_from_ns(age_ns);
+            if self.frames[last].stamp_ns < stationary.since_ns {
+                return Decision::new(true, "keyframe: the first at rest", age_s, 0.0);
+            }
+            let limit_s = seconds_from_ns(KEYFRAME_AT_REST_NS);
+            let message = "at rest: only time makes a keyframe, s";
+            return Decision::new(age_ns >= KEYFRAME_AT_REST_NS, message, age_s, limit_s);
+        }
+        // Whichever camera asks for a keyframe gets it; one without an image has nothing to say.
+        let observed = |camera: usize| {
+            let features = self.features[camera].values();
+            (camera, features.filter(|feature| feature.observation(newest).is_some()).count())
+        };
+        let mut decisions: Vec<Decision> = (0..self.features.len())
+            .map(observed)
+            .filter(|(_, observed)| *observed > 0)
+            .map(|(camera, observed)| self.keyframe_by_image(options, camera, last, observed))
+            .collect();
+        if decisions.is_empty() {
+            return self.keyframe_by_image(options, MAIN, last, 0);
+        }
+        let first = decisions.iter().position(|decision| decision.keyframe).unwrap_or(0);
+        decisions.swap_remove(first)
+    }
+
+    /// Whether one camera asks for a keyframe, by what it has in common with the last one; `observed` features are in its
+    /// newest image.
+    fn keyframe_by_image(&self, options: &EstimatorOptions, camera: usize, last: usize, observed: usize) -> Decision {
+        let newest = self.frames.newest_slot();
+        let poses = self.camera_poses(camera);
+        let (parallax, common) = features::compensated_parallax(&self.features[camera], &poses, last, newest);
+        let new_ratio = 1.0 - common as f64 / observed.max(1) as f64;
+        if common < options.keyframe_min_tracked {
+            let limit = options.keyframe_min_tracked as f64;
+            let message = format!("keyframe: only {common} features in common with the last one");
+            return Decision::new(true, message, common as f64, limit);
+        }
+        if new_ratio > options.keyframe_new_share {
+            let message = format!("keyframe: {:.0} % of the features are new since the last one", 100.0 * new_ratio);
+            return Decision::new(true, message, new_ratio, options.keyframe_new_share);
+        }
+        let limit = options.keyframe_parallax_rad;
+        let chosen = parallax >= limit;
+        let verdict = if chosen { "keyframe" } else { "no keyframe" };
+        let message = format!(
+            "{verdict}: parallax against the last one {:.2}° of {:.2}°, rotation taken out",
+            parallax.to_degrees(),
+            limit.to_degrees()
+        );
+        Decision::new(chosen, message, parallax, limit)
+    }
+}

@@ -1,0 +1,118 @@
+//! Which frames leave the window, and what they leave behind.
+
+use super::active_tracks::ActiveTracks;
+use super::features::{self, FeatureMap};
+use super::marginalization;
+use super::window_state::WindowState;
+use crate::estimator::options::{EstimatorOptions, LandmarkModel, TrackContinuation};
+use crate::estimator::setup::Setup;
+use crate::estimator::{Event, EventKind};
+
+/// A window that is larger than usual shrinks by one frame per keyframe.
+const MOST_MARGINALIZED_AT_ONCE: usize = 2;
+
+impl WindowState {
+    /// Makes room for the next frame: the second-newest is dropped when it is no keyframe, else the oldest of a full window
+    /// is marginalized.
+    pub(crate) fn make_room(&mut self, setup: &Setup, events: &mut Vec<Event>) {
+        let newest = self.frames.newest_slot();
+        if newest >= 2 && !self.frames[newest - 1].keyframe {
+            let message = format!("image {} dropped: no keyframe", self.frames[newest - 1].index);
+            events.push(Event::new(EventKind::SecondNewestDropped, message));
+            self.drop_frame(setup, newest - 1);
+            return;
+        }
+        for _ in 0..MOST_MARGINALIZED_AT_ONCE {
+            let room = self.room(&setup.config.options);
+            if self.frames.len() <= room {
+                break;
+            }
+            let message = format!("image {} marginalized: the window is full", self.frames.oldest().index);
+            let count = self.frames.len() as f64;
+            events.push(Event::decided(EventKind::OldestMarginalized, message, count, room as f64));
+            self.marginalize_oldest(setup);
+        }
+    }
+
+    /// How many frames may stay. The first window is larger: what is marginalized is linearized for good, and the chain has
+    /// to come near its true values first.
+    pub(crate) fn room(&self, options: &EstimatorOptions) -> usize {
+        if self.prior.is_none() { options.window * options.first_window_factor } else { options.window }
+    }
+
+    /// Drops the frame at a slot before the newest one: its encoder angles and its IMU samples go to the frame after it.
+    fn drop_frame(&mut self, setup: &Setup, gone: usize) {
+        if self.prior.as_ref().is_none_or(|prior| !prior.holds_frame(gone)) {
+            self.carry_encoder(setup, gone, gone + 1);
+        }
+        let estimate = self.estimate(vec![Vec::new(); self.features.len()]);
+        self.prior = marginalization::dropped(&self.problem(setup, &[]), &estimate, gone);
+        self.drop_observations(gone);
+        self.frames.drop_before_newest(gone);
+        self.renumber_prior(gone);
+    }
+
+    fn marginalize_oldest(&mut self, setup: &Setup) {
+        let newest = self.frames.newest_slot();
+        let continuation = setup.config.options.track_continuation;
+        let leaving: Vec<ActiveTracks> = self
+            .active_tracks()
+            .into_iter()
+            .map(|active| {
+                active.filtered(|track| {
+                    let continues = track.sightings.last().is_some_and(|last| last.slot == newest);
+                    let anchored = track.sightings.first().is_some_and(|first| first.slot == 0);
+                    anchored && !(continues && continuation == TrackContinuation::ForgetAnchor)
+                })
+            })
+            .collect();
+        let estimate = self.estimate(leaving.iter().map(|active| active.landmarks.clone()).collect());
+        let prior = marginalization::oldest(&self.problem(setup, &leaving), &estimate);
+
+        for (features, active) in self.features.iter_mut().zip(&leaving) {
+            for (id, track) in active.ids.iter().zip(&active.tracks) {
+                let ended = track.sightings.last().is_none_or(|last| last.slot != newest);
+                if ended || continuation == TrackContinuation::UseOnce {
+                    features.remove(id);
+                }
+            }
+        }
+        self.prior = prior;
+        self.start = None;
+        self.drop_observations(0);
+        if setup.config.options.landmark_model == LandmarkModel::InverseDistance {
+            self.face_measured_bearings();
+        }
+        self.frames.remove_oldest();
+        self.renumber_prior(0);
+    }
+
+    /// Takes the observations of a frame out of all features.
+    fn drop_observations(&mut self, gone: usize) {
+        for camera in 0..self.features.len() {
+            let poses = self.camera_poses(camera);
+            features::drop_frame(&mut self.features[camera], gone, &poses);
+        }
+    }
+
+    /// Landmarks that moved to another anchor lie on the bearing that it measured.
+    fn face_measured_bearings(&mut self) {
+        for feature in self.features.iter_mut().flat_map(FeatureMap::values_mut) {
+            if let (Some(first), Some(landmark)) = (feature.observations.first(), feature.landmark.as_mut()) {
+                landmark.bearing = first.bearing;
+            }
+        }
+    }
+
+    /// The prior follows the slots after a frame has left; first estimates follow the prior.
+    fn renumber_prior(&mut self, gone: usize) {
+        if let Some(prior) = &mut self.prior {
+            prior.renumber(gone);
+            marginalization::keep_first_estimates(prior, &mut self.frames);
+        } else {
+            self.frames.iter_mut().for_each(|frame| frame.first_estimate = None);
+        }
+        let prior = self.prior.as_ref();
+        self.calibration.keep_first_estimates(|columns| prior.is_some_and(|prior| prior.holds_calibration(columns)));
+    }
+}

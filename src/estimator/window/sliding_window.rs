@@ -1,0 +1,198 @@
+//! A running window: one step predicts, observes, solves, rejects outliers, decides about keyframes and makes room.
+
+use super::calibration_columns::calibration_estimate;
+use super::consistency::ConsistencyMonitor;
+use super::failure::{LandmarkWatch, failure, saturation};
+use super::features::{self, FeatureMap};
+use super::frames::Frame;
+use super::reporting::empty_report;
+use super::solve::SolvedWindow;
+use super::stationary::{Observed, StationaryDetector};
+use super::window_state::WindowState;
+use crate::estimator::factors::preintegration::Preintegration;
+use crate::estimator::report::{Event, EventKind, Phase, StepReport};
+use crate::estimator::setup::Setup;
+use crate::estimator::state::calibrations::MAIN;
+use crate::estimator::state::frame_state::{FrameState, Rates};
+use crate::estimator::step_input::StepInput;
+use crate::geometry::{RigidTransform, median, seconds_from_ns};
+
+/// Distance of a scene without triangulated landmarks.
+const UNKNOWN_DISTANCE_M: f64 = 10.0;
+/// A scene counts as no farther than this.
+const FARTHEST_USUAL_M: f64 = 100.0;
+
+/// A running window, and what is watched from step to step.
+#[derive(Clone, Debug)]
+pub(crate) struct SlidingWindow {
+    pub(crate) state: WindowState,
+    /// Posterior standard deviations of the calibration's columns after the last solve.
+    calibration_sigmas: Vec<f64>,
+    stationary: StationaryDetector,
+    consistency: ConsistencyMonitor,
+    landmarks: LandmarkWatch,
+}
+
+/// The window has failed.
+#[derive(Debug)]
+pub(crate) struct WindowFailure {
+    /// What happened in the step, the failure last.
+    pub(crate) events: Vec<Event>,
+    /// The last pose before the failure, `None` when none is finite.
+    pub(crate) last_pose: Option<RigidTransform>,
+}
+
+impl SlidingWindow {
+    /// A window that starts from these frames.
+    pub(crate) fn new(state: WindowState) -> Self {
+        Self {
+            state,
+            calibration_sigmas: Vec::new(),
+            stationary: StationaryDetector::default(),
+            consistency: ConsistencyMonitor::default(),
+            landmarks: LandmarkWatch::default(),
+        }
+    }
+
+    /// Takes in one image's tracks with the IMU samples before it.
+    pub(crate) fn step(&mut self, setup: &Setup, input: &StepInput<'_>) -> Result<StepReport, WindowFailure> {
+        let newest_stamp_ns = self.state.frames.newest().stamp_ns;
+        if input.stamp_ns <= newest_stamp_ns {
+            return Ok(self.skip(setup, input, newest_stamp_ns));
+        }
+        let options = &setup.config.options;
+        let begin_ms = setup.clock_ms();
+        if let Err(failure) = self.push_frame(setup, input) {
+            return Err(self.failed(input, vec![failure]));
+        }
+        let mut events: Vec<Event> = saturation(self.state.frames.newest()).into_iter().collect();
+        events.extend(self.detect_stationary(setup, input));
+        let predicted = self.state.frames.newest().state.navigation;
+        let mut solved = self.state.solve(setup, options.iterations);
+        events.extend(self.landmarks.observe(&self.state, options));
+        if let Some(failure) = failure(self.state.frames.newest(), &predicted, &self.landmarks, options) {
+            events.push(failure);
+            return Err(self.failed(input, events));
+        }
+        events.push(self.state.choose_keyframe(options));
+        let optimized_ms = setup.clock_ms();
+
+        let mut report = self.report(setup, input, &mut solved);
+        let marginalizing_ms = setup.clock_ms();
+        self.state.drop_rejected(&solved, options, &mut events);
+        events.extend(self.switch_near_singularity(setup));
+        self.state.make_room(setup, &mut events);
+        report.times.optimize_ms = optimized_ms - begin_ms;
+        report.times.marginalize_ms = setup.clock_ms() - marginalizing_ms;
+        report.events.extend(events);
+        report.warnings = self.consistency.observe(report.stamp_ns, &report.residuals, &setup.config);
+        Ok(report)
+    }
+
+    /// The report of a solved window.
+    pub(crate) fn report(&mut self, setup: &Setup, input: &StepInput<'_>, solved: &mut SolvedWindow) -> StepReport {
+        self.calibration_sigmas = solved.solution.calibration_sigmas();
+        let calibration = calibration_estimate(setup, &self.state.calibration, &self.calibration_sigmas);
+        self.state.report(setup, input, solved, calibration)
+    }
+
+    /// Bytes on the heap.
+    pub(crate) fn heap_bytes(&self) -> usize {
+        self.state.heap_bytes()
+    }
+
+    /// An image that is not later than the newest one changes nothing.
+    fn skip(&self, setup: &Setup, input: &StepInput<'_>, newest_stamp_ns: i64) -> StepReport {
+        let calibration = calibration_estimate(setup, &self.state.calibration, &self.calibration_sigmas);
+        let mut report = empty_report(setup, input, Phase::Tracking, calibration);
+        report.window = self.state.window_report();
+        let stamp_s = seconds_from_ns(input.stamp_ns);
+        let message =
+            format!("image {} is stamped {stamp_s:.3} s, not after the newest one: passed over", input.frame_index);
+        let newest_s = seconds_from_ns(newest_stamp_ns);
+        report.events.push(Event::decided(EventKind::MeasurementMissing, message, stamp_s, newest_s));
+        report
+    }
+
+    fn failed(&self, input: &StepInput<'_>, events: Vec<Event>) -> WindowFailure {
+        let pose = |frame: &Frame| frame.state.navigation.world_from_imu;
+        let is_good = |frame: &&Frame| {
+            frame.index != input.frame_index && pose(frame).translation_m.iter().all(|x| x.is_finite())
+        };
+        WindowFailure { events, last_pose: self.state.frames.iter().rev().find(is_good).map(pose) }
+    }
+
+    /// Adds the frame of `input` behind the newest one, its state predicted; a failure when IMU samples are missing.
+    fn push_frame(&mut self, setup: &Setup, input: &StepInput<'_>) -> Result<(), Event> {
+        let window = &mut self.state;
+        let last = window.frames.newest();
+        let interval_s = seconds_from_ns(input.stamp_ns - last.stamp_ns);
+        let motion = Preintegration::from_samples(setup.imu_noise, last.state.navigation.bias, input.imu);
+        let covered = motion.duration_s();
+        if covered < 0.5 * interval_s || interval_s <= 0.0 {
+            let message =
+                format!("inertial samples cover {covered:.3} s of the {interval_s:.3} s since the last image");
+            return Err(Event::decided(EventKind::Failure, message, covered, 0.5 * interval_s));
+        }
+        let navigation = motion.predict(&last.state.navigation, &setup.gravity_in_world);
+        let encoder = setup.encoder_reading(input, window.calibration.of(MAIN).joint_count());
+        let joints_rad =
+            encoder.as_ref().map_or_else(|| last.state.joints_rad.clone(), |encoder| encoder.angles_rad.clone());
+        let motion_information = motion.square_root_information();
+        window.frames.push(Frame {
+            index: input.frame_index,
+            stamp_ns: input.stamp_ns,
+            state: FrameState { navigation, joints_rad, rates: Rates::at(input.imu, encoder.as_ref()) },
+            first_estimate: None,
+            encoder,
+            stationary: None,
+            keyframe: false,
+            motion,
+            motion_information,
+        });
+        let slot = window.frames.newest_slot();
+        for (camera, features) in window.features.iter_mut().enumerate() {
+            features::observe(features, slot, input.features(camera));
+        }
+        window.align_newest_joints(setup);
+        Ok(())
+    }
+
+    /// Detects whether the vehicle is stationary at the newest frame.
+    fn detect_stationary(&mut self, setup: &Setup, input: &StepInput<'_>) -> Option<Event> {
+        let newest = self.state.frames.newest();
+        let navigation = newest.state.navigation;
+        let camera = self.state.calibration.leading();
+        let observed = Observed {
+            features: input.features(camera),
+            noise: &setup.imu_noise,
+            bias: &navigation.bias,
+            speed_m_per_s: navigation.velocity_m_per_s.norm(),
+            imu_from_camera: self.state.calibration.of(camera).imu_from_camera(&newest.state.joints_rad).rotation,
+            distance_m: usual_distance_m(&self.state.features),
+        };
+        let (stationary, event) = self.stationary.observe(input, &observed)?;
+        self.state.frames.newest_mut().stationary = Some(stationary);
+        Some(event)
+    }
+
+    /// Switches the minimal parameterization when the chain comes near its singularity and the configuration allows it.
+    fn switch_near_singularity(&mut self, setup: &Setup) -> Option<Event> {
+        if !setup.config.auto_chart || self.state.calibration.dof() == 0 {
+            return None;
+        }
+        let chain = self.state.calibration.of(MAIN).chain();
+        let better = chain.should_switch()?;
+        let margin = chain.margins().iter().map(|(_, margin)| *margin).fold(1.0, f64::min);
+        self.state.switch_parameterization(better);
+        let message = format!("the chain goes over to the chart {better}: the old one is near its lock");
+        Some(Event::decided(EventKind::ChartSwitched, message, margin, crate::gimbal::SWITCH_MARGIN))
+    }
+}
+
+/// Median distance of the landmarks from their anchors, in metres.
+fn usual_distance_m(features: &[FeatureMap]) -> f64 {
+    let features = features.iter().flat_map(FeatureMap::values);
+    median(features.filter_map(|feature| Some(feature.landmark?.inverse_distance)))
+        .map_or(UNKNOWN_DISTANCE_M, |inverse_distance| 1.0 / inverse_distance.max(1.0 / FARTHEST_USUAL_M))
+}

@@ -1,0 +1,117 @@
+//! One solve of the window: triangulate, minimize, find outliers.
+
+use nalgebra::Vector2;
+
+use super::active_tracks::ActiveTracks;
+use super::problem::{CameraFactors, Estimate, Problem};
+use super::solver::{self, Solution, SolverLimits};
+use super::window_state::WindowState;
+use crate::estimator::factors::visual::{self, RelativePoses, Sighting};
+use crate::estimator::options::EstimatorOptions;
+use crate::estimator::setup::Setup;
+use crate::estimator::state::camera_pose;
+use crate::estimator::{Event, EventKind};
+
+/// Reprojection residuals in pixels, by track and observation; `None` behind the camera.
+pub(crate) type TrackResiduals = Vec<Vec<Option<Vector2<f64>>>>;
+
+/// What a solve of the window used and found, for the report.
+#[derive(Clone, Debug)]
+pub(crate) struct SolvedWindow {
+    /// By camera, with the landmarks as they were before.
+    pub(crate) cameras: Vec<ActiveTracks>,
+    pub(crate) solution: Solution,
+    /// By camera.
+    pub(crate) checks: Vec<TrackChecks>,
+}
+
+/// How well the tracks of one camera fit.
+#[derive(Clone, Debug)]
+pub(crate) struct TrackChecks {
+    pub(crate) residuals_before: TrackResiduals,
+    pub(crate) residuals_after: TrackResiduals,
+    pub(crate) rejected: Vec<bool>,
+}
+
+impl WindowState {
+    /// Solves the window, takes over the estimate and marks features that do not fit as rejected.
+    pub(crate) fn solve(&mut self, setup: &Setup, iterations: usize) -> SolvedWindow {
+        let options = &setup.config.options;
+        self.frames.reintegrate(options);
+        self.triangulate_new(options);
+        let cameras = self.active_tracks();
+        let start = self.estimate(cameras.iter().map(|active| active.landmarks.clone()).collect());
+        let limits = SolverLimits { iterations, relative_cost_tolerance: options.relative_cost_tolerance };
+        let problem = self.problem(setup, &cameras);
+        let before = track_residuals(&problem, &start);
+        let solution = solver::solve(&problem, start, limits);
+        let after = track_residuals(&problem, &solution.estimate);
+
+        for (frame, state) in self.frames.iter_mut().zip(&solution.estimate.frames) {
+            frame.state = state.clone();
+        }
+        self.calibration = solution.estimate.calibration.clone();
+        for (camera, active) in cameras.iter().enumerate() {
+            for (id, landmark) in active.ids.iter().zip(&solution.estimate.landmarks[camera]) {
+                if let Some(feature) = self.features[camera].get_mut(id) {
+                    feature.landmark = Some(*landmark);
+                }
+            }
+        }
+        let checks = before
+            .into_iter()
+            .zip(after)
+            .map(|(residuals_before, residuals_after)| TrackChecks {
+                rejected: residuals_after.iter().map(|residuals| is_outlier(residuals, options)).collect(),
+                residuals_before,
+                residuals_after,
+            })
+            .collect();
+        SolvedWindow { cameras, solution, checks }
+    }
+
+    /// Drops rejected features; a track that goes on is a new feature from its next observation.
+    pub(crate) fn drop_rejected(&mut self, solved: &SolvedWindow, options: &EstimatorOptions, events: &mut Vec<Event>) {
+        let (mut count, mut all) = (0, 0);
+        for (features, (active, checks)) in self.features.iter_mut().zip(solved.cameras.iter().zip(&solved.checks)) {
+            for (id, _) in active.ids.iter().zip(&checks.rejected).filter(|(_, rejected)| **rejected) {
+                features.remove(id);
+                count += 1;
+            }
+            all += active.ids.len();
+        }
+        if count > 0 {
+            let limit = options.outlier_px;
+            let message = format!("{count} of {all} features off by more than {limit:.1} px on average");
+            events.push(Event::decided(EventKind::OutliersRejected, message, count as f64, limit));
+        }
+    }
+}
+
+fn is_outlier(residuals: &[Option<Vector2<f64>>], options: &EstimatorOptions) -> bool {
+    let unseen = residuals.iter().any(Option::is_none);
+    let counted = residuals.len().max(1) as f64;
+    let mean = residuals.iter().flatten().map(|residual| residual.norm()).sum::<f64>() / counted;
+    unseen || mean > options.outlier_px
+}
+
+/// Reprojection residuals of all observations at an estimate, by camera.
+fn track_residuals(problem: &Problem<'_>, estimate: &Estimate) -> Vec<TrackResiduals> {
+    let of_camera = |(camera, factors): (usize, &CameraFactors<'_>)| {
+        let poses = camera_pose::by_slot(&estimate.frames, estimate.calibration.of(camera));
+        let relative = RelativePoses::new(&poses);
+        factors
+            .tracks
+            .iter()
+            .zip(&estimate.landmarks[camera])
+            .map(|(track, landmark)| {
+                let anchor = track.sightings[0].slot;
+                let residual = |sighting: &Sighting| {
+                    visual::sighting_residual_px(&factors.visual, &relative, anchor, landmark, sighting)
+                };
+                track.sightings.iter().map(residual).collect()
+            })
+            .collect()
+    };
+    problem.cameras.iter().enumerate().map(of_camera).collect()
+}

@@ -1,0 +1,105 @@
+//! Everything that the least-squares problem of the window is made from.
+
+use super::active_tracks::ActiveTracks;
+use super::features::{self, FeatureMap};
+use super::frames::{self, Frames};
+use super::problem::{CameraFactors, Estimate, Problem};
+use crate::estimator::factors::prior::{Prior, StartPrior};
+use crate::estimator::factors::reprojection::{CameraPose, Landmark};
+use crate::estimator::factors::visual::VisualModel;
+use crate::estimator::options::EstimatorOptions;
+use crate::estimator::setup::Setup;
+use crate::estimator::state::calibrations::Calibrations;
+use crate::estimator::state::camera_pose;
+use crate::gimbal::Parameterization;
+
+/// Frames, features, calibration and priors of the window.
+#[derive(Clone, Debug)]
+pub(crate) struct WindowState {
+    pub(crate) frames: Frames,
+    /// Features by camera: none is observed by two of them.
+    pub(crate) features: Vec<FeatureMap>,
+    pub(crate) calibration: Calibrations,
+    /// What marginalized frames leave behind.
+    pub(crate) prior: Option<Prior>,
+    /// The prior on the first frame, until that is marginalized.
+    pub(crate) start: Option<StartPrior>,
+}
+
+impl WindowState {
+    /// Poses of a camera by slot.
+    pub(crate) fn camera_poses(&self, camera: usize) -> Vec<CameraPose> {
+        let calibration = self.calibration.of(camera);
+        self.frames.iter().map(|frame| camera_pose::at(&frame.state, calibration)).collect()
+    }
+
+    /// The least-squares problem of the window as it is, with the tracks of each camera; cameras without any may be left out
+    /// at the end.
+    pub(crate) fn problem<'a>(&'a self, setup: &'a Setup, active: &'a [ActiveTracks]) -> Problem<'a> {
+        let options = &setup.config.options;
+        let layout = frames::layout(&self.frames, self.calibration.dof());
+        let start = layout.calibration().start;
+        let factors = |camera: usize| {
+            let columns = self.calibration.columns(camera);
+            CameraFactors {
+                visual: VisualModel::new(setup.config.model(camera), options),
+                tracks: active.get(camera).map_or(&[], |active| &active.tracks),
+                columns: start + columns.start..start + columns.end,
+            }
+        };
+        Problem {
+            layout,
+            cameras: (0..self.calibration.cameras()).map(factors).collect(),
+            gravity_in_world: setup.gravity_in_world,
+            frames: &self.frames,
+            prior: self.prior.as_ref(),
+            start: self.start.as_ref(),
+            first_estimate_reach_rad: options.first_estimate_reach_rad,
+            calibration_first_estimates: options.calibration_first_estimates,
+        }
+    }
+
+    /// The features that take part in the solve, by camera.
+    pub(crate) fn active_tracks(&self) -> Vec<ActiveTracks> {
+        self.features.iter().map(ActiveTracks::new).collect()
+    }
+
+    /// The present values of the unknowns, with landmarks by camera in the order of its tracks.
+    pub(crate) fn estimate(&self, landmarks: Vec<Vec<Landmark>>) -> Estimate {
+        Estimate {
+            frames: self.frames.iter().map(|frame| frame.state.clone()).collect(),
+            calibration: self.calibration.clone(),
+            landmarks,
+        }
+    }
+
+    /// Triangulates features whose rays open far enough.
+    pub(crate) fn triangulate_new(&mut self, options: &EstimatorOptions) {
+        for camera in 0..self.features.len() {
+            let poses = self.camera_poses(camera);
+            for feature in self.features[camera].values_mut() {
+                if feature.landmark.is_none() {
+                    feature.landmark = features::triangulate(feature, &poses, options);
+                }
+            }
+        }
+    }
+
+    /// Switches the chain's parameterization: the calibration stays the same, and the prior's columns are transported.
+    pub(crate) fn switch_parameterization(&mut self, parameterization: Parameterization) {
+        let layout = frames::layout(&self.frames, self.calibration.dof());
+        let before = self.calibration.deviation();
+        let old_from_new = self.calibration.switch_parameterization(parameterization);
+        if let Some(prior) = &mut self.prior {
+            let deviations = before.zip(self.calibration.deviation());
+            prior.transport_calibration(&old_from_new, deviations.as_ref(), &layout);
+        }
+    }
+
+    /// Bytes on the heap.
+    pub(crate) fn heap_bytes(&self) -> usize {
+        self.frames.bytes()
+            + self.features.iter().map(features::heap_bytes).sum::<usize>()
+            + self.prior.as_ref().map_or(0, Prior::heap_bytes)
+    }
+}
