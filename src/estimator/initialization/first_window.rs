@@ -1,15 +1,17 @@
 //! The first window: made from a solution of the initialization and solved several times, outliers taken out in between.
 
+use std::collections::VecDeque;
+
 use nalgebra::{UnitQuaternion, Vector3};
 
-use super::initializer::Initializer;
 use super::mount_fit::fit_mounts;
+use super::waiting_frame::WaitingFrame;
 use super::{InitializationOrigin, InitializationSolution};
 use crate::estimator::factors::preintegration::Preintegration;
 use crate::estimator::factors::prior::StartPrior;
 use crate::estimator::report::{Event, EventKind, StepReport};
 use crate::estimator::setup::Setup;
-use crate::estimator::state::calibrations::MAIN;
+use crate::estimator::state::calibrations::{Calibrations, MAIN};
 use crate::estimator::state::frame_state::{FrameState, Rates};
 use crate::estimator::state::navigation::{ImuBias, NavigationState};
 use crate::estimator::step_input::StepInput;
@@ -32,18 +34,19 @@ pub(super) struct FirstWindow<'a> {
 }
 
 impl<'a> FirstWindow<'a> {
-    /// The window of the newest views of a solution, with the features of the leading camera; `None` when none of them is a
-    /// kept frame. The initializer's frames are used up.
+    /// The window of the newest views of a solution, with the features of the leading camera; `None` when none of them is
+    /// among the waiting frames.
     pub(super) fn new(
-        initializer: &mut Initializer,
         setup: &Setup,
         solution: &'a InitializationSolution,
+        waiting: VecDeque<WaitingFrame>,
+        mut calibration: Calibrations,
+        resume_at: Option<&RigidTransform>,
     ) -> Option<Self> {
         let options = &setup.config.options;
-        let mut calibration = initializer.calibration.clone();
         let leading = calibration.leading();
         let joints = calibration.of(MAIN).joint_count();
-        let world = world_from_solution(solution, initializer.resume_at.as_ref());
+        let world = world_from_solution(solution, resume_at);
         let room = options.window * options.first_window_factor;
         let views = &solution.frames[solution.frames.len().saturating_sub(room + 1)..];
         let empty = || Preintegration::new(setup.imu_noise, solution.bias);
@@ -52,7 +55,7 @@ impl<'a> FirstWindow<'a> {
         let mut observed = Vec::new();
         let mut features = vec![FeatureMap::new(); calibration.cameras()];
         let mut frames: Option<Frames> = None;
-        for waiting in std::mem::take(&mut initializer.waiting) {
+        for waiting in waiting {
             imu.extend(&waiting.imu);
             let Some(view) = views.iter().find(|view| view.frame_index == waiting.index) else { continue };
             let since_last = std::mem::replace(&mut imu, empty());

@@ -4,9 +4,10 @@ use std::borrow::Cow;
 use std::collections::VecDeque;
 
 use super::first_window::FirstWindow;
+use super::waiting_frame::{WaitingFrame, initial_joints_rad};
 use super::{
-    InitializationFrame, InitializationInput, InitializationOptions, InitializationOutcome, StandstillEstimate,
-    WaitReason, try_initialize,
+    InitializationFrame, InitializationInput, InitializationOptions, InitializationOutcome, InitializationSolution,
+    StandstillEstimate, WaitReason, try_initialize,
 };
 use crate::estimator::report::{Event, EventKind, Phase, StepReport};
 use crate::estimator::setup::Setup;
@@ -15,42 +16,12 @@ use crate::estimator::step_input::StepInput;
 use crate::estimator::window::calibration_columns::calibration_estimate;
 use crate::estimator::window::reporting::empty_report;
 use crate::estimator::window::sliding_window::SlidingWindow;
-use crate::frontend::{FeatureId, TrackedFeature};
+use crate::frontend::FeatureId;
 use crate::geometry::{RigidTransform, seconds_from_ns};
-use crate::sensors::{ChainPrior, ImuSample, JointAngles};
+use crate::sensors::{ChainPrior, ImuSample};
 
 /// Longest gap in the IMU samples over which frames on both sides may be used together.
 const LONGEST_GAP_S: f64 = 0.1;
-
-/// A frame kept until the initialization succeeds.
-#[derive(Clone, Debug)]
-pub(super) struct WaitingFrame {
-    pub(super) index: usize,
-    pub(super) stamp_ns: i64,
-    /// By camera.
-    pub(super) features: Vec<Vec<TrackedFeature>>,
-    pub(super) encoder: Option<JointAngles>,
-    /// Of the leading camera.
-    imu_from_camera: RigidTransform,
-    pub(super) imu: Vec<ImuSample>,
-}
-
-impl WaitingFrame {
-    /// The encoder angles, zeros without encoders.
-    pub(super) fn initial_joints_rad(&self, joints: usize) -> Vec<f64> {
-        initial_joints_rad(self.encoder.as_ref(), joints)
-    }
-
-    fn bytes(&self) -> usize {
-        let features: usize = self.features.iter().map(|seen| seen.capacity() * size_of::<TrackedFeature>()).sum();
-        let encoder = self.encoder.as_ref().map_or(0, JointAngles::heap_bytes);
-        size_of::<Self>() + features + encoder + self.imu.capacity() * size_of::<ImuSample>()
-    }
-}
-
-fn initial_joints_rad(encoder: Option<&JointAngles>, joints: usize) -> Vec<f64> {
-    encoder.map_or_else(|| vec![0.0; joints], |encoder| encoder.angles_rad.clone())
-}
 
 /// Keeps the frames of the last seconds and tries to initialize from them.
 #[derive(Clone, Debug)]
@@ -58,9 +29,9 @@ pub(crate) struct Initializer {
     /// As the rig gives it; parameters may be fixed or set in between.
     pub(crate) calibration: Calibrations,
     /// Where the world of a restarted window begins: the last pose before the failure.
-    pub(super) resume_at: Option<RigidTransform>,
+    resume_at: Option<RigidTransform>,
     /// Oldest first.
-    pub(super) waiting: VecDeque<WaitingFrame>,
+    waiting: VecDeque<WaitingFrame>,
     standstill: Option<StandstillEstimate>,
 }
 
@@ -85,7 +56,7 @@ impl Initializer {
         self.keep(setup, input, &mut events);
         let options = self.options(setup);
         let mut step = match self.attempt(setup, &options) {
-            InitializationOutcome::Initialized(solution) => match FirstWindow::new(self, setup, &solution) {
+            InitializationOutcome::Initialized(solution) => match self.first_window(setup, &solution) {
                 Some(first) => {
                     let most_scale_sigma = options.most_scale_sigma;
                     let (window, report) = first.solve(setup, input, most_scale_sigma, &mut events);
@@ -114,6 +85,12 @@ impl Initializer {
         events.append(&mut report.events);
         report.events = events;
         step
+    }
+
+    /// The window of a solution; the frames are used up.
+    fn first_window<'a>(&mut self, setup: &Setup, solution: &'a InitializationSolution) -> Option<FirstWindow<'a>> {
+        let waiting = std::mem::take(&mut self.waiting);
+        FirstWindow::new(setup, solution, waiting, self.calibration.clone(), self.resume_at.as_ref())
     }
 
     /// Drops features of a camera.

@@ -38,6 +38,7 @@ mod selection;
 mod standstill;
 mod structure;
 mod visual_problem;
+mod waiting_frame;
 
 mod attempt;
 #[cfg(test)]

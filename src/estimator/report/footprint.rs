@@ -1,5 +1,6 @@
 //! How much memory a report takes.
 
+use super::allocation::allocated_bytes;
 use super::information_gain::InformationGain;
 use super::jacobian_source::JacobianSource;
 use super::step::{CalibrationEstimate, FrameStateReport, StepReport};
@@ -37,11 +38,6 @@ impl ReportBytes {
             + self.jacobian
             + self.other
     }
-}
-
-/// What the allocator sets aside for so many bytes: 8 of its own, in steps of 16, at least 32 (glibc's rule on 64 bits).
-pub fn allocated_bytes(bytes: usize) -> usize {
-    if bytes == 0 { 0 } else { (bytes + 8).next_multiple_of(16).max(32) }
 }
 
 fn of_vec<T>(vec: &Vec<T>) -> usize {

@@ -1,6 +1,6 @@
 //! What the newest image tells about the calibration, and which motion that is owed to.
 
-use super::footprint::allocated_bytes;
+use super::allocation::allocated_bytes;
 
 /// Something that moves: the body along or about an axis of the IMU, or a joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

@@ -2,6 +2,7 @@
 //!
 //! A report holds everything that panels, tables and the observability analysis ask for; making one is the window's business.
 
+mod allocation;
 pub(crate) mod columns;
 mod events;
 mod features;
@@ -14,10 +15,11 @@ mod observations;
 mod residuals;
 mod step;
 
+pub use allocation::allocated_bytes;
 pub use columns::{ColumnBlock, ColumnGroup, ColumnId, FrameId};
 pub use events::{Event, EventKind};
 pub use features::{FeatureCounts, FeatureReport, LandmarkReport, ObservationReport};
-pub use footprint::{ReportBytes, allocated_bytes};
+pub use footprint::ReportBytes;
 pub use information_gain::{InformationGain, Motion};
 pub use jacobian::{FeatureRows, StepJacobian};
 pub use jacobian_source::{FactorRows, JacobianFactor, JacobianRow, JacobianSource};
