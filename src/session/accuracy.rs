@@ -13,16 +13,16 @@ pub struct StampedPose {
     pub pose: RigidTransform,
 }
 
-/// How the estimate is laid on the reference before positions are compared.
+/// How the estimate is aligned with the reference before positions are compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Alignment {
     /// Not at all.
     None,
-    /// Rotation about the vertical and a shift: the gauge freedom of visual-inertial odometry.
+    /// Rotation about the vertical and a translation: the gauge freedom of visual-inertial odometry.
     YawPosition,
-    /// Any rotation and a shift (`evo_ape --align`).
+    /// Any rotation and a translation (`evo_ape --align`).
     Rigid,
-    /// Any rotation, a shift and a scale (`evo_ape --align --correct_scale`).
+    /// Any rotation, a translation and a scale (`evo_ape --align --correct_scale`).
     Similarity,
 }
 
@@ -80,7 +80,7 @@ pub struct AlignmentTransform {
 }
 
 impl AlignmentTransform {
-    /// Lays a pose of the estimate on the reference.
+    /// A pose of the estimate, aligned with the reference: `reference_from_body`.
     pub fn apply(&self, pose: &RigidTransform) -> RigidTransform {
         let position = self.rigid.rotation * pose.translation_m * self.scale + self.rigid.translation_m;
         RigidTransform::new(self.rigid.rotation * pose.rotation, position)
@@ -194,7 +194,7 @@ pub fn absolute_errors_m(pairs: &[(StampedPose, StampedPose)], transform: &Align
         .collect()
 }
 
-/// How far apart the poses of a relative error lie.
+/// Distance between the two poses of a relative error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RelativeDelta {
     /// A number of frames.
@@ -203,7 +203,7 @@ pub enum RelativeDelta {
     Metres(f64),
 }
 
-/// Translation (m) and rotation (rad) errors over consecutive stretches of one delta (evo's relative pose error).
+/// Translation (m) and rotation (rad) errors over consecutive sub-trajectories of one delta (evo's relative pose error).
 pub fn relative_errors(
     pairs: &[(StampedPose, StampedPose)],
     transform: &AlignmentTransform,
@@ -211,7 +211,7 @@ pub fn relative_errors(
 ) -> (Vec<f64>, Vec<f64>) {
     let mut translations = Vec::new();
     let mut rotations = Vec::new();
-    for (begin, end) in stretches(pairs, transform, delta) {
+    for (begin, end) in sub_trajectories(pairs, transform, delta) {
         let estimate_step = transform.apply(&pairs[begin].0.pose).inverse() * transform.apply(&pairs[end].0.pose);
         let reference_step = pairs[begin].1.pose.inverse() * pairs[end].1.pose;
         let error = reference_step.inverse() * estimate_step;
@@ -222,7 +222,7 @@ pub fn relative_errors(
 }
 
 /// Index pairs one delta apart, one after the other.
-fn stretches(
+fn sub_trajectories(
     pairs: &[(StampedPose, StampedPose)],
     transform: &AlignmentTransform,
     delta: RelativeDelta,

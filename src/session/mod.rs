@@ -36,6 +36,6 @@ pub use playback::{
     SavedSessionError, Session,
 };
 pub use record::{
-    ChainDistance, Comparison, ForkOrigin, Parting, Quantity, RELATIVE_LENGTHS_M, Recording, RelativeAccuracy,
+    ChainDistance, Comparison, Divergence, ForkOrigin, Quantity, RELATIVE_LENGTHS_M, Recording, RelativeAccuracy,
     RunMemory, RunRecord, RunWarning, SolverPosition, SolverTrace, StepFactorRows, StepRecord, TrajectoryAccuracy,
 };

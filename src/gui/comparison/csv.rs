@@ -41,14 +41,16 @@ impl CsvTable for ComparisonPanel {
                     number(value),
                 ]);
             };
-            for (quantity, parting) in Quantity::ALL.into_iter().zip(&comparison.partings) {
+            for (quantity, divergence) in Quantity::ALL.into_iter().zip(&comparison.divergences) {
                 let at = |stamp_ns: i64| comparison.at(quantity, stamp_ns).unwrap_or(f64::NAN);
-                for (kind, stamp_ns) in [("first different", parting.exact_ns), ("first notable", parting.notable_ns)] {
+                for (kind, stamp_ns) in
+                    [("first different", divergence.exact_ns), ("first notable", divergence.notable_ns)]
+                {
                     if let Some(stamp_ns) = stamp_ns {
                         say(kind, quantity, stamp_ns, at(stamp_ns));
                     }
                 }
-                if let Some((largest, stamp_ns)) = parting.largest {
+                if let Some((largest, stamp_ns)) = divergence.largest {
                     say("largest", quantity, stamp_ns, largest);
                 }
             }

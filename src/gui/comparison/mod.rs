@@ -137,19 +137,19 @@ impl ComparisonPanel {
             let accuracy = |ui: &mut Ui, ctx: &mut PanelContext<'_>| {
                 ui.vertical(|ui| numbers::accuracy_ui(ui, ctx, &self.scores));
             };
-            let partings = |ui: &mut Ui, ctx: &mut PanelContext<'_>| {
-                ui.vertical(|ui| numbers::partings_ui(ui, ctx, self.reference, &self.comparisons));
+            let divergences = |ui: &mut Ui, ctx: &mut PanelContext<'_>| {
+                ui.vertical(|ui| numbers::divergences_ui(ui, ctx, self.reference, &self.comparisons));
             };
             if wide {
                 ui.horizontal_top(|ui| {
                     accuracy(ui, ctx);
                     ui.add_space(24.0);
-                    partings(ui, ctx);
+                    divergences(ui, ctx);
                 });
             } else {
                 accuracy(ui, ctx);
                 ui.add_space(6.0);
-                partings(ui, ctx);
+                divergences(ui, ctx);
             }
         });
     }

@@ -5,7 +5,7 @@ use egui::{Button, Grid, RichText, Ui, WidgetInfo, vec2};
 use super::scores::Scores;
 use crate::gui::PanelContext;
 use crate::gui::units::{figure, fixed, seconds};
-use crate::session::{Command, Comparison, Parting, Quantity};
+use crate::session::{Command, Comparison, Divergence, Quantity};
 
 /// How a quantity is shown: the factor on the stored number, and the unit.
 pub(super) fn shown(quantity: Quantity) -> (f64, &'static str) {
@@ -66,7 +66,7 @@ pub(super) fn accuracy_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, scores: &Scor
 }
 
 /// Where each run parts from the reference, with ways to go there.
-pub(super) fn partings_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, reference: usize, comparisons: &[Comparison]) {
+pub(super) fn divergences_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, reference: usize, comparisons: &[Comparison]) {
     let theme = *ctx.theme;
     let Some(base) = ctx.recording.runs.get(reference) else { return };
     for (number, (run, comparison)) in ctx.recording.runs.iter().zip(comparisons).enumerate() {
@@ -111,8 +111,8 @@ fn table_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, number: usize, own: &str, c
             ui.label(RichText::new(heading).small().color(theme.text_weak));
         }
         ui.end_row();
-        for (quantity, parting) in Quantity::ALL.into_iter().zip(&comparison.partings) {
-            let Parting { exact_ns, notable_ns, largest } = *parting;
+        for (quantity, divergence) in Quantity::ALL.into_iter().zip(&comparison.divergences) {
+            let Divergence { exact_ns, notable_ns, largest } = *divergence;
             let Some((largest, largest_ns)) = largest else { continue };
             let name = |what: &str| format!("{own}, {}: {what}", quantity.name());
             let apart = comparison.at(quantity, ctx.cursor_ns);

@@ -106,7 +106,7 @@ impl OverTime {
             } else {
                 paint_curve(&painter.with_clip_rect(rect), &area, curve, style, CURVE_WIDTH);
             }
-            if let Some(stamp_ns) = comparison.parting(quantity).notable_ns {
+            if let Some(stamp_ns) = comparison.divergence(quantity).notable_ns {
                 let x = area.x(stamp_ns);
                 if rect.x_range().contains(x) {
                     let foot = vec![pos2(x - 4.0, rect.top()), pos2(x + 4.0, rect.top()), pos2(x, rect.top() + 7.0)];

@@ -9,7 +9,7 @@ use crate::session::record::StepRecord;
 /// A step as a condition sees it.
 #[derive(Clone, Copy, Debug)]
 pub struct Moment<'a> {
-    /// The step; its outline will do.
+    /// The step; its summary suffices.
     pub step: &'a StepRecord,
     /// The step before it.
     pub previous: Option<&'a StepRecord>,

@@ -1,11 +1,9 @@
 //! A condition as a tree.
 
 use std::fmt;
-use std::str::FromStr;
 
 use thiserror::Error;
 
-use super::parser;
 use super::quantities::{FlagName, NamedNumber, NumberName};
 use crate::estimator::EventKind;
 
@@ -32,14 +30,6 @@ impl Condition {
     /// As it was written.
     pub fn text(&self) -> &str {
         &self.text
-    }
-}
-
-impl FromStr for Condition {
-    type Err = ConditionProblem;
-
-    fn from_str(text: &str) -> Result<Self, ConditionProblem> {
-        parser::parse(text)
     }
 }
 

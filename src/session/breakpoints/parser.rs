@@ -1,5 +1,7 @@
 //! From words to a condition, with a message for every mistake.
 
+use std::str::FromStr;
+
 use super::expression::{Arithmetic, Condition, ConditionProblem, Number, Span, Truth};
 use super::lexer::{Token, words};
 use super::quantities::{CAUSES, EVENTS, FLAGS, NAMED, NUMBERS, NamedNumber};
@@ -39,8 +41,16 @@ struct Parser<'a> {
 
 type Result<T> = std::result::Result<T, ConditionProblem>;
 
+impl FromStr for Condition {
+    type Err = ConditionProblem;
+
+    fn from_str(text: &str) -> Result<Self> {
+        parse(text)
+    }
+}
+
 /// Reads a condition.
-pub(super) fn parse(text: &str) -> Result<Condition> {
+fn parse(text: &str) -> Result<Condition> {
     let mut parser = Parser { text, words: words(text)?, at: 0, depth: 0 };
     if matches!(parser.peek(), Token::End) {
         return Err(parser.problem_at(0, "a condition is missing, such as 'rank < 18 or features < 40'"));

@@ -1,4 +1,4 @@
-//! An offline calibration over a log: both cameras' images through the front end, then the calibration.
+//! Offline calibration from a log: both cameras' images through the front end, then the calibration.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -16,15 +16,15 @@ use crate::geometry::{Dimension, RigidTransform, ns_from_seconds, seconds_from_n
 use crate::sensors::{CameraMount, CameraRig, ChainPrior, GimbalRig, Rig};
 use crate::session::plan::{ParameterizationChoice, RunSpec, SessionError};
 
-/// Share of the whole work that tracking takes.
-const TRACKING_SHARE: f64 = 0.6;
-/// Bound of a uniform error per standard deviation.
+/// Tracking's part of the progress.
+const TRACKING_PART: f64 = 0.6;
+/// Bound of a uniform error per standard deviation, √3.
 const BOUND_PER_SIGMA: f64 = 1.732_050_807_568_877_2;
 
 /// Why a log could not be calibrated from.
 #[derive(Debug, Error)]
 pub enum CalibrationRunError {
-    /// The log, its rig or its truth cannot be read.
+    /// The log, its rig or its ground truth cannot be read.
     #[error(transparent)]
     Log(#[from] LogError),
     /// A run cannot be configured.
@@ -42,7 +42,7 @@ pub enum CalibrationRunError {
         /// The log.
         path: PathBuf,
     },
-    /// The flight cannot tell.
+    /// The calibration is not observable from the log, or does not converge.
     #[error("{reason}: {path}")]
     Calibration {
         /// Why.
@@ -60,16 +60,16 @@ pub enum CalibrationRunError {
     },
 }
 
-/// What to calibrate from.
+/// What to calibrate from, as on the command line.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CalibrationRequest {
     /// The log.
     pub log_path: PathBuf,
     /// The rig, when it is not beside the log or in it.
     pub rig_path: Option<PathBuf>,
-    /// The true values, when they are not beside the log.
+    /// The ground truth of the rig, when it is not beside the log.
     pub truth_path: Option<PathBuf>,
-    /// Seconds of the log to leave out at its begin.
+    /// Seconds of the log to leave out at its start.
     pub start_s: f64,
     /// Seconds to read from there, `None` to the end.
     pub duration_s: Option<f64>,
@@ -78,13 +78,13 @@ pub struct CalibrationRequest {
 /// A calibrated log.
 #[derive(Clone, Debug)]
 pub struct CalibrationRun {
-    /// Where the log lies.
+    /// Path of the log.
     pub log_path: PathBuf,
-    /// The rig that was given.
+    /// The rig before the calibration.
     pub given_rig: Rig,
-    /// The rig with the calibrated values, its prior as tight as they are certain.
+    /// The rig with the calibrated values and a prior from their standard deviations.
     pub rig: Rig,
-    /// The rig with the true values, when known.
+    /// The rig with the ground truth, when known.
     pub truth_rig: Option<Rig>,
     /// Key of the static camera.
     pub static_camera: String,
@@ -99,7 +99,7 @@ pub struct CalibrationRun {
 /// Tracks both cameras over the log and calibrates.
 ///
 /// # Errors
-/// When the log cannot be read, the rig lacks a camera or encoders, or the flight cannot tell.
+/// When the log cannot be read, the rig lacks a camera or encoders, or the calibration is not observable.
 pub fn calibrate(
     request: &CalibrationRequest,
     options: &CalibrationOptions,
@@ -111,10 +111,7 @@ pub fn calibrate(
     let parts = RigParts::of(&given_rig, request)?;
     let (input, warnings) = track(&log, &given_rig, &parts, request, on_progress)?;
     let outcome = calibration::calibrate(&input, options, &mut |progress| {
-        on_progress(CalibrationProgress {
-            share: TRACKING_SHARE + (1.0 - TRACKING_SHARE) * progress.share,
-            ..progress
-        });
+        on_progress(CalibrationProgress { share: TRACKING_PART + (1.0 - TRACKING_PART) * progress.share, ..progress });
     })
     .map_err(|reason| CalibrationRunError::Calibration { reason, path: request.log_path.clone() })?;
     Ok(CalibrationRun {
@@ -129,7 +126,7 @@ pub fn calibrate(
     })
 }
 
-/// What of a rig is calibrated.
+/// The parts of a rig that are calibrated.
 #[derive(Clone, Debug)]
 struct RigParts {
     static_camera: CameraRig,
@@ -168,7 +165,7 @@ impl RigParts {
         if gimbal.encoder_sigma_rad.is_none() || gimbal.topic.is_none() {
             return Err(missing(
                 "encoders (gimbal.rostopic and gimbal.encoder_sigma)",
-                "the offline calibration needs joint angles; fly online with 'dcvins run --run auto:encoder=off'",
+                "the offline calibration needs joint angles; calibrate online with 'dcvins run --run auto:encoder=off'",
             ));
         }
         Ok(Self { static_camera: static_camera.clone(), imu_from_camera, gimbal_camera: gimbal_camera.clone(), gimbal })
@@ -191,7 +188,7 @@ fn track(
     let (static_result, gimbal_result) = std::thread::scope(|scope| {
         let gimbal = scope.spawn(|| views(&mut of_gimbal, &parts.gimbal_camera, &mut |_| {}));
         let rigid = views(&mut of_static, &parts.static_camera, &mut |stamp_ns| {
-            let share = TRACKING_SHARE * (seconds_from_ns(stamp_ns) - request.start_s) / length_s;
+            let share = TRACKING_PART * (seconds_from_ns(stamp_ns) - request.start_s) / length_s;
             on_progress(CalibrationProgress { stage: "tracking both cameras", share });
         });
         (rigid, gimbal.join())
@@ -257,7 +254,8 @@ fn views(
     (views, warnings)
 }
 
-/// The rig with what was found; its prior is the largest uncertainty of a parameter, as bounds of a uniform error.
+/// The rig with the calibrated values; its prior is the largest standard deviation of a parameter, as bounds of a uniform
+/// error.
 fn calibrated(rig: &Rig, parts: &RigParts, outcome: &CalibrationOutcome) -> Rig {
     let mut calibrated = rig.clone();
     let largest = |dimension: Dimension| {

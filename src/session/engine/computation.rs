@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::history::{History, SnapshotUse};
+use super::message::EngineMessage;
 use super::recompute::{Detail, RecomputeRequest, Recomputed};
-use super::threads::EngineMessage;
 use crate::session::plan::SessionPlan;
 use crate::session::record::{Recording, RunRecord, SolverPosition, SolverTrace, StepFactorRows, StepRecord};
 

@@ -1,7 +1,8 @@
 //! Runs computed to their end, or to a time, while the caller waits.
 
 use super::computation::Computation;
-use super::threads::{Engine, EngineMessage};
+use super::message::EngineMessage;
+use super::threads::Engine;
 use crate::session::breakpoints::{Breakpoints, Condition, Hit, NamedValue};
 use crate::session::plan::{SessionError, SessionPlan};
 use crate::session::record::Recording;

@@ -1,4 +1,4 @@
-//! The rotations between the images of a log's cameras, from their pictures alone: what `check` holds the rig against.
+//! Rotations between the images of a log's cameras, from the images alone: `check` compares the rig with them.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -13,31 +13,32 @@ use crate::geometry::seconds_from_ns;
 use crate::log_check::ImageRotation;
 use crate::sensors::{CameraRig, Rig};
 
-/// Stretches of the log that are looked at, spread evenly.
-const STRETCHES: usize = 3;
-/// Length of each.
-const STRETCH_S: f64 = 5.0;
+/// Number of sections of the log that are used, spread evenly.
+const SECTIONS: usize = 3;
+/// Length of a section.
+const SECTION_S: f64 = 5.0;
 /// Standard deviation of a tracked pixel, per coordinate.
 const PIXEL_SIGMA_PX: f64 = 0.5;
-/// How far a camera may turn from one image to the next, about each axis; not what the rig says, which is to be judged.
-const TURN_SIGMA_RAD: f64 = 0.3;
+/// Standard deviation of a camera's rotation from one image to the next, about each axis; independent of the rig, which is
+/// to be checked.
+const ROTATION_SIGMA_RAD: f64 = 0.3;
 /// Fewer features in common give no rotation.
 const FEWEST_PAIRS: usize = 30;
-/// A smaller share of features that fit one motion gives no rotation.
-const LEAST_INLIER_SHARE: f64 = 0.6;
+/// A smaller ratio of inliers gives no rotation.
+const LEAST_INLIER_RATIO: f64 = 0.6;
 
-/// Rotations from image to image over some stretches of the log, for every camera of the rig that the log has.
+/// Rotations from image to image over some sections of the log, for every camera of the rig that the log has.
 ///
-/// Neither gyroscope nor encoders nor extrinsics enter. A camera whose images cannot be read has none; `check` says why.
+/// Independent of gyroscope, encoders and extrinsics. A camera whose images cannot be read has none; `check` reports why.
 pub fn image_rotations(log: &Arc<FlightLog>, rig: &Rig) -> Vec<ImageRotation> {
     let duration_s = seconds_from_ns(log.duration_ns());
-    let length_s = STRETCH_S.min(duration_s / STRETCHES as f64);
-    let stretch = |number: usize| {
-        let middle_s = duration_s * (number as f64 + 0.5) / STRETCHES as f64;
+    let length_s = SECTION_S.min(duration_s / SECTIONS as f64);
+    let section = |number: usize| {
+        let middle_s = duration_s * (number as f64 + 0.5) / SECTIONS as f64;
         middle_s - 0.5 * length_s
     };
     let jobs: Vec<(&CameraRig, f64)> =
-        rig.cameras.iter().flat_map(|camera| (0..STRETCHES).map(move |number| (camera, stretch(number)))).collect();
+        rig.cameras.iter().flat_map(|camera| (0..SECTIONS).map(move |number| (camera, section(number)))).collect();
     let found: Vec<Vec<ImageRotation>> =
         jobs.par_iter().map(|(camera, start_s)| rotations_of(log, rig, camera, *start_s, length_s)).collect();
     found.into_iter().flatten().collect()
@@ -70,7 +71,7 @@ fn rotations_of(
     rotations
 }
 
-/// The rotation that takes directions of the first camera into the second one, from the features that both see.
+/// Rotation `second_from_first` of the camera, from the features observed in both images.
 fn rotation_between(first: &TrackedFrame, second: &TrackedFrame, sigma_rad: f64) -> Option<UnitQuaternion<f64>> {
     let before: BTreeMap<FeatureId, Vector3<f64>> =
         first.features.iter().map(|feature| (feature.id, feature.bearing)).collect();
@@ -79,8 +80,8 @@ fn rotation_between(first: &TrackedFrame, second: &TrackedFrame, sigma_rad: f64)
     if pairs.len() < FEWEST_PAIRS {
         return None;
     }
-    let prior = RotationPrior { rotation: UnitQuaternion::identity(), sigma_rad: TURN_SIGMA_RAD };
+    let prior = RotationPrior { rotation: UnitQuaternion::identity(), sigma_rad: ROTATION_SIGMA_RAD };
     let best = relative_poses(&pairs, &prior, sigma_rad, second.stamp_ns.unsigned_abs()).into_iter().next()?;
-    let fits = best.inliers.len() as f64 >= LEAST_INLIER_SHARE * pairs.len() as f64;
+    let fits = best.inliers.len() as f64 >= LEAST_INLIER_RATIO * pairs.len() as f64;
     fits.then_some(best.camera_j_from_camera_i.rotation)
 }

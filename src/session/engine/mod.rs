@@ -12,6 +12,7 @@ mod configuration;
 mod fork;
 mod history;
 mod image_rotations;
+mod message;
 mod recompute;
 mod run_engine;
 mod step_inputs;
@@ -29,10 +30,11 @@ pub(in crate::session) use fork::apply_fork;
 pub(in crate::session) use history::History;
 pub use history::SnapshotUse;
 pub use image_rotations::image_rotations;
+pub(in crate::session) use message::EngineMessage;
 pub(in crate::session) use recompute::{Detail, RecomputeRequest, RecomputeThread, Recomputed, STEPS_AT_ONCE};
 #[cfg(test)]
 pub(in crate::session) use run_engine::RunEngine;
 #[cfg(test)]
 pub(in crate::session) use step_inputs::OwnedStepInput;
 pub use stopwatch::Stopwatch;
-pub(in crate::session) use threads::{Engine, EngineMessage};
+pub(in crate::session) use threads::Engine;

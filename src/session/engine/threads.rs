@@ -13,39 +13,17 @@ use std::thread::{Builder, JoinHandle};
 use super::computation::Computation;
 use super::configuration::estimator_config;
 use super::history::History;
+use super::message::EngineMessage;
 use super::run_engine::RunEngine;
 use super::step_inputs::OwnedStepInput;
 use super::synchronized_frames::SynchronizedFrames;
 use super::tracker::CameraTracker;
-use crate::flight_log::LogWarning;
 use crate::session::plan::{SessionError, SessionPlan, cameras_of_run};
-use crate::session::record::StepRecord;
 
 /// Frames that may wait between the tracker and an estimator.
 const QUEUED_FRAMES: usize = 8;
 /// Steps that may wait for whoever collects them.
 const QUEUED_STEPS: usize = 64;
-
-/// A message of a thread.
-#[derive(Debug)]
-pub(in crate::session) enum EngineMessage {
-    /// A run has computed a step.
-    Step {
-        /// Number of the run.
-        run: usize,
-        /// The step.
-        record: Box<StepRecord>,
-    },
-    /// A run has reached the end of the log, or failed for a reason that no restart cures.
-    Finished {
-        /// Number of the run.
-        run: usize,
-        /// Why it ended early.
-        error: Option<String>,
-    },
-    /// The log has something wrong with it.
-    Warnings(Vec<LogWarning>),
-}
 
 /// Running threads; dropping it stops them.
 #[derive(Debug)]

@@ -8,17 +8,17 @@ use crate::sensors::Rig;
 /// Which parameterization a run estimates in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ParameterizationChoice {
-    /// The minimal form in the chart that suits the mechanism.
+    /// The minimal parameterization, switched away from singularities of the mechanism.
     Auto,
     /// Eqs. 18–20 as printed (corrected).
     Minimal,
-    /// The end block swapped against gimbal lock.
+    /// The minimal parameterization with the end block swapped, away from the singularity of the printed one.
     MinimalSwapped,
     /// Eqs. 5–6, 12 + 4N columns.
     Classical,
-    /// The chart-free product of exponentials.
+    /// The product of exponentials, without singularities.
     Poe,
-    /// The rigid camera of the rig.
+    /// The rigid camera of the rig alone.
     Static,
     /// The gimbal camera as in `auto` and the rigid camera of the rig, in one window.
     Cluster,
@@ -48,7 +48,7 @@ impl ParameterizationChoice {
         NAMES.iter().find(|(_, choice)| *choice == self).map_or("auto", |(name, _)| name)
     }
 
-    /// Whether its runs go over to the other chart near a lock; a rig may ask for it in any minimal run.
+    /// Whether its runs switch to the other parameterization near a singularity; a rig may ask for it in any minimal run.
     pub fn switches_chart(self, rig: &Rig) -> bool {
         match self {
             Self::Auto | Self::Cluster => true,
@@ -74,15 +74,15 @@ pub struct RunSpec {
     pub encoder: bool,
     /// Whether the static calibration is estimated (`calibrate=off` clears it).
     pub calibrate: bool,
-    /// Whether the offsets of the clocks of cameras and encoders are estimated (`timeshift=on` sets it).
+    /// Whether the time offsets of cameras and encoders are estimated (`timeshift=on` sets it).
     pub timeshift: bool,
-    /// Whether derivatives are taken at first estimates (`first-estimates=off` clears it): without, priors come to claim what
-    /// nobody can measure.
+    /// Whether Jacobians are evaluated at first estimates, FEJ (`first-estimates=off` clears it): without, the prior gains
+    /// spurious information.
     pub first_estimates: bool,
     /// Number of keyframes in the window (`window=10`).
     pub window: usize,
-    /// Camera to watch (`camera=cam1`); `None` is the gimballed one, or the first rigid one for `static` and for rigs
-    /// without a gimbal. A `cluster` watches the first rigid one beside it.
+    /// Main camera (`camera=cam1`); `None` is the gimballed one, or the first rigid one for `static` and for rigs without a
+    /// gimbal. A `cluster` uses the first rigid one beside it.
     pub camera_key: Option<String>,
 }
 
@@ -219,7 +219,7 @@ fn on_or_off(value: &str) -> Result<bool, String> {
     }
 }
 
-/// Makes the labels of several runs differ, by a number behind the later ones.
+/// Makes the labels of several runs differ, by a number after the later ones.
 pub(in crate::session) fn distinct_labels(specs: &mut [RunSpec]) {
     for index in 1..specs.len() {
         let wanted = specs[index].label.clone();

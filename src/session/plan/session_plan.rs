@@ -1,4 +1,4 @@
-//! What a session is to do: a log, its rigs, the stretch of time, and the runs with the camera that each watches.
+//! What a session is to do: a log, its rigs, the time span, and the runs with the main camera of each.
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -18,10 +18,10 @@ pub const MAX_RUNS: usize = 4;
 /// Why a session cannot start.
 #[derive(Debug, Error)]
 pub enum SessionError {
-    /// The log, its rig or its truth cannot be read.
+    /// The log, its rig or its ground truth cannot be read.
     #[error(transparent)]
     Log(#[from] LogError),
-    /// The rig has no camera that the run can watch.
+    /// The rig has no camera for the run.
     #[error("run '{run}' needs {wanted}, but the rig '{rig}' has only {present}")]
     NoCamera {
         /// The run.
@@ -33,7 +33,7 @@ pub enum SessionError {
         /// The rig's cameras.
         present: String,
     },
-    /// More runs than can be told apart.
+    /// More runs than are shown side by side.
     #[error("{count} runs were asked for, at most {MAX_RUNS} fit side by side: leave some out")]
     TooManyRuns {
         /// How many.
@@ -47,54 +47,54 @@ pub enum SessionError {
     },
 }
 
-/// What to open.
+/// What to open, as on the command line.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SessionRequest {
     /// The log.
     pub log_path: PathBuf,
     /// The rig, when it is not beside the log or in it.
     pub rig_path: Option<PathBuf>,
-    /// The true values, when they are not beside the log.
+    /// The ground truth of the rig, when it is not beside the log.
     pub truth_path: Option<PathBuf>,
     /// The runs; none means one `auto`.
     pub specs: Vec<RunSpec>,
-    /// Seconds of the log to leave out at its begin.
+    /// Seconds of the log to leave out at its start.
     pub start_s: f64,
     /// Seconds to read from there, `None` to the end.
     pub duration_s: Option<f64>,
 }
 
-/// Everything that the threads of a session need, checked.
+/// A request whose log is open and whose runs have their cameras.
 #[derive(Clone, Debug)]
 pub struct SessionPlan {
     /// The opened log.
     pub log: Arc<FlightLog>,
-    /// Where it lies.
+    /// Its path.
     pub log_path: PathBuf,
     /// The rig's file, when it was named.
     pub rig_path: Option<PathBuf>,
-    /// The file of the true values, when it was named.
+    /// The file of the ground truth, when it was named.
     pub truth_path: Option<PathBuf>,
-    /// The rig that the runs are given.
+    /// The rig of the runs.
     pub rig: Arc<Rig>,
-    /// The rig with the true values.
+    /// The rig with the ground truth.
     pub truth_rig: Option<Arc<Rig>>,
     /// The runs and the main camera of each.
     pub runs: Vec<(RunSpec, String)>,
-    /// Seconds left out at the begin.
+    /// Seconds left out at the start.
     pub start_s: f64,
     /// Seconds to read.
     pub duration_s: Option<f64>,
-    /// Changes to the runs' estimators beyond what a specification can say, by run; a bench tries options with them.
+    /// Changes of the runs' configurations beyond their specifications, by run; benches try options with them.
     pub changes: Vec<fn(&mut EstimatorConfig)>,
     /// One report in so many frames keeps its linearization for whoever wants covariances; `None` keeps none.
     pub keep_linearization_every: Option<usize>,
-    /// How much memory what is recorded may take, in bytes: beyond it, steps are kept in outline and taken again when
-    /// somebody looks at them.
+    /// How much memory record and histories may take, in bytes: beyond it, only summaries of steps are kept, and steps at
+    /// the cursor are recomputed.
     pub memory_budget_bytes: usize,
 }
 
-/// What a recording may take, so that the whole process of a played log stays under 1.5 GiB.
+/// Memory for record and histories with which the whole process of a played log stays under 1.5 GiB.
 pub const DEFAULT_MEMORY_BUDGET_BYTES: usize = 1200 << 20;
 
 impl SessionPlan {
@@ -131,7 +131,7 @@ impl SessionPlan {
         })
     }
 
-    /// The calibration parameters that its runs may have, in whatever parameterization they come to be.
+    /// The calibration parameters of its runs, in all parameterizations.
     pub fn parameters(&self) -> Vec<ParameterId> {
         let mut parameters: Vec<ParameterId> = Vec::new();
         for (spec, camera_key) in &self.runs {
@@ -149,7 +149,7 @@ impl SessionPlan {
     }
 }
 
-/// The cameras that a run watches.
+/// The cameras of a run.
 #[derive(Clone, Debug)]
 pub(in crate::session) struct WatchedCameras<'rig> {
     /// The one whose image is shown.
@@ -165,7 +165,7 @@ impl<'rig> WatchedCameras<'rig> {
     }
 }
 
-/// Finds the cameras that a run watches.
+/// Finds the cameras of a run.
 pub(in crate::session) fn cameras_of_run<'rig>(
     rig: &'rig Rig,
     spec: &RunSpec,

@@ -5,12 +5,12 @@ use crate::session::plan::{ForkChanges, RunSpec};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlaybackSpeed(pub f64);
 
-/// What a person, a key or the command line may ask of a session; applied between two pictures, in one place.
+/// A command from a button, a key or the command line; applied between two frames of the window, in one place.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Command {
-    /// Let the cursor run.
+    /// Start playing.
     Play,
-    /// Hold the cursor.
+    /// Pause.
     Pause,
     /// Play when paused, pause when playing.
     TogglePlay,
@@ -18,12 +18,12 @@ pub enum Command {
     SetSpeed(PlaybackSpeed),
     /// Put the cursor at a time since the log began.
     Seek {
-        /// Where to, in nanoseconds.
+        /// Target, in nanoseconds.
         stamp_ns: i64,
     },
     /// Move the cursor by whole frames, backwards when negative.
     StepFrames(i64),
-    /// Look at the step at the cursor one iteration of its solver further, or back; beyond its ends at its neighbours.
+    /// Show the step at the cursor one iteration of its solver further, or back; beyond its ends, the neighbouring steps.
     StepIteration {
         /// Direction.
         forward: bool,
@@ -37,24 +37,23 @@ pub enum Command {
     AddBreakpoint(Condition),
     /// Give a breakpoint another condition.
     ChangeBreakpoint {
-        /// Which one.
+        /// Its number.
         number: usize,
-        /// When it is to be hit.
+        /// The new condition.
         condition: Condition,
     },
     /// Enable or disable a breakpoint.
     EnableBreakpoint {
-        /// Which one.
+        /// Its number.
         number: usize,
-        /// Whether it stops the cursor from now on.
+        /// Whether it stops the cursor.
         enabled: bool,
     },
-    /// Take a breakpoint away, by its number.
+    /// Remove a breakpoint, by its number.
     RemoveBreakpoint(usize),
-    /// Set a breakpoint at the frame of the cursor, or take it away.
+    /// Set a breakpoint at the frame of the cursor, or remove it.
     ToggleBreakpointHere,
-    /// Run to the next (`forward`) or the previous hit of a breakpoint; forward waits for the estimators where they have
-    /// not come there yet.
+    /// Run to the next (`forward`) or the previous hit of a breakpoint; forward waits for the estimators.
     RunToBreakpoint {
         /// Direction.
         forward: bool,
@@ -63,22 +62,22 @@ pub enum Command {
     GoToStart,
     /// To the last computed frame.
     GoToEnd,
-    /// Play a range over and over; `None` ends it.
+    /// Play a range in a loop; `None` ends it.
     SetLoop(Option<(i64, i64)>),
     /// Set or clear a marker at the cursor.
     ToggleMarker,
     /// Add a run over the same log.
     AddRun(RunSpec),
-    /// Let a run go on from the step at the cursor in another way, beside what it did.
+    /// Fork a run: continue it from the step at the cursor with changes, beside the run itself.
     Fork {
-        /// Number of the run to leave.
+        /// Number of the run.
         run: usize,
-        /// What to do otherwise.
+        /// What changes.
         changes: ForkChanges,
-        /// The fork's name; `None` for one made of what changes and when.
+        /// The fork's name; `None` for one made of changes and time.
         label: Option<String>,
     },
-    /// Take a run away, by its number.
+    /// Remove a run, by its number.
     RemoveRun(usize),
     /// Recompute the linearized rows of a step's factors; they come into [`RunRecord::factor_rows`] and stay requested
     /// while the cursor is at the step.

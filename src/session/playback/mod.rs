@@ -3,6 +3,7 @@
 mod command;
 mod cursor;
 mod recomputed_view;
+mod restore;
 mod runs;
 mod saved;
 mod session;

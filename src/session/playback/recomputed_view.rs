@@ -2,24 +2,9 @@
 
 use std::sync::Arc;
 
-use super::session::Session;
+use super::session::{FactorRowsView, Session};
 use crate::session::engine::{Detail, RecomputeRequest, STEPS_AT_ONCE};
 use crate::session::record::RunRecord;
-
-/// A step whose factor rows are shown.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct FactorRowsView {
-    /// [`RunRecord::id`].
-    run: u64,
-    step: usize,
-}
-
-impl FactorRowsView {
-    /// Whether the rows are in the record.
-    fn is_in(self, run: &RunRecord) -> bool {
-        run.factor_rows.as_ref().is_some_and(|rows| rows.step == self.step)
-    }
-}
 
 impl Session {
     /// Waits until everything that the view at the cursor needs is in the record.
@@ -68,7 +53,7 @@ impl Session {
                 requests.push(request(step, Detail::SolverStates(shown), false));
             }
             let rows = self.factor_rows.filter(|view| view.run == run.id && view.step == step);
-            if rows.is_some_and(|view| !view.is_in(run)) {
+            if rows.is_some() && run.factor_rows.as_ref().is_none_or(|rows| rows.step != step) {
                 requests.push(request(step, Detail::FactorRows, false));
             }
             // People step back: the steps before are recomputed while they look.

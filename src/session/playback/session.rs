@@ -5,7 +5,6 @@ use std::sync::Arc;
 
 use super::command::{Command, PlaybackSpeed};
 use super::cursor::{Cursor, MoveOutcome};
-use super::recomputed_view::FactorRowsView;
 use super::saved::Pending;
 use super::shared::SharedComputation;
 use crate::flight_log::ImageReader;
@@ -15,6 +14,15 @@ use crate::session::breakpoints::{Breakpoints, Condition};
 use crate::session::engine::{Computation, Engine, RecomputeThread};
 use crate::session::plan::{SessionError, SessionPlan, SessionRequest};
 use crate::session::record::{Recording, SolverPosition};
+
+/// A step whose factor rows are shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct FactorRowsView {
+    /// [`RunRecord::id`](crate::session::RunRecord::id).
+    pub(super) run: u64,
+    /// Number of the step.
+    pub(super) step: usize,
+}
 
 /// A log with its runs, computed on threads of their own, and a cursor that plays over the results.
 ///

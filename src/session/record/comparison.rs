@@ -1,4 +1,4 @@
-//! Two runs over the same log, frame by frame: how far they are apart, and where they part.
+//! Two runs over the same log, frame by frame: their differences, and where they diverge.
 
 use std::collections::BTreeSet;
 
@@ -43,7 +43,7 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    /// All of them, in their order, in which a difference usually spreads.
+    /// All of them, in the order in which a difference usually spreads.
     pub const ALL: [Self; 14] = [
         Self::Phase,
         Self::Tracks,
@@ -61,8 +61,8 @@ impl Quantity {
         Self::RankInformed,
     ];
 
-    /// Its name, its unit as stored, and from where on a difference is worth a look: a centimetre and a tenth of a degree
-    /// show in a flight, a millimetre and the same angle in a calibration, and biases by what they move in a second.
+    /// Its name, its unit as stored, and the threshold of a notable difference: a centimetre and a tenth of a degree for a
+    /// trajectory, a millimetre and the same angle for a calibration, and for biases what they change in a second.
     const fn facts(self) -> (&'static str, &'static str, f64) {
         match self {
             Self::Phase => ("phase", "", 1.0),
@@ -92,13 +92,13 @@ impl Quantity {
         self.facts().1
     }
 
-    /// From where on a difference is worth a look, in its unit.
+    /// Threshold of a notable difference, in its unit.
     pub const fn notable(self) -> f64 {
         self.facts().2
     }
 
-    /// How far two steps of the same instant are apart, the second one's world turned and shifted by `gauge`; `None` where
-    /// one of them does not have it.
+    /// Difference of two steps of the same stamp, the second one's world rotated and translated by `gauge`
+    /// (`world_a_from_world_b`); `None` where one of them does not have the quantity.
     pub fn difference(self, a: &StepRecord, b: &StepRecord, gauge: &RigidTransform) -> Option<f64> {
         let frames = || Some((a.report.newest()?, b.report.newest()?));
         let flag = |differ: bool| Some(f64::from(u8::from(differ)));
@@ -147,7 +147,7 @@ impl Quantity {
         }
     }
 
-    /// Whether it can be compared between runs that watch other cameras.
+    /// Whether it can be compared between runs on different cameras.
     const fn is_of_the_vehicle(self) -> bool {
         !matches!(
             self,
@@ -175,39 +175,39 @@ fn tracks_apart(a: &StepRecord, b: &StepRecord) -> f64 {
     ids(a).symmetric_difference(&ids(b)).count() as f64
 }
 
-/// Where two runs part in one quantity.
+/// Where two runs diverge in one quantity.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Parting {
-    /// The first instant at which it is not the same number.
+pub struct Divergence {
+    /// Stamp of the first divergence: the numbers are not equal.
     pub exact_ns: Option<i64>,
-    /// The first instant at which the difference is worth a look.
+    /// Stamp of the first notable divergence: the difference reaches [`Quantity::notable`].
     pub notable_ns: Option<i64>,
-    /// The largest difference and its instant.
+    /// The largest difference and its stamp.
     pub largest: Option<(f64, i64)>,
 }
 
-/// A run held against a reference, growing as they grow.
+/// A run compared with a reference, growing as they grow.
 ///
-/// Where both have a pose for the first time, the run's world is laid on the reference's by yaw and position, the freedom
-/// that odometry has; a fork has its parent's world as it is.
+/// At the first stamp at which both have a pose, the run's world is aligned with the reference's by yaw and position, the
+/// gauge freedom of visual-inertial odometry; a fork has its parent's world as it is.
 #[derive(Clone, Debug, Default)]
 pub struct Comparison {
     runs: Option<(u64, u64)>,
     read: (usize, usize),
     gauge: Option<RigidTransform>,
     same_camera: bool,
-    /// Stamps of the instants that both have, since the log began.
+    /// Stamps that both have, since the log began.
     pub stamps_ns: Vec<i64>,
     /// Differences by the number of the quantity and the row; not-a-number where one run does not have it.
     pub columns: [Vec<f64>; Quantity::ALL.len()],
-    /// Where they part, by the number of the quantity.
-    pub partings: [Parting; Quantity::ALL.len()],
-    /// Changes when rows were forgotten.
+    /// Where they diverge, by the number of the quantity.
+    pub divergences: [Divergence; Quantity::ALL.len()],
+    /// Changes when rows were dropped.
     pub epoch: u64,
 }
 
 impl Comparison {
-    /// Reads the steps that have come since the last call; begins anew with other runs.
+    /// Reads the steps that are new since the last call; restarts with other runs.
     pub fn read(&mut self, reference: &RunRecord, run: &RunRecord) {
         let shrunk = self.read.0 > reference.steps.len() || self.read.1 > run.steps.len();
         if self.runs != Some((reference.id, run.id)) || shrunk {
@@ -239,22 +239,22 @@ impl Comparison {
             let apart = quantity.difference(a, b, &gauge).filter(|_| comparable);
             self.columns[index].push(apart.unwrap_or(f64::NAN));
             let Some(apart) = apart else { continue };
-            let parting = &mut self.partings[index];
-            // As they are, without the gauge: its own rounding is no difference.
-            if parting.exact_ns.is_none() {
+            let divergence = &mut self.divergences[index];
+            // Without the gauge, whose own rounding is no difference.
+            if divergence.exact_ns.is_none() {
                 let as_they_are = quantity.difference(a, b, &RigidTransform::default());
-                parting.exact_ns = as_they_are.filter(|apart| *apart != 0.0).map(|_| stamp_ns);
+                divergence.exact_ns = as_they_are.filter(|apart| *apart != 0.0).map(|_| stamp_ns);
             }
             if apart >= quantity.notable() {
-                parting.notable_ns.get_or_insert(stamp_ns);
+                divergence.notable_ns.get_or_insert(stamp_ns);
             }
-            if parting.largest.is_none_or(|(largest, _)| apart > largest) {
-                parting.largest = Some((apart, stamp_ns));
+            if divergence.largest.is_none_or(|(largest, _)| apart > largest) {
+                divergence.largest = Some((apart, stamp_ns));
             }
         }
     }
 
-    /// The difference at the last common instant at or before a time.
+    /// The difference at the last common stamp at or before a time.
     pub fn at(&self, quantity: Quantity, stamp_ns: i64) -> Option<f64> {
         let row = self.stamps_ns.partition_point(|stamp| *stamp <= stamp_ns).checked_sub(1)?;
         self.column(quantity).get(row).copied().filter(|apart| apart.is_finite())
@@ -265,34 +265,36 @@ impl Comparison {
         &self.columns[quantity as usize]
     }
 
-    /// Where the runs part in a quantity.
-    pub fn parting(&self, quantity: Quantity) -> &Parting {
-        &self.partings[quantity as usize]
+    /// Where the runs diverge in a quantity.
+    pub fn divergence(&self, quantity: Quantity) -> &Divergence {
+        &self.divergences[quantity as usize]
     }
 
-    /// The first instant at which anything is not the same number, with what it is.
+    /// The first divergence in any quantity, with the quantity.
     pub fn first_exact(&self) -> Option<(i64, Quantity)> {
-        self.first(|parting| parting.exact_ns)
+        self.first(|divergence| divergence.exact_ns)
     }
 
-    /// The first instant at which a difference is worth a look, with what differs.
+    /// The first notable divergence in any quantity, with the quantity.
     pub fn first_notable(&self) -> Option<(i64, Quantity)> {
-        self.first(|parting| parting.notable_ns)
+        self.first(|divergence| divergence.notable_ns)
     }
 
-    fn first(&self, of: impl Fn(&Parting) -> Option<i64>) -> Option<(i64, Quantity)> {
-        let known = self.partings.iter().zip(Quantity::ALL);
-        known.filter_map(|(parting, quantity)| Some((of(parting)?, quantity))).min_by_key(|(stamp_ns, _)| *stamp_ns)
+    fn first(&self, of: impl Fn(&Divergence) -> Option<i64>) -> Option<(i64, Quantity)> {
+        let known = self.divergences.iter().zip(Quantity::ALL);
+        known
+            .filter_map(|(divergence, quantity)| Some((of(divergence)?, quantity)))
+            .min_by_key(|(stamp_ns, _)| *stamp_ns)
     }
 }
 
-/// The turn about the vertical and the shift that lay one pose on another; the identity for equal ones.
+/// The rotation about the vertical and the translation that align one pose with another; the identity for equal ones.
 fn yaw_and_position(onto: &RigidTransform, from: &RigidTransform) -> RigidTransform {
     if onto == from {
         return RigidTransform::default();
     }
-    let turn = onto.rotation * from.rotation.inverse();
-    let yaw = 2.0 * turn.k.atan2(turn.w);
+    let rotation = onto.rotation * from.rotation.inverse();
+    let yaw = 2.0 * rotation.k.atan2(rotation.w);
     let rotation = UnitQuaternion::from_axis_angle(&nalgebra::Vector3::z_axis(), yaw);
     RigidTransform::new(rotation, onto.translation_m - rotation * from.translation_m)
 }
@@ -308,7 +310,7 @@ mod tests {
     }
 
     #[test]
-    fn a_run_against_itself_never_parts() {
+    fn a_run_against_itself_never_diverges() {
         let run = recorded(&flight(), "auto");
         let mut comparison = Comparison::default();
         comparison.read(&run, &run);
@@ -321,7 +323,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_changed_parts_at_its_frame_and_the_rest_stays() {
+    fn a_change_diverges_at_its_frame_and_the_rest_stays() {
         let run = recorded(&flight(), "auto");
         let mut other = run.clone();
         let at = run.steps.len() - 20;
@@ -339,9 +341,9 @@ mod tests {
         let stamp_ns = |number: usize| run.steps[number].report.stamp_ns;
         assert_eq!(comparison.first_exact(), Some((stamp_ns(at), Quantity::Position)));
         assert_eq!(comparison.first_notable(), Some((stamp_ns(at + 2), Quantity::Position)));
-        let parting = comparison.parting(Quantity::Position);
-        let (largest, largest_ns) = parting.largest.unwrap();
-        assert!((largest - 0.08).abs() < 1e-9 && largest_ns == stamp_ns(at + 19), "{parting:?}");
+        let divergence = comparison.divergence(Quantity::Position);
+        let (largest, largest_ns) = divergence.largest.unwrap();
+        assert!((largest - 0.08).abs() < 1e-9 && largest_ns == stamp_ns(at + 19), "{divergence:?}");
         assert_eq!(comparison.at(Quantity::Velocity, stamp_ns(at + 19)), Some(0.0));
         let epoch = comparison.epoch;
         comparison.read(&run, &run);

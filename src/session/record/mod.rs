@@ -10,7 +10,7 @@ mod step;
 mod summary;
 mod warnings;
 
-pub use comparison::{Comparison, Parting, Quantity};
+pub use comparison::{Comparison, Divergence, Quantity};
 pub use recording::Recording;
 pub use run::{ForkOrigin, RunMemory, RunRecord};
 pub use run_accuracy::{ChainDistance, RELATIVE_LENGTHS_M, RelativeAccuracy, TrajectoryAccuracy};

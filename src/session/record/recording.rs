@@ -8,20 +8,20 @@ use crate::geometry::ns_from_seconds;
 use crate::sensors::Rig;
 use crate::session::plan::SessionPlan;
 
-/// Everything computed so far about one log.
+/// The reports of all runs over one log so far.
 #[derive(Clone, Debug)]
 pub struct Recording {
-    /// Where the log lies.
+    /// Path of the log.
     pub log_path: PathBuf,
-    /// The rig the runs were given.
+    /// The rig of the runs.
     pub rig: Arc<Rig>,
-    /// The rig with the true values, when known.
+    /// The rig with the ground truth, when known.
     pub truth_rig: Option<Arc<Rig>>,
     /// Length of the log in nanoseconds.
     pub duration_ns: i64,
     /// Where the runs start, in nanoseconds since the log began.
     pub start_ns: i64,
-    /// Absolute header stamp of the log's begin, in nanoseconds since the epoch.
+    /// Absolute header stamp of the log's start, in nanoseconds since the epoch.
     pub epoch_ns: i64,
     /// Runs in the order they were asked for.
     pub runs: Vec<RunRecord>,

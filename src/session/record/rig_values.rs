@@ -6,11 +6,11 @@ use crate::gimbal::{Chain, NearestForm, ParameterId, Parameterization};
 use crate::sensors::Rig;
 
 impl RunRecord {
-    /// What a rig says about the columns of the run's calibration, by name, in the parameterization of an estimate; `None`
-    /// when the rig does not have the cameras.
+    /// The rig's values of the calibration parameters of the run in the parameterization of an estimate; radians,
+    /// metres and seconds. `None` when the rig does not have the cameras.
     ///
-    /// Of the equivalent numbers of the classical form it takes those nearest to what `given` says, the rig that the run
-    /// began with: in those the run counts.
+    /// Of the equivalent values of the classical parameterization it takes those nearest to `given`, the rig that the run
+    /// started with: the run estimates near those.
     pub fn values_in(&self, rig: &Rig, given: &Rig, estimate: &CalibrationEstimate) -> Option<Vec<(ParameterId, f64)>> {
         let main = rig.chain_of_camera(&self.camera_key)?;
         let parameterization = estimate.parameterization.parse().ok()?;
@@ -28,9 +28,9 @@ impl RunRecord {
         Some(values)
     }
 
-    /// How mechanisms are said in a parameterization, with the numbers nearest to the rig's where there is a choice; the
-    /// prior deviations of the estimate weigh them where it is of that parameterization. `None` when the rig does not have
-    /// the camera.
+    /// The conversion of mechanisms to a parameterization, with the values nearest to the rig's where several are
+    /// equivalent; the prior standard deviations of the estimate weigh them where it has that parameterization. `None` when
+    /// the rig does not have the camera.
     pub fn form_in(
         &self,
         given: &Rig,

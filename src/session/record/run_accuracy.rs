@@ -1,4 +1,4 @@
-//! How well a run did against the truth: its trajectory and its chain.
+//! Errors of a run's trajectory and chain against ground truth.
 
 use super::run::RunRecord;
 use crate::geometry::{seconds_from_ns, so3};
@@ -7,24 +7,24 @@ use crate::session::accuracy::{
     Alignment, ErrorStatistics, RelativeDelta, StampedPose, absolute_errors_m, align, path_length_m, relative_errors,
 };
 
-/// Stretches over which the relative error is given, in metres.
+/// Lengths of the sub-trajectories of the relative error, in metres.
 pub const RELATIVE_LENGTHS_M: [f64; 3] = [5.0, 10.0, 25.0];
 
-/// Errors of a trajectory, laid on the truth by yaw and position.
+/// Errors of a trajectory, aligned with the ground truth by yaw and position.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrajectoryAccuracy {
     /// Length of the true path over the estimated frames, in metres.
     pub length_m: f64,
     /// Position errors in metres.
     pub absolute_m: ErrorStatistics,
-    /// Relative errors by the length of their stretches; lengths that the path does not have are left out.
+    /// Relative errors by the length of the sub-trajectories, where the path is long enough.
     pub relative: Vec<RelativeAccuracy>,
 }
 
-/// Relative errors over stretches of one length.
+/// Relative errors over sub-trajectories of one length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RelativeAccuracy {
-    /// Path length of a stretch in metres.
+    /// Path length of a sub-trajectory in metres.
     pub delta_m: f64,
     /// Translation errors in metres.
     pub translation_m: ErrorStatistics,
@@ -32,17 +32,17 @@ pub struct RelativeAccuracy {
     pub rotation_rad: ErrorStatistics,
 }
 
-/// How far a chain is from another one over the joint angles that a run has visited.
+/// Error of a chain against a reference over the joint angles of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ChainDistance {
-    /// Distances of the camera's positions in metres.
+    /// Position errors of the camera in metres.
     pub translation_m: ErrorStatistics,
-    /// Angles between its attitudes in radians.
+    /// Attitude errors of the camera in radians.
     pub rotation_rad: ErrorStatistics,
 }
 
 impl TrajectoryAccuracy {
-    /// Errors of estimated poses against true ones, `None` with too few pairs to lay one on the other.
+    /// Errors of estimated poses against ground truth, `None` with too few pairs to align them.
     pub fn of(pairs: &[(StampedPose, StampedPose)]) -> Option<Self> {
         let transform = align(pairs, Alignment::YawPosition)?;
         let relative = RELATIVE_LENGTHS_M.into_iter().filter_map(|delta_m| {
@@ -62,7 +62,7 @@ impl TrajectoryAccuracy {
 }
 
 impl RunRecord {
-    /// The estimated pose of each frame and the true one, where both are known.
+    /// Estimated `world_from_imu` of each frame with its ground truth, where both are known.
     pub fn pairs_with_truth(&self) -> Vec<(StampedPose, StampedPose)> {
         self.steps
             .iter()
@@ -74,15 +74,15 @@ impl RunRecord {
             .collect()
     }
 
-    /// How far one chain is from another over the joint angles of the run's frames, `None` before the first pose.
+    /// Error of a chain against a reference over the joint angles of the run's frames, `None` before the first pose.
     pub fn chain_distance(&self, chain: &ClassicalChain, reference: &ClassicalChain) -> Option<ChainDistance> {
         let newest = self.steps.iter().filter_map(|step| step.report.newest());
         let (translations, rotations): (Vec<f64>, Vec<f64>) = newest
             .map(|newest| {
                 let estimate = chain.imu_from_camera(&newest.joint_angles_rad);
                 let reference = reference.imu_from_camera(&newest.joint_angles_rad);
-                let turn = reference.rotation.inverse() * estimate.rotation;
-                ((estimate.translation_m - reference.translation_m).norm(), so3::log(&turn).norm())
+                let reference_from_estimate = reference.rotation.inverse() * estimate.rotation;
+                ((estimate.translation_m - reference.translation_m).norm(), so3::log(&reference_from_estimate).norm())
             })
             .unzip();
         Some(ChainDistance {

@@ -1,10 +1,10 @@
-//! Looking at one step as the solver went through it.
+//! The solver's states in one step.
 
 use std::sync::Arc;
 
 use super::step::StepRecord;
 
-/// Where in the solver's work a step is looked at.
+/// The solver's iteration at which a step is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SolverPosition {
     /// After so many iterations; 0 is before the first.
@@ -14,7 +14,7 @@ pub enum SolverPosition {
 }
 
 impl SolverPosition {
-    /// The number of iterations that it means in a step of so many, from 0 to all of them.
+    /// The number of iterations done, in a step of so many.
     pub fn of(self, iterations: usize) -> usize {
         match self {
             Self::AfterFirst(count) => count.min(iterations),
@@ -22,7 +22,7 @@ impl SolverPosition {
         }
     }
 
-    /// One iteration further (or back) in a step of so many, `None` beyond its end.
+    /// One iteration further (or back) in a step of so many, `None` beyond its ends.
     pub fn moved(self, forward: bool, iterations: usize) -> Option<Self> {
         let at = self.of(iterations);
         let next = if forward { at.checked_add(1) } else { at.checked_sub(1) };
@@ -30,7 +30,7 @@ impl SolverPosition {
     }
 }
 
-/// The states that the solver went through in one step of a run.
+/// The solver's states in one step of a run, as records.
 #[derive(Clone, Debug)]
 pub struct SolverTrace {
     /// Number of the step.
@@ -47,7 +47,7 @@ impl SolverTrace {
         self.records.get(self.at)
     }
 
-    /// Number of iterations that the step took.
+    /// Number of iterations of the step.
     pub fn iterations(&self) -> usize {
         self.records.len().saturating_sub(1)
     }

@@ -1,0 +1,211 @@
+//! Sessions saved and opened again.
+
+use std::path::PathBuf;
+
+use super::saved::{Pending, SavedBreakpoint, SavedFork, SavedLog, SavedSession, SavedSessionError, VERSION, part};
+use super::session::Session;
+use crate::session::breakpoints::Condition;
+use crate::session::plan::{ForkChanges, SessionPlan};
+
+impl SavedSession {
+    /// Opens the log and starts the runs; forks are made as their parents reach the first own step, and the cursor is put at
+    /// its position as soon as all runs have reached it.
+    pub fn open(&self) -> Result<Session, SavedSessionError> {
+        let plan = SessionPlan::open(&self.request()?)?;
+        let conditions: Result<Vec<Condition>, _> = self.breakpoints.iter().map(|it| it.condition.parse()).collect();
+        let conditions = conditions.map_err(part)?;
+        let mut forks = Vec::new();
+        for fork in &self.forks {
+            let changes: ForkChanges = fork.changes.parse().map_err(part)?;
+            forks.push((fork.clone(), changes));
+        }
+        let same = (plan.log.size_bytes(), plan.log.checksum()) == (self.log.bytes, self.log.crc32);
+        let mut session = Session::start(plan)?;
+        if !same {
+            let text = "The log is not the one that the session was saved with: its bytes differ";
+            session.notices.push(text.to_owned());
+        }
+        session.change_breakpoints(|all| {
+            for (number, (condition, saved)) in conditions.into_iter().zip(&self.breakpoints).enumerate() {
+                all.add(condition);
+                all.enable(number, saved.enabled);
+            }
+        });
+        session.markers_ns.clone_from(&self.markers_ns);
+        session.markers_ns.sort_unstable();
+        session.pending = Pending { forks, cursor_ns: Some(self.cursor_ns) };
+        session.layout.clone_from(&self.layout);
+        Ok(session)
+    }
+}
+
+impl Session {
+    /// The session for a file; `layout` is the layout of the panels.
+    pub fn saved(&self, layout: Option<serde_json::Value>) -> SavedSession {
+        let recording = self.recording();
+        let log = &self.plan.log;
+        let absolute = |path: &PathBuf| std::path::absolute(path).unwrap_or_else(|_| path.clone());
+        let name_of = |id: u64| recording.runs.iter().find(|run| run.id == id).map(|run| run.spec.label.clone());
+        let forks = recording.runs.iter().filter_map(|run| {
+            let origin = run.origin.as_ref()?;
+            Some(SavedFork {
+                parent: name_of(origin.parent)?,
+                name: run.spec.label.clone(),
+                stamp_ns: origin.stamp_ns,
+                changes: origin.changes.to_string(),
+            })
+        });
+        let pending = self.pending.forks.iter().map(|(fork, _)| fork.clone());
+        let breakpoints = self.breakpoints.list().iter().map(|breakpoint| SavedBreakpoint {
+            condition: breakpoint.condition.text().to_owned(),
+            enabled: breakpoint.enabled,
+        });
+        SavedSession {
+            session_version: VERSION,
+            log: SavedLog { path: absolute(&self.plan.log_path), bytes: log.size_bytes(), crc32: log.checksum() },
+            rig: self.plan.rig_path.as_ref().map(absolute),
+            truth: self.plan.truth_path.as_ref().map(absolute),
+            start_s: self.plan.start_s,
+            duration_s: self.plan.duration_s,
+            runs: recording.runs.iter().filter(|run| run.origin.is_none()).map(|run| run.spec.to_string()).collect(),
+            forks: forks.chain(pending).collect(),
+            breakpoints: breakpoints.collect(),
+            markers_ns: self.markers_ns().to_vec(),
+            cursor_ns: self.pending.cursor_ns.unwrap_or(self.cursor.stamp_ns),
+            layout,
+        }
+    }
+
+    /// Waits until all runs are computed, all forks of a saved session are made, and the cursor is at its position.
+    pub fn finish(&mut self) {
+        /// Period of the check, in milliseconds.
+        const CHECK_MS: u64 = 5;
+        let open = |session: &Self| {
+            let pending = !session.pending.forks.is_empty() || session.pending.cursor_ns.is_some();
+            pending || session.recording().runs.iter().any(|run| !run.finished)
+        };
+        while open(self) {
+            self.advance(0.0);
+            std::thread::sleep(std::time::Duration::from_millis(CHECK_MS));
+        }
+        self.advance(0.0);
+    }
+
+    /// The layout of the panels when the session was saved.
+    pub fn layout(&self) -> Option<&serde_json::Value> {
+        self.layout.as_ref()
+    }
+
+    /// Makes the forks whose parents have reached them, and puts the cursor at its saved position.
+    pub(in crate::session) fn resume(&mut self) {
+        let recording = self.recording();
+        if let Some((fork, changes)) = self.pending.forks.first().cloned() {
+            let parent = recording.runs.iter().position(|run| run.spec.label == fork.parent);
+            let run = parent.and_then(|parent| recording.runs.get(parent));
+            let reached =
+                run.and_then(|run| run.steps.last()).is_some_and(|last| last.report.stamp_ns >= fork.stamp_ns);
+            if let (Some(parent), true) = (parent, reached) {
+                self.pending.forks.remove(0);
+                if let Err(problem) = self.fork_at(parent, fork.stamp_ns, &changes, Some(fork.name)) {
+                    self.notices.push(problem);
+                }
+            } else if run.is_none_or(|run| run.finished) {
+                self.pending.forks.remove(0);
+                let text = format!(
+                    "The fork {} cannot be made again: {} does not reach its first step",
+                    fork.name, fork.parent
+                );
+                self.notices.push(text);
+            }
+        }
+        if let Some(cursor_ns) = self.pending.cursor_ns
+            && self.pending.forks.is_empty()
+            && recording.computed_ns() >= cursor_ns.min(recording.last_stamp_ns())
+            && (recording.computed_ns() >= cursor_ns || recording.runs.iter().all(|run| run.finished))
+        {
+            self.pending.cursor_ns = None;
+            self.cursor = self.cursor.seek(&recording, cursor_ns);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::session::plan::SessionRequest;
+    use crate::session::playback::Command;
+
+    fn garden(duration_s: f64) -> SessionPlan {
+        let request = SessionRequest {
+            log_path: PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("sample_logs/garden.mcap"),
+            duration_s: Some(duration_s),
+            ..SessionRequest::default()
+        };
+        SessionPlan::open(&request).unwrap()
+    }
+
+    fn settled(session: &mut Session) {
+        let busy = |session: &Session| {
+            session.pending.cursor_ns.is_some() || session.recording().runs.iter().any(|run| !run.finished)
+        };
+        while busy(session) {
+            session.advance(0.0);
+            std::thread::sleep(std::time::Duration::from_millis(10));
+        }
+    }
+
+    #[test]
+    fn a_session_comes_back_as_it_was_saved() {
+        // More steps than are spared when memory runs short.
+        let mut session = Session::start(garden(4.5)).unwrap();
+        settled(&mut session);
+        session.apply(Command::AddBreakpoint("features < 40".parse().unwrap()));
+        session.apply(Command::AddBreakpoint("rank < 18 and tracking".parse().unwrap()));
+        session.apply(Command::EnableBreakpoint { number: 0, enabled: false });
+        session.apply(Command::GoToEnd);
+        session.apply(Command::StepFrames(-4));
+        session.apply(Command::ToggleMarker);
+        let changes: ForkChanges = "classical,freeze=yaw.d".parse().unwrap();
+        session.apply(Command::Fork { run: 0, changes, label: None });
+        assert!(session.take_notices().is_empty());
+        settled(&mut session);
+        session.apply(Command::StepFrames(1));
+        let layout = serde_json::json!({ "panels": [1, 2] });
+        let saved = session.saved(Some(layout.clone()));
+        assert_eq!(SavedSession::from_text(&saved.to_text()).unwrap(), saved);
+
+        let mut again = SavedSession::from_text(&saved.to_text()).unwrap().open().unwrap();
+        settled(&mut again);
+        assert!(again.take_notices().is_empty());
+        assert_eq!(again.layout(), Some(&layout));
+        assert_eq!(again.saved(Some(layout)), saved);
+        let (before, after) = (session.recording(), again.recording());
+        assert_eq!(before.runs.len(), after.runs.len());
+        // With less memory older steps become summaries at once.
+        assert!(after.runs.iter().all(|run| run.memory.summaries == 0));
+        again.apply(Command::SetMemoryBudget(1 << 20));
+        let thin = again.recording();
+        assert!(thin.memory_budget_bytes == 1 << 20 && thin.memory_bytes() < after.memory_bytes());
+        assert!(thin.runs[0].memory.summaries > 0);
+        for (before, after) in before.runs.iter().zip(&after.runs) {
+            let newest = |run: &crate::session::RunRecord| run.steps.last().unwrap().report.window.clone();
+            assert_eq!(newest(before), newest(after));
+        }
+    }
+
+    #[test]
+    fn what_is_no_session_is_refused() {
+        let saved = Session::start(garden(3.0)).unwrap().saved(None);
+        let refused = |text: &str| SavedSession::from_text(text).unwrap_err().to_string();
+        assert!(refused("hello").contains("no saved session"));
+        assert!(refused("{}").contains("session_version"));
+        assert!(refused("{\"session_version\": 9}").contains("version 9"));
+        let problem = |saved: SavedSession| saved.open().err().map(|error| error.to_string()).unwrap_or_default();
+        assert!(problem(SavedSession { runs: vec!["minimol".to_owned()], ..saved.clone() }).contains("minimol"));
+        let breakpoints = vec![SavedBreakpoint { condition: "rank <".to_owned(), enabled: true }];
+        assert!(problem(SavedSession { breakpoints, ..saved.clone() }).contains("column 7"));
+        let log = SavedLog { crc32: saved.log.crc32 ^ 1, ..saved.log.clone() };
+        let mut other = SavedSession { log, ..saved }.open().unwrap();
+        assert!(other.take_notices()[0].contains("not the one"));
+    }
+}
