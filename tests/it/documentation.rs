@@ -11,7 +11,8 @@ fn root() -> &'static Path {
 
 /// All Rust files below a folder, in order of their paths.
 fn rust_files(folder: &Path, found: &mut Vec<PathBuf>) {
-    let mut entries: Vec<PathBuf> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    let entries = fs::read_dir(folder).expect("the folder can be listed");
+    let mut entries: Vec<PathBuf> = entries.map(|entry| entry.expect("the entry can be read").path()).collect();
     entries.sort();
     for path in entries {
         if path.is_dir() {

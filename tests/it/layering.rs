@@ -53,18 +53,18 @@ fn sources() -> Vec<Source> {
     let mut open = vec![root.clone()];
     let mut sources = Vec::new();
     while let Some(folder) = open.pop() {
-        for entry in fs::read_dir(&folder).unwrap() {
-            let path = entry.unwrap().path();
+        for entry in fs::read_dir(&folder).expect("the folder can be listed") {
+            let path = entry.expect("the entry can be read").path();
             if path.is_dir() {
                 open.push(path);
             } else if path.extension().is_some_and(|extension| extension == "rs") {
-                let inside = path.strip_prefix(&root).unwrap();
-                let first = inside.components().next().unwrap().as_os_str().to_string_lossy();
+                let inside = path.strip_prefix(&root).expect("the file is below the root");
+                let first = inside.components().next().expect("the path has a name").as_os_str().to_string_lossy();
                 let test = inside.iter().any(|part| {
                     let part = part.to_string_lossy();
                     part.starts_with("tests") || part.ends_with("_tests.rs")
                 });
-                let text = code_of(&fs::read_to_string(&path).unwrap());
+                let text = code_of(&fs::read_to_string(&path).expect("the source is UTF-8"));
                 sources.push(Source { folder: first.trim_end_matches(".rs").to_owned(), text, test, path });
             }
         }
@@ -78,7 +78,7 @@ fn sources() -> Vec<Source> {
 fn code_of(text: &str) -> String {
     let end = text.find("#[cfg(test)]\nmod tests {").unwrap_or(text.len());
     let lines = text[..end].lines().map(|line| line.find("//").map_or(line, |comment| &line[..comment]));
-    lines.fold(String::new(), |code, line| code + line + "\n")
+    lines.flat_map(|line| [line, "\n"]).collect()
 }
 
 /// Names that stand directly behind `crate::` or `dcvins::`, groups in braces included.

@@ -43,9 +43,15 @@ pub(crate) fn column_blocks(layout: &Layout, parameters: &[ParameterId], frames:
             push(ColumnId::Calibration(*parameter), 1);
         }
     }
-    frames.iter().for_each(|frame| push(ColumnId::Joints(*frame), layout.joints));
-    frames.iter().for_each(|frame| push(ColumnId::Pose(*frame), POSE));
-    frames.iter().for_each(|frame| push(ColumnId::VelocityBias(*frame), VELOCITY_BIAS));
+    for frame in frames {
+        push(ColumnId::Joints(*frame), layout.joints);
+    }
+    for frame in frames {
+        push(ColumnId::Pose(*frame), POSE);
+    }
+    for frame in frames {
+        push(ColumnId::VelocityBias(*frame), VELOCITY_BIAS);
+    }
     blocks
 }
 
