@@ -42,7 +42,7 @@ fn variants() -> Vec<Variant> {
             config.options.track_continuation = TrackContinuation::Reuse;
         }),
         changed("anchor's measurement forgotten", |config| {
-            config.options.track_continuation = TrackContinuation::ForgetAnchor;
+            config.options.track_continuation = TrackContinuation::DropAnchor;
         }),
         changed("12 iterations", |config| config.options.iterations = 12),
         changed("inertial noise × 2", |config| config.options.imu_noise_factor = 2.0),

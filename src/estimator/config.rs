@@ -6,12 +6,12 @@ use crate::geometry::RigidTransform;
 use crate::gimbal::{Chain, ClassicalChain, ParameterId, Parameterization};
 use crate::sensors::{CameraMount, CameraRig, ImuNoise, Rig, UnknownCamera};
 
-/// What an estimator is told once.
+/// Configuration of an estimator: sensors, calibration as given, options.
 #[derive(Clone, Debug)]
 pub struct EstimatorConfig {
     /// The camera that it watches.
     pub camera: CameraModel,
-    /// Noise of the inertial sensor.
+    /// Noise of the IMU.
     pub imu_noise: ImuNoise,
     /// Magnitude of gravity in m/s².
     pub gravity_m_per_s2: f64,
@@ -19,7 +19,7 @@ pub struct EstimatorConfig {
     pub chain: ClassicalChain,
     /// The form in which the mount is estimated.
     pub parameterization: Parameterization,
-    /// Whether the minimal form may change its chart when it comes near a lock.
+    /// Whether the minimal parameterization may switch to another one near a singularity.
     pub auto_chart: bool,
     /// Standard deviation of an encoder reading, `None` without encoders.
     pub encoder_sigma_rad: Option<f64>,
@@ -29,7 +29,7 @@ pub struct EstimatorConfig {
     pub calibrate: bool,
     /// Standard deviations of the given chain's numbers, in metres and radians; `None` for [`DEFAULT_CHAIN_PRIOR`].
     pub chain_prior: Option<(f64, f64)>,
-    /// Whether the offsets of the clocks of cameras and encoders against the inertial sensor's are estimated as well; only
+    /// Whether the offsets of the clocks of cameras and encoders against the IMU's are estimated as well; only
     /// together with `calibrate`.
     pub estimate_timeshift: bool,
     /// What the rig says about `camera`'s offset, in seconds (`t_imu = t_cam + shift`): stamps have it in them already.

@@ -72,7 +72,7 @@ impl Estimator {
     }
 
     /// Drops features of a camera; what went into the marginalization prior because of them stays.
-    pub fn forget_features(&mut self, camera: usize, dropped: impl Fn(FeatureId) -> bool) {
+    pub fn drop_features(&mut self, camera: usize, dropped: impl Fn(FeatureId) -> bool) {
         match &mut self.phase {
             PhaseState::Initializing(initializer) => initializer.drop_features(camera, &dropped),
             PhaseState::Tracking(window) => {

@@ -6,6 +6,7 @@ mod config;
 #[expect(clippy::module_inception, reason = "the type that the folder is about")]
 mod estimator;
 mod factors;
+mod hypothetical;
 pub mod initialization;
 mod interventions;
 mod options;
@@ -13,7 +14,6 @@ mod report;
 mod setup;
 mod state;
 mod step_input;
-mod supposed;
 #[cfg(test)]
 mod tests;
 mod window;
@@ -22,6 +22,7 @@ pub use config::{DEFAULT_CHAIN_PRIOR, EstimatorConfig, RigidCamera, rigid_column
 pub use estimator::Estimator;
 pub(crate) use factors::visual::damped_inverse;
 pub use factors::{imu_factor, preintegration};
+pub use hypothetical::{HypotheticalFrame, HypotheticalLandmark, HypotheticalWindow, JointKnowledge, PoseKnowledge};
 pub use interventions::InterventionError;
 pub use options::{EstimatorOptions, LandmarkModel, RobustLoss, TrackContinuation};
 pub use preintegration::{ImuBias, MotionIncrement, NavigationState, Preintegration};
@@ -33,4 +34,3 @@ pub use report::{
 };
 pub use setup::gravity_in_world;
 pub use step_input::StepInput;
-pub use supposed::{JointKnowledge, PoseKnowledge, SupposedFrame, SupposedLandmark, SupposedWindow};

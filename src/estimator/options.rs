@@ -54,8 +54,8 @@ pub enum TrackContinuation {
     /// Every measurement is used once, as in Basalt: those that went into the prior leave the window, and the feature begins
     /// anew with the images to come.
     UseOnce,
-    /// The anchor's measurement is forgotten and the others stay.
-    ForgetAnchor,
+    /// The anchor's measurement is dropped and the others stay.
+    DropAnchor,
 }
 
 /// Tunables of the estimator.
@@ -105,7 +105,7 @@ pub struct EstimatorOptions {
     pub accelerometer_bias_sigma: f64,
     /// Standard deviation of the gyroscope's bias at the start, in rad/s.
     pub gyroscope_bias_sigma: f64,
-    /// The inertial noise densities of the rig are multiplied by this.
+    /// The IMU noise densities of the rig are multiplied by this.
     pub imu_noise_factor: f64,
     /// Change of the biases at which an interval is integrated again.
     pub reintegration_change: ImuBias,
@@ -113,12 +113,12 @@ pub struct EstimatorOptions {
     pub max_accelerometer_bias: f64,
     /// Failure: norm of the gyroscope's bias, in rad/s.
     pub max_gyroscope_bias: f64,
-    /// Failure: speed, in m/s.
+    /// Failure: norm of the velocity, in m/s.
     pub max_speed: f64,
     /// Failure: correction of the newest position against its prediction, in metres.
     pub max_position_correction_m: f64,
-    /// Failure: fewer than `min_landmarks` landmarks in view for so long, in seconds. Until then the inertial sensor carries
-    /// the window on, which costs less than to begin anew.
+    /// Failure: fewer than `min_landmarks` landmarks in view for so long, in seconds. Until then the IMU carries
+    /// the window on, which costs less than to restart.
     pub max_blind_s: f64,
     /// Fewer landmarks in view than this count as blind.
     pub min_landmarks: usize,

@@ -1,4 +1,4 @@
-//! Inertial samples between two instants, summed up once (Forster et al., TRO 2017) with covariance and bias Jacobians.
+//! IMU samples between two instants, summed up once (Forster et al., TRO 2017) with covariance and bias Jacobians.
 //!
 //! Angular velocity and specific force are taken as linear between samples: rotations by the second Magnus term, velocity
 //! and position by Simpson's rule over each sample interval.
@@ -69,7 +69,7 @@ impl Repeats {
     }
 }
 
-/// What the inertial samples of an interval say about the motion over it.
+/// What the IMU samples of an interval say about the motion over it.
 #[derive(Clone, Debug)]
 pub struct Preintegration {
     noise: ImuNoise,

@@ -150,9 +150,10 @@ impl Prior {
         rows
     }
 
-    /// Its calibration columns carried to another chart: `old = by_new · new` to first order.
+    /// Transports its calibration columns to another parameterization: `old = by_new · new` to first order.
     ///
-    /// `deviations` are the calibration's from its first estimate in the old and in the new chart. Where the two differ by
+    /// `deviations` are the calibration's from its first estimate in the old and in the new parameterization. Where the
+    /// two differ by
     /// more than the first order, the residual takes the difference up, so that cost and gradient stay what they are at
     /// the present estimate.
     pub(crate) fn transport_calibration(
@@ -208,7 +209,7 @@ impl StartPrior {
     /// Number of scalar residuals.
     pub(crate) const LEN: usize = 10;
 
-    /// Whitened rows on the first frame's block `[pose | joints | speed and biases]` and their residuals.
+    /// Whitened rows on the first frame's block `[pose | joints | velocity and biases]` and their residuals.
     pub(crate) fn rows(&self, state: &FrameState) -> (DMatrix<f64>, DVector<f64>) {
         let joints = state.joints_rad.len();
         let mut jacobian = DMatrix::zeros(Self::LEN, 15 + joints);

@@ -21,7 +21,7 @@ use crate::geometry::{RigidTransform, seconds_from_ns};
 
 /// Most rounds of the refinement before and after landmarks that do not fit are dropped.
 const REFINEMENT_ROUNDS: [usize; 2] = [10, 25];
-/// A landmark with a sighting beyond this many standard deviations is dropped in between.
+/// A landmark with a observation beyond this many standard deviations is dropped in between.
 const OUTLIER_SIGMAS: f64 = 4.0;
 /// A change of the gyroscope's bias by more than this is integrated anew.
 const REINTEGRATE_RAD_PER_S: f64 = 0.003;
@@ -45,7 +45,7 @@ pub fn try_initialize(input: &InitializationInput<'_>, options: &InitializationO
     }
 }
 
-/// Gravity along the mean specific force; of the accelerometer's bias only what lies along it can be told.
+/// Gravity along the mean specific force; of the accelerometer's bias only what lies along it is observable.
 fn from_standstill(
     input: &InitializationInput<'_>,
     standing: &StandstillEstimate,

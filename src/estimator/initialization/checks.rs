@@ -9,7 +9,7 @@ pub struct WaitReason {
     pub message: String,
     /// The measured value.
     pub value: f64,
-    /// The threshold it was held against.
+    /// The threshold that it was compared with.
     pub threshold: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Initialization: from a short stretch of tracked features and inertial samples to poses, velocities, gravity, biases and
+//! Initialization: from a short stretch of tracked features and IMU samples to poses, velocities, gravity, biases and
 //! landmarks in metres.
 //!
 //! [`try_initialize`] is a pure function of its input; call it at frames while waiting, with the frames of the last
@@ -6,17 +6,17 @@
 //!
 //! How it works, in the order of the checks that it reports:
 //!
-//! 1. *Standstill.* Quiet inertial samples and an unmoving picture give the gyroscope's bias and gravity's direction.
-//!    An accelerometer's turn-on bias of 0.5 m/s² tilts that direction by 3°, and only motion tells the two apart.
+//! 1. *Standstill.* Quiet IMU samples and an unmoving image give the gyroscope's bias and gravity's direction.
+//!    An accelerometer's turn-on bias of 0.5 m/s² tilts that direction by 3°, and only motion separates the two.
 //!    So by default a standstill is remembered ([`StandstillEstimate`]) and motion is awaited; with
 //!    [`StandstillPolicy::InitializeAtOnce`] it initializes right away, with velocity zero and no landmarks: the estimator
 //!    then has to find depths itself once there is parallax, and must give the accelerometer's bias its full prior.
-//! 2. *Selection.* A dozen views, spaced by parallax and time, so that a hover before the motion is held by few of them:
-//!    these few bind tilt and accelerometer bias together, which makes the scale of the motion after it reliable.
+//! 2. *Selection.* A dozen views, spaced by parallax and time, so that a hover before the motion is represented by few of
+//!    them: these few bind tilt and accelerometer bias together, which makes the scale of the motion after it reliable.
 //! 3. *Structure.* Camera poses from the images alone. A gimbal's encoders may be off by many degrees, so they only guess.
 //! 4. *Alignment.* The mount's rotation and the gyroscope's bias from rotations; scale, gravity of exact magnitude,
 //!    velocities and accelerometer bias from a linear system.
-//! 5. *Refinement.* All of it together with the inertial covariances, the calibration's error included as unknowns with priors.
+//! 5. *Refinement.* All of it together with the IMU covariances, the calibration's error included as unknowns with priors.
 //! 6. *Acceptance.* Residuals, and the standard deviations of scale, velocity and gravity from the refined problem.
 //!    These decide: constant velocity, hover and pure rotation have no small standard deviation of the scale.
 //!
@@ -69,20 +69,20 @@ pub struct InitializationFrame<'a> {
     pub features: &'a [TrackedFeature],
     /// The mount as calibration and encoders say.
     pub imu_from_camera: RigidTransform,
-    /// Inertial samples from the previous frame's stamp to this one's, both ends included.
+    /// IMU samples from the previous frame's stamp to this one's, both ends included.
     pub imu: &'a [ImuSample],
 }
 
 /// Everything that an attempt looks at.
 #[derive(Clone, Debug)]
 pub struct InitializationInput<'a> {
-    /// Frames in time order, without gaps in the inertial samples between them.
+    /// Frames in time order, without gaps in the IMU samples between them.
     pub frames: &'a [InitializationFrame<'a>],
     /// Magnitude of gravity in m/s².
     pub gravity_m_per_s2: f64,
-    /// Noise of the inertial sensor.
+    /// Noise of the IMU.
     pub imu_noise: ImuNoise,
-    /// What the last standstill told, when there was one ([`InitializationOutcome::Waiting`] carries it).
+    /// What the last standstill measured, when there was one ([`InitializationOutcome::Waiting`] carries it).
     pub standstill: Option<StandstillEstimate>,
 }
 
@@ -97,7 +97,7 @@ pub enum InitializationOutcome {
         reasons: Vec<WaitReason>,
         /// Tests that passed, with the same figures.
         passed: Vec<WaitReason>,
-        /// The vehicle stands still: to be kept and handed in with later attempts.
+        /// The vehicle is stationary: to be kept and handed in with later attempts.
         standstill: Option<StandstillEstimate>,
     },
 }
@@ -156,7 +156,7 @@ pub struct InitializationDiagnostics {
     pub accelerometer_bias_sigma_m_per_s2: f64,
     /// Root mean square angle error of a bearing's coordinate.
     pub reprojection_rms_rad: f64,
-    /// Mean square of the whitened inertial residuals (1 when the noise is as stated, less with few intervals).
+    /// Mean square of the whitened IMU residuals (1 when the noise is as stated, less with few intervals).
     pub inertial_mean_square: f64,
     /// Largest rotation-compensated parallax between two views.
     pub parallax_rad: f64,

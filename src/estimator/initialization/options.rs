@@ -1,6 +1,6 @@
 use crate::sensors::ChainPrior;
 
-/// What to do while the vehicle stands still.
+/// What to do while the vehicle is stationary.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StandstillPolicy {
     /// Remember the standstill and wait for motion: the most accurate.
@@ -9,9 +9,9 @@ pub enum StandstillPolicy {
     InitializeAtOnce,
 }
 
-/// Error of the mount's rotation in each frame when no encoder tells it.
+/// Error of the mount's rotation in each frame without an encoder.
 const BLIND_MOUNT_NOISE_RAD: f64 = 0.5;
-/// Error of the mount's rotation that all frames share when no encoder tells it.
+/// Error of the mount's rotation that all frames share without an encoder.
 const BLIND_MOUNT_SIGMA_RAD: f64 = 1.0;
 
 /// Tunables of [`super::try_initialize`].
@@ -51,7 +51,7 @@ pub struct InitializationOptions {
     pub least_common_features: usize,
     /// Rotation-compensated parallax that the base of the reconstruction needs.
     pub least_parallax_rad: f64,
-    /// Standard deviation of the acceleration between views, gravity included, below which nothing can tell the scale.
+    /// Standard deviation of the acceleration between views, gravity included, below which the scale is unobservable.
     pub least_excitation_m_per_s2: f64,
     /// Share of features that must agree with a pose.
     pub least_inlier_share: f64,
@@ -61,7 +61,7 @@ pub struct InitializationOptions {
     pub most_landmarks: usize,
     /// Largest root mean square reprojection error, in standard deviations of a bearing.
     pub most_reprojection_sigmas: f64,
-    /// The inertial sensor may be noisier than its rig says by this factor before its residuals speak against a solution.
+    /// The IMU may be noisier than its rig says by this factor before its residuals reject a solution.
     pub inertial_noise_factor: f64,
     /// Largest relative standard deviation of the scale.
     pub most_scale_sigma: f64,
@@ -103,7 +103,7 @@ impl Default for InitializationOptions {
     }
 }
 
-/// Parallax, in standard deviations of a bearing, that two views need to tell depths: a landmark that is seen under so wide
+/// Parallax, in standard deviations of a bearing, that two views need to triangulate: a landmark that is seen under so wide
 /// an angle has a depth to about a fifth (the noise of two bearings over it), and hundreds of them make a base.
 const PARALLAX_SIGMAS: f64 = 7.0;
 

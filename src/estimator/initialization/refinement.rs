@@ -1,4 +1,4 @@
-//! One adjustment of everything with images and inertial sensor together: poses, velocities, biases, gravity, the mount.
+//! One adjustment of everything with images and IMU together: poses, velocities, biases, gravity, the mount.
 //!
 //! The IMU frame of the first view is the frame of reference, so there is no gauge freedom left; gravity is a direction in
 //! it with known magnitude.
@@ -80,7 +80,7 @@ impl Layout {
         Self::GLOBALS + view * self.per_view()
     }
 
-    /// Pose of a view (6); the first view's columns are held.
+    /// Pose of a view (6); the first view's columns are fixed.
     pub(super) fn pose(&self, view: usize) -> usize {
         self.velocity(view) + 3
     }
@@ -215,7 +215,7 @@ pub(super) struct Refinement<'a> {
 #[derive(Clone, Debug)]
 pub(super) struct Refined {
     pub(super) state: RefinedState,
-    /// Mean square of the whitened inertial residuals, biases' priors left out.
+    /// Mean square of the whitened IMU residuals, biases' priors left out.
     pub(super) inertial_mean_square: f64,
     pub(super) sigmas: Option<RefinementSigmas>,
     pub(super) rounds: usize,

@@ -1,4 +1,4 @@
-//! Standing still: quiet inertial samples and an unmoving picture.
+//! Detects a stationary vehicle before the window runs: IMU samples of little variance and an unmoving image.
 
 use nalgebra::Vector3;
 
@@ -16,14 +16,14 @@ const BLOCK_NS: i64 = 100_000_000;
 const MOST_GYROSCOPE_STD_RAD_PER_S: f64 = 0.002;
 /// Largest standard deviation of the averaged specific force (worst axis), beyond the sensor's own noise.
 const MOST_ACCELEROMETER_STD_M_PER_S2: f64 = 0.03;
-/// A slow turn that a second cannot tell from a bias.
+/// A slow rotation that a second cannot separate from a bias.
 const HIDDEN_TURN_RAD_PER_S: f64 = 0.001;
 /// Largest mean angular velocity: a turn-on bias may be this large, a turn is larger.
 const MOST_TURN_RAD_PER_S: f64 = 0.15;
-/// Largest rotation-compensated motion of the picture over the stretch.
+/// Largest rotation-compensated parallax over the stretch.
 const MOST_PARALLAX_RAD: f64 = 0.004;
 
-/// What a standstill tells.
+/// What a standstill measures.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StandstillEstimate {
     /// Stamp of the newest frame that belongs to it.

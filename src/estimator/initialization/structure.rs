@@ -23,13 +23,13 @@ const AMPLE_PARALLAX_RAD: f64 = 0.14;
 const AMPLE_PAIRS: f64 = 60.0;
 /// How many pairs of views are tried.
 const PAIRS_TRIED: usize = 3;
-/// A landmark with a sighting beyond this many standard deviations is dropped.
+/// A landmark with a observation beyond this many standard deviations is dropped.
 const OUTLIER_SIGMAS: f64 = 4.0;
 
-/// All sightings of one feature as `(view, bearing)`, views rising.
+/// All observations of one feature as `(view, bearing)`, views rising.
 pub(super) type Tracks = BTreeMap<FeatureId, Vec<(usize, Vector3<f64>)>>;
 
-/// Collects the sightings of all features that at least two of the views hold.
+/// Collects the observations of all features that at least two of the views hold.
 pub(super) fn collect_tracks(views: &[&[TrackedFeature]]) -> Tracks {
     let mut tracks = Tracks::new();
     for (view, features) in views.iter().enumerate() {
@@ -154,14 +154,14 @@ pub(super) struct Structure {
     pub(super) views: Vec<usize>,
     /// `first_camera_from_camera`, one per placed view.
     pub(super) poses: Vec<RigidTransform>,
-    /// Landmarks; anchors and sightings are numbers of placed views.
+    /// Landmarks; anchors and observations are numbers of placed views.
     pub(super) landmarks: Vec<Landmark>,
     /// Root mean square angle error per coordinate, in radians.
     pub(super) rms_rad: f64,
 }
 
 impl Structure {
-    /// Number of sightings of all landmarks.
+    /// Number of observations of all landmarks.
     fn sightings(&self) -> usize {
         self.landmarks.iter().map(|landmark| landmark.sightings.len()).sum()
     }

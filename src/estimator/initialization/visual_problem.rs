@@ -16,7 +16,7 @@ pub(super) const HUBER_SIGMAS: f64 = 1.5;
 /// What a point behind a camera costs, in standard deviations.
 const BEHIND_SIGMAS: f64 = 100.0;
 
-/// One further sighting of a feature.
+/// One further observation of a feature.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sighting {
     /// Number of the view.
@@ -42,12 +42,12 @@ pub(super) struct Landmark {
     pub(super) direction: Vector3<f64>,
     /// Inverse of the distance along `direction`.
     pub(super) inverse_distance: f64,
-    /// All sightings, the anchor's first.
+    /// All observations, the anchor's first.
     pub(super) sightings: Vec<Sighting>,
 }
 
 impl Landmark {
-    /// A feature along the bearing of its first sighting.
+    /// A feature along the bearing of its first observation.
     pub(super) fn new(id: FeatureId, inverse_distance: f64, sightings: Vec<Sighting>) -> Option<Self> {
         let first = sightings.first()?;
         Some(Self { id, anchor: first.view, direction: first.bearing, inverse_distance, sightings })
@@ -66,7 +66,7 @@ impl Landmark {
         (self.inverse_distance > 0.0).then(|| pose.transform(&(self.direction / self.inverse_distance)))
     }
 
-    /// Whitened residual in one sighting, `None` when the point lies behind that camera.
+    /// Whitened residual in one observation, `None` when the point lies behind that camera.
     fn residual(
         &self,
         world_from_camera: &[RigidTransform],
@@ -82,7 +82,7 @@ impl Landmark {
         (in_other.dot(&sighting.bearing) > 1e-3 * length).then(|| sighting.basis * in_other / (length * sigma_rad))
     }
 
-    /// Largest whitened residual over all sightings.
+    /// Largest whitened residual over all observations.
     pub(super) fn worst_ratio(&self, world_from_camera: &[RigidTransform], sigma_rad: f64) -> f64 {
         self.sightings
             .iter()
@@ -91,7 +91,7 @@ impl Landmark {
     }
 }
 
-/// Robust cost of all sightings.
+/// Robust cost of all observations.
 pub(super) fn visual_cost(landmarks: &[Landmark], world_from_camera: &[RigidTransform], sigma_rad: f64) -> f64 {
     let mut cost = 0.0;
     for landmark in landmarks {
@@ -109,7 +109,7 @@ fn huber_cost(ratio: f64) -> f64 {
     if ratio <= HUBER_SIGMAS { ratio * ratio } else { 2.0 * HUBER_SIGMAS * ratio - HUBER_SIGMAS * HUBER_SIGMAS }
 }
 
-/// Mean square whitened residual per coordinate over all sightings, and how many coordinates there are.
+/// Mean square whitened residual per coordinate over all observations, and how many coordinates there are.
 pub(super) fn mean_square(
     landmarks: &[Landmark],
     world_from_camera: &[RigidTransform],
@@ -144,7 +144,7 @@ struct EliminatedLandmark {
 }
 
 impl VisualNormal {
-    /// Linearizes all sightings; `damping` is added relatively to each landmark's own curvature.
+    /// Linearizes all observations; `damping` is added relatively to each landmark's own curvature.
     pub(super) fn new(
         landmarks: &[Landmark],
         world_from_camera: &[RigidTransform],
@@ -240,7 +240,7 @@ impl VisualNormal {
         target += part;
     }
 
-    /// The landmarks after the poses moved by `step` (6K, zeros where a view is held).
+    /// The landmarks after the poses moved by `step` (6K, zeros where a view is fixed).
     pub(super) fn moved_landmarks(&self, landmarks: &[Landmark], step: &DVector<f64>) -> Vec<Landmark> {
         let mut moved = landmarks.to_vec();
         for (landmark, eliminated) in moved.iter_mut().zip(&self.eliminated) {
@@ -254,7 +254,7 @@ impl VisualNormal {
     }
 }
 
-/// One sighting's whitened residual and derivatives; a landmark moves by two angles and its inverse distance.
+/// One observation's whitened residual and derivatives; a landmark moves by two angles and its inverse distance.
 struct LinearSighting {
     residual: Vector2<f64>,
     by_anchor: Matrix2x6<f64>,

@@ -19,18 +19,18 @@ pub enum EventKind {
     SecondNewestDropped,
     /// Features were rejected as outliers after the solve.
     OutliersRejected,
-    /// The vehicle stands still.
+    /// The vehicle is stationary.
     Standstill,
     /// The estimator failed and starts again.
     Failure,
-    /// The chart of the parameterization was switched.
+    /// The parameterization was switched near a singularity.
     ChartSwitched,
     /// Measurements were missing or unusable.
     MeasurementMissing,
 }
 
 impl EventKind {
-    /// Whether it tells that the step made the first window.
+    /// Whether the step made the first window.
     pub fn begins_window(self) -> bool {
         matches!(self, Self::InitializedFromMotion | Self::InitializedFromStandstill)
     }
@@ -63,7 +63,7 @@ pub struct Event {
     pub message: String,
     /// The measured value, when one decided.
     pub value: Option<f64>,
-    /// The threshold it was held against.
+    /// The threshold that it was compared with.
     pub threshold: Option<f64>,
 }
 

@@ -25,7 +25,7 @@ pub struct ObservationReport {
 /// One feature that took part in the solve.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FeatureReport {
-    /// Who it is; [`FeatureId::camera`] tells which camera sees it.
+    /// Who it is; [`FeatureId::camera`] is the number of the camera that observes it.
     pub id: FeatureId,
     /// The frame it is anchored in.
     pub anchor_frame_index: usize,

@@ -1,4 +1,4 @@
-//! What the newest image tells about the calibration, and which motion that is owed to.
+//! Information gain of the newest image about the calibration, and the motion that it comes from.
 
 use super::allocation::allocated_bytes;
 
@@ -30,15 +30,14 @@ impl Motion {
     }
 }
 
-/// How much the newest image tells about each parameter beyond what was known without it, and which motion of the window
-/// that is owed to.
+/// Information gain of the newest image about each parameter, and the motion of the window that it comes from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InformationGain {
     /// Time since the image before, in seconds.
     pub interval_s: f64,
     /// Number of joints.
     pub joints: usize,
-    /// By free calibration column: `log₂` of the deviation without the image over that with it.
+    /// By free calibration column: `log₂` of the standard deviation without the image over that with it.
     bits: Box<[f32]>,
     /// Of these, by column: the part of each motion in the order of [`Motion::all`].
     by_motion: Box<[f32]>,

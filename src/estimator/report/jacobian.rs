@@ -21,17 +21,17 @@ use crate::gimbal::Chain;
 /// The Jacobian of a step by blocks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StepJacobian {
-    /// Calibration, joint angles, poses, velocities and biases, and last the inverse depths as one block: every feature has its
-    /// own, and no other row touches it.
+    /// Calibration, joint angles, poses, velocities and biases, and last the inverse depths as one block: every feature
+    /// has its own, and no other row touches it.
     pub columns: Vec<ColumnBlock>,
     /// The features in the report's order, then the rest.
     pub rows: Vec<JacobianRow>,
 }
 
-/// The rows of one feature in some columns, two a sighting.
+/// The rows of one feature in some columns, two a observation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FeatureRows {
-    /// Number of the observing frame of each sighting.
+    /// Number of the observing frame of each observation.
     pub frames: Vec<FrameId>,
     /// By the columns of the step, those of the feature's inverse depth last; whitened: residuals by their standard
     /// deviations with robust weights, per radian, metre, and 1/m.
@@ -160,7 +160,7 @@ impl<'a> Writer<'a> {
         let mut rows: Vec<JacobianRow> = self.source.rows(&numbers).collect();
         let is_inertial = |row: &JacobianRow| matches!(row.factor, JacobianFactor::Inertial { .. });
         let place = rows.iter().position(|row| !is_inertial(row)).unwrap_or(rows.len());
-        // The readings of a frame touch its joint angles alone, each with the inverse of its deviation.
+        // The readings of a frame touch its joint angles alone, each with the inverse of its standard deviation.
         let encoders = self.report.window.iter().enumerate().filter_map(|(slot, frame)| {
             let sigmas = frame.encoder_sigmas_rad.as_ref().filter(|sigmas| !sigmas.is_empty())?;
             let id = ColumnId::Joints(numbers[slot]);

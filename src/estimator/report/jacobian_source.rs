@@ -59,7 +59,7 @@ pub(crate) struct PackedRow {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum PackedKind {
-    /// The inertial samples that end at this slot.
+    /// The IMU samples that end at this slot.
     Inertial(u8),
     Standstill,
     CalibrationPrior,
@@ -87,17 +87,17 @@ impl PackedKind {
 pub struct FactorRows {
     /// Whose they are.
     pub factor: JacobianFactor,
-    /// By the columns of the step (calibration, joints, poses, velocities and biases), whitened; the residual last, at the final
-    /// estimate.
+    /// By the columns of the step (calibration, joints, poses, velocities and biases), whitened; the residual last, at
+    /// the final estimate.
     pub rows: DMatrix<f64>,
 }
 
 /// Where residuals come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum JacobianFactor {
-    /// The reprojections of a feature, two rows a sighting.
+    /// The reprojections of a feature, two rows a observation.
     Feature(crate::frontend::FeatureId),
-    /// The inertial samples between two frames, by the frames' numbers.
+    /// The IMU samples between two frames, by the frames' numbers.
     Inertial {
         /// The earlier one.
         from: FrameId,
@@ -106,7 +106,7 @@ pub enum JacobianFactor {
     },
     /// The encoder readings of a frame.
     Encoder(FrameId),
-    /// What standing still says.
+    /// Zero-velocity updates.
     Standstill,
     /// The rig's prior on the calibration.
     CalibrationPrior,

@@ -64,7 +64,8 @@ pub struct CalibrationEstimate {
     pub parameterization: String,
     /// The parameters in column order: those of the chain, then those of the rigid cameras beside the main one.
     pub parameters: Vec<ParameterId>,
-    /// Value of each in its SI unit (rotation blocks as rotation vectors relative to the rig's value, plus that value's own log).
+    /// Value of each in its SI unit (rotation blocks as rotation vectors relative to the rig's value, plus that value's
+    /// own log).
     pub values: Vec<f64>,
     /// Posterior standard deviation of each (NaN before the first solve).
     pub sigmas: Vec<f64>,
@@ -72,7 +73,7 @@ pub struct CalibrationEstimate {
     pub prior_sigmas: Vec<f64>,
     /// The whole chain in the classical form.
     pub classical: ClassicalChain,
-    /// Margins to the chart's locks: base, end, then |sin alpha| of each middle link.
+    /// Margins to the parameterization's singularities: base, end, then |sin alpha| of each middle link.
     pub margins: Vec<(Singularity, f64)>,
     /// The rigid cameras that are watched beside the main one, with their poses on the IMU; their columns follow the
     /// chain's.
@@ -90,7 +91,7 @@ pub struct StageTimes {
     pub linearize_ms: f64,
     /// Building the report.
     pub report_ms: f64,
-    /// Rejecting outliers, switching charts, marginalizing.
+    /// Rejecting outliers, switching the parameterization, marginalizing.
     pub marginalize_ms: f64,
     /// Observability analysis.
     pub observability_ms: f64,
@@ -111,7 +112,7 @@ pub struct StepReport {
     pub restarts: usize,
     /// Standard deviation of a well tracked pixel that it counts with, per coordinate.
     pub pixel_sigma_px: f64,
-    /// The same with the robust weights of this step: the one that tells as much as its pixels do on average.
+    /// The same with the robust weights of this step: the one that carries as much information as its pixels do on average.
     pub effective_pixel_sigma_px: f64,
     /// What happened.
     pub events: Vec<Event>,
@@ -142,8 +143,8 @@ pub struct StepReport {
     pub jacobian_source: Option<JacobianSource>,
     /// The rows of the factors that are not of features, when they were asked for and the estimator is tracking.
     pub factor_rows: Option<Vec<FactorRows>>,
-    /// What the newest image tells about the calibration, when the linearization was asked for and the estimator is tracking:
-    /// nothing unless it becomes a keyframe, since another image is forgotten again.
+    /// Information gain of the newest image about the calibration, when the linearization was asked for and the estimator
+    /// is tracking: nothing unless it becomes a keyframe, since another image is dropped again.
     pub gain: Option<InformationGain>,
     /// Whether the frame is a keyframe.
     pub keyframe: bool,

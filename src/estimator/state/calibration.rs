@@ -28,7 +28,7 @@ struct GivenChain {
 /// a frame's length at most.
 const CLOCK_SIGMA_S: f64 = 0.02;
 
-/// Which clocks are compared with the inertial sensor's.
+/// Which clocks are compared with the IMU's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum FreeClocks {
     /// All are taken to agree.
@@ -55,7 +55,7 @@ impl FreeClocks {
 #[derive(Clone, Debug)]
 struct Values {
     chain: Chain,
-    /// Offsets of the clocks beyond what the rig says, in seconds: the inertial sensor's time is the stamp plus this. The
+    /// Offsets of the clocks beyond what the rig says, in seconds: the IMU's time is the stamp plus this. The
     /// camera's, then the encoders'; as many as are estimated.
     clocks_s: DVector<f64>,
 }
@@ -94,7 +94,7 @@ pub(crate) struct Calibration {
 }
 
 impl Calibration {
-    /// The given chain in a parameterization; without encoders its joint offsets are held fixed.
+    /// The given chain in a parameterization; without encoders its joint offsets are fixed.
     pub(crate) fn new(
         classical: &ClassicalChain,
         parameterization: Parameterization,
@@ -115,7 +115,7 @@ impl Calibration {
         }
     }
 
-    /// The same with offsets of clocks beside the chain; a calibration that is held fixed has none.
+    /// The same with offsets of clocks beside the chain; a calibration that is fixed has none.
     pub(crate) fn with_clocks(self, clocks: FreeClocks, given_timeshift_s: f64) -> Self {
         let clocks = if self.free { clocks } else { FreeClocks::None };
         let clocks_s = DVector::zeros(clocks.parameters().len());
@@ -173,7 +173,7 @@ impl Calibration {
         self.frozen.clone_from(&other.frozen);
     }
 
-    /// Free columns that are held at their values.
+    /// Free columns that are fixed at their values.
     pub(crate) fn frozen_columns(&self) -> Vec<usize> {
         if self.frozen.is_empty() || !self.free {
             return Vec::new();
@@ -241,7 +241,7 @@ impl Calibration {
         };
     }
 
-    /// Whitened deviation from the given chain and from clocks that agree.
+    /// Whitened difference from the given chain and from clocks without offset, one row per column.
     pub(crate) fn prior_residual(&self) -> DVector<f64> {
         let chain = &self.given.square_root_information * self.chain().minus(&self.given.chain);
         let clocks = self.values.clocks_s.iter().map(|shift_s| shift_s / CLOCK_SIGMA_S);
@@ -250,8 +250,8 @@ impl Calibration {
 
     /// Its derivative by a step.
     ///
-    /// For rotation blocks the logarithm of the deviation turns with the deviation itself, and a step counts from the first
-    /// estimate; the inner blocks of `poe` are taken as flat.
+    /// For rotation blocks the logarithm of the difference rotates with the difference itself, and a step counts from the
+    /// first estimate; the inner blocks of `poe` are taken as flat.
     pub(crate) fn prior_jacobian(&self) -> DMatrix<f64> {
         let (all, chain) = (self.values.dof(), self.chain().dof());
         let mut jacobian = self.given.square_root_information.clone().resize(all, all, 0.0);
@@ -291,7 +291,7 @@ impl Calibration {
         self.values.chain = chain;
     }
 
-    /// Goes over to another chart; returns how the old columns follow the new ones at the first estimate.
+    /// Switches to another parameterization; returns how the old columns follow the new ones at the first estimate.
     pub(crate) fn switch_parameterization(&mut self, parameterization: Parameterization) -> DMatrix<f64> {
         let offsets = !self.chain().hides_joint_offsets();
         let old = &self.first_estimate.as_ref().unwrap_or(&self.values).chain;

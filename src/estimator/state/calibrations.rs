@@ -57,7 +57,7 @@ impl Calibrations {
         start..start + self.0[camera].dof()
     }
 
-    /// Columns that are held at their values.
+    /// Columns that are fixed at their values.
     pub(crate) fn frozen_columns(&self) -> Vec<usize> {
         let of_camera = |camera: usize| {
             let start = self.columns(camera).start;
@@ -128,8 +128,8 @@ impl Calibrations {
         self.0.iter().enumerate().filter(|(_, one)| one.dof() > 0)
     }
 
-    /// The main camera's chain goes over to another chart; returns how the old columns follow the new ones at the first
-    /// estimate.
+    /// Switches the main camera's chain to another parameterization; returns how the old columns follow the new ones at
+    /// the first estimate.
     pub(crate) fn switch_parameterization(&mut self, parameterization: Parameterization) -> DMatrix<f64> {
         let old_from_new = self.0[MAIN].switch_parameterization(parameterization);
         let (old, main) = (old_from_new.nrows(), old_from_new.ncols());

@@ -15,7 +15,7 @@ use crate::gimbal::{Chain, ChainLinearization};
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Mount<'a> {
     pub(crate) chain: &'a Chain,
-    /// Columns of the calibration, those of clocks behind the chain's; none when it is held fixed.
+    /// Columns of the calibration, those of clocks behind the chain's; none when it is fixed.
     pub(crate) columns: usize,
     /// The camera saw an image so many seconds after its stamp.
     pub(crate) shift_s: f64,
@@ -63,7 +63,7 @@ pub(crate) fn at_mount(state: &FrameState, mount: &Mount<'_>) -> CameraPose {
     CameraPose { rotation: pose.rotation_matrix(), position_m: pose.translation_m }
 }
 
-/// The state at which the camera took its picture, since its clock may be off.
+/// The state at which the camera took its image, `shift_s` after the stamp.
 pub(crate) fn when_seen(state: &FrameState, shift_s: f64) -> Cow<'_, FrameState> {
     if shift_s == 0.0 { Cow::Borrowed(state) } else { Cow::Owned(state.later(shift_s)) }
 }
@@ -90,7 +90,8 @@ impl CameraMaps {
 
     /// [`Self::new`] for a mount.
     ///
-    /// That a clock's offset multiplies speed and gyroscope bias is left out: a centisecond of a bias' change moves nothing.
+    /// That a clock's offset multiplies velocity and gyroscope bias is left out: a centisecond of a bias' change moves
+    /// nothing.
     pub(crate) fn of_mount(frames: &[FrameState], mount: &Mount<'_>) -> Self {
         let mut maps = Self { own: Vec::new(), calibration: Vec::new() };
         for stamped in frames {

@@ -41,7 +41,7 @@ impl Rates {
         })
     }
 
-    /// Of one joint, in rad/s; zero where nothing tells it.
+    /// Of one joint, in rad/s; zero where it is not measured.
     pub(crate) fn joint_rad_per_s(&self, joint: usize) -> f64 {
         self.joints_rad_per_s.get(joint).copied().unwrap_or(0.0)
     }

@@ -12,7 +12,7 @@ pub type Matrix15 = SMatrix<f64, 15, 15>;
 /// 15, ordered `[φ, p, v, b_g, b_a]`.
 pub type Vector15 = SVector<f64, 15>;
 
-/// Biases of the inertial sensor: what it shows beyond the truth.
+/// Biases of the IMU: measured minus true.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ImuBias {
     /// Of the gyroscope, in rad/s.
@@ -21,7 +21,7 @@ pub struct ImuBias {
     pub accelerometer_m_per_s2: Vector3<f64>,
 }
 
-/// Where the vehicle is, how it moves and what its inertial sensor adds.
+/// Pose, velocity and IMU biases of the vehicle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct NavigationState {
     /// Pose.

@@ -1,6 +1,6 @@
 //! Whether what is measured contradicts what is believed: residuals that stay larger than their noise allows.
 //!
-//! A clock that is off by some milliseconds, or a chain that is held at wrong values, does not stop the estimator: it bends
+//! A time offset of some milliseconds, or a chain that is fixed at wrong values, does not stop the estimator: it bends
 //! trajectory and calibration to make the best of it. What it cannot hide is that encoder readings, and what earlier images
 //! told, then disagree with the images in the window.
 

@@ -1,4 +1,4 @@
-//! What tells that the window has failed, or soon may.
+//! Checks whether the window has failed, or soon may.
 
 use super::features::FeatureMap;
 use super::frames::Frame;

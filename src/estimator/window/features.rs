@@ -9,7 +9,7 @@ use crate::estimator::factors::reprojection::{CameraPose, Landmark};
 use crate::estimator::options::{EstimatorOptions, LandmarkModel};
 use crate::frontend::{FeatureId, TrackedFeature};
 
-/// One sighting of a feature.
+/// One observation of a feature.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Observation {
     /// Slot of the frame.
@@ -55,7 +55,7 @@ pub(crate) fn observe(features: &mut FeatureMap, slot: usize, seen: &[TrackedFea
     }
 }
 
-/// Takes a frame out: its sightings go, later slots move up, and landmarks that were anchored there move to the next
+/// Takes a frame out: its observations go, later slots move up, and landmarks that were anchored there move to the next
 /// frame that saw them. `cameras` are the poses before the frame goes.
 pub(crate) fn drop_frame(features: &mut FeatureMap, gone: usize, cameras: &[CameraPose]) {
     for feature in features.values_mut() {
@@ -87,7 +87,7 @@ fn moved(landmark: &Landmark, from: &CameraPose, to: &CameraPose) -> Option<Land
     })
 }
 
-/// The landmark of a feature from all its sightings: the point with the least summed squared distance from the rays,
+/// The landmark of a feature from all its observations: the point with the least summed squared distance from the rays,
 /// measured across the bearings, refined once by its depth weights. `None` while the rays open too little, or when the
 /// point is out of range or behind a camera.
 pub(crate) fn triangulate(feature: &Feature, cameras: &[CameraPose], options: &EstimatorOptions) -> Option<Landmark> {
@@ -138,7 +138,7 @@ pub(crate) fn triangulate(feature: &Feature, cameras: &[CameraPose], options: &E
     })
 }
 
-/// Mean angle between the sightings of two frames that is left once the rotation between them is taken out, with the
+/// Mean angle between the observations of two frames that is left once the rotation between them is taken out, with the
 /// number of features in common.
 pub(crate) fn compensated_parallax(
     features: &FeatureMap,

@@ -1,9 +1,9 @@
-//! What the newest image tells about the calibration, and which motion that is owed to.
+//! Information gain of the newest image about the calibration, and the motion that it comes from.
 //!
-//! The window's information about the calibration, everything else eliminated, is held against the same window without the
-//! factors of the newest image: its sightings, its inertial interval, its encoder readings, its rest.
+//! The window's information about the calibration, everything else eliminated, is compared with the same window without the
+//! factors of the newest image: its observations, its IMU interval, its encoder readings, its zero-velocity update.
 //! What they add is `G = JcᵀU·UᵀJc`, with `U` an orthonormal basis of what the new rows say beyond all states. The
-//! calibration's columns of the sightings are zero, up to a rigid move of the whole scene, where nothing moved within the
+//! calibration's columns of the observations are zero, up to a rigid move of the whole scene, where nothing moved within the
 //! window; with motion they are a sum over the motions ([`super::motion_parts`]), and so is `G`: each motion's part is the
 //! symmetric `½(JmᵀU·UᵀJc + JcᵀU·UᵀJm)`, which is also its Shapley value. What is left over comes with the marginalization
 //! prior: images that have left the window.
@@ -26,7 +26,7 @@ const FLOOR: f64 = 1e-6;
 /// A gain below this share of the variance is rounding.
 const ROUNDING: f64 = 1e-10;
 
-/// The sightings of one camera at the final estimate, with and without the newest image.
+/// The observations of one camera at the final estimate, with and without the newest image.
 #[derive(Debug)]
 pub(crate) struct CameraInformation {
     maps: CameraMaps,
@@ -77,8 +77,8 @@ impl Answer {
 }
 
 impl Problem<'_> {
-    /// What the newest image tells; `None` without a calibration to tell about, in a window of one frame, or when a matrix
-    /// is not positive definite.
+    /// Information gain of the newest image; `None` without free calibration columns, in a window of one frame, or when a
+    /// matrix is not positive definite.
     pub(crate) fn information_gain(
         &self,
         estimate: &Estimate,
@@ -117,7 +117,7 @@ impl Problem<'_> {
         Some(InformationGain::new(interval_s, layout.joints, bits, by_motion))
     }
 
-    /// What an image tells that is forgotten again; `None` as in [`Self::information_gain`].
+    /// No gain, of an image that is dropped again; `None` as in [`Self::information_gain`].
     pub(crate) fn no_information_gain(&self, estimate: &Estimate) -> Option<InformationGain> {
         let (interval_s, free) = self.newest_interval(estimate)?;
         let joints = self.layout.joints;
@@ -168,7 +168,7 @@ impl Problem<'_> {
         let layout = self.layout;
         let calibration = self.linearization_calibration(&estimate.calibration);
         let mut parts = DMatrix::zeros(6 + layout.joints, free.len());
-        // Everything by the motion of all parameters that a deviation of one of them goes with.
+        // Everything by the motion of all parameters that a change of one of them goes with.
         let (with_p, without_p) = (&with.response * &with.covariance, &without.response * &with.covariance);
         for (camera, information) in cameras.iter().enumerate() {
             let maps = &information.maps;
@@ -190,7 +190,7 @@ impl Problem<'_> {
         parts
     }
 
-    /// What the readings of moving joints tell about the encoders' clock.
+    /// What the readings of moving joints contribute to the time offset of the encoders.
     fn encoder_clock_parts(
         &self,
         estimate: &Estimate,

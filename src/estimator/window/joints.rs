@@ -10,17 +10,17 @@ use crate::estimator::state::camera_pose::{self, CameraMaps};
 use crate::geometry::wrap_angle;
 use crate::sensors::JointAngles;
 
-/// How far a joint may have turned since the frame before where no encoder tells it, as a standard deviation.
+/// Standard deviation of a joint's rotation since the frame before, without an encoder.
 pub(crate) const UNKNOWN_JOINT_SIGMA_RAD: f64 = 1.0;
-/// Fewest landmarks by which the picture tells the joint angles of a frame.
+/// Fewest landmarks that constrain the joint angles of a frame.
 const LEAST_LANDMARKS: usize = 15;
-/// The picture must tell an angle better than the encoder by this factor before it may carry the encoder's angle on: then
-/// what the picture says about the turn in between owes nothing to the encoder.
+/// The standard deviation of an angle by the image must be smaller than the encoder's by this factor before the image may
+/// carry the encoder's angle on: then the rotation in between, as the image measures it, is independent of the encoder.
 const SHARPER: f64 = 3.0;
 
 impl WindowState {
-    /// Fits the newest frame's joint angles to the observations of triangulated landmarks with the pose fixed: an encoder may
-    /// be off by many degrees, and without one there is no other initial value.
+    /// Fits the newest frame's joint angles to the observations of triangulated landmarks with the pose fixed: an encoder
+    /// may be off by many degrees, and without one there is no other initial value.
     pub(crate) fn align_newest_joints(&mut self, setup: &Setup) {
         let joints = self.calibration.of(MAIN).joint_count();
         if joints == 0 {
@@ -52,7 +52,7 @@ impl WindowState {
         }
     }
 
-    /// Normal equations of a frame's joint angles from the landmarks that other frames anchor, everything else held, and
+    /// Normal equations of a frame's joint angles from the landmarks that other frames anchor, everything else fixed, and
     /// the number of those landmarks.
     fn joints_by_landmarks(
         &self,
@@ -96,7 +96,7 @@ impl WindowState {
         (hessian, gradient, count)
     }
 
-    /// Variances of a frame's joint angles as the picture tells them, `None` with too few landmarks.
+    /// Variances of a frame's joint angles as the image constrains them, `None` with too few landmarks.
     fn visual_variances(&self, setup: &Setup, slot: usize, cameras: &[CameraPose]) -> Option<DVector<f64>> {
         let (hessian, _, count) = self.joints_by_landmarks(setup, slot, &self.frames[slot].state.joints_rad, cameras);
         let inverse = hessian.cholesky()?.inverse();
@@ -104,9 +104,9 @@ impl WindowState {
     }
 
     /// A frame is about to leave, and its encoder angles with it, although they are as good as any: the next frame takes
-    /// them over, turned on by what the picture says about the joints in between.
+    /// them over, advanced by the rotation of the joints in between as the image measures it.
     ///
-    /// Only the independent part of their errors is averaged; what the picture may have got wrong is added.
+    /// Only the independent part of their errors is averaged; the variance of the image's rotation is added.
     pub(crate) fn carry_encoder(&mut self, setup: &Setup, from: usize, to: usize) {
         let (Some(leaving), Some(own)) = (&self.frames[from].encoder, &self.frames[to].encoder) else { return };
         let cameras = self.camera_poses(MAIN);

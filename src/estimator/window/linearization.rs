@@ -16,8 +16,8 @@ use crate::estimator::{FrameId, InformationGain, Linearization};
 use crate::gimbal::ParameterId;
 
 impl WindowState {
-    /// The linearization at the final estimate: the measurements' rows, and those of the priors; and what the newest image
-    /// tells.
+    /// The linearization at the final estimate: the measurements' rows, and those of the priors; and the
+    /// information gain of the newest image.
     pub(crate) fn linearization(
         &self,
         setup: &Setup,

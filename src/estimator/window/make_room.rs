@@ -62,7 +62,7 @@ impl WindowState {
                 active.filtered(|track| {
                     let continues = track.sightings.last().is_some_and(|last| last.slot == newest);
                     let anchored = track.sightings.first().is_some_and(|first| first.slot == 0);
-                    anchored && !(continues && continuation == TrackContinuation::ForgetAnchor)
+                    anchored && !(continues && continuation == TrackContinuation::DropAnchor)
                 })
             })
             .collect();

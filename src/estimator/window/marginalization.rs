@@ -23,8 +23,8 @@ pub(crate) fn oldest(problem: &Problem<'_>, estimate: &Estimate) -> Option<Prior
     eliminated(problem, estimate, &parts, 0)
 }
 
-/// The prior without the frame at `slot`, whose encoder readings go into it while its sightings are forgotten and its
-/// inertial samples pass to the next frame; `None` when there is no prior.
+/// The prior without the frame at `slot`, whose encoder readings go into it while its observations are dropped and its
+/// IMU samples pass to the next frame; `None` when there is no prior.
 pub(crate) fn dropped(problem: &Problem<'_>, estimate: &Estimate, slot: usize) -> Option<Prior> {
     let prior = problem.prior?;
     if !prior.holds_frame(slot) {

@@ -37,11 +37,11 @@ pub(crate) struct CameraFactors<'a> {
     pub(crate) columns: Range<usize>,
 }
 
-/// Everything that the unknowns are held against.
+/// All factors of the window.
 #[derive(Clone, Debug)]
 pub(crate) struct Problem<'a> {
     pub(crate) layout: Layout,
-    /// No feature is seen by two cameras, so that each has a visual system of its own.
+    /// No feature is observed by two cameras, so that each has a visual system of its own.
     pub(crate) cameras: Vec<CameraFactors<'a>>,
     pub(crate) gravity_in_world: Vector3<f64>,
     pub(crate) frames: &'a [Frame],
@@ -300,7 +300,7 @@ impl Problem<'_> {
         (hessian, gradient)
     }
 
-    /// Whitened Jacobians and residual of the inertial factor that ends at `slot`.
+    /// Whitened Jacobians and residual of the IMU factor that ends at `slot`.
     pub(crate) fn imu_rows(
         &self,
         slot: usize,
@@ -386,7 +386,7 @@ impl NormalEquations {
         self.cameras.iter().map(|camera| camera.visual.eliminate(damping)).collect()
     }
 
-    /// The reduced normal equations over poses, joints, speeds, biases and calibration; the lower triangle counts.
+    /// The reduced normal equations over poses, joints, velocities, biases and calibration; the lower triangle counts.
     pub(crate) fn reduced(&self, layout: &Layout, visual: &[ReducedVisualSystem]) -> (DMatrix<f64>, DVector<f64>) {
         let mut hessian = self.hessian.clone();
         let mut gradient = self.gradient.clone();

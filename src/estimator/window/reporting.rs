@@ -199,7 +199,7 @@ impl WindowState {
     }
 }
 
-/// The standard deviation that tells as much as these pixels do with their robust weights.
+/// The standard deviation of a pixel that carries as much information as these do on average with their robust weights.
 fn effective_sigma(sigma_px: f64, features: &[FeatureReport]) -> f64 {
     let weights = || {
         let kept = features.iter().filter(|feature| !feature.rejected);

@@ -57,7 +57,7 @@ impl Problem<'_> {
         rows
     }
 
-    /// The inertial factor that ends at `slot`, 15 rows, or none.
+    /// The IMU factor that ends at `slot`, 15 rows, or none.
     pub(crate) fn inertial_rows(&self, slot: usize, estimate: &Estimate) -> DMatrix<f64> {
         self.inertial_rows_at(slot, estimate, &self.linearization_frames(estimate))
     }

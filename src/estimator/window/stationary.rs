@@ -1,8 +1,9 @@
 //! Detects a stationary vehicle while the window runs.
 //!
 //! A landed vehicle sees no parallax, so that new features get no depth and the old ones are lost one by one; without
-//! zero-velocity updates IMU-only propagation would drift. Two criteria must agree: IMU samples of little variance (a hovering
-//! multirotor turns by more), and an image that stays the same once rotation is compensated (a gimbal may turn on the ground).
+//! zero-velocity updates IMU-only propagation would drift. Two criteria must agree: IMU samples of little variance (a
+//! hovering multirotor turns by more), and an image that stays the same once rotation is compensated (a gimbal may turn on
+//! the ground).
 
 use std::collections::VecDeque;
 
@@ -221,7 +222,7 @@ impl StationaryDetector {
     }
 }
 
-/// How much the inertial samples vary, with the limits.
+/// How much the IMU samples vary, with the limits.
 #[derive(Clone, Copy, Debug)]
 struct Spread {
     turn: f64,

@@ -11,7 +11,8 @@ use super::super::classification::excitable_directions;
 use super::Situation;
 use super::mechanism::LaboratoryJoint;
 use crate::estimator::{
-    EstimatorOptions, LandmarkModel, NavigationState, PoseKnowledge, SupposedFrame, SupposedLandmark, SupposedWindow,
+    EstimatorOptions, HypotheticalFrame, HypotheticalLandmark, HypotheticalWindow, LandmarkModel, NavigationState,
+    PoseKnowledge,
 };
 use crate::geometry::{Dimension, RigidTransform, ns_from_seconds, so3};
 use crate::sensors::ImuSample;
@@ -167,10 +168,10 @@ fn information_of(situation: &Situation, exercise: &Exercise) -> Option<DMatrix<
         })
         .collect();
     let gravity = situation.gravity_in_world;
-    let frames: Vec<SupposedFrame> = states
+    let frames: Vec<HypotheticalFrame> = states
         .iter()
         .enumerate()
-        .map(|(slot, (time_s, navigation, joints_rad))| SupposedFrame {
+        .map(|(slot, (time_s, navigation, joints_rad))| HypotheticalFrame {
             time_s: *time_s,
             navigation: *navigation,
             joints_rad: joints_rad.clone(),
@@ -188,7 +189,7 @@ fn information_of(situation: &Situation, exercise: &Exercise) -> Option<DMatrix<
     if !makes_keyframes(&landmarks, &poses) {
         landmarks.clear();
     }
-    let window = SupposedWindow {
+    let window = HypotheticalWindow {
         camera: situation.camera.clone(),
         landmarks,
         frames,
@@ -273,7 +274,7 @@ fn samples(
 }
 
 /// Landmarks in every frame's view at the scene's distances, each followed while it stays in sight.
-fn landmarks(situation: &Situation, poses: &[RigidTransform]) -> Vec<SupposedLandmark> {
+fn landmarks(situation: &Situation, poses: &[RigidTransform]) -> Vec<HypotheticalLandmark> {
     let camera = &situation.camera;
     let scene_m = situation.scene_m();
     let [width, height] = camera.resolution_px.map(|size| size as f64);
@@ -299,7 +300,7 @@ fn landmarks(situation: &Situation, poses: &[RigidTransform]) -> Vec<SupposedLan
             continue;
         }
         let in_anchor = poses[first].inverse().transform(&point);
-        landmarks.push(SupposedLandmark {
+        landmarks.push(HypotheticalLandmark {
             anchor: first,
             bearing: in_anchor.normalize(),
             inverse_distance_per_m: in_anchor.norm().recip(),
@@ -311,7 +312,7 @@ fn landmarks(situation: &Situation, poses: &[RigidTransform]) -> Vec<SupposedLan
 
 /// Whether the estimator makes a keyframe of any frame beside the first, by parallax or by what is new. A camera that hardly
 /// moves makes none, whatever its gimbal does, and what it saw is forgotten.
-fn makes_keyframes(landmarks: &[SupposedLandmark], poses: &[RigidTransform]) -> bool {
+fn makes_keyframes(landmarks: &[HypotheticalLandmark], poses: &[RigidTransform]) -> bool {
     let options = EstimatorOptions::default();
     let is_keyframe = |slot: usize| {
         let seen = || landmarks.iter().filter(|landmark| landmark.anchor == slot || landmark.observers.contains(&slot));

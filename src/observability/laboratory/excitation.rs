@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::super::analysis::measured_information;
-use crate::estimator::{Motion, SupposedFrame, SupposedLandmark, SupposedWindow};
+use crate::estimator::{HypotheticalFrame, HypotheticalLandmark, HypotheticalWindow, Motion};
 use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::{Chain, ParameterNames};
 
@@ -39,7 +39,7 @@ pub struct ParameterExcitation {
 ///
 /// What is missing without each motion need not add up to the whole: two motions may tell the same, or only together.
 pub fn excitation(
-    window: &SupposedWindow,
+    window: &HypotheticalWindow,
     chain: &Chain,
     joint_names: &[String],
     names: &ParameterNames,
@@ -70,7 +70,7 @@ pub fn excitation(
 }
 
 /// Variance of each column after the window, in units of the prior.
-fn variances(window: &SupposedWindow, chain: &Chain) -> Option<Vec<f64>> {
+fn variances(window: &HypotheticalWindow, chain: &Chain) -> Option<Vec<f64>> {
     let linearization = window.linearize(&chain.to_classical(), chain.parameterization(), !chain.hides_joint_offsets());
     let information = measured_information(&linearization)?;
     let count = information.ncols();
@@ -79,10 +79,10 @@ fn variances(window: &SupposedWindow, chain: &Chain) -> Option<Vec<f64>> {
 }
 
 /// The window with a motion taken out of its states.
-fn without(window: &SupposedWindow, chain: &Chain, motion: Motion) -> SupposedWindow {
+fn without(window: &HypotheticalWindow, chain: &Chain, motion: Motion) -> HypotheticalWindow {
     let middle = &window.frames[window.frames.len() / 2];
     let about = middle.navigation.world_from_imu;
-    let frames: Vec<SupposedFrame> = window
+    let frames: Vec<HypotheticalFrame> = window
         .frames
         .iter()
         .map(|frame| {
@@ -105,21 +105,22 @@ fn without(window: &SupposedWindow, chain: &Chain, motion: Motion) -> SupposedWi
             frame
         })
         .collect();
-    let poses = |frames: &[SupposedFrame]| -> Vec<RigidTransform> {
-        let pose = |frame: &SupposedFrame| frame.navigation.world_from_imu * chain.imu_from_camera(&frame.joints_rad);
+    let poses = |frames: &[HypotheticalFrame]| -> Vec<RigidTransform> {
+        let pose =
+            |frame: &HypotheticalFrame| frame.navigation.world_from_imu * chain.imu_from_camera(&frame.joints_rad);
         frames.iter().map(pose).collect()
     };
     let (before, after) = (poses(&window.frames), poses(&frames));
     let landmarks = window.landmarks.iter().filter_map(|landmark| {
         let at = landmark.bearing.normalize() / landmark.inverse_distance_per_m;
         let in_anchor = after[landmark.anchor].inverse().transform(&before[landmark.anchor].transform(&at));
-        (in_anchor.z > 0.0).then(|| SupposedLandmark {
+        (in_anchor.z > 0.0).then(|| HypotheticalLandmark {
             bearing: in_anchor.normalize(),
             inverse_distance_per_m: in_anchor.norm().recip(),
             ..landmark.clone()
         })
     });
-    SupposedWindow { landmarks: landmarks.collect(), frames, ..window.clone() }
+    HypotheticalWindow { landmarks: landmarks.collect(), frames, ..window.clone() }
 }
 
 impl fmt::Display for Excitation {

@@ -7,7 +7,8 @@ use super::mechanism::Mechanism;
 use super::motion::{Flight, LaboratoryMotion};
 use crate::camera::CameraModel;
 use crate::estimator::{
-    JointKnowledge, LandmarkModel, PoseKnowledge, SupposedFrame, SupposedLandmark, SupposedWindow, gravity_in_world,
+    HypotheticalFrame, HypotheticalLandmark, HypotheticalWindow, JointKnowledge, LandmarkModel, PoseKnowledge,
+    gravity_in_world,
 };
 use crate::geometry::{Dimension, SplitMix64};
 use crate::gimbal::{Chain, ParameterId, Parameterization};
@@ -147,18 +148,18 @@ impl LaboratorySetup {
     }
 
     /// The window of the experiment.
-    pub fn window(&self) -> SupposedWindow {
+    pub fn window(&self) -> HypotheticalWindow {
         self.window_from(0)
     }
 
     /// The window that begins so many frames after the begin of the motion.
-    pub(super) fn window_from(&self, first: usize) -> SupposedWindow {
+    pub(super) fn window_from(&self, first: usize) -> HypotheticalWindow {
         let gravity_in_world = gravity_in_world(GRAVITY_M_PER_S2);
         let flight = Flight { mechanism: &self.mechanism, motion: self.motion, frozen: &self.frozen, gravity_in_world };
         let inertial = matches!(self.poses, PoseKnowledge::Inertial { .. });
         let time_of = |slot: usize| (first + slot) as f64 * FRAME_PERIOD_S;
-        let frames: Vec<SupposedFrame> = (0..self.frames)
-            .map(|slot| SupposedFrame {
+        let frames: Vec<HypotheticalFrame> = (0..self.frames)
+            .map(|slot| HypotheticalFrame {
                 time_s: time_of(slot),
                 navigation: flight.navigation(time_of(slot)),
                 joints_rad: flight.joints_rad(time_of(slot)),
@@ -170,7 +171,7 @@ impl LaboratorySetup {
             })
             .collect();
         let landmarks = self.landmarks_of(&frames);
-        SupposedWindow {
+        HypotheticalWindow {
             camera: self.camera.clone(),
             frames,
             landmarks,
@@ -184,7 +185,7 @@ impl LaboratorySetup {
     }
 
     /// Landmarks drawn in the views of all frames in turn, anchored in the first frame that sees them.
-    fn landmarks_of(&self, frames: &[SupposedFrame]) -> Vec<SupposedLandmark> {
+    fn landmarks_of(&self, frames: &[HypotheticalFrame]) -> Vec<HypotheticalLandmark> {
         let mut random = SplitMix64::new(1);
         let mut within = |low: f64, high: f64| low + (high - low) * random.next_unit();
         let cameras: Vec<_> = frames
@@ -199,7 +200,7 @@ impl LaboratorySetup {
                 let mut observers = (0..cameras.len()).filter(seen);
                 let anchor = observers.next()?;
                 let in_anchor = cameras[anchor].inverse().transform(&point);
-                Some(SupposedLandmark {
+                Some(HypotheticalLandmark {
                     anchor,
                     bearing: in_anchor.normalize(),
                     inverse_distance_per_m: in_anchor.norm().recip(),

@@ -1,7 +1,7 @@
 //! The laboratory: what a mechanism, a parameterization and a motion can tell about the calibration, without a log.
 //!
 //! An experiment supposes a window, linearizes it with the estimator's own factors
-//! ([`crate::estimator::SupposedWindow`]) and analyses it as every step is analysed.
+//! ([`crate::estimator::HypotheticalWindow`]) and analyses it as every step is analysed.
 //! [`truth_table`] runs all scenarios of docs/mathematics.md, section 7, and compares the ranks with the expected ones.
 
 mod advice;

@@ -13,7 +13,7 @@ use serde::Serialize;
 use super::LaboratoryForm;
 use super::table::setup;
 use super::truth::{Joints, Poses};
-use crate::estimator::SupposedWindow;
+use crate::estimator::HypotheticalWindow;
 use crate::geometry::{Dimension, SplitMix64, dense};
 use crate::gimbal::{Chain, ClassicalChain, Parameterization};
 use crate::observability::analysis::measured_block;
@@ -99,7 +99,7 @@ impl Case {
         let (old, new) = (setup.window_from(0), setup.window_from(FRAMES));
         let form = LaboratoryForm::whole(self.parameterization);
         let chain = &setup.mechanism.chain;
-        let seen = |window: &SupposedWindow, chain: &ClassicalChain| {
+        let seen = |window: &HypotheticalWindow, chain: &ClassicalChain| {
             measured_block(&window.linearize(chain, form.parameterization, form.joint_offsets))
         };
         let (before, after) = (seen(&old, chain)?, seen(&new, chain)?);

@@ -4,8 +4,8 @@ use nalgebra::Vector3;
 
 use crate::camera::CameraModel;
 use crate::estimator::{
-    ImuBias, JointKnowledge, LandmarkModel, Linearization, NavigationState, PoseKnowledge, SupposedFrame,
-    SupposedLandmark, SupposedWindow,
+    HypotheticalFrame, HypotheticalLandmark, HypotheticalWindow, ImuBias, JointKnowledge, LandmarkModel, Linearization,
+    NavigationState, PoseKnowledge,
 };
 use crate::geometry::{Dimension, RigidTransform};
 use crate::gimbal::Chain;
@@ -32,10 +32,10 @@ impl Window {
     pub(super) fn linearize(&self, chain: &Chain, joints_free: bool) -> Linearization {
         let frames = self.world_from_imu.iter().zip(&self.joint_angles_rad).enumerate();
         let landmarks = self.landmarks.iter().enumerate();
-        let supposed = SupposedWindow {
+        let supposed = HypotheticalWindow {
             camera: self.camera.clone(),
             frames: frames
-                .map(|(slot, (world_from_imu, joints_rad))| SupposedFrame {
+                .map(|(slot, (world_from_imu, joints_rad))| HypotheticalFrame {
                     time_s: slot as f64,
                     navigation: NavigationState {
                         world_from_imu: *world_from_imu,
@@ -47,7 +47,7 @@ impl Window {
                 })
                 .collect(),
             landmarks: landmarks
-                .map(|(index, landmark)| SupposedLandmark {
+                .map(|(index, landmark)| HypotheticalLandmark {
                     anchor: landmark.anchor,
                     bearing: landmark.bearing,
                     inverse_distance_per_m: landmark.inverse_depth_per_m / landmark.bearing.norm(),

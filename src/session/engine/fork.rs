@@ -48,7 +48,7 @@ pub(in crate::session) fn apply_fork(
     let dropped = changes.dropped.clone();
     for camera in 0..engine.cameras() {
         let all = left_out.contains(&camera);
-        engine.estimator_mut().forget_features(camera, |id| all || dropped.contains(&id.of_camera(camera).0));
+        engine.estimator_mut().drop_features(camera, |id| all || dropped.contains(&id.of_camera(camera).0));
     }
     engine.alter(AlteredMeasurements {
         dropped: changes.dropped.clone(),

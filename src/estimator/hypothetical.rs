@@ -1,5 +1,5 @@
-//! Windows that nobody flew: supposed states and landmarks whose measurements are exact, linearized by the estimator's own
-//! factors, for asking what a motion would tell before it is flown.
+//! Hypothetical windows: states and landmarks with exact measurements, linearized by the estimator's own factors, to predict
+//! the information of a motion before it is flown.
 
 use std::sync::Arc;
 
@@ -22,12 +22,12 @@ use crate::geometry::ns_from_seconds;
 use crate::gimbal::{ClassicalChain, Parameterization};
 use crate::sensors::{ImuNoise, ImuSample, JointAngles};
 
-/// What is known of the poses of a supposed window.
+/// What is known of the poses of a hypothetical window.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PoseKnowledge {
     /// Everything.
     Known,
-    /// What the inertial sensor tells, its biases being known or not.
+    /// What the IMU measures, its biases being known or not.
     Inertial {
         /// Noise of the sensor.
         noise: ImuNoise,
@@ -36,7 +36,7 @@ pub enum PoseKnowledge {
     },
 }
 
-/// What is known of the joint angles of a supposed window.
+/// What is known of the joint angles of a hypothetical window.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum JointKnowledge {
     /// Everything.
@@ -47,22 +47,22 @@ pub enum JointKnowledge {
     Unknown,
 }
 
-/// One frame of a supposed window.
+/// One frame of a hypothetical window.
 #[derive(Clone, Debug)]
-pub struct SupposedFrame {
+pub struct HypotheticalFrame {
     /// When, in seconds.
     pub time_s: f64,
     /// Pose, velocity and biases.
     pub navigation: NavigationState,
     /// Joint angles without the static offsets.
     pub joints_rad: Vec<f64>,
-    /// Inertial samples since the frame before it, both ends included; not needed where the poses are known.
+    /// IMU samples since the frame before it, both ends included; not needed where the poses are known.
     pub imu: Vec<ImuSample>,
 }
 
-/// A landmark of a supposed window and who sees it.
+/// A landmark of a hypothetical window and the frames that observe it.
 #[derive(Clone, Debug)]
-pub struct SupposedLandmark {
+pub struct HypotheticalLandmark {
     /// Slot of the frame in which it is anchored.
     pub anchor: usize,
     /// Direction in the anchor's camera, of any length.
@@ -73,15 +73,15 @@ pub struct SupposedLandmark {
     pub observers: Vec<usize>,
 }
 
-/// A window of supposed states with exact measurements.
+/// A window of hypothetical states with exact measurements.
 #[derive(Clone, Debug)]
-pub struct SupposedWindow {
+pub struct HypotheticalWindow {
     /// The camera.
     pub camera: CameraModel,
     /// Oldest first.
-    pub frames: Vec<SupposedFrame>,
+    pub frames: Vec<HypotheticalFrame>,
     /// What is seen.
-    pub landmarks: Vec<SupposedLandmark>,
+    pub landmarks: Vec<HypotheticalLandmark>,
     /// What is known of the poses.
     pub poses: PoseKnowledge,
     /// What is known of the joint angles.
@@ -96,7 +96,7 @@ pub struct SupposedWindow {
     pub chain_prior: (f64, f64),
 }
 
-impl SupposedWindow {
+impl HypotheticalWindow {
     /// The linearization with the mount in one form, with or without its joint offsets as columns.
     ///
     /// What is known has no columns. The rows of the priors are those of the rig's prior alone.
@@ -143,30 +143,30 @@ impl SupposedWindow {
         })
     }
 
-    fn frame(&self, slot: usize, supposed: &SupposedFrame) -> Frame {
-        let navigation = supposed.navigation;
+    fn frame(&self, slot: usize, hypothetical: &HypotheticalFrame) -> Frame {
+        let navigation = hypothetical.navigation;
         let motion = match &self.poses {
             PoseKnowledge::Inertial { noise, .. } if slot > 0 => {
-                Preintegration::from_samples(*noise, navigation.bias, &supposed.imu)
+                Preintegration::from_samples(*noise, navigation.bias, &hypothetical.imu)
             }
             PoseKnowledge::Inertial { noise, .. } => Preintegration::new(*noise, navigation.bias),
             PoseKnowledge::Known => Preintegration::new(NO_NOISE, navigation.bias),
         };
         let encoder = match self.joints {
             JointKnowledge::Encoder(sigma_rad) => Some(JointAngles {
-                angles_rad: supposed.joints_rad.clone(),
-                sigmas_rad: vec![sigma_rad; supposed.joints_rad.len()],
-                lasting_sigmas_rad: vec![0.0; supposed.joints_rad.len()],
-                rates_rad_per_s: vec![0.0; supposed.joints_rad.len()],
+                angles_rad: hypothetical.joints_rad.clone(),
+                sigmas_rad: vec![sigma_rad; hypothetical.joints_rad.len()],
+                lasting_sigmas_rad: vec![0.0; hypothetical.joints_rad.len()],
+                rates_rad_per_s: vec![0.0; hypothetical.joints_rad.len()],
             }),
             JointKnowledge::Known | JointKnowledge::Unknown => None,
         };
         Frame {
             index: slot,
-            stamp_ns: ns_from_seconds(supposed.time_s),
+            stamp_ns: ns_from_seconds(hypothetical.time_s),
             state: FrameState {
                 navigation,
-                joints_rad: supposed.joints_rad.clone(),
+                joints_rad: hypothetical.joints_rad.clone(),
                 rates: Arc::new(Rates::default()),
             },
             first_estimate: None,
@@ -183,13 +183,15 @@ impl SupposedWindow {
         let cameras = camera_pose::by_slot(states, calibration);
         let mut tracks = Vec::with_capacity(self.landmarks.len());
         let mut landmarks = Vec::with_capacity(self.landmarks.len());
-        for supposed in &self.landmarks {
-            let landmark =
-                Landmark { bearing: supposed.bearing.normalize(), inverse_distance: supposed.inverse_distance_per_m };
-            let anchor = supposed.anchor;
+        for hypothetical in &self.landmarks {
+            let landmark = Landmark {
+                bearing: hypothetical.bearing.normalize(),
+                inverse_distance: hypothetical.inverse_distance_per_m,
+            };
+            let anchor = hypothetical.anchor;
             let Some(uv_px) = self.camera.project(&landmark.bearing) else { continue };
             let mut sightings = vec![Sighting { slot: anchor, uv_px }];
-            for slot in supposed.observers.iter().copied().filter(|slot| *slot != anchor) {
+            for slot in hypothetical.observers.iter().copied().filter(|slot| *slot != anchor) {
                 let relative = RelativePose::new(&cameras[anchor], &cameras[slot]);
                 let seen = self.camera.project(&relative.direction(&landmark));
                 sightings.extend(seen.map(|uv_px| Sighting { slot, uv_px }));
