@@ -79,7 +79,7 @@ pub enum Command {
     },
     /// Remove a run, by its number.
     RemoveRun(usize),
-    /// Recompute the linearized rows of a step's factors; they come into [`RunRecord::factor_rows`] and stay requested
+    /// Recompute the linearized rows of a step's factors; they come into `RunRecord::factor_rows` and stay requested
     /// while the cursor is at the step.
     RequestFactorRows {
         /// Number of the run.

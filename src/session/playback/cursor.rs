@@ -73,9 +73,8 @@ impl Cursor {
     pub fn apply(&self, command: &Command, recording: &Recording, breakpoints: &Breakpoints) -> Option<Moved> {
         let paused = Self { playing: false, ..*self };
         let (mut cursor, outcome) = match *command {
-            Command::Play => (self.play(recording), None),
             Command::TogglePlay if self.playing => (paused, None),
-            Command::TogglePlay => (self.play(recording), None),
+            Command::Play | Command::TogglePlay => (self.play(recording), None),
             Command::Pause => (paused, None),
             Command::SetSpeed(speed) if speed.0.is_finite() && speed.0 > 0.0 => (Self { speed, ..*self }, None),
             Command::SetSpeed(_) => (*self, Some(MoveOutcome::BadSpeed)),
@@ -280,23 +279,23 @@ mod tests {
     }
 
     /// The cursor after a command, without breakpoints.
-    fn after(cursor: Cursor, command: Command) -> Cursor {
-        cursor.apply(&command, sample(), &Breakpoints::default()).unwrap().0
+    fn after(cursor: Cursor, command: &Command) -> Cursor {
+        cursor.apply(command, sample(), &Breakpoints::default()).unwrap().0
     }
 
     #[test]
     fn frames_are_stepped_over_and_ends_hold() {
         let stamps = stamps();
         let (first, last) = (stamps[0], stamps[stamps.len() - 1]);
-        let at_start = after(Cursor::new(0), Command::GoToStart);
+        let at_start = after(Cursor::new(0), &Command::GoToStart);
         assert_eq!(at_start, Cursor::new(first));
-        assert_eq!(after(at_start, Command::StepFrames(3)).stamp_ns, stamps[3]);
-        assert_eq!(after(at_start, Command::StepFrames(-1)), at_start);
-        assert_eq!(after(at_start, Command::StepFrames(i64::MAX)).stamp_ns, last);
-        assert_eq!(after(Cursor::new(last), Command::StepFrames(i64::MIN)).stamp_ns, first);
-        assert_eq!(after(at_start, Command::Seek { stamp_ns: i64::MAX }).stamp_ns, last);
-        let playing = after(at_start, Command::Play);
-        assert!(playing.playing && !after(playing, Command::StepFrames(1)).playing);
+        assert_eq!(after(at_start, &Command::StepFrames(3)).stamp_ns, stamps[3]);
+        assert_eq!(after(at_start, &Command::StepFrames(-1)), at_start);
+        assert_eq!(after(at_start, &Command::StepFrames(i64::MAX)).stamp_ns, last);
+        assert_eq!(after(Cursor::new(last), &Command::StepFrames(i64::MIN)).stamp_ns, first);
+        assert_eq!(after(at_start, &Command::Seek { stamp_ns: i64::MAX }).stamp_ns, last);
+        let playing = after(at_start, &Command::Play);
+        assert!(playing.playing && !after(playing, &Command::StepFrames(1)).playing);
         // Commands that concern something else leave it to the session.
         assert_eq!(at_start.apply(&Command::ToggleMarker, sample(), &Breakpoints::default()), None);
     }
@@ -306,13 +305,13 @@ mod tests {
         let stamps = stamps();
         let (first, last) = (stamps[0], stamps[stamps.len() - 1]);
         let none = Breakpoints::default();
-        let playing = after(Cursor::new(first), Command::Play);
-        let faster = after(playing, Command::SetSpeed(PlaybackSpeed(2.0)));
+        let playing = after(Cursor::new(first), &Command::Play);
+        let faster = after(playing, &Command::SetSpeed(PlaybackSpeed(2.0)));
         assert_eq!(faster.advance(sample(), &none, 0.5).0.stamp_ns, first + 1_000_000_000);
         let (ended, _) = faster.advance(sample(), &none, 100.0);
         assert_eq!((ended.stamp_ns, ended.playing), (last, false));
-        assert_eq!(after(ended, Command::Play).stamp_ns, first);
-        let looped = after(playing, Command::SetLoop(Some((stamps[2], stamps[8]))));
+        assert_eq!(after(ended, &Command::Play).stamp_ns, first);
+        let looped = after(playing, &Command::SetLoop(Some((stamps[2], stamps[8]))));
         let (again, _) = looped.advance(sample(), &none, 100.0);
         assert_eq!((again.stamp_ns, again.playing), (stamps[2], true));
         // A paused cursor does not move, and where nothing more is computed, a playing one waits.
@@ -329,14 +328,14 @@ mod tests {
         let number = stamps.len() - 1;
         let iterations = sample().runs[0].steps[number].report.iterations.len();
         let mut cursor = Cursor::new(stamps[number]);
-        assert_eq!(after(cursor, Command::StepIteration { forward: true }), cursor);
+        assert_eq!(after(cursor, &Command::StepIteration { forward: true }), cursor);
         for _ in 0..=iterations {
-            cursor = after(cursor, Command::StepIteration { forward: false });
+            cursor = after(cursor, &Command::StepIteration { forward: false });
         }
         assert_eq!((cursor.stamp_ns, cursor.solver), (stamps[number - 1], Some(SolverPosition::BeforeLast(0))));
-        let forth = after(cursor, Command::StepIteration { forward: true });
+        let forth = after(cursor, &Command::StepIteration { forward: true });
         assert_eq!((forth.stamp_ns, forth.solver), (stamps[number], Some(SolverPosition::AfterFirst(0))));
-        assert_eq!(after(forth, Command::StepFrames(-1)).solver, None);
+        assert_eq!(after(forth, &Command::StepFrames(-1)).solver, None);
     }
 
     #[test]
@@ -353,7 +352,7 @@ mod tests {
         assert_eq!(run(Cursor::new(stamps[stamps.len() - 1]), sample(), false), stopped);
         assert_eq!(run(start, sample(), false).1, Some(MoveOutcome::NoHitBefore));
         assert_eq!(run(stopped.0, sample(), true).1, Some(MoveOutcome::NoHitAfter));
-        assert_eq!(after(start, Command::Play).advance(sample(), &breakpoints, 100.0), stopped);
+        assert_eq!(after(start, &Command::Play).advance(sample(), &breakpoints, 100.0), stopped);
         let none = start.apply(&Command::RunToBreakpoint { forward: true }, sample(), &Breakpoints::default());
         assert_eq!(none, Some((start, Some(MoveOutcome::NoBreakpoint))));
 
@@ -364,7 +363,7 @@ mod tests {
         assert!(running.running_to_breakpoint && outcome.is_none());
         let (followed, _) = running.advance(&growing, &breakpoints, 0.0);
         assert_eq!(followed.stamp_ns, growing.last_stamp_ns());
-        assert!(!after(followed, Command::Pause).running_to_breakpoint);
+        assert!(!after(followed, &Command::Pause).running_to_breakpoint);
         let (ended, outcome) = followed.advance(sample(), &breakpoints, 0.0);
         assert_eq!((ended.running_to_breakpoint, outcome), (false, Some(MoveOutcome::NoHitToEnd)));
     }
