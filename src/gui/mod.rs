@@ -16,10 +16,10 @@ pub mod inspector;
 pub mod jacobian;
 pub mod laboratory;
 pub mod offscreen;
-pub mod open_dialog;
 pub mod painter;
 #[cfg(test)]
 mod panel_tests;
+mod path_field;
 mod plot;
 pub mod rank;
 pub mod residuals;

@@ -6,13 +6,13 @@ use std::sync::Arc;
 use egui::{Align, Button, Layout, RichText, ScrollArea, Sense, Stroke, StrokeKind, Ui, vec2};
 
 use super::desktop::Desktop;
-use super::open_dialog::PathBox;
+use super::path_field::PathField;
 use super::theme::Theme;
 
 /// State of the welcome view.
 #[derive(Default)]
 pub struct Welcome {
-    path_box: PathBox,
+    path_field: PathField,
     samples: Vec<PathBuf>,
     recent: Vec<PathBuf>,
 }
@@ -21,7 +21,7 @@ impl Welcome {
     /// Reads which logs can be offered.
     pub fn new(desktop: Arc<dyn Desktop>) -> Self {
         let (samples, recent) = (desktop.sample_logs(), desktop.recent_logs());
-        Self { path_box: PathBox::new(desktop), samples, recent }
+        Self { path_field: PathField::new(desktop), samples, recent }
     }
 
     /// Draws it; returns the log that was chosen. `opening` names a log that is being opened.
@@ -43,7 +43,7 @@ impl Welcome {
                 ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
                     drop_target_ui(ui, theme);
                     ui.add_space(10.0);
-                    chosen = self.path_box.ui(ui, theme, false, 130.0);
+                    chosen = self.path_field.ui(ui, theme, false, 130.0);
                     ui.add_space(10.0);
                     let lists = [
                         ("Sample logs", &self.samples, "None found beside the program"),

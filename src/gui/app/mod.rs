@@ -90,7 +90,7 @@ impl App {
         state.show_times = true;
         state.panels.laboratory.in_background = true;
         state.panels.rank.in_background = true;
-        state.open_dialog.set_desktop(Arc::clone(&desktop));
+        state.dialogs.set_desktop(Arc::clone(&desktop));
         state.saved_layouts = SavedLayouts::from_text(&desktop.kept_layouts().unwrap_or_default());
         state.settings = Settings::from_text(&desktop.kept_settings().unwrap_or_default(), theme);
         let layout = state.settings.layout.clone();

@@ -3,7 +3,7 @@
 use egui::{Key, KeyboardShortcut, Modifiers, Popup, Ui};
 
 use super::tiles::Preset;
-use super::{NoticeLevel, PanelName, WindowState};
+use super::{Dialog, NoticeLevel, PanelName, WindowState};
 use crate::frontend::FeatureId;
 use crate::gui::PanelContext;
 use crate::gui::theme::ThemeName;
@@ -39,14 +39,8 @@ pub(crate) enum Action {
     Dismiss,
     /// Show the next run in the panels that show one.
     NextRun,
-    /// Open a log.
-    Open,
-    /// Add a run.
-    AddRun,
-    /// Fork the shown run at the cursor.
-    Fork,
-    /// List all commands.
-    Palette,
+    /// Open a dialog.
+    Dialog(Dialog),
     /// List all shortcuts.
     Shortcuts,
     /// List the warnings.
@@ -63,8 +57,6 @@ pub(crate) enum Action {
     NextPanel(bool),
     /// Dark or light.
     Theme,
-    /// Change the settings.
-    Settings,
     /// A theme by name.
     SetTheme(ThemeName),
     /// Put the cursor at a time since the log began, in nanoseconds.
@@ -81,13 +73,6 @@ pub(crate) enum Action {
     Hide(PanelName),
     /// Play so fast, in log seconds per second.
     Speed(f64),
-}
-
-impl Action {
-    /// Whether a dialog comes of it that takes all keys.
-    pub(crate) fn opens_dialog(self) -> bool {
-        matches!(self, Self::Palette | Self::Settings | Self::Open | Self::AddRun | Self::Fork)
-    }
 }
 
 /// One row of the table.
@@ -122,11 +107,11 @@ pub(crate) const TABLE: &[Entry] = &[
     entry(Action::Step(-10), "Ten frames back", "Shift+Left", &[(SHIFT, Key::ArrowLeft)]),
     entry(Action::Hit(false), "Run back to the previous hit of a breakpoint", "Shift+N", &[(SHIFT, Key::N)]),
     entry(Action::NextPanel(false), "Focus the previous panel", "Shift+F6", &[(SHIFT, Key::F6)]),
-    entry(Action::Settings, "Settings…", "Ctrl+,", &[(CTRL, Key::Comma)]),
-    entry(Action::Open, "Open a log or a session…", "Ctrl+O", &[(CTRL, Key::O)]),
+    entry(Action::Dialog(Dialog::Settings), "Settings…", "Ctrl+,", &[(CTRL, Key::Comma)]),
+    entry(Action::Dialog(Dialog::OpenLog), "Open a log or a session…", "Ctrl+O", &[(CTRL, Key::O)]),
     entry(Action::Export, "Export this panel (PNG, CSV)", "Ctrl+E", &[(CTRL, Key::E)]),
     entry(Action::Save, "Save the session", "Ctrl+S", &[(CTRL, Key::S)]),
-    entry(Action::Palette, "Command palette…", "Ctrl+P", &[(CTRL, Key::P)]),
+    entry(Action::Dialog(Dialog::Palette), "Command palette…", "Ctrl+P", &[(CTRL, Key::P)]),
     entry(Action::TogglePlay, "Play or pause", "Space", &[(NONE, Key::Space)]),
     entry(Action::Step(1), "One frame forward", "Right", &[(NONE, Key::ArrowRight)]),
     entry(Action::Step(-1), "One frame back", "Left", &[(NONE, Key::ArrowLeft)]),
@@ -140,8 +125,8 @@ pub(crate) const TABLE: &[Entry] = &[
     entry(Action::Hit(true), "Run to the next hit of a breakpoint", "N", &[(NONE, Key::N)]),
     entry(Action::WholeLog, "Show the whole log", "Z", &[(NONE, Key::Z)]),
     entry(Action::NextRun, "Show the next run", "R", &[(NONE, Key::R)]),
-    entry(Action::Fork, "Fork the shown run here…", "F", &[(NONE, Key::F)]),
-    entry(Action::AddRun, "Add a run…", "A", &[(NONE, Key::A)]),
+    entry(Action::Dialog(Dialog::Fork), "Fork the shown run here…", "F", &[(NONE, Key::F)]),
+    entry(Action::Dialog(Dialog::AddRun), "Add a run…", "A", &[(NONE, Key::A)]),
     entry(Action::Warnings, "List warnings", "W", &[(NONE, Key::W)]),
     entry(Action::Theme, "Dark or light theme", "T", &[(NONE, Key::T)]),
     entry(Action::Layout(Preset::Overview), "Layout: overview", "1", &[(NONE, Key::Num1)]),
@@ -214,10 +199,7 @@ pub(crate) fn perform(action: Action, state: &mut WindowState, ctx: &mut PanelCo
         Action::NextRun => {
             ctx.selection.run = (ctx.selection.run + 1) % ctx.recording.runs.len().max(1);
         }
-        Action::Open => state.open_dialog.show(),
-        Action::AddRun => state.add_run.show(),
-        Action::Fork => state.fork.show(),
-        Action::Palette => state.palette.show(),
+        Action::Dialog(dialog) => state.dialogs.show(dialog),
         Action::Shortcuts => state.shortcuts_open = !state.shortcuts_open,
         Action::Warnings => state.notices.list_open = !state.notices.list_open,
         Action::Export => {
@@ -236,7 +218,6 @@ pub(crate) fn perform(action: Action, state: &mut WindowState, ctx: &mut PanelCo
         Action::Theme => {
             state.settings.theme = if ctx.theme.is_dark() { ThemeName::Light } else { ThemeName::Dark };
         }
-        Action::Settings => state.settings_dialog.show(),
         Action::SetTheme(theme) => state.settings.theme = theme,
         Action::GoTo(stamp_ns) => ctx.commands.push(Command::Seek { stamp_ns }),
         Action::Feature(feature) => ctx.selection.feature = Some(feature),

@@ -6,7 +6,7 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::{By, NodeT as _, Queryable as _};
 
 use super::tests::{Bench, SECOND_NS, bench, commands_of};
-use super::{PanelName, Preset};
+use super::{Dialog, PanelName, Preset};
 use crate::frontend::FeatureId;
 use crate::gimbal::tests::parameter;
 use crate::gui::theme::ThemeName;
@@ -54,7 +54,7 @@ fn the_palette_has_every_action_with_its_keys_and_moves_by_key() {
     harness.run_steps(3);
     for entry in super::actions::TABLE {
         use super::actions::Action;
-        if matches!(entry.action, Action::Palette | Action::Dismiss | Action::SavedLayout(_)) {
+        if matches!(entry.action, Action::Dialog(Dialog::Palette) | Action::Dismiss | Action::SavedLayout(_)) {
             continue;
         }
         assert!(harness.query_all_by_label(entry.name).next().is_some(), "{}", entry.name);

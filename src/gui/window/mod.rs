@@ -3,16 +3,12 @@
 //! The real window and the headless pictures draw the same [`window_ui`].
 
 mod actions;
-mod add_run;
+mod dialogs;
 mod focus_ring;
-mod fork;
-mod fuzzy;
 #[cfg(test)]
 mod keyboard_tests;
 mod legend;
 mod notices;
-mod palette;
-mod palette_items;
 mod panel_export;
 mod panels;
 mod progress;
@@ -31,23 +27,19 @@ use std::path::PathBuf;
 use egui::{CentralPanel, Frame, Margin, Panel, Rect, Ui, Vec2};
 
 use self::actions::Action;
-pub use self::add_run::AddRunDialog;
+pub use self::dialogs::{Dialog, Dialogs};
 use self::focus_ring::FocusRing;
-pub use self::fork::ForkDialog;
 pub use self::legend::RunLegend;
 pub use self::notices::{NoticeLevel, Notices};
-pub use self::palette::CommandPalette;
 pub use self::panel_export::{PanelExport, alone_ui, panel_table};
 pub use self::panels::{PanelName, Panels};
 pub use self::progress::{Progress, ProgressMeter};
 pub use self::saved_layouts::SavedLayouts;
-pub use self::settings::{SCALES, Settings, SettingsDialog};
+pub use self::settings::{SCALES, Settings};
 use self::tiles::Layout;
 pub use self::tiles::Preset;
 use super::PanelContext;
-use super::open_dialog::OpenDialog;
 use super::slide;
-use super::theme::Theme;
 use super::timeline::TimelinePanel;
 
 /// What the window wants of the program, beyond what a session can do.
@@ -72,14 +64,8 @@ pub struct WindowState {
     pub legend: RunLegend,
     /// What went wrong, for people to see.
     pub notices: Notices,
-    /// Adds a run.
-    pub add_run: AddRunDialog,
-    /// Forks a run.
-    pub fork: ForkDialog,
-    /// Opens a log.
-    pub open_dialog: OpenDialog,
-    /// Lists commands.
-    pub palette: CommandPalette,
+    /// Dialogs that the rest of the window waits for.
+    pub dialogs: Dialogs,
     /// Whether the sheet of shortcuts is open.
     pub shortcuts_open: bool,
     /// Memory of the process in bytes, when it is known; pictures leave it out, because it differs from run to run.
@@ -92,8 +78,6 @@ pub struct WindowState {
     pub saved_layouts: SavedLayouts,
     /// What a person has set; the program applies it.
     pub settings: Settings,
-    /// Changes the settings.
-    pub settings_dialog: SettingsDialog,
     /// How far the estimation has come, `None` when all is computed.
     pub progress: Option<Progress>,
     /// A log that is being opened while another one is shown.
@@ -107,21 +91,8 @@ pub struct WindowState {
 }
 
 impl WindowState {
-    /// Whether a dialog is open that everything else waits for.
-    fn is_modal(&self) -> bool {
-        self.palette.is_open()
-            || self.settings_dialog.is_open()
-            || self.fork.is_open()
-            || self.add_run.is_open()
-            || self.open_dialog.is_open()
-    }
-
     fn close_dialogs(&mut self) {
-        self.add_run.hide();
-        self.fork.hide();
-        self.open_dialog.hide();
-        self.palette.hide();
-        self.settings_dialog.hide();
+        self.dialogs.close();
         self.shortcuts_open = false;
         self.notices.list_open = false;
     }
@@ -182,9 +153,9 @@ pub fn window_ui(ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_
     let theme = *ctx.theme;
     slide::update(ctx);
     // Behind a dialog keys mean nothing.
-    let mut actions: Vec<Action> = if state.is_modal() { Vec::new() } else { actions::pressed(ui) };
+    let mut actions: Vec<Action> = if state.dialogs.is_open() { Vec::new() } else { actions::pressed(ui) };
     // A dialog takes the keys that come after the one that opens it, even in the same picture.
-    if let Some(opening) = actions.iter().copied().find(|action| action.opens_dialog()) {
+    if let Some(opening) = actions.iter().copied().find(|action| matches!(action, Action::Dialog(_))) {
         actions.clear();
         actions::perform(opening, state, ctx);
     }
@@ -209,32 +180,12 @@ pub fn window_ui(ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_
     });
     state.follow_focus(ui);
 
-    dialogs_ui(ui, state, ctx, &mut actions);
+    dialogs::ui(ui, state, ctx, &mut actions);
+    shortcuts::ui(ui, &theme, &mut state.shortcuts_open);
+    state.notices.list_ui(ui, ctx);
+    state.notices.toasts_ui(ui, &theme);
     state.ring.ui(ui, &theme);
     for action in actions {
         actions::perform(action, state, ctx);
     }
-}
-
-fn dialogs_ui(ui: &Ui, state: &mut WindowState, ctx: &mut PanelContext<'_>, actions: &mut Vec<Action>) {
-    state.add_run.ui(ui, ctx);
-    state.fork.ui(ui, ctx);
-    if let Some(path) = state.open_dialog.ui(ui, ctx.theme) {
-        state.requests.push(WindowRequest::OpenLog(path));
-    }
-    state.palette.ui(ui, ctx, &state.saved_layouts, &state.layout, actions);
-    state.settings_dialog.ui(ui, ctx.theme, &mut state.settings, state.saved_layouts.names());
-    shortcuts::ui(ui, ctx.theme, &mut state.shortcuts_open);
-    state.notices.list_ui(ui, ctx);
-    state.notices.toasts_ui(ui, ctx.theme);
-}
-
-/// A frame for small windows and menus.
-pub(crate) fn dialog_frame(theme: &Theme) -> Frame {
-    Frame::new()
-        .fill(theme.surface)
-        .stroke(egui::Stroke::new(1.0, theme.outline))
-        .corner_radius(super::theme::CORNER_RADIUS)
-        .inner_margin(12)
-        .shadow(egui::Shadow { offset: [0, 6], blur: 18, spread: 0, color: egui::Color32::from_black_alpha(90) })
 }

@@ -2,9 +2,8 @@
 
 use egui::{Align2, Area, Button, Frame, Id, Margin, Order, Panel, RichText, ScrollArea, Ui, vec2};
 
-use super::dialog_frame;
 use crate::gui::PanelContext;
-use crate::gui::theme::Theme;
+use crate::gui::theme::{Theme, dialog_frame};
 use crate::gui::units::{counted, seconds};
 use crate::session::{Command, RunWarning};
 

@@ -5,17 +5,17 @@ use egui::{Align, Button, Layout as UiLayout, PopupCloseBehavior, RichText, Ui, 
 
 use super::actions::{Action, TABLE};
 use super::tiles::Preset;
-use super::{PanelName, WindowRequest, WindowState};
+use super::{Dialog, PanelName, WindowRequest, WindowState};
 use crate::gui::PanelContext;
 use crate::gui::theme::{MAX_RUNS, Theme};
 use crate::session::Recording;
 
 pub(super) fn ui(ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_>, actions: &mut Vec<Action>) {
     ui.horizontal_centered(|ui| {
-        action_button(ui, "Open…", Action::Open, true, actions);
+        action_button(ui, "Open…", Action::Dialog(Dialog::OpenLog), true, actions);
         let room = ctx.recording.runs.len() < MAX_RUNS;
-        action_button(ui, "Add run…", Action::AddRun, room, actions);
-        action_button(ui, "Fork…", Action::Fork, room, actions);
+        action_button(ui, "Add run…", Action::Dialog(Dialog::AddRun), room, actions);
+        action_button(ui, "Fork…", Action::Dialog(Dialog::Fork), room, actions);
         ui.separator();
         ui.label(RichText::new(log_name(ctx.recording)).color(ctx.theme.text_strong));
         ui.label(RichText::new(format!("rig {}", ctx.recording.rig.name)).color(ctx.theme.text_weak));

@@ -1,9 +1,7 @@
 //! What the command palette offers: all actions, and what the recording at the cursor has.
 
-use super::actions::{Action, TABLE};
 use super::palette::keys_of;
-use super::tiles::Layout;
-use super::{PanelName, SavedLayouts, fuzzy};
+use super::{Dialog, fuzzy};
 use crate::frontend::FeatureId;
 use crate::geometry::ns_from_seconds;
 use crate::gimbal::ParameterId;
@@ -12,6 +10,9 @@ use crate::gui::convergence::names::meaning_of;
 use crate::gui::theme::ThemeName;
 use crate::gui::timeline::SPEEDS;
 use crate::gui::units::seconds;
+use crate::gui::window::actions::{Action, TABLE};
+use crate::gui::window::tiles::Layout;
+use crate::gui::window::{PanelName, SavedLayouts};
 use crate::session::RunRecord;
 
 /// What comes of choosing an item.
@@ -55,7 +56,7 @@ pub(super) fn found(typed: &str, ctx: &PanelContext<'_>, layouts: &SavedLayouts,
 fn commands(ctx: &PanelContext<'_>, layouts: &SavedLayouts, layout: &Layout) -> Vec<Item> {
     let listed = TABLE.iter().filter(|entry| {
         // What they stand for is listed below, or open already.
-        !matches!(entry.action, Action::Palette | Action::Dismiss | Action::SavedLayout(_))
+        !matches!(entry.action, Action::Dialog(Dialog::Palette) | Action::Dismiss | Action::SavedLayout(_))
     });
     let mut items: Vec<Item> = listed.map(|entry| item(entry.name, entry.action)).collect();
     items.push(item("Clear the selection", Action::Dismiss));

@@ -1,11 +1,13 @@
 //! The command palette: everything that the window can do, found by typing.
 
-use egui::{Align, Id, Key, Layout as UiLayout, Modal, Modifiers, RichText, ScrollArea, TextEdit, Ui, WidgetInfo};
+use egui::{Align, Key, Layout as UiLayout, Modifiers, RichText, ScrollArea, TextEdit, Ui, WidgetInfo};
 
-use super::actions::{Action, TABLE};
+use super::modal::Modal;
 use super::palette_items::{Choice, Item, found};
-use super::{SavedLayouts, dialog_frame, tiles::Layout};
 use crate::gui::PanelContext;
+use crate::gui::window::SavedLayouts;
+use crate::gui::window::actions::{Action, TABLE};
+use crate::gui::window::tiles::Layout;
 
 /// Height of the list in points.
 const LIST_HEIGHT: f32 = 360.0;
@@ -14,29 +16,13 @@ const PAGE: usize = 10;
 
 /// State of the command palette.
 #[derive(Debug, Default)]
-pub struct CommandPalette {
-    open: bool,
+pub(super) struct CommandPalette {
     typed: String,
     chosen: usize,
 }
 
 impl CommandPalette {
-    /// Opens it, empty.
-    pub fn show(&mut self) {
-        *self = Self { open: true, ..Self::default() };
-    }
-
-    /// Whether it is open.
-    pub fn is_open(&self) -> bool {
-        self.open
-    }
-
-    /// Closes it.
-    pub fn hide(&mut self) {
-        self.open = false;
-    }
-
-    /// Draws it; what is chosen joins the actions, or is done at once where it is no action.
+    /// Draws it; what is chosen joins the actions, or is done at once where it is no action. Returns whether it stays open.
     pub(super) fn ui(
         &mut self,
         ui: &Ui,
@@ -44,14 +30,11 @@ impl CommandPalette {
         layouts: &SavedLayouts,
         layout: &Layout,
         actions: &mut Vec<Action>,
-    ) {
-        if !self.open {
-            return;
-        }
+    ) -> bool {
         let theme = *ctx.theme;
-        let modal = Modal::new(Id::unique("command palette")).frame(dialog_frame(&theme));
-        let response = modal.show(ui.ctx(), |ui| {
-            ui.set_width(480.0_f32.min(ui.ctx().content_rect().width() - 60.0));
+        let width = 480.0_f32.min(ui.ctx().content_rect().width() - 60.0);
+        let modal = Modal { name: "command palette", title: "", width };
+        let (choice, stays_open) = modal.ui(ui, &theme, |ui| {
             let moved = moves(ui);
             let hint = "Type a command, a time (12.5), a frame, a feature, a parameter";
             // It has the focus before it is drawn, so that nothing typed at once is lost.
@@ -77,14 +60,13 @@ impl CommandPalette {
             let entered = matches!(moved, Some(Move::Enter)).then_some(self.chosen);
             clicked.or(entered).and_then(|number| items.into_iter().nth(number)).map(|item| item.choice)
         });
-        let close = response.should_close();
-        match response.inner {
+        let chosen = choice.is_some();
+        match choice {
             Some(Choice::Action(action)) => actions.push(action),
             Some(Choice::Parameter(parameter)) => ctx.selection.parameter = Some(parameter),
-            None if !close => return,
             None => {}
         }
-        self.open = false;
+        stays_open && !chosen
     }
 }
 

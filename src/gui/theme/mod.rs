@@ -2,11 +2,18 @@
 //!
 //! Runs are told apart by Okabe–Ito colours *and* dash patterns, never by colour alone.
 
-use std::collections::BTreeMap;
+mod color;
+mod style;
+
 use std::str::FromStr;
 
-use egui::{Color32, CornerRadius, FontFamily, FontId, Stroke, TextStyle, vec2};
+use egui::Color32;
 use serde::{Deserialize, Serialize};
+
+use self::color::{contrast, rgb};
+pub use self::color::{mix, viridis};
+pub(crate) use self::style::dialog_frame;
+pub use self::style::{label_font, number_font};
 
 /// Which theme.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
@@ -141,10 +148,6 @@ impl Default for Theme {
     }
 }
 
-const fn rgb(hex: u32) -> Color32 {
-    Color32::from_rgb((hex >> 16) as u8, (hex >> 8) as u8, hex as u8)
-}
-
 impl Theme {
     /// The theme of a name.
     pub fn of(name: ThemeName) -> Self {
@@ -248,121 +251,6 @@ impl Theme {
         let (dark, light) = (rgb(0x0d1117), rgb(0xf0f3f7));
         if contrast(dark, ground) > contrast(light, ground) { dark } else { light }
     }
-
-    /// Puts the theme into egui: colours, fonts, spacing.
-    pub fn apply(&self, ctx: &egui::Context) {
-        let base = if self.is_dark() { egui::Theme::Dark } else { egui::Theme::Light };
-        let style = std::sync::Arc::new(self.style(base));
-        // The theme is the program's choice, not the desktop's: both of egui's slots hold it.
-        ctx.set_style_of(egui::Theme::Dark, style.clone());
-        ctx.set_style_of(egui::Theme::Light, style);
-        ctx.set_theme(base);
-    }
-
-    fn style(&self, base: egui::Theme) -> egui::Style {
-        let mut style = base.default_style();
-        style.text_styles = text_styles();
-        style.spacing.item_spacing = vec2(6.0, 4.0);
-        style.spacing.button_padding = vec2(6.0, 2.0);
-        style.spacing.interact_size = vec2(28.0, 20.0);
-        style.spacing.indent = 12.0;
-        style.interaction.selectable_labels = false;
-        style.interaction.tooltip_delay = 0.3;
-        style.animation_time = 0.08;
-
-        let visuals = &mut style.visuals;
-        visuals.panel_fill = self.surface;
-        visuals.window_fill = self.surface;
-        visuals.window_stroke = Stroke::new(1.0, self.outline);
-        visuals.extreme_bg_color = self.plot_background;
-        visuals.faint_bg_color = self.surface_raised.gamma_multiply(0.5);
-        visuals.code_bg_color = self.surface_raised;
-        visuals.weak_text_color = Some(self.text_weak);
-        visuals.hyperlink_color = self.accent;
-        visuals.warn_fg_color = self.warn;
-        visuals.error_fg_color = self.error;
-        visuals.selection.bg_fill = mix(self.surface, self.accent, 0.45);
-        visuals.selection.stroke = Stroke::new(1.0, self.text_strong);
-        visuals.window_shadow.color = Color32::from_black_alpha(if self.is_dark() { 110 } else { 40 });
-        visuals.popup_shadow.color = visuals.window_shadow.color;
-
-        let radius = CornerRadius::same(CORNER_RADIUS);
-        visuals.window_corner_radius = radius;
-        visuals.menu_corner_radius = radius;
-        let widgets = &mut visuals.widgets;
-        for (widget, ground, text) in [
-            (&mut widgets.noninteractive, self.surface, self.text),
-            (&mut widgets.inactive, self.surface_raised, self.text),
-            (&mut widgets.hovered, mix(self.surface_raised, self.accent, 0.25), self.text_strong),
-            (&mut widgets.active, mix(self.surface_raised, self.accent, 0.45), self.text_strong),
-            (&mut widgets.open, self.surface_raised, self.text_strong),
-        ] {
-            widget.bg_fill = ground;
-            widget.weak_bg_fill = ground;
-            widget.fg_stroke = Stroke::new(1.0, text);
-            widget.corner_radius = radius;
-            widget.expansion = 0.0;
-        }
-        widgets.noninteractive.bg_stroke = Stroke::new(1.0, self.outline);
-        widgets.hovered.bg_stroke = Stroke::new(1.0, self.accent);
-        widgets.active.bg_stroke = Stroke::new(1.0, self.accent);
-        style
-    }
-}
-
-fn text_styles() -> BTreeMap<TextStyle, FontId> {
-    use FontFamily::{Monospace, Proportional};
-    [
-        (TextStyle::Small, FontId::new(10.5, Proportional)),
-        (TextStyle::Body, FontId::new(12.5, Proportional)),
-        (TextStyle::Button, FontId::new(12.5, Proportional)),
-        (TextStyle::Heading, FontId::new(15.0, Proportional)),
-        (TextStyle::Monospace, FontId::new(11.5, Monospace)),
-    ]
-    .into_iter()
-    .collect()
-}
-
-/// Font of numbers in plots and tables.
-pub fn number_font() -> FontId {
-    FontId::new(11.0, FontFamily::Monospace)
-}
-
-/// Font of small labels in plots.
-pub fn label_font() -> FontId {
-    FontId::new(11.0, FontFamily::Proportional)
-}
-
-/// Mixes two opaque colours in their 8-bit values: `fraction` 0 is the first, 1 the second.
-pub fn mix(from: Color32, to: Color32, fraction: f32) -> Color32 {
-    let fraction = if fraction.is_nan() { 0.0 } else { fraction.clamp(0.0, 1.0) };
-    let blend = |a: u8, b: u8| (f32::from(a) + (f32::from(b) - f32::from(a)) * fraction).round() as u8;
-    Color32::from_rgb(blend(from.r(), to.r()), blend(from.g(), to.g()), blend(from.b(), to.b()))
-}
-
-/// Contrast ratio of WCAG 2.1 between two opaque colours.
-fn contrast(a: Color32, b: Color32) -> f64 {
-    let luminance = |color: Color32| {
-        let linear = |value: u8| {
-            let value = f64::from(value) / 255.0;
-            if value <= 0.03928 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
-        };
-        0.2126 * linear(color.r()) + 0.7152 * linear(color.g()) + 0.0722 * linear(color.b())
-    };
-    let (a, b) = (luminance(a), luminance(b));
-    (a.max(b) + 0.05) / (a.min(b) + 0.05)
-}
-
-/// Matplotlib's viridis from 0 to 1 in steps of a ninth, interpolated linearly between.
-const VIRIDIS: [u32; 10] =
-    [0x440154, 0x482878, 0x3e4a89, 0x31688e, 0x26828e, 0x1f9e89, 0x35b779, 0x6dcd59, 0xb4de2c, 0xfde725];
-
-/// Viridis at a fraction in 0 to 1, clamped; not-a-number counts as 0.
-pub fn viridis(fraction: f64) -> Color32 {
-    let fraction = if fraction.is_nan() { 0.0 } else { fraction.clamp(0.0, 1.0) };
-    let position = fraction * (VIRIDIS.len() - 1) as f64;
-    let lower = (position as usize).min(VIRIDIS.len() - 2);
-    mix(rgb(VIRIDIS[lower]), rgb(VIRIDIS[lower + 1]), (position - lower as f64) as f32)
 }
 
 #[cfg(test)]

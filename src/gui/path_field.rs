@@ -1,73 +1,19 @@
-//! A box for the path of a log, with completion.
+//! A text field for the path of a log, with completion.
 
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use egui::{Id, Key, Modal, Modifiers, RichText, ScrollArea, TextEdit, Ui};
+use egui::{Id, Key, Modifiers, RichText, ScrollArea, TextEdit, Ui};
 
 use super::desktop::{Desktop, PathEntry};
 use super::theme::Theme;
-use super::window::dialog_frame;
 
 /// How many completions are listed.
 const MOST_ENTRIES: usize = 200;
 
-/// State of the dialog.
-#[derive(Default)]
-pub struct OpenDialog {
-    open: bool,
-    path_box: PathBox,
-}
-
-impl OpenDialog {
-    /// Lets it complete paths.
-    pub fn set_desktop(&mut self, desktop: Arc<dyn Desktop>) {
-        self.path_box = PathBox::new(desktop);
-    }
-
-    /// Opens it.
-    pub fn show(&mut self) {
-        self.open = true;
-    }
-
-    /// Whether it is open.
-    pub fn is_open(&self) -> bool {
-        self.open
-    }
-
-    /// Closes it.
-    pub fn hide(&mut self) {
-        self.open = false;
-    }
-
-    /// Draws it; returns the path that was chosen.
-    pub fn ui(&mut self, ui: &Ui, theme: &Theme) -> Option<PathBuf> {
-        if !self.open {
-            return None;
-        }
-        let modal = Modal::new(Id::unique("open log")).frame(dialog_frame(theme));
-        let response = modal.show(ui.ctx(), |ui| {
-            ui.set_width(560.0);
-            ui.label(RichText::new("Open a flight log or a saved session").size(15.0).color(theme.text_strong));
-            ui.label(RichText::new("Either can also be dropped onto the window").color(theme.text_weak));
-            ui.add_space(4.0);
-            let chosen = self.path_box.ui(ui, theme, true, 300.0);
-            ui.add_space(4.0);
-            let cancelled = ui.button("Cancel").clicked();
-            (chosen, cancelled)
-        });
-        let close = response.should_close();
-        let (chosen, cancelled) = response.inner;
-        if chosen.is_some() || cancelled || close {
-            self.open = false;
-        }
-        chosen
-    }
-}
-
 /// A line for a path, and what it could become.
 #[derive(Default)]
-pub(crate) struct PathBox {
+pub(crate) struct PathField {
     desktop: Option<Arc<dyn Desktop>>,
     typed: String,
     chosen: Option<usize>,
@@ -75,7 +21,7 @@ pub(crate) struct PathBox {
     completed: Option<(String, Vec<PathEntry>)>,
 }
 
-impl PathBox {
+impl PathField {
     /// An empty line that completes paths.
     pub(crate) fn new(desktop: Arc<dyn Desktop>) -> Self {
         Self { desktop: Some(desktop), ..Self::default() }

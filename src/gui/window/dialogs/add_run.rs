@@ -1,8 +1,8 @@
 //! The dialog that adds a run over the same log.
 
-use egui::{ComboBox, Grid, Id, Modal, RichText, TextEdit, Ui, vec2};
+use egui::{ComboBox, Grid, RichText, TextEdit, Ui, vec2};
 
-use super::dialog_frame;
+use super::modal::{Modal, accept_or_cancel_ui};
 use crate::gui::PanelContext;
 use crate::session::{Command, RunSpec};
 
@@ -19,8 +19,7 @@ const CHOICES: [(&str, &str); 7] = [
 
 /// State of the dialog.
 #[derive(Debug)]
-pub struct AddRunDialog {
-    open: bool,
+pub(super) struct AddRunDialog {
     choice: usize,
     encoder: bool,
     calibrate: bool,
@@ -34,7 +33,6 @@ impl Default for AddRunDialog {
     fn default() -> Self {
         let standard = RunSpec::default();
         Self {
-            open: false,
             choice: 3,
             encoder: standard.encoder,
             calibrate: standard.calibrate,
@@ -47,21 +45,6 @@ impl Default for AddRunDialog {
 }
 
 impl AddRunDialog {
-    /// Opens it.
-    pub fn show(&mut self) {
-        self.open = true;
-    }
-
-    /// Whether it is open.
-    pub fn is_open(&self) -> bool {
-        self.open
-    }
-
-    /// Closes it.
-    pub fn hide(&mut self) {
-        self.open = false;
-    }
-
     /// What it would add, as on the command line.
     fn written(&self) -> String {
         let mut options = Vec::new();
@@ -87,18 +70,12 @@ impl AddRunDialog {
         if options.is_empty() { name.to_owned() } else { format!("{name}:{}", options.join(",")) }
     }
 
-    /// Draws it; the run it makes joins the commands.
-    pub(crate) fn ui(&mut self, ui: &Ui, ctx: &mut PanelContext<'_>) {
-        if !self.open {
-            return;
-        }
+    /// Draws it; the run it makes joins the commands. Returns whether it stays open.
+    pub(super) fn ui(&mut self, ui: &Ui, ctx: &mut PanelContext<'_>) -> bool {
         let theme = *ctx.theme;
-        let modal = Modal::new(Id::unique("add run")).frame(dialog_frame(&theme));
-        let response = modal.show(ui.ctx(), |ui| {
-            ui.set_width(430.0);
-            ui.label(
-                RichText::new("Add a run over the same log and the same tracks").size(15.0).color(theme.text_strong),
-            );
+        let title = "Add a run over the same log and the same tracks";
+        let modal = Modal { name: "add run", title, width: 430.0 };
+        let contents = modal.ui(ui, &theme, |ui| {
             ui.add_space(4.0);
             self.fields_ui(ui, &theme);
             let written = self.written();
@@ -109,21 +86,11 @@ impl AddRunDialog {
                 Err(error) => ui.add(egui::Label::new(RichText::new(error.to_string()).color(theme.error)).wrap()),
             };
             ui.add_space(6.0);
-            let enter = ui.input(|input| input.key_pressed(egui::Key::Enter));
-            ui.horizontal(|ui| {
-                let add = ui.add_enabled(parsed.is_ok(), egui::Button::new("Add run")).clicked();
-                if let (true, Ok(spec)) = (add || enter, parsed) {
-                    ctx.commands.push(Command::AddRun(spec));
-                    self.open = false;
-                }
-                if ui.button("Cancel").clicked() {
-                    self.open = false;
-                }
-            });
+            if let (true, Ok(spec)) = (accept_or_cancel_ui(ui, "Add run", parsed.is_ok()), parsed) {
+                ctx.commands.push(Command::AddRun(spec));
+            }
         });
-        if response.should_close() {
-            self.open = false;
-        }
+        contents.1
     }
 
     fn fields_ui(&mut self, ui: &mut Ui, theme: &crate::gui::theme::Theme) {

@@ -1,8 +1,8 @@
 //! The dialog that lets a run go on from the frame at the cursor in another way.
 
-use egui::{ComboBox, DragValue, Grid, Id, Modal, RichText, TextEdit, Ui, vec2};
+use egui::{ComboBox, DragValue, Grid, RichText, TextEdit, Ui, vec2};
 
-use super::dialog_frame;
+use super::modal::{Modal, accept_or_cancel_ui};
 use crate::gui::PanelContext;
 use crate::gui::units::seconds;
 use crate::session::{Command, FORK_PARAMETERIZATIONS, ForkChanges, RunSpec};
@@ -12,8 +12,7 @@ const AS_BEFORE: &str = "as before";
 
 /// State of the dialog.
 #[derive(Debug)]
-pub struct ForkDialog {
-    open: bool,
+pub(super) struct ForkDialog {
     /// Number in the list, 0 for the parent's own.
     choice: usize,
     frozen: String,
@@ -31,7 +30,6 @@ pub struct ForkDialog {
 impl Default for ForkDialog {
     fn default() -> Self {
         Self {
-            open: false,
             choice: 0,
             frozen: String::new(),
             values: String::new(),
@@ -48,21 +46,6 @@ impl Default for ForkDialog {
 }
 
 impl ForkDialog {
-    /// Opens it.
-    pub fn show(&mut self) {
-        self.open = true;
-    }
-
-    /// Whether it is open.
-    pub fn is_open(&self) -> bool {
-        self.open
-    }
-
-    /// Closes it.
-    pub fn hide(&mut self) {
-        self.open = false;
-    }
-
     /// The changes as text.
     fn written(&self) -> String {
         let mut parts = Vec::new();
@@ -102,19 +85,14 @@ impl ForkDialog {
         spec.map(|spec| Some(spec.label)).map_err(|error| error.to_string())
     }
 
-    /// Draws it; the fork it makes joins the commands.
-    pub(crate) fn ui(&mut self, ui: &Ui, ctx: &mut PanelContext<'_>) {
-        if !self.open {
-            return;
-        }
+    /// Draws it; the fork it makes joins the commands. Returns whether it stays open.
+    pub(super) fn ui(&mut self, ui: &Ui, ctx: &mut PanelContext<'_>) -> bool {
         let theme = *ctx.theme;
         let run = ctx.selection.run.min(ctx.recording.runs.len().saturating_sub(1));
         let parent = ctx.recording.runs.get(run).map_or_else(String::new, |run| run.spec.label.clone());
-        let modal = Modal::new(Id::unique("fork")).frame(dialog_frame(&theme));
-        let response = modal.show(ui.ctx(), |ui| {
-            ui.set_width(470.0);
-            let title = format!("Fork {parent} at {} s", seconds(ctx.cursor_ns));
-            ui.label(RichText::new(title).size(15.0).color(theme.text_strong));
+        let title = format!("Fork {parent} at {} s", seconds(ctx.cursor_ns));
+        let modal = Modal { name: "fork", title: &title, width: 470.0 };
+        let contents = modal.ui(ui, &theme, |ui| {
             ui.add_space(4.0);
             self.fields_ui(ui, ctx);
             let written = self.written();
@@ -128,21 +106,11 @@ impl ForkDialog {
                 Err(problem) => ui.add(egui::Label::new(RichText::new(problem).color(theme.error)).wrap()),
             };
             ui.add_space(6.0);
-            let enter = ui.input(|input| input.key_pressed(egui::Key::Enter));
-            ui.horizontal(|ui| {
-                let fork = ui.add_enabled(asked.is_ok(), egui::Button::new("Fork")).clicked();
-                if let (true, Ok((changes, label))) = (fork || enter, asked) {
-                    ctx.commands.push(Command::Fork { run, changes, label });
-                    self.open = false;
-                }
-                if ui.button("Cancel").clicked() {
-                    self.open = false;
-                }
-            });
+            if let (true, Ok((changes, label))) = (accept_or_cancel_ui(ui, "Fork", asked.is_ok()), asked) {
+                ctx.commands.push(Command::Fork { run, changes, label });
+            }
         });
-        if response.should_close() {
-            self.open = false;
-        }
+        contents.1
     }
 
     fn fields_ui(&mut self, ui: &mut Ui, ctx: &PanelContext<'_>) {

@@ -1,0 +1,95 @@
+//! Dialogs that the rest of the window waits for; one is open at a time.
+
+mod add_run;
+mod fork;
+mod fuzzy;
+mod modal;
+mod open_log;
+mod palette;
+mod palette_items;
+mod settings;
+
+use std::sync::Arc;
+
+use egui::Ui;
+
+use self::add_run::AddRunDialog;
+use self::fork::ForkDialog;
+use self::open_log::OpenLogDialog;
+use self::palette::CommandPalette;
+use self::settings::SettingsDialog;
+use super::actions::Action;
+use super::{WindowRequest, WindowState};
+use crate::gui::PanelContext;
+use crate::gui::desktop::Desktop;
+
+/// A dialog by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Dialog {
+    /// Asks for the path of a log or a saved session.
+    OpenLog,
+    /// Adds a run over the same log.
+    AddRun,
+    /// Forks the selected run at the cursor.
+    Fork,
+    /// The command palette.
+    Palette,
+    /// The settings.
+    Settings,
+}
+
+/// What the dialogs hold, open or not.
+#[derive(Default)]
+pub struct Dialogs {
+    open: Option<Dialog>,
+    open_log: OpenLogDialog,
+    add_run: AddRunDialog,
+    fork: ForkDialog,
+    palette: CommandPalette,
+    settings: SettingsDialog,
+}
+
+impl Dialogs {
+    /// Lets the dialog for logs complete paths.
+    pub fn set_desktop(&mut self, desktop: Arc<dyn Desktop>) {
+        self.open_log = OpenLogDialog::new(desktop);
+    }
+
+    /// Opens a dialog in place of the one that is open; the palette opens with nothing typed.
+    pub fn show(&mut self, dialog: Dialog) {
+        if dialog == Dialog::Palette {
+            self.palette = CommandPalette::default();
+        }
+        self.open = Some(dialog);
+    }
+
+    /// Whether a dialog is open.
+    pub fn is_open(&self) -> bool {
+        self.open.is_some()
+    }
+
+    /// Closes the dialog that is open.
+    pub fn close(&mut self) {
+        self.open = None;
+    }
+}
+
+/// Draws the dialog that is open.
+pub(super) fn ui(ui: &Ui, state: &mut WindowState, ctx: &mut PanelContext<'_>, actions: &mut Vec<Action>) {
+    let WindowState { dialogs, requests, saved_layouts, settings, layout, .. } = state;
+    let stays_open = match dialogs.open {
+        None => return,
+        Some(Dialog::OpenLog) => {
+            let (path, stays_open) = dialogs.open_log.ui(ui, ctx.theme);
+            requests.extend(path.map(WindowRequest::OpenLog));
+            stays_open
+        }
+        Some(Dialog::AddRun) => dialogs.add_run.ui(ui, ctx),
+        Some(Dialog::Fork) => dialogs.fork.ui(ui, ctx),
+        Some(Dialog::Palette) => dialogs.palette.ui(ui, ctx, saved_layouts, layout, actions),
+        Some(Dialog::Settings) => dialogs.settings.ui(ui, ctx.theme, settings, saved_layouts.names()),
+    };
+    if !stays_open {
+        dialogs.open = None;
+    }
+}

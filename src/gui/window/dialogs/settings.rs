@@ -1,0 +1,113 @@
+//! The dialog for the settings.
+
+use egui::util::undoer::Undoer;
+use egui::{ComboBox, DragValue, Grid, Key, Modifiers, RichText, Ui, vec2};
+
+use super::modal::Modal;
+use crate::gui::theme::{Theme, ThemeName};
+use crate::gui::timeline::SPEEDS;
+use crate::gui::window::settings::{MEMORY_MIB, SCALES, Settings};
+use crate::gui::window::tiles::Preset;
+
+/// State of the dialog.
+#[derive(Debug, Default)]
+pub(super) struct SettingsDialog {
+    undoer: Undoer<Settings>,
+}
+
+impl SettingsDialog {
+    /// Draws it; settings hold as soon as they are changed. Returns whether it stays open.
+    pub(super) fn ui<'a>(
+        &mut self,
+        ui: &Ui,
+        theme: &Theme,
+        settings: &mut Settings,
+        layouts: impl Iterator<Item = &'a str>,
+    ) -> bool {
+        self.undoer.feed_state(ui.input(|input| input.time), settings);
+        let modal = Modal { name: "settings", title: "Settings", width: 430.0 };
+        let contents = modal.ui(ui, theme, |ui| {
+            ui.add_space(4.0);
+            fields_ui(ui, settings, layouts);
+            ui.add_space(4.0);
+            ui.label(RichText::new("They hold at once and are kept for the next start").color(theme.text_weak));
+            ui.add_space(6.0);
+            self.buttons_ui(ui, settings);
+        });
+        contents.1
+    }
+
+    fn buttons_ui(&mut self, ui: &mut Ui, settings: &mut Settings) {
+        let keys = ui.input_mut(|input| {
+            let redo = input.consume_key(Modifiers::COMMAND | Modifiers::SHIFT, Key::Z);
+            (!redo && input.consume_key(Modifiers::COMMAND, Key::Z), redo)
+        });
+        ui.horizontal(|ui| {
+            if ui.button("Close").clicked() {
+                ui.close();
+            }
+            let (undoes, redoes) = (self.undoer.has_undo(settings), self.undoer.has_redo(settings));
+            let button = |ui: &mut Ui, able: bool, text: &str, keys: &str| {
+                ui.add_enabled(able, egui::Button::new(text)).on_hover_text(keys).clicked()
+            };
+            let undo = button(ui, undoes, "Undo", "Ctrl+Z") || keys.0 && undoes;
+            let redo = button(ui, redoes, "Redo", "Ctrl+Shift+Z") || keys.1 && redoes;
+            let other = if undo {
+                self.undoer.undo(settings)
+            } else if redo {
+                self.undoer.redo(settings)
+            } else {
+                None
+            };
+            if let Some(other) = other.cloned() {
+                *settings = other;
+            }
+            if ui.button("As delivered").clicked() {
+                *settings = Settings { theme: settings.theme, ..Settings::default() };
+            }
+        });
+    }
+}
+
+fn fields_ui<'a>(ui: &mut Ui, settings: &mut Settings, layouts: impl Iterator<Item = &'a str>) {
+    Grid::new("settings").num_columns(2).spacing(vec2(12.0, 6.0)).show(ui, |ui| {
+        let name = ui.label("Theme");
+        let themes = [ThemeName::Light, ThemeName::Dark, ThemeName::Print];
+        let combo = ComboBox::from_id_salt("theme").width(200.0).selected_text(settings.theme.as_str());
+        let shown = combo.show_ui(ui, |ui| {
+            for theme in themes {
+                ui.selectable_value(&mut settings.theme, theme, theme.as_str());
+            }
+        });
+        shown.response.labelled_by(name.id);
+        ui.end_row();
+        let name = ui.label("Size of everything");
+        let drag = DragValue::new(&mut settings.scale).range(SCALES).speed(0.01).max_decimals(2).suffix("×");
+        ui.add(drag).labelled_by(name.id).on_hover_text("Ctrl and +, − or 0 do the same");
+        ui.end_row();
+        let name = ui.label("Memory of a recording");
+        ui.add(DragValue::new(&mut settings.memory_mib).range(MEMORY_MIB).speed(4.0).suffix(" MiB"))
+            .labelled_by(name.id)
+            .on_hover_text("What does not fit is kept in outline and taken again when you go there");
+        ui.end_row();
+        let name = ui.label("Layout at the start");
+        let combo = ComboBox::from_id_salt("layout").width(200.0).selected_text(&settings.layout);
+        let shown = combo.show_ui(ui, |ui| {
+            for layout in Preset::ALL.map(Preset::name).into_iter().chain(layouts) {
+                ui.selectable_value(&mut settings.layout, layout.to_owned(), layout);
+            }
+        });
+        shown.response.labelled_by(name.id);
+        ui.end_row();
+        let name = ui.label("Speed at the start");
+        let text = |speed: f64| format!("{speed}×");
+        let combo = ComboBox::from_id_salt("speed at the start").width(200.0).selected_text(text(settings.speed));
+        let shown = combo.show_ui(ui, |ui| {
+            for speed in SPEEDS {
+                ui.selectable_value(&mut settings.speed, speed, text(speed));
+            }
+        });
+        shown.response.labelled_by(name.id);
+        ui.end_row();
+    });
+}
