@@ -1,11 +1,6 @@
 //! The sub-commands: each turns its arguments into calls of the library and prints what came of it.
 
-use std::io::{self, IsTerminal as _, Write as _};
-use std::path::Path;
-use std::sync::Arc;
 #[cfg(feature = "gui")]
-use std::sync::{Mutex, PoisonError};
-
 use anyhow::{Context as _, Result, bail};
 use dcvins::calibration::CalibrationOptions;
 use dcvins::export::{self, EvaluationOptions, RunFileOptions, RunSummary};
@@ -17,6 +12,9 @@ use dcvins::sensors::Rig;
 use dcvins::session::breakpoints::Condition;
 use dcvins::session::{self, BreakpointHit, CalibrationRequest, Computation, Recording, SessionPlan, Stopwatch};
 use dcvins::simulation::{self, Experiment, SimulationOptions};
+use std::io::{self, IsTerminal as _, Write as _};
+use std::path::Path;
+use std::sync::Arc;
 
 use crate::cli::arguments::{
     CalibrateArguments, CheckArguments, ConvertArguments, EncoderArgument, EvaluateArguments, ExperimentArgument,
@@ -284,6 +282,7 @@ pub(crate) fn view(arguments: &ViewArguments) -> Result<()> {
     use dcvins::gui::run_window::{WindowError, WindowOptions, run_window};
     use dcvins::gui::theme::ThemeName;
     use dcvins::session::Session;
+    use parking_lot::Mutex;
 
     // What is wrong with the log or its rig is told here, before a window opens.
     let request = |log: &Path| arguments.estimation.request(log.to_owned());
@@ -295,7 +294,7 @@ pub(crate) fn view(arguments: &ViewArguments) -> Result<()> {
     let opened = Mutex::new(plan.clone());
     let estimation = arguments.estimation.clone();
     let open_log = move |path: &Path| {
-        let mut opened = opened.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut opened = opened.lock();
         // The log of the command line is open already; whatever comes later is opened here.
         let session = match opened.take().filter(|plan| plan.log_path == path) {
             Some(plan) => Session::start(plan),

@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, channel};
 
 use super::error::ExportError;
 use super::picture::{write_csv, write_png, write_svg};
@@ -81,6 +82,24 @@ impl Desktop for Machine {
             .collect();
         found.sort_by(|a, b| (!a.folder, &a.path).cmp(&(!b.folder, &b.path)));
         found
+    }
+
+    fn pick_log(&self) -> Option<Receiver<Option<PathBuf>>> {
+        let mut dialog = rfd::AsyncFileDialog::new()
+            .set_title("Open a flight log or a saved session")
+            .add_filter("Flight logs and sessions", &["mcap", "MCAP", "json"]);
+        if let Ok(folder) = std::env::current_dir() {
+            dialog = dialog.set_directory(folder);
+        }
+        // macOS makes the dialog on the thread of the window; any thread may wait for its answer.
+        let answer = dialog.pick_file();
+        let (sender, receiver) = channel();
+        let wait = move || {
+            let file = pollster::block_on(answer);
+            // Nobody waits any more when the window was closed meanwhile.
+            drop(sender.send(file.map(|file| file.path().to_path_buf())));
+        };
+        std::thread::Builder::new().name("file-dialog".to_owned()).spawn(wait).ok().map(|_| receiver)
     }
 
     fn recent_logs(&self) -> Vec<PathBuf> {

@@ -1,4 +1,6 @@
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
+
+use parking_lot::Mutex;
 
 use super::container::{BlockCache, TopicIndex};
 use super::image_decoding::{BitDepth, decode_image};
@@ -69,8 +71,7 @@ impl ImageReader {
             UnknownCamera { key: camera_key.to_owned(), available }
         })?;
         let camera = &self.cameras[number];
-        // A panic of another reader leaves the cache valid: entries are only pushed when complete.
-        let mut cache = self.cache.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut cache = self.cache.lock();
         let position = cache.topics[number].get(self.log.index(), self.log.file(), index);
         let position = position.ok_or_else(|| LogError::NoSuchImage {
             topic: camera.topic.clone(),

@@ -1,6 +1,7 @@
 //! What the window needs of the machine; files are other people's business, so it asks for them here.
 
 use std::path::{Path, PathBuf};
+use std::sync::mpsc::Receiver;
 
 use super::window::PanelExport;
 
@@ -17,6 +18,10 @@ pub struct PathEntry {
 pub trait Desktop: Send + Sync {
     /// Folders and logs whose paths begin as typed, in order.
     fn complete(&self, typed: &str) -> Vec<PathEntry>;
+    /// Asks for a log or a saved session with the desktop's own file dialog, without waiting for it; `None` where there is none.
+    ///
+    /// `None` comes of it when nothing is chosen, and at once where the desktop turns out to have no such dialog.
+    fn pick_log(&self) -> Option<Receiver<Option<PathBuf>>>;
     /// Logs opened lately that still exist, the newest first.
     fn recent_logs(&self) -> Vec<PathBuf>;
     /// Puts a log at the head of the recent ones.

@@ -27,6 +27,11 @@ impl PathField {
         Self { desktop: Some(desktop), ..Self::default() }
     }
 
+    /// Whether nothing has been typed.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.typed.trim().is_empty()
+    }
+
     /// Draws it; returns the path that was chosen.
     pub(crate) fn ui(&mut self, ui: &mut Ui, theme: &Theme, focus: bool, height: f32) -> Option<PathBuf> {
         if self.completed.as_ref().is_none_or(|(typed, _)| *typed != self.typed) {

@@ -1,6 +1,7 @@
 //! The program of the window over a log that plays without files and threads of its own.
 
 use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, OnceLock};
 
 use egui::{Key, Modifiers};
@@ -92,6 +93,8 @@ pub(super) struct TestDesktop {
     written: Mutex<Vec<PanelExport>>,
     sessions: Mutex<Vec<String>>,
     settings: Mutex<Option<String>>,
+    /// What the desktop's file dialog will answer with, where it has one.
+    picked: Mutex<Option<Receiver<Option<PathBuf>>>>,
 }
 
 impl Desktop for TestDesktop {
@@ -102,6 +105,10 @@ impl Desktop for TestDesktop {
         all.into_iter()
             .filter(|it| it.path.starts_with(typed) && depth(&it.path) == typed.matches('/').count())
             .collect()
+    }
+
+    fn pick_log(&self) -> Option<Receiver<Option<PathBuf>>> {
+        self.picked.lock().unwrap().take()
     }
 
     fn recent_logs(&self) -> Vec<PathBuf> {
@@ -219,6 +226,52 @@ fn a_dropped_log_is_opened_and_a_wrong_file_explained() {
     run_until(&mut harness, |harness| opened(harness).is_some());
     harness.input_mut().dropped_files.push(Arc::new(Dropped(PathBuf::from("/x/b.mcap"))));
     run_until(&mut harness, |harness| opened(harness) == Some(PathBuf::from("/x/b.mcap")));
+}
+
+/// A window over a log, with the desktop's file dialog open; the sender answers for it.
+fn with_file_dialog() -> (Harness<'static, App>, Sender<Option<PathBuf>>) {
+    let (mut harness, desktop) = app();
+    harness.get_by_label("Open yard.mcap").click();
+    run_until(&mut harness, |harness| opened(harness).is_some());
+    let (sender, receiver) = channel();
+    *desktop.picked.lock().unwrap() = Some(receiver);
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::O);
+    harness.run_steps(3);
+    (harness, sender)
+}
+
+#[test]
+fn the_file_dialog_of_the_desktop_opens_a_log() {
+    let (mut harness, sender) = with_file_dialog();
+    sender.send(Some(PathBuf::from("/logs/city.mcap"))).unwrap();
+    run_until(&mut harness, |harness| opened(harness) == Some(PathBuf::from("/logs/city.mcap")));
+    assert!(harness.query_by_label("Path of the log").is_none(), "the path field closes with it");
+}
+
+#[test]
+fn the_path_field_stays_where_the_desktop_has_no_file_dialog() {
+    let (mut harness, desktop) = app();
+    harness.get_by_label("Open yard.mcap").click();
+    run_until(&mut harness, |harness| opened(harness).is_some());
+    *desktop.picked.lock().unwrap() = Some(channel().1);
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::O);
+    harness.run_steps(5);
+    assert!(harness.query_by_label("Path of the log").is_some());
+}
+
+#[test]
+fn cancelling_the_file_dialog_closes_the_path_field_unless_it_is_in_use() {
+    for (typed, stays_open) in [("", false), ("/lo", true)] {
+        let (mut harness, sender) = with_file_dialog();
+        if !typed.is_empty() {
+            harness.event(egui::Event::Text(typed.to_owned()));
+        }
+        harness.run_steps(20);
+        assert!(harness.query_by_label("Path of the log").is_some(), "both are open");
+        sender.send(None).unwrap();
+        harness.run_steps(3);
+        assert_eq!(harness.query_by_label("Path of the log").is_some(), stays_open, "{typed:?}");
+    }
 }
 
 #[test]

@@ -15,7 +15,7 @@ use egui::Ui;
 
 use self::add_run::AddRunDialog;
 use self::fork::ForkDialog;
-use self::open_log::OpenLogDialog;
+use self::open_log::{OpenLogDialog, Picked};
 use self::palette::CommandPalette;
 use self::settings::SettingsDialog;
 use super::actions::Action;
@@ -57,8 +57,10 @@ impl Dialogs {
 
     /// Opens a dialog in place of the one that is open; the palette opens with nothing typed.
     pub fn show(&mut self, dialog: Dialog) {
-        if dialog == Dialog::Palette {
-            self.palette = CommandPalette::default();
+        match dialog {
+            Dialog::OpenLog => self.open_log.show_picker(),
+            Dialog::Palette => self.palette = CommandPalette::default(),
+            _ => {}
         }
         self.open = Some(dialog);
     }
@@ -77,6 +79,13 @@ impl Dialogs {
 /// Draws the dialog that is open.
 pub(super) fn ui(ui: &Ui, state: &mut WindowState, ctx: &mut PanelContext<'_>, actions: &mut Vec<Action>) {
     let WindowState { dialogs, requests, saved_layouts, settings, layout, .. } = state;
+    let picked = dialogs.open_log.picked(ui);
+    if picked.is_some() && dialogs.open == Some(Dialog::OpenLog) {
+        dialogs.open = None;
+    }
+    if let Some(Picked::Path(path)) = picked {
+        requests.push(WindowRequest::OpenLog(path));
+    }
     let stays_open = match dialogs.open {
         None => return,
         Some(Dialog::OpenLog) => {

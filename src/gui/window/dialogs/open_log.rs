@@ -1,7 +1,9 @@
-//! The dialog that opens a log or a saved session.
+//! The dialog that opens a log or a saved session: a path field, and over it the desktop's own file dialog where there is one.
 
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::mpsc::{Receiver, TryRecvError};
+use std::time::Duration;
 
 use egui::{RichText, Ui};
 
@@ -10,16 +12,65 @@ use crate::gui::desktop::Desktop;
 use crate::gui::path_field::PathField;
 use crate::gui::theme::Theme;
 
+/// How often the desktop's file dialog is asked for its answer.
+const POLL_PERIOD: Duration = Duration::from_millis(100);
+/// A file dialog that ends without a choice sooner than this has never been on the screen, in seconds.
+const SHORTEST_CANCEL_S: f64 = 0.5;
+
 /// State of the dialog.
 #[derive(Default)]
 pub(super) struct OpenLogDialog {
+    desktop: Option<Arc<dyn Desktop>>,
     path_field: PathField,
+    picker: Option<FilePicker>,
+}
+
+/// The desktop's file dialog while it is open.
+struct FilePicker {
+    answer: Receiver<Option<PathBuf>>,
+    /// Time of the first frame that it was asked in.
+    since_s: Option<f64>,
+}
+
+/// What a person answered in the desktop's file dialog.
+pub(super) enum Picked {
+    Path(PathBuf),
+    Cancelled,
 }
 
 impl OpenLogDialog {
     /// A dialog that completes paths.
     pub(super) fn new(desktop: Arc<dyn Desktop>) -> Self {
-        Self { path_field: PathField::new(desktop) }
+        Self { path_field: PathField::new(Arc::clone(&desktop)), desktop: Some(desktop), picker: None }
+    }
+
+    /// Opens the desktop's file dialog, if it is not open already.
+    pub(super) fn show_picker(&mut self) {
+        if self.picker.is_none() {
+            let answer = self.desktop.as_ref().and_then(|desktop| desktop.pick_log());
+            self.picker = answer.map(|answer| FilePicker { answer, since_s: None });
+        }
+    }
+
+    /// The answer of the desktop's file dialog, once; `None` also where it could not be shown and the path field has to do.
+    pub(super) fn picked(&mut self, ui: &Ui) -> Option<Picked> {
+        let picker = self.picker.as_mut()?;
+        let now_s = ui.input(|input| input.time);
+        let since_s = *picker.since_s.get_or_insert(now_s);
+        let path = match picker.answer.try_recv() {
+            Err(TryRecvError::Empty) => {
+                ui.ctx().request_repaint_after(POLL_PERIOD);
+                return None;
+            }
+            Ok(path) => path,
+            Err(TryRecvError::Disconnected) => None,
+        };
+        self.picker = None;
+        match path {
+            Some(path) => Some(Picked::Path(path)),
+            None if now_s - since_s < SHORTEST_CANCEL_S || !self.path_field.is_empty() => None,
+            None => Some(Picked::Cancelled),
+        }
     }
 
     /// Draws it; returns the path that was chosen, and whether the dialog stays open.
