@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use dcvins::flight_log::ImageReader;
-use dcvins::gui::headless::{Frame, Headless, HeadlessOptions};
-use dcvins::gui::painter::Painter;
+use dcvins::gui::rendering::headless::{Frame, Headless, HeadlessOptions};
+use dcvins::gui::rendering::painter::Painter;
 use dcvins::gui::theme::{Theme, ThemeName};
 use dcvins::gui::window::{Preset, WindowState, window_ui};
 use dcvins::gui::{PanelContext, Playback, Selection};

@@ -279,7 +279,7 @@ pub(crate) fn evaluate(arguments: &EvaluateArguments) -> Result<()> {
 pub(crate) fn view(arguments: &ViewArguments) -> Result<()> {
     use dcvins::export::{Machine, is_session};
     use dcvins::gui::app::PlayingLog;
-    use dcvins::gui::run_window::{WindowError, WindowOptions, run_window};
+    use dcvins::gui::app::run_window::{WindowError, WindowOptions, run_window};
     use dcvins::gui::theme::ThemeName;
     use dcvins::session::Session;
     use parking_lot::Mutex;

@@ -7,8 +7,7 @@ use std::sync::mpsc::{Receiver, channel};
 use super::error::ExportError;
 use super::picture::{write_csv, write_png, write_svg};
 use super::recent_files::{RecentFiles, state_folder};
-use crate::gui::desktop::{Desktop, PathEntry};
-use crate::gui::window::PanelExport;
+use crate::gui::desktop::{Desktop, PanelExport, PathEntry};
 
 /// How many entries of a folder are looked at.
 const MOST_READ: usize = 5000;

@@ -10,8 +10,8 @@ use image::{ExtendedColorType, ImageEncoder as _, RgbaImage};
 use thiserror::Error;
 
 use super::error::ExportError;
-use crate::gui::headless::{self, HeadlessOptions};
-use crate::gui::offscreen::{Offscreen, OffscreenError};
+use crate::gui::rendering::offscreen::{Offscreen, OffscreenError};
+use crate::gui::rendering::{headless, headless::HeadlessOptions};
 use crate::gui::theme::{Theme, ThemeName};
 use crate::gui::window::{PanelName, Preset, WindowState, alone_ui, panel_table, window_ui};
 use crate::gui::{ImageSource, PanelContext, Playback, Selection};
@@ -252,7 +252,7 @@ fn write_bytes(bytes: &[u8], path: &Path) -> Result<(), PictureError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gui::sample_recording::{sample_images, sample_recording};
+    use crate::gui::samples::{sample_images, sample_recording};
     use crate::gui::tests::keep_picture;
 
     #[test]

@@ -66,7 +66,7 @@ const AXES: [Quantity; 3] = [Quantity::Rx, Quantity::Ry, Quantity::Rz];
 mod tests {
     use super::*;
     use crate::gimbal::ParameterNames;
-    use crate::gui::sample_recording::sample_recording_of;
+    use crate::gui::samples::sample_recording_of;
 
     #[test]
     fn the_truth_has_the_names_of_the_run_and_lies_near_its_end() {

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::Receiver;
 
-use super::window::PanelExport;
+use image::RgbaImage;
 
 /// A path that could be meant.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -12,6 +12,19 @@ pub struct PathEntry {
     pub path: String,
     /// Whether it is a folder.
     pub folder: bool,
+}
+
+/// A panel to be written to files.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PanelExport {
+    /// Folder and name of the files without extension: `garden/scene-5.953s`.
+    pub name: String,
+    /// What the panel shows, drawn anew at twice the size.
+    pub picture: RgbaImage,
+    /// The same as a drawing of lines and texts (SVG).
+    pub drawing: String,
+    /// The numbers behind it, comma separated.
+    pub table: String,
 }
 
 /// Files and figures of the machine.

@@ -88,7 +88,7 @@ impl RunTables {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gui::sample_recording::sample_recording_of;
+    use crate::gui::samples::sample_recording_of;
 
     #[test]
     fn every_step_is_read_once_and_another_run_starts_anew() {

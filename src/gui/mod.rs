@@ -9,41 +9,27 @@ pub mod csv_table;
 pub mod desktop;
 mod events;
 mod follow;
-pub mod headless;
-mod histogram;
 pub mod image_panel;
 pub mod inspector;
 pub mod jacobian;
 pub mod laboratory;
-pub mod offscreen;
-pub mod painter;
 #[cfg(test)]
 mod panel_tests;
 mod path_field;
 mod plot;
 pub mod rank;
+pub mod rendering;
 pub mod residuals;
-pub mod run_window;
 #[cfg(test)]
-mod sample_calibration;
-#[cfg(test)]
-mod sample_flight;
-#[cfg(test)]
-mod sample_images;
-#[cfg(test)]
-pub(crate) mod sample_recording;
+pub(crate) mod samples;
 pub mod scene;
-mod session_log;
 mod slide;
-mod software_window;
 mod step_work;
-mod svg;
 #[cfg(test)]
 pub(crate) mod tests;
 pub mod theme;
 pub mod timeline;
 mod units;
-pub mod welcome;
 pub mod window;
 
 use std::sync::Arc;

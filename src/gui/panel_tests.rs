@@ -2,8 +2,8 @@
 
 use egui::Ui;
 
-use super::headless::{HeadlessOptions, draw};
-use super::sample_recording::{sample_images, sample_recording, sample_recording_of};
+use super::rendering::headless::{HeadlessOptions, draw};
+use super::samples::{sample_images, sample_recording, sample_recording_of};
 use super::tests::{keep_picture, with_context};
 use super::theme::{Theme, ThemeName};
 use super::{PanelContext, Selection};
@@ -166,8 +166,8 @@ fn the_inspector_is_drawn_in_every_case() {
 #[ignore = "a measurement, not a test"]
 #[expect(clippy::disallowed_methods, clippy::print_stdout, reason = "it measures and says so")]
 fn time_of_a_window_frame() {
-    use super::headless::Headless;
-    use super::painter::Painter;
+    use super::rendering::headless::Headless;
+    use super::rendering::painter::Painter;
     use super::window::{WindowState, window_ui};
     use std::time::Instant;
 

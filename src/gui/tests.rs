@@ -1,6 +1,6 @@
-use super::sample_recording::{FIRST_TRACKED_FRAME, sample_images, sample_recording};
 use super::theme::Theme;
 use super::{ImageSource, PanelContext, Playback, Selection};
+use crate::gui::samples::{FIRST_TRACKED_FRAME, sample_images, sample_recording};
 use crate::session::Recording;
 
 #[test]

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use dcvins::export::{PictureError, PictureOptions, Renderer, draw_panel};
 use dcvins::flight_log::ImageReader;
 use dcvins::geometry::ns_from_seconds;
-use dcvins::gui::offscreen::{Offscreen, OffscreenError};
+use dcvins::gui::rendering::offscreen::{Offscreen, OffscreenError};
 use dcvins::gui::theme::ThemeName;
 use dcvins::session::{self, SessionPlan, SessionRequest};
 use image::RgbaImage;

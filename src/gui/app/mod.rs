@@ -1,9 +1,14 @@
 //! The window's program: it owns the session, feeds it time and commands, and draws what it has computed.
 
+mod playing_log;
+pub mod run_window;
+mod session_log;
 #[cfg(test)]
 mod session_tests;
+mod software_window;
 #[cfg(test)]
 mod tests;
+mod welcome;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -11,43 +16,17 @@ use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
 use egui::{CentralPanel, Frame, Ui, ViewportCommand};
 
-use crate::gui::desktop::Desktop;
+use self::playing_log::{Images, go_to_first_frame};
+pub use self::playing_log::{OpenLog, PlayingLog};
+use self::welcome::Welcome;
+use crate::gui::desktop::{Desktop, PanelExport};
 use crate::gui::theme::{Theme, ThemeName};
 use crate::gui::units::counted;
-use crate::gui::welcome::Welcome;
 use crate::gui::window::{
-    NoticeLevel, PanelExport, ProgressMeter, SCALES, SavedLayouts, Settings, WindowRequest, WindowState, window_ui,
+    NoticeLevel, ProgressMeter, SCALES, SavedLayouts, Settings, WindowRequest, WindowState, window_ui,
 };
-use crate::gui::{ImageSource, PanelContext, Playback, Selection};
-use crate::sensors::GrayImage;
+use crate::gui::{PanelContext, Selection};
 use crate::session::{Command, PlaybackSpeed, Recording};
-
-/// A log that plays: what the window needs of a session.
-pub trait PlayingLog: Send {
-    /// What has been computed so far; cheap.
-    fn recording(&self) -> Arc<Recording>;
-    /// Changes whenever something new has been computed.
-    fn generation(&self) -> u64;
-    /// Where the cursor stands, since the log began.
-    fn cursor_ns(&self) -> i64;
-    /// How the cursor moves.
-    fn playback(&self) -> Playback;
-    /// Does what a person asked for.
-    fn apply(&mut self, command: Command);
-    /// Lets the cursor run for so many seconds of the wall.
-    fn advance(&mut self, elapsed_s: f64);
-    /// An image of the log.
-    fn image(&mut self, camera_key: &str, frame_index: usize) -> Option<Arc<GrayImage>>;
-    /// What could not be done as asked, since the last call.
-    fn take_notices(&mut self) -> Vec<String>;
-    /// The session as text, with where the panels are; `None` for a log that no session plays.
-    fn saved(&self, layout: Option<serde_json::Value>) -> Option<String>;
-    /// Where the panels were when the session was saved.
-    fn layout(&self) -> Option<&serde_json::Value>;
-}
-
-/// Opens a log; the message of an error says what was wrong and what to do.
-pub type OpenLog = Arc<dyn Fn(&Path) -> Result<Box<dyn PlayingLog>, String> + Send + Sync>;
 
 /// Seconds between two pictures from which the cursor does not catch up: the window was hidden, or the machine asleep.
 const STALL_S: f64 = 2.0;
@@ -358,26 +337,6 @@ impl App {
             ui.ctx().send_viewport_cmd(ViewportCommand::Title(title.clone()));
             self.title = title;
         }
-    }
-}
-
-/// Moves a cursor that stands before the first frame there, so that a log just opened shows something; whether there is
-/// a frame yet.
-fn go_to_first_frame(log: &mut dyn PlayingLog) -> bool {
-    let recording = log.recording();
-    let first = recording.runs.iter().filter_map(|run| run.steps.first()).map(|step| step.report.stamp_ns).min();
-    if first.is_some_and(|first_ns| log.cursor_ns() < first_ns) {
-        log.apply(Command::GoToStart);
-    }
-    first.is_some()
-}
-
-/// The session's images, for the panels.
-struct Images<'a>(&'a mut dyn PlayingLog);
-
-impl ImageSource for Images<'_> {
-    fn image(&mut self, camera_key: &str, frame_index: usize) -> Option<Arc<GrayImage>> {
-        self.0.image(camera_key, frame_index)
     }
 }
 

@@ -9,10 +9,9 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 
 use super::{App, OpenLog, PlayingLog};
-use crate::gui::desktop::{Desktop, PathEntry};
-use crate::gui::sample_recording::{FRAME_PERIOD_NS, sample_images, sample_recording_of};
+use crate::gui::desktop::{Desktop, PanelExport, PathEntry};
+use crate::gui::samples::{FRAME_PERIOD_NS, sample_images, sample_recording_of};
 use crate::gui::theme::ThemeName;
-use crate::gui::window::PanelExport;
 use crate::gui::{ImageSource as _, Playback};
 use crate::sensors::GrayImage;
 use crate::session::{Command, Recording};
@@ -437,8 +436,8 @@ fn the_theme_changes_at_a_key() {
 
 #[test]
 fn dialogs_can_be_looked_at() {
-    use crate::gui::headless::{Headless, HeadlessOptions};
-    use crate::gui::painter::Painter;
+    use crate::gui::rendering::headless::{Headless, HeadlessOptions};
+    use crate::gui::rendering::painter::Painter;
     use crate::gui::tests::keep_picture;
 
     let options = HeadlessOptions { size_px: [1366, 768], pixels_per_point: 1.0, theme: ThemeName::Dark };

@@ -5,7 +5,7 @@ use egui_kittest::kittest::Queryable as _;
 
 use super::ComparisonPanel;
 use super::scores::ScoreRow;
-use crate::gui::sample_recording::{sample_images, sample_recording_of};
+use crate::gui::samples::{sample_images, sample_recording_of};
 use crate::gui::theme::{Theme, ThemeName};
 use crate::gui::{PanelContext, Playback, Selection};
 use crate::session::{Command, Quantity, Recording};

@@ -223,7 +223,7 @@ pub(crate) fn knowledge(rank: Option<&RankReport>) -> Option<BTreeMap<ParameterI
 mod tests {
     use super::*;
     use crate::gimbal::ParameterNames;
-    use crate::gui::sample_recording::{FIRST_TRACKED_FRAME, sample_recording_of};
+    use crate::gui::samples::{FIRST_TRACKED_FRAME, sample_recording_of};
 
     fn id(name: &str) -> ParameterId {
         ParameterNames::default().parse(name).unwrap()

@@ -78,7 +78,7 @@ pub(crate) fn meaning_of(parameter: ParameterId, rig: &Rig) -> String {
 mod tests {
     use super::*;
     use crate::gimbal::ParameterNames;
-    use crate::gui::sample_recording::sample_recording_of;
+    use crate::gui::samples::sample_recording_of;
 
     fn id(name: &str) -> ParameterId {
         ParameterNames::default().parse(name).unwrap()

@@ -150,7 +150,7 @@ pub(crate) fn parameters_of_weights(
 mod tests {
     use super::*;
     use crate::gimbal::{ParameterPart, Quantity};
-    use crate::gui::sample_recording::{FIRST_TRACKED_FRAME, sample_recording_of};
+    use crate::gui::samples::{FIRST_TRACKED_FRAME, sample_recording_of};
 
     #[test]
     fn the_verdict_says_what_is_lost_and_to_what() {

@@ -1,6 +1,7 @@
 //! The residuals panel: how well the window fits, as a histogram, over time, and by kind of factor.
 
 mod csv;
+mod histogram;
 
 use std::sync::Arc;
 
@@ -11,7 +12,6 @@ use egui::{
 use super::PanelContext;
 use super::convergence::empty_ui;
 use super::follow::RunTables;
-use super::histogram::ResidualHistogram;
 use super::plot::{
     Clicks, Curve, PlotArea, decimals_of_step, navigate, paint_cursor, paint_curve, paint_ground, paint_value_grid,
     ticks, visible_range,
@@ -19,6 +19,7 @@ use super::plot::{
 use super::theme::{CURVE_WIDTH, Theme, label_font};
 use super::units::{figure, fixed};
 use crate::estimator::{ResidualSummary, StepReport};
+use crate::gui::residuals::histogram::ResidualHistogram;
 use crate::session::StepRecord;
 
 /// State of the residuals panel.

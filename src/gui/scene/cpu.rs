@@ -5,8 +5,8 @@ use rayon::prelude::*;
 
 use super::camera;
 use super::layout::{Disc, Drawing, PictureCorner, PictureShape, Segment};
-use crate::gui::painter::blend;
-use crate::gui::painter::raster::{Clip, Plane, SUBPIXELS, spans};
+use crate::gui::rendering::painter::blend;
+use crate::gui::rendering::painter::triangle::{Clip, Plane, SUBPIXELS, spans};
 
 /// Places of the samples within a pixel, in 1/256 pixel: the standard pattern of four.
 const SAMPLES: [[i32; 2]; 4] = [[96, 32], [224, 96], [32, 160], [160, 224]];

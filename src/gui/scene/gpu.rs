@@ -10,12 +10,9 @@ use egui::PaintCallbackInfo;
 use wgpu::util::DeviceExt as _;
 
 use super::layout::{Corner, Disc, Drawing, PictureCorner, Segment};
+use super::pipelines::{COLOR_FORMAT, DEPTH_FORMAT, PipelineMaker, SAMPLES};
 use crate::sensors::GrayImage;
 
-/// Samples per pixel, as on the CPU.
-const SAMPLES: u32 = 4;
-const COLOR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
-const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 /// Vertices of the two triangles of a segment.
 const SEGMENT_VERTICES: u32 = 6;
 /// Vertices of the triangles of a disc, drawn as an octagon.
@@ -355,85 +352,4 @@ fn texture_group(
             wgpu::BindGroupEntry { binding: 1, resource: wgpu::BindingResource::Sampler(sampler) },
         ],
     })
-}
-
-/// Makes pipelines of one shader.
-struct PipelineMaker<'a> {
-    device: &'a wgpu::Device,
-    shader: &'a wgpu::ShaderModule,
-    uniform_layout: &'a wgpu::BindGroupLayout,
-    texture_layout: &'a wgpu::BindGroupLayout,
-}
-
-impl PipelineMaker<'_> {
-    /// Draws into the scene's own targets, nearest wins.
-    fn scene(
-        &self,
-        [vertex, fragment]: [&str; 2],
-        buffer: Option<wgpu::VertexBufferLayout<'_>>,
-    ) -> wgpu::RenderPipeline {
-        let layout = self.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some(vertex),
-            bind_group_layouts: &[Some(self.uniform_layout), Some(self.texture_layout)]
-                [..if fragment == "picture_fragment" { 2 } else { 1 }],
-            immediate_size: 0,
-        });
-        self.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some(vertex),
-            layout: Some(&layout),
-            vertex: wgpu::VertexState {
-                module: self.shader,
-                entry_point: Some(vertex),
-                buffers: &[buffer],
-                compilation_options: wgpu::PipelineCompilationOptions::default(),
-            },
-            primitive: wgpu::PrimitiveState::default(),
-            depth_stencil: Some(wgpu::DepthStencilState {
-                format: DEPTH_FORMAT,
-                depth_write_enabled: Some(true),
-                depth_compare: Some(wgpu::CompareFunction::GreaterEqual),
-                stencil: wgpu::StencilState::default(),
-                bias: wgpu::DepthBiasState::default(),
-            }),
-            multisample: wgpu::MultisampleState { count: SAMPLES, ..wgpu::MultisampleState::default() },
-            fragment: Some(wgpu::FragmentState {
-                module: self.shader,
-                entry_point: Some(fragment),
-                targets: &[Some(COLOR_FORMAT.into())],
-                compilation_options: wgpu::PipelineCompilationOptions::default(),
-            }),
-            multiview_mask: None,
-            cache: None,
-        })
-    }
-
-    /// Copies the finished scene into egui's pass.
-    fn copy(&self, fragment: &str, target_format: wgpu::TextureFormat) -> wgpu::RenderPipeline {
-        let layout = self.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some("scene copy"),
-            bind_group_layouts: &[Some(self.texture_layout)],
-            immediate_size: 0,
-        });
-        self.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some("scene copy"),
-            layout: Some(&layout),
-            vertex: wgpu::VertexState {
-                module: self.shader,
-                entry_point: Some("copy_vertex"),
-                buffers: &[],
-                compilation_options: wgpu::PipelineCompilationOptions::default(),
-            },
-            primitive: wgpu::PrimitiveState::default(),
-            depth_stencil: None,
-            multisample: wgpu::MultisampleState::default(),
-            fragment: Some(wgpu::FragmentState {
-                module: self.shader,
-                entry_point: Some(fragment),
-                targets: &[Some(target_format.into())],
-                compilation_options: wgpu::PipelineCompilationOptions::default(),
-            }),
-            multiview_mask: None,
-            cache: None,
-        })
-    }
 }

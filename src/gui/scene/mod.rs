@@ -12,6 +12,7 @@ mod gpu;
 mod layout;
 mod model;
 mod overlay;
+mod pipelines;
 #[cfg(test)]
 mod tests;
 mod world;

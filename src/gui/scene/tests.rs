@@ -11,10 +11,8 @@ use super::layout::{Drawing, lay_out};
 use super::model::{Dot, Face, Line, Picture, SceneModel};
 use super::{Follow, ScenePanel, cpu};
 use crate::gui::Selection;
-use crate::gui::headless::{HeadlessOptions, draw};
-use crate::gui::sample_recording::{
-    chain_pose, given_chain, sample_images, sample_recording, sample_recording_of, true_chain,
-};
+use crate::gui::rendering::headless::{HeadlessOptions, draw};
+use crate::gui::samples::{chain_pose, given_chain, sample_images, sample_recording, sample_recording_of, true_chain};
 use crate::gui::tests::{keep_picture, with_context};
 use crate::gui::theme::{Theme, ThemeName};
 use crate::sensors::GrayImage;

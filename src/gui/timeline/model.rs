@@ -96,7 +96,7 @@ impl RunLanes {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gui::sample_recording::{FIRST_TRACKED_FRAME, sample_recording_of};
+    use crate::gui::samples::{FIRST_TRACKED_FRAME, sample_recording_of};
 
     #[test]
     fn lanes_hold_what_the_steps_said() {

@@ -31,7 +31,7 @@ pub use self::dialogs::{Dialog, Dialogs};
 use self::focus_ring::FocusRing;
 pub use self::legend::RunLegend;
 pub use self::notices::{NoticeLevel, Notices};
-pub use self::panel_export::{PanelExport, alone_ui, panel_table};
+pub use self::panel_export::{alone_ui, panel_table};
 pub use self::panels::{PanelName, Panels};
 pub use self::progress::{Progress, ProgressMeter};
 pub use self::saved_layouts::SavedLayouts;
@@ -39,6 +39,7 @@ pub use self::settings::{SCALES, Settings};
 use self::tiles::Layout;
 pub use self::tiles::Preset;
 use super::PanelContext;
+use super::desktop::PanelExport;
 use super::slide;
 use super::timeline::TimelinePanel;
 

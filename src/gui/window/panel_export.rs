@@ -1,11 +1,11 @@
 //! The panel that has the focus, as files: a picture of what it shows, and the numbers behind it.
 
 use egui::{CentralPanel, Frame, Ui, Vec2};
-use image::RgbaImage;
 
 use super::{PanelName, WindowState};
 use crate::geometry::seconds_from_ns;
-use crate::gui::headless::{self, HeadlessOptions};
+use crate::gui::desktop::PanelExport;
+use crate::gui::rendering::{headless, headless::HeadlessOptions};
 use crate::gui::slide;
 use crate::gui::theme::PANEL_MARGIN;
 use crate::gui::{PanelContext, Playback};
@@ -17,19 +17,6 @@ const LARGEST_SIDE_PX: f32 = 8192.0;
 
 /// Least size of the picture of a panel that is a list, in points.
 const LEAST_SIZE_OF_LISTS: Vec2 = Vec2::new(460.0, 640.0);
-
-/// A panel to be written to files.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct PanelExport {
-    /// Folder and name of the files without extension: `garden/scene-5.953s`.
-    pub name: String,
-    /// What the panel shows, drawn anew at twice the size.
-    pub picture: RgbaImage,
-    /// The same as a drawing of lines and texts (SVG).
-    pub drawing: String,
-    /// The numbers behind it, comma separated.
-    pub table: String,
-}
 
 /// Draws the panel once more, without the window around it.
 pub(super) fn export(state: &WindowState, ctx: &mut PanelContext<'_>) -> PanelExport {

@@ -55,7 +55,7 @@ impl ProgressMeter {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gui::sample_recording::sample_recording_of;
+    use crate::gui::samples::sample_recording_of;
 
     #[test]
     fn the_remaining_time_follows_the_pace() {

@@ -8,7 +8,7 @@ use egui_kittest::kittest::{NodeT as _, Queryable as _};
 
 use super::{PanelName, Preset, WindowState, window_ui};
 use crate::gimbal::tests::parameter;
-use crate::gui::sample_recording::{sample_images, sample_recording_of};
+use crate::gui::samples::{sample_images, sample_recording_of};
 use crate::gui::theme::{Theme, ThemeName};
 use crate::gui::{PanelContext, Playback, Selection};
 use crate::observability::SlideRequest;

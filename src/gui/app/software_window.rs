@@ -6,7 +6,7 @@
 use egui::epaint::{ClippedShape, ImageDelta, Mesh};
 use egui::{Color32, Context, FullOutput, Plugin, Pos2, Rect, Shape, TextureId, TextureOptions, pos2};
 
-use super::painter::Painter;
+use crate::gui::rendering::painter::Painter;
 
 /// The texture that shows the window; egui counts its own up from 0.
 const PICTURE: TextureId = TextureId::Managed(u64::MAX);
@@ -56,7 +56,7 @@ impl Plugin for SoftwareWindow {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gui::headless::{Headless, HeadlessOptions};
+    use crate::gui::rendering::headless::{Headless, HeadlessOptions};
     use crate::gui::theme::ThemeName;
 
     fn sample_ui(ui: &mut egui::Ui) {

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use super::app::PlayingLog;
-use super::{ImageSource, Playback};
 use crate::flight_log::ImageReader;
+use crate::gui::app::PlayingLog;
+use crate::gui::{ImageSource, Playback};
 use crate::sensors::GrayImage;
 use crate::session::{Command, Recording, Session};
 

@@ -8,10 +8,11 @@
 
 pub(in crate::gui) mod blend;
 mod canvas;
-pub(in crate::gui) mod raster;
+mod raster;
 #[cfg(test)]
 mod tests;
 mod texture;
+pub(in crate::gui) mod triangle;
 
 use egui::epaint::{ClippedPrimitive, Primitive};
 use egui::{Color32, ColorImage, TexturesDelta};
@@ -84,12 +85,12 @@ impl Painter {
     }
 
     /// The last picture, as colours.
-    pub(super) fn whole(&self) -> ColorImage {
+    pub(in crate::gui) fn whole(&self) -> ColorImage {
         self.canvas.part(PixelRect { at: [0; 2], size: self.canvas.size_px() })
     }
 
     /// The parts of the picture that differ from the one before it, as colours.
-    pub(super) fn changes(&self) -> impl Iterator<Item = (PixelRect, ColorImage)> {
+    pub(in crate::gui) fn changes(&self) -> impl Iterator<Item = (PixelRect, ColorImage)> {
         self.canvas.changed().into_iter().map(|rect| (rect, self.canvas.part(rect)))
     }
 }

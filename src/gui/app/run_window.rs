@@ -7,11 +7,11 @@ use std::sync::Arc;
 use egui::ViewportBuilder;
 use thiserror::Error;
 
-use super::app::{App, OpenLog, PlayingLog};
-use super::desktop::Desktop;
-use super::scene::SceneBackend;
 use super::software_window::SoftwareWindow;
-use super::theme::ThemeName;
+use crate::gui::app::{App, OpenLog, PlayingLog};
+use crate::gui::desktop::Desktop;
+use crate::gui::scene::SceneBackend;
+use crate::gui::theme::ThemeName;
 
 /// What a server without a desktop needs for the window (Debian and Ubuntu).
 pub const WINDOW_PACKAGES: &str = "mesa-vulkan-drivers libx11-6 libxcursor1 libxi6 libxkbcommon-x11-0";

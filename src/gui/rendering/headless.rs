@@ -7,7 +7,7 @@ use image::RgbaImage;
 
 use super::painter::Painter;
 use super::svg::{self, Textures};
-use super::theme::{Theme, ThemeName};
+use crate::gui::theme::{Theme, ThemeName};
 
 /// Frames that run before the picture: layouts, scroll areas and plot bounds settle.
 const SETTLING_FRAMES: usize = 3;

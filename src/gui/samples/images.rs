@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use super::ImageSource;
-use super::sample_recording::{INTRINSICS_PX, Instant, RESOLUTION_PX, WALL_HEIGHT_M, YARD_HALF_SIDE_M, true_chain};
+use super::yard::{INTRINSICS_PX, Instant, RESOLUTION_PX, WALL_HEIGHT_M, YARD_HALF_SIDE_M, true_chain};
+use crate::gui::ImageSource;
 use crate::sensors::GrayImage;
 
 /// Gives the image of `cam0` at any frame.

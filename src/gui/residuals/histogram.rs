@@ -92,7 +92,7 @@ fn round_up(length: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::estimator::ObservationReport;
-    use crate::gui::sample_recording::sample_recording_of;
+    use crate::gui::samples::sample_recording_of;
 
     #[test]
     fn every_residual_is_counted_once() {

@@ -11,7 +11,7 @@ use image::RgbaImage;
 use thiserror::Error;
 
 use super::headless::{FramePainter, Headless, HeadlessOptions};
-use super::scene::SceneBackend;
+use crate::gui::scene::SceneBackend;
 
 /// What is painted into: eight bits per channel in gamma space, where egui blends.
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;

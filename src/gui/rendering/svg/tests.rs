@@ -3,7 +3,7 @@ use egui::{Color32, Pos2, Rect, RichText, Shape, Stroke, Ui, pos2};
 
 use super::mesh::quad;
 use super::{Textures, document};
-use crate::gui::headless::{HeadlessOptions, svg_of};
+use crate::gui::rendering::headless::{HeadlessOptions, svg_of};
 use crate::gui::theme::ThemeName;
 
 const SCREEN: Rect = Rect { min: Pos2::ZERO, max: pos2(100.0, 50.0) };

@@ -5,7 +5,8 @@ use image::RgbaImage;
 use rayon::prelude::*;
 
 use super::blend;
-use super::raster::{Clip, PreparedMesh, Target, mixed};
+use super::raster::{PreparedMesh, Target, mixed};
+use super::triangle::Clip;
 
 /// Size of a tile in pixels: small enough that a moving cursor touches little, and that a tile stays in the cache.
 pub(super) const TILE_PX: [usize; 2] = [64, 32];

@@ -1,6 +1,7 @@
 //! Calibration and rank of the made-up recording.
 
-use super::sample_recording::{Dice, FIRST_TRACKED_FRAME};
+use super::recording::FIRST_TRACKED_FRAME;
+use super::yard::Dice;
 use crate::estimator::CalibrationEstimate;
 use crate::geometry::{Dimension, RigidTransform, so3};
 use crate::gimbal::{ClassicalChain, DhLink, ParameterId, ParameterPart, Quantity, Singularity};

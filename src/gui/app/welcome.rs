@@ -5,13 +5,13 @@ use std::sync::Arc;
 
 use egui::{Align, Button, Layout, RichText, ScrollArea, Sense, Stroke, StrokeKind, Ui, vec2};
 
-use super::desktop::Desktop;
-use super::path_field::PathField;
-use super::theme::Theme;
+use crate::gui::desktop::Desktop;
+use crate::gui::path_field::PathField;
+use crate::gui::theme::Theme;
 
 /// State of the welcome view.
 #[derive(Default)]
-pub struct Welcome {
+pub(super) struct Welcome {
     path_field: PathField,
     samples: Vec<PathBuf>,
     recent: Vec<PathBuf>,
@@ -19,13 +19,13 @@ pub struct Welcome {
 
 impl Welcome {
     /// Reads which logs can be offered.
-    pub fn new(desktop: Arc<dyn Desktop>) -> Self {
+    pub(super) fn new(desktop: Arc<dyn Desktop>) -> Self {
         let (samples, recent) = (desktop.sample_logs(), desktop.recent_logs());
         Self { path_field: PathField::new(desktop), samples, recent }
     }
 
     /// Draws it; returns the log that was chosen. `opening` names a log that is being opened.
-    pub fn ui(&mut self, ui: &mut Ui, theme: &Theme, opening: Option<&Path>) -> Option<PathBuf> {
+    pub(super) fn ui(&mut self, ui: &mut Ui, theme: &Theme, opening: Option<&Path>) -> Option<PathBuf> {
         let mut chosen = None;
         ui.with_layout(Layout::top_down(Align::Center), |ui| {
             ui.add_space((0.08 * ui.available_height()).clamp(8.0, 80.0));

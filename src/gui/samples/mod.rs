@@ -1,0 +1,13 @@
+//! Recordings that the tests of panels and screenshots draw.
+
+mod calibration;
+mod images;
+mod recording;
+mod simulated;
+mod yard;
+
+pub(crate) use self::recording::{
+    FIRST_TRACKED_FRAME, FRAME_PERIOD_NS, sample_images, sample_recording, sample_recording_of,
+};
+pub(crate) use self::simulated::flown_recording;
+pub(crate) use self::yard::{chain_pose, given_chain, true_chain};
