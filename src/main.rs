@@ -9,8 +9,8 @@ fn main() -> ExitCode {
     match cli::run() {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            // With standard error closed, nobody can be informed.
-            drop(writeln!(std::io::stderr(), "dcvins: {error:#}"));
+            // A closed standard error loses the message; the exit code remains.
+            drop(writeln!(std::io::stderr(), "dcvins: {}", cli::message(&error)));
             ExitCode::FAILURE
         }
     }

@@ -12,7 +12,7 @@ use dcvins::observability::laboratory::{
 };
 use dcvins::sensors::Rig;
 
-use crate::cli::commands::print;
+use crate::cli::terminal::{print, print_report};
 
 /// `dcvins degeneracy`.
 #[derive(Args, Clone, Debug)]
@@ -95,8 +95,7 @@ pub(crate) fn degeneracy(arguments: &DegeneracyArguments) -> Result<()> {
         return print(&list());
     }
     if arguments.asks_nothing() {
-        let table = truth_table();
-        return print_as(&table, arguments.json);
+        return print_report(&truth_table(), arguments.json);
     }
     let setup = arguments.setup()?;
     let forms = match (arguments.forms.is_empty(), arguments.advise) {
@@ -110,10 +109,10 @@ pub(crate) fn degeneracy(arguments: &DegeneracyArguments) -> Result<()> {
     }
     let report = LaboratoryReport::new(&setup, &results);
     if !arguments.advise {
-        return print_as(&report, arguments.json);
+        return print_report(&report, arguments.json);
     }
     let form = forms.first().copied().context("--advise needs a form")?;
-    print_as(&Advised::new(report, &setup, form)?, arguments.json)
+    print_report(&Advised::new(report, &setup, form)?, arguments.json)
 }
 
 /// An experiment with what should be flown after it.
@@ -155,10 +154,6 @@ const DEFAULT_FORMS: [LaboratoryForm; 4] = [
     LaboratoryForm::whole(Parameterization::MinimalSwapped),
     LaboratoryForm::whole(Parameterization::Poe),
 ];
-
-fn print_as<T: serde::Serialize + std::fmt::Display>(report: &T, json: bool) -> Result<()> {
-    if json { print(&format!("{}\n", serde_json::to_string_pretty(report)?)) } else { print(&report.to_string()) }
-}
 
 fn list() -> String {
     let line = |(name, meaning): (&str, &str)| format!("  {name:<28}{meaning}\n");

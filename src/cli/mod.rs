@@ -1,15 +1,25 @@
 //! The command line: arguments and sub-commands.
 
 mod arguments;
-mod commands;
+mod calibrate;
+mod check;
+mod compute;
+mod convert;
 mod degeneracy;
+mod evaluate;
 mod report;
+mod run;
+mod run_summary;
 #[cfg(feature = "gui")]
 mod screenshot;
+mod simulate;
+mod terminal;
+mod view;
 
 use clap::Parser as _;
 
-use arguments::{Arguments, Command, ViewArguments};
+use arguments::{Arguments, Command};
+use view::ViewArguments;
 
 /// Reads the arguments of the process and does what they ask for.
 ///
@@ -17,16 +27,41 @@ use arguments::{Arguments, Command, ViewArguments};
 pub(crate) fn run() -> anyhow::Result<()> {
     let arguments = Arguments::parse();
     match arguments.command.unwrap_or_else(|| Command::View(ViewArguments::default())) {
-        Command::View(view) => commands::view(&view),
-        Command::Run(run) => commands::run(&run),
+        Command::View(arguments) => view::view(&arguments),
+        Command::Run(arguments) => run::run(&arguments),
         #[cfg(feature = "gui")]
-        Command::Screenshot(screenshot) => screenshot::screenshot(&screenshot),
+        Command::Screenshot(arguments) => screenshot::screenshot(&arguments),
         Command::Report(arguments) => report::report(&arguments),
-        Command::Calibrate(calibrate) => commands::calibrate(&calibrate),
-        Command::Check(check) => commands::check(&check),
-        Command::Simulate(simulate) => commands::simulate(&simulate),
+        Command::Calibrate(arguments) => calibrate::calibrate(&arguments),
+        Command::Check(arguments) => check::check(&arguments),
+        Command::Simulate(arguments) => simulate::simulate(&arguments),
         Command::Degeneracy(arguments) => degeneracy::degeneracy(&arguments),
-        Command::Convert(convert) => commands::convert(&convert),
-        Command::Evaluate(evaluate) => commands::evaluate(&evaluate),
+        Command::Convert(arguments) => convert::convert(&arguments),
+        Command::Evaluate(arguments) => evaluate::evaluate(&arguments),
+    }
+}
+
+/// The message of an error with those of its causes that it does not quote itself.
+pub(crate) fn message(error: &anyhow::Error) -> String {
+    let mut text = error.to_string();
+    for cause in error.chain().skip(1).map(ToString::to_string) {
+        if !text.contains(&cause) {
+            text = format!("{text}: {cause}");
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use anyhow::anyhow;
+
+    use super::message;
+
+    #[test]
+    fn a_cause_is_printed_once() {
+        let error = anyhow!("no such file");
+        assert_eq!(message(&error.context("cannot read: no such file: a.mcap")), "cannot read: no such file: a.mcap");
+        assert_eq!(message(&anyhow!("no such file").context("cannot read a.mcap")), "cannot read a.mcap: no such file");
     }
 }

@@ -3,13 +3,30 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
+use clap::Args;
 use dcvins::export::{ReportOptions, write_report};
-
 use dcvins::log_check::{self, CheckReport};
 use dcvins::session::{SessionPlan, image_rotations};
 
-use crate::cli::arguments::ReportArguments;
-use crate::cli::commands::{compute, print};
+use crate::cli::arguments::{EstimationArguments, seconds};
+use crate::cli::compute::compute;
+use crate::cli::terminal::{Progress, print};
+
+/// `dcvins report`.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct ReportArguments {
+    /// The log.
+    pub log: PathBuf,
+    /// Folder for report.html, report.json and the files of each run.
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// An instant to be pictured, in seconds since the first message of the log; may be given several times [default: the
+    /// end].
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    pub at: Vec<f64>,
+    #[command(flatten)]
+    pub estimation: EstimationArguments,
+}
 
 /// `dcvins report`.
 pub(crate) fn report(arguments: &ReportArguments) -> Result<()> {
@@ -34,6 +51,7 @@ pub(crate) fn report(arguments: &ReportArguments) -> Result<()> {
 
 /// What there is to know about the log and its rig beforehand.
 fn check(plan: &SessionPlan) -> CheckReport {
+    let _progress = Progress::spinner("checking the log");
     let rotations = image_rotations(&plan.log, &plan.rig);
     log_check::check(&plan.log, Ok(&plan.rig), &rotations)
 }
@@ -71,7 +89,8 @@ mod pictures {
     use dcvins::gui::theme::ThemeName;
     use dcvins::session::{Computation, SessionPlan};
 
-    use crate::cli::arguments::ReportArguments;
+    use super::ReportArguments;
+    use crate::cli::terminal::Progress;
 
     /// A panel of the report.
     struct Shown {
@@ -108,10 +127,15 @@ mod pictures {
         let mut images = ImageReader::new(Arc::clone(&plan.log), &plan.rig);
         let mut pictures = Vec::new();
         let end_ns = computation.recording().last_stamp_ns();
+        let instants: Vec<i64> = arguments.at.iter().map(|at_s| ns_from_seconds(*at_s).min(end_ns)).collect();
+        let instants = if instants.is_empty() { vec![end_ns] } else { instants };
+        let count = WHOLE.len() + instants.len() * INSTANT.len();
+        let progress = Progress::new();
         let mut draw = |heading: &str, panels: &[Shown], cursor_ns| -> Result<()> {
             computation.fill_in(cursor_ns);
             let recording = computation.recording();
             for Shown { panel, size_px, caption, plot } in panels {
+                progress.show(pictures.len() as f64 / count as f64, || format!("drawing {panel}"));
                 let options =
                     PictureOptions { size_px: *size_px, theme: ThemeName::Print, ..PictureOptions::default() };
                 let caption = format!("{caption}, at {:.2} s", seconds_from_ns(cursor_ns));
@@ -128,8 +152,6 @@ mod pictures {
             Ok(())
         };
         draw("The whole flight", &WHOLE, end_ns)?;
-        let instants: Vec<i64> = arguments.at.iter().map(|at_s| ns_from_seconds(*at_s).min(end_ns)).collect();
-        let instants = if instants.is_empty() { vec![end_ns] } else { instants };
         for cursor_ns in instants {
             draw(&format!("At {:.2} s", seconds_from_ns(cursor_ns)), &INSTANT, cursor_ns)?;
         }

@@ -4,9 +4,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::{Context as _, Result, bail};
+use clap::{Args, ValueEnum};
 use dcvins::export::{
-    PANEL_NAMES, PictureOptions, Renderer, draw_panel, draw_panel_svg, is_session, log_name, panel_csv, write_csv,
-    write_png, write_svg,
+    PANEL_NAMES, PictureOptions, Renderer, draw_panel, draw_panel_svg, is_session, log_name, panel_csv, read_session,
+    write_csv, write_png, write_svg,
 };
 use dcvins::flight_log::ImageReader;
 use dcvins::geometry::{ns_from_seconds, seconds_from_ns};
@@ -16,8 +17,100 @@ use dcvins::gui::window::Preset;
 use dcvins::gui::{ImageSource, Playback};
 use dcvins::session::{Computation, Session, SessionPlan};
 
-use crate::cli::arguments::{FormatArgument, RendererArgument, ScreenshotArguments, ThemeArgument};
-use crate::cli::commands::{compute, print, saved_session, tell};
+use crate::cli::arguments::{EstimationArguments, seconds, sides};
+use crate::cli::compute::compute;
+use crate::cli::terminal::{notify, print};
+
+/// `dcvins screenshot`.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct ScreenshotArguments {
+    /// The log, or a saved session (LOG.session.json) with its forks and breakpoints.
+    pub log: PathBuf,
+    /// Seconds since the first message of the log; may be given several times. Several pictures get their time into their
+    /// names.
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, required_unless_present = "every")]
+    pub at: Vec<f64>,
+    /// A picture every so many seconds from the begin to the end (or from --start, for --duration).
+    #[arg(long, value_name = "SECONDS", value_parser = period)]
+    pub every: Option<f64>,
+    /// Which panel; `all` is the whole window.
+    #[arg(long, value_name = "NAME", default_value = "all")]
+    pub panel: String,
+    /// Layout of the whole window, as its keys 1 to 5: overview, calibration, front end, scene, comparison.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=5))]
+    pub layout: u8,
+    /// The picture to write: a PNG, or with .svg a drawing of lines and texts.
+    #[arg(short, long, value_name = "FILE.png")]
+    pub output: PathBuf,
+    /// What is written, when the file's name does not say it.
+    #[arg(long, value_enum)]
+    pub format: Option<FormatArgument>,
+    /// Also write what the panel shows as a table of comma-separated values, beside the picture.
+    #[arg(long)]
+    pub csv: bool,
+    /// Size of the picture in pixels.
+    #[arg(long, value_name = "WxH", default_value = "1920x1080", value_parser = size)]
+    pub size: [usize; 2],
+    /// Pixels per point: 2 draws everything twice as large.
+    #[arg(long, value_name = "N", default_value_t = 1.0, value_parser = scale)]
+    pub scale: f32,
+    /// Colours.
+    #[arg(long, value_enum, default_value_t = ThemeArgument::Light)]
+    pub theme: ThemeArgument,
+    /// Who draws: cpu needs no driver and gives the same bytes everywhere, wgpu uses a graphics adapter.
+    #[arg(long, value_enum, default_value_t = RendererArgument::Cpu)]
+    pub renderer: RendererArgument,
+    /// Move the first run's chain along a direction: its number in the rank panel (1 is the weakest), a known one
+    /// (base-d, end-theta, …) or a parameter by name, and how far in units of 10° and 3 cm. Scene and image show what
+    /// comes of it.
+    #[arg(long, value_name = "DIRECTION=VALUE")]
+    pub slide: Option<dcvins::observability::SlideRequest>,
+    #[command(flatten)]
+    pub estimation: EstimationArguments,
+}
+
+/// What `--format` may say.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum FormatArgument {
+    /// Pixels.
+    Png,
+    /// Lines and texts.
+    Svg,
+}
+
+/// Names of the renderers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum RendererArgument {
+    /// The program itself.
+    Cpu,
+    /// A graphics adapter.
+    Wgpu,
+}
+
+/// Names of the themes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ThemeArgument {
+    /// Dark on light.
+    Light,
+    /// Light on dark.
+    Dark,
+    /// For paper.
+    Print,
+}
+
+fn period(text: &str) -> Result<f64, String> {
+    let value = text.parse::<f64>().ok().filter(|value| value.is_finite() && *value >= 1e-3);
+    value.ok_or_else(|| "expected seconds, a number from 0.001 up".to_owned())
+}
+
+fn scale(text: &str) -> Result<f32, String> {
+    let value = text.parse::<f32>().ok().filter(|value| (0.25..=8.0).contains(value));
+    value.ok_or_else(|| "expected a number from 0.25 to 8".to_owned())
+}
+
+fn size(text: &str) -> Result<[usize; 2], String> {
+    sides(text, 64..=8192).ok_or_else(|| "expected WIDTHxHEIGHT, each from 64 to 8192, as in 1920x1080".to_owned())
+}
 
 /// The most pictures of one command: more is a mistyped period.
 const MOST_PICTURES: usize = 100_000;
@@ -37,7 +130,7 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<()> {
     let end_ns =
         shown.duration_s.map_or(log_end_ns, |duration_s| log_end_ns.min(begin_ns + ns_from_seconds(duration_s)));
     if arguments.at.iter().any(|at_s| ns_from_seconds(*at_s) > log_end_ns) {
-        tell(&format!("dcvins: the log ends at {:.3} s, which is what is drawn", seconds_from_ns(log_end_ns)));
+        notify(&format!("dcvins: the log ends at {:.3} s, which is what is drawn", seconds_from_ns(log_end_ns)));
     }
     let mut instants: Vec<i64> = arguments.at.iter().map(|at_s| ns_from_seconds(*at_s).min(log_end_ns)).collect();
     if let Some(period_s) = arguments.every {
@@ -147,7 +240,7 @@ impl Shown {
             if !arguments.estimation.runs.is_empty() {
                 bail!("a saved session has its own runs: leave --run out");
             }
-            let saved = saved_session(&arguments.log)?;
+            let saved = read_session(&arguments.log)?;
             let (start_s, duration_s) = (saved.start_s, saved.duration_s);
             (Source::Saved(Box::new(saved.open()?)), start_s, duration_s)
         } else {
@@ -169,7 +262,7 @@ impl Shown {
             Source::Log(plan, _) => compute(plan, Some(until_ns)),
             Source::Saved(session) => {
                 session.finish();
-                session.take_notices().iter().for_each(|notice| tell(&format!("dcvins: {notice}")));
+                session.take_notices().iter().for_each(|notice| notify(&format!("dcvins: {notice}")));
                 Ok(session.computation())
             }
         }

@@ -7,6 +7,7 @@ use std::sync::mpsc::{Receiver, channel};
 use super::error::ExportError;
 use super::picture::{write_csv, write_png, write_svg};
 use super::recent_files::{RecentFiles, state_folder};
+use super::session_file::is_session;
 use crate::gui::desktop::{Desktop, PanelExport, PathEntry};
 
 /// How many entries of a folder are looked at.
@@ -161,11 +162,6 @@ impl Desktop for Machine {
 
 fn is_log(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mcap")) || is_session(path)
-}
-
-/// Whether a file is a saved session by its name.
-pub fn is_session(path: &Path) -> bool {
-    path.file_name().is_some_and(|name| name.to_string_lossy().ends_with(".session.json"))
 }
 
 fn logs_in(folder: &Path) -> Vec<PathBuf> {

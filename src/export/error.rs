@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 use crate::flight_log::LogError;
+use crate::session::SavedSessionError;
 
 /// Why something could not be written or evaluated.
 #[derive(Debug, Error)]
@@ -21,6 +22,14 @@ pub enum ExportError {
     Read {
         /// What the system said.
         source: io::Error,
+        /// Which file.
+        path: PathBuf,
+    },
+    /// A file is no saved session that this version reads.
+    #[error("cannot open: {problem}: {path}")]
+    Session {
+        /// What is wrong with it.
+        problem: SavedSessionError,
         /// Which file.
         path: PathBuf,
     },

@@ -12,6 +12,7 @@ mod recent_files;
 mod report;
 mod results;
 mod run_files;
+mod session_file;
 mod structure;
 mod summary;
 mod tables;
@@ -20,7 +21,7 @@ pub mod trajectory;
 pub use calibration_files::write_calibration;
 pub use calibration_report::{CalibrationReport, report_calibration};
 #[cfg(feature = "gui")]
-pub use desktop::{Machine, is_session};
+pub use desktop::Machine;
 pub use error::ExportError;
 pub use evaluation::{EvaluationOptions, EvaluationReport, evaluate};
 #[cfg(feature = "gui")]
@@ -32,5 +33,6 @@ pub use recent_files::RecentFiles;
 pub use report::{ReportDrawing, ReportOptions, ReportPicture, write_report};
 pub use results::write_results;
 pub use run_files::{RunFileOptions, write_run};
+pub use session_file::{is_session, read_session};
 pub use structure::KnownLossSummary;
 pub use summary::{CalibrationSummary, RunSummary, StageSummary, TimingSummary, log_name, summarize};

@@ -1,0 +1,60 @@
+//! `dcvins calibrate`: the offline calibration of a log.
+
+use std::path::PathBuf;
+
+use anyhow::Result;
+use clap::Args;
+use dcvins::calibration::CalibrationOptions;
+use dcvins::export;
+use dcvins::session::{self, CalibrationRequest};
+
+use crate::cli::arguments::seconds;
+use crate::cli::terminal::{Progress, print, print_json};
+
+/// `dcvins calibrate`.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct CalibrateArguments {
+    /// The log; its rig names a static camera, a gimbal camera and encoders.
+    pub log: PathBuf,
+    /// Folder for rig.yaml, calibration.json and report.txt.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// The rig, when it is not beside the log (LOG with .rig.yaml) or attached to it.
+    #[arg(long, value_name = "FILE")]
+    pub rig: Option<PathBuf>,
+    /// The rig's true values, when they are not beside the log (LOG with .truth.yaml).
+    #[arg(long, value_name = "FILE")]
+    pub truth: Option<PathBuf>,
+    /// Leave out this many seconds at the begin of the log.
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = seconds)]
+    pub start: f64,
+    /// Read this many seconds from there.
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    pub duration: Option<f64>,
+    /// Print calibration.json instead of the report.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `dcvins calibrate`.
+pub(crate) fn calibrate(arguments: &CalibrateArguments) -> Result<()> {
+    let request = CalibrationRequest {
+        log_path: arguments.log.clone(),
+        rig_path: arguments.rig.clone(),
+        truth_path: arguments.truth.clone(),
+        start_s: arguments.start,
+        duration_s: arguments.duration,
+    };
+    let progress = Progress::new();
+    let run = session::calibrate(&request, &CalibrationOptions::default(), &mut |at| {
+        progress.show(at.share, || at.stage.to_owned());
+    })?;
+    drop(progress);
+    let report = export::report_calibration(&run);
+    export::write_calibration(&run, &report, &arguments.out)?;
+    if arguments.json {
+        print_json(&report)
+    } else {
+        print(&format!("{report}  files        {}\n", arguments.out.display()))
+    }
+}

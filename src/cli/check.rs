@@ -1,0 +1,37 @@
+//! `dcvins check`: what is in a log and what is wrong with it.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use anyhow::Result;
+use clap::Args;
+use dcvins::flight_log::FlightLog;
+use dcvins::log_check;
+use dcvins::sensors::Rig;
+use dcvins::session;
+
+use crate::cli::terminal::{Progress, print_report};
+
+/// `dcvins check`.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct CheckArguments {
+    /// The log.
+    pub log: PathBuf,
+    /// The rig, when it is not beside the log or attached to it.
+    #[arg(long, value_name = "FILE")]
+    pub rig: Option<PathBuf>,
+    /// Print the findings as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `dcvins check`.
+pub(crate) fn check(arguments: &CheckArguments) -> Result<()> {
+    let progress = Progress::spinner("reading the log");
+    let log = Arc::new(FlightLog::open(&arguments.log)?);
+    let rig = Rig::for_log(&log, arguments.rig.as_deref());
+    let rotations = rig.as_ref().map_or_else(|_| Vec::new(), |rig| session::image_rotations(&log, rig));
+    let report = log_check::check(&log, rig.as_ref(), &rotations);
+    drop(progress);
+    print_report(&report, arguments.json)
+}

@@ -1,0 +1,38 @@
+//! The estimation that `run`, `view`, `screenshot` and `report` share, with its progress bar.
+
+use anyhow::{Result, bail};
+use dcvins::geometry::seconds_from_ns;
+use dcvins::session::breakpoints::Condition;
+use dcvins::session::{self, BreakpointHit, Computation, Recording, SessionPlan};
+
+use crate::cli::terminal::Progress;
+
+/// Runs the estimators of a plan to its end, or to a time of the log.
+pub(crate) fn compute(plan: &SessionPlan, until_ns: Option<i64>) -> Result<Computation> {
+    let begin_s = plan.start_s;
+    let log_end_s = seconds_from_ns(plan.log.duration_ns());
+    let end_s = plan.duration_s.map_or(log_end_s, |duration_s| log_end_s.min(begin_s + duration_s));
+    let end_s = until_ns.map_or(end_s, |until_ns| end_s.min(seconds_from_ns(until_ns)));
+    let progress = Progress::new();
+    Ok(session::compute(plan, until_ns, &mut |recording| {
+        let now_s = seconds_from_ns(recording.computed_ns());
+        progress.show((now_s - begin_s) / (end_s - begin_s).max(1e-3), || format!("{now_s:.1} of {end_s:.1} s"));
+    })?)
+}
+
+/// Runs the estimators of a plan until a condition becomes true; returns the hit, if there is one.
+pub(crate) fn compute_until(plan: &SessionPlan, condition: &Condition) -> Result<(Recording, Option<BreakpointHit>)> {
+    let (names, parameters) = (plan.rig.parameter_names(), plan.parameters());
+    let unknown = condition.unknown_names(&names, &parameters);
+    if !unknown.is_empty() {
+        let known: Vec<String> = parameters.iter().map(|parameter| names.name(*parameter)).collect();
+        bail!("no run has '{}' of '{condition}'; there are {}", unknown.join("', '"), known.join(", "));
+    }
+    let end_s = seconds_from_ns(plan.log.duration_ns());
+    let progress = Progress::new();
+    let (computation, hit) = session::compute_until(plan, condition, &mut |recording| {
+        let now_s = seconds_from_ns(recording.computed_ns());
+        progress.show(now_s / end_s.max(1e-3), || format!("{now_s:.1} s, looking for {condition}"));
+    })?;
+    Ok((computation.into_recording(), hit))
+}

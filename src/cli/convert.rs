@@ -1,0 +1,32 @@
+//! `dcvins convert`: logs of other programs.
+
+use std::path::PathBuf;
+
+use anyhow::Result;
+use clap::Args;
+use dcvins::flight_log;
+
+use crate::cli::terminal::{Progress, print_report};
+
+/// `dcvins convert`.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct ConvertArguments {
+    /// A EuRoC/ASL folder (with mav0), a ROS 1 bag, or a ROS 2 bag: its folder, one .db3 or one .mcap.
+    pub source: PathBuf,
+    /// The log to write; the rig, where the source describes one, gets the same name with .rig.yaml.
+    #[arg(short, long, value_name = "LOG.mcap")]
+    pub output: PathBuf,
+    /// Print what was taken and what was left as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `dcvins convert`.
+pub(crate) fn convert(arguments: &ConvertArguments) -> Result<()> {
+    let progress = Progress::new();
+    let report = flight_log::convert::convert(&arguments.source, &arguments.output, &mut |ratio| {
+        progress.show(ratio, String::new);
+    })?;
+    drop(progress);
+    print_report(&report, arguments.json)
+}

@@ -1,0 +1,112 @@
+//! `dcvins run`: the estimator over a log, without a window.
+
+use std::path::PathBuf;
+
+use anyhow::{Result, bail};
+use clap::Args;
+use dcvins::export::{self, RunFileOptions, RunSummary};
+use dcvins::geometry::seconds_from_ns;
+use dcvins::session::breakpoints::Condition;
+use dcvins::session::{BreakpointHit, Recording, SessionPlan};
+
+use crate::cli::arguments::EstimationArguments;
+use crate::cli::compute::{compute, compute_until};
+use crate::cli::run_summary::describe;
+use crate::cli::terminal::{print, print_json};
+
+/// `dcvins run`.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct RunArguments {
+    /// The log.
+    pub log: PathBuf,
+    /// Folder for the files; each run gets a folder of its name in it.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    #[command(flatten)]
+    pub estimation: EstimationArguments,
+    /// Stop where this comes true in a run, as in "rank < 18 or features < 40", write what there is up to there and tell
+    /// the values; README.md lists what can be asked for.
+    #[arg(long = "break", value_name = "CONDITION", value_parser = condition)]
+    pub break_at: Option<Condition>,
+    /// Leave the measured times out of frames.csv and summary.json, so that two runs give the same bytes in every file.
+    #[arg(long)]
+    pub no_timing: bool,
+    /// Also write results.mcap for Foxglove and Rerun: poses, frames of the chain, image annotations, landmarks,
+    /// calibration and rank over time.
+    #[arg(long)]
+    pub mcap: bool,
+    /// Also write trajectory.euroc.csv, a table like EuRoC's ground truth.
+    #[arg(long)]
+    pub euroc: bool,
+    /// Print the summaries as JSON instead of a table.
+    #[arg(long)]
+    pub json: bool,
+}
+
+fn condition(text: &str) -> Result<Condition, String> {
+    text.parse::<Condition>().map_err(|problem| problem.to_string())
+}
+
+/// `dcvins run`.
+pub(crate) fn run(arguments: &RunArguments) -> Result<()> {
+    let plan = SessionPlan::open(&arguments.estimation.request(arguments.log.clone()))?;
+    let (recording, hit) = match &arguments.break_at {
+        Some(condition) => compute_until(&plan, condition)?,
+        None => (compute(&plan, None)?.into_recording(), None),
+    };
+    let mut summaries = Vec::new();
+    for run in &recording.runs {
+        let options =
+            RunFileOptions { timing: !arguments.no_timing, mcap: arguments.mcap, euroc_trajectory: arguments.euroc };
+        let (folder, summary) = export::write_run(&recording, run, &arguments.out, options)?;
+        summaries.push((folder, summary));
+    }
+    if arguments.json {
+        let all: Vec<&RunSummary> = summaries.iter().map(|(_, summary)| summary).collect();
+        match &arguments.break_at {
+            Some(condition) => {
+                let hit = break_json(condition, hit.as_ref(), &recording);
+                print_json(&serde_json::json!({ "break": hit, "runs": all }))?;
+            }
+            None => print_json(&all)?,
+        }
+    } else {
+        for (folder, summary) in &summaries {
+            print(&describe(folder, summary))?;
+        }
+        if let Some(condition) = &arguments.break_at {
+            print(&describe_break(condition, hit.as_ref()))?;
+        }
+    }
+    let failed: Vec<&str> = recording.runs.iter().filter_map(|run| run.error.as_deref()).collect();
+    if !failed.is_empty() {
+        bail!("{}", failed.join("; "));
+    }
+    if recording.runs.iter().all(|run| run.steps.is_empty()) {
+        let log = export::log_name(&arguments.log);
+        bail!("no image of '{log}' could be used; 'dcvins check {}' says why", arguments.log.display());
+    }
+    Ok(())
+}
+
+/// What `--break` came to, in a line for people.
+fn describe_break(condition: &Condition, hit: Option<&BreakpointHit>) -> String {
+    hit.map_or_else(|| format!("break: '{condition}' never came true\n"), |hit| format!("break: {}\n", hit.description))
+}
+
+/// What `--break` came to, for programs.
+fn break_json(condition: &Condition, hit: Option<&BreakpointHit>, recording: &Recording) -> serde_json::Value {
+    let Some(found) = hit else { return serde_json::json!({ "condition": condition.text(), "hit": null }) };
+    let run = recording.runs.get(found.hit.run);
+    let values: serde_json::Map<String, serde_json::Value> =
+        found.values.iter().map(|value| (value.name.clone(), value.value.into())).collect();
+    serde_json::json!({
+        "condition": condition.text(),
+        "hit": {
+            "run": run.map(|run| run.spec.label.as_str()),
+            "time_s": seconds_from_ns(found.hit.stamp_ns),
+            "frame": run.and_then(|run| run.steps.get(found.hit.step)).map(|step| step.report.frame_index),
+            "values": values,
+        },
+    })
+}

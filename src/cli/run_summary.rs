@@ -1,0 +1,95 @@
+//! A run's summary as text for the terminal.
+
+use std::path::Path;
+
+use dcvins::export::{self, RunSummary};
+use dcvins::observability::LEAST_FALSE_GAIN;
+
+/// A run's summary in a few lines.
+pub(crate) fn describe(folder: &Path, summary: &RunSummary) -> String {
+    let frames = &summary.frames;
+    let mut lines = vec![format!("{} on {} ({})\n", summary.run, summary.log, summary.camera)];
+    let begin = frames
+        .initialized_at_s
+        .map_or_else(|| "never initialized".to_owned(), |time_s| format!("initialized at {time_s:.2} s"));
+    lines.push(format!(
+        "  frames       {} of {} estimated, {} keyframes, {begin}, {} restarts\n",
+        frames.estimated, frames.total, frames.keyframes, frames.restarts
+    ));
+    if let Some(accuracy) = &summary.accuracy {
+        lines.push(format!(
+            "  accuracy     ATE {:.3} m rmse, {:.3} m max ({}), {:.2} % of {:.1} m\n",
+            accuracy.ate_rmse_m,
+            accuracy.ate_max_m,
+            accuracy.alignment,
+            accuracy.ate_percent_of_length,
+            summary.length_m
+        ));
+    } else if let Some(reason) = &summary.accuracy_missing {
+        lines.push(format!("  accuracy     none: {reason}\n"));
+    }
+    let calibration = &summary.calibration;
+    if let (Some(first), Some(last)) = (&calibration.chain_error_initial, &calibration.chain_error) {
+        lines.push(format!(
+            "  chain error  {:.1} mm, {:.2}° with the rig's values; {:.1} ± {:.1} mm, {:.2} ± {:.2}° at the end ({})\n",
+            first.translation_mean_m * 1e3,
+            first.rotation_mean_rad.to_degrees(),
+            last.translation_mean_m * 1e3,
+            last.translation_std_m * 1e3,
+            last.rotation_mean_rad.to_degrees(),
+            last.rotation_std_rad.to_degrees(),
+            calibration.parameterization
+        ));
+    }
+    if let Some(rank) = &summary.rank {
+        lines.push(format!(
+            "  rank         structural {} of {}, informed {}; lost: {} parameterization, {} joints, {} absorbed, {} motion\n",
+            rank.rank_structural,
+            rank.columns,
+            rank.rank_informed,
+            rank.deficit.parameterization,
+            rank.deficit.joints,
+            rank.deficit.absorbed,
+            rank.deficit.motion
+        ));
+        let held = |known: &export::KnownLossSummary| known.agreeing == known.steps;
+        if !rank.known.is_empty() {
+            let agreeing = rank.known.iter().filter(|known| held(known)).count();
+            lines.push(format!(
+                "  structure    {agreeing} of {} known losses measured as null in every step; {}\n",
+                rank.known.len(),
+                falsely_known(&rank.known)
+            ));
+        }
+        lines.extend(rank.known.iter().filter(|known| !held(known)).map(|known| {
+            format!("               null in {} of {} steps only: {}\n", known.agreeing, known.steps, known.reason)
+        }));
+    }
+    if let (Some(timing), Some(factor)) = (&summary.timing_ms, summary.real_time_factor) {
+        let stage = |stage: &export::StageSummary| format!("{:.1}/{:.1}", stage.p50, stage.p95);
+        lines.push(format!(
+            "  ms p50/p95   front end {}, optimize {}, linearize {}, report {}, marginalize {}, observability {}, step {}; {factor:.1} × real time\n",
+            stage(&timing.frontend),
+            stage(&timing.optimize),
+            stage(&timing.linearize),
+            stage(&timing.report),
+            stage(&timing.marginalize),
+            stage(&timing.observability),
+            stage(&timing.step)
+        ));
+    }
+    for warning in &summary.warnings {
+        lines.push(format!("  warning      {warning}\n"));
+    }
+    lines.push(format!("  files        {}\n", folder.display()));
+    lines.concat()
+}
+
+/// How much priors claim of what nobody can measure.
+fn falsely_known(known: &[export::KnownLossSummary]) -> String {
+    let claimed = known.iter().map(|known| known.largest_false_gain).filter(|gain| *gain > LEAST_FALSE_GAIN);
+    match (claimed.clone().count(), claimed.fold(0.0, f64::max)) {
+        (0, _) => "no prior claims to know them".to_owned(),
+        (count, most) => format!("priors falsely claim {count}, up to {most:.2} (1: as much as 10° or 3 cm)"),
+    }
+}

@@ -1,0 +1,121 @@
+//! `dcvins simulate`: a synthetic flight with ground truth.
+
+use std::path::PathBuf;
+
+use anyhow::Result;
+use clap::{Args, ValueEnum};
+use dcvins::simulation::{self, Experiment, SimulationOptions};
+
+use crate::cli::arguments::{seconds, sides};
+use crate::cli::terminal::{Progress, print};
+
+/// `dcvins simulate`.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct SimulateArguments {
+    /// The paper's experiment: T1, T2, T3 or T4.
+    #[arg(value_name = "EXPERIMENT", ignore_case = true)]
+    pub experiment: ExperimentArgument,
+    /// The log to write; its rig and truth get the same name with .rig.yaml and .truth.yaml.
+    #[arg(short, long, value_name = "LOG.mcap")]
+    pub output: PathBuf,
+    /// Seed of every random number.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Length of the flight [default: the experiment's].
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    pub duration: Option<f64>,
+    /// Standard deviation of the encoders in degrees, or none [default: the experiment's].
+    #[arg(long, value_name = "D|none", value_parser = encoder_sigma)]
+    pub encoder_sigma_deg: Option<EncoderArgument>,
+    /// Size of the images in pixels; the field of view stays the same.
+    #[arg(long, value_name = "WxH", default_value = "640x480", value_parser = image_size)]
+    pub size: [usize; 2],
+    /// Images per second.
+    #[arg(long, value_name = "HZ", default_value_t = 20.0)]
+    pub rate: f64,
+    /// Record the camera on the gimbal alone: half the work and half the bytes of a long flight.
+    #[arg(long)]
+    pub no_static_camera: bool,
+    /// Something that goes wrong, in seconds and SI units; may be given several times: camera-offset=S, joint-lag=S,
+    /// joint-start=S, image-gap=START,LENGTH, exposure=S, gyroscope-range=RAD/S, accelerometer-range=M/S²,
+    /// light=START,FACTOR, blank=START,LENGTH, slew=START,LENGTH, spin=START,LENGTH,RAD/S, hold-joint=NUMBER,START,LENGTH,
+    /// hover=START,LENGTH, stabilize=START,LENGTH.
+    #[arg(long, value_name = "KEY=VALUE[,VALUE…]")]
+    pub disturb: Vec<String>,
+}
+
+/// Names of the experiments.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ExperimentArgument {
+    /// The paper's T1.
+    T1,
+    /// The paper's T2.
+    T2,
+    /// The paper's T3.
+    T3,
+    /// The paper's T4.
+    T4,
+}
+
+/// What `--encoder-sigma-deg` may say.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum EncoderArgument {
+    /// No encoders in the log.
+    None,
+    /// White noise of this standard deviation, in degrees.
+    Sigma(f64),
+}
+
+fn image_size(text: &str) -> Result<[usize; 2], String> {
+    sides(text, 32..=4096).ok_or_else(|| "expected WIDTHxHEIGHT, each from 32 to 4096, as in 640x480".to_owned())
+}
+
+fn encoder_sigma(text: &str) -> Result<EncoderArgument, String> {
+    if text == "none" {
+        return Ok(EncoderArgument::None);
+    }
+    let value = text.parse::<f64>().ok().filter(|value| value.is_finite() && *value > 0.0);
+    value.map(EncoderArgument::Sigma).ok_or_else(|| "expected degrees, a number above 0, or none".to_owned())
+}
+
+/// `dcvins simulate`.
+pub(crate) fn simulate(arguments: &SimulateArguments) -> Result<()> {
+    let experiment = match arguments.experiment {
+        ExperimentArgument::T1 => Experiment::T1,
+        ExperimentArgument::T2 => Experiment::T2,
+        ExperimentArgument::T3 => Experiment::T3,
+        ExperimentArgument::T4 => Experiment::T4,
+    };
+    let mut options = SimulationOptions::new(experiment);
+    options.seed = arguments.seed;
+    options.duration_s = arguments.duration;
+    options.resolution_px = arguments.size;
+    options.camera_rate_hz = arguments.rate;
+    options.static_camera = !arguments.no_static_camera;
+    match arguments.encoder_sigma_deg {
+        Some(EncoderArgument::None) => options.encoder_sigma_rad = None,
+        Some(EncoderArgument::Sigma(sigma_deg)) => options.encoder_sigma_rad = Some(sigma_deg.to_radians()),
+        None => {}
+    }
+    for disturbance in &arguments.disturb {
+        options.disturbances.set(disturbance)?;
+    }
+    let progress = Progress::new();
+    let summary = simulation::simulate(&options, &arguments.output, &mut |at| {
+        let ratio = at.images_done as f64 / at.images_total.max(1) as f64;
+        progress.show(ratio, || format!("{} of {} images", at.images_done, at.images_total));
+    })?;
+    drop(progress);
+    let (translation_m, rotation_rad) = summary.given_chain_error;
+    print(&format!(
+        "{}: {:.1} s, {:.1} m, {} images; the given chain is off by {:.1} mm and {:.2}°\n{}\n{}\n",
+        summary.log.display(),
+        summary.duration_s,
+        summary.path_length_m,
+        summary.images,
+        translation_m * 1e3,
+        rotation_rad.to_degrees(),
+        summary.rig.display(),
+        summary.truth.display(),
+    ))
+}
