@@ -8,7 +8,7 @@ use dcvins::estimator::{JointKnowledge, PoseKnowledge};
 use dcvins::gimbal::Parameterization;
 use dcvins::observability::laboratory::{
     Advice, Excitation, LABORATORY_IMU, LaboratoryForm, LaboratoryMotion, LaboratoryReport, LaboratorySetup, Mechanism,
-    Situation, advise, excitation, truth_table,
+    Situation, advise, excitation, survey,
 };
 use dcvins::sensors::Rig;
 
@@ -17,7 +17,7 @@ use crate::cli::terminal::{print, print_report};
 /// `dcvins degeneracy`.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct DegeneracyArguments {
-    /// Measure every scenario of docs/mathematics.md, section 7, and compare with the expected results; the default without
+    /// Compute ranks, losses and null directions of every scenario of docs/mathematics.md, section 7; the default without
     /// arguments.
     #[arg(long, conflicts_with_all = ["mechanism", "rig", "forms", "motion", "freeze", "encoder_sigma_deg", "poses"])]
     pub table: bool,
@@ -95,7 +95,7 @@ pub(crate) fn degeneracy(arguments: &DegeneracyArguments) -> Result<()> {
         return print(&list());
     }
     if arguments.asks_nothing() {
-        return print_report(&truth_table(), arguments.json);
+        return print_report(&survey(), arguments.json);
     }
     let setup = arguments.setup()?;
     let forms = match (arguments.forms.is_empty(), arguments.advise) {

@@ -1,21 +1,22 @@
-//! The laboratory: what a mechanism, a parameterization and a motion can tell about the calibration, without a log.
+//! The laboratory: which calibration parameters are observable with a mechanism, a parameterization and a motion,
+//! without a log.
 //!
-//! An experiment supposes a window, linearizes it with the estimator's own factors
+//! An experiment makes a hypothetical window, linearizes it with the estimator's own factors
 //! ([`crate::estimator::HypotheticalWindow`]) and analyses it as every step is analysed.
-//! [`truth_table`] runs all scenarios of docs/mathematics.md, section 7, and compares the ranks with the expected ones.
+//! [`survey`] runs the built-in experiments.
 
 mod advice;
 mod excitation;
 mod experiment;
+mod experiments;
 mod mechanism;
 mod motion;
 mod report;
 mod situation;
 mod spurious;
-mod table;
+mod survey;
 #[cfg(test)]
 mod tests;
-mod truth;
 
 pub use advice::{ADVICE_DURATION_S, Advice, CandidateReport, WeakDirection, advise};
 pub use excitation::{Excitation, ParameterExcitation, excitation};
@@ -27,4 +28,4 @@ pub use motion::{LaboratoryMotion, UnknownMotion};
 pub use report::LaboratoryReport;
 pub use situation::Situation;
 pub use spurious::SpuriousRow;
-pub use table::{TableEntry, TableRow, TableSection, TruthTable, truth_table};
+pub use survey::{LeastFramesRow, Survey, SurveyEntry, SurveyRow, SurveySection, survey};

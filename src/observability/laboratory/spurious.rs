@@ -1,8 +1,8 @@
 //! Spurious information: an old window and a new one, linearized at different values of the calibration, together
-//! constrain directions that neither observes (docs/mathematics.md, section 9).
+//! constrain directions that are unobservable in each of them (docs/mathematics.md, section 9).
 //!
-//! That is what a marginalization prior does beside the window when the calibration has moved meanwhile. With first
-//! estimates both are linearized at the old value.
+//! A marginalization prior and the window do so when the calibration has changed between them. With first-estimate
+//! Jacobians both are linearized at the old value.
 
 use std::fmt;
 
@@ -11,8 +11,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::LaboratoryForm;
-use super::table::setup;
-use super::truth::{Joints, Poses};
+use super::experiments::{GENERIC, GENERIC_WITHOUT_ENCODER};
 use crate::estimator::HypotheticalWindow;
 use crate::geometry::{Dimension, SplitMix64, dense};
 use crate::gimbal::{Chain, ClassicalChain, Parameterization};
@@ -20,96 +19,75 @@ use crate::observability::analysis::measured_block;
 
 /// Frames of each of the two windows.
 const FRAMES: usize = 10;
-/// Changes of the calibration that are drawn for each row.
+/// Random changes of the calibration per row.
 const DRAWS: u64 = 8;
-/// A direction that is claimed this much counts as known: as much as its scale of 10° or 3 cm.
+/// A direction with a larger scaled singular value counts as constrained: σ below its scale of 10° or 3 cm.
 const KNOWN: f64 = 1.0;
-/// With first estimates nothing above this is claimed.
-const ROUNDING: f64 = 1e-9;
 
 /// Heading of the rows.
 pub(super) fn title() -> String {
     format!(
-        "Two windows, the calibration changed between them: the most that they claim together of what neither sees\n  \
-         (1: as much as 10° or 3 cm), and how many such directions are claimed over 1; {DRAWS} draws"
+        "Spurious information of two windows, the calibration changed between them: largest scaled singular value of the\n\
+         directions that are unobservable in both (1: σ of 10° or 3 cm), and how many are over 1; {DRAWS} draws"
     )
 }
 
-/// What is claimed of a form's null directions by two windows together.
+/// Spurious information along the null directions of one parameterization.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SpuriousRow {
-    /// Name of the form.
+    /// Name of the parameterization.
     pub form: String,
     /// Whether the joint angles are known.
     pub encoder: bool,
-    /// How far the calibration moved between the windows, each angle and each length up to this either way: in degrees and
-    /// in millimetres.
+    /// Bound of the uniform change of each angle, in degrees, and of each length, in millimetres.
     pub change: (f64, f64),
-    /// Number of directions that neither window sees.
+    /// Number of directions that are unobservable in both windows.
     pub null: usize,
-    /// The largest singular value of these, both windows linearized at the first value.
+    /// Their largest singular value with both windows linearized at the first value.
     pub with_first_estimates: f64,
     /// The same with each window linearized at its own value: least and most over the draws.
     pub without: (f64, f64),
     /// How many of them are then over 1: least and most over the draws.
     pub known: (usize, usize),
-    /// The largest singular value in docs/mathematics.md, section 9.
-    pub without_expected: f64,
-    /// The numbers above 1 in docs/mathematics.md, section 9: least and most.
-    pub known_expected: (usize, usize),
-    /// Whether the measured range overlaps the expected one, and first estimates add no information.
-    pub agrees: bool,
 }
 
 struct Case {
     parameterization: Parameterization,
-    joints: Joints,
+    encoder: bool,
     change: (f64, f64),
-    without: f64,
-    known: (usize, usize),
 }
 
 const CASES: [Case; 6] = [
-    case(Parameterization::Classical, Joints::Known, (0.1, 1.0), 0.7, (0, 0)),
-    case(Parameterization::Classical, Joints::Known, (1.0, 10.0), 5.7, (1, 2)),
-    case(Parameterization::Classical, Joints::Known, (10.0, 30.0), 7.3, (2, 3)),
-    case(Parameterization::Minimal, Joints::Known, (10.0, 30.0), 0.0, (0, 0)),
-    case(Parameterization::Minimal, Joints::Free, (10.0, 30.0), 0.0, (0, 0)),
-    case(Parameterization::Poe, Joints::Free, (10.0, 30.0), 0.48, (0, 0)),
+    Case { parameterization: Parameterization::Classical, encoder: true, change: (0.1, 1.0) },
+    Case { parameterization: Parameterization::Classical, encoder: true, change: (1.0, 10.0) },
+    Case { parameterization: Parameterization::Classical, encoder: true, change: (10.0, 30.0) },
+    Case { parameterization: Parameterization::Minimal, encoder: true, change: (10.0, 30.0) },
+    Case { parameterization: Parameterization::Minimal, encoder: false, change: (10.0, 30.0) },
+    Case { parameterization: Parameterization::Poe, encoder: false, change: (10.0, 30.0) },
 ];
 
-const fn case(
-    parameterization: Parameterization,
-    joints: Joints,
-    change: (f64, f64),
-    without: f64,
-    known: (usize, usize),
-) -> Case {
-    Case { parameterization, joints, change, without, known }
-}
-
-/// Every case of docs/mathematics.md, section 9.
+/// The spurious information of every case.
 pub(super) fn measure() -> Vec<SpuriousRow> {
     CASES.par_iter().filter_map(Case::measure).collect()
 }
 
 impl Case {
     fn measure(&self) -> Option<SpuriousRow> {
-        let setup = setup("generic", self.joints, Poses::Known, FRAMES)?;
+        let setup = if self.encoder { GENERIC } else { GENERIC_WITHOUT_ENCODER }.setup_of(FRAMES)?;
         let (old, new) = (setup.window_from(0), setup.window_from(FRAMES));
         let form = LaboratoryForm::whole(self.parameterization);
         let chain = &setup.mechanism.chain;
-        let seen = |window: &HypotheticalWindow, chain: &ClassicalChain| {
+        let scaled_block = |window: &HypotheticalWindow, chain: &ClassicalChain| {
             measured_block(&window.linearize(chain, form.parameterization, form.joint_offsets))
         };
-        let (before, after) = (seen(&old, chain)?, seen(&new, chain)?);
+        let (before, after) = (scaled_block(&old, chain)?, scaled_block(&new, chain)?);
         let consistent = stacked_singular_values(&before.block, &after.block)?;
         let threshold = before.structural_threshold.max(after.structural_threshold);
         let rank = consistent.iter().filter(|value| **value > threshold).count();
         let mut without = (f64::INFINITY, 0.0_f64);
         let mut known = (usize::MAX, 0);
         for draw in 1..=DRAWS {
-            let moved = seen(&new, &changed(chain, self.change, draw))?;
+            let moved = scaled_block(&new, &changed(chain, self.change, draw))?;
             let values = stacked_singular_values(&before.block, &moved.block)?;
             let spurious = &values[rank..];
             let most = spurious.first().copied().unwrap_or(0.0);
@@ -118,19 +96,14 @@ impl Case {
             known = (known.0.min(count), known.1.max(count));
         }
         let with_first_estimates = consistent.get(rank).copied().unwrap_or(0.0);
-        let overlaps = known.0 <= self.known.1 && self.known.0 <= known.1;
-        let none = self.without > 0.0 || without.1 <= ROUNDING;
         Some(SpuriousRow {
             form: form.name(),
-            encoder: self.joints == Joints::Known,
+            encoder: self.encoder,
             change: self.change,
             null: consistent.len() - rank,
             with_first_estimates,
             without,
             known,
-            without_expected: self.without,
-            known_expected: self.known,
-            agrees: overlaps && none && with_first_estimates <= ROUNDING,
         })
     }
 }
@@ -159,26 +132,22 @@ fn changed(chain: &ClassicalChain, (degrees, millimetres): (f64, f64), seed: u64
 
 impl fmt::Display for SpuriousRow {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mark = if self.agrees { ' ' } else { '!' };
         let (degrees, millimetres) = self.change;
         let encoder = if self.encoder { "" } else { ", no encoder" };
         let scenario = format!("{}{encoder}, change {degrees}° {millimetres} mm", self.form);
-        write!(out, "{mark} {scenario:<42}")?;
+        write!(out, "  {scenario:<42}")?;
         if self.null == 0 {
-            return write!(out, "nothing is lost, so that nothing can be claimed");
+            return write!(out, "full rank");
         }
         let (least, most) = self.without;
-        let range = |(least, most): (usize, usize)| {
-            if least == most { least.to_string() } else { format!("{least} to {most}") }
+        let known = match self.known {
+            (least, most) if least == most => least.to_string(),
+            (least, most) => format!("{least} to {most}"),
         };
         write!(
             out,
-            "first estimates {:.0e}, without {least:.2} to {most:.2} (expected {}); over 1: {}/{} of {}",
-            self.with_first_estimates,
-            self.without_expected,
-            range(self.known),
-            range(self.known_expected),
-            self.null
+            "with FEJ {:.0e}, without {least:.2} to {most:.2}; over 1: {known} of {}",
+            self.with_first_estimates, self.null
         )
     }
 }

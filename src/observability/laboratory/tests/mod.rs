@@ -1,5 +1,6 @@
-//! The truth table, advice that is flown, and chains that slide.
+//! The truth table of the mathematics, suggested excitation, and chains moved along null directions.
 
 mod excitation;
+mod experiments;
 mod slide;
-mod table;
+mod truth_table;

@@ -1,0 +1,268 @@
+//! The experiments of the survey: mechanisms, motions and knowledge under which the rank of the calibration is computed.
+
+use super::{LABORATORY_IMU, LaboratoryForm, LaboratoryMotion as Motion, LaboratorySetup, Mechanism};
+use crate::estimator::{JointKnowledge, PoseKnowledge};
+use crate::gimbal::Parameterization;
+
+/// Landmarks of the windows with unknown joint angles; the others have a hundred.
+const LANDMARKS_WITHOUT_ENCODER: usize = 130;
+
+/// An experiment of the survey.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Experiment {
+    /// Its label in the table.
+    pub(super) scenario: &'static str,
+    /// Name of the mechanism.
+    pub(super) mechanism: &'static str,
+    /// Motion of vehicle and camera.
+    pub(super) motion: Motion,
+    /// Joints that do not move, counted from 1.
+    frozen: &'static [usize],
+    joints: JointKnowledge,
+    poses: PoseKnowledge,
+    frames: usize,
+    /// Parameterizations whose ranks are compared.
+    pub(super) forms: &'static [LaboratoryForm],
+}
+
+/// Experiments under one heading.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Section {
+    /// The heading.
+    pub(super) title: &'static str,
+    /// Its experiments.
+    pub(super) experiments: &'static [Experiment],
+}
+
+/// The mechanism with exciting motion, known poses and joint angles, in the classical and the minimal form.
+const fn experiment(scenario: &'static str, mechanism: &'static str) -> Experiment {
+    Experiment {
+        scenario,
+        mechanism,
+        motion: Motion::Aggressive,
+        frozen: &[],
+        joints: JointKnowledge::Known,
+        poses: PoseKnowledge::Known,
+        frames: 10,
+        forms: CLASSICAL_MINIMAL,
+    }
+}
+
+impl Experiment {
+    const fn moving(self, motion: Motion) -> Self {
+        Self { motion, ..self }
+    }
+
+    const fn freezing(self, frozen: &'static [usize]) -> Self {
+        Self { frozen, ..self }
+    }
+
+    const fn encoder_deg(self, sigma_deg: f64) -> Self {
+        Self { joints: JointKnowledge::Encoder(sigma_deg.to_radians()), ..self }
+    }
+
+    const fn without_encoder(self) -> Self {
+        Self { joints: JointKnowledge::Unknown, ..self }
+    }
+
+    const fn poses(self, poses: PoseKnowledge) -> Self {
+        Self { poses, ..self }
+    }
+
+    const fn frames(self, frames: usize) -> Self {
+        Self { frames, ..self }
+    }
+
+    const fn forms(self, forms: &'static [LaboratoryForm]) -> Self {
+        Self { forms, ..self }
+    }
+
+    /// The experiment as it is run; `None` without a mechanism of that name.
+    pub(super) fn setup(&self) -> Option<LaboratorySetup> {
+        let mut setup = LaboratorySetup::new(Mechanism::named(self.mechanism).ok()?);
+        setup.motion = self.motion;
+        setup.frozen = self.frozen.iter().map(|joint| joint - 1).collect();
+        setup.joints = self.joints;
+        setup.poses = self.poses;
+        setup.frames = self.frames;
+        if self.joints == JointKnowledge::Unknown {
+            setup.landmarks = LANDMARKS_WITHOUT_ENCODER;
+        }
+        Some(setup)
+    }
+
+    /// The experiment with another number of frames.
+    pub(super) fn setup_of(&self, frames: usize) -> Option<LaboratorySetup> {
+        self.frames(frames).setup()
+    }
+}
+
+const CLASSICAL: LaboratoryForm = LaboratoryForm::whole(Parameterization::Classical);
+const MINIMAL: LaboratoryForm = LaboratoryForm::whole(Parameterization::Minimal);
+const POE: LaboratoryForm = LaboratoryForm::whole(Parameterization::Poe);
+const CLASSICAL_MINIMAL: &[LaboratoryForm] = &[CLASSICAL, MINIMAL];
+const CLASSICAL_MINIMAL_POE: &[LaboratoryForm] = &[CLASSICAL, MINIMAL, POE];
+const ALL_FORMS: &[LaboratoryForm] = &[
+    CLASSICAL,
+    MINIMAL,
+    LaboratoryForm::whole(Parameterization::MinimalSwapped),
+    LaboratoryForm::whole(Parameterization::MinimalYx),
+    POE,
+];
+const WITHOUT_OFFSETS: &[LaboratoryForm] =
+    &[LaboratoryForm { joint_offsets: false, ..CLASSICAL }, LaboratoryForm { joint_offsets: false, ..MINIMAL }];
+
+const OFFSET: &str = "yaw-roll-pitch-offset";
+const IDEAL: &str = "yaw-roll-pitch-ideal";
+const IMU: PoseKnowledge = PoseKnowledge::Inertial { noise: LABORATORY_IMU, biases_known: false };
+const IMU_BIASES_KNOWN: PoseKnowledge = PoseKnowledge::Inertial { noise: LABORATORY_IMU, biases_known: true };
+
+/// Two windows of one motion, with and without encoders; see [`super::spurious`].
+pub(super) const GENERIC: Experiment = experiment("", "generic");
+/// The same with free joint angles.
+pub(super) const GENERIC_WITHOUT_ENCODER: Experiment = GENERIC.without_encoder();
+
+/// Experiments whose least number of frames is searched.
+pub(super) const LEAST_FRAMES: [Experiment; 6] = [
+    experiment("encoder, poses known", "generic"),
+    experiment("encoder, IMU, bias known", "generic").poses(IMU_BIASES_KNOWN),
+    experiment("encoder, IMU, bias free", "generic").poses(IMU),
+    experiment("no encoder, poses known", "generic").without_encoder(),
+    experiment("no encoder, IMU, bias known", "generic").without_encoder().poses(IMU_BIASES_KNOWN),
+    experiment("no encoder, IMU, bias free", "generic").without_encoder().poses(IMU),
+];
+
+/// The experiments whose ranks are computed.
+pub(super) const SECTIONS: [Section; 6] = [
+    Section {
+        title: "Joint angles and poses (exciting motion)",
+        experiments: &[
+            experiment("encoder known, poses known", OFFSET).forms(CLASSICAL_MINIMAL_POE),
+            experiment("encoder known, poses known, generic", "generic").forms(CLASSICAL_MINIMAL_POE),
+            experiment("encoder known, IMU, bias known", OFFSET).poses(IMU_BIASES_KNOWN).forms(CLASSICAL_MINIMAL_POE),
+            experiment("encoder known, IMU, bias free", OFFSET).poses(IMU).forms(CLASSICAL_MINIMAL_POE),
+            experiment("encoder prior 7 deg, poses known", OFFSET).encoder_deg(7.0).forms(CLASSICAL_MINIMAL_POE),
+            experiment("encoder prior 10 deg, IMU, bias free", OFFSET)
+                .encoder_deg(10.0)
+                .poses(IMU)
+                .forms(CLASSICAL_MINIMAL_POE),
+            experiment("no encoder, poses known", OFFSET).without_encoder().frames(16).forms(CLASSICAL_MINIMAL_POE),
+            experiment("no encoder, poses known, generic", "generic")
+                .without_encoder()
+                .frames(16)
+                .forms(CLASSICAL_MINIMAL_POE),
+            experiment("no encoder, IMU, bias known", OFFSET)
+                .without_encoder()
+                .poses(IMU_BIASES_KNOWN)
+                .frames(16)
+                .forms(CLASSICAL_MINIMAL_POE),
+            experiment("no encoder, IMU, bias free, 10 frames", OFFSET)
+                .without_encoder()
+                .poses(IMU)
+                .forms(CLASSICAL_MINIMAL_POE),
+            experiment("no encoder, IMU, bias free, 11 frames", OFFSET)
+                .without_encoder()
+                .poses(IMU)
+                .frames(11)
+                .forms(CLASSICAL_MINIMAL_POE),
+            experiment("no encoder, ideal gimbal, poses known", IDEAL)
+                .without_encoder()
+                .frames(16)
+                .forms(CLASSICAL_MINIMAL_POE),
+            experiment("no encoder, ideal gimbal, IMU, bias known", IDEAL)
+                .without_encoder()
+                .poses(IMU_BIASES_KNOWN)
+                .frames(16)
+                .forms(CLASSICAL_MINIMAL_POE),
+            experiment("no encoder, ideal gimbal, IMU, bias free", IDEAL)
+                .without_encoder()
+                .poses(IMU)
+                .frames(16)
+                .forms(CLASSICAL_MINIMAL_POE),
+            experiment("no encoder, without offsets (21 and 15)", OFFSET)
+                .without_encoder()
+                .frames(16)
+                .forms(WITHOUT_OFFSETS),
+        ],
+    },
+    Section {
+        title: "Number of joints (12 + 4N columns, 4N + 6 identifiable)",
+        experiments: &[
+            experiment("no joints", "rigid").forms(CLASSICAL_MINIMAL_POE),
+            experiment("one joint", "generic-1").forms(CLASSICAL_MINIMAL_POE),
+            experiment("two joints", "generic-2").forms(CLASSICAL_MINIMAL_POE),
+            experiment("three joints", "generic").forms(CLASSICAL_MINIMAL_POE),
+            experiment("four joints", "generic-4").forms(CLASSICAL_MINIMAL_POE),
+        ],
+    },
+    Section {
+        title: "Mechanisms (exciting, encoder known, poses known)",
+        experiments: &[
+            experiment("generic", "generic").forms(ALL_FORMS),
+            experiment("yaw-roll-pitch, 2-8 cm offsets, optical", OFFSET).forms(ALL_FORMS),
+            experiment("yaw-roll-pitch, axes intersect, optical", IDEAL).forms(ALL_FORMS),
+            experiment("yaw-roll-pitch, camera frame FLU", "yaw-roll-pitch-flu").forms(ALL_FORMS),
+            experiment("same, camera centre on the last axis", "yaw-roll-pitch-flu-centred").forms(ALL_FORMS),
+            experiment("pitch-roll-yaw, optical", "pitch-roll-yaw").forms(ALL_FORMS),
+            experiment("roll first (first axis || IMU x)", "roll-first").forms(ALL_FORMS),
+            experiment("axes 1, 2 parallel", "parallel-axes").forms(ALL_FORMS),
+            experiment("axes 2, 3 parallel", "parallel-axes-2-3").forms(ALL_FORMS),
+            experiment("axes 1, 2 coaxial", "coaxial-axes").forms(ALL_FORMS),
+            experiment("pan only, optical", "one-joint").forms(ALL_FORMS),
+            experiment("pan-tilt", "pan-tilt").forms(ALL_FORMS),
+        ],
+    },
+    Section {
+        title: "Joints that do not move (identifiable = 4 N_moving + 6)",
+        experiments: &[
+            experiment("joints 1, 2 move", OFFSET).freezing(&[3]),
+            experiment("joints 1, 3 move", OFFSET).freezing(&[2]),
+            experiment("joints 2, 3 move", OFFSET).freezing(&[1]),
+            experiment("joints 1, 2 move, generic", "generic").freezing(&[3]),
+            experiment("joint 1 moves", OFFSET).freezing(&[2, 3]),
+            experiment("joint 2 moves", OFFSET).freezing(&[1, 3]),
+            experiment("joint 3 moves", OFFSET).freezing(&[1, 2]),
+            experiment("no joint moves", OFFSET).freezing(&[1, 2, 3]),
+            experiment("joint 2 rests, axes 1, 3 parallel", "outer-parallel").freezing(&[2]),
+            experiment("no encoder, joints 1, 3 move", OFFSET).freezing(&[2]).without_encoder().frames(16),
+            experiment("no encoder, joint 1 moves", OFFSET).freezing(&[2, 3]).without_encoder().frames(16),
+            experiment("no encoder, no joint moves", OFFSET).freezing(&[1, 2, 3]).without_encoder().frames(16),
+        ],
+    },
+    Section {
+        title: "Motion of vehicle and camera (encoder known)",
+        experiments: &[
+            experiment("pure translation", OFFSET).moving(Motion::TranslationOnly),
+            experiment("hover", OFFSET).moving(Motion::Hover),
+            experiment("constant velocity, IMU", OFFSET).moving(Motion::ConstantVelocity).poses(IMU),
+            experiment("yaw only + translation", OFFSET).moving(Motion::YawOnly),
+            experiment("the same in the plane", OFFSET).moving(Motion::YawPlanar),
+            experiment("the same, body tilted", OFFSET).moving(Motion::YawTilted),
+            experiment("yaw in place", OFFSET).moving(Motion::YawInPlace),
+            experiment("rotation only", OFFSET).moving(Motion::RotationOnly),
+            experiment("constant velocity + rotation, IMU", OFFSET).moving(Motion::ConstantVelocityRotation).poses(IMU),
+            experiment("straight line, accelerated, rotating", OFFSET).moving(Motion::StraightLine),
+            experiment("camera never rotates in the world", OFFSET).moving(Motion::Stabilized),
+            experiment("the same, IMU, bias free", OFFSET).moving(Motion::Stabilized).poses(IMU),
+            experiment("camera follows yaw only", OFFSET).moving(Motion::YawFollowing),
+            experiment("stabilised + rotation only", OFFSET).moving(Motion::StabilizedRotationOnly),
+            experiment("stabilised + pure translation", OFFSET).moving(Motion::StabilizedTranslationOnly),
+        ],
+    },
+    Section {
+        title: "Motion without encoders",
+        experiments: &[
+            experiment("pure translation", OFFSET).moving(Motion::TranslationOnly).without_encoder().frames(16),
+            experiment("hover", OFFSET).moving(Motion::Hover).without_encoder().frames(16),
+            experiment("yaw only + translation", OFFSET).moving(Motion::YawOnly).without_encoder().frames(16),
+            experiment("camera never rotates in the world", OFFSET)
+                .moving(Motion::Stabilized)
+                .without_encoder()
+                .frames(16),
+            experiment("stabilised + pure translation", OFFSET)
+                .moving(Motion::StabilizedTranslationOnly)
+                .without_encoder()
+                .frames(16),
+        ],
+    },
+];

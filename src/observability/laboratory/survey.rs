@@ -1,0 +1,220 @@
+//! Ranks, losses and null directions of the scenarios of docs/mathematics.md, section 7, in one table.
+
+use std::fmt;
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::experiments::{Experiment, LEAST_FRAMES, SECTIONS};
+use super::spurious::{self, SpuriousRow};
+use super::{Deficit, LaboratoryForm, LaboratoryResult};
+use crate::gimbal::{ParameterNames, Parameterization};
+
+/// With this many frames a window constrains everything that its motion and sensors can.
+const MOST_FRAMES: usize = 16;
+const MINIMAL: LaboratoryForm = LaboratoryForm::whole(Parameterization::Minimal);
+
+/// Computed ranks and null directions of the built-in experiments.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Survey {
+    /// Experiments by subject.
+    pub sections: Vec<SurveySection>,
+    /// Numbers of frames from which on the minimal form has its full rank.
+    pub least_frames: Vec<LeastFramesRow>,
+    /// Spurious information of two windows that are linearized at different values of the calibration.
+    pub spurious: Vec<SpuriousRow>,
+}
+
+/// Experiments on one subject.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct SurveySection {
+    /// The subject.
+    pub title: String,
+    /// One row per experiment.
+    pub rows: Vec<SurveyRow>,
+}
+
+/// One experiment.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct SurveyRow {
+    /// Label of the experiment.
+    pub scenario: String,
+    /// Name of the mechanism.
+    pub mechanism: String,
+    /// Name of the motion.
+    pub motion: String,
+    /// Rank of each parameterization.
+    pub entries: Vec<SurveyEntry>,
+    /// Rank deficit of the first parameterization, by cause.
+    pub deficit: Option<Deficit>,
+    /// Null directions of the first parameterization that are known in closed form.
+    pub known: usize,
+    /// How many of these were computed to be null.
+    pub known_agreeing: usize,
+    /// Parameters of the null directions of the minimal parameterization.
+    pub null_of_minimal: Vec<String>,
+}
+
+/// The rank of an experiment in one parameterization.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct SurveyEntry {
+    /// Name of the parameterization.
+    pub form: String,
+    /// Its abbreviation in the table.
+    pub column: String,
+    /// Number of columns.
+    pub columns: usize,
+    /// Structural rank.
+    pub rank: usize,
+}
+
+/// The least number of frames for the full rank of the minimal parameterization.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct LeastFramesRow {
+    /// What is known of poses and joint angles.
+    pub scenario: String,
+    /// Number of columns.
+    pub columns: usize,
+    /// The full structural rank.
+    pub rank: usize,
+    /// From this number of frames on the rank is full.
+    pub frames: usize,
+}
+
+/// Runs every built-in experiment: the scenarios of docs/mathematics.md, section 7, and the cases of section 9.
+pub fn survey() -> Survey {
+    Survey {
+        sections: SECTIONS
+            .par_iter()
+            .map(|section| SurveySection {
+                title: section.title.to_owned(),
+                rows: section.experiments.par_iter().filter_map(SurveyRow::of).collect(),
+            })
+            .collect(),
+        least_frames: LEAST_FRAMES.par_iter().filter_map(LeastFramesRow::of).collect(),
+        spurious: spurious::measure(),
+    }
+}
+
+impl SurveyRow {
+    fn of(experiment: &Experiment) -> Option<Self> {
+        let results = experiment.setup()?.run_all(experiment.forms);
+        if results.len() != experiment.forms.len() {
+            return None;
+        }
+        let entries = results
+            .iter()
+            .map(|result| SurveyEntry {
+                form: result.form.name(),
+                column: abbreviation(result.form),
+                columns: result.rank.parameters.len(),
+                rank: result.rank.rank_structural,
+            })
+            .collect();
+        let first = results.first();
+        let minimal = results.iter().find(|result| result.form == MINIMAL);
+        Some(Self {
+            scenario: experiment.scenario.to_owned(),
+            mechanism: experiment.mechanism.to_owned(),
+            motion: experiment.motion.name().to_owned(),
+            entries,
+            deficit: first.map(LaboratoryResult::deficit),
+            known: first.map_or(0, |result| result.rank.known.len()),
+            known_agreeing: first.map_or(0, |result| result.rank.known_agreeing()),
+            null_of_minimal: minimal
+                .map_or_else(Vec::new, LaboratoryResult::null_parameters)
+                .into_iter()
+                .map(|parameter| ParameterNames::default().name(parameter))
+                .collect(),
+        })
+    }
+}
+
+impl LeastFramesRow {
+    fn of(experiment: &Experiment) -> Option<Self> {
+        let rank_of = |frames: usize| experiment.setup_of(frames)?.run(MINIMAL).map(|result| result.rank);
+        let full = rank_of(MOST_FRAMES)?;
+        let frames = (2..MOST_FRAMES)
+            .find(|frames| rank_of(*frames).is_some_and(|rank| rank.rank_structural >= full.rank_structural))
+            .unwrap_or(MOST_FRAMES);
+        Some(Self {
+            scenario: experiment.scenario.to_owned(),
+            columns: full.parameters.len(),
+            rank: full.rank_structural,
+            frames,
+        })
+    }
+}
+
+/// `C`, `M`, … as the heading of the table explains them.
+fn abbreviation(form: LaboratoryForm) -> String {
+    let name = match form.parameterization {
+        Parameterization::Classical => "C",
+        Parameterization::Minimal => "M",
+        Parameterization::MinimalSwapped => "B",
+        Parameterization::MinimalYx => "Mb",
+        Parameterization::Poe => "P",
+        other => other.name(),
+    };
+    let suffix = if form.joint_offsets { "" } else { "-" };
+    format!("{name}{suffix}")
+}
+
+impl fmt::Display for Survey {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            out,
+            "Structural rank of columns. C classical, M minimal, B minimal-swapped, Mb minimal-yx, P poe, - without joint\n\
+             offsets. Deficit of the first: G parameterization, F joints that do not move, E free joint angles, M motion;\n\
+             = how many of its null directions known in closed form were computed to be null."
+        )?;
+        for section in &self.sections {
+            writeln!(out, "\n{}", section.title)?;
+            for row in &section.rows {
+                writeln!(out, "{row}")?;
+            }
+        }
+        writeln!(out, "\nLeast number of frames for the full rank of the minimal form (three joints, generic)")?;
+        for LeastFramesRow { scenario, columns, rank, frames } in &self.least_frames {
+            writeln!(out, "  {scenario:<42}M {rank}/{columns} from {frames} frames on")?;
+        }
+        writeln!(out, "\n{}", spurious::title())?;
+        for row in &self.spurious {
+            writeln!(out, "{row}")?;
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Display for SurveyRow {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let ranks: Vec<String> =
+            self.entries.iter().map(|entry| format!("{} {}/{}", entry.column, entry.rank, entry.columns)).collect();
+        let deficit = self.deficit.as_ref().map_or_else(String::new, Deficit::short);
+        let known = if self.known == 0 { String::new() } else { format!("= {}/{}", self.known_agreeing, self.known) };
+        let null = if self.null_of_minimal.is_empty() {
+            String::new()
+        } else {
+            format!("  null of M: {}", short_list(&self.null_of_minimal))
+        };
+        let row = format!("  {:<42}{:<46}{deficit:<12}{known:<7}{null}", self.scenario, ranks.join("  "));
+        write!(out, "{}", row.trim_end())
+    }
+}
+
+/// The names, or the first few and how many more.
+fn short_list(names: &[String]) -> String {
+    const SHOWN: usize = 6;
+    let shown = names.iter().take(SHOWN).map(String::as_str).collect::<Vec<_>>().join(" ");
+    if names.len() > SHOWN { format!("{shown} and {} more", names.len() - SHOWN) } else { shown }
+}
+
+impl Deficit {
+    /// `G6 F4`, or `-` at full rank.
+    pub(super) fn short(&self) -> String {
+        let parts = [("G", self.parameterization), ("F", self.joints), ("E", self.absorbed), ("M", self.motion)];
+        let lost: Vec<String> =
+            parts.iter().filter(|(_, count)| *count > 0).map(|(name, count)| format!("{name}{count}")).collect();
+        if lost.is_empty() { "-".to_owned() } else { lost.join(" ") }
+    }
+}
