@@ -1,12 +1,10 @@
 //! The files that `dcvins calibrate` writes.
 
-use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-use super::calibration_report::CalibrationReport;
+use super::calibration_report::{CalibrationReport, ParameterReport};
 use super::error::ExportError;
-use super::tables::INTO_STRING;
 use crate::session::CalibrationRun;
 
 /// Writes `rig.yaml`, `calibration.json` and `report.txt` into a folder.
@@ -31,11 +29,13 @@ pub fn write_calibration(run: &CalibrationRun, report: &CalibrationReport, folde
 
 /// The standard deviations as a further entry of the rig, which its readers pass over.
 fn sigmas_yaml(report: &CalibrationReport) -> String {
-    let mut text = "# Standard deviations of the calibrated parameters, in the form named here.\n".to_owned();
-    writeln!(text, "calibration:\n  parameterization: {}\n  sigmas:", report.parameterization).expect(INTO_STRING);
-    for parameter in &report.parameters {
-        writeln!(text, "    {}_{}: {:?}", parameter.name, parameter.dimension.unit(), parameter.sigma)
-            .expect(INTO_STRING);
-    }
-    text
+    let sigma_of = |parameter: &ParameterReport| {
+        format!("    {}_{}: {:?}\n", parameter.name, parameter.dimension.unit(), parameter.sigma)
+    };
+    let sigmas: String = report.parameters.iter().map(sigma_of).collect();
+    format!(
+        "# Standard deviations of the calibrated parameters, in the form named here.\n\
+         calibration:\n  parameterization: {}\n  sigmas:\n{sigmas}",
+        report.parameterization
+    )
 }

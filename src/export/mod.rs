@@ -2,6 +2,7 @@
 
 mod calibration_files;
 mod calibration_report;
+mod csv_table;
 #[cfg(feature = "gui")]
 mod desktop;
 mod error;

@@ -1,38 +1,15 @@
 //! The CSV tables of a run, one row per frame.
 
-use std::fmt::Write as _;
-
+use super::csv_table::{CsvTable, number_cell};
 use crate::estimator::{Event, Motion};
 use crate::geometry::seconds_from_ns;
 use crate::gimbal::{ParameterId, ParameterNames, Singularity};
 use crate::sensors::Rig;
 use crate::session::{RunRecord, StepRecord};
 
-/// Why writing into a text needs no error of its own.
-pub(super) const INTO_STRING: &str = "writing into a string cannot fail";
-
 /// Seconds since the log began with all their nanoseconds.
 fn seconds_text(stamp_ns: i64) -> String {
     format!("{:.9}", seconds_from_ns(stamp_ns))
-}
-
-fn push_cell(text: &mut String, cell: &str) {
-    text.push(',');
-    if cell.contains([',', '"', '\n']) {
-        text.push('"');
-        text.push_str(&cell.replace('"', "\"\""));
-        text.push('"');
-    } else {
-        text.push_str(cell);
-    }
-}
-
-fn push_number(text: &mut String, number: f64) {
-    if number.is_finite() {
-        write!(text, ",{number}").expect(INTO_STRING);
-    } else {
-        text.push(',');
-    }
 }
 
 /// `calibration.csv`: each parameter and its sigma, then the joint angles. A chart switch changes the parameters, so
@@ -49,31 +26,30 @@ pub(super) fn calibration_csv(run: &RunRecord, rig: &Rig) -> String {
         }
     }
     let joints = joint_names(run, rig);
-    let mut text = "t_s".to_owned();
+    let mut header = vec!["t_s".to_owned()];
     for parameter in &columns {
         let (name, unit) = (names.name(*parameter), parameter.dimension().unit());
-        write!(text, ",{name}_{unit},{name}_sigma_{unit}").expect(INTO_STRING);
+        header.extend([format!("{name}_{unit}"), format!("{name}_sigma_{unit}")]);
     }
-    for joint in &joints {
-        write!(text, ",{joint}_rad").expect(INTO_STRING);
-    }
-    text.push('\n');
+    header.extend(joints.iter().map(|joint| format!("{joint}_rad")));
+    let mut table = CsvTable::new(header);
     for step in run.steps.iter().filter(|step| step.report.newest().is_some()) {
         let calibration = &step.report.calibration;
-        text.push_str(&seconds_text(step.report.stamp_ns));
+        let mut row = vec![seconds_text(step.report.stamp_ns)];
         for parameter in &columns {
             let index = calibration.parameters.iter().position(|known| known == parameter);
-            for series in [&calibration.values, &calibration.sigmas] {
-                push_number(&mut text, index.and_then(|index| series.get(index)).copied().unwrap_or(f64::NAN));
-            }
+            let series = [&calibration.values, &calibration.sigmas];
+            row.extend(series.map(|series| optional_cell(index.and_then(|index| series.get(index)))));
         }
         let angles = step.report.newest().map_or(&[][..], |newest| &newest.joint_angles_rad);
-        for index in 0..joints.len() {
-            push_number(&mut text, angles.get(index).copied().unwrap_or(f64::NAN));
-        }
-        text.push('\n');
+        row.extend((0..joints.len()).map(|index| optional_cell(angles.get(index))));
+        table.push(row);
     }
-    text
+    table.into_text()
+}
+
+fn optional_cell(number: Option<&f64>) -> String {
+    number.map_or_else(String::new, |number| number_cell(*number))
 }
 
 fn joint_names(run: &RunRecord, rig: &Rig) -> Vec<String> {
@@ -95,23 +71,30 @@ pub(super) fn rank_csv(run: &RunRecord, names: &ParameterNames) -> String {
             margins.push(*singularity);
         }
     }
-    let mut text =
-        "t_s,columns,rank_structural,rank_informed,deficit_parameterization,deficit_joints,deficit_absorbed,\
-                    deficit_motion,known_directions,known_agreeing,false_gain,reference,structural_threshold,informed_threshold"
-            .to_owned();
-    for singularity in &margins {
-        let name = names.singularity(*singularity);
-        write!(text, ",margin_{}", name.replace([' ', ','], "_")).expect(INTO_STRING);
-    }
-    for index in 1..=columns {
-        write!(text, ",singular_value_{index}").expect(INTO_STRING);
-    }
-    for index in 1..=columns {
-        write!(text, ",singular_value_with_priors_{index}").expect(INTO_STRING);
-    }
-    text.push('\n');
+    let mut header = [
+        "t_s",
+        "columns",
+        "rank_structural",
+        "rank_informed",
+        "deficit_parameterization",
+        "deficit_joints",
+        "deficit_absorbed",
+        "deficit_motion",
+        "known_directions",
+        "known_agreeing",
+        "false_gain",
+        "reference",
+        "structural_threshold",
+        "informed_threshold",
+    ]
+    .map(str::to_owned)
+    .to_vec();
+    header.extend(margins.iter().map(|it| format!("margin_{}", names.singularity(*it).replace([' ', ','], "_"))));
+    header.extend((1..=columns).map(|index| format!("singular_value_{index}")));
+    header.extend((1..=columns).map(|index| format!("singular_value_with_priors_{index}")));
+    let mut table = CsvTable::new(header);
     for (step, rank) in ranked {
-        text.push_str(&seconds_text(step.report.stamp_ns));
+        let mut row = vec![seconds_text(step.report.stamp_ns)];
         let counts = [
             rank.parameters.len(),
             rank.rank_structural,
@@ -123,24 +106,19 @@ pub(super) fn rank_csv(run: &RunRecord, names: &ParameterNames) -> String {
             rank.known.len(),
             rank.known_agreeing(),
         ];
-        for count in counts {
-            write!(text, ",{count}").expect(INTO_STRING);
-        }
-        for number in [rank.false_gain(), rank.reference, rank.structural_threshold, rank.informed_threshold] {
-            push_number(&mut text, number);
-        }
+        row.extend(counts.map(|count| count.to_string()));
+        let numbers = [rank.false_gain(), rank.reference, rank.structural_threshold, rank.informed_threshold];
+        row.extend(numbers.map(number_cell));
         for singularity in &margins {
             let margin = rank.margins.iter().find(|(known, _)| known == singularity);
-            push_number(&mut text, margin.map_or(f64::NAN, |(_, margin)| *margin));
+            row.push(optional_cell(margin.map(|(_, margin)| margin)));
         }
         for series in [&rank.singular_values, &rank.singular_values_with_priors] {
-            for index in 0..columns {
-                push_number(&mut text, series.get(index).copied().unwrap_or(f64::NAN));
-            }
+            row.extend((0..columns).map(|index| optional_cell(series.get(index))));
         }
-        text.push('\n');
+        table.push(row);
     }
-    text
+    table.into_text()
 }
 
 /// `information.csv`: for each step and parameter how fast the image narrows it, and which motion that is owed to, in bits
@@ -149,57 +127,73 @@ pub(super) fn information_csv(run: &RunRecord, rig: &Rig) -> String {
     let (names, joints) = (rig.parameter_names(), rig.joint_names());
     let told = || run.steps.iter().filter_map(|step| Some((step, step.gain()?)));
     let count = told().map(|(_, (_, gain))| gain.joints).max().unwrap_or(0);
-    let mut text = "t_s,keyframe,interval_s,parameter,bits_per_s".to_owned();
-    for motion in Motion::all(count) {
-        write!(text, ",{}", motion.name(&joints).replace(' ', "_")).expect(INTO_STRING);
-    }
-    text.push_str(",earlier\n");
+    let mut header = ["t_s", "keyframe", "interval_s", "parameter", "bits_per_s"].map(str::to_owned).to_vec();
+    header.extend(Motion::all(count).into_iter().map(|motion| motion.name(&joints).replace(' ', "_")));
+    header.push("earlier".to_owned());
+    let mut table = CsvTable::new(header);
     for (step, (rank, gain)) in told().filter(|(_, (rank, gain))| rank.parameters.len() == gain.columns()) {
         for (column, parameter) in rank.parameters.iter().enumerate() {
-            text.push_str(&seconds_text(step.report.stamp_ns));
-            write!(text, ",{}", u8::from(step.report.keyframe)).expect(INTO_STRING);
-            push_number(&mut text, gain.interval_s);
-            write!(text, ",{}", names.name(*parameter)).expect(INTO_STRING);
-            push_number(&mut text, gain.bits_per_s(column));
+            let mut row = vec![
+                seconds_text(step.report.stamp_ns),
+                u8::from(step.report.keyframe).to_string(),
+                number_cell(gain.interval_s),
+                names.name(*parameter),
+                number_cell(gain.bits_per_s(column)),
+            ];
             let parts: Vec<f64> = gain.by_motion_per_s(column).collect();
-            for motion in 0..6 + count {
-                push_number(&mut text, parts.get(motion).copied().unwrap_or(f64::NAN));
-            }
-            push_number(&mut text, gain.earlier_per_s(column));
-            text.push('\n');
+            row.extend((0..6 + count).map(|motion| optional_cell(parts.get(motion))));
+            row.push(number_cell(gain.earlier_per_s(column)));
+            table.push(row);
         }
     }
-    text
+    table.into_text()
 }
 
 /// `frames.csv`: counts, residuals, iterations, stage times and events. Without `timing` the time cells stay empty, so
 /// that two runs give the same bytes.
 pub(super) fn frames_csv(run: &RunRecord, timing: bool) -> String {
-    let mut text = "t_s,frame,log_time_s,phase,tracked,new,lost,rejected,inliers,keyframe,reprojection_rms_before_px,\
-                    reprojection_rms_after_px,iterations,frontend_ms,optimize_ms,linearize_ms,report_ms,marginalize_ms,\
-                    observability_ms,step_ms,events,warnings\n"
-        .to_owned();
+    let mut table = CsvTable::new([
+        "t_s",
+        "frame",
+        "log_time_s",
+        "phase",
+        "tracked",
+        "new",
+        "lost",
+        "rejected",
+        "inliers",
+        "keyframe",
+        "reprojection_rms_before_px",
+        "reprojection_rms_after_px",
+        "iterations",
+        "frontend_ms",
+        "optimize_ms",
+        "linearize_ms",
+        "report_ms",
+        "marginalize_ms",
+        "observability_ms",
+        "step_ms",
+        "events",
+        "warnings",
+    ]);
     for step in &run.steps {
         let report = &step.report;
         let statistics = &step.tracks.statistics;
-        text.push_str(&seconds_text(report.stamp_ns));
-        let phase = report.phase.name();
-        let inliers = report.counts.inliers();
-        write!(
-            text,
-            ",{},{},{phase},{},{},{},{},{inliers},{}",
-            report.frame_index,
+        let mut row = vec![
+            seconds_text(report.stamp_ns),
+            report.frame_index.to_string(),
             seconds_text(step.log_time_ns),
-            statistics.tracked,
-            statistics.detected,
-            statistics.lost,
-            statistics.rejected,
-            u8::from(report.keyframe),
-        )
-        .expect(INTO_STRING);
-        push_number(&mut text, report.reprojection_rms_before_px);
-        push_number(&mut text, report.reprojection_rms_after_px);
-        write!(text, ",{}", report.iterations.len()).expect(INTO_STRING);
+            report.phase.name().to_owned(),
+            statistics.tracked.to_string(),
+            statistics.detected.to_string(),
+            statistics.lost.to_string(),
+            statistics.rejected.to_string(),
+            report.counts.inliers().to_string(),
+            u8::from(report.keyframe).to_string(),
+            number_cell(report.reprojection_rms_before_px),
+            number_cell(report.reprojection_rms_after_px),
+            report.iterations.len().to_string(),
+        ];
         let times = &report.times;
         let stages_ms = [
             times.frontend_ms,
@@ -210,18 +204,12 @@ pub(super) fn frames_csv(run: &RunRecord, timing: bool) -> String {
             times.observability_ms,
             times.step_ms,
         ];
-        for time_ms in stages_ms {
-            if timing {
-                write!(text, ",{time_ms:.3}").expect(INTO_STRING);
-            } else {
-                text.push(',');
-            }
-        }
-        push_cell(&mut text, &report.events.iter().map(event_text).collect::<Vec<_>>().join("; "));
-        push_cell(&mut text, &report.warnings.join("; "));
-        text.push('\n');
+        row.extend(stages_ms.map(|time_ms| if timing { format!("{time_ms:.3}") } else { String::new() }));
+        row.push(report.events.iter().map(event_text).collect::<Vec<_>>().join("; "));
+        row.push(report.warnings.join("; "));
+        table.push(row);
     }
-    text
+    table.into_text()
 }
 
 fn event_text(event: &Event) -> String {

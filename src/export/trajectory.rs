@@ -6,8 +6,8 @@ use std::path::Path;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3, Vector4};
 
+use super::csv_table::CsvTable;
 use super::error::ExportError;
-use super::tables::INTO_STRING;
 use crate::geometry::RigidTransform;
 use crate::session::RunRecord;
 use crate::session::accuracy::StampedPose;
@@ -35,7 +35,7 @@ pub fn tum_of_run(run: &RunRecord, epoch_ns: i64) -> String {
         let numbers = [position.x, position.y, position.z, rotation.i, rotation.j, rotation.k, rotation.w];
         text.push_str(&stamp);
         for number in numbers {
-            write!(text, " {number:.9}").expect(INTO_STRING);
+            write!(text, " {number:.9}").expect("writing into a string cannot fail");
         }
         text.push('\n');
     }
@@ -45,22 +45,35 @@ pub fn tum_of_run(run: &RunRecord, epoch_ns: i64) -> String {
 /// The trajectory of a run as a table like EuRoC's `state_groundtruth_estimate0`: stamp in nanoseconds, position,
 /// orientation (w first) and velocity of the IMU in the estimator's world, gyroscope and accelerometer bias.
 pub fn euroc_of_run(run: &RunRecord, epoch_ns: i64) -> String {
-    let mut text = "#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x [],q_RS_y [],q_RS_z [],\
-                    v_RS_R_x [m s^-1],v_RS_R_y [m s^-1],v_RS_R_z [m s^-1],b_w_RS_S_x [rad s^-1],\
-                    b_w_RS_S_y [rad s^-1],b_w_RS_S_z [rad s^-1],b_a_RS_S_x [m s^-2],b_a_RS_S_y [m s^-2],\
-                    b_a_RS_S_z [m s^-2]\n"
-        .to_owned();
+    let mut table = CsvTable::new([
+        "#timestamp [ns]",
+        "p_RS_R_x [m]",
+        "p_RS_R_y [m]",
+        "p_RS_R_z [m]",
+        "q_RS_w []",
+        "q_RS_x []",
+        "q_RS_y []",
+        "q_RS_z []",
+        "v_RS_R_x [m s^-1]",
+        "v_RS_R_y [m s^-1]",
+        "v_RS_R_z [m s^-1]",
+        "b_w_RS_S_x [rad s^-1]",
+        "b_w_RS_S_y [rad s^-1]",
+        "b_w_RS_S_z [rad s^-1]",
+        "b_a_RS_S_x [m s^-2]",
+        "b_a_RS_S_y [m s^-2]",
+        "b_a_RS_S_z [m s^-2]",
+    ]);
     for newest in run.steps.iter().filter_map(|step| step.report.newest()) {
         let rotation = newest.world_from_imu.rotation.quaternion();
         let orientation = Vector4::new(rotation.w, rotation.i, rotation.j, rotation.k);
-        write!(text, "{}", i128::from(epoch_ns) + i128::from(newest.stamp_ns)).expect(INTO_STRING);
+        let stamp_ns = i128::from(epoch_ns) + i128::from(newest.stamp_ns);
         let numbers = newest.world_from_imu.translation_m.iter().chain(&orientation).chain(&newest.velocity_m_per_s);
-        for number in numbers.chain(&newest.gyroscope_bias_rad_per_s).chain(&newest.accelerometer_bias_m_per_s2) {
-            write!(text, ",{number:.9}").expect(INTO_STRING);
-        }
-        text.push('\n');
+        let numbers = numbers.chain(&newest.gyroscope_bias_rad_per_s).chain(&newest.accelerometer_bias_m_per_s2);
+        let cells = numbers.map(|number| format!("{number:.9}"));
+        table.push(std::iter::once(stamp_ns.to_string()).chain(cells));
     }
-    text
+    table.into_text()
 }
 
 /// Reads a TUM trajectory; lines that begin with `#` are comments.
