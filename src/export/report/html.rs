@@ -1,79 +1,65 @@
-//! Small pieces of HTML.
+//! Parts of the page that several sections share.
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
+use maud::{Markup, PreEscaped, html};
 
 use super::ReportDrawing;
 
-/// Text as HTML.
-pub(super) fn escape(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for letter in text.chars() {
-        match letter {
-            '&' => escaped.push_str("&amp;"),
-            '<' => escaped.push_str("&lt;"),
-            '>' => escaped.push_str("&gt;"),
-            '"' => escaped.push_str("&quot;"),
-            other => escaped.push(other),
+/// An unordered list of texts, nothing when there are none.
+pub(super) fn list(items: &[String]) -> Markup {
+    html! {
+        @if !items.is_empty() {
+            ul { @for item in items { li { (item) } } }
         }
     }
-    escaped
 }
 
-/// An element with a text in it.
-pub(super) fn element(tag: &str, text: &str) -> String {
-    format!("<{tag}>{}</{tag}>\n", escape(text))
-}
-
-/// A list of texts, nothing when there are none.
-pub(super) fn list(items: &[String]) -> String {
-    if items.is_empty() {
-        return String::new();
-    }
-    let items: Vec<String> = items.iter().map(|item| element("li", item)).collect();
-    format!("<ul>\n{}</ul>\n", items.concat())
-}
-
-/// A table whose first column names the rows.
-pub(super) fn table(caption: &str, header: &[&str], rows: &[Vec<String>]) -> String {
-    let head: Vec<String> = header.iter().map(|cell| format!("<th scope=\"col\">{}</th>", escape(cell))).collect();
-    let mut text = format!(
-        "<table>\n<caption>{}</caption>\n<thead><tr>{}</tr></thead>\n<tbody>\n",
-        escape(caption),
-        head.concat()
-    );
-    for row in rows {
-        text.push_str("<tr>");
-        for (column, cell) in row.iter().enumerate() {
-            let number = cell.starts_with(|first: char| first.is_ascii_digit() || "−-±".contains(first));
-            let cell = escape(cell);
-            let (open, close) = match (column, number) {
-                (0, _) => ("<th scope=\"row\">", "</th>"),
-                (_, true) => ("<td class=\"number\">", "</td>"),
-                (_, false) => ("<td>", "</td>"),
-            };
-            text.extend([open, &cell, close]);
+/// A table whose first column names the rows; cells that begin with a digit, a sign or ± are aligned as numbers.
+pub(super) fn table<S: AsRef<str>>(caption: &str, header: &[S], rows: &[Vec<String>]) -> Markup {
+    let number = |cell: &str| cell.starts_with(|first: char| first.is_ascii_digit() || "−-±".contains(first));
+    html! {
+        table {
+            caption { (caption) }
+            thead { tr { @for cell in header { th scope="col" { (cell.as_ref()) } } } }
+            tbody {
+                @for row in rows {
+                    tr {
+                        @for (column, cell) in row.iter().enumerate() {
+                            @if column == 0 {
+                                th scope="row" { (cell) }
+                            } @else if number(cell) {
+                                td.number { (cell) }
+                            } @else {
+                                td { (cell) }
+                            }
+                        }
+                    }
+                }
+            }
         }
-        text.push_str("</tr>\n");
     }
-    text.push_str("</tbody>\n</table>\n");
-    text
 }
 
-/// A picture within the page.
-pub(super) fn picture(caption: &str, drawing: &ReportDrawing) -> String {
-    let caption = escape(caption);
-    let shown = match drawing {
-        ReportDrawing::Png(png) => {
-            format!("<img alt=\"{caption}\" src=\"data:image/png;base64,{}\">", STANDARD.encode(png))
+/// A drawing with its caption.
+pub(super) fn figure(caption: &str, drawing: &ReportDrawing) -> Markup {
+    html! {
+        figure {
+            @match drawing {
+                ReportDrawing::Png(png) => {
+                    img alt=(caption) src={ "data:image/png;base64," (STANDARD.encode(png)) };
+                }
+                // Within HTML an SVG needs no name space, and without it nothing in the page looks like an address.
+                ReportDrawing::Svg(svg) => {
+                    (PreEscaped(svg.trim_end().replacen(" xmlns=\"http://www.w3.org/2000/svg\"", "", 1)))
+                }
+            }
+            figcaption { (caption) }
         }
-        // Within HTML a drawing needs no name space, and then nothing in the page looks like an address.
-        ReportDrawing::Svg(svg) => svg.trim_end().replacen(" xmlns=\"http://www.w3.org/2000/svg\"", "", 1),
-    };
-    format!("<figure>{shown}<figcaption>{caption}</figcaption></figure>\n")
+    }
 }
 
-/// A number of the table with a true minus sign.
+/// A number with so many decimals and a true minus sign; a negative zero is 0.
 pub(super) fn number(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     match text.strip_prefix('-') {
@@ -89,14 +75,16 @@ mod tests {
 
     #[test]
     fn what_a_log_says_cannot_become_markup() {
-        let text = table("a & b", &["<name>"], &[vec!["<script>alert(\"x\")</script>".to_owned(), "-1".to_owned()]]);
+        let text = table("a & b", &["<name>"], &[vec!["<script>alert(\"x\")</script>".to_owned(), "-1".to_owned()]])
+            .into_string();
         assert!(!text.contains("<script>") && text.contains("&lt;script&gt;"), "{text}");
         assert!(text.contains("a &amp; b") && text.contains("&lt;name&gt;"), "{text}");
         assert!(text.contains("<td class=\"number\">-1</td>"), "{text}");
-        assert_eq!(picture("p", &ReportDrawing::Png(b"abc".to_vec())).matches("base64,YWJj").count(), 1);
+        let image = figure("p", &ReportDrawing::Png(b"abc".to_vec())).into_string();
+        assert_eq!(image.matches("base64,YWJj").count(), 1);
         let svg = "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"1\"></svg>\n".to_owned();
-        let figure = picture("<p>", &ReportDrawing::Svg(svg));
-        assert_eq!(figure, "<figure><svg width=\"1\"></svg><figcaption>&lt;p&gt;</figcaption></figure>\n");
+        let drawing = figure("<p>", &ReportDrawing::Svg(svg)).into_string();
+        assert_eq!(drawing, "<figure><svg width=\"1\"></svg><figcaption>&lt;p&gt;</figcaption></figure>");
     }
 
     #[test]

@@ -1,9 +1,11 @@
 //! The page of a report, from its content and its pictures.
 
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
 use super::ReportPicture;
 use super::content::{ReportContent, RunContent};
-use super::html::{element, escape, list, number, picture};
-use super::tables;
+use super::html::{figure, list, number};
+use super::{RankSpell, tables};
 
 /// Readable on a screen, and on A4 without cut tables and pictures.
 const STYLE: &str = "\
@@ -39,42 +41,54 @@ nav ul { padding: 0; }
 /// The whole page.
 pub(super) fn page(content: &ReportContent, pictures: &[ReportPicture]) -> String {
     let title = format!("Flight report of {}", content.log);
-    let mut body = element("h1", &title);
-    body.extend(["<p class=\"lead\">", &escape(&lead(content)), "</p>\n"]);
-    body.push_str(&contents(content));
-    body.push_str("<h2 id=\"accuracy\">Accuracy</h2>\n");
-    body.push_str(&tables::frames(content));
-    body.push_str(&tables::accuracy(content));
-    body.push_str(&pictures_of(pictures));
-    for (index, run) in content.runs.iter().enumerate() {
-        body.push_str(&run_section(index, run));
-    }
-    if content.check.is_some() || !content.log_warnings.is_empty() {
-        body.push_str("<h2 id=\"log\">The log and its rig</h2>\n");
-    }
-    if let Some(check) = &content.check {
-        body.push_str(&tables::findings(check));
-        body.push_str(&tables::topics(check));
-    }
-    if !content.log_warnings.is_empty() {
-        body.push_str(&element("h3", "Warnings while it was read"));
-        body.push_str(&list(&content.log_warnings));
-    }
-    body.push_str("<h2 id=\"origin\">Origin</h2>\n<p>This report was made by</p>\n");
-    body.push_str(&element("pre", &content.command));
-    body.push_str(&tables::inputs(content));
-    let origin = format!(
-        "Made with {}. The same files, command and version give the same bytes. Beside this page lie report.json and, \
-         for each run, trajectory.tum, calibration.csv, rank.csv, information.csv, frames.csv, rig.yaml and summary.json.",
-        content.program
-    );
-    body.push_str(&element("p", &origin));
-    format!(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>{}</title>\n\
-         <style>\n{STYLE}</style>\n</head>\n<body>\n{body}</body>\n</html>\n",
-        escape(&title)
-    )
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                title { (title) }
+                style { (PreEscaped(STYLE)) }
+            }
+            body {
+                h1 { (title) }
+                p.lead { (lead(content)) }
+                (contents(content))
+                h2 #accuracy { "Accuracy" }
+                (tables::frames(content))
+                (tables::accuracy(content))
+                (figures(pictures))
+                @for (index, run) in content.runs.iter().enumerate() {
+                    (run_section(index, run))
+                }
+                @if has_log_section(content) {
+                    h2 #log { "The log and its rig" }
+                }
+                @if let Some(check) = &content.check {
+                    (tables::findings(check))
+                    (tables::topics(check))
+                }
+                @if !content.log_warnings.is_empty() {
+                    h3 { "Warnings while it was read" }
+                    (list(&content.log_warnings))
+                }
+                h2 #origin { "Origin" }
+                p { "This report was made by" }
+                pre { (content.command) }
+                (tables::inputs(content))
+                p {
+                    "Made with " (content.program) ". The same files, command and version give the same bytes. Beside this \
+                     page lie report.json and, for each run, trajectory.tum, calibration.csv, rank.csv, information.csv, \
+                     frames.csv, rig.yaml and summary.json."
+                }
+            }
+        }
+    };
+    page.into_string() + "\n"
+}
+
+fn has_log_section(content: &ReportContent) -> bool {
+    content.check.is_some() || !content.log_warnings.is_empty()
 }
 
 /// The report in one sentence.
@@ -93,71 +107,79 @@ fn lead(content: &ReportContent) -> String {
 }
 
 /// Links to the sections.
-fn contents(content: &ReportContent) -> String {
-    let mut links = vec!["<li><a href=\"#accuracy\">Accuracy</a></li>".to_owned()];
-    for (index, run) in content.runs.iter().enumerate() {
-        links.push(format!("<li><a href=\"#run-{index}\">{}</a></li>", escape(&run.label)));
-    }
-    if content.check.is_some() || !content.log_warnings.is_empty() {
-        links.push("<li><a href=\"#log\">The log and its rig</a></li>".to_owned());
-    }
-    links.push("<li><a href=\"#origin\">Origin</a></li>".to_owned());
-    format!("<nav><ul>\n{}\n</ul></nav>\n", links.join("\n"))
-}
-
-fn pictures_of(pictures: &[ReportPicture]) -> String {
-    let mut text = String::new();
-    let mut heading = "";
-    for shown in pictures {
-        if shown.heading != heading {
-            heading = &shown.heading;
-            text.push_str(&element("h2", heading));
+fn contents(content: &ReportContent) -> Markup {
+    html! {
+        nav {
+            ul {
+                li { a href="#accuracy" { "Accuracy" } }
+                @for (index, run) in content.runs.iter().enumerate() {
+                    " " li { a href={ "#run-" (index) } { (run.label) } }
+                }
+                @if has_log_section(content) {
+                    " " li { a href="#log" { "The log and its rig" } }
+                }
+                " " li { a href="#origin" { "Origin" } }
+            }
         }
-        text.push_str(&picture(&shown.caption, &shown.drawing));
     }
-    text
 }
 
-fn run_section(index: usize, run: &RunContent) -> String {
-    let mut text = format!("<h2 id=\"run-{index}\">Run {}</h2>\n", escape(&run.label));
+fn figures(pictures: &[ReportPicture]) -> Markup {
+    html! {
+        @for group in pictures.chunk_by(|a, b| a.heading == b.heading) {
+            @if let Some(first) = group.first() {
+                h2 { (first.heading) }
+            }
+            @for shown in group {
+                (figure(&shown.caption, &shown.drawing))
+            }
+        }
+    }
+}
+
+fn run_section(index: usize, run: &RunContent) -> Markup {
     let calibration = &run.summary.calibration;
-    if let (Some(first), Some(last)) = (&calibration.chain_error_initial, &calibration.chain_error) {
-        let chain = format!(
-            "Over the joint angles visited, the camera sits {} mm and {}° from the truth with the rig's values, and {} mm \
-             and {}° at the end.",
-            number(first.translation_mean_m * 1e3, 1),
-            number(first.rotation_mean_rad.to_degrees(), 2),
-            number(last.translation_mean_m * 1e3, 1),
-            number(last.rotation_mean_rad.to_degrees(), 2),
-        );
-        text.push_str(&element("p", &chain));
+    let frequent: Vec<String> = run.frequent_events.iter().map(|(kind, count)| format!("{kind} {count}")).collect();
+    html! {
+        h2 id={ "run-" (index) } { "Run " (run.label) }
+        @if let (Some(first), Some(last)) = (&calibration.chain_error_initial, &calibration.chain_error) {
+            p {
+                "Over the joint angles visited, the camera sits " (number(first.translation_mean_m * 1e3, 1)) " mm and "
+                (number(first.rotation_mean_rad.to_degrees(), 2)) "° from the truth with the rig's values, and "
+                (number(last.translation_mean_m * 1e3, 1)) " mm and " (number(last.rotation_mean_rad.to_degrees(), 2))
+                "° at the end."
+            }
+        }
+        @if !calibration.parameters.is_empty() {
+            (tables::calibration(run))
+        }
+        (rank_section(run))
+        h3 { "Events and warnings" }
+        @if !run.events.is_empty() {
+            (tables::events(run))
+        }
+        @if !frequent.is_empty() {
+            p { "Besides: " (frequent.join(", ")) "." }
+        }
+        (list(&run.summary.warnings))
     }
-    if !calibration.parameters.is_empty() {
-        text.push_str(&tables::calibration(run));
-    }
-    text.push_str(&element("h3", "Rank over time"));
-    if run.rank_story.is_empty() {
-        text.push_str(&element("p", "There was no linearization to analyse."));
-    } else {
-        let sentences: Vec<String> = run.rank_story.iter().map(super::RankSpell::sentence).collect();
-        text.push_str(&list(&sentences));
-        let known = run.summary.rank.iter().flat_map(|rank| &rank.known);
-        let known: Vec<String> = known
-            .map(|known| format!("{} (null in {} of {} steps)", known.reason, known.agreeing, known.steps))
-            .collect();
-        if !known.is_empty() {
-            text.push_str(&element("p", "Known from the form of the chain, and measured:"));
-            text.push_str(&list(&known));
+}
+
+fn rank_section(run: &RunContent) -> Markup {
+    let sentences: Vec<String> = run.rank_story.iter().map(RankSpell::sentence).collect();
+    let known = run.summary.rank.iter().flat_map(|rank| &rank.known);
+    let known: Vec<String> =
+        known.map(|known| format!("{} (null in {} of {} steps)", known.reason, known.agreeing, known.steps)).collect();
+    html! {
+        h3 { "Rank over time" }
+        @if sentences.is_empty() {
+            p { "There was no linearization to analyse." }
+        } @else {
+            (list(&sentences))
+            @if !known.is_empty() {
+                p { "Known from the form of the chain, and measured:" }
+                (list(&known))
+            }
         }
     }
-    text.push_str(&element("h3", "Events and warnings"));
-    if !run.events.is_empty() {
-        text.push_str(&tables::events(run));
-    }
-    let frequent: Vec<String> = run.frequent_events.iter().map(|(kind, count)| format!("{kind} {count}")).collect();
-    if !frequent.is_empty() {
-        text.push_str(&element("p", &format!("Besides: {}.", frequent.join(", "))));
-    }
-    text.push_str(&list(&run.summary.warnings));
-    text
 }

@@ -1,7 +1,9 @@
 //! The tables of a report.
 
+use maud::{Markup, html};
+
 use super::content::{ReportContent, RunContent};
-use super::html::{element, list, number, table};
+use super::html::{list, number, table};
 use crate::export::summary::ParameterSummary;
 use crate::geometry::Dimension;
 use crate::log_check::{CheckReport, Severity};
@@ -12,7 +14,7 @@ const MM_PER_M: f64 = 1e3;
 const MS_PER_S: f64 = 1e3;
 
 /// Frames of each run.
-pub(super) fn frames(content: &ReportContent) -> String {
+pub(super) fn frames(content: &ReportContent) -> Markup {
     let rows: Vec<Vec<String>> = content
         .runs
         .iter()
@@ -35,7 +37,7 @@ pub(super) fn frames(content: &ReportContent) -> String {
 }
 
 /// Trajectory errors of each run.
-pub(super) fn accuracy(content: &ReportContent) -> String {
+pub(super) fn accuracy(content: &ReportContent) -> Markup {
     let mut header = ["run", "ATE rmse m", "mean m", "median m", "max m", "% of length"].map(str::to_owned).to_vec();
     // Every run has relative errors over the same lengths, as long as its path is long enough.
     let mut lengths_m: Vec<f64> = Vec::new();
@@ -71,7 +73,6 @@ pub(super) fn accuracy(content: &ReportContent) -> String {
             row
         })
         .collect();
-    let header: Vec<&str> = header.iter().map(String::as_str).collect();
     table(
         "Position error after alignment by yaw and position, and relative error (rmse) over stretches",
         &header,
@@ -80,7 +81,7 @@ pub(super) fn accuracy(content: &ReportContent) -> String {
 }
 
 /// Calibration of one run: degrees, millimetres, milliseconds.
-pub(super) fn calibration(run: &RunContent) -> String {
+pub(super) fn calibration(run: &RunContent) -> Markup {
     let parameters = &run.summary.calibration.parameters;
     let with_truth = parameters.iter().any(|parameter| parameter.truth.is_some());
     let mut header = vec!["parameter", "unit", "given", "at the end", "± σ"];
@@ -112,7 +113,7 @@ fn calibration_row(parameter: &ParameterSummary, with_truth: bool) -> Vec<String
 }
 
 /// What happened in one run.
-pub(super) fn events(run: &RunContent) -> String {
+pub(super) fn events(run: &RunContent) -> Markup {
     let rows: Vec<Vec<String>> = run
         .events
         .iter()
@@ -125,7 +126,7 @@ pub(super) fn events(run: &RunContent) -> String {
 }
 
 /// What `check` found about the log and its rig, worst first; what is in order is told in a sentence.
-pub(super) fn findings(check: &CheckReport) -> String {
+pub(super) fn findings(check: &CheckReport) -> Markup {
     let (good, others): (Vec<_>, Vec<_>) = check.findings.iter().partition(|found| found.severity == Severity::Good);
     let rows: Vec<Vec<String>> = others
         .iter()
@@ -134,22 +135,22 @@ pub(super) fn findings(check: &CheckReport) -> String {
             vec![found.severity.label().to_owned(), found.area.label().to_owned(), what, found.remedy.clone()]
         })
         .collect();
-    let mut text = String::new();
-    if rows.is_empty() {
-        text.push_str(&element("p", "Nothing is wrong with the log and its rig, as far as can be told beforehand."));
-    } else {
-        text.push_str(&table("Found in the whole log, before any estimation", &["", "about", "what", "remedy"], &rows));
-    }
     let good: Vec<String> = good.iter().map(|found| format!("{}: {}", found.title, found.evidence)).collect();
-    if !good.is_empty() {
-        text.push_str(&element("p", "In order:"));
-        text.push_str(&list(&good));
+    html! {
+        @if rows.is_empty() {
+            p { "Nothing is wrong with the log and its rig, as far as can be told beforehand." }
+        } @else {
+            (table("Found in the whole log, before any estimation", &["", "about", "what", "remedy"], &rows))
+        }
+        @if !good.is_empty() {
+            p { "In order:" }
+            (list(&good))
+        }
     }
-    text
 }
 
 /// What is in the log.
-pub(super) fn topics(check: &CheckReport) -> String {
+pub(super) fn topics(check: &CheckReport) -> Markup {
     let rows: Vec<Vec<String>> = check
         .topics
         .iter()
@@ -169,7 +170,7 @@ pub(super) fn topics(check: &CheckReport) -> String {
 }
 
 /// What went in.
-pub(super) fn inputs(content: &ReportContent) -> String {
+pub(super) fn inputs(content: &ReportContent) -> Markup {
     let row = |input: &super::InputFile| vec![input.name.clone(), input.bytes.to_string(), input.sha256.clone()];
     let rows: Vec<Vec<String>> = content.inputs.iter().map(row).collect();
     table("Files that went in", &["file", "bytes", "SHA-256"], &rows)
