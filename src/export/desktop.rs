@@ -4,6 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, channel};
 
+use directories::UserDirs;
+
 use super::error::ExportError;
 use super::picture::{write_csv, write_png, write_svg};
 use super::recent_files::{RecentFiles, state_folder};
@@ -57,9 +59,8 @@ impl Default for Machine {
 
 impl Desktop for Machine {
     fn complete(&self, typed: &str) -> Vec<PathEntry> {
-        let home = std::env::var("HOME").ok();
-        let typed = match (typed.strip_prefix("~/"), home) {
-            (Some(rest), Some(home)) => format!("{home}/{rest}"),
+        let typed = match (typed.strip_prefix("~/"), UserDirs::new()) {
+            (Some(rest), Some(user)) => format!("{}/{rest}", user.home_dir().display()),
             _ => typed.to_owned(),
         };
         let (folder, begin) = typed.rsplit_once('/').map_or(("", typed.as_str()), |(folder, begin)| (folder, begin));

@@ -1,9 +1,12 @@
-//! The logs opened lately, kept in the user's state folder; everything here is a convenience, so nothing here can fail.
+//! The logs opened recently, listed in a file of the user's state folder. A list that cannot be read or written is empty
+//! and no error.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// How many are kept.
+use directories::ProjectDirs;
+
+/// Most logs in the list.
 const MOST_KEPT: usize = 12;
 
 /// The list in one file: a path per line, the newest first.
@@ -12,21 +15,20 @@ pub struct RecentFiles {
     file: Option<PathBuf>,
 }
 
-/// Where the program keeps what it remembers: `$XDG_STATE_HOME/dcvins`, else `~/.local/state/dcvins`.
+/// Folder of the program's state: `$XDG_STATE_HOME/dcvins` or `~/.local/state/dcvins` on Linux, the user's local
+/// application data elsewhere; `None` for a user without a home folder.
 pub(super) fn state_folder() -> Option<PathBuf> {
-    let folder = |name: &str| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
-    let home = folder("HOME").or_else(|| folder("USERPROFILE"));
-    let state = folder("XDG_STATE_HOME").or_else(|| Some(home?.join(".local/state")));
-    state.map(|state| state.join("dcvins"))
+    let folders = ProjectDirs::from("", "", "dcvins")?;
+    Some(folders.state_dir().unwrap_or_else(|| folders.data_local_dir()).to_path_buf())
 }
 
 impl RecentFiles {
-    /// The user's list: `$XDG_STATE_HOME/dcvins/recent`, else `~/.local/state/dcvins/recent`.
+    /// The user's list: the file `recent` in the program's state folder.
     pub fn of_user() -> Self {
         Self { file: state_folder().map(|folder| folder.join("recent")) }
     }
 
-    /// A list in a file of one's own.
+    /// A list in a given file.
     pub fn in_file(file: PathBuf) -> Self {
         Self { file: Some(file) }
     }
@@ -41,7 +43,7 @@ impl RecentFiles {
         text.lines().filter(|line| !line.trim().is_empty()).map(PathBuf::from).take(MOST_KEPT).collect()
     }
 
-    /// Puts a log at the head of the list; a state folder that cannot be written loses nothing but this.
+    /// Puts a log at the head of the list; a state folder that cannot be written leaves the list as it is.
     pub fn remember(&self, path: &Path) {
         let Some(file) = &self.file else { return };
         let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
