@@ -15,21 +15,19 @@ mod window;
 
 use nalgebra::Vector3;
 
-/// Seeded normal noise (splitmix64 and Box–Muller).
-pub(super) struct Noise(u64);
+use crate::geometry::SplitMix64;
+
+/// Seeded uniform and normal numbers (Box–Muller).
+pub(super) struct Noise(SplitMix64);
 
 impl Noise {
     pub(super) fn new(seed: u64) -> Self {
-        Self(seed)
+        Self(SplitMix64::new(seed))
     }
 
     /// Uniform in (0, 1).
     pub(super) fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64 + 1e-17
+        self.0.next_unit() + 1e-17
     }
 
     /// Standard normal.
