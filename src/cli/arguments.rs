@@ -30,30 +30,30 @@ pub(crate) struct Arguments {
 /// The sub-commands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Open the window on a log; without a display, write the pictures instead and say where.
+    /// Open the window on a log; without a display, write screenshots instead and print their paths.
     View(ViewArguments),
     /// Run the estimator over a log without a window and write its files.
     Run(RunArguments),
     /// Draw one panel at one instant into a PNG, without a display.
     #[cfg(feature = "gui")]
     Screenshot(ScreenshotArguments),
-    /// Write a report on a log: one HTML file with pictures and tables, with CSV and JSON beside it.
+    /// Write a report on a log: one HTML file with figures and tables, with CSV and JSON beside it.
     Report(ReportArguments),
     /// Calibrate static camera and gimbal offline from a flight with both, as the paper's baseline does.
     Calibrate(CalibrateArguments),
-    /// Say what is in a log and what is wrong with it, before anyone trusts a result.
+    /// Check a log and its rig: content, timing, calibration, noise, each finding with evidence and remedy.
     Check(CheckArguments),
-    /// Write a synthetic flight with known truth: the log, its rig and its truth.
+    /// Write a synthetic flight: the log, its rig and the ground truth.
     Simulate(SimulateArguments),
-    /// Tell which calibration parameters a mechanism, its parameterization and a motion can identify, without a log.
+    /// Compute which calibration parameters are observable with a mechanism, a parameterization and a motion, without a log.
     Degeneracy(DegeneracyArguments),
-    /// Turn a EuRoC/ASL folder, a ROS 1 bag or a ROS 2 bag into a log.
+    /// Convert a EuRoC/ASL folder, a ROS 1 bag or a ROS 2 bag into a log.
     Convert(ConvertArguments),
     /// Compare a trajectory with a reference: absolute and relative errors, as evo computes them.
     Evaluate(EvaluateArguments),
 }
 
-/// The runs and the stretch of the log, shared by everything that estimates.
+/// Runs, rig, ground truth and time range, shared by the sub-commands that run the estimator.
 #[derive(Args, Clone, Debug, Default)]
 pub(crate) struct EstimationArguments {
     /// A run over the log: NAME[:key=value,…], NAME one of auto, minimal, minimal-swapped, classical, poe, static,
@@ -64,13 +64,13 @@ pub(crate) struct EstimationArguments {
     /// The rig, when it is not beside the log (LOG with .rig.yaml) or attached to it.
     #[arg(long, value_name = "FILE")]
     pub rig: Option<PathBuf>,
-    /// The rig's true values, when they are not beside the log (LOG with .truth.yaml).
+    /// The ground truth of the rig, when it is not beside the log (LOG with .truth.yaml).
     #[arg(long, value_name = "FILE")]
     pub truth: Option<PathBuf>,
-    /// Leave out this many seconds at the begin of the log.
+    /// Skip this many seconds at the start of the log.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = seconds)]
     pub start: f64,
-    /// Read this many seconds from there.
+    /// Duration to process from there.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub duration: Option<f64>,
 }

@@ -22,13 +22,13 @@ pub(crate) struct CalibrateArguments {
     /// The rig, when it is not beside the log (LOG with .rig.yaml) or attached to it.
     #[arg(long, value_name = "FILE")]
     pub rig: Option<PathBuf>,
-    /// The rig's true values, when they are not beside the log (LOG with .truth.yaml).
+    /// The ground truth of the rig, when it is not beside the log (LOG with .truth.yaml).
     #[arg(long, value_name = "FILE")]
     pub truth: Option<PathBuf>,
-    /// Leave out this many seconds at the begin of the log.
+    /// Skip this many seconds at the start of the log.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = seconds)]
     pub start: f64,
-    /// Read this many seconds from there.
+    /// Duration to process from there.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub duration: Option<f64>,
     /// Print calibration.json instead of the report.

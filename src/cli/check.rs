@@ -1,4 +1,4 @@
-//! `dcvins check`: what is in a log and what is wrong with it.
+//! `dcvins check`: findings about a log and its rig.
 
 use std::path::PathBuf;
 use std::sync::Arc;

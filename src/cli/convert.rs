@@ -16,7 +16,7 @@ pub(crate) struct ConvertArguments {
     /// The log to write; the rig, where the source describes one, gets the same name with .rig.yaml.
     #[arg(short, long, value_name = "LOG.mcap")]
     pub output: PathBuf,
-    /// Print what was taken and what was left as JSON.
+    /// Print the converted and skipped topics as JSON.
     #[arg(long)]
     pub json: bool,
 }

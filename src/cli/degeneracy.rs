@@ -1,4 +1,4 @@
-//! `dcvins degeneracy`: what a mechanism, its forms and a motion can tell about the calibration, without a log.
+//! `dcvins degeneracy`: observability of the calibration by mechanism, parameterization and motion, without a log.
 
 use std::path::PathBuf;
 
@@ -21,7 +21,7 @@ pub(crate) struct DegeneracyArguments {
     /// arguments.
     #[arg(long, conflicts_with_all = ["mechanism", "rig", "forms", "motion", "freeze", "encoder_sigma_deg", "poses"])]
     pub table: bool,
-    /// A mechanism by name; `--list` tells them all [default: yaw-roll-pitch-offset].
+    /// A mechanism by name; `--list` prints all [default: yaw-roll-pitch-offset].
     #[arg(long, value_name = "NAME", conflicts_with = "rig")]
     pub mechanism: Option<String>,
     /// The mechanism of a rig file.
@@ -30,11 +30,11 @@ pub(crate) struct DegeneracyArguments {
     /// The rig's camera [default: the first one on the gimbal, or the first].
     #[arg(long, value_name = "KEY", requires = "rig")]
     pub camera: Option<String>,
-    /// Forms to compare: classical, minimal, minimal-yx, minimal-swapped, minimal-swapped-yx, poe, each also with
+    /// Parameterizations to compare: classical, minimal, minimal-yx, minimal-swapped, minimal-swapped-yx, poe, each also with
     /// `-without-offsets` [default: classical,minimal,minimal-swapped,poe].
     #[arg(long = "form", value_name = "NAME", value_delimiter = ',')]
     pub forms: Vec<LaboratoryForm>,
-    /// How vehicle and camera move; `--list` tells all motions [default: aggressive].
+    /// Motion of vehicle and camera; `--list` prints all [default: aggressive].
     #[arg(long, value_name = "NAME")]
     pub motion: Option<LaboratoryMotion>,
     /// Numbers of joints that do not move, from 1.
@@ -44,7 +44,7 @@ pub(crate) struct DegeneracyArguments {
     /// [default: known].
     #[arg(long, value_name = "D|known|none", value_parser = joint_knowledge)]
     pub encoder_sigma_deg: Option<JointKnowledge>,
-    /// What is known of the vehicle's poses [default: known].
+    /// Knowledge of the vehicle's poses [default: known].
     #[arg(long, value_enum)]
     pub poses: Option<PosesArgument>,
     /// Number of frames, 0.25 s apart [default: 10].
@@ -53,11 +53,11 @@ pub(crate) struct DegeneracyArguments {
     /// Number of landmarks [default: 100].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=2000))]
     pub landmarks: Option<u16>,
-    /// Tell what to fly next: candidate motions from the end of the experiment, by what they would leave of the direction
-    /// that is known least, and which motion told what so far; for the first form.
+    /// Suggest excitation: candidate motions from the end of the experiment, by the σ that they would leave of the least
+    /// observable direction, and the information gain of each motion so far; for the first parameterization.
     #[arg(long, conflicts_with = "table")]
     pub advise: bool,
-    /// Tell the mechanisms and motions by name.
+    /// Print the names of the mechanisms and motions.
     #[arg(long)]
     pub list: bool,
     /// Print the result as JSON.
@@ -65,14 +65,14 @@ pub(crate) struct DegeneracyArguments {
     pub json: bool,
 }
 
-/// What is known of the poses.
+/// Values of `--poses`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum PosesArgument {
-    /// Everything.
+    /// Known exactly.
     Known,
-    /// What the inertial sensor tells, its biases unknown.
+    /// From the IMU, its biases unknown.
     Imu,
-    /// What the inertial sensor tells, its biases known.
+    /// From the IMU, its biases known.
     ImuBiasKnown,
 }
 
@@ -115,7 +115,7 @@ pub(crate) fn degeneracy(arguments: &DegeneracyArguments) -> Result<()> {
     print_report(&Advised::new(report, &setup, form)?, arguments.json)
 }
 
-/// An experiment with what should be flown after it.
+/// An experiment with the suggested excitation after it.
 #[derive(Debug, serde::Serialize)]
 struct Advised {
     experiment: LaboratoryReport,
@@ -132,7 +132,7 @@ impl Advised {
             experiment,
             form: form.name(),
             excitation: excitation(&setup.window(), &form.chain(&setup.mechanism), &names, &setup.mechanism.names),
-            advice: advice.context("no motion can tell anything about this mechanism")?,
+            advice: advice.context("no motion constrains this mechanism")?,
         })
     }
 }
@@ -185,7 +185,7 @@ impl DegeneracyArguments {
             let key = self.camera_key(&rig)?;
             let camera = rig.camera(&key)?;
             let mechanism =
-                Mechanism::of_rig(&rig, &key).with_context(|| format!("the rig's camera '{key}' has no mount"))?;
+                Mechanism::of_rig(&rig, &key).with_context(|| format!("the rig's camera '{key}' has no extrinsics"))?;
             imu_noise = rig.imu.noise;
             LaboratorySetup { camera: camera.model.clone(), ..LaboratorySetup::new(mechanism) }
         } else {

@@ -13,17 +13,17 @@ use crate::cli::terminal::print_report;
 /// `dcvins evaluate`.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct EvaluateArguments {
-    /// The trajectory to judge: t x y z qx qy qz qw.
+    /// The estimated trajectory: t x y z qx qy qz qw.
     pub estimate: PathBuf,
-    /// The trajectory to judge it by.
+    /// The reference trajectory.
     pub reference: PathBuf,
-    /// How the estimate is laid on the reference.
+    /// Alignment of the estimate to the reference.
     #[arg(long, value_enum, default_value_t = AlignArgument::Se3)]
     pub align: AlignArgument,
-    /// Length of the stretches of the relative error: frames (5f) or metres (10m).
+    /// Interval of the relative error: frames (5f) or metres (10m).
     #[arg(long, value_name = "Nf|Xm", default_value = "1f", value_parser = delta)]
     pub delta: RelativeDelta,
-    /// Largest difference of two stamps that count as the same instant.
+    /// Largest time difference of associated poses.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.01, value_parser = seconds)]
     pub max_difference: f64,
     /// Print the result as JSON.
@@ -31,16 +31,16 @@ pub(crate) struct EvaluateArguments {
     pub json: bool,
 }
 
-/// Names of the alignments.
+/// Values of `--align`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum AlignArgument {
-    /// Leave the estimate where it is.
+    /// No alignment.
     None,
-    /// Rotation about the vertical and a shift.
+    /// Rotation about the vertical and translation.
     Yaw,
-    /// Rotation and a shift (evo's --align).
+    /// Rotation and translation (evo's --align).
     Se3,
-    /// Rotation, shift and scale (evo's `--align --correct_scale`).
+    /// Rotation, translation and scale (evo's `--align --correct_scale`).
     Sim3,
 }
 

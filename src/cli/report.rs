@@ -1,4 +1,4 @@
-//! `dcvins report`: the runs computed, their pictures drawn, and the page written.
+//! `dcvins report`: runs the estimators, draws the figures and writes the page.
 
 use std::path::{Path, PathBuf};
 
@@ -20,7 +20,7 @@ pub(crate) struct ReportArguments {
     /// Folder for report.html, report.json and the files of each run.
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
-    /// An instant to be pictured, in seconds since the first message of the log; may be given several times [default: the
+    /// A time of the figures, in seconds since the first message of the log; may be given several times [default: the
     /// end].
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub at: Vec<f64>,
@@ -31,16 +31,16 @@ pub(crate) struct ReportArguments {
 /// `dcvins report`.
 pub(crate) fn report(arguments: &ReportArguments) -> Result<()> {
     let plan = SessionPlan::open(&arguments.estimation.request(arguments.log.clone()))?;
-    #[cfg_attr(not(feature = "gui"), expect(unused_mut, reason = "only pictures need steps recomputed"))]
+    #[cfg_attr(not(feature = "gui"), expect(unused_mut, reason = "only figures need steps recomputed"))]
     let mut computation = compute(&plan, None)?;
     let options = ReportOptions {
         command: command_line(std::env::args()),
         check: Some(check(&plan)),
         inputs: inputs(arguments),
         #[cfg(feature = "gui")]
-        pictures: pictures::draw(arguments, &plan, &mut computation)?,
+        figures: figures::draw(arguments, &plan, &mut computation)?,
         #[cfg(not(feature = "gui"))]
-        pictures: Vec::new(),
+        figures: Vec::new(),
     };
     let recording = computation.recording();
     let page = write_report(recording, &arguments.output, &options)?;
@@ -49,7 +49,7 @@ pub(crate) fn report(arguments: &ReportArguments) -> Result<()> {
     if failed.is_empty() { Ok(()) } else { anyhow::bail!("{}", failed.join("; ")) }
 }
 
-/// What there is to know about the log and its rig beforehand.
+/// Findings about the log and its rig.
 fn check(plan: &SessionPlan) -> CheckReport {
     let _progress = Progress::spinner("checking the log");
     let rotations = image_rotations(&plan.log, &plan.rig);
@@ -79,11 +79,11 @@ fn command_line(mut words: impl Iterator<Item = String>) -> String {
 }
 
 #[cfg(feature = "gui")]
-mod pictures {
+mod figures {
     use std::sync::Arc;
 
     use anyhow::Result;
-    use dcvins::export::{PictureOptions, ReportDrawing, ReportPicture, draw_panel, draw_panel_svg, png_bytes};
+    use dcvins::export::{ReportDrawing, ReportFigure, ScreenshotOptions, draw_panel, draw_panel_svg, png_bytes};
     use dcvins::flight_log::ImageReader;
     use dcvins::geometry::{ns_from_seconds, seconds_from_ns};
     use dcvins::gui::theme::ThemeName;
@@ -109,23 +109,23 @@ mod pictures {
     const INSTANT: [Shown; 3] = [
         shown("image", [1280, 900], "Tracks and residuals in the image", false),
         shown("scene", [1280, 900], "Trajectory, landmarks and the chain", false),
-        shown("rank", [1280, 900], "Ranks, singular values and the directions that are lost", true),
+        shown("rank", [1280, 900], "Ranks, singular values and null directions", true),
     ];
     /// Panels that show the whole flight.
     const WHOLE: [Shown; 3] = [
-        shown("convergence", [1680, 1200], "Every calibration parameter with three sigmas and the truth", true),
+        shown("convergence", [1680, 1200], "Calibration parameters with ±3σ and ground truth", true),
         shown("residuals", [1280, 800], "Residuals", true),
         shown("timeline", [1680, 480], "Events, ranks, features and gaps", true),
     ];
 
-    /// The pictures of a report: the whole flight, then each instant (without one, the end).
+    /// The figures of a report: the whole flight, then each instant (without one, the end).
     pub(super) fn draw(
         arguments: &ReportArguments,
         plan: &SessionPlan,
         computation: &mut Computation,
-    ) -> Result<Vec<ReportPicture>> {
+    ) -> Result<Vec<ReportFigure>> {
         let mut images = ImageReader::new(Arc::clone(&plan.log), &plan.rig);
-        let mut pictures = Vec::new();
+        let mut figures = Vec::new();
         let end_ns = computation.recording().last_stamp_ns();
         let instants: Vec<i64> = arguments.at.iter().map(|at_s| ns_from_seconds(*at_s).min(end_ns)).collect();
         let instants = if instants.is_empty() { vec![end_ns] } else { instants };
@@ -135,19 +135,19 @@ mod pictures {
             computation.fill_in(cursor_ns);
             let recording = computation.recording();
             for Shown { panel, size_px, caption, plot } in panels {
-                progress.show(pictures.len() as f64 / count as f64, || format!("drawing {panel}"));
+                progress.show(figures.len() as f64 / count as f64, || format!("drawing {panel}"));
                 let options =
-                    PictureOptions { size_px: *size_px, theme: ThemeName::Print, ..PictureOptions::default() };
+                    ScreenshotOptions { size_px: *size_px, theme: ThemeName::Print, ..ScreenshotOptions::default() };
                 let caption = format!("{caption}, at {:.2} s", seconds_from_ns(cursor_ns));
                 let drawing = if *plot {
-                    let prefix = format!("clip{}-", pictures.len());
+                    let prefix = format!("clip{}-", figures.len());
                     let names = [prefix.as_str(), caption.as_str()];
                     ReportDrawing::Svg(draw_panel_svg(panel, recording, cursor_ns, &mut images, &options, names)?)
                 } else {
                     let picture = draw_panel(panel, recording, cursor_ns, &mut images, &options)?;
                     ReportDrawing::Png(png_bytes(&picture)?)
                 };
-                pictures.push(ReportPicture { heading: heading.to_owned(), caption, drawing });
+                figures.push(ReportFigure { heading: heading.to_owned(), caption, drawing });
             }
             Ok(())
         };
@@ -155,7 +155,7 @@ mod pictures {
         for cursor_ns in instants {
             draw(&format!("At {:.2} s", seconds_from_ns(cursor_ns)), &INSTANT, cursor_ns)?;
         }
-        Ok(pictures)
+        Ok(figures)
     }
 }
 

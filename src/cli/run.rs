@@ -24,11 +24,11 @@ pub(crate) struct RunArguments {
     pub out: PathBuf,
     #[command(flatten)]
     pub estimation: EstimationArguments,
-    /// Stop where this comes true in a run, as in "rank < 18 or features < 40", write what there is up to there and tell
-    /// the values; README.md lists what can be asked for.
+    /// Stop where this condition becomes true in a run, as in "rank < 18 or features < 40", write the files up to there and
+    /// print the values; README.md lists the quantities.
     #[arg(long = "break", value_name = "CONDITION", value_parser = condition)]
     pub break_at: Option<Condition>,
-    /// Leave the measured times out of frames.csv and summary.json, so that two runs give the same bytes in every file.
+    /// Leave measured times out of frames.csv and summary.json, so that two runs give the same bytes in every file.
     #[arg(long)]
     pub no_timing: bool,
     /// Also write results.mcap for Foxglove and Rerun: poses, frames of the chain, image annotations, landmarks,
@@ -89,12 +89,15 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<()> {
     Ok(())
 }
 
-/// What `--break` came to, in a line for people.
+/// The hit of `--break` as a line of text.
 fn describe_break(condition: &Condition, hit: Option<&BreakpointHit>) -> String {
-    hit.map_or_else(|| format!("break: '{condition}' never came true\n"), |hit| format!("break: {}\n", hit.description))
+    hit.map_or_else(
+        || format!("break: '{condition}' never became true\n"),
+        |hit| format!("break: {}\n", hit.description),
+    )
 }
 
-/// What `--break` came to, for programs.
+/// The hit of `--break` as JSON.
 fn break_json(condition: &Condition, hit: Option<&BreakpointHit>, recording: &Recording) -> serde_json::Value {
     let Some(found) = hit else { return serde_json::json!({ "condition": condition.text(), "hit": null }) };
     let run = recording.runs.get(found.hit.run);

@@ -9,11 +9,11 @@ use dcvins::observability::LEAST_FALSE_GAIN;
 pub(crate) fn describe(folder: &Path, summary: &RunSummary) -> String {
     let frames = &summary.frames;
     let mut lines = vec![format!("{} on {} ({})\n", summary.run, summary.log, summary.camera)];
-    let begin = frames
+    let start = frames
         .initialized_at_s
         .map_or_else(|| "never initialized".to_owned(), |time_s| format!("initialized at {time_s:.2} s"));
     lines.push(format!(
-        "  frames       {} of {} estimated, {} keyframes, {begin}, {} restarts\n",
+        "  frames       {} of {} estimated, {} keyframes, {start}, {} restarts\n",
         frames.estimated, frames.total, frames.keyframes, frames.restarts
     ));
     if let Some(accuracy) = &summary.accuracy {
@@ -43,7 +43,7 @@ pub(crate) fn describe(folder: &Path, summary: &RunSummary) -> String {
     }
     if let Some(rank) = &summary.rank {
         lines.push(format!(
-            "  rank         structural {} of {}, informed {}; lost: {} parameterization, {} joints, {} absorbed, {} motion\n",
+            "  rank         structural {} of {}, informed {}; deficit: {} parameterization, {} joints, {} absorbed, {} motion\n",
             rank.rank_structural,
             rank.columns,
             rank.rank_informed,
@@ -52,16 +52,16 @@ pub(crate) fn describe(folder: &Path, summary: &RunSummary) -> String {
             rank.deficit.absorbed,
             rank.deficit.motion
         ));
-        let held = |known: &export::KnownLossSummary| known.agreeing == known.steps;
+        let null_throughout = |known: &export::KnownLossSummary| known.agreeing == known.steps;
         if !rank.known.is_empty() {
-            let agreeing = rank.known.iter().filter(|known| held(known)).count();
+            let agreeing = rank.known.iter().filter(|known| null_throughout(known)).count();
             lines.push(format!(
-                "  structure    {agreeing} of {} known losses measured as null in every step; {}\n",
+                "  structure    {agreeing} of {} null directions known in closed form null in every step; {}\n",
                 rank.known.len(),
-                falsely_known(&rank.known)
+                spurious_information(&rank.known)
             ));
         }
-        lines.extend(rank.known.iter().filter(|known| !held(known)).map(|known| {
+        lines.extend(rank.known.iter().filter(|known| !null_throughout(known)).map(|known| {
             format!("               null in {} of {} steps only: {}\n", known.agreeing, known.steps, known.reason)
         }));
     }
@@ -85,11 +85,11 @@ pub(crate) fn describe(folder: &Path, summary: &RunSummary) -> String {
     lines.concat()
 }
 
-/// How much priors claim of what nobody can measure.
-fn falsely_known(known: &[export::KnownLossSummary]) -> String {
+/// Spurious information of the priors along the unobservable directions.
+fn spurious_information(known: &[export::KnownLossSummary]) -> String {
     let claimed = known.iter().map(|known| known.largest_false_gain).filter(|gain| *gain > LEAST_FALSE_GAIN);
     match (claimed.clone().count(), claimed.fold(0.0, f64::max)) {
-        (0, _) => "no prior claims to know them".to_owned(),
-        (count, most) => format!("priors falsely claim {count}, up to {most:.2} (1: as much as 10° or 3 cm)"),
+        (0, _) => "no spurious information".to_owned(),
+        (count, most) => format!("spurious information on {count}, up to {most:.2} (1: σ of 10° or 3 cm)"),
     }
 }

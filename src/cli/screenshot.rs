@@ -6,8 +6,8 @@ use std::sync::Arc;
 use anyhow::{Context as _, Result, bail};
 use clap::{Args, ValueEnum};
 use dcvins::export::{
-    PANEL_NAMES, PictureOptions, Renderer, draw_panel, draw_panel_svg, is_session, log_name, panel_csv, read_session,
-    write_csv, write_png, write_svg,
+    PANEL_NAMES, Renderer, ScreenshotOptions, draw_panel, draw_panel_svg, is_session, log_name, panel_csv,
+    read_session, write_csv, write_png, write_svg,
 };
 use dcvins::flight_log::ImageReader;
 use dcvins::geometry::{ns_from_seconds, seconds_from_ns};
@@ -26,11 +26,11 @@ use crate::cli::terminal::{notify, print};
 pub(crate) struct ScreenshotArguments {
     /// The log, or a saved session (LOG.session.json) with its forks and breakpoints.
     pub log: PathBuf,
-    /// Seconds since the first message of the log; may be given several times. Several pictures get their time into their
-    /// names.
+    /// Seconds since the first message of the log; may be given several times. The time is then part of
+    /// the file names.
     #[arg(long, value_name = "SECONDS", value_parser = seconds, required_unless_present = "every")]
     pub at: Vec<f64>,
-    /// A picture every so many seconds from the begin to the end (or from --start, for --duration).
+    /// A screenshot every so many seconds from the start to the end of the log (or from --start, for --duration).
     #[arg(long, value_name = "SECONDS", value_parser = period)]
     pub every: Option<f64>,
     /// Which panel; `all` is the whole window.
@@ -39,16 +39,16 @@ pub(crate) struct ScreenshotArguments {
     /// Layout of the whole window, as its keys 1 to 5: overview, calibration, front end, scene, comparison.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=5))]
     pub layout: u8,
-    /// The picture to write: a PNG, or with .svg a drawing of lines and texts.
+    /// The file to write: a PNG, or an SVG with the extension .svg.
     #[arg(short, long, value_name = "FILE.png")]
     pub output: PathBuf,
-    /// What is written, when the file's name does not say it.
+    /// File format, when it does not follow from the extension.
     #[arg(long, value_enum)]
     pub format: Option<FormatArgument>,
-    /// Also write what the panel shows as a table of comma-separated values, beside the picture.
+    /// Also write the values of the panel as CSV beside the screenshot.
     #[arg(long)]
     pub csv: bool,
-    /// Size of the picture in pixels.
+    /// Size in pixels.
     #[arg(long, value_name = "WxH", default_value = "1920x1080", value_parser = size)]
     pub size: [usize; 2],
     /// Pixels per point: 2 draws everything twice as large.
@@ -57,37 +57,37 @@ pub(crate) struct ScreenshotArguments {
     /// Colours.
     #[arg(long, value_enum, default_value_t = ThemeArgument::Light)]
     pub theme: ThemeArgument,
-    /// Who draws: cpu needs no driver and gives the same bytes everywhere, wgpu uses a graphics adapter.
+    /// Renderer: cpu needs no driver and gives the same bytes on every machine, wgpu uses a graphics adapter.
     #[arg(long, value_enum, default_value_t = RendererArgument::Cpu)]
     pub renderer: RendererArgument,
-    /// Move the first run's chain along a direction: its number in the rank panel (1 is the weakest), a known one
-    /// (base-d, end-theta, …) or a parameter by name, and how far in units of 10° and 3 cm. Scene and image show what
-    /// comes of it.
+    /// Move the first run's chain along a direction: its number in the rank panel (1 is the least observable), a known one
+    /// (base-d, end-theta, …) or a parameter by name, and how far in units of 10° and 3 cm. Scene and image show
+    /// the moved chain.
     #[arg(long, value_name = "DIRECTION=VALUE")]
     pub slide: Option<dcvins::observability::SlideRequest>,
     #[command(flatten)]
     pub estimation: EstimationArguments,
 }
 
-/// What `--format` may say.
+/// Values of `--format`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum FormatArgument {
-    /// Pixels.
+    /// Portable Network Graphics.
     Png,
-    /// Lines and texts.
+    /// Scalable Vector Graphics.
     Svg,
 }
 
-/// Names of the renderers.
+/// Values of `--renderer`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum RendererArgument {
-    /// The program itself.
+    /// The program's own painter.
     Cpu,
     /// A graphics adapter.
     Wgpu,
 }
 
-/// Names of the themes.
+/// Values of `--theme`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum ThemeArgument {
     /// Dark on light.
@@ -112,8 +112,8 @@ fn size(text: &str) -> Result<[usize; 2], String> {
     sides(text, 64..=8192).ok_or_else(|| "expected WIDTHxHEIGHT, each from 64 to 8192, as in 1920x1080".to_owned())
 }
 
-/// The most pictures of one command: more is a mistyped period.
-const MOST_PICTURES: usize = 100_000;
+/// Most screenshots of one command: more is a mistyped period.
+const MOST_SCREENSHOTS: usize = 100_000;
 
 /// `dcvins screenshot`.
 pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<()> {
@@ -136,9 +136,9 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<()> {
     if let Some(period_s) = arguments.every {
         let period_ns = ns_from_seconds(period_s).max(1);
         let count = ((end_ns - begin_ns) / period_ns) as usize + 1;
-        if count > MOST_PICTURES {
+        if count > MOST_SCREENSHOTS {
             bail!(
-                "--every {period_s} asks for {count} pictures, at most {MOST_PICTURES} are drawn: give a longer period"
+                "--every {period_s} asks for {count} screenshots, at most {MOST_SCREENSHOTS} are drawn: give a longer period"
             );
         }
         instants.extend((0..count).map(|number| begin_ns + number as i64 * period_ns));
@@ -160,7 +160,7 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<()> {
         }
         None => None,
     };
-    let options = PictureOptions {
+    let options = ScreenshotOptions {
         size_px: arguments.size.map(|side| side as u32),
         pixels_per_point: arguments.scale,
         theme: match arguments.theme {

@@ -33,10 +33,10 @@ pub(crate) struct SimulateArguments {
     /// Images per second.
     #[arg(long, value_name = "HZ", default_value_t = 20.0)]
     pub rate: f64,
-    /// Record the camera on the gimbal alone: half the work and half the bytes of a long flight.
+    /// Leave out the static camera: half the time and half the bytes.
     #[arg(long)]
     pub no_static_camera: bool,
-    /// Something that goes wrong, in seconds and SI units; may be given several times: camera-offset=S, joint-lag=S,
+    /// A disturbance, in seconds and SI units; may be given several times: camera-offset=S, joint-lag=S,
     /// joint-start=S, image-gap=START,LENGTH, exposure=S, gyroscope-range=RAD/S, accelerometer-range=M/S²,
     /// light=START,FACTOR, blank=START,LENGTH, slew=START,LENGTH, spin=START,LENGTH,RAD/S, hold-joint=NUMBER,START,LENGTH,
     /// hover=START,LENGTH, stabilize=START,LENGTH.
@@ -57,7 +57,7 @@ pub(crate) enum ExperimentArgument {
     T4,
 }
 
-/// What `--encoder-sigma-deg` may say.
+/// Values of `--encoder-sigma-deg`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum EncoderArgument {
     /// No encoders in the log.
@@ -108,7 +108,7 @@ pub(crate) fn simulate(arguments: &SimulateArguments) -> Result<()> {
     drop(progress);
     let (translation_m, rotation_rad) = summary.given_chain_error;
     print(&format!(
-        "{}: {:.1} s, {:.1} m, {} images; the given chain is off by {:.1} mm and {:.2}°\n{}\n{}\n",
+        "{}: {:.1} s, {:.1} m, {} images; extrinsics error of the given chain: {:.1} mm, {:.2}°\n{}\n{}\n",
         summary.log.display(),
         summary.duration_s,
         summary.path_length_m,

@@ -9,9 +9,9 @@ use crate::cli::arguments::EstimationArguments;
 /// `dcvins view`.
 #[derive(Args, Clone, Debug, Default)]
 pub(crate) struct ViewArguments {
-    /// The log; without one the window welcomes with the sample logs and the recent files.
+    /// The log or the saved session; without one the window lists the sample logs and the recent files.
     pub log: Option<PathBuf>,
-    /// Where the pictures go when there is no display [default: dcvins-output/NAME].
+    /// Folder of the screenshots when there is no display [default: dcvins-output/NAME].
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     #[command(flatten)]
@@ -34,7 +34,7 @@ mod window {
 
     use anyhow::Result;
     use dcvins::export::{
-        self, Machine, PANEL_NAMES, PictureOptions, RunFileOptions, draw_panel, is_session, read_session, write_png,
+        self, Machine, PANEL_NAMES, RunFileOptions, ScreenshotOptions, draw_panel, is_session, read_session, write_png,
     };
     use dcvins::flight_log::ImageReader;
     use dcvins::gui::app::PlayingLog;
@@ -90,12 +90,12 @@ mod window {
     fn write_screenshots(plan: &SessionPlan, out: Option<&Path>) -> Result<()> {
         let stem = plan.log_path.file_stem().unwrap_or(plan.log_path.as_os_str());
         let folder = out.map_or_else(|| Path::new("dcvins-output").join(stem), Path::to_path_buf);
-        notify(&format!("dcvins: there is no display, so the pictures are written to {}", folder.display()));
+        notify(&format!("dcvins: there is no display, so screenshots are written to {}", folder.display()));
         let mut computation = compute(plan, None)?;
         computation.fill_in(computation.recording().last_stamp_ns());
         let recording = computation.into_recording();
         let mut images = ImageReader::new(Arc::clone(&plan.log), &plan.rig);
-        let options = PictureOptions::default();
+        let options = ScreenshotOptions::default();
         for name in PANEL_NAMES {
             let path = folder.join(format!("{name}.png"));
             write_png(&draw_panel(name, &recording, recording.last_stamp_ns(), &mut images, &options)?, &path)?;

@@ -68,7 +68,7 @@ pub struct ReprojectionReport {
     pub camera: String,
     /// Landmarks that it saw.
     pub landmarks: usize,
-    /// Lengths in pixels, one per sighting.
+    /// Lengths in pixels, one per observation.
     pub error_px: StatisticsReport,
 }
 
@@ -139,7 +139,7 @@ pub struct CalibrationRank {
 pub struct CalibrationReport {
     /// File name of the log.
     pub log: String,
-    /// Begin and end of the stretch that was used, in seconds since the log began.
+    /// Start and end of the interval that was used, in seconds since the log began.
     pub stretch_s: [f64; 2],
     /// Instants whose states were estimated.
     pub instants: usize,
@@ -165,7 +165,7 @@ pub struct CalibrationReport {
     pub rank: Option<CalibrationRank>,
     /// Against the truth, where it is known.
     pub truth: Option<TruthReport>,
-    /// What a user should know.
+    /// Warnings.
     pub warnings: Vec<String>,
 }
 

@@ -1,4 +1,4 @@
-//! The files and figures of the machine that the window asks for.
+//! Files, folders and memory of the machine, for the window.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -7,8 +7,8 @@ use std::sync::mpsc::{Receiver, channel};
 use directories::UserDirs;
 
 use super::error::ExportError;
-use super::picture::{write_csv, write_png, write_svg};
 use super::recent_files::{RecentFiles, state_folder};
+use super::screenshot::{write_csv, write_png, write_svg};
 use super::session_file::is_session;
 use crate::gui::desktop::{Desktop, PanelExport, PathEntry};
 

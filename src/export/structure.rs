@@ -6,7 +6,7 @@ use crate::gimbal::ParameterNames;
 use crate::observability::KnownLoss;
 use crate::session::RunRecord;
 
-/// A known loss held against every step of a run.
+/// A null direction known in closed form, compared with every step of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct KnownLossSummary {
     /// Why it is lost, in one sentence with its equation.
@@ -17,7 +17,7 @@ pub struct KnownLossSummary {
     pub agreeing: usize,
     /// The window's largest response to it, relative to the reference of the rank rule.
     pub largest_response: f64,
-    /// The largest part of it that a prior claims to know, 1 as much as 10° or 3 cm: false, and zero with first estimates.
+    /// Largest spurious information of the priors along it (1: σ of 10° or 3 cm); zero with first-estimate Jacobians.
     pub largest_false_gain: f64,
 }
 

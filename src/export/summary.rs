@@ -110,7 +110,7 @@ pub struct CalibrationSummary {
     pub parameters: Vec<ParameterSummary>,
     /// Distance of the whole chain from the truth at the end.
     pub chain_error: Option<ChainError>,
-    /// The same at the begin, with the values the rig gave.
+    /// The same at the start, with the values of the rig.
     pub chain_error_initial: Option<ChainError>,
 }
 
@@ -149,7 +149,7 @@ pub struct RankSummary {
     pub deficit: DeficitSummary,
     /// Structural null directions, each as its parameters with weight over a hundredth.
     pub null_directions: Vec<Vec<DirectionWeight>>,
-    /// What the form of the chain is known to lose, held against every step.
+    /// Null directions of the parameterization that are known in closed form, compared with every step.
     pub known: Vec<KnownLossSummary>,
     /// How fast the images of all steps narrowed each parameter, and which motions that is owed to.
     pub information: Option<InformationSummary>,
@@ -466,7 +466,7 @@ fn real_time_factor(run: &RunRecord) -> Option<f64> {
     (work_ms > 0.0).then(|| log_s * 1e3 / work_ms)
 }
 
-/// Warnings of the log, then of the run, each with its time; a step's repeated warning is told once with its count.
+/// Warnings of the log, then of the run, each with its time; a repeated warning once with its count.
 fn warnings(recording: &Recording, run: &RunRecord) -> Vec<String> {
     let mut texts: Vec<String> = recording
         .warnings

@@ -12,8 +12,8 @@ fn seconds_text(stamp_ns: i64) -> String {
     format!("{:.9}", seconds_from_ns(stamp_ns))
 }
 
-/// `calibration.csv`: each parameter and its sigma, then the joint angles. A chart switch changes the parameters, so
-/// the columns are those of all charts, and a cell is empty while another chart is in use.
+/// `calibration.csv`: each parameter and its sigma, then the joint angles. A switch of the
+/// parameterization changes the parameters: the columns are those of all in use, and empty while another one is.
 pub(super) fn calibration_csv(run: &RunRecord, rig: &Rig) -> String {
     let names = rig.parameter_names();
     let mut columns: Vec<ParameterId> = Vec::new();
@@ -121,17 +121,17 @@ pub(super) fn rank_csv(run: &RunRecord, names: &ParameterNames) -> String {
     table.into_text()
 }
 
-/// `information.csv`: for each step and parameter how fast the image narrows it, and which motion that is owed to, in bits
-/// per second; zeros where the image does not become a keyframe.
+/// `information.csv`: information gain of each step and parameter, in total and by motion, in bits per second; zeros
+/// where the image does not become a keyframe.
 pub(super) fn information_csv(run: &RunRecord, rig: &Rig) -> String {
     let (names, joints) = (rig.parameter_names(), rig.joint_names());
-    let told = || run.steps.iter().filter_map(|step| Some((step, step.gain()?)));
-    let count = told().map(|(_, (_, gain))| gain.joints).max().unwrap_or(0);
+    let informed = || run.steps.iter().filter_map(|step| Some((step, step.gain()?)));
+    let count = informed().map(|(_, (_, gain))| gain.joints).max().unwrap_or(0);
     let mut header = ["t_s", "keyframe", "interval_s", "parameter", "bits_per_s"].map(str::to_owned).to_vec();
     header.extend(Motion::all(count).into_iter().map(|motion| motion.name(&joints).replace(' ', "_")));
     header.push("earlier".to_owned());
     let mut table = CsvTable::new(header);
-    for (step, (rank, gain)) in told().filter(|(_, (rank, gain))| rank.parameters.len() == gain.columns()) {
+    for (step, (rank, gain)) in informed().filter(|(_, (rank, gain))| rank.parameters.len() == gain.columns()) {
         for (column, parameter) in rank.parameters.iter().enumerate() {
             let mut row = vec![
                 seconds_text(step.report.stamp_ns),

@@ -71,8 +71,8 @@ fn experiments_name_what_is_lost_and_why() {
     );
     check(&["--mechanism", "parallel-axes", "--form", "minimal"], 17, &["the axes of joints 1 and 2 are parallel"]);
     check(&["--encoder-sigma-deg", "none", "--frames", "16", "--form", "minimal"], 15, &["L2.theta", "unknown angles"]);
-    check(&["--freeze", "1,3", "--form", "minimal"], 10, &["joint 1, joint 3 held"]);
-    check(&["--motion", "one-joint-frozen", "--form", "minimal"], 14, &["lost to joints at rest"]);
+    check(&["--freeze", "1,3", "--form", "minimal"], 10, &["joint 1, joint 3 fixed"]);
+    check(&["--motion", "one-joint-frozen", "--form", "minimal"], 14, &["lost to stationary joints"]);
     let rig = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("sample_logs/garden.rig.yaml");
     let rig = rig.to_str().expect("paths of tests are UTF-8");
     check(&["--rig", rig, "--form", "minimal", "--poses", "imu"], 18, &["garden (3 joints)"]);

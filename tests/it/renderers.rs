@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Arc;
 
-use dcvins::export::{PictureError, PictureOptions, Renderer, draw_panel};
+use dcvins::export::{Renderer, ScreenshotError, ScreenshotOptions, draw_panel};
 use dcvins::flight_log::ImageReader;
 use dcvins::geometry::ns_from_seconds;
 use dcvins::gui::rendering::offscreen::{Offscreen, OffscreenError};
@@ -70,8 +70,8 @@ fn cpu_and_graphics_adapter_draw_the_same_panels() {
     let recording =
         session::compute(&plan, Some(cursor_ns), &mut |_| {}).expect("the sample log is computed").into_recording();
     let mut images = ImageReader::new(Arc::clone(&plan.log), &plan.rig);
-    let mut draw = |panel: &str, renderer, options: PictureOptions| {
-        let options = PictureOptions { renderer, ..options };
+    let mut draw = |panel: &str, renderer, options: ScreenshotOptions| {
+        let options = ScreenshotOptions { renderer, ..options };
         draw_panel(panel, &recording, cursor_ns, &mut images, &options).expect("the picture is drawn")
     };
     let cases = [
@@ -83,7 +83,7 @@ fn cpu_and_graphics_adapter_draw_the_same_panels() {
     ];
     let mut pictures = Vec::new();
     for (panel, theme, size_px, pixels_per_point) in cases {
-        let options = PictureOptions { size_px, pixels_per_point, theme, ..PictureOptions::default() };
+        let options = ScreenshotOptions { size_px, pixels_per_point, theme, ..ScreenshotOptions::default() };
         let (cpu, wgpu) = (draw(panel, Renderer::Cpu, options.clone()), draw(panel, Renderer::Wgpu, options));
         let difference = Difference::between(&cpu, &wgpu);
         report(&format!(
@@ -103,10 +103,10 @@ fn cpu_and_graphics_adapter_draw_the_same_panels() {
     let empty = RgbaImage::from_pixel(scene.width(), scene.height(), *scene.get_pixel(450, 350));
     assert!(!Difference::between(scene, &empty).is_tolerable());
     // Larger than any adapter draws.
-    let options = PictureOptions { size_px: [16_384, 64], renderer: Renderer::Wgpu, ..PictureOptions::default() };
+    let options = ScreenshotOptions { size_px: [16_384, 64], renderer: Renderer::Wgpu, ..ScreenshotOptions::default() };
     match draw_panel("rank", &recording, cursor_ns, &mut images, &options) {
         Ok(picture) => assert_eq!(picture.dimensions(), (16_384, 64)),
-        Err(PictureError::Graphics(error @ OffscreenError::TooLarge { .. })) => {
+        Err(ScreenshotError::Graphics(error @ OffscreenError::TooLarge { .. })) => {
             assert!(error.to_string().contains("use --renderer cpu"), "{error}");
         }
         Err(error) => panic!("{error}"),

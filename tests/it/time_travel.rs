@@ -163,7 +163,7 @@ fn the_solver_can_be_followed_through_a_step() {
 #[cfg(feature = "gui")]
 #[test]
 fn pictures_of_any_instant_have_the_same_bytes_with_little_memory() {
-    use dcvins::export::{PANEL_NAMES, PictureOptions, draw_panel, panel_csv, png_bytes};
+    use dcvins::export::{PANEL_NAMES, ScreenshotOptions, draw_panel, panel_csv, png_bytes};
     use dcvins::flight_log::ImageReader;
 
     let whole = straight(&["auto", "classical"]).into_recording();
@@ -175,7 +175,7 @@ fn pictures_of_any_instant_have_the_same_bytes_with_little_memory() {
     };
     assert!(stamps_ns.iter().all(|stamp_ns| summary_only(*stamp_ns)));
     let mut images = ImageReader::new(Arc::clone(&plan.log), &plan.rig);
-    let options = PictureOptions { size_px: [960, 720], ..PictureOptions::default() };
+    let options = ScreenshotOptions { size_px: [960, 720], ..ScreenshotOptions::default() };
     for stamp_ns in stamps_ns {
         little.fill_in(stamp_ns);
         for panel in PANEL_NAMES {

@@ -21,7 +21,7 @@ pub(super) struct ReportEvent {
     pub(super) kind: String,
     /// Why, in one sentence.
     pub(super) message: String,
-    /// How many frames in a row tell the same.
+    /// Number of consecutive frames with the same event.
     pub(super) times: usize,
 }
 
@@ -98,11 +98,11 @@ impl ReportContent {
     }
 }
 
-/// The notable events, those told by several frames in a row once, and the counts of the others by kind.
+/// The notable events, those of several consecutive frames once, and the counts of the others by kind.
 fn events(run: &RunRecord) -> (Vec<ReportEvent>, BTreeMap<String, usize>) {
     let mut notable: Vec<ReportEvent> = Vec::new();
     let mut frequent = BTreeMap::new();
-    // By kind the number of the frame that told it last, and its place in `notable`.
+    // By kind the number of the last frame with it, and its index in `notable`.
     let mut latest: BTreeMap<String, (usize, usize)> = BTreeMap::new();
     for (number, step) in run.steps.iter().enumerate() {
         for event in &step.report.events {

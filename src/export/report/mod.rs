@@ -21,10 +21,10 @@ use super::run_files::{RunFileOptions, write_run};
 use crate::log_check::CheckReport;
 use crate::session::Recording;
 
-/// A picture of a report.
+/// A figure of a report.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ReportPicture {
-    /// Heading under which it stands; pictures with the same heading stand together.
+pub struct ReportFigure {
+    /// Heading above it; consecutive figures with the same heading share it.
     pub heading: String,
     /// What it shows.
     pub caption: String,
@@ -32,24 +32,24 @@ pub struct ReportPicture {
     pub drawing: ReportDrawing,
 }
 
-/// How a picture of a report is kept.
+/// Content of a figure.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ReportDrawing {
-    /// Pixels, for images and the scene.
+    /// PNG file, for images and the scene.
     Png(Vec<u8>),
-    /// Lines and texts, for plots; its names begin differently from those of the other pictures.
+    /// SVG, for plots; the prefix of its element names is unique in the report.
     Svg(String),
 }
 
-/// What a report is told beside the recording.
+/// Contents of a report beyond the recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReportOptions {
     /// The command that makes it, as typed.
     pub command: String,
     /// Files that went in, to be named with their hashes.
     pub inputs: Vec<PathBuf>,
-    /// Pictures in the order in which they are shown.
-    pub pictures: Vec<ReportPicture>,
+    /// Figures in the order of the page.
+    pub figures: Vec<ReportFigure>,
     /// What `check` found about the whole log and its rig.
     pub check: Option<CheckReport>,
 }
@@ -72,6 +72,6 @@ pub fn write_report(recording: &Recording, folder: &Path, options: &ReportOption
         .map_err(|source| ExportError::Write { source: source.into(), path: json_path.clone() })?;
     fs::write(&json_path, format!("{json}\n")).map_err(ExportError::write(&json_path))?;
     let path = folder.join("report.html");
-    fs::write(&path, page::page(&content, &options.pictures)).map_err(ExportError::write(&path))?;
+    fs::write(&path, page::page(&content, &options.figures)).map_err(ExportError::write(&path))?;
     Ok(path)
 }

@@ -1,13 +1,13 @@
-//! The page of a report, from its content and its pictures.
+//! The HTML page of a report, from its content and its figures.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-use super::ReportPicture;
+use super::ReportFigure;
 use super::content::{ReportContent, RunContent};
 use super::html::{figure, list, number};
 use super::{RankSpell, tables};
 
-/// Readable on a screen, and on A4 without cut tables and pictures.
+/// Style sheet for screens and for A4, where tables and figures are not cut.
 const STYLE: &str = "\
 :root { color-scheme: light; }
 body { font: 15px/1.5 system-ui, sans-serif; color: #1a1a1a; background: #fff; max-width: 76rem; margin: 2rem auto; padding: 0 1.5rem; }
@@ -39,7 +39,7 @@ nav ul { padding: 0; }
 ";
 
 /// The whole page.
-pub(super) fn page(content: &ReportContent, pictures: &[ReportPicture]) -> String {
+pub(super) fn page(content: &ReportContent, figures: &[ReportFigure]) -> String {
     let title = format!("Flight report of {}", content.log);
     let page = html! {
         (DOCTYPE)
@@ -57,7 +57,7 @@ pub(super) fn page(content: &ReportContent, pictures: &[ReportPicture]) -> Strin
                 h2 #accuracy { "Accuracy" }
                 (tables::frames(content))
                 (tables::accuracy(content))
-                (figures(pictures))
+                (grouped(figures))
                 @for (index, run) in content.runs.iter().enumerate() {
                     (run_section(index, run))
                 }
@@ -124,9 +124,9 @@ fn contents(content: &ReportContent) -> Markup {
     }
 }
 
-fn figures(pictures: &[ReportPicture]) -> Markup {
+fn grouped(figures: &[ReportFigure]) -> Markup {
     html! {
-        @for group in pictures.chunk_by(|a, b| a.heading == b.heading) {
+        @for group in figures.chunk_by(|a, b| a.heading == b.heading) {
             @if let Some(first) = group.first() {
                 h2 { (first.heading) }
             }

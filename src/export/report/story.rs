@@ -10,7 +10,7 @@ use crate::observability::RankReport;
 use crate::sensors::Rig;
 use crate::session::RunRecord;
 
-/// Ranks are told for stretches of at least this length, each by what was found most often in it: on a real flight the
+/// Ranks are reported for stretches of at least this length, each by its most frequent finding: on a real flight the
 /// informed rank flickers from frame to frame.
 const STRETCH_NS: i64 = 1_000_000_000;
 
@@ -49,7 +49,7 @@ impl RankSpell {
     }
 }
 
-/// Columns, structural and informed rank, losses: what is told of a step.
+/// Number of columns, structural and informed rank, rank deficit by cause.
 type Finding = (usize, usize, usize, [usize; 4]);
 
 fn finding(rank: &RankReport) -> Finding {

@@ -125,7 +125,7 @@ pub(super) fn events(run: &RunContent) -> Markup {
     table(&format!("Events of {}", run.label), &["at s", "event", "why", ""], &rows)
 }
 
-/// What `check` found about the log and its rig, worst first; what is in order is told in a sentence.
+/// What `check` found about the log and its rig, worst first; findings that are in order as a list.
 pub(super) fn findings(check: &CheckReport) -> Markup {
     let (good, others): (Vec<_>, Vec<_>) = check.findings.iter().partition(|found| found.severity == Severity::Good);
     let rows: Vec<Vec<String>> = others

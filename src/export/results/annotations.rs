@@ -10,7 +10,7 @@ use crate::session::StepRecord;
 
 /// Residuals are drawn so many times longer than they are.
 const RESIDUAL_MAGNIFICATION: f64 = 20.0;
-/// Diameter of the rings in pixels: larger for what takes part in the solve, so that colour alone tells nothing.
+/// Diameter of the keypoint markers in pixels: larger for features in the window, so that color is not the only cue.
 const SOLVED_PX: f64 = 9.0;
 const TRACKED_PX: f64 = 5.0;
 /// Bluish green, orange, sky blue, vermilion of Okabe and Ito.
@@ -26,7 +26,7 @@ struct Solved {
     residual_line_px: Option<[Vector2<f64>; 2]>,
 }
 
-/// Writes a ring for every track (large ones took part in the solve), where it came from, and its residual after the
+/// Writes a keypoint marker for every track (large for features in the window), its track trail, and its residual after the
 /// solve, predicted minus measured, magnified 20 times.
 pub(super) fn write(log: &mut LogWriter, topic: &str, times: MessageTimes, step: &StepRecord) -> Result<(), LogError> {
     let frame_index = step.report.frame_index;

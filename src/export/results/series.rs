@@ -41,7 +41,7 @@ impl Series {
         let calibration = &step.report.calibration;
         let mut row: Vec<(&str, f64)> = Vec::new();
         for (parameter, value_field, sigma_field) in &self.parameters {
-            // A chart that is not in use has no value now.
+            // The parameters of another parameterization have no value now.
             let index = calibration.parameters.iter().position(|known| known == parameter);
             let of = |series: &[f64]| index.and_then(|index| series.get(index)).copied().unwrap_or(f64::NAN);
             row.push((value_field, of(&calibration.values)));

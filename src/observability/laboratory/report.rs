@@ -213,7 +213,7 @@ impl fmt::Display for LaboratoryReport {
         writeln!(out, "mechanism  {} ({} joint{plural})", self.mechanism, self.joint_count)?;
         writeln!(out, "motion     {}: {}", self.motion, self.motion_meaning)?;
         if !self.frozen_joints.is_empty() {
-            writeln!(out, "           {} held", self.frozen_joints.join(", "))?;
+            writeln!(out, "           {} fixed", self.frozen_joints.join(", "))?;
         }
         writeln!(out, "knowledge  joint angles {}, poses {}", self.joint_angles, self.poses)?;
         writeln!(
@@ -244,14 +244,14 @@ impl LaboratoryReport {
         line(out, "structural rank", &|form| form.rank_structural.to_string())?;
         line(out, "informed rank", &|form| form.rank_informed.to_string())?;
         line(out, "lost to the parameterization", &|form| form.deficit.parameterization.to_string())?;
-        line(out, "lost to joints at rest", &|form| form.deficit.joints.to_string())?;
+        line(out, "lost to stationary joints", &|form| form.deficit.joints.to_string())?;
         line(out, "absorbed by free angles", &|form| form.deficit.absorbed.to_string())?;
         line(out, "lost to the motion", &|form| form.deficit.motion.to_string())?;
-        line(out, "weakest seen direction", &|form| {
+        line(out, "least observable direction", &|form| {
             let weakest = form.rank_structural.checked_sub(1).map(|index| form.singular_values[index]);
             weakest.map_or_else(|| "-".to_owned(), |value| format!("{value:.3}"))
         })?;
-        line(out, "least margin to a lock", &|form| {
+        line(out, "least singularity margin", &|form| {
             let least = form.margins.iter().min_by(|a, b| a.margin.total_cmp(&b.margin));
             least.map_or_else(|| "-".to_owned(), |margin| format!("{:.2}", margin.margin))
         })

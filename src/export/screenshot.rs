@@ -1,4 +1,4 @@
-//! Pictures of panels without a window: the same bytes on every machine.
+//! Screenshots of panels without a window: the same bytes on every machine.
 
 use std::fs;
 use std::io::Cursor;
@@ -32,10 +32,10 @@ pub const PANEL_NAMES: [&str; PanelName::ALL.len() + 1] = {
     names
 };
 
-/// Largest side of a picture in pixels.
+/// Largest side of a screenshot in pixels.
 const LARGEST_SIDE_PX: u32 = 16_384;
 
-/// Who draws a picture.
+/// Renderer of a screenshot.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Renderer {
     /// The program itself: needs no driver, and gives the same bytes everywhere.
@@ -45,9 +45,9 @@ pub enum Renderer {
     Wgpu,
 }
 
-/// How a picture is drawn.
+/// Size, theme and renderer of a screenshot.
 #[derive(Clone, Debug, PartialEq)]
-pub struct PictureOptions {
+pub struct ScreenshotOptions {
     /// Width and height in pixels.
     pub size_px: [u32; 2],
     /// Pixels per point: 1 as on an ordinary screen, 2 draws everything twice as large.
@@ -64,7 +64,7 @@ pub struct PictureOptions {
     pub playback: Playback,
 }
 
-impl Default for PictureOptions {
+impl Default for ScreenshotOptions {
     fn default() -> Self {
         Self {
             size_px: [1920, 1080],
@@ -78,24 +78,24 @@ impl Default for PictureOptions {
     }
 }
 
-/// Why there is no picture.
+/// Why a screenshot cannot be made.
 #[derive(Debug, Error)]
-pub enum PictureError {
+pub enum ScreenshotError {
     /// No such panel.
     #[error("no panel is called '{name}': expected one of {}", PANEL_NAMES.join(", "))]
     UnknownPanel {
         /// What was asked for.
         name: String,
     },
-    /// No picture can have this size.
-    #[error("a picture of {width}×{height} pixels cannot be drawn: expected 16 to {LARGEST_SIDE_PX} each way")]
+    /// The size is out of range.
+    #[error("a screenshot of {width}×{height} pixels cannot be drawn: expected 16 to {LARGEST_SIDE_PX} each way")]
     Size {
         /// Width in pixels.
         width: u32,
         /// Height in pixels.
         height: u32,
     },
-    /// No picture can have this scale.
+    /// The scale is out of range.
     #[error("a scale of {scale} cannot be drawn: expected 0.25 to 8 pixels per point")]
     Scale {
         /// Pixels per point.
@@ -104,8 +104,8 @@ pub enum PictureError {
     /// The graphics adapter could not draw it.
     #[error(transparent)]
     Graphics(#[from] OffscreenError),
-    /// The picture could not be encoded.
-    #[error("cannot encode the picture as PNG: {source}")]
+    /// The PNG encoder failed.
+    #[error("cannot encode the screenshot as PNG: {source}")]
     Encode {
         /// What the encoder said.
         source: image::ImageError,
@@ -115,7 +115,7 @@ pub enum PictureError {
     Write(#[from] ExportError),
 }
 
-/// Names that [`draw_panel`] knows.
+/// Names of the panels, as [`draw_panel`] takes them.
 pub fn panel_names() -> &'static [&'static str] {
     &PANEL_NAMES
 }
@@ -126,8 +126,8 @@ pub fn draw_panel(
     recording: &Recording,
     cursor_ns: i64,
     images: &mut dyn ImageSource,
-    options: &PictureOptions,
-) -> Result<RgbaImage, PictureError> {
+    options: &ScreenshotOptions,
+) -> Result<RgbaImage, ScreenshotError> {
     with_panel(name, recording, cursor_ns, images, options, |headless, ui| match options.renderer {
         Renderer::Cpu => Ok(headless::draw(headless, ui)),
         Renderer::Wgpu => Ok(Offscreen::open()?.draw(headless, ui)?),
@@ -136,15 +136,15 @@ pub fn draw_panel(
 
 /// The same panel as a drawing of lines and texts (SVG); images and the scene are embedded as they are painted.
 ///
-/// `prefix` begins the names of its parts, so that several drawings can stand in one page; `title` says what it shows.
+/// `prefix` begins the names of its elements, so that one page can hold several; `title` is its title.
 pub fn draw_panel_svg(
     name: &str,
     recording: &Recording,
     cursor_ns: i64,
     images: &mut dyn ImageSource,
-    options: &PictureOptions,
+    options: &ScreenshotOptions,
     [prefix, title]: [&str; 2],
-) -> Result<String, PictureError> {
+) -> Result<String, ScreenshotError> {
     with_panel(name, recording, cursor_ns, images, options, |headless, ui| {
         Ok(headless::svg_of(headless, prefix, title, ui))
     })
@@ -159,10 +159,10 @@ pub fn panel_csv(
     recording: &Recording,
     cursor_ns: i64,
     images: &mut dyn ImageSource,
-    options: &PictureOptions,
-) -> Result<String, PictureError> {
+    options: &ScreenshotOptions,
+) -> Result<String, ScreenshotError> {
     let panel = PanelName::ALL.into_iter().find(|known| known.as_str() == name);
-    let panel = panel.ok_or_else(|| PictureError::UnknownPanel { name: name.to_owned() })?;
+    let panel = panel.ok_or_else(|| ScreenshotError::UnknownPanel { name: name.to_owned() })?;
     let theme = Theme::of(options.theme);
     let mut selection = Selection { slide: options.slide, ..Selection::default() };
     let playback = Playback { playing: false, ..options.playback.clone() };
@@ -178,12 +178,12 @@ fn with_panel<T>(
     recording: &Recording,
     cursor_ns: i64,
     images: &mut dyn ImageSource,
-    options: &PictureOptions,
-    draw: impl FnOnce(HeadlessOptions, &mut dyn FnMut(&mut Ui)) -> Result<T, PictureError>,
-) -> Result<T, PictureError> {
+    options: &ScreenshotOptions,
+    draw: impl FnOnce(HeadlessOptions, &mut dyn FnMut(&mut Ui)) -> Result<T, ScreenshotError>,
+) -> Result<T, ScreenshotError> {
     let panel = PanelName::ALL.into_iter().find(|known| known.as_str() == name);
     if panel.is_none() && name != WHOLE_WINDOW {
-        return Err(PictureError::UnknownPanel { name: name.to_owned() });
+        return Err(ScreenshotError::UnknownPanel { name: name.to_owned() });
     }
     check(options)?;
     let theme = Theme::of(options.theme);
@@ -203,46 +203,46 @@ fn with_panel<T>(
             None => window_ui(ui, &mut state, context),
         }
     };
-    let PictureOptions { size_px, pixels_per_point, theme, .. } = *options;
+    let ScreenshotOptions { size_px, pixels_per_point, theme, .. } = *options;
     draw(HeadlessOptions { size_px, pixels_per_point, theme }, &mut ui)
 }
 
-fn check(options: &PictureOptions) -> Result<(), PictureError> {
+fn check(options: &ScreenshotOptions) -> Result<(), ScreenshotError> {
     let [width, height] = options.size_px;
     if [width, height].iter().any(|side| !(16..=LARGEST_SIDE_PX).contains(side)) {
-        return Err(PictureError::Size { width, height });
+        return Err(ScreenshotError::Size { width, height });
     }
     let scale = options.pixels_per_point;
-    if (0.25..=8.0).contains(&scale) { Ok(()) } else { Err(PictureError::Scale { scale }) }
+    if (0.25..=8.0).contains(&scale) { Ok(()) } else { Err(ScreenshotError::Scale { scale }) }
 }
 
-/// Encodes an opaque picture as PNG, always with the same settings.
-pub fn png_bytes(picture: &RgbaImage) -> Result<Vec<u8>, PictureError> {
+/// Encodes an opaque image as PNG, always with the same settings.
+pub fn png_bytes(picture: &RgbaImage) -> Result<Vec<u8>, ScreenshotError> {
     let rgb: Vec<u8> = picture.pixels().flat_map(|pixel| [pixel.0[0], pixel.0[1], pixel.0[2]]).collect();
     let mut bytes = Cursor::new(Vec::new());
     let encoder = PngEncoder::new_with_quality(&mut bytes, CompressionType::Default, FilterType::Adaptive);
     encoder
         .write_image(&rgb, picture.width(), picture.height(), ExtendedColorType::Rgb8)
-        .map_err(|source| PictureError::Encode { source })?;
+        .map_err(|source| ScreenshotError::Encode { source })?;
     Ok(bytes.into_inner())
 }
 
-/// Writes a picture as PNG, making its folder when it is missing.
-pub fn write_png(picture: &RgbaImage, path: &Path) -> Result<(), PictureError> {
+/// Writes an image as PNG, making its folder when it is missing.
+pub fn write_png(picture: &RgbaImage, path: &Path) -> Result<(), ScreenshotError> {
     write_bytes(&png_bytes(picture)?, path)
 }
 
 /// Writes a drawing as SVG, making its folder when it is missing.
-pub fn write_svg(drawing: &str, path: &Path) -> Result<(), PictureError> {
+pub fn write_svg(drawing: &str, path: &Path) -> Result<(), ScreenshotError> {
     write_bytes(drawing.as_bytes(), path)
 }
 
 /// Writes a table of comma-separated values, making its folder when it is missing.
-pub fn write_csv(table: &str, path: &Path) -> Result<(), PictureError> {
+pub fn write_csv(table: &str, path: &Path) -> Result<(), ScreenshotError> {
     write_bytes(table.as_bytes(), path)
 }
 
-fn write_bytes(bytes: &[u8], path: &Path) -> Result<(), PictureError> {
+fn write_bytes(bytes: &[u8], path: &Path) -> Result<(), ScreenshotError> {
     if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
         fs::create_dir_all(folder).map_err(ExportError::write(folder))?;
     }
@@ -260,14 +260,14 @@ mod tests {
         let recording = sample_recording();
         let mut seen: Vec<Vec<u8>> = Vec::new();
         for name in panel_names() {
-            let options = PictureOptions { size_px: [800, 500], ..PictureOptions::default() };
+            let options = ScreenshotOptions { size_px: [800, 500], ..ScreenshotOptions::default() };
             let draw = || {
                 let picture = draw_panel(name, &recording, 9_000_000_000, &mut sample_images(), &options).unwrap();
                 assert_eq!([picture.width(), picture.height()], options.size_px);
                 png_bytes(&picture).unwrap()
             };
             let bytes = draw();
-            assert!(bytes == draw(), "two pictures of '{name}' differ");
+            assert!(bytes == draw(), "two screenshots of '{name}' differ");
             assert!(!seen.contains(&bytes), "'{name}' looks like another panel");
             let back = image::load_from_memory(&bytes).unwrap().to_rgba8();
             assert_eq!([back.width(), back.height()], options.size_px);
@@ -279,7 +279,7 @@ mod tests {
     fn the_table_of_the_timeline_holds_every_step_and_every_event() {
         let recording = sample_recording();
         let images = &mut sample_images();
-        let table = panel_csv("timeline", &recording, 9_000_000_000, images, &PictureOptions::default()).unwrap();
+        let table = panel_csv("timeline", &recording, 9_000_000_000, images, &ScreenshotOptions::default()).unwrap();
         let rows: Vec<Vec<&str>> = table.lines().map(|line| line.split(',').collect()).collect();
         let column = |name: &str| rows[0].iter().position(|head| *head == name).unwrap();
         let (run, phase, event) = (column("run"), column("phase"), column("event"));
@@ -315,7 +315,7 @@ mod tests {
         for name in panel_names() {
             for (theme, ground) in [(ThemeName::Light, "light"), (ThemeName::Dark, "dark"), (ThemeName::Print, "print")]
             {
-                let options = PictureOptions { size_px: [1200, 800], theme, ..PictureOptions::default() };
+                let options = ScreenshotOptions { size_px: [1200, 800], theme, ..ScreenshotOptions::default() };
                 let draw = || {
                     let images = &mut sample_images();
                     draw_panel_svg(name, &recording, 9_000_000_000, images, &options, ["p", "a & b"]).unwrap()
@@ -340,7 +340,7 @@ mod tests {
             (ThemeName::Light, 1.0, [1920, 1080]),
             (ThemeName::Print, 1.5, [2400, 1350]),
         ] {
-            let options = PictureOptions { size_px, pixels_per_point: scale, theme, ..PictureOptions::default() };
+            let options = ScreenshotOptions { size_px, pixels_per_point: scale, theme, ..ScreenshotOptions::default() };
             let picture = draw_panel("all", &recording, 9_000_000_000, &mut sample_images(), &options).unwrap();
             keep_picture(&format!("all-{}", theme.as_str()), &picture);
             assert_eq!([picture.width(), picture.height()], size_px);
@@ -351,13 +351,13 @@ mod tests {
     fn refusals_say_what_was_expected() {
         let recording = sample_recording();
         let draw = |name: &str, size_px, scale| {
-            let options = PictureOptions { size_px, pixels_per_point: scale, ..PictureOptions::default() };
+            let options = ScreenshotOptions { size_px, pixels_per_point: scale, ..ScreenshotOptions::default() };
             draw_panel(name, &recording, 0, &mut sample_images(), &options).unwrap_err().to_string()
         };
         let text = draw("images", [640, 480], 1.0);
         assert!(text.starts_with("no panel is called 'images': expected one of all, image, scene"), "{text}");
         let text = draw("image", [0, 480], 1.0);
-        assert!(text.starts_with("a picture of 0×480 pixels cannot be drawn"), "{text}");
+        assert!(text.starts_with("a screenshot of 0×480 pixels cannot be drawn"), "{text}");
         for scale in [0.0, -1.0, f32::NAN, 100.0] {
             assert!(draw("image", [640, 480], scale).contains("pixels per point"));
         }
