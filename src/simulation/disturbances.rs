@@ -30,9 +30,9 @@ pub struct Disturbances {
     /// From when and for how long the operator swings the gimbal's heading to and fro, 60° to each side, as fast as the
     /// motors follow (200°/s).
     pub gimbal_slew_s: Option<[f64; 2]>,
-    /// Which joint (from 1) is held where it is, from when and for how long.
+    /// Joint (from 1) that is fixed at its angle, start and duration in seconds.
     pub held_joint: Option<[f64; 3]>,
-    /// From when and for how long the vehicle hovers, swaying by a centimetre, before it flies on.
+    /// Start and duration in seconds of hovering with a sway of a centimetre; the flight goes on after it.
     pub hover_s: Option<[f64; 2]>,
     /// From when and for how long the camera keeps its orientation in the world exactly, as far as the stops let it.
     pub stabilized_s: Option<[f64; 2]>,
@@ -90,7 +90,7 @@ impl Disturbances {
         Ok(())
     }
 
-    /// Refuses what cannot be flown or recorded.
+    /// Checks the ranges of all values.
     pub(crate) fn check(&self) -> Result<(), SimulationError> {
         let within = |option: &'static str, value: f64, low: f64, high: f64| {
             let inside = value >= low && value <= high;
@@ -103,12 +103,12 @@ impl Disturbances {
         within("range of the gyroscope in rad/s", self.gyroscope_range_rad_per_s.unwrap_or(1.0), 1e-3, 1e3)?;
         within("range of the accelerometer in m/s²", self.accelerometer_range_m_per_s2.unwrap_or(1.0), 1e-3, 1e4)?;
         within("factor of the light", self.light_change.map_or(1.0, |[_, factor]| factor), 0.01, 100.0)?;
-        within("number of the held joint", self.held_joint.map_or(1.0, |[joint, _, _]| joint), 1.0, 3.0)?;
+        within("number of the fixed joint", self.held_joint.map_or(1.0, |[joint, _, _]| joint), 1.0, 3.0)?;
         within("length of the hover in seconds", self.hover_s.map_or(0.0, |[_, length]| length), 0.0, 3600.0)?;
         within("rate of the spin in rad/s", self.spin.map_or(0.0, |[_, _, rate]| rate), -6.0, 6.0)
     }
 
-    /// How much brighter pictures are at a time than without a change of the light.
+    /// Ratio of the image brightness at a time to that without a change of the light.
     pub(crate) fn light_at(&self, time_s: f64) -> f64 {
         match self.light_change {
             Some([start_s, factor]) if time_s >= start_s => factor.powf((-(time_s - start_s) / AUTO_EXPOSURE_S).exp()),

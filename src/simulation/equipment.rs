@@ -12,7 +12,7 @@ use crate::sensors::{CameraMount, CameraRig, ChainPrior, GimbalRig, ImuRig, Rig}
 
 /// Gravity in the simulated worlds, in m/s².
 pub(crate) const GRAVITY_M_PER_S2: f64 = 9.81;
-/// Rate of the inertial sensor and of the encoders.
+/// Rate of the IMU and of the encoders.
 pub(crate) const IMU_RATE_HZ: f64 = 200.0;
 /// Size that the intrinsics below belong to.
 const NOMINAL_SIZE_PX: [usize; 2] = [640, 480];
@@ -26,7 +26,7 @@ pub enum Lens {
     Radtan,
 }
 
-/// A simulated camera at this image size; `which` tells the gimbal's (0) from the static one (1).
+/// A simulated camera at this image size; `which` is 0 for the gimbal camera, 1 for the static one.
 pub(crate) fn camera_model(which: usize, lens: Lens, resolution_px: [usize; 2]) -> CameraModel {
     let [fx, fy, cx, cy] = [[361.4, 360.9, 318.6, 241.8], [357.8, 358.3, 322.7, 237.4]][which.min(1)];
     let distortion = match (lens, which) {
@@ -117,7 +117,7 @@ fn static_mount(random: &mut RandomStream) -> RigidTransform {
 
 /// The rig an estimator is given: each of the chain's `4N + 6` independent parameters (the minimal form's) is wrong by
 /// a uniform error within `bounds`, as the paper starts its experiments; static cameras are wrong within the same
-/// bounds, but by no more than 3 mm and 0.5° per axis, and the cameras' time offset is not told.
+/// bounds, but by no more than 3 mm and 0.5° per axis, and the cameras' time offset is not in it.
 pub(crate) fn given_rig(truth: &Rig, bounds: ChainPrior, random: &mut RandomStream) -> Rig {
     let mut given = truth.clone();
     if let Some(gimbal) = &mut given.gimbal {

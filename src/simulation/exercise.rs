@@ -38,7 +38,7 @@ pub struct JointSwing {
     pub amplitude_rad: f64,
 }
 
-/// Swings of the vehicle and of a joint at once, the other joints held.
+/// Simultaneous swings of the vehicle and of a joint, the other joints fixed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Exercise {
     /// The vehicle's.
@@ -85,7 +85,7 @@ impl Exercise {
         }
     }
 
-    /// Turn of the vehicle about the vertical, in radians.
+    /// Rotation of the vehicle about the vertical, in radians.
     pub fn turn_rad(&self, time_s: f64) -> f64 {
         if self.vehicle == VehicleSwing::Yaw { YAW_SWING_RAD * swing(time_s, YAW_PERIOD_S) } else { 0.0 }
     }

@@ -53,7 +53,7 @@ impl Experiment {
         Self::ALL.into_iter().find(|experiment| experiment.name().eq_ignore_ascii_case(name))
     }
 
-    /// The world it is flown in.
+    /// Its environment.
     pub fn environment(self) -> Environment {
         match self {
             Self::T1 | Self::T2 => Environment::House,
@@ -123,7 +123,7 @@ impl Experiment {
                 forward_strokes: 5,
             }),
             Self::T3 | Self::T4 => {
-                // Streets of their own stream: a longer flight begins as a shorter one does.
+                // Streets of their own stream: a longer flight starts as a shorter one does.
                 let mut turns = RandomStream::new(random.next_u64(), 0);
                 let path = Path::new(streets(length_m, &mut turns), false, 5);
                 Box::new(Cruise::new(pace, path, [2.9, 0.8], 0.7, 0.0, random))

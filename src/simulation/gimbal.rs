@@ -60,7 +60,7 @@ pub(crate) struct LookAround {
     pub(crate) roll_rad: f64,
     /// From when and for how long the heading is swung to and fro as fast as the motors follow.
     pub(crate) slew_s: Option<[f64; 2]>,
-    /// Which joint is held where it is, from when and for how long.
+    /// Joint that is fixed at its angle, start and duration in seconds.
     pub(crate) held_joint: Option<(usize, [f64; 2])>,
     /// From when and for how long the camera keeps its orientation in the world exactly.
     pub(crate) stabilized_s: Option<[f64; 2]>,
@@ -139,7 +139,7 @@ pub struct JointMotion {
 }
 
 impl JointMotion {
-    /// Flies the gimbal: at every step the controller asks for joint rates that turn the camera to what is wanted, the
+    /// Simulates the gimbal: at every step the controller asks for joint rates that turn the camera to what is wanted, the
     /// motors follow with lag, and the stops hold.
     pub(crate) fn fly(
         trajectory: &Trajectory,
@@ -186,7 +186,7 @@ impl JointMotion {
         Self { states }
     }
 
-    /// From a time on the joints are held where they are, but for an exercise's swing within the stops.
+    /// From a time on the joints are fixed, but for an exercise's swing within the stops.
     pub(crate) fn exercise_from(&mut self, start_s: f64, exercise: &Exercise, joints: &[Joint]) {
         let first = ((start_s / CONTROL_STEP_S).ceil() as usize).min(self.states.len() - 1);
         let held = self.states[first].0;
@@ -220,7 +220,7 @@ impl JointMotion {
     }
 }
 
-/// The joint steps that would turn the camera to the wanted orientation, to first order.
+/// First-order joint increments, in radians, that rotate the camera to the wanted orientation.
 fn turn_towards(
     world_from_imu: &UnitQuaternion<f64>,
     chain: &ClassicalChain,
@@ -240,7 +240,7 @@ fn turn_towards(
     normal.try_inverse().map_or_else(Vector3::zeros, |inverse| inverse * (axes.transpose() * error))
 }
 
-/// Turns the joints so that the camera has an orientation in the world, as far as the stops let them.
+/// Joint angles, in radians within the stops, for a wanted orientation of the camera in the world.
 fn keep(
     world_from_imu: &UnitQuaternion<f64>,
     chain: &ClassicalChain,
@@ -258,7 +258,7 @@ fn keep(
     }
 }
 
-/// The angles at which the gimbal already holds what is wanted when the log begins.
+/// Joint angles, in radians, that meet the wanted orientation at the start of the log.
 fn start_angles(trajectory: &Trajectory, chain: &ClassicalChain, look: &LookAround, heading_rad: f64) -> [f64; 3] {
     let rotation = trajectory.at(0.0).world_from_imu.rotation;
     let wanted = look.orientation(heading_rad, 0.0);

@@ -1,4 +1,4 @@
-//! The inertial sensor: truth from the trajectory's derivatives, noise densities, bias walks and turn-on biases.
+//! The IMU: ground truth from the trajectory's derivatives, noise densities, bias random walks and turn-on biases.
 
 use nalgebra::Vector3;
 
@@ -7,7 +7,7 @@ use super::trajectory::Trajectory;
 use crate::geometry::ns_from_seconds;
 use crate::sensors::{ImuNoise, ImuSample};
 
-/// Noise of the ADIS16448 as `RotorS` gives it, which the paper flew.
+/// Noise of the ADIS16448 as `RotorS` gives it, the IMU of the paper.
 pub(crate) const FIREFLY_IMU: ImuNoise = ImuNoise {
     accelerometer_noise_density: 0.004,
     accelerometer_random_walk: 0.006,

@@ -8,21 +8,21 @@ use super::experiment::Experiment;
 use crate::flight_log::LogError;
 use crate::sensors::ChainPrior;
 
-/// What `simulate` is to fly and record; [`SimulationOptions::new`] gives an experiment as the paper flew it.
+/// Flight and sensors of a simulation; [`SimulationOptions::new`] gives an experiment of the paper.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SimulationOptions {
     /// Which experiment.
     pub experiment: Experiment,
     /// Everything random follows from this.
     pub seed: u64,
-    /// Length in seconds; `None` flies until the path has the experiment's length. A shorter flight is the beginning
+    /// Length in seconds; `None` ends where the path has the experiment's length. A shorter flight is the beginning
     /// of a longer one.
     pub duration_s: Option<f64>,
     /// Standard deviation of the encoders' white noise; `None` records no joint angles.
     pub encoder_sigma_rad: Option<f64>,
     /// How wrong the given rig's chain is.
     pub start_error: ChainPrior,
-    /// Scales noise, bias walk and turn-on biases of the inertial sensor; 0 makes it perfect.
+    /// Scales noise, bias random walk and turn-on biases of the IMU; 0 makes it ideal.
     pub imu_noise_scale: f64,
     /// The cameras' lenses.
     pub lens: Lens,
@@ -60,7 +60,7 @@ impl SimulationOptions {
         }
     }
 
-    /// Refuses what cannot be flown or recorded.
+    /// Checks the ranges of all options.
     pub(crate) fn check(&self) -> Result<(), SimulationError> {
         let within = |option: &'static str, value: f64, low: f64, high: f64| {
             let inside = value >= low && value <= high;
@@ -99,7 +99,7 @@ pub struct SimulationSummary {
     pub path_length_m: f64,
     /// Number of images, all cameras together.
     pub images: usize,
-    /// How far the given chain is off over the joint angles visited, on the mean: metres and radians.
+    /// Mean extrinsics error of the given chain over the joint angles visited: metres and radians.
     pub given_chain_error: (f64, f64),
 }
 

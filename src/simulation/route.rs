@@ -1,4 +1,4 @@
-//! Where the experiments fly: routes on the plan with speed, height, heading and how much they deviate.
+//! Routes of the experiments in plan view, with velocity, height, heading and random deviations.
 
 use nalgebra::{Vector2, Vector3};
 
@@ -30,16 +30,16 @@ pub(crate) trait Flight {
     fn point(&self, time_s: f64) -> FlightPoint;
 }
 
-/// How hard a flight is flown.
+/// Dynamics of a flight.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Pace {
     /// Seconds of hover at the start.
     pub(crate) hover_s: f64,
     /// Sway while hovering (standard deviation).
     pub(crate) sway_m: f64,
-    /// Seconds from hover to full speed.
+    /// Seconds from hover to full velocity.
     pub(crate) ramp_s: f64,
-    /// Speed along the route once under way.
+    /// Velocity along the route after the ramp.
     pub(crate) speed_m_per_s: f64,
     /// Horizontal and vertical manoeuvres (standard deviation of the spline's control points).
     pub(crate) manoeuvre_m: [f64; 2],
@@ -177,7 +177,7 @@ fn cut_corners(points: &[Vector2<f64>], closed: bool) -> Vec<Vector2<f64>> {
     cut
 }
 
-/// Along a path with slowly changing speed, height and distance from it.
+/// Along a path with slowly changing velocity, height and distance from it.
 #[derive(Clone, Debug)]
 pub(crate) struct Cruise {
     /// How hard.
@@ -216,7 +216,7 @@ impl Flight for Cruise {
         let speed_swing_m = 1.6 * self.pace.speed_m_per_s * since(&self.waves[0]) * 0.5;
         let along_m = self.pace.speed_m_per_s * flown_s + speed_swing_m.max(-self.pace.speed_m_per_s * flown_s);
         let (on_path, _) = self.path.at(along_m);
-        // The heading is that of a chord ahead: it turns before the corner does.
+        // The heading is that of a chord ahead: it rotates before the corner.
         let (_, direction) = self.path.at(along_m);
         let (_, ahead) = self.path.at(along_m + 2.5);
         let side = Vector2::new(-direction.sin(), direction.cos()) * (self.wander_m * since(&self.waves[1]));
@@ -283,9 +283,9 @@ pub(crate) struct Station {
 pub(crate) struct Drill {
     /// Where.
     pub(crate) position_m: Vector3<f64>,
-    /// Heading at rest.
+    /// Heading while hovering.
     pub(crate) heading_rad: f64,
-    /// When the exercise begins.
+    /// Start of the exercise.
     pub(crate) start_s: f64,
     /// What is exercised.
     pub(crate) exercise: Exercise,
@@ -295,7 +295,7 @@ impl Drill {
     /// Rest before and after the warm-up.
     const REST_S: f64 = 1.0;
 
-    /// Share of the warm-up's size at a time: none while resting.
+    /// Amplitude of the warm-up at a time as a ratio of its full size: 0 while hovering.
     fn liveliness(&self, time_s: f64) -> f64 {
         let (begin_s, end_s) = (Self::REST_S, self.start_s - Self::REST_S);
         let share = ((time_s - begin_s) / (end_s - begin_s).max(1e-3)).clamp(0.0, 1.0);

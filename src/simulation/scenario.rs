@@ -22,10 +22,10 @@ pub(crate) mod stream {
     pub(crate) const DELIVERY: u64 = 10;
 }
 
-/// When the encoders are read after the inertial sensor.
+/// Time from an IMU sample to the encoder reading.
 const ENCODER_PHASE_S: f64 = 0.002;
 
-/// A flight, its rig, and the measurements of its inertial sensor and encoders.
+/// A flight, its rig, and the measurements of its IMU and encoders.
 #[derive(Clone, Debug)]
 pub(crate) struct Scenario {
     pub(crate) trajectory: Trajectory,
@@ -47,7 +47,7 @@ pub(crate) struct ScenarioOptions<'a> {
 }
 
 impl Scenario {
-    /// Flies a trajectory with the gimbal looking around as told, and measures.
+    /// Simulates gimbal and sensors along a trajectory.
     pub(crate) fn new(trajectory: Trajectory, look: &LookAround, options: &ScenarioOptions<'_>) -> Self {
         let random = |stream| RandomStream::new(options.seed, stream);
         let true_rig = options.equipment.true_rig(options.name, &mut random(stream::RIG));
@@ -66,7 +66,7 @@ impl Scenario {
         Self { trajectory, joints, inertial, true_rig, given_rig, seed: options.seed }
     }
 
-    /// The true pose of a camera in the world at a time of the inertial sensor's clock.
+    /// Ground truth `world_from_camera` at a time of the IMU's clock.
     pub(crate) fn world_from_camera(&self, camera: &CameraRig, time_s: f64) -> RigidTransform {
         let world_from_imu = self.trajectory.at(time_s).world_from_imu;
         match (&camera.mount, &self.true_rig.gimbal, &self.joints) {

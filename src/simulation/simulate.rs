@@ -1,4 +1,4 @@
-//! An experiment flown, pictured and written as a flight log with its rig and its truth.
+//! Simulates an experiment and writes it as a flight log with its rig and ground truth.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::fmt::Write as _;
@@ -22,20 +22,20 @@ use crate::flight_log::{LogWriter, LogWriterOptions, MessageTimes};
 use crate::geometry::{ns_from_seconds, seconds_from_ns, so3};
 use crate::sensors::{CameraRig, ImuSample, JointSample};
 
-/// When simulated logs begin: 15 June 2025, 15:06:40 UTC.
+/// Start of simulated logs: 15 June 2025, 15:06:40 UTC.
 const EPOCH_NS: i64 = 1_750_000_000_000_000_000;
 /// Stamp of the first image; streams are not aligned on purpose.
 const FIRST_IMAGE_S: f64 = 0.003;
 /// Images that are rendered at once, over all threads.
 const BATCH: usize = 24;
-/// Pictures that make up one blurred image.
+/// Rendered images that are averaged into one with motion blur.
 const BLUR_STEPS: usize = 7;
-/// Mean speed that flights are planned for, rather too low.
+/// Mean velocity that flights are planned for, a lower bound.
 const PLANNED_M_PER_S: f64 = 2.5;
-/// Delay from measurement to recording: inertial sensor, encoders, first camera, and each further camera.
+/// Delay from measurement to recording: IMU, encoders, first camera, and each further camera.
 const DELAYS_S: [f64; 4] = [0.0004, 0.0007, 0.018, 0.0015];
 
-/// Flies an experiment and writes `output` (an MCAP log) with `.rig.yaml` and `.truth.yaml` beside it.
+/// Simulates an experiment and writes `output` (an MCAP log) with `.rig.yaml` and `.truth.yaml` beside it.
 ///
 /// The same options and file name give the same bytes whatever the thread count. `progress` is called as images are
 /// done.
@@ -349,7 +349,7 @@ impl<'a> Studio<'a> {
     }
 }
 
-/// How far the given chain is off over the joint angles visited: mean translation in metres and rotation in radians.
+/// Extrinsics error of the given chain, averaged over the joint angles visited: translation in metres, rotation in radians.
 fn given_chain_error(scenario: &Scenario) -> (f64, f64) {
     let (Some(given), Some(truth)) = (&scenario.given_rig.gimbal, &scenario.true_rig.gimbal) else { return (0.0, 0.0) };
     let samples = scenario.true_joint_samples();

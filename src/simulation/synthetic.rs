@@ -55,11 +55,11 @@ pub struct SyntheticOptions {
     pub frame_rate_hz: f64,
     /// Noise of a feature's pixel, per axis.
     pub pixel_sigma_px: f64,
-    /// Share of the features whose tracks slip off their landmark.
+    /// Ratio of features whose tracks drift off their landmark.
     pub outlier_share: f64,
     /// Most features in a frame.
     pub features: usize,
-    /// Scales noise, bias walk and turn-on bias of the inertial sensor; 0 makes it perfect.
+    /// Scales noise, bias random walk and turn-on bias of the IMU; 0 makes it ideal.
     pub imu_noise_scale: f64,
     /// Noise of the encoders; `None` without encoders.
     pub encoder_sigma_rad: Option<f64>,
@@ -158,7 +158,7 @@ const FIRST_FRAME_S: f64 = 0.003;
 /// Half the time over which the rate of a joint is taken.
 const RATE_STEP_S: f64 = 0.005;
 
-/// Flies a synthetic flight.
+/// Simulates a flight and its feature tracks.
 pub fn synthetic_tracks(options: &SyntheticOptions) -> SyntheticFlight {
     let gimbal = options.mount == SyntheticMount::Gimbal;
     let equipment = Equipment {
@@ -268,7 +268,7 @@ struct Track {
     remaining: u32,
 }
 
-/// An ideal front end: it knows the landmarks.
+/// An ideal front end with known correspondences.
 struct Tracker {
     model: CameraModel,
     random: RandomStream,

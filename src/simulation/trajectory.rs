@@ -18,7 +18,7 @@ pub struct VehicleLimits {
     pub largest_thrust_m_per_s2: f64,
     /// Largest angular rate about any axis, in rad/s.
     pub rate_rad_per_s: f64,
-    /// Largest speed, in m/s.
+    /// Largest velocity, in m/s.
     pub speed_m_per_s: f64,
 }
 
@@ -45,7 +45,7 @@ pub struct Kinematics {
     pub acceleration_m_per_s2: Vector3<f64>,
     /// Angular velocity in the IMU frame.
     pub angular_velocity_rad_per_s: Vector3<f64>,
-    /// Specific force in the IMU frame: +g along z at rest.
+    /// Specific force in the IMU frame, 3 × 1 in m/s²: +g along z when stationary and level.
     pub specific_force_m_per_s2: Vector3<f64>,
     /// Heading of the vehicle's route, in radians from the world's x axis, not wrapped.
     pub heading_rad: f64,
@@ -64,7 +64,7 @@ pub struct Trajectory {
     duration_s: f64,
 }
 
-/// Drag of the air over mass and speed, in 1/s.
+/// Drag of the air over mass and velocity, in 1/s.
 pub(crate) const AIR_DRAG_PER_S: f64 = 0.15;
 
 /// Step at which limits are checked and lengths are summed, in seconds.
@@ -129,7 +129,7 @@ impl Trajectory {
         }
     }
 
-    /// Turns the vehicle about the vertical for a stretch of start and length in seconds, beyond what it turns anyway.
+    /// Adds a rotation about the vertical over an interval of start and length in seconds.
     pub(crate) fn spin(&mut self, [start_s, length_s]: [f64; 2], rate_rad_per_s: f64) {
         for index in 0..self.heading_rad.points.len() {
             let time_s = self.heading_rad.time_of_point(index);
@@ -137,9 +137,9 @@ impl Trajectory {
         }
     }
 
-    /// Hovers for a stretch of start and length in seconds, swaying by a centimetre; what comes later is flown later.
+    /// Inserts hovering over an interval of start and length in seconds, swaying by a centimetre; the rest is delayed.
     ///
-    /// A spline reaches three knots to either side of its points, so the vehicle slows down before and is at rest after.
+    /// A spline reaches three knots to either side of its points, so the vehicle slows down before and is stationary after.
     pub(crate) fn hover(&mut self, [start_s, length_s]: [f64; 2]) {
         const SWAY_M: f64 = 0.01;
         const REACH: usize = 6;
@@ -166,7 +166,7 @@ impl Trajectory {
         self.duration_s
     }
 
-    /// Where the vehicle is, how it moves and what a perfect inertial sensor would feel, `time_s` after the start.
+    /// Pose, velocity and the measurement of an ideal IMU, `time_s` after the start.
     pub fn at(&self, time_s: f64) -> Kinematics {
         let position_m = self.position_m.derivative(time_s, 0);
         let velocity_m_per_s = self.position_m.derivative(time_s, 1);
@@ -204,14 +204,14 @@ impl Trajectory {
         }
     }
 
-    /// Length of the path flown until `time_s`, in metres.
+    /// Length of the path until `time_s`, in metres.
     pub fn length_m(&self, time_s: f64) -> f64 {
         let steps = (time_s / CHECK_STEP_S).round().max(1.0) as usize;
         let step_s = time_s / steps as f64;
         (0..steps).map(|step| self.position_m.derivative((step as f64 + 0.5) * step_s, 1).norm() * step_s).sum()
     }
 
-    /// When the path flown has this length, at most the duration; a multiple of 0.05 s.
+    /// Time in seconds at which the path has this length, at most the duration; a multiple of 0.05 s.
     pub(crate) fn time_of_length(&self, length_m: f64) -> f64 {
         const STEP_S: f64 = 0.05;
         let mut length = 0.0;

@@ -1,4 +1,4 @@
-//! What to fly next: candidate motions from here, linearized, and what each would leave of the weakest direction.
+//! Suggested excitation: candidate motions from here, linearized, and the σ that each leaves of the least observable direction.
 
 use std::fmt;
 
@@ -18,7 +18,7 @@ use crate::geometry::{Dimension, RigidTransform, ns_from_seconds, so3};
 use crate::sensors::ImuSample;
 use crate::simulation::{Exercise, JOINT_PERIOD_S, JointSwing, SWING_M, VehicleSwing, YAW_SWING_RAD};
 
-/// How long a candidate is flown, in seconds.
+/// Duration of a candidate, in seconds.
 pub const ADVICE_DURATION_S: f64 = 4.0;
 /// Frames of a candidate's window: about as many keyframes as the estimator makes of one.
 const FRAMES: usize = 16;
@@ -36,17 +36,17 @@ const JOINT_SWING_RAD: f64 = 20.0 * std::f64::consts::PI / 180.0;
 const JOINT_RATE_RAD_PER_S: f64 = 60.0 * std::f64::consts::PI / 180.0;
 /// A joint with less room than this is left alone, in radians.
 const LEAST_SWING_RAD: f64 = 3.0 * std::f64::consts::PI / 180.0;
-/// A vehicle's speed at the start fades with this time constant, in seconds.
+/// The vehicle's velocity at the start decays with this time constant, in seconds.
 const BRAKING_S: f64 = 0.8;
 
-/// Which motion would tell most about what is known least.
+/// Candidate motions by the σ that they leave of the least observable direction.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Advice {
-    /// The direction that is known least, of all that some motion can tell.
+    /// The least observable direction among those that some motion constrains.
     pub weakest: WeakDirection,
     /// Every candidate, the best one first.
     pub candidates: Vec<CandidateReport>,
-    /// How long each is flown.
+    /// Duration of each, in seconds.
     pub duration_s: f64,
 }
 
@@ -59,7 +59,7 @@ pub struct WeakDirection {
     pub weights: Vec<f64>,
     /// Standard deviation along it, in the same units.
     pub sigma: f64,
-    /// The parameter with the largest share.
+    /// The parameter with the largest weight.
     pub leading: String,
     /// The deviation of the leading parameter that belongs to one sigma along the direction, in radians or metres.
     pub leading_sigma: f64,
@@ -73,20 +73,20 @@ pub struct WeakDirection {
 pub struct CandidateReport {
     /// What to do, in words.
     pub words: String,
-    /// The standard deviation along the weakest direction that it would leave.
+    /// Standard deviation along the least observable direction after it.
     pub sigma_after: f64,
     /// The same over what it is now.
     pub remaining: f64,
-    /// What is flown.
+    /// The motion.
     #[serde(skip)]
     pub exercise: Exercise,
 }
 
-/// Linearizes every candidate from here and orders them by what they would leave of the weakest direction; `None` when
+/// Linearizes every candidate from here and orders them by the σ that they leave of the least observable direction; `None` when
 /// nothing is estimated or a number is not finite.
 ///
-/// A candidate's window stands alone: positions, yaw, speeds and biases at its start count as unknown, so that what it
-/// tells is added to what is known of the calibration.
+/// A candidate's window stands alone: positions, yaw, velocities and biases at its start are unknown; its information is
+/// added to the posterior of the calibration.
 pub fn advise(situation: &Situation) -> Option<Advice> {
     let excitable = excitable_directions(&situation.chain, situation.joints_free());
     if excitable.ncols() == 0 {
@@ -159,7 +159,7 @@ fn candidates(situation: &Situation) -> Vec<Exercise> {
     VehicleSwing::ALL.into_iter().flat_map(with).collect()
 }
 
-/// What flying a candidate tells about the calibration, in units of 10° and 3 cm.
+/// Information of a candidate about the calibration, in units of 10° and 3 cm.
 fn information_of(situation: &Situation, exercise: &Exercise) -> Option<DMatrix<f64>> {
     let states: Vec<(f64, NavigationState, Vec<f64>)> = (0..FRAMES)
         .map(|slot| {
@@ -210,7 +210,7 @@ fn joints_at(situation: &Situation, exercise: &Exercise, time_s: f64) -> Vec<f64
     angles.map(|(joint, angle)| angle + exercise.joint_rad(joint, time_s)).collect()
 }
 
-/// Position of the vehicle: its speed fades, and the exercise comes on top.
+/// Position of the vehicle: its velocity decays, and the exercise comes on top.
 fn position_at(situation: &Situation, exercise: &Exercise, time_s: f64) -> Vector3<f64> {
     let start = &situation.navigation;
     let shift = exercise.shift_m(time_s.max(0.0));
@@ -231,7 +231,7 @@ fn forward_of(world_from_imu: &RigidTransform) -> Vector3<f64> {
     ahead.try_normalize(1e-6).unwrap_or_else(Vector3::x)
 }
 
-/// Pose and speed during a candidate: the vehicle tilts as a multirotor must to accelerate so (without drag).
+/// Pose and velocity during a candidate: the vehicle tilts as a multirotor must to accelerate so (without drag).
 fn navigation_at(situation: &Situation, exercise: &Exercise, time_s: f64) -> NavigationState {
     const STEP_S: f64 = 1e-3;
     let at = |steps: f64| position_at(situation, exercise, time_s + steps * STEP_S);
@@ -248,7 +248,7 @@ fn navigation_at(situation: &Situation, exercise: &Exercise, time_s: f64) -> Nav
     }
 }
 
-/// What an inertial sensor feels over an interval of a motion, both ends included.
+/// Samples of an ideal IMU over an interval of a motion, both ends included.
 fn samples(
     motion: &dyn Fn(f64) -> NavigationState,
     from_s: f64,
@@ -281,7 +281,7 @@ fn landmarks(situation: &Situation, poses: &[RigidTransform]) -> Vec<Hypothetica
     let mut landmarks = Vec::new();
     for index in 0..LANDMARKS_PER_FRAME * poses.len() {
         let home = index % poses.len();
-        // A low-discrepancy sequence over the picture and over the distances (Roberts' R3).
+        // A low-discrepancy sequence over the image and over the distances (Roberts' R3).
         let fraction = |factor: f64| (0.5 + factor * (index + 1) as f64).fract();
         let (across, down, far) = (fraction(0.819_172_513_4), fraction(0.671_043_606_7), fraction(0.549_700_477_9));
         let inside = |share: f64, size: f64| BORDER_PX + share * (size - 2.0 * BORDER_PX);

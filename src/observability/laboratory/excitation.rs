@@ -1,4 +1,4 @@
-//! What told what: how much a window says about each parameter per second, and which motion that is owed to.
+//! Information gain of a window per parameter and second, and the motion that it is due to.
 
 use std::fmt;
 
@@ -33,11 +33,11 @@ pub struct ParameterExcitation {
     pub by_motion: Vec<f64>,
 }
 
-/// How much a window tells about each parameter per second beyond a prior of 10° and 3 cm, and how much of it would be
-/// missing if one motion had not been flown: the same window is linearized again with that motion taken out of its states,
-/// the landmarks where they are and seen by the same frames. `None` for windows without length or finite numbers.
+/// Information gain of a window per parameter and second beyond a prior of 10° and 3 cm, and the part that is lost without
+/// one motion: the same window is linearized again with that motion taken out of its states, with the same landmarks and
+/// observations. `None` for windows without length or finite numbers.
 ///
-/// What is missing without each motion need not add up to the whole: two motions may tell the same, or only together.
+/// These parts need not add up to the whole: two motions may constrain the same parameter, or only together.
 pub fn excitation(
     window: &HypotheticalWindow,
     chain: &Chain,
@@ -58,7 +58,7 @@ pub fn excitation(
     let bits = |more: f64, less: f64| 0.5 * (more / less).log2() / duration_s;
     let parameters = chain.parameters().into_iter().enumerate().map(|(column, parameter)| ParameterExcitation {
         name: names.name(parameter),
-        // In units of the prior the variance begins at 1.
+        // In units of the prior the variance starts at 1.
         bits_per_s: bits(1.0, whole[column]),
         by_motion: without.iter().map(|variances| bits(variances[column], whole[column])).collect(),
     });

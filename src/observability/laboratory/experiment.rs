@@ -7,8 +7,7 @@ use super::mechanism::Mechanism;
 use super::motion::{Flight, LaboratoryMotion};
 use crate::camera::CameraModel;
 use crate::estimator::{
-    HypotheticalFrame, HypotheticalLandmark, HypotheticalWindow, JointKnowledge, LandmarkModel, PoseKnowledge,
-    gravity_in_world,
+    JointKnowledge, LandmarkModel, PoseKnowledge, HypotheticalFrame, HypotheticalLandmark, HypotheticalWindow, gravity_in_world,
 };
 use crate::geometry::{Dimension, SplitMix64};
 use crate::gimbal::{Chain, ParameterId, Parameterization};
@@ -18,7 +17,7 @@ use crate::sensors::ImuNoise;
 /// A parameterization of the mechanism, with or without its joint offsets as columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct LaboratoryForm {
-    /// The chart.
+    /// The parameterization of the chain.
     pub parameterization: Parameterization,
     /// Whether the joint offsets are estimated.
     pub joint_offsets: bool,
@@ -47,11 +46,11 @@ impl std::str::FromStr for LaboratoryForm {
     type Err = crate::gimbal::UnknownParameterization;
 
     fn from_str(name: &str) -> Result<Self, Self::Err> {
-        let (chart, joint_offsets) = match name.strip_suffix("-without-offsets") {
-            Some(chart) => (chart, false),
+        let (parameterization, joint_offsets) = match name.strip_suffix("-without-offsets") {
+            Some(parameterization) => (parameterization, false),
             None => (name, true),
         };
-        Ok(Self { parameterization: chart.parse()?, joint_offsets })
+        Ok(Self { parameterization: parameterization.parse()?, joint_offsets })
     }
 }
 
@@ -80,7 +79,7 @@ pub struct LaboratorySetup {
 pub const FRAME_PERIOD_S: f64 = 0.25;
 /// Magnitude of gravity in an experiment.
 const GRAVITY_M_PER_S2: f64 = 9.81;
-/// Rate of the inertial sensor.
+/// Rate of the IMU.
 const IMU_RATE_HZ: f64 = 200.0;
 /// Standard deviation of a pixel.
 pub const PIXEL_SIGMA_PX: f64 = 1.0;
@@ -88,12 +87,12 @@ pub const PIXEL_SIGMA_PX: f64 = 1.0;
 const DEPTH_M: [f64; 2] = [4.0, 14.0];
 /// Landmarks are drawn within this tangent of the optical axis, across and down.
 const VIEW: [f64; 2] = [0.6, 0.45];
-/// A landmark is seen by every camera that has it this far in front of it.
+/// A landmark is observed by every camera that has it this far in front of it.
 const LEAST_DEPTH_M: f64 = 1.0;
 /// Standard deviations of the chain's numbers with the priors kept in: 3 cm and 10°, the scale of the columns.
 const CHAIN_PRIOR: (f64, f64) = (Dimension::Length.scale(), Dimension::Angle.scale());
 
-/// The inertial sensor of an experiment without a rig: the ADIS16448 that the paper flew, as `RotorS` gives it.
+/// The IMU of an experiment without a rig: the ADIS16448 of the paper, as `RotorS` gives it.
 pub const LABORATORY_IMU: ImuNoise = ImuNoise {
     accelerometer_noise_density: 0.004,
     accelerometer_random_walk: 0.006,
@@ -102,7 +101,7 @@ pub const LABORATORY_IMU: ImuNoise = ImuNoise {
 };
 
 impl LaboratorySetup {
-    /// A mechanism flown aggressively, with poses and joint angles known, ten frames and a hundred landmarks.
+    /// A mechanism in aggressive motion, with poses and joint angles known, ten frames and a hundred landmarks.
     pub fn new(mechanism: Mechanism) -> Self {
         let camera = CameraModel::pinhole([460.0, 460.0, 320.0, 240.0], [640, 480]);
         Self {
@@ -152,7 +151,7 @@ impl LaboratorySetup {
         self.window_from(0)
     }
 
-    /// The window that begins so many frames after the begin of the motion.
+    /// The window that starts so many frames after the start of the motion.
     pub(super) fn window_from(&self, first: usize) -> HypotheticalWindow {
         let gravity_in_world = gravity_in_world(GRAVITY_M_PER_S2);
         let flight = Flight { mechanism: &self.mechanism, motion: self.motion, frozen: &self.frozen, gravity_in_world };
@@ -184,7 +183,7 @@ impl LaboratorySetup {
         }
     }
 
-    /// Landmarks drawn in the views of all frames in turn, anchored in the first frame that sees them.
+    /// Landmarks drawn in the views of all frames in turn, anchored in the first frame that observes them.
     fn landmarks_of(&self, frames: &[HypotheticalFrame]) -> Vec<HypotheticalLandmark> {
         let mut random = SplitMix64::new(1);
         let mut within = |low: f64, high: f64| low + (high - low) * random.next_unit();
@@ -223,7 +222,7 @@ pub struct LaboratoryResult {
 /// How many columns are lost to what.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Deficit {
-    /// Redundant in the parameterization, or its chart singular (G).
+    /// Redundant in the parameterization, or its parameterization singular (G).
     pub parameterization: usize,
     /// Joints that did not move (F).
     pub joints: usize,

@@ -43,7 +43,7 @@ pub struct UnknownMechanism {
 type JointAxis = (Vector3<f64>, Vector3<f64>);
 
 impl Mechanism {
-    /// The names that [`Self::named`] knows, each with what it is.
+    /// The names that [`Self::named`] takes, each with its meaning.
     pub const NAMES: [(&'static str, &'static str); 19] = [
         (
             "yaw-roll-pitch-offset",

@@ -45,9 +45,9 @@ pub enum LaboratoryMotion {
     StabilizedTranslationOnly,
     /// The camera neither turns nor moves in the world.
     CameraHeldStill,
-    /// As aggressive, the second joint (or the only one) held.
+    /// As aggressive, the second joint (or the only one) fixed.
     OneJointFrozen,
-    /// As aggressive, all joints held.
+    /// As aggressive, all joints fixed.
     AllJointsFrozen,
 }
 
@@ -112,7 +112,7 @@ impl LaboratoryMotion {
             Self::Aggressive => "the vehicle turns and translates about all axes",
             Self::TranslationOnly => "the vehicle translates and never rotates",
             Self::Hover => "the vehicle neither translates nor rotates",
-            Self::ConstantVelocity => "the vehicle flies at constant velocity without rotation",
+            Self::ConstantVelocity => "the vehicle moves at constant velocity without rotation",
             Self::YawOnly => "the level vehicle yaws and translates in space",
             Self::YawPlanar => "the level vehicle yaws and translates in the horizontal plane",
             Self::YawTilted => "the tilted vehicle turns about the vertical only and translates",
@@ -125,12 +125,14 @@ impl LaboratoryMotion {
             Self::StabilizedRotationOnly => "the camera never rotates in the world, the vehicle does not translate",
             Self::StabilizedTranslationOnly => "the camera never rotates in the world, nor do vehicle and joints",
             Self::CameraHeldStill => "the camera neither turns nor moves in the world while vehicle and joints do",
-            Self::OneJointFrozen => "all move about all axes but the second joint, or the only one, which rests",
+            Self::OneJointFrozen => {
+                "all move about all axes but the second joint, or the only one, which is stationary"
+            }
             Self::AllJointsFrozen => "the vehicle turns and translates about all axes while all joints rest",
         }
     }
 
-    /// Whether a joint of so many rests although it could move.
+    /// Whether a joint of so many is stationary in this motion.
     fn holds_joint(self, joint: usize, joints: usize) -> bool {
         match self {
             Self::StabilizedTranslationOnly | Self::AllJointsFrozen => true,
@@ -183,12 +185,12 @@ const STEP_S: f64 = 1e-3;
 /// A joint uses this part of the room between its rest and the nearer stop at most.
 const ROOM_SHARE: f64 = 0.9;
 
-/// A mechanism in motion, some of its joints held.
+/// A mechanism in motion, some of its joints fixed.
 #[derive(Clone, Debug)]
 pub(super) struct Flight<'a> {
     pub(super) mechanism: &'a Mechanism,
     pub(super) motion: LaboratoryMotion,
-    /// Which joints are held, in order.
+    /// Fixed joints, in order.
     pub(super) frozen: &'a [usize],
     pub(super) gravity_in_world: Vector3<f64>,
 }
@@ -291,7 +293,7 @@ impl Flight<'_> {
         }
     }
 
-    /// What a perfect inertial sensor feels at a time.
+    /// Measurement of an ideal IMU at a time.
     fn imu_sample(&self, time_s: f64) -> ImuSample {
         let rotation_at = |time_s: f64| self.world_from_imu(time_s).rotation;
         let turned = rotation_at(time_s - STEP_S).inverse() * rotation_at(time_s + STEP_S);

@@ -57,9 +57,9 @@ pub struct FormReport {
     pub structural_threshold: f64,
     /// Below this a direction is uninformed.
     pub informed_threshold: f64,
-    /// Margins to the chart's locks.
+    /// Singularity margins.
     pub margins: Vec<Margin>,
-    /// Null and weak directions, weakest first.
+    /// Null and weak directions, least observable first.
     pub directions: Vec<DirectionReport>,
     /// What is known to be lost from the form of the chain, and whether it was measured.
     pub known: Vec<KnownReport>,
@@ -76,12 +76,12 @@ pub struct KnownReport {
     pub agrees: bool,
 }
 
-/// How far a chart is from a lock.
+/// Singularity margin of the parameterization.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Margin {
-    /// Which lock.
+    /// Name of the singularity.
     pub lock: String,
-    /// 1 far away, 0 at the lock.
+    /// 1 far away, 0 singular.
     pub margin: f64,
 }
 

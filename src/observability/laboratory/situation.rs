@@ -1,4 +1,4 @@
-//! Where a flight is and what it knows of its calibration: the starting point of every question about what to fly next.
+//! State and calibration posterior of a flight, from which excitation is suggested.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -19,27 +19,27 @@ pub struct Situation {
     pub chain: Chain,
     /// Its joints.
     pub joints: Vec<LaboratoryJoint>,
-    /// What its parameters are called.
+    /// Names of its parameters.
     pub names: ParameterNames,
-    /// What is known of the calibration, as information of its columns in units of 10° and 3 cm.
+    /// Posterior of the calibration as the information matrix of its columns (n × n), in units of 10° and 3 cm.
     pub information: DMatrix<f64>,
     /// Pose, velocity and biases.
     pub navigation: NavigationState,
     /// Joint angles.
     pub joints_rad: Vec<f64>,
-    /// What the encoders will tell.
+    /// Knowledge of the joint angles.
     pub encoders: JointKnowledge,
-    /// Noise of the inertial sensor.
+    /// Noise of the IMU.
     pub imu_noise: ImuNoise,
     /// Gravity in the world, in m/s².
     pub gravity_in_world: Vector3<f64>,
-    /// Standard deviation of a pixel: what it tells on average.
+    /// Standard deviation of a pixel, averaged over the observations.
     pub pixel_sigma_px: f64,
     /// Distances at which the scene has landmarks, in metres.
     pub distances_m: Vec<f64>,
 }
 
-/// Information about a parameter that is held, in units of 10° and 3 cm: a millionth of them.
+/// Information about a fixed parameter in units of 10° and 3 cm: σ is a millionth of them.
 const KNOWN: f64 = 1e12;
 
 /// Where a scene is taken to be that has no landmarks yet, in metres.
@@ -118,7 +118,7 @@ impl Situation {
         if self.distances_m.is_empty() { &UNKNOWN_DISTANCE_M } else { &self.distances_m }
     }
 
-    /// Whether the joint angles have to be found from the pictures alone.
+    /// Whether the joint angles are estimated from images alone.
     pub(super) fn joints_free(&self) -> bool {
         self.encoders == JointKnowledge::Unknown && self.chain.joint_count() > 0
     }

@@ -7,9 +7,9 @@ use crate::simulation::random::mix;
 pub(crate) struct SensorOptions {
     /// Standard deviation of the noise in grey values.
     pub(crate) noise: f64,
-    /// How far the exposure drifts, as a share of its mean.
+    /// Drift of the exposure as a ratio of its mean.
     pub(crate) exposure_drift: f64,
-    /// How much darker the farthest corner is, as a share.
+    /// Vignetting: ratio by which the farthest corner is darker.
     pub(crate) vignetting: f64,
 }
 
@@ -38,7 +38,7 @@ impl Sensor {
         Self { options, width: view.width, height: view.height, shading, seed }
     }
 
-    /// Exposes a picture of linear grey values.
+    /// Exposes an image of linear gray values.
     pub(crate) fn expose(&self, picture: &[f32], frame_index: usize, time_s: f64) -> GrayImage {
         let phase = (self.seed % 628) as f64 * 0.01;
         let gain =

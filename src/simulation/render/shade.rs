@@ -13,7 +13,7 @@ const LANES: usize = 8;
 /// Marks a pixel whose samples see several faces.
 const MIXED: u32 = SKY - 1;
 
-/// Share of the light that comes from the sky on all sides.
+/// Ratio of the light that comes from the sky on all sides.
 const AMBIENT: f32 = 0.6;
 /// Light of sky and sun together on a surface square to the sun, against the texture's own grey.
 const BRIGHTNESS: f32 = 1.38;
@@ -22,7 +22,7 @@ const HAZE: f32 = 186.0;
 /// Distance at which half of a surface's grey has gone into haze.
 const HAZE_M: f32 = 420.0;
 
-/// A world ready to be pictured, from any number of threads at once.
+/// An environment prepared for rendering, by any number of threads at once.
 #[derive(Clone, Debug)]
 pub(crate) struct Renderer<'a> {
     world: &'a World,
@@ -51,7 +51,7 @@ impl<'a> Renderer<'a> {
         Self { world, shadows: ShadowMap::new(world) }
     }
 
-    /// Renders what a camera sees from a pose: linear grey values, row by row, added to `picture` times `share`.
+    /// Renders the image of a camera at a pose: linear gray values, row by row, added to `picture` times `share`.
     pub(crate) fn render(
         &self,
         view: &View,
@@ -82,8 +82,8 @@ impl<'a> Renderer<'a> {
         }
     }
 
-    /// Adds a row of pixels; `first_sample` is the row of the grid that the workspace begins with.
-    #[expect(clippy::too_many_arguments, reason = "a row of a picture needs all that the picture needs")]
+    /// Adds a row of pixels; `first_sample` is the first row of the grid in the workspace.
+    #[expect(clippy::too_many_arguments, reason = "a row of an image needs all that the image needs")]
     fn shade_row(
         &self,
         view: &View,

@@ -70,7 +70,7 @@ impl From<PixelRay> for Rays<1> {
     }
 }
 
-/// Buffers that a thread keeps between pictures.
+/// Buffers that a thread keeps between images.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Workspace {
     /// Of a band of the sample grid.

@@ -1,4 +1,4 @@
-//! What both worlds share: materials, ground, hills and trees.
+//! Parts of both environments: materials, ground, hills and trees.
 
 use nalgebra::{Vector2, Vector3};
 

@@ -1,4 +1,4 @@
-//! The worlds that experiments fly through, built from painted surfaces.
+//! The environments of the experiments, built from textured surfaces.
 
 mod canvas;
 mod facade;

@@ -49,7 +49,7 @@ const SHARES: [f32; LARGEST_ANISOTROPY + 1] =
 /// Places in a texture are held to this part of a texel.
 const FRACTION_BITS: i32 = 10;
 const FRACTION: f32 = (1 << FRACTION_BITS) as f32;
-/// Levels of detail are this much finer than exact, for a crisp picture as lenses give it.
+/// Levels of detail are this much finer than exact, for images as sharp as a lens gives.
 const LEVEL_BIAS: f32 = -0.2;
 
 impl Texture {
