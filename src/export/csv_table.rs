@@ -21,7 +21,7 @@ impl CsvTable {
 
     /// The table with a line break after every row.
     pub(super) fn into_text(self) -> String {
-        let bytes = self.0.into_inner().ok().expect(IN_MEMORY);
+        let bytes = self.0.into_inner().map_err(|error| error.to_string()).expect(IN_MEMORY);
         String::from_utf8(bytes).expect("cells are UTF-8")
     }
 }

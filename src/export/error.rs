@@ -29,7 +29,7 @@ pub enum ExportError {
     #[error("cannot open: {problem}: {path}")]
     Session {
         /// What is wrong with it.
-        problem: SavedSessionError,
+        problem: Box<SavedSessionError>,
         /// Which file.
         path: PathBuf,
     },

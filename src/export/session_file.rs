@@ -17,5 +17,6 @@ pub fn is_session(path: &Path) -> bool {
 /// When the file cannot be read or holds no session of this version.
 pub fn read_session(path: &Path) -> Result<SavedSession, ExportError> {
     let text = fs::read_to_string(path).map_err(|source| ExportError::Read { source, path: path.to_owned() })?;
-    SavedSession::from_text(&text).map_err(|problem| ExportError::Session { problem, path: path.to_owned() })
+    SavedSession::from_text(&text)
+        .map_err(|problem| ExportError::Session { problem: Box::new(problem), path: path.to_owned() })
 }

@@ -128,7 +128,7 @@ pub(super) fn information_csv(run: &RunRecord, rig: &Rig) -> String {
     let informed = || run.steps.iter().filter_map(|step| Some((step, step.gain()?)));
     let count = informed().map(|(_, (_, gain))| gain.joints).max().unwrap_or(0);
     let mut header = ["t_s", "keyframe", "interval_s", "parameter", "bits_per_s"].map(str::to_owned).to_vec();
-    header.extend(Motion::all(count).into_iter().map(|motion| motion.name(&joints).replace(' ', "_")));
+    header.extend(Motion::all(count).map(|motion| motion.name(&joints).replace(' ', "_")));
     header.push("earlier".to_owned());
     let mut table = CsvTable::new(header);
     for (step, (rank, gain)) in informed().filter(|(_, (rank, gain))| rank.parameters.len() == gain.columns()) {

@@ -84,7 +84,7 @@ pub(super) fn page(content: &ReportContent, figures: &[ReportFigure]) -> String 
             }
         }
     };
-    page.into_string() + "\n"
+    format!("{}\n", page.into_string())
 }
 
 fn has_log_section(content: &ReportContent) -> bool {

@@ -154,7 +154,7 @@ fn abbreviation(form: LaboratoryForm) -> String {
         Parameterization::MinimalSwapped => "B",
         Parameterization::MinimalYx => "Mb",
         Parameterization::Poe => "P",
-        other => other.name(),
+        other @ Parameterization::MinimalSwappedYx => other.name(),
     };
     let suffix = if form.joint_offsets { "" } else { "-" };
     format!("{name}{suffix}")
