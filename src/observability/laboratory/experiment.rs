@@ -7,7 +7,8 @@ use super::mechanism::Mechanism;
 use super::motion::{Flight, LaboratoryMotion};
 use crate::camera::CameraModel;
 use crate::estimator::{
-    JointKnowledge, LandmarkModel, PoseKnowledge, HypotheticalFrame, HypotheticalLandmark, HypotheticalWindow, gravity_in_world,
+    HypotheticalFrame, HypotheticalLandmark, HypotheticalWindow, JointKnowledge, LandmarkModel, PoseKnowledge,
+    gravity_in_world,
 };
 use crate::geometry::{Dimension, SplitMix64};
 use crate::gimbal::{Chain, ParameterId, Parameterization};
