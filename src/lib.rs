@@ -10,6 +10,7 @@
 //! | [`camera`] | projection and back-projection with their Jacobians | gimbals, images |
 //! | [`gimbal`] | the actuated chain in each parameterization, its Jacobians, conversions and singularity margins | measurements |
 //! | [`sensors`] | plain types of what sensors deliver and of the rig that describes them | where they come from |
+//! | [`optimization`] | robust loss, reprojection residual with its Jacobians, elimination of landmarks, damped solver | whose unknowns they are |
 //! | `flight_log` | MCAP in and out as typed events in time order; rig files; logs of other recorders | what the events are used for |
 //! | [`frontend`] | image in, feature tracks out | the estimator, so that runs share tracks |
 //! | [`simulation`] | a synthetic flight with ground truth, as tracks or written as a flight log | the estimator |
@@ -86,6 +87,7 @@ pub mod gui;
 #[cfg(feature = "logs")]
 pub mod log_check;
 pub mod observability;
+pub mod optimization;
 pub mod sensors;
 #[cfg(feature = "logs")]
 pub mod session;

@@ -1,7 +1,8 @@
 //! What each part of the estimator is worth: runs that differ from the default by one option, over the same pieces.
 
 use anyhow::Result;
-use dcvins::estimator::{EstimatorConfig, LandmarkModel, RobustLoss, TrackContinuation};
+use dcvins::estimator::{EstimatorConfig, TrackContinuation};
+use dcvins::optimization::{LandmarkModel, RobustLoss};
 use dcvins::simulation::Experiment;
 
 use crate::drive::{Driven, Variant, drive};

@@ -8,9 +8,9 @@ use nalgebra::{DMatrix, DVector, Matrix3, Matrix6xX, UnitQuaternion, Vector3, Ve
 
 use super::chain_prior::ChainTerm;
 use super::segments::Segment;
-use crate::estimator::RobustLoss;
 use crate::geometry::{RigidTransform, median, so3, wrap_angle};
 use crate::gimbal::Chain;
+use crate::optimization::RobustLoss;
 use crate::sensors::JointAngles;
 
 /// Standard deviation of the rotations of a measured pose, in radians: a pixel over the root of the features.

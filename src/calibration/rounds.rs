@@ -10,8 +10,8 @@ use super::timeline::Instant;
 use super::visual::{PixelModel, Track};
 use super::{CalibrationError, CalibrationOptions};
 use crate::camera::CameraModel;
-use crate::estimator::RobustLoss;
 use crate::geometry::median;
+use crate::optimization::RobustLoss;
 
 /// What a tracked pixel is worth before the residuals say, per coordinate.
 const FIRST_SIGMA_PX: f64 = 1.0;

@@ -7,7 +7,7 @@ use nalgebra::{Matrix2x3, Matrix2x6, Matrix3, Matrix6, Matrix6x3, Vector2, Vecto
 use super::landmark::{self, Landmark, ViewPose};
 use super::state::ViewId;
 use crate::camera::CameraModel;
-use crate::estimator::{RobustLoss, damped_inverse};
+use crate::optimization::{RobustLoss, damped_inverse};
 
 /// Squared whitened residual of a sighting whose landmark lies behind the camera.
 const UNSEEN_SQUARED: f64 = 1e4;
@@ -92,7 +92,7 @@ pub(super) struct ReducedEquations {
 }
 
 impl VisualEquations {
-    /// Linearizes all sightings.
+    /// Linearizes all observations.
     pub(super) fn new(
         model: &PixelModel<'_>,
         poses: &BTreeMap<ViewId, ViewPose>,

@@ -5,11 +5,9 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, Vector3};
 
-use super::options::{LandmarkModel, RobustLoss};
 use super::{ColumnBlock, ColumnGroup, FrameId, Linearization};
 use crate::camera::CameraModel;
 use crate::estimator::factors::preintegration::Preintegration;
-use crate::estimator::factors::reprojection::{Landmark, RelativePose};
 use crate::estimator::factors::visual::{Sighting, Track, VisualModel};
 use crate::estimator::state::calibration::{Calibration, GivenSigmas};
 use crate::estimator::state::calibrations::Calibrations;
@@ -20,6 +18,7 @@ use crate::estimator::window::frames::{Frame, layout};
 use crate::estimator::window::problem::{CameraFactors, Estimate, Problem};
 use crate::geometry::ns_from_seconds;
 use crate::gimbal::{ClassicalChain, Parameterization};
+use crate::optimization::{Landmark, LandmarkModel, RelativePose, RobustLoss};
 use crate::sensors::{ImuNoise, ImuSample, JointAngles};
 
 /// What is known of the poses of a hypothetical window.

@@ -20,11 +20,10 @@ mod window;
 
 pub use config::{DEFAULT_CHAIN_PRIOR, EstimatorConfig, RigidCamera, rigid_columns};
 pub use estimator::Estimator;
-pub(crate) use factors::visual::damped_inverse;
 pub use factors::{imu_factor, preintegration};
 pub use hypothetical::{HypotheticalFrame, HypotheticalLandmark, HypotheticalWindow, JointKnowledge, PoseKnowledge};
 pub use interventions::InterventionError;
-pub use options::{EstimatorOptions, LandmarkModel, RobustLoss, TrackContinuation};
+pub use options::{EstimatorOptions, TrackContinuation};
 pub use preintegration::{ImuBias, MotionIncrement, NavigationState, Preintegration};
 pub use report::{
     CalibrationEstimate, ColumnBlock, ColumnGroup, ColumnId, Event, EventKind, FactorKind, FactorRows, FeatureCounts,

@@ -3,47 +3,7 @@
 use nalgebra::Vector3;
 
 use crate::estimator::state::navigation::ImuBias;
-
-/// How the squared whitened residuals of the visual factors grow.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum RobustLoss {
-    /// Quadratic everywhere.
-    None,
-    /// Quadratic up to this many sigmas, linear beyond.
-    Huber(f64),
-    /// Logarithmic, half weight at this many sigmas.
-    Cauchy(f64),
-}
-
-impl RobustLoss {
-    /// Cost and weight `dρ/ds²` of a squared whitened residual.
-    pub fn cost_and_weight(self, squared: f64) -> (f64, f64) {
-        match self {
-            Self::None => (squared, 1.0),
-            Self::Huber(limit) => {
-                if squared <= limit * limit {
-                    (squared, 1.0)
-                } else {
-                    let norm = squared.sqrt();
-                    (2.0 * limit * norm - limit * limit, limit / norm)
-                }
-            }
-            Self::Cauchy(scale) => {
-                let ratio = squared / (scale * scale);
-                (scale * scale * ratio.ln_1p(), 1.0 / (1.0 + ratio))
-            }
-        }
-    }
-}
-
-/// What the unknowns of a feature are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LandmarkModel {
-    /// The inverse distance along the anchor's measured bearing (Eq. 9): the anchor's measurement counts as exact.
-    InverseDistance,
-    /// Bearing and inverse distance in the anchor's frame: the anchor's measurement is one like the others.
-    BearingAndInverseDistance,
-}
+use crate::optimization::{LandmarkModel, RobustLoss};
 
 /// What becomes of a feature whose anchor leaves the window while it is still being tracked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

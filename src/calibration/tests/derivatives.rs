@@ -11,8 +11,9 @@ use crate::calibration::observations;
 use crate::calibration::state::{Camera, Columns, Estimate, ViewId};
 use crate::calibration::timeline::{Instant, instants};
 use crate::calibration::visual::{PixelModel, Track};
-use crate::estimator::{RobustLoss, gravity_in_world};
+use crate::estimator::gravity_in_world;
 use crate::geometry::{RigidTransform, so3};
+use crate::optimization::RobustLoss;
 use crate::simulation::{SyntheticMotion, SyntheticOptions};
 
 const STEP: f64 = 1e-6;

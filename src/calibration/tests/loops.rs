@@ -5,9 +5,9 @@ use nalgebra::{DVector, UnitQuaternion, Vector3, Vector6};
 use crate::calibration::chain_distance;
 use crate::calibration::chain_prior::ChainTerm;
 use crate::calibration::pose_loop::{LoopNoise, LoopState, PairedSegment, PoseLoops, PosePair, SegmentFrame};
-use crate::estimator::RobustLoss;
 use crate::geometry::{RigidTransform, SplitMix64, so3, wrap_angle};
 use crate::gimbal::{Chain, ClassicalChain, Parameterization};
+use crate::optimization::RobustLoss;
 use crate::sensors::{ChainPrior, JointAngles};
 use crate::simulation::{SyntheticOptions, synthetic_tracks};
 

@@ -2,12 +2,9 @@
 //!
 //! A factor takes states and measurements and returns whitened residuals and derivatives; it does not know the window.
 
-pub(crate) mod dense;
 pub mod imu_factor;
-pub(crate) mod pose_blocks;
 pub mod preintegration;
 pub(crate) mod prior;
 pub(crate) mod projection;
-pub(crate) mod reprojection;
 pub(crate) mod visual;
 pub(crate) mod zero_velocity;

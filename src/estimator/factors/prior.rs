@@ -4,10 +4,10 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use super::dense;
 use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::state::layout::{Layout, POSE};
 use crate::estimator::state::navigation::ImuBias;
+use crate::optimization::dense;
 
 /// Which unknown a column of the prior stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

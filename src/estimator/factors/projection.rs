@@ -3,10 +3,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::dense;
-use super::pose_blocks::PoseBlocks;
-use super::reprojection::{CameraPose, Landmark, Reprojection};
-use super::visual::{RelativePoses, Track, VisualModel, whitened};
+use crate::estimator::factors::visual::{Track, VisualModel, whitened};
+use crate::optimization::{CameraPose, Landmark, LandmarkRows, PoseBlocks, RelativePoses, dense};
 
 /// Columns of a landmark.
 const LANDMARK: usize = 3;
@@ -45,7 +43,7 @@ impl ProjectedRows {
         let mut rows: Vec<Vec<f64>> =
             (0..frames).map(|slot| Vec::with_capacity(height_of(tracks, slot) * (columns - POSE * slot))).collect();
         let mut newest_rows = Vec::new();
-        let mut local = TrackRows::default();
+        let mut local = LandmarkRows::default();
         for (track, landmark) in tracks.iter().zip(landmarks) {
             let Some(anchor) = track.sightings.first().map(|first| first.slot) else { continue };
             local.begin(anchor, track.sightings.len());
@@ -57,15 +55,15 @@ impl ProjectedRows {
                 }
                 local.push(sighting.slot, &term);
             }
-            let seen_last = anchor != newest && local.slots.last() == Some(&newest);
+            let seen_last = anchor != newest && local.last_pose() == Some(newest);
             if apart == NewestRows::Apart && seen_last {
-                local.project_out_landmark_apart();
-                local.append_to(&mut newest_rows, columns, 0, local.used..local.used + local.added);
+                local.eliminate_last_apart();
+                local.append_to(&mut newest_rows, columns, 0, local.added_by_last());
             } else {
-                local.project_out_landmark(local.height());
+                local.eliminate();
             }
             let first = first_slot(track).unwrap_or(anchor);
-            local.append_to(&mut rows[first], columns, first, local.used..local.height());
+            local.append_to(&mut rows[first], columns, first, local.remaining());
         }
         // Without a row that holds nothing but the residual that no camera pose can change.
         let rows = dense::triangularize_groups(&rows, POSE, columns);
@@ -97,129 +95,4 @@ pub(crate) enum NewestRows {
     Among,
     /// They are kept beside the others, too.
     Apart,
-}
-
-/// The rows of one track, `[landmark 3 | anchor 6 | observers 6 each | residual]`: of the camera poses only those that
-/// the track has sightings from.
-#[derive(Debug, Default)]
-struct TrackRows {
-    /// Row-major.
-    entries: Vec<f64>,
-    width: usize,
-    /// Slots of the blocks of columns, the anchor's first.
-    slots: Vec<usize>,
-    /// Rows that the landmark still fills after the projection.
-    used: usize,
-    /// Rows behind them that the last sighting adds to the others.
-    added: usize,
-    reflector: Vec<f64>,
-    products: Vec<f64>,
-}
-
-impl TrackRows {
-    /// A track without rows yet, of at most so many sightings.
-    fn begin(&mut self, anchor: usize, sightings: usize) {
-        self.slots.clear();
-        self.slots.push(anchor);
-        self.entries.clear();
-        self.width = LANDMARK + POSE * sightings.max(1) + 1;
-        (self.used, self.added) = (0, 0);
-    }
-
-    fn height(&self) -> usize {
-        self.entries.len() / self.width
-    }
-
-    fn push(&mut self, slot: usize, term: &Reprojection) {
-        let anchor = self.slots[0];
-        if slot != anchor {
-            self.slots.push(slot);
-        }
-        let place = LANDMARK + POSE * (self.slots.len() - 1);
-        for axis in 0..2 {
-            let begin = self.entries.len();
-            self.entries.resize(begin + self.width, 0.0);
-            let row = &mut self.entries[begin..];
-            for k in 0..LANDMARK {
-                row[k] = term.by_landmark[(axis, k)];
-            }
-            if slot != anchor {
-                for k in 0..POSE {
-                    row[LANDMARK + k] = term.by_anchor[(axis, k)];
-                    row[place + k] = term.by_observer[(axis, k)];
-                }
-            }
-            row[self.width - 1] = term.residual_px[axis];
-        }
-    }
-
-    /// Projects the landmark out of the rows before the last sighting first, and then out of what is left of it there
-    /// together with the last sighting.
-    fn project_out_landmark_apart(&mut self) {
-        const SIGHTING: usize = 2;
-        let older = self.height() - SIGHTING;
-        self.project_out_landmark(older);
-        let landmark = self.used;
-        // The last sighting goes right behind what is left of the landmark.
-        self.entries[landmark * self.width..].rotate_right(SIGHTING * self.width);
-        self.used = 0;
-        self.project_out_landmark(landmark + SIGHTING);
-        self.added = landmark + SIGHTING - self.used;
-    }
-
-    /// Householder reflections of the first `height` rows that clear the landmark's columns below as many rows (fewer for
-    /// dependent columns).
-    fn project_out_landmark(&mut self, height: usize) {
-        let width = self.width;
-        for column in 0..LANDMARK {
-            if self.used >= height {
-                break;
-            }
-            let entry = |row: usize| self.entries[row * width + column];
-            let norm = (0..height).map(|row| entry(row) * entry(row)).sum::<f64>().sqrt();
-            let tail = (self.used..height).map(|row| entry(row) * entry(row)).sum::<f64>().sqrt();
-            if tail <= 1e-12 * norm.max(1e-300) {
-                continue;
-            }
-            self.reflector.clear();
-            self.reflector.extend((self.used..height).map(entry));
-            self.reflector[0] += if self.reflector[0] > 0.0 { tail } else { -tail };
-            let factor = 2.0 / self.reflector.iter().map(|entry| entry * entry).sum::<f64>();
-            self.reflect(factor, height);
-            self.used += 1;
-        }
-    }
-
-    /// `A ← A − factor·v·(vᵀA)` on the rows from `used` to `height`.
-    fn reflect(&mut self, factor: f64, height: usize) {
-        let rows = &mut self.entries[self.used * self.width..height * self.width];
-        self.products.clear();
-        self.products.resize(self.width, 0.0);
-        for (row, weight) in rows.chunks_exact(self.width).zip(&self.reflector) {
-            for (product, entry) in self.products.iter_mut().zip(row) {
-                *product += weight * entry;
-            }
-        }
-        for (row, weight) in rows.chunks_exact_mut(self.width).zip(&self.reflector) {
-            let weight = factor * weight;
-            for (entry, product) in row.iter_mut().zip(&self.products) {
-                *entry -= weight * product;
-            }
-        }
-    }
-
-    /// Some rows, with the camera poses of the window from the slot `first` on.
-    fn append_to(&self, rows: &mut Vec<f64>, columns: usize, first: usize, range: std::ops::Range<usize>) {
-        let width = columns - POSE * first;
-        for row in self.entries.chunks_exact(self.width).skip(range.start).take(range.len()) {
-            let begin = rows.len();
-            rows.resize(begin + width, 0.0);
-            let target = &mut rows[begin..];
-            for (slot, block) in self.slots.iter().zip(row[LANDMARK..].chunks_exact(POSE)) {
-                let place = POSE * (slot - first);
-                target[place..place + POSE].copy_from_slice(block);
-            }
-            target[width - 1] = row[self.width - 1];
-        }
-    }
 }

@@ -7,8 +7,7 @@ use nalgebra::{DMatrix, Matrix2x6, Vector3};
 use super::columns::scales_of;
 use super::linearization::column_blocks;
 use crate::camera::CameraModel;
-use crate::estimator::factors::reprojection::{CameraPose, Landmark, Reprojection};
-use crate::estimator::factors::visual::{RelativePoses, Sighting, VisualModel, whitened};
+use crate::estimator::factors::visual::{Sighting, VisualModel, whitened};
 use crate::estimator::state::camera_pose::{self, CameraMaps, Mount};
 use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::state::layout::{Layout, POSE};
@@ -17,6 +16,7 @@ use crate::estimator::{
 };
 use crate::frontend::FeatureId;
 use crate::gimbal::Chain;
+use crate::optimization::{CameraPose, Landmark, RelativePoses, Reprojection};
 
 /// The Jacobian of a step by blocks.
 #[derive(Clone, Debug, PartialEq)]

@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, Quaternion, UnitQuaternion, Vector3};
 
-use crate::estimator::options::{LandmarkModel, RobustLoss};
 use crate::estimator::state::frame_state::{FrameState, Rates};
 use crate::estimator::state::layout::POSE;
 use crate::estimator::{FactorKind, FrameId, ImuBias, NavigationState, allocated_bytes};
 use crate::geometry::RigidTransform;
 use crate::gimbal::Chain;
+use crate::optimization::{LandmarkModel, RobustLoss};
 
 /// Where the step's Jacobian was taken, and the blocks that a report could not write out again.
 ///

@@ -6,10 +6,10 @@ use nalgebra::{DMatrix, Matrix3, Matrix6xX};
 
 use super::calibration::Calibration;
 use super::layout::POSE;
-use crate::estimator::factors::reprojection::CameraPose;
 use crate::estimator::state::frame_state::FrameState;
 use crate::geometry::so3;
 use crate::gimbal::{Chain, ChainLinearization};
+use crate::optimization::CameraPose;
 
 /// A camera's place on the vehicle and how its clock is off.
 #[derive(Clone, Copy, Debug)]

@@ -3,7 +3,6 @@
 use nalgebra::DVector;
 
 use super::Noise;
-use crate::camera::CameraModel;
 use crate::estimator::estimator::PhaseState;
 use crate::estimator::factors::preintegration::Preintegration;
 use crate::estimator::factors::prior::StartPrior;
@@ -24,12 +23,7 @@ use crate::frontend::TrackedFrame;
 use crate::geometry::Dimension;
 use crate::gimbal::{Chain, ParameterId, Parameterization};
 use crate::sensors::Rig;
-use crate::simulation::{Lens, SyntheticFlight, SyntheticFrame, SyntheticMount, SyntheticOptions, synthetic_tracks};
-
-pub(super) fn camera(lens: Lens) -> CameraModel {
-    let options = SyntheticOptions { duration_s: 0.1, lens, ..SyntheticOptions::default() };
-    synthetic_tracks(&options).given_rig.cameras[0].model.clone()
-}
+use crate::simulation::{SyntheticFlight, SyntheticFrame, SyntheticMount, SyntheticOptions, synthetic_tracks};
 
 /// A window, and the setup that it reads.
 pub(super) struct TestWindow {

@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 use super::fixture::{self, TestWindow};
 use super::flight::step;
 use crate::estimator::factors::projection::NewestRows;
-use crate::estimator::options::{EstimatorOptions, RobustLoss};
+use crate::estimator::options::EstimatorOptions;
 use crate::estimator::state::camera_pose::{self, CameraMaps};
 use crate::estimator::window::active_tracks::ActiveTracks;
 use crate::estimator::window::information_gain::CameraInformation;
@@ -14,6 +14,7 @@ use crate::estimator::window::problem::{Estimate, Problem};
 use crate::estimator::{ColumnGroup, ColumnId, Estimator, FrameId, InformationGain, Motion};
 use crate::gimbal::Parameterization;
 use crate::gimbal::tests::parameter;
+use crate::optimization::RobustLoss;
 use crate::simulation::{Exercise, JointSwing, SyntheticMotion, SyntheticOptions, VehicleSwing, synthetic_tracks};
 
 /// Windows with a prior, away from the truth.

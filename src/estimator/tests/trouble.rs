@@ -5,11 +5,11 @@ use nalgebra::DMatrix;
 use super::fixture::{self, TestWindow};
 use super::flight::{chain_error, fly, step, trajectory_error_m};
 use crate::estimator::estimator::PhaseState;
-use crate::estimator::factors::dense::Cholesky;
 use crate::estimator::state::calibrations::MAIN;
 use crate::estimator::{Estimator, EstimatorConfig, EstimatorOptions, EventKind, Phase, StepReport};
 use crate::frontend::FeatureId;
 use crate::gimbal::{Parameterization, transport_covariance};
+use crate::optimization::dense::Cholesky;
 use crate::sensors::ImuSample;
 use crate::simulation::{
     Experiment, SyntheticFlight, SyntheticFrame, SyntheticMount, SyntheticOptions, synthetic_tracks,

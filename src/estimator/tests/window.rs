@@ -1,20 +1,18 @@
 //! The window's problem: Jacobians, elimination, marginalization, solving.
 
-use nalgebra::{DMatrix, DVector, Vector2, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, Vector3};
 
+use super::fixture;
 use super::fixture::TestWindow;
-use super::{Noise, fixture};
-use crate::estimator::factors::dense::{self, Cholesky};
-use crate::estimator::factors::reprojection::{self, CameraPose, Landmark, RelativePose};
-use crate::estimator::options::{EstimatorOptions, RobustLoss};
+use crate::estimator::options::EstimatorOptions;
 use crate::estimator::state::calibrations::MAIN;
 use crate::estimator::window::marginalization;
 use crate::estimator::window::problem::Estimate;
 use crate::estimator::window::rows::stack;
 use crate::estimator::window::solver::{self, SolverLimits};
-use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::Parameterization;
-use crate::simulation::Lens;
+use crate::optimization::RobustLoss;
+use crate::optimization::dense::{self, Cholesky};
 
 fn quadratic() -> EstimatorOptions {
     EstimatorOptions { loss: RobustLoss::None, ..EstimatorOptions::default() }
@@ -32,53 +30,6 @@ fn windows() -> Vec<(&'static str, TestWindow)> {
         ("cluster", fixture::cluster_window(quadratic(), false)),
         ("cluster with clocks", fixture::cluster_window(quadratic(), true)),
     ]
-}
-
-fn moved(pose: &RigidTransform, delta: &Vector6<f64>) -> CameraPose {
-    let pose = pose.plus(delta);
-    CameraPose { rotation: pose.rotation_matrix(), position_m: pose.translation_m }
-}
-
-#[test]
-fn reprojection_jacobians_meet_central_differences() {
-    let mut random = Noise::new(3);
-    for lens in [Lens::Pinhole, Lens::Radtan] {
-        let camera = fixture::camera(lens);
-        for _ in 0..40 {
-            let anchor = RigidTransform::new(so3::exp(&(random.vector() * 0.3)), random.vector() * 0.3);
-            let observer = RigidTransform::new(so3::exp(&(random.vector() * 0.3)), random.vector() * 0.3);
-            let bearing = Vector3::new(0.3 * random.normal(), 0.3 * random.normal(), 1.0).normalize();
-            let landmark = Landmark { bearing, inverse_distance: 0.05 + 0.4 * random.uniform() };
-            let measured = Vector2::new(300.0, 200.0);
-            let zero = Vector6::zeros();
-            let at = |a: &Vector6<f64>, o: &Vector6<f64>, l: &Vector3<f64>| {
-                let relative = RelativePose::new(&moved(&anchor, a), &moved(&observer, o));
-                reprojection::residual_px(&camera, &relative, &landmark.plus(l), &measured)
-            };
-            let relative = RelativePose::new(&moved(&anchor, &zero), &moved(&observer, &zero));
-            let Some(term) = reprojection::linearize(&camera, &relative, &relative, &landmark, &measured) else {
-                continue;
-            };
-            let step = 1e-6;
-            for column in 0..6 {
-                let mut delta = Vector6::zeros();
-                delta[column] = step;
-                let still = Vector3::zeros();
-                let by_anchor =
-                    (at(&delta, &zero, &still).unwrap() - at(&-delta, &zero, &still).unwrap()) / (2.0 * step);
-                let by_observer =
-                    (at(&zero, &delta, &still).unwrap() - at(&zero, &-delta, &still).unwrap()) / (2.0 * step);
-                assert!((term.by_anchor.column(column) - by_anchor).amax() < 1e-4, "anchor, column {column}");
-                assert!((term.by_observer.column(column) - by_observer).amax() < 1e-4, "observer, column {column}");
-            }
-            for column in 0..3 {
-                let mut delta = Vector3::zeros();
-                delta[column] = step;
-                let numeric = (at(&zero, &zero, &delta).unwrap() - at(&zero, &zero, &-delta).unwrap()) / (2.0 * step);
-                assert!((term.by_landmark.column(column) - numeric).amax() < 1e-4, "landmark, column {column}");
-            }
-        }
-    }
 }
 
 #[test]

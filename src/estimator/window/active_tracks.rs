@@ -1,9 +1,9 @@
 //! The features that take part in a solve.
 
 use super::features::{FeatureMap, Observation};
-use crate::estimator::factors::reprojection::Landmark;
 use crate::estimator::factors::visual::{Sighting, Track};
 use crate::frontend::FeatureId;
+use crate::optimization::Landmark;
 
 /// The features of one camera that take part, in the order of their ids.
 #[derive(Clone, Debug, Default)]

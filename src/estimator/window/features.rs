@@ -5,9 +5,10 @@ use std::collections::BTreeMap;
 use nalgebra::{Matrix3, Vector2, Vector3};
 
 use crate::estimator::allocated_bytes;
-use crate::estimator::factors::reprojection::{CameraPose, Landmark};
-use crate::estimator::options::{EstimatorOptions, LandmarkModel};
+use crate::estimator::options::EstimatorOptions;
 use crate::frontend::{FeatureId, TrackedFeature};
+use crate::optimization::LandmarkModel;
+use crate::optimization::{CameraPose, Landmark};
 
 /// One observation of a feature.
 #[derive(Clone, Copy, Debug, PartialEq)]

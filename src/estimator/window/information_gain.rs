@@ -11,7 +11,6 @@
 use nalgebra::DMatrix;
 
 use super::motion_parts::motion_parts;
-use crate::estimator::factors::dense::Cholesky;
 use crate::estimator::factors::projection::ProjectedRows;
 use crate::estimator::report::InformationGain;
 use crate::estimator::state::camera_pose::{self, CameraMaps};
@@ -19,6 +18,7 @@ use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::state::layout::Layout;
 use crate::estimator::window::problem::{Estimate, Problem};
 use crate::geometry::seconds_from_ns;
+use crate::optimization::dense::Cholesky;
 
 /// Added to the diagonals, as the solver does: an unknown without any factor stays where it is.
 const FLOOR: f64 = 1e-6;

@@ -3,11 +3,11 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::window_state::WindowState;
-use crate::estimator::factors::reprojection::{self, CameraPose, RelativePose};
 use crate::estimator::setup::Setup;
 use crate::estimator::state::calibrations::MAIN;
 use crate::estimator::state::camera_pose::{self, CameraMaps};
 use crate::geometry::wrap_angle;
+use crate::optimization::{CameraPose, RelativePose, reprojection};
 use crate::sensors::JointAngles;
 
 /// Standard deviation of a joint's rotation since the frame before, without an encoder.
@@ -86,11 +86,11 @@ impl WindowState {
             else {
                 continue;
             };
-            let squared = term.residual_px.norm_squared() / (sigma * sigma);
+            let squared = term.residual.norm_squared() / (sigma * sigma);
             let weight = 1.0 / (sigma * sigma * squared.sqrt().max(1.0));
             let rows = term.by_observer * &by_joints;
             hessian += rows.tr_mul(&rows) * weight;
-            gradient += rows.tr_mul(&term.residual_px) * weight;
+            gradient += rows.tr_mul(&term.residual) * weight;
             count += 1;
         }
         (hessian, gradient, count)

@@ -4,9 +4,10 @@ use super::active_tracks::ActiveTracks;
 use super::features::{self, FeatureMap};
 use super::marginalization;
 use super::window_state::WindowState;
-use crate::estimator::options::{EstimatorOptions, LandmarkModel, TrackContinuation};
+use crate::estimator::options::{EstimatorOptions, TrackContinuation};
 use crate::estimator::setup::Setup;
 use crate::estimator::{Event, EventKind};
+use crate::optimization::LandmarkModel;
 
 /// A window that is larger than usual shrinks by one frame per keyframe.
 const MOST_MARGINALIZED_AT_ONCE: usize = 2;

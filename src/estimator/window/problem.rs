@@ -2,12 +2,11 @@
 
 use std::ops::Range;
 
-use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, SMatrix, Vector3, Vector6};
 
 use crate::estimator::factors::imu_factor;
 use crate::estimator::factors::prior::{Prior, StartPrior};
-use crate::estimator::factors::reprojection::Landmark;
-use crate::estimator::factors::visual::{self, ReducedVisualSystem, Track, VisualModel, VisualSystem};
+use crate::estimator::factors::visual::{self, ReducedVisualEquations, Track, VisualEquations, VisualModel};
 use crate::estimator::factors::zero_velocity::ZeroVelocityTerm;
 use crate::estimator::state::calibrations::{Calibrations, MAIN};
 use crate::estimator::state::camera_pose::{self, CameraMaps};
@@ -16,6 +15,7 @@ use crate::estimator::state::layout::{Layout, POSE, VELOCITY_BIAS};
 use crate::estimator::state::navigation::{Matrix15, Vector15};
 use crate::estimator::window::frames::Frame;
 use crate::geometry::wrap_angle;
+use crate::optimization::Landmark;
 
 /// Values of all unknowns.
 #[derive(Clone, Debug)]
@@ -72,7 +72,7 @@ impl Costs {
 /// One camera's reprojection factors.
 #[derive(Clone, Debug)]
 struct CameraEquations {
-    visual: VisualSystem,
+    visual: VisualEquations,
     maps: CameraMaps,
     columns: Range<usize>,
 }
@@ -226,7 +226,7 @@ impl Problem<'_> {
                 let current = camera_pose::by_slot(&estimate.frames, estimate.calibration.of(camera));
                 let linearized = camera_pose::by_slot(&frames, calibration.of(camera));
                 CameraEquations {
-                    visual: VisualSystem::new(&factors.visual, &current, &linearized, factors.tracks, landmarks),
+                    visual: visual::equations(&factors.visual, &current, &linearized, factors.tracks, landmarks),
                     maps: CameraMaps::new(&frames, calibration.of(camera)),
                     columns: factors.columns.clone(),
                 }
@@ -382,12 +382,12 @@ impl Problem<'_> {
 
 impl NormalEquations {
     /// Eliminates the landmarks of every camera.
-    pub(crate) fn eliminate(&self, damping: f64) -> Vec<ReducedVisualSystem> {
+    pub(crate) fn eliminate(&self, damping: f64) -> Vec<ReducedVisualEquations> {
         self.cameras.iter().map(|camera| camera.visual.eliminate(damping)).collect()
     }
 
     /// The reduced normal equations over poses, joints, velocities, biases and calibration; the lower triangle counts.
-    pub(crate) fn reduced(&self, layout: &Layout, visual: &[ReducedVisualSystem]) -> (DMatrix<f64>, DVector<f64>) {
+    pub(crate) fn reduced(&self, layout: &Layout, visual: &[ReducedVisualEquations]) -> (DMatrix<f64>, DVector<f64>) {
         let mut hessian = self.hessian.clone();
         let mut gradient = self.gradient.clone();
         for (camera, visual) in self.cameras.iter().zip(visual) {
@@ -400,13 +400,16 @@ impl NormalEquations {
     pub(crate) fn landmark_steps(
         &self,
         layout: &Layout,
-        reduced: &[ReducedVisualSystem],
+        reduced: &[ReducedVisualEquations],
         step: &DVector<f64>,
     ) -> Vec<Vec<Vector3<f64>>> {
         self.cameras
             .iter()
             .zip(reduced)
-            .map(|(camera, reduced)| camera.visual.substitute(reduced, &camera.pose_steps(layout, step)))
+            .map(|(camera, reduced)| {
+                let steps = camera.pose_steps(layout, step);
+                camera.visual.substitute(reduced, |slot| steps[slot])
+            })
             .collect()
     }
 }
@@ -416,7 +419,7 @@ impl CameraEquations {
     fn add_to(
         &self,
         layout: &Layout,
-        visual: &ReducedVisualSystem,
+        visual: &ReducedVisualEquations,
         hessian: &mut DMatrix<f64>,
         gradient: &mut DVector<f64>,
     ) {
@@ -424,8 +427,7 @@ impl CameraEquations {
         for row in 0..layout.frames {
             let mut by_cameras: DMatrix<f64> = DMatrix::zeros(6, calibration.len());
             for column in 0..layout.frames {
-                let block: Matrix6<f64> =
-                    if row <= column { *visual.block(row, column) } else { visual.block(column, row).transpose() };
+                let block = visual.poses.hessian.symmetric_block(row, column);
                 by_cameras += block * &self.maps.calibration[column];
                 if column <= row {
                     // Lower triangle: the frame `row` below the frame `column`.
@@ -438,7 +440,7 @@ impl CameraEquations {
             coupling += by_cameras.tr_mul(&self.maps.own[row]);
             let mut corner = hessian.view_range_mut(calibration.clone(), calibration.clone());
             corner += self.maps.calibration[row].tr_mul(&by_cameras);
-            let camera_gradient = visual.gradient(row);
+            let camera_gradient = &visual.poses.gradient[row];
             let mut part = gradient.rows_range_mut(layout.camera(row));
             part += self.maps.own[row].tr_mul(camera_gradient);
             let mut part = gradient.rows_range_mut(calibration.clone());

@@ -4,11 +4,11 @@ use nalgebra::DMatrix;
 
 use super::problem::{Estimate, Problem};
 use crate::estimator::factors::projection::{NewestRows, ProjectedRows};
-use crate::estimator::factors::reprojection::CameraPose;
 use crate::estimator::factors::zero_velocity::ZeroVelocityTerm;
 use crate::estimator::state::camera_pose::{self, CameraMaps};
 use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::state::layout::{POSE, VELOCITY_BIAS};
+use crate::optimization::CameraPose;
 
 impl Problem<'_> {
     /// The reprojection factors, landmarks projected out; at most `6·frames` rows a camera.

@@ -6,11 +6,12 @@ use super::active_tracks::ActiveTracks;
 use super::problem::{CameraFactors, Estimate, Problem};
 use super::solver::{self, Solution, SolverLimits};
 use super::window_state::WindowState;
-use crate::estimator::factors::visual::{self, RelativePoses, Sighting};
+use crate::estimator::factors::visual::{self, Sighting};
 use crate::estimator::options::EstimatorOptions;
 use crate::estimator::setup::Setup;
 use crate::estimator::state::camera_pose;
 use crate::estimator::{Event, EventKind};
+use crate::optimization::RelativePoses;
 
 /// Reprojection residuals in pixels, by track and observation; `None` behind the camera.
 pub(crate) type TrackResiduals = Vec<Vec<Option<Vector2<f64>>>>;

@@ -2,9 +2,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::problem::{Costs, Estimate, Problem};
+use super::problem::{Costs, Estimate, NormalEquations, Problem};
 use crate::estimator::IterationReport;
-use crate::estimator::factors::dense::Cholesky;
+use crate::optimization::damped::{DampedOptions, DampedProblem, Iteration, minimize};
+use crate::optimization::dense::Cholesky;
 
 /// Limits of a solve.
 #[derive(Clone, Copy, Debug)]
@@ -34,87 +35,106 @@ impl Solution {
     }
 }
 
-const FIRST_DAMPING: f64 = 1e-6;
-const LEAST_DAMPING: f64 = 1e-9;
-const MOST_DAMPING: f64 = 1e8;
 /// Added to the diagonal so that an unknown without any factor stays where it is.
 const FLOOR: f64 = 1e-6;
 
 /// Lowers the cost from `start`.
 pub(crate) fn solve(problem: &Problem<'_>, start: Estimate, limits: SolverLimits) -> Solution {
-    let costs_before = problem.costs(&start);
-    let mut solution = Solution {
-        estimate: start,
+    let first = problem.layout.calibration().start;
+    let fixed = start.calibration.frozen_columns().into_iter().map(|column| first + column).collect();
+    let mut window =
+        DampedWindow { problem, fixed, step_norms: Vec::new(), calibration_covariance: DMatrix::zeros(0, 0) };
+    let start = window.evaluated(start);
+    let costs_before = start.costs;
+    let options = DampedOptions {
+        iterations: limits.iterations,
+        relative_cost_tolerance: limits.relative_cost_tolerance,
+        first_damping: 1e-6,
+        least_damping: 1e-9,
+        most_damping: 1e8,
+        growth: 100.0,
+    };
+    let solution = minimize(&mut window, start, &options);
+    let report = |(tried, step_norm): (&Iteration, &f64)| IterationReport {
+        cost_before: tried.cost_before,
+        cost_after: tried.cost_after,
+        damping: tried.damping,
+        step_norm: *step_norm,
+        accepted: tried.accepted,
+    };
+    Solution {
+        iterations: solution.iterations.iter().zip(&window.step_norms).map(report).collect(),
+        calibration_covariance: window.calibration_covariance,
         costs_before,
-        costs_after: costs_before,
-        iterations: Vec::new(),
-        calibration_covariance: DMatrix::zeros(0, 0),
-    };
-    let held: Vec<usize> = {
-        let start = problem.layout.calibration().start;
-        solution.estimate.calibration.frozen_columns().into_iter().map(|column| start + column).collect()
-    };
-    let mut damping = FIRST_DAMPING;
-    let mut tries = 0;
-    while tries < limits.iterations {
-        let equations = problem.linearize(&solution.estimate);
-        let mut done = true;
-        while tries < limits.iterations {
-            tries += 1;
-            let reduced = equations.eliminate(damping);
-            let (mut hessian, mut gradient) = equations.reduced(&problem.layout, &reduced);
-            hold(&held, &mut hessian, &mut gradient);
-            let Some(factor) = Cholesky::new(&damped(&hessian, damping)) else {
-                damping = (damping * 100.0).min(MOST_DAMPING);
-                continue;
-            };
-            let step = -factor.solve(&gradient);
-            let landmarks = equations.landmark_steps(&problem.layout, &reduced, &step);
-            let candidate = problem.stepped(&solution.estimate, &step, &landmarks);
-            let costs = problem.costs(&candidate);
-            let before = solution.costs_after.total();
-            let after = costs.total();
-            let accepted = after.is_finite() && after <= before;
-            solution.iterations.push(IterationReport {
-                cost_before: before,
-                cost_after: after,
-                damping,
-                step_norm: step.norm(),
-                accepted,
-            });
-            solution.calibration_covariance = factor.trailing_covariance(problem.layout.calibration);
-            for column in &held {
-                let column = column - problem.layout.calibration().start;
-                solution.calibration_covariance.row_mut(column).fill(0.0);
-                solution.calibration_covariance.column_mut(column).fill(0.0);
-            }
-            if accepted {
-                solution.estimate = candidate;
-                solution.costs_after = costs;
-                damping = (damping * 0.1).max(LEAST_DAMPING);
-                done = before - after <= limits.relative_cost_tolerance * before;
-                break;
-            }
-            // A step that fails by no more than rounding is the end of the way.
-            if after - before <= 1e-9 * before {
-                break;
-            }
-            damping = (damping * 100.0).clamp(LEAST_DAMPING, MOST_DAMPING);
-            done = damping >= MOST_DAMPING;
-            if done {
-                break;
-            }
-        }
-        if done {
-            break;
-        }
+        costs_after: solution.estimate.costs,
+        estimate: solution.estimate.estimate,
     }
-    solution
+}
+
+/// The window's problem as the damped solver sees it.
+struct DampedWindow<'a> {
+    problem: &'a Problem<'a>,
+    /// Columns of parameters that are not estimated at present.
+    fixed: Vec<usize>,
+    /// Norm of each step whose equations were solved.
+    step_norms: Vec<f64>,
+    /// Of the last such step.
+    calibration_covariance: DMatrix<f64>,
+}
+
+/// An estimate and its costs.
+struct Evaluated {
+    estimate: Estimate,
+    costs: Costs,
+}
+
+impl DampedWindow<'_> {
+    fn evaluated(&self, estimate: Estimate) -> Evaluated {
+        Evaluated { costs: self.problem.costs(&estimate), estimate }
+    }
+
+    /// Covariance of the calibration, the rest marginalized; zero where it is fixed.
+    fn covariance(&self, factor: &Cholesky) -> DMatrix<f64> {
+        let layout = &self.problem.layout;
+        let mut covariance = factor.trailing_covariance(layout.calibration);
+        for column in &self.fixed {
+            let column = column - layout.calibration().start;
+            covariance.row_mut(column).fill(0.0);
+            covariance.column_mut(column).fill(0.0);
+        }
+        covariance
+    }
+}
+
+impl DampedProblem for DampedWindow<'_> {
+    type Estimate = Evaluated;
+    type Equations = NormalEquations;
+
+    fn cost(&self, evaluated: &Evaluated) -> f64 {
+        evaluated.costs.total()
+    }
+
+    fn linearize(&self, evaluated: &Evaluated) -> NormalEquations {
+        self.problem.linearize(&evaluated.estimate)
+    }
+
+    fn step(&mut self, evaluated: &Evaluated, equations: &NormalEquations, damping: f64) -> Option<Evaluated> {
+        let layout = &self.problem.layout;
+        let reduced = equations.eliminate(damping);
+        let (mut hessian, mut gradient) = equations.reduced(layout, &reduced);
+        fix(&self.fixed, &mut hessian, &mut gradient);
+        let factor = Cholesky::new(&damped(&hessian, damping))?;
+        let step = -factor.solve(&gradient);
+        let landmarks = equations.landmark_steps(layout, &reduced, &step);
+        self.step_norms.push(step.norm());
+        self.calibration_covariance = self.covariance(&factor);
+        Some(self.evaluated(self.problem.stepped(&evaluated.estimate, &step, &landmarks)))
+    }
 }
 
 /// Takes unknowns out of the normal equations: their steps become zero, whatever the factors say.
-fn hold(held: &[usize], hessian: &mut DMatrix<f64>, gradient: &mut DVector<f64>) {
-    for column in held {
+fn fix(fixed: &[usize], hessian: &mut DMatrix<f64>, gradient: &mut DVector<f64>) {
+    for column in fixed {
         hessian.row_mut(*column).fill(0.0);
         hessian.column_mut(*column).fill(0.0);
         hessian[(*column, *column)] = 1.0;

@@ -5,13 +5,13 @@ use super::features::{self, FeatureMap};
 use super::frames::{self, Frames};
 use super::problem::{CameraFactors, Estimate, Problem};
 use crate::estimator::factors::prior::{Prior, StartPrior};
-use crate::estimator::factors::reprojection::{CameraPose, Landmark};
 use crate::estimator::factors::visual::VisualModel;
 use crate::estimator::options::EstimatorOptions;
 use crate::estimator::setup::Setup;
 use crate::estimator::state::calibrations::Calibrations;
 use crate::estimator::state::camera_pose;
 use crate::gimbal::Parameterization;
+use crate::optimization::{CameraPose, Landmark};
 
 /// Frames, features, calibration and priors of the window.
 #[derive(Clone, Debug)]

@@ -11,10 +11,10 @@ use super::super::classification::excitable_directions;
 use super::Situation;
 use super::mechanism::LaboratoryJoint;
 use crate::estimator::{
-    EstimatorOptions, HypotheticalFrame, HypotheticalLandmark, HypotheticalWindow, LandmarkModel, NavigationState,
-    PoseKnowledge,
+    EstimatorOptions, HypotheticalFrame, HypotheticalLandmark, HypotheticalWindow, NavigationState, PoseKnowledge,
 };
 use crate::geometry::{Dimension, RigidTransform, ns_from_seconds, so3};
+use crate::optimization::LandmarkModel;
 use crate::sensors::ImuSample;
 use crate::simulation::{Exercise, JOINT_PERIOD_S, JointSwing, SWING_M, VehicleSwing, YAW_SWING_RAD};
 

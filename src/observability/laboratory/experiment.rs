@@ -7,12 +7,12 @@ use super::mechanism::Mechanism;
 use super::motion::{Flight, LaboratoryMotion};
 use crate::camera::CameraModel;
 use crate::estimator::{
-    HypotheticalFrame, HypotheticalLandmark, HypotheticalWindow, JointKnowledge, LandmarkModel, PoseKnowledge,
-    gravity_in_world,
+    HypotheticalFrame, HypotheticalLandmark, HypotheticalWindow, JointKnowledge, PoseKnowledge, gravity_in_world,
 };
 use crate::geometry::{Dimension, SplitMix64};
 use crate::gimbal::{Chain, ParameterId, Parameterization};
 use crate::observability::{RankReport, analyse};
+use crate::optimization::LandmarkModel;
 use crate::sensors::ImuNoise;
 
 /// A parameterization of the mechanism, with or without its joint offsets as columns.

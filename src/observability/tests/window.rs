@@ -4,11 +4,12 @@ use nalgebra::Vector3;
 
 use crate::camera::CameraModel;
 use crate::estimator::{
-    HypotheticalFrame, HypotheticalLandmark, HypotheticalWindow, ImuBias, JointKnowledge, LandmarkModel, Linearization,
+    HypotheticalFrame, HypotheticalLandmark, HypotheticalWindow, ImuBias, JointKnowledge, Linearization,
     NavigationState, PoseKnowledge,
 };
 use crate::geometry::{Dimension, RigidTransform};
 use crate::gimbal::Chain;
+use crate::optimization::LandmarkModel;
 
 pub(super) struct Landmark {
     pub(super) anchor: usize,

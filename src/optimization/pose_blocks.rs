@@ -1,10 +1,8 @@
-//! A symmetric matrix over the camera poses of a window, by 6 × 6 blocks.
-
 use nalgebra::{DMatrix, DVector, Matrix6};
 
-use super::reprojection::Reprojection;
+use super::Reprojection;
 
-/// Upper blocks, row-wise: `(0,0) (0,1) … (1,1) …`.
+/// A symmetric matrix over camera poses, its upper 6 × 6 blocks stored row by row: `(0,0) (0,1) … (1,1) …`.
 #[derive(Clone, Debug)]
 pub(crate) struct PoseBlocks {
     frames: usize,
@@ -27,13 +25,18 @@ impl PoseBlocks {
         &self.blocks[self.index(row, column)]
     }
 
-    /// The same to be changed.
+    /// The block of two camera poses in either order.
+    pub(crate) fn symmetric_block(&self, row: usize, column: usize) -> Matrix6<f64> {
+        if row <= column { *self.block(row, column) } else { self.block(column, row).transpose() }
+    }
+
+    /// [`Self::block`] to be changed.
     pub(crate) fn block_mut(&mut self, row: usize, column: usize) -> &mut Matrix6<f64> {
         let index = self.index(row, column);
         &mut self.blocks[index]
     }
 
-    /// Adds the `JᵀJ` of one sighting from another frame than the anchor.
+    /// Adds the `JᵀJ` of one observation by another camera than the anchor.
     pub(crate) fn add(&mut self, anchor: usize, observer: usize, term: &Reprojection) {
         *self.block_mut(observer, observer) += term.by_observer.tr_mul(&term.by_observer);
         if anchor < observer {
@@ -44,7 +47,7 @@ impl PoseBlocks {
         *self.block_mut(anchor, anchor) += term.by_anchor.tr_mul(&term.by_anchor);
     }
 
-    /// The diagonal of `CᵀAC` for the columns `C` that move the camera poses, per slot 6 × n.
+    /// The diagonal of `CᵀAC` for the columns `C` that move the camera poses, one 6 × n matrix a pose.
     pub(crate) fn squared_norms(&self, columns: &[DMatrix<f64>]) -> DVector<f64> {
         let count = columns.first().map_or(0, DMatrix::ncols);
         let mut norms = DVector::zeros(count);

@@ -1,0 +1,26 @@
+//! What every least-squares problem here shares: landmark and reprojection residual with their Jacobians, robust loss,
+//! elimination of landmarks, damped solver.
+//!
+//! Residuals are predicted minus measured; poses are perturbed by the rule of [`crate::geometry`]. A problem keeps its own
+//! unknowns and its own assembly: it linearizes observations by camera poses here ([`reprojection`]), eliminates the
+//! landmarks by QR ([`LandmarkRows`]) or by the Schur complement ([`ReprojectionEquations`]), carries the result on to its
+//! unknowns, and hands itself to [`damped::minimize`].
+
+pub(crate) mod damped;
+pub(crate) mod dense;
+mod landmark;
+mod landmark_rows;
+mod pose_blocks;
+pub(crate) mod reprojection;
+mod robust_loss;
+mod schur;
+#[cfg(test)]
+mod tests;
+
+pub(crate) use landmark::Landmark;
+pub use landmark::LandmarkModel;
+pub(crate) use landmark_rows::LandmarkRows;
+pub(crate) use pose_blocks::PoseBlocks;
+pub(crate) use reprojection::{CameraPose, RelativePose, RelativePoses, Reprojection};
+pub use robust_loss::RobustLoss;
+pub(crate) use schur::{DensePoseEquations, ReducedEquations, ReprojectionEquations, damped_inverse};

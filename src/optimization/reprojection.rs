@@ -1,0 +1,206 @@
+//! The reprojection residual of one observation (Eqs. 9–10) with its Jacobians.
+//!
+//! With the landmark's bearing `b` and inverse distance `ρ` in the anchor camera `a`, observed by camera `o`:
+//!
+//! ```text
+//! R = R_woᵀ R_wa,  t = R_woᵀ (p_wa − p_wo)      observer_from_anchor
+//! d = R b + ρ t                                 direction in the observing camera, up to the positive factor ρ
+//! r = π(d) − z                                  predicted minus measured, in the unit of the projection (2)
+//! ∂r/∂φ_a = −Π R [b]×     ∂r/∂p_a =  ρ Π R_woᵀ    by [φ; δt] of world_from_anchor (2 × 6)
+//! ∂r/∂φ_o =  Π [d]×       ∂r/∂p_o = −ρ Π R_woᵀ    by [φ; δt] of world_from_observer (2 × 6)
+//! ∂r/∂α   =  Π R B(b)     ∂r/∂ρ   =  Π t          by the landmark (2 × 3)
+//! ```
+//!
+//! `Π = ∂π/∂d` (2 × 3), poses are perturbed by the rule of [`crate::geometry`], the landmark by [`Landmark::plus`].
+//! Extrinsics, joint angles and time offsets change a residual only through the poses of the two cameras, parameters of
+//! the camera model only through `π`: [`linearize`] is the one place where a new sensor model adds its derivative.
+
+use nalgebra::{Matrix2, Matrix2x3, Matrix2x6, Matrix3, Vector2, Vector3};
+
+use super::{Landmark, RobustLoss};
+use crate::camera::CameraModel;
+use crate::geometry::{RigidTransform, so3, tangent_basis};
+
+/// Pose of a camera in the world.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct CameraPose {
+    /// `world_from_camera`.
+    pub(crate) rotation: Matrix3<f64>,
+    /// Its centre in the world, in metres.
+    pub(crate) position_m: Vector3<f64>,
+}
+
+impl From<RigidTransform> for CameraPose {
+    fn from(world_from_camera: RigidTransform) -> Self {
+        Self { rotation: world_from_camera.rotation_matrix(), position_m: world_from_camera.translation_m }
+    }
+}
+
+/// `observer_from_anchor` of two cameras.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RelativePose {
+    /// Rotation from the anchor camera to the observing one.
+    pub(crate) rotation: Matrix3<f64>,
+    /// The anchor's centre in the observing camera, in metres.
+    pub(crate) translation_m: Vector3<f64>,
+    /// Rotation from the world to the observing camera, which the derivatives by positions need.
+    pub(crate) observer_from_world: Matrix3<f64>,
+}
+
+impl RelativePose {
+    pub(crate) fn new(anchor: &CameraPose, observer: &CameraPose) -> Self {
+        let observer_from_world = observer.rotation.transpose();
+        Self {
+            rotation: observer_from_world * anchor.rotation,
+            translation_m: observer_from_world * (anchor.position_m - observer.position_m),
+            observer_from_world,
+        }
+    }
+
+    /// The landmark in the observing camera, up to the positive factor `inverse_distance`.
+    pub(crate) fn direction(&self, landmark: &Landmark) -> Vector3<f64> {
+        self.rotation * landmark.bearing + self.translation_m * landmark.inverse_distance
+    }
+}
+
+/// Relative poses of every pair of cameras, `[anchor][observer]`.
+#[derive(Clone, Debug)]
+pub(crate) struct RelativePoses {
+    cameras: usize,
+    pairs: Vec<RelativePose>,
+}
+
+impl RelativePoses {
+    pub(crate) fn new(cameras: &[CameraPose]) -> Self {
+        let pairs = cameras
+            .iter()
+            .flat_map(|anchor| cameras.iter().map(move |observer| RelativePose::new(anchor, observer)))
+            .collect();
+        Self { cameras: cameras.len(), pairs }
+    }
+
+    pub(crate) fn get(&self, anchor: usize, observer: usize) -> &RelativePose {
+        &self.pairs[anchor * self.cameras + observer]
+    }
+}
+
+/// `π`: what an observation of a direction in the camera would measure.
+pub(crate) trait Projection {
+    /// The prediction, `None` when the camera cannot observe that direction.
+    fn project(&self, direction: &Vector3<f64>) -> Option<Vector2<f64>>;
+
+    /// The prediction and its derivative by the direction (2 × 3).
+    fn project_with_jacobian(&self, direction: &Vector3<f64>) -> Option<(Vector2<f64>, Matrix2x3<f64>)>;
+}
+
+/// Pixels.
+impl Projection for CameraModel {
+    fn project(&self, direction: &Vector3<f64>) -> Option<Vector2<f64>> {
+        self.project(direction)
+    }
+
+    fn project_with_jacobian(&self, direction: &Vector3<f64>) -> Option<(Vector2<f64>, Matrix2x3<f64>)> {
+        self.project_with_jacobian(direction)
+    }
+}
+
+/// Residual of one observation and its derivatives, in the unit of the projection or whitened.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Reprojection {
+    /// Predicted minus measured.
+    pub(crate) residual: Vector2<f64>,
+    /// By `[φ; δt]` of the anchor's camera pose; zero when the anchor observes itself.
+    pub(crate) by_anchor: Matrix2x6<f64>,
+    /// By `[φ; δt]` of the observing camera's pose.
+    pub(crate) by_observer: Matrix2x6<f64>,
+    /// By [`Landmark::plus`].
+    pub(crate) by_landmark: Matrix2x3<f64>,
+}
+
+impl Reprojection {
+    /// Divided by the standard deviation and multiplied by the root of the robust weight, so that `rᵀr` and `Jᵀr` are those
+    /// of the reweighted problem.
+    pub(crate) fn whitened(&self, sigma: f64, loss: RobustLoss) -> Self {
+        let squared = self.residual.norm_squared() / (sigma * sigma);
+        self.weighted(sigma, loss.cost_and_weight(squared).1)
+    }
+
+    /// [`Self::whitened`] with a given robust weight.
+    pub(crate) fn weighted(&self, sigma: f64, weight: f64) -> Self {
+        let scale = weight.sqrt() / sigma;
+        Self {
+            residual: self.residual * scale,
+            by_anchor: self.by_anchor * scale,
+            by_observer: self.by_observer * scale,
+            by_landmark: self.by_landmark * scale,
+        }
+    }
+}
+
+/// The residual alone (2), `None` when the camera cannot observe the landmark.
+pub(crate) fn residual(
+    projection: &impl Projection,
+    relative: &RelativePose,
+    landmark: &Landmark,
+    measured: &Vector2<f64>,
+) -> Option<Vector2<f64>> {
+    let predicted = projection.project(&relative.direction(landmark))?;
+    Some(predicted - measured)
+}
+
+/// The residual with its Jacobians.
+///
+/// `relative` holds the current poses; `linearized` the ones at which the derivatives by the poses are taken (first
+/// estimates): the derivative of the projection and the landmark stay at the current estimate, as in Basalt.
+pub(crate) fn linearize(
+    projection: &impl Projection,
+    relative: &RelativePose,
+    linearized: &RelativePose,
+    landmark: &Landmark,
+    measured: &Vector2<f64>,
+) -> Option<Reprojection> {
+    let direction = relative.direction(landmark);
+    let (predicted, by_direction) = projection.project_with_jacobian(&direction)?;
+    let by_shift = by_direction * linearized.observer_from_world * landmark.inverse_distance;
+    let by_anchor_rotation = by_direction * linearized.rotation * so3::hat(&landmark.bearing) * -1.0;
+    let by_observer_rotation = by_direction * so3::hat(&linearized.direction(landmark));
+
+    let mut by_anchor = Matrix2x6::zeros();
+    by_anchor.fixed_view_mut::<2, 3>(0, 0).copy_from(&by_anchor_rotation);
+    by_anchor.fixed_view_mut::<2, 3>(0, 3).copy_from(&by_shift);
+    let mut by_observer = Matrix2x6::zeros();
+    by_observer.fixed_view_mut::<2, 3>(0, 0).copy_from(&by_observer_rotation);
+    by_observer.fixed_view_mut::<2, 3>(0, 3).copy_from(&-by_shift);
+    Some(Reprojection {
+        residual: predicted - measured,
+        by_anchor,
+        by_observer,
+        by_landmark: landmark_columns(
+            &(by_direction * relative.rotation * tangent_basis(&landmark.bearing)),
+            &(by_direction * relative.translation_m),
+        ),
+    })
+}
+
+/// The anchor's own observation of its landmark: only the bearing changes it.
+pub(crate) fn linearize_in_anchor(
+    projection: &impl Projection,
+    landmark: &Landmark,
+    measured: &Vector2<f64>,
+) -> Option<Reprojection> {
+    let (predicted, by_direction) = projection.project_with_jacobian(&landmark.bearing)?;
+    Some(Reprojection {
+        residual: predicted - measured,
+        by_anchor: Matrix2x6::zeros(),
+        by_observer: Matrix2x6::zeros(),
+        by_landmark: landmark_columns(&(by_direction * tangent_basis(&landmark.bearing)), &Vector2::zeros()),
+    })
+}
+
+fn landmark_columns(by_tangent: &Matrix2<f64>, by_inverse_distance: &Vector2<f64>) -> Matrix2x3<f64> {
+    Matrix2x3::from_columns(&[
+        by_tangent.column(0).into_owned(),
+        by_tangent.column(1).into_owned(),
+        *by_inverse_distance,
+    ])
+}

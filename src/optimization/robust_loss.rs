@@ -1,0 +1,43 @@
+use nalgebra::Vector2;
+
+/// Squared whitened residual of an observation whose landmark its camera cannot observe.
+const UNSEEN_SQUARED: f64 = 1e4;
+
+/// Robust loss ρ on the squared whitened norm `s = ‖r‖²/σ²` of a residual; a problem minimizes `½ Σ ρ(s)`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum RobustLoss {
+    /// `ρ(s) = s`.
+    None,
+    /// Quadratic up to `k` standard deviations, linear beyond: `ρ(s) = 2k√s − k²`.
+    Huber(f64),
+    /// `ρ(s) = c² ln(1 + s/c²)`, half weight at `c` standard deviations.
+    Cauchy(f64),
+}
+
+impl RobustLoss {
+    /// `ρ(s)` and its derivative `dρ/ds`, the weight in iteratively reweighted least squares.
+    pub fn cost_and_weight(self, squared: f64) -> (f64, f64) {
+        match self {
+            Self::None => (squared, 1.0),
+            Self::Huber(limit) => {
+                if squared <= limit * limit {
+                    (squared, 1.0)
+                } else {
+                    let norm = squared.sqrt();
+                    (2.0 * limit * norm - limit * limit, limit / norm)
+                }
+            }
+            Self::Cauchy(scale) => {
+                let ratio = squared / (scale * scale);
+                (scale * scale * ratio.ln_1p(), 1.0 / (1.0 + ratio))
+            }
+        }
+    }
+
+    /// `ρ` of an observation's residual with standard deviation `sigma`; a point that its camera cannot observe (`None`)
+    /// costs as much as a residual of 100 standard deviations.
+    pub(crate) fn cost_of(self, residual: Option<Vector2<f64>>, sigma: f64) -> f64 {
+        let squared = residual.map_or(UNSEEN_SQUARED, |residual| residual.norm_squared() / (sigma * sigma));
+        self.cost_and_weight(squared).0
+    }
+}

@@ -1,0 +1,210 @@
+use nalgebra::{DMatrix, DVector, Matrix2, Vector2, Vector3, Vector6};
+
+use super::damped::{DampedOptions, DampedProblem, StopReason, minimize};
+use super::reprojection::{self, Projection};
+use super::{
+    CameraPose, DensePoseEquations, Landmark, LandmarkRows, RelativePose, Reprojection, ReprojectionEquations,
+    RobustLoss,
+};
+use crate::camera::{self, CameraModel, Distortion};
+use crate::geometry::{RigidTransform, SplitMix64, so3};
+
+fn uniform(random: &mut SplitMix64, half_width: f64) -> f64 {
+    (2.0 * random.next_unit() - 1.0) * half_width
+}
+
+fn vector(random: &mut SplitMix64, half_width: f64) -> Vector3<f64> {
+    Vector3::from_fn(|_, _| uniform(random, half_width))
+}
+
+fn pose(random: &mut SplitMix64) -> RigidTransform {
+    RigidTransform::new(so3::exp(&vector(random, 0.4)), vector(random, 0.5))
+}
+
+fn moved(pose: &RigidTransform, delta: &Vector6<f64>) -> CameraPose {
+    pose.plus(delta).into()
+}
+
+fn cameras() -> Vec<CameraModel> {
+    let radtan = Distortion::Radtan([-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05]);
+    let fisheye = Distortion::Equidistant([0.0034823894, 0.0007150348, -0.0020532361, 0.00020293673]);
+    [
+        (camera::Projection::Pinhole, Distortion::None),
+        (camera::Projection::Pinhole, radtan),
+        (camera::Projection::Pinhole, fisheye),
+        (camera::Projection::Ds { xi: -0.18, alpha: 0.59 }, Distortion::None),
+    ]
+    .into_iter()
+    .map(|(projection, distortion)| {
+        CameraModel::new(projection, distortion, [352.6, 348.1, 322.4, 238.1], [640, 480]).unwrap()
+    })
+    .collect()
+}
+
+/// Every column of the Jacobians against central differences; `tolerance` is absolute, in the unit of the projection.
+fn check_jacobians(random: &mut SplitMix64, projection: &impl Projection, measured: &Vector2<f64>, tolerance: f64) {
+    const STEP: f64 = 1e-6;
+    let (anchor, observer) = (pose(random), pose(random));
+    let bearing = (vector(random, 0.6).xy().push(1.0)).normalize();
+    let landmark = Landmark { bearing, inverse_distance: 0.05 + 0.4 * random.next_unit() };
+    let zero = Vector6::zeros();
+    let relative = RelativePose::new(&moved(&anchor, &zero), &moved(&observer, &zero));
+    let Some(term) = reprojection::linearize(projection, &relative, &relative, &landmark, measured) else { return };
+    let at = |a: &Vector6<f64>, o: &Vector6<f64>, l: &Vector3<f64>| {
+        let relative = RelativePose::new(&moved(&anchor, a), &moved(&observer, o));
+        reprojection::residual(projection, &relative, &landmark.plus(l), measured).unwrap()
+    };
+    let still = Vector3::zeros();
+    assert!((term.residual - at(&zero, &zero, &still)).amax() < tolerance);
+    for column in 0..6 {
+        let mut delta = Vector6::zeros();
+        delta[column] = STEP;
+        let by_anchor = (at(&delta, &zero, &still) - at(&-delta, &zero, &still)) / (2.0 * STEP);
+        let by_observer = (at(&zero, &delta, &still) - at(&zero, &-delta, &still)) / (2.0 * STEP);
+        assert!((term.by_anchor.column(column) - by_anchor).amax() < tolerance, "anchor, column {column}");
+        assert!((term.by_observer.column(column) - by_observer).amax() < tolerance, "observer, column {column}");
+    }
+    let own = reprojection::linearize_in_anchor(projection, &landmark, measured);
+    let in_anchor = |landmark: &Landmark| projection.project(&landmark.bearing).unwrap() - measured;
+    for column in 0..3 {
+        let mut delta = Vector3::zeros();
+        delta[column] = STEP;
+        let numeric = (at(&zero, &zero, &delta) - at(&zero, &zero, &-delta)) / (2.0 * STEP);
+        assert!((term.by_landmark.column(column) - numeric).amax() < tolerance, "landmark, column {column}");
+        let Some(own) = &own else { continue };
+        let numeric = (in_anchor(&landmark.plus(&delta)) - in_anchor(&landmark.plus(&-delta))) / (2.0 * STEP);
+        assert!((own.by_landmark.column(column) - numeric).amax() < tolerance, "in the anchor, column {column}");
+        assert_eq!((own.by_anchor.amax(), own.by_observer.amax()), (0.0, 0.0));
+    }
+}
+
+#[test]
+fn reprojection_jacobians_meet_central_differences() {
+    let mut random = SplitMix64::new(3);
+    for camera in cameras() {
+        for _ in 0..60 {
+            check_jacobians(&mut random, &camera, &Vector2::new(300.0, 200.0), 1e-4);
+        }
+    }
+}
+
+#[test]
+fn losses_have_the_weights_that_their_slopes_are() {
+    for loss in [RobustLoss::None, RobustLoss::Huber(1.5), RobustLoss::Cauchy(0.8)] {
+        for squared in [0.01, 1.0, 2.0, 3.0, 50.0] {
+            let slope = (loss.cost_and_weight(squared + 1e-6).0 - loss.cost_and_weight(squared - 1e-6).0) / 2e-6;
+            assert!((slope - loss.cost_and_weight(squared).1).abs() < 1e-7, "{loss:?} at {squared}");
+        }
+        assert_eq!(loss.cost_of(None, 0.3), loss.cost_and_weight(1e4).0);
+    }
+}
+
+/// Whitened terms of one landmark observed by `poses` cameras, the first of them its anchor.
+fn terms(random: &mut SplitMix64, poses: usize) -> Vec<(usize, Reprojection)> {
+    let camera = &cameras()[0];
+    let world_from_camera: Vec<CameraPose> = (0..poses).map(|_| pose(random).into()).collect();
+    let landmark = Landmark { bearing: Vector3::new(0.1, -0.2, 1.0).normalize(), inverse_distance: 0.3 };
+    (0..poses)
+        .map(|observer| {
+            let relative = RelativePose::new(&world_from_camera[0], &world_from_camera[observer]);
+            let measured = Vector2::new(320.0 + uniform(random, 40.0), 240.0 + uniform(random, 40.0));
+            let term = if observer == 0 {
+                reprojection::linearize_in_anchor(camera, &landmark, &measured)
+            } else {
+                reprojection::linearize(camera, &relative, &relative, &landmark, &measured)
+            };
+            (observer, term.unwrap().whitened(0.7, RobustLoss::Huber(1.5)))
+        })
+        .collect()
+}
+
+#[test]
+fn elimination_by_qr_equals_the_schur_complement() {
+    let mut random = SplitMix64::new(8);
+    for poses in 2..6 {
+        let terms = terms(&mut random, poses);
+        let mut equations = ReprojectionEquations::new(DensePoseEquations::new(poses), 1);
+        equations.add_landmark(Some(0), poses, terms.iter().copied());
+        let reduced = equations.eliminate(0.0).poses;
+
+        let columns = 6 * poses + 1;
+        for apart in [false, true] {
+            let mut local = LandmarkRows::default();
+            local.begin(0, poses);
+            for (observer, term) in &terms {
+                local.push(*observer, term);
+            }
+            if apart {
+                local.eliminate_last_apart()
+            } else {
+                local.eliminate()
+            }
+            assert_eq!(local.remaining().len(), 2 * poses - 3);
+            let mut rows = Vec::new();
+            local.append_to(&mut rows, columns, 0, local.remaining());
+            let rows = DMatrix::from_row_slice(2 * poses - 3, columns, &rows);
+            let squared = rows.tr_mul(&rows);
+            let scale = squared.amax();
+            for row in 0..poses {
+                let gradient = squared.view((6 * row, columns - 1), (6, 1)).into_owned();
+                let expected = DVector::from_column_slice(reduced.gradient[row].as_slice());
+                assert!((gradient - expected).amax() < 1e-6 * scale, "{poses} poses, gradient");
+                for column in row..poses {
+                    let block = squared.fixed_view::<6, 6>(6 * row, 6 * column);
+                    let expected = reduced.hessian.block(row, column);
+                    assert!((block - expected).amax() < 1e-6 * scale, "{poses} poses, block {row} {column}");
+                }
+            }
+        }
+    }
+}
+
+/// Rosenbrock's valley, `r = [1 − x, 10 (y − x²)]`.
+struct Valley;
+
+impl DampedProblem for Valley {
+    type Estimate = Vector2<f64>;
+    type Equations = (Matrix2<f64>, Vector2<f64>);
+
+    fn cost(&self, at: &Vector2<f64>) -> f64 {
+        (1.0 - at.x).powi(2) + 100.0 * (at.y - at.x * at.x).powi(2)
+    }
+
+    fn linearize(&self, at: &Vector2<f64>) -> Self::Equations {
+        let jacobian = Matrix2::new(-1.0, 0.0, -20.0 * at.x, 10.0);
+        let residual = Vector2::new(1.0 - at.x, 10.0 * (at.y - at.x * at.x));
+        (jacobian.tr_mul(&jacobian), jacobian.tr_mul(&residual))
+    }
+
+    fn step(&mut self, at: &Vector2<f64>, (hessian, gradient): &Self::Equations, damping: f64) -> Option<Vector2<f64>> {
+        let damped = hessian + Matrix2::from_diagonal(&(hessian.diagonal() * damping));
+        Some(at - damped.cholesky()?.solve(gradient))
+    }
+}
+
+#[test]
+fn the_damped_solver_descends_and_says_why_it_stopped() {
+    let options = DampedOptions {
+        iterations: 100,
+        relative_cost_tolerance: 1e-12,
+        first_damping: 1e-3,
+        least_damping: 1e-9,
+        most_damping: 1e8,
+        growth: 10.0,
+    };
+    let start = Vector2::new(-1.2, 1.0);
+    let solution = minimize(&mut Valley, start, &options);
+    assert!((solution.estimate - Vector2::new(1.0, 1.0)).norm() < 1e-6, "{solution:?}");
+    assert!(matches!(solution.stop, StopReason::Converged | StopReason::Rounding), "{:?}", solution.stop);
+    assert!(solution.iterations.iter().any(|iteration| !iteration.accepted));
+    for pair in solution.iterations.windows(2) {
+        let [before, after] = pair else { continue };
+        let kept = if before.accepted { before.cost_after } else { before.cost_before };
+        assert_eq!(after.cost_before, kept);
+        assert_eq!(before.accepted, after.damping < before.damping || after.damping == options.least_damping);
+    }
+    let stopped = minimize(&mut Valley, start, &DampedOptions { iterations: 2, ..options });
+    assert_eq!((stopped.stop, stopped.tried), (StopReason::IterationLimit, 2));
+    let limit = DampedOptions { most_damping: 1e-2, growth: 100.0, ..options };
+    assert_eq!(minimize(&mut Valley, Vector2::new(-1.2, 1.4), &limit).stop, StopReason::DampingLimit);
+}
