@@ -6,14 +6,13 @@ use nalgebra::{DMatrix, DVector, Matrix6, Vector3, Vector6};
 
 use super::arrow::ArrowMatrix;
 use super::chain_prior::ChainTerm;
-use super::landmark::ViewPose;
 use super::state::{Camera, Columns, Estimate, ViewId, ViewMap};
 use super::timeline::Instant;
-use super::visual::{PixelModel, ReducedEquations, Track, VisualEquations};
-use crate::estimator::NavigationState;
-use crate::estimator::imu_factor;
+use super::visual::{self, PixelModel, ReducedVisualEquations, Track, VisualEquations};
 use crate::estimator::preintegration::Vector15;
+use crate::estimator::{NavigationState, imu_factor};
 use crate::geometry::{RigidTransform, so3, wrap_angle};
+use crate::optimization::CameraPose;
 
 /// Standard deviation of the first position, which only fixes where the map lies, in metres.
 const GAUGE_SIGMA_M: f64 = 1e-3;
@@ -82,7 +81,7 @@ impl Bundle<'_> {
     }
 
     /// Poses of all views that take part.
-    pub(super) fn poses(&self, estimate: &Estimate) -> BTreeMap<ViewId, ViewPose> {
+    pub(super) fn poses(&self, estimate: &Estimate) -> BTreeMap<ViewId, CameraPose> {
         let pose = |view: ViewId| (view, estimate.view(view, self.instants, &self.gravity_in_world));
         self.views().into_iter().map(pose).collect()
     }
@@ -188,7 +187,7 @@ impl Bundle<'_> {
         let maps: BTreeMap<ViewId, ViewMap> = poses.keys().map(|view| map(*view)).collect();
         let (border_rows, border_residual) = self.border_rows(estimate);
         let mut equations = BundleEquations {
-            visual: VisualEquations::new(&self.pixels, &poses, self.tracks, &estimate.landmarks),
+            visual: visual::equations(&self.pixels, &poses, self.tracks, &estimate.landmarks),
             maps,
             inertial: Vec::with_capacity(self.instants.len()),
             encoders: Vec::new(),
@@ -235,7 +234,7 @@ impl Bundle<'_> {
     pub(super) fn assemble(
         &self,
         equations: &BundleEquations,
-        reduced: &ReducedEquations,
+        reduced: &ReducedVisualEquations,
     ) -> (ArrowMatrix, Vec<f64>, DVector<f64>) {
         let columns = &self.columns;
         let mut matrix =
@@ -271,7 +270,7 @@ impl Bundle<'_> {
                 matrix.add(self.navigation_column(0, a), self.navigation_column(0, b), hessian[(a, b)]);
             }
         }
-        for (view, gradient) in &reduced.gradient {
+        for (view, gradient) in &reduced.poses.gradient {
             let map = &equations.maps[view];
             let start = view.instant() * columns.block();
             for (offset, value) in map.own.tr_mul(gradient).iter().enumerate() {
@@ -279,7 +278,7 @@ impl Bundle<'_> {
             }
             border -= map.shared.tr_mul(gradient);
         }
-        for ((first, second), block) in &reduced.hessian {
+        for ((first, second), block) in &reduced.poses.hessian {
             self.add_pair(&mut matrix, (*first, &equations.maps[first]), (*second, &equations.maps[second]), block);
         }
         (matrix, band, border)

@@ -4,12 +4,13 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 
-use super::landmark::{self, Landmark, ViewPose};
+use super::landmark::{self, AnchoredLandmark};
 use super::state::{Camera, ViewId};
 use super::timeline::Instant;
 use super::visual::{PixelModel, Sighting, Track};
 use super::{CalibrationInput, CalibrationOptions};
 use crate::frontend::{FeatureId, TrackedFrame};
+use crate::optimization::CameraPose;
 
 /// What a camera saw at an instant.
 pub(super) fn tracked<'a>(input: &'a CalibrationInput, instant: &Instant, camera: Camera) -> Option<&'a TrackedFrame> {
@@ -55,13 +56,13 @@ pub(super) fn collect(
 /// Landmarks of the tracks at the present poses; tracks without one are left out.
 pub(super) fn triangulated(
     tracks: Vec<Track>,
-    poses: &BTreeMap<ViewId, ViewPose>,
+    poses: &BTreeMap<ViewId, CameraPose>,
     options: &CalibrationOptions,
-) -> (Vec<Track>, Vec<Landmark>) {
+) -> (Vec<Track>, Vec<AnchoredLandmark>) {
     tracks
         .into_iter()
         .filter_map(|track| {
-            let rays: Vec<(ViewPose, Vector3<f64>)> = track
+            let rays: Vec<(CameraPose, Vector3<f64>)> = track
                 .sightings
                 .iter()
                 .filter_map(|sighting| Some((*poses.get(&sighting.view)?, sighting.bearing)))
@@ -75,12 +76,12 @@ pub(super) fn triangulated(
 /// Drops the sightings beyond `limit` standard deviations of their camera, and landmarks that keep too few.
 pub(super) fn without_outliers(
     tracks: Vec<Track>,
-    landmarks: &[Landmark],
-    poses: &BTreeMap<ViewId, ViewPose>,
+    landmarks: &[AnchoredLandmark],
+    poses: &BTreeMap<ViewId, CameraPose>,
     pixels: &PixelModel<'_>,
     limit: f64,
     options: &CalibrationOptions,
-) -> (Vec<Track>, Vec<Landmark>) {
+) -> (Vec<Track>, Vec<AnchoredLandmark>) {
     tracks
         .into_iter()
         .zip(landmarks)
@@ -97,8 +98,8 @@ pub(super) fn without_outliers(
 /// Lengths of the residuals of one camera in pixels.
 pub(super) fn residual_lengths_px(
     tracks: &[Track],
-    landmarks: &[Landmark],
-    poses: &BTreeMap<ViewId, ViewPose>,
+    landmarks: &[AnchoredLandmark],
+    poses: &BTreeMap<ViewId, CameraPose>,
     pixels: &PixelModel<'_>,
     camera: Camera,
 ) -> Vec<f64> {

@@ -3,12 +3,11 @@
 use nalgebra::{DMatrix, Vector3};
 
 use super::bundle::{Bundle, Priors};
-use super::observations;
 use super::solver::{adjust, border_covariance};
 use super::state::{Camera, Columns, Estimate};
 use super::timeline::Instant;
 use super::visual::{PixelModel, Track};
-use super::{CalibrationError, CalibrationOptions};
+use super::{CalibrationError, CalibrationOptions, observations};
 use crate::camera::CameraModel;
 use crate::geometry::median;
 use crate::optimization::RobustLoss;

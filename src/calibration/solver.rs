@@ -3,12 +3,10 @@
 use nalgebra::DMatrix;
 
 use super::CalibrationOptions;
-use super::bundle::Bundle;
+use super::bundle::{Bundle, BundleEquations};
 use super::state::Estimate;
+use crate::optimization::damped::{DampedOptions, DampedProblem, minimize};
 
-const FIRST_DAMPING: f64 = 1e-5;
-const LEAST_DAMPING: f64 = 1e-9;
-const MOST_DAMPING: f64 = 1e8;
 /// Added to the diagonal so that an unknown without any factor stays where it is.
 const FLOOR: f64 = 1e-6;
 
@@ -16,51 +14,49 @@ const FLOOR: f64 = 1e-6;
 #[derive(Clone, Debug)]
 pub(super) struct Adjusted {
     pub(super) estimate: Estimate,
-    /// Steps tried, taken or not.
+    /// Steps tried, accepted or not.
     pub(super) iterations: usize,
 }
 
 /// Lowers the bundle's cost from `start`; `None` when not even the first equations can be solved.
 pub(super) fn adjust(bundle: &Bundle<'_>, start: Estimate, options: &CalibrationOptions) -> Option<Adjusted> {
-    let mut adjusted = Adjusted { estimate: start, iterations: 0 };
-    let mut cost = bundle.cost(&adjusted.estimate);
-    let mut damping = FIRST_DAMPING;
-    let mut solved = false;
-    while adjusted.iterations < options.iterations {
-        let equations = bundle.linearize(&adjusted.estimate);
-        let mut settled = true;
-        while adjusted.iterations < options.iterations {
-            adjusted.iterations += 1;
-            let reduced = equations.visual().eliminate(damping);
-            let (mut matrix, band, border) = bundle.assemble(&equations, &reduced);
-            matrix.damp(damping, FLOOR);
-            let solution = matrix.factor().and_then(|factor| factor.solve(&band, &border));
-            let Some((band, border)) = solution else {
-                damping = (damping * 100.0).min(MOST_DAMPING);
-                continue;
-            };
-            solved = true;
-            let view_steps = bundle.view_steps(&equations, &band, &border);
-            let landmarks = equations.visual().substitute(&reduced, &view_steps);
-            let candidate = adjusted.estimate.moved(&bundle.columns, &band, &border, &landmarks);
-            let next = bundle.cost(&candidate);
-            if next.is_finite() && next <= cost {
-                settled = cost - next <= options.relative_cost_tolerance * cost;
-                (adjusted.estimate, cost) = (candidate, next);
-                damping = (damping * 0.1).max(LEAST_DAMPING);
-                break;
-            }
-            // A step that fails by no more than rounding is the end of the way.
-            if next - cost <= 1e-9 * cost || damping >= MOST_DAMPING {
-                break;
-            }
-            damping = (damping * 30.0).min(MOST_DAMPING);
-        }
-        if settled {
-            break;
-        }
+    let options = DampedOptions {
+        iterations: options.iterations,
+        relative_cost_tolerance: options.relative_cost_tolerance,
+        first_damping: 1e-5,
+        least_damping: 1e-9,
+        most_damping: 1e8,
+        growth: 30.0,
+    };
+    let solution = minimize(&mut DampedBundle(bundle), start, &options);
+    (!solution.iterations.is_empty()).then_some(Adjusted { estimate: solution.estimate, iterations: solution.tried })
+}
+
+/// The bundle as the damped solver sees it.
+struct DampedBundle<'a>(&'a Bundle<'a>);
+
+impl DampedProblem for DampedBundle<'_> {
+    type Estimate = Estimate;
+    type Equations = BundleEquations;
+
+    fn cost(&self, estimate: &Estimate) -> f64 {
+        self.0.cost(estimate)
     }
-    solved.then_some(adjusted)
+
+    fn linearize(&self, estimate: &Estimate) -> BundleEquations {
+        self.0.linearize(estimate)
+    }
+
+    fn step(&mut self, estimate: &Estimate, equations: &BundleEquations, damping: f64) -> Option<Estimate> {
+        let bundle = self.0;
+        let reduced = equations.visual().eliminate(damping);
+        let (mut matrix, band, border) = bundle.assemble(equations, &reduced);
+        matrix.damp(damping, FLOOR);
+        let (band, border) = matrix.factor()?.solve(&band, &border)?;
+        let view_steps = bundle.view_steps(equations, &band, &border);
+        let landmarks = equations.visual().substitute(&reduced, |view| view_steps[&view]);
+        Some(estimate.moved(&bundle.columns, &band, &border, &landmarks))
+    }
 }
 
 /// Covariance of the border's unknowns, everything else eliminated.

@@ -2,12 +2,13 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
-use super::landmark::{Landmark, ViewPose};
+use super::landmark::AnchoredLandmark;
 use super::timeline::Instant;
 use crate::estimator::NavigationState;
 use crate::estimator::preintegration::Vector15;
 use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::Chain;
+use crate::optimization::CameraPose;
 
 /// Pose and velocity, which come first in an instant's block.
 const MOTION: usize = 9;
@@ -55,7 +56,7 @@ pub(super) struct Estimate {
     /// The gimbal's chain.
     pub(super) chain: Chain,
     /// In the order of the tracks.
-    pub(super) landmarks: Vec<Landmark>,
+    pub(super) landmarks: Vec<AnchoredLandmark>,
 }
 
 /// Columns: a block per instant, `[φ p v | joints | b_g b_a]`, and the border that all instants share,
@@ -167,9 +168,8 @@ impl Estimate {
     }
 
     /// Pose of a view.
-    pub(super) fn view(&self, view: ViewId, instants: &[Instant], gravity: &Vector3<f64>) -> ViewPose {
-        let pose = self.world_from_imu(view, instants, gravity) * self.imu_from_camera(view);
-        ViewPose { rotation: pose.rotation_matrix(), position_m: pose.translation_m }
+    pub(super) fn view(&self, view: ViewId, instants: &[Instant], gravity: &Vector3<f64>) -> CameraPose {
+        (self.world_from_imu(view, instants, gravity) * self.imu_from_camera(view)).into()
     }
 
     /// How the pose of a view follows the unknowns.

@@ -26,6 +26,12 @@ pub(crate) struct Landmark {
 const MIN_INVERSE_DISTANCE: f64 = 1e-5;
 
 impl Landmark {
+    /// The landmark at a point of the anchor's frame; `None` within 1 mm of its centre.
+    pub(crate) fn from_point(point_in_anchor: &Vector3<f64>) -> Option<Self> {
+        let distance = point_in_anchor.norm();
+        (distance > 1e-3).then(|| Self { bearing: point_in_anchor / distance, inverse_distance: distance.recip() })
+    }
+
     /// `x ⊞ [α; δρ]`: `bearing ← normalize(bearing + B α)` with `B` its [`tangent_basis`] (α in radians, 2), and
     /// `inverse_distance ← inverse_distance + δρ`, not below [`MIN_INVERSE_DISTANCE`].
     #[must_use]

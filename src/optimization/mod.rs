@@ -23,4 +23,4 @@ pub(crate) use landmark_rows::LandmarkRows;
 pub(crate) use pose_blocks::PoseBlocks;
 pub(crate) use reprojection::{CameraPose, RelativePose, RelativePoses, Reprojection};
 pub use robust_loss::RobustLoss;
-pub(crate) use schur::{DensePoseEquations, ReducedEquations, ReprojectionEquations, damped_inverse};
+pub(crate) use schur::{DensePoseEquations, ReducedEquations, ReprojectionEquations, SparsePoseEquations};

@@ -10,6 +10,8 @@
 //!
 //! `H_ll` is block-diagonal, 3 × 3 a landmark.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{Matrix3, Matrix6, Matrix6x3, Vector3, Vector6};
 
 use super::{PoseBlocks, Reprojection};
@@ -51,6 +53,34 @@ impl PoseEquations for DensePoseEquations {
 
     fn gradient_mut(&mut self, pose: usize) -> &mut Vector6<f64> {
         &mut self.gradient[pose]
+    }
+}
+
+/// Equations of many poses of which each is coupled with few others, as over a whole flight.
+#[derive(Clone, Debug)]
+pub(crate) struct SparsePoseEquations<K> {
+    /// Blocks that are not zero, by `(row, column)`.
+    pub(crate) hessian: BTreeMap<(K, K), Matrix6<f64>>,
+    /// By pose.
+    pub(crate) gradient: BTreeMap<K, Vector6<f64>>,
+}
+
+impl<K> SparsePoseEquations<K> {
+    /// Zeros.
+    pub(crate) fn new() -> Self {
+        Self { hessian: BTreeMap::new(), gradient: BTreeMap::new() }
+    }
+}
+
+impl<K: Copy + Ord> PoseEquations for SparsePoseEquations<K> {
+    type Pose = K;
+
+    fn hessian_mut(&mut self, row: K, column: K) -> &mut Matrix6<f64> {
+        self.hessian.entry((row, column)).or_insert_with(Matrix6::zeros)
+    }
+
+    fn gradient_mut(&mut self, pose: K) -> &mut Vector6<f64> {
+        self.gradient.entry(pose).or_insert_with(Vector6::zeros)
     }
 }
 
@@ -178,7 +208,7 @@ fn subtract_product(block: &mut Matrix6<f64>, left: &Matrix6x3<f64>, right: &Mat
 }
 
 /// The inverse of a landmark's block with its diagonal raised; directions without information get no step.
-pub(crate) fn damped_inverse(hessian: &Matrix3<f64>, damping: f64) -> Matrix3<f64> {
+fn damped_inverse(hessian: &Matrix3<f64>, damping: f64) -> Matrix3<f64> {
     let mut damped = *hessian;
     let floor = 1e-9 * hessian.trace().max(1e-6);
     for axis in 0..3 {

@@ -89,6 +89,16 @@ fn reprojection_jacobians_meet_central_differences() {
 }
 
 #[test]
+fn a_landmark_of_a_point_leads_back_to_it() {
+    let point = Vector3::new(0.3, -2.0, 5.0);
+    let landmark = Landmark::from_point(&point).unwrap();
+    assert!((landmark.point_in_anchor() - point).norm() < 1e-14);
+    assert!(Landmark::from_point(&Vector3::new(0.0, 0.0, 1e-4)).is_none());
+    let infinitely_far = landmark.plus(&Vector3::new(0.0, 0.0, -10.0));
+    assert!(infinitely_far.inverse_distance > 0.0);
+}
+
+#[test]
 fn losses_have_the_weights_that_their_slopes_are() {
     for loss in [RobustLoss::None, RobustLoss::Huber(1.5), RobustLoss::Cauchy(0.8)] {
         for squared in [0.01, 1.0, 2.0, 3.0, 50.0] {
