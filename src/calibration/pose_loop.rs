@@ -11,6 +11,7 @@ use super::segments::Segment;
 use crate::geometry::{RigidTransform, median, so3, wrap_angle};
 use crate::gimbal::Chain;
 use crate::optimization::RobustLoss;
+use crate::optimization::damped::{DampedOptions, DampedProblem, minimize};
 use crate::sensors::JointAngles;
 
 /// Standard deviation of the rotations of a measured pose, in radians: a pixel over the root of the features.
@@ -24,7 +25,6 @@ const CAUCHY_SIGMAS: f64 = 3.0;
 /// How often the noise of the positions is learnt.
 const ROUNDS: usize = 4;
 const ITERATIONS: usize = 25;
-const MOST_DAMPING: f64 = 1e10;
 /// Columns of a segment's frame: turn, shift, logarithm of its unit.
 const FRAME: usize = 7;
 /// Median length of a three-dimensional normal error, in standard deviations of a coordinate.
@@ -140,12 +140,24 @@ pub(super) struct PairRows {
     pub(super) by_chain: Matrix6xX<f64>,
 }
 
-/// One segment eliminated: what is left on the chain, and how to come back.
-struct Eliminated {
-    factor: nalgebra::linalg::Cholesky<f64, nalgebra::Dyn>,
+/// Normal equations of the loops: the chain's part, and each segment's.
+#[derive(Clone)]
+struct LoopEquations {
+    hessian: DMatrix<f64>,
+    gradient: DVector<f64>,
+    segments: Vec<SegmentEquations>,
+}
+
+/// One segment's part: its frame and the joint angles of its views.
+#[derive(Clone)]
+struct SegmentEquations {
+    own: DMatrix<f64>,
+    /// Own × chain.
     coupling: DMatrix<f64>,
     gradient: DVector<f64>,
 }
+
+type SegmentFactor = nalgebra::linalg::Cholesky<f64, nalgebra::Dyn>;
 
 impl PoseLoops<'_> {
     /// Solves from the given chain and the readings; `None` when the equations are singular.
@@ -162,8 +174,9 @@ impl PoseLoops<'_> {
         let mut iterations = 0;
         let mut covariance = None;
         for _ in 0..ROUNDS {
-            let (next, used, found) = self.descend(state, &noise);
-            (state, covariance) = (next, found);
+            let (next, used) = self.adjust(state, &noise);
+            covariance = self.covariance(&next, &noise);
+            state = next;
             iterations += used;
             let lengths = self.each_pair().map(|(segment, pair)| self.position_error(&state, segment, pair).norm());
             let spread_m = median(lengths)? / MEDIAN_LENGTH;
@@ -270,74 +283,37 @@ impl PoseLoops<'_> {
         cost
     }
 
-    /// Levenberg–Marquardt; also returns the steps tried and the chain's covariance at the last linearization.
-    fn descend(&self, start: LoopState, noise: &LoopNoise) -> (LoopState, usize, Option<DMatrix<f64>>) {
-        let mut state = start;
-        let mut cost = self.cost(&state, noise);
-        let mut damping = 1e-4;
-        let mut covariance = None;
-        let mut tried = 0;
-        while tried < ITERATIONS {
-            tried += 1;
-            if let Some((next, found)) = self.step(&state, noise, damping) {
-                let next_cost = self.cost(&next, noise);
-                if next_cost.is_finite() && next_cost <= cost {
-                    let settled = cost - next_cost <= 1e-8 * cost;
-                    (state, cost, covariance) = (next, next_cost, Some(found));
-                    damping = (damping * 0.1).max(1e-10);
-                    if settled {
-                        break;
-                    }
-                    continue;
-                }
-                covariance = covariance.or(Some(found));
-            }
-            damping *= 20.0;
-            if damping > MOST_DAMPING {
-                break;
-            }
-        }
-        (state, tried, covariance)
+    /// Adjusts the loops from a state; also returns the steps tried.
+    fn adjust(&self, start: LoopState, noise: &LoopNoise) -> (LoopState, usize) {
+        let options = DampedOptions {
+            iterations: ITERATIONS,
+            relative_cost_tolerance: 1e-8,
+            first_damping: 1e-4,
+            least_damping: 1e-10,
+            most_damping: 1e10,
+            growth: 20.0,
+        };
+        let solution = minimize(&mut DampedLoops { loops: self, noise }, start, &options);
+        (solution.estimate, solution.tried)
     }
 
-    fn step(&self, state: &LoopState, noise: &LoopNoise, damping: f64) -> Option<(LoopState, DMatrix<f64>)> {
-        let count = state.chain.dof();
+    /// Covariance of the chain's columns at a state, everything else eliminated; `None` when the equations are singular.
+    fn covariance(&self, state: &LoopState, noise: &LoopNoise) -> Option<DMatrix<f64>> {
+        let mut equations = self.linearize(state, noise);
+        equations.eliminate(0.0)?;
+        Some(equations.hessian.cholesky()?.inverse())
+    }
+
+    fn linearize(&self, state: &LoopState, noise: &LoopNoise) -> LoopEquations {
         let mut hessian = self.prior.information();
         let mut gradient = self.prior.jacobian().tr_mul(&self.prior.residual(&state.chain));
-        let mut undamped = hessian.clone();
-        let mut eliminated = Vec::with_capacity(self.segments.len());
-        for segment in 0..self.segments.len() {
-            let (own, coupling, own_gradient) =
-                self.segment_equations(state, segment, noise, &mut hessian, &mut gradient, &mut undamped);
-            let exact = own.clone().cholesky()?;
-            undamped -= coupling.tr_mul(&exact.solve(&coupling));
-            let mut damped = own;
-            for k in 0..damped.nrows() {
-                damped[(k, k)] *= 1.0 + damping;
-            }
-            let factor = damped.cholesky()?;
-            hessian -= coupling.tr_mul(&factor.solve(&coupling));
-            gradient -= coupling.tr_mul(&factor.solve(&own_gradient));
-            eliminated.push(Eliminated { factor, coupling, gradient: own_gradient });
-        }
-        for k in 0..count {
-            hessian[(k, k)] *= 1.0 + damping;
-        }
-        let delta = -hessian.cholesky()?.solve(&gradient);
-        let mut next = state.clone();
-        next.chain = state.chain.plus(&delta);
-        for (segment, part) in eliminated.iter().enumerate() {
-            let own = -part.factor.solve(&(&part.gradient + &part.coupling * &delta));
-            next.frames[segment] = state.frames[segment].plus(&own.as_slice()[..FRAME]);
-            for (angle, step) in next.joints_rad[segment].iter_mut().flatten().zip(own.iter().skip(FRAME)) {
-                *angle += step;
-            }
-        }
-        Some((next, undamped.cholesky()?.inverse()))
+        let segments = (0..self.segments.len())
+            .map(|segment| self.segment_equations(state, segment, noise, &mut hessian, &mut gradient))
+            .collect();
+        LoopEquations { hessian, gradient, segments }
     }
 
-    /// Normal equations of one segment: its own block, its coupling with the chain (own × chain) and its own gradient;
-    /// what touches the chain alone is added to `hessian`, `undamped` and `gradient`.
+    /// Normal equations of one segment; what touches the chain alone is added to `hessian` and `gradient`.
     fn segment_equations(
         &self,
         state: &LoopState,
@@ -345,8 +321,7 @@ impl PoseLoops<'_> {
         noise: &LoopNoise,
         hessian: &mut DMatrix<f64>,
         gradient: &mut DVector<f64>,
-        undamped: &mut DMatrix<f64>,
-    ) -> (DMatrix<f64>, DMatrix<f64>, DVector<f64>) {
+    ) -> SegmentEquations {
         let joints = state.chain.joint_count();
         let pairs = &self.segments[segment];
         let size = FRAME + joints * pairs.len();
@@ -368,9 +343,7 @@ impl PoseLoops<'_> {
                 let mut place = own_gradient.rows_mut(row, left.ncols());
                 place += left.tr_mul(&rows.residual) * weight;
             }
-            let corner = rows.by_chain.tr_mul(&rows.by_chain) * weight;
-            *hessian += &corner;
-            *undamped += &corner;
+            *hessian += rows.by_chain.tr_mul(&rows.by_chain) * weight;
             *gradient += rows.by_chain.tr_mul(&rows.residual) * weight;
             for (joint, (angle, (reading, sigma))) in
                 state.joints_rad[segment][pair].iter().zip(measured.readings()).enumerate()
@@ -380,7 +353,64 @@ impl PoseLoops<'_> {
                 own_gradient[at + joint] += information * wrap_angle(angle - reading);
             }
         }
-        (own, coupling, own_gradient)
+        SegmentEquations { own, coupling, gradient: own_gradient }
+    }
+}
+
+impl LoopEquations {
+    /// Eliminates every segment onto the chain, diagonals of the segments raised by the factor `1 + damping`, and returns
+    /// their damped factors; `None` when one is singular.
+    fn eliminate(&mut self, damping: f64) -> Option<Vec<SegmentFactor>> {
+        let mut factors = Vec::with_capacity(self.segments.len());
+        for segment in &self.segments {
+            let mut damped = segment.own.clone();
+            for k in 0..damped.nrows() {
+                damped[(k, k)] *= 1.0 + damping;
+            }
+            let factor = damped.cholesky()?;
+            self.hessian -= segment.coupling.tr_mul(&factor.solve(&segment.coupling));
+            self.gradient -= segment.coupling.tr_mul(&factor.solve(&segment.gradient));
+            factors.push(factor);
+        }
+        Some(factors)
+    }
+}
+
+/// The pose loops as the damped solver sees them.
+struct DampedLoops<'a> {
+    loops: &'a PoseLoops<'a>,
+    noise: &'a LoopNoise,
+}
+
+impl DampedProblem for DampedLoops<'_> {
+    type Estimate = LoopState;
+    type Equations = LoopEquations;
+
+    fn cost(&self, state: &LoopState) -> f64 {
+        self.loops.cost(state, self.noise)
+    }
+
+    fn linearize(&self, state: &LoopState) -> LoopEquations {
+        self.loops.linearize(state, self.noise)
+    }
+
+    fn step(&mut self, state: &LoopState, equations: &LoopEquations, damping: f64) -> Option<LoopState> {
+        let mut reduced = equations.clone();
+        let factors = reduced.eliminate(damping)?;
+        for k in 0..reduced.hessian.nrows() {
+            reduced.hessian[(k, k)] *= 1.0 + damping;
+        }
+        let delta = -reduced.hessian.cholesky()?.solve(&reduced.gradient);
+        let mut next = state.clone();
+        next.chain = state.chain.plus(&delta);
+        for (segment, (part, factor)) in equations.segments.iter().zip(&factors).enumerate() {
+            let own = -factor.solve(&(&part.gradient + &part.coupling * &delta));
+            next.frames[segment] = state.frames[segment].plus(&own.as_slice()[..FRAME]);
+            for (angle, step) in next.joints_rad[segment].iter_mut().flatten().zip(own.iter().skip(FRAME)) {
+                *angle += step;
+            }
+        }
+        Some(next)
     }
 }
 

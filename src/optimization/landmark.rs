@@ -43,6 +43,11 @@ impl Landmark {
         }
     }
 
+    /// Whether its inverse distance is at its least value.
+    pub(crate) fn is_infinitely_far(&self) -> bool {
+        self.inverse_distance <= MIN_INVERSE_DISTANCE
+    }
+
     /// The point in the anchor's frame, in metres.
     pub(crate) fn point_in_anchor(&self) -> Vector3<f64> {
         self.bearing / self.inverse_distance.max(MIN_INVERSE_DISTANCE)

@@ -104,6 +104,39 @@ impl Projection for CameraModel {
     }
 }
 
+/// Angles in radians about a measured bearing, on the plane tangent to the unit sphere there; the bearing itself is zero.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TangentPlane {
+    /// Unit direction in the camera.
+    pub(crate) bearing: Vector3<f64>,
+    basis: Matrix2x3<f64>,
+}
+
+impl TangentPlane {
+    pub(crate) fn new(bearing: Vector3<f64>) -> Self {
+        Self { bearing, basis: tangent_basis(&bearing).transpose() }
+    }
+
+    /// The unit vector along a direction that points to the bearing's side, and its length.
+    fn ahead(&self, direction: &Vector3<f64>) -> Option<(Vector3<f64>, f64)> {
+        let length = direction.norm();
+        (direction.dot(&self.bearing) > 1e-3 * length).then(|| (direction / length, length))
+    }
+}
+
+impl Projection for TangentPlane {
+    fn project(&self, direction: &Vector3<f64>) -> Option<Vector2<f64>> {
+        let (unit, _) = self.ahead(direction)?;
+        Some(self.basis * unit)
+    }
+
+    fn project_with_jacobian(&self, direction: &Vector3<f64>) -> Option<(Vector2<f64>, Matrix2x3<f64>)> {
+        let (unit, length) = self.ahead(direction)?;
+        let by_direction = self.basis * (Matrix3::identity() - unit * unit.transpose()) / length;
+        Some((self.basis * unit, by_direction))
+    }
+}
+
 /// Residual of one observation and its derivatives, in the unit of the projection or whitened.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Reprojection {

@@ -1,7 +1,7 @@
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2, Vector3, Vector6};
 
 use super::damped::{DampedOptions, DampedProblem, StopReason, minimize};
-use super::reprojection::{self, Projection};
+use super::reprojection::{self, Projection, TangentPlane};
 use super::{
     CameraPose, DensePoseEquations, Landmark, LandmarkRows, RelativePose, Reprojection, ReprojectionEquations,
     RobustLoss,
@@ -86,6 +86,10 @@ fn reprojection_jacobians_meet_central_differences() {
             check_jacobians(&mut random, &camera, &Vector2::new(300.0, 200.0), 1e-4);
         }
     }
+    for _ in 0..200 {
+        let measured = (vector(&mut random, 0.8).xy().push(1.0)).normalize();
+        check_jacobians(&mut random, &TangentPlane::new(measured), &Vector2::zeros(), 1e-7);
+    }
 }
 
 #[test]
@@ -95,7 +99,9 @@ fn a_landmark_of_a_point_leads_back_to_it() {
     assert!((landmark.point_in_anchor() - point).norm() < 1e-14);
     assert!(Landmark::from_point(&Vector3::new(0.0, 0.0, 1e-4)).is_none());
     let infinitely_far = landmark.plus(&Vector3::new(0.0, 0.0, -10.0));
-    assert!(infinitely_far.inverse_distance > 0.0);
+    assert!(
+        infinitely_far.is_infinitely_far() && infinitely_far.inverse_distance > 0.0 && !landmark.is_infinitely_far()
+    );
 }
 
 #[test]

@@ -10,7 +10,7 @@ use super::structure::{
     Structure, StructureFailure, StructureLimits, ViewPair, collect_tracks, common_bearings, rank_pairs, reconstruct,
     thin_out,
 };
-use super::visual_problem::mean_square;
+use super::visual_problem::{between, mean_square};
 use super::{
     InitializationDiagnostics, InitializationFrame, InitializationInput, InitializationOptions, InitializationOrigin,
     InitializationOutcome, InitializationSolution, InitializedFrame, InitializedLandmark, StandstillEstimate,
@@ -283,7 +283,9 @@ impl Problem<'_> {
             cameras: &self.structure.poses,
             imu_from_camera: mounts,
             increments,
-            median_distance: median_distance(self.structure.landmarks.iter().map(|landmark| landmark.inverse_distance)),
+            median_distance: median_distance(
+                self.structure.landmarks.iter().map(|tracked| tracked.landmark.inverse_distance),
+            ),
             bearing_sigma_rad: self.options.bearing_sigma_rad,
             gravity_m_per_s2: self.input.gravity_m_per_s2,
             mount_rotation_sigma_rad: self.options.mount_rotation_sigma_rad,
@@ -335,11 +337,8 @@ impl Problem<'_> {
         let start = RefinedState::new(&input, alignment, &self.structure.landmarks);
         let mut refined = refinement.run(start, REFINEMENT_ROUNDS[0]);
         let before = refined.state.landmarks.len();
-        let cameras = refined.state.cameras(&mounts);
-        refined.state.landmarks.retain(|landmark| {
-            landmark.inverse_distance > 0.0
-                && landmark.worst_ratio(&cameras, options.bearing_sigma_rad) < OUTLIER_SIGMAS
-        });
+        let cameras = between(&refined.state.cameras(&mounts));
+        refined.state.landmarks.retain(|landmark| landmark.fits(&cameras, options.bearing_sigma_rad, OUTLIER_SIGMAS));
         let rounds = refined.rounds;
         let mut refined = refinement.run(refined.state, REFINEMENT_ROUNDS[1]);
         refined.rounds += rounds;
@@ -350,7 +349,7 @@ impl Problem<'_> {
         let subject = "share of landmarks that fit with positive depth";
         checklist.at_least("positive depth", subject, share, options.least_inlier_share, Shown::Percent);
         let cameras = refined.state.cameras(&mounts);
-        let rms = mean_square(&refined.state.landmarks, &cameras, options.bearing_sigma_rad).0.sqrt();
+        let rms = mean_square(&refined.state.landmarks, &cameras, options.bearing_sigma_rad).sqrt();
         let subject = "reprojection error over its standard deviation";
         checklist.at_most("reprojection", subject, rms, options.most_reprojection_sigmas, Shown::Plain(""));
         let subject = "mean square of the whitened inertial residuals";
@@ -398,7 +397,7 @@ impl Problem<'_> {
             .landmarks
             .iter()
             .filter_map(|landmark| {
-                let depth_m = landmark.direction.z / landmark.inverse_distance;
+                let depth_m = landmark.landmark.bearing.z / landmark.landmark.inverse_distance;
                 (depth_m > 0.0).then_some(())?;
                 Some(InitializedLandmark {
                     id: landmark.id,
@@ -411,7 +410,7 @@ impl Problem<'_> {
             .collect();
         landmarks.sort_by_key(|landmark| landmark.id);
         let sigmas = refined.sigmas.unwrap_or_default();
-        let (square, _) = mean_square(&state.landmarks, &state.cameras(&given), self.options.bearing_sigma_rad);
+        let square = mean_square(&state.landmarks, &state.cameras(&given), self.options.bearing_sigma_rad);
         InitializationSolution {
             origin: InitializationOrigin::FromMotion,
             frames,

@@ -4,11 +4,6 @@ use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
 use crate::geometry::{RigidTransform, median, so3, tangent_basis};
 
-/// Weight of Huber's loss for a residual of `ratio` standard deviations.
-pub(super) fn huber_weight(ratio: f64, threshold: f64) -> f64 {
-    if ratio <= threshold { 1.0 } else { threshold / ratio }
-}
-
 /// What a rotation alone leaves between two sets of bearings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RotationFit {

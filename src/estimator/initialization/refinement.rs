@@ -2,15 +2,17 @@
 //!
 //! The IMU frame of the first view is the frame of reference, so there is no gauge freedom left; gravity is a direction in
 //! it with known magnitude.
-//! The mount is the given one with an error that all views share (a turn on the IMU's side and a shift) and, on a
-//! gimbal, a turn of its own in each view: `R = Exp(shared)·given·Exp(own)`.
+//! The mount is the given one with an error that all views share (a rotation on the IMU's side and a shift) and, on a
+//! gimbal, a rotation of its own in each view: `R = shared·given·own`. Every rotation is perturbed on the right.
 
-use nalgebra::{DMatrix, DVector, Matrix3, Matrix3x2, SMatrix, SVector, UnitQuaternion, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix3x2, SMatrix, SVector, UnitQuaternion, Vector3, Vector6};
 
 use super::alignment::{Alignment, VectorPrior};
-use super::visual_problem::{Landmark, VisualNormal, visual_cost};
+use super::visual_problem::{TrackedLandmark, moved, visual_cost, visual_equations};
 use crate::estimator::{ImuBias, Preintegration};
 use crate::geometry::{RigidTransform, so3, tangent_basis};
+use crate::optimization::damped::{DampedOptions, DampedProblem, StopReason, minimize};
+use crate::optimization::{DensePoseEquations, ReducedEquations, ReprojectionEquations};
 
 /// Tightest standard deviation that a prior on the mount may have, so that "exactly known" stays solvable.
 const LEAST_SIGMA: f64 = 1e-5;
@@ -40,7 +42,7 @@ pub(super) struct RefinedState {
     /// Gravity, pointing down.
     pub(super) gravity: Vector3<f64>,
     pub(super) bias: ImuBias,
-    pub(super) landmarks: Vec<Landmark>,
+    pub(super) landmarks: Vec<TrackedLandmark>,
     pub(super) shared_turn: UnitQuaternion<f64>,
     pub(super) shared_shift: Vector3<f64>,
     pub(super) own_turns: Vec<UnitQuaternion<f64>>,
@@ -97,7 +99,7 @@ impl Layout {
 
 impl RefinedState {
     /// Starts from an alignment; `landmarks` carry the cameras' unit of length and are scaled here.
-    pub(super) fn new(input: &RefinementInput<'_>, alignment: &Alignment, landmarks: &[Landmark]) -> Self {
+    pub(super) fn new(input: &RefinementInput<'_>, alignment: &Alignment, landmarks: &[TrackedLandmark]) -> Self {
         // What the alignment changed about the mount is split: the mean turn on the IMU's side, the rest per view.
         let changes: Vec<UnitQuaternion<f64>> = alignment
             .imu_from_camera
@@ -116,9 +118,10 @@ impl RefinedState {
         } else {
             vec![UnitQuaternion::identity(); changes.len()]
         };
-        let scaled = |landmark: &Landmark| Landmark {
-            inverse_distance: landmark.inverse_distance / alignment.scale,
-            ..landmark.clone()
+        let scaled = |tracked: &TrackedLandmark| {
+            let mut tracked = tracked.clone();
+            tracked.landmark.inverse_distance /= alignment.scale;
+            tracked
         };
         Self {
             poses: alignment.poses.clone(),
@@ -156,12 +159,12 @@ impl RefinedState {
         tangent_basis(&(self.gravity / norm)) * norm
     }
 
-    pub(super) fn moved(&self, step: &DVector<f64>, layout: &Layout, landmarks: Vec<Landmark>) -> Self {
+    pub(super) fn moved(&self, step: &DVector<f64>, layout: &Layout, landmarks: Vec<TrackedLandmark>) -> Self {
         let three = |start: usize| -> Vector3<f64> { step.fixed_rows::<3>(start).into_owned() };
         let normalized = |q: UnitQuaternion<f64>| UnitQuaternion::new_normalize(q.into_inner());
         let mut next = self.clone();
         next.landmarks = landmarks;
-        next.shared_turn = normalized(so3::exp(&three(Layout::SHARED_TURN)) * self.shared_turn);
+        next.shared_turn = normalized(self.shared_turn * so3::exp(&three(Layout::SHARED_TURN)));
         next.shared_shift += three(Layout::SHARED_SHIFT);
         next.bias.gyroscope_rad_per_s += three(Layout::GYROSCOPE);
         next.bias.accelerometer_m_per_s2 += three(Layout::ACCELEROMETER);
@@ -201,6 +204,14 @@ fn inertial_residual(
     residual.fixed_rows_mut::<3>(3).copy_from(&(shift - motion.position_m));
     residual.fixed_rows_mut::<3>(6).copy_from(&(gain - motion.velocity_m_per_s));
     (residual, shift, gain)
+}
+
+/// All factors linearized at a state.
+pub(super) struct RefinementEquations {
+    visual: ReprojectionEquations<DensePoseEquations>,
+    /// Normal matrix of the IMU factors and the priors.
+    normal: DMatrix<f64>,
+    gradient: DVector<f64>,
 }
 
 /// The adjustment's problem: fixed data, whitening matrices and column layout.
@@ -243,39 +254,32 @@ impl<'a> Refinement<'a> {
         Some(Self { input, whitening, layout })
     }
 
-    /// Levenberg–Marquardt for at most `rounds` rounds.
+    /// Adjusts in at most `rounds` rounds.
     pub(super) fn run(&self, start: RefinedState, rounds: usize) -> Refined {
-        let mut state = start;
-        let mut cost = self.cost(&state);
-        let mut damping = 1e-4;
-        let (mut taken, mut settled) = (0, false);
-        while taken < rounds && !settled {
-            taken += 1;
-            let (normal, gradient, visual) = self.normal_equations(&state, damping);
-            let Some(step) = damped_step(normal, &gradient, damping) else {
-                damping *= 10.0;
-                continue;
-            };
-            let landmarks = visual.moved_landmarks(&state.landmarks, &self.camera_step(&state, &step));
-            let next = state.moved(&step, &self.layout, landmarks);
-            let next_cost = self.cost(&next);
-            if next_cost < cost {
-                settled = cost - next_cost < 1e-4 * cost;
-                (state, cost) = (next, next_cost);
-                damping = (damping * 0.1).max(1e-9);
-            } else {
-                damping *= 20.0;
-                // No step leads down any more.
-                settled = damping > 1e6;
-            }
+        let options = DampedOptions {
+            iterations: rounds,
+            relative_cost_tolerance: 1e-4,
+            first_damping: 1e-4,
+            least_damping: 1e-9,
+            most_damping: 1e6,
+            growth: 20.0,
+        };
+        let mut problem = self;
+        let solution = minimize(&mut problem, start, &options);
+        let inertial_mean_square =
+            self.inertial_cost(&solution.estimate) / (9 * self.input.increments.len()).max(1) as f64;
+        Refined {
+            inertial_mean_square,
+            sigmas: None,
+            rounds: solution.tried,
+            settled: solution.stop != StopReason::IterationLimit,
+            state: solution.estimate,
         }
-        let inertial_mean_square = self.inertial_cost(&state) / (9 * self.input.increments.len()).max(1) as f64;
-        Refined { state, inertial_mean_square, sigmas: None, rounds: taken, settled }
     }
 
     /// Standard deviations at a state.
     pub(super) fn sigmas(&self, state: &RefinedState) -> Option<RefinementSigmas> {
-        let (normal, _, _) = self.normal_equations(state, 0.0);
+        let (normal, _, _) = self.reduced(state, &self.linearized(state), 0.0);
         let factor = normal.cholesky()?;
         let layout = &self.layout;
         // Columns of the covariance for a handful of quantities only.
@@ -340,25 +344,36 @@ impl<'a> Refinement<'a> {
         cost
     }
 
-    /// Normal matrix, gradient, and the visual part for finding the depths again.
-    pub(super) fn normal_equations(
+    /// Linearizes all factors.
+    pub(super) fn linearized(&self, state: &RefinedState) -> RefinementEquations {
+        let columns = self.layout.columns();
+        let cameras = state.cameras(self.input.imu_from_camera);
+        let mut equations = RefinementEquations {
+            visual: visual_equations(&state.landmarks, &cameras, self.input.bearing_sigma_rad),
+            normal: DMatrix::zeros(columns, columns),
+            gradient: DVector::zeros(columns),
+        };
+        let RefinementEquations { normal, gradient, .. } = &mut equations;
+        for (view, increment) in self.input.increments.iter().enumerate() {
+            self.add_inertial(state, view, increment, normal, gradient);
+        }
+        self.add_priors(state, normal, gradient);
+        equations
+    }
+
+    /// Normal matrix and gradient with the landmarks eliminated, and what finds the landmarks' steps again.
+    pub(super) fn reduced(
         &self,
         state: &RefinedState,
+        equations: &RefinementEquations,
         damping: f64,
-    ) -> (DMatrix<f64>, DVector<f64>, VisualNormal) {
-        let columns = self.layout.columns();
-        let mut normal = DMatrix::zeros(columns, columns);
-        let mut gradient = DVector::zeros(columns);
-        let cameras = state.cameras(self.input.imu_from_camera);
-        let visual = VisualNormal::new(&state.landmarks, &cameras, self.input.bearing_sigma_rad, damping);
-        self.add_visual(state, &visual, &mut normal, &mut gradient);
-        for (view, increment) in self.input.increments.iter().enumerate() {
-            self.add_inertial(state, view, increment, &mut normal, &mut gradient);
-        }
-        self.add_priors(state, &mut normal, &mut gradient);
+    ) -> (DMatrix<f64>, DVector<f64>, ReducedEquations<DensePoseEquations>) {
+        let (mut normal, mut gradient) = (equations.normal.clone(), equations.gradient.clone());
+        let visual = equations.visual.eliminate(damping);
+        self.add_visual(state, &visual.poses, &mut normal, &mut gradient);
         // The first view is the frame of reference.
-        let held = self.layout.pose(0);
-        for column in held..held + 6 {
+        let fixed = self.layout.pose(0);
+        for column in fixed..fixed + 6 {
             normal.row_mut(column).fill(0.0);
             normal.column_mut(column).fill(0.0);
             normal[(column, column)] = 1.0;
@@ -372,6 +387,7 @@ impl<'a> Refinement<'a> {
         let pose = &state.poses[view];
         let given = &self.input.imu_from_camera[view];
         let lever = given.translation_m + state.shared_shift;
+        let after_shared: Matrix3<f64> = (given.rotation * state.own_turns[view]).to_rotation_matrix().into_inner();
         let mount = (state.shared_turn * given.rotation * state.own_turns[view]).to_rotation_matrix().into_inner();
         let rotation = pose.rotation_matrix();
         let block = |top: Matrix3<f64>, bottom: Matrix3<f64>| {
@@ -382,7 +398,7 @@ impl<'a> Refinement<'a> {
         };
         let start = self.layout.pose(view);
         let mut blocks = vec![
-            (Layout::SHARED_TURN, block(mount.transpose(), Matrix3::zeros())),
+            (Layout::SHARED_TURN, block(after_shared.transpose(), Matrix3::zeros())),
             (Layout::SHARED_SHIFT, block(Matrix3::zeros(), rotation)),
             (start, block(mount.transpose(), -rotation * so3::hat(&lever))),
             (start + 3, block(Matrix3::zeros(), Matrix3::identity())),
@@ -396,19 +412,19 @@ impl<'a> Refinement<'a> {
     fn add_visual(
         &self,
         state: &RefinedState,
-        visual: &VisualNormal,
+        visual: &DensePoseEquations,
         normal: &mut DMatrix<f64>,
         gradient: &mut DVector<f64>,
     ) {
         let blocks: Vec<_> = (0..self.layout.views).map(|view| self.camera_blocks(state, view)).collect();
         for (view_a, blocks_a) in blocks.iter().enumerate() {
-            let slope = visual.gradient.fixed_rows::<6>(6 * view_a);
+            let slope = &visual.gradient[view_a];
             for (column, block) in blocks_a {
                 let mut target = gradient.fixed_rows_mut::<3>(*column);
-                target += block.tr_mul(&slope);
+                target += block.tr_mul(slope);
             }
             for (view_b, blocks_b) in blocks.iter().enumerate() {
-                let corner = visual.hessian.fixed_view::<6, 6>(6 * view_a, 6 * view_b);
+                let corner = visual.hessian.symmetric_block(view_a, view_b);
                 for (column_b, block_b) in blocks_b {
                     let product = corner * block_b;
                     for (column_a, block_a) in blocks_a {
@@ -420,16 +436,14 @@ impl<'a> Refinement<'a> {
         }
     }
 
-    /// How the cameras move when the state moves by `step`.
-    fn camera_step(&self, state: &RefinedState, step: &DVector<f64>) -> DVector<f64> {
-        let mut cameras = DVector::zeros(6 * self.layout.views);
-        for view in 0..self.layout.views {
-            let mut target = cameras.fixed_rows_mut::<6>(6 * view);
-            for (column, block) in self.camera_blocks(state, view) {
-                target += block * step.fixed_rows::<3>(column);
-            }
-        }
-        cameras
+    /// Step `[φ; δt]` of each camera pose that belongs to a step of the state.
+    fn camera_steps(&self, state: &RefinedState, step: &DVector<f64>) -> Vec<Vector6<f64>> {
+        (0..self.layout.views)
+            .map(|view| {
+                let blocks = self.camera_blocks(state, view);
+                blocks.iter().map(|(column, block)| block * step.fixed_rows::<3>(*column)).sum()
+            })
+            .collect()
     }
 
     fn add_inertial(
@@ -506,9 +520,8 @@ impl<'a> Refinement<'a> {
             let mut target = gradient.fixed_rows_mut::<3>(start);
             target += jacobian.tr_mul(residual) * weight;
         };
-        // The shared turn moves on the left: Log(Exp(δ)·Exp(x)) = x + J_l⁻¹(x)·δ with J_l⁻¹(x) = J_r⁻¹(−x).
         let shared = so3::log(&state.shared_turn);
-        add(Layout::SHARED_TURN, &shared, &so3::right_jacobian_inverse(&-shared), input.mount_rotation_sigma_rad);
+        add(Layout::SHARED_TURN, &shared, &so3::right_jacobian_inverse(&shared), input.mount_rotation_sigma_rad);
         let identity = Matrix3::identity();
         add(Layout::SHARED_SHIFT, &state.shared_shift, &identity, input.mount_translation_sigma_m);
         let gyroscope = state.bias.gyroscope_rad_per_s - input.gyroscope_bias.mean;
@@ -533,11 +546,26 @@ fn gravity_columns(state: &RefinedState, back: &Matrix3<f64>, t: f64) -> SMatrix
     block
 }
 
-/// Solves `(N + damping · diag N) x = −gradient`.
-fn damped_step(mut normal: DMatrix<f64>, gradient: &DVector<f64>, damping: f64) -> Option<DVector<f64>> {
-    for index in 0..gradient.len() {
-        normal[(index, index)] *= 1.0 + damping;
+impl DampedProblem for &Refinement<'_> {
+    type Estimate = RefinedState;
+    type Equations = RefinementEquations;
+
+    fn cost(&self, state: &RefinedState) -> f64 {
+        Refinement::cost(self, state)
     }
-    let step = -normal.cholesky()?.solve(gradient);
-    step.iter().all(|value| value.is_finite()).then_some(step)
+
+    fn linearize(&self, state: &RefinedState) -> RefinementEquations {
+        self.linearized(state)
+    }
+
+    fn step(&mut self, state: &RefinedState, equations: &RefinementEquations, damping: f64) -> Option<RefinedState> {
+        let (mut normal, gradient, visual) = self.reduced(state, equations, damping);
+        for index in 0..gradient.len() {
+            normal[(index, index)] *= 1.0 + damping;
+        }
+        let step = -normal.cholesky()?.solve(&gradient);
+        let camera_steps = self.camera_steps(state, &step);
+        let landmark_steps = equations.visual.substitute(&visual, |view| camera_steps[view]);
+        Some(state.moved(&step, &self.layout, moved(&state.landmarks, &landmark_steps)))
+    }
 }

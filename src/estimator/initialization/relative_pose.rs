@@ -5,6 +5,7 @@ use nalgebra::{Matrix3, Matrix5, UnitQuaternion, Vector3, Vector5};
 use super::bearing::angle_between;
 use super::essential::{decompose, five_point};
 use crate::geometry::{RigidTransform, SplitMix64, so3, tangent_basis};
+use crate::optimization::damped::{DampedOptions, DampedProblem, minimize};
 
 /// Largest number of five-point samples drawn.
 const MAX_SAMPLES: usize = 160;
@@ -23,6 +24,9 @@ const SAME_ROTATION_RAD: f64 = 0.02;
 const SAME_HEADING_RAD: f64 = 0.2;
 /// A pose whose cost (χ²) lies within this much per pair of the best one is returned as well.
 const AMBIGUOUS_SHARE: f64 = 0.3;
+
+/// Unit bearings of one point in camera i and camera j.
+type BearingPair = (Vector3<f64>, Vector3<f64>);
 
 /// What is known of a rotation before looking.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -91,7 +95,7 @@ pub fn relative_poses(
 
 /// The best few hypotheses that differ from each other, least cost first.
 struct Candidates<'a> {
-    pairs: &'a [(Vector3<f64>, Vector3<f64>)],
+    pairs: &'a [BearingPair],
     prior: &'a RotationPrior,
     sigma_rad: f64,
     found: Vec<(f64, RigidTransform)>,
@@ -160,14 +164,14 @@ fn essential_of(camera_j_from_camera_i: &RigidTransform) -> Matrix3<f64> {
 }
 
 /// Distance of a pair from the epipolar constraint, to first order, in radians.
-fn epipolar_angle(essential: &Matrix3<f64>, (bearing_i, bearing_j): &(Vector3<f64>, Vector3<f64>)) -> f64 {
+fn epipolar_angle(essential: &Matrix3<f64>, (bearing_i, bearing_j): &BearingPair) -> f64 {
     let line_j = essential * bearing_i;
     let line_i = essential.tr_mul(bearing_j);
     let gradient = (line_i.norm_squared() + line_j.norm_squared()).sqrt();
     if gradient > 0.0 { bearing_j.dot(&line_j).abs() / gradient } else { 0.0 }
 }
 
-fn epipolar_cost(pairs: &[(Vector3<f64>, Vector3<f64>)], essential: &Matrix3<f64>, sigma_rad: f64) -> f64 {
+fn epipolar_cost(pairs: &[BearingPair], essential: &Matrix3<f64>, sigma_rad: f64) -> f64 {
     let limit = INLIER_SIGMAS * INLIER_SIGMAS;
     pairs.iter().map(|pair| (epipolar_angle(essential, pair) / sigma_rad).powi(2).min(limit)).sum()
 }
@@ -175,7 +179,7 @@ fn epipolar_cost(pairs: &[(Vector3<f64>, Vector3<f64>)], essential: &Matrix3<f64
 /// Whether the pair's point lies before both cameras; too little parallax to tell counts as yes.
 fn lies_in_front(
     camera_j_from_camera_i: &RigidTransform,
-    (bearing_i, bearing_j): &(Vector3<f64>, Vector3<f64>),
+    (bearing_i, bearing_j): &BearingPair,
     sigma_rad: f64,
 ) -> bool {
     let turned = camera_j_from_camera_i.rotation * bearing_i;
@@ -190,19 +194,16 @@ fn lies_in_front(
     along_i > 0.0 && along_j > 0.0
 }
 
-fn inliers(pairs: &[(Vector3<f64>, Vector3<f64>)], pose: &RigidTransform, sigma_rad: f64) -> Vec<usize> {
+fn inliers(pairs: &[BearingPair], pose: &RigidTransform, sigma_rad: f64) -> Vec<usize> {
     let essential = essential_of(pose);
-    let fits = |pair: &(Vector3<f64>, Vector3<f64>)| {
+    let fits = |pair: &BearingPair| {
         epipolar_angle(&essential, pair) < INLIER_SIGMAS * sigma_rad && lies_in_front(pose, pair, sigma_rad)
     };
     (0..pairs.len()).filter(|&index| fits(&pairs[index])).collect()
 }
 
 /// The direction of translation that suits a known rotation best (least eigenvector of the epipolar normals).
-fn translation_for_rotation(
-    pairs: &[(Vector3<f64>, Vector3<f64>)],
-    rotation: &UnitQuaternion<f64>,
-) -> Option<Vector3<f64>> {
+fn translation_for_rotation(pairs: &[BearingPair], rotation: &UnitQuaternion<f64>) -> Option<Vector3<f64>> {
     let mut moment = Matrix3::zeros();
     for (bearing_i, bearing_j) in pairs {
         let normal = (rotation * bearing_i).cross(bearing_j);
@@ -213,63 +214,75 @@ fn translation_for_rotation(
     Some(eigen.eigenvectors.column(least).into_owned())
 }
 
-/// Robust Gauss–Newton on the epipolar angles over rotation (3) and direction of translation (2).
-fn refine(pairs: &[(Vector3<f64>, Vector3<f64>)], start: &RigidTransform, sigma_rad: f64) -> RigidTransform {
-    const ROUNDS: usize = 12;
-    let mut pose = *start;
-    let mut damping = 1e-4;
-    let mut cost = robust_cost(pairs, &pose, sigma_rad);
-    for _ in 0..ROUNDS {
+/// Robust least squares on the epipolar angles over rotation (3) and direction of translation (2).
+fn refine(pairs: &[BearingPair], start: &RigidTransform, sigma_rad: f64) -> RigidTransform {
+    let options = DampedOptions {
+        iterations: 12,
+        relative_cost_tolerance: 1e-6,
+        first_damping: 1e-4,
+        least_damping: 1e-9,
+        most_damping: 1e6,
+        growth: 30.0,
+    };
+    minimize(&mut EpipolarFit { pairs, sigma_rad }, *start, &options).estimate
+}
+
+/// The epipolar angles of all pairs.
+struct EpipolarFit<'a> {
+    pairs: &'a [BearingPair],
+    sigma_rad: f64,
+}
+
+impl DampedProblem for EpipolarFit<'_> {
+    type Estimate = RigidTransform;
+    /// Normal matrix and gradient by `[φ; two on the tangent plane of the translation]`.
+    type Equations = (Matrix5<f64>, Vector5<f64>);
+
+    fn cost(&self, pose: &RigidTransform) -> f64 {
+        robust_cost(self.pairs, pose, self.sigma_rad)
+    }
+
+    fn linearize(&self, pose: &RigidTransform) -> Self::Equations {
         let basis = tangent_basis(&pose.translation_m);
         let rotation = pose.rotation_matrix();
-        let essential = essential_of(&pose);
-        let (mut normal, mut rhs) = (Matrix5::<f64>::zeros(), Vector5::zeros());
-        for (bearing_i, bearing_j) in pairs {
-            let gradient = ((essential * bearing_i).norm_squared() + essential.tr_mul(bearing_j).norm_squared()).sqrt();
-            if gradient < 1e-12 {
+        let essential = essential_of(pose);
+        let (mut normal, mut gradient) = (Matrix5::<f64>::zeros(), Vector5::zeros());
+        for (bearing_i, bearing_j) in self.pairs {
+            let length = ((essential * bearing_i).norm_squared() + essential.tr_mul(bearing_j).norm_squared()).sqrt();
+            if length < 1e-12 {
                 continue;
             }
-            let residual = bearing_j.dot(&(essential * bearing_i)) / gradient;
+            let residual = bearing_j.dot(&(essential * bearing_i)) / length;
             let by_rotation = -(bearing_j.transpose() * so3::hat(&pose.translation_m) * rotation * so3::hat(bearing_i));
             let by_direction = basis.tr_mul(&(rotation * bearing_i).cross(bearing_j));
             let row =
-                Vector5::new(by_rotation.x, by_rotation.y, by_rotation.z, by_direction.x, by_direction.y) / gradient;
-            let weight = 1.0 / (1.0 + (residual / (2.0 * sigma_rad)).powi(2)).powi(2);
+                Vector5::new(by_rotation.x, by_rotation.y, by_rotation.z, by_direction.x, by_direction.y) / length;
+            let weight = 1.0 / (1.0 + (residual / (2.0 * self.sigma_rad)).powi(2)).powi(2);
             normal += row * row.transpose() * weight;
-            rhs -= row * (residual * weight);
+            gradient += row * (residual * weight);
         }
-        let mut damped = normal;
+        (normal, gradient)
+    }
+
+    fn step(
+        &mut self,
+        pose: &RigidTransform,
+        (normal, gradient): &Self::Equations,
+        damping: f64,
+    ) -> Option<RigidTransform> {
+        let mut damped = *normal;
         for index in 0..5 {
             damped[(index, index)] *= 1.0 + damping;
         }
-        let Some(factor) = damped.cholesky() else { break };
-        let step = factor.solve(&rhs);
-        let turn = so3::exp(&Vector3::new(step[0], step[1], step[2]));
-        let direction = pose.translation_m + basis * nalgebra::Vector2::new(step[3], step[4]);
-        let next = RigidTransform::new(
-            UnitQuaternion::new_normalize((pose.rotation * turn).into_inner()),
-            direction.normalize(),
-        );
-        let next_cost = robust_cost(pairs, &next, sigma_rad);
-        if next_cost < cost {
-            let gain = cost - next_cost;
-            (pose, cost) = (next, next_cost);
-            damping = (damping * 0.1).max(1e-9);
-            if gain < 1e-6 * cost {
-                break;
-            }
-        } else {
-            damping *= 30.0;
-            if damping > 1e6 {
-                break;
-            }
-        }
+        let step = -damped.cholesky()?.solve(gradient);
+        let rotation = pose.rotation * so3::exp(&step.fixed_rows::<3>(0).into_owned());
+        let direction = pose.translation_m + tangent_basis(&pose.translation_m) * step.fixed_rows::<2>(3);
+        Some(RigidTransform::new(UnitQuaternion::new_normalize(rotation.into_inner()), direction.normalize()))
     }
-    pose
 }
 
 /// Geman–McClure cost of the epipolar angles, scale two standard deviations.
-fn robust_cost(pairs: &[(Vector3<f64>, Vector3<f64>)], pose: &RigidTransform, sigma_rad: f64) -> f64 {
+fn robust_cost(pairs: &[BearingPair], pose: &RigidTransform, sigma_rad: f64) -> f64 {
     let essential = essential_of(pose);
     let square = |pair| (epipolar_angle(&essential, pair) / (2.0 * sigma_rad)).powi(2);
     pairs.iter().map(|pair| square(pair) / (1.0 + square(pair))).sum()

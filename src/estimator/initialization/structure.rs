@@ -5,13 +5,15 @@
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
-use nalgebra::{DMatrix, DVector, UnitQuaternion, Vector3};
+use nalgebra::{DMatrix, DVector, UnitQuaternion, Vector3, Vector6};
 
 use super::bearing::{RotationFit, fit_rotation, refine_camera_pose, triangulate};
 use super::relative_pose::{RelativePose, RotationPrior, relative_poses};
-use super::visual_problem::{Landmark, Sighting, VisualNormal, mean_square, visual_cost};
+use super::visual_problem::{Sighting, TrackedLandmark, between, mean_square, moved, visual_cost, visual_equations};
 use crate::frontend::{FeatureId, TrackedFeature};
 use crate::geometry::RigidTransform;
+use crate::optimization::damped::{DampedOptions, DampedProblem, minimize};
+use crate::optimization::{DensePoseEquations, ReprojectionEquations};
 
 /// A feature must be seen under at least this angle before its depth counts.
 const LEAST_PARALLAX_RAD: f64 = 0.006;
@@ -155,7 +157,7 @@ pub(super) struct Structure {
     /// `first_camera_from_camera`, one per placed view.
     pub(super) poses: Vec<RigidTransform>,
     /// Landmarks; anchors and observations are numbers of placed views.
-    pub(super) landmarks: Vec<Landmark>,
+    pub(super) landmarks: Vec<TrackedLandmark>,
     /// Root mean square angle error per coordinate, in radians.
     pub(super) rms_rad: f64,
 }
@@ -333,7 +335,7 @@ impl GrowingMap<'_> {
                 .collect();
             let Some(anchor) = seen.first().map(|sighting| sighting.view) else { continue };
             let distance = (first_from_base.transform(point) - poses[anchor].translation_m).norm();
-            landmarks.extend(Landmark::new(*id, 1.0 / distance, seen));
+            landmarks.extend(TrackedLandmark::new(*id, 1.0 / distance, seen));
         }
         Structure { views, poses, landmarks, rms_rad: 0.0 }
     }
@@ -342,58 +344,73 @@ impl GrowingMap<'_> {
 /// Adjusts all poses and depths together, twice, with bad landmarks dropped in between.
 fn adjust(mut structure: Structure, sigma_rad: f64) -> Structure {
     for _ in 0..2 {
-        bundle_adjust(&mut structure, sigma_rad);
-        let poses = &structure.poses;
-        structure.landmarks.retain(|landmark| {
-            landmark.inverse_distance > 0.0 && landmark.worst_ratio(poses, sigma_rad) < OUTLIER_SIGMAS
-        });
+        structure = bundle_adjust(structure, sigma_rad);
+        let poses = between(&structure.poses);
+        structure.landmarks.retain(|landmark| landmark.fits(&poses, sigma_rad, OUTLIER_SIGMAS));
     }
-    structure.rms_rad = mean_square(&structure.landmarks, &structure.poses, sigma_rad).0.sqrt() * sigma_rad;
+    structure.rms_rad = mean_square(&structure.landmarks, &structure.poses, sigma_rad).sqrt() * sigma_rad;
     structure
 }
 
-/// Levenberg–Marquardt over all poses but the first; the free scale is held by the damping alone.
-fn bundle_adjust(structure: &mut Structure, sigma_rad: f64) {
-    const ROUNDS: usize = 8;
-    let mut damping = 1e-3;
-    let mut cost = visual_cost(&structure.landmarks, &structure.poses, sigma_rad);
-    for _ in 0..ROUNDS {
-        let normal = VisualNormal::new(&structure.landmarks, &structure.poses, sigma_rad, damping);
-        let free = normal.gradient.len().saturating_sub(6);
-        if free == 0 {
-            return;
+/// Adjusts all poses but the first, and all landmarks; only the damping constrains the scale.
+fn bundle_adjust(structure: Structure, sigma_rad: f64) -> Structure {
+    if structure.poses.len() < 2 {
+        return structure;
+    }
+    let options = DampedOptions {
+        iterations: 8,
+        relative_cost_tolerance: 1e-4,
+        first_damping: 1e-3,
+        least_damping: 1e-8,
+        most_damping: 1e8,
+        growth: 20.0,
+    };
+    minimize(&mut FreeViews { sigma_rad }, structure, &options).estimate
+}
+
+/// All poses but the first, and all landmarks.
+struct FreeViews {
+    sigma_rad: f64,
+}
+
+impl DampedProblem for FreeViews {
+    type Estimate = Structure;
+    type Equations = ReprojectionEquations<DensePoseEquations>;
+
+    fn cost(&self, structure: &Structure) -> f64 {
+        visual_cost(&structure.landmarks, &structure.poses, self.sigma_rad)
+    }
+
+    fn linearize(&self, structure: &Structure) -> Self::Equations {
+        visual_equations(&structure.landmarks, &structure.poses, self.sigma_rad)
+    }
+
+    fn step(&mut self, structure: &Structure, equations: &Self::Equations, damping: f64) -> Option<Structure> {
+        let reduced = equations.eliminate(damping);
+        let free = structure.poses.len() - 1;
+        let mut hessian: DMatrix<f64> = DMatrix::zeros(6 * free, 6 * free);
+        let mut gradient = DVector::zeros(6 * free);
+        for row in 0..free {
+            gradient.fixed_rows_mut::<6>(6 * row).copy_from(&reduced.poses.gradient[row + 1]);
+            for column in 0..free {
+                let block = reduced.poses.hessian.symmetric_block(row + 1, column + 1);
+                hessian.fixed_view_mut::<6, 6>(6 * row, 6 * column).copy_from(&block);
+            }
         }
-        let mut hessian: DMatrix<f64> = normal.hessian.view((6, 6), (free, free)).into_owned();
-        for index in 0..free {
+        for index in 0..6 * free {
             hessian[(index, index)] = hessian[(index, index)] * (1.0 + damping) + 1e-9;
         }
-        let Some(factor) = hessian.cholesky() else {
-            damping *= 10.0;
-            continue;
+        let solved = hessian.cholesky()?.solve(&gradient);
+        let pose_step = |view: usize| match view.checked_sub(1) {
+            Some(free) => -solved.fixed_rows::<6>(6 * free),
+            None => Vector6::zeros(),
         };
-        let solved = factor.solve(&normal.gradient.rows(6, free));
-        let mut step = DVector::zeros(free + 6);
-        step.rows_mut(6, free).copy_from(&-solved);
-        let poses: Vec<RigidTransform> = structure
-            .poses
-            .iter()
-            .enumerate()
-            .map(|(view, pose)| pose.plus(&step.fixed_rows::<6>(6 * view).into_owned()))
-            .collect();
-        let landmarks = normal.moved_landmarks(&structure.landmarks, &step);
-        let next = visual_cost(&landmarks, &poses, sigma_rad);
-        if next < cost {
-            let settled = cost - next < 1e-4 * cost;
-            (structure.poses, structure.landmarks, cost) = (poses, landmarks, next);
-            damping = (damping * 0.1).max(1e-8);
-            if settled {
-                break;
-            }
-        } else {
-            damping *= 20.0;
-            if damping > 1e8 {
-                break;
-            }
-        }
+        let steps = equations.substitute(&reduced, pose_step);
+        Some(Structure {
+            poses: structure.poses.iter().enumerate().map(|(view, pose)| pose.plus(&pose_step(view))).collect(),
+            landmarks: moved(&structure.landmarks, &steps),
+            views: structure.views.clone(),
+            rms_rad: structure.rms_rad,
+        })
     }
 }

@@ -5,7 +5,7 @@ use nalgebra::{DVector, Vector3};
 use super::flight::{Random, noise};
 use crate::estimator::initialization::VectorPrior;
 use crate::estimator::initialization::refinement::{RefinedState, Refinement, RefinementInput};
-use crate::estimator::initialization::visual_problem::{Landmark, Sighting};
+use crate::estimator::initialization::visual_problem::{Sighting, TrackedLandmark};
 use crate::estimator::{ImuBias, Preintegration};
 use crate::frontend::FeatureId;
 use crate::geometry::{RigidTransform, so3};
@@ -53,8 +53,8 @@ fn gradient_of_the_refinement_meets_central_differences() {
                 let sightings =
                     [anchor, 2, 3].map(|view| Sighting::new(view, (random.vector(0.4) + Vector3::z()).normalize()));
                 let mut landmark =
-                    Landmark::new(FeatureId(index), random.uniform(0.1, 0.3), sightings.to_vec()).unwrap();
-                landmark.direction = (landmark.direction + random.vector(0.05)).normalize();
+                    TrackedLandmark::new(FeatureId(index), random.uniform(0.1, 0.3), sightings.to_vec()).unwrap();
+                landmark.landmark.bearing = (landmark.landmark.bearing + random.vector(0.05)).normalize();
                 landmark
             })
             .collect();
@@ -71,7 +71,7 @@ fn gradient_of_the_refinement_meets_central_differences() {
         };
         let refinement = Refinement::new(&input).unwrap();
         // An endless damping of the depths leaves the plain gradient at fixed depths.
-        let (normal, gradient, _) = refinement.normal_equations(&state, 1e15);
+        let (normal, gradient, _) = refinement.reduced(&state, &refinement.linearized(&state), 1e15);
         assert!((&normal - normal.transpose()).amax() < 1e-9 * normal.amax());
         let held = refinement.layout.pose(0);
         for column in 0..refinement.layout.columns() {
