@@ -151,9 +151,9 @@ fn elimination_by_qr_equals_the_schur_complement() {
                 local.push(*observer, term);
             }
             if apart {
-                local.eliminate_last_apart()
+                local.eliminate_last_apart();
             } else {
-                local.eliminate()
+                local.eliminate();
             }
             assert_eq!(local.remaining().len(), 2 * poses - 3);
             let mut rows = Vec::new();
