@@ -8,12 +8,19 @@ use super::ImuNoise;
 
 /// The rig has no camera with this key.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the rig has no camera '{key}'; it has {}", available.join(", "))]
+#[error("the rig has no camera '{key}'; it has {}", quoted(available))]
 pub struct UnknownCamera {
     /// What was asked for.
     pub key: String,
     /// The keys that the rig has.
     pub available: Vec<String>,
+}
+
+fn quoted(keys: &[String]) -> String {
+    if keys.is_empty() {
+        return "none".to_owned();
+    }
+    keys.iter().map(|key| format!("'{key}'")).collect::<Vec<_>>().join(", ")
 }
 
 /// The inertial sensor.
