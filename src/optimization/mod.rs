@@ -2,9 +2,9 @@
 //! elimination of landmarks, damped solver.
 //!
 //! Residuals are predicted minus measured; poses are perturbed by the rule of [`crate::geometry`]. A problem keeps its own
-//! unknowns and its own assembly: it linearizes observations by camera poses here ([`reprojection`]), eliminates the
-//! landmarks by QR ([`LandmarkRows`]) or by the Schur complement ([`ReprojectionEquations`]), carries the result on to its
-//! unknowns, and hands itself to [`damped::minimize`].
+//! unknowns and its own assembly: it linearizes observations by camera poses here (`reprojection`), eliminates the
+//! landmarks by QR (`LandmarkRows`) or by the Schur complement (`ReprojectionEquations`), carries the result on to its
+//! unknowns, and hands itself to `damped::minimize`.
 
 pub(crate) mod damped;
 pub(crate) mod dense;
