@@ -84,7 +84,7 @@ impl ChainOrientation {
 
 /// Predicts the rotation of a camera between two images, from the gyroscope and the orientation on the IMU at both images.
 ///
-/// `imu` goes from the previous image's stamp to this one's (see [`SensorFrame::imu`](crate::flight_log::SensorFrame)); the
+/// `imu` goes from the previous image's stamp to this one's (see `SensorFrame::imu` of the flight log); the
 /// angular velocity is interpolated linearly.
 /// `gyroscope_bias_rad_per_s` is subtracted; zero when it is unknown.
 /// The covariance consists of gyroscope bias and noise, joint angles at both images, and the error of the chain, of which
