@@ -81,8 +81,9 @@ impl Sequence {
         let mut table = String::new();
         for (index, points) in self.points.iter().enumerate() {
             for uv in points {
-                let truth = self.scene.flow(index, index + 1, uv);
-                writeln!(table, "{index},{},{},{},{}", uv.x, uv.y, truth.x, truth.y).expect("a string takes it");
+                let ground_truth = self.scene.flow(index, index + 1, uv);
+                writeln!(table, "{index},{},{},{},{}", uv.x, uv.y, ground_truth.x, ground_truth.y)
+                    .expect("a string takes it");
             }
         }
         std::fs::write(folder.join(format!("{}.csv", self.name)), table).expect("the folder can be written");
@@ -108,11 +109,11 @@ fn bench_tracker(sequence: &Sequence, label: &str, options: &LucasKanadeOptions)
                 continue;
             }
             for (uv, found) in sequence.points[index].iter().zip(found) {
-                let truth = sequence.scene.flow(index, index + 1, uv);
-                flows.push((truth - uv).norm());
+                let ground_truth = sequence.scene.flow(index, index + 1, uv);
+                flows.push((ground_truth - uv).norm());
                 total += 1;
                 if let Some(found) = found {
-                    errors.push((found - truth).norm());
+                    errors.push((found - ground_truth).norm());
                 }
             }
         }

@@ -127,10 +127,10 @@ fn plan(log: &Log, rig_path: Option<&Path>, variants: &[Variant]) -> Result<Sess
 
 fn driven(recording: &Recording, run: &RunRecord) -> Driven {
     let truths: BTreeMap<i64, RigidTransform> =
-        run.steps.iter().filter_map(|step| Some((step.report.stamp_ns, step.truth?))).collect();
+        run.steps.iter().filter_map(|step| Some((step.report.stamp_ns, step.ground_truth?))).collect();
     let samples = run.steps.iter().filter_map(|step| pose_sample(&step.report));
     let poses = samples.filter_map(|sample| sample.judged(&truths)).collect();
-    let truth = recording.truth_rig.as_ref().and_then(|rig| rig.chain_of_camera(&run.camera_key));
+    let ground_truth = recording.ground_truth_rig.as_ref().and_then(|rig| rig.chain_of_camera(&run.camera_key));
     let last = run.steps.iter().rev().find_map(|step| calibration_sample(&step.report));
 
     let mut sums: BTreeMap<FactorKind, (f64, usize)> = BTreeMap::new();
@@ -173,7 +173,7 @@ fn driven(recording: &Recording, run: &RunRecord) -> Driven {
             .map(|error| ChainDistance::new(error.translation_mean_m, error.rotation_mean_rad)),
         step_ms: timing_ms.map(|timing| [timing.step.p50, timing.step.p95]),
         poses,
-        calibration: last.zip(truth).and_then(|(sample, truth)| sample.judged(&truth)),
+        calibration: last.zip(ground_truth).and_then(|(sample, ground_truth)| sample.judged(&ground_truth)),
         chi2: sums.into_iter().map(|(factor, (sum, count))| (factor.name().to_owned(), sum / count as f64)).collect(),
         lost_s: lost_ns as f64 * 1e-9,
         failures,

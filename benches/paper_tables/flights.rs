@@ -50,16 +50,16 @@ pub(crate) struct OfflineErrors {
 
 impl OfflineErrors {
     fn of(report: &CalibrationReport) -> Self {
-        let truth = report.truth.as_ref();
+        let ground_truth = report.ground_truth.as_ref();
         Self {
             static_alone_px: report.camera_imu_reprojection.error_px.mean,
             cluster_px: report.reprojection.iter().map(|camera| camera.error_px.mean).collect(),
-            static_mount: truth.map(|truth| {
-                let error = &truth.static_camera_imu;
+            static_mount: ground_truth.map(|ground_truth| {
+                let error = &ground_truth.static_camera_imu;
                 ChainDistance::new(error.translation_mean_m, error.rotation_mean_rad)
             }),
-            chain: truth.map(|truth| {
-                let error = &truth.chain_final;
+            chain: ground_truth.map(|ground_truth| {
+                let error = &ground_truth.chain_final;
                 ChainDistance::new(error.translation_mean_m, error.rotation_mean_rad)
             }),
         }

@@ -68,9 +68,9 @@ impl Archive {
     /// The log at a path when it lies there complete and was made with these options.
     fn found(path: &Path, options: &SimulationOptions) -> Option<Log> {
         // The truth is written when the log is complete.
-        let truth = fs::read_to_string(path.with_extension("truth.yaml")).ok().filter(|_| path.exists())?;
+        let ground_truth = fs::read_to_string(path.with_extension("truth.yaml")).ok().filter(|_| path.exists())?;
         let note = |key: &str| {
-            let notes = truth.split_once("\ntruth:\n")?.1;
+            let notes = ground_truth.split_once("\ntruth:\n")?.1;
             notes.lines().find_map(|line| line.trim().strip_prefix(key)?.strip_prefix(": "))
         };
         let seconds: f64 = note("duration")?.parse().ok()?;

@@ -123,13 +123,13 @@ pub(crate) fn calibration_sample(report: &StepReport) -> Option<CalibrationSampl
 
 impl CalibrationSample {
     /// The sample held against the true chain; `None` when the two have other columns.
-    pub(crate) fn judged(&self, truth: &ClassicalChain) -> Option<CalibrationErrors> {
+    pub(crate) fn judged(&self, ground_truth: &ClassicalChain) -> Option<CalibrationErrors> {
         let parameterization = self.parameterization.parse().ok()?;
         let chain = |classical: &ClassicalChain| {
             let chain = Chain::from_classical(classical, parameterization);
             if chain.dof() == self.chain_columns { chain } else { chain.without_joint_offsets() }
         };
-        let error = chain(&self.chain).minus(&chain(truth));
+        let error = chain(&self.chain).minus(&chain(ground_truth));
         let columns = error.len();
         if columns > self.covariance.nrows() {
             return None;

@@ -65,8 +65,8 @@ pub(crate) struct EstimationArguments {
     #[arg(long, value_name = "FILE")]
     pub rig: Option<PathBuf>,
     /// The ground truth of the rig, when it is not beside the log (LOG with .truth.yaml).
-    #[arg(long, value_name = "FILE")]
-    pub truth: Option<PathBuf>,
+    #[arg(long = "truth", value_name = "FILE")]
+    pub ground_truth: Option<PathBuf>,
     /// Skip this many seconds at the start of the log.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = seconds)]
     pub start: f64,
@@ -81,7 +81,7 @@ impl EstimationArguments {
         SessionRequest {
             log_path,
             rig_path: self.rig.clone(),
-            truth_path: self.truth.clone(),
+            ground_truth_path: self.ground_truth.clone(),
             specs: self.runs.clone(),
             start_s: self.start,
             duration_s: self.duration,

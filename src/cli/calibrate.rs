@@ -23,8 +23,8 @@ pub(crate) struct CalibrateArguments {
     #[arg(long, value_name = "FILE")]
     pub rig: Option<PathBuf>,
     /// The ground truth of the rig, when it is not beside the log (LOG with .truth.yaml).
-    #[arg(long, value_name = "FILE")]
-    pub truth: Option<PathBuf>,
+    #[arg(long = "truth", value_name = "FILE")]
+    pub ground_truth: Option<PathBuf>,
     /// Skip this many seconds at the start of the log.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = seconds)]
     pub start: f64,
@@ -41,7 +41,7 @@ pub(crate) fn calibrate(arguments: &CalibrateArguments) -> Result<()> {
     let request = CalibrationRequest {
         log_path: arguments.log.clone(),
         rig_path: arguments.rig.clone(),
-        truth_path: arguments.truth.clone(),
+        ground_truth_path: arguments.ground_truth.clone(),
         start_s: arguments.start,
         duration_s: arguments.duration,
     };

@@ -63,8 +63,8 @@ fn inputs(arguments: &ReportArguments) -> Vec<PathBuf> {
         given.cloned().or_else(beside)
     };
     let rig = beside(arguments.estimation.rig.as_ref(), "rig.yaml");
-    let truth = beside(arguments.estimation.truth.as_ref(), "truth.yaml");
-    [Some(arguments.log.clone()), rig, truth].into_iter().flatten().collect()
+    let ground_truth = beside(arguments.estimation.ground_truth.as_ref(), "truth.yaml");
+    [Some(arguments.log.clone()), rig, ground_truth].into_iter().flatten().collect()
 }
 
 /// The command as it can be typed again; the program by its name alone, wherever it lies.

@@ -116,6 +116,6 @@ pub(crate) fn simulate(arguments: &SimulateArguments) -> Result<()> {
         translation_m * 1e3,
         rotation_rad.to_degrees(),
         summary.rig.display(),
-        summary.truth.display(),
+        summary.ground_truth.display(),
     ))
 }

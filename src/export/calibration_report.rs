@@ -54,8 +54,8 @@ pub struct ParameterReport {
     /// Its standard deviation by the rig alone.
     pub prior_sigma: Option<f64>,
     /// The true value.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub truth: Option<f64>,
+    #[serde(rename = "truth", skip_serializing_if = "Option::is_none")]
+    pub ground_truth: Option<f64>,
     /// Final minus true.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<f64>,
@@ -93,7 +93,7 @@ pub struct DistanceReport {
 
 /// Distances from the truth, stage by stage.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct TruthReport {
+pub struct GroundTruthReport {
     /// `imu_from_camera` of the static camera as the rig gave it.
     pub static_initial: DistanceReport,
     /// After the camera–IMU calibration alone.
@@ -164,7 +164,8 @@ pub struct CalibrationReport {
     /// Observability of the chain.
     pub rank: Option<CalibrationRank>,
     /// Against the truth, where it is known.
-    pub truth: Option<TruthReport>,
+    #[serde(rename = "truth")]
+    pub ground_truth: Option<GroundTruthReport>,
     /// Warnings.
     pub warnings: Vec<String>,
 }
@@ -201,7 +202,7 @@ pub fn report_calibration(run: &CalibrationRun) -> CalibrationReport {
             rank_informed: rank.rank_informed,
             verdict: rank.verdict(&run.given_rig.parameter_names()),
         }),
-        truth: run.truth_rig.as_ref().and_then(|truth| truth_report(run, truth)),
+        ground_truth: run.ground_truth_rig.as_ref().and_then(|ground_truth| ground_truth_report(run, ground_truth)),
         warnings,
     }
 }
@@ -211,17 +212,17 @@ fn rows(transform: &RigidTransform) -> [[f64; 4]; 4] {
     std::array::from_fn(|row| std::array::from_fn(|column| matrix[(row, column)]))
 }
 
-fn true_mount(truth: &Rig, key: &str) -> Option<RigidTransform> {
-    truth.cameras.iter().find(|camera| camera.key == key).and_then(|camera| match &camera.mount {
+fn true_mount(ground_truth: &Rig, key: &str) -> Option<RigidTransform> {
+    ground_truth.cameras.iter().find(|camera| camera.key == key).and_then(|camera| match &camera.mount {
         CameraMount::Static { imu_from_camera } => Some(*imu_from_camera),
         CameraMount::Gimbal => None,
     })
 }
 
-fn truth_report(run: &CalibrationRun, truth: &Rig) -> Option<TruthReport> {
+fn ground_truth_report(run: &CalibrationRun, ground_truth: &Rig) -> Option<GroundTruthReport> {
     let outcome = &run.outcome;
-    let mount = true_mount(truth, &run.static_camera)?;
-    let chain = &truth.gimbal.as_ref()?.chain;
+    let mount = true_mount(ground_truth, &run.static_camera)?;
+    let chain = &ground_truth.gimbal.as_ref()?.chain;
     if chain.joint_count() != outcome.chain.joint_count() {
         return None;
     }
@@ -238,7 +239,7 @@ fn truth_report(run: &CalibrationRun, truth: &Rig) -> Option<TruthReport> {
             rotation_std_rad: rotation.std,
         })
     };
-    Some(TruthReport {
+    Some(GroundTruthReport {
         static_initial: of_mount(&outcome.mount.initial),
         static_camera_imu: of_mount(&outcome.mount_alone.imu_from_camera),
         static_final: of_mount(&outcome.mount.imu_from_camera),
@@ -263,10 +264,10 @@ fn mount_parameters(run: &CalibrationRun, mount: &MountReport) -> Vec<ParameterR
         let (turn, shift) = (so3::log(&transform.rotation), transform.translation_m);
         [turn.x, turn.y, turn.z, shift.x, shift.y, shift.z]
     };
-    let truth = run.truth_rig.as_ref().and_then(|rig| true_mount(rig, &run.static_camera));
+    let ground_truth = run.ground_truth_rig.as_ref().and_then(|rig| true_mount(rig, &run.static_camera));
     let (initial, last) = (values(&mount.initial), values(&mount.imu_from_camera));
-    let truth_values = truth.as_ref().map(values);
-    let error = truth.map(|truth| mount.imu_from_camera.minus(&truth));
+    let ground_truth_values = ground_truth.as_ref().map(values);
+    let error = ground_truth.map(|ground_truth| mount.imu_from_camera.minus(&ground_truth));
     Quantity::TRANSFORM
         .into_iter()
         .enumerate()
@@ -277,7 +278,7 @@ fn mount_parameters(run: &CalibrationRun, mount: &MountReport) -> Vec<ParameterR
             last: last[axis],
             sigma: mount.sigmas[axis],
             prior_sigma: None,
-            truth: truth_values.map(|truth| truth[axis]),
+            ground_truth: ground_truth_values.map(|ground_truth| ground_truth[axis]),
             error: error.map(|error| error[axis]),
         })
         .collect()
@@ -286,7 +287,7 @@ fn mount_parameters(run: &CalibrationRun, mount: &MountReport) -> Vec<ParameterR
 fn time_shift(run: &CalibrationRun, key: &str, (change_s, sigma_s): (f64, f64)) -> ParameterReport {
     let of = |rig: &Rig| rig.cameras.iter().find(|camera| camera.key == key).map(|camera| camera.timeshift_cam_imu_s);
     let initial = of(&run.given_rig).unwrap_or(0.0);
-    let truth = run.truth_rig.as_ref().and_then(of);
+    let ground_truth = run.ground_truth_rig.as_ref().and_then(of);
     ParameterReport {
         name: format!("{key}.timeshift_cam_imu"),
         dimension: Dimension::Time,
@@ -294,13 +295,13 @@ fn time_shift(run: &CalibrationRun, key: &str, (change_s, sigma_s): (f64, f64)) 
         last: initial + change_s,
         sigma: sigma_s,
         prior_sigma: None,
-        truth,
-        error: truth.map(|truth| initial + change_s - truth),
+        ground_truth,
+        error: ground_truth.map(|ground_truth| initial + change_s - ground_truth),
     }
 }
 
 fn chain_parameters(run: &CalibrationRun, outcome: &CalibrationOutcome) -> Vec<ParameterReport> {
-    let truth = run.truth_rig.as_ref().and_then(|rig| {
+    let ground_truth = run.ground_truth_rig.as_ref().and_then(|rig| {
         let parameterization = outcome.parameterization.parse().ok()?;
         let chain = Chain::from_classical(&rig.gimbal.as_ref()?.chain, parameterization);
         (chain.dof() == outcome.parameters.len()).then(|| chain.values())
@@ -311,7 +312,7 @@ fn chain_parameters(run: &CalibrationRun, outcome: &CalibrationOutcome) -> Vec<P
         .iter()
         .enumerate()
         .map(|(place, parameter)| {
-            let truth = truth.as_ref().map(|values| values[place]);
+            let ground_truth = ground_truth.as_ref().map(|values| values[place]);
             ParameterReport {
                 name: names.name(parameter.parameter),
                 dimension: parameter.parameter.dimension(),
@@ -319,8 +320,9 @@ fn chain_parameters(run: &CalibrationRun, outcome: &CalibrationOutcome) -> Vec<P
                 last: parameter.value,
                 sigma: parameter.sigma,
                 prior_sigma: Some(parameter.prior_sigma),
-                truth,
-                error: truth.map(|truth| difference(parameter.parameter.dimension(), parameter.value, truth)),
+                ground_truth,
+                error: ground_truth
+                    .map(|ground_truth| difference(parameter.parameter.dimension(), parameter.value, ground_truth)),
             }
         })
         .collect()
@@ -388,15 +390,15 @@ impl fmt::Display for CalibrationReport {
         }
         matrix(f, "T_cam_imu of the static camera", &self.static_t_cam_imu)?;
         matrix(f, "T_imu_cam of the gimbal camera, all joints at zero", &self.gimbal_t_imu_cam_at_zero)?;
-        if let Some(truth) = &self.truth {
+        if let Some(ground_truth) = &self.ground_truth {
             writeln!(f, "\nAgainst the truth")?;
             for (name, distance) in [
-                ("static camera, given", &truth.static_initial),
-                ("static camera, camera-IMU", &truth.static_camera_imu),
-                ("static camera, bundle", &truth.static_final),
-                ("gimbal, given", &truth.chain_initial),
-                ("gimbal, pose loops", &truth.chain_pose_loop),
-                ("gimbal, bundle", &truth.chain_final),
+                ("static camera, given", &ground_truth.static_initial),
+                ("static camera, camera-IMU", &ground_truth.static_camera_imu),
+                ("static camera, bundle", &ground_truth.static_final),
+                ("gimbal, given", &ground_truth.chain_initial),
+                ("gimbal, pose loops", &ground_truth.chain_pose_loop),
+                ("gimbal, bundle", &ground_truth.chain_final),
             ] {
                 writeln!(
                     f,

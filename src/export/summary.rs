@@ -79,8 +79,8 @@ pub struct ParameterSummary {
     /// Posterior standard deviation.
     pub sigma: Option<f64>,
     /// The true value.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub truth: Option<f64>,
+    #[serde(rename = "truth", skip_serializing_if = "Option::is_none")]
+    pub ground_truth: Option<f64>,
     /// Final minus true.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<f64>,
@@ -242,12 +242,12 @@ pub struct RunSummary {
 /// Sums up one run of a recording.
 pub fn summarize(recording: &Recording, run: &RunRecord, timing: bool) -> RunSummary {
     let estimated: Vec<_> = run.steps.iter().filter(|step| step.report.newest().is_some()).collect();
-    let pairs = run.pairs_with_truth();
+    let pairs = run.pairs_with_ground_truth();
     let positions: Vec<_> = estimated.iter().filter_map(|step| step.report.newest()).collect();
     let length_m = if pairs.is_empty() {
         path_length_m(positions.iter().map(|frame| &frame.world_from_imu.translation_m))
     } else {
-        path_length_m(pairs.iter().map(|(_, truth)| &truth.pose.translation_m))
+        path_length_m(pairs.iter().map(|(_, ground_truth)| &ground_truth.pose.translation_m))
     };
     let accuracy = TrajectoryAccuracy::of(&pairs).map(|accuracy| accuracy_summary(&accuracy));
     let accuracy_missing = match (&accuracy, estimated.is_empty(), pairs.is_empty()) {
@@ -332,11 +332,11 @@ fn calibration(recording: &Recording, run: &RunRecord) -> CalibrationSummary {
             chain_error_initial: None,
         };
     };
-    let truth = recording.truth_rig.as_ref().and_then(|rig| rig.chain_of_camera(&run.camera_key));
+    let ground_truth = recording.ground_truth_rig.as_ref().and_then(|rig| rig.chain_of_camera(&run.camera_key));
     let given = recording.rig.chain_of_camera(&run.camera_key);
     let values_in = |rig: &Rig| run.values_in(rig, &recording.rig, last);
     let initial_values = values_in(&recording.rig).unwrap_or_default();
-    let true_values = recording.truth_rig.as_deref().and_then(values_in).unwrap_or_default();
+    let true_values = recording.ground_truth_rig.as_deref().and_then(values_in).unwrap_or_default();
     let value_of = |values: &[(ParameterId, f64)], parameter: ParameterId| {
         values.iter().find(|(known, _)| *known == parameter).map(|(_, value)| *value)
     };
@@ -349,19 +349,20 @@ fn calibration(recording: &Recording, run: &RunRecord) -> CalibrationSummary {
             let parameter = *parameter;
             let dimension = parameter.dimension();
             let value = last.values[index];
-            let truth = value_of(&true_values, parameter);
+            let ground_truth = value_of(&true_values, parameter);
             ParameterSummary {
                 name: names.name(parameter),
                 dimension,
                 initial: value_of(&initial_values, parameter).unwrap_or(value),
                 last: value,
                 sigma: last.sigmas.get(index).copied().filter(|sigma| sigma.is_finite()),
-                truth,
-                error: truth.map(|truth| difference(dimension, value, truth)),
+                ground_truth,
+                error: ground_truth.map(|ground_truth| difference(dimension, value, ground_truth)),
             }
         })
         .collect();
-    let chain_error = |chain: &ClassicalChain| truth.as_ref().and_then(|truth| chain_error(run, chain, truth));
+    let chain_error =
+        |chain: &ClassicalChain| ground_truth.as_ref().and_then(|ground_truth| chain_error(run, chain, ground_truth));
     CalibrationSummary {
         parameterization: last.parameterization.clone(),
         columns: last.parameters.len(),
@@ -379,8 +380,8 @@ pub(super) fn difference(dimension: Dimension, value: f64, reference: f64) -> f6
     }
 }
 
-fn chain_error(run: &RunRecord, chain: &ClassicalChain, truth: &ClassicalChain) -> Option<ChainError> {
-    let distance = run.chain_distance(chain, truth)?;
+fn chain_error(run: &RunRecord, chain: &ClassicalChain, ground_truth: &ClassicalChain) -> Option<ChainError> {
+    let distance = run.chain_distance(chain, ground_truth)?;
     Some(ChainError {
         translation_mean_m: distance.translation_m.mean,
         translation_std_m: distance.translation_m.std,

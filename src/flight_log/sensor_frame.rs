@@ -31,7 +31,7 @@ pub struct SensorFrame {
     /// Encoder angles at the stamp, from all readings around it; `None` without encoders or when none lies within 0.1 s.
     pub joint_angles: Option<JointAngles>,
     /// Ground truth `world_from_imu` interpolated at the stamp: for comparison and display only, never for estimation.
-    pub truth: Option<RigidTransform>,
+    pub ground_truth: Option<RigidTransform>,
     /// Problems of the log since the previous frame.
     pub warnings: Vec<LogWarning>,
 }

@@ -21,8 +21,8 @@ pub(crate) fn parameter_values(classical: &ClassicalChain, form: &NearestForm) -
 /// `None` when the truth is not known.
 pub(crate) fn true_values(recording: &Recording, run: &RunRecord, stamp_ns: i64) -> Option<ParameterValues> {
     let calibration = &run.step_at(stamp_ns).or_else(|| run.steps.first())?.report.calibration;
-    let truth = recording.truth_rig.as_ref()?;
-    let mut values: ParameterValues = run.values_in(truth, &recording.rig, calibration)?.into_iter().collect();
+    let ground_truth = recording.ground_truth_rig.as_ref()?;
+    let mut values: ParameterValues = run.values_in(ground_truth, &recording.rig, calibration)?.into_iter().collect();
     let estimate = calibration.parameters.iter().copied().zip(calibration.values.iter().copied()).collect();
     turn_towards(&mut values, &estimate);
     Some(values)
@@ -78,26 +78,26 @@ mod tests {
         };
         for run in &recording.runs {
             let end = &run.steps.last().unwrap().report;
-            let truth = true_values(&recording, run, end.stamp_ns).unwrap();
-            assert_eq!(truth.len(), end.calibration.parameters.len());
+            let ground_truth = true_values(&recording, run, end.stamp_ns).unwrap();
+            assert_eq!(ground_truth.len(), end.calibration.parameters.len());
             if end.calibration.parameterization == "classical" {
                 // Of the equivalent numbers those nearest to the rig's are told, and the drawn run is none of an estimator.
-                let true_rig = recording.truth_rig.as_ref().unwrap();
+                let true_rig = recording.ground_truth_rig.as_ref().unwrap();
                 let squared = |value: &dyn Fn(ParameterId) -> f64| -> f64 {
                     let gap = |parameter: ParameterId| {
                         let (given, scale) = raw(&recording.rig, parameter);
                         (value(parameter) - given) / scale
                     };
-                    truth.keys().map(|parameter| gap(*parameter).powi(2)).sum()
+                    ground_truth.keys().map(|parameter| gap(*parameter).powi(2)).sum()
                 };
                 let (told, written) =
-                    (squared(&|parameter| truth[&parameter]), squared(&|parameter| raw(true_rig, parameter).0));
+                    (squared(&|parameter| ground_truth[&parameter]), squared(&|parameter| raw(true_rig, parameter).0));
                 assert!(told < written, "{told} is farther from the rig than {written}");
                 continue;
             }
             for (parameter, value) in end.calibration.parameters.iter().zip(&end.calibration.values) {
-                let truth = truth[parameter];
-                assert!((truth - value).abs() < 0.01, "{parameter:?}: {truth} and {value}");
+                let ground_truth = ground_truth[parameter];
+                assert!((ground_truth - value).abs() < 0.01, "{parameter:?}: {ground_truth} and {value}");
             }
         }
     }

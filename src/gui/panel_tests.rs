@@ -43,17 +43,17 @@ fn trying_cases() -> Vec<(&'static str, Recording, i64)> {
         run.steps.clear();
         run.alignment = None;
     }
-    let mut no_truth = whole.clone();
-    no_truth.truth_rig = None;
-    for run in &mut no_truth.runs {
+    let mut no_ground_truth = whole.clone();
+    no_ground_truth.ground_truth_rig = None;
+    for run in &mut no_ground_truth.runs {
         run.alignment = None;
         for step in &mut run.steps {
-            std::sync::Arc::make_mut(step).truth = None;
+            std::sync::Arc::make_mut(step).ground_truth = None;
         }
     }
     let mut rigid = whole.clone();
     std::sync::Arc::make_mut(&mut rigid.rig).gimbal = None;
-    rigid.truth_rig = None;
+    rigid.ground_truth_rig = None;
     for step in rigid.runs.iter_mut().flat_map(|run| &mut run.steps) {
         let step = std::sync::Arc::make_mut(step);
         let calibration = &mut step.report.calibration;
@@ -76,7 +76,7 @@ fn trying_cases() -> Vec<(&'static str, Recording, i64)> {
     vec![
         ("no-runs", no_runs, end_ns),
         ("no-steps", no_steps, end_ns),
-        ("no-truth", no_truth, end_ns),
+        ("no-truth", no_ground_truth, end_ns),
         ("rigid", rigid, end_ns),
         ("instant", instant, 0),
         ("initializing", whole.clone(), SECOND_NS),

@@ -15,7 +15,7 @@ fn the_sample_is_consistent() {
     assert!(run.steps[FIRST_TRACKED_FRAME - 1].report.newest().is_none());
     // The aligned estimate lies near the truth.
     let aligned = run.alignment.expect("aligned") * newest.world_from_imu;
-    let error_m = (aligned.translation_m - step.truth.expect("truth").translation_m).norm();
+    let error_m = (aligned.translation_m - step.ground_truth.expect("truth").translation_m).norm();
     assert!(error_m < 1.0, "{error_m} m off");
     let image = sample_images().image("cam0", step.report.frame_index).expect("an image");
     assert_eq!(image.pixels.len(), image.width * image.height);

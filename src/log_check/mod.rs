@@ -80,7 +80,7 @@ pub struct TopicReport {
     pub topic: String,
     /// Message type, such as `sensor_msgs/msg/Imu`.
     pub schema: String,
-    /// Its use: `imu0`, `cam0`, `gimbal`, `ground truth`, `not in the rig`, or `ignored`.
+    /// Its use: `imu0`, `cam0`, `gimbal`, `ground ground_truth`, `not in the rig`, or `ignored`.
     pub role: String,
     /// Number of messages.
     pub count: u64,

@@ -118,8 +118,8 @@ fn static_mount(random: &mut RandomStream) -> RigidTransform {
 /// The rig an estimator is given: each of the chain's `4N + 6` independent parameters (the minimal form's) is wrong by
 /// a uniform error within `bounds`, as the paper starts its experiments; static cameras are wrong within the same
 /// bounds, but by no more than 3 mm and 0.5° per axis, and the cameras' time offset is not in it.
-pub(crate) fn given_rig(truth: &Rig, bounds: ChainPrior, random: &mut RandomStream) -> Rig {
-    let mut given = truth.clone();
+pub(crate) fn given_rig(ground_truth: &Rig, bounds: ChainPrior, random: &mut RandomStream) -> Rig {
+    let mut given = ground_truth.clone();
     if let Some(gimbal) = &mut given.gimbal {
         gimbal.chain = wrong_chain(&gimbal.chain, bounds, random);
         gimbal.prior = bounds;

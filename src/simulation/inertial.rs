@@ -55,13 +55,13 @@ impl InertialRecord {
         let mut record = Self { samples: Vec::with_capacity(count), biases: Vec::with_capacity(count) };
         for index in 0..count {
             let time_s = index as f64 / rate_hz;
-            let truth = trajectory.at(time_s);
+            let ground_truth = trajectory.at(time_s);
             record.samples.push(ImuSample {
                 stamp_ns: ns_from_seconds(time_s),
-                angular_velocity_rad_per_s: truth.angular_velocity_rad_per_s
+                angular_velocity_rad_per_s: ground_truth.angular_velocity_rad_per_s
                     + bias.gyroscope_rad_per_s
                     + random.normal_vector(noise.gyroscope_noise_density * white),
-                specific_force_m_per_s2: truth.specific_force_m_per_s2
+                specific_force_m_per_s2: ground_truth.specific_force_m_per_s2
                     + bias.accelerometer_m_per_s2
                     + random.normal_vector(noise.accelerometer_noise_density * white),
             });

@@ -92,7 +92,7 @@ pub struct SimulationSummary {
     /// The rig given to an estimator.
     pub rig: PathBuf,
     /// The rig as it is, with what else is known.
-    pub truth: PathBuf,
+    pub ground_truth: PathBuf,
     /// Length in seconds.
     pub duration_s: f64,
     /// Length of the path.

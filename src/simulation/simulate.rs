@@ -35,7 +35,7 @@ const PLANNED_M_PER_S: f64 = 2.5;
 /// Delay from measurement to recording: IMU, encoders, first camera, and each further camera.
 const DELAYS_S: [f64; 4] = [0.0004, 0.0007, 0.018, 0.0015];
 
-/// Simulates an experiment and writes `output` (an MCAP log) with `.rig.yaml` and `.truth.yaml` beside it.
+/// Simulates an experiment and writes `output` (an MCAP log) with `.rig.yaml` and `.ground_truth.yaml` beside it.
 ///
 /// The same options and file name give the same bytes whatever the thread count. `progress` is called as images are
 /// done.
@@ -51,8 +51,8 @@ pub fn simulate(
     let name = output.file_stem().map_or_else(|| "simulation".to_owned(), |stem| stem.to_string_lossy().into_owned());
     let scenario = fly(options, &name);
     let chain_error = given_chain_error(&scenario);
-    let truth_notes = truth_notes(options, &scenario, chain_error);
-    let (rig_path, truth_path) = (output.with_extension("rig.yaml"), output.with_extension("truth.yaml"));
+    let ground_truth_notes = ground_truth_notes(options, &scenario, chain_error);
+    let (rig_path, ground_truth_path) = (output.with_extension("rig.yaml"), output.with_extension("truth.yaml"));
 
     let mut log = LogWriter::create(output, &LogWriterOptions::default())?;
     let notes = BTreeMap::from([
@@ -61,19 +61,21 @@ pub fn simulate(
     ]);
     log.write_metadata("dcvins simulate", notes)?;
     let images = write_messages(options, &scenario, &mut log, progress)?;
-    let attachments =
-        [("rig", scenario.given_rig.to_yaml()), ("truth", format!("{}{truth_notes}", scenario.true_rig.to_yaml()))];
+    let attachments = [
+        ("rig", scenario.given_rig.to_yaml()),
+        ("truth", format!("{}{ground_truth_notes}", scenario.true_rig.to_yaml())),
+    ];
     for (kind, text) in attachments {
         log.attach(&format!("{name}.{kind}.yaml"), "application/yaml", &text, EPOCH_NS)?;
     }
     log.finish()?;
     scenario.given_rig.save(&rig_path, "")?;
-    scenario.true_rig.save(&truth_path, &truth_notes)?;
+    scenario.true_rig.save(&ground_truth_path, &ground_truth_notes)?;
     let duration_s = scenario.trajectory.duration_s();
     Ok(SimulationSummary {
         log: output.to_owned(),
         rig: rig_path,
-        truth: truth_path,
+        ground_truth: ground_truth_path,
         duration_s,
         path_length_m: scenario.trajectory.length_m(duration_s),
         images,
@@ -192,10 +194,10 @@ fn write_messages(
             }
             Message::Truth(index) => {
                 let stamp_ns = recordings.imu[index].stamp_ns;
-                let truth = scenario.trajectory.at(seconds_from_ns(stamp_ns));
-                let velocity = truth.world_from_imu.rotation.inverse() * truth.velocity_m_per_s;
+                let ground_truth = scenario.trajectory.at(seconds_from_ns(stamp_ns));
+                let velocity = ground_truth.world_from_imu.rotation.inverse() * ground_truth.velocity_m_per_s;
                 let topic = rig.ground_truth_topic.as_deref().unwrap_or("/ground_truth/odometry");
-                let (pose, rate) = (&truth.world_from_imu, &truth.angular_velocity_rad_per_s);
+                let (pose, rate) = (&ground_truth.world_from_imu, &ground_truth.angular_velocity_rad_per_s);
                 log.write_odometry(topic, "world", "imu", times(stamp_ns), pose, &velocity, rate)?;
             }
             Message::Joints(index) => {
@@ -351,21 +353,23 @@ impl<'a> Studio<'a> {
 
 /// Extrinsics error of the given chain, averaged over the joint angles visited: translation in metres, rotation in radians.
 fn given_chain_error(scenario: &Scenario) -> (f64, f64) {
-    let (Some(given), Some(truth)) = (&scenario.given_rig.gimbal, &scenario.true_rig.gimbal) else { return (0.0, 0.0) };
+    let (Some(given), Some(ground_truth)) = (&scenario.given_rig.gimbal, &scenario.true_rig.gimbal) else {
+        return (0.0, 0.0);
+    };
     let samples = scenario.true_joint_samples();
     let mut sums = (0.0, 0.0);
     for sample in &samples {
-        let (given, truth) =
-            (given.chain.imu_from_camera(&sample.angles_rad), truth.chain.imu_from_camera(&sample.angles_rad));
-        sums.0 += (given.translation_m - truth.translation_m).norm();
-        sums.1 += so3::log(&(truth.rotation.inverse() * given.rotation)).norm();
+        let (given, ground_truth) =
+            (given.chain.imu_from_camera(&sample.angles_rad), ground_truth.chain.imu_from_camera(&sample.angles_rad));
+        sums.0 += (given.translation_m - ground_truth.translation_m).norm();
+        sums.1 += so3::log(&(ground_truth.rotation.inverse() * given.rotation)).norm();
     }
     let count = samples.len().max(1) as f64;
     (sums.0 / count, sums.1 / count)
 }
 
 /// What else is true, as further entries of the truth's YAML.
-fn truth_notes(options: &SimulationOptions, scenario: &Scenario, chain_error: (f64, f64)) -> String {
+fn ground_truth_notes(options: &SimulationOptions, scenario: &Scenario, chain_error: (f64, f64)) -> String {
     let environment = match options.experiment.environment() {
         super::Environment::House => 1,
         super::Environment::Town => 2,

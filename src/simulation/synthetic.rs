@@ -202,7 +202,7 @@ pub fn synthetic_tracks(options: &SyntheticOptions) -> SyntheticFlight {
     for index in 0..count {
         let time_s = FIRST_FRAME_S + index as f64 / options.frame_rate_hz;
         let stamp_ns = ns_from_seconds(time_s);
-        let truth = scenario.trajectory.at(time_s);
+        let ground_truth = scenario.trajectory.at(time_s);
         let [camera_offset_s, encoder_offset_s] = options.clock_offsets_s;
         let true_world_from_camera = scenario.world_from_camera(camera, time_s + camera_offset_s);
         let joint_angles_rad = |time_s: f64| scenario.joint_angles_rad(time_s).unwrap_or_default();
@@ -220,8 +220,8 @@ pub fn synthetic_tracks(options: &SyntheticOptions) -> SyntheticFlight {
             imu: scenario.inertial.between(previous_ns, stamp_ns),
             joint_angles_rad: read_angles_rad,
             tracks: tracker.track(stamp_ns, &true_world_from_camera),
-            true_world_from_imu: truth.world_from_imu,
-            true_velocity_m_per_s: truth.velocity_m_per_s,
+            true_world_from_imu: ground_truth.world_from_imu,
+            true_velocity_m_per_s: ground_truth.velocity_m_per_s,
             true_bias: scenario.inertial.bias_at(stamp_ns),
             true_joint_angles_rad,
             true_joint_rates_rad_per_s,

@@ -21,9 +21,14 @@ fn options(seed: u64) -> SyntheticOptions {
 }
 
 /// Mean over the parameters of the squared error in standard deviations.
-fn normalized_square(chain: &ClassicalChain, sigmas: &[f64], truth: &ClassicalChain, form: Parameterization) -> f64 {
+fn normalized_square(
+    chain: &ClassicalChain,
+    sigmas: &[f64],
+    ground_truth: &ClassicalChain,
+    form: Parameterization,
+) -> f64 {
     let chain = Chain::from_classical(chain, form);
-    let error = chain.minus(&Chain::from_classical(truth, form));
+    let error = chain.minus(&Chain::from_classical(ground_truth, form));
     let parameters = chain.parameters();
     let square = |k: usize| {
         let is_angle = parameters[k].dimension() == Dimension::Angle;

@@ -30,7 +30,7 @@ impl Random {
 }
 
 struct Example {
-    truth: ClassicalChain,
+    ground_truth: ClassicalChain,
     given: ClassicalChain,
     segments: Vec<PairedSegment>,
     visited: Vec<Vec<f64>>,
@@ -40,9 +40,9 @@ struct Example {
 fn example(seed: u64, encoder_sigma_rad: f64, noise: (f64, f64), still: bool) -> Example {
     let flight =
         synthetic_tracks(&SyntheticOptions { seed, duration_s: 0.2, features: 1, ..SyntheticOptions::default() });
-    let truth = flight.true_rig.gimbal.unwrap().chain;
+    let ground_truth = flight.true_rig.gimbal.unwrap().chain;
     let mut random = Random(SplitMix64::new(seed));
-    let minimal = Chain::from_classical(&truth, Parameterization::MinimalYx);
+    let minimal = Chain::from_classical(&ground_truth, Parameterization::MinimalYx);
     let parameters = minimal.parameters();
     let error = DVector::from_fn(minimal.dof(), |k, _| random.next() * parameters[k].dimension().scale());
     let given = minimal.plus(&error).to_classical();
@@ -65,7 +65,7 @@ fn example(seed: u64, encoder_sigma_rad: f64, noise: (f64, f64), still: bool) ->
                         so3::exp(&random.vector(0.6)),
                         start + Vector3::new(0.4, 0.1, 0.0) * f64::from(step) + random.vector(0.2),
                     );
-                    let camera = world_from_imu * truth.imu_from_camera(&angles);
+                    let camera = world_from_imu * ground_truth.imu_from_camera(&angles);
                     let mut seen = frame.world_from_segment.inverse() * camera;
                     let mut errors = || Vector3::from_fn(|_, _| random.normal(1.0));
                     let (turn, shift) = (errors() * noise.0, errors() * noise.1);
@@ -90,7 +90,7 @@ fn example(seed: u64, encoder_sigma_rad: f64, noise: (f64, f64), still: bool) ->
                 .collect()
         })
         .collect();
-    Example { truth, given, segments, visited }
+    Example { ground_truth, given, segments, visited }
 }
 
 fn prior() -> ChainPrior {
@@ -151,8 +151,9 @@ fn exact_poses_give_the_chain_back_to_what_the_encoders_leave_open() {
         let example = example(seed, 1e-4, (0.0, 0.0), false);
         let term = ChainTerm::new(&example.given, &prior());
         let solution = PoseLoops { segments: &example.segments, prior: &term }.solve().unwrap();
-        let (before, _) = chain_distance(&example.given, &example.truth, &example.visited).unwrap();
-        let (shift, turn) = chain_distance(&solution.chain.to_classical(), &example.truth, &example.visited).unwrap();
+        let (before, _) = chain_distance(&example.given, &example.ground_truth, &example.visited).unwrap();
+        let (shift, turn) =
+            chain_distance(&solution.chain.to_classical(), &example.ground_truth, &example.visited).unwrap();
         assert!(before.mean > 0.01, "seed {seed} begins {} m off", before.mean);
         assert!(shift.mean < 5e-4 && turn.mean < 1e-3, "seed {seed}: {} m, {} rad", shift.mean, turn.mean);
     }
@@ -165,8 +166,8 @@ fn noisy_encoders_leave_the_chain_within_its_sigmas() {
         let example = example(seed, 0.1, (1e-3, 5e-3), false);
         let term = ChainTerm::new(&example.given, &prior());
         let solution = PoseLoops { segments: &example.segments, prior: &term }.solve().unwrap();
-        let truth = Chain::from_classical(&example.truth, solution.chain.parameterization());
-        let error = solution.chain.minus(&truth).map(wrap_angle);
+        let ground_truth = Chain::from_classical(&example.ground_truth, solution.chain.parameterization());
+        let error = solution.chain.minus(&ground_truth).map(wrap_angle);
         let information = solution.covariance.clone().try_inverse().unwrap();
         square += (error.transpose() * information * &error)[0];
         count += error.len() as f64;
@@ -188,6 +189,7 @@ fn still_joints_leave_the_prior_on_what_they_do_not_show() {
         (0..covariance.nrows()).map(|k| covariance[(k, k)] / term.prior_sigmas[k].powi(2)).sum::<f64>()
     };
     assert!(total(&solution.covariance) > 5.0 * total(&moved.covariance));
-    let (shift, turn) = chain_distance(&solution.chain.to_classical(), &example.truth, &example.visited).unwrap();
+    let (shift, turn) =
+        chain_distance(&solution.chain.to_classical(), &example.ground_truth, &example.visited).unwrap();
     assert!(shift.mean < 0.01 && turn.mean < 0.02, "{} m, {} rad", shift.mean, turn.mean);
 }

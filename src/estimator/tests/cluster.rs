@@ -118,8 +118,9 @@ fn both_calibrations_are_columns_with_names_of_their_own() {
     assert_eq!(columns, calibration.parameters);
 
     // The rigid mount is found as well.
-    let truth = flights.rigid.true_rig.chain_of_camera("cam0").unwrap().imu_from_camera(&[]);
-    let angle = |pose: &crate::geometry::RigidTransform| so3::log(&(pose.rotation.inverse() * truth.rotation)).norm();
+    let ground_truth = flights.rigid.true_rig.chain_of_camera("cam0").unwrap().imu_from_camera(&[]);
+    let angle =
+        |pose: &crate::geometry::RigidTransform| so3::log(&(pose.rotation.inverse() * ground_truth.rotation)).norm();
     let [(key, mount)] = calibration.rigid_cameras.as_slice() else { panic!("one rigid camera") };
     assert_eq!(key, "cam1");
     let given = estimator.config().rigid_cameras[0].imu_from_camera;

@@ -140,11 +140,11 @@ fn window_of(flight: &SyntheticFlight, rigid: Option<&SyntheticFlight>, config: 
     let first = 100;
     for slot in 0..6 {
         let index = first + slot * spacing;
-        let truth = &flight.frames[index];
-        let encoder = setup.config.encoder_sigma_rad.and_then(|sigma_rad| truth.encoder_angles(sigma_rad));
+        let ground_truth = &flight.frames[index];
+        let encoder = setup.config.encoder_sigma_rad.and_then(|sigma_rad| ground_truth.encoder_angles(sigma_rad));
         let bias = ImuBias {
-            gyroscope_rad_per_s: truth.true_bias.gyroscope_rad_per_s,
-            accelerometer_m_per_s2: truth.true_bias.accelerometer_m_per_s2,
+            gyroscope_rad_per_s: ground_truth.true_bias.gyroscope_rad_per_s,
+            accelerometer_m_per_s2: ground_truth.true_bias.accelerometer_m_per_s2,
         };
         let mut motion = Preintegration::new(setup.imu_noise, bias);
         if slot > 0 {
@@ -154,15 +154,15 @@ fn window_of(flight: &SyntheticFlight, rigid: Option<&SyntheticFlight>, config: 
         }
         let frame = Frame {
             index,
-            stamp_ns: truth.stamp_ns,
+            stamp_ns: ground_truth.stamp_ns,
             state: FrameState {
                 navigation: NavigationState {
-                    world_from_imu: truth.true_world_from_imu,
-                    velocity_m_per_s: truth.true_velocity_m_per_s,
+                    world_from_imu: ground_truth.true_world_from_imu,
+                    velocity_m_per_s: ground_truth.true_velocity_m_per_s,
                     bias,
                 },
-                joints_rad: truth.true_joint_angles_rad.clone(),
-                rates: Rates::at(&truth.imu, encoder.as_ref()),
+                joints_rad: ground_truth.true_joint_angles_rad.clone(),
+                rates: Rates::at(&ground_truth.imu, encoder.as_ref()),
             },
             first_estimate: None,
             encoder,
@@ -175,7 +175,7 @@ fn window_of(flight: &SyntheticFlight, rigid: Option<&SyntheticFlight>, config: 
             None => frames = Some(Frames::new(frame)),
             Some(frames) => frames.push(frame),
         }
-        features::observe(&mut features[MAIN], slot, &truth.tracks.features);
+        features::observe(&mut features[MAIN], slot, &ground_truth.tracks.features);
         if let Some(rigid) = rigid {
             features::observe(&mut features[1], slot, &rigid.frames[index].tracks.features);
         }

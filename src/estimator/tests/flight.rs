@@ -45,25 +45,26 @@ pub(super) fn trajectory_error_m(frames: &[SyntheticFrame], reports: &[StepRepor
     assert!(pairs.len() > 100, "estimated {} of {} frames", pairs.len(), reports.len());
     let count = pairs.len() as f64;
     let middle = |pick: fn(&Pair) -> Vector3<f64>| pairs.iter().map(pick).sum::<Vector3<f64>>() / count;
-    let (estimated, truth) = (middle(|pair| pair.0), middle(|pair| pair.1));
+    let (estimated, ground_truth) = (middle(|pair| pair.0), middle(|pair| pair.1));
     let (mut cosine, mut sine) = (0.0, 0.0);
-    for (e, t) in pairs.iter().map(|pair| (pair.0 - estimated, pair.1 - truth)) {
+    for (e, t) in pairs.iter().map(|pair| (pair.0 - estimated, pair.1 - ground_truth)) {
         cosine += e.x * t.x + e.y * t.y;
         sine += e.x * t.y - e.y * t.x;
     }
     let turn = so3::exp(&Vector3::new(0.0, 0.0, sine.atan2(cosine)));
-    let squares: f64 = pairs.iter().map(|pair| (turn * (pair.0 - estimated) - (pair.1 - truth)).norm_squared()).sum();
+    let squares: f64 =
+        pairs.iter().map(|pair| (turn * (pair.0 - estimated) - (pair.1 - ground_truth)).norm_squared()).sum();
     let length = pairs.windows(2).map(|two| (two[1].1 - two[0].1).norm()).sum();
     ((squares / count).sqrt(), length)
 }
 
 /// Mean error of the chain over the joint angles of the flight, in metres and radians.
 pub(super) fn chain_error(flight: &SyntheticFlight, estimator: &Estimator) -> (f64, f64) {
-    let (estimated, truth) = (estimator.classical_chain(), flight.true_rig.chain_of_camera("cam0").unwrap());
+    let (estimated, ground_truth) = (estimator.classical_chain(), flight.true_rig.chain_of_camera("cam0").unwrap());
     let count = flight.frames.len() as f64;
     flight.frames.iter().fold((0.0, 0.0), |(shift, turn), frame| {
         let angles = &frame.true_joint_angles_rad;
-        let error = estimated.imu_from_camera(angles).inverse() * truth.imu_from_camera(angles);
+        let error = estimated.imu_from_camera(angles).inverse() * ground_truth.imu_from_camera(angles);
         (shift + error.translation_m.norm() / count, turn + so3::log(&error.rotation).norm() / count)
     })
 }

@@ -131,8 +131,8 @@ impl<'a> Landing<'a> {
             still.true_world_from_imu.translation_m += shift;
             if let (Some(angles), Some(sigma)) = (&mut still.joint_angles_rad, self.flight.given_rig.gimbal.as_ref()) {
                 let sigma = sigma.encoder_sigma_rad.unwrap_or(0.0);
-                for (angle, truth) in angles.iter_mut().zip(&first.true_joint_angles_rad) {
-                    *angle = truth + sigma * self.random.normal();
+                for (angle, ground_truth) in angles.iter_mut().zip(&first.true_joint_angles_rad) {
+                    *angle = ground_truth + sigma * self.random.normal();
                 }
             }
             self.push(still);
@@ -214,9 +214,9 @@ fn a_creeping_vehicle_is_not_held() {
         let place = |index: usize| reports[index].newest().unwrap().world_from_imu.translation_m;
         (place(to) - place(from)).norm()
     };
-    let truth = creep(11.9) - creep(0.95);
+    let ground_truth = creep(11.9) - creep(0.95);
     let found = moved(landed + 20, landed + 239);
-    assert!((found - truth).abs() < 0.25 * truth, "{found} m of {truth} m");
+    assert!((found - ground_truth).abs() < 0.25 * ground_truth, "{found} m of {ground_truth} m");
 }
 
 #[test]

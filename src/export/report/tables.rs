@@ -83,17 +83,18 @@ pub(super) fn accuracy(content: &ReportContent) -> Markup {
 /// Calibration of one run: degrees, millimetres, milliseconds.
 pub(super) fn calibration(run: &RunContent) -> Markup {
     let parameters = &run.summary.calibration.parameters;
-    let with_truth = parameters.iter().any(|parameter| parameter.truth.is_some());
+    let with_ground_truth = parameters.iter().any(|parameter| parameter.ground_truth.is_some());
     let mut header = vec!["parameter", "unit", "given", "at the end", "± σ"];
-    if with_truth {
+    if with_ground_truth {
         header.extend(["truth", "error", "error / σ"]);
     }
-    let rows: Vec<Vec<String>> = parameters.iter().map(|parameter| calibration_row(parameter, with_truth)).collect();
+    let rows: Vec<Vec<String>> =
+        parameters.iter().map(|parameter| calibration_row(parameter, with_ground_truth)).collect();
     let caption = format!("Calibration of {}, {} form", run.label, run.summary.calibration.parameterization);
     table(&caption, &header, &rows)
 }
 
-fn calibration_row(parameter: &ParameterSummary, with_truth: bool) -> Vec<String> {
+fn calibration_row(parameter: &ParameterSummary, with_ground_truth: bool) -> Vec<String> {
     let (unit, scale, decimals) = match parameter.dimension {
         Dimension::Angle => ("°", 1f64.to_degrees(), 3),
         Dimension::Length => ("mm", MM_PER_M, 2),
@@ -103,8 +104,8 @@ fn calibration_row(parameter: &ParameterSummary, with_truth: bool) -> Vec<String
     let shown = |value: f64| number(value * scale, decimals);
     let sigma = parameter.sigma.map_or_else(String::new, |sigma| format!("±{}", number(sigma * scale, decimals)));
     let mut row = vec![parameter.name.clone(), unit.to_owned(), shown(parameter.initial), shown(parameter.last), sigma];
-    if with_truth {
-        row.push(parameter.truth.map_or_else(String::new, shown));
+    if with_ground_truth {
+        row.push(parameter.ground_truth.map_or_else(String::new, shown));
         row.push(parameter.error.map_or_else(String::new, shown));
         let ratio = parameter.error.zip(parameter.sigma).filter(|(_, sigma)| *sigma > 0.0);
         row.push(ratio.map_or_else(String::new, |(error, sigma)| number(error / sigma, 1)));
@@ -184,8 +185,8 @@ mod tests {
     fn every_unit_is_shown_as_people_read_it() {
         let check = |dimension: Dimension, expected: [&str; 8]| {
             let name = "parameter".to_owned();
-            let (truth, error, sigma) = (Some(0.5), Some(-0.25), Some(0.125));
-            let parameter = ParameterSummary { name, dimension, initial: 0.0, last: 0.25, sigma, truth, error };
+            let (ground_truth, error, sigma) = (Some(0.5), Some(-0.25), Some(0.125));
+            let parameter = ParameterSummary { name, dimension, initial: 0.0, last: 0.25, sigma, ground_truth, error };
             assert_eq!(calibration_row(&parameter, true), expected);
             assert_eq!(calibration_row(&parameter, false), expected[..5]);
         };

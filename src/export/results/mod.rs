@@ -90,8 +90,8 @@ impl Results {
         self.write_events(step, times)?;
         annotations::write(&mut self.log, &self.names.topic("annotations"), times, step)?;
         self.series.write(&mut self.log, &self.names, times, step)?;
-        if let Some(truth) = &step.truth {
-            self.log.write_pose(&self.names.topic("truth"), WORLD, times, truth)?;
+        if let Some(ground_truth) = &step.ground_truth {
+            self.log.write_pose(&self.names.topic("truth"), WORLD, times, ground_truth)?;
         }
         let Some(newest) = report.newest() else { return Ok(()) };
         let (run_world, imu) = (self.names.frame(WORLD), self.names.frame("imu"));

@@ -71,8 +71,8 @@ pub(super) fn convert(source: &Path, sink: &mut Sink<'_>) -> Result<Option<Rig>,
         write(stamp_ns, &sample, &cameras, &poses, sink)?;
         sink.progress((index + 1) as f64 / count as f64);
     }
-    let truth = POSE_FOLDERS.into_iter().find(|name| poses.iter().any(|present| present == name));
-    rig_of(source, &root, &cameras, truth.map(pose_topic), sink)
+    let ground_truth = POSE_FOLDERS.into_iter().find(|name| poses.iter().any(|present| present == name));
+    rig_of(source, &root, &cameras, ground_truth.map(pose_topic), sink)
 }
 
 fn pose_topic(folder: &str) -> String {

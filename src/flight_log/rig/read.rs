@@ -65,8 +65,8 @@ pub(super) fn read_rig(root: &Field<'_>, default_name: &str, facts: &dyn CameraF
         let expected = format!("a gimbal, since {}.mount is gimbal", camera.key);
         return Err(root.field("gimbal").unexpected(&expected));
     }
-    let truth = root.field("ground_truth").optional();
-    let ground_truth_topic = truth.and_then(|truth| truth.field("rostopic").optional());
+    let ground_truth = root.field("ground_truth").optional();
+    let ground_truth_topic = ground_truth.and_then(|ground_truth| ground_truth.field("rostopic").optional());
     let ground_truth_topic = ground_truth_topic.map(|topic| topic.text("a topic").map(str::to_owned)).transpose()?;
     Ok(Rig { name, gravity_m_per_s2, imu, cameras, gimbal, ground_truth_topic })
 }

@@ -65,7 +65,7 @@ pub(super) struct FrameSource {
     /// IMU samples not before the previous frame, and the first one after the frame.
     samples: VecDeque<ImuSample>,
     joints: Option<JointAngleStream>,
-    truth: Option<Lookup<PoseSample>>,
+    ground_truth: Option<Lookup<PoseSample>>,
     /// IMU interpolated at the previous frame's end.
     previous_end: Option<ImuSample>,
     start_ns: i64,
@@ -115,7 +115,7 @@ impl FrameSource {
         let from_ns = start_ns.saturating_sub(FIRST_FRAME_IMU_NS + SEEK_MARGIN_NS + shift_ns.abs());
         let half_interval_ns = gap_ns(0.5, camera.rate_hz, images.rate_hz);
         let joints = joint_angles(log, rig, from_ns, half_interval_ns)?;
-        let truth = ground_truth_samples(log, rig, from_ns, &mut context).map(Lookup::new);
+        let ground_truth = ground_truth_samples(log, rig, from_ns, &mut context).map(Lookup::new);
         let log_warnings = log.warnings().iter().cloned().collect();
         let stream = CameraStream {
             images: OrderedSamples::new(log, &camera.topic, from_ns, true, image_decoder(log.epoch_ns())),
@@ -138,7 +138,7 @@ impl FrameSource {
             imu_ended: false,
             samples: VecDeque::new(),
             joints,
-            truth,
+            ground_truth,
             previous_end: None,
             start_ns,
             end_ns,
@@ -176,7 +176,7 @@ impl FrameSource {
             let imu = self.take_imu(imu_stamp_ns);
             let context = &mut self.context;
             let joint_angles = self.joints.as_mut().and_then(|joints| joints.at(context, imu_stamp_ns, previous_ns));
-            let truth = self.ground_truth_at(imu_stamp_ns);
+            let ground_truth = self.ground_truth_at(imu_stamp_ns);
             while self.log_warnings.front().is_some_and(|warning| warning.stamp_ns <= stamp_ns) {
                 self.context.warnings.extend(self.log_warnings.pop_front());
             }
@@ -187,7 +187,7 @@ impl FrameSource {
                 image: Arc::new(image),
                 imu,
                 joint_angles,
-                truth,
+                ground_truth,
                 warnings: std::mem::take(&mut self.context.warnings),
             });
         }
@@ -253,7 +253,7 @@ impl FrameSource {
     }
 
     fn ground_truth_at(&mut self, stamp_ns: i64) -> Option<RigidTransform> {
-        let [before, after] = self.truth.as_mut()?.around(&mut self.context, stamp_ns);
+        let [before, after] = self.ground_truth.as_mut()?.around(&mut self.context, stamp_ns);
         let (from_ns, from) = before?;
         if *from_ns == stamp_ns {
             return Some(from.world_from_imu);

@@ -44,11 +44,11 @@ fn play(seconds: i64, sigma_rad: f64, mut read: impl FnMut(i64) -> Option<f64>) 
 }
 
 /// Root mean square of the errors from the tenth second on, and of the sigmas stated there.
-fn errors(played: &[(i64, Option<JointAngles>)], truth: impl Fn(f64) -> f64) -> (f64, f64) {
+fn errors(played: &[(i64, Option<JointAngles>)], ground_truth: impl Fn(f64) -> f64) -> (f64, f64) {
     let (mut squares, mut variances, mut count) = (0.0, 0.0, 0.0);
     for (stamp_ns, angles) in &played[200..] {
         let angles = angles.as_ref().unwrap();
-        squares += (angles.angles_rad[0] - truth(seconds_from_ns(*stamp_ns))).powi(2);
+        squares += (angles.angles_rad[0] - ground_truth(seconds_from_ns(*stamp_ns))).powi(2);
         variances += angles.sigmas_rad[0].powi(2);
         count += 1.0;
     }
@@ -110,9 +110,9 @@ fn correlated_noise_does_not_count_as_white() {
 fn steps_of_a_coarse_encoder_keep_their_variance() {
     // Steps of 2°: uniform errors of 0.58°; the joint creeps from one to the next in seconds.
     let step = 2_f64.to_radians();
-    let truth = |time_s: f64| 0.01 * time_s;
-    let played = play(60, step / 12_f64.sqrt(), |at| Some((truth(seconds_from_ns(at)) / step).round() * step));
-    let (error, stated) = errors(&played, truth);
+    let ground_truth = |time_s: f64| 0.01 * time_s;
+    let played = play(60, step / 12_f64.sqrt(), |at| Some((ground_truth(seconds_from_ns(at)) / step).round() * step));
+    let (error, stated) = errors(&played, ground_truth);
     assert!(stated > 0.95 * error, "{stated} stated, {error} found");
     assert!(stated > 0.9 * step / 12_f64.sqrt());
 }
@@ -129,33 +129,33 @@ fn a_slew_and_a_reversal_are_followed() {
         };
         angles.push(angles[millisecond as usize] + 0.5e-3 * (rate_at(millisecond) + rate_at(millisecond + 1)));
     }
-    let truth = |time_s: f64| angles[(time_s * 1e3).round() as usize];
+    let ground_truth = |time_s: f64| angles[(time_s * 1e3).round() as usize];
     let mut noise = Noise::new(7);
     for sigma in [0.0087, 0.0009] {
-        let played = play(120, sigma, |at| Some(truth(seconds_from_ns(at)) + sigma * noise.normal()));
+        let played = play(120, sigma, |at| Some(ground_truth(seconds_from_ns(at)) + sigma * noise.normal()));
         let bend = ACCELERATION * 0.025_f64.powi(2) / 6.0;
         for (stamp_ns, angles) in &played[200..] {
             let angles = angles.as_ref().unwrap();
-            let error = (angles.angles_rad[0] - truth(seconds_from_ns(*stamp_ns))).abs();
+            let error = (angles.angles_rad[0] - ground_truth(seconds_from_ns(*stamp_ns))).abs();
             assert!(error < bend + 4.5 * angles.sigmas_rad[0], "{error} at {stamp_ns}");
         }
         // On average over reversals and constant rates the bias vanishes.
-        let (error, stated) = errors(&played, truth);
+        let (error, stated) = errors(&played, ground_truth);
         assert!(error < 1.3 * stated, "{sigma}: {error} against {stated}");
     }
 }
 
 #[test]
 fn wrapped_angles_are_averaged_unwrapped() {
-    let truth = |time_s: f64| std::f64::consts::PI + 0.05 * (3.0 * time_s).sin();
+    let ground_truth = |time_s: f64| std::f64::consts::PI + 0.05 * (3.0 * time_s).sin();
     let mut noise = Noise::new(8);
     let played = play(30, SIGMA_RAD, |at| {
-        let angle = truth(seconds_from_ns(at)) + SIGMA_RAD * noise.normal();
+        let angle = ground_truth(seconds_from_ns(at)) + SIGMA_RAD * noise.normal();
         Some(angle.sin().atan2(angle.cos()))
     });
     for (stamp_ns, angles) in &played[40..] {
         let angles = angles.as_ref().unwrap();
-        let error = angles.angles_rad[0] - truth(seconds_from_ns(*stamp_ns));
+        let error = angles.angles_rad[0] - ground_truth(seconds_from_ns(*stamp_ns));
         assert!(error.sin().abs() < 5.0 * angles.sigmas_rad[0] && error.cos() > 0.9, "{error}");
     }
 }

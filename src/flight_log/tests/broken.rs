@@ -283,7 +283,7 @@ fn a_rig_that_does_not_match_the_log_is_refused() {
     let message = stream_error(&RIG.replace("joint: yaw", "joint: pan"));
     assert!(message.contains("gimbal.links[0].joint is 'pan'") && message.contains("name 'roll', 'yaw'"), "{message}");
     let (frames, warnings) = play(&Flight::default(), &RIG.replace("rostopic: /truth", "rostopic: /vicon"), 0.0);
-    assert!(frames.iter().all(|frame| frame.truth.is_none()));
+    assert!(frames.iter().all(|frame| frame.ground_truth.is_none()));
     warning_with(&warnings, &["no ground truth", "/vicon", "'/truth'"]);
 }
 

@@ -26,12 +26,12 @@ fn a_rig_is_found_beside_the_log_then_in_it() {
     let folder = TempDir::new().unwrap();
     let path = folder.path().join("flight.mcap");
     let attached = RIG.replace("name: test", "name: attached");
-    let truth = RIG.replace("name: test", "name: actual");
-    write_log(&path, &[("x.rig.yaml", &attached), ("x.truth.yaml", &truth)], None);
+    let ground_truth = RIG.replace("name: test", "name: actual");
+    write_log(&path, &[("x.rig.yaml", &attached), ("x.truth.yaml", &ground_truth)], None);
     let log = FlightLog::open(&path).unwrap();
     assert_eq!(Rig::beside_log(&path).unwrap(), None);
     assert_eq!(Rig::for_log(&log, None).unwrap().name, "attached");
-    assert_eq!(Rig::truth_for_log(&log, None).unwrap().unwrap().name, "actual");
+    assert_eq!(Rig::ground_truth_for_log(&log, None).unwrap().unwrap().name, "actual");
     std::fs::write(folder.path().join("flight.rig.yaml"), RIG).unwrap();
     assert_eq!(Rig::for_log(&log, None).unwrap().name, "test");
     assert_eq!(Rig::beside_log(&path).unwrap().unwrap().name, "test");

@@ -31,8 +31,8 @@ fn frames_are_the_same_whatever_the_container() {
                 (expected.index, expected.stamp_ns, expected.log_time_ns)
             );
             assert_eq!(
-                (&frame.imu, &frame.joint_angles, frame.truth),
-                (&expected.imu, &expected.joint_angles, expected.truth)
+                (&frame.imu, &frame.joint_angles, frame.ground_truth),
+                (&expected.imu, &expected.joint_angles, expected.ground_truth)
             );
         }
     }
@@ -64,7 +64,7 @@ fn a_frame_has_its_measurements() {
         let angle = frame.joint_angles.as_ref().unwrap().angles_rad[0];
         let defect = (angle - yaw_rad(stamp_ns)).rem_euclid(std::f64::consts::TAU);
         assert!(defect.min(std::f64::consts::TAU - defect) < 1e-9, "{angle} at {stamp_ns}");
-        let defect = frame.truth.unwrap().minus(&true_pose(stamp_ns));
+        let defect = frame.ground_truth.unwrap().minus(&true_pose(stamp_ns));
         assert!(defect.norm() < 1e-9, "{defect}");
     }
 }
@@ -93,7 +93,7 @@ fn the_time_offset_shifts_everything_but_the_image() {
     let frame = &frames[10];
     assert_eq!(frame.stamp_ns, 527 * MS);
     assert_eq!(frame.imu.last().unwrap().stamp_ns, 539 * MS);
-    assert!(frame.truth.unwrap().minus(&true_pose(539 * MS)).norm() < 1e-9);
+    assert!(frame.ground_truth.unwrap().minus(&true_pose(539 * MS)).norm() < 1e-9);
 }
 
 #[test]

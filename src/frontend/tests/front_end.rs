@@ -45,8 +45,8 @@ fn play(
 fn errors(scene: &Scene, previous: &TrackedFrame, now: &TrackedFrame) -> Vec<f64> {
     let tracked = now.features.iter().filter_map(|feature| Some((feature, feature.previous_uv_px?)));
     let error = tracked.map(|(feature, before)| {
-        let truth = scene.flow(previous.stamp_ns as usize, now.stamp_ns as usize, &before);
-        (feature.uv_px - truth).norm()
+        let ground_truth = scene.flow(previous.stamp_ns as usize, now.stamp_ns as usize, &before);
+        (feature.uv_px - ground_truth).norm()
     });
     error.collect()
 }

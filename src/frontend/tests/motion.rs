@@ -41,7 +41,7 @@ fn check(name: &str, view: &View, least_right: f64, most_wrong: f64) {
     for seed in 1..20 {
         let mut dice = Dice(seed * 7919);
         let rotation = so3::exp(&view.rotation);
-        let mut truth = Vec::new();
+        let mut ground_truth = Vec::new();
         let mut pairs = Vec::new();
         while pairs.len() < 120 {
             let depth = view.depths.0 + (view.depths.1 - view.depths.0) * dice.uniform();
@@ -54,16 +54,17 @@ fn check(name: &str, view: &View, least_right: f64, most_wrong: f64) {
                 let angle = std::f64::consts::TAU * dice.uniform();
                 observed += Vector3::new(angle.cos(), angle.sin(), 0.0) * ((8.0 + 40.0 * dice.uniform()) / FOCAL_PX);
             }
-            truth.push(right);
+            ground_truth.push(right);
             pairs.push(BearingPair { previous: point.normalize(), now: observed.normalize() });
         }
         let predicted = PredictedRotation::isotropic(so3::exp(&view.prediction_error) * rotation, 0.05);
         let predicted = view.predicted.then_some(&predicted);
         let start = predicted.map_or_else(UnitQuaternion::identity, |predicted| predicted.rotation);
         let motion = estimate_motion(&pairs, &start, predicted, FOCAL_PX, &OutlierOptions::default());
-        let count = |kind: bool| truth.iter().filter(|right| **right == kind).count().max(1) as f64;
+        let count = |kind: bool| ground_truth.iter().filter(|right| **right == kind).count().max(1) as f64;
         let kept = |kind: bool| {
-            truth.iter().zip(&motion.is_inlier).filter(|(right, inlier)| **right == kind && **inlier).count() as f64
+            ground_truth.iter().zip(&motion.is_inlier).filter(|(right, inlier)| **right == kind && **inlier).count()
+                as f64
         };
         let (right, wrong) = (kept(true) / count(true), kept(false) / count(false));
         assert!(right >= least_right, "{name}, seed {seed}: keeps {right} of the right ones");

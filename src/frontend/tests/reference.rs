@@ -26,10 +26,10 @@ fn find_all(scene: &Scene, to: usize) -> (Vec<f64>, usize) {
     let observed: Vec<_> = places().into_iter().filter(|uv| scene.sees(&scene.flow(4, to, uv))).collect();
     let mut errors = Vec::new();
     for uv in &observed {
-        let truth = scene.flow(4, to, uv);
+        let ground_truth = scene.flow(4, to, uv);
         let mut reference = ReferencePatch::cut(&first, uv).unwrap();
-        if let ReferenceMatch::Found(found) = find(&mut reference, &later, &(truth + Vector2::new(0.4, -0.3))) {
-            errors.push((found - truth).norm());
+        if let ReferenceMatch::Found(found) = find(&mut reference, &later, &(ground_truth + Vector2::new(0.4, -0.3))) {
+            errors.push((found - ground_truth).norm());
         }
     }
     (errors, observed.len())

@@ -129,15 +129,16 @@ impl RunScore {
     fn of(recording: &Recording, run: &RunRecord) -> Self {
         let tracking = |step: &&std::sync::Arc<crate::session::StepRecord>| step.report.phase == Phase::Tracking;
         let last = run.steps.last();
-        let truth = recording.truth_rig.as_ref().and_then(|rig| rig.chain_of_camera(&run.camera_key));
-        let chain =
-            truth.zip(last).and_then(|(truth, last)| run.chain_distance(&last.report.calibration.classical, &truth));
+        let ground_truth = recording.ground_truth_rig.as_ref().and_then(|rig| rig.chain_of_camera(&run.camera_key));
+        let chain = ground_truth
+            .zip(last)
+            .and_then(|(ground_truth, last)| run.chain_distance(&last.report.calibration.classical, &ground_truth));
         let first = run.steps.iter().find(tracking);
         Self {
             id: run.id,
             count: run.steps.len(),
             finished: run.finished,
-            accuracy: TrajectoryAccuracy::of(&run.pairs_with_truth()),
+            accuracy: TrajectoryAccuracy::of(&run.pairs_with_ground_truth()),
             chain,
             estimated: run.steps.iter().filter(tracking).count(),
             initialized_s: first.map(|step| seconds_from_ns(step.report.stamp_ns)),

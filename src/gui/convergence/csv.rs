@@ -10,7 +10,7 @@ impl CsvTable for ConvergencePanel {
     /// The calibration of the shown run over the whole recording, with the truth in the columns of the cursor's chart.
     fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {
         let Some(run) = ctx.selected_run() else { return String::new() };
-        let truth = true_values(ctx.recording, run, ctx.cursor_ns).unwrap_or_default();
+        let ground_truth = true_values(ctx.recording, run, ctx.cursor_ns).unwrap_or_default();
         let mut parameters: Vec<ParameterId> = Vec::new();
         for calibration in run.steps.iter().map(|step| &step.report.calibration) {
             for parameter in &calibration.parameters {
@@ -31,8 +31,8 @@ impl CsvTable for ConvergencePanel {
             let cells = parameters.iter().flat_map(|parameter| {
                 let index = calibration.parameters.iter().position(|known| known == parameter);
                 let entry = |values: &[f64]| index.and_then(|index| values.get(index)).copied().unwrap_or(f64::NAN);
-                let truth = truth.get(parameter).copied().unwrap_or(f64::NAN);
-                [entry(&calibration.values), entry(&calibration.sigmas), truth].map(number)
+                let ground_truth = ground_truth.get(parameter).copied().unwrap_or(f64::NAN);
+                [entry(&calibration.values), entry(&calibration.sigmas), ground_truth].map(number)
             });
             table.row(std::iter::once(seconds(step.report.stamp_ns)).chain(cells));
         }

@@ -71,7 +71,7 @@ impl ConvergencePanel {
         }
         parameters.sort_by_key(|parameter| names::part_of(*parameter));
         self.read_converted(ctx, shown);
-        let truth = true_values(ctx.recording, &ctx.recording.runs[shown], ctx.cursor_ns).unwrap_or_default();
+        let ground_truth = true_values(ctx.recording, &ctx.recording.runs[shown], ctx.cursor_ns).unwrap_or_default();
 
         let available = ui.available_rect_before_wrap();
         let layout = layout::lay_out(&parameters, available);
@@ -81,10 +81,10 @@ impl ConvergencePanel {
                 let narrow = Rect::from_min_size(top, vec2(available.width() - 10.0, available.height()));
                 let layout = layout::lay_out(&parameters, narrow);
                 ui.allocate_space(vec2(1.0, layout.height));
-                self.cells_ui(ui, ctx, shown, &parameters, &truth, &layout);
+                self.cells_ui(ui, ctx, shown, &parameters, &ground_truth, &layout);
             });
         } else {
-            self.cells_ui(ui, ctx, shown, &parameters, &truth, &layout);
+            self.cells_ui(ui, ctx, shown, &parameters, &ground_truth, &layout);
         }
     }
 
@@ -113,7 +113,7 @@ impl ConvergencePanel {
         ctx: &mut PanelContext<'_>,
         shown: usize,
         parameters: &[ParameterId],
-        truth: &ParameterValues,
+        ground_truth: &ParameterValues,
         layout: &layout::Layout,
     ) {
         for (part, rect) in &layout.headings {
@@ -124,7 +124,7 @@ impl ConvergencePanel {
         }
         for (parameter, rect) in parameters.iter().zip(&layout.cells) {
             if ui.is_rect_visible(*rect) {
-                let told = paint::Told { histories: &self.histories, converted: &self.converted, truth, shown };
+                let told = paint::Told { histories: &self.histories, converted: &self.converted, ground_truth, shown };
                 paint::cell_ui(ui, ctx, &told, &mut self.curves, *parameter, *rect);
             }
         }

@@ -64,9 +64,9 @@ pub(super) fn legend(ui: &Ui, ctx: &PanelContext<'_>, rect: Rect) {
     say("±3σ", &|place| {
         painter.rect_filled(place, 0.0, band);
     });
-    if ctx.recording.truth_rig.is_some() {
+    if ctx.recording.ground_truth_rig.is_some() {
         say("truth", &|place| {
-            paint_line(&painter, &[place.left_center(), place.right_center()], theme.truth_style(), CURVE_WIDTH);
+            paint_line(&painter, &[place.left_center(), place.right_center()], theme.ground_truth_style(), CURVE_WIDTH);
         });
     }
     for (state, text) in MARKED.into_iter().zip(["weak: no better than the prior", "unobservable", "initializing"]) {
@@ -87,7 +87,7 @@ pub(super) struct Told<'a> {
     /// The runs that have another parameterization than the shown one, told in that.
     pub(super) converted: &'a [ConvertedHistory],
     /// True values in the shown run's parameterization.
-    pub(super) truth: &'a ParameterValues,
+    pub(super) ground_truth: &'a ParameterValues,
     /// The run on screen.
     pub(super) shown: usize,
 }
@@ -157,10 +157,10 @@ pub(super) fn cell_ui(
         }
     }
     let curve_of = |run: usize| curves.get(&(run, id));
-    let truth = told.truth.get(&id).copied();
+    let ground_truth = told.ground_truth.get(&id).copied();
     let extent_of = |run: usize| curve_of(run)?.value.extent;
     let others = overlaid.iter().filter(|run| **run != shown_run).filter_map(|run| extent_of(*run));
-    let (low, high) = value_range(extent_of(shown_run), truth, others, parameter);
+    let (low, high) = value_range(extent_of(shown_run), ground_truth, others, parameter);
     area = area.with_values(low, high);
 
     let painter = ui.painter_at(rect.expand(1.0));
@@ -174,10 +174,10 @@ pub(super) fn cell_ui(
         let fill = theme.run(shown_run).color.gamma_multiply(0.22);
         paint_band(&inner, &area, &curves.band, fill);
     }
-    if let Some(truth) = truth {
-        let y = area.y(truth);
+    if let Some(ground_truth) = ground_truth {
+        let y = area.y(ground_truth);
         let line = [pos2(plot.left(), y), pos2(plot.right(), y)];
-        paint_line(&inner, &line, theme.truth_style(), CURVE_WIDTH);
+        paint_line(&inner, &line, theme.ground_truth_style(), CURVE_WIDTH);
     }
     // The shown run comes last, on top.
     for run in overlaid.iter().filter(|run| **run != shown_run).chain([&shown_run]) {
@@ -205,7 +205,7 @@ pub(super) fn cell_ui(
         boxed_text(&inner, &theme, place, Align2::RIGHT_TOP, state.tag(), state_color(&theme, state));
     }
 
-    let error = value.zip(truth).map(|((value, sigma), truth)| (value - truth, sigma));
+    let error = value.zip(ground_truth).map(|((value, sigma), ground_truth)| (value - ground_truth, sigma));
     if let Some((error, sigma)) = error {
         let far = error.abs() > 3.0 * sigma;
         let place = plot.right_bottom() + vec2(-3.0, -STRIP_HEIGHT - 1.0);

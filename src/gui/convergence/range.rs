@@ -26,7 +26,7 @@ impl Extent {
 /// the direction is told: the others widen the axis a little and no more.
 pub(super) fn value_range(
     own: Option<(f64, f64)>,
-    truth: Option<f64>,
+    ground_truth: Option<f64>,
     others: impl Iterator<Item = (f64, f64)>,
     parameter: &ParameterHistory,
 ) -> (f64, f64) {
@@ -37,8 +37,9 @@ pub(super) fn value_range(
         .rev()
         .find(|(value, sigma)| value.is_finite() && sigma.is_finite())
         .map(|(value, sigma)| (value - 4.5 * sigma, value + 4.5 * sigma));
-    let truth = truth.filter(|truth| truth.is_finite()).map(|truth| (truth, truth));
-    let own = Extent::of(own.into_iter().chain(truth).chain(last));
+    let ground_truth =
+        ground_truth.filter(|ground_truth| ground_truth.is_finite()).map(|ground_truth| (ground_truth, ground_truth));
+    let own = Extent::of(own.into_iter().chain(ground_truth).chain(last));
     let (mut low, mut high) = own.0.unwrap_or((f64::INFINITY, f64::NEG_INFINITY));
     let span = high - low;
     // A held value alone spans nothing: then the others decide.
@@ -105,7 +106,9 @@ mod tests {
     #[test]
     fn the_axis_follows_the_run_on_screen() {
         let own = history(&[0.0, 1.0, 1.0], 0.1);
-        let range = |others: &[(f64, f64)], truth| value_range(Some((0.0, 1.0)), truth, others.iter().copied(), &own);
+        let range = |others: &[(f64, f64)], ground_truth| {
+            value_range(Some((0.0, 1.0)), ground_truth, others.iter().copied(), &own)
+        };
         let (low, high) = range(&[], None);
         assert!(low < 0.0 && low > -0.2 && high > 1.45 && high < 1.6, "{low} {high}");
         // A run near by is seen whole, one far away moves the axis by half its height at most.

@@ -37,11 +37,12 @@ pub(super) fn ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, step: &St
         rows.push(("at the start".to_owned(), vec![shown.value(*begin, sigma)]));
         rows.push(("moved by".to_owned(), vec![shown.value(value - begin, sigma)]));
     }
-    let truth = true_values(ctx.recording, run, ctx.cursor_ns).and_then(|truth| truth.get(&parameter).copied());
-    if let Some(truth) = truth {
-        rows.push(("truth".to_owned(), vec![shown.value(truth, sigma)]));
-        let times = fixed((value - truth).abs() / sigma, 1);
-        rows.push(("error".to_owned(), vec![format!("{} ({times}σ)", shown.value(value - truth, sigma))]));
+    let ground_truth =
+        true_values(ctx.recording, run, ctx.cursor_ns).and_then(|ground_truth| ground_truth.get(&parameter).copied());
+    if let Some(ground_truth) = ground_truth {
+        rows.push(("truth".to_owned(), vec![shown.value(ground_truth, sigma)]));
+        let times = fixed((value - ground_truth).abs() / sigma, 1);
+        rows.push(("error".to_owned(), vec![format!("{} ({times}σ)", shown.value(value - ground_truth, sigma))]));
     }
     let state = knowledge(step.rank.as_ref())
         .map_or(Knowledge::Waiting, |known| known.get(&parameter).copied().unwrap_or(Knowledge::Informed));

@@ -43,11 +43,11 @@ pub(super) fn frame_ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, ste
         three("accelerometer bias, m/s²", [a.x, a.y, a.z], 4),
         three("gyroscope bias, °/s", [g.x, g.y, g.z].map(f64::to_degrees), 4),
     ];
-    if let (Some(alignment), Some(truth)) = (run.alignment, step.truth) {
+    if let (Some(alignment), Some(ground_truth)) = (run.alignment, step.ground_truth) {
         let aligned = alignment * newest.world_from_imu;
-        let error = aligned.translation_m - truth.translation_m;
+        let error = aligned.translation_m - ground_truth.translation_m;
         rows.push(three("position error, m", [error.x, error.y, error.z], 3));
-        let turn = so3::log(&(truth.rotation.inverse() * aligned.rotation));
+        let turn = so3::log(&(ground_truth.rotation.inverse() * aligned.rotation));
         rows.push(three("attitude error, °", [turn.x, turn.y, turn.z].map(f64::to_degrees), 2));
     }
     rows_ui(ui, ctx.theme, "state", &rows);

@@ -17,10 +17,10 @@ pub(crate) fn calibration_at(
     name: &str,
     index: usize,
     given: &ClassicalChain,
-    truth: &ClassicalChain,
+    ground_truth: &ClassicalChain,
 ) -> CalibrationEstimate {
     let age_s = index.saturating_sub(FIRST_TRACKED_FRAME) as f64 * 0.05;
-    let mixed = mix(given, truth, (-age_s / 2.0).exp());
+    let mixed = mix(given, ground_truth, (-age_s / 2.0).exp());
     let (parameters, values): (Vec<ParameterId>, Vec<f64>) =
         if name == "classical" { classical_values(&mixed) } else { minimal_values(&mixed) }.into_iter().unzip();
     let is_angle = |parameter: &ParameterId| parameter.dimension() == Dimension::Angle;
@@ -107,23 +107,25 @@ pub(crate) fn rank_at(parameters: &[ParameterId], index: usize) -> RankReport {
     }
 }
 
-fn mix(given: &ClassicalChain, truth: &ClassicalChain, weight_of_given: f64) -> ClassicalChain {
-    let pose = |given: &RigidTransform, truth: &RigidTransform| truth.plus(&(given.minus(truth) * weight_of_given));
-    let number = |given: f64, truth: f64| truth + (given - truth) * weight_of_given;
+fn mix(given: &ClassicalChain, ground_truth: &ClassicalChain, weight_of_given: f64) -> ClassicalChain {
+    let pose = |given: &RigidTransform, ground_truth: &RigidTransform| {
+        ground_truth.plus(&(given.minus(ground_truth) * weight_of_given))
+    };
+    let number = |given: f64, ground_truth: f64| ground_truth + (given - ground_truth) * weight_of_given;
     ClassicalChain {
-        imu_from_base: pose(&given.imu_from_base, &truth.imu_from_base),
+        imu_from_base: pose(&given.imu_from_base, &ground_truth.imu_from_base),
         links: given
             .links
             .iter()
-            .zip(&truth.links)
-            .map(|(given, truth)| DhLink {
-                theta_offset_rad: number(given.theta_offset_rad, truth.theta_offset_rad),
-                d_m: number(given.d_m, truth.d_m),
-                a_m: number(given.a_m, truth.a_m),
-                alpha_rad: number(given.alpha_rad, truth.alpha_rad),
+            .zip(&ground_truth.links)
+            .map(|(given, ground_truth)| DhLink {
+                theta_offset_rad: number(given.theta_offset_rad, ground_truth.theta_offset_rad),
+                d_m: number(given.d_m, ground_truth.d_m),
+                a_m: number(given.a_m, ground_truth.a_m),
+                alpha_rad: number(given.alpha_rad, ground_truth.alpha_rad),
             })
             .collect(),
-        effector_from_camera: pose(&given.effector_from_camera, &truth.effector_from_camera),
+        effector_from_camera: pose(&given.effector_from_camera, &ground_truth.effector_from_camera),
     }
 }
 

@@ -54,7 +54,7 @@ pub(crate) fn sample_recording_of(frame_count: usize, run_names: &[&str]) -> Rec
     Recording {
         log_path: PathBuf::from("sample/yard.mcap"),
         rig: Arc::new(rig_with(given_chain, "yard")),
-        truth_rig: Some(Arc::new(rig_with(true_chain, "yard"))),
+        ground_truth_rig: Some(Arc::new(rig_with(true_chain, "yard"))),
         duration_ns: frame_count as i64 * FRAME_PERIOD_NS,
         start_ns: 0,
         epoch_ns: 1_718_451_937_250_000_000,
@@ -125,7 +125,7 @@ fn sample_run(
     flight: &[Instant],
     tracks: &[Arc<TrackedFrame>],
     given: &ClassicalChain,
-    truth: &ClassicalChain,
+    ground_truth: &ClassicalChain,
 ) -> RunRecord {
     let points = yard_points();
     let true_from_estimate =
@@ -134,7 +134,7 @@ fn sample_run(
     let steps = (0..flight.len())
         .map(|index| {
             let estimate = Estimate { number, flight, true_from_estimate };
-            let calibration = calibration_at(name, index, given, truth);
+            let calibration = calibration_at(name, index, given, ground_truth);
             let report = if index < FIRST_TRACKED_FRAME {
                 waiting_report(index, calibration)
             } else {
@@ -145,7 +145,7 @@ fn sample_run(
                 report,
                 rank,
                 tracks: Arc::clone(&tracks[index]),
-                truth: Some(flight[index].world_from_imu),
+                ground_truth: Some(flight[index].world_from_imu),
                 log_time_ns: index as i64 * FRAME_PERIOD_NS + 19_000_000,
                 summary_only: false,
             })

@@ -48,7 +48,7 @@ fn fly() -> Recording {
                 report,
                 rank,
                 tracks: Arc::new(frame.tracks.clone()),
-                truth: Some(frame.true_world_from_imu),
+                ground_truth: Some(frame.true_world_from_imu),
                 log_time_ns: frame.stamp_ns,
                 summary_only: false,
             });
@@ -59,7 +59,7 @@ fn fly() -> Recording {
     Recording {
         log_path: PathBuf::from("sample/flight.mcap"),
         rig: Arc::new(rig.clone()),
-        truth_rig: Some(Arc::new(flight.true_rig.clone())),
+        ground_truth_rig: Some(Arc::new(flight.true_rig.clone())),
         duration_ns: flight.frames.last().map_or(0, |frame| frame.stamp_ns),
         start_ns: 0,
         epoch_ns: 0,

@@ -118,11 +118,11 @@ impl ChainPose {
 pub(super) struct ChainModel {
     pub(super) estimate: ChainPose,
     /// The true chain at the same joint angles, or the estimate when `estimate` is moved away from it.
-    pub(super) truth: Option<ChainPose>,
-    /// Whether `estimate` is moved along a direction, and `truth` the chain before that.
+    pub(super) ground_truth: Option<ChainPose>,
+    /// Whether `estimate` is moved along a direction, and `ground_truth` the chain before that.
     pub(super) moved: bool,
     pub(super) rows: Vec<LinkRow>,
-    /// Distance in metres and angle in radians between the camera's poses on the IMU in `estimate` and `truth`.
+    /// Distance in metres and angle in radians between the camera's poses on the IMU in `estimate` and `ground_truth`.
     pub(super) camera_error: Option<(f64, f64)>,
 }
 
@@ -147,9 +147,9 @@ impl ChainModel {
         joint_names: &[String],
     ) -> Self {
         let estimate = ChainPose::at(chain, angles_rad);
-        let truth = true_chain.map(|chain| ChainPose::at(chain, angles_rad));
-        let camera_error = truth.as_ref().map(|truth| {
-            let difference = truth.imu_from_camera().inverse() * estimate.imu_from_camera();
+        let ground_truth = true_chain.map(|chain| ChainPose::at(chain, angles_rad));
+        let camera_error = ground_truth.as_ref().map(|ground_truth| {
+            let difference = ground_truth.imu_from_camera().inverse() * estimate.imu_from_camera();
             (difference.translation_m.norm(), so3::log(&difference.rotation).norm())
         });
         let rows = chain
@@ -165,11 +165,11 @@ impl ChainModel {
                 alpha_rad: link.alpha_rad,
             })
             .collect();
-        Self { estimate, truth, moved: false, rows, camera_error }
+        Self { estimate, ground_truth, moved: false, rows, camera_error }
     }
 
     fn axis_length_m(&self) -> f64 {
-        let sized = self.truth.as_ref().filter(|_| self.moved).unwrap_or(&self.estimate);
+        let sized = self.ground_truth.as_ref().filter(|_| self.moved).unwrap_or(&self.estimate);
         sized.axis_length_m()
     }
 
@@ -177,7 +177,7 @@ impl ChainModel {
     pub(super) fn framing_points_m(&self) -> Vec<Vector3<f64>> {
         /// Room around a chain for its moves.
         const ROOM: f64 = 1.35;
-        let held = self.truth.as_ref().filter(|_| self.moved);
+        let held = self.ground_truth.as_ref().filter(|_| self.moved);
         let Some(held) = held else { return self.estimate.framing_points_m() };
         let points = held.framing_points_m();
         let middle = points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64;
@@ -189,13 +189,13 @@ impl ChainModel {
         let mut scene = SceneModel::default();
         let length_m = self.axis_length_m();
         let axes = axis_colors(theme);
-        if let Some(truth) = &self.truth {
+        if let Some(ground_truth) = &self.ground_truth {
             let faint = axes.map(|color| mix(theme.surface, color, 0.45));
-            for pose in &truth.imu_from_frame[1..] {
+            for pose in &ground_truth.imu_from_frame[1..] {
                 scene.axes(pose, 0.7 * length_m, faint, 1.0);
             }
-            let style = theme.truth_style();
-            scene.line(truth.skeleton_m(), style.color, 1.2, style.dashes);
+            let style = theme.ground_truth_style();
+            scene.line(ground_truth.skeleton_m(), style.color, 1.2, style.dashes);
         }
         for pose in &self.estimate.imu_from_frame {
             scene.axes(pose, length_m, axes, 1.8);

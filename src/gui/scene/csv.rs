@@ -12,8 +12,8 @@ impl CsvTable for ScenePanel {
             let aligned = run.alignment.unwrap_or_default();
             for step in run.steps.iter().take_while(|step| step.report.stamp_ns <= ctx.cursor_ns) {
                 let estimate = step.report.newest().map(|frame| aligned.transform(&frame.world_from_imu.translation_m));
-                let truth = step.truth.map(|pose| pose.translation_m);
-                let places = [estimate, truth];
+                let ground_truth = step.ground_truth.map(|pose| pose.translation_m);
+                let places = [estimate, ground_truth];
                 let coordinates =
                     places.iter().flat_map(|at| at.map_or([f64::NAN; 3], |at| [at.x, at.y, at.z]).map(number));
                 table.row([seconds(step.report.stamp_ns), run.spec.label.clone()].into_iter().chain(coordinates));

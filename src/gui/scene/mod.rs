@@ -185,7 +185,7 @@ impl ScenePanel {
         let mut builder = WorldBuilder::new(theme, options, view.camera.distance_m);
         let spacing_m = builder.ground(&points);
         if let Some(first) = views.first() {
-            builder.truth(first);
+            builder.ground_truth(first);
         }
         for run in &views {
             let camera = camera_of(&context.recording.rig, run.run);
@@ -234,7 +234,7 @@ impl ScenePanel {
         overlay::labels(&painter, picture, scale, &drawing.labels, theme.surface);
         overlay::scale_bar(&painter, picture, scale, theme, &view, "");
         let label = context.recording.runs.get(context.selection.run).map_or("", |run| run.spec.label.as_str());
-        let text = match &chain.truth {
+        let text = match &chain.ground_truth {
             Some(_) if chain.moved => format!("Gimbal chain, {label}, moved; estimate dashed"),
             Some(_) => format!("Gimbal chain, {label}; truth dashed"),
             None => format!("Gimbal chain, {label}"),
@@ -257,14 +257,14 @@ fn legend_lines(views: &[RunView<'_>], theme: &super::theme::Theme) -> Vec<Legen
             let text = match (view.error_m(), view.newest(), view.run.alignment) {
                 (Some(error_m), ..) => format!("{label}, {error_m:.2} m from truth"),
                 (None, None, _) => format!("{label}, initializing"),
-                (None, Some(_), None) if view.has_truth() => format!("{label}, not aligned yet"),
+                (None, Some(_), None) if view.has_ground_truth() => format!("{label}, not aligned yet"),
                 _ => label.clone(),
             };
             LegendLine { style: theme.run(view.number), text }
         })
         .collect();
-    if views.first().is_some_and(RunView::has_truth) {
-        lines.push(LegendLine { style: theme.truth_style(), text: "truth".to_owned() });
+    if views.first().is_some_and(RunView::has_ground_truth) {
+        lines.push(LegendLine { style: theme.ground_truth_style(), text: "truth".to_owned() });
     }
     lines
 }
@@ -280,8 +280,8 @@ fn chain_model(context: &PanelContext<'_>) -> Option<ChainModel> {
         let model = ChainModel::at(angles_rad, &slide.chain, Some(estimate), &joint_names);
         return Some(ChainModel { moved: true, camera_error: Some(slide.camera_moves), ..model });
     }
-    let true_chain = context.recording.truth_rig.as_ref().and_then(|rig| rig.chain_of_camera(&run.camera_key));
-    let true_chain = true_chain.filter(|truth| truth.links.len() == estimate.links.len());
+    let true_chain = context.recording.ground_truth_rig.as_ref().and_then(|rig| rig.chain_of_camera(&run.camera_key));
+    let true_chain = true_chain.filter(|ground_truth| ground_truth.links.len() == estimate.links.len());
     Some(ChainModel::at(angles_rad, estimate, true_chain.as_ref(), &joint_names))
 }
 

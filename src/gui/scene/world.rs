@@ -34,7 +34,7 @@ pub(super) struct WorldOptions {
 /// Columns of a run's table: where the estimate is, then where the truth is; not-a-number where there is none.
 const PLACES: usize = 6;
 const ESTIMATE: usize = 0;
-const TRUTH: usize = 3;
+const GROUND_TRUTH: usize = 3;
 
 /// Where each run was and where the truth says it was, read step by step: a long recording is not gone through again for
 /// every picture.
@@ -48,9 +48,10 @@ impl Trajectories {
     pub(super) fn read(&mut self, recording: &Recording) -> &[StepTable] {
         self.tables.read::<PLACES>(&recording.runs, |step| {
             let estimate = step.report.newest().map(|frame| frame.world_from_imu.translation_m);
-            let truth = step.truth.map(|pose| pose.translation_m);
-            let [estimate, truth] = [estimate, truth].map(|at| at.unwrap_or_else(|| Vector3::repeat(f64::NAN)));
-            [estimate.x, estimate.y, estimate.z, truth.x, truth.y, truth.z]
+            let ground_truth = step.ground_truth.map(|pose| pose.translation_m);
+            let [estimate, ground_truth] =
+                [estimate, ground_truth].map(|at| at.unwrap_or_else(|| Vector3::repeat(f64::NAN)));
+            [estimate.x, estimate.y, estimate.z, ground_truth.x, ground_truth.y, ground_truth.z]
         })
     }
 }
@@ -91,7 +92,7 @@ impl<'a> RunView<'a> {
     pub(super) fn error_m(&self) -> Option<f64> {
         let step = self.step()?;
         let estimate = self.run.alignment? * step.report.newest()?.world_from_imu;
-        Some((estimate.translation_m - step.truth?.translation_m).norm())
+        Some((estimate.translation_m - step.ground_truth?.translation_m).norm())
     }
 
     /// Where the vehicle is at the cursor, aligned.
@@ -100,8 +101,8 @@ impl<'a> RunView<'a> {
     }
 
     /// Whether the log has a truth for this run up to the cursor.
-    pub(super) fn has_truth(&self) -> bool {
-        self.places.columns[TRUTH][..self.shown].iter().any(|x| x.is_finite())
+    pub(super) fn has_ground_truth(&self) -> bool {
+        self.places.columns[GROUND_TRUTH][..self.shown].iter().any(|x| x.is_finite())
     }
 
     /// Aligned positions, broken where the run did not track.
@@ -109,8 +110,8 @@ impl<'a> RunView<'a> {
         broken_line(self.shown, |step| self.aligned.transform(&self.place(ESTIMATE, step)))
     }
 
-    fn truth_m(&self) -> Vec<Vec<Vector3<f64>>> {
-        broken_line(self.shown, |step| self.place(TRUTH, step))
+    fn ground_truth_m(&self) -> Vec<Vec<Vector3<f64>>> {
+        broken_line(self.shown, |step| self.place(GROUND_TRUTH, step))
     }
 
     fn place(&self, column: usize, step: usize) -> Vector3<f64> {
@@ -145,7 +146,7 @@ fn broken_line(steps: usize, position: impl Fn(usize) -> Vector3<f64>) -> Vec<Ve
 /// Everything that a view of the flight must hold: all trajectories over the whole recording.
 pub(super) fn framing_points_m(views: &[RunView<'_>]) -> Vec<Vector3<f64>> {
     let whole = views.iter().map(RunView::whole);
-    let lines = whole.flat_map(|run| run.trajectory_m().into_iter().chain(run.truth_m()));
+    let lines = whole.flat_map(|run| run.trajectory_m().into_iter().chain(run.ground_truth_m()));
     let mut points: Vec<Vector3<f64>> = lines.flatten().collect();
     if let Some((low, high)) = bounds(&points) {
         // Hover and a first second still get a view of some metres.
@@ -204,9 +205,9 @@ impl<'a> WorldBuilder<'a> {
     }
 
     /// The true trajectory up to the cursor.
-    pub(super) fn truth(&mut self, view: &RunView<'_>) {
-        let style = self.theme.truth_style();
-        for line in view.truth_m() {
+    pub(super) fn ground_truth(&mut self, view: &RunView<'_>) {
+        let style = self.theme.ground_truth_style();
+        for line in view.ground_truth_m() {
             self.scene.line(line, style.color, 1.5, style.dashes);
         }
     }

@@ -73,7 +73,7 @@ pub struct RunStyle {
 const RUN_DASHES: [&[f32]; 4] = [&[], &[11.0, 4.0], &[8.0, 3.0, 2.0, 3.0], &[4.0, 3.0]];
 
 /// Dash and gap of the truth.
-const TRUTH_DASHES: &[f32] = &[5.0, 4.0];
+const GROUND_TRUTH_DASHES: &[f32] = &[5.0, 4.0];
 
 /// How many runs can be told apart.
 pub const MAX_RUNS: usize = RUN_DASHES.len();
@@ -129,7 +129,7 @@ pub struct Theme {
     /// Z axis, softened blue.
     pub axis_z: Color32,
     /// Truth, always dashed.
-    pub truth: Color32,
+    pub ground_truth: Color32,
     /// Good news.
     pub ok: Color32,
     /// Something to look at.
@@ -169,7 +169,7 @@ impl Theme {
                 axis_x: rgb(0xe5746c),
                 axis_y: rgb(0x77c277),
                 axis_z: rgb(0x6ea3ec),
-                truth: rgb(0xa3a9b2),
+                ground_truth: rgb(0xa3a9b2),
                 ok: rgb(0x3fbf8f),
                 warn: rgb(0xf0b429),
                 error: rgb(0xf0655b),
@@ -193,7 +193,7 @@ impl Theme {
                 axis_x: rgb(0xc9473f),
                 axis_y: rgb(0x3f9143),
                 axis_z: rgb(0x3a6fc4),
-                truth: rgb(0x747b85),
+                ground_truth: rgb(0x747b85),
                 ok: rgb(0x087f5b),
                 warn: rgb(0x9a6700),
                 error: rgb(0xc4261d),
@@ -211,7 +211,7 @@ impl Theme {
                 text_strong: Color32::BLACK,
                 text_weak: rgb(0x4a4a4a),
                 cursor: Color32::BLACK,
-                truth: rgb(0x666666),
+                ground_truth: rgb(0x666666),
                 diverging: [rgb(0x2f86cf), Color32::WHITE, rgb(0xe06520)],
                 ..Self::of(ThemeName::Light)
             },
@@ -229,8 +229,8 @@ impl Theme {
     }
 
     /// How the truth is drawn.
-    pub fn truth_style(&self) -> RunStyle {
-        RunStyle { color: self.truth, dashes: TRUTH_DASHES }
+    pub fn ground_truth_style(&self) -> RunStyle {
+        RunStyle { color: self.ground_truth, dashes: GROUND_TRUTH_DASHES }
     }
 
     /// The diverging colour of a signed weight in −1 to 1: blue, ground, orange; not-a-number is the ground.
@@ -285,7 +285,7 @@ mod tests {
             for text in [theme.text, theme.text_strong, theme.text_weak, theme.ok, theme.warn, theme.error] {
                 assert!(contrast(text, theme.surface) >= 4.5, "{name:?} {text:?}");
             }
-            for line in theme.runs.into_iter().chain([theme.truth, theme.axis_x, theme.axis_y, theme.axis_z]) {
+            for line in theme.runs.into_iter().chain([theme.ground_truth, theme.axis_x, theme.axis_y, theme.axis_z]) {
                 assert!(contrast(line, theme.plot_background) >= 3.0, "{name:?} {line:?}");
             }
             for fraction in [0.0, 0.5, 1.0] {

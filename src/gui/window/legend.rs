@@ -60,7 +60,7 @@ fn position_errors(run: &RunRecord, alignment: &RigidTransform) -> Option<ErrorS
         .iter()
         .filter_map(|step| {
             let estimate = alignment.transform(&step.report.newest()?.world_from_imu.translation_m);
-            Some((estimate - step.truth?.translation_m).norm())
+            Some((estimate - step.ground_truth?.translation_m).norm())
         })
         .collect();
     ErrorStatistics::of(&errors_m)

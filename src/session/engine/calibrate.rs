@@ -68,7 +68,7 @@ pub struct CalibrationRequest {
     /// The rig, when it is not beside the log or in it.
     pub rig_path: Option<PathBuf>,
     /// The ground truth of the rig, when it is not beside the log.
-    pub truth_path: Option<PathBuf>,
+    pub ground_truth_path: Option<PathBuf>,
     /// Seconds of the log to leave out at its start.
     pub start_s: f64,
     /// Seconds to read from there, `None` to the end.
@@ -85,7 +85,7 @@ pub struct CalibrationRun {
     /// The rig with the calibrated values and a prior from their standard deviations.
     pub rig: Rig,
     /// The rig with the ground truth, when known.
-    pub truth_rig: Option<Rig>,
+    pub ground_truth_rig: Option<Rig>,
     /// Key of the static camera.
     pub static_camera: String,
     /// Key of the camera on the gimbal.
@@ -107,7 +107,7 @@ pub fn calibrate(
 ) -> Result<CalibrationRun, CalibrationRunError> {
     let log = Arc::new(FlightLog::open(&request.log_path)?);
     let given_rig = Rig::for_log(&log, request.rig_path.as_deref())?;
-    let truth_rig = Rig::truth_for_log(&log, request.truth_path.as_deref())?;
+    let ground_truth_rig = Rig::ground_truth_for_log(&log, request.ground_truth_path.as_deref())?;
     let parts = RigParts::of(&given_rig, request)?;
     let (input, warnings) = track(&log, &given_rig, &parts, request, on_progress)?;
     let outcome = calibration::calibrate(&input, options, &mut |progress| {
@@ -120,7 +120,7 @@ pub fn calibrate(
         static_camera: parts.static_camera.key.clone(),
         gimbal_camera: parts.gimbal_camera.key.clone(),
         given_rig,
-        truth_rig,
+        ground_truth_rig,
         outcome,
         warnings,
     })

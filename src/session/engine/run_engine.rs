@@ -75,7 +75,7 @@ impl RunEngine {
             report,
             rank,
             tracks: Arc::clone(input.main_tracks()),
-            truth: input.truth,
+            ground_truth: input.ground_truth,
             log_time_ns: input.log_time_ns,
             summary_only: false,
         }

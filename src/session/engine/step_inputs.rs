@@ -32,7 +32,7 @@ pub(in crate::session) struct OwnedStepInput {
     /// Tracks by camera of the run, the main one's first; empty ones where an image is missing.
     pub(in crate::session) tracks: Vec<Arc<TrackedFrame>>,
     /// Ground truth of `world_from_imu`.
-    pub(in crate::session) truth: Option<RigidTransform>,
+    pub(in crate::session) ground_truth: Option<RigidTransform>,
     /// Time that the front ends took.
     pub(in crate::session) frontend_ms: f64,
 }
@@ -47,7 +47,7 @@ impl OwnedStepInput {
             imu: frame.imu,
             joint_angles: frame.joint_angles,
             tracks: vec![Arc::new(tracks)],
-            truth: frame.truth,
+            ground_truth: frame.ground_truth,
             frontend_ms,
         }
     }
@@ -139,7 +139,7 @@ mod tests {
                 imu: Vec::new(),
                 joint_angles: None,
                 tracks: vec![Arc::default()],
-                truth: None,
+                ground_truth: None,
                 frontend_ms: 0.0,
             }));
         }

@@ -117,7 +117,7 @@ impl SynchronizedFrames {
             imu,
             joint_angles: any.joint_angles.clone(),
             tracks: frames.iter().map(tracks).collect(),
-            truth: any.truth,
+            ground_truth: any.ground_truth,
             frontend_ms: frames.iter().flatten().map(|frame| frame.frontend_ms).sum(),
         })
     }
@@ -179,7 +179,7 @@ mod tests {
                     imu,
                     joint_angles: None,
                     tracks: vec![Arc::new(TrackedFrame { stamp_ns: *stamp_ns, ..TrackedFrame::default() })],
-                    truth: None,
+                    ground_truth: None,
                     frontend_ms: 1.0,
                 }))
                 .unwrap();

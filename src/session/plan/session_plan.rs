@@ -55,7 +55,7 @@ pub struct SessionRequest {
     /// The rig, when it is not beside the log or in it.
     pub rig_path: Option<PathBuf>,
     /// The ground truth of the rig, when it is not beside the log.
-    pub truth_path: Option<PathBuf>,
+    pub ground_truth_path: Option<PathBuf>,
     /// The runs; none means one `auto`.
     pub specs: Vec<RunSpec>,
     /// Seconds of the log to leave out at its start.
@@ -74,11 +74,11 @@ pub struct SessionPlan {
     /// The rig's file, when it was named.
     pub rig_path: Option<PathBuf>,
     /// The file of the ground truth, when it was named.
-    pub truth_path: Option<PathBuf>,
+    pub ground_truth_path: Option<PathBuf>,
     /// The rig of the runs.
     pub rig: Arc<Rig>,
     /// The rig with the ground truth.
-    pub truth_rig: Option<Arc<Rig>>,
+    pub ground_truth_rig: Option<Arc<Rig>>,
     /// The runs and the main camera of each.
     pub runs: Vec<(RunSpec, String)>,
     /// Seconds left out at the start.
@@ -102,7 +102,7 @@ impl SessionPlan {
     pub fn open(request: &SessionRequest) -> Result<Self, SessionError> {
         let log = Arc::new(FlightLog::open(&request.log_path)?);
         let rig = Rig::for_log(&log, request.rig_path.as_deref())?;
-        let truth_rig = Rig::truth_for_log(&log, request.truth_path.as_deref())?;
+        let ground_truth_rig = Rig::ground_truth_for_log(&log, request.ground_truth_path.as_deref())?;
         let mut specs = request.specs.clone();
         if specs.is_empty() {
             specs.push(RunSpec::default());
@@ -119,9 +119,9 @@ impl SessionPlan {
             log,
             log_path: request.log_path.clone(),
             rig_path: request.rig_path.clone(),
-            truth_path: request.truth_path.clone(),
+            ground_truth_path: request.ground_truth_path.clone(),
             rig: Arc::new(rig),
-            truth_rig: truth_rig.map(Arc::new),
+            ground_truth_rig: ground_truth_rig.map(Arc::new),
             runs,
             start_s: request.start_s,
             duration_s: request.duration_s,

@@ -256,7 +256,7 @@ mod tests {
             Recording {
                 log_path: "synthetic.mcap".into(),
                 rig: std::sync::Arc::new(flight.given_rig),
-                truth_rig: None,
+                ground_truth_rig: None,
                 duration_ns: 4_000_000_000,
                 start_ns: 0,
                 epoch_ns: 0,

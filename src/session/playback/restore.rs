@@ -64,7 +64,7 @@ impl Session {
             session_version: VERSION,
             log: SavedLog { path: absolute(&self.plan.log_path), bytes: log.size_bytes(), crc32: log.checksum() },
             rig: self.plan.rig_path.as_ref().map(absolute),
-            truth: self.plan.truth_path.as_ref().map(absolute),
+            ground_truth: self.plan.ground_truth_path.as_ref().map(absolute),
             start_s: self.plan.start_s,
             duration_s: self.plan.duration_s,
             runs: recording.runs.iter().filter(|run| run.origin.is_none()).map(|run| run.spec.to_string()).collect(),

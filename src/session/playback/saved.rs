@@ -48,7 +48,8 @@ pub struct SavedSession {
     /// The rig, when it was named.
     pub rig: Option<PathBuf>,
     /// The ground truth, when it was named.
-    pub truth: Option<PathBuf>,
+    #[serde(rename = "truth")]
+    pub ground_truth: Option<PathBuf>,
     /// Seconds left out at the start.
     pub start_s: f64,
     /// Seconds read.
@@ -125,7 +126,7 @@ impl SavedSession {
         Ok(SessionRequest {
             log_path: self.log.path.clone(),
             rig_path: self.rig.clone(),
-            truth_path: self.truth.clone(),
+            ground_truth_path: self.ground_truth.clone(),
             specs: specs.map_err(part)?,
             start_s: self.start_s,
             duration_s: self.duration_s,

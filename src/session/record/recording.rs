@@ -16,7 +16,7 @@ pub struct Recording {
     /// The rig of the runs.
     pub rig: Arc<Rig>,
     /// The rig with the ground truth, when known.
-    pub truth_rig: Option<Arc<Rig>>,
+    pub ground_truth_rig: Option<Arc<Rig>>,
     /// Length of the log in nanoseconds.
     pub duration_ns: i64,
     /// Where the runs start, in nanoseconds since the log began.
@@ -37,7 +37,7 @@ impl Recording {
         let mut recording = Self {
             log_path: plan.log_path.clone(),
             rig: Arc::clone(&plan.rig),
-            truth_rig: plan.truth_rig.clone(),
+            ground_truth_rig: plan.ground_truth_rig.clone(),
             duration_ns: plan.log.duration_ns(),
             start_ns: ns_from_seconds(plan.start_s),
             epoch_ns: plan.log.epoch_ns(),

@@ -116,8 +116,8 @@ impl RunRecord {
 
     /// Appends a step.
     pub fn push(&mut self, record: StepRecord) {
-        if let (Some(newest), Some(truth)) = (record.report.newest(), &record.truth) {
-            self.alignment_sums.add(&newest.world_from_imu.translation_m, &truth.translation_m);
+        if let (Some(newest), Some(ground_truth)) = (record.report.newest(), &record.ground_truth) {
+            self.alignment_sums.add(&newest.world_from_imu.translation_m, &ground_truth.translation_m);
             self.alignment = self.alignment_sums.solve(Alignment::YawPosition).map(|transform| transform.rigid);
         }
         self.memory.own += record.own_bytes();
@@ -150,8 +150,8 @@ impl RunRecord {
     fn align(&mut self) {
         self.alignment_sums = AlignmentSums::default();
         for step in &self.steps {
-            if let (Some(newest), Some(truth)) = (step.report.newest(), &step.truth) {
-                self.alignment_sums.add(&newest.world_from_imu.translation_m, &truth.translation_m);
+            if let (Some(newest), Some(ground_truth)) = (step.report.newest(), &step.ground_truth) {
+                self.alignment_sums.add(&newest.world_from_imu.translation_m, &ground_truth.translation_m);
             }
         }
         self.alignment = self.alignment_sums.solve(Alignment::YawPosition).map(|transform| transform.rigid);

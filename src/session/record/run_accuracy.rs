@@ -54,7 +54,7 @@ impl TrajectoryAccuracy {
             })
         });
         Some(Self {
-            length_m: path_length_m(pairs.iter().map(|(_, truth)| &truth.pose.translation_m)),
+            length_m: path_length_m(pairs.iter().map(|(_, ground_truth)| &ground_truth.pose.translation_m)),
             absolute_m: ErrorStatistics::of(&absolute_errors_m(pairs, &transform))?,
             relative: relative.collect(),
         })
@@ -63,13 +63,16 @@ impl TrajectoryAccuracy {
 
 impl RunRecord {
     /// Estimated `world_from_imu` of each frame with its ground truth, where both are known.
-    pub fn pairs_with_truth(&self) -> Vec<(StampedPose, StampedPose)> {
+    pub fn pairs_with_ground_truth(&self) -> Vec<(StampedPose, StampedPose)> {
         self.steps
             .iter()
             .filter_map(|step| {
                 let newest = step.report.newest()?;
                 let stamp_s = seconds_from_ns(newest.stamp_ns);
-                Some((StampedPose { stamp_s, pose: newest.world_from_imu }, StampedPose { stamp_s, pose: step.truth? }))
+                Some((
+                    StampedPose { stamp_s, pose: newest.world_from_imu },
+                    StampedPose { stamp_s, pose: step.ground_truth? },
+                ))
             })
             .collect()
     }

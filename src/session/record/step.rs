@@ -15,7 +15,7 @@ pub struct StepRecord {
     /// Feature tracks of the main camera; empty where it has no image.
     pub tracks: Arc<TrackedFrame>,
     /// Ground truth of `world_from_imu`.
-    pub truth: Option<RigidTransform>,
+    pub ground_truth: Option<RigidTransform>,
     /// Log time of the image since the log began, beside the report's header stamp.
     pub log_time_ns: i64,
     /// Whether features, older frames of the window and most landmarks were evicted to save memory; see

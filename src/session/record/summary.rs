@@ -49,7 +49,7 @@ impl StepRecord {
             },
             rank: self.rank.clone(),
             tracks: std::sync::Arc::clone(&self.tracks),
-            truth: self.truth,
+            ground_truth: self.ground_truth,
             log_time_ns: self.log_time_ns,
             summary_only: true,
         }

@@ -16,7 +16,7 @@ pub(in crate::session) fn input_of(frame: &SyntheticFrame, encoder_sigma_rad: f6
         imu: frame.imu.clone(),
         joint_angles: frame.encoder_angles(encoder_sigma_rad),
         tracks: vec![Arc::new(frame.tracks.clone())],
-        truth: Some(frame.true_world_from_imu),
+        ground_truth: Some(frame.true_world_from_imu),
         frontend_ms: 0.0,
     }
 }

@@ -28,9 +28,9 @@ fn a_simulated_log_reads_back_with_its_rig_and_truth() {
     let log = Arc::new(FlightLog::open(&summary.log).unwrap());
     assert!(log.warnings().is_empty(), "{:?}", log.warnings());
     let rig = Rig::for_log(&log, None).unwrap();
-    let truth = Rig::truth_for_log(&log, None).unwrap().unwrap();
-    assert_ne!(rig.gimbal, truth.gimbal);
-    assert_eq!(rig.imu, truth.imu);
+    let ground_truth = Rig::ground_truth_for_log(&log, None).unwrap().unwrap();
+    assert_ne!(rig.gimbal, ground_truth.gimbal);
+    assert_eq!(rig.imu, ground_truth.imu);
     assert!(summary.given_chain_error.0 > 1e-3 && summary.given_chain_error.0 < 0.02, "{summary:?}");
     for camera in ["cam0", "cam1"] {
         let frames: Vec<_> = FrameStream::new(Arc::clone(&log), &rig, camera, 0.0, None).unwrap().collect();
@@ -38,7 +38,7 @@ fn a_simulated_log_reads_back_with_its_rig_and_truth() {
         for frame in &frames {
             assert!(frame.log_time_ns > frame.stamp_ns + 15_000_000);
             assert_eq!([frame.image.width, frame.image.height], [96, 72]);
-            assert!(frame.truth.is_some());
+            assert!(frame.ground_truth.is_some());
             assert_eq!(frame.joint_angles.as_ref().map(|angles| angles.angles_rad.len()), Some(3));
             let spread = frame.image.pixels.iter().max().unwrap() - frame.image.pixels.iter().min().unwrap();
             assert!(spread > 60);
@@ -54,7 +54,7 @@ fn the_same_options_give_the_same_bytes_whatever_the_thread_count() {
         let folder = tempfile::tempdir().unwrap();
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let summary = pool.install(|| write(&SimulationOptions { seed, ..options.clone() }, folder.path()));
-        [summary.log, summary.rig, summary.truth].map(|path| std::fs::read(path).unwrap())
+        [summary.log, summary.rig, summary.ground_truth].map(|path| std::fs::read(path).unwrap())
     };
     let first = read(1, 7);
     assert_eq!(first, read(3, 7));
@@ -63,7 +63,7 @@ fn the_same_options_give_the_same_bytes_whatever_the_thread_count() {
 
 #[test]
 fn a_shorter_flight_is_the_beginning_of_a_longer_one() {
-    let truth = |duration_s: f64| {
+    let ground_truth = |duration_s: f64| {
         let folder = tempfile::tempdir().unwrap();
         let options = SimulationOptions {
             duration_s: Some(duration_s),
@@ -76,9 +76,9 @@ fn a_shorter_flight_is_the_beginning_of_a_longer_one() {
         let log = Arc::new(FlightLog::open(&summary.log).unwrap());
         let rig = Rig::for_log(&log, None).unwrap();
         let frames = FrameStream::new(log, &rig, "cam0", 0.0, None).unwrap();
-        frames.map(|frame| frame.truth).collect::<Vec<_>>()
+        frames.map(|frame| frame.ground_truth).collect::<Vec<_>>()
     };
-    let (short, long) = (truth(4.0), truth(8.0));
+    let (short, long) = (ground_truth(4.0), ground_truth(8.0));
     assert_eq!(short[..7], long[..7]);
 }
 

@@ -70,8 +70,8 @@ fn noise_and_motion_are_as_asked() {
         .iter()
         .flat_map(|frame| {
             let readings = frame.joint_angles_rad.clone().unwrap();
-            let truth = frame.true_joint_angles_rad.clone();
-            readings.into_iter().zip(truth).map(|(reading, truth)| reading - truth)
+            let ground_truth = frame.true_joint_angles_rad.clone();
+            readings.into_iter().zip(ground_truth).map(|(reading, ground_truth)| reading - ground_truth)
         })
         .collect();
     let spread = (errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt();
@@ -84,23 +84,23 @@ fn noise_and_motion_are_as_asked() {
 #[test]
 fn given_rig_is_wrong_within_its_bounds_only() {
     let flight = synthetic_tracks(&short(SyntheticMount::Gimbal, SyntheticMotion::Hover));
-    let (given, truth) = (flight.given_rig.gimbal.unwrap(), flight.true_rig.gimbal.unwrap());
+    let (given, ground_truth) = (flight.given_rig.gimbal.unwrap(), flight.true_rig.gimbal.unwrap());
     let (length, angle) = (given.prior.translation_bound_m, given.prior.rotation_bound_rad);
     assert!(length > 0.0 && angle > 0.0);
     let mut differences = 0;
-    for (given, truth) in given.chain.links.iter().zip(&truth.chain.links) {
-        for (given, truth, bound) in [
-            (given.theta_offset_rad, truth.theta_offset_rad, angle),
-            (given.alpha_rad, truth.alpha_rad, angle),
-            (given.d_m, truth.d_m, length),
-            (given.a_m, truth.a_m, length),
+    for (given, ground_truth) in given.chain.links.iter().zip(&ground_truth.chain.links) {
+        for (given, ground_truth, bound) in [
+            (given.theta_offset_rad, ground_truth.theta_offset_rad, angle),
+            (given.alpha_rad, ground_truth.alpha_rad, angle),
+            (given.d_m, ground_truth.d_m, length),
+            (given.a_m, ground_truth.a_m, length),
         ] {
-            assert!((given - truth).abs() <= bound);
-            differences += usize::from(given != truth);
+            assert!((given - ground_truth).abs() <= bound);
+            differences += usize::from(given != ground_truth);
         }
     }
     assert_eq!(differences, 12);
-    let base = given.chain.imu_from_base.minus(&truth.chain.imu_from_base);
+    let base = given.chain.imu_from_base.minus(&ground_truth.chain.imu_from_base);
     assert!(base.fixed_rows::<3>(0).amax() <= angle && base.fixed_rows::<3>(3).amax() <= length);
     assert!(base.norm() > 0.0);
 }

@@ -78,13 +78,13 @@ fn write_folder(source: &Path) {
     }
     write("cam0/data.csv", &images);
     write("cam0/sensor.yaml", CAMERA_YAML);
-    let mut truth = "#timestamp, p_RS_R_x [m], …\n".to_owned();
+    let mut ground_truth = "#timestamp, p_RS_R_x [m], …\n".to_owned();
     for index in 0..60 {
         let x = 4.6 + 0.005 * index as f64;
         let stamp_ns = STAMP_NS + index * 5_000_000;
-        writeln!(truth, "{stamp_ns},{x},-1.7,0.9,0.5,-0.5,0.5,0.5,1,0,0,0,0,0,0,0,0").expect(INTO_STRING);
+        writeln!(ground_truth, "{stamp_ns},{x},-1.7,0.9,0.5,-0.5,0.5,0.5,1,0,0,0,0,0,0,0,0").expect(INTO_STRING);
     }
-    write("state_groundtruth_estimate0/data.csv", &truth);
+    write("state_groundtruth_estimate0/data.csv", &ground_truth);
     write("leica0/data.csv", &format!("#timestamp, p_RS_R_x [m]\n{STAMP_NS},4.6,-1.7,0.9\n"));
 }
 
@@ -116,7 +116,7 @@ fn a_folder_becomes_a_log_with_its_rig() {
     let frame = frames.iter().find(|frame| frame.stamp_ns == 50_000_000).expect("the second image is a frame");
     assert_eq!(frame.image.pixels[64 + 1], 4, "x + 2 y + 1");
     assert!((frame.imu[3].angular_velocity_rad_per_s - Vector3::new(0.1, -0.2, 0.003)).norm() < 1e-12);
-    let pose = frame.truth.expect("the image has a truth");
+    let pose = frame.ground_truth.expect("the image has a truth");
     assert!((pose.translation_m - Vector3::new(4.65, -1.7, 0.9)).norm() < 1e-9, "{pose:?}");
 
     let again = folder.path().join("again.mcap");

@@ -82,24 +82,25 @@ fn errors(flight: &Flight, hover_s: f64, newest: usize, solution: &Initializatio
     let first = &flight.frames[solution.frames[0].frame_index];
     let (mut dot, mut square, mut mount) = (0.0, 0.0, 0.0_f64);
     for frame in &solution.frames {
-        let truth = &flight.frames[frame.frame_index];
-        let moved = first.true_world_from_imu.inverse().transform(&truth.true_world_from_imu.translation_m);
+        let ground_truth = &flight.frames[frame.frame_index];
+        let moved = first.true_world_from_imu.inverse().transform(&ground_truth.true_world_from_imu.translation_m);
         let estimated = solution.frames[0].world_from_imu.inverse().transform(&frame.world_from_imu.translation_m);
         dot += moved.dot(&estimated);
         square += moved.norm_squared();
-        mount = mount.max((truth.true_imu_from_camera.rotation.inverse() * frame.imu_from_camera.rotation).angle());
+        mount =
+            mount.max((ground_truth.true_imu_from_camera.rotation.inverse() * frame.imu_from_camera.rotation).angle());
     }
     let last = solution.frames.last().unwrap();
-    let truth = &flight.frames[last.frame_index];
+    let ground_truth = &flight.frames[last.frame_index];
     assert_eq!(last.frame_index, newest);
     let up = last.world_from_imu.rotation.inverse() * Vector3::z();
-    let true_up = truth.true_world_from_imu.rotation.inverse() * Vector3::z();
+    let true_up = ground_truth.true_world_from_imu.rotation.inverse() * Vector3::z();
     let velocity = last.world_from_imu.rotation.inverse() * last.velocity_m_per_s;
-    let true_velocity = truth.true_world_from_imu.rotation.inverse() * truth.true_velocity;
-    let moved = first.true_world_from_imu.inverse().transform(&truth.true_world_from_imu.translation_m);
+    let true_velocity = ground_truth.true_world_from_imu.rotation.inverse() * ground_truth.true_velocity;
+    let moved = first.true_world_from_imu.inverse().transform(&ground_truth.true_world_from_imu.translation_m);
     let estimated = solution.frames[0].world_from_imu.inverse().transform(&last.world_from_imu.translation_m);
     Errors {
-        since_motion_s: truth.stamp_ns as f64 * 1e-9 - hover_s,
+        since_motion_s: ground_truth.stamp_ns as f64 * 1e-9 - hover_s,
         scale: dot / square - 1.0,
         gravity_deg: angle_between(&up, &true_up).to_degrees(),
         velocity_m_per_s: (velocity - true_velocity).norm(),
@@ -259,10 +260,10 @@ fn standstill_is_remembered_or_used_at_once() {
     // The accelerometer's bias tilts the world by up to asin(0.5·√2/9.81) = 4.1°.
     assert!(errors.gravity_deg < 4.2 && errors.velocity_m_per_s < 1e-9, "{errors:?}");
     assert!(errors.gyroscope_rad_per_s < 1e-3);
-    let truth = flight.frames[newest].true_world_from_imu.rotation.inverse() * Vector3::z();
+    let ground_truth = flight.frames[newest].true_world_from_imu.rotation.inverse() * Vector3::z();
     let predicted = solution.frames[0].world_from_imu.rotation.inverse() * (Vector3::z() * GRAVITY)
         + solution.bias.accelerometer_m_per_s2;
-    assert!((predicted - truth * GRAVITY - flight.accelerometer_bias).norm() < 0.02);
+    assert!((predicted - ground_truth * GRAVITY - flight.accelerometer_bias).norm() < 0.02);
 }
 
 #[test]

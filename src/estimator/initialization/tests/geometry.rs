@@ -72,17 +72,20 @@ fn five_points_give_the_true_essential_matrix() {
     for _ in 0..200 {
         let pose = random_pose(&mut random);
         let pairs: [_; 5] = pairs_of(&pose, 5, false, 0.0, &mut random).try_into().unwrap();
-        let mut truth = so3::hat(&pose.translation_m) * pose.rotation_matrix();
-        truth /= truth.norm();
+        let mut ground_truth = so3::hat(&pose.translation_m) * pose.rotation_matrix();
+        ground_truth /= ground_truth.norm();
         let found = five_point(&pairs);
         for essential in &found {
             for (first, second) in &pairs {
                 assert!((second.transpose() * essential * first)[0].abs() < 1e-8);
             }
         }
-        let nearest = found.iter().map(|e| (e - truth).norm().min((e + truth).norm())).fold(f64::INFINITY, f64::min);
+        let nearest = found
+            .iter()
+            .map(|e| (e - ground_truth).norm().min((e + ground_truth).norm()))
+            .fold(f64::INFINITY, f64::min);
         missed += usize::from(nearest > 1e-5);
-        let poses = decompose(&truth).unwrap();
+        let poses = decompose(&ground_truth).unwrap();
         let nearest_rotation = poses
             .iter()
             .map(|(rotation, _)| (pose.rotation.inverse() * rotation).angle())
@@ -213,10 +216,10 @@ fn constrained_system_returns_the_solution_it_was_made_of() {
     let mut random = Random::new(9);
     let n = 16;
     let rows = DMatrix::from_fn(60, n, |_, _| random.normal());
-    let mut truth = DVector::from_fn(n, |_, _| random.normal());
+    let mut ground_truth = DVector::from_fn(n, |_, _| random.normal());
     let gravity = Vector3::new(1.0, -2.0, 9.0).normalize() * 9.81;
-    truth.fixed_rows_mut::<3>(7).copy_from(&gravity);
-    let side = &rows * &truth;
+    ground_truth.fixed_rows_mut::<3>(7).copy_from(&gravity);
+    let side = &rows * &ground_truth;
     let found = solve_with_gravity_norm(&rows.tr_mul(&rows), &rows.tr_mul(&side), 9.81).unwrap();
-    assert!((found - truth).norm() < 1e-8);
+    assert!((found - ground_truth).norm() < 1e-8);
 }
