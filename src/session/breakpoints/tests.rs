@@ -195,7 +195,7 @@ fn recording_of(ranks: &[usize]) -> Recording {
     Recording {
         log_path: "made-up.mcap".into(),
         rig: Arc::new(rig.clone()),
-        truth_rig: None,
+        ground_truth_rig: None,
         duration_ns: 1_000_000,
         start_ns: 0,
         epoch_ns: 0,
