@@ -90,7 +90,7 @@ impl Bundle<'_> {
     pub(super) fn cost(&self, estimate: &Estimate) -> f64 {
         let mut cost = self.pixels.cost(&self.poses(estimate), self.tracks, &estimate.landmarks);
         for instant in 1..self.instants.len() {
-            if let Some(residual) = self.inertial_residual(instant, estimate) {
+            if let Some(residual) = self.imu_residual(instant, estimate) {
                 cost += residual.norm_squared();
             }
         }
@@ -101,7 +101,7 @@ impl Bundle<'_> {
         cost + self.border_rows(estimate).1.norm_squared()
     }
 
-    fn inertial_residual(&self, instant: usize, estimate: &Estimate) -> Option<Vector15> {
+    fn imu_residual(&self, instant: usize, estimate: &Estimate) -> Option<Vector15> {
         let (motion, information) = self.instants[instant].motion.as_ref()?;
         let (from, to) = (&estimate.navigation[instant - 1], &estimate.navigation[instant]);
         Some(information * imu_factor::residual(motion, from, to, &self.gravity_in_world))
@@ -196,7 +196,7 @@ impl Bundle<'_> {
             border_gradient: border_rows.tr_mul(&border_residual),
         };
         for instant in 1..self.instants.len() {
-            let Some(residual) = self.inertial_residual(instant, estimate) else { continue };
+            let Some(residual) = self.imu_residual(instant, estimate) else { continue };
             let Some((motion, information)) = &self.instants[instant].motion else { continue };
             let (from, to) = (&estimate.navigation[instant - 1], &estimate.navigation[instant]);
             let (by_from, by_to) = imu_factor::jacobians(motion, from, to, &self.gravity_in_world);

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use super::bundle::{Priors, gimbal_view};
 use super::chain_prior::ChainTerm;
 use super::outcome::{
-    CalibratedParameter, CalibrationOutcome, InertialReport, MountReport, PixelReport, PoseLoopReport,
+    CalibratedParameter, CalibrationOutcome, ExtrinsicsReport, ImuResidualReport, PixelReport, PoseLoopReport,
 };
 use super::pose_loop::{PoseLoopSolution, PoseLoops, paired};
 use super::rounds::{Stage, StageResult};
@@ -114,7 +114,7 @@ pub fn calibrate(
     Ok(CalibrationOutcome {
         stretch_ns,
         instants: instants.len(),
-        mount_alone: mount_report(input, &alone),
+        static_camera_imu: extrinsics_report(input, &alone),
         static_pixels: pixels(&alone, Camera::Static).ok_or_else(|| singular(ALONE))?,
         pose_loop: PoseLoopReport {
             segments: segments.len(),
@@ -126,7 +126,7 @@ pub fn calibrate(
             sigmas: loops.covariance.diagonal().iter().map(|variance| variance.max(0.0).sqrt()).collect(),
             iterations: loops.iterations,
         },
-        mount: mount_report(input, &both),
+        mount: extrinsics_report(input, &both),
         gimbal_time_shift_s: (
             both.estimate.shifts_s[1],
             both.covariance[(columns.gimbal_shift(), columns.gimbal_shift())].max(0.0).sqrt(),
@@ -140,7 +140,7 @@ pub fn calibrate(
             pixels(&both, Camera::Gimbal).ok_or_else(|| singular(BOTH))?,
         ],
         iterations: [alone.iterations, both.iterations],
-        inertial: inertial_report(input, &instants, &both.estimate).ok_or_else(|| singular(BOTH))?,
+        inertial: imu_residual_report(input, &instants, &both.estimate).ok_or_else(|| singular(BOTH))?,
         rank: rank(&both, &visited_rad),
         warnings: warnings(counts, &segments, &instants),
         visited_rad,
@@ -170,14 +170,14 @@ fn check_joint_motion(
     for (joint, name) in gimbal.joints.iter().enumerate() {
         let angles: Vec<f64> = readings.iter().filter_map(|reading| reading.get(joint).copied()).collect();
         let variance = Statistics::of(&angles).map_or(0.0, |statistics| statistics.std.powi(2));
-        moving |= variance - noise > options.least_joint_motion_rad.powi(2) + doubt;
+        moving |= variance - noise > options.min_joint_motion_rad.powi(2) + doubt;
         spreads.push(format!("{name} {:.1}°", (variance - noise).max(0.0).sqrt().to_degrees()));
     }
     if moving || readings.is_empty() {
         return Ok(());
     }
     Err(CalibrationError::NoJointMotion {
-        limit_deg: options.least_joint_motion_rad.to_degrees(),
+        limit_deg: options.min_joint_motion_rad.to_degrees(),
         from_s: seconds_from_ns(from_ns),
         to_s: seconds_from_ns(to_ns),
         spreads: spreads.join(", "),
@@ -191,13 +191,13 @@ fn check_measurements(
     (from_ns, to_ns): (i64, i64),
 ) -> Result<(), CalibrationError> {
     let found: usize = segments.iter().map(|segment| segment.instants.len()).sum();
-    if found >= options.least_measurements {
+    if found >= options.min_measurements {
         return Ok(());
     }
     let SegmentCounts { offered, broken, unsolved } = counts;
     Err(CalibrationError::TooFewMeasurements {
         found,
-        needed: options.least_measurements,
+        needed: options.min_measurements,
         from_s: seconds_from_ns(from_ns),
         to_s: seconds_from_ns(to_ns),
         reason: format!(
@@ -242,9 +242,9 @@ fn close_loops(
     Ok((solution, gaps))
 }
 
-fn mount_report(input: &CalibrationInput, result: &StageResult) -> MountReport {
+fn extrinsics_report(input: &CalibrationInput, result: &StageResult) -> ExtrinsicsReport {
     let sigma = |column: usize| result.covariance[(column, column)].max(0.0).sqrt();
-    MountReport {
+    ExtrinsicsReport {
         initial: input.static_camera.imu_from_camera,
         imu_from_camera: result.estimate.mount,
         sigmas: std::array::from_fn(|axis| sigma(Columns::MOUNT + axis)),
@@ -280,7 +280,11 @@ fn pixel_report(input: &CalibrationInput, result: &StageResult, camera: Camera) 
 }
 
 /// Rotation and velocity residuals of the intervals over their length.
-fn inertial_report(input: &CalibrationInput, instants: &[Instant], estimate: &Estimate) -> Option<InertialReport> {
+fn imu_residual_report(
+    input: &CalibrationInput,
+    instants: &[Instant],
+    estimate: &Estimate,
+) -> Option<ImuResidualReport> {
     let gravity: Vector3<f64> = gravity_in_world(input.gravity_m_per_s2);
     let (mut gyroscope, mut accelerometer) = (Vec::new(), Vec::new());
     for index in 1..instants.len() {
@@ -290,7 +294,7 @@ fn inertial_report(input: &CalibrationInput, instants: &[Instant], estimate: &Es
         gyroscope.push(residual.fixed_rows::<3>(0).norm() / motion.duration_s());
         accelerometer.push(residual.fixed_rows::<3>(6).norm() / motion.duration_s());
     }
-    Some(InertialReport {
+    Some(ImuResidualReport {
         gyroscope_rad_per_s: Statistics::of(&gyroscope)?,
         accelerometer_m_per_s2: Statistics::of(&accelerometer)?,
     })

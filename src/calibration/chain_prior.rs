@@ -6,7 +6,7 @@ use crate::gimbal::{Chain, ClassicalChain, auto_parameterization};
 use crate::sensors::ChainPrior;
 
 /// Variance added to every column, so that one that the prior fixes entirely leaves the covariance regular.
-const LEAST_VARIANCE: f64 = 1e-12;
+const MIN_VARIANCE: f64 = 1e-12;
 
 /// The given chain in the minimal chart that suits it, and how wrong it may be.
 #[derive(Clone, Debug)]
@@ -24,7 +24,7 @@ impl ChainTerm {
         let (translation_m, rotation_rad) = prior.sigmas();
         let mut covariance = given.prior_covariance(classical, translation_m, rotation_rad);
         for k in 0..covariance.nrows() {
-            covariance[(k, k)] += LEAST_VARIANCE;
+            covariance[(k, k)] += MIN_VARIANCE;
         }
         let prior_sigmas = covariance.diagonal().map(f64::sqrt);
         let dof = given.dof();

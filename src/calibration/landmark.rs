@@ -28,12 +28,12 @@ impl AnchoredLandmark {
 }
 
 /// The landmark nearest to all rays `(view, unit bearing in its camera)`, measured across them and weighed by distance;
-/// `None` while the rays open less than `least_angle_rad` or when the point lies behind a camera.
-pub(super) fn triangulate(rays: &[(CameraPose, Vector3<f64>)], least_angle_rad: f64) -> Option<AnchoredLandmark> {
+/// `None` while the rays open less than `min_angle_rad` or when the point lies behind a camera.
+pub(super) fn triangulate(rays: &[(CameraPose, Vector3<f64>)], min_angle_rad: f64) -> Option<AnchoredLandmark> {
     let (first, first_bearing) = rays.first()?;
     let first_ray = first.rotation * first_bearing;
     let opening = rays.iter().map(|(view, bearing)| first_ray.cross(&(view.rotation * bearing)).norm());
-    if opening.fold(0.0, f64::max) < least_angle_rad {
+    if opening.fold(0.0, f64::max) < min_angle_rad {
         return None;
     }
     let mut point: Option<Vector3<f64>> = None;

@@ -38,7 +38,7 @@ pub use error::CalibrationError;
 pub use input::{CalibrationInput, GimbalCamera, StaticCamera, TrackedView};
 pub use options::CalibrationOptions;
 pub use outcome::{
-    CalibratedParameter, CalibrationOutcome, InertialReport, MountReport, PixelReport, PoseLoopReport, chain_distance,
-    transform_distance,
+    CalibratedParameter, CalibrationOutcome, ExtrinsicsReport, ImuResidualReport, PixelReport, PoseLoopReport,
+    chain_distance, transform_distance,
 };
 pub use statistics::Statistics;

@@ -40,7 +40,7 @@ pub(super) fn collect(
             }
             let track = open.entry(feature.id).or_default();
             let begin = track.sightings.first().map_or(index, |first| first.view.instant());
-            if index - begin >= options.most_instants_per_track {
+            if index - begin >= options.max_frame_sets_per_track {
                 finished.push(std::mem::take(track));
             }
             let view = ViewId::new(index, camera);
@@ -48,7 +48,7 @@ pub(super) fn collect(
         }
     }
     finished.extend(open.into_values());
-    finished.retain(|track| track.sightings.len() >= options.least_sightings);
+    finished.retain(|track| track.sightings.len() >= options.min_observations);
     finished.sort_by_key(|track| track.sightings[0].view);
     finished
 }
@@ -67,7 +67,7 @@ pub(super) fn triangulated(
                 .iter()
                 .filter_map(|sighting| Some((*poses.get(&sighting.view)?, sighting.bearing)))
                 .collect();
-            let landmark = landmark::triangulate(&rays, options.least_parallax_rad)?;
+            let landmark = landmark::triangulate(&rays, options.min_parallax_rad)?;
             Some((track, landmark))
         })
         .unzip()
@@ -90,7 +90,7 @@ pub(super) fn without_outliers(
                 let sigma = pixels.sigma_px[sighting.view.0 % 2];
                 pixels.residual_px(poses, landmark, sighting).is_some_and(|residual| residual.norm() <= limit * sigma)
             });
-            (track.sightings.len() >= options.least_sightings).then_some((track, *landmark))
+            (track.sightings.len() >= options.min_observations).then_some((track, *landmark))
         })
         .unzip()
 }

@@ -4,11 +4,11 @@ pub struct CalibrationOptions {
     /// Time between the instants whose states are estimated, in seconds.
     pub spacing_s: f64,
     /// A track is cut so that none spans more instants than this: it bounds the work.
-    pub most_instants_per_track: usize,
+    pub max_frame_sets_per_track: usize,
     /// Fewest sightings of a landmark.
-    pub least_sightings: usize,
+    pub min_observations: usize,
     /// Rays of a landmark must open this far, in radians.
-    pub least_parallax_rad: f64,
+    pub min_parallax_rad: f64,
     /// Most iterations of one adjustment.
     pub iterations: usize,
     /// An adjustment ends when a step lowers its cost by less than this share.
@@ -20,9 +20,9 @@ pub struct CalibrationOptions {
     /// Views in one reconstruction of the gimbal camera's poses.
     pub segment_views: usize,
     /// Fewest pairs of poses; the paper takes 39.
-    pub least_measurements: usize,
+    pub min_measurements: usize,
     /// A joint counts as moving when its angle's standard deviation exceeds this, in radians.
-    pub least_joint_motion_rad: f64,
+    pub min_joint_motion_rad: f64,
     /// Standard deviation of a camera's unknown time offset, in seconds.
     pub time_shift_sigma_s: f64,
     /// Standard deviation of the biases about zero at the begin, in rad/s and m/s².
@@ -33,16 +33,16 @@ impl Default for CalibrationOptions {
     fn default() -> Self {
         Self {
             spacing_s: 0.1,
-            most_instants_per_track: 18,
-            least_sightings: 3,
-            least_parallax_rad: 0.015,
+            max_frame_sets_per_track: 18,
+            min_observations: 3,
+            min_parallax_rad: 0.015,
             iterations: 15,
             relative_cost_tolerance: 1e-5,
             rounds: 3,
             outlier_sigmas: 4.0,
             segment_views: 16,
-            least_measurements: 39,
-            least_joint_motion_rad: 1.5_f64.to_radians(),
+            min_measurements: 39,
+            min_joint_motion_rad: 1.5_f64.to_radians(),
             time_shift_sigma_s: 0.01,
             bias_sigmas: (0.05, 0.5),
         }

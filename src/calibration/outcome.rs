@@ -35,7 +35,7 @@ pub struct PixelReport {
 
 /// What the inertial samples disagree by with the adjusted motion.
 #[derive(Clone, Debug, PartialEq)]
-pub struct InertialReport {
+pub struct ImuResidualReport {
     /// Mean angular velocity between instants against the gyroscope's, in rad/s.
     pub gyroscope_rad_per_s: Statistics,
     /// Mean acceleration between instants against the accelerometer's, in m/s².
@@ -66,7 +66,7 @@ pub struct PoseLoopReport {
 
 /// The static camera's pose on the IMU after a stage.
 #[derive(Clone, Debug, PartialEq)]
-pub struct MountReport {
+pub struct ExtrinsicsReport {
     /// What the rig gave.
     pub initial: RigidTransform,
     /// What was found.
@@ -85,13 +85,13 @@ pub struct CalibrationOutcome {
     /// Instants whose states were estimated.
     pub instants: usize,
     /// Static camera and IMU alone.
-    pub mount_alone: MountReport,
+    pub static_camera_imu: ExtrinsicsReport,
     /// Residuals of that stage.
     pub static_pixels: PixelReport,
     /// The pose loops.
     pub pose_loop: PoseLoopReport,
     /// The static camera after the bundle of both cameras.
-    pub mount: MountReport,
+    pub mount: ExtrinsicsReport,
     /// What is to be added to the gimbal camera's time offset, in seconds, and its standard deviation.
     pub gimbal_time_shift_s: (f64, f64),
     /// The chain after the bundle.
@@ -107,7 +107,7 @@ pub struct CalibrationOutcome {
     /// Steps of the solver: static camera alone, both cameras.
     pub iterations: [usize; 2],
     /// Residuals of the inertial samples.
-    pub inertial: InertialReport,
+    pub inertial: ImuResidualReport,
     /// Observability of the chain in the whole flight.
     pub rank: Option<RankReport>,
     /// Joint angles of the measurements, as estimated.

@@ -19,7 +19,7 @@ const ROTATION_SIGMA_RAD: f64 = 1e-3;
 /// What the loops are held to at first, when the chain and the readings are far off: they pull, but do not tear.
 const FIRST_NOISE: LoopNoise = LoopNoise { rotation_rad: 0.02, position_m: 0.05, loss: RobustLoss::None };
 /// Positions are never better than this, in metres.
-const LEAST_POSITION_SIGMA_M: f64 = 2e-3;
+const MIN_POSITION_SIGMA_M: f64 = 2e-3;
 /// Standard deviations at which a pair has half its weight.
 const CAUCHY_SIGMAS: f64 = 3.0;
 /// How often the noise of the positions is learnt.
@@ -182,7 +182,7 @@ impl PoseLoops<'_> {
             let spread_m = median(lengths)? / MEDIAN_LENGTH;
             noise = LoopNoise {
                 rotation_rad: ROTATION_SIGMA_RAD,
-                position_m: (spread_m * self.lost_freedom()).max(LEAST_POSITION_SIGMA_M),
+                position_m: (spread_m * self.lost_freedom()).max(MIN_POSITION_SIGMA_M),
                 loss: RobustLoss::Cauchy(CAUCHY_SIGMAS),
             };
         }
@@ -289,8 +289,8 @@ impl PoseLoops<'_> {
             iterations: ITERATIONS,
             relative_cost_tolerance: 1e-8,
             first_damping: 1e-4,
-            least_damping: 1e-10,
-            most_damping: 1e10,
+            min_damping: 1e-10,
+            max_damping: 1e10,
             growth: 20.0,
         };
         let solution = minimize(&mut DampedLoops { loops: self, noise }, start, &options);

@@ -15,7 +15,7 @@ use crate::optimization::RobustLoss;
 /// What a tracked pixel is worth before the residuals say, per coordinate.
 const FIRST_SIGMA_PX: f64 = 1.0;
 /// No tracker is better than this, per coordinate.
-const LEAST_SIGMA_PX: f64 = 0.05;
+const MIN_SIGMA_PX: f64 = 0.05;
 /// Standard deviations up to which the loss is quadratic.
 const HUBER_SIGMAS: f64 = 1.5;
 /// Median length of a two-dimensional normal error, in standard deviations of a coordinate.
@@ -116,7 +116,7 @@ impl Stage<'_> {
                 let lengths =
                     observations::residual_lengths_px(&tracks, &estimate.landmarks, &poses, &bundle.pixels, camera);
                 if let Some(median) = median(lengths) {
-                    sigma_px[usize::from(camera == Camera::Gimbal)] = (median / MEDIAN_LENGTH).max(LEAST_SIGMA_PX);
+                    sigma_px[usize::from(camera == Camera::Gimbal)] = (median / MEDIAN_LENGTH).max(MIN_SIGMA_PX);
                 }
             }
             kept = tracks;

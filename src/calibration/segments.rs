@@ -14,9 +14,9 @@ use crate::frontend::TrackedFeature;
 use crate::geometry::RigidTransform;
 
 /// A reconstruction breaks off where neighbouring views share fewer features.
-const LEAST_COMMON: usize = 25;
+const MIN_COMMON: usize = 25;
 /// Fewest views of a reconstruction: its frame and unit take seven of their six equations each.
-const LEAST_VIEWS: usize = 6;
+const MIN_VIEWS: usize = 6;
 
 /// One reconstruction.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,7 +52,7 @@ pub(super) fn reconstruct(
     let chain_rad = gimbal.prior.sigmas().1;
     let sigma_rad =
         (encoder_sigma_rad(instants) * (2.0 * joints).sqrt()).hypot(chain_rad * (joints + 2.0).sqrt()).max(0.02);
-    let limits = InitializationOptions { least_views: LEAST_VIEWS, ..InitializationOptions::default() };
+    let limits = InitializationOptions { min_views: MIN_VIEWS, ..InitializationOptions::default() };
     let mut counts = SegmentCounts::default();
     let mut segments = Vec::new();
     for stretch in stretches(input, options, instants, &mut counts) {
@@ -107,7 +107,7 @@ fn stretches(
         let Some(last) = stretches.last_mut() else { continue };
         let linked = last.last().is_none_or(|before| {
             tracked(input, &instants[*before], Camera::Gimbal)
-                .is_some_and(|other| common(&other.features, &frame.features) >= LEAST_COMMON)
+                .is_some_and(|other| common(&other.features, &frame.features) >= MIN_COMMON)
         });
         if linked && last.len() < options.segment_views {
             last.push(index);
@@ -115,7 +115,7 @@ fn stretches(
             stretches.push(vec![index]);
         }
     }
-    let (long, short): (Vec<_>, Vec<_>) = stretches.into_iter().partition(|stretch| stretch.len() >= LEAST_VIEWS);
+    let (long, short): (Vec<_>, Vec<_>) = stretches.into_iter().partition(|stretch| stretch.len() >= MIN_VIEWS);
     counts.broken += short.iter().map(Vec::len).sum::<usize>();
     long
 }

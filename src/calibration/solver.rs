@@ -24,8 +24,8 @@ pub(super) fn adjust(bundle: &Bundle<'_>, start: Estimate, options: &Calibration
         iterations: options.iterations,
         relative_cost_tolerance: options.relative_cost_tolerance,
         first_damping: 1e-5,
-        least_damping: 1e-9,
-        most_damping: 1e8,
+        min_damping: 1e-9,
+        max_damping: 1e8,
         growth: 30.0,
     };
     let solution = minimize(&mut DampedBundle(bundle), start, &options);

@@ -61,11 +61,11 @@ impl Instant {
 }
 
 /// All inertial samples in time order.
-pub(super) struct InertialTape {
+pub(super) struct ImuBuffer {
     samples: Vec<ImuSample>,
 }
 
-impl InertialTape {
+impl ImuBuffer {
     /// From the stretches that came with the images of a camera.
     pub(super) fn new(views: &[TrackedView]) -> Self {
         let mut samples: Vec<ImuSample> = Vec::new();
@@ -117,7 +117,7 @@ pub(super) fn instants(
     states: &[Option<NavigationState>],
 ) -> (Vec<Instant>, Vec<NavigationState>) {
     let static_views = &input.static_camera.views;
-    let tape = InertialTape::new(static_views);
+    let tape = ImuBuffer::new(static_views);
     let spacing_ns = ns_from_seconds(options.spacing_s);
     let mut chosen: Vec<(usize, NavigationState)> = Vec::new();
     for index in longest_stretch(states) {
@@ -153,7 +153,7 @@ pub(super) fn instants(
 }
 
 /// The first image of the gimbal camera at or after an instant, when it follows closely and has encoder readings.
-fn gimbal_view(input: &CalibrationInput, tape: &InertialTape, stamp_ns: i64, bias: &ImuBias) -> Option<GimbalView> {
+fn gimbal_view(input: &CalibrationInput, tape: &ImuBuffer, stamp_ns: i64, bias: &ImuBias) -> Option<GimbalView> {
     let views = &input.gimbal_camera.views;
     let index = views.partition_point(|view| view.stamp_ns < stamp_ns);
     let view = views.get(index)?;

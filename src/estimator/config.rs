@@ -20,7 +20,7 @@ pub struct EstimatorConfig {
     /// The form in which the mount is estimated.
     pub parameterization: Parameterization,
     /// Whether the minimal parameterization may switch to another one near a singularity.
-    pub auto_chart: bool,
+    pub auto_parameterize: bool,
     /// Standard deviation of an encoder reading, `None` without encoders.
     pub encoder_sigma_rad: Option<f64>,
     /// Whether encoder readings are used.
@@ -60,13 +60,13 @@ pub struct RigidCamera {
 /// Parameters and values of the six columns of a rigid camera that is watched beside the main one, by the camera's number:
 /// rotation vector and translation of its pose on the IMU.
 pub fn rigid_columns(camera: u8, imu_from_camera: &RigidTransform) -> Vec<(ParameterId, f64)> {
-    let chain = Chain::from_classical(&rigid_mount(imu_from_camera), Parameterization::Minimal);
+    let chain = Chain::from_classical(&rigid_chain(imu_from_camera), Parameterization::Minimal);
     let parameters = chain.parameters().into_iter().map(|parameter| parameter.of_camera(camera));
     parameters.zip(chain.values().iter().copied()).collect()
 }
 
 /// A mount without joints.
-pub(super) fn rigid_mount(imu_from_camera: &RigidTransform) -> ClassicalChain {
+pub(super) fn rigid_chain(imu_from_camera: &RigidTransform) -> ClassicalChain {
     ClassicalChain { imu_from_base: *imu_from_camera, ..ClassicalChain::default() }
 }
 
@@ -104,7 +104,7 @@ impl EstimatorConfig {
             gravity_m_per_s2: rig.gravity_m_per_s2,
             chain: rig.chain_of_camera(camera_key).unwrap_or_default(),
             parameterization,
-            auto_chart: false,
+            auto_parameterize: false,
             encoder_sigma_rad,
             use_encoder: encoder_sigma_rad.is_some(),
             calibrate: true,

@@ -22,8 +22,8 @@ pub enum InterventionError {
 impl Estimator {
     /// Switches the parameterization of the chain: the calibration stays what it is, and so does everything that is known
     /// about it, as far as the new columns can express it.
-    pub fn use_parameterization(&mut self, parameterization: Parameterization, auto_chart: bool) {
-        self.setup.config.auto_chart = auto_chart;
+    pub fn use_parameterization(&mut self, parameterization: Parameterization, auto_parameterize: bool) {
+        self.setup.config.auto_parameterize = auto_parameterize;
         self.setup.config.parameterization = parameterization;
         if self.calibration().of(MAIN).chain().parameterization() == parameterization {
             return;

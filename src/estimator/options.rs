@@ -49,7 +49,7 @@ pub struct EstimatorOptions {
     /// Fewer features in common with the last keyframe than this make a keyframe.
     pub keyframe_min_tracked: usize,
     /// A larger share of features new since the last keyframe makes a keyframe.
-    pub keyframe_new_share: f64,
+    pub keyframe_new_ratio: f64,
     /// Features whose mean reprojection error exceeds this are rejected, in pixels.
     pub outlier_px: f64,
     /// Jacobians of states that the prior holds are evaluated where it was linearized, as long as attitude and joint
@@ -104,7 +104,7 @@ impl Default for EstimatorOptions {
             distance_range_m: (0.1, 300.0),
             keyframe_parallax_rad: 10.0 / 460.0,
             keyframe_min_tracked: 50,
-            keyframe_new_share: 0.5,
+            keyframe_new_ratio: 0.5,
             outlier_px: 3.0,
             first_estimate_reach_rad: 0.01,
             calibration_first_estimates: true,

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::config::{EstimatorConfig, rigid_mount};
+use super::config::{EstimatorConfig, rigid_chain};
 use super::state::calibration::{Calibration, FreeClocks, GivenSigmas};
 use super::state::calibrations::{Calibrations, MAIN};
 use super::step_input::StepInput;
@@ -59,7 +59,7 @@ impl Setup {
         let has_readings = main.joint_count() > 0 && encoders;
         let main = main.with_clocks(clocks(has_readings), config.timeshift_s);
         let rigid = config.rigid_cameras.iter().enumerate().map(|(index, camera)| {
-            let mount = rigid_mount(&camera.imu_from_camera);
+            let mount = rigid_chain(&camera.imu_from_camera);
             Calibration::new(&mount, Parameterization::Minimal, given(index + 1), config.calibrate, false)
                 .with_clocks(clocks(false), camera.timeshift_s)
         });

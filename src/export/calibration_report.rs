@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::summary::{difference, log_name};
 use crate::calibration::{
-    CalibrationOutcome, MountReport, PixelReport, Statistics, chain_distance, transform_distance,
+    CalibrationOutcome, ExtrinsicsReport, PixelReport, Statistics, chain_distance, transform_distance,
 };
 use crate::geometry::{Dimension, RigidTransform, seconds_from_ns, so3};
 use crate::gimbal::{Chain, ClassicalChain, Quantity};
@@ -226,7 +226,7 @@ fn ground_truth_report(run: &CalibrationRun, ground_truth: &Rig) -> Option<Groun
     if chain.joint_count() != outcome.chain.joint_count() {
         return None;
     }
-    let of_mount = |found: &RigidTransform| {
+    let of_extrinsics = |found: &RigidTransform| {
         let (translation_mean_m, rotation_mean_rad) = transform_distance(found, &mount);
         DistanceReport { translation_mean_m, translation_std_m: 0.0, rotation_mean_rad, rotation_std_rad: 0.0 }
     };
@@ -240,9 +240,9 @@ fn ground_truth_report(run: &CalibrationRun, ground_truth: &Rig) -> Option<Groun
         })
     };
     Some(GroundTruthReport {
-        static_initial: of_mount(&outcome.mount.initial),
-        static_camera_imu: of_mount(&outcome.mount_alone.imu_from_camera),
-        static_final: of_mount(&outcome.mount.imu_from_camera),
+        static_initial: of_extrinsics(&outcome.mount.initial),
+        static_camera_imu: of_extrinsics(&outcome.static_camera_imu.imu_from_camera),
+        static_final: of_extrinsics(&outcome.mount.imu_from_camera),
         chain_initial: of_chain(&outcome.given_chain)?,
         chain_pose_loop: of_chain(&outcome.pose_loop.chain)?,
         chain_final: of_chain(&outcome.chain)?,
@@ -259,7 +259,7 @@ fn parameters(run: &CalibrationRun) -> Vec<ParameterReport> {
     parameters
 }
 
-fn mount_parameters(run: &CalibrationRun, mount: &MountReport) -> Vec<ParameterReport> {
+fn mount_parameters(run: &CalibrationRun, mount: &ExtrinsicsReport) -> Vec<ParameterReport> {
     let values = |transform: &RigidTransform| {
         let (turn, shift) = (so3::log(&transform.rotation), transform.translation_m);
         [turn.x, turn.y, turn.z, shift.x, shift.y, shift.z]

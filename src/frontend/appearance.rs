@@ -8,7 +8,7 @@ use pulp::{Arch, NullaryFnOnce};
 use super::reference::{CENTRE, LANES, Rows, SIDE, WINDOW};
 
 /// Minimum variance of a window, in squared grey levels.
-const LEAST_VARIANCE: f32 = 4.0;
+const MIN_VARIANCE: f32 = 4.0;
 
 /// A window with its gradient and the normal matrix of the comparison.
 ///
@@ -73,7 +73,7 @@ impl Appearance {
             }
         }
         let square: f32 = squares.iter().sum();
-        if square < LEAST_VARIANCE * area {
+        if square < MIN_VARIANCE * area {
             return None;
         }
         let means = [0, 1, 2, 3, 4, 5].map(|k: usize| sums[k][0].iter().sum::<f32>() / area);

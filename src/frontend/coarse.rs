@@ -19,15 +19,15 @@ pub(super) const EXTRA_LEVELS: usize = 1;
 /// A prediction with a smaller standard deviation is used unchanged, in pixels: the tracker converges from that distance.
 const ACCURATE_SIGMA_PX: f64 = 6.0;
 /// Maximum number of samples on a level; more do not improve the result.
-const MOST_SAMPLES: usize = 1200;
+const MAX_SAMPLES: usize = 1200;
 /// Number of independent grey-level measurements that all samples count as: neighbouring samples are correlated, and near
 /// objects move differently.
 const INDEPENDENT_SAMPLES: f64 = 100.0;
 /// Scale of the robust loss: this ratio of the image's contrast (its standard deviation), at least this many grey levels.
 const SCALE_RATIO: f64 = 0.5;
-const LEAST_SCALE: f64 = 4.0;
+const MIN_SCALE: f64 = 4.0;
 /// Minimum contrast of an image, in grey levels.
-const LEAST_CONTRAST: f64 = 2.0;
+const MIN_CONTRAST: f64 = 2.0;
 /// Cost of a sample outside of the other image; a matching one has cost 0, an outlier nearly 1.
 const OUTSIDE_COST: f64 = 0.5;
 /// A prediction is rejected when the cost under it is higher than under no rotation by this.
@@ -127,7 +127,7 @@ impl CoarseAligner {
         }
         for level in (first..count).rev() {
             let image = &pyramid.levels()[level];
-            let stride = ((image.width * image.height) as f64 / MOST_SAMPLES as f64).sqrt().ceil().max(1.0) as usize;
+            let stride = ((image.width * image.height) as f64 / MAX_SAMPLES as f64).sqrt().ceil().max(1.0) as usize;
             let scale = f64::from(1_u32 << level);
             let mut samples = Vec::new();
             for y in (1..image.height.saturating_sub(1)).step_by(stride) {
@@ -184,10 +184,10 @@ impl<'a> View<'a> {
             previous,
             now,
             scale_px: f64::from(1_u32 << sampled.level),
-            scale: (SCALE_RATIO * contrast).max(LEAST_SCALE),
+            scale: (SCALE_RATIO * contrast).max(MIN_SCALE),
             prior: prior.map(|prior| (prior.rotation, prior.information())),
         };
-        (contrast >= LEAST_CONTRAST).then_some(view)
+        (contrast >= MIN_CONTRAST).then_some(view)
     }
 
     /// Grey level of the current image at a sample's predicted position, `None` outside the image.

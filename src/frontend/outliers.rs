@@ -185,7 +185,7 @@ const STAGES: [f64; 3] = [6.0, 2.0, 1.0];
 const REFINEMENTS: usize = 6;
 
 /// With a larger ratio of outliers motions with a free rotation are tried.
-const MOST_OUTLIERS_RATIO: f64 = 0.3;
+const MAX_OUTLIER_RATIO: f64 = 0.3;
 /// Number of random samples of five tracks, and Gauss–Newton steps for each.
 const FULL_HYPOTHESES: usize = 60;
 const MINIMAL_ITERATIONS: usize = 5;
@@ -243,8 +243,8 @@ impl Search<'_> {
                 best = Some(found);
             }
         }
-        let outlier_share = |best: &Hypothesis| best.cost / self.pairs.len() as f64;
-        if best.as_ref().is_none_or(|best| outlier_share(best) > MOST_OUTLIERS_RATIO)
+        let outlier_ratio = |best: &Hypothesis| best.cost / self.pairs.len() as f64;
+        if best.as_ref().is_none_or(|best| outlier_ratio(best) > MAX_OUTLIER_RATIO)
             && let Some(found) = self.draw_with_rotation(fitted, threshold)
             && best.is_none_or(|best| found.cost < best.cost)
         {
@@ -375,7 +375,7 @@ impl Search<'_> {
 }
 
 /// Damping of directions that neither tracks nor prior constrain, in the unit of [`step_towards`]'s normal matrix.
-const LEAST_INFORMATION: f64 = 1e-9;
+const MIN_INFORMATION: f64 = 1e-9;
 
 /// A Gauss–Newton step on the epipolar distances of `pairs` in units of `scale`, with weights that decrease with
 /// the distance.
@@ -414,7 +414,7 @@ fn step_towards(
     top -= prior * rotation_error;
     for k in 0..5 {
         // Without parallax the direction is unobservable, and without a prior the rotation about a single track.
-        normal[(k, k)] += LEAST_INFORMATION;
+        normal[(k, k)] += MIN_INFORMATION;
     }
     let step = normal.cholesky()?.solve(&right);
     let rotation_vector = so3::exp(&Vector3::new(step[0], step[1], step[2]));

@@ -26,13 +26,13 @@ impl PredictedRotation {
 
     /// Inverse of the covariance (3 × 3, 1/rad²); zero for a singular one.
     pub(super) fn information(&self) -> Matrix3<f64> {
-        let floor = Matrix3::identity() * LEAST_SIGMA_RAD.powi(2);
+        let floor = Matrix3::identity() * MIN_SIGMA_RAD.powi(2);
         (self.covariance_rad2 + floor).try_inverse().unwrap_or_else(Matrix3::zeros)
     }
 }
 
 /// Lower bound of a prediction's standard deviation, a tenth of a pixel or less.
-const LEAST_SIGMA_RAD: f64 = 2e-4;
+const MIN_SIGMA_RAD: f64 = 2e-4;
 
 /// Standard deviations, per axis, of the inputs of a predicted rotation.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -46,11 +46,11 @@ impl Default for Responses {
 }
 
 impl Responses {
-    /// Computes the tile of `image` at `first` (column, row); responses below `least` are no peaks.
-    pub(super) fn compute(&mut self, image: &GrayImage, first: [usize; 2], least: f32) {
+    /// Computes the tile of `image` at `first` (column, row); responses below `min_response` are no peaks.
+    pub(super) fn compute(&mut self, image: &GrayImage, first: [usize; 2], min_response: f32) {
         let mut pixels = [[0.0_f32; PIXELS]; PIXELS];
         cut_out(image, first.map(|t| t as i32 - (BLOCK_RADIUS + 2) as i32), &mut pixels, f32::from);
-        Arch::new().dispatch(Computation { pixels: &pixels, least, responses: self });
+        Arch::new().dispatch(Computation { pixels: &pixels, min_response, responses: self });
     }
 
     /// The peaks among the tile's first columns and rows, row by row.
@@ -80,7 +80,7 @@ impl Responses {
 /// Filling [`Responses`], compiled for every width of vector registers.
 struct Computation<'a> {
     pixels: &'a [[f32; PIXELS]; PIXELS],
-    least: f32,
+    min_response: f32,
     responses: &'a mut Responses,
 }
 
@@ -89,7 +89,7 @@ impl NullaryFnOnce for Computation<'_> {
 
     #[inline(always)]
     fn call(self) {
-        let Self { pixels, least, responses: Responses { values, is_peak } } = self;
+        let Self { pixels, min_response, responses: Responses { values, is_peak } } = self;
         smaller_eigenvalues(pixels, values);
         for y in 0..TILE {
             let (above, row, below) = (&values[y], &values[y + 1], &values[y + 2]);
@@ -98,7 +98,7 @@ impl NullaryFnOnce for Computation<'_> {
                 // Of equal neighbours the first one counts.
                 let before = (here > above[x]) & (here > above[x + 1]) & (here > above[x + 2]) & (here > row[x]);
                 let after = (here >= row[x + 2]) & (here >= below[x]) & (here >= below[x + 1]) & (here >= below[x + 2]);
-                is_peak[y][x] = (here >= least) & before & after;
+                is_peak[y][x] = (here >= min_response) & before & after;
             }
         }
     }

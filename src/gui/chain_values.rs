@@ -24,13 +24,13 @@ pub(crate) fn true_values(recording: &Recording, run: &RunRecord, stamp_ns: i64)
     let ground_truth = recording.ground_truth_rig.as_ref()?;
     let mut values: ParameterValues = run.values_in(ground_truth, &recording.rig, calibration)?.into_iter().collect();
     let estimate = calibration.parameters.iter().copied().zip(calibration.values.iter().copied()).collect();
-    turn_towards(&mut values, &estimate);
+    unwrap_towards(&mut values, &estimate);
     Some(values)
 }
 
 /// Replaces angles by equal ones that lie nearest to a reference: whole turns are added, and rotation vectors may go the
 /// other way round.
-pub(crate) fn turn_towards(values: &mut ParameterValues, reference: &ParameterValues) {
+pub(crate) fn unwrap_towards(values: &mut ParameterValues, reference: &ParameterValues) {
     let parts: BTreeSet<ParameterPart> = values.keys().map(|parameter| parameter.part).collect();
     let rotation_vector = |part: ParameterPart| AXES.map(|quantity| ParameterId { part, quantity });
     let blocks: Vec<ParameterPart> =
@@ -109,16 +109,16 @@ mod tests {
             entries.iter().map(|(name, value)| (id(name), *value)).collect()
         };
         let mut values = named(&[("L1.theta", 3.1), ("L1.d", 9.0), ("I.rx", -3.1)]);
-        turn_towards(&mut values, &named(&[("L1.theta", -3.15), ("L1.d", 0.0), ("I.rx", 3.0)]));
+        unwrap_towards(&mut values, &named(&[("L1.theta", -3.15), ("L1.d", 0.0), ("I.rx", 3.0)]));
         assert!((values[&id("L1.theta")] - (3.1 - TAU)).abs() < 1e-12);
         assert_eq!(values[&id("L1.d")], 9.0);
         assert!((values[&id("I.rx")] - (TAU - 3.1)).abs() < 1e-12);
 
         let mut block = named(&[("IB.rx", 3.12), ("IB.ry", 0.0), ("IB.rz", 0.0)]);
-        turn_towards(&mut block, &named(&[("IB.rx", -3.13), ("IB.ry", 0.01), ("IB.rz", 0.0)]));
+        unwrap_towards(&mut block, &named(&[("IB.rx", -3.13), ("IB.ry", 0.01), ("IB.rz", 0.0)]));
         assert!((block[&id("IB.rx")] - (3.12 - TAU)).abs() < 1e-12);
         let before = block.clone();
-        turn_towards(&mut block, &ParameterValues::new());
+        unwrap_towards(&mut block, &ParameterValues::new());
         assert_eq!(block, before);
     }
 }

@@ -27,14 +27,14 @@ pub(crate) fn name_of(kind: EventKind) -> &'static str {
     match kind {
         EventKind::InitializationWaits => "initialization waits",
         EventKind::InitializedFromMotion => "initialized from motion",
-        EventKind::InitializedFromStandstill => "initialized from standstill",
+        EventKind::InitializedFromStationary => "initialized from standstill",
         EventKind::KeyframeChosen => "keyframe",
         EventKind::OldestMarginalized => "oldest frame marginalized",
         EventKind::SecondNewestDropped => "second-newest frame dropped",
         EventKind::OutliersRejected => "outliers rejected",
         EventKind::Standstill => "standstill",
         EventKind::Failure => "failure",
-        EventKind::ChartSwitched => "chart switched",
+        EventKind::ParameterizationSwitched => "chart switched",
         EventKind::MeasurementMissing => "measurement missing",
     }
 }
@@ -42,9 +42,9 @@ pub(crate) fn name_of(kind: EventKind) -> &'static str {
 /// The sign and colour of a kind of event.
 pub(crate) fn look_of(kind: EventKind, theme: &Theme) -> (Mark, Color32) {
     match kind {
-        EventKind::InitializedFromMotion | EventKind::InitializedFromStandstill => (Mark::Triangle, theme.ok),
+        EventKind::InitializedFromMotion | EventKind::InitializedFromStationary => (Mark::Triangle, theme.ok),
         EventKind::Failure => (Mark::Cross, theme.error),
-        EventKind::ChartSwitched => (Mark::Rhombus, theme.accent),
+        EventKind::ParameterizationSwitched => (Mark::Rhombus, theme.accent),
         EventKind::MeasurementMissing => (Mark::Square, theme.warn),
         EventKind::Standstill | EventKind::InitializationWaits => (Mark::Disc, theme.text_weak),
         EventKind::OutliersRejected => (Mark::Cross, theme.warn),

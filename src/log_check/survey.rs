@@ -19,7 +19,7 @@ const HALF_BATCH_NS: i64 = 25_000_000;
 const LONGEST_GAP_NS: i64 = 200_000_000;
 
 /// Lower bound of an encoder's standard deviation.
-const LEAST_SIGMA_RAD: f64 = 1e-5;
+const MIN_SIGMA_RAD: f64 = 1e-5;
 
 /// Log time and header stamp of a message since the log began.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -98,7 +98,7 @@ impl Survey {
         let named = rig.map(|rig| rig.imu.topic.clone()).filter(|topic| imu_topics.contains(topic));
         survey.imu_topic = named.or_else(|| imu_topics.first().cloned());
         let sigma_rad = rig.and_then(|rig| rig.gimbal.as_ref()?.encoder_sigma_rad).unwrap_or(0.0);
-        survey.encoder_variance_rad2 = sigma_rad.max(LEAST_SIGMA_RAD).powi(2);
+        survey.encoder_variance_rad2 = sigma_rad.max(MIN_SIGMA_RAD).powi(2);
         let mut counts: BTreeMap<String, u64> = BTreeMap::new();
         for block in &log.index().blocks {
             let decoded = DecodedBlock::decode(log.file(), block);

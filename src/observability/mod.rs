@@ -29,4 +29,4 @@ pub use persistence::steps_lost;
 pub use report::{CalibrationDirection, RankReport};
 pub use slide::{ChainSlide, chain_of_step, slide};
 pub use slide_direction::{InvalidSlide, SlideDirection, SlidePosition, SlideRequest};
-pub use structure::{KnownDirection, KnownLoss, LEAST_FALSE_GAIN, known_losses};
+pub use structure::{KnownDirection, KnownLoss, MIN_SPURIOUS_GAIN, known_losses};

@@ -55,7 +55,7 @@ pub struct CalibrationDirection {
 }
 
 impl RankReport {
-    /// The report in one line: `18 of 24 structural; 6 redundant in the parameterization; 15 informed; weakest yaw.d`.
+    /// The report in one line: `18 of 24 structural; 6 redundant in the parameterization; 15 informed; least_observable yaw.d`.
     pub fn verdict(&self, names: &ParameterNames) -> String {
         let causes = [
             (self.deficit_parameterization, "redundant in the parameterization"),
@@ -66,7 +66,7 @@ impl RankReport {
         let mut parts = vec![format!("{} of {} structural", self.rank_structural, self.parameters.len())];
         parts.extend(causes.iter().filter(|(count, _)| *count > 0).map(|(count, cause)| format!("{count} {cause}")));
         parts.push(format!("{} informed", self.rank_informed));
-        if let Some(parameter) = self.weakest() {
+        if let Some(parameter) = self.least_observable() {
             parts.push(format!("weakest {}", names.name(parameter)));
         }
         parts.join("; ")
@@ -102,7 +102,7 @@ impl RankReport {
     }
 
     /// The parameter with the largest share in the weakest direction that is not a structural zero.
-    pub fn weakest(&self) -> Option<ParameterId> {
+    pub fn least_observable(&self) -> Option<ParameterId> {
         let direction = self.directions.iter().find(|direction| !direction.structural)?;
         direction.leading(&self.parameters)
     }

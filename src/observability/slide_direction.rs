@@ -110,10 +110,10 @@ impl SlideDirection {
 impl KnownLoss {
     /// The loss of a name on the command line.
     fn parse(name: &str) -> Option<Self> {
-        const MOST_JOINTS: usize = u8::MAX as usize;
+        const MAX_JOINTS: usize = u8::MAX as usize;
         let ends = [Self::BaseTheta, Self::BaseD, Self::EndTheta, Self::EndD, Self::EndA, Self::EndAlpha].into_iter();
-        let rigid = (0..3).flat_map(|axis| [Self::RigidTurn(axis), Self::RigidShift(axis)]);
-        let joints = (0..MOST_JOINTS)
+        let rigid = (0..3).flat_map(|axis| [Self::RigidRotation(axis), Self::RigidShift(axis)]);
+        let joints = (0..MAX_JOINTS)
             .flat_map(|joint| [Self::FreeAngle(joint), Self::ParallelD(joint), Self::CoaxialTheta(joint)]);
         ends.chain(rigid).chain(joints).find(|loss| loss.name() == name)
     }
@@ -128,7 +128,7 @@ impl KnownLoss {
             Self::EndD => "end-d".to_owned(),
             Self::EndA => "end-a".to_owned(),
             Self::EndAlpha => "end-alpha".to_owned(),
-            Self::RigidTurn(about) => format!("rigid-turn-{}", axis(about)),
+            Self::RigidRotation(about) => format!("rigid-turn-{}", axis(about)),
             Self::RigidShift(along) => format!("rigid-shift-{}", axis(along)),
             Self::FreeAngle(joint) => format!("free-angle-{}", joint + 1),
             Self::ParallelD(link) => format!("parallel-d-{}", link + 1),

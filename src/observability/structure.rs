@@ -32,7 +32,7 @@ pub enum KnownLoss {
     /// The last link's `α` against a turn of `effector_from_camera`.
     EndAlpha,
     /// Without joints: a turn of `imu_from_base` about this axis against `effector_from_camera`.
-    RigidTurn(usize),
+    RigidRotation(usize),
     /// Without joints: a shift of `imu_from_base` along this axis against `effector_from_camera`.
     RigidShift(usize),
     /// A link's offset (counted from 0) against its joint's angles, when these are unknown.
@@ -52,7 +52,7 @@ pub struct KnownDirection {
     /// measurement agrees.
     pub response: f64,
     /// Share of the scaled direction that lies in the measured null space, 1 when the measurement agrees.
-    pub share_in_null_space: f64,
+    pub null_space_fraction: f64,
     /// Whether the measurement agrees.
     pub agrees: bool,
     /// What is taken to be known of the direction beyond the rig's prior, 1 as much as the scale.
@@ -64,12 +64,12 @@ pub struct KnownDirection {
 }
 
 /// A smaller [`KnownDirection::false_gain`] than this is not worth a word.
-pub const LEAST_FALSE_GAIN: f64 = 0.01;
+pub const MIN_SPURIOUS_GAIN: f64 = 0.01;
 
 impl KnownDirection {
     /// Whether a prior claims a part of it that counts.
     pub fn is_claimed(&self) -> bool {
-        self.false_gain > LEAST_FALSE_GAIN
+        self.false_gain > MIN_SPURIOUS_GAIN
     }
 }
 
@@ -94,7 +94,7 @@ pub fn known_losses(chain: &Chain, joints_free: bool) -> Vec<(KnownLoss, DVector
 fn redundant(chain: &Chain, joints_free: bool, losses: &mut Vec<(KnownLoss, DVector<f64>)>) {
     let classical = chain.to_classical();
     let directions = redundant_directions(&classical);
-    let rigid = [0, 1, 2].map(KnownLoss::RigidTurn).into_iter().chain([0, 1, 2].map(KnownLoss::RigidShift));
+    let rigid = [0, 1, 2].map(KnownLoss::RigidRotation).into_iter().chain([0, 1, 2].map(KnownLoss::RigidShift));
     let jointed = [
         KnownLoss::BaseTheta,
         KnownLoss::BaseD,
@@ -193,12 +193,12 @@ impl Measured<'_> {
                 // The chain's columns come first, those of other cameras behind them take no part.
                 let direction = direction.resize_vertically(scale.len(), 0.0).component_div(scale).normalize();
                 let response = (self.block * &direction).norm();
-                let share_in_null_space = self.null_space.tr_mul(&direction).norm();
+                let null_space_fraction = self.null_space.tr_mul(&direction).norm();
                 KnownDirection {
                     loss,
                     response: if self.reference > 0.0 { response / self.reference } else { 0.0 },
-                    share_in_null_space,
-                    agrees: response <= self.structural_threshold && share_in_null_space >= INSIDE,
+                    null_space_fraction,
+                    agrees: response <= self.structural_threshold && null_space_fraction >= INSIDE,
                     false_gain: if matches!(loss, KnownLoss::FreeAngle(_)) { 0.0 } else { self.false_gain(&direction) },
                 }
             })
@@ -218,7 +218,7 @@ impl KnownLoss {
             Self::BaseD => "Eqs. 11–17",
             Self::BaseTheta => "§4.5, removed by Eq. 20",
             Self::EndTheta | Self::EndD | Self::EndA | Self::EndAlpha => "§4.5, removed by Eq. 19",
-            Self::RigidTurn(_) | Self::RigidShift(_) => "Eq. 5 without links",
+            Self::RigidRotation(_) | Self::RigidShift(_) => "Eq. 5 without links",
             Self::FreeAngle(_) | Self::ParallelD(_) | Self::CoaxialTheta(_) => "Eq. 2",
         }
     }
@@ -249,7 +249,7 @@ impl KnownLoss {
                     "{last}.alpha and a rotation of effector_from_camera about the effector's x axis are the same motion"
                 )
             }
-            Self::RigidTurn(about) => format!(
+            Self::RigidRotation(about) => format!(
                 "without joints a rotation of imu_from_base about {} is one of effector_from_camera",
                 axis(about)
             ),

@@ -28,9 +28,9 @@ pub(crate) struct DampedOptions {
     /// λ of the first step.
     pub(crate) first_damping: f64,
     /// Smallest λ.
-    pub(crate) least_damping: f64,
+    pub(crate) min_damping: f64,
     /// λ at which the solver stops.
-    pub(crate) most_damping: f64,
+    pub(crate) max_damping: f64,
     /// λ grows by this factor after a rejected step and when the equations are singular.
     pub(crate) growth: f64,
 }
@@ -93,7 +93,7 @@ pub(crate) fn minimize<P: DampedProblem>(
             solution.iterations.push(Iteration { cost_before, cost_after, damping, accepted });
             if accepted {
                 (solution.estimate, cost, linearized) = (candidate, cost_after, None);
-                damping = (damping * SHRINKAGE).max(options.least_damping);
+                damping = (damping * SHRINKAGE).max(options.min_damping);
                 if cost_before - cost_after <= options.relative_cost_tolerance * cost_before {
                     solution.stop = StopReason::Converged;
                     break;
@@ -105,8 +105,8 @@ pub(crate) fn minimize<P: DampedProblem>(
                 break;
             }
         }
-        damping = (damping * options.growth).min(options.most_damping);
-        if damping >= options.most_damping {
+        damping = (damping * options.growth).min(options.max_damping);
+        if damping >= options.max_damping {
             solution.stop = StopReason::DampingLimit;
             break;
         }

@@ -204,8 +204,8 @@ fn the_damped_solver_descends_and_says_why_it_stopped() {
         iterations: 100,
         relative_cost_tolerance: 1e-12,
         first_damping: 1e-3,
-        least_damping: 1e-9,
-        most_damping: 1e8,
+        min_damping: 1e-9,
+        max_damping: 1e8,
         growth: 10.0,
     };
     let start = Vector2::new(-1.2, 1.0);
@@ -217,10 +217,10 @@ fn the_damped_solver_descends_and_says_why_it_stopped() {
         let [before, after] = pair else { continue };
         let kept = if before.accepted { before.cost_after } else { before.cost_before };
         assert_eq!(after.cost_before, kept);
-        assert_eq!(before.accepted, after.damping < before.damping || after.damping == options.least_damping);
+        assert_eq!(before.accepted, after.damping < before.damping || after.damping == options.min_damping);
     }
     let stopped = minimize(&mut Valley, start, &DampedOptions { iterations: 2, ..options });
     assert_eq!((stopped.stop, stopped.tried), (StopReason::IterationLimit, 2));
-    let limit = DampedOptions { most_damping: 1e-2, growth: 100.0, ..options };
+    let limit = DampedOptions { max_damping: 1e-2, growth: 100.0, ..options };
     assert_eq!(minimize(&mut Valley, Vector2::new(-1.2, 1.4), &limit).stop, StopReason::DampingLimit);
 }

@@ -109,7 +109,7 @@ pub struct GimbalRig {
     /// How wrong `chain` may be.
     pub prior: ChainPrior,
     /// Whether runs in a minimal form go over to its other chart near a lock (`parameterization: auto`).
-    pub switches_chart: bool,
+    pub switches_parameterization: bool,
     /// The chain in the classical form (Eqs. 5–6), links in order.
     pub chain: ClassicalChain,
     /// The joints, one per link of `chain`.

@@ -31,7 +31,7 @@ pub struct Disturbances {
     /// motors follow (200°/s).
     pub gimbal_slew_s: Option<[f64; 2]>,
     /// Joint (from 1) that is fixed at its angle, start and duration in seconds.
-    pub held_joint: Option<[f64; 3]>,
+    pub fixed_joint: Option<[f64; 3]>,
     /// Start and duration in seconds of hovering with a sway of a centimetre; the flight goes on after it.
     pub hover_s: Option<[f64; 2]>,
     /// From when and for how long the camera keeps its orientation in the world exactly, as far as the stops let it.
@@ -82,7 +82,7 @@ impl Disturbances {
             "blank" => self.blank_s = Some(two()?),
             "slew" => self.gimbal_slew_s = Some(two()?),
             "spin" => self.spin = Some(three()?),
-            "hold-joint" => self.held_joint = Some(three()?),
+            "hold-joint" => self.fixed_joint = Some(three()?),
             "hover" => self.hover_s = Some(two()?),
             "stabilize" => self.stabilized_s = Some(two()?),
             _ => return Err(unknown()),
@@ -103,7 +103,7 @@ impl Disturbances {
         within("range of the gyroscope in rad/s", self.gyroscope_range_rad_per_s.unwrap_or(1.0), 1e-3, 1e3)?;
         within("range of the accelerometer in m/s²", self.accelerometer_range_m_per_s2.unwrap_or(1.0), 1e-3, 1e4)?;
         within("factor of the light", self.light_change.map_or(1.0, |[_, factor]| factor), 0.01, 100.0)?;
-        within("number of the fixed joint", self.held_joint.map_or(1.0, |[joint, _, _]| joint), 1.0, 3.0)?;
+        within("number of the fixed joint", self.fixed_joint.map_or(1.0, |[joint, _, _]| joint), 1.0, 3.0)?;
         within("length of the hover in seconds", self.hover_s.map_or(0.0, |[_, length]| length), 0.0, 3600.0)?;
         within("rate of the spin in rad/s", self.spin.map_or(0.0, |[_, _, rate]| rate), -6.0, 6.0)
     }

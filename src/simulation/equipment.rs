@@ -85,7 +85,7 @@ impl Equipment {
             rate_hz: IMU_RATE_HZ,
             encoder_sigma_rad: self.encoder_sigma_rad,
             prior: ChainPrior { translation_bound_m: 0.0, rotation_bound_rad: 0.0 },
-            switches_chart: false,
+            switches_parameterization: false,
             chain,
             joints: joints(),
         });

@@ -61,7 +61,7 @@ pub(crate) struct LookAround {
     /// From when and for how long the heading is swung to and fro as fast as the motors follow.
     pub(crate) slew_s: Option<[f64; 2]>,
     /// Joint that is fixed at its angle, start and duration in seconds.
-    pub(crate) held_joint: Option<(usize, [f64; 2])>,
+    pub(crate) fixed_joint: Option<(usize, [f64; 2])>,
     /// From when and for how long the camera keeps its orientation in the world exactly.
     pub(crate) stabilized_s: Option<[f64; 2]>,
     waves: [Wave; 3],
@@ -75,7 +75,7 @@ impl LookAround {
             pitch_rad: pitch_deg.map(f64::to_radians),
             roll_rad: roll_deg.to_radians(),
             slew_s: None,
-            held_joint: None,
+            fixed_joint: None,
             stabilized_s: None,
             waves: [Wave::new(random, 11.3), Wave::new(random, 9.1), Wave::new(random, 7.3)],
         }
@@ -167,9 +167,10 @@ impl JointMotion {
             states.push((angles, rates));
             followed_rad += (vehicle.heading_rad - followed_rad) * (CONTROL_STEP_S / stabilizer.follow_s);
             let wanted = look.orientation(followed_rad, time_s);
-            let asked = turn_towards(&vehicle.world_from_imu.rotation, chain, &angles, &wanted) * stabilizer.gain_per_s;
+            let asked =
+                joint_rates_towards(&vehicle.world_from_imu.rotation, chain, &angles, &wanted) * stabilizer.gain_per_s;
             let limit = stabilizer.rate_rad_per_s;
-            let held = look.held_joint.filter(|(_, stretch_s)| during(Some(*stretch_s), time_s));
+            let held = look.fixed_joint.filter(|(_, stretch_s)| during(Some(*stretch_s), time_s));
             if during(look.stabilized_s, time_s) {
                 continue;
             }
@@ -221,7 +222,7 @@ impl JointMotion {
 }
 
 /// First-order joint increments, in radians, that rotate the camera to the wanted orientation.
-fn turn_towards(
+fn joint_rates_towards(
     world_from_imu: &UnitQuaternion<f64>,
     chain: &ClassicalChain,
     angles_rad: &[f64; 3],
@@ -250,7 +251,7 @@ fn keep(
 ) {
     const ROUNDS: usize = 8;
     for _ in 0..ROUNDS {
-        let step = turn_towards(world_from_imu, chain, angles_rad, wanted);
+        let step = joint_rates_towards(world_from_imu, chain, angles_rad, wanted);
         for k in 0..3 {
             let (low, high) = joints[k].limits_rad;
             angles_rad[k] = (angles_rad[k] + step[k]).clamp(low, high);
@@ -264,7 +265,7 @@ fn start_angles(trajectory: &Trajectory, chain: &ClassicalChain, look: &LookArou
     let wanted = look.orientation(heading_rad, 0.0);
     let mut angles = [0.0; 3];
     for _ in 0..40 {
-        let step = turn_towards(&rotation, chain, &angles, &wanted);
+        let step = joint_rates_towards(&rotation, chain, &angles, &wanted);
         for k in 0..3 {
             angles[k] += step[k].clamp(-0.3, 0.3);
         }

@@ -31,12 +31,12 @@ pub struct ImuBias {
 
 /// All samples of a flight with the biases that are in them.
 #[derive(Clone, Debug)]
-pub(crate) struct InertialRecord {
+pub(crate) struct ImuRecord {
     pub(crate) samples: Vec<ImuSample>,
     pub(crate) biases: Vec<ImuBias>,
 }
 
-impl InertialRecord {
+impl ImuRecord {
     /// Measures a flight from its start to its end; `noise_scale` 0 gives perfect samples without bias.
     pub(crate) fn measure(
         trajectory: &Trajectory,

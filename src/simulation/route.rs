@@ -12,11 +12,11 @@ pub(crate) struct FlightPoint {
     /// Position in the world.
     pub(crate) position_m: Vector3<f64>,
     /// Standard deviation of the random manoeuvres, per axis of the world.
-    pub(crate) deviation_m: Vector3<f64>,
+    pub(crate) lateral_offset_m: Vector3<f64>,
     /// Heading, continuous over time.
     pub(crate) heading_rad: f64,
     /// Standard deviation of the heading's.
-    pub(crate) deviation_heading_rad: f64,
+    pub(crate) heading_wander_rad: f64,
 }
 
 /// A plan that a trajectory follows with its random manoeuvres.
@@ -67,20 +67,20 @@ impl Pace {
     }
 
     /// Time under way, with the ramp counted at its growing speed; its derivative is [`Self::liveliness`].
-    pub(crate) fn flown_s(&self, time_s: f64) -> f64 {
+    pub(crate) fn moving_time_s(&self, time_s: f64) -> f64 {
         let share = ((time_s - self.hover_s) / self.ramp_s).clamp(0.0, 1.0);
         let ramp = share.powi(4) * (share * (share - 3.0) + 2.5);
         let after = (time_s - self.hover_s - self.ramp_s).max(0.0);
         ramp * self.ramp_s + after
     }
 
-    fn deviation_m(&self, time_s: f64) -> Vector3<f64> {
+    fn lateral_offset_m(&self, time_s: f64) -> Vector3<f64> {
         let share = self.liveliness(time_s);
         let blend = |full: f64| self.sway_m + (full - self.sway_m) * share;
         Vector3::new(blend(self.manoeuvre_m[0]), blend(self.manoeuvre_m[0]), blend(self.manoeuvre_m[1]))
     }
 
-    fn deviation_heading_rad(&self, time_s: f64) -> f64 {
+    fn heading_wander_rad(&self, time_s: f64) -> f64 {
         self.sway_m * 0.3 + self.manoeuvre_heading_rad * self.liveliness(time_s)
     }
 }
@@ -210,11 +210,12 @@ impl Cruise {
 
 impl Flight for Cruise {
     fn point(&self, time_s: f64) -> FlightPoint {
-        let flown_s = self.pace.flown_s(time_s);
+        let moving_time_s = self.pace.moving_time_s(time_s);
         // The wave starts at no displacement, so that hovering really hovers.
-        let since = |wave: &Wave| wave.at(flown_s) - wave.at(0.0) * (-flown_s / 4.0).exp();
+        let since = |wave: &Wave| wave.at(moving_time_s) - wave.at(0.0) * (-moving_time_s / 4.0).exp();
         let speed_swing_m = 1.6 * self.pace.speed_m_per_s * since(&self.waves[0]) * 0.5;
-        let along_m = self.pace.speed_m_per_s * flown_s + speed_swing_m.max(-self.pace.speed_m_per_s * flown_s);
+        let along_m =
+            self.pace.speed_m_per_s * moving_time_s + speed_swing_m.max(-self.pace.speed_m_per_s * moving_time_s);
         let (on_path, _) = self.path.at(along_m);
         // The heading is that of a chord ahead: it rotates before the corner.
         let (_, direction) = self.path.at(along_m);
@@ -223,9 +224,9 @@ impl Flight for Cruise {
         let height_m = self.height_m[0] + self.height_m[1] * since(&self.waves[2]);
         FlightPoint {
             position_m: Vector3::new(on_path.x + side.x, on_path.y + side.y, height_m),
-            deviation_m: self.pace.deviation_m(time_s),
+            lateral_offset_m: self.pace.lateral_offset_m(time_s),
             heading_rad: 0.5 * (direction + ahead) + self.heading_offset_rad + 0.35 * since(&self.waves[3]),
-            deviation_heading_rad: self.pace.deviation_heading_rad(time_s),
+            heading_wander_rad: self.pace.heading_wander_rad(time_s),
         }
     }
 }
@@ -249,8 +250,8 @@ pub(crate) struct Shuttle {
 
 impl Flight for Shuttle {
     fn point(&self, time_s: f64) -> FlightPoint {
-        let flown_s = self.pace.flown_s(time_s);
-        let strokes = flown_s / self.period_s;
+        let moving_time_s = self.pace.moving_time_s(time_s);
+        let strokes = moving_time_s / self.period_s;
         let forward_share = f64::from(self.forward_strokes);
         let swing = -(std::f64::consts::TAU * strokes).cos() * 0.5 * self.stroke_m;
         // Each half starts and ends at the rear end of the forward stroke; the left-right half starts on the right.
@@ -260,9 +261,9 @@ impl Flight for Shuttle {
         let shift = Vector3::new(cosine * ahead_m - sine * left_m, sine * ahead_m + cosine * left_m, 0.0);
         FlightPoint {
             position_m: self.centre_m + shift,
-            deviation_m: self.pace.deviation_m(time_s),
+            lateral_offset_m: self.pace.lateral_offset_m(time_s),
             heading_rad: self.heading_rad,
-            deviation_heading_rad: self.pace.deviation_heading_rad(time_s),
+            heading_wander_rad: self.pace.heading_wander_rad(time_s),
         }
     }
 }
@@ -319,9 +320,9 @@ impl Flight for Drill {
         let shift = Vector3::new(cosine * shift.x - sine * shift.y, sine * shift.x + cosine * shift.y, shift.z);
         FlightPoint {
             position_m: self.position_m + warm_up * liveliness + shift,
-            deviation_m: Vector3::zeros(),
+            lateral_offset_m: Vector3::zeros(),
             heading_rad: self.heading_rad + liveliness * wave(0.4, 3.7, 0.5) + self.exercise.turn_rad(exercise_s),
-            deviation_heading_rad: 0.0,
+            heading_wander_rad: 0.0,
         }
     }
 }
@@ -330,9 +331,9 @@ impl Flight for Station {
     fn point(&self, time_s: f64) -> FlightPoint {
         FlightPoint {
             position_m: self.position_m,
-            deviation_m: self.pace.deviation_m(time_s),
+            lateral_offset_m: self.pace.lateral_offset_m(time_s),
             heading_rad: self.heading_rad,
-            deviation_heading_rad: self.pace.deviation_heading_rad(time_s),
+            heading_wander_rad: self.pace.heading_wander_rad(time_s),
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::equipment::{Equipment, GRAVITY_M_PER_S2, IMU_RATE_HZ, given_rig};
 use super::gimbal::{JointMotion, LookAround, Stabilizer};
-use super::inertial::{FIREFLY_IMU, InertialRecord};
+use super::inertial::{FIREFLY_IMU, ImuRecord};
 use super::random::RandomStream;
 use super::trajectory::Trajectory;
 use crate::geometry::{RigidTransform, ns_from_seconds, seconds_from_ns};
@@ -30,7 +30,7 @@ const ENCODER_PHASE_S: f64 = 0.002;
 pub(crate) struct Scenario {
     pub(crate) trajectory: Trajectory,
     pub(crate) joints: Option<JointMotion>,
-    pub(crate) inertial: InertialRecord,
+    pub(crate) inertial: ImuRecord,
     pub(crate) true_rig: Rig,
     pub(crate) given_rig: Rig,
     seed: u64,
@@ -56,7 +56,7 @@ impl Scenario {
             .gimbal
             .as_ref()
             .map(|gimbal| JointMotion::fly(&trajectory, &gimbal.chain, &gimbal.joints, look, &Stabilizer::default()));
-        let inertial = InertialRecord::measure(
+        let inertial = ImuRecord::measure(
             &trajectory,
             &FIREFLY_IMU,
             IMU_RATE_HZ,

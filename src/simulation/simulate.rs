@@ -107,7 +107,7 @@ fn fly(options: &SimulationOptions, name: &str) -> Scenario {
     let mut look = experiment.look_around(&mut random(stream::LOOK));
     look.slew_s = options.disturbances.gimbal_slew_s;
     look.stabilized_s = options.disturbances.stabilized_s;
-    look.held_joint = options.disturbances.held_joint.map(|[joint, start_s, length_s]| {
+    look.fixed_joint = options.disturbances.fixed_joint.map(|[joint, start_s, length_s]| {
         // Checked to be 1 to 3.
         (joint.round() as usize - 1, [start_s, length_s])
     });

@@ -35,7 +35,7 @@ pub enum SyntheticMotion {
     /// Two seconds of hover with centimetres of sway, then aggressive.
     HoverThenAggressive,
     /// Two seconds without any motion, then aggressive.
-    StandstillThenAggressive,
+    StationaryThenAggressive,
     /// Hover with centimetres of sway throughout: the calibration stays unobservable.
     Hover,
 }
@@ -56,7 +56,7 @@ pub struct SyntheticOptions {
     /// Noise of a feature's pixel, per axis.
     pub pixel_sigma_px: f64,
     /// Ratio of features whose tracks drift off their landmark.
-    pub outlier_share: f64,
+    pub outlier_ratio: f64,
     /// Most features in a frame.
     pub features: usize,
     /// Scales noise, bias random walk and turn-on bias of the IMU; 0 makes it ideal.
@@ -84,7 +84,7 @@ impl Default for SyntheticOptions {
             duration_s: 20.0,
             frame_rate_hz: 20.0,
             pixel_sigma_px: 0.3,
-            outlier_share: 0.0,
+            outlier_ratio: 0.0,
             features: 150,
             imu_noise_scale: 1.0,
             encoder_sigma_rad: Some(0.5_f64.to_radians()),
@@ -238,7 +238,7 @@ fn trajectory(options: &SyntheticOptions) -> Trajectory {
     let pace = match options.motion {
         SyntheticMotion::Aggressive => Pace { hover_s: -30.0, ..Pace::aggressive() },
         SyntheticMotion::HoverThenAggressive => Pace::aggressive(),
-        SyntheticMotion::StandstillThenAggressive => Pace { hover_s: 4.0, sway_m: 0.0, ..Pace::aggressive() },
+        SyntheticMotion::StationaryThenAggressive => Pace { hover_s: 4.0, sway_m: 0.0, ..Pace::aggressive() },
         SyntheticMotion::Hover => Pace { hover_s: 1e6, ..Pace::aggressive() },
     };
     let station_m = Vector3::new(0.0, -12.0, 2.5);
@@ -273,7 +273,7 @@ struct Tracker {
     model: CameraModel,
     random: RandomStream,
     pixel_sigma_px: f64,
-    outlier_share: f64,
+    outlier_ratio: f64,
     features: usize,
     tracks: Vec<Track>,
     landmarks: BTreeMap<FeatureId, Vector3<f64>>,
@@ -296,7 +296,7 @@ impl Tracker {
             model,
             random: RandomStream::new(options.seed, stream::FEATURES),
             pixel_sigma_px: options.pixel_sigma_px,
-            outlier_share: options.outlier_share,
+            outlier_ratio: options.outlier_ratio,
             features: options.features,
             tracks: Vec::new(),
             landmarks: BTreeMap::new(),
@@ -364,7 +364,7 @@ impl Tracker {
             let Some(bearing) = self.model.unproject(&uv_px) else { continue };
             let id = FeatureId(self.next_id);
             self.next_id += 1;
-            let slips = self.random.chance(self.outlier_share);
+            let slips = self.random.chance(self.outlier_ratio);
             let life = 2.0 - LIFE_FRAMES * (1.0 - self.random.unit()).ln();
             self.landmarks.insert(id, landmark_m);
             self.tracks.push(Track {

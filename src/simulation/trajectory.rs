@@ -13,7 +13,7 @@ pub struct VehicleLimits {
     /// Largest angle between thrust and the vertical, in radians.
     pub tilt_rad: f64,
     /// Least thrust over mass, in m/s².
-    pub least_thrust_m_per_s2: f64,
+    pub min_thrust_m_per_s2: f64,
     /// Largest thrust over mass, in m/s².
     pub largest_thrust_m_per_s2: f64,
     /// Largest angular rate about any axis, in rad/s.
@@ -26,7 +26,7 @@ impl Default for VehicleLimits {
     fn default() -> Self {
         Self {
             tilt_rad: 38_f64.to_radians(),
-            least_thrust_m_per_s2: 4.5,
+            min_thrust_m_per_s2: 4.5,
             largest_thrust_m_per_s2: 18.5,
             rate_rad_per_s: 2.4,
             speed_m_per_s: 7.0,
@@ -91,8 +91,8 @@ impl Trajectory {
             let point = flight.point(time_s.max(0.0));
             base.push(point.position_m);
             let shares = Vector3::new(random.normal(), random.normal(), random.normal()).map(|x| x.clamp(-2.0, 2.0));
-            deviation.push(shares.component_mul(&point.deviation_m));
-            let turn = random.normal().clamp(-2.0, 2.0) * point.deviation_heading_rad;
+            deviation.push(shares.component_mul(&point.lateral_offset_m));
+            let turn = random.normal().clamp(-2.0, 2.0) * point.heading_wander_rad;
             heading.push(Vector1::new(point.heading_rad + turn));
         }
         clock.points = base.iter().zip(&deviation).map(|(position, shift)| position + shift).collect();
@@ -236,7 +236,7 @@ impl VehicleLimits {
         let thrust = state.specific_force_m_per_s2.z;
         let upright = (state.world_from_imu.rotation * Vector3::z()).z;
         upright >= self.tilt_rad.cos()
-            && thrust >= self.least_thrust_m_per_s2
+            && thrust >= self.min_thrust_m_per_s2
             && thrust <= self.largest_thrust_m_per_s2
             && state.angular_velocity_rad_per_s.amax() <= self.rate_rad_per_s
             && state.velocity_m_per_s.norm() <= self.speed_m_per_s

@@ -13,7 +13,7 @@ fn options(seed: u64) -> SyntheticOptions {
         duration_s: 14.0,
         features: 60,
         pixel_sigma_px: 0.5,
-        outlier_share: 0.02,
+        outlier_ratio: 0.02,
         encoder_sigma_rad: Some(2_f64.to_radians()),
         start_error: ChainPrior { translation_bound_m: 0.03, rotation_bound_rad: 10_f64.to_radians() },
         ..SyntheticOptions::default()
@@ -78,7 +78,7 @@ fn the_same_flight_gives_the_same_numbers() {
 fn a_flight_that_cannot_tell_says_why() {
     let mut flight = flight(&SyntheticOptions { duration_s: 8.0, ..options(5) });
     let options = CalibrationOptions::default();
-    let more = CalibrationOptions { least_measurements: 1000, ..options };
+    let more = CalibrationOptions { min_measurements: 1000, ..options };
     let error = calibrate(&flight.input, &more, &mut |_| {}).unwrap_err();
     assert!(matches!(error, CalibrationError::TooFewMeasurements { needed: 1000, .. }), "{error}");
     for view in &mut flight.input.gimbal_camera.views {

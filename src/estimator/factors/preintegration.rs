@@ -24,15 +24,15 @@ pub struct MotionIncrement {
     pub velocity_m_per_s: Vector3<f64>,
 }
 
-/// An axis that shows the same value so often, and one as large as [`LEAST_SATURATED_RAD_PER_S`] or
-/// [`LEAST_SATURATED_M_PER_S2`], is at the end of its range: noise never repeats a value of full resolution.
+/// An axis that shows the same value so often, and one as large as [`MIN_SATURATED_RAD_PER_S`] or
+/// [`MIN_SATURATED_M_PER_S2`], is at the end of its range: noise never repeats a value of full resolution.
 const SATURATED_REPEATS: u8 = 3;
 
 /// Slower turns are in every sensor's range.
-const LEAST_SATURATED_RAD_PER_S: f64 = 0.5;
+const MIN_SATURATED_RAD_PER_S: f64 = 0.5;
 
 /// Every sensor's range reaches beyond gravity.
-const LEAST_SATURATED_M_PER_S2: f64 = 12.0;
+const MIN_SATURATED_M_PER_S2: f64 = 12.0;
 
 /// Noise density of an axis at the end of its range, as a share of what it shows, in √s: the truth lies beyond by about
 /// half of it (standard deviation) for about a tenth of a second.
@@ -218,13 +218,13 @@ impl Preintegration {
         let (turn_noise, turn_saturated) = Repeats::densities(
             &self.repeats.gyroscope,
             &to.angular_velocity_rad_per_s,
-            LEAST_SATURATED_RAD_PER_S,
+            MIN_SATURATED_RAD_PER_S,
             self.noise.gyroscope_noise_density,
         );
         let (force_noise, force_saturated) = Repeats::densities(
             &self.repeats.accelerometer,
             &to.specific_force_m_per_s2,
-            LEAST_SATURATED_M_PER_S2,
+            MIN_SATURATED_M_PER_S2,
             self.noise.accelerometer_noise_density,
         );
         self.saturated += usize::from(turn_saturated || force_saturated);

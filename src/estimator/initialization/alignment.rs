@@ -40,9 +40,9 @@ pub(super) struct AlignmentInput<'a> {
     pub(super) bearing_sigma_rad: f64,
     pub(super) gravity_m_per_s2: f64,
     /// Error of the mount's rotation that all views share.
-    pub(super) mount_rotation_sigma_rad: f64,
+    pub(super) extrinsics_rotation_sigma_rad: f64,
     /// Error of the mount's rotation of its own in each view.
-    pub(super) mount_rotation_noise_rad: f64,
+    pub(super) extrinsics_rotation_noise_rad: f64,
     pub(super) gyroscope_bias: VectorPrior,
     pub(super) accelerometer_bias: VectorPrior,
 }
@@ -92,7 +92,7 @@ fn gyroscope_rotations(increments: &[Preintegration], bias: &Vector3<f64>) -> Ve
 /// Each view says `imu_from_first_camera = start_from_imu · imu_from_camera · camera_from_first_camera`.
 pub(super) fn align_rotations(input: &AlignmentInput<'_>) -> Option<RotationAlignment> {
     const ROUNDS: usize = 10;
-    let sigma = input.mount_rotation_noise_rad.hypot(VISUAL_ROTATION_SIGMA_RAD);
+    let sigma = input.extrinsics_rotation_noise_rad.hypot(VISUAL_ROTATION_SIGMA_RAD);
     let mut bias = input.gyroscope_bias.mean;
     let mut mount = input.imu_from_camera.first()?.rotation;
     for _ in 0..ROUNDS {
@@ -139,7 +139,7 @@ const GRAVITY: usize = 7;
 const VELOCITY: usize = 10;
 
 /// Beyond this uncertainty of the mount's rotation the alignment is tried from rotations all around.
-const AMPLE_MOUNT_SIGMA_RAD: f64 = 0.6;
+const AMPLE_EXTRINSICS_SIGMA_RAD: f64 = 0.6;
 
 /// Solves for scale, gravity of exact magnitude, velocities, accelerometer bias and what the mount's rotation still lacks.
 ///
@@ -147,7 +147,7 @@ const AMPLE_MOUNT_SIGMA_RAD: f64 = 0.6;
 /// further than 63° from any rotation, and the least cost wins.
 pub(super) fn align(input: &AlignmentInput<'_>, rotation: &RotationAlignment) -> Option<Alignment> {
     let mut best = align_from(input, rotation, rotation.imu_from_first_camera);
-    if input.mount_rotation_sigma_rad > AMPLE_MOUNT_SIGMA_RAD {
+    if input.extrinsics_rotation_sigma_rad > AMPLE_EXTRINSICS_SIGMA_RAD {
         for turn in cube_rotations() {
             let candidate = align_from(input, rotation, turn * rotation.imu_from_first_camera);
             let better = match (&candidate, &best) {
@@ -275,14 +275,14 @@ fn linear_system(
         add_rows(&mut normal, &mut rhs, &mut square, &row, &side, sigma);
     }
     let bias_weight = 1.0 / input.accelerometer_bias.sigma.powi(2);
-    let mount_weight = 1.0 / input.mount_rotation_sigma_rad.max(1e-4).powi(2);
+    let extrinsics_weight = 1.0 / input.extrinsics_rotation_sigma_rad.max(1e-4).powi(2);
     for axis in 0..3 {
         normal[(BIAS + axis, BIAS + axis)] += bias_weight;
         rhs[BIAS + axis] += bias_weight * input.accelerometer_bias.mean[axis];
         square += bias_weight * input.accelerometer_bias.mean[axis].powi(2);
-        normal[(MOUNT + axis, MOUNT + axis)] += mount_weight;
-        rhs[MOUNT + axis] -= mount_weight * turned[axis];
-        square += mount_weight * turned[axis].powi(2);
+        normal[(MOUNT + axis, MOUNT + axis)] += extrinsics_weight;
+        rhs[MOUNT + axis] -= extrinsics_weight * turned[axis];
+        square += extrinsics_weight * turned[axis].powi(2);
     }
     (normal, rhs, square)
 }

@@ -13,8 +13,8 @@ use super::structure::{
 use super::visual_problem::{between, mean_square};
 use super::{
     InitializationDiagnostics, InitializationFrame, InitializationInput, InitializationOptions, InitializationOrigin,
-    InitializationOutcome, InitializationSolution, InitializedFrame, InitializedLandmark, StandstillEstimate,
-    StandstillPolicy, standstill,
+    InitializationOutcome, InitializationSolution, InitializedFrame, InitializedLandmark, StationaryEstimate,
+    StationaryPolicy, standstill,
 };
 use crate::estimator::{ImuBias, Preintegration};
 use crate::geometry::{RigidTransform, seconds_from_ns};
@@ -30,7 +30,7 @@ const REINTEGRATE_RAD_PER_S: f64 = 0.003;
 pub fn try_initialize(input: &InitializationInput<'_>, options: &InitializationOptions) -> InitializationOutcome {
     let mut still = Checklist::default();
     let standing = standstill::detect(input, &mut still);
-    if let (Some(standing), StandstillPolicy::InitializeAtOnce) = (&standing, options.standstill_policy) {
+    if let (Some(standing), StationaryPolicy::InitializeAtOnce) = (&standing, options.stationary_policy) {
         return from_standstill(input, standing, still);
     }
     let mut checklist = Checklist::default();
@@ -48,7 +48,7 @@ pub fn try_initialize(input: &InitializationInput<'_>, options: &InitializationO
 /// Gravity along the mean specific force; of the accelerometer's bias only what lies along it is observable.
 fn from_standstill(
     input: &InitializationInput<'_>,
-    standing: &StandstillEstimate,
+    standing: &StationaryEstimate,
     checklist: Checklist,
 ) -> InitializationOutcome {
     let force = standing.specific_force_m_per_s2;
@@ -67,7 +67,7 @@ fn from_standstill(
         })
         .collect();
     InitializationOutcome::Initialized(Box::new(InitializationSolution {
-        origin: InitializationOrigin::FromStandstill,
+        origin: InitializationOrigin::FromStationary,
         frames,
         bias: ImuBias {
             gyroscope_rad_per_s: standing.gyroscope_bias_rad_per_s,
@@ -95,7 +95,7 @@ fn level(gravity_in_imu: &Vector3<f64>) -> UnitQuaternion<f64> {
 fn from_motion(
     input: &InitializationInput<'_>,
     options: &InitializationOptions,
-    standing: Option<&StandstillEstimate>,
+    standing: Option<&StationaryEstimate>,
     checklist: &mut Checklist,
 ) -> Option<InitializationSolution> {
     let gyroscope_prior = match standing {
@@ -108,7 +108,7 @@ fn from_motion(
     let rotations = guessed_rotations(input.frames, &gyroscope_prior.mean);
     let selected = select_views(input.frames, &rotations, options);
     let count = selected.len() as f64;
-    checklist.at_least("views", "number of views", count, options.least_views as f64, Shown::Plain(""));
+    checklist.at_least("views", "number of views", count, options.min_views as f64, Shown::Plain(""));
     let span = match (selected.first(), selected.last()) {
         (Some(&first), Some(&last)) => seconds_from_ns(input.frames[last].stamp_ns - input.frames[first].stamp_ns),
         _ => 0.0,
@@ -123,27 +123,27 @@ fn from_motion(
     let views: Vec<_> = selected.iter().map(|&index| input.frames[index].features).collect();
     let guesses: Vec<_> = selected.iter().map(|&index| rotations[index]).collect();
     let mut tracks = collect_tracks(&views);
-    let pairs = rank_pairs(&tracks, &guesses, options.least_common_features);
+    let pairs = rank_pairs(&tracks, &guesses, options.min_common_features);
     let common = (1..views.len()).map(|view| common_bearings(&tracks, view - 1, view).len()).min().unwrap_or(0);
-    let least_common = options.least_common_features as f64;
+    let min_common = options.min_common_features as f64;
     checklist.at_least(
         "features",
         "features that neighbouring views share",
         common as f64,
-        least_common,
+        min_common,
         Shown::Plain(""),
     );
     let parallax_rad = pairs.first().map_or(0.0, |pair: &ViewPair| pair.fit.median_parallax_rad);
     let subject = "parallax between the best two views, rotation taken out,";
-    checklist.at_least("parallax", subject, parallax_rad, options.least_parallax_rad, Shown::Degrees);
+    checklist.at_least("parallax", subject, parallax_rad, options.min_parallax_rad, Shown::Degrees);
     let excitation = excitation(input.frames, &selected, &rotations);
     let subject = "spread of the acceleration between views";
-    checklist.at_least("excitation", subject, excitation, options.least_excitation_m_per_s2, Shown::Plain(" m/s²"));
+    checklist.at_least("excitation", subject, excitation, options.min_excitation_m_per_s2, Shown::Plain(" m/s²"));
     if !checklist.all_passed() {
         return None;
     }
 
-    thin_out(&mut tracks, views.len(), options.most_landmarks);
+    thin_out(&mut tracks, views.len(), options.max_landmarks);
     let structure = structure_of(&tracks, &pairs, &guesses, input, options, checklist)?;
     let kept: Vec<usize> = structure.views.iter().map(|&view| selected[view]).collect();
     let problem = Problem { input, options, kept: &kept, structure: &structure, gyroscope_prior };
@@ -184,12 +184,12 @@ fn structure_of(
 ) -> Option<Structure> {
     let limits = StructureLimits {
         bearing_sigma_rad: options.bearing_sigma_rad,
-        rotation_sigma_rad: (options.mount_rotation_noise_rad * 1.5)
-            .hypot(0.5 * options.mount_rotation_sigma_rad)
+        rotation_sigma_rad: (options.extrinsics_rotation_noise_rad * 1.5)
+            .hypot(0.5 * options.extrinsics_rotation_sigma_rad)
             .hypot(0.02),
-        least_landmarks: options.least_landmarks,
-        least_views: options.least_views,
-        least_inlier_share: options.least_inlier_share,
+        min_landmarks: options.min_landmarks,
+        min_views: options.min_views,
+        min_inlier_ratio: options.min_inlier_ratio,
         seed: input.frames.last()?.frame_index as u64,
     };
     let plain = Shown::Plain("");
@@ -200,7 +200,7 @@ fn structure_of(
                 "landmarks",
                 subject,
                 structure.landmarks.len() as f64,
-                limits.least_landmarks as f64,
+                limits.min_landmarks as f64,
                 plain,
             );
             let newest = structure.views.last().is_some_and(|&last| last + 1 == guesses.len());
@@ -213,19 +213,19 @@ fn structure_of(
             );
             checklist.all_passed().then_some(structure)
         }
-        Err(StructureFailure::NoRelativePose { inlier_share }) => {
+        Err(StructureFailure::NoRelativePose { inlier_ratio }) => {
             let subject = "share of features that agree with a relative pose";
-            checklist.at_least("relative pose", subject, inlier_share, limits.least_inlier_share, Shown::Percent);
+            checklist.at_least("relative pose", subject, inlier_ratio, limits.min_inlier_ratio, Shown::Percent);
             None
         }
         Err(StructureFailure::FewLandmarks { landmarks }) => {
             let subject = "landmarks with a depth";
-            checklist.at_least("landmarks", subject, landmarks as f64, limits.least_landmarks as f64, plain);
+            checklist.at_least("landmarks", subject, landmarks as f64, limits.min_landmarks as f64, plain);
             None
         }
         Err(StructureFailure::FewViews { views }) => {
             let subject = "views that could be placed";
-            checklist.at_least("placed views", subject, views as f64, limits.least_views as f64, plain);
+            checklist.at_least("placed views", subject, views as f64, limits.min_views as f64, plain);
             None
         }
     }
@@ -288,8 +288,8 @@ impl Problem<'_> {
             ),
             bearing_sigma_rad: self.options.bearing_sigma_rad,
             gravity_m_per_s2: self.input.gravity_m_per_s2,
-            mount_rotation_sigma_rad: self.options.mount_rotation_sigma_rad,
-            mount_rotation_noise_rad: self.options.mount_rotation_noise_rad,
+            extrinsics_rotation_sigma_rad: self.options.extrinsics_rotation_sigma_rad,
+            extrinsics_rotation_noise_rad: self.options.extrinsics_rotation_noise_rad,
             gyroscope_bias: self.gyroscope_prior,
             accelerometer_bias: self.accelerometer_prior(),
         }
@@ -327,9 +327,9 @@ impl Problem<'_> {
             imu_from_camera: &mounts,
             increments,
             bearing_sigma_rad: options.bearing_sigma_rad,
-            mount_rotation_sigma_rad: options.mount_rotation_sigma_rad,
-            mount_rotation_noise_rad: options.mount_rotation_noise_rad,
-            mount_translation_sigma_m: options.mount_translation_sigma_m,
+            extrinsics_rotation_sigma_rad: options.extrinsics_rotation_sigma_rad,
+            extrinsics_rotation_noise_rad: options.extrinsics_rotation_noise_rad,
+            extrinsics_translation_sigma_m: options.extrinsics_translation_sigma_m,
             gyroscope_bias: self.gyroscope_prior,
             accelerometer_bias: self.accelerometer_prior(),
         };
@@ -347,15 +347,15 @@ impl Problem<'_> {
         checklist.at_least("settled", subject, f64::from(u8::from(refined.settled)), 1.0, Shown::Plain(""));
         let share = refined.state.landmarks.len() as f64 / before.max(1) as f64;
         let subject = "share of landmarks that fit with positive depth";
-        checklist.at_least("positive depth", subject, share, options.least_inlier_share, Shown::Percent);
+        checklist.at_least("positive depth", subject, share, options.min_inlier_ratio, Shown::Percent);
         let cameras = refined.state.cameras(&mounts);
         let rms = mean_square(&refined.state.landmarks, &cameras, options.bearing_sigma_rad).sqrt();
         let subject = "reprojection error over its standard deviation";
-        checklist.at_most("reprojection", subject, rms, options.most_reprojection_sigmas, Shown::Plain(""));
+        checklist.at_most("reprojection", subject, rms, options.max_reprojection_sigmas, Shown::Plain(""));
         let subject = "mean square of the whitened inertial residuals";
-        let value = refined.inertial_mean_square;
+        let value = refined.imu_mean_square;
         let chance = upper_mean_square(9 * increments.len());
-        let limit = options.inertial_noise_factor.powi(2) * chance;
+        let limit = options.imu_noise_factor.powi(2) * chance;
         checklist.at_most("inertial residual", subject, value, limit, Shown::Plain(""));
 
         refined.sigmas = refinement.sigmas(&refined.state);
@@ -363,13 +363,13 @@ impl Problem<'_> {
         let or_far = |value: Option<f64>| value.unwrap_or(f64::INFINITY);
         let scale = or_far(sigmas.map(|sigmas| sigmas.scale));
         let subject = "standard deviation of the scale";
-        checklist.at_most("scale", subject, scale, options.most_scale_sigma, Shown::Percent);
+        checklist.at_most("scale", subject, scale, options.max_scale_sigma, Shown::Percent);
         let velocity = or_far(sigmas.map(|sigmas| sigmas.velocity_m_per_s));
         let subject = "standard deviation of the velocity";
-        checklist.at_most("velocity", subject, velocity, options.most_velocity_sigma_m_per_s, Shown::Plain(" m/s"));
+        checklist.at_most("velocity", subject, velocity, options.max_velocity_sigma_m_per_s, Shown::Plain(" m/s"));
         let gravity = or_far(sigmas.map(|sigmas| sigmas.gravity_rad));
         let subject = "standard deviation of gravity's direction";
-        checklist.at_most("gravity", subject, gravity, options.most_gravity_sigma_rad, Shown::Degrees);
+        checklist.at_most("gravity", subject, gravity, options.max_gravity_sigma_rad, Shown::Degrees);
         checklist.all_passed().then_some(refined)
     }
 
@@ -423,7 +423,7 @@ impl Problem<'_> {
                 gyroscope_bias_sigma_rad_per_s: sigmas.gyroscope_bias_rad_per_s,
                 accelerometer_bias_sigma_m_per_s2: sigmas.accelerometer_bias_m_per_s2,
                 reprojection_rms_rad: square.sqrt() * self.options.bearing_sigma_rad,
-                inertial_mean_square: refined.inertial_mean_square,
+                imu_mean_square: refined.imu_mean_square,
                 parallax_rad,
                 refinement_rounds: refined.rounds,
             },

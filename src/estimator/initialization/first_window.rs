@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use super::mount_fit::fit_mounts;
+use super::extrinsics_fit::fit_extrinsics;
 use super::waiting_frame::WaitingFrame;
 use super::{InitializationOrigin, InitializationSolution};
 use crate::estimator::factors::preintegration::Preintegration;
@@ -88,7 +88,7 @@ impl<'a> FirstWindow<'a> {
         let mut frames = frames?;
         frames.newest_mut().keyframe = false;
         if leading == MAIN {
-            fit_mounts(calibration.of_mut(MAIN), &mut frames, &mounts);
+            fit_extrinsics(calibration.of_mut(MAIN), &mut frames, &mounts);
         }
         let start = StartPrior {
             reference: frames.oldest().state.clone(),
@@ -108,7 +108,7 @@ impl<'a> FirstWindow<'a> {
         mut self,
         setup: &Setup,
         input: &StepInput<'_>,
-        most_scale_sigma: f64,
+        max_scale_sigma: f64,
         events: &mut Vec<Event>,
     ) -> (SlidingWindow, StepReport) {
         let options = &setup.config.options;
@@ -127,7 +127,7 @@ impl<'a> FirstWindow<'a> {
         }
         let (kind, how) = match self.solution.origin {
             InitializationOrigin::FromMotion => (EventKind::InitializedFromMotion, "motion"),
-            InitializationOrigin::FromStandstill => (EventKind::InitializedFromStandstill, "standstill"),
+            InitializationOrigin::FromStationary => (EventKind::InitializedFromStationary, "standstill"),
         };
         let scale_sigma = self.solution.diagnostics.scale_sigma;
         let message = format!(
@@ -136,7 +136,7 @@ impl<'a> FirstWindow<'a> {
             self.solution.landmarks.len(),
             100.0 * scale_sigma
         );
-        events.push(Event::decided(kind, message, scale_sigma, most_scale_sigma));
+        events.push(Event::decided(kind, message, scale_sigma, max_scale_sigma));
         events.push(window.choose_keyframe(options));
         let report = self.window.report(setup, input, &mut solved);
         self.window.state.drop_rejected(&solved, options, events);

@@ -7,7 +7,7 @@ use super::first_window::FirstWindow;
 use super::waiting_frame::{WaitingFrame, initial_joints_rad};
 use super::{
     InitializationFrame, InitializationInput, InitializationOptions, InitializationOutcome, InitializationSolution,
-    StandstillEstimate, WaitReason, try_initialize,
+    StationaryEstimate, WaitReason, try_initialize,
 };
 use crate::estimator::report::{Event, EventKind, Phase, StepReport};
 use crate::estimator::setup::Setup;
@@ -32,7 +32,7 @@ pub(crate) struct Initializer {
     resume_at: Option<RigidTransform>,
     /// Oldest first.
     waiting: VecDeque<WaitingFrame>,
-    standstill: Option<StandstillEstimate>,
+    standstill: Option<StationaryEstimate>,
 }
 
 /// What came of one image while there is no window.
@@ -58,8 +58,8 @@ impl Initializer {
         let mut step = match self.attempt(setup, &options) {
             InitializationOutcome::Initialized(solution) => match self.first_window(setup, &solution) {
                 Some(first) => {
-                    let most_scale_sigma = options.most_scale_sigma;
-                    let (window, report) = first.solve(setup, input, most_scale_sigma, &mut events);
+                    let max_scale_sigma = options.max_scale_sigma;
+                    let (window, report) = first.solve(setup, input, max_scale_sigma, &mut events);
                     InitializationStep::Initialized(Box::new(window), report)
                 }
                 None => InitializationStep::Waiting(self.report(setup, input)),
@@ -163,7 +163,7 @@ impl Initializer {
         .for_camera(setup.config.model(camera).focal_length_px(), options.pixel_sigma_px);
         let joints = self.calibration.of(camera).joint_count();
         if joints == 0 {
-            return base.for_rigid_mount(rotation_rad, translation_m);
+            return base.for_rigid_camera(rotation_rad, translation_m);
         }
         // The rig's bounds are those of uniform errors.
         let bounds = ChainPrior {

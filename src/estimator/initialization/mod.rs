@@ -8,8 +8,8 @@
 //!
 //! 1. *Standstill.* Quiet IMU samples and an unmoving image give the gyroscope's bias and gravity's direction.
 //!    An accelerometer's turn-on bias of 0.5 m/s² tilts that direction by 3°, and only motion separates the two.
-//!    So by default a standstill is remembered ([`StandstillEstimate`]) and motion is awaited; with
-//!    [`StandstillPolicy::InitializeAtOnce`] it initializes right away, with velocity zero and no landmarks: the estimator
+//!    So by default a standstill is remembered ([`StationaryEstimate`]) and motion is awaited; with
+//!    [`StationaryPolicy::InitializeAtOnce`] it initializes right away, with velocity zero and no landmarks: the estimator
 //!    then has to find depths itself once there is parallax, and must give the accelerometer's bias its full prior.
 //! 2. *Selection.* A dozen views, spaced by parallax and time, so that a hover before the motion is represented by few of
 //!    them: these few bind tilt and accelerometer bias together, which makes the scale of the motion after it reliable.
@@ -26,9 +26,9 @@ mod alignment;
 pub mod bearing;
 mod checks;
 mod essential;
+mod extrinsics_fit;
 mod first_window;
 pub(crate) mod initializer;
-mod mount_fit;
 mod options;
 mod polynomial;
 mod reconstruction;
@@ -47,9 +47,9 @@ mod tests;
 pub use alignment::VectorPrior;
 pub use attempt::try_initialize;
 pub use checks::WaitReason;
-pub use options::{InitializationOptions, StandstillPolicy};
+pub use options::{InitializationOptions, StationaryPolicy};
 pub use reconstruction::{Reconstruction, ReconstructionGuess, reconstruct_views};
-pub use standstill::StandstillEstimate;
+pub use standstill::StationaryEstimate;
 
 use nalgebra::Vector3;
 
@@ -83,7 +83,7 @@ pub struct InitializationInput<'a> {
     /// Noise of the IMU.
     pub imu_noise: ImuNoise,
     /// What the last standstill measured, when there was one ([`InitializationOutcome::Waiting`] carries it).
-    pub standstill: Option<StandstillEstimate>,
+    pub standstill: Option<StationaryEstimate>,
 }
 
 /// What an attempt came to.
@@ -98,7 +98,7 @@ pub enum InitializationOutcome {
         /// Tests that passed, with the same figures.
         passed: Vec<WaitReason>,
         /// The vehicle is stationary: to be kept and handed in with later attempts.
-        standstill: Option<StandstillEstimate>,
+        standstill: Option<StationaryEstimate>,
     },
 }
 
@@ -108,7 +108,7 @@ pub enum InitializationOrigin {
     /// From motion: everything is known, scale included.
     FromMotion,
     /// From standstill: no landmark has a depth.
-    FromStandstill,
+    FromStationary,
 }
 
 /// State of one view of the solution.
@@ -157,7 +157,7 @@ pub struct InitializationDiagnostics {
     /// Root mean square angle error of a bearing's coordinate.
     pub reprojection_rms_rad: f64,
     /// Mean square of the whitened IMU residuals (1 when the noise is as stated, less with few intervals).
-    pub inertial_mean_square: f64,
+    pub imu_mean_square: f64,
     /// Largest rotation-compensated parallax between two views.
     pub parallax_rad: f64,
     /// Rounds of the refinement.

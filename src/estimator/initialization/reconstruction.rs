@@ -39,19 +39,19 @@ pub fn reconstruct_views(
     options: &InitializationOptions,
 ) -> Option<Reconstruction> {
     let tracks = collect_tracks(views);
-    let pairs = rank_pairs(&tracks, guess.rotations, options.least_common_features);
-    if pairs.first()?.fit.median_parallax_rad < options.least_parallax_rad {
+    let pairs = rank_pairs(&tracks, guess.rotations, options.min_common_features);
+    if pairs.first()?.fit.median_parallax_rad < options.min_parallax_rad {
         return None;
     }
     let limits = StructureLimits {
         bearing_sigma_rad: options.bearing_sigma_rad,
         rotation_sigma_rad: guess.sigma_rad,
-        least_landmarks: options.least_landmarks,
-        least_views: options.least_views,
-        least_inlier_share: options.least_inlier_share,
+        min_landmarks: options.min_landmarks,
+        min_views: options.min_views,
+        min_inlier_ratio: options.min_inlier_ratio,
         seed: guess.seed,
     };
     let structure = reconstruct(&tracks, &pairs, guess.rotations, &limits).ok()?;
-    let fits = structure.rms_rad <= options.most_reprojection_sigmas * options.bearing_sigma_rad;
+    let fits = structure.rms_rad <= options.max_reprojection_sigmas * options.bearing_sigma_rad;
     fits.then_some(Reconstruction { views: structure.views, poses: structure.poses, rms_rad: structure.rms_rad })
 }

@@ -15,7 +15,7 @@ use crate::optimization::damped::{DampedOptions, DampedProblem, StopReason, mini
 use crate::optimization::{DensePoseEquations, ReducedEquations, ReprojectionEquations};
 
 /// Tightest standard deviation that a prior on the mount may have, so that "exactly known" stays solvable.
-const LEAST_SIGMA: f64 = 1e-5;
+const MIN_SIGMA: f64 = 1e-5;
 
 type Matrix9 = SMatrix<f64, 9, 9>;
 type Vector9 = SVector<f64, 9>;
@@ -27,9 +27,9 @@ pub(super) struct RefinementInput<'a> {
     /// Motion from each view to the next.
     pub(super) increments: &'a [Preintegration],
     pub(super) bearing_sigma_rad: f64,
-    pub(super) mount_rotation_sigma_rad: f64,
-    pub(super) mount_rotation_noise_rad: f64,
-    pub(super) mount_translation_sigma_m: f64,
+    pub(super) extrinsics_rotation_sigma_rad: f64,
+    pub(super) extrinsics_rotation_noise_rad: f64,
+    pub(super) extrinsics_translation_sigma_m: f64,
     pub(super) gyroscope_bias: VectorPrior,
     pub(super) accelerometer_bias: VectorPrior,
 }
@@ -43,9 +43,9 @@ pub(super) struct RefinedState {
     pub(super) gravity: Vector3<f64>,
     pub(super) bias: ImuBias,
     pub(super) landmarks: Vec<TrackedLandmark>,
-    pub(super) shared_turn: UnitQuaternion<f64>,
-    pub(super) shared_shift: Vector3<f64>,
-    pub(super) own_turns: Vec<UnitQuaternion<f64>>,
+    pub(super) common_rotation: UnitQuaternion<f64>,
+    pub(super) common_shift: Vector3<f64>,
+    pub(super) per_view_rotations: Vec<UnitQuaternion<f64>>,
 }
 
 /// Standard deviations from the inverse of the last normal matrix.
@@ -62,19 +62,19 @@ pub(super) struct RefinementSigmas {
 /// Where each block of columns begins.
 pub(super) struct Layout {
     views: usize,
-    own_turns: bool,
+    per_view_rotations: bool,
 }
 
 impl Layout {
-    const SHARED_TURN: usize = 0;
-    const SHARED_SHIFT: usize = 3;
+    const COMMON_ROTATION: usize = 0;
+    const COMMON_SHIFT: usize = 3;
     const GYROSCOPE: usize = 6;
     const ACCELEROMETER: usize = 9;
     const GRAVITY: usize = 12;
     const GLOBALS: usize = 14;
 
     fn per_view(&self) -> usize {
-        if self.own_turns { 12 } else { 9 }
+        if self.per_view_rotations { 12 } else { 9 }
     }
 
     /// Velocity of a view (3).
@@ -88,8 +88,8 @@ impl Layout {
     }
 
     /// Own turn of a view's mount (3), when there is one.
-    fn own_turn(&self, view: usize) -> Option<usize> {
-        self.own_turns.then(|| self.velocity(view) + 9)
+    fn view_rotation(&self, view: usize) -> Option<usize> {
+        self.per_view_rotations.then(|| self.velocity(view) + 9)
     }
 
     pub(super) fn columns(&self) -> usize {
@@ -109,11 +109,11 @@ impl RefinedState {
             .collect();
         let first = changes.first().copied().unwrap_or_else(UnitQuaternion::identity);
         let from_first = changes.iter().map(|change| so3::log(&(first.inverse() * change))).sum::<Vector3<f64>>();
-        let shared_turn = first * so3::exp(&(from_first / changes.len().max(1) as f64));
+        let common_rotation = first * so3::exp(&(from_first / changes.len().max(1) as f64));
         let own = |(change, given): (&UnitQuaternion<f64>, &RigidTransform)| {
-            given.rotation.inverse() * shared_turn.inverse() * change * given.rotation
+            given.rotation.inverse() * common_rotation.inverse() * change * given.rotation
         };
-        let own_turns = if input.mount_rotation_noise_rad > 0.0 {
+        let per_view_rotations = if input.extrinsics_rotation_noise_rad > 0.0 {
             changes.iter().zip(input.imu_from_camera).map(own).collect()
         } else {
             vec![UnitQuaternion::identity(); changes.len()]
@@ -129,9 +129,9 @@ impl RefinedState {
             gravity: alignment.gravity,
             bias: alignment.bias,
             landmarks: landmarks.iter().map(scaled).collect(),
-            shared_turn,
-            shared_shift: Vector3::zeros(),
-            own_turns,
+            common_rotation,
+            common_shift: Vector3::zeros(),
+            per_view_rotations,
         }
     }
 
@@ -139,11 +139,11 @@ impl RefinedState {
     pub(super) fn imu_from_camera(&self, given: &[RigidTransform]) -> Vec<RigidTransform> {
         given
             .iter()
-            .zip(&self.own_turns)
+            .zip(&self.per_view_rotations)
             .map(|(given, own)| {
                 RigidTransform::new(
-                    UnitQuaternion::new_normalize((self.shared_turn * given.rotation * own).into_inner()),
-                    given.translation_m + self.shared_shift,
+                    UnitQuaternion::new_normalize((self.common_rotation * given.rotation * own).into_inner()),
+                    given.translation_m + self.common_shift,
                 )
             })
             .collect()
@@ -164,8 +164,8 @@ impl RefinedState {
         let normalized = |q: UnitQuaternion<f64>| UnitQuaternion::new_normalize(q.into_inner());
         let mut next = self.clone();
         next.landmarks = landmarks;
-        next.shared_turn = normalized(self.shared_turn * so3::exp(&three(Layout::SHARED_TURN)));
-        next.shared_shift += three(Layout::SHARED_SHIFT);
+        next.common_rotation = normalized(self.common_rotation * so3::exp(&three(Layout::COMMON_ROTATION)));
+        next.common_shift += three(Layout::COMMON_SHIFT);
         next.bias.gyroscope_rad_per_s += three(Layout::GYROSCOPE);
         next.bias.accelerometer_m_per_s2 += three(Layout::ACCELEROMETER);
         let gravity = self.gravity + self.gravity_basis() * step.fixed_rows::<2>(Layout::GRAVITY);
@@ -175,8 +175,8 @@ impl RefinedState {
             if view > 0 {
                 next.poses[view] = self.poses[view].plus(&step.fixed_rows::<6>(layout.pose(view)).into_owned());
             }
-            if let Some(start) = layout.own_turn(view) {
-                next.own_turns[view] = normalized(self.own_turns[view] * so3::exp(&three(start)));
+            if let Some(start) = layout.view_rotation(view) {
+                next.per_view_rotations[view] = normalized(self.per_view_rotations[view] * so3::exp(&three(start)));
             }
         }
         next
@@ -184,7 +184,7 @@ impl RefinedState {
 }
 
 /// Whitened inertial residual `[φ, p, v]` of one interval.
-fn inertial_residual(
+fn imu_residual(
     state: &RefinedState,
     view: usize,
     increment: &Preintegration,
@@ -227,7 +227,7 @@ pub(super) struct Refinement<'a> {
 pub(super) struct Refined {
     pub(super) state: RefinedState,
     /// Mean square of the whitened IMU residuals, biases' priors left out.
-    pub(super) inertial_mean_square: f64,
+    pub(super) imu_mean_square: f64,
     pub(super) sigmas: Option<RefinementSigmas>,
     pub(super) rounds: usize,
     /// The last round changed next to nothing.
@@ -250,7 +250,10 @@ impl<'a> Refinement<'a> {
                 lower.solve_lower_triangular(&Matrix9::identity()).filter(|w| w.iter().all(|x| x.is_finite()))
             })
             .collect::<Option<Vec<_>>>()?;
-        let layout = Layout { views: input.imu_from_camera.len(), own_turns: input.mount_rotation_noise_rad > 0.0 };
+        let layout = Layout {
+            views: input.imu_from_camera.len(),
+            per_view_rotations: input.extrinsics_rotation_noise_rad > 0.0,
+        };
         Some(Self { input, whitening, layout })
     }
 
@@ -260,16 +263,15 @@ impl<'a> Refinement<'a> {
             iterations: rounds,
             relative_cost_tolerance: 1e-4,
             first_damping: 1e-4,
-            least_damping: 1e-9,
-            most_damping: 1e6,
+            min_damping: 1e-9,
+            max_damping: 1e6,
             growth: 20.0,
         };
         let mut problem = self;
         let solution = minimize(&mut problem, start, &options);
-        let inertial_mean_square =
-            self.inertial_cost(&solution.estimate) / (9 * self.input.increments.len()).max(1) as f64;
+        let imu_mean_square = self.imu_cost(&solution.estimate) / (9 * self.input.increments.len()).max(1) as f64;
         Refined {
-            inertial_mean_square,
+            imu_mean_square,
             sigmas: None,
             rounds: solution.tried,
             settled: solution.stop != StopReason::IterationLimit,
@@ -314,31 +316,29 @@ impl<'a> Refinement<'a> {
     pub(super) fn cost(&self, state: &RefinedState) -> f64 {
         let cameras = state.cameras(self.input.imu_from_camera);
         visual_cost(&state.landmarks, &cameras, self.input.bearing_sigma_rad)
-            + self.inertial_cost(state)
+            + self.imu_cost(state)
             + self.prior_cost(state)
     }
 
-    fn inertial_cost(&self, state: &RefinedState) -> f64 {
+    fn imu_cost(&self, state: &RefinedState) -> f64 {
         self.input
             .increments
             .iter()
             .enumerate()
-            .map(|(view, increment)| {
-                (self.whitening[view] * inertial_residual(state, view, increment).0).norm_squared()
-            })
+            .map(|(view, increment)| (self.whitening[view] * imu_residual(state, view, increment).0).norm_squared())
             .sum()
     }
 
     fn prior_cost(&self, state: &RefinedState) -> f64 {
         let input = self.input;
-        let square = |vector: Vector3<f64>, sigma: f64| vector.norm_squared() / sigma.max(LEAST_SIGMA).powi(2);
-        let mut cost = square(so3::log(&state.shared_turn), input.mount_rotation_sigma_rad)
-            + square(state.shared_shift, input.mount_translation_sigma_m)
+        let square = |vector: Vector3<f64>, sigma: f64| vector.norm_squared() / sigma.max(MIN_SIGMA).powi(2);
+        let mut cost = square(so3::log(&state.common_rotation), input.extrinsics_rotation_sigma_rad)
+            + square(state.common_shift, input.extrinsics_translation_sigma_m)
             + square(state.bias.gyroscope_rad_per_s - input.gyroscope_bias.mean, input.gyroscope_bias.sigma)
             + square(state.bias.accelerometer_m_per_s2 - input.accelerometer_bias.mean, input.accelerometer_bias.sigma);
-        if self.layout.own_turns {
-            for own in &state.own_turns {
-                cost += square(so3::log(own), input.mount_rotation_noise_rad);
+        if self.layout.per_view_rotations {
+            for own in &state.per_view_rotations {
+                cost += square(so3::log(own), input.extrinsics_rotation_noise_rad);
             }
         }
         cost
@@ -355,7 +355,7 @@ impl<'a> Refinement<'a> {
         };
         let RefinementEquations { normal, gradient, .. } = &mut equations;
         for (view, increment) in self.input.increments.iter().enumerate() {
-            self.add_inertial(state, view, increment, normal, gradient);
+            self.add_imu(state, view, increment, normal, gradient);
         }
         self.add_priors(state, normal, gradient);
         equations
@@ -386,9 +386,11 @@ impl<'a> Refinement<'a> {
     fn camera_blocks(&self, state: &RefinedState, view: usize) -> Vec<(usize, SMatrix<f64, 6, 3>)> {
         let pose = &state.poses[view];
         let given = &self.input.imu_from_camera[view];
-        let lever = given.translation_m + state.shared_shift;
-        let after_shared: Matrix3<f64> = (given.rotation * state.own_turns[view]).to_rotation_matrix().into_inner();
-        let mount = (state.shared_turn * given.rotation * state.own_turns[view]).to_rotation_matrix().into_inner();
+        let lever = given.translation_m + state.common_shift;
+        let after_shared: Matrix3<f64> =
+            (given.rotation * state.per_view_rotations[view]).to_rotation_matrix().into_inner();
+        let mount =
+            (state.common_rotation * given.rotation * state.per_view_rotations[view]).to_rotation_matrix().into_inner();
         let rotation = pose.rotation_matrix();
         let block = |top: Matrix3<f64>, bottom: Matrix3<f64>| {
             let mut block = SMatrix::<f64, 6, 3>::zeros();
@@ -398,12 +400,12 @@ impl<'a> Refinement<'a> {
         };
         let start = self.layout.pose(view);
         let mut blocks = vec![
-            (Layout::SHARED_TURN, block(after_shared.transpose(), Matrix3::zeros())),
-            (Layout::SHARED_SHIFT, block(Matrix3::zeros(), rotation)),
+            (Layout::COMMON_ROTATION, block(after_shared.transpose(), Matrix3::zeros())),
+            (Layout::COMMON_SHIFT, block(Matrix3::zeros(), rotation)),
             (start, block(mount.transpose(), -rotation * so3::hat(&lever))),
             (start + 3, block(Matrix3::zeros(), Matrix3::identity())),
         ];
-        if let Some(start) = self.layout.own_turn(view) {
+        if let Some(start) = self.layout.view_rotation(view) {
             blocks.push((start, block(Matrix3::identity(), Matrix3::zeros())));
         }
         blocks
@@ -446,7 +448,7 @@ impl<'a> Refinement<'a> {
             .collect()
     }
 
-    fn add_inertial(
+    fn add_imu(
         &self,
         state: &RefinedState,
         view: usize,
@@ -454,7 +456,7 @@ impl<'a> Refinement<'a> {
         normal: &mut DMatrix<f64>,
         gradient: &mut DVector<f64>,
     ) {
-        let (residual, shift, gain) = inertial_residual(state, view, increment);
+        let (residual, shift, gain) = imu_residual(state, view, increment);
         let whitening = &self.whitening[view];
         let t = increment.duration_s();
         let from = state.poses[view].rotation_matrix();
@@ -514,24 +516,29 @@ impl<'a> Refinement<'a> {
     fn add_priors(&self, state: &RefinedState, normal: &mut DMatrix<f64>, gradient: &mut DVector<f64>) {
         let input = self.input;
         let mut add = |start: usize, residual: &Vector3<f64>, jacobian: &Matrix3<f64>, sigma: f64| {
-            let weight = 1.0 / sigma.max(LEAST_SIGMA).powi(2);
+            let weight = 1.0 / sigma.max(MIN_SIGMA).powi(2);
             let mut target = normal.fixed_view_mut::<3, 3>(start, start);
             target += jacobian.tr_mul(jacobian) * weight;
             let mut target = gradient.fixed_rows_mut::<3>(start);
             target += jacobian.tr_mul(residual) * weight;
         };
-        let shared = so3::log(&state.shared_turn);
-        add(Layout::SHARED_TURN, &shared, &so3::right_jacobian_inverse(&shared), input.mount_rotation_sigma_rad);
+        let shared = so3::log(&state.common_rotation);
+        add(
+            Layout::COMMON_ROTATION,
+            &shared,
+            &so3::right_jacobian_inverse(&shared),
+            input.extrinsics_rotation_sigma_rad,
+        );
         let identity = Matrix3::identity();
-        add(Layout::SHARED_SHIFT, &state.shared_shift, &identity, input.mount_translation_sigma_m);
+        add(Layout::COMMON_SHIFT, &state.common_shift, &identity, input.extrinsics_translation_sigma_m);
         let gyroscope = state.bias.gyroscope_rad_per_s - input.gyroscope_bias.mean;
         add(Layout::GYROSCOPE, &gyroscope, &identity, input.gyroscope_bias.sigma);
         let accelerometer = state.bias.accelerometer_m_per_s2 - input.accelerometer_bias.mean;
         add(Layout::ACCELEROMETER, &accelerometer, &identity, input.accelerometer_bias.sigma);
-        for (view, own) in state.own_turns.iter().enumerate() {
-            if let Some(start) = self.layout.own_turn(view) {
+        for (view, own) in state.per_view_rotations.iter().enumerate() {
+            if let Some(start) = self.layout.view_rotation(view) {
                 let own = so3::log(own);
-                add(start, &own, &so3::right_jacobian_inverse(&own), input.mount_rotation_noise_rad);
+                add(start, &own, &so3::right_jacobian_inverse(&own), input.extrinsics_rotation_noise_rad);
             }
         }
     }

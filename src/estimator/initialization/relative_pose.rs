@@ -220,8 +220,8 @@ fn refine(pairs: &[BearingPair], start: &RigidTransform, sigma_rad: f64) -> Rigi
         iterations: 12,
         relative_cost_tolerance: 1e-6,
         first_damping: 1e-4,
-        least_damping: 1e-9,
-        most_damping: 1e6,
+        min_damping: 1e-9,
+        max_damping: 1e6,
         growth: 30.0,
     };
     minimize(&mut EpipolarFit { pairs, sigma_rad }, *start, &options).estimate

@@ -54,22 +54,22 @@ pub(super) fn select_views(
     let mut candidate = newest;
     // The farthest frame so far that still shares enough features with the last one taken.
     let mut linked = None;
-    while candidate > 0 && selected.len() < options.most_views {
+    while candidate > 0 && selected.len() < options.max_views {
         candidate -= 1;
         if age(candidate, newest) > options.longest_window_s {
             break;
         }
         let pairs = shared_bearings(frames[candidate].features, frames[last].features);
         let mut taken = None;
-        if pairs.len() < options.least_common_features {
+        if pairs.len() < options.min_common_features {
             let Some(frame) = linked else { break };
             taken = Some(frame);
         } else {
             linked = Some(candidate);
             let spacing = age(candidate, last);
-            if spacing >= options.most_spacing_s {
+            if spacing >= options.max_spacing_s {
                 taken = linked;
-            } else if spacing >= options.least_spacing_s {
+            } else if spacing >= options.min_spacing_s {
                 let guess = rotations[last].inverse() * rotations[candidate];
                 let parallax = fit_rotation(&pairs, &guess).map_or(0.0, |fit| fit.median_parallax_rad);
                 taken = linked.filter(|_| parallax >= options.spacing_parallax_rad);

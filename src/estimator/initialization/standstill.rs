@@ -13,19 +13,19 @@ const QUIET_S: f64 = 1.0;
 /// Samples are averaged over this long first, so that vibration and white noise do not hide that nothing moves.
 const BLOCK_NS: i64 = 100_000_000;
 /// Largest standard deviation of the averaged angular velocity (worst axis), beyond the sensor's own noise.
-const MOST_GYROSCOPE_STD_RAD_PER_S: f64 = 0.002;
+const MAX_GYROSCOPE_STD_RAD_PER_S: f64 = 0.002;
 /// Largest standard deviation of the averaged specific force (worst axis), beyond the sensor's own noise.
-const MOST_ACCELEROMETER_STD_M_PER_S2: f64 = 0.03;
+const MAX_ACCELEROMETER_STD_M_PER_S2: f64 = 0.03;
 /// A slow rotation that a second cannot separate from a bias.
 const HIDDEN_TURN_RAD_PER_S: f64 = 0.001;
 /// Largest mean angular velocity: a turn-on bias may be this large, a turn is larger.
-const MOST_TURN_RAD_PER_S: f64 = 0.15;
+const MAX_ANGULAR_RATE_RAD_PER_S: f64 = 0.15;
 /// Largest rotation-compensated parallax over the stretch.
-const MOST_PARALLAX_RAD: f64 = 0.004;
+const MAX_PARALLAX_RAD: f64 = 0.004;
 
 /// What a standstill measures.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StandstillEstimate {
+pub struct StationaryEstimate {
     /// Stamp of the newest frame that belongs to it.
     pub stamp_ns: i64,
     /// Mean angular velocity: the gyroscope's bias.
@@ -37,7 +37,7 @@ pub struct StandstillEstimate {
 }
 
 /// Looks at the last [`QUIET_S`] seconds; the tests go to `checklist`.
-pub(super) fn detect(input: &InitializationInput<'_>, checklist: &mut Checklist) -> Option<StandstillEstimate> {
+pub(super) fn detect(input: &InitializationInput<'_>, checklist: &mut Checklist) -> Option<StationaryEstimate> {
     let newest = input.frames.last()?;
     let begin = newest.stamp_ns - (QUIET_S * 1e9) as i64;
     let frames: Vec<&InitializationFrame<'_>> = input.frames.iter().filter(|frame| frame.stamp_ns >= begin).collect();
@@ -51,8 +51,8 @@ pub(super) fn detect(input: &InitializationInput<'_>, checklist: &mut Checklist)
     let (gyroscope, gyroscope_std) = mean_and_std(blocks.iter().map(|block| block.0));
     let (force, force_std) = mean_and_std(blocks.iter().map(|block| block.1));
     let own = |density: f64| 1.5 * density / (BLOCK_NS as f64 * 1e-9).sqrt();
-    let gyroscope_limit = MOST_GYROSCOPE_STD_RAD_PER_S.hypot(own(input.imu_noise.gyroscope_noise_density));
-    let force_limit = MOST_ACCELEROMETER_STD_M_PER_S2.hypot(own(input.imu_noise.accelerometer_noise_density));
+    let gyroscope_limit = MAX_GYROSCOPE_STD_RAD_PER_S.hypot(own(input.imu_noise.gyroscope_noise_density));
+    let force_limit = MAX_ACCELEROMETER_STD_M_PER_S2.hypot(own(input.imu_noise.accelerometer_noise_density));
     let plain = Shown::Plain;
     let subject = "spread of the angular velocity";
     checklist.at_most("standstill gyroscope", subject, gyroscope_std, gyroscope_limit, plain(" rad/s"));
@@ -60,7 +60,7 @@ pub(super) fn detect(input: &InitializationInput<'_>, checklist: &mut Checklist)
         "standstill turn",
         "mean angular velocity",
         gyroscope.norm(),
-        MOST_TURN_RAD_PER_S,
+        MAX_ANGULAR_RATE_RAD_PER_S,
         plain(" rad/s"),
     );
     let subject = "spread of the specific force";
@@ -72,8 +72,8 @@ pub(super) fn detect(input: &InitializationInput<'_>, checklist: &mut Checklist)
     let guess = frames.first()?.imu_from_camera.rotation;
     let fit = fit_rotation(&pairs, &(newest.imu_from_camera.rotation.inverse() * guess))?;
     let subject = "motion of the picture within a second, rotation taken out,";
-    checklist.at_most("standstill picture", subject, fit.median_parallax_rad, MOST_PARALLAX_RAD, Shown::Degrees);
-    checklist.all_passed().then(|| StandstillEstimate {
+    checklist.at_most("standstill picture", subject, fit.median_parallax_rad, MAX_PARALLAX_RAD, Shown::Degrees);
+    checklist.all_passed().then(|| StationaryEstimate {
         stamp_ns: newest.stamp_ns,
         gyroscope_bias_rad_per_s: gyroscope,
         gyroscope_bias_sigma_rad_per_s: HIDDEN_TURN_RAD_PER_S.hypot(gyroscope_std),

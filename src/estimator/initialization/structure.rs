@@ -16,7 +16,7 @@ use crate::optimization::damped::{DampedOptions, DampedProblem, minimize};
 use crate::optimization::{DensePoseEquations, ReprojectionEquations};
 
 /// A feature must be seen under at least this angle before its depth counts.
-const LEAST_PARALLAX_RAD: f64 = 0.006;
+const MIN_PARALLAX_RAD: f64 = 0.006;
 /// Pairs looked at when the parallax of two views is measured.
 const PARALLAX_PAIRS: usize = 60;
 /// Parallax beyond this makes a pair of views no better.
@@ -103,17 +103,17 @@ impl ViewPair {
     }
 }
 
-/// Every pair of views with at least `least_common` features in common, best base for a reconstruction first.
+/// Every pair of views with at least `min_common` features in common, best base for a reconstruction first.
 pub(super) fn rank_pairs(
     tracks: &Tracks,
     guessed_rotations: &[UnitQuaternion<f64>],
-    least_common: usize,
+    min_common: usize,
 ) -> Vec<ViewPair> {
     let mut pairs = Vec::new();
     for view_j in 1..guessed_rotations.len() {
         for view_i in 0..view_j {
             let bearings = common_bearings(tracks, view_i, view_j);
-            if bearings.len() < least_common {
+            if bearings.len() < min_common {
                 continue;
             }
             // Every n-th one: ids follow the grid in which features were found, so this stays spread.
@@ -135,7 +135,7 @@ pub(super) enum StructureFailure {
     /// No pair of views has a relative pose that enough features agree with; the best share of them.
     NoRelativePose {
         /// Inliers of the best pair over its common features.
-        inlier_share: f64,
+        inlier_ratio: f64,
     },
     /// Too few landmarks remained; how many.
     FewLandmarks {
@@ -175,9 +175,9 @@ pub(super) struct StructureLimits {
     pub(super) bearing_sigma_rad: f64,
     /// Standard deviation of the guessed relative rotations.
     pub(super) rotation_sigma_rad: f64,
-    pub(super) least_landmarks: usize,
-    pub(super) least_views: usize,
-    pub(super) least_inlier_share: f64,
+    pub(super) min_landmarks: usize,
+    pub(super) min_views: usize,
+    pub(super) min_inlier_ratio: f64,
     pub(super) seed: u64,
 }
 
@@ -188,7 +188,7 @@ pub(super) fn reconstruct(
     guessed_rotations: &[UnitQuaternion<f64>],
     limits: &StructureLimits,
 ) -> Result<Structure, StructureFailure> {
-    let mut failure = StructureFailure::NoRelativePose { inlier_share: 0.0 };
+    let mut failure = StructureFailure::NoRelativePose { inlier_ratio: 0.0 };
     for pair in pairs.iter().take(PAIRS_TRIED) {
         match reconstruct_from(tracks, pair, guessed_rotations, limits) {
             Ok(structure) => return Ok(structure),
@@ -209,9 +209,9 @@ fn reconstruct_from(
     let prior = RotationPrior { rotation: guess, sigma_rad: limits.rotation_sigma_rad };
     let bases = relative_poses(&bearings, &prior, limits.bearing_sigma_rad, limits.seed);
     let share = |base: &RelativePose| base.inliers.len() as f64 / bearings.len() as f64;
-    let inlier_share = bases.iter().map(share).fold(0.0, f64::max);
-    let mut best: Result<Structure, StructureFailure> = Err(StructureFailure::NoRelativePose { inlier_share });
-    for base in bases.iter().filter(|base| share(base) >= limits.least_inlier_share) {
+    let inlier_ratio = bases.iter().map(share).fold(0.0, f64::max);
+    let mut best: Result<Structure, StructureFailure> = Err(StructureFailure::NoRelativePose { inlier_ratio });
+    for base in bases.iter().filter(|base| share(base) >= limits.min_inlier_ratio) {
         let grown = grow(tracks, pair, base, guessed_rotations, limits);
         // Of two solutions of a plane the wrong one places fewer views or landmarks.
         let merit = |structure: &Structure| {
@@ -247,11 +247,11 @@ fn grow(
         map.place(view, guessed_rotations, limits);
     }
     let structure = map.finish();
-    if structure.views.len() < limits.least_views {
+    if structure.views.len() < limits.min_views {
         return Err(StructureFailure::FewViews { views: structure.views.len() });
     }
     let structure = adjust(structure, limits.bearing_sigma_rad);
-    if structure.landmarks.len() < limits.least_landmarks {
+    if structure.landmarks.len() < limits.min_landmarks {
         return Err(StructureFailure::FewLandmarks { landmarks: structure.landmarks.len() });
     }
     Ok(structure)
@@ -287,7 +287,7 @@ impl GrowingMap<'_> {
             self.points.remove(id);
             let Some(point) = triangulate(&rays) else { continue };
             let fits = point.worst_angle_rad < OUTLIER_SIGMAS * self.sigma_rad;
-            if point.in_front && fits && point.parallax_rad > LEAST_PARALLAX_RAD {
+            if point.in_front && fits && point.parallax_rad > MIN_PARALLAX_RAD {
                 self.points.insert(*id, point.position);
             }
         }
@@ -313,7 +313,7 @@ impl GrowingMap<'_> {
         let start = RigidTransform::new(neighbour_pose.rotation * rotation, neighbour_pose.translation_m);
         let Some(pose) = refine_camera_pose(&known, &start, self.sigma_rad, OUTLIER_SIGMAS) else { return };
         let fitting = pose.inliers.iter().filter(|inlier| **inlier).count();
-        let needed = (limits.least_inlier_share * known.len() as f64).max(8.0);
+        let needed = (limits.min_inlier_ratio * known.len() as f64).max(8.0);
         if fitting as f64 >= needed {
             self.poses[view] = Some(pose.world_from_camera);
             self.triangulate_seen_in(view);
@@ -361,8 +361,8 @@ fn bundle_adjust(structure: Structure, sigma_rad: f64) -> Structure {
         iterations: 8,
         relative_cost_tolerance: 1e-4,
         first_damping: 1e-3,
-        least_damping: 1e-8,
-        most_damping: 1e8,
+        min_damping: 1e-8,
+        max_damping: 1e8,
         growth: 20.0,
     };
     minimize(&mut FreeViews { sigma_rad }, structure, &options).estimate

@@ -8,7 +8,7 @@ pub enum EventKind {
     /// The window was initialized from motion.
     InitializedFromMotion,
     /// The window was initialized from standstill.
-    InitializedFromStandstill,
+    InitializedFromStationary,
     /// The frame became a keyframe (or did not); the value is the deciding figure.
     KeyframeChosen,
     /// The oldest frame was marginalized.
@@ -24,15 +24,15 @@ pub enum EventKind {
     /// The estimator failed and starts again.
     Failure,
     /// The parameterization was switched near a singularity.
-    ChartSwitched,
+    ParameterizationSwitched,
     /// Measurements were missing or unusable.
     MeasurementMissing,
 }
 
 impl EventKind {
     /// Whether the step made the first window.
-    pub fn begins_window(self) -> bool {
-        matches!(self, Self::InitializedFromMotion | Self::InitializedFromStandstill)
+    pub fn initializes_window(self) -> bool {
+        matches!(self, Self::InitializedFromMotion | Self::InitializedFromStationary)
     }
 
     /// Whether it is rare enough to jump to, and for the lane of events; nearly every frame has one of the others, which
@@ -40,10 +40,10 @@ impl EventKind {
     pub fn is_notable(self) -> bool {
         match self {
             Self::InitializedFromMotion
-            | Self::InitializedFromStandstill
+            | Self::InitializedFromStationary
             | Self::Standstill
             | Self::Failure
-            | Self::ChartSwitched
+            | Self::ParameterizationSwitched
             | Self::MeasurementMissing => true,
             Self::InitializationWaits
             | Self::KeyframeChosen

@@ -158,8 +158,8 @@ impl<'a> Writer<'a> {
     fn other_rows(&self) -> Vec<JacobianRow> {
         let numbers: Vec<FrameId> = self.report.window.iter().map(|frame| FrameId(frame.frame_index)).collect();
         let mut rows: Vec<JacobianRow> = self.source.rows(&numbers).collect();
-        let is_inertial = |row: &JacobianRow| matches!(row.factor, JacobianFactor::Inertial { .. });
-        let place = rows.iter().position(|row| !is_inertial(row)).unwrap_or(rows.len());
+        let is_imu = |row: &JacobianRow| matches!(row.factor, JacobianFactor::Inertial { .. });
+        let place = rows.iter().position(|row| !is_imu(row)).unwrap_or(rows.len());
         // The readings of a frame touch its joint angles alone, each with the inverse of its standard deviation.
         let encoders = self.report.window.iter().enumerate().filter_map(|(slot, frame)| {
             let sigmas = frame.encoder_sigmas_rad.as_ref().filter(|sigmas| !sigmas.is_empty())?;
@@ -253,8 +253,8 @@ fn window_camera<'a>(
         shift_s: then_s,
         shift_column: (source.calibrated && clocks.count > 0).then(|| chain.dof()),
     };
-    let linearized: Vec<CameraPose> = states.iter().map(|state| camera_pose::at_mount(state, &mount)).collect();
-    let maps = CameraMaps::of_mount(states, &mount);
+    let linearized: Vec<CameraPose> = states.iter().map(|state| camera_pose::at_extrinsics(state, &mount)).collect();
+    let maps = CameraMaps::of_extrinsics(states, &mount);
     let maps = maps.own.into_iter().zip(maps.calibration).collect();
     let rigid = camera.checked_sub(1).and_then(|rigid| report.calibration.rigid_cameras.get(rigid));
     let now = report.window.iter().zip(states).map(|(frame, state)| {
@@ -263,7 +263,7 @@ fn window_camera<'a>(
         state.navigation.velocity_m_per_s = frame.velocity_m_per_s;
         state.joints_rad.clone_from(&frame.joint_angles_rad);
         let seen = camera_pose::when_seen(&state, now_s);
-        let mounted = match rigid {
+        let imu_from_observer = match rigid {
             Some((_, mount)) => *mount,
             // With its clock right the camera is where the report has it.
             None if now_s == 0.0 => frame.imu_from_camera,
@@ -274,7 +274,7 @@ fn window_camera<'a>(
                 frame.imu_from_camera * moved
             }
         };
-        let pose = seen.navigation.world_from_imu * mounted;
+        let pose = seen.navigation.world_from_imu * imu_from_observer;
         CameraPose { rotation: pose.rotation_matrix(), position_m: pose.translation_m }
     });
     let current: Vec<CameraPose> = now.collect();

@@ -53,11 +53,11 @@ impl Calibration {
 /// Pose of the camera at a state: the IMU's pose and the mount at the state's joint angles, when the camera's clock says
 /// the frame's stamp.
 pub(crate) fn at(state: &FrameState, calibration: &Calibration) -> CameraPose {
-    at_mount(state, &calibration.mount())
+    at_extrinsics(state, &calibration.mount())
 }
 
 /// [`at`] for a mount.
-pub(crate) fn at_mount(state: &FrameState, mount: &Mount<'_>) -> CameraPose {
+pub(crate) fn at_extrinsics(state: &FrameState, mount: &Mount<'_>) -> CameraPose {
     let state = &*when_seen(state, mount.shift_s);
     let pose = state.navigation.world_from_imu * mount.chain.imu_from_camera(mount.own(&state.joints_rad));
     CameraPose { rotation: pose.rotation_matrix(), position_m: pose.translation_m }
@@ -85,14 +85,14 @@ pub(crate) struct CameraMaps {
 impl CameraMaps {
     /// The maps at these states and this calibration.
     pub(crate) fn new(frames: &[FrameState], calibration: &Calibration) -> Self {
-        Self::of_mount(frames, &calibration.mount())
+        Self::of_extrinsics(frames, &calibration.mount())
     }
 
     /// [`Self::new`] for a mount.
     ///
     /// That a clock's offset multiplies velocity and gyroscope bias is left out: a centisecond of a bias' change moves
     /// nothing.
-    pub(crate) fn of_mount(frames: &[FrameState], mount: &Mount<'_>) -> Self {
+    pub(crate) fn of_extrinsics(frames: &[FrameState], mount: &Mount<'_>) -> Self {
         let mut maps = Self { own: Vec::new(), calibration: Vec::new() };
         for stamped in frames {
             let state = &*when_seen(stamped, mount.shift_s);

@@ -24,7 +24,7 @@ impl BothFlights {
             seed,
             duration_s,
             pixel_sigma_px: EstimatorOptions::default().pixel_sigma_px,
-            outlier_share: 0.02,
+            outlier_ratio: 0.02,
             features: 80,
             ..SyntheticOptions::default()
         };

@@ -17,7 +17,7 @@ fn options(mount: SyntheticMount) -> SyntheticOptions {
         seed: 5,
         duration_s: 10.0,
         pixel_sigma_px: 0.5,
-        outlier_share: 0.02,
+        outlier_ratio: 0.02,
         features: 100,
         ..SyntheticOptions::default()
     }

@@ -173,7 +173,7 @@ fn says_standstill(report: &StepReport) -> bool {
 #[test]
 fn a_landed_vehicle_stays_where_it_is_and_flies_on() {
     for mount in [SyntheticMount::Gimbal, SyntheticMount::Static] {
-        let flight = synthetic_tracks(&options(mount, SyntheticMotion::StandstillThenAggressive));
+        let flight = synthetic_tracks(&options(mount, SyntheticMotion::StationaryThenAggressive));
         // One track in fifty ends in every image: hardly one lives through ten seconds.
         let (landing, ids) = Landing::new(&flight).land().stay(12.0, 0.02, |_| 0.0);
         let frames = landing.take_off(&ids);
@@ -204,7 +204,7 @@ fn a_landed_vehicle_stays_where_it_is_and_flies_on() {
 #[test]
 fn a_creeping_vehicle_is_not_held() {
     let creep = |after_s: f64| 0.01 * (after_s * after_s / (after_s.max(0.0) + 2.0));
-    let flight = synthetic_tracks(&options(SyntheticMount::Static, SyntheticMotion::StandstillThenAggressive));
+    let flight = synthetic_tracks(&options(SyntheticMount::Static, SyntheticMotion::StationaryThenAggressive));
     let frames = Landing::new(&flight).land().stay(12.0, 0.004, creep).0.frames;
     let config = fixture::config(&flight.given_rig, Parameterization::Minimal, EstimatorOptions::default());
     let (estimator, reports) = fly(&frames, config);
@@ -245,7 +245,7 @@ fn a_hovering_vehicle_is_not_taken_for_a_resting_one() {
 #[test]
 fn from_standstill_it_waits_for_motion_and_says_so() {
     for mount in [SyntheticMount::Gimbal, SyntheticMount::Static] {
-        let flight = synthetic_tracks(&options(mount, SyntheticMotion::StandstillThenAggressive));
+        let flight = synthetic_tracks(&options(mount, SyntheticMotion::StationaryThenAggressive));
         let config = fixture::config(&flight.given_rig, Parameterization::Minimal, EstimatorOptions::default());
         let (estimator, reports) = fly(&flight.frames, config);
         assert_eq!(estimator.restarts, 0);

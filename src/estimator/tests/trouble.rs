@@ -21,7 +21,7 @@ fn options(mount: SyntheticMount, seed: u64) -> SyntheticOptions {
         seed,
         duration_s: 14.0,
         pixel_sigma_px: 0.5,
-        outlier_share: 0.02,
+        outlier_ratio: 0.02,
         features: 100,
         ..SyntheticOptions::default()
     }
@@ -250,7 +250,7 @@ fn a_switch_of_charts_in_a_running_window_changes_nothing_else() {
 #[test]
 fn a_chart_near_its_lock_is_left_once_and_for_good() {
     let flight = synthetic_tracks(&SyntheticOptions { duration_s: 8.0, ..options(SyntheticMount::Gimbal, 5) });
-    let config = EstimatorConfig { auto_chart: true, ..config(&flight) };
+    let config = EstimatorConfig { auto_parameterize: true, ..config(&flight) };
     let mut estimator = Estimator::new(config);
     let mut switched = 0;
     for frame in &flight.frames {
@@ -260,7 +260,7 @@ fn a_chart_near_its_lock_is_left_once_and_for_good() {
             switch(&mut estimator, Parameterization::MinimalSwapped);
         }
         let report = step(&mut estimator, frame);
-        for event in report.events.iter().filter(|event| event.kind == EventKind::ChartSwitched) {
+        for event in report.events.iter().filter(|event| event.kind == EventKind::ParameterizationSwitched) {
             switched += 1;
             assert_eq!(frame.index, 130);
             assert!(event.value.unwrap() < event.threshold.unwrap());

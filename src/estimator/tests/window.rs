@@ -115,7 +115,7 @@ fn marginalizing_the_oldest_agrees_with_the_full_batch() {
         // The oldest frame and all tracks first, the rest of the factors on what they leave.
         let mut prior = marginalization::oldest(&problem, &estimate).unwrap();
         let mut rest = vec![problem.calibration_prior_rows(&estimate)];
-        rest.extend((2..layout.frames).map(|slot| problem.inertial_rows(slot, &estimate)));
+        rest.extend((2..layout.frames).map(|slot| problem.imu_rows(slot, &estimate)));
         rest.extend((1..layout.frames).map(|slot| problem.encoder_rows(slot, &estimate)));
         let rest = stack(&rest, layout.total() + 1);
         prior.renumber(0);
@@ -220,7 +220,7 @@ fn the_classical_chain_keeps_its_null_directions_with_first_estimates() {
     let total = problem.layout.total();
     let mut parts =
         vec![problem.visual_rows(&estimate), problem.prior.unwrap().rows(&problem.layout, &DVector::zeros(total))];
-    parts.extend((1..problem.layout.frames).map(|slot| problem.inertial_rows(slot, &estimate)));
+    parts.extend((1..problem.layout.frames).map(|slot| problem.imu_rows(slot, &estimate)));
     let rows = stack(&parts, total + 1);
     let first = estimate.calibration.at_first_estimate();
     let directions = crate::gimbal::redundant_directions(&first.of(MAIN).chain().to_classical());

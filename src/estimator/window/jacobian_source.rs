@@ -43,7 +43,7 @@ impl WindowState {
             }
         };
         for slot in 1..layout.frames {
-            push(PackedKind::Inertial(slot as u8), &problem.inertial_rows_at(slot, estimate, &frames));
+            push(PackedKind::Inertial(slot as u8), &problem.imu_rows_at(slot, estimate, &frames));
         }
         let stationary: Vec<_> = problem.zero_velocity_terms(&estimate.frames).collect();
         push(PackedKind::Standstill, &problem.zero_velocity_rows(&stationary));

@@ -13,7 +13,7 @@ use crate::sensors::JointAngles;
 /// Standard deviation of a joint's rotation since the frame before, without an encoder.
 pub(crate) const UNKNOWN_JOINT_SIGMA_RAD: f64 = 1.0;
 /// Fewest landmarks that constrain the joint angles of a frame.
-const LEAST_LANDMARKS: usize = 15;
+const MIN_LANDMARKS: usize = 15;
 /// The standard deviation of an angle by the image must be smaller than the encoder's by this factor before the image may
 /// carry the encoder's angle on: then the rotation in between, as the image measures it, is independent of the encoder.
 const SHARPER: f64 = 3.0;
@@ -100,7 +100,7 @@ impl WindowState {
     fn visual_variances(&self, setup: &Setup, slot: usize, cameras: &[CameraPose]) -> Option<DVector<f64>> {
         let (hessian, _, count) = self.joints_by_landmarks(setup, slot, &self.frames[slot].state.joints_rad, cameras);
         let inverse = hessian.cholesky()?.inverse();
-        (count >= LEAST_LANDMARKS).then(|| inverse.diagonal())
+        (count >= MIN_LANDMARKS).then(|| inverse.diagonal())
     }
 
     /// A frame is about to leave, and its encoder angles with it, although they are as good as any: the next frame takes

@@ -74,9 +74,9 @@ impl WindowState {
             let message = format!("keyframe: only {common} features in common with the last one");
             return Decision::new(true, message, common as f64, limit);
         }
-        if new_ratio > options.keyframe_new_share {
+        if new_ratio > options.keyframe_new_ratio {
             let message = format!("keyframe: {:.0} % of the features are new since the last one", 100.0 * new_ratio);
-            return Decision::new(true, message, new_ratio, options.keyframe_new_share);
+            return Decision::new(true, message, new_ratio, options.keyframe_new_ratio);
         }
         let limit = options.keyframe_parallax_rad;
         let chosen = parallax >= limit;

@@ -65,7 +65,7 @@ impl Problem<'_> {
                 seen.push(CameraInformation::new(&projected, maps));
             }
         }
-        measured.extend((1..layout.frames).map(|slot| self.inertial_rows_at(slot, estimate, &frames)));
+        measured.extend((1..layout.frames).map(|slot| self.imu_rows_at(slot, estimate, &frames)));
         measured.extend((0..layout.frames).map(|slot| self.encoder_rows(slot, estimate)));
         let stationary: Vec<_> = self.zero_velocity_terms(&estimate.frames).collect();
         measured.push(self.zero_velocity_rows(&stationary));

@@ -10,7 +10,7 @@ use crate::estimator::{Event, EventKind};
 use crate::optimization::LandmarkModel;
 
 /// A window that is larger than usual shrinks by one frame per keyframe.
-const MOST_MARGINALIZED_AT_ONCE: usize = 2;
+const MAX_MARGINALIZED_AT_ONCE: usize = 2;
 
 impl WindowState {
     /// Makes room for the next frame: the second-newest is dropped when it is no keyframe, else the oldest of a full window
@@ -23,7 +23,7 @@ impl WindowState {
             self.drop_frame(setup, newest - 1);
             return;
         }
-        for _ in 0..MOST_MARGINALIZED_AT_ONCE {
+        for _ in 0..MAX_MARGINALIZED_AT_ONCE {
             let room = self.room(&setup.config.options);
             if self.frames.len() <= room {
                 break;

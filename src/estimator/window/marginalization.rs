@@ -16,7 +16,7 @@ pub(crate) fn oldest(problem: &Problem<'_>, estimate: &Estimate) -> Option<Prior
     let mut parts = vec![problem.prior_rows(estimate), problem.encoder_rows(0, estimate)];
     parts.extend(problem.velocity_terms(0, &estimate.frames[0]).map(|terms| problem.zero_velocity_rows(&terms)));
     if problem.frames.len() > 1 {
-        parts.push(problem.inertial_rows(1, estimate));
+        parts.push(problem.imu_rows(1, estimate));
         parts.extend(problem.position_terms(1, &estimate.frames).map(|terms| problem.zero_velocity_rows(&terms)));
     }
     parts.push(problem.visual_rows(estimate));

@@ -248,7 +248,7 @@ impl Problem<'_> {
         let mut hessian = DMatrix::zeros(total, total);
         let mut gradient = DVector::zeros(total);
         for slot in 1..slots {
-            if let Some((by_from, by_to, residual)) = self.imu_rows(slot, estimate, linearized) {
+            if let Some((by_from, by_to, residual)) = self.imu_blocks(slot, estimate, linearized) {
                 self.add_imu(slot, &by_from, &by_to, &residual, &mut hessian, &mut gradient);
             }
         }
@@ -301,7 +301,7 @@ impl Problem<'_> {
     }
 
     /// Whitened Jacobians and residual of the IMU factor that ends at `slot`.
-    pub(crate) fn imu_rows(
+    pub(crate) fn imu_blocks(
         &self,
         slot: usize,
         estimate: &Estimate,

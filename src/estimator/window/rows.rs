@@ -58,14 +58,14 @@ impl Problem<'_> {
     }
 
     /// The IMU factor that ends at `slot`, 15 rows, or none.
-    pub(crate) fn inertial_rows(&self, slot: usize, estimate: &Estimate) -> DMatrix<f64> {
-        self.inertial_rows_at(slot, estimate, &self.linearization_frames(estimate))
+    pub(crate) fn imu_rows(&self, slot: usize, estimate: &Estimate) -> DMatrix<f64> {
+        self.imu_rows_at(slot, estimate, &self.linearization_frames(estimate))
     }
 
-    /// [`Self::inertial_rows`] with the states at which derivatives are taken.
-    pub(crate) fn inertial_rows_at(&self, slot: usize, estimate: &Estimate, linearized: &[FrameState]) -> DMatrix<f64> {
+    /// [`Self::imu_rows`] with the states at which derivatives are taken.
+    pub(crate) fn imu_rows_at(&self, slot: usize, estimate: &Estimate, linearized: &[FrameState]) -> DMatrix<f64> {
         let total = self.layout.total();
-        let Some((by_from, by_to, residual)) = self.imu_rows(slot, estimate, linearized) else {
+        let Some((by_from, by_to, residual)) = self.imu_blocks(slot, estimate, linearized) else {
             return DMatrix::zeros(0, total + 1);
         };
         let mut rows = DMatrix::zeros(15, total + 1);

@@ -178,7 +178,7 @@ impl SlidingWindow {
 
     /// Switches the minimal parameterization when the chain comes near its singularity and the configuration allows it.
     fn switch_near_singularity(&mut self, setup: &Setup) -> Option<Event> {
-        if !setup.config.auto_chart || self.state.calibration.dof() == 0 {
+        if !setup.config.auto_parameterize || self.state.calibration.dof() == 0 {
             return None;
         }
         let chain = self.state.calibration.of(MAIN).chain();
@@ -186,7 +186,7 @@ impl SlidingWindow {
         let margin = chain.margins().iter().map(|(_, margin)| *margin).fold(1.0, f64::min);
         self.state.switch_parameterization(better);
         let message = format!("the chain goes over to the chart {better}: the old one is near its lock");
-        Some(Event::decided(EventKind::ChartSwitched, message, margin, crate::gimbal::SWITCH_MARGIN))
+        Some(Event::decided(EventKind::ParameterizationSwitched, message, margin, crate::gimbal::SWITCH_MARGIN))
     }
 }
 

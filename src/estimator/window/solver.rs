@@ -50,8 +50,8 @@ pub(crate) fn solve(problem: &Problem<'_>, start: Estimate, limits: SolverLimits
         iterations: limits.iterations,
         relative_cost_tolerance: limits.relative_cost_tolerance,
         first_damping: 1e-6,
-        least_damping: 1e-9,
-        most_damping: 1e8,
+        min_damping: 1e-9,
+        max_damping: 1e8,
         growth: 100.0,
     };
     let solution = minimize(&mut window, start, &options);

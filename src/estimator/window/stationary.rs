@@ -22,25 +22,25 @@ use crate::sensors::ImuNoise;
 const QUIET_NS: i64 = 1_000_000_000;
 
 /// Largest standard deviation of the angular velocity (worst axis, averaged from image to image), beyond the sensor's own.
-const MOST_TURN_SPREAD_RAD_PER_S: f64 = 0.002;
+const MAX_ANGULAR_RATE_SPREAD_RAD_PER_S: f64 = 0.002;
 
 /// Largest mean angular velocity once the known bias is taken off (worst axis).
-const MOST_TURN_RAD_PER_S: f64 = 0.01;
+const MAX_ANGULAR_RATE_RAD_PER_S: f64 = 0.01;
 
 /// Largest standard deviation of the specific force (worst axis, averaged from image to image), beyond the sensor's own.
-const MOST_FORCE_SPREAD_M_PER_S2: f64 = 0.03;
+const MAX_FORCE_SPREAD_M_PER_S2: f64 = 0.03;
 
 /// Largest rotation-compensated parallax since the vehicle became stationary.
-const MOST_PARALLAX_RAD: f64 = 0.004;
+const MAX_PARALLAX_RAD: f64 = 0.004;
 
 /// Estimated speed above which nothing is detected: something fast over a far scene shows no parallax either.
-const MOST_SPEED_M_PER_S: f64 = 0.5;
+const MAX_VELOCITY_M_PER_S: f64 = 0.5;
 
 /// Fewest features in common with the reference image.
-const LEAST_COMMON: usize = 12;
+const MIN_COMMON: usize = 12;
 
 /// Smallest parallax that an image is believed to resolve: a tenth of a pixel at usual focal lengths.
-const LEAST_PARALLAX_RAD: f64 = 2e-4;
+const MIN_PARALLAX_RAD: f64 = 2e-4;
 
 /// Angular velocity and specific force from one image to the next.
 #[derive(Clone, Copy, Debug)]
@@ -105,7 +105,7 @@ impl StationaryDetector {
         let before_ns = self.unmoved_since_ns;
         let parallax_rad = self.compare_image(input.stamp_ns, image);
         let spread = self.spread(input.stamp_ns, image);
-        let quiet = spread.as_ref().is_some_and(Spread::is_quiet) && image.speed_m_per_s <= MOST_SPEED_M_PER_S;
+        let quiet = spread.as_ref().is_some_and(Spread::is_quiet) && image.speed_m_per_s <= MAX_VELOCITY_M_PER_S;
         let unmoved_ns = input.stamp_ns - self.unmoved_since_ns;
         if !quiet {
             self.required_ns = QUIET_NS;
@@ -119,7 +119,7 @@ impl StationaryDetector {
         };
         let quiet_since_ns = self.unmoved_since_ns.max(input.stamp_ns - QUIET_NS);
         let since_ns = *self.stationary_since_ns.get_or_insert(quiet_since_ns);
-        let position_sigma_m = parallax_rad.max(LEAST_PARALLAX_RAD) * image.distance_m;
+        let position_sigma_m = parallax_rad.max(MIN_PARALLAX_RAD) * image.distance_m;
         let event = Event {
             kind: EventKind::Standstill,
             message: format!(
@@ -127,14 +127,14 @@ impl StationaryDetector {
                  spreads by {:.4} of {:.4} rad/s, the specific force by {:.3} of {:.3} m/s²",
                 seconds_from_ns(input.stamp_ns - since_ns),
                 parallax_rad.to_degrees(),
-                MOST_PARALLAX_RAD.to_degrees(),
+                MAX_PARALLAX_RAD.to_degrees(),
                 spread.turn,
                 spread.turn_limit,
                 spread.force,
                 spread.force_limit
             ),
             value: Some(parallax_rad),
-            threshold: Some(MOST_PARALLAX_RAD),
+            threshold: Some(MAX_PARALLAX_RAD),
         };
         let velocity_sigma_m_per_s = position_sigma_m / seconds_from_ns(QUIET_NS);
         Some((Stationary { since_ns, position_sigma_m, velocity_sigma_m_per_s }, event))
@@ -180,14 +180,14 @@ impl StationaryDetector {
                     Some((*before, features[place].bearing)).filter(|(_, now)| now.iter().all(|x| x.is_finite()))
                 })
                 .collect();
-            if pairs.len() < LEAST_COMMON {
+            if pairs.len() < MIN_COMMON {
                 return None;
             }
             // The vehicle's own rotation is left to the gyroscope: a stationary vehicle has none.
             let guess = imu_from_camera.inverse() * reference.imu_from_camera;
             Some(fit_rotation(&pairs, &guess)?.median_parallax_rad)
         });
-        let moved = parallax_rad.is_none_or(|parallax_rad| parallax_rad > MOST_PARALLAX_RAD);
+        let moved = parallax_rad.is_none_or(|parallax_rad| parallax_rad > MAX_PARALLAX_RAD);
         // Tracks end in a stationary image, too: detection goes on from the newest image before too few are left.
         let fading = self.reference.is_some() && parallax_rad.is_none() && self.stationary_since_ns.is_some();
         if moved {
@@ -197,7 +197,7 @@ impl StationaryDetector {
                 self.unmoved_since_ns = stamp_ns;
             }
         }
-        if fading && features.len() >= LEAST_COMMON { Some(MOST_PARALLAX_RAD) } else { parallax_rad }
+        if fading && features.len() >= MIN_COMMON { Some(MAX_PARALLAX_RAD) } else { parallax_rad }
     }
 
     /// Standard deviations of the last second's samples, `None` while that much is not there.
@@ -214,10 +214,10 @@ impl StationaryDetector {
         let (_, force) = mean_and_spread(self.intervals.iter().map(|i| i.specific_force_m_per_s2));
         Some(Spread {
             turn,
-            turn_limit: MOST_TURN_SPREAD_RAD_PER_S.hypot(own(image.noise.gyroscope_noise_density)),
+            turn_limit: MAX_ANGULAR_RATE_SPREAD_RAD_PER_S.hypot(own(image.noise.gyroscope_noise_density)),
             mean_turn: (turn_mean - image.bias.gyroscope_rad_per_s).amax(),
             force,
-            force_limit: MOST_FORCE_SPREAD_M_PER_S2.hypot(own(image.noise.accelerometer_noise_density)),
+            force_limit: MAX_FORCE_SPREAD_M_PER_S2.hypot(own(image.noise.accelerometer_noise_density)),
         })
     }
 }
@@ -234,7 +234,7 @@ struct Spread {
 
 impl Spread {
     fn is_quiet(&self) -> bool {
-        self.turn <= self.turn_limit && self.mean_turn <= MOST_TURN_RAD_PER_S && self.force <= self.force_limit
+        self.turn <= self.turn_limit && self.mean_turn <= MAX_ANGULAR_RATE_RAD_PER_S && self.force <= self.force_limit
     }
 }
 

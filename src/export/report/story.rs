@@ -30,7 +30,7 @@ pub(super) struct RankSpell {
     /// Lost to the parameterization, to joints that did not move, absorbed by free joint angles, to the vehicle's motion.
     pub(super) lost: [usize; 4],
     /// The parameter that is known least, most of the time.
-    pub(super) weakest: Option<String>,
+    pub(super) least_observable: Option<String>,
 }
 
 impl RankSpell {
@@ -41,9 +41,10 @@ impl RankSpell {
         let lost = self.lost.iter().zip(causes).filter(|(count, _)| **count > 0);
         let lost: Vec<String> = lost.map(|(count, cause)| format!("{count} to {cause}")).collect();
         let lost = if lost.is_empty() { String::new() } else { format!("; lost: {}", lost.join(", ")) };
-        let weakest = self.weakest.as_ref().map_or_else(String::new, |name| format!("; known least: {name}"));
+        let least_observable =
+            self.least_observable.as_ref().map_or_else(String::new, |name| format!("; known least: {name}"));
         format!(
-            "rank {} of {} from {:.1} s to {:.1} s{lost}; the window tells more than the rig about {} of {}{weakest}",
+            "rank {} of {} from {:.1} s to {:.1} s{lost}; the window tells more than the rig about {} of {}{least_observable}",
             self.structural, self.columns, self.from_s, self.to_s, self.informed, self.columns
         )
     }
@@ -73,7 +74,7 @@ pub(super) fn rank_story(run: &RunRecord, rig: &Rig) -> Vec<RankSpell> {
         run.steps.iter().filter_map(|step| Some((step.report.stamp_ns, step.rank.as_ref()?))).collect();
     let names = rig.parameter_names();
     let mut spells: Vec<RankSpell> = Vec::new();
-    let mut weakest_of_spell: Vec<ParameterId> = Vec::new();
+    let mut least_observable_of_spell: Vec<ParameterId> = Vec::new();
     let begin_ns = ranked.first().map_or(0, |(stamp_ns, _)| *stamp_ns);
     let stretches = ranked.chunk_by(|(a, _), (b, _)| (a - begin_ns) / STRETCH_NS == (b - begin_ns) / STRETCH_NS);
     for stretch in stretches {
@@ -83,15 +84,15 @@ pub(super) fn rank_story(run: &RunRecord, rig: &Rig) -> Vec<RankSpell> {
         };
         let ends =
             [stretch.first(), stretch.last()].map(|end| end.map_or(0.0, |(stamp_ns, _)| seconds_from_ns(*stamp_ns)));
-        let weakest = stretch.iter().filter_map(|(_, rank)| rank.weakest());
+        let least_observable = stretch.iter().filter_map(|(_, rank)| rank.least_observable());
         let same = |spell: &&mut RankSpell| {
             (spell.columns, spell.structural, spell.informed, spell.lost) == (columns, structural, informed, lost)
         };
         if let Some(spell) = spells.last_mut().filter(same) {
             spell.to_s = ends[1];
-            weakest_of_spell.extend(weakest);
+            least_observable_of_spell.extend(least_observable);
         } else {
-            weakest_of_spell = weakest.collect();
+            least_observable_of_spell = least_observable.collect();
             spells.push(RankSpell {
                 from_s: ends[0],
                 to_s: ends[1],
@@ -99,11 +100,12 @@ pub(super) fn rank_story(run: &RunRecord, rig: &Rig) -> Vec<RankSpell> {
                 structural,
                 informed,
                 lost,
-                weakest: None,
+                least_observable: None,
             });
         }
         if let Some(spell) = spells.last_mut() {
-            spell.weakest = most_frequent(weakest_of_spell.iter()).map(|parameter| names.name(*parameter));
+            spell.least_observable =
+                most_frequent(least_observable_of_spell.iter()).map(|parameter| names.name(*parameter));
         }
     }
     spells
@@ -122,14 +124,14 @@ mod tests {
             structural: 15,
             informed: 11,
             lost: [6, 0, 0, 3],
-            weakest: Some("yaw.d".to_owned()),
+            least_observable: Some("yaw.d".to_owned()),
         };
         assert_eq!(
             spell.sentence(),
             "rank 15 of 24 from 3.2 s to 8.5 s; lost: 6 to the parameterization, 3 to the motion of the vehicle; the window \
              tells more than the rig about 11 of 24; known least: yaw.d"
         );
-        let full = RankSpell { structural: 24, lost: [0; 4], weakest: None, ..spell };
+        let full = RankSpell { structural: 24, lost: [0; 4], least_observable: None, ..spell };
         assert!(!full.sentence().contains("lost"), "{}", full.sentence());
     }
 

@@ -207,11 +207,12 @@ fn read_gimbal(gimbal: &Field<'_>) -> Result<GimbalRig, LogError> {
         rotation_bound_rad: prior.field("rotation_bound").not_negative("a bound in rad")?,
     };
     let parameterization = gimbal.field("parameterization");
-    let switches_chart = match parameterization.is_present().then(|| parameterization.text("auto")).transpose()? {
-        None => false,
-        Some("auto") => true,
-        Some(other) => return Err(parameterization.error(format!("holds '{other}', expected auto, or nothing"))),
-    };
+    let switches_parameterization =
+        match parameterization.is_present().then(|| parameterization.text("auto")).transpose()? {
+            None => false,
+            Some("auto") => true,
+            Some(other) => return Err(parameterization.error(format!("holds '{other}', expected auto, or nothing"))),
+        };
     let mut links = Vec::new();
     let mut joints: Vec<Joint> = Vec::new();
     for link in gimbal.field("links").list("a list of links with joint, theta_offset, d, a, alpha and limits")? {
@@ -243,5 +244,5 @@ fn read_gimbal(gimbal: &Field<'_>) -> Result<GimbalRig, LogError> {
         links,
         effector_from_camera: gimbal.field("T_E_C").transform()?,
     };
-    Ok(GimbalRig { topic, rate_hz, encoder_sigma_rad, prior, switches_chart, chain, joints })
+    Ok(GimbalRig { topic, rate_hz, encoder_sigma_rad, prior, switches_parameterization, chain, joints })
 }

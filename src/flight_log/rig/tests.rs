@@ -21,7 +21,7 @@ fn a_rig_reads_back_as_written() {
     odd.cameras[0].frame_id = "a \"frame\": #1".into();
     odd.gimbal.as_mut().unwrap().topic = None;
     odd.gimbal.as_mut().unwrap().encoder_sigma_rad = None;
-    odd.gimbal.as_mut().unwrap().switches_chart = true;
+    odd.gimbal.as_mut().unwrap().switches_parameterization = true;
     let yaml = odd.to_yaml();
     assert!(yaml.contains("1.0e+22") && !yaml.contains("1e22"), "{yaml}");
     check_same(&odd, &parse(&yaml).unwrap());

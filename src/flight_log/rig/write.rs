@@ -62,7 +62,7 @@ fn write_gimbal(out: &mut String, gimbal: &GimbalRig) {
     line(out, 1, "prior", "");
     line(out, 2, "translation_bound", &number(gimbal.prior.translation_bound_m));
     line(out, 2, "rotation_bound", &number(gimbal.prior.rotation_bound_rad));
-    if gimbal.switches_chart {
+    if gimbal.switches_parameterization {
         line(out, 1, "parameterization", "auto");
     }
     write_transform(out, "T_I_B", &gimbal.chain.imu_from_base);

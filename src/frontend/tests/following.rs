@@ -25,7 +25,7 @@ fn common_points(scene: &Scene, from: usize, to: usize) -> Vec<Vector2<f64>> {
 }
 
 /// Follows the lattice from image 4 to image 5 and demands a ratio of tracked points and a median error.
-fn check(scene: &Scene, least_ratio: f64, largest_median_px: f64) {
+fn check(scene: &Scene, min_ratio: f64, largest_median_px: f64) {
     let texture = texture();
     let (previous, now) = (pyramid(&scene.render(&texture, 4)), pyramid(&scene.render(&texture, 5)));
     let points = common_points(scene, 4, 5);
@@ -35,7 +35,7 @@ fn check(scene: &Scene, least_ratio: f64, largest_median_px: f64) {
         found.iter().filter_map(|(uv, found)| Some((found.as_ref()? - scene.flow(4, 5, uv)).norm())).collect();
     let ratio = errors.len() as f64 / points.len() as f64;
     assert!(points.len() > 150, "{} points", points.len());
-    assert!(ratio >= least_ratio, "only {ratio} of {} points are tracked", points.len());
+    assert!(ratio >= min_ratio, "only {ratio} of {} points are tracked", points.len());
     let wrong = errors.iter().filter(|error| **error > 1.0).count();
     assert!(wrong * 200 <= errors.len(), "{wrong} of {} are wrong", errors.len());
     let median_px = median(errors).unwrap();

@@ -18,7 +18,7 @@ struct View {
     /// How wrong the predicted rotation is.
     prediction_error: Vector3<f64>,
     predicted: bool,
-    outlier_share: f64,
+    outlier_ratio: f64,
     /// Depths between these, in the unit of the translation.
     depths: (f64, f64),
 }
@@ -30,14 +30,14 @@ impl Default for View {
             translation: Vector3::new(0.1, -0.05, 0.2),
             prediction_error: Vector3::zeros(),
             predicted: true,
-            outlier_share: 0.15,
+            outlier_ratio: 0.15,
             depths: (3.0, 15.0),
         }
     }
 }
 
 /// Judges 120 tracks and counts how many of the right ones are kept and how many of the wrong ones.
-fn check(name: &str, view: &View, least_right: f64, most_wrong: f64) {
+fn check(name: &str, view: &View, min_inliers_kept: f64, max_outliers_kept: f64) {
     for seed in 1..20 {
         let mut dice = Dice(seed * 7919);
         let rotation = so3::exp(&view.rotation);
@@ -49,7 +49,7 @@ fn check(name: &str, view: &View, least_right: f64, most_wrong: f64) {
             let mut observed = rotation * point + view.translation;
             observed /= observed.z;
             observed += Vector3::new(dice.normal(), dice.normal(), 0.0) * (0.15 / FOCAL_PX);
-            let right = dice.uniform() >= view.outlier_share;
+            let right = dice.uniform() >= view.outlier_ratio;
             if !right {
                 let angle = std::f64::consts::TAU * dice.uniform();
                 observed += Vector3::new(angle.cos(), angle.sin(), 0.0) * ((8.0 + 40.0 * dice.uniform()) / FOCAL_PX);
@@ -67,8 +67,8 @@ fn check(name: &str, view: &View, least_right: f64, most_wrong: f64) {
                 as f64
         };
         let (right, wrong) = (kept(true) / count(true), kept(false) / count(false));
-        assert!(right >= least_right, "{name}, seed {seed}: keeps {right} of the right ones");
-        assert!(wrong <= most_wrong, "{name}, seed {seed}: keeps {wrong} of the wrong ones");
+        assert!(right >= min_inliers_kept, "{name}, seed {seed}: keeps {right} of the right ones");
+        assert!(wrong <= max_outliers_kept, "{name}, seed {seed}: keeps {wrong} of the wrong ones");
     }
 }
 
@@ -76,7 +76,7 @@ fn check(name: &str, view: &View, least_right: f64, most_wrong: f64) {
 fn a_good_prediction_tells_outliers() {
     check("general", &View::default(), 0.97, 0.3);
     check("sideways", &View { translation: Vector3::new(0.2, 0.0, 0.0), ..View::default() }, 0.97, 0.3);
-    check("many outliers", &View { outlier_share: 0.4, ..View::default() }, 0.95, 0.35);
+    check("many outliers", &View { outlier_ratio: 0.4, ..View::default() }, 0.95, 0.35);
 }
 
 #[test]
@@ -99,8 +99,8 @@ fn pure_rotation_keeps_what_turns_and_nothing_else() {
 
 #[test]
 fn a_clean_scene_loses_nothing() {
-    check("clean", &View { outlier_share: 0.0, ..View::default() }, 0.99, 0.0);
-    let far = View { outlier_share: 0.0, depths: (50.0, 300.0), ..View::default() };
+    check("clean", &View { outlier_ratio: 0.0, ..View::default() }, 0.99, 0.0);
+    let far = View { outlier_ratio: 0.0, depths: (50.0, 300.0), ..View::default() };
     check("far", &far, 0.99, 0.0);
 }
 

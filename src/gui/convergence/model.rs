@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::estimator::rigid_columns;
 use crate::gimbal::{NearestForm, ParameterId, Parameterization};
-use crate::gui::chain_values::{ParameterValues, parameter_values, turn_towards};
+use crate::gui::chain_values::{ParameterValues, parameter_values, unwrap_towards};
 use crate::gui::follow::Follower;
 use crate::observability::RankReport;
 use crate::sensors::Rig;
@@ -92,7 +92,7 @@ impl CalibrationHistory {
         let known = knowledge(step.rank.as_ref());
         let mut values: ParameterValues =
             calibration.parameters.iter().copied().zip(calibration.values.iter().copied()).collect();
-        turn_towards(&mut values, &self.last);
+        unwrap_towards(&mut values, &self.last);
         for (index, parameter) in calibration.parameters.iter().enumerate() {
             let known_place = self.parameters.iter().position(|(known, _)| known == parameter);
             let place = known_place.unwrap_or(self.parameters.len());
@@ -171,7 +171,7 @@ impl ConvertedHistory {
             let mut values = parameter_values(&calibration.classical, &form);
             let rigid = (1..).zip(&calibration.rigid_cameras);
             values.extend(rigid.flat_map(|(camera, (_, pose))| rigid_columns(camera, pose)));
-            turn_towards(&mut values, &self.last);
+            unwrap_towards(&mut values, &self.last);
             for (parameter, value) in &values {
                 let column = self.values.entry(*parameter).or_default();
                 column.resize(row, f64::NAN);

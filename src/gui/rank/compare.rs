@@ -60,7 +60,7 @@ pub(super) fn lock_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, number: usize, ru
         chain.margins().into_iter().find(|(lock, _)| *lock == Singularity::End).map(|(_, margin)| margin)
     };
     let (Some(here), Some(there)) = (margin_of(own), margin_of(other)) else { return };
-    let taken = run.spec.parameterization.switches_chart(&ctx.recording.rig);
+    let taken = run.spec.parameterization.switches_parameterization(&ctx.recording.rig);
     ui.horizontal_wrapped(|ui| {
         let color = if here < SWITCH_MARGIN { ctx.theme.error } else { ctx.theme.text };
         let text = format!(

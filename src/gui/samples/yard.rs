@@ -169,7 +169,7 @@ pub(super) fn rig_with(chain: ClassicalChain, name: &str) -> Rig {
             rate_hz: 200.0,
             encoder_sigma_rad: Some(0.0087),
             prior: ChainPrior { translation_bound_m: 0.006, rotation_bound_rad: 0.026 },
-            switches_chart: false,
+            switches_parameterization: false,
             chain,
             joints: vec![joint("yaw", -180.0, 180.0), joint("roll", -25.0, 25.0), joint("pitch", -120.0, 30.0)],
         }),

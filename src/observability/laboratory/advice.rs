@@ -25,7 +25,7 @@ const FRAMES: usize = 16;
 /// Landmarks drawn in each frame's view.
 const LANDMARKS_PER_FRAME: usize = 12;
 /// A landmark takes part from so many sightings on, as in the estimator.
-const LEAST_SIGHTINGS: usize = 3;
+const MIN_OBSERVATIONS: usize = 3;
 /// Landmarks are drawn this far from the border, and followed up to it.
 const BORDER_PX: f64 = 8.0;
 /// Rate of the supposed inertial samples: their covariance hardly depends on it.
@@ -35,7 +35,7 @@ const JOINT_SWING_RAD: f64 = 20.0 * std::f64::consts::PI / 180.0;
 /// A joint turns at most this fast, in rad/s: slow for any gimbal.
 const JOINT_RATE_RAD_PER_S: f64 = 60.0 * std::f64::consts::PI / 180.0;
 /// A joint with less room than this is left alone, in radians.
-const LEAST_SWING_RAD: f64 = 3.0 * std::f64::consts::PI / 180.0;
+const MIN_SWING_RAD: f64 = 3.0 * std::f64::consts::PI / 180.0;
 /// The vehicle's velocity at the start decays with this time constant, in seconds.
 const BRAKING_S: f64 = 0.8;
 
@@ -43,7 +43,8 @@ const BRAKING_S: f64 = 0.8;
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Advice {
     /// The least observable direction among those that some motion constrains.
-    pub weakest: WeakDirection,
+    #[serde(rename = "weakest")]
+    pub least_observable: WeakDirection,
     /// Every candidate, the best one first.
     pub candidates: Vec<CandidateReport>,
     /// Duration of each, in seconds.
@@ -94,8 +95,8 @@ pub fn advise(situation: &Situation) -> Option<Advice> {
     }
     let known = excitable.tr_mul(&(&situation.information * &excitable));
     let eigen = known.clone().symmetric_eigen();
-    let weakest = eigen.eigenvalues.imin();
-    let along: DVector<f64> = eigen.eigenvectors.column(weakest).into_owned();
+    let least_observable = eigen.eigenvalues.imin();
+    let along: DVector<f64> = eigen.eigenvectors.column(least_observable).into_owned();
     let sigma_along = |information: &DMatrix<f64>| {
         let solved = information.clone().cholesky()?.solve(&along);
         Some(along.dot(&solved).sqrt()).filter(|sigma| sigma.is_finite())
@@ -120,7 +121,7 @@ pub fn advise(situation: &Situation) -> Option<Advice> {
     reports.sort_by(|a, b| a.sigma_after.total_cmp(&b.sigma_after));
     let direction = &excitable * along;
     Some(Advice {
-        weakest: WeakDirection::new(situation, &direction, sigma),
+        least_observable: WeakDirection::new(situation, &direction, sigma),
         candidates: reports,
         duration_s: ADVICE_DURATION_S,
     })
@@ -151,7 +152,7 @@ fn candidates(situation: &Situation) -> Vec<Exercise> {
         let room = (high - angle_rad).min(angle_rad - low);
         let by_rate = JOINT_RATE_RAD_PER_S * JOINT_PERIOD_S / std::f64::consts::TAU;
         let amplitude_rad = JOINT_SWING_RAD.min(room).min(by_rate);
-        if amplitude_rad >= LEAST_SWING_RAD {
+        if amplitude_rad >= MIN_SWING_RAD {
             swings.push(Some(JointSwing { joint, amplitude_rad }));
         }
     }
@@ -296,7 +297,7 @@ fn landmarks(situation: &Situation, poses: &[RigidTransform]) -> Vec<Hypothetica
         };
         let first = (0..=home).rev().take_while(seen).last().unwrap_or(home);
         let last = (home..poses.len()).take_while(seen).last().unwrap_or(home);
-        if last + 1 - first < LEAST_SIGHTINGS {
+        if last + 1 - first < MIN_OBSERVATIONS {
             continue;
         }
         let in_anchor = poses[first].inverse().transform(&point);
@@ -325,7 +326,7 @@ fn makes_keyframes(landmarks: &[HypotheticalLandmark], poses: &[RigidTransform])
         let common = parallaxes().count() as f64;
         let new_share = 1.0 - common / seen().count().max(1) as f64;
         let parallax_rad = parallaxes().sum::<f64>() / common.max(1.0);
-        parallax_rad >= options.keyframe_parallax_rad || new_share > options.keyframe_new_share
+        parallax_rad >= options.keyframe_parallax_rad || new_share > options.keyframe_new_ratio
     };
     (1..poses.len()).any(is_keyframe)
 }
@@ -371,7 +372,7 @@ impl Advice {
             best.words,
             self.duration_s,
             100.0 * best.remaining,
-            self.weakest
+            self.least_observable
         ))
     }
 }
@@ -395,7 +396,7 @@ impl fmt::Display for WeakDirection {
 
 impl fmt::Display for Advice {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(out, "known least   {}", self.weakest)?;
+        writeln!(out, "known least   {}", self.least_observable)?;
         writeln!(out, "to be flown   what {:.0} s of it leave of that deviation, in percent", self.duration_s)?;
         for candidate in &self.candidates {
             writeln!(out, "  {:5.1}  {}", 100.0 * candidate.remaining, candidate.words)?;

@@ -89,7 +89,7 @@ const DEPTH_M: [f64; 2] = [4.0, 14.0];
 /// Landmarks are drawn within this tangent of the optical axis, across and down.
 const VIEW: [f64; 2] = [0.6, 0.45];
 /// A landmark is observed by every camera that has it this far in front of it.
-const LEAST_DEPTH_M: f64 = 1.0;
+const MIN_DEPTH_M: f64 = 1.0;
 /// Standard deviations of the chain's numbers with the priors kept in: 3 cm and 10°, the scale of the columns.
 const CHAIN_PRIOR: (f64, f64) = (Dimension::Length.scale(), Dimension::Angle.scale());
 
@@ -196,7 +196,7 @@ impl LaboratorySetup {
             .filter_map(|index| {
                 let ray = Vector3::new(within(-VIEW[0], VIEW[0]), within(-VIEW[1], VIEW[1]), 1.0);
                 let point = cameras[index % cameras.len()].transform(&(ray * within(DEPTH_M[0], DEPTH_M[1])));
-                let seen = |slot: &usize| cameras[*slot].inverse().transform(&point).z > LEAST_DEPTH_M;
+                let seen = |slot: &usize| cameras[*slot].inverse().transform(&point).z > MIN_DEPTH_M;
                 let mut observers = (0..cameras.len()).filter(seen);
                 let anchor = observers.next()?;
                 let in_anchor = cameras[anchor].inverse().transform(&point);

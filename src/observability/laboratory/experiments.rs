@@ -123,7 +123,7 @@ pub(super) const GENERIC: Experiment = experiment("", "generic");
 pub(super) const GENERIC_WITHOUT_ENCODER: Experiment = GENERIC.without_encoder();
 
 /// Experiments whose least number of frames is searched.
-pub(super) const LEAST_FRAMES: [Experiment; 6] = [
+pub(super) const MIN_FRAMES: [Experiment; 6] = [
     experiment("encoder, poses known", "generic"),
     experiment("encoder, IMU, bias known", "generic").poses(IMU_BIASES_KNOWN),
     experiment("encoder, IMU, bias free", "generic").poses(IMU),

@@ -28,4 +28,4 @@ pub use motion::{LaboratoryMotion, UnknownMotion};
 pub use report::LaboratoryReport;
 pub use situation::Situation;
 pub use spurious::SpuriousRow;
-pub use survey::{LeastFramesRow, Survey, SurveyEntry, SurveyRow, SurveySection, survey};
+pub use survey::{MinFramesRow, Survey, SurveyEntry, SurveyRow, SurveySection, survey};

@@ -44,7 +44,7 @@ pub enum LaboratoryMotion {
     /// The camera never rotates in the world; the vehicle translates only, so that no joint moves.
     StabilizedTranslationOnly,
     /// The camera neither turns nor moves in the world.
-    CameraHeldStill,
+    CameraStationary,
     /// As aggressive, the second joint (or the only one) fixed.
     OneJointFrozen,
     /// As aggressive, all joints fixed.
@@ -77,7 +77,7 @@ impl LaboratoryMotion {
         Self::YawFollowing,
         Self::StabilizedRotationOnly,
         Self::StabilizedTranslationOnly,
-        Self::CameraHeldStill,
+        Self::CameraStationary,
         Self::OneJointFrozen,
         Self::AllJointsFrozen,
     ];
@@ -100,7 +100,7 @@ impl LaboratoryMotion {
             Self::YawFollowing => "yaw-following",
             Self::StabilizedRotationOnly => "stabilized-rotation-only",
             Self::StabilizedTranslationOnly => "stabilized-translation-only",
-            Self::CameraHeldStill => "camera-held-still",
+            Self::CameraStationary => "camera-held-still",
             Self::OneJointFrozen => "one-joint-frozen",
             Self::AllJointsFrozen => "all-joints-frozen",
         }
@@ -124,7 +124,7 @@ impl LaboratoryMotion {
             Self::YawFollowing => "the camera turns about the vertical only while vehicle and joints move",
             Self::StabilizedRotationOnly => "the camera never rotates in the world, the vehicle does not translate",
             Self::StabilizedTranslationOnly => "the camera never rotates in the world, nor do vehicle and joints",
-            Self::CameraHeldStill => "the camera neither turns nor moves in the world while vehicle and joints do",
+            Self::CameraStationary => "the camera neither turns nor moves in the world while vehicle and joints do",
             Self::OneJointFrozen => {
                 "all move about all axes but the second joint, or the only one, which is stationary"
             }
@@ -248,7 +248,7 @@ impl Flight<'_> {
             LaboratoryMotion::YawTilted => yaw * so3::exp(&turn(0.0)),
             LaboratoryMotion::Stabilized
             | LaboratoryMotion::StabilizedRotationOnly
-            | LaboratoryMotion::CameraHeldStill => start() * imu_from_camera().inverse(),
+            | LaboratoryMotion::CameraStationary => start() * imu_from_camera().inverse(),
             LaboratoryMotion::YawFollowing => yaw * start() * imu_from_camera().inverse(),
             LaboratoryMotion::Aggressive
             | LaboratoryMotion::OneJointFrozen
@@ -263,7 +263,7 @@ impl Flight<'_> {
     pub(super) fn world_from_imu(&self, time_s: f64) -> RigidTransform {
         let joints_rad = self.joints_rad(time_s);
         let rotation = self.rotation(time_s, &joints_rad);
-        let position_m = if self.motion == LaboratoryMotion::CameraHeldStill {
+        let position_m = if self.motion == LaboratoryMotion::CameraStationary {
             -(rotation * self.mechanism.chain.imu_from_camera(&joints_rad).translation_m)
         } else {
             self.path_m(time_s, 0)
@@ -282,7 +282,7 @@ impl Flight<'_> {
 
     /// First or second derivative of the position: exact, but for a path that hangs on the joints.
     fn derivative_m(&self, time_s: f64, derivative: i32) -> Vector3<f64> {
-        if self.motion != LaboratoryMotion::CameraHeldStill {
+        if self.motion != LaboratoryMotion::CameraStationary {
             return self.path_m(time_s, derivative);
         }
         let at = |steps: f64| self.world_from_imu(time_s + steps * STEP_S).translation_m;

@@ -93,12 +93,12 @@ pub struct DirectionReport {
     /// Its singular value.
     pub singular_value: f64,
     /// Its parameters, strongest first.
-    pub parameters: Vec<ParameterShare>,
+    pub parameters: Vec<ParameterWeight>,
 }
 
 /// A parameter's part in a direction.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct ParameterShare {
+pub struct ParameterWeight {
     /// Its name.
     pub name: String,
     /// Its weight in the unit direction, columns scaled by 10° and 3 cm.
@@ -175,11 +175,11 @@ impl FormReport {
 
 impl DirectionReport {
     fn new(direction: &CalibrationDirection, names: &[String]) -> Self {
-        let mut parameters: Vec<ParameterShare> = names
+        let mut parameters: Vec<ParameterWeight> = names
             .iter()
             .zip(&direction.weights)
             .filter(|(_, weight)| weight.abs() >= SMALLEST_WEIGHT)
-            .map(|(name, weight)| ParameterShare { name: name.clone(), weight: *weight })
+            .map(|(name, weight)| ParameterWeight { name: name.clone(), weight: *weight })
             .collect();
         parameters.sort_by(|a, b| b.weight.abs().total_cmp(&a.weight.abs()));
         Self { null: direction.structural, singular_value: direction.singular_value, parameters }
@@ -248,8 +248,8 @@ impl LaboratoryReport {
         line(out, "absorbed by free angles", &|form| form.deficit.absorbed.to_string())?;
         line(out, "lost to the motion", &|form| form.deficit.motion.to_string())?;
         line(out, "least observable direction", &|form| {
-            let weakest = form.rank_structural.checked_sub(1).map(|index| form.singular_values[index]);
-            weakest.map_or_else(|| "-".to_owned(), |value| format!("{value:.3}"))
+            let least_observable = form.rank_structural.checked_sub(1).map(|index| form.singular_values[index]);
+            least_observable.map_or_else(|| "-".to_owned(), |value| format!("{value:.3}"))
         })?;
         line(out, "least singularity margin", &|form| {
             let least = form.margins.iter().min_by(|a, b| a.margin.total_cmp(&b.margin));

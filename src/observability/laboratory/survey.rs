@@ -5,13 +5,13 @@ use std::fmt;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::experiments::{Experiment, LEAST_FRAMES, SECTIONS};
+use super::experiments::{Experiment, MIN_FRAMES, SECTIONS};
 use super::spurious::{self, SpuriousRow};
 use super::{Deficit, LaboratoryForm, LaboratoryResult};
 use crate::gimbal::{ParameterNames, Parameterization};
 
 /// With this many frames a window constrains everything that its motion and sensors can.
-const MOST_FRAMES: usize = 16;
+const MAX_FRAMES: usize = 16;
 const MINIMAL: LaboratoryForm = LaboratoryForm::whole(Parameterization::Minimal);
 
 /// Computed ranks and null directions of the built-in experiments.
@@ -20,7 +20,7 @@ pub struct Survey {
     /// Experiments by subject.
     pub sections: Vec<SurveySection>,
     /// Numbers of frames from which on the minimal form has its full rank.
-    pub least_frames: Vec<LeastFramesRow>,
+    pub least_frames: Vec<MinFramesRow>,
     /// Spurious information of two windows that are linearized at different values of the calibration.
     pub spurious: Vec<SpuriousRow>,
 }
@@ -70,7 +70,7 @@ pub struct SurveyEntry {
 
 /// The least number of frames for the full rank of the minimal parameterization.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct LeastFramesRow {
+pub struct MinFramesRow {
     /// What is known of poses and joint angles.
     pub scenario: String,
     /// Number of columns.
@@ -91,7 +91,7 @@ pub fn survey() -> Survey {
                 rows: section.experiments.par_iter().filter_map(SurveyRow::of).collect(),
             })
             .collect(),
-        least_frames: LEAST_FRAMES.par_iter().filter_map(LeastFramesRow::of).collect(),
+        least_frames: MIN_FRAMES.par_iter().filter_map(MinFramesRow::of).collect(),
         spurious: spurious::measure(),
     }
 }
@@ -130,13 +130,13 @@ impl SurveyRow {
     }
 }
 
-impl LeastFramesRow {
+impl MinFramesRow {
     fn of(experiment: &Experiment) -> Option<Self> {
         let rank_of = |frames: usize| experiment.setup_of(frames)?.run(MINIMAL).map(|result| result.rank);
-        let full = rank_of(MOST_FRAMES)?;
-        let frames = (2..MOST_FRAMES)
+        let full = rank_of(MAX_FRAMES)?;
+        let frames = (2..MAX_FRAMES)
             .find(|frames| rank_of(*frames).is_some_and(|rank| rank.rank_structural >= full.rank_structural))
-            .unwrap_or(MOST_FRAMES);
+            .unwrap_or(MAX_FRAMES);
         Some(Self {
             scenario: experiment.scenario.to_owned(),
             columns: full.parameters.len(),
@@ -175,7 +175,7 @@ impl fmt::Display for Survey {
             }
         }
         writeln!(out, "\nLeast number of frames for the full rank of the minimal form (three joints, generic)")?;
-        for LeastFramesRow { scenario, columns, rank, frames } in &self.least_frames {
+        for MinFramesRow { scenario, columns, rank, frames } in &self.least_frames {
             writeln!(out, "  {scenario:<42}M {rank}/{columns} from {frames} frames on")?;
         }
         writeln!(out, "\n{}", spurious::title())?;

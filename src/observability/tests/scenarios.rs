@@ -183,7 +183,7 @@ fn known_parameters_carry_the_null_directions() {
         "{} of 18 structural; 3 absorbed by free joint angles; {} lost to the motion of the vehicle; {} informed",
         hover.rank_structural, hover.deficit_motion, hover.rank_informed
     );
-    let expected = match hover.weakest() {
+    let expected = match hover.least_observable() {
         Some(parameter) if weak > 0 => format!("{expected}; weakest {}", names.name(parameter)),
         _ => expected,
     };

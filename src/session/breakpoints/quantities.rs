@@ -147,14 +147,14 @@ pub(super) const FLAGS: &[FlagName] = &[
 /// Names of kinds of events.
 pub(super) const EVENTS: [(&str, &[EventKind]); 10] = [
     ("waits", &[EventKind::InitializationWaits]),
-    ("initialized", &[EventKind::InitializedFromMotion, EventKind::InitializedFromStandstill]),
+    ("initialized", &[EventKind::InitializedFromMotion, EventKind::InitializedFromStationary]),
     ("keyframe_decided", &[EventKind::KeyframeChosen]),
     ("marginalized", &[EventKind::OldestMarginalized]),
     ("dropped", &[EventKind::SecondNewestDropped]),
     ("outliers", &[EventKind::OutliersRejected]),
     ("standstill", &[EventKind::Standstill]),
     ("failure", &[EventKind::Failure]),
-    ("chart_switched", &[EventKind::ChartSwitched]),
+    ("chart_switched", &[EventKind::ParameterizationSwitched]),
     ("missing", &[EventKind::MeasurementMissing]),
 ];
 

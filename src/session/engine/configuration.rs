@@ -28,7 +28,7 @@ pub(in crate::session) fn estimator_config(rig: &Rig, spec: &RunSpec) -> Result<
         ..standard
     };
     Ok(EstimatorConfig {
-        auto_chart: !chain.links.is_empty() && spec.parameterization.switches_chart(rig),
+        auto_parameterize: !chain.links.is_empty() && spec.parameterization.switches_parameterization(rig),
         use_encoder: spec.encoder && configuration.use_encoder,
         calibrate: spec.calibrate,
         estimate_timeshift: spec.timeshift,

@@ -19,14 +19,14 @@ pub(in crate::session) fn apply_fork(
     let left_out = left_out(changes, &engine.camera_keys(camera_key))?;
     let estimator = engine.estimator_mut();
     if let Some(choice) = changes.parameterization {
-        let (parameterization, auto_chart) = match choice {
+        let (parameterization, auto_parameterize) = match choice {
             ParameterizationChoice::Minimal => (Parameterization::Minimal, false),
             ParameterizationChoice::MinimalSwapped => (Parameterization::MinimalSwapped, false),
             ParameterizationChoice::Classical => (Parameterization::Classical, false),
             ParameterizationChoice::Poe => (Parameterization::Poe, false),
             _ => (auto_parameterization(&estimator.classical_chain()), true),
         };
-        estimator.use_parameterization(parameterization, auto_chart);
+        estimator.use_parameterization(parameterization, auto_parameterize);
     }
     let names = rig.parameter_names();
     let known = estimator.parameters();

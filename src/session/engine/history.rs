@@ -186,7 +186,7 @@ impl History {
         };
         let whole = engine.clone().step(&input);
         // The first window is solved several times over, outliers taken out in between.
-        let begins = whole.report.events.iter().any(|event| event.kind.begins_window());
+        let begins = whole.report.events.iter().any(|event| event.kind.initializes_window());
         let iterations = if begins { 0 } else { whole.report.iterations.len() };
         let mut records: Vec<StepRecord> = (0..iterations)
             .map(|count| {

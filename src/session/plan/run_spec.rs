@@ -49,10 +49,12 @@ impl ParameterizationChoice {
     }
 
     /// Whether its runs switch to the other parameterization near a singularity; a rig may ask for it in any minimal run.
-    pub fn switches_chart(self, rig: &Rig) -> bool {
+    pub fn switches_parameterization(self, rig: &Rig) -> bool {
         match self {
             Self::Auto | Self::Cluster => true,
-            Self::Minimal | Self::MinimalSwapped => rig.gimbal.as_ref().is_some_and(|gimbal| gimbal.switches_chart),
+            Self::Minimal | Self::MinimalSwapped => {
+                rig.gimbal.as_ref().is_some_and(|gimbal| gimbal.switches_parameterization)
+            }
             Self::Classical | Self::Poe | Self::Static => false,
         }
     }

@@ -27,7 +27,7 @@ fn stretches_of_hover_of_a_held_joint_and_of_a_kept_camera_begin_and_end_when_to
 
     let chain = true_chain(&mut RandomStream::new(3, stream::RIG));
     let mut look = Experiment::T1.look_around(&mut RandomStream::new(3, stream::LOOK));
-    look.held_joint = Some((1, [5.0, 4.0]));
+    look.fixed_joint = Some((1, [5.0, 4.0]));
     let motion = JointMotion::fly(&before, &chain, &joints(), &look, &Stabilizer::default());
     let spread = |joint: usize, from_s: f64, to_s: f64| {
         let angles = (0..100).map(|step| motion.at(from_s + (to_s - from_s) * f64::from(step) / 100.0)[joint]);
@@ -37,7 +37,7 @@ fn stretches_of_hover_of_a_held_joint_and_of_a_kept_camera_begin_and_end_when_to
     assert!(spread(1, 5.5, 9.0) < 1e-6 && spread(0, 5.5, 9.0) > 0.02 && spread(2, 5.5, 9.0) > 0.02);
     assert!(spread(1, 9.0, 13.0) > 0.02);
 
-    look.held_joint = None;
+    look.fixed_joint = None;
     look.stabilized_s = Some([5.0, 4.0]);
     let motion = JointMotion::fly(&before, &chain, &joints(), &look, &Stabilizer::default());
     let looks =

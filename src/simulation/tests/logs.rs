@@ -126,7 +126,7 @@ fn disturbances_are_read_as_they_are_written_on_the_command_line() {
         blank_s: Some([5.0, 1.5]),
         gimbal_slew_s: Some([6.0, 2.0]),
         spin: Some([7.0, 1.0, 3.5]),
-        held_joint: Some([2.0, 8.0, 1.0]),
+        fixed_joint: Some([2.0, 8.0, 1.0]),
         hover_s: Some([9.0, 2.0]),
         stabilized_s: Some([12.0, 2.0]),
         ..Disturbances::default()

@@ -59,7 +59,7 @@ fn inertial_samples_join_from_frame_to_frame_and_integrate_to_the_truth() {
 
 #[test]
 fn noise_and_motion_are_as_asked() {
-    let flight = synthetic_tracks(&short(SyntheticMount::Gimbal, SyntheticMotion::StandstillThenAggressive));
+    let flight = synthetic_tracks(&short(SyntheticMount::Gimbal, SyntheticMotion::StationaryThenAggressive));
     let still = flight.frames.iter().filter(|frame| frame.stamp_ns < 2_000_000_000);
     assert!(still.clone().count() > 30);
     assert!(still.clone().all(|frame| frame.true_velocity_m_per_s.norm() < 1e-9));

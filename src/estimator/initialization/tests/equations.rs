@@ -39,9 +39,9 @@ fn gradient_of_the_refinement_meets_central_differences() {
             imu_from_camera: &mounts,
             increments: &increments,
             bearing_sigma_rad: 0.05,
-            mount_rotation_sigma_rad: 0.1,
-            mount_rotation_noise_rad: own_noise,
-            mount_translation_sigma_m: 0.05,
+            extrinsics_rotation_sigma_rad: 0.1,
+            extrinsics_rotation_noise_rad: own_noise,
+            extrinsics_translation_sigma_m: 0.05,
             gyroscope_bias: VectorPrior { mean: random.vector(0.01), sigma: 0.05 },
             accelerometer_bias: VectorPrior { mean: Vector3::zeros(), sigma: 0.5 },
         };
@@ -65,9 +65,9 @@ fn gradient_of_the_refinement_meets_central_differences() {
             gravity: Vector3::new(0.5, -1.0, -9.7).normalize() * 9.81,
             bias: ImuBias { gyroscope_rad_per_s: random.vector(0.02), accelerometer_m_per_s2: random.vector(0.3) },
             landmarks,
-            shared_turn: so3::exp(&random.vector(0.1)),
-            shared_shift: random.vector(0.02),
-            own_turns: (0..VIEWS).map(|_| turns(&mut random)).collect(),
+            common_rotation: so3::exp(&random.vector(0.1)),
+            common_shift: random.vector(0.02),
+            per_view_rotations: (0..VIEWS).map(|_| turns(&mut random)).collect(),
         };
         let refinement = Refinement::new(&input).unwrap();
         // An endless damping of the depths leaves the plain gradient at fixed depths.

@@ -66,7 +66,7 @@ pub(super) struct FlightOptions {
     pub(super) chain_rotation_bound_rad: f64,
     pub(super) chain_translation_bound_m: f64,
     pub(super) pixel_sigma: f64,
-    pub(super) outlier_share: f64,
+    pub(super) outlier_ratio: f64,
     pub(super) accelerometer_bias_bound: f64,
     pub(super) gyroscope_bias_bound: f64,
 }
@@ -84,7 +84,7 @@ impl FlightOptions {
             chain_rotation_bound_rad: 0.0087,
             chain_translation_bound_m: 0.003,
             pixel_sigma: 0.5,
-            outlier_share: 0.02,
+            outlier_ratio: 0.02,
             accelerometer_bias_bound: 0.5,
             gyroscope_bias_bound: 0.01,
         }
@@ -326,7 +326,7 @@ impl Tracker {
         while live.len() < 110 {
             let landmark = (random.uniform(0.0, 1.0) * self.landmarks.len() as f64) as usize % self.landmarks.len();
             if self.pixel(landmark, &camera_from_world).is_some() {
-                let outlier = random.uniform(0.0, 1.0) < options.outlier_share;
+                let outlier = random.uniform(0.0, 1.0) < options.outlier_ratio;
                 let drift_px =
                     if outlier { Vector2::new(random.normal(), random.normal()) * 3.0 } else { Vector2::zeros() };
                 let id = FeatureId(self.next_id);

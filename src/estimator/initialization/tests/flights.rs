@@ -6,7 +6,7 @@ use super::flight::{FOCAL_PX, Flight, FlightOptions, GRAVITY, Motion, fly, noise
 use crate::estimator::initialization::bearing::angle_between;
 use crate::estimator::initialization::{
     InitializationFrame, InitializationInput, InitializationOptions, InitializationOrigin, InitializationOutcome,
-    InitializationSolution, StandstillEstimate, StandstillPolicy, WaitReason, try_initialize,
+    InitializationSolution, StationaryEstimate, StationaryPolicy, WaitReason, try_initialize,
 };
 use crate::sensors::ChainPrior;
 
@@ -19,7 +19,7 @@ fn options_for(flight: &FlightOptions) -> InitializationOptions {
         };
         options.for_gimbal(&prior, 3, flight.encoders.then_some(flight.encoder_sigma_rad))
     } else {
-        options.for_rigid_mount(
+        options.for_rigid_camera(
             (flight.chain_rotation_bound_rad * 1.2).max(0.003),
             (flight.chain_translation_bound_m * 1.2).max(0.001),
         )
@@ -30,7 +30,7 @@ fn attempt(
     flight: &Flight,
     newest: usize,
     options: &InitializationOptions,
-    standstill: Option<StandstillEstimate>,
+    standstill: Option<StationaryEstimate>,
 ) -> InitializationOutcome {
     let first = newest.saturating_sub((options.longest_window_s / 0.05) as usize);
     let frames: Vec<InitializationFrame<'_>> = flight.frames[first..=newest]
@@ -75,7 +75,7 @@ struct Errors {
     gyroscope_rad_per_s: f64,
     accelerometer_m_per_s2: f64,
     position_m: f64,
-    mount_deg: f64,
+    extrinsics_deg: f64,
 }
 
 fn errors(flight: &Flight, hover_s: f64, newest: usize, solution: &InitializationSolution) -> Errors {
@@ -107,7 +107,7 @@ fn errors(flight: &Flight, hover_s: f64, newest: usize, solution: &Initializatio
         gyroscope_rad_per_s: (solution.bias.gyroscope_rad_per_s - flight.gyroscope_bias).norm(),
         accelerometer_m_per_s2: (solution.bias.accelerometer_m_per_s2 - flight.accelerometer_bias).norm(),
         position_m: (moved - estimated).norm(),
-        mount_deg: mount.to_degrees(),
+        extrinsics_deg: mount.to_degrees(),
     }
 }
 
@@ -149,9 +149,9 @@ fn check(name: &str, seeds: u64, flight_of: impl Fn(u64) -> FlightOptions, limit
                     errors.accelerometer_m_per_s2,
                     d.accelerometer_bias_sigma_m_per_s2,
                     errors.position_m,
-                    errors.mount_deg,
+                    errors.extrinsics_deg,
                     d.reprojection_rms_rad * FOCAL_PX,
-                    d.inertial_mean_square,
+                    d.imu_mean_square,
                     d.refinement_rounds,
                 );
                 all.push(errors);
@@ -251,11 +251,11 @@ fn standstill_is_remembered_or_used_at_once() {
     assert!(reasons.iter().any(|reason| reason.test == "parallax"), "{reasons:?}");
     assert!((standing.gyroscope_bias_rad_per_s - flight.gyroscope_bias).norm() < 1e-3);
 
-    let at_once = InitializationOptions { standstill_policy: StandstillPolicy::InitializeAtOnce, ..options };
+    let at_once = InitializationOptions { stationary_policy: StationaryPolicy::InitializeAtOnce, ..options };
     let InitializationOutcome::Initialized(solution) = attempt(&flight, newest, &at_once, None) else {
         panic!("a standstill initializes at once when told to");
     };
-    assert_eq!(solution.origin, InitializationOrigin::FromStandstill);
+    assert_eq!(solution.origin, InitializationOrigin::FromStationary);
     let errors = errors(&flight, 0.0, newest, &solution);
     // The accelerometer's bias tilts the world by up to asin(0.5·√2/9.81) = 4.1°.
     assert!(errors.gravity_deg < 4.2 && errors.velocity_m_per_s < 1e-9, "{errors:?}");

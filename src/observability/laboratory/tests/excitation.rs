@@ -94,8 +94,8 @@ fn flown(seed: u64, every: usize) -> (Advice, Vec<(String, f64, f64)>) {
     let (report, rank) = fly(&mut start, &warm_up, -1.0, SHARED_S);
     let situation = Situation::of_step(&report, &rank, &warm_up.given_rig, "cam0").unwrap();
     let advice = advise(&situation).unwrap();
-    let before = sigma(&rank, &advice.weakest.weights);
-    assert!((before / advice.weakest.sigma - 1.0).abs() < 1e-3, "{before} {}", advice.weakest.sigma);
+    let before = sigma(&rank, &advice.least_observable.weights);
+    assert!((before / advice.least_observable.sigma - 1.0).abs() < 1e-3, "{before} {}", advice.least_observable.sigma);
     let outcomes = advice
         .candidates
         .iter()
@@ -104,7 +104,7 @@ fn flown(seed: u64, every: usize) -> (Advice, Vec<(String, f64, f64)>) {
             let mut estimator = start.clone();
             let flight = flight(candidate.exercise, seed);
             let (_, rank) = fly(&mut estimator, &flight, SHARED_S, START_S + FLOWN_S);
-            (candidate.words.clone(), candidate.remaining, sigma(&rank, &advice.weakest.weights) / before)
+            (candidate.words.clone(), candidate.remaining, sigma(&rank, &advice.least_observable.weights) / before)
         })
         .collect();
     (advice, outcomes)
@@ -122,18 +122,18 @@ fn check_flown(seed: u64) {
     let (advice, outcomes) = flown(seed, 5);
     let table: Vec<String> = outcomes
         .iter()
-        .map(|(words, foretold, left)| format!("{foretold:.3} foretold, {left:.3} left: {words}"))
+        .map(|(words, predicted, left)| format!("{predicted:.3} foretold, {left:.3} left: {words}"))
         .collect();
-    let table = format!("seed {seed}: {}\n{}", advice.weakest, table.join("\n"));
+    let table = format!("seed {seed}: {}\n{}", advice.least_observable, table.join("\n"));
     assert_eq!(advice.candidates.len(), 28, "seven swings of the vehicle with none or one of three joints");
-    let (_, first_foretold, best) = &outcomes[0];
+    let (_, first_predicted, best) = &outcomes[0];
     assert!(*best < 0.9, "{table}");
-    for (words, foretold, left) in &outcomes {
-        assert!((foretold - left).abs() < 0.1, "{words}\n{table}");
+    for (words, predicted, left) in &outcomes {
+        assert!((predicted - left).abs() < 0.1, "{words}\n{table}");
         // What is foretold is worth three percent: nearer ones are as good.
-        assert!(*foretold < 1.03 * first_foretold || best < left, "{words}\n{table}");
+        assert!(*predicted < 1.03 * first_predicted || best < left, "{words}\n{table}");
     }
-    let apart = outcomes.iter().filter(|(_, foretold, _)| *foretold >= 1.03 * first_foretold).count();
+    let apart = outcomes.iter().filter(|(_, predicted, _)| *predicted >= 1.03 * first_predicted).count();
     assert!(apart >= 3, "{table}");
     assert!(advice.sentence().unwrap().starts_with(&advice.candidates[0].words));
 }

@@ -141,7 +141,7 @@ const SECTIONS: [(&str, &[Expected]); 6] = [
 ];
 
 /// Columns, full rank, and the least number of frames for it, from and to where the table leaves it open.
-const LEAST_FRAMES: [(&str, usize, [usize; 2]); 6] = [
+const MIN_FRAMES: [(&str, usize, [usize; 2]); 6] = [
     ("encoder, poses known", 18, [5, 5]),
     ("encoder, IMU, bias known", 18, [6, 6]),
     ("encoder, IMU, bias free", 18, [7, 7]),
@@ -190,8 +190,8 @@ fn ranks_losses_and_null_directions_are_those_of_the_truth_table() {
         assert_eq!(section.rows.len(), rows.len(), "{title}");
         compared += section.rows.iter().zip(*rows).map(|(row, expected)| check(row, expected)).sum::<usize>();
     }
-    assert_eq!(least_frames.len(), LEAST_FRAMES.len());
-    for (row, (scenario, rank, [least, most])) in least_frames.iter().zip(&LEAST_FRAMES) {
+    assert_eq!(least_frames.len(), MIN_FRAMES.len());
+    for (row, (scenario, rank, [least, most])) in least_frames.iter().zip(&MIN_FRAMES) {
         assert_eq!((row.scenario.as_str(), row.rank), (*scenario, *rank));
         assert!((*least..=*most).contains(&row.frames), "{row:?}");
         compared += 1;

@@ -8,12 +8,12 @@ use crate::estimator::window::joints::UNKNOWN_JOINT_SIGMA_RAD;
 use crate::geometry::{RigidTransform, so3};
 
 /// Standard deviation of the rotations `imu_from_camera` that the initialization found.
-const MOUNT_SIGMA_RAD: f64 = 0.01;
+const EXTRINSICS_SIGMA_RAD: f64 = 0.01;
 const ROUNDS: usize = 10;
 
 /// Fits chain parameters and joint angles to the rotations `imu_from_camera` of the frames, by Gauss–Newton, with the encoder
 /// angles and the rig's prior on the chain as priors. Nothing changes when the equations are singular or there are no joints.
-pub(super) fn fit_mounts(calibration: &mut Calibration, frames: &mut Frames, imu_from_camera: &[RigidTransform]) {
+pub(super) fn fit_extrinsics(calibration: &mut Calibration, frames: &mut Frames, imu_from_camera: &[RigidTransform]) {
     let joints = calibration.joint_count();
     if joints == 0 || imu_from_camera.len() != frames.len() {
         return;
@@ -41,9 +41,9 @@ pub(super) fn fit_mounts(calibration: &mut Calibration, frames: &mut Frames, imu
             let place = dof + joints * slot;
             rows.columns_mut(0, dof).copy_from(&chain.by_parameters.fixed_rows::<3>(0));
             rows.columns_mut(place, joints).copy_from(&chain.by_joints.fixed_rows::<3>(0));
-            let rows = so3::right_jacobian_inverse(&error) * rows / MOUNT_SIGMA_RAD;
+            let rows = so3::right_jacobian_inverse(&error) * rows / EXTRINSICS_SIGMA_RAD;
             hessian += rows.tr_mul(&rows);
-            gradient += rows.tr_mul(&(error / MOUNT_SIGMA_RAD));
+            gradient += rows.tr_mul(&(error / EXTRINSICS_SIGMA_RAD));
             for joint in 0..joints {
                 let weight = sigma(slot, joint).powi(-2);
                 hessian[(place + joint, place + joint)] += weight;
