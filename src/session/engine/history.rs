@@ -4,7 +4,9 @@
 //! snapshot before it, to the same bits.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
+
+use parking_lot::Mutex;
 
 use super::run_engine::RunEngine;
 use super::step_inputs::{OwnedStepInput, StepInputs};
@@ -73,14 +75,9 @@ impl History {
         self.begin
     }
 
-    fn lock(&self) -> MutexGuard<'_, Snapshots> {
-        // Snapshots are only ever put in and taken out whole.
-        self.snapshots.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     /// Counts the step's input, and keeps a snapshot of the engine where one is due.
     pub(in crate::session) fn before_step(&self, step: usize, engine: &RunEngine, input: &OwnedStepInput) {
-        let mut snapshots = self.lock();
+        let mut snapshots = self.snapshots.lock();
         if self.parent.is_none() {
             snapshots.input_bytes += input.own_bytes();
         }
@@ -95,25 +92,25 @@ impl History {
 
     /// Sets how many bytes snapshots may take together.
     pub(in crate::session) fn set_budget(&self, budget_bytes: usize) {
-        let mut snapshots = self.lock();
+        let mut snapshots = self.snapshots.lock();
         snapshots.budget_bytes = budget_bytes;
         snapshots.keep_within_budget(self.begin);
     }
 
     /// Steps between two snapshots.
     pub(in crate::session) fn spacing(&self) -> usize {
-        self.lock().spacing
+        self.snapshots.lock().spacing
     }
 
     /// The snapshots that are kept of this run's own steps.
     pub(super) fn snapshots(&self) -> SnapshotUse {
-        let snapshots = self.lock();
+        let snapshots = self.snapshots.lock();
         SnapshotUse { count: snapshots.kept.len(), bytes: snapshots.bytes, spacing: snapshots.spacing }
     }
 
     /// Bytes of snapshots and step inputs.
     pub(in crate::session) fn bytes(&self) -> usize {
-        let snapshots = self.lock();
+        let snapshots = self.snapshots.lock();
         snapshots.bytes + snapshots.input_bytes
     }
 
@@ -131,7 +128,7 @@ impl History {
     }
 
     fn snapshot_before(&self, step: usize) -> Option<(usize, Arc<RunEngine>)> {
-        let snapshots = self.lock();
+        let snapshots = self.snapshots.lock();
         let (at, (engine, _)) = snapshots.kept.range(..=step).next_back()?;
         Some((*at, Arc::clone(engine)))
     }

@@ -1,8 +1,10 @@
 //! A thread that recomputes steps at the cursor: those of which only the summary is kept, and the solver's states.
 
 use std::collections::VecDeque;
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 use std::thread::{Builder, JoinHandle};
+
+use parking_lot::{Condvar, Mutex};
 
 use super::history::History;
 use crate::estimator::FactorRows;
@@ -85,13 +87,6 @@ struct Shared {
     changed: Condvar,
 }
 
-impl Shared {
-    fn lock(&self) -> MutexGuard<'_, Queue> {
-        // RecomputeRequestes are only ever put in and taken out whole.
-        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
 /// The thread; dropping it ends it after the request that it works on.
 #[derive(Debug)]
 pub(in crate::session) struct RecomputeThread {
@@ -108,8 +103,8 @@ impl RecomputeThread {
         let seen = Arc::clone(&shared);
         let work = move || {
             loop {
-                let ready = seen.changed.wait_while(seen.lock(), |queue| queue.waiting.is_empty() && !queue.closed);
-                let mut queue = ready.unwrap_or_else(PoisonError::into_inner);
+                let mut queue = seen.queue.lock();
+                seen.changed.wait_while(&mut queue, |queue| queue.waiting.is_empty() && !queue.closed);
                 if queue.closed {
                     return;
                 }
@@ -119,7 +114,7 @@ impl RecomputeThread {
                 drop(queue);
                 let recomputed = match request.detail {
                     Detail::Step => {
-                        let still_wanted = || !request.prefetch || seen.lock().is_wanted(&request);
+                        let still_wanted = || !request.prefetch || seen.queue.lock().is_wanted(&request);
                         request
                             .history
                             .recompute_while(request.step, STEPS_AT_ONCE, &still_wanted)
@@ -132,10 +127,10 @@ impl RecomputeThread {
                 };
                 if let Some(recomputed) = recomputed {
                     // Another state of the solver may be shown by now.
-                    let request = seen.lock().working.clone().unwrap_or(request);
+                    let request = seen.queue.lock().working.clone().unwrap_or(request);
                     deliver(&request, recomputed);
                 }
-                seen.lock().working = None;
+                seen.queue.lock().working = None;
                 seen.changed.notify_all();
             }
         };
@@ -145,7 +140,7 @@ impl RecomputeThread {
 
     /// Replaces all requests by these, in this order.
     pub(in crate::session) fn request(&self, requests: Vec<RecomputeRequest>) {
-        let mut queue = self.shared.lock();
+        let mut queue = self.shared.queue.lock();
         queue.waiting.clear();
         let mut working_wanted = false;
         for request in requests {
@@ -166,18 +161,19 @@ impl RecomputeThread {
 
     /// Waits until everything at the cursor has been delivered.
     pub(in crate::session) fn settle(&self) {
-        drop(self.shared.changed.wait_while(self.shared.lock(), |queue| !queue.closed && queue.has_work_at_cursor()));
+        let mut queue = self.shared.queue.lock();
+        self.shared.changed.wait_while(&mut queue, |queue| !queue.closed && queue.has_work_at_cursor());
     }
 
     /// Whether something at the cursor is being recomputed.
     pub(in crate::session) fn is_busy(&self) -> bool {
-        self.shared.lock().has_work_at_cursor()
+        self.shared.queue.lock().has_work_at_cursor()
     }
 }
 
 impl Drop for RecomputeThread {
     fn drop(&mut self) {
-        self.shared.lock().closed = true;
+        self.shared.queue.lock().closed = true;
         self.shared.changed.notify_all();
         if let Some(thread) = self.thread.take() {
             drop(thread.join());
@@ -210,7 +206,7 @@ mod tests {
             thread: None,
         };
         thread.request(vec![request(7, false), request(3, true)]);
-        let queue = thread.shared.lock();
+        let queue = thread.shared.queue.lock();
         assert!(queue.is_wanted(&request(7, true)) && queue.has_work_at_cursor());
         assert_eq!(queue.waiting.iter().map(|request| request.step).collect::<Vec<_>>(), [3]);
     }

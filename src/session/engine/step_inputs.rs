@@ -1,6 +1,8 @@
 //! The inputs of a run's steps, kept so that the steps can be recomputed.
 
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
+
+use parking_lot::{Condvar, Mutex};
 
 use crate::estimator::allocated_bytes;
 use crate::flight_log::SensorFrame;
@@ -86,32 +88,28 @@ struct State {
 }
 
 impl StepInputs {
-    fn lock(&self) -> MutexGuard<'_, State> {
-        // Inputs are only ever pushed whole.
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     /// Adds the input of the next step.
     pub(in crate::session) fn push(&self, input: Arc<OwnedStepInput>) {
-        self.lock().steps.push(input);
+        self.state.lock().steps.push(input);
         self.grown.notify_all();
     }
 
     /// No more will come.
     pub(in crate::session) fn end(&self) {
-        self.lock().ended = true;
+        self.state.lock().ended = true;
         self.grown.notify_all();
     }
 
     /// The input of a step that has been computed.
     pub(in crate::session) fn get(&self, step: usize) -> Option<Arc<OwnedStepInput>> {
-        self.lock().steps.get(step).cloned()
+        self.state.lock().steps.get(step).cloned()
     }
 
     /// The input of a step; waits for it. `None` behind the last one.
     pub(in crate::session) fn wait_for(&self, step: usize) -> Option<Arc<OwnedStepInput>> {
-        let waiting = self.grown.wait_while(self.lock(), |state| state.steps.len() <= step && !state.ended);
-        waiting.unwrap_or_else(PoisonError::into_inner).steps.get(step).cloned()
+        let mut state = self.state.lock();
+        self.grown.wait_while(&mut state, |state| state.steps.len() <= step && !state.ended);
+        state.steps.get(step).cloned()
     }
 }
 

@@ -2,8 +2,10 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::Receiver;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 use std::thread::{Builder, JoinHandle};
+
+use parking_lot::Mutex;
 
 use crate::session::engine::{Computation, EngineMessage, RecomputeRequest, Recomputed};
 use crate::session::plan::SessionError;
@@ -16,13 +18,8 @@ struct State {
 }
 
 impl State {
-    fn lock(&self) -> MutexGuard<'_, Computation> {
-        // Every change adds or replaces something whole.
-        self.computation.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     fn change(&self, change: impl FnOnce(&mut Computation)) {
-        change(&mut self.lock());
+        change(&mut self.computation.lock());
         self.generation.fetch_add(1, Ordering::Release);
     }
 }
@@ -60,11 +57,11 @@ impl SharedComputation {
     }
 
     pub(super) fn recording(&self) -> Arc<Recording> {
-        Arc::clone(self.state.lock().recording())
+        Arc::clone(self.state.computation.lock().recording())
     }
 
     pub(super) fn computation(&self) -> Computation {
-        self.state.lock().clone()
+        self.state.computation.lock().clone()
     }
 
     /// Changes with every change.
