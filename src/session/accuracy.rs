@@ -4,19 +4,19 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use crate::geometry::{RigidTransform, so3};
 
-/// A stamped pose; stamps are seconds on any clock that both trajectories share.
+/// A stamped pose. Stamps are in seconds, on a clock that both trajectories share.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StampedPose {
-    /// Seconds.
+    /// Stamp in seconds.
     pub stamp_s: f64,
-    /// World from body.
+    /// `world_from_body`.
     pub pose: RigidTransform,
 }
 
 /// How the estimate is aligned with the reference before positions are compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Alignment {
-    /// Not at all.
+    /// No alignment: both trajectories are already in one world.
     None,
     /// Rotation about the vertical and a translation: the gauge freedom of visual-inertial odometry.
     YawPosition,
@@ -31,22 +31,22 @@ pub enum Alignment {
 pub struct ErrorStatistics {
     /// Number of errors.
     pub count: usize,
-    /// Root of the mean square.
+    /// Root mean square.
     pub rmse: f64,
-    /// Mean.
+    /// Arithmetic mean.
     pub mean: f64,
-    /// Median.
+    /// Middle of the sorted errors; of an even number, the mean of the middle two.
     pub median: f64,
     /// Standard deviation (of the population, as numpy's default).
     pub std: f64,
-    /// Smallest.
+    /// Smallest error.
     pub min: f64,
-    /// Largest.
+    /// Largest error.
     pub max: f64,
 }
 
 impl ErrorStatistics {
-    /// Statistics of the errors, `None` of none.
+    /// Statistics of the errors, `None` without any.
     pub fn of(errors: &[f64]) -> Option<Self> {
         if errors.is_empty() {
             return None;
@@ -70,24 +70,26 @@ impl ErrorStatistics {
     }
 }
 
-/// `reference ≈ scale · rotation · estimate + translation`.
+/// A similarity transform that maps the estimate onto the reference: `reference ≈ scale · rotation · estimate +
+/// translation`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AlignmentTransform {
-    /// Reference from estimate.
+    /// `reference_from_estimate`.
     pub rigid: RigidTransform,
-    /// Factor on the estimate's lengths.
+    /// Scale factor of the estimate's lengths, without unit.
     pub scale: f64,
 }
 
 impl AlignmentTransform {
-    /// A pose of the estimate, aligned with the reference: `reference_from_body`.
+    /// A pose of the estimate in the frame of the reference: `reference_from_body`.
     pub fn apply(&self, pose: &RigidTransform) -> RigidTransform {
         let position = self.rigid.rotation * pose.translation_m * self.scale + self.rigid.translation_m;
         RigidTransform::new(self.rigid.rotation * pose.rotation, position)
     }
 }
 
-/// Sums over position pairs from which an alignment follows at any time; pairs can be added one by one.
+/// Running sums over pairs of positions, from which [`AlignmentSums::solve`] computes the alignment of the pairs so
+/// far.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct AlignmentSums {
     count: usize,
@@ -107,8 +109,8 @@ impl AlignmentSums {
         self.estimate_square += estimate_m.norm_squared();
     }
 
-    /// The least-squares alignment (Umeyama 1991; about the vertical only for [`Alignment::YawPosition`]), `None` with
-    /// fewer than three pairs or when the positions do not fix it.
+    /// The least-squares alignment (Umeyama 1991; about the vertical only for [`Alignment::YawPosition`]). Returns
+    /// `None` with fewer than three pairs, or when the positions do not constrain it.
     pub fn solve(&self, alignment: Alignment) -> Option<AlignmentTransform> {
         if alignment == Alignment::None {
             return Some(AlignmentTransform { rigid: RigidTransform::identity(), scale: 1.0 });
@@ -148,10 +150,10 @@ impl AlignmentSums {
     }
 }
 
-/// Pairs of poses at the same instants, estimate first.
+/// Pairs of poses with the same stamp, estimate first.
 ///
-/// As in evo, each stamp of the shorter trajectory takes the nearest of the longer one, when that lies within
-/// `max_difference_s`.
+/// As in evo, each stamp of the shorter trajectory is paired with the nearest stamp of the longer one, if the two
+/// differ by at most `max_difference_s`.
 pub fn associate(
     estimate: &[StampedPose],
     reference: &[StampedPose],
@@ -175,7 +177,7 @@ pub fn associate(
         .collect()
 }
 
-/// The alignment of associated poses.
+/// The alignment of associated poses; see [`AlignmentSums::solve`].
 pub fn align(pairs: &[(StampedPose, StampedPose)], alignment: Alignment) -> Option<AlignmentTransform> {
     let mut sums = AlignmentSums::default();
     for (estimate, reference) in pairs {
@@ -184,7 +186,7 @@ pub fn align(pairs: &[(StampedPose, StampedPose)], alignment: Alignment) -> Opti
     sums.solve(alignment)
 }
 
-/// Distance of each aligned position from its reference (evo's absolute pose error, translation part), in metres.
+/// Position error of each aligned pose, in metres (evo's absolute pose error, translation part).
 pub fn absolute_errors_m(pairs: &[(StampedPose, StampedPose)], transform: &AlignmentTransform) -> Vec<f64> {
     pairs
         .iter()
@@ -197,13 +199,14 @@ pub fn absolute_errors_m(pairs: &[(StampedPose, StampedPose)], transform: &Align
 /// Distance between the two poses of a relative error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RelativeDelta {
-    /// A number of frames.
+    /// This number of frames.
     Frames(usize),
-    /// A path length along the aligned estimate, in metres.
+    /// This path length along the aligned estimate, in metres.
     Metres(f64),
 }
 
-/// Translation (m) and rotation (rad) errors over consecutive sub-trajectories of one delta (evo's relative pose error).
+/// Translation errors (m) and rotation errors (rad) over consecutive sub-trajectories of length `delta` (evo's relative
+/// pose error).
 pub fn relative_errors(
     pairs: &[(StampedPose, StampedPose)],
     transform: &AlignmentTransform,
@@ -221,7 +224,7 @@ pub fn relative_errors(
     (translations, rotations)
 }
 
-/// Index pairs one delta apart, one after the other.
+/// Index pairs of consecutive sub-trajectories of length `delta`.
 fn sub_trajectories(
     pairs: &[(StampedPose, StampedPose)],
     transform: &AlignmentTransform,

@@ -1,15 +1,15 @@
-//! A log, the runs over it, and the reports of their steps.
+//! A log, the runs on it, and the reports of their steps.
 //!
-//! A [`Recording`] holds the reports so far; the window and the exports draw it at a cursor. [`compute`] fills one without
-//! a window; a [`Session`] plays one while it still grows.
+//! A [`Recording`] holds the reports so far; the window and the exports draw it at a cursor. [`compute`] fills one
+//! without a window; a [`Session`] plays one while it is computed.
 //!
 //! A folder uses those above it in this list and none below it:
 //!
 //! - [`accuracy`]: trajectory errors against ground truth.
-//! - `plan/`: what a session is to do: log, rig, runs, and the changes of a fork.
+//! - `plan/`: the definition of a session: log, rig, runs, and the changes of a fork.
 //! - `record/`: the reports of every step as plain data; no threads, and nothing that runs an estimator.
-//! - [`breakpoints`]: conditions over those reports.
-//! - `engine/`: runs on threads, and the recomputation of their steps from step inputs and estimator snapshots. Messages of
+//! - [`breakpoints`]: conditions on those reports.
+//! - `engine/`: runs on threads, and recomputation of their steps from step inputs and estimator snapshots. Messages of
 //!   the threads become records in [`Computation`], nowhere else.
 //! - `playback/`: a cursor over the record, the commands that move it, and the session that connects cursor, engine and
 //!   record.

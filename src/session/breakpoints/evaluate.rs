@@ -1,4 +1,4 @@
-//! Whether a condition holds in a step.
+//! Evaluation of a condition in a step.
 
 use super::expression::{Arithmetic, Condition, Number, Span, Truth};
 use super::quantities::NamedNumber;
@@ -6,33 +6,33 @@ use crate::estimator::ResidualSummary;
 use crate::gimbal::{ParameterId, ParameterNames};
 use crate::session::record::StepRecord;
 
-/// A step as a condition sees it.
+/// The inputs of the evaluation of a condition.
 #[derive(Clone, Copy, Debug)]
 pub struct Moment<'a> {
-    /// The step; its summary suffices.
+    /// The step. Its summary suffices.
     pub step: &'a StepRecord,
     /// The step before it.
     pub previous: Option<&'a StepRecord>,
-    /// What parameters and joints are called.
+    /// Names of parameters and joints.
     pub names: &'a ParameterNames,
 }
 
-/// A quantity of a condition with its value in a step.
+/// A quantity of a condition and its value in a step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NamedValue {
-    /// As written in the condition.
+    /// The quantity as written in the condition.
     pub name: String,
-    /// Its value; `None` where the step has none.
+    /// The value; `None` where the step does not have the quantity.
     pub value: Option<f64>,
 }
 
 impl Condition {
-    /// Whether it holds, `None` when the step lacks what decides it.
+    /// Whether the condition is true in the step, `None` when the step lacks a quantity that decides it.
     pub fn holds(&self, moment: &Moment<'_>) -> Option<bool> {
         self.truth.holds(moment)
     }
 
-    /// Every quantity that is asked for, once, in the order of the text.
+    /// Every quantity of the condition once, in the order of the text.
     pub fn values(&self, moment: &Moment<'_>) -> Vec<NamedValue> {
         let mut parts = Vec::new();
         self.truth.visit(&mut |span, number| parts.push((span, number.value(moment))));
@@ -46,7 +46,8 @@ impl Condition {
         values
     }
 
-    /// Parameters and joints that it names and that are not among these; a name of neither kind can never be found.
+    /// Parameters and joints in the condition that are not in `names` and `parameters`. A condition on such a name is
+    /// never true.
     pub fn unknown_names(&self, names: &ParameterNames, parameters: &[ParameterId]) -> Vec<String> {
         let mut unknown = Vec::new();
         self.truth.visit(&mut |_, number| {
@@ -77,7 +78,7 @@ impl Truth {
                 Some(comparison.holds(left.value(moment)?, right.value(moment)?))
             }
             Self::Not(inner) => inner.holds(moment).map(|truth| !truth),
-            // What is missing decides nothing where the other side decides alone.
+            // A missing value matters only where the other operand does not decide alone.
             Self::And(left, right) => match (left.holds(moment), right.holds(moment)) {
                 (Some(false), _) | (_, Some(false)) => Some(false),
                 (Some(true), Some(true)) => Some(true),
@@ -91,7 +92,7 @@ impl Truth {
         }
     }
 
-    /// Calls for every quantity of the step, from left to right.
+    /// Calls `visit` for every quantity, from left to right.
     fn visit<'a>(&'a self, visit: &mut impl FnMut(Span, &'a Number)) {
         match self {
             Self::Literal(_) | Self::Flag(_) | Self::Event(..) => {}

@@ -1,4 +1,4 @@
-//! A condition as a tree.
+//! The syntax tree of a condition.
 
 use std::fmt;
 
@@ -7,19 +7,19 @@ use thiserror::Error;
 use super::quantities::{FlagName, NamedNumber, NumberName};
 use crate::estimator::EventKind;
 
-/// Why a text is no condition: what is wrong, and where.
+/// A syntax error in a condition and its column.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("column {column}: {message}\n  {text}\n  {}^", " ".repeat(column - 1))]
 pub struct ConditionProblem {
-    /// The whole text.
+    /// The text of the whole condition.
     pub text: String,
-    /// Where the mistake begins, counted in characters from 1; one more than the text has where something is missing.
+    /// Column of the error in characters, from 1; behind the last character where something is missing.
     pub column: usize,
-    /// What is wrong and what was expected.
+    /// The error and what was expected.
     pub message: String,
 }
 
-/// Something that is true or not in a step of a run.
+/// A Boolean expression over the quantities of a step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Condition {
     pub(super) text: String,
@@ -27,7 +27,7 @@ pub struct Condition {
 }
 
 impl Condition {
-    /// As it was written.
+    /// The text from which it was parsed.
     pub fn text(&self) -> &str {
         &self.text
     }
@@ -39,31 +39,31 @@ impl fmt::Display for Condition {
     }
 }
 
-/// Characters of the text, first and behind the last, from 0.
+/// Range of characters in the text, from 0; `end` is exclusive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Span {
     pub(super) begin: usize,
     pub(super) end: usize,
 }
 
-/// A part that is a number.
+/// A numerical sub-expression.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Number {
     Literal(f64),
-    /// A quantity of the step, and where it is written.
+    /// A quantity of the step.
     Quantity(NumberName, Span),
-    /// A quantity that goes by a name, and where it is written.
+    /// A quantity with an argument: `sigma(yaw.alpha)`.
     Named(NamedNumber, String, Span),
-    /// A singular value by its number from 1, largest first.
+    /// A singular value by its number from 1, largest first: `singular(1)`.
     Singular(usize, Span),
-    /// The change since the step before.
+    /// The difference from the step before: `rise(x)`.
     Rise(Box<Self>, Span),
     Negated(Box<Self>),
     Absolute(Box<Self>),
     Combined(Arithmetic, Box<Self>, Box<Self>),
 }
 
-/// What two numbers become.
+/// An operation on two numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Arithmetic {
     Sum,
@@ -74,7 +74,7 @@ pub(super) enum Arithmetic {
     Greatest,
 }
 
-/// A part that is true or not.
+/// A sub-expression that is true or false.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Truth {
     Literal(bool),
@@ -86,7 +86,7 @@ pub(super) enum Truth {
     Or(Box<Self>, Box<Self>),
 }
 
-/// How two numbers compare.
+/// A comparison operator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Comparison {
     Less,

@@ -1,13 +1,13 @@
-//! A condition's text as words, numbers and signs.
+//! Tokens of a condition's text.
 
 use super::expression::{Comparison, ConditionProblem, Span};
 
-/// A word of the text.
+/// A token of the text.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Token {
     Number(f64),
     Name(String),
-    /// A name in quotes.
+    /// A quoted name.
     Quoted(String),
     Compare(Comparison),
     Plus,
@@ -24,7 +24,7 @@ pub(super) enum Token {
     End,
 }
 
-/// Signs, longer ones first.
+/// Operators and punctuation, longer ones first.
 const SIGNS: [(&str, Token); 19] = [
     ("<=", Token::Compare(Comparison::AtMost)),
     (">=", Token::Compare(Comparison::AtLeast)),
@@ -47,7 +47,7 @@ const SIGNS: [(&str, Token); 19] = [
     ("%", Token::Percent),
 ];
 
-/// The words with their places, an end behind the last.
+/// The tokens with their positions; the last one is [`Token::End`].
 pub(super) fn words(text: &str) -> Result<Vec<(Token, Span)>, ConditionProblem> {
     let letters: Vec<char> = text.chars().collect();
     let problem = |at: usize, message: String| ConditionProblem { text: text.to_owned(), column: at + 1, message };
@@ -97,7 +97,7 @@ fn run_of(letters: &[char], begin: usize, belongs: impl Fn(char) -> bool) -> usi
     letters[begin..].iter().position(|letter| !belongs(*letter)).map_or(letters.len(), |length| begin + length)
 }
 
-/// Digits, a point, and an exponent where one follows.
+/// End of a number literal: digits, decimal point, optional exponent.
 fn end_of_number(letters: &[char], begin: usize) -> usize {
     let end = run_of(letters, begin, |letter| letter.is_ascii_digit() || letter == '.');
     let exponent = letters.get(end).is_some_and(|letter| "eE".contains(*letter));

@@ -1,4 +1,4 @@
-//! The breakpoints of a session, and where they were hit.
+//! The breakpoints of a session and their hits.
 
 use std::collections::BTreeMap;
 
@@ -7,51 +7,51 @@ use super::expression::Condition;
 use crate::gimbal::ParameterNames;
 use crate::session::record::{Recording, RunRecord};
 
-/// A step in which a breakpoint was hit.
+/// A step in which the condition of a breakpoint became true.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Hit {
-    /// When, since the log began.
+    /// Stamp of the step, in nanoseconds since the log began.
     pub stamp_ns: i64,
-    /// Number of the run.
+    /// Index of the run.
     pub run: usize,
-    /// Number of the step in the run.
+    /// Index of the step in the run.
     pub step: usize,
-    /// Number of the breakpoint.
+    /// Index of the breakpoint.
     pub breakpoint: usize,
 }
 
-/// How far a breakpoint has been evaluated over a run, and where it was hit.
+/// The steps of one run that a breakpoint has been evaluated over, and its hits.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Track {
     read: usize,
     held: bool,
-    /// Stamp and number of the steps in which the condition became true.
+    /// Stamp and index of each step in which the condition became true.
     hits: Vec<(i64, usize)>,
 }
 
 /// A condition at which the cursor stops.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Breakpoint {
-    /// When it is hit.
+    /// It is hit where this becomes true.
     pub condition: Condition,
-    /// Whether it stops anything.
+    /// Whether the cursor stops at its hits.
     pub enabled: bool,
-    /// By run.
+    /// By [`RunRecord::id`].
     tracks: BTreeMap<u64, Track>,
 }
 
 impl Breakpoint {
-    /// One that is enabled and has not been evaluated.
+    /// An enabled breakpoint that has not been evaluated yet.
     pub fn new(condition: Condition) -> Self {
         Self { condition, enabled: true, tracks: BTreeMap::new() }
     }
 
-    /// How often it was hit in a run so far.
+    /// Number of its hits in a run so far.
     pub fn hit_count(&self, run: &RunRecord) -> usize {
         self.tracks.get(&run.id).map_or(0, |track| track.hits.len())
     }
 
-    /// Stamps at which it was hit in a run so far, in order.
+    /// Stamps of its hits in a run so far, in ascending order.
     pub fn hits_ns(&self, run: &RunRecord) -> impl Iterator<Item = i64> {
         self.tracks.get(&run.id).into_iter().flat_map(|track| track.hits.iter().map(|(stamp_ns, _)| *stamp_ns))
     }
@@ -72,13 +72,13 @@ impl Breakpoint {
     }
 }
 
-/// A step of a run with the one before it.
+/// A step and the step before it.
 fn moment<'a>(run: &'a RunRecord, number: usize, names: &'a ParameterNames) -> Option<Moment<'a>> {
     let previous = number.checked_sub(1).and_then(|before| run.steps.get(before));
     Some(Moment { step: run.steps.get(number)?, previous: previous.map(|step| &**step), names })
 }
 
-/// All breakpoints, evaluated as far as the runs have come.
+/// All breakpoints, evaluated over the steps computed so far.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Breakpoints {
     list: Vec<Breakpoint>,
@@ -90,19 +90,19 @@ impl Breakpoints {
         &self.list
     }
 
-    /// Adds one.
+    /// Appends an enabled breakpoint.
     pub fn add(&mut self, condition: Condition) {
         self.list.push(Breakpoint::new(condition));
     }
 
-    /// Takes one away.
+    /// Removes a breakpoint by its index.
     pub fn remove(&mut self, number: usize) {
         if number < self.list.len() {
             self.list.remove(number);
         }
     }
 
-    /// Sets one, or takes it away where there is one with the same text.
+    /// Appends a breakpoint, or removes the one with the same text.
     pub fn toggle(&mut self, condition: Condition) {
         match self.list.iter().position(|known| known.condition.text() == condition.text()) {
             Some(number) => self.remove(number),
@@ -110,21 +110,21 @@ impl Breakpoints {
         }
     }
 
-    /// Gives one another condition.
+    /// Replaces the condition of a breakpoint; its hits are evaluated again.
     pub fn change(&mut self, number: usize, condition: Condition) {
         if let Some(breakpoint) = self.list.get_mut(number) {
             *breakpoint = Breakpoint { enabled: breakpoint.enabled, ..Breakpoint::new(condition) };
         }
     }
 
-    /// Enables one, or disables it.
+    /// Enables or disables a breakpoint.
     pub fn enable(&mut self, number: usize, enabled: bool) {
         if let Some(breakpoint) = self.list.get_mut(number) {
             breakpoint.enabled = enabled;
         }
     }
 
-    /// Evaluates all of them over the steps that are new.
+    /// Evaluates all breakpoints over the new steps.
     pub fn read(&mut self, recording: &Recording) {
         let names = recording.rig.parameter_names();
         for breakpoint in &mut self.list {
@@ -132,7 +132,7 @@ impl Breakpoints {
         }
     }
 
-    /// Whether steps have come that have not been evaluated.
+    /// Whether there are steps that have not been evaluated.
     pub fn is_behind(&self, recording: &Recording) -> bool {
         let read = |breakpoint: &Breakpoint, run: &RunRecord| breakpoint.tracks.get(&run.id).map(|track| track.read);
         self.list.iter().any(|breakpoint| {
@@ -141,7 +141,7 @@ impl Breakpoints {
         })
     }
 
-    /// The hits of enabled breakpoints in all runs, in no order.
+    /// Hits of the enabled breakpoints in all runs, unordered.
     fn hits<'a>(&'a self, recording: &'a Recording) -> impl Iterator<Item = Hit> + 'a {
         let enabled = self.list.iter().enumerate().filter(|(_, breakpoint)| breakpoint.enabled);
         enabled.flat_map(|(number, breakpoint)| {
@@ -157,19 +157,19 @@ impl Breakpoints {
         })
     }
 
-    /// The first hit of an enabled breakpoint after a time.
+    /// The first hit of an enabled breakpoint after a stamp.
     pub fn next_after(&self, recording: &Recording, stamp_ns: i64) -> Option<Hit> {
         let after = self.hits(recording).filter(|hit| hit.stamp_ns > stamp_ns);
         after.min_by_key(|hit| (hit.stamp_ns, hit.run, hit.breakpoint))
     }
 
-    /// The last hit of an enabled breakpoint before a time.
+    /// The last hit of an enabled breakpoint before a stamp.
     pub fn last_before(&self, recording: &Recording, stamp_ns: i64) -> Option<Hit> {
         let before = self.hits(recording).filter(|hit| hit.stamp_ns < stamp_ns);
         before.min_by_key(|hit| (std::cmp::Reverse(hit.stamp_ns), hit.run, hit.breakpoint))
     }
 
-    /// What a breakpoint asks for, with the values of a step.
+    /// The quantities of the breakpoint's condition with their values in the step of the hit.
     pub fn values_at(&self, recording: &Recording, hit: Hit) -> Vec<NamedValue> {
         let run = recording.runs.get(hit.run);
         let names = recording.rig.parameter_names();
@@ -178,7 +178,7 @@ impl Breakpoints {
         breakpoint.zip(moment).map_or_else(Vec::new, |(breakpoint, moment)| breakpoint.condition.values(&moment))
     }
 
-    /// A hit in one line: `rank < 18 in auto at 4.250 s, frame 85: rank = 17`.
+    /// One line of text: `rank < 18 in auto at 4.250 s, frame 85: rank = 17`.
     pub fn describe(&self, recording: &Recording, hit: Hit) -> String {
         let Some((breakpoint, run)) = self.list.get(hit.breakpoint).zip(recording.runs.get(hit.run)) else {
             return String::new();

@@ -1,8 +1,8 @@
-//! Conditions over the reports of a run, and where they came true.
+//! Conditions on the reports of a run, and the steps in which they become true.
 //!
-//! `rank < 18 or features < 40`: quantities of a step compared with numbers, joined by `and`, `or` and `not`. What a step
-//! does not have (a rank while it initializes) makes no condition true. A breakpoint is hit where its condition becomes
-//! true.
+//! `rank < 18 or features < 40` compares quantities of a step with numbers and joins comparisons by `and`, `or` and
+//! `not`. A quantity that a step does not have (a rank during initialization) makes no condition true. A breakpoint is
+//! hit where its condition becomes true.
 
 mod evaluate;
 mod expression;

@@ -1,4 +1,4 @@
-//! From words to a condition, with a message for every mistake.
+//! Parser of conditions, with an error message for every mistake.
 
 use std::str::FromStr;
 
@@ -7,9 +7,9 @@ use super::lexer::{Token, words};
 use super::quantities::{CAUSES, EVENTS, FLAGS, NAMED, NUMBERS, NamedNumber};
 use crate::estimator::FactorKind;
 
-/// Brackets and signs within each other; more is a mistake and would take too much of the stack.
+/// Limit of nested parentheses and signs; deeper nesting is an error, because it could overflow the stack.
 const DEEPEST: usize = 60;
-/// Units behind a number, and what they are in radians, metres, seconds or pixels.
+/// Unit suffixes and their factors to radians, metres, seconds or pixels.
 const UNITS: [(&str, f64); 11] = [
     ("deg", std::f64::consts::PI / 180.0),
     ("°", std::f64::consts::PI / 180.0),
@@ -23,10 +23,10 @@ const UNITS: [(&str, f64); 11] = [
     ("s", 1.0),
     ("px", 1.0),
 ];
-/// Functions of numbers.
+/// Functions that return numbers.
 const FUNCTIONS: [&str; 5] = ["singular", "rise", "abs", "min", "max"];
 
-/// A part of which it is not yet known what it must be.
+/// A sub-expression that may be a number or a predicate.
 enum Part {
     Number(Number),
     Truth(Truth),
@@ -49,7 +49,7 @@ impl FromStr for Condition {
     }
 }
 
-/// Reads a condition.
+/// Parses a condition.
 fn parse(text: &str) -> Result<Condition> {
     let mut parser = Parser { text, words: words(text)?, at: 0, depth: 0 };
     if matches!(parser.peek(), Token::End) {
@@ -80,7 +80,7 @@ impl Parser<'_> {
         self.span().begin
     }
 
-    /// Where the word before ends.
+    /// End of the previous token.
     fn end(&self) -> usize {
         self.words[self.at.saturating_sub(1)].1.end
     }
@@ -235,7 +235,7 @@ impl Parser<'_> {
         }
     }
 
-    /// The unit behind a number, as a factor.
+    /// Factor of the unit behind a number; 1 without a unit.
     fn unit(&mut self) -> Result<f64> {
         if self.take(&Token::Percent) {
             return Ok(0.01);
@@ -277,7 +277,7 @@ impl Parser<'_> {
         Err(self.problem_at(begin, unknown("quantity", name, known)))
     }
 
-    /// A name with brackets behind it.
+    /// A name with an argument list.
     fn call(&mut self, name: &str, begin: usize) -> Result<Part> {
         self.at += 1;
         let inside = self.begin();
@@ -372,7 +372,7 @@ impl Parser<'_> {
     }
 }
 
-/// Says that a name is not known, and which are; the nearest one first where there is one.
+/// The message for an unknown name, with the nearest known name where one is similar, else with all known names.
 fn unknown<'a>(what: &str, name: &str, known: impl Iterator<Item = &'a str>) -> String {
     let known: Vec<&str> = known.collect();
     let near = known.iter().map(|known| (distance(name, known), *known)).min().filter(|(far, _)| *far <= 2);
@@ -382,7 +382,7 @@ fn unknown<'a>(what: &str, name: &str, known: impl Iterator<Item = &'a str>) -> 
     }
 }
 
-/// How many letters have to be changed, put in or taken out.
+/// Levenshtein distance in characters.
 fn distance(from: &str, to: &str) -> usize {
     let to: Vec<char> = to.chars().collect();
     let mut row: Vec<usize> = (0..=to.len()).collect();

@@ -1,10 +1,10 @@
-//! What a condition can ask of a step: the names, and where the values come from.
+//! The quantities of a step that a condition can use: names, meanings, accessors.
 
 use crate::estimator::{EventKind, Phase};
 use crate::geometry::seconds_from_ns;
 use crate::session::record::StepRecord;
 
-/// A number that every step may have.
+/// A quantity without an argument.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct NumberName {
     pub(super) name: &'static str,
@@ -28,7 +28,7 @@ const fn number(name: &'static str, meaning: &'static str, value: fn(&StepRecord
     NumberName { name, meaning, value }
 }
 
-/// All of them.
+/// All quantities without an argument.
 pub(super) const NUMBERS: &[NumberName] = &[
     number("rank", "structural rank of the calibration", |step| Some(step.rank.as_ref()?.rank_structural as f64)),
     number("rank_informed", "informed rank", |step| Some(step.rank.as_ref()?.rank_informed as f64)),
@@ -84,7 +84,7 @@ fn tracking(step: &StepRecord) -> bool {
     step.report.phase == Phase::Tracking
 }
 
-/// A number that goes by a name in brackets.
+/// A quantity with an argument.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum NamedNumber {
     Sigma,
@@ -97,7 +97,7 @@ pub(super) enum NamedNumber {
     Nis,
 }
 
-/// All of them: what they are called, what goes into the brackets, what they mean.
+/// All quantities with an argument: name, kind, example of the argument, meaning.
 pub(super) const NAMED: [(&str, NamedNumber, &str, &str); 8] = [
     ("sigma", NamedNumber::Sigma, "yaw.alpha", "standard deviation of a parameter, rad or m"),
     ("prior_sigma", NamedNumber::PriorSigma, "yaw.alpha", "its prior standard deviation"),
@@ -112,7 +112,7 @@ pub(super) const NAMED: [(&str, NamedNumber, &str, &str); 8] = [
 /// Causes of lost rank.
 pub(super) const CAUSES: [&str; 4] = ["parameterization", "joints", "absorbed", "motion"];
 
-/// Something that a step is or is not.
+/// A Boolean property of a step.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FlagName {
     pub(super) name: &'static str,
@@ -132,7 +132,7 @@ impl FlagName {
     }
 }
 
-/// All of them.
+/// All Boolean properties.
 pub(super) const FLAGS: &[FlagName] = &[
     FlagName { name: "tracking", meaning: "the window runs", value: tracking },
     FlagName { name: "initializing", meaning: "it waits for a window", value: |step| !tracking(step) },
@@ -144,7 +144,7 @@ pub(super) const FLAGS: &[FlagName] = &[
     },
 ];
 
-/// Names of kinds of events.
+/// Names of event kinds.
 pub(super) const EVENTS: [(&str, &[EventKind]); 10] = [
     ("waits", &[EventKind::InitializationWaits]),
     ("initialized", &[EventKind::InitializedFromMotion, EventKind::InitializedFromStationary]),
@@ -158,7 +158,7 @@ pub(super) const EVENTS: [(&str, &[EventKind]); 10] = [
     ("missing", &[EventKind::MeasurementMissing]),
 ];
 
-/// Everything that a condition can ask for, how it is written and what it means.
+/// Every quantity with its syntax and its meaning, for help texts.
 pub fn quantity_help() -> Vec<(String, &'static str)> {
     let numbers = NUMBERS.iter().map(|it| (it.name.to_owned(), it.meaning));
     let named = NAMED.iter().map(|(name, _, example, meaning)| (format!("{name}({example})"), *meaning));

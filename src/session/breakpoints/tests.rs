@@ -23,7 +23,7 @@ fn condition(text: &str) -> Condition {
     text.parse().unwrap_or_else(|problem| panic!("{problem}"))
 }
 
-/// Two made-up steps: numbers that a person can check.
+/// Two made-up steps with simple numbers.
 fn steps() -> [StepRecord; 2] {
     let (_, run) = sample();
     let mut step = StepRecord::clone(run.steps.last().unwrap());
@@ -180,7 +180,7 @@ fn the_values_of_a_condition_are_told_as_written() {
     assert_eq!(told, ["rank = 17", "rise(rms) = 0.1500", "rms = 0.4000", "chi2(imu) is missing"]);
 }
 
-/// A recording of one run whose ranks are these, nothing else changed.
+/// A recording of one run with these ranks in its steps.
 fn recording_of(ranks: &[usize]) -> Recording {
     let (rig, run) = sample();
     let last = run.steps.last().unwrap();
@@ -237,7 +237,7 @@ fn breakpoints_are_hit_where_they_become_true_as_the_run_grows() {
     breakpoints.toggle(condition("frame == 3"));
     let texts: Vec<&str> = breakpoints.list().iter().map(|breakpoint| breakpoint.condition.text()).collect();
     assert_eq!(texts, ["rank < 18", "frame == 3"]);
-    // Another run in its place is evaluated from its begin.
+    // Another run at the same index is evaluated from its first step.
     let other = recording_of(&[17, 18]);
     breakpoints.read(&other);
     assert_eq!(breakpoints.list()[0].hits_ns(&other.runs[0]).collect::<Vec<_>>(), [0]);

@@ -1,4 +1,4 @@
-//! Measurements as a fork changes them.
+//! Measurements as changed by a fork.
 
 use std::collections::BTreeSet;
 
@@ -6,11 +6,11 @@ use crate::frontend::{FeatureId, TrackedFrame};
 use crate::geometry::SplitMix64;
 use crate::sensors::JointAngles;
 
-/// Changes of a run's measurements before the estimator uses them.
+/// Changes to a run's measurements before the estimator uses them.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct AlteredMeasurements {
     pub(super) dropped: BTreeSet<u64>,
-    /// Numbers of cameras whose tracks are not used.
+    /// Indices of cameras whose tracks are not used.
     pub(super) left_out: BTreeSet<usize>,
     pub(super) encoder_off: bool,
     pub(super) joint_noise_rad: f64,
@@ -30,7 +30,7 @@ impl Default for AlteredMeasurements {
 }
 
 impl AlteredMeasurements {
-    /// Adds those of a fork to those of its parent.
+    /// Adds the changes of a fork to those of its parent.
     pub(super) fn add(&mut self, other: Self) {
         self.dropped.extend(other.dropped);
         self.left_out.extend(other.left_out);
@@ -44,7 +44,7 @@ impl AlteredMeasurements {
         self.encoder_off
     }
 
-    /// The tracks of a camera without dropped features, `None` where none of them is dropped.
+    /// The tracks of a camera without the dropped features, `None` where no feature is dropped.
     pub(super) fn tracks(&self, camera: usize, tracks: &TrackedFrame) -> Option<TrackedFrame> {
         let left_out = self.left_out.contains(&camera);
         let gone = |id: FeatureId| left_out || self.dropped.contains(&id.of_camera(camera).0);
@@ -55,7 +55,7 @@ impl AlteredMeasurements {
         })
     }
 
-    /// Joint angles with added noise, which depends on the stamp and the joint alone; `None` without a change.
+    /// Joint angles with added Gaussian noise that depends only on stamp and joint, `None` without noise.
     pub(super) fn joint_angles(&self, angles: &JointAngles, stamp_ns: i64) -> Option<JointAngles> {
         if self.joint_noise_rad == 0.0 && self.encoder_noise == 1.0 {
             return None;

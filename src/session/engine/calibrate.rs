@@ -1,4 +1,4 @@
-//! Offline calibration from a log: both cameras' images through the front end, then the calibration.
+//! Offline calibration of a log: features of both cameras are tracked first, then the calibration is estimated.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -16,38 +16,38 @@ use crate::geometry::{Dimension, RigidTransform, ns_from_seconds, seconds_from_n
 use crate::sensors::{CameraMount, CameraRig, ChainPrior, GimbalRig, Rig};
 use crate::session::plan::{ParameterizationChoice, RunSpec, SessionError};
 
-/// Tracking's part of the progress.
+/// Fraction of the progress that feature tracking takes.
 const TRACKING_PART: f64 = 0.6;
-/// Bound of a uniform error per standard deviation, √3.
+/// Ratio of the bound of a uniform error to its standard deviation: √3.
 const BOUND_PER_SIGMA: f64 = 1.732_050_807_568_877_2;
 
-/// Why a log could not be calibrated from.
+/// The reason why the calibration from a log failed.
 #[derive(Debug, Error)]
 pub enum CalibrationRunError {
     /// The log, its rig or its ground truth cannot be read.
     #[error(transparent)]
     Log(#[from] LogError),
-    /// A run cannot be configured.
+    /// A run could not be configured.
     #[error(transparent)]
     Session(#[from] SessionError),
-    /// The rig lacks what is to be calibrated.
+    /// The rig lacks something that is to be calibrated.
     #[error("the rig '{rig}' has no {missing}; {remedy}: {path}")]
     Missing {
         /// Name of the rig.
         rig: String,
-        /// What it lacks.
+        /// The missing entry.
         missing: &'static str,
-        /// What to do.
+        /// The remedy.
         remedy: &'static str,
-        /// The log.
+        /// Path of the log.
         path: PathBuf,
     },
     /// The calibration is not observable from the log, or does not converge.
     #[error("{reason}: {path}")]
     Calibration {
-        /// Why.
+        /// The reason.
         reason: CalibrationError,
-        /// The log.
+        /// Path of the log.
         path: PathBuf,
     },
     /// The camera's images could not be read to the end.
@@ -55,44 +55,44 @@ pub enum CalibrationRunError {
     Tracking {
         /// Key of the camera.
         camera: String,
-        /// The log.
+        /// Path of the log.
         path: PathBuf,
     },
 }
 
-/// What to calibrate from, as on the command line.
+/// The arguments of an offline calibration, as on the command line.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CalibrationRequest {
-    /// The log.
+    /// Path of the log.
     pub log_path: PathBuf,
-    /// The rig, when it is not beside the log or in it.
+    /// Path of the rig file, when it is not beside the log or in it.
     pub rig_path: Option<PathBuf>,
-    /// The ground truth of the rig, when it is not beside the log.
+    /// Path of the ground-truth rig file, when it is not beside the log.
     pub ground_truth_path: Option<PathBuf>,
-    /// Seconds of the log to leave out at its start.
+    /// Seconds to skip at the start of the log.
     pub start_s: f64,
-    /// Seconds to read from there, `None` to the end.
+    /// Seconds to read from there, `None` for the rest of the log.
     pub duration_s: Option<f64>,
 }
 
-/// A calibrated log.
+/// The result of an offline calibration.
 #[derive(Clone, Debug)]
 pub struct CalibrationRun {
     /// Path of the log.
     pub log_path: PathBuf,
-    /// The rig before the calibration.
+    /// The rig before the calibration, which gave the initial values.
     pub given_rig: Rig,
     /// The rig with the calibrated values and a prior from their standard deviations.
     pub rig: Rig,
-    /// The rig with the ground truth, when known.
+    /// The ground-truth rig, when known.
     pub ground_truth_rig: Option<Rig>,
     /// Key of the static camera.
     pub static_camera: String,
     /// Key of the camera on the gimbal.
     pub gimbal_camera: String,
-    /// The calibration.
+    /// Estimates, covariances and residuals.
     pub outcome: CalibrationOutcome,
-    /// What is wrong with the log.
+    /// Warnings of the reader about the log.
     pub warnings: Vec<LogWarning>,
 }
 
@@ -126,7 +126,7 @@ pub fn calibrate(
     })
 }
 
-/// The parts of a rig that are calibrated.
+/// The entries of a rig that are calibrated.
 #[derive(Clone, Debug)]
 struct RigParts {
     static_camera: CameraRig,
@@ -172,7 +172,7 @@ impl RigParts {
     }
 }
 
-/// Both cameras' tracks, each on a thread of its own.
+/// Tracks the features of both cameras, each on its own thread.
 fn track(
     log: &Arc<FlightLog>,
     rig: &Rig,
@@ -254,8 +254,8 @@ fn views(
     (views, warnings)
 }
 
-/// The rig with the calibrated values; its prior is the largest standard deviation of a parameter, as bounds of a uniform
-/// error.
+/// The rig with the calibrated values. Its prior bounds are √3 times the largest standard deviation of a parameter,
+/// because they are bounds of a uniform error.
 fn calibrated(rig: &Rig, parts: &RigParts, outcome: &CalibrationOutcome) -> Rig {
     let mut calibrated = rig.clone();
     let largest = |dimension: Dimension| {

@@ -1,4 +1,4 @@
-//! The record of a session together with what its steps are recomputed from.
+//! The record of a session together with the histories from which its steps can be recomputed.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -9,11 +9,11 @@ use super::recompute::{Detail, RecomputeRequest, Recomputed};
 use crate::session::plan::SessionPlan;
 use crate::session::record::{Recording, RunRecord, SolverPosition, SolverTrace, StepFactorRows, StepRecord};
 
-/// Of the memory of a recording, one part in so many is for snapshots.
+/// Inverse of the ratio of the memory budget that estimator snapshots may take.
 const SNAPSHOT_PART: usize = 4;
 
-/// The runs of a session as far as they are computed: their record, and by run the history from which any step of it can
-/// be recomputed to the same bits.
+/// The runs of a session as far as they are computed: their record, and for each run the history from which any of its
+/// steps can be recomputed to the same bits.
 ///
 /// A clone shares record and histories.
 #[derive(Clone, Debug)]
@@ -24,7 +24,7 @@ pub struct Computation {
 }
 
 impl Computation {
-    /// The runs of a plan before their first steps.
+    /// The runs of a plan before their first step.
     pub(in crate::session) fn new(plan: &SessionPlan) -> Self {
         let recording = Arc::new(Recording::new(plan));
         let history = |run: &RunRecord| (run.id, Arc::new(History::new(plan.memory_budget_bytes)));
@@ -39,22 +39,22 @@ impl Computation {
         &self.recording
     }
 
-    /// The reports alone.
+    /// The reports without the histories.
     pub fn into_recording(self) -> Recording {
         Arc::unwrap_or_clone(self.recording)
     }
 
-    /// The reports, to be changed; whoever holds the record keeps it as it is.
+    /// The reports for modification (copy on write: clones keep the old state).
     pub(in crate::session) fn recording_mut(&mut self) -> &mut Recording {
         Arc::make_mut(&mut self.recording)
     }
 
-    /// The history of a run by its number.
+    /// The history of a run by its index.
     pub(in crate::session) fn history(&self, run: usize) -> Option<&Arc<History>> {
         self.histories.get(&self.recording.runs.get(run)?.id)
     }
 
-    /// Adds a run that is to be computed, with its history.
+    /// Adds a run with its history, to be computed.
     pub(in crate::session) fn add_run(&mut self, run: RunRecord, history: Arc<History>) {
         self.histories.insert(run.id, history);
         self.recording_mut().runs.push(run);
@@ -68,7 +68,7 @@ impl Computation {
         }
     }
 
-    /// Adds what a thread reports.
+    /// Stores a message of the engine in the record.
     pub(in crate::session) fn apply(&mut self, message: EngineMessage) {
         match message {
             EngineMessage::Step { run, record } => {
@@ -87,7 +87,7 @@ impl Computation {
         }
     }
 
-    /// Adds what has been recomputed of a run.
+    /// Stores recomputed steps of a run.
     pub(in crate::session) fn add_recomputed(&mut self, request: &RecomputeRequest, recomputed: Recomputed) {
         let Some(run) = self.recording_mut().runs.iter_mut().find(|run| run.id == request.run) else { return };
         match recomputed {
@@ -105,20 +105,20 @@ impl Computation {
         }
     }
 
-    /// Sets how much memory record and histories may take, in bytes; steps that do not fit any more become summaries.
+    /// Sets the memory budget of record and histories in bytes. Steps beyond it are replaced by their summaries.
     pub(in crate::session) fn set_memory_budget(&mut self, bytes: usize) {
         self.recording_mut().memory_budget_bytes = bytes;
         self.divide_snapshot_memory();
         self.keep_within_budget();
     }
 
-    /// Divides the memory for snapshots among the runs.
+    /// Divides the snapshot memory equally among the runs.
     fn divide_snapshot_memory(&self) {
         let each = self.recording.memory_budget_bytes / SNAPSHOT_PART / self.recording.runs.len().max(1);
         self.histories.values().for_each(|history| history.set_budget(each));
     }
 
-    /// Replaces steps by their summaries until everything fits into its memory, or only the newest steps are left.
+    /// Replaces steps by their summaries until the record fits into its budget or only the newest steps are complete.
     fn keep_within_budget(&mut self) {
         let recording = Arc::make_mut(&mut self.recording);
         for run in &mut recording.runs {
@@ -139,7 +139,7 @@ impl Computation {
         }
     }
 
-    /// Recomputes the steps at a time of which only summaries are kept, so that drawings of that time show everything.
+    /// Recomputes the steps at a stamp of which only the summary is kept, so that drawings of that time are complete.
     pub fn fill_in(&mut self, stamp_ns: i64) {
         for run in 0..self.recording.runs.len() {
             let record = &self.recording.runs[run];
@@ -149,14 +149,14 @@ impl Computation {
         }
     }
 
-    /// Recomputes the step `last` of a run, and before it up to `most - 1` others, from the nearest snapshot of the
-    /// estimator, whatever is kept of them; with their numbers, in order. Empty for a step that has not been computed.
+    /// Recomputes step `last` of a run and up to `max_count - 1` steps before it from the nearest snapshot of the
+    /// estimator. Returns the steps with their indices in ascending order; empty for a step that has not been computed.
     pub fn recompute(&self, run: usize, last: usize, most: usize) -> Vec<(usize, StepRecord)> {
         self.history(run).map_or_else(Vec::new, |history| history.recompute(last, most))
     }
 
-    /// A step of a run with everything, recomputed where only its summary is kept: the same bits, but for the measured
-    /// times.
+    /// A complete step of a run, recomputed where only its summary is kept. The result is the same to the bit except
+    /// for the measured times.
     pub fn whole_step(&self, run: usize, number: usize) -> Option<Arc<StepRecord>> {
         let step = self.recording.runs.get(run)?.steps.get(number)?;
         if !step.summary_only {
@@ -166,13 +166,13 @@ impl Computation {
         Some(Arc::new(record))
     }
 
-    /// The states of the solver in a step: before its first iteration, after it, and so on to the last, which is the step
+    /// The states of the solver in a step: before its first iteration, after each iteration. The last one is the step
     /// itself. A step that initializes the window has only that.
     pub fn solver_states(&self, run: usize, number: usize) -> Vec<StepRecord> {
         self.history(run).map_or_else(Vec::new, |history| history.solver_states(number))
     }
 
-    /// How much the estimator snapshots of a run take; forks count their own.
+    /// Number and memory of the estimator snapshots of a run; forks count their own.
     pub fn snapshots(&self, run: usize) -> Option<SnapshotUse> {
         self.history(run).map(|history| history.snapshots())
     }

@@ -1,4 +1,4 @@
-//! Runs computed to their end, or to a time, while the caller waits.
+//! Computation of runs to their end or to a stamp; the caller waits.
 
 use super::computation::Computation;
 use super::message::EngineMessage;
@@ -7,20 +7,20 @@ use crate::session::breakpoints::{Breakpoints, Condition, Hit, NamedValue};
 use crate::session::plan::{SessionError, SessionPlan};
 use crate::session::record::Recording;
 
-/// Where [`compute_until`] ended, and what was true there.
+/// The hit that ended [`compute_until`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct BreakpointHit {
     /// The step.
     pub hit: Hit,
-    /// The quantities of the condition with their values in that step.
+    /// The quantities of the condition and their values in that step.
     pub values: Vec<NamedValue>,
-    /// All of it in one line.
+    /// One line of text for the terminal.
     pub description: String,
 }
 
-/// Computes every run of the plan until a condition becomes true in one of them, and returns where that was.
+/// Computes every run of the plan until a condition becomes true in one of them, and returns that hit.
 ///
-/// All runs end at that stamp, however far their threads were ahead: later steps are removed.
+/// All runs end at that stamp: later steps of threads that were ahead are removed.
 pub fn compute_until(
     plan: &SessionPlan,
     condition: &Condition,
@@ -49,7 +49,7 @@ pub fn compute_until(
     for run in &mut recording.runs {
         run.finished = true;
     }
-    // The threads read ahead by as much as their queues hold.
+    // The threads are ahead by the length of their queues.
     recording.warnings.retain(|warning| warning.stamp_ns <= until_ns);
     let hit = breakpoints.next_after(recording, i64::MIN).map(|hit| {
         let values = breakpoints.values_at(recording, hit);
@@ -58,9 +58,9 @@ pub fn compute_until(
     Ok((computation, hit))
 }
 
-/// Computes every run of the plan and returns all their reports; `on_step` is called after each step.
+/// Computes every run of the plan and returns the reports. `on_step` is called after each step.
 ///
-/// `until_ns` ends the work once every run has passed that time (for a screenshot of one instant).
+/// With `until_ns` the computation ends when every run has passed that stamp (for a screenshot of one frame).
 pub fn compute(
     plan: &SessionPlan,
     until_ns: Option<i64>,
@@ -77,13 +77,14 @@ pub fn compute(
         }
     }
     if let Some(until_ns) = until_ns {
-        // The threads read ahead by as much as their queues hold.
+        // The threads are ahead by the length of their queues.
         computation.recording_mut().warnings.retain(|warning| warning.stamp_ns <= until_ns);
     }
     Ok(computation)
 }
 
-/// The end of a run in place of a step after a time: such steps would depend on how the threads are scheduled.
+/// Replaces a step after `until_ns` by the end of its run: the number of such steps depends on the scheduling of
+/// threads.
 fn ended_at(message: EngineMessage, until_ns: i64) -> EngineMessage {
     match message {
         EngineMessage::Step { run, record } if record.report.stamp_ns > until_ns => {

@@ -1,4 +1,4 @@
-//! From a rig and a run specification to an estimator's configuration.
+//! The estimator's configuration from a rig and a run specification.
 
 use super::stopwatch::clock_ms;
 use crate::estimator::{EstimatorConfig, EstimatorOptions, RigidCamera};
@@ -7,7 +7,7 @@ use crate::gimbal::{Parameterization, auto_parameterization};
 use crate::sensors::Rig;
 use crate::session::plan::{ParameterizationChoice, RunSpec, SessionError, WatchedCameras, cameras_of_run};
 
-/// The estimator that a run asks for.
+/// The configuration of the estimator of a run.
 pub(in crate::session) fn estimator_config(rig: &Rig, spec: &RunSpec) -> Result<EstimatorConfig, SessionError> {
     let WatchedCameras { main: camera, rigid } = cameras_of_run(rig, spec)?;
     let chain = rig.chain_of_camera(&camera.key).unwrap_or_default();

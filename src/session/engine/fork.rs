@@ -1,4 +1,4 @@
-//! The changes of a fork, applied to the engine that it takes over from its parent.
+//! Application of a fork's changes to its parent's engine.
 
 use std::collections::BTreeSet;
 
@@ -8,8 +8,8 @@ use crate::gimbal::{Parameterization, auto_parameterization};
 use crate::sensors::Rig;
 use crate::session::plan::{ForkChanges, ForkError, ParameterizationChoice};
 
-/// Changes the parent's engine, as it is before the fork's first step, into the fork's; `camera_key` is that of the main
-/// camera.
+/// Applies `changes` to the parent's engine, in its state before the fork's first step. `camera_key` is the key of the
+/// main camera.
 pub(in crate::session) fn apply_fork(
     changes: &ForkChanges,
     engine: &mut RunEngine,
@@ -60,7 +60,7 @@ pub(in crate::session) fn apply_fork(
     Ok(())
 }
 
-/// Numbers of the cameras that are left out, of those with the given keys.
+/// Indices of the disabled cameras in `keys`.
 fn left_out(changes: &ForkChanges, keys: &[String]) -> Result<BTreeSet<usize>, ForkError> {
     let number = |key: &String| keys.iter().position(|known| known == key);
     let missing = |key: &String| ForkError::NoCamera { camera: key.clone(), present: keys.join(", ") };

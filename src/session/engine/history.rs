@@ -1,7 +1,7 @@
-//! What the steps of a run are recomputed from: their inputs, and snapshots of the estimator in between.
+//! The data from which the steps of a run are recomputed: their inputs and snapshots of the estimator.
 //!
-//! An estimator is a plain value and its steps are exact, so that any step of a run can be recomputed from the nearest
-//! snapshot before it, to the same bits.
+//! The estimator is a plain value and its steps are deterministic, so any step can be recomputed from the nearest
+//! snapshot before it to the same bits.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -13,32 +13,32 @@ use super::step_inputs::{OwnedStepInput, StepInputs};
 use crate::estimator::FactorRows;
 use crate::session::record::StepRecord;
 
-/// Steps between two snapshots while there is room for all of them.
+/// Steps between two snapshots while the budget allows all of them.
 const CLOSEST_SPACING: usize = 16;
 
-/// How many snapshots of an estimator are kept.
+/// Number and memory of the kept estimator snapshots.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SnapshotUse {
-    /// Their number.
+    /// Number of snapshots.
     pub count: usize,
-    /// Bytes of all of them.
+    /// Bytes of all snapshots.
     pub bytes: usize,
-    /// Steps from one to the next.
+    /// Steps between two snapshots.
     pub spacing: usize,
 }
 
-/// The history of one run; the threads share it.
+/// The history of one run, shared by the threads.
 #[derive(Debug)]
 pub(in crate::session) struct History {
     inputs: Arc<StepInputs>,
-    /// Number of the first step that is this run's own.
+    /// Index of the first step that is not shared with the parent.
     begin: usize,
-    /// The history of a fork's parent, whose steps come before `begin`.
+    /// The history of a fork's parent, which has the steps before `begin`.
     parent: Option<Arc<Self>>,
     snapshots: Mutex<Snapshots>,
 }
 
-/// Snapshots by the number of the step before which they were taken.
+/// Snapshots by the index of the step before which they were taken.
 #[derive(Debug)]
 struct Snapshots {
     kept: BTreeMap<usize, (Arc<RunEngine>, usize)>,
@@ -49,12 +49,12 @@ struct Snapshots {
 }
 
 impl History {
-    /// Of a run from the start of the log; snapshots may take so many bytes together.
+    /// The history of a run from the start of the log, with a budget for its snapshots.
     pub(in crate::session) fn new(budget_bytes: usize) -> Self {
         Self::with(Arc::default(), 0, None, budget_bytes)
     }
 
-    /// Of a fork whose first own step is `begin`.
+    /// The history of a fork whose first own step is `begin`.
     pub(in crate::session) fn fork(parent: &Arc<Self>, begin: usize, budget_bytes: usize) -> Self {
         Self::with(Arc::clone(&parent.inputs), begin, Some(Arc::clone(parent)), budget_bytes)
     }
@@ -65,17 +65,17 @@ impl History {
         Self { inputs, begin, parent, snapshots: Mutex::new(snapshots) }
     }
 
-    /// The inputs of the steps.
+    /// The inputs of all steps.
     pub(in crate::session) fn inputs(&self) -> &Arc<StepInputs> {
         &self.inputs
     }
 
-    /// Number of the first step that is this run's own.
+    /// Index of the first step that is not shared with the parent.
     pub(in crate::session) fn begin(&self) -> usize {
         self.begin
     }
 
-    /// Counts the step's input, and keeps a snapshot of the engine where one is due.
+    /// Counts the memory of the step's input, and stores a snapshot of the engine where one is due.
     pub(in crate::session) fn before_step(&self, step: usize, engine: &RunEngine, input: &OwnedStepInput) {
         let mut snapshots = self.snapshots.lock();
         if self.parent.is_none() {
@@ -90,7 +90,7 @@ impl History {
         snapshots.keep_within_budget(self.begin);
     }
 
-    /// Sets how many bytes snapshots may take together.
+    /// Sets the memory budget of the snapshots in bytes.
     pub(in crate::session) fn set_budget(&self, budget_bytes: usize) {
         let mut snapshots = self.snapshots.lock();
         snapshots.budget_bytes = budget_bytes;
@@ -102,7 +102,7 @@ impl History {
         self.snapshots.lock().spacing
     }
 
-    /// The snapshots that are kept of this run's own steps.
+    /// Number and memory of the snapshots of this run's own steps.
     pub(super) fn snapshots(&self) -> SnapshotUse {
         let snapshots = self.snapshots.lock();
         SnapshotUse { count: snapshots.kept.len(), bytes: snapshots.bytes, spacing: snapshots.spacing }
@@ -114,7 +114,7 @@ impl History {
         snapshots.bytes + snapshots.input_bytes
     }
 
-    /// The engine as it was before a step, `None` for a step that has not been computed.
+    /// The engine in its state before a step, `None` for a step that has not been computed.
     pub(in crate::session) fn engine_before(&self, step: usize) -> Option<RunEngine> {
         if step < self.begin {
             return self.parent.as_ref()?.engine_before(step);
@@ -133,13 +133,13 @@ impl History {
         Some((*at, Arc::clone(engine)))
     }
 
-    /// Recomputes the steps up to `last` from the snapshot before it, and returns the last `most` of them with their
-    /// numbers; empty for a step that has not been computed.
+    /// Recomputes the steps up to `last` from the snapshot before it. Returns the last `max_count` of them with their
+    /// indices; empty for a step that has not been computed.
     pub(in crate::session) fn recompute(&self, last: usize, most: usize) -> Vec<(usize, StepRecord)> {
         self.recompute_while(last, most, &|| true).unwrap_or_default()
     }
 
-    /// The same while `wanted` returns true, else `None`.
+    /// As [`History::recompute`], but returns `None` as soon as `wanted` returns false.
     pub(in crate::session) fn recompute_while(
         &self,
         last: usize,
@@ -175,14 +175,14 @@ impl History {
         engine.step(&input).report.factor_rows
     }
 
-    /// The states of the solver in a step, as records of their own: before its first iteration, after it, after the
-    /// second, and so on to the last, which is the step itself.
+    /// The states of the solver in a step as records: before the first iteration and after each iteration. The last one
+    /// is the step itself.
     pub(in crate::session) fn solver_states(&self, step: usize) -> Vec<StepRecord> {
         let (Some(engine), Some(input)) = (self.engine_before(step), self.inputs.get(step)) else {
             return Vec::new();
         };
         let whole = engine.clone().step(&input);
-        // The first window is solved several times over, outliers taken out in between.
+        // The first window is solved several times, with outlier rejection in between.
         let begins = whole.report.events.iter().any(|event| event.kind.initializes_window());
         let iterations = if begins { 0 } else { whole.report.iterations.len() };
         let mut records: Vec<StepRecord> = (0..iterations)
@@ -198,7 +198,8 @@ impl History {
 }
 
 impl Snapshots {
-    /// Evicts every other snapshot until they fit; the first one stays, without which nothing could be recomputed.
+    /// Evicts every other snapshot until the rest fits into the budget. The first one stays: every recomputation could
+    /// need it.
     fn keep_within_budget(&mut self, begin: usize) {
         while self.bytes > self.budget_bytes && self.kept.len() > 1 {
             self.spacing *= 2;

@@ -1,4 +1,4 @@
-//! Rotations between the images of a log's cameras, from the images alone: `check` compares the rig with them.
+//! Camera rotations between images, estimated from the images alone. `check` compares them with the rig.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -13,23 +13,24 @@ use crate::geometry::seconds_from_ns;
 use crate::log_check::ImageRotation;
 use crate::sensors::{CameraRig, Rig};
 
-/// Number of sections of the log that are used, spread evenly.
+/// Number of sections of the log, evenly spaced.
 const SECTIONS: usize = 3;
-/// Length of a section.
+/// Length of a section in seconds.
 const SECTION_S: f64 = 5.0;
-/// Standard deviation of a tracked pixel, per coordinate.
+/// Standard deviation of a tracked feature's position, per coordinate.
 const PIXEL_SIGMA_PX: f64 = 0.5;
-/// Standard deviation of a camera's rotation from one image to the next, about each axis; independent of the rig, which is
-/// to be checked.
+/// Standard deviation of a camera's rotation between consecutive images, per axis. It does not depend on the rig,
+/// because the rig is checked.
 const ROTATION_SIGMA_RAD: f64 = 0.3;
-/// Fewer features in common give no rotation.
+/// Minimum number of common features for a rotation.
 const FEWEST_PAIRS: usize = 30;
-/// A smaller ratio of inliers gives no rotation.
+/// Minimum ratio of inliers for a rotation.
 const LEAST_INLIER_RATIO: f64 = 0.6;
 
-/// Rotations from image to image over some sections of the log, for every camera of the rig that the log has.
+/// Rotations between consecutive images of some sections of the log, for every camera of the rig that the log has.
 ///
-/// Independent of gyroscope, encoders and extrinsics. A camera whose images cannot be read has none; `check` reports why.
+/// They do not depend on gyroscope, encoders and extrinsics. A camera whose images cannot be read has none; `check`
+/// reports the reason.
 pub fn image_rotations(log: &Arc<FlightLog>, rig: &Rig) -> Vec<ImageRotation> {
     let duration_s = seconds_from_ns(log.duration_ns());
     let length_s = SECTION_S.min(duration_s / SECTIONS as f64);
@@ -71,7 +72,7 @@ fn rotations_of(
     rotations
 }
 
-/// Rotation `second_from_first` of the camera, from the features observed in both images.
+/// Rotation `second_from_first` of the camera from the features observed in both images, `None` with too few inliers.
 fn rotation_between(first: &TrackedFrame, second: &TrackedFrame, sigma_rad: f64) -> Option<UnitQuaternion<f64>> {
     let before: BTreeMap<FeatureId, Vector3<f64>> =
         first.features.iter().map(|feature| (feature.id, feature.bearing)).collect();

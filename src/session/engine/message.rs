@@ -1,23 +1,23 @@
 use crate::flight_log::LogWarning;
 use crate::session::record::StepRecord;
 
-/// A message of a thread.
+/// A message from a thread of the engine to the collector.
 #[derive(Debug)]
 pub(in crate::session) enum EngineMessage {
     /// A run has computed a step.
     Step {
-        /// Number of the run.
+        /// Index of the run.
         run: usize,
         /// The step.
         record: Box<StepRecord>,
     },
-    /// A run has reached the end of the log, or failed for a reason that no restart cures.
+    /// A run has reached the end of the log, or has failed without a possible restart.
     Finished {
-        /// Number of the run.
+        /// Index of the run.
         run: usize,
-        /// Why it ended early.
+        /// The reason of an early end.
         error: Option<String>,
     },
-    /// The log has something wrong with it.
+    /// New warnings about the log.
     Warnings(Vec<LogWarning>),
 }

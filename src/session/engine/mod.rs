@@ -1,8 +1,9 @@
-//! Runs on threads, and the recomputation of their steps.
+//! Computation of runs on threads, and recomputation of their steps.
 //!
-//! [`Engine`] runs a tracker thread per camera and an estimator thread per run and reports over a channel; [`Computation`]
-//! is the one place where those messages enter the record. A [`RunEngine`] is one estimator as a plain value, a
-//! [`History`] its snapshots and step inputs, and the [`RecomputeThread`] answers requests of playback from them.
+//! [`Engine`] runs a tracker thread per camera and an estimator thread per run and reports over a channel;
+//! [`Computation`] is the one place where those messages enter the record. A [`RunEngine`] is one estimator as a plain
+//! value, a [`History`] its snapshots and step inputs, and the [`RecomputeThread`] answers requests of playback from
+//! them.
 
 mod altered_measurements;
 mod calibrate;

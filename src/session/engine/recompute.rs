@@ -1,4 +1,5 @@
-//! A thread that recomputes steps at the cursor: those of which only the summary is kept, and the solver's states.
+//! A thread that recomputes steps at the cursor: steps of which only the summary is kept, solver states and factor
+//! rows.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -11,36 +12,36 @@ use crate::estimator::FactorRows;
 use crate::session::plan::SessionError;
 use crate::session::record::{SolverPosition, StepRecord};
 
-/// Steps up to a requested one that are recomputed with it, because people step back.
+/// Steps up to the requested one that are recomputed with it, because users often step back.
 pub(in crate::session) const STEPS_AT_ONCE: usize = 32;
 
-/// What of a step is requested.
+/// The requested data of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::session) enum Detail {
-    /// The whole record.
+    /// The complete record.
     Step,
-    /// The states of the solver, of which one is shown.
+    /// The states of the solver; this one is shown.
     SolverStates(SolverPosition),
-    /// The linearized rows of its factors other than reprojection.
+    /// The linearized rows of the factors other than reprojection.
     FactorRows,
 }
 
-/// A step to be recomputed.
+/// A request to recompute a step.
 #[derive(Clone, Debug)]
 pub(in crate::session) struct RecomputeRequest {
     /// [`RunRecord::id`](crate::session::RunRecord::id).
     pub(in crate::session) run: u64,
-    /// The run's history.
+    /// History of the run.
     pub(in crate::session) history: Arc<History>,
-    /// Number of the step.
+    /// Index of the step.
     pub(in crate::session) step: usize,
-    /// What of it.
+    /// The requested data.
     pub(in crate::session) detail: Detail,
-    /// Whether it is prefetched: it is abandoned when something at the cursor is requested.
+    /// Whether it is a prefetch, which is cancelled by a request at the cursor.
     pub(in crate::session) prefetch: bool,
 }
 
-/// Requests are equal that ask for the same work, whatever is shown of its result.
+/// Two requests are equal if they need the same computation, whichever solver state is shown.
 impl PartialEq for RecomputeRequest {
     fn eq(&self, other: &Self) -> bool {
         let detail = std::mem::discriminant(&self.detail) == std::mem::discriminant(&other.detail);
@@ -48,10 +49,10 @@ impl PartialEq for RecomputeRequest {
     }
 }
 
-/// The answer to a request.
+/// The result of a request.
 #[derive(Debug)]
 pub(in crate::session) enum Recomputed {
-    /// Steps with their numbers.
+    /// Steps with their indices.
     Steps(Vec<(usize, StepRecord)>),
     /// The solver's states of one step.
     SolverStates(Vec<StepRecord>),
@@ -63,13 +64,13 @@ pub(in crate::session) enum Recomputed {
 struct Queue {
     waiting: VecDeque<RecomputeRequest>,
     working: Option<RecomputeRequest>,
-    /// Whether the request being worked on is still there.
+    /// Whether the request in progress is still requested.
     working_wanted: bool,
     closed: bool,
 }
 
 impl Queue {
-    /// Whether a request that is being worked on is still there, and none at the cursor waits behind a prefetched one.
+    /// Whether the request in progress is still requested and, if it is a prefetch, no request at the cursor waits.
     fn is_wanted(&self, request: &RecomputeRequest) -> bool {
         let at_cursor = self.working.as_ref().is_some_and(|working| working == request && !working.prefetch);
         let others = self.waiting.iter().any(|waiting| !waiting.prefetch);
@@ -87,7 +88,7 @@ struct Shared {
     changed: Condvar,
 }
 
-/// The thread; dropping it ends it after the request that it works on.
+/// The recompute thread. Dropping it ends the thread after the request in progress.
 #[derive(Debug)]
 pub(in crate::session) struct RecomputeThread {
     shared: Arc<Shared>,
@@ -95,7 +96,7 @@ pub(in crate::session) struct RecomputeThread {
 }
 
 impl RecomputeThread {
-    /// Starts the thread, which hands every answer to `deliver`.
+    /// Starts the thread, which passes every result to `deliver`.
     pub(in crate::session) fn start(
         mut deliver: impl FnMut(&RecomputeRequest, Recomputed) + Send + 'static,
     ) -> Result<Self, SessionError> {
@@ -126,7 +127,7 @@ impl RecomputeThread {
                     Detail::FactorRows => Some(Recomputed::FactorRows(request.history.factor_rows(request.step))),
                 };
                 if let Some(recomputed) = recomputed {
-                    // Another state of the solver may be shown by now.
+                    // The shown solver state may have changed meanwhile.
                     let request = seen.queue.lock().working.clone().unwrap_or(request);
                     deliver(&request, recomputed);
                 }
@@ -145,7 +146,7 @@ impl RecomputeThread {
         let mut working_wanted = false;
         for request in requests {
             match &mut queue.working {
-                // The cursor may have come to a prefetched step meanwhile.
+                // The cursor may have reached a prefetched step meanwhile.
                 Some(working) if *working == request => {
                     working.prefetch = request.prefetch;
                     working.detail = request.detail;
@@ -159,13 +160,13 @@ impl RecomputeThread {
         self.shared.changed.notify_all();
     }
 
-    /// Waits until everything at the cursor has been delivered.
+    /// Waits until all results for the cursor have been delivered.
     pub(in crate::session) fn settle(&self) {
         let mut queue = self.shared.queue.lock();
         self.shared.changed.wait_while(&mut queue, |queue| !queue.closed && queue.has_work_at_cursor());
     }
 
-    /// Whether something at the cursor is being recomputed.
+    /// Whether a request at the cursor is waiting or in progress.
     pub(in crate::session) fn is_busy(&self) -> bool {
         self.shared.queue.lock().has_work_at_cursor()
     }
@@ -197,10 +198,10 @@ mod tests {
         };
         let mut queue = Queue { working: Some(request(7, true)), working_wanted: true, ..Queue::default() };
         assert!(!queue.has_work_at_cursor() && queue.is_wanted(&request(7, true)));
-        // Something else is requested at the cursor: prefetching is abandoned.
+        // A request at the cursor cancels the prefetch.
         queue.waiting.push_back(request(90, false));
         assert!(queue.has_work_at_cursor() && !queue.is_wanted(&request(7, true)));
-        // The cursor has come to the prefetched step.
+        // The cursor has reached the prefetched step.
         let thread = RecomputeThread {
             shared: Arc::new(Shared { queue: Mutex::new(queue), ..Shared::default() }),
             thread: None,

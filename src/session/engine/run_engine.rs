@@ -11,23 +11,23 @@ use crate::gimbal::{Chain, ParameterId};
 use crate::observability::{RankReport, analyse};
 use crate::session::record::StepRecord;
 
-/// Columns of a rigid camera beside the main one: its pose on the IMU.
+/// Jacobian columns of the extrinsics of a second, rigid camera.
 const RIGID_COLUMNS: usize = 6;
 
-/// One estimator and the analysis of each of its steps.
+/// One estimator with the observability analysis of its steps.
 #[derive(Clone, Debug)]
 pub(in crate::session) struct RunEngine {
     estimator: Estimator,
     has_joints: bool,
     joints_free: bool,
-    /// One report in so many frames keeps its linearization.
+    /// One report in this many frames keeps its linearization.
     keep_linearization_every: Option<usize>,
-    /// Changes of its measurements, in a fork.
+    /// Changes of a fork to the measurements.
     altered_measurements: AlteredMeasurements,
 }
 
 impl RunEngine {
-    /// A fresh estimator.
+    /// An engine with an estimator that has not been initialized.
     pub(in crate::session) fn new(config: EstimatorConfig, keep_linearization_every: Option<usize>) -> Self {
         let has_joints = !config.chain.links.is_empty();
         let joints_free = has_joints && !config.use_encoder;
@@ -41,28 +41,28 @@ impl RunEngine {
         }
     }
 
-    /// The estimator, to be changed between two steps.
+    /// The estimator, for changes between two steps.
     pub(in crate::session) fn estimator_mut(&mut self) -> &mut Estimator {
         &mut self.estimator
     }
 
-    /// Number of cameras that it uses.
+    /// Number of cameras of the estimator.
     pub(in crate::session) fn cameras(&self) -> usize {
         1 + self.estimator.config().rigid_cameras.len()
     }
 
-    /// Keys of the cameras that it uses; the main one's is given.
+    /// Keys of the estimator's cameras; `main` is the key of the main camera.
     pub(in crate::session) fn camera_keys(&self, main: &str) -> Vec<String> {
         let rigid = self.estimator.config().rigid_cameras.iter().map(|camera| camera.key.clone());
         std::iter::once(main.to_owned()).chain(rigid).collect()
     }
 
-    /// Adds changes of its measurements.
+    /// Adds changes of a fork to the measurements.
     pub(super) fn alter(&mut self, changes: AlteredMeasurements) {
         self.altered_measurements.add(changes);
     }
 
-    /// One step through the estimator and the observability analysis.
+    /// Runs one step of the estimator and the observability analysis.
     pub(in crate::session) fn step(&mut self, input: &OwnedStepInput) -> StepRecord {
         let watch = Stopwatch::start();
         let mut report = self.estimate(input);
@@ -81,7 +81,7 @@ impl RunEngine {
         }
     }
 
-    /// The same step without the observability analysis: the estimator ends in the same state.
+    /// Runs the same step without the observability analysis. The estimator ends in the same state.
     pub(in crate::session) fn pass(&mut self, input: &OwnedStepInput) {
         let keep = self.estimator.config().options.keep_linearization;
         self.estimator.set_keep_linearization(false);
@@ -89,12 +89,12 @@ impl RunEngine {
         self.estimator.set_keep_linearization(keep);
     }
 
-    /// Sets the most iterations of the solver, from the next step on.
+    /// Limits the iterations of the solver from the next step on.
     pub(in crate::session) fn set_iterations(&mut self, iterations: usize) {
         self.estimator.set_iterations(iterations);
     }
 
-    /// Bytes of a snapshot of it.
+    /// Memory of a snapshot in bytes.
     pub(in crate::session) fn bytes(&self) -> usize {
         size_of::<Self>() - size_of::<Estimator>() + self.estimator.bytes()
     }
@@ -123,7 +123,7 @@ impl RunEngine {
         })
     }
 
-    /// Analyses the step's linearization and drops it unless it is to be kept: one per frame would fill the memory.
+    /// Analyses the step's linearization and drops it unless it is to be kept, because linearizations take much memory.
     fn rank(&self, report: &mut StepReport) -> Option<RankReport> {
         let linearization = report.linearization.take()?;
         let angles: Vec<&[f64]> = report.window.iter().map(|frame| frame.joint_angles_rad.as_slice()).collect();
@@ -135,7 +135,7 @@ impl RunEngine {
         let clocks = calibration.parameters.iter().filter(is_clock).count();
         let mounts = calibration.parameters.len() - clocks;
         let chain = if chain.dof() + rigid == mounts { chain } else { chain.without_joint_offsets() };
-        // A fork's parent has used the readings of earlier frames, which stay in the window for a while.
+        // In a fork without encoders, frames of the window may still have encoder readings that the parent used.
         let unread = || report.window.iter().all(|frame| frame.encoder_angles_rad.is_none());
         let joints_free = self.joints_free || self.has_joints && self.altered_measurements.encoder_off() && unread();
         let rank = analyse(&linearization, &chain, &angles, joints_free);

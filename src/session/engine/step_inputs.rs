@@ -1,4 +1,4 @@
-//! The inputs of a run's steps, kept so that the steps can be recomputed.
+//! The inputs of a run's steps, kept for recomputation.
 
 use std::sync::Arc;
 
@@ -11,36 +11,36 @@ use crate::geometry::RigidTransform;
 use crate::sensors::{ImuSample, JointAngles};
 use crate::session::record::tracks_bytes;
 
-/// The input of one step, of one camera or of all synchronized cameras of a run.
+/// The input of one step: measurements of one camera or of a synchronized frame set.
 ///
-/// It stands between the two other carriers on the way from the log to the estimator. A [`SensorFrame`] is what the log
-/// has of one camera's image: it holds the image, which nobody needs after the front end, and no tracks. The estimator's
-/// [`StepInput`](crate::estimator::StepInput) borrows its measurements for the call, because a fork changes some of them
-/// first. This one owns the same measurements: it goes from the trackers' threads to the runs', and stays in their
-/// histories, so that steps are recomputed without tracking an image again (the front end does not know the estimator, so
-/// that its tracks do not depend on the run). Runs on the same camera share it.
+/// On the way from the log to the estimator there are three such types. A [`SensorFrame`] is what the log has for one
+/// image of one camera: it owns the image, which is not needed after the front end, and has no tracks. The estimator's
+/// [`StepInput`](crate::estimator::StepInput) borrows its measurements for the call, because a fork changes some of
+/// them first. This one owns the same measurements: tracker threads send it to the runs, and their histories keep it,
+/// so that steps are recomputed without tracking features again (the front end does not know the estimator, so that its
+/// tracks do not depend on the run). Runs on the same camera share it.
 #[derive(Clone, Debug, PartialEq)]
 pub(in crate::session) struct OwnedStepInput {
-    /// Number of the main camera's image; where it is missing, one that no image has.
+    /// Index of the main camera's image; where that image is missing, an index that no image has.
     pub(in crate::session) frame_index: usize,
-    /// Header stamp since the log began, on the main camera's clock.
+    /// Header stamp on the main camera's clock, in nanoseconds since the log began.
     pub(in crate::session) stamp_ns: i64,
-    /// Log time since the log began.
+    /// Log time, in nanoseconds since the log began.
     pub(in crate::session) log_time_ns: i64,
-    /// IMU samples from the stamp of the input before to this one, both ends included.
+    /// IMU samples from the stamp of the previous input to this one, both ends included.
     pub(in crate::session) imu: Vec<ImuSample>,
-    /// Encoder angles at the stamp.
+    /// Encoder readings at the stamp.
     pub(in crate::session) joint_angles: Option<JointAngles>,
-    /// Tracks by camera of the run, the main one's first; empty ones where an image is missing.
+    /// Tracks by camera, the main camera first; empty where an image is missing.
     pub(in crate::session) tracks: Vec<Arc<TrackedFrame>>,
-    /// Ground truth of `world_from_imu`.
+    /// `world_from_imu` of the ground truth.
     pub(in crate::session) ground_truth: Option<RigidTransform>,
-    /// Time that the front ends took.
+    /// Computing time of the front ends.
     pub(in crate::session) frontend_ms: f64,
 }
 
 impl OwnedStepInput {
-    /// The input from one camera alone.
+    /// The input from one camera.
     pub(in crate::session) fn of_camera(frame: SensorFrame, tracks: TrackedFrame, frontend_ms: f64) -> Self {
         Self {
             frame_index: frame.index,
@@ -54,17 +54,18 @@ impl OwnedStepInput {
         }
     }
 
-    /// The main camera's tracks.
+    /// Tracks of the main camera.
     pub(in crate::session) fn main_tracks(&self) -> &Arc<TrackedFrame> {
         &self.tracks[0]
     }
 
-    /// Stamp of the images on the clock of the IMU.
+    /// Stamp of the images on the IMU's clock.
     pub(super) fn imu_stamp_ns(&self) -> i64 {
         self.imu.last().map_or(self.stamp_ns, |last| last.stamp_ns)
     }
 
-    /// Bytes without the main camera's tracks, which the step's record counts; every run that shares it counts them.
+    /// Memory in bytes without the main camera's tracks, which the step's record counts. Every run that shares the
+    /// input counts it.
     pub(super) fn own_bytes(&self) -> usize {
         let rigid: usize = self.tracks.iter().skip(1).map(|tracks| tracks_bytes(tracks)).sum();
         allocated_bytes(size_of::<Self>() + 2 * size_of::<usize>())
@@ -74,7 +75,7 @@ impl OwnedStepInput {
     }
 }
 
-/// The inputs of a run's steps so far, which its forks share.
+/// The inputs of a run's steps so far, shared with its forks.
 #[derive(Debug, Default)]
 pub(in crate::session) struct StepInputs {
     state: Mutex<State>,
@@ -88,24 +89,24 @@ struct State {
 }
 
 impl StepInputs {
-    /// Adds the input of the next step.
+    /// Appends the input of the next step.
     pub(in crate::session) fn push(&self, input: Arc<OwnedStepInput>) {
         self.state.lock().steps.push(input);
         self.grown.notify_all();
     }
 
-    /// No more will come.
+    /// Marks the end of the inputs, so that no reader waits for more.
     pub(in crate::session) fn end(&self) {
         self.state.lock().ended = true;
         self.grown.notify_all();
     }
 
-    /// The input of a step that has been computed.
+    /// The input of a step, `None` if it has not been computed.
     pub(in crate::session) fn get(&self, step: usize) -> Option<Arc<OwnedStepInput>> {
         self.state.lock().steps.get(step).cloned()
     }
 
-    /// The input of a step; waits for it. `None` behind the last one.
+    /// The input of a step. Waits until it is there; `None` behind the last one.
     pub(in crate::session) fn wait_for(&self, step: usize) -> Option<Arc<OwnedStepInput>> {
         let mut state = self.state.lock();
         self.grown.wait_while(&mut state, |state| state.steps.len() <= step && !state.ended);

@@ -1,4 +1,4 @@
-//! Synchronized frame sets: the images that the cameras of a run took together, with the IMU samples since the set before.
+//! Synchronized frame sets: images of several cameras with the same stamp, and the IMU samples since the previous set.
 
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
@@ -8,14 +8,15 @@ use thiserror::Error;
 use super::step_inputs::OwnedStepInput;
 use crate::sensors::ImuSample;
 
-/// Images further apart were not taken together. A vehicle that turns by 3 rad/s turns by 0.1° meanwhile, a pixel.
+/// Largest difference of stamps in a synchronized frame set. At an angular rate of 3 rad/s the vehicle rotates by 0.1°
+/// in that time, which is about one pixel.
 const TOGETHER_NS: i64 = 500_000;
-/// After so many images of each camera without a pair, the cameras are not synchronized.
+/// After this many images of each camera without a partner, the cameras are not synchronized.
 const LONE_IMAGES: usize = 10;
-/// Images of other cameras are numbered from here where the main one has none: no camera has taken so many.
+/// Offset of the indices of images where the main camera has none; larger than any index of the main camera.
 const BESIDE_MAIN: usize = 1 << 30;
 
-/// Why a run cannot use its cameras together.
+/// The reason why a run cannot use its cameras together.
 #[derive(Debug, Error, PartialEq)]
 #[error(
     "the images of {first} and {second} were not taken together: those of {second} are {offset_ms:+.2} ms from those of \
@@ -30,14 +31,14 @@ pub(in crate::session) struct NotSynchronized {
     count: usize,
 }
 
-/// The inputs of one camera on their way to a run.
+/// The inputs of one camera of a run.
 #[derive(Debug)]
 struct CameraInputs {
     key: String,
     inputs: Receiver<Arc<OwnedStepInput>>,
     next: Option<Arc<OwnedStepInput>>,
     ended: bool,
-    /// Stamps of its images since the last set of several images.
+    /// Stamps of images since the last set with several images.
     lone_ns: Vec<i64>,
 }
 
@@ -49,24 +50,24 @@ impl CameraInputs {
         }
     }
 
-    /// Stamp of the next image, on the clock of the IMU.
+    /// Stamp of the next image, on the IMU's clock.
     fn next_ns(&self) -> Option<i64> {
         self.next.as_deref().map(OwnedStepInput::imu_stamp_ns)
     }
 }
 
-/// The step inputs of a run in time order, one for each synchronized frame set of its cameras.
+/// The step inputs of a run in time order, one per synchronized frame set.
 #[derive(Debug)]
 pub(super) struct SynchronizedFrames {
     cameras: Vec<CameraInputs>,
-    /// IMU sample at the end of the last set.
+    /// Last IMU sample of the previous set.
     end: Option<ImuSample>,
     /// Offset of the IMU's clock from the main camera's, from its last image.
     main_shift_ns: Option<i64>,
 }
 
 impl SynchronizedFrames {
-    /// From the inputs of the run's cameras by their keys, the main camera's first.
+    /// The inputs of the run's cameras with their keys, the main camera first.
     pub(super) fn new(cameras: impl IntoIterator<Item = (String, Receiver<Arc<OwnedStepInput>>)>) -> Self {
         let cameras = cameras
             .into_iter()
@@ -75,7 +76,7 @@ impl SynchronizedFrames {
         Self { cameras, end: None, main_shift_ns: None }
     }
 
-    /// Waits for the next set, `None` at the end of all streams.
+    /// The next set; waits for it. `None` at the end of all streams.
     pub(super) fn next(&mut self) -> Result<Option<Arc<OwnedStepInput>>, NotSynchronized> {
         self.cameras.iter_mut().for_each(CameraInputs::wait);
         if let [camera] = self.cameras.as_mut_slice() {
@@ -92,14 +93,16 @@ impl SynchronizedFrames {
         Ok(self.combined(&frames).map(Arc::new))
     }
 
-    /// One input from those of the cameras; what all of them have comes from the main camera's where there is one.
+    /// One input from those of the cameras. Values that all cameras have are taken from the main camera where it has an
+    /// image.
     fn combined(&mut self, frames: &[Option<Arc<OwnedStepInput>>]) -> Option<OwnedStepInput> {
         let main = frames.first()?.as_deref();
         let any = main.or_else(|| frames.iter().flatten().map(|frame| &**frame).next())?;
         if let Some(main) = main {
             self.main_shift_ns = Some(main.imu_stamp_ns() - main.stamp_ns);
         }
-        // An image brings the samples since the image before it of the same camera, which another one may have followed.
+        // An input has the samples since the previous image of its own camera; another camera may have an image in
+        // between.
         let imu: Vec<ImuSample> = match self.end {
             None => any.imu.clone(),
             Some(end) => std::iter::once(end)
@@ -142,7 +145,7 @@ impl SynchronizedFrames {
     }
 }
 
-/// How much later a stamp is than the nearest of others.
+/// Offset of a stamp from the nearest of `others_ns`.
 fn nearest_offset(at_ns: i64, others_ns: &[i64]) -> Option<i64> {
     others_ns.iter().map(|other_ns| at_ns - other_ns).min_by_key(|offset_ns| offset_ns.abs())
 }
@@ -158,7 +161,7 @@ mod tests {
 
     const PERIOD_NS: i64 = 50_000_000;
 
-    /// Images at these stamps, each with the samples since the one before at 200 Hz.
+    /// Images at these stamps, each with the IMU samples since the previous one at 200 Hz.
     fn images(stamps_ns: &[i64]) -> Receiver<Arc<OwnedStepInput>> {
         let (sender, receiver) = sync_channel(stamps_ns.len());
         let mut before_ns = 0;
@@ -206,7 +209,7 @@ mod tests {
         let mut ends_ns = 0;
         let mut seen = Vec::new();
         while let Some(input) = sets.next().unwrap() {
-            // Tracks of an image that is missing have no stamp.
+            // Tracks of a missing image have stamp 0.
             let has = |camera: usize| input.tracks[camera].stamp_ns != 0;
             let imu = &input.imu;
             assert_eq!(imu[0].stamp_ns, ends_ns);
@@ -215,7 +218,7 @@ mod tests {
             assert_eq!(ends_ns, input.stamp_ns);
             assert_eq!(input.frontend_ms, (0..2).filter(|camera| has(*camera)).count() as f64);
             seen.push([has(0), has(1)]);
-            // The main camera's image where there is one, else a number that no image of it has.
+            // The index of the main camera's image where there is one, else an index that no image of it has.
             assert_eq!(input.frame_index < BESIDE_MAIN, has(0));
         }
         assert_eq!(seen.len(), 12);

@@ -1,7 +1,7 @@
-//! The threads of a session: one tracker per camera, one estimator per run, results in order over one channel.
+//! The threads of a session: one tracker per camera, one estimator per run, results over one channel.
 //!
-//! Every run is computed on its own thread from its own copy of the tracks, so what comes out does not depend on how the
-//! threads are scheduled. A run on two cameras is fed by two trackers, each on its own thread.
+//! Every run is computed on its own thread from its own copy of the tracks, so the results do not depend on the
+//! scheduling of threads. A run with two cameras receives inputs from two trackers.
 
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -20,12 +20,12 @@ use super::synchronized_frames::SynchronizedFrames;
 use super::tracker::CameraTracker;
 use crate::session::plan::{SessionError, SessionPlan, cameras_of_run};
 
-/// Frames that may wait between the tracker and an estimator.
+/// Capacity in frames of the queue between a tracker and an estimator.
 const QUEUED_FRAMES: usize = 8;
-/// Steps that may wait for whoever collects them.
+/// Capacity in steps of the queue to the collector.
 const QUEUED_STEPS: usize = 64;
 
-/// Running threads; dropping it stops them.
+/// The running threads. Dropping it stops them.
 #[derive(Debug)]
 pub(in crate::session) struct Engine {
     sender: Option<SyncSender<EngineMessage>>,
@@ -47,14 +47,14 @@ impl Default for Engine {
 }
 
 impl Engine {
-    /// Starts every run of the plan.
+    /// Starts all runs of the plan.
     pub(in crate::session) fn start(plan: &SessionPlan, computation: &Computation) -> Result<Self, SessionError> {
         let mut engine = Self::default();
         engine.start_runs(plan, computation, &(0..plan.runs.len()).collect::<Vec<_>>())?;
         Ok(engine)
     }
 
-    /// Starts the given runs of the plan from the start of the log; runs on the same camera share one tracker.
+    /// Starts these runs of the plan at the start of the log. Runs on the same camera share one tracker.
     pub(in crate::session) fn start_runs(
         &mut self,
         plan: &SessionPlan,
@@ -94,7 +94,7 @@ impl Engine {
         Ok(())
     }
 
-    /// Starts a fork from an engine as it is before the first step of its history.
+    /// Starts a fork from an engine in its state before the fork's first step.
     pub(in crate::session) fn start_fork(
         &mut self,
         run: usize,
@@ -109,12 +109,12 @@ impl Engine {
         Ok(())
     }
 
-    /// Closes the engine's own end of the channel: once all runs are done, [`Engine::receive`] returns `None`.
+    /// Closes the engine's own sender: [`Engine::receive`] returns `None` when all runs have ended.
     pub(in crate::session) fn no_more_runs(&mut self) {
         self.sender = None;
     }
 
-    /// Takes the receiving end, for a collecting thread.
+    /// Takes the receiver, for a collector thread.
     pub(in crate::session) fn take_receiver(&mut self) -> Option<Receiver<EngineMessage>> {
         self.receiver.take()
     }
@@ -131,7 +131,7 @@ impl Drop for Engine {
         self.sender = None;
         self.receiver = None;
         for thread in self.threads.drain(..) {
-            // A thread that panicked has already reported its run as failed.
+            // A thread that panicked has already been reported as failed.
             drop(thread.join());
         }
     }
@@ -141,7 +141,7 @@ fn spawn(name: String, work: impl FnOnce() + Send + 'static) -> Result<JoinHandl
     Builder::new().name(name).spawn(work).map_err(|source| SessionError::Thread { source })
 }
 
-/// Sends the camera's step inputs to every run on it.
+/// Sends the camera's step inputs to every run that uses it.
 fn track_thread(
     mut tracker: CameraTracker,
     mut queues: Vec<SyncSender<Arc<OwnedStepInput>>>,
@@ -150,7 +150,7 @@ fn track_thread(
 ) {
     while !cancelled.load(Ordering::Relaxed) {
         let Some((input, warnings)) = tracker.next_input() else {
-            // Nobody listens any more when the session was closed.
+            // The receiver is gone when the session was closed.
             drop(results.send(EngineMessage::Warnings(tracker.remaining_warnings().to_vec())));
             return;
         };
@@ -165,7 +165,7 @@ fn track_thread(
     }
 }
 
-/// Steps one estimator over the synchronized frame sets, keeps each in the history, and reports each step.
+/// Runs an estimator over the synchronized frame sets, stores each set in the history, and reports each step.
 fn run_thread(
     run: usize,
     engine: RunEngine,
@@ -184,7 +184,7 @@ fn run_thread(
     history.inputs().end();
 }
 
-/// Computes a step from each input, and reports it.
+/// Computes and reports a step for each input.
 fn run_steps(
     run: usize,
     mut engine: RunEngine,
@@ -208,7 +208,7 @@ fn run_steps(
             break;
         };
         if results.send(EngineMessage::Step { run, record: Box::new(record) }).is_err() {
-            // Nobody listens any more when the session was closed.
+            // The receiver is gone when the session was closed.
             return;
         }
     }

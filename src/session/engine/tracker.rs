@@ -1,4 +1,4 @@
-//! One camera's stream through the front end; all runs on the camera share its tracks.
+//! Feature tracking of one camera's stream; all runs on the camera share the tracks.
 
 use std::sync::Arc;
 
@@ -23,11 +23,11 @@ pub(super) struct CameraTracker {
 
 /// Standard deviation of a gyroscope's turn-on bias, in rad/s (1.1°/s, a small MEMS IMU).
 const GYROSCOPE_BIAS_SIGMA_RAD_PER_S: f64 = 0.02;
-/// Standard deviation of the orientation of a rigid camera on the IMU, in radians (0.6°).
+/// Standard deviation of the orientation of a rigid camera's extrinsics, in radians (0.6°).
 const RIGID_MOUNT_SIGMA_RAD: f64 = 0.01;
 
 impl CameraTracker {
-    /// Starts at a time of the log.
+    /// Starts at a stamp of the log.
     pub(super) fn new(
         log: Arc<FlightLog>,
         rig: &Rig,
@@ -46,8 +46,8 @@ impl CameraTracker {
         })
     }
 
-    /// The next step input of the camera alone and what is wrong with the log since the last one, `None` at the end of the
-    /// stream; an image that the front end refuses is left out with a warning.
+    /// The next step input of this camera and the new warnings about the log, `None` at the end of the stream. An image
+    /// that the front end rejects is skipped with a warning.
     pub(super) fn next_input(&mut self) -> Option<(OwnedStepInput, Vec<LogWarning>)> {
         let mut refused = Vec::new();
         loop {
@@ -55,7 +55,7 @@ impl CameraTracker {
             let watch = Stopwatch::start();
             let mount = self.mount(&frame);
             let predicted = match (&self.previous_mount, &mount) {
-                // The estimators know the bias; over one frame it rotates the image by a pixel or two at most.
+                // The gyroscope bias is not removed here: over one frame it rotates the image by two pixels at most.
                 (Some(previous), Some(now)) => {
                     predict_camera_rotation(&frame.imu, &Vector3::zeros(), previous, now, &self.noise)
                 }
@@ -76,15 +76,15 @@ impl CameraTracker {
         }
     }
 
-    /// What is wrong with the log behind the last image.
+    /// Warnings about the log behind the last image.
     pub(super) fn remaining_warnings(&self) -> &[LogWarning] {
         self.stream.remaining_warnings()
     }
 
-    /// Orientation of the camera on the IMU by rig and encoders, `None` without a joint's angle.
+    /// Orientation `imu_from_camera` from rig and encoders, `None` when a joint angle is missing.
     fn mount(&self, frame: &SensorFrame) -> Option<ChainOrientation> {
         let (angles_rad, sigmas_rad) = match &frame.joint_angles {
-            // A rigid camera of a gimbal rig has readings beside it that are not its own.
+            // Encoder readings of a gimbal rig do not concern its rigid camera.
             _ if self.chain.links.is_empty() => (&[][..], &[][..]),
             Some(angles) => (angles.angles_rad.as_slice(), angles.sigmas_rad.as_slice()),
             None => return None,
@@ -93,7 +93,7 @@ impl CameraTracker {
     }
 }
 
-/// Noise of what a camera's rotation is predicted from, by the rig.
+/// Standard deviations of the inputs of the predicted camera rotation, from the rig.
 fn prediction_noise(rig: &Rig, mount: &CameraMount) -> PredictionNoise {
     let gimbal = rig.gimbal.as_ref().filter(|_| *mount == CameraMount::Gimbal);
     PredictionNoise {

@@ -1,4 +1,4 @@
-//! Forks: a run that leaves another one at a frame, with something changed.
+//! Forks: a fork continues another run from a frame on, with changes.
 
 use std::collections::BTreeSet;
 
@@ -7,30 +7,30 @@ use thiserror::Error;
 use super::run_spec::{ParameterizationChoice, RunSpec};
 use crate::estimator::InterventionError;
 
-/// What a fork changes against the run that it leaves.
+/// The changes of a fork against its parent run.
 ///
-/// Written as `classical,freeze=yaw.alpha+yaw.d,set=pitch.a:30mm,drop=12+15,joint-noise=0.5deg,imu-noise=2`.
+/// Syntax: `classical,freeze=yaw.alpha+yaw.d,set=pitch.a:30mm,drop=12+15,joint-noise=0.5deg,imu-noise=2`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ForkChanges {
     /// Another parameterization of the same chain.
     pub parameterization: Option<ParameterizationChoice>,
-    /// Parameters that are fixed at their values from there on.
+    /// Names of parameters that are fixed at their values (`freeze=`).
     pub frozen: Vec<String>,
-    /// Parameters that are set to other values, in radians or metres.
+    /// Names and new values of parameters, in radians or metres (`set=`).
     pub values: Vec<(String, f64)>,
-    /// Features that are not used any more.
+    /// Ids of features that are not used any more (`drop=`).
     pub dropped: BTreeSet<u64>,
-    /// Keys of cameras that are not used any more, of a run on two.
+    /// Keys of cameras that are not used any more, for a run with two (`without=`).
     pub without: BTreeSet<String>,
-    /// Encoder readings are not used any more.
+    /// Whether encoder readings are not used any more (`encoder=off`).
     pub encoder_off: bool,
-    /// Standard deviation of noise that is added to every joint angle, in radians, without a change of the estimator's σ.
+    /// Standard deviation of noise added to every joint angle, in radians; the estimator's σ stays as it is.
     pub joint_noise_rad: f64,
-    /// Factor on the IMU noise densities.
+    /// Scale factor of the IMU noise densities.
     pub imu_noise: f64,
-    /// Factor on the standard deviation of a tracked pixel.
+    /// Scale factor of the standard deviation of a tracked pixel.
     pub pixel_noise: f64,
-    /// Factor on the standard deviations of the joint angles in the estimator.
+    /// Scale factor of the joint angles' standard deviations in the estimator.
     pub encoder_noise: f64,
 }
 
@@ -51,29 +51,29 @@ impl Default for ForkChanges {
     }
 }
 
-/// Why a fork cannot be made.
+/// The reason why a fork cannot be made.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum ForkError {
-    /// Something that no fork can change, or a value that it cannot take.
+    /// A change that is not supported, or an invalid value.
     #[error("fork '{text}': {problem}")]
     BadChange {
-        /// What was written.
+        /// The change as written.
         text: String,
-        /// What is wrong with it, and what was expected.
+        /// The problem, and what was expected.
         problem: String,
     },
-    /// The run does not use such a camera.
+    /// The run does not use this camera.
     #[error("the run uses no camera '{camera}', only {present}")]
     NoCamera {
-        /// The key that was given.
+        /// The given key.
         camera: String,
-        /// The cameras that it uses.
+        /// Keys of the cameras that the run uses.
         present: String,
     },
-    /// No camera would be left.
+    /// The fork would have no camera.
     #[error("without {without} the run would have no visual measurements: leave it one of its cameras")]
     Blind {
-        /// The keys of its cameras.
+        /// The given keys.
         without: String,
     },
     /// The run has no such parameter.
@@ -82,27 +82,27 @@ pub enum ForkError {
         known.join(", ")
     )]
     UnknownParameter {
-        /// The name that was given.
+        /// The given name.
         name: String,
-        /// The parameters that there are.
+        /// Names of the run's parameters.
         known: Vec<String>,
     },
-    /// The estimator refuses.
+    /// The estimator rejected the change.
     #[error("this run cannot be forked so: {0}")]
     Estimator(#[from] InterventionError),
     /// There is no step at the cursor, or it cannot be recomputed.
     #[error("there is no step of the run '{run}' here to fork from")]
     NoStep {
-        /// The run.
+        /// Label of the run.
         run: String,
     },
 }
 
-/// Why a fork cannot use another camera.
+/// The reason why a fork cannot use another camera.
 pub(super) const OTHER_CAMERA: &str = "the window of the run holds features that only its own cameras have observed, so that a fork \
                             can leave a camera of two out (without=cam1) but not add another one";
 
-/// Parameterizations that a fork can change to: another camera would have other tracks.
+/// Parameterizations that a fork can change to. Those on another camera would need other tracks.
 pub const FORK_PARAMETERIZATIONS: [ParameterizationChoice; 5] = [
     ParameterizationChoice::Auto,
     ParameterizationChoice::Minimal,
@@ -112,7 +112,7 @@ pub const FORK_PARAMETERIZATIONS: [ParameterizationChoice; 5] = [
 ];
 
 impl ForkChanges {
-    /// The specification of the fork: the parent's with those changes that a specification has.
+    /// The specification of the fork: the parent's, with the changes that a specification has.
     pub(in crate::session) fn spec(&self, parent: &RunSpec, time_s: f64) -> RunSpec {
         let parameterization = self.parameterization.unwrap_or(parent.parameterization);
         let name = self.parameterization.map_or(&*parent.label, |choice| choice.name());

@@ -82,7 +82,7 @@ impl FromStr for ForkChanges {
     }
 }
 
-/// The parts of `yaw.a:1e+3+yaw.d:2`: a plus after an exponent belongs to its number.
+/// The items of `yaw.a:1e+3+yaw.d:2`; a plus sign after an exponent belongs to the number.
 fn several_values(text: &str) -> Vec<String> {
     let mut parts: Vec<String> = Vec::new();
     for piece in text.split('+') {

@@ -1,4 +1,4 @@
-//! What a session is to do: the log with its rig, the runs over it, and what a fork changes. Data; nothing runs here.
+//! The definition of a session: the log with its rig, its runs, and the changes of a fork. Plain data.
 
 mod fork_changes;
 mod fork_text;

@@ -5,26 +5,26 @@ use thiserror::Error;
 
 use crate::sensors::Rig;
 
-/// Which parameterization a run estimates in.
+/// The parameterization in which a run estimates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ParameterizationChoice {
-    /// The minimal parameterization, switched away from singularities of the mechanism.
+    /// The minimal parameterization; switches to the other end block near a singularity.
     Auto,
     /// Eqs. 18–20 as printed (corrected).
     Minimal,
-    /// The minimal parameterization with the end block swapped, away from the singularity of the printed one.
+    /// The minimal parameterization with the swapped end block, whose singularity is elsewhere.
     MinimalSwapped,
-    /// Eqs. 5–6, 12 + 4N columns.
+    /// Denavit–Hartenberg parameters of Eqs. 5–6, 12 + 4N columns.
     Classical,
     /// The product of exponentials, without singularities.
     Poe,
-    /// The rigid camera of the rig alone.
+    /// The extrinsics of the rig's rigid camera.
     Static,
-    /// The gimbal camera as in `auto` and the rigid camera of the rig, in one window.
+    /// The gimbal camera as in `auto` and the rig's rigid camera, in one window.
     Cluster,
 }
 
-/// Names on the command line, in the order in which they are offered.
+/// Names on the command line, in the order of the help text.
 const NAMES: [(&str, ParameterizationChoice); 7] = [
     ("auto", ParameterizationChoice::Auto),
     ("minimal", ParameterizationChoice::Minimal),
@@ -35,11 +35,11 @@ const NAMES: [(&str, ParameterizationChoice); 7] = [
     ("cluster", ParameterizationChoice::Cluster),
 ];
 
-/// Smallest and largest window that makes sense: two keyframes give no parallax to spare, and beyond thirty the dense
-/// solve leaves real time far behind.
+/// Range of the window size: two keyframes give too little parallax, and with more than thirty the dense solve takes
+/// much longer than real time.
 const WINDOW_RANGE: std::ops::RangeInclusive<usize> = 4..=30;
 
-/// Keyframes in the window unless the specification says otherwise, as in the paper.
+/// Default number of keyframes in the window, as in the paper.
 const DEFAULT_WINDOW: usize = 10;
 
 impl ParameterizationChoice {
@@ -48,7 +48,7 @@ impl ParameterizationChoice {
         NAMES.iter().find(|(_, choice)| *choice == self).map_or("auto", |(name, _)| name)
     }
 
-    /// Whether its runs switch to the other parameterization near a singularity; a rig may ask for it in any minimal run.
+    /// Whether its runs switch to the other end block near a singularity. A rig may demand that for every minimal run.
     pub fn switches_parameterization(self, rig: &Rig) -> bool {
         match self {
             Self::Auto | Self::Cluster => true,
@@ -59,7 +59,7 @@ impl ParameterizationChoice {
         }
     }
 
-    /// Every choice with its name, in the order in which they are offered.
+    /// All parameterizations with their names, in the order of the help text.
     pub fn all() -> impl Iterator<Item = (&'static str, Self)> {
         NAMES.into_iter()
     }
@@ -68,23 +68,23 @@ impl ParameterizationChoice {
 /// One `--run NAME[:key=value,…]`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RunSpec {
-    /// Its name on screen and as a folder: `name=…`, or the specification as written.
+    /// Its name in the window and of its folder: `name=…`, or the specification as written.
     pub label: String,
-    /// The parameterization.
+    /// The parameterization in which the calibration is estimated.
     pub parameterization: ParameterizationChoice,
     /// Whether encoder readings are used (`encoder=off` clears it).
     pub encoder: bool,
-    /// Whether the static calibration is estimated (`calibrate=off` clears it).
+    /// Whether the calibration is estimated (`calibrate=off` clears it).
     pub calibrate: bool,
     /// Whether the time offsets of cameras and encoders are estimated (`timeshift=on` sets it).
     pub timeshift: bool,
-    /// Whether Jacobians are evaluated at first estimates, FEJ (`first-estimates=off` clears it): without, the prior gains
-    /// spurious information.
+    /// Whether Jacobians are evaluated at first estimates, FEJ (`first-estimates=off` clears it). Without FEJ the prior
+    /// gains spurious information.
     pub first_estimates: bool,
     /// Number of keyframes in the window (`window=10`).
     pub window: usize,
-    /// Main camera (`camera=cam1`); `None` is the gimballed one, or the first rigid one for `static` and for rigs without a
-    /// gimbal. A `cluster` uses the first rigid one beside it.
+    /// Key of the main camera (`camera=cam1`). `None` means the gimballed camera, or the first rigid one for `static`
+    /// and for rigs without a gimbal. A `cluster` also uses the first rigid camera.
     pub camera_key: Option<String>,
 }
 
@@ -103,21 +103,21 @@ impl Default for RunSpec {
     }
 }
 
-/// Why a run specification was refused.
+/// The reason why a run specification was rejected.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum RunSpecError {
-    /// No such parameterization.
+    /// Unknown parameterization.
     #[error("unknown run '{name}': expected one of auto, minimal, minimal-swapped, classical, poe, static, cluster")]
     UnknownName {
-        /// What was written.
+        /// The name as written.
         name: String,
     },
-    /// A key that no run has, or a value that the key cannot take.
+    /// Unknown key, or invalid value.
     #[error("run '{spec}': {problem}")]
     BadOption {
         /// The whole specification.
         spec: String,
-        /// What is wrong with it, and what was expected.
+        /// The problem, and what was expected.
         problem: String,
     },
 }
@@ -204,7 +204,7 @@ impl fmt::Display for RunSpec {
     }
 }
 
-/// The text with everything that a folder's name should not hold replaced by `-`; never empty, `.` or `..`.
+/// The text with every character that is unsafe in folder names replaced by `-`; never empty, `.` or `..`.
 fn folder_name(text: &str) -> String {
     let clean: String = text
         .chars()
@@ -221,7 +221,7 @@ fn on_or_off(value: &str) -> Result<bool, String> {
     }
 }
 
-/// Makes the labels of several runs differ, by a number after the later ones.
+/// Makes the labels of several runs unique by appending numbers.
 pub(in crate::session) fn distinct_labels(specs: &mut [RunSpec]) {
     for index in 1..specs.len() {
         let wanted = specs[index].label.clone();

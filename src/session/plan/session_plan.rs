@@ -1,4 +1,4 @@
-//! What a session is to do: a log, its rigs, the time span, and the runs with the main camera of each.
+//! The plan of a session: log, rigs, time span, and the runs with their main cameras.
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -12,10 +12,10 @@ use crate::flight_log::{FlightLog, LogError};
 use crate::gimbal::{Chain, ParameterId, Parameterization};
 use crate::sensors::{CameraMount, CameraRig, Rig};
 
-/// The most runs side by side.
+/// Maximum number of runs of a session.
 pub const MAX_RUNS: usize = 4;
 
-/// Why a session cannot start.
+/// The reason why a session cannot start.
 #[derive(Debug, Error)]
 pub enum SessionError {
     /// The log, its rig or its ground truth cannot be read.
@@ -24,77 +24,77 @@ pub enum SessionError {
     /// The rig has no camera for the run.
     #[error("run '{run}' needs {wanted}, but the rig '{rig}' has only {present}")]
     NoCamera {
-        /// The run.
+        /// Label of the run.
         run: String,
-        /// What was looked for.
+        /// Description of the required camera.
         wanted: String,
         /// Name of the rig.
         rig: String,
-        /// The rig's cameras.
+        /// Keys and kinds of the rig's cameras.
         present: String,
     },
-    /// More runs than are shown side by side.
+    /// More than [`MAX_RUNS`] runs.
     #[error("{count} runs were asked for, at most {MAX_RUNS} fit side by side: leave some out")]
     TooManyRuns {
-        /// How many.
+        /// Requested number of runs.
         count: usize,
     },
     /// A thread could not be started.
     #[error("cannot start a thread for the estimation: {source}")]
     Thread {
-        /// What the system said.
+        /// The error of the operating system.
         source: std::io::Error,
     },
 }
 
-/// What to open, as on the command line.
+/// The arguments of a session, as on the command line.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SessionRequest {
-    /// The log.
+    /// Path of the log.
     pub log_path: PathBuf,
-    /// The rig, when it is not beside the log or in it.
+    /// Path of the rig file, when it is not beside the log or in it.
     pub rig_path: Option<PathBuf>,
-    /// The ground truth of the rig, when it is not beside the log.
+    /// Path of the ground-truth rig file, when it is not beside the log.
     pub ground_truth_path: Option<PathBuf>,
     /// The runs; none means one `auto`.
     pub specs: Vec<RunSpec>,
-    /// Seconds of the log to leave out at its start.
+    /// Seconds to skip at the start of the log.
     pub start_s: f64,
-    /// Seconds to read from there, `None` to the end.
+    /// Seconds to read from there, `None` for the rest of the log.
     pub duration_s: Option<f64>,
 }
 
-/// A request whose log is open and whose runs have their cameras.
+/// A request with its log opened and a camera found for each run.
 #[derive(Clone, Debug)]
 pub struct SessionPlan {
     /// The opened log.
     pub log: Arc<FlightLog>,
-    /// Its path.
+    /// Path of the log.
     pub log_path: PathBuf,
-    /// The rig's file, when it was named.
+    /// Path of the rig file, when it was given.
     pub rig_path: Option<PathBuf>,
-    /// The file of the ground truth, when it was named.
+    /// Path of the ground-truth rig file, when it was given.
     pub ground_truth_path: Option<PathBuf>,
-    /// The rig of the runs.
+    /// The rig whose calibration gives the priors of the runs.
     pub rig: Arc<Rig>,
-    /// The rig with the ground truth.
+    /// The ground-truth rig, when known.
     pub ground_truth_rig: Option<Arc<Rig>>,
-    /// The runs and the main camera of each.
+    /// The runs, each with the key of its main camera.
     pub runs: Vec<(RunSpec, String)>,
-    /// Seconds left out at the start.
+    /// Seconds to skip at the start of the log.
     pub start_s: f64,
-    /// Seconds to read.
+    /// Seconds to read from there, `None` for the rest of the log.
     pub duration_s: Option<f64>,
-    /// Changes of the runs' configurations beyond their specifications, by run; benches try options with them.
+    /// Changes to the runs' configurations beyond their specifications, by run; used by benches to try options.
     pub changes: Vec<fn(&mut EstimatorConfig)>,
-    /// One report in so many frames keeps its linearization for whoever wants covariances; `None` keeps none.
+    /// One report in this many frames keeps its linearization, from which covariances are computed; `None` keeps none.
     pub keep_linearization_every: Option<usize>,
-    /// How much memory record and histories may take, in bytes: beyond it, only summaries of steps are kept, and steps at
-    /// the cursor are recomputed.
+    /// Memory budget of record and histories in bytes. Beyond it, only summaries of steps are kept, and steps at the
+    /// cursor are recomputed.
     pub memory_budget_bytes: usize,
 }
 
-/// Memory for record and histories with which the whole process of a played log stays under 1.5 GiB.
+/// Memory budget with which the whole process stays below 1.5 GiB while a log is played.
 pub const DEFAULT_MEMORY_BUDGET_BYTES: usize = 1200 << 20;
 
 impl SessionPlan {
@@ -152,14 +152,14 @@ impl SessionPlan {
 /// The cameras of a run.
 #[derive(Clone, Debug)]
 pub(in crate::session) struct WatchedCameras<'rig> {
-    /// The one whose image is shown.
+    /// The camera whose image is shown.
     pub(in crate::session) main: &'rig CameraRig,
-    /// The rigid one beside it.
+    /// The second, rigid camera.
     pub(in crate::session) rigid: Option<&'rig CameraRig>,
 }
 
 impl<'rig> WatchedCameras<'rig> {
-    /// The main camera, then the other.
+    /// The main camera, then the rigid one.
     pub(in crate::session) fn iter(&self) -> impl Iterator<Item = &'rig CameraRig> {
         std::iter::once(self.main).chain(self.rigid)
     }

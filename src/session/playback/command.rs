@@ -1,92 +1,93 @@
 use crate::session::breakpoints::Condition;
 use crate::session::plan::{ForkChanges, RunSpec};
 
-/// How fast the cursor moves, in log seconds per second.
+/// Speed of playback, in log seconds per second of the wall clock.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlaybackSpeed(pub f64);
 
 /// A command from a button, a key or the command line; applied between two frames of the window, in one place.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Command {
-    /// Start playing.
+    /// Start playback.
     Play,
-    /// Pause.
+    /// Pause playback.
     Pause,
-    /// Play when paused, pause when playing.
+    /// Toggle between playback and pause.
     TogglePlay,
-    /// Change the speed.
+    /// Set the speed of playback.
     SetSpeed(PlaybackSpeed),
-    /// Put the cursor at a time since the log began.
+    /// Move the cursor to a stamp.
     Seek {
-        /// Target, in nanoseconds.
+        /// Target, in nanoseconds since the log began.
         stamp_ns: i64,
     },
-    /// Move the cursor by whole frames, backwards when negative.
+    /// Move the cursor by this number of frames, backwards when negative.
     StepFrames(i64),
-    /// Show the step at the cursor one iteration of its solver further, or back; beyond its ends, the neighbouring steps.
+    /// Show the step at the cursor one solver iteration later or earlier; beyond its first or last iteration, the
+    /// neighbouring step.
     StepIteration {
-        /// Direction.
+        /// Later (`true`) or earlier.
         forward: bool,
     },
     /// Move the cursor to the next event (`forward`) or the previous one.
     JumpToEvent {
-        /// Direction.
+        /// Next (`true`) or previous.
         forward: bool,
     },
-    /// Set a breakpoint.
+    /// Add a breakpoint.
     AddBreakpoint(Condition),
-    /// Give a breakpoint another condition.
+    /// Replace the condition of a breakpoint.
     ChangeBreakpoint {
-        /// Its number.
+        /// Index of the breakpoint.
         number: usize,
         /// The new condition.
         condition: Condition,
     },
     /// Enable or disable a breakpoint.
     EnableBreakpoint {
-        /// Its number.
+        /// Index of the breakpoint.
         number: usize,
         /// Whether it stops the cursor.
         enabled: bool,
     },
-    /// Remove a breakpoint, by its number.
+    /// Remove a breakpoint by its index.
     RemoveBreakpoint(usize),
-    /// Set a breakpoint at the frame of the cursor, or remove it.
+    /// Add a breakpoint at the frame of the cursor, or remove it.
     ToggleBreakpointHere,
-    /// Run to the next (`forward`) or the previous hit of a breakpoint; forward waits for the estimators.
+    /// Run to the next or previous hit of a breakpoint; forward, it waits for the estimators.
     RunToBreakpoint {
-        /// Direction.
+        /// Next (`true`) or previous.
         forward: bool,
     },
-    /// To the first frame.
+    /// Move the cursor to the first frame.
     GoToStart,
-    /// To the last computed frame.
+    /// Move the cursor to the last computed frame.
     GoToEnd,
-    /// Play a range in a loop; `None` ends it.
+    /// Play a range of stamps in a loop; `None` ends the loop.
     SetLoop(Option<(i64, i64)>),
-    /// Set or clear a marker at the cursor.
+    /// Add or remove a marker at the cursor.
     ToggleMarker,
-    /// Add a run over the same log.
+    /// Add a run on the same log.
     AddRun(RunSpec),
-    /// Fork a run: continue it from the step at the cursor with changes, beside the run itself.
+    /// Fork a run: a new run continues it from the step at the cursor with changes.
     Fork {
-        /// Number of the run.
+        /// Index of the parent run.
         run: usize,
-        /// What changes.
+        /// The changes against the parent.
         changes: ForkChanges,
-        /// The fork's name; `None` for one made of changes and time.
+        /// Label of the fork; `None` derives it from the changes and the stamp.
         label: Option<String>,
     },
-    /// Remove a run, by its number.
+    /// Remove a run by its index.
     RemoveRun(usize),
-    /// Recompute the linearized rows of a step's factors; they come into `RunRecord::factor_rows` and stay requested
-    /// while the cursor is at the step.
+    /// Recompute the linearized rows of a step's factors. They are stored in `RunRecord::factor_rows` and stay
+    /// requested while the cursor is at the step.
     RequestFactorRows {
-        /// Number of the run.
+        /// Index of the run.
         run: usize,
-        /// Number of the step.
+        /// Index of the step.
         step: usize,
     },
-    /// Set how much memory the recording may take, in bytes.
+    /// Set the memory budget of the recording in bytes.
     SetMemoryBudget(usize),
 }

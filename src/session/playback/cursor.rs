@@ -5,42 +5,42 @@ use crate::geometry::ns_from_seconds;
 use crate::session::breakpoints::{Breakpoints, Hit};
 use crate::session::record::{Recording, SolverPosition, StepRecord};
 
-/// Where playback stands and how it goes on.
+/// Position and state of playback.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cursor {
-    /// Position in nanoseconds since the log began.
+    /// Position, in nanoseconds since the log began.
     pub stamp_ns: i64,
-    /// Whether it plays.
+    /// Whether playback runs.
     pub playing: bool,
-    /// How fast it plays.
+    /// Speed of playback.
     pub speed: PlaybackSpeed,
-    /// Start and end of the range that is played in a loop.
+    /// Start and end of the loop range, in nanoseconds since the log began.
     pub loop_range_ns: Option<(i64, i64)>,
-    /// The solver's iteration at which the step is shown, `None` for the converged step.
+    /// The solver iteration at which the step is shown, `None` for the converged step.
     pub solver: Option<SolverPosition>,
     /// Whether it runs to a breakpoint that the estimators have not reached yet.
     pub running_to_breakpoint: bool,
 }
 
-/// What a move of the cursor came to, where that is worth a message.
+/// The outcome of a move of the cursor that needs a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MoveOutcome {
-    /// It stopped at a breakpoint.
+    /// The cursor stopped at a breakpoint.
     Hit(Hit),
-    /// There is no enabled breakpoint to run to.
+    /// No breakpoint is enabled.
     NoBreakpoint,
-    /// No breakpoint was hit before the cursor.
+    /// There is no hit before the cursor.
     NoHitBefore,
-    /// No breakpoint is hit after the cursor, in the whole log.
+    /// There is no hit after the cursor in the whole log.
     NoHitAfter,
-    /// It ran to the end of the log without a hit.
+    /// The cursor reached the end of the log without a hit.
     NoHitToEnd,
     /// The speed is not a positive number.
     BadSpeed,
 }
 
 impl MoveOutcome {
-    /// The message for a person.
+    /// The text of the message.
     pub fn message(self, recording: &Recording, breakpoints: &Breakpoints) -> String {
         match self {
             Self::Hit(hit) => format!("Breakpoint {}", breakpoints.describe(recording, hit)),
@@ -53,7 +53,7 @@ impl MoveOutcome {
     }
 }
 
-/// A moved cursor and what the move came to.
+/// A moved cursor and the outcome of the move.
 pub type Moved = (Cursor, Option<MoveOutcome>);
 
 impl Cursor {
@@ -93,7 +93,7 @@ impl Cursor {
             }
             _ => return None,
         };
-        // Whatever else is asked for ends a run to a breakpoint.
+        // Any other command cancels a run to a breakpoint.
         cursor.running_to_breakpoint &= matches!(command, Command::RunToBreakpoint { .. });
         if cursor.stamp_ns != self.stamp_ns && !matches!(command, Command::StepIteration { .. }) {
             cursor.solver = None;
@@ -101,8 +101,8 @@ impl Cursor {
         Some((cursor, outcome))
     }
 
-    /// The cursor after `elapsed_s` seconds of the wall clock: it waits where nothing is computed yet, restarts in a loop,
-    /// and stops at breakpoints and at the end.
+    /// The cursor after `elapsed_s` seconds of the wall clock. It waits at the last computed step, jumps back at the
+    /// end of a loop, and stops at breakpoints and at the end of the log.
     pub fn advance(&self, recording: &Recording, breakpoints: &Breakpoints, elapsed_s: f64) -> Moved {
         let (mut cursor, outcome) = if self.running_to_breakpoint {
             self.run_on(recording, breakpoints)
@@ -121,7 +121,7 @@ impl Cursor {
         (cursor, outcome)
     }
 
-    /// At a position, as far as steps are computed.
+    /// The cursor at a position, limited to the computed steps.
     pub fn seek(&self, recording: &Recording, stamp_ns: i64) -> Self {
         let last_ns = recording.last_stamp_ns();
         let first_ns = recording.first_stamp_ns().min(last_ns);
@@ -153,7 +153,7 @@ impl Cursor {
         cursor
     }
 
-    /// By whole frames of all runs, each stamp once.
+    /// Moves by frames of all runs; equal stamps count once.
     fn step_frames(&self, recording: &Recording, count: i64) -> Self {
         self.step_over(&stamps_ns(recording, |_| true), count)
     }
@@ -163,8 +163,8 @@ impl Cursor {
         self.step_over(&stamps_ns(recording, notable), if forward { 1 } else { -1 })
     }
 
-    /// To the stamp `count` places after the cursor (before it when negative), or the outermost one; stays where there is
-    /// none in that direction.
+    /// Moves to the stamp `count` places after the cursor (before it when negative), or to the last one in that
+    /// direction; stays where there is none.
     fn step_over(&self, stamps_ns: &[i64], count: i64) -> Self {
         let places = usize::try_from(count.unsigned_abs()).unwrap_or(usize::MAX);
         let target = if count >= 0 {
@@ -178,7 +178,7 @@ impl Cursor {
         Self { stamp_ns: target.unwrap_or(self.stamp_ns), ..*self }
     }
 
-    /// One iteration of the solver further or back in the step at the cursor, and on to the neighbouring steps.
+    /// Moves by one solver iteration in the step at the cursor, and on to the neighbouring steps.
     fn step_iteration(&self, recording: &Recording, forward: bool) -> Self {
         let steps = recording.runs.iter().filter_map(|run| run.steps.get(run.index_at(self.stamp_ns)?));
         let iterations = steps.map(|step| step.report.iterations.len()).max().unwrap_or(0);
@@ -194,7 +194,7 @@ impl Cursor {
         Self { solver: Some(end), ..beside }
     }
 
-    /// To the next or the previous hit; forward, it keeps running while none is computed yet.
+    /// Moves to the next or previous hit; forward, it keeps running while none is computed yet.
     fn run_to_breakpoint(&self, recording: &Recording, breakpoints: &Breakpoints, forward: bool) -> Moved {
         if !breakpoints.list().iter().any(|breakpoint| breakpoint.enabled) {
             return (*self, Some(MoveOutcome::NoBreakpoint));
@@ -212,7 +212,7 @@ impl Cursor {
         }
     }
 
-    /// Goes on to where the estimators are, until a breakpoint is hit or the log ends.
+    /// Follows the estimators until a breakpoint is hit or the log ends.
     fn run_on(&self, recording: &Recording, breakpoints: &Breakpoints) -> Moved {
         if let Some(hit) = breakpoints.next_after(recording, self.stamp_ns) {
             return self.stop_at(hit);
@@ -231,7 +231,7 @@ impl Cursor {
     }
 }
 
-/// Stamps of the steps of all runs that pass the filter, in order, each once.
+/// Stamps of the steps of all runs that pass the filter, in ascending order without duplicates.
 fn stamps_ns(recording: &Recording, wanted: impl Fn(&StepRecord) -> bool) -> Vec<i64> {
     let steps = recording.runs.iter().flat_map(|run| run.steps.iter());
     let mut stamps_ns: Vec<i64> = steps.filter(|step| wanted(step)).map(|step| step.report.stamp_ns).collect();
@@ -246,7 +246,7 @@ mod tests {
     use crate::session::tests::memory::recorded;
     use crate::simulation::{SyntheticOptions, synthetic_tracks};
 
-    /// A run over four seconds of a synthetic flight; no thread computes it.
+    /// A run over four seconds of a synthetic flight, computed without threads.
     fn sample() -> &'static Recording {
         static SAMPLE: std::sync::OnceLock<Recording> = std::sync::OnceLock::new();
         SAMPLE.get_or_init(|| {
@@ -296,7 +296,7 @@ mod tests {
         assert_eq!(after(at_start, &Command::Seek { stamp_ns: i64::MAX }).stamp_ns, last);
         let playing = after(at_start, &Command::Play);
         assert!(playing.playing && !after(playing, &Command::StepFrames(1)).playing);
-        // Commands that concern something else leave it to the session.
+        // Other commands are left to the session.
         assert_eq!(at_start.apply(&Command::ToggleMarker, sample(), &Breakpoints::default()), None);
     }
 
@@ -314,7 +314,7 @@ mod tests {
         let looped = after(playing, &Command::SetLoop(Some((stamps[2], stamps[8]))));
         let (again, _) = looped.advance(sample(), &none, 100.0);
         assert_eq!((again.stamp_ns, again.playing), (stamps[2], true));
-        // A paused cursor does not move, and where nothing more is computed, a playing one waits.
+        // A paused cursor does not move, and a playing one waits for computed steps.
         assert_eq!(Cursor::new(first).advance(sample(), &none, 1.0), (Cursor::new(first), None));
         let mut growing = sample().clone();
         growing.runs[0].finished = false;
@@ -356,7 +356,7 @@ mod tests {
         let none = start.apply(&Command::RunToBreakpoint { forward: true }, sample(), &Breakpoints::default());
         assert_eq!(none, Some((start, Some(MoveOutcome::NoBreakpoint))));
 
-        // While nothing is hit yet it follows the estimators, until another command or the end.
+        // Without a hit it follows the estimators until another command or the end of the log.
         let mut growing = sample().clone();
         growing.runs[0].finished = false;
         let (running, outcome) = run(stopped.0, &growing, true);

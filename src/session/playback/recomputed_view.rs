@@ -1,4 +1,4 @@
-//! What the session has recomputed for the view at the cursor.
+//! Recomputation of steps for the view at the cursor.
 
 use std::sync::Arc;
 
@@ -7,11 +7,11 @@ use crate::session::engine::{Detail, RecomputeRequest, STEPS_AT_ONCE};
 use crate::session::record::RunRecord;
 
 impl Session {
-    /// Waits until everything that the view at the cursor needs is in the record.
+    /// Waits until the record has everything that the view at the cursor needs.
     pub fn settle(&self) {
         self.request_recomputation();
         self.recompute.settle();
-        // A state of the solver that has been requested meanwhile is shown from here on.
+        // A solver state that was requested meanwhile is shown from here on.
         self.request_recomputation();
     }
 
@@ -24,8 +24,8 @@ impl Session {
         self.factor_rows = self.recording().runs.get(run).map(|run| FactorRowsView { run: run.id, step });
     }
 
-    /// Requests what the view at the cursor needs and the record lacks, and removes solver states that are not shown any
-    /// more.
+    /// Requests the data that the view at the cursor needs and the record lacks, and removes solver states that are no
+    /// longer shown.
     pub(super) fn request_recomputation(&self) {
         let computation = self.computation();
         let cursor = self.cursor;
@@ -42,7 +42,7 @@ impl Session {
                 prefetch,
             };
             if run.lacks(step) {
-                // Playing needs the next steps too, and all of them take no longer than the last.
+                // Playback also needs the next steps; recomputing all of them takes no longer than the last one.
                 let end = step + if cursor.playing { STEPS_AT_ONCE } else { 1 };
                 let last = (step..end).take_while(|step| run.lacks(*step)).last().unwrap_or(step);
                 requests.push(request(last, Detail::Step, false));
@@ -56,7 +56,7 @@ impl Session {
             if rows.is_some() && run.factor_rows.as_ref().is_none_or(|rows| rows.step != step) {
                 requests.push(request(step, Detail::FactorRows, false));
             }
-            // People step back: the steps before are recomputed while they look.
+            // Users step back: the steps before the cursor are prefetched.
             let before = (step.saturating_sub(STEPS_AT_ONCE)..step).rev().find(|step| run.lacks(*step));
             if let Some(before) = before.filter(|_| !cursor.playing) {
                 prefetched.push(request(before, Detail::Step, true));
@@ -72,7 +72,7 @@ impl Session {
             }
         };
         let stale = computation.recording().runs.iter().any(is_stale);
-        // Not held on to while the record changes, which would copy it.
+        // Released before the record changes, which would copy it otherwise.
         drop(computation);
         if stale {
             self.shared.change(|computation| {

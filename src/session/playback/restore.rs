@@ -1,4 +1,4 @@
-//! Sessions saved and opened again.
+//! Saving and restoring sessions.
 
 use std::path::PathBuf;
 
@@ -8,8 +8,8 @@ use crate::session::breakpoints::Condition;
 use crate::session::plan::{ForkChanges, SessionPlan};
 
 impl SavedSession {
-    /// Opens the log and starts the runs; forks are made as their parents reach the first own step, and the cursor is put at
-    /// its position as soon as all runs have reached it.
+    /// Opens the log and starts the runs. Forks are started when their parents reach the fork's first step, and the
+    /// cursor is set to its position when all runs have reached it.
     pub fn open(&self) -> Result<Session, SavedSessionError> {
         let plan = SessionPlan::open(&self.request()?)?;
         let conditions: Result<Vec<Condition>, _> = self.breakpoints.iter().map(|it| it.condition.parse()).collect();
@@ -76,7 +76,7 @@ impl Session {
         }
     }
 
-    /// Waits until all runs are computed, all forks of a saved session are made, and the cursor is at its position.
+    /// Waits until all runs are computed, all forks of a saved session are started, and the cursor is at its position.
     pub fn finish(&mut self) {
         /// Period of the check, in milliseconds.
         const CHECK_MS: u64 = 5;
@@ -91,12 +91,12 @@ impl Session {
         self.advance(0.0);
     }
 
-    /// The layout of the panels when the session was saved.
+    /// The panel layout of the saved session.
     pub fn layout(&self) -> Option<&serde_json::Value> {
         self.layout.as_ref()
     }
 
-    /// Makes the forks whose parents have reached them, and puts the cursor at its saved position.
+    /// Starts the forks whose parents have reached their first step, and sets the cursor to its saved position.
     pub(in crate::session) fn resume(&mut self) {
         let recording = self.recording();
         if let Some((fork, changes)) = self.pending.forks.first().cloned() {
@@ -156,7 +156,7 @@ mod tests {
 
     #[test]
     fn a_session_comes_back_as_it_was_saved() {
-        // More steps than are spared when memory runs short.
+        // More steps than are always kept complete.
         let mut session = Session::start(garden(4.5)).unwrap();
         settled(&mut session);
         session.apply(Command::AddBreakpoint("features < 40".parse().unwrap()));
@@ -181,7 +181,7 @@ mod tests {
         assert_eq!(again.saved(Some(layout)), saved);
         let (before, after) = (session.recording(), again.recording());
         assert_eq!(before.runs.len(), after.runs.len());
-        // With less memory older steps become summaries at once.
+        // A smaller memory budget summarizes older steps at once.
         assert!(after.runs.iter().all(|run| run.memory.summaries == 0));
         again.apply(Command::SetMemoryBudget(1 << 20));
         let thin = again.recording();

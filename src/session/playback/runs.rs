@@ -1,4 +1,4 @@
-//! Runs and forks that a session adds and removes while it plays.
+//! Adding and removing runs and forks during playback.
 
 use std::sync::Arc;
 
@@ -25,7 +25,7 @@ impl Session {
         self.engine.start_runs(&self.plan, &self.computation(), &[self.plan.runs.len() - 1])
     }
 
-    /// Forks a run at a time: the step there is the fork's first own one.
+    /// Forks a run at a stamp: the step there is the fork's first own step.
     pub(super) fn fork_at(
         &mut self,
         run: usize,
@@ -48,7 +48,7 @@ impl Session {
         let fork = RunRecord::fork(parent, spec.clone(), step, changes.clone());
         let history = Arc::new(History::fork(history, step, self.plan.memory_budget_bytes));
         self.plan.runs.push((spec, fork.camera_key.clone()));
-        // Not held on to while the record changes, which would copy it.
+        // Released before the record changes, which would copy it otherwise.
         drop(computation);
         self.shared.change(|computation| computation.add_run(fork, Arc::clone(&history)));
         let number = self.plan.runs.len() - 1;
@@ -60,14 +60,14 @@ impl Session {
         if count > MAX_RUNS { Err(SessionError::TooManyRuns { count }) } else { Ok(()) }
     }
 
-    /// The specification with a label that differs from those of all runs.
+    /// The specification with a label that no run has.
     fn distinct(&self, spec: RunSpec) -> RunSpec {
         let mut specs: Vec<RunSpec> = self.plan.runs.iter().map(|(spec, _)| spec.clone()).chain([spec]).collect();
         distinct_labels(&mut specs);
         specs.swap_remove(specs.len() - 1)
     }
 
-    /// Removes the last run; an earlier one keeps its number, so only the last can be removed.
+    /// Removes the last run. An earlier run cannot be removed, because the indices of the others would change.
     pub(super) fn remove_run(&mut self, run: usize) {
         let last = self.plan.runs.len().saturating_sub(1);
         let finished = self.recording().runs.get(run).is_some_and(|run| run.finished);

@@ -1,6 +1,6 @@
-//! A session as a file: what was opened, the runs and forks, breakpoints, markers and where the cursor stood.
+//! A session as a file: paths, runs, forks, breakpoints, markers and the position of the cursor.
 //!
-//! Results are not kept: they are computed anew, to the same bits.
+//! Results are not stored: they are recomputed to the same bits.
 
 use std::path::PathBuf;
 
@@ -9,28 +9,28 @@ use thiserror::Error;
 
 use crate::session::plan::{ForkChanges, RunSpec, SessionError, SessionRequest};
 
-/// The format that this program writes.
+/// The version of the format that this program writes.
 pub(super) const VERSION: u32 = 1;
 
-/// Why a text is not a saved session, or its session cannot be opened.
+/// The reason why a text is not a saved session, or its session cannot be opened.
 #[derive(Debug, Error)]
 pub enum SavedSessionError {
-    /// It is not in the format of a session.
+    /// The text does not have the format of a session.
     #[error("this is no saved session: {problem}")]
     NoSession {
-        /// What is wrong with it.
+        /// The problem.
         problem: String,
     },
-    /// A later version of the program has written it.
+    /// The file was written by a later version of the program.
     #[error("the session has version {found}, this program reads {VERSION}: open it with the program that saved it")]
     Version {
-        /// Its version.
+        /// Version of the file's format.
         found: u32,
     },
     /// A run, a fork or a breakpoint in it cannot be parsed.
     #[error("in the saved session: {problem}")]
     Part {
-        /// What is wrong with it.
+        /// The problem.
         problem: String,
     },
     /// The log cannot be opened.
@@ -38,31 +38,31 @@ pub enum SavedSessionError {
     Session(#[from] SessionError),
 }
 
-/// A session, written as JSON.
+/// A session as it is written to JSON.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SavedSession {
     /// Version of the format.
     pub session_version: u32,
-    /// The log.
+    /// The log, with a checksum to recognize it.
     pub log: SavedLog,
-    /// The rig, when it was named.
+    /// Path of the rig file, when it was given.
     pub rig: Option<PathBuf>,
-    /// The ground truth, when it was named.
+    /// Path of the ground-truth rig file, when it was given.
     #[serde(rename = "truth")]
     pub ground_truth: Option<PathBuf>,
-    /// Seconds left out at the start.
+    /// Seconds to skip at the start of the log.
     pub start_s: f64,
-    /// Seconds read.
+    /// Seconds to read from there, `None` for the rest of the log.
     pub duration_s: Option<f64>,
-    /// The runs that are not forks, as on the command line.
+    /// Specifications of the runs that are not forks, as on the command line.
     pub runs: Vec<String>,
     /// The forks, each after its parent.
     pub forks: Vec<SavedFork>,
-    /// The breakpoints.
+    /// Conditions of the breakpoints.
     pub breakpoints: Vec<SavedBreakpoint>,
-    /// Marked stamps since the log began.
+    /// Stamps of the markers, in nanoseconds since the log began.
     pub markers_ns: Vec<i64>,
-    /// Position of the cursor.
+    /// Position of the cursor, in nanoseconds since the log began.
     pub cursor_ns: i64,
     /// The layout of the panels, in the window's own format.
     pub layout: Option<serde_json::Value>,
@@ -71,33 +71,33 @@ pub struct SavedSession {
 /// A log with its size and checksum.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SavedLog {
-    /// Its path.
+    /// Path of the log.
     pub path: PathBuf,
-    /// Its size.
+    /// Size of the file in bytes.
     pub bytes: u64,
-    /// Checksum of its first and last mebibyte.
+    /// CRC-32 of its first and last mebibyte.
     pub crc32: u32,
 }
 
-/// A fork.
+/// A fork of a saved session.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SavedFork {
-    /// Name of the parent run.
+    /// Label of the parent run.
     pub parent: String,
-    /// Its own name.
+    /// Label of the fork.
     pub name: String,
-    /// Stamp of its first own step since the log began.
+    /// Stamp of its first own step, in nanoseconds since the log began.
     pub stamp_ns: i64,
-    /// What it changes, as [`ForkChanges`] writes it.
+    /// The changes against the parent, as [`ForkChanges`] writes them.
     pub changes: String,
 }
 
-/// A breakpoint.
+/// A breakpoint of a saved session.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SavedBreakpoint {
-    /// Its condition.
+    /// The text of its condition.
     pub condition: String,
-    /// Whether it is enabled.
+    /// Whether the cursor stops at its hits.
     pub enabled: bool,
 }
 
@@ -113,14 +113,14 @@ impl SavedSession {
         serde_json::from_value(value).map_err(no_session)
     }
 
-    /// The session as JSON.
+    /// The session as indented JSON.
     pub fn to_text(&self) -> String {
         let mut text = serde_json::to_string_pretty(self).unwrap_or_default();
         text.push('\n');
         text
     }
 
-    /// What to open for it.
+    /// The request that opens its log and runs.
     pub fn request(&self) -> Result<SessionRequest, SavedSessionError> {
         let specs: Result<Vec<RunSpec>, _> = self.runs.iter().map(|run| run.parse()).collect();
         Ok(SessionRequest {
@@ -139,7 +139,7 @@ pub(super) fn part(error: impl ToString) -> SavedSessionError {
     SavedSessionError::Part { problem: error.to_string() }
 }
 
-/// What a session that was opened from a file still has to do, once the runs have reached it.
+/// The forks and the cursor position of a saved session that are still to be restored.
 #[derive(Clone, Debug, Default)]
 pub(in crate::session) struct Pending {
     pub(in crate::session) forks: Vec<(SavedFork, ForkChanges)>,

@@ -1,4 +1,4 @@
-//! A session that plays: a cursor over what the threads have computed so far.
+//! A session with playback: a cursor over the results that the threads have computed so far.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -20,14 +20,14 @@ use crate::session::record::{Recording, SolverPosition};
 pub(super) struct FactorRowsView {
     /// [`RunRecord::id`](crate::session::RunRecord::id).
     pub(super) run: u64,
-    /// Number of the step.
+    /// Index of the step.
     pub(super) step: usize,
 }
 
-/// A log with its runs, computed on threads of their own, and a cursor that plays over the results.
+/// A log with its runs, computed on their own threads, and a cursor over the results.
 ///
-/// It connects three things and decides nothing itself: the [`Cursor`], a plain value; the engine, which computes and
-/// recomputes steps; and the record that both look at. Nothing here waits for the estimators.
+/// It connects three things: the [`Cursor`], a plain value; the engine, which computes and recomputes steps; and the
+/// record that both read. No method except those that say so waits for the estimators.
 #[derive(Debug)]
 pub struct Session {
     pub(super) plan: SessionPlan,
@@ -39,9 +39,9 @@ pub struct Session {
     pub(super) markers_ns: Vec<i64>,
     /// The step whose factor rows are shown.
     pub(super) factor_rows: Option<FactorRowsView>,
-    /// What is still to be done of a session that was opened from a file.
+    /// The forks and cursor position of a saved session that are still to be restored.
     pub(super) pending: Pending,
-    /// Where the panels were when it was saved.
+    /// The panel layout of the saved session.
     pub(super) layout: Option<serde_json::Value>,
     pub(super) notices: Vec<String>,
     images: ImageReader,
@@ -77,22 +77,22 @@ impl Session {
         })
     }
 
-    /// The reports so far; cheap.
+    /// The reports so far; a cheap copy.
     pub fn recording(&self) -> Arc<Recording> {
         self.shared.recording()
     }
 
-    /// The reports so far with what recomputes them; cheap.
+    /// The reports so far with the histories to recompute them; a cheap copy.
     pub fn computation(&self) -> Computation {
         self.shared.computation()
     }
 
-    /// Changes with everything that is computed.
+    /// A counter that grows with every computed step and every change of the record.
     pub fn generation(&self) -> u64 {
         self.shared.generation()
     }
 
-    /// How much memory record and histories take, in bytes.
+    /// Memory of record and histories in bytes.
     pub fn memory_bytes(&self) -> usize {
         self.recording().memory_bytes()
     }
@@ -112,17 +112,17 @@ impl Session {
         self.cursor.stamp_ns
     }
 
-    /// Whether the cursor plays.
+    /// Whether playback runs.
     pub fn is_playing(&self) -> bool {
         self.cursor.playing
     }
 
-    /// How fast the cursor plays.
+    /// Speed of playback.
     pub fn speed(&self) -> PlaybackSpeed {
         self.cursor.speed
     }
 
-    /// Start and end of the range that is played in a loop, in nanoseconds since the log began.
+    /// Start and end of the loop range, in nanoseconds since the log began.
     pub fn loop_range_ns(&self) -> Option<(i64, i64)> {
         self.cursor.loop_range_ns
     }
@@ -132,12 +132,12 @@ impl Session {
         self.cursor.running_to_breakpoint
     }
 
-    /// The solver's iteration at which the step at the cursor is shown, `None` for the converged step.
+    /// The solver iteration at which the step at the cursor is shown, `None` for the converged step.
     pub fn solver_position(&self) -> Option<SolverPosition> {
         self.cursor.solver
     }
 
-    /// Marked stamps, in time order.
+    /// Stamps of the markers, in ascending order.
     pub fn markers_ns(&self) -> &[i64] {
         &self.markers_ns
     }
@@ -147,12 +147,12 @@ impl Session {
         &self.breakpoints
     }
 
-    /// Messages about commands that could not be carried out, since the last call.
+    /// Messages about commands that failed, since the last call.
     pub fn take_notices(&mut self) -> Vec<String> {
         std::mem::take(&mut self.notices)
     }
 
-    /// An image of the log by camera and number in its stream, `None` when it is missing or not decodable.
+    /// An image of the log by camera and index in its stream, `None` when it is missing or cannot be decoded.
     pub fn image(&self, camera_key: &str, frame_index: usize) -> Option<Arc<GrayImage>> {
         self.images.image(camera_key, frame_index).ok()
     }
@@ -168,7 +168,7 @@ impl Session {
         self.request_recomputation();
     }
 
-    /// Carries out a command.
+    /// Executes a command.
     pub fn apply(&mut self, command: Command) {
         self.evaluate_breakpoints();
         let recording = self.recording();
@@ -186,9 +186,9 @@ impl Session {
         self.notices.extend(outcome.map(|outcome| outcome.message(recording, &self.breakpoints)));
     }
 
-    /// Carries out a command that does not concern the cursor.
+    /// Executes a command that does not concern the cursor.
     fn perform(&mut self, command: Command) {
-        // Rows that a panel requests while it draws end no run to a breakpoint.
+        // A panel may request factor rows while it draws; that does not cancel a run to a breakpoint.
         self.cursor.running_to_breakpoint &= matches!(command, Command::RequestFactorRows { .. });
         match command {
             Command::AddBreakpoint(condition) => self.change_breakpoints(|all| all.add(condition)),
@@ -226,7 +226,7 @@ impl Session {
         }
     }
 
-    /// Evaluates the breakpoints over the steps that are new.
+    /// Evaluates the breakpoints over the new steps.
     fn evaluate_breakpoints(&mut self) {
         let recording = self.recording();
         if self.breakpoints.is_behind(&recording) {
@@ -239,7 +239,7 @@ impl Session {
         self.evaluate_breakpoints();
     }
 
-    /// Sets a breakpoint at the frame of the cursor, or removes it.
+    /// Adds a breakpoint at the frame of the cursor, or removes it.
     fn toggle_breakpoint_here(&mut self) {
         let recording = self.recording();
         let here = recording.runs.iter().find_map(|run| run.step_at(self.cursor.stamp_ns));
@@ -261,7 +261,7 @@ impl Session {
 
 impl Drop for Session {
     fn drop(&mut self) {
-        // The collecting thread ends with the last thread that reports to it.
+        // The collector thread ends with the last thread that sends to it.
         self.engine = Engine::default();
         self.engine.no_more_runs();
         self.shared.join();

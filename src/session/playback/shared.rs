@@ -1,4 +1,4 @@
-//! The computation of a session, which grows on a collecting thread while others look at it.
+//! The computation of a session, shared between the collector thread and its readers.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::Receiver;
@@ -24,7 +24,7 @@ impl State {
     }
 }
 
-/// A computation behind a lock that is only held for the moment of a change or a copy.
+/// A computation behind a mutex that is locked only for a change or a copy.
 #[derive(Debug)]
 pub(super) struct SharedComputation {
     state: Arc<State>,
@@ -37,7 +37,7 @@ impl SharedComputation {
         Self { state: Arc::new(state), collector: None }
     }
 
-    /// Starts the thread that adds what the engine's threads report.
+    /// Starts the thread that stores the engine's messages.
     pub(super) fn collect(&mut self, messages: Option<Receiver<EngineMessage>>) -> Result<(), SessionError> {
         let state = Arc::clone(&self.state);
         let work = move || {
@@ -50,7 +50,7 @@ impl SharedComputation {
         Ok(())
     }
 
-    /// Adds what has been recomputed, for the thread that recomputes.
+    /// A function for the recompute thread that stores its results.
     pub(super) fn receiver_of_recomputed(&self) -> impl FnMut(&RecomputeRequest, Recomputed) + Send + 'static {
         let state = Arc::clone(&self.state);
         move |request, recomputed| state.change(|computation| computation.add_recomputed(request, recomputed))
@@ -64,7 +64,7 @@ impl SharedComputation {
         self.state.computation.lock().clone()
     }
 
-    /// Changes with every change.
+    /// A counter that grows with every change.
     pub(super) fn generation(&self) -> u64 {
         self.state.generation.load(Ordering::Acquire)
     }
@@ -73,7 +73,7 @@ impl SharedComputation {
         self.state.change(change);
     }
 
-    /// Waits for the end of the collecting thread.
+    /// Waits for the end of the collector thread.
     pub(super) fn join(&mut self) {
         if let Some(collector) = self.collector.take() {
             drop(collector.join());

@@ -1,4 +1,4 @@
-//! Two runs over the same log, frame by frame: their differences, and where they diverge.
+//! Comparison of two runs on the same log by frame: differences and first divergence.
 
 use std::collections::BTreeSet;
 
@@ -9,14 +9,14 @@ use super::step::StepRecord;
 use crate::estimator::{FrameStateReport, Phase};
 use crate::geometry::{RigidTransform, so3, wrap_angle};
 
-/// What two runs are compared in.
+/// A compared quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Quantity {
-    /// Whether they initialize or track; 1 where they differ.
+    /// Phase of the estimator, initializing or tracking; 1 where they differ.
     Phase,
-    /// Features that only one of them was given.
+    /// Number of features that only one of the runs received.
     Tracks,
-    /// Whether the frame is a keyframe; 1 where they differ.
+    /// Keyframe decision; 1 where they differ.
     Keyframe,
     /// Position of the newest frame.
     Position,
@@ -34,16 +34,16 @@ pub enum Quantity {
     ChainTranslation,
     /// Attitude of the camera on the IMU at the newest frame.
     ChainRotation,
-    /// Reprojection RMS.
+    /// Reprojection RMS after the solve.
     Reprojection,
-    /// Structural rank.
+    /// Structural rank of the calibration.
     RankStructural,
-    /// Informed rank.
+    /// Informed rank of the calibration.
     RankInformed,
 }
 
 impl Quantity {
-    /// All of them, in the order in which a difference usually spreads.
+    /// All quantities, in the order in which a difference usually spreads.
     pub const ALL: [Self; 14] = [
         Self::Phase,
         Self::Tracks,
@@ -61,8 +61,8 @@ impl Quantity {
         Self::RankInformed,
     ];
 
-    /// Its name, its unit as stored, and the threshold of a notable difference: a centimetre and a tenth of a degree for a
-    /// trajectory, a millimetre and the same angle for a calibration, and for biases what they change in a second.
+    /// Name, unit as stored, and threshold of a notable difference: 1 cm and 0.1° for a trajectory, 1 mm and 0.1° for a
+    /// calibration; for biases, the values that change the trajectory by as much within a second.
     const fn facts(self) -> (&'static str, &'static str, f64) {
         match self {
             Self::Phase => ("phase", "", 1.0),
@@ -82,12 +82,12 @@ impl Quantity {
         }
     }
 
-    /// Its name.
+    /// Name in tables and plots.
     pub const fn name(self) -> &'static str {
         self.facts().0
     }
 
-    /// Its unit, as stored; empty for counts.
+    /// Unit as stored; empty for counts.
     pub const fn unit(self) -> &'static str {
         self.facts().1
     }
@@ -97,8 +97,8 @@ impl Quantity {
         self.facts().2
     }
 
-    /// Difference of two steps of the same stamp, the second one's world rotated and translated by `gauge`
-    /// (`world_a_from_world_b`); `None` where one of them does not have the quantity.
+    /// Difference of two steps with the same stamp. The world of `b` is transformed by `gauge` (`world_a_from_world_b`)
+    /// first. Returns `None` where a step does not have the quantity.
     pub fn difference(self, a: &StepRecord, b: &StepRecord, gauge: &RigidTransform) -> Option<f64> {
         let frames = || Some((a.report.newest()?, b.report.newest()?));
         let flag = |differ: bool| Some(f64::from(u8::from(differ)));
@@ -147,7 +147,7 @@ impl Quantity {
         }
     }
 
-    /// Whether it can be compared between runs on different cameras.
+    /// Whether runs on different cameras can be compared in it.
     const fn is_of_the_vehicle(self) -> bool {
         !matches!(
             self,
@@ -156,7 +156,7 @@ impl Quantity {
     }
 }
 
-/// Angle between two attitudes; exactly nothing between equal ones.
+/// Angle between two attitudes in radians; exactly zero for equal ones.
 fn angle(a: &UnitQuaternion<f64>, b: &UnitQuaternion<f64>) -> f64 {
     if a == b { 0.0 } else { so3::log(&(a.inverse() * b)).norm() }
 }
@@ -175,39 +175,39 @@ fn tracks_apart(a: &StepRecord, b: &StepRecord) -> f64 {
     ids(a).symmetric_difference(&ids(b)).count() as f64
 }
 
-/// Where two runs diverge in one quantity.
+/// The divergence of two runs in one quantity.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Divergence {
-    /// Stamp of the first divergence: the numbers are not equal.
+    /// Stamp of the first difference: the values are not equal.
     pub exact_ns: Option<i64>,
-    /// Stamp of the first notable divergence: the difference reaches [`Quantity::notable`].
+    /// Stamp of the first notable difference: it reaches [`Quantity::notable`].
     pub notable_ns: Option<i64>,
     /// The largest difference and its stamp.
     pub largest: Option<(f64, i64)>,
 }
 
-/// A run compared with a reference, growing as they grow.
+/// A run compared with a reference run, updated as both are computed.
 ///
-/// At the first stamp at which both have a pose, the run's world is aligned with the reference's by yaw and position, the
-/// gauge freedom of visual-inertial odometry; a fork has its parent's world as it is.
+/// At the first stamp at which both have a pose, the run's world is aligned with the reference's by yaw and position,
+/// the gauge freedom of visual-inertial odometry. A fork shares its parent's world.
 #[derive(Clone, Debug, Default)]
 pub struct Comparison {
     runs: Option<(u64, u64)>,
     read: (usize, usize),
     gauge: Option<RigidTransform>,
     same_camera: bool,
-    /// Stamps that both have, since the log began.
+    /// Stamps that both runs have, in nanoseconds since the log began.
     pub stamps_ns: Vec<i64>,
-    /// Differences by the number of the quantity and the row; not-a-number where one run does not have it.
+    /// Differences by quantity and row; NaN where a run does not have the quantity.
     pub columns: [Vec<f64>; Quantity::ALL.len()],
-    /// Where they diverge, by the number of the quantity.
+    /// Divergences by quantity.
     pub divergences: [Divergence; Quantity::ALL.len()],
-    /// Changes when rows were dropped.
+    /// Changes when rows were removed.
     pub epoch: u64,
 }
 
 impl Comparison {
-    /// Reads the steps that are new since the last call; restarts with other runs.
+    /// Compares the steps that are new since the last call; restarts when a run was replaced.
     pub fn read(&mut self, reference: &RunRecord, run: &RunRecord) {
         let shrunk = self.read.0 > reference.steps.len() || self.read.1 > run.steps.len();
         if self.runs != Some((reference.id, run.id)) || shrunk {
@@ -240,7 +240,7 @@ impl Comparison {
             self.columns[index].push(apart.unwrap_or(f64::NAN));
             let Some(apart) = apart else { continue };
             let divergence = &mut self.divergences[index];
-            // Without the gauge, whose own rounding is no difference.
+            // Without the gauge transform, whose rounding errors are no difference between the runs.
             if divergence.exact_ns.is_none() {
                 let as_they_are = quantity.difference(a, b, &RigidTransform::default());
                 divergence.exact_ns = as_they_are.filter(|apart| *apart != 0.0).map(|_| stamp_ns);
@@ -254,7 +254,7 @@ impl Comparison {
         }
     }
 
-    /// The difference at the last common stamp at or before a time.
+    /// The difference at the last common stamp at or before `stamp_ns`.
     pub fn at(&self, quantity: Quantity, stamp_ns: i64) -> Option<f64> {
         let row = self.stamps_ns.partition_point(|stamp| *stamp <= stamp_ns).checked_sub(1)?;
         self.column(quantity).get(row).copied().filter(|apart| apart.is_finite())
@@ -265,17 +265,17 @@ impl Comparison {
         &self.columns[quantity as usize]
     }
 
-    /// Where the runs diverge in a quantity.
+    /// The divergence in a quantity.
     pub fn divergence(&self, quantity: Quantity) -> &Divergence {
         &self.divergences[quantity as usize]
     }
 
-    /// The first divergence in any quantity, with the quantity.
+    /// Stamp of the first difference in any quantity, and the quantity.
     pub fn first_exact(&self) -> Option<(i64, Quantity)> {
         self.first(|divergence| divergence.exact_ns)
     }
 
-    /// The first notable divergence in any quantity, with the quantity.
+    /// Stamp of the first notable difference in any quantity, and the quantity.
     pub fn first_notable(&self) -> Option<(i64, Quantity)> {
         self.first(|divergence| divergence.notable_ns)
     }
@@ -288,7 +288,8 @@ impl Comparison {
     }
 }
 
-/// The rotation about the vertical and the translation that align one pose with another; the identity for equal ones.
+/// The rotation about the vertical and the translation that align pose `from` with pose `onto`; the identity for equal
+/// poses.
 fn yaw_and_position(onto: &RigidTransform, from: &RigidTransform) -> RigidTransform {
     if onto == from {
         return RigidTransform::default();
@@ -333,7 +334,7 @@ mod tests {
         }
         other.id += 1;
         let mut comparison = Comparison::default();
-        // Read as they grow, the result is the same.
+        // The result is the same if the runs are read while they grow.
         let mut growing = other.clone();
         growing.steps.truncate(at + 3);
         comparison.read(&run, &growing);

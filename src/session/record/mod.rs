@@ -1,4 +1,4 @@
-//! Stored reports of every step of every run, and what follows from them without running an estimator.
+//! Stored reports of every step of every run, and values derived from them without running an estimator.
 
 mod comparison;
 mod recording;

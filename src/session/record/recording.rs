@@ -8,31 +8,31 @@ use crate::geometry::ns_from_seconds;
 use crate::sensors::Rig;
 use crate::session::plan::SessionPlan;
 
-/// The reports of all runs over one log so far.
+/// The reports of all runs on one log so far.
 #[derive(Clone, Debug)]
 pub struct Recording {
     /// Path of the log.
     pub log_path: PathBuf,
     /// The rig of the runs.
     pub rig: Arc<Rig>,
-    /// The rig with the ground truth, when known.
+    /// The ground-truth rig, when known.
     pub ground_truth_rig: Option<Arc<Rig>>,
     /// Length of the log in nanoseconds.
     pub duration_ns: i64,
-    /// Where the runs start, in nanoseconds since the log began.
+    /// Start of the runs, in nanoseconds since the log began.
     pub start_ns: i64,
-    /// Absolute header stamp of the log's start, in nanoseconds since the epoch.
+    /// Header stamp of the log's start, in nanoseconds since the Unix epoch.
     pub epoch_ns: i64,
-    /// Runs in the order they were asked for.
+    /// The runs in the order of the request; added runs and forks follow.
     pub runs: Vec<RunRecord>,
-    /// What is wrong with the log, as found so far.
+    /// Warnings about the log so far, in time order.
     pub warnings: Vec<LogWarning>,
-    /// How much memory it may take, in bytes.
+    /// Memory budget in bytes.
     pub memory_budget_bytes: usize,
 }
 
 impl Recording {
-    /// The runs of a plan before their first steps.
+    /// The runs of a plan before their first step.
     pub fn new(plan: &SessionPlan) -> Self {
         let mut recording = Self {
             log_path: plan.log_path.clone(),
@@ -49,8 +49,8 @@ impl Recording {
         recording
     }
 
-    /// Adds what is wrong with the log, each problem once and in time order: two cameras read the same log and find the
-    /// same problems, in an order that their threads decide.
+    /// Adds warnings about the log in time order without duplicates: two cameras read the same log and find the same
+    /// problems, in an order that depends on the scheduling of threads.
     pub(in crate::session) fn add_warnings(&mut self, warnings: Vec<LogWarning>) {
         for warning in warnings {
             let key = |known: &LogWarning| (known.stamp_ns, known.message.clone());
@@ -60,7 +60,7 @@ impl Recording {
         }
     }
 
-    /// Removes everything after a time.
+    /// Removes all steps and warnings after a stamp.
     pub(in crate::session) fn end_at(&mut self, stamp_ns: i64) {
         for run in &mut self.runs {
             run.end_at(stamp_ns);
@@ -68,7 +68,7 @@ impl Recording {
         self.warnings.retain(|warning| warning.stamp_ns <= stamp_ns);
     }
 
-    /// How much memory it takes, in bytes; tracks that runs share are counted once.
+    /// Memory in bytes; tracks that runs share are counted once.
     pub fn memory_bytes(&self) -> usize {
         let mut tracks: BTreeMap<&str, usize> = BTreeMap::new();
         for run in &self.runs {
@@ -78,19 +78,19 @@ impl Recording {
         tracks.values().sum::<usize>() + self.runs.iter().map(RunRecord::own_bytes).sum::<usize>()
     }
 
-    /// Stamp that every run has reached, in nanoseconds since the log began; the last stamp when all are finished.
+    /// The stamp that every run has reached, in nanoseconds since the log began; the last stamp when all are finished.
     pub fn computed_ns(&self) -> i64 {
         let reached = |run: &RunRecord| run.steps.last().map_or(0, |step| step.report.stamp_ns);
         self.runs.iter().filter(|run| !run.finished).map(reached).min().unwrap_or_else(|| self.last_stamp_ns())
     }
 
-    /// Stamp of the first step of any run; where the runs start, before there is one.
+    /// Stamp of the first step of any run; the start of the runs before there is one.
     pub fn first_stamp_ns(&self) -> i64 {
         let first = self.runs.iter().filter_map(|run| run.steps.first()).map(|step| step.report.stamp_ns).min();
         first.unwrap_or(self.start_ns)
     }
 
-    /// Whether no run has steps left to compute.
+    /// Whether all runs are finished.
     pub fn is_finished(&self) -> bool {
         self.runs.iter().all(|run| run.finished)
     }

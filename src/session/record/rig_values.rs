@@ -1,4 +1,4 @@
-//! A rig's values of the calibration parameters that a run estimates.
+//! The rig's values of the calibration parameters that a run estimates.
 
 use super::run::RunRecord;
 use crate::estimator::{CalibrationEstimate, rigid_columns};
@@ -6,11 +6,11 @@ use crate::gimbal::{Chain, NearestForm, ParameterId, Parameterization};
 use crate::sensors::Rig;
 
 impl RunRecord {
-    /// The rig's values of the calibration parameters of the run in the parameterization of an estimate; radians,
-    /// metres and seconds. `None` when the rig does not have the cameras.
+    /// The rig's values of the run's calibration parameters in the parameterization of `estimate`, in radians, metres
+    /// and seconds. Returns `None` when the rig does not have the cameras.
     ///
-    /// Of the equivalent values of the classical parameterization it takes those nearest to `given`, the rig that the run
-    /// started with: the run estimates near those.
+    /// The classical parameterization has several equivalent values; the result has those nearest to `given`, the rig
+    /// of the run's prior, because the run estimates near those.
     pub fn values_in(&self, rig: &Rig, given: &Rig, estimate: &CalibrationEstimate) -> Option<Vec<(ParameterId, f64)>> {
         let main = rig.chain_of_camera(&self.camera_key)?;
         let parameterization = estimate.parameterization.parse().ok()?;
@@ -28,9 +28,9 @@ impl RunRecord {
         Some(values)
     }
 
-    /// The conversion of mechanisms to a parameterization, with the values nearest to the rig's where several are
-    /// equivalent; the prior standard deviations of the estimate weigh them where it has that parameterization. `None` when
-    /// the rig does not have the camera.
+    /// The conversion of mechanisms to a parameterization. Of several equivalent values it returns those nearest to the
+    /// rig's, weighted by the estimate's prior standard deviations if these are in that parameterization. Returns
+    /// `None` when the rig does not have the camera.
     pub fn form_in(
         &self,
         given: &Rig,

@@ -1,4 +1,4 @@
-//! One run's record: its steps in time order and what follows from them.
+//! The record of one run: its steps in time order and values derived from them.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -12,69 +12,69 @@ use crate::geometry::RigidTransform;
 use crate::session::accuracy::{Alignment, AlignmentSums};
 use crate::session::plan::{ForkChanges, RunSpec};
 
-/// Recomputed steps of a run that are kept beside their summaries.
+/// Maximum number of recomputed steps that a run keeps beside their summaries.
 const MOST_RECOMPUTED: usize = 96;
 
-/// Number of the next run.
+/// Id of the next run.
 static NEXT_ID: AtomicU64 = AtomicU64::new(0);
 
-/// How much memory a run takes, in bytes.
+/// Memory of a run in bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RunMemory {
-    /// The steps without their tracks.
+    /// Steps without their tracks.
     pub own: usize,
-    /// The tracks, which runs on the same camera share.
+    /// Tracks, which runs on the same camera share.
     pub tracks: usize,
-    /// The step inputs and estimator snapshots that its steps are recomputed from.
+    /// Step inputs and estimator snapshots for recomputation.
     pub history: usize,
     /// Number of steps of which only the summary is kept.
     pub summaries: usize,
 }
 
-/// Where a fork has left its parent.
+/// The origin of a fork.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ForkOrigin {
     /// [`RunRecord::id`] of the parent.
     pub parent: u64,
-    /// Number of the first step that is the fork's own.
+    /// Index of the fork's first own step.
     pub step: usize,
-    /// Its stamp since the log began.
+    /// Stamp of that step, in nanoseconds since the log began.
     pub stamp_ns: i64,
-    /// What the fork changes.
+    /// The changes against the parent.
     pub changes: ForkChanges,
 }
 
-/// One run: an estimator over the log, and all its steps so far in time order.
+/// One run: an estimator on the log with all its steps so far, in time order.
 #[derive(Clone, Debug)]
 pub struct RunRecord {
-    /// The specification; its `label` is the run's name on screen.
+    /// The specification; its `label` is the run's name in the window.
     pub spec: RunSpec,
-    /// Key of the main camera (`cam0`): of two, the one whose image is shown.
+    /// Key of the main camera (`cam0`), whose image is shown.
     pub camera_key: String,
-    /// Steps in time order.
+    /// Steps in time order; some may be summaries.
     pub steps: Vec<Arc<StepRecord>>,
-    /// Whether the log's end has been reached.
+    /// Whether it has reached the end of the log, or has failed.
     pub finished: bool,
-    /// Why it ended early.
+    /// The reason of an early end.
     pub error: Option<String>,
-    /// `true_from_estimate`: the yaw and translation that align the estimated trajectory with the ground truth, `None`
-    /// until enough frames have ground truth.
+    /// `true_from_estimate`: the yaw rotation and translation that align the estimated trajectory with the ground
+    /// truth, `None` with too few frames.
     pub alignment: Option<RigidTransform>,
-    /// Sums over the frames with ground truth so far, from which `alignment` follows.
+    /// Running sums over the frames with ground truth, from which `alignment` is computed.
     pub alignment_sums: AlignmentSums,
-    /// Warnings of its steps.
+    /// Warnings of its steps, each message once.
     pub warnings: Vec<RunWarning>,
-    /// How much memory it takes.
+    /// Memory of its steps and its history.
     pub memory: RunMemory,
-    /// By number, recomputed steps of which only the summary is kept otherwise.
+    /// Complete steps by index, recomputed where `steps` has only the summary.
     pub recomputed: BTreeMap<usize, Arc<StepRecord>>,
-    /// The solver's states in the step at the cursor, while they are shown.
+    /// The solver states of the step at the cursor, while they are shown.
     pub trace: Option<SolverTrace>,
-    /// The factor rows that were requested last, of any step.
+    /// The factor rows of the last request, of any step.
     pub factor_rows: Option<StepFactorRows>,
-    /// Differs between all runs of the process.
+    /// Unique among all runs of the process.
     pub id: u64,
-    /// Where it comes from, for a fork.
+    /// The origin, for a fork.
     pub origin: Option<ForkOrigin>,
     summary_order: SummaryOrder,
 }
@@ -101,7 +101,7 @@ impl RunRecord {
         }
     }
 
-    /// A fork of another run before its first own step: the steps up to there are the parent's.
+    /// A fork before its first own step; the steps before are the parent's.
     pub(in crate::session) fn fork(parent: &Self, spec: RunSpec, step: usize, changes: ForkChanges) -> Self {
         let stamp_ns = parent.steps.get(step).map_or(0, |step| step.report.stamp_ns);
         let mut fork = Self::new(spec, parent.camera_key.clone());
@@ -114,7 +114,7 @@ impl RunRecord {
         fork
     }
 
-    /// Appends a step.
+    /// Appends a step and updates alignment and warnings.
     pub fn push(&mut self, record: StepRecord) {
         if let (Some(newest), Some(ground_truth)) = (record.report.newest(), &record.ground_truth) {
             self.alignment_sums.add(&newest.world_from_imu.translation_m, &ground_truth.translation_m);
@@ -126,7 +126,7 @@ impl RunRecord {
         self.steps.push(Arc::new(record));
     }
 
-    /// Removes the steps after a time, however far the run's thread was ahead of others.
+    /// Removes the steps after a stamp.
     pub(in crate::session) fn end_at(&mut self, stamp_ns: i64) {
         let count = self.steps.partition_point(|step| step.report.stamp_ns <= stamp_ns);
         if count == self.steps.len() {
@@ -141,7 +141,7 @@ impl RunRecord {
         self.align();
     }
 
-    /// Whether its last step is at a time or after it.
+    /// Whether its last step is at a stamp or after it.
     pub(in crate::session) fn ends_at(&self, stamp_ns: i64) -> bool {
         self.steps.last().is_some_and(|step| step.report.stamp_ns >= stamp_ns)
     }
@@ -157,29 +157,29 @@ impl RunRecord {
         self.alignment = self.alignment_sums.solve(Alignment::YawPosition).map(|transform| transform.rigid);
     }
 
-    /// Number of the last step at or before a time.
+    /// Index of the last step at or before a stamp.
     pub fn index_at(&self, stamp_ns: i64) -> Option<usize> {
         self.steps.partition_point(|step| step.report.stamp_ns <= stamp_ns).checked_sub(1)
     }
 
-    /// The last step at or before a time, as it is shown; see [`RunRecord::step`].
+    /// The last step at or before a stamp as it is shown; see [`RunRecord::step`].
     pub fn step_at(&self, stamp_ns: i64) -> Option<&Arc<StepRecord>> {
         self.step(self.index_at(stamp_ns)?)
     }
 
-    /// A step as it is shown: a state of its solver while those are shown, recomputed where only the summary is kept and
-    /// it has been recomputed.
+    /// A step as it is shown: a solver state if one is selected, else the recomputed step if `steps` has only the
+    /// summary.
     pub fn step(&self, number: usize) -> Option<&Arc<StepRecord>> {
         let traced = self.trace.as_ref().filter(|trace| trace.step == number).and_then(SolverTrace::shown);
         traced.or_else(|| self.recomputed.get(&number)).or_else(|| self.steps.get(number))
     }
 
-    /// Whether only the summary of a step is there.
+    /// Whether only the summary of a step is stored.
     pub(in crate::session) fn lacks(&self, number: usize) -> bool {
         self.steps.get(number).is_some_and(|step| step.summary_only) && !self.recomputed.contains_key(&number)
     }
 
-    /// Stores recomputed steps around `number` beside their summaries; beyond 96, the farthest from it are evicted.
+    /// Stores recomputed steps around step `number`; beyond [`MAX_RECOMPUTED`], the farthest from it are evicted.
     pub(in crate::session) fn add_recomputed(&mut self, number: usize, steps: Vec<(usize, StepRecord)>) {
         let summary_only = |step: usize| self.steps.get(step).is_some_and(|step| step.summary_only);
         let steps: Vec<_> = steps.into_iter().filter(|(step, _)| summary_only(*step)).collect();
@@ -192,14 +192,14 @@ impl RunRecord {
         }
     }
 
-    /// Bytes of its steps and of its history, without tracks that runs share.
+    /// Bytes of its steps and its history, without tracks that runs share.
     pub fn own_bytes(&self) -> usize {
         let recomputed = self.recomputed.values().chain(self.trace.iter().flat_map(|trace| &trace.records));
         self.memory.own + recomputed.map(|step| step.own_bytes()).sum::<usize>() + self.memory.history
     }
 
-    /// Replaces one more of its own steps, those from `begin` on, by its summary; `spacing` is the number of steps between
-    /// two estimator snapshots. Returns whether there was a step left.
+    /// Replaces one more of its own steps (from `begin` on) by its summary; `spacing` is the number of steps between
+    /// two estimator snapshots. Returns whether a step was left.
     pub(in crate::session) fn summarize_one(&mut self, begin: usize, spacing: usize) -> bool {
         while let Some(number) = self.summary_order.next(begin, self.steps.len(), spacing) {
             let step = &self.steps[number];

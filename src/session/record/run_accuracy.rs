@@ -7,21 +7,21 @@ use crate::session::accuracy::{
     Alignment, ErrorStatistics, RelativeDelta, StampedPose, absolute_errors_m, align, path_length_m, relative_errors,
 };
 
-/// Lengths of the sub-trajectories of the relative error, in metres.
+/// Path lengths of the relative errors, in metres.
 pub const RELATIVE_LENGTHS_M: [f64; 3] = [5.0, 10.0, 25.0];
 
-/// Errors of a trajectory, aligned with the ground truth by yaw and position.
+/// Errors of a trajectory that is aligned with the ground truth by yaw and position.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrajectoryAccuracy {
-    /// Length of the true path over the estimated frames, in metres.
+    /// Length of the ground-truth path over the estimated frames, in metres.
     pub length_m: f64,
-    /// Position errors in metres.
+    /// Absolute position errors in metres.
     pub absolute_m: ErrorStatistics,
-    /// Relative errors by the length of the sub-trajectories, where the path is long enough.
+    /// Relative errors by path length, for lengths that the trajectory has.
     pub relative: Vec<RelativeAccuracy>,
 }
 
-/// Relative errors over sub-trajectories of one length.
+/// Relative errors over sub-trajectories of one path length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RelativeAccuracy {
     /// Path length of a sub-trajectory in metres.
@@ -32,12 +32,12 @@ pub struct RelativeAccuracy {
     pub rotation_rad: ErrorStatistics,
 }
 
-/// Error of a chain against a reference over the joint angles of a run.
+/// Error of a chain against a reference chain over the joint angles of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ChainDistance {
-    /// Position errors of the camera in metres.
+    /// Errors of the camera position in metres.
     pub translation_m: ErrorStatistics,
-    /// Attitude errors of the camera in radians.
+    /// Errors of the camera attitude in radians.
     pub rotation_rad: ErrorStatistics,
 }
 
@@ -62,7 +62,7 @@ impl TrajectoryAccuracy {
 }
 
 impl RunRecord {
-    /// Estimated `world_from_imu` of each frame with its ground truth, where both are known.
+    /// Estimated and ground-truth `world_from_imu` of each frame that has both.
     pub fn pairs_with_ground_truth(&self) -> Vec<(StampedPose, StampedPose)> {
         self.steps
             .iter()

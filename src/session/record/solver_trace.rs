@@ -1,20 +1,20 @@
-//! The solver's states in one step.
+//! The states of the solver in one step.
 
 use std::sync::Arc;
 
 use super::step::StepRecord;
 
-/// The solver's iteration at which a step is shown.
+/// The solver iteration at which a step is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SolverPosition {
-    /// After so many iterations; 0 is before the first.
+    /// After this number of iterations; 0 is before the first.
     AfterFirst(usize),
-    /// So many iterations before the last; 0 is the step itself.
+    /// This number of iterations before the last; 0 is the converged step.
     BeforeLast(usize),
 }
 
 impl SolverPosition {
-    /// The number of iterations done, in a step of so many.
+    /// The number of completed iterations, in a step of `iterations`.
     pub fn of(self, iterations: usize) -> usize {
         match self {
             Self::AfterFirst(count) => count.min(iterations),
@@ -22,7 +22,7 @@ impl SolverPosition {
         }
     }
 
-    /// One iteration further (or back) in a step of so many, `None` beyond its ends.
+    /// One iteration further (or back), `None` beyond the first or last of `iterations`.
     pub fn moved(self, forward: bool, iterations: usize) -> Option<Self> {
         let at = self.of(iterations);
         let next = if forward { at.checked_add(1) } else { at.checked_sub(1) };
@@ -30,19 +30,19 @@ impl SolverPosition {
     }
 }
 
-/// The solver's states in one step of a run, as records.
+/// The states of the solver in one step of a run, as records.
 #[derive(Clone, Debug)]
 pub struct SolverTrace {
-    /// Number of the step.
+    /// Index of the step.
     pub step: usize,
-    /// Before the first iteration, after the first, and so on to the last.
+    /// Before the first iteration and after each iteration.
     pub records: Vec<Arc<StepRecord>>,
-    /// Which of them is shown.
+    /// Index of the shown state.
     pub at: usize,
 }
 
 impl SolverTrace {
-    /// The state that is shown.
+    /// The shown state.
     pub fn shown(&self) -> Option<&Arc<StepRecord>> {
         self.records.get(self.at)
     }
@@ -70,7 +70,7 @@ mod tests {
         }
         assert_eq!(positions, [5, 4, 3, 2, 1, 0]);
         assert_eq!(SolverPosition::AfterFirst(0).moved(true, 5), Some(SolverPosition::AfterFirst(1)));
-        // Of two runs over one step the one with fewer iterations stays at its end.
+        // For a run with fewer iterations in the step, the position stays at its last one.
         assert_eq!(SolverPosition::AfterFirst(5).of(3), 3);
     }
 }

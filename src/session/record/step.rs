@@ -5,18 +5,18 @@ use crate::frontend::{TrackedFeature, TrackedFrame};
 use crate::geometry::RigidTransform;
 use crate::observability::RankReport;
 
-/// One step of one run with what it was computed from.
+/// One step of one run, with the tracks and ground truth of its image.
 #[derive(Clone, Debug)]
 pub struct StepRecord {
-    /// The estimator's report; its `linearization` has been analysed and dropped.
+    /// The estimator's report; its `linearization` is dropped after the analysis unless it is to be kept.
     pub report: StepReport,
-    /// Observability of the calibration in this step, `None` while initializing.
+    /// Observability of the calibration in this step, `None` during initialization.
     pub rank: Option<RankReport>,
     /// Feature tracks of the main camera; empty where it has no image.
     pub tracks: Arc<TrackedFrame>,
-    /// Ground truth of `world_from_imu`.
+    /// `world_from_imu` of the ground truth.
     pub ground_truth: Option<RigidTransform>,
-    /// Log time of the image since the log began, beside the report's header stamp.
+    /// Log time of the image in nanoseconds since the log began; the report has its header stamp.
     pub log_time_ns: i64,
     /// Whether features, older frames of the window and most landmarks were evicted to save memory; see
     /// [`RunRecord::step_at`](super::RunRecord::step_at).
@@ -24,22 +24,22 @@ pub struct StepRecord {
 }
 
 impl StepRecord {
-    /// The calibration's columns and the information gain of the image in them; `None` before the estimator tracks.
+    /// The calibration's columns and the image's information gain in them; `None` before the estimator tracks.
     pub fn gain(&self) -> Option<(&RankReport, &InformationGain)> {
         Some((self.rank.as_ref()?, self.report.gain.as_ref()?))
     }
 
-    /// Bytes without the tracks, which the runs on the same camera share.
+    /// Memory in bytes without the tracks, which runs on the same camera share.
     pub fn own_bytes(&self) -> usize {
         let reference_counts = 2 * size_of::<usize>();
-        // The report's own fields lie within the record's.
+        // The record contains the report itself.
         let fields = size_of::<Self>() - size_of::<StepReport>();
         allocated_bytes(reference_counts + fields)
             + self.report.bytes().total()
             + self.rank.as_ref().map_or(0, RankReport::heap_bytes)
     }
 
-    /// Bytes of the tracks.
+    /// Memory of the tracks in bytes.
     pub fn tracks_bytes(&self) -> usize {
         tracks_bytes(&self.tracks)
     }
@@ -48,13 +48,13 @@ impl StepRecord {
 /// The linearized rows of one step's factors other than reprojection, which records do not keep.
 #[derive(Clone, Debug)]
 pub struct StepFactorRows {
-    /// Number of the step.
+    /// Index of the step.
     pub step: usize,
-    /// By factor, `None` where the step has no window.
+    /// Rows by factor, `None` where the step has no window.
     pub rows: Option<Vec<FactorRows>>,
 }
 
-/// Bytes of one camera's tracks behind an [`Arc`].
+/// Memory of one camera's tracks behind an [`Arc`], in bytes.
 pub(in crate::session) fn tracks_bytes(tracks: &TrackedFrame) -> usize {
     allocated_bytes(size_of::<TrackedFrame>() + 2 * size_of::<usize>())
         + allocated_bytes(tracks.features.capacity() * size_of::<TrackedFeature>())

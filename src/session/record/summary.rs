@@ -1,19 +1,19 @@
-//! The summary of a step, which is all that is kept of it when memory runs short, and the order in which steps are
+//! The summary of a step, kept instead of the complete step when memory is short, and the order in which steps are
 //! summarized.
 
 use super::step::StepRecord;
 use crate::estimator::StepReport;
 
-/// One summary in so many keeps its landmarks, for the scene, which draws those of earlier steps.
+/// One summary in this many keeps its landmarks: the 3D scene draws landmarks of earlier steps.
 const LANDMARKS_EVERY: usize = 4;
-/// So many of the newest steps are not summarized: they are the ones looked at.
+/// This many of the newest steps are not summarized, because they are shown most often.
 const NEWEST_KEPT: usize = 64;
 
 impl StepRecord {
-    /// The step without features, older frames of the window, and (but in every fourth step) landmarks: only drawings of
-    /// this very step need them. A linearization that is kept keeps the window, whose frames its columns belong to.
+    /// The step without features, older frames of the window, and (except in every fourth step) landmarks, which only
+    /// drawings of this step need. A kept linearization keeps the window, to whose frames its columns belong.
     ///
-    /// Everything that is plotted over time or written into tables stays: events, χ², iterations, calibration, ranks.
+    /// All values that are plotted over time or written to tables stay: events, χ², iterations, calibration, ranks.
     pub(in crate::session) fn summary(&self, number: usize) -> Self {
         let report = &self.report;
         let keeps_landmarks = number.is_multiple_of(LANDMARKS_EVERY);
@@ -39,7 +39,7 @@ impl StepRecord {
                 reprojection_median_after_px: report.reprojection_median_after_px,
                 iterations: report.iterations.clone(),
                 linearization: report.linearization.clone(),
-                // Worth nothing without the features.
+                // Useless without the features.
                 jacobian_source: None,
                 factor_rows: None,
                 gain: report.gain.clone(),
@@ -56,18 +56,18 @@ impl StepRecord {
     }
 }
 
-/// The order in which a run's steps are summarized: those with the cheapest recomputation first, right behind a snapshot,
-/// over the whole run.
+/// The order in which a run's steps are summarized: over the whole run, those right behind a snapshot first, because
+/// their recomputation is cheapest.
 #[derive(Clone, Debug, Default)]
 pub(super) struct SummaryOrder {
-    /// Steps between two snapshots when the order was made.
+    /// Steps between two snapshots when the order was computed.
     spacing: usize,
-    /// By distance from the snapshot, the next step to be summarized.
+    /// Next step to be summarized, by distance from the snapshot.
     next: Vec<usize>,
 }
 
 impl SummaryOrder {
-    /// The step to be summarized next, `None` when only the newest ones are left.
+    /// The next step to be summarized, `None` when only the newest ones are left.
     pub(super) fn next(&mut self, begin: usize, steps: usize, spacing: usize) -> Option<usize> {
         if self.spacing != spacing {
             self.spacing = spacing;
@@ -95,7 +95,7 @@ mod tests {
         };
         assert_eq!(numbers(40 + NEWEST_KEPT, 16, 5), [0, 16, 32, 1, 17]);
         assert_eq!(numbers(50 + NEWEST_KEPT, 16, 2), [48, 33]);
-        // Fewer snapshots: the order restarts, and steps that are summarized already come by again.
+        // With fewer snapshots the order restarts, and returns steps that are summarized already.
         assert_eq!(numbers(50 + NEWEST_KEPT, 32, 3), [0, 32, 1]);
         assert_eq!(numbers(50 + NEWEST_KEPT, 32, 1000).len(), 50 - 3);
         assert!(numbers(NEWEST_KEPT, 32, 1).is_empty());

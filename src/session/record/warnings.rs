@@ -5,18 +5,18 @@ use std::sync::Arc;
 use super::step::StepRecord;
 use crate::estimator::StepReport;
 
-/// A warning message, over all the steps that gave it.
+/// A warning message and the steps that reported it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RunWarning {
-    /// What is wrong, and what to try.
+    /// The problem and its remedy.
     pub message: String,
-    /// Header stamp of the first step with it.
+    /// Header stamp of the first step that reported it.
     pub first_ns: i64,
-    /// Number of steps with it.
+    /// Number of steps that reported it.
     pub steps: usize,
 }
 
-/// The warnings of a run's steps in the order of their first steps.
+/// The warnings of a run's steps, ordered by their first step.
 pub(in crate::session) fn warnings_of(steps: &[Arc<StepRecord>]) -> Vec<RunWarning> {
     let mut warnings = Vec::new();
     for step in steps {

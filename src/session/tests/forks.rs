@@ -1,4 +1,4 @@
-//! Forks over a synthetic flight, and a session that stops at breakpoints and forks there.
+//! Forks on a synthetic flight, and a session that stops at breakpoints and forks there.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use crate::session::record::StepRecord;
 use crate::session::tests::memory::input_of;
 use crate::simulation::{SyntheticFlight, SyntheticOptions, synthetic_tracks};
 
-/// A run over a synthetic flight and the way that it took.
+/// A run on a synthetic flight, with its engine and inputs.
 struct Flown {
     flight: SyntheticFlight,
     history: Arc<History>,
@@ -38,7 +38,7 @@ fn flown(spec: &str) -> Flown {
 }
 
 impl Flown {
-    /// Steps of a fork from a step on.
+    /// Steps of a fork from step `begin` on.
     fn forked(&self, begin: usize, changes: &str) -> Result<Vec<StepRecord>, String> {
         let changes: ForkChanges = changes.parse().map_err(|error: crate::session::ForkError| error.to_string())?;
         let mut engine = self.history.engine_before(begin).unwrap();
@@ -54,7 +54,7 @@ fn bits(record: &StepRecord) -> String {
     format!("{record:?}")
 }
 
-/// Distance of the newest positions, in metres.
+/// Distance between the newest positions of two steps, in metres.
 fn apart_m(one: &StepRecord, other: &StepRecord) -> f64 {
     let at = |record: &StepRecord| record.report.newest().unwrap().world_from_imu.translation_m;
     (at(one) - at(other)).norm()
@@ -88,7 +88,7 @@ fn a_fork_goes_on_in_another_parameterization() {
             assert!(apart_m < 0.01, "{changes}: {apart_m} m from the parent");
         }
     }
-    // The other way round the redundant columns go.
+    // The reverse direction removes the redundant columns.
     let parent = flown("classical");
     for (fork, parent) in parent.forked(FORK_AT, "minimal").unwrap().iter().zip(&parent.steps[FORK_AT..]) {
         assert!(tracking(fork) && fork.rank.as_ref().unwrap().deficit_parameterization == 0);
@@ -112,7 +112,7 @@ fn frozen_parameters_stay_and_changed_ones_start_elsewhere() {
     let elsewhere = format!("freeze=L2.alpha,set=L2.alpha:{}", held + 0.05);
     let fork = parent.forked(FORK_AT, &elsewhere).unwrap();
     assert!((parameter(&fork[0], "L2.alpha").0 - held - 0.05).abs() < 1e-12);
-    // A parameter that is only set is found again.
+    // A parameter that is only set is estimated again.
     let fork = parent.forked(FORK_AT, &format!("set=L2.alpha:{}", held + 0.05)).unwrap();
     let found = parameter(fork.last().unwrap(), "L2.alpha").0;
     assert!((found - held).abs() < 0.01, "{found} after {held}");
@@ -140,14 +140,14 @@ fn measurements_can_be_dropped_and_disturbed() {
         again.iter().map(bits).collect::<Vec<_>>()
     });
     let lax = parent.forked(FORK_AT, "encoder-noise=10").unwrap();
-    // Frames that were in the window already keep what they were told.
+    // Frames that were in the window already keep their joint-angle measurements.
     assert!(chi2(&lax, FactorKind::Encoder) < 0.8 * usual, "{} after {usual}", chi2(&lax, FactorKind::Encoder));
     let visual = chi2(&parent.steps[FORK_AT..], FactorKind::Visual);
     let lax = parent.forked(FORK_AT, "pixel-noise=3").unwrap();
     assert!(chi2(&lax, FactorKind::Visual) < 0.5 * visual);
 }
 
-/// Norm of the inertial rows between two frames in the columns of the later one's pose, in standard deviations.
+/// Norm of the IMU factor's rows between two frames in the columns of the later pose, in standard deviations.
 fn inertial_weight(flight: &SyntheticFlight, step: &StepRecord, slot: usize) -> f64 {
     let model = &flight.given_rig.cameras[0].model;
     let jacobian = step.report.jacobian(&[model]).unwrap();
@@ -167,7 +167,7 @@ fn inertial_noise_weakens_the_intervals_to_come_by_just_that_much() {
         for slot in 1..=newest {
             let share =
                 inertial_weight(&parent.flight, parent_step, slot) / inertial_weight(&parent.flight, fork, slot);
-            // Only the newest interval has come since; the others move a little with the state.
+            // Only the newest interval has the altered noise; the others change a little with the state.
             let expected = if slot == newest { factor } else { 1.0 };
             assert!((share / expected - 1.0).abs() < 0.01, "imu-noise={factor}, slot {slot} of {newest}: {share}");
         }
@@ -176,7 +176,7 @@ fn inertial_noise_weakens_the_intervals_to_come_by_just_that_much() {
 
 #[test]
 fn a_fork_with_other_inertial_noise_from_the_start_is_a_run_of_such_a_rig() {
-    // A power of two, so that no order of multiplications rounds otherwise.
+    // A power of two, so that the order of multiplications does not change the rounding.
     const FACTOR: f64 = 4.0;
     let parent = flown("auto");
     let fork = parent.forked(0, &format!("imu-noise={FACTOR}")).unwrap();
@@ -191,7 +191,7 @@ fn a_fork_with_other_inertial_noise_from_the_start_is_a_run_of_such_a_rig() {
         let input = parent.history.inputs().get(step).unwrap();
         assert_eq!(bits(forked), bits(&engine.step(&input)), "step {step}");
     }
-    // Less is known by inertia, so less is known of every parameter, though pictures and encoders say the most.
+    // A noisier IMU increases every parameter's σ, although images and encoders constrain them most.
     let sigmas = |steps: &[StepRecord]| steps.last().unwrap().report.calibration.sigmas.clone();
     let ratios: Vec<f64> = sigmas(&fork).iter().zip(sigmas(&parent.steps)).map(|(more, usual)| more / usual).collect();
     assert!(ratios.iter().all(|ratio| *ratio > 1.0 && *ratio < FACTOR), "{ratios:?}");
@@ -204,14 +204,14 @@ fn encoder_readings_can_be_left_out_from_there_on() {
     for (number, step) in fork.iter().enumerate() {
         let read = |index: usize| step.report.window[index].encoder_angles_rad.is_some();
         let own = |index: usize| step.report.window[index].frame_index >= parent.steps[FORK_AT].report.frame_index;
-        // Frames from before keep what they were told, those to come are told nothing.
+        // Frames from before keep their measurements, later frames have none.
         assert!((0..step.report.window.len()).all(|index| read(index) != own(index)), "step {number}");
         assert_eq!(step.report.calibration.parameters, parent.steps[FORK_AT].report.calibration.parameters);
     }
     let last = fork.last().unwrap();
     let tracking = last.report.phase == Phase::Tracking && last.report.restarts == 0;
     assert!(tracking && apart_m(last, parent.steps.last().unwrap()) < 0.05);
-    // Angles that nobody reads are known by the picture alone.
+    // Without encoder readings only the images constrain the joint angles.
     let joint_sigma = |step: &StepRecord| step.report.calibration.sigmas.iter().sum::<f64>();
     assert!(joint_sigma(last) > joint_sigma(parent.steps.last().unwrap()));
 }
@@ -303,7 +303,7 @@ fn a_session_stops_at_breakpoints_and_forks_there() {
     assert_eq!(stop_ns, parent.steps[first].report.stamp_ns);
     let notice = session.take_notices().pop().unwrap();
     assert!(notice.contains("tracking and features > 20 in auto at") && notice.contains("features = "), "{notice}");
-    // Playing over it stops there as well, and back from the end.
+    // Playback over it stops there as well, and so does a run back from the end.
     session.apply(Command::GoToStart);
     session.apply(Command::Play);
     session.advance(100.0);
@@ -329,7 +329,7 @@ fn a_session_stops_at_breakpoints_and_forks_there() {
         assert_eq!(bits(original), bits(twin), "step {number}");
         assert_eq!(other.report.calibration.parameters.len(), if number < at { 18 } else { 24 });
     }
-    // A fork's steps can be recomputed as well, those of its parent too.
+    // Steps of a fork can be recomputed as well, including those of its parent.
     for number in [at - 3, at, parent.steps.len() - 1] {
         let (_, again) = session.computation().recompute(2, number, 1).pop().unwrap();
         assert_eq!(bits(&again), bits(&classical.steps[number]));

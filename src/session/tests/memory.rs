@@ -1,4 +1,4 @@
-//! How much memory a recording takes.
+//! Memory of a recording.
 
 use std::sync::Arc;
 
@@ -25,7 +25,7 @@ pub(in crate::session) fn recorded(flight: &SyntheticFlight, spec: &str) -> RunR
     recorded_with(flight, spec, None)
 }
 
-/// Keeps the linearization of one report in so many frames.
+/// A recorded run of which one report in this many frames keeps its linearization.
 fn recorded_with(flight: &SyntheticFlight, spec: &str, keep_linearization_every: Option<usize>) -> RunRecord {
     let spec: crate::session::RunSpec = spec.parse().unwrap();
     let config = estimator_config(&flight.given_rig, &spec).unwrap();
@@ -38,8 +38,8 @@ fn recorded_with(flight: &SyntheticFlight, spec: &str, keep_linearization_every:
     run
 }
 
-/// Ten minutes at 20 images a second must fit into 1.5 GiB, tracks included: 134 kB a frame. A frame with 150 features
-/// in a window of eleven takes about half of that.
+/// Ten minutes at 20 fps must fit into 1.5 GiB, tracks included: 134 kB per frame. A frame with 150 features in a
+/// window of eleven takes about half of that.
 #[test]
 fn a_recorded_frame_stays_small() {
     let flight = synthetic_tracks(&SyntheticOptions { duration_s: 10.0, ..SyntheticOptions::default() });
@@ -51,12 +51,12 @@ fn a_recorded_frame_stays_small() {
     assert!(observations / steps.len() > 500, "a full window: {} observations", observations / steps.len());
     let bytes = steps.iter().map(|step| step.own_bytes() + step.tracks_bytes()).sum::<usize>() / steps.len();
     assert!(bytes < 90_000, "{bytes} bytes a frame: {:?}", steps[0].report.bytes());
-    // The running sum says the same.
+    // The running sum is the same.
     let summed: usize = run.steps.iter().map(|step| step.own_bytes() + step.tracks_bytes()).sum();
     assert_eq!(run.memory.own + run.memory.tracks, summed);
 }
 
-/// A covariance is that of the frames of the window: whoever asked for it finds both in a summary.
+/// A covariance refers to the frames of the window, so the summary must keep both.
 #[test]
 fn a_summary_with_a_linearization_keeps_the_frames_of_its_columns() {
     let flight = synthetic_tracks(&SyntheticOptions { duration_s: 6.0, ..SyntheticOptions::default() });

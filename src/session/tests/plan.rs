@@ -6,7 +6,7 @@ use crate::session::engine::estimator_config;
 use crate::session::plan::{ParameterizationChoice, RunSpec, RunSpecError, cameras_of_run, distinct_labels};
 use crate::simulation::{SyntheticMount, SyntheticOptions, synthetic_tracks};
 
-/// The specification, and its message when it is refused.
+/// The parsed specification, or the message of its rejection.
 fn parse(text: &str) -> Result<RunSpec, String> {
     text.parse().map_err(|error: RunSpecError| error.to_string())
 }
@@ -96,7 +96,7 @@ fn a_cluster_watches_the_gimballed_camera_and_the_rigid_one() {
     let message = refused(&rig, "cluster:camera=cam1");
     assert!(message.contains("camera 'cam1' with mount: gimbal"), "{message}");
 
-    // Both cameras are given as the runs that watch one of them are given them.
+    // Both cameras are configured as in the runs that use one of them.
     let config = |text: &str| estimator_config(&rig, &parse(text).unwrap()).unwrap();
     let (cluster, alone) = (config("cluster:window=8,calibrate=off,encoder=off"), config("static"));
     assert_eq!((cluster.options.window, cluster.calibrate, cluster.use_encoder), (8, false, false));

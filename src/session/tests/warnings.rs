@@ -5,7 +5,7 @@ use crate::session::record::{RunRecord, warnings_of};
 use crate::session::tests::memory::recorded;
 use crate::simulation::{SyntheticOptions, synthetic_tracks};
 
-/// A camera's clock that is 15 ms off is told from some step on, and only in what holds that step.
+/// A time offset of 15 ms of a camera is reported from some step on, and only by records that contain that step.
 #[test]
 fn a_warning_is_kept_once_with_its_first_time_and_its_count() {
     let flight = synthetic_tracks(&SyntheticOptions { clock_offsets_s: [0.015, 0.0], ..SyntheticOptions::default() });
