@@ -83,7 +83,7 @@ pub struct Playback {
     /// The breakpoints with their hits so far.
     pub breakpoints: Arc<Breakpoints>,
     /// Whether the cursor is on its way to a hit that the estimators have not reached yet.
-    pub running_on: bool,
+    pub running_to_breakpoint: bool,
 }
 
 impl Default for Playback {
@@ -96,7 +96,7 @@ impl Default for Playback {
             solver: None,
             recomputing: false,
             breakpoints: Arc::default(),
-            running_on: false,
+            running_to_breakpoint: false,
         }
     }
 }

@@ -265,7 +265,7 @@ impl App {
         let computing = recording.runs.iter().any(|run| !run.finished && run.error.is_none());
         if commanded || playback.playing || log.generation() != generation {
             ui.ctx().request_repaint();
-        } else if computing || playback.recomputing || playback.running_on {
+        } else if computing || playback.recomputing || playback.running_to_breakpoint {
             ui.ctx().request_repaint_after(std::time::Duration::from_millis(LOOK_MS));
         }
         self.tell_warnings(&recording);

@@ -30,7 +30,7 @@ impl PlayingLog for Session {
             solver: self.solver_position(),
             recomputing: self.is_recomputing(),
             breakpoints: Arc::clone(self.breakpoints()),
-            running_on: self.is_running_on(),
+            running_to_breakpoint: self.is_running_to_breakpoint(),
         }
     }
 

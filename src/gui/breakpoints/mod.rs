@@ -111,7 +111,7 @@ fn buttons_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>) {
                 ctx.commands.push(Command::RunToBreakpoint { forward });
             }
         }
-        if ctx.playback.running_on {
+        if ctx.playback.running_to_breakpoint {
             ui.label(RichText::new("running to the next hit…").color(ctx.theme.text_weak));
         }
     });

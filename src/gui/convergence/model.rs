@@ -153,7 +153,7 @@ impl ConvertedHistory {
         if self.target.as_ref().is_none_or(|(known, _)| *known != target) {
             self.follower = Follower::default();
             let estimate = run.steps.first().map(|first| &first.report.calibration);
-            let form = estimate.and_then(|estimate| run.form_in(rig, estimate, target));
+            let form = estimate.and_then(|estimate| run.conversion_for(rig, estimate, target));
             self.target = form.map(|form| (target, form));
             self.forget();
         }

@@ -1,6 +1,6 @@
 //! Evaluation of a condition in a step.
 
-use super::expression::{Arithmetic, Condition, Number, Span, Truth};
+use super::expression::{Arithmetic, Condition, Number, Predicate, Span};
 use super::quantities::NamedNumber;
 use crate::estimator::ResidualSummary;
 use crate::gimbal::{ParameterId, ParameterNames};
@@ -8,7 +8,7 @@ use crate::session::record::StepRecord;
 
 /// The inputs of the evaluation of a condition.
 #[derive(Clone, Copy, Debug)]
-pub struct Moment<'a> {
+pub struct StepContext<'a> {
     /// The step. Its summary suffices.
     pub step: &'a StepRecord,
     /// The step before it.
@@ -28,16 +28,16 @@ pub struct NamedValue {
 
 impl Condition {
     /// Whether the condition is true in the step, `None` when the step lacks a quantity that decides it.
-    pub fn holds(&self, moment: &Moment<'_>) -> Option<bool> {
-        self.truth.holds(moment)
+    pub fn holds(&self, context: &StepContext<'_>) -> Option<bool> {
+        self.predicate.holds(context)
     }
 
     /// Every quantity of the condition once, in the order of the text.
-    pub fn values(&self, moment: &Moment<'_>) -> Vec<NamedValue> {
-        let mut parts = Vec::new();
-        self.truth.visit(&mut |span, number| parts.push((span, number.value(moment))));
+    pub fn values(&self, context: &StepContext<'_>) -> Vec<NamedValue> {
+        let mut values_by_span = Vec::new();
+        self.predicate.visit(&mut |span, number| values_by_span.push((span, number.value(context))));
         let mut values: Vec<NamedValue> = Vec::new();
-        for (span, value) in parts {
+        for (span, value) in values_by_span {
             let name: String = self.text.chars().skip(span.begin).take(span.end - span.begin).collect();
             if !values.iter().any(|known| known.name == name) {
                 values.push(NamedValue { name, value });
@@ -50,7 +50,7 @@ impl Condition {
     /// never true.
     pub fn unknown_names(&self, names: &ParameterNames, parameters: &[ParameterId]) -> Vec<String> {
         let mut unknown = Vec::new();
-        self.truth.visit(&mut |_, number| {
+        self.predicate.visit(&mut |_, number| {
             if let Number::Named(kind, name, _) = number {
                 let known = match kind {
                     NamedNumber::Sigma | NamedNumber::PriorSigma | NamedNumber::Value => {
@@ -68,23 +68,23 @@ impl Condition {
     }
 }
 
-impl Truth {
-    fn holds(&self, moment: &Moment<'_>) -> Option<bool> {
+impl Predicate {
+    fn holds(&self, context: &StepContext<'_>) -> Option<bool> {
         match self {
-            Self::Literal(truth) => Some(*truth),
-            Self::Flag(flag) => Some(flag.of(moment.step)),
-            Self::Event(kinds, _) => Some(moment.step.report.events.iter().any(|event| kinds.contains(&event.kind))),
+            Self::Literal(value) => Some(*value),
+            Self::Flag(flag) => Some(flag.of(context.step)),
+            Self::Event(kinds, _) => Some(context.step.report.events.iter().any(|event| kinds.contains(&event.kind))),
             Self::Compared(comparison, left, right) => {
-                Some(comparison.holds(left.value(moment)?, right.value(moment)?))
+                Some(comparison.holds(left.value(context)?, right.value(context)?))
             }
-            Self::Not(inner) => inner.holds(moment).map(|truth| !truth),
+            Self::Not(inner) => inner.holds(context).map(|value| !value),
             // A missing value matters only where the other operand does not decide alone.
-            Self::And(left, right) => match (left.holds(moment), right.holds(moment)) {
+            Self::And(left, right) => match (left.holds(context), right.holds(context)) {
                 (Some(false), _) | (_, Some(false)) => Some(false),
                 (Some(true), Some(true)) => Some(true),
                 _ => None,
             },
-            Self::Or(left, right) => match (left.holds(moment), right.holds(moment)) {
+            Self::Or(left, right) => match (left.holds(context), right.holds(context)) {
                 (Some(true), _) | (_, Some(true)) => Some(true),
                 (Some(false), Some(false)) => Some(false),
                 _ => None,
@@ -110,27 +110,27 @@ impl Truth {
 }
 
 impl Number {
-    fn value(&self, moment: &Moment<'_>) -> Option<f64> {
+    fn value(&self, context: &StepContext<'_>) -> Option<f64> {
         let value = match self {
             Self::Literal(value) => *value,
-            Self::Quantity(name, _) => name.of(moment.step)?,
-            Self::Named(kind, name, _) => named(*kind, name, moment)?,
-            Self::Singular(index, _) => *moment.step.rank.as_ref()?.singular_values.get(index.checked_sub(1)?)?,
+            Self::Quantity(name, _) => name.of(context.step)?,
+            Self::Named(kind, name, _) => named(*kind, name, context)?,
+            Self::Singular(index, _) => *context.step.rank.as_ref()?.singular_values.get(index.checked_sub(1)?)?,
             Self::Rise(inner, _) => {
-                let before = Moment { step: moment.previous?, previous: None, names: moment.names };
-                inner.value(moment)? - inner.value(&before)?
+                let before = StepContext { step: context.previous?, previous: None, names: context.names };
+                inner.value(context)? - inner.value(&before)?
             }
-            Self::Negated(inner) => -inner.value(moment)?,
-            Self::Absolute(inner) => inner.value(moment)?.abs(),
+            Self::Negated(inner) => -inner.value(context)?,
+            Self::Absolute(inner) => inner.value(context)?.abs(),
             Self::Combined(arithmetic, left, right) => {
-                let (left, right) = (left.value(moment)?, right.value(moment)?);
+                let (left, right) = (left.value(context)?, right.value(context)?);
                 match arithmetic {
                     Arithmetic::Sum => left + right,
                     Arithmetic::Difference => left - right,
                     Arithmetic::Product => left * right,
                     Arithmetic::Quotient => left / right,
-                    Arithmetic::Least => left.min(right),
-                    Arithmetic::Greatest => left.max(right),
+                    Arithmetic::Min => left.min(right),
+                    Arithmetic::Max => left.max(right),
                 }
             }
         };
@@ -154,11 +154,11 @@ impl Number {
     }
 }
 
-fn named(kind: NamedNumber, name: &str, moment: &Moment<'_>) -> Option<f64> {
-    let report = &moment.step.report;
+fn named(kind: NamedNumber, name: &str, context: &StepContext<'_>) -> Option<f64> {
+    let report = &context.step.report;
     let calibration = &report.calibration;
     let parameter = |values: &[f64]| {
-        let parameter = moment.names.parse(name)?;
+        let parameter = context.names.parse(name)?;
         values.get(calibration.parameters.iter().position(|known| *known == parameter)?).copied()
     };
     let factor = || report.residuals.iter().find(|summary| summary.factor.key() == name);
@@ -166,13 +166,13 @@ fn named(kind: NamedNumber, name: &str, moment: &Moment<'_>) -> Option<f64> {
         NamedNumber::Sigma => parameter(&calibration.sigmas),
         NamedNumber::PriorSigma => parameter(&calibration.prior_sigmas),
         NamedNumber::Value => parameter(&calibration.values),
-        NamedNumber::Joint => report.newest()?.joint_angles_rad.get(joint_index(name, moment.names)?).copied(),
+        NamedNumber::Joint => report.newest()?.joint_angles_rad.get(joint_index(name, context.names)?).copied(),
         NamedNumber::Margin => {
-            let singularity = moment.names.parse_singularity(name)?;
+            let singularity = context.names.parse_singularity(name)?;
             calibration.margins.iter().find(|(known, _)| *known == singularity).map(|(_, margin)| *margin)
         }
         NamedNumber::Lost => {
-            let rank = moment.step.rank.as_ref()?;
+            let rank = context.step.rank.as_ref()?;
             let count = match name {
                 "parameterization" => rank.deficit_parameterization,
                 "joints" => rank.deficit_joints,

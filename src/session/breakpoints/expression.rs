@@ -23,7 +23,7 @@ pub struct ConditionProblem {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Condition {
     pub(super) text: String,
-    pub(super) truth: Truth,
+    pub(super) predicate: Predicate,
 }
 
 impl Condition {
@@ -70,13 +70,13 @@ pub(super) enum Arithmetic {
     Difference,
     Product,
     Quotient,
-    Least,
-    Greatest,
+    Min,
+    Max,
 }
 
 /// A sub-expression that is true or false.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Truth {
+pub(super) enum Predicate {
     Literal(bool),
     Flag(FlagName),
     Event(Vec<EventKind>, Span),
@@ -90,9 +90,9 @@ pub(super) enum Truth {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Comparison {
     Less,
-    AtMost,
+    LessOrEqual,
     Greater,
-    AtLeast,
+    GreaterOrEqual,
     Equal,
     Unequal,
 }
@@ -101,9 +101,9 @@ impl Comparison {
     pub(super) fn holds(self, left: f64, right: f64) -> bool {
         match self {
             Self::Less => left < right,
-            Self::AtMost => left <= right,
+            Self::LessOrEqual => left <= right,
             Self::Greater => left > right,
-            Self::AtLeast => left >= right,
+            Self::GreaterOrEqual => left >= right,
             Self::Equal => left == right,
             Self::Unequal => left != right,
         }

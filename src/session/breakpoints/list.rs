@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::evaluate::{Moment, NamedValue};
+use super::evaluate::{NamedValue, StepContext};
 use super::expression::Condition;
 use crate::gimbal::ParameterNames;
 use crate::session::record::{Recording, RunRecord};
@@ -24,7 +24,7 @@ pub struct Hit {
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Track {
     read: usize,
-    held: bool,
+    was_true: bool,
     /// Stamp and index of each step in which the condition became true.
     hits: Vec<(i64, usize)>,
 }
@@ -61,11 +61,12 @@ impl Breakpoint {
         for run in runs {
             let track = self.tracks.entry(run.id).or_default();
             for number in track.read..run.steps.len() {
-                let held = moment(run, number, names).and_then(|moment| self.condition.holds(&moment)) == Some(true);
-                if held && !track.held {
+                let was_true =
+                    context(run, number, names).and_then(|context| self.condition.holds(&context)) == Some(true);
+                if was_true && !track.was_true {
                     track.hits.push((run.steps[number].report.stamp_ns, number));
                 }
-                track.held = held;
+                track.was_true = was_true;
             }
             track.read = run.steps.len();
         }
@@ -73,9 +74,9 @@ impl Breakpoint {
 }
 
 /// A step and the step before it.
-fn moment<'a>(run: &'a RunRecord, number: usize, names: &'a ParameterNames) -> Option<Moment<'a>> {
+fn context<'a>(run: &'a RunRecord, number: usize, names: &'a ParameterNames) -> Option<StepContext<'a>> {
     let previous = number.checked_sub(1).and_then(|before| run.steps.get(before));
-    Some(Moment { step: run.steps.get(number)?, previous: previous.map(|step| &**step), names })
+    Some(StepContext { step: run.steps.get(number)?, previous: previous.map(|step| &**step), names })
 }
 
 /// All breakpoints, evaluated over the steps computed so far.
@@ -173,9 +174,9 @@ impl Breakpoints {
     pub fn values_at(&self, recording: &Recording, hit: Hit) -> Vec<NamedValue> {
         let run = recording.runs.get(hit.run);
         let names = recording.rig.parameter_names();
-        let moment = run.and_then(|run| moment(run, hit.step, &names));
+        let context = run.and_then(|run| context(run, hit.step, &names));
         let breakpoint = self.list.get(hit.breakpoint);
-        breakpoint.zip(moment).map_or_else(Vec::new, |(breakpoint, moment)| breakpoint.condition.values(&moment))
+        breakpoint.zip(context).map_or_else(Vec::new, |(breakpoint, context)| breakpoint.condition.values(&context))
     }
 
     /// One line of text: `rank < 18 in auto at 4.250 s, frame 85: rank = 17`.

@@ -13,7 +13,7 @@ mod quantities;
 #[cfg(test)]
 mod tests;
 
-pub use evaluate::{Moment, NamedValue};
+pub use evaluate::{NamedValue, StepContext};
 pub use expression::{Condition, ConditionProblem};
 pub use list::{Breakpoint, Breakpoints, Hit};
 pub use quantities::quantity_help;

@@ -2,13 +2,13 @@
 
 use std::str::FromStr;
 
-use super::expression::{Arithmetic, Condition, ConditionProblem, Number, Span, Truth};
-use super::lexer::{Token, words};
+use super::expression::{Arithmetic, Condition, ConditionProblem, Number, Predicate, Span};
+use super::lexer::{Token, tokens};
 use super::quantities::{CAUSES, EVENTS, FLAGS, NAMED, NUMBERS, NamedNumber};
 use crate::estimator::FactorKind;
 
 /// Limit of nested parentheses and signs; deeper nesting is an error, because it could overflow the stack.
-const DEEPEST: usize = 60;
+const MAX_DEPTH: usize = 60;
 /// Unit suffixes and their factors to radians, metres, seconds or pixels.
 const UNITS: [(&str, f64); 11] = [
     ("deg", std::f64::consts::PI / 180.0),
@@ -27,14 +27,14 @@ const UNITS: [(&str, f64); 11] = [
 const FUNCTIONS: [&str; 5] = ["singular", "rise", "abs", "min", "max"];
 
 /// A sub-expression that may be a number or a predicate.
-enum Part {
+enum Expression {
     Number(Number),
-    Truth(Truth),
+    Predicate(Predicate),
 }
 
 struct Parser<'a> {
     text: &'a str,
-    words: Vec<(Token, Span)>,
+    tokens: Vec<(Token, Span)>,
     at: usize,
     depth: usize,
 }
@@ -51,29 +51,29 @@ impl FromStr for Condition {
 
 /// Parses a condition.
 fn parse(text: &str) -> Result<Condition> {
-    let mut parser = Parser { text, words: words(text)?, at: 0, depth: 0 };
+    let mut parser = Parser { text, tokens: tokens(text)?, at: 0, depth: 0 };
     if matches!(parser.peek(), Token::End) {
         return Err(parser.problem_at(0, "a condition is missing, such as 'rank < 18 or features < 40'"));
     }
     let begin = parser.begin();
-    let part = parser.alternatives()?;
+    let expression = parser.alternatives()?;
     match parser.peek() {
         Token::End => {}
         Token::Close => return Err(parser.problem("this bracket closes nothing")),
         Token::Compare(_) => return Err(parser.problem("comparisons do not chain: write 'a < b and b < c'")),
         _ => return Err(parser.problem("expected 'and', 'or' or the end of the condition")),
     }
-    let truth = parser.truth(part, begin)?;
-    Ok(Condition { text: text.to_owned(), truth })
+    let predicate = parser.predicate(expression, begin)?;
+    Ok(Condition { text: text.to_owned(), predicate })
 }
 
 impl Parser<'_> {
     fn peek(&self) -> &Token {
-        &self.words[self.at.min(self.words.len() - 1)].0
+        &self.tokens[self.at.min(self.tokens.len() - 1)].0
     }
 
     fn span(&self) -> Span {
-        self.words[self.at.min(self.words.len() - 1)].1
+        self.tokens[self.at.min(self.tokens.len() - 1)].1
     }
 
     fn begin(&self) -> usize {
@@ -82,7 +82,7 @@ impl Parser<'_> {
 
     /// End of the previous token.
     fn end(&self) -> usize {
-        self.words[self.at.saturating_sub(1)].1.end
+        self.tokens[self.at.saturating_sub(1)].1.end
     }
 
     fn next(&mut self) -> Token {
@@ -105,55 +105,55 @@ impl Parser<'_> {
         ConditionProblem { text: self.text.to_owned(), column: at + 1, message: message.into() }
     }
 
-    fn truth(&self, part: Part, begin: usize) -> Result<Truth> {
-        match part {
-            Part::Truth(truth) => Ok(truth),
-            Part::Number(_) => Err(self.problem_at(begin, "this is a number; compare it, as in 'rank < 18'")),
+    fn predicate(&self, expression: Expression, begin: usize) -> Result<Predicate> {
+        match expression {
+            Expression::Predicate(predicate) => Ok(predicate),
+            Expression::Number(_) => Err(self.problem_at(begin, "this is a number; compare it, as in 'rank < 18'")),
         }
     }
 
-    fn number(&self, part: Part, begin: usize) -> Result<Number> {
-        match part {
-            Part::Number(number) => Ok(number),
-            Part::Truth(_) => Err(self.problem_at(begin, "this is true or false, where a number is needed")),
+    fn number(&self, expression: Expression, begin: usize) -> Result<Number> {
+        match expression {
+            Expression::Number(number) => Ok(number),
+            Expression::Predicate(_) => Err(self.problem_at(begin, "this is true or false, where a number is needed")),
         }
     }
 
-    fn alternatives(&mut self) -> Result<Part> {
-        self.joined(&Token::Or, Self::conjunction, Truth::Or)
+    fn alternatives(&mut self) -> Result<Expression> {
+        self.joined(&Token::Or, Self::conjunction, Predicate::Or)
     }
 
-    fn conjunction(&mut self) -> Result<Part> {
-        self.joined(&Token::And, Self::negation, Truth::And)
+    fn conjunction(&mut self) -> Result<Expression> {
+        self.joined(&Token::And, Self::negation, Predicate::And)
     }
 
     fn joined(
         &mut self,
-        sign: &Token,
-        part: fn(&mut Self) -> Result<Part>,
-        join: fn(Box<Truth>, Box<Truth>) -> Truth,
-    ) -> Result<Part> {
+        operator: &Token,
+        expression: fn(&mut Self) -> Result<Expression>,
+        join: fn(Box<Predicate>, Box<Predicate>) -> Predicate,
+    ) -> Result<Expression> {
         let begin = self.begin();
-        let mut left = part(self)?;
-        while self.take(sign) {
+        let mut left = expression(self)?;
+        while self.take(operator) {
             let right_begin = self.begin();
-            let right = part(self)?;
-            let (first, second) = (self.truth(left, begin)?, self.truth(right, right_begin)?);
-            left = Part::Truth(join(Box::new(first), Box::new(second)));
+            let right = expression(self)?;
+            let (first, second) = (self.predicate(left, begin)?, self.predicate(right, right_begin)?);
+            left = Expression::Predicate(join(Box::new(first), Box::new(second)));
         }
         Ok(left)
     }
 
-    fn negation(&mut self) -> Result<Part> {
+    fn negation(&mut self) -> Result<Expression> {
         if !self.take(&Token::Not) {
             return self.comparison();
         }
         let begin = self.begin();
         let inner = self.deeper(Self::negation)?;
-        Ok(Part::Truth(Truth::Not(Box::new(self.truth(inner, begin)?))))
+        Ok(Expression::Predicate(Predicate::Not(Box::new(self.predicate(inner, begin)?))))
     }
 
-    fn comparison(&mut self) -> Result<Part> {
+    fn comparison(&mut self) -> Result<Expression> {
         let begin = self.begin();
         let left = self.sum()?;
         let Token::Compare(comparison) = *self.peek() else { return Ok(left) };
@@ -161,10 +161,10 @@ impl Parser<'_> {
         let right_begin = self.begin();
         let right = self.sum()?;
         let (left, right) = (self.number(left, begin)?, self.number(right, right_begin)?);
-        Ok(Part::Truth(Truth::Compared(comparison, left, right)))
+        Ok(Expression::Predicate(Predicate::Compared(comparison, left, right)))
     }
 
-    fn sum(&mut self) -> Result<Part> {
+    fn sum(&mut self) -> Result<Expression> {
         self.combined(Self::product, |token| match token {
             Token::Plus => Some(Arithmetic::Sum),
             Token::Minus => Some(Arithmetic::Difference),
@@ -172,7 +172,7 @@ impl Parser<'_> {
         })
     }
 
-    fn product(&mut self) -> Result<Part> {
+    fn product(&mut self) -> Result<Expression> {
         self.combined(Self::signed, |token| match token {
             Token::Times => Some(Arithmetic::Product),
             Token::Over => Some(Arithmetic::Quotient),
@@ -182,44 +182,44 @@ impl Parser<'_> {
 
     fn combined(
         &mut self,
-        part: fn(&mut Self) -> Result<Part>,
-        sign: fn(&Token) -> Option<Arithmetic>,
-    ) -> Result<Part> {
+        expression: fn(&mut Self) -> Result<Expression>,
+        operator: fn(&Token) -> Option<Arithmetic>,
+    ) -> Result<Expression> {
         let begin = self.begin();
-        let mut left = part(self)?;
-        while let Some(arithmetic) = sign(self.peek()) {
+        let mut left = expression(self)?;
+        while let Some(arithmetic) = operator(self.peek()) {
             self.at += 1;
             let right_begin = self.begin();
-            let right = part(self)?;
+            let right = expression(self)?;
             let (first, second) = (self.number(left, begin)?, self.number(right, right_begin)?);
-            left = Part::Number(Number::Combined(arithmetic, Box::new(first), Box::new(second)));
+            left = Expression::Number(Number::Combined(arithmetic, Box::new(first), Box::new(second)));
         }
         Ok(left)
     }
 
-    fn signed(&mut self) -> Result<Part> {
+    fn signed(&mut self) -> Result<Expression> {
         if !self.take(&Token::Minus) {
             return self.primary();
         }
         let begin = self.begin();
         let inner = self.deeper(Self::signed)?;
-        Ok(Part::Number(Number::Negated(Box::new(self.number(inner, begin)?))))
+        Ok(Expression::Number(Number::Negated(Box::new(self.number(inner, begin)?))))
     }
 
-    fn deeper(&mut self, part: fn(&mut Self) -> Result<Part>) -> Result<Part> {
-        if self.depth == DEEPEST {
-            return Err(self.problem(format!("more than {DEEPEST} brackets and signs within each other")));
+    fn deeper(&mut self, expression: fn(&mut Self) -> Result<Expression>) -> Result<Expression> {
+        if self.depth == MAX_DEPTH {
+            return Err(self.problem(format!("more than {MAX_DEPTH} brackets and signs within each other")));
         }
         self.depth += 1;
-        let result = part(self);
+        let result = expression(self);
         self.depth -= 1;
         result
     }
 
-    fn primary(&mut self) -> Result<Part> {
+    fn primary(&mut self) -> Result<Expression> {
         let begin = self.begin();
         match self.next() {
-            Token::Number(value) => Ok(Part::Number(Number::Literal(value * self.unit()?))),
+            Token::Number(value) => Ok(Expression::Number(Number::Literal(value * self.unit()?))),
             Token::Open => {
                 let inner = self.deeper(Self::alternatives)?;
                 if !self.take(&Token::Close) {
@@ -250,17 +250,17 @@ impl Parser<'_> {
         Ok(unit)
     }
 
-    fn plain(&self, name: &str, begin: usize) -> Result<Part> {
+    fn plain(&self, name: &str, begin: usize) -> Result<Expression> {
         let span = Span { begin, end: self.end() };
         if let Some(number) = NUMBERS.iter().find(|known| known.name == name) {
-            return Ok(Part::Number(Number::Quantity(*number, span)));
+            return Ok(Expression::Number(Number::Quantity(*number, span)));
         }
         if let Some(flag) = FLAGS.iter().find(|known| known.name == name) {
-            return Ok(Part::Truth(Truth::Flag(*flag)));
+            return Ok(Expression::Predicate(Predicate::Flag(*flag)));
         }
         match name {
-            "true" => return Ok(Part::Truth(Truth::Literal(true))),
-            "false" => return Ok(Part::Truth(Truth::Literal(false))),
+            "true" => return Ok(Expression::Predicate(Predicate::Literal(true))),
+            "false" => return Ok(Expression::Predicate(Predicate::Literal(false))),
             _ => {}
         }
         if let Some((name, _, example, _)) = NAMED.iter().find(|(known, ..)| *known == name) {
@@ -278,17 +278,17 @@ impl Parser<'_> {
     }
 
     /// A name with an argument list.
-    fn call(&mut self, name: &str, begin: usize) -> Result<Part> {
+    fn call(&mut self, name: &str, begin: usize) -> Result<Expression> {
         self.at += 1;
         let inside = self.begin();
-        let part = match name {
+        let expression = match name {
             "event" => {
                 let kind = self.name("a kind of event")?;
                 let kinds = EVENTS.iter().find(|(known, _)| *known == kind).map(|(_, kinds)| kinds.to_vec());
                 let known = EVENTS.iter().map(|(known, _)| *known);
                 let kinds = kinds.ok_or_else(|| self.problem_at(inside, unknown("kind of event", &kind, known)))?;
                 self.close(begin)?;
-                Part::Truth(Truth::Event(kinds, Span { begin, end: self.end() }))
+                Expression::Predicate(Predicate::Event(kinds, Span { begin, end: self.end() }))
             }
             "singular" => {
                 let Token::Number(number) = self.next() else {
@@ -298,17 +298,17 @@ impl Parser<'_> {
                     return Err(self.problem_at(inside, "singular values are counted from 1, the largest first"));
                 }
                 self.close(begin)?;
-                Part::Number(Number::Singular(number as usize, Span { begin, end: self.end() }))
+                Expression::Number(Number::Singular(number as usize, Span { begin, end: self.end() }))
             }
             "rise" => {
                 let inner = self.argument()?;
                 self.close(begin)?;
-                Part::Number(Number::Rise(Box::new(inner), Span { begin, end: self.end() }))
+                Expression::Number(Number::Rise(Box::new(inner), Span { begin, end: self.end() }))
             }
             "abs" => {
                 let inner = self.argument()?;
                 self.close(begin)?;
-                Part::Number(Number::Absolute(Box::new(inner)))
+                Expression::Number(Number::Absolute(Box::new(inner)))
             }
             "min" | "max" => {
                 let first = self.argument()?;
@@ -317,12 +317,12 @@ impl Parser<'_> {
                 }
                 let second = self.argument()?;
                 self.close(begin)?;
-                let arithmetic = if name == "min" { Arithmetic::Least } else { Arithmetic::Greatest };
-                Part::Number(Number::Combined(arithmetic, Box::new(first), Box::new(second)))
+                let arithmetic = if name == "min" { Arithmetic::Min } else { Arithmetic::Max };
+                Expression::Number(Number::Combined(arithmetic, Box::new(first), Box::new(second)))
             }
-            _ => Part::Number(self.named(name, begin)?),
+            _ => Expression::Number(self.named(name, begin)?),
         };
-        Ok(part)
+        Ok(expression)
     }
 
     fn named(&mut self, function: &str, begin: usize) -> Result<Number> {
@@ -352,8 +352,8 @@ impl Parser<'_> {
 
     fn argument(&mut self) -> Result<Number> {
         let begin = self.begin();
-        let part = self.deeper(Self::sum)?;
-        self.number(part, begin)
+        let expression = self.deeper(Self::sum)?;
+        self.number(expression, begin)
     }
 
     fn name(&mut self, expected: &str) -> Result<String> {
@@ -386,10 +386,10 @@ fn unknown<'a>(what: &str, name: &str, known: impl Iterator<Item = &'a str>) -> 
 fn distance(from: &str, to: &str) -> usize {
     let to: Vec<char> = to.chars().collect();
     let mut row: Vec<usize> = (0..=to.len()).collect();
-    for (index, letter) in from.chars().enumerate() {
+    for (index, character) in from.chars().enumerate() {
         let mut diagonal = std::mem::replace(&mut row[0], index + 1);
         for (place, other) in to.iter().enumerate() {
-            let changed = diagonal + usize::from(letter != *other);
+            let changed = diagonal + usize::from(character != *other);
             diagonal = row[place + 1];
             row[place + 1] = changed.min(diagonal + 1).min(row[place] + 1);
         }

@@ -1,6 +1,6 @@
 use std::sync::Arc;
 
-use super::{Breakpoints, Condition, Moment};
+use super::{Breakpoints, Condition, StepContext};
 use crate::estimator::{Event, EventKind, FactorKind, IterationReport, ResidualSummary};
 use crate::gimbal::tests::parameter;
 use crate::observability::RankReport;
@@ -57,7 +57,7 @@ fn steps() -> [StepRecord; 2] {
 fn holds(text: &str) -> Option<bool> {
     let (rig, _) = sample();
     let [before, step] = steps();
-    condition(text).holds(&Moment { step: &step, previous: Some(&before), names: &rig.parameter_names() })
+    condition(text).holds(&StepContext { step: &step, previous: Some(&before), names: &rig.parameter_names() })
 }
 
 #[test]
@@ -90,12 +90,12 @@ fn conditions_are_read_and_evaluated() {
 }
 
 #[test]
-fn what_is_missing_decides_nothing() {
+fn missing_values_make_no_condition_true() {
     let (rig, _) = sample();
     let [_, mut step] = steps();
     step.rank = None;
     let check = |text: &str, expected: Option<bool>| {
-        let found = condition(text).holds(&Moment { step: &step, previous: None, names: &rig.parameter_names() });
+        let found = condition(text).holds(&StepContext { step: &step, previous: None, names: &rig.parameter_names() });
         assert_eq!(found, expected, "{text}");
     };
     check("rank < 18", None);
@@ -111,7 +111,7 @@ fn what_is_missing_decides_nothing() {
 }
 
 #[test]
-fn mistakes_are_told_with_their_column() {
+fn mistakes_are_reported_with_their_column() {
     let check = |text: &str, column: usize, words: &[&str]| {
         let problem = text.parse::<Condition>().unwrap_err();
         assert_eq!(problem.column, column, "{problem}");
@@ -167,13 +167,13 @@ fn names_that_no_run_has_are_found() {
 }
 
 #[test]
-fn the_values_of_a_condition_are_told_as_written() {
+fn values_of_a_condition_are_reported_with_their_text() {
     let (rig, _) = sample();
     let [before, step] = steps();
     let names = rig.parameter_names();
-    let moment = Moment { step: &step, previous: Some(&before), names: &names };
+    let context = StepContext { step: &step, previous: Some(&before), names: &names };
     let told: Vec<String> = condition("rank < 18 or rise(rms) > 0.1 and rank > chi2(imu) + 2")
-        .values(&moment)
+        .values(&context)
         .iter()
         .map(ToString::to_string)
         .collect();

@@ -11,7 +11,7 @@ use crate::sensors::JointAngles;
 pub(super) struct AlteredMeasurements {
     pub(super) dropped: BTreeSet<u64>,
     /// Indices of cameras whose tracks are not used.
-    pub(super) left_out: BTreeSet<usize>,
+    pub(super) disabled_cameras: BTreeSet<usize>,
     pub(super) encoder_off: bool,
     pub(super) joint_noise_rad: f64,
     pub(super) encoder_noise: f64,
@@ -21,7 +21,7 @@ impl Default for AlteredMeasurements {
     fn default() -> Self {
         Self {
             dropped: BTreeSet::new(),
-            left_out: BTreeSet::new(),
+            disabled_cameras: BTreeSet::new(),
             encoder_off: false,
             joint_noise_rad: 0.0,
             encoder_noise: 1.0,
@@ -33,7 +33,7 @@ impl AlteredMeasurements {
     /// Adds the changes of a fork to those of its parent.
     pub(super) fn add(&mut self, other: Self) {
         self.dropped.extend(other.dropped);
-        self.left_out.extend(other.left_out);
+        self.disabled_cameras.extend(other.disabled_cameras);
         self.encoder_off |= other.encoder_off;
         self.joint_noise_rad = self.joint_noise_rad.hypot(other.joint_noise_rad);
         self.encoder_noise *= other.encoder_noise;
@@ -46,8 +46,8 @@ impl AlteredMeasurements {
 
     /// The tracks of a camera without the dropped features, `None` where no feature is dropped.
     pub(super) fn tracks(&self, camera: usize, tracks: &TrackedFrame) -> Option<TrackedFrame> {
-        let left_out = self.left_out.contains(&camera);
-        let gone = |id: FeatureId| left_out || self.dropped.contains(&id.of_camera(camera).0);
+        let disabled = self.disabled_cameras.contains(&camera);
+        let gone = |id: FeatureId| disabled || self.dropped.contains(&id.of_camera(camera).0);
         tracks.features.iter().any(|feature| gone(feature.id)).then(|| {
             let mut kept = tracks.clone();
             kept.features.retain(|feature| !gone(feature.id));
@@ -99,7 +99,7 @@ mod tests {
         let errors: Vec<f64> = (0..2000)
             .map(|stamp_ns| altered_measurements.joint_angles(&angles, stamp_ns).unwrap().angles_rad[1] - 0.2)
             .collect();
-        let deviation = (errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt();
-        assert!((deviation - 0.05).abs() < 0.003, "{deviation}");
+        let measured_sigma = (errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt();
+        assert!((measured_sigma - 0.05).abs() < 0.003, "{measured_sigma}");
     }
 }

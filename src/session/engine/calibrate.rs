@@ -17,7 +17,7 @@ use crate::sensors::{CameraMount, CameraRig, ChainPrior, GimbalRig, Rig};
 use crate::session::plan::{ParameterizationChoice, RunSpec, SessionError};
 
 /// Fraction of the progress that feature tracking takes.
-const TRACKING_PART: f64 = 0.6;
+const TRACKING_RATIO: f64 = 0.6;
 /// Ratio of the bound of a uniform error to its standard deviation: √3.
 const BOUND_PER_SIGMA: f64 = 1.732_050_807_568_877_2;
 
@@ -108,17 +108,20 @@ pub fn calibrate(
     let log = Arc::new(FlightLog::open(&request.log_path)?);
     let given_rig = Rig::for_log(&log, request.rig_path.as_deref())?;
     let ground_truth_rig = Rig::ground_truth_for_log(&log, request.ground_truth_path.as_deref())?;
-    let parts = RigParts::of(&given_rig, request)?;
-    let (input, warnings) = track(&log, &given_rig, &parts, request, on_progress)?;
+    let entries = CalibratedEntries::of(&given_rig, request)?;
+    let (input, warnings) = track(&log, &given_rig, &entries, request, on_progress)?;
     let outcome = calibration::calibrate(&input, options, &mut |progress| {
-        on_progress(CalibrationProgress { share: TRACKING_PART + (1.0 - TRACKING_PART) * progress.share, ..progress });
+        on_progress(CalibrationProgress {
+            share: TRACKING_RATIO + (1.0 - TRACKING_RATIO) * progress.share,
+            ..progress
+        });
     })
     .map_err(|reason| CalibrationRunError::Calibration { reason, path: request.log_path.clone() })?;
     Ok(CalibrationRun {
         log_path: request.log_path.clone(),
-        rig: calibrated(&given_rig, &parts, &outcome),
-        static_camera: parts.static_camera.key.clone(),
-        gimbal_camera: parts.gimbal_camera.key.clone(),
+        rig: calibrated(&given_rig, &entries, &outcome),
+        static_camera: entries.static_camera.key.clone(),
+        gimbal_camera: entries.gimbal_camera.key.clone(),
         given_rig,
         ground_truth_rig,
         outcome,
@@ -128,14 +131,14 @@ pub fn calibrate(
 
 /// The entries of a rig that are calibrated.
 #[derive(Clone, Debug)]
-struct RigParts {
+struct CalibratedEntries {
     static_camera: CameraRig,
     imu_from_camera: RigidTransform,
     gimbal_camera: CameraRig,
     gimbal: GimbalRig,
 }
 
-impl RigParts {
+impl CalibratedEntries {
     fn of(rig: &Rig, request: &CalibrationRequest) -> Result<Self, CalibrationRunError> {
         let missing = |missing: &'static str, remedy: &'static str| CalibrationRunError::Missing {
             rig: rig.name.clone(),
@@ -176,25 +179,25 @@ impl RigParts {
 fn track(
     log: &Arc<FlightLog>,
     rig: &Rig,
-    parts: &RigParts,
+    entries: &CalibratedEntries,
     request: &CalibrationRequest,
     on_progress: &mut dyn FnMut(CalibrationProgress),
 ) -> Result<(CalibrationInput, Vec<LogWarning>), CalibrationRunError> {
     let tracker =
         |camera: &CameraRig| CameraTracker::new(Arc::clone(log), rig, &camera.key, request.start_s, request.duration_s);
-    let (mut of_static, mut of_gimbal) = (tracker(&parts.static_camera)?, tracker(&parts.gimbal_camera)?);
+    let (mut of_static, mut of_gimbal) = (tracker(&entries.static_camera)?, tracker(&entries.gimbal_camera)?);
     let end_s = seconds_from_ns(log.duration_ns()) - request.start_s;
     let length_s = request.duration_s.map_or(end_s, |duration_s| duration_s.min(end_s)).max(1e-3);
     let (static_result, gimbal_result) = std::thread::scope(|scope| {
-        let gimbal = scope.spawn(|| views(&mut of_gimbal, &parts.gimbal_camera, &mut |_| {}));
-        let rigid = views(&mut of_static, &parts.static_camera, &mut |stamp_ns| {
-            let share = TRACKING_PART * (seconds_from_ns(stamp_ns) - request.start_s) / length_s;
+        let gimbal = scope.spawn(|| views(&mut of_gimbal, &entries.gimbal_camera, &mut |_| {}));
+        let rigid = views(&mut of_static, &entries.static_camera, &mut |stamp_ns| {
+            let share = TRACKING_RATIO * (seconds_from_ns(stamp_ns) - request.start_s) / length_s;
             on_progress(CalibrationProgress { stage: "tracking both cameras", share });
         });
         (rigid, gimbal.join())
     });
     let Ok((gimbal_views, gimbal_warnings)) = gimbal_result else {
-        let camera = parts.gimbal_camera.key.clone();
+        let camera = entries.gimbal_camera.key.clone();
         return Err(CalibrationRunError::Tracking { camera, path: request.log_path.clone() });
     };
     let (static_views, mut warnings) = static_result;
@@ -204,25 +207,25 @@ fn track(
     warnings.dedup();
     let spec = RunSpec {
         parameterization: ParameterizationChoice::Static,
-        camera_key: Some(parts.static_camera.key.clone()),
+        camera_key: Some(entries.static_camera.key.clone()),
         ..RunSpec::default()
     };
     let mut estimator = estimator_config(rig, &spec)?;
     estimator.options.keep_linearization = false;
     let input = CalibrationInput {
         static_camera: StaticCamera {
-            key: parts.static_camera.key.clone(),
-            model: parts.static_camera.model.clone(),
-            imu_from_camera: parts.imu_from_camera,
-            prior: rig.extrinsics_prior(&parts.static_camera),
+            key: entries.static_camera.key.clone(),
+            model: entries.static_camera.model.clone(),
+            imu_from_camera: entries.imu_from_camera,
+            prior: rig.extrinsics_prior(&entries.static_camera),
             views: static_views,
         },
         gimbal_camera: GimbalCamera {
-            key: parts.gimbal_camera.key.clone(),
-            model: parts.gimbal_camera.model.clone(),
-            chain: parts.gimbal.chain.clone(),
-            joints: parts.gimbal.joints.iter().map(|joint| joint.name.clone()).collect(),
-            prior: rig.extrinsics_prior(&parts.gimbal_camera),
+            key: entries.gimbal_camera.key.clone(),
+            model: entries.gimbal_camera.model.clone(),
+            chain: entries.gimbal.chain.clone(),
+            joints: entries.gimbal.joints.iter().map(|joint| joint.name.clone()).collect(),
+            prior: rig.extrinsics_prior(&entries.gimbal_camera),
             views: gimbal_views,
         },
         imu_noise: rig.imu.noise,
@@ -256,17 +259,17 @@ fn views(
 
 /// The rig with the calibrated values. Its prior bounds are √3 times the largest standard deviation of a parameter,
 /// because they are bounds of a uniform error.
-fn calibrated(rig: &Rig, parts: &RigParts, outcome: &CalibrationOutcome) -> Rig {
+fn calibrated(rig: &Rig, entries: &CalibratedEntries, outcome: &CalibrationOutcome) -> Rig {
     let mut calibrated = rig.clone();
     let largest = |dimension: Dimension| {
         let sigmas = outcome.parameters.iter().filter(|found| found.parameter.dimension() == dimension);
         BOUND_PER_SIGMA * sigmas.map(|parameter| parameter.sigma).fold(0.0, f64::max)
     };
     for camera in &mut calibrated.cameras {
-        if camera.key == parts.static_camera.key {
+        if camera.key == entries.static_camera.key {
             camera.mount = CameraMount::Static { imu_from_camera: outcome.mount.imu_from_camera };
             camera.timeshift_cam_imu_s += outcome.mount.time_shift_s.0;
-        } else if camera.key == parts.gimbal_camera.key {
+        } else if camera.key == entries.gimbal_camera.key {
             camera.timeshift_cam_imu_s += outcome.gimbal_time_shift_s.0;
         }
     }

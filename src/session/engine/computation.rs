@@ -10,7 +10,7 @@ use crate::session::plan::SessionPlan;
 use crate::session::record::{Recording, RunRecord, SolverPosition, SolverTrace, StepFactorRows, StepRecord};
 
 /// Inverse of the ratio of the memory budget that estimator snapshots may take.
-const SNAPSHOT_PART: usize = 4;
+const SNAPSHOT_BUDGET_DIVISOR: usize = 4;
 
 /// The runs of a session as far as they are computed: their record, and for each run the history from which any of its
 /// steps can be recomputed to the same bits.
@@ -114,7 +114,7 @@ impl Computation {
 
     /// Divides the snapshot memory equally among the runs.
     fn divide_snapshot_memory(&self) {
-        let each = self.recording.memory_budget_bytes / SNAPSHOT_PART / self.recording.runs.len().max(1);
+        let each = self.recording.memory_budget_bytes / SNAPSHOT_BUDGET_DIVISOR / self.recording.runs.len().max(1);
         self.histories.values().for_each(|history| history.set_budget(each));
     }
 
@@ -143,7 +143,9 @@ impl Computation {
     pub fn fill_in(&mut self, stamp_ns: i64) {
         for run in 0..self.recording.runs.len() {
             let record = &self.recording.runs[run];
-            let Some(number) = record.index_at(stamp_ns).filter(|number| record.lacks(*number)) else { continue };
+            let Some(number) = record.index_at(stamp_ns).filter(|number| record.has_only_summary(*number)) else {
+                continue;
+            };
             let steps = self.recompute(run, number, 1);
             self.recording_mut().runs[run].add_recomputed(number, steps);
         }
@@ -151,8 +153,8 @@ impl Computation {
 
     /// Recomputes step `last` of a run and up to `max_count - 1` steps before it from the nearest snapshot of the
     /// estimator. Returns the steps with their indices in ascending order; empty for a step that has not been computed.
-    pub fn recompute(&self, run: usize, last: usize, most: usize) -> Vec<(usize, StepRecord)> {
-        self.history(run).map_or_else(Vec::new, |history| history.recompute(last, most))
+    pub fn recompute(&self, run: usize, last: usize, max_count: usize) -> Vec<(usize, StepRecord)> {
+        self.history(run).map_or_else(Vec::new, |history| history.recompute(last, max_count))
     }
 
     /// A complete step of a run, recomputed where only its summary is kept. The result is the same to the bit except

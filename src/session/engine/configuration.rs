@@ -5,11 +5,11 @@ use crate::estimator::{EstimatorConfig, EstimatorOptions, RigidCamera};
 use crate::flight_log::LogError;
 use crate::gimbal::{Parameterization, auto_parameterization};
 use crate::sensors::Rig;
-use crate::session::plan::{ParameterizationChoice, RunSpec, SessionError, WatchedCameras, cameras_of_run};
+use crate::session::plan::{ParameterizationChoice, RunCameras, RunSpec, SessionError, cameras_of_run};
 
 /// The configuration of the estimator of a run.
 pub(in crate::session) fn estimator_config(rig: &Rig, spec: &RunSpec) -> Result<EstimatorConfig, SessionError> {
-    let WatchedCameras { main: camera, rigid } = cameras_of_run(rig, spec)?;
+    let RunCameras { main: camera, rigid } = cameras_of_run(rig, spec)?;
     let chain = rig.chain_of_camera(&camera.key).unwrap_or_default();
     let parameterization = match spec.parameterization {
         ParameterizationChoice::Auto | ParameterizationChoice::Cluster => auto_parameterization(&chain),

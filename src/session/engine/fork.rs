@@ -16,7 +16,7 @@ pub(in crate::session) fn apply_fork(
     rig: &Rig,
     camera_key: &str,
 ) -> Result<(), ForkError> {
-    let left_out = left_out(changes, &engine.camera_keys(camera_key))?;
+    let disabled_cameras = disabled_cameras(changes, &engine.camera_keys(camera_key))?;
     let estimator = engine.estimator_mut();
     if let Some(choice) = changes.parameterization {
         let (parameterization, auto_parameterize) = match choice {
@@ -47,12 +47,12 @@ pub(in crate::session) fn apply_fork(
     estimator.scale_pixel_noise(changes.pixel_noise);
     let dropped = changes.dropped.clone();
     for camera in 0..engine.cameras() {
-        let all = left_out.contains(&camera);
+        let all = disabled_cameras.contains(&camera);
         engine.estimator_mut().drop_features(camera, |id| all || dropped.contains(&id.of_camera(camera).0));
     }
     engine.alter(AlteredMeasurements {
         dropped: changes.dropped.clone(),
-        left_out,
+        disabled_cameras,
         encoder_off: changes.encoder_off,
         joint_noise_rad: changes.joint_noise_rad,
         encoder_noise: changes.encoder_noise,
@@ -61,13 +61,13 @@ pub(in crate::session) fn apply_fork(
 }
 
 /// Indices of the disabled cameras in `keys`.
-fn left_out(changes: &ForkChanges, keys: &[String]) -> Result<BTreeSet<usize>, ForkError> {
+fn disabled_cameras(changes: &ForkChanges, keys: &[String]) -> Result<BTreeSet<usize>, ForkError> {
     let number = |key: &String| keys.iter().position(|known| known == key);
     let missing = |key: &String| ForkError::NoCamera { camera: key.clone(), present: keys.join(", ") };
-    let left_out: BTreeSet<usize> =
+    let disabled_cameras: BTreeSet<usize> =
         changes.without.iter().map(|key| number(key).ok_or_else(|| missing(key))).collect::<Result<_, _>>()?;
-    if left_out.len() == keys.len() {
+    if disabled_cameras.len() == keys.len() {
         return Err(ForkError::Blind { without: keys.join(", ") });
     }
-    Ok(left_out)
+    Ok(disabled_cameras)
 }

@@ -14,7 +14,7 @@ use crate::estimator::FactorRows;
 use crate::session::record::StepRecord;
 
 /// Steps between two snapshots while the budget allows all of them.
-const CLOSEST_SPACING: usize = 16;
+const MIN_SPACING: usize = 16;
 
 /// Number and memory of the kept estimator snapshots.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -61,7 +61,7 @@ impl History {
 
     fn with(inputs: Arc<StepInputs>, begin: usize, parent: Option<Arc<Self>>, budget_bytes: usize) -> Self {
         let snapshots =
-            Snapshots { kept: BTreeMap::new(), spacing: CLOSEST_SPACING, bytes: 0, budget_bytes, input_bytes: 0 };
+            Snapshots { kept: BTreeMap::new(), spacing: MIN_SPACING, bytes: 0, budget_bytes, input_bytes: 0 };
         Self { inputs, begin, parent, snapshots: Mutex::new(snapshots) }
     }
 
@@ -122,7 +122,7 @@ impl History {
         let (at, snapshot) = self.snapshot_before(step)?;
         let mut engine = RunEngine::clone(&snapshot);
         for number in at..step {
-            engine.pass(&*self.inputs.get(number)?);
+            engine.step_without_rank(&*self.inputs.get(number)?);
         }
         Some(engine)
     }
@@ -135,22 +135,25 @@ impl History {
 
     /// Recomputes the steps up to `last` from the snapshot before it. Returns the last `max_count` of them with their
     /// indices; empty for a step that has not been computed.
-    pub(in crate::session) fn recompute(&self, last: usize, most: usize) -> Vec<(usize, StepRecord)> {
-        self.recompute_while(last, most, &|| true).unwrap_or_default()
+    pub(in crate::session) fn recompute(&self, last: usize, max_count: usize) -> Vec<(usize, StepRecord)> {
+        self.recompute_while(last, max_count, &|| true).unwrap_or_default()
     }
 
     /// As [`History::recompute`], but returns `None` as soon as `wanted` returns false.
     pub(in crate::session) fn recompute_while(
         &self,
         last: usize,
-        most: usize,
+        max_count: usize,
         wanted: &dyn Fn() -> bool,
     ) -> Option<Vec<(usize, StepRecord)>> {
         if last < self.begin {
-            return self.parent.as_ref().map_or_else(|| Some(Vec::new()), |it| it.recompute_while(last, most, wanted));
+            return self
+                .parent
+                .as_ref()
+                .map_or_else(|| Some(Vec::new()), |it| it.recompute_while(last, max_count, wanted));
         }
         let Some((at, snapshot)) = self.snapshot_before(last) else { return Some(Vec::new()) };
-        let first = (last + 1).saturating_sub(most.max(1)).max(at);
+        let first = (last + 1).saturating_sub(max_count.max(1)).max(at);
         let mut engine = RunEngine::clone(&snapshot);
         let mut steps = Vec::new();
         for number in at..=last {
@@ -159,7 +162,7 @@ impl History {
                 return None;
             }
             if number < first {
-                engine.pass(&input);
+                engine.step_without_rank(&input);
             } else {
                 steps.push((number, engine.step(&input)));
             }

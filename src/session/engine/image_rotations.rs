@@ -23,9 +23,9 @@ const PIXEL_SIGMA_PX: f64 = 0.5;
 /// because the rig is checked.
 const ROTATION_SIGMA_RAD: f64 = 0.3;
 /// Minimum number of common features for a rotation.
-const FEWEST_PAIRS: usize = 30;
+const MIN_PAIRS: usize = 30;
 /// Minimum ratio of inliers for a rotation.
-const LEAST_INLIER_RATIO: f64 = 0.6;
+const MIN_INLIER_RATIO: f64 = 0.6;
 
 /// Rotations between consecutive images of some sections of the log, for every camera of the rig that the log has.
 ///
@@ -78,11 +78,11 @@ fn rotation_between(first: &TrackedFrame, second: &TrackedFrame, sigma_rad: f64)
         first.features.iter().map(|feature| (feature.id, feature.bearing)).collect();
     let pairs: Vec<(Vector3<f64>, Vector3<f64>)> =
         second.features.iter().filter_map(|feature| Some((*before.get(&feature.id)?, feature.bearing))).collect();
-    if pairs.len() < FEWEST_PAIRS {
+    if pairs.len() < MIN_PAIRS {
         return None;
     }
     let prior = RotationPrior { rotation: UnitQuaternion::identity(), sigma_rad: ROTATION_SIGMA_RAD };
     let best = relative_poses(&pairs, &prior, sigma_rad, second.stamp_ns.unsigned_abs()).into_iter().next()?;
-    let fits = best.inliers.len() as f64 >= LEAST_INLIER_RATIO * pairs.len() as f64;
+    let fits = best.inliers.len() as f64 >= MIN_INLIER_RATIO * pairs.len() as f64;
     fits.then_some(best.camera_j_from_camera_i.rotation)
 }

@@ -187,7 +187,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn prefetching_gives_way_to_requests_at_the_cursor() {
+    fn requests_at_the_cursor_cancel_a_prefetch() {
         let history = Arc::new(History::new(0));
         let request = |step, prefetch| RecomputeRequest {
             run: 1,

@@ -82,7 +82,7 @@ impl RunEngine {
     }
 
     /// Runs the same step without the observability analysis. The estimator ends in the same state.
-    pub(in crate::session) fn pass(&mut self, input: &OwnedStepInput) {
+    pub(in crate::session) fn step_without_rank(&mut self, input: &OwnedStepInput) {
         let keep = self.estimator.config().options.keep_linearization;
         self.estimator.set_keep_linearization(false);
         drop(self.estimate(input));

@@ -119,7 +119,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn whoever_waits_for_an_input_gets_it_or_the_end() {
+    fn a_waiting_reader_receives_the_input_or_the_end() {
         let inputs = Arc::new(StepInputs::default());
         let waiting = Arc::clone(&inputs);
         let reader = std::thread::Builder::new().spawn(move || {

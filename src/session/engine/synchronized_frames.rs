@@ -10,11 +10,11 @@ use crate::sensors::ImuSample;
 
 /// Largest difference of stamps in a synchronized frame set. At an angular rate of 3 rad/s the vehicle rotates by 0.1°
 /// in that time, which is about one pixel.
-const TOGETHER_NS: i64 = 500_000;
+const MAX_STAMP_DIFFERENCE_NS: i64 = 500_000;
 /// After this many images of each camera without a partner, the cameras are not synchronized.
-const LONE_IMAGES: usize = 10;
+const MAX_UNPAIRED_IMAGES: usize = 10;
 /// Offset of the indices of images where the main camera has none; larger than any index of the main camera.
-const BESIDE_MAIN: usize = 1 << 30;
+const MISSING_IMAGE_OFFSET: usize = 1 << 30;
 
 /// The reason why a run cannot use its cameras together.
 #[derive(Debug, Error, PartialEq)]
@@ -22,9 +22,9 @@ const BESIDE_MAIN: usize = 1 << 30;
     "the images of {first} and {second} were not taken together: those of {second} are {offset_ms:+.2} ms from those of \
      {first} (median of {count}, at most {:.1} ms is allowed); trigger both cameras at once, or correct \
      timeshift_cam_imu in the rig if there is a time offset, or use one camera each in two runs",
-    TOGETHER_NS as f64 * 1e-6
+    MAX_STAMP_DIFFERENCE_NS as f64 * 1e-6
 )]
-pub(in crate::session) struct NotSynchronized {
+pub(in crate::session) struct SynchronizationError {
     first: String,
     second: String,
     offset_ms: f64,
@@ -39,7 +39,7 @@ struct CameraInputs {
     next: Option<Arc<OwnedStepInput>>,
     ended: bool,
     /// Stamps of images since the last set with several images.
-    lone_ns: Vec<i64>,
+    unpaired_ns: Vec<i64>,
 }
 
 impl CameraInputs {
@@ -71,13 +71,13 @@ impl SynchronizedFrames {
     pub(super) fn new(cameras: impl IntoIterator<Item = (String, Receiver<Arc<OwnedStepInput>>)>) -> Self {
         let cameras = cameras
             .into_iter()
-            .map(|(key, inputs)| CameraInputs { key, inputs, next: None, ended: false, lone_ns: Vec::new() })
+            .map(|(key, inputs)| CameraInputs { key, inputs, next: None, ended: false, unpaired_ns: Vec::new() })
             .collect();
         Self { cameras, end: None, main_shift_ns: None }
     }
 
     /// The next set; waits for it. `None` at the end of all streams.
-    pub(super) fn next(&mut self) -> Result<Option<Arc<OwnedStepInput>>, NotSynchronized> {
+    pub(super) fn next(&mut self) -> Result<Option<Arc<OwnedStepInput>>, SynchronizationError> {
         self.cameras.iter_mut().for_each(CameraInputs::wait);
         if let [camera] = self.cameras.as_mut_slice() {
             return Ok(camera.next.take());
@@ -85,9 +85,9 @@ impl SynchronizedFrames {
         let Some(first_ns) = self.cameras.iter().filter_map(CameraInputs::next_ns).min() else { return Ok(None) };
         let mut frames = Vec::with_capacity(self.cameras.len());
         for camera in &mut self.cameras {
-            let stamp_ns = camera.next_ns().filter(|stamp_ns| stamp_ns - first_ns <= TOGETHER_NS);
+            let stamp_ns = camera.next_ns().filter(|stamp_ns| stamp_ns - first_ns <= MAX_STAMP_DIFFERENCE_NS);
             frames.push(if stamp_ns.is_some() { camera.next.take() } else { None });
-            camera.lone_ns.extend(stamp_ns);
+            camera.unpaired_ns.extend(stamp_ns);
         }
         self.check_together(&frames)?;
         Ok(self.combined(&frames).map(Arc::new))
@@ -114,7 +114,7 @@ impl SynchronizedFrames {
             frame.as_ref().map_or_else(Arc::default, |frame| Arc::clone(frame.main_tracks()))
         };
         Some(OwnedStepInput {
-            frame_index: if main.is_some() { any.frame_index } else { BESIDE_MAIN + any.frame_index },
+            frame_index: if main.is_some() { any.frame_index } else { MISSING_IMAGE_OFFSET + any.frame_index },
             stamp_ns: self.main_shift_ns.map_or(any.stamp_ns, |shift_ns| any.imu_stamp_ns() - shift_ns),
             log_time_ns: any.log_time_ns,
             imu,
@@ -125,18 +125,18 @@ impl SynchronizedFrames {
         })
     }
 
-    fn check_together(&mut self, frames: &[Option<Arc<OwnedStepInput>>]) -> Result<(), NotSynchronized> {
+    fn check_together(&mut self, frames: &[Option<Arc<OwnedStepInput>>]) -> Result<(), SynchronizationError> {
         if frames.iter().flatten().count() > 1 {
-            self.cameras.iter_mut().for_each(|camera| camera.lone_ns.clear());
+            self.cameras.iter_mut().for_each(|camera| camera.unpaired_ns.clear());
         }
         let [first, second] = self.cameras.as_slice() else { return Ok(()) };
-        if first.lone_ns.len().min(second.lone_ns.len()) < LONE_IMAGES {
+        if first.unpaired_ns.len().min(second.unpaired_ns.len()) < MAX_UNPAIRED_IMAGES {
             return Ok(());
         }
         let mut offsets_ns: Vec<i64> =
-            second.lone_ns.iter().filter_map(|at| nearest_offset(*at, &first.lone_ns)).collect();
+            second.unpaired_ns.iter().filter_map(|at| nearest_offset(*at, &first.unpaired_ns)).collect();
         offsets_ns.sort_unstable();
-        Err(NotSynchronized {
+        Err(SynchronizationError {
             first: first.key.clone(),
             second: second.key.clone(),
             offset_ms: offsets_ns[offsets_ns.len() / 2] as f64 * 1e-6,
@@ -219,7 +219,7 @@ mod tests {
             assert_eq!(input.frontend_ms, (0..2).filter(|camera| has(*camera)).count() as f64);
             seen.push([has(0), has(1)]);
             // The index of the main camera's image where there is one, else an index that no image of it has.
-            assert_eq!(input.frame_index < BESIDE_MAIN, has(0));
+            assert_eq!(input.frame_index < MISSING_IMAGE_OFFSET, has(0));
         }
         assert_eq!(seen.len(), 12);
         assert_eq!((seen[4], seen[7], seen[9]), ([false, true], [true, false], [true, false]));
@@ -227,15 +227,15 @@ mod tests {
     }
 
     #[test]
-    fn cameras_that_are_not_synchronized_are_refused_with_their_offset() {
+    fn unsynchronized_cameras_are_rejected_with_their_offset() {
         let mut sets = frame_sets(&periods(40, 0), &periods(40, -12_300_000));
-        let refused = loop {
+        let rejected = loop {
             match sets.next() {
                 Ok(input) => assert!(input.is_some(), "not refused"),
-                Err(refused) => break refused.to_string(),
+                Err(rejected) => break rejected.to_string(),
             }
         };
-        assert!(refused.contains("cam1 are -12.30 ms") && refused.contains("timeshift_cam_imu"), "{refused}");
+        assert!(rejected.contains("cam1 are -12.30 ms") && rejected.contains("timeshift_cam_imu"), "{rejected}");
     }
 
     #[test]

@@ -21,9 +21,9 @@ use super::tracker::CameraTracker;
 use crate::session::plan::{SessionError, SessionPlan, cameras_of_run};
 
 /// Capacity in frames of the queue between a tracker and an estimator.
-const QUEUED_FRAMES: usize = 8;
+const FRAME_QUEUE_CAPACITY: usize = 8;
 /// Capacity in steps of the queue to the collector.
-const QUEUED_STEPS: usize = 64;
+const STEP_QUEUE_CAPACITY: usize = 64;
 
 /// The running threads. Dropping it stops them.
 #[derive(Debug)]
@@ -36,7 +36,7 @@ pub(in crate::session) struct Engine {
 
 impl Default for Engine {
     fn default() -> Self {
-        let (sender, receiver) = sync_channel(QUEUED_STEPS);
+        let (sender, receiver) = sync_channel(STEP_QUEUE_CAPACITY);
         Self {
             sender: Some(sender),
             receiver: Some(receiver),
@@ -67,7 +67,7 @@ impl Engine {
             let (spec, _) = &plan.runs[run];
             let mut frames = Vec::new();
             for camera in cameras_of_run(&plan.rig, spec)?.iter() {
-                let (queue, receiver) = sync_channel(QUEUED_FRAMES);
+                let (queue, receiver) = sync_channel(FRAME_QUEUE_CAPACITY);
                 queues.entry(&camera.key).or_default().push(queue);
                 frames.push((camera.key.clone(), receiver));
             }

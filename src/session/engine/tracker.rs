@@ -18,13 +18,13 @@ pub(super) struct CameraTracker {
     front_end: FrontEnd,
     chain: ClassicalChain,
     noise: PredictionNoise,
-    previous_mount: Option<ChainOrientation>,
+    previous_orientation: Option<ChainOrientation>,
 }
 
 /// Standard deviation of a gyroscope's turn-on bias, in rad/s (1.1°/s, a small MEMS IMU).
 const GYROSCOPE_BIAS_SIGMA_RAD_PER_S: f64 = 0.02;
 /// Standard deviation of the orientation of a rigid camera's extrinsics, in radians (0.6°).
-const RIGID_MOUNT_SIGMA_RAD: f64 = 0.01;
+const RIGID_EXTRINSICS_SIGMA_RAD: f64 = 0.01;
 
 impl CameraTracker {
     /// Starts at a stamp of the log.
@@ -42,35 +42,35 @@ impl CameraTracker {
             front_end: FrontEnd::new(camera.model.clone(), FrontEndOptions::default()),
             chain: rig.chain_of_camera(camera_key).unwrap_or_default(),
             noise: prediction_noise(rig, &camera.mount),
-            previous_mount: None,
+            previous_orientation: None,
         })
     }
 
     /// The next step input of this camera and the new warnings about the log, `None` at the end of the stream. An image
     /// that the front end rejects is skipped with a warning.
     pub(super) fn next_input(&mut self) -> Option<(OwnedStepInput, Vec<LogWarning>)> {
-        let mut refused = Vec::new();
+        let mut rejected = Vec::new();
         loop {
             let mut frame = self.stream.next_frame()?;
             let watch = Stopwatch::start();
-            let mount = self.mount(&frame);
-            let predicted = match (&self.previous_mount, &mount) {
+            let orientation = self.camera_orientation(&frame);
+            let predicted = match (&self.previous_orientation, &orientation) {
                 // The gyroscope bias is not removed here: over one frame it rotates the image by two pixels at most.
                 (Some(previous), Some(now)) => {
                     predict_camera_rotation(&frame.imu, &Vector3::zeros(), previous, now, &self.noise)
                 }
                 _ => None,
             };
-            self.previous_mount = mount;
+            self.previous_orientation = orientation;
             match self.front_end.process(&frame.image, frame.stamp_ns, predicted.as_ref()) {
                 Ok(tracks) => {
-                    frame.warnings.append(&mut refused);
+                    frame.warnings.append(&mut rejected);
                     let warnings = std::mem::take(&mut frame.warnings);
                     return Some((OwnedStepInput::of_camera(frame, tracks, watch.elapsed_ms()), warnings));
                 }
                 Err(error) => {
-                    refused.append(&mut frame.warnings);
-                    refused.push(LogWarning { stamp_ns: frame.stamp_ns, message: format!("image left out: {error}") });
+                    rejected.append(&mut frame.warnings);
+                    rejected.push(LogWarning { stamp_ns: frame.stamp_ns, message: format!("image left out: {error}") });
                 }
             }
         }
@@ -82,7 +82,7 @@ impl CameraTracker {
     }
 
     /// Orientation `imu_from_camera` from rig and encoders, `None` when a joint angle is missing.
-    fn mount(&self, frame: &SensorFrame) -> Option<ChainOrientation> {
+    fn camera_orientation(&self, frame: &SensorFrame) -> Option<ChainOrientation> {
         let (angles_rad, sigmas_rad) = match &frame.joint_angles {
             // Encoder readings of a gimbal rig do not concern its rigid camera.
             _ if self.chain.links.is_empty() => (&[][..], &[][..]),
@@ -101,6 +101,6 @@ fn prediction_noise(rig: &Rig, mount: &CameraMount) -> PredictionNoise {
         gyroscope_noise_density: rig.imu.noise.gyroscope_noise_density,
         // A uniform error of bound b has standard deviation b/√3.
         chain_rotation_rad: gimbal
-            .map_or(RIGID_MOUNT_SIGMA_RAD, |gimbal| gimbal.prior.rotation_bound_rad / 3.0_f64.sqrt()),
+            .map_or(RIGID_EXTRINSICS_SIGMA_RAD, |gimbal| gimbal.prior.rotation_bound_rad / 3.0_f64.sqrt()),
     }
 }

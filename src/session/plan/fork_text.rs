@@ -12,15 +12,15 @@ impl FromStr for ForkChanges {
     fn from_str(text: &str) -> Result<Self, ForkError> {
         let mut changes = Self::default();
         let bad = |problem: String| ForkError::BadChange { text: text.to_owned(), problem };
-        for part in text.split(',').map(str::trim).filter(|part| !part.is_empty()) {
-            let Some((key, value)) = part.split_once('=') else {
-                let choice = FORK_PARAMETERIZATIONS.into_iter().find(|choice| choice.name() == part);
+        for item in text.split(',').map(str::trim).filter(|item| !item.is_empty()) {
+            let Some((key, value)) = item.split_once('=') else {
+                let choice = FORK_PARAMETERIZATIONS.into_iter().find(|choice| choice.name() == item);
                 let known = FORK_PARAMETERIZATIONS.map(ParameterizationChoice::name).join(", ");
                 let expected = || {
-                    if ParameterizationChoice::all().any(|(name, _)| name == part) {
-                        bad(format!("'{part}' uses other cameras: {OTHER_CAMERA}; run {part} beside it instead"))
+                    if ParameterizationChoice::all().any(|(name, _)| name == item) {
+                        bad(format!("'{item}' uses other cameras: {OTHER_CAMERA}; run {item} beside it instead"))
                     } else {
-                        bad(format!("'{part}' is no parameterization that a fork can have ({known})"))
+                        bad(format!("'{item}' is no parameterization that a fork can have ({known})"))
                     }
                 };
                 changes.parameterization = Some(choice.ok_or_else(expected)?);
@@ -84,18 +84,18 @@ impl FromStr for ForkChanges {
 
 /// The items of `yaw.a:1e+3+yaw.d:2`; a plus sign after an exponent belongs to the number.
 fn several_values(text: &str) -> Vec<String> {
-    let mut parts: Vec<String> = Vec::new();
+    let mut items: Vec<String> = Vec::new();
     for piece in text.split('+') {
-        match parts.last_mut() {
+        match items.last_mut() {
             Some(last) if last.ends_with(['e', 'E']) && last.contains(':') && !piece.contains(':') => {
                 last.push('+');
                 last.push_str(piece);
             }
-            _ => parts.push(piece.trim().to_owned()),
+            _ => items.push(piece.trim().to_owned()),
         }
     }
-    parts.retain(|part| !part.is_empty());
-    parts
+    items.retain(|item| !item.is_empty());
+    items
 }
 
 /// A number with an optional unit (`deg`, `mrad`, `rad`, `mm`, `m`), in radians or metres.
@@ -110,20 +110,20 @@ fn number(text: &str) -> Option<f64> {
 impl fmt::Display for ForkChanges {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         let standard = Self::default();
-        let mut parts: Vec<String> = self.parameterization.iter().map(|choice| choice.name().to_owned()).collect();
+        let mut items: Vec<String> = self.parameterization.iter().map(|choice| choice.name().to_owned()).collect();
         if !self.frozen.is_empty() {
-            parts.push(format!("freeze={}", self.frozen.join("+")));
+            items.push(format!("freeze={}", self.frozen.join("+")));
         }
-        parts.extend(self.values.iter().map(|(name, value)| format!("set={name}:{value}")));
+        items.extend(self.values.iter().map(|(name, value)| format!("set={name}:{value}")));
         if !self.dropped.is_empty() {
             let dropped: Vec<String> = self.dropped.iter().map(u64::to_string).collect();
-            parts.push(format!("drop={}", dropped.join("+")));
+            items.push(format!("drop={}", dropped.join("+")));
         }
         if !self.without.is_empty() {
-            parts.push(format!("without={}", self.without.iter().cloned().collect::<Vec<_>>().join("+")));
+            items.push(format!("without={}", self.without.iter().cloned().collect::<Vec<_>>().join("+")));
         }
         if self.encoder_off {
-            parts.push("encoder=off".to_owned());
+            items.push("encoder=off".to_owned());
         }
         let values = [
             ("joint-noise", self.joint_noise_rad, standard.joint_noise_rad),
@@ -131,13 +131,13 @@ impl fmt::Display for ForkChanges {
             ("pixel-noise", self.pixel_noise, standard.pixel_noise),
             ("encoder-noise", self.encoder_noise, standard.encoder_noise),
         ];
-        parts.extend(
+        items.extend(
             values
                 .iter()
                 .filter(|(_, value, default)| value != default)
                 .map(|(key, value, _)| format!("{key}={value}")),
         );
-        formatter.write_str(&parts.join(","))
+        formatter.write_str(&items.join(","))
     }
 }
 
@@ -166,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn refused_changes_say_what_was_expected() {
+    fn rejected_changes_report_what_was_expected() {
         let check = |text: &str, words: &[&str]| {
             let message = text.parse::<ForkChanges>().unwrap_err().to_string();
             assert!(words.iter().all(|word| message.contains(word)), "{text}: {message}");

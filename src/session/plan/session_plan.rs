@@ -151,14 +151,14 @@ impl SessionPlan {
 
 /// The cameras of a run.
 #[derive(Clone, Debug)]
-pub(in crate::session) struct WatchedCameras<'rig> {
+pub(in crate::session) struct RunCameras<'rig> {
     /// The camera whose image is shown.
     pub(in crate::session) main: &'rig CameraRig,
     /// The second, rigid camera.
     pub(in crate::session) rigid: Option<&'rig CameraRig>,
 }
 
-impl<'rig> WatchedCameras<'rig> {
+impl<'rig> RunCameras<'rig> {
     /// The main camera, then the rigid one.
     pub(in crate::session) fn iter(&self) -> impl Iterator<Item = &'rig CameraRig> {
         std::iter::once(self.main).chain(self.rigid)
@@ -169,7 +169,7 @@ impl<'rig> WatchedCameras<'rig> {
 pub(in crate::session) fn cameras_of_run<'rig>(
     rig: &'rig Rig,
     spec: &RunSpec,
-) -> Result<WatchedCameras<'rig>, SessionError> {
+) -> Result<RunCameras<'rig>, SessionError> {
     let is_gimballed = |camera: &&CameraRig| camera.mount == CameraMount::Gimbal;
     let gimballed = || "a camera with mount: gimbal".to_owned();
     let rigid = || (rig.cameras.iter().find(|camera| !is_gimballed(camera)), "a camera with mount: static".to_owned());
@@ -199,7 +199,7 @@ pub(in crate::session) fn cameras_of_run<'rig>(
     } else {
         None
     };
-    Ok(WatchedCameras { main, rigid })
+    Ok(RunCameras { main, rigid })
 }
 
 fn describe(camera: &CameraRig) -> String {

@@ -339,7 +339,7 @@ mod tests {
     }
 
     #[test]
-    fn breakpoints_stop_the_cursor_and_a_run_waits_for_them() {
+    fn breakpoints_stop_the_cursor_and_a_run_to_one_waits() {
         let stamps = stamps();
         let breakpoints = breakpoints("tracking");
         let hit = breakpoints.next_after(sample(), i64::MIN).unwrap();

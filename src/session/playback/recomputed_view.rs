@@ -41,10 +41,10 @@ impl Session {
                 detail,
                 prefetch,
             };
-            if run.lacks(step) {
+            if run.has_only_summary(step) {
                 // Playback also needs the next steps; recomputing all of them takes no longer than the last one.
                 let end = step + if cursor.playing { STEPS_AT_ONCE } else { 1 };
-                let last = (step..end).take_while(|step| run.lacks(*step)).last().unwrap_or(step);
+                let last = (step..end).take_while(|step| run.has_only_summary(*step)).last().unwrap_or(step);
                 requests.push(request(last, Detail::Step, false));
             }
             if let Some(shown) = cursor.solver
@@ -57,7 +57,7 @@ impl Session {
                 requests.push(request(step, Detail::FactorRows, false));
             }
             // Users step back: the steps before the cursor are prefetched.
-            let before = (step.saturating_sub(STEPS_AT_ONCE)..step).rev().find(|step| run.lacks(*step));
+            let before = (step.saturating_sub(STEPS_AT_ONCE)..step).rev().find(|step| run.has_only_summary(*step));
             if let Some(before) = before.filter(|_| !cursor.playing) {
                 prefetched.push(request(before, Detail::Step, true));
             }

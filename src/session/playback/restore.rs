@@ -2,7 +2,9 @@
 
 use std::path::PathBuf;
 
-use super::saved::{Pending, SavedBreakpoint, SavedFork, SavedLog, SavedSession, SavedSessionError, VERSION, part};
+use super::saved::{
+    PendingRestore, SavedBreakpoint, SavedFork, SavedLog, SavedSession, SavedSessionError, VERSION, entry_error,
+};
 use super::session::Session;
 use crate::session::breakpoints::Condition;
 use crate::session::plan::{ForkChanges, SessionPlan};
@@ -13,10 +15,10 @@ impl SavedSession {
     pub fn open(&self) -> Result<Session, SavedSessionError> {
         let plan = SessionPlan::open(&self.request()?)?;
         let conditions: Result<Vec<Condition>, _> = self.breakpoints.iter().map(|it| it.condition.parse()).collect();
-        let conditions = conditions.map_err(part)?;
+        let conditions = conditions.map_err(entry_error)?;
         let mut forks = Vec::new();
         for fork in &self.forks {
-            let changes: ForkChanges = fork.changes.parse().map_err(part)?;
+            let changes: ForkChanges = fork.changes.parse().map_err(entry_error)?;
             forks.push((fork.clone(), changes));
         }
         let same = (plan.log.size_bytes(), plan.log.checksum()) == (self.log.bytes, self.log.crc32);
@@ -33,7 +35,7 @@ impl SavedSession {
         });
         session.markers_ns.clone_from(&self.markers_ns);
         session.markers_ns.sort_unstable();
-        session.pending = Pending { forks, cursor_ns: Some(self.cursor_ns) };
+        session.pending = PendingRestore { forks, cursor_ns: Some(self.cursor_ns) };
         session.layout.clone_from(&self.layout);
         Ok(session)
     }
@@ -155,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn a_session_comes_back_as_it_was_saved() {
+    fn a_restored_session_equals_the_saved_one() {
         // More steps than are always kept complete.
         let mut session = Session::start(garden(4.5)).unwrap();
         settled(&mut session);
@@ -194,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_session_is_refused() {
+    fn invalid_session_files_are_rejected() {
         let saved = Session::start(garden(3.0)).unwrap().saved(None);
         let refused = |text: &str| SavedSession::from_text(text).unwrap_err().to_string();
         assert!(refused("hello").contains("no saved session"));

@@ -17,7 +17,7 @@ pub(super) const VERSION: u32 = 1;
 pub enum SavedSessionError {
     /// The text does not have the format of a session.
     #[error("this is no saved session: {problem}")]
-    NoSession {
+    Format {
         /// The problem.
         problem: String,
     },
@@ -29,7 +29,7 @@ pub enum SavedSessionError {
     },
     /// A run, a fork or a breakpoint in it cannot be parsed.
     #[error("in the saved session: {problem}")]
-    Part {
+    Entry {
         /// The problem.
         problem: String,
     },
@@ -104,7 +104,7 @@ pub struct SavedBreakpoint {
 impl SavedSession {
     /// Reads what [`SavedSession::to_text`] wrote.
     pub fn from_text(text: &str) -> Result<Self, SavedSessionError> {
-        let no_session = |error: serde_json::Error| SavedSessionError::NoSession { problem: error.to_string() };
+        let no_session = |error: serde_json::Error| SavedSessionError::Format { problem: error.to_string() };
         let value: serde_json::Value = serde_json::from_str(text).map_err(no_session)?;
         let version = value.get("session_version").and_then(serde_json::Value::as_u64);
         if let Some(found) = version.and_then(|version| u32::try_from(version).ok()).filter(|found| *found > VERSION) {
@@ -127,7 +127,7 @@ impl SavedSession {
             log_path: self.log.path.clone(),
             rig_path: self.rig.clone(),
             ground_truth_path: self.ground_truth.clone(),
-            specs: specs.map_err(part)?,
+            specs: specs.map_err(entry_error)?,
             start_s: self.start_s,
             duration_s: self.duration_s,
         })
@@ -135,13 +135,13 @@ impl SavedSession {
 }
 
 #[expect(clippy::needless_pass_by_value, reason = "for map_err")]
-pub(super) fn part(error: impl ToString) -> SavedSessionError {
-    SavedSessionError::Part { problem: error.to_string() }
+pub(super) fn entry_error(error: impl ToString) -> SavedSessionError {
+    SavedSessionError::Entry { problem: error.to_string() }
 }
 
 /// The forks and the cursor position of a saved session that are still to be restored.
 #[derive(Clone, Debug, Default)]
-pub(in crate::session) struct Pending {
+pub(in crate::session) struct PendingRestore {
     pub(in crate::session) forks: Vec<(SavedFork, ForkChanges)>,
     pub(in crate::session) cursor_ns: Option<i64>,
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::command::{Command, PlaybackSpeed};
 use super::cursor::{Cursor, MoveOutcome};
-use super::saved::Pending;
+use super::saved::PendingRestore;
 use super::shared::SharedComputation;
 use crate::flight_log::ImageReader;
 use crate::geometry::ns_from_seconds;
@@ -40,7 +40,7 @@ pub struct Session {
     /// The step whose factor rows are shown.
     pub(super) factor_rows: Option<FactorRowsView>,
     /// The forks and cursor position of a saved session that are still to be restored.
-    pub(super) pending: Pending,
+    pub(super) pending: PendingRestore,
     /// The panel layout of the saved session.
     pub(super) layout: Option<serde_json::Value>,
     pub(super) notices: Vec<String>,
@@ -70,7 +70,7 @@ impl Session {
             breakpoints: Arc::default(),
             markers_ns: Vec::new(),
             factor_rows: None,
-            pending: Pending::default(),
+            pending: PendingRestore::default(),
             layout: None,
             notices: Vec::new(),
             images,
@@ -128,7 +128,7 @@ impl Session {
     }
 
     /// Whether the cursor runs to a breakpoint that the estimators have not reached yet.
-    pub fn is_running_on(&self) -> bool {
+    pub fn is_running_to_breakpoint(&self) -> bool {
         self.cursor.running_to_breakpoint
     }
 

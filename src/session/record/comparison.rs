@@ -106,7 +106,7 @@ impl Quantity {
         let ranks = || Some((a.rank.as_ref()?, b.rank.as_ref()?));
         match self {
             Self::Phase => flag((a.report.phase == Phase::Tracking) != (b.report.phase == Phase::Tracking)),
-            Self::Tracks => Some(tracks_apart(a, b)),
+            Self::Tracks => Some(track_difference(a, b)),
             Self::Keyframe => frames().and_then(|_| flag(a.report.keyframe != b.report.keyframe)),
             Self::Position => {
                 let (a, b) = frames()?;
@@ -128,7 +128,7 @@ impl Quantity {
                 let (a, b) = frames()?;
                 Some((b.gyroscope_bias_rad_per_s - a.gyroscope_bias_rad_per_s).norm())
             }
-            Self::JointAngles => frames().and_then(|(a, b)| joints_apart(a, b)),
+            Self::JointAngles => frames().and_then(|(a, b)| joint_difference(a, b)),
             Self::ChainTranslation => {
                 let (a, b) = frames()?;
                 Some((b.imu_from_camera.translation_m - a.imu_from_camera.translation_m).norm())
@@ -161,13 +161,13 @@ fn angle(a: &UnitQuaternion<f64>, b: &UnitQuaternion<f64>) -> f64 {
     if a == b { 0.0 } else { so3::log(&(a.inverse() * b)).norm() }
 }
 
-fn joints_apart(a: &FrameStateReport, b: &FrameStateReport) -> Option<f64> {
+fn joint_difference(a: &FrameStateReport, b: &FrameStateReport) -> Option<f64> {
     let (a, b) = (&a.joint_angles_rad, &b.joint_angles_rad);
     let apart = a.iter().zip(b).map(|(a, b)| wrap_angle(b - a).abs()).fold(0.0, f64::max);
     (!a.is_empty() && a.len() == b.len()).then_some(apart)
 }
 
-fn tracks_apart(a: &StepRecord, b: &StepRecord) -> f64 {
+fn track_difference(a: &StepRecord, b: &StepRecord) -> f64 {
     if std::sync::Arc::ptr_eq(&a.tracks, &b.tracks) {
         return 0.0;
     }
@@ -324,7 +324,7 @@ mod tests {
     }
 
     #[test]
-    fn a_change_diverges_at_its_frame_and_the_rest_stays() {
+    fn a_change_diverges_at_its_frame_and_nowhere_else() {
         let run = recorded(&flight(), "auto");
         let mut other = run.clone();
         let at = run.steps.len() - 20;
@@ -352,23 +352,23 @@ mod tests {
     }
 
     #[test]
-    fn another_world_is_no_difference_and_another_form_is_a_small_one() {
+    fn another_gauge_is_no_difference_and_another_parameterization_is_a_small_one() {
         let flight = flight();
         let run = recorded(&flight, "auto");
-        let mut turned = run.clone();
+        let mut rotated = run.clone();
         let world = RigidTransform::new(
             UnitQuaternion::from_axis_angle(&nalgebra::Vector3::z_axis(), 1.0),
             nalgebra::Vector3::new(3.0, -2.0, 1.0),
         );
-        for step in &mut turned.steps {
+        for step in &mut rotated.steps {
             for frame in &mut std::sync::Arc::make_mut(step).report.window {
                 frame.world_from_imu = world * frame.world_from_imu;
                 frame.velocity_m_per_s = world.rotation * frame.velocity_m_per_s;
             }
         }
-        turned.id += 1;
+        rotated.id += 1;
         let mut comparison = Comparison::default();
-        comparison.read(&run, &turned);
+        comparison.read(&run, &rotated);
         assert_eq!(comparison.first_notable(), None);
         assert!(comparison.column(Quantity::Position).iter().all(|apart| apart.is_nan() || *apart < 1e-9));
 

@@ -14,7 +14,7 @@ impl RunRecord {
     pub fn values_in(&self, rig: &Rig, given: &Rig, estimate: &CalibrationEstimate) -> Option<Vec<(ParameterId, f64)>> {
         let main = rig.chain_of_camera(&self.camera_key)?;
         let parameterization = estimate.parameterization.parse().ok()?;
-        let form = self.form_in(given, estimate, parameterization)?;
+        let form = self.conversion_for(given, estimate, parameterization)?;
         let chain = form.of(&Chain::from_classical(&main, Parameterization::Classical));
         let mut values: Vec<_> = chain.parameters().into_iter().zip(chain.values().iter().copied()).collect();
         let mut clocks = vec![(ParameterId::timeshift(0), self.camera_key.as_str())];
@@ -31,7 +31,7 @@ impl RunRecord {
     /// The conversion of mechanisms to a parameterization. Of several equivalent values it returns those nearest to the
     /// rig's, weighted by the estimate's prior standard deviations if these are in that parameterization. Returns
     /// `None` when the rig does not have the camera.
-    pub fn form_in(
+    pub fn conversion_for(
         &self,
         given: &Rig,
         estimate: &CalibrationEstimate,

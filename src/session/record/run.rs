@@ -13,7 +13,7 @@ use crate::session::accuracy::{Alignment, AlignmentSums};
 use crate::session::plan::{ForkChanges, RunSpec};
 
 /// Maximum number of recomputed steps that a run keeps beside their summaries.
-const MOST_RECOMPUTED: usize = 96;
+const MAX_RECOMPUTED: usize = 96;
 
 /// Id of the next run.
 static NEXT_ID: AtomicU64 = AtomicU64::new(0);
@@ -175,7 +175,7 @@ impl RunRecord {
     }
 
     /// Whether only the summary of a step is stored.
-    pub(in crate::session) fn lacks(&self, number: usize) -> bool {
+    pub(in crate::session) fn has_only_summary(&self, number: usize) -> bool {
         self.steps.get(number).is_some_and(|step| step.summary_only) && !self.recomputed.contains_key(&number)
     }
 
@@ -184,7 +184,7 @@ impl RunRecord {
         let summary_only = |step: usize| self.steps.get(step).is_some_and(|step| step.summary_only);
         let steps: Vec<_> = steps.into_iter().filter(|(step, _)| summary_only(*step)).collect();
         self.recomputed.extend(steps.into_iter().map(|(step, record)| (step, Arc::new(record))));
-        while self.recomputed.len() > MOST_RECOMPUTED {
+        while self.recomputed.len() > MAX_RECOMPUTED {
             let (first, last) = (self.recomputed.first_key_value(), self.recomputed.last_key_value());
             let (Some((first, _)), Some((last, _))) = (first, last) else { return };
             let farthest = if number.abs_diff(*first) > number.abs_diff(*last) { *first } else { *last };

@@ -14,13 +14,13 @@ use crate::session::tests::memory::input_of;
 use crate::simulation::{SyntheticFlight, SyntheticOptions, synthetic_tracks};
 
 /// A run on a synthetic flight, with its engine and inputs.
-struct Flown {
+struct SimulatedRun {
     flight: SyntheticFlight,
     history: Arc<History>,
     steps: Vec<StepRecord>,
 }
 
-fn flown(spec: &str) -> Flown {
+fn simulated_run(spec: &str) -> SimulatedRun {
     let flight = synthetic_tracks(&SyntheticOptions { duration_s: 6.0, ..SyntheticOptions::default() });
     let spec: RunSpec = spec.parse().unwrap();
     let config = estimator_config(&flight.given_rig, &spec).unwrap();
@@ -34,10 +34,10 @@ fn flown(spec: &str) -> Flown {
         engine.step(&input)
     });
     let steps = steps.collect();
-    Flown { flight, history, steps }
+    SimulatedRun { flight, history, steps }
 }
 
-impl Flown {
+impl SimulatedRun {
     /// Steps of a fork from step `begin` on.
     fn forked(&self, begin: usize, changes: &str) -> Result<Vec<StepRecord>, String> {
         let changes: ForkChanges = changes.parse().map_err(|error: crate::session::ForkError| error.to_string())?;
@@ -55,7 +55,7 @@ fn bits(record: &StepRecord) -> String {
 }
 
 /// Distance between the newest positions of two steps, in metres.
-fn apart_m(one: &StepRecord, other: &StepRecord) -> f64 {
+fn position_difference_m(one: &StepRecord, other: &StepRecord) -> f64 {
     let at = |record: &StepRecord| record.report.newest().unwrap().world_from_imu.translation_m;
     (at(one) - at(other)).norm()
 }
@@ -70,7 +70,7 @@ const FORK_AT: usize = 90;
 
 #[test]
 fn a_fork_without_changes_is_its_parent() {
-    let parent = flown("auto");
+    let parent = simulated_run("auto");
     for (again, step) in parent.forked(FORK_AT, "").unwrap().iter().zip(&parent.steps[FORK_AT..]) {
         assert_eq!(bits(again), bits(step));
     }
@@ -78,49 +78,53 @@ fn a_fork_without_changes_is_its_parent() {
 
 #[test]
 fn a_fork_goes_on_in_another_parameterization() {
-    let parent = flown("minimal");
+    let parent = simulated_run("minimal");
     let tracking = |step: &StepRecord| step.report.phase == Phase::Tracking && step.report.restarts == 0;
     for (changes, columns) in [("classical", 24), ("poe", 18), ("minimal-swapped", 18), ("auto", 18)] {
         let fork = parent.forked(FORK_AT, changes).unwrap();
         for (fork, parent) in fork.iter().zip(&parent.steps[FORK_AT..]) {
             assert!(tracking(fork) && fork.report.calibration.parameters.len() == columns, "{changes}");
-            let apart_m = apart_m(fork, parent);
-            assert!(apart_m < 0.01, "{changes}: {apart_m} m from the parent");
+            let position_difference_m = position_difference_m(fork, parent);
+            assert!(position_difference_m < 0.01, "{changes}: {position_difference_m} m from the parent");
         }
     }
     // The reverse direction removes the redundant columns.
-    let parent = flown("classical");
+    let parent = simulated_run("classical");
     for (fork, parent) in parent.forked(FORK_AT, "minimal").unwrap().iter().zip(&parent.steps[FORK_AT..]) {
         assert!(tracking(fork) && fork.rank.as_ref().unwrap().deficit_parameterization == 0);
-        assert!(apart_m(fork, parent) < 0.01, "{} m from the parent", apart_m(fork, parent));
+        assert!(
+            position_difference_m(fork, parent) < 0.01,
+            "{} m from the parent",
+            position_difference_m(fork, parent)
+        );
     }
 }
 
 #[test]
-fn frozen_parameters_stay_and_changed_ones_start_elsewhere() {
-    let parent = flown("auto");
+fn frozen_parameters_stay_and_changed_ones_start_at_their_values() {
+    let parent = simulated_run("auto");
     let before = &parent.steps[FORK_AT - 1];
-    let (held, _) = parameter(before, "L2.alpha");
+    let (frozen_value, _) = parameter(before, "L2.alpha");
     let fork = parent.forked(FORK_AT, "freeze=L2.alpha").unwrap();
     for step in &fork {
         let (value, sigma) = parameter(step, "L2.alpha");
-        assert!((value - held).abs() < 1e-12 && sigma == 0.0, "{value} {sigma}");
+        assert!((value - frozen_value).abs() < 1e-12 && sigma == 0.0, "{value} {sigma}");
     }
     let moved = |name: &str| (parameter(&fork[20], name).0 - parameter(before, name).0).abs();
     assert!(moved("L2.a") > 1e-9 && parameter(&fork[20], "L2.a").1 > 0.0);
 
-    let elsewhere = format!("freeze=L2.alpha,set=L2.alpha:{}", held + 0.05);
+    let elsewhere = format!("freeze=L2.alpha,set=L2.alpha:{}", frozen_value + 0.05);
     let fork = parent.forked(FORK_AT, &elsewhere).unwrap();
-    assert!((parameter(&fork[0], "L2.alpha").0 - held - 0.05).abs() < 1e-12);
+    assert!((parameter(&fork[0], "L2.alpha").0 - frozen_value - 0.05).abs() < 1e-12);
     // A parameter that is only set is estimated again.
-    let fork = parent.forked(FORK_AT, &format!("set=L2.alpha:{}", held + 0.05)).unwrap();
+    let fork = parent.forked(FORK_AT, &format!("set=L2.alpha:{}", frozen_value + 0.05)).unwrap();
     let found = parameter(fork.last().unwrap(), "L2.alpha").0;
-    assert!((found - held).abs() < 0.01, "{found} after {held}");
+    assert!((found - frozen_value).abs() < 0.01, "{found} after {frozen_value}");
 }
 
 #[test]
 fn measurements_can_be_dropped_and_disturbed() {
-    let parent = flown("auto");
+    let parent = simulated_run("auto");
     let ids: Vec<String> = parent.steps[FORK_AT].report.features[..8].iter().map(|it| it.id.0.to_string()).collect();
     let fork = parent.forked(FORK_AT, &format!("drop={}", ids.join("+"))).unwrap();
     let used = |steps: &[StepRecord], id: &String| {
@@ -148,7 +152,7 @@ fn measurements_can_be_dropped_and_disturbed() {
 }
 
 /// Norm of the IMU factor's rows between two frames in the columns of the later pose, in standard deviations.
-fn inertial_weight(flight: &SyntheticFlight, step: &StepRecord, slot: usize) -> f64 {
+fn imu_row_norm(flight: &SyntheticFlight, step: &StepRecord, slot: usize) -> f64 {
     let model = &flight.given_rig.cameras[0].model;
     let jacobian = step.report.jacobian(&[model]).unwrap();
     let (from, to) = (FrameId(step.report.window[slot - 1].frame_index), FrameId(step.report.window[slot].frame_index));
@@ -158,27 +162,30 @@ fn inertial_weight(flight: &SyntheticFlight, step: &StepRecord, slot: usize) -> 
 }
 
 #[test]
-fn inertial_noise_weakens_the_intervals_to_come_by_just_that_much() {
-    let parent = flown("auto");
+fn imu_noise_scales_the_rows_of_later_intervals() {
+    let parent = simulated_run("auto");
     for factor in [2.0, 0.25] {
         let fork = parent.forked(FORK_AT, &format!("imu-noise={factor}")).unwrap();
         let (fork, parent_step) = (&fork[0], &parent.steps[FORK_AT]);
         let newest = fork.report.window.len() - 1;
         for slot in 1..=newest {
-            let share =
-                inertial_weight(&parent.flight, parent_step, slot) / inertial_weight(&parent.flight, fork, slot);
+            let weight_ratio =
+                imu_row_norm(&parent.flight, parent_step, slot) / imu_row_norm(&parent.flight, fork, slot);
             // Only the newest interval has the altered noise; the others change a little with the state.
             let expected = if slot == newest { factor } else { 1.0 };
-            assert!((share / expected - 1.0).abs() < 0.01, "imu-noise={factor}, slot {slot} of {newest}: {share}");
+            assert!(
+                (weight_ratio / expected - 1.0).abs() < 0.01,
+                "imu-noise={factor}, slot {slot} of {newest}: {weight_ratio}"
+            );
         }
     }
 }
 
 #[test]
-fn a_fork_with_other_inertial_noise_from_the_start_is_a_run_of_such_a_rig() {
+fn a_fork_with_other_imu_noise_from_the_start_equals_a_run_of_such_a_rig() {
     // A power of two, so that the order of multiplications does not change the rounding.
     const FACTOR: f64 = 4.0;
-    let parent = flown("auto");
+    let parent = simulated_run("auto");
     let fork = parent.forked(0, &format!("imu-noise={FACTOR}")).unwrap();
     let mut rig = parent.flight.given_rig.clone();
     let noise = &mut rig.imu.noise;
@@ -198,8 +205,8 @@ fn a_fork_with_other_inertial_noise_from_the_start_is_a_run_of_such_a_rig() {
 }
 
 #[test]
-fn encoder_readings_can_be_left_out_from_there_on() {
-    let parent = flown("auto");
+fn encoder_readings_can_be_disabled() {
+    let parent = simulated_run("auto");
     let fork = parent.forked(FORK_AT, "encoder=off").unwrap();
     for (number, step) in fork.iter().enumerate() {
         let read = |index: usize| step.report.window[index].encoder_angles_rad.is_some();
@@ -210,14 +217,14 @@ fn encoder_readings_can_be_left_out_from_there_on() {
     }
     let last = fork.last().unwrap();
     let tracking = last.report.phase == Phase::Tracking && last.report.restarts == 0;
-    assert!(tracking && apart_m(last, parent.steps.last().unwrap()) < 0.05);
+    assert!(tracking && position_difference_m(last, parent.steps.last().unwrap()) < 0.05);
     // Without encoder readings only the images constrain the joint angles.
     let joint_sigma = |step: &StepRecord| step.report.calibration.sigmas.iter().sum::<f64>();
     assert!(joint_sigma(last) > joint_sigma(parent.steps.last().unwrap()));
 }
 
 #[test]
-fn one_camera_of_two_can_be_left_out() {
+fn one_camera_of_two_can_be_disabled() {
     let request = SessionRequest {
         log_path: PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("sample_logs/garden.mcap"),
         specs: vec!["cluster".parse().unwrap()],
@@ -258,16 +265,16 @@ fn one_camera_of_two_can_be_left_out() {
 }
 
 #[test]
-fn what_cannot_be_changed_is_told() {
-    let problem = flown("auto").forked(FORK_AT, "freeze=L2.alfa").unwrap_err();
+fn unsupported_changes_are_reported() {
+    let problem = simulated_run("auto").forked(FORK_AT, "freeze=L2.alfa").unwrap_err();
     assert!(problem.contains("'L2.alfa'") && problem.contains("roll.alpha"), "{problem}");
-    let problem = flown("auto:calibrate=off").forked(FORK_AT, "freeze=L2.alpha").unwrap_err();
+    let problem = simulated_run("auto:calibrate=off").forked(FORK_AT, "freeze=L2.alpha").unwrap_err();
     assert!(problem.contains("calibrate=off"), "{problem}");
 }
 
 #[test]
-fn a_run_that_waits_can_be_forked_too() {
-    let parent = flown("minimal");
+fn a_run_that_initializes_can_be_forked() {
+    let parent = simulated_run("minimal");
     let first = parent.steps.iter().position(|step| step.report.phase == Phase::Tracking).unwrap();
     let fork = parent.forked(first - 2, "classical").unwrap();
     let begun = fork.iter().find(|step| step.report.phase == Phase::Tracking).unwrap();
@@ -284,7 +291,7 @@ fn a_session_stops_at_breakpoints_and_forks_there() {
     };
     let mut session = Session::start(SessionPlan::open(&request).unwrap()).unwrap();
     let finished = |session: &mut Session| {
-        while session.recording().runs.iter().any(|run| !run.finished) || session.is_running_on() {
+        while session.recording().runs.iter().any(|run| !run.finished) || session.is_running_to_breakpoint() {
             session.advance(0.0);
             std::thread::sleep(std::time::Duration::from_millis(10));
         }

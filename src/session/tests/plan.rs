@@ -31,7 +31,7 @@ fn run_specifications_are_read_and_written() {
 }
 
 #[test]
-fn refused_specifications_say_what_was_expected() {
+fn rejected_specifications_report_what_was_expected() {
     let check = |text: &str, words: &[&str]| {
         let message = parse(text).unwrap_err();
         assert!(words.iter().all(|word| message.contains(word)), "{text}: {message}");
@@ -55,7 +55,7 @@ fn labels_are_folders_and_differ() {
 }
 
 #[test]
-fn alignment_finds_yaw_shift_and_scale_again() {
+fn alignment_recovers_yaw_translation_and_scale() {
     let yaw = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 2.1);
     let shift = Vector3::new(3.0, -2.0, 0.7);
     let check = |alignment: Alignment, rotation: UnitQuaternion<f64>, scale: f64| {
@@ -77,7 +77,7 @@ fn alignment_finds_yaw_shift_and_scale_again() {
 }
 
 #[test]
-fn a_cluster_watches_the_gimballed_camera_and_the_rigid_one() {
+fn a_cluster_uses_the_gimballed_and_the_rigid_camera() {
     let rig_of =
         |mount| synthetic_tracks(&SyntheticOptions { mount, duration_s: 0.1, ..SyntheticOptions::default() }).given_rig;
     let (mut rig, rigid) = (rig_of(SyntheticMount::Gimbal), rig_of(SyntheticMount::Static));
