@@ -8,35 +8,7 @@ use super::html::{figure, list, number};
 use super::{RankSpell, tables};
 
 /// Style sheet for screens and for A4, where tables and figures are not cut.
-const STYLE: &str = "\
-:root { color-scheme: light; }
-body { font: 15px/1.5 system-ui, sans-serif; color: #1a1a1a; background: #fff; max-width: 76rem; margin: 2rem auto; padding: 0 1.5rem; }
-h1 { font-size: 1.7rem; margin-bottom: 0.2rem; }
-h2 { font-size: 1.3rem; margin-top: 2.4rem; border-bottom: 1px solid #bbb; }
-h3 { font-size: 1.05rem; margin-top: 1.6rem; }
-p.lead { color: #444; margin-top: 0; }
-pre { background: #f4f4f4; border: 1px solid #ddd; padding: 0.6rem 0.8rem; white-space: pre-wrap; overflow-wrap: anywhere; }
-table { border-collapse: collapse; margin: 0.8rem 0 1.4rem; font-size: 0.92em; }
-caption { text-align: left; color: #444; padding-bottom: 0.3rem; }
-th, td { text-align: left; vertical-align: top; padding: 0.18rem 0.7rem 0.18rem 0; border-bottom: 1px solid #e2e2e2; overflow-wrap: anywhere; }
-thead th { border-bottom: 1px solid #888; white-space: nowrap; }
-tbody th { font-weight: 600; }
-td.number { font-variant-numeric: tabular-nums; white-space: nowrap; }
-figure { margin: 0.8rem 0 1.4rem; }
-figure img, figure svg { display: block; max-width: 100%; height: auto; border: 1px solid #ddd; }
-figcaption { color: #444; font-size: 0.92em; }
-nav li { display: inline; margin-right: 1.2rem; }
-nav ul { padding: 0; }
-@page { size: A4; margin: 14mm; }
-@media print {
-  body { font-size: 10px; max-width: none; margin: 0; padding: 0; }
-  nav { display: none; }
-  h2, h3, caption { break-after: avoid; }
-  figure, tr, pre { break-inside: avoid; }
-  figure img, figure svg { max-height: 120mm; width: auto; }
-  thead { display: table-header-group; }
-}
-";
+const STYLE: &str = include_str!("../../../assets/report/style.css");
 
 /// The whole page.
 pub(super) fn page(content: &ReportContent, figures: &[ReportFigure]) -> String {
