@@ -4,7 +4,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use egui::ViewportBuilder;
+use egui::{IconData, ViewportBuilder};
 use thiserror::Error;
 
 use super::software_window::SoftwareWindow;
@@ -15,6 +15,9 @@ use crate::gui::theme::ThemeName;
 
 /// What a server without a desktop needs for the window (Debian and Ubuntu).
 pub const WINDOW_PACKAGES: &str = "mesa-vulkan-drivers libx11-6 libxcursor1 libxi6 libxkbcommon-x11-0";
+
+/// The icon of the window, in its title bar and in the task bar.
+const ICON_PNG: &[u8] = include_bytes!("../../../assets/icon/dcvins-128.png");
 
 /// Why there is no window.
 #[derive(Debug, Error)]
@@ -57,7 +60,9 @@ pub fn run_window(options: WindowOptions) -> Result<(), WindowError> {
     }
     let viewport = ViewportBuilder::default()
         .with_title("dcvins")
+        // The name of the desktop entry, `assets/linux/dcvins.desktop`.
         .with_app_id("dcvins")
+        .with_icon(icon())
         .with_inner_size([1600.0, 900.0])
         .with_min_inner_size([640.0, 400.0])
         .with_drag_and_drop(true);
@@ -85,6 +90,10 @@ pub fn run_window(options: WindowOptions) -> Result<(), WindowError> {
         Ok(Err(error)) => Err(refused(error.to_string())),
         Err(problem) => Err(refused(problem)),
     }
+}
+
+fn icon() -> IconData {
+    eframe::icon_data::from_png_bytes(ICON_PNG).expect("the icon is a PNG, as a test checks")
 }
 
 /// A graphics card draws the scene and everything else; an adapter that computes on the CPU is several times slower than
@@ -140,6 +149,12 @@ fn without_loader_panics<T>(run: impl FnOnce() -> T) -> Result<T, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_icon_is_a_square() {
+        let icon = icon();
+        assert_eq!((icon.width, icon.height), (128, 128));
+    }
 
     #[test]
     fn missing_libraries_become_errors_and_other_panics_go_on() {
