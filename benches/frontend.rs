@@ -179,8 +179,9 @@ fn bench_front_end(sequence: &Sequence, label: &str, options: &FrontEndOptions) 
 fn main() {
     let arguments = Arguments::parse();
     let texture = Texture::new(2048, 1);
-    let scene = Scene { width: 752, height: 480, focal_px: 458.0, speed: 1.0, noise: 2.0, flicker: arguments.flicker };
-    let slow = Sequence::new("slow", Scene { speed: 0.27, ..scene }, &texture);
+    let scene =
+        Scene { width: 752, height: 480, focal_px: 458.0, motion_scale: 1.0, noise: 2.0, flicker: arguments.flicker };
+    let slow = Sequence::new("slow", Scene { motion_scale: 0.27, ..scene }, &texture);
     let fast = Sequence::new("fast", scene, &texture);
     for sequence in [&slow, &fast] {
         if let Some(folder) = &arguments.export {

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector, Matrix6, Vector3, Vector6};
 use super::arrow::ArrowMatrix;
 use super::chain_prior::ChainTerm;
 use super::state::{Camera, Columns, Estimate, ViewId, ViewMap};
-use super::timeline::Instant;
+use super::timeline::FrameSet;
 use super::visual::{self, PixelModel, ReducedVisualEquations, Track, VisualEquations};
 use crate::estimator::preintegration::Vector15;
 use crate::estimator::{NavigationState, imu_factor};
@@ -25,9 +25,9 @@ pub(super) struct Priors {
     /// The gimbal's chain.
     pub(super) chain: ChainTerm,
     /// The static camera's pose on the IMU.
-    pub(super) mount: RigidTransform,
+    pub(super) extrinsics: RigidTransform,
     /// Its standard deviations per axis, in metres and radians.
-    pub(super) mount_sigmas: (f64, f64),
+    pub(super) extrinsics_sigmas: (f64, f64),
     pub(super) time_shift_sigma_s: f64,
     /// Of the biases about zero at the first instant, in rad/s and m/s².
     pub(super) bias_sigmas: (f64, f64),
@@ -39,7 +39,7 @@ pub(super) struct Priors {
 #[derive(Clone, Debug)]
 pub(super) struct Bundle<'a> {
     pub(super) columns: Columns,
-    pub(super) instants: &'a [Instant],
+    pub(super) frame_sets: &'a [FrameSet],
     pub(super) gravity_in_world: Vector3<f64>,
     pub(super) priors: &'a Priors,
     pub(super) pixels: PixelModel<'a>,
@@ -73,8 +73,11 @@ pub(super) struct BundleEquations {
 impl Bundle<'_> {
     /// Views that take part: those with a sighting.
     fn views(&self) -> Vec<ViewId> {
-        let mut views: Vec<ViewId> =
-            self.tracks.iter().flat_map(|track| track.sightings.iter().map(|sighting| sighting.view)).collect();
+        let mut views: Vec<ViewId> = self
+            .tracks
+            .iter()
+            .flat_map(|track| track.observations.iter().map(|observation| observation.view))
+            .collect();
         views.sort_unstable();
         views.dedup();
         views
@@ -82,15 +85,15 @@ impl Bundle<'_> {
 
     /// Poses of all views that take part.
     pub(super) fn poses(&self, estimate: &Estimate) -> BTreeMap<ViewId, CameraPose> {
-        let pose = |view: ViewId| (view, estimate.view(view, self.instants, &self.gravity_in_world));
+        let pose = |view: ViewId| (view, estimate.view(view, self.frame_sets, &self.gravity_in_world));
         self.views().into_iter().map(pose).collect()
     }
 
     /// Twice the cost.
     pub(super) fn cost(&self, estimate: &Estimate) -> f64 {
         let mut cost = self.pixels.cost(&self.poses(estimate), self.tracks, &estimate.landmarks);
-        for instant in 1..self.instants.len() {
-            if let Some(residual) = self.imu_residual(instant, estimate) {
+        for frame_set in 1..self.frame_sets.len() {
+            if let Some(residual) = self.imu_residual(frame_set, estimate) {
                 cost += residual.norm_squared();
             }
         }
@@ -101,19 +104,19 @@ impl Bundle<'_> {
         cost + self.border_rows(estimate).1.norm_squared()
     }
 
-    fn imu_residual(&self, instant: usize, estimate: &Estimate) -> Option<Vector15> {
-        let (motion, information) = self.instants[instant].motion.as_ref()?;
-        let (from, to) = (&estimate.navigation[instant - 1], &estimate.navigation[instant]);
+    fn imu_residual(&self, frame_set: usize, estimate: &Estimate) -> Option<Vector15> {
+        let (motion, information) = self.frame_sets[frame_set].motion.as_ref()?;
+        let (from, to) = (&estimate.navigation[frame_set - 1], &estimate.navigation[frame_set]);
         Some(information * imu_factor::residual(motion, from, to, &self.gravity_in_world))
     }
 
-    /// `(instant and joint, 1/σ², q − reading)` of every encoder reading, the reading carried along by the time shift.
+    /// `(frame_set and joint, 1/σ², q − reading)` of every encoder reading, the reading carried along by the time shift.
     fn encoder_terms<'s>(&'s self, estimate: &'s Estimate) -> impl Iterator<Item = ((usize, usize), f64, f64)> + 's {
         let shift_s = estimate.shifts_s[1];
-        self.instants
+        self.frame_sets
             .iter()
             .enumerate()
-            .filter_map(|(index, instant)| Some((index, instant.gimbal.as_ref()?)))
+            .filter_map(|(index, frame_set)| Some((index, frame_set.gimbal.as_ref()?)))
             .flat_map(move |(index, gimbal)| {
                 let angles = &estimate.joints_rad[index];
                 let encoder = &gimbal.encoder;
@@ -130,12 +133,12 @@ impl Bundle<'_> {
         let (gyroscope, accelerometer) = self.priors.bias_sigmas;
         let mut rows = DMatrix::zeros(10, 15);
         let mut residual = DVector::zeros(10);
-        let turn = so3::log(&(first.world_from_imu.rotation.inverse() * state.world_from_imu.rotation));
+        let rotation_error = so3::log(&(first.world_from_imu.rotation.inverse() * state.world_from_imu.rotation));
         // The vertical in the first instant's own axes.
         let vertical: Vector3<f64> = first.world_from_imu.rotation.inverse() * Vector3::z();
-        let heading = vertical.transpose() * so3::right_jacobian_inverse(&turn);
+        let heading = vertical.transpose() * so3::right_jacobian_inverse(&rotation_error);
         rows.fixed_view_mut::<1, 3>(0, 0).copy_from(&(heading / GAUGE_SIGMA_RAD));
-        residual[0] = vertical.dot(&turn) / GAUGE_SIGMA_RAD;
+        residual[0] = vertical.dot(&rotation_error) / GAUGE_SIGMA_RAD;
         let shift = state.world_from_imu.translation_m - first.world_from_imu.translation_m;
         for axis in 0..3 {
             rows[(1 + axis, 3 + axis)] = 1.0 / GAUGE_SIGMA_M;
@@ -153,11 +156,11 @@ impl Bundle<'_> {
         let columns = &self.columns;
         let count = columns.borders();
         let (mut rows, mut residual) = (DMatrix::zeros(count, count), DVector::zeros(count));
-        let (translation_m, rotation_rad) = self.priors.mount_sigmas;
-        let change = estimate.mount.minus(&self.priors.mount);
-        let turn: Vector3<f64> = change.fixed_rows::<3>(0).into_owned();
-        rows.fixed_view_mut::<3, 3>(0, 0).copy_from(&(so3::right_jacobian_inverse(&turn) / rotation_rad));
-        residual.fixed_rows_mut::<3>(0).copy_from(&(turn / rotation_rad));
+        let (translation_m, rotation_rad) = self.priors.extrinsics_sigmas;
+        let change = estimate.extrinsics.minus(&self.priors.extrinsics);
+        let rotation_error: Vector3<f64> = change.fixed_rows::<3>(0).into_owned();
+        rows.fixed_view_mut::<3, 3>(0, 0).copy_from(&(so3::right_jacobian_inverse(&rotation_error) / rotation_rad));
+        residual.fixed_rows_mut::<3>(0).copy_from(&(rotation_error / rotation_rad));
         for axis in 3..6 {
             rows[(axis, axis)] = 1.0 / translation_m;
             residual[axis] = change[axis] / translation_m;
@@ -183,48 +186,49 @@ impl Bundle<'_> {
     /// Linearizes every factor.
     pub(super) fn linearize(&self, estimate: &Estimate) -> BundleEquations {
         let poses = self.poses(estimate);
-        let map = |view: ViewId| (view, estimate.view_map(view, &self.columns, self.instants, &self.gravity_in_world));
+        let map =
+            |view: ViewId| (view, estimate.view_map(view, &self.columns, self.frame_sets, &self.gravity_in_world));
         let maps: BTreeMap<ViewId, ViewMap> = poses.keys().map(|view| map(*view)).collect();
         let (border_rows, border_residual) = self.border_rows(estimate);
         let mut equations = BundleEquations {
             visual: visual::equations(&self.pixels, &poses, self.tracks, &estimate.landmarks),
             maps,
-            inertial: Vec::with_capacity(self.instants.len()),
+            inertial: Vec::with_capacity(self.frame_sets.len()),
             encoders: Vec::new(),
             first: self.first_rows(estimate),
             border_hessian: border_rows.tr_mul(&border_rows),
             border_gradient: border_rows.tr_mul(&border_residual),
         };
-        for instant in 1..self.instants.len() {
-            let Some(residual) = self.imu_residual(instant, estimate) else { continue };
-            let Some((motion, information)) = &self.instants[instant].motion else { continue };
-            let (from, to) = (&estimate.navigation[instant - 1], &estimate.navigation[instant]);
+        for frame_set in 1..self.frame_sets.len() {
+            let Some(residual) = self.imu_residual(frame_set, estimate) else { continue };
+            let Some((motion, information)) = &self.frame_sets[frame_set].motion else { continue };
+            let (from, to) = (&estimate.navigation[frame_set - 1], &estimate.navigation[frame_set]);
             let (by_from, by_to) = imu_factor::jacobians(motion, from, to, &self.gravity_in_world);
             let mut rows = DMatrix::zeros(15, 30);
             rows.fixed_columns_mut::<15>(0).copy_from(&(information * by_from));
             rows.fixed_columns_mut::<15>(15).copy_from(&(information * by_to));
-            equations.inertial.push((instant, rows, residual));
+            equations.inertial.push((frame_set, rows, residual));
         }
-        for ((instant, joint), information, residual) in self.encoder_terms(estimate) {
+        for ((frame_set, joint), information, residual) in self.encoder_terms(estimate) {
             equations.encoders.push(EncoderEquation {
-                column: instant * self.columns.block() + Columns::joint(joint),
+                column: frame_set * self.columns.block() + Columns::joint(joint),
                 information,
                 residual,
-                rate: self.instants[instant].gimbal.as_ref().map_or(0.0, |g| g.reading_rate_rad_per_s[joint]),
+                rate: self.frame_sets[frame_set].gimbal.as_ref().map_or(0.0, |g| g.reading_rate_rad_per_s[joint]),
             });
         }
         equations
     }
 
     /// Column of the band of an entry of a navigation state.
-    fn navigation_column(&self, instant: usize, entry: usize) -> usize {
-        instant * self.columns.block() + self.columns.navigation(entry)
+    fn navigation_column(&self, frame_set: usize, entry: usize) -> usize {
+        frame_set * self.columns.block() + self.columns.navigation(entry)
     }
 
     /// Most instants between two sightings of one landmark, at least one for the inertial factors.
     fn reach(&self) -> usize {
-        let span = |track: &Track| match (track.sightings.first(), track.sightings.last()) {
-            (Some(first), Some(last)) => last.view.instant() - first.view.instant(),
+        let span = |track: &Track| match (track.observations.first(), track.observations.last()) {
+            (Some(first), Some(last)) => last.view.frame_set() - first.view.frame_set(),
             _ => 0,
         };
         self.tracks.iter().map(span).max().unwrap_or(0).max(1)
@@ -242,8 +246,8 @@ impl Bundle<'_> {
         let mut band = vec![0.0; columns.band()];
         let mut border = -&equations.border_gradient;
         *matrix.corner_mut() += &equations.border_hessian;
-        for (instant, rows, residual) in &equations.inertial {
-            let column = |entry: usize| self.navigation_column(instant - 1 + entry / 15, entry % 15);
+        for (frame_set, rows, residual) in &equations.inertial {
+            let column = |entry: usize| self.navigation_column(frame_set - 1 + entry / 15, entry % 15);
             let hessian = rows.tr_mul(rows);
             let gradient = rows.tr_mul(residual);
             for a in 0..30 {
@@ -272,7 +276,7 @@ impl Bundle<'_> {
         }
         for (view, gradient) in &reduced.poses.gradient {
             let map = &equations.maps[view];
-            let start = view.instant() * columns.block();
+            let start = view.frame_set() * columns.block();
             for (offset, value) in map.own.tr_mul(gradient).iter().enumerate() {
                 band[start + offset] -= value;
             }
@@ -293,7 +297,7 @@ impl Bundle<'_> {
         block: &Matrix6<f64>,
     ) {
         let size = self.columns.block();
-        let (at_first, at_second) = (first.instant() * size, second.instant() * size);
+        let (at_first, at_second) = (first.frame_set() * size, second.frame_set() * size);
         let right = block * &second_map.own;
         let own = first_map.own.tr_mul(&right);
         let shared_right = block * &second_map.shared;
@@ -334,7 +338,7 @@ impl Bundle<'_> {
     ) -> BTreeMap<ViewId, Vector6<f64>> {
         let own = self.columns.own();
         let step = |(view, map): (&ViewId, &ViewMap)| {
-            let start = view.instant() * self.columns.block();
+            let start = view.frame_set() * self.columns.block();
             let moved = &map.own * DVector::from_column_slice(&band[start..start + own]) + &map.shared * border;
             (*view, Vector6::from_column_slice(moved.as_slice()))
         };
@@ -350,6 +354,6 @@ impl BundleEquations {
 }
 
 /// The gimbal camera's view of an instant.
-pub(super) fn gimbal_view(instant: usize) -> ViewId {
-    ViewId::new(instant, Camera::Gimbal)
+pub(super) fn gimbal_view(frame_set: usize) -> ViewId {
+    ViewId::new(frame_set, Camera::Gimbal)
 }

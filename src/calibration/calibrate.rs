@@ -12,7 +12,7 @@ use super::rounds::{Stage, StageResult};
 use super::segments::{self, Segment, SegmentCounts};
 use super::state::{Camera, Columns, Estimate};
 use super::statistics::Statistics;
-use super::timeline::{Instant, instants};
+use super::timeline::{FrameSet, frame_sets};
 use super::{CalibrationError, CalibrationInput, CalibrationOptions, observations, trajectory};
 use crate::estimator::{ColumnBlock, ColumnId, Linearization, gravity_in_world, imu_factor};
 use crate::geometry::seconds_from_ns;
@@ -35,7 +35,7 @@ pub struct CalibrationProgress {
     /// What is being done.
     pub stage: &'static str,
     /// Share of the whole, 0 to 1.
-    pub share: f64,
+    pub fraction: f64,
 }
 
 /// Calibrates static camera and gimbal from a flight: camera–IMU first, then the pose loops, then the pixels of both
@@ -48,14 +48,14 @@ pub fn calibrate(
     options: &CalibrationOptions,
     on_progress: &mut dyn FnMut(CalibrationProgress),
 ) -> Result<CalibrationOutcome, CalibrationError> {
-    let mut tell = |stage: &'static str, share: f64| on_progress(CalibrationProgress { stage, share });
+    let mut report_progress = |stage: &'static str, fraction: f64| on_progress(CalibrationProgress { stage, fraction });
     let images = input.static_camera.views.len().max(1) as f64;
-    let states = trajectory::fly(&input.static_camera, &input.estimator, &mut |place| {
-        tell("flying the static camera", 0.5 * place as f64 / images);
+    let states = trajectory::estimate_trajectory(&input.static_camera, &input.estimator, &mut |place| {
+        report_progress("flying the static camera", 0.5 * place as f64 / images);
     })?;
-    let (mut instants, navigation) = instants(input, options, &states);
-    let stretch_ns = stretch(&instants);
-    check_joint_motion(input, options, &instants, stretch_ns)?;
+    let (mut frame_sets, navigation) = frame_sets(input, options, &states);
+    let stretch_ns = stretch(&frame_sets);
+    check_joint_motion(input, options, &frame_sets, stretch_ns)?;
 
     let priors = priors(input, options, &navigation);
     let stage = |name: &'static str| Stage {
@@ -67,43 +67,43 @@ pub fn calibrate(
     };
     let joints = input.gimbal_camera.chain.joint_count();
     let first = Estimate {
-        joints_rad: instants
+        joints_rad: frame_sets
             .iter()
-            .map(|instant| {
-                instant.gimbal.as_ref().map_or_else(|| vec![0.0; joints], |gimbal| gimbal.encoder.angles_rad.clone())
+            .map(|frame_set| {
+                frame_set.gimbal.as_ref().map_or_else(|| vec![0.0; joints], |gimbal| gimbal.encoder.angles_rad.clone())
             })
             .collect(),
         navigation,
-        mount: input.static_camera.imu_from_camera,
+        extrinsics: input.static_camera.imu_from_camera,
         shifts_s: [0.0; 2],
         chain: priors.chain.given.clone(),
         landmarks: Vec::new(),
     };
-    let static_tracks = observations::collect(input, options, &instants, Camera::Static, &|_| true);
-    let alone = stage(ALONE).run(&mut instants, &static_tracks, first, &mut |round| {
-        tell("calibrating the static camera", 0.5 + 0.05 * round as f64);
+    let static_tracks = observations::collect(input, options, &frame_sets, Camera::Static, &|_| true);
+    let alone = stage(ALONE).run(&mut frame_sets, &static_tracks, first, &mut |round| {
+        report_progress("calibrating the static camera", 0.5 + 0.05 * round as f64);
     })?;
 
-    tell("reconstructing the gimbal camera's poses", 0.7);
-    let (segments, counts) = segments::reconstruct(input, options, &instants, &alone.estimate);
+    report_progress("reconstructing the gimbal camera's poses", 0.7);
+    let (segments, counts) = segments::reconstruct(input, options, &frame_sets, &alone.estimate);
     check_measurements(options, &segments, counts, stretch_ns)?;
-    tell("closing the pose loops", 0.75);
-    let (loops, gaps_m) = close_loops(input, &priors, &instants, &segments, &alone.estimate)?;
+    report_progress("closing the pose loops", 0.75);
+    let (loops, gaps_m) = close_loops(input, &priors, &frame_sets, &segments, &alone.estimate)?;
 
     let mut start = alone.estimate.clone();
     start.chain = loops.chain.clone();
-    let mut measured = vec![false; instants.len()];
+    let mut measured = vec![false; frame_sets.len()];
     for (segment, joints_rad) in segments.iter().zip(&loops.joints_rad) {
-        for (&instant, angles) in segment.instants.iter().zip(joints_rad) {
-            start.joints_rad[instant].clone_from(angles);
-            measured[instant] = true;
+        for (&frame_set, angles) in segment.frame_sets.iter().zip(joints_rad) {
+            start.joints_rad[frame_set].clone_from(angles);
+            measured[frame_set] = true;
         }
     }
     let mut tracks = static_tracks;
-    tracks.extend(observations::collect(input, options, &instants, Camera::Gimbal, &|instant| measured[instant]));
-    tracks.sort_by_key(|track| track.sightings[0].view);
-    let both = stage(BOTH).run(&mut instants, &tracks, start, &mut |round| {
-        tell("adjusting both cameras together", 0.8 + 0.05 * round as f64);
+    tracks.extend(observations::collect(input, options, &frame_sets, Camera::Gimbal, &|frame_set| measured[frame_set]));
+    tracks.sort_by_key(|track| track.observations[0].view);
+    let both = stage(BOTH).run(&mut frame_sets, &tracks, start, &mut |round| {
+        report_progress("adjusting both cameras together", 0.8 + 0.05 * round as f64);
     })?;
 
     let visited_rad: Vec<Vec<f64>> =
@@ -113,12 +113,12 @@ pub fn calibrate(
     let pixels = |result: &StageResult, camera: Camera| pixel_report(input, result, camera);
     Ok(CalibrationOutcome {
         stretch_ns,
-        instants: instants.len(),
+        frame_sets: frame_sets.len(),
         static_camera_imu: extrinsics_report(input, &alone),
         static_pixels: pixels(&alone, Camera::Static).ok_or_else(|| singular(ALONE))?,
         pose_loop: PoseLoopReport {
             segments: segments.len(),
-            pairs: segments.iter().map(|segment| segment.instants.len()).sum(),
+            pairs: segments.iter().map(|segment| segment.frame_sets.len()).sum(),
             fitting: loops.weights.iter().flatten().filter(|weight| **weight >= 0.5).count(),
             gaps_m,
             position_sigma_m: loops.position_sigma_m,
@@ -126,7 +126,7 @@ pub fn calibrate(
             sigmas: loops.covariance.diagonal().iter().map(|variance| variance.max(0.0).sqrt()).collect(),
             iterations: loops.iterations,
         },
-        mount: extrinsics_report(input, &both),
+        extrinsics: extrinsics_report(input, &both),
         gimbal_time_shift_s: (
             both.estimate.shifts_s[1],
             both.covariance[(columns.gimbal_shift(), columns.gimbal_shift())].max(0.0).sqrt(),
@@ -140,29 +140,29 @@ pub fn calibrate(
             pixels(&both, Camera::Gimbal).ok_or_else(|| singular(BOTH))?,
         ],
         iterations: [alone.iterations, both.iterations],
-        inertial: imu_residual_report(input, &instants, &both.estimate).ok_or_else(|| singular(BOTH))?,
+        inertial: imu_residual_report(input, &frame_sets, &both.estimate).ok_or_else(|| singular(BOTH))?,
         rank: rank(&both, &visited_rad),
-        warnings: warnings(counts, &segments, &instants),
+        warnings: warnings(counts, &segments, &frame_sets),
         visited_rad,
     })
 }
 
-fn stretch(instants: &[Instant]) -> (i64, i64) {
-    (instants.first().map_or(0, |first| first.stamp_ns), instants.last().map_or(0, |last| last.stamp_ns))
+fn stretch(frame_sets: &[FrameSet]) -> (i64, i64) {
+    (frame_sets.first().map_or(0, |first| first.stamp_ns), frame_sets.last().map_or(0, |last| last.stamp_ns))
 }
 
 /// A joint moves when its readings spread by more than their noise and the limit explain.
 fn check_joint_motion(
     input: &CalibrationInput,
     options: &CalibrationOptions,
-    instants: &[Instant],
+    frame_sets: &[FrameSet],
     (from_ns, to_ns): (i64, i64),
 ) -> Result<(), CalibrationError> {
     let gimbal = &input.gimbal_camera;
     let readings: Vec<&Vec<f64>> =
-        instants.iter().filter_map(|instant| Some(&instant.gimbal.as_ref()?.encoder.angles_rad)).collect();
+        frame_sets.iter().filter_map(|frame_set| Some(&frame_set.gimbal.as_ref()?.encoder.angles_rad)).collect();
     let count = readings.len().max(1) as f64;
-    let noise = segments::encoder_sigma_rad(instants).powi(2);
+    let noise = segments::encoder_sigma_rad(frame_sets).powi(2);
     // The variance of the readings is itself uncertain by this much.
     let doubt = 3.0 * noise * (2.0 / count).sqrt();
     let mut moving = false;
@@ -190,7 +190,7 @@ fn check_measurements(
     counts: SegmentCounts,
     (from_ns, to_ns): (i64, i64),
 ) -> Result<(), CalibrationError> {
-    let found: usize = segments.iter().map(|segment| segment.instants.len()).sum();
+    let found: usize = segments.iter().map(|segment| segment.frame_sets.len()).sum();
     if found >= options.min_measurements {
         return Ok(());
     }
@@ -214,8 +214,8 @@ fn priors(
 ) -> Priors {
     Priors {
         chain: ChainTerm::new(&input.gimbal_camera.chain, &input.gimbal_camera.prior),
-        mount: input.static_camera.imu_from_camera,
-        mount_sigmas: input.static_camera.prior.sigmas(),
+        extrinsics: input.static_camera.imu_from_camera,
+        extrinsics_sigmas: input.static_camera.prior.sigmas(),
         time_shift_sigma_s: options.time_shift_sigma_s,
         bias_sigmas: options.bias_sigmas,
         first: navigation.first().copied().unwrap_or_default(),
@@ -226,16 +226,19 @@ fn priors(
 fn close_loops(
     input: &CalibrationInput,
     priors: &Priors,
-    instants: &[Instant],
+    frame_sets: &[FrameSet],
     segments: &[Segment],
     estimate: &Estimate,
 ) -> Result<(PoseLoopSolution, Statistics), CalibrationError> {
     let gravity = gravity_in_world(input.gravity_m_per_s2);
-    let pairs =
-        paired(segments, &|instant| estimate.world_from_imu(gimbal_view(instant), instants, &gravity), &|instant| {
+    let pairs = paired(
+        segments,
+        &|frame_set| estimate.world_from_imu(gimbal_view(frame_set), frame_sets, &gravity),
+        &|frame_set| {
             let none = JointAngles::default;
-            instants[instant].gimbal.as_ref().map_or_else(none, |gimbal| gimbal.encoder.clone())
-        });
+            frame_sets[frame_set].gimbal.as_ref().map_or_else(none, |gimbal| gimbal.encoder.clone())
+        },
+    );
     let loops = PoseLoops { segments: &pairs, prior: &priors.chain };
     let solution = loops.solve().ok_or_else(|| singular(LOOPS))?;
     let gaps = Statistics::of(&loops.gaps_m(&solution)).ok_or_else(|| singular(LOOPS))?;
@@ -246,8 +249,8 @@ fn extrinsics_report(input: &CalibrationInput, result: &StageResult) -> Extrinsi
     let sigma = |column: usize| result.covariance[(column, column)].max(0.0).sqrt();
     ExtrinsicsReport {
         initial: input.static_camera.imu_from_camera,
-        imu_from_camera: result.estimate.mount,
-        sigmas: std::array::from_fn(|axis| sigma(Columns::MOUNT + axis)),
+        imu_from_camera: result.estimate.extrinsics,
+        sigmas: std::array::from_fn(|axis| sigma(Columns::EXTRINSICS + axis)),
         time_shift_s: (result.estimate.shifts_s[0], sigma(Columns::STATIC_SHIFT)),
     }
 }
@@ -269,26 +272,28 @@ fn parameters(prior: &ChainTerm, chain: &Chain, sigma: &dyn Fn(usize) -> f64) ->
 }
 
 fn pixel_report(input: &CalibrationInput, result: &StageResult, camera: Camera) -> Option<PixelReport> {
-    let which = usize::from(camera == Camera::Gimbal);
-    let sees = |track: &&super::visual::Track| track.sightings.iter().any(|sighting| sighting.view.camera() == camera);
+    let camera_index = usize::from(camera == Camera::Gimbal);
+    let sees = |track: &&super::visual::Track| {
+        track.observations.iter().any(|observation| observation.view.camera() == camera)
+    };
     Some(PixelReport {
-        camera: [&input.static_camera.key, &input.gimbal_camera.key][which].clone(),
+        camera: [&input.static_camera.key, &input.gimbal_camera.key][camera_index].clone(),
         landmarks: result.tracks.iter().filter(sees).count(),
-        residuals_px: Statistics::of(&result.residuals_px[which])?,
-        sigma_px: result.sigma_px[which],
+        residuals_px: Statistics::of(&result.residuals_px[camera_index])?,
+        sigma_px: result.sigma_px[camera_index],
     })
 }
 
 /// Rotation and velocity residuals of the intervals over their length.
 fn imu_residual_report(
     input: &CalibrationInput,
-    instants: &[Instant],
+    frame_sets: &[FrameSet],
     estimate: &Estimate,
 ) -> Option<ImuResidualReport> {
     let gravity: Vector3<f64> = gravity_in_world(input.gravity_m_per_s2);
     let (mut gyroscope, mut accelerometer) = (Vec::new(), Vec::new());
-    for index in 1..instants.len() {
-        let Some((motion, _)) = &instants[index].motion else { continue };
+    for index in 1..frame_sets.len() {
+        let Some((motion, _)) = &frame_sets[index].motion else { continue };
         let residual =
             imu_factor::residual(motion, &estimate.navigation[index - 1], &estimate.navigation[index], &gravity);
         gyroscope.push(residual.fixed_rows::<3>(0).norm() / motion.duration_s());
@@ -323,7 +328,7 @@ fn rank(result: &StageResult, visited_rad: &[Vec<f64>]) -> Option<RankReport> {
             .enumerate()
             .map(|(start, parameter)| ColumnBlock { id: ColumnId::Calibration(parameter), start, len: 1 })
             .collect(),
-        held: Vec::new(),
+        fixed_parameters: Vec::new(),
         calibration_column_norms: DVector::from_fn(count, |k, _| measured[(k, k)].max(0.0).sqrt()),
         jacobian: square_root(measured),
         prior_jacobian: square_root(priors),
@@ -333,12 +338,12 @@ fn rank(result: &StageResult, visited_rad: &[Vec<f64>]) -> Option<RankReport> {
     analyse(&linearization, chain, visited_rad, false)
 }
 
-fn warnings(counts: SegmentCounts, segments: &[Segment], instants: &[Instant]) -> Vec<String> {
+fn warnings(counts: SegmentCounts, segments: &[Segment], frame_sets: &[FrameSet]) -> Vec<String> {
     let mut warnings = Vec::new();
-    let used: usize = segments.iter().map(|segment| segment.instants.len()).sum();
-    let missing = instants.len() - counts.offered;
+    let used: usize = segments.iter().map(|segment| segment.frame_sets.len()).sum();
+    let missing = frame_sets.len() - counts.offered;
     if missing > 0 {
-        warnings.push(format!("{missing} of {} instants have no gimbal image with encoder readings", instants.len()));
+        warnings.push(format!("{missing} of {} instants have no gimbal image with encoder readings", frame_sets.len()));
     }
     if 2 * used < counts.offered {
         warnings.push(format!(

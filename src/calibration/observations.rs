@@ -6,17 +6,21 @@ use nalgebra::Vector3;
 
 use super::landmark::{self, AnchoredLandmark};
 use super::state::{Camera, ViewId};
-use super::timeline::Instant;
-use super::visual::{PixelModel, Sighting, Track};
+use super::timeline::FrameSet;
+use super::visual::{Observation, PixelModel, Track};
 use super::{CalibrationInput, CalibrationOptions};
 use crate::frontend::{FeatureId, TrackedFrame};
 use crate::optimization::CameraPose;
 
 /// What a camera saw at an instant.
-pub(super) fn tracked<'a>(input: &'a CalibrationInput, instant: &Instant, camera: Camera) -> Option<&'a TrackedFrame> {
+pub(super) fn tracked<'a>(
+    input: &'a CalibrationInput,
+    frame_set: &FrameSet,
+    camera: Camera,
+) -> Option<&'a TrackedFrame> {
     match camera {
-        Camera::Static => Some(&input.static_camera.views[instant.static_view].tracks),
-        Camera::Gimbal => instant.gimbal.as_ref().map(|gimbal| &*input.gimbal_camera.views[gimbal.view].tracks),
+        Camera::Static => Some(&input.static_camera.views[frame_set.static_view].tracks),
+        Camera::Gimbal => frame_set.gimbal.as_ref().map(|gimbal| &*input.gimbal_camera.views[gimbal.view].tracks),
     }
 }
 
@@ -25,31 +29,31 @@ pub(super) fn tracked<'a>(input: &'a CalibrationInput, instant: &Instant, camera
 pub(super) fn collect(
     input: &CalibrationInput,
     options: &CalibrationOptions,
-    instants: &[Instant],
+    frame_sets: &[FrameSet],
     camera: Camera,
     wanted: &dyn Fn(usize) -> bool,
 ) -> Vec<Track> {
     let mut open: BTreeMap<FeatureId, Track> = BTreeMap::new();
     let mut finished = Vec::new();
-    for (index, instant) in instants.iter().enumerate() {
-        let Some(frame) = tracked(input, instant, camera).filter(|_| wanted(index)) else { continue };
+    for (index, frame_set) in frame_sets.iter().enumerate() {
+        let Some(frame) = tracked(input, frame_set, camera).filter(|_| wanted(index)) else { continue };
         for feature in &frame.features {
             let finite = feature.bearing.iter().chain(&feature.uv_px).all(|value| value.is_finite());
             if !finite {
                 continue;
             }
             let track = open.entry(feature.id).or_default();
-            let begin = track.sightings.first().map_or(index, |first| first.view.instant());
+            let begin = track.observations.first().map_or(index, |first| first.view.frame_set());
             if index - begin >= options.max_frame_sets_per_track {
                 finished.push(std::mem::take(track));
             }
             let view = ViewId::new(index, camera);
-            track.sightings.push(Sighting { view, uv_px: feature.uv_px, bearing: feature.bearing });
+            track.observations.push(Observation { view, uv_px: feature.uv_px, bearing: feature.bearing });
         }
     }
     finished.extend(open.into_values());
-    finished.retain(|track| track.sightings.len() >= options.min_observations);
-    finished.sort_by_key(|track| track.sightings[0].view);
+    finished.retain(|track| track.observations.len() >= options.min_observations);
+    finished.sort_by_key(|track| track.observations[0].view);
     finished
 }
 
@@ -63,9 +67,9 @@ pub(super) fn triangulated(
         .into_iter()
         .filter_map(|track| {
             let rays: Vec<(CameraPose, Vector3<f64>)> = track
-                .sightings
+                .observations
                 .iter()
-                .filter_map(|sighting| Some((*poses.get(&sighting.view)?, sighting.bearing)))
+                .filter_map(|observation| Some((*poses.get(&observation.view)?, observation.bearing)))
                 .collect();
             let landmark = landmark::triangulate(&rays, options.min_parallax_rad)?;
             Some((track, landmark))
@@ -86,11 +90,13 @@ pub(super) fn without_outliers(
         .into_iter()
         .zip(landmarks)
         .filter_map(|(mut track, landmark)| {
-            track.sightings.retain(|sighting| {
-                let sigma = pixels.sigma_px[sighting.view.0 % 2];
-                pixels.residual_px(poses, landmark, sighting).is_some_and(|residual| residual.norm() <= limit * sigma)
+            track.observations.retain(|observation| {
+                let sigma = pixels.sigma_px[observation.view.0 % 2];
+                pixels
+                    .residual_px(poses, landmark, observation)
+                    .is_some_and(|residual| residual.norm() <= limit * sigma)
             });
-            (track.sightings.len() >= options.min_observations).then_some((track, *landmark))
+            (track.observations.len() >= options.min_observations).then_some((track, *landmark))
         })
         .unzip()
 }
@@ -106,9 +112,9 @@ pub(super) fn residual_lengths_px(
     tracks
         .iter()
         .zip(landmarks)
-        .flat_map(|(track, landmark)| track.sightings.iter().map(move |sighting| (landmark, sighting)))
-        .filter(|(_, sighting)| sighting.view.camera() == camera)
-        .filter_map(|(landmark, sighting)| pixels.residual_px(poses, landmark, sighting))
+        .flat_map(|(track, landmark)| track.observations.iter().map(move |observation| (landmark, observation)))
+        .filter(|(_, observation)| observation.view.camera() == camera)
+        .filter_map(|(landmark, observation)| pixels.residual_px(poses, landmark, observation))
         .map(|residual| residual.norm())
         .collect()
 }

@@ -83,7 +83,7 @@ pub struct CalibrationOutcome {
     /// Begin and end of the stretch that was used, since the log began.
     pub stretch_ns: (i64, i64),
     /// Instants whose states were estimated.
-    pub instants: usize,
+    pub frame_sets: usize,
     /// Static camera and IMU alone.
     pub static_camera_imu: ExtrinsicsReport,
     /// Residuals of that stage.
@@ -91,7 +91,7 @@ pub struct CalibrationOutcome {
     /// The pose loops.
     pub pose_loop: PoseLoopReport,
     /// The static camera after the bundle of both cameras.
-    pub mount: ExtrinsicsReport,
+    pub extrinsics: ExtrinsicsReport,
     /// What is to be added to the gimbal camera's time offset, in seconds, and its standard deviation.
     pub gimbal_time_shift_s: (f64, f64),
     /// The chain after the bundle.

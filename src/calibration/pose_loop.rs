@@ -17,7 +17,7 @@ use crate::sensors::JointAngles;
 /// Standard deviation of the rotations of a measured pose, in radians: a pixel over the root of the features.
 const ROTATION_SIGMA_RAD: f64 = 1e-3;
 /// What the loops are held to at first, when the chain and the readings are far off: they pull, but do not tear.
-const FIRST_NOISE: LoopNoise = LoopNoise { rotation_rad: 0.02, position_m: 0.05, loss: RobustLoss::None };
+const INITIAL_NOISE: LoopNoise = LoopNoise { rotation_rad: 0.02, position_m: 0.05, loss: RobustLoss::None };
 /// Positions are never better than this, in metres.
 const MIN_POSITION_SIGMA_M: f64 = 2e-3;
 /// Standard deviations at which a pair has half its weight.
@@ -60,12 +60,12 @@ pub(super) fn paired(
     segments
         .iter()
         .map(|segment| {
-            let pair = |(&instant, pose): (&usize, &RigidTransform)| PosePair {
-                world_from_imu: world_from_imu(instant),
+            let pair = |(&frame_set, pose): (&usize, &RigidTransform)| PosePair {
+                world_from_imu: world_from_imu(frame_set),
                 segment_from_camera: *pose,
-                encoder: encoder(instant),
+                encoder: encoder(frame_set),
             };
-            segment.instants.iter().zip(&segment.poses).map(pair).collect()
+            segment.frame_sets.iter().zip(&segment.poses).map(pair).collect()
         })
         .collect()
 }
@@ -170,7 +170,7 @@ impl PoseLoops<'_> {
             .collect();
         let frames = self.segments.iter().map(|pairs| first_frame(pairs, &chain)).collect();
         let mut state = LoopState { chain, joints_rad, frames };
-        let mut noise = FIRST_NOISE;
+        let mut noise = INITIAL_NOISE;
         let mut iterations = 0;
         let mut covariance = None;
         for _ in 0..ROUNDS {
@@ -239,19 +239,19 @@ impl PoseLoops<'_> {
         let chain = state.chain.linearize(&state.joints_rad[segment][pair]);
         let predicted = measured.world_from_imu * chain.imu_from_camera;
         let on_map = frame.world_from_camera(&measured.segment_from_camera);
-        let turn = so3::log(&(on_map.rotation.inverse() * predicted.rotation));
+        let rotation_error = so3::log(&(on_map.rotation.inverse() * predicted.rotation));
         let shift = predicted.translation_m - on_map.translation_m;
         let (rotation, position) = (1.0 / noise.rotation_rad, 1.0 / noise.position_m);
         let mut residual = Vector6::zeros();
-        residual.fixed_rows_mut::<3>(0).copy_from(&(turn * rotation));
+        residual.fixed_rows_mut::<3>(0).copy_from(&(rotation_error * rotation));
         residual.fixed_rows_mut::<3>(3).copy_from(&(shift * position));
 
-        let by_turn = so3::right_jacobian_inverse(&turn);
+        let by_rotation_error = so3::right_jacobian_inverse(&rotation_error);
         let world_from_imu = measured.world_from_imu.rotation_matrix();
         let carried = |part: &Matrix6xX<f64>| {
             let mut rows = part.clone();
-            let turned = by_turn * part.fixed_rows::<3>(0) * rotation;
-            rows.fixed_rows_mut::<3>(0).copy_from(&turned);
+            let rotation_rows = by_rotation_error * part.fixed_rows::<3>(0) * rotation;
+            rows.fixed_rows_mut::<3>(0).copy_from(&rotation_rows);
             let shifted = world_from_imu * part.fixed_rows::<3>(3) * position;
             rows.fixed_rows_mut::<3>(3).copy_from(&shifted);
             rows
@@ -260,7 +260,9 @@ impl PoseLoops<'_> {
         let camera_from_segment: Matrix3<f64> = measured.segment_from_camera.rotation_matrix().transpose();
         let place = measured.segment_from_camera.translation_m * frame.metres_per_unit;
         let mut by_frame = Matrix6xX::zeros(FRAME);
-        by_frame.fixed_view_mut::<3, 3>(0, 0).copy_from(&(by_turn.transpose() * camera_from_segment * -rotation));
+        by_frame
+            .fixed_view_mut::<3, 3>(0, 0)
+            .copy_from(&(by_rotation_error.transpose() * camera_from_segment * -rotation));
         by_frame.fixed_view_mut::<3, 3>(3, 0).copy_from(&(segment_rotation * so3::hat(&place) * position));
         by_frame.fixed_view_mut::<3, 3>(3, 3).fill_diagonal(-position);
         by_frame.fixed_view_mut::<3, 1>(3, 6).copy_from(&(segment_rotation * place * -position));
@@ -273,9 +275,9 @@ impl PoseLoops<'_> {
             let measured = &self.segments[segment][pair];
             let predicted = measured.world_from_imu * state.chain.imu_from_camera(&state.joints_rad[segment][pair]);
             let on_map = state.frames[segment].world_from_camera(&measured.segment_from_camera);
-            let turn = so3::log(&(on_map.rotation.inverse() * predicted.rotation)) / noise.rotation_rad;
+            let rotation_error = so3::log(&(on_map.rotation.inverse() * predicted.rotation)) / noise.rotation_rad;
             let shift = (predicted.translation_m - on_map.translation_m) / noise.position_m;
-            cost += noise.loss.cost_and_weight(turn.norm_squared() + shift.norm_squared()).0;
+            cost += noise.loss.cost_and_weight(rotation_error.norm_squared() + shift.norm_squared()).0;
             for (angle, (reading, sigma)) in state.joints_rad[segment][pair].iter().zip(measured.readings()) {
                 cost += (wrap_angle(angle - reading) / sigma).powi(2);
             }
@@ -418,24 +420,25 @@ impl DampedProblem for DampedLoops<'_> {
 fn first_frame(pairs: &[PosePair], chain: &Chain) -> SegmentFrame {
     let predicted: Vec<RigidTransform> =
         pairs.iter().map(|pair| pair.world_from_imu * chain.imu_from_camera(&pair.encoder.angles_rad)).collect();
-    let turns: Vec<UnitQuaternion<f64>> = pairs
+    let rotations: Vec<UnitQuaternion<f64>> = pairs
         .iter()
         .zip(&predicted)
         .map(|(pair, predicted)| predicted.rotation * pair.segment_from_camera.rotation.inverse())
         .collect();
-    let mut rotation = turns.first().copied().unwrap_or_else(UnitQuaternion::identity);
+    let mut rotation = rotations.first().copied().unwrap_or_else(UnitQuaternion::identity);
     for _ in 0..5 {
-        let sum: Vector3<f64> = turns.iter().map(|turn| so3::log(&(rotation.inverse() * turn))).sum();
+        let sum: Vector3<f64> =
+            rotations.iter().map(|rotation_error| so3::log(&(rotation.inverse() * rotation_error))).sum();
         rotation =
-            UnitQuaternion::new_normalize((rotation * so3::exp(&(sum / turns.len().max(1) as f64))).into_inner());
+            UnitQuaternion::new_normalize((rotation * so3::exp(&(sum / rotations.len().max(1) as f64))).into_inner());
     }
     let count = pairs.len().max(1) as f64;
-    let turned: Vec<Vector3<f64>> =
+    let rotation_rows: Vec<Vector3<f64>> =
         pairs.iter().map(|pair| rotation * pair.segment_from_camera.translation_m).collect();
-    let middle = turned.iter().sum::<Vector3<f64>>() / count;
+    let middle = rotation_rows.iter().sum::<Vector3<f64>>() / count;
     let middle_m = predicted.iter().map(|pose| pose.translation_m).sum::<Vector3<f64>>() / count;
     let (mut along, mut square, mut square_m) = (0.0, 0.0, 0.0);
-    for (place, pose) in turned.iter().zip(&predicted) {
+    for (place, pose) in rotation_rows.iter().zip(&predicted) {
         along += (place - middle).dot(&(pose.translation_m - middle_m));
         square += (place - middle).norm_squared();
         square_m += (pose.translation_m - middle_m).norm_squared();

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, Vector3};
 use super::bundle::{Bundle, Priors};
 use super::solver::{adjust, border_covariance};
 use super::state::{Camera, Columns, Estimate};
-use super::timeline::Instant;
+use super::timeline::FrameSet;
 use super::visual::{PixelModel, Track};
 use super::{CalibrationError, CalibrationOptions, observations};
 use crate::camera::CameraModel;
@@ -13,7 +13,7 @@ use crate::geometry::median;
 use crate::optimization::RobustLoss;
 
 /// What a tracked pixel is worth before the residuals say, per coordinate.
-const FIRST_SIGMA_PX: f64 = 1.0;
+const INITIAL_SIGMA_PX: f64 = 1.0;
 /// No tracker is better than this, per coordinate.
 const MIN_SIGMA_PX: f64 = 0.05;
 /// Standard deviations up to which the loss is quadratic.
@@ -56,7 +56,7 @@ impl StageResult {
 }
 
 fn columns(estimate: &Estimate) -> Columns {
-    Columns { instants: estimate.navigation.len(), joints: estimate.chain.joint_count(), chain: estimate.chain.dof() }
+    Columns { frame_sets: estimate.navigation.len(), joints: estimate.chain.joint_count(), chain: estimate.chain.dof() }
 }
 
 impl Stage<'_> {
@@ -66,14 +66,14 @@ impl Stage<'_> {
 
     fn bundle<'b>(
         &'b self,
-        instants: &'b [Instant],
+        frame_sets: &'b [FrameSet],
         columns: Columns,
         tracks: &'b [Track],
         sigma_px: [f64; 2],
     ) -> Bundle<'b> {
         Bundle {
             columns,
-            instants,
+            frame_sets,
             gravity_in_world: self.gravity_in_world,
             priors: self.priors,
             pixels: self.pixels(sigma_px),
@@ -84,7 +84,7 @@ impl Stage<'_> {
     /// Adjusts all unknowns to all tracks in rounds.
     pub(super) fn run(
         &self,
-        instants: &mut [Instant],
+        frame_sets: &mut [FrameSet],
         all_tracks: &[Track],
         start: Estimate,
         on_round: &mut dyn FnMut(usize),
@@ -92,22 +92,22 @@ impl Stage<'_> {
         let singular = || CalibrationError::Singular { stage: self.name };
         let columns = columns(&start);
         let mut estimate = start;
-        let mut sigma_px = [FIRST_SIGMA_PX; 2];
+        let mut sigma_px = [INITIAL_SIGMA_PX; 2];
         let mut iterations = 0;
         let mut kept: Vec<Track> = Vec::new();
         let rounds = self.options.rounds.max(1);
         for round in 0..=rounds {
             on_round(round);
-            Self::reintegrate(instants, &estimate);
-            let poses = self.bundle(instants, columns, all_tracks, sigma_px).poses(&estimate);
+            Self::reintegrate(frame_sets, &estimate);
+            let poses = self.bundle(frame_sets, columns, all_tracks, sigma_px).poses(&estimate);
             let (tracks, landmarks) = observations::triangulated(all_tracks.to_vec(), &poses, self.options);
             // The first poses are rough: what does not fit them may fit later.
-            let limit = if round == 0 { 30.0 / FIRST_SIGMA_PX } else { self.options.outlier_sigmas };
+            let limit = if round == 0 { 30.0 / INITIAL_SIGMA_PX } else { self.options.outlier_sigmas };
             let pixels = self.pixels(sigma_px);
             let (tracks, landmarks) =
                 observations::without_outliers(tracks, &landmarks, &poses, &pixels, limit, self.options);
             estimate.landmarks = landmarks;
-            let bundle = self.bundle(instants, columns, &tracks, sigma_px);
+            let bundle = self.bundle(frame_sets, columns, &tracks, sigma_px);
             let adjusted = adjust(&bundle, estimate, self.options).ok_or_else(singular)?;
             iterations += adjusted.iterations;
             estimate = adjusted.estimate;
@@ -121,7 +121,7 @@ impl Stage<'_> {
             }
             kept = tracks;
         }
-        let bundle = self.bundle(instants, columns, &kept, sigma_px);
+        let bundle = self.bundle(frame_sets, columns, &kept, sigma_px);
         let covariance = border_covariance(&bundle, &estimate).ok_or_else(singular)?;
         let poses = bundle.poses(&estimate);
         let residuals_px = [Camera::Static, Camera::Gimbal].map(|camera| {
@@ -131,10 +131,10 @@ impl Stage<'_> {
         Ok(StageResult { estimate, tracks: kept, sigma_px, iterations, covariance, prior_information, residuals_px })
     }
 
-    fn reintegrate(instants: &mut [Instant], estimate: &Estimate) {
-        for index in 0..instants.len() {
+    fn reintegrate(frame_sets: &mut [FrameSet], estimate: &Estimate) {
+        for index in 0..frame_sets.len() {
             let before = index.checked_sub(1).map(|before| estimate.navigation[before].bias);
-            instants[index].reintegrate(before.as_ref(), &estimate.navigation[index].bias);
+            frame_sets[index].reintegrate(before.as_ref(), &estimate.navigation[index].bias);
         }
     }
 }

@@ -6,7 +6,7 @@ use nalgebra::UnitQuaternion;
 use super::bundle::gimbal_view;
 use super::observations::tracked;
 use super::state::{Camera, Estimate};
-use super::timeline::Instant;
+use super::timeline::FrameSet;
 use super::{CalibrationInput, CalibrationOptions};
 use crate::estimator::gravity_in_world;
 use crate::estimator::initialization::{InitializationOptions, ReconstructionGuess, reconstruct_views};
@@ -22,7 +22,7 @@ const MIN_VIEWS: usize = 6;
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Segment {
     /// The instants of its views, rising.
-    pub(super) instants: Vec<usize>,
+    pub(super) frame_sets: Vec<usize>,
     /// `segment_from_camera` of each, translations in the segment's unit.
     pub(super) poses: Vec<RigidTransform>,
 }
@@ -42,7 +42,7 @@ pub(super) struct SegmentCounts {
 pub(super) fn reconstruct(
     input: &CalibrationInput,
     options: &CalibrationOptions,
-    instants: &[Instant],
+    frame_sets: &[FrameSet],
     estimate: &Estimate,
 ) -> (Vec<Segment>, SegmentCounts) {
     let gravity = gravity_in_world(input.gravity_m_per_s2);
@@ -51,20 +51,20 @@ pub(super) fn reconstruct(
     let joints = gimbal.chain.joint_count() as f64;
     let chain_rad = gimbal.prior.sigmas().1;
     let sigma_rad =
-        (encoder_sigma_rad(instants) * (2.0 * joints).sqrt()).hypot(chain_rad * (joints + 2.0).sqrt()).max(0.02);
+        (encoder_sigma_rad(frame_sets) * (2.0 * joints).sqrt()).hypot(chain_rad * (joints + 2.0).sqrt()).max(0.02);
     let limits = InitializationOptions { min_views: MIN_VIEWS, ..InitializationOptions::default() };
     let mut counts = SegmentCounts::default();
     let mut segments = Vec::new();
-    for stretch in stretches(input, options, instants, &mut counts) {
+    for stretch in stretches(input, options, frame_sets, &mut counts) {
         let views: Vec<&[TrackedFeature]> = stretch
             .iter()
-            .filter_map(|&index| tracked(input, &instants[index], Camera::Gimbal))
+            .filter_map(|&index| tracked(input, &frame_sets[index], Camera::Gimbal))
             .map(|frame| frame.features.as_slice())
             .collect();
         let rotations: Vec<UnitQuaternion<f64>> = stretch
             .iter()
             .map(|&index| {
-                let vehicle = estimate.world_from_imu(gimbal_view(index), instants, &gravity);
+                let vehicle = estimate.world_from_imu(gimbal_view(index), frame_sets, &gravity);
                 vehicle.rotation * estimate.chain.imu_from_camera(&estimate.joints_rad[index]).rotation
             })
             .collect();
@@ -73,7 +73,7 @@ pub(super) fn reconstruct(
             Some(reconstruction) => {
                 counts.unsolved += stretch.len() - reconstruction.views.len();
                 segments.push(Segment {
-                    instants: reconstruction.views.iter().map(|view| stretch[*view]).collect(),
+                    frame_sets: reconstruction.views.iter().map(|view| stretch[*view]).collect(),
                     poses: reconstruction.poses,
                 });
             }
@@ -84,8 +84,9 @@ pub(super) fn reconstruct(
 }
 
 /// Root mean square of the standard deviations of all readings.
-pub(super) fn encoder_sigma_rad(instants: &[Instant]) -> f64 {
-    let sigmas = instants.iter().filter_map(|instant| instant.gimbal.as_ref()).flat_map(|g| &g.encoder.sigmas_rad);
+pub(super) fn encoder_sigma_rad(frame_sets: &[FrameSet]) -> f64 {
+    let sigmas =
+        frame_sets.iter().filter_map(|frame_set| frame_set.gimbal.as_ref()).flat_map(|g| &g.encoder.sigmas_rad);
     let (sum, count) = sigmas.fold((0.0, 0_usize), |(sum, count), sigma| (sum + sigma * sigma, count + 1));
     (sum / count.max(1) as f64).sqrt()
 }
@@ -94,19 +95,19 @@ pub(super) fn encoder_sigma_rad(instants: &[Instant]) -> f64 {
 fn stretches(
     input: &CalibrationInput,
     options: &CalibrationOptions,
-    instants: &[Instant],
+    frame_sets: &[FrameSet],
     counts: &mut SegmentCounts,
 ) -> Vec<Vec<usize>> {
     let mut stretches: Vec<Vec<usize>> = vec![Vec::new()];
-    for index in 0..instants.len() {
-        let Some(frame) = tracked(input, &instants[index], Camera::Gimbal) else {
+    for index in 0..frame_sets.len() {
+        let Some(frame) = tracked(input, &frame_sets[index], Camera::Gimbal) else {
             stretches.push(Vec::new());
             continue;
         };
         counts.offered += 1;
         let Some(last) = stretches.last_mut() else { continue };
         let linked = last.last().is_none_or(|before| {
-            tracked(input, &instants[*before], Camera::Gimbal)
+            tracked(input, &frame_sets[*before], Camera::Gimbal)
                 .is_some_and(|other| common(&other.features, &frame.features) >= MIN_COMMON)
         });
         if linked && last.len() < options.segment_views {

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::landmark::AnchoredLandmark;
-use super::timeline::Instant;
+use super::timeline::FrameSet;
 use crate::estimator::NavigationState;
 use crate::estimator::preintegration::Vector15;
 use crate::geometry::{RigidTransform, so3};
@@ -29,11 +29,11 @@ pub(super) enum Camera {
 pub(super) struct ViewId(pub(super) usize);
 
 impl ViewId {
-    pub(super) fn new(instant: usize, camera: Camera) -> Self {
-        Self(2 * instant + usize::from(camera == Camera::Gimbal))
+    pub(super) fn new(frame_set: usize, camera: Camera) -> Self {
+        Self(2 * frame_set + usize::from(camera == Camera::Gimbal))
     }
 
-    pub(super) fn instant(self) -> usize {
+    pub(super) fn frame_set(self) -> usize {
         self.0 / 2
     }
 
@@ -50,7 +50,7 @@ pub(super) struct Estimate {
     /// Joint angles at the gimbal camera's image, without the static offsets; by instant.
     pub(super) joints_rad: Vec<Vec<f64>>,
     /// `imu_from_camera` of the static camera.
-    pub(super) mount: RigidTransform,
+    pub(super) extrinsics: RigidTransform,
     /// `t_imu = t_cam + shift`, beyond what the rig says, of the static and the gimbal camera, in seconds.
     pub(super) shifts_s: [f64; 2],
     /// The gimbal's chain.
@@ -60,16 +60,16 @@ pub(super) struct Estimate {
 }
 
 /// Columns: a block per instant, `[φ p v | joints | b_g b_a]`, and the border that all instants share,
-/// `[mount 6 | static shift | chain | gimbal shift]`.
+/// `[extrinsics 6 | static shift | chain | gimbal shift]`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Columns {
-    pub(super) instants: usize,
+    pub(super) frame_sets: usize,
     pub(super) joints: usize,
     pub(super) chain: usize,
 }
 
 impl Columns {
-    pub(super) const MOUNT: usize = 0;
+    pub(super) const EXTRINSICS: usize = 0;
     pub(super) const STATIC_SHIFT: usize = 6;
     pub(super) const CHAIN: usize = 7;
 
@@ -86,7 +86,7 @@ impl Columns {
     }
 
     pub(super) fn band(&self) -> usize {
-        self.instants * self.block()
+        self.frame_sets * self.block()
     }
 
     /// Columns that move a view directly: pose, velocity and joints of its instant.
@@ -115,14 +115,14 @@ impl Estimate {
         landmarks: &[Vector3<f64>],
     ) -> Self {
         let mut moved = self.clone();
-        for (instant, block) in band.chunks_exact(columns.block()).enumerate() {
+        for (frame_set, block) in band.chunks_exact(columns.block()).enumerate() {
             let step = Vector15::from_fn(|entry, _| block[columns.navigation(entry)]);
-            moved.navigation[instant] = self.navigation[instant].plus(&step);
-            for (joint, angle) in moved.joints_rad[instant].iter_mut().enumerate() {
+            moved.navigation[frame_set] = self.navigation[frame_set].plus(&step);
+            for (joint, angle) in moved.joints_rad[frame_set].iter_mut().enumerate() {
                 *angle += block[Columns::joint(joint)];
             }
         }
-        moved.mount = self.mount.plus(&border.fixed_rows::<6>(Columns::MOUNT).into_owned());
+        moved.extrinsics = self.extrinsics.plus(&border.fixed_rows::<6>(Columns::EXTRINSICS).into_owned());
         moved.shifts_s[0] += border[Columns::STATIC_SHIFT];
         moved.chain = self.chain.plus_slice(&border.as_slice()[Columns::CHAIN..columns.gimbal_shift()]);
         moved.shifts_s[1] += border[columns.gimbal_shift()];
@@ -137,22 +137,27 @@ impl Estimate {
     fn vehicle_at(
         &self,
         view: ViewId,
-        instants: &[Instant],
+        frame_sets: &[FrameSet],
         gravity: &Vector3<f64>,
     ) -> (NavigationState, Vector3<f64>) {
-        let instant = &instants[view.instant()];
-        let here = NavigationState { bias: instant.bias, ..self.navigation[view.instant()] };
-        match (view.camera(), &instant.gimbal) {
+        let frame_set = &frame_sets[view.frame_set()];
+        let here = NavigationState { bias: frame_set.bias, ..self.navigation[view.frame_set()] };
+        match (view.camera(), &frame_set.gimbal) {
             (Camera::Gimbal, Some(gimbal)) => {
-                (gimbal.hop.predict(&here, gravity), gimbal.gyroscope_rad_per_s - here.bias.gyroscope_rad_per_s)
+                (gimbal.image_delay.predict(&here, gravity), gimbal.gyroscope_rad_per_s - here.bias.gyroscope_rad_per_s)
             }
-            _ => (here, instant.gyroscope_rad_per_s - here.bias.gyroscope_rad_per_s),
+            _ => (here, frame_set.gyroscope_rad_per_s - here.bias.gyroscope_rad_per_s),
         }
     }
 
     /// `world_from_imu` when a view was taken.
-    pub(super) fn world_from_imu(&self, view: ViewId, instants: &[Instant], gravity: &Vector3<f64>) -> RigidTransform {
-        let (state, rate) = self.vehicle_at(view, instants, gravity);
+    pub(super) fn world_from_imu(
+        &self,
+        view: ViewId,
+        frame_sets: &[FrameSet],
+        gravity: &Vector3<f64>,
+    ) -> RigidTransform {
+        let (state, rate) = self.vehicle_at(view, frame_sets, gravity);
         let shift_s = self.shifts_s[usize::from(view.camera() == Camera::Gimbal)];
         RigidTransform::new(
             state.world_from_imu.rotation * so3::exp(&(rate * shift_s)),
@@ -162,14 +167,14 @@ impl Estimate {
 
     fn imu_from_camera(&self, view: ViewId) -> RigidTransform {
         match view.camera() {
-            Camera::Static => self.mount,
-            Camera::Gimbal => self.chain.imu_from_camera(&self.joints_rad[view.instant()]),
+            Camera::Static => self.extrinsics,
+            Camera::Gimbal => self.chain.imu_from_camera(&self.joints_rad[view.frame_set()]),
         }
     }
 
     /// Pose of a view.
-    pub(super) fn view(&self, view: ViewId, instants: &[Instant], gravity: &Vector3<f64>) -> CameraPose {
-        (self.world_from_imu(view, instants, gravity) * self.imu_from_camera(view)).into()
+    pub(super) fn view(&self, view: ViewId, frame_sets: &[FrameSet], gravity: &Vector3<f64>) -> CameraPose {
+        (self.world_from_imu(view, frame_sets, gravity) * self.imu_from_camera(view)).into()
     }
 
     /// How the pose of a view follows the unknowns.
@@ -177,34 +182,34 @@ impl Estimate {
         &self,
         view: ViewId,
         columns: &Columns,
-        instants: &[Instant],
+        frame_sets: &[FrameSet],
         gravity: &Vector3<f64>,
     ) -> ViewMap {
-        let (state, rate) = self.vehicle_at(view, instants, gravity);
-        let instant = view.instant();
-        let here = &self.navigation[instant];
+        let (state, rate) = self.vehicle_at(view, frame_sets, gravity);
+        let frame_set = view.frame_set();
+        let here = &self.navigation[frame_set];
         let gimbal = view.camera() == Camera::Gimbal;
         let shift_s = self.shifts_s[usize::from(gimbal)];
         let node: Matrix3<f64> = here.world_from_imu.rotation_matrix();
-        let hop = instants[instant].gimbal.as_ref().filter(|_| gimbal).map(|gimbal| &gimbal.hop);
+        let image_delay = frame_sets[frame_set].gimbal.as_ref().filter(|_| gimbal).map(|gimbal| &gimbal.image_delay);
         let world_from_imu: Matrix3<f64> =
             (state.world_from_imu.rotation * so3::exp(&(rate * shift_s))).to_rotation_matrix().into_inner();
         // From the instant's body axes to the camera.
         let imu_from_node = world_from_imu.tr_mul(&node);
-        let (lag_s, carried) = hop.map_or_else(
+        let (lag_s, carried) = image_delay.map_or_else(
             || (0.0, Vector3::zeros()),
-            |hop| {
-                let motion = hop.corrected(&instants[instant].bias);
-                (hop.duration_s(), motion.position_m + motion.velocity_m_per_s * shift_s)
+            |image_delay| {
+                let motion = image_delay.corrected(&frame_sets[frame_set].bias);
+                (image_delay.duration_s(), motion.position_m + motion.velocity_m_per_s * shift_s)
             },
         );
-        let mount = self.imu_from_camera(view);
-        let camera_from_imu: Matrix3<f64> = mount.rotation_matrix().transpose();
-        let turn = camera_from_imu * imu_from_node;
-        let lever = world_from_imu * so3::hat(&mount.translation_m);
+        let extrinsics = self.imu_from_camera(view);
+        let camera_from_imu: Matrix3<f64> = extrinsics.rotation_matrix().transpose();
+        let camera_from_node = camera_from_imu * imu_from_node;
+        let lever = world_from_imu * so3::hat(&extrinsics.translation_m);
 
         let mut own = DMatrix::zeros(6, columns.own());
-        own.fixed_view_mut::<3, 3>(0, 0).copy_from(&turn);
+        own.fixed_view_mut::<3, 3>(0, 0).copy_from(&camera_from_node);
         own.fixed_view_mut::<3, 3>(3, 0).copy_from(&-(lever * imu_from_node + node * so3::hat(&carried)));
         own.fixed_view_mut::<3, 3>(3, 3).fill_with_identity();
         own.fixed_view_mut::<3, 3>(3, 6).fill_diagonal(lag_s + shift_s);
@@ -213,7 +218,7 @@ impl Estimate {
         shared.fixed_view_mut::<3, 1>(0, shift).copy_from(&(camera_from_imu * rate));
         shared.fixed_view_mut::<3, 1>(3, shift).copy_from(&(state.velocity_m_per_s - lever * rate));
         if gimbal {
-            let chain = self.chain.linearize(&self.joints_rad[instant]);
+            let chain = self.chain.linearize(&self.joints_rad[frame_set]);
             let carry = |part: &nalgebra::Matrix6xX<f64>, mut place: nalgebra::DMatrixViewMut<'_, f64>| {
                 place.copy_from(part);
                 let outer = world_from_imu * part.fixed_rows::<3>(3);
@@ -222,8 +227,8 @@ impl Estimate {
             carry(&chain.by_joints, own.columns_mut(MOTION, columns.joints));
             carry(&chain.by_parameters, shared.columns_mut(Columns::CHAIN, columns.chain));
         } else {
-            shared.fixed_view_mut::<3, 3>(0, Columns::MOUNT).fill_with_identity();
-            shared.fixed_view_mut::<3, 3>(3, Columns::MOUNT + 3).copy_from(&world_from_imu);
+            shared.fixed_view_mut::<3, 3>(0, Columns::EXTRINSICS).fill_with_identity();
+            shared.fixed_view_mut::<3, 3>(3, Columns::EXTRINSICS + 3).copy_from(&world_from_imu);
         }
         ViewMap { own, shared }
     }

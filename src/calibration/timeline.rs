@@ -10,7 +10,7 @@ use crate::geometry::{ns_from_seconds, seconds_from_ns, wrap_angle};
 use crate::sensors::{ImuNoise, ImuSample, JointAngles};
 
 /// An image of the gimbal camera belongs to an instant when it was taken at most this long after it.
-const LONGEST_HOP_NS: i64 = 60_000_000;
+const MAX_IMAGE_DELAY_NS: i64 = 60_000_000;
 
 /// The gimbal camera's image that belongs to an instant.
 #[derive(Clone, Debug)]
@@ -18,7 +18,7 @@ pub(super) struct GimbalView {
     /// Its place among the camera's views.
     pub(super) view: usize,
     /// Motion from the instant to the image: so short that it counts as exact.
-    pub(super) hop: Preintegration,
+    pub(super) image_delay: Preintegration,
     /// Angular velocity measured at the image's stamp, in rad/s.
     pub(super) gyroscope_rad_per_s: Vector3<f64>,
     /// What the encoders say.
@@ -29,7 +29,7 @@ pub(super) struct GimbalView {
 
 /// One instant.
 #[derive(Clone, Debug)]
-pub(super) struct Instant {
+pub(super) struct FrameSet {
     /// Since the log began.
     pub(super) stamp_ns: i64,
     /// Place of the static camera's image among its views.
@@ -44,7 +44,7 @@ pub(super) struct Instant {
     pub(super) gimbal: Option<GimbalView>,
 }
 
-impl Instant {
+impl FrameSet {
     /// Integrates the inertial samples again around the bias of the state that they begin at.
     pub(super) fn reintegrate(&mut self, before: Option<&ImuBias>, here: &ImuBias) {
         if let (Some((motion, information)), Some(bias)) = (&mut self.motion, before) {
@@ -55,7 +55,7 @@ impl Instant {
         }
         self.bias = *here;
         if let Some(gimbal) = &mut self.gimbal {
-            gimbal.hop.reintegrate(*here);
+            gimbal.image_delay.reintegrate(*here);
         }
     }
 }
@@ -84,11 +84,13 @@ impl ImuBuffer {
         let after = self.samples.partition_point(|sample| sample.stamp_ns < stamp_ns);
         let Some(next) = self.samples.get(after) else { return self.samples.last().copied() };
         let Some(before) = after.checked_sub(1).map(|index| &self.samples[index]) else { return Some(*next) };
-        let share = (stamp_ns - before.stamp_ns) as f64 / (next.stamp_ns - before.stamp_ns) as f64;
+        let fraction = (stamp_ns - before.stamp_ns) as f64 / (next.stamp_ns - before.stamp_ns) as f64;
         Some(ImuSample {
             stamp_ns,
-            angular_velocity_rad_per_s: before.angular_velocity_rad_per_s.lerp(&next.angular_velocity_rad_per_s, share),
-            specific_force_m_per_s2: before.specific_force_m_per_s2.lerp(&next.specific_force_m_per_s2, share),
+            angular_velocity_rad_per_s: before
+                .angular_velocity_rad_per_s
+                .lerp(&next.angular_velocity_rad_per_s, fraction),
+            specific_force_m_per_s2: before.specific_force_m_per_s2.lerp(&next.specific_force_m_per_s2, fraction),
         })
     }
 
@@ -111,11 +113,11 @@ impl ImuBuffer {
 }
 
 /// The instants of the longest stretch for which the static camera has states, with those states.
-pub(super) fn instants(
+pub(super) fn frame_sets(
     input: &CalibrationInput,
     options: &CalibrationOptions,
     states: &[Option<NavigationState>],
-) -> (Vec<Instant>, Vec<NavigationState>) {
+) -> (Vec<FrameSet>, Vec<NavigationState>) {
     let static_views = &input.static_camera.views;
     let tape = ImuBuffer::new(static_views);
     let spacing_ns = ns_from_seconds(options.spacing_s);
@@ -131,16 +133,16 @@ pub(super) fn instants(
             chosen.push((index, *state));
         }
     }
-    let mut instants: Vec<Instant> = Vec::with_capacity(chosen.len());
+    let mut frame_sets: Vec<FrameSet> = Vec::with_capacity(chosen.len());
     for (index, state) in &chosen {
         let stamp_ns = static_views[*index].stamp_ns;
-        let motion = instants.last().zip(instants.len().checked_sub(1)).and_then(|(before, place)| {
+        let motion = frame_sets.last().zip(frame_sets.len().checked_sub(1)).and_then(|(before, place)| {
             let bias = chosen[place].1.bias;
             let motion = tape.integrated(input.imu_noise, bias, before.stamp_ns, stamp_ns);
             let information = motion.square_root_information()?;
             Some((motion, information))
         });
-        instants.push(Instant {
+        frame_sets.push(FrameSet {
             stamp_ns,
             static_view: *index,
             gyroscope_rad_per_s: tape.at(stamp_ns).map_or_else(Vector3::zeros, |s| s.angular_velocity_rad_per_s),
@@ -149,7 +151,7 @@ pub(super) fn instants(
             gimbal: gimbal_view(input, &tape, stamp_ns, &state.bias),
         });
     }
-    (instants, chosen.into_iter().map(|(_, state)| state).collect())
+    (frame_sets, chosen.into_iter().map(|(_, state)| state).collect())
 }
 
 /// The first image of the gimbal camera at or after an instant, when it follows closely and has encoder readings.
@@ -157,13 +159,13 @@ fn gimbal_view(input: &CalibrationInput, tape: &ImuBuffer, stamp_ns: i64, bias: 
     let views = &input.gimbal_camera.views;
     let index = views.partition_point(|view| view.stamp_ns < stamp_ns);
     let view = views.get(index)?;
-    if view.stamp_ns - stamp_ns > LONGEST_HOP_NS {
+    if view.stamp_ns - stamp_ns > MAX_IMAGE_DELAY_NS {
         return None;
     }
     let encoder = view.joint_angles.clone()?;
     Some(GimbalView {
         view: index,
-        hop: tape.integrated(input.imu_noise, *bias, stamp_ns, view.stamp_ns),
+        image_delay: tape.integrated(input.imu_noise, *bias, stamp_ns, view.stamp_ns),
         gyroscope_rad_per_s: tape.at(view.stamp_ns)?.angular_velocity_rad_per_s,
         reading_rate_rad_per_s: reading_rates(views, index).unwrap_or_else(|| vec![0.0; encoder.angles_rad.len()]),
         encoder,

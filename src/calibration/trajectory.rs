@@ -8,7 +8,7 @@ use crate::estimator::{Estimator, EstimatorConfig, EventKind, ImuBias, Navigatio
 
 /// State of every image of the static camera as the estimator last knew it, `None` where it was not running; a restart
 /// leaves a gap of one image, so that stretches before and after it are told apart.
-pub(super) fn fly(
+pub(super) fn estimate_trajectory(
     camera: &StaticCamera,
     config: &EstimatorConfig,
     on_image: &mut dyn FnMut(usize),

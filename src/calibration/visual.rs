@@ -13,7 +13,7 @@ use crate::optimization::{
 
 /// One measurement of a landmark.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Sighting {
+pub(super) struct Observation {
     pub(super) view: ViewId,
     pub(super) uv_px: Vector2<f64>,
     /// Unit direction in the camera.
@@ -23,7 +23,7 @@ pub(super) struct Sighting {
 /// All sightings of one landmark, views rising.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Track {
-    pub(super) sightings: Vec<Sighting>,
+    pub(super) observations: Vec<Observation>,
 }
 
 /// How pixels are weighed: camera models by [`super::state::Camera`], static one first.
@@ -36,7 +36,7 @@ pub(super) struct PixelModel<'a> {
 }
 
 impl PixelModel<'_> {
-    fn which(view: ViewId) -> usize {
+    fn camera_index(view: ViewId) -> usize {
         view.0 % 2
     }
 
@@ -45,11 +45,11 @@ impl PixelModel<'_> {
         &self,
         poses: &BTreeMap<ViewId, CameraPose>,
         anchored: &AnchoredLandmark,
-        sighting: &Sighting,
+        observation: &Observation,
     ) -> Option<Vector2<f64>> {
-        let camera = self.cameras[Self::which(sighting.view)];
-        let relative = RelativePose::new(&anchored.anchor, poses.get(&sighting.view)?);
-        reprojection::residual(camera, &relative, &anchored.landmark, &sighting.uv_px)
+        let camera = self.cameras[Self::camera_index(observation.view)];
+        let relative = RelativePose::new(&anchored.anchor, poses.get(&observation.view)?);
+        reprojection::residual(camera, &relative, &anchored.landmark, &observation.uv_px)
     }
 
     /// Robust cost of all sightings, twice the halved sum.
@@ -61,9 +61,9 @@ impl PixelModel<'_> {
     ) -> f64 {
         let mut cost = 0.0;
         for (track, landmark) in tracks.iter().zip(landmarks) {
-            for sighting in &track.sightings {
-                let sigma = self.sigma_px[Self::which(sighting.view)];
-                cost += self.loss.cost_of(self.residual_px(poses, landmark, sighting), sigma);
+            for observation in &track.observations {
+                let sigma = self.sigma_px[Self::camera_index(observation.view)];
+                cost += self.loss.cost_of(self.residual_px(poses, landmark, observation), sigma);
             }
         }
         cost
@@ -85,15 +85,15 @@ pub(super) fn equations(
 ) -> VisualEquations {
     let mut equations = ReprojectionEquations::new(SparsePoseEquations::new(), tracks.len());
     for (track, anchored) in tracks.iter().zip(landmarks) {
-        let terms = track.sightings.iter().filter_map(|sighting| {
-            let relative = RelativePose::new(&anchored.anchor, poses.get(&sighting.view)?);
-            let which = PixelModel::which(sighting.view);
-            let camera = model.cameras[which];
-            let term = reprojection::linearize(camera, &relative, &relative, &anchored.landmark, &sighting.uv_px)?;
-            Some((sighting.view, term.whitened(model.sigma_px[which], model.loss)))
+        let terms = track.observations.iter().filter_map(|observation| {
+            let relative = RelativePose::new(&anchored.anchor, poses.get(&observation.view)?);
+            let camera_index = PixelModel::camera_index(observation.view);
+            let camera = model.cameras[camera_index];
+            let term = reprojection::linearize(camera, &relative, &relative, &anchored.landmark, &observation.uv_px)?;
+            Some((observation.view, term.whitened(model.sigma_px[camera_index], model.loss)))
         });
         // The anchors are fixed: only the observing views have columns.
-        equations.add_landmark(None, track.sightings.len(), terms);
+        equations.add_landmark(None, track.observations.len(), terms);
     }
     equations
 }

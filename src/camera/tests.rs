@@ -35,8 +35,8 @@ fn points() -> Vec<Vector3<f64>> {
     let mut points = vec![Vector3::new(0.0, 0.0, 2.0), Vector3::new(1e-11, -2e-11, 1.0)];
     for distance in [0.4, 3.0, 60.0] {
         for polar in [1e-4, 0.05, 0.2, 0.4, 0.6, 0.75] {
-            for turn in 0..7 {
-                let azimuth = 0.3 + f64::from(turn) * 0.9;
+            for eighth in 0..7 {
+                let azimuth = 0.3 + f64::from(eighth) * 0.9;
                 points.push(distance * bearing(polar, azimuth));
             }
         }

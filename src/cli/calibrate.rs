@@ -47,7 +47,7 @@ pub(crate) fn calibrate(arguments: &CalibrateArguments) -> Result<()> {
     };
     let progress = Progress::new();
     let run = session::calibrate(&request, &CalibrationOptions::default(), &mut |at| {
-        progress.show(at.share, || at.stage.to_owned());
+        progress.show(at.fraction, || at.stage.to_owned());
     })?;
     drop(progress);
     let report = export::report_calibration(&run);

@@ -123,7 +123,7 @@ impl EstimatorConfig {
     }
 
     /// Standard deviations of the numbers of a camera's mount as given, in metres and radians.
-    pub(super) fn mount_sigmas(&self, camera: usize) -> (f64, f64) {
+    pub(super) fn extrinsics_sigmas(&self, camera: usize) -> (f64, f64) {
         let main = self.chain_prior.unwrap_or(DEFAULT_CHAIN_PRIOR);
         camera.checked_sub(1).map_or(main, |rigid| self.rigid_cameras[rigid].prior)
     }

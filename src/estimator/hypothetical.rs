@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, Vector3};
 use super::{ColumnBlock, ColumnGroup, FrameId, Linearization};
 use crate::camera::CameraModel;
 use crate::estimator::factors::preintegration::Preintegration;
-use crate::estimator::factors::visual::{Sighting, Track, VisualModel};
+use crate::estimator::factors::visual::{Track, TrackObservation, VisualModel};
 use crate::estimator::state::calibration::{Calibration, GivenSigmas};
 use crate::estimator::state::calibrations::Calibrations;
 use crate::estimator::state::camera_pose;
@@ -189,14 +189,14 @@ impl HypotheticalWindow {
             };
             let anchor = hypothetical.anchor;
             let Some(uv_px) = self.camera.project(&landmark.bearing) else { continue };
-            let mut sightings = vec![Sighting { slot: anchor, uv_px }];
+            let mut observations = vec![TrackObservation { slot: anchor, uv_px }];
             for slot in hypothetical.observers.iter().copied().filter(|slot| *slot != anchor) {
                 let relative = RelativePose::new(&cameras[anchor], &cameras[slot]);
                 let seen = self.camera.project(&relative.direction(&landmark));
-                sightings.extend(seen.map(|uv_px| Sighting { slot, uv_px }));
+                observations.extend(seen.map(|uv_px| TrackObservation { slot, uv_px }));
             }
-            if sightings.len() > 1 {
-                tracks.push(Track { sightings });
+            if observations.len() > 1 {
+                tracks.push(Track { observations });
                 landmarks.push(landmark);
             }
         }
@@ -226,7 +226,7 @@ fn keeping(whole: &Linearization, count: impl Fn(ColumnGroup) -> usize) -> Linea
     let select = |matrix: &DMatrix<f64>| matrix.select_columns(&kept);
     Linearization {
         columns,
-        held: whole.held.clone(),
+        fixed_parameters: whole.fixed_parameters.clone(),
         jacobian: select(&whole.jacobian),
         prior_jacobian: select(&whole.prior_jacobian),
         rig_prior_rows: whole.rig_prior_rows,

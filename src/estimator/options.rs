@@ -74,7 +74,7 @@ pub struct EstimatorOptions {
     /// Failure: norm of the gyroscope's bias, in rad/s.
     pub max_gyroscope_bias: f64,
     /// Failure: norm of the velocity, in m/s.
-    pub max_speed: f64,
+    pub max_velocity_m_per_s: f64,
     /// Failure: correction of the newest position against its prediction, in metres.
     pub max_position_correction_m: f64,
     /// Failure: fewer than `min_landmarks` landmarks in view for so long, in seconds. Until then the IMU carries
@@ -117,7 +117,7 @@ impl Default for EstimatorOptions {
             },
             max_accelerometer_bias: 3.0,
             max_gyroscope_bias: 0.5,
-            max_speed: 50.0,
+            max_velocity_m_per_s: 50.0,
             max_position_correction_m: 5.0,
             max_blind_s: 5.0,
             min_landmarks: 6,

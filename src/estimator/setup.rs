@@ -46,7 +46,7 @@ impl Setup {
     pub(crate) fn given_calibration(&self) -> Calibrations {
         let config = &self.config;
         let given = |camera: usize| {
-            let (translation_m, rotation_rad) = config.mount_sigmas(camera);
+            let (translation_m, rotation_rad) = config.extrinsics_sigmas(camera);
             GivenSigmas { translation_m, rotation_rad }
         };
         let encoders = config.encoder_in_use().is_some();

@@ -181,7 +181,7 @@ pub fn report_calibration(run: &CalibrationRun) -> CalibrationReport {
     CalibrationReport {
         log: log_name(&run.log_path),
         stretch_s: [seconds_from_ns(outcome.stretch_ns.0), seconds_from_ns(outcome.stretch_ns.1)],
-        instants: outcome.instants,
+        instants: outcome.frame_sets,
         parameterization: outcome.parameterization.to_owned(),
         camera_imu_reprojection: (&outcome.static_pixels).into(),
         reprojection: outcome.pixels.iter().map(Into::into).collect(),
@@ -194,7 +194,7 @@ pub fn report_calibration(run: &CalibrationRun) -> CalibrationReport {
             gap_m: outcome.pose_loop.gaps_m.into(),
         },
         parameters: parameters(run),
-        static_t_cam_imu: rows(&outcome.mount.imu_from_camera.inverse()),
+        static_t_cam_imu: rows(&outcome.extrinsics.imu_from_camera.inverse()),
         gimbal_t_imu_cam_at_zero: rows(&outcome.chain.imu_from_camera(&zero)),
         rank: outcome.rank.as_ref().map(|rank| CalibrationRank {
             columns: rank.parameters.len(),
@@ -240,9 +240,9 @@ fn ground_truth_report(run: &CalibrationRun, ground_truth: &Rig) -> Option<Groun
         })
     };
     Some(GroundTruthReport {
-        static_initial: of_extrinsics(&outcome.mount.initial),
+        static_initial: of_extrinsics(&outcome.extrinsics.initial),
         static_camera_imu: of_extrinsics(&outcome.static_camera_imu.imu_from_camera),
-        static_final: of_extrinsics(&outcome.mount.imu_from_camera),
+        static_final: of_extrinsics(&outcome.extrinsics.imu_from_camera),
         chain_initial: of_chain(&outcome.given_chain)?,
         chain_pose_loop: of_chain(&outcome.pose_loop.chain)?,
         chain_final: of_chain(&outcome.chain)?,
@@ -252,8 +252,8 @@ fn ground_truth_report(run: &CalibrationRun, ground_truth: &Rig) -> Option<Groun
 /// Static camera, time offsets, then the chain.
 fn parameters(run: &CalibrationRun) -> Vec<ParameterReport> {
     let outcome = &run.outcome;
-    let mut parameters = mount_parameters(run, &outcome.mount);
-    parameters.push(time_shift(run, &run.static_camera, outcome.mount.time_shift_s));
+    let mut parameters = mount_parameters(run, &outcome.extrinsics);
+    parameters.push(time_shift(run, &run.static_camera, outcome.extrinsics.time_shift_s));
     parameters.extend(chain_parameters(run, outcome));
     parameters.push(time_shift(run, &run.gimbal_camera, outcome.gimbal_time_shift_s));
     parameters

@@ -37,7 +37,7 @@ pub(super) fn known_losses(run: &RunRecord, names: &ParameterNames) -> Vec<Known
             summary.steps += 1;
             summary.agreeing += usize::from(known.agrees);
             summary.largest_response = summary.largest_response.max(known.response);
-            summary.largest_false_gain = summary.largest_false_gain.max(known.false_gain);
+            summary.largest_false_gain = summary.largest_false_gain.max(known.spurious_gain);
         }
     }
     found.into_iter().map(|(_, summary)| summary).collect()

@@ -107,7 +107,7 @@ pub(super) fn rank_csv(run: &RunRecord, names: &ParameterNames) -> String {
             rank.known_agreeing(),
         ];
         row.extend(counts.map(|count| count.to_string()));
-        let numbers = [rank.false_gain(), rank.reference, rank.structural_threshold, rank.informed_threshold];
+        let numbers = [rank.spurious_gain(), rank.reference, rank.structural_threshold, rank.informed_threshold];
         row.extend(numbers.map(number_cell));
         for singularity in &margins {
             let margin = rank.margins.iter().find(|(known, _)| known == singularity);

@@ -117,14 +117,14 @@ fn rows_are_split_by_a_column_space_even_with_dependent_columns() {
     let repeated = spanning.column(0) + spanning.column(2);
     spanning.set_column(3, &repeated);
     let rest = nalgebra::DMatrix::from_fn(12, 4, |row, column| entry(row, column + 9));
-    let mut turned = to_faer(&rest);
-    let rank = split_by_column_space(to_faer(&spanning).as_ref(), turned.as_mut(), 1e-11);
+    let mut transformed = to_faer(&rest);
+    let rank = split_by_column_space(to_faer(&spanning).as_ref(), transformed.as_mut(), 1e-11);
     assert_eq!(rank, 4);
     // What is left has the Gram matrix of the part orthogonal to the columns.
     let svd = thin_svd(&spanning).unwrap();
     let basis = svd.u.columns(0, 4);
     let outside = &rest - basis * basis.tr_mul(&rest);
-    let left = nalgebra::DMatrix::from_fn(12 - rank, 4, |row, column| turned[(rank + row, column)]);
+    let left = nalgebra::DMatrix::from_fn(12 - rank, 4, |row, column| transformed[(rank + row, column)]);
     assert!((left.tr_mul(&left) - outside.tr_mul(&outside)).amax() < 1e-13);
     let product = &svd.u * nalgebra::DMatrix::from_diagonal(&svd.singular_values) * svd.v.transpose();
     assert!((product - spanning).amax() < 1e-14);
@@ -138,9 +138,12 @@ fn angles_are_wrapped_to_one_turn_and_left_alone_within_it() {
         assert_eq!(wrap_angle(angle).to_bits(), angle.to_bits(), "{angle}");
     }
     assert_eq!(wrap_angle(PI), -PI);
-    for turns in -3..=3 {
+    for revolutions in -3..=3 {
         for angle in [-3.0, -0.5, 0.0, 0.7, 3.1] {
-            assert!((wrap_angle(angle + f64::from(turns) * TAU) - angle).abs() < 1e-14, "{angle} and {turns} turns");
+            assert!(
+                (wrap_angle(angle + f64::from(revolutions) * TAU) - angle).abs() < 1e-14,
+                "{angle} and {revolutions} turns"
+            );
         }
     }
 }

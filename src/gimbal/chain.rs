@@ -215,9 +215,9 @@ impl Chain {
             Form::Poe(blocks) => {
                 let (last, inner) = blocks.split_last().expect("a product of exponentials has a last block");
                 for transform in inner {
-                    let turn = so3::log(&transform.rotation);
+                    let rotation_vector = so3::log(&transform.rotation);
                     let shift = transform.rotation.inverse() * transform.translation_m;
-                    values.extend([turn.x, turn.y, shift.x, shift.y]);
+                    values.extend([rotation_vector.x, rotation_vector.y, shift.x, shift.y]);
                 }
                 block(&mut values, last);
             }

@@ -24,10 +24,10 @@ impl DhLink {
     }
 
     pub(super) fn extend(&self, frame: &mut Frame, joint_angle_rad: f64) {
-        frame.turn(Axis::Z, joint_angle_rad + self.theta_offset_rad);
-        frame.slide(Axis::Z, self.d_m);
-        frame.slide(Axis::X, self.a_m);
-        frame.turn(Axis::X, self.alpha_rad);
+        frame.rotate(Axis::Z, joint_angle_rad + self.theta_offset_rad);
+        frame.translate(Axis::Z, self.d_m);
+        frame.translate(Axis::X, self.a_m);
+        frame.rotate(Axis::X, self.alpha_rad);
     }
 }
 

@@ -12,7 +12,7 @@ use super::frame::{Axis, Frame};
 use super::{Chain, ClassicalChain, DhLink, Parameterization};
 
 /// Below this cosine (or sine) of the middle angle a decomposition counts as locked.
-const LOCK: f64 = 1e-12;
+const SINGULAR_COSINE: f64 = 1e-12;
 
 /// The minimal form of a chain of at least one joint.
 ///
@@ -20,8 +20,8 @@ const LOCK: f64 = 1e-12;
 pub(super) fn minimal(classical: &ClassicalChain, parameterization: Parameterization) -> MinimalChain {
     let base = split_base(&Frame::of(&classical.imu_from_base), parameterization.base_yx());
     let mut links = classical.links.clone();
-    links[0].theta_offset_rad += base.turn_rad;
-    links[0].d_m += base.slide_m;
+    links[0].theta_offset_rad += base.joint_rotation_rad;
+    links[0].d_m += base.joint_translation_m;
     let end = links.len() - 1;
     let block = split_end(&end_block(&links[end], &classical.effector_from_camera), parameterization.end_swapped());
     links[end] = block.link;
@@ -46,28 +46,33 @@ struct Base {
     angles_rad: [f64; 2],
     shift_m: [f64; 2],
     /// Turn and slide along z that are left for the first joint.
-    turn_rad: f64,
-    slide_m: f64,
+    joint_rotation_rad: f64,
+    joint_translation_m: f64,
 }
 
-/// `Rx·Ry·T(tx, ty, 0)·Rz(turn)·Tz(slide)`, or with `Ry·Rx`.
+/// `Rx·Ry·T(tx, ty, 0)·Rz(rotate)·Tz(translate)`, or with `Ry·Rx`.
 fn split_base(base: &Frame, yx: bool) -> Base {
     let r = &base.rotation;
     let (angles_rad, axes) = if yx {
         let middle_cosine = r[(0, 2)].hypot(r[(2, 2)]);
-        let ry = if middle_cosine < LOCK { 0.0 } else { r[(0, 2)].atan2(r[(2, 2)]) };
+        let ry = if middle_cosine < SINGULAR_COSINE { 0.0 } else { r[(0, 2)].atan2(r[(2, 2)]) };
         ([ry, (-r[(1, 2)]).atan2(middle_cosine)], [Axis::Y, Axis::X])
     } else {
         let middle_cosine = r[(1, 2)].hypot(r[(2, 2)]);
-        let rx = if middle_cosine < LOCK { 0.0 } else { (-r[(1, 2)]).atan2(r[(2, 2)]) };
+        let rx = if middle_cosine < SINGULAR_COSINE { 0.0 } else { (-r[(1, 2)]).atan2(r[(2, 2)]) };
         ([rx, r[(0, 2)].atan2(middle_cosine)], [Axis::X, Axis::Y])
     };
-    let mut turned = Frame::identity();
-    turned.turn(axes[0], angles_rad[0]);
-    turned.turn(axes[1], angles_rad[1]);
-    let rest = turned.rotation.tr_mul(r);
-    let shift = turned.rotation.tr_mul(&base.origin);
-    Base { angles_rad, shift_m: [shift.x, shift.y], turn_rad: rest[(1, 0)].atan2(rest[(1, 1)]), slide_m: shift.z }
+    let mut rotated = Frame::identity();
+    rotated.rotate(axes[0], angles_rad[0]);
+    rotated.rotate(axes[1], angles_rad[1]);
+    let rest = rotated.rotation.tr_mul(r);
+    let shift = rotated.rotation.tr_mul(&base.origin);
+    Base {
+        angles_rad,
+        shift_m: [shift.x, shift.y],
+        joint_rotation_rad: rest[(1, 0)].atan2(rest[(1, 1)]),
+        joint_translation_m: shift.z,
+    }
 }
 
 struct End {
@@ -81,12 +86,12 @@ fn split_end(block: &Frame, swapped: bool) -> End {
     let (r, t) = (&block.rotation, &block.origin);
     if swapped {
         let middle_cosine = r[(0, 0)].hypot(r[(1, 0)]);
-        let locked = middle_cosine < LOCK;
+        let singular = middle_cosine < SINGULAR_COSINE;
         let beta_rad = (-r[(2, 0)]).atan2(middle_cosine);
         // Locked, only a combination of theta and alpha is determined: R·Ry(−beta) is the turn about z for alpha = 0.
-        let theta_offset_rad = if locked { (-r[(0, 1)]).atan2(r[(1, 1)]) } else { r[(1, 0)].atan2(r[(0, 0)]) };
-        let alpha_rad = if locked { 0.0 } else { r[(2, 1)].atan2(r[(2, 2)]) };
-        let shift = turned_back(theta_offset_rad, t);
+        let theta_offset_rad = if singular { (-r[(0, 1)]).atan2(r[(1, 1)]) } else { r[(1, 0)].atan2(r[(0, 0)]) };
+        let alpha_rad = if singular { 0.0 } else { r[(2, 1)].atan2(r[(2, 2)]) };
+        let shift = rotated_back(theta_offset_rad, t);
         return End {
             link: DhLink { theta_offset_rad, d_m: shift.z, a_m: shift.x, alpha_rad },
             beta_rad,
@@ -95,13 +100,13 @@ fn split_end(block: &Frame, swapped: bool) -> End {
     }
     let middle_cosine = r[(0, 1)].hypot(r[(1, 1)]);
     let alpha_rad = r[(2, 1)].atan2(middle_cosine);
-    if middle_cosine < LOCK {
+    if middle_cosine < SINGULAR_COSINE {
         // Theta and beta turn about the same line; theta is chosen so that y is not needed.
         let theta_offset_rad = if t.x == 0.0 && t.y == 0.0 { 0.0 } else { t.y.atan2(t.x) };
-        let mut turned = Frame::identity();
-        turned.turn(Axis::Z, theta_offset_rad);
-        turned.turn(Axis::X, alpha_rad);
-        let rest = turned.rotation.tr_mul(r);
+        let mut rotated = Frame::identity();
+        rotated.rotate(Axis::Z, theta_offset_rad);
+        rotated.rotate(Axis::X, alpha_rad);
+        let rest = rotated.rotation.tr_mul(r);
         return End {
             link: DhLink { theta_offset_rad, d_m: t.z, a_m: t.x.hypot(t.y), alpha_rad },
             beta_rad: rest[(0, 2)].atan2(rest[(0, 0)]),
@@ -109,7 +114,7 @@ fn split_end(block: &Frame, swapped: bool) -> End {
         };
     }
     let theta_offset_rad = (-r[(0, 1)]).atan2(r[(1, 1)]);
-    let shift = turned_back(theta_offset_rad, t);
+    let shift = rotated_back(theta_offset_rad, t);
     let y_m = shift.y / middle_cosine;
     End {
         link: DhLink { theta_offset_rad, d_m: shift.z - y_m * alpha_rad.sin(), a_m: shift.x, alpha_rad },
@@ -119,7 +124,7 @@ fn split_end(block: &Frame, swapped: bool) -> End {
 }
 
 /// `Rz(−angle)·v`.
-fn turned_back(angle_rad: f64, v: &Vector3<f64>) -> Vector3<f64> {
+fn rotated_back(angle_rad: f64, v: &Vector3<f64>) -> Vector3<f64> {
     let (sine, cosine) = angle_rad.sin_cos();
     Vector3::new(cosine * v.x + sine * v.y, cosine * v.y - sine * v.x, v.z)
 }
@@ -130,22 +135,22 @@ pub(super) fn classical_of_minimal(chain: &MinimalChain, parameterization: Param
     let mut base = Frame::identity();
     let order = if parameterization.base_yx() { [Axis::Y, Axis::X] } else { [Axis::X, Axis::Y] };
     for (axis, angle) in order.into_iter().zip(chain.base_angles_rad) {
-        base.turn(axis, angle);
+        base.rotate(axis, angle);
     }
-    base.slide(Axis::X, chain.base_shift_m[0]);
-    base.slide(Axis::Y, chain.base_shift_m[1]);
+    base.translate(Axis::X, chain.base_shift_m[0]);
+    base.translate(Axis::Y, chain.base_shift_m[1]);
     let mut links = chain.links.clone();
     let mut camera = Frame::identity();
     if parameterization.end_swapped() {
-        camera.slide(Axis::Y, chain.y_m);
-        camera.turn(Axis::Y, chain.beta_rad);
+        camera.translate(Axis::Y, chain.y_m);
+        camera.rotate(Axis::Y, chain.beta_rad);
         if let Some(last) = links.last_mut() {
-            camera.turn(Axis::X, last.alpha_rad);
+            camera.rotate(Axis::X, last.alpha_rad);
             last.alpha_rad = 0.0;
         }
     } else {
-        camera.turn(Axis::Y, chain.beta_rad);
-        camera.slide(Axis::Y, chain.y_m);
+        camera.rotate(Axis::Y, chain.beta_rad);
+        camera.translate(Axis::Y, chain.y_m);
     }
     ClassicalChain { imu_from_base: base.to_transform(), links, effector_from_camera: camera.to_transform() }
 }
@@ -168,11 +173,11 @@ pub(super) fn classical_of_poe(blocks: &[RigidTransform]) -> ClassicalChain {
     let mut links = Vec::with_capacity(last);
     let mut handed_on = RigidTransform::identity();
     for block in &blocks[1..last] {
-        let (link, turn_rad, slide_m) = split_inner(&Frame::of(&(handed_on * *block)));
+        let (link, joint_rotation_rad, joint_translation_m) = split_inner(&Frame::of(&(handed_on * *block)));
         links.push(link);
         handed_on = RigidTransform::new(
-            Rotation3::from_axis_angle(&Vector3::z_axis(), turn_rad).into(),
-            Vector3::new(0.0, 0.0, slide_m),
+            Rotation3::from_axis_angle(&Vector3::z_axis(), joint_rotation_rad).into(),
+            Vector3::new(0.0, 0.0, joint_translation_m),
         );
     }
     let block = Frame::of(&(handed_on * blocks[last]));
@@ -185,12 +190,12 @@ pub(super) fn classical_of_poe(blocks: &[RigidTransform]) -> ClassicalChain {
     ClassicalChain { imu_from_base: blocks[0], ..on_the_first_joint }
 }
 
-/// `Rz·Tz·Tx·Rx·Rz(turn)·Tz(slide)`, with a twist between 0 and π.
+/// `Rz·Tz·Tx·Rx·Rz(rotate)·Tz(translate)`, with a twist between 0 and π.
 fn split_inner(block: &Frame) -> (DhLink, f64, f64) {
     let (r, t) = (&block.rotation, &block.origin);
     let twist_sine = r[(0, 2)].hypot(r[(1, 2)]);
     let alpha_rad = twist_sine.atan2(r[(2, 2)]);
-    let parallel = twist_sine < LOCK;
+    let parallel = twist_sine < SINGULAR_COSINE;
     let theta_offset_rad = if !parallel {
         r[(0, 2)].atan2(-r[(1, 2)])
     } else if t.x == 0.0 && t.y == 0.0 {
@@ -198,15 +203,15 @@ fn split_inner(block: &Frame) -> (DhLink, f64, f64) {
     } else {
         t.y.atan2(t.x)
     };
-    let mut turned = Frame::identity();
-    turned.turn(Axis::Z, theta_offset_rad);
-    turned.turn(Axis::X, alpha_rad);
-    let rest: Matrix3<f64> = turned.rotation.tr_mul(r);
-    let turn_rad = rest[(1, 0)].atan2(rest[(0, 0)]);
-    let shift = turned_back(theta_offset_rad, t);
-    let slide_m = if parallel { 0.0 } else { -shift.y / twist_sine };
-    let d_m = shift.z - slide_m * r[(2, 2)];
-    (DhLink { theta_offset_rad, d_m, a_m: shift.x, alpha_rad }, turn_rad, slide_m)
+    let mut rotated = Frame::identity();
+    rotated.rotate(Axis::Z, theta_offset_rad);
+    rotated.rotate(Axis::X, alpha_rad);
+    let rest: Matrix3<f64> = rotated.rotation.tr_mul(r);
+    let joint_rotation_rad = rest[(1, 0)].atan2(rest[(0, 0)]);
+    let shift = rotated_back(theta_offset_rad, t);
+    let joint_translation_m = if parallel { 0.0 } else { -shift.y / twist_sine };
+    let d_m = shift.z - joint_translation_m * r[(2, 2)];
+    (DhLink { theta_offset_rad, d_m, a_m: shift.x, alpha_rad }, joint_rotation_rad, joint_translation_m)
 }
 
 impl Chain {

@@ -42,7 +42,7 @@ impl Frame {
     }
 
     /// Turns about its own axis.
-    pub(super) fn turn(&mut self, axis: Axis, angle_rad: f64) {
+    pub(super) fn rotate(&mut self, axis: Axis, angle_rad: f64) {
         let (sine, cosine) = angle_rad.sin_cos();
         let (next, after) = ((axis.index() + 1) % 3, (axis.index() + 2) % 3);
         let first = self.rotation.column(next) * cosine + self.rotation.column(after) * sine;
@@ -52,7 +52,7 @@ impl Frame {
     }
 
     /// Moves along its own axis.
-    pub(super) fn slide(&mut self, axis: Axis, distance_m: f64) {
+    pub(super) fn translate(&mut self, axis: Axis, distance_m: f64) {
         self.origin += self.rotation.column(axis.index()) * distance_m;
     }
 

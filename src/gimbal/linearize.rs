@@ -29,7 +29,7 @@ impl Chain {
     /// # Panics
     /// When the number of angles is not the number of joints.
     pub fn imu_from_camera(&self, joint_angles_rad: &[f64]) -> RigidTransform {
-        self.walk(joint_angles_rad, &mut Unrecorded).to_transform()
+        self.traverse(joint_angles_rad, &mut Unrecorded).to_transform()
     }
 
     /// Forward kinematics and its derivatives.
@@ -42,7 +42,7 @@ impl Chain {
             joints: Columns::new(self.joint_count()),
             offsets: !self.offsets_hidden,
         };
-        let frame = self.walk(joint_angles_rad, &mut recorder);
+        let frame = self.traverse(joint_angles_rad, &mut recorder);
         ChainLinearization {
             imu_from_camera: frame.to_transform(),
             by_parameters: recorder.parameters.finish(&frame),
@@ -50,54 +50,54 @@ impl Chain {
         }
     }
 
-    fn walk<S: Sink>(&self, joint_angles_rad: &[f64], sink: &mut S) -> Frame {
+    fn traverse<S: Sink>(&self, joint_angles_rad: &[f64], sink: &mut S) -> Frame {
         assert_eq!(joint_angles_rad.len(), self.joint_count(), "one angle per joint");
         let mut frame = Frame::identity();
         match &self.form {
             Form::Classical(chain) => {
-                walk_block(&mut frame, &chain.imu_from_base, sink);
+                traverse_block(&mut frame, &chain.imu_from_base, sink);
                 for (link, angle) in chain.links.iter().zip(joint_angles_rad) {
-                    walk_link(&mut frame, link, *angle, sink);
-                    turn(&mut frame, Axis::X, link.alpha_rad, sink);
+                    traverse_link(&mut frame, link, *angle, sink);
+                    rotate(&mut frame, Axis::X, link.alpha_rad, sink);
                 }
-                walk_block(&mut frame, &chain.effector_from_camera, sink);
+                traverse_block(&mut frame, &chain.effector_from_camera, sink);
             }
             Form::Minimal(chain) => {
                 let order = if self.parameterization.base_yx() { [Axis::Y, Axis::X] } else { [Axis::X, Axis::Y] };
                 for (axis, angle) in order.into_iter().zip(chain.base_angles_rad) {
-                    turn(&mut frame, axis, angle, sink);
+                    rotate(&mut frame, axis, angle, sink);
                 }
-                slide(&mut frame, Axis::X, chain.base_shift_m[0], sink);
-                slide(&mut frame, Axis::Y, chain.base_shift_m[1], sink);
+                translate(&mut frame, Axis::X, chain.base_shift_m[0], sink);
+                translate(&mut frame, Axis::Y, chain.base_shift_m[1], sink);
                 let end = chain.links.len() - 1;
                 for (index, (link, angle)) in chain.links.iter().zip(joint_angles_rad).enumerate() {
-                    walk_link(&mut frame, link, *angle, sink);
+                    traverse_link(&mut frame, link, *angle, sink);
                     if index == end && self.parameterization.end_swapped() {
-                        slide(&mut frame, Axis::Y, chain.y_m, sink);
-                        turn(&mut frame, Axis::Y, chain.beta_rad, sink);
+                        translate(&mut frame, Axis::Y, chain.y_m, sink);
+                        rotate(&mut frame, Axis::Y, chain.beta_rad, sink);
                     }
-                    turn(&mut frame, Axis::X, link.alpha_rad, sink);
+                    rotate(&mut frame, Axis::X, link.alpha_rad, sink);
                 }
                 if !self.parameterization.end_swapped() {
-                    turn(&mut frame, Axis::Y, chain.beta_rad, sink);
-                    slide(&mut frame, Axis::Y, chain.y_m, sink);
+                    rotate(&mut frame, Axis::Y, chain.beta_rad, sink);
+                    translate(&mut frame, Axis::Y, chain.y_m, sink);
                 }
             }
             Form::Poe(blocks) => {
                 for (block, angle) in blocks.iter().zip(joint_angles_rad) {
                     frame.then(block);
                     for axis in [Axis::X, Axis::Y] {
-                        sink.turn(&frame.axis(axis), &frame.origin);
+                        sink.rotate(&frame.axis(axis), &frame.origin);
                     }
                     for axis in [Axis::X, Axis::Y] {
-                        sink.slide(&frame.axis(axis));
+                        sink.translate(&frame.axis(axis));
                     }
                     sink.joint(&frame.axis(Axis::Z), &frame.origin);
-                    frame.turn(Axis::Z, *angle);
+                    frame.rotate(Axis::Z, *angle);
                 }
-                walk_block(&mut frame, &blocks[blocks.len() - 1], sink);
+                traverse_block(&mut frame, &blocks[blocks.len() - 1], sink);
             }
-            Form::Rigid(transform) => walk_block(&mut frame, transform, sink),
+            Form::Rigid(transform) => traverse_block(&mut frame, transform, sink),
         }
         frame
     }
@@ -105,8 +105,8 @@ impl Chain {
 
 /// What a walk along the chain meets, in column order.
 trait Sink {
-    fn turn(&mut self, axis: &Vector3<f64>, point: &Vector3<f64>);
-    fn slide(&mut self, axis: &Vector3<f64>);
+    fn rotate(&mut self, axis: &Vector3<f64>, point: &Vector3<f64>);
+    fn translate(&mut self, axis: &Vector3<f64>);
     fn joint(&mut self, axis: &Vector3<f64>, point: &Vector3<f64>);
     fn offset(&mut self, axis: &Vector3<f64>, point: &Vector3<f64>);
 }
@@ -115,8 +115,8 @@ trait Sink {
 struct Unrecorded;
 
 impl Sink for Unrecorded {
-    fn turn(&mut self, _axis: &Vector3<f64>, _point: &Vector3<f64>) {}
-    fn slide(&mut self, _axis: &Vector3<f64>) {}
+    fn rotate(&mut self, _axis: &Vector3<f64>, _point: &Vector3<f64>) {}
+    fn translate(&mut self, _axis: &Vector3<f64>) {}
     fn joint(&mut self, _axis: &Vector3<f64>, _point: &Vector3<f64>) {}
     fn offset(&mut self, _axis: &Vector3<f64>, _point: &Vector3<f64>) {}
 }
@@ -128,11 +128,11 @@ struct Recorder {
 }
 
 impl Sink for Recorder {
-    fn turn(&mut self, axis: &Vector3<f64>, point: &Vector3<f64>) {
+    fn rotate(&mut self, axis: &Vector3<f64>, point: &Vector3<f64>) {
         self.parameters.push(axis, point);
     }
 
-    fn slide(&mut self, axis: &Vector3<f64>) {
+    fn translate(&mut self, axis: &Vector3<f64>) {
         self.parameters.push(&Vector3::zeros(), axis);
     }
 
@@ -180,34 +180,34 @@ impl Columns {
     }
 }
 
-fn turn<S: Sink>(frame: &mut Frame, axis: Axis, angle_rad: f64, sink: &mut S) {
-    sink.turn(&frame.axis(axis), &frame.origin);
-    frame.turn(axis, angle_rad);
+fn rotate<S: Sink>(frame: &mut Frame, axis: Axis, angle_rad: f64, sink: &mut S) {
+    sink.rotate(&frame.axis(axis), &frame.origin);
+    frame.rotate(axis, angle_rad);
 }
 
-fn slide<S: Sink>(frame: &mut Frame, axis: Axis, distance_m: f64, sink: &mut S) {
-    sink.slide(&frame.axis(axis));
-    frame.slide(axis, distance_m);
+fn translate<S: Sink>(frame: &mut Frame, axis: Axis, distance_m: f64, sink: &mut S) {
+    sink.translate(&frame.axis(axis));
+    frame.translate(axis, distance_m);
 }
 
 /// A link up to its twist.
-fn walk_link<S: Sink>(frame: &mut Frame, link: &DhLink, joint_angle_rad: f64, sink: &mut S) {
+fn traverse_link<S: Sink>(frame: &mut Frame, link: &DhLink, joint_angle_rad: f64, sink: &mut S) {
     let axis = frame.axis(Axis::Z);
     sink.joint(&axis, &frame.origin);
     sink.offset(&axis, &frame.origin);
-    frame.turn(Axis::Z, joint_angle_rad + link.theta_offset_rad);
-    slide(frame, Axis::Z, link.d_m, sink);
-    slide(frame, Axis::X, link.a_m, sink);
+    frame.rotate(Axis::Z, joint_angle_rad + link.theta_offset_rad);
+    translate(frame, Axis::Z, link.d_m, sink);
+    translate(frame, Axis::X, link.a_m, sink);
 }
 
 /// A rigid transform with its six columns: it turns about its inner axes and slides along its outer ones.
-fn walk_block<S: Sink>(frame: &mut Frame, transform: &RigidTransform, sink: &mut S) {
+fn traverse_block<S: Sink>(frame: &mut Frame, transform: &RigidTransform, sink: &mut S) {
     let outer = *frame;
     frame.then(transform);
     for axis in [Axis::X, Axis::Y, Axis::Z] {
-        sink.turn(&frame.axis(axis), &frame.origin);
+        sink.rotate(&frame.axis(axis), &frame.origin);
     }
     for axis in [Axis::X, Axis::Y, Axis::Z] {
-        sink.slide(&outer.axis(axis));
+        sink.translate(&outer.axis(axis));
     }
 }

@@ -60,8 +60,9 @@ impl Chain {
                 let (last, inner) = blocks.split_last_mut().expect("a product of exponentials has a last block");
                 for block in inner {
                     let mut next = || delta.next().unwrap_or(0.0);
-                    let (turn, shift) = (Vector3::new(next(), next(), 0.0), Vector3::new(next(), next(), 0.0));
-                    let step = RigidTransform::new(so3::exp(&turn), shift);
+                    let (rotation_vector, shift) =
+                        (Vector3::new(next(), next(), 0.0), Vector3::new(next(), next(), 0.0));
+                    let step = RigidTransform::new(so3::exp(&rotation_vector), shift);
                     *block = normalized(*block * step);
                 }
                 *last = last.plus(&take_block(delta));
@@ -141,8 +142,8 @@ fn poe_difference(blocks: &[RigidTransform], origins: &[RigidTransform]) -> Vec<
         let axis = swing * Vector3::z();
         let slide = step.translation_m.z / axis.z;
         let shift = step.translation_m - axis * slide;
-        let turn = so3::log(&swing);
-        difference.extend([turn.x, turn.y, shift.x, shift.y]);
+        let rotation_vector = so3::log(&swing);
+        difference.extend([rotation_vector.x, rotation_vector.y, shift.x, shift.y]);
         handed_on = RigidTransform::new(twist, Vector3::z() * slide);
     }
     difference.extend((handed_on * blocks[last]).minus(&origins[last]).iter());

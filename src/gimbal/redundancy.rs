@@ -18,7 +18,7 @@ pub fn redundant_directions(chain: &ClassicalChain) -> DMatrix<f64> {
     let camera_rotation = chain.effector_from_camera.rotation_matrix();
     let camera_position = chain.effector_from_camera.translation_m;
     // A turn about an axis through a point of the effector, undone by the camera's pose on it.
-    let undo_turn = |directions: &mut DMatrix<f64>, direction: usize, axis: &Vector3<f64>, arm: &Vector3<f64>| {
+    let undo_rotation = |directions: &mut DMatrix<f64>, direction: usize, axis: &Vector3<f64>, arm: &Vector3<f64>| {
         set(directions, direction, camera, &-camera_rotation.tr_mul(axis));
         set(directions, direction, camera + 3, &-axis.cross(arm));
     };
@@ -26,7 +26,7 @@ pub fn redundant_directions(chain: &ClassicalChain) -> DMatrix<f64> {
         for index in 0..3 {
             let axis = Vector3::ith(index, 1.0);
             directions[(index, index)] = 1.0;
-            undo_turn(&mut directions, index, &axis, &camera_position);
+            undo_rotation(&mut directions, index, &axis, &camera_position);
             set(&mut directions, 3 + index, 3, &(base_rotation * axis));
             set(&mut directions, 3 + index, camera + 3, &-axis);
         }
@@ -40,12 +40,12 @@ pub fn redundant_directions(chain: &ClassicalChain) -> DMatrix<f64> {
     let (sine, cosine) = last.alpha_rad.sin_cos();
     let joint_axis = Vector3::new(0.0, sine, cosine);
     directions[(link, 2)] = 1.0;
-    undo_turn(&mut directions, 2, &joint_axis, &(camera_position + Vector3::x() * last.a_m));
+    undo_rotation(&mut directions, 2, &joint_axis, &(camera_position + Vector3::x() * last.a_m));
     directions[(link + 1, 3)] = 1.0;
     set(&mut directions, 3, camera + 3, &-joint_axis);
     directions[(link + 2, 4)] = 1.0;
     set(&mut directions, 4, camera + 3, &-Vector3::x());
     directions[(link + 3, 5)] = 1.0;
-    undo_turn(&mut directions, 5, &Vector3::x(), &camera_position);
+    undo_rotation(&mut directions, 5, &Vector3::x(), &camera_position);
     directions
 }

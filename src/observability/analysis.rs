@@ -79,11 +79,12 @@ pub fn analyse_with_scaling<A: AsRef<[f64]>>(
         .map(|angles| angles.as_ref().to_vec())
         .filter(|angles| angles.len() == chain.joint_count())
         .collect();
-    let held = &linearization.held;
-    let deficits = classify(chain, &kept_columns(chain, held), &angles, joints_free, columns, rank_structural);
+    let fixed_parameters = &linearization.fixed_parameters;
+    let deficits =
+        classify(chain, &kept_columns(chain, fixed_parameters), &angles, joints_free, columns, rank_structural);
     let null_space = svd.v.columns(rank_structural, columns - rank_structural);
     let losses = known_losses(&linearization.chain, joints_free);
-    let kept = kept_columns(&linearization.chain, held);
+    let kept = kept_columns(&linearization.chain, fixed_parameters);
     let rig_prior = linearization.prior_jacobian.view((0, 0), (linearization.rig_prior_rows, columns));
     let measured = Measured {
         scale: &scale,
@@ -98,7 +99,7 @@ pub fn analyse_with_scaling<A: AsRef<[f64]>>(
     Some(RankReport {
         directions: weak_directions(&block, &svd.v, &singular_values, rank_structural, INFORMED_THRESHOLD),
         parameters,
-        held: held.clone(),
+        fixed_parameters: fixed_parameters.clone(),
         singular_values,
         singular_values_with_priors: dense::singular_values(&with_priors)?,
         posterior: PackedFactor::new(&with_priors),
@@ -117,10 +118,10 @@ pub fn analyse_with_scaling<A: AsRef<[f64]>>(
     })
 }
 
-/// Places of the chain's columns that are not held.
-fn kept_columns(chain: &Chain, held: &[ParameterId]) -> Vec<usize> {
+/// Places of the chain's columns that are not fixed_parameters.
+fn kept_columns(chain: &Chain, fixed_parameters: &[ParameterId]) -> Vec<usize> {
     let parameters = chain.parameters().into_iter().enumerate();
-    parameters.filter(|(_, parameter)| !held.contains(parameter)).map(|(column, _)| column).collect()
+    parameters.filter(|(_, parameter)| !fixed_parameters.contains(parameter)).map(|(column, _)| column).collect()
 }
 
 /// What the measurements alone tell about the calibration, as the information of its columns in units of 10° and 3 cm;
@@ -173,16 +174,17 @@ impl Projected {
         let columns = calibration_parameters(linearization).len();
         let norms = column_norms(measurements, priors);
         // Blocks that no prior touches are projected out once for both readings.
-        let held = |block: &Range<usize>| {
+        let fixed_parameters = |block: &Range<usize>| {
             priors.nrows() > 0 && priors.columns_range(block.clone()).iter().any(|entry| *entry != 0.0)
         };
-        let (held, free): (Vec<_>, Vec<_>) = nuisance_blocks(linearization).into_iter().partition(held);
+        let (fixed_parameters, free): (Vec<_>, Vec<_>) =
+            nuisance_blocks(linearization).into_iter().partition(fixed_parameters);
         let mut rows = Rows::new(measurements);
         for block in merged(free) {
             rows.project_out(&block, &norms);
         }
         let mut with_priors = rows.stacked_on(priors);
-        for block in merged(held) {
+        for block in merged(fixed_parameters) {
             rows.project_out(&block, &norms);
             with_priors.project_out(&block, &norms);
         }

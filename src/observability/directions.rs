@@ -6,7 +6,7 @@ use super::CalibrationDirection;
 
 /// A parameter may lead a null direction when its share is at least this part of the largest one; the first such
 /// parameter in column order does, so that the choice is stable from frame to frame.
-const LEADING_SHARE: f64 = 0.5;
+const LEADING_RATIO: f64 = 0.5;
 
 /// A share this small is rounding left from the elimination, not a part of a null direction.
 const ROUNDING: f64 = 1e-8;
@@ -53,12 +53,12 @@ fn eliminated_basis(mut basis: DMatrix<f64>) -> Vec<DVector<f64>> {
     // The part of each parameter that the directions without a leader yet can still move.
     for step in 0..columns {
         let open = basis.columns(step, columns - step);
-        let share = |row: usize| open.row(row).norm();
+        let projection = |row: usize| open.row(row).norm();
         let free: Vec<usize> = (0..rows).filter(|row| leaders.iter().all(|(leader, _)| leader != row)).collect();
-        let largest = free.iter().map(|row| share(*row)).fold(0.0, f64::max);
-        let Some(leader) = free.into_iter().find(|row| share(*row) >= LEADING_SHARE * largest) else { break };
+        let largest = free.iter().map(|row| projection(*row)).fold(0.0, f64::max);
+        let Some(leader) = free.into_iter().find(|row| projection(*row) >= LEADING_RATIO * largest) else { break };
         // Turn the open directions so that only the first of them moves the leader.
-        let along = open.row(leader).transpose() / share(leader);
+        let along = open.row(leader).transpose() / projection(leader);
         let mut mirror = along;
         mirror[0] += if mirror[0] < 0.0 { -1.0 } else { 1.0 };
         let square = mirror.norm_squared();

@@ -6,7 +6,7 @@ use super::RankReport;
 use crate::gimbal::ParameterId;
 
 /// A direction counts as lost in another step when this share of it lies among that step's null and weak directions.
-const SAME_SHARE: f64 = 0.9;
+const SAME_RATIO: f64 = 0.9;
 
 /// In how many of the earlier steps, the latest first, a direction was null or weak without interruption.
 ///
@@ -31,7 +31,7 @@ impl RankReport {
         let basis = DMatrix::from_fn(rows, self.directions.len(), |row, column| {
             self.directions[column].weights.get(row).copied().unwrap_or(0.0)
         });
-        basis.qr().q().tr_mul(direction).norm() >= SAME_SHARE * direction.norm()
+        basis.qr().q().tr_mul(direction).norm() >= SAME_RATIO * direction.norm()
     }
 }
 
@@ -49,7 +49,7 @@ mod tests {
     fn report(directions: &[[f64; 3]]) -> RankReport {
         RankReport {
             parameters: parameters().into(),
-            held: Vec::new(),
+            fixed_parameters: Vec::new(),
             singular_values: vec![3.0, 2.0, 0.1],
             singular_values_with_priors: vec![3.0, 2.0, 1.0],
             reference: 1.0,

@@ -8,7 +8,7 @@ pub struct RankReport {
     /// Parameters of the calibration columns.
     pub parameters: Vec<ParameterId>,
     /// Parameters that are fixed at their values: they are known, and take no part.
-    pub held: Vec<ParameterId>,
+    pub fixed_parameters: Vec<ParameterId>,
     /// Singular values of the prior-scaled, projected calibration columns, largest first, one per column.
     pub singular_values: Vec<f64>,
     /// Singular values with the priors kept in.
@@ -35,7 +35,7 @@ pub struct RankReport {
     pub directions: Vec<CalibrationDirection>,
     /// Margins to the chart's locks.
     pub margins: Vec<(Singularity, f64)>,
-    /// What is known to be lost from the form of the chain, held against this measurement.
+    /// What is known to be lost from the form of the chain, fixed_parameters against this measurement.
     pub known: Vec<KnownDirection>,
     /// Number of joints of the chain.
     pub joint_count: usize,
@@ -77,7 +77,7 @@ impl RankReport {
         let weights = self.directions.iter().map(|direction| of_vec(&direction.weights)).sum::<usize>();
         weights
             + of_vec(&self.parameters)
-            + of_vec(&self.held)
+            + of_vec(&self.fixed_parameters)
             + of_vec(&self.margins)
             + of_vec(&self.singular_values)
             + of_vec(&self.singular_values_with_priors)
@@ -96,9 +96,9 @@ impl RankReport {
         self.known.iter().filter(|known| known.is_claimed()).count()
     }
 
-    /// The largest [`KnownDirection::false_gain`].
-    pub fn false_gain(&self) -> f64 {
-        self.known.iter().map(|known| known.false_gain).fold(0.0, f64::max)
+    /// The largest [`KnownDirection::spurious_gain`].
+    pub fn spurious_gain(&self) -> f64 {
+        self.known.iter().map(|known| known.spurious_gain).fold(0.0, f64::max)
     }
 
     /// The parameter with the largest share in the weakest direction that is not a structural zero.

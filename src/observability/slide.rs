@@ -45,7 +45,7 @@ pub fn chain_of_step(report: &StepReport, rank: &RankReport) -> Option<Chain> {
     let chain = Chain::from_classical(&report.calibration.classical, parameterization);
     let has = |chain: &Chain| {
         let mut free = chain.parameters();
-        free.retain(|parameter| !rank.held.contains(parameter));
+        free.retain(|parameter| !rank.fixed_parameters.contains(parameter));
         rank.parameters.starts_with(&free)
     };
     let chain = if has(&chain) { chain } else { chain.without_joint_offsets() };
@@ -71,21 +71,21 @@ pub fn slide(
     let weights = weights.get(..parameters.len())?;
     let entries = weights.iter().zip(&parameters).map(|(weight, parameter)| weight * parameter.dimension().scale());
     let step = DVector::from_iterator(parameters.len(), entries);
-    let mounts = |chain: &Chain, like: Option<&[RigidTransform]>| -> Vec<RigidTransform> {
+    let all_extrinsics = |chain: &Chain, like: Option<&[RigidTransform]>| -> Vec<RigidTransform> {
         let frames = report.window.iter().enumerate();
-        frames.map(|(slot, frame)| mount(frame, chain, like.map(|like| &like[slot]))).collect()
+        frames.map(|(slot, frame)| extrinsics(frame, chain, like.map(|like| &like[slot]))).collect()
     };
-    let mounts_before = mounts(chain, None);
-    let poses = |mounts: &[RigidTransform]| -> Vec<RigidTransform> {
-        report.window.iter().zip(mounts).map(|(frame, mount)| frame.world_from_imu * *mount).collect()
+    let extrinsics_before = all_extrinsics(chain, None);
+    let poses = |all_extrinsics: &[RigidTransform]| -> Vec<RigidTransform> {
+        report.window.iter().zip(all_extrinsics).map(|(frame, extrinsics)| frame.world_from_imu * *extrinsics).collect()
     };
-    let window = Window { report, camera, before: poses(&mounts_before) };
+    let window = Window { report, camera, before: poses(&extrinsics_before) };
     let moved = chain.plus(&(&step * amount));
-    let mounts_after = mounts(&moved, Some(&mounts_before));
-    let after = poses(&mounts_after);
-    let nearby = poses(&mounts(&chain.plus(&(&step * SMALL)), Some(&mounts_before)));
+    let extrinsics_after = all_extrinsics(&moved, Some(&extrinsics_before));
+    let after = poses(&extrinsics_after);
+    let nearby = poses(&all_extrinsics(&chain.plus(&(&step * SMALL)), Some(&extrinsics_before)));
     let newest = report.window.len().checked_sub(1)?;
-    let difference = mounts_before[newest].inverse() * mounts_after[newest];
+    let difference = extrinsics_before[newest].inverse() * extrinsics_after[newest];
     let mut slide = ChainSlide {
         stamp_ns: report.stamp_ns,
         amount,
@@ -116,7 +116,7 @@ pub fn slide(
 
 /// Pose of the camera on the IMU at a frame; where the joint angles were not read they follow, to stay as near as they can
 /// to the mount `like`.
-fn mount(frame: &FrameStateReport, chain: &Chain, like: Option<&RigidTransform>) -> RigidTransform {
+fn extrinsics(frame: &FrameStateReport, chain: &Chain, like: Option<&RigidTransform>) -> RigidTransform {
     if frame.joint_angles_rad.len() != chain.joint_count() {
         return frame.imu_from_camera;
     }

@@ -60,16 +60,16 @@ pub struct KnownDirection {
     /// Nobody can measure it, so anything but zero is false: the marginalization prior and the window were linearized at
     /// different values of the calibration. First estimates keep it at zero. Offsets of free joint angles are left out
     /// (zero): readings from before a fork may tell them.
-    pub false_gain: f64,
+    pub spurious_gain: f64,
 }
 
-/// A smaller [`KnownDirection::false_gain`] than this is not worth a word.
+/// A smaller [`KnownDirection::spurious_gain`] than this is not worth a word.
 pub const MIN_SPURIOUS_GAIN: f64 = 0.01;
 
 impl KnownDirection {
     /// Whether a prior claims a part of it that counts.
     pub fn is_claimed(&self) -> bool {
-        self.false_gain > MIN_SPURIOUS_GAIN
+        self.spurious_gain > MIN_SPURIOUS_GAIN
     }
 }
 
@@ -199,13 +199,17 @@ impl Measured<'_> {
                     response: if self.reference > 0.0 { response / self.reference } else { 0.0 },
                     null_space_fraction,
                     agrees: response <= self.structural_threshold && null_space_fraction >= INSIDE,
-                    false_gain: if matches!(loss, KnownLoss::FreeAngle(_)) { 0.0 } else { self.false_gain(&direction) },
+                    spurious_gain: if matches!(loss, KnownLoss::FreeAngle(_)) {
+                        0.0
+                    } else {
+                        self.spurious_gain(&direction)
+                    },
                 }
             })
             .collect()
     }
 
-    fn false_gain(&self, direction: &DVector<f64>) -> f64 {
+    fn spurious_gain(&self, direction: &DVector<f64>) -> f64 {
         let known = (self.with_priors * direction).norm_squared();
         (known - (self.rig_prior * direction).norm_squared()).max(0.0).sqrt()
     }

@@ -61,11 +61,11 @@ impl Equipment {
     /// The true rig, its chain's errors of manufacture drawn from a random stream.
     pub(crate) fn true_rig(&self, name: &str, random: &mut RandomStream) -> Rig {
         let chain = true_chain(random);
-        let static_mount = CameraMount::Static { imu_from_camera: static_mount(random) };
+        let static_extrinsics = CameraMount::Static { imu_from_camera: static_extrinsics(random) };
         let mut cameras = Vec::new();
         let kinds = [
             (self.gimbal_camera, "gimbal_camera", CameraMount::Gimbal, 0),
-            (self.static_camera, "static_camera", static_mount, 1),
+            (self.static_camera, "static_camera", static_extrinsics, 1),
         ];
         for (wanted, camera, mount, which) in kinds {
             if wanted {
@@ -106,7 +106,7 @@ impl Equipment {
 }
 
 /// A static camera under the nose, ahead and 12° down, give or take two degrees.
-fn static_mount(random: &mut RandomStream) -> RigidTransform {
+fn static_extrinsics(random: &mut RandomStream) -> RigidTransform {
     let optical = Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
     let optical = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(optical));
     let down = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), 12_f64.to_radians());
@@ -124,12 +124,12 @@ pub(crate) fn given_rig(ground_truth: &Rig, bounds: ChainPrior, random: &mut Ran
         gimbal.chain = wrong_chain(&gimbal.chain, bounds, random);
         gimbal.prior = bounds;
     }
-    let turn = bounds.rotation_bound_rad.min(0.5_f64.to_radians());
+    let rotation_bound = bounds.rotation_bound_rad.min(0.5_f64.to_radians());
     let shift = bounds.translation_bound_m.min(0.003);
     for camera in &mut given.cameras {
         camera.timeshift_cam_imu_s = 0.0;
         if let CameraMount::Static { imu_from_camera } = &mut camera.mount {
-            let phi = Vector3::from_fn(|_, _| random.uniform(-turn, turn));
+            let phi = Vector3::from_fn(|_, _| random.uniform(-rotation_bound, rotation_bound));
             imu_from_camera.rotation *= so3::exp(&phi);
             imu_from_camera.translation_m += Vector3::from_fn(|_, _| random.uniform(-shift, shift));
         }
@@ -142,13 +142,13 @@ pub(crate) fn given_rig(ground_truth: &Rig, bounds: ChainPrior, random: &mut Ran
 fn wrong_chain(chain: &ClassicalChain, bounds: ChainPrior, random: &mut RandomStream) -> ClassicalChain {
     let mut wrong = chain.clone();
     if chain.links.is_empty() {
-        let turn = bounds.rotation_bound_rad;
-        let phi = Vector3::from_fn(|_, _| random.uniform(-turn, turn));
+        let rotation_bound = bounds.rotation_bound_rad;
+        let phi = Vector3::from_fn(|_, _| random.uniform(-rotation_bound, rotation_bound));
         wrong.imu_from_base.rotation *= so3::exp(&phi);
         return wrong;
     }
-    let mut turn = RandomStream::new(random.next_u64(), 0);
-    let mut angle = || turn.uniform(-bounds.rotation_bound_rad, bounds.rotation_bound_rad);
+    let mut rotation_bound = RandomStream::new(random.next_u64(), 0);
+    let mut angle = || rotation_bound.uniform(-bounds.rotation_bound_rad, bounds.rotation_bound_rad);
     let mut length = || random.uniform(-bounds.translation_bound_m, bounds.translation_bound_m);
     let tilt = Vector3::new(angle(), angle(), 0.0);
     let aside = Vector3::new(length(), length(), 0.0);

@@ -65,8 +65,8 @@ pub const JOINT_PERIOD_S: f64 = 2.6;
 const GROWTH_S: f64 = 1.0;
 
 fn swing(time_s: f64, period_s: f64) -> f64 {
-    let share = (time_s / GROWTH_S).clamp(0.0, 1.0);
-    let grown = share * share * share * (share * (share * 6.0 - 15.0) + 10.0);
+    let fraction = (time_s / GROWTH_S).clamp(0.0, 1.0);
+    let grown = fraction * fraction * fraction * (fraction * (fraction * 6.0 - 15.0) + 10.0);
     grown * (TAU * time_s / period_s).sin()
 }
 

@@ -124,8 +124,8 @@ impl Experiment {
             }),
             Self::T3 | Self::T4 => {
                 // Streets of their own stream: a longer flight starts as a shorter one does.
-                let mut turns = RandomStream::new(random.next_u64(), 0);
-                let path = Path::new(streets(length_m, &mut turns), false, 5);
+                let mut random_directions = RandomStream::new(random.next_u64(), 0);
+                let path = Path::new(streets(length_m, &mut random_directions), false, 5);
                 Box::new(Cruise::new(pace, path, [2.9, 0.8], 0.7, 0.0, random))
             }
         }
@@ -155,7 +155,7 @@ fn streets(length_m: f64, random: &mut RandomStream) -> Vec<Vector2<f64>> {
         node = next;
         let [x, y] = direction;
         let choices: Vec<[i32; 2]> =
-            [[x, y], [-y, x], [y, -x]].into_iter().filter(|turn| inside(step(node, *turn))).collect();
+            [[x, y], [-y, x], [y, -x]].into_iter().filter(|heading| inside(step(node, *heading))).collect();
         direction = choices[random.index(choices.len())];
     }
     points

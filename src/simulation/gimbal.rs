@@ -141,7 +141,7 @@ pub struct JointMotion {
 impl JointMotion {
     /// Simulates the gimbal: at every step the controller asks for joint rates that turn the camera to what is wanted, the
     /// motors follow with lag, and the stops hold.
-    pub(crate) fn fly(
+    pub(crate) fn simulate(
         trajectory: &Trajectory,
         chain: &ClassicalChain,
         joints: &[Joint],
@@ -170,13 +170,13 @@ impl JointMotion {
             let asked =
                 joint_rates_towards(&vehicle.world_from_imu.rotation, chain, &angles, &wanted) * stabilizer.gain_per_s;
             let limit = stabilizer.rate_rad_per_s;
-            let held = look.fixed_joint.filter(|(_, stretch_s)| during(Some(*stretch_s), time_s));
+            let fixed = look.fixed_joint.filter(|(_, stretch_s)| during(Some(*stretch_s), time_s));
             if during(look.stabilized_s, time_s) {
                 continue;
             }
             for k in 0..3 {
                 let (low, high) = joints[k].limits_rad;
-                let asked = if held.is_some_and(|(joint, _)| joint == k) { 0.0 } else { asked[k] };
+                let asked = if fixed.is_some_and(|(joint, _)| joint == k) { 0.0 } else { asked[k] };
                 rates[k] += (asked.clamp(-limit, limit) - rates[k]) * (CONTROL_STEP_S / stabilizer.motor_s);
                 // Braking ahead of a stop keeps the motion smooth up to it.
                 let brake_per_s = 20.0;
@@ -190,13 +190,13 @@ impl JointMotion {
     /// From a time on the joints are fixed, but for an exercise's swing within the stops.
     pub(crate) fn exercise_from(&mut self, start_s: f64, exercise: &Exercise, joints: &[Joint]) {
         let first = ((start_s / CONTROL_STEP_S).ceil() as usize).min(self.states.len() - 1);
-        let held = self.states[first].0;
+        let fixed = self.states[first].0;
         for (step, (angles, rates)) in self.states.iter_mut().enumerate().skip(first) {
             let time_s = (step - first) as f64 * CONTROL_STEP_S;
             for (joint, (angle, rate)) in angles.iter_mut().zip(rates).enumerate() {
                 let swung = |time_s: f64| {
                     let (low, high) = joints[joint].limits_rad;
-                    (held[joint] + exercise.joint_rad(joint, time_s)).clamp(low, high)
+                    (fixed[joint] + exercise.joint_rad(joint, time_s)).clamp(low, high)
                 };
                 *angle = swung(time_s);
                 *rate = (swung(time_s + CONTROL_STEP_S) - swung(time_s - CONTROL_STEP_S)) / (2.0 * CONTROL_STEP_S);

@@ -80,11 +80,11 @@ impl ImuRecord {
         let Some(from) = after.checked_sub(1).map(|index| &self.samples[index]) else {
             return Some(ImuSample { stamp_ns, ..*to });
         };
-        let share = (stamp_ns - from.stamp_ns) as f64 / (to.stamp_ns - from.stamp_ns) as f64;
+        let fraction = (stamp_ns - from.stamp_ns) as f64 / (to.stamp_ns - from.stamp_ns) as f64;
         Some(ImuSample {
             stamp_ns,
-            angular_velocity_rad_per_s: from.angular_velocity_rad_per_s.lerp(&to.angular_velocity_rad_per_s, share),
-            specific_force_m_per_s2: from.specific_force_m_per_s2.lerp(&to.specific_force_m_per_s2, share),
+            angular_velocity_rad_per_s: from.angular_velocity_rad_per_s.lerp(&to.angular_velocity_rad_per_s, fraction),
+            specific_force_m_per_s2: from.specific_force_m_per_s2.lerp(&to.specific_force_m_per_s2, fraction),
         })
     }
 

@@ -12,7 +12,7 @@ pub(crate) struct FlightPoint {
     /// Position in the world.
     pub(crate) position_m: Vector3<f64>,
     /// Standard deviation of the random manoeuvres, per axis of the world.
-    pub(crate) lateral_offset_m: Vector3<f64>,
+    pub(crate) position_wander_m: Vector3<f64>,
     /// Heading, continuous over time.
     pub(crate) heading_rad: f64,
     /// Standard deviation of the heading's.
@@ -62,21 +62,21 @@ impl Pace {
 
     /// Progress of the ramp: 0 while hovering, 1 under way, smooth in between.
     pub(crate) fn liveliness(&self, time_s: f64) -> f64 {
-        let share = ((time_s - self.hover_s) / self.ramp_s).clamp(0.0, 1.0);
-        share * share * share * (share * (share * 6.0 - 15.0) + 10.0)
+        let fraction = ((time_s - self.hover_s) / self.ramp_s).clamp(0.0, 1.0);
+        fraction * fraction * fraction * (fraction * (fraction * 6.0 - 15.0) + 10.0)
     }
 
     /// Time under way, with the ramp counted at its growing speed; its derivative is [`Self::liveliness`].
     pub(crate) fn moving_time_s(&self, time_s: f64) -> f64 {
-        let share = ((time_s - self.hover_s) / self.ramp_s).clamp(0.0, 1.0);
-        let ramp = share.powi(4) * (share * (share - 3.0) + 2.5);
+        let fraction = ((time_s - self.hover_s) / self.ramp_s).clamp(0.0, 1.0);
+        let ramp = fraction.powi(4) * (fraction * (fraction - 3.0) + 2.5);
         let after = (time_s - self.hover_s - self.ramp_s).max(0.0);
         ramp * self.ramp_s + after
     }
 
-    fn lateral_offset_m(&self, time_s: f64) -> Vector3<f64> {
-        let share = self.liveliness(time_s);
-        let blend = |full: f64| self.sway_m + (full - self.sway_m) * share;
+    fn position_wander_m(&self, time_s: f64) -> Vector3<f64> {
+        let fraction = self.liveliness(time_s);
+        let blend = |full: f64| self.sway_m + (full - self.sway_m) * fraction;
         Vector3::new(blend(self.manoeuvre_m[0]), blend(self.manoeuvre_m[0]), blend(self.manoeuvre_m[1]))
     }
 
@@ -143,9 +143,9 @@ impl Path {
         let after = self.length_m.partition_point(|length| *length <= rest).clamp(1, self.points.len() - 1);
         let (from, to) = (self.points[after - 1], self.points[after]);
         let step = to - from;
-        let share = (rest - self.length_m[after - 1]) / step.norm().max(1e-12);
-        let turn = if self.closed { self.turn_rad() * laps } else { 0.0 };
-        (from + step * share, self.heading_rad[after - 1] + turn)
+        let fraction = (rest - self.length_m[after - 1]) / step.norm().max(1e-12);
+        let heading_change = if self.closed { self.turn_rad() * laps } else { 0.0 };
+        (from + step * fraction, self.heading_rad[after - 1] + heading_change)
     }
 
     /// By how much the direction turns in one round of a closed path.
@@ -224,7 +224,7 @@ impl Flight for Cruise {
         let height_m = self.height_m[0] + self.height_m[1] * since(&self.waves[2]);
         FlightPoint {
             position_m: Vector3::new(on_path.x + side.x, on_path.y + side.y, height_m),
-            lateral_offset_m: self.pace.lateral_offset_m(time_s),
+            position_wander_m: self.pace.position_wander_m(time_s),
             heading_rad: 0.5 * (direction + ahead) + self.heading_offset_rad + 0.35 * since(&self.waves[3]),
             heading_wander_rad: self.pace.heading_wander_rad(time_s),
         }
@@ -261,7 +261,7 @@ impl Flight for Shuttle {
         let shift = Vector3::new(cosine * ahead_m - sine * left_m, sine * ahead_m + cosine * left_m, 0.0);
         FlightPoint {
             position_m: self.centre_m + shift,
-            lateral_offset_m: self.pace.lateral_offset_m(time_s),
+            position_wander_m: self.pace.position_wander_m(time_s),
             heading_rad: self.heading_rad,
             heading_wander_rad: self.pace.heading_wander_rad(time_s),
         }
@@ -299,8 +299,8 @@ impl Drill {
     /// Amplitude of the warm-up at a time as a ratio of its full size: 0 while hovering.
     fn liveliness(&self, time_s: f64) -> f64 {
         let (begin_s, end_s) = (Self::REST_S, self.start_s - Self::REST_S);
-        let share = ((time_s - begin_s) / (end_s - begin_s).max(1e-3)).clamp(0.0, 1.0);
-        (std::f64::consts::PI * share).sin().powi(2)
+        let fraction = ((time_s - begin_s) / (end_s - begin_s).max(1e-3)).clamp(0.0, 1.0);
+        (std::f64::consts::PI * fraction).sin().powi(2)
     }
 }
 
@@ -320,7 +320,7 @@ impl Flight for Drill {
         let shift = Vector3::new(cosine * shift.x - sine * shift.y, sine * shift.x + cosine * shift.y, shift.z);
         FlightPoint {
             position_m: self.position_m + warm_up * liveliness + shift,
-            lateral_offset_m: Vector3::zeros(),
+            position_wander_m: Vector3::zeros(),
             heading_rad: self.heading_rad + liveliness * wave(0.4, 3.7, 0.5) + self.exercise.turn_rad(exercise_s),
             heading_wander_rad: 0.0,
         }
@@ -331,7 +331,7 @@ impl Flight for Station {
     fn point(&self, time_s: f64) -> FlightPoint {
         FlightPoint {
             position_m: self.position_m,
-            lateral_offset_m: self.pace.lateral_offset_m(time_s),
+            position_wander_m: self.pace.position_wander_m(time_s),
             heading_rad: self.heading_rad,
             heading_wander_rad: self.pace.heading_wander_rad(time_s),
         }

@@ -52,10 +52,9 @@ impl Scenario {
         let random = |stream| RandomStream::new(options.seed, stream);
         let true_rig = options.equipment.true_rig(options.name, &mut random(stream::RIG));
         let given_rig = given_rig(&true_rig, options.start_error, &mut random(stream::GIVEN_RIG));
-        let joints = true_rig
-            .gimbal
-            .as_ref()
-            .map(|gimbal| JointMotion::fly(&trajectory, &gimbal.chain, &gimbal.joints, look, &Stabilizer::default()));
+        let joints = true_rig.gimbal.as_ref().map(|gimbal| {
+            JointMotion::simulate(&trajectory, &gimbal.chain, &gimbal.joints, look, &Stabilizer::default())
+        });
         let inertial = ImuRecord::measure(
             &trajectory,
             &FIREFLY_IMU,

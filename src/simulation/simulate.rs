@@ -49,7 +49,7 @@ pub fn simulate(
 ) -> Result<SimulationSummary, SimulationError> {
     options.check()?;
     let name = output.file_stem().map_or_else(|| "simulation".to_owned(), |stem| stem.to_string_lossy().into_owned());
-    let scenario = fly(options, &name);
+    let scenario = fly_scenario(options, &name);
     let chain_error = given_chain_error(&scenario);
     let ground_truth_notes = ground_truth_notes(options, &scenario, chain_error);
     let (rig_path, ground_truth_path) = (output.with_extension("rig.yaml"), output.with_extension("truth.yaml"));
@@ -84,7 +84,7 @@ pub fn simulate(
 }
 
 /// The flight with its measurements.
-fn fly(options: &SimulationOptions, name: &str) -> Scenario {
+fn fly_scenario(options: &SimulationOptions, name: &str) -> Scenario {
     let experiment = options.experiment;
     let variant = 100 * Experiment::ALL.iter().position(|other| *other == experiment).unwrap_or(0) as u64;
     let random = |stream: u64| RandomStream::new(options.seed, stream + variant);
@@ -309,21 +309,26 @@ impl<'a> Studio<'a> {
             .par_iter()
             .map_init(
                 || (Workspace::default(), Vec::new()),
-                |(workspace, picture), shot| self.shoot(*shot, workspace, picture),
+                |(workspace, radiance), shot| self.shoot(*shot, workspace, radiance),
             )
             .collect();
         developed.map(VecDeque::from)
     }
 
-    fn shoot(&self, shot: Shot, workspace: &mut Workspace, picture: &mut Vec<f32>) -> Result<Vec<u8>, SimulationError> {
+    fn shoot(
+        &self,
+        shot: Shot,
+        workspace: &mut Workspace,
+        radiance: &mut Vec<f32>,
+    ) -> Result<Vec<u8>, SimulationError> {
         let (camera, view, sensor) = &self.cameras[shot.camera];
         let disturbances = &self.options.disturbances;
         let time_s = seconds_from_ns(shot.stamp_ns) + disturbances.camera_time_offset_s;
-        picture.clear();
-        picture.resize(view.pixels(), 0.0);
+        radiance.clear();
+        radiance.resize(view.pixels(), 0.0);
         let steps = match disturbances.exposure_s {
             _ if disturbances.blank_at(time_s) => {
-                picture.fill(BLANK_GREY);
+                radiance.fill(BLANK_GREY);
                 0
             }
             exposure_s if exposure_s > 0.0 => BLUR_STEPS,
@@ -334,15 +339,15 @@ impl<'a> Studio<'a> {
             let place = (step as f64 + 0.5) / steps as f64 - 0.5;
             let at_s = (time_s + place * disturbances.exposure_s).clamp(0.0, self.scenario.trajectory.duration_s());
             let pose = self.scenario.world_from_camera(camera, at_s);
-            self.renderer.render(view, &pose, 1.0 / steps as f32, workspace, picture);
+            self.renderer.render(view, &pose, 1.0 / steps as f32, workspace, radiance);
         }
         let light = disturbances.light_at(time_s) as f32;
         if light != 1.0 {
-            for grey in picture.iter_mut() {
+            for grey in radiance.iter_mut() {
                 *grey *= light;
             }
         }
-        let image = sensor.expose(picture, shot.frame_index, time_s);
+        let image = sensor.expose(radiance, shot.frame_index, time_s);
         let mut jpeg = Vec::with_capacity(image.pixels.len() / 4);
         JpegEncoder::new_with_quality(&mut jpeg, self.options.jpeg_quality)
             .write_image(&image.pixels, image.width as u32, image.height as u32, ExtendedColorType::L8)

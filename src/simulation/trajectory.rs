@@ -83,27 +83,27 @@ impl Trajectory {
         let knot_s = flight.knot_s();
         let count = Spline::<3>::points_for(duration_s, knot_s);
         let mut base = Vec::with_capacity(count);
-        let mut deviation = Vec::with_capacity(count);
+        let mut position_wander = Vec::with_capacity(count);
         let mut heading = Vec::with_capacity(count);
         let mut clock = Spline::<3> { knot_s, points: Vec::new() };
         for index in 0..count {
             let time_s = clock.time_of_point(index);
             let point = flight.point(time_s.max(0.0));
             base.push(point.position_m);
-            let shares = Vector3::new(random.normal(), random.normal(), random.normal()).map(|x| x.clamp(-2.0, 2.0));
-            deviation.push(shares.component_mul(&point.lateral_offset_m));
-            let turn = random.normal().clamp(-2.0, 2.0) * point.heading_wander_rad;
-            heading.push(Vector1::new(point.heading_rad + turn));
+            let fractions = Vector3::new(random.normal(), random.normal(), random.normal()).map(|x| x.clamp(-2.0, 2.0));
+            position_wander.push(fractions.component_mul(&point.position_wander_m));
+            let heading_wander = random.normal().clamp(-2.0, 2.0) * point.heading_wander_rad;
+            heading.push(Vector1::new(point.heading_rad + heading_wander));
         }
-        clock.points = base.iter().zip(&deviation).map(|(position, shift)| position + shift).collect();
+        clock.points = base.iter().zip(&position_wander).map(|(position, shift)| position + shift).collect();
         let heading_rad = Spline { knot_s, points: heading };
-        let mut flown = Self { position_m: clock, heading_rad, gravity_m_per_s2, duration_s };
-        flown.soften(&base, &mut deviation, limits);
-        flown
+        let mut trajectory = Self { position_m: clock, heading_rad, gravity_m_per_s2, duration_s };
+        trajectory.soften(&base, &mut position_wander, limits);
+        trajectory
     }
 
     /// Shrinks the deviations that act where a limit is exceeded until none is, at most 200 times.
-    fn soften(&mut self, base: &[SVector<f64, 3>], deviation: &mut [SVector<f64, 3>], limits: &VehicleLimits) {
+    fn soften(&mut self, base: &[SVector<f64, 3>], position_wander: &mut [SVector<f64, 3>], limits: &VehicleLimits) {
         for _ in 0..200 {
             let mut factor = vec![1.0_f64; base.len()];
             let mut exceeded = false;
@@ -123,8 +123,8 @@ impl Trajectory {
                 return;
             }
             for (index, slot) in factor.iter().enumerate() {
-                deviation[index] *= *slot;
-                self.position_m.points[index] = base[index] + deviation[index];
+                position_wander[index] *= *slot;
+                self.position_m.points[index] = base[index] + position_wander[index];
             }
         }
     }

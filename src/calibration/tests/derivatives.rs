@@ -6,7 +6,7 @@ use super::fixture::{Flight, flight, true_states};
 use crate::calibration::bundle::{Bundle, Priors};
 use crate::calibration::chain_prior::ChainTerm;
 use crate::calibration::state::{Camera, Columns, Estimate, ViewId};
-use crate::calibration::timeline::{Instant, instants};
+use crate::calibration::timeline::{FrameSet, frame_sets};
 use crate::calibration::visual::{PixelModel, Track};
 use crate::calibration::{CalibrationOptions, observations};
 use crate::estimator::gravity_in_world;
@@ -19,7 +19,7 @@ const STEP: f64 = 1e-6;
 /// A short flight whose gimbal images lie 50 ms after the static ones, at an estimate away from the truth.
 struct Example {
     flight: Flight,
-    instants: Vec<Instant>,
+    frame_sets: Vec<FrameSet>,
     estimate: Estimate,
     tracks: Vec<Track>,
     priors: Priors,
@@ -37,39 +37,40 @@ fn example() -> Example {
     flight.input.gimbal_camera.views.retain(odd);
     let options = CalibrationOptions { spacing_s: 0.2, ..CalibrationOptions::default() };
     let states: Vec<_> = true_states(&flight).into_iter().map(Some).collect();
-    let (instants, navigation) = instants(&flight.input, &options, &states);
-    assert!(instants.iter().filter(|instant| instant.gimbal.is_some()).count() > 4);
+    let (frame_sets, navigation) = frame_sets(&flight.input, &options, &states);
+    assert!(frame_sets.iter().filter(|frame_set| frame_set.gimbal.is_some()).count() > 4);
     let term = ChainTerm::new(&flight.input.gimbal_camera.chain, &flight.input.gimbal_camera.prior);
     let chain = term.given.clone();
     let priors = Priors {
         chain: term,
-        mount: flight.input.static_camera.imu_from_camera,
-        mount_sigmas: (0.003, 0.005),
+        extrinsics: flight.input.static_camera.imu_from_camera,
+        extrinsics_sigmas: (0.003, 0.005),
         time_shift_sigma_s: 0.01,
         bias_sigmas: (0.05, 0.5),
         first: navigation[0],
     };
-    let joint = |instant: &Instant| {
-        instant
+    let joint = |frame_set: &FrameSet| {
+        frame_set
             .gimbal
             .as_ref()
             .map_or_else(|| vec![0.0; 3], |g| g.encoder.angles_rad.iter().map(|q| q + 0.01).collect())
     };
     let mut estimate = Estimate {
-        joints_rad: instants.iter().map(joint).collect(),
+        joints_rad: frame_sets.iter().map(joint).collect(),
         navigation,
-        mount: flight.true_mount,
+        extrinsics: flight.true_extrinsics,
         shifts_s: [0.002, -0.003],
         chain: chain.plus(&DVector::from_fn(chain.dof(), |k, _| 0.001 * (k as f64).sin())),
         landmarks: Vec::new(),
     };
-    let columns = Columns { instants: instants.len(), joints: 3, chain: chain.dof() };
-    let mut tracks = observations::collect(&flight.input, &options, &instants, Camera::Static, &|_| true);
-    tracks.extend(observations::collect(&flight.input, &options, &instants, Camera::Gimbal, &|_| true));
-    let mut example = Example { flight, instants, estimate: estimate.clone(), tracks: tracks.clone(), priors, columns };
+    let columns = Columns { frame_sets: frame_sets.len(), joints: 3, chain: chain.dof() };
+    let mut tracks = observations::collect(&flight.input, &options, &frame_sets, Camera::Static, &|_| true);
+    tracks.extend(observations::collect(&flight.input, &options, &frame_sets, Camera::Gimbal, &|_| true));
+    let mut example =
+        Example { flight, frame_sets, estimate: estimate.clone(), tracks: tracks.clone(), priors, columns };
     let poses = bundle(&example).poses(&estimate);
     let (tracks, landmarks) = observations::triangulated(tracks, &poses, &options);
-    assert!(tracks.iter().any(|track| track.sightings[0].view.camera() == Camera::Gimbal));
+    assert!(tracks.iter().any(|track| track.observations[0].view.camera() == Camera::Gimbal));
     estimate.landmarks = landmarks;
     (example.estimate, example.tracks) = (estimate, tracks);
     example
@@ -78,7 +79,7 @@ fn example() -> Example {
 fn bundle(example: &Example) -> Bundle<'_> {
     Bundle {
         columns: example.columns,
-        instants: &example.instants,
+        frame_sets: &example.frame_sets,
         gravity_in_world: gravity_in_world(9.81),
         priors: &example.priors,
         pixels: PixelModel {
@@ -105,11 +106,11 @@ fn views_follow_every_unknown() {
     let landmarks = vec![Vector3::zeros(); estimate.landmarks.len()];
     for camera in [Camera::Static, Camera::Gimbal] {
         let view = ViewId::new(3, camera);
-        let map = estimate.view_map(view, columns, &example.instants, &gravity);
+        let map = estimate.view_map(view, columns, &example.frame_sets, &gravity);
         let slope = |band: &dyn Fn(f64) -> Vec<f64>, border: &dyn Fn(f64) -> DVector<f64>| {
             let at = |sign: f64| {
                 let moved = estimate.moved(columns, &band(sign * STEP), &border(sign * STEP), &landmarks);
-                moved.view(view, &example.instants, &gravity)
+                moved.view(view, &example.frame_sets, &gravity)
             };
             pose_difference(&at(1.0), &at(-1.0)) / (2.0 * STEP)
         };

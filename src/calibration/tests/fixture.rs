@@ -12,7 +12,7 @@ use crate::simulation::{SyntheticFlight, SyntheticFrame, SyntheticMount, Synthet
 /// A flight seen by both cameras, and the truth.
 pub(super) struct Flight {
     pub(super) input: CalibrationInput,
-    pub(super) true_mount: RigidTransform,
+    pub(super) true_extrinsics: RigidTransform,
     pub(super) true_chain: ClassicalChain,
     rigid: SyntheticFlight,
 }
@@ -56,16 +56,16 @@ pub(super) fn flight(options: &SyntheticOptions) -> Flight {
     let gimbal = synthetic_tracks(&SyntheticOptions { mount: SyntheticMount::Gimbal, ..options.clone() });
     let rigid = synthetic_tracks(&SyntheticOptions { mount: SyntheticMount::Static, ..options.clone() });
     assert_eq!(gimbal.frames[7].imu, rigid.frames[7].imu, "one flight");
-    let given_mount = mount(&rigid.given_rig);
-    let mount_prior = ChainPrior { translation_bound_m: 0.003, rotation_bound_rad: 0.0087 };
+    let given_extrinsics = mount(&rigid.given_rig);
+    let extrinsics_prior = ChainPrior { translation_bound_m: 0.003, rotation_bound_rad: 0.0087 };
     let given = gimbal.given_rig.gimbal.clone().unwrap();
     let sigma_rad = given.encoder_sigma_rad.unwrap();
     let input = CalibrationInput {
         static_camera: StaticCamera {
             key: "cam1".to_owned(),
             model: rigid.given_rig.cameras[0].model.clone(),
-            imu_from_camera: given_mount,
-            prior: mount_prior,
+            imu_from_camera: given_extrinsics,
+            prior: extrinsics_prior,
             views: views(&rigid, sigma_rad),
         },
         gimbal_camera: GimbalCamera {
@@ -79,10 +79,10 @@ pub(super) fn flight(options: &SyntheticOptions) -> Flight {
         imu_noise: rigid.given_rig.imu.noise,
         gravity_m_per_s2: rigid.given_rig.gravity_m_per_s2,
         estimator: EstimatorConfig {
-            chain: ClassicalChain { imu_from_base: given_mount, ..ClassicalChain::default() },
+            chain: ClassicalChain { imu_from_base: given_extrinsics, ..ClassicalChain::default() },
             chain_prior: Some((0.0017, 0.005)),
             ..EstimatorConfig::for_camera(&rigid.given_rig, "cam0", Parameterization::Minimal).unwrap()
         },
     };
-    Flight { input, true_mount: mount(&rigid.true_rig), true_chain: gimbal.true_rig.gimbal.unwrap().chain, rigid }
+    Flight { input, true_extrinsics: mount(&rigid.true_rig), true_chain: gimbal.true_rig.gimbal.unwrap().chain, rigid }
 }

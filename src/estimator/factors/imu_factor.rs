@@ -16,7 +16,7 @@ pub fn residual(
     let motion = preintegration.corrected(&from.bias);
     let t = preintegration.duration_s();
     let back = from.world_from_imu.rotation.inverse();
-    let turn = back * to.world_from_imu.rotation;
+    let relative_rotation = back * to.world_from_imu.rotation;
     let shift = to.world_from_imu.translation_m
         - from.world_from_imu.translation_m
         - from.velocity_m_per_s * t
@@ -24,7 +24,7 @@ pub fn residual(
     let gain = to.velocity_m_per_s - from.velocity_m_per_s - gravity_in_world * t;
 
     let mut residual = Vector15::zeros();
-    residual.fixed_rows_mut::<3>(0).copy_from(&so3::log(&(motion.rotation.inverse() * turn)));
+    residual.fixed_rows_mut::<3>(0).copy_from(&so3::log(&(motion.rotation.inverse() * relative_rotation)));
     residual.fixed_rows_mut::<3>(3).copy_from(&(back * shift - motion.position_m));
     residual.fixed_rows_mut::<3>(6).copy_from(&(back * gain - motion.velocity_m_per_s));
     residual.fixed_rows_mut::<3>(9).copy_from(&(to.bias.gyroscope_rad_per_s - from.bias.gyroscope_rad_per_s));
@@ -45,10 +45,10 @@ pub fn jacobians(
     let motion = preintegration.corrected(&from.bias);
     let back_rotation = from.world_from_imu.rotation.inverse();
     let back: Matrix3<f64> = back_rotation.to_rotation_matrix().into_inner();
-    let turn = back_rotation * to.world_from_imu.rotation;
-    let rotation_error = so3::log(&(motion.rotation.inverse() * turn));
+    let relative_rotation = back_rotation * to.world_from_imu.rotation;
+    let rotation_error = so3::log(&(motion.rotation.inverse() * relative_rotation));
     let error_inverse = so3::right_jacobian_inverse(&rotation_error);
-    let turn_back: Matrix3<f64> = turn.inverse().to_rotation_matrix().into_inner();
+    let relative_rotation_transpose: Matrix3<f64> = relative_rotation.inverse().to_rotation_matrix().into_inner();
     let shift = to.world_from_imu.translation_m
         - from.world_from_imu.translation_m
         - from.velocity_m_per_s * t
@@ -63,7 +63,7 @@ pub fn jacobians(
         -(error_inverse * error_back * so3::right_jacobian(&correction)) * by_bias.fixed_view::<3, 6>(0, 0);
 
     let mut by_from = Matrix15::zeros();
-    by_from.fixed_view_mut::<3, 3>(0, 0).copy_from(&-(error_inverse * turn_back));
+    by_from.fixed_view_mut::<3, 3>(0, 0).copy_from(&-(error_inverse * relative_rotation_transpose));
     by_from.fixed_view_mut::<3, 6>(0, 9).copy_from(&phi_by_bias);
     by_from.fixed_view_mut::<3, 3>(3, 0).copy_from(&so3::hat(&(back * shift)));
     by_from.fixed_view_mut::<3, 3>(3, 3).copy_from(&-back);

@@ -215,7 +215,7 @@ impl Preintegration {
     fn propagate(&mut self, from: &ImuSample, to: &ImuSample) {
         let h = seconds_from_ns(to.stamp_ns - from.stamp_ns);
         self.repeats.count(from, to);
-        let (turn_noise, turn_saturated) = Repeats::densities(
+        let (turn_noise, gyroscope_saturated) = Repeats::densities(
             &self.repeats.gyroscope,
             &to.angular_velocity_rad_per_s,
             MIN_SATURATED_RAD_PER_S,
@@ -227,7 +227,7 @@ impl Preintegration {
             MIN_SATURATED_M_PER_S2,
             self.noise.accelerometer_noise_density,
         );
-        self.saturated += usize::from(turn_saturated || force_saturated);
+        self.saturated += usize::from(gyroscope_saturated || force_saturated);
         let w0 = from.angular_velocity_rad_per_s - self.bias.gyroscope_rad_per_s;
         let w1 = to.angular_velocity_rad_per_s - self.bias.gyroscope_rad_per_s;
         let a0 = from.specific_force_m_per_s2 - self.bias.accelerometer_m_per_s2;
@@ -238,18 +238,18 @@ impl Preintegration {
         let w_half = (w0 + w1) * 0.5;
         let phi_half = (w0 + w_half) * (0.25 * h) + w0.cross(&w_half) * (h * h / 48.0);
         let phi = w_half * h + w0.cross(&w1) * (h * h / 12.0);
-        let turn_half = so3::exp(&phi_half);
-        let turn = so3::exp(&phi);
+        let half_rotation = so3::exp(&phi_half);
+        let step_rotation = so3::exp(&phi);
 
         // Simpson's rule, in the frame at `from`.
-        let force_half = turn_half * a_half;
-        let force_end = turn * a1;
+        let force_half = half_rotation * a_half;
+        let force_end = step_rotation * a1;
         let dv = (a0 + force_half * 4.0 + force_end) * (h / 6.0);
         let dp = (a0 + force_half * 2.0) * (h * h / 6.0);
 
         let r = self.increment.rotation.to_rotation_matrix().into_inner();
-        let e_half: Matrix3<f64> = turn_half.to_rotation_matrix().into_inner();
-        let e: Matrix3<f64> = turn.to_rotation_matrix().into_inner();
+        let e_half: Matrix3<f64> = half_rotation.to_rotation_matrix().into_inner();
+        let e: Matrix3<f64> = step_rotation.to_rotation_matrix().into_inner();
         // Derivatives of the step by a constant change of angular velocity and specific force over it.
         let phi_by_w = so3::right_jacobian(&phi) * (Matrix3::identity() * h - so3::hat(&(w1 - w0)) * (h * h / 12.0));
         let phi_half_by_w = so3::right_jacobian(&phi_half)
@@ -260,20 +260,20 @@ impl Preintegration {
         let dp_by_w = r * half_by_w * (h * h / 3.0);
         let dv_by_a = r * (Matrix3::identity() + e_half * 4.0 + e) * (h / 6.0);
         let dp_by_a = r * (Matrix3::identity() + e_half * 2.0) * (h * h / 6.0);
-        let turn_back = e.transpose();
+        let step_rotation_transpose = e.transpose();
         let dv_by_phi = -(r * so3::hat(&dv));
         let dp_by_phi = -(r * so3::hat(&dp));
 
         self.propagate_bias_jacobian(
             h,
-            &turn_back,
+            &step_rotation_transpose,
             [&dp_by_phi, &dv_by_phi],
             [&phi_by_w, &dp_by_w, &dv_by_w],
             [&dp_by_a, &dv_by_a],
         );
 
         let mut transition = Matrix15::identity();
-        transition.fixed_view_mut::<3, 3>(0, 0).copy_from(&turn_back);
+        transition.fixed_view_mut::<3, 3>(0, 0).copy_from(&step_rotation_transpose);
         transition.fixed_view_mut::<3, 3>(0, 9).copy_from(&-phi_by_w);
         transition.fixed_view_mut::<3, 3>(3, 0).copy_from(&dp_by_phi);
         transition.fixed_view_mut::<3, 3>(3, 6).copy_from(&(Matrix3::identity() * h));
@@ -292,14 +292,14 @@ impl Preintegration {
 
         self.increment.position_m += self.increment.velocity_m_per_s * h + r * dp;
         self.increment.velocity_m_per_s += r * dv;
-        self.increment.rotation = UnitQuaternion::new_normalize((self.increment.rotation * turn).into_inner());
+        self.increment.rotation = UnitQuaternion::new_normalize((self.increment.rotation * step_rotation).into_inner());
         self.duration_s += h;
     }
 
     fn propagate_bias_jacobian(
         &mut self,
         h: f64,
-        turn_back: &Matrix3<f64>,
+        step_rotation_transpose: &Matrix3<f64>,
         [dp_by_phi, dv_by_phi]: [&Matrix3<f64>; 2],
         [phi_by_w, dp_by_w, dv_by_w]: [&Matrix3<f64>; 3],
         [dp_by_a, dv_by_a]: [&Matrix3<f64>; 2],
@@ -316,7 +316,7 @@ impl Preintegration {
         v_by_bg += dv_by_phi * phi_by_bg - dv_by_w;
         let mut v_by_ba = j.fixed_view_mut::<3, 3>(6, 3);
         v_by_ba -= dv_by_a;
-        j.fixed_view_mut::<3, 3>(0, 0).copy_from(&(turn_back * phi_by_bg - phi_by_w));
+        j.fixed_view_mut::<3, 3>(0, 0).copy_from(&(step_rotation_transpose * phi_by_bg - phi_by_w));
     }
 
     /// White noise and random walk of one sample interval, from the squared continuous densities: of the angular velocity

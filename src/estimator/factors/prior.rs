@@ -56,10 +56,10 @@ impl Prior {
     /// frame at `gone` have been eliminated; `None` when nothing remains.
     pub(crate) fn eliminating(rows: &DMatrix<f64>, layout: &Layout, gone: usize) -> Option<Self> {
         let total = layout.total();
-        let leaving = layout.frame(gone);
+        let removed = layout.frame(gone);
         let active = |column: &usize| rows.column(*column).iter().any(|entry| *entry != 0.0);
-        let eliminated: Vec<usize> = leaving.clone().filter(active).collect();
-        let kept: Vec<usize> = (0..total).filter(|column| !leaving.contains(column)).filter(active).collect();
+        let eliminated: Vec<usize> = removed.clone().filter(active).collect();
+        let kept: Vec<usize> = (0..total).filter(|column| !removed.contains(column)).filter(active).collect();
         if kept.is_empty() {
             return None;
         }
@@ -97,13 +97,15 @@ impl Prior {
 
     /// Whether it holds unknowns of the frame at `slot`.
     pub(crate) fn holds_frame(&self, slot: usize) -> bool {
-        self.columns.iter().any(|column| matches!(column, PriorColumn::Frame { slot: held, .. } if *held == slot))
+        self.columns
+            .iter()
+            .any(|column| matches!(column, PriorColumn::Frame { slot: contained, .. } if *contained == slot))
     }
 
     /// Whether it holds some of these calibration parameters.
     pub(crate) fn holds_calibration(&self, parameters: &Range<usize>) -> bool {
-        let held = |column: &PriorColumn| matches!(column, PriorColumn::Calibration(held) if parameters.contains(held));
-        self.columns.iter().any(held)
+        let contained = |column: &PriorColumn| matches!(column, PriorColumn::Calibration(contained) if parameters.contains(contained));
+        self.columns.iter().any(contained)
     }
 
     /// Number of scalar residuals.
@@ -117,20 +119,20 @@ impl Prior {
         self.columns.capacity() * size_of::<PriorColumn>() + numbers * size_of::<f64>()
     }
 
-    /// The residuals at an estimate; `deviation` is `x ⊟ x₀` in the window's layout.
-    pub(crate) fn residual(&self, layout: &Layout, deviation: &DVector<f64>) -> DVector<f64> {
-        &self.residual + &self.jacobian * self.gather(layout, deviation)
+    /// The residuals at an estimate; `first_estimate_offset` is `x ⊟ x₀` in the window's layout.
+    pub(crate) fn residual(&self, layout: &Layout, first_estimate_offset: &DVector<f64>) -> DVector<f64> {
+        &self.residual + &self.jacobian * self.gather(layout, first_estimate_offset)
     }
 
     /// Adds `JᵀJ` (lower triangle at least) and `Jᵀ(r + J δ)` to the normal equations.
     pub(crate) fn add_to(
         &self,
         layout: &Layout,
-        deviation: &DVector<f64>,
+        first_estimate_offset: &DVector<f64>,
         hessian: &mut DMatrix<f64>,
         gradient: &mut DVector<f64>,
     ) {
-        let local = &self.gradient + &self.hessian * self.gather(layout, deviation);
+        let local = &self.gradient + &self.hessian * self.gather(layout, first_estimate_offset);
         let indices: Vec<usize> = self.columns.iter().map(|column| column.index(layout)).collect();
         for (column, global_column) in indices.iter().enumerate() {
             gradient[*global_column] += local[column];
@@ -140,26 +142,26 @@ impl Prior {
         }
     }
 
-    /// Whitened rows `[columns of the layout | residual]`, residuals at `deviation` from `x₀`.
-    pub(crate) fn rows(&self, layout: &Layout, deviation: &DVector<f64>) -> DMatrix<f64> {
+    /// Whitened rows `[columns of the layout | residual]`, residuals at `first_estimate_offset` from `x₀`.
+    pub(crate) fn rows(&self, layout: &Layout, first_estimate_offset: &DVector<f64>) -> DMatrix<f64> {
         let mut rows = DMatrix::zeros(self.len(), layout.total() + 1);
         for (column, place) in self.columns.iter().enumerate() {
             rows.set_column(place.index(layout), &self.jacobian.column(column));
         }
-        rows.set_column(layout.total(), &self.residual(layout, deviation));
+        rows.set_column(layout.total(), &self.residual(layout, first_estimate_offset));
         rows
     }
 
     /// Transports its calibration columns to another parameterization: `old = by_new · new` to first order.
     ///
-    /// `deviations` are the calibration's from its first estimate in the old and in the new parameterization. Where the
+    /// `first_estimate_offsets` are the calibration's from its first estimate in the old and in the new parameterization. Where the
     /// two differ by
     /// more than the first order, the residual takes the difference up, so that cost and gradient stay what they are at
     /// the present estimate.
     pub(crate) fn transport_calibration(
         &mut self,
         old_from_new: &DMatrix<f64>,
-        deviations: Option<&(DVector<f64>, DVector<f64>)>,
+        first_estimate_offsets: Option<&(DVector<f64>, DVector<f64>)>,
         layout: &Layout,
     ) {
         let zero = DVector::zeros(layout.total());
@@ -175,14 +177,17 @@ impl Prior {
         jacobian.columns_mut(columns.len(), moved.ncols()).copy_from(&moved);
         columns.extend((0..moved.ncols()).map(PriorColumn::Calibration));
         let mut residual = self.residual.clone();
-        if let Some((old, new)) = deviations {
+        if let Some((old, new)) = first_estimate_offsets {
             residual += rows.columns_range(calibration) * (old - old_from_new * new);
         }
         *self = Self::new(columns, jacobian, residual);
     }
 
-    fn gather(&self, layout: &Layout, deviation: &DVector<f64>) -> DVector<f64> {
-        DVector::from_iterator(self.columns.len(), self.columns.iter().map(|column| deviation[column.index(layout)]))
+    fn gather(&self, layout: &Layout, first_estimate_offset: &DVector<f64>) -> DVector<f64> {
+        DVector::from_iterator(
+            self.columns.len(),
+            self.columns.iter().map(|column| first_estimate_offset[column.index(layout)]),
+        )
     }
 }
 
@@ -216,9 +221,9 @@ impl StartPrior {
         let mut residual = DVector::zeros(Self::LEN);
         let pose = &state.navigation.world_from_imu;
         let reference = &self.reference.navigation.world_from_imu;
-        let turn = crate::geometry::so3::log(&(pose.rotation * reference.rotation.inverse()));
+        let rotation_error = crate::geometry::so3::log(&(pose.rotation * reference.rotation.inverse()));
         let vertical = pose.rotation.inverse() * Vector3::z();
-        residual[0] = turn.z / YAW_SIGMA_RAD;
+        residual[0] = rotation_error.z / YAW_SIGMA_RAD;
         for axis in 0..3 {
             jacobian[(0, axis)] = vertical[axis] / YAW_SIGMA_RAD;
             jacobian[(1 + axis, 3 + axis)] = 1.0 / ORIGIN_SIGMA_M;

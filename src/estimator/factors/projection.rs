@@ -45,15 +45,15 @@ impl ProjectedRows {
         let mut newest_rows = Vec::new();
         let mut local = LandmarkRows::default();
         for (track, landmark) in tracks.iter().zip(landmarks) {
-            let Some(anchor) = track.sightings.first().map(|first| first.slot) else { continue };
-            local.begin(anchor, track.sightings.len());
-            for sighting in &track.sightings {
-                let term = whitened(model, &relative, &relative_linearized, anchor, landmark, sighting, None);
+            let Some(anchor) = track.observations.first().map(|first| first.slot) else { continue };
+            local.begin(anchor, track.observations.len());
+            for observation in &track.observations {
+                let term = whitened(model, &relative, &relative_linearized, anchor, landmark, observation, None);
                 let Some(term) = term else { continue };
-                if sighting.slot != anchor {
-                    blocks.add(anchor, sighting.slot, &term);
+                if observation.slot != anchor {
+                    blocks.add(anchor, observation.slot, &term);
                 }
-                local.push(sighting.slot, &term);
+                local.push(observation.slot, &term);
             }
             let seen_last = anchor != newest && local.last_pose() == Some(newest);
             if apart == NewestRows::Apart && seen_last {
@@ -79,13 +79,13 @@ impl ProjectedRows {
 
 /// The anchor need not be the first to see a feature.
 fn first_slot(track: &Track) -> Option<usize> {
-    track.sightings.iter().map(|sighting| sighting.slot).min()
+    track.observations.iter().map(|observation| observation.slot).min()
 }
 
 /// Most rows that the tracks leave which begin in a slot.
 fn height_of(tracks: &[Track], slot: usize) -> usize {
     let beginning = tracks.iter().filter(|track| first_slot(track) == Some(slot));
-    beginning.map(|track| (2 * track.sightings.len()).saturating_sub(LANDMARK)).sum()
+    beginning.map(|track| (2 * track.observations.len()).saturating_sub(LANDMARK)).sum()
 }
 
 /// Whether the rows that the newest frame adds are told apart.

@@ -11,7 +11,7 @@ use crate::optimization::{
 
 /// One measurement of a feature: the slot of the frame and the pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Sighting {
+pub(crate) struct TrackObservation {
     /// Slot of the frame in the window.
     pub(crate) slot: usize,
     /// Measured pixel.
@@ -22,7 +22,7 @@ pub(crate) struct Sighting {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Track {
     /// In the order of the slots.
-    pub(crate) sightings: Vec<Sighting>,
+    pub(crate) observations: Vec<TrackObservation>,
 }
 
 /// How pixels are weighed.
@@ -51,9 +51,9 @@ pub(crate) fn sighting_residual_px(
     relative: &RelativePoses,
     anchor: usize,
     landmark: &Landmark,
-    sighting: &Sighting,
+    observation: &TrackObservation,
 ) -> Option<Vector2<f64>> {
-    reprojection::residual(model.camera, relative.get(anchor, sighting.slot), landmark, &sighting.uv_px)
+    reprojection::residual(model.camera, relative.get(anchor, observation.slot), landmark, &observation.uv_px)
 }
 
 /// Robust cost (half the sum of losses) of all reprojection factors.
@@ -61,12 +61,12 @@ pub(crate) fn cost(model: &VisualModel<'_>, cameras: &[CameraPose], tracks: &[Tr
     let relative = RelativePoses::new(cameras);
     let mut total = 0.0;
     for (track, landmark) in tracks.iter().zip(landmarks) {
-        let Some(anchor) = track.sightings.first().map(|first| first.slot) else { continue };
-        for sighting in &track.sightings {
-            if sighting.slot == anchor && !model.measures_in_anchor() {
+        let Some(anchor) = track.observations.first().map(|first| first.slot) else { continue };
+        for observation in &track.observations {
+            if observation.slot == anchor && !model.measures_in_anchor() {
                 continue;
             }
-            let residual = sighting_residual_px(model, &relative, anchor, landmark, sighting);
+            let residual = sighting_residual_px(model, &relative, anchor, landmark, observation);
             total += 0.5 * model.loss.cost_of(residual, model.sigma_px);
         }
     }
@@ -92,12 +92,12 @@ pub(crate) fn equations(
     let mut equations = ReprojectionEquations::new(DensePoseEquations::new(current.len()), tracks.len());
     for (track, landmark) in tracks.iter().zip(landmarks) {
         // Observations come in the order of the slots and the anchor is the first of them.
-        let anchor = track.sightings.first().map(|first| first.slot);
-        let terms = track.sightings.iter().filter_map(|sighting| {
-            let term = whitened(model, &relative, &linearized, anchor?, landmark, sighting, None)?;
-            Some((sighting.slot, term))
+        let anchor = track.observations.first().map(|first| first.slot);
+        let terms = track.observations.iter().filter_map(|observation| {
+            let term = whitened(model, &relative, &linearized, anchor?, landmark, observation, None)?;
+            Some((observation.slot, term))
         });
-        equations.add_landmark(anchor, track.sightings.len(), terms);
+        equations.add_landmark(anchor, track.observations.len(), terms);
     }
     equations
 }
@@ -110,21 +110,21 @@ pub(crate) fn whitened(
     linearized: &RelativePoses,
     anchor: usize,
     landmark: &Landmark,
-    sighting: &Sighting,
+    observation: &TrackObservation,
     known_weight: Option<f64>,
 ) -> Option<Reprojection> {
-    let term = if sighting.slot == anchor {
+    let term = if observation.slot == anchor {
         if !model.measures_in_anchor() {
             return None;
         }
-        reprojection::linearize_in_anchor(model.camera, landmark, &sighting.uv_px)?
+        reprojection::linearize_in_anchor(model.camera, landmark, &observation.uv_px)?
     } else {
         reprojection::linearize(
             model.camera,
-            relative.get(anchor, sighting.slot),
-            linearized.get(anchor, sighting.slot),
+            relative.get(anchor, observation.slot),
+            linearized.get(anchor, observation.slot),
             landmark,
-            &sighting.uv_px,
+            &observation.uv_px,
         )?
     };
     let mut term = match known_weight {

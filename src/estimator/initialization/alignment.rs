@@ -78,10 +78,10 @@ fn gyroscope_rotations(increments: &[Preintegration], bias: &Vector3<f64>) -> Ve
     let (mut rotation, mut by_bias) = (UnitQuaternion::identity(), Matrix3::zeros());
     for increment in increments {
         let bias = ImuBias { gyroscope_rad_per_s: *bias, ..*increment.bias() };
-        let turn = increment.corrected(&bias).rotation;
+        let rotation_step = increment.corrected(&bias).rotation;
         let own: Matrix3<f64> = increment.bias_jacobian().fixed_view::<3, 3>(0, 0).into_owned();
-        by_bias = turn.inverse().to_rotation_matrix().into_inner() * by_bias + own;
-        rotation = UnitQuaternion::new_normalize((rotation * turn).into_inner());
+        by_bias = rotation_step.inverse().to_rotation_matrix().into_inner() * by_bias + own;
+        rotation = UnitQuaternion::new_normalize((rotation * rotation_step).into_inner());
         rotations.push((rotation, by_bias));
     }
     rotations
@@ -94,7 +94,7 @@ pub(super) fn align_rotations(input: &AlignmentInput<'_>) -> Option<RotationAlig
     const ROUNDS: usize = 10;
     let sigma = input.extrinsics_rotation_noise_rad.hypot(VISUAL_ROTATION_SIGMA_RAD);
     let mut bias = input.gyroscope_bias.mean;
-    let mut mount = input.imu_from_camera.first()?.rotation;
+    let mut extrinsics = input.imu_from_camera.first()?.rotation;
     for _ in 0..ROUNDS {
         let rotations = gyroscope_rotations(input.increments, &bias);
         let (mut normal, mut rhs) = (Matrix6::<f64>::zeros(), Vector6::zeros());
@@ -107,7 +107,7 @@ pub(super) fn align_rotations(input: &AlignmentInput<'_>) -> Option<RotationAlig
             rotations.iter().zip(input.imu_from_camera.iter().zip(input.cameras))
         {
             let predicted = start_from_imu * given.rotation * camera.rotation.inverse();
-            let error = so3::log(&(mount.inverse() * predicted));
+            let error = so3::log(&(extrinsics.inverse() * predicted));
             // A right turn of `start_from_imu` passes through the rest of the product.
             let onward = (given.rotation * camera.rotation.inverse()).inverse().to_rotation_matrix().into_inner();
             let by_bias = onward * by_bias;
@@ -121,19 +121,20 @@ pub(super) fn align_rotations(input: &AlignmentInput<'_>) -> Option<RotationAlig
             rhs -= jacobian.transpose() * error * weight;
         }
         let step = normal.cholesky()?.solve(&rhs);
-        mount = UnitQuaternion::new_normalize((mount * so3::exp(&step.fixed_rows::<3>(0).into_owned())).into_inner());
+        extrinsics =
+            UnitQuaternion::new_normalize((extrinsics * so3::exp(&step.fixed_rows::<3>(0).into_owned())).into_inner());
         bias += step.fixed_rows::<3>(3);
         if step.norm() < 1e-7 {
             break;
         }
     }
-    (mount.norm().is_finite() && bias.norm().is_finite())
-        .then_some(RotationAlignment { imu_from_first_camera: mount, gyroscope_bias: bias })
+    (extrinsics.norm().is_finite() && bias.norm().is_finite())
+        .then_some(RotationAlignment { imu_from_first_camera: extrinsics, gyroscope_bias: bias })
 }
 
 /// Columns of the linear system: scale, mount (3), accelerometer bias (3), gravity (3), velocities (3 each).
 const SCALE: usize = 0;
-const MOUNT: usize = 1;
+const EXTRINSICS: usize = 1;
 const BIAS: usize = 4;
 const GRAVITY: usize = 7;
 const VELOCITY: usize = 10;
@@ -148,8 +149,8 @@ const AMPLE_EXTRINSICS_SIGMA_RAD: f64 = 0.6;
 pub(super) fn align(input: &AlignmentInput<'_>, rotation: &RotationAlignment) -> Option<Alignment> {
     let mut best = align_from(input, rotation, rotation.imu_from_first_camera);
     if input.extrinsics_rotation_sigma_rad > AMPLE_EXTRINSICS_SIGMA_RAD {
-        for turn in cube_rotations() {
-            let candidate = align_from(input, rotation, turn * rotation.imu_from_first_camera);
+        for rotation_step in cube_rotations() {
+            let candidate = align_from(input, rotation, rotation_step * rotation.imu_from_first_camera);
             let better = match (&candidate, &best) {
                 (Some(new), Some(old)) => new.scale > 0.0 && (old.scale <= 0.0 || new.cost < old.cost),
                 (Some(_), None) => true,
@@ -169,8 +170,8 @@ fn cube_rotations() -> impl Iterator<Item = UnitQuaternion<f64>> {
     axes.into_iter().flat_map(|up| (0..4).map(move |quarter| (up, quarter))).filter_map(|(up, quarter)| {
         let tilt = UnitQuaternion::rotation_between(&Vector3::z(), &up)
             .unwrap_or_else(|| UnitQuaternion::from_scaled_axis(Vector3::x() * std::f64::consts::PI));
-        let turn = Vector3::z() * (f64::from(quarter) * std::f64::consts::FRAC_PI_2);
-        let rotation = tilt * UnitQuaternion::from_scaled_axis(turn);
+        let rotation_step = Vector3::z() * (f64::from(quarter) * std::f64::consts::FRAC_PI_2);
+        let rotation = tilt * UnitQuaternion::from_scaled_axis(rotation_step);
         (rotation.angle() > 0.1).then_some(rotation)
     })
 }
@@ -185,17 +186,17 @@ fn align_from(
         .into_iter()
         .map(|(rotation, _)| rotation)
         .collect();
-    let mut mount = imu_from_first_camera;
+    let mut extrinsics = imu_from_first_camera;
     let mut scale: Option<f64> = None;
-    let mut turned = so3::log(&(mount * rotation.imu_from_first_camera.inverse()));
+    let mut rotation_change = so3::log(&(extrinsics * rotation.imu_from_first_camera.inverse()));
     let mut last: Option<(DVector<f64>, f64)> = None;
     for _ in 0..ROUNDS {
-        let (normal, rhs, square) = linear_system(input, &rotations, &mount, scale, &turned, rotation);
+        let (normal, rhs, square) = linear_system(input, &rotations, &extrinsics, scale, &rotation_change, rotation);
         let solution = solve_with_gravity_norm(&normal, &rhs, input.gravity_m_per_s2)?;
         let cost = square + (solution.transpose() * (&normal * &solution - &rhs * 2.0))[0];
-        let turn = solution.fixed_rows::<3>(MOUNT).into_owned();
-        mount = UnitQuaternion::new_normalize((so3::exp(&turn) * mount).into_inner());
-        turned += turn;
+        let rotation_step = solution.fixed_rows::<3>(EXTRINSICS).into_owned();
+        extrinsics = UnitQuaternion::new_normalize((so3::exp(&rotation_step) * extrinsics).into_inner());
+        rotation_change += rotation_step;
         // A negative scale would mirror the scene; go on from a small positive one.
         scale = Some(solution[SCALE].max(1e-6));
         last = Some((solution, cost));
@@ -208,28 +209,28 @@ fn align_from(
     let gravity = solution.fixed_rows::<3>(GRAVITY).into_owned();
     let lever = input.imu_from_camera.first()?.translation_m;
     let mut poses = Vec::new();
-    let mut mounts = Vec::new();
+    let mut camera_extrinsics = Vec::new();
     for ((start_from_imu, camera), given) in rotations.iter().zip(input.cameras).zip(input.imu_from_camera) {
-        let camera_rotation = mount * camera.rotation;
-        let position = mount * camera.translation_m * scale + lever - start_from_imu * given.translation_m;
+        let camera_rotation = extrinsics * camera.rotation;
+        let position = extrinsics * camera.translation_m * scale + lever - start_from_imu * given.translation_m;
         poses.push(RigidTransform::new(*start_from_imu, position));
-        mounts.push(RigidTransform::new(start_from_imu.inverse() * camera_rotation, given.translation_m));
+        camera_extrinsics.push(RigidTransform::new(start_from_imu.inverse() * camera_rotation, given.translation_m));
     }
     let velocities = (0..poses.len()).map(|k| solution.fixed_rows::<3>(VELOCITY + 3 * k).into_owned()).collect();
     let bias = ImuBias {
         gyroscope_rad_per_s: rotation.gyroscope_bias,
         accelerometer_m_per_s2: solution.fixed_rows::<3>(BIAS).into_owned(),
     };
-    Some(Alignment { scale, gravity, poses, velocities, imu_from_camera: mounts, bias, cost })
+    Some(Alignment { scale, gravity, poses, velocities, imu_from_camera: camera_extrinsics, bias, cost })
 }
 
 /// Weighted normal equations `N x = b` of all intervals and priors, and the sum of the weighted squared right sides.
 fn linear_system(
     input: &AlignmentInput<'_>,
     rotations: &[UnitQuaternion<f64>],
-    mount: &UnitQuaternion<f64>,
+    extrinsics: &UnitQuaternion<f64>,
     scale: Option<f64>,
-    turned: &Vector3<f64>,
+    rotation_change: &Vector3<f64>,
     rotation: &RotationAlignment,
 ) -> (DMatrix<f64>, DVector<f64>, f64) {
     let columns = VELOCITY + 3 * rotations.len();
@@ -250,13 +251,13 @@ fn linear_system(
         let v_by_ba: Matrix3<f64> = r * jacobian.fixed_view::<3, 3>(6, 3);
         let lever = rotations[k + 1] * input.imu_from_camera[k + 1].translation_m
             - rotations[k] * input.imu_from_camera[k].translation_m;
-        let baseline = mount * (input.cameras[k + 1].translation_m - input.cameras[k].translation_m);
+        let baseline = extrinsics * (input.cameras[k + 1].translation_m - input.cameras[k].translation_m);
         let tilt = TILT_SIGMA_RAD * input.gravity_m_per_s2;
 
         row.fill(0.0);
         row.fixed_view_mut::<3, 1>(0, SCALE).copy_from(&baseline);
         if let Some(scale) = scale {
-            row.fixed_view_mut::<3, 3>(0, MOUNT).copy_from(&(-so3::hat(&baseline) * scale));
+            row.fixed_view_mut::<3, 3>(0, EXTRINSICS).copy_from(&(-so3::hat(&baseline) * scale));
         }
         row.fixed_view_mut::<3, 3>(0, BIAS).copy_from(&-p_by_ba);
         row.fixed_view_mut::<3, 3>(0, GRAVITY).copy_from(&(Matrix3::identity() * (-0.5 * t * t)));
@@ -280,9 +281,9 @@ fn linear_system(
         normal[(BIAS + axis, BIAS + axis)] += bias_weight;
         rhs[BIAS + axis] += bias_weight * input.accelerometer_bias.mean[axis];
         square += bias_weight * input.accelerometer_bias.mean[axis].powi(2);
-        normal[(MOUNT + axis, MOUNT + axis)] += extrinsics_weight;
-        rhs[MOUNT + axis] -= extrinsics_weight * turned[axis];
-        square += extrinsics_weight * turned[axis].powi(2);
+        normal[(EXTRINSICS + axis, EXTRINSICS + axis)] += extrinsics_weight;
+        rhs[EXTRINSICS + axis] -= extrinsics_weight * rotation_change[axis];
+        square += extrinsics_weight * rotation_change[axis].powi(2);
     }
     (normal, rhs, square)
 }

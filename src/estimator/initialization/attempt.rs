@@ -14,7 +14,7 @@ use super::visual_problem::{between, mean_square};
 use super::{
     InitializationDiagnostics, InitializationFrame, InitializationInput, InitializationOptions, InitializationOrigin,
     InitializationOutcome, InitializationSolution, InitializedFrame, InitializedLandmark, StationaryEstimate,
-    StationaryPolicy, standstill,
+    StationaryPolicy, stationary,
 };
 use crate::estimator::{ImuBias, Preintegration};
 use crate::geometry::{RigidTransform, seconds_from_ns};
@@ -29,35 +29,33 @@ const REINTEGRATE_RAD_PER_S: f64 = 0.003;
 /// Tries to initialize on the frames given.
 pub fn try_initialize(input: &InitializationInput<'_>, options: &InitializationOptions) -> InitializationOutcome {
     let mut still = Checklist::default();
-    let standing = standstill::detect(input, &mut still);
-    if let (Some(standing), StationaryPolicy::InitializeAtOnce) = (&standing, options.stationary_policy) {
-        return from_standstill(input, standing, still);
+    let stationary = stationary::detect(input, &mut still);
+    if let (Some(stationary), StationaryPolicy::InitializeAtOnce) = (&stationary, options.stationary_policy) {
+        return from_stationary(input, stationary, still);
     }
     let mut checklist = Checklist::default();
-    match from_motion(input, options, standing.or(input.standstill).as_ref(), &mut checklist) {
+    match from_motion(input, options, stationary.or(input.stationary).as_ref(), &mut checklist) {
         Some(mut solution) => {
             solution.passed = checklist.passed;
             InitializationOutcome::Initialized(Box::new(solution))
         }
-        None => {
-            InitializationOutcome::Waiting { reasons: checklist.failed, passed: checklist.passed, standstill: standing }
-        }
+        None => InitializationOutcome::Waiting { reasons: checklist.failed, passed: checklist.passed, stationary },
     }
 }
 
 /// Gravity along the mean specific force; of the accelerometer's bias only what lies along it is observable.
-fn from_standstill(
+fn from_stationary(
     input: &InitializationInput<'_>,
-    standing: &StationaryEstimate,
+    stationary: &StationaryEstimate,
     checklist: Checklist,
 ) -> InitializationOutcome {
-    let force = standing.specific_force_m_per_s2;
+    let force = stationary.specific_force_m_per_s2;
     let excess = 1.0 - input.gravity_m_per_s2 / force.norm();
     let world_from_imu = RigidTransform::new(level(&-force), Vector3::zeros());
     let frames = input
         .frames
         .iter()
-        .filter(|frame| standing.stamp_ns - frame.stamp_ns <= 1_000_000_000)
+        .filter(|frame| stationary.stamp_ns - frame.stamp_ns <= 1_000_000_000)
         .map(|frame| InitializedFrame {
             frame_index: frame.frame_index,
             stamp_ns: frame.stamp_ns,
@@ -70,12 +68,12 @@ fn from_standstill(
         origin: InitializationOrigin::FromStationary,
         frames,
         bias: ImuBias {
-            gyroscope_rad_per_s: standing.gyroscope_bias_rad_per_s,
+            gyroscope_rad_per_s: stationary.gyroscope_bias_rad_per_s,
             accelerometer_m_per_s2: force * excess,
         },
         landmarks: Vec::new(),
         diagnostics: InitializationDiagnostics {
-            gyroscope_bias_sigma_rad_per_s: standing.gyroscope_bias_sigma_rad_per_s,
+            gyroscope_bias_sigma_rad_per_s: stationary.gyroscope_bias_sigma_rad_per_s,
             ..InitializationDiagnostics::default()
         },
         passed: checklist.passed,
@@ -95,13 +93,13 @@ fn level(gravity_in_imu: &Vector3<f64>) -> UnitQuaternion<f64> {
 fn from_motion(
     input: &InitializationInput<'_>,
     options: &InitializationOptions,
-    standing: Option<&StationaryEstimate>,
+    stationary: Option<&StationaryEstimate>,
     checklist: &mut Checklist,
 ) -> Option<InitializationSolution> {
-    let gyroscope_prior = match standing {
-        Some(standing) => VectorPrior {
-            mean: standing.gyroscope_bias_rad_per_s,
-            sigma: standing.gyroscope_bias_sigma_rad_per_s.max(5e-4),
+    let gyroscope_prior = match stationary {
+        Some(stationary) => VectorPrior {
+            mean: stationary.gyroscope_bias_rad_per_s,
+            sigma: stationary.gyroscope_bias_sigma_rad_per_s.max(5e-4),
         },
         None => VectorPrior { mean: Vector3::zeros(), sigma: options.gyroscope_bias_sigma_rad_per_s },
     };
@@ -235,8 +233,8 @@ fn structure_of(
 /// freedom, by the cube root of Wilson and Hilferty).
 fn upper_mean_square(count: usize) -> f64 {
     const NORMAL_QUANTILE: f64 = 3.09;
-    let share = 2.0 / (9.0 * count.max(1) as f64);
-    (1.0 - share + NORMAL_QUANTILE * share.sqrt()).powi(3)
+    let ratio = 2.0 / (9.0 * count.max(1) as f64);
+    (1.0 - ratio + NORMAL_QUANTILE * ratio.sqrt()).powi(3)
 }
 
 /// The views that were placed, with all that the metric part needs.
@@ -250,7 +248,7 @@ struct Problem<'a> {
 }
 
 impl Problem<'_> {
-    fn mounts(&self) -> Vec<RigidTransform> {
+    fn extrinsics(&self) -> Vec<RigidTransform> {
         self.kept.iter().map(|&index| self.input.frames[index].imu_from_camera).collect()
     }
 
@@ -276,12 +274,12 @@ impl Problem<'_> {
 
     fn alignment_input<'b>(
         &'b self,
-        mounts: &'b [RigidTransform],
+        extrinsics: &'b [RigidTransform],
         increments: &'b [Preintegration],
     ) -> AlignmentInput<'b> {
         AlignmentInput {
             cameras: &self.structure.poses,
-            imu_from_camera: mounts,
+            imu_from_camera: extrinsics,
             increments,
             median_distance: median_distance(
                 self.structure.landmarks.iter().map(|tracked| tracked.landmark.inverse_distance),
@@ -296,11 +294,11 @@ impl Problem<'_> {
     }
 
     fn align(&self, checklist: &mut Checklist) -> Option<(Alignment, Vec<Preintegration>)> {
-        let mounts = self.mounts();
+        let extrinsics = self.extrinsics();
         let mut bias =
             ImuBias { gyroscope_rad_per_s: self.gyroscope_prior.mean, accelerometer_m_per_s2: Vector3::zeros() };
         let mut increments = self.increments(bias);
-        let rotation = align_rotations(&self.alignment_input(&mounts, &increments));
+        let rotation = align_rotations(&self.alignment_input(&extrinsics, &increments));
         let subject = "gyroscope and images agree about rotations";
         checklist.at_least("rotations", subject, f64::from(u8::from(rotation.is_some())), 1.0, Shown::Plain(""));
         let rotation = rotation?;
@@ -308,7 +306,7 @@ impl Problem<'_> {
             bias.gyroscope_rad_per_s = rotation.gyroscope_bias;
             increments = self.increments(bias);
         }
-        let alignment = align(&self.alignment_input(&mounts, &increments), &rotation);
+        let alignment = align(&self.alignment_input(&extrinsics, &increments), &rotation);
         let scale = alignment.as_ref().map_or(0.0, |alignment| alignment.scale);
         let subject = "metres per unit of the reconstruction, by the linear alignment,";
         let positive = checklist.at_least("linear scale", subject, scale, 1e-3, Shown::Plain(" m"));
@@ -322,9 +320,9 @@ impl Problem<'_> {
         checklist: &mut Checklist,
     ) -> Option<Refined> {
         let options = self.options;
-        let mounts = self.mounts();
+        let extrinsics = self.extrinsics();
         let input = RefinementInput {
-            imu_from_camera: &mounts,
+            imu_from_camera: &extrinsics,
             increments,
             bearing_sigma_rad: options.bearing_sigma_rad,
             extrinsics_rotation_sigma_rad: options.extrinsics_rotation_sigma_rad,
@@ -337,7 +335,7 @@ impl Problem<'_> {
         let start = RefinedState::new(&input, alignment, &self.structure.landmarks);
         let mut refined = refinement.run(start, REFINEMENT_ROUNDS[0]);
         let before = refined.state.landmarks.len();
-        let cameras = between(&refined.state.cameras(&mounts));
+        let cameras = between(&refined.state.cameras(&extrinsics));
         refined.state.landmarks.retain(|landmark| landmark.fits(&cameras, options.bearing_sigma_rad, OUTLIER_SIGMAS));
         let rounds = refined.rounds;
         let mut refined = refinement.run(refined.state, REFINEMENT_ROUNDS[1]);
@@ -345,10 +343,10 @@ impl Problem<'_> {
 
         let subject = "whether the refinement came to rest";
         checklist.at_least("settled", subject, f64::from(u8::from(refined.settled)), 1.0, Shown::Plain(""));
-        let share = refined.state.landmarks.len() as f64 / before.max(1) as f64;
+        let ratio = refined.state.landmarks.len() as f64 / before.max(1) as f64;
         let subject = "share of landmarks that fit with positive depth";
-        checklist.at_least("positive depth", subject, share, options.min_inlier_ratio, Shown::Percent);
-        let cameras = refined.state.cameras(&mounts);
+        checklist.at_least("positive depth", subject, ratio, options.min_inlier_ratio, Shown::Percent);
+        let cameras = refined.state.cameras(&extrinsics);
         let rms = mean_square(&refined.state.landmarks, &cameras, options.bearing_sigma_rad).sqrt();
         let subject = "reprojection error over its standard deviation";
         checklist.at_most("reprojection", subject, rms, options.max_reprojection_sigmas, Shown::Plain(""));
@@ -376,8 +374,8 @@ impl Problem<'_> {
     /// Turns the refined state upright.
     fn solution(&self, refined: &Refined, parallax_rad: f64) -> InitializationSolution {
         let state = &refined.state;
-        let given = self.mounts();
-        let mounts = state.imu_from_camera(&given);
+        let given = self.extrinsics();
+        let extrinsics = state.imu_from_camera(&given);
         let upright = RigidTransform::new(level(&state.gravity), Vector3::zeros());
         let world_from_camera: Vec<RigidTransform> =
             state.cameras(&given).iter().map(|camera| upright * *camera).collect();
@@ -390,7 +388,7 @@ impl Problem<'_> {
                 stamp_ns: self.input.frames[index].stamp_ns,
                 world_from_imu: upright * state.poses[view],
                 velocity_m_per_s: upright.rotation * state.velocities[view],
-                imu_from_camera: mounts[view],
+                imu_from_camera: extrinsics[view],
             })
             .collect();
         let mut landmarks: Vec<InitializedLandmark> = state
@@ -404,7 +402,7 @@ impl Problem<'_> {
                     anchor_frame_index: self.input.frames[self.kept[landmark.anchor]].frame_index,
                     position_m: landmark.position(&world_from_camera)?,
                     inverse_depth_per_m: 1.0 / depth_m,
-                    views: landmark.sightings.len(),
+                    views: landmark.observations.len(),
                 })
             })
             .collect();

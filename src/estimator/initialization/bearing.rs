@@ -30,12 +30,12 @@ pub fn fit_rotation(
         let scale = median_angle(pairs, &rotation).max(1e-6);
         let (mut normal, mut rhs) = (Matrix3::zeros(), Vector3::zeros());
         for (bearing_i, bearing_j) in pairs {
-            let turned = rotation * bearing_i;
-            let error = bearing_j.cross(&turned);
+            let rotated = rotation * bearing_i;
+            let error = bearing_j.cross(&rotated);
             let weight = 1.0 / (1.0 + (error.norm() / scale).powi(2));
-            // A small left rotation δ moves `turned` by δ × turned; only its part across the bearing is seen.
-            normal += (Matrix3::identity() - turned * turned.transpose()) * weight;
-            rhs += turned.cross(bearing_j) * weight;
+            // A small left rotation δ moves `rotated` by δ × turned; only its part across the bearing is seen.
+            normal += (Matrix3::identity() - rotated * rotated.transpose()) * weight;
+            rhs += rotated.cross(bearing_j) * weight;
         }
         let step = normal.cholesky()?.solve(&rhs);
         rotation = UnitQuaternion::new_normalize((so3::exp(&step) * rotation).into_inner());

@@ -270,11 +270,11 @@ pub(super) fn decompose(essential: &Matrix3<f64>) -> Option<[(UnitQuaternion<f64
     if v_t.determinant() < 0.0 {
         v_t.row_mut(2).neg_mut();
     }
-    let quarter_turn = Matrix3::new(0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
+    let quarter_rotation = Matrix3::new(0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
     let direction: Vector3<f64> = u.column(2).into_owned();
     let rotation = |w: Matrix3<f64>| {
         UnitQuaternion::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(u * w * v_t))
     };
-    let (first, second) = (rotation(quarter_turn), rotation(quarter_turn.transpose()));
+    let (first, second) = (rotation(quarter_rotation), rotation(quarter_rotation.transpose()));
     Some([(first, direction), (first, -direction), (second, direction), (second, -direction)])
 }

@@ -34,9 +34,9 @@ pub(super) fn fit_extrinsics(calibration: &mut Calibration, frames: &mut Frames,
             hessian.view_mut((0, 0), (dof, dof)).copy_from(&rows.tr_mul(&rows));
             gradient.rows_mut(0, dof).copy_from(&rows.tr_mul(&fitted.prior_residual()));
         }
-        for (slot, mount) in imu_from_camera.iter().enumerate() {
+        for (slot, extrinsics) in imu_from_camera.iter().enumerate() {
             let chain = fitted.linearize(&angles[slot]);
-            let error = so3::log(&(mount.rotation.inverse() * chain.imu_from_camera.rotation));
+            let error = so3::log(&(extrinsics.rotation.inverse() * chain.imu_from_camera.rotation));
             let mut rows = DMatrix::zeros(3, total);
             let place = dof + joints * slot;
             rows.columns_mut(0, dof).copy_from(&chain.by_parameters.fixed_rows::<3>(0));

@@ -51,7 +51,7 @@ impl<'a> FirstWindow<'a> {
         let views = &solution.frames[solution.frames.len().saturating_sub(room + 1)..];
         let empty = || Preintegration::new(setup.imu_noise, solution.bias);
         let mut imu = empty();
-        let mut mounts = Vec::new();
+        let mut extrinsics = Vec::new();
         let mut observed = Vec::new();
         let mut features = vec![FeatureMap::new(); calibration.cameras()];
         let mut frames: Option<Frames> = None;
@@ -81,14 +81,14 @@ impl<'a> FirstWindow<'a> {
                 None => frames = Some(Frames::new(frame)),
                 Some(frames) => frames.push(frame),
             }
-            mounts.push(view.imu_from_camera);
-            features::observe(&mut features[leading], mounts.len() - 1, &waiting.features[leading]);
+            extrinsics.push(view.imu_from_camera);
+            features::observe(&mut features[leading], extrinsics.len() - 1, &waiting.features[leading]);
             observed.push(waiting.features);
         }
         let mut frames = frames?;
         frames.newest_mut().keyframe = false;
         if leading == MAIN {
-            fit_extrinsics(calibration.of_mut(MAIN), &mut frames, &mounts);
+            fit_extrinsics(calibration.of_mut(MAIN), &mut frames, &extrinsics);
         }
         let start = StartPrior {
             reference: frames.oldest().state.clone(),
@@ -167,7 +167,7 @@ fn world_from_solution(solution: &InitializationSolution, resume_at: Option<&Rig
         let forward = rotation * Vector3::x();
         forward.y.atan2(forward.x)
     };
-    let turn = yaw(&resume.rotation) - yaw(&first.world_from_imu.rotation);
-    let rotation = so3::exp(&Vector3::new(0.0, 0.0, turn));
+    let yaw_change = yaw(&resume.rotation) - yaw(&first.world_from_imu.rotation);
+    let rotation = so3::exp(&Vector3::new(0.0, 0.0, yaw_change));
     RigidTransform::new(rotation, resume.translation_m - rotation * first.world_from_imu.translation_m)
 }

@@ -32,7 +32,7 @@ pub(crate) struct Initializer {
     resume_at: Option<RigidTransform>,
     /// Oldest first.
     waiting: VecDeque<WaitingFrame>,
-    standstill: Option<StationaryEstimate>,
+    stationary: Option<StationaryEstimate>,
 }
 
 /// What came of one image while there is no window.
@@ -47,7 +47,7 @@ pub(crate) enum InitializationStep {
 impl Initializer {
     /// An initializer without frames.
     pub(crate) fn new(calibration: Calibrations, resume_at: Option<RigidTransform>) -> Self {
-        Self { calibration, resume_at, waiting: VecDeque::new(), standstill: None }
+        Self { calibration, resume_at, waiting: VecDeque::new(), stationary: None }
     }
 
     /// Takes in one image's tracks with the IMU samples before it; `events` are those that the step begins with.
@@ -64,16 +64,16 @@ impl Initializer {
                 }
                 None => InitializationStep::Waiting(self.report(setup, input)),
             },
-            InitializationOutcome::Waiting { reasons, standstill, .. } => {
-                if let Some(standstill) = standstill {
-                    let bias = standstill.gyroscope_bias_rad_per_s.norm();
+            InitializationOutcome::Waiting { reasons, stationary, .. } => {
+                if let Some(stationary) = stationary {
+                    let bias = stationary.gyroscope_bias_rad_per_s.norm();
                     events.push(Event {
                         kind: EventKind::Standstill,
                         message: "standing still: the gyroscope's bias is measured, motion is awaited".to_owned(),
                         value: Some(bias),
                         threshold: None,
                     });
-                    self.standstill = Some(standstill);
+                    self.stationary = Some(stationary);
                 }
                 events.extend(reasons.into_iter().map(waiting_for));
                 InitializationStep::Waiting(self.report(setup, input))
@@ -128,7 +128,7 @@ impl Initializer {
                     format!("a hole of {gap_s:.3} s in the inertial samples: the frames before it are forgotten");
                 events.push(Event::decided(EventKind::MeasurementMissing, message, gap_s, LONGEST_GAP_S));
                 self.waiting.clear();
-                self.standstill = None;
+                self.stationary = None;
             }
         }
         self.waiting.push_back(WaitingFrame {
@@ -155,7 +155,7 @@ impl Initializer {
     fn options(&self, setup: &Setup) -> InitializationOptions {
         let options = &setup.config.options;
         let camera = self.calibration.leading();
-        let (translation_m, rotation_rad) = setup.config.mount_sigmas(camera);
+        let (translation_m, rotation_rad) = setup.config.extrinsics_sigmas(camera);
         let base = InitializationOptions {
             accelerometer_bias_sigma_m_per_s2: options.accelerometer_bias_sigma,
             ..InitializationOptions::default()
@@ -178,7 +178,7 @@ impl Initializer {
         // Beside other cameras the leading one may lack an image; its motion goes to the next frame.
         let has_image = |frame: &WaitingFrame| frame.features.len() == 1 || !frame.features[leading].is_empty();
         if !self.waiting.back().is_some_and(has_image) {
-            return InitializationOutcome::Waiting { reasons: Vec::new(), passed: Vec::new(), standstill: None };
+            return InitializationOutcome::Waiting { reasons: Vec::new(), passed: Vec::new(), stationary: None };
         }
         let mut motions: Vec<Cow<'_, [ImuSample]>> = Vec::new();
         let mut pending: Vec<ImuSample> = Vec::new();
@@ -209,7 +209,7 @@ impl Initializer {
             frames: &frames,
             gravity_m_per_s2: setup.config.gravity_m_per_s2,
             imu_noise: setup.imu_noise,
-            standstill: self.standstill,
+            stationary: self.stationary,
         };
         try_initialize(&input, options)
     }

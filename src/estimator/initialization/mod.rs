@@ -35,7 +35,7 @@ mod reconstruction;
 mod refinement;
 pub mod relative_pose;
 mod selection;
-mod standstill;
+mod stationary;
 mod structure;
 mod visual_problem;
 mod waiting_frame;
@@ -49,7 +49,7 @@ pub use attempt::try_initialize;
 pub use checks::WaitReason;
 pub use options::{InitializationOptions, StationaryPolicy};
 pub use reconstruction::{Reconstruction, ReconstructionGuess, reconstruct_views};
-pub use standstill::StationaryEstimate;
+pub use stationary::StationaryEstimate;
 
 use nalgebra::Vector3;
 
@@ -83,7 +83,7 @@ pub struct InitializationInput<'a> {
     /// Noise of the IMU.
     pub imu_noise: ImuNoise,
     /// What the last standstill measured, when there was one ([`InitializationOutcome::Waiting`] carries it).
-    pub standstill: Option<StationaryEstimate>,
+    pub stationary: Option<StationaryEstimate>,
 }
 
 /// What an attempt came to.
@@ -98,7 +98,7 @@ pub enum InitializationOutcome {
         /// Tests that passed, with the same figures.
         passed: Vec<WaitReason>,
         /// The vehicle is stationary: to be kept and handed in with later attempts.
-        standstill: Option<StationaryEstimate>,
+        stationary: Option<StationaryEstimate>,
     },
 }
 

@@ -192,7 +192,7 @@ fn imu_residual(
     let (from, to) = (&state.poses[view], &state.poses[view + 1]);
     let t = increment.duration_s();
     let motion = increment.corrected(&state.bias);
-    let turn = so3::log(&(motion.rotation.inverse() * from.rotation.inverse() * to.rotation));
+    let rotation_error = so3::log(&(motion.rotation.inverse() * from.rotation.inverse() * to.rotation));
     let shift = from.rotation.inverse_transform_vector(
         &(to.translation_m - from.translation_m - state.velocities[view] * t - state.gravity * (0.5 * t * t)),
     );
@@ -200,7 +200,7 @@ fn imu_residual(
         .rotation
         .inverse_transform_vector(&(state.velocities[view + 1] - state.velocities[view] - state.gravity * t));
     let mut residual = Vector9::zeros();
-    residual.fixed_rows_mut::<3>(0).copy_from(&turn);
+    residual.fixed_rows_mut::<3>(0).copy_from(&rotation_error);
     residual.fixed_rows_mut::<3>(3).copy_from(&(shift - motion.position_m));
     residual.fixed_rows_mut::<3>(6).copy_from(&(gain - motion.velocity_m_per_s));
     (residual, shift, gain)
@@ -462,12 +462,12 @@ impl<'a> Refinement<'a> {
         let from = state.poses[view].rotation_matrix();
         let to = state.poses[view + 1].rotation_matrix();
         let back = from.transpose();
-        let turn: Vector3<f64> = residual.fixed_rows::<3>(0).into_owned();
-        let by_turn = so3::right_jacobian_inverse(&turn);
+        let rotation_error: Vector3<f64> = residual.fixed_rows::<3>(0).into_owned();
+        let by_rotation_error = so3::right_jacobian_inverse(&rotation_error);
         let by_bias = increment.bias_jacobian();
         let change: Vector3<f64> = by_bias.fixed_rows::<3>(0) * increment.bias_change(&state.bias);
-        let turn_by_bg: Matrix3<f64> = -by_turn
-            * so3::exp(&turn).inverse().to_rotation_matrix().into_inner()
+        let rotation_by_gyroscope_bias: Matrix3<f64> = -by_rotation_error
+            * so3::exp(&rotation_error).inverse().to_rotation_matrix().into_inner()
             * so3::right_jacobian(&change)
             * by_bias.fixed_view::<3, 3>(0, 0);
         let column = |top: Option<Matrix3<f64>>, middle: Option<Matrix3<f64>>, bottom: Option<Matrix3<f64>>| {
@@ -483,13 +483,16 @@ impl<'a> Refinement<'a> {
         let (velocity_i, velocity_j) = (self.layout.velocity(view), self.layout.velocity(view + 1));
         let part = |row: usize, col: usize| -> Matrix3<f64> { -by_bias.fixed_view::<3, 3>(row, col).into_owned() };
         let blocks = [
-            (pose_i, column(Some(-by_turn * to.transpose() * from), Some(so3::hat(&shift)), Some(so3::hat(&gain)))),
+            (
+                pose_i,
+                column(Some(-by_rotation_error * to.transpose() * from), Some(so3::hat(&shift)), Some(so3::hat(&gain))),
+            ),
             (pose_i + 3, column(None, Some(-back), None)),
-            (pose_j, column(Some(by_turn), None, None)),
+            (pose_j, column(Some(by_rotation_error), None, None)),
             (pose_j + 3, column(None, Some(back), None)),
             (velocity_i, column(None, Some(-back * t), Some(-back))),
             (velocity_j, column(None, None, Some(back))),
-            (Layout::GYROSCOPE, column(Some(turn_by_bg), Some(part(3, 0)), Some(part(6, 0)))),
+            (Layout::GYROSCOPE, column(Some(rotation_by_gyroscope_bias), Some(part(3, 0)), Some(part(6, 0)))),
             (Layout::ACCELEROMETER, column(None, Some(part(3, 3)), Some(part(6, 3)))),
         ];
         let gravity_block = whitening * gravity_columns(state, &back, t);
@@ -546,10 +549,10 @@ impl<'a> Refinement<'a> {
 
 /// Derivative of an inertial residual by the two gravity columns (9 × 2), not yet whitened.
 fn gravity_columns(state: &RefinedState, back: &Matrix3<f64>, t: f64) -> SMatrix<f64, 9, 2> {
-    let turned = back * state.gravity_basis();
+    let rotated_basis = back * state.gravity_basis();
     let mut block = SMatrix::<f64, 9, 2>::zeros();
-    block.fixed_view_mut::<3, 2>(3, 0).copy_from(&(turned * (-0.5 * t * t)));
-    block.fixed_view_mut::<3, 2>(6, 0).copy_from(&(turned * -t));
+    block.fixed_view_mut::<3, 2>(3, 0).copy_from(&(rotated_basis * (-0.5 * t * t)));
+    block.fixed_view_mut::<3, 2>(6, 0).copy_from(&(rotated_basis * -t));
     block
 }
 

@@ -23,7 +23,7 @@ const SAME_ROTATION_RAD: f64 = 0.02;
 /// See [`SAME_ROTATION_RAD`].
 const SAME_HEADING_RAD: f64 = 0.2;
 /// A pose whose cost (χ²) lies within this much per pair of the best one is returned as well.
-const AMBIGUOUS_SHARE: f64 = 0.3;
+const AMBIGUOUS_RATIO: f64 = 0.3;
 
 /// Unit bearings of one point in camera i and camera j.
 type BearingPair = (Vector3<f64>, Vector3<f64>);
@@ -85,8 +85,8 @@ pub fn relative_poses(
             }
         }
         if let Some((_, pose)) = candidates.found.first() {
-            let share = inliers(pairs, pose, bearing_sigma_rad).len() as f64 / pairs.len() as f64;
-            let clean = share.powi(5).clamp(1e-9, 1.0 - 1e-9);
+            let inlier_ratio = inliers(pairs, pose, bearing_sigma_rad).len() as f64 / pairs.len() as f64;
+            let clean = inlier_ratio.powi(5).clamp(1e-9, 1.0 - 1e-9);
             needed = needed.min(((1.0 - CONFIDENCE).ln() / (1.0 - clean).ln()).ceil() as usize + EXTRA_SAMPLES);
         }
     }
@@ -144,7 +144,7 @@ impl Candidates<'_> {
             refined.consider(&refine(self.pairs, pose, self.sigma_rad));
         }
         let limit =
-            refined.found.first().map_or(0.0, |(cost, _)| cost + (AMBIGUOUS_SHARE * self.pairs.len() as f64).max(10.0));
+            refined.found.first().map_or(0.0, |(cost, _)| cost + (AMBIGUOUS_RATIO * self.pairs.len() as f64).max(10.0));
         let poses = refined.found.iter().take_while(|(cost, _)| *cost <= limit);
         poses
             .filter_map(|(_, pose)| {
@@ -182,15 +182,15 @@ fn lies_in_front(
     (bearing_i, bearing_j): &BearingPair,
     sigma_rad: f64,
 ) -> bool {
-    let turned = camera_j_from_camera_i.rotation * bearing_i;
+    let rotated = camera_j_from_camera_i.rotation * bearing_i;
     // distance_j · bearing_j = distance_i · turned + t; cross with each ray to solve for the other distance.
-    let normal = turned.cross(bearing_j);
+    let normal = rotated.cross(bearing_j);
     if normal.norm() < 2.0 * sigma_rad {
         return true;
     }
     let t = &camera_j_from_camera_i.translation_m;
     let along_i = bearing_j.cross(t).dot(&normal);
-    let along_j = turned.cross(t).dot(&normal);
+    let along_j = rotated.cross(t).dot(&normal);
     along_i > 0.0 && along_j > 0.0
 }
 

@@ -29,9 +29,9 @@ fn gyroscope_rotation(samples: &[ImuSample], bias: &Vector3<f64>) -> UnitQuatern
     for pair in samples.windows(2) {
         let [from, to] = pair else { continue };
         let rate = (from.angular_velocity_rad_per_s + to.angular_velocity_rad_per_s) * 0.5 - bias;
-        let turn = rate * seconds_from_ns(to.stamp_ns - from.stamp_ns);
-        if turn.iter().all(|value| value.is_finite()) {
-            rotation *= so3::exp(&turn);
+        let rotation_vector = rate * seconds_from_ns(to.stamp_ns - from.stamp_ns);
+        if rotation_vector.iter().all(|value| value.is_finite()) {
+            rotation *= so3::exp(&rotation_vector);
         }
     }
     rotation

@@ -9,7 +9,9 @@ use nalgebra::{DMatrix, DVector, UnitQuaternion, Vector3, Vector6};
 
 use super::bearing::{RotationFit, fit_rotation, refine_camera_pose, triangulate};
 use super::relative_pose::{RelativePose, RotationPrior, relative_poses};
-use super::visual_problem::{Sighting, TrackedLandmark, between, mean_square, moved, visual_cost, visual_equations};
+use super::visual_problem::{
+    BearingObservation, TrackedLandmark, between, mean_square, moved, visual_cost, visual_equations,
+};
 use crate::frontend::{FeatureId, TrackedFeature};
 use crate::geometry::RigidTransform;
 use crate::optimization::damped::{DampedOptions, DampedProblem, minimize};
@@ -38,14 +40,14 @@ pub(super) fn collect_tracks(views: &[&[TrackedFeature]]) -> Tracks {
         for feature in *features {
             let norm = feature.bearing.norm();
             if norm.is_finite() && norm > 1e-9 {
-                let sightings = tracks.entry(feature.id).or_default();
-                if sightings.last().is_none_or(|(last, _)| *last != view) {
-                    sightings.push((view, feature.bearing / norm));
+                let observations = tracks.entry(feature.id).or_default();
+                if observations.last().is_none_or(|(last, _)| *last != view) {
+                    observations.push((view, feature.bearing / norm));
                 }
             }
         }
     }
-    tracks.retain(|_, sightings| sightings.len() >= 2);
+    tracks.retain(|_, observations| observations.len() >= 2);
     tracks
 }
 
@@ -56,10 +58,10 @@ pub(super) fn thin_out(tracks: &mut Tracks, views: usize, most: usize) {
         return;
     }
     let mut longest_first: Vec<_> = tracks.iter().collect();
-    longest_first.sort_by_key(|(id, sightings)| (std::cmp::Reverse(sightings.len()), **id));
+    longest_first.sort_by_key(|(id, observations)| (std::cmp::Reverse(observations.len()), **id));
     let mut queues: Vec<VecDeque<FeatureId>> = vec![VecDeque::new(); views];
-    for (id, sightings) in longest_first {
-        for pair in sightings.windows(2).filter(|pair| pair[0].0 + 1 == pair[1].0) {
+    for (id, observations) in longest_first {
+        for pair in observations.windows(2).filter(|pair| pair[0].0 + 1 == pair[1].0) {
             queues[pair[0].0].push_back(*id);
         }
     }
@@ -80,10 +82,13 @@ pub(super) fn thin_out(tracks: &mut Tracks, views: usize, most: usize) {
 
 /// Bearings of the features that two views share.
 pub(super) fn common_bearings(tracks: &Tracks, view_i: usize, view_j: usize) -> Vec<(Vector3<f64>, Vector3<f64>)> {
-    let in_view = |sightings: &[(usize, Vector3<f64>)], view: usize| {
-        sightings.binary_search_by_key(&view, |(view, _)| *view).ok().map(|index| sightings[index].1)
+    let in_view = |observations: &[(usize, Vector3<f64>)], view: usize| {
+        observations.binary_search_by_key(&view, |(view, _)| *view).ok().map(|index| observations[index].1)
     };
-    tracks.values().filter_map(|sightings| Some((in_view(sightings, view_i)?, in_view(sightings, view_j)?))).collect()
+    tracks
+        .values()
+        .filter_map(|observations| Some((in_view(observations, view_i)?, in_view(observations, view_j)?)))
+        .collect()
 }
 
 /// Two views and what lies between them.
@@ -164,8 +169,8 @@ pub(super) struct Structure {
 
 impl Structure {
     /// Number of observations of all landmarks.
-    fn sightings(&self) -> usize {
-        self.landmarks.iter().map(|landmark| landmark.sightings.len()).sum()
+    fn observations(&self) -> usize {
+        self.landmarks.iter().map(|landmark| landmark.observations.len()).sum()
     }
 }
 
@@ -208,14 +213,14 @@ fn reconstruct_from(
     let guess = guessed_rotations[pair.view_j].inverse() * guessed_rotations[pair.view_i];
     let prior = RotationPrior { rotation: guess, sigma_rad: limits.rotation_sigma_rad };
     let bases = relative_poses(&bearings, &prior, limits.bearing_sigma_rad, limits.seed);
-    let share = |base: &RelativePose| base.inliers.len() as f64 / bearings.len() as f64;
-    let inlier_ratio = bases.iter().map(share).fold(0.0, f64::max);
+    let ratio_of_inliers = |base: &RelativePose| base.inliers.len() as f64 / bearings.len() as f64;
+    let inlier_ratio = bases.iter().map(ratio_of_inliers).fold(0.0, f64::max);
     let mut best: Result<Structure, StructureFailure> = Err(StructureFailure::NoRelativePose { inlier_ratio });
-    for base in bases.iter().filter(|base| share(base) >= limits.min_inlier_ratio) {
+    for base in bases.iter().filter(|base| ratio_of_inliers(base) >= limits.min_inlier_ratio) {
         let grown = grow(tracks, pair, base, guessed_rotations, limits);
         // Of two solutions of a plane the wrong one places fewer views or landmarks.
         let merit = |structure: &Structure| {
-            structure.sightings() as f64 * (1.0 - structure.rms_rad / limits.bearing_sigma_rad / 3.0)
+            structure.observations() as f64 * (1.0 - structure.rms_rad / limits.bearing_sigma_rad / 3.0)
         };
         match (&grown, &best) {
             (Ok(new), Ok(old)) if merit(new) > merit(old) => best = grown,
@@ -278,12 +283,12 @@ impl GrowingMap<'_> {
     /// Triangulates every feature that a view holds, anew, from all views placed so far; the others stay as they are, as
     /// their views are the same.
     fn triangulate_seen_in(&mut self, view: usize) {
-        for (id, sightings) in self.tracks {
-            if sightings.binary_search_by_key(&view, |(view, _)| *view).is_err() {
+        for (id, observations) in self.tracks {
+            if observations.binary_search_by_key(&view, |(view, _)| *view).is_err() {
                 continue;
             }
             let rays: Vec<(RigidTransform, Vector3<f64>)> =
-                sightings.iter().filter_map(|(view, bearing)| Some((self.poses[*view]?, *bearing))).collect();
+                observations.iter().filter_map(|(view, bearing)| Some((self.poses[*view]?, *bearing))).collect();
             self.points.remove(id);
             let Some(point) = triangulate(&rays) else { continue };
             let fits = point.worst_angle_rad < OUTLIER_SIGMAS * self.sigma_rad;
@@ -299,9 +304,9 @@ impl GrowingMap<'_> {
             .points
             .iter()
             .filter_map(|(id, point)| {
-                let sightings = self.tracks.get(id)?;
-                let index = sightings.binary_search_by_key(&view, |(view, _)| *view).ok()?;
-                Some((*point, sightings[index].1))
+                let observations = self.tracks.get(id)?;
+                let index = observations.binary_search_by_key(&view, |(view, _)| *view).ok()?;
+                Some((*point, observations[index].1))
             })
             .collect();
         let placed = (0..self.poses.len()).filter(|&other| self.poses[other].is_some());
@@ -328,12 +333,12 @@ impl GrowingMap<'_> {
         let poses: Vec<RigidTransform> = placed.iter().map(|pose| first_from_base * *pose).collect();
         let mut landmarks = Vec::new();
         for (id, point) in &self.points {
-            let Some(sightings) = self.tracks.get(id) else { continue };
-            let seen: Vec<Sighting> = sightings
+            let Some(observations) = self.tracks.get(id) else { continue };
+            let seen: Vec<BearingObservation> = observations
                 .iter()
-                .filter_map(|(view, bearing)| Some(Sighting::new(views.binary_search(view).ok()?, *bearing)))
+                .filter_map(|(view, bearing)| Some(BearingObservation::new(views.binary_search(view).ok()?, *bearing)))
                 .collect();
-            let Some(anchor) = seen.first().map(|sighting| sighting.view) else { continue };
+            let Some(anchor) = seen.first().map(|observation| observation.view) else { continue };
             let distance = (first_from_base.transform(point) - poses[anchor].translation_m).norm();
             landmarks.extend(TrackedLandmark::new(*id, 1.0 / distance, seen));
         }

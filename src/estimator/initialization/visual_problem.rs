@@ -20,14 +20,14 @@ const BEHIND_SIGMAS: f64 = 100.0;
 
 /// One observation of a feature.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Sighting {
+pub(super) struct BearingObservation {
     /// Number of the view.
     pub(super) view: usize,
     /// About the measured bearing there.
     plane: TangentPlane,
 }
 
-impl Sighting {
+impl BearingObservation {
     /// From the measured unit bearing.
     pub(super) fn new(view: usize, bearing: Vector3<f64>) -> Self {
         Self { view, plane: TangentPlane::new(bearing) }
@@ -43,15 +43,15 @@ pub(super) struct TrackedLandmark {
     /// In the anchor's frame; the inverse distance is in 1/baseline before the scale is known.
     pub(super) landmark: Landmark,
     /// All observations, the anchor's first.
-    pub(super) sightings: Vec<Sighting>,
+    pub(super) observations: Vec<BearingObservation>,
 }
 
 impl TrackedLandmark {
     /// A landmark along the bearing of its first observation.
-    pub(super) fn new(id: FeatureId, inverse_distance: f64, sightings: Vec<Sighting>) -> Option<Self> {
-        let first = sightings.first()?;
+    pub(super) fn new(id: FeatureId, inverse_distance: f64, observations: Vec<BearingObservation>) -> Option<Self> {
+        let first = observations.first()?;
         let landmark = Landmark { bearing: first.plane.bearing, inverse_distance };
-        Some(Self { id, anchor: first.view, landmark, sightings })
+        Some(Self { id, anchor: first.view, landmark, observations })
     }
 
     /// Its position in the world, `None` when it is infinitely far.
@@ -61,24 +61,24 @@ impl TrackedLandmark {
     }
 
     /// Residual of one observation in radians, `None` when the landmark lies behind that camera.
-    fn residual_rad(&self, poses: &RelativePoses, sighting: &Sighting) -> Option<Vector2<f64>> {
-        let relative = poses.get(self.anchor, sighting.view);
-        reprojection::residual(&sighting.plane, relative, &self.landmark, &Vector2::zeros())
+    fn residual_rad(&self, poses: &RelativePoses, observation: &BearingObservation) -> Option<Vector2<f64>> {
+        let relative = poses.get(self.anchor, observation.view);
+        reprojection::residual(&observation.plane, relative, &self.landmark, &Vector2::zeros())
     }
 
     /// [`Self::residual_rad`] with its Jacobians.
-    fn linearize(&self, poses: &RelativePoses, sighting: &Sighting) -> Option<Reprojection> {
-        if sighting.view == self.anchor {
-            return reprojection::linearize_in_anchor(&sighting.plane, &self.landmark, &Vector2::zeros());
+    fn linearize(&self, poses: &RelativePoses, observation: &BearingObservation) -> Option<Reprojection> {
+        if observation.view == self.anchor {
+            return reprojection::linearize_in_anchor(&observation.plane, &self.landmark, &Vector2::zeros());
         }
-        let relative = poses.get(self.anchor, sighting.view);
-        reprojection::linearize(&sighting.plane, relative, relative, &self.landmark, &Vector2::zeros())
+        let relative = poses.get(self.anchor, observation.view);
+        reprojection::linearize(&observation.plane, relative, relative, &self.landmark, &Vector2::zeros())
     }
 
     /// Whether it has a finite distance and no observation is off by more than `limit` standard deviations.
     pub(super) fn fits(&self, poses: &RelativePoses, sigma_rad: f64, limit: f64) -> bool {
-        let ratio = |sighting| self.residual_rad(poses, sighting).map_or(BEHIND_SIGMAS, |r| r.norm() / sigma_rad);
-        !self.landmark.is_infinitely_far() && self.sightings.iter().all(|sighting| ratio(sighting) < limit)
+        let ratio = |observation| self.residual_rad(poses, observation).map_or(BEHIND_SIGMAS, |r| r.norm() / sigma_rad);
+        !self.landmark.is_infinitely_far() && self.observations.iter().all(|observation| ratio(observation) < limit)
     }
 }
 
@@ -93,8 +93,8 @@ pub(super) fn visual_cost(landmarks: &[TrackedLandmark], world_from_camera: &[Ri
     let poses = between(world_from_camera);
     let mut cost = 0.0;
     for landmark in landmarks {
-        for sighting in &landmark.sightings {
-            cost += LOSS.cost_of(landmark.residual_rad(&poses, sighting), sigma_rad);
+        for observation in &landmark.observations {
+            cost += LOSS.cost_of(landmark.residual_rad(&poses, observation), sigma_rad);
         }
     }
     cost
@@ -105,8 +105,8 @@ pub(super) fn mean_square(landmarks: &[TrackedLandmark], world_from_camera: &[Ri
     let poses = between(world_from_camera);
     let (mut sum, mut count) = (0.0, 0_usize);
     for landmark in landmarks {
-        for sighting in &landmark.sightings {
-            if let Some(residual) = landmark.residual_rad(&poses, sighting) {
+        for observation in &landmark.observations {
+            if let Some(residual) = landmark.residual_rad(&poses, observation) {
                 sum += residual.norm_squared() / (sigma_rad * sigma_rad);
                 count += 2;
             }
@@ -124,11 +124,11 @@ pub(super) fn visual_equations(
     let poses = between(world_from_camera);
     let mut equations = ReprojectionEquations::new(DensePoseEquations::new(world_from_camera.len()), landmarks.len());
     for landmark in landmarks {
-        let terms = landmark.sightings.iter().filter_map(|sighting| {
-            let term = landmark.linearize(&poses, sighting)?;
-            Some((sighting.view, term.whitened(sigma_rad, LOSS)))
+        let terms = landmark.observations.iter().filter_map(|observation| {
+            let term = landmark.linearize(&poses, observation)?;
+            Some((observation.view, term.whitened(sigma_rad, LOSS)))
         });
-        equations.add_landmark(Some(landmark.anchor), landmark.sightings.len(), terms);
+        equations.add_landmark(Some(landmark.anchor), landmark.observations.len(), terms);
     }
     equations
 }

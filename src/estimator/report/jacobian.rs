@@ -7,8 +7,8 @@ use nalgebra::{DMatrix, Matrix2x6, Vector3};
 use super::columns::scales_of;
 use super::linearization::column_blocks;
 use crate::camera::CameraModel;
-use crate::estimator::factors::visual::{Sighting, VisualModel, whitened};
-use crate::estimator::state::camera_pose::{self, CameraMaps, Mount};
+use crate::estimator::factors::visual::{TrackObservation, VisualModel, whitened};
+use crate::estimator::state::camera_pose::{self, CameraExtrinsics, CameraMaps};
 use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::state::layout::{Layout, POSE};
 use crate::estimator::{
@@ -129,11 +129,13 @@ impl<'a> Writer<'a> {
         let mut frames = Vec::new();
         for seen in feature.observations.iter() {
             let Some(slot) = slot_of(seen.frame_index) else { continue };
-            let sighting = Sighting { slot, uv_px: seen.measured_px };
+            let observation = TrackObservation { slot, uv_px: seen.measured_px };
             let (now, then) = (&camera.relative, &camera.linearized);
             // The report's residuals are rounded; the weight that the step counted with is not taken from them again.
             let weight = seen.residual_after_px.map(|_| seen.robust_weight);
-            let Some(term) = whitened(&camera.model, now, then, anchor, &landmark, &sighting, weight) else { continue };
+            let Some(term) = whitened(&camera.model, now, then, anchor, &landmark, &observation, weight) else {
+                continue;
+            };
             let mut target = rows.rows_mut(2 * frames.len(), 2);
             self.write(&mut target, camera, anchor, slot, &term);
             frames.push(FrameId(seen.frame_index));
@@ -247,14 +249,15 @@ fn window_camera<'a>(
     let chain = &source.chains[camera];
     let clocks = source.clocks.get(camera).copied().unwrap_or_default();
     let [then_s, now_s] = clocks.shifts_s;
-    let mount = Mount {
+    let extrinsics = CameraExtrinsics {
         chain,
         columns: if source.calibrated { chain.dof() + clocks.count } else { 0 },
         shift_s: then_s,
         shift_column: (source.calibrated && clocks.count > 0).then(|| chain.dof()),
     };
-    let linearized: Vec<CameraPose> = states.iter().map(|state| camera_pose::at_extrinsics(state, &mount)).collect();
-    let maps = CameraMaps::of_extrinsics(states, &mount);
+    let linearized: Vec<CameraPose> =
+        states.iter().map(|state| camera_pose::at_extrinsics(state, &extrinsics)).collect();
+    let maps = CameraMaps::of_extrinsics(states, &extrinsics);
     let maps = maps.own.into_iter().zip(maps.calibration).collect();
     let rigid = camera.checked_sub(1).and_then(|rigid| report.calibration.rigid_cameras.get(rigid));
     let now = report.window.iter().zip(states).map(|(frame, state)| {
@@ -264,7 +267,7 @@ fn window_camera<'a>(
         state.joints_rad.clone_from(&frame.joint_angles_rad);
         let seen = camera_pose::when_seen(&state, now_s);
         let imu_from_observer = match rigid {
-            Some((_, mount)) => *mount,
+            Some((_, extrinsics)) => *extrinsics,
             // With its clock right the camera is where the report has it.
             None if now_s == 0.0 => frame.imu_from_camera,
             None => {

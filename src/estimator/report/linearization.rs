@@ -15,7 +15,7 @@ pub struct Linearization {
     /// Column blocks in order: calibration, joints, poses, velocities and biases.
     pub columns: Vec<ColumnBlock>,
     /// Calibration parameters that are fixed at their values: they are known, and have no columns.
-    pub held: Vec<ParameterId>,
+    pub fixed_parameters: Vec<ParameterId>,
     /// Jacobian of the measurements, rows whitened.
     pub jacobian: DMatrix<f64>,
     /// Jacobian of the priors (rig prior on the calibration, marginalization prior), same columns, whitened.

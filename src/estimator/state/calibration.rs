@@ -222,7 +222,7 @@ impl Calibration {
     }
 
     /// `x ⊟ x₀`, `None` without a first estimate.
-    pub(crate) fn deviation(&self) -> Option<DVector<f64>> {
+    pub(crate) fn first_estimate_offset(&self) -> Option<DVector<f64>> {
         self.first_estimate.as_ref().map(|first| self.values.minus(first))
     }
 
@@ -233,10 +233,10 @@ impl Calibration {
     }
 
     /// The prior holds the calibration (keep the first estimate, or take the present one), or holds it no more.
-    pub(crate) fn keep_first_estimate(&mut self, held: bool) {
+    pub(crate) fn keep_first_estimate(&mut self, in_prior: bool) {
         self.first_estimate = match self.first_estimate.take() {
-            Some(first) if held => Some(first),
-            None if held => Some(self.values.clone()),
+            Some(first) if in_prior => Some(first),
+            None if in_prior => Some(self.values.clone()),
             _ => None,
         };
     }
@@ -266,15 +266,15 @@ impl Calibration {
             return jacobian;
         }
         let from_given = self.chain().minus(&self.given.chain);
-        let from_first = self.deviation();
+        let from_first = self.first_estimate_offset();
         for start in starts {
-            let turn: Vector3<f64> = from_given.fixed_rows::<3>(*start).into_owned();
-            let mut by_step: Matrix3<f64> = so3::right_jacobian_inverse(&turn);
-            if let Some(deviation) = &from_first {
-                by_step *= so3::right_jacobian(&deviation.fixed_rows::<3>(*start).into_owned());
+            let rotation_vector: Vector3<f64> = from_given.fixed_rows::<3>(*start).into_owned();
+            let mut by_step: Matrix3<f64> = so3::right_jacobian_inverse(&rotation_vector);
+            if let Some(first_estimate_offset) = &from_first {
+                by_step *= so3::right_jacobian(&first_estimate_offset.fixed_rows::<3>(*start).into_owned());
             }
-            let turned = jacobian.fixed_columns::<3>(*start) * by_step;
-            jacobian.fixed_columns_mut::<3>(*start).copy_from(&turned);
+            let by_step_columns = jacobian.fixed_columns::<3>(*start) * by_step;
+            jacobian.fixed_columns_mut::<3>(*start).copy_from(&by_step_columns);
         }
         jacobian
     }

@@ -79,19 +79,19 @@ impl Calibrations {
     }
 
     /// `x ⊟ x₀`, zero for a camera without a first estimate; `None` when no camera has one.
-    pub(crate) fn deviation(&self) -> Option<DVector<f64>> {
-        let parts: Vec<_> = self.0.iter().map(Calibration::deviation).collect();
-        if parts.iter().all(Option::is_none) {
+    pub(crate) fn first_estimate_offset(&self) -> Option<DVector<f64>> {
+        let offsets: Vec<_> = self.0.iter().map(Calibration::first_estimate_offset).collect();
+        if offsets.iter().all(Option::is_none) {
             return None;
         }
-        let mut deviation = DVector::zeros(self.dof());
-        for (camera, part) in parts.iter().enumerate() {
+        let mut first_estimate_offset = DVector::zeros(self.dof());
+        for (camera, offset) in offsets.iter().enumerate() {
             let columns = self.columns(camera);
-            if let Some(part) = part.as_ref().filter(|part| part.len() == columns.len()) {
-                deviation.rows_range_mut(columns).copy_from(part);
+            if let Some(offset) = offset.as_ref().filter(|offset| offset.len() == columns.len()) {
+                first_estimate_offset.rows_range_mut(columns).copy_from(offset);
             }
         }
-        Some(deviation)
+        Some(first_estimate_offset)
     }
 
     /// The calibrations at their first estimates, or as they are.
@@ -110,8 +110,8 @@ impl Calibrations {
 
     /// Whitened deviations from what the rig says.
     pub(crate) fn prior_residual(&self) -> DVector<f64> {
-        let parts: Vec<DVector<f64>> = self.free().map(|(_, one)| one.prior_residual()).collect();
-        DVector::from_iterator(self.dof(), parts.iter().flat_map(DVector::iter).copied())
+        let offsets: Vec<DVector<f64>> = self.free().map(|(_, one)| one.prior_residual()).collect();
+        DVector::from_iterator(self.dof(), offsets.iter().flat_map(DVector::iter).copied())
     }
 
     /// Their derivative by a step.

@@ -13,7 +13,7 @@ use crate::optimization::CameraPose;
 
 /// A camera's place on the vehicle and how its clock is off.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Mount<'a> {
+pub(crate) struct CameraExtrinsics<'a> {
     pub(crate) chain: &'a Chain,
     /// Columns of the calibration, those of clocks behind the chain's; none when it is fixed.
     pub(crate) columns: usize,
@@ -23,7 +23,7 @@ pub(crate) struct Mount<'a> {
     pub(crate) shift_column: Option<usize>,
 }
 
-impl Mount<'_> {
+impl CameraExtrinsics<'_> {
     /// A rigid camera does not follow the joints.
     fn own<'j>(&self, joints_rad: &'j [f64]) -> &'j [f64] {
         &joints_rad[..self.chain.joint_count().min(joints_rad.len())]
@@ -40,8 +40,8 @@ impl Mount<'_> {
 
 impl Calibration {
     /// The camera's place on the vehicle.
-    pub(crate) fn mount(&self) -> Mount<'_> {
-        Mount {
+    pub(crate) fn extrinsics(&self) -> CameraExtrinsics<'_> {
+        CameraExtrinsics {
             chain: self.chain(),
             columns: self.dof(),
             shift_s: self.camera_shift_s(),
@@ -53,13 +53,13 @@ impl Calibration {
 /// Pose of the camera at a state: the IMU's pose and the mount at the state's joint angles, when the camera's clock says
 /// the frame's stamp.
 pub(crate) fn at(state: &FrameState, calibration: &Calibration) -> CameraPose {
-    at_extrinsics(state, &calibration.mount())
+    at_extrinsics(state, &calibration.extrinsics())
 }
 
 /// [`at`] for a mount.
-pub(crate) fn at_extrinsics(state: &FrameState, mount: &Mount<'_>) -> CameraPose {
-    let state = &*when_seen(state, mount.shift_s);
-    let pose = state.navigation.world_from_imu * mount.chain.imu_from_camera(mount.own(&state.joints_rad));
+pub(crate) fn at_extrinsics(state: &FrameState, extrinsics: &CameraExtrinsics<'_>) -> CameraPose {
+    let state = &*when_seen(state, extrinsics.shift_s);
+    let pose = state.navigation.world_from_imu * extrinsics.chain.imu_from_camera(extrinsics.own(&state.joints_rad));
     CameraPose { rotation: pose.rotation_matrix(), position_m: pose.translation_m }
 }
 
@@ -85,24 +85,24 @@ pub(crate) struct CameraMaps {
 impl CameraMaps {
     /// The maps at these states and this calibration.
     pub(crate) fn new(frames: &[FrameState], calibration: &Calibration) -> Self {
-        Self::of_extrinsics(frames, &calibration.mount())
+        Self::of_extrinsics(frames, &calibration.extrinsics())
     }
 
     /// [`Self::new`] for a mount.
     ///
     /// That a clock's offset multiplies velocity and gyroscope bias is left out: a centisecond of a bias' change moves
     /// nothing.
-    pub(crate) fn of_extrinsics(frames: &[FrameState], mount: &Mount<'_>) -> Self {
+    pub(crate) fn of_extrinsics(frames: &[FrameState], extrinsics: &CameraExtrinsics<'_>) -> Self {
         let mut maps = Self { own: Vec::new(), calibration: Vec::new() };
         for stamped in frames {
-            let state = &*when_seen(stamped, mount.shift_s);
-            let chain = mount.linearize(&state.joints_rad);
+            let state = &*when_seen(stamped, extrinsics.shift_s);
+            let chain = extrinsics.linearize(&state.joints_rad);
             let world_from_imu = state.navigation.world_from_imu.rotation_matrix();
             let (mut own, mut by_calibration) = camera_map(&world_from_imu, state.joints_rad.len(), &chain);
-            if let Some(column) = mount.shift_column {
+            if let Some(column) = extrinsics.shift_column {
                 by_calibration.set_column(column, &(&own * state.motion()));
             }
-            if mount.shift_s != 0.0 {
+            if extrinsics.shift_s != 0.0 {
                 // The attitude that is unknown is the one at the stamp.
                 let at_stamp = stamped.navigation.world_from_imu.rotation_matrix();
                 let by_turn = own.fixed_columns::<3>(0) * world_from_imu.tr_mul(&at_stamp);

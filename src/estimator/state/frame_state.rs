@@ -51,9 +51,9 @@ impl FrameState {
     /// The state so many seconds later, at the rates of this moment.
     pub(crate) fn later(&self, seconds: f64) -> Self {
         let mut later = self.clone();
-        let turned = self.turn_rate_rad_per_s() * seconds;
+        let rotation_vector = self.body_rate_rad_per_s() * seconds;
         let pose = &mut later.navigation.world_from_imu;
-        pose.rotation *= so3::exp(&turned);
+        pose.rotation *= so3::exp(&rotation_vector);
         pose.translation_m += self.navigation.velocity_m_per_s * seconds;
         for (joint, angle) in later.joints_rad.iter_mut().enumerate() {
             *angle += self.rates.joint_rad_per_s(joint) * seconds;
@@ -64,12 +64,12 @@ impl FrameState {
     /// Derivative of pose and joints, as [`Layout::camera`] orders them, by time.
     pub(crate) fn motion(&self) -> DVector<f64> {
         let joints = (0..self.joints_rad.len()).map(|joint| self.rates.joint_rad_per_s(joint));
-        let (turn, shift) = (self.turn_rate_rad_per_s(), self.navigation.velocity_m_per_s);
-        let all: Vec<f64> = turn.iter().chain(shift.iter()).copied().chain(joints).collect();
+        let (angular_velocity, velocity) = (self.body_rate_rad_per_s(), self.navigation.velocity_m_per_s);
+        let all: Vec<f64> = angular_velocity.iter().chain(velocity.iter()).copied().chain(joints).collect();
         DVector::from_vec(all)
     }
 
-    fn turn_rate_rad_per_s(&self) -> Vector3<f64> {
+    fn body_rate_rad_per_s(&self) -> Vector3<f64> {
         self.rates.gyroscope_rad_per_s - self.navigation.bias.gyroscope_rad_per_s
     }
 
@@ -100,7 +100,7 @@ impl FrameState {
     }
 
     /// The largest of the turn of the vehicle and those of the joints from another state, in radians.
-    pub(crate) fn turn_from_rad(&self, other: &Self) -> f64 {
+    pub(crate) fn rotation_from_rad(&self, other: &Self) -> f64 {
         let vehicle = self.navigation.world_from_imu.rotation.angle_to(&other.navigation.world_from_imu.rotation);
         let joints = self.joints_rad.iter().zip(&other.joints_rad);
         joints.map(|(angle, start)| wrap_angle(angle - start).abs()).fold(vehicle, f64::max)

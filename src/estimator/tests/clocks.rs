@@ -1,7 +1,7 @@
 //! Cameras and encoders whose clocks are off.
 
 use super::fixture;
-use super::flight::{fly, trajectory_error_m};
+use super::flight::{run_flight, trajectory_error_m};
 use crate::estimator::{EstimatorConfig, EstimatorOptions, StepReport};
 use crate::geometry::Dimension;
 use crate::gimbal::{ParameterId, Parameterization, Quantity};
@@ -18,13 +18,13 @@ fn flight(mount: SyntheticMount, seed: u64, clock_offsets_s: [f64; 2]) -> Synthe
 }
 
 /// Error in metres, and the last report.
-fn flown(flight: &SyntheticFlight, estimate_timeshift: bool) -> (f64, StepReport) {
+fn run_flight_at(flight: &SyntheticFlight, estimate_timeshift: bool) -> (f64, StepReport) {
     let options = EstimatorOptions::default();
     let config = EstimatorConfig {
         estimate_timeshift,
         ..fixture::config(&flight.given_rig, Parameterization::Minimal, options)
     };
-    let (_, mut reports) = fly(&flight.frames, config);
+    let (_, mut reports) = run_flight(&flight.frames, config);
     let (error_m, _) = trajectory_error_m(&flight.frames, &reports);
     (error_m, reports.pop().expect("a flight has frames"))
 }
@@ -41,10 +41,10 @@ fn clock(report: &StepReport, clock: ParameterId) -> (f64, f64) {
 fn the_offset_of_a_rigid_camera_is_found() {
     for (seed, offset_s) in [(1, 0.01), (2, -0.015), (3, 0.0)] {
         let flight = flight(SyntheticMount::Static, seed, [offset_s, 0.0]);
-        let (ignored_m, report) = flown(&flight, false);
+        let (ignored_m, report) = run_flight_at(&flight, false);
         assert!(report.calibration.parameters.iter().all(|parameter| parameter.quantity != Quantity::Timeshift));
         assert_eq!(report.warnings.is_empty(), offset_s == 0.0, "seed {seed}: {:?}", report.warnings);
-        let (error_m, report) = flown(&flight, true);
+        let (error_m, report) = run_flight_at(&flight, true);
         assert!(report.warnings.is_empty(), "seed {seed}: {:?}", report.warnings);
         let (found_s, sigma_s) = clock(&report, ParameterId::timeshift(0));
         assert!((found_s - offset_s).abs() < 0.001, "seed {seed}: {found_s} of {offset_s} s");
@@ -60,9 +60,9 @@ fn the_offset_of_a_rigid_camera_is_found() {
 fn offsets_of_a_gimbals_camera_and_of_its_encoders_are_told_apart() {
     for (seed, offsets_s) in [(1, [0.01, -0.02]), (2, [-0.01, 0.01])] {
         let flight = flight(SyntheticMount::Gimbal, seed, offsets_s);
-        let (ignored_m, report) = flown(&flight, false);
+        let (ignored_m, report) = run_flight_at(&flight, false);
         assert!(!report.warnings.is_empty(), "seed {seed}: {:?}", report.residuals);
-        let (error_m, report) = flown(&flight, true);
+        let (error_m, report) = run_flight_at(&flight, true);
         assert!(report.warnings.is_empty(), "seed {seed}: {:?}", report.warnings);
         for (id, offset_s) in [ParameterId::timeshift(0), ParameterId::ENCODER_TIMESHIFT].into_iter().zip(offsets_s) {
             let (found_s, sigma_s) = clock(&report, id);

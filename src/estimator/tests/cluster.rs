@@ -1,7 +1,7 @@
 //! A gimballed and a rigid camera in one window.
 
 use super::fixture;
-use super::flight::{chain_error, fly, trajectory_error_m};
+use super::flight::{chain_error, run_flight, trajectory_error_m};
 use crate::estimator::{Estimator, EstimatorConfig, EstimatorOptions, Phase, StepReport};
 use crate::frontend::TrackedFrame;
 use crate::geometry::so3;
@@ -51,7 +51,7 @@ impl BothFlights {
         fixture::step(estimator, frame, tracks, &[rigid_tracks])
     }
 
-    fn fly(&self, config: EstimatorConfig, seen: impl Fn(usize) -> [bool; 2]) -> (Estimator, Vec<StepReport>) {
+    fn run_flight(&self, config: EstimatorConfig, seen: impl Fn(usize) -> [bool; 2]) -> (Estimator, Vec<StepReport>) {
         let mut estimator = Estimator::new(config);
         let steps = 0..self.gimbal.frames.len();
         let reports = steps.map(|index| self.step(&mut estimator, index, seen(index))).collect();
@@ -73,13 +73,13 @@ fn both_cameras_beat_either_where_the_chain_is_given_wrong() {
         let given = chain_error(&flights.gimbal, &Estimator::new(config.clone()));
         assert!(given.1 > 5.0_f64.to_radians(), "seed {seed}: the chain is given wrong by {} rad", given.1);
         let alone = EstimatorConfig { rigid_cameras: Vec::new(), ..config.clone() };
-        let (estimator, reports) = fly(&flights.gimbal.frames, alone);
+        let (estimator, reports) = run_flight(&flights.gimbal.frames, alone);
         gimbal_m += trajectory_error_m(&flights.gimbal.frames, &reports).0;
         gimbal_rad += chain_error(&flights.gimbal, &estimator).1;
         let alone = fixture::config(&flights.rigid.given_rig, Parameterization::Minimal, EstimatorOptions::default());
-        let (_, reports) = fly(&flights.rigid.frames, alone);
+        let (_, reports) = run_flight(&flights.rigid.frames, alone);
         rigid_m += trajectory_error_m(&flights.rigid.frames, &reports).0;
-        let (estimator, reports) = flights.fly(config, both);
+        let (estimator, reports) = flights.run_flight(config, both);
         assert_eq!(estimator.restarts, 0, "seed {seed}");
         cluster_m += trajectory_error_m(&flights.gimbal.frames, &reports).0;
         cluster_rad += chain_error(&flights.gimbal, &estimator).1;
@@ -96,7 +96,7 @@ fn both_calibrations_are_columns_with_names_of_their_own() {
     let flights = BothFlights::new(5, 10.0);
     let options = EstimatorOptions { keep_linearization: true, ..EstimatorOptions::default() };
     let config = EstimatorConfig { options, ..flights.config() };
-    let (estimator, reports) = flights.fly(config, both);
+    let (estimator, reports) = flights.run_flight(config, both);
     let last = reports.last().unwrap();
     let calibration = &last.calibration;
     assert_eq!(calibration.parameters.len(), 24);
@@ -142,7 +142,7 @@ fn a_missing_image_leaves_the_step_to_the_other_camera() {
         160..180 => [true, false],
         _ => [true, true],
     };
-    let (estimator, reports) = flights.fly(flights.config(), seen);
+    let (estimator, reports) = flights.run_flight(flights.config(), seen);
     assert_eq!(estimator.restarts, 0);
     assert!(reports[100..].iter().all(|report| report.phase == Phase::Tracking));
     let (error, length) = trajectory_error_m(&flights.gimbal.frames, &reports);
@@ -154,7 +154,7 @@ fn fixed_calibrations_stay_as_they_were_given() {
     let flights = BothFlights::new(5, 8.5);
     let config = EstimatorConfig { calibrate: false, ..flights.config() };
     let given = Estimator::new(config.clone()).classical_chain();
-    let (estimator, reports) = flights.fly(config, both);
+    let (estimator, reports) = flights.run_flight(config, both);
     assert_eq!(estimator.classical_chain(), given);
     let calibration = &reports.last().unwrap().calibration;
     assert_eq!(calibration.rigid_cameras[0].1, fixture::rigid_camera(&flights.rigid).imu_from_camera);
@@ -164,7 +164,7 @@ fn fixed_calibrations_stay_as_they_were_given() {
 #[test]
 fn replays_and_clones_give_the_same_bits() {
     let flights = BothFlights::new(8, 6.5);
-    let (_, reports) = flights.fly(flights.config(), both);
+    let (_, reports) = flights.run_flight(flights.config(), both);
     let mut estimator = Estimator::new(flights.config());
     let half = flights.gimbal.frames.len() / 2 + 10;
     for (index, report) in reports[..half].iter().enumerate() {

@@ -16,33 +16,33 @@ fn config() -> EstimatorConfig {
 }
 
 /// Steps, at 20 Hz, in which something is told.
-fn told(mean_squares: impl IntoIterator<Item = f64>) -> Vec<usize> {
+fn reported(mean_squares: impl IntoIterator<Item = f64>) -> Vec<usize> {
     let config = config();
     let mut watch = ConsistencyMonitor::default();
-    let mut told = Vec::new();
+    let mut reported = Vec::new();
     for (step, value) in mean_squares.into_iter().enumerate() {
         let warnings = watch.observe(step as i64 * 50_000_000, &encoder(value), &config);
         if let [warning] = warnings.as_slice() {
             assert!(warning.contains("joint angles") && warning.ends_with("try timeshift=on"), "{warning}");
-            told.push(step);
+            reported.push(step);
         }
     }
-    told
+    reported
 }
 
 #[test]
 fn residuals_as_large_as_their_noise_say_nothing() {
-    assert_eq!(told((0..400).map(|step| if step % 2 == 0 { 0.6 } else { 1.8 })), [0_usize; 0]);
+    assert_eq!(reported((0..400).map(|step| if step % 2 == 0 { 0.6 } else { 1.8 })), [0_usize; 0]);
 }
 
 #[test]
 fn a_jolt_says_nothing() {
-    assert_eq!(told((0..400).map(|step| if (200..206).contains(&step) { 6.0 } else { 0.9 })), [0_usize; 0]);
+    assert_eq!(reported((0..400).map(|step| if (200..206).contains(&step) { 6.0 } else { 0.9 })), [0_usize; 0]);
 }
 
 #[test]
 fn what_stays_too_large_is_told_after_four_seconds_until_it_is_over() {
-    let steps = told((0..400).map(|step| if step < 200 { 3.0 } else { 0.9 }));
+    let steps = reported((0..400).map(|step| if step < 200 { 3.0 } else { 0.9 }));
     assert_eq!(steps.first(), Some(&80));
     assert_eq!(steps.len(), steps.last().unwrap() - 79, "without a pause");
     // The mean falls from 3 towards 0.9 with a time constant of four seconds: below 0.8 of 1.6 after some 135 steps.

@@ -202,7 +202,7 @@ pub(super) fn marginalize_once(test: &mut TestWindow) {
 }
 
 /// Moves every unknown but the clocks at random; `scale` 1 is 2 cm and 1° of pose, 0.1 m/s, 2 mm and 0.2° of calibration.
-pub(super) fn shake(test: &mut TestWindow, scale: f64) {
+pub(super) fn disturb(test: &mut TestWindow, scale: f64) {
     let mut random = Noise::new(11);
     let layout = Layout {
         frames: test.window.frames.len(),

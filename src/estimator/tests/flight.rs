@@ -27,7 +27,7 @@ pub(super) fn step(estimator: &mut Estimator, frame: &SyntheticFrame) -> StepRep
     fixture::step(estimator, frame, &frame.tracks, &[])
 }
 
-pub(super) fn fly(frames: &[SyntheticFrame], config: EstimatorConfig) -> (Estimator, Vec<StepReport>) {
+pub(super) fn run_flight(frames: &[SyntheticFrame], config: EstimatorConfig) -> (Estimator, Vec<StepReport>) {
     let mut estimator = Estimator::new(config);
     let reports = frames.iter().map(|frame| step(&mut estimator, frame)).collect();
     (estimator, reports)
@@ -73,7 +73,7 @@ pub(super) fn chain_error(flight: &SyntheticFlight, estimator: &Estimator) -> (f
 fn a_rigid_camera_follows_the_flight() {
     let flight = synthetic_tracks(&options(SyntheticMount::Static));
     let config = fixture::config(&flight.given_rig, Parameterization::Minimal, EstimatorOptions::default());
-    let (estimator, reports) = fly(&flight.frames, config);
+    let (estimator, reports) = run_flight(&flight.frames, config);
     let (error, length) = trajectory_error_m(&flight.frames, &reports);
     assert!(error < 0.003 * length, "{error} m over {length} m");
     assert_eq!(estimator.restarts, 0);
@@ -89,7 +89,7 @@ fn a_gimbal_camera_follows_the_flight_and_calibrates_its_chain() {
     for parameterization in [Parameterization::Minimal, Parameterization::Classical, Parameterization::Poe] {
         let config = fixture::config(&flight.given_rig, parameterization, EstimatorOptions::default());
         let before = chain_error(&flight, &Estimator::new(config.clone()));
-        let (estimator, reports) = fly(&flight.frames, config);
+        let (estimator, reports) = run_flight(&flight.frames, config);
         let (error, length) = trajectory_error_m(&flight.frames, &reports);
         assert!(error < 0.003 * length, "{parameterization}: {error} m over {length} m");
         let after = chain_error(&flight, &estimator);
@@ -105,7 +105,7 @@ fn a_fixed_chain_stays_as_it_was_given() {
     let mut config = fixture::config(&flight.given_rig, Parameterization::Minimal, EstimatorOptions::default());
     config.calibrate = false;
     let given = Estimator::new(config.clone()).classical_chain();
-    let (estimator, reports) = fly(&flight.frames, config);
+    let (estimator, reports) = run_flight(&flight.frames, config);
     assert_eq!(estimator.classical_chain(), given);
     let last = reports.last().unwrap();
     assert_eq!(last.phase, Phase::Tracking);
@@ -118,7 +118,7 @@ fn a_fixed_chain_stays_as_it_was_given() {
 fn replays_and_clones_give_the_same_bits() {
     let flight = synthetic_tracks(&SyntheticOptions { duration_s: 7.0, ..options(SyntheticMount::Gimbal) });
     let config = fixture::config(&flight.given_rig, Parameterization::Minimal, EstimatorOptions::default());
-    let (_, reports) = fly(&flight.frames, config.clone());
+    let (_, reports) = run_flight(&flight.frames, config.clone());
     let mut estimator = Estimator::new(config);
     let half = flight.frames.len() / 2 + 10;
     let comparable = |report: &StepReport| format!("{report:?}");

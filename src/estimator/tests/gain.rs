@@ -35,7 +35,7 @@ fn windows() -> Vec<(&'static str, TestWindow)> {
     }
     windows.push(("frozen", frozen));
     for (_, estimator) in &mut windows {
-        fixture::shake(estimator, 0.2);
+        fixture::disturb(estimator, 0.2);
         fixture::marginalize_once(estimator);
     }
     windows
@@ -79,7 +79,7 @@ fn bits_by_definition(problem: &Problem<'_>, estimate: &Estimate, active: &[Acti
         .map(|active| {
             let mut active = active.clone();
             for track in &mut active.tracks {
-                track.sightings.retain(|sighting| sighting.slot != newest);
+                track.observations.retain(|observation| observation.slot != newest);
             }
             active
         })
@@ -134,8 +134,8 @@ fn the_gain_is_that_of_two_windows_of_which_one_lacks_the_newest_image() {
         let expected = bits_by_definition(&problem, &estimate, &active);
         assert_eq!(gain.columns(), expected.len(), "{name}");
         for (column, bits) in expected.iter().enumerate() {
-            let told = gain.bits_per_s(column) * gain.interval_s;
-            assert!((told - bits).abs() < 1e-4 * (0.01 + bits), "{name}, column {column}: {told} for {bits}");
+            let reported = gain.bits_per_s(column) * gain.interval_s;
+            assert!((reported - bits).abs() < 1e-4 * (0.01 + bits), "{name}, column {column}: {reported} for {bits}");
             let parts = gain.by_motion_per_s(column).sum::<f64>() + gain.earlier_per_s(column);
             assert!((parts - gain.bits_per_s(column)).abs() < 1e-9 + 1e-6 * parts.abs(), "{name}, column {column}");
         }

@@ -1,7 +1,7 @@
 //! The Jacobian that is written out from a report, against the linearization of the step.
 
 use super::fixture;
-use super::flight::fly;
+use super::flight::run_flight;
 use crate::camera::CameraModel;
 use crate::estimator::{
     ColumnGroup, ColumnId, EstimatorOptions, FactorKind, FactorRows, FrameId, JacobianFactor, Linearization,
@@ -77,8 +77,11 @@ fn check_factor_rows(report: &StepReport, jacobian: &StepJacobian) {
         (FactorKind::CalibrationPrior, chi2(|factor| *factor == JacobianFactor::CalibrationPrior)),
         (FactorKind::MarginalizationPrior, chi2(|factor| *factor == JacobianFactor::MarginalizationPrior)),
     ] {
-        let told = report.residuals.iter().find(|summary| summary.factor == kind).expect("every kind is told");
-        assert!((told.chi2_after - measured).abs() < 1e-9 + 1e-6 * measured, "{kind:?}: {measured} for {told:?}");
+        let reported = report.residuals.iter().find(|summary| summary.factor == kind).expect("every kind is told");
+        assert!(
+            (reported.chi2_after - measured).abs() < 1e-9 + 1e-6 * measured,
+            "{kind:?}: {measured} for {reported:?}"
+        );
     }
 }
 
@@ -97,7 +100,7 @@ fn blocks_are_those_of_the_linearization() {
         let mut config = fixture::config(&flight.given_rig, parameterization, options);
         (config.calibrate, config.estimate_timeshift) = (calibrate, clocks);
         let camera = config.camera.clone();
-        let (_, reports) = fly(&flight.frames, config);
+        let (_, reports) = run_flight(&flight.frames, config);
         let report = reports.last().unwrap();
         let jacobian = check(report, &[&camera]);
         let of = |wanted: fn(&JacobianFactor) -> bool| jacobian.rows.iter().filter(|row| wanted(&row.factor)).count();

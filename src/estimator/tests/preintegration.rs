@@ -176,8 +176,8 @@ fn states() -> (NavigationState, NavigationState) {
     };
     let preintegration = Preintegration::from_samples(NOISE, bias(), &samples(0.3, 200.0));
     let to = preintegration.predict(&from, &Vector3::new(0.0, 0.0, -9.81));
-    let shake = Vector15::from_fn(|row, _| 0.05 * ((row * 7 % 5) as f64 - 2.0));
-    (from, to.plus(&shake))
+    let disturb = Vector15::from_fn(|row, _| 0.05 * ((row * 7 % 5) as f64 - 2.0));
+    (from, to.plus(&disturb))
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 
-use super::flight::{fly, trajectory_error_m};
+use super::flight::{run_flight, trajectory_error_m};
 use super::{Noise, fixture};
 use crate::estimator::{EstimatorOptions, EventKind, Phase, StepReport};
 use crate::frontend::{FeatureId, TrackedFeature, TrackedFrame};
@@ -54,7 +54,8 @@ impl<'a> Landing<'a> {
 
     /// The flight backwards: the specific force stays, velocities and turns change their sign, biases do not.
     fn land(mut self) -> Self {
-        let at_rest: Vec<FeatureId> = self.flight.frames[0].tracks.features.iter().map(|feature| feature.id).collect();
+        let stationary_features: Vec<FeatureId> =
+            self.flight.frames[0].tracks.features.iter().map(|feature| feature.id).collect();
         let frames = &self.flight.frames;
         for index in (0..frames.len()).rev() {
             let stamp_ns = self.next_stamp_ns();
@@ -70,7 +71,11 @@ impl<'a> Landing<'a> {
             });
             // A track that ends before the rest is not the one that begins after it.
             let features = frame.tracks.features.iter().map(|feature| {
-                let id = if at_rest.contains(&feature.id) { feature.id } else { FeatureId(feature.id.0 + 1_000_000) };
+                let id = if stationary_features.contains(&feature.id) {
+                    feature.id
+                } else {
+                    FeatureId(feature.id.0 + 1_000_000)
+                };
                 TrackedFeature { id, ..*feature }
             });
             let tracks = tracked(stamp_ns, features.collect());
@@ -166,7 +171,7 @@ fn tracked(stamp_ns: i64, mut features: Vec<TrackedFeature>) -> TrackedFrame {
     TrackedFrame { stamp_ns, features, ..TrackedFrame::default() }
 }
 
-fn says_standstill(report: &StepReport) -> bool {
+fn reports_stationary(report: &StepReport) -> bool {
     report.events.iter().any(|event| event.kind == EventKind::Standstill)
 }
 
@@ -178,24 +183,27 @@ fn a_landed_vehicle_stays_where_it_is_and_flies_on() {
         let (landing, ids) = Landing::new(&flight).land().stay(12.0, 0.02, |_| 0.0);
         let frames = landing.take_off(&ids);
         let config = fixture::config(&flight.given_rig, Parameterization::Minimal, EstimatorOptions::default());
-        let (estimator, reports) = fly(&frames, config);
+        let (estimator, reports) = run_flight(&frames, config);
         assert_eq!(estimator.restarts, 0, "{mount:?}");
         let landed = flight.frames.len();
         // Two seconds of rest are needed to notice it: one of quiet samples, and the landing itself is one.
-        let resting = &reports[landed + 20..landed + 235];
-        let told = resting.iter().filter(|report| says_standstill(report)).count();
-        assert!(told > 200, "{mount:?}: standstill told {told} times of {}", resting.len());
-        let event = resting[100].events.iter().find(|event| event.kind == EventKind::Standstill).unwrap();
+        let stationary_reports = &reports[landed + 20..landed + 235];
+        let reported = stationary_reports.iter().filter(|report| reports_stationary(report)).count();
+        assert!(reported > 200, "{mount:?}: standstill told {reported} times of {}", stationary_reports.len());
+        let event = stationary_reports[100].events.iter().find(|event| event.kind == EventKind::Standstill).unwrap();
         assert!(event.value.unwrap() < event.threshold.unwrap());
         let place = |report: &StepReport| report.newest().unwrap().world_from_imu.translation_m;
-        let start = place(&resting[0]);
-        let drift = resting.iter().map(|report| (place(report) - start).norm()).fold(0.0, f64::max);
+        let start = place(&stationary_reports[0]);
+        let drift = stationary_reports.iter().map(|report| (place(report) - start).norm()).fold(0.0, f64::max);
         assert!(drift < 0.03, "{mount:?}: drifted {drift} m");
-        let speed = resting.iter().map(|report| report.newest().unwrap().velocity_m_per_s.norm()).fold(0.0, f64::max);
-        assert!(speed < 0.02, "{mount:?}: {speed} m/s");
+        let velocity = stationary_reports
+            .iter()
+            .map(|report| report.newest().unwrap().velocity_m_per_s.norm())
+            .fold(0.0, f64::max);
+        assert!(velocity < 0.02, "{mount:?}: {velocity} m/s");
         let (error, length) = trajectory_error_m(&frames, &reports);
         assert!(error < 0.004 * length, "{mount:?}: {error} m over {length} m");
-        let moving = reports[landed + 320..].iter().filter(|report| says_standstill(report)).count();
+        let moving = reports[landed + 320..].iter().filter(|report| reports_stationary(report)).count();
         assert_eq!(moving, 0, "{mount:?}: no rest in flight");
     }
 }
@@ -207,7 +215,7 @@ fn a_creeping_vehicle_is_not_held() {
     let flight = synthetic_tracks(&options(SyntheticMount::Static, SyntheticMotion::StationaryThenAggressive));
     let frames = Landing::new(&flight).land().stay(12.0, 0.004, creep).0.frames;
     let config = fixture::config(&flight.given_rig, Parameterization::Minimal, EstimatorOptions::default());
-    let (estimator, reports) = fly(&frames, config);
+    let (estimator, reports) = run_flight(&frames, config);
     assert_eq!(estimator.restarts, 0);
     let landed = flight.frames.len();
     let moved = |from: usize, to: usize| {
@@ -230,10 +238,10 @@ fn a_hovering_vehicle_is_not_taken_for_a_resting_one() {
         let flight = synthetic_tracks(&hover);
         let frames = Landing::new(&flight).land().frames;
         let config = fixture::config(&flight.given_rig, Parameterization::Minimal, EstimatorOptions::default());
-        let (_, reports) = fly(&frames, config);
+        let (_, reports) = run_flight(&frames, config);
         for (report, frame) in reports.iter().zip(&frames) {
             let Some(newest) = report.newest() else { continue };
-            assert!(!says_standstill(report), "seed {seed}, image {}: {:?}", report.frame_index, report.events);
+            assert!(!reports_stationary(report), "seed {seed}, image {}: {:?}", report.frame_index, report.events);
             if frame.index > frames.len() - 30 {
                 let error = newest.velocity_m_per_s.norm() - frame.true_velocity_m_per_s.norm();
                 assert!(error.abs() < 0.05, "seed {seed}: speed off by {error} m/s");
@@ -247,14 +255,14 @@ fn from_standstill_it_waits_for_motion_and_says_so() {
     for mount in [SyntheticMount::Gimbal, SyntheticMount::Static] {
         let flight = synthetic_tracks(&options(mount, SyntheticMotion::StationaryThenAggressive));
         let config = fixture::config(&flight.given_rig, Parameterization::Minimal, EstimatorOptions::default());
-        let (estimator, reports) = fly(&flight.frames, config);
+        let (estimator, reports) = run_flight(&flight.frames, config);
         assert_eq!(estimator.restarts, 0);
         let moves = flight.frames.iter().position(|frame| frame.true_velocity_m_per_s.norm() > 0.3).unwrap();
         let starts = reports.iter().position(|report| report.phase == Phase::Tracking).unwrap();
         assert!(starts > 40, "{mount:?}: not before it moves");
         assert!(starts < moves + 60, "{mount:?}: moving from image {moves} on, initialized at {starts}");
-        let told = reports[25..40].iter().filter(|report| says_standstill(report)).count();
-        assert_eq!(told, 15, "{mount:?}");
+        let reported = reports[25..40].iter().filter(|report| reports_stationary(report)).count();
+        assert_eq!(reported, 15, "{mount:?}");
         for report in &reports[..starts] {
             let waits: Vec<_> =
                 report.events.iter().filter(|event| event.kind == EventKind::InitializationWaits).collect();

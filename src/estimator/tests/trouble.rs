@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::fixture::{self, TestWindow};
-use super::flight::{chain_error, fly, step, trajectory_error_m};
+use super::flight::{chain_error, run_flight, step, trajectory_error_m};
 use crate::estimator::estimator::PhaseState;
 use crate::estimator::state::calibrations::MAIN;
 use crate::estimator::{Estimator, EstimatorConfig, EstimatorOptions, EventKind, Phase, StepReport};
@@ -49,7 +49,7 @@ fn without_encoders_the_flight_is_followed_and_the_calibration_stays_weak() {
             synthetic_tracks(&SyntheticOptions { encoder_sigma_rad: None, ..options(SyntheticMount::Gimbal, seed) });
         let config = EstimatorConfig { use_encoder: false, ..config(&flight) };
         let before = chain_error(&flight, &Estimator::new(config.clone()));
-        let (estimator, reports) = fly(&flight.frames, config);
+        let (estimator, reports) = run_flight(&flight.frames, config);
         assert_eq!(estimator.restarts, 0, "seed {seed}");
         let (error, length) = trajectory_error_m(&flight.frames, &reports);
         assert!(error < 0.01 * length, "seed {seed}: {error} m over {length} m");
@@ -79,7 +79,7 @@ fn encoders_that_start_late_and_pause_are_survived() {
             frame.joint_angles_rad = None;
         }
     }
-    let (estimator, reports) = fly(&frames, config(&flight));
+    let (estimator, reports) = run_flight(&frames, config(&flight));
     assert_eq!(estimator.restarts, 0);
     let (error, length) = trajectory_error_m(&frames, &reports);
     assert!(error < 0.006 * length, "{error} m over {length} m");
@@ -104,7 +104,7 @@ fn three_seconds_without_pictures_are_bridged() {
             frame.imu = std::mem::take(&mut waiting);
             frames.push(frame);
         }
-        let (estimator, reports) = fly(&frames, config(&flight));
+        let (estimator, reports) = run_flight(&frames, config(&flight));
         let last = reports.last().unwrap();
         assert_eq!(last.phase, Phase::Tracking, "{mount:?}: {:?}", last.events);
         // Three seconds on the inertial sensor alone: centimetres to decimetres.
@@ -132,11 +132,15 @@ fn three_seconds_with_nothing_to_see_are_bridged() {
     for mount in [SyntheticMount::Gimbal, SyntheticMount::Static] {
         let flight = synthetic_tracks(&options(mount, 5));
         let frames = blinded(&flight, 160..220);
-        let (estimator, reports) = fly(&frames, config(&flight));
+        let (estimator, reports) = run_flight(&frames, config(&flight));
         assert_eq!(estimator.restarts, 0, "{mount:?}");
-        let told =
+        let reported =
             |report: &StepReport| report.events.iter().any(|event| event.message.contains("inertial sensor alone"));
-        assert!(told(&reports[160]) && !reports[161..220].iter().any(told), "{mount:?}: {:?}", reports[160].events);
+        assert!(
+            reported(&reports[160]) && !reports[161..220].iter().any(reported),
+            "{mount:?}: {:?}",
+            reports[160].events
+        );
         let (error, length) = trajectory_error_m(&frames, &reports);
         assert!(error < 0.3, "{mount:?}: {error} m over {length} m");
     }
@@ -146,7 +150,7 @@ fn three_seconds_with_nothing_to_see_are_bridged() {
 fn a_long_blindness_ends_in_a_restart_that_finds_its_way() {
     let flight = synthetic_tracks(&SyntheticOptions { duration_s: 23.0, ..options(SyntheticMount::Gimbal, 5) });
     let frames = blinded(&flight, 160..280);
-    let (estimator, reports) = fly(&frames, config(&flight));
+    let (estimator, reports) = run_flight(&frames, config(&flight));
     let failed =
         reports.iter().position(|report| kinds(std::slice::from_ref(report)).contains(&EventKind::Failure)).unwrap();
     let event = reports[failed].events.iter().find(|event| event.kind == EventKind::Failure).unwrap();
@@ -178,7 +182,7 @@ fn a_saturated_inertial_sensor_does_not_throw_the_window_off() {
             sample.specific_force_m_per_s2 = sample.specific_force_m_per_s2.map(|force| limit(force, 13.0));
             clipped += usize::from(before != *sample);
         }
-        let (estimator, reports) = fly(&frames, config(&flight));
+        let (estimator, reports) = run_flight(&frames, config(&flight));
         let last = reports.last().unwrap();
         assert_eq!(last.phase, Phase::Tracking);
         let (error, length) = trajectory_error_m(&frames, &reports);
@@ -187,8 +191,8 @@ fn a_saturated_inertial_sensor_does_not_throw_the_window_off() {
             error < 0.02 * length,
             "{mount:?}: {error} m over {length} m, {clipped} samples clipped, {restarts} restarts"
         );
-        let told = reports[150..].iter().flat_map(|report| &report.events);
-        assert!(told.filter(|event| event.message.contains("saturated")).count() > 0);
+        let reported = reports[150..].iter().flat_map(|report| &report.events);
+        assert!(reported.filter(|event| event.message.contains("saturated")).count() > 0);
     }
 }
 
@@ -219,7 +223,7 @@ fn a_switch_of_charts_in_a_running_window_changes_nothing_else() {
     for frame in &flight.frames[..half] {
         step(&mut stays, frame);
     }
-    assert!(TestWindow::of(&stays).window.prior.is_some() && stays.calibration().deviation().is_some());
+    assert!(TestWindow::of(&stays).window.prior.is_some() && stays.calibration().first_estimate_offset().is_some());
     let mut switches = stays.clone();
     switch(&mut switches, Parameterization::MinimalYx);
     let angles = &flight.frames[half].true_joint_angles_rad;
@@ -289,7 +293,7 @@ fn a_poor_start_is_recovered_from() {
             .map(|seed| {
                 let flight = far_off(seed, 20.0);
                 let config = fixture::config(&flight.given_rig, Parameterization::Minimal, options);
-                let (_, reports) = fly(&flight.frames, config);
+                let (_, reports) = run_flight(&flight.frames, config);
                 trajectory_error_m(&flight.frames, &reports).0
             })
             .collect()

@@ -36,7 +36,7 @@ fn windows() -> Vec<(&'static str, TestWindow)> {
 fn the_gradient_of_every_factor_meets_central_differences() {
     for (name, mut estimator) in windows() {
         // Steps count from the first estimates, so that derivatives are plain ones only there.
-        fixture::shake(&mut estimator, 0.2);
+        fixture::disturb(&mut estimator, 0.2);
         fixture::marginalize_once(&mut estimator);
         let active = estimator.active_tracks();
         let problem = estimator.problem(&active);
@@ -186,14 +186,14 @@ fn an_echelon_gives_dependent_columns_no_row() {
 fn a_prior_holds_nothing_that_no_step_can_change() {
     for (name, mut estimator) in windows() {
         for left in (3..6).rev() {
-            fixture::shake(&mut estimator, 0.2);
+            fixture::disturb(&mut estimator, 0.2);
             estimator.setup.config.options.window = left - 1;
             estimator.setup.config.options.first_window_factor = 1;
             estimator.window.make_room(&estimator.setup, &mut Vec::new());
             let problem = estimator.problem(&[]);
             let estimate = estimator.estimate(&[]);
             let total = problem.layout.total();
-            let rows = problem.prior.unwrap().rows(&problem.layout, &problem.deviation(&estimate));
+            let rows = problem.prior.unwrap().rows(&problem.layout, &problem.first_estimate_offset(&estimate));
             let residual = rows.column(total).into_owned();
             // Columns of one length, since units differ.
             let mut jacobian = rows.columns(0, total).into_owned();
@@ -213,7 +213,7 @@ fn a_prior_holds_nothing_that_no_step_can_change() {
 fn the_classical_chain_keeps_its_null_directions_with_first_estimates() {
     let mut estimator = fixture::window(Parameterization::Classical, true, quadratic());
     fixture::marginalize_once(&mut estimator);
-    fixture::shake(&mut estimator, 0.5);
+    fixture::disturb(&mut estimator, 0.5);
     let active = estimator.active_tracks();
     let problem = estimator.problem(&active);
     let estimate = estimator.estimate(&active);
@@ -233,13 +233,13 @@ fn the_classical_chain_keeps_its_null_directions_with_first_estimates() {
 #[test]
 fn solving_finds_the_truth_from_a_shaken_start() {
     for (name, mut estimator) in windows() {
-        fixture::shake(&mut estimator, 1.0);
+        fixture::disturb(&mut estimator, 1.0);
         let active = estimator.active_tracks();
         let problem = estimator.problem(&active);
         let limits = SolverLimits { iterations: 20, relative_cost_tolerance: 1e-9 };
         let solution = solver::solve(&problem, estimator.estimate(&active), limits);
         let tracks = active.iter().flat_map(|active| &active.tracks);
-        let residuals = 2 * tracks.map(|track| track.sightings.len()).sum::<usize>();
+        let residuals = 2 * tracks.map(|track| track.observations.len()).sum::<usize>();
         // The tracks are off by 0.3 px (standard deviation).
         let expected = residuals as f64 * (0.3 / estimator.setup.config.options.pixel_sigma_px).powi(2);
         assert!(solution.costs_after.visual < 1.5 * expected, "{name}: {:?} of {expected}", solution.costs_after);

@@ -1,7 +1,7 @@
 //! The features that take part in a solve.
 
 use super::features::{FeatureMap, Observation};
-use crate::estimator::factors::visual::{Sighting, Track};
+use crate::estimator::factors::visual::{Track, TrackObservation};
 use crate::frontend::FeatureId;
 use crate::optimization::Landmark;
 
@@ -22,9 +22,10 @@ impl ActiveTracks {
             if feature.observations.len() < 2 {
                 continue;
             }
-            let sighting = |observation: &Observation| Sighting { slot: observation.slot, uv_px: observation.uv_px };
+            let sighting =
+                |observation: &Observation| TrackObservation { slot: observation.slot, uv_px: observation.uv_px };
             active.ids.push(*id);
-            active.tracks.push(Track { sightings: feature.observations.iter().map(sighting).collect() });
+            active.tracks.push(Track { observations: feature.observations.iter().map(sighting).collect() });
             active.landmarks.push(landmark);
         }
         active

@@ -13,34 +13,34 @@ const AVERAGED_NS: i64 = 4_000_000_000;
 const RELEASE: f64 = 0.8;
 
 /// A kind of factor whose residuals are watched.
-struct Watched {
+struct MonitoredFactor {
     factor: FactorKind,
     /// Largest mean of its squared whitened residuals.
     limit: f64,
     /// What a larger one means.
-    contradiction: &'static str,
+    inconsistency: &'static str,
 }
 
 /// Encoder readings that agree leave 1. Most of the prior's rows are fitted, so that it leaves 0.1 to 0.45 (simulated and
 /// real logs) where the model holds; a camera's clock that is 10 ms off makes that 2, encoders 20 ms late 1.2.
-const WATCHED: [Watched; 2] = [
-    Watched {
+const MONITORED: [MonitoredFactor; 2] = [
+    MonitoredFactor {
         factor: FactorKind::Encoder,
         limit: 1.6,
-        contradiction: "joint angles contradict images and inertial sensor by more than the encoders' noise allows",
+        inconsistency: "joint angles contradict images and inertial sensor by more than the encoders' noise allows",
     },
-    Watched {
+    MonitoredFactor {
         factor: FactorKind::MarginalizationPrior,
         limit: 0.7,
-        contradiction: "what earlier images told contradicts the images in the window by more than their noise allows",
+        inconsistency: "what earlier images told contradicts the images in the window by more than their noise allows",
     },
 ];
 
-/// The running means, one for each of [`WATCHED`].
+/// The running means, one for each of [`MONITORED`].
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ConsistencyMonitor {
     last_ns: Option<i64>,
-    means: [Mean; WATCHED.len()],
+    means: [Mean; MONITORED.len()],
 }
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -48,7 +48,7 @@ struct Mean {
     value: f64,
     /// Time that it is the mean of.
     over_ns: i64,
-    told: bool,
+    inconsistent: bool,
 }
 
 impl Mean {
@@ -69,14 +69,14 @@ impl ConsistencyMonitor {
     ) -> Vec<String> {
         let Some(last_ns) = self.last_ns.replace(stamp_ns) else { return Vec::new() };
         let mut warnings = Vec::new();
-        for (watched, mean) in WATCHED.iter().zip(&mut self.means) {
+        for (watched, mean) in MONITORED.iter().zip(&mut self.means) {
             let summary = residuals.iter().find(|summary| summary.factor == watched.factor);
             let Some(mean_square) = summary.and_then(ResidualSummary::mean_square) else { continue };
             mean.take(mean_square, stamp_ns - last_ns);
-            let limit = if mean.told { RELEASE * watched.limit } else { watched.limit };
-            mean.told = mean.over_ns >= AVERAGED_NS && mean.value > limit;
-            if mean.told {
-                warnings.push(said(watched, config));
+            let limit = if mean.inconsistent { RELEASE * watched.limit } else { watched.limit };
+            mean.inconsistent = mean.over_ns >= AVERAGED_NS && mean.value > limit;
+            if mean.inconsistent {
+                warnings.push(warning_text(watched, config));
             }
         }
         warnings
@@ -84,9 +84,9 @@ impl ConsistencyMonitor {
 }
 
 /// What contradicts what, and what to try.
-fn said(watched: &Watched, config: &EstimatorConfig) -> String {
-    let held = [("calibrate=on", config.calibrate), ("timeshift=on", config.estimate_timeshift)];
-    let tries: Vec<&str> = held.into_iter().filter(|(_, on)| !on).map(|(option, _)| option).collect();
+fn warning_text(watched: &MonitoredFactor, config: &EstimatorConfig) -> String {
+    let options = [("calibrate=on", config.calibrate), ("timeshift=on", config.estimate_timeshift)];
+    let tries: Vec<&str> = options.into_iter().filter(|(_, on)| !on).map(|(option, _)| option).collect();
     let tries = if tries.is_empty() { String::new() } else { format!("; try {}", tries.join(" and ")) };
-    format!("{}: clocks, calibration or noise are not as the rig says{tries}", watched.contradiction)
+    format!("{}: clocks, calibration or noise are not as the rig says{tries}", watched.inconsistency)
 }

@@ -68,7 +68,7 @@ pub(crate) fn failure(
             state.bias.gyroscope_rad_per_s.norm(),
             options.max_gyroscope_bias,
         ),
-        ("the speed is out of bounds, m/s", state.velocity_m_per_s.norm(), options.max_speed),
+        ("the speed is out of bounds, m/s", state.velocity_m_per_s.norm(), options.max_velocity_m_per_s),
         (
             "the newest position was corrected by too much, m",
             (state.world_from_imu.translation_m - predicted.world_from_imu.translation_m).norm(),

@@ -38,7 +38,7 @@ impl Frame {
     /// The state at which derivatives are taken: the first estimate while `current` is within `reach_rad` of it, in attitude
     /// and joint angles.
     pub(crate) fn linearization_point<'a>(&'a self, current: &'a FrameState, reach_rad: f64) -> &'a FrameState {
-        self.first_estimate.as_ref().filter(|first| current.turn_from_rad(first) <= reach_rad).unwrap_or(current)
+        self.first_estimate.as_ref().filter(|first| current.rotation_from_rad(first) <= reach_rad).unwrap_or(current)
     }
 
     fn bytes(&self) -> usize {

@@ -98,7 +98,7 @@ impl Problem<'_> {
         };
         let (with, without) = (answer(layout.frames)?, answer(newest)?);
         let covariance = &with.covariance;
-        let parts = self.parts(estimate, &frames, cameras, [&with, &without], &free);
+        let motion_terms = self.motion_terms(estimate, &frames, cameras, [&with, &without], &free);
         // `P·G·P` on the diagonal.
         let before = without.covariance.clone().cholesky()?;
         let kept = covariance * before.solve(covariance);
@@ -108,11 +108,11 @@ impl Problem<'_> {
         for column in 0..free.len() {
             let variance = covariance[(column, column)];
             let gained = variance - kept[(column, column)];
-            let told = 0.5 * (without.covariance[(column, column)] / variance).log2();
-            let counts = told.is_finite() && told > 0.0 && gained > ROUNDING * variance;
-            let share = if counts { told / gained } else { 0.0 };
-            bits.push(if counts { told as f32 } else { 0.0 });
-            by_motion.extend((0..motions).map(|motion| (share * parts[(motion, column)]) as f32));
+            let gained_bits = 0.5 * (without.covariance[(column, column)] / variance).log2();
+            let counts = gained_bits.is_finite() && gained_bits > 0.0 && gained > ROUNDING * variance;
+            let bits_per_variance = if counts { gained_bits / gained } else { 0.0 };
+            bits.push(if counts { gained_bits as f32 } else { 0.0 });
+            by_motion.extend((0..motions).map(|motion| (bits_per_variance * motion_terms[(motion, column)]) as f32));
         }
         Some(InformationGain::new(interval_s, layout.joints, bits, by_motion))
     }
@@ -157,7 +157,7 @@ impl Problem<'_> {
     }
 
     /// The diagonals of `P·Gm·P`: a row for each motion, a column for each free parameter.
-    fn parts(
+    fn motion_terms(
         &self,
         estimate: &Estimate,
         frames: &[FrameState],
@@ -167,7 +167,7 @@ impl Problem<'_> {
     ) -> DMatrix<f64> {
         let layout = self.layout;
         let calibration = self.linearization_calibration(&estimate.calibration);
-        let mut parts = DMatrix::zeros(6 + layout.joints, free.len());
+        let mut motion_terms = DMatrix::zeros(6 + layout.joints, free.len());
         // Everything by the motion of all parameters that a change of one of them goes with.
         let (with_p, without_p) = (&with.response * &with.covariance, &without.response * &with.covariance);
         for (camera, information) in cameras.iter().enumerate() {
@@ -182,12 +182,12 @@ impl Problem<'_> {
             for (motion, moves) in motion_parts(&seen, of_camera, maps, layout.joints).into_iter().enumerate() {
                 let moves = moves * own;
                 for column in 0..free.len() {
-                    parts[(motion, column)] += moves.column(column).dot(&force.column(column));
+                    motion_terms[(motion, column)] += moves.column(column).dot(&force.column(column));
                 }
             }
         }
-        self.encoder_clock_parts(estimate, &with_p, &without_p, &mut parts);
-        parts
+        self.encoder_clock_parts(estimate, &with_p, &without_p, &mut motion_terms);
+        motion_terms
     }
 
     /// What the readings of moving joints contribute to the time offset of the encoders.
@@ -196,7 +196,7 @@ impl Problem<'_> {
         estimate: &Estimate,
         with: &DMatrix<f64>,
         without: &DMatrix<f64>,
-        parts: &mut DMatrix<f64>,
+        motion_terms: &mut DMatrix<f64>,
     ) {
         let Some(clock) = self.encoder_clock_column(estimate) else { return };
         let newest = self.layout.frames - 1;
@@ -207,7 +207,7 @@ impl Problem<'_> {
                 let row = |answer: &DMatrix<f64>| answer.row(joints + joint) * slope + answer.row(clock) * by_clock;
                 let force = if slot == newest { row(with) } else { row(with) - row(without) };
                 for column in 0..force.len() {
-                    parts[(6 + joint, column)] += by_clock * with[(clock, column)] * force[column];
+                    motion_terms[(6 + joint, column)] += by_clock * with[(clock, column)] * force[column];
                 }
             }
         }

@@ -108,7 +108,7 @@ impl WindowState {
     ///
     /// Only the independent part of their errors is averaged; the variance of the image's rotation is added.
     pub(crate) fn carry_encoder(&mut self, setup: &Setup, from: usize, to: usize) {
-        let (Some(leaving), Some(own)) = (&self.frames[from].encoder, &self.frames[to].encoder) else { return };
+        let (Some(removed), Some(own)) = (&self.frames[from].encoder, &self.frames[to].encoder) else { return };
         let cameras = self.camera_poses(MAIN);
         let (Some(variance_from), Some(variance_to)) =
             (self.visual_variances(setup, from, &cameras), self.visual_variances(setup, to, &cameras))
@@ -117,31 +117,32 @@ impl WindowState {
         };
         let mut combined = own.clone();
         for joint in 0..own.angles_rad.len() {
-            let turned = self.frames[to].state.joints_rad[joint] - self.frames[from].state.joints_rad[joint];
+            let rotation_rad = self.frames[to].state.joints_rad[joint] - self.frames[from].state.joints_rad[joint];
             let between = variance_from[joint] + variance_to[joint];
-            let (own_part, own_lasting) = parts(own, joint);
-            let (leaving_part, leaving_lasting) = parts(leaving, joint);
-            if between * SHARPER * SHARPER > own_part.min(leaving_part) {
+            let (own_variance, own_bias_variance) = variances(own, joint);
+            let (removed_variance, removed_bias_variance) = variances(removed, joint);
+            if between * SHARPER * SHARPER > own_variance.min(removed_variance) {
                 continue;
             }
-            let leaving_part = leaving_part + between;
-            let share = own_part / (own_part + leaving_part);
+            let removed_variance = removed_variance + between;
+            let removed_weight = own_variance / (own_variance + removed_variance);
             // A reading that is late by the clocks' offset is late at either frame's rate.
             let faster = self.frames[to].state.rates.joint_rad_per_s(joint)
                 - self.frames[from].state.rates.joint_rad_per_s(joint);
-            let turned = turned + faster * self.calibration.of(MAIN).encoder_shift_s();
-            let change = wrap_angle(leaving.angles_rad[joint] + turned - own.angles_rad[joint]);
-            let lasting = own_lasting.max(leaving_lasting);
-            combined.angles_rad[joint] = own.angles_rad[joint] + share * change;
-            combined.sigmas_rad[joint] = (own_part * leaving_part / (own_part + leaving_part) + lasting).sqrt();
-            combined.lasting_sigmas_rad[joint] = lasting.sqrt();
+            let rotation_rad = rotation_rad + faster * self.calibration.of(MAIN).encoder_shift_s();
+            let change = wrap_angle(removed.angles_rad[joint] + rotation_rad - own.angles_rad[joint]);
+            let bias_variance = own_bias_variance.max(removed_bias_variance);
+            combined.angles_rad[joint] = own.angles_rad[joint] + removed_weight * change;
+            combined.sigmas_rad[joint] =
+                (own_variance * removed_variance / (own_variance + removed_variance) + bias_variance).sqrt();
+            combined.lasting_sigmas_rad[joint] = bias_variance.sqrt();
         }
         self.frames[to].encoder = Some(combined);
     }
 }
 
 /// Variance of an encoder angle: the part of its own, and the part that neighbouring frames share.
-fn parts(encoder: &JointAngles, joint: usize) -> (f64, f64) {
-    let lasting = encoder.lasting_sigmas_rad[joint].powi(2);
-    ((encoder.sigmas_rad[joint].powi(2) - lasting).max(0.0), lasting)
+fn variances(encoder: &JointAngles, joint: usize) -> (f64, f64) {
+    let bias_variance = encoder.lasting_sigmas_rad[joint].powi(2);
+    ((encoder.sigmas_rad[joint].powi(2) - bias_variance).max(0.0), bias_variance)
 }

@@ -8,7 +8,7 @@ use crate::estimator::{Event, EventKind};
 use crate::geometry::seconds_from_ns;
 
 /// A stationary vehicle gets a keyframe this often, so that IMU intervals stay short enough to be integrated again.
-const KEYFRAME_AT_REST_NS: i64 = 5_000_000_000;
+const STATIONARY_KEYFRAME_NS: i64 = 5_000_000_000;
 
 /// Whether the newest frame becomes a keyframe, with the value that decides.
 struct Decision {
@@ -41,9 +41,9 @@ impl WindowState {
             if self.frames[last].stamp_ns < stationary.since_ns {
                 return Decision::new(true, "keyframe: the first at rest", age_s, 0.0);
             }
-            let limit_s = seconds_from_ns(KEYFRAME_AT_REST_NS);
+            let limit_s = seconds_from_ns(STATIONARY_KEYFRAME_NS);
             let message = "at rest: only time makes a keyframe, s";
-            return Decision::new(age_ns >= KEYFRAME_AT_REST_NS, message, age_s, limit_s);
+            return Decision::new(age_ns >= STATIONARY_KEYFRAME_NS, message, age_s, limit_s);
         }
         // Whichever camera asks for a keyframe gets it; one without an image has nothing to say.
         let observed = |camera: usize| {

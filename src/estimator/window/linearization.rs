@@ -75,15 +75,16 @@ impl Problem<'_> {
         let first = layout.calibration().start;
         let order: Vec<usize> =
             column_order(&layout).into_iter().filter(|column| *column < first || !is_held(column - first)).collect();
-        let of = |held: bool| {
-            let parameters = parameters.iter().enumerate().filter(move |(column, _)| is_held(*column) == held);
+        let of = |fixed_parameters: bool| {
+            let parameters =
+                parameters.iter().enumerate().filter(move |(column, _)| is_held(*column) == fixed_parameters);
             parameters.map(|(_, parameter)| *parameter).collect::<Vec<_>>()
         };
         let free = |column: &usize| !is_held(*column);
         let norms: Vec<f64> = (0..norms.len()).filter(free).map(|column| norms[column]).collect();
         Linearization {
             columns: column_blocks(&layout, &of(false), numbers),
-            held: of(true),
+            fixed_parameters: of(true),
             jacobian: stack_columns(&measured, order.iter().copied()),
             prior_jacobian: stack_columns(&priors, order.iter().copied()),
             rig_prior_rows: priors[0].nrows(),

@@ -56,23 +56,23 @@ impl WindowState {
     fn marginalize_oldest(&mut self, setup: &Setup) {
         let newest = self.frames.newest_slot();
         let continuation = setup.config.options.track_continuation;
-        let leaving: Vec<ActiveTracks> = self
+        let removed: Vec<ActiveTracks> = self
             .active_tracks()
             .into_iter()
             .map(|active| {
                 active.filtered(|track| {
-                    let continues = track.sightings.last().is_some_and(|last| last.slot == newest);
-                    let anchored = track.sightings.first().is_some_and(|first| first.slot == 0);
+                    let continues = track.observations.last().is_some_and(|last| last.slot == newest);
+                    let anchored = track.observations.first().is_some_and(|first| first.slot == 0);
                     anchored && !(continues && continuation == TrackContinuation::DropAnchor)
                 })
             })
             .collect();
-        let estimate = self.estimate(leaving.iter().map(|active| active.landmarks.clone()).collect());
-        let prior = marginalization::oldest(&self.problem(setup, &leaving), &estimate);
+        let estimate = self.estimate(removed.iter().map(|active| active.landmarks.clone()).collect());
+        let prior = marginalization::oldest(&self.problem(setup, &removed), &estimate);
 
-        for (features, active) in self.features.iter_mut().zip(&leaving) {
+        for (features, active) in self.features.iter_mut().zip(&removed) {
             for (id, track) in active.ids.iter().zip(&active.tracks) {
-                let ended = track.sightings.last().is_none_or(|last| last.slot != newest);
+                let ended = track.observations.last().is_none_or(|last| last.slot != newest);
                 if ended || continuation == TrackContinuation::UseOnce {
                     features.remove(id);
                 }

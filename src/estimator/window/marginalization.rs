@@ -30,15 +30,15 @@ pub(crate) fn dropped(problem: &Problem<'_>, estimate: &Estimate, slot: usize) -
     if !prior.holds_frame(slot) {
         return Some(prior.clone());
     }
-    let held = prior.rows(&problem.layout, &problem.deviation(estimate));
-    eliminated(problem, estimate, &[held, problem.encoder_rows(slot, estimate)], slot)
+    let carried = prior.rows(&problem.layout, &problem.first_estimate_offset(estimate));
+    eliminated(problem, estimate, &[carried, problem.encoder_rows(slot, estimate)], slot)
 }
 
 /// Rows with residuals at the present estimate become a prior that keeps them at the first estimates.
 fn eliminated(problem: &Problem<'_>, estimate: &Estimate, parts: &[DMatrix<f64>], slot: usize) -> Option<Prior> {
     let total = problem.layout.total();
     let mut rows = stack(parts, total + 1);
-    let shift = rows.columns(0, total) * problem.deviation(estimate);
+    let shift = rows.columns(0, total) * problem.first_estimate_offset(estimate);
     let mut residual = rows.column_mut(total);
     residual -= shift;
     Prior::eliminating(&rows, &problem.layout, slot)

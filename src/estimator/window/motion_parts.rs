@@ -39,10 +39,10 @@ pub(crate) fn motion_parts(
     let there = twists(calibration, &newest.joints_rad);
     for (slot, frame) in frames.iter().enumerate() {
         let pose = &frame.navigation.world_from_imu;
-        let mount = calibration.imu_from_camera(&frame.joints_rad);
+        let extrinsics = calibration.imu_from_camera(&frame.joints_rad);
         let to_newest = pose.inverse() * newest.navigation.world_from_imu;
         let mut put = |motion: usize, twists: &Twists| {
-            let moved = camera_moves(twists, &mount, &pose.rotation_matrix());
+            let moved = camera_moves(twists, &extrinsics, &pose.rotation_matrix());
             let mut place = parts[motion].view_mut((6 * slot, 0), (6, columns));
             place += moved;
         };
@@ -58,10 +58,10 @@ pub(crate) fn motion_parts(
 /// What the parameters of the mount do to it; a clock does nothing to it.
 fn twists(calibration: &Calibration, joints_rad: &[f64]) -> Twists {
     let linearization = calibration.linearize(joints_rad);
-    let mount = linearization.imu_from_camera;
+    let extrinsics = linearization.imu_from_camera;
     let by_parameters = linearization.by_parameters;
-    let turn = mount.rotation_matrix() * by_parameters.fixed_rows::<3>(0);
-    let shift = by_parameters.fixed_rows::<3>(3) + so3::hat(&mount.translation_m) * &turn;
+    let turn = extrinsics.rotation_matrix() * by_parameters.fixed_rows::<3>(0);
+    let shift = by_parameters.fixed_rows::<3>(3) + so3::hat(&extrinsics.translation_m) * &turn;
     Twists { turn, shift }
 }
 
@@ -119,10 +119,10 @@ fn clock_parts(frames: &[Cow<'_, FrameState>], maps: &CameraMaps, clock: usize, 
 }
 
 /// Twists in the IMU frame as moves `[φ; δt]` of the camera's pose in the world.
-fn camera_moves(twists: &Twists, mount: &RigidTransform, world_from_imu: &Matrix3<f64>) -> DMatrix<f64> {
+fn camera_moves(twists: &Twists, extrinsics: &RigidTransform, world_from_imu: &Matrix3<f64>) -> DMatrix<f64> {
     let mut moves = DMatrix::zeros(6, twists.turn.ncols());
-    moves.rows_mut(0, 3).copy_from(&(mount.rotation_matrix().transpose() * &twists.turn));
-    let shift = &twists.shift - so3::hat(&mount.translation_m) * &twists.turn;
+    moves.rows_mut(0, 3).copy_from(&(extrinsics.rotation_matrix().transpose() * &twists.turn));
+    let shift = &twists.shift - so3::hat(&extrinsics.translation_m) * &twists.turn;
     moves.rows_mut(3, 3).copy_from(&(world_from_imu * shift));
     moves
 }

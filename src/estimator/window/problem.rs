@@ -117,7 +117,7 @@ impl Problem<'_> {
             costs.calibration = estimate.calibration.prior_residual().norm_squared();
         }
         if let Some(prior) = self.prior {
-            costs.prior += prior.residual(&self.layout, &self.deviation(estimate)).norm_squared();
+            costs.prior += prior.residual(&self.layout, &self.first_estimate_offset(estimate)).norm_squared();
         }
         if let (Some(start), Some(first)) = (self.start, estimate.frames.first()) {
             costs.prior += start.rows(first).1.norm_squared();
@@ -126,19 +126,19 @@ impl Problem<'_> {
     }
 
     /// `x ⊟ x₀` of everything that has a first estimate, zero elsewhere.
-    pub(crate) fn deviation(&self, estimate: &Estimate) -> DVector<f64> {
-        let mut deviation = DVector::zeros(self.layout.total());
+    pub(crate) fn first_estimate_offset(&self, estimate: &Estimate) -> DVector<f64> {
+        let mut first_estimate_offset = DVector::zeros(self.layout.total());
         for (slot, (frame, current)) in self.frames.iter().zip(&estimate.frames).enumerate() {
             if let Some(first) = &frame.first_estimate {
-                deviation.rows_range_mut(self.layout.frame(slot)).copy_from(&current.minus(first));
+                first_estimate_offset.rows_range_mut(self.layout.frame(slot)).copy_from(&current.minus(first));
             }
         }
         if self.layout.calibration > 0
-            && let Some(change) = estimate.calibration.deviation()
+            && let Some(change) = estimate.calibration.first_estimate_offset()
         {
-            deviation.rows_range_mut(self.layout.calibration()).copy_from(&change);
+            first_estimate_offset.rows_range_mut(self.layout.calibration()).copy_from(&change);
         }
-        deviation
+        first_estimate_offset
     }
 
     fn imu_residual(&self, slot: usize, frames: &[FrameState]) -> Option<Vector15> {
@@ -287,7 +287,7 @@ impl Problem<'_> {
             part += rows.tr_mul(&residual);
         }
         if let Some(prior) = self.prior {
-            prior.add_to(&self.layout, &self.deviation(estimate), &mut hessian, &mut gradient);
+            prior.add_to(&self.layout, &self.first_estimate_offset(estimate), &mut hessian, &mut gradient);
         }
         if let (Some(start), Some(first)) = (self.start, estimate.frames.first()) {
             let (rows, residual) = start.rows(first);
@@ -327,28 +327,28 @@ impl Problem<'_> {
         hessian: &mut DMatrix<f64>,
         gradient: &mut DVector<f64>,
     ) {
-        let places = [
+        let pose_blocks = [
             (self.layout.pose(slot - 1).start, by_from.fixed_columns::<POSE>(0).into_owned()),
             (self.layout.pose(slot).start, by_to.fixed_columns::<POSE>(0).into_owned()),
         ];
-        let speeds = [
+        let velocity_bias_blocks = [
             (self.layout.velocity_bias(slot - 1).start, by_from.fixed_columns::<VELOCITY_BIAS>(POSE).into_owned()),
             (self.layout.velocity_bias(slot).start, by_to.fixed_columns::<VELOCITY_BIAS>(POSE).into_owned()),
         ];
-        for (row, left) in &places {
+        for (row, left) in &pose_blocks {
             add_vector(gradient, *row, &left.tr_mul(residual));
-            for (column, right) in &places {
+            for (column, right) in &pose_blocks {
                 add_block(hessian, *row, *column, &left.tr_mul(right));
             }
-            for (column, right) in &speeds {
+            for (column, right) in &velocity_bias_blocks {
                 let block: SMatrix<f64, POSE, VELOCITY_BIAS> = left.tr_mul(right);
                 add_block(hessian, *row, *column, &block);
                 add_block(hessian, *column, *row, &block.transpose());
             }
         }
-        for (row, left) in &speeds {
+        for (row, left) in &velocity_bias_blocks {
             add_vector(gradient, *row, &left.tr_mul(residual));
-            for (column, right) in &speeds {
+            for (column, right) in &velocity_bias_blocks {
                 add_block(hessian, *row, *column, &left.tr_mul(right));
             }
         }

@@ -129,14 +129,14 @@ impl WindowState {
         for (camera, of_camera) in solved.cameras.iter().enumerate() {
             let checks = &solved.checks[camera];
             reports.extend((0..of_camera.ids.len()).map(|index| {
-                let sightings = &of_camera.tracks[index].sightings;
+                let observations = &of_camera.tracks[index].observations;
                 let landmark = &solved.solution.estimate.landmarks[camera][index];
                 let (before, after) = (&checks.residuals_before[index], &checks.residuals_after[index]);
                 FeatureReport {
                     id: of_camera.ids[index].of_camera(camera),
-                    anchor_frame_index: self.frames[sightings[0].slot].index,
+                    anchor_frame_index: self.frames[observations[0].slot].index,
                     inverse_depth_per_m: landmark.inverse_distance / landmark.bearing.z,
-                    observations: sightings
+                    observations: observations
                         .iter()
                         .zip(before.iter().zip(after))
                         .map(|(sighting, (before, after))| observation(sighting.slot, sighting.uv_px, *before, *after))
@@ -156,7 +156,7 @@ impl WindowState {
             let poses = self.camera_poses(camera);
             let kept = (0..of_camera.ids.len()).filter(|index| !solved.checks[camera].rejected[*index]);
             landmarks.extend(kept.map(|index| {
-                let pose = &poses[of_camera.tracks[index].sightings[0].slot];
+                let pose = &poses[of_camera.tracks[index].observations[0].slot];
                 let point = solved.solution.estimate.landmarks[camera][index].point_in_anchor();
                 LandmarkReport {
                     id: of_camera.ids[index].of_camera(camera),
@@ -173,11 +173,12 @@ impl WindowState {
         let problem = self.problem(setup, &solved.cameras);
         let joints = problem.layout.joints;
         let tracks = solved.cameras.iter().flat_map(|of_camera| &of_camera.tracks);
-        let sightings: usize = tracks.map(|track| track.sightings.len()).sum();
+        let observations: usize = tracks.map(|track| track.observations.len()).sum();
         let read = self.frames.iter().filter(|frame| frame.encoder.is_some()).count();
         let stationary = problem.zero_velocity_terms(&solved.solution.estimate.frames).count();
         let intervals = self.frames.iter().skip(1).filter(|frame| frame.motion_information.is_some()).count();
-        let held = self.prior.as_ref().map_or(0, Prior::len) + if self.start.is_some() { StartPrior::LEN } else { 0 };
+        let prior_rows =
+            self.prior.as_ref().map_or(0, Prior::len) + if self.start.is_some() { StartPrior::LEN } else { 0 };
         let (before, after) = (&solved.solution.costs_before, &solved.solution.costs_after);
         let summary = |factor: FactorKind, count: usize, part: fn(&Costs) -> f64| ResidualSummary {
             factor,
@@ -186,11 +187,11 @@ impl WindowState {
             chi2_after: part(after),
         };
         let mut summaries = vec![
-            summary(FactorKind::Visual, 2 * sightings, |costs| costs.visual),
+            summary(FactorKind::Visual, 2 * observations, |costs| costs.visual),
             summary(FactorKind::Imu, 15 * intervals, |costs| costs.imu),
             summary(FactorKind::Encoder, joints * read, |costs| costs.encoder),
             summary(FactorKind::CalibrationPrior, problem.layout.calibration, |costs| costs.calibration),
-            summary(FactorKind::MarginalizationPrior, held, |costs| costs.prior),
+            summary(FactorKind::MarginalizationPrior, prior_rows, |costs| costs.prior),
         ];
         if stationary > 0 {
             summaries.push(summary(FactorKind::Standstill, stationary, |costs| costs.zero_velocity));

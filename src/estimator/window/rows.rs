@@ -109,15 +109,16 @@ impl Problem<'_> {
     /// The marginalization prior and what was known at the start.
     pub(crate) fn prior_rows(&self, estimate: &Estimate) -> DMatrix<f64> {
         let total = self.layout.total();
-        let held = self
-            .prior
-            .map_or_else(|| DMatrix::zeros(0, total + 1), |prior| prior.rows(&self.layout, &self.deviation(estimate)));
-        let (Some(start), Some(first)) = (self.start, estimate.frames.first()) else { return held };
+        let window_prior = self.prior.map_or_else(
+            || DMatrix::zeros(0, total + 1),
+            |prior| prior.rows(&self.layout, &self.first_estimate_offset(estimate)),
+        );
+        let (Some(start), Some(first)) = (self.start, estimate.frames.first()) else { return window_prior };
         let (jacobian, residual) = start.rows(first);
         let mut rows = DMatrix::zeros(jacobian.nrows(), total + 1);
         rows.columns_range_mut(self.layout.frame(0)).copy_from(&jacobian);
         rows.set_column(total, &residual);
-        stack(&[held, rows], total + 1)
+        stack(&[window_prior, rows], total + 1)
     }
 
     /// The rig's prior on the calibration.

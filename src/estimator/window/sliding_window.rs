@@ -167,7 +167,7 @@ impl SlidingWindow {
             features: input.features(camera),
             noise: &setup.imu_noise,
             bias: &navigation.bias,
-            speed_m_per_s: navigation.velocity_m_per_s.norm(),
+            velocity_norm_m_per_s: navigation.velocity_m_per_s.norm(),
             imu_from_camera: self.state.calibration.of(camera).imu_from_camera(&newest.state.joints_rad).rotation,
             distance_m: usual_distance_m(&self.state.features),
         };

@@ -6,7 +6,7 @@ use super::active_tracks::ActiveTracks;
 use super::problem::{CameraFactors, Estimate, Problem};
 use super::solver::{self, Solution, SolverLimits};
 use super::window_state::WindowState;
-use crate::estimator::factors::visual::{self, Sighting};
+use crate::estimator::factors::visual::{self, TrackObservation};
 use crate::estimator::options::EstimatorOptions;
 use crate::estimator::setup::Setup;
 use crate::estimator::state::camera_pose;
@@ -106,11 +106,11 @@ fn track_residuals(problem: &Problem<'_>, estimate: &Estimate) -> Vec<TrackResid
             .iter()
             .zip(&estimate.landmarks[camera])
             .map(|(track, landmark)| {
-                let anchor = track.sightings[0].slot;
-                let residual = |sighting: &Sighting| {
-                    visual::sighting_residual_px(&factors.visual, &relative, anchor, landmark, sighting)
+                let anchor = track.observations[0].slot;
+                let residual = |observation: &TrackObservation| {
+                    visual::sighting_residual_px(&factors.visual, &relative, anchor, landmark, observation)
                 };
-                track.sightings.iter().map(residual).collect()
+                track.observations.iter().map(residual).collect()
             })
             .collect()
     };

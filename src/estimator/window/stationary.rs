@@ -92,7 +92,7 @@ pub(crate) struct Observed<'a> {
     pub(crate) features: &'a [TrackedFeature],
     pub(crate) noise: &'a ImuNoise,
     pub(crate) bias: &'a ImuBias,
-    pub(crate) speed_m_per_s: f64,
+    pub(crate) velocity_norm_m_per_s: f64,
     pub(crate) imu_from_camera: UnitQuaternion<f64>,
     /// Usual distance of the scene.
     pub(crate) distance_m: f64,
@@ -105,7 +105,8 @@ impl StationaryDetector {
         let before_ns = self.unmoved_since_ns;
         let parallax_rad = self.compare_image(input.stamp_ns, image);
         let spread = self.spread(input.stamp_ns, image);
-        let quiet = spread.as_ref().is_some_and(Spread::is_quiet) && image.speed_m_per_s <= MAX_VELOCITY_M_PER_S;
+        let quiet =
+            spread.as_ref().is_some_and(Spread::is_quiet) && image.velocity_norm_m_per_s <= MAX_VELOCITY_M_PER_S;
         let unmoved_ns = input.stamp_ns - self.unmoved_since_ns;
         if !quiet {
             self.required_ns = QUIET_NS;
@@ -128,8 +129,8 @@ impl StationaryDetector {
                 seconds_from_ns(input.stamp_ns - since_ns),
                 parallax_rad.to_degrees(),
                 MAX_PARALLAX_RAD.to_degrees(),
-                spread.turn,
-                spread.turn_limit,
+                spread.angular_rate,
+                spread.angular_rate_limit,
                 spread.force,
                 spread.force_limit
             ),
@@ -210,12 +211,13 @@ impl StationaryDetector {
         let covered_s: f64 = self.intervals.iter().map(|interval| interval.duration_s).sum();
         let averaged_s = covered_s / self.intervals.len() as f64;
         let own = |density: f64| 1.5 * density / averaged_s.max(1e-3).sqrt();
-        let (turn_mean, turn) = mean_and_spread(self.intervals.iter().map(|i| i.angular_velocity_rad_per_s));
+        let (angular_rate_mean, angular_rate) =
+            mean_and_spread(self.intervals.iter().map(|i| i.angular_velocity_rad_per_s));
         let (_, force) = mean_and_spread(self.intervals.iter().map(|i| i.specific_force_m_per_s2));
         Some(Spread {
-            turn,
-            turn_limit: MAX_ANGULAR_RATE_SPREAD_RAD_PER_S.hypot(own(image.noise.gyroscope_noise_density)),
-            mean_turn: (turn_mean - image.bias.gyroscope_rad_per_s).amax(),
+            angular_rate,
+            angular_rate_limit: MAX_ANGULAR_RATE_SPREAD_RAD_PER_S.hypot(own(image.noise.gyroscope_noise_density)),
+            mean_angular_rate: (angular_rate_mean - image.bias.gyroscope_rad_per_s).amax(),
             force,
             force_limit: MAX_FORCE_SPREAD_M_PER_S2.hypot(own(image.noise.accelerometer_noise_density)),
         })
@@ -225,16 +227,18 @@ impl StationaryDetector {
 /// How much the IMU samples vary, with the limits.
 #[derive(Clone, Copy, Debug)]
 struct Spread {
-    turn: f64,
-    turn_limit: f64,
-    mean_turn: f64,
+    angular_rate: f64,
+    angular_rate_limit: f64,
+    mean_angular_rate: f64,
     force: f64,
     force_limit: f64,
 }
 
 impl Spread {
     fn is_quiet(&self) -> bool {
-        self.turn <= self.turn_limit && self.mean_turn <= MAX_ANGULAR_RATE_RAD_PER_S && self.force <= self.force_limit
+        self.angular_rate <= self.angular_rate_limit
+            && self.mean_angular_rate <= MAX_ANGULAR_RATE_RAD_PER_S
+            && self.force <= self.force_limit
     }
 }
 

@@ -88,11 +88,11 @@ impl WindowState {
     /// Switches the chain's parameterization: the calibration stays the same, and the prior's columns are transported.
     pub(crate) fn switch_parameterization(&mut self, parameterization: Parameterization) {
         let layout = frames::layout(&self.frames, self.calibration.dof());
-        let before = self.calibration.deviation();
+        let before = self.calibration.first_estimate_offset();
         let old_from_new = self.calibration.switch_parameterization(parameterization);
         if let Some(prior) = &mut self.prior {
-            let deviations = before.zip(self.calibration.deviation());
-            prior.transport_calibration(&old_from_new, deviations.as_ref(), &layout);
+            let first_estimate_offsets = before.zip(self.calibration.first_estimate_offset());
+            prior.transport_calibration(&old_from_new, first_estimate_offsets.as_ref(), &layout);
         }
     }
 

@@ -139,7 +139,7 @@ pub(crate) struct Scene {
     pub(crate) height: usize,
     pub(crate) focal_px: f64,
     /// Scales the motion per image.
-    pub(crate) speed: f64,
+    pub(crate) motion_scale: f64,
     /// Standard deviation of the pixel noise in grey levels.
     pub(crate) noise: f64,
     /// Relative amplitude of the gain's change from image to image.
@@ -160,13 +160,14 @@ impl Scene {
             -rate * period / std::f64::consts::TAU * (std::f64::consts::TAU * (phase / period + shift)).cos()
         };
         let axis = Vector3::new(angle(0.02, 17.0, 0.0), angle(0.034, 23.0, 0.2), angle(0.012, 13.0, 0.5));
-        Rotation3::new(axis * self.speed)
+        Rotation3::new(axis * self.motion_scale)
     }
 
     /// Maps pixels of image `index` to texture pixels.
     pub(crate) fn texture_from_image(&self, index: usize) -> Matrix3<f64> {
         let phase = index as f64;
-        let shift = Vector3::new((phase / 9.0).sin(), (phase / 7.0).cos(), (phase / 6.0).sin()) * (0.06 * self.speed);
+        let shift =
+            Vector3::new((phase / 9.0).sin(), (phase / 7.0).cos(), (phase / 6.0).sin()) * (0.06 * self.motion_scale);
         let mut camera_from_plane = self.camera_from_plane(index).into_inner();
         // The plane z = 1: its points (x, y, 1) go to R·(x, y, 1) + t.
         camera_from_plane.column_mut(2).axpy(1.0, &shift, 1.0);

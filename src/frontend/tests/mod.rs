@@ -11,8 +11,8 @@ use crate::sensors::GrayImage;
 use homography::{Scene, Texture};
 
 /// A plane of rich texture before a small camera.
-fn scene(speed: f64) -> Scene {
-    Scene { width: 320, height: 240, focal_px: 200.0, speed, noise: 2.0, flicker: 0.0 }
+fn scene(motion_scale: f64) -> Scene {
+    Scene { width: 320, height: 240, focal_px: 200.0, motion_scale, noise: 2.0, flicker: 0.0 }
 }
 
 fn texture() -> Texture {

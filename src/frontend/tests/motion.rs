@@ -202,15 +202,15 @@ fn the_covariance_is_that_of_predictions_from_wrong_numbers() {
 
 #[test]
 fn no_rotation_is_predicted_from_broken_samples() {
-    let mount = rigid(UnitQuaternion::identity());
+    let extrinsics = rigid(UnitQuaternion::identity());
     let good = [sample(0, Vector3::x()), sample(5_000_000, Vector3::x())];
-    assert!(predict_camera_rotation(&good, &Vector3::zeros(), &mount, &mount, &NOISE).is_some());
+    assert!(predict_camera_rotation(&good, &Vector3::zeros(), &extrinsics, &extrinsics, &NOISE).is_some());
     for imu in [
         vec![],
         vec![good[0]],
         vec![good[1], good[0]],
         vec![good[0], sample(5_000_000, Vector3::new(f64::NAN, 0.0, 0.0))],
     ] {
-        assert_eq!(predict_camera_rotation(&imu, &Vector3::zeros(), &mount, &mount, &NOISE), None);
+        assert_eq!(predict_camera_rotation(&imu, &Vector3::zeros(), &extrinsics, &extrinsics, &NOISE), None);
     }
 }

@@ -37,8 +37,8 @@ fn find_all(scene: &Scene, to: usize) -> (Vec<f64>, usize) {
 
 #[test]
 fn a_reference_is_matched_rotated_and_scaled() {
-    for (to, speed, flicker) in [(5, 0.3, 0.0), (7, 0.8, 0.0), (7, 0.8, 0.3)] {
-        let (errors, count) = find_all(&Scene { flicker, ..scene(speed) }, to);
+    for (to, motion_scale, flicker) in [(5, 0.3, 0.0), (7, 0.8, 0.0), (7, 0.8, 0.3)] {
+        let (errors, count) = find_all(&Scene { flicker, ..scene(motion_scale) }, to);
         assert!(count > 50 && errors.len() * 20 >= count * 19, "{} of {count} in image {to}", errors.len());
         let median_px = median(errors).unwrap();
         assert!(median_px < 0.06, "median error {median_px} px in image {to}");

@@ -180,8 +180,8 @@ fn auto_never_starts_near_a_lock_and_switches_late() {
             classical = tilted.to_classical();
         }
     }
-    let lock_side = FRAC_PI_2 - switched_at_rad.unwrap();
-    assert!(lock_side.sin() < 0.3 && (lock_side + 1.1_f64.to_radians()).sin() > 0.3);
+    let remaining_rad = FRAC_PI_2 - switched_at_rad.unwrap();
+    assert!(remaining_rad.sin() < 0.3 && (remaining_rad + 1.1_f64.to_radians()).sin() > 0.3);
     assert_eq!(auto_parameterization(&classical), Parameterization::MinimalSwapped);
 }
 
@@ -208,8 +208,11 @@ fn canonical_numbers_do_not_depend_on_how_the_chain_was_written() {
                 let first = Chain::from_classical(&classical, parameterization).canonical();
                 let second = Chain::from_classical(&other, parameterization).canonical();
                 for (a, b) in first.values().iter().zip(&second.values()) {
-                    let turns = (a - b) / std::f64::consts::TAU;
-                    assert!((turns - turns.round()).abs() < 1e-9, "{parameterization}: {first:?} {second:?}");
+                    let revolutions = (a - b) / std::f64::consts::TAU;
+                    assert!(
+                        (revolutions - revolutions.round()).abs() < 1e-9,
+                        "{parameterization}: {first:?} {second:?}"
+                    );
                 }
             }
         }

@@ -75,15 +75,20 @@ pub(crate) fn check_values(chain: &Chain, values: &Value, tolerance: f64, contex
     for (name, expected) in values.as_object().unwrap() {
         if let Some(expected) = expected.as_f64() {
             let index = names.iter().position(|other| other == name).unwrap();
-            let turns = (found[index] - expected) / std::f64::consts::TAU;
+            let revolutions = (found[index] - expected) / std::f64::consts::TAU;
             let angle = parameters[index].dimension() == Dimension::Angle;
-            let error = if angle { (turns - turns.round()) * std::f64::consts::TAU } else { found[index] - expected };
+            let error = if angle {
+                (revolutions - revolutions.round()) * std::f64::consts::TAU
+            } else {
+                found[index] - expected
+            };
             assert!(error.abs() < tolerance, "{context} {name}: {} for {expected}", found[index]);
         } else if let Some(first) = names.iter().position(|other| *other == format!("{}.rx", &name[2..])) {
-            let turn = Vector3::new(found[first], found[first + 1], found[first + 2]);
+            let rotation_vector = Vector3::new(found[first], found[first + 1], found[first + 2]);
             let shift = Vector3::new(found[first + 3], found[first + 4], found[first + 5]);
-            let error =
-                (RigidTransform::new(so3::exp(&turn), shift).to_matrix() - transform(expected).to_matrix()).amax();
+            let error = (RigidTransform::new(so3::exp(&rotation_vector), shift).to_matrix()
+                - transform(expected).to_matrix())
+            .amax();
             assert!(error < tolerance, "{context} {name}: {error}");
         }
     }
@@ -112,7 +117,7 @@ fn golden_chains() {
             let units: Vec<_> = chain.parameters().into_iter().map(|parameter| parameter.dimension().unit()).collect();
             assert_eq!(units, names(&form["units"]), "{context}");
             let canonical = chain.canonical();
-            let locked = chain.margins().iter().any(|(_, margin)| *margin < 1e-9);
+            let singular = chain.margins().iter().any(|(_, margin)| *margin < 1e-9);
             check_values(&canonical, &form["values"], 1e-11, &context);
             for (angles, pose) in encoder.iter().zip(array(&golden["T_I_C"])) {
                 for chain in [&chain, &canonical] {
@@ -123,7 +128,7 @@ fn golden_chains() {
             for expected in array(&form["jacobians"]) {
                 let found = canonical.linearize(&numbers(&expected["theta"]));
                 let error = amax_difference(&found.by_parameters, &matrix(&expected["J"]));
-                assert!(error < 1e-11, "{context} (locked: {locked}): {error}");
+                assert!(error < 1e-11, "{context} (locked: {singular}): {error}");
                 assert!(amax_difference(&found.by_joints, &matrix(&expected["J_theta"])) < 1e-11, "{context}");
                 compared += 1;
             }

@@ -214,7 +214,7 @@ pub(crate) fn knowledge(rank: Option<&RankReport>) -> Option<BTreeMap<ParameterI
             Knowledge::Informed
         }
     };
-    let held = rank.held.iter().map(|parameter| (*parameter, Knowledge::Held));
+    let held = rank.fixed_parameters.iter().map(|parameter| (*parameter, Knowledge::Held));
     let columns = rank.parameters.iter().enumerate().map(|(column, parameter)| (*parameter, verdict(column)));
     Some(columns.chain(held).collect())
 }

@@ -59,7 +59,10 @@ fn table_ui(ui: &mut Ui, theme: &Theme, names: &ParameterNames, columns: &[RankC
         ("to the motion", |rank, _| lost(rank.deficit_motion)),
         ("falsely known", |rank, _| {
             let claimed = rank.claimed();
-            (if claimed == 0 { lost(0).0 } else { format!("{claimed}, up to {:.2}", rank.false_gain()) }, claimed > 0)
+            (
+                if claimed == 0 { lost(0).0 } else { format!("{claimed}, up to {:.2}", rank.spurious_gain()) },
+                claimed > 0,
+            )
         }),
         ("nearest lock", |rank, names| {
             let nearest = rank.margins.iter().min_by(|a, b| a.1.total_cmp(&b.1));

@@ -76,7 +76,7 @@ fn of_rank(rank: &RankReport, names: &ParameterNames) -> Verdict {
         reasons.push(format!(
             "The prior falsely claims {} of what cannot be told, up to {:.2} of 10° or 3 cm",
             rank.claimed(),
-            rank.false_gain()
+            rank.spurious_gain()
         ));
     }
     if let Some(direction) = rank.directions.iter().find(|direction| !direction.structural) {
@@ -97,7 +97,7 @@ pub(crate) fn structure_lines(rank: &RankReport, names: &ParameterNames) -> Vec<
     let line = |known: &KnownDirection| {
         let mark = if known.agrees { "✔" } else { "✖" };
         let claimed =
-            if known.is_claimed() { format!("; falsely known: {:.2}", known.false_gain) } else { String::new() };
+            if known.is_claimed() { format!("; falsely known: {:.2}", known.spurious_gain) } else { String::new() };
         format!("{mark} {}{claimed}", known.loss.reason(rank.joint_count, names))
     };
     rank.known.iter().map(line).collect()

@@ -87,7 +87,7 @@ pub(crate) fn rank_at(parameters: &[ParameterId], index: usize) -> RankReport {
         .collect();
     RankReport {
         parameters: parameters.to_vec(),
-        held: Vec::new(),
+        fixed_parameters: Vec::new(),
         singular_values_with_priors: singular_values.iter().map(|value| (value * value + 1.0).sqrt()).collect(),
         singular_values,
         reference,

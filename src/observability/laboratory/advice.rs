@@ -240,8 +240,8 @@ fn navigation_at(situation: &Situation, exercise: &Exercise, time_s: f64) -> Nav
     let acceleration = (after - here * 2.0 + before) / (STEP_S * STEP_S);
     let thrust = acceleration - situation.gravity_in_world;
     let tilt = UnitQuaternion::rotation_between(&Vector3::z(), &thrust).unwrap_or_else(UnitQuaternion::identity);
-    let turn = so3::exp(&(Vector3::z() * exercise.turn_rad(time_s.max(0.0))));
-    let rotation = tilt * turn * situation.navigation.world_from_imu.rotation;
+    let yaw = so3::exp(&(Vector3::z() * exercise.turn_rad(time_s.max(0.0))));
+    let rotation = tilt * yaw * situation.navigation.world_from_imu.rotation;
     NavigationState {
         world_from_imu: RigidTransform::new(rotation, here),
         velocity_m_per_s: (after - before) / (2.0 * STEP_S),
@@ -262,12 +262,12 @@ fn samples(
         .map(|index| {
             let time_s = from_s + (to_s - from_s) * index as f64 / count as f64;
             let (before, here, after) = (motion(time_s - STEP_S), motion(time_s), motion(time_s + STEP_S));
-            let turned = before.world_from_imu.rotation.inverse() * after.world_from_imu.rotation;
+            let rotation_change = before.world_from_imu.rotation.inverse() * after.world_from_imu.rotation;
             let acceleration = (after.velocity_m_per_s - before.velocity_m_per_s) / (2.0 * STEP_S);
             let felt = here.world_from_imu.rotation.inverse() * (acceleration - gravity_in_world);
             ImuSample {
                 stamp_ns: ns_from_seconds(time_s),
-                angular_velocity_rad_per_s: so3::log(&turned) / (2.0 * STEP_S) + here.bias.gyroscope_rad_per_s,
+                angular_velocity_rad_per_s: so3::log(&rotation_change) / (2.0 * STEP_S) + here.bias.gyroscope_rad_per_s,
                 specific_force_m_per_s2: felt + here.bias.accelerometer_m_per_s2,
             }
         })
@@ -285,7 +285,7 @@ fn landmarks(situation: &Situation, poses: &[RigidTransform]) -> Vec<Hypothetica
         // A low-discrepancy sequence over the image and over the distances (Roberts' R3).
         let fraction = |factor: f64| (0.5 + factor * (index + 1) as f64).fract();
         let (across, down, far) = (fraction(0.819_172_513_4), fraction(0.671_043_606_7), fraction(0.549_700_477_9));
-        let inside = |share: f64, size: f64| BORDER_PX + share * (size - 2.0 * BORDER_PX);
+        let inside = |position: f64, size: f64| BORDER_PX + position * (size - 2.0 * BORDER_PX);
         let uv_px = Vector2::new(inside(across, width), inside(down, height));
         let distance_m = scene_m[((far * scene_m.len() as f64) as usize).min(scene_m.len() - 1)];
         let Some(ray) = camera.unproject(&uv_px) else { continue };
@@ -324,9 +324,9 @@ fn makes_keyframes(landmarks: &[HypotheticalLandmark], poses: &[RigidTransform])
             })
         };
         let common = parallaxes().count() as f64;
-        let new_share = 1.0 - common / seen().count().max(1) as f64;
+        let new_ratio = 1.0 - common / seen().count().max(1) as f64;
         let parallax_rad = parallaxes().sum::<f64>() / common.max(1.0);
-        parallax_rad >= options.keyframe_parallax_rad || new_share > options.keyframe_new_ratio
+        parallax_rad >= options.keyframe_parallax_rad || new_ratio > options.keyframe_new_ratio
     };
     (1..poses.len()).any(is_keyframe)
 }

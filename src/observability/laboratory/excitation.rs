@@ -96,9 +96,9 @@ fn without(window: &HypotheticalWindow, chain: &Chain, motion: Motion) -> Hypoth
                     *velocity -= axis * axis.dot(velocity);
                 }
                 Motion::Rotation(axis) => {
-                    let mut turn = so3::log(&(about.rotation.inverse() * pose.rotation));
-                    turn[axis] = 0.0;
-                    pose.rotation = about.rotation * so3::exp(&turn);
+                    let mut rotation_vector = so3::log(&(about.rotation.inverse() * pose.rotation));
+                    rotation_vector[axis] = 0.0;
+                    pose.rotation = about.rotation * so3::exp(&rotation_vector);
                 }
                 Motion::Joint(joint) => frame.joints_rad[joint] = middle.joints_rad[joint],
             }

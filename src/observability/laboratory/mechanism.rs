@@ -181,8 +181,11 @@ fn out_of_square(directions: &[Vector3<f64>], seed: u64) -> Vec<JointAxis> {
 /// A camera about 16 cm from the IMU, turned against a nominal frame by up to a quarter of a radian about each axis.
 fn out_of_true(nominal: &UnitQuaternion<f64>, seed: u64) -> RigidTransform {
     let mut random = SplitMix64::new(seed);
-    let turn = Vector3::repeat(0.15) + vector_within(&mut random, 0.1);
-    RigidTransform::new(nominal * so3::exp(&turn), Vector3::new(0.14, 0.03, -0.08) + vector_within(&mut random, 0.02))
+    let rotation_vector = Vector3::repeat(0.15) + vector_within(&mut random, 0.1);
+    RigidTransform::new(
+        nominal * so3::exp(&rotation_vector),
+        Vector3::new(0.14, 0.03, -0.08) + vector_within(&mut random, 0.02),
+    )
 }
 
 fn random_chain(joints: usize, seed: u64) -> ClassicalChain {

@@ -172,7 +172,7 @@ const fn sine(size: f64, rate_rad_per_s: f64, phase_rad: f64) -> Sine {
 }
 
 /// Turns of the vehicle, as a rotation vector in radians.
-const TURN: [Sine; 3] = [sine(0.2, 2.8, 0.4), sine(0.25, 2.0, 1.3), sine(0.3, 1.6, 0.2)];
+const ROTATION: [Sine; 3] = [sine(0.2, 2.8, 0.4), sine(0.25, 2.0, 1.3), sine(0.3, 1.6, 0.2)];
 /// Its position in metres.
 const PATH: [Sine; 3] = [sine(1.2, 1.6, 0.0), sine(0.9, 2.4, 0.7), sine(0.7, 2.0, 1.9)];
 /// Its constant velocity, where it has one.
@@ -183,7 +183,7 @@ const JOINTS: [Sine; 5] =
 /// Step of the numeric derivatives of rotations and of composed positions.
 const STEP_S: f64 = 1e-3;
 /// A joint uses this part of the room between its rest and the nearer stop at most.
-const ROOM_SHARE: f64 = 0.9;
+const ROOM_RATIO: f64 = 0.9;
 
 /// A mechanism in motion, some of its joints fixed.
 #[derive(Clone, Debug)]
@@ -204,13 +204,13 @@ impl Flight<'_> {
                 let (low, high) = self.mechanism.joints.get(joint).map_or((-TAU, TAU), |joint| joint.limits_rad);
                 // At zero, or where there is room to both sides.
                 let quarter = 0.25 * (high - low).max(0.0);
-                let rest = 0.0_f64.max(low + quarter).min(high - quarter);
+                let center = 0.0_f64.max(low + quarter).min(high - quarter);
                 if self.frozen.contains(&joint) || self.motion.holds_joint(joint, joints) {
-                    return rest;
+                    return center;
                 }
                 let wave = JOINTS[joint % JOINTS.len()];
-                let room = ROOM_SHARE * (high - rest).min(rest - low);
-                rest + wave.at(time_s, 0) * (room / wave.size).min(1.0)
+                let room = ROOM_RATIO * (high - center).min(center - low);
+                center + wave.at(time_s, 0) * (room / wave.size).min(1.0)
             })
             .collect()
     }
@@ -235,17 +235,18 @@ impl Flight<'_> {
     }
 
     fn rotation(&self, time_s: f64, joints_rad: &[f64]) -> UnitQuaternion<f64> {
-        let turn = |time_s: f64| Vector3::from_fn(|axis, _| TURN[axis].at(time_s, 0));
-        let yaw = so3::exp(&(Vector3::z() * (2.0 * TURN[2].at(time_s, 0))));
+        let rotation_vector = |time_s: f64| Vector3::from_fn(|axis, _| ROTATION[axis].at(time_s, 0));
+        let yaw = so3::exp(&(Vector3::z() * (2.0 * ROTATION[2].at(time_s, 0))));
         let imu_from_camera = || self.mechanism.chain.imu_from_camera(joints_rad).rotation;
-        let start = || so3::exp(&turn(0.0)) * self.mechanism.chain.imu_from_camera(&self.joints_rad(0.0)).rotation;
+        let start =
+            || so3::exp(&rotation_vector(0.0)) * self.mechanism.chain.imu_from_camera(&self.joints_rad(0.0)).rotation;
         match self.motion {
             LaboratoryMotion::TranslationOnly
             | LaboratoryMotion::Hover
             | LaboratoryMotion::ConstantVelocity
-            | LaboratoryMotion::StabilizedTranslationOnly => so3::exp(&turn(0.0)),
+            | LaboratoryMotion::StabilizedTranslationOnly => so3::exp(&rotation_vector(0.0)),
             LaboratoryMotion::YawOnly | LaboratoryMotion::YawPlanar | LaboratoryMotion::YawInPlace => yaw,
-            LaboratoryMotion::YawTilted => yaw * so3::exp(&turn(0.0)),
+            LaboratoryMotion::YawTilted => yaw * so3::exp(&rotation_vector(0.0)),
             LaboratoryMotion::Stabilized
             | LaboratoryMotion::StabilizedRotationOnly
             | LaboratoryMotion::CameraStationary => start() * imu_from_camera().inverse(),
@@ -255,7 +256,7 @@ impl Flight<'_> {
             | LaboratoryMotion::AllJointsFrozen
             | LaboratoryMotion::RotationOnly
             | LaboratoryMotion::ConstantVelocityRotation
-            | LaboratoryMotion::StraightLine => so3::exp(&turn(time_s)),
+            | LaboratoryMotion::StraightLine => so3::exp(&rotation_vector(time_s)),
         }
     }
 
@@ -296,11 +297,11 @@ impl Flight<'_> {
     /// Measurement of an ideal IMU at a time.
     fn imu_sample(&self, time_s: f64) -> ImuSample {
         let rotation_at = |time_s: f64| self.world_from_imu(time_s).rotation;
-        let turned = rotation_at(time_s - STEP_S).inverse() * rotation_at(time_s + STEP_S);
+        let rotation_change = rotation_at(time_s - STEP_S).inverse() * rotation_at(time_s + STEP_S);
         let felt = self.derivative_m(time_s, 2) - self.gravity_in_world;
         ImuSample {
             stamp_ns: ns_from_seconds(time_s),
-            angular_velocity_rad_per_s: so3::log(&turned) / (2.0 * STEP_S),
+            angular_velocity_rad_per_s: so3::log(&rotation_change) / (2.0 * STEP_S),
             specific_force_m_per_s2: rotation_at(time_s).inverse() * felt,
         }
     }

@@ -80,7 +80,8 @@ pub struct KnownReport {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Margin {
     /// Name of the singularity.
-    pub lock: String,
+    #[serde(rename = "lock")]
+    pub singularity: String,
     /// 1 far away, 0 singular.
     pub margin: f64,
 }
@@ -158,7 +159,7 @@ impl FormReport {
             margins: rank
                 .margins
                 .iter()
-                .map(|(singularity, margin)| Margin { lock: names.singularity(*singularity), margin: *margin })
+                .map(|(singularity, margin)| Margin { singularity: names.singularity(*singularity), margin: *margin })
                 .collect(),
             known: rank
                 .known
@@ -189,14 +190,14 @@ impl DirectionReport {
 impl fmt::Display for DirectionReport {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         const SHOWN: usize = 8;
-        for (place, share) in self.parameters.iter().take(SHOWN).enumerate() {
-            let sign = match (place, share.weight < 0.0) {
+        for (place, entry) in self.parameters.iter().take(SHOWN).enumerate() {
+            let sign = match (place, entry.weight < 0.0) {
                 (0, false) => "",
                 (0, true) => "−",
                 (_, false) => " + ",
                 (_, true) => " − ",
             };
-            write!(out, "{sign}{:.2} {}", share.weight.abs(), share.name)?;
+            write!(out, "{sign}{:.2} {}", entry.weight.abs(), entry.name)?;
         }
         if self.parameters.len() > SHOWN {
             write!(out, " and {} smaller", self.parameters.len() - SHOWN)?;

@@ -50,7 +50,8 @@ impl Situation {
     pub fn of_step(report: &StepReport, rank: &RankReport, rig: &Rig, camera_key: &str) -> Option<Self> {
         let newest = report.newest()?;
         let chain = chain_of_step(report, rank).filter(|_| rank.posterior.columns() == rank.parameters.len())?;
-        let free: Vec<bool> = chain.parameters().iter().map(|parameter| !rank.held.contains(parameter)).collect();
+        let free: Vec<bool> =
+            chain.parameters().iter().map(|parameter| !rank.fixed_parameters.contains(parameter)).collect();
         let count = free.iter().filter(|free| **free).count();
         let information = spread(&marginal(rank.posterior.information(), count)?, &free);
         let sigma_of_joints = newest.encoder_sigmas_rad.as_ref().and_then(|sigmas| mean(sigmas));

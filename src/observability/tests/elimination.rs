@@ -10,9 +10,9 @@ const JOINTS: usize = 3;
 const CALIBRATION: usize = 18;
 const JOINTS_START: usize = CALIBRATION;
 const POSES_START: usize = JOINTS_START + JOINTS * FRAMES;
-const SPEEDS_START: usize = POSES_START + 6 * FRAMES;
+const VELOCITIES_START: usize = POSES_START + 6 * FRAMES;
 const PRIORS: usize = 120;
-const COLUMNS: usize = SPEEDS_START + 9 * FRAMES;
+const COLUMNS: usize = VELOCITIES_START + 9 * FRAMES;
 
 /// A random linearization with the sparsity of a real one, in which the poses' columns depend on each other as in a
 /// visual-inertial window: four directions of all poses and speeds move nothing.
@@ -26,11 +26,11 @@ fn window(random: &mut Random, parameters: &[ParameterId]) -> Linearization {
                 }
             }
         };
-    fill(&mut jacobian, 0..66, 0..SPEEDS_START, 100.0);
+    fill(&mut jacobian, 0..66, 0..VELOCITIES_START, 100.0);
     for slot in 1..FRAMES {
         let rows = 66 + 15 * (slot - 1)..66 + 15 * slot;
         fill(&mut jacobian, rows.clone(), POSES_START + 6 * (slot - 1)..POSES_START + 6 * (slot + 1), 1000.0);
-        fill(&mut jacobian, rows, SPEEDS_START + 9 * (slot - 1)..SPEEDS_START + 9 * (slot + 1), 30.0);
+        fill(&mut jacobian, rows, VELOCITIES_START + 9 * (slot - 1)..VELOCITIES_START + 9 * (slot + 1), 30.0);
     }
     for index in 0..JOINTS * FRAMES {
         let row = 66 + 15 * (FRAMES - 1) + index;
@@ -50,7 +50,7 @@ fn window(random: &mut Random, parameters: &[ParameterId]) -> Linearization {
     for row in 0..PRIORS {
         let after = POSES_START + 6 * (FRAMES - 1);
         fill(&mut prior_jacobian, row..row + 1, row.min(after)..after, 10.0);
-        fill(&mut prior_jacobian, row..row + 1, SPEEDS_START..SPEEDS_START + 9, 10.0);
+        fill(&mut prior_jacobian, row..row + 1, VELOCITIES_START..VELOCITIES_START + 9, 10.0);
     }
     let mut columns: Vec<_> = parameters
         .iter()
@@ -62,11 +62,11 @@ fn window(random: &mut Random, parameters: &[ParameterId]) -> Linearization {
     };
     columns.extend(blocks(ColumnId::Joints, JOINTS_START, JOINTS));
     columns.extend(blocks(ColumnId::Pose, POSES_START, 6));
-    columns.extend(blocks(ColumnId::VelocityBias, SPEEDS_START, 9));
+    columns.extend(blocks(ColumnId::VelocityBias, VELOCITIES_START, 9));
     let calibration_column_norms = nalgebra::DVector::from_fn(CALIBRATION, |column, _| jacobian.column(column).norm());
     Linearization {
         columns,
-        held: Vec::new(),
+        fixed_parameters: Vec::new(),
         jacobian,
         prior_jacobian,
         rig_prior_rows: 0,

@@ -43,7 +43,7 @@ fn mechanism(offsets: bool) -> ClassicalChain {
 
 fn window(classical: &ClassicalChain, motion: Motion) -> Window {
     let mut random = Random::new(42);
-    let wave = |size: f64, frame: usize, speed: f64, phase: f64| size * (speed * frame as f64 + phase).sin();
+    let wave = |size: f64, frame: usize, rate: f64, phase: f64| size * (rate * frame as f64 + phase).sin();
     let camera = CameraModel::pinhole([460.0, 460.0, 0.0, 0.0], [640, 480]).unwrap();
     let joint_angles_rad: Vec<Vec<f64>> = (0..FRAMES)
         .map(|frame| {
@@ -56,7 +56,7 @@ fn window(classical: &ClassicalChain, motion: Motion) -> Window {
             angles
         })
         .collect();
-    let turned = |frame: usize| {
+    let rotation_vector = |frame: usize| {
         Vector3::new(wave(0.2, frame, 0.7, 0.4), wave(0.25, frame, 0.5, 1.3), wave(0.3, frame, 0.4, 0.2))
     };
     let moved =
@@ -64,9 +64,9 @@ fn window(classical: &ClassicalChain, motion: Motion) -> Window {
     let world_from_imu: Vec<RigidTransform> = (0..FRAMES)
         .map(|frame| {
             let rotation = match motion {
-                Motion::NeverRotates | Motion::Hover => so3::exp(&turned(0)),
+                Motion::NeverRotates | Motion::Hover => so3::exp(&rotation_vector(0)),
                 Motion::CameraNeverRotates => classical.imu_from_camera(&joint_angles_rad[frame]).rotation.inverse(),
-                _ => so3::exp(&turned(frame)),
+                _ => so3::exp(&rotation_vector(frame)),
             };
             let translation = if motion == Motion::Hover { moved(0) } else { moved(frame) };
             RigidTransform::new(UnitQuaternion::new_normalize(rotation.into_inner()), translation)
@@ -244,11 +244,11 @@ fn known_and_measured_redundancy_agree() {
             Linearization { prior_jacobian: prior_jacobian.clone(), rig_prior_rows, ..linearization.clone() };
         analyse(&with_prior, &chain, &window.joint_angles_rad, false).unwrap().known
     };
-    assert!(claimed(&linearization.jacobian, 0).iter().all(|known| known.false_gain < 1e-3));
-    let false_gains = claimed(&mixed.jacobian, 0);
-    assert!(false_gains.iter().filter(|known| known.is_claimed()).count() >= 3, "{false_gains:?}");
+    assert!(claimed(&linearization.jacobian, 0).iter().all(|known| known.spurious_gain < 1e-3));
+    let spurious_gains = claimed(&mixed.jacobian, 0);
+    assert!(spurious_gains.iter().filter(|known| known.is_claimed()).count() >= 3, "{spurious_gains:?}");
     let rig_prior = DMatrix::identity(24, mixed.jacobian.ncols()) * 100.0;
-    assert!(claimed(&rig_prior, 24).iter().all(|known| known.false_gain < 1e-3));
+    assert!(claimed(&rig_prior, 24).iter().all(|known| known.spurious_gain < 1e-3));
     // The minimal form has lost nothing by itself, and without encoders its offsets.
     let minimal = Chain::from_classical(&classical, Parameterization::Minimal);
     let known = |joints_free: bool| {

@@ -33,7 +33,7 @@ impl Window {
     pub(super) fn linearize(&self, chain: &Chain, joints_free: bool) -> Linearization {
         let frames = self.world_from_imu.iter().zip(&self.joint_angles_rad).enumerate();
         let landmarks = self.landmarks.iter().enumerate();
-        let supposed = HypotheticalWindow {
+        let hypothetical = HypotheticalWindow {
             camera: self.camera.clone(),
             frames: frames
                 .map(|(slot, (world_from_imu, joints_rad))| HypotheticalFrame {
@@ -62,6 +62,6 @@ impl Window {
             gravity_in_world: Vector3::new(0.0, 0.0, -9.81),
             chain_prior: (Dimension::Length.scale(), Dimension::Angle.scale()),
         };
-        supposed.linearize(&chain.to_classical(), chain.parameterization(), !chain.hides_joint_offsets())
+        hypothetical.linearize(&chain.to_classical(), chain.parameterization(), !chain.hides_joint_offsets())
     }
 }

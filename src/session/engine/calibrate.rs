@@ -112,7 +112,7 @@ pub fn calibrate(
     let (input, warnings) = track(&log, &given_rig, &entries, request, on_progress)?;
     let outcome = calibration::calibrate(&input, options, &mut |progress| {
         on_progress(CalibrationProgress {
-            share: TRACKING_RATIO + (1.0 - TRACKING_RATIO) * progress.share,
+            fraction: TRACKING_RATIO + (1.0 - TRACKING_RATIO) * progress.fraction,
             ..progress
         });
     })
@@ -191,8 +191,8 @@ fn track(
     let (static_result, gimbal_result) = std::thread::scope(|scope| {
         let gimbal = scope.spawn(|| views(&mut of_gimbal, &entries.gimbal_camera, &mut |_| {}));
         let rigid = views(&mut of_static, &entries.static_camera, &mut |stamp_ns| {
-            let share = TRACKING_RATIO * (seconds_from_ns(stamp_ns) - request.start_s) / length_s;
-            on_progress(CalibrationProgress { stage: "tracking both cameras", share });
+            let fraction = TRACKING_RATIO * (seconds_from_ns(stamp_ns) - request.start_s) / length_s;
+            on_progress(CalibrationProgress { stage: "tracking both cameras", fraction });
         });
         (rigid, gimbal.join())
     });
@@ -267,8 +267,8 @@ fn calibrated(rig: &Rig, entries: &CalibratedEntries, outcome: &CalibrationOutco
     };
     for camera in &mut calibrated.cameras {
         if camera.key == entries.static_camera.key {
-            camera.mount = CameraMount::Static { imu_from_camera: outcome.mount.imu_from_camera };
-            camera.timeshift_cam_imu_s += outcome.mount.time_shift_s.0;
+            camera.mount = CameraMount::Static { imu_from_camera: outcome.extrinsics.imu_from_camera };
+            camera.timeshift_cam_imu_s += outcome.extrinsics.time_shift_s.0;
         } else if camera.key == entries.gimbal_camera.key {
             camera.timeshift_cam_imu_s += outcome.gimbal_time_shift_s.0;
         }

@@ -95,8 +95,8 @@ impl Workspace {
         for corner in corners {
             let point = seen(corner);
             if (before.z > NEAR_M) != (point.z > NEAR_M) {
-                let share = (NEAR_M - before.z) / (point.z - before.z);
-                self.outlines.push(grid.place(&(before + (point - before) * share)));
+                let fraction = (NEAR_M - before.z) / (point.z - before.z);
+                self.outlines.push(grid.place(&(before + (point - before) * fraction)));
             }
             if point.z > NEAR_M {
                 self.outlines.push(grid.place(&point));

@@ -39,7 +39,7 @@ impl Sensor {
     }
 
     /// Exposes an image of linear gray values.
-    pub(crate) fn expose(&self, picture: &[f32], frame_index: usize, time_s: f64) -> GrayImage {
+    pub(crate) fn expose(&self, radiance: &[f32], frame_index: usize, time_s: f64) -> GrayImage {
         let phase = (self.seed % 628) as f64 * 0.01;
         let gain =
             1.0 + self.options.exposure_drift * (0.41 * time_s + phase).sin() * (0.173 * time_s + 2.0 * phase).cos();
@@ -47,9 +47,9 @@ impl Sensor {
         // The sum of four bytes is nearly normal; this is one over its standard deviation.
         let noise = (self.options.noise / 147.8) as f32;
         let key = mix(self.seed ^ (frame_index as u64).wrapping_mul(0xA24B_AED4_963E_E407));
-        let mut pixels = Vec::with_capacity(picture.len());
+        let mut pixels = Vec::with_capacity(radiance.len());
         // One random word serves two pixels.
-        for (index, (values, shading)) in (0_u64..).zip(picture.chunks(2).zip(self.shading.chunks(2))) {
+        for (index, (values, shading)) in (0_u64..).zip(radiance.chunks(2).zip(self.shading.chunks(2))) {
             let word = mix(key.wrapping_add(index));
             for ((value, shading), part) in values.iter().zip(shading).zip([word as u32, (word >> 32) as u32]) {
                 let sum: i32 = part.to_le_bytes().into_iter().map(i32::from).sum();

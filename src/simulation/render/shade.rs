@@ -51,14 +51,14 @@ impl<'a> Renderer<'a> {
         Self { world, shadows: ShadowMap::new(world) }
     }
 
-    /// Renders the image of a camera at a pose: linear gray values, row by row, added to `picture` times `share`.
+    /// Renders the image of a camera at a pose: linear gray values, row by row, added to `radiance` times `fraction`.
     pub(crate) fn render(
         &self,
         view: &View,
         world_from_camera: &RigidTransform,
-        share: f32,
+        fraction: f32,
         workspace: &mut Workspace,
-        picture: &mut [f32],
+        radiance: &mut [f32],
     ) {
         let eye = Eye::new(world_from_camera);
         workspace.prepare(self.world, &eye, &view.grid);
@@ -76,8 +76,8 @@ impl<'a> Renderer<'a> {
             let samples = if view.places.is_some() { 0..view.grid.rows } else { top * SAMPLES..bottom * SAMPLES };
             workspace.draw(&view.grid, samples.clone());
             for row in top..bottom {
-                let pixels = &mut picture[row * view.width..][..view.width];
-                self.shade_row(view, &light, row, samples.start, share, workspace, pixels);
+                let pixels = &mut radiance[row * view.width..][..view.width];
+                self.shade_row(view, &light, row, samples.start, fraction, workspace, pixels);
             }
         }
     }
@@ -90,7 +90,7 @@ impl<'a> Renderer<'a> {
         light: &Light,
         row: usize,
         first_sample: usize,
-        share: f32,
+        fraction: f32,
         workspace: &mut Workspace,
         pixels: &mut [f32],
     ) {
@@ -134,10 +134,10 @@ impl<'a> Renderer<'a> {
                 continue;
             };
             if face_here == MIXED {
-                pixels[column] += share * self.mixed(prepared, light, faces_of(face, column), ray);
+                pixels[column] += fraction * self.mixed(prepared, light, faces_of(face, column), ray);
                 column += 1;
             } else if face_here == SKY {
-                pixels[column] += share * self.sky(light, ray.ray);
+                pixels[column] += fraction * self.sky(light, ray.ray);
                 column += 1;
             } else {
                 let dark = |at: usize| view.places.is_some() && view.pixel_ray(at, row).is_none();
@@ -146,7 +146,7 @@ impl<'a> Renderer<'a> {
                 let rays = view.rays::<LANES>(column..end, row);
                 let greys = self.shade(&prepared[face_here as usize], light, &rays, end - column);
                 for (pixel, grey) in pixels[column..end].iter_mut().zip(greys) {
-                    *pixel += share * grey;
+                    *pixel += fraction * grey;
                 }
                 column = end;
             }

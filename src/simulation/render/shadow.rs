@@ -79,17 +79,19 @@ impl ShadowMap {
         }
         let (cell_x, cell_y) = ((x + 0.5) as usize, (y + 0.5) as usize);
         let (middle_x, middle_y) = (cell_x as f32, cell_y as f32);
-        let weights = |share: f32| [0.5 * (0.5 - share).powi(2), 0.75 - share * share, 0.5 * (0.5 + share).powi(2)];
+        let weights = |fraction: f32| {
+            [0.5 * (0.5 - fraction).powi(2), 0.75 - fraction * fraction, 0.5 * (0.5 + fraction).powi(2)]
+        };
         let (along, across) = (weights(x - middle_x), weights(y - middle_y));
         let first = (cell_y - 1) * CELLS + cell_x - 1;
         let mut sum = 0.0;
-        for (line, share) in across.iter().enumerate() {
+        for (line, fraction) in across.iter().enumerate() {
             let cells = &self.heights[first + line * CELLS..][..3];
             let mut of_line = 0.0;
             for (cell, weight) in cells.iter().zip(&along) {
                 of_line += if height + BIAS_M >= *cell { *weight } else { 0.0 };
             }
-            sum += share * of_line;
+            sum += fraction * of_line;
         }
         sum
     }

@@ -28,7 +28,7 @@ fn stretches_of_hover_of_a_held_joint_and_of_a_kept_camera_begin_and_end_when_to
     let chain = true_chain(&mut RandomStream::new(3, stream::RIG));
     let mut look = Experiment::T1.look_around(&mut RandomStream::new(3, stream::LOOK));
     look.fixed_joint = Some((1, [5.0, 4.0]));
-    let motion = JointMotion::fly(&before, &chain, &joints(), &look, &Stabilizer::default());
+    let motion = JointMotion::simulate(&before, &chain, &joints(), &look, &Stabilizer::default());
     let spread = |joint: usize, from_s: f64, to_s: f64| {
         let angles = (0..100).map(|step| motion.at(from_s + (to_s - from_s) * f64::from(step) / 100.0)[joint]);
         let angles: Vec<f64> = angles.collect();
@@ -39,10 +39,10 @@ fn stretches_of_hover_of_a_held_joint_and_of_a_kept_camera_begin_and_end_when_to
 
     look.fixed_joint = None;
     look.stabilized_s = Some([5.0, 4.0]);
-    let motion = JointMotion::fly(&before, &chain, &joints(), &look, &Stabilizer::default());
+    let motion = JointMotion::simulate(&before, &chain, &joints(), &look, &Stabilizer::default());
     let looks =
         |time_s: f64| before.at(time_s).world_from_imu.rotation * chain.imu_from_camera(&motion.at(time_s)).rotation;
-    let turned = |time_s: f64| so3::log(&(looks(5.001).inverse() * looks(time_s))).norm();
+    let rotated_rad = |time_s: f64| so3::log(&(looks(5.001).inverse() * looks(time_s))).norm();
     let within = |time_s: f64| {
         let angles = motion.at(time_s);
         joints()
@@ -52,8 +52,8 @@ fn stretches_of_hover_of_a_held_joint_and_of_a_kept_camera_begin_and_end_when_to
     };
     let kept: Vec<f64> = (51..90).map(|tenth| 0.1 * f64::from(tenth)).filter(|time_s| within(*time_s)).collect();
     assert!(kept.len() > 20, "{} instants clear of the stops", kept.len());
-    assert!(kept.iter().all(|time_s| turned(*time_s) < 1e-5), "the camera keeps its orientation");
-    assert!((95..130).any(|tenth| turned(0.1 * f64::from(tenth)) > 0.02), "and follows again");
+    assert!(kept.iter().all(|time_s| rotated_rad(*time_s) < 1e-5), "the camera keeps its orientation");
+    assert!((95..130).any(|tenth| rotated_rad(0.1 * f64::from(tenth)) > 0.02), "and follows again");
 }
 
 #[test]
@@ -116,8 +116,8 @@ fn inertial_truth_integrates_back_to_the_trajectory() {
         rotation *= so3::exp(&(middle.angular_velocity_rad_per_s * step_s));
     }
     let end = trajectory.at(4.0 + steps as f64 * step_s);
-    let turn = so3::log(&(rotation.inverse() * end.world_from_imu.rotation)).norm();
-    assert!(turn < 1e-5, "{turn} rad");
+    let error_rad = so3::log(&(rotation.inverse() * end.world_from_imu.rotation)).norm();
+    assert!(error_rad < 1e-5, "{error_rad} rad");
     assert!((velocity - end.velocity_m_per_s).norm() < 1e-4);
     assert!((position - end.world_from_imu.translation_m).norm() < 1e-3);
 }
@@ -179,15 +179,15 @@ fn a_slewed_gimbal_and_a_spun_vehicle_turn_as_fast_as_asked_and_only_then() {
     // The flight's spline rounds the ends of the stretch, which reaches a little into its middle.
     assert!((added / 3.0 - 1.0).abs() < 0.05, "{added} rad/s");
     for (time_s, turned_rad) in [(1.0, 0.0), (10.0, 6.0)] {
-        let turned = trajectory.at(time_s).heading_rad - plain.at(time_s).heading_rad;
-        assert!((turned - turned_rad).abs() < 1e-9, "{turned} rad at {time_s} s");
+        let rotated_rad = trajectory.at(time_s).heading_rad - plain.at(time_s).heading_rad;
+        assert!((rotated_rad - turned_rad).abs() < 1e-9, "{rotated_rad} rad at {time_s} s");
     }
 
     let mut random = RandomStream::new(1, 5);
     let chain = true_chain(&mut random);
     let mut look = Experiment::T3.look_around(&mut random);
     look.slew_s = Some([5.0, 4.0]);
-    let motion = JointMotion::fly(&plain, &chain, &joints(), &look, &Stabilizer::default());
+    let motion = JointMotion::simulate(&plain, &chain, &joints(), &look, &Stabilizer::default());
     let yaw_rate = |time_s: f64| ((motion.at(time_s + 0.01)[0] - motion.at(time_s - 0.01)[0]) / 0.02).abs();
     let largest = |from_s: f64| (0..300).map(|step| yaw_rate(from_s + 0.01 * f64::from(step))).fold(0.0, f64::max);
     assert!(largest(5.5) > 150_f64.to_radians(), "{} rad/s", largest(5.5));

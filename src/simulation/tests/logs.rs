@@ -164,9 +164,9 @@ fn light_and_fog_change_the_pictures_only_while_they_last() {
     let disturbed = means_and_spreads(&options);
     assert_eq!(plain[..7], disturbed[..7]);
     // Frame 8 is taken at 0.403 s, just after the light has halved; frames 15 and 16 see fog.
-    let share = disturbed[8].0 / plain[8].0;
-    assert!((share - 0.5).abs() < 0.02, "{share}");
-    assert!(disturbed[12].0 / plain[12].0 > share + 0.05);
+    let fraction = disturbed[8].0 / plain[8].0;
+    assert!((fraction - 0.5).abs() < 0.02, "{fraction}");
+    assert!(disturbed[12].0 / plain[12].0 > fraction + 0.05);
     assert!(disturbed[15].1 < 10.0 && plain[15].1 > 20.0, "{:?} {:?}", disturbed[15], plain[15]);
     assert!(disturbed[17].1 > 12.0);
 }

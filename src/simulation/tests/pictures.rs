@@ -10,13 +10,13 @@ use crate::geometry::{RigidTransform, so3};
 use crate::sensors::GrayImage;
 
 /// A picture from a place, looking along a heading, 8° down.
-fn picture(world: &World, lens: Lens, place_m: [f64; 3], heading_deg: f64) -> GrayImage {
+fn radiance(world: &World, lens: Lens, place_m: [f64; 3], heading_deg: f64) -> GrayImage {
     let view = View::new(&camera_model(0, lens, [640, 480]));
     let optical = nalgebra::Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
     let optical = nalgebra::UnitQuaternion::from_matrix(&optical);
-    let turn = so3::exp(&Vector3::new(0.0, 0.0, heading_deg.to_radians())) * so3::exp(&Vector3::new(0.0, 0.14, 0.0));
+    let heading = so3::exp(&Vector3::new(0.0, 0.0, heading_deg.to_radians())) * so3::exp(&Vector3::new(0.0, 0.14, 0.0));
     let mut grey = vec![0.0; view.pixels()];
-    let pose = RigidTransform::new(turn * optical, Vector3::from(place_m));
+    let pose = RigidTransform::new(heading * optical, Vector3::from(place_m));
     Renderer::new(world).render(&view, &pose, 1.0, &mut Workspace::default(), &mut grey);
     let options = SensorOptions { noise: 2.0, exposure_drift: 0.0, vignetting: 0.12 };
     Sensor::new(&view, options, 5).expose(&grey, 0, 0.0)
@@ -55,7 +55,7 @@ fn both_worlds_are_rich_in_corners_and_well_exposed() {
         let world = world::build(environment, 1);
         for lens in [Lens::Pinhole, Lens::Radtan] {
             for heading_deg in [0.0, 50.0, 90.0, 180.0] {
-                let image = picture(&world, lens, place_m, heading_deg);
+                let image = radiance(&world, lens, place_m, heading_deg);
                 let mean = image.pixels.iter().map(|pixel| f64::from(*pixel)).sum::<f64>() / image.pixels.len() as f64;
                 let clipped = image.pixels.iter().filter(|pixel| matches!(**pixel, 0 | 255)).count();
                 let cells = cells_with_corners(&image);
@@ -112,9 +112,9 @@ fn textures_do_not_shimmer_when_the_camera_creeps() {
     let optical = nalgebra::Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
     let optical = nalgebra::UnitQuaternion::from_matrix(&optical);
     let shot = |turn_px: f64| {
-        let turn = so3::exp(&Vector3::new(0.0, 0.0, 0.4 + turn_px / 180.0));
+        let heading = so3::exp(&Vector3::new(0.0, 0.0, 0.4 + turn_px / 180.0));
         let mut grey = vec![0.0; view.pixels()];
-        let pose = RigidTransform::new(turn * optical, Vector3::new(-15.0, -4.0, 2.9));
+        let pose = RigidTransform::new(heading * optical, Vector3::new(-15.0, -4.0, 2.9));
         renderer.render(&view, &pose, 1.0, &mut Workspace::default(), &mut grey);
         grey
     };

@@ -46,8 +46,8 @@ fn stations(texels: usize, cells: usize) -> Vec<(usize, usize, f32)> {
         .map(|index| {
             let place = (index as f32 + 0.5) * cells as f32 / texels as f32;
             let before = (place as usize).min(cells - 1);
-            let share = place - before as f32;
-            (before, (before + 1) % cells, share * share * (3.0 - 2.0 * share))
+            let fraction = place - before as f32;
+            (before, (before + 1) % cells, fraction * fraction * (3.0 - 2.0 * fraction))
         })
         .collect()
 }
@@ -83,7 +83,7 @@ impl Canvas {
     }
 
     /// Blends a value into one texel.
-    fn blend(&mut self, x: i64, y: i64, value: f32, share: f32) {
+    fn blend(&mut self, x: i64, y: i64, value: f32, fraction: f32) {
         let (width, height) = (self.width as i64, self.height as i64);
         let inside = (0..width).contains(&x) && (0..height).contains(&y);
         if !inside && !self.wrap {
@@ -91,7 +91,7 @@ impl Canvas {
         }
         let place = (y.rem_euclid(height) * width + x.rem_euclid(width)) as usize;
         let slot = &mut self.values[place];
-        *slot += (value - *slot) * share;
+        *slot += (value - *slot) * fraction;
     }
 
     /// Adds fractal noise of this grain (size of the coarsest blotches) everywhere.
@@ -129,9 +129,9 @@ impl Canvas {
         let first = |from: f32| (from * scale - 0.5).ceil() as i64;
         for y in first(area.y)..first(area.y + area.h) {
             for x in first(area.x)..first(area.x + area.w) {
-                let (value, share) = paint((x as f32 + 0.5) / scale - area.x, (y as f32 + 0.5) / scale - area.y);
-                if share > 0.0 {
-                    self.blend(x, y, value, share);
+                let (value, fraction) = paint((x as f32 + 0.5) / scale - area.x, (y as f32 + 0.5) / scale - area.y);
+                if fraction > 0.0 {
+                    self.blend(x, y, value, fraction);
                 }
             }
         }
@@ -158,7 +158,7 @@ impl Canvas {
     }
 
     /// An ellipse, turned by an angle, its border softened over a texel.
-    pub(crate) fn ellipse(&mut self, centre: [f32; 2], radii: [f32; 2], angle: f32, value: f32, share: f32) {
+    pub(crate) fn ellipse(&mut self, centre: [f32; 2], radii: [f32; 2], angle: f32, value: f32, fraction: f32) {
         let reach = radii[0].max(radii[1]);
         let (sine, cosine) = angle.sin_cos();
         let soft = 1.0 / (self.texels_per_m * radii[0].min(radii[1]).max(1e-4));
@@ -168,12 +168,12 @@ impl Canvas {
             let along = (dx * cosine + dy * sine) / radii[0];
             let across = (dy * cosine - dx * sine) / radii[1];
             let inside = (1.0 - along.hypot(across)) / soft + 0.5;
-            (value, share * inside.clamp(0.0, 1.0))
+            (value, fraction * inside.clamp(0.0, 1.0))
         });
     }
 
     /// A straight stroke of this width, softened over a texel.
-    pub(crate) fn stroke(&mut self, from: [f32; 2], to: [f32; 2], width: f32, value: f32, share: f32) {
+    pub(crate) fn stroke(&mut self, from: [f32; 2], to: [f32; 2], width: f32, value: f32, fraction: f32) {
         let half = 0.5 * width;
         let margin = half + 1.0 / self.texels_per_m;
         let area = Area::new(
@@ -189,7 +189,7 @@ impl Canvas {
             let (px, py) = (x + area.x - from[0], y + area.y - from[1]);
             let along = ((px * dx + py * dy) / square).clamp(0.0, 1.0);
             let distance = (px - along * dx).hypot(py - along * dy);
-            (value, share * ((half - distance) * scale + 0.5).clamp(0.0, 1.0))
+            (value, fraction * ((half - distance) * scale + 0.5).clamp(0.0, 1.0))
         });
     }
 
@@ -227,7 +227,7 @@ impl Canvas {
         count: usize,
         radius: [f32; 2],
         grey: [f32; 2],
-        share: f32,
+        fraction: f32,
         random: &mut RandomStream,
     ) {
         let [w, h] = self.size_m();
@@ -237,7 +237,7 @@ impl Canvas {
             let flat = random.uniform(0.45, 1.0) as f32;
             let angle = random.uniform(0.0, std::f64::consts::PI) as f32;
             let value = random.uniform(f64::from(grey[0]), f64::from(grey[1])) as f32;
-            self.ellipse(centre, [size, size * flat], angle, value, share);
+            self.ellipse(centre, [size, size * flat], angle, value, fraction);
         }
     }
 

@@ -192,10 +192,10 @@ impl World {
         material: MaterialId,
         random: &mut RandomStream,
     ) {
-        let turn = random.uniform(0.0, 1.0);
+        let start_angle = random.uniform(0.0, 1.0);
         let plan: Vec<_> = (0..sides)
             .map(|k| {
-                let angle = turn + std::f64::consts::TAU * k as f64 / sides as f64;
+                let angle = start_angle + std::f64::consts::TAU * k as f64 / sides as f64;
                 Vector2::new(foot.x + radius_m * angle.cos(), foot.y + radius_m * angle.sin())
             })
             .collect();
@@ -211,12 +211,12 @@ impl World {
         material: MaterialId,
         random: &mut RandomStream,
     ) {
-        let turn = random.uniform(0.0, std::f64::consts::TAU);
+        let start_angle = random.uniform(0.0, std::f64::consts::TAU);
         let corners = (0..sides)
             .map(|k| {
                 let angle = std::f64::consts::TAU * k as f64 / sides as f64;
                 let (x, y) = (radii_m[0] * angle.cos(), radii_m[1] * angle.sin());
-                let (sine, cosine) = turn.sin_cos();
+                let (sine, cosine) = start_angle.sin_cos();
                 centre + Vector3::new(cosine * x - sine * y, sine * x + cosine * y, 0.0)
             })
             .collect();

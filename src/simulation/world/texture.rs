@@ -93,8 +93,8 @@ impl Texture {
             }
         }
         let levels: [f32; N] = std::array::from_fn(|k| {
-            let share = 1.0 / counts[k] as f32;
-            let width2 = (long2[k] * share * share).max(short2[k].min(long2[k]));
+            let fraction = 1.0 / counts[k] as f32;
+            let width2 = (long2[k] * fraction * fraction).max(short2[k].min(long2[k]));
             (0.5 * fast_log2(width2.max(1e-6)) + LEVEL_BIAS).max(0.0)
         });
         let mut means = [0.0; N];
@@ -136,10 +136,10 @@ impl Texture {
     /// The mean of `count` bilinear samples spread along a side of the footprint, in fixed point.
     #[inline]
     fn along(&self, level: &Level, centre: [f32; 2], side: [f32; 2], count: usize) -> f32 {
-        let share = SHARES[count];
-        let first = 0.5 * share - 0.5;
+        let fraction = SHARES[count];
+        let first = 0.5 * fraction - 0.5;
         let start = |axis: usize| ((centre[axis] + side[axis] * first) * level.scale[axis] - 0.5) * FRACTION;
-        let step = |axis: usize| (side[axis] * share * level.scale[axis] * FRACTION) as i32;
+        let step = |axis: usize| (side[axis] * fraction * level.scale[axis] * FRACTION) as i32;
         let (mut u, mut v) = (start(0) as i32, start(1) as i32);
         let (step_u, step_v) = (step(0), step(1));
         let mut sum = 0_u32;
@@ -148,7 +148,7 @@ impl Texture {
             u += step_u;
             v += step_v;
         }
-        sum as f32 * share * (1.0 / (FRACTION * FRACTION))
+        sum as f32 * fraction * (1.0 / (FRACTION * FRACTION))
     }
 }
 
@@ -175,7 +175,7 @@ impl Level {
         let stride = self.width + 1;
         let at = index(v, self.height) * stride + index(u, self.width);
         let (upper, lower) = (&self.texels[at..at + 2], &self.texels[at + stride..at + stride + 2]);
-        let mix = |from: i32, to: i32, share: i32| (from << FRACTION_BITS) + (to - from) * share;
+        let mix = |from: i32, to: i32, fraction: i32| (from << FRACTION_BITS) + (to - from) * fraction;
         let across = |row: &[u8]| mix(i32::from(row[0]), i32::from(row[1]), u & MASK);
         mix(across(upper), across(lower), v & MASK)
     }

@@ -5,7 +5,7 @@ use nalgebra::{DVector, Vector3};
 use super::flight::{Random, noise};
 use crate::estimator::initialization::VectorPrior;
 use crate::estimator::initialization::refinement::{RefinedState, Refinement, RefinementInput};
-use crate::estimator::initialization::visual_problem::{Sighting, TrackedLandmark};
+use crate::estimator::initialization::visual_problem::{BearingObservation, TrackedLandmark};
 use crate::estimator::{ImuBias, Preintegration};
 use crate::frontend::FeatureId;
 use crate::geometry::{RigidTransform, so3};
@@ -14,11 +14,11 @@ use crate::sensors::ImuSample;
 fn increments(count: usize, random: &mut Random) -> Vec<Preintegration> {
     (0..count)
         .map(|_| {
-            let (turn, force) = (random.vector(0.8), random.vector(3.0) + Vector3::new(0.0, 0.0, 9.8));
+            let (angular_velocity, force) = (random.vector(0.8), random.vector(3.0) + Vector3::new(0.0, 0.0, 9.8));
             let samples: Vec<ImuSample> = (0..=30)
                 .map(|step| ImuSample {
                     stamp_ns: step * 5_000_000,
-                    angular_velocity_rad_per_s: turn + random.vector(0.1),
+                    angular_velocity_rad_per_s: angular_velocity + random.vector(0.1),
                     specific_force_m_per_s2: force + random.vector(0.5),
                 })
                 .collect();
@@ -32,11 +32,11 @@ fn gradient_of_the_refinement_meets_central_differences() {
     const VIEWS: usize = 4;
     let mut random = Random::new(11);
     for own_noise in [0.0, 0.1] {
-        let mounts: Vec<RigidTransform> =
+        let extrinsics: Vec<RigidTransform> =
             (0..VIEWS).map(|_| RigidTransform::new(so3::exp(&random.vector(0.5)), random.vector(0.1))).collect();
         let increments = increments(VIEWS - 1, &mut random);
         let input = RefinementInput {
-            imu_from_camera: &mounts,
+            imu_from_camera: &extrinsics,
             increments: &increments,
             bearing_sigma_rad: 0.05,
             extrinsics_rotation_sigma_rad: 0.1,
@@ -50,15 +50,15 @@ fn gradient_of_the_refinement_meets_central_differences() {
         let landmarks = (0..12)
             .map(|index: u64| {
                 let anchor = index as usize % 2;
-                let sightings =
-                    [anchor, 2, 3].map(|view| Sighting::new(view, (random.vector(0.4) + Vector3::z()).normalize()));
+                let observations = [anchor, 2, 3]
+                    .map(|view| BearingObservation::new(view, (random.vector(0.4) + Vector3::z()).normalize()));
                 let mut landmark =
-                    TrackedLandmark::new(FeatureId(index), random.uniform(0.1, 0.3), sightings.to_vec()).unwrap();
+                    TrackedLandmark::new(FeatureId(index), random.uniform(0.1, 0.3), observations.to_vec()).unwrap();
                 landmark.landmark.bearing = (landmark.landmark.bearing + random.vector(0.05)).normalize();
                 landmark
             })
             .collect();
-        let turns = |random: &mut Random| so3::exp(&random.vector(if own_noise > 0.0 { 0.1 } else { 0.0 }));
+        let random_rotation = |random: &mut Random| so3::exp(&random.vector(if own_noise > 0.0 { 0.1 } else { 0.0 }));
         let state = RefinedState {
             poses,
             velocities: (0..VIEWS).map(|_| random.vector(1.0)).collect(),
@@ -67,7 +67,7 @@ fn gradient_of_the_refinement_meets_central_differences() {
             landmarks,
             common_rotation: so3::exp(&random.vector(0.1)),
             common_shift: random.vector(0.02),
-            per_view_rotations: (0..VIEWS).map(|_| turns(&mut random)).collect(),
+            per_view_rotations: (0..VIEWS).map(|_| random_rotation(&mut random)).collect(),
         };
         let refinement = Refinement::new(&input).unwrap();
         // An endless damping of the depths leaves the plain gradient at fixed depths.

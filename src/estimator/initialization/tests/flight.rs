@@ -128,7 +128,7 @@ struct Path {
     motion: Motion,
     hover_s: f64,
     amplitudes: Vec<[Vector3<f64>; 2]>,
-    speed: Vector3<f64>,
+    mean_velocity: Vector3<f64>,
     yaw_rate: f64,
     yaw_amplitude: f64,
 }
@@ -147,7 +147,7 @@ impl Path {
             motion: options.motion,
             hover_s: options.hover_s,
             amplitudes,
-            speed: Vector3::new(random.uniform(0.5, 1.5), random.uniform(-1.0, 1.0), 0.0),
+            mean_velocity: Vector3::new(random.uniform(0.5, 1.5), random.uniform(-1.0, 1.0), 0.0),
             yaw_rate: random.uniform(0.4, 0.9),
             yaw_amplitude: random.uniform(-0.8, 0.8),
         }
@@ -171,7 +171,7 @@ impl Path {
         match self.motion {
             Motion::Flight => {
                 let since = t - self.hover_s;
-                let mut swing = self.speed * since;
+                let mut swing = self.mean_velocity * since;
                 for [amplitude, frequency] in &self.amplitudes {
                     swing += amplitude.component_mul(&(frequency * since).map(f64::sin));
                 }
@@ -229,16 +229,16 @@ impl Path {
 
 /// A yaw–roll–pitch gimbal with a forward-looking optical frame.
 #[derive(Clone)]
-struct Mount {
-    parts: [RigidTransform; 4],
+struct TestGimbal {
+    transforms: [RigidTransform; 4],
 }
 
-impl Mount {
+impl TestGimbal {
     fn nominal() -> Self {
         let shift = |x, y, z| RigidTransform::new(UnitQuaternion::identity(), Vector3::new(x, y, z));
         let optical = UnitQuaternion::from_basis_unchecked(&[-Vector3::y(), -Vector3::z(), Vector3::x()]);
         Self {
-            parts: [
+            transforms: [
                 shift(0.09, 0.01, -0.06),
                 shift(-0.02, 0.0, -0.04),
                 shift(0.03, 0.02, 0.0),
@@ -248,20 +248,20 @@ impl Mount {
     }
 
     fn disturbed(&self, rotation_bound: f64, translation_bound: f64, random: &mut Random) -> Self {
-        let mut parts = self.parts;
-        for part in &mut parts {
-            part.rotation *= so3::exp(&random.vector(rotation_bound));
-            part.translation_m += random.vector(translation_bound);
+        let mut transforms = self.transforms;
+        for fixed_transform in &mut transforms {
+            fixed_transform.rotation *= so3::exp(&random.vector(rotation_bound));
+            fixed_transform.translation_m += random.vector(translation_bound);
         }
-        Self { parts }
+        Self { transforms }
     }
 
     fn imu_from_camera(&self, angles: &Vector3<f64>) -> RigidTransform {
         let axes = [Vector3::z(), Vector3::x(), Vector3::y()];
-        let mut pose = self.parts[0];
+        let mut pose = self.transforms[0];
         for joint in 0..3 {
-            let turn = RigidTransform::new(so3::exp(&(axes[joint] * angles[joint])), Vector3::zeros());
-            pose = pose * turn * self.parts[joint + 1];
+            let joint_rotation = RigidTransform::new(so3::exp(&(axes[joint] * angles[joint])), Vector3::zeros());
+            pose = pose * joint_rotation * self.transforms[joint + 1];
         }
         pose
     }
@@ -353,8 +353,8 @@ impl Tracker {
 pub(super) fn fly(options: &FlightOptions) -> Flight {
     let mut random = Random::new(options.seed);
     let path = Path::new(options, &mut random);
-    let mount = Mount::nominal();
-    let given = mount.disturbed(options.chain_rotation_bound_rad, options.chain_translation_bound_m, &mut random);
+    let gimbal = TestGimbal::nominal();
+    let given = gimbal.disturbed(options.chain_rotation_bound_rad, options.chain_translation_bound_m, &mut random);
     let mut tracker = Tracker::new(&mut random);
     let gyroscope_bias = random.vector(options.gyroscope_bias_bound);
     let accelerometer_bias = random.vector(options.accelerometer_bias_bound);
@@ -387,7 +387,7 @@ pub(super) fn fly(options: &FlightOptions) -> Flight {
         let angles = joint_angles(options, &path, t);
         let readings = if options.encoders { angles } else { Vector3::zeros() }
             + random.normal_vector() * options.encoder_sigma_rad;
-        let true_imu_from_camera = mount.imu_from_camera(&angles);
+        let true_imu_from_camera = gimbal.imu_from_camera(&angles);
         let true_world_from_imu = path.pose(t);
         let features = tracker.track(&(true_world_from_imu * true_imu_from_camera), options, &mut random);
         frames.push(Frame {

@@ -30,7 +30,7 @@ fn attempt(
     flight: &Flight,
     newest: usize,
     options: &InitializationOptions,
-    standstill: Option<StationaryEstimate>,
+    stationary: Option<StationaryEstimate>,
 ) -> InitializationOutcome {
     let first = newest.saturating_sub((options.longest_window_s / 0.05) as usize);
     let frames: Vec<InitializationFrame<'_>> = flight.frames[first..=newest]
@@ -45,20 +45,20 @@ fn attempt(
         })
         .collect();
     try_initialize(
-        &InitializationInput { frames: &frames, gravity_m_per_s2: GRAVITY, imu_noise: noise(), standstill },
+        &InitializationInput { frames: &frames, gravity_m_per_s2: GRAVITY, imu_noise: noise(), stationary },
         options,
     )
 }
 
 /// Tries at every frame; the solution, or the last reasons.
 fn run(flight: &Flight, options: &InitializationOptions) -> Result<(usize, InitializationSolution), Vec<WaitReason>> {
-    let mut standstill = None;
+    let mut stationary = None;
     let mut last = Vec::new();
     for newest in 0..flight.frames.len() {
-        match attempt(flight, newest, options, standstill) {
+        match attempt(flight, newest, options, stationary) {
             InitializationOutcome::Initialized(solution) => return Ok((newest, *solution)),
-            InitializationOutcome::Waiting { reasons, standstill: standing, .. } => {
-                standstill = standing.or(standstill);
+            InitializationOutcome::Waiting { reasons, stationary: found, .. } => {
+                stationary = found.or(stationary);
                 last = reasons;
             }
         }
@@ -80,15 +80,15 @@ struct Errors {
 
 fn errors(flight: &Flight, hover_s: f64, newest: usize, solution: &InitializationSolution) -> Errors {
     let first = &flight.frames[solution.frames[0].frame_index];
-    let (mut dot, mut square, mut mount) = (0.0, 0.0, 0.0_f64);
+    let (mut dot, mut square, mut extrinsics) = (0.0, 0.0, 0.0_f64);
     for frame in &solution.frames {
         let ground_truth = &flight.frames[frame.frame_index];
         let moved = first.true_world_from_imu.inverse().transform(&ground_truth.true_world_from_imu.translation_m);
         let estimated = solution.frames[0].world_from_imu.inverse().transform(&frame.world_from_imu.translation_m);
         dot += moved.dot(&estimated);
         square += moved.norm_squared();
-        mount =
-            mount.max((ground_truth.true_imu_from_camera.rotation.inverse() * frame.imu_from_camera.rotation).angle());
+        extrinsics = extrinsics
+            .max((ground_truth.true_imu_from_camera.rotation.inverse() * frame.imu_from_camera.rotation).angle());
     }
     let last = solution.frames.last().unwrap();
     let ground_truth = &flight.frames[last.frame_index];
@@ -107,7 +107,7 @@ fn errors(flight: &Flight, hover_s: f64, newest: usize, solution: &Initializatio
         gyroscope_rad_per_s: (solution.bias.gyroscope_rad_per_s - flight.gyroscope_bias).norm(),
         accelerometer_m_per_s2: (solution.bias.accelerometer_m_per_s2 - flight.accelerometer_bias).norm(),
         position_m: (moved - estimated).norm(),
-        extrinsics_deg: mount.to_degrees(),
+        extrinsics_deg: extrinsics.to_degrees(),
     }
 }
 
@@ -243,13 +243,13 @@ fn standstill_is_remembered_or_used_at_once() {
     let flight = fly(&flight_options);
     let options = options_for(&flight_options);
     let newest = flight.frames.len() - 1;
-    let InitializationOutcome::Waiting { standstill: Some(standing), reasons, .. } =
+    let InitializationOutcome::Waiting { stationary: Some(found), reasons, .. } =
         attempt(&flight, newest, &options, None)
     else {
         panic!("a standstill without motion waits");
     };
     assert!(reasons.iter().any(|reason| reason.test == "parallax"), "{reasons:?}");
-    assert!((standing.gyroscope_bias_rad_per_s - flight.gyroscope_bias).norm() < 1e-3);
+    assert!((found.gyroscope_bias_rad_per_s - flight.gyroscope_bias).norm() < 1e-3);
 
     let at_once = InitializationOptions { stationary_policy: StationaryPolicy::InitializeAtOnce, ..options };
     let InitializationOutcome::Initialized(solution) = attempt(&flight, newest, &at_once, None) else {

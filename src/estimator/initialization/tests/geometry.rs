@@ -114,17 +114,17 @@ fn relative_pose_survives_noise_outliers_and_planes() {
             continue;
         }
         let error = |found: &RelativePose| {
-            let turn = (found.camera_j_from_camera_i.rotation.inverse() * pose.rotation).angle();
-            (turn, angle_between(&found.camera_j_from_camera_i.translation_m, &pose.translation_m))
+            let rotation_error = (found.camera_j_from_camera_i.rotation.inverse() * pose.rotation).angle();
+            (rotation_error, angle_between(&found.camera_j_from_camera_i.translation_m, &pose.translation_m))
         };
         // A plane has two solutions: one of those found must be the true one.
         let best = found.iter().map(error).min_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
         let worst = &mut worst[usize::from(planar)];
         *worst = (worst.0.max(best.0), worst.1.max(best.1));
     }
-    for (worst, turn, heading) in [(worst[0], 0.02, 0.1), (worst[1], 0.05, 0.5)] {
+    for (worst, rotation_error, heading) in [(worst[0], 0.02, 0.1), (worst[1], 0.05, 0.5)] {
         println!("worst rotation {:.3}°, worst heading {:.2}°", worst.0.to_degrees(), worst.1.to_degrees());
-        assert!(worst.0 < turn && worst.1 < heading);
+        assert!(worst.0 < rotation_error && worst.1 < heading);
     }
 }
 

@@ -16,12 +16,12 @@ const START_S: f64 = 6.0;
 /// Exercises may differ from here on: a spline looks three knots ahead.
 const SHARED_S: f64 = START_S - 0.4;
 /// How long it is flown: as long as the advice supposes.
-const FLOWN_S: f64 = super::super::ADVICE_DURATION_S;
+const MOTION_S: f64 = super::super::ADVICE_DURATION_S;
 
 pub(super) fn flight(exercise: Exercise, seed: u64) -> SyntheticFlight {
     synthetic_tracks(&SyntheticOptions {
         seed,
-        duration_s: START_S + FLOWN_S,
+        duration_s: START_S + MOTION_S,
         features: 80,
         motion: SyntheticMotion::Hover,
         look_around_rad: 0.3,
@@ -61,7 +61,7 @@ fn step(estimator: &mut Estimator, frame: &SyntheticFrame) -> (StepReport, Optio
 }
 
 /// Flies frames up to a time and returns what the last of them told.
-pub(super) fn fly(
+pub(super) fn run_flight(
     estimator: &mut Estimator,
     flight: &SyntheticFlight,
     from_s: f64,
@@ -87,11 +87,11 @@ fn sigma(rank: &RankReport, direction: &[f64]) -> f64 {
 
 /// Flies the advised motion and every seventh of the others from the same moment; returns the advice and, for each, what
 /// the advice foretold and what the estimator then had left of the weakest direction's deviation.
-fn flown(seed: u64, every: usize) -> (Advice, Vec<(String, f64, f64)>) {
+fn run_advised(seed: u64, every: usize) -> (Advice, Vec<(String, f64, f64)>) {
     let rest = Exercise { vehicle: VehicleSwing::Hover, joint: None };
     let warm_up = flight(rest, seed);
     let mut start = estimator(&warm_up.given_rig, Parameterization::Minimal, true);
-    let (report, rank) = fly(&mut start, &warm_up, -1.0, SHARED_S);
+    let (report, rank) = run_flight(&mut start, &warm_up, -1.0, SHARED_S);
     let situation = Situation::of_step(&report, &rank, &warm_up.given_rig, "cam0").unwrap();
     let advice = advise(&situation).unwrap();
     let before = sigma(&rank, &advice.least_observable.weights);
@@ -103,7 +103,7 @@ fn flown(seed: u64, every: usize) -> (Advice, Vec<(String, f64, f64)>) {
         .map(|candidate| {
             let mut estimator = start.clone();
             let flight = flight(candidate.exercise, seed);
-            let (_, rank) = fly(&mut estimator, &flight, SHARED_S, START_S + FLOWN_S);
+            let (_, rank) = run_flight(&mut estimator, &flight, SHARED_S, START_S + MOTION_S);
             (candidate.words.clone(), candidate.remaining, sigma(&rank, &advice.least_observable.weights) / before)
         })
         .collect();
@@ -113,13 +113,13 @@ fn flown(seed: u64, every: usize) -> (Advice, Vec<(String, f64, f64)>) {
 #[test]
 fn flying_the_advised_motion_lowers_the_weakest_sigma_more_than_the_alternatives() {
     for seed in [3, 5, 8] {
-        check_flown(seed);
+        check_advice(seed);
     }
 }
 
 /// Flies the advised motion and every fifth of the others.
-fn check_flown(seed: u64) {
-    let (advice, outcomes) = flown(seed, 5);
+fn check_advice(seed: u64) {
+    let (advice, outcomes) = run_advised(seed, 5);
     let table: Vec<String> = outcomes
         .iter()
         .map(|(words, predicted, left)| format!("{predicted:.3} foretold, {left:.3} left: {words}"))
@@ -164,14 +164,14 @@ fn information_is_put_down_to_the_motion_that_brought_it() {
     let setup = LaboratorySetup::new(Mechanism::named("yaw-roll-pitch-offset").unwrap());
     let form = LaboratoryForm::whole(Parameterization::Minimal);
     let chain = form.chain(&setup.mechanism);
-    let told = excitation(&setup.window(), &chain, &[], &setup.mechanism.names).unwrap();
+    let reported = excitation(&setup.window(), &chain, &[], &setup.mechanism.names).unwrap();
     let gain = |parameter: &str, motion: &str| {
-        let parameter = told.parameters.iter().find(|it| it.name == parameter).unwrap();
-        parameter.by_motion[told.motions.iter().position(|name| name == motion).unwrap()]
+        let parameter = reported.parameters.iter().find(|it| it.name == parameter).unwrap();
+        parameter.by_motion[reported.motions.iter().position(|name| name == motion).unwrap()]
     };
-    assert_eq!(told.motions.len(), 9);
-    assert!(told.parameters.iter().all(|parameter| parameter.bits_per_s > 0.0), "{told}");
+    assert_eq!(reported.motions.len(), 9);
+    assert!(reported.parameters.iter().all(|parameter| parameter.bits_per_s > 0.0), "{reported}");
     // What a link turns with its joint is told by that joint: without its motion the link merges with its neighbour.
-    assert!(gain("L2.alpha", "joint 2") > 10.0 * gain("L2.alpha", "move x").abs(), "{told}");
-    assert!(gain("L3.alpha", "joint 3") > gain("L3.alpha", "move z"), "{told}");
+    assert!(gain("L2.alpha", "joint 2") > 10.0 * gain("L2.alpha", "move x").abs(), "{reported}");
+    assert!(gain("L3.alpha", "joint 3") > gain("L3.alpha", "move z"), "{reported}");
 }

@@ -1,4 +1,4 @@
-use super::excitation::{estimator, flight, fly};
+use super::excitation::{estimator, flight, run_flight};
 use crate::estimator::Estimator;
 use crate::gimbal::tests::parameter;
 use crate::gimbal::{Chain, ParameterNames, Parameterization};
@@ -16,11 +16,11 @@ fn moves(parameterization: Parameterization, encoder: bool) -> (RankReport, impl
     config.options.calibration_first_estimates = false;
     config.options.first_estimate_reach_rad = 0.0;
     let mut estimator = Estimator::new(config);
-    let (report, rank) = fly(&mut estimator, &flight, -1.0, 4.0);
+    let (report, rank) = run_flight(&mut estimator, &flight, -1.0, 4.0);
     let chain = chain_of_step(&report, &rank).unwrap();
-    let told = rank.clone();
+    let reported = rank.clone();
     let moved = move |direction: &SlideDirection| {
-        let weights = direction.weights(&told, &chain).unwrap();
+        let weights = direction.weights(&reported, &chain).unwrap();
         slide(&report, &flight.given_rig.cameras[0].model, &chain, &weights, 1.0).unwrap()
     };
     (rank, moved)
@@ -59,7 +59,7 @@ fn reprojections_stay_while_the_chain_slides_along_a_redundant_direction() {
 fn parameters_that_are_held_count_as_known() {
     let flight = flight(Exercise { vehicle: VehicleSwing::Hover, joint: None }, 7);
     let mut estimator = estimator(&flight.given_rig, Parameterization::Classical, true);
-    let (_, before) = fly(&mut estimator, &flight, -1.0, 4.0);
+    let (_, before) = run_flight(&mut estimator, &flight, -1.0, 4.0);
     assert_eq!((before.parameters.len(), before.rank_structural, before.deficit_parameterization), (24, 18, 6));
     let mut from_s = 4.0;
     // Each takes one of the six redundant directions away; the columns that Eqs. 18–20 drop leave nothing to be lost.
@@ -67,7 +67,7 @@ fn parameters_that_are_held_count_as_known() {
     for (count, name) in dropped.into_iter().enumerate() {
         let held = parameter(name);
         estimator.freeze(held).unwrap();
-        let (report, rank) = fly(&mut estimator, &flight, from_s, from_s + 0.2);
+        let (report, rank) = run_flight(&mut estimator, &flight, from_s, from_s + 0.2);
         from_s += 0.2;
         let lost = 5 - count;
         assert_eq!((rank.parameters.len(), rank.rank_structural), (18 + lost, 18), "{name}");
@@ -76,7 +76,7 @@ fn parameters_that_are_held_count_as_known() {
             (lost, lost, lost),
             "{name}"
         );
-        assert!(rank.held.contains(&held) && !rank.parameters.contains(&held), "{name}");
+        assert!(rank.fixed_parameters.contains(&held) && !rank.parameters.contains(&held), "{name}");
         assert_eq!(report.gain.as_ref().unwrap().columns(), rank.parameters.len(), "{name}");
         // The chain still has all its columns; a held one does not slide.
         let chain = chain_of_step(&report, &rank).unwrap();

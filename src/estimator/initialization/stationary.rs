@@ -17,7 +17,7 @@ const MAX_GYROSCOPE_STD_RAD_PER_S: f64 = 0.002;
 /// Largest standard deviation of the averaged specific force (worst axis), beyond the sensor's own noise.
 const MAX_ACCELEROMETER_STD_M_PER_S2: f64 = 0.03;
 /// A slow rotation that a second cannot separate from a bias.
-const HIDDEN_TURN_RAD_PER_S: f64 = 0.001;
+const HIDDEN_ANGULAR_RATE_RAD_PER_S: f64 = 0.001;
 /// Largest mean angular velocity: a turn-on bias may be this large, a turn is larger.
 const MAX_ANGULAR_RATE_RAD_PER_S: f64 = 0.15;
 /// Largest rotation-compensated parallax over the stretch.
@@ -76,7 +76,7 @@ pub(super) fn detect(input: &InitializationInput<'_>, checklist: &mut Checklist)
     checklist.all_passed().then(|| StationaryEstimate {
         stamp_ns: newest.stamp_ns,
         gyroscope_bias_rad_per_s: gyroscope,
-        gyroscope_bias_sigma_rad_per_s: HIDDEN_TURN_RAD_PER_S.hypot(gyroscope_std),
+        gyroscope_bias_sigma_rad_per_s: HIDDEN_ANGULAR_RATE_RAD_PER_S.hypot(gyroscope_std),
         specific_force_m_per_s2: force,
     })
 }
@@ -89,9 +89,9 @@ fn block_means(samples: &[&ImuSample]) -> Vec<(Vector3<f64>, Vector3<f64>)> {
         .filter(|block| block.len() > 1)
         .map(|block| {
             let count = block.len() as f64;
-            let turn: Vector3<f64> = block.iter().map(|sample| sample.angular_velocity_rad_per_s).sum();
+            let angular_velocity_sum: Vector3<f64> = block.iter().map(|sample| sample.angular_velocity_rad_per_s).sum();
             let force: Vector3<f64> = block.iter().map(|sample| sample.specific_force_m_per_s2).sum();
-            (turn / count, force / count)
+            (angular_velocity_sum / count, force / count)
         })
         .collect()
 }
