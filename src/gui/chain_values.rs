@@ -1,4 +1,4 @@
-//! Calibration values of a chain by parameter: the truth and other runs, told in the columns of the run on screen.
+//! Calibration values of a chain by parameter: ground truth and other runs in the parameterization of the shown run.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::{PI, TAU};
@@ -10,15 +10,16 @@ use crate::session::{Recording, RunRecord};
 /// Values by parameter.
 pub(crate) type ParameterValues = BTreeMap<ParameterId, f64>;
 
-/// The values of a chain in a form.
+/// The values of a chain in a parameterization.
 pub(crate) fn parameter_values(classical: &ClassicalChain, form: &NearestForm) -> ParameterValues {
     let chain = form.of(&Chain::from_classical(classical, Parameterization::Classical));
     chain.parameters().into_iter().zip(chain.values().iter().copied()).collect()
 }
 
-/// The true values in the columns of a run, as they were at a step, turned to lie nearest to the estimate.
+/// The ground-truth values in the parameterization of a run at a step; angles differ from the estimate by less than
+/// half a turn.
 ///
-/// `None` when the truth is not known.
+/// Returns `None` when the ground truth is not known.
 pub(crate) fn true_values(recording: &Recording, run: &RunRecord, stamp_ns: i64) -> Option<ParameterValues> {
     let calibration = &run.step_at(stamp_ns).or_else(|| run.steps.first())?.report.calibration;
     let ground_truth = recording.ground_truth_rig.as_ref()?;
@@ -28,8 +29,8 @@ pub(crate) fn true_values(recording: &Recording, run: &RunRecord, stamp_ns: i64)
     Some(values)
 }
 
-/// Replaces angles by equal ones that lie nearest to a reference: whole turns are added, and rotation vectors may go the
-/// other way round.
+/// Replaces angles by equivalent ones nearest to a reference: multiples of 2π are added, and rotation vectors may be
+/// replaced by the complementary rotation about the opposite axis.
 pub(crate) fn unwrap_towards(values: &mut ParameterValues, reference: &ParameterValues) {
     let parts: BTreeSet<ParameterPart> = values.keys().map(|parameter| parameter.part).collect();
     let rotation_vector = |part: ParameterPart| AXES.map(|quantity| ParameterId { part, quantity });
@@ -50,7 +51,7 @@ pub(crate) fn unwrap_towards(values: &mut ParameterValues, reference: &Parameter
         }
     }
     for (parameter, value) in values.iter_mut() {
-        // The local rotations of `poe` are parts of a rotation vector as well.
+        // The local rotations of `poe` are components of a rotation vector as well.
         let is_local = matches!(parameter.quantity, Quantity::Wx | Quantity::Wy);
         let angle = parameter.dimension() == Dimension::Angle && !is_local && !blocks.contains(&parameter.part);
         if let (true, Some(reference)) = (angle, reference.get(parameter).filter(|reference| reference.is_finite())) {
@@ -59,7 +60,7 @@ pub(crate) fn unwrap_towards(values: &mut ParameterValues, reference: &Parameter
     }
 }
 
-/// The parts of a rotation vector.
+/// The components of a rotation vector.
 const AXES: [Quantity; 3] = [Quantity::Rx, Quantity::Ry, Quantity::Rz];
 
 #[cfg(test)]
@@ -81,7 +82,8 @@ mod tests {
             let ground_truth = true_values(&recording, run, end.stamp_ns).unwrap();
             assert_eq!(ground_truth.len(), end.calibration.parameters.len());
             if end.calibration.parameterization == "classical" {
-                // Of the equivalent numbers those nearest to the rig's are told, and the drawn run is none of an estimator.
+                // Of the equivalent values the one nearest to the rig's is shown, and the drawn run has no real
+                // estimator.
                 let true_rig = recording.ground_truth_rig.as_ref().unwrap();
                 let squared = |value: &dyn Fn(ParameterId) -> f64| -> f64 {
                     let gap = |parameter: ParameterId| {

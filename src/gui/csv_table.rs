@@ -1,17 +1,17 @@
-//! The numbers behind a panel as a table of comma-separated values.
+//! The values of a panel as a table of comma-separated values.
 
 use std::fmt::Write as _;
 
 use super::PanelContext;
 use crate::geometry::seconds_from_ns;
 
-/// A panel whose numbers can be written as a CSV table.
+/// A panel whose values can be written as a CSV table.
 pub trait CsvTable {
-    /// The table with its header line, in seconds, radians, metres and pixels; empty where there is nothing to list.
+    /// The table with its header line, in seconds, radians, metres and pixels; empty where there are no values.
     fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String;
 }
 
-/// A table that grows row by row.
+/// A CSV table that is built row by row.
 pub(super) struct Table {
     /// RFC 4180, with lines that end in `\n` alone.
     text: String,
@@ -40,18 +40,18 @@ impl Table {
         self.text.push('\n');
     }
 
-    /// All lines.
+    /// The text of the table.
     pub(super) fn into_text(self) -> String {
         self.text
     }
 }
 
-/// A number with all its digits, nothing when it is not finite.
+/// A number with all its digits, empty if it is not finite.
 pub(super) fn number(value: f64) -> String {
     if value.is_finite() { value.to_string() } else { String::new() }
 }
 
-/// A time stamp in seconds, to the nanosecond.
+/// A stamp in seconds with nanosecond resolution.
 pub(super) fn seconds(stamp_ns: i64) -> String {
     format!("{:.9}", seconds_from_ns(stamp_ns))
 }

@@ -1,14 +1,15 @@
-//! What the window needs of the machine; files are other people's business, so it asks for them here.
+//! The interface through which the window accesses files and memory of the machine; the GUI itself does not touch the
+//! file system.
 
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::Receiver;
 
 use image::RgbaImage;
 
-/// A path that could be meant.
+/// A completion of a path.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PathEntry {
-    /// The whole path, as it would be typed.
+    /// The whole path as it would be typed.
     pub path: String,
     /// Whether it is a folder.
     pub folder: bool,
@@ -19,40 +20,41 @@ pub struct PathEntry {
 pub struct PanelExport {
     /// Folder and name of the files without extension: `garden/scene-5.953s`.
     pub name: String,
-    /// What the panel shows, drawn anew at twice the size.
+    /// The panel as an image at twice the size.
     pub picture: RgbaImage,
-    /// The same as a drawing of lines and texts (SVG).
+    /// The panel as an SVG drawing.
     pub drawing: String,
-    /// The numbers behind it, comma separated.
+    /// The values of the panel, comma separated.
     pub table: String,
 }
 
-/// Files and figures of the machine.
+/// Access to files and memory of the machine.
 pub trait Desktop: Send + Sync {
-    /// Folders and logs whose paths begin as typed, in order.
+    /// Folders and logs whose paths begin with the typed text, in order.
     fn complete(&self, typed: &str) -> Vec<PathEntry>;
-    /// Asks for a log or a saved session with the desktop's own file dialog, without waiting for it; `None` where there is none.
+    /// Opens the desktop's file dialog for a log or a saved session without waiting for it; `None` where there is no
+    /// such dialog.
     ///
-    /// `None` comes of it when nothing is chosen, and at once where the desktop turns out to have no such dialog.
+    /// The receiver gets `None` when nothing is chosen, and at once if the desktop has no such dialog.
     fn pick_log(&self) -> Option<Receiver<Option<PathBuf>>>;
-    /// Logs opened lately that still exist, the newest first.
+    /// Recently opened logs that still exist, newest first.
     fn recent_logs(&self) -> Vec<PathBuf>;
     /// Puts a log at the head of the recent ones.
     fn remember_log(&self, path: &Path);
-    /// Logs that come with the program.
+    /// Sample logs that come with the program.
     fn sample_logs(&self) -> Vec<PathBuf>;
-    /// What [`Desktop::keep_layouts`] kept last.
+    /// The text of the last [`Desktop::keep_layouts`].
     fn kept_layouts(&self) -> Option<String>;
-    /// Keeps the saved layouts for the next start.
+    /// Stores the saved layouts for the next start.
     fn keep_layouts(&self, text: &str) -> Result<(), String>;
-    /// What [`Desktop::keep_settings`] kept last.
+    /// The text of the last [`Desktop::keep_settings`].
     fn kept_settings(&self) -> Option<String>;
-    /// Keeps the settings for the next start.
+    /// Stores the settings for the next start.
     fn keep_settings(&self, text: &str) -> Result<(), String>;
-    /// Writes a panel as a picture and as a table, and says where.
+    /// Writes a panel as images and as a table, and returns the paths.
     fn write_panel(&self, export: &PanelExport) -> Result<Vec<PathBuf>, String>;
-    /// Writes a session of a log of this name, and says where.
+    /// Writes a session of a log with this name, and returns the path.
     fn write_session(&self, name: &str, text: &str) -> Result<PathBuf, String>;
-    /// Memory of this process in bytes.
+    /// Resident memory of this process in bytes.
     fn resident_bytes(&self) -> Option<u64>;
 }

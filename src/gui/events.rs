@@ -1,16 +1,16 @@
-//! How events look and what they are called.
+//! Names and symbols of events.
 
 use egui::{Color32, Painter, Pos2, Shape, Stroke, pos2};
 
 use super::theme::Theme;
 use crate::estimator::EventKind;
 
-/// The sign of an event: kinds differ by shape, not by colour alone.
+/// The symbol of an event: kinds differ by shape, not by colour alone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Mark {
-    /// A line over the whole lane.
+    /// A line over the whole height of the lane.
     Line,
-    /// A triangle that points up.
+    /// An upward triangle.
     Triangle,
     /// A cross.
     Cross,
@@ -22,7 +22,7 @@ pub(crate) enum Mark {
     Square,
 }
 
-/// The name of a kind of event, for people.
+/// The name of a kind of event in the window.
 pub(crate) fn name_of(kind: EventKind) -> &'static str {
     match kind {
         EventKind::InitializationWaits => "initialization waits",
@@ -39,7 +39,7 @@ pub(crate) fn name_of(kind: EventKind) -> &'static str {
     }
 }
 
-/// The sign and colour of a kind of event.
+/// Symbol and colour of a kind of event.
 pub(crate) fn look_of(kind: EventKind, theme: &Theme) -> (Mark, Color32) {
     match kind {
         EventKind::InitializedFromMotion | EventKind::InitializedFromStationary => (Mark::Triangle, theme.ok),
@@ -54,7 +54,7 @@ pub(crate) fn look_of(kind: EventKind, theme: &Theme) -> (Mark, Color32) {
     }
 }
 
-/// Paints a sign of so many points across.
+/// Paints a symbol of `size` points.
 pub(crate) fn paint_mark(painter: &Painter, mark: Mark, center: Pos2, size: f32, color: Color32) {
     let half = size / 2.0;
     let at = |x: f32, y: f32| pos2(center.x + x * half, center.y + y * half);

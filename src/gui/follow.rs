@@ -1,29 +1,29 @@
-//! Following a run that grows, so that a panel reads each step once.
+//! Incremental reading of a run, so that a panel reads each step once.
 
 use std::sync::Arc;
 
 use crate::session::{RunRecord, StepRecord};
 
-/// How far a panel has read a run.
+/// How many steps of a run a panel has read.
 #[derive(Debug, Default)]
 pub(crate) struct Follower {
     count: usize,
-    /// The run that was read.
+    /// Id of the run.
     run: Option<u64>,
 }
 
-/// What is new in a run.
+/// The new steps of a run.
 pub(crate) struct News<'a> {
-    /// Whether it is another run than before, or was computed anew: forget everything.
+    /// Whether the run was replaced or computed again, so that everything read before is invalid.
     pub(crate) restarted: bool,
     /// The steps not read before.
     pub(crate) steps: &'a [Arc<StepRecord>],
 }
 
 impl Follower {
-    /// The steps that have come since the last call.
+    /// The steps that are new since the last call.
     pub(crate) fn news<'a>(&mut self, run: &'a RunRecord) -> News<'a> {
-        // Steps that were read may be kept in outline later; they are the same steps.
+        // Steps that were read may become summaries later; they are the same steps.
         let same = self.count <= run.steps.len() && self.run.is_none_or(|id| id == run.id);
         let read = if same { self.count } else { 0 };
         self.count = run.steps.len();
@@ -32,15 +32,15 @@ impl Follower {
     }
 }
 
-/// Figures of a run's steps, one column each, for plots over time.
+/// Values of a run's steps for plots over time, one column per value.
 #[derive(Debug, Default)]
 pub(crate) struct StepTable {
     follower: Follower,
-    /// Stamps of the rows, since the log began.
+    /// Stamps of the rows, in nanoseconds since the log began.
     pub(crate) stamps_ns: Vec<i64>,
-    /// The columns; not-a-number where a step has no such figure.
+    /// The columns; NaN where a step does not have the value.
     pub(crate) columns: Vec<Vec<f64>>,
-    /// Changes when rows were forgotten.
+    /// Changes when rows were removed.
     pub(crate) epoch: u64,
 }
 
@@ -64,14 +64,14 @@ impl StepTable {
     }
 }
 
-/// One table per run; runs that went away take theirs along.
+/// One table per run; the table of a removed run is removed.
 #[derive(Debug, Default)]
 pub(crate) struct RunTables {
     tables: Vec<StepTable>,
 }
 
 impl RunTables {
-    /// Reads what is new in all runs and gives the tables in the runs' order.
+    /// Reads the new steps of all runs and returns the tables in the order of the runs.
     pub(crate) fn read<const N: usize>(
         &mut self,
         runs: &[RunRecord],

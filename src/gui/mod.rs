@@ -42,47 +42,47 @@ use crate::sensors::GrayImage;
 use crate::session::breakpoints::Breakpoints;
 use crate::session::{Command, Recording, RunRecord, SolverPosition};
 
-/// Gives the images of the log's cameras, by camera key and number in the stream.
+/// Gives the images of the log's cameras, by camera key and index in the stream.
 pub trait ImageSource {
-    /// The image, `None` when it is missing or not decodable.
+    /// The image, `None` when it is missing or cannot be decoded.
     fn image(&mut self, camera_key: &str, frame_index: usize) -> Option<Arc<GrayImage>>;
 }
 
-/// What is selected, linked across all panels.
+/// The selection, common to all panels.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Selection {
-    /// A feature.
+    /// The selected feature.
     pub feature: Option<FeatureId>,
-    /// A calibration parameter.
+    /// The selected calibration parameter.
     pub parameter: Option<ParameterId>,
-    /// The run that single-run panels show.
+    /// Index of the run in panels that show one run.
     pub run: usize,
-    /// The stretch of time that plots show, begin and end since the log began; `None` for the whole log.
+    /// Time range of all plots, in nanoseconds since the log began; `None` for the whole log.
     pub visible_ns: Option<(i64, i64)>,
-    /// Along which direction the selected run's chain is moved, and how far.
+    /// Direction and distance by which the selected run's chain is moved.
     pub slide: Option<SlidePosition>,
-    /// What comes of it at the cursor.
+    /// The moved chain at the cursor.
     pub(crate) moved: slide::MovedChain,
 }
 
-/// How the cursor moves.
+/// The state of playback.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Playback {
-    /// Whether it runs.
+    /// Whether the cursor moves.
     pub playing: bool,
-    /// How fast, in log seconds per second.
+    /// Speed in log seconds per second.
     pub speed: f64,
-    /// The range that is played over and over, since the log began.
+    /// The loop range, in nanoseconds since the log began.
     pub loop_range_ns: Option<(i64, i64)>,
-    /// Marked instants, in time order.
+    /// Stamps of the markers in ascending order.
     pub markers_ns: Vec<i64>,
-    /// Where in the solver's work the step at the cursor is shown, `None` at its end.
+    /// The solver iteration at which the step is shown, `None` for the converged step.
     pub solver: Option<SolverPosition>,
     /// Whether steps at the cursor are being recomputed.
     pub recomputing: bool,
     /// The breakpoints with their hits so far.
     pub breakpoints: Arc<Breakpoints>,
-    /// Whether the cursor is on its way to a hit that the estimators have not reached yet.
+    /// Whether the cursor runs to a hit that the estimators have not reached yet.
     pub running_to_breakpoint: bool,
 }
 
@@ -101,31 +101,31 @@ impl Default for Playback {
     }
 }
 
-/// What every panel is given to draw.
+/// The inputs and outputs of a panel in one frame.
 pub struct PanelContext<'a> {
-    /// What has been computed.
+    /// The results so far.
     pub recording: &'a Recording,
-    /// Where the cursor stands, since the log began; panels show the last value at or before it.
+    /// Position of the cursor in nanoseconds since the log began; panels show the last step at or before it.
     pub cursor_ns: i64,
-    /// How the cursor moves.
+    /// The state of playback.
     pub playback: &'a Playback,
-    /// Images.
+    /// The source of camera images.
     pub images: &'a mut dyn ImageSource,
-    /// The linked selection, which a panel may change.
+    /// The common selection, which a panel may change.
     pub selection: &'a mut Selection,
     /// Colours and sizes.
     pub theme: &'a Theme,
-    /// Commands that the panel wants applied after this picture.
+    /// Commands of the panel, applied after this frame.
     pub commands: &'a mut Vec<Command>,
 }
 
 impl<'a> PanelContext<'a> {
-    /// The run that single-run panels show, `None` before the first run has started.
+    /// The selected run, `None` before the first run has started.
     pub fn selected_run(&self) -> Option<&'a RunRecord> {
         self.recording.runs.get(self.selection.run)
     }
 
-    /// What calibration parameters are called.
+    /// Names of calibration parameters and joints.
     pub(crate) fn names(&self) -> ParameterNames {
         self.recording.rig.parameter_names()
     }

@@ -1,4 +1,4 @@
-//! Every panel is drawn at instants that try it; nothing may panic, and the pictures can be kept for looking at.
+//! Every panel is drawn at stamps with missing data; nothing may panic. The screenshots can be kept for inspection.
 
 use egui::Ui;
 
@@ -12,7 +12,7 @@ use crate::session::Recording;
 
 const SECOND_NS: i64 = 1_000_000_000;
 
-/// Draws a panel at an instant and keeps the picture.
+/// Draws a panel at a stamp and keeps the screenshot.
 fn picture(
     name: &str,
     recording: &Recording,
@@ -33,7 +33,7 @@ fn picture(
     keep_picture(name, &image);
 }
 
-/// Recordings and instants that leave out what a panel may have counted on.
+/// Recordings and stamps that lack data that a panel may rely on.
 fn trying_cases() -> Vec<(&'static str, Recording, i64)> {
     let whole = sample_recording_of(70, &["auto", "classical"]);
     let mut no_runs = whole.clone();
@@ -85,7 +85,7 @@ fn trying_cases() -> Vec<(&'static str, Recording, i64)> {
     ]
 }
 
-/// Draws a panel as it is meant to be seen, then in every trying case, large and tiny.
+/// Draws a panel as usual, then in every case, large and tiny.
 fn check<P: Default>(name: &str, size_px: [u32; 2], mut ui: impl FnMut(&mut P, &mut Ui, &mut PanelContext<'_>)) {
     let recording = sample_recording();
     let selection = Selection { parameter: Some(parameter("L2.alpha")), ..Selection::default() };
@@ -161,7 +161,8 @@ fn the_inspector_is_drawn_in_every_case() {
     });
 }
 
-/// Prints what a picture of the whole window costs: `cargo test --release --lib time_of_a -- --ignored --nocapture`.
+/// Prints the computing time of a screenshot of the whole window: `cargo test --release --lib time_of_a -- --ignored
+/// --nocapture`.
 #[test]
 #[ignore = "a measurement, not a test"]
 #[expect(clippy::disallowed_methods, clippy::print_stdout, reason = "it measures and says so")]

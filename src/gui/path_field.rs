@@ -8,35 +8,35 @@ use egui::{Id, Key, Modifiers, RichText, ScrollArea, TextEdit, Ui};
 use super::desktop::{Desktop, PathEntry};
 use super::theme::Theme;
 
-/// How many completions are listed.
+/// Maximum number of completions.
 const MOST_ENTRIES: usize = 200;
 
-/// A line for a path, and what it could become.
+/// The text field with its completions.
 #[derive(Default)]
 pub(crate) struct PathField {
     desktop: Option<Arc<dyn Desktop>>,
     typed: String,
     chosen: Option<usize>,
-    /// What was completed, and how.
+    /// The completed text, and its completions.
     completed: Option<(String, Vec<PathEntry>)>,
 }
 
 impl PathField {
-    /// An empty line that completes paths.
+    /// An empty text field.
     pub(crate) fn new(desktop: Arc<dyn Desktop>) -> Self {
         Self { desktop: Some(desktop), ..Self::default() }
     }
 
-    /// Whether nothing has been typed.
+    /// Whether the text field is empty.
     pub(crate) fn is_empty(&self) -> bool {
         self.typed.trim().is_empty()
     }
 
-    /// Draws it; returns the path that was chosen.
+    /// Draws the text field; returns the chosen path.
     pub(crate) fn ui(&mut self, ui: &mut Ui, theme: &Theme, focus: bool, height: f32) -> Option<PathBuf> {
         if self.completed.as_ref().is_none_or(|(typed, _)| *typed != self.typed) {
             let mut entries = self.desktop.as_ref().map_or_else(Vec::new, |desktop| desktop.complete(&self.typed));
-            // A folder that is filled in shall show what it holds next.
+            // A completed folder lists its content next.
             for entry in entries.iter_mut().filter(|entry| entry.folder && !entry.path.ends_with('/')) {
                 entry.path.push('/');
             }
@@ -120,7 +120,7 @@ fn move_caret_to_end(ui: &Ui, id: Id, end: usize) {
     }
 }
 
-/// The longest beginning that all have in common, `None` of nothing.
+/// The longest common prefix of all paths, `None` without paths.
 fn common_beginning<'a>(mut paths: impl Iterator<Item = &'a str>) -> Option<String> {
     let mut common = paths.next()?.to_owned();
     for path in paths {

@@ -1,4 +1,4 @@
-//! The selected run's chain moved along a direction, worked out once for all panels.
+//! The selected run's chain moved along a direction, computed once for all panels.
 
 use std::sync::Arc;
 
@@ -6,7 +6,7 @@ use super::PanelContext;
 use crate::observability::{ChainSlide, SlidePosition, chain_of_step, slide};
 use crate::session::{RunRecord, StepRecord};
 
-/// The last answer and what it answers.
+/// The last result and its inputs.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct MovedChain {
     answered: Option<(SlidePosition, Arc<StepRecord>)>,
@@ -14,13 +14,13 @@ pub(crate) struct MovedChain {
 }
 
 impl PartialEq for MovedChain {
-    /// The answer follows from the rest of the selection, the recording and the cursor.
+    /// Always equal: the result follows from the rest of the selection, the recording and the cursor.
     fn eq(&self, _other: &Self) -> bool {
         true
     }
 }
 
-/// Works out the moved chain when the position, the run or the step is another one than before.
+/// Computes the moved chain when position, run or step has changed.
 pub(crate) fn update(ctx: &mut PanelContext<'_>) {
     let run = ctx.recording.runs.get(ctx.selection.run);
     let step = run.and_then(|run| Some((run, run.step_at(ctx.cursor_ns)?)));
@@ -45,7 +45,7 @@ fn moved(ctx: &PanelContext<'_>, run: &RunRecord, step: &StepRecord, position: &
     slide(&step.report, &camera.model, &chain, &weights, position.amount)
 }
 
-/// The moved chain, when it belongs to the step at the cursor.
+/// The moved chain if it belongs to the step at the cursor.
 pub(crate) fn of<'a>(ctx: &'a PanelContext<'_>, stamp_ns: i64) -> Option<&'a Arc<ChainSlide>> {
     ctx.selection.moved.slide.as_ref().filter(|slide| slide.stamp_ns == stamp_ns)
 }

@@ -1,5 +1,5 @@
-//! Something about one step that takes a while to compute from its report: on a thread of its own, or while the caller
-//! waits. No estimator runs here: what needs one is requested from the session by a command.
+//! A slow computation from the report of one step: on its own thread, or while the caller waits. No estimator runs
+//! here: results of an estimator are requested from the session by a command.
 
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
@@ -8,10 +8,10 @@ use std::time::Duration;
 
 use crate::session::StepRecord;
 
-/// How often it is worth a look whether it has come.
+/// Period at which the window checks for the result.
 pub(super) const REPAINT: Duration = Duration::from_millis(50);
 
-/// What was worked out about the step that was asked for last.
+/// The result for the step that was requested last.
 #[derive(Debug)]
 pub(super) struct StepWork<T> {
     known: Option<(Arc<StepRecord>, Option<T>)>,
@@ -25,18 +25,17 @@ impl<T> Default for StepWork<T> {
 }
 
 impl<T: Send + 'static> StepWork<T> {
-    /// Whether a step's has been worked out.
+    /// Whether the result of a step is there.
     pub(super) fn is_known(&self, step: &StepRecord) -> bool {
         self.known.as_ref().is_some_and(|(known, _)| std::ptr::eq(Arc::as_ptr(known), step))
     }
 
-    /// Whether something is still to come.
+    /// Whether a computation is running.
     pub(super) fn is_busy(&self) -> bool {
         self.coming.is_some()
     }
 
-    /// Sees to it that a step's comes: begins with what `work` hands over unless that is under way or done, and takes what
-    /// has come.
+    /// Starts the computation for a step, given by `work`, unless it is running or done, and receives finished results.
     pub(super) fn ask<W>(
         &mut self,
         step: &Arc<StepRecord>,
@@ -55,7 +54,7 @@ impl<T: Send + 'static> StepWork<T> {
         self.receive();
     }
 
-    /// Takes what has come of the step that was asked for last.
+    /// Receives the result for the step that was requested last.
     pub(super) fn receive(&mut self) {
         let Some((_, coming)) = &self.coming else { return };
         let result = match coming.try_recv() {
@@ -65,7 +64,7 @@ impl<T: Send + 'static> StepWork<T> {
         self.known = self.coming.take().map(|(step, _)| (step, result));
     }
 
-    /// The step that was worked out last, with what came of it.
+    /// The step that was computed last, with its result.
     pub(super) fn last(&self) -> Option<(&Arc<StepRecord>, Option<&T>)> {
         self.known.as_ref().map(|(step, result)| (step, result.as_ref()))
     }
@@ -80,7 +79,7 @@ where
     let (later, given) = (sender.clone(), work.clone());
     let background = move || drop(later.send(given()));
     if !(in_background && Builder::new().name(thread_name.to_owned()).spawn(background).is_ok()) {
-        // Nobody else has the receiver.
+        // The receiver belongs to this value alone.
         drop(sender.send(work()));
     }
     receiver

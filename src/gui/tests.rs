@@ -13,7 +13,7 @@ fn the_sample_is_consistent() {
     assert!(step.report.features.len() > 60, "{} features", step.report.features.len());
     assert_eq!(newest.frame_index, step.report.frame_index);
     assert!(run.steps[FIRST_TRACKED_FRAME - 1].report.newest().is_none());
-    // The aligned estimate lies near the truth.
+    // The aligned estimate is near the ground truth.
     let aligned = run.alignment.expect("aligned") * newest.world_from_imu;
     let error_m = (aligned.translation_m - step.ground_truth.expect("truth").translation_m).norm();
     assert!(error_m < 1.0, "{error_m} m off");
@@ -21,14 +21,14 @@ fn the_sample_is_consistent() {
     assert_eq!(image.pixels.len(), image.width * image.height);
 }
 
-/// Keeps a picture for looking at, in the folder that the variable `DCVINS_PICTURES` names.
+/// Keeps a screenshot for inspection, in the folder of the environment variable `DCVINS_PICTURES`.
 pub(crate) fn keep_picture(name: &str, picture: &image::RgbaImage) {
     if let Some(folder) = std::env::var_os("DCVINS_PICTURES") {
         picture.save(std::path::Path::new(&folder).join(format!("{name}.png"))).unwrap();
     }
 }
 
-/// Hands a panel a context with nothing playing; its commands are dropped.
+/// Passes a panel context without playback to a function; commands are dropped.
 pub(crate) fn with_context(
     recording: &Recording,
     cursor_ns: i64,

@@ -1,18 +1,18 @@
-//! How numbers are shown: degrees and millimetres on screen, radians and metres underneath.
+//! Display of numbers: degrees and millimetres on the screen, radians and metres in the data.
 
 use crate::geometry::Dimension;
 
-/// What a stored unit becomes on screen.
+/// Conversion of a stored unit to the shown one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Shown {
-    /// Stored value times this is the shown one.
+    /// Shown value per stored value.
     pub(crate) factor: f64,
-    /// The shown unit with the space that belongs before it.
+    /// The shown unit with its leading space.
     pub(crate) unit: &'static str,
 }
 
 impl Shown {
-    /// How values of a dimension are shown: in degrees, millimetres, milliseconds.
+    /// The conversion for a dimension: to degrees, millimetres, milliseconds.
     pub(crate) const fn of(dimension: Dimension) -> Self {
         match dimension {
             Dimension::Angle => Self { factor: 180.0 / std::f64::consts::PI, unit: "°" },
@@ -22,24 +22,24 @@ impl Shown {
         }
     }
 
-    /// A stored value with its unit, as precise as its standard deviation says (two digits of it).
+    /// A stored value with its unit, with the precision of two digits of its standard deviation.
     pub(crate) fn value(self, stored: f64, stored_sigma: f64) -> String {
         format!("{}{}", fixed(stored * self.factor, decimals_for(stored_sigma * self.factor)), self.unit)
     }
 
-    /// A standard deviation with its unit, to two digits.
+    /// A standard deviation with its unit, with two digits.
     pub(crate) fn sigma(self, stored_sigma: f64) -> String {
         let sigma = stored_sigma * self.factor;
         if sigma.is_finite() { format!("{}{}", fixed(sigma, decimals_for(sigma)), self.unit) } else { "–".to_owned() }
     }
 }
 
-/// Decimals that show two digits of a standard deviation; two when it is unknown.
+/// Decimals for two digits of a standard deviation; two when it is unknown.
 fn decimals_for(sigma: f64) -> usize {
     if sigma.is_finite() && sigma > 0.0 { (1.0 - sigma.log10().floor()).clamp(0.0, 5.0) as usize } else { 2 }
 }
 
-/// A number with so many decimals, a dash when it is not finite, never a negative zero.
+/// A number with this many decimals, a dash if it is not finite, never a negative zero.
 pub(crate) fn fixed(value: f64, decimals: usize) -> String {
     if !value.is_finite() {
         return "–".to_owned();
@@ -51,7 +51,7 @@ pub(crate) fn fixed(value: f64, decimals: usize) -> String {
     }
 }
 
-/// A number to three significant digits, in powers of ten when it is very large or small.
+/// A number with three significant digits, in powers of ten if it is very large or small.
 pub(crate) fn figure(value: f64) -> String {
     let size = value.abs();
     if !value.is_finite() {
@@ -65,18 +65,18 @@ pub(crate) fn figure(value: f64) -> String {
     }
 }
 
-/// Seconds since the log began, in milliseconds' steps.
+/// Seconds since the log began with three decimals.
 pub(crate) fn seconds(stamp_ns: i64) -> String {
     fixed(crate::geometry::seconds_from_ns(stamp_ns), 3)
 }
 
-/// A size in memory in binary units.
+/// An amount of memory in binary units.
 pub(crate) fn bytes(count: u64) -> String {
     let mebibytes = count as f64 / (1 << 20) as f64;
     if mebibytes < 1024.0 { format!("{mebibytes:.0} MiB") } else { format!("{:.2} GiB", mebibytes / 1024.0) }
 }
 
-/// A count with its noun, `1 run`, `2 runs`.
+/// A count with its noun: `1 run`, `2 runs`.
 pub(crate) fn counted(count: usize, noun: &str) -> String {
     format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }

@@ -1,4 +1,4 @@
-//! The window's program: it owns the session, feeds it time and commands, and draws what it has computed.
+//! The window's program: it owns the session, passes time and commands to it, and draws its results.
 
 mod playing_log;
 pub mod run_window;
@@ -28,42 +28,43 @@ use crate::gui::window::{
 use crate::gui::{PanelContext, Selection};
 use crate::session::{Command, PlaybackSpeed, Recording};
 
-/// Seconds between two pictures from which the cursor does not catch up: the window was hidden, or the machine asleep.
+/// After a longer pause between two frames the cursor does not catch up: the window was hidden or the machine
+/// suspended.
 const STALL_S: f64 = 2.0;
-/// Milliseconds between two looks at what the estimators have computed.
+/// Period in milliseconds at which the window checks for new steps.
 const LOOK_MS: u64 = 60;
-/// Seconds between two readings of the process's memory.
+/// Period in seconds at which the process's memory is read.
 const MEMORY_PERIOD_S: f64 = 1.0;
 
-/// A log that is being opened on a thread of its own.
+/// A log that is being opened on its own thread.
 struct Opening {
     path: PathBuf,
     result: Receiver<Result<Box<dyn PlayingLog>, String>>,
 }
 
-/// The program of the window.
+/// The application of the window.
 pub struct App {
     open_log: OpenLog,
     desktop: Arc<dyn Desktop>,
     log: Option<Box<dyn PlayingLog>>,
-    /// Whether the cursor has been put on the log's first frame.
+    /// Whether the cursor has been moved to the first frame of the log.
     at_first_frame: bool,
     opening: Option<Opening>,
     welcome: Welcome,
     state: WindowState,
     selection: Selection,
     theme: Theme,
-    /// The settings as they have been put into effect, `None` before the first picture.
+    /// The settings in effect, `None` before the first frame.
     applied: Option<Settings>,
     progress: ProgressMeter,
-    /// Warnings of the log that a notice has told.
+    /// Number of warnings about the log that a notice has reported.
     warnings_told: usize,
     title: String,
     memory_read_s: Option<f64>,
 }
 
 impl App {
-    /// A window without a log; `theme` holds until a person chooses another one.
+    /// A window without a log; `theme` is used until the user chooses another one.
     pub fn new(open_log: OpenLog, desktop: Arc<dyn Desktop>, theme: ThemeName) -> Self {
         let mut state = WindowState::default();
         state.show_times = true;
@@ -93,12 +94,12 @@ impl App {
         }
     }
 
-    /// Begins to open a log; the one before stays until it is there.
+    /// Starts to open a log; the current one stays until the new one is open.
     pub fn open(&mut self, path: PathBuf) {
         let (sender, result) = channel();
         let (open_log, target) = (Arc::clone(&self.open_log), path.clone());
         let thread = std::thread::Builder::new().name("open-log".to_owned()).spawn(move || {
-            // Nobody waits any more when another log was asked for meanwhile.
+            // The receiver is gone when another log was requested meanwhile.
             drop(sender.send(open_log(&target)));
         });
         match thread {
@@ -107,7 +108,7 @@ impl App {
         }
     }
 
-    /// Shows a session that is open already; `path` is what was opened, where it is not the log itself.
+    /// Shows an open session. `path` is the path that was opened if it differs from the log's (a saved session).
     pub fn show(&mut self, log: Box<dyn PlayingLog>, path: Option<&Path>) {
         let mut log = log;
         self.desktop.remember_log(path.unwrap_or(&log.recording().log_path));
@@ -123,12 +124,12 @@ impl App {
         self.warnings_told = 0;
     }
 
-    /// The session, when a log is open.
+    /// The session, `None` before a log is open.
     pub fn log(&self) -> Option<&dyn PlayingLog> {
         self.log.as_deref()
     }
 
-    /// Draws one picture and does what was asked for in it.
+    /// Draws one frame and executes the commands and requests of that frame.
     pub fn ui(&mut self, ui: &mut Ui) {
         self.apply_settings(ui);
         self.take_opened();
@@ -140,7 +141,7 @@ impl App {
             self.welcome_ui(ui);
         }
         for request in std::mem::take(&mut self.state.requests) {
-            // What comes of it is seen in the next picture.
+            // The next frame shows the result.
             ui.ctx().request_repaint();
             match request {
                 WindowRequest::OpenLog(path) => self.open(path),
@@ -159,10 +160,10 @@ impl App {
         }
     }
 
-    /// Puts settings that were changed into effect, and keeps them.
+    /// Applies and stores changed settings.
     fn apply_settings(&mut self, ui: &Ui) {
         let first = self.applied.is_none();
-        // Ctrl and +, − or 0 are egui's own keys.
+        // egui handles Ctrl with +, − and 0 itself.
         let zoom = ui.ctx().zoom_factor();
         if self
             .applied
@@ -192,7 +193,7 @@ impl App {
         ui.ctx().request_repaint();
     }
 
-    /// Says once that the log has warnings; the list has them all.
+    /// Shows one notice about the warnings of the log; the list has all of them.
     fn tell_warnings(&mut self, recording: &Recording) {
         let count = recording.warnings.len();
         if count > 0 && self.warnings_told == 0 {
@@ -229,7 +230,7 @@ impl App {
 
     fn session_ui(&mut self, ui: &mut Ui) {
         let Some(log) = &mut self.log else { return };
-        // Log time follows the wall: slow drawing leaves out pictures, not time.
+        // Log time follows the wall clock: slow drawing skips frames, not time.
         let (elapsed_s, now_s) = ui.input(|input| (f64::from(input.stable_dt), input.time));
         if elapsed_s < STALL_S {
             log.advance(elapsed_s);
@@ -281,7 +282,7 @@ impl App {
         }
     }
 
-    /// Takes over a log that has been opened.
+    /// Shows a log that has been opened.
     fn take_opened(&mut self) {
         let Some(opening) = &self.opening else { return };
         match opening.result.try_recv() {
@@ -302,7 +303,7 @@ impl App {
         }
     }
 
-    /// Opens the first of the files that were dropped.
+    /// Opens the first of the dropped files.
     fn take_dropped(&mut self, ui: &Ui) {
         let dropped: Vec<PathBuf> =
             ui.input(|input| input.raw.dropped_files.iter().map(|file| file.path().to_path_buf()).collect());
@@ -323,7 +324,7 @@ impl App {
         }
     }
 
-    /// The window is called after the log.
+    /// Sets the title of the window to the name of the log.
     fn update_title(&mut self, ui: &Ui) {
         let title = self.log.as_ref().map_or_else(
             || "dcvins".to_owned(),

@@ -1,4 +1,4 @@
-//! A log that plays: what the window needs of a session.
+//! The interface of a session that the window needs.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -7,35 +7,35 @@ use crate::gui::{ImageSource, Playback};
 use crate::sensors::GrayImage;
 use crate::session::{Command, Recording};
 
-/// A log that plays: what the window needs of a session.
+/// A log during playback: the interface of a session that the window needs.
 pub trait PlayingLog: Send {
-    /// What has been computed so far; cheap.
+    /// The results so far; a cheap copy.
     fn recording(&self) -> Arc<Recording>;
-    /// Changes whenever something new has been computed.
+    /// A counter that grows with every change of the results.
     fn generation(&self) -> u64;
-    /// Where the cursor stands, since the log began.
+    /// Position of the cursor, in nanoseconds since the log began.
     fn cursor_ns(&self) -> i64;
-    /// How the cursor moves.
+    /// The state of playback.
     fn playback(&self) -> Playback;
-    /// Does what a person asked for.
+    /// Executes a command.
     fn apply(&mut self, command: Command);
-    /// Lets the cursor run for so many seconds of the wall.
+    /// Moves the cursor by `elapsed_s` seconds of the wall clock.
     fn advance(&mut self, elapsed_s: f64);
-    /// An image of the log.
+    /// An image of the log by camera and index in its stream.
     fn image(&mut self, camera_key: &str, frame_index: usize) -> Option<Arc<GrayImage>>;
-    /// What could not be done as asked, since the last call.
+    /// Messages about commands that failed, since the last call.
     fn take_notices(&mut self) -> Vec<String>;
-    /// The session as text, with where the panels are; `None` for a log that no session plays.
+    /// The session as text, with the layout of the panels; `None` for a log without a session.
     fn saved(&self, layout: Option<serde_json::Value>) -> Option<String>;
-    /// Where the panels were when the session was saved.
+    /// The panel layout of the saved session.
     fn layout(&self) -> Option<&serde_json::Value>;
 }
 
-/// Opens a log; the message of an error says what was wrong and what to do.
+/// Opens a log. The message of an error has its cause and remedy.
 pub type OpenLog = Arc<dyn Fn(&Path) -> Result<Box<dyn PlayingLog>, String> + Send + Sync>;
 
-/// Moves a cursor that stands before the first frame there, so that a log just opened shows something; whether there is
-/// a frame yet.
+/// Moves a cursor before the first frame to that frame, so that a newly opened log shows something. Returns whether
+/// there is a frame yet.
 pub(super) fn go_to_first_frame(log: &mut dyn PlayingLog) -> bool {
     let recording = log.recording();
     let first = recording.runs.iter().filter_map(|run| run.steps.first()).map(|step| step.report.stamp_ns).min();
@@ -45,7 +45,7 @@ pub(super) fn go_to_first_frame(log: &mut dyn PlayingLog) -> bool {
     first.is_some()
 }
 
-/// The session's images, for the panels.
+/// The images of the session as an [`ImageSource`].
 pub(super) struct Images<'a>(pub(super) &'a mut dyn PlayingLog);
 
 impl ImageSource for Images<'_> {

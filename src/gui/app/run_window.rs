@@ -1,4 +1,4 @@
-//! Opening the window on a screen.
+//! Opening the window on a display.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
@@ -13,42 +13,42 @@ use crate::gui::desktop::Desktop;
 use crate::gui::scene::SceneBackend;
 use crate::gui::theme::ThemeName;
 
-/// What a server without a desktop needs for the window (Debian and Ubuntu).
+/// Packages that a server without a desktop needs for the window (Debian and Ubuntu).
 pub const WINDOW_PACKAGES: &str = "mesa-vulkan-drivers libx11-6 libxcursor1 libxi6 libxkbcommon-x11-0";
 
 /// The icon of the window, in its title bar and in the task bar.
 const ICON_PNG: &[u8] = include_bytes!("../../../assets/icon/dcvins-128.png");
 
-/// Why there is no window.
+/// The reason why the window cannot be opened.
 #[derive(Debug, Error)]
 pub enum WindowError {
-    /// No screen to open it on.
+    /// No display.
     #[error(
         "there is no display: neither WAYLAND_DISPLAY nor DISPLAY is set\n\
          start it in a desktop session or with 'ssh -X', or draw pictures without a display with 'dcvins screenshot'"
     )]
     NoDisplay,
-    /// A library or a graphics driver is missing, or the screen refused.
+    /// A library or a graphics driver is missing, or the display refused the connection.
     #[error("the window cannot be opened: {problem}\n{remedy}")]
     Refused {
-        /// What the system said.
+        /// The error of the operating system.
         problem: String,
-        /// What to do about it.
+        /// The remedy.
         remedy: String,
     },
 }
 
-/// What the window begins with.
+/// The initial state of the window.
 pub struct WindowOptions {
-    /// A session that is open already.
+    /// A session that is already open.
     pub log: Option<Box<dyn PlayingLog>>,
-    /// A log to open while the window is up already.
+    /// A log to open when the window is shown.
     pub log_path: Option<PathBuf>,
-    /// How logs are opened.
+    /// Opens the logs that the user selects.
     pub open_log: OpenLog,
-    /// Files and figures of the machine.
+    /// Access to files and memory of the machine.
     pub desktop: Arc<dyn Desktop>,
-    /// Colours.
+    /// The initial theme.
     pub theme: ThemeName,
 }
 
@@ -84,7 +84,7 @@ pub fn run_window(options: WindowOptions) -> Result<(), WindowError> {
             }),
         )
     };
-    // The loader of a keyboard library panics when the library is missing; that is a message like any other.
+    // The loader of the keyboard library panics when the library is missing; it is reported as an error.
     match without_loader_panics(start) {
         Ok(Ok(())) => Ok(()),
         Ok(Err(error)) => Err(refused(error.to_string())),
@@ -96,8 +96,8 @@ fn icon() -> IconData {
     eframe::icon_data::from_png_bytes(ICON_PNG).expect("the icon is a PNG, as a test checks")
 }
 
-/// A graphics card draws the scene and everything else; an adapter that computes on the CPU is several times slower than
-/// drawing there ourselves.
+/// Selects the renderer: a graphics card draws everything; with a CPU adapter, drawing on the CPU here is several times
+/// faster.
 fn arrange_drawing(state: Option<&eframe::egui_wgpu::RenderState>, context: &egui::Context) {
     match state {
         Some(state) if state.adapter.get_info().device_type != wgpu::DeviceType::Cpu => {
@@ -122,7 +122,7 @@ fn refused(problem: String) -> WindowError {
     WindowError::Refused { problem, remedy }
 }
 
-/// Runs something whose panic about a library that cannot be loaded becomes an error; other panics go on.
+/// Runs a function and returns a panic about a library that cannot be loaded as an error; other panics propagate.
 fn without_loader_panics<T>(run: impl FnOnce() -> T) -> Result<T, String> {
     const SIGN: &str = "could not be loaded";
     let text = |payload: &(dyn std::any::Any + Send)| {

@@ -1,4 +1,4 @@
-//! A session as the log that the window plays.
+//! A session as the [`PlayingLog`] of the window.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! The program of the window over a session that estimates a sample log.
+//! The application of the window with a session that processes a sample log.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use crate::gui::desktop::Desktop;
 use crate::gui::theme::ThemeName;
 use crate::session::{RunRecord, Session, SessionPlan, SessionRequest};
 
-/// The window over the first seconds of the sample log, estimated by one run.
+/// The window on the first seconds of the sample log, processed by one run.
 fn window_over_garden(spec: &str, duration_s: f64) -> Harness<'static, App> {
     let log_path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("sample_logs/garden.mcap");
     let specs = vec![spec.parse().unwrap()];
@@ -35,12 +35,12 @@ fn all_finished(harness: &Harness<'static, App>) -> bool {
     harness.state().log().unwrap().recording().runs.iter().all(|run| run.finished)
 }
 
-/// Informed rank of a step, `None` while the run initializes.
+/// Informed rank of a step, `None` during initialization.
 fn informed(run: &RunRecord, step: usize) -> Option<usize> {
     run.steps[step].rank.as_ref().map(|rank| rank.rank_informed)
 }
 
-/// Texts on the screen with their places.
+/// Texts on the screen and their rectangles.
 fn painted_texts(harness: &Harness<'static, App>) -> Vec<(String, Rect)> {
     fn collect(shape: &Shape, texts: &mut Vec<(String, Rect)>) {
         match shape {
@@ -63,7 +63,7 @@ fn a_classical_run_goes_on_as_minimal_from_where_its_rank_drops() {
     let at = (1..parent.steps.len()).rfind(drops).expect("the informed rank drops somewhere");
     let step = &parent.steps[at];
 
-    // There by key: the palette goes to a frame.
+    // By keyboard: the palette moves the cursor to a frame.
     harness.key_press_modifiers(Modifiers::COMMAND, Key::P);
     harness.run_steps(3);
     harness.event(egui::Event::Text(format!("frame {}", step.report.frame_index)));
@@ -74,7 +74,7 @@ fn a_classical_run_goes_on_as_minimal_from_where_its_rank_drops() {
     let rank = step.rank.as_ref().unwrap();
     assert_eq!((rank.parameters.len(), rank.rank_structural, rank.deficit_parameterization), (24, 18, 6));
 
-    // The fork by key and label.
+    // The fork by keyboard and label.
     harness.key_press(Key::F);
     harness.run_steps(3);
     assert!(harness.query_by_label_contains("Fork classical at ").is_some());
@@ -100,7 +100,7 @@ fn a_classical_run_goes_on_as_minimal_from_where_its_rank_drops() {
     let forked = fork.steps[at].rank.as_ref().unwrap();
     assert_eq!((forked.parameters.len(), forked.rank_structural, forked.deficit_parameterization), (18, 18, 0));
 
-    // Both lanes, by their names beside the timeline, and where the fork left its parent.
+    // Both lanes by their names beside the timeline, and the fork's origin.
     harness.run_steps(4);
     let timeline = harness.get_by_label("Timeline").rect();
     let lanes: Vec<String> = painted_texts(&harness)
@@ -115,7 +115,7 @@ fn a_classical_run_goes_on_as_minimal_from_where_its_rank_drops() {
     harness.run_steps(8);
     assert!(harness.query_by_label_contains("s: minimal").is_some(), "the legend says where it was forked");
 
-    // The comparison: both in the table, and they part at the very frame of the fork.
+    // The comparison has both runs; they diverge at the frame of the fork.
     harness.key_press(Key::Num5);
     harness.run_steps(6);
     for run in [&parent, &fork] {
@@ -126,7 +126,7 @@ fn a_classical_run_goes_on_as_minimal_from_where_its_rank_drops() {
     let time = format!("{parting}: {:.3} s", step.report.stamp_ns as f64 * 1e-9);
     assert!(harness.query_by_label(&time).is_some(), "{time}");
 
-    // And the rank of the fork in the panel beside it.
+    // The rank panel beside it shows the fork.
     harness.get_by_label(&format!("Show run {} in all panels", fork.spec.label)).click();
     harness.run_steps(4);
     assert_eq!(harness.state().selection.run, 1);

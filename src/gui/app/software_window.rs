@@ -1,21 +1,21 @@
-//! Paints the whole window ourselves where the graphics adapter computes on the CPU anyway.
+//! Paints the window on the CPU where the graphics adapter computes on the CPU anyway.
 //!
-//! A software Vulkan takes several times as long for egui's meshes as [`Painter`] does, so the window's meshes are
-//! painted here and the adapter is left one textured rectangle.
+//! A software Vulkan driver takes several times as long for egui's meshes as [`Painter`]. The window's meshes are
+//! therefore painted here, and the adapter draws one textured rectangle.
 
 use egui::epaint::{ClippedShape, ImageDelta, Mesh};
 use egui::{Color32, Context, FullOutput, Plugin, Pos2, Rect, Shape, TextureId, TextureOptions, pos2};
 
 use crate::gui::rendering::painter::Painter;
 
-/// The texture that shows the window; egui counts its own up from 0.
+/// The texture with the content of the window; egui counts its own textures up from 0.
 const PICTURE: TextureId = TextureId::Managed(u64::MAX);
 
-/// Replaces what a picture of the window consists of by one texture.
+/// Replaces the meshes of a frame by one texture.
 #[derive(Default)]
 pub(super) struct SoftwareWindow {
     painter: Painter,
-    /// Size of the picture that the adapter has.
+    /// Size of the texture on the adapter.
     shown_px: [u32; 2],
 }
 
@@ -85,7 +85,7 @@ mod tests {
             assert!(again.textures.is_empty(), "what did not change is not handed over again");
             again.textures.clear();
 
-            // Of another picture only the parts that differ are handed over.
+            // Only changed rectangles are uploaded.
             let changed = |ui: &mut egui::Ui| {
                 egui::CentralPanel::default().show(ui, |ui| {
                     sample_ui(ui);

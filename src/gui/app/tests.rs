@@ -1,4 +1,4 @@
-//! The program of the window over a log that plays without files and threads of its own.
+//! The application of the window with a log that needs no files and no threads.
 
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -16,7 +16,7 @@ use crate::gui::{ImageSource as _, Playback};
 use crate::sensors::GrayImage;
 use crate::session::{Command, Recording};
 
-/// A log that is computed already.
+/// A log that has been computed already.
 struct SampleLog {
     recording: Arc<Recording>,
     cursor_ns: i64,
@@ -24,7 +24,7 @@ struct SampleLog {
 }
 
 impl SampleLog {
-    /// The cursor stands before the first frame, as in a log whose images begin after its first message.
+    /// The cursor is before the first frame, as in a log whose images begin after its first message.
     fn new(path: &Path) -> Self {
         static SAMPLE: OnceLock<Recording> = OnceLock::new();
         let sample = SAMPLE.get_or_init(|| sample_recording_of(70, &["auto", "classical"]));
@@ -92,7 +92,7 @@ pub(super) struct TestDesktop {
     written: Mutex<Vec<PanelExport>>,
     sessions: Mutex<Vec<String>>,
     settings: Mutex<Option<String>>,
-    /// What the desktop's file dialog will answer with, where it has one.
+    /// The answer of the desktop's file dialog, where it has one.
     picked: Mutex<Option<Receiver<Option<PathBuf>>>>,
 }
 
@@ -183,7 +183,7 @@ fn app() -> (Harness<'static, App>, Arc<TestDesktop>) {
     (harness, desktop)
 }
 
-/// Runs until something holds; opening happens on a thread of its own.
+/// Runs frames until the condition is true; logs are opened on their own thread.
 pub(super) fn run_until(harness: &mut Harness<'static, App>, holds: impl Fn(&Harness<'static, App>) -> bool) {
     for _ in 0..2000 {
         harness.run_steps(1);
@@ -227,7 +227,7 @@ fn a_dropped_log_is_opened_and_a_wrong_file_explained() {
     run_until(&mut harness, |harness| opened(harness) == Some(PathBuf::from("/x/b.mcap")));
 }
 
-/// A window over a log, with the desktop's file dialog open; the sender answers for it.
+/// A window with a log and with the desktop's file dialog open; the sender gives its answer.
 fn with_file_dialog() -> (Harness<'static, App>, Sender<Option<PathBuf>>) {
     let (mut harness, desktop) = app();
     harness.get_by_label("Open yard.mcap").click();
@@ -403,7 +403,7 @@ fn settings_hold_at_once_and_are_kept() {
     harness.get_by_label("Undo").click();
     harness.run_steps(3);
     assert_eq!(harness.ctx.theme(), egui::Theme::Dark);
-    // The next start has them.
+    // The next start uses them.
     *desktop.settings.lock().unwrap() = Some("{\"theme\": \"light\", \"layout\": \"Scene\"}".to_owned());
     let open: OpenLog = Arc::new(|path: &Path| Ok(Box::new(SampleLog::new(path)) as Box<dyn PlayingLog>));
     let again = App::new(open, desktop as Arc<dyn Desktop>, ThemeName::Dark);

@@ -1,4 +1,4 @@
-//! What the window shows before a log is open.
+//! The view before a log is open.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -18,13 +18,13 @@ pub(super) struct Welcome {
 }
 
 impl Welcome {
-    /// Reads which logs can be offered.
+    /// Reads the lists of sample logs and recent logs.
     pub(super) fn new(desktop: Arc<dyn Desktop>) -> Self {
         let (samples, recent) = (desktop.sample_logs(), desktop.recent_logs());
         Self { path_field: PathField::new(desktop), samples, recent }
     }
 
-    /// Draws it; returns the log that was chosen. `opening` names a log that is being opened.
+    /// Draws the view and returns the chosen log. `opening` is the log that is being opened.
     pub(super) fn ui(&mut self, ui: &mut Ui, theme: &Theme, opening: Option<&Path>) -> Option<PathBuf> {
         let mut chosen = None;
         ui.with_layout(Layout::top_down(Align::Center), |ui| {
@@ -61,7 +61,7 @@ impl Welcome {
     }
 }
 
-/// The place that says a log can be dropped; while one is held over the window it lights up.
+/// The area for dropping a log; it is highlighted while a file is dragged over the window.
 fn drop_target_ui(ui: &mut Ui, theme: &Theme) {
     let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), 76.0), Sense::hover());
     let held = ui.input(|input| !input.raw.hovered_files.is_empty());

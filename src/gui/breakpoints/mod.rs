@@ -1,4 +1,4 @@
-//! The breakpoints: conditions over the steps, how often each was hit, and the way to the next hit.
+//! The breakpoints: conditions on the steps, their hit counts, and buttons to go to the next hit.
 
 mod csv;
 
@@ -13,12 +13,12 @@ use crate::session::breakpoints::{Breakpoint, Condition, quantity_help};
 #[derive(Debug, Default)]
 pub struct BreakpointsPanel {
     typed: String,
-    /// The breakpoint whose condition is being changed.
+    /// Index of the breakpoint whose condition is being edited.
     changing: Option<usize>,
 }
 
 impl BreakpointsPanel {
-    /// Draws the panel.
+    /// Draws editor, list and buttons.
     pub fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
         buttons_ui(ui, ctx);
         self.editor_ui(ui, ctx);
@@ -36,7 +36,7 @@ impl BreakpointsPanel {
         });
     }
 
-    /// The line in which a condition is written, and what is wrong with it.
+    /// The input line for a condition with its syntax error.
     fn editor_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
         let parsed: Result<Condition, _> = self.typed.parse();
         ui.horizontal(|ui| {
@@ -61,7 +61,7 @@ impl BreakpointsPanel {
         if let Err(problem) = parsed
             && !self.typed.trim().is_empty()
         {
-            // The text once more, with a sign under the mistake.
+            // The text again with a caret under the error.
             let pointed = format!("{}\n{}^", problem.text, " ".repeat(problem.column - 1));
             ui.label(RichText::new(pointed).monospace().color(ctx.theme.text_weak));
             let text = format!("Column {}: {}", problem.column, problem.message);
@@ -101,7 +101,7 @@ impl BreakpointsPanel {
     }
 }
 
-/// The way to the hits before and after the cursor.
+/// Buttons to the hits before and after the cursor.
 fn buttons_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>) {
     ui.horizontal(|ui| {
         let any = ctx.playback.breakpoints.list().iter().any(|breakpoint| breakpoint.enabled);
@@ -117,7 +117,7 @@ fn buttons_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>) {
     });
 }
 
-/// Everything that a condition can ask for.
+/// The list of quantities for conditions.
 fn help_ui(ui: &mut Ui, ctx: &PanelContext<'_>) {
     let theme = ctx.theme;
     let header = CollapsingHeader::new("What can be asked for").id_salt("quantities");

@@ -1,4 +1,4 @@
-//! The comparison of all runs as a long table, one number a row.
+//! The comparison of all runs as a long table, one value per row.
 
 use super::ComparisonPanel;
 use crate::gui::PanelContext;
@@ -6,8 +6,8 @@ use crate::gui::csv_table::{CsvTable, Table, number, seconds};
 use crate::session::Quantity;
 
 impl CsvTable for ComparisonPanel {
-    /// Accuracy of all runs, where each parts from the reference, and the differences of every common frame; differences in the
-    /// stored units (radians, metres), accuracy in the units of the panel.
+    /// Accuracy of all runs, their first divergences from the reference, and the differences of every common frame.
+    /// Differences are in stored units (radians, metres), accuracy in the units of the panel.
     fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {
         let runs = &ctx.recording.runs;
         let mut table = Table::new(["kind", "run", "reference", "quantity", "unit", "t_s", "value"]);

@@ -1,4 +1,5 @@
-//! The comparison panel: up to four runs over one cursor, in numbers, as differences over time, and side by side.
+//! The comparison panel: up to four runs at one cursor, as tables, as differences over time, and as images and scenes
+//! side by side.
 
 mod csv;
 mod numbers;
@@ -18,14 +19,14 @@ use super::convergence::empty_ui;
 use super::rank;
 use crate::session::Comparison;
 
-/// From this size on everything is shown at once.
+/// Panel size from which all views are shown at once.
 const ROOM_FOR_ALL: Vec2 = vec2(960.0, 430.0);
-/// From this width on the two tables stand beside each other.
+/// Width from which the two tables are side by side.
 const ROOM_FOR_BOTH_TABLES: f32 = 860.0;
-/// From this height on scenes are shown beside images.
+/// Height from which scenes are shown below the images.
 const ROOM_FOR_SCENES: f32 = 760.0;
 
-/// What is shown.
+/// A view of the comparison.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum View {
     All,
@@ -47,12 +48,12 @@ impl View {
     ];
 }
 
-/// State of the comparison panel.
+/// State of the comparison panel: reference run, view, and the cached comparisons.
 #[derive(Default)]
 pub struct ComparisonPanel {
-    /// Number of the run that the others are held against.
+    /// Index of the reference run.
     pub reference: usize,
-    /// What is shown, `None` while nobody has chosen.
+    /// The chosen view, `None` before a choice.
     view: Option<View>,
     scores: Scores,
     comparisons: Vec<Comparison>,
@@ -62,13 +63,13 @@ pub struct ComparisonPanel {
 }
 
 impl ComparisonPanel {
-    /// A panel that shows the same and holds no texture of a window.
+    /// A panel with the same view and no texture of a window.
     pub(in crate::gui) fn view_copy(&self) -> Self {
         let (images, scenes) = (self.images.view_copy(), self.scenes.view_copy());
         Self { reference: self.reference, view: self.view, images, scenes, ..Self::default() }
     }
 
-    /// Draws the panel.
+    /// Draws the controls and the chosen view.
     pub fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
         let runs = &ctx.recording.runs;
         if runs.is_empty() {
@@ -88,7 +89,7 @@ impl ComparisonPanel {
         }
     }
 
-    /// The runs held against the reference, by number; the reference's own is empty of differences.
+    /// Comparisons of all runs with the reference, by run index; the reference's own is empty.
     pub(in crate::gui) fn comparisons(&mut self, ctx: &PanelContext<'_>) -> &[Comparison] {
         self.read(ctx);
         &self.comparisons
@@ -106,7 +107,7 @@ impl ComparisonPanel {
         self.scores.read(ctx.recording);
     }
 
-    /// The reference and the choice of what is shown.
+    /// The selectors of reference and view.
     fn controls_ui(&mut self, ui: &mut Ui, ctx: &PanelContext<'_>) -> View {
         let mut view = self.view.unwrap_or(View::All);
         ui.horizontal_wrapped(|ui| {
@@ -162,7 +163,7 @@ impl ComparisonPanel {
         }
     }
 
-    /// Numbers on the left; differences above pictures on the right.
+    /// Tables on the left; differences and images on the right.
     fn all_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
         const GAP: f32 = 10.0;
         let all = ui.available_rect_before_wrap();

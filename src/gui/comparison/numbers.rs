@@ -1,4 +1,4 @@
-//! The tables: accuracy of all runs, and where each parts from the reference.
+//! The tables: accuracy of all runs, and their first divergences from the reference.
 
 use egui::{Button, Grid, RichText, Ui, WidgetInfo, vec2};
 
@@ -7,7 +7,7 @@ use crate::gui::PanelContext;
 use crate::gui::units::{figure, fixed, seconds};
 use crate::session::{Command, Comparison, Divergence, Quantity};
 
-/// How a quantity is shown: the factor on the stored number, and the unit.
+/// Factor from stored to shown unit, and the shown unit.
 pub(super) fn shown(quantity: Quantity) -> (f64, &'static str) {
     match quantity {
         Quantity::ChainTranslation => (1e3, "mm"),
@@ -25,7 +25,7 @@ pub(super) fn difference_text(quantity: Quantity, apart: f64) -> String {
     format!("{number}{space}{unit}")
 }
 
-/// Accuracy of all runs; the best of a row is marked.
+/// Accuracy of all runs; the best value of a row is marked.
 pub(super) fn accuracy_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, scores: &Scores) {
     let theme = *ctx.theme;
     let runs = &ctx.recording.runs;
@@ -65,7 +65,7 @@ pub(super) fn accuracy_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, scores: &Scor
     }
 }
 
-/// Where each run parts from the reference, with ways to go there.
+/// The first divergences of each run, with buttons that move the cursor there.
 pub(super) fn divergences_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, reference: usize, comparisons: &[Comparison]) {
     let theme = *ctx.theme;
     let Some(base) = ctx.recording.runs.get(reference) else { return };
@@ -132,7 +132,7 @@ fn table_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, number: usize, own: &str, c
     });
 }
 
-/// A time that leads there; a dash where there is none.
+/// A stamp as a button that moves the cursor there; a dash without one.
 fn time_button(ui: &mut Ui, ctx: &mut PanelContext<'_>, stamp_ns: Option<i64>, name: &str) {
     let Some(stamp_ns) = stamp_ns else {
         ui.label(RichText::new("–").color(ctx.theme.text_weak));

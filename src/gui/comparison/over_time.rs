@@ -1,4 +1,4 @@
-//! The difference rows: how far each run is from the reference over time.
+//! Plots of the differences of each run from the reference over time.
 
 use egui::{Align2, Rect, ScrollArea, Shape, Stroke, Ui, pos2, vec2};
 
@@ -11,12 +11,12 @@ use crate::gui::plot::{
 use crate::gui::theme::{self, CURVE_WIDTH};
 use crate::session::{Comparison, Quantity};
 
-/// Height of a row in points, where there is room and where there is not.
+/// Range of the row height in points.
 const HEIGHTS: std::ops::RangeInclusive<f32> = 46.0..=120.0;
-/// Room for names and values on the left.
+/// Width of names and values on the left.
 const NAMES: f32 = 150.0;
 
-/// The quantities that are drawn.
+/// The plotted quantities.
 const DRAWN: [Quantity; 8] = [
     Quantity::Position,
     Quantity::Attitude,
@@ -28,7 +28,7 @@ const DRAWN: [Quantity; 8] = [
     Quantity::RankInformed,
 ];
 
-/// Curves by drawn quantity and run.
+/// Curves by plotted quantity and run.
 #[derive(Debug, Default)]
 pub(super) struct OverTime {
     curves: [Vec<Curve>; DRAWN.len()],
@@ -77,7 +77,7 @@ impl OverTime {
             curve.update(&area, comparison.epoch, &comparison.stamps_ns, comparison.column(quantity));
             most = most.max(curve.extent.map_or(0.0, |(_, most)| most));
         }
-        // Differences that are no more than rounding shall not look like a storm.
+        // Rounding errors are not magnified to the height of the plot.
         area = area.with_values(0.0, 1.15 * most.max(0.1 * quantity.notable()));
         let painter = ui.painter_at(whole);
         paint_ground(&painter, &theme, rect);

@@ -1,14 +1,14 @@
-//! How well each run does, as rows of one table with a column per run.
+//! The accuracy of all runs as table rows with a column per run.
 
 use crate::estimator::Phase;
 use crate::geometry::seconds_from_ns;
 use crate::gui::units::{figure, fixed};
 use crate::session::{ChainDistance, RELATIVE_LENGTHS_M, Recording, RunRecord, TrajectoryAccuracy};
 
-/// Steps that a run may grow by before its accuracy is computed anew.
+/// Number of new steps after which a run's accuracy is computed again.
 const STEPS_BETWEEN: usize = 20;
 
-/// One run's figures over its whole way so far.
+/// The values of one run over all its steps so far.
 #[derive(Debug, Default)]
 struct RunScore {
     id: u64,
@@ -23,7 +23,7 @@ struct RunScore {
     informed: Option<usize>,
 }
 
-/// The figures of all runs, kept until a run has grown.
+/// The values of all runs, cached until a run has new steps.
 #[derive(Debug, Default)]
 pub(crate) struct Scores {
     runs: Vec<RunScore>,
@@ -32,32 +32,32 @@ pub(crate) struct Scores {
 /// A row of the table.
 #[derive(Debug)]
 pub(crate) struct ScoreRow {
-    /// What it tells.
+    /// Name of the value.
     pub(crate) name: String,
-    /// Its unit, empty for counts.
+    /// Shown unit, empty for counts.
     pub(crate) unit: &'static str,
-    /// By run, in that unit.
+    /// Values by run, in the shown unit.
     pub(crate) values: Vec<Option<f64>>,
-    /// Whether less is better; `None` where neither is.
+    /// Whether smaller is better; `None` where the value is no measure of quality.
     pub(super) less_is_better: Option<bool>,
-    /// Digits behind the point, `None` for three significant ones.
+    /// Decimals, `None` for three significant digits.
     pub(super) decimals: Option<usize>,
 }
 
 impl ScoreRow {
-    /// A value as it is shown.
+    /// The shown text of a value.
     pub(crate) fn text(&self, run: usize) -> String {
         let value = self.values.get(run).copied().flatten();
         value.map_or_else(|| "–".to_owned(), |value| self.decimals.map_or_else(|| figure(value), |it| fixed(value, it)))
     }
 
-    /// The run that does best, where runs differ in it.
+    /// Index of the best run, `None` where no run is better.
     pub(crate) fn best(&self) -> Option<usize> {
         let less = self.less_is_better?;
         let known = || self.values.iter().enumerate().filter_map(|(run, value)| Some((run, (*value)?)));
         let better = |a: &f64, b: &f64| if less { a.total_cmp(b) } else { b.total_cmp(a) };
         let (best, value) = known().min_by(|(_, a), (_, b)| better(a, b))?;
-        // What looks the same is no better.
+        // Equal texts count as equal values.
         let differs = |run: usize, other: f64| other != value && self.text(run) != self.text(best);
         let alone = known().count() > 1 && known().all(|(run, other)| run == best || differs(run, other));
         alone.then_some(best)
@@ -65,7 +65,7 @@ impl ScoreRow {
 }
 
 impl Scores {
-    /// Brings the figures up to date.
+    /// Updates the values.
     pub(super) fn read(&mut self, recording: &Recording) {
         self.runs.resize_with(recording.runs.len(), RunScore::default);
         for (score, run) in self.runs.iter_mut().zip(&recording.runs) {
@@ -77,7 +77,7 @@ impl Scores {
         }
     }
 
-    /// The table.
+    /// The rows of the table.
     pub(crate) fn rows(&self) -> Vec<ScoreRow> {
         let row = |name: &str, unit: &'static str, less, decimals, of: &dyn Fn(&RunScore) -> Option<f64>| ScoreRow {
             name: name.to_owned(),

@@ -1,4 +1,4 @@
-//! Images and scenes of all runs beside each other, looked at in the same way.
+//! Images and scenes of all runs side by side, with one common view.
 
 use egui::{Rect, RichText, Ui, UiBuilder, pos2, vec2};
 
@@ -6,11 +6,11 @@ use crate::gui::image_panel::ImagePanel;
 use crate::gui::scene::ScenePanel;
 use crate::gui::{PanelContext, Selection};
 
-/// Narrowest that a run's picture may be before they go two by two.
+/// Minimum width of a run's cell; below it the cells form two rows.
 const NARROWEST: f32 = 250.0;
 const GAP: f32 = 6.0;
 
-/// Images side by side; zoom, part and marks are those of the one that was changed last.
+/// Images side by side; zoom, position and options follow the image that was changed last.
 #[derive(Default)]
 pub(super) struct Images {
     lead: ImagePanel,
@@ -36,7 +36,7 @@ impl Images {
     }
 }
 
-/// Scenes side by side, seen from where the one that was turned last is seen from.
+/// Scenes side by side; the viewpoint follows the scene that was changed last.
 #[derive(Default)]
 pub(super) struct Scenes {
     lead: ScenePanel,
@@ -64,9 +64,9 @@ impl Scenes {
     }
 }
 
-/// Draws something for each run in a cell of its own, with that run as the shown one.
+/// Draws each run in its own cell, as the shown run.
 ///
-/// What is selected in one cell is selected in all: features in those whose runs watch the same camera.
+/// A selection in one cell applies to all: features only to runs on the same camera.
 fn each_run(ui: &mut Ui, ctx: &mut PanelContext<'_>, mut draw: impl FnMut(&mut Ui, &mut PanelContext<'_>, usize)) {
     let all = ui.available_rect_before_wrap();
     ui.advance_cursor_after_rect(all);
@@ -76,7 +76,7 @@ fn each_run(ui: &mut Ui, ctx: &mut PanelContext<'_>, mut draw: impl FnMut(&mut U
         let shown = ctx.selection.run;
         let kin = camera_of(run) == camera_of(shown);
         let feature = ctx.selection.feature.filter(|_| kin);
-        // Only the shown run's chain can be moved.
+        // The slide applies only to the chain of the shown run.
         let slide = ctx.selection.slide.filter(|_| run == shown);
         let before = Selection { feature, run, slide, ..ctx.selection.clone() };
         let mut selection = before.clone();
@@ -99,7 +99,7 @@ fn each_run(ui: &mut Ui, ctx: &mut PanelContext<'_>, mut draw: impl FnMut(&mut U
     }
 }
 
-/// The cells of so many runs: one row where they are wide enough, else two.
+/// The cells: one row where they are wide enough, else two.
 fn cells(all: Rect, count: usize) -> Vec<Rect> {
     let columns = if count > 2 && all.width() < NARROWEST * count as f32 { 2 } else { count.max(1) };
     let rows = count.div_ceil(columns);

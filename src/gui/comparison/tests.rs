@@ -1,4 +1,4 @@
-//! The comparison panel, asked by labels.
+//! The comparison panel, tested by its labels.
 
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
@@ -70,7 +70,7 @@ fn numbers_tell_accuracy_and_lead_to_where_runs_part() {
     harness.get_by_label(&label).click();
     harness.run_steps(2);
     assert_eq!(harness.state().commands, [Command::Seek { stamp_ns: first_ns }]);
-    // The other way round they part at the same frame.
+    // With the reference exchanged they diverge at the same frame.
     harness.state_mut().panel.reference = 1;
     harness.run_steps(2);
     assert!(harness.query_by_label("auto against classical").is_some());

@@ -1,4 +1,4 @@
-//! The calibration over time, one step a row.
+//! The calibration over time, one step per row.
 
 use super::ConvergencePanel;
 use crate::gimbal::ParameterId;
@@ -7,7 +7,8 @@ use crate::gui::chain_values::true_values;
 use crate::gui::csv_table::{CsvTable, Table, number, seconds};
 
 impl CsvTable for ConvergencePanel {
-    /// The calibration of the shown run over the whole recording, with the truth in the columns of the cursor's chart.
+    /// The calibration of the shown run over the whole recording, with the ground truth in the parameterization at the
+    /// cursor.
     fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {
         let Some(run) = ctx.selected_run() else { return String::new() };
         let ground_truth = true_values(ctx.recording, run, ctx.cursor_ns).unwrap_or_default();

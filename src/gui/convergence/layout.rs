@@ -1,33 +1,33 @@
-//! Where each parameter's small plot goes.
+//! Layout of the small plots of the parameters.
 
 use egui::{Rect, pos2, vec2};
 
 use super::names::{ChainPart, part_of};
 use crate::gimbal::ParameterId;
 
-/// The lowest plot that can still be read, in points, its heading included.
+/// Minimum height of a legible plot in points, its title included.
 const LOWEST_CELL: f32 = 52.0;
-/// The narrowest plot that can still be read.
+/// Minimum width of a legible plot in points.
 const NARROWEST_CELL: f32 = 118.0;
-/// Space between plots.
+/// Gap between plots in points.
 const GAP: f32 = 5.0;
-/// Width of the part names beside rows by part.
+/// Width of the headings beside the rows.
 pub(crate) const HEADING_WIDTH: f32 = 46.0;
 
-/// The places of the plots.
+/// Rectangles of the plots.
 #[derive(Debug, PartialEq)]
 pub(crate) struct Layout {
     /// One cell per parameter, in order.
     pub(crate) cells: Vec<Rect>,
-    /// Rows by part of the chain, with the heading's place; empty when the plots flow.
+    /// Rows by part of the chain, with the rectangle of the heading; empty in the flowing layout.
     pub(crate) headings: Vec<(ChainPart, Rect)>,
-    /// The largest room that rows by part leave free.
+    /// The largest free rectangle of the layout by rows.
     pub(crate) legend: Option<Rect>,
-    /// Height of everything: more than was available when it has to be scrolled.
+    /// Total height, more than available if it has to be scrolled.
     pub(crate) height: f32,
 }
 
-/// Lays out one cell per parameter (sorted along the chain): a row per part of the chain when that fits, else flowing.
+/// Lays out one cell per parameter (sorted along the chain): one row per part of the chain if that fits, else flowing.
 pub(crate) fn lay_out(parameters: &[ParameterId], available: Rect) -> Layout {
     by_part(parameters, available).unwrap_or_else(|| flowing(parameters.len(), available))
 }
@@ -44,7 +44,7 @@ fn by_part(parameters: &[ParameterId], available: Rect) -> Option<Layout> {
     let columns = rows.iter().map(|(_, count)| *count).max()?;
     let width = (available.width() - HEADING_WIDTH - GAP * columns as f32) / columns as f32;
     let height = (available.height() - GAP * (rows.len() as f32 - 1.0)) / rows.len() as f32;
-    // Rows by part leave holes: only worth it when plots stay well legible and few places are empty.
+    // The layout by rows leaves free cells; it is used only if plots stay legible and few cells are empty.
     let empty = rows.len() * columns - parameters.len();
     if rows.len() < 2
         || width < NARROWEST_CELL * 1.15
@@ -72,7 +72,7 @@ fn by_part(parameters: &[ParameterId], available: Rect) -> Option<Layout> {
     Some(layout)
 }
 
-/// First row, number of rows and number of columns of the largest room right of rows that are not full.
+/// First row, number of rows and number of columns of the largest free rectangle to the right of incomplete rows.
 fn free_corner(counts: &[usize], columns: usize) -> Option<(usize, usize, usize)> {
     let mut best: Option<(usize, usize, usize)> = None;
     for first in 0..counts.len() {

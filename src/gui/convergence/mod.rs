@@ -18,27 +18,27 @@ use super::chain_values::{ParameterValues, true_values};
 use super::plot::{BandCurve, Curve, StateCurve};
 use crate::gimbal::ParameterId;
 
-/// The curves of one parameter of one run.
+/// The cached curves of one parameter of one run.
 #[derive(Debug, Default)]
 struct ParameterCurves {
     value: Curve,
     band: BandCurve,
-    /// Where it is weak, unobservable, or not estimated yet.
+    /// Ranges in which it is weak, unobservable, or not estimated yet.
     states: [StateCurve; paint::MARKED.len()],
 }
 
-/// State of the convergence panel.
+/// State of the convergence panel: the calibration of each run over time, and its curves.
 #[derive(Debug, Default)]
 pub struct ConvergencePanel {
     histories: Vec<CalibrationHistory>,
-    /// The other runs in the parameterization of the one on screen.
+    /// The other runs in the parameterization of the shown one.
     converted: Vec<ConvertedHistory>,
     /// By run and parameter.
     curves: BTreeMap<(usize, ParameterId), ParameterCurves>,
 }
 
 impl ConvergencePanel {
-    /// Draws the panel.
+    /// Draws one plot per parameter of the shown run.
     pub fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
         self.histories.resize_with(ctx.recording.runs.len(), CalibrationHistory::default);
         for (history, run) in self.histories.iter_mut().zip(&ctx.recording.runs) {
@@ -56,7 +56,8 @@ impl ConvergencePanel {
             empty_ui(ui, "Waiting for the first step");
             return;
         }
-        // Only what the chart in use at the cursor estimates: after a switch the old chart's names are gone.
+        // Only the parameters of the parameterization at the cursor: after a switch the old ones are no longer
+        // estimated.
         let row = history.row_at(ctx.cursor_ns).unwrap_or(0);
         let mut parameters: Vec<ParameterId> = history
             .parameters
@@ -88,7 +89,7 @@ impl ConvergencePanel {
         }
     }
 
-    /// Brings the other runs into the parameterization that the shown run has at the cursor.
+    /// Converts the other runs to the parameterization of the shown run at the cursor.
     fn read_converted(&mut self, ctx: &PanelContext<'_>, shown: usize) {
         let runs = &ctx.recording.runs;
         let chart = |run: usize| {
@@ -131,7 +132,7 @@ impl ConvergencePanel {
     }
 }
 
-/// A panel that has nothing to show says why.
+/// Shows the reason why a panel has no content.
 pub(crate) fn empty_ui(ui: &mut Ui, why: &str) {
     ui.centered_and_justified(|ui| ui.label(RichText::new(why).weak()));
 }

@@ -10,26 +10,26 @@ use crate::observability::RankReport;
 use crate::sensors::Rig;
 use crate::session::{RunRecord, StepRecord};
 
-/// A parameter counts as lost to a set of directions when this much of its squared unit vector lies in them.
+/// A parameter counts as lost when at least this ratio of its squared unit vector lies in the span of the directions.
 const LOST_SHARE: f64 = 0.25;
 
-/// What a step could say about a parameter.
+/// Observability of a parameter in a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Knowledge {
-    /// The window informs it beyond the prior.
+    /// The window constrains it more than the prior.
     Informed,
-    /// Held at its value.
+    /// Fixed at its value.
     Held,
-    /// Too weakly seen in the window to beat the prior.
+    /// The window constrains it less than the prior.
     Weak,
-    /// Not seen at all: it lies in a structural null direction.
+    /// Unobservable: it lies in a structural null direction.
     Unobservable,
-    /// The estimator still initializes.
+    /// The estimator is not initialized yet.
     Waiting,
 }
 
 impl Knowledge {
-    /// One word for a tag, empty when all is well.
+    /// A one-word tag, empty for an informed parameter.
     pub(crate) fn tag(self) -> &'static str {
         match self {
             Self::Informed => "",
@@ -44,15 +44,15 @@ impl Knowledge {
 /// One parameter over time.
 #[derive(Debug, Default)]
 pub(crate) struct ParameterHistory {
-    /// Value of each step; not-a-number where the chart has no such parameter.
+    /// Value by step; NaN where the parameterization has no such parameter.
     pub(crate) values: Vec<f64>,
-    /// Value minus three standard deviations.
+    /// Value minus 3σ.
     pub(crate) lower: Vec<f64>,
-    /// Value plus three standard deviations.
+    /// Value plus 3σ.
     pub(crate) upper: Vec<f64>,
-    /// Standard deviation.
+    /// Standard deviation by step.
     pub(crate) sigmas: Vec<f64>,
-    /// What each step could say.
+    /// Observability by step.
     pub(crate) knowledge: Vec<Knowledge>,
 }
 
@@ -62,16 +62,16 @@ pub(crate) struct CalibrationHistory {
     follower: Follower,
     /// Stamps of the steps.
     pub(crate) stamps_ns: Vec<i64>,
-    /// The parameters in order of their first appearance.
+    /// The parameters, in the order of their first appearance.
     pub(crate) parameters: Vec<(ParameterId, ParameterHistory)>,
-    /// Changes when steps were forgotten.
+    /// Changes when steps were removed.
     pub(crate) epoch: u64,
-    /// The values of the last step, so that angles go on where they were.
+    /// Values of the last step, with which angles are unwrapped.
     last: ParameterValues,
 }
 
 impl CalibrationHistory {
-    /// Reads the steps that have come since the last call.
+    /// Reads the steps that are new since the last call.
     pub(crate) fn read(&mut self, run: &RunRecord) {
         let news = self.follower.news(run);
         if news.restarted {
@@ -118,18 +118,18 @@ impl CalibrationHistory {
         self.last = values;
     }
 
-    /// One parameter.
+    /// The history of one parameter.
     pub(crate) fn parameter(&self, parameter: ParameterId) -> Option<&ParameterHistory> {
         self.parameters.iter().find(|(known, _)| *known == parameter).map(|(_, history)| history)
     }
 
-    /// The row at or before a time.
+    /// The row at or before a stamp.
     pub(crate) fn row_at(&self, stamp_ns: i64) -> Option<usize> {
         self.stamps_ns.partition_point(|stamp| *stamp <= stamp_ns).checked_sub(1)
     }
 }
 
-/// A run's calibration told in another run's parameterization.
+/// A run's calibration in the parameterization of another run.
 #[derive(Debug, Default)]
 pub(crate) struct ConvertedHistory {
     follower: Follower,
@@ -138,16 +138,16 @@ pub(crate) struct ConvertedHistory {
     pub(crate) stamps_ns: Vec<i64>,
     /// Values of the steps by parameter.
     pub(crate) values: BTreeMap<ParameterId, Vec<f64>>,
-    /// Changes when steps were forgotten; differs from every epoch of a [`CalibrationHistory`].
+    /// Changes when steps were removed; differs from every epoch of a [`CalibrationHistory`].
     pub(crate) epoch: u64,
     last: ParameterValues,
 }
 
 impl ConvertedHistory {
-    /// Reads the steps that have come since the last call, or all when the parameterization is another one.
+    /// Reads the steps that are new since the last call, or all steps when the parameterization has changed.
     ///
-    /// Before the estimator tracks, its calibration is the rig's: nothing to compare. Of the equivalent numbers of the
-    /// classical form those nearest to the rig's are told, as a classical run counts.
+    /// Steps before the estimator tracks are skipped: their calibration is the rig's. Of several equivalent values of
+    /// the classical parameterization it takes those nearest to the rig's, as a classical run does.
     pub(crate) fn read(&mut self, run: &RunRecord, rig: &Rig, target: Parameterization) {
         const APART: u64 = 1 << 63;
         if self.target.as_ref().is_none_or(|(known, _)| *known != target) {
@@ -198,7 +198,7 @@ impl ParameterHistory {
     }
 }
 
-/// What a step could say about each parameter, `None` while initializing.
+/// Observability of each parameter, `None` during initialization.
 pub(crate) fn knowledge(rank: Option<&RankReport>) -> Option<BTreeMap<ParameterId, Knowledge>> {
     let rank = rank?;
     let share = |column: usize, structural_only: bool| -> f64 {

@@ -1,18 +1,18 @@
-//! Parameters: their order along the chain and what they mean.
+//! Order of the parameters along the chain, and their meanings.
 
 use crate::gimbal::{ParameterId, ParameterPart, Quantity};
 use crate::sensors::Rig;
 
-/// Where a parameter belongs.
+/// The part of the chain that a parameter belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum ChainPart {
     /// Between the IMU and the first joint.
     Base,
     /// A link, counted from 1.
     Link(usize),
-    /// Between the last joint and the camera, and what else there is.
+    /// Between the last joint and the camera, and time offsets.
     End,
-    /// The mount of a rigid camera that is watched beside the gimballed one.
+    /// The extrinsics of a second, rigid camera.
     Rigid,
 }
 
@@ -26,7 +26,7 @@ pub(crate) fn part_of(parameter: ParameterId) -> ChainPart {
     }
 }
 
-/// A short heading of a part.
+/// A short heading for a part of the chain.
 pub(crate) fn heading_of(part: ChainPart, rig: &Rig) -> String {
     match part {
         ChainPart::Base => "base".to_owned(),
@@ -41,7 +41,7 @@ fn joint_name(number: usize, rig: &Rig) -> Option<&str> {
     joints.get(number.checked_sub(1)?).map(|joint| joint.name.as_str())
 }
 
-/// What a parameter means, in words.
+/// The meaning of a parameter in words.
 pub(crate) fn meaning_of(parameter: ParameterId, rig: &Rig) -> String {
     let part = part_of(parameter);
     let kind = match parameter.quantity {

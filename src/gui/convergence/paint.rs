@@ -1,4 +1,4 @@
-//! One small plot: a parameter's value with its ±3σ band, the truth, and where nothing informs it.
+//! Painting of one small plot: value with ±3σ band, ground truth, and where the parameter is not informed.
 
 use std::collections::BTreeMap;
 
@@ -18,7 +18,7 @@ use crate::gui::plot::{
 use crate::gui::theme::{self, CURVE_WIDTH};
 use crate::gui::units::{Shown, fixed};
 
-/// Height of the strip at the foot of a plot.
+/// Height of the state strip at the bottom of a plot.
 const STRIP_HEIGHT: f32 = 3.0;
 /// Height of the line with name and value.
 const TITLE_HEIGHT: f32 = 15.0;
@@ -26,7 +26,7 @@ const TITLE_HEIGHT: f32 = 15.0;
 /// States that are marked in the plots.
 pub(super) const MARKED: [Knowledge; 3] = [Knowledge::Weak, Knowledge::Unobservable, Knowledge::Waiting];
 
-/// The name of a part of the chain beside its row.
+/// The heading of a row.
 pub(super) fn heading(ui: &Ui, ctx: &PanelContext<'_>, part: ChainPart, rect: Rect) {
     let painter = ui.painter();
     let theme = ctx.theme;
@@ -35,7 +35,7 @@ pub(super) fn heading(ui: &Ui, ctx: &PanelContext<'_>, part: ChainPart, rect: Re
     painter.text(place, Align2::LEFT_TOP, heading_of(part, &ctx.recording.rig), theme::label_font(), theme.text_weak);
 }
 
-/// What the lines and signs mean, where rows by part of the chain leave room.
+/// The legend of lines and marks, where the layout has room for it.
 pub(super) fn legend(ui: &Ui, ctx: &PanelContext<'_>, rect: Rect) {
     const LINE: f32 = 15.0;
     let theme = ctx.theme;
@@ -80,15 +80,15 @@ pub(super) fn legend(ui: &Ui, ctx: &PanelContext<'_>, rect: Rect) {
     }
 }
 
-/// What the plots tell.
+/// The data of the plots.
 pub(super) struct Told<'a> {
     /// The calibration of each run in its own parameterization.
     pub(super) histories: &'a [CalibrationHistory],
-    /// The runs that have another parameterization than the shown one, told in that.
+    /// The runs in another parameterization than the shown one, converted to it.
     pub(super) converted: &'a [ConvertedHistory],
-    /// True values in the shown run's parameterization.
+    /// Ground-truth values in the shown run's parameterization.
     pub(super) ground_truth: &'a ParameterValues,
-    /// The run on screen.
+    /// Index of the shown run.
     pub(super) shown: usize,
 }
 
@@ -104,7 +104,7 @@ impl<'a> Told<'a> {
         Some((history.epoch, &history.stamps_ns, &history.parameter(parameter)?.values))
     }
 
-    /// What the other runs say at the cursor, and whether the axis reaches that far.
+    /// Values of the other runs at the cursor, and whether they are inside the plot.
     fn others_lines(
         &self,
         ctx: &PanelContext<'_>,
@@ -125,7 +125,7 @@ impl<'a> Told<'a> {
     }
 }
 
-/// Draws the plot of one parameter and lets the pointer select it.
+/// Draws the plot of one parameter; a click selects the parameter.
 pub(super) fn cell_ui(
     ui: &Ui,
     ctx: &mut PanelContext<'_>,
@@ -179,7 +179,7 @@ pub(super) fn cell_ui(
         let line = [pos2(plot.left(), y), pos2(plot.right(), y)];
         paint_line(&inner, &line, theme.ground_truth_style(), CURVE_WIDTH);
     }
-    // The shown run comes last, on top.
+    // The shown run is drawn last, on top.
     for run in overlaid.iter().filter(|run| **run != shown_run).chain([&shown_run]) {
         if let Some(curves) = curve_of(*run) {
             paint_curve(&inner, &area, &curves.value, theme.run(*run), CURVE_WIDTH);
@@ -233,7 +233,7 @@ pub(super) fn cell_ui(
     });
 }
 
-/// The distance from the truth, with its sign, and in standard deviations.
+/// The signed error against the ground truth, also in standard deviations.
 fn error_text(shown: Shown, error: f64, sigma: f64) -> String {
     let times = error.abs() / sigma;
     let value = shown.value(error, sigma);
@@ -241,7 +241,7 @@ fn error_text(shown: Shown, error: f64, sigma: f64) -> String {
     if times.is_finite() { format!("{text} ({times:.1}σ) off") } else { format!("{text} off") }
 }
 
-/// Hatched where nothing informs the parameter; a strip at the foot tells why.
+/// Hatches the ranges in which the parameter is not informed; a strip at the bottom shows the state.
 fn paint_knowledge(painter: &egui::Painter, theme: &theme::Theme, area: &PlotArea, curves: &ParameterCurves) {
     for (stretches, state) in curves.states.iter().zip(MARKED) {
         for stretch in stretches.on_screen(area) {
@@ -299,7 +299,7 @@ fn fixed_value(shown: Shown, value: f64, sigma: f64) -> String {
     text.strip_suffix(shown.unit).map_or_else(|| fixed(value, 2), str::to_owned)
 }
 
-/// Text on a ground of its own, so that it can be read over curves.
+/// Text with a background, legible over curves.
 fn boxed_text(painter: &egui::Painter, theme: &theme::Theme, place: Pos2, align: Align2, text: &str, color: Color32) {
     let galley = painter.layout_no_wrap(text.to_owned(), FontId::new(9.5, FontFamily::Proportional), color);
     let rect = align.anchor_size(place, galley.size());

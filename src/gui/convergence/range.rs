@@ -1,4 +1,4 @@
-//! Which values a small plot spans, and where another run's curve leaves it.
+//! Value range of a small plot, and marks where another run's curve leaves it.
 
 use egui::{Painter, Rangef, Shape, Stroke, pos2};
 
@@ -6,10 +6,10 @@ use super::model::ParameterHistory;
 use crate::gui::plot::{Curve, PlotArea};
 use crate::gui::theme::RunStyle;
 
-/// Other runs widen a plot on either side by at most this much of what the run on screen spans itself.
+/// Other runs extend the range on either side by at most this ratio of the shown run's own range.
 const WIDENING: f64 = 0.5;
 
-/// Least and greatest value, `None` while there is none.
+/// Smallest and largest value, `None` without values.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Extent(Option<(f64, f64)>);
 
@@ -19,11 +19,11 @@ impl Extent {
     }
 }
 
-/// The values to show.
+/// The value range of the plot.
 ///
-/// The axis follows the run on screen: its curve (`own`), the truth, and its band around the last value, which keeps the wide
-/// bands of the beginning from flattening everything. A run that was converted from another form can lie far away, where only
-/// the direction is told: the others widen the axis a little and no more.
+/// It contains the shown run's curve (`own`), the ground truth, and the band around the last value; the wide bands of
+/// the first steps would flatten everything else. A run that was converted from another parameterization can lie far
+/// away: the others extend the range a little at most.
 pub(super) fn value_range(
     own: Option<(f64, f64)>,
     ground_truth: Option<f64>,
@@ -42,7 +42,7 @@ pub(super) fn value_range(
     let own = Extent::of(own.into_iter().chain(ground_truth).chain(last));
     let (mut low, mut high) = own.0.unwrap_or((f64::INFINITY, f64::NEG_INFINITY));
     let span = high - low;
-    // A held value alone spans nothing: then the others decide.
+    // A constant value has no range of its own: then the others decide.
     let room = if span > 0.0 { WIDENING * span } else { f64::INFINITY };
     let (least, most) = (low - room, high + room);
     if let Extent(Some((others_low, others_high))) = Extent::of(others) {
@@ -53,7 +53,7 @@ pub(super) fn value_range(
     (low - margin, high + margin)
 }
 
-/// Stretches of the screen in which a curve lies above the plot, and in which it lies below.
+/// Horizontal ranges in which a curve lies above the plot, and in which it lies below.
 fn outside(area: &PlotArea, curve: &Curve) -> [Vec<Rangef>; 2] {
     let mut found = [Vec::new(), Vec::new()];
     for stretch in &curve.stretches {
@@ -111,13 +111,13 @@ mod tests {
         };
         let (low, high) = range(&[], None);
         assert!(low < 0.0 && low > -0.2 && high > 1.45 && high < 1.6, "{low} {high}");
-        // A run near by is seen whole, one far away moves the axis by half its height at most.
+        // A nearby run is completely visible; a distant one extends the range by at most half its height.
         assert!(range(&[(-0.2, 1.0)], None).0 < -0.2);
         let (least, most) = range(&[(-90.0, 400.0)], None);
         assert!(least > -1.0 && most < 2.5, "{least} {most}");
-        // The truth is always seen.
+        // The ground truth is always visible.
         assert!(range(&[], Some(-9.0)).0 < -9.0);
-        // What is held spans nothing by itself.
+        // A fixed value has no range of its own.
         let held = history(&[2.0, 2.0], f64::NAN);
         let (low, high) = value_range(Some((2.0, 2.0)), None, [(1.0, 3.0)].into_iter(), &held);
         assert!(low < 1.0 && high > 3.0);

@@ -19,22 +19,22 @@ use super::units::figure;
 use super::{PanelContext, slide};
 use crate::sensors::GrayImage;
 
-/// Furthest that the image can be magnified over its fitting size.
+/// Maximum magnification relative to the fitted size.
 const LARGEST_ZOOM: f32 = 16.0;
-/// Width that a row of all options needs, in points.
+/// Width in points of the row with all options.
 const OPTIONS_WIDTH: f32 = 395.0;
-/// Height of the legend and of the caption in points.
+/// Height of legend and caption in points.
 const LINE_HEIGHT: f32 = 18.0;
 
-/// The image panel: what is shown of the tracks, and which part of the image.
+/// State of the image panel: options of the overlay, and the visible region of the image.
 pub struct ImagePanel {
-    /// Whose residuals.
+    /// Residuals before or after the solve.
     pub side: SolveSide,
-    /// Residuals are drawn this many times as long as they are.
+    /// Magnification of the residuals.
     pub magnification: f32,
     /// Draw residuals.
     pub residuals: bool,
-    /// Draw where tracks come from.
+    /// Draw the track trails.
     pub tails: bool,
     /// Write every feature's id.
     pub ids: bool,
@@ -56,12 +56,12 @@ impl Default for ImagePanel {
     }
 }
 
-/// Which part of the image is seen.
+/// The visible region of the image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct View {
-    /// Size over the size that fits.
+    /// Size relative to the fitted size.
     zoom: f32,
-    /// What lies in the middle, as fractions of the image.
+    /// Centre of the region as fractions of the image size.
     centre: Vec2,
 }
 
@@ -77,20 +77,20 @@ struct CachedTexture {
 }
 
 impl ImagePanel {
-    /// A panel that shows the same and holds no texture of a window.
+    /// A panel with the same view and no texture of a window.
     pub(in crate::gui) fn view_copy(&self) -> Self {
         let Self { side, magnification, residuals, tails, ids, view, .. } = *self;
         Self { side, magnification, residuals, tails, ids, view, texture: None }
     }
 
-    /// Shows its own image as another panel shows its.
+    /// Copies the view of another panel.
     pub(in crate::gui) fn follow(&mut self, other: &Self) {
         let Self { side, magnification, residuals, tails, ids, view, .. } = *other;
         let texture = self.texture.take();
         *self = Self { side, magnification, residuals, tails, ids, view, texture };
     }
 
-    /// Whether it shows its image as another panel does.
+    /// Whether it has the view of another panel.
     pub(in crate::gui) fn looks_like(&self, other: &Self) -> bool {
         let look = |panel: &Self| {
             let Self { side, magnification, residuals, tails, ids, view, .. } = *panel;
@@ -99,7 +99,7 @@ impl ImagePanel {
         look(self) == look(other)
     }
 
-    /// Draws the panel into what is left of `ui`.
+    /// Draws options, image, overlay and legend.
     pub fn ui(&mut self, ui: &mut Ui, context: &mut PanelContext<'_>) {
         let Some(run) = context.recording.runs.get(context.selection.run) else {
             message_ui(ui, "No run to show");
@@ -143,7 +143,7 @@ impl ImagePanel {
         });
     }
 
-    /// What is drawn over the image: in a row where there is room, else in a menu.
+    /// The options of the overlay: in a row where there is room, else in a menu.
     fn options_ui(&mut self, ui: &mut Ui) {
         ui.checkbox(&mut self.residuals, "Residuals");
         ui.spacing_mut().slider_width = 70.0;
@@ -201,7 +201,7 @@ impl ImagePanel {
         self.pick_ui(ui, &painter, &place, response, context, model);
     }
 
-    /// Hover, click and the selected feature.
+    /// Tooltip, click, and the selected feature.
     fn pick_ui(
         &self,
         ui: &Ui,
@@ -211,7 +211,7 @@ impl ImagePanel {
         context: &mut PanelContext<'_>,
         model: &ImageModel,
     ) {
-        /// How near the pointer must be, in points.
+        /// Maximum distance of the pointer from a feature in points.
         const REACH: f32 = 10.0;
         let nearest = response.hover_pos().and_then(|pointer| {
             model
@@ -240,7 +240,7 @@ impl ImagePanel {
         }
     }
 
-    /// Wheel zooms about the pointer, dragging moves, a double click fits.
+    /// The wheel zooms about the pointer, dragging pans, a double click fits the image.
     fn navigate(&mut self, ui: &Ui, area: Rect, response: &egui::Response, size_px: [usize; 2]) {
         if response.double_clicked() {
             self.view = View::default();
@@ -250,7 +250,7 @@ impl ImagePanel {
             let factor = ui.input(|input| input.zoom_delta() * (input.smooth_scroll_delta().y * 0.004).exp());
             let zoom = (self.view.zoom * factor).clamp(1.0, LARGEST_ZOOM);
             if zoom != self.view.zoom {
-                // The place under the pointer stays there.
+                // The position under the pointer stays fixed.
                 let held = (pointer - before.rect.min) / before.rect.size();
                 self.view.centre = held + (self.view.centre - held) * (self.view.zoom / zoom);
                 self.view.zoom = zoom;

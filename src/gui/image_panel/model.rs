@@ -1,4 +1,4 @@
-//! What the image panel shows of one step, gathered from the report and the tracks.
+//! The content of the image panel for one step, collected from report and tracks.
 
 use nalgebra::Vector2;
 
@@ -7,15 +7,15 @@ use crate::frontend::{FeatureId, FrontEndStatistics};
 use crate::geometry::seconds_from_ns;
 use crate::session::RunRecord;
 
-/// How many images a track's tail reaches back.
+/// Length of a track trail in images.
 const TAIL_FRAMES: usize = 4;
 
-/// Which side of the solve the residuals are from.
+/// The state of the solve in which residuals are taken.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SolveSide {
     /// Before the solve.
     Before,
-    /// After it.
+    /// After the solve.
     #[default]
     After,
 }
@@ -24,20 +24,20 @@ pub enum SolveSide {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct FeatureMark {
     pub(super) id: FeatureId,
-    /// In how many images before this one it was seen.
+    /// Number of earlier images with an observation of it.
     pub(super) age: u32,
-    /// Where it was measured.
+    /// Measured position in pixels.
     pub(super) measured_px: Vector2<f64>,
-    /// Where it was in the images before, newest first.
+    /// Measured positions in earlier images, newest first.
     pub(super) tail_px: Vec<Vector2<f64>>,
-    /// What the solve made of it, `None` for a feature that took no part.
+    /// Its result of the solve, `None` for a feature that was not solved.
     pub(super) solved: Option<SolvedMark>,
 }
 
-/// What the solve made of a feature.
+/// The result of the solve for a feature.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SolvedMark {
-    /// Predicted minus measured in this image, `None` in the image that anchors the feature.
+    /// Predicted minus measured position in this image, `None` in the image that anchors the feature.
     pub(super) residual_before_px: Option<Vector2<f64>>,
     pub(super) residual_after_px: Option<Vector2<f64>>,
     pub(super) chi2: f64,
@@ -56,7 +56,7 @@ impl SolvedMark {
     }
 }
 
-/// Everything that is drawn over one image.
+/// The overlay of one image.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct ImageModel {
     pub(super) frame_index: usize,
@@ -64,18 +64,18 @@ pub(super) struct ImageModel {
     pub(super) phase: Phase,
     pub(super) keyframe: bool,
     pub(super) statistics: FrontEndStatistics,
-    /// Features that the solve rejected.
+    /// Number of features rejected in the solve.
     pub(super) rejected: usize,
     pub(super) rms_before_px: f64,
     pub(super) rms_after_px: f64,
-    /// Of the residuals after the solve: the mean square is led by the few bad ones.
+    /// Median of the residuals after the solve; the RMS is dominated by a few large ones.
     pub(super) median_after_px: f64,
-    /// Ordered by id.
+    /// Features in the order of their ids.
     pub(super) marks: Vec<FeatureMark>,
 }
 
 impl ImageModel {
-    /// The last step of a run at or before the cursor, `None` before the first.
+    /// The overlay of the last step at or before the cursor, `None` before the first.
     pub(super) fn at(run: &RunRecord, cursor_ns: i64) -> Option<Self> {
         let after = run.steps.partition_point(|step| step.report.stamp_ns <= cursor_ns);
         let earlier = run.steps.get(..after)?;
@@ -127,8 +127,8 @@ impl ImageModel {
         })
     }
 
-    /// `frame 120 · 6.000 s · keyframe · 98 tracked, 12 new, 9 lost, 5 rejected · RMS 0.93 px before, 0.40 px after the solve, median
-    /// 0.12 px`.
+    /// The text `frame 120 · 6.000 s · keyframe · 98 tracked, 12 new, 9 lost, 5 rejected · RMS 0.93 px before, 0.40 px
+    /// after the solve, median 0.12 px`.
     pub(super) fn caption(&self) -> String {
         let mut parts = vec![format!("frame {}", self.frame_index), format!("{:.3} s", seconds_from_ns(self.stamp_ns))];
         if self.keyframe {
@@ -149,7 +149,7 @@ impl ImageModel {
     }
 }
 
-/// `17 · age 42 · …`, one fact per line, for the pointer that rests on a feature.
+/// The tooltip of a feature: `17 · age 42 · …`, one value per line.
 pub(super) fn description(mark: &FeatureMark) -> String {
     let mut lines = vec![
         format!("feature {}", mark.id.0),

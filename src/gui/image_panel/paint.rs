@@ -1,4 +1,4 @@
-//! Paints tracks, residuals and the legend over an image.
+//! Painting of tracks, residuals and legend over an image.
 
 use egui::{Align2, Color32, Painter, Pos2, Rect, Shape, Stroke, pos2, vec2};
 use nalgebra::Vector2;
@@ -6,39 +6,39 @@ use nalgebra::Vector2;
 use super::model::{FeatureMark, SolveSide};
 use crate::gui::theme::{self, Theme, ThemeName};
 
-/// Age that gets the last colour, in frames.
+/// Age in frames with the last colour of the map.
 const OLDEST_AGE: f64 = 100.0;
-/// Ages named in the legend.
+/// Ages in the legend.
 const LEGEND_AGES: [u32; 4] = [0, 10, 40, 100];
-/// Radius of the ring of a feature in the solve, in points, where the image is large enough for it.
+/// Radius of the keypoint marker of a solved feature in points, where the image is large enough.
 const RING_RADIUS: f32 = 4.0;
-/// Radius of the ring in pixels of the image, so that rings do not hide a small image.
+/// Radius of the keypoint marker in image pixels, so that markers do not hide a small image.
 const RING_RADIUS_PX: f32 = 7.0;
-/// Radius of a feature that is only tracked.
+/// Radius in points of a feature that is only tracked.
 const DOT_RADIUS: f32 = 2.0;
-/// Shadow under bright marks, so that they are seen on light parts of the image.
+/// Shadow below bright marks, for bright regions of the image.
 const HALO: Color32 = Color32::from_black_alpha(150);
-/// Glow under dark marks, so that they are seen on dark parts of the image.
+/// Glow below dark marks, for dark regions of the image.
 const GLOW: Color32 = Color32::from_rgba_premultiplied(190, 190, 190, 190);
 
-/// Where image pixels lie on the screen.
+/// The rectangle of the image on the screen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ImagePlacement {
-    /// Where the whole image lies, perhaps larger than what is seen of it.
+    /// Rectangle of the whole image, which may be larger than the visible region.
     pub(super) rect: Rect,
-    /// Columns and rows of the image.
+    /// Width and height of the image in pixels.
     pub(super) size_px: [usize; 2],
 }
 
 impl ImagePlacement {
-    /// The screen position of an image position; pixel centres lie at whole numbers.
+    /// Screen position of an image position; pixel centres have integer coordinates.
     pub(super) fn position(&self, uv_px: &Vector2<f64>) -> Pos2 {
         let fraction = |at: f64, size: usize| ((at + 0.5) / size.max(1) as f64) as f32;
         let [width, height] = self.size_px;
         self.rect.lerp_inside(vec2(fraction(uv_px.x, width), fraction(uv_px.y, height)))
     }
 
-    /// Radius of the ring of a feature in the solve, in points.
+    /// Radius of the keypoint marker of a solved feature in points.
     pub(super) fn ring_radius(&self) -> f32 {
         (RING_RADIUS_PX * self.scale()).clamp(0.5 * RING_RADIUS, RING_RADIUS)
     }
@@ -49,7 +49,7 @@ impl ImagePlacement {
     }
 }
 
-/// What is drawn of each feature.
+/// Options of the marks of a feature.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct MarkOptions {
     pub(super) side: SolveSide,
@@ -64,13 +64,13 @@ pub(super) fn age_color(age: u32) -> Color32 {
     theme::viridis((f64::from(age) / OLDEST_AGE).sqrt())
 }
 
-/// What lies under a mark of a colour.
+/// The colour below a mark.
 fn halo_of(color: Color32) -> Color32 {
     let [red, green, blue, _] = color.to_array().map(u32::from);
     if 2 * red + 5 * green + blue < 900 { GLOW } else { HALO }
 }
 
-/// The image is its own ground, so what lies on it has the same colours in every theme.
+/// The theme of the overlay: the image is its background in every theme, so its colours are the same.
 fn ink() -> Theme {
     Theme::of(ThemeName::Dark)
 }
@@ -79,7 +79,7 @@ fn residual_color() -> Color32 {
     ink().runs[1]
 }
 
-/// One feature: tail, ring, residual, cross, id.
+/// One feature: trail, keypoint marker, residual, cross, id.
 pub(super) fn feature(painter: &Painter, place: &ImagePlacement, mark: &FeatureMark, options: &MarkOptions) {
     let at = place.position(&mark.measured_px);
     let (color, ring) = (age_color(mark.age), place.ring_radius());
@@ -89,7 +89,7 @@ pub(super) fn feature(painter: &Painter, place: &ImagePlacement, mark: &FeatureM
         painter.add(Shape::line(points, Stroke::new(1.0, color.gamma_multiply(0.8))));
     }
     if let Some(solved) = &mark.solved {
-        // Small rings are thin rings.
+        // Small markers have thin lines.
         let thickness = 0.5 * ring;
         painter.circle_stroke(at, ring, Stroke::new(thickness + 1.5, halo_of(color)));
         painter.circle_stroke(at, ring, Stroke::new(thickness, color));
@@ -112,7 +112,7 @@ pub(super) fn feature(painter: &Painter, place: &ImagePlacement, mark: &FeatureM
     }
 }
 
-/// Where a feature is predicted with the chain moved along a direction: a cross, and a line from where it was predicted
+/// The predicted position of a feature for the chain moved along a direction: a cross, and a line from the prediction
 /// before.
 pub(super) fn moved_prediction(painter: &Painter, place: &ImagePlacement, now: &Vector2<f64>, moved: &Vector2<f64>) {
     let (from, to) = (place.position(now), place.position(moved));
@@ -128,7 +128,7 @@ fn upright_cross(painter: &Painter, at: Pos2, reach: f32, stroke: Stroke) {
     painter.line_segment([at - vec2(0.0, reach), at + vec2(0.0, reach)], stroke);
 }
 
-/// From the measurement to the (magnified) prediction, which gets a small diamond.
+/// A line from the measurement to the (magnified) prediction, with a diamond at its end.
 fn residual_arrow(painter: &Painter, from: Pos2, tip: Pos2) {
     let color = residual_color();
     painter.line_segment([from, tip], Stroke::new(3.0, HALO));
@@ -147,14 +147,14 @@ fn cross(painter: &Painter, at: Pos2, radius: f32) {
     }
 }
 
-/// A ring around the selected feature.
+/// A circle around the selected feature.
 pub(super) fn selection(painter: &Painter, place: &ImagePlacement, at: Pos2) {
     let radius = place.ring_radius() + 5.0;
     painter.circle_stroke(at, radius, Stroke::new(4.0, HALO));
     painter.circle_stroke(at, radius, Stroke::new(2.0, ink().cursor));
 }
 
-/// A text on the image with a dark plate under it.
+/// A text on the image with a dark background.
 pub(super) fn label(painter: &Painter, at: Pos2, align: Align2, text: &str) -> Rect {
     let galley = painter.layout_no_wrap(text.to_owned(), theme::label_font(), ink().text_strong);
     let rect = align.anchor_size(at, galley.size());
@@ -163,9 +163,9 @@ pub(super) fn label(painter: &Painter, at: Pos2, align: Align2, text: &str) -> R
     rect
 }
 
-/// The key to what the marks mean, in one line; what does not fit is left out from the right.
+/// The legend of the marks in one line; entries that do not fit are omitted from the right.
 ///
-/// `moved` says that predictions with a moved chain are drawn.
+/// `moved`: predictions with a moved chain are drawn.
 pub(super) fn legend(painter: &Painter, rect: Rect, theme: &Theme, options: &MarkOptions, moved: bool) {
     let painter = painter.with_clip_rect(rect);
     let mut pen = LegendPen { painter: &painter, theme, at: rect.left_center(), end: rect.right() };

@@ -12,7 +12,7 @@ use crate::gui::theme::{Theme, ThemeName};
 use crate::gui::{ImageSource, Selection};
 use crate::session::Recording;
 
-/// A recording of 80 frames; the last one is tracked.
+/// A recording of 80 frames; the estimator tracks in the last one.
 fn recording() -> Recording {
     sample_recording_of(80, &["auto"])
 }
@@ -111,9 +111,9 @@ fn a_click_selects_the_feature_under_it() {
         (ImagePanel::default(), Selection::default()),
     );
     harness.run();
-    // The image fills the width or the height of its area; look for a feature by trying its place.
+    // The image fills width or height of its area; a feature is searched by trying positions.
     let area = harness.ctx.globally_used_rect();
-    // What the pointer is told is the picture's description for those who do not see it.
+    // The tooltip is also the accessible description of the image.
     let told = |node: &AccessKitNode<'_>| node.description().is_some_and(|text| text.contains("residual after"));
     let mut found = None;
     'search: for row in 0..60 {

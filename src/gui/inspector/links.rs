@@ -1,4 +1,4 @@
-//! What is linked through the step's Jacobian: residuals, the features that they are of, and the parameters that move them.
+//! Links through the step's Jacobian: residuals, their features, and the parameters that they depend on.
 
 use std::sync::Arc;
 
@@ -13,10 +13,10 @@ use crate::gui::jacobian::cameras;
 use crate::gui::units::{Shown, figure, fixed};
 use crate::session::{RunRecord, StepRecord};
 
-/// Links shown of one thing.
+/// Number of links shown for a feature or parameter.
 const SHOWN: usize = 6;
 
-/// The Jacobian of the step that was asked for last.
+/// The Jacobian of the step that was requested last.
 #[derive(Debug, Default)]
 pub(super) struct Links {
     of: Option<(Arc<StepRecord>, Option<StepJacobian>)>,
@@ -31,7 +31,7 @@ impl Links {
         self.of.as_ref()?.1.as_ref()
     }
 
-    /// The features whose residuals follow a parameter most; a click selects one.
+    /// The features whose residuals depend most on a parameter; a click selects one.
     pub(super) fn of_parameter_ui(
         &mut self,
         ui: &mut Ui,
@@ -61,7 +61,7 @@ impl Links {
         }
     }
 
-    /// The parameters that a feature's residuals follow most; a click selects one.
+    /// The parameters on which a feature's residuals depend most; a click selects one.
     pub(super) fn of_feature_ui(
         &mut self,
         ui: &mut Ui,
@@ -89,7 +89,7 @@ impl Links {
     }
 }
 
-/// Links with the norms of their blocks; returns the one that was clicked.
+/// Links with the norms of their blocks; returns the clicked one.
 fn links_ui(
     ui: &mut Ui,
     ctx: &PanelContext<'_>,
@@ -110,7 +110,7 @@ fn links_ui(
     clicked
 }
 
-/// Each residual of a feature with its derivative by a parameter.
+/// The residuals of a feature with their derivatives with respect to a parameter.
 pub(super) fn block_ui(
     ui: &mut Ui,
     ctx: &PanelContext<'_>,
@@ -134,7 +134,7 @@ pub(super) fn block_ui(
     let lines = rows.frames.iter().enumerate().filter_map(|(place, frame)| {
         let seen = feature.observations.iter().find(|seen| seen.frame_index == frame.0)?;
         let residual = seen.residual_after_px.map_or([f64::NAN; 2], |residual| [residual.x, residual.y]);
-        // Back from standard deviations to pixels.
+        // Conversion from standard deviations to pixels.
         let pixels = report.pixel_sigma_px / seen.robust_weight.sqrt() / shown.factor;
         let slopes = [0, 1].map(|axis| figure(rows.rows[(2 * place + axis, column)] * pixels));
         let mut cells = vec![frame.to_string()];

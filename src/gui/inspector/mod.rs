@@ -1,4 +1,4 @@
-//! The inspector: all numbers of what is selected, and of the step at the cursor.
+//! The inspector: the values of the selection and of the step at the cursor.
 
 mod csv;
 mod feature;
@@ -19,13 +19,13 @@ use crate::session::{RunRecord, StepRecord};
 /// State of the inspector.
 #[derive(Debug, Default)]
 pub struct InspectorPanel {
-    /// Whether stage timings are shown: they differ from run to run, and pictures must not.
+    /// Whether stage times are shown. They differ between runs; screenshots must not.
     pub show_times: bool,
     links: Links,
 }
 
 impl InspectorPanel {
-    /// Draws the panel.
+    /// Draws one section per selected item, then the sections of the step.
     pub fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
         let recording = ctx.recording;
         let run = ctx.selection.run.min(recording.runs.len().saturating_sub(1));
@@ -74,13 +74,13 @@ impl InspectorPanel {
 }
 
 fn section_ui(ui: &mut Ui, theme: &Theme, title: &str, contents: impl FnOnce(&mut Ui)) {
-    // The first word names the section: it stays open or closed when another parameter or frame is shown.
+    // The first word identifies the section: it stays open or closed when another parameter or frame is shown.
     let salt = title.split(' ').next().unwrap_or(title);
     let title = RichText::new(title).strong().color(theme.text_strong);
     CollapsingHeader::new(title).id_salt(salt).default_open(true).show_unindented(ui, contents);
 }
 
-/// Rows of a name and its values, aligned.
+/// Aligned rows of a name and its values.
 fn rows_ui(ui: &mut Ui, theme: &Theme, salt: &str, rows: &[(String, Vec<String>)]) {
     Grid::new(salt).spacing(vec2(8.0, 1.0)).min_row_height(15.0).show(ui, |ui| {
         for (name, values) in rows {
@@ -93,7 +93,7 @@ fn rows_ui(ui: &mut Ui, theme: &Theme, salt: &str, rows: &[(String, Vec<String>)
     });
 }
 
-/// A table with headings.
+/// A table with column headings.
 fn table_ui(ui: &mut Ui, theme: &Theme, salt: &str, headings: &[&str], rows: impl Iterator<Item = Vec<String>>) {
     Grid::new(salt).striped(true).spacing(vec2(9.0, 1.0)).min_row_height(15.0).show(ui, |ui| {
         for heading in headings {

@@ -64,7 +64,7 @@ pub(super) fn frame_ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, ste
     }
 }
 
-/// What happened in the step, with the figures that decided it.
+/// The events of the step with the values that caused them.
 pub(super) fn events_ui(ui: &mut Ui, theme: &Theme, report: &StepReport) {
     if report.events.is_empty() && report.warnings.is_empty() {
         ui.label(RichText::new("Nothing happened").color(theme.text_weak));
@@ -96,7 +96,7 @@ pub(super) fn events_ui(ui: &mut Ui, theme: &Theme, report: &StepReport) {
     }
 }
 
-/// The solver's iterations.
+/// The iterations of the solver.
 pub(super) fn iterations_ui(ui: &mut Ui, theme: &Theme, report: &StepReport) {
     if report.iterations.is_empty() {
         ui.label(RichText::new("No solve in this step").color(theme.text_weak));
@@ -115,7 +115,7 @@ pub(super) fn iterations_ui(ui: &mut Ui, theme: &Theme, report: &StepReport) {
     table_ui(ui, theme, "iterations", &["", "cost before", "after", "step", "damping", ""], lines);
 }
 
-/// Milliseconds by stage.
+/// Stage times in milliseconds.
 pub(super) fn times_ui(ui: &mut Ui, theme: &Theme, report: &StepReport) {
     let times = &report.times;
     let row = |name: &str, value: f64| (name.to_owned(), vec![format!("{} ms", fixed(value, 1))]);

@@ -1,4 +1,4 @@
-//! The norms of the Jacobian's blocks, one factor a row.
+//! The norms of the Jacobian's blocks, one factor per row.
 
 use super::JacobianPanel;
 use super::{cameras, column_name, name_of};
@@ -6,7 +6,7 @@ use crate::gui::PanelContext;
 use crate::gui::csv_table::{CsvTable, Table};
 
 impl CsvTable for JacobianPanel {
-    /// Norms of the Jacobian's blocks, as the Jacobian panel counts them; zeros are left empty.
+    /// Norms of the Jacobian's blocks as in the panel; zeros are empty.
     fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {
         let Some(run) = ctx.selected_run() else { return String::new() };
         let Some(step) = run.step_at(ctx.cursor_ns) else { return String::new() };

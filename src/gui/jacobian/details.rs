@@ -1,4 +1,4 @@
-//! The numbers of a block and the residuals that it comes from.
+//! The values of a block and of its residuals.
 
 use egui::{Grid, Label, RichText, ScrollArea, Ui, vec2};
 
@@ -11,7 +11,7 @@ use crate::gui::PanelContext;
 use crate::gui::units::{Shown, figure, fixed};
 use crate::session::{RunRecord, StepRecord};
 
-/// A block in one line: what it is, its size and its norm.
+/// A block in one line: name, size and norm.
 pub(super) fn headline(model: &JacobianModel, row: usize, column: usize) -> String {
     let (of_row, block) = (&model.jacobian.rows[row], &model.jacobian.columns[column]);
     let norm = model.norm(row, column);
@@ -23,7 +23,7 @@ pub(super) fn headline(model: &JacobianModel, row: usize, column: usize) -> Stri
     format!("{name}: {} {} ({size})", figure(f64::from(norm)), scale_words(block.id))
 }
 
-/// What is known of the picked row, column or block.
+/// The values of the selected row, column or block.
 pub(super) fn ui(
     ui: &mut Ui,
     ctx: &PanelContext<'_>,
@@ -47,7 +47,7 @@ fn line_ui(ui: &mut Ui, ctx: &PanelContext<'_>, text: &str) {
     ui.add(Label::new(RichText::new(text).color(ctx.theme.text_strong)).wrap());
 }
 
-/// The parameters that a row speaks of most.
+/// The parameters with the largest norms in a row.
 fn strongest_columns(model: &JacobianModel, row: usize) -> String {
     const SHOWN: usize = 4;
     let of_row = &model.jacobian.rows[row];
@@ -67,7 +67,7 @@ fn strongest_columns(model: &JacobianModel, row: usize) -> String {
     if shown.is_empty() { format!("{name}: no parameter") } else { format!("{name}, strongest: {shown}") }
 }
 
-/// The rows that speak most of a column.
+/// The rows with the largest norms in a column.
 fn strongest_rows(model: &JacobianModel, column: usize) -> String {
     const SHOWN: usize = 4;
     let rows = 0..model.jacobian.rows.len();
@@ -115,7 +115,7 @@ fn block_ui(
     }
 }
 
-/// A row for each sighting: its residual, and how the pixel moves with the unknown.
+/// A row for each observation: its residual, and the derivatives of the pixel position with respect to the unknown.
 fn sightings_ui(
     ui: &mut Ui,
     ctx: &PanelContext<'_>,
@@ -137,7 +137,7 @@ fn sightings_ui(
         cells.extend([seen.measured_px.x, seen.measured_px.y].map(|pixel| fixed(pixel, 1)));
         cells.extend(residual.map(|pixel| fixed(pixel, 2)));
         cells.push(fixed(seen.robust_weight, 2));
-        // Back from standard deviations to pixels.
+        // Conversion from standard deviations to pixels.
         let pixels = step.report.pixel_sigma_px / seen.robust_weight.sqrt();
         for (part, (_, factor)) in parts.iter().enumerate() {
             let at = |axis: usize| rows.rows[(2 * place + axis, block.start + part)] * pixels / factor;
@@ -148,7 +148,7 @@ fn sightings_ui(
     numbers_ui(ui, ctx, &heads, lines);
 }
 
-/// A row for each encoder: its reading, its residual, and how that follows the unknown.
+/// A row for each encoder: its reading, its residual, and the derivatives of the residual with respect to the unknown.
 fn readings_ui(
     ui: &mut Ui,
     ctx: &PanelContext<'_>,
@@ -177,7 +177,7 @@ fn readings_ui(
     numbers_ui(ui, ctx, &["joint", "reading °", "estimate °", "σ °", "residual σ", "∂ σ/°"].map(str::to_owned), lines);
 }
 
-/// A table of numbers with headings.
+/// A table of numbers with column headings.
 pub(super) fn numbers_ui(
     ui: &mut Ui,
     ctx: &PanelContext<'_>,
@@ -198,7 +198,7 @@ pub(super) fn numbers_ui(
     });
 }
 
-/// The columns of a block: how they are shown, and how many shown units one stored unit is.
+/// The scalar columns of a block: the label of each, and its shown units per stored unit.
 fn parts_of(block: &ColumnBlock) -> Vec<(String, f64)> {
     let shown = |name: &str, dimension: Dimension| {
         let shown = Shown::of(dimension);

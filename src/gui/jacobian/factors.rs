@@ -1,5 +1,5 @@
-//! The numbers of the factors other than reprojection: a record keeps only the norms of their blocks, so the session
-//! recomputes the rows when one is picked.
+//! The rows of the factors other than reprojection. A record has only the norms of their blocks, so the session
+//! recomputes the rows of a selected factor.
 
 use egui::{RichText, Ui};
 
@@ -11,10 +11,10 @@ use crate::gui::PanelContext;
 use crate::gui::units::{Shown, figure, fixed};
 use crate::session::{Command, RunRecord};
 
-/// Rows of a block that are shown; a marginalization prior has over a hundred, the strongest come first.
+/// Maximum number of rows shown; a marginalization prior has over a hundred, the largest come first.
 const MOST_ROWS: usize = 40;
 
-/// Requests the rows of the picked factor of a step, by the step's number, while the record does not have them.
+/// Requests the rows of the selected factor of step `number` if the record does not have them.
 pub(super) fn request(ctx: &mut PanelContext<'_>, run: &RunRecord, number: Option<usize>, picked: JacobianFactor) {
     let kept = matches!(picked, JacobianFactor::Feature(_) | JacobianFactor::Encoder(_));
     let known = |step| run.factor_rows.as_ref().is_some_and(|rows| rows.step == step);
@@ -24,7 +24,7 @@ pub(super) fn request(ctx: &mut PanelContext<'_>, run: &RunRecord, number: Optio
     }
 }
 
-/// A row for each residual of the factor that the block is in: the residual, and its derivatives by the unknowns.
+/// A row for each residual of the block's factor: the residual, and its derivatives with respect to the unknowns.
 pub(super) fn block_ui(
     ui: &mut Ui,
     ctx: &PanelContext<'_>,
@@ -73,7 +73,8 @@ pub(super) fn block_ui(
     numbers_ui(ui, ctx, &heads, lines);
 }
 
-/// The columns of a block: the label of a residual's derivative by each, and how many shown units one stored unit is.
+/// The scalar columns of a block: the label of the derivative with respect to each, and its shown units per stored
+/// unit.
 fn parts_of(block: &ColumnBlock) -> Vec<(String, f64)> {
     let shown = |name: &str, dimension: Dimension| {
         let shown = Shown::of(dimension);

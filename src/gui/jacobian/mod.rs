@@ -1,6 +1,6 @@
-//! The Jacobian panel: the step's linearization by blocks, before anything is eliminated.
+//! The Jacobian panel: the linearization of a step by blocks, before elimination.
 //!
-//! Rows are the factors that residuals come from, columns the unknowns; a block is coloured by its norm.
+//! Rows are factors, columns are unknowns; the colour of a block is its norm.
 
 mod csv;
 mod details;
@@ -21,36 +21,36 @@ use super::convergence::empty_ui;
 use crate::estimator::{ColumnId, JacobianFactor};
 use crate::session::{RunRecord, StepRecord};
 
-/// Furthest that the picture can be magnified.
+/// Maximum magnification of the matrix.
 const LARGEST_ZOOM: f32 = 40.0;
-/// Room for the names of rows on the left and of columns above, in points.
+/// Width of the row names on the left and height of the column names above, in points.
 const ROW_NAMES: f32 = 104.0;
 const COLUMN_NAMES: f32 = 68.0;
-/// Height of the legend under the picture.
+/// Height of the legend below the matrix in points.
 const LEGEND: f32 = 18.0;
-/// Height from which the numbers of the selected block have room, and what they take of it.
+/// Panel height from which the values of the selected block are shown, and their ratio of it.
 const LOWEST_WITH_DETAILS: f32 = 300.0;
 const DETAILS_SHARE: f32 = 0.3;
-/// Height of a single line about a row or a column.
+/// Height of the line about a row or a column in points.
 const DETAILS_LINE: f32 = 34.0;
 
-/// State of the Jacobian panel.
+/// State of the Jacobian panel: the visible region and the selected block.
 #[derive(Default)]
 pub struct JacobianPanel {
     model: Option<JacobianModel>,
     mesh: paint::CachedMesh,
     view: View,
-    /// The picked row, when it is not a feature's (those are selected everywhere).
+    /// The selected row, when it is not a feature (features are selected in all panels).
     row: Option<JacobianFactor>,
-    /// The picked column, when it is not a parameter's.
+    /// The selected column, when it is not a parameter.
     column: Option<ColumnId>,
 }
 
-/// Which part of the picture is seen.
+/// The visible region of the matrix.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct View {
     zoom: f32,
-    /// What lies in the middle, as shares of the picture.
+    /// Centre of the region as fractions of the matrix size.
     centre: Vec2,
 }
 
@@ -61,7 +61,7 @@ impl Default for View {
 }
 
 impl View {
-    /// Where the whole picture lies, perhaps larger than what is seen of it.
+    /// Rectangle of the whole matrix, which may be larger than the visible region.
     fn place(self, area: Rect) -> Rect {
         let size = area.size() * self.zoom;
         Rect::from_min_size(area.center() - self.centre * size, size)
@@ -69,7 +69,7 @@ impl View {
 }
 
 impl JacobianPanel {
-    /// Draws the panel.
+    /// Draws the matrix, its axes, the legend and the values of the selected block.
     pub fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
         let run = ctx.recording.runs.get(ctx.selection.run.min(ctx.recording.runs.len().saturating_sub(1)));
         let Some((run, step)) = run.and_then(|run| Some((run, run.step_at(ctx.cursor_ns)?))) else {
@@ -79,7 +79,7 @@ impl JacobianPanel {
         if !self.model.as_ref().is_some_and(|model| Arc::ptr_eq(&model.step, step)) {
             self.model = JacobianModel::of_step(&ctx.recording.rig, &ctx.names(), run, step);
         }
-        // Taken out while it is drawn, so that the rest of the panel can change.
+        // Taken out for drawing, so that the rest of the panel can change.
         let Some(model) = self.model.take() else {
             let why = if step.summary_only { "Recomputing this step…" } else { "No linearization in this step" };
             empty_ui(ui, why);
@@ -135,7 +135,7 @@ impl JacobianPanel {
         }
     }
 
-    /// The block that is picked here or follows from what is selected everywhere: a row, or a column, or both.
+    /// The block that is selected here or follows from the common selection: a row, a column, or both.
     fn picked(&self, ctx: &PanelContext<'_>, model: &JacobianModel) -> Option<(Option<usize>, Option<usize>)> {
         let wanted = self.row.or_else(|| ctx.selection.feature.map(JacobianFactor::Feature));
         let row = wanted.and_then(|wanted| model.jacobian.rows.iter().position(|row| row.factor == wanted));
@@ -144,7 +144,7 @@ impl JacobianPanel {
         (row.is_some() || column.is_some()).then_some((row, column))
     }
 
-    /// A click selects feature and parameter everywhere, the rest here.
+    /// A click selects features and parameters in all panels, other rows and columns here.
     fn pick(&mut self, ctx: &mut PanelContext<'_>, model: &JacobianModel, block: Option<(usize, usize)>) {
         (self.row, self.column) = (None, None);
         (ctx.selection.feature, ctx.selection.parameter) = (None, None);
@@ -159,7 +159,7 @@ impl JacobianPanel {
         }
     }
 
-    /// Wheel zooms about the pointer, dragging moves, a double click fits.
+    /// The wheel zooms about the pointer, dragging pans, a double click fits the matrix.
     fn navigate(&mut self, ui: &Ui, area: Rect, response: &Response) {
         if response.double_clicked() {
             self.view = View::default();
@@ -169,7 +169,7 @@ impl JacobianPanel {
             let factor = ui.input(|input| input.zoom_delta() * (input.smooth_scroll_delta().y * 0.004).exp());
             let zoom = (self.view.zoom * factor).clamp(1.0, LARGEST_ZOOM);
             if zoom != self.view.zoom {
-                // The place under the pointer stays there.
+                // The position under the pointer stays fixed.
                 let held = (pointer - before.min) / before.size();
                 self.view.centre = held + (self.view.centre - held) * (self.view.zoom / zoom);
                 self.view.zoom = zoom;
@@ -183,13 +183,13 @@ impl JacobianPanel {
     }
 }
 
-/// The row and column under a place on the screen.
+/// The row and column at a screen position.
 fn block_at(model: &JacobianModel, place: Rect, pointer: Pos2) -> Option<(usize, usize)> {
     let share = (pointer - place.min) / place.size();
     Some((model.rows.at(share.y)?, model.columns.at(share.x)?))
 }
 
-/// Where a block lies on the screen.
+/// The screen rectangle of a block.
 fn rect_of(model: &JacobianModel, place: Rect, row: usize, column: usize) -> Rect {
     let (row, column) = (&model.rows.strips[row], &model.columns.strips[column]);
     let at = |x: f32, y: f32| pos2(place.left() + x * place.width(), place.top() + y * place.height());

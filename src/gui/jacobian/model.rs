@@ -1,4 +1,4 @@
-//! The blocks of one step's Jacobian, and where each lies in the picture, as shares of its width and height.
+//! The blocks of one step's Jacobian and their rectangles, as fractions of width and height.
 
 use std::sync::Arc;
 
@@ -10,38 +10,38 @@ use crate::gui::units::counted;
 use crate::sensors::Rig;
 use crate::session::{RunRecord, StepRecord};
 
-/// Decades that the colours span at most.
+/// Maximum number of decades of the colour map.
 const MOST_DECADES: f64 = 6.0;
 
 /// A row or a column of blocks, or a group of them.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Strip {
     pub(super) name: String,
-    /// Where it begins and ends, of 1.
+    /// Begin and end as fractions of the axis.
     pub(super) begin: f32,
     pub(super) end: f32,
 }
 
-/// The strips of one axis.
+/// The rows or columns of one axis.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Axis {
     pub(super) strips: Vec<Strip>,
     pub(super) groups: Vec<Strip>,
 }
 
-/// What is drawn of one step.
+/// The matrix of one step.
 #[derive(Clone, Debug)]
 pub(super) struct JacobianModel {
-    /// The step it belongs to; held, so that its address cannot come back as another step's.
+    /// The step. It is kept so that its address stays unique.
     pub(super) step: Arc<StepRecord>,
     pub(super) jacobian: StepJacobian,
     pub(super) rows: Axis,
     pub(super) columns: Axis,
-    /// Powers of ten of the first and the last colour.
+    /// Exponents of the norms with the first and last colour.
     pub(super) decades: (f64, f64),
 }
 
-/// The cameras of a run in the order of its features, the main one first.
+/// The cameras of a run in the order of its features, the main camera first.
 pub(in crate::gui) fn cameras<'a>(rig: &'a Rig, run: &RunRecord, step: &StepRecord) -> Vec<&'a CameraModel> {
     let rigid = step.report.calibration.rigid_cameras.iter().map(|(key, _)| key);
     let keys = std::iter::once(&run.camera_key).chain(rigid);
@@ -49,7 +49,7 @@ pub(in crate::gui) fn cameras<'a>(rig: &'a Rig, run: &RunRecord, step: &StepReco
 }
 
 impl JacobianModel {
-    /// The blocks of a step, `None` while it has none.
+    /// The matrix of a step, `None` if it has none.
     pub(super) fn of_step(rig: &Rig, names: &ParameterNames, run: &RunRecord, step: &Arc<StepRecord>) -> Option<Self> {
         let jacobian = step.report.jacobian(&cameras(rig, run, step))?;
         let norms = jacobian.rows.iter().flat_map(|row| &row.norms).map(|(_, norm)| f64::from(*norm).log10());
@@ -69,13 +69,13 @@ impl JacobianModel {
         })
     }
 
-    /// Share of the colours at a norm.
+    /// Position of a norm in the colour map, 0 to 1.
     pub(super) fn fraction(&self, norm: f32) -> f64 {
         let (low, high) = self.decades;
         ((f64::from(norm).log10() - low) / (high - low)).clamp(0.0, 1.0)
     }
 
-    /// The norm of a block, 0 where nothing is.
+    /// The norm of a block, 0 for an empty one.
     pub(super) fn norm(&self, row: usize, column: usize) -> f32 {
         let row = self.jacobian.rows.get(row).map_or(&[][..], |row| &row.norms);
         row.iter().find(|(known, _)| usize::from(*known) == column).map_or(0.0, |(_, norm)| *norm)
@@ -83,13 +83,13 @@ impl JacobianModel {
 }
 
 impl Axis {
-    /// The strip at a share.
+    /// Index of the row or column at a fraction of the axis.
     pub(super) fn at(&self, share: f32) -> Option<usize> {
         let after = self.strips.partition_point(|strip| strip.begin <= share);
         after.checked_sub(1).filter(|index| share < self.strips[*index].end)
     }
 
-    /// Lays strips side by side: each with the group that it belongs to and its weight.
+    /// Lays out rows or columns in sequence, given name, group and weight of each.
     fn lay_out(strips: impl Iterator<Item = (String, usize, f32)>, group_names: &[String]) -> Self {
         let strips: Vec<_> = strips.collect();
         let total: f32 = strips.iter().map(|(_, _, weight)| weight).sum();
@@ -121,9 +121,9 @@ pub(in crate::gui) fn name_of(factor: &JacobianFactor) -> String {
     }
 }
 
-/// Features above, the rest below, each group with a share of the height that lets it be seen.
+/// Features at the top, the other factors below; each group has a minimum height.
 fn rows_of(jacobian: &StepJacobian) -> Axis {
-    /// Shares of visual, inertial, encoder rows and priors.
+    /// Ratios of the height for visual, IMU and encoder rows and priors.
     const SHARES: [f32; 4] = [0.62, 0.15, 0.13, 0.1];
     let group_of = |factor: &JacobianFactor| match factor {
         JacobianFactor::Feature(_) => 0,
@@ -148,7 +148,7 @@ fn rows_of(jacobian: &StepJacobian) -> Axis {
     Axis::lay_out(strips, &names)
 }
 
-/// Calibration wide, since its columns are read one by one; the states of the frames narrow.
+/// Calibration columns are wide, so that they can be read one by one; states of the frames are narrow.
 fn columns_of(jacobian: &StepJacobian, names: &ParameterNames) -> Axis {
     let groups = ["calibration", "joints", "poses", "speeds, biases", "depth"].map(str::to_owned);
     let strips = jacobian.columns.iter().map(|block| {
@@ -175,7 +175,7 @@ pub(in crate::gui) fn column_name(id: ColumnId, names: &ParameterNames) -> Strin
     }
 }
 
-/// What the norms of a block are counted by.
+/// The unit of a column in which the norms are given.
 pub(super) fn scale_words(id: ColumnId) -> &'static str {
     match id {
         ColumnId::Calibration(parameter) => match parameter.dimension() {

@@ -1,4 +1,4 @@
-//! Paints the blocks as one mesh, the names on both axes, and the legend.
+//! Painting of the blocks as one mesh, of the names on both axes, and of the legend.
 
 use std::sync::Arc;
 
@@ -11,10 +11,10 @@ use crate::gui::plot::paint_ground;
 use crate::gui::theme::{Theme, ThemeName, label_font};
 use crate::session::StepRecord;
 
-/// Narrowest strip that gets its name written, in points.
+/// Minimum width in points of a row or column with a name.
 const NAMED_FROM: f32 = 9.0;
 
-/// The blocks as triangles, kept while step, place and colours stay.
+/// The blocks as triangles, cached while step, rectangle and colours stay the same.
 #[derive(Debug, Default)]
 pub(super) struct CachedMesh {
     of: Option<(Arc<StepRecord>, Rect, Rect, ThemeName)>,
@@ -45,7 +45,7 @@ impl CachedMesh {
 }
 
 fn mesh_of(theme: &Theme, area: Rect, place: Rect, model: &JacobianModel) -> Mesh {
-    /// Room between wide blocks, in points.
+    /// Gap between wide blocks in points.
     const GAP: f32 = 0.5;
     let mut mesh = Mesh::default();
     for (number, row) in model.jacobian.rows.iter().enumerate() {
@@ -61,7 +61,7 @@ fn mesh_of(theme: &Theme, area: Rect, place: Rect, model: &JacobianModel) -> Mes
     mesh
 }
 
-/// The names on both axes, and what is picked.
+/// The names on both axes, and the selection.
 pub(super) fn axes(
     ui: &Ui,
     theme: &Theme,
@@ -143,7 +143,7 @@ fn column_names(painter: &Painter, theme: &Theme, top: Rect, place: Rect, column
             continue;
         }
         let color = if chosen { theme.accent } else { theme.text };
-        // A frame's block is told by the frame's number under the group's name.
+        // Frames are labelled by their number under the name of the group.
         let name = strip.name.rsplit(' ').next().unwrap_or(&strip.name);
         let galley = painter.layout_no_wrap(name.to_owned(), small.clone(), color);
         let foot = pos2(range.center() - 0.5 * galley.size().y, top.bottom() - 3.0);
@@ -156,7 +156,7 @@ fn column_names(painter: &Painter, theme: &Theme, top: Rect, place: Rect, column
     }
 }
 
-/// Lines to both axes from the block under the pointer.
+/// Lines from the block under the pointer to both axes.
 pub(super) fn hover(ui: &Ui, theme: &Theme, area: Rect, place: Rect, model: &JacobianModel, block: (usize, usize)) {
     let rect = rect_of(model, place, block.0, block.1);
     let painter = ui.painter_at(area);
@@ -166,7 +166,7 @@ pub(super) fn hover(ui: &Ui, theme: &Theme, area: Rect, place: Rect, model: &Jac
     painter.rect_stroke(rect, 0.0, Stroke::new(1.5, theme.cursor), StrokeKind::Outside);
 }
 
-/// The colours in powers of ten.
+/// The colour map with powers of ten.
 pub(super) fn legend(ui: &Ui, theme: &Theme, rect: Rect, model: &JacobianModel) {
     const WIDTH: f32 = 150.0;
     const STEPS: u16 = 30;

@@ -48,7 +48,7 @@ fn click(harness: &mut Harness<'static, Shown>, at: egui::Pos2) {
     harness.run_steps(3);
 }
 
-/// Middle of a block on the screen, as the harness lays the panel out.
+/// Centre of a block on the screen, in the layout of the test.
 fn middle(harness: &Harness<'static, Shown>, row: usize, column: usize) -> egui::Pos2 {
     let area = harness.get_by_label("Jacobian blocks").rect();
     rect_of(&model(), View::default().place(area), row, column).center()
@@ -86,11 +86,11 @@ fn a_click_selects_feature_and_parameter_and_tells_their_numbers() {
     assert_eq!((selection.feature, selection.parameter), (Some(id), Some(parameter("L2.alpha"))));
     assert!(harness.query_by_label_contains(&format!("feature {} by roll.alpha: ", id.0)).is_some());
     assert!(harness.query_by_label("∂u, px/°").is_some());
-    // What is selected elsewhere is shown here: a parameter alone, with the rows that speak of it most.
+    // A parameter selected in another panel is shown alone, with the rows of the largest norms.
     harness.state_mut().1 = Selection { parameter: Some(parameter("L1.alpha")), ..Selection::default() };
     harness.run_steps(2);
     assert!(harness.query_by_label_contains("yaw.alpha: in ").is_some());
-    // An inertial factor by a pose is nobody else's.
+    // An IMU factor with respect to a pose is selected only here.
     let is_imu = |factor: &JacobianFactor| matches!(factor, JacobianFactor::Inertial { .. });
     let row = model.jacobian.rows.iter().position(|row| is_imu(&row.factor)).unwrap();
     let pose = model.jacobian.columns.iter().position(|block| block.id.group() == ColumnGroup::Pose).unwrap();

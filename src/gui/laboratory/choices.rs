@@ -1,4 +1,4 @@
-//! What the experiment consists of, as chosen.
+//! The choices that define an experiment.
 
 use egui::{ComboBox, Ui};
 
@@ -8,10 +8,10 @@ use crate::gimbal::Parameterization;
 use crate::gui::PanelContext;
 use crate::observability::laboratory::{LABORATORY_IMU, LaboratoryForm, LaboratoryMotion, LaboratorySetup, Mechanism};
 
-/// Forms that can be compared.
+/// Parameterizations that can be compared.
 const FORMS: [Parameterization; 6] = Parameterization::ALL;
 
-/// What is known of the joint angles.
+/// Knowledge of the joint angles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Joints {
     Known,
@@ -19,7 +19,7 @@ enum Joints {
     Unknown,
 }
 
-/// What is known of the poses.
+/// Knowledge of the poses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Poses {
     Known,
@@ -27,7 +27,7 @@ enum Poses {
     InertialBiasKnown,
 }
 
-/// The choices.
+/// The current choices.
 #[derive(Clone, Debug)]
 pub(super) struct Choices {
     /// A mechanism's name, `None` for the rig's.
@@ -60,7 +60,7 @@ impl Default for Choices {
 }
 
 impl Choices {
-    /// Draws them.
+    /// Draws the choices.
     pub(super) fn ui(&mut self, ui: &mut Ui, ctx: &PanelContext<'_>) {
         ui.horizontal_wrapped(|ui| {
             self.mechanism_ui(ui, ctx);
@@ -153,7 +153,7 @@ impl Choices {
         Mechanism::named(name).ok()
     }
 
-    /// The experiment that is chosen, or why there is none.
+    /// The chosen experiment, or the reason why it is invalid.
     pub(super) fn experiment(&self, ctx: &PanelContext<'_>) -> Result<Experiment, String> {
         let forms = FORMS.iter().zip(self.forms).filter(|(_, chosen)| *chosen);
         let forms: Vec<LaboratoryForm> = forms

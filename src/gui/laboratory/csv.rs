@@ -1,11 +1,11 @@
-//! The spectra of the compared parameterizations, one singular value or one weight of a direction a row.
+//! The spectra of the compared parameterizations: one row per singular value or weight of a direction.
 
 use super::LaboratoryPanel;
 use crate::gui::PanelContext;
 use crate::gui::csv_table::{CsvTable, Table, number};
 
 impl CsvTable for LaboratoryPanel {
-    /// Each form's singular values and directions.
+    /// Singular values and directions of each parameterization.
     fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {
         let mut table = Table::new(["form", "kind", "number", "singular_value", "parameter", "weight"]);
         let names = ctx.names();

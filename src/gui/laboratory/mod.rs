@@ -1,4 +1,5 @@
-//! The laboratory panel: what a mechanism, its forms and a motion can identify, without the log.
+//! The laboratory panel: which parameters a mechanism, its parameterizations and a motion make observable, without a
+//! log.
 //!
 //! The experiments are those of `dcvins degeneracy`.
 
@@ -17,22 +18,22 @@ use super::rank::columns::{RankColumn, columns_ui};
 use crate::observability::RankReport;
 use crate::observability::laboratory::{LaboratoryReport, LaboratoryResult};
 
-/// State of the laboratory panel.
+/// State of the laboratory panel: choices and results.
 #[derive(Default)]
 pub struct LaboratoryPanel {
-    /// Whether experiments run on a thread of their own, as in the window; pictures wait for them.
+    /// Whether experiments run on their own thread, as in the window; screenshots wait for them.
     pub in_background: bool,
     choices: Choices,
     worker: Worker,
 }
 
 impl LaboratoryPanel {
-    /// A panel that shows the same, for a picture.
+    /// A panel with the same choices, for a screenshot.
     pub(in crate::gui) fn view_copy(&self) -> Self {
         Self { in_background: false, choices: self.choices.clone(), worker: Worker::default() }
     }
 
-    /// The forms that are chosen, each with its ranks; waits for what is not there yet.
+    /// The chosen parameterizations with their rank reports; waits for missing results.
     pub(in crate::gui) fn ranks(&mut self, ctx: &PanelContext<'_>) -> Vec<(String, RankReport)> {
         if let Ok(experiment) = self.choices.experiment(ctx) {
             self.worker.ask(&experiment, self.in_background);
@@ -40,7 +41,7 @@ impl LaboratoryPanel {
         self.worker.results().0.iter().map(|result| (result.form.name(), result.rank.clone())).collect()
     }
 
-    /// Draws the panel.
+    /// Draws choices and results.
     pub fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
             ui.spacing_mut().item_spacing.y = 3.0;
@@ -82,7 +83,7 @@ impl LaboratoryPanel {
     }
 }
 
-/// What is supposed, in one sentence.
+/// The assumptions of the experiment in one sentence.
 fn words(report: &LaboratoryReport) -> String {
     let held = if report.frozen_joints.is_empty() {
         String::new()

@@ -30,7 +30,7 @@ fn bench(in_background: bool) -> Harness<'static, LaboratoryPanel> {
     harness
 }
 
-/// Chooses an entry of a list by the list's label.
+/// Selects an entry of a list by the label of the list.
 fn choose(harness: &mut Harness<'static, LaboratoryPanel>, list: &str, entry: &str) {
     harness.get_by_role_and_label(Role::ComboBox, list).click();
     harness.run_steps(3);
@@ -41,10 +41,10 @@ fn choose(harness: &mut Harness<'static, LaboratoryPanel>, list: &str, entry: &s
 #[test]
 fn experiments_tell_what_the_command_tells() {
     let mut harness = bench(false);
-    // The rig's mechanism, flown aggressively: nothing but the form is lost.
+    // The rig's mechanism with aggressive motion: only the parameterization loses rank.
     assert!(harness.query_by_label("18 of 24").is_some());
     assert_eq!(harness.query_all_by_label("18 of 18").count(), 2);
-    // Another mechanism and motion, as the command computes them.
+    // Another mechanism and motion, with the results of the command.
     choose(&mut harness, "Mechanism", "yaw-roll-pitch-ideal");
     choose(&mut harness, "Motion", "hover");
     let mechanism = Mechanism::named("yaw-roll-pitch-ideal").unwrap();

@@ -1,21 +1,21 @@
-//! Runs experiments, on a thread of its own or while the caller waits.
+//! Computes experiments, on their own thread or while the caller waits.
 //!
-//! An experiment is made up of a mechanism, motions and joint readings alone: it has no log, no run and no step, so that
-//! neither the session nor its record has a place for it, and the panel keeps its thread.
+//! An experiment consists of a mechanism, motions and joint readings alone: it has no log, no run and no step, so that
+//! it belongs neither to the session nor to its record, and the panel owns the thread.
 
 use std::sync::mpsc::{Receiver, channel};
 use std::thread::Builder;
 
 use crate::observability::laboratory::{LaboratoryForm, LaboratoryResult, LaboratorySetup};
 
-/// A setup and the forms to compare.
+/// A setup and the parameterizations to compare.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Experiment {
     pub(super) setup: LaboratorySetup,
     pub(super) forms: Vec<LaboratoryForm>,
 }
 
-/// The experiment that was asked for last, and what is known of it.
+/// The requested experiment and its results so far.
 #[derive(Default)]
 pub(super) struct Worker {
     asked: Option<Experiment>,
@@ -24,7 +24,7 @@ pub(super) struct Worker {
 }
 
 impl Worker {
-    /// Starts an experiment unless it is the one asked for before; takes what has come of it.
+    /// Starts an experiment unless it is the current one, and receives results.
     pub(super) fn ask(&mut self, experiment: &Experiment, in_background: bool) {
         if self.asked.as_ref() != Some(experiment) {
             self.results.clear();
@@ -48,7 +48,7 @@ impl Worker {
             let given = experiment.clone();
             let work = move || {
                 given.setup.run_each(&given.forms, |result| {
-                    // Nobody waits any more when another experiment was asked for meanwhile.
+                    // The receiver is gone when another experiment was requested meanwhile.
                     sender.send(result).is_ok()
                 });
             };
@@ -60,17 +60,17 @@ impl Worker {
         self.results = experiment.setup.run_all(&experiment.forms);
     }
 
-    /// Whether more is to come.
+    /// Whether results are missing.
     pub(super) fn is_busy(&self) -> bool {
         self.coming.is_some()
     }
 
-    /// What has come so far, and of how many forms.
+    /// The results so far, and the number of parameterizations.
     pub(super) fn results(&self) -> (&[LaboratoryResult], usize) {
         (&self.results, self.asked.as_ref().map_or(0, |experiment| experiment.forms.len()))
     }
 
-    /// What is supposed.
+    /// The setup of the current experiment.
     pub(super) fn setup(&self) -> Option<&LaboratorySetup> {
         self.asked.as_ref().map(|experiment| &experiment.setup)
     }

@@ -1,10 +1,10 @@
-//! Curves over time, reduced to what the pixel columns of a plot can show.
+//! Curves over time, reduced to one value range per pixel column of a plot.
 
 use egui::{Rangef, vec2};
 
 use super::{PlotArea, visible_stretches};
 
-/// What a reduced curve was made from; the same key gives the same curve.
+/// The inputs of a reduced curve; equal keys have equal curves.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct CurveKey {
     epoch: u64,
@@ -14,13 +14,13 @@ struct CurveKey {
     width_px: u32,
 }
 
-/// A curve with its values by pixel column; remade only when its data, its range or its width changes.
+/// A curve reduced to pixel columns; updated only when its data, range or width changes.
 #[derive(Debug, Default)]
 pub(crate) struct Curve {
     key: Option<CurveKey>,
-    /// Unbroken stretches of `(points right of the plot's left edge, value)`.
+    /// Contiguous line strips of `(points to the right of the plot's left edge, value)`.
     pub(crate) stretches: Vec<Vec<(f32, f64)>>,
-    /// Least and greatest value in range, `None` when there is none.
+    /// Smallest and largest value in the range, `None` without values.
     pub(crate) extent: Option<(f64, f64)>,
 }
 
@@ -32,9 +32,9 @@ impl CurveKey {
 }
 
 impl Curve {
-    /// Brings the curve up to date with `values` at `stamps_ns` (ascending); values that are not finite break it.
+    /// Updates the curve to `values` at `stamps_ns` (ascending); values that are not finite interrupt it.
     ///
-    /// `epoch` changes when earlier rows do; as long as it stays, rows are only added.
+    /// `epoch` changes when earlier rows change; while it stays the same, rows are only appended.
     pub(crate) fn update(&mut self, area: &PlotArea, epoch: u64, stamps_ns: &[i64], values: &[f64]) {
         let key = CurveKey::of(area, epoch, stamps_ns.len().min(values.len()));
         if self.key != Some(key) {
@@ -47,19 +47,19 @@ impl Curve {
     }
 }
 
-/// A band between two values over time, by pixel column.
+/// A band between two values over time, reduced to pixel columns.
 ///
-/// Both edges are reduced together: two curves of their own would keep different rows of a column, and a band between
-/// points that do not belong together frays.
+/// Both edges are reduced together: reduced separately, they would keep different rows of a column, and the band would
+/// have gaps.
 #[derive(Debug, Default)]
 pub(crate) struct BandCurve {
     key: Option<CurveKey>,
-    /// Unbroken stretches of `(points right of the plot's left edge, lower, upper value)`.
+    /// Contiguous strips of `(points to the right of the plot's left edge, lower, upper value)`.
     pub(crate) stretches: Vec<Vec<(f32, f64, f64)>>,
 }
 
 impl BandCurve {
-    /// Brings the band up to date, as [`Curve::update`] does; a row without both values breaks it.
+    /// Updates the band as [`Curve::update`] does; a row without both values interrupts it.
     pub(crate) fn update(&mut self, area: &PlotArea, epoch: u64, stamps_ns: &[i64], lower: &[f64], upper: &[f64]) {
         let count = stamps_ns.len().min(lower.len()).min(upper.len());
         let key = CurveKey::of(area, epoch, count);
@@ -70,16 +70,16 @@ impl BandCurve {
     }
 }
 
-/// Where a state holds over time; remade only as a [`Curve`] is.
+/// The time ranges in which a state is true, cached as a [`Curve`] is.
 #[derive(Debug, Default)]
 pub(crate) struct StateCurve {
     key: Option<CurveKey>,
-    /// In points right of the plot's left edge.
+    /// Ranges in points to the right of the plot's left edge.
     stretches: Vec<Rangef>,
 }
 
 impl StateCurve {
-    /// Brings the stretches up to date, as [`Curve::update`] does.
+    /// Updates the ranges as [`Curve::update`] does.
     pub(crate) fn update(&mut self, area: &PlotArea, epoch: u64, stamps_ns: &[i64], holds: impl Fn(usize) -> bool) {
         let key = CurveKey::of(area, epoch, stamps_ns.len());
         if self.key != Some(key) {
@@ -89,14 +89,14 @@ impl StateCurve {
         }
     }
 
-    /// The stretches on the screen.
+    /// The ranges in screen coordinates.
     pub(crate) fn on_screen(&self, area: &PlotArea) -> impl Iterator<Item = Rangef> {
         let left = area.rect.left();
         self.stretches.iter().map(move |stretch| Rangef::new(left + stretch.min, left + stretch.max))
     }
 }
 
-/// Least lower and greatest upper value of each pixel column.
+/// Smallest lower and largest upper value of each pixel column.
 fn reduce_band(area: &PlotArea, stamps_ns: &[i64], lower: &[f64], upper: &[f64]) -> Vec<Vec<(f32, f64, f64)>> {
     let mut stretches: Vec<Vec<(f32, f64, f64)>> = vec![Vec::new()];
     for row in rows_in_range(area, stamps_ns) {
@@ -119,14 +119,14 @@ fn reduce_band(area: &PlotArea, stamps_ns: &[i64], lower: &[f64], upper: &[f64])
     stretches
 }
 
-/// The rows from the one before the range to the one after it, so that lines run to the edges.
+/// The rows from the one before the time range to the one after it, so that lines reach the edges.
 fn rows_in_range(area: &PlotArea, stamps_ns: &[i64]) -> std::ops::Range<usize> {
     let first = stamps_ns.partition_point(|stamp| *stamp < area.begin_ns).saturating_sub(1);
     let end = (stamps_ns.partition_point(|stamp| *stamp <= area.end_ns) + 1).min(stamps_ns.len());
     first..end.max(first)
 }
 
-/// First, least, greatest and last value of each pixel column, in the order in which they came.
+/// First, smallest, largest and last value of each pixel column, in the order of their rows.
 fn reduce(area: &PlotArea, stamps_ns: &[i64], values: &[f64]) -> Vec<Vec<(f32, f64)>> {
     let rows = rows_in_range(area, stamps_ns);
     let columns = area.rect.width().max(1.0) as usize;
@@ -241,7 +241,7 @@ mod tests {
 
     #[test]
     fn a_band_keeps_both_edges_of_a_column_together() {
-        // Each edge has its extremes at rows of its own, and once both are missing.
+        // Each edge has its extremes at its own rows, and in one place both are missing.
         let stamps: Vec<i64> = (0..10_000).collect();
         let lower: Vec<f64> = stamps.iter().map(|row| -1.0 - f64::from((row * 7 % 13) as i32)).collect();
         let mut upper: Vec<f64> = stamps.iter().map(|row| 1.0 + f64::from((row * 5 % 11) as i32)).collect();
@@ -254,7 +254,7 @@ mod tests {
             assert!(stretch.iter().all(|(_, low, high)| (*low, *high) == (-13.0, 11.0)), "the whole reach of a column");
         }
         assert!(band.stretches.iter().map(Vec::len).sum::<usize>() <= 102);
-        // Few rows stay as they are.
+        // A few rows stay as they are.
         band.update(&area(100.0), 1, &[0, 5000], &[1.0, 2.0], &[3.0, 4.0]);
         assert_eq!(band.stretches, [[(0.0, 1.0, 3.0), (50.0, 2.0, 4.0)]]);
     }

@@ -1,6 +1,6 @@
-//! Small plots over time: the area they map to, ticks, curves, bands, hatching.
+//! Small plots over time: mapping to the screen, ticks, curves, bands, hatching.
 //!
-//! All plots over time share the visible stretch of [`Selection`](super::Selection), so that zooming one zooms all.
+//! All plots over time use the time range of [`Selection`](super::Selection), so that zooming one zooms all.
 
 mod curve;
 mod navigate;
@@ -15,14 +15,14 @@ pub(crate) use ticks::{decimals_of_step, ticks};
 
 use super::theme::{self, RunStyle, Theme};
 
-/// Where a plot over time lies and what it spans.
+/// Rectangle and ranges of a plot over time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct PlotArea {
-    /// On screen, in points.
+    /// Screen rectangle in points.
     pub(crate) rect: Rect,
-    /// Time at the left edge, since the log began.
+    /// Stamp at the left edge, in nanoseconds since the log began.
     pub(crate) begin_ns: i64,
-    /// Time at the right edge.
+    /// Stamp at the right edge.
     pub(crate) end_ns: i64,
     /// Value at the lower edge.
     pub(crate) low: f64,
@@ -31,32 +31,32 @@ pub(crate) struct PlotArea {
 }
 
 impl PlotArea {
-    /// Points right of the left edge, at most one width outside: dashes along a line that ran on for miles would take
-    /// all memory.
+    /// Distance to the right of the left edge in points, limited to one width outside: dashes along a very long line
+    /// would take all memory.
     pub(crate) fn offset_of(&self, stamp_ns: i64) -> f32 {
         let span_ns = self.end_ns.saturating_sub(self.begin_ns).max(1);
         let fraction = stamp_ns.saturating_sub(self.begin_ns) as f64 / span_ns as f64;
         fraction.clamp(-1.0, 2.0) as f32 * self.rect.width()
     }
 
-    /// Screen x of a time.
+    /// Screen x of a stamp.
     pub(crate) fn x(&self, stamp_ns: i64) -> f32 {
         self.rect.left() + self.offset_of(stamp_ns)
     }
 
-    /// Screen y of a value, kept within a few heights of the plot so that nothing overflows.
+    /// Screen y of a value, limited to a few heights of the plot to avoid overflow.
     pub(crate) fn y(&self, value: f64) -> f32 {
         let fraction = ((value - self.low) / (self.high - self.low)).clamp(-4.0, 5.0);
         self.rect.bottom() - fraction as f32 * self.rect.height()
     }
 
-    /// Time at a screen x.
+    /// Stamp at a screen x.
     pub(crate) fn stamp_ns_at(&self, x: f32) -> i64 {
         let fraction = f64::from((x - self.rect.left()) / self.rect.width().max(1.0));
         self.begin_ns + (fraction * (self.end_ns - self.begin_ns) as f64).round() as i64
     }
 
-    /// Sets the range of values, widened when it is empty.
+    /// Sets the range of values; an empty range is extended.
     pub(crate) fn with_values(mut self, low: f64, high: f64) -> Self {
         let (low, high) = if low.is_finite() && high.is_finite() && low <= high { (low, high) } else { (0.0, 1.0) };
         let least = (1e-9_f64).max(low.abs().max(high.abs()) * 1e-9);
@@ -66,18 +66,18 @@ impl PlotArea {
     }
 }
 
-/// Ground and border of a plot.
+/// Background and border of a plot.
 pub(crate) fn paint_ground(painter: &Painter, theme: &Theme, rect: Rect) {
     painter.rect_filled(rect, 0.0, theme.plot_background);
 }
 
-/// Horizontal grid lines with their values inside the left edge; `factor` turns stored values into shown ones.
+/// Horizontal grid lines with their values inside the left edge; `factor` converts stored values to shown ones.
 pub(crate) fn paint_value_grid(painter: &Painter, theme: &Theme, area: &PlotArea, factor: f64, max_count: usize) {
     let (marks, step) = ticks(area.low * factor, area.high * factor, max_count);
     for shown in marks {
         let y = area.y(shown / factor).round() + 0.5;
         painter.hline(area.rect.x_range(), y, Stroke::new(theme::HAIRLINE_WIDTH, theme.grid));
-        // Labels that would leave the plot are left out.
+        // Labels that would leave the plot are omitted.
         if y - 10.0 > area.rect.top() && y < area.rect.bottom() - 1.0 {
             let text = super::units::fixed(shown, decimals_of_step(step));
             let font = egui::FontId::new(9.0, egui::FontFamily::Monospace);
@@ -86,7 +86,7 @@ pub(crate) fn paint_value_grid(painter: &Painter, theme: &Theme, area: &PlotArea
     }
 }
 
-/// The cursor over time.
+/// The cursor as a vertical line.
 pub(crate) fn paint_cursor(painter: &Painter, theme: &Theme, area: &PlotArea, cursor_ns: i64) {
     let x = area.x(cursor_ns);
     if area.rect.x_range().expand(0.5).contains(x) {
@@ -103,7 +103,7 @@ pub(crate) fn paint_curve(painter: &Painter, area: &PlotArea, curve: &Curve, sty
     }
 }
 
-/// A curve whose value holds until the next one, for counts and states.
+/// A curve whose value is constant until the next row, for counts and states.
 pub(crate) fn paint_steps(painter: &Painter, area: &PlotArea, curve: &Curve, style: RunStyle, width: f32) {
     for stretch in &curve.stretches {
         let places = stretch.iter().map(|(offset, value)| pos2(area.rect.left() + offset, area.y(*value)));
@@ -111,7 +111,7 @@ pub(crate) fn paint_steps(painter: &Painter, area: &PlotArea, curve: &Curve, sty
     }
 }
 
-/// The corners of a staircase: level from each place to the next one, then straight up or down.
+/// The corners of a step curve: horizontal from each position to the next, then vertical.
 fn staircase(places: impl Iterator<Item = Pos2>) -> Vec<Pos2> {
     let mut corners: Vec<Pos2> = Vec::new();
     for place in places {
@@ -121,7 +121,7 @@ fn staircase(places: impl Iterator<Item = Pos2>) -> Vec<Pos2> {
         };
         let foot = pos2(place.x, last.y);
         match corners.as_mut_slice() {
-            // A level stretch goes on: its end moves along.
+            // A horizontal line is extended.
             [.., begin, end] if begin.y == end.y => *end = foot,
             _ => corners.push(foot),
         }
@@ -169,14 +169,14 @@ pub(crate) fn paint_band(painter: &Painter, area: &PlotArea, band: &BandCurve, f
     }
 }
 
-/// Diagonal hatching of a part of a plot.
+/// Diagonal hatching of a rectangle of a plot.
 pub(crate) fn paint_hatch(painter: &Painter, rect: Rect, color: Color32) {
     const SPACING: f32 = 6.0;
     if rect.width() < 0.5 || rect.height() < 0.5 {
         return;
     }
     let painter = painter.with_clip_rect(painter.clip_rect().intersect(rect));
-    // The lines keep their places on the screen, so that neighbouring hatched stretches join.
+    // The lines have fixed screen positions, so that adjacent rectangles join.
     let first = ((rect.left() + rect.top()) / SPACING).floor() as i64;
     let last = ((rect.right() + rect.bottom()) / SPACING).ceil() as i64;
     let lines = (first..=last).map(|line| {
@@ -187,7 +187,8 @@ pub(crate) fn paint_hatch(painter: &Painter, rect: Rect, color: Color32) {
     painter.extend(lines);
 }
 
-/// Stretches of rows for which something holds, as times: begin of the first row to begin of the row after the last.
+/// Time ranges of the rows for which `holds` is true: from the stamp of the first row to that of the row behind the
+/// last.
 fn stretches_where(stamps_ns: &[i64], holds: impl Fn(usize) -> bool) -> Vec<(i64, i64)> {
     let mut stretches = Vec::new();
     let mut begin = None;
@@ -207,8 +208,8 @@ fn stretches_where(stamps_ns: &[i64], holds: impl Fn(usize) -> bool) -> Vec<(i64
     stretches
 }
 
-/// The same stretches on the screen, from left to right; those with less than a pixel between them are one, so that a state
-/// that flickers over a long flight gives no more than a plot has columns.
+/// The same ranges on the screen, from left to right. Ranges less than a pixel apart are merged, so that a flickering
+/// state has no more ranges than the plot has columns.
 pub(crate) fn visible_stretches(area: &PlotArea, stamps_ns: &[i64], holds: impl Fn(usize) -> bool) -> Vec<Rangef> {
     let mut visible: Vec<Rangef> = Vec::new();
     for (begin_ns, end_ns) in stretches_where(stamps_ns, holds) {

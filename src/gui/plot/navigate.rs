@@ -1,4 +1,4 @@
-//! Moving through time with the pointer, the same in every plot.
+//! Navigation in time with the pointer, the same in every plot.
 
 use egui::{Id, PointerButton, Response, Role, Sense, Ui, WidgetInfo};
 
@@ -6,26 +6,26 @@ use super::PlotArea;
 use crate::gui::PanelContext;
 use crate::session::Command;
 
-/// The shortest visible stretch.
+/// Minimum visible time range.
 const SHORTEST_VISIBLE_NS: i64 = 200_000_000;
 
-/// The stretch of time that plots show: what is zoomed to, else the whole log.
+/// The time range of all plots: the zoomed range, or the whole log.
 pub(crate) fn visible_range(ctx: &PanelContext<'_>) -> (i64, i64) {
     let whole = (0, ctx.recording.duration_ns.max(1));
     ctx.selection.visible_ns.filter(|(begin, end)| begin < end).unwrap_or(whole)
 }
 
-/// What a click on a plot means.
+/// The effect of a click on a plot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Clicks {
-    /// It puts the cursor there.
+    /// It moves the cursor there.
     Seek,
     /// It selects the plot; dragging still moves the cursor.
     Select,
 }
 
-/// Lets the pointer move the cursor (drag, or click), zoom (scroll with Ctrl, or scroll alone when `scroll_zooms`),
-/// pan (middle drag) and show the whole log (double click).
+/// Moves the cursor (drag or click), zooms (wheel with Ctrl, or the wheel alone when `scroll_zooms`), pans (middle
+/// button) and shows the whole log (double click).
 pub(crate) fn navigate(
     ui: &Ui,
     ctx: &mut PanelContext<'_>,
@@ -76,7 +76,7 @@ pub(crate) fn navigate(
     response
 }
 
-/// Shows a stretch, kept inside the log and not too short; the whole log when it covers it.
+/// Shows a time range, limited to the log and to the minimum range; the whole log if the range covers it.
 fn show(ctx: &mut PanelContext<'_>, begin_ns: i64, end_ns: i64) {
     let whole_ns = ctx.recording.duration_ns.max(1);
     let length_ns = (end_ns - begin_ns).max(SHORTEST_VISIBLE_NS);

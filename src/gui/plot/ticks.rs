@@ -1,6 +1,6 @@
-//! Round numbers along an axis.
+//! Round tick values of an axis.
 
-/// Round values from `low` to `high`, at most `max_count`, and the step between them.
+/// Round values from `low` to `high`, at most `max_count`, and their spacing.
 pub(crate) fn ticks(low: f64, high: f64, max_count: usize) -> (Vec<f64>, f64) {
     let span = high - low;
     if !(span.is_finite() && span > 0.0) || max_count == 0 {
@@ -12,14 +12,14 @@ pub(crate) fn ticks(low: f64, high: f64, max_count: usize) -> (Vec<f64>, f64) {
     let step = step.unwrap_or(10.0 * power);
     let first = (low / step).ceil() as i64;
     let last = (high / step).floor() as i64;
-    // A range far from zero and narrower than its rounding has no ticks worth showing.
+    // A range that is narrow relative to the magnitude of its values has no useful ticks.
     if last.saturating_sub(first) > 2 * max_count as i64 {
         return (Vec::new(), step);
     }
     ((first..=last).map(|number| number as f64 * step).collect(), step)
 }
 
-/// Decimals that tell neighbouring ticks apart.
+/// Decimals needed to distinguish adjacent ticks.
 pub(crate) fn decimals_of_step(step: f64) -> usize {
     if step > 0.0 { (-(step * 1.000_001).log10().floor()).clamp(0.0, 9.0) as usize } else { 0 }
 }

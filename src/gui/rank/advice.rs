@@ -1,4 +1,4 @@
-//! Since when the weakest direction has been lost, and what to fly against it.
+//! How long the least observable direction has been unobservable, and the suggested excitation.
 
 use std::sync::Arc;
 
@@ -13,41 +13,41 @@ use crate::observability::laboratory::{Advice, Situation, advise};
 use crate::observability::steps_lost;
 use crate::session::{RunRecord, StepRecord};
 
-/// Candidates shown behind the best one.
+/// Number of alternatives shown below the best motion.
 const OTHERS_SHOWN: usize = 3;
 
-/// Seconds that the cursor must have rested before advice is asked for in the background.
+/// Seconds without a move of the cursor before advice is computed in the background.
 const REST_S: f64 = 0.15;
-/// Seconds between two questions while the cursor moves: nobody can read what changes with every image.
+/// Minimum period in seconds of the computation while the cursor moves.
 const PERIOD_S: f64 = 1.0;
 
-/// What is told about one step.
+/// The results for one step.
 #[derive(Debug)]
 struct Told {
-    /// Since when the weakest direction has been lost.
+    /// Text: since when the least observable direction has been unobservable.
     since: Option<String>,
-    /// What to fly against it.
+    /// The suggested excitation.
     advice: Option<Advice>,
 }
 
-/// What was found out about one step; another step is asked anew.
+/// The results for one step; they are computed again for another step.
 #[derive(Debug, Default)]
 pub(super) struct AdviceUi {
-    /// The run that all of this is about.
+    /// Id of the run.
     run: Option<u64>,
     told: StepWork<Told>,
-    /// The step at the cursor, and since when, in the seconds of the window.
+    /// The step at the cursor, and when the cursor reached it, in seconds of the window's clock.
     seen: Option<(Arc<StepRecord>, f64)>,
-    /// When something was asked last, in the seconds of the window.
+    /// Start of the last computation, in seconds of the window's clock.
     asked_s: f64,
 }
 
 impl AdviceUi {
-    /// Draws how long the weakest direction has been lost, and what to fly against it.
+    /// Draws since when the least observable direction has been unobservable, and the suggested excitation.
     ///
-    /// Worked out while the caller waits, or in the background: then for the step where the cursor rests, and once a second
-    /// while it moves. What is told of an earlier step stays until then, with its time. Without `room` only the best motion
-    /// is told, the next ones where the pointer rests.
+    /// Both are computed while the caller waits, or in the background: then for the step at which the cursor rests, and
+    /// once per second while it moves. The results of an earlier step stay until then, with its stamp. Without `room`
+    /// only the best motion is shown, the alternatives in a tooltip.
     pub(super) fn ui(
         &mut self,
         ui: &mut Ui,
@@ -93,7 +93,7 @@ impl AdviceUi {
         }
     }
 
-    /// Whether it is time for a question in the background.
+    /// Whether a computation in the background is due.
     fn is_due(&self, now_s: f64) -> bool {
         let rests = self.seen.as_ref().is_some_and(|(_, since_s)| now_s - since_s >= REST_S);
         let first = self.told.last().is_none();
@@ -115,7 +115,7 @@ impl AdviceUi {
     }
 }
 
-/// What to fly; `time` says of when, where that is not the cursor's.
+/// The suggested excitation; `time` is the stamp it was computed for, where that is not the cursor's.
 fn advice_ui(ui: &mut Ui, ctx: &PanelContext<'_>, advice: Option<&Advice>, time: &str, room: bool) {
     let Some(advice) = advice else {
         ui.label(RichText::new("No motion can tell more about this calibration").color(ctx.theme.text_weak));
@@ -140,8 +140,8 @@ fn advice_ui(ui: &mut Ui, ctx: &PanelContext<'_>, advice: Option<&Advice>, time:
     }
 }
 
-/// The weakest direction and the first second from which on it was null or weak without interruption; `before` are the run's
-/// earlier steps.
+/// The least observable direction and the stamp since which it has been null or weak without interruption; `before` are
+/// the run's earlier steps.
 fn since(before: &[Arc<StepRecord>], step: &StepRecord, names: &ParameterNames) -> Option<String> {
     let rank = step.rank.as_ref()?;
     let weak = rank.directions.iter().find(|direction| !direction.structural);

@@ -1,5 +1,5 @@
-//! Several rank reports side by side: what is lost to what, spectra over one axis, and null and weak directions in one heat
-//! map with one order of rows.
+//! Several rank reports side by side: causes of lost rank, spectra on one axis, and null and weak directions in one
+//! heat map with a common order of rows.
 
 use egui::{Align2, Color32, FontFamily, FontId, Grid, Label, Rect, RichText, Role, Sense, Stroke, Ui, WidgetInfo};
 use egui::{StrokeKind, pos2, vec2};
@@ -12,28 +12,28 @@ use crate::gui::theme::{self, Theme};
 use crate::gui::units::counted;
 use crate::observability::{CalibrationDirection, RankReport};
 
-/// One report with its name.
+/// One report with its title.
 pub(in crate::gui) struct RankColumn<'a> {
-    /// What it is of.
+    /// Title of the column.
     pub(in crate::gui) title: String,
     /// Colour of the title.
     pub(in crate::gui) color: Color32,
-    /// The report.
+    /// The rank report.
     pub(in crate::gui) rank: &'a RankReport,
 }
 
-/// Room for names on the left, in points.
+/// Width of the names on the left in points.
 const NAMES: f32 = 116.0;
-/// Room between two reports.
+/// Gap between two reports in points.
 const GAP: f32 = 10.0;
-/// Widest column of a direction.
+/// Maximum width of a direction's column.
 const WIDEST: f32 = 42.0;
-/// Narrowest column that holds a signed number.
+/// Minimum width of a column with signed numbers.
 const NUMBER_WIDTH: f32 = 30.0;
 const LOWEST_ROW: f32 = 11.0;
 const HIGHEST_ROW: f32 = 20.0;
 
-/// Draws the reports side by side into what is left of `ui`.
+/// Draws the reports side by side.
 pub(in crate::gui) fn columns_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, columns: &[RankColumn<'_>]) {
     if columns.is_empty() {
         return;
@@ -166,7 +166,7 @@ fn heat_map_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, columns: &[RankColumn<'_
     }
 }
 
-/// The parameters of all reports in chain order, each once.
+/// The parameters of all reports along the chain, without duplicates.
 fn parameters_of(columns: &[RankColumn<'_>]) -> Vec<ParameterId> {
     let mut parameters: Vec<ParameterId> = Vec::new();
     for parameter in columns.iter().flat_map(|column| &column.rank.parameters) {

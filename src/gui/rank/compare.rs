@@ -1,4 +1,4 @@
-//! All runs at the cursor side by side, and the chart that would suit a minimal one better.
+//! All runs at the cursor side by side, and the better of the two minimal parameterizations.
 
 use egui::{RichText, ScrollArea, Ui};
 
@@ -8,10 +8,10 @@ use crate::gui::PanelContext;
 use crate::observability::RankReport;
 use crate::session::{Command, MAX_RUNS, RunRecord, RunSpec, StepRecord};
 
-/// Width that a run needs, in points.
+/// Width of a run in points.
 pub(super) const WIDTH_OF_A_RUN: f32 = 300.0;
 
-/// How many runs have a rank at the cursor.
+/// Number of runs with a rank at the cursor.
 pub(super) fn comparable(ctx: &PanelContext<'_>) -> usize {
     ranked(ctx).count()
 }
@@ -46,7 +46,7 @@ pub(in crate::gui) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>) {
     });
 }
 
-/// How far a minimal run is from its chart's lock, and the other chart for the end where there is no such run yet.
+/// The singularity margin of a minimal run, and the other end block if no run uses it.
 pub(super) fn lock_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, number: usize, run: &RunRecord, step: &StepRecord) {
     let calibration = &step.report.calibration;
     let own = calibration.parameterization.parse::<Parameterization>().ok();

@@ -1,4 +1,4 @@
-//! The singular values and directions at the cursor, one singular value a row.
+//! The singular values and directions at the cursor, one singular value per row.
 
 use super::RankPanel;
 use crate::gui::PanelContext;
@@ -14,7 +14,7 @@ impl CsvTable for RankPanel {
         let mut table =
             Table::new(heads.into_iter().chain(rank.parameters.iter().map(|parameter| names.name(*parameter))));
         for (index, value) in rank.singular_values.iter().enumerate() {
-            // Directions come weakest first, singular values largest first.
+            // Directions start with the least observable one, singular values with the largest.
             let direction = rank.directions.get(rank.singular_values.len() - 1 - index);
             let kind = direction.map_or("informed", |direction| if direction.structural { "null" } else { "weak" });
             let with_priors = rank.singular_values_with_priors.get(index).copied().unwrap_or(f64::NAN);

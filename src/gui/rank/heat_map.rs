@@ -1,4 +1,4 @@
-//! Null and weak directions by parameter name: a heat map with the signed weights written in.
+//! Null and weak directions by parameter name: a heat map with the signed weights as text.
 
 use egui::epaint::TextShape;
 use egui::{Align2, FontFamily, FontId, Rect, RichText, Role, Sense, Stroke, StrokeKind, Ui, WidgetInfo, pos2, vec2};
@@ -13,20 +13,20 @@ use crate::observability::{CalibrationDirection, RankReport};
 
 const NAME_WIDTH: f32 = 62.0;
 const HEADER_HEIGHT: f32 = 28.0;
-/// Height of the heads of narrow columns, whose numbers stand upright.
+/// Height of the header of narrow columns, whose numbers are vertical.
 const UPRIGHT_HEADER_HEIGHT: f32 = 40.0;
 const HIGHEST_ROW: f32 = 26.0;
 const LOWEST_ROW: f32 = 12.0;
-/// Narrowest column that still holds a signed number.
+/// Minimum width of a column with signed numbers.
 const NUMBER_WIDTH: f32 = 30.0;
-/// Narrowest column whose singular value has room beside its neighbours'.
+/// Minimum width of a column whose singular value fits beside its neighbours'.
 const HEAD_WIDTH: f32 = 40.0;
 const WIDEST_COLUMN: f32 = 84.0;
 const NARROWEST_COLUMN: f32 = 15.0;
-/// Weights below this may be left out when room is short.
+/// Rows with smaller weights may be omitted when room is short.
 const SMALLEST_SHOWN: f64 = 0.1;
 
-/// Draws the heat map in about so many points of height; it takes more when it must.
+/// Draws the heat map in about `height` points; it takes more if necessary.
 pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, rank: &RankReport, height: f32) {
     let theme = *ctx.theme;
     if rank.directions.is_empty() {

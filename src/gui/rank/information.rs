@@ -1,4 +1,4 @@
-//! What the last second of images told: bits per second by parameter and by motion.
+//! Information gain of the images in the last second: bits per second by parameter and by motion.
 
 use std::sync::Arc;
 
@@ -13,19 +13,19 @@ use crate::gui::units::fixed;
 use crate::observability::{InformationRate, information_rate};
 use crate::session::{RunRecord, StepRecord};
 
-/// So much of the flight before the cursor is summed up.
+/// Interval before the cursor over which the gain is summed.
 const STRETCH_NS: i64 = 1_000_000_000;
-/// Parts below this, in bits per second, are not worth a number.
+/// Smaller contributions, in bits per second, are not shown.
 const LEAST_SHOWN: f64 = 0.005;
 
-/// What was summed up for one step; another step is summed up anew.
+/// The cached sums of one step.
 #[derive(Debug, Default)]
 pub(super) struct InformationUi {
     told: Option<(Arc<StepRecord>, Option<InformationRate>)>,
 }
 
 impl InformationUi {
-    /// Draws one line, and the table where it is opened (as it is from the start where there is `room`).
+    /// Draws one line, and the table if it is open (initially with `room`).
     pub(super) fn ui(
         &mut self,
         ui: &mut Ui,
@@ -47,7 +47,7 @@ impl InformationUi {
     }
 }
 
-/// The steps of the last second up to this one.
+/// Information rate over the last second up to a step.
 fn rate_before(run: &RunRecord, step: &StepRecord) -> Option<InformationRate> {
     let stamp_ns = step.report.stamp_ns;
     let begin = run.index_at(stamp_ns - STRETCH_NS).map_or(0, |before| before + 1);
@@ -55,8 +55,7 @@ fn rate_before(run: &RunRecord, step: &StepRecord) -> Option<InformationRate> {
     information_rate(run.steps[begin..end].iter().filter_map(|step| step.gain()))
 }
 
-/// The longest headline that has room beside the arrow, else the shortest: one that runs over the edge would widen
-/// everything below it.
+/// The longest headline that fits, else the shortest: a wider one would widen all content below.
 fn fitting<'a>(ui: &Ui, headlines: &'a [String; 3]) -> &'a str {
     let font = TextStyle::Button.resolve(ui.style());
     let room = ui.available_width() - ui.spacing().indent - 2.0 * ui.spacing().button_padding.x;
@@ -64,7 +63,7 @@ fn fitting<'a>(ui: &Ui, headlines: &'a [String; 3]) -> &'a str {
     headlines.iter().find(|text| width(text) <= room).unwrap_or(&headlines[2])
 }
 
-/// All in one line: everything, without the parameter that gains most, and the sum alone.
+/// Headlines: complete, without the parameter of the largest gain, and the sum alone.
 fn headlines(rate: &InformationRate, names: &ParameterNames, joints: &[String]) -> [String; 3] {
     let most = rate
         .leading(None)
@@ -125,10 +124,10 @@ fn table_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, rate: &InformationRate, joi
     });
 }
 
-/// A number on a ground that tells its sign and size.
+/// A number whose background shows its sign and magnitude.
 fn number_ui(ui: &mut Ui, theme: &Theme, number: f64, share: f64) {
     let text = if number.abs() < LEAST_SHOWN { "·".to_owned() } else { fixed(number, 2) };
-    // Right-aligned, so that signs and points stand under one another.
+    // Right-aligned, so that signs and decimal points are aligned.
     let mut text = RichText::new(format!("{text:>5}")).monospace().size(10.5).color(theme.text_strong);
     if share.abs() >= 0.05 {
         let ground = theme.diverging(share);

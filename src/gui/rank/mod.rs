@@ -1,4 +1,4 @@
-//! The rank panel: what the window can say about the calibration, in words, as a spectrum and by parameter name.
+//! The rank panel: observability of the calibration as a verdict, as a spectrum and by parameter name.
 
 mod advice;
 pub(super) mod columns;
@@ -33,35 +33,35 @@ const STRUCTURAL: usize = 0;
 const INFORMED: usize = 1;
 const PARAMETERS: usize = 2;
 
-/// Width that the lines about one run need, in points.
+/// Width in points of the lines about one run.
 const OWN_WIDTH: f32 = 480.0;
 
-/// Height from which the ranks over time have room, in points.
+/// Panel height in points from which the ranks over time are shown.
 const LOWEST_WITH_TIME: f32 = 340.0;
 
-/// Height from which more than the best motion to fly next has room, in points.
+/// Panel height in points from which alternatives to the best motion are shown.
 const LOWEST_WITH_OTHERS: f32 = 300.0;
 
-/// Height from which the table of the information has room beside the heat map, in points.
+/// Panel height in points from which the table of the information gain is shown beside the heat map.
 const TALL: f32 = 1000.0;
 
 /// State of the rank panel.
 #[derive(Debug, Default)]
 pub struct RankPanel {
     tables: RunTables,
-    /// By run: informed, then structural rank.
+    /// By run: informed and structural rank.
     curves: Vec<[Curve; 2]>,
-    /// Whether advice is worked out on a thread of its own, as in the window; pictures wait for it.
+    /// Whether advice is computed on its own thread, as in the window; screenshots wait for it.
     pub in_background: bool,
     advice: AdviceUi,
     information: InformationUi,
     slider: SliderUi,
-    /// Show all runs side by side where there is no room for both.
+    /// Show all runs side by side, in a panel too small for both views.
     all_runs: bool,
 }
 
 impl RankPanel {
-    /// Draws the panel.
+    /// Draws the shown run, or all runs side by side.
     pub fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
         let recording = ctx.recording;
         let Some(run) = recording.runs.get(ctx.selection.run.min(recording.runs.len().saturating_sub(1))) else {
@@ -129,7 +129,7 @@ impl RankPanel {
 
     /// Structural and informed rank of all runs over time.
     fn over_time_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
-        /// Room for the caption over the plot, and for the plot.
+        /// Heights of the caption and of the plot.
         const CAPTION: f32 = 14.0;
         const HEIGHT: f32 = 58.0;
         let theme = *ctx.theme;
@@ -168,14 +168,14 @@ fn rank_row(step: &StepRecord) -> [f64; 3] {
     })
 }
 
-/// A rectangle cut upright at a share of its width, with some room between.
+/// A rectangle split into left and right at a fraction of its width, with a gap.
 fn halves(rect: egui::Rect, share: f32) -> [egui::Rect; 2] {
     const GAP: f32 = 16.0;
     let (left, right) = rect.split_left_right_at_fraction(share);
     [left.with_max_x(left.right() - GAP), right]
 }
 
-/// The verdict: a mark, one line, and the reasons.
+/// The verdict: a symbol, one line, and the reasons.
 fn verdict_ui(ui: &mut Ui, theme: &Theme, names: &ParameterNames, step: &StepRecord) {
     let verdict = verdict::verdict(step, names);
     let (mark, color) = mark_of(verdict.level, theme);
@@ -200,7 +200,7 @@ fn verdict_ui(ui: &mut Ui, theme: &Theme, names: &ParameterNames, step: &StepRec
     });
 }
 
-/// A sign and its colour: never the colour alone.
+/// Symbol and colour of a level: never the colour alone.
 fn mark_of(level: Level, theme: &Theme) -> (&'static str, egui::Color32) {
     match level {
         Level::Good => ("✔", theme.ok),

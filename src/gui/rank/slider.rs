@@ -1,5 +1,5 @@
-//! A slider that moves the chain along a null or weak direction: the scene shows the chain slide, the image shows what
-//! becomes of the reprojections.
+//! A slider that moves the chain along a null or weak direction: the scene shows the moved chain, the image the change
+//! of the reprojections.
 
 use egui::{ComboBox, Label, RichText, Role, Slider, Ui, WidgetInfo};
 
@@ -10,13 +10,13 @@ use crate::gui::{PanelContext, slide};
 use crate::observability::{ChainSlide, RankReport, SlideDirection, SlidePosition, chain_of_step};
 use crate::session::StepRecord;
 
-/// Farthest move, in units of 10° and 3 cm along the unit direction.
+/// Maximum displacement, in units of 10° and 3 cm along the unit direction.
 const FARTHEST: f64 = 2.0;
-/// Seconds that the play button takes from one end to the other and back.
+/// Period of the animation in seconds.
 const PERIOD_S: f64 = 4.0;
-/// Changes of the reprojections up to here count as none, in pixels.
+/// Changes of the reprojections up to here count as zero, in pixels.
 const STAYS_PX: f64 = 0.1;
-/// Parameters whose changes are written out.
+/// Number of parameters whose changes are listed.
 const CHANGES_SHOWN: usize = 4;
 
 /// State of the slider.
@@ -26,7 +26,7 @@ pub(super) struct SliderUi {
 }
 
 impl SliderUi {
-    /// Draws the slider, which sets the position in the selection, and says what comes of it.
+    /// Draws the slider, which sets the position in the selection, and its effect.
     pub(super) fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>, step: &StepRecord) {
         let Some(rank) = &step.rank else { return };
         let Some(chain) = chain_of_step(&step.report, rank) else { return };
@@ -110,7 +110,7 @@ fn is_other(direction: &SlideDirection, rank: &RankReport) -> bool {
     !SlideDirection::of_step(rank).contains(direction)
 }
 
-/// What the move does to the reprojections, and what was moved.
+/// The changes of reprojections and parameters.
 fn outcome_ui(ui: &mut Ui, ctx: &PanelContext<'_>, slide: &ChainSlide, parameters: &[ParameterId]) {
     let names = ctx.names();
     let stays = slide.largest_px <= STAYS_PX;

@@ -1,4 +1,4 @@
-//! The singular values on a logarithmic axis, with both thresholds.
+//! The singular values on a logarithmic axis with both thresholds.
 
 use egui::{Align2, FontFamily, FontId, Rect, Role, Sense, Stroke, StrokeKind, Ui, WidgetInfo, pos2, vec2};
 
@@ -9,13 +9,13 @@ use crate::gui::theme::Theme;
 use crate::gui::units::figure;
 use crate::observability::RankReport;
 
-/// Draws the spectrum in so many points of height.
+/// Draws the spectrum in `height` points.
 pub(super) fn ui(ui: &mut Ui, theme: &Theme, names: &ParameterNames, rank: &RankReport, height: f32) {
     let (_, rect) = ui.allocate_space(vec2(ui.available_width(), height));
     paint(ui, theme, names, rank, &[rank], rect, 0);
 }
 
-/// Draws the spectrum into a rectangle, on an axis that holds those of all peers; `number` tells it apart from theirs.
+/// Draws the spectrum into a rectangle, on an axis common to all `peers`; `number` makes its id unique.
 pub(super) fn paint(
     ui: &Ui,
     theme: &Theme,
@@ -30,7 +30,7 @@ pub(super) fn paint(
     let plot = Rect::from_min_max(rect.min + vec2(30.0, 3.0), rect.max - vec2(4.0, 3.0));
     let Some(axis) = LogAxis::of(peers, plot).filter(|_| !rank.singular_values.is_empty()) else { return };
 
-    // Decades: a line for each third, its power of ten beside it.
+    // Grid lines at thirds of decades, with powers of ten as labels.
     let font = FontId::new(9.0, FontFamily::Monospace);
     for decade in (axis.low.ceil() as i32..=axis.high.floor() as i32).filter(|decade| decade.rem_euclid(3) == 0) {
         let y = axis.y_of_power(f64::from(decade));
@@ -57,7 +57,7 @@ pub(super) fn paint(
         };
         let bar = Rect::from_min_max(pos2(x - width / 2.0, axis.y(*value)), pos2(x + width / 2.0, plot.bottom()));
         if *value <= rank.structural_threshold {
-            // A zero has no height: an open box at the foot stands for it.
+            // A zero has no position on the axis: an open box at the bottom represents it.
             let zero = Rect::from_min_max(pos2(bar.left(), plot.bottom() - 5.0), bar.max);
             painter.rect_stroke(zero, 0.0, Stroke::new(1.0, color), StrokeKind::Inside);
         } else {
@@ -79,7 +79,7 @@ pub(super) fn paint(
             if let Some(with_priors) = rank.singular_values_with_priors.get(index) {
                 lines.push(format!("with priors {}", figure(*with_priors)));
             }
-            // Directions come weakest first, singular values largest first.
+            // Directions start with the least observable one, singular values with the largest.
             let direction = (rank.singular_values.len() - 1).checked_sub(index).and_then(|d| rank.directions.get(d));
             if let Some(direction) = direction {
                 lines.push(parameters_of(names, &rank.parameters, direction, 4));
@@ -100,7 +100,7 @@ fn threshold(painter: &egui::Painter, theme: &Theme, plot: Rect, y: f32, name: &
     painter.galley(place, galley, theme.text_strong);
 }
 
-/// Powers of ten along the vertical axis.
+/// A vertical logarithmic axis.
 struct LogAxis {
     plot: Rect,
     low: f64,
@@ -108,7 +108,7 @@ struct LogAxis {
 }
 
 impl LogAxis {
-    /// The axis that holds the spectra of all reports.
+    /// The axis that contains the spectra of all reports.
     fn of(reports: &[&RankReport], plot: Rect) -> Option<Self> {
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
         for rank in reports.iter().filter(|rank| !rank.singular_values.is_empty()) {

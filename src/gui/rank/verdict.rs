@@ -6,31 +6,31 @@ use crate::gui::units::counted;
 use crate::observability::{CalibrationDirection, KnownDirection, RankReport};
 use crate::session::StepRecord;
 
-/// How good the news is.
+/// Severity of the verdict.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Level {
-    /// Everything is informed.
+    /// All directions are informed.
     Good,
     /// Some directions are weak.
     Weak,
-    /// Some directions are not seen at all.
+    /// Some directions are unobservable.
     Lost,
-    /// Nothing can be said yet.
+    /// No verdict yet.
     None,
 }
 
-/// What the panel says first.
+/// The summary of a step's rank report.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Verdict {
-    /// How good the news is.
+    /// Severity.
     pub(crate) level: Level,
     /// One line.
     pub(crate) headline: String,
-    /// Why, one line each.
+    /// The reasons, one line each.
     pub(crate) reasons: Vec<String>,
 }
 
-/// What a step says about the calibration's observability.
+/// The observability of the calibration in a step.
 pub(crate) fn verdict(step: &StepRecord, names: &ParameterNames) -> Verdict {
     match &step.rank {
         Some(rank) if rank.parameters.is_empty() => {
@@ -92,7 +92,7 @@ fn of_rank(rank: &RankReport, names: &ParameterNames) -> Verdict {
     Verdict { level, headline, reasons }
 }
 
-/// Every known loss with its reason and what was measured, a line each.
+/// Every known loss with its reason and the measured response, one line each.
 pub(crate) fn structure_lines(rank: &RankReport, names: &ParameterNames) -> Vec<String> {
     let line = |known: &KnownDirection| {
         let mark = if known.agrees { "✔" } else { "✖" };
@@ -106,7 +106,7 @@ pub(crate) fn structure_lines(rank: &RankReport, names: &ParameterNames) -> Vec<
 /// Below this singularity margin the parameterization is switched (docs/mathematics.md, section 4).
 const LOW_MARGIN: f64 = 0.3;
 
-/// The strongest parameters of a direction, `L1.d - I.tx`, at most `most`.
+/// The parameters with the largest weights in a direction, `L1.d - I.tx`, at most `most`.
 pub(crate) fn parameters_of(
     names: &ParameterNames,
     parameters: &[ParameterId],
@@ -116,7 +116,7 @@ pub(crate) fn parameters_of(
     parameters_of_weights(names, parameters, &direction.weights, most)
 }
 
-/// The same of the bare weights.
+/// The same for weights without a direction.
 pub(crate) fn parameters_of_weights(
     names: &ParameterNames,
     parameters: &[ParameterId],
@@ -128,7 +128,7 @@ pub(crate) fn parameters_of_weights(
     entries.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
     entries.retain(|(_, weight)| weight.abs() >= SMALLEST_NAMED);
     let left_out = entries.len().saturating_sub(most);
-    // A direction has no sign of its own: the first entry counts as positive.
+    // A direction has no sign of its own: the first weight counts as positive.
     let flip = entries.first().map_or(1.0, |(_, weight)| weight.signum());
     let mut text = String::new();
     for (place, (column, weight)) in entries.iter().take(most).enumerate() {

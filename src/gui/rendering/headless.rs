@@ -1,4 +1,4 @@
-//! Runs a piece of user interface without a window and paints it, on the CPU or with [`Offscreen`](super::offscreen).
+//! Runs egui without a window and paints the result, on the CPU or with [`Offscreen`](super::offscreen).
 
 use std::convert::Infallible;
 
@@ -9,42 +9,42 @@ use super::painter::Painter;
 use super::svg::{self, Textures};
 use crate::gui::theme::{Theme, ThemeName};
 
-/// Frames that run before the picture: layouts, scroll areas and plot bounds settle.
+/// Frames before the screenshot, in which layouts, scroll areas and plot ranges settle.
 const SETTLING_FRAMES: usize = 3;
-/// Seconds between two frames where nobody says otherwise, long enough for every animation to end.
+/// Default time between two frames in seconds, long enough for every animation to end.
 const FRAME_TIME_S: f64 = 1.0;
 
-/// How large and in which theme.
+/// Size and theme of a screenshot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HeadlessOptions {
-    /// Width and height of the picture in pixels.
+    /// Width and height of the screenshot in pixels.
     pub size_px: [u32; 2],
-    /// Pixels per point: 1 as on an ordinary screen, 2 for print.
+    /// Pixels per point: 1 on an ordinary screen, 2 for print.
     pub pixels_per_point: f32,
     /// Colours.
     pub theme: ThemeName,
 }
 
-/// What a frame left to paint.
+/// The output of egui for one frame.
 pub struct Frame {
     /// Meshes, in points.
     pub primitives: Vec<egui::ClippedPrimitive>,
-    /// Textures that changed.
+    /// New, changed and freed textures.
     pub textures: TexturesDelta,
 }
 
-/// Turns frames into pixels.
+/// Paints frames into pixels.
 pub trait FramePainter {
-    /// Why there is no picture.
+    /// The reason why a frame cannot be painted.
     type Error;
 
-    /// Takes over new and changed textures; called with every frame, before it is painted.
+    /// Stores new and changed textures; called for every frame before it is painted.
     fn set_textures(&mut self, delta: &TexturesDelta);
 
-    /// Forgets the textures that a frame frees; called with every frame, after it is painted.
+    /// Drops the textures that a frame frees; called for every frame after it is painted.
     fn free_textures(&mut self, delta: &TexturesDelta);
 
-    /// Paints primitives, whose positions are in points, over an opaque ground.
+    /// Paints primitives, whose positions are in points, over an opaque background.
     fn paint(
         &mut self,
         primitives: &[ClippedPrimitive],
@@ -76,29 +76,29 @@ impl FramePainter for Painter {
     }
 }
 
-/// An egui context without a window; fonts are egui's own, never the system's.
+/// An egui context without a window; it uses egui's own fonts, never the system's.
 pub struct Headless {
     context: egui::Context,
     options: HeadlessOptions,
-    /// Seconds that pass from frame to frame, and that have passed.
+    /// Time between frames and elapsed time in seconds.
     frame_time_s: f64,
     time_s: f64,
 }
 
 impl Headless {
-    /// A fresh context in the theme of the options.
+    /// A new context with the theme of the options.
     pub fn new(options: HeadlessOptions) -> Self {
         let context = egui::Context::default();
         Theme::of(options.theme).apply(&context);
         Self { context, options, frame_time_s: FRAME_TIME_S, time_s: 0.0 }
     }
 
-    /// The context, for setting it up before the first frame.
+    /// The context, for setup before the first frame.
     pub fn context(&self) -> &egui::Context {
         &self.context
     }
 
-    /// Lets so many seconds pass from frame to frame, as in a window; at first every animation ends between two frames.
+    /// Sets the time between frames, as in a window; by default every animation ends between two frames.
     pub fn set_frame_time_s(&mut self, frame_time_s: f64) {
         self.frame_time_s = frame_time_s;
     }
@@ -127,8 +127,8 @@ impl Headless {
         self.context.run_ui(input, ui)
     }
 
-    /// Runs the interface until it has settled and writes it as a drawing of lines and texts (SVG); see
-    /// [`svg_of`] for the words.
+    /// Runs the user interface until it has settled and returns it as an SVG drawing; see [`svg_of`] for the
+    /// parameters.
     pub fn drawing(&mut self, prefix: &str, title: &str, mut ui: impl FnMut(&mut Ui)) -> String {
         let mut textures = Textures::default();
         let mut shapes = Vec::new();
@@ -144,7 +144,7 @@ impl Headless {
         svg::document(&shapes, &textures, size, size_px, Theme::of(theme).background, prefix, title)
     }
 
-    /// Runs the interface until it has settled and paints it over the theme's ground.
+    /// Runs the user interface until it has settled and paints it over the theme's background.
     pub fn picture<P: FramePainter>(
         &mut self,
         painter: &mut P,
@@ -166,15 +166,16 @@ impl Headless {
     }
 }
 
-/// One picture of a piece of user interface, painted on the CPU.
+/// A screenshot of a user interface, painted on the CPU.
 pub fn draw(options: HeadlessOptions, ui: impl FnMut(&mut Ui)) -> RgbaImage {
     let Ok(picture) = Headless::new(options).picture(&mut Painter::new(), ui);
     picture
 }
 
-/// A piece of user interface as a drawing of lines and texts (SVG).
+/// A user interface as an SVG drawing.
 ///
-/// `title` says what it shows; `prefix` begins the names of its parts, so that several drawings can stand in one page.
+/// `title` is the title of the drawing; `prefix` begins the ids of its elements, so that one page can hold several
+/// drawings.
 pub fn svg_of(options: HeadlessOptions, prefix: &str, title: &str, ui: impl FnMut(&mut Ui)) -> String {
     Headless::new(options).drawing(prefix, title, ui)
 }

@@ -1,4 +1,5 @@
-//! From a frame of egui to pixels or SVG without a window: on the CPU with the same bytes everywhere, or on a graphics adapter.
+//! Painting of egui's frames without a window into pixels or SVG: on the CPU with the same bytes on every machine, or
+//! on a graphics adapter.
 
 pub mod headless;
 pub mod offscreen;

@@ -1,7 +1,7 @@
-//! Paints frames with wgpu, as the window does, but into a texture that is read back: for comparing graphics drivers with
-//! the CPU painter, and for pictures of scenes that are large.
+//! Paints frames with wgpu, as the window does, but into a texture that is read back: for comparing graphics drivers
+//! with the CPU painter, and for large screenshots of scenes.
 //!
-//! The bytes of such a picture depend on the driver; those of the CPU painter do not.
+//! The bytes of such a screenshot depend on the driver; those of the CPU painter do not.
 
 use std::time::Duration;
 
@@ -13,22 +13,22 @@ use thiserror::Error;
 use super::headless::{FramePainter, Headless, HeadlessOptions};
 use crate::gui::scene::SceneBackend;
 
-/// What is painted into: eight bits per channel in gamma space, where egui blends.
+/// Format of the target: eight bits per channel in gamma space, where egui blends.
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 const BYTES_PER_PIXEL: u32 = 4;
-/// A driver that has not finished a picture after this long never will.
+/// Timeout for one frame of the driver.
 const DRIVER_HANGS_AFTER: Duration = Duration::from_mins(1);
 
-/// Why there is no picture.
+/// The reason why a screenshot cannot be painted.
 #[derive(Debug, Error)]
 pub enum OffscreenError {
-    /// No driver, or none that can be used.
+    /// No driver, or no usable one.
     #[error("no graphics adapter: {problem}; use --renderer cpu")]
     NoAdapter {
-        /// What was tried.
+        /// The backends that were tried.
         problem: String,
     },
-    /// The picture does not fit the adapter's textures.
+    /// The screenshot is larger than the adapter's largest texture.
     #[error(
         "a picture of {width}×{height} pixels is too large for the graphics adapter {adapter}, which draws up to \
          {largest} each way; use --renderer cpu"
@@ -38,17 +38,17 @@ pub enum OffscreenError {
         width: u32,
         /// Height in pixels.
         height: u32,
-        /// Largest side in pixels.
+        /// Largest side of a texture in pixels.
         largest: u32,
-        /// Its name.
+        /// Name of the adapter.
         adapter: String,
     },
-    /// The picture was not delivered.
+    /// The driver did not return the pixels.
     #[error("the graphics adapter {adapter} delivered no picture: {problem}; use --renderer cpu")]
     NotDelivered {
-        /// Its name.
+        /// Name of the adapter.
         adapter: String,
-        /// What the driver said.
+        /// The error of the driver.
         problem: String,
     },
 }
@@ -63,8 +63,8 @@ pub struct Offscreen {
 }
 
 impl Offscreen {
-    /// Finds an adapter: through Vulkan, Metal or Direct3D 12, and through OpenGL when there is none; the variable
-    /// `WGPU_BACKEND` chooses otherwise.
+    /// Selects an adapter: through Vulkan, Metal or Direct3D 12, or through OpenGL when there is none. The environment
+    /// variable `WGPU_BACKEND` overrides the choice.
     pub fn open() -> Result<Self, OffscreenError> {
         let tries = wgpu::Backends::from_env()
             .map_or_else(|| vec![wgpu::Backends::PRIMARY, wgpu::Backends::GL], |chosen| vec![chosen]);
@@ -101,12 +101,12 @@ impl Offscreen {
         Ok(Self { device, queue, renderer, largest_side_px, adapter: format!("{} ({:?})", info.name, info.backend) })
     }
 
-    /// The adapter's name and the interface it is used through.
+    /// The adapter's name and its graphics interface.
     pub fn adapter(&self) -> &str {
         &self.adapter
     }
 
-    /// One picture of a piece of user interface.
+    /// A screenshot of a user interface.
     pub fn draw(&mut self, options: HeadlessOptions, ui: impl FnMut(&mut Ui)) -> Result<RgbaImage, OffscreenError> {
         let [width, height] = options.size_px;
         if width.max(height) > self.largest_side_px {
@@ -142,7 +142,7 @@ impl Offscreen {
         let target = wgpu::TexelCopyBufferInfo { buffer: &buffer, layout };
         encoder.copy_texture_to_buffer(texture.as_image_copy(), target, texture.size());
         let submission = self.queue.submit(before.into_iter().chain([encoder.finish()]));
-        // What mapping says is asked below, when the range is taken.
+        // The result of mapping is checked below, when the range is taken.
         buffer.map_async(wgpu::MapMode::Read, .., drop);
         let wait = wgpu::PollType::Wait { submission_index: Some(submission), timeout: Some(DRIVER_HANGS_AFTER) };
         self.device.poll(wait).map_err(|error| self.not_delivered(&error))?;
@@ -156,7 +156,7 @@ impl FramePainter for Offscreen {
     type Error = OffscreenError;
 
     fn set_textures(&mut self, delta: &TexturesDelta) {
-        // The textures do not depend on each other, but a fixed order costs nothing.
+        // The textures do not depend on each other; the fixed order is for reproducibility.
         let mut ids: Vec<TextureId> = delta.set.keys().copied().collect();
         ids.sort_unstable();
         for id in ids {

@@ -1,4 +1,4 @@
-//! The residuals over time, one step of one run a row.
+//! The residuals over time, one step of one run per row.
 
 use super::{ResidualsPanel, rms_px};
 use crate::estimator::FactorKind;

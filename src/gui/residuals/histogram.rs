@@ -1,29 +1,29 @@
-//! Counting residuals into bins.
+//! Histogram of residuals.
 
 use crate::estimator::StepReport;
 
-/// Reprojection residuals of one step in bins, both image axes together.
+/// Histogram of one step's reprojection residuals, both image axes together.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct ResidualHistogram {
-    /// Half the width of the range in pixels: bins run from minus this to plus this.
+    /// Half the range in pixels: bins run from minus this to plus this.
     pub(crate) reach_px: f64,
     /// Counts before the solve.
     pub(crate) before: Vec<usize>,
     /// Counts after the solve.
     pub(crate) after: Vec<usize>,
-    /// Residuals after the solve that lie outside the range.
+    /// Number of residuals after the solve outside the range.
     pub(crate) outside: usize,
     /// Mean of the residuals after the solve, by image axis, in pixels.
     pub(crate) mean_px: [f64; 2],
     /// Median length of the residual vectors after the solve, in pixels.
     pub(crate) median_px: f64,
-    /// Length that 95 % of the residual vectors after the solve stay under, in pixels.
+    /// 95th percentile of the lengths of the residual vectors after the solve, in pixels.
     pub(crate) p95_px: f64,
-    /// Residual vectors after the solve.
+    /// Number of residual vectors after the solve.
     pub(crate) observations: usize,
-    /// Observations that the robust loss left less than half their weight.
+    /// Number of observations whose robust weight is below one half.
     pub(crate) downweighted: usize,
-    /// Features rejected as outliers.
+    /// Number of features rejected as outliers.
     pub(crate) rejected: usize,
 }
 
@@ -81,7 +81,7 @@ impl ResidualHistogram {
     }
 }
 
-/// The next of 1, 2, 3, 5, 10, … at or above a length, so that the axis does not jump from frame to frame.
+/// The next of 1, 2, 3, 5, 10, … at or above a length, so that the axis does not change with every frame.
 fn round_up(length: f64) -> f64 {
     let length = if length.is_finite() { length.clamp(1e-3, 1e6) } else { 1.0 };
     let power = 10_f64.powf(length.log10().floor());

@@ -1,4 +1,4 @@
-//! The residuals panel: how well the window fits, as a histogram, over time, and by kind of factor.
+//! The residuals panel: the fit of the window as a histogram, over time, and by kind of factor.
 
 mod csv;
 mod histogram;
@@ -22,17 +22,17 @@ use crate::estimator::{ResidualSummary, StepReport};
 use crate::gui::residuals::histogram::ResidualHistogram;
 use crate::session::StepRecord;
 
-/// State of the residuals panel.
+/// State of the residuals panel: RMS of all runs over time, and the histogram of the step.
 #[derive(Debug, Default)]
 pub struct ResidualsPanel {
     tables: RunTables,
     curves: Vec<Curve>,
-    /// The step that the histogram was made of.
+    /// The step of the histogram, and the histogram.
     counted: Option<(Arc<StepRecord>, ResidualHistogram)>,
 }
 
 impl ResidualsPanel {
-    /// Draws the panel.
+    /// Draws histogram, plot over time and table of factors.
     pub fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
         let recording = ctx.recording;
         let run = ctx.selection.run.min(recording.runs.len().saturating_sub(1));
@@ -69,7 +69,7 @@ impl ResidualsPanel {
         self.over_time_ui(ui, ctx, over_time);
     }
 
-    /// Root mean square of the reprojection residuals after the solve, all runs.
+    /// Reprojection RMS after the solve over time, for all runs.
     fn over_time_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>, height: f32) {
         let theme = *ctx.theme;
         let top = ui.cursor().top();
@@ -97,12 +97,12 @@ impl ResidualsPanel {
     }
 }
 
-/// The step's reprojection RMS after the solve, not-a-number without a solve.
+/// The step's reprojection RMS after the solve in pixels, NaN without a solve.
 pub(crate) fn rms_px(report: &StepReport) -> f64 {
     if report.window.is_empty() { f64::NAN } else { report.reprojection_rms_after_px }
 }
 
-/// The figures in one line.
+/// Summary of the step in one line.
 fn summary_ui(ui: &mut Ui, theme: &Theme, report: &StepReport, histogram: &ResidualHistogram) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = vec2(4.0, 2.0);
@@ -174,7 +174,7 @@ fn histogram_ui(ui: &mut Ui, theme: &Theme, histogram: &ResidualHistogram, heigh
     } else {
         [unit.to_owned(), "px".to_owned()]
     };
-    // What would run into the key is said shorter.
+    // A text that would overlap the legend is replaced by a shorter one.
     let galleys = texts.map(|text| painter.layout_no_wrap(text, label_font(), theme.text_weak));
     let right = rect.right_top() + vec2(-5.0, 2.0);
     if let Some(galley) = galleys.into_iter().find(|galley| end.right() + 10.0 + galley.size().x < right.x) {
@@ -184,7 +184,7 @@ fn histogram_ui(ui: &mut Ui, theme: &Theme, histogram: &ResidualHistogram, heigh
     response.widget_info(|| WidgetInfo::labeled(Role::Image, true, "Histogram of reprojection residuals"));
 }
 
-/// χ² by kind of factor: before, after, and per residual, where about 1 is as expected.
+/// χ² by kind of factor: before, after, and per residual, which is expected to be about 1.
 fn factors_ui(ui: &mut Ui, theme: &Theme, residuals: &[ResidualSummary]) {
     if residuals.is_empty() {
         ui.label(RichText::new("No solve in this step").color(theme.text_weak));

@@ -1,4 +1,4 @@
-//! Calibration and rank of the made-up recording.
+//! Calibration and rank of the artificial recording.
 
 use super::recording::FIRST_TRACKED_FRAME;
 use super::yard::Dice;
@@ -7,12 +7,12 @@ use crate::geometry::{Dimension, RigidTransform, so3};
 use crate::gimbal::{ClassicalChain, DhLink, ParameterId, ParameterPart, Quantity, Singularity};
 use crate::observability::{CalibrationDirection, RankReport};
 
-/// Margins of the made-up calibration.
+/// Singularity margins of the artificial calibration.
 const MARGINS: [(Singularity, f64); 3] =
     [(Singularity::Base, 0.98), (Singularity::End, 0.93), (Singularity::ParallelAxes(1), 0.99)];
 
-/// The calibration at a frame: the given chain at first, then ever nearer to the truth, faster for angles than for
-/// lengths, with a shrinking σ.
+/// The calibration at a frame: the given chain at first, then converging to the ground truth, faster for angles than
+/// for lengths, with a decreasing σ.
 pub(crate) fn calibration_at(
     name: &str,
     index: usize,
@@ -53,7 +53,7 @@ pub(crate) fn calibration_at(
     }
 }
 
-/// The rank at a frame: everything structural at once, informed directions one after the other.
+/// The rank at a frame: structural rank at once, informed directions one after the other.
 pub(crate) fn rank_at(parameters: &[ParameterId], index: usize) -> RankReport {
     let columns = parameters.len();
     let redundant = if columns == 24 { 6 } else { 0 };
@@ -129,7 +129,7 @@ fn mix(given: &ClassicalChain, ground_truth: &ClassicalChain, weight_of_given: f
     }
 }
 
-/// Parameters and values of the classical form.
+/// Parameters and values of the classical parameterization.
 fn classical_values(chain: &ClassicalChain) -> Vec<(ParameterId, f64)> {
     let mut entries = pose_entries(ParameterPart::ImuFromBase, &chain.imu_from_base);
     for (number, link) in (0..).zip(&chain.links) {

@@ -1,4 +1,4 @@
-//! Images of the made-up yard: brick walls, a tiled ground and a plain sky, cast ray by ray.
+//! Ray-cast images of the artificial yard: brick walls, a tiled ground and a plain sky.
 
 use std::sync::Arc;
 
@@ -8,7 +8,7 @@ use super::yard::{INTRINSICS_PX, Instant, RESOLUTION_PX, WALL_HEIGHT_M, YARD_HAL
 use crate::gui::ImageSource;
 use crate::sensors::GrayImage;
 
-/// Gives the image of `cam0` at any frame.
+/// The image of `cam0` at any frame.
 pub(crate) struct SampleImages;
 
 impl ImageSource for SampleImages {
@@ -51,7 +51,7 @@ fn grey(origin: &Vector3<f64>, ray: &Vector3<f64>) -> u8 {
     shade(tile(along, hit.z, 1.6, 0.8), noise(along * 2.0, hit.z * 2.0, wall), base, to_side)
 }
 
-/// Darker towards joints: 1 inside a tile, 0.6 on its edge.
+/// Brightness of a tile: 1 inside, 0.6 at its edge.
 fn tile(u: f64, v: f64, width: f64, height: f64) -> f64 {
     let row = (v / height).floor();
     let (along, up) = ((u / width + 0.5 * row).rem_euclid(1.0), (v / height).rem_euclid(1.0));

@@ -1,4 +1,4 @@
-//! Recordings that the tests of panels and screenshots draw.
+//! Recordings for the tests of panels and screenshots.
 
 mod calibration;
 mod images;

@@ -1,8 +1,8 @@
-//! A made-up recording for the tests of panels and screenshots: a flight in a walled yard with a three-axis gimbal.
+//! An artificial recording for the tests of panels and screenshots: a flight in a walled yard with a three-axis gimbal.
 //!
-//! Two seconds of hover, then a figure of eight; two runs (`auto` in the minimal form, `classical`) whose calibration
-//! starts at the rig's wrong chain and approaches the true one.
-//! The geometry is consistent: features are projections of points on the walls that [`SampleImages`] draws.
+//! Two seconds of hover, then a figure of eight; two runs (`auto` in the minimal parameterization, `classical`) whose
+//! calibration starts at the rig's values and converges to the ground truth.
+//! The geometry is consistent: features are projections of points on the walls in [`SampleImages`].
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -25,9 +25,9 @@ use crate::geometry::RigidTransform;
 use crate::gimbal::ClassicalChain;
 use crate::session::{Recording, RunRecord, StepRecord};
 
-/// Nanoseconds between two images (20 Hz).
+/// Period of the images in nanoseconds (20 Hz).
 pub(crate) const FRAME_PERIOD_NS: i64 = 50_000_000;
-/// The first frame that the made-up estimator tracks (2.5 s).
+/// The first frame in which the estimator tracks (2.5 s).
 pub(crate) const FIRST_TRACKED_FRAME: usize = 50;
 
 /// Twelve seconds with the runs `auto` and `classical`.
@@ -35,7 +35,7 @@ pub(crate) fn sample_recording() -> Recording {
     sample_recording_of(240, &["auto", "classical"])
 }
 
-/// The images that belong to [`sample_recording`].
+/// The images of [`sample_recording`].
 pub(crate) fn sample_images() -> SampleImages {
     SampleImages
 }
@@ -157,7 +157,7 @@ fn sample_run(
     run
 }
 
-/// How the made-up estimate errs.
+/// The errors of an artificial estimate.
 struct Estimate<'a> {
     number: usize,
     flight: &'a [Instant],
@@ -165,7 +165,7 @@ struct Estimate<'a> {
 }
 
 impl Estimate<'_> {
-    /// The estimated pose: truth, a slow drift that differs by run, seen in the estimator's own world.
+    /// The estimated pose: ground truth with a slow drift that differs by run, in the estimator's own world.
     fn world_from_imu(&self, index: usize) -> RigidTransform {
         let age_s = index.saturating_sub(FIRST_TRACKED_FRAME) as f64 * 0.05;
         let gain = 0.03 + 0.05 * self.number as f64;

@@ -1,4 +1,4 @@
-//! A short synthetic flight through the real estimator, for panels that need a real linearization.
+//! A short synthetic flight processed by the real estimator, for panels that need a real linearization.
 
 use std::path::PathBuf;
 use std::sync::{Arc, OnceLock};
@@ -9,7 +9,7 @@ use crate::observability::analyse;
 use crate::session::{Recording, RunRecord, StepRecord};
 use crate::simulation::{SyntheticOptions, synthetic_tracks};
 
-/// Five seconds in the classical, the minimal and the swapped form; made once.
+/// Five seconds in the classical, the minimal and the swapped parameterization; computed once.
 pub(crate) fn flown_recording() -> &'static Recording {
     static FLOWN: OnceLock<Recording> = OnceLock::new();
     FLOWN.get_or_init(fly)

@@ -1,4 +1,5 @@
-//! The made-up flight of the samples: a walled yard, a rig with a three-axis gimbal, and the true motion.
+//! The artificial flight of the samples: a walled yard, a rig with a three-axis gimbal, and the ground-truth
+//! trajectory.
 
 use nalgebra::{UnitQuaternion, Vector2, Vector3};
 
@@ -8,16 +9,16 @@ use crate::geometry::{RigidTransform, SplitMix64, so3};
 use crate::gimbal::{ClassicalChain, DhLink};
 use crate::sensors::{CameraMount, CameraRig, ChainPrior, GimbalRig, ImuNoise, ImuRig, Joint, Rig};
 
-/// Half the side of the walled yard, in metres.
+/// Half the side of the walled yard in metres.
 pub(super) const YARD_HALF_SIDE_M: f64 = 22.0;
-/// Height of its walls, in metres.
+/// Height of its walls in metres.
 pub(super) const WALL_HEIGHT_M: f64 = 12.0;
-/// Focal lengths and principal point of the made-up camera, in pixels.
+/// Focal lengths and principal point of the camera in pixels.
 pub(super) const INTRINSICS_PX: [f64; 4] = [352.6, 352.1, 322.4, 238.1];
-/// Its resolution.
+/// Its resolution in pixels.
 pub(super) const RESOLUTION_PX: [usize; 2] = [640, 480];
 
-/// Seeded random numbers, so that the sample is the same everywhere.
+/// Seeded random numbers, so that the sample is the same on every machine.
 pub(super) struct Dice(SplitMix64);
 
 impl Dice {
@@ -30,7 +31,7 @@ impl Dice {
         self.0.next_unit()
     }
 
-    /// Roughly normal with unit variance (sum of twelve uniforms).
+    /// Approximately normal with unit variance (sum of twelve uniform numbers).
     pub(super) fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.unit()).sum::<f64>() - 6.0
     }
@@ -45,7 +46,7 @@ pub(super) struct Instant {
 }
 
 impl Instant {
-    /// The true flight at a frame.
+    /// The ground truth at a frame.
     pub(super) fn at(frame_index: usize, chain: &ClassicalChain) -> Self {
         let t_s = frame_index as f64 * 0.05;
         let position = position_m(t_s);
@@ -65,7 +66,7 @@ impl Instant {
     }
 }
 
-/// Hover for two seconds, then a figure of eight.
+/// Position in metres: hover for two seconds, then a figure of eight.
 fn position_m(t_s: f64) -> Vector3<f64> {
     let moved_s = (t_s - 2.0).max(0.0);
     let phase = 0.55 * moved_s * moved_s / (moved_s + 1.5);
@@ -77,7 +78,7 @@ fn position_m(t_s: f64) -> Vector3<f64> {
     )
 }
 
-/// The classical chain at joint angles, link by link.
+/// `imu_from_camera` of the classical chain at joint angles, link by link.
 pub(crate) fn chain_pose(chain: &ClassicalChain, joint_angles_rad: &[f64]) -> RigidTransform {
     let mut pose = chain.imu_from_base;
     for (link, angle_rad) in chain.links.iter().zip(joint_angles_rad) {
@@ -98,7 +99,7 @@ fn link(theta_offset_rad: f64, d_m: f64, a_m: f64, alpha_rad: f64) -> DhLink {
     DhLink { theta_offset_rad, d_m, a_m, alpha_rad }
 }
 
-/// The chain as it really is: yaw, roll, pitch, an optical camera frame that looks forward.
+/// The ground-truth chain: yaw, roll, pitch, an optical camera frame that looks forward.
 pub(crate) fn true_chain() -> ClassicalChain {
     ClassicalChain {
         imu_from_base: pose_of([3.13, -0.04, 0.02], [0.09, 0.008, -0.062]),
@@ -111,7 +112,7 @@ pub(crate) fn true_chain() -> ClassicalChain {
     }
 }
 
-/// The chain as the rig gives it: each parameter wrong by up to 6 mm and 1.5°.
+/// The chain of the rig: each parameter has an error of up to 6 mm and 1.5°.
 pub(crate) fn given_chain() -> ClassicalChain {
     let mut chain = true_chain();
     let mut dice = Dice::new(7);
@@ -210,7 +211,7 @@ pub(super) fn project(
     inside.then_some((uv, point.z))
 }
 
-/// The point of a feature; its id is one more than the point's number.
+/// The point of a feature; its id is the point's index plus one.
 pub(super) fn point_of(id: FeatureId, points: &[Vector3<f64>]) -> Vector3<f64> {
     points[id.0 as usize - 1]
 }

@@ -1,46 +1,47 @@
-//! Where the scene is seen from, and how it falls on the screen.
+//! The viewpoint of the scene and its projection onto the screen.
 //!
-//! No sine or cosine is taken unless a person turns the view, so that pictures do not depend on a system's library.
+//! No sine or cosine is computed unless the user rotates the view, so that screenshots do not depend on the system's
+//! math library.
 
 use nalgebra::{Unit, UnitQuaternion, Vector3};
 
-/// Tangent of half the angle of view along the shorter side of a viewport of the world.
+/// Tangent of half the field of view along the shorter side of a viewport of the world.
 const WORLD_HALF_TANGENT: f64 = 0.40;
-/// The same close up, where a small angle keeps near and far things of one size.
+/// The same for the close-up, where a small field of view reduces the perspective.
 const CLOSE_UP_HALF_TANGENT: f64 = 0.08;
-/// Nearest visible distance as a share of the distance to the target.
+/// Ratio of the near distance to the distance of the target.
 const NEAR_SHARE: f64 = 0.02;
-/// The steepest view: sine of the elevation, short of straight down so that "up" stays defined.
+/// Largest sine of the elevation, less than 1 so that "up" stays defined.
 const STEEPEST: f64 = 0.999;
-/// Share of the viewport that framed points may fill.
+/// Ratio of the viewport that framed points may fill.
 const FRAME_SHARE: f64 = 0.86;
 
-/// A camera that looks at a target, with the frame's z axis up.
+/// A camera that looks at a target, with the z axis up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct OrbitCamera {
     pub(super) target_m: Vector3<f64>,
-    /// Unit vector from the target to the eye.
+    /// Unit vector from the target to the camera.
     pub(super) towards: Vector3<f64>,
     pub(super) distance_m: f64,
 }
 
-/// The rectangle drawn into, in pixels.
+/// The screen rectangle of a view in pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Viewport {
     pub(super) size_px: [u32; 2],
-    /// Left, top, right, bottom of the part that framing may use.
+    /// Left, top, right, bottom of the region for framing.
     pub(super) frame_px: [f64; 4],
-    /// Tangent of half the angle of view along the shorter side of that part.
+    /// Tangent of half the field of view along the shorter side of that region.
     half_tangent: f64,
 }
 
 impl Viewport {
-    /// For the world, with the part of it that framing may use.
+    /// For the world, with the region for framing.
     pub(super) fn world(size_px: [u32; 2], frame_px: [f64; 4]) -> Self {
         Self { size_px, frame_px, half_tangent: WORLD_HALF_TANGENT }
     }
 
-    /// For something small, over the whole size.
+    /// For a small object, over the whole size.
     pub(super) fn close_up(size_px: [u32; 2]) -> Self {
         let frame_px = [0.0, 0.0, f64::from(size_px[0]), f64::from(size_px[1])];
         Self { size_px, frame_px, half_tangent: CLOSE_UP_HALF_TANGENT }
@@ -62,7 +63,7 @@ impl Viewport {
     }
 }
 
-/// A camera and its viewport, ready to project.
+/// A camera and its viewport, ready for projection.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct View {
     pub(super) camera: OrbitCamera,
@@ -72,9 +73,9 @@ pub(super) struct View {
     pub(super) near_m: f64,
 }
 
-/// A place on the screen: pixels from the upper left corner, and depth 1 at the near plane, 0 at infinity.
+/// A screen position: pixels from the upper left corner, and depth 1 at the near plane, 0 at infinity.
 ///
-/// Depth is the near distance over the distance along the view, so it is linear over the screen.
+/// Depth is the near distance divided by the distance along the view, so it is linear over the screen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ScreenPoint {
     pub(super) x_px: f64,
@@ -83,7 +84,7 @@ pub(super) struct ScreenPoint {
 }
 
 impl ScreenPoint {
-    /// Between two places, which is also between them in depth.
+    /// Linear interpolation between two positions, also in depth.
     pub(super) fn lerp(&self, other: &Self, fraction: f64) -> Self {
         Self {
             x_px: self.x_px + (other.x_px - self.x_px) * fraction,
@@ -99,14 +100,14 @@ impl View {
         Self { camera, viewport, right, up, near_m: (camera.distance_m * NEAR_SHARE).max(1e-6) }
     }
 
-    /// Right, up and away from the eye, in metres.
+    /// A point in the view: right, up and forward, in metres.
     pub(super) fn in_view(&self, point_m: &Vector3<f64>) -> Vector3<f64> {
         let offset = point_m - self.camera.target_m;
         let away = self.camera.distance_m - self.camera.towards.dot(&offset);
         Vector3::new(self.right.dot(&offset), self.up.dot(&offset), away)
     }
 
-    /// Where something at or behind the near plane falls, given [`View::in_view`].
+    /// Screen position of a point at or behind the near plane, from [`View::in_view`].
     pub(super) fn on_screen(&self, in_view_m: &Vector3<f64>) -> ScreenPoint {
         let [centre_x, centre_y] = self.viewport.centre_px();
         let scale = self.viewport.focal_px() / in_view_m.z;
@@ -117,7 +118,7 @@ impl View {
         }
     }
 
-    /// Where a place falls, `None` in front of the near plane.
+    /// Screen position of a point, `None` in front of the near plane.
     pub(super) fn project(&self, point_m: &Vector3<f64>) -> Option<ScreenPoint> {
         let in_view = self.in_view(point_m);
         (in_view.z >= self.near_m).then(|| self.on_screen(&in_view))
@@ -128,20 +129,20 @@ impl View {
         self.camera.distance_m / self.viewport.focal_px()
     }
 
-    /// How far the target moves when it is dragged over the screen, in metres.
+    /// Displacement of the target in metres when it is dragged over the screen.
     pub(super) fn drag_m(&self, drag_px: [f64; 2]) -> Vector3<f64> {
         (self.up * drag_px[1] - self.right * drag_px[0]) * self.metres_per_px()
     }
 }
 
-/// Right and up of a view from a direction.
+/// Right and up axes of a view from a direction.
 pub(super) fn screen_axes(towards: &Vector3<f64>) -> [Vector3<f64>; 2] {
     let right = Vector3::z().cross(towards);
     let right = if right.norm() > 1e-9 { right.normalize() } else { Vector3::x() };
     [right, towards.cross(&right)]
 }
 
-/// A camera from a direction that has all points within the viewport's frame, as large as possible.
+/// A camera in direction `towards` that shows all points inside the viewport's region as large as possible.
 pub(super) fn frame(points_m: &[Vector3<f64>], towards: Vector3<f64>, viewport: &Viewport) -> OrbitCamera {
     let finite = || points_m.iter().filter(|point| point.iter().all(|coordinate| coordinate.is_finite()));
     let Some(first) = finite().next() else {
@@ -152,8 +153,10 @@ pub(super) fn frame(points_m: &[Vector3<f64>], towards: Vector3<f64>, viewport: 
     let smallest_m = ((high - low).norm() * 0.05).max(1e-3);
     let reach = viewport.half_size_px().map(|half| FRAME_SHARE * half / viewport.focal_px());
     let middle = (low + high) * 0.5;
-    // A point at `across` and `nearer` (towards the eye) is inside when |across − shift| ≤ reach · (distance − nearer).
-    // For each side that bounds the shift from above or below; where both bounds meet is the smallest distance.
+    // A point at `across` and `nearer` (towards the camera) is inside when
+    // across − shift
+    // ≤ reach · (distance − nearer). For each side that bounds the shift from above or below; the smallest distance is
+    // where both bounds are equal.
     let solve = |axis: &Vector3<f64>, reach: f64| {
         let (most, least) = finite().fold((f64::NEG_INFINITY, f64::INFINITY), |(most, least), point| {
             let offset = point - middle;
@@ -168,7 +171,7 @@ pub(super) fn frame(points_m: &[Vector3<f64>], towards: Vector3<f64>, viewport: 
     OrbitCamera { target_m: middle + right * shift_right + up * shift_up, towards, distance_m }
 }
 
-/// How a person has turned, shifted and zoomed a view that otherwise frames its content.
+/// The user's rotation, shift and zoom of a view that otherwise frames its content.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Orbit {
     pub(super) towards: Vector3<f64>,
@@ -177,12 +180,12 @@ pub(super) struct Orbit {
 }
 
 impl Orbit {
-    /// Untouched, looking from a direction that is not zero.
+    /// Without changes by the user, from a direction that is not zero.
     pub(super) fn from_direction(direction: Vector3<f64>) -> Self {
         Self { towards: direction.normalize(), zoom: 1.0, shift_m: Vector3::zeros() }
     }
 
-    /// The framing camera as the person wants it.
+    /// The framing camera with the user's changes.
     pub(super) fn applied(&self, framing: OrbitCamera) -> OrbitCamera {
         OrbitCamera {
             target_m: framing.target_m + self.shift_m,
@@ -191,7 +194,7 @@ impl Orbit {
         }
     }
 
-    /// Turns by angles in radians: about z, and up.
+    /// Rotates the view by angles in radians: about z, and in elevation.
     pub(super) fn turn(&mut self, about_z_rad: f64, up_rad: f64) {
         let [right, _] = screen_axes(&self.towards);
         let turned = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), about_z_rad) * self.towards;

@@ -1,4 +1,4 @@
-//! Shows a drawing in a rectangle, by whichever back end the context was given.
+//! Shows a drawing in a rectangle with the context's scene backend.
 
 use std::sync::Arc;
 
@@ -7,13 +7,13 @@ use egui::{Context, Id, Pos2, Rect, TextureHandle, TextureOptions, Ui, pos2};
 use super::layout::Drawing;
 use super::{cpu, gpu};
 
-/// How scenes are drawn.
+/// Renderer of the scenes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SceneBackend {
-    /// On the CPU into a texture: for pictures, and for windows on an adapter that computes on the CPU anyway.
+    /// On the CPU into a texture: for screenshots, and for windows on a CPU adapter.
     #[default]
     Cpu,
-    /// With wgpu in egui's paint callback, into targets of that format.
+    /// With wgpu in egui's paint callback, into targets of this format.
     Wgpu(wgpu::TextureFormat),
 }
 
@@ -22,12 +22,12 @@ impl SceneBackend {
         Id::unique("scene back end")
     }
 
-    /// Chooses the back end of a context; without a choice it is the CPU.
+    /// Sets the backend of a context; the default is the CPU.
     pub fn set(self, context: &Context) {
         context.data_mut(|data| data.insert_temp(Self::key(), self));
     }
 
-    /// The back end of a context.
+    /// The backend of a context.
     pub fn of(context: &Context) -> Self {
         context.data(|data| data.get_temp(Self::key())).unwrap_or_default()
     }
@@ -41,12 +41,12 @@ pub(super) struct Canvas {
 }
 
 impl Canvas {
-    /// An empty canvas; the name tells two of one panel apart.
+    /// An empty canvas; the name distinguishes canvases of one panel.
     pub(super) fn new(name: &'static str) -> Self {
         Self { name, drawing: None, texture: None }
     }
 
-    /// Draws everything but the labels; `rect` lies on whole pixels.
+    /// Draws everything except the labels; `rect` has whole pixels.
     pub(super) fn show(&mut self, ui: &Ui, rect: Rect, drawing: Drawing) -> Arc<Drawing> {
         let drawing = match self.drawing.take() {
             Some(last) if *last == drawing => last,

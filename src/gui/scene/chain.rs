@@ -1,4 +1,4 @@
-//! The gimbal's chain at one frame: its frames as axes, its links as what they are made of, and the true chain as a ghost.
+//! The gimbal's chain at one frame: its frames as axes, its links as rods, and the ground-truth chain translucent.
 
 use egui::Color32;
 use nalgebra::{UnitQuaternion, Vector3};
@@ -9,22 +9,23 @@ use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::ClassicalChain;
 use crate::gui::theme::{Theme, mix};
 
-/// Length of an axis as a share of the chain's extent.
+/// Ratio of the length of an axis to the extent of the chain.
 const AXIS_SHARE: f64 = 0.13;
 
-/// A chain at some joint angles, in the frame of the IMU.
+/// A chain at given joint angles, in the IMU frame.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct ChainPose {
-    /// `I`, `B`, `J2`, …, `E`, `C`.
+    /// Names of the frames: `I`, `B`, `J2`, …, `E`, `C`.
     pub(super) names: Vec<String>,
-    /// Pose of each frame in the IMU's.
+    /// Poses `imu_from_frame` of the frames.
     pub(super) imu_from_frame: Vec<RigidTransform>,
-    /// For each link the corner between its shift along the joint's axis and its shift along the link.
+    /// For each link the corner between its translation along the joint's axis and its translation along the link, in
+    /// the IMU frame in metres.
     corners_m: Vec<Vector3<f64>>,
 }
 
 impl ChainPose {
-    /// Goes along the chain, link by link (Eq. 2); angles that are missing count as zero.
+    /// Forward kinematics link by link (Eq. 2); missing angles count as zero.
     pub(super) fn at(chain: &ClassicalChain, joint_angles_rad: &[f64]) -> Self {
         let mut names = vec!["I".to_owned()];
         let mut imu_from_frame = vec![RigidTransform::identity()];
@@ -50,8 +51,8 @@ impl ChainPose {
         Self { names, imu_from_frame, corners_m }
     }
 
-    /// The direction from which the frames lie furthest apart on the screen; the same for all joint angles, so that the
-    /// view stands still while the joints turn.
+    /// The direction from which the frames have the largest distances on the screen; the same for all joint angles, so
+    /// that the view does not rotate with the joints.
     pub(super) fn best_direction(chain: &ClassicalChain) -> Vector3<f64> {
         const ROUND: [[f64; 2]; 16] = {
             const QUARTER: [[f64; 2]; 4] = [[5.0, 0.0], [4.6, 1.9], [3.5, 3.5], [1.9, 4.6]];
@@ -86,7 +87,7 @@ impl ChainPose {
         best.1
     }
 
-    /// Pose of the camera.
+    /// Pose `imu_from_camera`.
     pub(super) fn imu_from_camera(&self) -> RigidTransform {
         self.imu_from_frame.last().copied().unwrap_or_default()
     }
@@ -95,7 +96,7 @@ impl ChainPose {
         self.imu_from_frame.iter().map(|pose| pose.translation_m)
     }
 
-    /// Largest distance of a frame from the IMU, in metres.
+    /// Largest distance of a frame from the IMU in metres.
     fn extent_m(&self) -> f64 {
         self.origins_m().map(|origin| origin.norm()).fold(0.0, f64::max)
     }
@@ -113,24 +114,25 @@ impl ChainPose {
     }
 }
 
-/// What is known of the chain at one frame.
+/// The chain at one frame and its reference.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct ChainModel {
     pub(super) estimate: ChainPose,
-    /// The true chain at the same joint angles, or the estimate when `estimate` is moved away from it.
+    /// The ground-truth chain at the same joint angles, or the estimate when `estimate` is moved away from it.
     pub(super) ground_truth: Option<ChainPose>,
-    /// Whether `estimate` is moved along a direction, and `ground_truth` the chain before that.
+    /// Whether `estimate` is moved along a direction, and `ground_truth` is the chain before that.
     pub(super) moved: bool,
     pub(super) rows: Vec<LinkRow>,
-    /// Distance in metres and angle in radians between the camera's poses on the IMU in `estimate` and `ground_truth`.
+    /// Distance in metres and angle in radians between the camera poses in the IMU frame of `estimate` and
+    /// `ground_truth`.
     pub(super) camera_error: Option<(f64, f64)>,
 }
 
-/// One link as numbers.
+/// The values of one link.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct LinkRow {
     pub(super) joint: String,
-    /// The joint's angle, without the static offset.
+    /// The joint angle without the static offset.
     pub(super) angle_rad: f64,
     pub(super) theta_offset_rad: f64,
     pub(super) d_m: f64,
@@ -139,7 +141,7 @@ pub(super) struct LinkRow {
 }
 
 impl ChainModel {
-    /// The chain at some joint angles; angles that are not known yet count as zero.
+    /// The chain at given joint angles; missing angles count as zero.
     pub(super) fn at(
         angles_rad: &[f64],
         chain: &ClassicalChain,
@@ -173,9 +175,9 @@ impl ChainModel {
         sized.axis_length_m()
     }
 
-    /// Places that a view of the chain must hold; a chain that is moved to and fro is seen from one place.
+    /// Points that a view of the chain must contain; they do not depend on a move along a direction.
     pub(super) fn framing_points_m(&self) -> Vec<Vector3<f64>> {
-        /// Room around a chain for its moves.
+        /// Ratio of the framed extent to the chain's, so that a moved chain fits.
         const ROOM: f64 = 1.35;
         let held = self.ground_truth.as_ref().filter(|_| self.moved);
         let Some(held) = held else { return self.estimate.framing_points_m() };
@@ -184,7 +186,7 @@ impl ChainModel {
         points.into_iter().map(|point| middle + (point - middle) * ROOM).collect()
     }
 
-    /// The close-up, in the frame of the IMU.
+    /// The close-up in the IMU frame.
     pub(super) fn scene(&self, theme: &Theme) -> SceneModel {
         let mut scene = SceneModel::default();
         let length_m = self.axis_length_m();
@@ -216,7 +218,7 @@ impl ChainModel {
         scene
     }
 
-    /// A small pyramid of view.
+    /// A small camera frustum.
     fn camera_symbol(&self, theme: &Theme, scene: &mut SceneModel) {
         let pose = self.estimate.imu_from_camera();
         let depth_m = 1.1 * self.axis_length_m();
@@ -229,8 +231,8 @@ impl ChainModel {
         }
     }
 
-    /// The rods: grey from the IMU to the base and from the effector to the camera, per link its `d` in the colour of z
-    /// and its `a` in the colour of x.
+    /// The rods: grey from the IMU to the base and from the effector to the camera; for each link its `d` in the colour
+    /// of z and its `a` in the colour of x.
     fn links(&self, theme: &Theme, scene: &mut SceneModel) {
         const ROD: f32 = 3.0;
         let axes = axis_colors(theme);
@@ -248,11 +250,11 @@ impl ChainModel {
 }
 
 impl ChainPose {
-    /// All origins and the corners between them, as one line.
+    /// All origins and the corners between them, as one line, in metres.
     pub(super) fn skeleton_m(&self) -> Vec<Vector3<f64>> {
         let mut points = Vec::new();
         for (index, origin) in self.origins_m().enumerate() {
-            // The corner of a link lies before the frame that ends it; the first link ends at frame 2.
+            // The corner of a link is before the frame at its end; the first link ends at frame 2.
             if let Some(corner) = index.checked_sub(2).and_then(|link| self.corners_m.get(link)) {
                 points.push(*corner);
             }
@@ -262,7 +264,7 @@ impl ChainPose {
     }
 }
 
-/// x, y, z.
+/// Colours of x, y, z.
 pub(super) fn axis_colors(theme: &Theme) -> [Color32; 3] {
     [theme.axis_x, theme.axis_y, theme.axis_z]
 }

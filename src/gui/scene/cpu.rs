@@ -1,4 +1,4 @@
-//! Draws a scene on the CPU: four samples per pixel at the places where graphics cards have them, each with its depth.
+//! Draws a scene on the CPU: four samples per pixel at the positions that graphics cards use, each with its depth.
 
 use egui::{Color32, ColorImage};
 use rayon::prelude::*;
@@ -8,12 +8,12 @@ use super::layout::{Disc, Drawing, PictureCorner, PictureShape, Segment};
 use crate::gui::rendering::painter::blend;
 use crate::gui::rendering::painter::triangle::{Clip, Plane, SUBPIXELS, spans};
 
-/// Places of the samples within a pixel, in 1/256 pixel: the standard pattern of four.
+/// Positions of the samples in a pixel, in 1/256 pixel: the standard pattern of four.
 const SAMPLES: [[i32; 2]; 4] = [[96, 32], [224, 96], [32, 160], [160, 224]];
-/// Rows that one worker draws at a time.
+/// Number of rows that one worker draws at a time.
 const BAND_ROWS: usize = 32;
 
-/// Draws everything but the labels.
+/// Draws everything except the labels.
 pub(super) fn draw(drawing: &Drawing) -> ColorImage {
     let [width, height] = drawing.size_px.map(|side| side as usize);
     let background = blend::pack(drawing.background.to_array());
@@ -50,12 +50,12 @@ pub(super) fn draw(drawing: &Drawing) -> ColorImage {
     ColorImage::new([width, height], pixels)
 }
 
-/// The shapes that touch each band, in order, given the rows between which one lies.
+/// The shapes that touch each band, in order; `reach_px` returns the first and last row of a shape.
 fn sort_into_bands<T>(shapes: &[T], bands: usize, reach_px: impl Fn(&T) -> (f32, f32)) -> Vec<Vec<&T>> {
     let mut sorted = vec![Vec::new(); bands];
     for shape in shapes {
         let (top, bottom) = reach_px(shape);
-        // Not-a-number becomes 0 and infinity the last band: what cannot be drawn is left out there.
+        // NaN becomes 0 and infinity the last band; such shapes are skipped there.
         let band_of = |row: f32| (row.max(0.0) as usize) / BAND_ROWS;
         let (first, end) = (band_of(top), band_of(bottom).saturating_add(1).min(bands));
         if bottom >= 0.0 && first < end {
@@ -67,7 +67,7 @@ fn sort_into_bands<T>(shapes: &[T], bands: usize, reach_px: impl Fn(&T) -> (f32,
     sorted
 }
 
-/// The samples of some rows; one worker uses it for band after band.
+/// The samples of some rows; one worker reuses it for several bands.
 #[derive(Default)]
 struct Band {
     clip: Clip,
@@ -83,7 +83,7 @@ struct SamplePlane {
 }
 
 impl Band {
-    /// Empties it for other rows.
+    /// Clears it for other rows.
     fn begin(&mut self, width: usize, rows: usize, first_row: usize, background: u32) {
         self.clip = Clip { left: 0, top: first_row as i32, right: width as i32, bottom: (first_row + rows) as i32 };
         self.width = width;
@@ -95,7 +95,7 @@ impl Band {
         }
     }
 
-    /// Whether something between two heights touches the band.
+    /// Whether a range of rows does not touch the band.
     fn misses(&self, top_px: f32, bottom_px: f32) -> bool {
         bottom_px < self.clip.top as f32 || top_px > self.clip.bottom as f32
     }
@@ -111,11 +111,11 @@ impl Band {
         self.polygon(&[points], &depth, color);
     }
 
-    /// Triangles in one plane, already snapped.
+    /// Triangles in one plane, already snapped to subpixels.
     fn polygon(&mut self, triangles: &[[[i32; 2]; 3]], depth: &Plane, color: impl Fn(f64, f64, f64) -> u32) {
         let clip = self.clip;
         for (plane, [sample_x, sample_y]) in self.planes.iter_mut().zip(SAMPLES) {
-            // A sample is covered when the pixel's centre is, once everything has moved by the difference.
+            // A sample is covered when the pixel's centre is, after a displacement by their difference.
             let (dx, dy) = (SUBPIXELS / 2 - sample_x, SUBPIXELS / 2 - sample_y);
             let (off_x, off_y) = (-f64::from(dx) / f64::from(SUBPIXELS), -f64::from(dy) / f64::from(SUBPIXELS));
             for triangle in triangles {
@@ -145,7 +145,7 @@ impl Band {
             return self.disc(&Disc { centre: segment.from, radius_px: half, color: segment.color });
         }
         let (ux, uy) = ((x1 - x0) / length, (y1 - y0) / length);
-        // A little longer at both ends, so that bends have no notch.
+        // Extended a little at both ends, so that bends have no notch.
         let (ex, ey) = (0.5 * half * ux, 0.5 * half * uy);
         let (nx, ny) = (-uy * half, ux * half);
         let quad = [
@@ -202,7 +202,7 @@ impl Band {
         }
         let positions = corners.map(|corner| corner.position);
         let points = positions.map(snap);
-        // Depth is one over the distance up to a factor, so what is divided by the distance is linear.
+        // Depth is proportional to 1/distance, so values divided by the distance are linear over the screen.
         let over_distance = |axis: usize, size: usize| {
             let values = corners.map(|corner| f64::from(corner.uv[axis]) * size as f64 * f64::from(corner.position[2]));
             Plane::through(points, values)
@@ -234,7 +234,7 @@ fn clamped(coordinate: f64, size: usize) -> usize {
     (coordinate.max(0.0) as usize).min(size - 1)
 }
 
-/// Pixels to subpixels, held where whole-number edges are safe.
+/// Pixels to subpixels, limited to the range of integer edges.
 fn snap([x, y, _]: [f32; 3]) -> [i32; 2] {
     const FURTHEST: f32 = (1 << 22) as f32;
     [x, y].map(|pixels| (pixels * SUBPIXELS as f32).round().clamp(-FURTHEST, FURTHEST) as i32)

@@ -1,11 +1,11 @@
-//! The trajectories of the scene, one step of one run a row.
+//! The trajectories of the scene, one step of one run per row.
 
 use super::ScenePanel;
 use crate::gui::PanelContext;
 use crate::gui::csv_table::{CsvTable, Table, number, seconds};
 
 impl CsvTable for ScenePanel {
-    /// Positions of all runs up to the cursor, laid on the truth as in the scene, and the truth.
+    /// Positions of all runs up to the cursor, aligned with the ground truth as in the scene, and the ground truth.
     fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {
         let mut table = Table::new(["t_s", "run", "x_m", "y_m", "z_m", "truth_x_m", "truth_y_m", "truth_z_m"]);
         for run in &ctx.recording.runs {

@@ -1,6 +1,7 @@
-//! Draws a scene with wgpu: into its own colour and depth targets, four samples per pixel, then copied into egui's pass.
+//! Draws a scene with wgpu: into its own colour and depth targets with four samples per pixel, then copied into egui's
+//! pass.
 //!
-//! egui's pass has no depth, and so the scene is drawn again only when it changed.
+//! egui's pass has no depth buffer, so the scene has its own, and is drawn again only when it has changed.
 
 use std::sync::Arc;
 
@@ -18,7 +19,7 @@ const SEGMENT_VERTICES: u32 = 6;
 /// Vertices of the triangles of a disc, drawn as an octagon.
 const DISC_VERTICES: u32 = 18;
 
-/// One view of a scene in egui's list of things to paint.
+/// One view of a scene as a paint callback of egui.
 pub(super) struct SceneCallback {
     canvas: egui::Id,
     drawing: Arc<Drawing>,
@@ -26,7 +27,7 @@ pub(super) struct SceneCallback {
 }
 
 impl SceneCallback {
-    /// `canvas` tells views apart, so that each keeps its targets.
+    /// `canvas` identifies the view, so that each keeps its targets.
     pub(super) fn new(canvas: egui::Id, drawing: Arc<Drawing>, target_format: wgpu::TextureFormat) -> Self {
         Self { canvas, drawing, target_format }
     }
@@ -54,7 +55,7 @@ impl CallbackTrait for SceneCallback {
     }
 }
 
-/// What the shaders need to know about the view.
+/// Uniforms of the shaders.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 struct Uniforms {
@@ -75,7 +76,7 @@ struct SceneRenderer {
     canvases: egui::IdMap<Canvas>,
 }
 
-/// The targets of one view and what was drawn last.
+/// The targets of one view and its last drawing.
 struct Canvas {
     drawing: Arc<Drawing>,
     size_px: [u32; 2],
@@ -176,7 +177,7 @@ impl SceneRenderer {
         }
     }
 
-    /// Draws a view when it changed.
+    /// Draws a view if it has changed.
     fn prepare(
         &mut self,
         device: &wgpu::Device,
@@ -269,7 +270,7 @@ impl SceneRenderer {
         }
     }
 
-    /// The image as a texture; `None` when it has no pixels.
+    /// The bind group with the image as a texture; `None` for an image without pixels.
     fn picture_group(&self, device: &wgpu::Device, queue: &wgpu::Queue, image: &GrayImage) -> Option<wgpu::BindGroup> {
         if image.pixels.is_empty() || image.pixels.len() < image.width * image.height {
             return None;
@@ -294,7 +295,7 @@ impl SceneRenderer {
         Some(texture_group(device, &self.texture_layout, &view, &self.linear))
     }
 
-    /// Copies a view that was prepared into egui's pass.
+    /// Copies a prepared view into egui's pass.
     fn copy(&self, pass: &mut wgpu::RenderPass<'static>, id: egui::Id) {
         if let Some(canvas) = self.canvases.get(&id) {
             pass.set_pipeline(&self.copy_pipeline);

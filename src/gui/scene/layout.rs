@@ -1,4 +1,4 @@
-//! From a scene to the shapes on the screen that every back end draws alike.
+//! Projection of a scene to screen shapes, which every backend draws.
 
 use std::sync::Arc;
 
@@ -10,12 +10,12 @@ use super::camera::{ScreenPoint, View, length};
 use super::model::{Line, Picture, SceneModel};
 use crate::sensors::GrayImage;
 
-/// Lines lie this much nearer than what they are drawn on.
+/// Factor by which lines are nearer than the surfaces on which they are drawn.
 const LINE_LIFT: f64 = 1.004;
-/// How far outside the viewport a line is still kept, in pixels.
+/// Distance outside the viewport in pixels up to which lines are kept.
 const MARGIN_PX: f64 = 64.0;
 
-/// A straight piece of a line.
+/// A straight line segment.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub(super) struct Segment {
@@ -27,7 +27,7 @@ pub(super) struct Segment {
     pub(super) color: [u8; 4],
 }
 
-/// A filled circle that faces the viewer.
+/// A filled circle parallel to the screen.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub(super) struct Disc {
@@ -44,7 +44,7 @@ pub(super) struct Corner {
     pub(super) color: [u8; 4],
 }
 
-/// A corner of a triangle of an image; `uv` is 0 to 1 from the image's upper left corner.
+/// A corner of a textured triangle; `uv` is 0 to 1 from the image's upper left corner.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub(super) struct PictureCorner {
@@ -52,15 +52,15 @@ pub(super) struct PictureCorner {
     pub(super) uv: [f32; 2],
 }
 
-/// An image as triangles.
+/// An image as textured triangles.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct PictureShape {
-    /// Three per triangle.
+    /// Three corners per triangle.
     pub(super) corners: Vec<PictureCorner>,
     pub(super) image: Arc<GrayImage>,
 }
 
-/// A text at a place on the screen.
+/// A text at a screen position.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct ScreenLabel {
     pub(super) x_px: f32,
@@ -69,14 +69,14 @@ pub(super) struct ScreenLabel {
     pub(super) color: Color32,
 }
 
-/// Everything on the screen, in pixels of the viewport.
+/// All shapes of a view, in pixels of the viewport.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Drawing {
     pub(super) size_px: [u32; 2],
     pub(super) background: Color32,
     pub(super) segments: Vec<Segment>,
     pub(super) discs: Vec<Disc>,
-    /// Three per triangle.
+    /// Three corners per triangle.
     pub(super) corners: Vec<Corner>,
     pub(super) pictures: Vec<PictureShape>,
     pub(super) labels: Vec<ScreenLabel>,
@@ -164,7 +164,7 @@ fn lay_out_line(line: &Line, view: &View, pixels_per_point: f32, drawing: &mut D
     }
 }
 
-/// Calls `emit(begin, end)` for every dash within a stretch, measured from the stretch's begin.
+/// Calls `emit(begin, end)` for every dash of a line, measured from the begin of the line.
 fn each_dash(dashes: &[f64], travelled_px: f64, length_px: f64, mut emit: impl FnMut(f64, f64)) {
     let period: f64 = dashes.iter().sum();
     if !(period > 1e-3 && length_px.is_finite() && travelled_px.is_finite()) {
@@ -181,7 +181,7 @@ fn each_dash(dashes: &[f64], travelled_px: f64, length_px: f64, mut emit: impl F
     }
 }
 
-/// The part of a stretch behind the near plane.
+/// The section of a line behind the near plane.
 fn in_front(from: &Vector3<f64>, to: &Vector3<f64>, near_m: f64) -> Option<(Vector3<f64>, Vector3<f64>)> {
     let at_near = |inside: &Vector3<f64>, outside: &Vector3<f64>| {
         let mut point = inside + (outside - inside) * ((inside.z - near_m) / (inside.z - outside.z));
@@ -196,7 +196,7 @@ fn in_front(from: &Vector3<f64>, to: &Vector3<f64>, near_m: f64) -> Option<(Vect
     }
 }
 
-/// Where a stretch enters and leaves the viewport with its margin, as fractions.
+/// Fractions at which a line enters and leaves the viewport with its margin.
 fn within_viewport(from: &ScreenPoint, to: &ScreenPoint, size_px: [u32; 2]) -> Option<(f64, f64)> {
     let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
     for (start, end, size) in [(from.x_px, to.x_px, size_px[0]), (from.y_px, to.y_px, size_px[1])] {
@@ -214,10 +214,10 @@ fn within_viewport(from: &ScreenPoint, to: &ScreenPoint, size_px: [u32; 2]) -> O
     (enter < leave || (enter == leave && from == to)).then_some((enter, leave))
 }
 
-/// A corner in the view with its place in the image.
+/// A corner in the view and its position in the image.
 type ViewCorner = (Vector3<f64>, [f64; 2]);
 
-/// A convex polygon without its part in front of the near plane, as triangles.
+/// The section of a convex polygon behind the near plane, as triangles.
 fn clipped_triangles(corners: &[ViewCorner], near_m: f64) -> Vec<[ViewCorner; 3]> {
     let mut kept: Vec<ViewCorner> = Vec::with_capacity(corners.len() + 1);
     for (index, corner) in corners.iter().enumerate() {
@@ -252,7 +252,7 @@ fn lay_out_picture(picture: &Picture, view: &View) -> Option<PictureShape> {
     (!shape.is_empty()).then(|| PictureShape { corners: shape, image: shrunk(&picture.image, width_px) })
 }
 
-/// The image at the smallest power-of-two reduction that still has a column per pixel on the screen.
+/// The image at the smallest power-of-two reduction with at least one column per pixel on the screen.
 fn shrunk(image: &Arc<GrayImage>, width_px: f32) -> Arc<GrayImage> {
     let mut factor = 1;
     while factor < 16 && (image.width / (2 * factor)) as f32 >= width_px.max(16.0) {

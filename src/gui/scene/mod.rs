@@ -1,7 +1,7 @@
-//! The 3D scene: the flight in the world, and the gimbal's chain close up.
+//! The 3D scene: the flight in the world, and a close-up of the gimbal's chain.
 //!
-//! `world.rs` and `chain.rs` describe what there is, `camera.rs` and `layout.rs` put it on the screen, and `cpu.rs` or
-//! `gpu.rs` draws it.
+//! `world.rs` and `chain.rs` build the scene, `camera.rs` and `layout.rs` project it, and `cpu.rs` or `gpu.rs` draws
+//! it.
 
 mod camera;
 mod canvas;
@@ -32,7 +32,7 @@ use crate::camera::CameraModel;
 use crate::sensors::Rig;
 use crate::session::RunRecord;
 
-/// What the view of the world keeps in its middle.
+/// The centre of the view of the world.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Follow {
     /// All trajectories.
@@ -42,31 +42,31 @@ pub enum Follow {
     Vehicle,
 }
 
-/// How much nearer the view is to the vehicle than to the whole trajectory.
+/// Ratio of the view's distance from the vehicle to its distance from the whole trajectory.
 const VEHICLE_SHARE: f64 = 0.3;
-/// Radians that the view turns per point of dragging.
+/// Rotation of the view in radians per point of dragging.
 const TURN_PER_POINT: f64 = 0.008;
-/// Width that the table of the chain's links needs.
+/// Width of the table of the chain's links in points.
 const TABLE_WIDTH: f32 = 256.0;
-/// Height that the axes and the scale below them take under the legend.
+/// Height of the axes and the scale below the legend in points.
 const GIZMO_ROOM: f32 = 105.0;
-/// Smallest panel that has room for the close-up.
+/// Smallest panel size with a close-up.
 const CLOSE_UP_FROM: Vec2 = vec2(440.0, 230.0);
 
-/// The scene panel: what is shown, and from where.
+/// State of the scene panel: options and viewpoints.
 pub struct ScenePanel {
-    /// What stays in the middle.
+    /// The centre of the view.
     pub follow: Follow,
     /// Show landmarks.
     pub landmarks: bool,
     /// Show the window's keyframes.
     pub keyframes: bool,
-    /// Show the newest image in its camera's pyramid.
+    /// Show the newest image in the camera's frustum.
     pub image: bool,
     /// Show the close-up of the gimbal's chain.
     pub chain: bool,
     world: Orbit,
-    /// `None` while nobody has turned it.
+    /// Viewpoint of the close-up, `None` before the user has rotated it.
     close_up: Option<Orbit>,
     world_canvas: Canvas,
     close_up_canvas: Canvas,
@@ -95,20 +95,20 @@ fn default_world_orbit() -> Orbit {
 }
 
 impl ScenePanel {
-    /// A panel that shows the same and holds no texture of a window.
+    /// A panel with the same view and no texture of a window.
     pub(in crate::gui) fn view_copy(&self) -> Self {
         let Self { follow, landmarks, keyframes, image, chain, world, close_up, .. } = *self;
         Self { follow, landmarks, keyframes, image, chain, world, close_up, ..Self::default() }
     }
 
-    /// Shows the same from the same place as another panel.
+    /// Copies options and viewpoint of another panel.
     pub(in crate::gui) fn follow(&mut self, other: &Self) {
         let Self { follow, landmarks, keyframes, image, chain, world, close_up, .. } = *other;
         (self.follow, self.world, self.close_up) = (follow, world, close_up);
         (self.landmarks, self.keyframes, self.image, self.chain) = (landmarks, keyframes, image, chain);
     }
 
-    /// Whether it shows the same from the same place as another panel.
+    /// Whether it has options and viewpoint of another panel.
     pub(in crate::gui) fn looks_like(&self, other: &Self) -> bool {
         let look = |panel: &Self| {
             let Self { follow, landmarks, keyframes, image, chain, world, close_up, .. } = *panel;
@@ -117,7 +117,7 @@ impl ScenePanel {
         look(self) == look(other)
     }
 
-    /// Draws the panel into what is left of `ui`.
+    /// Draws world, close-up and legend.
     pub fn ui(&mut self, ui: &mut Ui, context: &mut PanelContext<'_>) {
         self.controls_ui(ui);
         let (area, response) =
@@ -168,7 +168,7 @@ impl ScenePanel {
         let views: Vec<RunView<'_>> =
             runs.map(|(number, (run, places))| RunView::new(number, run, places, context.cursor_ns)).collect();
         let points = framing_points_m(&views);
-        // The key in the upper left corner: a line per run, the truth's, the landmarks'.
+        // The legend in the upper left corner: a line per run, one for the ground truth, one for the landmarks.
         let key = overlay::LINE_HEIGHT * (views.len() + 2) as f32;
         let viewport = world_viewport(area, close_up, key.min(0.22 * area.height()), scale);
         let mut framing = frame(&points, self.world.towards, &viewport);
@@ -204,7 +204,7 @@ impl ScenePanel {
         overlay::labels(&painter, area, scale, &drawing.labels, theme.plot_background);
         overlay::legend(&painter, area, theme, &legend_lines(&views, theme), builder.height_range_m);
         overlay::scale_bar(&painter, area, scale, theme, &view, &format!(", grid {spacing_m} m"));
-        // In a low panel the legend is where the axes would be.
+        // In a low panel the legend covers the place of the axes.
         if area.height() > key + GIZMO_ROOM {
             overlay::gizmo(&painter, area.left_bottom() + vec2(34.0, -62.0), theme, &view);
         }
@@ -248,7 +248,7 @@ impl ScenePanel {
     }
 }
 
-/// Runs in order, then the truth.
+/// The runs in order, then the ground truth.
 fn legend_lines(views: &[RunView<'_>], theme: &super::theme::Theme) -> Vec<LegendLine> {
     let mut lines: Vec<LegendLine> = views
         .iter()
@@ -285,7 +285,7 @@ fn chain_model(context: &PanelContext<'_>) -> Option<ChainModel> {
     Some(ChainModel::at(angles_rad, estimate, true_chain.as_ref(), &joint_names))
 }
 
-/// From where the close-up looks: chosen for the chain that the rig gives, so that it does not depend on the cursor.
+/// Direction of the close-up's viewpoint, from the rig's chain, so that it does not depend on the cursor.
 fn close_up_direction(context: &PanelContext<'_>) -> Vector3<f64> {
     let camera_key = context.recording.runs.get(context.selection.run).map_or("", |run| run.camera_key.as_str());
     ChainPose::best_direction(&context.recording.rig.chain_of_camera(camera_key).unwrap_or_default())
@@ -295,7 +295,7 @@ fn camera_of<'a>(rig: &'a Rig, run: &RunRecord) -> Option<&'a CameraModel> {
     rig.cameras.iter().find(|camera| camera.key == run.camera_key).map(|camera| &camera.model)
 }
 
-/// Moves a rectangle's edges onto whole pixels.
+/// Rounds a rectangle's edges to whole pixels.
 fn on_pixels(rect: Rect, pixels_per_point: f32) -> Rect {
     let snap = |coordinate: f32| (coordinate * pixels_per_point).round() / pixels_per_point;
     Rect::from_min_max(pos2(snap(rect.min.x), snap(rect.min.y)), pos2(snap(rect.max.x), snap(rect.max.y)))
@@ -306,7 +306,7 @@ fn size_px(rect: Rect, pixels_per_point: f32) -> [u32; 2] {
     [rect.width(), rect.height()].map(|side| (side * pixels_per_point).round().max(1.0) as u32)
 }
 
-/// The whole area, framed to the left of the close-up and under the key.
+/// The whole area; framing uses the region to the left of the close-up and below the legend.
 fn world_viewport(area: Rect, close_up: Option<Rect>, key_height: f32, pixels_per_point: f32) -> Viewport {
     let size_px = size_px(area, pixels_per_point);
     let right = close_up.map_or_else(|| area.right(), |rect| rect.left());
@@ -319,16 +319,16 @@ fn world_viewport(area: Rect, close_up: Option<Rect>, key_height: f32, pixels_pe
     Viewport::world(size_px, frame_px.map(f64::from))
 }
 
-/// The lower right corner.
+/// The rectangle of the close-up in the lower right corner.
 fn close_up_rect(area: Rect, pixels_per_point: f32) -> Rect {
     const INSET: f32 = 6.0;
-    // The table of links needs some width, but the flight half of the panel.
+    // The table of links has a minimum width, but the flight keeps half of the panel.
     let least = (0.5 * area.width()).min(TABLE_WIDTH);
     let size = vec2((0.42 * area.width()).clamp(least, 420.0), (0.8 * area.height()).clamp(180.0, 420.0));
     on_pixels(Rect::from_min_max(area.max - size - Vec2::splat(INSET), area.max - Vec2::splat(INSET)), pixels_per_point)
 }
 
-/// Dragging turns, with Shift or another button it shifts, the wheel zooms, a double click goes back.
+/// Dragging rotates, with Shift or another button it shifts, the wheel zooms, a double click resets the view.
 fn navigate(ui: &Ui, response: &Response, orbit: &mut Orbit, home: Orbit, view: &View) {
     if response.double_clicked() {
         *orbit = home;

@@ -1,4 +1,4 @@
-//! What a scene consists of: one description for every back end, in metres of one frame.
+//! The content of a scene, common to all backends, in metres in one frame.
 
 use std::sync::Arc;
 
@@ -42,7 +42,7 @@ pub(super) struct Picture {
     pub(super) image: Arc<GrayImage>,
 }
 
-/// A text beside a place.
+/// A text beside a point.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Label {
     pub(super) position_m: Vector3<f64>,
@@ -50,31 +50,31 @@ pub(super) struct Label {
     pub(super) color: Color32,
 }
 
-/// Everything in view of one camera.
+/// All objects of a scene.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct SceneModel {
     pub(super) lines: Vec<Line>,
     pub(super) dots: Vec<Dot>,
     pub(super) faces: Vec<Face>,
     pub(super) pictures: Vec<Picture>,
-    /// The first ones get their place first.
+    /// Labels by priority, highest first.
     pub(super) labels: Vec<Label>,
 }
 
 impl SceneModel {
-    /// A solid line between two places.
+    /// A solid line between two points.
     pub(super) fn segment(&mut self, from_m: Vector3<f64>, to_m: Vector3<f64>, color: Color32, width: f32) {
         self.line(vec![from_m, to_m], color, width, &[]);
     }
 
-    /// A line through several places; fewer than two leave nothing.
+    /// A line through several points; nothing for fewer than two.
     pub(super) fn line(&mut self, points_m: Vec<Vector3<f64>>, color: Color32, width: f32, dashes: &'static [f32]) {
         if points_m.len() > 1 {
             self.lines.push(Line { points_m, color, width, dashes });
         }
     }
 
-    /// The three axes of a frame, `colors` for x, y, z.
+    /// The three axes of a frame; `colors` of x, y, z.
     pub(super) fn axes(&mut self, pose: &RigidTransform, length_m: f64, colors: [Color32; 3], width: f32) {
         for (axis, color) in colors.into_iter().enumerate() {
             let mut tip = Vector3::zeros();

@@ -1,4 +1,4 @@
-//! Texts and keys over the scene.
+//! Texts and legends over the scene.
 
 use egui::{Align2, Color32, FontId, Galley, Painter, Pos2, Rect, Shape, Stroke, Vec2, pos2, vec2};
 use std::sync::Arc;
@@ -11,7 +11,7 @@ use crate::gui::theme::{self, RunStyle, Theme};
 /// Height of one line of text.
 pub(super) const LINE_HEIGHT: f32 = 15.0;
 
-/// Where a label may stand beside its place, best first.
+/// Positions of a label relative to its point, best first.
 const SIDES: [(Align2, Vec2); 8] = [
     (Align2::LEFT_BOTTOM, vec2(5.0, -4.0)),
     (Align2::LEFT_TOP, vec2(5.0, 4.0)),
@@ -23,7 +23,7 @@ const SIDES: [(Align2, Vec2); 8] = [
     (Align2::RIGHT_CENTER, vec2(-16.0, 0.0)),
 ];
 
-/// Writes labels so that none covers another or leaves `rect`; a label without room is left out.
+/// Writes labels without overlaps and inside `rect`; a label without room is omitted.
 pub(super) fn labels(painter: &Painter, rect: Rect, pixels_per_point: f32, labels: &[ScreenLabel], ground: Color32) {
     let mut taken: Vec<Rect> = Vec::new();
     for label in labels {
@@ -40,20 +40,20 @@ pub(super) fn labels(painter: &Painter, rect: Rect, pixels_per_point: f32, label
     }
 }
 
-/// A text on a half transparent plate.
+/// A text on a translucent background.
 fn plated(painter: &Painter, at: Pos2, galley: Arc<Galley>, color: Color32, ground: Color32) {
     let plate = Rect::from_min_size(at, galley.size()).expand2(vec2(2.0, -1.0));
     painter.rect_filled(plate, 2.0, ground.gamma_multiply(0.8));
     painter.galley(at, galley, color);
 }
 
-/// A line of the legend: how it is drawn, and what it is.
+/// A line of the legend: style and name.
 pub(super) struct LegendLine {
     pub(super) style: RunStyle,
     pub(super) text: String,
 }
 
-/// The key to the lines in the upper left corner, and under it the colours of the landmarks.
+/// The legend of the lines in the upper left corner, and below it the colour map of the landmarks.
 pub(super) fn legend(
     painter: &Painter,
     rect: Rect,
@@ -91,7 +91,7 @@ pub(super) fn legend(
     }
 }
 
-/// How a length is written: millimetres below 0.1 m.
+/// The text of a length: millimetres below 0.1 m.
 fn length_text(length_m: f64) -> String {
     if length_m < 0.0995 { format!("{:.0} mm", length_m * 1e3) } else { format!("{length_m} m") }
 }
@@ -112,7 +112,7 @@ pub(super) fn scale_bar(painter: &Painter, rect: Rect, pixels_per_point: f32, th
     plated(painter, left + vec2(4.0, -6.0 - galley.size().y), galley, theme.text, theme.plot_background);
 }
 
-/// The directions of x, y, z as a small cross in a corner.
+/// The directions of x, y, z as small axes in a corner.
 pub(super) fn gizmo(painter: &Painter, centre: Pos2, theme: &Theme, view: &View) {
     const REACH: f32 = 20.0;
     let camera = view.camera;
@@ -125,7 +125,7 @@ pub(super) fn gizmo(painter: &Painter, centre: Pos2, theme: &Theme, view: &View)
             (in_view.z, reach, axis_colors(theme)[axis], name)
         })
         .into();
-    // Far ones first.
+    // The farthest axis first.
     arms.sort_by(|a, b| b.0.total_cmp(&a.0));
     for (_, reach, color, name) in arms {
         painter.line_segment([centre, centre + reach], Stroke::new(2.0, color));
@@ -136,18 +136,18 @@ pub(super) fn gizmo(painter: &Painter, centre: Pos2, theme: &Theme, view: &View)
     }
 }
 
-/// Height that [`chain_table`] needs.
+/// Height of [`chain_table`] in points.
 pub(super) fn chain_table_height(chain: &ChainModel) -> f32 {
     let rows = if chain.rows.is_empty() { 0 } else { chain.rows.len() + 1 };
     let footer = usize::from(chain.camera_error.is_some());
     (rows + footer) as f32 * LINE_HEIGHT + 6.0
 }
 
-/// The links as numbers, degrees and millimetres.
+/// The values of the links in degrees and millimetres.
 pub(super) fn chain_table(painter: &Painter, rect: Rect, theme: &Theme, chain: &ChainModel) {
     let font = FontId::monospace(10.5);
     let mut y = rect.top() + 2.0;
-    // Right edges of the columns of numbers, as shares of the width.
+    // Right edges of the columns of numbers, as fractions of the width.
     const EDGES: [f32; 5] = [0.3, 0.49, 0.65, 0.81, 1.0];
     let inner = rect.shrink2(vec2(8.0, 0.0));
     let mut row = |cells: [String; 6], color: Color32| {

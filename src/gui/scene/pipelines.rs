@@ -1,11 +1,11 @@
-//! The pipelines that draw the scene with wgpu, and the formats of their targets.
+//! The wgpu pipelines of the scene, and the formats of their targets.
 
 /// Samples per pixel, as on the CPU.
 pub(super) const SAMPLES: u32 = 4;
 pub(super) const COLOR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 pub(super) const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
-/// Makes the pipelines of the scene's shader.
+/// Creates the pipelines of the scene's shader.
 pub(super) struct PipelineMaker<'a> {
     pub(super) device: &'a wgpu::Device,
     pub(super) shader: &'a wgpu::ShaderModule,
@@ -14,7 +14,7 @@ pub(super) struct PipelineMaker<'a> {
 }
 
 impl PipelineMaker<'_> {
-    /// Draws into the scene's own targets, nearest wins.
+    /// A pipeline that draws into the scene's own targets with a depth test.
     pub(super) fn scene(
         &self,
         [vertex, fragment]: [&str; 2],
@@ -55,7 +55,7 @@ impl PipelineMaker<'_> {
         })
     }
 
-    /// Copies the finished scene into egui's pass.
+    /// A pipeline that copies the finished scene into egui's pass.
     pub(super) fn copy(&self, fragment: &str, target_format: wgpu::TextureFormat) -> wgpu::RenderPipeline {
         let layout = self.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some("scene copy"),

@@ -20,7 +20,7 @@ use crate::session::Recording;
 
 const GROUND: Color32 = Color32::from_rgb(1, 2, 3);
 
-/// From ten metres in front of the origin, along the world's y axis: x to the right, z up, focal length 250 px.
+/// A view from ten metres in front of the origin, along the world's y axis: x to the right, z up, focal length 250 px.
 fn front_view() -> View {
     let camera = OrbitCamera { target_m: Vector3::zeros(), towards: -Vector3::y(), distance_m: 10.0 };
     View::new(camera, Viewport::world([400, 200], [0.0, 0.0, 400.0, 200.0]))
@@ -56,9 +56,9 @@ fn places_fall_where_a_pinhole_puts_them() {
     check([0.0, 0.0, 0.0], Some([200.0, 100.0, 0.02]));
     check([1.0, 0.0, 0.0], Some([225.0, 100.0, 0.02]));
     check([0.0, 0.0, 1.0], Some([200.0, 75.0, 0.02]));
-    // Twice as far, half as large.
+    // Twice the distance, half the size.
     check([1.0, 10.0, 1.0], Some([212.5, 87.5, 0.01]));
-    // At the near plane, and before it.
+    // At the near plane, and in front of it.
     check([0.0, -9.6, 0.0], Some([200.0, 100.0, 0.5]));
     check([0.0, -9.81, 0.0], None);
 }
@@ -85,7 +85,7 @@ fn framing_holds_every_point_and_fills_the_view() {
         let filled = ((right - left) / 500.0).max((bottom - top) / 430.0);
         assert!(filled > 0.75, "only {filled} of the view is used from {direction:?}");
     }
-    // Nothing, one place, and nonsense.
+    // No point, equal points, NaN.
     for points in [vec![], vec![Vector3::zeros(); 3], vec![Vector3::new(f64::NAN, 0.0, 0.0)]] {
         let camera = frame(&points, Vector3::z(), &viewport);
         assert!(camera.distance_m > 0.0 && camera.distance_m.is_finite());
@@ -128,7 +128,7 @@ fn dashes_keep_their_lengths_across_corners() {
 
 #[test]
 fn lines_are_cut_at_the_near_plane_and_the_viewport() {
-    // From behind the eye to far ahead, and one that misses the viewport.
+    // A line from behind the camera into the distance, and one outside the viewport.
     let through = vec![Vector3::new(0.5, -30.0, 0.0), Vector3::new(0.5, 90.0, 0.0)];
     let beside = vec![Vector3::new(50.0, 0.0, -5.0), Vector3::new(50.0, 0.0, 5.0)];
     let lines = [through, beside].map(|points_m| Line { points_m, color: Color32::WHITE, width: 2.0, dashes: &[] });
@@ -156,7 +156,7 @@ fn the_nearest_wins_whatever_the_order() {
         // 2 m at 10 m are 50 px.
         assert_eq!((at(150, 100), at(149, 100), at(249, 100), at(250, 100)), (red, GROUND, red, GROUND));
     }
-    // A line in the plane of a face is seen, one behind it is not.
+    // A line in the plane of a face is visible, a line behind it is not.
     let line = |y: f64, z: f64| Line {
         points_m: vec![Vector3::new(-1.0, y, z), Vector3::new(1.0, y, z)],
         color: Color32::WHITE,
@@ -187,7 +187,7 @@ fn lines_and_dots_have_their_size() {
         image.pixels.iter().map(|pixel| (f64::from(pixel.g()) - 2.0) / 253.0).sum::<f64>()
     };
     let lines = ink(&SceneModel { lines: vec![line], ..SceneModel::default() });
-    // Half a width longer in all.
+    // Longer by half a width at both ends.
     let exact = 3.0 * (200.0_f64.hypot(82.5) + 1.5);
     assert!((lines / exact - 1.0).abs() < 0.02, "{lines}, expected {exact}");
     let dot = Dot { position_m: Vector3::new(0.33, 0.0, 0.21), color: Color32::WHITE, radius: 9.0 };
@@ -198,7 +198,7 @@ fn lines_and_dots_have_their_size() {
 
 #[test]
 fn pictures_are_seen_in_perspective() {
-    // A checkerboard of 8 by 8 fields on a floor; each field's centre shows its field.
+    // A checkerboard of 8 by 8 fields on the ground; the centre of each field has its colour.
     let pixels = (0..64 * 64).map(|index| if (index / 8 + index / 512) % 2 == 0 { 40 } else { 220 }).collect();
     let image = Arc::new(GrayImage { width: 64, height: 64, pixels });
     let floor = |x: f64, y: f64| Vector3::new(x, y, -1.5);
@@ -230,7 +230,7 @@ fn the_chain_is_walked_as_it_multiplies() {
     let (distance_m, angle_rad) = model.camera_error.unwrap();
     assert!((distance_m - error.translation_m.norm()).abs() < 1e-12);
     assert!((angle_rad - error.rotation.angle()).abs() < 1e-9);
-    // A rigid camera is I and C.
+    // A rigid camera has the frames I and C.
     let rigid = crate::gimbal::ClassicalChain { imu_from_base: exact, ..Default::default() };
     let pose = ChainPose::at(&rigid, &[]);
     assert_eq!(pose.names, ["I", "C"]);

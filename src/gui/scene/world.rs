@@ -16,14 +16,14 @@ use crate::gui::theme::{Theme, mix};
 use crate::sensors::GrayImage;
 use crate::session::{Recording, RunRecord};
 
-/// Most points that one trajectory is drawn with.
+/// Maximum number of points of a drawn trajectory.
 const MOST_TRAJECTORY_POINTS: usize = 4000;
-/// Most earlier steps whose landmarks are shown.
+/// Maximum number of earlier steps whose landmarks are shown.
 const MOST_LANDMARK_STEPS: usize = 128;
-/// Most landmarks in one picture.
+/// Maximum number of drawn landmarks.
 const MOST_LANDMARKS: usize = 20_000;
 
-/// What of the world is drawn.
+/// Options of the world.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct WorldOptions {
     pub(super) landmarks: bool,
@@ -31,20 +31,20 @@ pub(super) struct WorldOptions {
     pub(super) image: bool,
 }
 
-/// Columns of a run's table: where the estimate is, then where the truth is; not-a-number where there is none.
+/// Columns of a run's table: estimated position, then ground-truth position; NaN where unknown.
 const PLACES: usize = 6;
 const ESTIMATE: usize = 0;
 const GROUND_TRUTH: usize = 3;
 
-/// Where each run was and where the truth says it was, read step by step: a long recording is not gone through again for
-/// every picture.
+/// Estimated and ground-truth positions of each run, read step by step, so that a long recording is not read again for
+/// every frame.
 #[derive(Debug, Default)]
 pub(super) struct Trajectories {
     tables: RunTables,
 }
 
 impl Trajectories {
-    /// Reads what is new; one table per run.
+    /// Reads the new steps; one table per run.
     pub(super) fn read(&mut self, recording: &Recording) -> &[StepTable] {
         self.tables.read::<PLACES>(&recording.runs, |step| {
             let estimate = step.report.newest().map(|frame| frame.world_from_imu.translation_m);
@@ -56,13 +56,13 @@ impl Trajectories {
     }
 }
 
-/// A run of the recording up to the cursor, laid on the truth.
+/// A run of the recording up to the cursor, aligned with the ground truth.
 pub(super) struct RunView<'a> {
     pub(super) number: usize,
     pub(super) run: &'a RunRecord,
-    /// Of all its steps.
+    /// Positions of all its steps.
     places: &'a StepTable,
-    /// Steps at or before the cursor.
+    /// Number of steps at or before the cursor.
     shown: usize,
     aligned: RigidTransform,
 }
@@ -88,24 +88,24 @@ impl<'a> RunView<'a> {
         self.step()?.report.newest()
     }
 
-    /// Distance between the aligned estimate and the truth at the cursor, in metres.
+    /// Distance between aligned estimate and ground truth at the cursor in metres.
     pub(super) fn error_m(&self) -> Option<f64> {
         let step = self.step()?;
         let estimate = self.run.alignment? * step.report.newest()?.world_from_imu;
         Some((estimate.translation_m - step.ground_truth?.translation_m).norm())
     }
 
-    /// Where the vehicle is at the cursor, aligned.
+    /// Aligned position of the vehicle at the cursor.
     pub(super) fn position_m(&self) -> Option<Vector3<f64>> {
         Some((self.aligned * self.newest()?.world_from_imu).translation_m)
     }
 
-    /// Whether the log has a truth for this run up to the cursor.
+    /// Whether the run has ground truth up to the cursor.
     pub(super) fn has_ground_truth(&self) -> bool {
         self.places.columns[GROUND_TRUTH][..self.shown].iter().any(|x| x.is_finite())
     }
 
-    /// Aligned positions, broken where the run did not track.
+    /// Aligned positions in metres, interrupted where the run did not track.
     fn trajectory_m(&self) -> Vec<Vec<Vector3<f64>>> {
         broken_line(self.shown, |step| self.aligned.transform(&self.place(ESTIMATE, step)))
     }
@@ -120,8 +120,8 @@ impl<'a> RunView<'a> {
     }
 }
 
-/// Positions of so many steps as lines, broken where they are not finite; long ones are thinned by a power of two, so that
-/// what is drawn does not flicker.
+/// Positions of `steps` steps as lines, interrupted where they are not finite. Long lines are thinned by a power of
+/// two, so that the drawn points do not change with every step.
 fn broken_line(steps: usize, position: impl Fn(usize) -> Vector3<f64>) -> Vec<Vec<Vector3<f64>>> {
     let mut stride = 1;
     while steps / stride > MOST_TRAJECTORY_POINTS {
@@ -143,13 +143,13 @@ fn broken_line(steps: usize, position: impl Fn(usize) -> Vector3<f64>) -> Vec<Ve
     lines
 }
 
-/// Everything that a view of the flight must hold: all trajectories over the whole recording.
+/// Points that a view of the flight must contain: all trajectories over the whole recording.
 pub(super) fn framing_points_m(views: &[RunView<'_>]) -> Vec<Vector3<f64>> {
     let whole = views.iter().map(RunView::whole);
     let lines = whole.flat_map(|run| run.trajectory_m().into_iter().chain(run.ground_truth_m()));
     let mut points: Vec<Vector3<f64>> = lines.flatten().collect();
     if let Some((low, high)) = bounds(&points) {
-        // Hover and a first second still get a view of some metres.
+        // A short trajectory, such as hover, still gets a view of some metres.
         let room = Vector3::new(1.0, 1.0, 0.5) * (1.5 - (high - low).norm()).max(0.0);
         points.extend([low - room, high + room]);
     }
@@ -161,18 +161,18 @@ fn bounds(points: &[Vector3<f64>]) -> Option<(Vector3<f64>, Vector3<f64>)> {
     Some(points.iter().fold((first, first), |(low, high), point| (low.inf(point), high.sup(point))))
 }
 
-/// Height of the grid: zero, or the lowest place when the flight goes below.
+/// Height of the grid: zero, or the lowest point if the flight goes below.
 pub(super) fn ground_height_m(points: &[Vector3<f64>]) -> f64 {
     points.iter().map(|point| point.z).fold(0.0, f64::min)
 }
 
-/// Builds the world; sizes of things without a size of their own follow `view_distance_m`.
+/// Builds the world. Objects without a size of their own scale with `view_distance_m`.
 pub(super) struct WorldBuilder<'a> {
     pub(super) theme: &'a Theme,
     pub(super) options: WorldOptions,
     pub(super) view_distance_m: f64,
     pub(super) scene: SceneModel,
-    /// Heights of the first and the last colour of the landmarks.
+    /// Heights with the first and the last colour of the landmarks.
     pub(super) height_range_m: Option<(f64, f64)>,
 }
 
@@ -204,7 +204,7 @@ impl<'a> WorldBuilder<'a> {
         spacing_m
     }
 
-    /// The true trajectory up to the cursor.
+    /// The ground-truth trajectory up to the cursor.
     pub(super) fn ground_truth(&mut self, view: &RunView<'_>) {
         let style = self.theme.ground_truth_style();
         for line in view.ground_truth_m() {
@@ -230,7 +230,7 @@ impl<'a> WorldBuilder<'a> {
         }
     }
 
-    /// What only the selected run shows: window, landmarks, height over the ground.
+    /// Details of the selected run: window, landmarks, height above the ground.
     pub(super) fn details(&mut self, view: &RunView<'_>, camera: Option<&CameraModel>, ground_height_m: f64) {
         let Some(step) = view.step() else { return };
         if self.options.landmarks {
@@ -262,7 +262,7 @@ impl<'a> WorldBuilder<'a> {
         self.scene.dots.push(Dot { position_m, color, radius });
     }
 
-    /// Landmarks of the step at the cursor, and fainter those of earlier steps; viridis over their height.
+    /// Landmarks of the step at the cursor, and paler those of earlier steps; viridis over their height.
     fn landmarks(&mut self, view: &RunView<'_>) {
         let steps = &view.run.steps[..view.shown];
         let Some(now) = view.step() else { return };
@@ -298,7 +298,7 @@ impl<'a> WorldBuilder<'a> {
         }
     }
 
-    /// A camera's pyramid of view, with the image at its far end.
+    /// A camera's frustum, with the image at its far end.
     fn frustum(
         &mut self,
         world_from_camera: &RigidTransform,
@@ -314,7 +314,7 @@ impl<'a> WorldBuilder<'a> {
             self.scene.segment(apex, *corner, color, width);
             self.scene.segment(*corner, corners_m[(index + 1) % 4], color, width);
         }
-        // A small roof marks the image's upper side.
+        // A small triangle marks the upper side of the image.
         let [left, right] = [corners_m[0], corners_m[1]];
         let above = (corners_m[0] - corners_m[3]) * 0.18 + (left + right) * 0.5;
         self.scene.line(vec![left + (right - left) * 0.35, above, left + (right - left) * 0.65], color, width, &[]);
@@ -324,7 +324,7 @@ impl<'a> WorldBuilder<'a> {
     }
 }
 
-/// Heights between which most landmarks lie, in metres.
+/// Range of heights of most landmarks in metres.
 fn height_range_m(heights_m: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     let mut heights: Vec<f64> = heights_m.collect();
     heights.sort_by(f64::total_cmp);
@@ -332,13 +332,13 @@ fn height_range_m(heights_m: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     Some((heights[last / 50], heights[last - last / 50]))
 }
 
-/// The image's corners at unit depth: top left, top right, bottom right, bottom left.
+/// Corners of the image at unit depth in the camera frame: top left, top right, bottom right, bottom left.
 fn frustum_corners(camera: &CameraModel) -> [Vector3<f64>; 4] {
     let [width, height] = camera.resolution_px.map(|side| side as f64 - 0.5);
     let [fx, fy, cx, cy] = camera.intrinsics_px;
     [(-0.5, -0.5), (width, -0.5), (width, height), (-0.5, height)].map(|(u, v)| {
         let bearing = camera.unproject(&Vector2::new(u, v)).filter(|bearing| bearing.z > 0.1);
-        // Wide lenses see behind the image plane; there the pinhole's corner must do.
+        // Wide lenses also see behind the image plane; there the corner of the pinhole model is used.
         bearing.map_or_else(|| Vector3::new((u - cx) / fx, (v - cy) / fy, 1.0), |bearing| bearing / bearing.z)
     })
 }

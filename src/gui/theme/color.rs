@@ -31,7 +31,7 @@ pub(super) fn contrast(a: Color32, b: Color32) -> f64 {
 const VIRIDIS: [u32; 10] =
     [0x440154, 0x482878, 0x3e4a89, 0x31688e, 0x26828e, 0x1f9e89, 0x35b779, 0x6dcd59, 0xb4de2c, 0xfde725];
 
-/// Viridis at a fraction in 0 to 1, clamped; not-a-number counts as 0.
+/// Viridis at a fraction in 0 to 1, clamped; NaN counts as 0.
 pub fn viridis(fraction: f64) -> Color32 {
     let fraction = if fraction.is_nan() { 0.0 } else { fraction.clamp(0.0, 1.0) };
     let position = fraction * (VIRIDIS.len() - 1) as f64;

@@ -1,6 +1,6 @@
-//! All colours, dash patterns and sizes of the window and of exported pictures.
+//! All colours, dash patterns and sizes of the window and of exported screenshots.
 //!
-//! Runs are told apart by Okabe–Ito colours *and* dash patterns, never by colour alone.
+//! Runs differ in Okabe–Ito colours *and* dash patterns, never in colour alone.
 
 mod color;
 mod style;
@@ -15,16 +15,16 @@ pub use self::color::{mix, viridis};
 pub(crate) use self::style::dialog_frame;
 pub use self::style::{label_font, number_font};
 
-/// Which theme.
+/// A theme by name.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ThemeName {
-    /// Dark ground, for the screen.
+    /// Dark background, for the screen.
     #[default]
     Dark,
-    /// Light ground, for the screen.
+    /// Light background, for the screen.
     Light,
-    /// White ground and dark ink, for reports and paper.
+    /// White background and dark text, for reports and paper.
     Print,
 }
 
@@ -39,11 +39,11 @@ impl ThemeName {
     }
 }
 
-/// No theme of that name.
+/// There is no theme of that name.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("unknown theme '{name}': expected dark, light or print")]
 pub struct UnknownTheme {
-    /// What was written.
+    /// The name as written.
     pub name: String,
 }
 
@@ -60,7 +60,7 @@ impl FromStr for ThemeName {
     }
 }
 
-/// How one run is drawn everywhere.
+/// Colour and dashes of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RunStyle {
     /// Its Okabe–Ito colour.
@@ -72,10 +72,10 @@ pub struct RunStyle {
 /// Dash, gap, … of run 0, 1, 2, 3: solid, long, dash-dot, short.
 const RUN_DASHES: [&[f32]; 4] = [&[], &[11.0, 4.0], &[8.0, 3.0, 2.0, 3.0], &[4.0, 3.0]];
 
-/// Dash and gap of the truth.
+/// Dash and gap of the ground truth.
 const GROUND_TRUTH_DASHES: &[f32] = &[5.0, 4.0];
 
-/// How many runs can be told apart.
+/// Maximum number of distinguishable runs.
 pub const MAX_RUNS: usize = RUN_DASHES.len();
 
 /// Corner radius of frames and buttons in points.
@@ -96,21 +96,21 @@ pub const HAIRLINE_WIDTH: f32 = 1.0;
 /// Every colour of a theme.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Theme {
-    /// Which one it is.
+    /// Name of the theme.
     pub name: ThemeName,
-    /// Ground of the window.
+    /// Background of the window.
     pub background: Color32,
-    /// Ground of panels.
+    /// Background of panels.
     pub surface: Color32,
-    /// Ground of buttons and header rows.
+    /// Background of buttons and header rows.
     pub surface_raised: Color32,
-    /// Ground of plots and of the scene.
+    /// Background of plots and of the scene.
     pub plot_background: Color32,
     /// Lines between panels and around frames.
     pub outline: Color32,
     /// Grid lines of plots and of the scene's floor.
     pub grid: Color32,
-    /// Hatch over what is not informed.
+    /// Hatching of ranges without information.
     pub hatch: Color32,
     /// Ordinary text.
     pub text: Color32,
@@ -128,17 +128,17 @@ pub struct Theme {
     pub axis_y: Color32,
     /// Z axis, softened blue.
     pub axis_z: Color32,
-    /// Truth, always dashed.
+    /// Ground truth, always dashed.
     pub ground_truth: Color32,
-    /// Good news.
+    /// Values in order.
     pub ok: Color32,
-    /// Something to look at.
+    /// Warnings.
     pub warn: Color32,
-    /// Something wrong.
+    /// Errors.
     pub error: Color32,
     /// Runs 0 to 3 (Okabe–Ito).
     pub runs: [Color32; MAX_RUNS],
-    /// −1, 0, +1 of the diverging map.
+    /// Colours of −1, 0 and +1 in the diverging map.
     diverging: [Color32; 3],
 }
 
@@ -149,7 +149,7 @@ impl Default for Theme {
 }
 
 impl Theme {
-    /// The theme of a name.
+    /// The theme with a name.
     pub fn of(name: ThemeName) -> Self {
         match name {
             ThemeName::Dark => Self {
@@ -218,35 +218,35 @@ impl Theme {
         }
     }
 
-    /// Whether the ground is dark.
+    /// Whether the background is dark.
     pub fn is_dark(&self) -> bool {
         self.name == ThemeName::Dark
     }
 
-    /// How run number `index` is drawn; numbers past the last repeat.
+    /// Style of run `index`; indices past the last repeat.
     pub fn run(&self, index: usize) -> RunStyle {
         RunStyle { color: self.runs[index % MAX_RUNS], dashes: RUN_DASHES[index % MAX_RUNS] }
     }
 
-    /// How the truth is drawn.
+    /// Style of the ground truth.
     pub fn ground_truth_style(&self) -> RunStyle {
         RunStyle { color: self.ground_truth, dashes: GROUND_TRUTH_DASHES }
     }
 
-    /// The diverging colour of a signed weight in −1 to 1: blue, ground, orange; not-a-number is the ground.
+    /// The diverging colour of a signed weight in −1 to 1: blue, background, orange; NaN is the background.
     pub fn diverging(&self, weight: f64) -> Color32 {
         let weight = if weight.is_nan() { 0.0 } else { weight.clamp(-1.0, 1.0) as f32 };
         let [negative, zero, positive] = self.diverging;
         mix(zero, if weight < 0.0 { negative } else { positive }, weight.abs())
     }
 
-    /// Viridis over heights, without the end that this theme's ground swallows.
+    /// Viridis over heights, without the end that has too little contrast with this theme's background.
     pub fn height_color(&self, fraction: f64) -> Color32 {
         let (low, high) = if self.is_dark() { (0.3, 1.0) } else { (0.0, 0.75) };
         viridis(low + (high - low) * fraction.clamp(0.0, 1.0))
     }
 
-    /// The ink that reads best on a ground.
+    /// The text colour with the best contrast on a background.
     pub fn text_on(ground: Color32) -> Color32 {
         let (dark, light) = (rgb(0x0d1117), rgb(0xf0f3f7));
         if contrast(dark, ground) > contrast(light, ground) { dark } else { light }

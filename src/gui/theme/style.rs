@@ -7,11 +7,11 @@ use egui::{Color32, CornerRadius, FontFamily, FontId, Frame, Shadow, Stroke, Tex
 use super::{CORNER_RADIUS, Theme, mix};
 
 impl Theme {
-    /// Puts the theme into egui: colours, fonts, spacing.
+    /// Applies the theme to egui: colours, fonts, spacing.
     pub fn apply(&self, ctx: &egui::Context) {
         let base = if self.is_dark() { egui::Theme::Dark } else { egui::Theme::Light };
         let style = std::sync::Arc::new(self.style(base));
-        // The theme is the program's choice, not the desktop's: both of egui's slots hold it.
+        // The user chooses the theme, not the desktop: both of egui's slots hold it.
         ctx.set_style_of(egui::Theme::Dark, style.clone());
         ctx.set_style_of(egui::Theme::Light, style);
         ctx.set_theme(base);
@@ -91,7 +91,7 @@ pub fn label_font() -> FontId {
     FontId::new(11.0, FontFamily::Proportional)
 }
 
-/// A frame for dialogs, notices and menus.
+/// The frame of dialogs, notices and menus.
 pub(crate) fn dialog_frame(theme: &Theme) -> Frame {
     Frame::new()
         .fill(theme.surface)

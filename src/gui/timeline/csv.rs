@@ -1,4 +1,4 @@
-//! The lanes of the timeline, one step or one event a row.
+//! The lanes of the timeline, one step or one event per row.
 
 use super::TimelinePanel;
 use crate::gui::PanelContext;
@@ -7,7 +7,8 @@ use crate::gui::events::name_of;
 use crate::gui::residuals::rms_px;
 
 impl CsvTable for TimelinePanel {
-    /// The lanes: a row for every step of every run, and below it one for each of its notable events and of the log's warnings.
+    /// The lanes: a row for every step of every run, followed by one for each of its notable events and of the log's
+    /// warnings.
     fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {
         const FIGURES: [&str; 7] =
             ["phase", "keyframe", "features", "reprojection_rms_px", "rank_informed", "rank_structural", "rejected"];

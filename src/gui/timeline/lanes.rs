@@ -1,4 +1,4 @@
-//! Painting one lane after the other.
+//! Painting of the lanes.
 
 use std::collections::BTreeSet;
 
@@ -11,9 +11,9 @@ use crate::gui::plot::{Curve, PlotArea, paint_curve, paint_hatch, paint_steps, p
 use crate::gui::theme::{self, RunStyle, Theme};
 use crate::gui::units::fixed;
 
-/// Height of the bar of a run where there is room, in points.
+/// Maximum height of the bar of a run in points.
 const HIGHEST_BAR: f32 = 24.0;
-/// Height from which a lane has room for a scale, in points.
+/// Minimum height of a lane with a scale in points.
 const LOWEST_WITH_SCALE: f32 = 28.0;
 
 /// A lane.
@@ -21,9 +21,9 @@ const LOWEST_WITH_SCALE: f32 = 28.0;
 pub(crate) enum Lane {
     /// Phases and keyframes of a run.
     Run(usize),
-    /// Where breakpoints were hit.
+    /// Hits of breakpoints.
     Breakpoints,
-    /// Rare events of all runs.
+    /// Infrequent events of all runs.
     Events,
     /// Informed rank.
     Rank,
@@ -33,12 +33,12 @@ pub(crate) enum Lane {
     Reprojection,
     /// Rejected outliers.
     Outliers,
-    /// Warnings of the log (gaps and the like) and of steps.
+    /// Warnings about the log (gaps etc.) and of steps.
     Warnings,
 }
 
 impl Lane {
-    /// Its name beside the lane.
+    /// The name beside the lane.
     pub(crate) fn name(self, ctx: &PanelContext<'_>) -> String {
         match self {
             Self::Run(run) => ctx.recording.runs.get(run).map_or_else(String::new, |run| run.spec.label.clone()),
@@ -52,7 +52,7 @@ impl Lane {
         }
     }
 
-    /// Its value at the cursor in a run.
+    /// The value of a run at the cursor.
     pub(crate) fn value(self, lanes: &RunLanes, cursor_ns: i64) -> Option<String> {
         match self {
             Self::Rank => lanes.at(INFORMED, cursor_ns).map(|value| fixed(value, 0)),
@@ -73,7 +73,7 @@ impl Lane {
     }
 }
 
-/// The phases of a run as a bar, keyframes as ticks in it; what is not computed yet stays empty.
+/// The phases of a run as a bar, with keyframes as ticks; steps that are not computed yet stay empty.
 pub(super) fn run(painter: &Painter, theme: &Theme, area: &PlotArea, lanes: &RunLanes, style: RunStyle) {
     let bar = area.rect.shrink2(vec2(0.0, (0.5 * (area.rect.height() - HIGHEST_BAR)).max(4.0)));
     for stretch in visible_stretches(area, &lanes.stamps_ns, |row| !lanes.tracking[row]) {
@@ -99,7 +99,7 @@ pub(super) fn run(painter: &Painter, theme: &Theme, area: &PlotArea, lanes: &Run
     });
 }
 
-/// Calls for each stamp in range, once per pixel column.
+/// Calls `paint` for each stamp in range, once per pixel column.
 fn each_pixel(area: &PlotArea, stamps_ns: impl Iterator<Item = i64>, mut paint: impl FnMut(f32)) {
     let mut last = f32::NEG_INFINITY;
     for stamp_ns in stamps_ns.filter(|stamp_ns| (area.begin_ns..=area.end_ns).contains(stamp_ns)) {
@@ -111,20 +111,20 @@ fn each_pixel(area: &PlotArea, stamps_ns: impl Iterator<Item = i64>, mut paint: 
     }
 }
 
-/// Where signs were painted already: of several that would cover each other to the pixel one is enough.
+/// Positions of painted symbols: symbols at the same pixel are painted once.
 #[derive(Default)]
 struct Covered {
     places: BTreeSet<(i32, i32, u8)>,
 }
 
 impl Covered {
-    /// Whether a place is new; `kind` tells signs apart that must all be seen.
+    /// Whether a position is new; `kind` separates symbols that must all be visible.
     fn is_new(&mut self, place: Pos2, kind: u8) -> bool {
         self.places.insert((place.x.round() as i32, place.y.round() as i32, kind))
     }
 }
 
-/// Rare events as signs.
+/// Infrequent events as symbols.
 pub(super) fn events(painter: &Painter, theme: &Theme, area: &PlotArea, runs: &[RunLanes]) {
     let mut covered = Covered::default();
     for (number, lanes) in runs.iter().enumerate() {
@@ -141,7 +141,7 @@ pub(super) fn events(painter: &Painter, theme: &Theme, area: &PlotArea, runs: &[
     }
 }
 
-/// A figure of all runs as curves; whole numbers as steps.
+/// A value of all runs as curves; integers as step curves.
 pub(super) fn figures(
     painter: &Painter,
     theme: &Theme,
@@ -174,7 +174,7 @@ pub(super) fn figures(
     }
 }
 
-/// Hits of breakpoints: full for those that are enabled, in the colour of the run and in its part of the lane.
+/// Hits of breakpoints: filled for enabled ones, in the colour of the run and in its section of the lane.
 pub(super) fn breakpoints(painter: &Painter, theme: &Theme, area: &PlotArea, ctx: &PanelContext<'_>) {
     let runs = &ctx.recording.runs;
     for (number, run) in runs.iter().enumerate() {
@@ -194,7 +194,7 @@ pub(super) fn breakpoints(painter: &Painter, theme: &Theme, area: &PlotArea, ctx
     }
 }
 
-/// Rejected outliers: a line as high as their number.
+/// Rejected outliers: a line whose height is their number.
 pub(super) fn outliers(painter: &Painter, theme: &Theme, area: &PlotArea, runs: &[RunLanes]) {
     let most = runs.iter().flat_map(|lanes| &lanes.rejected).map(|(_, count)| *count).max().unwrap_or(1);
     for (run, lanes) in runs.iter().enumerate() {
@@ -207,7 +207,7 @@ pub(super) fn outliers(painter: &Painter, theme: &Theme, area: &PlotArea, runs: 
     }
 }
 
-/// The highest count of each pixel column in range, with where it is; stamps ascend.
+/// The highest count of each pixel column in range, with its screen x; stamps are ascending.
 fn highest_by_column(area: &PlotArea, counts: &[(i64, usize)]) -> Vec<(f32, usize)> {
     let mut columns: Vec<(f32, usize)> = Vec::new();
     for (stamp_ns, count) in counts.iter().filter(|(at, _)| (area.begin_ns..=area.end_ns).contains(at)) {
@@ -224,7 +224,7 @@ fn highest_by_column(area: &PlotArea, counts: &[(i64, usize)]) -> Vec<(f32, usiz
     columns
 }
 
-/// Warnings of the log and of the steps.
+/// Warnings about the log and of the steps.
 pub(super) fn warnings(painter: &Painter, theme: &Theme, area: &PlotArea, log_ns: &[i64], runs: &[RunLanes]) {
     let step_ns = runs.iter().flat_map(|lanes| &lanes.warnings).map(|(stamp_ns, _)| *stamp_ns);
     let mut covered = Covered::default();

@@ -22,28 +22,28 @@ use crate::geometry::seconds_from_ns;
 use crate::session::Command;
 
 const RULER_HEIGHT: f32 = 18.0;
-/// Height that a lane takes where there is room, in points.
+/// Maximum height of a lane in points.
 const HIGHEST_LANE: f32 = 90.0;
 
 /// State of the timeline.
 #[derive(Debug, Default)]
 pub struct TimelinePanel {
-    /// How fast the cursor really runs.
+    /// The measured speed of the cursor.
     pub pace: Pace,
     runs: Vec<RunLanes>,
-    /// Curves of the lanes that plot figures, by lane: rank, features, reprojection.
+    /// Curves of the plotted lanes: rank, features, reprojection.
     curves: [Vec<Curve>; 3],
-    /// Where a range was begun with Shift.
+    /// Begin of a range that is being selected with Shift.
     range_begin_ns: Option<i64>,
 }
 
 impl TimelinePanel {
-    /// Height that shows the transport and all lanes of so many runs.
+    /// Height in points of the transport and of all lanes for this number of runs.
     pub fn height_for(runs: usize) -> f32 {
         transport::HEIGHT + RULER_HEIGHT + LANE_HEIGHT * (runs + 7) as f32 + 10.0
     }
 
-    /// Draws the panel.
+    /// Draws transport, lanes and cursor.
     pub fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
         self.runs.resize_with(ctx.recording.runs.len(), RunLanes::default);
         for (lanes, run) in self.runs.iter_mut().zip(&ctx.recording.runs) {
@@ -56,7 +56,7 @@ impl TimelinePanel {
         if plot.width() < 8.0 || plot.height() < RULER_HEIGHT {
             return;
         }
-        // The lanes take all the room there is, so that the panel around them keeps its height.
+        // The lanes take all available room, so that the panel around them keeps its height.
         ui.advance_cursor_after_rect(rect);
         let (begin_ns, end_ns) = visible_range(ctx);
         let area = PlotArea { rect: plot, begin_ns, end_ns, low: 0.0, high: 1.0 };
@@ -124,7 +124,7 @@ impl TimelinePanel {
         lanes::label(&painter, &theme, label_rect, &lane.name(ctx), value, color);
     }
 
-    /// Shift and drag sets the range that is played over and over.
+    /// Shift and drag sets the loop range.
     fn select_range(&mut self, ui: &Ui, ctx: &mut PanelContext<'_>, area: &PlotArea, response: &Response) {
         let shift = ui.input(|input| input.modifiers.shift);
         let Some(pointer) = response.interact_pointer_pos() else {
@@ -134,7 +134,7 @@ impl TimelinePanel {
         let stamp_at = |x: f32| area.stamp_ns_at(x).clamp(0, ctx.recording.duration_ns.max(0));
         let stamp_ns = stamp_at(pointer.x);
         if response.drag_started_by(PointerButton::Primary) && shift {
-            // A drag is noticed some points after the press.
+            // A drag is recognized some points after the press.
             self.range_begin_ns = ui.input(|input| input.pointer.press_origin()).map(|origin| stamp_at(origin.x));
         }
         if let Some(begin_ns) = self.range_begin_ns.filter(|begin_ns| *begin_ns != stamp_ns) {
@@ -142,7 +142,7 @@ impl TimelinePanel {
         }
     }
 
-    /// Says what lies under the pointer.
+    /// Tooltip of the step or event under the pointer.
     fn hover(&self, ui: &Ui, ctx: &PanelContext<'_>, area: &PlotArea, response: Response) {
         const REACH: f32 = 5.0;
         let Some(pointer) = response.hover_pos() else { return };
@@ -178,7 +178,7 @@ impl TimelinePanel {
     }
 }
 
-/// The range that is played over and over.
+/// The loop range.
 fn paint_range(painter: &egui::Painter, ctx: &PanelContext<'_>, area: &PlotArea) {
     if let Some((begin_ns, end_ns)) = ctx.playback.loop_range_ns {
         let rect = Rect::from_x_y_ranges(area.x(begin_ns)..=area.x(end_ns), area.rect.y_range());
@@ -192,7 +192,7 @@ fn paint_range(painter: &egui::Painter, ctx: &PanelContext<'_>, area: &PlotArea)
     }
 }
 
-/// Seconds along the upper edge, with a line under each through the lanes.
+/// Seconds along the upper edge, with a grid line through the lanes for each.
 fn paint_ruler(painter: &egui::Painter, theme: &Theme, area: &PlotArea) {
     let (begin_s, end_s) = (seconds_from_ns(area.begin_ns), seconds_from_ns(area.end_ns));
     let (marks, step) = ticks(begin_s, end_s, ((area.rect.width() / 70.0) as usize).max(1));
@@ -212,7 +212,7 @@ fn paint_ruler(painter: &egui::Painter, theme: &Theme, area: &PlotArea) {
     }
 }
 
-/// Where forks have left their parents: what they share with them is dimmed, and a line leads over.
+/// The origins of forks: the steps shared with the parent are dimmed, and a line connects both lanes.
 fn paint_forks(painter: &egui::Painter, ctx: &PanelContext<'_>, area: &PlotArea, lane_y: impl Fn(usize) -> f32) {
     let runs = &ctx.recording.runs;
     for (number, run) in runs.iter().enumerate() {
@@ -246,7 +246,7 @@ fn paint_cursor(painter: &egui::Painter, theme: &Theme, area: &PlotArea, cursor_
     if !area.rect.x_range().expand(1.0).contains(x) {
         return;
     }
-    // The head stays under the seconds, which must be read right where the cursor is.
+    // The head of the cursor is below the seconds, so that they stay legible.
     let foot = area.rect.top() + RULER_HEIGHT;
     painter.vline(x, foot - 1.0..=area.rect.bottom(), Stroke::new(1.5, theme.cursor));
     let head = vec![pos2(x - 5.0, foot - 6.0), pos2(x + 5.0, foot - 6.0), pos2(x, foot)];

@@ -1,20 +1,20 @@
-//! What the lanes of the timeline show, read from the steps as they come.
+//! The content of the lanes, read from the steps incrementally.
 
 use crate::estimator::{EventKind, Phase};
 use crate::gui::follow::Follower;
 use crate::gui::residuals::rms_px;
 use crate::session::RunRecord;
 
-/// An event and where to find it.
+/// An event with its position in the run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct TimedEvent {
-    /// When, since the log began.
+    /// Stamp, in nanoseconds since the log began.
     pub(crate) stamp_ns: i64,
-    /// What kind.
+    /// Kind of the event.
     pub(crate) kind: EventKind,
-    /// Number of the step in the run.
+    /// Index of the step in the run.
     pub(crate) step: usize,
-    /// Number of the event in the step.
+    /// Index of the event in the step.
     pub(crate) event: usize,
 }
 
@@ -26,30 +26,30 @@ pub(crate) const STRUCTURAL: usize = 3;
 /// Number of columns.
 pub(crate) const COLUMNS: usize = 4;
 
-/// One run over time.
+/// The lanes of one run.
 #[derive(Debug, Default)]
 pub(crate) struct RunLanes {
     follower: Follower,
     /// Stamps of the steps.
     pub(crate) stamps_ns: Vec<i64>,
-    /// Figures of the steps, not-a-number where there are none.
+    /// Values of the steps by column, NaN where unknown.
     pub(crate) columns: [Vec<f64>; COLUMNS],
-    /// Whether each step tracked.
+    /// Whether each step was in the tracking phase.
     pub(crate) tracking: Vec<bool>,
     /// Stamps of keyframes.
     pub(crate) keyframes_ns: Vec<i64>,
-    /// Rare events.
+    /// Infrequent events.
     pub(crate) events: Vec<TimedEvent>,
-    /// Steps that rejected outliers: stamp and number of features.
+    /// Steps with rejected outliers: stamp and number of rejected features.
     pub(crate) rejected: Vec<(i64, usize)>,
-    /// Steps with warnings.
+    /// Steps with warnings: stamp and index.
     pub(crate) warnings: Vec<(i64, usize)>,
-    /// Changes when steps were forgotten.
+    /// Changes when steps were removed.
     pub(crate) epoch: u64,
 }
 
 impl RunLanes {
-    /// Reads the steps that have come since the last call.
+    /// Reads the steps that are new since the last call.
     pub(crate) fn read(&mut self, run: &RunRecord) {
         let news = self.follower.news(run);
         if news.restarted {
@@ -86,7 +86,7 @@ impl RunLanes {
         }
     }
 
-    /// The value of a column at the last step at or before a time.
+    /// The value of a column at the last step at or before a stamp.
     pub(crate) fn at(&self, column: usize, stamp_ns: i64) -> Option<f64> {
         let row = self.stamps_ns.partition_point(|stamp| *stamp <= stamp_ns).checked_sub(1)?;
         self.columns[column].get(row).copied().filter(|value| value.is_finite())

@@ -1,32 +1,32 @@
-//! How fast the cursor really runs while it plays.
+//! The measured speed of the cursor during playback.
 
 use std::collections::VecDeque;
 
-/// Over how many seconds the pace is taken.
+/// Interval in seconds over which the speed is measured.
 const WINDOW_S: f64 = 1.5;
-/// Seconds before a pace is told at all.
+/// Seconds of playback before a speed is shown.
 const SHORTEST_S: f64 = 0.4;
 
-/// The last pictures while playing.
+/// The last frames during playback.
 #[derive(Debug, Default)]
 pub struct Pace {
-    /// Seconds of the wall and the cursor at each picture.
+    /// Wall clock in seconds and position of the cursor at each frame.
     pictures: VecDeque<(f64, i64)>,
 }
 
-/// A pace.
+/// A measured speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reading {
     /// Log seconds per second.
     pub speed: f64,
-    /// Pictures drawn per second.
+    /// Frames drawn per second (fps).
     pub pictures_per_s: f64,
 }
 
 impl Pace {
-    /// Notes that a picture is drawn at a time of the wall with the cursor there.
+    /// Records a frame with wall clock and position of the cursor.
     pub fn picture(&mut self, playing: bool, now_s: f64, cursor_ns: i64) {
-        // A loop that begins anew, or a seek back, begins the measuring anew.
+        // After a jump back (loop or seek) the measurement restarts.
         if !playing || self.pictures.back().is_some_and(|(_, before_ns)| cursor_ns < *before_ns) {
             self.pictures.clear();
         }
@@ -38,7 +38,7 @@ impl Pace {
         }
     }
 
-    /// The pace, once it has played for long enough.
+    /// The measured speed, `None` until playback has run for long enough.
     pub fn reading(&self) -> Option<Reading> {
         let ((begin_s, begin_ns), (end_s, end_ns)) = (self.pictures.front()?, self.pictures.back()?);
         let elapsed_s = end_s - begin_s;

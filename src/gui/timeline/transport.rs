@@ -1,4 +1,4 @@
-//! Play, pause, step, seek: the buttons above the lanes.
+//! The buttons above the lanes: play, pause, step, seek.
 
 use egui::{Button, ComboBox, RichText, Ui, vec2};
 
@@ -7,13 +7,13 @@ use crate::gui::PanelContext;
 use crate::gui::units::{fixed, seconds};
 use crate::session::{Command, PlaybackSpeed, RunRecord};
 
-/// Height of the row of buttons.
+/// Height of the row of buttons in points.
 pub(super) const HEIGHT: f32 = 26.0;
 
-/// Speeds to choose from, in log seconds per second.
+/// Selectable speeds in log seconds per second.
 pub(crate) const SPEEDS: [f64; 7] = [0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 10.0];
 
-/// Draws the buttons, the time, and how far the estimation has come.
+/// Draws the buttons, the time, and the progress of the estimation.
 pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, pace: Option<Reading>) {
     ui.horizontal(|ui| {
         ui.set_height(HEIGHT - 4.0);
@@ -77,13 +77,13 @@ fn loop_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>) {
     }
 }
 
-/// Ends the loop, or begins one over what is visible.
+/// Ends the loop, or starts one over the visible range.
 pub(crate) fn toggled_loop(ctx: &PanelContext<'_>) -> Command {
     let range = ctx.playback.loop_range_ns.is_none().then(|| crate::gui::plot::visible_range(ctx));
     Command::SetLoop(range)
 }
 
-/// The time at the cursor, the length of the log, and the number of the frame.
+/// The time at the cursor, the length of the log, and the index of the frame.
 fn time_ui(ui: &mut Ui, ctx: &PanelContext<'_>) {
     let theme = ctx.theme;
     ui.label(RichText::new(format!("{} s", seconds(ctx.cursor_ns))).monospace().size(14.0).color(theme.text_strong));
@@ -106,7 +106,7 @@ fn time_ui(ui: &mut Ui, ctx: &PanelContext<'_>) {
     }
 }
 
-/// Which state of the solver is shown, and what its last iteration did.
+/// The shown state of the solver, and the result of its last iteration.
 fn solver_ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord) {
     let theme = ctx.theme;
     ui.add_space(8.0);
@@ -126,10 +126,10 @@ fn solver_ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord) {
     }
 }
 
-/// How many pictures a second, and a warning when the cursor runs slower than asked: pictures are left out before time
-/// is, so then it waits for the estimation.
+/// The frame rate, and a warning when the cursor is slower than the set speed. Slow drawing skips frames first, so then
+/// it waits for the estimator.
 fn pace_ui(ui: &mut Ui, ctx: &PanelContext<'_>, pace: Reading) {
-    /// Below this share of the speed asked for the cursor counts as late.
+    /// Below this ratio of the set speed the cursor counts as slow.
     const LATE_SHARE: f64 = 0.9;
     let theme = ctx.theme;
     let text = format!("{} pictures/s", fixed(pace.pictures_per_s, 0));
@@ -141,7 +141,7 @@ fn pace_ui(ui: &mut Ui, ctx: &PanelContext<'_>, pace: Reading) {
     ui.add_space(8.0);
 }
 
-/// How far each run has come, until all are done.
+/// The progress of each run, until all are finished.
 fn progress_ui(ui: &mut Ui, ctx: &PanelContext<'_>) {
     let theme = ctx.theme;
     let duration_ns = ctx.recording.duration_ns.max(1);

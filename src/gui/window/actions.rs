@@ -1,4 +1,4 @@
-//! What a key, a button or the command palette can do, in one table.
+//! The actions of keys, buttons and the command palette in one table.
 
 use egui::{Key, KeyboardShortcut, Modifiers, Popup, Ui};
 
@@ -10,32 +10,32 @@ use crate::gui::theme::ThemeName;
 use crate::gui::timeline::toggled_loop;
 use crate::session::{Command, PlaybackSpeed};
 
-/// Something that a person can ask the window to do.
+/// An action of the window.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Action {
     /// Play or pause.
     TogglePlay,
-    /// Move the cursor by so many frames.
+    /// Move the cursor by this number of frames.
     Step(i64),
-    /// To the next or the previous iteration of the solver.
+    /// Move the cursor to the next (`true`) or previous iteration of the solver.
     Iteration(bool),
-    /// To the next or the previous event.
+    /// Move the cursor to the next (`true`) or previous event.
     Event(bool),
-    /// To the first frame.
+    /// Move the cursor to the first frame.
     Start,
-    /// To the last computed frame.
+    /// Move the cursor to the last computed frame.
     End,
-    /// Loop over what is visible, or no longer.
+    /// Start or end a loop over the visible range.
     Loop,
     /// Set or clear a marker.
     Marker,
     /// Set or clear a breakpoint at the frame of the cursor.
     Breakpoint,
-    /// Run to the next or the previous hit of a breakpoint.
+    /// Run to the next (`true`) or previous hit of a breakpoint.
     Hit(bool),
     /// Show the whole log in all plots.
     WholeLog,
-    /// Forget the selection and close what is open.
+    /// Clear the selection and close open lists.
     Dismiss,
     /// Show the next run in the panels that show one.
     NextRun,
@@ -49,39 +49,39 @@ pub(crate) enum Action {
     Save,
     /// Write the panel with the focus to files.
     Export,
-    /// Arrange the panels.
+    /// Arrange the panels as in a preset.
     Layout(Preset),
-    /// Arrange the panels as in a layout of one's own, by its number in the list.
+    /// Arrange the panels as in a saved layout, by its index.
     SavedLayout(usize),
-    /// Give the next panel on the screen the focus, or the previous one.
+    /// Move the focus to the next (`true`) or previous panel on the screen.
     NextPanel(bool),
-    /// Dark or light.
+    /// Toggle between dark and light theme.
     Theme,
-    /// A theme by name.
+    /// Set a theme.
     SetTheme(ThemeName),
-    /// Put the cursor at a time since the log began, in nanoseconds.
+    /// Move the cursor to a stamp, in nanoseconds since the log began.
     GoTo(i64),
     /// Select a feature.
     Feature(FeatureId),
     /// Show a run in the panels that show one.
     Run(usize),
-    /// Take the last run away.
+    /// Remove the last run.
     RemoveRun(usize),
-    /// Show a panel and give it the focus.
+    /// Show a panel and focus it.
     Show(PanelName),
     /// Hide a panel.
     Hide(PanelName),
-    /// Play so fast, in log seconds per second.
+    /// Set the speed of playback in log seconds per second.
     Speed(f64),
 }
 
 /// One row of the table.
 pub(crate) struct Entry {
-    /// What it does.
+    /// The action.
     pub(crate) action: Action,
-    /// In words.
+    /// Its name in the window.
     pub(crate) name: &'static str,
-    /// The keys as a person reads them.
+    /// Its keys as shown to the user.
     pub(crate) keys: &'static str,
     shortcuts: &'static [(Modifiers, Key)],
 }
@@ -99,7 +99,7 @@ const NONE: Modifiers = Modifiers::NONE;
 const SHIFT: Modifiers = Modifiers::SHIFT;
 const CTRL: Modifiers = Modifiers::COMMAND;
 
-/// All actions; those with more modifiers come first, because keys match whatever else is held.
+/// All actions. Those with more modifiers come first, because a shortcut also matches with further modifiers.
 pub(crate) const TABLE: &[Entry] = &[
     entry(Action::Event(true), "Next event", "Ctrl+Right", &[(CTRL, Key::ArrowRight)]),
     entry(Action::Event(false), "Previous event", "Ctrl+Left", &[(CTRL, Key::ArrowLeft)]),
@@ -140,11 +140,12 @@ pub(crate) const TABLE: &[Entry] = &[
     entry(Action::Dismiss, "Clear the selection", "Escape", &[(NONE, Key::Escape)]),
 ];
 
-/// Keys of the layouts of one's own, in order, with Ctrl.
+/// Keys of the saved layouts in order, with Ctrl.
 const LAYOUT_KEYS: [Key; 9] =
     [Key::Num1, Key::Num2, Key::Num3, Key::Num4, Key::Num5, Key::Num6, Key::Num7, Key::Num8, Key::Num9];
 
-/// Takes the actions whose keys were pressed; none while somebody types, and no bare keys while a widget has the focus.
+/// Consumes the pressed shortcuts: none while the user types, and no keys without modifiers while a widget has the
+/// focus.
 pub(crate) fn pressed(ui: &Ui) -> Vec<Action> {
     if ui.egui_wants_keyboard_input() {
         return Vec::new();
@@ -160,7 +161,7 @@ pub(crate) fn pressed(ui: &Ui) -> Vec<Action> {
         }
         for entry in TABLE {
             for (modifiers, key) in entry.shortcuts {
-                // Space and the arrows belong to a focused widget; letters and the rest stay ours.
+                // Space and the arrows belong to a focused widget, other keys to the window.
                 let widget_key = matches!(key, Key::Space | Key::ArrowLeft | Key::ArrowRight | Key::Home | Key::End);
                 // Escape closes an open menu first.
                 let menu_key = menu_open && *key == Key::Escape;
@@ -178,7 +179,7 @@ pub(crate) fn pressed(ui: &Ui) -> Vec<Action> {
     actions
 }
 
-/// Does an action: commands for the session, state for the window.
+/// Executes an action: commands for the session, state for the window.
 pub(crate) fn perform(action: Action, state: &mut WindowState, ctx: &mut PanelContext<'_>) {
     match action {
         Action::TogglePlay => ctx.commands.push(Command::TogglePlay),

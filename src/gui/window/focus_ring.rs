@@ -1,17 +1,17 @@
-//! Which widget the keyboard has: a ring around it, whatever it paints itself.
+//! A ring around the widget with the keyboard focus.
 
 use egui::{Event, Key, LayerId, Order, Stroke, StrokeKind, Ui};
 
 use crate::gui::theme::{CORNER_RADIUS, Theme};
 
-/// Whether somebody goes through the window with the keyboard.
+/// Whether the user navigates by keyboard.
 #[derive(Debug, Default)]
 pub(super) struct FocusRing {
     by_key: bool,
 }
 
 impl FocusRing {
-    /// Draws the ring; none while the pointer is what moves the focus.
+    /// Draws the ring; none while the pointer moves the focus.
     pub(super) fn ui(&mut self, ui: &Ui, theme: &Theme) {
         ui.input(|input| {
             for event in &input.raw.events {
@@ -28,7 +28,7 @@ impl FocusRing {
         });
         let focused = ui.memory(egui::Memory::focused).filter(|_| self.by_key);
         let Some(response) = focused.and_then(|id| ui.ctx().read_response(id)) else { return };
-        // Above everything, so that the neighbours of a widget do not cover its ring.
+        // Above everything, so that adjacent widgets do not cover the ring.
         let layer = LayerId::new(Order::Tooltip, egui::Id::unique("focus ring"));
         let painter = ui.ctx().layer_painter(layer).with_clip_rect(ui.ctx().content_rect());
         let rect = response.rect.intersect(response.interact_rect.expand(2.0)).expand(1.0);

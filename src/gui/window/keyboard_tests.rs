@@ -1,4 +1,4 @@
-//! The window by keyboard alone, and what a screen reader is told.
+//! The window by keyboard alone, and its accessible names.
 
 use egui::accesskit::Action;
 use egui::{Key, Modifiers, Role};
@@ -82,7 +82,7 @@ fn the_palette_has_every_action_with_its_keys_and_moves_by_key() {
 #[test]
 fn what_is_typed_at_once_goes_into_the_palette_and_not_to_the_shortcuts() {
     let mut harness = bench();
-    // On a slow machine the key that opens it and the next one come in one picture.
+    // On a slow machine the key that opens the palette and the next one are in one frame.
     harness.key_press_modifiers(Modifiers::COMMAND, Key::P);
     harness.event(egui::Event::Text("4".to_owned()));
     harness.key_press(Key::Num4);
@@ -91,7 +91,7 @@ fn what_is_typed_at_once_goes_into_the_palette_and_not_to_the_shortcuts() {
     assert!(harness.query_by_label("Go to 4.000 s").is_some() || harness.query_by_label_contains("frame 4").is_some());
     harness.key_press(Key::Escape);
     harness.run_steps(3);
-    // Behind a dialog nothing moves.
+    // Shortcuts have no effect while a dialog is open.
     harness.key_press_modifiers(Modifiers::COMMAND, Key::Comma);
     harness.run_steps(3);
     let pushed = commands_of(&mut harness, |harness| {
@@ -120,7 +120,7 @@ fn panels_get_the_focus_by_key_in_the_order_on_the_screen() {
     harness.key_press_modifiers(Modifiers::SHIFT, Key::F6);
     harness.run_steps(2);
     assert_eq!(harness.state().window.focus, seen.iter().rev().nth(1).copied());
-    // A layout of one's own by key, and what is said when there is none.
+    // A saved layout by key, and the notice without one.
     harness.key_press_modifiers(Modifiers::COMMAND, Key::Num3);
     harness.run_steps(3);
     assert!(harness.query_by_label_contains("No layout of your own has that number").is_some());
@@ -133,10 +133,10 @@ fn everything_that_can_be_used_has_a_name() {
     let check = |harness: &Harness<'static, Bench>, place: &str| {
         let usable = By::new().predicate(|node| {
             let acts = |action| node.data().supports_action(action);
-            // Scroll bars tell where they are, and belong to what they scroll.
+            // Scroll bars report their position and belong to the content that they scroll.
             let container =
                 matches!(node.role(), Role::GenericContainer | Role::Window | Role::ScrollView | Role::ScrollBar);
-            // The lines between panels, by which they are resized, are the libraries' and have no place for a name.
+            // The lines between panels, which resize them, belong to the libraries and cannot have a name.
             let line = node.bounding_box().is_some_and(|at| at.width().min(at.height()) < 14.0);
             (acts(Action::Click) || acts(Action::Focus)) && !container && !(line && node.role() == Role::Unknown)
         });
@@ -205,7 +205,7 @@ fn tab_reaches_everything_and_shows_where_it_is() {
         }
     }
     assert!(wanted.is_empty(), "not reached by Tab: {wanted:?}");
-    // Enter presses what has the focus.
+    // Enter presses the focused widget.
     harness.get_by_label("Go to end").focus();
     harness.run_steps(1);
     let pushed = commands_of(&mut harness, |harness| harness.key_press(Key::Enter));

@@ -12,7 +12,7 @@ use crate::gui::units::fixed;
 use crate::session::accuracy::ErrorStatistics;
 use crate::session::{Command, RunRecord, StepRecord};
 
-/// The accuracy of one run, and what it was computed of.
+/// The accuracy of one run, and the number of steps it was computed from.
 #[derive(Debug, Default)]
 struct RunAccuracy {
     count: usize,
@@ -21,14 +21,14 @@ struct RunAccuracy {
     statistics: Option<ErrorStatistics>,
 }
 
-/// State of the legend: the absolute trajectory error of each run, kept until the run grows.
+/// State of the legend: the absolute trajectory error of each run, cached until the run has new steps.
 #[derive(Debug, Default)]
 pub struct RunLegend {
     runs: Vec<RunAccuracy>,
 }
 
 impl RunLegend {
-    /// Draws one entry per run; a click shows the run in the panels that show one.
+    /// Draws one entry per run; a click selects the run.
     pub fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
         let recording = ctx.recording;
         self.runs.resize_with(recording.runs.len(), RunAccuracy::default);
@@ -53,7 +53,7 @@ impl RunAccuracy {
     }
 }
 
-/// Distances between the aligned estimate and the truth, in metres, over the frames that were estimated.
+/// Distances between aligned estimate and ground truth in metres, over the estimated frames.
 fn position_errors(run: &RunRecord, alignment: &RigidTransform) -> Option<ErrorStatistics> {
     let errors_m: Vec<f64> = run
         .steps
@@ -109,13 +109,13 @@ fn entry_ui(
             ui.close();
         }
     });
-    // Going through all steps is only worth it for whoever asks.
+    // All steps are read only for an open tooltip.
     response.on_hover_ui(|ui| {
         ui.label(details(run, statistics));
     });
 }
 
-/// What the run is and how well it does.
+/// Specification and accuracy of a run.
 fn details(run: &RunRecord, statistics: Option<&ErrorStatistics>) -> String {
     let mut lines = vec![format!("--run {}", run.spec), format!("camera {}", run.camera_key)];
     if let Some(origin) = &run.origin {

@@ -1,6 +1,6 @@
-//! Everything inside the window: bars, panels, timeline, dialogs.
+//! The content of the window: bars, panels, timeline, dialogs.
 //!
-//! The real window and the headless pictures draw the same [`window_ui`].
+//! The real window and headless screenshots both draw [`window_ui`].
 
 mod actions;
 mod dialogs;
@@ -43,12 +43,12 @@ use super::desktop::PanelExport;
 use super::slide;
 use super::timeline::TimelinePanel;
 
-/// What the window wants of the program, beyond what a session can do.
+/// A request of the window to the application, beyond the commands of a session.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum WindowRequest {
     /// Open a log.
     OpenLog(PathBuf),
-    /// Keep the saved layouts, written as text.
+    /// Store the saved layouts, given as text.
     KeepLayouts(String),
     /// Write the session to a file.
     SaveSession,
@@ -56,38 +56,38 @@ pub enum WindowRequest {
     WritePanel(Box<PanelExport>),
 }
 
-/// State of everything in the window that is not the session's.
+/// State of the window without the session.
 #[derive(Default)]
 pub struct WindowState {
     /// The panels.
     pub panels: Panels,
-    /// Runs with their accuracy.
+    /// The runs with their accuracy.
     pub legend: RunLegend,
-    /// What went wrong, for people to see.
+    /// Messages for the user.
     pub notices: Notices,
-    /// Dialogs that the rest of the window waits for.
+    /// The modal dialogs.
     pub dialogs: Dialogs,
-    /// Whether the sheet of shortcuts is open.
+    /// Whether the list of shortcuts is open.
     pub shortcuts_open: bool,
-    /// Memory of the process in bytes, when it is known; pictures leave it out, because it differs from run to run.
+    /// Memory of the process in bytes if known; screenshots omit it, because it differs between runs of the program.
     pub memory_bytes: Option<u64>,
-    /// Whether step times are shown; pictures leave them out for the same reason.
+    /// Whether step times are shown; screenshots omit them for the same reason.
     pub show_times: bool,
-    /// What the window wants of the program; the program takes them after each picture.
+    /// Requests to the application, which takes them after each frame.
     pub requests: Vec<WindowRequest>,
-    /// Layouts that a person has made.
+    /// The user's saved layouts.
     pub saved_layouts: SavedLayouts,
-    /// What a person has set; the program applies it.
+    /// The user's settings, applied by the application.
     pub settings: Settings,
-    /// How far the estimation has come, `None` when all is computed.
+    /// Progress of the estimation, `None` when all steps are computed.
     pub progress: Option<Progress>,
-    /// A log that is being opened while another one is shown.
+    /// The log that is being opened while another one is shown.
     pub opening: Option<PathBuf>,
     ring: FocusRing,
     layout: Layout,
     /// The panel that was clicked last.
     focus: Option<PanelName>,
-    /// Where the panels lie that are on the screen.
+    /// The rectangles of the panels on the screen.
     places: Vec<(PanelName, Rect)>,
 }
 
@@ -98,14 +98,14 @@ impl WindowState {
         self.notices.list_open = false;
     }
 
-    /// The panel that commands about one panel mean, and its size in points.
+    /// The focused panel, to which commands about one panel apply, and its size in points.
     fn focused(&self) -> (PanelName, Vec2) {
         let panel = self.focus.unwrap_or(PanelName::Image);
         let place = self.places.iter().find(|(known, _)| *known == panel);
         (panel, place.map_or(panel_export::HIDDEN_PANEL_SIZE, |(_, rect)| rect.size()))
     }
 
-    /// Gives the panel after the one with the focus the focus, or the one before it, in the order on the screen.
+    /// Moves the focus to the next or previous panel on the screen.
     fn focus_neighbour(&mut self, forward: bool) {
         let mut shown = self.places.clone();
         shown
@@ -116,7 +116,7 @@ impl WindowState {
         self.focus = shown.get(next).map(|(panel, _)| *panel).or(self.focus);
     }
 
-    /// A click into a panel gives it the focus.
+    /// A click into a panel focuses it.
     fn follow_focus(&mut self, ui: &Ui) {
         let pressed = ui.input(|input| input.pointer.any_pressed().then(|| input.pointer.interact_pos()).flatten());
         let Some(pressed) = pressed.filter(|at| ui.ctx().layer_id_at(*at) == Some(ui.layer_id())) else { return };
@@ -124,12 +124,12 @@ impl WindowState {
         self.focus = place.map_or(self.focus, |(panel, _)| Some(*panel));
     }
 
-    /// Where the panels are, for a saved session.
+    /// The layout of the panels for a saved session.
     pub fn layout_value(&self) -> Option<serde_json::Value> {
         saved_layouts::layout_value(&self.layout)
     }
 
-    /// Arranges the panels as in a saved session.
+    /// Restores the layout of a saved session.
     pub fn take_layout(&mut self, value: &serde_json::Value) {
         saved_layouts::take_layout(&mut self.layout, value);
     }
@@ -139,7 +139,7 @@ impl WindowState {
         self.layout.arrange(preset);
     }
 
-    /// Arranges the panels as in a preset or a layout of one's own, by name; the layout stays when there is none.
+    /// Arranges the panels as in a preset or a saved layout, by name; no change for an unknown name.
     pub fn arrange_by_name(&mut self, name: &str) {
         if let Some(preset) = Preset::ALL.into_iter().find(|preset| preset.name() == name) {
             self.layout.arrange(preset);
@@ -149,13 +149,13 @@ impl WindowState {
     }
 }
 
-/// Draws all of the window's content over a session.
+/// Draws the window for a session.
 pub fn window_ui(ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_>) {
     let theme = *ctx.theme;
     slide::update(ctx);
-    // Behind a dialog keys mean nothing.
+    // Shortcuts have no effect while a dialog is open.
     let mut actions: Vec<Action> = if state.dialogs.is_open() { Vec::new() } else { actions::pressed(ui) };
-    // A dialog takes the keys that come after the one that opens it, even in the same picture.
+    // A dialog receives the keys after the one that opens it, even in the same frame.
     if let Some(opening) = actions.iter().copied().find(|action| matches!(action, Action::Dialog(_))) {
         actions.clear();
         actions::perform(opening, state, ctx);

@@ -1,4 +1,4 @@
-//! What went wrong, said where people look: toasts, a banner for runs that stopped, a list of all warnings.
+//! Messages for the user: toasts, a banner for runs that stopped, a list of all warnings.
 
 use egui::{Align2, Area, Button, Frame, Id, Margin, Order, Panel, RichText, ScrollArea, Ui, vec2};
 
@@ -7,18 +7,18 @@ use crate::gui::theme::{Theme, dialog_frame};
 use crate::gui::units::{counted, seconds};
 use crate::session::{Command, RunWarning};
 
-/// How bad it is.
+/// Severity of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NoticeLevel {
-    /// Good to know.
+    /// Information.
     Info,
-    /// Something to look at.
+    /// A problem that does not stop the operation.
     Warning,
-    /// Something did not work; stays until it is dismissed.
+    /// A failed operation; the message stays until it is dismissed.
     Error,
 }
 
-/// How long a notice that is no error stays, in seconds.
+/// Seconds for which a message below error level is shown.
 const SHOWN_S: f64 = 8.0;
 
 #[derive(Debug)]
@@ -28,7 +28,7 @@ struct Toast {
     since_s: Option<f64>,
 }
 
-/// Notices on screen.
+/// Messages on the screen.
 #[derive(Debug, Default)]
 pub struct Notices {
     toasts: Vec<Toast>,
@@ -37,7 +37,7 @@ pub struct Notices {
 }
 
 impl Notices {
-    /// Says something in the corner of the window.
+    /// Shows a message in the corner of the window.
     pub fn say(&mut self, level: NoticeLevel, text: impl Into<String>) {
         let text = text.into();
         if !self.toasts.iter().any(|toast| toast.text == text) {
@@ -45,7 +45,7 @@ impl Notices {
         }
     }
 
-    /// Draws the notices in the corner.
+    /// Draws the messages in the corner.
     pub(crate) fn toasts_ui(&mut self, ui: &Ui, theme: &Theme) {
         let now_s = ui.input(|input| input.time);
         for toast in &mut self.toasts {
@@ -89,7 +89,7 @@ impl Notices {
         }
     }
 
-    /// Draws the list of everything that is wrong with the log and its runs; a click on a time goes there.
+    /// Draws the list of warnings about the log and its runs; a click on a stamp moves the cursor there.
     pub(crate) fn list_ui(&mut self, ui: &Ui, ctx: &mut PanelContext<'_>) {
         let theme = *ctx.theme;
         let mut open = self.list_open;
@@ -122,7 +122,7 @@ impl Notices {
     }
 }
 
-/// A strip for each run that stopped with an error.
+/// A banner for each run that stopped with an error.
 pub(super) fn banner_ui(ui: &mut Ui, ctx: &PanelContext<'_>) {
     let theme = ctx.theme;
     for (number, run) in ctx.recording.runs.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! The panel that has the focus, as files: a picture of what it shows, and the numbers behind it.
+//! Export of the focused panel: a screenshot, a drawing and its values.
 
 use egui::{CentralPanel, Frame, Ui, Vec2};
 
@@ -10,20 +10,20 @@ use crate::gui::slide;
 use crate::gui::theme::PANEL_MARGIN;
 use crate::gui::{PanelContext, Playback};
 
-/// Pixels per point of the picture: twice an ordinary screen, so that it can be printed.
+/// Pixels per point of the screenshot: twice an ordinary screen, so that it can be printed.
 const PIXELS_PER_POINT: f32 = 2.0;
-/// Largest side of the picture in pixels.
+/// Largest side of the screenshot in pixels.
 const LARGEST_SIDE_PX: f32 = 8192.0;
 
-/// Least size of the picture of a panel that is a list, in points.
+/// Minimum size in points of the screenshot of a panel with a list.
 const LEAST_SIZE_OF_LISTS: Vec2 = Vec2::new(460.0, 640.0);
 
-/// Draws the panel once more, without the window around it.
+/// Draws the panel again without the window around it.
 pub(super) fn export(state: &WindowState, ctx: &mut PanelContext<'_>) -> PanelExport {
     let (panel, size) = state.focused();
     let mut copy = WindowState { panels: state.panels.views(), show_times: state.show_times, ..WindowState::default() };
     copy.panels.inspector.show_times = state.show_times;
-    // A list that scrolls in a low panel is written whole, as far as it goes.
+    // A scrolling list in a low panel is written completely, up to a limit.
     let least = match panel {
         PanelName::Rank | PanelName::Inspector | PanelName::Breakpoints => LEAST_SIZE_OF_LISTS,
         _ => Vec2::ZERO,
@@ -40,7 +40,7 @@ pub(super) fn export(state: &WindowState, ctx: &mut PanelContext<'_>) -> PanelEx
     let images = &mut *ctx.images;
     let playback = Playback { playing: false, ..ctx.playback.clone() };
     let mut draw_ui = |ui: &mut Ui| {
-        // Nobody is there to carry out what a panel may ask for.
+        // Commands of the panel have no effect.
         let commands = &mut Vec::new();
         let (images, selection, playback) = (&mut *images, &mut selection, &playback);
         let context = &mut PanelContext { recording, cursor_ns, playback, images, selection, theme, commands };
@@ -53,18 +53,18 @@ pub(super) fn export(state: &WindowState, ctx: &mut PanelContext<'_>) -> PanelEx
     PanelExport { name, picture, drawing, table: copy.panels.csv_table(panel, ctx) }
 }
 
-/// The numbers behind what a panel shows, comma separated.
+/// The values of a panel, comma separated.
 pub fn panel_table(panel: PanelName, state: &mut WindowState, ctx: &mut PanelContext<'_>) -> String {
     slide::update(ctx);
     state.panels.csv_table(panel, ctx)
 }
 
-/// Draws a panel into all of `ui`.
+/// Draws one panel into all of `ui`.
 pub fn alone_ui(panel: PanelName, ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_>) {
     let frame = Frame::new().fill(ctx.theme.surface).inner_margin(PANEL_MARGIN);
     slide::update(ctx);
     CentralPanel::no_frame().frame(frame).show(ui, |ui| state.panels.ui(panel, ui, ctx));
 }
 
-/// Size of a panel that is not on the screen, in points.
+/// Size in points of a panel that is not on the screen.
 pub(super) const HIDDEN_PANEL_SIZE: Vec2 = Vec2::new(960.0, 540.0);

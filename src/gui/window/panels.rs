@@ -1,4 +1,4 @@
-//! The panels by name, and their own state.
+//! The panels by name, and their state.
 
 use egui::Ui;
 use serde::{Deserialize, Serialize};
@@ -17,12 +17,12 @@ use crate::gui::residuals::ResidualsPanel;
 use crate::gui::scene::ScenePanel;
 use crate::gui::timeline::TimelinePanel;
 
-/// A panel by its name on the command line, in the names of files and in saved layouts.
+/// A panel by its name on the command line, in file names and in saved layouts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize)]
 pub enum PanelName {
     /// The camera's image.
     Image,
-    /// The scene in three dimensions.
+    /// The 3D scene.
     Scene,
     /// Calibration over time.
     Convergence,
@@ -30,22 +30,22 @@ pub enum PanelName {
     Rank,
     /// The linearization by blocks.
     Jacobian,
-    /// Residuals.
+    /// Residuals as a histogram, over time and by factor.
     Residuals,
-    /// Numbers of what is selected.
+    /// Values of the selection.
     Inspector,
-    /// What a mechanism and a motion can identify.
+    /// Observability of a mechanism and a motion without a log.
     Laboratory,
-    /// All runs held against each other.
+    /// Comparison of all runs.
     Comparison,
-    /// Breakpoints.
+    /// Breakpoints and their hits.
     Breakpoints,
-    /// The lanes over time, across the bottom of the window.
+    /// The timeline at the bottom of the window.
     Timeline,
 }
 
 impl PanelName {
-    /// All of them.
+    /// All panels.
     pub const ALL: [Self; 11] = [
         Self::Image,
         Self::Scene,
@@ -60,12 +60,12 @@ impl PanelName {
         Self::Timeline,
     ];
 
-    /// Those that can be moved and hidden.
+    /// The panels that can be moved and hidden: all but the timeline.
     pub fn movable() -> impl Iterator<Item = Self> {
         Self::ALL.into_iter().filter(|panel| *panel != Self::Timeline)
     }
 
-    /// Its name on the command line and its title.
+    /// Name on the command line, and title.
     const fn names(self) -> (&'static str, &'static str) {
         match self {
             Self::Image => ("image", "Image"),
@@ -87,41 +87,41 @@ impl PanelName {
         self.names().0
     }
 
-    /// Its title on screen.
+    /// Its title in the window.
     pub const fn title(self) -> &'static str {
         self.names().1
     }
 }
 
-/// The panels' own state.
+/// The state of all panels.
 #[derive(Default)]
 pub struct Panels {
-    /// The camera's image.
+    /// State of the camera's image.
     pub image: ImagePanel,
-    /// The scene in three dimensions.
+    /// State of the 3D scene.
     pub scene: ScenePanel,
-    /// Calibration over time.
+    /// State of the calibration over time.
     pub convergence: ConvergencePanel,
-    /// Rank and null directions.
+    /// State of rank and null directions.
     pub rank: RankPanel,
-    /// The linearization by blocks.
+    /// State of the linearization by blocks.
     pub jacobian: JacobianPanel,
-    /// Residuals.
+    /// State of the residuals.
     pub residuals: ResidualsPanel,
-    /// Numbers of what is selected.
+    /// State of the inspector.
     pub inspector: InspectorPanel,
-    /// What a mechanism and a motion can identify.
+    /// State of the laboratory.
     pub laboratory: LaboratoryPanel,
-    /// All runs held against each other.
+    /// State of the comparison of runs.
     pub comparison: ComparisonPanel,
-    /// Breakpoints.
+    /// State of the breakpoints.
     pub breakpoints: BreakpointsPanel,
-    /// The lanes over time.
+    /// State of the timeline.
     pub timeline: TimelinePanel,
 }
 
 impl Panels {
-    /// Panels that show the same and hold nothing of a window.
+    /// Panels with the same view and no texture of a window.
     pub(super) fn views(&self) -> Self {
         Self {
             image: self.image.view_copy(),
@@ -132,7 +132,7 @@ impl Panels {
         }
     }
 
-    /// Draws a panel into what is left of `ui`.
+    /// Draws a panel into the available room of `ui`.
     pub(super) fn ui(&mut self, panel: PanelName, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
         match panel {
             PanelName::Image => self.image.ui(ui, ctx),
@@ -149,7 +149,7 @@ impl Panels {
         }
     }
 
-    /// The numbers behind a panel as a CSV table, empty while there is no run.
+    /// The values of a panel as a CSV table, empty without a run.
     pub(super) fn csv_table(&mut self, panel: PanelName, ctx: &PanelContext<'_>) -> String {
         if ctx.selected_run().is_none() {
             return String::new();

@@ -1,32 +1,32 @@
-//! How far the estimation of all runs has come, and how long it will still take.
+//! Progress and remaining time of the estimation of all runs.
 
 use crate::session::Recording;
 
-/// Seconds of computing before a remaining time is told.
+/// Seconds of computation before a remaining time is shown.
 const SHORTEST_S: f64 = 1.5;
 
-/// Watches the estimation.
+/// Measures the progress of the estimation.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ProgressMeter {
-    /// Seconds of the wall, and the share that was computed then.
+    /// Wall clock in seconds at the first reading, and the ratio computed then.
     begun: Option<(f64, f64)>,
-    /// The share at the last reading.
+    /// The ratio at the last reading.
     last: f64,
 }
 
-/// How far it has come.
+/// Progress of the estimation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Progress {
-    /// Runs that are not done.
+    /// Number of unfinished runs.
     pub runs: usize,
-    /// Share of the log that they have behind them.
+    /// Ratio of the log that has been processed, 0 to 1.
     pub share: f64,
-    /// Seconds that it will still take at the present pace.
+    /// Remaining seconds at the present speed.
     pub left_s: Option<f64>,
 }
 
 impl ProgressMeter {
-    /// Reads a recording at a time of the wall; `None` when everything is computed.
+    /// Reads a recording at a time of the wall clock; `None` when all steps are computed.
     pub fn read(&mut self, recording: &Recording, now_s: Option<f64>) -> Option<Progress> {
         let open = recording.runs.iter().filter(|run| !run.finished && run.error.is_none());
         let duration_ns = recording.duration_ns.max(1) as f64;
@@ -38,7 +38,7 @@ impl ProgressMeter {
             return None;
         }
         let share = shares.iter().sum::<f64>() / shares.len() as f64;
-        // Another run makes the share fall: the pace is taken anew.
+        // A new run reduces the ratio: the measurement restarts.
         if share < self.last {
             self.begun = None;
         }

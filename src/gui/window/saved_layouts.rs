@@ -1,4 +1,4 @@
-//! Layouts that a person has made and named.
+//! The user's named layouts.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use super::PanelName;
 use super::tiles::Layout;
 use crate::gui::theme::Theme;
 
-/// Most layouts that are kept.
+/// Maximum number of saved layouts.
 const MOST_KEPT: usize = 12;
 
 /// The layouts by name, and the name that is being typed.
@@ -20,19 +20,19 @@ pub struct SavedLayouts {
 }
 
 impl SavedLayouts {
-    /// Reads what [`SavedLayouts::to_text`] wrote; those of a later program that has other panels are left out.
+    /// Reads the text of [`SavedLayouts::to_text`]; layouts with unknown panels (of a later version) are skipped.
     pub fn from_text(text: &str) -> Self {
         let values: BTreeMap<String, serde_json::Value> = serde_json::from_str(text).unwrap_or_default();
         let layouts = values.into_iter().filter_map(|(name, value)| Some((name, tree_of(value)?))).collect();
         Self { layouts, typed: String::new() }
     }
 
-    /// Their names in order.
+    /// The names in order.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.layouts.keys().map(String::as_str)
     }
 
-    /// Arranges the panels as in the layout of a number, in the order of the names; whether there is one.
+    /// Applies the layout with an index in the order of the names; returns whether it exists.
     pub(super) fn take(&self, number: usize, layout: &mut Layout) -> bool {
         let tree = self.layouts.values().nth(number);
         if let Some(tree) = tree {
@@ -46,7 +46,8 @@ impl SavedLayouts {
         serde_json::to_string(&self.layouts).unwrap_or_default()
     }
 
-    /// Lists the layouts, to be taken or forgotten, and saves the present one; whether the list changed.
+    /// Lists the layouts with buttons to apply and delete them, and saves the current one. Returns whether the list
+    /// changed.
     pub(super) fn ui(&mut self, ui: &mut Ui, theme: &Theme, layout: &mut Layout) -> bool {
         let mut forgotten = None;
         for (name, tree) in &self.layouts {
@@ -84,19 +85,19 @@ impl SavedLayouts {
     }
 }
 
-/// The present layout, for a saved session.
+/// The current layout for a saved session.
 pub(super) fn layout_value(layout: &Layout) -> Option<serde_json::Value> {
     serde_json::to_value(layout.tree()).ok()
 }
 
-/// Takes over the layout of a saved session, if this program has its panels.
+/// Applies the layout of a saved session if this program has its panels.
 pub(super) fn take_layout(layout: &mut Layout, value: &serde_json::Value) {
     if let Some(tree) = tree_of(value.clone()) {
         layout.take(tree);
     }
 }
 
-/// A layout that shows something. It may miss panels that have come since: they can be brought in.
+/// A layout with at least one panel. Panels that are missing in it can be added.
 fn tree_of(value: serde_json::Value) -> Option<Tree<PanelName>> {
     let tree: Tree<PanelName> = serde_json::from_value(value).ok()?;
     let shows = tree.root().is_some() && PanelName::movable().any(|panel| tree.tiles.find_pane(&panel).is_some());
@@ -118,7 +119,7 @@ mod tests {
         let back = SavedLayouts::from_text(&saved.to_text());
         assert!(back.layouts["mine"] == *layout.tree());
         assert!(SavedLayouts::from_text("no json").layouts.is_empty());
-        // An older layout knows fewer panels, and a panel can be brought into it; a later one may know others.
+        // An older layout has fewer panels, which can be added; a later one may have unknown ones.
         let mut older = layout.tree().clone();
         let rank = older.tiles.find_pane(&PanelName::Rank).unwrap();
         older.remove_recursively(rank);

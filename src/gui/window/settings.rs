@@ -1,4 +1,4 @@
-//! The user's settings, kept for the next start.
+//! The user's settings, stored for the next start.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,24 +6,24 @@ use super::tiles::Preset;
 use crate::gui::theme::ThemeName;
 use crate::session::DEFAULT_MEMORY_BUDGET_BYTES;
 
-/// Sizes that everything may be drawn at.
+/// Range of the scale.
 pub const SCALES: std::ops::RangeInclusive<f32> = 0.5..=3.0;
-/// Mebibytes that a recording may take.
+/// Range of the memory budget of a recording in MiB.
 pub(super) const MEMORY_MIB: std::ops::RangeInclusive<usize> = 64..=65_536;
 
-/// The settings; they are kept for the next start.
+/// The user's settings, stored for the next start.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(default)]
 pub struct Settings {
-    /// Colours.
+    /// Theme of the window.
     pub theme: ThemeName,
-    /// How large everything is drawn, 1 as the screen has it.
+    /// Scale factor of the whole window, 1 is the scale of the screen.
     pub scale: f32,
-    /// How much memory what is recorded may take, in MiB.
+    /// Memory budget of a recording in MiB.
     pub memory_mib: usize,
-    /// Where the panels are at the start: name of a preset or of a layout of one's own.
+    /// Initial layout: name of a preset or of a saved layout.
     pub layout: String,
-    /// How fast a log plays at first, in log seconds per second.
+    /// Initial speed of playback in log seconds per second.
     pub speed: f64,
 }
 
@@ -40,11 +40,11 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// Reads what [`Settings::to_text`] wrote; what is missing or cannot be is as without settings.
+    /// Reads the text of [`Settings::to_text`]; missing and invalid entries get their defaults.
     pub fn from_text(text: &str, theme: ThemeName) -> Self {
         let standard = Self { theme, ..Self::default() };
         let mut value: serde_json::Value = serde_json::from_str(text).unwrap_or_default();
-        // One setting that is not understood shall not take the others along.
+        // One invalid entry must not discard the others.
         let Some(entries) = value.as_object_mut() else { return standard };
         let Ok(serde_json::Value::Object(known)) = serde_json::to_value(&standard) else { return standard };
         for (name, usual) in &known {
@@ -63,7 +63,7 @@ impl Settings {
         serde_json::to_string_pretty(self).unwrap_or_default()
     }
 
-    /// With every number in its range.
+    /// With every number limited to its range.
     fn sensible(mut self) -> Self {
         let clamp = |value: f32| value.clamp(*SCALES.start(), *SCALES.end());
         self.scale = if self.scale.is_finite() { clamp(self.scale) } else { 1.0 };
@@ -72,7 +72,7 @@ impl Settings {
         self
     }
 
-    /// How much memory what is recorded may take, in bytes.
+    /// Memory budget of a recording in bytes.
     pub fn memory_bytes(&self) -> usize {
         self.memory_mib << 20
     }

@@ -1,11 +1,11 @@
-//! The sheet of shortcuts.
+//! The list of shortcuts.
 
 use egui::{Align2, Grid, RichText, Ui, vec2};
 
 use super::actions::TABLE;
 use crate::gui::theme::Theme;
 
-/// What the pointer does.
+/// Actions of the pointer.
 const POINTER: [(&str, &str); 6] = [
     ("Drag", "move the cursor"),
     ("Ctrl+scroll", "zoom in time, in all plots at once; over the timeline scrolling is enough"),
@@ -15,14 +15,14 @@ const POINTER: [(&str, &str); 6] = [
     ("Click a parameter or a feature", "select it in all panels"),
 ];
 
-/// What the keyboard does everywhere.
+/// Keys that work everywhere.
 const EVERYWHERE: [(&str, &str); 3] = [
     ("Tab, Shift+Tab", "the next or previous button, tab or plot; Enter or Space presses it"),
     ("Ctrl and +, − or 0", "everything larger, smaller, or as it was"),
     ("Ctrl+P, then a number", "go to a time, a frame, a feature"),
 ];
 
-/// Draws the sheet while it is open.
+/// Draws the list while it is open.
 pub(super) fn ui(ui: &Ui, theme: &Theme, open: &mut bool) {
     let window = egui::Window::new("Shortcuts").open(open).collapsible(false).resizable(false);
     window.anchor(Align2::CENTER_CENTER, vec2(0.0, 0.0)).show(ui.ctx(), |ui| {

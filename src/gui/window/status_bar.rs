@@ -9,7 +9,7 @@ use crate::gui::PanelContext;
 use crate::gui::units::{bytes, counted, fixed};
 use crate::session::{Recording, RunRecord, StepRecord};
 
-/// Steps over which the real-time factor is taken.
+/// Number of steps over which the real-time factor is averaged.
 const STEPS_OF_MEAN: usize = 100;
 
 pub(super) fn ui(ui: &mut Ui, state: &mut WindowState, ctx: &PanelContext<'_>) {
@@ -67,7 +67,7 @@ pub(super) fn ui(ui: &mut Ui, state: &mut WindowState, ctx: &PanelContext<'_>) {
     });
 }
 
-/// How far the estimation has come.
+/// The progress of the estimation.
 fn progress_ui(ui: &mut Ui, progress: &Progress) {
     let left = progress.left_s.map_or_else(String::new, |left_s| format!(", {} s left", fixed(left_s.ceil(), 0)));
     let text = format!("{} {} %{left}", counted(progress.runs, "run"), fixed(100.0 * progress.share, 0));
@@ -78,14 +78,14 @@ fn progress_ui(ui: &mut Ui, progress: &Progress) {
     response.on_hover_text("How far the estimators have come");
 }
 
-/// Another log is on its way.
+/// Another log is being opened.
 fn opening_ui(ui: &mut Ui, path: &Path) {
     let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
     ui.label(RichText::new(format!("opening {name}…")).small());
     ui.add(egui::Spinner::new().size(12.0));
 }
 
-/// How much memory the recording takes of what it may, and what that means for its steps.
+/// Memory of the recording relative to its budget, and the effect on its steps.
 fn recorded(recording: &Recording) -> (String, String) {
     let steps: usize = recording.runs.iter().map(|run| run.steps.len()).sum();
     let outlined: usize = recording.runs.iter().map(|run| run.memory.summaries).sum();

@@ -1,4 +1,4 @@
-//! The window, asked by the labels that a person and a screen reader see.
+//! The window, tested by its labels.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ use crate::session::{Command, ForkChanges, ForkOrigin, PlaybackSpeed, Recording,
 
 pub(super) const SECOND_NS: i64 = 1_000_000_000;
 
-/// A window over the sample, with the commands it pushed.
+/// A window with the sample, and the commands that it pushed.
 pub(super) struct Bench {
     pub(super) recording: Recording,
     pub(super) cursor_ns: i64,
@@ -43,7 +43,7 @@ impl Bench {
     }
 }
 
-/// Made once: it takes longer than all the rest.
+/// Computed once, because it takes longer than all other tests.
 fn sample() -> Recording {
     static SAMPLE: std::sync::OnceLock<Recording> = std::sync::OnceLock::new();
     SAMPLE.get_or_init(|| sample_recording_of(80, &["auto", "classical"])).clone()
@@ -67,7 +67,7 @@ pub(super) fn bench() -> Harness<'static, Bench> {
     harness
 }
 
-/// Does something and gives the commands that came of it.
+/// Executes a function and returns the commands that it pushed.
 pub(super) fn commands_of(
     harness: &mut Harness<'static, Bench>,
     act: impl FnOnce(&Harness<'static, Bench>),
@@ -201,7 +201,7 @@ fn a_run_is_added_through_the_dialog() {
     assert!(harness.query_by_label("Encoder readings").is_none(), "the dialog closes");
 }
 
-/// A window with the breakpoints in front.
+/// A window with the breakpoints panel in front.
 fn breakpoints_bench(conditions: &[&str]) -> Harness<'static, Bench> {
     let mut harness = bench();
     let state = harness.state_mut();
@@ -234,7 +234,7 @@ fn a_breakpoint_is_typed_and_its_mistakes_are_pointed_at() {
     let pushed = commands_of(&mut harness, |harness| harness.get_by_label("Add breakpoint").click());
     let [Command::AddBreakpoint(condition)] = pushed.as_slice() else { panic!("{pushed:?}") };
     assert_eq!(condition.text(), "rank < 18 or features < 40");
-    // While somebody types, B and N are letters.
+    // While the user types, B and N are letters.
     harness.get_by_role_and_label(Role::TextInput, "Condition").focus();
     harness.run_steps(1);
     let pushed = commands_of(&mut harness, |harness| harness.key_press(Key::N));
@@ -293,7 +293,7 @@ fn a_fork_is_made_by_key_and_label_and_has_a_lane() {
     let changes: ForkChanges = "classical,freeze=yaw.d,drop=12".parse().unwrap();
     assert_eq!(pushed, [Command::Fork { run: 0, changes: changes.clone(), label: None }]);
 
-    // The lane says where it has left its parent.
+    // The lane shows the fork's origin.
     let state = harness.state_mut();
     let parent = state.recording.runs[0].id;
     let origin = ForkOrigin { parent, step: 60, stamp_ns: 3 * SECOND_NS, changes };
@@ -392,7 +392,7 @@ fn the_chain_slides_from_the_rank_panel() {
     harness.run_steps(2);
     assert_eq!(amount(&harness), held);
     let names = harness.state().recording.rig.parameter_names();
-    // Along what is known to be lost the reprojections stay, along a parameter alone they move.
+    // Along a known unobservable direction the reprojections stay; along a single parameter they move.
     harness.state_mut().selection.run = 1;
     for (position, said) in [("base-d=1", "Reprojections stay"), ("roll.alpha=1", "Reprojections move")] {
         harness.state_mut().selection.slide = position.parse::<SlideRequest>().unwrap().position(&names);

@@ -9,7 +9,7 @@ use super::{PanelName, Panels};
 use crate::gui::PanelContext;
 use crate::gui::theme::{PANEL_MARGIN, Theme};
 
-/// A ready-made layout.
+/// A predefined layout.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Preset {
     /// Image and scene above convergence, rank and inspector on the right.
@@ -21,12 +21,12 @@ pub enum Preset {
     FrontEnd,
     /// Scene large.
     Scene,
-    /// All runs held against each other.
+    /// Comparison of all runs large.
     Comparison,
 }
 
 impl Preset {
-    /// All of them, in the order of their keys 1 to 5.
+    /// All presets in the order of their keys 1 to 5.
     pub const ALL: [Self; 5] = [Self::Overview, Self::Calibration, Self::FrontEnd, Self::Scene, Self::Comparison];
 
     /// Its name.
@@ -41,11 +41,11 @@ impl Preset {
     }
 }
 
-/// Where the panels are.
+/// The layout of the movable panels.
 #[derive(Debug)]
 pub(crate) struct Layout {
     tree: Tree<PanelName>,
-    /// The preset that was chosen last, `None` for a layout of one's own.
+    /// The preset that was chosen last, `None` for a saved layout.
     pub(crate) preset: Option<Preset>,
 }
 
@@ -62,13 +62,13 @@ impl Layout {
         self.preset = Some(preset);
     }
 
-    /// Arranges the panels as in a layout of one's own.
+    /// Applies a saved layout.
     pub(crate) fn take(&mut self, tree: Tree<PanelName>) {
         self.tree = tree;
         self.preset = None;
     }
 
-    /// Where the panels are, for keeping.
+    /// The tree of panels, for storing.
     pub(crate) fn tree(&self) -> &Tree<PanelName> {
         &self.tree
     }
@@ -81,7 +81,7 @@ impl Layout {
     /// Shows or hides a panel.
     pub(crate) fn set_visible(&mut self, pane: PanelName, visible: bool) {
         if visible && self.tree.tiles.find_pane(&pane).is_none() {
-            // A layout of one's own may be older than the panel.
+            // A saved layout may be older than the panel.
             let tile = tabs(&mut self.tree.tiles, &[pane]);
             let whole =
                 self.tree.root().map(|root| split(&mut self.tree.tiles, LinearDir::Horizontal, [root, tile], 0.7));
@@ -95,7 +95,7 @@ impl Layout {
         }
     }
 
-    /// Draws the panels, marks the one with the focus, and notes where they lie.
+    /// Draws the panels, marks the focused one, and stores their rectangles.
     pub(crate) fn ui(
         &mut self,
         ui: &mut Ui,
@@ -195,12 +195,13 @@ impl Behavior<PanelName> for Shown<'_, '_> {
         matches!(tiles.get(tile), Some(Tile::Pane(_)))
     }
 
-    /// Panels are dragged by their tabs. A bar that drags all of its tabs would be one more nameless stop for the keyboard.
+    /// Panels are dragged by their tabs. A bar that drags all of its tabs would be another unnamed stop for the
+    /// keyboard.
     fn is_tile_draggable(&self, tiles: &Tiles<PanelName>, tile: TileId) -> bool {
         matches!(tiles.get(tile), Some(Tile::Pane(_)))
     }
 
-    /// A closed panel is hidden, so that the menu can bring it back.
+    /// A closed panel is hidden, so that the menu can show it again.
     fn on_tab_close(&mut self, tiles: &mut Tiles<PanelName>, tile: TileId) -> bool {
         tiles.set_visible(tile, false);
         false

@@ -1,4 +1,4 @@
-//! The bar at the top: what to open, the runs, the layouts.
+//! The bar at the top: logs, runs, layouts.
 
 use egui::containers::menu::{MenuButton, MenuConfig};
 use egui::{Align, Button, Layout as UiLayout, PopupCloseBehavior, RichText, Ui, vec2};
@@ -43,7 +43,7 @@ fn action_button(ui: &mut Ui, text: &str, action: Action, enabled: bool, actions
     let entry = TABLE.iter().find(|entry| entry.action == action);
     let (name, keys) = entry.map_or((text, ""), |entry| (entry.name, entry.keys));
     let response = ui.add_enabled(enabled, Button::new(text));
-    // A sign alone would be read out as the sign.
+    // A screen reader would read a lone symbol literally.
     let label = if text.chars().count() < 3 { name } else { text };
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, enabled, label));
     if response.on_hover_text(format!("{name} ({keys})")).clicked() {

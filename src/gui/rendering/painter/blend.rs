@@ -1,6 +1,6 @@
 //! Arithmetic on packed premultiplied pixels: red in the lowest byte, alpha in the highest.
 
-/// Two of the four channels, with room to carry.
+/// Two of the four channels, with room for carries.
 const LANES: u32 = 0x00ff_00ff;
 
 /// Packs red, green, blue, alpha.
@@ -13,7 +13,7 @@ pub(in crate::gui) const fn unpack(pixel: u32) -> [u8; 4] {
     pixel.to_le_bytes()
 }
 
-/// `source + below · (1 − source alpha)`, each channel rounded and held at 255.
+/// `source + below · (1 − source alpha)`, each channel rounded and limited to 255.
 #[inline]
 pub(super) fn over(below: u32, source: u32) -> u32 {
     let keep = 255 - (source >> 24);
@@ -28,7 +28,7 @@ pub(super) fn scale(pixel: u32, factor: u32) -> u32 {
     scale_lanes(pixel & LANES, factor) | (scale_lanes((pixel >> 8) & LANES, factor) << 8)
 }
 
-/// Channel by channel `a · b / 255`, rounded.
+/// Channel-wise `a · b / 255`, rounded.
 #[inline]
 pub(super) fn multiply(a: u32, b: u32) -> u32 {
     let (a, b) = (unpack(a), unpack(b));
@@ -65,7 +65,7 @@ fn scale_lanes(lanes: u32, factor: u32) -> u32 {
     ((exact + ((exact >> 8) & LANES)) >> 8) & LANES
 }
 
-/// Holds each of two lanes (at most 510) at 255.
+/// Limits each of two lanes (at most 510) to 255.
 #[inline]
 fn saturate(lanes: u32) -> u32 {
     let carry = lanes & 0x0100_0100;

@@ -1,4 +1,4 @@
-//! The picture in tiles that are painted again only when something in them changes.
+//! The image in tiles that are painted again only when their content changes.
 
 use egui::{Color32, ColorImage};
 use image::RgbaImage;
@@ -8,39 +8,39 @@ use super::blend;
 use super::raster::{PreparedMesh, Target, mixed};
 use super::triangle::Clip;
 
-/// Size of a tile in pixels: small enough that a moving cursor touches little, and that a tile stays in the cache.
+/// Size of a tile in pixels: small enough that a moving cursor changes few tiles, and that a tile fits the cache.
 pub(super) const TILE_PX: [usize; 2] = [64, 32];
 
-/// A triangle of a mesh, by their numbers.
+/// Indices of a mesh and of a triangle in it.
 #[derive(Clone, Copy)]
 struct Piece {
     mesh: u32,
     triangle: u32,
 }
 
-/// Part of the picture.
+/// A tile of the image.
 #[derive(Default)]
 struct Tile {
-    /// What lies in it, in the order in which it is painted.
+    /// Triangles that may touch it, in the order of painting.
     pieces: Vec<Piece>,
-    /// Tells what its pixels show, `None` before the first time.
+    /// Hash of its content, `None` before it is painted.
     mark: Option<u64>,
-    /// Row by row, each as wide as the tile.
+    /// Pixels by row, each row as wide as the tile.
     pixels: Vec<u32>,
-    /// Whether it was painted for the last picture.
+    /// Whether it was painted in the last update.
     changed: bool,
 }
 
-/// A rectangle of the picture in pixels.
+/// A rectangle of the image in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::gui) struct PixelRect {
     /// Column and row of its upper left pixel.
     pub(in crate::gui) at: [usize; 2],
-    /// Columns and rows.
+    /// Width and height.
     pub(in crate::gui) size: [usize; 2],
 }
 
-/// The last picture.
+/// The last image.
 #[derive(Default)]
 pub(super) struct Canvas {
     size_px: [usize; 2],
@@ -49,7 +49,7 @@ pub(super) struct Canvas {
 }
 
 impl Canvas {
-    /// Tiles side by side.
+    /// Number of tiles in a row.
     fn columns(&self) -> usize {
         self.size_px[0].div_ceil(TILE_PX[0])
     }
@@ -65,7 +65,7 @@ impl Canvas {
         PixelRect { at, size: [0, 1].map(|axis| TILE_PX[axis].min(self.size_px[axis] - at[axis])) }
     }
 
-    /// Brings the picture up to date; every pixel is as if all of it had been painted anew.
+    /// Updates the image; the result is the same as painting all of it again.
     pub(super) fn update(&mut self, meshes: &[PreparedMesh<'_>], size_px: [usize; 2], ground: u32) {
         if (self.size_px, self.ground) != (size_px, ground) {
             *self = Self { size_px, ground, tiles: Vec::new() };
@@ -77,7 +77,7 @@ impl Canvas {
         self.tiles.par_iter_mut().zip(clips).for_each(|(tile, clip)| tile.update(meshes, clip, ground));
     }
 
-    /// Gives each tile the triangles that may touch it.
+    /// Assigns each triangle to the tiles that it may touch.
     fn sort_in(&mut self, meshes: &[PreparedMesh<'_>]) {
         let columns = self.columns();
         for tile in &mut self.tiles {
@@ -97,7 +97,7 @@ impl Canvas {
         }
     }
 
-    /// The rectangles that the last update painted again; those side by side are one.
+    /// The rectangles that the last update painted; adjacent ones are merged.
     pub(super) fn changed(&self) -> Vec<PixelRect> {
         let mut rects: Vec<PixelRect> = Vec::new();
         for (number, _) in self.tiles.iter().enumerate().filter(|(_, tile)| tile.changed) {
@@ -117,7 +117,7 @@ impl Canvas {
         self.size_px
     }
 
-    /// A rectangle that consists of whole tiles, as colours.
+    /// A rectangle of whole tiles as colours.
     pub(super) fn part(&self, rect: PixelRect) -> ColorImage {
         let [left, top] = rect.at;
         let [first, end] = [left / TILE_PX[0], (left + rect.size[0]).div_ceil(TILE_PX[0])];
@@ -136,7 +136,7 @@ impl Canvas {
         ColorImage::new(rect.size, pixels)
     }
 
-    /// The whole picture.
+    /// The whole image.
     pub(super) fn picture(&self) -> RgbaImage {
         let [width, height] = self.size_px;
         let mut bytes = vec![0; width * height * 4];

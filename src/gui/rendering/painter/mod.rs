@@ -1,10 +1,10 @@
-//! A rasterizer on the CPU for what egui tessellates, so that pictures need no driver and have the same bytes everywhere.
+//! A CPU rasterizer for egui's meshes, so that screenshots need no driver and have the same bytes on every machine.
 //!
-//! It does what egui's shader does: colours are premultiplied and blended in gamma space, textures are filtered between
-//! texel centres, and clip rectangles are rounded to whole pixels.
-//! Vertices are snapped to 1/256 pixel and edges follow the top-left rule in whole numbers, so that triangles that share
-//! an edge leave no gap and paint no pixel twice.
-//! Paint callbacks are not drawn: on the CPU the scene comes as a texture.
+//! It follows egui's shader: colours are premultiplied and blended in gamma space, textures are filtered between texel
+//! centres, and clip rectangles are rounded to whole pixels.
+//! Vertices are snapped to 1/256 pixel and edges follow the top-left rule in integers, so that triangles with a common
+//! edge leave no gap and paint no pixel twice.
+//! Paint callbacks are not drawn: on the CPU the scene is a texture.
 
 pub(in crate::gui) mod blend;
 mod canvas;
@@ -23,7 +23,7 @@ use self::canvas::{Canvas, PixelRect};
 use self::raster::PreparedMesh;
 use self::texture::TextureStore;
 
-/// Paints egui's meshes; it keeps their textures and the last picture, of which only what changes is painted again.
+/// Paints egui's meshes. It keeps their textures and the last image, of which only changed tiles are painted again.
 #[derive(Default)]
 pub struct Painter {
     textures: TextureStore,
@@ -36,21 +36,21 @@ impl Painter {
         Self::default()
     }
 
-    /// Takes over new and changed textures; call it before [`Painter::paint`] with each output of egui, then
+    /// Stores new and changed textures. Call it before [`Painter::paint`] with each output of egui, and
     /// [`Painter::free_textures`] after it.
     pub fn set_textures(&mut self, delta: &TexturesDelta) {
         self.textures.set(delta);
     }
 
-    /// Forgets the textures that the output frees.
+    /// Drops the textures that the output frees.
     pub fn free_textures(&mut self, delta: &TexturesDelta) {
         self.textures.free(delta);
     }
 
-    /// Paints primitives, whose positions are in points, over an opaque ground.
+    /// Paints primitives, whose positions are in points, over an opaque background.
     ///
-    /// Primitives with an unknown texture are left out, as are triangles with positions that are not finite. What is the same
-    /// as in the picture before is not painted again.
+    /// Primitives with an unknown texture are skipped, as are triangles with positions that are not finite. Tiles that
+    /// did not change since the last image are not painted again.
     pub fn paint(
         &mut self,
         primitives: &[ClippedPrimitive],
@@ -62,7 +62,7 @@ impl Painter {
         self.canvas.picture()
     }
 
-    /// Paints as [`Painter::paint`] does and leaves the picture where it is.
+    /// Paints as [`Painter::paint`] does without copying the image.
     pub fn update(
         &mut self,
         primitives: &[ClippedPrimitive],
@@ -84,12 +84,12 @@ impl Painter {
         self.canvas.update(&meshes, size_px.map(|side| side as usize), blend::pack(ground.to_array()));
     }
 
-    /// The last picture, as colours.
+    /// The last image as colours.
     pub(in crate::gui) fn whole(&self) -> ColorImage {
         self.canvas.part(PixelRect { at: [0; 2], size: self.canvas.size_px() })
     }
 
-    /// The parts of the picture that differ from the one before it, as colours.
+    /// The rectangles of the image that changed in the last update, as colours.
     pub(in crate::gui) fn changes(&self) -> impl Iterator<Item = (PixelRect, ColorImage)> {
         self.canvas.changed().into_iter().map(|rect| (rect, self.canvas.part(rect)))
     }

@@ -1,4 +1,4 @@
-//! Meshes with their textures, painted triangle by triangle.
+//! Painting of textured meshes by triangles.
 
 use egui::Rect;
 use egui::epaint::{Mesh, Vertex};
@@ -7,18 +7,18 @@ use super::blend;
 use super::texture::{TEXEL_BITS, TexelKind, Texture, weight};
 use super::triangle::{Clip, Gradient, Place, SUBPIXELS, first_centre, pack_fixed, spans, to_texels};
 
-/// Furthest coordinate in subpixels (32 768 pixels), so that products fit 64 bits.
+/// Largest coordinate in subpixels (32 768 pixels), so that products fit into 64 bits.
 const FURTHEST: f32 = (1 << 23) as f32;
 
-/// A rectangle of the picture that one worker owns.
+/// A rectangle of the image that one worker paints.
 pub(super) struct Target<'a> {
-    /// Row by row, each as wide as `clip`.
+    /// Pixels by row, each row as wide as `clip`.
     pub(super) pixels: &'a mut [u32],
     pub(super) clip: Clip,
 }
 
 impl Target<'_> {
-    /// What of a span lies here, and how many pixels of it lie left of that.
+    /// The pixels of a span inside the rectangle, and the number of its pixels to the left of them.
     #[inline]
     fn span(&mut self, row: i32, left: i32, right: i32) -> (i32, &mut [u32]) {
         let Clip { left: first, right: end, top, .. } = self.clip;
@@ -36,14 +36,14 @@ pub(super) struct PreparedMesh<'a> {
     mesh: &'a Mesh,
     texture: &'a Texture,
     clip: Clip,
-    /// Position of each vertex, `None` when it is not finite.
+    /// Position of each vertex, `None` if it is not finite.
     points: Vec<Option<[i32; 2]>>,
-    /// Tells each vertex from others: its position, its place in the texture and its colour.
+    /// Hash of each vertex: position, texture position and colour.
     marks: Vec<u64>,
 }
 
 impl<'a> PreparedMesh<'a> {
-    /// `None` when nothing of it can be seen.
+    /// `None` if the mesh is outside the image or has no triangle.
     pub(super) fn new(
         mesh: &'a Mesh,
         texture: &'a Texture,
@@ -68,25 +68,25 @@ impl<'a> PreparedMesh<'a> {
         Some(Self { mesh, texture, clip, points, marks })
     }
 
-    /// How many triangles it has.
+    /// Number of triangles.
     pub(super) fn triangles(&self) -> usize {
         self.mesh.indices.len() / 3
     }
 
-    /// Numbers of the corners of a triangle.
+    /// Vertex indices of a triangle.
     #[inline]
     fn corners(&self, triangle: usize) -> [usize; 3] {
         [0, 1, 2].map(|corner| self.mesh.indices[3 * triangle + corner] as usize)
     }
 
-    /// Places of the corners of a triangle, `None` when one is not finite.
+    /// Positions of the corners of a triangle, `None` if one is not finite.
     #[inline]
     fn points(&self, triangle: usize) -> Option<[[i32; 2]; 3]> {
         let [a, b, c] = self.corners(triangle).map(|corner| self.points.get(corner).copied().flatten());
         Some([a?, b?, c?])
     }
 
-    /// Pixels of the picture that a triangle may touch, `None` when nothing of it can be seen.
+    /// Pixels that a triangle may touch, `None` if it is outside the clip rectangle.
     pub(super) fn reach(&self, triangle: usize) -> Option<Clip> {
         let points = self.points(triangle)?;
         let [across, down] = [0, 1].map(|axis| points.map(|point| point[axis]));
@@ -104,7 +104,7 @@ impl<'a> PreparedMesh<'a> {
         (reach.left < reach.right && reach.top < reach.bottom && is_inked()).then_some(reach)
     }
 
-    /// Tells what a triangle looks like: two with the same mark leave the same pixels.
+    /// Hash of a triangle: triangles with the same hash have the same pixels.
     pub(super) fn mark(&self, triangle: usize) -> u64 {
         let corners = self.corners(triangle);
         let [a, b, c] = corners.map(|corner| self.marks[corner]);
@@ -115,13 +115,13 @@ impl<'a> PreparedMesh<'a> {
         let texels = if uvs[0] == uvs[1] && uvs[1] == uvs[2] {
             u64::from(self.texel_at(uvs[0]))
         } else {
-            // Above every texel, which has 32 bits.
+            // Bit above every texel value, which has 32 bits.
             self.texture.version(uvs.map(|uv| uv.y)) | 1 << 63
         };
         mixed(mixed(mixed(a, b), c), mixed(clip, texels))
     }
 
-    /// Paints what of a triangle lies in a rectangle.
+    /// Paints the pixels of a triangle inside a rectangle.
     pub(super) fn paint(&self, triangle: usize, target: &mut Target<'_>) {
         let rows = &target.clip;
         let clip = Clip { top: self.clip.top.max(rows.top), bottom: self.clip.bottom.min(rows.bottom), ..self.clip };
@@ -199,7 +199,7 @@ impl<'a> PreparedMesh<'a> {
         self.texture.sample(coordinate(uv.x, self.texture.width), coordinate(uv.y, self.texture.height))
     }
 
-    /// A span of one colour times the texture, from a place in it on.
+    /// A span of one colour times the texture, from a texture position on.
     fn texture_span(&self, [mut u, mut v]: [i64; 2], [step_u, step_v]: [i64; 2], color: u32, pixels: &mut [u32]) {
         const ONE: i64 = 1 << TEXEL_BITS;
         const HALF: i64 = ONE / 2;
@@ -224,11 +224,11 @@ impl<'a> PreparedMesh<'a> {
             }
             return;
         }
-        // The texture lies upright, as glyphs and images do: two rows of texels serve the whole span.
+        // The texture is axis-aligned, as for glyphs and images: two rows of texels are enough for the span.
         (u, v) = (u - HALF, v - HALF);
         let (upper, lower) = (texture.row(v >> TEXEL_BITS), texture.row((v >> TEXEL_BITS) + 1));
         let down = weight(v);
-        // Texel on pixel, as glyphs lie: so near to a texel's centre that every weight is all or nothing.
+        // One texel per pixel, as for glyphs: positions are so near to texel centres that every weight is 0 or 1.
         let nearest = (u + HALF) >> TEXEL_BITS;
         let off = (u - (nearest << TEXEL_BITS)).abs() + (step_u - ONE).abs().saturating_mul(pixels.len() as i64);
         if off < ONE / 512 && (down == 0 || down == 256) {
@@ -272,14 +272,14 @@ fn fill(pixels: &mut [u32], color: u32) {
     }
 }
 
-/// Two numbers stirred into one, so that different ones give different results but once in 2⁶⁴ (wyhash's mixing step).
+/// Mixes two numbers into a hash (mixing step of wyhash).
 #[inline]
 pub(super) fn mixed(a: u64, b: u64) -> u64 {
     let product = u128::from(a ^ 0xa076_1d64_78bd_642f) * u128::from(b ^ 0xe703_7ed1_a0b4_28db);
     product as u64 ^ (product >> 64) as u64
 }
 
-/// Tells a vertex from others.
+/// Hash of a vertex.
 fn mark_of(vertex: &Vertex, point: Option<[i32; 2]>) -> u64 {
     let [x, y] = point.unwrap_or([i32::MIN; 2]);
     let pair = |a: u32, b: u32| u64::from(a) << 32 | u64::from(b);

@@ -7,7 +7,7 @@ use super::Painter;
 
 const GROUND: Color32 = Color32::from_rgb(20, 30, 40);
 
-/// A painter with a white font texture and, as texture 1, the given image.
+/// A painter with a white font texture and an image as texture 1.
 fn painter_with(image: Option<(ColorImage, TextureOptions)>) -> Painter {
     let mut delta = TexturesDelta::default();
     let white = ColorImage::filled([2, 2], Color32::WHITE);
@@ -50,7 +50,7 @@ fn rgb(image: &RgbaImage, x: u32, y: u32) -> [u8; 3] {
     [red, green, blue]
 }
 
-/// Pixels that are not the ground.
+/// Pixels that differ from the background.
 fn touched(image: &RgbaImage) -> Vec<(u32, u32)> {
     image
         .enumerate_pixels()
@@ -70,7 +70,7 @@ fn a_rectangle_covers_the_pixels_whose_centres_it_holds() {
         assert_eq!(touched(&image), inside, "{left} {top} {right} {bottom}");
     };
     check(2.0, 3.0, 5.0, 7.0, [2, 3, 5, 7]);
-    // A centre on the left or upper edge is in, on the right or lower one it is out.
+    // A centre on the left or upper edge is inside, on the right or lower edge outside.
     check(2.5, 3.5, 5.5, 7.5, [2, 3, 5, 7]);
     check(2.51, 3.49, 5.51, 7.49, [3, 3, 6, 7]);
     check(-50.0, -50.0, 500.0, 500.0, [0, 0, 12, 10]);
@@ -95,7 +95,7 @@ fn triangles_that_share_edges_paint_each_pixel_once() {
         mesh.add_colored_rect(everything(), veil);
         rgb(&paint_mesh(&mut painter_with(None), mesh, everything(), [4, 4], 1.0), 1, 1)
     };
-    // A fan around odd places that covers the whole picture.
+    // A fan of triangles with irregular corners that covers the whole image.
     for step in 0..40 {
         let centre = (13.37 + 0.61 * step as f32, 47.9 - 0.83 * step as f32);
         let rim: Vec<(f32, f32)> = (0..23)
@@ -212,7 +212,7 @@ fn a_turned_texture_follows_its_corners() {
     let texels: Vec<Color32> = (0..16).map(|index| Color32::from_gray(index * 16)).collect();
     let image = ColorImage::new([4, 4], texels.clone());
     let mut mesh = Mesh::with_texture(TextureId::Managed(1));
-    // A quarter turn: u runs down, v runs to the left.
+    // A rotation by 90°: u runs down, v runs to the left.
     for (x, y, u, v) in [(8.0, 0.0, 0.0, 0.0), (8.0, 8.0, 1.0, 0.0), (0.0, 8.0, 1.0, 1.0), (0.0, 0.0, 0.0, 1.0)] {
         mesh.vertices.push(Vertex { pos: pos2(x, y), uv: pos2(u, v), color: Color32::WHITE });
     }
@@ -254,7 +254,7 @@ fn nonsense_is_left_out() {
     mesh.append(triangles(&[(3.0, 3.0), (3.0, 3.0), (3.0, 3.0)], Color32::WHITE));
     mesh.indices.extend([700, 701, 702]);
     assert!(touched(&paint_mesh(&mut painter_with(None), mesh, everything(), [8, 8], 1.0)).is_empty());
-    // Huge but finite: covers everything.
+    // Very large but finite: covers everything.
     let mesh = triangles(&[(-1e9, -1e9), (1e9, -1e9), (0.0, 1e9)], Color32::WHITE);
     assert_eq!(touched(&paint_mesh(&mut painter_with(None), mesh, everything(), [8, 8], 1.0)).len(), 64);
 }
@@ -274,7 +274,7 @@ fn bytes_do_not_depend_on_the_number_of_threads() {
     assert_eq!(alone, many);
 }
 
-/// Shapes, a glyph-like texture and a gradient, moved by a number.
+/// Shapes, a glyph-like texture and a gradient, displaced by `moved`.
 fn moving_primitives(moved: f32) -> Vec<ClippedPrimitive> {
     let mut mesh = Mesh::default();
     let mut tessellator = Tessellator::new(1.0, Default::default(), [2, 2], Vec::new());
@@ -327,7 +327,7 @@ fn a_picture_brought_up_to_date_is_a_picture_painted_anew() {
         fresh.set_textures(&delta);
         delta.clear();
         assert!(picture == fresh.paint(&primitives, SIZE, 1.0, GROUND), "picture {moved}");
-        // The parts that are told are all that differs.
+        // The reported rectangles are all that differs.
         for (rect, part) in kept.changes() {
             for (index, color) in part.pixels.iter().enumerate() {
                 let (column, row) = (rect.at[0] + index % rect.size[0], rect.at[1] + index / rect.size[0]);

@@ -1,4 +1,4 @@
-//! Textures as egui hands them over, and how a pixel is looked up in them.
+//! Textures of egui, and texel lookup.
 
 use std::collections::BTreeMap;
 
@@ -15,11 +15,11 @@ pub(super) const TEXEL_BITS: u32 = 32;
 #[derive(Default)]
 pub(super) struct TextureStore {
     textures: BTreeMap<TextureId, Texture>,
-    /// Counts changes.
+    /// Number of changes so far.
     version: u64,
 }
 
-/// Rows of texels whose changes are told together.
+/// Number of texel rows whose changes share one version.
 const BLOCK_ROWS: usize = 32;
 
 impl TextureStore {
@@ -69,14 +69,14 @@ impl TextureStore {
     }
 }
 
-/// What all texels have in common.
+/// A common property of all texels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum TexelKind {
-    /// Four equal channels: a coverage, as in the font atlas.
+    /// Four equal channels: coverage, as in the font atlas.
     Coverage,
     /// Alpha 255: an image.
     Opaque,
-    /// Anything.
+    /// No common property.
     Mixed,
 }
 
@@ -104,7 +104,7 @@ pub(super) struct Texture {
     pub(super) kind: TexelKind,
     options: TextureOptions,
     texels: Vec<u32>,
-    /// When each block of [`BLOCK_ROWS`] rows was changed last.
+    /// Version of the last change of each block of [`BLOCK_ROWS`] rows.
     versions: Vec<u64>,
 }
 
@@ -115,7 +115,7 @@ impl Texture {
         Self { width: size[0], height: size[1], kind: TexelKind::of(pixels), options, texels, versions }
     }
 
-    /// Notes that rows change, and perhaps how they are read.
+    /// Records a change of rows, and of the texture options.
     fn change_rows(&mut self, top: usize, rows: usize, options: TextureOptions, version: u64) {
         let all = self.versions.len();
         let blocks = if self.options == options {
@@ -127,13 +127,13 @@ impl Texture {
         self.versions[blocks].fill(version);
     }
 
-    /// When the rows that a triangle with such heights in the texture can show were changed last: another one after every
-    /// change.
+    /// Version of the rows that a triangle with these texture coordinates can show; it differs after every change of
+    /// them.
     pub(super) fn version(&self, vs: [f32; 3]) -> u64 {
         let (low, high) = (vs[0].min(vs[1]).min(vs[2]), vs[0].max(vs[1]).max(vs[2]));
         let all = self.versions.len();
         let blocks = if low >= 0.0 && high <= 1.0 && self.options.wrap_mode == TextureWrapMode::ClampToEdge {
-            // Filtering reads the rows beside.
+            // Filtering also reads the adjacent rows.
             let row = |v: f32| (v * self.height as f32) as usize;
             let (first, last) = (row(low).saturating_sub(2), row(high) + 2);
             first / BLOCK_ROWS..(last / BLOCK_ROWS + 1).min(all)
@@ -143,7 +143,7 @@ impl Texture {
         self.versions.get(blocks).unwrap_or(&self.versions).iter().copied().max().unwrap_or(0)
     }
 
-    /// The texel at the very corner, which egui uses for everything that has no texture.
+    /// The corner texel, which egui uses for untextured meshes.
     pub(super) fn corner(&self) -> u32 {
         self.texels.first().copied().unwrap_or(u32::MAX)
     }
@@ -156,13 +156,13 @@ impl Texture {
         self.options.magnification == TextureFilter::Nearest
     }
 
-    /// One row of texels, wrapped.
+    /// One row of texels; row indices wrap.
     pub(super) fn row(&self, row: i64) -> &[u32] {
         let start = self.wrap(row, self.height) * self.width;
         &self.texels[start..start + self.width]
     }
 
-    /// A column number within the texture.
+    /// A column index inside the texture.
     #[inline]
     pub(super) fn column(&self, column: i64) -> usize {
         self.wrap(column, self.width)
@@ -182,7 +182,7 @@ impl Texture {
         wrapped as usize
     }
 
-    /// The colour at a place in texels with [`TEXEL_BITS`] fractional bits, the corner of the first texel being 0.
+    /// The colour at a position in texels with [`TEXEL_BITS`] fractional bits, from the corner of the first texel.
     #[inline]
     pub(super) fn sample(&self, u: i64, v: i64) -> u32 {
         if self.is_nearest() {
@@ -193,7 +193,7 @@ impl Texture {
         self.between(self.row(row), self.row(row + 1), u, weight(v))
     }
 
-    /// Between four texels of two rows; `u` is counted from the centre of the first texel.
+    /// Bilinear interpolation between texels of two rows; `u` is relative to the centre of the first texel.
     #[inline]
     pub(super) fn between(&self, upper: &[u32], lower: &[u32], u: i64, down: u32) -> u32 {
         let column = u >> TEXEL_BITS;
@@ -207,7 +207,7 @@ impl Texture {
     }
 }
 
-/// The fraction of a texel coordinate in 256ths, rounded: 0 to 256.
+/// The fraction of a texel coordinate in 1/256, rounded: 0 to 256.
 #[inline]
 pub(super) fn weight(coordinate: i64) -> u32 {
     const SHIFT: u32 = TEXEL_BITS - 8;

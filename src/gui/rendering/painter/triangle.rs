@@ -1,11 +1,11 @@
-//! Pixels of a triangle, row by row, and values that change linearly over it.
+//! Pixels of a triangle by rows, and linear interpolation over it.
 
 use egui::Rect;
 
 use super::blend;
 use super::texture::{TEXEL_BITS, Texture};
 
-/// Steps per pixel that vertices are snapped to.
+/// Subpixel resolution to which vertices are snapped, per pixel.
 pub(in crate::gui) const SUBPIXELS: i32 = 256;
 
 /// Pixels `left..right` of rows `top..bottom`.
@@ -18,7 +18,7 @@ pub(in crate::gui) struct Clip {
 }
 
 impl Clip {
-    /// Rounded as egui's own renderer rounds its scissor rectangle.
+    /// A clip rectangle, rounded as egui's own renderer rounds its scissor rectangle.
     pub(super) fn new(rect: Rect, pixels_per_point: f32, size_px: [u32; 2]) -> Self {
         let pixel = |coordinate: f32, size: u32| ((coordinate * pixels_per_point).round() as i32).clamp(0, size as i32);
         Self {
@@ -34,7 +34,7 @@ impl Clip {
     }
 }
 
-/// The first pixel whose centre lies at or behind a subpixel coordinate.
+/// The first pixel whose centre is at or behind a subpixel coordinate.
 pub(super) fn first_centre(subpixels: i32) -> i32 {
     (subpixels + SUBPIXELS / 2 - 1) >> SUBPIXELS.trailing_zeros()
 }
@@ -80,7 +80,7 @@ fn cross(a: [i32; 2], b: [i32; 2], c: [i32; 2]) -> i64 {
     ux * vy - uy * vx
 }
 
-/// Walks down an edge row by row in whole numbers: `pixel` is the first whose centre lies at or right of the edge.
+/// An edge traversed by rows in integers: `pixel` is the first whose centre is at or to the right of the edge.
 struct Edge {
     pixel: i64,
     remainder: i64,
@@ -95,7 +95,7 @@ impl Edge {
         let [dx, dy] = [i64::from(to[0] - from[0]), i64::from(to[1] - from[1])];
         let divisor = scale * dy;
         let down = i64::from(row) * scale + scale / 2 - i64::from(from[1]);
-        // Rounding up: one less than the divisor is added before dividing.
+        // Rounded up: the divisor minus one is added before the division.
         let numerator = (i64::from(from[0]) - scale / 2) * dy + down * dx + divisor - 1;
         Self {
             pixel: numerator.div_euclid(divisor),
@@ -116,9 +116,9 @@ impl Edge {
     }
 }
 
-/// What all planes over one triangle share.
+/// The common terms of all planes over one triangle.
 struct Slopes {
-    /// First corner, and from there to the others, in subpixels.
+    /// First corner, and vectors from it to the others, in subpixels.
     corner: [f64; 2],
     second: [f64; 2],
     third: [f64; 2],
@@ -146,7 +146,7 @@ impl Slopes {
     }
 }
 
-/// A value that changes linearly over the picture, by pixels.
+/// A value that is linear over the image, in pixels.
 #[derive(Clone, Copy)]
 pub(in crate::gui) struct Plane {
     at_corner: f64,
@@ -155,7 +155,7 @@ pub(in crate::gui) struct Plane {
 }
 
 impl Plane {
-    /// From its value at the picture's corner and its slopes.
+    /// From its value at the image's corner and its slopes.
     pub(in crate::gui) fn new(at_corner: f64, per_column: f64, per_row: f64) -> Self {
         Self { at_corner, per_column, per_row }
     }
@@ -165,7 +165,7 @@ impl Plane {
         Slopes::of(points).map(|slopes| slopes.plane(values))
     }
 
-    /// The value at a place in pixels from the picture's corner.
+    /// The value at a position in pixels from the image's corner.
     #[inline]
     pub(in crate::gui) fn at_place(&self, x_px: f64, y_px: f64) -> f64 {
         self.at_corner + self.per_column * x_px + self.per_row * y_px
@@ -177,10 +177,10 @@ impl Plane {
     }
 }
 
-/// Four channels that change linearly.
+/// Four linear channels.
 pub(super) struct Gradient([Plane; 4]);
 
-/// Fractional bits of a channel while it changes along a span.
+/// Fractional bits of a channel along a span.
 const CHANNEL_BITS: u32 = 16;
 
 impl Gradient {
@@ -190,7 +190,7 @@ impl Gradient {
         Some(Self([0, 1, 2, 3].map(|channel| slopes.plane(colors.map(|color| f64::from(color[channel]))))))
     }
 
-    /// Value at the pixel so many steps right of a span's first one, and step to the next, in fixed point.
+    /// Value at the pixel `steps` to the right of a span's first one, and the increment per pixel, in fixed point.
     #[inline]
     pub(super) fn start(&self, column: i32, row: i32, steps: i32) -> ([i32; 4], [i32; 4]) {
         const ONE: f64 = (1 << CHANNEL_BITS) as f64;
@@ -203,13 +203,13 @@ impl Gradient {
     }
 }
 
-/// Packs channels in fixed point, held within 0 to 255.
+/// Packs channels in fixed point, limited to 0 to 255.
 #[inline]
 pub(super) fn pack_fixed(channels: [i32; 4]) -> u32 {
     blend::pack(channels.map(|channel| (channel >> CHANNEL_BITS).clamp(0, 255) as u8))
 }
 
-/// Where a pixel lies in the texture.
+/// Texture position of a pixel.
 pub(super) struct Place {
     planes: [Plane; 2],
     pub(super) step: [i64; 2],
@@ -224,7 +224,7 @@ impl Place {
         Some(Self { planes, step: planes.map(|plane| to_texels(plane.per_column)) })
     }
 
-    /// At the pixel so many steps right of a span's first one.
+    /// The position at the pixel `steps` to the right of a span's first one.
     #[inline]
     pub(super) fn at(&self, column: i32, row: i32, steps: i32) -> [i64; 2] {
         let [u, v] = self.planes.map(|plane| to_texels(plane.at(column, row)));

@@ -1,4 +1,4 @@
-//! A whole drawing from the shapes of one picture.
+//! An SVG document from the shapes of one frame.
 
 use egui::epaint::{BandShape, ClippedShape, ColorMode, PathShape, RectShape, Shape};
 use egui::{Color32, Pos2, Rect, Stroke, StrokeKind, TextureId, Vec2};
@@ -7,13 +7,13 @@ use super::element::{attribute, escape, lines_through, number, paint, put, strok
 use super::textures::Textures;
 use super::{mesh, text};
 
-/// Curves are cut into so many lines.
+/// Number of lines that approximate a curve.
 const LINES_PER_CURVE: usize = 24;
 
-/// The drawing of shapes over an opaque ground.
+/// The drawing of shapes over an opaque background.
 ///
-/// `size` is in points and `size_px` what a viewer shows it as; `prefix` begins the names of its parts, so that several
-/// drawings can stand in one page; `title` says what it shows.
+/// `size` is in points and `size_px` the size in a viewer; `prefix` begins the ids of the elements, so that one page
+/// can hold several drawings; `title` is its title.
 pub(in crate::gui) fn document(
     shapes: &[ClippedShape],
     textures: &Textures,
@@ -32,7 +32,7 @@ pub(in crate::gui) fn document(
         if !within.is_positive() || !bounds.intersects(within) {
             continue;
         }
-        // What lies within anyhow needs no clipping, whatever was asked for.
+        // Shapes inside the clip rectangle need no clipping.
         let needed =
             (!within.contains_rect(bounds) || clip == Some(within)).then_some(within).filter(|it| *it != screen);
         if needed != clip {
@@ -128,8 +128,8 @@ impl Writer<'_> {
                 }
                 return;
             }
-            // Many lines of one stroke in a row, such as dashes and grids, become one path. Where they are translucent they
-            // would add up one by one.
+            // Consecutive lines of one stroke, such as dashes and grids, become one path. Translucent ones would add up
+            // one by one.
             Shape::LineSegment { points, stroke } => return self.line(points, *stroke),
             _ => self.finish_lines(),
         }
@@ -232,7 +232,7 @@ fn places() -> impl Iterator<Item = f32> {
     (0..=LINES_PER_CURVE).map(|place| place as f32 / LINES_PER_CURVE as f32)
 }
 
-/// The colour of a path; one that varies along the path is not drawn, the program has none.
+/// The colour of a path. Colours that vary along a path are not supported; the program does not use them.
 fn solid(color: &ColorMode) -> Color32 {
     match color {
         ColorMode::Solid(color) => *color,
@@ -240,7 +240,7 @@ fn solid(color: &ColorMode) -> Color32 {
     }
 }
 
-/// The part of its texture that an upright mesh shows.
+/// The region of its texture that an axis-aligned mesh shows.
 fn uv_of(mesh: &egui::Mesh) -> Rect {
     let mut uv = Rect::NOTHING;
     for vertex in &mesh.vertices {

@@ -1,15 +1,15 @@
-//! Small pieces of SVG.
+//! Elements and attributes of SVG.
 
 use std::fmt::{Arguments, Write as _};
 
 use egui::{Color32, Pos2, Stroke};
 
-/// Writes behind what there is.
+/// Appends formatted text.
 pub(super) fn put(text: &mut String, piece: Arguments<'_>) {
     text.write_fmt(piece).expect("writing into a string cannot fail");
 }
 
-/// A number with two decimals, without those that are zero.
+/// A number with at most two decimals, without trailing zeros.
 pub(super) fn number(value: f32) -> String {
     if !value.is_finite() {
         return "0".to_owned();
@@ -46,7 +46,7 @@ pub(super) fn stroke(stroke: Stroke) -> String {
     [paint("stroke", stroke.color), attribute("stroke-width", stroke.width)].concat()
 }
 
-/// Moves to the first point and draws lines to the others.
+/// Path commands: move to the first point, lines to the others.
 pub(super) fn lines_through(path: &mut String, points: &[Pos2], closed: bool) {
     for (index, point) in points.iter().enumerate() {
         path.push(if index == 0 { 'M' } else { 'L' });
@@ -59,7 +59,7 @@ pub(super) fn lines_through(path: &mut String, points: &[Pos2], closed: bool) {
     }
 }
 
-/// Text as XML; what XML cannot hold is left out.
+/// XML-escaped text; characters that XML does not allow are omitted.
 pub(super) fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for letter in text.chars() {

@@ -7,9 +7,9 @@ use egui::{Color32, Pos2, Rect};
 
 use super::element::{lines_through, number, paint, put};
 
-/// A mesh without a texture; triangles in a row with the same colour become one path, so that no seams show.
+/// A mesh without a texture. Consecutive triangles of the same colour become one path, so that no seams are visible.
 ///
-/// A triangle whose corners differ in colour gets their mean.
+/// A triangle with different corner colours gets their mean.
 pub(super) fn mesh(text: &mut String, mesh: &Mesh) {
     let mut color = Color32::TRANSPARENT;
     let mut path = String::new();
@@ -59,7 +59,7 @@ fn mean_color(corners: [&Vertex; 3]) -> Color32 {
     Color32::from_rgba_premultiplied(channel(Color32::r), channel(Color32::g), channel(Color32::b), channel(Color32::a))
 }
 
-/// The upright rectangle that two triangles make together.
+/// The axis-aligned rectangle that two triangles form.
 pub(super) fn quad(mesh: &Mesh, one: &[u32; 3], other: &[u32; 3]) -> Option<Rect> {
     let corners: BTreeSet<u32> = one.iter().chain(other).copied().collect();
     let shared = one.iter().filter(|index| other.contains(index)).count();

@@ -1,7 +1,7 @@
-//! What egui paints, as a drawing of lines, areas and texts (SVG 1.1): sharp at any size, with texts that can be searched.
+//! Export of egui's shapes as SVG 1.1: sharp at any size, with searchable texts.
 //!
-//! Every shape becomes an element of its own kind before anything is tessellated; pictures are embedded as PNG.
-//! Numbers are written with two decimals of a point, so that the same shapes give the same bytes.
+//! Every shape becomes an element before tessellation; textures are embedded as PNG. Numbers have two decimals of a
+//! point, so that the same shapes give the same bytes.
 
 mod document;
 mod element;

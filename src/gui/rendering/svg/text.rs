@@ -1,4 +1,4 @@
-//! Laid-out text as text: every run of one colour and font on a row at its place, as wide as it was laid out.
+//! Laid-out text as SVG text: one element per run of one colour and font on a row, with its laid-out width.
 
 use egui::epaint::TextShape;
 use egui::epaint::text::{Glyph, LayoutSection};
@@ -19,7 +19,7 @@ pub(super) fn text(svg: &mut String, shape: &TextShape) {
         let mut run: Vec<&Glyph> = Vec::new();
         let mut section_of_run = None;
         for glyph in &row.row.glyphs {
-            // Line breaks have no glyph; what stands for text that was cut off is in no section.
+            // Line breaks have no glyph; the ellipsis of truncated text belongs to no section.
             while letters.peek().is_some_and(|(_, letter)| *letter == '\n') {
                 letters.next();
             }

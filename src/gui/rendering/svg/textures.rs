@@ -1,4 +1,4 @@
-//! The pictures that shapes refer to.
+//! Textures as embedded images.
 
 use std::collections::BTreeMap;
 use std::io::Cursor;
@@ -12,21 +12,21 @@ use image::{ExtendedColorType, ImageEncoder as _};
 
 use super::element::number;
 
-/// Pixels of a texture, red, green, blue and alpha, not premultiplied.
+/// Pixels of a texture: red, green, blue and alpha, not premultiplied.
 #[derive(Clone, Debug, Default)]
 struct Picture {
     size: [usize; 2],
     rgba: Vec<u8>,
 }
 
-/// All textures but the one with the letters.
+/// All textures except the font atlas.
 #[derive(Clone, Debug, Default)]
 pub(in crate::gui) struct Textures {
     pictures: BTreeMap<TextureId, Picture>,
 }
 
 impl Textures {
-    /// Takes over new and changed textures.
+    /// Stores new and changed textures.
     pub(in crate::gui) fn set(&mut self, delta: &TexturesDelta) {
         for (id, changes) in delta.set.iter().filter(|(id, _)| **id != TextureId::default()) {
             let picture = self.pictures.entry(*id).or_default();
@@ -36,12 +36,12 @@ impl Textures {
         }
     }
 
-    /// Forgets the textures that the output frees.
+    /// Drops the textures that the output frees.
     pub(in crate::gui) fn free(&mut self, delta: &TexturesDelta) {
         self.pictures.retain(|id, _| !delta.free.contains(id));
     }
 
-    /// The part `uv` of a texture within a rectangle, nothing for an unknown texture.
+    /// The region `uv` of a texture in a rectangle; empty for an unknown texture.
     pub(super) fn element(&self, id: TextureId, rect: Rect, uv: Rect) -> String {
         let Some(picture) = self.pictures.get(&id).filter(|picture| !picture.rgba.is_empty()) else {
             return String::new();

@@ -1,4 +1,4 @@
-//! The dialog that adds a run over the same log.
+//! The dialog that adds a run on the same log.
 
 use egui::{ComboBox, Grid, RichText, TextEdit, Ui, vec2};
 
@@ -6,7 +6,7 @@ use super::modal::{Modal, accept_or_cancel_ui};
 use crate::gui::PanelContext;
 use crate::session::{Command, RunSpec};
 
-/// What a parameterization is called on the command line, and what it is.
+/// Name of a parameterization on the command line, and its description.
 const CHOICES: [(&str, &str); 7] = [
     ("auto", "the minimal form in the chart that suits the mechanism"),
     ("minimal", "the minimal form as printed"),
@@ -45,7 +45,7 @@ impl Default for AddRunDialog {
 }
 
 impl AddRunDialog {
-    /// What it would add, as on the command line.
+    /// The specification of the run, as on the command line.
     fn written(&self) -> String {
         let mut options = Vec::new();
         if !self.encoder {
@@ -70,7 +70,7 @@ impl AddRunDialog {
         if options.is_empty() { name.to_owned() } else { format!("{name}:{}", options.join(",")) }
     }
 
-    /// Draws it; the run it makes joins the commands. Returns whether it stays open.
+    /// Draws the dialog and pushes the command that adds the run. Returns whether it stays open.
     pub(super) fn ui(&mut self, ui: &Ui, ctx: &mut PanelContext<'_>) -> bool {
         let theme = *ctx.theme;
         let title = "Add a run over the same log and the same tracks";

@@ -1,4 +1,4 @@
-//! The dialog that lets a run go on from the frame at the cursor in another way.
+//! The dialog that forks a run at the cursor with changes.
 
 use egui::{ComboBox, DragValue, Grid, RichText, TextEdit, Ui, vec2};
 
@@ -7,13 +7,13 @@ use crate::gui::PanelContext;
 use crate::gui::units::seconds;
 use crate::session::{Command, FORK_PARAMETERIZATIONS, ForkChanges, RunSpec};
 
-/// What the list offers first: no other parameterization.
+/// First entry of the list: no other parameterization.
 const AS_BEFORE: &str = "as before";
 
 /// State of the dialog.
 #[derive(Debug)]
 pub(super) struct ForkDialog {
-    /// Number in the list, 0 for the parent's own.
+    /// Index in the list, 0 for the parent's parameterization.
     choice: usize,
     frozen: String,
     values: String,
@@ -59,7 +59,7 @@ impl ForkDialog {
             }
         }
         for value in self.values.split([',', ' ']).filter(|value| !value.is_empty()) {
-            // People write an equals sign there.
+            // Users may write an equals sign there.
             parts.push(format!("set={}", value.replacen('=', ":", 1)));
         }
         if !self.encoder {
@@ -75,7 +75,7 @@ impl ForkDialog {
         parts.join(",")
     }
 
-    /// The fork's name, `None` for one of its own making; an error when it cannot be a folder's.
+    /// The fork's label, `None` for an automatic one; an error if it is no valid folder name.
     fn label(&self) -> Result<Option<String>, String> {
         let name = self.name.trim();
         if name.is_empty() {
@@ -85,7 +85,7 @@ impl ForkDialog {
         spec.map(|spec| Some(spec.label)).map_err(|error| error.to_string())
     }
 
-    /// Draws it; the fork it makes joins the commands. Returns whether it stays open.
+    /// Draws the dialog and pushes the command that forks the run. Returns whether it stays open.
     pub(super) fn ui(&mut self, ui: &Ui, ctx: &mut PanelContext<'_>) -> bool {
         let theme = *ctx.theme;
         let run = ctx.selection.run.min(ctx.recording.runs.len().saturating_sub(1));
@@ -163,7 +163,7 @@ impl ForkDialog {
     }
 }
 
-/// The camera beside the main one of the shown run.
+/// The second camera of the shown run.
 fn second_camera(ctx: &PanelContext<'_>) -> Option<String> {
     let run = ctx.recording.runs.get(ctx.selection.run)?;
     let step = run.step_at(ctx.cursor_ns)?;

@@ -1,7 +1,7 @@
-//! How well a text answers what somebody has typed so far.
+//! Fuzzy match of a text with typed words.
 
-/// How well a text answers typed words, in any order and with letters left out; higher is better, `None` when a word is not
-/// in it. Nothing typed is answered by everything alike.
+/// Match of a text with typed words, in any order and with letters omitted. Higher is better; `None` if a word does not
+/// match. An empty input matches every text equally.
 pub(super) fn score(typed: &str, text: &str) -> Option<i32> {
     let text = text.to_lowercase();
     typed.to_lowercase().split_whitespace().map(|word| word_score(word, &text)).sum()
@@ -9,7 +9,7 @@ pub(super) fn score(typed: &str, text: &str) -> Option<i32> {
 
 /// Best of: at the begin of a word, within a word, as letters in order.
 fn word_score(word: &str, text: &str) -> Option<i32> {
-    /// A match far behind is worth this much less at most.
+    /// Largest penalty for the distance of a match from the begin.
     const FARTHEST: usize = 20;
     let begins = |at: usize| !text[..at].chars().next_back().is_some_and(char::is_alphanumeric);
     let places = text.match_indices(word).map(|(at, _)| at);
@@ -18,9 +18,9 @@ fn word_score(word: &str, text: &str) -> Option<i32> {
     whole.or_else(|| scattered(word, text))
 }
 
-/// Letters in order with others between: begins of words count for them, holes against.
+/// Letters in order with others between: begins of words increase the result, gaps reduce it.
 fn scattered(word: &str, text: &str) -> Option<i32> {
-    /// Letters that may be left out between the first and the last one.
+    /// Maximum number of letters between the first and the last one that are not typed.
     const MOST_HOLES: i32 = 16;
     let mut wanted = word.chars().peekable();
     let (mut begins, mut holes, mut begun, mut before) = (0, 0, false, ' ');

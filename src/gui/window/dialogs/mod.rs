@@ -1,4 +1,4 @@
-//! Dialogs that the rest of the window waits for; one is open at a time.
+//! Modal dialogs; one is open at a time.
 
 mod add_run;
 mod fork;
@@ -26,9 +26,9 @@ use crate::gui::desktop::Desktop;
 /// A dialog by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Dialog {
-    /// Asks for the path of a log or a saved session.
+    /// Opens a log or a saved session.
     OpenLog,
-    /// Adds a run over the same log.
+    /// Adds a run on the same log.
     AddRun,
     /// Forks the selected run at the cursor.
     Fork,
@@ -38,7 +38,7 @@ pub enum Dialog {
     Settings,
 }
 
-/// What the dialogs hold, open or not.
+/// The state of all dialogs, open or not.
 #[derive(Default)]
 pub struct Dialogs {
     open: Option<Dialog>,
@@ -50,12 +50,12 @@ pub struct Dialogs {
 }
 
 impl Dialogs {
-    /// Lets the dialog for logs complete paths.
+    /// Gives the dialog for logs access to the machine, for completing paths.
     pub fn set_desktop(&mut self, desktop: Arc<dyn Desktop>) {
         self.open_log = OpenLogDialog::new(desktop);
     }
 
-    /// Opens a dialog in place of the one that is open; the palette opens with nothing typed.
+    /// Opens a dialog and closes the one that is open; the palette opens with an empty input.
     pub fn show(&mut self, dialog: Dialog) {
         match dialog {
             Dialog::OpenLog => self.open_log.show_picker(),

@@ -1,24 +1,24 @@
-//! What all dialogs share: backdrop, frame, title, and how they close.
+//! The common parts of all dialogs: backdrop, frame, title, and closing.
 
 use egui::{Button, Id, Key, RichText, Ui};
 
 use crate::gui::theme::{Theme, dialog_frame};
 
-/// A dialog that the rest of the window waits for.
+/// A modal dialog.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Modal<'a> {
-    /// Its name among the parts of the window.
+    /// Its id in the window.
     pub(super) name: &'static str,
-    /// The first line, none where it is empty.
+    /// The title, none if it is empty.
     pub(super) title: &'a str,
-    /// Width of the contents in points.
+    /// Width of the content in points.
     pub(super) width: f32,
 }
 
 impl Modal<'_> {
-    /// Draws the dialog; returns what the contents returned, and whether the dialog stays open.
+    /// Draws the dialog. Returns the result of `contents`, and whether the dialog stays open.
     ///
-    /// Escape, a click beside it and `ui.close()` in the contents close it.
+    /// Escape, a click outside and `ui.close()` in the contents close it.
     pub(super) fn ui<T>(self, ui: &Ui, theme: &Theme, contents: impl FnOnce(&mut Ui) -> T) -> (T, bool) {
         let modal = egui::Modal::new(Id::unique(self.name)).frame(dialog_frame(theme));
         let response = modal.show(ui.ctx(), |ui| {
@@ -33,8 +33,8 @@ impl Modal<'_> {
     }
 }
 
-/// The last line of a dialog that asks for something: the button that accepts, which Enter presses too, and the one that
-/// cancels. Either closes the dialog; returns whether it was accepted.
+/// The buttons at the bottom: the one that accepts, also by Enter, and the one that cancels. Both close the dialog;
+/// returns whether it was accepted.
 pub(super) fn accept_or_cancel_ui(ui: &mut Ui, label: &str, ready: bool) -> bool {
     let enter = ui.input(|input| input.key_pressed(Key::Enter));
     let clicked = ui.horizontal(|ui| {

@@ -1,4 +1,4 @@
-//! The dialog that opens a log or a saved session: a path field, and over it the desktop's own file dialog where there is one.
+//! The dialog that opens a log or a saved session: a path field, and the desktop's own file dialog where there is one.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -12,9 +12,9 @@ use crate::gui::desktop::Desktop;
 use crate::gui::path_field::PathField;
 use crate::gui::theme::Theme;
 
-/// How often the desktop's file dialog is asked for its answer.
+/// Period at which the desktop's file dialog is polled.
 const POLL_PERIOD: Duration = Duration::from_millis(100);
-/// A file dialog that ends without a choice sooner than this has never been on the screen, in seconds.
+/// A file dialog that ends without a choice within this many seconds was not shown.
 const SHORTEST_CANCEL_S: f64 = 0.5;
 
 /// State of the dialog.
@@ -28,11 +28,11 @@ pub(super) struct OpenLogDialog {
 /// The desktop's file dialog while it is open.
 struct FilePicker {
     answer: Receiver<Option<PathBuf>>,
-    /// Time of the first frame that it was asked in.
+    /// Time of the first frame in which it was polled.
     since_s: Option<f64>,
 }
 
-/// What a person answered in the desktop's file dialog.
+/// The result of the desktop's file dialog.
 pub(super) enum Picked {
     Path(PathBuf),
     Cancelled,
@@ -44,7 +44,7 @@ impl OpenLogDialog {
         Self { path_field: PathField::new(Arc::clone(&desktop)), desktop: Some(desktop), picker: None }
     }
 
-    /// Opens the desktop's file dialog, if it is not open already.
+    /// Opens the desktop's file dialog unless it is open.
     pub(super) fn show_picker(&mut self) {
         if self.picker.is_none() {
             let answer = self.desktop.as_ref().and_then(|desktop| desktop.pick_log());
@@ -52,7 +52,8 @@ impl OpenLogDialog {
         }
     }
 
-    /// The answer of the desktop's file dialog, once; `None` also where it could not be shown and the path field has to do.
+    /// The result of the desktop's file dialog, once; `None` also if it could not be shown and the path field has to be
+    /// used.
     pub(super) fn picked(&mut self, ui: &Ui) -> Option<Picked> {
         let picker = self.picker.as_mut()?;
         let now_s = ui.input(|input| input.time);
@@ -73,7 +74,7 @@ impl OpenLogDialog {
         }
     }
 
-    /// Draws it; returns the path that was chosen, and whether the dialog stays open.
+    /// Draws the dialog. Returns the chosen path, and whether the dialog stays open.
     pub(super) fn ui(&mut self, ui: &Ui, theme: &Theme) -> (Option<PathBuf>, bool) {
         let modal = Modal { name: "open log", title: "Open a flight log or a saved session", width: 560.0 };
         modal.ui(ui, theme, |ui| {

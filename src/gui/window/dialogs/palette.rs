@@ -1,4 +1,4 @@
-//! The command palette: everything that the window can do, found by typing.
+//! The command palette: search over all actions of the window.
 
 use egui::{Align, Key, Layout as UiLayout, Modifiers, RichText, ScrollArea, TextEdit, Ui, WidgetInfo};
 
@@ -11,7 +11,7 @@ use crate::gui::window::tiles::Layout;
 
 /// Height of the list in points.
 const LIST_HEIGHT: f32 = 360.0;
-/// Rows that Page up and Page down go.
+/// Number of rows that Page up and Page down move.
 const PAGE: usize = 10;
 
 /// State of the command palette.
@@ -22,7 +22,8 @@ pub(super) struct CommandPalette {
 }
 
 impl CommandPalette {
-    /// Draws it; what is chosen joins the actions, or is done at once where it is no action. Returns whether it stays open.
+    /// Draws the palette. A chosen action is pushed to `actions`, another choice is executed at once. Returns whether
+    /// it stays open.
     pub(super) fn ui(
         &mut self,
         ui: &Ui,
@@ -37,7 +38,7 @@ impl CommandPalette {
         let (choice, stays_open) = modal.ui(ui, &theme, |ui| {
             let moved = moves(ui);
             let hint = "Type a command, a time (12.5), a frame, a feature, a parameter";
-            // It has the focus before it is drawn, so that nothing typed at once is lost.
+            // It gets the focus before it is drawn, so that no typed letter is lost.
             let id = ui.unique_id().with("command");
             ui.memory_mut(|memory| memory.request_focus(id));
             let edit = TextEdit::singleline(&mut self.typed).id(id).hint_text(hint).desired_width(f32::INFINITY);
@@ -70,7 +71,7 @@ impl CommandPalette {
     }
 }
 
-/// What a key does in the list.
+/// A move of the selection by a key.
 #[derive(Clone, Copy, Debug)]
 enum Move {
     By(isize),
@@ -89,7 +90,7 @@ fn moves(ui: &Ui) -> Option<Move> {
     ui.input_mut(|input| keys.into_iter().find(|(key, _)| input.consume_key(Modifiers::NONE, *key)).map(|(_, it)| it))
 }
 
-/// The items, the chosen one marked and in view; returns the one that was clicked.
+/// The items with the selected one marked and in view; returns the clicked one.
 fn list_ui(ui: &mut Ui, ctx: &PanelContext<'_>, items: &[Item], chosen: usize, bring: bool) -> Option<usize> {
     let mut clicked = None;
     ScrollArea::vertical().max_height(LIST_HEIGHT).auto_shrink([false, true]).show(ui, |ui| {
@@ -111,7 +112,7 @@ fn list_ui(ui: &mut Ui, ctx: &PanelContext<'_>, items: &[Item], chosen: usize, b
     clicked
 }
 
-/// The keys of an action, for who looks for it.
+/// The keys of an action for display.
 pub(super) fn keys_of(action: Action) -> &'static str {
     TABLE.iter().find(|entry| entry.action == action).map_or("", |entry| entry.keys)
 }

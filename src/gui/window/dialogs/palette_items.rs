@@ -1,4 +1,4 @@
-//! What the command palette offers: all actions, and what the recording at the cursor has.
+//! The items of the command palette: all actions, and the content of the recording at the cursor.
 
 use super::palette::keys_of;
 use super::{Dialog, fuzzy};
@@ -15,23 +15,23 @@ use crate::gui::window::tiles::Layout;
 use crate::gui::window::{PanelName, SavedLayouts};
 use crate::session::RunRecord;
 
-/// What comes of choosing an item.
+/// The effect of an item.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Choice {
-    /// An action.
+    /// An action of the window.
     Action(Action),
-    /// A parameter is selected.
+    /// Selection of a parameter.
     Parameter(ParameterId),
 }
 
 /// A row of the palette.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Item {
-    /// What it is called.
+    /// Its name.
     pub(super) name: String,
-    /// Its keys, empty where it has none.
+    /// Its keys, empty without keys.
     pub(super) keys: &'static str,
-    /// What it does.
+    /// Its effect.
     pub(super) choice: Choice,
 }
 
@@ -39,7 +39,7 @@ fn item(name: impl Into<String>, action: Action) -> Item {
     Item { name: name.into(), keys: keys_of(action), choice: Choice::Action(action) }
 }
 
-/// What answers the typed text, best first; all commands in their own order when nothing is typed.
+/// Items that match the typed text, best first; all actions in their own order for an empty text.
 pub(super) fn found(typed: &str, ctx: &PanelContext<'_>, layouts: &SavedLayouts, layout: &Layout) -> Vec<Item> {
     let places = places(typed, ctx);
     let mut items = commands(ctx, layouts, layout);
@@ -48,14 +48,14 @@ pub(super) fn found(typed: &str, ctx: &PanelContext<'_>, layouts: &SavedLayouts,
     }
     let mut scored: Vec<(i32, Item)> =
         items.into_iter().filter_map(|item| Some((fuzzy::score(typed, &item.name)?, item))).collect();
-    // Equally good ones stay in their order.
+    // Equally good matches keep their order.
     scored.sort_by_key(|(score, _)| std::cmp::Reverse(*score));
     places.into_iter().chain(scored.into_iter().map(|(_, item)| item)).collect()
 }
 
 fn commands(ctx: &PanelContext<'_>, layouts: &SavedLayouts, layout: &Layout) -> Vec<Item> {
     let listed = TABLE.iter().filter(|entry| {
-        // What they stand for is listed below, or open already.
+        // Their effects are listed below, or are in effect already.
         !matches!(entry.action, Action::Dialog(Dialog::Palette) | Action::Dismiss | Action::SavedLayout(_))
     });
     let mut items: Vec<Item> = listed.map(|entry| item(entry.name, entry.action)).collect();
@@ -107,7 +107,7 @@ fn parameters(ctx: &PanelContext<'_>) -> Vec<Item> {
         .collect()
 }
 
-/// Times, frames and features that a typed number could mean.
+/// Times, frames and features with the typed number.
 fn places(typed: &str, ctx: &PanelContext<'_>) -> Vec<Item> {
     let text = typed.trim().to_lowercase();
     let text = text.strip_prefix("go to").map_or(text.as_str(), str::trim_start);
@@ -143,7 +143,7 @@ fn places(typed: &str, ctx: &PanelContext<'_>) -> Vec<Item> {
     items
 }
 
-/// `12.5`, `12.5 s` or `1:05.2` as seconds.
+/// Seconds of a text such as `12.5`, `12.5 s` or `1:05.2`.
 fn seconds_of(text: &str) -> Option<f64> {
     let text = text.trim().strip_suffix('s').unwrap_or(text).trim();
     let (minutes, rest) = text.split_once(':').unwrap_or(("0", text));

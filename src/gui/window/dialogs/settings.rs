@@ -16,7 +16,7 @@ pub(super) struct SettingsDialog {
 }
 
 impl SettingsDialog {
-    /// Draws it; settings hold as soon as they are changed. Returns whether it stays open.
+    /// Draws the dialog; changes have effect at once. Returns whether it stays open.
     pub(super) fn ui<'a>(
         &mut self,
         ui: &Ui,
