@@ -6,8 +6,8 @@ use nalgebra::{DMatrix, DVector, Matrix6, Vector3, Vector6};
 
 use super::arrow::ArrowMatrix;
 use super::chain_prior::ChainTerm;
+use super::frame_sets::FrameSet;
 use super::state::{Camera, Columns, Estimate, ViewId, ViewMap};
-use super::timeline::FrameSet;
 use super::visual::{self, PixelModel, ReducedVisualEquations, Track, VisualEquations};
 use crate::estimator::preintegration::Vector15;
 use crate::estimator::{NavigationState, imu_factor};

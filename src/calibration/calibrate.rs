@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::bundle::{Priors, gimbal_view};
 use super::chain_prior::ChainTerm;
+use super::frame_sets::{FrameSet, frame_sets};
 use super::outcome::{
     CalibratedParameter, CalibrationOutcome, ExtrinsicsReport, ImuResidualReport, PixelReport, PoseLoopReport,
 };
@@ -12,7 +13,6 @@ use super::rounds::{Stage, StageResult};
 use super::segments::{self, Segment, SegmentCounts};
 use super::state::{Camera, Columns, Estimate};
 use super::statistics::Statistics;
-use super::timeline::{FrameSet, frame_sets};
 use super::{CalibrationError, CalibrationInput, CalibrationOptions, observations, trajectory};
 use crate::estimator::{ColumnBlock, ColumnId, Linearization, gravity_in_world, imu_factor};
 use crate::geometry::seconds_from_ns;

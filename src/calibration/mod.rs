@@ -16,6 +16,7 @@ mod bundle;
 mod calibrate;
 mod chain_prior;
 mod error;
+mod frame_sets;
 mod input;
 mod landmark;
 mod observations;
@@ -29,7 +30,6 @@ mod state;
 mod statistics;
 #[cfg(test)]
 mod tests;
-mod timeline;
 mod trajectory;
 mod visual;
 

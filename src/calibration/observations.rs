@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 
+use super::frame_sets::FrameSet;
 use super::landmark::{self, AnchoredLandmark};
 use super::state::{Camera, ViewId};
-use super::timeline::FrameSet;
 use super::visual::{Observation, PixelModel, Track};
 use super::{CalibrationInput, CalibrationOptions};
 use crate::frontend::{FeatureId, TrackedFrame};

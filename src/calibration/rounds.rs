@@ -3,9 +3,9 @@
 use nalgebra::{DMatrix, Vector3};
 
 use super::bundle::{Bundle, Priors};
+use super::frame_sets::FrameSet;
 use super::solver::{adjust, border_covariance};
 use super::state::{Camera, Columns, Estimate};
-use super::timeline::FrameSet;
 use super::visual::{PixelModel, Track};
 use super::{CalibrationError, CalibrationOptions, observations};
 use crate::camera::CameraModel;

@@ -4,9 +4,9 @@
 use nalgebra::UnitQuaternion;
 
 use super::bundle::gimbal_view;
+use super::frame_sets::FrameSet;
 use super::observations::tracked;
 use super::state::{Camera, Estimate};
-use super::timeline::FrameSet;
 use super::{CalibrationInput, CalibrationOptions};
 use crate::estimator::gravity_in_world;
 use crate::estimator::initialization::{InitializationOptions, ReconstructionGuess, reconstruct_views};

@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
+use super::frame_sets::FrameSet;
 use super::landmark::AnchoredLandmark;
-use super::timeline::FrameSet;
 use crate::estimator::NavigationState;
 use crate::estimator::preintegration::Vector15;
 use crate::geometry::{RigidTransform, so3};

@@ -88,7 +88,7 @@ fn jacobian_meets_central_differences() {
 }
 
 #[test]
-fn the_models_agree_where_they_coincide() {
+fn models_with_equal_parameters_project_equally() {
     let pinhole = CameraModel::pinhole(INTRINSICS_PX, RESOLUTION_PX).unwrap();
     let same = [
         (Projection::Omni { xi: 0.0 }, Distortion::None),
@@ -118,7 +118,7 @@ fn the_models_agree_where_they_coincide() {
 }
 
 #[test]
-fn what_cannot_be_seen_is_none() {
+fn invisible_points_do_not_project() {
     let nothing = [Vector3::new(0.0, 0.0, -1.0), Vector3::zeros(), Vector3::new(f64::NAN, 0.0, 1.0)];
     for camera in cameras() {
         for point in &nothing {
@@ -143,7 +143,7 @@ fn what_cannot_be_seen_is_none() {
 }
 
 #[test]
-fn kalibr_lists_go_both_ways() {
+fn kalibr_parameters_convert_both_ways() {
     for camera in cameras() {
         let again = CameraModel::from_kalibr(
             camera.projection.name(),
@@ -159,7 +159,7 @@ fn kalibr_lists_go_both_ways() {
 }
 
 #[test]
-fn bad_descriptions_say_what_is_wrong() {
+fn invalid_descriptions_name_the_faulty_field() {
     let check = |model: &str, intrinsics: &[f64], distortion: &str, coefficients: &[f64], resolution, message: &str| {
         let error: CameraError =
             CameraModel::from_kalibr(model, intrinsics, distortion, coefficients, resolution).unwrap_err();

@@ -59,7 +59,7 @@ fn right_jacobian_series(phi: &Vector3<f64>) -> (Matrix3<f64>, Matrix3<f64>) {
 }
 
 #[test]
-fn right_jacobians_are_as_accurate_as_they_state() {
+fn right_jacobians_meet_their_stated_accuracy() {
     let axes =
         [Vector3::x(), Vector3::new(0.3, -0.5, 0.8), Vector3::new(-0.7, 0.1, -0.2), Vector3::new(0.0, 1.0, -1.0)];
     for step in 0..=760 {
@@ -96,7 +96,7 @@ fn rigid_transform_obeys_the_manifold_laws() {
 }
 
 #[test]
-fn matrices_go_both_ways_and_bad_ones_are_refused() {
+fn transforms_convert_to_matrices_and_invalid_ones_are_refused() {
     for x in transforms() {
         let back = RigidTransform::from_matrix(&x.to_matrix(), 1e-9).unwrap();
         assert!((back.to_matrix() - x.to_matrix()).amax() < 1e-12);
@@ -131,7 +131,7 @@ fn rows_are_split_by_a_column_space_even_with_dependent_columns() {
 }
 
 #[test]
-fn angles_are_wrapped_to_one_turn_and_left_alone_within_it() {
+fn wrap_angle_maps_to_one_revolution() {
     use super::wrap_angle;
     use std::f64::consts::{PI, TAU};
     for angle in [0.0, 1e-300, -1e-17, 0.1, -2.5, 3.13, -PI, -PI + 1e-15] {

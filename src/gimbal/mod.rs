@@ -7,7 +7,6 @@
 //! Parameterizations and their singularities: docs/mathematics.md, sections 3 and 4.
 
 mod chain;
-mod chart;
 mod classical;
 mod conversion;
 mod covariance;
@@ -18,11 +17,11 @@ mod nearest;
 mod parameter;
 mod parameterization;
 mod redundancy;
+mod singularity;
 #[cfg(test)]
 pub(crate) mod tests;
 
 pub use chain::Chain;
-pub use chart::{SWITCH_MARGIN, Singularity, auto_parameterization};
 pub use classical::{ClassicalChain, DhLink};
 pub use covariance::{generic_joint_angles, stacked_jacobian, transport, transport_covariance};
 pub use linearize::ChainLinearization;
@@ -30,3 +29,4 @@ pub use nearest::NearestForm;
 pub use parameter::{ParameterId, ParameterNames, ParameterPart, Quantity};
 pub use parameterization::{Parameterization, UnknownParameterization};
 pub use redundancy::redundant_directions;
+pub use singularity::{SWITCH_MARGIN, Singularity, auto_parameterization};

@@ -90,7 +90,7 @@ mod tests {
     use crate::gimbal::tests::random::Random;
 
     #[test]
-    fn the_nearest_numbers_say_the_same_mechanism_and_leave_out_what_moves_nothing() {
+    fn nearest_classical_values_keep_the_mechanism_and_avoid_redundant_directions() {
         let mut random = Random::new(5);
         for joints in 0..4 {
             let near = Chain::from_classical(&random.chain(joints), Parameterization::Classical);

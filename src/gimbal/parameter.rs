@@ -306,7 +306,7 @@ mod tests {
     use crate::gimbal::{Chain, Parameterization};
 
     #[test]
-    fn every_name_is_read_as_the_parameter_that_it_names() {
+    fn parameter_names_convert_both_ways() {
         let named = ParameterNames {
             joints: ["yaw", "roll", "pitch"].map(str::to_owned).into(),
             cameras: vec!["cam4".to_owned()],
@@ -341,7 +341,7 @@ mod tests {
     }
 
     #[test]
-    fn what_no_part_has_is_no_parameter() {
+    fn quantities_outside_a_block_are_no_parameters() {
         let names = ParameterNames { joints: vec!["yaw".to_owned()], cameras: Vec::new() };
         for name in ["", "yaw", "yaw.rx", "L0.d", "IB.theta", "encoder.rx", "rx", "X.wx", "pan.alpha", "cam0.rx"] {
             assert_eq!(names.parse(name), None, "{name}");

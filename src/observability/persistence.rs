@@ -77,7 +77,7 @@ mod tests {
     }
 
     #[test]
-    fn a_direction_is_lost_until_a_step_sees_it() {
+    fn a_direction_is_lost_until_a_step_observes_it() {
         let names = parameters();
         let (first, mixed) = ([1.0, 0.0, 0.0], [0.6, 0.8, 0.0]);
         let (lost, seen) = (report(&[[0.0, 1.0, 0.0], first]), report(&[[0.0, 0.0, 1.0]]));

@@ -93,7 +93,7 @@ fn reprojection_jacobians_meet_central_differences() {
 }
 
 #[test]
-fn a_landmark_of_a_point_leads_back_to_it() {
+fn a_landmark_reproduces_its_point() {
     let point = Vector3::new(0.3, -2.0, 5.0);
     let landmark = Landmark::from_point(&point).unwrap();
     assert!((landmark.point_in_anchor() - point).norm() < 1e-14);
@@ -105,7 +105,7 @@ fn a_landmark_of_a_point_leads_back_to_it() {
 }
 
 #[test]
-fn losses_have_the_weights_that_their_slopes_are() {
+fn loss_weights_are_the_slopes_of_the_cost() {
     for loss in [RobustLoss::None, RobustLoss::Huber(1.5), RobustLoss::Cauchy(0.8)] {
         for squared in [0.01, 1.0, 2.0, 3.0, 50.0] {
             let slope = (loss.cost_and_weight(squared + 1e-6).0 - loss.cost_and_weight(squared - 1e-6).0) / 2e-6;
@@ -199,7 +199,7 @@ impl DampedProblem for Valley {
 }
 
 #[test]
-fn the_damped_solver_descends_and_says_why_it_stopped() {
+fn the_damped_solver_descends_and_reports_why_it_stopped() {
     let options = DampedOptions {
         iterations: 100,
         relative_cost_tolerance: 1e-12,

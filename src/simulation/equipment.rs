@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use super::gimbal::{joints, true_chain};
-use super::inertial::FIREFLY_IMU;
+use super::imu::FIREFLY_IMU;
 use super::random::RandomStream;
 use crate::camera::{CameraModel, Distortion, Projection};
 use crate::geometry::{RigidTransform, so3};

@@ -12,7 +12,7 @@ mod equipment;
 mod exercise;
 mod experiment;
 mod gimbal;
-mod inertial;
+mod imu;
 mod interval;
 #[cfg(feature = "logs")]
 mod options;
@@ -37,7 +37,7 @@ pub use equipment::Lens;
 pub use exercise::{Exercise, JOINT_PERIOD_S, JointSwing, SWING_M, VehicleSwing, YAW_SWING_RAD};
 pub use experiment::{Environment, Experiment};
 pub use gimbal::JointMotion;
-pub use inertial::ImuBias;
+pub use imu::ImuBias;
 #[cfg(feature = "logs")]
 pub use options::{SimulationError, SimulationOptions, SimulationProgress, SimulationSummary};
 #[cfg(feature = "logs")]

@@ -2,7 +2,7 @@
 
 use super::equipment::{Equipment, GRAVITY_M_PER_S2, IMU_RATE_HZ, given_rig};
 use super::gimbal::{JointMotion, LookAround, Stabilizer};
-use super::inertial::{FIREFLY_IMU, ImuRecord};
+use super::imu::{FIREFLY_IMU, ImuRecord};
 use super::random::RandomStream;
 use super::trajectory::Trajectory;
 use crate::geometry::{RigidTransform, ns_from_seconds, seconds_from_ns};

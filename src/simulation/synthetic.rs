@@ -8,7 +8,7 @@ use super::equipment::{Equipment, Lens};
 use super::exercise::Exercise;
 use super::experiment::Experiment;
 use super::gimbal::LookAround;
-use super::inertial::ImuBias;
+use super::imu::ImuBias;
 use super::random::RandomStream;
 use super::route::{Drill, Flight, Pace, Station};
 use super::scenario::{Scenario, ScenarioOptions, gravity_m_per_s2, stream};

@@ -1,4 +1,4 @@
 mod flight;
+mod images;
 mod logs;
-mod pictures;
 mod synthetic;

@@ -52,7 +52,7 @@ fn check(len: usize, half_width: usize, borders: usize) {
 }
 
 #[test]
-fn a_bordered_band_is_solved_as_a_dense_matrix() {
+fn the_bordered_band_solver_equals_dense_algebra() {
     let small = [(1, 0, 0), (5, 4, 0), (40, 7, 3), (33, 16, 1), (20, 100, 4)];
     // Of several blocks, whole ones and not.
     let large = [(130, 0, 1), (128, 64, 2), (200, 70, 3), (321, 130, 2), (150, 149, 1)];

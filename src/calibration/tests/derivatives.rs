@@ -5,8 +5,8 @@ use nalgebra::{DVector, Vector3, Vector6};
 use super::fixture::{Flight, flight, true_states};
 use crate::calibration::bundle::{Bundle, Priors};
 use crate::calibration::chain_prior::ChainTerm;
+use crate::calibration::frame_sets::{FrameSet, frame_sets};
 use crate::calibration::state::{Camera, Columns, Estimate, ViewId};
-use crate::calibration::timeline::{FrameSet, frame_sets};
 use crate::calibration::visual::{PixelModel, Track};
 use crate::calibration::{CalibrationOptions, observations};
 use crate::estimator::gravity_in_world;
@@ -100,7 +100,7 @@ fn pose_difference(to: &CameraPose, from: &CameraPose) -> Vector6<f64> {
 }
 
 #[test]
-fn views_follow_every_unknown() {
+fn view_jacobians_meet_central_differences() {
     let example = example();
     let (estimate, columns, gravity) = (&example.estimate, &example.columns, gravity_in_world(9.81));
     let landmarks = vec![Vector3::zeros(); estimate.landmarks.len()];

@@ -75,7 +75,7 @@ fn the_same_flight_gives_the_same_numbers() {
 }
 
 #[test]
-fn a_flight_that_cannot_tell_says_why() {
+fn an_unusable_flight_is_refused_with_the_reason() {
     let mut flight = flight(&SyntheticOptions { duration_s: 8.0, ..options(5) });
     let options = CalibrationOptions::default();
     let more = CalibrationOptions { min_measurements: 1000, ..options };

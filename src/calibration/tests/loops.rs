@@ -98,7 +98,7 @@ fn prior() -> ChainPrior {
 }
 
 #[test]
-fn rows_are_differentiated() {
+fn pose_loop_jacobians_meet_central_differences() {
     let example = example(3, 0.05, (0.0, 0.0), false);
     let term = ChainTerm::new(&example.given, &prior());
     let loops = PoseLoops { segments: &example.segments, prior: &term };
@@ -146,7 +146,7 @@ fn rows_are_differentiated() {
 }
 
 #[test]
-fn exact_poses_give_the_chain_back_to_what_the_encoders_leave_open() {
+fn exact_poses_recover_the_chain_up_to_encoder_noise() {
     for seed in 1..=4 {
         let example = example(seed, 1e-4, (0.0, 0.0), false);
         let term = ChainTerm::new(&example.given, &prior());
@@ -179,7 +179,7 @@ fn noisy_encoders_leave_the_chain_within_its_sigmas() {
 
 /// With still joints only one rigid transform can be told: the parameters stay as uncertain as they were, but it is found.
 #[test]
-fn still_joints_leave_the_prior_on_what_they_do_not_show() {
+fn stationary_joints_leave_unobservable_directions_at_the_prior() {
     let moving = example(5, 0.01, (0.0, 0.0), false);
     let example = example(5, 0.01, (0.0, 0.0), true);
     let term = ChainTerm::new(&example.given, &prior());

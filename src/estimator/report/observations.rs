@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn packing_keeps_what_anybody_looks_at() {
+    fn packed_reports_keep_all_readable_values() {
         let observation = ObservationReport {
             frame_index: 11_999,
             measured_px: Vector2::new(1919.123, 0.031),
@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_that_are_none_are_not_taken_for_missing() {
+    fn not_a_number_differs_from_missing() {
         let wrong = Vector2::new(f64::NAN, 1.0);
         let observation = ObservationReport {
             frame_index: 0,

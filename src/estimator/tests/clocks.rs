@@ -57,7 +57,7 @@ fn the_offset_of_a_rigid_camera_is_found() {
 }
 
 #[test]
-fn offsets_of_a_gimbals_camera_and_of_its_encoders_are_told_apart() {
+fn camera_and_encoder_time_offsets_are_separated() {
     for (seed, offsets_s) in [(1, [0.01, -0.02]), (2, [-0.01, 0.01])] {
         let flight = flight(SyntheticMount::Gimbal, seed, offsets_s);
         let (ignored_m, report) = run_flight_at(&flight, false);

@@ -64,7 +64,7 @@ fn both(_: usize) -> [bool; 2] {
 }
 
 #[test]
-fn both_cameras_beat_either_where_the_chain_is_given_wrong() {
+fn two_cameras_are_more_accurate_than_one_with_a_wrong_chain() {
     let (mut cluster_m, mut gimbal_m, mut rigid_m) = (0.0, 0.0, 0.0);
     let (mut cluster_rad, mut gimbal_rad) = (0.0, 0.0);
     for seed in 1..=6 {
@@ -92,7 +92,7 @@ fn both_cameras_beat_either_where_the_chain_is_given_wrong() {
 }
 
 #[test]
-fn both_calibrations_are_columns_with_names_of_their_own() {
+fn both_calibrations_have_named_columns() {
     let flights = BothFlights::new(5, 10.0);
     let options = EstimatorOptions { keep_linearization: true, ..EstimatorOptions::default() };
     let config = EstimatorConfig { options, ..flights.config() };
@@ -133,7 +133,7 @@ fn both_calibrations_are_columns_with_names_of_their_own() {
 }
 
 #[test]
-fn a_missing_image_leaves_the_step_to_the_other_camera() {
+fn a_missing_image_leaves_the_other_cameras_observations() {
     let flights = BothFlights::new(6, 12.0);
     let seen = |index: usize| match index {
         // One by one at the start, then a second without each camera.
@@ -150,7 +150,7 @@ fn a_missing_image_leaves_the_step_to_the_other_camera() {
 }
 
 #[test]
-fn fixed_calibrations_stay_as_they_were_given() {
+fn fixed_calibrations_keep_their_given_values() {
     let flights = BothFlights::new(5, 8.5);
     let config = EstimatorConfig { calibrate: false, ..flights.config() };
     let given = Estimator::new(config.clone()).classical_chain();

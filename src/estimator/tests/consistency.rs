@@ -31,17 +31,17 @@ fn reported(mean_squares: impl IntoIterator<Item = f64>) -> Vec<usize> {
 }
 
 #[test]
-fn residuals_as_large_as_their_noise_say_nothing() {
+fn consistent_residuals_give_no_warning() {
     assert_eq!(reported((0..400).map(|step| if step % 2 == 0 { 0.6 } else { 1.8 })), [0_usize; 0]);
 }
 
 #[test]
-fn a_jolt_says_nothing() {
+fn a_short_residual_peak_gives_no_warning() {
     assert_eq!(reported((0..400).map(|step| if (200..206).contains(&step) { 6.0 } else { 0.9 })), [0_usize; 0]);
 }
 
 #[test]
-fn what_stays_too_large_is_told_after_four_seconds_until_it_is_over() {
+fn inconsistent_residuals_warn_after_four_seconds_until_they_end() {
     let steps = reported((0..400).map(|step| if step < 200 { 3.0 } else { 0.9 }));
     assert_eq!(steps.first(), Some(&80));
     assert_eq!(steps.len(), steps.last().unwrap() - 79, "without a pause");
@@ -50,7 +50,7 @@ fn what_stays_too_large_is_told_after_four_seconds_until_it_is_over() {
 }
 
 #[test]
-fn only_what_is_held_is_offered_for_a_try() {
+fn only_fixed_parameters_are_suggested_for_estimation() {
     let mut config = EstimatorConfig { estimate_timeshift: true, calibrate: false, ..config() };
     let said = |config: &EstimatorConfig| {
         let mut watch = ConsistencyMonitor::default();

@@ -100,7 +100,7 @@ fn a_gimbal_camera_follows_the_flight_and_calibrates_its_chain() {
 }
 
 #[test]
-fn a_fixed_chain_stays_as_it_was_given() {
+fn a_fixed_chain_keeps_its_given_values() {
     let flight = synthetic_tracks(&SyntheticOptions { duration_s: 8.5, ..options(SyntheticMount::Gimbal) });
     let mut config = fixture::config(&flight.given_rig, Parameterization::Minimal, EstimatorOptions::default());
     config.calibrate = false;
@@ -133,7 +133,7 @@ fn replays_and_clones_give_the_same_bits() {
 }
 
 #[test]
-fn trouble_is_reported_and_survived() {
+fn measurement_faults_are_reported_and_survived() {
     let flight = synthetic_tracks(&SyntheticOptions { duration_s: 14.0, ..options(SyntheticMount::Static) });
     let config = fixture::config(&flight.given_rig, Parameterization::Minimal, EstimatorOptions::default());
     let mut estimator = Estimator::new(config);

@@ -42,7 +42,7 @@ fn windows() -> Vec<(&'static str, TestWindow)> {
 }
 
 #[test]
-fn the_parts_of_the_motions_make_up_what_the_calibration_does_to_the_pictures() {
+fn the_terms_of_the_motions_sum_to_the_calibration_jacobian() {
     for (name, estimator) in windows() {
         let active = estimator.active_tracks();
         let problem = estimator.problem(&active);
@@ -125,7 +125,7 @@ fn gain_of(problem: &Problem<'_>, estimate: &Estimate) -> InformationGain {
 }
 
 #[test]
-fn the_gain_is_that_of_two_windows_of_which_one_lacks_the_newest_image() {
+fn information_gain_equals_that_of_windows_with_and_without_the_newest_image() {
     for (name, estimator) in windows() {
         let active = estimator.active_tracks();
         let problem = estimator.problem(&active);
@@ -144,7 +144,7 @@ fn the_gain_is_that_of_two_windows_of_which_one_lacks_the_newest_image() {
 }
 
 #[test]
-fn what_a_swinging_joint_tells_is_put_down_to_it() {
+fn information_gain_is_attributed_to_the_moving_joint() {
     for joint in 0..3 {
         let swing = JointSwing { joint, amplitude_rad: 15_f64.to_radians() };
         let flight = synthetic_tracks(&SyntheticOptions {

@@ -83,7 +83,7 @@ fn extending_equals_integrating_at_once() {
 }
 
 #[test]
-fn useless_samples_are_passed_over() {
+fn invalid_imu_samples_are_skipped() {
     let all = samples(0.05, 200.0);
     let mut broken = all.clone();
     broken.insert(3, ImuSample { specific_force_m_per_s2: Vector3::repeat(f64::NAN), ..all[3] });

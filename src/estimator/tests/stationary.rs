@@ -176,7 +176,7 @@ fn reports_stationary(report: &StepReport) -> bool {
 }
 
 #[test]
-fn a_landed_vehicle_stays_where_it_is_and_flies_on() {
+fn a_landed_vehicle_does_not_drift_and_takes_off_again() {
     for mount in [SyntheticMount::Gimbal, SyntheticMount::Static] {
         let flight = synthetic_tracks(&options(mount, SyntheticMotion::StationaryThenAggressive));
         // One track in fifty ends in every image: hardly one lives through ten seconds.
@@ -210,7 +210,7 @@ fn a_landed_vehicle_stays_where_it_is_and_flies_on() {
 
 /// A centimetre a second, as smooth as can be: the inertial samples show nothing, only the picture does.
 #[test]
-fn a_creeping_vehicle_is_not_held() {
+fn a_slowly_moving_vehicle_gets_no_zero_velocity_update() {
     let creep = |after_s: f64| 0.01 * (after_s * after_s / (after_s.max(0.0) + 2.0));
     let flight = synthetic_tracks(&options(SyntheticMount::Static, SyntheticMotion::StationaryThenAggressive));
     let frames = Landing::new(&flight).land().stay(12.0, 0.004, creep).0.frames;
@@ -228,7 +228,7 @@ fn a_creeping_vehicle_is_not_held() {
 }
 
 #[test]
-fn a_hovering_vehicle_is_not_taken_for_a_resting_one() {
+fn a_hovering_vehicle_is_not_stationary() {
     for seed in [3, 4, 5] {
         let hover = SyntheticOptions {
             seed,
@@ -251,7 +251,7 @@ fn a_hovering_vehicle_is_not_taken_for_a_resting_one() {
 }
 
 #[test]
-fn from_standstill_it_waits_for_motion_and_says_so() {
+fn a_stationary_start_waits_for_motion_and_reports_it() {
     for mount in [SyntheticMount::Gimbal, SyntheticMount::Static] {
         let flight = synthetic_tracks(&options(mount, SyntheticMotion::StationaryThenAggressive));
         let config = fixture::config(&flight.given_rig, Parameterization::Minimal, EstimatorOptions::default());

@@ -43,7 +43,7 @@ fn renamed(frame: &mut SyntheticFrame) {
 }
 
 #[test]
-fn without_encoders_the_flight_is_followed_and_the_calibration_stays_weak() {
+fn without_encoders_the_trajectory_is_tracked_and_the_calibration_stays_uncertain() {
     for seed in [5, 6, 8] {
         let flight =
             synthetic_tracks(&SyntheticOptions { encoder_sigma_rad: None, ..options(SyntheticMount::Gimbal, seed) });
@@ -71,7 +71,7 @@ fn without_encoders_the_flight_is_followed_and_the_calibration_stays_weak() {
 
 /// Joint angles that come late or pause are no reason to fail.
 #[test]
-fn encoders_that_start_late_and_pause_are_survived() {
+fn late_and_interrupted_encoder_readings_are_handled() {
     let flight = synthetic_tracks(&options(SyntheticMount::Gimbal, 5));
     let mut frames = flight.frames.clone();
     for frame in &mut frames {
@@ -86,7 +86,7 @@ fn encoders_that_start_late_and_pause_are_survived() {
 }
 
 #[test]
-fn three_seconds_without_pictures_are_bridged() {
+fn three_seconds_without_images_are_bridged() {
     for mount in [SyntheticMount::Gimbal, SyntheticMount::Static] {
         let flight = synthetic_tracks(&options(mount, 5));
         let mut frames: Vec<SyntheticFrame> = Vec::new();
@@ -128,7 +128,7 @@ fn blinded(flight: &SyntheticFlight, blind: std::ops::Range<usize>) -> Vec<Synth
 }
 
 #[test]
-fn three_seconds_with_nothing_to_see_are_bridged() {
+fn three_seconds_without_texture_are_bridged() {
     for mount in [SyntheticMount::Gimbal, SyntheticMount::Static] {
         let flight = synthetic_tracks(&options(mount, 5));
         let frames = blinded(&flight, 160..220);
@@ -147,7 +147,7 @@ fn three_seconds_with_nothing_to_see_are_bridged() {
 }
 
 #[test]
-fn a_long_blindness_ends_in_a_restart_that_finds_its_way() {
+fn a_long_visual_outage_leads_to_a_successful_restart() {
     let flight = synthetic_tracks(&SyntheticOptions { duration_s: 23.0, ..options(SyntheticMount::Gimbal, 5) });
     let frames = blinded(&flight, 160..280);
     let (estimator, reports) = run_flight(&frames, config(&flight));
@@ -170,7 +170,7 @@ fn a_long_blindness_ends_in_a_restart_that_finds_its_way() {
 }
 
 #[test]
-fn a_saturated_inertial_sensor_does_not_throw_the_window_off() {
+fn a_saturated_imu_does_not_corrupt_the_window() {
     for mount in [SyntheticMount::Gimbal, SyntheticMount::Static] {
         let flight = synthetic_tracks(&options(mount, 5));
         let mut frames = flight.frames.clone();
@@ -215,7 +215,7 @@ fn switch(estimator: &mut Estimator, parameterization: Parameterization) {
 
 /// The same flight with and without a switch of the chart: the posterior is carried over, not only the values.
 #[test]
-fn a_switch_of_charts_in_a_running_window_changes_nothing_else() {
+fn a_switch_of_parameterization_keeps_the_window_estimate() {
     let flight = synthetic_tracks(&SyntheticOptions { duration_s: 9.0, ..options(SyntheticMount::Gimbal, 5) });
     let config = config(&flight);
     let mut stays = Estimator::new(config.clone());
@@ -252,7 +252,7 @@ fn a_switch_of_charts_in_a_running_window_changes_nothing_else() {
 }
 
 #[test]
-fn a_chart_near_its_lock_is_left_once_and_for_good() {
+fn a_parameterization_near_its_singularity_is_switched_once() {
     let flight = synthetic_tracks(&SyntheticOptions { duration_s: 8.0, ..options(SyntheticMount::Gimbal, 5) });
     let config = EstimatorConfig { auto_parameterize: true, ..config(&flight) };
     let mut estimator = Estimator::new(config);
@@ -287,7 +287,7 @@ fn far_off(seed: u64, duration_s: f64) -> SyntheticFlight {
 
 /// After a start with a poor chain, derivatives at poor first estimates and an early prior would hold the flight back.
 #[test]
-fn a_poor_start_is_recovered_from() {
+fn the_window_converges_from_poor_initial_values() {
     let errors_m = |options: EstimatorOptions| -> Vec<f64> {
         (1..=3)
             .map(|seed| {

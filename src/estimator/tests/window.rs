@@ -133,7 +133,7 @@ fn marginalizing_the_oldest_agrees_with_the_full_batch() {
 }
 
 #[test]
-fn dropping_a_frame_from_the_prior_keeps_what_it_said_about_the_others() {
+fn dropping_a_frame_from_the_prior_keeps_the_information_on_the_others() {
     let mut estimator = fixture::window(Parameterization::Minimal, true, quadratic());
     fixture::marginalize_once(&mut estimator);
     let problem = estimator.problem(&[]);
@@ -183,7 +183,7 @@ fn an_echelon_gives_dependent_columns_no_row() {
 
 /// A residual that no step can change would count in every cost from then on, and pile up over a flight.
 #[test]
-fn a_prior_holds_nothing_that_no_step_can_change() {
+fn a_prior_contains_only_estimated_columns() {
     for (name, mut estimator) in windows() {
         for left in (3..6).rev() {
             fixture::disturb(&mut estimator, 0.2);
@@ -231,7 +231,7 @@ fn the_classical_chain_keeps_its_null_directions_with_first_estimates() {
 }
 
 #[test]
-fn solving_finds_the_truth_from_a_shaken_start() {
+fn solving_converges_to_the_ground_truth_from_disturbed_values() {
     for (name, mut estimator) in windows() {
         fixture::disturb(&mut estimator, 1.0);
         let active = estimator.active_tracks();

@@ -47,7 +47,7 @@ fn a_window_beyond_the_image_or_too_large_is_none() {
 }
 
 #[test]
-fn brightness_does_not_move_a_window_and_a_shift_is_seen() {
+fn window_comparison_ignores_brightness_and_detects_shifts() {
     let image = scene(0.3).render(&texture(), 4);
     let middle = Vector2::new(150.0, 120.0);
     let mut pixels = [[0.0; SIDE]; SIDE];

@@ -29,7 +29,7 @@ fn chessboard_of_one(squares: &[(usize, usize, u8)]) -> (GrayImage, Vec<Vector2<
 }
 
 #[test]
-fn corners_of_squares_are_found_weak_beside_strong() {
+fn weak_corners_are_found_beside_strong_ones() {
     let (image, corners) = chessboard_of_one(&[(30, 30, 250), (120, 90, 56)]);
     let options = CornerOptions { min_distance_px: 10.0, ..Default::default() };
     let found = detect(&image, &[], &options);

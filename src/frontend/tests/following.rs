@@ -58,12 +58,12 @@ fn changing_gain_and_offset_do_not_matter() {
 }
 
 #[test]
-fn without_noise_hardly_an_error_remains() {
+fn without_noise_the_error_is_negligible() {
     check(&Scene { noise: 0.0, ..scene(0.1) }, 0.99, 0.03);
 }
 
 #[test]
-fn points_at_the_very_border_are_not_lost() {
+fn points_at_the_border_are_tracked() {
     let scene = scene(0.3);
     let texture = texture();
     let (previous, now) = (pyramid(&scene.render(&texture, 4)), pyramid(&scene.render(&texture, 5)));

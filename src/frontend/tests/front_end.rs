@@ -87,7 +87,7 @@ fn features_are_followed_through_a_sequence() {
 }
 
 #[test]
-fn same_images_same_bits_and_a_clone_goes_on_alike() {
+fn equal_images_give_equal_bits_also_in_a_clone() {
     let (scene, texture) = (scene(1.0), texture());
     let images: Vec<GrayImage> = (0..5).map(|index| scene.render(&texture, index)).collect();
     let mut original = front_end(&scene);
@@ -131,7 +131,7 @@ fn a_wrong_prediction_loses_few() {
 }
 
 #[test]
-fn a_flash_and_a_blank_image_are_survived() {
+fn tracking_survives_a_flash_and_a_blank_image() {
     let (scene, texture) = (scene(0.3), texture());
     let mut front_end = front_end(&scene);
     front_end.process(&scene.render(&texture, 0), 0, None).unwrap();

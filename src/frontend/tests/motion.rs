@@ -73,14 +73,14 @@ fn check(name: &str, view: &View, min_inliers_kept: f64, max_outliers_kept: f64)
 }
 
 #[test]
-fn a_good_prediction_tells_outliers() {
+fn a_good_prediction_separates_outliers() {
     check("general", &View::default(), 0.97, 0.3);
     check("sideways", &View { translation: Vector3::new(0.2, 0.0, 0.0), ..View::default() }, 0.97, 0.3);
     check("many outliers", &View { outlier_ratio: 0.4, ..View::default() }, 0.95, 0.35);
 }
 
 #[test]
-fn a_prediction_that_is_degrees_off_does_no_harm() {
+fn a_prediction_with_degrees_of_error_does_no_harm() {
     for error in [Vector3::new(0.05, 0.0, 0.0), Vector3::new(0.0, -0.07, 0.03), Vector3::new(0.02, 0.02, -0.1)] {
         check("wrong prediction", &View { prediction_error: error, ..View::default() }, 0.9, 0.35);
     }
@@ -90,7 +90,7 @@ fn a_prediction_that_is_degrees_off_does_no_harm() {
 }
 
 #[test]
-fn pure_rotation_keeps_what_turns_and_nothing_else() {
+fn pure_rotation_keeps_only_rotating_tracks() {
     let view = View { translation: Vector3::zeros(), ..View::default() };
     check("pure rotation", &view, 0.99, 0.02);
     let wrong = View { translation: Vector3::zeros(), prediction_error: Vector3::new(0.03, -0.05, 0.0), ..view };
@@ -98,14 +98,14 @@ fn pure_rotation_keeps_what_turns_and_nothing_else() {
 }
 
 #[test]
-fn a_clean_scene_loses_nothing() {
+fn clean_scenes_keep_all_tracks() {
     check("clean", &View { outlier_ratio: 0.0, ..View::default() }, 0.99, 0.0);
     let far = View { outlier_ratio: 0.0, depths: (50.0, 300.0), ..View::default() };
     check("far", &far, 0.99, 0.0);
 }
 
 #[test]
-fn nonsense_rejects_nothing_rather_than_everything() {
+fn random_matches_are_kept_rather_than_all_rejected() {
     let mut dice = Dice(5);
     let mut direction = || Vector3::new(dice.uniform() - 0.5, dice.uniform() - 0.5, 1.0).normalize();
     let pairs: Vec<_> = (0..60).map(|_| BearingPair { previous: direction(), now: direction() }).collect();
@@ -120,7 +120,7 @@ fn nonsense_rejects_nothing_rather_than_everything() {
 }
 
 #[test]
-fn one_track_many_times_says_nothing_of_a_rotation() {
+fn one_repeated_track_does_not_determine_a_rotation() {
     let pair = BearingPair { previous: Vector3::z(), now: Vector3::z() };
     let rotation = fit_rotation(&[pair; 20], &UnitQuaternion::identity(), 1e-3);
     assert!(rotation.angle() < 1e-9);
@@ -170,7 +170,7 @@ fn the_predicted_rotation_is_that_of_the_chain_of_frames() {
 }
 
 #[test]
-fn the_covariance_is_that_of_predictions_from_wrong_numbers() {
+fn the_covariance_matches_predictions_from_perturbed_input() {
     let imu: Vec<_> = (0..11).map(|k| sample(k * 5_000_000, Vector3::new(0.9, -1.6, 6.0))).collect();
     let predict = |chain: &ClassicalChain, bias: &Vector3<f64>, angles: [f64; 2]| {
         let [previous, now] = angles.map(|angle| ChainOrientation::new(chain, &[angle], &[JOINT_SIGMA_RAD]));

@@ -91,7 +91,7 @@ fn frames_end_at_the_camera() {
 }
 
 #[test]
-fn columns_are_as_many_as_stated() {
+fn column_counts_match_the_parameterization() {
     let mut random = Random::new(4);
     for joints in 0..=5 {
         let classical = random.chain(joints);
@@ -114,7 +114,7 @@ fn columns_are_as_many_as_stated() {
 }
 
 #[test]
-fn names_on_the_command_line_go_both_ways() {
+fn command_line_names_convert_both_ways() {
     for parameterization in Parameterization::ALL {
         assert_eq!(parameterization.name().parse(), Ok(parameterization));
     }
@@ -123,7 +123,7 @@ fn names_on_the_command_line_go_both_ways() {
 }
 
 #[test]
-fn margins_show_the_locks_and_auto_avoids_them() {
+fn margins_vanish_at_singularities_and_auto_avoids_them() {
     let expected = [
         ("ideal", "minimal", [1.0, 1.0]),
         ("roll first", "minimal-yx", [0.0, 1.0]),
@@ -153,7 +153,7 @@ fn margins_show_the_locks_and_auto_avoids_them() {
 }
 
 #[test]
-fn auto_never_starts_near_a_lock_and_switches_late() {
+fn auto_starts_away_from_singularities_and_switches_late() {
     let mut random = Random::new(5);
     for _ in 0..500 {
         let classical = random.chain(3);

@@ -73,7 +73,7 @@ fn chains_obey_the_manifold_laws() {
 }
 
 #[test]
-fn values_move_with_the_scalars() {
+fn values_follow_scalar_updates() {
     let mut random = Random::new(13);
     for (name, chain) in every_chain() {
         let delta = DVector::from_fn(chain.dof(), |_, _| random.within(1e-3));
@@ -88,7 +88,7 @@ fn values_move_with_the_scalars() {
 }
 
 #[test]
-fn redundant_directions_of_the_classical_form_move_nothing() {
+fn redundant_directions_of_the_classical_form_keep_the_camera_pose() {
     let mut random = Random::new(14);
     for (name, classical) in all_chains() {
         let directions = redundant_directions(&classical);
@@ -143,7 +143,7 @@ fn ranks_over_all_joint_angles_are_four_per_joint_and_six() {
 }
 
 #[test]
-fn generic_angles_are_spread_and_the_same_every_time() {
+fn generic_angles_are_spread_and_repeatable() {
     let angles = generic_joint_angles(3, 64);
     assert_eq!(angles, generic_joint_angles(3, 64));
     for joint in 0..3 {

@@ -8,7 +8,7 @@ const TRANSLATION_SIGMA_M: f64 = 0.003;
 const ROTATION_SIGMA_RAD: f64 = 0.0087;
 
 #[test]
-fn transport_moves_the_camera_as_the_columns_it_came_from() {
+fn transported_steps_move_the_camera_equally() {
     let mut random = Random::new(21);
     for (name, classical) in all_chains() {
         let given = Chain::from_classical(&classical, Parameterization::Classical);
@@ -27,7 +27,7 @@ fn transport_moves_the_camera_as_the_columns_it_came_from() {
 }
 
 #[test]
-fn the_prior_covers_what_the_rig_may_be_wrong_by() {
+fn the_prior_covers_the_error_bounds_of_the_rig() {
     let mut random = Random::new(22);
     let (_, mut classical) = special_chains().remove(0);
     classical.links.iter_mut().for_each(|link| {
@@ -69,7 +69,7 @@ fn the_prior_covers_what_the_rig_may_be_wrong_by() {
 }
 
 #[test]
-fn every_prior_can_be_inverted_even_at_a_lock() {
+fn every_prior_is_invertible_even_at_a_singularity() {
     for (name, classical) in all_chains() {
         for parameterization in Parameterization::ALL {
             let chain = Chain::from_classical(&classical, parameterization);
@@ -85,7 +85,7 @@ fn every_prior_can_be_inverted_even_at_a_lock() {
 }
 
 #[test]
-fn a_switch_of_charts_keeps_the_prior() {
+fn a_switch_of_parameterization_keeps_the_prior() {
     let mut random = Random::new(23);
     for joints in 1..=4 {
         let classical = random.chain(joints);

@@ -97,7 +97,7 @@ fn chain() -> Chain {
 }
 
 #[test]
-fn elimination_by_blocks_is_the_projection() {
+fn block_elimination_equals_the_projection() {
     let mut random = Random::new(32);
     let chain = chain();
     let scale: Vec<f64> = chain.parameters().iter().map(|parameter| parameter.dimension().scale()).collect();

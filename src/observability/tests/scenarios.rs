@@ -115,7 +115,7 @@ fn deficits(report: &RankReport) -> [usize; 4] {
 }
 
 #[test]
-fn every_loss_is_put_down_to_its_cause() {
+fn every_rank_loss_is_attributed_to_its_cause() {
     // Offsets, motion, free joints; the deficits of the minimal form. The classical one has six more in the first.
     let table = [
         (true, Motion::Exciting, false, [0, 0, 0, 0]),
@@ -152,7 +152,7 @@ fn every_loss_is_put_down_to_its_cause() {
 }
 
 #[test]
-fn known_parameters_carry_the_null_directions() {
+fn excluded_parameters_leave_the_null_directions() {
     let null_names = |case: &Case| -> Vec<String> {
         let parameters = &case.report.parameters;
         let structural = case.report.directions.iter().filter(|direction| direction.structural);
@@ -191,7 +191,7 @@ fn known_parameters_carry_the_null_directions() {
 }
 
 #[test]
-fn moving_along_a_redundant_direction_leaves_the_camera_where_it_was() {
+fn moving_along_a_redundant_direction_keeps_the_camera_pose() {
     let Case { report, chain } = case(true, Motion::Exciting, false, Parameterization::Classical);
     let parameters = chain.parameters();
     let mut random = Random::new(43);
@@ -270,7 +270,7 @@ fn known_and_measured_redundancy_agree() {
 }
 
 #[test]
-fn neighbours_on_parallel_axes_lose_what_is_said() {
+fn parallel_neighbouring_axes_lose_the_predicted_directions() {
     for (name, expected) in [
         ("parallel axes", &[KnownLoss::ParallelD(0)][..]),
         ("coaxial axes", &[KnownLoss::ParallelD(0), KnownLoss::CoaxialTheta(0)]),

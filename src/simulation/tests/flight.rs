@@ -16,7 +16,7 @@ pub(super) fn experiment_trajectory(experiment: Experiment, seed: u64, duration_
 }
 
 #[test]
-fn stretches_of_hover_of_a_held_joint_and_of_a_kept_camera_begin_and_end_when_told() {
+fn hover_fixed_joint_and_fixed_camera_intervals_start_and_end_as_given() {
     let mut trajectory = experiment_trajectory(Experiment::T1, 3, 40.0);
     let before = trajectory.clone();
     trajectory.hover([10.0, 6.0]);
@@ -73,7 +73,7 @@ fn spline_derivatives_meet_central_differences() {
 }
 
 #[test]
-fn every_experiment_flies_its_length_hard_but_within_the_limits() {
+fn every_experiment_lasts_its_length_and_keeps_the_limits() {
     let limits = VehicleLimits::default();
     for experiment in Experiment::ALL {
         let trajectory = experiment_trajectory(experiment, 3, 200.0);
@@ -99,7 +99,7 @@ fn every_experiment_flies_its_length_hard_but_within_the_limits() {
 }
 
 #[test]
-fn inertial_truth_integrates_back_to_the_trajectory() {
+fn noise_free_imu_samples_integrate_to_the_trajectory() {
     let trajectory = experiment_trajectory(Experiment::T3, 5, 30.0);
     let step_s = 5e-4;
     let start = trajectory.at(4.0);
@@ -123,7 +123,7 @@ fn inertial_truth_integrates_back_to_the_trajectory() {
 }
 
 #[test]
-fn gimbal_stays_within_its_stops_and_steadies_the_picture() {
+fn the_gimbal_keeps_its_limits_and_stabilizes_the_image() {
     for experiment in [Experiment::T1, Experiment::T4] {
         let look = experiment.look_around(&mut RandomStream::new(8, stream::LOOK));
         let equipment = Equipment {
@@ -170,7 +170,7 @@ fn gimbal_stays_within_its_stops_and_steadies_the_picture() {
 }
 
 #[test]
-fn a_slewed_gimbal_and_a_spun_vehicle_turn_as_fast_as_asked_and_only_then() {
+fn slew_and_spin_reach_their_rates_in_their_intervals_only() {
     let mut trajectory = experiment_trajectory(Experiment::T3, 1, 12.0);
     let plain = trajectory.clone();
     trajectory.spin([5.0, 2.0], 3.0);

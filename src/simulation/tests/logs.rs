@@ -21,7 +21,7 @@ fn write(options: &SimulationOptions, folder: &Path) -> SimulationSummary {
 }
 
 #[test]
-fn a_simulated_log_reads_back_with_its_rig_and_truth() {
+fn a_simulated_log_reads_back_with_its_rig_and_ground_truth() {
     let folder = tempfile::tempdir().unwrap();
     let summary = write(&small(Experiment::T3), folder.path());
     assert_eq!(summary.images, 40);
@@ -144,7 +144,7 @@ fn disturbances_are_read_as_they_are_written_on_the_command_line() {
 }
 
 #[test]
-fn light_and_fog_change_the_pictures_only_while_they_last() {
+fn light_and_fog_change_images_only_while_active() {
     let folder = tempfile::tempdir().unwrap();
     let mut options = small(Experiment::T1);
     let means_and_spreads = |options: &SimulationOptions| -> Vec<(f64, f64)> {

@@ -34,7 +34,7 @@ fn tracks_are_projections_of_their_landmarks_through_the_true_rig() {
 }
 
 #[test]
-fn inertial_samples_join_from_frame_to_frame_and_integrate_to_the_truth() {
+fn imu_samples_of_consecutive_frames_integrate_to_the_ground_truth() {
     let options =
         SyntheticOptions { imu_noise_scale: 0.0, ..short(SyntheticMount::Gimbal, SyntheticMotion::Aggressive) };
     let flight = synthetic_tracks(&options);
@@ -82,7 +82,7 @@ fn noise_and_motion_are_as_asked() {
 }
 
 #[test]
-fn given_rig_is_wrong_within_its_bounds_only() {
+fn the_given_rig_errs_within_its_bounds() {
     let flight = synthetic_tracks(&short(SyntheticMount::Gimbal, SyntheticMotion::Hover));
     let (given, ground_truth) = (flight.given_rig.gimbal.unwrap(), flight.true_rig.gimbal.unwrap());
     let (length, angle) = (given.prior.translation_bound_m, given.prior.rotation_bound_rad);

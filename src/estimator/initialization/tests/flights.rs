@@ -221,7 +221,7 @@ fn gimbal_without_encoders_initializes() {
 }
 
 #[test]
-fn hover_rotation_and_constant_velocity_wait_and_say_for_what() {
+fn hover_rotation_and_constant_velocity_wait_with_reasons() {
     for (motion, tests) in [
         (Motion::Hover, &["parallax", "excitation"][..]),
         (Motion::RotationOnly, &["parallax"][..]),
@@ -238,7 +238,7 @@ fn hover_rotation_and_constant_velocity_wait_and_say_for_what() {
 }
 
 #[test]
-fn standstill_is_remembered_or_used_at_once() {
+fn a_stationary_estimate_is_kept_or_used_at_once() {
     let flight_options = FlightOptions { duration_s: 2.0, ..FlightOptions::new(3, Motion::Standstill) };
     let flight = fly(&flight_options);
     let options = options_for(&flight_options);

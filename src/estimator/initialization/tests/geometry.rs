@@ -129,7 +129,7 @@ fn relative_pose_survives_noise_outliers_and_planes() {
 }
 
 #[test]
-fn rotation_fit_finds_the_turn_and_the_parallax() {
+fn rotation_fit_finds_rotation_and_parallax() {
     let mut random = Random::new(3);
     for _ in 0..50 {
         let rotation = so3::exp(&random.vector(0.8));
@@ -168,7 +168,7 @@ fn triangulation_meets_the_point() {
 }
 
 #[test]
-fn camera_pose_is_refined_from_far_off_with_outliers() {
+fn camera_pose_is_refined_from_a_poor_guess_with_outliers() {
     let mut random = Random::new(5);
     let noise = 0.001;
     for _ in 0..40 {

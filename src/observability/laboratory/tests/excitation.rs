@@ -111,7 +111,7 @@ fn run_advised(seed: u64, every: usize) -> (Advice, Vec<(String, f64, f64)>) {
 }
 
 #[test]
-fn flying_the_advised_motion_lowers_the_weakest_sigma_more_than_the_alternatives() {
+fn the_suggested_excitation_lowers_the_largest_sigma_most() {
     for seed in [3, 5, 8] {
         check_advice(seed);
     }
@@ -139,7 +139,7 @@ fn check_advice(seed: u64) {
 }
 
 #[test]
-fn advice_repeats_bit_by_bit_and_answers_in_words() {
+fn advice_is_repeatable_and_rendered_as_text() {
     let mut setup = LaboratorySetup::new(Mechanism::named("yaw-roll-pitch-offset").unwrap());
     setup.motion = LaboratoryMotion::Hover;
     let form = LaboratoryForm::whole(Parameterization::Minimal);
@@ -160,7 +160,7 @@ fn advice_repeats_bit_by_bit_and_answers_in_words() {
 }
 
 #[test]
-fn information_is_put_down_to_the_motion_that_brought_it() {
+fn information_is_attributed_to_its_motion() {
     let setup = LaboratorySetup::new(Mechanism::named("yaw-roll-pitch-offset").unwrap());
     let form = LaboratoryForm::whole(Parameterization::Minimal);
     let chain = form.chain(&setup.mechanism);

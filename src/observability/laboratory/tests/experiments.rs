@@ -2,7 +2,7 @@ use super::super::{LaboratoryForm, LaboratoryMotion, LaboratorySetup, Mechanism}
 use crate::gimbal::Parameterization;
 
 #[test]
-fn mechanisms_are_what_their_names_say() {
+fn mechanisms_match_their_names() {
     for (name, _) in Mechanism::NAMES {
         let mechanism = Mechanism::named(name).unwrap();
         assert_eq!(mechanism.name, name);
@@ -23,7 +23,7 @@ fn mechanisms_are_what_their_names_say() {
 }
 
 #[test]
-fn experiments_repeat_bit_by_bit() {
+fn experiments_are_repeatable() {
     let mut setup = LaboratorySetup::new(Mechanism::named("pan-tilt").unwrap());
     setup.motion = LaboratoryMotion::YawTilted;
     let form = LaboratoryForm::whole(Parameterization::Classical);

@@ -1,6 +1,6 @@
 //! The truth table of the mathematics, suggested excitation, and chains moved along null directions.
 
 mod excitation;
+mod expected_table;
 mod experiments;
 mod slide;
-mod truth_table;

@@ -27,7 +27,7 @@ fn moves(parameterization: Parameterization, encoder: bool) -> (RankReport, impl
 }
 
 #[test]
-fn reprojections_stay_while_the_chain_slides_along_a_redundant_direction() {
+fn reprojections_are_unchanged_along_a_redundant_direction() {
     let (rank, moved) = moves(Parameterization::Classical, true);
     assert_eq!((rank.parameters.len(), rank.rank_structural, rank.known.len()), (24, 18, 6));
     // As measured: to first order nothing moves.
@@ -56,7 +56,7 @@ fn reprojections_stay_while_the_chain_slides_along_a_redundant_direction() {
 }
 
 #[test]
-fn parameters_that_are_held_count_as_known() {
+fn fixed_parameters_count_as_known() {
     let flight = flight(Exercise { vehicle: VehicleSwing::Hover, joint: None }, 7);
     let mut estimator = estimator(&flight.given_rig, Parameterization::Classical, true);
     let (_, before) = run_flight(&mut estimator, &flight, -1.0, 4.0);

@@ -50,7 +50,7 @@ fn cells_with_corners(image: &GrayImage) -> usize {
 }
 
 #[test]
-fn both_worlds_are_rich_in_corners_and_well_exposed() {
+fn both_worlds_have_many_corners_and_good_exposure() {
     for (environment, place_m) in [(Environment::House, [-13.0, -11.0, 2.6]), (Environment::Town, [-15.0, -4.0, 2.9])] {
         let world = world::build(environment, 1);
         for lens in [Lens::Pinhole, Lens::Radtan] {
@@ -103,7 +103,7 @@ fn a_pixel_sees_what_its_ray_hits() {
 }
 
 #[test]
-fn textures_do_not_shimmer_when_the_camera_creeps() {
+fn textures_do_not_flicker_under_slow_motion() {
     // Moving by a hundredth of a pixel at a time, a tracked patch must change smoothly: neighbouring pictures are far
     // more alike than pictures a pixel apart.
     let world = world::build(Environment::Town, 1);

@@ -181,7 +181,7 @@ fn check(row: &SurveyRow, expected: &Expected) -> usize {
 }
 
 #[test]
-fn ranks_losses_and_null_directions_are_those_of_the_truth_table() {
+fn ranks_losses_and_null_directions_match_the_expected_table() {
     let Survey { sections, least_frames, spurious } = survey();
     let mut compared = 0;
     assert_eq!(sections.len(), SECTIONS.len());
