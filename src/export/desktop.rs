@@ -16,6 +16,8 @@ use crate::gui::desktop::{Desktop, PanelExport, PathEntry};
 const MOST_READ: usize = 5000;
 /// How far above the program sample logs are looked for: `target/release/dcvins` lies three folders deep.
 const LEVELS_ABOVE: usize = 4;
+/// Where sample logs lie there: in the repository, and below the prefix of an installed package.
+const SAMPLE_FOLDERS: [&str; 2] = ["sample_logs", "share/dcvins/sample_logs"];
 
 /// File of the saved layouts in the user's state folder.
 const LAYOUTS: &str = "layouts.json";
@@ -115,7 +117,8 @@ impl Desktop for Machine {
         let program = std::env::current_exe().ok();
         let above =
             program.iter().flat_map(|program| program.ancestors().skip(1).take(LEVELS_ABOVE)).map(Path::to_path_buf);
-        let folders = std::env::current_dir().into_iter().chain(above).map(|folder| folder.join("sample_logs"));
+        let here = std::env::current_dir().into_iter().map(|folder| folder.join("sample_logs"));
+        let folders = here.chain(above.flat_map(|folder| SAMPLE_FOLDERS.map(|name| folder.join(name))));
         folders.map(|folder| logs_in(&folder)).find(|logs| !logs.is_empty()).unwrap_or_default()
     }
 
