@@ -203,8 +203,8 @@ impl DegeneracyArguments {
         setup.joints = self.encoder_sigma_deg.unwrap_or(setup.joints);
         setup.poses = match self.poses.unwrap_or(PosesArgument::Known) {
             PosesArgument::Known => PoseKnowledge::Known,
-            PosesArgument::Imu => PoseKnowledge::Inertial { noise: imu_noise, biases_known: false },
-            PosesArgument::ImuBiasKnown => PoseKnowledge::Inertial { noise: imu_noise, biases_known: true },
+            PosesArgument::Imu => PoseKnowledge::Imu { noise: imu_noise, biases_known: false },
+            PosesArgument::ImuBiasKnown => PoseKnowledge::Imu { noise: imu_noise, biases_known: true },
         };
         setup.frames = self.frames.map_or(setup.frames, usize::from);
         setup.landmarks = self.landmarks.map_or(setup.landmarks, usize::from);

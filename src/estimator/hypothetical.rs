@@ -27,7 +27,7 @@ pub enum PoseKnowledge {
     /// Everything.
     Known,
     /// What the IMU measures, its biases being known or not.
-    Inertial {
+    Imu {
         /// Noise of the sensor.
         noise: ImuNoise,
         /// Whether the biases are known.
@@ -137,7 +137,7 @@ impl HypotheticalWindow {
             (ColumnGroup::Joints, _, JointKnowledge::Known)
             | (ColumnGroup::Pose | ColumnGroup::VelocityBias, PoseKnowledge::Known, _) => 0,
             // The biases come after the velocity.
-            (ColumnGroup::VelocityBias, PoseKnowledge::Inertial { biases_known: true, .. }, _) => 3,
+            (ColumnGroup::VelocityBias, PoseKnowledge::Imu { biases_known: true, .. }, _) => 3,
             _ => usize::MAX,
         })
     }
@@ -145,10 +145,10 @@ impl HypotheticalWindow {
     fn frame(&self, slot: usize, hypothetical: &HypotheticalFrame) -> Frame {
         let navigation = hypothetical.navigation;
         let motion = match &self.poses {
-            PoseKnowledge::Inertial { noise, .. } if slot > 0 => {
+            PoseKnowledge::Imu { noise, .. } if slot > 0 => {
                 Preintegration::from_samples(*noise, navigation.bias, &hypothetical.imu)
             }
-            PoseKnowledge::Inertial { noise, .. } => Preintegration::new(*noise, navigation.bias),
+            PoseKnowledge::Imu { noise, .. } => Preintegration::new(*noise, navigation.bias),
             PoseKnowledge::Known => Preintegration::new(NO_NOISE, navigation.bias),
         };
         let encoder = match self.joints {

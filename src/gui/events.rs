@@ -32,7 +32,7 @@ pub(crate) fn name_of(kind: EventKind) -> &'static str {
         EventKind::OldestMarginalized => "oldest frame marginalized",
         EventKind::SecondNewestDropped => "second-newest frame dropped",
         EventKind::OutliersRejected => "outliers rejected",
-        EventKind::Standstill => "standstill",
+        EventKind::Stationary => "standstill",
         EventKind::Failure => "failure",
         EventKind::ParameterizationSwitched => "chart switched",
         EventKind::MeasurementMissing => "measurement missing",
@@ -46,7 +46,7 @@ pub(crate) fn look_of(kind: EventKind, theme: &Theme) -> (Mark, Color32) {
         EventKind::Failure => (Mark::Cross, theme.error),
         EventKind::ParameterizationSwitched => (Mark::Rhombus, theme.accent),
         EventKind::MeasurementMissing => (Mark::Square, theme.warn),
-        EventKind::Standstill | EventKind::InitializationWaits => (Mark::Disc, theme.text_weak),
+        EventKind::Stationary | EventKind::InitializationWaits => (Mark::Disc, theme.text_weak),
         EventKind::OutliersRejected => (Mark::Cross, theme.warn),
         EventKind::KeyframeChosen | EventKind::OldestMarginalized | EventKind::SecondNewestDropped => {
             (Mark::Line, theme.text_weak)

@@ -132,7 +132,7 @@ fn from_motion(
         Shown::Plain(""),
     );
     let parallax_rad = pairs.first().map_or(0.0, |pair: &ViewPair| pair.fit.median_parallax_rad);
-    let subject = "parallax between the best two views, rotation taken out,";
+    let subject = "parallax between the best two views, rotation compensated,";
     checklist.at_least("parallax", subject, parallax_rad, options.min_parallax_rad, Shown::Degrees);
     let excitation = excitation(input.frames, &selected, &rotations);
     let subject = "spread of the acceleration between views";
@@ -212,7 +212,7 @@ fn structure_of(
             checklist.all_passed().then_some(structure)
         }
         Err(StructureFailure::NoRelativePose { inlier_ratio }) => {
-            let subject = "share of features that agree with a relative pose";
+            let subject = "ratio of features consistent with a relative pose";
             checklist.at_least("relative pose", subject, inlier_ratio, limits.min_inlier_ratio, Shown::Percent);
             None
         }
@@ -341,20 +341,20 @@ impl Problem<'_> {
         let mut refined = refinement.run(refined.state, REFINEMENT_ROUNDS[1]);
         refined.rounds += rounds;
 
-        let subject = "whether the refinement came to rest";
-        checklist.at_least("settled", subject, f64::from(u8::from(refined.settled)), 1.0, Shown::Plain(""));
+        let subject = "convergence of the refinement";
+        checklist.at_least("converged", subject, f64::from(u8::from(refined.converged)), 1.0, Shown::Plain(""));
         let ratio = refined.state.landmarks.len() as f64 / before.max(1) as f64;
-        let subject = "share of landmarks that fit with positive depth";
+        let subject = "ratio of landmarks with positive depth and small residuals";
         checklist.at_least("positive depth", subject, ratio, options.min_inlier_ratio, Shown::Percent);
         let cameras = refined.state.cameras(&extrinsics);
         let rms = mean_square(&refined.state.landmarks, &cameras, options.bearing_sigma_rad).sqrt();
         let subject = "reprojection error over its standard deviation";
         checklist.at_most("reprojection", subject, rms, options.max_reprojection_sigmas, Shown::Plain(""));
-        let subject = "mean square of the whitened inertial residuals";
+        let subject = "mean square of the whitened IMU residuals";
         let value = refined.imu_mean_square;
         let chance = upper_mean_square(9 * increments.len());
         let limit = options.imu_noise_factor.powi(2) * chance;
-        checklist.at_most("inertial residual", subject, value, limit, Shown::Plain(""));
+        checklist.at_most("IMU residual", subject, value, limit, Shown::Plain(""));
 
         refined.sigmas = refinement.sigmas(&refined.state);
         let sigmas = refined.sigmas;

@@ -127,11 +127,11 @@ impl<'a> FirstWindow<'a> {
         }
         let (kind, how) = match self.solution.origin {
             InitializationOrigin::FromMotion => (EventKind::InitializedFromMotion, "motion"),
-            InitializationOrigin::FromStationary => (EventKind::InitializedFromStationary, "standstill"),
+            InitializationOrigin::FromStationary => (EventKind::InitializedFromStationary, "a stationary vehicle"),
         };
         let scale_sigma = self.solution.diagnostics.scale_sigma;
         let message = format!(
-            "initialized from {how}: {} frames, {} landmarks, scale known to {:.1} %",
+            "initialized from {how}: {} frames, {} landmarks, σ(scale) {:.1} %",
             self.solution.frames.len(),
             self.solution.landmarks.len(),
             100.0 * scale_sigma

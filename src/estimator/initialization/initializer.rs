@@ -68,8 +68,8 @@ impl Initializer {
                 if let Some(stationary) = stationary {
                     let bias = stationary.gyroscope_bias_rad_per_s.norm();
                     events.push(Event {
-                        kind: EventKind::Standstill,
-                        message: "standing still: the gyroscope's bias is measured, motion is awaited".to_owned(),
+                        kind: EventKind::Stationary,
+                        message: "stationary: gyroscope bias measured, waiting for motion".to_owned(),
                         value: Some(bias),
                         threshold: None,
                     });
@@ -124,8 +124,7 @@ impl Initializer {
             let interval_s = seconds_from_ns(input.stamp_ns - last.stamp_ns);
             let gap_s = longest_gap_s(input, last.stamp_ns);
             if interval_s <= 0.0 || gap_s > LONGEST_GAP_S {
-                let message =
-                    format!("a hole of {gap_s:.3} s in the inertial samples: the frames before it are forgotten");
+                let message = format!("gap of {gap_s:.3} s in the IMU samples: earlier frames discarded");
                 events.push(Event::decided(EventKind::MeasurementMissing, message, gap_s, LONGEST_GAP_S));
                 self.waiting.clear();
                 self.stationary = None;

@@ -231,7 +231,7 @@ pub(super) struct Refined {
     pub(super) sigmas: Option<RefinementSigmas>,
     pub(super) rounds: usize,
     /// The last round changed next to nothing.
-    pub(super) settled: bool,
+    pub(super) converged: bool,
 }
 
 impl<'a> Refinement<'a> {
@@ -274,7 +274,7 @@ impl<'a> Refinement<'a> {
             imu_mean_square,
             sigmas: None,
             rounds: solution.tried,
-            settled: solution.stop != StopReason::IterationLimit,
+            converged: solution.stop != StopReason::IterationLimit,
             state: solution.estimate,
         }
     }

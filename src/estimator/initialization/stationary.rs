@@ -55,24 +55,24 @@ pub(super) fn detect(input: &InitializationInput<'_>, checklist: &mut Checklist)
     let force_limit = MAX_ACCELEROMETER_STD_M_PER_S2.hypot(own(input.imu_noise.accelerometer_noise_density));
     let plain = Shown::Plain;
     let subject = "spread of the angular velocity";
-    checklist.at_most("standstill gyroscope", subject, gyroscope_std, gyroscope_limit, plain(" rad/s"));
+    checklist.at_most("stationary gyroscope", subject, gyroscope_std, gyroscope_limit, plain(" rad/s"));
     checklist.at_most(
-        "standstill turn",
+        "stationary angular rate",
         "mean angular velocity",
         gyroscope.norm(),
         MAX_ANGULAR_RATE_RAD_PER_S,
         plain(" rad/s"),
     );
     let subject = "spread of the specific force";
-    checklist.at_most("standstill accelerometer", subject, force_std, force_limit, plain(" m/s²"));
+    checklist.at_most("stationary accelerometer", subject, force_std, force_limit, plain(" m/s²"));
     if !checklist.all_passed() {
         return None;
     }
     let pairs = shared_bearings(frames.first()?.features, newest.features);
     let guess = frames.first()?.imu_from_camera.rotation;
     let fit = fit_rotation(&pairs, &(newest.imu_from_camera.rotation.inverse() * guess))?;
-    let subject = "motion of the picture within a second, rotation taken out,";
-    checklist.at_most("standstill picture", subject, fit.median_parallax_rad, MAX_PARALLAX_RAD, Shown::Degrees);
+    let subject = "parallax within a second, rotation compensated,";
+    checklist.at_most("stationary image", subject, fit.median_parallax_rad, MAX_PARALLAX_RAD, Shown::Degrees);
     checklist.all_passed().then(|| StationaryEstimate {
         stamp_ns: newest.stamp_ns,
         gyroscope_bias_rad_per_s: gyroscope,

@@ -20,7 +20,7 @@ pub enum EventKind {
     /// Features were rejected as outliers after the solve.
     OutliersRejected,
     /// The vehicle is stationary.
-    Standstill,
+    Stationary,
     /// The estimator failed and starts again.
     Failure,
     /// The parameterization was switched near a singularity.
@@ -41,7 +41,7 @@ impl EventKind {
         match self {
             Self::InitializedFromMotion
             | Self::InitializedFromStationary
-            | Self::Standstill
+            | Self::Stationary
             | Self::Failure
             | Self::ParameterizationSwitched
             | Self::MeasurementMissing => true,

@@ -160,7 +160,7 @@ impl<'a> Writer<'a> {
     fn other_rows(&self) -> Vec<JacobianRow> {
         let numbers: Vec<FrameId> = self.report.window.iter().map(|frame| FrameId(frame.frame_index)).collect();
         let mut rows: Vec<JacobianRow> = self.source.rows(&numbers).collect();
-        let is_imu = |row: &JacobianRow| matches!(row.factor, JacobianFactor::Inertial { .. });
+        let is_imu = |row: &JacobianRow| matches!(row.factor, JacobianFactor::Imu { .. });
         let place = rows.iter().position(|row| !is_imu(row)).unwrap_or(rows.len());
         // The readings of a frame touch its joint angles alone, each with the inverse of its standard deviation.
         let encoders = self.report.window.iter().enumerate().filter_map(|(slot, frame)| {

@@ -60,8 +60,8 @@ pub(crate) struct PackedRow {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum PackedKind {
     /// The IMU samples that end at this slot.
-    Inertial(u8),
-    Standstill,
+    Imu(u8),
+    ZeroVelocity,
     CalibrationPrior,
     MarginalizationPrior,
 }
@@ -70,12 +70,12 @@ impl PackedKind {
     /// What it stands for, with frames of these numbers.
     pub(crate) fn factor(self, numbers: &[FrameId]) -> Option<JacobianFactor> {
         Some(match self {
-            Self::Inertial(slot) => {
+            Self::Imu(slot) => {
                 let slot = usize::from(slot);
                 let from = numbers.get(slot.checked_sub(1)?)?;
-                JacobianFactor::Inertial { from: *from, to: *numbers.get(slot)? }
+                JacobianFactor::Imu { from: *from, to: *numbers.get(slot)? }
             }
-            Self::Standstill => JacobianFactor::Standstill,
+            Self::ZeroVelocity => JacobianFactor::ZeroVelocity,
             Self::CalibrationPrior => JacobianFactor::CalibrationPrior,
             Self::MarginalizationPrior => JacobianFactor::MarginalizationPrior,
         })
@@ -98,7 +98,7 @@ pub enum JacobianFactor {
     /// The reprojections of a feature, two rows a observation.
     Feature(crate::frontend::FeatureId),
     /// The IMU samples between two frames, by the frames' numbers.
-    Inertial {
+    Imu {
         /// The earlier one.
         from: FrameId,
         /// The later one.
@@ -107,7 +107,7 @@ pub enum JacobianFactor {
     /// The encoder readings of a frame.
     Encoder(FrameId),
     /// Zero-velocity updates.
-    Standstill,
+    ZeroVelocity,
     /// The rig's prior on the calibration.
     CalibrationPrior,
     /// The marginalization prior, and what was known at the start.
@@ -119,9 +119,9 @@ impl JacobianFactor {
     pub const fn kind(self) -> FactorKind {
         match self {
             Self::Feature(_) => FactorKind::Visual,
-            Self::Inertial { .. } => FactorKind::Imu,
+            Self::Imu { .. } => FactorKind::Imu,
             Self::Encoder(_) => FactorKind::Encoder,
-            Self::Standstill => FactorKind::Standstill,
+            Self::ZeroVelocity => FactorKind::ZeroVelocity,
             Self::CalibrationPrior => FactorKind::CalibrationPrior,
             Self::MarginalizationPrior => FactorKind::MarginalizationPrior,
         }

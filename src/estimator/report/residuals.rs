@@ -14,13 +14,19 @@ pub enum FactorKind {
     /// The marginalization prior, or the prior at the start.
     MarginalizationPrior,
     /// Zero-velocity update of a stationary vehicle.
-    Standstill,
+    ZeroVelocity,
 }
 
 impl FactorKind {
     /// All of them.
-    pub const ALL: [Self; 6] =
-        [Self::Visual, Self::Imu, Self::Encoder, Self::CalibrationPrior, Self::MarginalizationPrior, Self::Standstill];
+    pub const ALL: [Self; 6] = [
+        Self::Visual,
+        Self::Imu,
+        Self::Encoder,
+        Self::CalibrationPrior,
+        Self::MarginalizationPrior,
+        Self::ZeroVelocity,
+    ];
 
     /// Name for people.
     pub const fn name(self) -> &'static str {
@@ -30,7 +36,7 @@ impl FactorKind {
             Self::Encoder => "encoder",
             Self::CalibrationPrior => "calibration prior",
             Self::MarginalizationPrior => "marginalization prior",
-            Self::Standstill => "standstill",
+            Self::ZeroVelocity => "standstill",
         }
     }
 

@@ -1,4 +1,4 @@
-//! When residuals that stay too large are told, and when no longer.
+//! Start and end of the warnings about inconsistent residuals.
 
 use super::fixture;
 use crate::estimator::window::consistency::ConsistencyMonitor;
@@ -15,15 +15,17 @@ fn config() -> EstimatorConfig {
     fixture::config(&flight.given_rig, Parameterization::Minimal, EstimatorOptions::default())
 }
 
-/// Steps, at 20 Hz, in which something is told.
+/// Steps, at 20 Hz, that give a warning; all of them give the same one.
 fn reported(mean_squares: impl IntoIterator<Item = f64>) -> Vec<usize> {
     let config = config();
     let mut watch = ConsistencyMonitor::default();
-    let mut reported = Vec::new();
+    let (mut reported, mut first) = (Vec::new(), None);
     for (step, value) in mean_squares.into_iter().enumerate() {
         let warnings = watch.observe(step as i64 * 50_000_000, &encoder(value), &config);
         if let [warning] = warnings.as_slice() {
-            assert!(warning.contains("joint angles") && warning.ends_with("try timeshift=on"), "{warning}");
+            assert!(warning.starts_with("Encoder readings inconsistent"), "{warning}");
+            assert!(warning.contains("> 1.60 over 4 s") && warning.ends_with("try timeshift=on"), "{warning}");
+            assert_eq!(*first.get_or_insert_with(|| warning.clone()), *warning, "one message per inconsistency");
             reported.push(step);
         }
     }
@@ -52,11 +54,11 @@ fn inconsistent_residuals_warn_after_four_seconds_until_they_end() {
 #[test]
 fn only_fixed_parameters_are_suggested_for_estimation() {
     let mut config = EstimatorConfig { estimate_timeshift: true, calibrate: false, ..config() };
-    let said = |config: &EstimatorConfig| {
+    let warning = |config: &EstimatorConfig| {
         let mut watch = ConsistencyMonitor::default();
         (0..100).find_map(|step| watch.observe(step * 50_000_000, &encoder(5.0), config).pop()).unwrap()
     };
-    assert!(said(&config).ends_with("try calibrate=on"));
+    assert!(warning(&config).ends_with("try calibrate=on"));
     config.calibrate = true;
-    assert!(said(&config).ends_with("as the rig says"));
+    assert!(warning(&config).ends_with("noise densities"));
 }

@@ -40,7 +40,7 @@ pub(super) fn check(report: &StepReport, cameras: &[&CameraModel]) -> StepJacobi
         let inertial = jacobian
             .rows
             .iter()
-            .filter(|row| matches!(row.factor, JacobianFactor::Inertial { .. } | JacobianFactor::Standstill));
+            .filter(|row| matches!(row.factor, JacobianFactor::Imu { .. } | JacobianFactor::ZeroVelocity));
         let norms = inertial.flat_map(|row| &row.norms).filter(|(column, _)| usize::from(*column) == number);
         let written = norms.map(|(_, norm)| f64::from(*norm).powi(2)).sum::<f64>().sqrt();
         let held = (0..block.len)
@@ -73,7 +73,7 @@ fn check_factor_rows(report: &StepReport, jacobian: &StepJacobian) {
         of.map(|rows| rows.rows.column(rows.rows.ncols() - 1).norm_squared()).sum()
     };
     for (kind, measured) in [
-        (FactorKind::Imu, chi2(|factor| matches!(factor, JacobianFactor::Inertial { .. }))),
+        (FactorKind::Imu, chi2(|factor| matches!(factor, JacobianFactor::Imu { .. }))),
         (FactorKind::CalibrationPrior, chi2(|factor| *factor == JacobianFactor::CalibrationPrior)),
         (FactorKind::MarginalizationPrior, chi2(|factor| *factor == JacobianFactor::MarginalizationPrior)),
     ] {
@@ -113,7 +113,7 @@ fn blocks_are_those_of_the_linearization() {
         assert_eq!(timed, if clocks { 2 } else { 0 });
         check_factor_rows(report, &jacobian);
         assert_eq!(of(|factor| matches!(factor, JacobianFactor::Feature(_))), report.features.len());
-        assert_eq!(of(|factor| matches!(factor, JacobianFactor::Inertial { .. })), frames - 1);
+        assert_eq!(of(|factor| matches!(factor, JacobianFactor::Imu { .. })), frames - 1);
         assert_eq!(of(|factor| matches!(factor, JacobianFactor::Encoder(_))), frames);
         assert_eq!(of(|factor| *factor == JacobianFactor::CalibrationPrior), usize::from(calibrate));
         assert_eq!(of(|factor| *factor == JacobianFactor::MarginalizationPrior), 1);

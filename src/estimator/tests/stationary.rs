@@ -172,7 +172,7 @@ fn tracked(stamp_ns: i64, mut features: Vec<TrackedFeature>) -> TrackedFrame {
 }
 
 fn reports_stationary(report: &StepReport) -> bool {
-    report.events.iter().any(|event| event.kind == EventKind::Standstill)
+    report.events.iter().any(|event| event.kind == EventKind::Stationary)
 }
 
 #[test]
@@ -190,7 +190,7 @@ fn a_landed_vehicle_does_not_drift_and_takes_off_again() {
         let stationary_reports = &reports[landed + 20..landed + 235];
         let reported = stationary_reports.iter().filter(|report| reports_stationary(report)).count();
         assert!(reported > 200, "{mount:?}: standstill told {reported} times of {}", stationary_reports.len());
-        let event = stationary_reports[100].events.iter().find(|event| event.kind == EventKind::Standstill).unwrap();
+        let event = stationary_reports[100].events.iter().find(|event| event.kind == EventKind::Stationary).unwrap();
         assert!(event.value.unwrap() < event.threshold.unwrap());
         let place = |report: &StepReport| report.newest().unwrap().world_from_imu.translation_m;
         let start = place(&stationary_reports[0]);

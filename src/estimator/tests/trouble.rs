@@ -135,7 +135,7 @@ fn three_seconds_without_texture_are_bridged() {
         let (estimator, reports) = run_flight(&frames, config(&flight));
         assert_eq!(estimator.restarts, 0, "{mount:?}");
         let reported =
-            |report: &StepReport| report.events.iter().any(|event| event.message.contains("inertial sensor alone"));
+            |report: &StepReport| report.events.iter().any(|event| event.message.contains("IMU-only propagation"));
         assert!(
             reported(&reports[160]) && !reports[161..220].iter().any(reported),
             "{mount:?}: {:?}",

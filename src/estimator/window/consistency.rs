@@ -1,38 +1,39 @@
-//! Whether what is measured contradicts what is believed: residuals that stay larger than their noise allows.
+//! Consistency check: warns when the whitened residuals of a factor stay larger than their noise model allows.
 //!
-//! A time offset of some milliseconds, or a chain that is fixed at wrong values, does not stop the estimator: it bends
-//! trajectory and calibration to make the best of it. What it cannot hide is that encoder readings, and what earlier images
-//! told, then disagree with the images in the window.
+//! With a wrong time offset of some milliseconds, or with wrong fixed calibration values, the estimator does not fail: it
+//! absorbs the error in trajectory and calibration. The encoder residuals and the residuals of the marginalization prior
+//! then stay too large.
 
 use crate::estimator::{EstimatorConfig, FactorKind, ResidualSummary};
+use crate::geometry::seconds_from_ns;
 
-/// Residuals are averaged over this time, in nanoseconds, before anything is said: an image, a stop or a jolt by itself
-/// contradicts nothing, and the first window's values are wrong by right.
+/// Averaging time of the squared residuals, in nanoseconds. No warning is given earlier: single images, stops and shocks
+/// are no inconsistency, and the values of the first window are inaccurate by nature.
 const AVERAGED_NS: i64 = 4_000_000_000;
-/// Once said, it is said until the mean has come down to this share of its limit.
+/// Hysteresis: a warning ends when the mean falls to this fraction of its limit.
 const RELEASE: f64 = 0.8;
 
-/// A kind of factor whose residuals are watched.
+/// A kind of factor whose residuals are monitored.
 struct MonitoredFactor {
     factor: FactorKind,
-    /// Largest mean of its squared whitened residuals.
+    /// Largest mean of its squared whitened residuals (χ²/dof) without a warning.
     limit: f64,
-    /// What a larger one means.
+    /// Start of the warning.
     inconsistency: &'static str,
 }
 
-/// Encoder readings that agree leave 1. Most of the prior's rows are fitted, so that it leaves 0.1 to 0.45 (simulated and
-/// real logs) where the model holds; a camera's clock that is 10 ms off makes that 2, encoders 20 ms late 1.2.
+/// Consistent encoder readings have χ²/dof 1. Most rows of the prior are fitted, so that its χ²/dof is 0.1 to 0.45 (simulated
+/// and real logs) with a correct model; a camera time offset of 10 ms raises it to 2, an encoder time offset of 20 ms to 1.2.
 const MONITORED: [MonitoredFactor; 2] = [
     MonitoredFactor {
         factor: FactorKind::Encoder,
         limit: 1.6,
-        inconsistency: "joint angles contradict images and inertial sensor by more than the encoders' noise allows",
+        inconsistency: "Encoder readings inconsistent with images and IMU",
     },
     MonitoredFactor {
         factor: FactorKind::MarginalizationPrior,
         limit: 0.7,
-        inconsistency: "what earlier images told contradicts the images in the window by more than their noise allows",
+        inconsistency: "Marginalization prior inconsistent with the window",
     },
 ];
 
@@ -46,13 +47,14 @@ pub(crate) struct ConsistencyMonitor {
 #[derive(Clone, Copy, Debug, Default)]
 struct Mean {
     value: f64,
-    /// Time that it is the mean of.
+    /// Time averaged so far, up to [`AVERAGED_NS`].
     over_ns: i64,
-    inconsistent: bool,
+    /// Value that started the present warning. The warning keeps it, so that one inconsistency is one message.
+    reported: Option<f64>,
 }
 
 impl Mean {
-    /// Takes in a value that stands for an interval.
+    /// Adds a value that holds for an interval.
     fn take(&mut self, value: f64, interval_ns: i64) {
         self.over_ns = (self.over_ns + interval_ns).min(AVERAGED_NS.max(interval_ns));
         self.value += (value - self.value) * interval_ns as f64 / self.over_ns as f64;
@@ -60,7 +62,7 @@ impl Mean {
 }
 
 impl ConsistencyMonitor {
-    /// Takes in the residuals of a solved window; what contradicts, in words, for as long as it does.
+    /// Adds the residuals of a solved window and returns the warnings that hold in this step.
     pub(crate) fn observe(
         &mut self,
         stamp_ns: i64,
@@ -69,24 +71,30 @@ impl ConsistencyMonitor {
     ) -> Vec<String> {
         let Some(last_ns) = self.last_ns.replace(stamp_ns) else { return Vec::new() };
         let mut warnings = Vec::new();
-        for (watched, mean) in MONITORED.iter().zip(&mut self.means) {
-            let summary = residuals.iter().find(|summary| summary.factor == watched.factor);
+        for (monitored, mean) in MONITORED.iter().zip(&mut self.means) {
+            let summary = residuals.iter().find(|summary| summary.factor == monitored.factor);
             let Some(mean_square) = summary.and_then(ResidualSummary::mean_square) else { continue };
             mean.take(mean_square, stamp_ns - last_ns);
-            let limit = if mean.inconsistent { RELEASE * watched.limit } else { watched.limit };
-            mean.inconsistent = mean.over_ns >= AVERAGED_NS && mean.value > limit;
-            if mean.inconsistent {
-                warnings.push(warning_text(watched, config));
+            let limit = if mean.reported.is_some() { RELEASE * monitored.limit } else { monitored.limit };
+            let inconsistent = mean.over_ns >= AVERAGED_NS && mean.value > limit;
+            mean.reported = inconsistent.then(|| mean.reported.unwrap_or(mean.value));
+            if let Some(value) = mean.reported {
+                warnings.push(warning_text(monitored, value, config));
             }
         }
         warnings
     }
 }
 
-/// What contradicts what, and what to try.
-fn warning_text(watched: &MonitoredFactor, config: &EstimatorConfig) -> String {
+/// The warning with the mean that started it (χ²/dof), its limit, and the options that may remove it.
+fn warning_text(monitored: &MonitoredFactor, value: f64, config: &EstimatorConfig) -> String {
     let options = [("calibrate=on", config.calibrate), ("timeshift=on", config.estimate_timeshift)];
     let tries: Vec<&str> = options.into_iter().filter(|(_, on)| !on).map(|(option, _)| option).collect();
     let tries = if tries.is_empty() { String::new() } else { format!("; try {}", tries.join(" and ")) };
-    format!("{}: clocks, calibration or noise are not as the rig says{tries}", watched.inconsistency)
+    format!(
+        "{} (χ²/dof {value:.2} > {:.2} over {:.0} s): check time offsets, calibration, noise densities{tries}",
+        monitored.inconsistency,
+        monitored.limit,
+        seconds_from_ns(AVERAGED_NS)
+    )
 }

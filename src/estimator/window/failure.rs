@@ -18,7 +18,7 @@ pub(crate) struct LandmarkWatch {
 impl LandmarkWatch {
     /// Takes in a solved window; an event when the landmarks in view become too few.
     pub(crate) fn observe(&mut self, window: &WindowState, options: &EstimatorOptions) -> Option<Event> {
-        let least = options.min_landmarks;
+        let required = options.min_landmarks;
         let slot = window.frames.newest_slot();
         let observed = window
             .features
@@ -28,7 +28,7 @@ impl LandmarkWatch {
             .count();
         let newest = window.frames.newest();
         // A stationary vehicle needs no landmarks to know where it is.
-        if observed >= least || newest.stationary.is_some() {
+        if observed >= required || newest.stationary.is_some() {
             self.blind_since_ns = None;
             return None;
         }
@@ -37,10 +37,9 @@ impl LandmarkWatch {
         }
         self.blind_since_ns = Some(newest.stamp_ns);
         let message = format!(
-            "{observed} landmarks in view, at least {least} are needed: until there are more, the inertial sensor alone \
-             tells the motion"
+            "only {observed} landmarks observed, {required} required: IMU-only propagation until there are more"
         );
-        Some(Event::decided(EventKind::MeasurementMissing, message, observed as f64, least as f64))
+        Some(Event::decided(EventKind::MeasurementMissing, message, observed as f64, required as f64))
     }
 
     /// How long there have been too few, in seconds.
@@ -68,20 +67,16 @@ pub(crate) fn failure(
             state.bias.gyroscope_rad_per_s.norm(),
             options.max_gyroscope_bias,
         ),
-        ("the speed is out of bounds, m/s", state.velocity_m_per_s.norm(), options.max_velocity_m_per_s),
+        ("the velocity is out of bounds, m/s", state.velocity_m_per_s.norm(), options.max_velocity_m_per_s),
         (
-            "the newest position was corrected by too much, m",
+            "the correction of the newest position is too large, m",
             (state.world_from_imu.translation_m - predicted.world_from_imu.translation_m).norm(),
             options.max_position_correction_m,
         ),
-        (
-            "too few landmarks have been in view for too long, s",
-            landmarks.blind_s(newest.stamp_ns),
-            options.max_blind_s,
-        ),
+        ("too few landmarks observed for too long, s", landmarks.blind_s(newest.stamp_ns), options.max_blind_s),
     ];
     let (reason, value, limit) = checks.into_iter().find(|(_, value, limit)| !value.is_finite() || value > limit)?;
-    Some(Event::decided(EventKind::Failure, format!("{reason}: {value:.3} against {limit:.3}"), value, limit))
+    Some(Event::decided(EventKind::Failure, format!("{reason}: {value:.3} (limit {limit:.3})"), value, limit))
 }
 
 /// IMU samples of the newest interval that were at the end of the sensor's range.
@@ -89,8 +84,8 @@ pub(crate) fn saturation(newest: &Frame) -> Option<Event> {
     let (saturated, count) = (newest.motion.saturated_samples(), newest.motion.samples().len());
     (saturated > 0).then(|| {
         let message = format!(
-            "the inertial sensor is saturated in {saturated} of {count} samples: an axis repeats a large value; it \
-             counts for little there"
+            "IMU saturated in {saturated} of {count} samples (an axis repeats a large value): their noise \
+             densities are raised"
         );
         Event::decided(EventKind::MeasurementMissing, message, saturated as f64, 0.0)
     })

@@ -43,10 +43,10 @@ impl WindowState {
             }
         };
         for slot in 1..layout.frames {
-            push(PackedKind::Inertial(slot as u8), &problem.imu_rows_at(slot, estimate, &frames));
+            push(PackedKind::Imu(slot as u8), &problem.imu_rows_at(slot, estimate, &frames));
         }
         let stationary: Vec<_> = problem.zero_velocity_terms(&estimate.frames).collect();
-        push(PackedKind::Standstill, &problem.zero_velocity_rows(&stationary));
+        push(PackedKind::ZeroVelocity, &problem.zero_velocity_rows(&stationary));
         push(PackedKind::CalibrationPrior, &problem.calibration_prior_rows(estimate));
         push(PackedKind::MarginalizationPrior, &problem.prior_rows(estimate));
         let packed_frame = |state: &FrameState| {

@@ -39,13 +39,13 @@ impl WindowState {
             let age_ns = self.frames[newest].stamp_ns - self.frames[last].stamp_ns;
             let age_s = seconds_from_ns(age_ns);
             if self.frames[last].stamp_ns < stationary.since_ns {
-                return Decision::new(true, "keyframe: the first at rest", age_s, 0.0);
+                return Decision::new(true, "keyframe: the first while stationary", age_s, 0.0);
             }
             let limit_s = seconds_from_ns(STATIONARY_KEYFRAME_NS);
-            let message = "at rest: only time makes a keyframe, s";
+            let message = "stationary: keyframes by time only, s";
             return Decision::new(age_ns >= STATIONARY_KEYFRAME_NS, message, age_s, limit_s);
         }
-        // Whichever camera asks for a keyframe gets it; one without an image has nothing to say.
+        // Any camera can request a keyframe; a camera without an image takes no part.
         let observed = |camera: usize| {
             let features = self.features[camera].values();
             (camera, features.filter(|feature| feature.observation(newest).is_some()).count())
@@ -62,7 +62,7 @@ impl WindowState {
         decisions.swap_remove(first)
     }
 
-    /// Whether one camera asks for a keyframe, by what it has in common with the last one; `observed` features are in its
+    /// Whether one camera requests a keyframe, by what it has in common with the last one; `observed` features are in its
     /// newest image.
     fn keyframe_by_image(&self, options: &EstimatorOptions, camera: usize, last: usize, observed: usize) -> Decision {
         let newest = self.frames.newest_slot();
@@ -82,7 +82,7 @@ impl WindowState {
         let chosen = parallax >= limit;
         let verdict = if chosen { "keyframe" } else { "no keyframe" };
         let message = format!(
-            "{verdict}: parallax against the last one {:.2}° of {:.2}°, rotation taken out",
+            "{verdict}: parallax against the last one {:.2}° (threshold {:.2}°), rotation compensated",
             parallax.to_degrees(),
             limit.to_degrees()
         );

@@ -194,7 +194,7 @@ impl WindowState {
             summary(FactorKind::MarginalizationPrior, prior_rows, |costs| costs.prior),
         ];
         if stationary > 0 {
-            summaries.push(summary(FactorKind::Standstill, stationary, |costs| costs.zero_velocity));
+            summaries.push(summary(FactorKind::ZeroVelocity, stationary, |costs| costs.zero_velocity));
         }
         summaries
     }

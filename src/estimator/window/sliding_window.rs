@@ -16,6 +16,7 @@ use crate::estimator::state::calibrations::MAIN;
 use crate::estimator::state::frame_state::{FrameState, Rates};
 use crate::estimator::step_input::StepInput;
 use crate::geometry::{RigidTransform, median, seconds_from_ns};
+use crate::gimbal::SWITCH_MARGIN;
 
 /// Distance of a scene without triangulated landmarks.
 const UNKNOWN_DISTANCE_M: f64 = 10.0;
@@ -108,7 +109,7 @@ impl SlidingWindow {
         report.window = self.state.window_report();
         let stamp_s = seconds_from_ns(input.stamp_ns);
         let message =
-            format!("image {} is stamped {stamp_s:.3} s, not after the newest one: passed over", input.frame_index);
+            format!("image {} is stamped {stamp_s:.3} s, not after the newest one: skipped", input.frame_index);
         let newest_s = seconds_from_ns(newest_stamp_ns);
         report.events.push(Event::decided(EventKind::MeasurementMissing, message, stamp_s, newest_s));
         report
@@ -130,8 +131,7 @@ impl SlidingWindow {
         let motion = Preintegration::from_samples(setup.imu_noise, last.state.navigation.bias, input.imu);
         let covered = motion.duration_s();
         if covered < 0.5 * interval_s || interval_s <= 0.0 {
-            let message =
-                format!("inertial samples cover {covered:.3} s of the {interval_s:.3} s since the last image");
+            let message = format!("IMU samples cover {covered:.3} s of the {interval_s:.3} s since the last image");
             return Err(Event::decided(EventKind::Failure, message, covered, 0.5 * interval_s));
         }
         let navigation = motion.predict(&last.state.navigation, &setup.gravity_in_world);
@@ -185,8 +185,9 @@ impl SlidingWindow {
         let better = chain.should_switch()?;
         let margin = chain.margins().iter().map(|(_, margin)| *margin).fold(1.0, f64::min);
         self.state.switch_parameterization(better);
-        let message = format!("the chain goes over to the chart {better}: the old one is near its lock");
-        Some(Event::decided(EventKind::ParameterizationSwitched, message, margin, crate::gimbal::SWITCH_MARGIN))
+        let message =
+            format!("parameterization switched to {better}: singularity margin {margin:.2} < {SWITCH_MARGIN:.2}");
+        Some(Event::decided(EventKind::ParameterizationSwitched, message, margin, SWITCH_MARGIN))
     }
 }
 

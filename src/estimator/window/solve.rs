@@ -83,7 +83,7 @@ impl WindowState {
         }
         if count > 0 {
             let limit = options.outlier_px;
-            let message = format!("{count} of {all} features off by more than {limit:.1} px on average");
+            let message = format!("{count} of {all} features rejected: mean residual above {limit:.1} px");
             events.push(Event::decided(EventKind::OutliersRejected, message, count as f64, limit));
         }
     }

@@ -122,10 +122,10 @@ impl StationaryDetector {
         let since_ns = *self.stationary_since_ns.get_or_insert(quiet_since_ns);
         let position_sigma_m = parallax_rad.max(MIN_PARALLAX_RAD) * image.distance_m;
         let event = Event {
-            kind: EventKind::Standstill,
+            kind: EventKind::Stationary,
             message: format!(
-                "standing still for {:.1} s: the picture moved by {:.2}° of {:.2}°, rotation taken out; the angular velocity \
-                 spreads by {:.4} of {:.4} rad/s, the specific force by {:.3} of {:.3} m/s²",
+                "stationary for {:.1} s: parallax {:.2}° (limit {:.2}°, rotation compensated), spread of the angular velocity \
+                 {:.4} (limit {:.4}) rad/s, of the specific force {:.3} (limit {:.3}) m/s²",
                 seconds_from_ns(input.stamp_ns - since_ns),
                 parallax_rad.to_degrees(),
                 MAX_PARALLAX_RAD.to_degrees(),

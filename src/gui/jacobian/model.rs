@@ -113,9 +113,9 @@ impl Axis {
 pub(in crate::gui) fn name_of(factor: &JacobianFactor) -> String {
     match factor {
         JacobianFactor::Feature(id) => format!("feature {}", id.0),
-        JacobianFactor::Inertial { from, to } => format!("IMU {from} to {to}"),
+        JacobianFactor::Imu { from, to } => format!("IMU {from} to {to}"),
         JacobianFactor::Encoder(frame) => format!("encoders {frame}"),
-        JacobianFactor::Standstill => "standstill".to_owned(),
+        JacobianFactor::ZeroVelocity => "standstill".to_owned(),
         JacobianFactor::CalibrationPrior => "rig prior".to_owned(),
         JacobianFactor::MarginalizationPrior => "marginal prior".to_owned(),
     }
@@ -127,9 +127,9 @@ fn rows_of(jacobian: &StepJacobian) -> Axis {
     const SHARES: [f32; 4] = [0.62, 0.15, 0.13, 0.1];
     let group_of = |factor: &JacobianFactor| match factor {
         JacobianFactor::Feature(_) => 0,
-        JacobianFactor::Inertial { .. } => 1,
+        JacobianFactor::Imu { .. } => 1,
         JacobianFactor::Encoder(_) => 2,
-        JacobianFactor::Standstill | JacobianFactor::CalibrationPrior | JacobianFactor::MarginalizationPrior => 3,
+        JacobianFactor::ZeroVelocity | JacobianFactor::CalibrationPrior | JacobianFactor::MarginalizationPrior => 3,
     };
     let mut counts = [0_usize; 4];
     for row in &jacobian.rows {

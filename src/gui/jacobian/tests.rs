@@ -91,7 +91,7 @@ fn a_click_selects_feature_and_parameter_and_tells_their_numbers() {
     harness.run_steps(2);
     assert!(harness.query_by_label_contains("yaw.alpha: in ").is_some());
     // An IMU factor with respect to a pose is selected only here.
-    let is_imu = |factor: &JacobianFactor| matches!(factor, JacobianFactor::Inertial { .. });
+    let is_imu = |factor: &JacobianFactor| matches!(factor, JacobianFactor::Imu { .. });
     let row = model.jacobian.rows.iter().position(|row| is_imu(&row.factor)).unwrap();
     let pose = model.jacobian.columns.iter().position(|block| block.id.group() == ColumnGroup::Pose).unwrap();
     let at = middle(&harness, row, pose);

@@ -180,8 +180,8 @@ impl Choices {
         };
         setup.poses = match self.poses {
             Poses::Known => PoseKnowledge::Known,
-            Poses::Inertial => PoseKnowledge::Inertial { noise, biases_known: false },
-            Poses::InertialBiasKnown => PoseKnowledge::Inertial { noise, biases_known: true },
+            Poses::Inertial => PoseKnowledge::Imu { noise, biases_known: false },
+            Poses::InertialBiasKnown => PoseKnowledge::Imu { noise, biases_known: true },
         };
         Ok(Experiment { setup, forms })
     }

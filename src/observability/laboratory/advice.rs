@@ -194,7 +194,7 @@ fn information_of(situation: &Situation, exercise: &Exercise) -> Option<DMatrix<
         camera: situation.camera.clone(),
         landmarks,
         frames,
-        poses: PoseKnowledge::Inertial { noise: situation.imu_noise, biases_known: false },
+        poses: PoseKnowledge::Imu { noise: situation.imu_noise, biases_known: false },
         joints: situation.encoders,
         pixel_sigma_px: situation.pixel_sigma_px,
         landmark_model: LandmarkModel::BearingAndInverseDistance,

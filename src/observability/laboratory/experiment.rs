@@ -156,7 +156,7 @@ impl LaboratorySetup {
     pub(super) fn window_from(&self, first: usize) -> HypotheticalWindow {
         let gravity_in_world = gravity_in_world(GRAVITY_M_PER_S2);
         let flight = Flight { mechanism: &self.mechanism, motion: self.motion, frozen: &self.frozen, gravity_in_world };
-        let inertial = matches!(self.poses, PoseKnowledge::Inertial { .. });
+        let inertial = matches!(self.poses, PoseKnowledge::Imu { .. });
         let time_of = |slot: usize| (first + slot) as f64 * FRAME_PERIOD_S;
         let frames: Vec<HypotheticalFrame> = (0..self.frames)
             .map(|slot| HypotheticalFrame {

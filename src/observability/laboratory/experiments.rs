@@ -114,8 +114,8 @@ const WITHOUT_OFFSETS: &[LaboratoryForm] =
 
 const OFFSET: &str = "yaw-roll-pitch-offset";
 const IDEAL: &str = "yaw-roll-pitch-ideal";
-const IMU: PoseKnowledge = PoseKnowledge::Inertial { noise: LABORATORY_IMU, biases_known: false };
-const IMU_BIASES_KNOWN: PoseKnowledge = PoseKnowledge::Inertial { noise: LABORATORY_IMU, biases_known: true };
+const IMU: PoseKnowledge = PoseKnowledge::Imu { noise: LABORATORY_IMU, biases_known: false };
+const IMU_BIASES_KNOWN: PoseKnowledge = PoseKnowledge::Imu { noise: LABORATORY_IMU, biases_known: true };
 
 /// Two windows of one motion, with and without encoders; see [`super::spurious`].
 pub(super) const GENERIC: Experiment = experiment("", "generic");

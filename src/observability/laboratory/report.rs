@@ -129,8 +129,8 @@ impl LaboratoryReport {
             },
             poses: match setup.poses {
                 PoseKnowledge::Known => "known",
-                PoseKnowledge::Inertial { biases_known: true, .. } => "from the IMU, its biases known",
-                PoseKnowledge::Inertial { biases_known: false, .. } => "from the IMU, its biases unknown",
+                PoseKnowledge::Imu { biases_known: true, .. } => "from the IMU, its biases known",
+                PoseKnowledge::Imu { biases_known: false, .. } => "from the IMU, its biases unknown",
             }
             .to_owned(),
             frames: setup.frames,

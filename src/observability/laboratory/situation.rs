@@ -95,7 +95,7 @@ impl Situation {
         let rank = analyse(&linearization, &chain, &angles, free)?;
         let last = window.frames.last()?;
         let imu_noise = match setup.poses {
-            PoseKnowledge::Inertial { noise, .. } => noise,
+            PoseKnowledge::Imu { noise, .. } => noise,
             PoseKnowledge::Known => imu_noise,
         };
         Some(Self {

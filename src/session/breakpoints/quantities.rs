@@ -152,7 +152,7 @@ pub(super) const EVENTS: [(&str, &[EventKind]); 10] = [
     ("marginalized", &[EventKind::OldestMarginalized]),
     ("dropped", &[EventKind::SecondNewestDropped]),
     ("outliers", &[EventKind::OutliersRejected]),
-    ("standstill", &[EventKind::Standstill]),
+    ("standstill", &[EventKind::Stationary]),
     ("failure", &[EventKind::Failure]),
     ("chart_switched", &[EventKind::ParameterizationSwitched]),
     ("missing", &[EventKind::MeasurementMissing]),

@@ -156,7 +156,7 @@ fn imu_row_norm(flight: &SyntheticFlight, step: &StepRecord, slot: usize) -> f64
     let model = &flight.given_rig.cameras[0].model;
     let jacobian = step.report.jacobian(&[model]).unwrap();
     let (from, to) = (FrameId(step.report.window[slot - 1].frame_index), FrameId(step.report.window[slot].frame_index));
-    let row = jacobian.rows.iter().find(|row| row.factor == JacobianFactor::Inertial { from, to }).unwrap();
+    let row = jacobian.rows.iter().find(|row| row.factor == JacobianFactor::Imu { from, to }).unwrap();
     let norm = |(_, norm): &(u16, f32)| f64::from(*norm).powi(2);
     row.norms.iter().map(norm).sum::<f64>().sqrt()
 }

@@ -45,7 +45,7 @@ pub(super) enum Motion {
     /// Near-hover for ever.
     Hover,
     /// On the ground.
-    Standstill,
+    Stationary,
     /// Turning in place.
     RotationOnly,
     /// A straight line at constant velocity, not turning.
@@ -161,7 +161,7 @@ impl Path {
 
     fn sway(&self, t: f64) -> Vector3<f64> {
         match self.motion {
-            Motion::Standstill | Motion::ConstantVelocity => Vector3::zeros(),
+            Motion::Stationary | Motion::ConstantVelocity => Vector3::zeros(),
             _ => Vector3::new(0.02 * (1.1 * t).sin(), 0.015 * (1.4 * t + 1.0).sin(), 0.01 * (0.9 * t + 2.0).sin()),
         }
     }
@@ -200,12 +200,12 @@ impl Path {
     fn rotation(&self, t: f64) -> UnitQuaternion<f64> {
         let envelope = self.envelope(t);
         let yaw = match self.motion {
-            Motion::Standstill | Motion::ConstantVelocity => 0.3,
+            Motion::Stationary | Motion::ConstantVelocity => 0.3,
             _ => 0.3 + envelope * self.yaw_amplitude * (self.yaw_rate * (t - self.hover_s)).sin(),
         };
         let heading = UnitQuaternion::from_scaled_axis(Vector3::z() * yaw);
         let tilt = match self.motion {
-            Motion::Standstill => so3::exp(&Vector3::new(0.05, -0.03, 0.0)),
+            Motion::Stationary => so3::exp(&Vector3::new(0.05, -0.03, 0.0)),
             Motion::RotationOnly => {
                 so3::exp(&(Vector3::new(0.3 * (1.3 * t).sin(), 0.25 * (1.7 * t).sin(), 0.0) * envelope))
             }

@@ -239,7 +239,7 @@ fn hover_rotation_and_constant_velocity_wait_with_reasons() {
 
 #[test]
 fn a_stationary_estimate_is_kept_or_used_at_once() {
-    let flight_options = FlightOptions { duration_s: 2.0, ..FlightOptions::new(3, Motion::Standstill) };
+    let flight_options = FlightOptions { duration_s: 2.0, ..FlightOptions::new(3, Motion::Stationary) };
     let flight = fly(&flight_options);
     let options = options_for(&flight_options);
     let newest = flight.frames.len() - 1;
