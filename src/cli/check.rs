@@ -29,9 +29,13 @@ pub(crate) struct CheckArguments {
 pub(crate) fn check(arguments: &CheckArguments) -> Result<()> {
     let progress = Progress::spinner("reading the log");
     let log = Arc::new(FlightLog::open(&arguments.log)?);
-    let rig = Rig::for_log(&log, arguments.rig.as_deref());
+    let (rig, unused_keys) = match Rig::for_log_with_unused_keys(&log, arguments.rig.as_deref()) {
+        Ok((rig, unused_keys)) => (Ok(rig), unused_keys),
+        Err(error) => (Err(error), Vec::new()),
+    };
     let rotations = rig.as_ref().map_or_else(|_| Vec::new(), |rig| session::image_rotations(&log, rig));
-    let report = log_check::check(&log, rig.as_ref(), &rotations);
+    let mut report = log_check::check(&log, rig.as_ref(), &rotations);
+    report.add_unused_rig_keys(&unused_keys);
     drop(progress);
     print_report(&report, arguments.json)
 }

@@ -18,6 +18,7 @@ mod sensor_frame;
 pub(crate) mod stream;
 #[cfg(test)]
 mod tests;
+mod text;
 mod writer;
 
 pub use error::LogError;
@@ -26,6 +27,7 @@ pub use log::{FlightLog, TopicInfo};
 pub use messages::MessageKind;
 pub use sensor_frame::{LogWarning, SensorFrame};
 pub use stream::FrameStream;
+pub use text::{edit_distance, nearest_name, printable, printable_lines, shortened};
 pub use writer::{
     CircleAnnotation, LinesAnnotation, LogCompression, LogLevel, LogWriter, LogWriterOptions, MessageTimes,
     MessageType, NamedTransform, Rgba,

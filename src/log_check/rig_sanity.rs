@@ -1,6 +1,6 @@
 use nalgebra::Vector2;
 
-use super::{Area, Findings, Severity};
+use super::{Area, CheckReport, Finding, Findings, Severity};
 use crate::camera::{CameraModel, Projection};
 use crate::flight_log::FlightLog;
 use crate::sensors::{CameraRig, ChainPrior, GimbalRig, Rig};
@@ -9,6 +9,24 @@ use crate::sensors::{CameraRig, ChainPrior, GimbalRig, Rig};
 const LONGEST_LEVER_M: f64 = 1.0;
 /// Difference of the log's intrinsics from the rig's that is reported, as a ratio of the focal length.
 const INTRINSICS_TOLERANCE: f64 = 0.02;
+
+impl CheckReport {
+    /// Adds a note about keys in the file of the rig that other programs write and this one does not use.
+    pub fn add_unused_rig_keys(&mut self, keys: &[String]) {
+        if keys.is_empty() {
+            return;
+        }
+        let place = self.findings.iter().position(|finding| finding.severity < Severity::Note);
+        let note = Finding {
+            severity: Severity::Note,
+            area: Area::Log,
+            title: "keys of the rig that are not used".to_owned(),
+            evidence: keys.join(", "),
+            remedy: String::new(),
+        };
+        self.findings.insert(place.unwrap_or(self.findings.len()), note);
+    }
+}
 
 /// Plausibility of the rig's intrinsics, time offsets and chain.
 pub(super) fn check_rig(log: &FlightLog, rig: &Rig, findings: &mut Findings) {

@@ -6,31 +6,37 @@ use nalgebra::Matrix4;
 use serde_json::Value;
 
 use super::super::LogError;
+use super::super::text::{nearest_name, shortened};
 use crate::geometry::RigidTransform;
 
 /// A rotation block may be this far from orthonormal (largest entry of `RᵀR − I`); Kalibr writes 1e-16, hand-written files
 /// are rounded.
 const ROTATION_TOLERANCE: f64 = 1e-3;
 
+/// Longest name of a topic, frame or joint in a rig.
+const LONGEST_TEXT_BYTES: usize = 1024;
+
 /// One field of a rig, present or not.
 #[derive(Clone, Debug)]
 pub(super) struct Field<'a> {
     path: String,
     value: Option<&'a Value>,
+    /// The mapping that it is, or would be, in.
+    parent: Option<&'a Value>,
     file: &'a Path,
 }
 
 impl<'a> Field<'a> {
     /// The whole document.
     pub(super) fn root(value: &'a Value, file: &'a Path) -> Self {
-        Self { path: String::new(), value: Some(value), file }
+        Self { path: String::new(), value: Some(value), parent: None, file }
     }
 
     /// A field of this mapping, present or not; reading it reports a missing one.
     pub(super) fn field(&self, key: &str) -> Self {
         let path = if self.path.is_empty() { key.to_owned() } else { format!("{}.{key}", self.path) };
         let value = self.value.and_then(|value| value.get(key)).filter(|value| !value.is_null());
-        Self { path, value, file: self.file }
+        Self { path, value, parent: self.value, file: self.file }
     }
 
     /// Whether it is there and not null.
@@ -52,16 +58,42 @@ impl<'a> Field<'a> {
     /// `holds X, expected Y`, or `missing, expected Y`.
     pub(super) fn unexpected(&self, expected: &str) -> LogError {
         match self.value {
-            None => self.error(format!("missing, expected {expected}")),
+            None => {
+                let found = self.nearest_sibling().map(|key| format!("; the key '{}' is unknown", shortened(key, 40)));
+                self.error(format!("missing, expected {expected}{}", found.unwrap_or_default()))
+            }
             Some(value) => self.error(format!("{}, expected {expected}", describe(value))),
         }
+    }
+
+    /// A key beside a missing one that looks like a misspelling of it.
+    fn nearest_sibling(&self) -> Option<&'a str> {
+        /// Characters that a misspelling changes at most.
+        const MOST_CHANGED: usize = 2;
+        let key = self.path.rsplit('.').next()?;
+        let siblings = self.parent?.as_object()?.iter().filter(|(_, value)| !value.is_null());
+        let (distance, nearest) = nearest_name(key, siblings.map(|(key, _)| key.as_str()))?;
+        (1..=MOST_CHANGED).contains(&distance).then_some(nearest)
+    }
+
+    /// An angle that was read from this field, when it is one in radians: beyond `largest_rad` it looks like degrees.
+    pub(super) fn in_radians(&self, angle: f64, largest_rad: f64) -> Result<f64, LogError> {
+        if angle.abs() <= largest_rad {
+            return Ok(angle);
+        }
+        let radians = angle.to_radians();
+        Err(self.error(format!(
+            "holds {angle}, which looks like degrees; expected radians, at most {largest_rad:.4} ({angle}° are {radians:.6})"
+        )))
     }
 
     /// The entries of a list.
     pub(super) fn list(&self, expected: &str) -> Result<Vec<Self>, LogError> {
         let items = self.value.and_then(Value::as_array).ok_or_else(|| self.unexpected(expected))?;
-        let item =
-            |(index, value)| Self { path: format!("{}[{index}]", self.path), value: Some(value), file: self.file };
+        let item = |(index, value)| {
+            let path = format!("{}[{index}]", self.path);
+            Self { path, value: Some(value), parent: None, file: self.file }
+        };
         Ok(items.iter().enumerate().map(item).collect())
     }
 
@@ -73,7 +105,11 @@ impl<'a> Field<'a> {
 
     /// A text.
     pub(super) fn text(&self, expected: &str) -> Result<&'a str, LogError> {
-        self.value.and_then(Value::as_str).ok_or_else(|| self.unexpected(expected))
+        let text = self.value.and_then(Value::as_str).ok_or_else(|| self.unexpected(expected))?;
+        if text.len() > LONGEST_TEXT_BYTES {
+            return Err(self.error(format!("{} bytes of text, expected at most {LONGEST_TEXT_BYTES}", text.len())));
+        }
+        Ok(text)
     }
 
     /// A finite number.
@@ -138,7 +174,7 @@ fn describe(value: &Value) -> String {
         Value::Null => "nothing".into(),
         Value::Bool(value) => format!("holds {value}"),
         Value::Number(number) => format!("holds {number}"),
-        Value::String(text) => format!("holds the text '{text}'"),
+        Value::String(text) => format!("holds the text '{}'", shortened(text, 60)),
         Value::Array(items) => format!("holds a list of {}", items.len()),
         Value::Object(_) => "holds a mapping".into(),
     }

@@ -1,24 +1,22 @@
 use std::path::{Path, PathBuf};
 
-use serde_json::Value;
-
 use super::super::messages::{self, CameraInfoMessage, MessageKind};
 use super::super::{FlightLog, LogError};
-use super::fields::Field;
-use super::kalibr;
+use super::document::Document;
 use super::read::{self, CameraFacts, NoFacts};
+use super::{kalibr, keys};
 use crate::camera::CameraModel;
 use crate::sensors::Rig;
 
 impl Rig {
     /// Reads a rig file: the schema of this program, or Kalibr's `camchain-imucam.yaml` with `imu.yaml` beside it.
     pub fn from_file(path: &Path) -> Result<Self, LogError> {
-        from_file(path, &NoFacts)
+        from_file(path, &NoFacts).map(|(rig, _)| rig)
     }
 
     /// Parses the text of a rig in the schema of this program; `file` is named in errors.
     pub fn from_yaml(text: &str, file: &Path) -> Result<Self, LogError> {
-        from_document(&read::parse_yaml(text, file)?, file, &NoFacts)
+        from_document(&Document::parse(text.to_owned(), file)?, &NoFacts).map(|(rig, _)| rig)
     }
 
     /// Reads `NAME.rig.yaml` beside `NAME.mcap`, `None` when there is no such file.
@@ -30,6 +28,11 @@ impl Rig {
     /// The rig to use with a log: the file named by the user, else the one beside the log, else the one attached to it.
     /// Intrinsics and image rates that it does not contain are taken from the log.
     pub fn for_log(log: &FlightLog, explicit: Option<&Path>) -> Result<Self, LogError> {
+        Self::for_log_with_unused_keys(log, explicit).map(|(rig, _)| rig)
+    }
+
+    /// The rig of [`Self::for_log`], with the paths of the keys in its file that other programs write and that are not used.
+    pub fn for_log_with_unused_keys(log: &FlightLog, explicit: Option<&Path>) -> Result<(Self, Vec<String>), LogError> {
         let beside = log.path().with_extension("rig.yaml");
         find(log, explicit, &beside, ".rig.yaml")?
             .ok_or_else(|| LogError::NoRig { beside, path: log.path().to_owned() })
@@ -37,11 +40,20 @@ impl Rig {
 
     /// The ground-truth rig, found in the same way (`NAME.ground_truth.yaml`, or attached); `None` when there is none.
     pub fn ground_truth_for_log(log: &FlightLog, explicit: Option<&Path>) -> Result<Option<Self>, LogError> {
-        find(log, explicit, &log.path().with_extension("truth.yaml"), ".truth.yaml")
+        let found = find(log, explicit, &log.path().with_extension("truth.yaml"), ".truth.yaml")?;
+        Ok(found.map(|(rig, _)| rig))
     }
 }
 
-fn find(log: &FlightLog, explicit: Option<&Path>, beside: &Path, ending: &str) -> Result<Option<Rig>, LogError> {
+/// A rig with the paths of those keys of its file that are known and have no use here.
+type RigWithUnusedKeys = (Rig, Vec<String>);
+
+fn find(
+    log: &FlightLog,
+    explicit: Option<&Path>,
+    beside: &Path,
+    ending: &str,
+) -> Result<Option<RigWithUnusedKeys>, LogError> {
     if let Some(path) = explicit {
         return from_file(path, log).map(Some);
     }
@@ -50,32 +62,26 @@ fn find(log: &FlightLog, explicit: Option<&Path>, beside: &Path, ending: &str) -
     }
     let Some((name, content)) = log.attachment(ending) else { return Ok(None) };
     let file = PathBuf::from(format!("{} (attachment {name})", log.path().display()));
-    let text = std::str::from_utf8(content)
-        .map_err(|error| LogError::RigSyntax { problem: error.to_string(), path: file.clone() })?;
-    from_document(&read::parse_yaml(text, &file)?, &file, log).map(Some)
+    from_document(&Document::from_bytes(content.to_vec(), &file)?, log).map(Some)
 }
 
-fn read_text(path: &Path) -> Result<String, LogError> {
-    std::fs::read_to_string(path).map_err(|source| LogError::Io {
-        action: "read the rig",
-        source,
-        path: path.to_owned(),
-    })
+fn from_file(path: &Path, facts: &dyn CameraFacts) -> Result<RigWithUnusedKeys, LogError> {
+    from_document(&Document::read(path)?, facts)
 }
 
-fn from_file(path: &Path, facts: &dyn CameraFacts) -> Result<Rig, LogError> {
-    from_document(&read::parse_yaml(&read_text(path)?, path)?, path, facts)
-}
-
-fn from_document(document: &Value, file: &Path, facts: &dyn CameraFacts) -> Result<Rig, LogError> {
-    let root = Field::root(document, file);
+fn from_document(document: &Document, facts: &dyn CameraFacts) -> Result<RigWithUnusedKeys, LogError> {
+    let file = &document.file;
     let stem = file.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let name = stem.split('.').next().unwrap_or_default();
-    if !kalibr::is_camera_chain(document) {
-        return read::read_rig(&root, name, facts);
+    let with_line = |error| document.with_line(error);
+    let root = document.root();
+    if !kalibr::is_camera_chain(&document.value) {
+        let rig = read::read_rig(&root, name, facts).map_err(with_line)?;
+        return Ok((rig, keys::check_rig(&document.value, file).map_err(with_line)?));
     }
     if root.field("imu0").is_present() {
-        return kalibr::read_camera_chain(&root, &root, name, facts);
+        let rig = kalibr::read_camera_chain(&root, &root, name, facts).map_err(with_line)?;
+        return Ok((rig, keys::check_rig(&document.value, file).map_err(with_line)?));
     }
     let candidates = kalibr::imu_files(file);
     let Some(imu_file) = candidates.iter().find(|candidate| candidate.is_file()) else {
@@ -87,8 +93,12 @@ fn from_document(document: &Value, file: &Path, facts: &dyn CameraFacts) -> Resu
         let expected = format!("the IMU in one of {} beside this camera chain", names.join(", "));
         return Err(root.field("imu0").unexpected(&expected));
     };
-    let imu = read::parse_yaml(&read_text(imu_file)?, imu_file)?;
-    kalibr::read_camera_chain(&root, &Field::root(&imu, imu_file), name, facts)
+    let imu = Document::read(imu_file)?;
+    let with_line = |error| imu.with_line(document.with_line(error));
+    let rig = kalibr::read_camera_chain(&root, &imu.root(), name, facts).map_err(with_line)?;
+    let mut unused = keys::check_rig(&document.value, file).map_err(with_line)?;
+    unused.extend(keys::check_imu_file(&imu.value, imu_file).map_err(with_line)?);
+    Ok((rig, unused))
 }
 
 impl CameraFacts for FlightLog {

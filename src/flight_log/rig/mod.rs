@@ -1,8 +1,10 @@
 //! Rig files: our own schema and Kalibr's, read and written.
 
+mod document;
 mod fields;
 mod find;
 mod kalibr;
+mod keys;
 mod read;
 mod save;
 #[cfg(test)]

@@ -1,7 +1,3 @@
-use std::path::Path;
-
-use serde_json::Value;
-
 use super::super::LogError;
 use super::fields::Field;
 use crate::camera::{CameraError, CameraModel};
@@ -10,8 +6,19 @@ use crate::sensors::{CameraMount, CameraRig, ChainPrior, GimbalRig, ImuNoise, Im
 
 /// The version of the schema that is read and written.
 const RIG_VERSION: u64 = 1;
+/// Most joints of a gimbal: the covariance of the chain grows with the square of its links.
+const MOST_LINKS: usize = 16;
+/// Most cameras of a rig.
+const MOST_CAMERAS: usize = 16;
 /// Gravity for Kalibr's files, which do not contain it, in m/s².
 pub(super) const STANDARD_GRAVITY_M_PER_S2: f64 = 9.81;
+
+/// A joint offset or twist beyond a full rotation is an angle in degrees.
+const LARGEST_OFFSET_RAD: f64 = std::f64::consts::TAU;
+/// A joint that rotates further than two rotations either way has limits in degrees.
+const LARGEST_LIMIT_RAD: f64 = 2.0 * std::f64::consts::TAU;
+/// An encoder with a larger standard deviation measures nothing; 0.5 to 1 occur as degrees.
+const LARGEST_SIGMA_RAD: f64 = 0.5;
 
 /// Values of a log for a rig that does not contain them, by image topic.
 pub(crate) trait CameraFacts {
@@ -32,15 +39,6 @@ impl CameraFacts for NoFacts {
     fn rate_hz(&self, _image_topic: &str) -> Option<f64> {
         None
     }
-}
-
-/// Parses the YAML text of any rig file.
-pub(super) fn parse_yaml(text: &str, file: &Path) -> Result<Value, LogError> {
-    serde_saphyr::from_str(text).map_err(|error| {
-        let problem = error.to_string();
-        let first_line = problem.lines().next().unwrap_or_default().to_owned();
-        LogError::RigSyntax { problem: first_line, path: file.to_owned() }
-    })
 }
 
 /// Reads a rig in the schema of this program.
@@ -77,6 +75,9 @@ pub(super) fn camera_keys(root: &Field<'_>) -> Result<Vec<String>, LogError> {
     let mut keys: Vec<&str> = root.keys("a mapping with imu0, cam0, …")?;
     keys.retain(|key| number(key).is_some());
     keys.sort_by_key(|key| number(key));
+    if keys.len() > MOST_CAMERAS {
+        return Err(root.error(format!("{} cameras, expected at most {MOST_CAMERAS}", keys.len())));
+    }
     Ok(keys.into_iter().map(str::to_owned).collect())
 }
 
@@ -201,11 +202,15 @@ fn read_gimbal(gimbal: &Field<'_>) -> Result<GimbalRig, LogError> {
     let sigma = gimbal.field("encoder_sigma").optional();
     let encoder_sigma_rad =
         sigma.map(|sigma| sigma.positive("a standard deviation greater than 0 in rad, or null")).transpose()?;
+    if let Some(sigma_rad) = encoder_sigma_rad {
+        gimbal.field("encoder_sigma").in_radians(sigma_rad, LARGEST_SIGMA_RAD)?;
+    }
     let prior = gimbal.field("prior");
     let prior = ChainPrior {
         translation_bound_m: prior.field("translation_bound").not_negative("a bound in m")?,
         rotation_bound_rad: prior.field("rotation_bound").not_negative("a bound in rad")?,
     };
+    gimbal.field("prior").field("rotation_bound").in_radians(prior.rotation_bound_rad, std::f64::consts::PI)?;
     let parameterization = gimbal.field("parameterization");
     let switches_parameterization =
         match parameterization.is_present().then(|| parameterization.text("auto")).transpose()? {
@@ -215,12 +220,19 @@ fn read_gimbal(gimbal: &Field<'_>) -> Result<GimbalRig, LogError> {
         };
     let mut links = Vec::new();
     let mut joints: Vec<Joint> = Vec::new();
-    for link in gimbal.field("links").list("a list of links with joint, theta_offset, d, a, alpha and limits")? {
+    let fields = gimbal.field("links").list("a list of links with joint, theta_offset, d, a, alpha and limits")?;
+    if fields.len() > MOST_LINKS {
+        return Err(gimbal.field("links").error(format!("{} links, expected at most {MOST_LINKS}", fields.len())));
+    }
+    for link in fields {
         let name = link.field("joint").text("the joint's name in the JointState")?.to_owned();
         if joints.iter().any(|joint| joint.name == name) {
             return Err(link.field("joint").error(format!("'{name}' again, expected each joint once")));
         }
-        let angle = |key: &str| link.field(key).number("an angle in rad");
+        let angle = |key: &str| {
+            let angle_rad = link.field(key).number("an angle in rad")?;
+            link.field(key).in_radians(angle_rad, LARGEST_OFFSET_RAD)
+        };
         let length = |key: &str| link.field(key).number("a length in m");
         links.push(DhLink {
             theta_offset_rad: angle("theta_offset")?,
@@ -236,6 +248,9 @@ fn read_gimbal(gimbal: &Field<'_>) -> Result<GimbalRig, LogError> {
         if limits[0] >= limits[1] {
             let problem = format!("lower limit {} not below upper limit {}", limits[0], limits[1]);
             return Err(link.field("limits").error(problem));
+        }
+        for limit_rad in limits {
+            link.field("limits").in_radians(limit_rad, LARGEST_LIMIT_RAD)?;
         }
         joints.push(Joint { name, limits_rad: (limits[0], limits[1]) });
     }

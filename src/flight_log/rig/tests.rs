@@ -120,6 +120,104 @@ fn a_wrong_field_is_named_with_its_value() {
     assert!(syntax.contains("not valid YAML"), "{syntax}");
 }
 
+#[test]
+fn an_unknown_key_is_named_with_the_nearest_known_one() {
+    let cases = [
+        (
+            "timeshift_cam_imu: 0.0",
+            "timeshift_cam_imuu: 0.05",
+            "cam0.timeshift_cam_imuu: unknown key, the nearest known key is 'timeshift_cam_imu', line 15",
+        ),
+        ("limits: [", "limit: [", "gimbal.links[0].limit: unknown key, the nearest known key is 'limits', line 22"),
+        ("rig_version: 1", "rig_version: 1\nnames: x", "names: unknown key, the nearest known key is 'name', line 2"),
+        ("{rostopic: /truth}", "{rostopic: /truth, topic: /t}", "ground_truth.topic: unknown key"),
+        ("rotation_bound: 0.0087", "rotation_bound: 0.0087, turn_bound: 1", "gimbal.prior.turn_bound: unknown key"),
+        ("frame_id: imu,", "frame: imu,", "imu0.frame: unknown key, the nearest known key is 'frame_id'"),
+        (
+            "mount: gimbal",
+            "mount: gimbal\n  T_imu_cam: []",
+            "cam0.T_imu_cam: unknown key, expected T_cam_imu, the inverse",
+        ),
+        // A required key is missing, and the text says what may be meant for it.
+        (
+            "gravity: 9.81",
+            "gravty: 9.81",
+            "gravity: missing, expected gravity's magnitude in m/s²; the key 'gravty' is unknown",
+        ),
+    ];
+    for (from, to, expected) in cases {
+        assert!(RIG.contains(from), "{from}");
+        let message = parse(&RIG.replacen(from, to, 1)).unwrap_err();
+        assert!(message.starts_with(expected), "{message}\nexpected {expected}");
+    }
+    let several = RIG.replace("frame_id", "frame_ID").replace("encoder_sigma", "encoder_sigm");
+    let message = parse(&several).unwrap_err();
+    assert!(
+        message.contains("also unknown: ") && message.contains("gimbal.encoder_sigm ('encoder_sigma'?)"),
+        "{message}"
+    );
+    let hostile = RIG.replace("rig_version: 1", "rig_version: 1\n\"\\e[2J\": 1");
+    let message = parse(&hostile).unwrap_err();
+    assert!(message.starts_with(r"\u{1b}[2J: unknown key"), "{message}");
+}
+
+#[test]
+fn angles_in_degrees_are_named_with_their_radians() {
+    let cases = [
+        (
+            "theta_offset: -1.56",
+            "theta_offset: -90",
+            "gimbal.links[0].theta_offset: holds -90, which looks like degrees",
+        ),
+        ("alpha: -1.55", "alpha: 90.5", "gimbal.links[0].alpha: holds 90.5, which looks like degrees"),
+        (
+            "limits: [-3.14, 3.14]",
+            "limits: [-180, 180]",
+            "gimbal.links[0].limits: holds -180, which looks like degrees",
+        ),
+        ("encoder_sigma: 0.0087", "encoder_sigma: 0.6", "gimbal.encoder_sigma: holds 0.6, which looks like degrees"),
+        (
+            "rotation_bound: 0.0087",
+            "rotation_bound: 5",
+            "gimbal.prior.rotation_bound: holds 5, which looks like degrees",
+        ),
+    ];
+    for (from, to, expected) in cases {
+        let message = parse(&RIG.replacen(from, to, 1)).unwrap_err();
+        assert!(message.starts_with(expected), "{message}\nexpected {expected}");
+    }
+    let message = parse(&RIG.replacen("theta_offset: -1.56", "theta_offset: -90", 1)).unwrap_err();
+    assert!(message.contains("(-90° are -1.570796)"), "{message}");
+    // A slip ring that is limited to two rotations, and a full rotation as an offset.
+    assert!(parse(&RIG.replacen("[-3.14, 3.14]", "[-12.5, 12.5]", 1)).is_ok());
+    assert!(parse(&RIG.replacen("theta_offset: -1.56", "theta_offset: 6.28", 1)).is_ok());
+}
+
+#[test]
+fn sizes_are_bounded() {
+    let link = "  - {joint: yaw, theta_offset: -1.56, d: 0.046, a: 0.016, alpha: -1.55, limits: [-3.14, 3.14]}\n";
+    let links = |count: usize| {
+        let links: String = (0..count).map(|number| link.replace("yaw", &format!("j{number}"))).collect();
+        parse(&RIG.replace(link, &links))
+    };
+    assert_eq!(links(16).unwrap().gimbal.unwrap().joints.len(), 16);
+    let message = links(17).unwrap_err();
+    assert!(message.starts_with("gimbal.links: 17 links, expected at most 16"), "{message}");
+    let message = links(5000).unwrap_err();
+    assert!(message.starts_with("gimbal.links: 5000 links, expected at most 16"), "{message}");
+    let message = parse(&RIG.replace("rostopic: /camera", &format!("rostopic: /{}", "c".repeat(5000)))).unwrap_err();
+    assert!(message.starts_with("cam0.rostopic: 5001 bytes of text, expected at most 1024"), "{message}");
+
+    let folder = tempfile::TempDir::new().unwrap();
+    let path = folder.path().join("large.rig.yaml");
+    fs::write(&path, format!("# {}\n{RIG}", "x".repeat(2 << 20))).unwrap();
+    let message = Rig::from_file(&path).unwrap_err().to_string();
+    assert!(message.contains("more than 1048576 bytes"), "{message}");
+    fs::write(&path, b"rig_version: 1\nname: \xff\n").unwrap();
+    let message = Rig::from_file(&path).unwrap_err().to_string();
+    assert!(message.contains("line 2: byte 21 is not UTF-8"), "{message}");
+}
+
 const CAMERA_CHAIN: &str = "\
 cam0:
   T_cam_imu:
@@ -168,4 +266,27 @@ fn kalibrs_files_are_a_rig() {
     let nested = format!("  {}", IMU.trim_end().replace('\n', "\n  "));
     fs::write(folder.path().join("imu-flight.yaml"), format!("imu0:\n{nested}\n").replace("/imu0", "/other")).unwrap();
     assert_eq!(Rig::from_file(&chain).unwrap().imu.topic, "/other");
+}
+
+#[test]
+fn keys_of_kalibr_without_a_use_are_listed() {
+    use crate::flight_log::{FlightLog, LogWriter, LogWriterOptions, MessageTimes};
+    let folder = tempfile::TempDir::new().unwrap();
+    let path = folder.path().join("flight.mcap");
+    let mut writer = LogWriter::create(&path, &LogWriterOptions::default()).unwrap();
+    let times = MessageTimes { stamp_ns: 1_000_000_000, log_time_ns: 1_000_000_000 };
+    writer.write_imu("/imu0", "imu", times, &nalgebra::Vector3::zeros(), &nalgebra::Vector3::z()).unwrap();
+    writer.finish().unwrap();
+    let chain = folder.path().join("camchain-imucam.yaml");
+    fs::write(&chain, format!("{CAMERA_CHAIN}  T_cn_cnm1:\n  - [1.0, 0.0, 0.0, 0.0]\n")).unwrap();
+    let imu = "model: calibrated\ntime_offset: 0.0\nT_i_b:\n- [1.0, 0.0, 0.0, 0.0]\n";
+    fs::write(folder.path().join("imu.yaml"), format!("{IMU}{imu}")).unwrap();
+    let log = FlightLog::open(&path).unwrap();
+    let (_, unused) = Rig::for_log_with_unused_keys(&log, Some(&chain)).unwrap();
+    assert_eq!(unused, ["cam0.cam_overlaps", "cam0.T_cn_cnm1", "T_i_b", "model", "time_offset"]);
+    // An unknown key of the IMU's own file is named with that file.
+    fs::write(folder.path().join("imu.yaml"), format!("{IMU}updaterate: 1\n")).unwrap();
+    let message = Rig::for_log(&log, Some(&chain)).unwrap_err().to_string();
+    assert!(message.starts_with("updaterate: unknown key, the nearest known key is 'update_rate', line 7"), "{message}");
+    assert!(message.ends_with("imu.yaml"), "{message}");
 }

@@ -6,6 +6,7 @@ use super::expression::{Arithmetic, Condition, ConditionProblem, Number, Predica
 use super::lexer::{Token, tokens};
 use super::quantities::{CAUSES, EVENTS, FLAGS, NAMED, NUMBERS, NamedNumber};
 use crate::estimator::FactorKind;
+use crate::flight_log::nearest_name;
 
 /// Limit of nested parentheses and signs; deeper nesting is an error, because it could overflow the stack.
 const MAX_DEPTH: usize = 60;
@@ -375,24 +376,9 @@ impl Parser<'_> {
 /// The message for an unknown name, with the nearest known name where one is similar, else with all known names.
 fn unknown<'a>(what: &str, name: &str, known: impl Iterator<Item = &'a str>) -> String {
     let known: Vec<&str> = known.collect();
-    let near = known.iter().map(|known| (distance(name, known), *known)).min().filter(|(far, _)| *far <= 2);
+    let near = nearest_name(name, known.iter().copied()).filter(|(far, _)| *far <= 2);
     match near {
         Some((_, near)) => format!("there is no {what} '{name}'; do you mean '{near}'?"),
         None => format!("there is no {what} '{name}'; expected one of {}", known.join(", ")),
     }
-}
-
-/// Levenshtein distance in characters.
-fn distance(from: &str, to: &str) -> usize {
-    let to: Vec<char> = to.chars().collect();
-    let mut row: Vec<usize> = (0..=to.len()).collect();
-    for (index, character) in from.chars().enumerate() {
-        let mut diagonal = std::mem::replace(&mut row[0], index + 1);
-        for (place, other) in to.iter().enumerate() {
-            let changed = diagonal + usize::from(character != *other);
-            diagonal = row[place + 1];
-            row[place + 1] = changed.min(diagonal + 1).min(row[place] + 1);
-        }
-    }
-    row[to.len()]
 }

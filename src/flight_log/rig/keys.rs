@@ -1,0 +1,169 @@
+//! The keys of a rig: which are read, which are known and unused, and an error for any other.
+
+use std::path::Path;
+
+use serde_json::Value;
+
+use super::super::LogError;
+use super::super::text::{nearest_name, printable, shortened};
+
+/// Keys of one kind of mapping.
+struct Keys {
+    /// Keys that are read.
+    read: &'static [&'static str],
+    /// Keys of other programs that have no meaning here, and appendices of our own that are for people.
+    unused: &'static [&'static str],
+}
+
+const ROOT: Keys = Keys {
+    read: &["rig_version", "name", "gravity", "imu0", "cam0", "gimbal", "ground_truth"],
+    // Written by `dcvins calibrate` and `dcvins simulate` at the end of a rig.
+    unused: APPENDICES,
+};
+/// Entries that this program appends to a rig for its reader; they are no surprise to anyone.
+const APPENDICES: &[&str] = &["calibration", "truth"];
+/// With what Kalibr writes for its IMU models, and OpenVINS in the same files.
+const IMU: Keys = Keys {
+    read: &[
+        "rostopic",
+        "frame_id",
+        "update_rate",
+        "accelerometer_noise_density",
+        "accelerometer_random_walk",
+        "gyroscope_noise_density",
+        "gyroscope_random_walk",
+    ],
+    unused: &[
+        "model",
+        "T_i_b",
+        "time_offset",
+        "accelerometers",
+        "gyroscopes",
+        "Tw",
+        "R_IMUtoGYRO",
+        "Ta",
+        "R_IMUtoACC",
+        "Tg",
+    ],
+};
+const CAMERA: Keys = Keys {
+    read: &[
+        "mount",
+        "rostopic",
+        "frame_id",
+        "update_rate",
+        "camera_model",
+        "intrinsics",
+        "distortion_model",
+        "distortion_coeffs",
+        "resolution",
+        "timeshift_cam_imu",
+        "T_cam_imu",
+    ],
+    unused: &["cam_overlaps", "T_cn_cnm1", "line_delay", "model"],
+};
+const GIMBAL: Keys = Keys {
+    read: &["rostopic", "update_rate", "encoder_sigma", "prior", "parameterization", "T_I_B", "links", "T_E_C"],
+    unused: &["frame_id", "model"],
+};
+const PRIOR: Keys = Keys { read: &["translation_bound", "rotation_bound"], unused: &[] };
+const LINK: Keys = Keys { read: &["joint", "theta_offset", "d", "a", "alpha", "limits"], unused: &[] };
+const GROUND_TRUTH: Keys = Keys { read: &["rostopic"], unused: &["frame_id"] };
+
+/// What a document holds beyond the keys that are read.
+#[derive(Default)]
+struct Found {
+    /// Paths of unknown keys, with the nearest known key.
+    unknown: Vec<(String, &'static str)>,
+    unused: Vec<String>,
+}
+
+/// Checks every key of a rig or of Kalibr's camera chain; returns the paths of known keys without a use here.
+pub(super) fn check_rig(document: &Value, file: &Path) -> Result<Vec<String>, LogError> {
+    let mut found = Found::default();
+    check_root(document, &mut found);
+    found.into_result(file)
+}
+
+/// Checks every key of Kalibr's IMU file: the IMU itself, or a mapping with `imu0`.
+pub(super) fn check_imu_file(document: &Value, file: &Path) -> Result<Vec<String>, LogError> {
+    let mut found = Found::default();
+    if document.get("imu0").is_some() {
+        check_root(document, &mut found);
+    } else {
+        check_mapping(document, "", &IMU, &mut found);
+    }
+    found.into_result(file)
+}
+
+/// Whether a key is a name with a number behind it, such as `cam0`.
+fn is_numbered(key: &str, name: &str) -> bool {
+    key.strip_prefix(name).is_some_and(|number| number.parse::<u32>().is_ok())
+}
+
+fn check_root(document: &Value, found: &mut Found) {
+    let Some(mapping) = document.as_object() else { return };
+    for (key, value) in mapping {
+        match key.as_str() {
+            "imu0" => check_mapping(value, key, &IMU, found),
+            "gimbal" => check_gimbal(value, found),
+            "ground_truth" => check_mapping(value, key, &GROUND_TRUTH, found),
+            key if is_numbered(key, "cam") => check_mapping(value, key, &CAMERA, found),
+            // One IMU is estimated; Kalibr's files may have several.
+            key if is_numbered(key, "imu") => found.unused.push(key.to_owned()),
+            key => found.check_key("", key, &ROOT),
+        }
+    }
+}
+
+fn check_gimbal(gimbal: &Value, found: &mut Found) {
+    check_mapping(gimbal, "gimbal", &GIMBAL, found);
+    if let Some(prior) = gimbal.get("prior") {
+        check_mapping(prior, "gimbal.prior", &PRIOR, found);
+    }
+    for (index, link) in gimbal.get("links").and_then(Value::as_array).into_iter().flatten().enumerate() {
+        check_mapping(link, &format!("gimbal.links[{index}]"), &LINK, found);
+    }
+}
+
+fn check_mapping(mapping: &Value, path: &str, keys: &Keys, found: &mut Found) {
+    for key in mapping.as_object().into_iter().flat_map(|mapping| mapping.keys()) {
+        found.check_key(path, key, keys);
+    }
+}
+
+impl Found {
+    fn check_key(&mut self, path: &str, key: &str, keys: &Keys) {
+        let full = || if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") };
+        if keys.read.contains(&key) || path.is_empty() && APPENDICES.contains(&key) {
+            return;
+        }
+        if keys.unused.contains(&key) {
+            self.unused.push(full());
+            return;
+        }
+        let known = keys.read.iter().chain(keys.unused).copied();
+        let nearest = nearest_name(key, known).map_or("", |(_, known)| known);
+        self.unknown.push((full(), nearest));
+    }
+
+    /// The unused keys, or an error about the unknown ones.
+    fn into_result(self, file: &Path) -> Result<Vec<String>, LogError> {
+        /// Further unknown keys that one message lists.
+        const MOST_LISTED: usize = 8;
+        let Some(((field, nearest), others)) = self.unknown.split_first() else { return Ok(self.unused) };
+        let mut problem = match field.rsplit_once('.') {
+            Some((_, "T_imu_cam")) => "unknown key, expected T_cam_imu, the inverse of T_imu_cam".to_owned(),
+            _ => format!("unknown key, the nearest known key is '{nearest}'"),
+        };
+        if !others.is_empty() {
+            let listed = others.iter().take(MOST_LISTED);
+            let listed: Vec<String> =
+                listed.map(|(field, nearest)| format!("{} ('{nearest}'?)", shortened(field, 60))).collect();
+            let more = others.len().saturating_sub(MOST_LISTED);
+            let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+            problem.push_str(&format!("; also unknown: {}{more}", listed.join(", ")));
+        }
+        Err(LogError::Rig { field: printable(field).into_owned(), problem, path: file.to_owned() })
+    }
+}

@@ -1,0 +1,105 @@
+//! Names of logs and rigs as text for people: safe for a terminal, short enough for a table, and the nearest known one.
+
+use std::borrow::Cow;
+use std::fmt::Write as _;
+
+/// Whether a character can change how a terminal shows the text around it: control characters (C0, DEL, C1), line and
+/// paragraph separators, marks that reorder text (bidirectional overrides, embeddings and isolates).
+fn is_unprintable(letter: char) -> bool {
+    letter.is_control()
+        || matches!(letter, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
+fn escaped(text: &str, keeps: impl Fn(char) -> bool) -> Cow<'_, str> {
+    let escapes = |letter: char| is_unprintable(letter) && !keeps(letter);
+    if !text.contains(escapes) {
+        return Cow::Borrowed(text);
+    }
+    let mut out = String::with_capacity(text.len() + 8);
+    for letter in text.chars() {
+        match letter {
+            letter if !escapes(letter) => out.push(letter),
+            '\n' | '\r' | '\t' => out.extend(letter.escape_default()),
+            // Writing to a string cannot fail.
+            letter => {
+                let _infallible = write!(out, "\\u{{{:x}}}", u32::from(letter));
+            }
+        }
+    }
+    Cow::Owned(out)
+}
+
+/// A name of foreign origin (topic, frame, joint, file) for one line of text: characters that control a terminal or
+/// reorder text are written as escapes such as `\u{1b}` and `\n`.
+pub fn printable(name: &str) -> Cow<'_, str> {
+    escaped(name, |_| false)
+}
+
+/// The same for a text of several lines, whose line breaks and tabs are kept.
+pub fn printable_lines(text: &str) -> Cow<'_, str> {
+    escaped(text, |letter| letter == '\n' || letter == '\t')
+}
+
+/// A printable name of at most `most` characters, its middle replaced by an ellipsis where it is longer.
+pub fn shortened(name: &str, most: usize) -> Cow<'_, str> {
+    let name = printable(name);
+    let count = name.chars().count();
+    if count <= most {
+        return name;
+    }
+    let kept = most.saturating_sub(1);
+    let head: String = name.chars().take(kept.div_ceil(2)).collect();
+    let tail: String = name.chars().skip(count - kept / 2).collect();
+    Cow::Owned(format!("{head}…{tail}"))
+}
+
+/// Edit distance: how many characters have to be replaced, inserted or deleted.
+pub fn edit_distance(from: &str, to: &str) -> usize {
+    let to: Vec<char> = to.chars().collect();
+    let mut row: Vec<usize> = (0..=to.len()).collect();
+    for (index, letter) in from.chars().enumerate() {
+        let mut diagonal = std::mem::replace(&mut row[0], index + 1);
+        for (place, other) in to.iter().enumerate() {
+            let changed = diagonal + usize::from(letter != *other);
+            diagonal = row[place + 1];
+            row[place + 1] = changed.min(diagonal + 1).min(row[place] + 1);
+        }
+    }
+    row[to.len()]
+}
+
+/// The known name with the smallest edit distance, with that distance; the first in the alphabet among equals.
+pub fn nearest_name<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<(usize, &'a str)> {
+    // A name of a megabyte is near nothing, and takes no time to say so.
+    let name: String = name.chars().take(256).collect();
+    known.into_iter().map(|known| (edit_distance(&name, known), known)).min()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn terminal_controls_are_escaped() {
+        assert_eq!(printable("/camera/größe"), "/camera/größe");
+        assert_eq!(printable("a\u{1b}[2Jb\n\u{7f}\u{9b}"), r"a\u{1b}[2Jb\n\u{7f}\u{9b}");
+        assert_eq!(printable("\u{202e}gpj.exe\u{2066}"), r"\u{202e}gpj.exe\u{2066}");
+        assert_eq!(printable_lines("a\tb\nc\rd\u{1b}"), "a\tb\nc\\rd\\u{1b}");
+    }
+
+    #[test]
+    fn long_names_are_cut_in_their_middle() {
+        assert_eq!(shortened("/imu", 4), "/imu");
+        assert_eq!(shortened("/abcdefgh", 5), "/a…gh");
+        assert_eq!(shortened(&"x".repeat(100_000), 40).chars().count(), 40);
+        assert_eq!(shortened("\u{1b}", 3), r"\…}");
+    }
+
+    #[test]
+    fn the_nearest_name_is_found() {
+        let known = ["timeshift_cam_imu", "T_cam_imu", "limits"];
+        assert_eq!(nearest_name("timeshift_cam_imuu", known), Some((1, "timeshift_cam_imu")));
+        assert_eq!(nearest_name("limit", known), Some((1, "limits")));
+        assert_eq!(nearest_name("x", []), None);
+    }
+}
