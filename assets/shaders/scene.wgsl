@@ -6,8 +6,8 @@ struct View {
 };
 
 @group(0) @binding(0) var<uniform> view: View;
-@group(1) @binding(0) var picture: texture_2d<f32>;
-@group(1) @binding(1) var picture_sampler: sampler;
+@group(1) @binding(0) var image: texture_2d<f32>;
+@group(1) @binding(1) var image_sampler: sampler;
 
 struct Colored {
     @builtin(position) position: vec4<f32>,
@@ -71,20 +71,20 @@ fn disc_vertex(
     return Colored(clip_position(vec3<f32>(place, centre.z)), color);
 }
 
-struct PictureCorner {
+struct ImageCorner {
     @builtin(position) position: vec4<f32>,
     @location(0) uv: vec2<f32>,
 };
 
 // Depth is one over the distance up to a factor, which makes it one over the w that keeps the image straight.
 @vertex
-fn picture_vertex(@location(0) place: vec3<f32>, @location(1) uv: vec2<f32>) -> PictureCorner {
-    return PictureCorner(clip_position(place) / place.z, uv);
+fn image_vertex(@location(0) place: vec3<f32>, @location(1) uv: vec2<f32>) -> ImageCorner {
+    return ImageCorner(clip_position(place) / place.z, uv);
 }
 
 @fragment
-fn picture_fragment(in: PictureCorner) -> @location(0) vec4<f32> {
-    let grey = textureSample(picture, picture_sampler, in.uv).r;
+fn image_fragment(in: ImageCorner) -> @location(0) vec4<f32> {
+    let grey = textureSample(image, image_sampler, in.uv).r;
     return vec4<f32>(grey, grey, grey, 1.0);
 }
 

@@ -144,8 +144,8 @@ mod figures {
                     let names = [prefix.as_str(), caption.as_str()];
                     ReportDrawing::Svg(draw_panel_svg(panel, recording, cursor_ns, &mut images, &options, names)?)
                 } else {
-                    let picture = draw_panel(panel, recording, cursor_ns, &mut images, &options)?;
-                    ReportDrawing::Png(png_bytes(&picture)?)
+                    let screenshot = draw_panel(panel, recording, cursor_ns, &mut images, &options)?;
+                    ReportDrawing::Png(png_bytes(&screenshot)?)
                 };
                 figures.push(ReportFigure { heading: heading.to_owned(), caption, drawing });
             }

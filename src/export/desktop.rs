@@ -13,7 +13,7 @@ use super::session_file::is_session;
 use crate::gui::desktop::{Desktop, PanelExport, PathEntry};
 
 /// How many entries of a folder are looked at.
-const MOST_READ: usize = 5000;
+const MAX_ENTRIES: usize = 5000;
 /// How far above the program sample logs are looked for: `target/release/dcvins` lies three folders deep.
 const LEVELS_ABOVE: usize = 4;
 /// Where sample logs lie there: in the repository, and below the prefix of an installed package.
@@ -71,7 +71,7 @@ impl Desktop for Machine {
         let prefix = if typed.contains('/') { format!("{folder}/") } else { String::new() };
         let mut found: Vec<PathEntry> = entries
             .filter_map(Result::ok)
-            .take(MOST_READ)
+            .take(MAX_ENTRIES)
             .filter_map(|entry| {
                 let name = entry.file_name().into_string().ok()?;
                 let hidden = name.starts_with('.') && !begin.starts_with('.');
@@ -140,8 +140,8 @@ impl Desktop for Machine {
 
     fn write_panel(&self, export: &PanelExport) -> Result<Vec<PathBuf>, String> {
         let paths = ["png", "svg", "csv"].map(|kind| self.output.join(format!("{}.{kind}", export.name)));
-        let [picture, drawing, table] = &paths;
-        let written = write_png(&export.picture, picture)
+        let [screenshot, drawing, table] = &paths;
+        let written = write_png(&export.screenshot, screenshot)
             .and_then(|()| write_svg(&export.drawing, drawing))
             .and_then(|()| write_csv(&export.table, table));
         written.map_err(|error| error.to_string())?;
@@ -196,12 +196,12 @@ mod tests {
         assert_eq!((machine.kept_layouts().as_deref(), machine.kept_settings()), (Some("{}"), None));
         machine.keep_settings("{\"scale\": 2}").unwrap();
         assert_eq!(machine.kept_settings().as_deref(), Some("{\"scale\": 2}"));
-        let picture = image::RgbaImage::from_pixel(20, 10, image::Rgba([9, 8, 7, 255]));
+        let screenshot = image::RgbaImage::from_pixel(20, 10, image::Rgba([9, 8, 7, 255]));
         let (drawing, table) = ("<svg/>\n".to_owned(), "a,b\n1,2\n".to_owned());
-        let export = PanelExport { name: "yard/rank-1.500s".to_owned(), picture, drawing, table };
+        let export = PanelExport { name: "yard/rank-1.500s".to_owned(), screenshot, drawing, table };
         let written = machine.write_panel(&export).unwrap();
         assert!(written[0].ends_with("output/yard/rank-1.500s.png"), "{written:?}");
-        assert_eq!(image::open(&written[0]).unwrap().to_rgba8(), export.picture);
+        assert_eq!(image::open(&written[0]).unwrap().to_rgba8(), export.screenshot);
         assert_eq!(fs::read_to_string(&written[1]).unwrap(), export.drawing);
         assert_eq!(fs::read_to_string(&written[2]).unwrap(), export.table);
         fs::write(folder.path().join("blocked"), "").unwrap();
@@ -229,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn memory_is_read_where_the_system_tells_it() {
+    fn memory_is_read_where_the_system_reports_it() {
         let bytes = Machine::new().resident_bytes();
         assert!(!cfg!(target_os = "linux") || bytes.is_some_and(|bytes| bytes > 1 << 20));
     }

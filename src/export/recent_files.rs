@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use directories::ProjectDirs;
 
 /// Most logs in the list.
-const MOST_KEPT: usize = 12;
+const MAX_LOGS: usize = 12;
 
 /// The list in one file: a path per line, the newest first.
 #[derive(Clone, Debug)]
@@ -40,7 +40,7 @@ impl RecentFiles {
 
     fn read(&self) -> Vec<PathBuf> {
         let text = self.file.as_ref().and_then(|file| fs::read_to_string(file).ok()).unwrap_or_default();
-        text.lines().filter(|line| !line.trim().is_empty()).map(PathBuf::from).take(MOST_KEPT).collect()
+        text.lines().filter(|line| !line.trim().is_empty()).map(PathBuf::from).take(MAX_LOGS).collect()
     }
 
     /// Puts a log at the head of the list; a state folder that cannot be written leaves the list as it is.
@@ -54,7 +54,7 @@ impl RecentFiles {
         let mut lines = vec![line];
         for known in self.read() {
             let known = known.to_string_lossy().into_owned();
-            if lines.len() < MOST_KEPT && !lines.contains(&known) {
+            if lines.len() < MAX_LOGS && !lines.contains(&known) {
                 lines.push(known);
             }
         }
@@ -83,11 +83,11 @@ mod tests {
         recent.remember(&logs[15]);
         let names: Vec<String> =
             recent.list().iter().map(|path| path.file_stem().unwrap().to_string_lossy().into_owned()).collect();
-        assert_eq!(names.len(), MOST_KEPT);
+        assert_eq!(names.len(), MAX_LOGS);
         assert_eq!(names[..4], ["15", "19", "18", "17"]);
         assert_eq!(names.iter().filter(|name| *name == "15").count(), 1);
         fs::remove_file(&logs[15]).unwrap();
-        assert_eq!(recent.list().len(), MOST_KEPT - 1, "what is gone is not offered");
+        assert_eq!(recent.list().len(), MAX_LOGS - 1, "what is gone is not offered");
     }
 
     #[test]

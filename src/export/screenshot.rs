@@ -33,7 +33,7 @@ pub const PANEL_NAMES: [&str; PanelName::ALL.len() + 1] = {
 };
 
 /// Largest side of a screenshot in pixels.
-const LARGEST_SIDE_PX: u32 = 16_384;
+const MAX_SIDE_PX: u32 = 16_384;
 
 /// Renderer of a screenshot.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -88,7 +88,7 @@ pub enum ScreenshotError {
         name: String,
     },
     /// The size is out of range.
-    #[error("a screenshot of {width}×{height} pixels cannot be drawn: expected 16 to {LARGEST_SIDE_PX} each way")]
+    #[error("a screenshot of {width}×{height} pixels cannot be drawn: expected 16 to {MAX_SIDE_PX} each way")]
     Size {
         /// Width in pixels.
         width: u32,
@@ -209,7 +209,7 @@ fn with_panel<T>(
 
 fn check(options: &ScreenshotOptions) -> Result<(), ScreenshotError> {
     let [width, height] = options.size_px;
-    if [width, height].iter().any(|side| !(16..=LARGEST_SIDE_PX).contains(side)) {
+    if [width, height].iter().any(|side| !(16..=MAX_SIDE_PX).contains(side)) {
         return Err(ScreenshotError::Size { width, height });
     }
     let scale = options.pixels_per_point;
@@ -217,19 +217,19 @@ fn check(options: &ScreenshotOptions) -> Result<(), ScreenshotError> {
 }
 
 /// Encodes an opaque image as PNG, always with the same settings.
-pub fn png_bytes(picture: &RgbaImage) -> Result<Vec<u8>, ScreenshotError> {
-    let rgb: Vec<u8> = picture.pixels().flat_map(|pixel| [pixel.0[0], pixel.0[1], pixel.0[2]]).collect();
+pub fn png_bytes(screenshot: &RgbaImage) -> Result<Vec<u8>, ScreenshotError> {
+    let rgb: Vec<u8> = screenshot.pixels().flat_map(|pixel| [pixel.0[0], pixel.0[1], pixel.0[2]]).collect();
     let mut bytes = Cursor::new(Vec::new());
     let encoder = PngEncoder::new_with_quality(&mut bytes, CompressionType::Default, FilterType::Adaptive);
     encoder
-        .write_image(&rgb, picture.width(), picture.height(), ExtendedColorType::Rgb8)
+        .write_image(&rgb, screenshot.width(), screenshot.height(), ExtendedColorType::Rgb8)
         .map_err(|source| ScreenshotError::Encode { source })?;
     Ok(bytes.into_inner())
 }
 
 /// Writes an image as PNG, making its folder when it is missing.
-pub fn write_png(picture: &RgbaImage, path: &Path) -> Result<(), ScreenshotError> {
-    write_bytes(&png_bytes(picture)?, path)
+pub fn write_png(screenshot: &RgbaImage, path: &Path) -> Result<(), ScreenshotError> {
+    write_bytes(&png_bytes(screenshot)?, path)
 }
 
 /// Writes a drawing as SVG, making its folder when it is missing.
@@ -253,7 +253,7 @@ fn write_bytes(bytes: &[u8], path: &Path) -> Result<(), ScreenshotError> {
 mod tests {
     use super::*;
     use crate::gui::samples::{sample_images, sample_recording};
-    use crate::gui::tests::keep_picture;
+    use crate::gui::tests::keep_screenshot;
 
     #[test]
     fn every_panel_is_drawn_twice_alike() {
@@ -262,9 +262,9 @@ mod tests {
         for name in panel_names() {
             let options = ScreenshotOptions { size_px: [800, 500], ..ScreenshotOptions::default() };
             let draw = || {
-                let picture = draw_panel(name, &recording, 9_000_000_000, &mut sample_images(), &options).unwrap();
-                assert_eq!([picture.width(), picture.height()], options.size_px);
-                png_bytes(&picture).unwrap()
+                let screenshot = draw_panel(name, &recording, 9_000_000_000, &mut sample_images(), &options).unwrap();
+                assert_eq!([screenshot.width(), screenshot.height()], options.size_px);
+                png_bytes(&screenshot).unwrap()
             };
             let bytes = draw();
             assert!(bytes == draw(), "two screenshots of '{name}' differ");
@@ -341,14 +341,14 @@ mod tests {
             (ThemeName::Print, 1.5, [2400, 1350]),
         ] {
             let options = ScreenshotOptions { size_px, pixels_per_point: scale, theme, ..ScreenshotOptions::default() };
-            let picture = draw_panel("all", &recording, 9_000_000_000, &mut sample_images(), &options).unwrap();
-            keep_picture(&format!("all-{}", theme.as_str()), &picture);
-            assert_eq!([picture.width(), picture.height()], size_px);
+            let screenshot = draw_panel("all", &recording, 9_000_000_000, &mut sample_images(), &options).unwrap();
+            keep_screenshot(&format!("all-{}", theme.as_str()), &screenshot);
+            assert_eq!([screenshot.width(), screenshot.height()], size_px);
         }
     }
 
     #[test]
-    fn refusals_say_what_was_expected() {
+    fn rejections_report_what_was_expected() {
         let recording = sample_recording();
         let draw = |name: &str, size_px, scale| {
             let options = ScreenshotOptions { size_px, pixels_per_point: scale, ..ScreenshotOptions::default() };
@@ -366,11 +366,11 @@ mod tests {
     #[test]
     fn files_are_written_into_new_folders() {
         let folder = tempfile::tempdir().unwrap();
-        let picture = RgbaImage::from_pixel(20, 30, image::Rgba([1, 2, 3, 255]));
+        let screenshot = RgbaImage::from_pixel(20, 30, image::Rgba([1, 2, 3, 255]));
         let path = folder.path().join("a/b/picture.png");
-        write_png(&picture, &path).unwrap();
-        assert_eq!(fs::read(&path).unwrap(), png_bytes(&picture).unwrap());
-        let error = write_png(&picture, &path.join("below-a-file.png")).unwrap_err().to_string();
+        write_png(&screenshot, &path).unwrap();
+        assert_eq!(fs::read(&path).unwrap(), png_bytes(&screenshot).unwrap());
+        let error = write_png(&screenshot, &path.join("below-a-file.png")).unwrap_err().to_string();
         assert!(error.starts_with("cannot write"), "{error}");
     }
 }

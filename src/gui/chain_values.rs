@@ -70,7 +70,7 @@ mod tests {
     use crate::gui::samples::sample_recording_of;
 
     #[test]
-    fn the_truth_has_the_names_of_the_run_and_lies_near_its_end() {
+    fn ground_truth_has_the_names_of_the_run_and_is_near_its_end() {
         let recording = sample_recording_of(240, &["auto", "classical"]);
         let raw = |rig: &crate::sensors::Rig, parameter: ParameterId| {
             let chain = Chain::from_classical(&rig.chain_of_camera("cam0").unwrap(), Parameterization::Classical);
@@ -92,9 +92,9 @@ mod tests {
                     };
                     ground_truth.keys().map(|parameter| gap(*parameter).powi(2)).sum()
                 };
-                let (told, written) =
+                let (converted, written) =
                     (squared(&|parameter| ground_truth[&parameter]), squared(&|parameter| raw(true_rig, parameter).0));
-                assert!(told < written, "{told} is farther from the rig than {written}");
+                assert!(converted < written, "{converted} is farther from the rig than {written}");
                 continue;
             }
             for (parameter, value) in end.calibration.parameters.iter().zip(&end.calibration.values) {
@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn angles_are_turned_towards_the_reference() {
+    fn angles_are_unwrapped_towards_the_reference() {
         let id = |name: &str| ParameterNames::default().parse(name).unwrap();
         let named = |entries: &[(&str, f64)]| -> ParameterValues {
             entries.iter().map(|(name, value)| (id(name), *value)).collect()

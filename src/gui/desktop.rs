@@ -21,7 +21,7 @@ pub struct PanelExport {
     /// Folder and name of the files without extension: `garden/scene-5.953s`.
     pub name: String,
     /// The panel as an image at twice the size.
-    pub picture: RgbaImage,
+    pub screenshot: RgbaImage,
     /// The panel as an SVG drawing.
     pub drawing: String,
     /// The values of the panel, comma separated.

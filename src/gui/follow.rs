@@ -13,7 +13,7 @@ pub(crate) struct Follower {
 }
 
 /// The new steps of a run.
-pub(crate) struct News<'a> {
+pub(crate) struct NewSteps<'a> {
     /// Whether the run was replaced or computed again, so that everything read before is invalid.
     pub(crate) restarted: bool,
     /// The steps not read before.
@@ -22,13 +22,13 @@ pub(crate) struct News<'a> {
 
 impl Follower {
     /// The steps that are new since the last call.
-    pub(crate) fn news<'a>(&mut self, run: &'a RunRecord) -> News<'a> {
+    pub(crate) fn new_steps<'a>(&mut self, run: &'a RunRecord) -> NewSteps<'a> {
         // Steps that were read may become summaries later; they are the same steps.
         let same = self.count <= run.steps.len() && self.run.is_none_or(|id| id == run.id);
         let read = if same { self.count } else { 0 };
         self.count = run.steps.len();
         self.run = Some(run.id);
-        News { restarted: !same, steps: &run.steps[read..] }
+        NewSteps { restarted: !same, steps: &run.steps[read..] }
     }
 }
 
@@ -47,20 +47,20 @@ pub(crate) struct StepTable {
 impl StepTable {
     /// Reads the new steps of the run into `N` columns; returns whether there were any.
     pub(crate) fn read<const N: usize>(&mut self, run: &RunRecord, row: impl Fn(&StepRecord) -> [f64; N]) -> bool {
-        let news = self.follower.news(run);
-        if news.restarted {
+        let new_steps = self.follower.new_steps(run);
+        if new_steps.restarted {
             self.stamps_ns.clear();
             self.columns.clear();
             self.epoch += 1;
         }
         self.columns.resize_with(N, Vec::new);
-        for step in news.steps {
+        for step in new_steps.steps {
             self.stamps_ns.push(step.report.stamp_ns);
             for (column, value) in self.columns.iter_mut().zip(row(step)) {
                 column.push(value);
             }
         }
-        news.restarted || !news.steps.is_empty()
+        new_steps.restarted || !new_steps.steps.is_empty()
     }
 }
 
@@ -91,7 +91,7 @@ mod tests {
     use crate::gui::samples::sample_recording_of;
 
     #[test]
-    fn every_step_is_read_once_and_another_run_starts_anew() {
+    fn every_step_is_read_once_and_another_run_restarts() {
         let recording = sample_recording_of(60, &["auto"]);
         let whole = &recording.runs[0];
         let mut growing = whole.clone();

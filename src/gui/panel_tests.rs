@@ -4,7 +4,7 @@ use egui::Ui;
 
 use super::rendering::headless::{HeadlessOptions, draw};
 use super::samples::{sample_images, sample_recording, sample_recording_of};
-use super::tests::{keep_picture, with_context};
+use super::tests::{keep_screenshot, with_context};
 use super::theme::{Theme, ThemeName};
 use super::{PanelContext, Selection};
 use crate::gimbal::tests::parameter;
@@ -13,7 +13,7 @@ use crate::session::Recording;
 const SECOND_NS: i64 = 1_000_000_000;
 
 /// Draws a panel at a stamp and keeps the screenshot.
-fn picture(
+fn screenshot(
     name: &str,
     recording: &Recording,
     cursor_ns: i64,
@@ -30,11 +30,11 @@ fn picture(
             with_context(recording, cursor_ns, &mut sample_images(), &mut selection, &colors, |ctx| show(ui, ctx));
         });
     });
-    keep_picture(name, &image);
+    keep_screenshot(name, &image);
 }
 
 /// Recordings and stamps that lack data that a panel may rely on.
-fn trying_cases() -> Vec<(&'static str, Recording, i64)> {
+fn cases_with_missing_data() -> Vec<(&'static str, Recording, i64)> {
     let whole = sample_recording_of(70, &["auto", "classical"]);
     let mut no_runs = whole.clone();
     no_runs.runs.clear();
@@ -92,7 +92,7 @@ fn check<P: Default>(name: &str, size_px: [u32; 2], mut ui: impl FnMut(&mut P, &
     let second = Selection { run: 1, ..Selection::default() };
     let mut shown = |file: &str, cursor_ns: i64, size_px: [u32; 2], theme: ThemeName, selection: &Selection| {
         let mut panel = P::default();
-        picture(&format!("{name}-{file}"), &recording, cursor_ns, size_px, theme, selection, |panel_ui, ctx| {
+        screenshot(&format!("{name}-{file}"), &recording, cursor_ns, size_px, theme, selection, |panel_ui, ctx| {
             ui(&mut panel, panel_ui, ctx);
         });
     };
@@ -101,10 +101,10 @@ fn check<P: Default>(name: &str, size_px: [u32; 2], mut ui: impl FnMut(&mut P, &
     shown("print", 9 * SECOND_NS, size_px, ThemeName::Print, &second);
     shown("second", 4 * SECOND_NS, size_px, ThemeName::Dark, &second);
     shown("tiny", 9 * SECOND_NS, [90, 40], ThemeName::Dark, &selection);
-    for (case, recording, cursor_ns) in trying_cases() {
+    for (case, recording, cursor_ns) in cases_with_missing_data() {
         let mut panel = P::default();
         let file = format!("{name}-{case}");
-        picture(&file, &recording, cursor_ns, size_px, ThemeName::Dark, &Selection::default(), |panel_ui, ctx| {
+        screenshot(&file, &recording, cursor_ns, size_px, ThemeName::Dark, &Selection::default(), |panel_ui, ctx| {
             ui(&mut panel, panel_ui, ctx);
         });
     }
@@ -140,7 +140,7 @@ fn the_window_is_drawn_in_every_case() {
         state.arrange(preset);
         let (recording, selection) = (sample_recording(), Selection::default());
         let name = format!("window-{preset:?}");
-        picture(&name, &recording, 9 * SECOND_NS, [1920, 1080], ThemeName::Dark, &selection, |ui, ctx| {
+        screenshot(&name, &recording, 9 * SECOND_NS, [1920, 1080], ThemeName::Dark, &selection, |ui, ctx| {
             window_ui(ui, &mut state, ctx);
         });
     }

@@ -9,7 +9,7 @@ use super::desktop::{Desktop, PathEntry};
 use super::theme::Theme;
 
 /// Maximum number of completions.
-const MOST_ENTRIES: usize = 200;
+const MAX_ENTRIES: usize = 200;
 
 /// The text field with its completions.
 #[derive(Default)]
@@ -44,7 +44,7 @@ impl PathField {
             self.chosen = None;
         }
         let entries = self.completed.as_ref().map_or(&[][..], |(_, entries)| entries);
-        let shown = &entries[..entries.len().min(MOST_ENTRIES)];
+        let shown = &entries[..entries.len().min(MAX_ENTRIES)];
         let id = ui.unique_id().with("path");
         let focused = ui.memory(|memory| memory.has_focus(id));
         let (up, down, tab, enter) = ui.input_mut(|input| {
@@ -61,7 +61,7 @@ impl PathField {
         let mut opened = None;
         let marked = self.chosen.and_then(|chosen| shown.get(chosen));
         if tab {
-            let common = || common_beginning(shown.iter().map(|entry| entry.path.as_str()));
+            let common = || common_prefix(shown.iter().map(|entry| entry.path.as_str()));
             filled = marked.map_or_else(common, |entry| Some(entry.path.clone()));
         }
         if enter {
@@ -121,7 +121,7 @@ fn move_caret_to_end(ui: &Ui, id: Id, end: usize) {
 }
 
 /// The longest common prefix of all paths, `None` without paths.
-fn common_beginning<'a>(mut paths: impl Iterator<Item = &'a str>) -> Option<String> {
+fn common_prefix<'a>(mut paths: impl Iterator<Item = &'a str>) -> Option<String> {
     let mut common = paths.next()?.to_owned();
     for path in paths {
         let same = common.char_indices().zip(path.chars()).find(|((_, a), b)| a != b).map(|((at, _), _)| at);
@@ -135,8 +135,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_common_beginning_ends_between_letters() {
-        let common = |paths: &[&str]| common_beginning(paths.iter().copied());
+    fn the_common_prefix_ends_between_letters() {
+        let common = |paths: &[&str]| common_prefix(paths.iter().copied());
         assert_eq!(common(&["/a/yard.mcap", "/a/yärd.mcap"]).as_deref(), Some("/a/y"));
         assert_eq!(common(&["/a/b", "/a/bcd"]).as_deref(), Some("/a/b"));
         assert_eq!(common(&["/a/bcd", "/a/b"]).as_deref(), Some("/a/b"));

@@ -26,7 +26,7 @@ impl<T> Default for StepWork<T> {
 
 impl<T: Send + 'static> StepWork<T> {
     /// Whether the result of a step is there.
-    pub(super) fn is_known(&self, step: &StepRecord) -> bool {
+    pub(super) fn has_result(&self, step: &StepRecord) -> bool {
         self.known.as_ref().is_some_and(|(known, _)| std::ptr::eq(Arc::as_ptr(known), step))
     }
 
@@ -36,7 +36,7 @@ impl<T: Send + 'static> StepWork<T> {
     }
 
     /// Starts the computation for a step, given by `work`, unless it is running or done, and receives finished results.
-    pub(super) fn ask<W>(
+    pub(super) fn request<W>(
         &mut self,
         step: &Arc<StepRecord>,
         thread_name: &str,
@@ -45,11 +45,11 @@ impl<T: Send + 'static> StepWork<T> {
     ) where
         W: Fn() -> Option<T> + Clone + Send + 'static,
     {
-        if self.is_known(step) {
+        if self.has_result(step) {
             return;
         }
         if !self.coming.as_ref().is_some_and(|(asked, _)| Arc::ptr_eq(asked, step)) {
-            self.coming = Some((Arc::clone(step), begun(thread_name, in_background, work())));
+            self.coming = Some((Arc::clone(step), started(thread_name, in_background, work())));
         }
         self.receive();
     }
@@ -59,7 +59,7 @@ impl<T: Send + 'static> StepWork<T> {
         let Some((_, coming)) = &self.coming else { return };
         let result = match coming.try_recv() {
             Err(TryRecvError::Empty) => return,
-            told => told.ok().flatten(),
+            received => received.ok().flatten(),
         };
         self.known = self.coming.take().map(|(step, _)| (step, result));
     }
@@ -70,7 +70,7 @@ impl<T: Send + 'static> StepWork<T> {
     }
 }
 
-fn begun<T, W>(thread_name: &str, in_background: bool, work: W) -> Receiver<Option<T>>
+fn started<T, W>(thread_name: &str, in_background: bool, work: W) -> Receiver<Option<T>>
 where
     T: Send + 'static,
     W: Fn() -> Option<T> + Clone + Send + 'static,

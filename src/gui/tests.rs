@@ -22,9 +22,9 @@ fn the_sample_is_consistent() {
 }
 
 /// Keeps a screenshot for inspection, in the folder of the environment variable `DCVINS_PICTURES`.
-pub(crate) fn keep_picture(name: &str, picture: &image::RgbaImage) {
+pub(crate) fn keep_screenshot(name: &str, screenshot: &image::RgbaImage) {
     if let Some(folder) = std::env::var_os("DCVINS_PICTURES") {
-        picture.save(std::path::Path::new(&folder).join(format!("{name}.png"))).unwrap();
+        screenshot.save(std::path::Path::new(&folder).join(format!("{name}.png"))).unwrap();
     }
 }
 

@@ -52,7 +52,7 @@ pub(crate) fn fixed(value: f64, decimals: usize) -> String {
 }
 
 /// A number with three significant digits, in powers of ten if it is very large or small.
-pub(crate) fn figure(value: f64) -> String {
+pub(crate) fn significant(value: f64) -> String {
     let size = value.abs();
     if !value.is_finite() {
         "–".to_owned()
@@ -98,14 +98,14 @@ mod tests {
     }
 
     #[test]
-    fn numbers_never_look_silly() {
+    fn numbers_have_no_negative_zero_and_no_nan() {
         assert_eq!(fixed(-0.0004, 2), "0.00");
         assert_eq!(fixed(-0.4, 1), "-0.4");
         assert_eq!(fixed(f64::INFINITY, 1), "–");
-        assert_eq!(figure(0.0), "0");
-        assert_eq!(figure(1234.5), "1234");
-        assert_eq!(figure(0.012345), "0.0123");
-        assert_eq!(figure(3e-14), "3.0e-14");
+        assert_eq!(significant(0.0), "0");
+        assert_eq!(significant(1234.5), "1234");
+        assert_eq!(significant(0.012345), "0.0123");
+        assert_eq!(significant(3e-14), "3.0e-14");
         assert_eq!(seconds(12_350_400_000), "12.350");
         assert_eq!(bytes(300 << 20), "300 MiB");
         assert_eq!(bytes(3 << 29), "1.50 GiB");

@@ -30,9 +30,9 @@ use crate::session::{Command, PlaybackSpeed, Recording};
 
 /// After a longer pause between two frames the cursor does not catch up: the window was hidden or the machine
 /// suspended.
-const STALL_S: f64 = 2.0;
+const MAX_FRAME_TIME_S: f64 = 2.0;
 /// Period in milliseconds at which the window checks for new steps.
-const LOOK_MS: u64 = 60;
+const POLL_PERIOD_MS: u64 = 60;
 /// Period in seconds at which the process's memory is read.
 const MEMORY_PERIOD_S: f64 = 1.0;
 
@@ -58,7 +58,7 @@ pub struct App {
     applied: Option<Settings>,
     progress: ProgressMeter,
     /// Number of warnings about the log that a notice has reported.
-    warnings_told: usize,
+    reported_warnings: usize,
     title: String,
     memory_read_s: Option<f64>,
 }
@@ -88,7 +88,7 @@ impl App {
             theme,
             applied: None,
             progress: ProgressMeter::default(),
-            warnings_told: 0,
+            reported_warnings: 0,
             title: String::new(),
             memory_read_s: None,
         }
@@ -104,7 +104,9 @@ impl App {
         });
         match thread {
             Ok(_) => self.opening = Some(Opening { path, result }),
-            Err(error) => self.state.notices.say(NoticeLevel::Error, format!("Cannot start a thread: {error}")),
+            Err(error) => {
+                self.state.notices.show_message(NoticeLevel::Error, format!("Cannot start a thread: {error}"))
+            }
         }
     }
 
@@ -121,7 +123,7 @@ impl App {
         self.at_first_frame = false;
         self.selection = Selection::default();
         self.progress = ProgressMeter::default();
-        self.warnings_told = 0;
+        self.reported_warnings = 0;
     }
 
     /// The session, `None` before a log is open.
@@ -147,7 +149,7 @@ impl App {
                 WindowRequest::OpenLog(path) => self.open(path),
                 WindowRequest::KeepLayouts(text) => {
                     if let Err(problem) = self.desktop.keep_layouts(&text) {
-                        self.state.notices.say(NoticeLevel::Error, problem);
+                        self.state.notices.show_message(NoticeLevel::Error, problem);
                     }
                 }
                 WindowRequest::SaveSession => self.save_session(),
@@ -156,7 +158,7 @@ impl App {
         }
         self.update_title(ui);
         if self.opening.is_some() {
-            ui.ctx().request_repaint_after(std::time::Duration::from_millis(LOOK_MS));
+            ui.ctx().request_repaint_after(std::time::Duration::from_millis(POLL_PERIOD_MS));
         }
     }
 
@@ -187,21 +189,21 @@ impl App {
             log.apply(Command::SetMemoryBudget(settings.memory_bytes()));
         }
         if !first && let Err(problem) = self.desktop.keep_settings(&settings.to_text()) {
-            self.state.notices.say(NoticeLevel::Error, problem);
+            self.state.notices.show_message(NoticeLevel::Error, problem);
         }
         self.applied = Some(settings);
         ui.ctx().request_repaint();
     }
 
     /// Shows one notice about the warnings of the log; the list has all of them.
-    fn tell_warnings(&mut self, recording: &Recording) {
+    fn report_warnings(&mut self, recording: &Recording) {
         let count = recording.warnings.len();
-        if count > 0 && self.warnings_told == 0 {
+        if count > 0 && self.reported_warnings == 0 {
             let first = &recording.warnings[0].message;
             let text = format!("{} about the log, the first: {first}\nW lists them all", counted(count, "warning"));
-            self.state.notices.say(NoticeLevel::Warning, text);
+            self.state.notices.show_message(NoticeLevel::Warning, text);
         }
-        self.warnings_told = count;
+        self.reported_warnings = count;
     }
 
     fn save_session(&mut self) {
@@ -212,9 +214,9 @@ impl App {
         match self.desktop.write_session(&stem.unwrap_or_else(|| "log".to_owned()), &text) {
             Ok(path) => {
                 let text = format!("Session written, to be opened like a log:\n{}", path.display());
-                self.state.notices.say(NoticeLevel::Info, text);
+                self.state.notices.show_message(NoticeLevel::Info, text);
             }
-            Err(problem) => self.state.notices.say(NoticeLevel::Error, problem),
+            Err(problem) => self.state.notices.show_message(NoticeLevel::Error, problem),
         }
     }
 
@@ -222,9 +224,9 @@ impl App {
         match self.desktop.write_panel(export) {
             Ok(paths) => {
                 let paths: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
-                self.state.notices.say(NoticeLevel::Info, format!("Written:\n{}", paths.join("\n")));
+                self.state.notices.show_message(NoticeLevel::Info, format!("Written:\n{}", paths.join("\n")));
             }
-            Err(problem) => self.state.notices.say(NoticeLevel::Error, problem),
+            Err(problem) => self.state.notices.show_message(NoticeLevel::Error, problem),
         }
     }
 
@@ -232,14 +234,14 @@ impl App {
         let Some(log) = &mut self.log else { return };
         // Log time follows the wall clock: slow drawing skips frames, not time.
         let (elapsed_s, now_s) = ui.input(|input| (f64::from(input.stable_dt), input.time));
-        if elapsed_s < STALL_S {
+        if elapsed_s < MAX_FRAME_TIME_S {
             log.advance(elapsed_s);
         } else if log.playback().playing {
             let text = format!("Nothing could be drawn for {elapsed_s:.1} s; playing goes on from where it was");
-            self.state.notices.say(NoticeLevel::Warning, text);
+            self.state.notices.show_message(NoticeLevel::Warning, text);
         }
         for notice in log.take_notices() {
-            self.state.notices.say(NoticeLevel::Warning, notice);
+            self.state.notices.show_message(NoticeLevel::Warning, notice);
         }
         if !self.at_first_frame {
             self.at_first_frame = go_to_first_frame(log.as_mut());
@@ -247,7 +249,7 @@ impl App {
         let (recording, playback, generation) = (log.recording(), log.playback(), log.generation());
         self.state.progress = self.progress.read(&recording, Some(now_s));
         self.state.opening = self.opening.as_ref().map(|opening| opening.path.clone());
-        self.state.panels.timeline.pace.picture(playback.playing, now_s, log.cursor_ns());
+        self.state.panels.timeline.pace.frame(playback.playing, now_s, log.cursor_ns());
         let mut commands = Vec::new();
         let mut context = PanelContext {
             recording: &recording,
@@ -267,9 +269,9 @@ impl App {
         if commanded || playback.playing || log.generation() != generation {
             ui.ctx().request_repaint();
         } else if computing || playback.recomputing || playback.running_to_breakpoint {
-            ui.ctx().request_repaint_after(std::time::Duration::from_millis(LOOK_MS));
+            ui.ctx().request_repaint_after(std::time::Duration::from_millis(POLL_PERIOD_MS));
         }
-        self.tell_warnings(&recording);
+        self.report_warnings(&recording);
     }
 
     fn welcome_ui(&mut self, ui: &mut Ui) {
@@ -292,12 +294,12 @@ impl App {
             }
             Ok(Err(message)) => {
                 self.opening = None;
-                self.state.notices.say(NoticeLevel::Error, message);
+                self.state.notices.show_message(NoticeLevel::Error, message);
             }
             Err(TryRecvError::Empty) => {}
             Err(TryRecvError::Disconnected) => {
                 let text = format!("Opening {} ended without a result", opening.path.display());
-                self.state.notices.say(NoticeLevel::Error, text);
+                self.state.notices.show_message(NoticeLevel::Error, text);
                 self.opening = None;
             }
         }
@@ -309,7 +311,7 @@ impl App {
             ui.input(|input| input.raw.dropped_files.iter().map(|file| file.path().to_path_buf()).collect());
         if dropped.len() > 1 {
             let text = format!("{} files were dropped: the first one is opened", dropped.len());
-            self.state.notices.say(NoticeLevel::Info, text);
+            self.state.notices.show_message(NoticeLevel::Info, text);
         }
         if let Some(path) = dropped.into_iter().next() {
             self.open(path);

@@ -87,8 +87,8 @@ pub fn run_window(options: WindowOptions) -> Result<(), WindowError> {
     // The loader of the keyboard library panics when the library is missing; it is reported as an error.
     match without_loader_panics(start) {
         Ok(Ok(())) => Ok(()),
-        Ok(Err(error)) => Err(refused(error.to_string())),
-        Err(problem) => Err(refused(problem)),
+        Ok(Err(error)) => Err(display_error(error.to_string())),
+        Err(problem) => Err(display_error(problem)),
     }
 }
 
@@ -110,7 +110,7 @@ fn arrange_drawing(state: Option<&eframe::egui_wgpu::RenderState>, context: &egu
     }
 }
 
-fn refused(problem: String) -> WindowError {
+fn display_error(problem: String) -> WindowError {
     let remedy = if cfg!(target_os = "linux") {
         format!(
             "on a machine without a desktop install what the window needs: apt-get install {WINDOW_PACKAGES}\n\
@@ -166,8 +166,8 @@ mod tests {
     }
 
     #[test]
-    fn a_refusal_says_what_to_install() {
-        let text = refused("no adapter".to_owned()).to_string();
+    fn a_display_error_names_the_missing_packages() {
+        let text = display_error("no adapter".to_owned()).to_string();
         assert!(text.starts_with("the window cannot be opened: no adapter"));
         assert!(!cfg!(target_os = "linux") || text.contains(WINDOW_PACKAGES));
     }

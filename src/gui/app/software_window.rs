@@ -9,7 +9,7 @@ use egui::{Color32, Context, FullOutput, Plugin, Pos2, Rect, Shape, TextureId, T
 use crate::gui::rendering::painter::Painter;
 
 /// The texture with the content of the window; egui counts its own textures up from 0.
-const PICTURE: TextureId = TextureId::Managed(u64::MAX);
+const WINDOW_TEXTURE: TextureId = TextureId::Managed(u64::MAX);
 
 /// Replaces the meshes of a frame by one texture.
 #[derive(Default)]
@@ -40,14 +40,14 @@ impl Plugin for SoftwareWindow {
         let options = TextureOptions::NEAREST;
         if self.shown_px == size_px {
             for (part, colors) in self.painter.changes() {
-                output.textures_delta.push(PICTURE, ImageDelta::partial(part.at, colors, options));
+                output.textures_delta.push(WINDOW_TEXTURE, ImageDelta::partial(part.at, colors, options));
             }
         } else {
             self.shown_px = size_px;
-            output.textures_delta.push(PICTURE, ImageDelta::full(self.painter.whole(), options));
+            output.textures_delta.push(WINDOW_TEXTURE, ImageDelta::full(self.painter.whole(), options));
         }
         let rect = Rect::from_min_size(Pos2::ZERO, egui::vec2(size_px[0] as f32, size_px[1] as f32) / scale);
-        let mut mesh = Mesh::with_texture(PICTURE);
+        let mut mesh = Mesh::with_texture(WINDOW_TEXTURE);
         mesh.add_rect_with_uv(rect, Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0)), Color32::WHITE);
         output.shapes = vec![ClippedShape::new(rect, Shape::mesh(mesh))];
     }
@@ -66,18 +66,18 @@ mod tests {
     }
 
     #[test]
-    fn the_window_comes_as_one_texture_with_the_same_pixels() {
+    fn the_window_is_one_texture_with_the_same_pixels() {
         for scale in [1.0, 1.5] {
             let options = HeadlessOptions { size_px: [360, 180], pixels_per_point: scale, theme: ThemeName::Light };
             let panel = |ui: &mut egui::Ui| {
                 egui::CentralPanel::default().show(ui, sample_ui);
             };
             let (mut plain, mut painter) = (Headless::new(options), Painter::new());
-            let Ok(expected) = plain.picture(&mut painter, panel);
+            let Ok(expected) = plain.screenshot(&mut painter, panel);
 
             let (mut window, mut adapter) = (Headless::new(options), Painter::new());
             window.context().add_plugin(SoftwareWindow::default());
-            let Ok(seen) = window.picture(&mut adapter, panel);
+            let Ok(seen) = window.screenshot(&mut adapter, panel);
             assert!(seen == expected, "at {scale}");
 
             let mut again = window.frame(Vec::new(), panel);
@@ -92,8 +92,8 @@ mod tests {
                     ui.label("more");
                 });
             };
-            let Ok(expected) = plain.picture(&mut painter, changed);
-            let Ok(seen) = window.picture(&mut adapter, changed);
+            let Ok(expected) = plain.screenshot(&mut painter, changed);
+            let Ok(seen) = window.screenshot(&mut adapter, changed);
             assert!(seen == expected, "changed at {scale}");
         }
     }

@@ -213,7 +213,7 @@ fn the_welcome_view_offers_logs_and_opens_them() {
 }
 
 #[test]
-fn a_dropped_log_is_opened_and_a_wrong_file_explained() {
+fn a_dropped_log_is_opened_and_a_wrong_file_reported() {
     let (mut harness, _) = app();
     harness.input_mut().dropped_files.push(Arc::new(Dropped(PathBuf::from("/x/notes.txt"))));
     run_until(&mut harness, |harness| harness.query_by_label_contains("this is not an MCAP file").is_some());
@@ -309,13 +309,13 @@ fn commands_reach_the_log_and_playing_moves_the_cursor() {
     assert!(cursor(&harness) > FRAME_PERIOD_NS);
     harness.get_by_label("Pause").click();
     harness.run_steps(2);
-    let held = cursor(&harness);
+    let before = cursor(&harness);
     harness.run_steps(5);
-    assert_eq!(cursor(&harness), held);
+    assert_eq!(cursor(&harness), before);
 }
 
 #[test]
-fn the_panel_clicked_last_is_written_as_picture_and_table() {
+fn the_panel_clicked_last_is_written_as_screenshot_and_table() {
     let (mut harness, desktop) = app();
     harness.get_by_label("Open yard.mcap").click();
     run_until(&mut harness, |harness| opened(harness).is_some());
@@ -346,7 +346,7 @@ fn the_panel_clicked_last_is_written_as_picture_and_table() {
     assert!(rank.name.starts_with("yard/rank-"), "{}", rank.name);
     assert_eq!(rank.table.lines().count(), 19, "a line for each singular value: {}", rank.table);
     assert!(rank.table.lines().all(|line| line.matches(',').count() == 21), "{}", rank.table);
-    assert!(rank.picture != image.picture && rank.picture.width() > 400);
+    assert!(rank.screenshot != image.screenshot && rank.screenshot.width() > 400);
 }
 
 #[test]
@@ -412,7 +412,7 @@ fn settings_hold_at_once_and_are_kept() {
 }
 
 #[test]
-fn a_log_with_warnings_says_so_once() {
+fn warnings_of_a_log_are_reported_once() {
     let (mut harness, _) = app();
     harness.get_by_label("Open yard.mcap").click();
     run_until(&mut harness, |harness| opened(harness).is_some());
@@ -435,10 +435,10 @@ fn the_theme_changes_at_a_key() {
 }
 
 #[test]
-fn dialogs_can_be_looked_at() {
+fn dialogs_are_drawn() {
     use crate::gui::rendering::headless::{Headless, HeadlessOptions};
     use crate::gui::rendering::painter::Painter;
-    use crate::gui::tests::keep_picture;
+    use crate::gui::tests::keep_screenshot;
 
     let options = HeadlessOptions { size_px: [1366, 768], pixels_per_point: 1.0, theme: ThemeName::Dark };
     let key = |key, modifiers| egui::Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers };
@@ -465,8 +465,8 @@ fn dialogs_can_be_looked_at() {
         let mut first = headless.frame(events.unwrap_or_default(), |ui| app.ui(ui));
         painter.set_textures(&first.textures);
         first.textures.clear();
-        let Ok(picture) = headless.picture(&mut painter, |ui| app.ui(ui));
-        keep_picture(name, &picture);
+        let Ok(screenshot) = headless.screenshot(&mut painter, |ui| app.ui(ui));
+        keep_screenshot(name, &screenshot);
         assert_eq!(app.log().is_some(), log_is_shown);
     }
 }

@@ -64,8 +64,8 @@ impl Welcome {
 /// The area for dropping a log; it is highlighted while a file is dragged over the window.
 fn drop_target_ui(ui: &mut Ui, theme: &Theme) {
     let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), 76.0), Sense::hover());
-    let held = ui.input(|input| !input.raw.hovered_files.is_empty());
-    let color = if held { theme.accent } else { theme.outline };
+    let file_over_window = ui.input(|input| !input.raw.hovered_files.is_empty());
+    let color = if file_over_window { theme.accent } else { theme.outline };
     ui.painter().rect(rect, 6.0, theme.plot_background, Stroke::new(1.5, color), StrokeKind::Inside);
     let center = rect.center();
     let font = egui::FontId::proportional(14.0);

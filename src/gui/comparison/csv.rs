@@ -30,7 +30,7 @@ impl CsvTable for ComparisonPanel {
         }
         let reference = label(self.reference);
         for (run, comparison) in comparisons.iter().enumerate().filter(|(run, _)| *run != self.reference) {
-            let mut say = |kind: &str, quantity: Quantity, stamp_ns: i64, value: f64| {
+            let mut push_row = |kind: &str, quantity: Quantity, stamp_ns: i64, value: f64| {
                 table.row([
                     kind.to_owned(),
                     label(run),
@@ -47,17 +47,17 @@ impl CsvTable for ComparisonPanel {
                     [("first different", divergence.exact_ns), ("first notable", divergence.notable_ns)]
                 {
                     if let Some(stamp_ns) = stamp_ns {
-                        say(kind, quantity, stamp_ns, at(stamp_ns));
+                        push_row(kind, quantity, stamp_ns, at(stamp_ns));
                     }
                 }
                 if let Some((largest, stamp_ns)) = divergence.largest {
-                    say("largest", quantity, stamp_ns, largest);
+                    push_row("largest", quantity, stamp_ns, largest);
                 }
             }
             for quantity in Quantity::ALL {
                 let known = comparison.stamps_ns.iter().zip(comparison.column(quantity));
                 for (stamp_ns, apart) in known.filter(|(_, apart)| apart.is_finite()) {
-                    say("difference", quantity, *stamp_ns, *apart);
+                    push_row("difference", quantity, *stamp_ns, *apart);
                 }
             }
         }

@@ -20,11 +20,11 @@ use super::rank;
 use crate::session::Comparison;
 
 /// Panel size from which all views are shown at once.
-const ROOM_FOR_ALL: Vec2 = vec2(960.0, 430.0);
+const MIN_SIZE_FOR_ALL: Vec2 = vec2(960.0, 430.0);
 /// Width from which the two tables are side by side.
-const ROOM_FOR_BOTH_TABLES: f32 = 860.0;
+const MIN_WIDTH_FOR_BOTH_TABLES: f32 = 860.0;
 /// Height from which scenes are shown below the images.
-const ROOM_FOR_SCENES: f32 = 760.0;
+const MIN_HEIGHT_FOR_SCENES: f32 = 760.0;
 
 /// A view of the comparison.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -80,7 +80,7 @@ impl ComparisonPanel {
         let view = self.controls_ui(ui, ctx);
         let room = ui.available_size();
         match view {
-            View::All if room.x >= ROOM_FOR_ALL.x && room.y >= ROOM_FOR_ALL.y => self.all_ui(ui, ctx),
+            View::All if room.x >= MIN_SIZE_FOR_ALL.x && room.y >= MIN_SIZE_FOR_ALL.y => self.all_ui(ui, ctx),
             View::All | View::Numbers => self.numbers_ui(ui, ctx),
             View::OverTime => self.over_time_ui(ui, ctx),
             View::Images => self.images.ui(ui, ctx),
@@ -133,7 +133,7 @@ impl ComparisonPanel {
     }
 
     fn numbers_ui(&self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
-        let wide = ui.available_width() >= ROOM_FOR_BOTH_TABLES;
+        let wide = ui.available_width() >= MIN_WIDTH_FOR_BOTH_TABLES;
         ScrollArea::both().id_salt("numbers").auto_shrink(false).show(ui, |ui| {
             let accuracy = |ui: &mut Ui, ctx: &mut PanelContext<'_>| {
                 ui.vertical(|ui| numbers::accuracy_ui(ui, ctx, &self.scores));
@@ -170,7 +170,7 @@ impl ComparisonPanel {
         ui.advance_cursor_after_rect(all);
         let (left, right) = all.split_left_right_at_fraction(0.44);
         let (above, below) = right.split_top_bottom_at_fraction(0.42);
-        let scenes = all.height() >= ROOM_FOR_SCENES;
+        let scenes = all.height() >= MIN_HEIGHT_FOR_SCENES;
         let (images, scene) = below.split_top_bottom_at_fraction(if scenes { 0.5 } else { 1.0 });
         let mut at = |rect: Rect, draw: &mut dyn FnMut(&mut Ui, &mut PanelContext<'_>)| {
             ui.scope_builder(UiBuilder::new().max_rect(rect.shrink2(vec2(0.0, 2.0))), |ui| {

@@ -4,7 +4,7 @@ use egui::{Button, Grid, RichText, Ui, WidgetInfo, vec2};
 
 use super::scores::Scores;
 use crate::gui::PanelContext;
-use crate::gui::units::{figure, fixed, seconds};
+use crate::gui::units::{fixed, seconds, significant};
 use crate::session::{Command, Comparison, Divergence, Quantity};
 
 /// Factor from stored to shown unit, and the shown unit.
@@ -21,7 +21,7 @@ pub(super) fn shown(quantity: Quantity) -> (f64, &'static str) {
 pub(super) fn difference_text(quantity: Quantity, apart: f64) -> String {
     let (factor, unit) = shown(quantity);
     let space = if unit.is_empty() || unit.starts_with('°') { "" } else { " " };
-    let number = if unit.is_empty() { fixed(apart, 0) } else { figure(apart * factor) };
+    let number = if unit.is_empty() { fixed(apart, 0) } else { significant(apart * factor) };
     format!("{number}{space}{unit}")
 }
 

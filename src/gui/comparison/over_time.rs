@@ -72,13 +72,13 @@ impl OverTime {
         let mut area = PlotArea { rect, begin_ns, end_ns, low: 0.0, high: 1.0 };
         let curves = &mut self.curves[index];
         curves.resize_with(comparisons.len(), Curve::default);
-        let mut most = 0.0_f64;
+        let mut max_value = 0.0_f64;
         for (comparison, curve) in comparisons.iter().zip(curves.iter_mut()) {
             curve.update(&area, comparison.epoch, &comparison.stamps_ns, comparison.column(quantity));
-            most = most.max(curve.extent.map_or(0.0, |(_, most)| most));
+            max_value = max_value.max(curve.extent.map_or(0.0, |(_, max_value)| max_value));
         }
         // Rounding errors are not magnified to the height of the plot.
-        area = area.with_values(0.0, 1.15 * most.max(0.1 * quantity.notable()));
+        area = area.with_values(0.0, 1.15 * max_value.max(0.1 * quantity.notable()));
         let painter = ui.painter_at(whole);
         paint_ground(&painter, &theme, rect);
         let (factor, unit) = shown(quantity);

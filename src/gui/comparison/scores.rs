@@ -2,11 +2,11 @@
 
 use crate::estimator::Phase;
 use crate::geometry::seconds_from_ns;
-use crate::gui::units::{figure, fixed};
+use crate::gui::units::{fixed, significant};
 use crate::session::{ChainDistance, RELATIVE_LENGTHS_M, Recording, RunRecord, TrajectoryAccuracy};
 
 /// Number of new steps after which a run's accuracy is computed again.
-const STEPS_BETWEEN: usize = 20;
+const UPDATE_PERIOD_STEPS: usize = 20;
 
 /// The values of one run over all its steps so far.
 #[derive(Debug, Default)]
@@ -48,7 +48,10 @@ impl ScoreRow {
     /// The shown text of a value.
     pub(crate) fn text(&self, run: usize) -> String {
         let value = self.values.get(run).copied().flatten();
-        value.map_or_else(|| "–".to_owned(), |value| self.decimals.map_or_else(|| figure(value), |it| fixed(value, it)))
+        value.map_or_else(
+            || "–".to_owned(),
+            |value| self.decimals.map_or_else(|| significant(value), |it| fixed(value, it)),
+        )
     }
 
     /// Index of the best run, `None` where no run is better.
@@ -70,7 +73,7 @@ impl Scores {
         self.runs.resize_with(recording.runs.len(), RunScore::default);
         for (score, run) in self.runs.iter_mut().zip(&recording.runs) {
             let count = run.steps.len();
-            let grown = count < score.count || count >= score.count + STEPS_BETWEEN;
+            let grown = count < score.count || count >= score.count + UPDATE_PERIOD_STEPS;
             if score.id != run.id || grown || run.finished && !(score.finished && score.count == count) {
                 *score = RunScore::of(recording, run);
             }

@@ -7,7 +7,7 @@ use crate::gui::scene::ScenePanel;
 use crate::gui::{PanelContext, Selection};
 
 /// Minimum width of a run's cell; below it the cells form two rows.
-const NARROWEST: f32 = 250.0;
+const MIN_CELL_WIDTH: f32 = 250.0;
 const GAP: f32 = 6.0;
 
 /// Images side by side; zoom, position and options follow the image that was changed last.
@@ -101,7 +101,7 @@ fn each_run(ui: &mut Ui, ctx: &mut PanelContext<'_>, mut draw: impl FnMut(&mut U
 
 /// The cells: one row where they are wide enough, else two.
 fn cells(all: Rect, count: usize) -> Vec<Rect> {
-    let columns = if count > 2 && all.width() < NARROWEST * count as f32 { 2 } else { count.max(1) };
+    let columns = if count > 2 && all.width() < MIN_CELL_WIDTH * count as f32 { 2 } else { count.max(1) };
     let rows = count.div_ceil(columns);
     let size = vec2(
         (all.width() - GAP * (columns - 1) as f32) / columns as f32,

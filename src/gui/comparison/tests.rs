@@ -48,7 +48,7 @@ fn bench(runs: &[&str], size: [f32; 2]) -> Harness<'static, Bench> {
 }
 
 #[test]
-fn numbers_tell_accuracy_and_lead_to_where_runs_part() {
+fn numbers_show_accuracy_and_lead_to_the_divergence() {
     let mut harness = bench(&["auto", "classical"], [900.0, 900.0]);
     let rows = harness.state().panel.scores.rows();
     let rms = rows.iter().find(|row| row.name == "ATE RMS").unwrap();
@@ -81,7 +81,7 @@ fn numbers_tell_accuracy_and_lead_to_where_runs_part() {
 }
 
 #[test]
-fn a_run_alone_and_a_twin_are_told_as_such() {
+fn a_single_run_and_an_equal_run_are_reported() {
     let mut harness = bench(&["auto"], [900.0, 700.0]);
     assert!(harness.query_by_label("Accuracy over the whole flight so far").is_some());
     harness.get_by_label("Differences").click();
@@ -96,7 +96,7 @@ fn a_run_alone_and_a_twin_are_told_as_such() {
 }
 
 #[test]
-fn every_view_has_its_parts_and_differences_seek() {
+fn every_view_is_complete_and_differences_seek() {
     let mut harness = bench(&["auto", "classical"], [1500.0, 900.0]);
     for label in ["Accuracy over the whole flight so far", "Difference in position over time", "classical against auto"]
     {

@@ -6,9 +6,9 @@ use super::names::{ChainPart, part_of};
 use crate::gimbal::ParameterId;
 
 /// Minimum height of a legible plot in points, its title included.
-const LOWEST_CELL: f32 = 52.0;
+const MIN_CELL_HEIGHT: f32 = 52.0;
 /// Minimum width of a legible plot in points.
-const NARROWEST_CELL: f32 = 118.0;
+const MIN_CELL_WIDTH: f32 = 118.0;
 /// Gap between plots in points.
 const GAP: f32 = 5.0;
 /// Width of the headings beside the rows.
@@ -47,8 +47,8 @@ fn by_part(parameters: &[ParameterId], available: Rect) -> Option<Layout> {
     // The layout by rows leaves free cells; it is used only if plots stay legible and few cells are empty.
     let empty = rows.len() * columns - parameters.len();
     if rows.len() < 2
-        || width < NARROWEST_CELL * 1.15
-        || height < LOWEST_CELL * 1.35
+        || width < MIN_CELL_WIDTH * 1.15
+        || height < MIN_CELL_HEIGHT * 1.35
         || 3 * empty > parameters.len() + 2
     {
         return None;
@@ -88,12 +88,12 @@ fn free_corner(counts: &[usize], columns: usize) -> Option<(usize, usize, usize)
 
 fn flowing(count: usize, available: Rect) -> Layout {
     const WANTED_ASPECT: f32 = 2.0;
-    let most = (((available.width() + GAP) / (NARROWEST_CELL + GAP)) as usize).clamp(1, count.max(1));
+    let max_columns = (((available.width() + GAP) / (MIN_CELL_WIDTH + GAP)) as usize).clamp(1, count.max(1));
     let size = |columns: usize| {
         let rows = count.div_ceil(columns).max(1);
         let width = (available.width() - GAP * (columns as f32 - 1.0)) / columns as f32;
         let height = (available.height() - GAP * (rows as f32 - 1.0)) / rows as f32;
-        vec2(width.max(1.0), height.max(LOWEST_CELL))
+        vec2(width.max(1.0), height.max(MIN_CELL_HEIGHT))
     };
     let loss = |columns: usize| {
         let size = size(columns);
@@ -102,7 +102,7 @@ fn flowing(count: usize, available: Rect) -> Layout {
         let overflow = (rows as f32 * (size.y + GAP) - GAP - available.height()).max(0.0) / available.height().max(1.0);
         (size.x / size.y / WANTED_ASPECT).ln().abs() + empty + 10.0 * overflow
     };
-    let columns = (1..=most).min_by(|a, b| loss(*a).total_cmp(&loss(*b))).unwrap_or(1);
+    let columns = (1..=max_columns).min_by(|a, b| loss(*a).total_cmp(&loss(*b))).unwrap_or(1);
     let size = size(columns);
     let cells: Vec<Rect> = (0..count)
         .map(|index| {
@@ -131,7 +131,7 @@ mod tests {
         let layout = lay_out(names, available);
         assert_eq!(layout.cells.len(), names.len());
         for (index, cell) in layout.cells.iter().enumerate() {
-            assert!(cell.height() >= LOWEST_CELL - 0.5, "{cell:?}");
+            assert!(cell.height() >= MIN_CELL_HEIGHT - 0.5, "{cell:?}");
             assert!(cell.left() >= available.left() - 0.5 && cell.right() <= available.right() + 0.5, "{cell:?}");
             assert!(layout.cells[..index].iter().all(|other| !other.shrink(0.1).intersects(cell.shrink(0.1))));
         }

@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 use egui::{Rect, RichText, ScrollArea, Ui, vec2};
 
 use self::model::{CalibrationHistory, ConvertedHistory};
-pub(crate) use self::model::{Knowledge, knowledge};
+pub(crate) use self::model::{ParameterState, parameter_states};
 use super::PanelContext;
 use super::chain_values::{ParameterValues, true_values};
 use super::plot::{BandCurve, Curve, StateCurve};
@@ -125,8 +125,9 @@ impl ConvergencePanel {
         }
         for (parameter, rect) in parameters.iter().zip(&layout.cells) {
             if ui.is_rect_visible(*rect) {
-                let told = paint::Told { histories: &self.histories, converted: &self.converted, ground_truth, shown };
-                paint::cell_ui(ui, ctx, &told, &mut self.curves, *parameter, *rect);
+                let data =
+                    paint::PlotData { histories: &self.histories, converted: &self.converted, ground_truth, shown };
+                paint::cell_ui(ui, ctx, &data, &mut self.curves, *parameter, *rect);
             }
         }
     }

@@ -11,15 +11,15 @@ use crate::sensors::Rig;
 use crate::session::{RunRecord, StepRecord};
 
 /// A parameter counts as lost when at least this ratio of its squared unit vector lies in the span of the directions.
-const LOST_SHARE: f64 = 0.25;
+const MIN_LOST_RATIO: f64 = 0.25;
 
 /// Observability of a parameter in a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Knowledge {
+pub(crate) enum ParameterState {
     /// The window constrains it more than the prior.
     Informed,
     /// Fixed at its value.
-    Held,
+    Fixed,
     /// The window constrains it less than the prior.
     Weak,
     /// Unobservable: it lies in a structural null direction.
@@ -28,12 +28,12 @@ pub(crate) enum Knowledge {
     Waiting,
 }
 
-impl Knowledge {
+impl ParameterState {
     /// A one-word tag, empty for an informed parameter.
     pub(crate) fn tag(self) -> &'static str {
         match self {
             Self::Informed => "",
-            Self::Held => "held",
+            Self::Fixed => "held",
             Self::Weak => "weak",
             Self::Unobservable => "unobservable",
             Self::Waiting => "waiting",
@@ -53,7 +53,7 @@ pub(crate) struct ParameterHistory {
     /// Standard deviation by step.
     pub(crate) sigmas: Vec<f64>,
     /// Observability by step.
-    pub(crate) knowledge: Vec<Knowledge>,
+    pub(crate) states: Vec<ParameterState>,
 }
 
 /// The calibration of one run over time.
@@ -73,14 +73,14 @@ pub(crate) struct CalibrationHistory {
 impl CalibrationHistory {
     /// Reads the steps that are new since the last call.
     pub(crate) fn read(&mut self, run: &RunRecord) {
-        let news = self.follower.news(run);
-        if news.restarted {
+        let new_steps = self.follower.new_steps(run);
+        if new_steps.restarted {
             self.stamps_ns.clear();
             self.parameters.clear();
             self.last.clear();
             self.epoch += 1;
         }
-        for step in news.steps {
+        for step in new_steps.steps {
             self.push(step);
         }
     }
@@ -89,7 +89,7 @@ impl CalibrationHistory {
         let calibration = &step.report.calibration;
         let row = self.stamps_ns.len();
         self.stamps_ns.push(step.report.stamp_ns);
-        let known = knowledge(step.rank.as_ref());
+        let known = parameter_states(step.rank.as_ref());
         let mut values: ParameterValues =
             calibration.parameters.iter().copied().zip(calibration.values.iter().copied()).collect();
         unwrap_towards(&mut values, &self.last);
@@ -107,9 +107,9 @@ impl CalibrationHistory {
             history.sigmas.push(sigma);
             history.lower.push(value - 3.0 * sigma);
             history.upper.push(value + 3.0 * sigma);
-            history.knowledge.push(match &known {
-                Some(known) => known.get(parameter).copied().unwrap_or(Knowledge::Informed),
-                None => Knowledge::Waiting,
+            history.states.push(match &known {
+                Some(known) => known.get(parameter).copied().unwrap_or(ParameterState::Informed),
+                None => ParameterState::Waiting,
             });
         }
         for (_, history) in &mut self.parameters {
@@ -159,12 +159,12 @@ impl ConvertedHistory {
         }
         let Some((_, form)) = &self.target else { return };
         let form = form.clone();
-        let news = self.follower.news(run);
-        if news.restarted {
+        let new_steps = self.follower.new_steps(run);
+        if new_steps.restarted {
             self.forget();
         }
         self.epoch |= APART;
-        for step in news.steps {
+        for step in new_steps.steps {
             let row = self.stamps_ns.len();
             self.stamps_ns.push(step.report.stamp_ns);
             let calibration = &step.report.calibration;
@@ -194,29 +194,29 @@ impl ParameterHistory {
         for column in [&mut self.values, &mut self.sigmas, &mut self.lower, &mut self.upper] {
             column.resize(rows.max(column.len()), f64::NAN);
         }
-        self.knowledge.resize(rows.max(self.knowledge.len()), Knowledge::Waiting);
+        self.states.resize(rows.max(self.states.len()), ParameterState::Waiting);
     }
 }
 
 /// Observability of each parameter, `None` during initialization.
-pub(crate) fn knowledge(rank: Option<&RankReport>) -> Option<BTreeMap<ParameterId, Knowledge>> {
+pub(crate) fn parameter_states(rank: Option<&RankReport>) -> Option<BTreeMap<ParameterId, ParameterState>> {
     let rank = rank?;
-    let share = |column: usize, structural_only: bool| -> f64 {
+    let lost_ratio = |column: usize, structural_only: bool| -> f64 {
         let directions = rank.directions.iter().filter(|direction| direction.structural || !structural_only);
         directions.filter_map(|direction| direction.weights.get(column)).map(|weight| weight * weight).sum()
     };
     let verdict = |column: usize| {
-        if share(column, true) >= LOST_SHARE {
-            Knowledge::Unobservable
-        } else if share(column, false) >= LOST_SHARE {
-            Knowledge::Weak
+        if lost_ratio(column, true) >= MIN_LOST_RATIO {
+            ParameterState::Unobservable
+        } else if lost_ratio(column, false) >= MIN_LOST_RATIO {
+            ParameterState::Weak
         } else {
-            Knowledge::Informed
+            ParameterState::Informed
         }
     };
-    let held = rank.fixed_parameters.iter().map(|parameter| (*parameter, Knowledge::Held));
+    let fixed = rank.fixed_parameters.iter().map(|parameter| (*parameter, ParameterState::Fixed));
     let columns = rank.parameters.iter().enumerate().map(|(column, parameter)| (*parameter, verdict(column)));
-    Some(columns.chain(held).collect())
+    Some(columns.chain(fixed).collect())
 }
 
 #[cfg(test)]
@@ -248,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn another_run_is_told_in_the_same_columns() {
+    fn another_run_is_converted_to_the_same_columns() {
         let recording = sample_recording_of(FIRST_TRACKED_FRAME + 30, &["auto", "classical"]);
         let mut converted = ConvertedHistory::default();
         converted.read(&recording.runs[1], &recording.rig, Parameterization::Minimal);
@@ -270,8 +270,9 @@ mod tests {
         let mut history = CalibrationHistory::default();
         history.read(&recording.runs[0]);
         let last = history.stamps_ns.len() - 1;
-        let lost = history.parameters.iter().filter(|(_, one)| one.knowledge[last] == Knowledge::Unobservable).count();
+        let lost =
+            history.parameters.iter().filter(|(_, one)| one.states[last] == ParameterState::Unobservable).count();
         assert!(lost > 0, "the classical chain is redundant");
-        assert!(history.parameters.iter().all(|(_, one)| one.knowledge[0] == Knowledge::Waiting));
+        assert!(history.parameters.iter().all(|(_, one)| one.states[0] == ParameterState::Waiting));
     }
 }

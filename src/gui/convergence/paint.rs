@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use egui::{Align2, Color32, FontFamily, FontId, Pos2, Rect, Stroke, StrokeKind, Ui, pos2, vec2};
 
 use super::ParameterCurves;
-use super::model::{CalibrationHistory, ConvertedHistory, Knowledge};
+use super::model::{CalibrationHistory, ConvertedHistory, ParameterState};
 use super::names::{ChainPart, heading_of, meaning_of};
 use super::range::{paint_outside, value_range};
 use crate::gimbal::ParameterId;
@@ -24,7 +24,8 @@ const STRIP_HEIGHT: f32 = 3.0;
 const TITLE_HEIGHT: f32 = 15.0;
 
 /// States that are marked in the plots.
-pub(super) const MARKED: [Knowledge; 3] = [Knowledge::Weak, Knowledge::Unobservable, Knowledge::Waiting];
+pub(super) const MARKED: [ParameterState; 3] =
+    [ParameterState::Weak, ParameterState::Unobservable, ParameterState::Waiting];
 
 /// The heading of a row.
 pub(super) fn heading(ui: &Ui, ctx: &PanelContext<'_>, part: ChainPart, rect: Rect) {
@@ -45,7 +46,7 @@ pub(super) fn legend(ui: &Ui, ctx: &PanelContext<'_>, rect: Rect) {
         Rect::from_min_size(pos2(rect.left() + 8.0, top), vec2(26.0, LINE - 4.0))
     };
     let mut line = 0;
-    let mut say = |text: &str, paint: &dyn Fn(Rect)| {
+    let mut add_entry = |text: &str, paint: &dyn Fn(Rect)| {
         let place = sample(line);
         if place.bottom() < rect.bottom() {
             paint(place);
@@ -56,22 +57,22 @@ pub(super) fn legend(ui: &Ui, ctx: &PanelContext<'_>, rect: Rect) {
     };
     for (number, run) in ctx.recording.runs.iter().enumerate() {
         let style = theme.run(number);
-        say(&run.spec.label, &|place| {
+        add_entry(&run.spec.label, &|place| {
             paint_line(&painter, &[place.left_center(), place.right_center()], style, CURVE_WIDTH);
         });
     }
     let band = theme.run(ctx.selection.run).color.gamma_multiply(0.22);
-    say("±3σ", &|place| {
+    add_entry("±3σ", &|place| {
         painter.rect_filled(place, 0.0, band);
     });
     if ctx.recording.ground_truth_rig.is_some() {
-        say("truth", &|place| {
+        add_entry("truth", &|place| {
             paint_line(&painter, &[place.left_center(), place.right_center()], theme.ground_truth_style(), CURVE_WIDTH);
         });
     }
     for (state, text) in MARKED.into_iter().zip(["weak: no better than the prior", "unobservable", "initializing"]) {
-        say(text, &|place| {
-            if state != Knowledge::Weak {
+        add_entry(text, &|place| {
+            if state != ParameterState::Weak {
                 paint_hatch(&painter, place, theme.hatch);
             }
             let strip = Rect::from_min_max(pos2(place.left(), place.bottom() - STRIP_HEIGHT), place.max);
@@ -81,7 +82,7 @@ pub(super) fn legend(ui: &Ui, ctx: &PanelContext<'_>, rect: Rect) {
 }
 
 /// The data of the plots.
-pub(super) struct Told<'a> {
+pub(super) struct PlotData<'a> {
     /// The calibration of each run in its own parameterization.
     pub(super) histories: &'a [CalibrationHistory],
     /// The runs in another parameterization than the shown one, converted to it.
@@ -92,7 +93,7 @@ pub(super) struct Told<'a> {
     pub(super) shown: usize,
 }
 
-impl<'a> Told<'a> {
+impl<'a> PlotData<'a> {
     /// Epoch, stamps and values of a run's parameter.
     fn values(&self, run: usize, parameter: ParameterId) -> Option<(u64, &'a [i64], &'a [f64])> {
         let converted = self.converted.get(run).filter(|converted| !converted.stamps_ns.is_empty());
@@ -129,13 +130,13 @@ impl<'a> Told<'a> {
 pub(super) fn cell_ui(
     ui: &Ui,
     ctx: &mut PanelContext<'_>,
-    told: &Told<'_>,
+    data: &PlotData<'_>,
     curves: &mut BTreeMap<(usize, ParameterId), ParameterCurves>,
     id: ParameterId,
     rect: Rect,
 ) {
-    let shown_run = told.shown;
-    let Some(history) = told.histories.get(shown_run) else { return };
+    let shown_run = data.shown;
+    let Some(history) = data.histories.get(shown_run) else { return };
     let Some(parameter) = history.parameter(id) else { return };
     let shown = Shown::of(id.dimension());
     let name = &ctx.names().name(id);
@@ -144,20 +145,20 @@ pub(super) fn cell_ui(
     let plot = Rect::from_min_max(pos2(rect.left(), rect.top() + TITLE_HEIGHT), rect.max);
     let mut area = PlotArea { rect: plot, begin_ns, end_ns, low: 0.0, high: 1.0 };
 
-    let overlaid: Vec<usize> = (0..told.histories.len()).filter(|run| told.values(*run, id).is_some()).collect();
+    let overlaid: Vec<usize> = (0..data.histories.len()).filter(|run| data.values(*run, id).is_some()).collect();
     for run in &overlaid {
-        let Some((epoch, stamps_ns, values)) = told.values(*run, id) else { continue };
+        let Some((epoch, stamps_ns, values)) = data.values(*run, id) else { continue };
         let curves = curves.entry((*run, id)).or_default();
         curves.value.update(&area, epoch, stamps_ns, values);
         if *run == shown_run {
             curves.band.update(&area, epoch, stamps_ns, &parameter.lower, &parameter.upper);
-            for (stretches, state) in curves.states.iter_mut().zip(MARKED) {
-                stretches.update(&area, epoch, stamps_ns, |row| parameter.knowledge[row] == state);
+            for (segments, state) in curves.states.iter_mut().zip(MARKED) {
+                segments.update(&area, epoch, stamps_ns, |row| parameter.states[row] == state);
             }
         }
     }
     let curve_of = |run: usize| curves.get(&(run, id));
-    let ground_truth = told.ground_truth.get(&id).copied();
+    let ground_truth = data.ground_truth.get(&id).copied();
     let extent_of = |run: usize| curve_of(run)?.value.extent;
     let others = overlaid.iter().filter(|run| **run != shown_run).filter_map(|run| extent_of(*run));
     let (low, high) = value_range(extent_of(shown_run), ground_truth, others, parameter);
@@ -167,7 +168,7 @@ pub(super) fn cell_ui(
     let inner = painter.with_clip_rect(plot);
     paint_ground(&painter, &theme, plot);
     if let Some(curves) = curve_of(shown_run) {
-        paint_knowledge(&inner, &theme, &area, curves);
+        paint_states(&inner, &theme, &area, curves);
     }
     paint_value_grid(&inner, &theme, &area, shown.factor, (plot.height() / 22.0) as usize + 1);
     if let Some(curves) = curve_of(shown_run) {
@@ -197,7 +198,7 @@ pub(super) fn cell_ui(
     painter.rect_stroke(plot, 0.0, border, StrokeKind::Inside);
 
     let row = history.row_at(ctx.cursor_ns);
-    let state = row.map_or(Knowledge::Waiting, |row| parameter.knowledge[row]);
+    let state = row.map_or(ParameterState::Waiting, |row| parameter.states[row]);
     let value = row.map(|row| (parameter.values[row], parameter.sigmas[row]));
     title(&painter, ctx, rect, name, shown, value, state, selected);
     if !state.tag().is_empty() {
@@ -228,7 +229,7 @@ pub(super) fn cell_ui(
     let meaning = meaning_of(id, &ctx.recording.rig);
     response.on_hover_ui_at_pointer(|ui| {
         let mut lines = vec![format!("{name}: {meaning}"), text];
-        lines.extend(told.others_lines(ctx, &overlaid, id, shown, &area));
+        lines.extend(data.others_lines(ctx, &overlaid, id, shown, &area));
         ui.label(lines.join("\n"));
     });
 }
@@ -242,25 +243,25 @@ fn error_text(shown: Shown, error: f64, sigma: f64) -> String {
 }
 
 /// Hatches the ranges in which the parameter is not informed; a strip at the bottom shows the state.
-fn paint_knowledge(painter: &egui::Painter, theme: &theme::Theme, area: &PlotArea, curves: &ParameterCurves) {
-    for (stretches, state) in curves.states.iter().zip(MARKED) {
-        for stretch in stretches.on_screen(area) {
-            let stretch = Rect::from_x_y_ranges(stretch, area.rect.y_range());
-            if state != Knowledge::Weak {
-                paint_hatch(painter, stretch, theme.hatch);
+fn paint_states(painter: &egui::Painter, theme: &theme::Theme, area: &PlotArea, curves: &ParameterCurves) {
+    for (segments, state) in curves.states.iter().zip(MARKED) {
+        for segment in segments.on_screen(area) {
+            let segment = Rect::from_x_y_ranges(segment, area.rect.y_range());
+            if state != ParameterState::Weak {
+                paint_hatch(painter, segment, theme.hatch);
             }
-            let strip = Rect::from_min_max(pos2(stretch.left(), stretch.bottom() - STRIP_HEIGHT), stretch.max);
+            let strip = Rect::from_min_max(pos2(segment.left(), segment.bottom() - STRIP_HEIGHT), segment.max);
             painter.rect_filled(strip, 0.0, state_color(theme, state));
         }
     }
 }
 
-fn state_color(theme: &theme::Theme, state: Knowledge) -> Color32 {
+fn state_color(theme: &theme::Theme, state: ParameterState) -> Color32 {
     match state {
-        Knowledge::Informed => theme.ok,
-        Knowledge::Weak => theme.warn,
-        Knowledge::Unobservable => theme.error,
-        Knowledge::Held | Knowledge::Waiting => theme.text_weak,
+        ParameterState::Informed => theme.ok,
+        ParameterState::Weak => theme.warn,
+        ParameterState::Unobservable => theme.error,
+        ParameterState::Fixed | ParameterState::Waiting => theme.text_weak,
     }
 }
 
@@ -273,14 +274,14 @@ fn title(
     name: &str,
     shown: Shown,
     value: Option<(f64, f64)>,
-    state: Knowledge,
+    state: ParameterState,
     selected: bool,
 ) {
     let theme = ctx.theme;
     let name_color = if selected { theme.accent } else { theme.text_strong };
     let end = painter.text(rect.left_top(), Align2::LEFT_TOP, name, theme::label_font(), name_color).right();
     let Some((value, sigma)) = value else { return };
-    let color = if state == Knowledge::Informed { theme.text_strong } else { theme.text_weak };
+    let color = if state == ParameterState::Informed { theme.text_strong } else { theme.text_weak };
     let font = FontId::new(10.5, FontFamily::Monospace);
     let with_sigma = format!("{} ±{}", fixed_value(shown, value, sigma), shown.sigma(sigma));
     let texts = [with_sigma, shown.value(value, sigma)];

@@ -15,7 +15,7 @@ struct Extent(Option<(f64, f64)>);
 
 impl Extent {
     fn of(values: impl IntoIterator<Item = (f64, f64)>) -> Self {
-        Self(values.into_iter().reduce(|(low, high), (least, most)| (low.min(least), high.max(most))))
+        Self(values.into_iter().reduce(|(low, high), (lowest, highest)| (low.min(lowest), high.max(highest))))
     }
 }
 
@@ -44,10 +44,10 @@ pub(super) fn value_range(
     let span = high - low;
     // A constant value has no range of its own: then the others decide.
     let room = if span > 0.0 { WIDENING * span } else { f64::INFINITY };
-    let (least, most) = (low - room, high + room);
+    let (lowest, highest) = (low - room, high + room);
     if let Extent(Some((others_low, others_high))) = Extent::of(others) {
-        low = low.min(others_low.max(least));
-        high = high.max(others_high.min(most));
+        low = low.min(others_low.max(lowest));
+        high = high.max(others_high.min(highest));
     }
     let margin = 0.06 * (high - low);
     (low - margin, high + margin)
@@ -56,9 +56,9 @@ pub(super) fn value_range(
 /// Horizontal ranges in which a curve lies above the plot, and in which it lies below.
 fn outside(area: &PlotArea, curve: &Curve) -> [Vec<Rangef>; 2] {
     let mut found = [Vec::new(), Vec::new()];
-    for stretch in &curve.stretches {
+    for segment in &curve.segments {
         let mut open: [Option<Rangef>; 2] = [None, None];
-        for (offset, value) in stretch {
+        for (offset, value) in segment {
             let x = (area.rect.left() + offset).clamp(area.rect.left(), area.rect.right());
             for (side, is_out) in [*value > area.high, *value < area.low].into_iter().enumerate() {
                 if is_out {
@@ -82,10 +82,10 @@ pub(super) fn paint_outside(painter: &Painter, area: &PlotArea, curve: &Curve, s
     const HALF: f32 = 3.5;
     let inset = 1.5 + level as f32 * PITCH;
     let edges = [(area.rect.top() + inset, 1.0), (area.rect.bottom() - inset, -1.0)];
-    for (stretches, (y, inwards)) in outside(area, curve).into_iter().zip(edges) {
-        for stretch in stretches {
-            painter.hline(stretch, y, Stroke::new(1.5, style.color));
-            let x = stretch.center().clamp(area.rect.left() + HALF, area.rect.right() - HALF);
+    for (segments, (y, inwards)) in outside(area, curve).into_iter().zip(edges) {
+        for segment in segments {
+            painter.hline(segment, y, Stroke::new(1.5, style.color));
+            let x = segment.center().clamp(area.rect.left() + HALF, area.rect.right() - HALF);
             let foot = y + inwards * 1.5 * HALF;
             let head = vec![pos2(x, y), pos2(x + inwards * HALF, foot), pos2(x - inwards * HALF, foot)];
             painter.add(Shape::convex_polygon(head, style.color, Stroke::NONE));
@@ -104,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn the_axis_follows_the_run_on_screen() {
+    fn the_axis_follows_the_shown_run() {
         let own = history(&[0.0, 1.0, 1.0], 0.1);
         let range = |others: &[(f64, f64)], ground_truth| {
             value_range(Some((0.0, 1.0)), ground_truth, others.iter().copied(), &own)
@@ -113,18 +113,18 @@ mod tests {
         assert!(low < 0.0 && low > -0.2 && high > 1.45 && high < 1.6, "{low} {high}");
         // A nearby run is completely visible; a distant one extends the range by at most half its height.
         assert!(range(&[(-0.2, 1.0)], None).0 < -0.2);
-        let (least, most) = range(&[(-90.0, 400.0)], None);
-        assert!(least > -1.0 && most < 2.5, "{least} {most}");
+        let (lowest, highest) = range(&[(-90.0, 400.0)], None);
+        assert!(lowest > -1.0 && highest < 2.5, "{lowest} {highest}");
         // The ground truth is always visible.
         assert!(range(&[], Some(-9.0)).0 < -9.0);
         // A fixed value has no range of its own.
-        let held = history(&[2.0, 2.0], f64::NAN);
-        let (low, high) = value_range(Some((2.0, 2.0)), None, [(1.0, 3.0)].into_iter(), &held);
+        let constant = history(&[2.0, 2.0], f64::NAN);
+        let (low, high) = value_range(Some((2.0, 2.0)), None, [(1.0, 3.0)].into_iter(), &constant);
         assert!(low < 1.0 && high > 3.0);
     }
 
     #[test]
-    fn what_lies_outside_is_found() {
+    fn curves_outside_the_plot_are_found() {
         let rect = Rect::from_min_max(pos2(10.0, 0.0), pos2(110.0, 20.0));
         let area = PlotArea { rect, begin_ns: 0, end_ns: 100, low: 0.0, high: 1.0 };
         let stamps: Vec<i64> = (0..=10).map(|row| row * 10).collect();

@@ -15,12 +15,12 @@ use self::model::ImageModel;
 pub use self::model::SolveSide;
 use self::paint::{ImagePlacement, MarkOptions};
 use super::theme::Theme;
-use super::units::figure;
+use super::units::significant;
 use super::{PanelContext, slide};
 use crate::sensors::GrayImage;
 
 /// Maximum magnification relative to the fitted size.
-const LARGEST_ZOOM: f32 = 16.0;
+const MAX_ZOOM: f32 = 16.0;
 /// Width in points of the row with all options.
 const OPTIONS_WIDTH: f32 = 395.0;
 /// Height of legend and caption in points.
@@ -35,7 +35,7 @@ pub struct ImagePanel {
     /// Draw residuals.
     pub residuals: bool,
     /// Draw the track trails.
-    pub tails: bool,
+    pub trails: bool,
     /// Write every feature's id.
     pub ids: bool,
     view: View,
@@ -48,7 +48,7 @@ impl Default for ImagePanel {
             side: SolveSide::After,
             magnification: 20.0,
             residuals: true,
-            tails: true,
+            trails: true,
             ids: false,
             view: View::default(),
             texture: None,
@@ -79,22 +79,22 @@ struct CachedTexture {
 impl ImagePanel {
     /// A panel with the same view and no texture of a window.
     pub(in crate::gui) fn view_copy(&self) -> Self {
-        let Self { side, magnification, residuals, tails, ids, view, .. } = *self;
-        Self { side, magnification, residuals, tails, ids, view, texture: None }
+        let Self { side, magnification, residuals, trails, ids, view, .. } = *self;
+        Self { side, magnification, residuals, trails, ids, view, texture: None }
     }
 
     /// Copies the view of another panel.
     pub(in crate::gui) fn follow(&mut self, other: &Self) {
-        let Self { side, magnification, residuals, tails, ids, view, .. } = *other;
+        let Self { side, magnification, residuals, trails, ids, view, .. } = *other;
         let texture = self.texture.take();
-        *self = Self { side, magnification, residuals, tails, ids, view, texture };
+        *self = Self { side, magnification, residuals, trails, ids, view, texture };
     }
 
     /// Whether it has the view of another panel.
     pub(in crate::gui) fn looks_like(&self, other: &Self) -> bool {
         let look = |panel: &Self| {
-            let Self { side, magnification, residuals, tails, ids, view, .. } = *panel;
-            (side, magnification, residuals, tails, ids, view)
+            let Self { side, magnification, residuals, trails, ids, view, .. } = *panel;
+            (side, magnification, residuals, trails, ids, view)
         };
         look(self) == look(other)
     }
@@ -123,8 +123,8 @@ impl ImagePanel {
     }
 
     fn mark_options(&self) -> MarkOptions {
-        let Self { side, magnification, residuals, tails, ids, .. } = *self;
-        MarkOptions { side, magnification, residuals, tails, ids }
+        let Self { side, magnification, residuals, trails, ids, .. } = *self;
+        MarkOptions { side, magnification, residuals, trails, ids }
     }
 
     fn controls_ui(&mut self, ui: &mut Ui, theme: &Theme, run: usize, run_label: &str) {
@@ -155,7 +155,7 @@ impl ImagePanel {
                 .prefix("×")
                 .text("magnification"),
         );
-        ui.checkbox(&mut self.tails, "Tails");
+        ui.checkbox(&mut self.trails, "Tails");
         ui.checkbox(&mut self.ids, "Ids");
     }
 
@@ -195,7 +195,7 @@ impl ImagePanel {
             for (_, [now, moved]) in &slide.predictions_px {
                 paint::moved_prediction(&painter, &place, now, moved);
             }
-            let text = format!("chain moved: reprojections change by up to {} px", figure(slide.largest_px));
+            let text = format!("chain moved: reprojections change by up to {} px", significant(slide.largest_px));
             paint::label(&painter, area.left_top() + vec2(8.0, 8.0), Align2::LEFT_TOP, &text);
         }
         self.pick_ui(ui, &painter, &place, response, context, model);
@@ -229,7 +229,7 @@ impl ImagePanel {
             let at = place.position(&mark.measured_px);
             paint::selection(painter, place, at);
             if !self.ids {
-                let beside = at + vec2(place.ring_radius() + 8.0, 0.0);
+                let beside = at + vec2(place.marker_radius() + 8.0, 0.0);
                 paint::label(painter, beside, Align2::LEFT_CENTER, &mark.id.0.to_string());
             }
         }
@@ -248,11 +248,11 @@ impl ImagePanel {
         let before = self.placement(area, size_px);
         if let Some(pointer) = response.hover_pos() {
             let factor = ui.input(|input| input.zoom_delta() * (input.smooth_scroll_delta().y * 0.004).exp());
-            let zoom = (self.view.zoom * factor).clamp(1.0, LARGEST_ZOOM);
+            let zoom = (self.view.zoom * factor).clamp(1.0, MAX_ZOOM);
             if zoom != self.view.zoom {
                 // The position under the pointer stays fixed.
-                let held = (pointer - before.rect.min) / before.rect.size();
-                self.view.centre = held + (self.view.centre - held) * (self.view.zoom / zoom);
+                let anchor = (pointer - before.rect.min) / before.rect.size();
+                self.view.centre = anchor + (self.view.centre - anchor) * (self.view.zoom / zoom);
                 self.view.zoom = zoom;
             }
         }

@@ -8,7 +8,7 @@ use crate::geometry::seconds_from_ns;
 use crate::session::RunRecord;
 
 /// Length of a track trail in images.
-const TAIL_FRAMES: usize = 4;
+const TRAIL_FRAMES: usize = 4;
 
 /// The state of the solve in which residuals are taken.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -29,7 +29,7 @@ pub(super) struct FeatureMark {
     /// Measured position in pixels.
     pub(super) measured_px: Vector2<f64>,
     /// Measured positions in earlier images, newest first.
-    pub(super) tail_px: Vec<Vector2<f64>>,
+    pub(super) trail_px: Vec<Vector2<f64>>,
     /// Its result of the solve, `None` for a feature that was not solved.
     pub(super) solved: Option<SolvedMark>,
 }
@@ -87,8 +87,8 @@ impl ImageModel {
             .features
             .iter()
             .map(|feature| {
-                let reach = TAIL_FRAMES.min(feature.age as usize);
-                let tail_px = before
+                let reach = TRAIL_FRAMES.min(feature.age as usize);
+                let trail_px = before
                     .iter()
                     .rev()
                     .take(reach)
@@ -110,7 +110,7 @@ impl ImageModel {
                         rejected: solved.rejected,
                     }
                 });
-                FeatureMark { id: feature.id, age: feature.age, measured_px: feature.uv_px, tail_px, solved }
+                FeatureMark { id: feature.id, age: feature.age, measured_px: feature.uv_px, trail_px, solved }
             })
             .collect();
         Some(Self {

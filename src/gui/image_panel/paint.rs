@@ -7,13 +7,13 @@ use super::model::{FeatureMark, SolveSide};
 use crate::gui::theme::{self, Theme, ThemeName};
 
 /// Age in frames with the last colour of the map.
-const OLDEST_AGE: f64 = 100.0;
+const MAX_AGE: f64 = 100.0;
 /// Ages in the legend.
 const LEGEND_AGES: [u32; 4] = [0, 10, 40, 100];
 /// Radius of the keypoint marker of a solved feature in points, where the image is large enough.
-const RING_RADIUS: f32 = 4.0;
+const MARKER_RADIUS: f32 = 4.0;
 /// Radius of the keypoint marker in image pixels, so that markers do not hide a small image.
-const RING_RADIUS_PX: f32 = 7.0;
+const MARKER_RADIUS_PX: f32 = 7.0;
 /// Radius in points of a feature that is only tracked.
 const DOT_RADIUS: f32 = 2.0;
 /// Shadow below bright marks, for bright regions of the image.
@@ -39,8 +39,8 @@ impl ImagePlacement {
     }
 
     /// Radius of the keypoint marker of a solved feature in points.
-    pub(super) fn ring_radius(&self) -> f32 {
-        (RING_RADIUS_PX * self.scale()).clamp(0.5 * RING_RADIUS, RING_RADIUS)
+    pub(super) fn marker_radius(&self) -> f32 {
+        (MARKER_RADIUS_PX * self.scale()).clamp(0.5 * MARKER_RADIUS, MARKER_RADIUS)
     }
 
     /// Points per image pixel.
@@ -55,13 +55,13 @@ pub(super) struct MarkOptions {
     pub(super) side: SolveSide,
     pub(super) magnification: f32,
     pub(super) residuals: bool,
-    pub(super) tails: bool,
+    pub(super) trails: bool,
     pub(super) ids: bool,
 }
 
 /// Colour of an age in frames: viridis over the square root, so that young tracks differ most.
 pub(super) fn age_color(age: u32) -> Color32 {
-    theme::viridis((f64::from(age) / OLDEST_AGE).sqrt())
+    theme::viridis((f64::from(age) / MAX_AGE).sqrt())
 }
 
 /// The colour below a mark.
@@ -82,17 +82,17 @@ fn residual_color() -> Color32 {
 /// One feature: trail, keypoint marker, residual, cross, id.
 pub(super) fn feature(painter: &Painter, place: &ImagePlacement, mark: &FeatureMark, options: &MarkOptions) {
     let at = place.position(&mark.measured_px);
-    let (color, ring) = (age_color(mark.age), place.ring_radius());
-    if options.tails && !mark.tail_px.is_empty() {
-        let points: Vec<Pos2> = std::iter::once(at).chain(mark.tail_px.iter().map(|uv| place.position(uv))).collect();
+    let (color, marker_radius) = (age_color(mark.age), place.marker_radius());
+    if options.trails && !mark.trail_px.is_empty() {
+        let points: Vec<Pos2> = std::iter::once(at).chain(mark.trail_px.iter().map(|uv| place.position(uv))).collect();
         painter.add(Shape::line(points.clone(), Stroke::new(2.0, halo_of(color).gamma_multiply(0.4))));
         painter.add(Shape::line(points, Stroke::new(1.0, color.gamma_multiply(0.8))));
     }
     if let Some(solved) = &mark.solved {
         // Small markers have thin lines.
-        let thickness = 0.5 * ring;
-        painter.circle_stroke(at, ring, Stroke::new(thickness + 1.5, halo_of(color)));
-        painter.circle_stroke(at, ring, Stroke::new(thickness, color));
+        let thickness = 0.5 * marker_radius;
+        painter.circle_stroke(at, marker_radius, Stroke::new(thickness + 1.5, halo_of(color)));
+        painter.circle_stroke(at, marker_radius, Stroke::new(thickness, color));
         if options.residuals
             && let Some(residual) = solved.residual_px(options.side)
         {
@@ -101,14 +101,14 @@ pub(super) fn feature(painter: &Painter, place: &ImagePlacement, mark: &FeatureM
             residual_arrow(painter, at, tip);
         }
         if solved.rejected {
-            cross(painter, at, ring + 3.0);
+            cross(painter, at, marker_radius + 3.0);
         }
     } else {
         painter.circle_filled(at, DOT_RADIUS + 1.0, halo_of(color));
         painter.circle_filled(at, DOT_RADIUS, color);
     }
     if options.ids {
-        label(painter, at + vec2(ring + 2.0, 0.0), Align2::LEFT_CENTER, &mark.id.0.to_string());
+        label(painter, at + vec2(marker_radius + 2.0, 0.0), Align2::LEFT_CENTER, &mark.id.0.to_string());
     }
 }
 
@@ -116,7 +116,7 @@ pub(super) fn feature(painter: &Painter, place: &ImagePlacement, mark: &FeatureM
 /// before.
 pub(super) fn moved_prediction(painter: &Painter, place: &ImagePlacement, now: &Vector2<f64>, moved: &Vector2<f64>) {
     let (from, to) = (place.position(now), place.position(moved));
-    let reach = place.ring_radius() + 2.0;
+    let reach = place.marker_radius() + 2.0;
     for stroke in [Stroke::new(3.0, HALO), Stroke::new(1.5, ink().runs[3])] {
         painter.line_segment([from, to], stroke);
         upright_cross(painter, to, reach, stroke);
@@ -149,7 +149,7 @@ fn cross(painter: &Painter, at: Pos2, radius: f32) {
 
 /// A circle around the selected feature.
 pub(super) fn selection(painter: &Painter, place: &ImagePlacement, at: Pos2) {
-    let radius = place.ring_radius() + 5.0;
+    let radius = place.marker_radius() + 5.0;
     painter.circle_stroke(at, radius, Stroke::new(4.0, HALO));
     painter.circle_stroke(at, radius, Stroke::new(2.0, ink().cursor));
 }
@@ -178,7 +178,7 @@ pub(super) fn legend(painter: &Painter, rect: Rect, theme: &Theme, options: &Mar
         pen.symbol("with the moved chain", |painter, at| upright_cross(painter, at, 5.0, stroke));
     }
     pen.symbol("in the solve", |painter, at| {
-        painter.circle_stroke(at, RING_RADIUS, Stroke::new(1.5, theme.text));
+        painter.circle_stroke(at, MARKER_RADIUS, Stroke::new(1.5, theme.text));
     });
     pen.symbol("tracked only", |painter, at| {
         painter.circle_filled(at, DOT_RADIUS, theme.text);
@@ -241,7 +241,7 @@ impl LegendPen<'_> {
             self.painter.rect_filled(slice, 0.0, color);
         }
         for age in LEGEND_AGES {
-            let fraction = (f64::from(age) / OLDEST_AGE).sqrt() as f32;
+            let fraction = (f64::from(age) / MAX_AGE).sqrt() as f32;
             let (align, inset) = match age {
                 0 => (Align2::LEFT_CENTER, 2.0),
                 100 => (Align2::RIGHT_CENTER, -2.0),

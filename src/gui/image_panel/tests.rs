@@ -7,7 +7,7 @@ use super::model::{ImageModel, SolveSide, description};
 use super::paint::ImagePlacement;
 use crate::gui::rendering::headless::{HeadlessOptions, draw};
 use crate::gui::samples::{FIRST_TRACKED_FRAME, FRAME_PERIOD_NS, sample_images, sample_recording_of};
-use crate::gui::tests::{keep_picture, with_context};
+use crate::gui::tests::{keep_screenshot, with_context};
 use crate::gui::theme::{Theme, ThemeName};
 use crate::gui::{ImageSource, Selection};
 use crate::session::Recording;
@@ -24,7 +24,7 @@ fn show(ui: &mut egui::Ui, panel: &mut ImagePanel, recording: &Recording, cursor
 }
 
 #[test]
-fn the_caption_tells_the_step_at_or_before_the_cursor() {
+fn the_caption_is_that_of_the_step_at_or_before_the_cursor() {
     let recording = recording();
     let model = ImageModel::at(&recording.runs[0], 70 * FRAME_PERIOD_NS + 30_000_000).unwrap();
     assert_eq!(model.frame_index, 70);
@@ -51,7 +51,7 @@ fn the_caption_tells_the_step_at_or_before_the_cursor() {
 }
 
 #[test]
-fn marks_hold_what_the_report_says() {
+fn marks_have_the_values_of_the_report() {
     let recording = recording();
     let step = &recording.runs[0].steps[79];
     let model = ImageModel::at(&recording.runs[0], step.report.stamp_ns).unwrap();
@@ -59,8 +59,8 @@ fn marks_hold_what_the_report_says() {
     let solved = model.marks.iter().filter(|mark| mark.solved.is_some()).count();
     assert_eq!(solved, step.report.features.len());
     for mark in &model.marks {
-        assert_eq!(mark.tail_px.len(), (mark.age as usize).min(4), "tail of {:?}", mark.id);
-        if let Some(earlier) = mark.tail_px.first() {
+        assert_eq!(mark.trail_px.len(), (mark.age as usize).min(4), "tail of {:?}", mark.id);
+        if let Some(earlier) = mark.trail_px.first() {
             let track = step.tracks.features.iter().find(|feature| feature.id == mark.id).unwrap();
             assert_eq!(Some(*earlier), track.previous_uv_px);
         }
@@ -73,7 +73,7 @@ fn marks_hold_what_the_report_says() {
 }
 
 #[test]
-fn pixel_centres_lie_at_whole_numbers() {
+fn pixel_centres_have_integer_coordinates() {
     let rect = egui::Rect::from_min_size(egui::pos2(100.0, 50.0), egui::vec2(1280.0, 960.0));
     let place = ImagePlacement { rect, size_px: [640, 480] };
     assert_eq!(place.position(&Vector2::new(0.0, 0.0)), egui::pos2(101.0, 51.0));
@@ -97,7 +97,7 @@ fn controls_are_found_by_label_and_work() {
     harness.get_by_label("Tails").click();
     harness.run();
     let panel = &harness.state().0;
-    assert_eq!((panel.side, panel.ids, panel.tails), (SolveSide::Before, true, false));
+    assert_eq!((panel.side, panel.ids, panel.trails), (SolveSide::Before, true, false));
     harness.get_by_label_contains("frame 79 · 3.950 s");
 }
 
@@ -114,14 +114,14 @@ fn a_click_selects_the_feature_under_it() {
     // The image fills width or height of its area; a feature is searched by trying positions.
     let area = harness.ctx.globally_used_rect();
     // The tooltip is also the accessible description of the image.
-    let told = |node: &AccessKitNode<'_>| node.description().is_some_and(|text| text.contains("residual after"));
+    let tooltip = |node: &AccessKitNode<'_>| node.description().is_some_and(|text| text.contains("residual after"));
     let mut found = None;
     'search: for row in 0..60 {
         for column in 0..60 {
             let at = area.lerp_inside(egui::vec2(column as f32 / 59.0, 0.1 + 0.7 * row as f32 / 59.0));
             harness.hover_at(at);
             harness.step();
-            if harness.query_by(told).is_some() {
+            if harness.query_by(tooltip).is_some() {
                 found = Some(at);
                 break 'search;
             }
@@ -136,7 +136,7 @@ fn a_click_selects_the_feature_under_it() {
 }
 
 #[test]
-fn missing_runs_frames_and_images_are_said() {
+fn missing_runs_frames_and_images_are_reported() {
     struct NoImages;
     impl ImageSource for NoImages {
         fn image(&mut self, _: &str, _: usize) -> Option<std::sync::Arc<crate::sensors::GrayImage>> {
@@ -162,15 +162,15 @@ fn missing_runs_frames_and_images_are_said() {
 }
 
 #[test]
-fn pictures_repeat_and_show_the_image() {
+fn screenshots_repeat_and_show_the_image() {
     let recording = recording();
     let options = HeadlessOptions { size_px: [900, 760], pixels_per_point: 1.0, theme: ThemeName::Dark };
-    let picture = |cursor_ns| {
+    let screenshot = |cursor_ns| {
         let mut panel = ImagePanel::default();
         draw(options, |ui| show(ui, &mut panel, &recording, cursor_ns, &mut Selection::default()))
     };
-    let late = picture(recording.duration_ns);
-    keep_picture("image", &late);
-    assert!(late == picture(recording.duration_ns));
-    assert!(late != picture(60 * FRAME_PERIOD_NS));
+    let late = screenshot(recording.duration_ns);
+    keep_screenshot("image", &late);
+    assert!(late == screenshot(recording.duration_ns));
+    assert!(late != screenshot(60 * FRAME_PERIOD_NS));
 }

@@ -11,11 +11,11 @@ impl CsvTable for InspectorPanel {
         let Some(run) = ctx.selected_run() else { return String::new() };
         let mut table = Table::new(["quantity", "unit", "value"]);
         let Some(step) = run.step_at(ctx.cursor_ns) else { return table.into_text() };
-        let mut say = |quantity: &str, unit: &str, value: f64| {
+        let mut push_row = |quantity: &str, unit: &str, value: f64| {
             table.row([quantity.to_owned(), unit.to_owned(), number(value)]);
         };
-        say("time", "s", seconds_from_ns(step.report.stamp_ns));
-        say("frame", "", step.report.frame_index as f64);
+        push_row("time", "s", seconds_from_ns(step.report.stamp_ns));
+        push_row("frame", "", step.report.frame_index as f64);
         if let Some(newest) = step.report.newest() {
             let rotation = newest.world_from_imu.rotation;
             let vectors = [
@@ -26,22 +26,22 @@ impl CsvTable for InspectorPanel {
             ];
             for (name, unit, vector) in vectors {
                 for (axis, value) in ["x", "y", "z"].into_iter().zip(vector.iter()) {
-                    say(&format!("{name} {axis}"), unit, *value);
+                    push_row(&format!("{name} {axis}"), unit, *value);
                 }
             }
             for (name, value) in ["x", "y", "z", "w"].into_iter().zip(rotation.coords.iter()) {
-                say(&format!("attitude q{name}"), "", *value);
+                push_row(&format!("attitude q{name}"), "", *value);
             }
             for (joint, angle) in newest.joint_angles_rad.iter().enumerate() {
-                say(&format!("joint {}", joint + 1), "rad", *angle);
+                push_row(&format!("joint {}", joint + 1), "rad", *angle);
             }
         }
         let calibration = &step.report.calibration;
         let names = ctx.names();
         for (index, parameter) in calibration.parameters.iter().enumerate() {
             let (name, unit) = (names.name(*parameter), parameter.dimension().unit());
-            say(&name, unit, calibration.values.get(index).copied().unwrap_or(f64::NAN));
-            say(&format!("{name} sigma"), unit, calibration.sigmas.get(index).copied().unwrap_or(f64::NAN));
+            push_row(&name, unit, calibration.values.get(index).copied().unwrap_or(f64::NAN));
+            push_row(&format!("{name} sigma"), unit, calibration.sigmas.get(index).copied().unwrap_or(f64::NAN));
         }
         table.into_text()
     }

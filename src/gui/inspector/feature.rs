@@ -5,7 +5,7 @@ use egui::{RichText, Ui};
 use super::{rows_ui, table_ui};
 use crate::frontend::FeatureId;
 use crate::gui::PanelContext;
-use crate::gui::units::{figure, fixed};
+use crate::gui::units::{fixed, significant};
 use crate::session::StepRecord;
 
 pub(super) fn ui(ui: &mut Ui, ctx: &PanelContext<'_>, step: &StepRecord, id: FeatureId) {
@@ -52,7 +52,7 @@ pub(super) fn ui(ui: &mut Ui, ctx: &PanelContext<'_>, step: &StepRecord, id: Fea
             fixed(one.measured_px.y, 1),
             length(one.residual_before_px),
             length(one.residual_after_px),
-            figure(one.chi2),
+            significant(one.chi2),
             fixed(one.robust_weight, 2),
         ]
     });

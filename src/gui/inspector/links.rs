@@ -10,7 +10,7 @@ use crate::frontend::FeatureId;
 use crate::gimbal::ParameterId;
 use crate::gui::PanelContext;
 use crate::gui::jacobian::cameras;
-use crate::gui::units::{Shown, figure, fixed};
+use crate::gui::units::{Shown, fixed, significant};
 use crate::session::{RunRecord, StepRecord};
 
 /// Number of links shown for a feature or parameter.
@@ -100,7 +100,7 @@ fn links_ui(
     ui.horizontal_wrapped(|ui| {
         ui.label(RichText::new(title).color(ctx.theme.text_weak));
         for (index, (name, norm, selected)) in links.enumerate() {
-            let text = RichText::new(format!("{name} ({})", figure(f64::from(norm)))).small();
+            let text = RichText::new(format!("{name} ({})", significant(f64::from(norm)))).small();
             let link = ui.selectable_label(selected, text);
             if link.on_hover_text("Norm of the block in σ by 10° or 3 cm; a click selects it everywhere").clicked() {
                 clicked = Some(index);
@@ -136,10 +136,10 @@ pub(super) fn block_ui(
         let residual = seen.residual_after_px.map_or([f64::NAN; 2], |residual| [residual.x, residual.y]);
         // Conversion from standard deviations to pixels.
         let pixels = report.pixel_sigma_px / seen.robust_weight.sqrt() / shown.factor;
-        let slopes = [0, 1].map(|axis| figure(rows.rows[(2 * place + axis, column)] * pixels));
+        let slopes = [0, 1].map(|axis| significant(rows.rows[(2 * place + axis, column)] * pixels));
         let mut cells = vec![frame.to_string()];
         cells.extend(residual.map(|pixel| fixed(pixel, 2)));
-        cells.push(figure(seen.chi2));
+        cells.push(significant(seen.chi2));
         cells.extend(slopes);
         Some(cells)
     });

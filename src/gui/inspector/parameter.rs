@@ -7,7 +7,7 @@ use crate::gimbal::ParameterId;
 use crate::gui::PanelContext;
 use crate::gui::chain_values::true_values;
 use crate::gui::convergence::names::meaning_of;
-use crate::gui::convergence::{Knowledge, knowledge};
+use crate::gui::convergence::{ParameterState, parameter_states};
 use crate::gui::units::{Shown, fixed};
 use crate::session::{RunRecord, StepRecord};
 
@@ -44,9 +44,9 @@ pub(super) fn ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, step: &St
         let times = fixed((value - ground_truth).abs() / sigma, 1);
         rows.push(("error".to_owned(), vec![format!("{} ({times}σ)", shown.value(value - ground_truth, sigma))]));
     }
-    let state = knowledge(step.rank.as_ref())
-        .map_or(Knowledge::Waiting, |known| known.get(&parameter).copied().unwrap_or(Knowledge::Informed));
-    let state = if state == Knowledge::Informed { "informed" } else { state.tag() };
+    let state = parameter_states(step.rank.as_ref())
+        .map_or(ParameterState::Waiting, |known| known.get(&parameter).copied().unwrap_or(ParameterState::Informed));
+    let state = if state == ParameterState::Informed { "informed" } else { state.tag() };
     rows.push(("in this window".to_owned(), vec![state.to_owned()]));
     rows_ui(ui, theme, "parameter", &rows);
 }

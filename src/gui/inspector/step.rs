@@ -8,7 +8,7 @@ use crate::geometry::so3;
 use crate::gui::PanelContext;
 use crate::gui::events::{look_of, name_of, paint_mark};
 use crate::gui::theme::Theme;
-use crate::gui::units::{figure, fixed, seconds};
+use crate::gui::units::{fixed, seconds, significant};
 use crate::session::{RunRecord, StepRecord};
 
 /// State of the newest frame.
@@ -74,13 +74,13 @@ pub(super) fn events_ui(ui: &mut Ui, theme: &Theme, report: &StepReport) {
             let (mark, color) = look_of(event.kind, theme);
             let (rect, _) = ui.allocate_exact_size(vec2(11.0, 14.0), Sense::hover());
             paint_mark(ui.painter(), mark, rect.center(), 8.0, color);
-            let figures = match (event.value, event.threshold) {
-                (Some(value), Some(threshold)) => format!("{} / {}", figure(value), figure(threshold)),
-                (Some(value), None) => figure(value),
+            let event_values = match (event.value, event.threshold) {
+                (Some(value), Some(threshold)) => format!("{} / {}", significant(value), significant(threshold)),
+                (Some(value), None) => significant(value),
                 (None, _) => String::new(),
             };
-            if !figures.is_empty() {
-                let text = RichText::new(figures).monospace().color(theme.text_strong);
+            if !event_values.is_empty() {
+                let text = RichText::new(event_values).monospace().color(theme.text_strong);
                 ui.label(text).on_hover_text("measured value / threshold");
             }
             let text = RichText::new(&event.message).color(theme.text);
@@ -105,10 +105,10 @@ pub(super) fn iterations_ui(ui: &mut Ui, theme: &Theme, report: &StepReport) {
     let lines = report.iterations.iter().enumerate().map(|(number, iteration)| {
         vec![
             (number + 1).to_string(),
-            figure(iteration.cost_before),
-            figure(iteration.cost_after),
-            figure(iteration.step_norm),
-            figure(iteration.damping),
+            significant(iteration.cost_before),
+            significant(iteration.cost_after),
+            significant(iteration.step_norm),
+            significant(iteration.damping),
             if iteration.accepted { "taken" } else { "refused" }.to_owned(),
         ]
     });

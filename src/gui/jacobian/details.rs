@@ -3,12 +3,12 @@
 use egui::{Grid, Label, RichText, ScrollArea, Ui, vec2};
 
 use super::factors;
-use super::model::{JacobianModel, cameras, name_of, scale_words};
+use super::model::{JacobianModel, cameras, name_of, unit_text};
 use crate::estimator::{ColumnBlock, ColumnId, FeatureRows, FrameId, JacobianFactor};
 use crate::frontend::FeatureId;
 use crate::geometry::Dimension;
 use crate::gui::PanelContext;
-use crate::gui::units::{Shown, figure, fixed};
+use crate::gui::units::{Shown, fixed, significant};
 use crate::session::{RunRecord, StepRecord};
 
 /// A block in one line: name, size and norm.
@@ -20,7 +20,7 @@ pub(super) fn headline(model: &JacobianModel, row: usize, column: usize) -> Stri
     if norm == 0.0 {
         return format!("{name}: zero ({size})");
     }
-    format!("{name}: {} {} ({size})", figure(f64::from(norm)), scale_words(block.id))
+    format!("{name}: {} {} ({size})", significant(f64::from(norm)), unit_text(block.id))
 }
 
 /// The values of the selected row, column or block.
@@ -59,8 +59,8 @@ fn strongest_columns(model: &JacobianModel, row: usize) -> String {
         .collect();
     norms.sort_by(|a, b| b.1.total_cmp(&a.1));
     let shown = norms.iter().take(SHOWN).map(|(column, norm)| {
-        let words = scale_words(model.jacobian.columns[*column].id);
-        format!("{} {} {words}", model.columns.strips[*column].name, figure(f64::from(*norm)))
+        let words = unit_text(model.jacobian.columns[*column].id);
+        format!("{} {} {words}", model.columns.strips[*column].name, significant(f64::from(*norm)))
     });
     let shown = shown.collect::<Vec<_>>().join(", ");
     let name = name_of(&of_row.factor);
@@ -76,8 +76,9 @@ fn strongest_rows(model: &JacobianModel, column: usize) -> String {
     norms.sort_by(|a, b| b.1.total_cmp(&a.1));
     let count = norms.len();
     let shown = norms.iter().take(SHOWN);
-    let shown = shown
-        .map(|(row, norm)| format!("{} ({})", name_of(&model.jacobian.rows[*row].factor), figure(f64::from(*norm))));
+    let shown = shown.map(|(row, norm)| {
+        format!("{} ({})", name_of(&model.jacobian.rows[*row].factor), significant(f64::from(*norm)))
+    });
     let shown = shown.collect::<Vec<_>>().join(", ");
     format!("{}: in {count} rows of blocks, strongest: {shown}", model.columns.strips[column].name)
 }
@@ -101,7 +102,7 @@ fn block_ui(
         factor => {
             let kind = factor.kind();
             if let Some(summary) = step.report.residuals.iter().find(|summary| summary.factor == kind) {
-                let (before, after) = (figure(summary.chi2_before), figure(summary.chi2_after));
+                let (before, after) = (significant(summary.chi2_before), significant(summary.chi2_after));
                 let text =
                     format!("all residuals of this kind: χ² {before} before, {after} after, {} rows", summary.count);
                 ui.label(RichText::new(text).color(ctx.theme.text));
@@ -127,7 +128,7 @@ fn sightings_ui(
 ) {
     let block = &model.jacobian.columns[column];
     let Some(feature) = step.report.features.iter().find(|feature| feature.id == id) else { return };
-    let parts = parts_of(block);
+    let parts = scalar_columns(block);
     let mut heads = ["frame", "u px", "v px", "residual u", "residual v", "weight"].map(str::to_owned).to_vec();
     heads.extend(parts.iter().flat_map(|(name, _)| [format!("∂u{name}"), format!("∂v{name}")]));
     let lines = rows.frames.iter().enumerate().filter_map(|(place, frame)| {
@@ -141,7 +142,7 @@ fn sightings_ui(
         let pixels = step.report.pixel_sigma_px / seen.robust_weight.sqrt();
         for (part, (_, factor)) in parts.iter().enumerate() {
             let at = |axis: usize| rows.rows[(2 * place + axis, block.start + part)] * pixels / factor;
-            cells.extend([figure(at(0)), figure(at(1))]);
+            cells.extend([significant(at(0)), significant(at(1))]);
         }
         Some(cells)
     });
@@ -163,8 +164,11 @@ fn readings_ui(
     let own = block.id == ColumnId::Joints(FrameId(frame.frame_index));
     let lines = readings.iter().zip(sigmas).zip(&frame.joint_angles_rad).enumerate();
     let lines = lines.map(|(joint, ((reading, sigma), angle))| {
-        let slope =
-            if own { format!("{} in q{}", figure(sigma.recip().to_radians()), joint + 1) } else { "–".to_owned() };
+        let slope = if own {
+            format!("{} in q{}", significant(sigma.recip().to_radians()), joint + 1)
+        } else {
+            "–".to_owned()
+        };
         vec![
             (joint + 1).to_string(),
             fixed(reading.to_degrees(), 3),
@@ -199,7 +203,7 @@ pub(super) fn numbers_ui(
 }
 
 /// The scalar columns of a block: the label of each, and its shown units per stored unit.
-fn parts_of(block: &ColumnBlock) -> Vec<(String, f64)> {
+fn scalar_columns(block: &ColumnBlock) -> Vec<(String, f64)> {
     let shown = |name: &str, dimension: Dimension| {
         let shown = Shown::of(dimension);
         (format!("{name}, px/{}", shown.unit.trim()), shown.factor)

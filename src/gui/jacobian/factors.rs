@@ -8,7 +8,7 @@ use super::model::JacobianModel;
 use crate::estimator::{ColumnBlock, ColumnId, FactorRows, JacobianFactor};
 use crate::geometry::Dimension;
 use crate::gui::PanelContext;
-use crate::gui::units::{Shown, figure, fixed};
+use crate::gui::units::{Shown, fixed, significant};
 use crate::session::{Command, RunRecord};
 
 /// Maximum number of rows shown; a marginalization prior has over a hundred, the largest come first.
@@ -51,7 +51,7 @@ pub(super) fn block_ui(
     if block.start + block.len > residuals {
         return;
     }
-    let parts = parts_of(block);
+    let parts = scalar_columns(block);
     let own = rows.columns(block.start, block.len);
     let mut order: Vec<usize> = (0..rows.nrows()).filter(|row| own.row(*row).amax() > 0.0).collect();
     let count = order.len();
@@ -61,13 +61,13 @@ pub(super) fn block_ui(
     }
     let squared = rows.column(residuals).norm_squared();
     let shown = if count > order.len() { format!(", the strongest {} shown", order.len()) } else { String::new() };
-    let text = format!("its {} residuals: χ² {}; {count} touch this block{shown}", rows.nrows(), figure(squared));
+    let text = format!("its {} residuals: χ² {}; {count} touch this block{shown}", rows.nrows(), significant(squared));
     ui.label(RichText::new(text).color(ctx.theme.text));
     let mut heads = vec!["row".to_owned(), "residual σ".to_owned()];
     heads.extend(parts.iter().map(|(name, _)| name.clone()));
     let lines = order.iter().map(|row| {
         let mut cells = vec![(row + 1).to_string(), fixed(rows[(*row, residuals)], 3)];
-        cells.extend(parts.iter().enumerate().map(|(part, (_, factor))| figure(own[(*row, part)] / factor)));
+        cells.extend(parts.iter().enumerate().map(|(part, (_, factor))| significant(own[(*row, part)] / factor)));
         cells
     });
     numbers_ui(ui, ctx, &heads, lines);
@@ -75,7 +75,7 @@ pub(super) fn block_ui(
 
 /// The scalar columns of a block: the label of the derivative with respect to each, and its shown units per stored
 /// unit.
-fn parts_of(block: &ColumnBlock) -> Vec<(String, f64)> {
+fn scalar_columns(block: &ColumnBlock) -> Vec<(String, f64)> {
     let shown = |name: &str, dimension: Dimension| {
         let shown = Shown::of(dimension);
         (format!("∂{name} σ/{}", shown.unit.trim()), shown.factor)
@@ -87,13 +87,13 @@ fn parts_of(block: &ColumnBlock) -> Vec<(String, f64)> {
         ColumnId::Calibration(parameter) => vec![shown("", parameter.dimension())],
         ColumnId::Joints(_) => (1..=block.len).map(|joint| shown(&format!("q{joint}"), Dimension::Angle)).collect(),
         ColumnId::Pose(_) => {
-            let turns = ["rx", "ry", "rz"].map(|part| shown(part, Dimension::Angle)).into_iter();
-            turns.chain(["tx", "ty", "tz"].map(|part| shown(part, Dimension::Length))).collect()
+            let rotations = ["rx", "ry", "rz"].map(|part| shown(part, Dimension::Angle)).into_iter();
+            rotations.chain(["tx", "ty", "tz"].map(|part| shown(part, Dimension::Length))).collect()
         }
         ColumnId::VelocityBias(_) => {
-            let speeds = three(["vx", "vy", "vz"], "(m/s)", 1.0).into_iter();
-            let turns = three(["gx", "gy", "gz"], "(°/s)", degrees);
-            speeds.chain(turns).chain(three(["ax", "ay", "az"], "(m/s²)", 1.0)).collect()
+            let velocities = three(["vx", "vy", "vz"], "(m/s)", 1.0).into_iter();
+            let angular_rates = three(["gx", "gy", "gz"], "(°/s)", degrees);
+            velocities.chain(angular_rates).chain(three(["ax", "ay", "az"], "(m/s²)", 1.0)).collect()
         }
         ColumnId::InverseDepth => Vec::new(),
     }

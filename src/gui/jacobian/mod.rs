@@ -22,15 +22,15 @@ use crate::estimator::{ColumnId, JacobianFactor};
 use crate::session::{RunRecord, StepRecord};
 
 /// Maximum magnification of the matrix.
-const LARGEST_ZOOM: f32 = 40.0;
+const MAX_ZOOM: f32 = 40.0;
 /// Width of the row names on the left and height of the column names above, in points.
 const ROW_NAMES: f32 = 104.0;
 const COLUMN_NAMES: f32 = 68.0;
 /// Height of the legend below the matrix in points.
 const LEGEND: f32 = 18.0;
 /// Panel height from which the values of the selected block are shown, and their ratio of it.
-const LOWEST_WITH_DETAILS: f32 = 300.0;
-const DETAILS_SHARE: f32 = 0.3;
+const MIN_HEIGHT_WITH_DETAILS: f32 = 300.0;
+const DETAILS_RATIO: f32 = 0.3;
 /// Height of the line about a row or a column in points.
 const DETAILS_LINE: f32 = 34.0;
 
@@ -98,10 +98,10 @@ impl JacobianPanel {
         model: &JacobianModel,
     ) {
         let height = ui.available_height();
-        let picked = self.picked(ctx, model);
-        let with_details = height >= LOWEST_WITH_DETAILS && picked.is_some();
-        let below = match picked {
-            Some((Some(_), Some(_))) if with_details => DETAILS_SHARE * height,
+        let selected_block = self.selected_block(ctx, model);
+        let with_details = height >= MIN_HEIGHT_WITH_DETAILS && selected_block.is_some();
+        let below = match selected_block {
+            Some((Some(_), Some(_))) if with_details => DETAILS_RATIO * height,
             Some(_) if with_details => DETAILS_LINE,
             _ => 0.0,
         };
@@ -117,9 +117,9 @@ impl JacobianPanel {
         let place = self.view.place(area);
         let hovered = response.hover_pos().and_then(|pointer| block_at(model, place, pointer));
         self.mesh.paint(ui, ctx.theme, area, place, model);
-        paint::axes(ui, ctx.theme, whole, area, place, model, picked);
+        paint::axes(ui, ctx.theme, whole, area, place, model, selected_block);
         if response.clicked() {
-            self.pick(ctx, model, hovered);
+            self.select(ctx, model, hovered);
         }
         if let Some((row, column)) = hovered {
             paint::hover(ui, ctx.theme, area, place, model, (row, column));
@@ -127,16 +127,16 @@ impl JacobianPanel {
         }
         let (_, legend) = ui.allocate_space(vec2(ui.available_width(), LEGEND));
         paint::legend(ui, ctx.theme, legend, model);
-        if let Some(picked) = picked.filter(|_| with_details) {
-            if let Some(row) = picked.0 {
+        if let Some(selected_block) = selected_block.filter(|_| with_details) {
+            if let Some(row) = selected_block.0 {
                 factors::request(ctx, run, run.index_at(ctx.cursor_ns), model.jacobian.rows[row].factor);
             }
-            details::ui(ui, ctx, run, step, model, picked);
+            details::ui(ui, ctx, run, step, model, selected_block);
         }
     }
 
     /// The block that is selected here or follows from the common selection: a row, a column, or both.
-    fn picked(&self, ctx: &PanelContext<'_>, model: &JacobianModel) -> Option<(Option<usize>, Option<usize>)> {
+    fn selected_block(&self, ctx: &PanelContext<'_>, model: &JacobianModel) -> Option<(Option<usize>, Option<usize>)> {
         let wanted = self.row.or_else(|| ctx.selection.feature.map(JacobianFactor::Feature));
         let row = wanted.and_then(|wanted| model.jacobian.rows.iter().position(|row| row.factor == wanted));
         let wanted = self.column.or_else(|| ctx.selection.parameter.map(ColumnId::Calibration));
@@ -145,7 +145,7 @@ impl JacobianPanel {
     }
 
     /// A click selects features and parameters in all panels, other rows and columns here.
-    fn pick(&mut self, ctx: &mut PanelContext<'_>, model: &JacobianModel, block: Option<(usize, usize)>) {
+    fn select(&mut self, ctx: &mut PanelContext<'_>, model: &JacobianModel, block: Option<(usize, usize)>) {
         (self.row, self.column) = (None, None);
         (ctx.selection.feature, ctx.selection.parameter) = (None, None);
         let Some((row, column)) = block else { return };
@@ -167,11 +167,11 @@ impl JacobianPanel {
         let before = self.view.place(area);
         if let Some(pointer) = response.hover_pos() {
             let factor = ui.input(|input| input.zoom_delta() * (input.smooth_scroll_delta().y * 0.004).exp());
-            let zoom = (self.view.zoom * factor).clamp(1.0, LARGEST_ZOOM);
+            let zoom = (self.view.zoom * factor).clamp(1.0, MAX_ZOOM);
             if zoom != self.view.zoom {
                 // The position under the pointer stays fixed.
-                let held = (pointer - before.min) / before.size();
-                self.view.centre = held + (self.view.centre - held) * (self.view.zoom / zoom);
+                let anchor = (pointer - before.min) / before.size();
+                self.view.centre = anchor + (self.view.centre - anchor) * (self.view.zoom / zoom);
                 self.view.zoom = zoom;
             }
         }
@@ -185,8 +185,8 @@ impl JacobianPanel {
 
 /// The row and column at a screen position.
 fn block_at(model: &JacobianModel, place: Rect, pointer: Pos2) -> Option<(usize, usize)> {
-    let share = (pointer - place.min) / place.size();
-    Some((model.rows.at(share.y)?, model.columns.at(share.x)?))
+    let fraction = (pointer - place.min) / place.size();
+    Some((model.rows.at(fraction.y)?, model.columns.at(fraction.x)?))
 }
 
 /// The screen rectangle of a block.

@@ -11,7 +11,7 @@ use crate::sensors::Rig;
 use crate::session::{RunRecord, StepRecord};
 
 /// Maximum number of decades of the colour map.
-const MOST_DECADES: f64 = 6.0;
+const MAX_DECADES: f64 = 6.0;
 
 /// A row or a column of blocks, or a group of them.
 #[derive(Clone, Debug, PartialEq)]
@@ -59,7 +59,7 @@ impl JacobianModel {
             return None;
         }
         let high = high.ceil();
-        let low = low.floor().max(high - MOST_DECADES).min(high - 1.0);
+        let low = low.floor().max(high - MAX_DECADES).min(high - 1.0);
         Some(Self {
             step: Arc::clone(step),
             rows: rows_of(&jacobian),
@@ -70,7 +70,7 @@ impl JacobianModel {
     }
 
     /// Position of a norm in the colour map, 0 to 1.
-    pub(super) fn fraction(&self, norm: f32) -> f64 {
+    pub(super) fn color_fraction(&self, norm: f32) -> f64 {
         let (low, high) = self.decades;
         ((f64::from(norm).log10() - low) / (high - low)).clamp(0.0, 1.0)
     }
@@ -84,9 +84,9 @@ impl JacobianModel {
 
 impl Axis {
     /// Index of the row or column at a fraction of the axis.
-    pub(super) fn at(&self, share: f32) -> Option<usize> {
-        let after = self.strips.partition_point(|strip| strip.begin <= share);
-        after.checked_sub(1).filter(|index| share < self.strips[*index].end)
+    pub(super) fn at(&self, fraction: f32) -> Option<usize> {
+        let after = self.strips.partition_point(|strip| strip.begin <= fraction);
+        after.checked_sub(1).filter(|index| fraction < self.strips[*index].end)
     }
 
     /// Lays out rows or columns in sequence, given name, group and weight of each.
@@ -124,7 +124,7 @@ pub(in crate::gui) fn name_of(factor: &JacobianFactor) -> String {
 /// Features at the top, the other factors below; each group has a minimum height.
 fn rows_of(jacobian: &StepJacobian) -> Axis {
     /// Ratios of the height for visual, IMU and encoder rows and priors.
-    const SHARES: [f32; 4] = [0.62, 0.15, 0.13, 0.1];
+    const HEIGHT_RATIOS: [f32; 4] = [0.62, 0.15, 0.13, 0.1];
     let group_of = |factor: &JacobianFactor| match factor {
         JacobianFactor::Feature(_) => 0,
         JacobianFactor::Imu { .. } => 1,
@@ -143,7 +143,7 @@ fn rows_of(jacobian: &StepJacobian) -> Axis {
     ];
     let strips = jacobian.rows.iter().map(|row| {
         let group = group_of(&row.factor);
-        (name_of(&row.factor), group, SHARES[group] / counts[group].max(1) as f32)
+        (name_of(&row.factor), group, HEIGHT_RATIOS[group] / counts[group].max(1) as f32)
     });
     Axis::lay_out(strips, &names)
 }
@@ -176,7 +176,7 @@ pub(in crate::gui) fn column_name(id: ColumnId, names: &ParameterNames) -> Strin
 }
 
 /// The unit of a column in which the norms are given.
-pub(super) fn scale_words(id: ColumnId) -> &'static str {
+pub(super) fn unit_text(id: ColumnId) -> &'static str {
     match id {
         ColumnId::Calibration(parameter) => match parameter.dimension() {
             Dimension::Angle => "σ per 10°",

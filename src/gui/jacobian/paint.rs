@@ -12,7 +12,7 @@ use crate::gui::theme::{Theme, ThemeName, label_font};
 use crate::session::StepRecord;
 
 /// Minimum width in points of a row or column with a name.
-const NAMED_FROM: f32 = 9.0;
+const MIN_NAMED_WIDTH: f32 = 9.0;
 
 /// The blocks as triangles, cached while step, rectangle and colours stay the same.
 #[derive(Debug, Default)]
@@ -55,7 +55,7 @@ fn mesh_of(theme: &Theme, area: Rect, place: Rect, model: &JacobianModel) -> Mes
                 continue;
             }
             let gap = vec2(if rect.width() > 6.0 { GAP } else { 0.0 }, if rect.height() > 4.0 { GAP } else { 0.0 });
-            mesh.add_colored_rect(rect.shrink2(gap), theme.height_color(model.fraction(*norm)));
+            mesh.add_colored_rect(rect.shrink2(gap), theme.height_color(model.color_fraction(*norm)));
         }
     }
     mesh
@@ -69,9 +69,9 @@ pub(super) fn axes(
     area: Rect,
     place: Rect,
     model: &JacobianModel,
-    picked: Option<(Option<usize>, Option<usize>)>,
+    selected_block: Option<(Option<usize>, Option<usize>)>,
 ) {
-    let (row, column) = picked.unwrap_or_default();
+    let (row, column) = selected_block.unwrap_or_default();
     let left = Rect::from_min_max(pos2(whole.left(), area.top()), area.left_bottom());
     row_names(&ui.painter_at(left), theme, left, place, &model.rows, row);
     let top = Rect::from_min_max(pos2(area.left(), whole.top()), area.right_top());
@@ -98,7 +98,7 @@ fn span(start: f32, length: f32, strip: &Strip) -> egui::Rangef {
     egui::Rangef::new(start + strip.begin * length, start + strip.end * length)
 }
 
-fn row_names(painter: &Painter, theme: &Theme, left: Rect, place: Rect, rows: &Axis, picked: Option<usize>) {
+fn row_names(painter: &Painter, theme: &Theme, left: Rect, place: Rect, rows: &Axis, selected: Option<usize>) {
     let write = |range: egui::Rangef, name: &str, color: Color32| {
         let seen = range.intersection(left.y_range());
         painter.text(pos2(left.right() - 4.0, seen.center()), Align2::RIGHT_CENTER, name, label_font(), color);
@@ -108,7 +108,7 @@ fn row_names(painter: &Painter, theme: &Theme, left: Rect, place: Rect, rows: &A
         let members = rows.strips.iter().filter(|strip| strip.begin >= group.begin && strip.end <= group.end + 1e-6);
         let count = members.clone().count();
         let pitch = range.span() / count.max(1) as f32;
-        if pitch >= NAMED_FROM + 1.0 {
+        if pitch >= MIN_NAMED_WIDTH + 1.0 {
             for strip in members {
                 write(span(place.top(), place.height(), strip), &strip.name, theme.text);
             }
@@ -116,7 +116,7 @@ fn row_names(painter: &Painter, theme: &Theme, left: Rect, place: Rect, rows: &A
             write(range, &group.name, theme.text);
         }
     }
-    if let Some(strip) = picked.map(|row| &rows.strips[row]) {
+    if let Some(strip) = selected.map(|row| &rows.strips[row]) {
         let range = span(place.top(), place.height(), strip);
         if left.y_range().contains(range.center()) {
             let line = Rect::from_center_size(pos2(left.center().x, range.center()), vec2(left.width(), 13.0));
@@ -126,7 +126,7 @@ fn row_names(painter: &Painter, theme: &Theme, left: Rect, place: Rect, rows: &A
     }
 }
 
-fn column_names(painter: &Painter, theme: &Theme, top: Rect, place: Rect, columns: &Axis, picked: Option<usize>) {
+fn column_names(painter: &Painter, theme: &Theme, top: Rect, place: Rect, columns: &Axis, selected: Option<usize>) {
     let small = FontId::new(10.5, FontFamily::Proportional);
     for group in &columns.groups {
         let seen = span(place.left(), place.width(), group).intersection(top.x_range());
@@ -138,8 +138,8 @@ fn column_names(painter: &Painter, theme: &Theme, top: Rect, place: Rect, column
     }
     for (number, strip) in columns.strips.iter().enumerate() {
         let range = span(place.left(), place.width(), strip);
-        let chosen = picked == Some(number);
-        if range.max < top.left() || range.min > top.right() || range.span() < NAMED_FROM && !chosen {
+        let chosen = selected == Some(number);
+        if range.max < top.left() || range.min > top.right() || range.span() < MIN_NAMED_WIDTH && !chosen {
             continue;
         }
         let color = if chosen { theme.accent } else { theme.text };

@@ -8,9 +8,9 @@ use crate::estimator::{ColumnGroup, JacobianFactor};
 use crate::gimbal::tests::parameter;
 use crate::gui::Selection;
 use crate::gui::rendering::headless::{HeadlessOptions, draw};
-use crate::gui::samples::flown_recording;
+use crate::gui::samples::simulated_recording;
 use crate::gui::samples::{sample_images, sample_recording_of};
-use crate::gui::tests::{keep_picture, with_context};
+use crate::gui::tests::{keep_screenshot, with_context};
 use crate::gui::theme::{Theme, ThemeName};
 use crate::session::Recording;
 
@@ -26,7 +26,7 @@ fn show(ui: &mut egui::Ui, shown: &mut Shown, recording: &Recording, theme: Them
 
 fn bench() -> Harness<'static, Shown> {
     let mut harness = Harness::builder().with_size([1000.0, 700.0]).build_ui_state(
-        |ui, shown: &mut Shown| show(ui, shown, flown_recording(), ThemeName::Dark),
+        |ui, shown: &mut Shown| show(ui, shown, simulated_recording(), ThemeName::Dark),
         (JacobianPanel::default(), Selection::default()),
     );
     harness.run_steps(2);
@@ -34,7 +34,7 @@ fn bench() -> Harness<'static, Shown> {
 }
 
 fn model() -> JacobianModel {
-    let recording = flown_recording();
+    let recording = simulated_recording();
     let run = &recording.runs[0];
     JacobianModel::of_step(&recording.rig, &recording.rig.parameter_names(), run, run.steps.last().unwrap()).unwrap()
 }
@@ -74,7 +74,7 @@ fn axes_are_whole_and_in_order() {
 }
 
 #[test]
-fn a_click_selects_feature_and_parameter_and_tells_their_numbers() {
+fn a_click_selects_feature_and_parameter_and_shows_their_values() {
     let mut harness = bench();
     let model = model();
     let column =
@@ -103,16 +103,16 @@ fn a_click_selects_feature_and_parameter_and_tells_their_numbers() {
 }
 
 #[test]
-fn pictures_zoom_and_steps_without_a_linearization_say_so() {
+fn the_matrix_zooms_and_steps_without_a_linearization_are_reported() {
     for theme in [ThemeName::Dark, ThemeName::Light] {
         let selection = Selection { parameter: Some(parameter("L2.alpha")), ..Selection::default() };
         let mut shown = (JacobianPanel::default(), selection);
         let options = HeadlessOptions { size_px: [1000, 640], pixels_per_point: 1.0, theme };
-        let whole = draw(options, |ui| show(ui, &mut shown, flown_recording(), theme));
-        keep_picture(&format!("jacobian-flown-{}", theme.as_str()), &whole);
+        let whole = draw(options, |ui| show(ui, &mut shown, simulated_recording(), theme));
+        keep_screenshot(&format!("jacobian-flown-{}", theme.as_str()), &whole);
         shown.0.view = View { zoom: 6.0, centre: egui::vec2(0.15, 0.3) };
-        let near = draw(options, |ui| show(ui, &mut shown, flown_recording(), theme));
-        keep_picture(&format!("jacobian-near-{}", theme.as_str()), &near);
+        let near = draw(options, |ui| show(ui, &mut shown, simulated_recording(), theme));
+        keep_screenshot(&format!("jacobian-near-{}", theme.as_str()), &near);
         assert!(whole != near);
     }
     let place = View { zoom: 2.0, centre: egui::vec2(0.25, 0.5) }

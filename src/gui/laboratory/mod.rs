@@ -36,7 +36,7 @@ impl LaboratoryPanel {
     /// The chosen parameterizations with their rank reports; waits for missing results.
     pub(in crate::gui) fn ranks(&mut self, ctx: &PanelContext<'_>) -> Vec<(String, RankReport)> {
         if let Ok(experiment) = self.choices.experiment(ctx) {
-            self.worker.ask(&experiment, self.in_background);
+            self.worker.request(&experiment, self.in_background);
         }
         self.worker.results().0.iter().map(|result| (result.form.name(), result.rank.clone())).collect()
     }
@@ -53,7 +53,7 @@ impl LaboratoryPanel {
                     return;
                 }
             };
-            self.worker.ask(&experiment, self.in_background);
+            self.worker.request(&experiment, self.in_background);
             let (results, asked) = self.worker.results();
             if results.len() < asked && self.worker.is_busy() {
                 let text = format!("Experiment {} of {asked}…", results.len() + 1);
@@ -64,7 +64,7 @@ impl LaboratoryPanel {
                 ui.ctx().request_repaint();
             }
             if let Some(setup) = self.worker.setup() {
-                let text = words(&LaboratoryReport::new(setup, &[]));
+                let text = assumptions(&LaboratoryReport::new(setup, &[]));
                 ui.add(Label::new(RichText::new(text).small().color(ctx.theme.text_weak)).wrap());
             }
             let theme = *ctx.theme;
@@ -84,14 +84,14 @@ impl LaboratoryPanel {
 }
 
 /// The assumptions of the experiment in one sentence.
-fn words(report: &LaboratoryReport) -> String {
-    let held = if report.frozen_joints.is_empty() {
+fn assumptions(report: &LaboratoryReport) -> String {
+    let frozen = if report.frozen_joints.is_empty() {
         String::new()
     } else {
         format!(", {} held", report.frozen_joints.join(", "))
     };
     format!(
-        "{}: {}{held}. Joint angles {}, poses {}; {} frames {} s apart, {} landmarks, {} px; columns by 10° and 3 cm.",
+        "{}: {}{frozen}. Joint angles {}, poses {}; {} frames {} s apart, {} landmarks, {} px; columns by 10° and 3 cm.",
         report.motion,
         report.motion_meaning,
         report.joint_angles,

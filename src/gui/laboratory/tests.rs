@@ -7,7 +7,7 @@ use crate::gimbal::Parameterization;
 use crate::gui::Selection;
 use crate::gui::rendering::headless::{HeadlessOptions, draw};
 use crate::gui::samples::{sample_images, sample_recording_of};
-use crate::gui::tests::{keep_picture, with_context};
+use crate::gui::tests::{keep_screenshot, with_context};
 use crate::gui::theme::{Theme, ThemeName};
 use crate::observability::laboratory::{LaboratoryForm, LaboratoryMotion, LaboratorySetup, Mechanism};
 use crate::session::Recording;
@@ -39,7 +39,7 @@ fn choose(harness: &mut Harness<'static, LaboratoryPanel>, list: &str, entry: &s
 }
 
 #[test]
-fn experiments_tell_what_the_command_tells() {
+fn experiments_have_the_results_of_the_command() {
     let mut harness = bench(false);
     // The rig's mechanism with aggressive motion: only the parameterization loses rank.
     assert!(harness.query_by_label("18 of 24").is_some());
@@ -51,12 +51,12 @@ fn experiments_tell_what_the_command_tells() {
     let setup = LaboratorySetup { motion: LaboratoryMotion::Hover, ..LaboratorySetup::new(mechanism) };
     let classical = setup.run(LaboratoryForm::whole(Parameterization::Classical)).unwrap().rank;
     assert!(classical.rank_structural < 18, "a hover tells less than every motion");
-    let told = format!("{} of 24", classical.rank_structural);
-    assert!(harness.query_by_label(&told).is_some(), "{told}");
+    let text = format!("{} of 24", classical.rank_structural);
+    assert!(harness.query_by_label(&text).is_some(), "{text}");
     assert!(harness.query_by_label_contains(LaboratoryMotion::Hover.meaning()).is_some());
     harness.get_by_role_and_label(Role::CheckBox, "classical").click();
     harness.run_steps(3);
-    assert!(harness.query_by_label(&told).is_none());
+    assert!(harness.query_by_label(&text).is_none());
     for form in ["minimal", "minimal-swapped"] {
         harness.get_by_role_and_label(Role::CheckBox, form).click();
         harness.run_steps(3);
@@ -65,7 +65,7 @@ fn experiments_tell_what_the_command_tells() {
 }
 
 #[test]
-fn in_the_window_the_experiments_come_one_by_one() {
+fn in_the_window_results_appear_one_by_one() {
     let mut harness = bench(true);
     while harness.state().worker.is_busy() {
         harness.run_steps(1);
@@ -77,14 +77,14 @@ fn in_the_window_the_experiments_come_one_by_one() {
 }
 
 #[test]
-fn pictures_wait_for_their_experiments() {
+fn screenshots_wait_for_their_experiments() {
     let recording = sample_recording_of(40, &["auto"]);
     for theme in [ThemeName::Dark, ThemeName::Light] {
         let mut panel = LaboratoryPanel::default();
         let options = HeadlessOptions { size_px: [1200, 760], pixels_per_point: 1.0, theme };
-        let picture = draw(options, |ui| show(ui, &mut panel, &recording, theme));
-        keep_picture(&format!("laboratory-{}", theme.as_str()), &picture);
+        let screenshot = draw(options, |ui| show(ui, &mut panel, &recording, theme));
+        keep_screenshot(&format!("laboratory-{}", theme.as_str()), &screenshot);
         let mut copy = panel.view_copy();
-        assert!(picture == draw(options, |ui| show(ui, &mut copy, &recording, theme)));
+        assert!(screenshot == draw(options, |ui| show(ui, &mut copy, &recording, theme)));
     }
 }

@@ -25,7 +25,7 @@ pub(super) struct Worker {
 
 impl Worker {
     /// Starts an experiment unless it is the current one, and receives results.
-    pub(super) fn ask(&mut self, experiment: &Experiment, in_background: bool) {
+    pub(super) fn request(&mut self, experiment: &Experiment, in_background: bool) {
         if self.asked.as_ref() != Some(experiment) {
             self.results.clear();
             self.coming = None;

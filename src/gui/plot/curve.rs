@@ -2,7 +2,7 @@
 
 use egui::{Rangef, vec2};
 
-use super::{PlotArea, visible_stretches};
+use super::{PlotArea, visible_segments};
 
 /// The inputs of a reduced curve; equal keys have equal curves.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -19,7 +19,7 @@ struct CurveKey {
 pub(crate) struct Curve {
     key: Option<CurveKey>,
     /// Contiguous line strips of `(points to the right of the plot's left edge, value)`.
-    pub(crate) stretches: Vec<Vec<(f32, f64)>>,
+    pub(crate) segments: Vec<Vec<(f32, f64)>>,
     /// Smallest and largest value in the range, `None` without values.
     pub(crate) extent: Option<(f64, f64)>,
 }
@@ -39,8 +39,8 @@ impl Curve {
         let key = CurveKey::of(area, epoch, stamps_ns.len().min(values.len()));
         if self.key != Some(key) {
             self.key = Some(key);
-            self.stretches = reduce(area, &stamps_ns[..key.count], values);
-            let values = || self.stretches.iter().flatten().map(|(_, value)| *value);
+            self.segments = reduce(area, &stamps_ns[..key.count], values);
+            let values = || self.segments.iter().flatten().map(|(_, value)| *value);
             let extent = (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
             self.extent = (extent.0 <= extent.1).then_some(extent);
         }
@@ -55,7 +55,7 @@ impl Curve {
 pub(crate) struct BandCurve {
     key: Option<CurveKey>,
     /// Contiguous strips of `(points to the right of the plot's left edge, lower, upper value)`.
-    pub(crate) stretches: Vec<Vec<(f32, f64, f64)>>,
+    pub(crate) segments: Vec<Vec<(f32, f64, f64)>>,
 }
 
 impl BandCurve {
@@ -65,7 +65,7 @@ impl BandCurve {
         let key = CurveKey::of(area, epoch, count);
         if self.key != Some(key) {
             self.key = Some(key);
-            self.stretches = reduce_band(area, &stamps_ns[..count], lower, upper);
+            self.segments = reduce_band(area, &stamps_ns[..count], lower, upper);
         }
     }
 }
@@ -75,7 +75,7 @@ impl BandCurve {
 pub(crate) struct StateCurve {
     key: Option<CurveKey>,
     /// Ranges in points to the right of the plot's left edge.
-    stretches: Vec<Rangef>,
+    segments: Vec<Rangef>,
 }
 
 impl StateCurve {
@@ -85,38 +85,38 @@ impl StateCurve {
         if self.key != Some(key) {
             self.key = Some(key);
             let at_zero = PlotArea { rect: area.rect.translate(vec2(-area.rect.left(), 0.0)), ..*area };
-            self.stretches = visible_stretches(&at_zero, stamps_ns, holds);
+            self.segments = visible_segments(&at_zero, stamps_ns, holds);
         }
     }
 
     /// The ranges in screen coordinates.
     pub(crate) fn on_screen(&self, area: &PlotArea) -> impl Iterator<Item = Rangef> {
         let left = area.rect.left();
-        self.stretches.iter().map(move |stretch| Rangef::new(left + stretch.min, left + stretch.max))
+        self.segments.iter().map(move |segment| Rangef::new(left + segment.min, left + segment.max))
     }
 }
 
 /// Smallest lower and largest upper value of each pixel column.
 fn reduce_band(area: &PlotArea, stamps_ns: &[i64], lower: &[f64], upper: &[f64]) -> Vec<Vec<(f32, f64, f64)>> {
-    let mut stretches: Vec<Vec<(f32, f64, f64)>> = vec![Vec::new()];
+    let mut segments: Vec<Vec<(f32, f64, f64)>> = vec![Vec::new()];
     for row in rows_in_range(area, stamps_ns) {
         let (x, low, high) = (area.offset_of(stamps_ns[row]), lower[row], upper[row]);
-        let Some(stretch) = stretches.last_mut() else { break };
+        let Some(segment) = segments.last_mut() else { break };
         if !(low.is_finite() && high.is_finite()) {
-            if !stretch.is_empty() {
-                stretches.push(Vec::new());
+            if !segment.is_empty() {
+                segments.push(Vec::new());
             }
             continue;
         }
-        match stretch.last_mut() {
-            Some((open, least, most)) if open.floor() == x.floor() => {
-                (*least, *most) = (least.min(low), most.max(high));
+        match segment.last_mut() {
+            Some((open, lowest, highest)) if open.floor() == x.floor() => {
+                (*lowest, *highest) = (lowest.min(low), highest.max(high));
             }
-            _ => stretch.push((x, low, high)),
+            _ => segment.push((x, low, high)),
         }
     }
-    stretches.retain(|stretch| !stretch.is_empty());
-    stretches
+    segments.retain(|segment| !segment.is_empty());
+    segments
 }
 
 /// The rows from the one before the time range to the one after it, so that lines reach the edges.
@@ -131,71 +131,71 @@ fn reduce(area: &PlotArea, stamps_ns: &[i64], values: &[f64]) -> Vec<Vec<(f32, f
     let rows = rows_in_range(area, stamps_ns);
     let columns = area.rect.width().max(1.0) as usize;
     let thin = rows.len() <= 2 * columns;
-    let mut stretches = Vec::new();
-    let mut stretch: Vec<(f32, f64)> = Vec::new();
+    let mut segments = Vec::new();
+    let mut segment: Vec<(f32, f64)> = Vec::new();
     let mut column: Option<Column> = None;
     for row in rows {
         let x = area.offset_of(stamps_ns[row]);
         let value = values[row];
         if !value.is_finite() {
-            flush(&mut stretch, &mut column);
-            if !stretch.is_empty() {
-                stretches.push(std::mem::take(&mut stretch));
+            flush(&mut segment, &mut column);
+            if !segment.is_empty() {
+                segments.push(std::mem::take(&mut segment));
             }
         } else if thin {
-            stretch.push((x, value));
+            segment.push((x, value));
         } else {
             match &mut column {
                 Some(open) if open.x.floor() == x.floor() => open.take(row, value),
                 _ => {
-                    flush(&mut stretch, &mut column);
+                    flush(&mut segment, &mut column);
                     column = Some(Column {
                         x,
                         first: (row, value),
-                        least: (row, value),
-                        most: (row, value),
+                        lowest: (row, value),
+                        highest: (row, value),
                         last: (row, value),
                     });
                 }
             }
         }
     }
-    flush(&mut stretch, &mut column);
-    if !stretch.is_empty() {
-        stretches.push(stretch);
+    flush(&mut segment, &mut column);
+    if !segment.is_empty() {
+        segments.push(segment);
     }
-    stretches
+    segments
 }
 
 /// One pixel column: rows and values of its extremes.
 struct Column {
     x: f32,
     first: (usize, f64),
-    least: (usize, f64),
-    most: (usize, f64),
+    lowest: (usize, f64),
+    highest: (usize, f64),
     last: (usize, f64),
 }
 
 impl Column {
     fn take(&mut self, row: usize, value: f64) {
-        if value < self.least.1 {
-            self.least = (row, value);
+        if value < self.lowest.1 {
+            self.lowest = (row, value);
         }
-        if value > self.most.1 {
-            self.most = (row, value);
+        if value > self.highest.1 {
+            self.highest = (row, value);
         }
         self.last = (row, value);
     }
 }
 
-fn flush(stretch: &mut Vec<(f32, f64)>, column: &mut Option<Column>) {
-    if let Some(Column { x, first, least, most, last }) = column.take() {
-        let mut points = [first, least, most, last];
+fn flush(segment: &mut Vec<(f32, f64)>, column: &mut Option<Column>) {
+    if let Some(Column { x, first, lowest, highest, last }) = column.take() {
+        let mut points = [first, lowest, highest, last];
         points.sort_by_key(|(row, _)| *row);
         let mut before = None;
         for (row, value) in points {
             if before != Some(row) {
-                stretch.push((x, value));
+                segment.push((x, value));
             }
             before = Some(row);
         }
@@ -225,18 +225,18 @@ mod tests {
         let mut curve = Curve::default();
         curve.update(&area(100.0), 0, &stamps, &values);
         assert_eq!(curve.extent, Some((0.5, 9.0)));
-        assert_eq!(curve.stretches.len(), 1);
-        assert!(curve.stretches[0].len() <= 400);
-        assert!(curve.stretches[0].is_sorted_by(|a, b| a.0 <= b.0));
+        assert_eq!(curve.segments.len(), 1);
+        assert!(curve.segments[0].len() <= 400);
+        assert!(curve.segments[0].is_sorted_by(|a, b| a.0 <= b.0));
     }
 
     #[test]
     fn gaps_break_the_line() {
         let mut curve = Curve::default();
         curve.update(&area(100.0), 0, &[0, 10, 20, 30, 40], &[1.0, 2.0, f64::NAN, 3.0, 4.0]);
-        assert_eq!(curve.stretches.iter().map(Vec::len).collect::<Vec<_>>(), [2, 2]);
+        assert_eq!(curve.segments.iter().map(Vec::len).collect::<Vec<_>>(), [2, 2]);
         curve.update(&area(100.0), 1, &[], &[]);
-        assert_eq!((curve.stretches.len(), curve.extent), (0, None));
+        assert_eq!((curve.segments.len(), curve.extent), (0, None));
     }
 
     #[test]
@@ -248,19 +248,19 @@ mod tests {
         upper[5000] = f64::NAN;
         let mut band = BandCurve::default();
         band.update(&area(100.0), 0, &stamps, &lower, &upper);
-        assert_eq!(band.stretches.len(), 2);
-        for stretch in &band.stretches {
-            assert!(stretch.is_sorted_by(|a, b| a.0.floor() < b.0.floor()), "one entry per column");
-            assert!(stretch.iter().all(|(_, low, high)| (*low, *high) == (-13.0, 11.0)), "the whole reach of a column");
+        assert_eq!(band.segments.len(), 2);
+        for segment in &band.segments {
+            assert!(segment.is_sorted_by(|a, b| a.0.floor() < b.0.floor()), "one entry per column");
+            assert!(segment.iter().all(|(_, low, high)| (*low, *high) == (-13.0, 11.0)), "the whole reach of a column");
         }
-        assert!(band.stretches.iter().map(Vec::len).sum::<usize>() <= 102);
+        assert!(band.segments.iter().map(Vec::len).sum::<usize>() <= 102);
         // A few rows stay as they are.
         band.update(&area(100.0), 1, &[0, 5000], &[1.0, 2.0], &[3.0, 4.0]);
-        assert_eq!(band.stretches, [[(0.0, 1.0, 3.0), (50.0, 2.0, 4.0)]]);
+        assert_eq!(band.segments, [[(0.0, 1.0, 3.0), (50.0, 2.0, 4.0)]]);
     }
 
     #[test]
-    fn it_is_remade_only_for_a_new_key() {
+    fn it_is_updated_only_for_a_new_key() {
         let mut curve = Curve::default();
         curve.update(&area(100.0), 0, &[0, 10], &[1.0, 2.0]);
         curve.update(&area(100.0), 0, &[0, 10], &[5.0, 6.0]);

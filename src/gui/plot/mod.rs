@@ -59,8 +59,8 @@ impl PlotArea {
     /// Sets the range of values; an empty range is extended.
     pub(crate) fn with_values(mut self, low: f64, high: f64) -> Self {
         let (low, high) = if low.is_finite() && high.is_finite() && low <= high { (low, high) } else { (0.0, 1.0) };
-        let least = (1e-9_f64).max(low.abs().max(high.abs()) * 1e-9);
-        let widen = if high - low < least { least } else { 0.0 };
+        let min_span = (1e-9_f64).max(low.abs().max(high.abs()) * 1e-9);
+        let widen = if high - low < min_span { min_span } else { 0.0 };
         (self.low, self.high) = (low - widen, high + widen);
         self
     }
@@ -96,17 +96,17 @@ pub(crate) fn paint_cursor(painter: &Painter, theme: &Theme, area: &PlotArea, cu
 
 /// A curve with a run's colour and dashes.
 pub(crate) fn paint_curve(painter: &Painter, area: &PlotArea, curve: &Curve, style: RunStyle, width: f32) {
-    for stretch in &curve.stretches {
+    for segment in &curve.segments {
         let points: Vec<Pos2> =
-            stretch.iter().map(|(offset, value)| pos2(area.rect.left() + offset, area.y(*value))).collect();
+            segment.iter().map(|(offset, value)| pos2(area.rect.left() + offset, area.y(*value))).collect();
         paint_line(painter, &points, style, width);
     }
 }
 
 /// A curve whose value is constant until the next row, for counts and states.
 pub(crate) fn paint_steps(painter: &Painter, area: &PlotArea, curve: &Curve, style: RunStyle, width: f32) {
-    for stretch in &curve.stretches {
-        let places = stretch.iter().map(|(offset, value)| pos2(area.rect.left() + offset, area.y(*value)));
+    for segment in &curve.segments {
+        let places = segment.iter().map(|(offset, value)| pos2(area.rect.left() + offset, area.y(*value)));
         paint_line(painter, &staircase(places), style, width);
     }
 }
@@ -153,9 +153,9 @@ pub(crate) fn paint_line(painter: &Painter, points: &[Pos2], style: RunStyle, wi
 
 /// The area of a band.
 pub(crate) fn paint_band(painter: &Painter, area: &PlotArea, band: &BandCurve, fill: Color32) {
-    for stretch in &band.stretches {
+    for segment in &band.segments {
         let mut mesh = Mesh::default();
-        for (offset, low, high) in stretch {
+        for (offset, low, high) in segment {
             for value in [*low, *high] {
                 let pos = pos2(area.rect.left() + offset, area.y(value));
                 mesh.vertices.push(Vertex { pos, uv: WHITE_UV, color: fill });
@@ -189,37 +189,37 @@ pub(crate) fn paint_hatch(painter: &Painter, rect: Rect, color: Color32) {
 
 /// Time ranges of the rows for which `holds` is true: from the stamp of the first row to that of the row behind the
 /// last.
-fn stretches_where(stamps_ns: &[i64], holds: impl Fn(usize) -> bool) -> Vec<(i64, i64)> {
-    let mut stretches = Vec::new();
+fn segments_where(stamps_ns: &[i64], holds: impl Fn(usize) -> bool) -> Vec<(i64, i64)> {
+    let mut segments = Vec::new();
     let mut begin = None;
     for (row, stamp_ns) in stamps_ns.iter().enumerate() {
         match (begin, holds(row)) {
             (None, true) => begin = Some(*stamp_ns),
             (Some(since), false) => {
-                stretches.push((since, *stamp_ns));
+                segments.push((since, *stamp_ns));
                 begin = None;
             }
             _ => {}
         }
     }
     if let (Some(since), Some(last)) = (begin, stamps_ns.last()) {
-        stretches.push((since, *last));
+        segments.push((since, *last));
     }
-    stretches
+    segments
 }
 
 /// The same ranges on the screen, from left to right. Ranges less than a pixel apart are merged, so that a flickering
 /// state has no more ranges than the plot has columns.
-pub(crate) fn visible_stretches(area: &PlotArea, stamps_ns: &[i64], holds: impl Fn(usize) -> bool) -> Vec<Rangef> {
+pub(crate) fn visible_segments(area: &PlotArea, stamps_ns: &[i64], holds: impl Fn(usize) -> bool) -> Vec<Rangef> {
     let mut visible: Vec<Rangef> = Vec::new();
-    for (begin_ns, end_ns) in stretches_where(stamps_ns, holds) {
-        let stretch = Rangef::new(area.x(begin_ns), area.x(end_ns)).intersection(area.rect.x_range());
-        if stretch.max < stretch.min {
+    for (begin_ns, end_ns) in segments_where(stamps_ns, holds) {
+        let segment = Rangef::new(area.x(begin_ns), area.x(end_ns)).intersection(area.rect.x_range());
+        if segment.max < segment.min {
             continue;
         }
         match visible.last_mut() {
-            Some(last) if stretch.min < last.max + 1.0 => last.max = stretch.max.max(last.max),
-            _ => visible.push(stretch),
+            Some(last) if segment.min < last.max + 1.0 => last.max = segment.max.max(last.max),
+            _ => visible.push(segment),
         }
     }
     visible
@@ -239,26 +239,26 @@ mod tests {
     }
 
     #[test]
-    fn stretches_join_rows() {
+    fn segments_join_rows() {
         let stamps = [0, 10, 20, 30, 40];
         let holds = [true, true, false, true, true];
-        assert_eq!(stretches_where(&stamps, |row| holds[row]), [(0, 20), (30, 40)]);
-        assert!(stretches_where(&[], |_| true).is_empty());
+        assert_eq!(segments_where(&stamps, |row| holds[row]), [(0, 20), (30, 40)]);
+        assert!(segments_where(&[], |_| true).is_empty());
     }
 
     #[test]
-    fn a_state_that_flickers_gives_few_stretches() {
+    fn a_flickering_state_has_few_segments() {
         let rect = Rect::from_min_max(pos2(0.0, 0.0), pos2(100.0, 10.0));
         let area = PlotArea { rect, begin_ns: 0, end_ns: 12_000, low: 0.0, high: 1.0 };
         let stamps: Vec<i64> = (0..12_000).collect();
-        let flickers = visible_stretches(&area, &stamps, |row| row % 2 == 0);
+        let flickers = visible_segments(&area, &stamps, |row| row % 2 == 0);
         assert!(flickers.len() == 1 && flickers[0].max > 99.0, "{flickers:?}");
-        let apart = visible_stretches(&area, &stamps, |row| row < 600 || row >= 6000 && row < 12_000);
+        let apart = visible_segments(&area, &stamps, |row| row < 600 || row >= 6000 && row < 12_000);
         assert_eq!(apart.len(), 2);
         assert!((apart[0].max - 5.0).abs() < 0.02 && (apart[1].min - 50.0).abs() < 0.02, "{apart:?}");
         // Beyond the edges there is nothing.
         let later = PlotArea { begin_ns: 20_000, end_ns: 30_000, ..area };
-        assert!(visible_stretches(&later, &stamps, |_| true).is_empty());
+        assert!(visible_segments(&later, &stamps, |_| true).is_empty());
     }
 
     #[test]

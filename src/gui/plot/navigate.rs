@@ -7,7 +7,7 @@ use crate::gui::PanelContext;
 use crate::session::Command;
 
 /// Minimum visible time range.
-const SHORTEST_VISIBLE_NS: i64 = 200_000_000;
+const MIN_VISIBLE_NS: i64 = 200_000_000;
 
 /// The time range of all plots: the zoomed range, or the whole log.
 pub(crate) fn visible_range(ctx: &PanelContext<'_>) -> (i64, i64) {
@@ -79,7 +79,7 @@ pub(crate) fn navigate(
 /// Shows a time range, limited to the log and to the minimum range; the whole log if the range covers it.
 fn show(ctx: &mut PanelContext<'_>, begin_ns: i64, end_ns: i64) {
     let whole_ns = ctx.recording.duration_ns.max(1);
-    let length_ns = (end_ns - begin_ns).max(SHORTEST_VISIBLE_NS);
+    let length_ns = (end_ns - begin_ns).max(MIN_VISIBLE_NS);
     if length_ns >= whole_ns {
         ctx.selection.visible_ns = None;
     } else {

@@ -17,13 +17,13 @@ use crate::session::{RunRecord, StepRecord};
 const OTHERS_SHOWN: usize = 3;
 
 /// Seconds without a move of the cursor before advice is computed in the background.
-const REST_S: f64 = 0.15;
+const CURSOR_IDLE_S: f64 = 0.15;
 /// Minimum period in seconds of the computation while the cursor moves.
-const PERIOD_S: f64 = 1.0;
+const MIN_PERIOD_S: f64 = 1.0;
 
 /// The results for one step.
 #[derive(Debug)]
-struct Told {
+struct StepAdvice {
     /// Text: since when the least observable direction has been unobservable.
     since: Option<String>,
     /// The suggested excitation.
@@ -35,11 +35,11 @@ struct Told {
 pub(super) struct AdviceUi {
     /// Id of the run.
     run: Option<u64>,
-    told: StepWork<Told>,
+    results: StepWork<StepAdvice>,
     /// The step at the cursor, and when the cursor reached it, in seconds of the window's clock.
     seen: Option<(Arc<StepRecord>, f64)>,
     /// Start of the last computation, in seconds of the window's clock.
-    asked_s: f64,
+    requested_s: f64,
 }
 
 impl AdviceUi {
@@ -64,17 +64,17 @@ impl AdviceUi {
         if !self.seen.as_ref().is_some_and(|(seen, _)| Arc::ptr_eq(seen, step)) {
             self.seen = Some((Arc::clone(step), now_s));
         }
-        self.told.receive();
-        if !self.told.is_known(step) {
+        self.results.receive();
+        if !self.results.has_result(step) {
             if !in_background || self.is_due(now_s) {
-                self.asked_s = now_s;
-                self.ask(ctx, run, step, in_background);
+                self.requested_s = now_s;
+                self.request(ctx, run, step, in_background);
             }
-            if !self.told.is_known(step) {
+            if !self.results.has_result(step) {
                 ui.ctx().request_repaint_after(REPAINT);
             }
         }
-        let Some((of, told)) = self.told.last() else {
+        let Some((of, results)) = self.results.last() else {
             if step.rank.is_some() {
                 ui.label(RichText::new("Linearizing candidate motions…").color(ctx.theme.text_weak));
             }
@@ -85,23 +85,23 @@ impl AdviceUi {
         } else {
             format!(" at {:.2} s", seconds_from_ns(of.report.stamp_ns))
         };
-        if let Some(text) = told.and_then(|told| told.since.as_ref()) {
+        if let Some(text) = results.and_then(|results| results.since.as_ref()) {
             ui.add(egui::Label::new(RichText::new(text).color(ctx.theme.text)).truncate()).on_hover_text(text);
         }
         if of.rank.is_some() {
-            advice_ui(ui, ctx, told.and_then(|told| told.advice.as_ref()), &time, room);
+            advice_ui(ui, ctx, results.and_then(|results| results.advice.as_ref()), &time, room);
         }
     }
 
     /// Whether a computation in the background is due.
     fn is_due(&self, now_s: f64) -> bool {
-        let rests = self.seen.as_ref().is_some_and(|(_, since_s)| now_s - since_s >= REST_S);
-        let first = self.told.last().is_none();
-        !self.told.is_busy() && (first || rests || now_s - self.asked_s >= PERIOD_S)
+        let rests = self.seen.as_ref().is_some_and(|(_, since_s)| now_s - since_s >= CURSOR_IDLE_S);
+        let first = self.results.last().is_none();
+        !self.results.is_busy() && (first || rests || now_s - self.requested_s >= MIN_PERIOD_S)
     }
 
-    fn ask(&mut self, ctx: &PanelContext<'_>, run: &RunRecord, step: &Arc<StepRecord>, in_background: bool) {
-        self.told.ask(step, "advice", in_background, || {
+    fn request(&mut self, ctx: &PanelContext<'_>, run: &RunRecord, step: &Arc<StepRecord>, in_background: bool) {
+        self.results.request(step, "advice", in_background, || {
             let before = run.steps.partition_point(|other| other.report.stamp_ns < step.report.stamp_ns);
             let earlier: Arc<[Arc<StepRecord>]> = run.steps[..before].into();
             let situation = step
@@ -110,7 +110,9 @@ impl AdviceUi {
                 .and_then(|rank| Situation::of_step(&step.report, rank, &ctx.recording.rig, &run.camera_key));
             let step = Arc::clone(step);
             let names = ctx.names();
-            move || Some(Told { since: since(&earlier, &step, &names), advice: situation.as_ref().and_then(advise) })
+            move || {
+                Some(StepAdvice { since: since(&earlier, &step, &names), advice: situation.as_ref().and_then(advise) })
+            }
         });
     }
 }

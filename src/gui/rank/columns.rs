@@ -27,11 +27,11 @@ const NAMES: f32 = 116.0;
 /// Gap between two reports in points.
 const GAP: f32 = 10.0;
 /// Maximum width of a direction's column.
-const WIDEST: f32 = 42.0;
+const MAX_COLUMN_WIDTH: f32 = 42.0;
 /// Minimum width of a column with signed numbers.
-const NUMBER_WIDTH: f32 = 30.0;
-const LOWEST_ROW: f32 = 11.0;
-const HIGHEST_ROW: f32 = 20.0;
+const MIN_COLUMN_WIDTH: f32 = 30.0;
+const MIN_ROW_HEIGHT: f32 = 11.0;
+const MAX_ROW_HEIGHT: f32 = 20.0;
 
 /// Draws the reports side by side.
 pub(in crate::gui) fn columns_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, columns: &[RankColumn<'_>]) {
@@ -126,23 +126,23 @@ fn heat_map_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, columns: &[RankColumn<'_
     let theme = *ctx.theme;
     let parameters = parameters_of(columns);
     let room = (bottom - ui.cursor().top() - HEADER - 4.0).max(0.0);
-    let row_height = (room / parameters.len().max(1) as f32).clamp(LOWEST_ROW, HIGHEST_ROW);
+    let row_height = (room / parameters.len().max(1) as f32).clamp(MIN_ROW_HEIGHT, MAX_ROW_HEIGHT);
     let size = vec2(ui.available_width(), HEADER + row_height * parameters.len() as f32);
     let (_, whole) = ui.allocate_space(size);
-    let mut left_out = 0;
+    let mut omitted = 0;
     for (number, column) in columns.iter().enumerate() {
         let left = whole.left() + NAMES + number as f32 * width;
         let fitting = ((width - GAP) / 6.0).max(1.0) as usize;
         let directions = &column.rank.directions[..column.rank.directions.len().min(fitting)];
-        left_out += column.rank.directions.len() - directions.len();
-        let pitch = ((width - GAP) / directions.len().max(1) as f32).min(WIDEST);
+        omitted += column.rank.directions.len() - directions.len();
+        let pitch = ((width - GAP) / directions.len().max(1) as f32).min(MAX_COLUMN_WIDTH);
         if directions.is_empty() {
             let at = pos2(left, whole.top() + HEADER);
             ui.painter().text(at, Align2::LEFT_TOP, "✔ nothing lost", theme::label_font(), theme.ok);
         }
         for (place, direction) in directions.iter().enumerate() {
             let (mark, color) = if direction.structural { ("null", theme.error) } else { ("weak", theme.warn) };
-            let mark = if pitch < NUMBER_WIDTH - 6.0 { &mark[..1] } else { mark };
+            let mark = if pitch < MIN_COLUMN_WIDTH - 6.0 { &mark[..1] } else { mark };
             let at = pos2(left + (place as f32 + 0.5) * pitch, whole.top());
             ui.painter().text(at, Align2::CENTER_TOP, mark, FontId::new(10.0, FontFamily::Proportional), color);
         }
@@ -160,8 +160,8 @@ fn heat_map_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, columns: &[RankColumn<'_
         let line = Rect::from_min_size(pos2(whole.left(), top), vec2(whole.width(), row_height));
         name_ui(ui, ctx, *parameter, line);
     }
-    if left_out > 0 {
-        let text = format!("Not shown: {}", counted(left_out, "stronger direction"));
+    if omitted > 0 {
+        let text = format!("Not shown: {}", counted(omitted, "stronger direction"));
         ui.label(RichText::new(text).small().color(theme.text_weak));
     }
 }
@@ -184,7 +184,7 @@ fn cell_ui(ui: &Ui, theme: &Theme, direction: &CalibrationDirection, entry: usiz
     let painter = ui.painter();
     painter.rect_filled(cell, 1.0, ground);
     let font = FontId::new((cell.height() - 1.5).clamp(7.0, 11.0), FontFamily::Monospace);
-    let text = if weight.abs() >= 0.05 && cell.width() >= NUMBER_WIDTH {
+    let text = if weight.abs() >= 0.05 && cell.width() >= MIN_COLUMN_WIDTH {
         format!("{weight:+.2}")
     } else if weight.abs() >= 0.2 {
         if weight < 0.0 { "−" } else { "+" }.to_owned()

@@ -32,7 +32,7 @@ pub(in crate::gui) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>) {
     ScrollArea::vertical().id_salt("all runs").auto_shrink(false).show(ui, |ui| {
         ui.spacing_mut().item_spacing.y = 3.0;
         for (number, run, step, _) in &ranked {
-            lock_ui(ui, ctx, *number, run, step);
+            singularity_ui(ui, ctx, *number, run, step);
         }
         let columns: Vec<RankColumn<'_>> = ranked
             .iter()
@@ -47,7 +47,13 @@ pub(in crate::gui) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>) {
 }
 
 /// The singularity margin of a minimal run, and the other end block if no run uses it.
-pub(super) fn lock_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, number: usize, run: &RunRecord, step: &StepRecord) {
+pub(super) fn singularity_ui(
+    ui: &mut Ui,
+    ctx: &mut PanelContext<'_>,
+    number: usize,
+    run: &RunRecord,
+    step: &StepRecord,
+) {
     let calibration = &step.report.calibration;
     let own = calibration.parameterization.parse::<Parameterization>().ok();
     let (own, other) = match own {

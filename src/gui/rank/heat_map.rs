@@ -8,23 +8,23 @@ use crate::gimbal::ParameterId;
 use crate::gui::PanelContext;
 use crate::gui::convergence::names::{meaning_of, part_of};
 use crate::gui::theme::{self, Theme};
-use crate::gui::units::{counted, figure};
+use crate::gui::units::{counted, significant};
 use crate::observability::{CalibrationDirection, RankReport};
 
 const NAME_WIDTH: f32 = 62.0;
 const HEADER_HEIGHT: f32 = 28.0;
 /// Height of the header of narrow columns, whose numbers are vertical.
 const UPRIGHT_HEADER_HEIGHT: f32 = 40.0;
-const HIGHEST_ROW: f32 = 26.0;
-const LOWEST_ROW: f32 = 12.0;
+const MAX_ROW_HEIGHT: f32 = 26.0;
+const MIN_ROW_HEIGHT: f32 = 12.0;
 /// Minimum width of a column with signed numbers.
 const NUMBER_WIDTH: f32 = 30.0;
 /// Minimum width of a column whose singular value fits beside its neighbours'.
 const HEAD_WIDTH: f32 = 40.0;
-const WIDEST_COLUMN: f32 = 84.0;
-const NARROWEST_COLUMN: f32 = 15.0;
+const MAX_COLUMN_WIDTH: f32 = 84.0;
+const MIN_COLUMN_WIDTH: f32 = 15.0;
 /// Rows with smaller weights may be omitted when room is short.
-const SMALLEST_SHOWN: f64 = 0.1;
+const MIN_SHOWN_WEIGHT: f64 = 0.1;
 
 /// Draws the heat map in about `height` points; it takes more if necessary.
 pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, rank: &RankReport, height: f32) {
@@ -34,23 +34,23 @@ pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, rank: &RankReport, hei
         return;
     }
     let width = ui.available_width();
-    let room = (width - NAME_WIDTH).max(NARROWEST_COLUMN);
-    let count = rank.directions.len().min((room / NARROWEST_COLUMN) as usize).max(1);
-    let pitch = (room / count as f32).min(WIDEST_COLUMN);
+    let room = (width - NAME_WIDTH).max(MIN_COLUMN_WIDTH);
+    let count = rank.directions.len().min((room / MIN_COLUMN_WIDTH) as usize).max(1);
+    let pitch = (room / count as f32).min(MAX_COLUMN_WIDTH);
     let directions = &rank.directions[..count];
 
     let mut rows: Vec<usize> = (0..rank.parameters.len()).collect();
     rows.sort_by_key(|row| part_of(rank.parameters[*row]));
     let all = rows.len();
     let header_height = if pitch >= HEAD_WIDTH { HEADER_HEIGHT } else { UPRIGHT_HEADER_HEIGHT };
-    if (height - header_height) / (rows.len() as f32) < LOWEST_ROW {
+    if (height - header_height) / (rows.len() as f32) < MIN_ROW_HEIGHT {
         rows.retain(|row| {
             let weight = |direction: &CalibrationDirection| direction.weights.get(*row).copied().unwrap_or(0.0);
-            directions.iter().any(|direction| weight(direction).abs() >= SMALLEST_SHOWN)
+            directions.iter().any(|direction| weight(direction).abs() >= MIN_SHOWN_WEIGHT)
         });
     }
     let left_out = all - rows.len();
-    let row_height = ((height - header_height) / rows.len().max(1) as f32).clamp(LOWEST_ROW, HIGHEST_ROW);
+    let row_height = ((height - header_height) / rows.len().max(1) as f32).clamp(MIN_ROW_HEIGHT, MAX_ROW_HEIGHT);
     let (_, rect) = ui.allocate_space(vec2(width, header_height + row_height * rows.len() as f32));
 
     for (column, direction) in directions.iter().enumerate() {
@@ -66,7 +66,7 @@ pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, rank: &RankReport, hei
     if left_out > 0 || count < rank.directions.len() {
         let mut notes = Vec::new();
         if left_out > 0 {
-            notes.push(format!("{} with weights under {SMALLEST_SHOWN}", counted(left_out, "parameter")));
+            notes.push(format!("{} with weights under {MIN_SHOWN_WEIGHT}", counted(left_out, "parameter")));
         }
         if count < rank.directions.len() {
             notes.push(counted(rank.directions.len() - count, "stronger direction"));
@@ -88,7 +88,7 @@ fn header(
     let color = if direction.structural { theme.error } else { theme.warn };
     let painter = ui.painter();
     let mark = if direction.structural { "null" } else { "weak" };
-    let value = if direction.structural { "0".to_owned() } else { figure(direction.singular_value) };
+    let value = if direction.structural { "0".to_owned() } else { significant(direction.singular_value) };
     let small = FontId::new(9.5, FontFamily::Monospace);
     if cell.width() >= HEAD_WIDTH {
         let top = cell.center_top();
@@ -102,7 +102,8 @@ fn header(
     let response = ui.interact(cell, ui.unique_id().with(("direction", column)), Sense::hover());
     let named = parameters_of(&ctx.names(), &rank.parameters, direction, 6);
     response.widget_info(|| WidgetInfo::labeled(Role::Label, true, format!("{mark} direction {named}")));
-    response.on_hover_text(format!("{mark} direction, singular value {}\n{named}", figure(direction.singular_value)));
+    response
+        .on_hover_text(format!("{mark} direction, singular value {}\n{named}", significant(direction.singular_value)));
 }
 
 fn row_ui(

@@ -14,14 +14,14 @@ use crate::observability::{InformationRate, information_rate};
 use crate::session::{RunRecord, StepRecord};
 
 /// Interval before the cursor over which the gain is summed.
-const STRETCH_NS: i64 = 1_000_000_000;
+const RATE_INTERVAL_NS: i64 = 1_000_000_000;
 /// Smaller contributions, in bits per second, are not shown.
-const LEAST_SHOWN: f64 = 0.005;
+const MIN_SHOWN: f64 = 0.005;
 
 /// The cached sums of one step.
 #[derive(Debug, Default)]
 pub(super) struct InformationUi {
-    told: Option<(Arc<StepRecord>, Option<InformationRate>)>,
+    cached: Option<(Arc<StepRecord>, Option<InformationRate>)>,
 }
 
 impl InformationUi {
@@ -34,10 +34,10 @@ impl InformationUi {
         step: &Arc<StepRecord>,
         room: bool,
     ) {
-        if !self.told.as_ref().is_some_and(|(known, _)| Arc::ptr_eq(known, step)) {
-            self.told = Some((Arc::clone(step), rate_before(run, step)));
+        if !self.cached.as_ref().is_some_and(|(known, _)| Arc::ptr_eq(known, step)) {
+            self.cached = Some((Arc::clone(step), rate_before(run, step)));
         }
-        let Some((_, Some(rate))) = &self.told else { return };
+        let Some((_, Some(rate))) = &self.cached else { return };
         let joints = ctx.recording.rig.joint_names();
         let headlines = headlines(rate, &ctx.names(), &joints);
         let title = RichText::new(fitting(ui, &headlines)).color(ctx.theme.text);
@@ -50,7 +50,7 @@ impl InformationUi {
 /// Information rate over the last second up to a step.
 fn rate_before(run: &RunRecord, step: &StepRecord) -> Option<InformationRate> {
     let stamp_ns = step.report.stamp_ns;
-    let begin = run.index_at(stamp_ns - STRETCH_NS).map_or(0, |before| before + 1);
+    let begin = run.index_at(stamp_ns - RATE_INTERVAL_NS).map_or(0, |before| before + 1);
     let end = run.index_at(stamp_ns).map_or(0, |last| last + 1);
     information_rate(run.steps[begin..end].iter().filter_map(|step| step.gain()))
 }
@@ -65,7 +65,7 @@ fn fitting<'a>(ui: &Ui, headlines: &'a [String; 3]) -> &'a str {
 
 /// Headlines: complete, without the parameter of the largest gain, and the sum alone.
 fn headlines(rate: &InformationRate, names: &ParameterNames, joints: &[String]) -> [String; 3] {
-    let most = rate
+    let main_motion = rate
         .leading(None)
         .map_or_else(String::new, |(motion, part)| format!(", most by {} ({part:.2})", motion.name(joints)));
     let fastest = (0..rate.parameters.len())
@@ -78,7 +78,7 @@ fn headlines(rate: &InformationRate, names: &ParameterNames, joints: &[String]) 
         format!("; fastest {} {:.2}{by}", names.name(parameter.parameter), parameter.bits_per_s)
     });
     let total = format!("Told in the last {:.1} s: {:.2} bit/s", rate.duration_s, rate.total());
-    [format!("{total}{most}{fastest}"), format!("{total}{most}"), total]
+    [format!("{total}{main_motion}{fastest}"), format!("{total}{main_motion}"), total]
 }
 
 fn table_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, rate: &InformationRate, joints: &[String]) {
@@ -125,12 +125,12 @@ fn table_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, rate: &InformationRate, joi
 }
 
 /// A number whose background shows its sign and magnitude.
-fn number_ui(ui: &mut Ui, theme: &Theme, number: f64, share: f64) {
-    let text = if number.abs() < LEAST_SHOWN { "·".to_owned() } else { fixed(number, 2) };
+fn number_ui(ui: &mut Ui, theme: &Theme, number: f64, ratio: f64) {
+    let text = if number.abs() < MIN_SHOWN { "·".to_owned() } else { fixed(number, 2) };
     // Right-aligned, so that signs and decimal points are aligned.
     let mut text = RichText::new(format!("{text:>5}")).monospace().size(10.5).color(theme.text_strong);
-    if share.abs() >= 0.05 {
-        let ground = theme.diverging(share);
+    if ratio.abs() >= 0.05 {
+        let ground = theme.diverging(ratio);
         text = text.color(Theme::text_on(ground)).background_color(ground);
     }
     ui.add(Label::new(text));

@@ -34,16 +34,16 @@ const INFORMED: usize = 1;
 const PARAMETERS: usize = 2;
 
 /// Width in points of the lines about one run.
-const OWN_WIDTH: f32 = 480.0;
+const RUN_WIDTH: f32 = 480.0;
 
 /// Panel height in points from which the ranks over time are shown.
-const LOWEST_WITH_TIME: f32 = 340.0;
+const MIN_HEIGHT_WITH_TIME: f32 = 340.0;
 
 /// Panel height in points from which alternatives to the best motion are shown.
-const LOWEST_WITH_OTHERS: f32 = 300.0;
+const MIN_HEIGHT_WITH_ALTERNATIVES: f32 = 300.0;
 
 /// Panel height in points from which the table of the information gain is shown beside the heat map.
-const TALL: f32 = 1000.0;
+const MIN_HEIGHT_WITH_INFORMATION: f32 = 1000.0;
 
 /// State of the rank panel.
 #[derive(Debug, Default)]
@@ -75,9 +75,9 @@ impl RankPanel {
         let height = ui.available_height();
         let count = compare::comparable(ctx);
         let width = ui.available_width();
-        if count > 1 && width >= OWN_WIDTH + compare::WIDTH_OF_A_RUN * count as f32 {
-            let share = (OWN_WIDTH / width).max(1.0 / (count + 1) as f32);
-            let [own, all] = halves(ui.available_rect_before_wrap(), share);
+        if count > 1 && width >= RUN_WIDTH + compare::WIDTH_OF_A_RUN * count as f32 {
+            let fraction = (RUN_WIDTH / width).max(1.0 / (count + 1) as f32);
+            let [own, all] = halves(ui.available_rect_before_wrap(), fraction);
             ui.scope_builder(UiBuilder::new().max_rect(own), |ui| self.run_ui(ui, ctx, run, step, height));
             ui.scope_builder(UiBuilder::new().max_rect(all), |ui| compare::ui(ui, ctx));
             return;
@@ -112,14 +112,14 @@ impl RankPanel {
                 self.over_time_ui(ui, ctx);
                 return;
             };
-            self.advice.ui(ui, ctx, run, step, self.in_background, height > LOWEST_WITH_OTHERS);
-            self.information.ui(ui, ctx, run, step, height > TALL);
+            self.advice.ui(ui, ctx, run, step, self.in_background, height > MIN_HEIGHT_WITH_ALTERNATIVES);
+            self.information.ui(ui, ctx, run, step, height > MIN_HEIGHT_WITH_INFORMATION);
             let number = ctx.selection.run.min(ctx.recording.runs.len().saturating_sub(1));
-            compare::lock_ui(ui, ctx, number, run, step);
+            compare::singularity_ui(ui, ctx, number, run, step);
             self.slider.ui(ui, ctx, step);
             spectrum::ui(ui, ctx.theme, &ctx.names(), rank, (0.16 * height).clamp(60.0, 150.0));
             // The timeline has a lane for it too, so it yields to the heat map first.
-            if height > LOWEST_WITH_TIME {
+            if height > MIN_HEIGHT_WITH_TIME {
                 self.over_time_ui(ui, ctx);
             }
             let left = height - (ui.cursor().top() - top) - 4.0;
@@ -134,15 +134,15 @@ impl RankPanel {
         const HEIGHT: f32 = 58.0;
         let theme = *ctx.theme;
         let tables = self.tables.read(&ctx.recording.runs, rank_row);
-        let most = tables.iter().flat_map(|table| &table.columns[PARAMETERS]).copied().fold(0.0, f64::max);
-        if most == 0.0 {
+        let max_rank = tables.iter().flat_map(|table| &table.columns[PARAMETERS]).copied().fold(0.0, f64::max);
+        if max_rank == 0.0 {
             return;
         }
         let (_, all) = ui.allocate_space(vec2(ui.available_width(), HEIGHT));
         let rect = egui::Rect::from_min_max(all.min + vec2(0.0, CAPTION), all.max);
         let (begin_ns, end_ns) = visible_range(ctx);
-        let area = PlotArea { rect, begin_ns, end_ns, low: 0.0, high: most * 1.08 };
-        let caption = format!("informed rank over time, of {most:.0} (faint: structural)");
+        let area = PlotArea { rect, begin_ns, end_ns, low: 0.0, high: max_rank * 1.08 };
+        let caption = format!("informed rank over time, of {max_rank:.0} (faint: structural)");
         let place = all.left_top() + vec2(3.0, 0.0);
         ui.painter().text(place, egui::Align2::LEFT_TOP, caption, super::theme::label_font(), theme.text_weak);
         let painter = ui.painter_at(rect);
@@ -169,9 +169,9 @@ fn rank_row(step: &StepRecord) -> [f64; 3] {
 }
 
 /// A rectangle split into left and right at a fraction of its width, with a gap.
-fn halves(rect: egui::Rect, share: f32) -> [egui::Rect; 2] {
+fn halves(rect: egui::Rect, fraction: f32) -> [egui::Rect; 2] {
     const GAP: f32 = 16.0;
-    let (left, right) = rect.split_left_right_at_fraction(share);
+    let (left, right) = rect.split_left_right_at_fraction(fraction);
     [left.with_max_x(left.right() - GAP), right]
 }
 

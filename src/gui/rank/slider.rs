@@ -5,17 +5,17 @@ use egui::{ComboBox, Label, RichText, Role, Slider, Ui, WidgetInfo};
 
 use super::verdict::parameters_of_weights;
 use crate::gimbal::ParameterId;
-use crate::gui::units::{Shown, figure, fixed};
+use crate::gui::units::{Shown, fixed, significant};
 use crate::gui::{PanelContext, slide};
 use crate::observability::{ChainSlide, RankReport, SlideDirection, SlidePosition, chain_of_step};
 use crate::session::StepRecord;
 
 /// Maximum displacement, in units of 10° and 3 cm along the unit direction.
-const FARTHEST: f64 = 2.0;
+const MAX_DISPLACEMENT: f64 = 2.0;
 /// Period of the animation in seconds.
 const PERIOD_S: f64 = 4.0;
 /// Changes of the reprojections up to here count as zero, in pixels.
-const STAYS_PX: f64 = 0.1;
+const ZERO_CHANGE_PX: f64 = 0.1;
 /// Number of parameters whose changes are listed.
 const CHANGES_SHOWN: usize = 4;
 
@@ -74,7 +74,7 @@ impl SliderUi {
                 });
             chosen.response.labelled_by(along.id);
             ui.spacing_mut().slider_width = (ui.available_width() - 12.0).max(40.0);
-            let slider = Slider::new(&mut amount, -FARTHEST..=FARTHEST).show_value(false);
+            let slider = Slider::new(&mut amount, -MAX_DISPLACEMENT..=MAX_DISPLACEMENT).show_value(false);
             let slider = ui.add(slider).on_hover_text(
                 "Moves the chain along this direction, by up to 20° and 6 cm, the poses of the vehicle held; double click \
                  for back",
@@ -89,7 +89,7 @@ impl SliderUi {
         });
         if self.playing {
             let time_s = ui.input(|input| input.time);
-            amount = FARTHEST * (std::f64::consts::TAU * time_s / PERIOD_S).sin();
+            amount = MAX_DISPLACEMENT * (std::f64::consts::TAU * time_s / PERIOD_S).sin();
             ui.ctx().request_repaint();
         }
         let untouched = ctx.selection.slide.is_none() && amount == 0.0 && !self.playing;
@@ -113,9 +113,9 @@ fn is_other(direction: &SlideDirection, rank: &RankReport) -> bool {
 /// The changes of reprojections and parameters.
 fn outcome_ui(ui: &mut Ui, ctx: &PanelContext<'_>, slide: &ChainSlide, parameters: &[ParameterId]) {
     let names = ctx.names();
-    let stays = slide.largest_px <= STAYS_PX;
+    let stays = slide.largest_px <= ZERO_CHANGE_PX;
     let (mark, color) = if stays { ("✔", ctx.theme.ok) } else { ("✖", ctx.theme.warn) };
-    let (finite, first_order) = (figure(slide.largest_px), figure(slide.largest_first_order_px));
+    let (finite, first_order) = (significant(slide.largest_px), significant(slide.largest_first_order_px));
     let verb = if stays { "stay" } else { "move" };
     let text = format!("{mark} Reprojections {verb}: by up to {finite} px, {first_order} px to first order");
     ui.add(Label::new(RichText::new(&text).color(color)).truncate()).on_hover_text(text);

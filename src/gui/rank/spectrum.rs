@@ -6,7 +6,7 @@ use super::verdict::parameters_of;
 use crate::gimbal::ParameterNames;
 use crate::gui::plot::paint_ground;
 use crate::gui::theme::Theme;
-use crate::gui::units::figure;
+use crate::gui::units::significant;
 use crate::observability::RankReport;
 
 /// Draws the spectrum in `height` points.
@@ -75,9 +75,9 @@ pub(super) fn paint(
     if let Some(pointer) = response.hover_pos() {
         let index = ((pointer.x - plot.left()) / pitch) as usize;
         if let Some(value) = rank.singular_values.get(index).filter(|_| plot.x_range().contains(pointer.x)) {
-            let mut lines = vec![format!("σ{} = {}", index + 1, figure(*value))];
+            let mut lines = vec![format!("σ{} = {}", index + 1, significant(*value))];
             if let Some(with_priors) = rank.singular_values_with_priors.get(index) {
-                lines.push(format!("with priors {}", figure(*with_priors)));
+                lines.push(format!("with priors {}", significant(*with_priors)));
             }
             // Directions start with the least observable one, singular values with the largest.
             let direction = (rank.singular_values.len() - 1).checked_sub(index).and_then(|d| rank.directions.get(d));

@@ -106,14 +106,14 @@ pub(crate) fn structure_lines(rank: &RankReport, names: &ParameterNames) -> Vec<
 /// Below this singularity margin the parameterization is switched (docs/mathematics.md, section 4).
 const LOW_MARGIN: f64 = 0.3;
 
-/// The parameters with the largest weights in a direction, `L1.d - I.tx`, at most `most`.
+/// The parameters with the largest weights in a direction, `L1.d - I.tx`, at most `max_count`.
 pub(crate) fn parameters_of(
     names: &ParameterNames,
     parameters: &[ParameterId],
     direction: &CalibrationDirection,
-    most: usize,
+    max_count: usize,
 ) -> String {
-    parameters_of_weights(names, parameters, &direction.weights, most)
+    parameters_of_weights(names, parameters, &direction.weights, max_count)
 }
 
 /// The same for weights without a direction.
@@ -121,17 +121,17 @@ pub(crate) fn parameters_of_weights(
     names: &ParameterNames,
     parameters: &[ParameterId],
     weights: &[f64],
-    most: usize,
+    max_count: usize,
 ) -> String {
     const SMALLEST_NAMED: f64 = 0.2;
     let mut entries: Vec<(usize, f64)> = weights.iter().copied().enumerate().collect();
     entries.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
     entries.retain(|(_, weight)| weight.abs() >= SMALLEST_NAMED);
-    let left_out = entries.len().saturating_sub(most);
+    let omitted = entries.len().saturating_sub(max_count);
     // A direction has no sign of its own: the first weight counts as positive.
     let flip = entries.first().map_or(1.0, |(_, weight)| weight.signum());
     let mut text = String::new();
-    for (place, (column, weight)) in entries.iter().take(most).enumerate() {
+    for (place, (column, weight)) in entries.iter().take(max_count).enumerate() {
         let sign = if weight * flip < 0.0 { " − " } else { " + " };
         if place > 0 {
             text.push_str(sign);
@@ -139,9 +139,9 @@ pub(crate) fn parameters_of_weights(
         let name = parameters.get(*column).map_or_else(|| "?".to_owned(), |parameter| names.name(*parameter));
         text.push_str(&name);
     }
-    if left_out > 0 {
+    if omitted > 0 {
         text.push_str(" and ");
-        text.push_str(&counted(left_out, "other"));
+        text.push_str(&counted(omitted, "other"));
     }
     text
 }
@@ -153,7 +153,7 @@ mod tests {
     use crate::gui::samples::{FIRST_TRACKED_FRAME, sample_recording_of};
 
     #[test]
-    fn the_verdict_says_what_is_lost_and_to_what() {
+    fn the_verdict_reports_what_is_lost_and_why() {
         let recording = sample_recording_of(FIRST_TRACKED_FRAME + 10, &["auto", "classical"]);
         let said = |run: usize, step: usize| verdict(&recording.runs[run].steps[step], &ParameterNames::default());
         let waiting = said(0, 3);
@@ -166,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn directions_are_named_by_their_strongest_parameters() {
+    fn directions_are_named_by_their_largest_weights() {
         let names = ParameterNames::default();
         let parameters = Quantity::LINK.map(|quantity| ParameterId { part: ParameterPart::Link(0), quantity });
         let direction =

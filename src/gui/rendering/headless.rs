@@ -145,7 +145,7 @@ impl Headless {
     }
 
     /// Runs the user interface until it has settled and paints it over the theme's background.
-    pub fn picture<P: FramePainter>(
+    pub fn screenshot<P: FramePainter>(
         &mut self,
         painter: &mut P,
         mut ui: impl FnMut(&mut Ui),
@@ -168,8 +168,8 @@ impl Headless {
 
 /// A screenshot of a user interface, painted on the CPU.
 pub fn draw(options: HeadlessOptions, ui: impl FnMut(&mut Ui)) -> RgbaImage {
-    let Ok(picture) = Headless::new(options).picture(&mut Painter::new(), ui);
-    picture
+    let Ok(screenshot) = Headless::new(options).screenshot(&mut Painter::new(), ui);
+    screenshot
 }
 
 /// A user interface as an SVG drawing.
@@ -183,7 +183,7 @@ pub fn svg_of(options: HeadlessOptions, prefix: &str, title: &str, ui: impl FnMu
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gui::tests::keep_picture;
+    use crate::gui::tests::keep_screenshot;
 
     fn options(theme: ThemeName, scale: f32) -> HeadlessOptions {
         HeadlessOptions { size_px: [(200.0 * scale) as u32, (60.0 * scale) as u32], pixels_per_point: scale, theme }
@@ -195,12 +195,12 @@ mod tests {
     }
 
     #[test]
-    fn pictures_are_repeatable_opaque_and_show_text() {
+    fn screenshots_are_repeatable_opaque_and_show_text() {
         for theme in [ThemeName::Dark, ThemeName::Light, ThemeName::Print] {
             for scale in [1.0, 1.5, 2.0] {
                 let options = options(theme, scale);
                 let image = draw(options, text_ui);
-                keep_picture(&format!("text-{}-{scale}", theme.as_str()), &image);
+                keep_screenshot(&format!("text-{}-{scale}", theme.as_str()), &image);
                 assert_eq!([image.width(), image.height()], options.size_px);
                 assert!(image == draw(options, text_ui), "two pictures differ");
                 assert!(image.pixels().all(|pixel| pixel.0[3] == 255));

@@ -115,7 +115,7 @@ impl Offscreen {
         }
         let mut headless = Headless::new(options);
         SceneBackend::Wgpu(FORMAT).set(headless.context());
-        headless.picture(self, ui)
+        headless.screenshot(self, ui)
     }
 
     fn not_delivered(&self, problem: &impl ToString) -> OffscreenError {
@@ -133,7 +133,7 @@ impl Offscreen {
         let row_bytes = width * BYTES_PER_PIXEL;
         let padded_bytes = row_bytes.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
         let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("picture"),
+            label: Some("screenshot"),
             size: u64::from(padded_bytes) * u64::from(height),
             usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
@@ -182,7 +182,7 @@ impl FramePainter for Offscreen {
         background: Color32,
     ) -> Result<RgbaImage, OffscreenError> {
         let screen = ScreenDescriptor { size_in_pixels: size_px, pixels_per_point };
-        let label = Some("picture");
+        let label = Some("screenshot");
         let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label });
         let before = self.renderer.update_buffers(&self.device, &self.queue, &mut encoder, primitives, &screen);
         let texture = self.device.create_texture(&wgpu::TextureDescriptor {

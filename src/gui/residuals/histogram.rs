@@ -40,9 +40,9 @@ impl ResidualHistogram {
             observations().filter_map(|one| one.residual_before_px).filter(|r| r.norm().is_finite()).collect();
         let mut lengths: Vec<f64> = after.iter().map(|residual| residual.norm()).collect();
         lengths.sort_by(f64::total_cmp);
-        let quantile = |share: f64| {
+        let quantile = |fraction: f64| {
             let last = lengths.len().checked_sub(1)?;
-            lengths.get((share * last as f64).round() as usize).copied()
+            lengths.get((fraction * last as f64).round() as usize).copied()
         };
         let p95_px = quantile(0.95).unwrap_or(f64::NAN);
         let reach_px = round_up(4.0 * quantile(0.5).unwrap_or(1.0));
@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_and_nonsense_are_harmless() {
+    fn empty_and_invalid_reports_are_accepted() {
         let recording = sample_recording_of(60, &["auto"]);
         let mut report = recording.runs[0].steps[59].report.clone();
         for feature in &mut report.features {

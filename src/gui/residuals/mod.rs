@@ -17,7 +17,7 @@ use super::plot::{
     ticks, visible_range,
 };
 use super::theme::{CURVE_WIDTH, Theme, label_font};
-use super::units::{figure, fixed};
+use super::units::{fixed, significant};
 use crate::estimator::{ResidualSummary, StepReport};
 use crate::gui::residuals::histogram::ResidualHistogram;
 use crate::session::StepRecord;
@@ -83,8 +83,9 @@ impl ResidualsPanel {
         for (table, curve) in tables.iter().zip(&mut self.curves) {
             curve.update(&area, table.epoch, &table.stamps_ns, &table.columns[0]);
         }
-        let most = self.curves.iter().filter_map(|curve| curve.extent).map(|(_, most)| most).fold(0.0, f64::max);
-        area = area.with_values(0.0, if most > 0.0 { 1.1 * most } else { 1.0 });
+        let max_value =
+            self.curves.iter().filter_map(|curve| curve.extent).map(|(_, max_value)| max_value).fold(0.0, f64::max);
+        area = area.with_values(0.0, if max_value > 0.0 { 1.1 * max_value } else { 1.0 });
         let painter = ui.painter_at(rect);
         paint_ground(&painter, &theme, rect);
         paint_value_grid(&painter, &theme, &area, 1.0, (height / 22.0) as usize + 1);
@@ -143,9 +144,9 @@ fn histogram_ui(ui: &mut Ui, theme: &Theme, histogram: &ResidualHistogram, heigh
         };
         painter.text(pos2(x(mark), plot.bottom() + 1.0), align, text, font.clone(), theme.text_weak);
     }
-    let most = histogram.after.iter().chain(&histogram.before).copied().max().unwrap_or(0).max(1) as f32;
+    let max_value = histogram.after.iter().chain(&histogram.before).copied().max().unwrap_or(0).max(1) as f32;
     let pitch = plot.width() / histogram.after.len().max(1) as f32;
-    let y = |count: usize| plot.bottom() - count as f32 / most * plot.height();
+    let y = |count: usize| plot.bottom() - count as f32 / max_value * plot.height();
     for (bin, count) in histogram.after.iter().enumerate() {
         let left = plot.left() + bin as f32 * pitch;
         let bar = Rect::from_min_max(pos2(left + 0.5, y(*count)), pos2(left + pitch - 0.5, plot.bottom()));
@@ -199,8 +200,8 @@ fn factors_ui(ui: &mut Ui, theme: &Theme, residuals: &[ResidualSummary]) {
             ui.label(RichText::new(summary.factor.name()).color(theme.text));
             let number = |text: String| RichText::new(text).monospace().color(theme.text_strong);
             ui.label(number(summary.count.to_string()));
-            ui.label(number(figure(summary.chi2_before)));
-            ui.label(number(figure(summary.chi2_after)));
+            ui.label(number(significant(summary.chi2_before)));
+            ui.label(number(significant(summary.chi2_after)));
             ratio_ui(ui, theme, summary.mean_square().unwrap_or(f64::NAN));
             ui.end_row();
         }
@@ -209,7 +210,7 @@ fn factors_ui(ui: &mut Ui, theme: &Theme, residuals: &[ResidualSummary]) {
 
 /// χ² per residual with a bar around 1.
 fn ratio_ui(ui: &mut Ui, theme: &Theme, ratio: f64) {
-    let (color, says) = if !ratio.is_finite() {
+    let (color, meaning) = if !ratio.is_finite() {
         (theme.text_weak, "")
     } else if ratio > 2.0 {
         (theme.error, "residuals larger than their noise says")
@@ -225,14 +226,14 @@ fn ratio_ui(ui: &mut Ui, theme: &Theme, ratio: f64) {
             let painter = ui.painter();
             painter.rect_filled(rect, 1.0, theme.surface_raised);
             if ratio.is_finite() {
-                let share = (ratio / 3.0).clamp(0.0, 1.0) as f32;
-                let bar = Rect::from_min_size(rect.min, vec2(rect.width() * share, rect.height()));
+                let ratio_of_width = (ratio / 3.0).clamp(0.0, 1.0) as f32;
+                let bar = Rect::from_min_size(rect.min, vec2(rect.width() * ratio_of_width, rect.height()));
                 painter.rect_filled(bar, 1.0, color);
             }
             painter.vline(rect.left() + rect.width() / 3.0, rect.y_range().expand(1.0), Stroke::new(1.0, theme.text));
         })
         .response;
-    if !says.is_empty() {
-        response.on_hover_text(says);
+    if !meaning.is_empty() {
+        response.on_hover_text(meaning);
     }
 }

@@ -1,7 +1,7 @@
 //! Calibration and rank of the artificial recording.
 
 use super::recording::FIRST_TRACKED_FRAME;
-use super::yard::Dice;
+use super::yard::RandomNumbers;
 use crate::estimator::CalibrationEstimate;
 use crate::geometry::{Dimension, RigidTransform, so3};
 use crate::gimbal::{ClassicalChain, DhLink, ParameterId, ParameterPart, Quantity, Singularity};
@@ -26,7 +26,7 @@ pub(crate) fn calibration_at(
     let is_angle = |parameter: &ParameterId| parameter.dimension() == Dimension::Angle;
     let prior_sigmas: Vec<f64> =
         parameters.iter().map(|parameter| if is_angle(parameter) { 0.015 } else { 0.0035 }).collect();
-    let mut dice = Dice::new(index as u64 + 100);
+    let mut random_numbers = RandomNumbers::new(index as u64 + 100);
     let waiting = index < FIRST_TRACKED_FRAME;
     let sigmas: Vec<f64> = prior_sigmas
         .iter()
@@ -39,7 +39,7 @@ pub(crate) fn calibration_at(
     let values = values
         .iter()
         .zip(&sigmas)
-        .map(|(value, sigma)| value + if waiting { 0.0 } else { 0.15 * sigma * dice.normal() })
+        .map(|(value, sigma)| value + if waiting { 0.0 } else { 0.15 * sigma * random_numbers.normal() })
         .collect();
     CalibrationEstimate {
         parameterization: if name == "auto" { "minimal".to_owned() } else { name.to_owned() },
@@ -73,9 +73,10 @@ pub(crate) fn rank_at(parameters: &[ParameterId], index: usize) -> RankReport {
         .rev()
         .map(|rank| {
             let mut weights = vec![0.0; columns];
-            let mut dice = Dice::new(rank as u64 * 977);
+            let mut random_numbers = RandomNumbers::new(rank as u64 * 977);
             for entry in 0..3 {
-                weights[(rank * 5 + entry * 7) % columns] = if entry == 0 { 1.0 } else { 1.4 * dice.unit() - 0.7 };
+                weights[(rank * 5 + entry * 7) % columns] =
+                    if entry == 0 { 1.0 } else { 1.4 * random_numbers.unit() - 0.7 };
             }
             let norm = weights.iter().map(|weight| weight * weight).sum::<f64>().sqrt();
             CalibrationDirection {
@@ -151,7 +152,7 @@ fn minimal_values(chain: &ClassicalChain) -> Vec<(ParameterId, f64)> {
     links[0].theta_offset_rad += psi;
     links[0].d_m += shift.z;
     let end = links[2];
-    let turn = RigidTransform::new(
+    let rotation = RigidTransform::new(
         so3::exp(&nalgebra::Vector3::new(0.0, 0.0, end.theta_offset_rad)),
         nalgebra::Vector3::new(0.0, 0.0, end.d_m),
     );
@@ -159,7 +160,7 @@ fn minimal_values(chain: &ClassicalChain) -> Vec<(ParameterId, f64)> {
         so3::exp(&nalgebra::Vector3::new(end.alpha_rad, 0.0, 0.0)),
         nalgebra::Vector3::new(end.a_m, 0.0, 0.0),
     );
-    let last = turn * twist * chain.effector_from_camera;
+    let last = rotation * twist * chain.effector_from_camera;
     let matrix = last.rotation_matrix();
     let cosine = matrix[(0, 1)].hypot(matrix[(1, 1)]);
     let theta = (-matrix[(0, 1)]).atan2(matrix[(1, 1)]);
@@ -187,7 +188,7 @@ fn link_entries(number: u8, link: &DhLink) -> impl Iterator<Item = (ParameterId,
 }
 
 fn pose_entries(part: ParameterPart, pose: &RigidTransform) -> Vec<(ParameterId, f64)> {
-    let (turn, shift) = (so3::log(&pose.rotation), pose.translation_m);
-    let values = [turn.x, turn.y, turn.z, shift.x, shift.y, shift.z];
+    let (rotation, shift) = (so3::log(&pose.rotation), pose.translation_m);
+    let values = [rotation.x, rotation.y, rotation.z, shift.x, shift.y, shift.z];
     Quantity::TRANSFORM.map(|quantity| ParameterId { part, quantity }).into_iter().zip(values).collect()
 }

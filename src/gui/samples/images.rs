@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use super::yard::{INTRINSICS_PX, Instant, RESOLUTION_PX, WALL_HEIGHT_M, YARD_HALF_SIDE_M, true_chain};
+use super::yard::{FlightState, INTRINSICS_PX, RESOLUTION_PX, WALL_HEIGHT_M, YARD_HALF_SIDE_M, true_chain};
 use crate::gui::ImageSource;
 use crate::sensors::GrayImage;
 
@@ -20,7 +20,7 @@ impl ImageSource for SampleImages {
 fn cast(frame_index: usize) -> GrayImage {
     let [width, height] = RESOLUTION_PX;
     let [fx, fy, cx, cy] = INTRINSICS_PX;
-    let pose = Instant::at(frame_index, &true_chain()).world_from_camera;
+    let pose = FlightState::at(frame_index, &true_chain()).world_from_camera;
     let mut pixels = Vec::with_capacity(width * height);
     for row in 0..height {
         for column in 0..width {

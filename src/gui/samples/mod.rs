@@ -9,5 +9,5 @@ mod yard;
 pub(crate) use self::recording::{
     FIRST_TRACKED_FRAME, FRAME_PERIOD_NS, sample_images, sample_recording, sample_recording_of,
 };
-pub(crate) use self::simulated::flown_recording;
+pub(crate) use self::simulated::simulated_recording;
 pub(crate) use self::yard::{chain_pose, given_chain, true_chain};

@@ -13,7 +13,8 @@ use nalgebra::{UnitQuaternion, Vector2, Vector3};
 use super::calibration::{calibration_at, rank_at};
 use super::images::SampleImages;
 use super::yard::{
-    Dice, INTRINSICS_PX, Instant, chain_pose, given_chain, point_of, project, rig_with, true_chain, yard_points,
+    FlightState, INTRINSICS_PX, RandomNumbers, chain_pose, given_chain, point_of, project, rig_with, true_chain,
+    yard_points,
 };
 use crate::estimator::{
     Event, EventKind, FactorKind, FeatureCounts, FeatureReport, FrameStateReport, IterationReport, LandmarkReport,
@@ -44,7 +45,7 @@ pub(crate) fn sample_images() -> SampleImages {
 pub(crate) fn sample_recording_of(frame_count: usize, run_names: &[&str]) -> Recording {
     let true_chain = true_chain();
     let given_chain = given_chain();
-    let flight: Vec<Instant> = (0..frame_count).map(|index| Instant::at(index, &true_chain)).collect();
+    let flight: Vec<FlightState> = (0..frame_count).map(|index| FlightState::at(index, &true_chain)).collect();
     let tracks = track_features(&flight);
     let runs = run_names
         .iter()
@@ -67,14 +68,14 @@ pub(crate) fn sample_recording_of(frame_count: usize, run_names: &[&str]) -> Rec
     }
 }
 
-fn track_features(flight: &[Instant]) -> Vec<Arc<TrackedFrame>> {
+fn track_features(flight: &[FlightState]) -> Vec<Arc<TrackedFrame>> {
     const WANTED: usize = 140;
     const MIN_DISTANCE_PX: f64 = 26.0;
     let points = yard_points();
-    let mut dice = Dice::new(23);
+    let mut random_numbers = RandomNumbers::new(23);
     let mut before: BTreeMap<u64, TrackedFeature> = BTreeMap::new();
     let mut frames = Vec::new();
-    for (index, instant) in flight.iter().enumerate() {
+    for (index, flight_state) in flight.iter().enumerate() {
         let mut candidates: Vec<u64> = (1..=points.len() as u64).collect();
         candidates.sort_by_key(|id| std::cmp::Reverse(before.get(id).map_or(0, |feature| feature.age + 1)));
         let mut now: BTreeMap<u64, TrackedFeature> = BTreeMap::new();
@@ -82,15 +83,15 @@ fn track_features(flight: &[Instant]) -> Vec<Arc<TrackedFrame>> {
         let mut detected = 0;
         for id in candidates {
             let earlier = before.get(&id);
-            if now.len() >= WANTED || (earlier.is_some() && dice.unit() < 0.015) {
+            if now.len() >= WANTED || (earlier.is_some() && random_numbers.unit() < 0.015) {
                 continue;
             }
-            let Some((uv, _)) = project(&instant.world_from_camera, &points[id as usize - 1]) else { continue };
+            let Some((uv, _)) = project(&flight_state.world_from_camera, &points[id as usize - 1]) else { continue };
             if taken.iter().any(|other| (other - uv).norm() < MIN_DISTANCE_PX) {
                 continue;
             }
             taken.push(uv);
-            let uv_px = uv + Vector2::new(dice.normal(), dice.normal()) * 0.3;
+            let uv_px = uv + Vector2::new(random_numbers.normal(), random_numbers.normal()) * 0.3;
             let [fx, fy, cx, cy] = INTRINSICS_PX;
             let bearing = Vector3::new((uv_px.x - cx) / fx, (uv_px.y - cy) / fy, 1.0).normalize();
             detected += usize::from(earlier.is_none());
@@ -122,7 +123,7 @@ fn track_features(flight: &[Instant]) -> Vec<Arc<TrackedFrame>> {
 fn sample_run(
     number: usize,
     name: &str,
-    flight: &[Instant],
+    flight: &[FlightState],
     tracks: &[Arc<TrackedFrame>],
     given: &ClassicalChain,
     ground_truth: &ClassicalChain,
@@ -130,7 +131,7 @@ fn sample_run(
     let points = yard_points();
     let true_from_estimate =
         RigidTransform::new(UnitQuaternion::from_euler_angles(0.0, 0.0, 0.4), Vector3::new(1.0, -2.0, 0.3));
-    let mut dice = Dice::new(31 + number as u64);
+    let mut random_numbers = RandomNumbers::new(31 + number as u64);
     let steps = (0..flight.len())
         .map(|index| {
             let estimate = Estimate { number, flight, true_from_estimate };
@@ -138,7 +139,7 @@ fn sample_run(
             let report = if index < FIRST_TRACKED_FRAME {
                 waiting_report(index, calibration)
             } else {
-                tracking_report(index, &estimate, calibration, tracks, &points, &mut dice)
+                tracking_report(index, &estimate, calibration, tracks, &points, &mut random_numbers)
             };
             let rank = (index >= FIRST_TRACKED_FRAME).then(|| rank_at(&report.calibration.parameters, index));
             Arc::new(StepRecord {
@@ -160,7 +161,7 @@ fn sample_run(
 /// The errors of an artificial estimate.
 struct Estimate<'a> {
     number: usize,
-    flight: &'a [Instant],
+    flight: &'a [FlightState],
     true_from_estimate: RigidTransform,
 }
 
@@ -217,7 +218,7 @@ fn tracking_report(
     calibration: crate::estimator::CalibrationEstimate,
     tracks: &[Arc<TrackedFrame>],
     points: &[Vector3<f64>],
-    dice: &mut Dice,
+    random_numbers: &mut RandomNumbers,
 ) -> StepReport {
     let keyframe = index.is_multiple_of(4);
     let mut indices: Vec<usize> =
@@ -237,20 +238,20 @@ fn tracking_report(
                 accelerometer_bias_m_per_s2: Vector3::new(-0.49, -0.14, 0.39),
                 gyroscope_bias_rad_per_s: Vector3::new(-0.0006, -0.0002, -0.0075),
                 joint_angles_rad: angles.to_vec(),
-                encoder_angles_rad: Some(angles.iter().map(|angle| angle + 0.0087 * dice.normal()).collect()),
+                encoder_angles_rad: Some(angles.iter().map(|angle| angle + 0.0087 * random_numbers.normal()).collect()),
                 encoder_sigmas_rad: Some(vec![0.0087; 3]),
                 imu_from_camera: chain_pose(&calibration.classical, angles),
                 keyframe: frame.is_multiple_of(4),
             }
         })
         .collect();
-    let features = feature_reports(index, &indices, estimate, tracks, points, dice);
+    let features = feature_reports(index, &indices, estimate, tracks, points, random_numbers);
     let landmarks = features
         .iter()
         .map(|feature| LandmarkReport {
             id: feature.id,
             position_m: estimate.true_from_estimate.inverse().transform(&point_of(feature.id, points))
-                + Vector3::new(dice.normal(), dice.normal(), dice.normal()) * 0.06,
+                + Vector3::new(random_numbers.normal(), random_numbers.normal(), random_numbers.normal()) * 0.06,
         })
         .collect();
     let rms = |residual: fn(ObservationReport) -> Option<Vector2<f64>>| {
@@ -290,8 +291,8 @@ fn tracking_report(
         .map(|(factor, count, ratio)| ResidualSummary {
             factor,
             count,
-            chi2_before: count as f64 * ratio * (3.0 + dice.unit()),
-            chi2_after: count as f64 * ratio * (0.9 + 0.2 * dice.unit()),
+            chi2_before: count as f64 * ratio * (3.0 + random_numbers.unit()),
+            chi2_after: count as f64 * ratio * (0.9 + 0.2 * random_numbers.unit()),
         })
         .to_vec(),
         iterations: (0..4)
@@ -309,13 +310,13 @@ fn tracking_report(
         gain: None,
         keyframe,
         times: StageTimes {
-            frontend_ms: 7.0 + dice.unit(),
-            optimize_ms: 14.0 + 4.0 * dice.unit(),
+            frontend_ms: 7.0 + random_numbers.unit(),
+            optimize_ms: 14.0 + 4.0 * random_numbers.unit(),
             linearize_ms: 1.0,
             report_ms: 0.3,
             marginalize_ms: 2.0,
             observability_ms: 1.2,
-            step_ms: 26.0 + 4.0 * dice.unit(),
+            step_ms: 26.0 + 4.0 * random_numbers.unit(),
         },
         warnings: Vec::new(),
     }
@@ -351,7 +352,7 @@ fn feature_reports(
     estimate: &Estimate<'_>,
     tracks: &[Arc<TrackedFrame>],
     points: &[Vector3<f64>],
-    dice: &mut Dice,
+    random_numbers: &mut RandomNumbers,
 ) -> Vec<FeatureReport> {
     const SIGMA_PX: f64 = 0.4;
     let find = |frame: usize, id: FeatureId| {
@@ -366,7 +367,7 @@ fn feature_reports(
             .filter(|&frame| index - frame <= feature.age as usize && find(frame, feature.id).is_some())
             .collect();
         let (Some(&anchor), true) = (seen.first(), seen.len() >= 3) else { continue };
-        let rejected = dice.unit() < 0.03;
+        let rejected = random_numbers.unit() < 0.03;
         let point = point_of(feature.id, points);
         let depth = project(&estimate.flight[anchor].world_from_camera, &point).map_or(10.0, |(_, depth)| depth);
         let observations = seen
@@ -374,7 +375,7 @@ fn feature_reports(
             .filter_map(|&frame| {
                 let measured_px = find(frame, feature.id)?.uv_px;
                 let scale = if rejected { 8.0 } else { 1.0 };
-                let after = Vector2::new(dice.normal(), dice.normal()) * SIGMA_PX * scale;
+                let after = Vector2::new(random_numbers.normal(), random_numbers.normal()) * SIGMA_PX * scale;
                 let push = Vector2::new(0.9, -0.5) * (0.6 + 0.3 * (measured_px.x * 0.01).sin());
                 let newest = if frame == index { 1.0 } else { 0.15 };
                 let chi2 = after.norm_squared() / (SIGMA_PX * SIGMA_PX);

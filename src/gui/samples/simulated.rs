@@ -10,12 +10,12 @@ use crate::session::{Recording, RunRecord, StepRecord};
 use crate::simulation::{SyntheticOptions, synthetic_tracks};
 
 /// Five seconds in the classical, the minimal and the swapped parameterization; computed once.
-pub(crate) fn flown_recording() -> &'static Recording {
-    static FLOWN: OnceLock<Recording> = OnceLock::new();
-    FLOWN.get_or_init(fly)
+pub(crate) fn simulated_recording() -> &'static Recording {
+    static RECORDING: OnceLock<Recording> = OnceLock::new();
+    RECORDING.get_or_init(simulate_runs)
 }
 
-fn fly() -> Recording {
+fn simulate_runs() -> Recording {
     let flight = synthetic_tracks(&SyntheticOptions { duration_s: 5.0, features: 80, ..SyntheticOptions::default() });
     let rig = &flight.given_rig;
     let gimbal = rig.gimbal.as_ref().expect("the synthetic rig has a gimbal");

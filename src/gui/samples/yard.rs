@@ -19,9 +19,9 @@ pub(super) const INTRINSICS_PX: [f64; 4] = [352.6, 352.1, 322.4, 238.1];
 pub(super) const RESOLUTION_PX: [usize; 2] = [640, 480];
 
 /// Seeded random numbers, so that the sample is the same on every machine.
-pub(super) struct Dice(SplitMix64);
+pub(super) struct RandomNumbers(SplitMix64);
 
-impl Dice {
+impl RandomNumbers {
     pub(super) fn new(seed: u64) -> Self {
         Self(SplitMix64::new(seed))
     }
@@ -38,14 +38,14 @@ impl Dice {
 }
 
 /// `world_from_imu`, joint angles and the camera's pose at one frame.
-pub(super) struct Instant {
+pub(super) struct FlightState {
     pub(super) world_from_imu: RigidTransform,
     pub(super) velocity_m_per_s: Vector3<f64>,
     pub(super) joint_angles_rad: [f64; 3],
     pub(super) world_from_camera: RigidTransform,
 }
 
-impl Instant {
+impl FlightState {
     /// The ground truth at a frame.
     pub(super) fn at(frame_index: usize, chain: &ClassicalChain) -> Self {
         let t_s = frame_index as f64 * 0.05;
@@ -53,10 +53,10 @@ impl Instant {
         let velocity = (position_m(t_s + 0.01) - position_m(t_s - 0.01)) / 0.02;
         let acceleration = (position_m(t_s + 0.05) + position_m(t_s - 0.05) - position * 2.0) / 0.0025;
         let heading = 0.35 * (0.5 * t_s).sin() + 0.12 * t_s;
-        let turned = UnitQuaternion::from_euler_angles(0.0, 0.0, -heading) * acceleration;
+        let rotated = UnitQuaternion::from_euler_angles(0.0, 0.0, -heading) * acceleration;
         let rotation = UnitQuaternion::from_euler_angles(
-            (-turned.y / 9.81).clamp(-0.5, 0.5),
-            (turned.x / 9.81).clamp(-0.5, 0.5),
+            (-rotated.y / 9.81).clamp(-0.5, 0.5),
+            (rotated.x / 9.81).clamp(-0.5, 0.5),
             heading,
         );
         let world_from_imu = RigidTransform::new(rotation, position);
@@ -82,10 +82,10 @@ fn position_m(t_s: f64) -> Vector3<f64> {
 pub(crate) fn chain_pose(chain: &ClassicalChain, joint_angles_rad: &[f64]) -> RigidTransform {
     let mut pose = chain.imu_from_base;
     for (link, angle_rad) in chain.links.iter().zip(joint_angles_rad) {
-        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle_rad + link.theta_offset_rad);
+        let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle_rad + link.theta_offset_rad);
         let twist = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), link.alpha_rad);
         pose = pose
-            * RigidTransform::new(turn, Vector3::new(0.0, 0.0, link.d_m))
+            * RigidTransform::new(rotation, Vector3::new(0.0, 0.0, link.d_m))
             * RigidTransform::new(twist, Vector3::new(link.a_m, 0.0, 0.0));
     }
     pose * chain.effector_from_camera
@@ -115,8 +115,8 @@ pub(crate) fn true_chain() -> ClassicalChain {
 /// The chain of the rig: each parameter has an error of up to 6 mm and 1.5°.
 pub(crate) fn given_chain() -> ClassicalChain {
     let mut chain = true_chain();
-    let mut dice = Dice::new(7);
-    let mut wrong = |bound: f64| bound * (2.0 * dice.unit() - 1.0);
+    let mut random_numbers = RandomNumbers::new(7);
+    let mut wrong = |bound: f64| bound * (2.0 * random_numbers.unit() - 1.0);
     let shift = |pose: &RigidTransform, wrong: &mut dyn FnMut(f64) -> f64| {
         let entries: Vec<f64> = (0..6).map(|entry| wrong(if entry < 3 { 0.026 } else { 0.006 })).collect();
         pose.plus(&nalgebra::Vector6::from_column_slice(&entries))
@@ -180,11 +180,11 @@ pub(super) fn rig_with(chain: ClassicalChain, name: &str) -> Rig {
 
 /// Points on the walls and the ground of the yard.
 pub(super) fn yard_points() -> Vec<Vector3<f64>> {
-    let mut dice = Dice::new(11);
+    let mut random_numbers = RandomNumbers::new(11);
     let side = YARD_HALF_SIDE_M;
     (0..6000)
         .map(|index| {
-            let (along, other) = (2.0 * dice.unit() - 1.0, dice.unit());
+            let (along, other) = (2.0 * random_numbers.unit() - 1.0, random_numbers.unit());
             match index % 5 {
                 0 => Vector3::new(side * along, side * (2.0 * other - 1.0), 0.0),
                 1 => Vector3::new(side, side * along, WALL_HEIGHT_M * other),

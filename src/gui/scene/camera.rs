@@ -10,11 +10,11 @@ const WORLD_HALF_TANGENT: f64 = 0.40;
 /// The same for the close-up, where a small field of view reduces the perspective.
 const CLOSE_UP_HALF_TANGENT: f64 = 0.08;
 /// Ratio of the near distance to the distance of the target.
-const NEAR_SHARE: f64 = 0.02;
+const NEAR_RATIO: f64 = 0.02;
 /// Largest sine of the elevation, less than 1 so that "up" stays defined.
-const STEEPEST: f64 = 0.999;
+const MAX_ELEVATION_SINE: f64 = 0.999;
 /// Ratio of the viewport that framed points may fill.
-const FRAME_SHARE: f64 = 0.86;
+const FRAME_RATIO: f64 = 0.86;
 
 /// A camera that looks at a target, with the z axis up.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -97,7 +97,7 @@ impl ScreenPoint {
 impl View {
     pub(super) fn new(camera: OrbitCamera, viewport: Viewport) -> Self {
         let [right, up] = screen_axes(&camera.towards);
-        Self { camera, viewport, right, up, near_m: (camera.distance_m * NEAR_SHARE).max(1e-6) }
+        Self { camera, viewport, right, up, near_m: (camera.distance_m * NEAR_RATIO).max(1e-6) }
     }
 
     /// A point in the view: right, up and forward, in metres.
@@ -151,19 +151,19 @@ pub(super) fn frame(points_m: &[Vector3<f64>], towards: Vector3<f64>, viewport: 
     let (low, high) = finite().fold((*first, *first), |(low, high), point| (low.inf(point), high.sup(point)));
     let [right, up] = screen_axes(&towards);
     let smallest_m = ((high - low).norm() * 0.05).max(1e-3);
-    let reach = viewport.half_size_px().map(|half| FRAME_SHARE * half / viewport.focal_px());
+    let reach = viewport.half_size_px().map(|half| FRAME_RATIO * half / viewport.focal_px());
     let middle = (low + high) * 0.5;
     // A point at `across` and `nearer` (towards the camera) is inside when
     // across − shift
     // ≤ reach · (distance − nearer). For each side that bounds the shift from above or below; the smallest distance is
     // where both bounds are equal.
     let solve = |axis: &Vector3<f64>, reach: f64| {
-        let (most, least) = finite().fold((f64::NEG_INFINITY, f64::INFINITY), |(most, least), point| {
+        let (highest, lowest) = finite().fold((f64::NEG_INFINITY, f64::INFINITY), |(highest, lowest), point| {
             let offset = point - middle;
             let (across, nearer) = (axis.dot(&offset), towards.dot(&offset) * reach);
-            (most.max(across + nearer), least.min(across - nearer))
+            (highest.max(across + nearer), lowest.min(across - nearer))
         });
-        ((most - least) / (2.0 * reach), 0.5 * (most + least))
+        ((highest - lowest) / (2.0 * reach), 0.5 * (highest + lowest))
     };
     let (across, shift_right) = solve(&right, reach[0]);
     let (upright, shift_up) = solve(&up, reach[1]);
@@ -195,14 +195,14 @@ impl Orbit {
     }
 
     /// Rotates the view by angles in radians: about z, and in elevation.
-    pub(super) fn turn(&mut self, about_z_rad: f64, up_rad: f64) {
+    pub(super) fn rotate(&mut self, about_z_rad: f64, up_rad: f64) {
         let [right, _] = screen_axes(&self.towards);
-        let turned = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), about_z_rad) * self.towards;
+        let rotated = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), about_z_rad) * self.towards;
         let elevated = UnitQuaternion::from_axis_angle(&Unit::new_normalize(right), -up_rad) * self.towards;
-        let level = Vector3::new(turned.x, turned.y, 0.0);
-        let sine = elevated.z.clamp(-STEEPEST, STEEPEST);
+        let level = Vector3::new(rotated.x, rotated.y, 0.0);
+        let sine = elevated.z.clamp(-MAX_ELEVATION_SINE, MAX_ELEVATION_SINE);
         let went_over = elevated.x * self.towards.x + elevated.y * self.towards.y < 0.0;
-        let sine = if went_over { STEEPEST.copysign(self.towards.z) } else { sine };
+        let sine = if went_over { MAX_ELEVATION_SINE.copysign(self.towards.z) } else { sine };
         if level.norm() > 1e-9 {
             let cosine = (1.0 - sine * sine).sqrt();
             self.towards = level.normalize() * cosine + Vector3::new(0.0, 0.0, sine);
@@ -221,16 +221,16 @@ pub(super) fn length(x: f64, y: f64) -> f64 {
 }
 
 /// The largest of 1, 2 or 5 times a power of ten at or below a length.
-pub(super) fn round_length(at_most: f64) -> f64 {
-    if !(at_most > 0.0 && at_most.is_finite()) {
+pub(super) fn round_length(upper_limit: f64) -> f64 {
+    if !(upper_limit > 0.0 && upper_limit.is_finite()) {
         return 1.0;
     }
     let mut decade: f64 = 1.0;
-    while decade > at_most {
+    while decade > upper_limit {
         decade /= 10.0;
     }
-    while decade * 10.0 <= at_most {
+    while decade * 10.0 <= upper_limit {
         decade *= 10.0;
     }
-    [5.0, 2.0].into_iter().map(|step| step * decade).find(|length| *length <= at_most).unwrap_or(decade)
+    [5.0, 2.0].into_iter().map(|step| step * decade).find(|length| *length <= upper_limit).unwrap_or(decade)
 }

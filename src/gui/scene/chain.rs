@@ -10,7 +10,7 @@ use crate::gimbal::ClassicalChain;
 use crate::gui::theme::{Theme, mix};
 
 /// Ratio of the length of an axis to the extent of the chain.
-const AXIS_SHARE: f64 = 0.13;
+const AXIS_LENGTH_RATIO: f64 = 0.13;
 
 /// A chain at given joint angles, in the IMU frame.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,9 +37,9 @@ impl ChainPose {
         }
         for (index, link) in chain.links.iter().enumerate() {
             let angle_rad = joint_angles_rad.get(index).copied().unwrap_or(0.0) + link.theta_offset_rad;
-            let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle_rad);
+            let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle_rad);
             let twist = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), link.alpha_rad);
-            let raised = pose * RigidTransform::new(turn, Vector3::new(0.0, 0.0, link.d_m));
+            let raised = pose * RigidTransform::new(rotation, Vector3::new(0.0, 0.0, link.d_m));
             corners_m.push(raised.translation_m);
             pose = raised * RigidTransform::new(twist, Vector3::new(link.a_m, 0.0, 0.0));
             let is_last = index + 1 == chain.links.len();
@@ -102,7 +102,7 @@ impl ChainPose {
     }
 
     fn axis_length_m(&self) -> f64 {
-        (self.extent_m() * AXIS_SHARE).max(1e-4)
+        (self.extent_m() * AXIS_LENGTH_RATIO).max(1e-4)
     }
 
     fn framing_points_m(&self) -> Vec<Vector3<f64>> {
@@ -179,9 +179,9 @@ impl ChainModel {
     pub(super) fn framing_points_m(&self) -> Vec<Vector3<f64>> {
         /// Ratio of the framed extent to the chain's, so that a moved chain fits.
         const ROOM: f64 = 1.35;
-        let held = self.ground_truth.as_ref().filter(|_| self.moved);
-        let Some(held) = held else { return self.estimate.framing_points_m() };
-        let points = held.framing_points_m();
+        let reference = self.ground_truth.as_ref().filter(|_| self.moved);
+        let Some(reference) = reference else { return self.estimate.framing_points_m() };
+        let points = reference.framing_points_m();
         let middle = points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64;
         points.into_iter().map(|point| middle + (point - middle) * ROOM).collect()
     }

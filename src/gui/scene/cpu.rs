@@ -4,7 +4,7 @@ use egui::{Color32, ColorImage};
 use rayon::prelude::*;
 
 use super::camera;
-use super::layout::{Disc, Drawing, PictureCorner, PictureShape, Segment};
+use super::layout::{Disc, Drawing, ImageCorner, ImageShape, Segment};
 use crate::gui::rendering::painter::blend;
 use crate::gui::rendering::painter::triangle::{Clip, Plane, SUBPIXELS, spans};
 
@@ -31,8 +31,8 @@ pub(super) fn draw(drawing: &Drawing) -> ColorImage {
         let rows = pixels.par_chunks_mut(width * BAND_ROWS).zip(segments).zip(discs).enumerate();
         rows.for_each_init(Band::default, |band, (number, ((rows, segments), discs))| {
             band.begin(width, rows.len() / width, number * BAND_ROWS, background);
-            for picture in &drawing.pictures {
-                band.picture(picture);
+            for image_shape in &drawing.images {
+                band.image_shape(image_shape);
             }
             for triangle in drawing.corners.chunks_exact(3) {
                 let color = blend::pack(triangle[0].color);
@@ -189,14 +189,14 @@ impl Band {
         }
     }
 
-    fn picture(&mut self, picture: &PictureShape) {
-        for triangle in picture.corners.chunks_exact(3) {
-            self.picture_triangle([triangle[0], triangle[1], triangle[2]], picture);
+    fn image_shape(&mut self, image_shape: &ImageShape) {
+        for triangle in image_shape.corners.chunks_exact(3) {
+            self.image_triangle([triangle[0], triangle[1], triangle[2]], image_shape);
         }
     }
 
-    fn picture_triangle(&mut self, corners: [PictureCorner; 3], picture: &PictureShape) {
-        let image = &picture.image;
+    fn image_triangle(&mut self, corners: [ImageCorner; 3], image_shape: &ImageShape) {
+        let image = &image_shape.image;
         if image.pixels.len() < image.width * image.height || image.pixels.is_empty() {
             return;
         }
@@ -236,6 +236,6 @@ fn clamped(coordinate: f64, size: usize) -> usize {
 
 /// Pixels to subpixels, limited to the range of integer edges.
 fn snap([x, y, _]: [f32; 3]) -> [i32; 2] {
-    const FURTHEST: f32 = (1 << 22) as f32;
-    [x, y].map(|pixels| (pixels * SUBPIXELS as f32).round().clamp(-FURTHEST, FURTHEST) as i32)
+    const MAX_COORDINATE: f32 = (1 << 22) as f32;
+    [x, y].map(|pixels| (pixels * SUBPIXELS as f32).round().clamp(-MAX_COORDINATE, MAX_COORDINATE) as i32)
 }

@@ -10,7 +10,7 @@ use eframe::egui_wgpu::{CallbackResources, CallbackTrait, ScreenDescriptor};
 use egui::PaintCallbackInfo;
 use wgpu::util::DeviceExt as _;
 
-use super::layout::{Corner, Disc, Drawing, PictureCorner, Segment};
+use super::layout::{Corner, Disc, Drawing, ImageCorner, Segment};
 use super::pipelines::{COLOR_FORMAT, DEPTH_FORMAT, PipelineMaker, SAMPLES};
 use crate::sensors::GrayImage;
 
@@ -65,7 +65,7 @@ struct Uniforms {
 
 /// Pipelines, and the targets of each view.
 struct SceneRenderer {
-    picture_pipeline: wgpu::RenderPipeline,
+    image_pipeline: wgpu::RenderPipeline,
     face_pipeline: wgpu::RenderPipeline,
     segment_pipeline: wgpu::RenderPipeline,
     disc_pipeline: wgpu::RenderPipeline,
@@ -132,10 +132,10 @@ impl SceneRenderer {
         let per_vertex = wgpu::VertexStepMode::Vertex;
         let copy_fragment = if target_format.is_srgb() { "copy_linear" } else { "copy_gamma" };
         Self {
-            picture_pipeline: pipelines.scene(
-                ["picture_vertex", "picture_fragment"],
+            image_pipeline: pipelines.scene(
+                ["image_vertex", "image_fragment"],
                 Some(wgpu::VertexBufferLayout {
-                    array_stride: size_of::<PictureCorner>() as u64,
+                    array_stride: size_of::<ImageCorner>() as u64,
                     step_mode: per_vertex,
                     attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x2],
                 }),
@@ -168,7 +168,7 @@ impl SceneRenderer {
             uniform_layout,
             texture_layout,
             linear: device.create_sampler(&wgpu::SamplerDescriptor {
-                label: Some("scene picture"),
+                label: Some("scene image"),
                 mag_filter: wgpu::FilterMode::Nearest,
                 min_filter: wgpu::FilterMode::Nearest,
                 ..wgpu::SamplerDescriptor::default()
@@ -215,12 +215,12 @@ impl SceneRenderer {
             layout: &self.uniform_layout,
             entries: &[wgpu::BindGroupEntry { binding: 0, resource: uniforms.as_entire_binding() }],
         });
-        let pictures: Vec<_> = drawing
-            .pictures
+        let images: Vec<_> = drawing
+            .images
             .iter()
-            .filter_map(|picture| {
-                let corners = vertices("scene pictures", bytemuck::cast_slice(&picture.corners))?;
-                Some((corners, picture.corners.len() as u32, self.picture_group(device, queue, &picture.image)?))
+            .filter_map(|image_shape| {
+                let corners = vertices("scene images", bytemuck::cast_slice(&image_shape.corners))?;
+                Some((corners, image_shape.corners.len() as u32, self.image_group(device, queue, &image_shape.image)?))
             })
             .collect();
         let faces = vertices("scene faces", bytemuck::cast_slice(&drawing.corners));
@@ -247,8 +247,8 @@ impl SceneRenderer {
             ..wgpu::RenderPassDescriptor::default()
         });
         pass.set_bind_group(0, &uniform_group, &[]);
-        pass.set_pipeline(&self.picture_pipeline);
-        for (corners, count, group) in &pictures {
+        pass.set_pipeline(&self.image_pipeline);
+        for (corners, count, group) in &images {
             pass.set_bind_group(1, group, &[]);
             pass.set_vertex_buffer(0, corners.slice(..));
             pass.draw(0..*count, 0..1);
@@ -271,7 +271,7 @@ impl SceneRenderer {
     }
 
     /// The bind group with the image as a texture; `None` for an image without pixels.
-    fn picture_group(&self, device: &wgpu::Device, queue: &wgpu::Queue, image: &GrayImage) -> Option<wgpu::BindGroup> {
+    fn image_group(&self, device: &wgpu::Device, queue: &wgpu::Queue, image: &GrayImage) -> Option<wgpu::BindGroup> {
         if image.pixels.is_empty() || image.pixels.len() < image.width * image.height {
             return None;
         }
@@ -279,7 +279,7 @@ impl SceneRenderer {
         let texture = device.create_texture_with_data(
             queue,
             &wgpu::TextureDescriptor {
-                label: Some("scene picture"),
+                label: Some("scene image"),
                 size,
                 mip_level_count: 1,
                 sample_count: 1,

@@ -7,7 +7,7 @@ use egui::Color32;
 use nalgebra::Vector3;
 
 use super::camera::{ScreenPoint, View, length};
-use super::model::{Line, Picture, SceneModel};
+use super::model::{ImageQuad, Line, SceneModel};
 use crate::sensors::GrayImage;
 
 /// Factor by which lines are nearer than the surfaces on which they are drawn.
@@ -47,16 +47,16 @@ pub(super) struct Corner {
 /// A corner of a textured triangle; `uv` is 0 to 1 from the image's upper left corner.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
-pub(super) struct PictureCorner {
+pub(super) struct ImageCorner {
     pub(super) position: [f32; 3],
     pub(super) uv: [f32; 2],
 }
 
 /// An image as textured triangles.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct PictureShape {
+pub(super) struct ImageShape {
     /// Three corners per triangle.
-    pub(super) corners: Vec<PictureCorner>,
+    pub(super) corners: Vec<ImageCorner>,
     pub(super) image: Arc<GrayImage>,
 }
 
@@ -78,7 +78,7 @@ pub(super) struct Drawing {
     pub(super) discs: Vec<Disc>,
     /// Three corners per triangle.
     pub(super) corners: Vec<Corner>,
-    pub(super) pictures: Vec<PictureShape>,
+    pub(super) images: Vec<ImageShape>,
     pub(super) labels: Vec<ScreenLabel>,
 }
 
@@ -90,7 +90,7 @@ pub(super) fn lay_out(model: &SceneModel, view: &View, pixels_per_point: f32, ba
         segments: Vec::new(),
         discs: Vec::new(),
         corners: Vec::new(),
-        pictures: Vec::new(),
+        images: Vec::new(),
         labels: Vec::new(),
     };
     for line in &model.lines {
@@ -118,7 +118,7 @@ pub(super) fn lay_out(model: &SceneModel, view: &View, pixels_per_point: f32, ba
             );
         }
     }
-    drawing.pictures.extend(model.pictures.iter().filter_map(|picture| lay_out_picture(picture, view)));
+    drawing.images.extend(model.images.iter().filter_map(|quad| lay_out_image(quad, view)));
     for label in &model.labels {
         if let Some(point) = view.project(&label.position_m).filter(is_near) {
             let (x_px, y_px) = (point.x_px as f32, point.y_px as f32);
@@ -235,21 +235,21 @@ fn clipped_triangles(corners: &[ViewCorner], near_m: f64) -> Vec<[ViewCorner; 3]
     (2..kept.len()).map(|last| [kept[0], kept[last - 1], kept[last]]).collect()
 }
 
-fn lay_out_picture(picture: &Picture, view: &View) -> Option<PictureShape> {
+fn lay_out_image(quad: &ImageQuad, view: &View) -> Option<ImageShape> {
     let uvs = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
     let corners: Vec<ViewCorner> =
-        picture.corners_m.iter().zip(uvs).map(|(corner, uv)| (view.in_view(corner), uv)).collect();
-    let shape: Vec<PictureCorner> = clipped_triangles(&corners, view.near_m)
+        quad.corners_m.iter().zip(uvs).map(|(corner, uv)| (view.in_view(corner), uv)).collect();
+    let shape: Vec<ImageCorner> = clipped_triangles(&corners, view.near_m)
         .into_iter()
         .flatten()
-        .map(|(corner, uv)| PictureCorner {
+        .map(|(corner, uv)| ImageCorner {
             position: position(&view.on_screen(&corner), 1.0),
             uv: uv.map(|coordinate| coordinate as f32),
         })
         .collect();
     let across = shape.iter().map(|corner| corner.position[0]);
     let width_px = across.clone().fold(f32::NEG_INFINITY, f32::max) - across.fold(f32::INFINITY, f32::min);
-    (!shape.is_empty()).then(|| PictureShape { corners: shape, image: shrunk(&picture.image, width_px) })
+    (!shape.is_empty()).then(|| ImageShape { corners: shape, image: shrunk(&quad.image, width_px) })
 }
 
 /// The image at the smallest power-of-two reduction with at least one column per pixel on the screen.

@@ -43,9 +43,9 @@ pub enum Follow {
 }
 
 /// Ratio of the view's distance from the vehicle to its distance from the whole trajectory.
-const VEHICLE_SHARE: f64 = 0.3;
+const VEHICLE_DISTANCE_RATIO: f64 = 0.3;
 /// Rotation of the view in radians per point of dragging.
-const TURN_PER_POINT: f64 = 0.008;
+const ROTATION_PER_POINT_RAD: f64 = 0.008;
 /// Width of the table of the chain's links in points.
 const TABLE_WIDTH: f32 = 256.0;
 /// Height of the axes and the scale below the legend in points.
@@ -175,7 +175,7 @@ impl ScenePanel {
         if self.follow == Follow::Vehicle
             && let Some(at) = views.get(context.selection.run).and_then(RunView::position_m)
         {
-            framing = OrbitCamera { target_m: at, distance_m: framing.distance_m * VEHICLE_SHARE, ..framing };
+            framing = OrbitCamera { target_m: at, distance_m: framing.distance_m * VEHICLE_DISTANCE_RATIO, ..framing };
         }
         let view = View::new(self.world.applied(framing), viewport);
         navigate(ui, response, &mut self.world, default_world_orbit(), &view);
@@ -219,9 +219,9 @@ impl ScenePanel {
         painter.rect_filled(rect, 0.0, theme.surface);
         let table_height = overlay::chain_table_height(chain);
         let title = Rect::from_min_size(rect.min, vec2(rect.width(), overlay::LINE_HEIGHT + 4.0));
-        let picture = Rect::from_min_max(title.left_bottom(), rect.max - vec2(0.0, table_height));
-        let picture = on_pixels(picture, scale);
-        let viewport = Viewport::close_up(size_px(picture, scale));
+        let view_rect = Rect::from_min_max(title.left_bottom(), rect.max - vec2(0.0, table_height));
+        let view_rect = on_pixels(view_rect, scale);
+        let viewport = Viewport::close_up(size_px(view_rect, scale));
         let home = Orbit::from_direction(close_up_direction(context));
         let mut orbit = self.close_up.unwrap_or(home);
         let framing = frame(&chain.framing_points_m(), orbit.towards, &viewport);
@@ -230,9 +230,9 @@ impl ScenePanel {
         self.close_up = (orbit != home).then_some(orbit);
         let view = View::new(orbit.applied(framing), viewport);
         let drawing = lay_out(&chain.scene(theme), &view, scale, theme.surface);
-        let drawing = self.close_up_canvas.show(ui, picture, drawing);
-        overlay::labels(&painter, picture, scale, &drawing.labels, theme.surface);
-        overlay::scale_bar(&painter, picture, scale, theme, &view, "");
+        let drawing = self.close_up_canvas.show(ui, view_rect, drawing);
+        overlay::labels(&painter, view_rect, scale, &drawing.labels, theme.surface);
+        overlay::scale_bar(&painter, view_rect, scale, theme, &view, "");
         let label = context.recording.runs.get(context.selection.run).map_or("", |run| run.spec.label.as_str());
         let text = match &chain.ground_truth {
             Some(_) if chain.moved => format!("Gimbal chain, {label}, moved; estimate dashed"),
@@ -241,7 +241,7 @@ impl ScenePanel {
         };
         let at = title.left_center() + vec2(8.0, 0.0);
         painter.text(at, egui::Align2::LEFT_CENTER, text, super::theme::label_font(), theme.text_strong);
-        let table = Rect::from_min_max(picture.left_bottom(), rect.max);
+        let table = Rect::from_min_max(view_rect.left_bottom(), rect.max);
         overlay::chain_table(&painter, table, theme, chain);
         let outline = egui::Stroke::new(1.0, theme.outline);
         painter.rect_stroke(rect, 0.0, outline, egui::StrokeKind::Inside);
@@ -323,8 +323,8 @@ fn world_viewport(area: Rect, close_up: Option<Rect>, key_height: f32, pixels_pe
 fn close_up_rect(area: Rect, pixels_per_point: f32) -> Rect {
     const INSET: f32 = 6.0;
     // The table of links has a minimum width, but the flight keeps half of the panel.
-    let least = (0.5 * area.width()).min(TABLE_WIDTH);
-    let size = vec2((0.42 * area.width()).clamp(least, 420.0), (0.8 * area.height()).clamp(180.0, 420.0));
+    let min_width = (0.5 * area.width()).min(TABLE_WIDTH);
+    let size = vec2((0.42 * area.width()).clamp(min_width, 420.0), (0.8 * area.height()).clamp(180.0, 420.0));
     on_pixels(Rect::from_min_max(area.max - size - Vec2::splat(INSET), area.max - Vec2::splat(INSET)), pixels_per_point)
 }
 
@@ -340,7 +340,7 @@ fn navigate(ui: &Ui, response: &Response, orbit: &mut Orbit, home: Orbit, view: 
     if response.dragged() && shifts {
         orbit.shift_m += view.drag_m(drag.map(|points| points * scale));
     } else if response.dragged() {
-        orbit.turn(-drag[0] * TURN_PER_POINT, drag[1] * TURN_PER_POINT);
+        orbit.rotate(-drag[0] * ROTATION_PER_POINT_RAD, drag[1] * ROTATION_PER_POINT_RAD);
     }
     if response.hovered() {
         let factor = ui.input(|input| input.zoom_delta() * (input.smooth_scroll_delta().y * 0.004).exp());

@@ -37,7 +37,7 @@ pub(super) struct Face {
 
 /// An image on a rectangle: corners top left, top right, bottom right, bottom left.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Picture {
+pub(super) struct ImageQuad {
     pub(super) corners_m: [Vector3<f64>; 4],
     pub(super) image: Arc<GrayImage>,
 }
@@ -56,7 +56,7 @@ pub(super) struct SceneModel {
     pub(super) lines: Vec<Line>,
     pub(super) dots: Vec<Dot>,
     pub(super) faces: Vec<Face>,
-    pub(super) pictures: Vec<Picture>,
+    pub(super) images: Vec<ImageQuad>,
     /// Labels by priority, highest first.
     pub(super) labels: Vec<Label>,
 }

@@ -23,7 +23,7 @@ impl PipelineMaker<'_> {
         let layout = self.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some(vertex),
             bind_group_layouts: &[Some(self.uniform_layout), Some(self.texture_layout)]
-                [..if fragment == "picture_fragment" { 2 } else { 1 }],
+                [..if fragment == "image_fragment" { 2 } else { 1 }],
             immediate_size: 0,
         });
         self.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {

@@ -8,12 +8,12 @@ use nalgebra::{UnitQuaternion, Vector3};
 use super::camera::{Orbit, OrbitCamera, View, Viewport, frame, round_length};
 use super::chain::{ChainModel, ChainPose};
 use super::layout::{Drawing, lay_out};
-use super::model::{Dot, Face, Line, Picture, SceneModel};
+use super::model::{Dot, Face, ImageQuad, Line, SceneModel};
 use super::{Follow, ScenePanel, cpu};
 use crate::gui::Selection;
 use crate::gui::rendering::headless::{HeadlessOptions, draw};
 use crate::gui::samples::{chain_pose, given_chain, sample_images, sample_recording, sample_recording_of, true_chain};
-use crate::gui::tests::{keep_picture, with_context};
+use crate::gui::tests::{keep_screenshot, with_context};
 use crate::gui::theme::{Theme, ThemeName};
 use crate::sensors::GrayImage;
 use crate::session::Recording;
@@ -40,7 +40,7 @@ fn show(ui: &mut egui::Ui, panel: &mut ScenePanel, recording: &Recording, cursor
 }
 
 #[test]
-fn places_fall_where_a_pinhole_puts_them() {
+fn points_are_projected_as_by_a_pinhole_camera() {
     let view = front_view();
     let check = |point: [f64; 3], expected: Option<[f64; 3]>| {
         let seen = view.project(&Vector3::from(point)).map(|at| [at.x_px, at.y_px, at.depth]);
@@ -64,7 +64,7 @@ fn places_fall_where_a_pinhole_puts_them() {
 }
 
 #[test]
-fn framing_holds_every_point_and_fills_the_view() {
+fn framing_contains_every_point_and_fills_the_view() {
     let directions = [[-0.45, -0.75, 0.55], [0.3, 0.9, 0.1], [0.0, -0.01, 1.0], [1.0, 0.0, 0.0]];
     let points: Vec<Vector3<f64>> = (0..50)
         .map(|index| {
@@ -93,10 +93,10 @@ fn framing_holds_every_point_and_fills_the_view() {
 }
 
 #[test]
-fn turning_stops_short_of_the_pole_and_keeps_unit_length() {
+fn rotation_stops_before_the_pole_and_keeps_unit_length() {
     let mut orbit = Orbit::from_direction(Vector3::new(-0.45, -0.75, 0.55));
     for step in 0..200 {
-        orbit.turn(0.1, if step < 100 { 0.3 } else { -0.3 });
+        orbit.rotate(0.1, if step < 100 { 0.3 } else { -0.3 });
         assert!((orbit.towards.norm() - 1.0).abs() < 1e-12);
         assert!(orbit.towards.xy().norm() > 0.01, "{:?}", orbit.towards);
         if step == 99 {
@@ -197,13 +197,13 @@ fn lines_and_dots_have_their_size() {
 }
 
 #[test]
-fn pictures_are_seen_in_perspective() {
+fn images_are_drawn_in_perspective() {
     // A checkerboard of 8 by 8 fields on the ground; the centre of each field has its colour.
     let pixels = (0..64 * 64).map(|index| if (index / 8 + index / 512) % 2 == 0 { 40 } else { 220 }).collect();
     let image = Arc::new(GrayImage { width: 64, height: 64, pixels });
     let floor = |x: f64, y: f64| Vector3::new(x, y, -1.5);
     let corners_m = [floor(-4.0, 4.0), floor(4.0, 4.0), floor(4.0, -4.0), floor(-4.0, -4.0)];
-    let model = SceneModel { pictures: vec![Picture { corners_m, image }], ..SceneModel::default() };
+    let model = SceneModel { images: vec![ImageQuad { corners_m, image }], ..SceneModel::default() };
     let (_, drawn) = draw_front(&model);
     let view = front_view();
     for row in 0..8 {
@@ -217,7 +217,7 @@ fn pictures_are_seen_in_perspective() {
 }
 
 #[test]
-fn the_chain_is_walked_as_it_multiplies() {
+fn the_chain_is_the_product_of_its_links() {
     let chain = given_chain();
     let angles_rad = [0.3, -0.2, 0.7];
     let pose = ChainPose::at(&chain, &angles_rad);
@@ -235,8 +235,8 @@ fn the_chain_is_walked_as_it_multiplies() {
     let pose = ChainPose::at(&rigid, &[]);
     assert_eq!(pose.names, ["I", "C"]);
     assert_eq!(pose.skeleton_m().len(), 2);
-    let turned = UnitQuaternion::identity();
-    assert!(pose.imu_from_frame[0].rotation.angle_to(&turned) < 1e-12);
+    let rotated = UnitQuaternion::identity();
+    assert!(pose.imu_from_frame[0].rotation.angle_to(&rotated) < 1e-12);
 }
 
 #[test]
@@ -260,7 +260,7 @@ fn controls_are_found_by_label_and_work() {
 }
 
 #[test]
-fn dragging_turns_the_view_and_a_double_click_brings_it_back() {
+fn dragging_rotates_the_view_and_a_double_click_resets_it() {
     let recording = sample_recording_of(80, &["auto"]);
     let mut harness = Harness::builder().with_size([900.0, 600.0]).build_ui_state(
         move |ui, panel| show(ui, panel, &recording, 3_900_000_000, ThemeName::Dark),
@@ -274,28 +274,28 @@ fn dragging_turns_the_view_and_a_double_click_brings_it_back() {
     harness.run();
     harness.drop_at(egui::pos2(260.0, 330.0));
     harness.run();
-    let turned = harness.state().world;
-    assert!(turned.towards.dot(&home.towards) < 0.95, "{turned:?}");
-    assert!(turned.towards.z > home.towards.z, "dragging down looks from higher up");
-    assert_eq!(turned.shift_m, home.shift_m);
+    let rotated = harness.state().world;
+    assert!(rotated.towards.dot(&home.towards) < 0.95, "{rotated:?}");
+    assert!(rotated.towards.z > home.towards.z, "dragging down looks from higher up");
+    assert_eq!(rotated.shift_m, home.shift_m);
 }
 
 #[test]
-fn pictures_repeat_and_every_instant_can_be_drawn() {
+fn screenshots_repeat_and_every_stamp_can_be_drawn() {
     let recording = sample_recording();
     let options = |theme| HeadlessOptions { size_px: [780, 480], pixels_per_point: 1.0, theme };
-    let picture = |cursor_ns, theme, follow| {
+    let screenshot = |cursor_ns, theme, follow| {
         let mut panel = ScenePanel { follow, ..ScenePanel::default() };
         draw(options(theme), |ui| show(ui, &mut panel, &recording, cursor_ns, theme))
     };
     for theme in [ThemeName::Dark, ThemeName::Light, ThemeName::Print] {
-        let late = picture(11_000_000_000, theme, Follow::Trajectory);
-        keep_picture(&format!("scene-{}", theme.as_str()), &late);
-        assert!(late == picture(11_000_000_000, theme, Follow::Trajectory));
+        let late = screenshot(11_000_000_000, theme, Follow::Trajectory);
+        keep_screenshot(&format!("scene-{}", theme.as_str()), &late);
+        assert!(late == screenshot(11_000_000_000, theme, Follow::Trajectory));
     }
-    let vehicle = picture(8_000_000_000, ThemeName::Dark, Follow::Vehicle);
-    keep_picture("scene-vehicle", &vehicle);
+    let vehicle = screenshot(8_000_000_000, ThemeName::Dark, Follow::Vehicle);
+    keep_screenshot("scene-vehicle", &vehicle);
     for cursor_ns in [-1, 0, 2_000_000_000] {
-        keep_picture(&format!("scene-{cursor_ns}"), &picture(cursor_ns, ThemeName::Dark, Follow::Vehicle));
+        keep_screenshot(&format!("scene-{cursor_ns}"), &screenshot(cursor_ns, ThemeName::Dark, Follow::Vehicle));
     }
 }

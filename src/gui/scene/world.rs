@@ -7,7 +7,7 @@ use nalgebra::{Vector2, Vector3};
 
 use super::camera::round_length;
 use super::chain::axis_colors;
-use super::model::{Dot, Picture, SceneModel};
+use super::model::{Dot, ImageQuad, SceneModel};
 use crate::camera::CameraModel;
 use crate::estimator::{FrameStateReport, LandmarkReport};
 use crate::geometry::RigidTransform;
@@ -17,11 +17,11 @@ use crate::sensors::GrayImage;
 use crate::session::{Recording, RunRecord};
 
 /// Maximum number of points of a drawn trajectory.
-const MOST_TRAJECTORY_POINTS: usize = 4000;
+const MAX_TRAJECTORY_POINTS: usize = 4000;
 /// Maximum number of earlier steps whose landmarks are shown.
-const MOST_LANDMARK_STEPS: usize = 128;
+const MAX_LANDMARK_STEPS: usize = 128;
 /// Maximum number of drawn landmarks.
-const MOST_LANDMARKS: usize = 20_000;
+const MAX_LANDMARKS: usize = 20_000;
 
 /// Options of the world.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -124,7 +124,7 @@ impl<'a> RunView<'a> {
 /// two, so that the drawn points do not change with every step.
 fn broken_line(steps: usize, position: impl Fn(usize) -> Vector3<f64>) -> Vec<Vec<Vector3<f64>>> {
     let mut stride = 1;
-    while steps / stride > MOST_TRAJECTORY_POINTS {
+    while steps / stride > MAX_TRAJECTORY_POINTS {
         stride *= 2;
     }
     let mut lines = vec![Vec::new()];
@@ -267,7 +267,7 @@ impl<'a> WorldBuilder<'a> {
         let steps = &view.run.steps[..view.shown];
         let Some(now) = view.step() else { return };
         let mut stride = 4;
-        while steps.len() / stride > MOST_LANDMARK_STEPS {
+        while steps.len() / stride > MAX_LANDMARK_STEPS {
             stride *= 2;
         }
         let mut latest: Vec<(u64, usize, Vector3<f64>)> = Vec::new();
@@ -282,7 +282,7 @@ impl<'a> WorldBuilder<'a> {
         latest.dedup_by_key(|(id, _, _)| *id);
         latest.retain(|(_, _, position)| position.iter().all(|coordinate| coordinate.is_finite()));
         latest.sort_by_key(|(id, age, _)| (*age > 0, std::cmp::Reverse(*id)));
-        latest.truncate(MOST_LANDMARKS);
+        latest.truncate(MAX_LANDMARKS);
         for (_, _, position) in &mut latest {
             *position = view.aligned.transform(position);
         }
@@ -319,7 +319,7 @@ impl<'a> WorldBuilder<'a> {
         let above = (corners_m[0] - corners_m[3]) * 0.18 + (left + right) * 0.5;
         self.scene.line(vec![left + (right - left) * 0.35, above, left + (right - left) * 0.65], color, width, &[]);
         if let Some(image) = image {
-            self.scene.pictures.push(Picture { corners_m, image });
+            self.scene.images.push(ImageQuad { corners_m, image });
         }
     }
 }

@@ -267,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn maps_hit_their_ends_and_survive_nonsense() {
+    fn maps_reach_their_ends_and_accept_nan() {
         assert_eq!(viridis(0.0), rgb(0x440154));
         assert_eq!(viridis(1.0), rgb(0xfde725));
         assert_eq!(viridis(f64::NAN), viridis(-3.0));

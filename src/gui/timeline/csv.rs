@@ -10,12 +10,12 @@ impl CsvTable for TimelinePanel {
     /// The lanes: a row for every step of every run, followed by one for each of its notable events and of the log's
     /// warnings.
     fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {
-        const FIGURES: [&str; 7] =
+        const VALUES: [&str; 7] =
             ["phase", "keyframe", "features", "reprojection_rms_px", "rank_informed", "rank_structural", "rejected"];
         const EVENT: [&str; 4] = ["event", "value", "threshold", "message"];
         let mut rows: Vec<(i64, Vec<String>)> = Vec::new();
         let event_row = |run: &str, event: [String; EVENT.len()]| -> Vec<String> {
-            std::iter::once(run.to_owned()).chain(FIGURES.map(|_| String::new())).chain(event).collect()
+            std::iter::once(run.to_owned()).chain(VALUES.map(|_| String::new())).chain(event).collect()
         };
         for warning in &ctx.recording.warnings {
             let cells = ["warning".to_owned(), String::new(), String::new(), warning.message.clone()];
@@ -25,7 +25,7 @@ impl CsvTable for TimelinePanel {
             for step in &run.steps {
                 let (report, label) = (&step.report, &run.spec.label);
                 let rank = step.rank.as_ref().filter(|rank| !rank.parameters.is_empty());
-                let figures = [
+                let values = [
                     report.phase.name().to_owned(),
                     report.keyframe.to_string(),
                     step.tracks.features.len().to_string(),
@@ -35,14 +35,14 @@ impl CsvTable for TimelinePanel {
                     report.counts.rejected.to_string(),
                 ];
                 let nothing = EVENT.map(|_| String::new());
-                let cells = std::iter::once(label.clone()).chain(figures).chain(nothing);
+                let cells = std::iter::once(label.clone()).chain(values).chain(nothing);
                 rows.push((report.stamp_ns, cells.collect()));
                 for event in report.events.iter().filter(|event| event.kind.is_notable()) {
-                    let figure = |value: Option<f64>| number(value.unwrap_or(f64::NAN));
+                    let significant = |value: Option<f64>| number(value.unwrap_or(f64::NAN));
                     let told = [
                         name_of(event.kind).to_owned(),
-                        figure(event.value),
-                        figure(event.threshold),
+                        significant(event.value),
+                        significant(event.threshold),
                         event.message.clone(),
                     ];
                     rows.push((report.stamp_ns, event_row(label, told)));
@@ -50,7 +50,7 @@ impl CsvTable for TimelinePanel {
             }
         }
         rows.sort_by_key(|(stamp_ns, _)| *stamp_ns);
-        let heads: Vec<&str> = ["t_s", "run"].into_iter().chain(FIGURES).chain(EVENT).collect();
+        let heads: Vec<&str> = ["t_s", "run"].into_iter().chain(VALUES).chain(EVENT).collect();
         let mut table = Table::new(heads);
         for (stamp_ns, cells) in rows {
             table.row(std::iter::once(seconds(stamp_ns)).chain(cells));

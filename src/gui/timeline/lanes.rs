@@ -7,14 +7,14 @@ use egui::{Align2, Color32, FontFamily, FontId, Painter, Pos2, Rect, Stroke, pos
 use super::model::{FEATURES, INFORMED, RMS, RunLanes, STRUCTURAL};
 use crate::gui::PanelContext;
 use crate::gui::events::{Mark, look_of, paint_mark};
-use crate::gui::plot::{Curve, PlotArea, paint_curve, paint_hatch, paint_steps, paint_value_grid, visible_stretches};
+use crate::gui::plot::{Curve, PlotArea, paint_curve, paint_hatch, paint_steps, paint_value_grid, visible_segments};
 use crate::gui::theme::{self, RunStyle, Theme};
 use crate::gui::units::fixed;
 
 /// Maximum height of the bar of a run in points.
-const HIGHEST_BAR: f32 = 24.0;
+const MAX_BAR_HEIGHT: f32 = 24.0;
 /// Minimum height of a lane with a scale in points.
-const LOWEST_WITH_SCALE: f32 = 28.0;
+const MIN_HEIGHT_WITH_SCALE: f32 = 28.0;
 
 /// A lane.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -75,9 +75,9 @@ impl Lane {
 
 /// The phases of a run as a bar, with keyframes as ticks; steps that are not computed yet stay empty.
 pub(super) fn run(painter: &Painter, theme: &Theme, area: &PlotArea, lanes: &RunLanes, style: RunStyle) {
-    let bar = area.rect.shrink2(vec2(0.0, (0.5 * (area.rect.height() - HIGHEST_BAR)).max(4.0)));
-    for stretch in visible_stretches(area, &lanes.stamps_ns, |row| !lanes.tracking[row]) {
-        let rect = Rect::from_x_y_ranges(stretch, bar.y_range());
+    let bar = area.rect.shrink2(vec2(0.0, (0.5 * (area.rect.height() - MAX_BAR_HEIGHT)).max(4.0)));
+    for segment in visible_segments(area, &lanes.stamps_ns, |row| !lanes.tracking[row]) {
+        let rect = Rect::from_x_y_ranges(segment, bar.y_range());
         painter.rect_filled(rect, 0.0, style.color.gamma_multiply(0.12));
         paint_hatch(painter, rect, style.color.gamma_multiply(0.5));
         if rect.width() > 64.0 {
@@ -89,8 +89,8 @@ pub(super) fn run(painter: &Painter, theme: &Theme, area: &PlotArea, lanes: &Run
             painter.galley(place, galley, theme.text_strong);
         }
     }
-    for stretch in visible_stretches(area, &lanes.stamps_ns, |row| lanes.tracking[row]) {
-        let rect = Rect::from_x_y_ranges(stretch, bar.y_range());
+    for segment in visible_segments(area, &lanes.stamps_ns, |row| lanes.tracking[row]) {
+        let rect = Rect::from_x_y_ranges(segment, bar.y_range());
         painter.rect_filled(rect, 0.0, style.color.gamma_multiply(0.4));
     }
     let tick = Stroke::new(1.0, style.color);
@@ -142,7 +142,7 @@ pub(super) fn events(painter: &Painter, theme: &Theme, area: &PlotArea, runs: &[
 }
 
 /// A value of all runs as curves; integers as step curves.
-pub(super) fn figures(
+pub(super) fn plotted_values(
     painter: &Painter,
     theme: &Theme,
     area: &PlotArea,
@@ -152,16 +152,17 @@ pub(super) fn figures(
 ) {
     let Some(column) = lane.column() else { return };
     curves.resize_with(runs.len(), Curve::default);
-    let mut most = 0.0_f64;
+    let mut max_value = 0.0_f64;
     for (lanes, curve) in runs.iter().zip(curves.iter_mut()) {
         curve.update(area, lanes.epoch, &lanes.stamps_ns, &lanes.columns[column]);
-        most = most.max(curve.extent.map_or(0.0, |(_, most)| most));
+        max_value = max_value.max(curve.extent.map_or(0.0, |(_, max_value)| max_value));
         if lane == Lane::Rank {
-            most = lanes.columns[STRUCTURAL].iter().copied().filter(|value| value.is_finite()).fold(most, f64::max);
+            max_value =
+                lanes.columns[STRUCTURAL].iter().copied().filter(|value| value.is_finite()).fold(max_value, f64::max);
         }
     }
-    let area = area.with_values(0.0, if most > 0.0 { most * 1.15 } else { 1.0 });
-    if area.rect.height() >= LOWEST_WITH_SCALE {
+    let area = area.with_values(0.0, if max_value > 0.0 { max_value * 1.15 } else { 1.0 });
+    if area.rect.height() >= MIN_HEIGHT_WITH_SCALE {
         paint_value_grid(painter, theme, &area, 1.0, (area.rect.height() / 22.0) as usize);
     }
     for (run, curve) in curves.iter().enumerate() {
@@ -178,8 +179,8 @@ pub(super) fn figures(
 pub(super) fn breakpoints(painter: &Painter, theme: &Theme, area: &PlotArea, ctx: &PanelContext<'_>) {
     let runs = &ctx.recording.runs;
     for (number, run) in runs.iter().enumerate() {
-        let share = (number as f32 + 0.5) / runs.len() as f32;
-        let y = egui::lerp(area.rect.y_range(), share);
+        let fraction = (number as f32 + 0.5) / runs.len() as f32;
+        let y = egui::lerp(area.rect.y_range(), fraction);
         let color = theme.run(number).color;
         for breakpoint in ctx.playback.breakpoints.list() {
             for stamp_ns in breakpoint.hits_ns(run).filter(|at| (area.begin_ns..=area.end_ns).contains(at)) {
@@ -196,12 +197,12 @@ pub(super) fn breakpoints(painter: &Painter, theme: &Theme, area: &PlotArea, ctx
 
 /// Rejected outliers: a line whose height is their number.
 pub(super) fn outliers(painter: &Painter, theme: &Theme, area: &PlotArea, runs: &[RunLanes]) {
-    let most = runs.iter().flat_map(|lanes| &lanes.rejected).map(|(_, count)| *count).max().unwrap_or(1);
+    let max_value = runs.iter().flat_map(|lanes| &lanes.rejected).map(|(_, count)| *count).max().unwrap_or(1);
     for (run, lanes) in runs.iter().enumerate() {
         let line = Stroke::new(1.0, theme.run(run).color);
         let foot = area.rect.bottom() - 1.0;
         for (x, count) in highest_by_column(area, &lanes.rejected) {
-            let height = (area.rect.height() - 3.0) * count as f32 / most as f32;
+            let height = (area.rect.height() - 3.0) * count as f32 / max_value as f32;
             painter.vline(x, foot - height..=foot, line);
         }
     }
@@ -213,9 +214,9 @@ fn highest_by_column(area: &PlotArea, counts: &[(i64, usize)]) -> Vec<(f32, usiz
     for (stamp_ns, count) in counts.iter().filter(|(at, _)| (area.begin_ns..=area.end_ns).contains(at)) {
         let x = area.x(*stamp_ns);
         match columns.last_mut() {
-            Some((open, most)) if open.floor() == x.floor() => {
-                if count > most {
-                    (*open, *most) = (x, *count);
+            Some((open, max_value)) if open.floor() == x.floor() => {
+                if count > max_value {
+                    (*open, *max_value) = (x, *count);
                 }
             }
             _ => columns.push((x, *count)),
@@ -262,7 +263,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_lane_paints_no_more_signs_than_it_has_columns() {
+    fn a_lane_paints_at_most_one_symbol_per_column() {
         let rect = Rect::from_min_max(pos2(0.0, 0.0), pos2(100.0, 20.0));
         let area = PlotArea { rect, begin_ns: 0, end_ns: 12_000, low: 0.0, high: 1.0 };
         let counts: Vec<(i64, usize)> = (0..12_000).map(|row| (row, if row == 4321 { 40 } else { 3 })).collect();

@@ -23,7 +23,7 @@ use crate::session::Command;
 
 const RULER_HEIGHT: f32 = 18.0;
 /// Maximum height of a lane in points.
-const HIGHEST_LANE: f32 = 90.0;
+const MAX_LANE_HEIGHT: f32 = 90.0;
 
 /// State of the timeline.
 #[derive(Debug, Default)]
@@ -71,7 +71,7 @@ impl TimelinePanel {
             .chain([Lane::Events, Lane::Rank, Lane::Features, Lane::Reprojection, Lane::Outliers, Lane::Warnings])
             .collect();
         let lanes_height = plot.height() - RULER_HEIGHT;
-        let height = (lanes_height / shown.len() as f32).clamp(11.0, HIGHEST_LANE);
+        let height = (lanes_height / shown.len() as f32).clamp(11.0, MAX_LANE_HEIGHT);
         for (place, lane) in shown.iter().enumerate() {
             let top = plot.top() + RULER_HEIGHT + place as f32 * height;
             if top + height > rect.bottom() + 1.0 {
@@ -106,9 +106,9 @@ impl TimelinePanel {
             }
             Lane::Breakpoints => lanes::breakpoints(&inner, &theme, &area, ctx),
             Lane::Events => lanes::events(&inner, &theme, &area, &self.runs),
-            Lane::Rank => lanes::figures(&inner, &theme, &area, lane, &self.runs, &mut self.curves[0]),
-            Lane::Features => lanes::figures(&inner, &theme, &area, lane, &self.runs, &mut self.curves[1]),
-            Lane::Reprojection => lanes::figures(&inner, &theme, &area, lane, &self.runs, &mut self.curves[2]),
+            Lane::Rank => lanes::plotted_values(&inner, &theme, &area, lane, &self.runs, &mut self.curves[0]),
+            Lane::Features => lanes::plotted_values(&inner, &theme, &area, lane, &self.runs, &mut self.curves[1]),
+            Lane::Reprojection => lanes::plotted_values(&inner, &theme, &area, lane, &self.runs, &mut self.curves[2]),
             Lane::Outliers => lanes::outliers(&inner, &theme, &area, &self.runs),
             Lane::Warnings => {
                 let stamps_ns: Vec<i64> = ctx.recording.warnings.iter().map(|warning| warning.stamp_ns).collect();
@@ -152,7 +152,7 @@ impl TimelinePanel {
         let near = |other_ns: i64| (other_ns - stamp_ns).abs() <= reach_ns;
         let mut text = format!("{} s", seconds(stamp_ns));
         let mut lines = 0;
-        let mut say = |line: String| {
+        let mut push_line = |line: String| {
             lines += 1;
             if lines <= 8 {
                 text.push('\n');
@@ -163,16 +163,16 @@ impl TimelinePanel {
             for event in lanes.events.iter().filter(|event| near(event.stamp_ns)) {
                 let message = run.steps.get(event.step).and_then(|step| step.report.events.get(event.event));
                 let message = message.map_or("", |event| event.message.as_str());
-                say(format!("{}: {}, {message}", run.spec.label, name_of(event.kind)));
+                push_line(format!("{}: {}, {message}", run.spec.label, name_of(event.kind)));
             }
             for (_, step) in lanes.warnings.iter().filter(|(stamp_ns, _)| near(*stamp_ns)) {
                 for warning in run.steps.get(*step).iter().flat_map(|step| &step.report.warnings) {
-                    say(format!("{}: {warning}", run.spec.label));
+                    push_line(format!("{}: {warning}", run.spec.label));
                 }
             }
         }
         for warning in ctx.recording.warnings.iter().filter(|warning| near(warning.stamp_ns)) {
-            say(warning.message.clone());
+            push_line(warning.message.clone());
         }
         response.on_hover_text_at_pointer(text);
     }

@@ -51,12 +51,12 @@ pub(crate) struct RunLanes {
 impl RunLanes {
     /// Reads the steps that are new since the last call.
     pub(crate) fn read(&mut self, run: &RunRecord) {
-        let news = self.follower.news(run);
-        if news.restarted {
+        let new_steps = self.follower.new_steps(run);
+        if new_steps.restarted {
             let epoch = self.epoch + 1;
             *self = Self { follower: std::mem::take(&mut self.follower), epoch, ..Self::default() };
         }
-        for step in news.steps {
+        for step in new_steps.steps {
             let report = &step.report;
             let (stamp_ns, number) = (report.stamp_ns, self.stamps_ns.len());
             self.stamps_ns.push(stamp_ns);
@@ -99,7 +99,7 @@ mod tests {
     use crate::gui::samples::{FIRST_TRACKED_FRAME, sample_recording_of};
 
     #[test]
-    fn lanes_hold_what_the_steps_said() {
+    fn lanes_have_the_values_of_the_steps() {
         let recording = sample_recording_of(FIRST_TRACKED_FRAME + 20, &["auto"]);
         let run = &recording.runs[0];
         let mut lanes = RunLanes::default();

@@ -130,11 +130,11 @@ fn solver_ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord) {
 /// it waits for the estimator.
 fn pace_ui(ui: &mut Ui, ctx: &PanelContext<'_>, pace: Reading) {
     /// Below this ratio of the set speed the cursor counts as slow.
-    const LATE_SHARE: f64 = 0.9;
+    const LATE_RATIO: f64 = 0.9;
     let theme = ctx.theme;
-    let text = format!("{} pictures/s", fixed(pace.pictures_per_s, 0));
+    let text = format!("{} pictures/s", fixed(pace.fps, 0));
     ui.label(RichText::new(text).color(theme.text_weak)).on_hover_text("Pictures drawn per second while playing");
-    if pace.speed < LATE_SHARE * ctx.playback.speed {
+    if pace.speed < LATE_RATIO * ctx.playback.speed {
         let text = format!("⚠ {}×, waits for the estimation", fixed(pace.speed, 2));
         ui.label(RichText::new(text).color(theme.warn)).on_hover_text("The speed that is reached");
     }
@@ -147,12 +147,12 @@ fn progress_ui(ui: &mut Ui, ctx: &PanelContext<'_>) {
     let duration_ns = ctx.recording.duration_ns.max(1);
     for (number, run) in ctx.recording.runs.iter().enumerate().filter(|(_, run)| !run.finished) {
         let computed_ns = run.steps.last().map_or(0, |step| step.report.stamp_ns);
-        let share = (computed_ns as f64 / duration_ns as f64).clamp(0.0, 1.0);
+        let fraction = (computed_ns as f64 / duration_ns as f64).clamp(0.0, 1.0);
         let text = format!(
             "{} computed to {} s ({} %)",
             run.spec.label,
             fixed(computed_ns as f64 * 1e-9, 1),
-            fixed(100.0 * share, 0)
+            fixed(100.0 * fraction, 0)
         );
         ui.label(RichText::new(text).color(theme.run(number).color));
     }

@@ -212,7 +212,7 @@ pub(crate) fn perform(action: Action, state: &mut WindowState, ctx: &mut PanelCo
         Action::SavedLayout(number) => {
             if !state.saved_layouts.take(number, &mut state.layout) {
                 let text = "No layout of your own has that number yet: save one under \"Panels\"";
-                state.notices.say(NoticeLevel::Info, text);
+                state.notices.show_message(NoticeLevel::Info, text);
             }
         }
         Action::NextPanel(forward) => state.focus_neighbour(forward),

@@ -80,7 +80,7 @@ fn the_palette_has_every_action_with_its_keys_and_moves_by_key() {
 }
 
 #[test]
-fn what_is_typed_at_once_goes_into_the_palette_and_not_to_the_shortcuts() {
+fn keys_typed_at_once_go_to_the_palette_and_not_to_the_shortcuts() {
     let mut harness = bench();
     // On a slow machine the key that opens the palette and the next one are in one frame.
     harness.key_press_modifiers(Modifiers::COMMAND, Key::P);

@@ -78,9 +78,9 @@ fn entry_ui(
     let shown = ctx.selection.run == number;
     let text_color = if shown { theme.text_strong } else { theme.text };
     let label = ui.painter().layout_no_wrap(run.spec.label.clone(), egui::FontId::proportional(12.5), text_color);
-    let figure =
+    let accuracy_label =
         ui.painter().layout_no_wrap(accuracy.clone().unwrap_or_default(), theme::number_font(), theme.text_weak);
-    let width = 34.0 + label.size().x + if accuracy.is_some() { 6.0 + figure.size().x } else { 0.0 } + 6.0;
+    let width = 34.0 + label.size().x + if accuracy.is_some() { 6.0 + accuracy_label.size().x } else { 0.0 } + 6.0;
     let (rect, response) = ui.allocate_exact_size(vec2(width, 22.0), Sense::click());
     let name = format!("Run {} {}", run.spec.label, accuracy.clone().unwrap_or_default());
     response.widget_info(|| WidgetInfo::selected(egui::Role::Button, true, shown, name.trim_end()));
@@ -97,8 +97,8 @@ fn entry_ui(
     paint_line(&painter, &line, theme.run(number), CURVE_WIDTH + 0.5);
     let place = Align2::LEFT_CENTER.anchor_size(pos2(rect.left() + 34.0, middle), label.size());
     painter.galley(place.min, label, text_color);
-    let place = Align2::LEFT_CENTER.anchor_size(pos2(place.right() + 6.0, middle), figure.size());
-    painter.galley(place.min, figure, theme.text_weak);
+    let place = Align2::LEFT_CENTER.anchor_size(pos2(place.right() + 6.0, middle), accuracy_label.size());
+    painter.galley(place.min, accuracy_label, theme.text_weak);
 
     if response.clicked() {
         ctx.selection.run = number;

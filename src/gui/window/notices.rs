@@ -38,7 +38,7 @@ pub struct Notices {
 
 impl Notices {
     /// Shows a message in the corner of the window.
-    pub fn say(&mut self, level: NoticeLevel, text: impl Into<String>) {
+    pub fn show_message(&mut self, level: NoticeLevel, text: impl Into<String>) {
         let text = text.into();
         if !self.toasts.iter().any(|toast| toast.text == text) {
             self.toasts.push(Toast { level, text, since_s: None });

@@ -13,10 +13,10 @@ use crate::gui::{PanelContext, Playback};
 /// Pixels per point of the screenshot: twice an ordinary screen, so that it can be printed.
 const PIXELS_PER_POINT: f32 = 2.0;
 /// Largest side of the screenshot in pixels.
-const LARGEST_SIDE_PX: f32 = 8192.0;
+const MAX_SIDE_PX: f32 = 8192.0;
 
 /// Minimum size in points of the screenshot of a panel with a list.
-const LEAST_SIZE_OF_LISTS: Vec2 = Vec2::new(460.0, 640.0);
+const MIN_LIST_SIZE: Vec2 = Vec2::new(460.0, 640.0);
 
 /// Draws the panel again without the window around it.
 pub(super) fn export(state: &WindowState, ctx: &mut PanelContext<'_>) -> PanelExport {
@@ -24,12 +24,12 @@ pub(super) fn export(state: &WindowState, ctx: &mut PanelContext<'_>) -> PanelEx
     let mut copy = WindowState { panels: state.panels.views(), show_times: state.show_times, ..WindowState::default() };
     copy.panels.inspector.show_times = state.show_times;
     // A scrolling list in a low panel is written completely, up to a limit.
-    let least = match panel {
-        PanelName::Rank | PanelName::Inspector | PanelName::Breakpoints => LEAST_SIZE_OF_LISTS,
+    let min_size = match panel {
+        PanelName::Rank | PanelName::Inspector | PanelName::Breakpoints => MIN_LIST_SIZE,
         _ => Vec2::ZERO,
     };
-    let size = size.max(least);
-    let side = |points: f32| (points * PIXELS_PER_POINT).clamp(64.0, LARGEST_SIDE_PX) as u32;
+    let size = size.max(min_size);
+    let side = |points: f32| (points * PIXELS_PER_POINT).clamp(64.0, MAX_SIDE_PX) as u32;
     let options = HeadlessOptions {
         size_px: [side(size.x), side(size.y)],
         pixels_per_point: PIXELS_PER_POINT,
@@ -46,11 +46,11 @@ pub(super) fn export(state: &WindowState, ctx: &mut PanelContext<'_>) -> PanelEx
         let context = &mut PanelContext { recording, cursor_ns, playback, images, selection, theme, commands };
         alone_ui(panel, ui, &mut copy, context);
     };
-    let picture = headless::draw(options, &mut draw_ui);
+    let screenshot = headless::draw(options, &mut draw_ui);
     let drawing = headless::svg_of(options, "clip", panel.as_str(), &mut draw_ui);
     let log = recording.log_path.file_stem().map_or_else(|| "log".into(), |stem| stem.to_string_lossy().into_owned());
     let name = format!("{log}/{}-{:.3}s", panel.as_str(), seconds_from_ns(cursor_ns));
-    PanelExport { name, picture, drawing, table: copy.panels.csv_table(panel, ctx) }
+    PanelExport { name, screenshot, drawing, table: copy.panels.csv_table(panel, ctx) }
 }
 
 /// The values of a panel, comma separated.

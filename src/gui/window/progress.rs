@@ -3,13 +3,13 @@
 use crate::session::Recording;
 
 /// Seconds of computation before a remaining time is shown.
-const SHORTEST_S: f64 = 1.5;
+const MIN_MEASURED_S: f64 = 1.5;
 
 /// Measures the progress of the estimation.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ProgressMeter {
     /// Wall clock in seconds at the first reading, and the ratio computed then.
-    begun: Option<(f64, f64)>,
+    start: Option<(f64, f64)>,
     /// The ratio at the last reading.
     last: f64,
 }
@@ -20,7 +20,7 @@ pub struct Progress {
     /// Number of unfinished runs.
     pub runs: usize,
     /// Ratio of the log that has been processed, 0 to 1.
-    pub share: f64,
+    pub fraction: f64,
     /// Remaining seconds at the present speed.
     pub left_s: Option<f64>,
 }
@@ -30,25 +30,25 @@ impl ProgressMeter {
     pub fn read(&mut self, recording: &Recording, now_s: Option<f64>) -> Option<Progress> {
         let open = recording.runs.iter().filter(|run| !run.finished && run.error.is_none());
         let duration_ns = recording.duration_ns.max(1) as f64;
-        let shares: Vec<f64> = open
+        let fractions: Vec<f64> = open
             .map(|run| run.steps.last().map_or(0.0, |step| (step.report.stamp_ns as f64 / duration_ns).clamp(0.0, 1.0)))
             .collect();
-        if shares.is_empty() {
+        if fractions.is_empty() {
             *self = Self::default();
             return None;
         }
-        let share = shares.iter().sum::<f64>() / shares.len() as f64;
+        let fraction = fractions.iter().sum::<f64>() / fractions.len() as f64;
         // A new run reduces the ratio: the measurement restarts.
-        if share < self.last {
-            self.begun = None;
+        if fraction < self.last {
+            self.start = None;
         }
-        self.last = share;
+        self.last = fraction;
         let left_s = now_s.and_then(|now_s| {
-            let (begun_s, begun_share) = *self.begun.get_or_insert((now_s, share));
-            let (elapsed_s, done) = (now_s - begun_s, share - begun_share);
-            (elapsed_s >= SHORTEST_S && done > 0.0).then(|| elapsed_s * (1.0 - share) / done)
+            let (begun_s, start_fraction) = *self.start.get_or_insert((now_s, fraction));
+            let (elapsed_s, done) = (now_s - begun_s, fraction - start_fraction);
+            (elapsed_s >= MIN_MEASURED_S && done > 0.0).then(|| elapsed_s * (1.0 - fraction) / done)
         });
-        Some(Progress { runs: shares.len(), share, left_s })
+        Some(Progress { runs: fractions.len(), fraction, left_s })
     }
 }
 
@@ -58,7 +58,7 @@ mod tests {
     use crate::gui::samples::sample_recording_of;
 
     #[test]
-    fn the_remaining_time_follows_the_pace() {
+    fn the_remaining_time_follows_the_speed() {
         let mut recording = sample_recording_of(60, &["auto", "classical"]);
         let whole = recording.runs.clone();
         let mut meter = ProgressMeter::default();
@@ -71,9 +71,9 @@ mod tests {
             recording.duration_ns = whole[0].steps[50].report.stamp_ns;
             meter.read(&recording, now_s).unwrap()
         };
-        assert_eq!(at(1, Some(10.0)), Progress { runs: 2, share: 0.0, left_s: None });
+        assert_eq!(at(1, Some(10.0)), Progress { runs: 2, fraction: 0.0, left_s: None });
         let half = at(26, Some(20.0));
-        assert!((half.share - 0.5).abs() < 1e-9 && (half.left_s.unwrap() - 10.0).abs() < 1e-6, "{half:?}");
+        assert!((half.fraction - 0.5).abs() < 1e-9 && (half.left_s.unwrap() - 10.0).abs() < 1e-6, "{half:?}");
         assert_eq!(at(11, Some(30.0)).left_s, None, "another run has come");
         assert_eq!(at(26, None).left_s, None, "pictures tell no times");
     }

@@ -10,7 +10,7 @@ use super::tiles::Layout;
 use crate::gui::theme::Theme;
 
 /// Maximum number of saved layouts.
-const MOST_KEPT: usize = 12;
+const MAX_LAYOUTS: usize = 12;
 
 /// The layouts by name, and the name that is being typed.
 #[derive(Debug, Default)]
@@ -70,7 +70,7 @@ impl SavedLayouts {
             let edit = ui.add(edit);
             edit.widget_info(|| egui::WidgetInfo::labeled(egui::Role::TextInput, true, "Name of the layout"));
             let name = self.typed.trim().to_owned();
-            let room = self.layouts.len() < MOST_KEPT || self.layouts.contains_key(&name);
+            let room = self.layouts.len() < MAX_LAYOUTS || self.layouts.contains_key(&name);
             let save = ui.add_enabled(!name.is_empty() && room, Button::new("Save layout"));
             if save.clicked() {
                 self.layouts.insert(name, layout.tree().clone());
@@ -78,8 +78,8 @@ impl SavedLayouts {
                 changed = true;
             }
         });
-        if self.layouts.len() >= MOST_KEPT {
-            ui.label(RichText::new(format!("{MOST_KEPT} layouts are kept at most")).small().color(theme.text_weak));
+        if self.layouts.len() >= MAX_LAYOUTS {
+            ui.label(RichText::new(format!("{MAX_LAYOUTS} layouts are kept at most")).small().color(theme.text_weak));
         }
         changed
     }
@@ -110,7 +110,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn layouts_survive_writing_and_foreign_ones_are_left_out() {
+    fn layouts_survive_writing_and_unknown_ones_are_skipped() {
         let mut layout = Layout::default();
         layout.arrange(Preset::Scene);
         layout.set_visible(PanelName::Rank, false);

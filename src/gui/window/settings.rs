@@ -55,7 +55,7 @@ impl Settings {
                 entries.insert(name.clone(), usual.clone());
             }
         }
-        serde_json::from_value(value).map_or(standard, Self::sensible)
+        serde_json::from_value(value).map_or(standard, Self::within_ranges)
     }
 
     /// The settings as JSON.
@@ -64,7 +64,7 @@ impl Settings {
     }
 
     /// With every number limited to its range.
-    fn sensible(mut self) -> Self {
+    fn within_ranges(mut self) -> Self {
         let clamp = |value: f32| value.clamp(*SCALES.start(), *SCALES.end());
         self.scale = if self.scale.is_finite() { clamp(self.scale) } else { 1.0 };
         self.memory_mib = self.memory_mib.clamp(*MEMORY_MIB.start(), *MEMORY_MIB.end());
@@ -83,7 +83,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn settings_come_back_and_nonsense_harms_nothing_else() {
+    fn settings_are_restored_and_invalid_entries_affect_nothing_else() {
         let settings =
             Settings { theme: ThemeName::Print, scale: 1.5, memory_mib: 700, layout: "mine".to_owned(), speed: 0.5 };
         assert_eq!(Settings::from_text(&settings.to_text(), ThemeName::Light), settings);

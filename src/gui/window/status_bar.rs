@@ -70,8 +70,8 @@ pub(super) fn ui(ui: &mut Ui, state: &mut WindowState, ctx: &PanelContext<'_>) {
 /// The progress of the estimation.
 fn progress_ui(ui: &mut Ui, progress: &Progress) {
     let left = progress.left_s.map_or_else(String::new, |left_s| format!(", {} s left", fixed(left_s.ceil(), 0)));
-    let text = format!("{} {} %{left}", counted(progress.runs, "run"), fixed(100.0 * progress.share, 0));
-    let bar = ProgressBar::new(progress.share as f32).desired_width(150.0).text(RichText::new(&text).small());
+    let text = format!("{} {} %{left}", counted(progress.runs, "run"), fixed(100.0 * progress.fraction, 0));
+    let bar = ProgressBar::new(progress.fraction as f32).desired_width(150.0).text(RichText::new(&text).small());
     let response = ui.add(bar);
     response
         .widget_info(|| egui::WidgetInfo::labeled(egui::Role::ProgressIndicator, true, format!("Computing {text}")));
@@ -88,10 +88,10 @@ fn opening_ui(ui: &mut Ui, path: &Path) {
 /// Memory of the recording relative to its budget, and the effect on its steps.
 fn recorded(recording: &Recording) -> (String, String) {
     let steps: usize = recording.runs.iter().map(|run| run.steps.len()).sum();
-    let outlined: usize = recording.runs.iter().map(|run| run.memory.summaries).sum();
-    let share =
+    let summarized: usize = recording.runs.iter().map(|run| run.memory.summaries).sum();
+    let fraction =
         format!("{} of {}", bytes(recording.memory_bytes() as u64), bytes(recording.memory_budget_bytes as u64));
-    let text = if outlined > 0 { format!("{share}, {outlined} of {steps} steps in outline") } else { share };
+    let text = if summarized > 0 { format!("{fraction}, {summarized} of {steps} steps in outline") } else { fraction };
     let hover = "Memory of all steps and of the snapshots of the estimators. When it is full, features and landmarks of \
                  older steps are let go, and taken again from the nearest snapshot, to the same bits, when you go there";
     (text, hover.to_owned())

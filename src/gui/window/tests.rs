@@ -217,7 +217,7 @@ fn breakpoints_bench(conditions: &[&str]) -> Harness<'static, Bench> {
 }
 
 #[test]
-fn a_breakpoint_is_typed_and_its_mistakes_are_pointed_at() {
+fn a_breakpoint_is_typed_and_its_mistakes_are_marked() {
     let mut harness = breakpoints_bench(&[]);
     let type_text = |harness: &mut Harness<'static, Bench>, text: &str| {
         harness.get_by_role_and_label(Role::TextInput, "Condition").focus();
@@ -305,7 +305,7 @@ fn a_fork_is_made_by_key_and_label_and_has_a_lane() {
 }
 
 #[test]
-fn the_dialog_refuses_what_the_command_line_refuses() {
+fn the_dialog_rejects_what_the_command_line_rejects() {
     let mut harness = bench();
     commands_of(&mut harness, |harness| harness.get_by_label("Add run…").click());
     harness.get_by_role_and_label(Role::TextInput, "Name").focus();
@@ -318,7 +318,7 @@ fn the_dialog_refuses_what_the_command_line_refuses() {
 }
 
 #[test]
-fn while_somebody_types_keys_are_letters() {
+fn while_the_user_types_keys_are_letters() {
     let mut harness = bench();
     harness.key_press_modifiers(Modifiers::COMMAND, Key::P);
     harness.run_steps(3);
@@ -388,9 +388,9 @@ fn the_chain_slides_from_the_rank_panel() {
     assert_ne!(amount(&harness), Some(first), "it goes on");
     harness.get_by_label("Hold the chain").click();
     harness.run_steps(2);
-    let held = amount(&harness);
+    let before = amount(&harness);
     harness.run_steps(2);
-    assert_eq!(amount(&harness), held);
+    assert_eq!(amount(&harness), before);
     let names = harness.state().recording.rig.parameter_names();
     // Along a known unobservable direction the reprojections stay; along a single parameter they move.
     harness.state_mut().selection.run = 1;
@@ -424,7 +424,7 @@ fn warnings_are_listed_and_lead_to_their_time() {
 }
 
 #[test]
-fn a_run_that_stopped_says_so() {
+fn a_run_that_stopped_is_reported() {
     let mut harness = bench();
     harness.state_mut().recording.runs[1].error = Some("the log ends in a damaged chunk".to_owned());
     harness.run_steps(2);

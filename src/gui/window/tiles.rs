@@ -133,8 +133,8 @@ fn tree_of(preset: Preset) -> Tree<PanelName> {
         Preset::Calibration => {
             let convergence = tabs(tiles, &[Convergence, Comparison]);
             let residuals = tabs(tiles, &[Residuals, Jacobian, Laboratory]);
-            let pictures = split(tiles, Horizontal, [image, scene], 0.5);
-            let below = split(tiles, Horizontal, [pictures, residuals], 0.66);
+            let images = split(tiles, Horizontal, [image, scene], 0.5);
+            let below = split(tiles, Horizontal, [images, residuals], 0.66);
             (split(tiles, Vertical, [convergence, below], 0.62), split(tiles, Vertical, [rank, inspector], 0.68))
         }
         Preset::FrontEnd => {

@@ -137,7 +137,7 @@ impl Canvas {
     }
 
     /// The whole image.
-    pub(super) fn picture(&self) -> RgbaImage {
+    pub(super) fn image(&self) -> RgbaImage {
         let [width, height] = self.size_px;
         let mut bytes = vec![0; width * height * 4];
         if width > 0 {

@@ -59,7 +59,7 @@ impl Painter {
         background: Color32,
     ) -> RgbaImage {
         self.update(primitives, size_px, pixels_per_point, background);
-        self.canvas.picture()
+        self.canvas.image()
     }
 
     /// Paints as [`Painter::paint`] does without copying the image.

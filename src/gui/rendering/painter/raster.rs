@@ -8,7 +8,7 @@ use super::texture::{TEXEL_BITS, TexelKind, Texture, weight};
 use super::triangle::{Clip, Gradient, Place, SUBPIXELS, first_centre, pack_fixed, spans, to_texels};
 
 /// Largest coordinate in subpixels (32 768 pixels), so that products fit into 64 bits.
-const FURTHEST: f32 = (1 << 23) as f32;
+const MAX_COORDINATE: f32 = (1 << 23) as f32;
 
 /// A rectangle of the image that one worker paints.
 pub(super) struct Target<'a> {
@@ -57,7 +57,7 @@ impl<'a> PreparedMesh<'a> {
         }
         let snap = |coordinate: f32| {
             let subpixels = (coordinate * pixels_per_point * SUBPIXELS as f32).round();
-            subpixels.clamp(-FURTHEST, FURTHEST) as i32
+            subpixels.clamp(-MAX_COORDINATE, MAX_COORDINATE) as i32
         };
         let points: Vec<Option<[i32; 2]>> = mesh
             .vertices

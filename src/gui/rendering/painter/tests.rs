@@ -60,7 +60,7 @@ fn touched(image: &RgbaImage) -> Vec<(u32, u32)> {
 }
 
 #[test]
-fn a_rectangle_covers_the_pixels_whose_centres_it_holds() {
+fn a_rectangle_covers_the_pixels_whose_centres_it_contains() {
     let check = |left: f32, top: f32, right: f32, bottom: f32, expected: [u32; 4]| {
         let mut mesh = Mesh::default();
         mesh.add_colored_rect(Rect::from_min_max(pos2(left, top), pos2(right, bottom)), Color32::RED);
@@ -88,7 +88,7 @@ fn pixels_per_point_scales_and_clips_are_rounded() {
 }
 
 #[test]
-fn triangles_that_share_edges_paint_each_pixel_once() {
+fn triangles_with_common_edges_paint_each_pixel_once() {
     let veil = Color32::from_rgba_premultiplied(60, 40, 20, 100);
     let once = {
         let mut mesh = Mesh::default();
@@ -208,7 +208,7 @@ fn a_texture_that_lies_texel_on_pixel_is_copied() {
 }
 
 #[test]
-fn a_turned_texture_follows_its_corners() {
+fn a_rotated_texture_follows_its_corners() {
     let texels: Vec<Color32> = (0..16).map(|index| Color32::from_gray(index * 16)).collect();
     let image = ColorImage::new([4, 4], texels.clone());
     let mut mesh = Mesh::with_texture(TextureId::Managed(1));
@@ -226,7 +226,7 @@ fn a_turned_texture_follows_its_corners() {
 }
 
 #[test]
-fn part_of_a_texture_can_change_and_a_freed_one_is_gone() {
+fn a_region_of_a_texture_can_change_and_a_freed_one_is_gone() {
     let mut painter = painter_with(Some((ColorImage::filled([4, 4], Color32::RED), TextureOptions::NEAREST)));
     let mut delta = TexturesDelta::default();
     let patch = ColorImage::filled([2, 9], Color32::BLUE);
@@ -248,7 +248,7 @@ fn part_of_a_texture_can_change_and_a_freed_one_is_gone() {
 }
 
 #[test]
-fn nonsense_is_left_out() {
+fn invalid_triangles_are_skipped() {
     let mut mesh = triangles(&[(0.0, 0.0), (f32::NAN, 0.0), (0.0, 8.0)], Color32::WHITE);
     mesh.append(triangles(&[(0.0, 0.0), (f32::INFINITY, 0.0), (0.0, 8.0)], Color32::WHITE));
     mesh.append(triangles(&[(3.0, 3.0), (3.0, 3.0), (3.0, 3.0)], Color32::WHITE));
@@ -286,15 +286,15 @@ fn moving_primitives(moved: f32) -> Vec<ClippedPrimitive> {
     }
     let cursor = [pos2(40.0 + moved, 0.0), pos2(40.0 + moved, 180.0)];
     tessellator.tessellate_shape(Shape::line_segment(cursor, Stroke::new(1.0, Color32::WHITE)), &mut mesh);
-    let mut picture = Mesh::with_texture(TextureId::Managed(1));
+    let mut image = Mesh::with_texture(TextureId::Managed(1));
     let uv = Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0));
-    picture.add_rect_with_uv(Rect::from_min_size(pos2(60.0, 20.0), vec2(170.0, 130.0)), uv, Color32::from_gray(200));
+    image.add_rect_with_uv(Rect::from_min_size(pos2(60.0, 20.0), vec2(170.0, 130.0)), uv, Color32::from_gray(200));
     let clip_rect = Rect::from_min_max(pos2(5.0, 5.0), pos2(235.0, 170.0));
-    [mesh, picture].map(|mesh| ClippedPrimitive { clip_rect, primitive: Primitive::Mesh(mesh) }).to_vec()
+    [mesh, image].map(|mesh| ClippedPrimitive { clip_rect, primitive: Primitive::Mesh(mesh) }).to_vec()
 }
 
 #[test]
-fn a_picture_brought_up_to_date_is_a_picture_painted_anew() {
+fn an_updated_image_equals_one_painted_again() {
     const SIZE: [u32; 2] = [241, 187];
     let texels = |shade: u8| ColorImage::new([3, 40], vec![Color32::from_rgb(shade, 90, 10); 120]);
     let mut kept = painter_with(Some((texels(30), TextureOptions::LINEAR)));
@@ -315,7 +315,7 @@ fn a_picture_brought_up_to_date_is_a_picture_painted_anew() {
             delta.push(TextureId::Managed(1), ImageDelta::full(texels(moved), TextureOptions::NEAREST));
         }
         kept.set_textures(&delta);
-        let picture = kept.paint(&primitives, SIZE, 1.0, GROUND);
+        let image = kept.paint(&primitives, SIZE, 1.0, GROUND);
         let mut fresh = painter_with(Some((texels(30), TextureOptions::LINEAR)));
         if moved >= 20 {
             let patch = ColorImage::filled([3, 1], Color32::WHITE);
@@ -326,7 +326,7 @@ fn a_picture_brought_up_to_date_is_a_picture_painted_anew() {
         }
         fresh.set_textures(&delta);
         delta.clear();
-        assert!(picture == fresh.paint(&primitives, SIZE, 1.0, GROUND), "picture {moved}");
+        assert!(image == fresh.paint(&primitives, SIZE, 1.0, GROUND), "picture {moved}");
         // The reported rectangles are all that differs.
         for (rect, part) in kept.changes() {
             for (index, color) in part.pixels.iter().enumerate() {
@@ -334,6 +334,6 @@ fn a_picture_brought_up_to_date_is_a_picture_painted_anew() {
                 shown.put_pixel(column as u32, row as u32, Rgba(color.to_array()));
             }
         }
-        assert!(shown == picture, "changes of picture {moved}");
+        assert!(shown == image, "changes of picture {moved}");
     }
 }

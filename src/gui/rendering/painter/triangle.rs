@@ -44,8 +44,8 @@ pub(super) fn first_centre(subpixels: i32) -> i32 {
 pub(in crate::gui) fn spans(mut points: [[i32; 2]; 3], clip: Clip, mut emit: impl FnMut(i32, i32, i32)) {
     points.sort_unstable_by_key(|point| point[1]);
     let [top, middle, bottom] = points;
-    let turn = cross(top, bottom, middle);
-    if turn == 0 {
+    let doubled_area = cross(top, bottom, middle);
+    if doubled_area == 0 {
         return;
     }
     let first = first_centre(top[1]).max(clip.top);
@@ -55,7 +55,7 @@ pub(in crate::gui) fn spans(mut points: [[i32; 2]; 3], clip: Clip, mut emit: imp
     }
     let bend = first_centre(middle[1]).clamp(first, last);
     let mut long = Edge::new(top, bottom, first);
-    let middle_is_right = turn < 0;
+    let middle_is_right = doubled_area < 0;
     for (mut short, rows) in [
         ((bend > first).then(|| Edge::new(top, middle, first)), first..bend),
         ((last > bend).then(|| Edge::new(middle, bottom, bend)), bend..last),

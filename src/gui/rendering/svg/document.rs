@@ -142,9 +142,9 @@ impl Writer<'_> {
             Shape::Ellipse(ellipse) => {
                 let [x, y] = [number(ellipse.center.x), number(ellipse.center.y)];
                 let radii = [attribute("rx", ellipse.radius.x), attribute("ry", ellipse.radius.y)].concat();
-                let turn = number(ellipse.angle.to_degrees());
+                let angle_deg = number(ellipse.angle.to_degrees());
                 let look = [paint("fill", ellipse.fill), stroke(ellipse.stroke)].concat();
-                let rest = format!(" cx=\"{x}\" cy=\"{y}\"{radii} transform=\"rotate({turn} {x} {y})\"{look}");
+                let rest = format!(" cx=\"{x}\" cy=\"{y}\"{radii} transform=\"rotate({angle_deg} {x} {y})\"{look}");
                 self.element("ellipse", &rest);
             }
             Shape::Path(path) => self.path(path),

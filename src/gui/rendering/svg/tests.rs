@@ -41,7 +41,7 @@ fn shapes_become_elements_of_their_kind() {
 }
 
 #[test]
-fn what_leaves_its_clip_is_clipped_and_what_lies_outside_is_left_out() {
+fn shapes_are_clipped_and_shapes_outside_are_omitted() {
     let clip = Rect::from_min_max(pos2(10.0, 10.0), pos2(30.0, 30.0));
     let circle = |x: f32| clipped(clip, Shape::circle_filled(pos2(x, 20.0), 3.0, Color32::BLUE));
     let shapes = [circle(20.0), circle(29.0), circle(60.0)];

@@ -8,8 +8,8 @@ use super::element::{attribute, escape, number, paint, put, stroke};
 
 /// One text with all its rows.
 pub(super) fn text(svg: &mut String, shape: &TextShape) {
-    let turned = shape.angle != 0.0;
-    if turned {
+    let is_rotated = shape.angle != 0.0;
+    if is_rotated {
         let [x, y] = [number(shape.pos.x), number(shape.pos.y)];
         put(svg, format_args!("<g transform=\"rotate({} {x} {y})\">\n", number(shape.angle.to_degrees())));
     }
@@ -34,7 +34,7 @@ pub(super) fn text(svg: &mut String, shape: &TextShape) {
         }
         write_run(svg, shape, row.pos.to_vec2(), &run, section_of_run);
     }
-    if turned {
+    if is_rotated {
         svg.push_str("</g>\n");
     }
 }

@@ -14,7 +14,7 @@ use super::element::number;
 
 /// Pixels of a texture: red, green, blue and alpha, not premultiplied.
 #[derive(Clone, Debug, Default)]
-struct Picture {
+struct TextureImage {
     size: [usize; 2],
     rgba: Vec<u8>,
 }
@@ -22,32 +22,32 @@ struct Picture {
 /// All textures except the font atlas.
 #[derive(Clone, Debug, Default)]
 pub(in crate::gui) struct Textures {
-    pictures: BTreeMap<TextureId, Picture>,
+    images: BTreeMap<TextureId, TextureImage>,
 }
 
 impl Textures {
     /// Stores new and changed textures.
     pub(in crate::gui) fn set(&mut self, delta: &TexturesDelta) {
         for (id, changes) in delta.set.iter().filter(|(id, _)| **id != TextureId::default()) {
-            let picture = self.pictures.entry(*id).or_default();
+            let texture = self.images.entry(*id).or_default();
             for change in changes {
-                picture.change(change);
+                texture.change(change);
             }
         }
     }
 
     /// Drops the textures that the output frees.
     pub(in crate::gui) fn free(&mut self, delta: &TexturesDelta) {
-        self.pictures.retain(|id, _| !delta.free.contains(id));
+        self.images.retain(|id, _| !delta.free.contains(id));
     }
 
     /// The region `uv` of a texture in a rectangle; empty for an unknown texture.
     pub(super) fn element(&self, id: TextureId, rect: Rect, uv: Rect) -> String {
-        let Some(picture) = self.pictures.get(&id).filter(|picture| !picture.rgba.is_empty()) else {
+        let Some(texture) = self.images.get(&id).filter(|texture| !texture.rgba.is_empty()) else {
             return String::new();
         };
-        let Some(png) = picture.png() else { return String::new() };
-        let [width, height] = picture.size.map(|side| side as f32);
+        let Some(png) = texture.png() else { return String::new() };
+        let [width, height] = texture.size.map(|side| side as f32);
         let view = [uv.left() * width, uv.top() * height, uv.width() * width, uv.height() * height].map(number);
         let place = [rect.left(), rect.top(), rect.width(), rect.height()].map(number);
         let [x, y, shown_width, shown_height] = place;
@@ -61,7 +61,7 @@ impl Textures {
     }
 }
 
-impl Picture {
+impl TextureImage {
     fn change(&mut self, delta: &ImageDelta) {
         let ImageData::Color(image) = &delta.image;
         let rgba: Vec<u8> = image.pixels.iter().flat_map(|pixel| pixel.to_srgba_unmultiplied()).collect();

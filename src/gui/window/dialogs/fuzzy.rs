@@ -10,10 +10,10 @@ pub(super) fn score(typed: &str, text: &str) -> Option<i32> {
 /// Best of: at the begin of a word, within a word, as letters in order.
 fn word_score(word: &str, text: &str) -> Option<i32> {
     /// Largest penalty for the distance of a match from the begin.
-    const FARTHEST: usize = 20;
+    const MAX_PENALTY: usize = 20;
     let begins = |at: usize| !text[..at].chars().next_back().is_some_and(char::is_alphanumeric);
     let places = text.match_indices(word).map(|(at, _)| at);
-    let near = |at: usize| i32::try_from(at.min(FARTHEST)).unwrap_or(0);
+    let near = |at: usize| i32::try_from(at.min(MAX_PENALTY)).unwrap_or(0);
     let whole = places.map(|at| if begins(at) { 100 - near(at) } else { 60 - near(at) }).max();
     whole.or_else(|| scattered(word, text))
 }
@@ -21,7 +21,7 @@ fn word_score(word: &str, text: &str) -> Option<i32> {
 /// Letters in order with others between: begins of words increase the result, gaps reduce it.
 fn scattered(word: &str, text: &str) -> Option<i32> {
     /// Maximum number of letters between the first and the last one that are not typed.
-    const MOST_HOLES: i32 = 16;
+    const MAX_GAP: i32 = 16;
     let mut wanted = word.chars().peekable();
     let (mut begins, mut holes, mut begun, mut before) = (0, 0, false, ' ');
     for letter in text.chars() {
@@ -35,7 +35,7 @@ fn scattered(word: &str, text: &str) -> Option<i32> {
         }
         before = letter;
     }
-    (wanted.peek().is_none() && holes <= MOST_HOLES).then(|| 20 + 4 * begins - holes)
+    (wanted.peek().is_none() && holes <= MAX_GAP).then(|| 20 + 4 * begins - holes)
 }
 
 #[cfg(test)]

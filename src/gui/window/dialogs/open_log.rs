@@ -15,7 +15,7 @@ use crate::gui::theme::Theme;
 /// Period at which the desktop's file dialog is polled.
 const POLL_PERIOD: Duration = Duration::from_millis(100);
 /// A file dialog that ends without a choice within this many seconds was not shown.
-const SHORTEST_CANCEL_S: f64 = 0.5;
+const MIN_CANCEL_S: f64 = 0.5;
 
 /// State of the dialog.
 #[derive(Default)]
@@ -69,7 +69,7 @@ impl OpenLogDialog {
         self.picker = None;
         match path {
             Some(path) => Some(Picked::Path(path)),
-            None if now_s - since_s < SHORTEST_CANCEL_S || !self.path_field.is_empty() => None,
+            None if now_s - since_s < MIN_CANCEL_S || !self.path_field.is_empty() => None,
             None => Some(Picked::Cancelled),
         }
     }

@@ -12,7 +12,7 @@ use crate::gui::window::tiles::Layout;
 /// Height of the list in points.
 const LIST_HEIGHT: f32 = 360.0;
 /// Number of rows that Page up and Page down move.
-const PAGE: usize = 10;
+const PAGE_ROWS: usize = 10;
 
 /// State of the command palette.
 #[derive(Debug, Default)]
@@ -79,7 +79,7 @@ enum Move {
 }
 
 fn moves(ui: &Ui) -> Option<Move> {
-    let page = PAGE as isize;
+    let page = PAGE_ROWS as isize;
     let keys = [
         (Key::ArrowUp, Move::By(-1)),
         (Key::ArrowDown, Move::By(1)),
