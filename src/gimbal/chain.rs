@@ -4,22 +4,22 @@ use crate::geometry::{RigidTransform, so3};
 
 use super::{ClassicalChain, DhLink, ParameterId, ParameterPart, Parameterization, Quantity, conversion};
 
-/// The numbers of a chain of at least one joint in a minimal form.
+/// Values of a chain with at least one joint in a minimal parameterization.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct MinimalChain {
-    /// `rx ry`, or `ry rx` in the yx order, in radians.
+    /// Base rotations `rx ry`, or `ry rx` in the `yx` order, in radians.
     pub(super) base_angles_rad: [f64; 2],
-    /// `tx ty` after those turns, in metres.
+    /// Base translation `tx ty` after those rotations, in metres.
     pub(super) base_shift_m: [f64; 2],
     /// All links; the last one's `alpha` belongs to the end block.
     pub(super) links: Vec<DhLink>,
-    /// Turn about y in the end block.
+    /// Rotation β about y in the end block.
     pub(super) beta_rad: f64,
-    /// Shift along y in the end block.
+    /// Translation along y in the end block.
     pub(super) y_m: f64,
 }
 
-/// The numbers of a chain, one variant for each kind of columns.
+/// Values of a chain, one variant for each kind of columns.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Form {
     Classical(ClassicalChain),
@@ -37,13 +37,14 @@ pub(super) enum Form {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Chain {
     pub(super) parameterization: Parameterization,
-    /// Whether the joint offsets are left out of the columns.
+    /// Whether the joint offsets are excluded from the columns.
     pub(super) offsets_hidden: bool,
     pub(super) form: Form,
 }
 
 impl Chain {
-    /// The same mechanism in another form; exact for every chain, also at a chart's lock.
+    /// Converts the classical form to `parameterization`. The conversion is exact for every chain, also at a
+    /// singularity.
     pub fn from_classical(classical: &ClassicalChain, parameterization: Parameterization) -> Self {
         let form = if parameterization == Parameterization::Classical {
             Form::Classical(classical.clone())
@@ -69,7 +70,7 @@ impl Chain {
         }
     }
 
-    /// The same mechanism with the same choice about offsets, in another form.
+    /// Converts to another parameterization; joint offsets stay included or excluded.
     pub fn in_parameterization(&self, parameterization: Parameterization) -> Self {
         if parameterization == self.parameterization {
             return self.clone();
@@ -78,22 +79,22 @@ impl Chain {
         if self.offsets_hidden { chain.without_joint_offsets() } else { chain }
     }
 
-    /// The chain with its joint offsets held fixed: their columns disappear from names, values, derivatives and updates.
+    /// Fixes the joint offsets: names, values, derivatives and updates no longer have their columns.
     ///
-    /// Without encoders and without a prior on the angles, free joint angles absorb the offsets, so that only one of the
-    /// two may be estimated. The columns of `poe` are not offsets; it keeps them all.
+    /// Without encoders and without a prior on the joint angles, unknown joint angles absorb the offsets, so that
+    /// only one of the two can be estimated. The columns of `poe` are no offsets; it keeps all of them.
     #[must_use]
     pub fn without_joint_offsets(mut self) -> Self {
         self.offsets_hidden = true;
         self
     }
 
-    /// Whether the joint offsets are left out of the columns.
+    /// Whether the joint offsets are excluded from the columns.
     pub fn hides_joint_offsets(&self) -> bool {
         self.offsets_hidden
     }
 
-    /// The form it is written in.
+    /// Parameterization of the columns.
     pub fn parameterization(&self) -> Parameterization {
         self.parameterization
     }
@@ -108,7 +109,7 @@ impl Chain {
         }
     }
 
-    /// Number of columns.
+    /// Number of columns, excluded joint offsets not counted.
     pub fn dof(&self) -> usize {
         let joints = self.joint_count();
         match self.form {
@@ -125,7 +126,7 @@ impl Chain {
         }
     }
 
-    /// Columns of the chain with its offsets that the chain without them keeps.
+    /// Indices of the columns that remain without the joint offsets.
     pub(super) fn kept_columns(&self) -> Vec<usize> {
         let columns = self.all_parameters();
         (0..columns.len()).filter(|&index| !self.hides(columns[index])).collect()
@@ -135,7 +136,7 @@ impl Chain {
         self.offsets_hidden && parameter.is_joint_offset()
     }
 
-    /// The parameters of all columns, hidden ones included.
+    /// Parameters of all columns, excluded joint offsets included.
     fn all_parameters(&self) -> Vec<ParameterId> {
         let of = |part: ParameterPart| move |quantity: Quantity| ParameterId { part, quantity };
         let link = |index: usize| Quantity::LINK.map(of(ParameterPart::Link(index as u8)));
@@ -175,7 +176,7 @@ impl Chain {
         }
     }
 
-    /// The parameters of its columns, in their order; those of a rigid chain are the main camera's.
+    /// Parameters in the order of the columns; those of a rigid chain belong to the main camera.
     pub fn parameters(&self) -> Vec<ParameterId> {
         let mut parameters = self.all_parameters();
         parameters.retain(|parameter| !self.hides(*parameter));
@@ -234,7 +235,7 @@ impl Chain {
     }
 }
 
-/// The six numbers of a block of columns, from where a slice of columns stands.
+/// Takes the next six entries `[φ; δt]` of a step.
 pub(super) fn take_block(delta: &mut impl Iterator<Item = f64>) -> Vector6<f64> {
     Vector6::from_fn(|_, _| delta.next().unwrap_or(0.0))
 }

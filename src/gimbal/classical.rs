@@ -5,18 +5,18 @@ use super::frame::{Axis, Frame};
 /// One Denavit–Hartenberg link, `Rz(θ + theta_offset)·Tz(d)·Tx(a)·Rx(α)` (Eq. 2).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DhLink {
-    /// Static offset added to the encoder's angle.
+    /// Static joint offset θ, added to the encoder angle.
     pub theta_offset_rad: f64,
-    /// Shift along the joint's axis.
+    /// Link offset d along the joint axis.
     pub d_m: f64,
-    /// Shift along the link.
+    /// Link length a.
     pub a_m: f64,
-    /// Twist about the link.
+    /// Link twist α.
     pub alpha_rad: f64,
 }
 
 impl DhLink {
-    /// The link at an encoder angle, `joint_l_from_joint_l+1`.
+    /// Returns `joint_l_from_joint_l+1` at an encoder angle (Eq. 2).
     pub fn transform(&self, joint_angle_rad: f64) -> RigidTransform {
         let mut frame = Frame::identity();
         self.extend(&mut frame, joint_angle_rad);
@@ -31,26 +31,27 @@ impl DhLink {
     }
 }
 
-/// The chain of Eqs. 5–6 as rigs write it; without links it is a rigid camera.
+/// The chain of Eqs. 5–6 as rigs define it; without links it is the extrinsics of a rigid camera.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ClassicalChain {
-    /// `T^{I:B}`.
+    /// `T^{I:B}` of the paper.
     pub imu_from_base: RigidTransform,
-    /// The links in order.
+    /// Links from base to end effector.
     pub links: Vec<DhLink>,
-    /// `T^{E:C}`.
+    /// `T^{E:C}` of the paper.
     pub effector_from_camera: RigidTransform,
 }
 
 impl ClassicalChain {
-    /// Number of joints.
+    /// Number of joints N.
     pub fn joint_count(&self) -> usize {
         self.links.len()
     }
 
-    /// Forward kinematics at the encoder angles, one per joint.
+    /// Returns `imu_from_camera` at the given encoder angles, one per joint (Eqs. 5–6).
     ///
     /// # Panics
+    ///
     /// When the number of angles is not the number of joints.
     pub fn imu_from_camera(&self, joint_angles_rad: &[f64]) -> RigidTransform {
         assert_eq!(joint_angles_rad.len(), self.links.len(), "one angle per joint");
@@ -62,10 +63,11 @@ impl ClassicalChain {
         frame.to_transform()
     }
 
-    /// Every frame of the chain in the IMU frame, for drawing: base (the first joint), the joints after it, the
-    /// effector, the camera; N + 2 of them.
+    /// Returns the N + 2 frames of the chain in the IMU frame, for drawing: base (the first joint), the following
+    /// joints, end effector, camera.
     ///
     /// # Panics
+    ///
     /// When the number of angles is not the number of joints.
     pub fn frames_in_imu(&self, joint_angles_rad: &[f64]) -> Vec<RigidTransform> {
         assert_eq!(joint_angles_rad.len(), self.links.len(), "one angle per joint");

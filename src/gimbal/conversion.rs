@@ -1,5 +1,5 @@
-//! From the classical form to the others and back; closed forms that exist for every chain (docs/mathematics.md,
-//! section 5).
+//! Conversions between the classical form and the other parameterizations, in closed forms that exist for every
+//! chain (docs/mathematics.md, section 5).
 
 use std::f64::consts::PI;
 
@@ -11,12 +11,12 @@ use super::chain::{Form, MinimalChain};
 use super::frame::{Axis, Frame};
 use super::{Chain, ClassicalChain, DhLink, Parameterization};
 
-/// Below this cosine (or sine) of the middle angle a decomposition counts as locked.
+/// A decomposition is singular when the cosine (or sine) of its middle angle is below this.
 const SINGULAR_COSINE: f64 = 1e-12;
 
-/// The minimal form of a chain of at least one joint.
+/// Converts a chain with at least one joint to a minimal parameterization.
 ///
-/// A base at its lock leaves its first angle at zero; an end block at its lock leaves `y` (or `alpha`) at zero.
+/// At a singularity of the base its first angle is set to zero; at one of the end block `y` (or `alpha`) is.
 pub(super) fn minimal(classical: &ClassicalChain, parameterization: Parameterization) -> MinimalChain {
     let base = split_base(&Frame::of(&classical.imu_from_base), parameterization.base_yx());
     let mut links = classical.links.clone();
@@ -34,7 +34,7 @@ pub(super) fn minimal(classical: &ClassicalChain, parameterization: Parameteriza
     }
 }
 
-/// What the last link and the camera behind it do together, at the link's joint angle zero.
+/// Transform of the last link and the camera behind it, at joint angle zero of that link.
 pub(super) fn end_block(link: &DhLink, effector_from_camera: &RigidTransform) -> Frame {
     let mut frame = Frame::identity();
     link.extend(&mut frame, 0.0);
@@ -45,12 +45,12 @@ pub(super) fn end_block(link: &DhLink, effector_from_camera: &RigidTransform) ->
 struct Base {
     angles_rad: [f64; 2],
     shift_m: [f64; 2],
-    /// Turn and slide along z that are left for the first joint.
+    /// Rotation about and translation along z that the first joint takes over.
     joint_rotation_rad: f64,
     joint_translation_m: f64,
 }
 
-/// `Rx·Ry·T(tx, ty, 0)·Rz(rotate)·Tz(translate)`, or with `Ry·Rx`.
+/// Decomposes into `Rx·Ry·T(tx, ty, 0)·Rz(θ)·Tz(d)`, or with `Ry·Rx`.
 fn split_base(base: &Frame, yx: bool) -> Base {
     let r = &base.rotation;
     let (angles_rad, axes) = if yx {
@@ -81,14 +81,15 @@ struct End {
     y_m: f64,
 }
 
-/// `Rz·Tz·Tx·Rx·Ry(beta)·Ty(y)` (Eq. 19), or `Rz·Tz·Tx·Ty(y)·Ry(beta)·Rx`.
+/// Decomposes into `Rz·Tz·Tx·Rx·Ry(β)·Ty(y)` (Eq. 19), or into `Rz·Tz·Tx·Ty(y)·Ry(β)·Rx`.
 fn split_end(block: &Frame, swapped: bool) -> End {
     let (r, t) = (&block.rotation, &block.origin);
     if swapped {
         let middle_cosine = r[(0, 0)].hypot(r[(1, 0)]);
         let singular = middle_cosine < SINGULAR_COSINE;
         let beta_rad = (-r[(2, 0)]).atan2(middle_cosine);
-        // Locked, only a combination of theta and alpha is determined: R·Ry(−beta) is the turn about z for alpha = 0.
+        // At the singularity only a combination of theta and alpha is determined: R·Ry(−beta) is the rotation about
+        // z for alpha = 0.
         let theta_offset_rad = if singular { (-r[(0, 1)]).atan2(r[(1, 1)]) } else { r[(1, 0)].atan2(r[(0, 0)]) };
         let alpha_rad = if singular { 0.0 } else { r[(2, 1)].atan2(r[(2, 2)]) };
         let shift = rotated_back(theta_offset_rad, t);
@@ -101,7 +102,7 @@ fn split_end(block: &Frame, swapped: bool) -> End {
     let middle_cosine = r[(0, 1)].hypot(r[(1, 1)]);
     let alpha_rad = r[(2, 1)].atan2(middle_cosine);
     if middle_cosine < SINGULAR_COSINE {
-        // Theta and beta turn about the same line; theta is chosen so that y is not needed.
+        // Theta and beta rotate about the same line; theta is chosen such that y is zero.
         let theta_offset_rad = if t.x == 0.0 && t.y == 0.0 { 0.0 } else { t.y.atan2(t.x) };
         let mut rotated = Frame::identity();
         rotated.rotate(Axis::Z, theta_offset_rad);
@@ -129,8 +130,8 @@ fn rotated_back(angle_rad: f64, v: &Vector3<f64>) -> Vector3<f64> {
     Vector3::new(cosine * v.x + sine * v.y, cosine * v.y - sine * v.x, v.z)
 }
 
-/// The classical form of a minimal chain: the base keeps its turns, and what follows the last link (for the swapped
-/// end block: what follows its shift) becomes the camera's pose on the effector.
+/// Converts a minimal chain to the classical form: the base keeps its rotations, and the transform behind the
+/// last link (with the swapped end block: behind its translation along y) becomes `effector_from_camera`.
 pub(super) fn classical_of_minimal(chain: &MinimalChain, parameterization: Parameterization) -> ClassicalChain {
     let mut base = Frame::identity();
     let order = if parameterization.base_yx() { [Axis::Y, Axis::X] } else { [Axis::X, Axis::Y] };
@@ -155,7 +156,7 @@ pub(super) fn classical_of_minimal(chain: &MinimalChain, parameterization: Param
     ClassicalChain { imu_from_base: base.to_transform(), links, effector_from_camera: camera.to_transform() }
 }
 
-/// The blocks `X0 … XN` of a chain of at least one joint.
+/// Returns the transforms `X0 … XN` of the product of exponentials, for a chain with at least one joint.
 pub(super) fn poe_blocks(classical: &ClassicalChain) -> Vec<RigidTransform> {
     let mut blocks = vec![classical.imu_from_base];
     blocks.extend(classical.links.iter().map(|link| link.transform(0.0)));
@@ -164,10 +165,11 @@ pub(super) fn poe_blocks(classical: &ClassicalChain) -> Vec<RigidTransform> {
     blocks
 }
 
-/// The classical form of a product of exponentials.
+/// Converts a product of exponentials to the classical form.
 ///
-/// Inner blocks become links, each handing the screw along its own z axis that a link cannot hold to the next block; the
-/// last block becomes a link with a turn and a shift about y behind it, in the end block with the larger margin.
+/// Inner transforms become links. The screw along its own z axis that a link cannot represent moves on to the
+/// next transform. The last transform becomes a link with a rotation about and a translation along y behind it,
+/// in the end block with the larger singularity margin.
 pub(super) fn classical_of_poe(blocks: &[RigidTransform]) -> ClassicalChain {
     let last = blocks.len() - 1;
     let mut links = Vec::with_capacity(last);
@@ -190,7 +192,7 @@ pub(super) fn classical_of_poe(blocks: &[RigidTransform]) -> ClassicalChain {
     ClassicalChain { imu_from_base: blocks[0], ..on_the_first_joint }
 }
 
-/// `Rz·Tz·Tx·Rx·Rz(rotate)·Tz(translate)`, with a twist between 0 and π.
+/// Decomposes into `Rz·Tz·Tx·Rx·Rz(θ)·Tz(d)` with a twist between 0 and π.
 fn split_inner(block: &Frame) -> (DhLink, f64, f64) {
     let (r, t) = (&block.rotation, &block.origin);
     let twist_sine = r[(0, 2)].hypot(r[(1, 2)]);
@@ -215,10 +217,11 @@ fn split_inner(block: &Frame) -> (DhLink, f64, f64) {
 }
 
 impl Chain {
-    /// The representative that equal mechanisms share: base and end middle angles within ±π/2, twists of the middle
-    /// links within 0 to π, offsets and turns within ±π. Other forms than the minimal ones come back as they are.
+    /// Returns the representative of all equal mechanisms: middle angles of base and end within ±π/2, twists of the
+    /// middle links within 0 to π, offsets and other rotations within ±π. Parameterizations that are not minimal
+    /// return unchanged.
     ///
-    /// Unique away from the chart's locks and from parallel neighbouring axes.
+    /// Unique away from singularities and from parallel neighbouring axes.
     #[must_use]
     pub fn canonical(&self) -> Self {
         if !matches!(self.form, Form::Minimal(_)) {

@@ -1,4 +1,4 @@
-//! Covariances between parameterizations, by what their columns do to the camera at many joint angles.
+//! Covariances between parameterizations, through the camera motions that their columns produce at many joint angles.
 
 use std::f64::consts::PI;
 
@@ -12,11 +12,10 @@ use super::{Chain, ClassicalChain, Parameterization};
 /// Singular values of the scaled, stacked chain Jacobian below this fraction of the largest are zero; regular
 /// mechanisms stay above 2e-4, redundant columns below 1e-15.
 const RANK_TOLERANCE: f64 = 1e-10;
-/// Gains of the scaled transport below this lead nowhere; regular mechanisms have gains of 0.1 and more.
+/// Gains of the scaled transport below this count as zero; regular mechanisms have gains of at least 0.1.
 const REACH_TOLERANCE: f64 = 1e-6;
 
-/// Joint angles that a mechanism has no preference for: a low-discrepancy sequence over whole turns, the same ones in
-/// every call.
+/// Generic joint angles for numerical tests: a low-discrepancy sequence over whole revolutions, equal in every call.
 pub fn generic_joint_angles(joints: usize, count: usize) -> Vec<Vec<f64>> {
     if joints == 0 {
         return vec![vec![]];
@@ -38,7 +37,7 @@ pub fn generic_joint_angles(joints: usize, count: usize) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// The chain's Jacobians at several joint angles under one another (6·count × dof), in radians and metres.
+/// Stacks the chain's Jacobians at several joint angles (6·count × dof), in radians and metres.
 pub fn stacked_jacobian(chain: &Chain, joint_angles_rad: &[Vec<f64>]) -> DMatrix<f64> {
     let mut stacked = DMatrix::zeros(6 * joint_angles_rad.len(), chain.dof());
     for (index, angles) in joint_angles_rad.iter().enumerate() {
@@ -47,12 +46,14 @@ pub fn stacked_jacobian(chain: &Chain, joint_angles_rad: &[Vec<f64>]) -> DMatrix
     stacked
 }
 
-/// How the columns of `to` move when those of `from` do, for two forms of one mechanism (`to.dof()` × `from.dof()`).
+/// Returns the Jacobian of the columns of `to` with respect to those of `from`, for two parameterizations of
+/// one mechanism (`to.dof()` × `from.dof()`).
 ///
-/// Least squares over generic joint angles: exact where the chart of `to` is regular, of least norm where it is not.
-/// All entries are NaN when a number of the chains is not finite.
+/// Least squares over generic joint angles: exact where `to` is regular, of least norm where it is singular.
+/// All entries are NaN when a value of the chains is not finite.
 ///
 /// # Panics
+///
 /// When the numbers of joints differ.
 pub fn transport(from: &Chain, to: &Chain) -> DMatrix<f64> {
     assert_eq!(from.joint_count(), to.joint_count(), "two forms of one mechanism");
@@ -74,7 +75,7 @@ pub fn transport(from: &Chain, to: &Chain) -> DMatrix<f64> {
         }
         &svd.v * &projected
     };
-    // One refinement step takes the rounding of the decomposition away.
+    // One refinement step removes the rounding error of the decomposition.
     let first = solve(&source);
     let mut motion = &first + solve(&(&source - &target * &first));
     for (mut row, scale) in motion.row_iter_mut().zip(&scale) {
@@ -83,12 +84,14 @@ pub fn transport(from: &Chain, to: &Chain) -> DMatrix<f64> {
     motion.select_rows(&to.kept_columns()).select_columns(&from.kept_columns())
 }
 
-/// A covariance of `from`'s columns as one of `to`'s, for a switch of charts.
+/// Transforms a covariance of `from`'s columns (`from.dof()` square) to one of `to`'s columns (`to.dof()`
+/// square), for a switch of parameterization.
 ///
-/// Directions of `to` that no motion of `from` leads to, at a lock or where one of the forms is redundant, are given 10°
-/// and 3 cm, so that they stay free instead of becoming certain.
+/// Directions of `to` that no motion of `from` reaches, at a singularity or where a parameterization is
+/// redundant, get standard deviations of 10° and 3 cm: they stay estimable instead of becoming certain.
 ///
 /// # Panics
+///
 /// When the numbers of joints differ, or the covariance does not belong to `from`.
 pub fn transport_covariance(from: &Chain, covariance: &DMatrix<f64>, to: &Chain) -> DMatrix<f64> {
     transported(from, covariance, to, Dimension::scale)
@@ -116,7 +119,7 @@ fn transported(from: &Chain, covariance: &DMatrix<f64>, to: &Chain, sigma: impl 
     (&result + result.transpose()) * 0.5
 }
 
-/// A value for each column by its dimension.
+/// Returns one value per column, by its dimension.
 fn by_column(chain: &Chain, value: impl Fn(Dimension) -> f64) -> DVector<f64> {
     let parameters = chain.parameters();
     DVector::from_iterator(parameters.len(), parameters.iter().map(|parameter| value(parameter.dimension())))
@@ -129,12 +132,13 @@ fn scale_columns(matrix: &mut DMatrix<f64>, scale: &DVector<f64>) {
 }
 
 impl Chain {
-    /// The covariance of its columns when every number of the rig's classical form is uncertain on its own, with these
-    /// standard deviations (rad, m); diagonal for the classical form.
+    /// Returns the prior covariance of the columns (dof × dof, in rad and m) when every value of the rig's
+    /// classical form has an independent error with these standard deviations; diagonal for the classical form.
     ///
-    /// `classical` is the mechanism that this chain was converted from.
+    /// `classical` is the mechanism from which this chain was converted.
     ///
     /// # Panics
+    ///
     /// When the numbers of joints differ.
     pub fn prior_covariance(
         &self,

@@ -20,7 +20,7 @@ impl Axis {
     }
 }
 
-/// A frame that walks along the chain: orientation and origin in the frame where the walk began.
+/// A frame that moves along the chain: its orientation and origin in the start frame.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Frame {
     pub(super) rotation: Matrix3<f64>,
@@ -36,12 +36,12 @@ impl Frame {
         Self { rotation: transform.rotation_matrix(), origin: transform.translation_m }
     }
 
-    /// One of its axes in the outer frame.
+    /// Direction of one of its axes in the start frame.
     pub(super) fn axis(&self, axis: Axis) -> Vector3<f64> {
         self.rotation.column(axis.index()).into_owned()
     }
 
-    /// Turns about its own axis.
+    /// Rotates the frame about its own axis.
     pub(super) fn rotate(&mut self, axis: Axis, angle_rad: f64) {
         let (sine, cosine) = angle_rad.sin_cos();
         let (next, after) = ((axis.index() + 1) % 3, (axis.index() + 2) % 3);
@@ -51,12 +51,12 @@ impl Frame {
         self.rotation.set_column(after, &second);
     }
 
-    /// Moves along its own axis.
+    /// Translates the frame along its own axis.
     pub(super) fn translate(&mut self, axis: Axis, distance_m: f64) {
         self.origin += self.rotation.column(axis.index()) * distance_m;
     }
 
-    /// Moves by a transform given in its own axes.
+    /// Moves the frame by a transform in its own axes.
     pub(super) fn then(&mut self, inner: &RigidTransform) {
         self.origin += self.rotation * inner.translation_m;
         self.rotation *= inner.rotation_matrix();

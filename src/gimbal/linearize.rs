@@ -1,8 +1,8 @@
-//! Forward kinematics and its closed-form derivatives, one walk along the chain for all forms.
+//! Forward kinematics and its closed-form derivatives, by one pass along the chain for all parameterizations.
 //!
-//! Every column is an elementary motion: a turn about an axis `w` through a point `p`, whose column is
-//! `[Rᵀ·w; w × (t − p)]`, or a slide along `w`, whose column is `[0; w]`; `R`, `t` are the camera's
-//! (docs/mathematics.md, section 6).
+//! Every column is an elementary motion: a rotation about an axis `w` through a point `p`, with the column
+//! `[Rᵀ·w; w × (t − p)]`, or a translation along `w`, with the column `[0; w]`. `R` and `t` are those of the
+//! camera (docs/mathematics.md, section 6).
 
 use nalgebra::{Matrix6xX, Vector3};
 
@@ -15,26 +15,29 @@ use super::{Chain, DhLink};
 /// Forward kinematics and its derivatives at one set of joint angles.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChainLinearization {
-    /// The camera's pose.
+    /// Pose of the camera in the IMU frame.
     pub imu_from_camera: RigidTransform,
-    /// Its `[φ; δt]` by the columns of the chain (6 × dof).
+    /// Derivative of `[φ; δt]` of `imu_from_camera` with respect to the chain's columns (6 × dof).
     pub by_parameters: Matrix6xX<f64>,
-    /// Its `[φ; δt]` by the joint angles (6 × N).
+    /// Derivative of `[φ; δt]` of `imu_from_camera` with respect to the joint angles (6 × N).
     pub by_joints: Matrix6xX<f64>,
 }
 
 impl Chain {
-    /// Forward kinematics at the encoder angles, one per joint.
+    /// Returns `imu_from_camera` at the given encoder angles, one per joint.
     ///
     /// # Panics
+    ///
     /// When the number of angles is not the number of joints.
     pub fn imu_from_camera(&self, joint_angles_rad: &[f64]) -> RigidTransform {
         self.traverse(joint_angles_rad, &mut Unrecorded).to_transform()
     }
 
-    /// Forward kinematics and its derivatives.
+    /// Returns `imu_from_camera` at the given encoder angles with its derivatives with respect to columns and joint
+    /// angles.
     ///
     /// # Panics
+    ///
     /// When the number of angles is not the number of joints.
     pub fn linearize(&self, joint_angles_rad: &[f64]) -> ChainLinearization {
         let mut recorder = Recorder {
@@ -103,7 +106,7 @@ impl Chain {
     }
 }
 
-/// What a walk along the chain meets, in column order.
+/// Receives the elementary motions of a chain in column order.
 trait Sink {
     fn rotate(&mut self, axis: &Vector3<f64>, point: &Vector3<f64>);
     fn translate(&mut self, axis: &Vector3<f64>);
@@ -111,7 +114,7 @@ trait Sink {
     fn offset(&mut self, axis: &Vector3<f64>, point: &Vector3<f64>);
 }
 
-/// For forward kinematics alone.
+/// Ignores all motions: forward kinematics without derivatives.
 struct Unrecorded;
 
 impl Sink for Unrecorded {
@@ -147,7 +150,7 @@ impl Sink for Recorder {
     }
 }
 
-/// Columns in the making: axis and point of a turn, or zero and axis of a slide, until the camera's pose is known.
+/// Columns before the camera pose is known: axis and point of a rotation, or zero and axis of a translation.
 struct Columns {
     matrix: Matrix6xX<f64>,
     filled: usize,
@@ -169,7 +172,7 @@ impl Columns {
         debug_assert_eq!(self.filled, self.matrix.ncols(), "the walk met every column");
         for mut column in self.matrix.column_iter_mut() {
             let axis: Vector3<f64> = column.fixed_rows::<3>(0).into_owned();
-            // The axis of a turn has unit length, that of a slide was put where the point would be.
+            // The axis of a rotation has unit length; the axis of a translation is stored in the place of the point.
             if axis != Vector3::zeros() {
                 let arm = camera.origin - column.fixed_rows::<3>(3);
                 column.fixed_rows_mut::<3>(0).copy_from(&camera.rotation.tr_mul(&axis));
@@ -190,7 +193,7 @@ fn translate<S: Sink>(frame: &mut Frame, axis: Axis, distance_m: f64, sink: &mut
     frame.translate(axis, distance_m);
 }
 
-/// A link up to its twist.
+/// Adds a link without its twist.
 fn traverse_link<S: Sink>(frame: &mut Frame, link: &DhLink, joint_angle_rad: f64, sink: &mut S) {
     let axis = frame.axis(Axis::Z);
     sink.joint(&axis, &frame.origin);
@@ -200,7 +203,7 @@ fn traverse_link<S: Sink>(frame: &mut Frame, link: &DhLink, joint_angle_rad: f64
     translate(frame, Axis::X, link.a_m, sink);
 }
 
-/// A rigid transform with its six columns: it turns about its inner axes and slides along its outer ones.
+/// Adds a rigid transform with its six columns: rotations about its inner axes, translations along its outer axes.
 fn traverse_block<S: Sink>(frame: &mut Frame, transform: &RigidTransform, sink: &mut S) {
     let outer = *frame;
     frame.then(transform);

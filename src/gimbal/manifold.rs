@@ -1,4 +1,4 @@
-//! `⊞` and `⊟` of a chain's columns.
+//! `⊞` and `⊟` of a chain in its columns.
 
 use nalgebra::{DVector, UnitQuaternion, Vector3};
 
@@ -8,19 +8,21 @@ use super::chain::{Form, take_block};
 use super::{Chain, DhLink};
 
 impl Chain {
-    /// The chain moved by one number per column.
+    /// Returns `chain ⊞ δ`, one entry of `delta` per column (dof).
     ///
     /// # Panics
-    /// When there are not as many numbers as columns.
+    ///
+    /// When the length of `delta` is not the number of columns.
     #[must_use]
     pub fn plus(&self, delta: &DVector<f64>) -> Self {
         self.plus_slice(delta.as_slice())
     }
 
-    /// [`Chain::plus`] for a slice, such as a piece of a larger step.
+    /// [`Chain::plus`] for a slice, such as a segment of a larger step.
     ///
     /// # Panics
-    /// When there are not as many numbers as columns.
+    ///
+    /// When the length of `delta` is not the number of columns.
     #[must_use]
     pub fn plus_slice(&self, delta: &[f64]) -> Self {
         assert_eq!(delta.len(), self.dof(), "one number per column");
@@ -72,12 +74,14 @@ impl Chain {
         moved
     }
 
-    /// The numbers that move `origin` here, `origin.plus(self.minus(origin)) = self`.
+    /// Returns `self ⊟ origin` (dof), the step with `origin.plus(self.minus(origin)) = self`.
     ///
-    /// A chain in another form is converted to `origin`'s first. In `poe` the two sides may differ by screws along the
-    /// joints' axes that cancel between neighbouring blocks; the equality then holds for the forward kinematics.
+    /// A chain in another parameterization is converted to that of `origin`. In `poe` the two sides may differ by
+    /// screws along joint axes that cancel between neighbouring transforms; the equality then holds for the forward
+    /// kinematics.
     ///
     /// # Panics
+    ///
     /// When the numbers of joints differ.
     pub fn minus(&self, origin: &Self) -> DVector<f64> {
         assert_eq!(self.joint_count(), origin.joint_count(), "chains of as many joints");
@@ -125,17 +129,17 @@ fn normalized(transform: RigidTransform) -> RigidTransform {
     RigidTransform::new(UnitQuaternion::new_normalize(transform.rotation.into_inner()), transform.translation_m)
 }
 
-/// The local updates from one product of exponentials to another.
+/// Returns the local updates between two products of exponentials.
 ///
-/// Each inner block reaches its counterpart up to a screw along its own z axis, which commutes with the joint behind it
-/// and is handed on to the next block.
+/// Each inner transform reaches its counterpart up to a screw along its own z axis. That screw commutes with
+/// the next joint and moves on to the next transform.
 fn poe_difference(blocks: &[RigidTransform], origins: &[RigidTransform]) -> Vec<f64> {
     let mut difference = Vec::with_capacity(4 * blocks.len() + 2);
     let mut handed_on = RigidTransform::identity();
     let last = blocks.len() - 1;
     for (block, origin) in blocks[..last].iter().zip(origins) {
         let step = origin.inverse() * (handed_on * *block);
-        // The twist about z comes off the right: what remains has no z in its rotation vector.
+        // The rotation about z is split off on the right: the remaining rotation vector has no z component.
         let twist =
             UnitQuaternion::new_normalize(nalgebra::Quaternion::new(step.rotation.w, 0.0, 0.0, step.rotation.k));
         let swing = step.rotation * twist.inverse();

@@ -1,9 +1,8 @@
 //! The actuated chain between the IMU and a gimballed camera, in each parameterization.
 //!
-//! Rigs write the [`ClassicalChain`]; the estimator works with a [`Chain`], which holds the same mechanism in one
-//! [`Parameterization`] and knows its columns: their parameters ([`ParameterId`]), values, derivatives, update rule and margins to the chart's
-//! locks.
-//! A joint's angle is the encoder's reading plus the static offset of its link.
+//! Rigs define a [`ClassicalChain`]. The estimator works with a [`Chain`]: the same mechanism in one
+//! [`Parameterization`], with the parameters ([`ParameterId`]), values, derivatives, update rule and
+//! singularity margins of its columns. A joint angle is the encoder reading plus the static offset of its link.
 //! Parameterizations and their singularities: docs/mathematics.md, sections 3 and 4.
 
 mod chain;

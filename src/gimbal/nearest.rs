@@ -1,4 +1,4 @@
-//! Of the many classical numbers that say the same mechanism, those nearest to given ones.
+//! Among all classical values of one mechanism, those nearest to given ones.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -6,30 +6,32 @@ use crate::geometry::dense;
 
 use super::{Chain, Parameterization, generic_joint_angles, stacked_jacobian};
 
-/// Joint angles per joint at which two forms of a mechanism are held against each other.
+/// Joint angles per joint at which two chains are compared.
 const ANGLES_PER_JOINT: usize = 4;
-/// Rounds in which the nearest numbers are looked for; each leaves a share of what was missing as large as the mechanism
-/// is far from the given one, in radians.
+/// Largest number of iterations; each reduces the remaining error by a factor about as large as the distance of
+/// the mechanism from the given one, in radians.
 const ROUNDS: usize = 60;
-/// Forms that differ by less, in radians and metres, are the same mechanism.
+/// Chains that differ by less than this, in radians and metres, are the same mechanism.
 const GAP: f64 = 1e-11;
-/// Singular values below this share of the largest one belong to directions that move nothing.
+/// Singular values below this fraction of the largest one belong to redundant directions.
 const REDUNDANT: f64 = 1e-9;
 
-/// Says mechanisms in one form, in its classical one with the numbers nearest to given ones.
+/// Converts mechanisms to one parameterization, to the classical one with the values nearest to given ones.
 ///
-/// The classical form can say the same mechanism in many ways (six directions of its columns move nothing), and a
-/// conversion picks one of them that has nothing to do with how the rig is written. The other forms say it in one way.
+/// The classical form has six redundant directions, so that many values describe the same mechanism; a plain
+/// conversion picks one of them without regard to the rig. The other parameterizations are unique.
 #[derive(Clone, Debug)]
 pub struct NearestForm {
     near: Chain,
     angles: Vec<Vec<f64>>,
-    /// The shortest step of the columns, in units of their scales, for a gap of the poses; empty for other forms.
+    /// Pseudo-inverse of the stacked Jacobian (dof × 6·count): the shortest step of the scaled columns for a pose
+    /// error; empty for other parameterizations than the classical one.
     inverse: DMatrix<f64>,
 }
 
 impl NearestForm {
-    /// For mechanisms near `near`; `scales` are what 1 means in each of its columns, such as prior deviations.
+    /// Prepares conversions of mechanisms near `near`; `scales` (dof) are the units of the columns, such as prior
+    /// standard deviations.
     pub fn new(near: Chain, scales: &DVector<f64>) -> Self {
         let joints = near.joint_count();
         let angles = generic_joint_angles(joints, ANGLES_PER_JOINT * (joints + 1));
@@ -38,7 +40,7 @@ impl NearestForm {
         Self { near, angles, inverse }
     }
 
-    /// A mechanism in the form; where no numbers are found near the given ones, as the conversion picks them.
+    /// Converts a mechanism; without convergence near the given values, returns the plain conversion.
     pub fn of(&self, mechanism: &Chain) -> Chain {
         let exact = mechanism.in_parameterization(self.near.parameterization());
         if self.inverse.is_empty() {
@@ -64,7 +66,7 @@ impl NearestForm {
     }
 }
 
-/// The pseudo-inverse of the chain's Jacobian with its columns scaled, back in the columns' units.
+/// Pseudo-inverse of the stacked Jacobian with scaled columns, in the units of the columns.
 fn shortest(chain: &Chain, angles: &[Vec<f64>], scales: &DVector<f64>) -> DMatrix<f64> {
     let mut jacobian = stacked_jacobian(chain, angles);
     for (mut column, scale) in jacobian.column_iter_mut().zip(scales) {
@@ -107,7 +109,7 @@ mod tests {
                 let gap = nearest.imu_from_camera(&angles).minus(&mechanism.imu_from_camera(&angles));
                 assert!(gap.amax() < 1e-9, "{joints} joints: {gap}");
             }
-            // Nothing of the way there is along a redundant direction, in units of the scales.
+            // The step has no component along a redundant direction, in units of the scales.
             let way = nearest.minus(&near).component_div(&scales);
             assert!(
                 way.norm() <= step.component_div(&scales).norm() * 1.02,

@@ -1,4 +1,4 @@
-//! Identity of a calibration parameter, and its name for people and files.
+//! Identity of a calibration parameter and its name.
 
 use crate::geometry::Dimension;
 
@@ -10,34 +10,34 @@ use super::Singularity;
 /// beside it follow from 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ParameterId {
-    /// Transform, link or sensor that it belongs to.
+    /// Transform, link or sensor of the parameter.
     pub part: ParameterPart,
-    /// What it is of that part.
+    /// Quantity within that transform, link or sensor.
     pub quantity: Quantity,
 }
 
-/// What a calibration parameter belongs to.
+/// Transform, link or sensor that has calibration parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum ParameterPart {
     /// `imu_from_base` of the classical form.
     ImuFromBase,
-    /// The base block of the minimal forms, rotation about and translation along x and y of the IMU.
+    /// Base block of the minimal parameterizations: rotations about and translations along x and y of the IMU.
     Base,
-    /// Denavit–Hartenberg link, counted from 0; with the end block of the minimal forms in the last one.
+    /// Denavit–Hartenberg link, counted from 0; the last one includes the end block of the minimal parameterizations.
     Link(u8),
     /// `effector_from_camera` of the classical form.
     EffectorFromCamera,
-    /// Transform between joint axes of the product of exponentials, counted from 0.
+    /// Transform between joint axes in the product of exponentials, counted from 0.
     Exponential(u8),
     /// `imu_from_camera` of a rigid camera.
     ImuFromCamera(u8),
-    /// A camera itself: its clock.
+    /// Clock of a camera.
     Camera(u8),
-    /// The joint encoders: their clock.
+    /// Clock of the joint encoders.
     Encoder,
 }
 
-/// What a calibration parameter is of its part.
+/// Quantity of a calibration parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Quantity {
     /// Rotation about x: of a rotation vector, or an angle of the minimal base block.
@@ -95,7 +95,7 @@ impl ParameterId {
         matches!(self.quantity, Quantity::Theta)
     }
 
-    /// The link that it belongs to, counted from 0.
+    /// Index of its link, counted from 0.
     pub const fn link(self) -> Option<usize> {
         match self.part {
             ParameterPart::Link(link) => Some(link as usize),
@@ -103,7 +103,7 @@ impl ParameterId {
         }
     }
 
-    /// The parameter of the main camera as the same one of another camera.
+    /// Returns the corresponding parameter of another camera.
     #[must_use]
     pub const fn of_camera(self, camera: u8) -> Self {
         let part = match self.part {
@@ -124,7 +124,7 @@ impl ParameterPart {
         }
     }
 
-    /// Whether the part can have the quantity in any parameterization.
+    /// Whether some parameterization has the quantity in this transform, link or sensor.
     fn has(self, quantity: Quantity) -> bool {
         use Quantity::{A, Alpha, Beta, D, Rx, Ry, Rz, Theta, Timeshift, Tx, Ty, Tz, Vx, Vy, Wx, Wy, Y};
         match self {
@@ -140,11 +140,11 @@ impl ParameterPart {
 }
 
 impl Quantity {
-    /// The six of a rigid transform: rotation vector, then translation.
+    /// Columns of a rigid transform: rotation vector, then translation.
     pub const TRANSFORM: [Self; 6] = [Self::Rx, Self::Ry, Self::Rz, Self::Tx, Self::Ty, Self::Tz];
-    /// The four of a Denavit–Hartenberg link.
+    /// Columns of a Denavit–Hartenberg link.
     pub const LINK: [Self; 4] = [Self::Theta, Self::D, Self::A, Self::Alpha];
-    /// The four of an inner block of the product of exponentials.
+    /// Columns of an inner transform of the product of exponentials.
     pub const EXPONENTIAL: [Self; 4] = [Self::Wx, Self::Wy, Self::Vx, Self::Vy];
 
     const ALL: [Self; 17] = [
@@ -167,7 +167,7 @@ impl Quantity {
         Self::Timeshift,
     ];
 
-    /// Name behind the dot of a parameter's name.
+    /// Second half of a parameter's name, after the dot.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Rx => "rx",
@@ -190,7 +190,7 @@ impl Quantity {
         }
     }
 
-    /// Physical dimension.
+    /// Physical dimension, which gives unit and scale.
     pub const fn dimension(self) -> Dimension {
         match self {
             Self::Rx | Self::Ry | Self::Rz | Self::Theta | Self::Alpha | Self::Beta | Self::Wx | Self::Wy => {
@@ -202,14 +202,14 @@ impl Quantity {
     }
 }
 
-/// What calibration parameters are called: by the names of joints and cameras where there are any.
+/// Names of calibration parameters, from the names of joints and cameras.
 ///
-/// Without them links are `L1`, `L2`, … and rigid cameras beside the main one `cam1`, `cam2`, ….
+/// Without names, links are `L1`, `L2`, … and further rigid cameras `cam1`, `cam2`, ….
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ParameterNames {
     /// Names of the joints by link.
     pub joints: Vec<String>,
-    /// Keys of the rigid cameras beside the main one, camera 1 first.
+    /// Keys of the further rigid cameras, camera 1 first.
     pub cameras: Vec<String>,
 }
 
@@ -222,7 +222,7 @@ impl ParameterNames {
         }
     }
 
-    /// Name of a part, which stands before the dot.
+    /// First half of a parameter's name, before the dot.
     pub fn part(&self, part: ParameterPart) -> String {
         let numbered = |names: &[String], index: usize, prefix: &str| {
             names.get(index).cloned().unwrap_or_else(|| format!("{prefix}{}", index + 1))
@@ -253,7 +253,7 @@ impl ParameterNames {
         }
     }
 
-    /// The singularity that a person or a file calls so.
+    /// Parses the name of a singularity.
     pub fn parse_singularity(&self, name: &str) -> Option<Singularity> {
         match name {
             "base" => Some(Singularity::Base),
@@ -267,7 +267,7 @@ impl ParameterNames {
         }
     }
 
-    /// The parameter that a person or a file calls so; a link by its joint's name or as `L1`.
+    /// Parses the name of a parameter; a link by its joint name or as `L1`.
     pub fn parse(&self, name: &str) -> Option<ParameterId> {
         let (part, quantity) = name.rsplit_once('.').unwrap_or(("", name));
         let quantity = Quantity::ALL.into_iter().find(|known| known.name() == quantity)?;

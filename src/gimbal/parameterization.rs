@@ -3,33 +3,34 @@ use std::str::FromStr;
 
 use thiserror::Error;
 
-/// How a chain is written as numbers; all but `Classical` have 4N + 6 columns.
+/// Parameterization of a chain; all but `Classical` have 4N + 6 columns.
 ///
-/// Minimal forms begin with `Rx·Ry·T(tx, ty, 0)` (Eq. 20), or `Ry·Rx·…` where the name says `Yx`, and end with a link
-/// widened by a turn and a shift: `DH·Ry(β)·Ty(y)` (Eq. 19 with the corrected Eq. 18), or `Rz·Tz·Tx·Ty(y)·Ry(β)·Rx(α)`
-/// where it says `Swapped`.
+/// Minimal parameterizations start with `Rx·Ry·T(tx, ty, 0)` (Eq. 20), or with `Ry·Rx·…` where the name has
+/// `Yx`. They end with a link extended by a rotation and a translation: `DH·Ry(β)·Ty(y)` (Eq. 19 with the
+/// corrected Eq. 18), or `Rz·Tz·Tx·Ty(y)·Ry(β)·Rx(α)` where the name has `Swapped`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Parameterization {
-    /// Eqs. 5–6: two whole rigid transforms around the links, 12 + 4N columns, six of them redundant.
+    /// Eqs. 5–6: rigid transforms before and after the links, 12 + 4N columns, six of them redundant.
     Classical,
-    /// Eqs. 18–20 as printed, corrected. Locks when the first axis is the IMU's x or the last one the camera's y.
+    /// Eqs. 18–20, corrected. Singular when the first axis is parallel to the IMU's x or the last one to the
+    /// camera's y.
     Minimal,
-    /// The other base order: locks when the first axis is the IMU's y.
+    /// The other base order: singular when the first axis is parallel to the IMU's y.
     MinimalYx,
-    /// The other end block: locks when the last axis is the camera's x.
+    /// The other end block: singular when the last axis is parallel to the camera's x.
     MinimalSwapped,
     /// The other base order and the other end block.
     MinimalSwappedYx,
-    /// `X0·Rz·X1·Rz ⋯ XN` with local updates: no lock, but no readable numbers either.
+    /// `X0·Rz·X1·Rz ⋯ XN` with local updates: no singularity, but values without a direct meaning.
     Poe,
 }
 
 impl Parameterization {
-    /// All of them.
+    /// All parameterizations, in the order of the manual.
     pub const ALL: [Self; 6] =
         [Self::Classical, Self::Minimal, Self::MinimalYx, Self::MinimalSwapped, Self::MinimalSwappedYx, Self::Poe];
 
-    /// The name on the command line.
+    /// Name on the command line and in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Classical => "classical",
@@ -41,7 +42,7 @@ impl Parameterization {
         }
     }
 
-    /// The minimal form in one of its four charts.
+    /// Returns the minimal parameterization with this base order and end block.
     pub fn minimal(yx: bool, swapped: bool) -> Self {
         match (yx, swapped) {
             (false, false) => Self::Minimal,
@@ -51,17 +52,17 @@ impl Parameterization {
         }
     }
 
-    /// Whether it is one of the four charts of the minimal form.
+    /// Whether it is one of the four minimal parameterizations.
     pub fn is_minimal(self) -> bool {
         !matches!(self, Self::Classical | Self::Poe)
     }
 
-    /// Whether the base is turned about y first.
+    /// Whether the base rotates about y first.
     pub(super) fn base_yx(self) -> bool {
         matches!(self, Self::MinimalYx | Self::MinimalSwappedYx)
     }
 
-    /// Whether the end block has beta and y before alpha.
+    /// Whether beta and y precede alpha in the end block.
     pub(super) fn end_swapped(self) -> bool {
         matches!(self, Self::MinimalSwapped | Self::MinimalSwappedYx)
     }
@@ -73,7 +74,7 @@ impl fmt::Display for Parameterization {
     }
 }
 
-/// A name that no parameterization has.
+/// A name that is no parameterization.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error(
     "unknown parameterization '{0}': expected one of classical, minimal, minimal-yx, minimal-swapped, minimal-swapped-yx, poe"

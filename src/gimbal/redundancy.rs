@@ -2,11 +2,12 @@ use nalgebra::{DMatrix, Vector3};
 
 use super::ClassicalChain;
 
-/// The directions in which the classical form moves without moving the camera at any joint angles, in closed form
-/// (Eqs. 11–17): one column each, (12 + 4N) × 6, in radians and metres and in the order of the classical columns.
+/// Returns the redundant directions of the classical form: steps that leave the camera pose unchanged at all
+/// joint angles, in closed form (Eqs. 11–17).
 ///
-/// At the base, a turn about and a shift along the first axis; at the end, each number of the last link against the
-/// camera's pose on the effector. Without joints, the two rigid transforms against each other.
+/// (12 + 4N) × 6, one direction per column, in radians and metres and in the order of the classical columns.
+/// At the base: a rotation about and a translation along the first axis. At the end: each parameter of the last
+/// link against `effector_from_camera`. Without joints: the two rigid transforms against each other.
 pub fn redundant_directions(chain: &ClassicalChain) -> DMatrix<f64> {
     let joints = chain.links.len();
     let camera = 6 + 4 * joints;
@@ -17,7 +18,7 @@ pub fn redundant_directions(chain: &ClassicalChain) -> DMatrix<f64> {
     let base_rotation = chain.imu_from_base.rotation_matrix();
     let camera_rotation = chain.effector_from_camera.rotation_matrix();
     let camera_position = chain.effector_from_camera.translation_m;
-    // A turn about an axis through a point of the effector, undone by the camera's pose on it.
+    // A rotation about an axis through a point of the effector, compensated by `effector_from_camera`.
     let undo_rotation = |directions: &mut DMatrix<f64>, direction: usize, axis: &Vector3<f64>, arm: &Vector3<f64>| {
         set(directions, direction, camera, &-camera_rotation.tr_mul(axis));
         set(directions, direction, camera + 3, &-axis.cross(arm));

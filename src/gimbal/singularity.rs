@@ -1,19 +1,19 @@
-//! Margins to the charts' locks, and which chart suits a mechanism.
+//! Singularity margins of the minimal parameterizations, and the choice among them.
 
 use super::chain::Form;
 use super::conversion::end_block;
 use super::frame::Frame;
 use super::{Chain, ClassicalChain, Parameterization};
 
-/// A minimal chart whose margin at the base or at the end falls below this is left for a better one.
+/// A minimal parameterization is replaced when its margin at base or end falls below this.
 pub const SWITCH_MARGIN: f64 = 0.3;
 
-/// Margins that differ by less than this (two angles of about 2.6° at the best place of both charts) are no reason to
-/// prefer the unprinted chart.
+/// Margins that differ by less than this (two angles of about 2.6° where both are best) count as equal: the
+/// printed parameterization is preferred.
 const TIE: f64 = 1e-3;
 
-/// The minimal form in the chart with the larger margin at the base and at the end; the printed one where both are
-/// equally far from their locks.
+/// Returns the minimal parameterization with the largest margins at base and end; the printed one when margins
+/// are equal.
 pub fn auto_parameterization(classical: &ClassicalChain) -> Parameterization {
     let Some(last) = classical.links.last() else { return Parameterization::Minimal };
     let base = Frame::of(&classical.imu_from_base).rotation;
@@ -25,22 +25,22 @@ pub fn auto_parameterization(classical: &ClassicalChain) -> Parameterization {
     Parameterization::minimal(margin_yx > margin_xy + TIE, margin_swapped > margin_printed + TIE)
 }
 
-/// Where a chart is singular.
+/// Place of a singularity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Singularity {
-    /// In the base block of a minimal form.
+    /// In the base block of a minimal parameterization.
     Base,
-    /// In the end block of a minimal form.
+    /// In the end block of a minimal parameterization.
     End,
     /// Where the joint axes at both ends of this link, counted from 0, are parallel.
     ParallelAxes(u8),
 }
 
 impl Chain {
-    /// Margins to the singularities of its chart, 1 far away and 0 when singular; of parallel axes the absolute sine of
-    /// the link's twist.
+    /// Returns the margins to the singularities, 0 when singular and 1 at the largest distance; for parallel axes
+    /// the absolute sine of the link's twist.
     ///
-    /// The classical form has only those of parallel axes, `poe` and a rigid camera none.
+    /// The classical form has margins of parallel axes only, `poe` and rigid cameras have none.
     pub fn margins(&self) -> Vec<(Singularity, f64)> {
         let twists = |links: &[super::DhLink]| -> Vec<(Singularity, f64)> {
             let middle = links.len().saturating_sub(1);
@@ -66,8 +66,9 @@ impl Chain {
         }
     }
 
-    /// The chart to switch to when this minimal one has come closer than [`SWITCH_MARGIN`] to a lock of its base or end
-    /// and another one is farther away; `None` to stay, also for the forms that have no charts.
+    /// Returns the parameterization to switch to when the margin of base or end is below [`SWITCH_MARGIN`] and
+    /// another minimal parameterization has a larger one; `None` otherwise, and for all others than the minimal
+    /// ones.
     pub fn should_switch(&self) -> Option<Parameterization> {
         let Form::Minimal(_) = self.form else { return None };
         let close = self.margins().iter().take(2).any(|(_, margin)| *margin < SWITCH_MARGIN);

@@ -162,7 +162,8 @@ fn auto_starts_away_from_singularities_and_switches_late() {
         assert!(chain.margins().iter().take(2).all(|(_, margin)| *margin > 0.7), "{:?}", chain.margins());
         assert_eq!(chain.should_switch(), None);
     }
-    // Turning the camera towards the lock: the chart is kept until the margin falls below 0.3, not before.
+    // The camera rotates towards the singularity: the parameterization changes when the margin falls below 0.3,
+    // not before.
     let (_, mut classical) = special_chains().remove(0);
     let mut switched_at_rad = None;
     let kept = Chain::from_classical(&classical, Parameterization::Minimal);
@@ -191,7 +192,7 @@ fn canonical_numbers_do_not_depend_on_how_the_chain_was_written() {
     for joints in 1..=4 {
         for _ in 0..20 {
             let classical = random.chain(joints);
-            // The same mechanism, written otherwise: moved along its redundant directions and with flipped links.
+            // The same mechanism with other values: moved along its redundant directions and with flipped links.
             let mut other = ClassicalChain::clone(&classical);
             for index in 0..joints - 1 {
                 let link = &mut other.links[index];

@@ -5,7 +5,7 @@ use crate::gimbal::{
     Chain, ParameterPart, Parameterization, Quantity, generic_joint_angles, redundant_directions, stacked_jacobian,
 };
 
-/// Every chain in every form, with and without offsets.
+/// Every chain in every parameterization, with and without offsets.
 fn every_chain() -> Vec<(String, Chain)> {
     let mut chains = vec![];
     for (name, classical) in all_chains() {
@@ -62,7 +62,7 @@ fn chains_obey_the_manifold_laws() {
             let moved = chain.plus(&delta);
             let error = (moved.minus(&chain) - &delta).amax();
             assert!(error < 1e-12, "{name}: (x ⊞ δ) ⊟ x is off by {error}");
-            // Twice, so that poe leaves the set that one update reaches.
+            // Two updates, so that `poe` leaves the set that one update reaches.
             let far = moved.plus(&DVector::from_fn(chain.dof(), |_, _| random.within(size)));
             let rebuilt = chain.plus(&far.minus(&chain));
             let angles = random.angles(chain.joint_count());
@@ -79,7 +79,8 @@ fn values_follow_scalar_updates() {
         let delta = DVector::from_fn(chain.dof(), |_, _| random.within(1e-3));
         let difference = chain.plus(&delta).values() - chain.values();
         for (index, column) in chain.parameters().iter().enumerate() {
-            // Rotation vectors do not add, and jump at half turns; the local translations of `poe` are in turned axes.
+            // Rotation vectors do not add, and jump at half revolutions; the local translations of `poe` are in
+            // rotated axes.
             let scalar = matches!(column.part, ParameterPart::Link(_) | ParameterPart::Base)
                 || matches!(column.quantity, Quantity::Tx | Quantity::Ty | Quantity::Tz);
             assert!(!scalar || (difference[index] - delta[index]).abs() < 1e-15, "{name} {column:?}");

@@ -146,7 +146,7 @@ fn golden_chains() {
         if joints > 0 {
             assert!((&found - &expected).amax() < 1e-14, "{id}");
         } else {
-            // The same subspace, whatever its basis.
+            // The same subspace, for any basis.
             let both =
                 DMatrix::from_fn(
                     12,
@@ -161,7 +161,7 @@ fn golden_chains() {
     assert!(compared >= 100, "only {compared} Jacobians were compared");
 }
 
-/// The derivatives of one reprojection (Eqs. 9–17) through the chain, the rule of perturbation and the camera.
+/// Derivatives of one reprojection (Eqs. 9–17) through chain, perturbation rule and camera.
 #[test]
 fn golden_visual_residuals() {
     let file = golden();
@@ -198,7 +198,7 @@ fn golden_visual_residuals() {
     assert!(compared >= 18, "only {compared} reprojections were compared");
 }
 
-/// One prediction of a feature's pixel with all its derivatives.
+/// One predicted pixel with its derivatives.
 pub(crate) struct Reprojection {
     pub(crate) uv_px: Vector2<f64>,
     pub(crate) by_parameters: DMatrix<f64>,

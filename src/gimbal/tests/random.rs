@@ -46,7 +46,7 @@ impl Random {
     }
 }
 
-/// Mechanisms at and around the locks: right angles everywhere, parallel and coaxial axes, a body-style camera.
+/// Mechanisms at and near singularities: right angles, parallel and coaxial axes, a body-style camera.
 pub(crate) fn special_chains() -> Vec<(&'static str, ClassicalChain)> {
     use std::f64::consts::{FRAC_PI_2, PI};
     let link = |theta_offset_rad, d_m, a_m, alpha_rad| DhLink { theta_offset_rad, d_m, a_m, alpha_rad };
