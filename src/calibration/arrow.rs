@@ -1,4 +1,5 @@
-//! Symmetric positive definite systems of a band with a border: states in time order, then what all of them share.
+//! Symmetric positive definite systems with a band and a border: states in time order, then the unknowns that
+//! all states share.
 
 use std::ops::Range;
 
@@ -10,22 +11,22 @@ use faer::{Accum, MatMut, MatRef, Par, Side};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-/// Rows and columns of the blocks that the band is factored by.
+/// Block size of the band's factorization, in rows and columns.
 const BLOCK: usize = 64;
 
 /// Lower triangle of `[band Cᵀ; C corner]`.
 #[derive(Clone, Debug)]
 pub(super) struct ArrowMatrix {
     band: Band,
-    /// One row of the band's length per border unknown.
+    /// One row per border unknown, as long as the band.
     border: Vec<Vec<f64>>,
     corner: DMatrix<f64>,
 }
 
 /// Lower triangle of a band, row by row.
 ///
-/// The rows of a block of [`BLOCK`] all begin so many blocks before it, so that blocks of rows are matrices; what lies
-/// before the first column or behind the last row holds nothing.
+/// The stored rows of a block of [`BLOCK`] start at the same column, so that blocks are matrices. Entries left
+/// of the first column or behind the last row are zero.
 #[derive(Clone, Debug)]
 struct Band {
     len: usize,
@@ -41,18 +42,18 @@ impl Band {
         Self { len, reach, entries: vec![0.0; blocks * BLOCK * (reach + 1) * BLOCK] }
     }
 
-    /// Entries of a row.
+    /// Number of stored entries per row.
     fn width(&self) -> usize {
         (self.reach + 1) * BLOCK
     }
 
-    /// The columns of a row that are stored up to its diagonal, and where they are.
+    /// Returns the stored columns of a row up to its diagonal, and their indices in the storage.
     fn stored(&self, row: usize) -> (Range<usize>, Range<usize>) {
         let first = (row / BLOCK * BLOCK).saturating_sub(self.reach * BLOCK);
         (first..row, self.index(row, first)..self.index(row, row))
     }
 
-    /// Where an entry of the lower triangle is.
+    /// Index of an entry of the lower triangle in the storage.
     fn index(&self, row: usize, column: usize) -> usize {
         row * self.width() + self.reach * BLOCK + column - row / BLOCK * BLOCK
     }
@@ -62,13 +63,13 @@ impl Band {
         &mut self.entries[index]
     }
 
-    /// The Cholesky factor in place, `false` when the matrix is not positive definite.
+    /// Factors in place by Cholesky; `false` when the matrix is not positive definite.
     ///
-    /// Right-looking by blocks: a block column is finished, then taken off all that it reaches. Every sum has its order
-    /// whatever the number of threads.
+    /// Right-looking by blocks: each finished block column is subtracted from the blocks that it reaches. Sums have
+    /// a fixed order for any number of threads.
     fn factor(&mut self) -> bool {
         let (width, reach) = (self.width(), self.reach);
-        // Rows that only fill up the last block.
+        // Padding rows of the last block.
         for row in self.len..self.entries.len() / width.max(1) {
             *self.diagonal(row) = 1.0;
         }
@@ -99,7 +100,7 @@ impl Band {
         true
     }
 
-    /// `L⁻¹ x`, in place.
+    /// Computes `L⁻¹ x` in place.
     fn forward(&self, vector: &mut [f64]) {
         for row in 0..self.len {
             let (columns, places) = self.stored(row);
@@ -108,7 +109,7 @@ impl Band {
         }
     }
 
-    /// `L⁻ᵀ x`, in place.
+    /// Computes `L⁻ᵀ x` in place.
     fn backward(&self, vector: &mut [f64]) {
         for row in (0..self.len).rev() {
             let (columns, places) = self.stored(row);
@@ -121,7 +122,7 @@ impl Band {
     }
 }
 
-/// Factors the block on the diagonal at the end of its rows and returns the factor.
+/// Factors the diagonal block at the end of its rows and returns the factor.
 fn factored_block(rows: &mut [f64], width: usize) -> Option<Llt<f64>> {
     let mut block = MatMut::from_row_major_slice_mut(rows, BLOCK, width).subcols_mut(width - BLOCK, BLOCK);
     let factor = block.rb().llt(Side::Lower).ok()?;
@@ -130,7 +131,7 @@ fn factored_block(rows: &mut [f64], width: usize) -> Option<Llt<f64>> {
 }
 
 impl ArrowMatrix {
-    /// All zero, for a band of `len` unknowns.
+    /// Returns a zero matrix for `len` unknowns in the band and `borders` in the border.
     pub(super) fn zeros(len: usize, half_width: usize, borders: usize) -> Self {
         Self {
             band: Band::zeros(len, half_width),
@@ -139,7 +140,7 @@ impl ArrowMatrix {
         }
     }
 
-    /// Adds to an entry of the lower triangle of the band; what lies above the diagonal is passed over.
+    /// Adds to an entry of the band's lower triangle; entries above the diagonal are ignored.
     pub(super) fn add(&mut self, row: usize, column: usize, value: f64) {
         if column <= row {
             debug_assert!(column >= self.band.stored(row).0.start, "within the band");
@@ -148,12 +149,12 @@ impl ArrowMatrix {
         }
     }
 
-    /// Adds to the coupling of a border unknown with one of the band.
+    /// Adds to the coupling between a border unknown and a band unknown.
     pub(super) fn add_border(&mut self, border: usize, column: usize, value: f64) {
         self.border[border][column] += value;
     }
 
-    /// The border's own block; both triangles are kept.
+    /// Block of the border (borders × borders, both triangles).
     pub(super) fn corner_mut(&mut self) -> &mut DMatrix<f64> {
         &mut self.corner
     }
@@ -187,7 +188,7 @@ impl ArrowMatrix {
     }
 }
 
-/// The factor `L` of the band, `L⁻¹Cᵀ`, and the border's Schur complement.
+/// Cholesky factor: `L` of the band, `L⁻¹Cᵀ`, and the border's Schur complement.
 #[derive(Clone, Debug)]
 pub(super) struct ArrowFactor {
     band: Band,
@@ -196,12 +197,12 @@ pub(super) struct ArrowFactor {
 }
 
 impl ArrowFactor {
-    /// Information about the border's unknowns once those of the band are eliminated.
+    /// Information matrix of the border's unknowns with the band eliminated (borders × borders).
     pub(super) fn border_information(&self) -> &DMatrix<f64> {
         &self.corner
     }
 
-    /// Solves for the band's and the border's unknowns, `None` when the border is not positive definite.
+    /// Solves for band and border; `None` when the border's Schur complement is not positive definite.
     pub(super) fn solve(&self, band: &[f64], border: &DVector<f64>) -> Option<(Vec<f64>, DVector<f64>)> {
         let mut solution = band.to_vec();
         self.band.forward(&mut solution);
@@ -220,7 +221,7 @@ impl ArrowFactor {
     }
 }
 
-/// The scalar product, summed in eight strands of a fixed order.
+/// Scalar product, summed in eight accumulators in a fixed order.
 fn dot(left: &[f64], right: &[f64]) -> f64 {
     let mut strands = [0.0; 8];
     let (left_chunks, right_chunks) = (left.chunks_exact(8), right.chunks_exact(8));

@@ -1,4 +1,4 @@
-//! The bundle: both cameras' sightings, the inertial samples between the instants, encoder readings and priors.
+//! Bundle adjustment: observations of both cameras, IMU samples between frame sets, encoder readings and priors.
 
 use std::collections::BTreeMap;
 
@@ -14,28 +14,28 @@ use crate::estimator::{NavigationState, imu_factor};
 use crate::geometry::{RigidTransform, so3, wrap_angle};
 use crate::optimization::CameraPose;
 
-/// Standard deviation of the first position, which only fixes where the map lies, in metres.
+/// Standard deviation of the first position, which only fixes the gauge, in metres.
 const GAUGE_SIGMA_M: f64 = 1e-3;
-/// Standard deviation of the first heading, which only fixes how the map is turned, in radians.
+/// Standard deviation of the first heading, which only fixes the gauge, in radians.
 const GAUGE_SIGMA_RAD: f64 = 1e-4;
 
-/// What is known beforehand besides the chain.
+/// Priors of the bundle.
 #[derive(Clone, Debug)]
 pub(super) struct Priors {
     /// The gimbal's chain.
     pub(super) chain: ChainTerm,
-    /// The static camera's pose on the IMU.
+    /// Given `imu_from_camera` of the static camera.
     pub(super) extrinsics: RigidTransform,
     /// Its standard deviations per axis, in metres and radians.
     pub(super) extrinsics_sigmas: (f64, f64),
     pub(super) time_shift_sigma_s: f64,
-    /// Of the biases about zero at the first instant, in rad/s and m/s².
+    /// Standard deviations of the first biases about zero, in rad/s and m/s².
     pub(super) bias_sigmas: (f64, f64),
-    /// Where the first instant lies on the map.
+    /// State of the first frame set, which fixes the gauge.
     pub(super) first: NavigationState,
 }
 
-/// A bundle to be adjusted.
+/// A bundle adjustment problem.
 #[derive(Clone, Debug)]
 pub(super) struct Bundle<'a> {
     pub(super) columns: Columns,
@@ -46,32 +46,32 @@ pub(super) struct Bundle<'a> {
     pub(super) tracks: &'a [Track],
 }
 
-/// What a reading says about its joint, and through the gimbal camera's time shift about that.
+/// Residual and derivatives of one encoder reading.
 struct EncoderEquation {
-    /// Of the band.
+    /// Column of the joint angle in the band.
     column: usize,
     information: f64,
-    /// `q − reading`.
+    /// `q − reading`, in radians; the reading is shifted by the gimbal camera's time offset.
     residual: f64,
-    /// How fast the reading changes, in rad/s.
+    /// Rate of change of the reading, in rad/s.
     rate: f64,
 }
 
-/// Normal equations without the visual factors' part of the view poses.
+/// Normal equations without the visual factors' blocks of the view poses.
 pub(super) struct BundleEquations {
     visual: VisualEquations,
     maps: BTreeMap<ViewId, ViewMap>,
-    /// Rows that touch one or two neighbouring instants.
+    /// IMU rows of two neighbouring frame sets: first column, whitened Jacobian, residual.
     inertial: Vec<(usize, DMatrix<f64>, Vector15)>,
     encoders: Vec<EncoderEquation>,
-    /// Blocks on the first instant: columns within it, rows, residuals.
+    /// Jacobian and residual of the priors on the first frame set.
     first: (DMatrix<f64>, DVector<f64>),
     border_hessian: DMatrix<f64>,
     border_gradient: DVector<f64>,
 }
 
 impl Bundle<'_> {
-    /// Views that take part: those with a sighting.
+    /// Views with at least one observation.
     fn views(&self) -> Vec<ViewId> {
         let mut views: Vec<ViewId> = self
             .tracks
@@ -83,13 +83,13 @@ impl Bundle<'_> {
         views
     }
 
-    /// Poses of all views that take part.
+    /// Poses `world_from_camera` of all views with an observation.
     pub(super) fn poses(&self, estimate: &Estimate) -> BTreeMap<ViewId, CameraPose> {
         let pose = |view: ViewId| (view, estimate.view(view, self.frame_sets, &self.gravity_in_world));
         self.views().into_iter().map(pose).collect()
     }
 
-    /// Twice the cost.
+    /// Twice the cost: the sum of the robust squared whitened residuals.
     pub(super) fn cost(&self, estimate: &Estimate) -> f64 {
         let mut cost = self.pixels.cost(&self.poses(estimate), self.tracks, &estimate.landmarks);
         for frame_set in 1..self.frame_sets.len() {
@@ -110,7 +110,8 @@ impl Bundle<'_> {
         Some(information * imu_factor::residual(motion, from, to, &self.gravity_in_world))
     }
 
-    /// `(frame_set and joint, 1/σ², q − reading)` of every encoder reading, the reading carried along by the time shift.
+    /// Returns `((frame_set, joint), 1/σ², q − reading)` of every encoder reading, shifted by the gimbal camera's
+    /// time offset.
     fn encoder_terms<'s>(&'s self, estimate: &'s Estimate) -> impl Iterator<Item = ((usize, usize), f64, f64)> + 's {
         let shift_s = estimate.shifts_s[1];
         self.frame_sets
@@ -127,14 +128,15 @@ impl Bundle<'_> {
             })
     }
 
-    /// Rows on the first instant's navigation state: position and heading of the map, biases.
+    /// Rows of the priors on the first frame set (Jacobian rows × 15, residual): position and heading of the gauge,
+    /// biases.
     fn first_rows(&self, estimate: &Estimate) -> (DMatrix<f64>, DVector<f64>) {
         let (state, first) = (&estimate.navigation[0], &self.priors.first);
         let (gyroscope, accelerometer) = self.priors.bias_sigmas;
         let mut rows = DMatrix::zeros(10, 15);
         let mut residual = DVector::zeros(10);
         let rotation_error = so3::log(&(first.world_from_imu.rotation.inverse() * state.world_from_imu.rotation));
-        // The vertical in the first instant's own axes.
+        // The vertical in the IMU axes of the first frame set.
         let vertical: Vector3<f64> = first.world_from_imu.rotation.inverse() * Vector3::z();
         let heading = vertical.transpose() * so3::right_jacobian_inverse(&rotation_error);
         rows.fixed_view_mut::<1, 3>(0, 0).copy_from(&(heading / GAUGE_SIGMA_RAD));
@@ -151,7 +153,7 @@ impl Bundle<'_> {
         (rows, residual)
     }
 
-    /// Rows of the priors on what all instants share.
+    /// Rows of the priors on the border (Jacobian rows × borders, whitened residual).
     fn border_rows(&self, estimate: &Estimate) -> (DMatrix<f64>, DVector<f64>) {
         let columns = &self.columns;
         let count = columns.borders();
@@ -177,13 +179,13 @@ impl Bundle<'_> {
         (rows, residual)
     }
 
-    /// The information of the priors on the border.
+    /// Information matrix of the priors on the border (borders × borders).
     pub(super) fn border_prior_information(&self, estimate: &Estimate) -> DMatrix<f64> {
         let (rows, _) = self.border_rows(estimate);
         rows.tr_mul(&rows)
     }
 
-    /// Linearizes every factor.
+    /// Linearizes all factors.
     pub(super) fn linearize(&self, estimate: &Estimate) -> BundleEquations {
         let poses = self.poses(estimate);
         let map =
@@ -220,12 +222,12 @@ impl Bundle<'_> {
         equations
     }
 
-    /// Column of the band of an entry of a navigation state.
+    /// Column of a navigation state's entry in the band.
     fn navigation_column(&self, frame_set: usize, entry: usize) -> usize {
         frame_set * self.columns.block() + self.columns.navigation(entry)
     }
 
-    /// Most instants between two sightings of one landmark, at least one for the inertial factors.
+    /// Largest number of frame sets between two observations of one landmark, at least one for the IMU factors.
     fn reach(&self) -> usize {
         let span = |track: &Track| match (track.observations.first(), track.observations.last()) {
             (Some(first), Some(last)) => last.view.frame_set() - first.view.frame_set(),
@@ -234,7 +236,7 @@ impl Bundle<'_> {
         self.tracks.iter().map(span).max().unwrap_or(0).max(1)
     }
 
-    /// The reduced normal equations and their right side `−gradient`.
+    /// Returns the reduced normal equations and their right side `−gradient`, split into band and border.
     pub(super) fn assemble(
         &self,
         equations: &BundleEquations,
@@ -288,7 +290,7 @@ impl Bundle<'_> {
         (matrix, band, border)
     }
 
-    /// Carries the block of two view poses (`first ≤ second`) on to the unknowns.
+    /// Adds the block of two view poses (6 × 6, `first ≤ second`) to the columns of the unknowns.
     fn add_pair(
         &self,
         matrix: &mut ArrowMatrix,
@@ -306,7 +308,7 @@ impl Bundle<'_> {
         let by_first = first_map.own.tr_mul(&shared_right);
         for a in 0..own.nrows() {
             for b in 0..own.ncols() {
-                // Rows of the later instant; within one instant the lower triangle, both orders of a mixed pair.
+                // Rows of the later frame set; within one frame set the lower triangle, both orders of a mixed pair.
                 matrix.add(at_second + b, at_first + a, own[(a, b)]);
                 if first != second && at_first == at_second {
                     matrix.add(at_first + a, at_second + b, own[(a, b)]);
@@ -329,7 +331,7 @@ impl Bundle<'_> {
         }
     }
 
-    /// Steps of the view poses that belong to a step of the unknowns.
+    /// Returns the steps `[φ; δt]` of the view poses for a step of the unknowns.
     pub(super) fn view_steps(
         &self,
         equations: &BundleEquations,
@@ -347,13 +349,13 @@ impl Bundle<'_> {
 }
 
 impl BundleEquations {
-    /// The visual part.
+    /// Normal equations of the visual factors over the view poses.
     pub(super) fn visual(&self) -> &VisualEquations {
         &self.visual
     }
 }
 
-/// The gimbal camera's view of an instant.
+/// View of the gimbal camera in a frame set.
 pub(super) fn gimbal_view(frame_set: usize) -> ViewId {
     ViewId::new(frame_set, Camera::Gimbal)
 }

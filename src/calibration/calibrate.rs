@@ -1,4 +1,4 @@
-//! The calibration from beginning to end.
+//! The calibration, stage by stage.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -20,7 +20,7 @@ use crate::gimbal::Chain;
 use crate::observability::{RankReport, analyse};
 use crate::sensors::JointAngles;
 
-/// Names of the steps, for messages.
+/// Names of the stages in messages.
 const ALONE: &str = "camera-IMU calibration";
 const LOOPS: &str = "pose loops";
 const BOTH: &str = "bundle of both cameras";
@@ -29,20 +29,21 @@ fn singular(stage: &'static str) -> CalibrationError {
     CalibrationError::Singular { stage }
 }
 
-/// How far a calibration is.
+/// Progress of a calibration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CalibrationProgress {
-    /// What is being done.
+    /// Name of the present stage.
     pub stage: &'static str,
-    /// Share of the whole, 0 to 1.
+    /// Completed fraction of the whole calibration, 0 to 1.
     pub fraction: f64,
 }
 
-/// Calibrates static camera and gimbal from a flight: camera–IMU first, then the pose loops, then the pixels of both
-/// cameras together.
+/// Calibrates static camera and gimbal from a flight: static camera and IMU, then pose loops, then a bundle of
+/// both cameras.
 ///
 /// # Errors
-/// When the flight cannot tell: no trajectory, no moving joint, too few pairs of camera poses.
+///
+/// When the flight does not constrain the calibration: no trajectory, no moving joint, too few pairs of camera poses.
 pub fn calibrate(
     input: &CalibrationInput,
     options: &CalibrationOptions,
@@ -151,7 +152,7 @@ fn stretch(frame_sets: &[FrameSet]) -> (i64, i64) {
     (frame_sets.first().map_or(0, |first| first.stamp_ns), frame_sets.last().map_or(0, |last| last.stamp_ns))
 }
 
-/// A joint moves when its readings spread by more than their noise and the limit explain.
+/// Refuses flights without a joint that moves: the spread of its readings must exceed their noise and the limit.
 fn check_joint_motion(
     input: &CalibrationInput,
     options: &CalibrationOptions,
@@ -163,7 +164,7 @@ fn check_joint_motion(
         frame_sets.iter().filter_map(|frame_set| Some(&frame_set.gimbal.as_ref()?.encoder.angles_rad)).collect();
     let count = readings.len().max(1) as f64;
     let noise = segments::encoder_sigma_rad(frame_sets).powi(2);
-    // The variance of the readings is itself uncertain by this much.
+    // Relative standard deviation of the estimated variance of the readings.
     let doubt = 3.0 * noise * (2.0 / count).sqrt();
     let mut moving = false;
     let mut spreads = Vec::new();
@@ -222,7 +223,7 @@ fn priors(
     }
 }
 
-/// The pose loops, and the lengths of the gaps that they leave.
+/// Solves the pose loops and returns the statistics of their gaps.
 fn close_loops(
     input: &CalibrationInput,
     priors: &Priors,
@@ -284,7 +285,7 @@ fn pixel_report(input: &CalibrationInput, result: &StageResult, camera: Camera) 
     })
 }
 
-/// Rotation and velocity residuals of the intervals over their length.
+/// Rotation and velocity residuals of the IMU intervals, divided by their duration.
 fn imu_residual_report(
     input: &CalibrationInput,
     frame_sets: &[FrameSet],
@@ -305,14 +306,14 @@ fn imu_residual_report(
     })
 }
 
-/// Ranks of the chain over the whole flight, everything else eliminated.
+/// Ranks of the chain over the whole flight, all other unknowns eliminated.
 fn rank(result: &StageResult, visited_rad: &[Vec<f64>]) -> Option<RankReport> {
     let chain = &result.estimate.chain;
     let count = chain.dof();
     let place = (Columns::CHAIN, Columns::CHAIN);
     let block = |matrix: &DMatrix<f64>| matrix.view(place, (count, count)).into_owned();
-    // Beside the chain the border holds mount and time offsets: marginal information of the chain is the inverse of its
-    // covariance.
+    // Beside the chain the border has extrinsics and time offsets: the marginal information of the chain is the
+    // inverse of its covariance.
     let with_priors = block(&result.covariance).cholesky()?.inverse();
     let priors = block(&result.prior_information);
     let measured = &with_priors - &priors;

@@ -1,14 +1,14 @@
-//! What the rig says about the chain, as a least-squares term on its minimal form.
+//! The rig's prior on the chain as a least-squares term in the minimal parameterization.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::gimbal::{Chain, ClassicalChain, auto_parameterization};
 use crate::sensors::ChainPrior;
 
-/// Variance added to every column, so that one that the prior fixes entirely leaves the covariance regular.
+/// Variance added to every column, so that the covariance stays regular when the prior fixes a column.
 const MIN_VARIANCE: f64 = 1e-12;
 
-/// The given chain in the minimal chart that suits it, and how wrong it may be.
+/// The given chain in its best minimal parameterization, with its prior.
 #[derive(Clone, Debug)]
 pub(super) struct ChainTerm {
     pub(super) given: Chain,
@@ -35,17 +35,17 @@ impl ChainTerm {
         Self { given, prior_sigmas, square_root_information }
     }
 
-    /// Whitened deviation from the given chain; every column of a minimal form is a plain number.
+    /// Whitened difference `W·(chain ⊟ given)` (dof).
     pub(super) fn residual(&self, chain: &Chain) -> DVector<f64> {
         &self.square_root_information * chain.minus(&self.given)
     }
 
-    /// Derivative of the residual by a step.
+    /// Derivative of the residual with respect to a step (dof × dof).
     pub(super) fn jacobian(&self) -> &DMatrix<f64> {
         &self.square_root_information
     }
 
-    /// `WᵀW`.
+    /// Prior information `WᵀW` (dof × dof).
     pub(super) fn information(&self) -> DMatrix<f64> {
         self.square_root_information.tr_mul(&self.square_root_information)
     }

@@ -1,29 +1,29 @@
 use thiserror::Error;
 
-/// Why a flight could not be calibrated from.
+/// Why a calibration failed.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum CalibrationError {
-    /// The static camera's estimator never began.
+    /// The estimator of the static camera did not initialize.
     #[error("the static camera '{camera}' gives no trajectory: {reason}; 'dcvins check' says more")]
     NoTrajectory {
         /// Key of the camera.
         camera: String,
-        /// What the estimator waited for.
+        /// Last reason for which the initialization waited.
         reason: String,
     },
-    /// Joints that stand still tell nothing about their axes.
+    /// No joint moves: the joint axes are unobservable.
     #[error(
         "no joint of the gimbal moves by more than {limit_deg:.1}° between {from_s:.1} and {to_s:.1} s ({spreads}): \
          record a flight in which the gimbal looks around"
     )]
     NoJointMotion {
-        /// What counts as motion: standard deviation of a joint's angle.
+        /// Smallest standard deviation of the angle of a moving joint.
         limit_deg: f64,
-        /// Begin of the stretch looked at.
+        /// Start of the examined interval.
         from_s: f64,
-        /// Its end.
+        /// End of the examined interval.
         to_s: f64,
-        /// What was measured, joint by joint.
+        /// Measured standard deviations, joint by joint.
         spreads: String,
     },
     /// Fewer pairs of camera poses than the calibration needs.
@@ -32,21 +32,21 @@ pub enum CalibrationError {
          {needed} are needed ({reason}): record a longer flight with both cameras over textured ground"
     )]
     TooFewMeasurements {
-        /// How many there are.
+        /// Number of measured pairs.
         found: usize,
-        /// How many there should be.
+        /// Required number of pairs.
         needed: usize,
-        /// Begin of the stretch with a trajectory.
+        /// Start of the interval with a trajectory.
         from_s: f64,
-        /// Its end.
+        /// End of the interval with a trajectory.
         to_s: f64,
-        /// What became of the others.
+        /// Why other pairs were not measured.
         reason: String,
     },
     /// A least-squares problem that has no solution.
     #[error("the {stage} did not converge: its equations are singular; 'dcvins check' may say why")]
     Singular {
-        /// Which step.
+        /// Name of the stage.
         stage: &'static str,
     },
 }

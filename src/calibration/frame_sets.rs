@@ -1,4 +1,5 @@
-//! The instants whose states are estimated: an image of the static camera each, and the gimbal camera's image next to it.
+//! Synchronized frame sets, whose states are estimated: an image of the static camera and the next image of the
+//! gimbal camera.
 
 use nalgebra::Vector3;
 
@@ -9,43 +10,44 @@ use crate::estimator::{ImuBias, NavigationState, Preintegration};
 use crate::geometry::{ns_from_seconds, seconds_from_ns, wrap_angle};
 use crate::sensors::{ImuNoise, ImuSample, JointAngles};
 
-/// An image of the gimbal camera belongs to an instant when it was taken at most this long after it.
+/// Largest delay of the gimbal camera's image after the static camera's image of the same frame set.
 const MAX_IMAGE_DELAY_NS: i64 = 60_000_000;
 
-/// The gimbal camera's image that belongs to an instant.
+/// Image of the gimbal camera in a frame set.
 #[derive(Clone, Debug)]
 pub(super) struct GimbalView {
-    /// Its place among the camera's views.
+    /// Index among the camera's views.
     pub(super) view: usize,
-    /// Motion from the instant to the image: so short that it counts as exact.
+    /// Preintegrated motion from the frame set's stamp to this image, so short that it counts as exact.
     pub(super) image_delay: Preintegration,
     /// Angular velocity measured at the image's stamp, in rad/s.
     pub(super) gyroscope_rad_per_s: Vector3<f64>,
-    /// What the encoders say.
+    /// Encoder readings at the image's stamp.
     pub(super) encoder: JointAngles,
-    /// Their rates of change by the readings before and after, in rad/s.
+    /// Rates of change of the readings, from those before and after, in rad/s.
     pub(super) reading_rate_rad_per_s: Vec<f64>,
 }
 
-/// One instant.
+/// An image of the static camera, with the gimbal camera's image that follows it.
 #[derive(Clone, Debug)]
 pub(super) struct FrameSet {
-    /// Since the log began.
+    /// Stamp of the static camera's image since the log started.
     pub(super) stamp_ns: i64,
-    /// Place of the static camera's image among its views.
+    /// Index of the static camera's image among its views.
     pub(super) static_view: usize,
-    /// Angular velocity measured there, in rad/s.
+    /// Angular velocity measured at the stamp, in rad/s.
     pub(super) gyroscope_rad_per_s: Vector3<f64>,
-    /// Bias that is taken off for what happens within milliseconds: the way to the gimbal camera's image, time offsets.
+    /// Bias for intervals of milliseconds: the delay of the gimbal camera's image and the time offsets.
     pub(super) bias: ImuBias,
-    /// Inertial samples since the instant before, and their square-root information; `None` at the first.
+    /// Preintegrated IMU samples since the previous frame set, and their square-root information (15 × 15); `None`
+    /// for the first.
     pub(super) motion: Option<(Preintegration, Matrix15)>,
-    /// The gimbal camera's image.
+    /// Image of the gimbal camera, if there is one close enough.
     pub(super) gimbal: Option<GimbalView>,
 }
 
 impl FrameSet {
-    /// Integrates the inertial samples again around the bias of the state that they begin at.
+    /// Reintegrates the IMU samples with the bias at the start of their interval.
     pub(super) fn reintegrate(&mut self, before: Option<&ImuBias>, here: &ImuBias) {
         if let (Some((motion, information)), Some(bias)) = (&mut self.motion, before) {
             motion.reintegrate(*bias);
@@ -60,13 +62,13 @@ impl FrameSet {
     }
 }
 
-/// All inertial samples in time order.
+/// All IMU samples in time order.
 pub(super) struct ImuBuffer {
     samples: Vec<ImuSample>,
 }
 
 impl ImuBuffer {
-    /// From the stretches that came with the images of a camera.
+    /// Collects the samples of all views of a camera.
     pub(super) fn new(views: &[TrackedView]) -> Self {
         let mut samples: Vec<ImuSample> = Vec::new();
         for sample in views.iter().flat_map(|view| &view.imu) {
@@ -79,7 +81,7 @@ impl ImuBuffer {
         Self { samples }
     }
 
-    /// The sample at a time, linear between its neighbours; the nearest one beyond the ends.
+    /// Sample at a time, interpolated linearly; beyond the ends the nearest sample.
     pub(super) fn at(&self, stamp_ns: i64) -> Option<ImuSample> {
         let after = self.samples.partition_point(|sample| sample.stamp_ns < stamp_ns);
         let Some(next) = self.samples.get(after) else { return self.samples.last().copied() };
@@ -94,7 +96,7 @@ impl ImuBuffer {
         })
     }
 
-    /// The samples of an interval, both ends interpolated.
+    /// Samples of an interval, interpolated at both ends.
     pub(super) fn between(&self, from_ns: i64, to_ns: i64) -> Vec<ImuSample> {
         let inside = self.samples.partition_point(|sample| sample.stamp_ns <= from_ns)
             ..self.samples.partition_point(|sample| sample.stamp_ns < to_ns);
@@ -112,7 +114,7 @@ impl ImuBuffer {
     }
 }
 
-/// The instants of the longest stretch for which the static camera has states, with those states.
+/// Returns the frame sets of the longest interval in which the static camera has states, with those states.
 pub(super) fn frame_sets(
     input: &CalibrationInput,
     options: &CalibrationOptions,
@@ -154,7 +156,7 @@ pub(super) fn frame_sets(
     (frame_sets, chosen.into_iter().map(|(_, state)| state).collect())
 }
 
-/// The first image of the gimbal camera at or after an instant, when it follows closely and has encoder readings.
+/// First image of the gimbal camera at or after a stamp, when its delay is small and it has encoder readings.
 fn gimbal_view(input: &CalibrationInput, tape: &ImuBuffer, stamp_ns: i64, bias: &ImuBias) -> Option<GimbalView> {
     let views = &input.gimbal_camera.views;
     let index = views.partition_point(|view| view.stamp_ns < stamp_ns);
@@ -179,7 +181,7 @@ fn reading_rates(views: &[TrackedView], index: usize) -> Option<Vec<f64>> {
     (duration_s > 0.0).then(|| pairs.map(|(from, to)| wrap_angle(to - from) / duration_s).collect())
 }
 
-/// The longest run of images with a state.
+/// Longest range of consecutive images with a state.
 fn longest_stretch(states: &[Option<NavigationState>]) -> std::ops::Range<usize> {
     let (mut longest, mut begin) = (0..0, 0);
     for index in 0..=states.len() {

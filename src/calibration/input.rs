@@ -1,4 +1,4 @@
-//! What the calibration is given.
+//! Input of the calibration.
 
 use std::sync::Arc;
 
@@ -18,55 +18,55 @@ pub struct TrackedView {
     pub stamp_ns: i64,
     /// IMU samples from the previous image's stamp to this one's, both ends included and interpolated.
     pub imu: Vec<ImuSample>,
-    /// Encoder angles at the stamp with their standard deviations.
+    /// Encoder angles at the stamp, with standard deviations.
     pub joint_angles: Option<JointAngles>,
-    /// The tracked features.
+    /// Tracked features of the image.
     pub tracks: Arc<TrackedFrame>,
 }
 
-/// The static camera as the rig gives it.
+/// The static camera with its given extrinsics.
 #[derive(Clone, Debug)]
 pub struct StaticCamera {
     /// Key in the rig.
     pub key: String,
-    /// Projection.
+    /// Projection model with intrinsics.
     pub model: CameraModel,
-    /// Its pose on the IMU.
+    /// Given extrinsics.
     pub imu_from_camera: RigidTransform,
-    /// How wrong that pose may be.
+    /// Error bounds of the extrinsics.
     pub prior: ChainPrior,
-    /// Its images in time order.
+    /// Images in time order.
     pub views: Vec<TrackedView>,
 }
 
-/// The camera on the gimbal as the rig gives it.
+/// The camera on the gimbal with its given chain.
 #[derive(Clone, Debug)]
 pub struct GimbalCamera {
     /// Key in the rig.
     pub key: String,
-    /// Projection.
+    /// Projection model with intrinsics.
     pub model: CameraModel,
-    /// The chain that carries it.
+    /// Given chain from IMU to camera.
     pub chain: ClassicalChain,
-    /// Names of the joints.
+    /// Joint names, from base to end effector.
     pub joints: Vec<String>,
-    /// How wrong the chain may be.
+    /// Error bounds of the chain.
     pub prior: ChainPrior,
-    /// Its images in time order.
+    /// Images in time order.
     pub views: Vec<TrackedView>,
 }
 
-/// A flight with both cameras.
+/// Tracked images, IMU samples and encoder readings of a flight with both cameras.
 #[derive(Clone, Debug)]
 pub struct CalibrationInput {
     /// The camera fixed to the vehicle.
     pub static_camera: StaticCamera,
     /// The camera on the gimbal.
     pub gimbal_camera: GimbalCamera,
-    /// Noise of the inertial sensor.
+    /// Noise densities of the IMU.
     pub imu_noise: ImuNoise,
     /// Magnitude of gravity in m/s².
     pub gravity_m_per_s2: f64,
-    /// The estimator that flies the static camera for the first trajectory.
+    /// Configuration of the estimator that processes the static camera for the initial trajectory.
     pub estimator: EstimatorConfig,
 }

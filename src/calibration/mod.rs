@@ -1,15 +1,16 @@
 //! The offline calibration that the paper compares against (§5.2), from a flight log alone.
 //!
-//! Where the paper takes a calibration target and a prebuilt map, this takes the flight itself:
+//! The paper uses a calibration target and a prebuilt map; this calibration uses the flight itself:
 //!
-//! 1. *Camera–IMU.* The static camera flies through the sliding-window estimator; a bundle over the whole flight then
-//!    adjusts its trajectory, its pose on the IMU and its time offset to all its tracks and the inertial samples.
-//! 2. *Pose loops.* The gimbal camera's poses are reconstructed from its own images, stretch by stretch, and paired with the
-//!    static camera's: static pose, then the chain, must lead to the gimbal pose. Unknown are the chain with the rig's
-//!    prior, every joint angle with its encoder's, and where each stretch lies on the map.
-//! 3. *Pixels.* One bundle of both cameras: every sighting, the inertial samples, encoders and priors, all unknowns at once.
+//! 1. *Camera–IMU.* The sliding-window estimator processes the static camera. A bundle adjustment over the
+//! whole flight then refines trajectory, extrinsics and time offset from all tracks and the IMU samples.
+//! 2. *Pose loops.* The gimbal camera's poses are reconstructed from its own images, segment by segment, and
+//! paired with the static camera's: static pose and chain must give the gimbal camera's pose. Unknown are the
+//! chain with the rig's prior, every joint angle with its encoder reading, and the frame of each segment.
+//! 3. *Pixels.* One bundle adjustment of both cameras: all observations, IMU samples, encoder readings and
+//! priors, all unknowns at once.
 //!
-//! The chain is written in the minimal form whose chart suits it, so that every column can be told.
+//! The chain has its best minimal parameterization, in which every column is observable under sufficient excitation.
 
 mod arrow;
 mod bundle;

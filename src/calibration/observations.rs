@@ -1,4 +1,4 @@
-//! From the front ends' tracks to the bundle's: which landmark was seen at which instants.
+//! Converts the front ends' tracks to those of the bundle.
 
 use std::collections::BTreeMap;
 
@@ -12,7 +12,7 @@ use super::{CalibrationInput, CalibrationOptions};
 use crate::frontend::{FeatureId, TrackedFrame};
 use crate::optimization::CameraPose;
 
-/// What a camera saw at an instant.
+/// Tracked features of a camera in a frame set.
 pub(super) fn tracked<'a>(
     input: &'a CalibrationInput,
     frame_set: &FrameSet,
@@ -24,8 +24,8 @@ pub(super) fn tracked<'a>(
     }
 }
 
-/// The tracks of one camera over the instants that `wanted` admits, cut into pieces that span no more instants than the
-/// options say; neighbouring pieces of one track share no sighting.
+/// Collects the tracks of one camera over the frame sets that `wanted` accepts, cut to the largest length of
+/// the options; the parts of one track share no observation.
 pub(super) fn collect(
     input: &CalibrationInput,
     options: &CalibrationOptions,
@@ -57,7 +57,7 @@ pub(super) fn collect(
     finished
 }
 
-/// Landmarks of the tracks at the present poses; tracks without one are left out.
+/// Triangulates the tracks with the present poses; tracks without a landmark are omitted.
 pub(super) fn triangulated(
     tracks: Vec<Track>,
     poses: &BTreeMap<ViewId, CameraPose>,
@@ -77,7 +77,8 @@ pub(super) fn triangulated(
         .unzip()
 }
 
-/// Drops the sightings beyond `limit` standard deviations of their camera, and landmarks that keep too few.
+/// Drops observations with residuals beyond `limit` standard deviations, and landmarks with too few
+/// observations left.
 pub(super) fn without_outliers(
     tracks: Vec<Track>,
     landmarks: &[AnchoredLandmark],
@@ -101,7 +102,7 @@ pub(super) fn without_outliers(
         .unzip()
 }
 
-/// Lengths of the residuals of one camera in pixels.
+/// Lengths of the reprojection residuals of one camera, in pixels.
 pub(super) fn residual_lengths_px(
     tracks: &[Track],
     landmarks: &[AnchoredLandmark],

@@ -1,31 +1,31 @@
-/// Tunables of the calibration.
+/// Options of the calibration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CalibrationOptions {
-    /// Time between the instants whose states are estimated, in seconds.
+    /// Time between frame sets, in seconds.
     pub spacing_s: f64,
-    /// A track is cut so that none spans more instants than this: it bounds the work.
+    /// Longest track in frame sets; longer ones are cut, which bounds the computing time.
     pub max_frame_sets_per_track: usize,
-    /// Fewest sightings of a landmark.
+    /// Smallest number of observations of a landmark.
     pub min_observations: usize,
-    /// Rays of a landmark must open this far, in radians.
+    /// Smallest angle between two rays of a landmark, in radians.
     pub min_parallax_rad: f64,
-    /// Most iterations of one adjustment.
+    /// Largest number of iterations of one adjustment.
     pub iterations: usize,
-    /// An adjustment ends when a step lowers its cost by less than this share.
+    /// An adjustment has converged when a step lowers its cost by less than this fraction.
     pub relative_cost_tolerance: f64,
-    /// Adjustments of the bundle, outliers dropped between them.
+    /// Number of bundle adjustments; outliers are dropped between them.
     pub rounds: usize,
-    /// Sightings beyond this many standard deviations are dropped.
+    /// Observations with residuals beyond this many standard deviations are dropped.
     pub outlier_sigmas: f64,
-    /// Views in one reconstruction of the gimbal camera's poses.
+    /// Largest number of views in one reconstruction of the gimbal camera's poses.
     pub segment_views: usize,
-    /// Fewest pairs of poses; the paper takes 39.
+    /// Smallest number of pairs of poses; the paper uses 39.
     pub min_measurements: usize,
-    /// A joint counts as moving when its angle's standard deviation exceeds this, in radians.
+    /// Smallest standard deviation of the angle of a moving joint, in radians.
     pub min_joint_motion_rad: f64,
-    /// Standard deviation of a camera's unknown time offset, in seconds.
+    /// Prior standard deviation of a camera's time offset, in seconds.
     pub time_shift_sigma_s: f64,
-    /// Standard deviation of the biases about zero at the begin, in rad/s and m/s².
+    /// Prior standard deviations of the first biases about zero, in rad/s and m/s².
     pub bias_sigmas: (f64, f64),
 }
 

@@ -1,124 +1,124 @@
-//! What a calibration came to, as plain numbers.
+//! Result of a calibration as plain numbers.
 
 use super::statistics::Statistics;
 use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::{ClassicalChain, ParameterId};
 use crate::observability::RankReport;
 
-/// One calibrated number.
+/// Value of one calibrated parameter, in radians, metres or seconds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CalibratedParameter {
-    /// Which of the chain's.
+    /// Identity of the parameter.
     pub parameter: ParameterId,
-    /// What the rig gave.
+    /// Value in the given rig.
     pub initial: f64,
-    /// What the calibration found.
+    /// Calibrated value.
     pub value: f64,
-    /// Its standard deviation.
+    /// Posterior standard deviation.
     pub sigma: f64,
-    /// Its standard deviation by the rig alone.
+    /// Prior standard deviation.
     pub prior_sigma: f64,
 }
 
-/// Residuals of one camera.
+/// Reprojection residuals of one camera.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PixelReport {
     /// Key of the camera.
     pub camera: String,
-    /// Landmarks with a sighting by this camera.
+    /// Number of landmarks with an observation by this camera.
     pub landmarks: usize,
     /// Lengths of the residuals in pixels.
     pub residuals_px: Statistics,
-    /// Standard deviation of a pixel's coordinate by their median.
+    /// Standard deviation of a pixel coordinate, estimated from the median residual.
     pub sigma_px: f64,
 }
 
-/// What the inertial samples disagree by with the adjusted motion.
+/// Residuals of the IMU samples after the adjustment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImuResidualReport {
-    /// Mean angular velocity between instants against the gyroscope's, in rad/s.
+    /// Mean angular velocity between frame sets minus the gyroscope's, in rad/s.
     pub gyroscope_rad_per_s: Statistics,
-    /// Mean acceleration between instants against the accelerometer's, in m/s².
+    /// Mean acceleration between frame sets minus the accelerometer's, in m/s².
     pub accelerometer_m_per_s2: Statistics,
 }
 
-/// The chain by the pose loops alone.
+/// Chain calibrated by the pose loops alone.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PoseLoopReport {
-    /// Reconstructions of the gimbal camera.
+    /// Number of reconstructions of the gimbal camera.
     pub segments: usize,
-    /// Pairs of camera poses.
+    /// Number of pairs of camera poses.
     pub pairs: usize,
-    /// Pairs that kept at least half of their weight.
+    /// Number of pairs with a robust weight of at least one half.
     pub fitting: usize,
-    /// Lengths of the gaps of the loops in metres.
+    /// Lengths of the position gaps of the loops, in metres.
     pub gaps_m: Statistics,
-    /// Standard deviation of a measured position per coordinate, by their median.
+    /// Standard deviation of a measured position per coordinate, estimated from the median gap, in metres.
     pub position_sigma_m: f64,
-    /// The chain.
+    /// Calibrated chain.
     pub chain: ClassicalChain,
-    /// Standard deviations of the chain's parameters if measured poses erred independently; what the poses of one
-    /// reconstruction have in common is not in them.
+    /// Standard deviations of the chain's parameters for independent errors of the measured poses; common errors of
+    /// the poses of one reconstruction are not included.
     pub sigmas: Vec<f64>,
-    /// Steps of the solver.
+    /// Number of solver iterations.
     pub iterations: usize,
 }
 
-/// The static camera's pose on the IMU after a stage.
+/// Extrinsics of the static camera after a stage.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExtrinsicsReport {
-    /// What the rig gave.
+    /// Extrinsics in the given rig.
     pub initial: RigidTransform,
-    /// What was found.
+    /// Calibrated extrinsics.
     pub imu_from_camera: RigidTransform,
-    /// Its standard deviations, `[φ; t]` in radians and metres.
+    /// Standard deviations of `[φ; t]`, in radians and metres.
     pub sigmas: [f64; 6],
-    /// What is to be added to the rig's time offset, in seconds, and its standard deviation.
+    /// Correction of the rig's time offset and its standard deviation, in seconds.
     pub time_shift_s: (f64, f64),
 }
 
 /// The result of an offline calibration.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CalibrationOutcome {
-    /// Begin and end of the stretch that was used, since the log began.
+    /// Start and end of the used interval since the log started.
     pub stretch_ns: (i64, i64),
-    /// Instants whose states were estimated.
+    /// Number of frame sets.
     pub frame_sets: usize,
-    /// Static camera and IMU alone.
+    /// Extrinsics after the stage with static camera and IMU alone.
     pub static_camera_imu: ExtrinsicsReport,
-    /// Residuals of that stage.
+    /// Reprojection residuals of that stage.
     pub static_pixels: PixelReport,
-    /// The pose loops.
+    /// Result of the pose loops.
     pub pose_loop: PoseLoopReport,
-    /// The static camera after the bundle of both cameras.
+    /// Extrinsics of the static camera after the bundle of both cameras.
     pub extrinsics: ExtrinsicsReport,
-    /// What is to be added to the gimbal camera's time offset, in seconds, and its standard deviation.
+    /// Correction of the gimbal camera's time offset and its standard deviation, in seconds.
     pub gimbal_time_shift_s: (f64, f64),
-    /// The chain after the bundle.
+    /// Chain after the bundle of both cameras.
     pub chain: ClassicalChain,
-    /// The chain as the rig gave it.
+    /// Chain in the given rig.
     pub given_chain: ClassicalChain,
-    /// Name of the form that was estimated.
+    /// Name of the estimated parameterization.
     pub parameterization: &'static str,
-    /// The chain's parameters.
+    /// Parameters of the chain, in the order of its columns.
     pub parameters: Vec<CalibratedParameter>,
-    /// Residuals of the bundle, static camera first.
+    /// Reprojection residuals of the bundle, static camera first.
     pub pixels: [PixelReport; 2],
-    /// Steps of the solver: static camera alone, both cameras.
+    /// Solver iterations of the static camera alone and of both cameras.
     pub iterations: [usize; 2],
     /// Residuals of the inertial samples.
     pub inertial: ImuResidualReport,
-    /// Observability of the chain in the whole flight.
+    /// Observability of the chain over the whole flight.
     pub rank: Option<RankReport>,
-    /// Joint angles of the measurements, as estimated.
+    /// Estimated joint angles of all measurements, in radians.
     pub visited_rad: Vec<Vec<f64>>,
-    /// What a user should know.
+    /// Problems that did not stop the calibration.
     pub warnings: Vec<String>,
 }
 
-/// Distance of a chain from another one over joint angles: translation in metres, rotation in radians.
+/// Distance of a chain from a reference over joint angles: translation in metres, rotation in radians.
 ///
-/// `None` without angles.
+/// `None` without joint angles.
 pub fn chain_distance(
     chain: &ClassicalChain,
     reference: &ClassicalChain,
@@ -131,7 +131,7 @@ pub fn chain_distance(
     Some((Statistics::of(&translations)?, Statistics::of(&rotations)?))
 }
 
-/// Distance and angle between two transforms, in metres and radians.
+/// Distance between two transforms: translation in metres, rotation angle in radians.
 pub fn transform_distance(transform: &RigidTransform, reference: &RigidTransform) -> (f64, f64) {
     (
         (transform.translation_m - reference.translation_m).norm(),

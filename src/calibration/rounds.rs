@@ -1,4 +1,4 @@
-//! The bundle in rounds: triangulate, adjust, drop what does not fit, learn how exact pixels are.
+//! Bundle adjustment in rounds: triangulate, adjust, drop outliers, estimate the pixel noise.
 
 use nalgebra::{DMatrix, Vector3};
 
@@ -12,19 +12,19 @@ use crate::camera::CameraModel;
 use crate::geometry::median;
 use crate::optimization::RobustLoss;
 
-/// What a tracked pixel is worth before the residuals say, per coordinate.
+/// Standard deviation of a tracked pixel coordinate before residuals are available.
 const INITIAL_SIGMA_PX: f64 = 1.0;
-/// No tracker is better than this, per coordinate.
+/// Smallest standard deviation of a tracked pixel coordinate.
 const MIN_SIGMA_PX: f64 = 0.05;
-/// Standard deviations up to which the loss is quadratic.
+/// Range of the quadratic part of the robust loss, in standard deviations.
 const HUBER_SIGMAS: f64 = 1.5;
 /// Median length of a two-dimensional normal error, in standard deviations of a coordinate.
 const MEDIAN_LENGTH: f64 = 1.177_410_022_515_474_7;
 
-/// What the rounds of one stage share.
+/// Input that the rounds of one stage share.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stage<'a> {
-    /// For messages.
+    /// Name in messages.
     pub(super) name: &'static str,
     pub(super) cameras: [&'a CameraModel; 2],
     pub(super) gravity_in_world: Vector3<f64>,
@@ -32,24 +32,24 @@ pub(super) struct Stage<'a> {
     pub(super) options: &'a CalibrationOptions,
 }
 
-/// How a stage ended.
+/// Result of a stage.
 #[derive(Clone, Debug)]
 pub(super) struct StageResult {
     pub(super) estimate: Estimate,
     pub(super) tracks: Vec<Track>,
-    /// Standard deviation of a pixel's coordinate of each camera, as the residuals show it.
+    /// Standard deviation of a pixel coordinate of each camera, estimated from the residuals.
     pub(super) sigma_px: [f64; 2],
     pub(super) iterations: usize,
-    /// Covariance of the border.
+    /// Covariance of the border's unknowns (borders × borders).
     pub(super) covariance: DMatrix<f64>,
-    /// Information of the priors on the border.
+    /// Information matrix of the priors on the border (borders × borders).
     pub(super) prior_information: DMatrix<f64>,
-    /// Residual lengths of each camera in pixels.
+    /// Lengths of the reprojection residuals of each camera, in pixels.
     pub(super) residuals_px: [Vec<f64>; 2],
 }
 
 impl StageResult {
-    /// Where the unknowns have their columns.
+    /// Column layout of the unknowns.
     pub(super) fn columns(&self) -> Columns {
         columns(&self.estimate)
     }
@@ -101,7 +101,7 @@ impl Stage<'_> {
             Self::reintegrate(frame_sets, &estimate);
             let poses = self.bundle(frame_sets, columns, all_tracks, sigma_px).poses(&estimate);
             let (tracks, landmarks) = observations::triangulated(all_tracks.to_vec(), &poses, self.options);
-            // The first poses are rough: what does not fit them may fit later.
+            // The first poses are inaccurate: observations that are outliers now may be inliers later.
             let limit = if round == 0 { 30.0 / INITIAL_SIGMA_PX } else { self.options.outlier_sigmas };
             let pixels = self.pixels(sigma_px);
             let (tracks, landmarks) =

@@ -1,5 +1,5 @@
-//! Measured poses of the gimbal camera: short reconstructions from its images alone, each in a frame and a unit of length
-//! of its own.
+//! Measured poses of the gimbal camera: short reconstructions from its images alone, each with its own frame
+//! and unit of length.
 
 use nalgebra::UnitQuaternion;
 
@@ -13,32 +13,32 @@ use crate::estimator::initialization::{InitializationOptions, ReconstructionGues
 use crate::frontend::TrackedFeature;
 use crate::geometry::RigidTransform;
 
-/// A reconstruction breaks off where neighbouring views share fewer features.
+/// A segment ends where neighbouring views have fewer common features.
 const MIN_COMMON: usize = 25;
-/// Fewest views of a reconstruction: its frame and unit take seven of their six equations each.
+/// Smallest number of views of a segment; its frame and unit alone take seven unknowns.
 const MIN_VIEWS: usize = 6;
 
 /// One reconstruction.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Segment {
-    /// The instants of its views, rising.
+    /// Frame sets of its views, ascending.
     pub(super) frame_sets: Vec<usize>,
     /// `segment_from_camera` of each, translations in the segment's unit.
     pub(super) poses: Vec<RigidTransform>,
 }
 
-/// How many views of the gimbal camera there were, and what became of them.
+/// Numbers of gimbal camera views by their use.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct SegmentCounts {
-    /// Instants with an image of the gimbal camera and encoder readings.
+    /// Frame sets with an image of the gimbal camera and encoder readings.
     pub(super) offered: usize,
-    /// Of these, in stretches too short to reconstruct.
+    /// Of these, in runs too short to reconstruct.
     pub(super) broken: usize,
-    /// Of these, in stretches whose reconstruction failed, for lack of parallax mostly.
+    /// Of these, in failed reconstructions, mostly for lack of parallax.
     pub(super) unsolved: usize,
 }
 
-/// Reconstructs the gimbal camera over the whole flight, stretch by stretch.
+/// Reconstructs the gimbal camera's poses over the whole flight, segment by segment.
 pub(super) fn reconstruct(
     input: &CalibrationInput,
     options: &CalibrationOptions,
@@ -47,7 +47,8 @@ pub(super) fn reconstruct(
 ) -> (Vec<Segment>, SegmentCounts) {
     let gravity = gravity_in_world(input.gravity_m_per_s2);
     let gimbal = &input.gimbal_camera;
-    // Guesses of the turns between views: two readings on each joint, and the part of the chain's error that turns along.
+    // Standard deviation of the predicted rotations between views: two readings per joint, and the part of the
+    // chain's error that rotates with the joints.
     let joints = gimbal.chain.joint_count() as f64;
     let chain_rad = gimbal.prior.sigmas().1;
     let sigma_rad =
@@ -91,7 +92,8 @@ pub(super) fn encoder_sigma_rad(frame_sets: &[FrameSet]) -> f64 {
     (sum / count.max(1) as f64).sqrt()
 }
 
-/// Runs of neighbouring instants whose gimbal views share features, none longer than the options say.
+/// Runs of neighbouring frame sets whose gimbal images have common features, cut to the largest length of the
+/// options.
 fn stretches(
     input: &CalibrationInput,
     options: &CalibrationOptions,
@@ -121,7 +123,7 @@ fn stretches(
     long
 }
 
-/// Number of features that two images share; both are ordered by id.
+/// Number of common features of two images; both lists are ordered by id.
 fn common(first: &[TrackedFeature], second: &[TrackedFeature]) -> usize {
     let mut rest = second.iter().peekable();
     first

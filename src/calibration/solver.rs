@@ -7,18 +7,18 @@ use super::bundle::{Bundle, BundleEquations};
 use super::state::Estimate;
 use crate::optimization::damped::{DampedOptions, DampedProblem, minimize};
 
-/// Added to the diagonal so that an unknown without any factor stays where it is.
+/// Added to the diagonal so that unknowns without a factor do not move.
 const FLOOR: f64 = 1e-6;
 
-/// How an adjustment ended.
+/// Result of an adjustment.
 #[derive(Clone, Debug)]
 pub(super) struct Adjusted {
     pub(super) estimate: Estimate,
-    /// Steps tried, accepted or not.
+    /// Number of tried steps, accepted or not.
     pub(super) iterations: usize,
 }
 
-/// Lowers the bundle's cost from `start`; `None` when not even the first equations can be solved.
+/// Minimizes the bundle's cost from `start`; `None` when the first equations are singular.
 pub(super) fn adjust(bundle: &Bundle<'_>, start: Estimate, options: &CalibrationOptions) -> Option<Adjusted> {
     let options = DampedOptions {
         iterations: options.iterations,
@@ -32,7 +32,7 @@ pub(super) fn adjust(bundle: &Bundle<'_>, start: Estimate, options: &Calibration
     (!solution.iterations.is_empty()).then_some(Adjusted { estimate: solution.estimate, iterations: solution.tried })
 }
 
-/// The bundle as the damped solver sees it.
+/// The bundle as a problem of the damped solver.
 struct DampedBundle<'a>(&'a Bundle<'a>);
 
 impl DampedProblem for DampedBundle<'_> {
@@ -59,7 +59,7 @@ impl DampedProblem for DampedBundle<'_> {
     }
 }
 
-/// Covariance of the border's unknowns, everything else eliminated.
+/// Covariance of the border's unknowns (borders × borders), all other unknowns eliminated.
 pub(super) fn border_covariance(bundle: &Bundle<'_>, estimate: &Estimate) -> Option<DMatrix<f64>> {
     let equations = bundle.linearize(estimate);
     let reduced = equations.visual().eliminate(0.0);

@@ -1,4 +1,4 @@
-//! The unknowns of the bundle and where each has its columns.
+//! Unknowns of the bundle and their columns.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
@@ -10,12 +10,12 @@ use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::Chain;
 use crate::optimization::CameraPose;
 
-/// Pose and velocity, which come first in an instant's block.
+/// Number of columns of pose and velocity, which come first in a frame set's block.
 const MOTION: usize = 9;
-/// All of a navigation state.
+/// Number of columns of a navigation state.
 const NAVIGATION: usize = 15;
 
-/// Which camera a view belongs to.
+/// Camera of a view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Camera {
     /// The one fixed to the vehicle.
@@ -24,7 +24,7 @@ pub(super) enum Camera {
     Gimbal,
 }
 
-/// An image in the bundle: an instant and a camera.
+/// Image in the bundle: a frame set and a camera.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct ViewId(pub(super) usize);
 
@@ -45,22 +45,22 @@ impl ViewId {
 /// Values of all unknowns.
 #[derive(Clone, Debug)]
 pub(super) struct Estimate {
-    /// By instant.
+    /// States by frame set.
     pub(super) navigation: Vec<NavigationState>,
-    /// Joint angles at the gimbal camera's image, without the static offsets; by instant.
+    /// Joint angles at the gimbal camera's image, without static offsets, by frame set.
     pub(super) joints_rad: Vec<Vec<f64>>,
     /// `imu_from_camera` of the static camera.
     pub(super) extrinsics: RigidTransform,
-    /// `t_imu = t_cam + shift`, beyond what the rig says, of the static and the gimbal camera, in seconds.
+    /// Corrections of the rig's time offsets of static and gimbal camera, `t_imu = t_cam + shift`, in seconds.
     pub(super) shifts_s: [f64; 2],
     /// The gimbal's chain.
     pub(super) chain: Chain,
-    /// In the order of the tracks.
+    /// Landmarks in the order of the tracks.
     pub(super) landmarks: Vec<AnchoredLandmark>,
 }
 
-/// Columns: a block per instant, `[φ p v | joints | b_g b_a]`, and the border that all instants share,
-/// `[extrinsics 6 | static shift | chain | gimbal shift]`.
+/// Column layout: a block per frame set, `[φ p v | joints | b_g b_a]`, and the border that all frame sets
+/// share, `[extrinsics 6 | static shift | chain | gimbal shift]`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Columns {
     pub(super) frame_sets: usize,
@@ -89,12 +89,12 @@ impl Columns {
         self.frame_sets * self.block()
     }
 
-    /// Columns that move a view directly: pose, velocity and joints of its instant.
+    /// Number of columns that move a view directly: pose, velocity and joints of its frame set.
     pub(super) fn own(&self) -> usize {
         MOTION + self.joints
     }
 
-    /// Column of an entry of the navigation state within the block.
+    /// Column of a navigation state's entry within the block.
     pub(super) fn navigation(&self, entry: usize) -> usize {
         if entry < MOTION { entry } else { entry + self.joints }
     }
@@ -106,7 +106,7 @@ impl Columns {
 }
 
 impl Estimate {
-    /// The estimate moved by a step of the band, of the border and of the landmarks.
+    /// Returns the estimate after a step of band, border and landmarks.
     pub(super) fn moved(
         &self,
         columns: &Columns,
@@ -132,8 +132,8 @@ impl Estimate {
         moved
     }
 
-    /// The state of the vehicle when a view was taken, its rotation over the time shift left out, with the angular velocity
-    /// there.
+    /// State of the vehicle at a view and its angular velocity there; the rotation over the time shift is not
+    /// applied.
     fn vehicle_at(
         &self,
         view: ViewId,
@@ -150,7 +150,7 @@ impl Estimate {
         }
     }
 
-    /// `world_from_imu` when a view was taken.
+    /// Returns `world_from_imu` at a view.
     pub(super) fn world_from_imu(
         &self,
         view: ViewId,
@@ -172,12 +172,12 @@ impl Estimate {
         }
     }
 
-    /// Pose of a view.
+    /// Returns `world_from_camera` of a view.
     pub(super) fn view(&self, view: ViewId, frame_sets: &[FrameSet], gravity: &Vector3<f64>) -> CameraPose {
         (self.world_from_imu(view, frame_sets, gravity) * self.imu_from_camera(view)).into()
     }
 
-    /// How the pose of a view follows the unknowns.
+    /// Returns the Jacobian of a view's pose with respect to the unknowns.
     pub(super) fn view_map(
         &self,
         view: ViewId,
@@ -194,7 +194,7 @@ impl Estimate {
         let image_delay = frame_sets[frame_set].gimbal.as_ref().filter(|_| gimbal).map(|gimbal| &gimbal.image_delay);
         let world_from_imu: Matrix3<f64> =
             (state.world_from_imu.rotation * so3::exp(&(rate * shift_s))).to_rotation_matrix().into_inner();
-        // From the instant's body axes to the camera.
+        // From the IMU axes of the frame set to the camera axes.
         let imu_from_node = world_from_imu.tr_mul(&node);
         let (lag_s, carried) = image_delay.map_or_else(
             || (0.0, Vector3::zeros()),
@@ -234,11 +234,11 @@ impl Estimate {
     }
 }
 
-/// `[φ; δt]` of `world_from_camera` of one view by the unknowns.
+/// Jacobian of `[φ; δt]` of one view's `world_from_camera` with respect to the unknowns.
 #[derive(Clone, Debug)]
 pub(super) struct ViewMap {
-    /// By pose, velocity and joints of its instant (6 × own).
+    /// With respect to pose, velocity and joints of its frame set (6 × own).
     pub(super) own: DMatrix<f64>,
-    /// By the border (6 × borders).
+    /// With respect to the border (6 × borders).
     pub(super) shared: DMatrix<f64>,
 }

@@ -1,4 +1,4 @@
-//! The first trajectory: the static camera through the sliding-window estimator.
+//! Initial trajectory: the sliding-window estimator processes the static camera.
 
 use std::collections::BTreeMap;
 
@@ -6,8 +6,8 @@ use super::CalibrationError;
 use super::input::StaticCamera;
 use crate::estimator::{Estimator, EstimatorConfig, EventKind, ImuBias, NavigationState, StepInput};
 
-/// State of every image of the static camera as the estimator last knew it, `None` where it was not running; a restart
-/// leaves a gap of one image, so that stretches before and after it are told apart.
+/// Returns the last estimated state of every image of the static camera, `None` where the estimator was not
+/// running. A restart leaves a gap of one image between the intervals.
 pub(super) fn estimate_trajectory(
     camera: &StaticCamera,
     config: &EstimatorConfig,

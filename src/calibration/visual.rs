@@ -1,4 +1,4 @@
-//! The reprojection factors of the bundle by view poses, with the landmarks eliminated.
+//! Reprojection factors of the bundle over view poses, with landmarks eliminated.
 
 use std::collections::BTreeMap;
 
@@ -11,26 +11,26 @@ use crate::optimization::{
     CameraPose, ReducedEquations, RelativePose, ReprojectionEquations, RobustLoss, SparsePoseEquations, reprojection,
 };
 
-/// One measurement of a landmark.
+/// An observation of a landmark in one view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Observation {
     pub(super) view: ViewId,
     pub(super) uv_px: Vector2<f64>,
-    /// Unit direction in the camera.
+    /// Unit bearing in the camera.
     pub(super) bearing: Vector3<f64>,
 }
 
-/// All sightings of one landmark, views rising.
+/// All observations of one landmark, views ascending.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Track {
     pub(super) observations: Vec<Observation>,
 }
 
-/// How pixels are weighed: camera models by [`super::state::Camera`], static one first.
+/// Pixel noise and camera models, indexed by [`super::state::Camera`].
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PixelModel<'a> {
     pub(super) cameras: [&'a CameraModel; 2],
-    /// Standard deviation of a pixel of each camera.
+    /// Standard deviation of a pixel coordinate of each camera.
     pub(super) sigma_px: [f64; 2],
     pub(super) loss: RobustLoss,
 }
@@ -40,7 +40,7 @@ impl PixelModel<'_> {
         view.0 % 2
     }
 
-    /// Residual in pixels, `None` when the landmark cannot be seen.
+    /// Reprojection residual in pixels (2 × 1), `None` when the landmark does not project into the camera.
     pub(super) fn residual_px(
         &self,
         poses: &BTreeMap<ViewId, CameraPose>,
@@ -52,7 +52,7 @@ impl PixelModel<'_> {
         reprojection::residual(camera, &relative, &anchored.landmark, &observation.uv_px)
     }
 
-    /// Robust cost of all sightings, twice the halved sum.
+    /// Sum of the robust squared residuals of all observations, twice the cost.
     pub(super) fn cost(
         &self,
         poses: &BTreeMap<ViewId, CameraPose>,
@@ -92,7 +92,7 @@ pub(super) fn equations(
             let term = reprojection::linearize(camera, &relative, &relative, &anchored.landmark, &observation.uv_px)?;
             Some((observation.view, term.whitened(model.sigma_px[camera_index], model.loss)))
         });
-        // The anchors are fixed: only the observing views have columns.
+        // Anchors are fixed: only observing views have columns.
         equations.add_landmark(None, track.observations.len(), terms);
     }
     equations

@@ -16,7 +16,7 @@ use crate::simulation::{SyntheticMotion, SyntheticOptions};
 
 const STEP: f64 = 1e-6;
 
-/// A short flight whose gimbal images lie 50 ms after the static ones, at an estimate away from the truth.
+/// A short flight whose gimbal images are 50 ms after the static ones, at an estimate away from the ground truth.
 struct Example {
     flight: Flight,
     frame_sets: Vec<FrameSet>,
@@ -130,7 +130,7 @@ fn view_jacobians_meet_central_differences() {
                 border[k] = step;
                 border
             };
-            // The turn by the time shift is taken to first order in the shift.
+            // The rotation over the time shift is of first order in the shift.
             assert!(
                 (slope(&still_band, &border) - map.shared.column(k)).amax()
                     < 2e-2 * map.shared.column(k).amax().max(1e-4),

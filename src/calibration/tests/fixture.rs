@@ -9,7 +9,7 @@ use crate::gimbal::{ClassicalChain, Parameterization};
 use crate::sensors::{CameraMount, ChainPrior, Rig};
 use crate::simulation::{SyntheticFlight, SyntheticFrame, SyntheticMount, SyntheticOptions, synthetic_tracks};
 
-/// A flight seen by both cameras, and the truth.
+/// A flight with both cameras and its ground truth.
 pub(super) struct Flight {
     pub(super) input: CalibrationInput,
     pub(super) true_extrinsics: RigidTransform,
@@ -17,7 +17,7 @@ pub(super) struct Flight {
     rigid: SyntheticFlight,
 }
 
-/// The true state at every image of the static camera.
+/// Ground-truth state at every image of the static camera.
 pub(super) fn true_states(flight: &Flight) -> Vec<NavigationState> {
     let state = |frame: &SyntheticFrame| NavigationState {
         world_from_imu: frame.true_world_from_imu,
@@ -51,7 +51,7 @@ fn views(flight: &SyntheticFlight, encoder_sigma_rad: f64) -> Vec<TrackedView> {
         .collect()
 }
 
-/// The same flight with either camera: one seed gives one trajectory and one inertial record.
+/// The same flight with either camera: one seed gives one trajectory and one series of IMU samples.
 pub(super) fn flight(options: &SyntheticOptions) -> Flight {
     let gimbal = synthetic_tracks(&SyntheticOptions { mount: SyntheticMount::Gimbal, ..options.clone() });
     let rigid = synthetic_tracks(&SyntheticOptions { mount: SyntheticMount::Static, ..options.clone() });

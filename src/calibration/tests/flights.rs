@@ -1,4 +1,4 @@
-//! Whole synthetic flights against their truth.
+//! Whole synthetic flights against their ground truth.
 
 use super::fixture::flight;
 use crate::calibration::{CalibrationError, CalibrationOptions, calibrate, chain_distance, transform_distance};

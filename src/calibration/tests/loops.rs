@@ -177,7 +177,8 @@ fn noisy_encoders_leave_the_chain_within_its_sigmas() {
     assert!((ratio - 1.0).abs() < 4.0 * (2.0 / count).sqrt(), "normalized square of the error {ratio}");
 }
 
-/// With still joints only one rigid transform can be told: the parameters stay as uncertain as they were, but it is found.
+/// Stationary joints determine one rigid transform only: the parameters keep their prior uncertainty, the
+/// transform is found.
 #[test]
 fn stationary_joints_leave_unobservable_directions_at_the_prior() {
     let moving = example(5, 0.01, (0.0, 0.0), false);

@@ -287,6 +287,9 @@ fn keys_of_kalibr_without_a_use_are_listed() {
     // An unknown key of the IMU's own file is named with that file.
     fs::write(folder.path().join("imu.yaml"), format!("{IMU}updaterate: 1\n")).unwrap();
     let message = Rig::for_log(&log, Some(&chain)).unwrap_err().to_string();
-    assert!(message.starts_with("updaterate: unknown key, the nearest known key is 'update_rate', line 7"), "{message}");
+    assert!(
+        message.starts_with("updaterate: unknown key, the nearest known key is 'update_rate', line 7"),
+        "{message}"
+    );
     assert!(message.ends_with("imu.yaml"), "{message}");
 }
