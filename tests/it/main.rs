@@ -4,6 +4,7 @@ mod check;
 mod command_line;
 mod convert;
 mod degeneracy;
+mod dependencies;
 mod documentation;
 mod evaluate;
 mod layering;
