@@ -1,0 +1,233 @@
+//! Writes the seed corpus: valid inputs of every fuzz target, `corpus/TARGET/NAME`.
+//!
+//! `cargo run --release --manifest-path fuzz/Cargo.toml --bin seeds -- fuzz/corpus`
+
+#[path = "../../../tests/it/convert/ros1.rs"]
+mod ros1;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use dcvins::camera::{CameraModel, Distortion, Projection};
+use dcvins::flight_log::{LogCompression, LogWriter, LogWriterOptions, MessageKind, MessageTimes};
+use dcvins::geometry::RigidTransform;
+use dcvins::sensors::Rig;
+use dcvins_fuzz::{EUROC_FILES, RIG, topic_of};
+use libfuzzer_sys as _; // it defines what the counters of the build call
+use nalgebra::Vector3;
+use ros1::{Compression, Message, bag, f64_sequence, f64s, header, text};
+use rusqlite::Connection;
+
+type Failed = Box<dyn std::error::Error>;
+
+/// Header stamp of the first message.
+const EPOCH_NS: i64 = 1_700_000_000_250_000_000;
+/// Width and height of the images.
+const RESOLUTION_PX: [usize; 2] = [16, 12];
+/// A PNG image of 16 × 12 gray pixels, all 0.
+const PNG: &[u8] = include_bytes!("../gray.png");
+
+fn times(index: i64) -> MessageTimes {
+    let stamp_ns = EPOCH_NS + 5_000_000 * index;
+    MessageTimes { stamp_ns, log_time_ns: stamp_ns + 1_000_000 }
+}
+
+/// A log with messages of every type over 0.5 s.
+fn write_log(path: &Path, options: &LogWriterOptions) -> Result<(), Failed> {
+    let mut log = LogWriter::create(path, options)?;
+    let camera = CameraModel {
+        projection: Projection::Pinhole,
+        intrinsics_px: [10.0, 10.0, 8.0, 6.0],
+        distortion: Distortion::None,
+        resolution_px: RESOLUTION_PX,
+    };
+    let pose = RigidTransform::identity();
+    let (rate, force) = (Vector3::new(0.1, -0.2, 0.3), Vector3::new(0.0, 0.1, 9.8));
+    let joints = ["yaw".to_owned(), "pitch".to_owned()];
+    log.write_camera_info("/gimbal_camera/camera_info", "gimbal_camera", times(0), &camera)?;
+    for index in 0..100 {
+        log.write_imu(topic_of(MessageKind::Imu), "imu", times(index), &rate, &force)?;
+        log.write_joints(topic_of(MessageKind::JointState), times(index), &joints, &[0.01 * index as f64, 0.2])?;
+        if index % 10 == 0 {
+            let pixels: Vec<u8> = (0..16 * 12).map(|pixel| (pixel * index % 251) as u8).collect();
+            log.write_compressed_image(
+                topic_of(MessageKind::CompressedImage),
+                "gimbal_camera",
+                times(index),
+                "png",
+                PNG,
+            )?;
+            log.write_raw_image(
+                topic_of(MessageKind::Image),
+                "static_camera",
+                times(index),
+                RESOLUTION_PX,
+                "mono8",
+                &pixels,
+            )?;
+            let odometry = topic_of(MessageKind::Odometry);
+            log.write_odometry(odometry, "world", "imu", times(index), &pose, &force, &rate)?;
+            log.write_pose(topic_of(MessageKind::PoseStamped), "world", times(index), &pose)?;
+            log.write_transform(topic_of(MessageKind::TransformStamped), "world", "imu", times(index), &pose)?;
+        }
+    }
+    log.attach("seed.rig.yaml", "application/yaml", RIG, EPOCH_NS)?;
+    log.finish()?;
+    Ok(())
+}
+
+/// The folder of a target's seeds.
+fn target(corpus: &Path, name: &str) -> Result<PathBuf, Failed> {
+    let folder = corpus.join(name);
+    fs::create_dir_all(&folder)?;
+    Ok(folder)
+}
+
+fn logs(corpus: &Path) -> Result<PathBuf, Failed> {
+    let folder = target(corpus, "log")?;
+    for compression in [LogCompression::None, LogCompression::Lz4, LogCompression::Zstd] {
+        for indexed in [true, false] {
+            for chunk_bytes in [Some(2048), None] {
+                let name = format!("{compression:?}-{indexed}-{}", chunk_bytes.is_some()).to_lowercase();
+                let options = LogWriterOptions { compression, indexed, chunk_bytes };
+                write_log(&folder.join(name), &options)?;
+            }
+        }
+    }
+    Ok(folder.join("none-true-true"))
+}
+
+/// One message of each type from a log, as an input of the target `message`.
+fn messages(corpus: &Path, log: &Path) -> Result<(), Failed> {
+    let folder = target(corpus, "message")?;
+    let file = fs::read(log)?;
+    for message in mcap::MessageStream::new(&file)? {
+        let message = message?;
+        let name = message.channel.schema.as_ref().map_or("", |schema| schema.name.as_str());
+        if let Some(kind) = MessageKind::ALL.iter().position(|kind| kind.schema_name() == name) {
+            let input = [&[kind as u8], message.data.as_ref()].concat();
+            fs::write(folder.join(name.replace('/', "-")), input)?;
+        }
+    }
+    Ok(())
+}
+
+fn bags(corpus: &Path) -> Result<(), Failed> {
+    let folder = target(corpus, "bag")?;
+    let covariance = f64s(&[0.0; 9]);
+    let mut messages = Vec::new();
+    for index in 0..4_i64 {
+        let stamp_ns = times(index).stamp_ns;
+        let imu = [
+            header(stamp_ns, "imu"),
+            f64s(&[0.0, 0.0, 0.0, 1.0]),
+            covariance.clone(),
+            f64s(&[0.1, -0.2, 0.3]),
+            covariance.clone(),
+            f64s(&[0.0, 0.1, 9.8]),
+            covariance.clone(),
+        ];
+        messages.push(Message {
+            topic: "/imu",
+            message_type: "sensor_msgs/Imu",
+            time_ns: stamp_ns,
+            data: imu.concat(),
+        });
+        let joints = [
+            header(stamp_ns, ""),
+            2_u32.to_le_bytes().to_vec(),
+            text("yaw"),
+            text("pitch"),
+            f64_sequence(&[0.1, 0.2]),
+            f64_sequence(&[]),
+            f64_sequence(&[]),
+        ];
+        let joint_state = "sensor_msgs/JointState";
+        messages.push(Message {
+            topic: "/joints",
+            message_type: joint_state,
+            time_ns: stamp_ns,
+            data: joints.concat(),
+        });
+        let image = [header(stamp_ns, "camera"), text("png"), (PNG.len() as u32).to_le_bytes().to_vec(), PNG.to_vec()];
+        let compressed = "sensor_msgs/CompressedImage";
+        messages.push(Message { topic: "/camera", message_type: compressed, time_ns: stamp_ns, data: image.concat() });
+    }
+    for compression in [Compression::None, Compression::Bz2, Compression::Lz4] {
+        let name = format!("{compression:?}").to_lowercase();
+        fs::write(folder.join(name), bag(&messages, 3, compression, ""))?;
+    }
+    Ok(())
+}
+
+fn databases(corpus: &Path, log: &Path) -> Result<(), Failed> {
+    let path = target(corpus, "database")?.join("two-topics");
+    if path.exists() {
+        fs::remove_file(&path)?;
+    }
+    let database = Connection::open(&path)?;
+    database.execute_batch(
+        "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL,
+             serialization_format TEXT NOT NULL, offered_qos_profiles TEXT NOT NULL);
+         CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, timestamp INTEGER NOT NULL,
+             data BLOB NOT NULL);",
+    )?;
+    let file = fs::read(log)?;
+    for message in mcap::MessageStream::new(&file)?.take(60) {
+        let message = message?;
+        let name = message.channel.schema.as_ref().map_or("", |schema| schema.name.as_str());
+        let topic = (i64::from(message.channel.id), &message.channel.topic, name);
+        database.execute("INSERT OR IGNORE INTO topics VALUES (?1, ?2, ?3, 'cdr', '')", topic)?;
+        let row = (i64::from(message.channel.id), message.log_time as i64, message.data.as_ref());
+        database.execute("INSERT INTO messages (topic_id, timestamp, data) VALUES (?1, ?2, ?3)", row)?;
+    }
+    Ok(())
+}
+
+/// The seeds of the targets that read text.
+fn texts(corpus: &Path) -> Result<(), Failed> {
+    let rigs = target(corpus, "rig")?;
+    fs::write(rigs.join("commented"), RIG)?;
+    fs::write(rigs.join("written"), Rig::from_yaml(RIG, Path::new("rig.yaml"))?.to_yaml())?;
+    fs::write(
+        rigs.join("kalibr"),
+        "cam0:\n  T_cam_imu:\n  - [0.0, -1.0, 0.0, 0.0]\n  - [0.0, 0.0, -1.0, 0.05]\n  - [1.0, 0.0, 0.0, -0.09]\n  \
+         - [0.0, 0.0, 0.0, 1.0]\n  cam_overlaps: []\n  camera_model: pinhole\n  \
+         distortion_coeffs: [-0.28, 0.07, 0.0002, 0.00002]\n  distortion_model: radtan\n  \
+         intrinsics: [458.6, 457.2, 367.2, 248.3]\n  resolution: [752, 480]\n  rostopic: /cam0/image_raw\n  \
+         timeshift_cam_imu: 0.001\n",
+    )?;
+    let session = "{\"session_version\": 1, \"log\": {\"path\": \"a.mcap\", \"size_bytes\": 1, \"checksum\": 2}, \
+                   \"rig\": null, \"truth\": null, \"start_s\": 0.0, \"duration_s\": null, \"runs\": [], \"forks\": [], \
+                   \"breakpoints\": [{\"condition\": \"rank drops and sigma(yaw.alpha) > 0.1 deg\", \"enabled\": true}]}";
+    fs::write(target(corpus, "session")?.join("session"), session)?;
+    let conditions = target(corpus, "condition")?;
+    let valid = [
+        "rank drops",
+        "sigma(yaw.alpha) > 0.1 and not keyframe",
+        "(features < 20 or chi2 >= 3.5) and event(restart)",
+        "auto:encoder=off,calibrate=off,window=12,name=a",
+        "minimal-swapped:timeshift=on",
+    ];
+    for (index, text) in valid.iter().enumerate() {
+        fs::write(conditions.join(index.to_string()), text)?;
+    }
+    let tum = "# stamp x y z qx qy qz qw\n1.0 0 0 0 0 0 0 1\n2.0 1 0 0.5 0 0 0.7071068 0.7071068\n3.0 2 0 1 0 0 1 0\n";
+    fs::write(target(corpus, "trajectory")?.join("two-poses"), tum)?;
+    let folder = target(corpus, "euroc")?;
+    for (index, (name, content)) in EUROC_FILES.iter().enumerate() {
+        fs::write(folder.join(name.replace('/', "-")), [&[index as u8], content.as_bytes()].concat())?;
+    }
+    fs::write(folder.join("image"), [&[5_u8], PNG].concat())?;
+    Ok(())
+}
+
+fn main() -> Result<(), Failed> {
+    let corpus = std::env::args_os().nth(1).ok_or("give the folder of the corpus")?;
+    let corpus = Path::new(&corpus);
+    let log = logs(corpus)?;
+    messages(corpus, &log)?;
+    bags(corpus)?;
+    databases(corpus, &log)?;
+    texts(corpus)
+}

@@ -1,0 +1,183 @@
+//! One function for each reader of foreign bytes, called by the fuzz target of the same name.
+//!
+//! Each takes the bytes of one input, hands them to the reader as a file or as text, and drops the result: an input is a
+//! finding when the reader panics, aborts, runs for seconds, or takes more memory than the fuzzer allows.
+//! `src/bin/seeds.rs` writes valid inputs to start from.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use dcvins::export::{self, EvaluationOptions};
+use dcvins::flight_log::convert::convert;
+use dcvins::flight_log::{
+    FlightLog, FrameStream, ImageReader, LogWriter, LogWriterOptions, MessageKind, MessageTimes, MessageType,
+};
+use dcvins::log_check;
+use dcvins::sensors::Rig;
+use dcvins::session::breakpoints::Condition;
+use dcvins::session::{RunSpec, SavedSession};
+use tempfile::TempDir;
+
+/// The rig of the logs that the seeds hold: a gimballed and a rigid camera of 16 × 12 pixels.
+pub const RIG: &str = include_str!("rig.yaml");
+
+/// Images and frames that are read of one input.
+const MAX_READ: usize = 40;
+
+/// An empty folder that is removed again when the value is dropped.
+fn folder() -> TempDir {
+    tempfile::tempdir().expect("a temporary folder can be made")
+}
+
+fn write(path: &Path, bytes: &[u8]) -> PathBuf {
+    if let Some(parent) = path.parent() {
+        fs::create_dir_all(parent).expect("the folder can be made");
+    }
+    fs::write(path, bytes).expect("the input can be written");
+    path.to_owned()
+}
+
+/// A flight log in MCAP: opened, checked, its frames and images read.
+pub fn log(bytes: &[u8]) {
+    let folder = folder();
+    read_log(&write(&folder.path().join("input.mcap"), bytes));
+}
+
+fn read_log(path: &Path) {
+    let Ok(log) = FlightLog::open(path).map(Arc::new) else { return };
+    let own = Rig::for_log(&log, None);
+    drop(log_check::check(&log, own.as_ref(), &[]));
+    let rig = Rig::from_yaml(RIG, Path::new("rig.yaml")).expect("the rig of the seeds is valid");
+    for camera in &rig.cameras {
+        if let Ok(frames) = FrameStream::new(Arc::clone(&log), &rig, &camera.key, 0.0, None) {
+            drop(frames.take(MAX_READ).count());
+        }
+    }
+    let images = ImageReader::new(Arc::clone(&log), &rig);
+    for camera in &rig.cameras {
+        for index in 0..images.count(&camera.key).min(MAX_READ) {
+            drop(images.image(&camera.key, index));
+        }
+    }
+}
+
+/// A message in CDR, wrapped into a log: the first byte picks the type, the rest is the message.
+pub fn message(bytes: &[u8]) {
+    let Some((kind, message)) = bytes.split_first() else { return };
+    let kind = MessageKind::ALL[usize::from(*kind) % MessageKind::ALL.len()];
+    let folder = folder();
+    let path = folder.path().join("input.mcap");
+    let mut writer = LogWriter::create(&path, &LogWriterOptions::default()).expect("the log can be created");
+    let message_type = MessageType::ros2(kind.schema_name(), "");
+    for index in 0..2 {
+        let times = MessageTimes { stamp_ns: index, log_time_ns: index };
+        writer.write_typed(topic_of(kind), &message_type, times, message).expect("the message can be written");
+    }
+    writer.finish().expect("the log can be finished");
+    read_log(&path);
+}
+
+/// The topic of the rig of the seeds that carries messages of a kind.
+pub fn topic_of(kind: MessageKind) -> &'static str {
+    match kind {
+        MessageKind::Imu => "/imu",
+        MessageKind::Image => "/static_camera",
+        MessageKind::CompressedImage => "/gimbal_camera",
+        MessageKind::CameraInfo => "/gimbal_camera/camera_info",
+        MessageKind::JointState => "/gimbal/joint_states",
+        MessageKind::Odometry => "/ground_truth/odometry",
+        MessageKind::PoseStamped => "/pose",
+        MessageKind::TransformStamped => "/transform",
+    }
+}
+
+/// A source of `convert` under a file name that its reader recognizes.
+fn converted(name: &str, bytes: &[u8]) {
+    let folder = folder();
+    let source = write(&folder.path().join(name), bytes);
+    let output = folder.path().join("output.mcap");
+    drop(convert(&source, &output, &mut |_| {}));
+}
+
+/// A ROS 1 bag.
+pub fn bag(bytes: &[u8]) {
+    converted("input.bag", bytes);
+}
+
+/// An SQLite file of a ROS 2 bag.
+pub fn database(bytes: &[u8]) {
+    converted("input.db3", bytes);
+}
+
+/// The files of an `EuRoC` folder, in the order of the first byte of an input of [`euroc`], each with a valid content.
+pub const EUROC_FILES: [(&str, &str); 6] = [
+    (
+        "imu0/data.csv",
+        "#timestamp [ns],w_x,w_y,w_z,a_x,a_y,a_z\n1000,0.1,0.2,0.3,9.8,0.1,0.2\n6000,0.1,0.2,0.3,9.8,0.1,0.2\n",
+    ),
+    (
+        "imu0/sensor.yaml",
+        "sensor_type: imu\nT_BS:\n  cols: 4\n  rows: 4\n  data: [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0]\n\
+         rate_hz: 200\ngyroscope_noise_density: 1.6968e-04\ngyroscope_random_walk: 1.9393e-05\n\
+         accelerometer_noise_density: 2.0000e-3\naccelerometer_random_walk: 3.0000e-3\n",
+    ),
+    ("cam0/data.csv", "#timestamp [ns],filename\n1000,1000.png\n6000,6000.png\n"),
+    (
+        "cam0/sensor.yaml",
+        "sensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n  data: [0.0, -1.0, 0.0, -0.02, 1.0, 0.0, 0.0, -0.06, 0.0, 0.0, 1.0, 0.01, 0.0, 0.0, 0.0, 1.0]\n\
+         rate_hz: 20\nresolution: [16, 12]\ncamera_model: pinhole\nintrinsics: [10.0, 10.0, 8.0, 6.0]\n\
+         distortion_model: radial-tangential\ndistortion_coefficients: [-0.28, 0.07, 0.0002, 1.8e-05]\n",
+    ),
+    (
+        "state_groundtruth_estimate0/data.csv",
+        "#timestamp,p_x,p_y,p_z,q_w,q_x,q_y,q_z\n1000,1,2,3,1,0,0,0,0,0,0,0,0,0,0,0,0\n",
+    ),
+    ("cam0/data/1000.png", "no image"),
+];
+
+/// An `EuRoC` folder with one file replaced: the first byte picks the file, the rest is its content.
+pub fn euroc(bytes: &[u8]) {
+    let Some((picked, content)) = bytes.split_first() else { return };
+    let picked = usize::from(*picked) % EUROC_FILES.len();
+    let folder = folder();
+    for (index, (name, valid)) in EUROC_FILES.iter().enumerate() {
+        let content = if index == picked { content } else { valid.as_bytes() };
+        write(&folder.path().join("mav0").join(name), content);
+    }
+    drop(convert(folder.path(), &folder.path().join("output.mcap"), &mut |_| {}));
+}
+
+/// A rig in the program's own format or in Kalibr's; what is written of a rig that was read can be read too.
+pub fn rig(bytes: &[u8]) {
+    let Ok(text) = std::str::from_utf8(bytes) else { return };
+    let Ok(rig) = Rig::from_yaml(text, Path::new("rig.yaml")) else { return };
+    Rig::from_yaml(&rig.to_yaml(), Path::new("rig.yaml")).expect("a rig that was written can be read");
+}
+
+/// A saved session.
+pub fn session(bytes: &[u8]) {
+    let Ok(text) = std::str::from_utf8(bytes) else { return };
+    if let Ok(session) = SavedSession::from_text(text) {
+        drop(session.request());
+        for breakpoint in &session.breakpoints {
+            drop(breakpoint.condition.parse::<Condition>());
+        }
+    }
+}
+
+/// Text of the command line: the condition of a breakpoint, and the specification of a run.
+pub fn condition(bytes: &[u8]) {
+    let Ok(text) = std::str::from_utf8(bytes) else { return };
+    drop(text.parse::<Condition>());
+    drop(text.parse::<RunSpec>());
+}
+
+/// A TUM trajectory that is evaluated against one of five poses.
+pub fn trajectory(bytes: &[u8]) {
+    let folder = folder();
+    let estimate = write(&folder.path().join("input.tum"), bytes);
+    let poses: String = (0..5).map(|index| format!("{}.0 {index} 0 0 0 0 0 1\n", index + 1)).collect();
+    let reference = write(&folder.path().join("reference.tum"), poses.as_bytes());
+    drop(export::evaluate(&estimate, &reference, &EvaluationOptions::default()));
+}
