@@ -1,8 +1,8 @@
-//! The pose-loop formulation: static camera's pose, then the chain, must lead to the gimbal camera's measured pose.
+//! The pose loops: the static camera's pose followed by the chain must give the gimbal camera's measured pose.
 //!
-//! The measured poses of a segment are known up to where, how turned and how large it is on the map, which is unknown
-//! along with the joint angles of every view.
-//! All that belongs to one segment is eliminated onto the chain.
+//! The measured poses of a segment have an unknown position, rotation and scale with respect to the map,
+//! estimated along with the joint angles of every view. All unknowns of one segment are eliminated onto the
+//! chain.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6xX, UnitQuaternion, Vector3, Vector6};
 
@@ -25,7 +25,7 @@ const CAUCHY_SIGMAS: f64 = 3.0;
 /// How often the noise of the positions is learnt.
 const ROUNDS: usize = 4;
 const ITERATIONS: usize = 25;
-/// Columns of a segment's frame: turn, shift, logarithm of its unit.
+/// Columns of a segment's frame: rotation, translation, logarithm of the scale.
 const FRAME: usize = 7;
 /// Median length of a three-dimensional normal error, in standard deviations of a coordinate.
 const MEDIAN_LENGTH: f64 = 1.538_172_254_455_05;
@@ -37,7 +37,7 @@ pub(super) struct PosePair {
     pub(super) world_from_imu: RigidTransform,
     /// `segment_from_camera` as measured.
     pub(super) segment_from_camera: RigidTransform,
-    /// What the encoders say.
+    /// Encoder readings at the view.
     pub(super) encoder: JointAngles,
 }
 

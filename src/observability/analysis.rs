@@ -12,20 +12,21 @@ use super::elimination::{Rows, column_norms};
 use super::structure::{Measured, known_losses};
 use super::{PackedFactor, RankReport};
 
-/// Below this scaled singular value a direction is uninformed: the window leaves it over 0.71 of its scale.
+/// Scaled singular values below this are uninformed: the posterior standard deviation exceeds 0.71 of the scale.
 const INFORMED_THRESHOLD: f64 = 1.0;
 
-/// Speeds and biases are projected out so many columns at a time, three frames: fewer pay for the calls, more for the
-/// zeros between frames that are not neighbours (measured at windows of 11 frames: 1.0 ms against 1.6 and 1.2).
+/// Velocities and biases are projected out this many columns at a time, three frames: fewer cost calls, more
+/// cost zeros between frames that are not neighbours (measured with windows of 11 frames: 1.0 ms against 1.6
+/// and 1.2).
 const BANDED_COLUMNS: usize = 27;
 
-/// What the calibration columns are multiplied by, so that angles and lengths compare and 1 means as much as the scale.
+/// Units of the calibration columns, so that angles and lengths are comparable.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum ScalingRule {
-    /// That of the dimension, the same for every rig: see [`Dimension::scale`](crate::geometry::Dimension::scale).
+    /// Fixed unit per dimension, the same for every rig: see [`Dimension::scale`](crate::geometry::Dimension::scale).
     #[default]
     Fixed,
-    /// A standard deviation for each column, such as the rig's prior: 1 then means as much as was known before.
+    /// A standard deviation per column, such as the rig's prior: the prior then has variance 1.
     PriorSigmas(Vec<f64>),
 }
 
@@ -38,10 +39,11 @@ impl ScalingRule {
     }
 }
 
-/// The ranks of a step's calibration, columns scaled by 10° and 3 cm; `None` when the linearization is not finite.
+/// Returns the ranks of a step's calibration, columns in units of 10° and 3 cm; `None` when the linearization
+/// is not finite.
 ///
-/// `chain` is the calibration that the linearization's columns belong to, `joint_angles_rad` those of each frame of the
-/// window, and `joints_free` says that the angles are unknowns without encoder readings or a prior.
+/// `chain` is the chain of the linearization's columns and `joint_angles_rad` the joint angles of each frame.
+/// `joints_free` means that the angles are unknowns without encoder readings or a prior.
 pub fn analyse<A: AsRef<[f64]>>(
     linearization: &Linearization,
     chain: &Chain,
@@ -51,7 +53,7 @@ pub fn analyse<A: AsRef<[f64]>>(
     analyse_with_scaling(linearization, chain, joint_angles_rad, joints_free, &ScalingRule::Fixed)
 }
 
-/// [`analyse`] with another rule for the scale of the columns.
+/// [`analyse`] with other units of the columns.
 pub fn analyse_with_scaling<A: AsRef<[f64]>>(
     linearization: &Linearization,
     chain: &Chain,
@@ -118,35 +120,35 @@ pub fn analyse_with_scaling<A: AsRef<[f64]>>(
     })
 }
 
-/// Places of the chain's columns that are not fixed_parameters.
+/// Indices of the chain's columns that are not fixed.
 fn kept_columns(chain: &Chain, fixed_parameters: &[ParameterId]) -> Vec<usize> {
     let parameters = chain.parameters().into_iter().enumerate();
     parameters.filter(|(_, parameter)| !fixed_parameters.contains(parameter)).map(|(column, _)| column).collect()
 }
 
-/// What the measurements alone tell about the calibration, as the information of its columns in units of 10° and 3 cm;
+/// Information matrix of the calibration columns (n × n) by measurements alone, in units of 10° and 3 cm;
 /// `None` when the linearization is not finite.
 pub(super) fn measured_information(linearization: &Linearization) -> Option<DMatrix<f64>> {
     let block = measured_block(linearization)?.block;
     Some(block.tr_mul(&block))
 }
 
-/// The calibration columns in units of 10° and 3 cm with everything else projected out, by measurements alone.
+/// Calibration columns in units of 10° and 3 cm, by measurements alone, with all other unknowns projected out.
 pub(super) struct MeasuredBlock {
     pub(super) block: DMatrix<f64>,
-    /// At or below this a singular value is a structural zero.
+    /// Singular values at or below this are structural zeros.
     pub(super) structural_threshold: f64,
 }
 
-/// `None` when the linearization is not finite.
+/// Projects all other unknowns out; `None` when the linearization is not finite.
 pub(super) fn measured_block(linearization: &Linearization) -> Option<MeasuredBlock> {
     let scale = ScalingRule::Fixed.scale(&calibration_parameters(linearization));
     let block = scaled(Projected::new(linearization)?.measurements, &scale);
     Some(MeasuredBlock { structural_threshold: structural_threshold(linearization, &scale), block })
 }
 
-/// The Frobenius norm of the columns before projection stands in for the spectral one, which the column norms alone do not
-/// give; it is larger by at most the root of the number of columns.
+/// Frobenius norm of the columns before projection. It replaces the spectral norm, which needs more than the
+/// column norms, and exceeds it at most by the root of the number of columns.
 fn reference(linearization: &Linearization, scale: &DVector<f64>) -> f64 {
     linearization.calibration_column_norms.component_mul(scale).norm()
 }
@@ -159,7 +161,7 @@ fn calibration_parameters(linearization: &Linearization) -> Vec<ParameterId> {
     linearization.columns.iter().filter_map(|block| block.id.parameter()).collect()
 }
 
-/// The calibration columns with everything else projected out, at least as many rows as columns.
+/// Calibration columns with all other unknowns projected out, with at least as many rows as columns.
 struct Projected {
     measurements: DMatrix<f64>,
     with_priors: DMatrix<f64>,
@@ -173,7 +175,7 @@ impl Projected {
         }
         let columns = calibration_parameters(linearization).len();
         let norms = column_norms(measurements, priors);
-        // Blocks that no prior touches are projected out once for both readings.
+        // Blocks without a prior are projected out once for both results.
         let fixed_parameters = |block: &Range<usize>| {
             priors.nrows() > 0 && priors.columns_range(block.clone()).iter().any(|entry| *entry != 0.0)
         };
@@ -199,8 +201,8 @@ impl Projected {
     }
 }
 
-/// The blocks that are not calibration in a cheap order of elimination: velocities and biases from the newest frame back,
-/// which are coupled to their neighbours only, then depths and joints, then poses, which are coupled to everything.
+/// Blocks of the other unknowns in an efficient order of elimination: velocities and biases from the newest
+/// frame back, which couple neighbours only, then depths and joints, then poses, which couple everything.
 fn nuisance_blocks(linearization: &Linearization) -> Vec<Range<usize>> {
     let of = |group: ColumnGroup| {
         let blocks = linearization.columns.iter().filter(move |block| block.id.group() == group);
@@ -214,8 +216,8 @@ fn nuisance_blocks(linearization: &Linearization) -> Vec<Range<usize>> {
     blocks
 }
 
-/// Neighbouring blocks as one: going forward (joints, poses: dense in their rows) without limit, going back (velocities and
-/// biases: banded) until they hold [`BANDED_COLUMNS`].
+/// Merges neighbouring blocks: ascending ones (joints, poses: dense in their rows) without limit, descending
+/// ones (velocities and biases: banded) up to [`BANDED_COLUMNS`].
 fn merged(blocks: impl IntoIterator<Item = Range<usize>>) -> Vec<Range<usize>> {
     let mut merged: Vec<Range<usize>> = Vec::new();
     for block in blocks {

@@ -1,25 +1,25 @@
-//! Why directions are lost, from the chain's Jacobians alone.
+//! Causes of rank loss, from the chain's Jacobians alone.
 
 use nalgebra::DMatrix;
 
 use crate::geometry::{Dimension, dense};
 use crate::gimbal::{Chain, generic_joint_angles, stacked_jacobian};
 
-/// How many columns are lost to what.
+/// Number of unobservable columns by cause.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Deficits {
-    /// Redundant in the parameterization, or its chart singular: lost at any joint angles.
+    /// Redundant in the parameterization, or at its singularity: unobservable at all joint angles.
     pub(super) parameterization: usize,
-    /// Lost at the joint angles of the window.
+    /// Unobservable at the joint angles of the window.
     pub(super) joints: usize,
-    /// Lost because a motion of the joints does the same in every frame.
+    /// Unobservable because unknown joint angles absorb them in every frame.
     pub(super) absorbed: usize,
-    /// The rest: motion of the vehicle, and the scene.
+    /// All others: due to the motion of the vehicle, and the scene.
     pub(super) motion: usize,
 }
 
-/// Splits what `rank` lacks of `columns` into its causes, as differences of ranks of the chain's Jacobians, of whose
-/// columns those at `kept` are unknown.
+/// Splits the deficit `columns − rank` by cause, as differences of ranks of the chain's Jacobians; the columns
+/// `kept` are unknown.
 pub(super) fn classify(
     chain: &Chain,
     kept: &[usize],
@@ -33,7 +33,7 @@ pub(super) fn classify(
     let anywhere = scaled_stack(chain, &generic).select_columns(kept);
     let values = singular_values(&anywhere);
     let anywhere = rank_above(&anywhere, &values, largest(&values));
-    // Columns of other cameras are as many motions of their own.
+    // Each other camera adds its own columns.
     let others = columns.saturating_sub(kept.len());
     let parameterization = columns.saturating_sub(anywhere + others).min(deficit);
     if joint_angles_rad.is_empty() {
@@ -53,8 +53,9 @@ pub(super) fn classify(
     Deficits { parameterization, joints, absorbed, motion: deficit - parameterization - joints - absorbed }
 }
 
-/// Orthonormal directions, in units of the two scales, that some motion of joints and vehicle can tell: what is neither
-/// redundant in the parameterization nor absorbed by free joint angles. Empty for a chain that is not finite.
+/// Returns orthonormal directions (dof × k, in units of the two scales) that some motion of joints and vehicle
+/// makes observable: neither redundant in the parameterization nor absorbed by free joint angles. Empty for a
+/// chain that is not finite.
 pub(super) fn excitable_directions(chain: &Chain, joints_free: bool) -> DMatrix<f64> {
     let generic = generic_joint_angles(chain.joint_count(), 4 * (chain.joint_count() + 1));
     let mut stack = scaled_stack(chain, &generic);
@@ -67,7 +68,7 @@ pub(super) fn excitable_directions(chain: &Chain, joints_free: bool) -> DMatrix<
     svd.v.columns(0, rank_above(&stack, &values, reference)).into_owned()
 }
 
-/// The chain's Jacobians under one another, rows and columns in units of the two scales.
+/// Stacked Jacobians of the chain, rows and columns in units of the two scales.
 fn scaled_stack(chain: &Chain, joint_angles_rad: &[Vec<f64>]) -> DMatrix<f64> {
     let mut stack = stacked_jacobian(chain, joint_angles_rad);
     for (mut column, parameter) in stack.column_iter_mut().zip(chain.parameters()) {
@@ -84,7 +85,7 @@ fn row_scale(row: usize) -> f64 {
     dimension.scale()
 }
 
-/// Takes from each frame's six rows what its joints can do.
+/// Projects the joint angles of each frame out of its six rows.
 fn project_joints_out(chain: &Chain, joint_angles_rad: &[Vec<f64>], stack: &mut DMatrix<f64>) {
     for (frame, angles) in joint_angles_rad.iter().enumerate() {
         let mut by_joints =
@@ -107,22 +108,22 @@ fn project_joints_out(chain: &Chain, joint_angles_rad: &[Vec<f64>], stack: &mut 
     }
 }
 
-/// `100·ε·max(m, n)`, the relative threshold of a structural zero.
+/// Relative threshold of a structural zero, `100·ε·max(m, n)`.
 pub(super) fn tolerance(rows: usize, columns: usize) -> f64 {
     100.0 * f64::EPSILON * rows.max(columns) as f64
 }
 
-/// In descending order; none for a matrix that is not finite.
+/// Singular values in descending order; none for a matrix that is not finite.
 fn singular_values(matrix: &DMatrix<f64>) -> Vec<f64> {
     dense::singular_values(matrix).unwrap_or_default()
 }
 
-/// The spectral norm.
+/// Spectral norm from the singular values.
 fn largest(singular_values: &[f64]) -> f64 {
     singular_values.first().copied().unwrap_or(0.0)
 }
 
-/// How many singular values of a matrix count against a reference norm.
+/// Number of singular values above the threshold relative to a reference norm.
 fn rank_above(matrix: &DMatrix<f64>, singular_values: &[f64], reference: f64) -> usize {
     let threshold = tolerance(matrix.nrows(), matrix.ncols()) * reference;
     singular_values.iter().filter(|value| **value > threshold).count()

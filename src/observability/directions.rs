@@ -4,18 +4,19 @@ use nalgebra::{DMatrix, DVector};
 
 use super::CalibrationDirection;
 
-/// A parameter may lead a null direction when its share is at least this part of the largest one; the first such
-/// parameter in column order does, so that the choice is stable from frame to frame.
+/// A parameter can lead a null direction when its projection is at least this fraction of the largest one. The
+/// first such parameter in column order leads, so that the choice is stable from frame to frame.
 const LEADING_RATIO: f64 = 0.5;
 
-/// A share this small is rounding left from the elimination, not a part of a null direction.
+/// Projections below this are rounding errors of the elimination.
 const ROUNDING: f64 = 1e-8;
 
-/// The directions with a singular value below `informed_threshold`, weakest first.
+/// Returns the directions with a singular value below `informed_threshold`, the least observable first.
 ///
-/// `block` is the scaled, projected calibration block and `v` its right singular vectors, strongest first.
-/// Within the structural null space any basis is as good as another; the one given has as few parameters per direction as
-/// elimination finds: each direction is led by a parameter that is absent from the others.
+/// `block` is the scaled, projected calibration block and `v` its right singular vectors by descending singular
+/// value.
+/// Any basis of the structural null space is equivalent. The returned one has as few parameters per direction
+/// as elimination finds: each direction has a leading parameter that is absent from the others.
 pub(super) fn weak_directions(
     block: &DMatrix<f64>,
     v: &DMatrix<f64>,
@@ -50,14 +51,14 @@ pub(super) fn weak_directions(
 fn eliminated_basis(mut basis: DMatrix<f64>) -> Vec<DVector<f64>> {
     let (rows, columns) = basis.shape();
     let mut leaders: Vec<(usize, usize)> = Vec::with_capacity(columns);
-    // The part of each parameter that the directions without a leader yet can still move.
+    // Norm of each parameter's projection on the directions without a leading parameter.
     for step in 0..columns {
         let open = basis.columns(step, columns - step);
         let projection = |row: usize| open.row(row).norm();
         let free: Vec<usize> = (0..rows).filter(|row| leaders.iter().all(|(leader, _)| leader != row)).collect();
         let largest = free.iter().map(|row| projection(*row)).fold(0.0, f64::max);
         let Some(leader) = free.into_iter().find(|row| projection(*row) >= LEADING_RATIO * largest) else { break };
-        // Turn the open directions so that only the first of them moves the leader.
+        // Rotate the open directions so that only the first one moves the leading parameter.
         let along = open.row(leader).transpose() / projection(leader);
         let mut mirror = along;
         mirror[0] += if mirror[0] < 0.0 { -1.0 } else { 1.0 };
@@ -67,7 +68,7 @@ fn eliminated_basis(mut basis: DMatrix<f64>) -> Vec<DVector<f64>> {
         open -= reflected * mirror.transpose();
         leaders.push((leader, step));
     }
-    // Back substitution: take each leader out of the directions before it.
+    // Back substitution: eliminate each leading parameter from the directions before it.
     for &(leader, step) in leaders.iter().rev() {
         for earlier in 0..step {
             let factor = basis[(leader, earlier)] / basis[(leader, step)];
@@ -86,7 +87,7 @@ fn eliminated_basis(mut basis: DMatrix<f64>) -> Vec<DVector<f64>> {
         .collect()
 }
 
-/// The direction with its largest weight positive, so that its sign does not flip between frames.
+/// Returns the direction with a positive largest weight, so that its sign is stable from frame to frame.
 fn signed(direction: DVector<f64>) -> DVector<f64> {
     let largest =
         direction.iter().fold(0.0_f64, |largest, weight| if weight.abs() > largest.abs() { *weight } else { largest });

@@ -1,4 +1,4 @@
-//! Projecting nuisance columns out of a Jacobian, block by block, by orthogonal rotations of the rows alone.
+//! Projects nuisance columns out of a Jacobian block by block, by orthogonal transformations of the rows.
 
 use std::ops::Range;
 
@@ -7,21 +7,21 @@ use nalgebra::DMatrix;
 
 use crate::geometry::dense;
 
-/// A pivot below this fraction of its column's norm belongs to a dependent column.
+/// A pivot below this fraction of its column's norm marks a dependent column.
 ///
-/// The four directions that visual-inertial windows never see leave pivots around 1e-15; directions that are merely weak
-/// stay above 1e-9.
+/// The four unobservable directions of visual-inertial windows leave pivots around 1e-15; weakly observable
+/// directions stay above 1e-9.
 const DEPENDENT: f64 = 1e-11;
 
-/// Rows of a Jacobian from which blocks of columns are projected out, in place.
+/// Rows of a Jacobian from which blocks of columns are projected out in place.
 ///
-/// A block only touches the rows in which it has entries, so that the banded structure of a window is made use of.
-/// Rows that a block takes up are dropped; what is left of the others has zeros in the block's columns.
+/// A block touches only rows with entries in it, which uses the banded structure of a window. Rows that a block
+/// consumes are dropped; the remaining rows are zero in the block's columns.
 #[derive(Clone, Debug)]
 pub(super) struct Rows {
     /// One row of the Jacobian per column, so that a row is contiguous.
     transposed: DMatrix<f64>,
-    /// The rows still there.
+    /// Indices of the remaining rows.
     alive: Vec<usize>,
 }
 
@@ -30,7 +30,7 @@ impl Rows {
         Self { transposed: jacobian.transpose(), alive: (0..jacobian.nrows()).collect() }
     }
 
-    /// The rows that are left, and those of another Jacobian with the same columns below them.
+    /// Returns the remaining rows with the rows of another Jacobian below them.
     pub(super) fn stacked_on(&self, jacobian: &DMatrix<f64>) -> Self {
         let kept = self.alive.len();
         let count = kept + jacobian.nrows();
@@ -80,7 +80,7 @@ impl Rows {
         self.alive.retain(|row| dropped.binary_search(row).is_err());
     }
 
-    /// Runs of columns outside of a block in which some of the rows have entries.
+    /// Runs of columns outside of a block in which the given rows have entries.
     fn filled_columns(&self, rows: &[usize], block: &Range<usize>) -> Vec<Range<usize>> {
         let mut filled = vec![false; self.transposed.nrows()];
         for row in rows {
@@ -109,13 +109,13 @@ impl Rows {
         &mut self.transposed.as_mut_slice()[row * width..(row + 1) * width]
     }
 
-    /// The first `count` columns of the rows that are left.
+    /// First `count` columns of the remaining rows.
     pub(super) fn leading_columns(&self, count: usize) -> DMatrix<f64> {
         DMatrix::from_fn(self.alive.len(), count, |row, column| self.transposed[(column, self.alive[row])])
     }
 }
 
-/// Norms of the columns of two Jacobians with the same columns, one above the other.
+/// Norms of the columns of two stacked Jacobians with the same columns.
 pub(super) fn column_norms(measurements: &DMatrix<f64>, priors: &DMatrix<f64>) -> Vec<f64> {
     (0..measurements.ncols())
         .map(|column| {

@@ -1,17 +1,17 @@
-//! The upper triangular factor of an information matrix, packed: every step of a recording keeps one.
+//! Packed upper triangular factor of an information matrix, stored with every step.
 
 use nalgebra::DMatrix;
 
 use crate::estimator::allocated_bytes;
 
-/// An upper triangle `R` in single precision, with `RᵀR` the information that it stands for.
+/// Upper triangle `R` in single precision of the information matrix `RᵀR`.
 ///
-/// A factor has the square root of the information's range, so that single precision keeps weak directions beside strong
-/// ones; a step's takes 1.2 kB at most.
+/// The range of a factor is the square root of that of the information, so that single precision represents
+/// weakly beside strongly observable directions. A step's factor takes 1.2 kB at most.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PackedFactor {
     columns: usize,
-    /// Row by row from the diagonal on.
+    /// Row by row, from the diagonal on.
     entries: Box<[f32]>,
 }
 
@@ -29,7 +29,7 @@ impl PackedFactor {
         self.columns
     }
 
-    /// The information `RᵀR`.
+    /// Returns the information matrix `RᵀR` (n × n).
     pub fn information(&self) -> DMatrix<f64> {
         let mut triangle = DMatrix::zeros(self.columns, self.columns);
         let mut entries = self.entries.iter();

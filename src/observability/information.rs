@@ -1,34 +1,34 @@
-//! How fast images narrow the calibration, over a stretch of a flight.
+//! Information gain about the calibration over an interval of a run.
 
 use super::RankReport;
 use crate::estimator::{InformationGain, Motion};
 use crate::gimbal::ParameterId;
 
-/// The gain of information over some steps.
+/// Information gain over several steps.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InformationRate {
-    /// Length of the steps together, in seconds.
+    /// Total duration of the steps, in seconds.
     pub duration_s: f64,
-    /// The motions of the columns of [`ParameterRate::by_motion`].
+    /// Motions in the order of the entries of [`ParameterRate::by_motion`].
     pub motions: Vec<Motion>,
     /// Each parameter, in the order of the columns.
     pub parameters: Vec<ParameterRate>,
 }
 
-/// One parameter's gain.
+/// Information gain of one parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParameterRate {
     /// Which.
     pub parameter: ParameterId,
-    /// In bits per second: one bit halves the standard deviation.
+    /// Gain in bits per second: one bit halves the standard deviation.
     pub bits_per_s: f64,
-    /// Of these, the part of each motion; a negative one takes away what others bring.
+    /// Contribution of each motion; a negative one reduces the contributions of others.
     pub by_motion: Vec<f64>,
-    /// The rest: what images add by confirming earlier ones that have left the window.
+    /// Remaining contribution: images that confirm earlier images outside of the window.
     pub earlier: f64,
 }
 
-/// Sums up the gains of steps, each with the columns that it is of; `None` where there are none.
+/// Sums the gains of steps, each with the report of its columns; `None` without gains.
 pub fn information_rate<'a>(
     steps: impl IntoIterator<Item = (&'a RankReport, &'a InformationGain)>,
 ) -> Option<InformationRate> {
@@ -67,18 +67,19 @@ pub fn information_rate<'a>(
 }
 
 impl InformationRate {
-    /// Of all parameters together, in bits per second.
+    /// Sum over all parameters, in bits per second.
     pub fn total(&self) -> f64 {
         self.parameters.iter().map(|parameter| parameter.bits_per_s).sum()
     }
 
-    /// Of all parameters together by motion, in bits per second.
+    /// Sum over all parameters by motion, in bits per second.
     pub fn by_motion(&self) -> Vec<f64> {
         let of = |motion: usize| self.parameters.iter().map(|parameter| parameter.by_motion[motion]).sum();
         (0..self.motions.len()).map(of).collect()
     }
 
-    /// The motion that brings most of one parameter (or of all of them) and its part; `None` where none brings anything.
+    /// Motion with the largest positive contribution to one parameter (or to all) and that contribution; `None`
+    /// without one.
     pub fn leading(&self, parameter: Option<usize>) -> Option<(Motion, f64)> {
         let parts = parameter.map_or_else(|| self.by_motion(), |index| self.parameters[index].by_motion.clone());
         let parts = self.motions.iter().copied().zip(parts);

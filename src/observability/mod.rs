@@ -1,11 +1,11 @@
-//! Which directions of the calibration the Jacobian cannot see.
+//! Observability of the calibration, from the Jacobian of a step.
 //!
-//! [`analyse`] takes a step's linearization: it projects everything but the calibration out, scales the columns so that
-//! a metre and a radian compare, and reads two ranks off the singular values.
-//! The structural rank counts what is not exactly zero; the informed one counts directions in which the window says more
-//! than the scale says beforehand.
-//! On real logs a degenerate motion is never exactly degenerate, so that only the second one shows it; the first one
-//! shows what the parameterization can never tell.
+//! [`analyse`] takes the linearization of a step, projects all unknowns but the calibration out, scales the
+//! columns so that angles and lengths are comparable, and derives two ranks from the singular values. The
+//! structural rank counts singular values that are not zero. The informed rank counts directions in which the
+//! measurements are more precise than the scale.
+//! Motions on real logs are never exactly degenerate, so that only the informed rank shows them; the structural
+//! rank shows what a parameterization can never make observable.
 
 mod analysis;
 mod classification;

@@ -1,16 +1,16 @@
-//! Since when a direction has been lost.
+//! Number of steps in which a direction has been unobservable.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::RankReport;
 use crate::gimbal::ParameterId;
 
-/// A direction counts as lost in another step when this share of it lies among that step's null and weak directions.
+/// A direction is unobservable in another step when this fraction of it lies in that step's null and weak directions.
 const SAME_RATIO: f64 = 0.9;
 
-/// In how many of the earlier steps, the latest first, a direction was null or weak without interruption.
+/// Counts the earlier steps, latest first, in which a direction was null or weak without interruption.
 ///
-/// The iteration ends at the first step that sees the direction, or has other columns.
+/// The iteration ends at the first step that observes the direction or has other columns.
 pub fn steps_lost<'a>(
     parameters: &[ParameterId],
     direction: &[f64],
@@ -22,7 +22,7 @@ pub fn steps_lost<'a>(
 }
 
 impl RankReport {
-    /// Whether a unit direction lies among the null and weak directions.
+    /// Whether a unit direction lies in the span of the null and weak directions.
     fn loses(&self, direction: &DVector<f64>) -> bool {
         if self.directions.is_empty() {
             return false;
@@ -84,7 +84,7 @@ mod tests {
         let count =
             |direction: &[f64], earlier: &[Option<&RankReport>]| steps_lost(&names, direction, earlier.iter().copied());
         assert_eq!(count(&first, &[Some(&lost), Some(&lost), Some(&seen), Some(&lost)]), 2);
-        // A mixture of lost directions is lost as well, however they are named from step to step.
+        // A combination of unobservable directions is unobservable as well, whatever basis each step has.
         assert_eq!(count(&mixed, &[Some(&lost), Some(&report(&[mixed])), Some(&report(&[first]))]), 2);
         assert_eq!(count(&first, &[None, Some(&lost)]), 0);
         assert_eq!(steps_lost(&names[..2], &first, [Some(&lost)]), 0);

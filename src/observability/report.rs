@@ -7,55 +7,55 @@ use crate::gimbal::{ParameterId, ParameterNames, Singularity};
 pub struct RankReport {
     /// Parameters of the calibration columns.
     pub parameters: Vec<ParameterId>,
-    /// Parameters that are fixed at their values: they are known, and take no part.
+    /// Parameters fixed at their values: known, without columns.
     pub fixed_parameters: Vec<ParameterId>,
     /// Singular values of the prior-scaled, projected calibration columns, largest first, one per column.
     pub singular_values: Vec<f64>,
-    /// Singular values with the priors kept in.
+    /// Singular values with the rows of the priors included.
     pub singular_values_with_priors: Vec<f64>,
     /// Norm of the prior-scaled calibration columns before projection: the reference of the structural threshold.
     pub reference: f64,
-    /// At or below this a singular value is a structural zero.
+    /// Singular values at or below this are structural zeros.
     pub structural_threshold: f64,
-    /// Below this a direction is uninformed (1: the posterior is over 0.71 of the prior).
+    /// Directions with a smaller singular value are uninformed (1: the posterior σ exceeds 0.71 of the scale).
     pub informed_threshold: f64,
     /// Number of singular values over the structural threshold.
     pub rank_structural: usize,
     /// Number of singular values at or over the informed threshold.
     pub rank_informed: usize,
-    /// Lost to the parameterization.
+    /// Deficit due to the parameterization.
     pub deficit_parameterization: usize,
-    /// Lost because joints did not move in the window.
+    /// Deficit due to joints that did not move in the window.
     pub deficit_joints: usize,
-    /// Absorbed by free joint angles.
+    /// Deficit due to unknown joint angles.
     pub deficit_absorbed: usize,
-    /// Lost to the motion of the vehicle.
+    /// Deficit due to the motion of the vehicle.
     pub deficit_motion: usize,
-    /// Null and weak directions, weakest first.
+    /// Null and weak directions, the least observable first.
     pub directions: Vec<CalibrationDirection>,
-    /// Margins to the chart's locks.
+    /// Singularity margins of the parameterization.
     pub margins: Vec<(Singularity, f64)>,
-    /// What is known to be lost from the form of the chain, fixed_parameters against this measurement.
+    /// Null directions of the chain in closed form, compared with this measurement.
     pub known: Vec<KnownDirection>,
     /// Number of joints of the chain.
     pub joint_count: usize,
-    /// Everything that is known of the calibration after the step, priors included, columns in units of the scale.
+    /// Posterior information of the calibration after the step, priors included, columns in units of the scale.
     pub posterior: PackedFactor,
 }
 
-/// One right singular direction of the calibration block.
+/// A right singular direction of the calibration block.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CalibrationDirection {
     /// Its singular value.
     pub singular_value: f64,
-    /// Whether it is a structural zero (else merely uninformed).
+    /// Whether it is a structural zero, not only uninformed.
     pub structural: bool,
-    /// Signed weight of each parameter in the prior-scaled, unit direction.
+    /// Signed weight of each parameter in the scaled unit direction.
     pub weights: Vec<f64>,
 }
 
 impl RankReport {
-    /// The report in one line: `18 of 24 structural; 6 redundant in the parameterization; 15 informed; least_observable yaw.d`.
+    /// Summary in one line: `18 of 24 structural; 6 redundant in the parameterization; 15 informed; weakest yaw.d`.
     pub fn verdict(&self, names: &ParameterNames) -> String {
         let causes = [
             (self.deficit_parameterization, "redundant in the parameterization"),
@@ -86,12 +86,12 @@ impl RankReport {
             + self.posterior.heap_bytes()
     }
 
-    /// How many of the known directions the measurement finds null.
+    /// Number of closed-form null directions that the measurement confirms.
     pub fn known_agreeing(&self) -> usize {
         self.known.iter().filter(|known| known.agrees).count()
     }
 
-    /// How many of the known directions a prior claims to know.
+    /// Number of closed-form null directions with spurious information.
     pub fn claimed(&self) -> usize {
         self.known.iter().filter(|known| known.is_claimed()).count()
     }
@@ -101,7 +101,7 @@ impl RankReport {
         self.known.iter().map(|known| known.spurious_gain).fold(0.0, f64::max)
     }
 
-    /// The parameter with the largest share in the weakest direction that is not a structural zero.
+    /// Parameter with the largest weight in the least observable direction that is not a structural zero.
     pub fn least_observable(&self) -> Option<ParameterId> {
         let direction = self.directions.iter().find(|direction| !direction.structural)?;
         direction.leading(&self.parameters)
@@ -109,7 +109,7 @@ impl RankReport {
 }
 
 impl CalibrationDirection {
-    /// The parameter with the largest share.
+    /// Parameter with the largest weight.
     pub fn leading(&self, parameters: &[ParameterId]) -> Option<ParameterId> {
         let mut leading = None;
         let mut largest = 0.0;

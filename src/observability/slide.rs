@@ -1,4 +1,4 @@
-//! The chain moved along a direction, and what that does to the reprojections of a step.
+//! Moves the chain along a direction and predicts the reprojections of a step.
 
 use nalgebra::{DVector, Vector2, Vector3};
 
@@ -18,28 +18,28 @@ pub struct ChainSlide {
     pub amount: f64,
     /// The moved chain.
     pub chain: ClassicalChain,
-    /// How far the camera moves on the IMU at the newest frame, in metres and radians.
+    /// Change of `imu_from_camera` at the newest frame, in metres and radians.
     pub camera_moves: (f64, f64),
-    /// By how much each parameter of the chain was moved, in its SI unit, in column order.
+    /// Change of each parameter of the chain in its SI unit, in column order.
     pub changes: Vec<f64>,
     /// Largest change of a reprojection in the window, in pixels.
     pub largest_px: f64,
-    /// The same to first order: what a small move of the chain does, scaled up.
+    /// The same to first order: the effect of a small change, scaled up.
     pub largest_first_order_px: f64,
-    /// Where the features of the newest frame are predicted now, and with the moved chain.
+    /// Predicted pixels of the newest frame's features with the present and with the moved chain.
     pub predictions_px: Vec<(FeatureId, [Vector2<f64>; 2])>,
 }
 
-/// A move so small that only its first order counts.
+/// A change small enough for first-order effects only.
 const SMALL: f64 = 1e-4;
 /// Steps of the search for a feature's depth.
 const DEPTH_STEPS: usize = 4;
-/// Steps of the joint angles where they follow.
+/// Iterations of the joint angles where they are unknown.
 const JOINT_STEPS: usize = 4;
-/// Least inverse depth, in 1/m.
+/// Smallest inverse depth, in 1/m.
 const FARTHEST_PER_M: f64 = 1e-5;
 
-/// The chain that a step's calibration columns belong to; `None` when the parameters are others.
+/// Returns the chain of a step's calibration columns; `None` when the parameters differ.
 pub fn chain_of_step(report: &StepReport, rank: &RankReport) -> Option<Chain> {
     let parameterization = report.calibration.parameterization.parse().ok()?;
     let chain = Chain::from_classical(&report.calibration.classical, parameterization);
@@ -52,14 +52,14 @@ pub fn chain_of_step(report: &StepReport, rank: &RankReport) -> Option<Chain> {
     has(&chain).then_some(chain)
 }
 
-/// Moves the chain of a step along a scaled direction and predicts every feature of the window anew, poses held; each
-/// feature takes the depth that suits its pixels best, as in the estimator, and joint angles without encoder readings
-/// follow.
+/// Moves the chain of a step along a scaled direction and predicts all features of the window with fixed poses.
+/// Each feature takes the depth with the smallest residuals, as in the estimator; joint angles without encoder
+/// readings are adapted.
 ///
-/// `None` where no feature can be predicted, since nothing could be said then.
+/// `None` when no feature can be predicted.
 ///
-/// Along a direction that the window cannot see the pixels stay, to first order or for any size, unless it needs the
-/// poses to follow.
+/// Along an unobservable direction the pixels stay, to first order or at any amount, unless the poses must
+/// change with it.
 pub fn slide(
     report: &StepReport,
     camera: &CameraModel,
@@ -114,8 +114,7 @@ pub fn slide(
     predicted.then_some(slide)
 }
 
-/// Pose of the camera on the IMU at a frame; where the joint angles were not read they follow, to stay as near as they can
-/// to the mount `like`.
+/// `imu_from_camera` at a frame; unknown joint angles are adapted so that it stays as close as possible to `like`.
 fn extrinsics(frame: &FrameStateReport, chain: &Chain, like: Option<&RigidTransform>) -> RigidTransform {
     if frame.joint_angles_rad.len() != chain.joint_count() {
         return frame.imu_from_camera;
@@ -132,7 +131,7 @@ fn extrinsics(frame: &FrameStateReport, chain: &Chain, like: Option<&RigidTransf
     chain.imu_from_camera(&angles)
 }
 
-/// The step of the joint angles that brings the mount nearest to another one, 10° counting as much as 3 cm.
+/// Step of the joint angles that brings `imu_from_camera` closest to `like`, 10° weighing as much as 3 cm.
 fn towards(chain: &Chain, angles_rad: &[f64], like: &RigidTransform) -> Option<DVector<f64>> {
     let linearization = chain.linearize(angles_rad);
     let mut wanted = like.minus(&linearization.imu_from_camera);
@@ -155,7 +154,7 @@ struct Window<'a> {
     before: Vec<RigidTransform>,
 }
 
-/// One feature: its direction and depth in the anchor's camera, and who else sees it.
+/// A feature with its bearing and depth in the anchor's camera, and its observing frames.
 struct Track {
     anchor: usize,
     /// `(x/z, y/z, 1)`.
@@ -181,7 +180,7 @@ impl Window<'_> {
 }
 
 impl Track {
-    /// Predicted pixels by observer.
+    /// Predicted pixels, one per observing frame.
     fn pixels(
         &self,
         poses: &[RigidTransform],
@@ -192,7 +191,7 @@ impl Track {
         self.observers.iter().map(|slot| camera.project(&poses[*slot].inverse().transform(&point))).collect()
     }
 
-    /// The pixels with the depth that brings them closest to the wanted ones.
+    /// Predicted pixels with the depth that minimizes the distance to the wanted ones.
     fn fitted(
         &self,
         poses: &[RigidTransform],

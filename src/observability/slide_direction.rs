@@ -9,43 +9,43 @@ use super::structure::known_losses;
 use super::{KnownLoss, RankReport};
 use crate::gimbal::{Chain, ParameterId, ParameterNames};
 
-/// Which way a chain is moved.
+/// Direction in which a chain is moved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SlideDirection {
-    /// A null or weak direction of the step, weakest first, counted from 0.
+    /// A null or weak direction of the step, the least observable first, counted from 0.
     Measured(usize),
-    /// One that is known to be lost.
+    /// A null direction in closed form.
     Known(KnownLoss),
-    /// A parameter alone.
+    /// A single parameter.
     Parameter(ParameterId),
 }
 
-/// Which way a chain is moved, and how far.
+/// Direction and amount of a change of the chain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SlidePosition {
-    /// Which way.
+    /// Direction of the change.
     pub direction: SlideDirection,
-    /// How far, in units of 10° and 3 cm along the unit direction.
+    /// Amount in units of 10° and 3 cm along the unit direction.
     pub amount: f64,
 }
 
-/// A position as a person writes it: `1=0.5`, `base-d=1`, `yaw.alpha=-1`.
+/// A change as text: `1=0.5`, `base-d=1`, `yaw.alpha=-1`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SlideRequest {
-    /// Number of a measured direction, counted from 1, a known one or a parameter.
+    /// Number of a measured direction, counted from 1, name of a closed-form one, or parameter.
     pub direction: String,
-    /// How far, in units of 10° and 3 cm along the unit direction.
+    /// Amount in units of 10° and 3 cm along the unit direction.
     pub amount: f64,
 }
 
-/// A position that is not written as one.
+/// A text that is no change.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error(
     "'{given}' is no direction with a value: expected DIRECTION=VALUE, as in 1=0.5 (the weakest direction by half of 10° \
      and 3 cm), base-d=1 or yaw.alpha=-1"
 )]
 pub struct InvalidSlide {
-    /// What was given.
+    /// The given text.
     pub given: String,
 }
 
@@ -63,7 +63,7 @@ impl FromStr for SlideRequest {
 }
 
 impl SlideRequest {
-    /// The position that it means on a rig whose parameters have these names; `None` when there is no such direction.
+    /// Resolves the direction on a rig with these parameter names; `None` when there is no such direction.
     pub fn position(&self, names: &ParameterNames) -> Option<SlidePosition> {
         let measured = self.direction.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
         let direction = measured
@@ -75,13 +75,14 @@ impl SlideRequest {
 }
 
 impl SlideDirection {
-    /// All that a step offers: the measured ones, then the known ones.
+    /// All directions of a step: the measured ones, then those in closed form.
     pub fn of_step(rank: &RankReport) -> Vec<Self> {
         let measured = (0..rank.directions.len()).map(Self::Measured);
         measured.chain(rank.known.iter().map(|known| Self::Known(known.loss))).collect()
     }
 
-    /// The unit direction in the columns of the chain, in units of 10° and 3 cm; `None` when the step has no such direction.
+    /// Unit direction in the columns of the chain (dof), in units of 10° and 3 cm; `None` when the step has no such
+    /// direction.
     pub fn weights(&self, rank: &RankReport, chain: &Chain) -> Option<Vec<f64>> {
         let parameters = chain.parameters();
         let unit_vector =
@@ -89,7 +90,7 @@ impl SlideDirection {
         match self {
             Self::Measured(index) => {
                 let weights = &rank.directions.get(*index)?.weights;
-                // A parameter that is held stays.
+                // A fixed parameter does not move.
                 let weight =
                     |parameter| rank.parameters.iter().position(|known| known == parameter).map(|it| weights[it]);
                 Some(parameters.iter().map(|parameter| weight(parameter).unwrap_or(0.0)).collect())
@@ -108,7 +109,7 @@ impl SlideDirection {
 }
 
 impl KnownLoss {
-    /// The loss of a name on the command line.
+    /// Parses the name on the command line.
     fn parse(name: &str) -> Option<Self> {
         const MAX_JOINTS: usize = u8::MAX as usize;
         let ends = [Self::BaseTheta, Self::BaseD, Self::EndTheta, Self::EndD, Self::EndA, Self::EndAlpha].into_iter();

@@ -1,14 +1,15 @@
-//! What is known to be lost before anything is measured: directions in which the chain's numbers move without moving the
-//! camera at any joint angles, in closed form, each with its reason.
+//! Null directions of the chain in closed form: steps of its columns that leave the camera pose unchanged at
+//! all joint angles, each with its reason.
 //!
-//! The paper claims six degenerate columns of the classical chain (§4.5): `d`, `a`, `α` and `θ` of the last link and `d`
-//! and `θ` of the first one. It proves the one of `d` (Eqs. 11–17) and fixes the others by the forms of Eqs. 19 and 20.
-//! Errors of the print do not affect the claim (docs/mathematics.md, section 2): Eq. 12 has a minus before the lever-arm
-//! block where a plus belongs (left convention; the proof uses other columns only), and Eq. 18 has `−cos β` in the lower
-//! right corner of a rotation, while Eq. 19 needs `+cos β`. Switching the rotations of α and β against the singularity of
-//! Eq. 19 works only when `y` is moved together with β (docs/mathematics.md, section 4):
-//! [`crate::gimbal::Parameterization::MinimalSwapped`].
-//! The paper perturbs rotations on the left; the directions here use the right convention, as the rest of the program.
+//! The paper claims six degenerate columns of the classical chain (§4.5): `d`, `a`, `α` and `θ` of the last
+//! link and `d` and `θ` of the first one. It proves that of `d` (Eqs. 11–17) and fixes the others by the forms
+//! of Eqs. 19 and 20. Errors of the print do not affect the claim (docs/mathematics.md, section 2): Eq. 12 has
+//! a minus before the lever-arm block where a plus belongs (left convention; the proof uses other columns
+//! only), and Eq. 18 has `−cos β` in the lower right corner of a rotation, while Eq. 19 needs `+cos β`.
+//! Switching the rotations of α and β against the singularity of Eq. 19 works only when `y` is moved together
+//! with β (docs/mathematics.md, section 4): [`crate::gimbal::Parameterization::MinimalSwapped`].
+//! The paper perturbs rotations on the left; the directions here use the right convention, as the rest of the
+//! program.
 
 use nalgebra::{DMatrix, DMatrixView, DVector};
 
@@ -16,26 +17,26 @@ use crate::gimbal::{
     Chain, ParameterId, ParameterNames, ParameterPart, Parameterization, Quantity, redundant_directions,
 };
 
-/// Something that no measurement can tell, known from the form of the chain.
+/// A null direction that follows from the structure of the chain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum KnownLoss {
-    /// The first link's offset against a turn of `imu_from_base`.
+    /// The first link's joint offset against a rotation of `imu_from_base`.
     BaseTheta,
-    /// The first link's `d` against a shift of `imu_from_base`.
+    /// The first link's `d` against a translation of `imu_from_base`.
     BaseD,
-    /// The last link's offset against `effector_from_camera`.
+    /// The last link's joint offset against `effector_from_camera`.
     EndTheta,
-    /// The last link's `d` against a shift of `effector_from_camera`.
+    /// The last link's `d` against a translation of `effector_from_camera`.
     EndD,
-    /// The last link's `a` against a shift of `effector_from_camera`.
+    /// The last link's `a` against a translation of `effector_from_camera`.
     EndA,
-    /// The last link's `α` against a turn of `effector_from_camera`.
+    /// The last link's `α` against a rotation of `effector_from_camera`.
     EndAlpha,
-    /// Without joints: a turn of `imu_from_base` about this axis against `effector_from_camera`.
+    /// Without joints: a rotation of `imu_from_base` about this axis against `effector_from_camera`.
     RigidRotation(usize),
-    /// Without joints: a shift of `imu_from_base` along this axis against `effector_from_camera`.
+    /// Without joints: a translation of `imu_from_base` along this axis against `effector_from_camera`.
     RigidShift(usize),
-    /// A link's offset (counted from 0) against its joint's angles, when these are unknown.
+    /// A link's joint offset (counted from 0) against its joint's angles, when these are unknown.
     FreeAngle(usize),
     /// The `d` of this link and of the next one, whose axes are parallel.
     ParallelD(usize),
@@ -43,44 +44,44 @@ pub enum KnownLoss {
     CoaxialTheta(usize),
 }
 
-/// A known loss held against a measurement.
+/// A closed-form null direction, compared with a measurement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KnownDirection {
-    /// What is lost.
+    /// The null direction.
     pub loss: KnownLoss,
-    /// Scaled response of the window to the direction, relative to the reference of the rank rule: rounding when the
-    /// measurement agrees.
+    /// Scaled response of the window to the direction, relative to the reference of the rank rule: a rounding error
+    /// when the measurement agrees.
     pub response: f64,
-    /// Share of the scaled direction that lies in the measured null space, 1 when the measurement agrees.
+    /// Fraction of the scaled direction inside the measured null space, 1 when the measurement agrees.
     pub null_space_fraction: f64,
     /// Whether the measurement agrees.
     pub agrees: bool,
-    /// What is taken to be known of the direction beyond the rig's prior, 1 as much as the scale.
+    /// Information along the direction beyond the rig's prior, 1 as much as that of the scale.
     ///
-    /// Nobody can measure it, so anything but zero is false: the marginalization prior and the window were linearized at
-    /// different values of the calibration. First estimates keep it at zero. Offsets of free joint angles are left out
-    /// (zero): readings from before a fork may tell them.
+    /// The direction is unobservable, so that any value but zero is spurious: marginalization prior and window were
+    /// linearized at different values of the calibration. First-estimate Jacobians keep it at zero. Zero for
+    /// offsets of free joint angles: encoder readings before a fork may constrain them.
     pub spurious_gain: f64,
 }
 
-/// A smaller [`KnownDirection::spurious_gain`] than this is not worth a word.
+/// A [`KnownDirection::spurious_gain`] below this is negligible.
 pub const MIN_SPURIOUS_GAIN: f64 = 0.01;
 
 impl KnownDirection {
-    /// Whether a prior claims a part of it that counts.
+    /// Whether the spurious information is not negligible.
     pub fn is_claimed(&self) -> bool {
         self.spurious_gain > MIN_SPURIOUS_GAIN
     }
 }
 
-/// Sine of a twist under which axes count as parallel, and length of a link under which parallel axes count as one line,
-/// in metres: far under what anyone can build, far over rounding.
+/// Sine of a twist below which axes are parallel, and length of a link below which parallel axes are coaxial,
+/// in metres: far below manufacturing tolerances, far above rounding errors.
 const PARALLEL: f64 = 1e-12;
 
-/// A share of the null space from which on a direction counts as inside.
+/// Smallest fraction inside the null space of a confirmed direction.
 const INSIDE: f64 = 1.0 - 1e-6;
 
-/// All known losses of a chain, each with its direction in the chain's columns, in radians and metres.
+/// Returns all closed-form null directions of a chain in its columns (dof), in radians and metres.
 pub fn known_losses(chain: &Chain, joints_free: bool) -> Vec<(KnownLoss, DVector<f64>)> {
     let mut losses = Vec::new();
     if chain.parameterization() == Parameterization::Classical {
@@ -90,7 +91,7 @@ pub fn known_losses(chain: &Chain, joints_free: bool) -> Vec<(KnownLoss, DVector
     losses
 }
 
-/// The six of the classical form.
+/// Adds the six of the classical form.
 fn redundant(chain: &Chain, joints_free: bool, losses: &mut Vec<(KnownLoss, DVector<f64>)>) {
     let classical = chain.to_classical();
     let directions = redundant_directions(&classical);
@@ -105,7 +106,7 @@ fn redundant(chain: &Chain, joints_free: bool, losses: &mut Vec<(KnownLoss, DVec
     ];
     let names: Vec<KnownLoss> = if classical.links.is_empty() { rigid.collect() } else { jointed.into() };
     let hidden = chain.hides_joint_offsets();
-    // Where the offsets have no columns, unknown joint angles take their part; known ones do not.
+    // Without columns, the offsets are absorbed by unknown joint angles, but not by known ones.
     let whole = chain.dof();
     let kept: Vec<usize> = if hidden {
         let link = |row: usize| row.checked_sub(6).filter(|row| *row < 4 * classical.links.len());
@@ -122,7 +123,7 @@ fn redundant(chain: &Chain, joints_free: bool, losses: &mut Vec<(KnownLoss, DVec
     }
 }
 
-/// What links lose: offsets to free angles, and neighbours on parallel axes to each other.
+/// Adds those of links: joint offsets against free angles, and neighbours on parallel axes.
 fn links(chain: &Chain, joints_free: bool, losses: &mut Vec<(KnownLoss, DVector<f64>)>) {
     let parameters = chain.parameters();
     let column = |link: usize, quantity: Quantity| {
@@ -161,25 +162,25 @@ fn links(chain: &Chain, joints_free: bool, losses: &mut Vec<(KnownLoss, DVector<
     }
 }
 
-/// What is known of the calibration, its columns scaled and everything else projected out.
+/// Information about the calibration, columns scaled and all other unknowns projected out.
 pub(super) struct Measured<'a> {
     pub(super) scale: &'a DVector<f64>,
-    /// By the measurements.
+    /// Rows of the measurements.
     pub(super) block: &'a DMatrix<f64>,
-    /// Basis of the null space of that block.
+    /// Null space of that block.
     pub(super) null_space: DMatrixView<'a, f64>,
-    /// By measurements and priors.
+    /// Rows of measurements and priors.
     pub(super) with_priors: &'a DMatrix<f64>,
-    /// By the rig's prior alone.
+    /// Rows of the rig's prior alone.
     pub(super) rig_prior: &'a DMatrix<f64>,
     pub(super) reference: f64,
     pub(super) structural_threshold: f64,
 }
 
 impl Measured<'_> {
-    /// Holds the known losses against the measurement.
+    /// Compares closed-form null directions with the measurement.
     ///
-    /// A direction that moves a parameter outside of `kept` is none: that one is held at its value.
+    /// A direction that moves a parameter outside of `kept` is omitted: that parameter is fixed.
     pub(super) fn compare(&self, losses: Vec<(KnownLoss, DVector<f64>)>, kept: &[usize]) -> Vec<KnownDirection> {
         let scale = self.scale;
         losses
@@ -190,7 +191,7 @@ impl Measured<'_> {
             })
             .map(|(loss, direction)| {
                 let direction = direction.select_rows(kept);
-                // The chain's columns come first, those of other cameras behind them take no part.
+                // The chain's columns come first; those of other cameras follow and are zero.
                 let direction = direction.resize_vertically(scale.len(), 0.0).component_div(scale).normalize();
                 let response = (self.block * &direction).norm();
                 let null_space_fraction = self.null_space.tr_mul(&direction).norm();
@@ -216,7 +217,7 @@ impl Measured<'_> {
 }
 
 impl KnownLoss {
-    /// Where it is written: equations of the paper.
+    /// Equations of the paper.
     pub fn equations(self) -> &'static str {
         match self {
             Self::BaseD => "Eqs. 11–17",
@@ -227,7 +228,7 @@ impl KnownLoss {
         }
     }
 
-    /// Why it cannot be told, in one sentence, for a chain of so many joints.
+    /// Why the direction is unobservable, in one sentence, for a chain with this number of joints.
     pub fn reason(self, joints: usize, names: &ParameterNames) -> String {
         let link = |link: usize| names.part(ParameterPart::Link(link as u8));
         let (first, last) = (link(0), link(joints.saturating_sub(1)));

@@ -20,21 +20,21 @@ use crate::simulation::{Exercise, JOINT_PERIOD_S, JointSwing, SWING_M, VehicleSw
 
 /// Duration of a candidate, in seconds.
 pub const ADVICE_DURATION_S: f64 = 4.0;
-/// Frames of a candidate's window: about as many keyframes as the estimator makes of one.
+/// Number of frames of a candidate's window: about as many keyframes as the estimator makes.
 const FRAMES: usize = 16;
 /// Landmarks drawn in each frame's view.
 const LANDMARKS_PER_FRAME: usize = 12;
-/// A landmark takes part from so many sightings on, as in the estimator.
+/// Smallest number of observations of a landmark, as in the estimator.
 const MIN_OBSERVATIONS: usize = 3;
-/// Landmarks are drawn this far from the border, and followed up to it.
+/// Landmarks are drawn with this distance to the image border, and observed up to the border.
 const BORDER_PX: f64 = 8.0;
-/// Rate of the supposed inertial samples: their covariance hardly depends on it.
+/// Rate of the simulated IMU samples: their covariance hardly depends on it.
 const IMU_RATE_HZ: f64 = 50.0;
-/// A joint swings this far at most.
+/// Largest amplitude of a joint.
 const JOINT_SWING_RAD: f64 = 20.0 * std::f64::consts::PI / 180.0;
-/// A joint turns at most this fast, in rad/s: slow for any gimbal.
+/// Largest rate of a joint, in rad/s: slow for any gimbal.
 const JOINT_RATE_RAD_PER_S: f64 = 60.0 * std::f64::consts::PI / 180.0;
-/// A joint with less room than this is left alone, in radians.
+/// Joints with less range than this do not move, in radians.
 const MIN_SWING_RAD: f64 = 3.0 * std::f64::consts::PI / 180.0;
 /// The vehicle's velocity at the start decays with this time constant, in seconds.
 const BRAKING_S: f64 = 0.8;
@@ -51,43 +51,44 @@ pub struct Advice {
     pub duration_s: f64,
 }
 
-/// A direction of the calibration and how well it is known.
+/// A direction of the calibration with its posterior standard deviation.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct WeakDirection {
     /// Names of the columns.
     pub names: Vec<String>,
-    /// Weight of each in the unit direction, in units of 10° and 3 cm.
+    /// Weight of each column in the unit direction, in units of 10° and 3 cm.
     pub weights: Vec<f64>,
     /// Standard deviation along it, in the same units.
     pub sigma: f64,
     /// The parameter with the largest weight.
     pub leading: String,
-    /// The deviation of the leading parameter that belongs to one sigma along the direction, in radians or metres.
+    /// Standard deviation of the leading parameter that corresponds to one σ along the direction, in radians or
+    /// metres.
     pub leading_sigma: f64,
     /// Dimension of the leading parameter.
     #[serde(rename = "unit")]
     pub dimension: Dimension,
 }
 
-/// A candidate and what it would leave.
+/// A candidate motion with the predicted σ.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CandidateReport {
-    /// What to do, in words.
+    /// Description of the motion.
     pub words: String,
-    /// Standard deviation along the least observable direction after it.
+    /// Predicted standard deviation along the least observable direction after the motion.
     pub sigma_after: f64,
-    /// The same over what it is now.
+    /// Ratio of the predicted to the present standard deviation.
     pub remaining: f64,
-    /// The motion.
+    /// The motion of vehicle and joint.
     #[serde(skip)]
     pub exercise: Exercise,
 }
 
-/// Linearizes every candidate from here and orders them by the σ that they leave of the least observable direction; `None` when
-/// nothing is estimated or a number is not finite.
+/// Linearizes every candidate from the present state and sorts them by the predicted σ of the least observable
+/// direction; `None` when no parameter is estimated or a number is not finite.
 ///
-/// A candidate's window stands alone: positions, yaw, velocities and biases at its start are unknown; its information is
-/// added to the posterior of the calibration.
+/// A candidate's window is independent of the past: positions, yaw, velocities and biases at its start are
+/// unknown. Its information is added to the posterior of the calibration.
 pub fn advise(situation: &Situation) -> Option<Advice> {
     let excitable = excitable_directions(&situation.chain, situation.joints_free());
     if excitable.ncols() == 0 {
@@ -117,7 +118,7 @@ pub fn advise(situation: &Situation) -> Option<Advice> {
             })
         })
         .collect();
-    // A stable sort: candidates that leave the same stay in their order.
+    // A stable sort: equal candidates keep their order.
     reports.sort_by(|a, b| a.sigma_after.total_cmp(&b.sigma_after));
     let direction = &excitable * along;
     Some(Advice {
@@ -144,7 +145,7 @@ impl WeakDirection {
     }
 }
 
-/// Every swing of the vehicle with every swing of a joint that has room for it.
+/// All combinations of a vehicle motion with a joint motion that the joint's range admits.
 fn candidates(situation: &Situation) -> Vec<Exercise> {
     let mut swings = vec![None];
     for (joint, angle_rad) in situation.joints_rad.iter().enumerate() {
@@ -160,7 +161,8 @@ fn candidates(situation: &Situation) -> Vec<Exercise> {
     VehicleSwing::ALL.into_iter().flat_map(with).collect()
 }
 
-/// Information of a candidate about the calibration, in units of 10° and 3 cm.
+/// Information matrix of a candidate about the calibration columns (n × n), in units of 10° and 3 cm; `None`
+/// when it is not finite.
 fn information_of(situation: &Situation, exercise: &Exercise) -> Option<DMatrix<f64>> {
     let states: Vec<(f64, NavigationState, Vec<f64>)> = (0..FRAMES)
         .map(|slot| {
@@ -211,7 +213,7 @@ fn joints_at(situation: &Situation, exercise: &Exercise, time_s: f64) -> Vec<f64
     angles.map(|(joint, angle)| angle + exercise.joint_rad(joint, time_s)).collect()
 }
 
-/// Position of the vehicle: its velocity decays, and the exercise comes on top.
+/// Position of the vehicle in the world: the present velocity decays, and the exercise is added.
 fn position_at(situation: &Situation, exercise: &Exercise, time_s: f64) -> Vector3<f64> {
     let start = &situation.navigation;
     let shift = exercise.shift_m(time_s.max(0.0));
@@ -221,7 +223,7 @@ fn position_at(situation: &Situation, exercise: &Exercise, time_s: f64) -> Vecto
     start.world_from_imu.translation_m + glide + forward * shift.x + left * shift.y + Vector3::z() * shift.z
 }
 
-/// Where the body looks on the plan: its x axis, or its z axis when that one is upright.
+/// Horizontal heading of the body: its x axis, or its z axis when the x axis is vertical.
 fn forward_of(world_from_imu: &RigidTransform) -> Vector3<f64> {
     let flat = |axis: Vector3<f64>| {
         let axis = world_from_imu.rotation * axis;
@@ -232,7 +234,7 @@ fn forward_of(world_from_imu: &RigidTransform) -> Vector3<f64> {
     ahead.try_normalize(1e-6).unwrap_or_else(Vector3::x)
 }
 
-/// Pose and velocity during a candidate: the vehicle tilts as a multirotor must to accelerate so (without drag).
+/// Pose and velocity during a candidate: the vehicle tilts like a multirotor to accelerate (without drag).
 fn navigation_at(situation: &Situation, exercise: &Exercise, time_s: f64) -> NavigationState {
     const STEP_S: f64 = 1e-3;
     let at = |steps: f64| position_at(situation, exercise, time_s + steps * STEP_S);
@@ -274,7 +276,7 @@ fn samples(
         .collect()
 }
 
-/// Landmarks in every frame's view at the scene's distances, each followed while it stays in sight.
+/// Landmarks in the view of every frame at the distances of the scene, observed while they are in the image.
 fn landmarks(situation: &Situation, poses: &[RigidTransform]) -> Vec<HypotheticalLandmark> {
     let camera = &situation.camera;
     let scene_m = situation.scene_m();
@@ -311,8 +313,8 @@ fn landmarks(situation: &Situation, poses: &[RigidTransform]) -> Vec<Hypothetica
     landmarks
 }
 
-/// Whether the estimator makes a keyframe of any frame beside the first, by parallax or by what is new. A camera that hardly
-/// moves makes none, whatever its gimbal does, and what it saw is forgotten.
+/// Whether the estimator makes a keyframe of any frame after the first, by parallax or by new features. A
+/// camera that hardly translates makes none, whatever its gimbal does, and its observations are dropped.
 fn makes_keyframes(landmarks: &[HypotheticalLandmark], poses: &[RigidTransform]) -> bool {
     let options = EstimatorOptions::default();
     let is_keyframe = |slot: usize| {
@@ -331,7 +333,7 @@ fn makes_keyframes(landmarks: &[HypotheticalLandmark], poses: &[RigidTransform])
     (1..poses.len()).any(is_keyframe)
 }
 
-/// What a candidate asks for.
+/// Describes a candidate as an instruction.
 fn words(exercise: &Exercise, joints: &[LaboratoryJoint]) -> String {
     let swing = exercise.joint.map(|swing| {
         let name = joints.get(swing.joint).map_or("a joint", |joint| joint.name.as_str());
@@ -364,7 +366,7 @@ fn words(exercise: &Exercise, joints: &[LaboratoryJoint]) -> String {
 }
 
 impl Advice {
-    /// The best candidate in one sentence with what it would bring.
+    /// The best candidate and its effect in one sentence.
     pub fn sentence(&self) -> Option<String> {
         let best = self.candidates.first()?;
         Some(format!(

@@ -1,4 +1,4 @@
-//! Information gain of a window per parameter and second, and the motion that it is due to.
+//! Information gain of a window by parameter and by motion.
 
 use std::fmt;
 
@@ -11,7 +11,7 @@ use crate::estimator::{HypotheticalFrame, HypotheticalLandmark, HypotheticalWind
 use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::{Chain, ParameterNames};
 
-/// The gain of information by parameter and by motion over a window.
+/// Information gain of a window by parameter and by motion.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Excitation {
     /// The motions: translations along and rotations about the body's axes, then the joints.
@@ -22,22 +22,22 @@ pub struct Excitation {
     pub duration_s: f64,
 }
 
-/// One parameter's gain.
+/// Information gain of one parameter.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ParameterExcitation {
     /// Its name.
     pub name: String,
-    /// How fast the window narrows it from the prior on, in bits per second: a bit halves the standard deviation.
+    /// Gain beyond the prior in bits per second: one bit halves the standard deviation.
     pub bits_per_s: f64,
-    /// How much of that would be missing without each motion.
+    /// Loss of that gain without each motion.
     pub by_motion: Vec<f64>,
 }
 
-/// Information gain of a window per parameter and second beyond a prior of 10° and 3 cm, and the part that is lost without
-/// one motion: the same window is linearized again with that motion taken out of its states, with the same landmarks and
-/// observations. `None` for windows without length or finite numbers.
+/// Returns the information gain of a window by parameter and second beyond a prior of 10° and 3 cm, and its
+/// loss without each motion: the window is linearized again without that motion, with the same landmarks and
+/// observations. `None` for windows without duration or finite numbers.
 ///
-/// These parts need not add up to the whole: two motions may constrain the same parameter, or only together.
+/// The losses need not add up to the gain: two motions may constrain the same parameter alone, or only together.
 pub fn excitation(
     window: &HypotheticalWindow,
     chain: &Chain,
@@ -78,7 +78,7 @@ fn variances(window: &HypotheticalWindow, chain: &Chain) -> Option<Vec<f64>> {
     Some(covariance.diagonal().iter().copied().collect())
 }
 
-/// The window with a motion taken out of its states.
+/// The window without one motion.
 fn without(window: &HypotheticalWindow, chain: &Chain, motion: Motion) -> HypotheticalWindow {
     let middle = &window.frames[window.frames.len() / 2];
     let about = middle.navigation.world_from_imu;
@@ -140,7 +140,7 @@ impl fmt::Display for Excitation {
         for parameter in &self.parameters {
             write!(out, "  {:<12}{:>8.2}", parameter.name, parameter.bits_per_s)?;
             for (name, missing) in self.motions.iter().zip(&parameter.by_motion) {
-                // Rounding of either sign is nothing.
+                // Rounding errors count as zero.
                 let missing = if missing.abs() < 0.005 { 0.0 } else { *missing };
                 write!(out, "{missing:>width$.2}", width = width(name))?;
             }

@@ -36,7 +36,7 @@ impl LaboratoryForm {
         format!("{}{suffix}", self.parameterization)
     }
 
-    /// The mechanism in this form.
+    /// The mechanism's chain in this parameterization.
     pub fn chain(self, mechanism: &Mechanism) -> Chain {
         let chain = Chain::from_classical(&mechanism.chain, self.parameterization);
         if self.joint_offsets { chain } else { chain.without_joint_offsets() }
@@ -55,20 +55,20 @@ impl std::str::FromStr for LaboratoryForm {
     }
 }
 
-/// What an experiment consists of.
+/// Setup of an experiment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LaboratorySetup {
-    /// The gimbal.
+    /// Mechanism of the gimbal.
     pub mechanism: Mechanism,
-    /// The camera.
+    /// Model of the camera.
     pub camera: CameraModel,
-    /// How everything moves.
+    /// Motion of vehicle and joints.
     pub motion: LaboratoryMotion,
-    /// Which joints do not move, counted from 0.
+    /// Joints that do not move, counted from 0.
     pub frozen: Vec<usize>,
-    /// What is known of the joint angles.
+    /// Knowledge of the joint angles.
     pub joints: JointKnowledge,
-    /// What is known of the poses.
+    /// Knowledge of the poses.
     pub poses: PoseKnowledge,
     /// Number of frames, [`FRAME_PERIOD_S`] apart.
     pub frames: usize,
@@ -80,7 +80,7 @@ pub struct LaboratorySetup {
 pub const FRAME_PERIOD_S: f64 = 0.25;
 /// Magnitude of gravity in an experiment.
 const GRAVITY_M_PER_S2: f64 = 9.81;
-/// Rate of the IMU.
+/// Rate of the IMU, in Hz.
 const IMU_RATE_HZ: f64 = 200.0;
 /// Standard deviation of a pixel.
 pub const PIXEL_SIGMA_PX: f64 = 1.0;
@@ -93,7 +93,7 @@ const MIN_DEPTH_M: f64 = 1.0;
 /// Standard deviations of the chain's numbers with the priors kept in: 3 cm and 10°, the scale of the columns.
 const CHAIN_PRIOR: (f64, f64) = (Dimension::Length.scale(), Dimension::Angle.scale());
 
-/// The IMU of an experiment without a rig: the ADIS16448 of the paper, as `RotorS` gives it.
+/// The IMU of an experiment without a rig: the ADIS16448 of the paper with the parameters of `RotorS`.
 pub const LABORATORY_IMU: ImuNoise = ImuNoise {
     accelerometer_noise_density: 0.004,
     accelerometer_random_walk: 0.006,
@@ -102,7 +102,7 @@ pub const LABORATORY_IMU: ImuNoise = ImuNoise {
 };
 
 impl LaboratorySetup {
-    /// A mechanism in aggressive motion, with poses and joint angles known, ten frames and a hundred landmarks.
+    /// Setup with aggressive motion, known poses and joint angles, ten frames and a hundred landmarks.
     pub fn new(mechanism: Mechanism) -> Self {
         let camera = CameraModel::pinhole([460.0, 460.0, 320.0, 240.0], [640, 480]);
         Self {
@@ -117,12 +117,12 @@ impl LaboratorySetup {
         }
     }
 
-    /// Runs the experiment in one form; `None` when a number of the mechanism is not finite.
+    /// Runs the experiment in one parameterization; `None` when a value of the mechanism is not finite.
     pub fn run(&self, form: LaboratoryForm) -> Option<LaboratoryResult> {
         self.run_all(&[form]).pop()
     }
 
-    /// Runs the experiment in several forms, leaving out those whose numbers are not finite.
+    /// Runs the experiment in several parameterizations; those with values that are not finite are omitted.
     pub fn run_all(&self, forms: &[LaboratoryForm]) -> Vec<LaboratoryResult> {
         let mut results = Vec::new();
         self.run_each(forms, |result| {
@@ -132,7 +132,7 @@ impl LaboratorySetup {
         results
     }
 
-    /// [`Self::run_all`], handing over each result as it comes; it ends early when `each` says `false`.
+    /// [`Self::run_all`], passing on each result when it is ready; it stops when `each` returns `false`.
     pub fn run_each(&self, forms: &[LaboratoryForm], mut each: impl FnMut(LaboratoryResult) -> bool) {
         let window = self.window();
         let angles: Vec<&[f64]> = window.frames.iter().map(|frame| frame.joints_rad.as_slice()).collect();
@@ -147,12 +147,12 @@ impl LaboratorySetup {
         }
     }
 
-    /// The window of the experiment.
+    /// Hypothetical window of the experiment.
     pub fn window(&self) -> HypotheticalWindow {
         self.window_from(0)
     }
 
-    /// The window that starts so many frames after the start of the motion.
+    /// Hypothetical window that starts `first` frames after the start of the motion.
     pub(super) fn window_from(&self, first: usize) -> HypotheticalWindow {
         let gravity_in_world = gravity_in_world(GRAVITY_M_PER_S2);
         let flight = Flight { mechanism: &self.mechanism, motion: self.motion, frozen: &self.frozen, gravity_in_world };
@@ -211,19 +211,19 @@ impl LaboratorySetup {
     }
 }
 
-/// What came of an experiment in one form.
+/// Result of an experiment in one parameterization.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LaboratoryResult {
     /// The form.
     pub form: LaboratoryForm,
-    /// Its ranks and directions.
+    /// Ranks, null and weak directions.
     pub rank: RankReport,
 }
 
-/// How many columns are lost to what.
+/// Number of unobservable columns by cause.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Deficit {
-    /// Redundant in the parameterization, or its parameterization singular (G).
+    /// Redundant in the parameterization, or at its singularity (G).
     pub parameterization: usize,
     /// Joints that did not move (F).
     pub joints: usize,
@@ -244,7 +244,7 @@ impl LaboratoryResult {
         }
     }
 
-    /// The parameters that take part in null directions, in column order.
+    /// Parameters with a weight in null directions, in column order.
     pub fn null_parameters(&self) -> Vec<ParameterId> {
         let null: Vec<_> = self.rank.directions.iter().filter(|direction| direction.structural).collect();
         let takes_part = |column: usize| null.iter().any(|direction| direction.weights[column].abs() > TAKES_PART);
@@ -253,5 +253,5 @@ impl LaboratoryResult {
     }
 }
 
-/// A scaled weight from which on a parameter takes part in a null direction.
+/// Smallest scaled weight that counts in a null direction.
 const TAKES_PART: f64 = 1e-5;

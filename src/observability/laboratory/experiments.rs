@@ -77,7 +77,7 @@ impl Experiment {
         Self { forms, ..self }
     }
 
-    /// The experiment as it is run; `None` without a mechanism of that name.
+    /// Setup of the experiment; `None` without a mechanism of that name.
     pub(super) fn setup(&self) -> Option<LaboratorySetup> {
         let mut setup = LaboratorySetup::new(Mechanism::named(self.mechanism).ok()?);
         setup.motion = self.motion;
@@ -91,7 +91,7 @@ impl Experiment {
         Some(setup)
     }
 
-    /// The experiment with another number of frames.
+    /// Setup with another number of frames.
     pub(super) fn setup_of(&self, frames: usize) -> Option<LaboratorySetup> {
         self.frames(frames).setup()
     }

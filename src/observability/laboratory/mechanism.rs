@@ -12,13 +12,13 @@ use crate::sensors::Rig;
 /// A joint of a mechanism.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LaboratoryJoint {
-    /// What it is called.
+    /// Name of the joint.
     pub name: String,
-    /// Lower and upper stop, in radians.
+    /// Lower and upper limit, in radians.
     pub limits_rad: (f64, f64),
 }
 
-/// A gimbal to experiment with.
+/// A gimbal of an experiment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mechanism {
     /// Its name on the command line, or the rig's.
@@ -27,15 +27,15 @@ pub struct Mechanism {
     pub chain: ClassicalChain,
     /// Its joints.
     pub joints: Vec<LaboratoryJoint>,
-    /// What its parameters are called.
+    /// Names of its parameters.
     pub names: ParameterNames,
 }
 
-/// A name that no mechanism has.
+/// A name without a mechanism.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("unknown mechanism '{given}': expected one of {}", Mechanism::NAMES.map(|(name, _)| name).join(", "))]
 pub struct UnknownMechanism {
-    /// What was asked for.
+    /// The given name.
     pub given: String,
 }
 
@@ -69,7 +69,7 @@ impl Mechanism {
         ("generic-5", "five joints, drawn at random"),
     ];
 
-    /// The mechanism of a name.
+    /// Returns the mechanism with the given name.
     pub fn named(name: &str) -> Result<Self, UnknownMechanism> {
         let (x, y, z) = (Vector3::x(), Vector3::y(), Vector3::z());
         let chain = match name {
@@ -132,7 +132,7 @@ impl Mechanism {
         Ok(Self { name: name.to_owned(), chain, joints, names: ParameterNames::default() })
     }
 
-    /// The mechanism that carries a rig's camera; `None` when the rig has no such camera.
+    /// Returns the mechanism of a rig's camera; `None` when the rig has no such camera.
     pub fn of_rig(rig: &Rig, camera_key: &str) -> Option<Self> {
         let chain = rig.chain_of_camera(camera_key)?;
         let joints = rig.gimbal.iter().flat_map(|gimbal| &gimbal.joints).take(chain.joint_count());
@@ -142,7 +142,7 @@ impl Mechanism {
     }
 }
 
-/// The optical frame of a camera that looks along the IMU's x axis: x right, y down, z ahead.
+/// Orientation of the optical frame of a camera along the IMU's x axis: x right, y down, z forward.
 fn optical() -> UnitQuaternion<f64> {
     let matrix = Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
     UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(matrix))
@@ -156,7 +156,7 @@ fn vector_within(random: &mut SplitMix64, bound: f64) -> Vector3<f64> {
     Vector3::from_fn(|_, _| within(random, bound))
 }
 
-/// Axes that miss each other by centimetres and are at right angles.
+/// Skew axes, centimetres apart, at right angles.
 fn apart(directions: &[Vector3<f64>]) -> Vec<JointAxis> {
     let step = Vector3::new(0.05, 0.02, -0.035);
     let far = Vector3::new(0.003, 0.025, 0.011);
@@ -167,7 +167,7 @@ fn apart(directions: &[Vector3<f64>]) -> Vec<JointAxis> {
         .collect()
 }
 
-/// The same, out of square by up to four degrees.
+/// The same axes with errors of up to four degrees.
 fn out_of_square(directions: &[Vector3<f64>], seed: u64) -> Vec<JointAxis> {
     let mut random = SplitMix64::new(seed);
     let mut axes = apart(directions);
@@ -178,7 +178,8 @@ fn out_of_square(directions: &[Vector3<f64>], seed: u64) -> Vec<JointAxis> {
     axes
 }
 
-/// A camera about 16 cm from the IMU, turned against a nominal frame by up to a quarter of a radian about each axis.
+/// A camera about 16 cm from the IMU, rotated from a nominal orientation by up to a quarter of a radian about
+/// each axis.
 fn out_of_true(nominal: &UnitQuaternion<f64>, seed: u64) -> RigidTransform {
     let mut random = SplitMix64::new(seed);
     let rotation_vector = Vector3::repeat(0.15) + vector_within(&mut random, 0.1);
@@ -203,7 +204,7 @@ fn random_chain(joints: usize, seed: u64) -> ClassicalChain {
     ClassicalChain { imu_from_base: transform(), links, effector_from_camera: transform() }
 }
 
-/// The classical chain whose joints turn about these axes when all encoder angles are zero, with the camera there.
+/// Returns the classical chain with these joint axes and this `imu_from_camera` at encoder angles zero.
 fn chain_of_axes(axes: &[JointAxis], imu_from_camera: &RigidTransform) -> ClassicalChain {
     let Some(((first, first_point), rest)) = axes.split_first() else {
         return ClassicalChain { imu_from_base: *imu_from_camera, ..ClassicalChain::default() };
@@ -216,7 +217,7 @@ fn chain_of_axes(axes: &[JointAxis], imu_from_camera: &RigidTransform) -> Classi
         frame = frame * link.transform(0.0);
         links.push(link);
     }
-    // What the last link holds, the camera's pose on the effector takes back.
+    // The camera's pose on the effector compensates the last link.
     let last = DhLink { theta_offset_rad: 0.2, d_m: 0.02, a_m: 0.03, alpha_rad: -0.5 * PI };
     frame = frame * last.transform(0.0);
     links.push(last);
@@ -236,7 +237,7 @@ fn link_to(frame: &RigidTransform, next: &Vector3<f64>, next_point: &Vector3<f64
     } else {
         z.cross(next).normalize()
     };
-    // The feet of the common normal; of parallel axes any will do, so the one that holds the given point.
+    // Feet of the common normal; parallel axes use the given point.
     let d_m = if parallel { z.dot(&between) } else { next.cross(&normal).dot(&between) / next.cross(&normal).dot(&z) };
     DhLink {
         theta_offset_rad: x.cross(&normal).dot(&z).atan2(x.dot(&normal)),
@@ -246,7 +247,7 @@ fn link_to(frame: &RigidTransform, next: &Vector3<f64>, next_point: &Vector3<f64
     }
 }
 
-/// A unit vector across another one.
+/// A unit vector orthogonal to the given one.
 fn across(direction: &Vector3<f64>) -> Vector3<f64> {
     let helper = if direction.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() };
     (helper - direction * direction.dot(&helper)).normalize()

@@ -10,10 +10,10 @@ use crate::estimator::{ImuBias, NavigationState};
 use crate::geometry::{RigidTransform, ns_from_seconds, so3};
 use crate::sensors::ImuSample;
 
-/// How the vehicle moves, or what the camera is to do.
+/// Motion of the vehicle, or constraint on the motion of the camera.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LaboratoryMotion {
-    /// Turns and translates about all axes.
+    /// The vehicle rotates and translates about all axes.
     Aggressive,
     /// Translates and never rotates.
     TranslationOnly,
@@ -37,13 +37,13 @@ pub enum LaboratoryMotion {
     StraightLine,
     /// The camera never rotates in the world while vehicle and joints move.
     Stabilized,
-    /// The camera turns about the vertical only.
+    /// The camera rotates about the vertical only.
     YawFollowing,
     /// The camera never rotates in the world; the vehicle rotates without translating.
     StabilizedRotationOnly,
     /// The camera never rotates in the world; the vehicle translates only, so that no joint moves.
     StabilizedTranslationOnly,
-    /// The camera neither turns nor moves in the world.
+    /// The camera neither rotates nor translates in the world.
     CameraStationary,
     /// As aggressive, the second joint (or the only one) fixed.
     OneJointFrozen,
@@ -51,16 +51,16 @@ pub enum LaboratoryMotion {
     AllJointsFrozen,
 }
 
-/// A name that no motion has.
+/// A name without a motion.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("unknown motion '{given}': expected one of {}", LaboratoryMotion::ALL.map(|it| it.name()).join(", "))]
 pub struct UnknownMotion {
-    /// What was asked for.
+    /// The given name.
     pub given: String,
 }
 
 impl LaboratoryMotion {
-    /// All of them.
+    /// All motions, in the order of the manual.
     pub const ALL: [Self; 18] = [
         Self::Aggressive,
         Self::TranslationOnly,
@@ -106,7 +106,7 @@ impl LaboratoryMotion {
         }
     }
 
-    /// What happens in it.
+    /// Description of the motion.
     pub fn meaning(self) -> &'static str {
         match self {
             Self::Aggressive => "the vehicle turns and translates about all axes",
@@ -132,7 +132,7 @@ impl LaboratoryMotion {
         }
     }
 
-    /// Whether a joint of so many is stationary in this motion.
+    /// Whether the joint with this index is stationary in the motion.
     fn holds_joint(self, joint: usize, joints: usize) -> bool {
         match self {
             Self::StabilizedTranslationOnly | Self::AllJointsFrozen => true,
@@ -159,7 +159,7 @@ struct Sine {
 }
 
 impl Sine {
-    /// Its value or a derivative by time.
+    /// Value or derivative with respect to time.
     fn at(&self, time_s: f64, derivative: i32) -> f64 {
         let quarter_turns = f64::from(derivative) * 0.25 * TAU;
         let phase = self.rate_rad_per_s * time_s + self.phase_rad + quarter_turns;
@@ -171,18 +171,18 @@ const fn sine(size: f64, rate_rad_per_s: f64, phase_rad: f64) -> Sine {
     Sine { size, rate_rad_per_s, phase_rad }
 }
 
-/// Turns of the vehicle, as a rotation vector in radians.
+/// Rotation vector of the vehicle, in radians.
 const ROTATION: [Sine; 3] = [sine(0.2, 2.8, 0.4), sine(0.25, 2.0, 1.3), sine(0.3, 1.6, 0.2)];
 /// Its position in metres.
 const PATH: [Sine; 3] = [sine(1.2, 1.6, 0.0), sine(0.9, 2.4, 0.7), sine(0.7, 2.0, 1.9)];
 /// Its constant velocity, where it has one.
 const VELOCITY_M_PER_S: Vector3<f64> = Vector3::new(0.9, 0.4, -0.3);
-/// Rates and phases of the joints, again from the front when there are more.
+/// Angles of the joints; further joints repeat them.
 const JOINTS: [Sine; 5] =
     [sine(0.4, 2.0, 0.1), sine(0.4, 3.2, 1.0), sine(0.4, 2.4, 2.0), sine(0.4, 2.8, 0.6), sine(0.4, 1.8, 1.5)];
-/// Step of the numeric derivatives of rotations and of composed positions.
+/// Step of the numerical derivatives of rotations and composed positions.
 const STEP_S: f64 = 1e-3;
-/// A joint uses this part of the room between its rest and the nearer stop at most.
+/// Largest amplitude of a joint as a fraction of the distance from its centre to the nearer limit.
 const ROOM_RATIO: f64 = 0.9;
 
 /// A mechanism in motion, some of its joints fixed.
@@ -202,7 +202,7 @@ impl Flight<'_> {
         (0..joints)
             .map(|joint| {
                 let (low, high) = self.mechanism.joints.get(joint).map_or((-TAU, TAU), |joint| joint.limits_rad);
-                // At zero, or where there is room to both sides.
+                // At zero, or where there is enough range on both sides.
                 let quarter = 0.25 * (high - low).max(0.0);
                 let center = 0.0_f64.max(low + quarter).min(high - quarter);
                 if self.frozen.contains(&joint) || self.motion.holds_joint(joint, joints) {
@@ -281,7 +281,7 @@ impl Flight<'_> {
         }
     }
 
-    /// First or second derivative of the position: exact, but for a path that hangs on the joints.
+    /// First or second derivative of the position: exact, except for a path that depends on the joints.
     fn derivative_m(&self, time_s: f64, derivative: i32) -> Vector3<f64> {
         if self.motion != LaboratoryMotion::CameraStationary {
             return self.path_m(time_s, derivative);

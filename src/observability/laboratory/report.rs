@@ -9,7 +9,7 @@ use crate::estimator::{JointKnowledge, PoseKnowledge};
 use crate::gimbal::ParameterNames;
 use crate::observability::CalibrationDirection;
 
-/// What came of an experiment in several forms.
+/// Results of an experiment in several parameterizations.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LaboratoryReport {
     /// Name of the mechanism.
@@ -18,27 +18,27 @@ pub struct LaboratoryReport {
     pub joint_count: usize,
     /// Name of the motion.
     pub motion: String,
-    /// What happens in it.
+    /// Description of the motion.
     pub motion_meaning: String,
     /// Names of the joints that do not move.
     pub frozen_joints: Vec<String>,
-    /// What is known of the joint angles.
+    /// Knowledge of the joint angles.
     pub joint_angles: String,
-    /// What is known of the poses.
+    /// Knowledge of the poses.
     pub poses: String,
     /// Number of frames.
     pub frames: usize,
-    /// Time between them.
+    /// Time between frames, in seconds.
     pub frame_period_s: f64,
     /// Number of landmarks.
     pub landmarks: usize,
     /// Standard deviation of a pixel.
     pub pixel_sigma_px: f64,
-    /// The forms, in the order asked for.
+    /// Parameterizations in the requested order.
     pub forms: Vec<FormReport>,
 }
 
-/// One form.
+/// Results of one parameterization.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FormReport {
     /// Its name.
@@ -49,26 +49,26 @@ pub struct FormReport {
     pub rank_structural: usize,
     /// Informed rank.
     pub rank_informed: usize,
-    /// What is lost to what.
+    /// Number of unobservable columns by cause.
     pub deficit: Deficit,
     /// Singular values, scaled by 10° and 3 cm, largest first.
     pub singular_values: Vec<f64>,
-    /// At or below this a singular value is zero.
+    /// Singular values at or below this are structural zeros.
     pub structural_threshold: f64,
-    /// Below this a direction is uninformed.
+    /// Directions with a smaller singular value are uninformed.
     pub informed_threshold: f64,
     /// Singularity margins.
     pub margins: Vec<Margin>,
     /// Null and weak directions, least observable first.
     pub directions: Vec<DirectionReport>,
-    /// What is known to be lost from the form of the chain, and whether it was measured.
+    /// Null directions in closed form, compared with the measurement.
     pub known: Vec<KnownReport>,
 }
 
-/// A known loss beside the measurement.
+/// A null direction in closed form, compared with the measurement.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct KnownReport {
-    /// Why it is lost, in one sentence with its equation.
+    /// Reason in one sentence with its equation.
     pub reason: String,
     /// Response of the window relative to the reference of the rank rule.
     pub response: f64,
@@ -82,22 +82,22 @@ pub struct Margin {
     /// Name of the singularity.
     #[serde(rename = "lock")]
     pub singularity: String,
-    /// 1 far away, 0 singular.
+    /// 0 when singular, 1 at the largest distance.
     pub margin: f64,
 }
 
 /// A null or weak direction.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DirectionReport {
-    /// Whether it is structurally unseen, else merely weak.
+    /// Whether it is structurally unobservable, not only uninformed.
     pub null: bool,
     /// Its singular value.
     pub singular_value: f64,
-    /// Its parameters, strongest first.
+    /// Parameters by descending weight.
     pub parameters: Vec<ParameterWeight>,
 }
 
-/// A parameter's part in a direction.
+/// Weight of a parameter in a direction.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ParameterWeight {
     /// Its name.
@@ -106,11 +106,11 @@ pub struct ParameterWeight {
     pub weight: f64,
 }
 
-/// Weights below this are left out of a direction's parameters.
+/// Smaller weights are omitted.
 const SMALLEST_WEIGHT: f64 = 0.005;
 
 impl LaboratoryReport {
-    /// The report of an experiment and what came of it.
+    /// Collects the results of an experiment.
     pub fn new(setup: &LaboratorySetup, results: &[LaboratoryResult]) -> Self {
         let joint_name = |joint: &usize| {
             let known = setup.mechanism.joints.get(*joint);

@@ -10,12 +10,12 @@ use crate::gimbal::{Chain, ParameterNames};
 use crate::observability::{RankReport, analyse, chain_of_step};
 use crate::sensors::{ImuNoise, Rig};
 
-/// A moment of a flight.
+/// State of a run and posterior of its calibration.
 #[derive(Clone, Debug)]
 pub struct Situation {
     /// The camera.
     pub camera: CameraModel,
-    /// The chain in the form in which it is estimated.
+    /// The chain in its estimated parameterization.
     pub chain: Chain,
     /// Its joints.
     pub joints: Vec<LaboratoryJoint>,
@@ -42,11 +42,11 @@ pub struct Situation {
 /// Information about a fixed parameter in units of 10° and 3 cm: σ is a millionth of them.
 const KNOWN: f64 = 1e12;
 
-/// Where a scene is taken to be that has no landmarks yet, in metres.
+/// Distances of a scene without landmarks, in metres.
 const UNKNOWN_DISTANCE_M: [f64; 3] = [4.0, 7.0, 12.0];
 
 impl Situation {
-    /// The moment after a step of a run with a rig's camera; `None` while there is no rank.
+    /// State after a step of a run with a rig's camera; `None` without a rank report.
     pub fn of_step(report: &StepReport, rank: &RankReport, rig: &Rig, camera_key: &str) -> Option<Self> {
         let newest = report.newest()?;
         let chain = chain_of_step(report, rank).filter(|_| rank.posterior.columns() == rank.parameters.len())?;
@@ -85,7 +85,7 @@ impl Situation {
         })
     }
 
-    /// The moment at the end of an experiment: its prior (10° and 3 cm) and its window are what is known.
+    /// State at the end of an experiment: its prior (10° and 3 cm) and its window are the posterior.
     pub fn of_experiment(setup: &LaboratorySetup, form: LaboratoryForm, imu_noise: ImuNoise) -> Option<Self> {
         let window = setup.window();
         let chain = form.chain(&setup.mechanism);
@@ -114,12 +114,12 @@ impl Situation {
         })
     }
 
-    /// Distances of the scene's landmarks, or what is taken for them.
+    /// Distances of the scene's landmarks, or assumed ones.
     pub(super) fn scene_m(&self) -> &[f64] {
         if self.distances_m.is_empty() { &UNKNOWN_DISTANCE_M } else { &self.distances_m }
     }
 
-    /// Whether the joint angles are estimated from images alone.
+    /// Whether the joint angles are estimated without encoder readings.
     pub(super) fn joints_free(&self) -> bool {
         self.encoders == JointKnowledge::Unknown && self.chain.joint_count() > 0
     }
@@ -131,7 +131,7 @@ impl Situation {
     }
 }
 
-/// The information of the first columns when the others (those of further cameras) are unknown.
+/// Marginal information of the first columns with the others (those of further cameras) eliminated.
 fn marginal(information: DMatrix<f64>, count: usize) -> Option<DMatrix<f64>> {
     if information.ncols() <= count {
         return Some(information);
@@ -140,7 +140,7 @@ fn marginal(information: DMatrix<f64>, count: usize) -> Option<DMatrix<f64>> {
     Some(covariance.view((0, 0), (count, count)).into_owned().cholesky()?.inverse())
 }
 
-/// The information of all columns when only those marked were unknown: the others are known for good.
+/// Extends the information of the free columns to all columns; the others are known.
 fn spread(information: &DMatrix<f64>, free: &[bool]) -> DMatrix<f64> {
     let mut places = vec![None; free.len()];
     for (place, column) in (0..free.len()).filter(|column| free[*column]).enumerate() {

@@ -45,9 +45,9 @@ pub struct SpuriousRow {
     pub null: usize,
     /// Their largest singular value with both windows linearized at the first value.
     pub with_first_estimates: f64,
-    /// The same with each window linearized at its own value: least and most over the draws.
+    /// The same with each window linearized at its own value: minimum and maximum over the draws.
     pub without: (f64, f64),
-    /// How many of them are then over 1: least and most over the draws.
+    /// Number of them over 1: minimum and maximum over the draws.
     pub known: (usize, usize),
 }
 
@@ -115,7 +115,7 @@ fn stacked_singular_values(old: &DMatrix<f64>, new: &DMatrix<f64>) -> Option<Vec
     dense::singular_values(&both)
 }
 
-/// The chain with each angle moved by up to so many degrees and each length by up to so many millimetres.
+/// The chain with random changes up to these bounds of each angle and each length.
 fn changed(chain: &ClassicalChain, (degrees, millimetres): (f64, f64), seed: u64) -> ClassicalChain {
     let chain = Chain::from_classical(chain, Parameterization::Classical);
     let mut random = SplitMix64::new(seed);

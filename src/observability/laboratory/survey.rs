@@ -10,7 +10,7 @@ use super::spurious::{self, SpuriousRow};
 use super::{Deficit, LaboratoryForm, LaboratoryResult};
 use crate::gimbal::{ParameterNames, Parameterization};
 
-/// With this many frames a window constrains everything that its motion and sensors can.
+/// Number of frames with which a window reaches its largest rank.
 const MAX_FRAMES: usize = 16;
 const MINIMAL: LaboratoryForm = LaboratoryForm::whole(Parameterization::Minimal);
 
@@ -19,7 +19,7 @@ const MINIMAL: LaboratoryForm = LaboratoryForm::whole(Parameterization::Minimal)
 pub struct Survey {
     /// Experiments by subject.
     pub sections: Vec<SurveySection>,
-    /// Numbers of frames from which on the minimal form has its full rank.
+    /// Smallest numbers of frames with which the minimal parameterization has its full rank.
     pub least_frames: Vec<MinFramesRow>,
     /// Spurious information of two windows that are linearized at different values of the calibration.
     pub spurious: Vec<SpuriousRow>,
@@ -68,16 +68,16 @@ pub struct SurveyEntry {
     pub rank: usize,
 }
 
-/// The least number of frames for the full rank of the minimal parameterization.
+/// Smallest number of frames with full rank in the minimal parameterization.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct MinFramesRow {
-    /// What is known of poses and joint angles.
+    /// Knowledge of poses and joint angles.
     pub scenario: String,
     /// Number of columns.
     pub columns: usize,
     /// The full structural rank.
     pub rank: usize,
-    /// From this number of frames on the rank is full.
+    /// Smallest number of frames with full rank.
     pub frames: usize,
 }
 

@@ -14,8 +14,8 @@ const VELOCITIES_START: usize = POSES_START + 6 * FRAMES;
 const PRIORS: usize = 120;
 const COLUMNS: usize = VELOCITIES_START + 9 * FRAMES;
 
-/// A random linearization with the sparsity of a real one, in which the poses' columns depend on each other as in a
-/// visual-inertial window: four directions of all poses and speeds move nothing.
+/// A random linearization with the sparsity of a real one, in which the poses' columns depend on each other as
+/// in a visual-inertial window: four directions of all poses and velocities have no effect.
 fn window(random: &mut Random, parameters: &[ParameterId]) -> Linearization {
     let mut jacobian = DMatrix::zeros(66 + 15 * (FRAMES - 1) + JOINTS * FRAMES, COLUMNS);
     let mut fill =
@@ -36,7 +36,7 @@ fn window(random: &mut Random, parameters: &[ParameterId]) -> Linearization {
         let row = 66 + 15 * (FRAMES - 1) + index;
         jacobian[(row, JOINTS_START + index)] = 115.0;
     }
-    // Four gauge directions: each pose's last four columns repeat what the other poses do, with the sign turned.
+    // Four gauge directions: each pose's last four columns repeat those of the other poses with the opposite sign.
     for gauge in 0..4 {
         let last = POSES_START + 6 * (FRAMES - 1) + 2 + gauge;
         let mut sum = nalgebra::DVector::zeros(jacobian.nrows());
@@ -45,7 +45,8 @@ fn window(random: &mut Random, parameters: &[ParameterId]) -> Linearization {
         }
         jacobian.set_column(last, &-sum);
     }
-    // The marginalization prior couples the calibration with all frames but the newest and the oldest speed and biases.
+    // The marginalization prior couples the calibration with all frames but the newest and with the oldest
+    // velocity and biases.
     let mut prior_jacobian = DMatrix::zeros(PRIORS, COLUMNS);
     for row in 0..PRIORS {
         let after = POSES_START + 6 * (FRAMES - 1);
@@ -138,7 +139,7 @@ fn empty_linearizations_are_analysed() {
     assert_eq!((report.rank_structural, report.rank_informed), (0, 0));
     assert_eq!(report.singular_values, vec![0.0; CALIBRATION]);
     assert_eq!(report.directions.len(), CALIBRATION);
-    // Nothing to calibrate at all, as in a run with a given calibration.
+    // No calibration columns, as in a run with a fixed calibration.
     linearization.columns.retain(|block| block.id.group() != ColumnGroup::Calibration);
     linearization.calibration_column_norms = nalgebra::DVector::zeros(0);
     let report = analyse(&linearization, &chain, &[vec![0.0; JOINTS]], false).unwrap();

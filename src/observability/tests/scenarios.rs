@@ -172,7 +172,7 @@ fn excluded_parameters_leave_the_null_directions() {
     }
     assert_eq!(null_names(&case(true, Motion::NeverRotates, false, minimal)), ["I.tx", "I.ty", "L1.d"]);
     assert_eq!(null_names(&case(true, Motion::CameraNeverRotates, false, minimal)), ["L3.a", "L3.d", "L3.y"]);
-    // An informed window is told in a line, a weak one names its weakest parameter.
+    // The summary of a weak window names its least observable parameter.
     let verdict = case(true, Motion::Exciting, false, Parameterization::Classical).report;
     let names = ParameterNames::default();
     let verdict = verdict.verdict(&names);
@@ -203,7 +203,7 @@ fn moving_along_a_redundant_direction_keeps_the_camera_pose() {
             moved.minus(&chain.imu_from_camera(&angles)).norm()
         };
         assert!(shift(1e-4) < 1e-8, "{}", shift(1e-4));
-        // Any single parameter of it moves the camera by far more.
+        // Each parameter alone moves the camera by far more.
         let leading = direction.leading(&report.parameters).unwrap();
         let index = report.parameters.iter().position(|parameter| *parameter == leading).unwrap();
         let mut alone = DVector::zeros(24);
@@ -228,7 +228,7 @@ fn known_and_measured_redundancy_agree() {
         "L1.d and the translation of imu_from_base along that axis are the same motion (Eqs. 11–17)"
     );
     assert!(reasons[3].starts_with("L3.d and"), "{reasons:?}");
-    // A linearization that mixes two values of the calibration sees what nobody can see.
+    // A linearization that mixes two values of the calibration has spurious information.
     let elsewhere = chain.plus(&DVector::from_element(24, 0.02));
     let mixed = window.linearize(&elsewhere, false);
     let mut inconsistent = linearization.clone();
@@ -238,7 +238,7 @@ fn known_and_measured_redundancy_agree() {
     assert!(report.rank_structural > 18, "{}", report.verdict(&ParameterNames::default()));
     let wrong: Vec<_> = report.known.iter().filter(|known| !known.agrees).collect();
     assert!(!wrong.is_empty() && wrong.iter().any(|known| known.response > 1e-6), "{:?}", report.known);
-    // A prior that was linearized there claims it; the rig's prior may, and one from here claims nothing.
+    // A prior linearized there adds spurious information; the rig's prior and one linearized here do not.
     let claimed = |prior_jacobian: &DMatrix<f64>, rig_prior_rows: usize| {
         let with_prior =
             Linearization { prior_jacobian: prior_jacobian.clone(), rig_prior_rows, ..linearization.clone() };
@@ -249,7 +249,7 @@ fn known_and_measured_redundancy_agree() {
     assert!(spurious_gains.iter().filter(|known| known.is_claimed()).count() >= 3, "{spurious_gains:?}");
     let rig_prior = DMatrix::identity(24, mixed.jacobian.ncols()) * 100.0;
     assert!(claimed(&rig_prior, 24).iter().all(|known| known.spurious_gain < 1e-3));
-    // The minimal form has lost nothing by itself, and without encoders its offsets.
+    // The minimal form has no null direction itself; without encoders it has those of its offsets.
     let minimal = Chain::from_classical(&classical, Parameterization::Minimal);
     let known = |joints_free: bool| {
         let linearization = window.linearize(&minimal, joints_free);

@@ -11,11 +11,11 @@ use crate::simulation::{
     Exercise, SyntheticFlight, SyntheticFrame, SyntheticMotion, SyntheticOptions, VehicleSwing, synthetic_tracks,
 };
 
-/// When the exercise begins.
+/// Start of the exercise.
 const START_S: f64 = 6.0;
-/// Exercises may differ from here on: a spline looks three knots ahead.
+/// Flights are equal up to here: a spline depends on the next three knots.
 const SHARED_S: f64 = START_S - 0.4;
-/// How long it is flown: as long as the advice supposes.
+/// Duration of the exercise, that of the candidates.
 const MOTION_S: f64 = super::super::ADVICE_DURATION_S;
 
 pub(super) fn flight(exercise: Exercise, seed: u64) -> SyntheticFlight {
@@ -60,7 +60,7 @@ fn step(estimator: &mut Estimator, frame: &SyntheticFrame) -> (StepReport, Optio
     (report, rank)
 }
 
-/// Flies frames up to a time and returns what the last of them told.
+/// Processes the frames up to a time and returns the last report with its ranks.
 pub(super) fn run_flight(
     estimator: &mut Estimator,
     flight: &SyntheticFlight,
@@ -85,8 +85,8 @@ fn sigma(rank: &RankReport, direction: &[f64]) -> f64 {
     direction.dot(&solved).sqrt()
 }
 
-/// Flies the advised motion and every seventh of the others from the same moment; returns the advice and, for each, what
-/// the advice foretold and what the estimator then had left of the weakest direction's deviation.
+/// Runs the suggested motion and every `every`-th of the others from the same state; returns the advice and,
+/// for each motion, the predicted and the estimated ratio of σ along the least observable direction.
 fn run_advised(seed: u64, every: usize) -> (Advice, Vec<(String, f64, f64)>) {
     let rest = Exercise { vehicle: VehicleSwing::Hover, joint: None };
     let warm_up = flight(rest, seed);
@@ -117,7 +117,7 @@ fn the_suggested_excitation_lowers_the_largest_sigma_most() {
     }
 }
 
-/// Flies the advised motion and every fifth of the others.
+/// Checks the suggested motion and every fifth of the others.
 fn check_advice(seed: u64) {
     let (advice, outcomes) = run_advised(seed, 5);
     let table: Vec<String> = outcomes
@@ -130,7 +130,7 @@ fn check_advice(seed: u64) {
     assert!(*best < 0.9, "{table}");
     for (words, predicted, left) in &outcomes {
         assert!((predicted - left).abs() < 0.1, "{words}\n{table}");
-        // What is foretold is worth three percent: nearer ones are as good.
+        // Predictions within three percent count as equal.
         assert!(*predicted < 1.03 * first_predicted || best < left, "{words}\n{table}");
     }
     let apart = outcomes.iter().filter(|(_, predicted, _)| *predicted >= 1.03 * first_predicted).count();
@@ -146,13 +146,13 @@ fn advice_is_repeatable_and_rendered_as_text() {
     let situation = Situation::of_experiment(&setup, form, LABORATORY_IMU).unwrap();
     let advice = advise(&situation).unwrap();
     assert_eq!(advice, advise(&situation).unwrap());
-    // Hover tells no lever arm of the IMU's side, and a camera that stays where it is makes no keyframes: hovering on brings
-    // nothing, and moving the vehicle helps.
+    // Hover does not constrain lever arms on the IMU side, and a camera that does not translate makes no
+    // keyframes: more hover gains nothing, a moving vehicle does.
     let hover = advice.candidates.iter().find(|candidate| candidate.words == "hover with the gimbal held").unwrap();
     assert!(hover.remaining > 0.999, "{advice}");
     assert!(!advice.candidates[0].words.contains("hover"), "{advice}");
     assert!(advice.candidates[0].remaining < 0.9, "{advice}");
-    // Redundant directions cannot be excited: the classical form gets advice about the others.
+    // Redundant directions cannot be excited: the classical form gets suggestions for the other directions.
     let classical = LaboratoryForm::whole(Parameterization::Classical);
     let situation = Situation::of_experiment(&setup, classical, LABORATORY_IMU).unwrap();
     let advice = advise(&situation).unwrap();
@@ -171,7 +171,8 @@ fn information_is_attributed_to_its_motion() {
     };
     assert_eq!(reported.motions.len(), 9);
     assert!(reported.parameters.iter().all(|parameter| parameter.bits_per_s > 0.0), "{reported}");
-    // What a link turns with its joint is told by that joint: without its motion the link merges with its neighbour.
+    // Only the joint of a link constrains the parameters that rotate with it: without its motion the link merges
+    // with its neighbour.
     assert!(gain("L2.alpha", "joint 2") > 10.0 * gain("L2.alpha", "move x").abs(), "{reported}");
     assert!(gain("L3.alpha", "joint 3") > gain("L3.alpha", "move z"), "{reported}");
 }

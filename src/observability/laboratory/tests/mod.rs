@@ -1,4 +1,4 @@
-//! The truth table of the mathematics, suggested excitation, and chains moved along null directions.
+//! The expected tables of docs/mathematics.md, suggested excitation, and chains moved along null directions.
 
 mod excitation;
 mod expected_table;

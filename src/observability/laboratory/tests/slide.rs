@@ -7,12 +7,12 @@ use crate::observability::{
 };
 use crate::simulation::{Exercise, VehicleSwing};
 
-/// A flight in a parameterization up to 4 s, linearized where the estimate is, and what moving its last chain does.
+/// Processes a flight up to 4 s and returns the ranks of its last step, and the effect of moving its last chain.
 fn moves(parameterization: Parameterization, encoder: bool) -> (RankReport, impl Fn(&SlideDirection) -> ChainSlide) {
     let flight = flight(Exercise { vehicle: VehicleSwing::Hover, joint: None }, 7);
     let like = estimator(&flight.given_rig, parameterization, encoder);
     let mut config = like.config().clone();
-    // First estimates are of an earlier chain, whose directions the present one's are near to.
+    // First estimates belong to an earlier chain, whose directions are close to those of the present one.
     config.options.calibration_first_estimates = false;
     config.options.first_estimate_reach_rad = 0.0;
     let mut estimator = Estimator::new(config);
@@ -30,7 +30,7 @@ fn moves(parameterization: Parameterization, encoder: bool) -> (RankReport, impl
 fn reprojections_are_unchanged_along_a_redundant_direction() {
     let (rank, moved) = moves(Parameterization::Classical, true);
     assert_eq!((rank.parameters.len(), rank.rank_structural, rank.known.len()), (24, 18, 6));
-    // As measured: to first order nothing moves.
+    // Measured directions: no change to first order.
     let null: Vec<usize> = (0..rank.directions.len()).filter(|index| rank.directions[*index].structural).collect();
     assert_eq!(null.len(), 6);
     for index in null {
@@ -38,7 +38,8 @@ fn reprojections_are_unchanged_along_a_redundant_direction() {
         assert!(slid.largest_first_order_px < 1e-5, "{index}: {} px", slid.largest_first_order_px);
         assert!(slid.predictions_px.len() > 20 && slid.changes.iter().any(|change| change.abs() > 0.01), "{index}");
     }
-    // As known: shifts along an axis leave all pixels and the camera for any size, turns too when nothing couples them.
+    // Directions in closed form: translations along an axis leave all pixels and the camera unchanged at any
+    // amount, rotations too when they are not coupled.
     for known in &rank.known {
         let slid = moved(&SlideDirection::Known(known.loss));
         assert!(slid.largest_first_order_px < 1e-5, "{:?}: {} px", known.loss, slid.largest_first_order_px);
@@ -47,7 +48,7 @@ fn reprojections_are_unchanged_along_a_redundant_direction() {
             assert!(slid.camera_moves.0 < 1e-12 && slid.camera_moves.1 < 1e-7, "{:?}", slid.camera_moves);
         }
     }
-    // A number that is seen moves them.
+    // An observable parameter changes both.
     for name in ["L2.alpha", "EC.rx"] {
         let seen = moved(&SlideDirection::Parameter(parameter(name)));
         assert!(seen.largest_px > 10.0 && seen.largest_first_order_px > 10.0, "{name}: {} px", seen.largest_px);
@@ -62,7 +63,7 @@ fn fixed_parameters_count_as_known() {
     let (_, before) = run_flight(&mut estimator, &flight, -1.0, 4.0);
     assert_eq!((before.parameters.len(), before.rank_structural, before.deficit_parameterization), (24, 18, 6));
     let mut from_s = 4.0;
-    // Each takes one of the six redundant directions away; the columns that Eqs. 18–20 drop leave nothing to be lost.
+    // Each fixes one of the six redundant directions; without the columns that Eqs. 18–20 drop there is none left.
     let dropped = ["L1.d", "L1.theta", "L3.theta", "L3.d", "L3.a", "L3.alpha"];
     for (count, name) in dropped.into_iter().enumerate() {
         let held = parameter(name);
@@ -78,7 +79,7 @@ fn fixed_parameters_count_as_known() {
         );
         assert!(rank.fixed_parameters.contains(&held) && !rank.parameters.contains(&held), "{name}");
         assert_eq!(report.gain.as_ref().unwrap().columns(), rank.parameters.len(), "{name}");
-        // The chain still has all its columns; a held one does not slide.
+        // The chain still has all its columns; fixed ones cannot be moved.
         let chain = chain_of_step(&report, &rank).unwrap();
         assert_eq!(chain.dof(), 24, "{name}");
         let place = chain.parameters().iter().position(|known| *known == held).unwrap();
@@ -113,7 +114,7 @@ fn directions_have_names() {
         let error = read(wrong).unwrap_err().to_string();
         assert!(error.contains("expected DIRECTION=VALUE"), "{error}");
     }
-    // No two losses share a name.
+    // Names are unique.
     let chain = super::super::Mechanism::named("coaxial-axes").unwrap().chain;
     let chain = Chain::from_classical(&chain, Parameterization::Classical);
     let mut names: Vec<String> = known_losses(&chain, true).iter().map(|(loss, _)| loss.name()).collect();
