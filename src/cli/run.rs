@@ -25,7 +25,7 @@ pub(crate) struct RunArguments {
     #[command(flatten)]
     pub estimation: EstimationArguments,
     /// Stop where this condition becomes true in a run, as in "rank < 18 or features < 40", write the files up to there and
-    /// print the values; README.md lists the quantities.
+    /// print the values; docs/manual.md lists the quantities.
     #[arg(long = "break", value_name = "CONDITION", value_parser = condition)]
     pub break_at: Option<Condition>,
     /// Leave measured times out of frames.csv and summary.json, so that two runs give the same bytes in every file.
