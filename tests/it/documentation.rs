@@ -1,7 +1,10 @@
-//! Every section of `docs/mathematics.md` that code, tests or the README cite exists there.
+//! The documents agree with the program: cited sections and linked headings exist, commands and options are those that
+//! it offers.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 const DOCUMENT: &str = "docs/mathematics.md";
 
@@ -81,12 +84,108 @@ fn citations_are_read() {
     check("see docs/mathematics.md for more", &[]);
 }
 
-#[test]
-fn links_of_the_readme_lead_somewhere() {
-    let readme = fs::read_to_string(root().join("README.md")).unwrap();
-    let links = readme.split("](").skip(1).filter_map(|rest| rest.split_once(')').map(|(target, _)| target));
-    for target in links.filter(|target| !target.starts_with("http") && !target.starts_with('#')) {
-        let path = target.split('#').next().unwrap_or_default();
-        assert!(root().join(path).exists(), "README.md links to '{path}'");
+/// All documents that a reader may open, relative to the repository.
+fn documents() -> Vec<PathBuf> {
+    let folder = fs::read_dir(root().join("docs")).expect("the folder can be listed");
+    let mut paths: Vec<PathBuf> = folder.map(|entry| entry.expect("the entry can be read").path()).collect();
+    paths.retain(|path| path.extension().is_some_and(|extension| extension == "md"));
+    paths.extend(["README.md", "assets/README.md", "sample_logs/README.md"].map(|name| root().join(name)));
+    paths.sort();
+    paths
+}
+
+/// The anchors of a document's headings, as forges make them; the second of two equal headings ends in `-1`.
+fn anchors(text: &str) -> Vec<String> {
+    let mut anchors: Vec<String> = Vec::new();
+    for heading in headings(text) {
+        let letters = heading.to_lowercase().replace(' ', "-");
+        let plain: String =
+            letters.chars().filter(|letter| letter.is_alphanumeric() || "-_".contains(*letter)).collect();
+        let earlier = anchors.iter().filter(|anchor| **anchor == plain).count();
+        anchors.push(if earlier == 0 { plain } else { format!("{plain}-{earlier}") });
     }
+    anchors
+}
+
+/// The headings of a document, without those inside of code blocks.
+fn headings(text: &str) -> impl Iterator<Item = &str> {
+    let mut code = false;
+    text.lines().filter_map(move |line| {
+        code ^= line.starts_with("```");
+        line.strip_prefix('#').filter(|_| !code).map(|rest| rest.trim_start_matches('#').trim())
+    })
+}
+
+#[test]
+fn links_of_the_documents_lead_somewhere() {
+    let mut followed = 0;
+    for document in documents() {
+        let text = fs::read_to_string(&document).unwrap();
+        let links = text.split("](").skip(1).filter_map(|rest| rest.split_once(')').map(|(target, _)| target));
+        for target in links.filter(|target| !target.starts_with("http")) {
+            let (path, anchor) = target.split_once('#').unwrap_or((target, ""));
+            let linked = if path.is_empty() { document.clone() } else { document.parent().unwrap().join(path) };
+            let shown = document.display();
+            assert!(linked.exists(), "{shown} links to '{target}', which does not exist");
+            if !anchor.is_empty() {
+                let anchors = anchors(&fs::read_to_string(&linked).unwrap());
+                assert!(anchors.iter().any(|known| known == anchor), "{shown} links to '{target}': no such heading");
+            }
+            followed += 1;
+        }
+    }
+    assert!(followed >= 40, "only {followed} links were found");
+}
+
+#[test]
+fn the_readme_is_short() {
+    let bytes = fs::metadata(root().join("README.md")).unwrap().len();
+    assert!(bytes <= 8_000, "README.md has {bytes} bytes: move what is not needed at first sight to docs/");
+}
+
+/// What `dcvins COMMAND --help` prints; without a command, the list of the commands.
+fn help(command: Option<&str>) -> String {
+    let program = Command::new(env!("CARGO_BIN_EXE_dcvins")).args(command).arg("--help").output();
+    String::from_utf8(program.expect("the program runs").stdout).unwrap()
+}
+
+/// The names of the commands that the program offers.
+fn commands() -> Vec<String> {
+    let text = help(None);
+    let listed = text.split("Commands:").nth(1).expect("the help lists the commands").lines().skip(1);
+    let names = listed.take_while(|line| !line.trim().is_empty()).filter_map(|line| line.split_whitespace().next());
+    names.filter(|name| *name != "help").map(str::to_owned).collect()
+}
+
+/// The long options in a text, `--out` of `--out DIR`.
+fn options(text: &str) -> BTreeSet<String> {
+    let starts = text.split("--").skip(1).zip(text.split("--"));
+    let starts =
+        starts.filter(|(_, before)| !before.ends_with(|letter: char| letter.is_alphanumeric() || letter == '-'));
+    let names = starts
+        .map(|(after, _)| after.chars().take_while(|letter| letter.is_ascii_lowercase() || "-_".contains(*letter)));
+    let names = names.map(|name| name.collect::<String>().trim_end_matches('-').to_owned());
+    names.filter(|name| !name.is_empty()).map(|name| format!("--{name}")).collect()
+}
+
+#[test]
+fn commands_and_options_are_those_of_the_program() {
+    let documented = fs::read_to_string(root().join("docs/commands.md")).unwrap();
+    let manual_page = fs::read_to_string(root().join("assets/linux/dcvins.1")).unwrap();
+    let readme = fs::read_to_string(root().join("README.md")).unwrap();
+    let common = ["--help", "--version"].map(str::to_owned);
+    let mut known = BTreeSet::from(common.clone());
+    for command in commands() {
+        assert!(documented.contains(&format!("\n## {command}\n")), "docs/commands.md has no section '{command}'");
+        assert!(readme.contains(&format!("`dcvins {command}")), "README.md does not list '{command}'");
+        assert!(manual_page.contains(&format!("\n.B {command}\n")), "the manual page does not list '{command}'");
+        let offered = options(&help(Some(&command)));
+        let missing: Vec<&String> = offered.iter().filter(|option| !documented.contains(*option)).collect();
+        assert!(missing.is_empty() || missing.iter().all(|option| common.contains(option)), "{command}: {missing:?}");
+        known.extend(offered);
+    }
+    // Options of other programs in the examples.
+    known.extend(["--release", "--test", "--ignored"].map(str::to_owned));
+    let unknown: Vec<String> = options(&documented).into_iter().filter(|option| !known.contains(option)).collect();
+    assert!(unknown.is_empty(), "docs/commands.md names options that no command has: {unknown:?}");
 }

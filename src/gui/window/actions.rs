@@ -234,3 +234,16 @@ pub(crate) fn perform(action: Action, state: &mut WindowState, ctx: &mut PanelCo
         Action::Speed(speed) => ctx.commands.push(Command::SetSpeed(PlaybackSpeed(speed))),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_manual_lists_every_key() {
+        let manual = include_str!("../../../docs/manual.md");
+        for entry in TABLE {
+            assert!(manual.contains(&format!("| `{}` |", entry.keys)), "docs/manual.md lacks {}", entry.keys);
+        }
+    }
+}
