@@ -8,8 +8,8 @@ use dcvins::calibration::CalibrationOptions;
 use dcvins::export;
 use dcvins::session::{self, CalibrationRequest};
 
-use crate::cli::arguments::seconds;
 use crate::cli::terminal::{Progress, print, print_json};
+use crate::cli::value_parsers::seconds;
 
 /// `dcvins calibrate`.
 #[derive(Args, Clone, Debug)]

@@ -7,8 +7,8 @@ use clap::{Args, ValueEnum};
 use dcvins::export::{self, EvaluationOptions};
 use dcvins::session::accuracy::{Alignment, RelativeDelta};
 
-use crate::cli::arguments::seconds;
 use crate::cli::terminal::print_report;
+use crate::cli::value_parsers::seconds;
 
 /// `dcvins evaluate`.
 #[derive(Args, Clone, Debug)]

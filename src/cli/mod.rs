@@ -6,6 +6,7 @@ mod check;
 mod compute;
 mod convert;
 mod degeneracy;
+mod estimation_arguments;
 mod evaluate;
 mod report;
 mod run;
@@ -14,6 +15,7 @@ mod run_summary;
 mod screenshot;
 mod simulate;
 mod terminal;
+mod value_parsers;
 mod view;
 
 use clap::Parser as _;

@@ -8,9 +8,10 @@ use dcvins::export::{ReportOptions, write_report};
 use dcvins::log_check::{self, CheckReport};
 use dcvins::session::{SessionPlan, image_rotations};
 
-use crate::cli::arguments::{EstimationArguments, seconds};
 use crate::cli::compute::compute;
+use crate::cli::estimation_arguments::EstimationArguments;
 use crate::cli::terminal::{Progress, print};
+use crate::cli::value_parsers::seconds;
 
 /// `dcvins report`.
 #[derive(Args, Clone, Debug)]

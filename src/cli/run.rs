@@ -9,8 +9,8 @@ use dcvins::geometry::seconds_from_ns;
 use dcvins::session::breakpoints::Condition;
 use dcvins::session::{BreakpointHit, Recording, SessionPlan};
 
-use crate::cli::arguments::EstimationArguments;
 use crate::cli::compute::{compute, compute_until};
+use crate::cli::estimation_arguments::EstimationArguments;
 use crate::cli::run_summary::describe;
 use crate::cli::terminal::{print, print_json};
 

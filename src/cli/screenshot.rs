@@ -17,9 +17,10 @@ use dcvins::gui::window::Preset;
 use dcvins::gui::{ImageSource, Playback};
 use dcvins::session::{Computation, Session, SessionPlan};
 
-use crate::cli::arguments::{EstimationArguments, seconds, sides};
 use crate::cli::compute::compute;
+use crate::cli::estimation_arguments::EstimationArguments;
 use crate::cli::terminal::{notify, print};
+use crate::cli::value_parsers::{seconds, sides};
 
 /// `dcvins screenshot`.
 #[derive(Args, Clone, Debug)]

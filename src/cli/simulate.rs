@@ -6,8 +6,8 @@ use anyhow::Result;
 use clap::{Args, ValueEnum};
 use dcvins::simulation::{self, Experiment, SimulationOptions};
 
-use crate::cli::arguments::{seconds, sides};
 use crate::cli::terminal::{Progress, print};
+use crate::cli::value_parsers::{seconds, sides};
 
 /// `dcvins simulate`.
 #[derive(Args, Clone, Debug)]

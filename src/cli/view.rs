@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::cli::arguments::EstimationArguments;
+use crate::cli::estimation_arguments::EstimationArguments;
 
 /// `dcvins view`.
 #[derive(Args, Clone, Debug, Default)]

@@ -1,9 +1,10 @@
 //! The values of a block and of its residuals.
 
-use egui::{Grid, Label, RichText, ScrollArea, Ui, vec2};
+use egui::{Label, RichText, ScrollArea, Ui, vec2};
 
 use super::factors;
 use super::model::{JacobianModel, cameras, name_of, unit_text};
+use super::numbers_table::numbers_ui;
 use crate::estimator::{ColumnBlock, ColumnId, FeatureRows, FrameId, JacobianFactor};
 use crate::frontend::FeatureId;
 use crate::geometry::Dimension;
@@ -96,7 +97,7 @@ fn block_ui(
         JacobianFactor::Feature(id) => {
             let cameras = cameras(&ctx.recording.rig, run, step);
             if let Some(rows) = step.report.feature_rows(&cameras, id) {
-                sightings_ui(ui, ctx, step, model, &rows, id, column);
+                observations_ui(ui, ctx, step, model, &rows, id, column);
             }
         }
         factor => {
@@ -117,7 +118,7 @@ fn block_ui(
 }
 
 /// A row for each observation: its residual, and the derivatives of the pixel position with respect to the unknown.
-fn sightings_ui(
+fn observations_ui(
     ui: &mut Ui,
     ctx: &PanelContext<'_>,
     step: &StepRecord,
@@ -179,27 +180,6 @@ fn readings_ui(
         ]
     });
     numbers_ui(ui, ctx, &["joint", "reading °", "estimate °", "σ °", "residual σ", "∂ σ/°"].map(str::to_owned), lines);
-}
-
-/// A table of numbers with column headings.
-pub(super) fn numbers_ui(
-    ui: &mut Ui,
-    ctx: &PanelContext<'_>,
-    heads: &[String],
-    lines: impl Iterator<Item = Vec<String>>,
-) {
-    Grid::new("block numbers").striped(true).spacing(vec2(9.0, 1.0)).min_row_height(14.0).show(ui, |ui| {
-        for head in heads {
-            ui.label(RichText::new(head).small().color(ctx.theme.text_weak));
-        }
-        ui.end_row();
-        for cells in lines {
-            for cell in cells {
-                ui.label(RichText::new(cell).monospace().color(ctx.theme.text_strong));
-            }
-            ui.end_row();
-        }
-    });
 }
 
 /// The scalar columns of a block: the label of each, and its shown units per stored unit.

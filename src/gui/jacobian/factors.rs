@@ -3,8 +3,8 @@
 
 use egui::{RichText, Ui};
 
-use super::details::numbers_ui;
 use super::model::JacobianModel;
+use super::numbers_table::numbers_ui;
 use crate::estimator::{ColumnBlock, ColumnId, FactorRows, JacobianFactor};
 use crate::geometry::Dimension;
 use crate::gui::PanelContext;
@@ -12,7 +12,7 @@ use crate::gui::units::{Shown, fixed, significant};
 use crate::session::{Command, RunRecord};
 
 /// Maximum number of rows shown; a marginalization prior has over a hundred, the largest come first.
-const MOST_ROWS: usize = 40;
+const MAX_ROWS: usize = 40;
 
 /// Requests the rows of the selected factor of step `number` if the record does not have them.
 pub(super) fn request(ctx: &mut PanelContext<'_>, run: &RunRecord, number: Option<usize>, picked: JacobianFactor) {
@@ -55,9 +55,9 @@ pub(super) fn block_ui(
     let own = rows.columns(block.start, block.len);
     let mut order: Vec<usize> = (0..rows.nrows()).filter(|row| own.row(*row).amax() > 0.0).collect();
     let count = order.len();
-    if count > MOST_ROWS {
+    if count > MAX_ROWS {
         order.sort_by(|a, b| own.row(*b).norm().total_cmp(&own.row(*a).norm()));
-        order.truncate(MOST_ROWS);
+        order.truncate(MAX_ROWS);
     }
     let squared = rows.column(residuals).norm_squared();
     let shown = if count > order.len() { format!(", the strongest {} shown", order.len()) } else { String::new() };

@@ -6,6 +6,7 @@ mod csv;
 mod details;
 mod factors;
 mod model;
+mod numbers_table;
 mod paint;
 #[cfg(test)]
 mod tests;

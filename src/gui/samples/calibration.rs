@@ -1,7 +1,6 @@
 //! Calibration and rank of the artificial recording.
 
-use super::recording::FIRST_TRACKED_FRAME;
-use super::yard::RandomNumbers;
+use super::yard::{FIRST_TRACKED_FRAME, RandomNumbers};
 use crate::estimator::CalibrationEstimate;
 use crate::geometry::{Dimension, RigidTransform, so3};
 use crate::gimbal::{ClassicalChain, DhLink, ParameterId, ParameterPart, Quantity, Singularity};

@@ -13,8 +13,8 @@ use nalgebra::{UnitQuaternion, Vector2, Vector3};
 use super::calibration::{calibration_at, rank_at};
 use super::images::SampleImages;
 use super::yard::{
-    FlightState, INTRINSICS_PX, RandomNumbers, chain_pose, given_chain, point_of, project, rig_with, true_chain,
-    yard_points,
+    FIRST_TRACKED_FRAME, FlightState, INTRINSICS_PX, RandomNumbers, chain_pose, given_chain, point_of, project,
+    rig_with, true_chain, yard_points,
 };
 use crate::estimator::{
     Event, EventKind, FactorKind, FeatureCounts, FeatureReport, FrameStateReport, IterationReport, LandmarkReport,
@@ -28,8 +28,6 @@ use crate::session::{Recording, RunRecord, StepRecord};
 
 /// Period of the images in nanoseconds (20 Hz).
 pub(crate) const FRAME_PERIOD_NS: i64 = 50_000_000;
-/// The first frame in which the estimator tracks (2.5 s).
-pub(crate) const FIRST_TRACKED_FRAME: usize = 50;
 
 /// Twelve seconds with the runs `auto` and `classical`.
 pub(crate) fn sample_recording() -> Recording {

@@ -9,6 +9,8 @@ use crate::geometry::{RigidTransform, SplitMix64, so3};
 use crate::gimbal::{ClassicalChain, DhLink};
 use crate::sensors::{CameraMount, CameraRig, ChainPrior, GimbalRig, ImuNoise, ImuRig, Joint, Rig};
 
+/// The first frame in which the estimator tracks (2.5 s).
+pub(crate) const FIRST_TRACKED_FRAME: usize = 50;
 /// Half the side of the walled yard in metres.
 pub(super) const YARD_HALF_SIDE_M: f64 = 22.0;
 /// Height of its walls in metres.

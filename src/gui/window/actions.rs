@@ -144,6 +144,11 @@ pub(crate) const TABLE: &[Entry] = &[
 const LAYOUT_KEYS: [Key; 9] =
     [Key::Num1, Key::Num2, Key::Num3, Key::Num4, Key::Num5, Key::Num6, Key::Num7, Key::Num8, Key::Num9];
 
+/// The keys of an action for display.
+pub(crate) fn keys_of(action: Action) -> &'static str {
+    TABLE.iter().find(|entry| entry.action == action).map_or("", |entry| entry.keys)
+}
+
 /// Consumes the pressed shortcuts: none while the user types, and no keys without modifiers while a widget has the
 /// focus.
 pub(crate) fn pressed(ui: &Ui) -> Vec<Action> {

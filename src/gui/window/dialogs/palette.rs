@@ -6,7 +6,7 @@ use super::modal::Modal;
 use super::palette_items::{Choice, Item, found};
 use crate::gui::PanelContext;
 use crate::gui::window::SavedLayouts;
-use crate::gui::window::actions::{Action, TABLE};
+use crate::gui::window::actions::Action;
 use crate::gui::window::tiles::Layout;
 
 /// Height of the list in points.
@@ -110,9 +110,4 @@ fn list_ui(ui: &mut Ui, ctx: &PanelContext<'_>, items: &[Item], chosen: usize, b
         }
     });
     clicked
-}
-
-/// The keys of an action for display.
-pub(super) fn keys_of(action: Action) -> &'static str {
-    TABLE.iter().find(|entry| entry.action == action).map_or("", |entry| entry.keys)
 }

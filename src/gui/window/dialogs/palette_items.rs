@@ -1,6 +1,5 @@
 //! The items of the command palette: all actions, and the content of the recording at the cursor.
 
-use super::palette::keys_of;
 use super::{Dialog, fuzzy};
 use crate::frontend::FeatureId;
 use crate::geometry::ns_from_seconds;
@@ -10,7 +9,7 @@ use crate::gui::convergence::names::meaning_of;
 use crate::gui::theme::ThemeName;
 use crate::gui::timeline::SPEEDS;
 use crate::gui::units::seconds;
-use crate::gui::window::actions::{Action, TABLE};
+use crate::gui::window::actions::{Action, TABLE, keys_of};
 use crate::gui::window::tiles::Layout;
 use crate::gui::window::{PanelName, SavedLayouts};
 use crate::session::RunRecord;
