@@ -1,69 +1,15 @@
+use super::image_measure::ImageMeasure;
 use super::inertial::InertialFacts;
 use super::statistics::{median, percentile};
 use super::survey::{SampledImage, Survey};
 use super::{Area, Findings, Severity};
 use crate::geometry::seconds_from_ns;
-use crate::sensors::{CameraMount, CameraRig, GrayImage, Rig};
+use crate::sensors::{CameraMount, CameraRig, Rig};
 
-/// A pixel with a larger gradient, in grey levels per pixel, has texture.
-const TEXTURE_SLOPE: usize = 12;
 /// An image is blurred when the ratio of its edge gradient to the median is below this.
 const BLURRED: f64 = 0.5;
 /// Ratio of pixels with texture below which an image gives few features.
-const LEAST_TEXTURE: f64 = 0.01;
-/// Pixels at least this bright count as overexposed.
-const BRIGHT: u8 = 250;
-/// Pixels at most this bright count as underexposed.
-const DARK: u8 = 5;
-
-/// Brightness, texture and sharpness of one image.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct ImageMeasure {
-    pub(super) resolution_px: [usize; 2],
-    pub(super) mean_grey: f64,
-    /// Ratio of black pixels, and of white pixels.
-    pub(super) dark: f64,
-    pub(super) bright: f64,
-    /// Ratio of pixels with texture.
-    pub(super) texture: f64,
-    /// Gradient that 1 % of the pixels exceed, in grey levels per pixel.
-    pub(super) edge: f64,
-}
-
-/// Measures every second pixel of every second row.
-pub(super) fn measure(image: &GrayImage) -> ImageMeasure {
-    let (width, height) = (image.width, image.height);
-    let mut slopes = [0_usize; 256];
-    let (mut count, mut sum, mut dark, mut bright) = (0_usize, 0_usize, 0_usize, 0_usize);
-    for row in (1..height.saturating_sub(1)).step_by(2) {
-        let line = |row: usize| &image.pixels[row * width..(row + 1) * width];
-        let (above, here, below) = (line(row - 1), line(row), line(row + 1));
-        for column in (1..width.saturating_sub(1)).step_by(2) {
-            let value = here[column];
-            let along = f64::from(here[column + 1]) - f64::from(here[column - 1]);
-            let across = f64::from(below[column]) - f64::from(above[column]);
-            slopes[((along.hypot(across) / 2.0) as usize).min(255)] += 1;
-            count += 1;
-            sum += usize::from(value);
-            dark += usize::from(value <= DARK);
-            bright += usize::from(value >= BRIGHT);
-        }
-    }
-    let mean = |sum: usize| sum as f64 / count.max(1) as f64;
-    let mut steeper = 0;
-    let edge = (0..256).rev().find(|slope| {
-        steeper += slopes[*slope];
-        steeper * 100 >= count.max(1)
-    });
-    ImageMeasure {
-        resolution_px: [width, height],
-        mean_grey: mean(sum),
-        dark: mean(dark),
-        bright: mean(bright),
-        texture: mean(slopes[TEXTURE_SLOPE..].iter().sum()),
-        edge: edge.unwrap_or(0) as f64,
-    }
-}
+const MIN_TEXTURE: f64 = 0.01;
 
 /// Size, blur, exposure and texture of each camera's images, and their motion by rotation.
 pub(super) fn check_images(survey: &Survey, rig: &Rig, inertial: &InertialFacts, findings: &mut Findings) {
@@ -163,7 +109,7 @@ fn check_exposure(camera: &CameraRig, images: &[SampledImage], findings: &mut Fi
 
 fn check_texture(camera: &CameraRig, images: &[SampledImage], findings: &mut Findings) {
     let ratios: Vec<f64> = images.iter().map(|image| image.measure.texture).collect();
-    let poor = ratios.iter().filter(|ratio| **ratio < LEAST_TEXTURE).count();
+    let poor = ratios.iter().filter(|ratio| **ratio < MIN_TEXTURE).count();
     let evidence = format!(
         "{:.1} % of the pixels have texture in the median image, {:.1} % in the poorest",
         median(&ratios) * 100.0,

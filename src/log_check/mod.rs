@@ -2,6 +2,7 @@
 //! each finding with its evidence and its remedy.
 
 mod hand_eye;
+mod image_measure;
 mod images;
 mod inertial;
 mod joints;

@@ -1,6 +1,6 @@
 use std::collections::BTreeMap;
 
-use super::images::{ImageMeasure, measure};
+use super::image_measure::{ImageMeasure, measure};
 use super::statistics::median;
 use crate::flight_log::container::DecodedBlock;
 use crate::flight_log::image_decoding::{BitDepth, decode_image};
