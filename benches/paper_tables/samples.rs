@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use dcvins::estimator::{ColumnGroup, Linearization, StepReport};
 use dcvins::geometry::{RigidTransform, so3};
-use dcvins::gimbal::{Chain, ClassicalChain, ParameterNames};
+use dcvins::gimbal::{Chain, ClassicalChain, ParameterNames, Parameterization};
 use nalgebra::{DMatrix, Matrix3, Matrix6, SMatrix};
 use serde::{Deserialize, Serialize};
 
@@ -28,7 +28,7 @@ pub(crate) type PoseSquares = [f64; 3];
 /// The calibration at one step with its covariance.
 pub(crate) struct CalibrationSample {
     chain: ClassicalChain,
-    parameterization: String,
+    parameterization: Parameterization,
     names: Vec<String>,
     /// Columns of the chain of the camera in question, without those of a rigid camera beside it.
     chain_columns: usize,
@@ -114,7 +114,7 @@ pub(crate) fn calibration_sample(report: &StepReport) -> Option<CalibrationSampl
     let covariance = information.cholesky()?.solve(&right).rows(0, columns).into_owned();
     Some(CalibrationSample {
         chain: report.calibration.classical.clone(),
-        parameterization: report.calibration.parameterization.clone(),
+        parameterization: report.calibration.parameterization,
         names: report.calibration.parameters.iter().map(|it| ParameterNames::default().name(*it)).collect(),
         chain_columns: report.calibration.parameters.len() - 6 * report.calibration.rigid_cameras.len(),
         covariance,
@@ -124,9 +124,8 @@ pub(crate) fn calibration_sample(report: &StepReport) -> Option<CalibrationSampl
 impl CalibrationSample {
     /// The sample held against the true chain; `None` when the two have other columns.
     pub(crate) fn judged(&self, ground_truth: &ClassicalChain) -> Option<CalibrationErrors> {
-        let parameterization = self.parameterization.parse().ok()?;
         let chain = |classical: &ClassicalChain| {
-            let chain = Chain::from_classical(classical, parameterization);
+            let chain = Chain::from_classical(classical, self.parameterization);
             if chain.dof() == self.chain_columns { chain } else { chain.without_joint_offsets() }
         };
         let error = chain(&self.chain).minus(&chain(ground_truth));

@@ -134,7 +134,7 @@ pub fn calibrate(
         ),
         chain: both.estimate.chain.to_classical(),
         given_chain: input.gimbal_camera.chain.clone(),
-        parameterization: both.estimate.chain.parameterization().name(),
+        parameterization: both.estimate.chain.parameterization(),
         parameters: parameters(&priors.chain, &both.estimate.chain, &chain_sigmas),
         pixels: [
             pixels(&both, Camera::Static).ok_or_else(|| singular(BOTH))?,

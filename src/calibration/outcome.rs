@@ -2,7 +2,7 @@
 
 use super::statistics::Statistics;
 use crate::geometry::{RigidTransform, so3};
-use crate::gimbal::{ClassicalChain, ParameterId};
+use crate::gimbal::{ClassicalChain, ParameterId, Parameterization};
 use crate::observability::RankReport;
 
 /// Value of one calibrated parameter, in radians, metres or seconds.
@@ -98,8 +98,8 @@ pub struct CalibrationOutcome {
     pub chain: ClassicalChain,
     /// Chain in the given rig.
     pub given_chain: ClassicalChain,
-    /// Name of the estimated parameterization.
-    pub parameterization: &'static str,
+    /// The parameterization of the estimated chain.
+    pub parameterization: Parameterization,
     /// Parameters of the chain, in the order of its columns.
     pub parameters: Vec<CalibratedParameter>,
     /// Reprojection residuals of the bundle, static camera first.

@@ -182,7 +182,7 @@ pub fn report_calibration(run: &CalibrationRun) -> CalibrationReport {
         log: log_name(&run.log_path),
         stretch_s: [seconds_from_ns(outcome.stretch_ns.0), seconds_from_ns(outcome.stretch_ns.1)],
         instants: outcome.frame_sets,
-        parameterization: outcome.parameterization.to_owned(),
+        parameterization: outcome.parameterization.to_string(),
         camera_imu_reprojection: (&outcome.static_pixels).into(),
         reprojection: outcome.pixels.iter().map(Into::into).collect(),
         gyroscope_error_rad_per_s: outcome.inertial.gyroscope_rad_per_s.into(),
@@ -302,8 +302,7 @@ fn time_shift(run: &CalibrationRun, key: &str, (change_s, sigma_s): (f64, f64)) 
 
 fn chain_parameters(run: &CalibrationRun, outcome: &CalibrationOutcome) -> Vec<ParameterReport> {
     let ground_truth = run.ground_truth_rig.as_ref().and_then(|rig| {
-        let parameterization = outcome.parameterization.parse().ok()?;
-        let chain = Chain::from_classical(&rig.gimbal.as_ref()?.chain, parameterization);
+        let chain = Chain::from_classical(&rig.gimbal.as_ref()?.chain, outcome.parameterization);
         (chain.dof() == outcome.parameters.len()).then(|| chain.values())
     });
     let names = run.given_rig.parameter_names();

@@ -364,7 +364,7 @@ fn calibration(recording: &Recording, run: &RunRecord) -> CalibrationSummary {
     let chain_error =
         |chain: &ClassicalChain| ground_truth.as_ref().and_then(|ground_truth| chain_error(run, chain, ground_truth));
     CalibrationSummary {
-        parameterization: last.parameterization.clone(),
+        parameterization: last.parameterization.to_string(),
         columns: last.parameters.len(),
         parameters,
         chain_error: chain_error(&last.classical),

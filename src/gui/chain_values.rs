@@ -81,7 +81,7 @@ mod tests {
             let end = &run.steps.last().unwrap().report;
             let ground_truth = true_values(&recording, run, end.stamp_ns).unwrap();
             assert_eq!(ground_truth.len(), end.calibration.parameters.len());
-            if end.calibration.parameterization == "classical" {
+            if end.calibration.parameterization == Parameterization::Classical {
                 // Of the equivalent values the one nearest to the rig's is shown, and the drawn run has no real
                 // estimator.
                 let true_rig = recording.ground_truth_rig.as_ref().unwrap();

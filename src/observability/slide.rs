@@ -41,8 +41,7 @@ const FARTHEST_PER_M: f64 = 1e-5;
 
 /// Returns the chain of a step's calibration columns; `None` when the parameters differ.
 pub fn chain_of_step(report: &StepReport, rank: &RankReport) -> Option<Chain> {
-    let parameterization = report.calibration.parameterization.parse().ok()?;
-    let chain = Chain::from_classical(&report.calibration.classical, parameterization);
+    let chain = Chain::from_classical(&report.calibration.classical, report.calibration.parameterization);
     let has = |chain: &Chain| {
         let mut free = chain.parameters();
         free.retain(|parameter| !rank.fixed_parameters.contains(parameter));

@@ -58,7 +58,7 @@ fn a_wrong_chain_is_found_within_its_sigmas() {
         assert!(outcome.parameters.iter().all(|parameter| parameter.sigma < parameter.prior_sigma));
         assert_eq!(outcome.rank.as_ref().map(|rank| rank.rank_structural), Some(18));
 
-        let form = outcome.parameterization.parse().unwrap();
+        let form = outcome.parameterization;
         let sigmas: Vec<f64> = outcome.parameters.iter().map(|parameter| parameter.sigma).collect();
         of_pixels += normalized_square(&outcome.chain, &sigmas, &flight.true_chain, form) / 3.0;
     }

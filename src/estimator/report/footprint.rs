@@ -85,8 +85,7 @@ fn of_frame(frame: &FrameStateReport) -> usize {
 }
 
 fn of_calibration(calibration: &CalibrationEstimate) -> usize {
-    of_text(&calibration.parameterization)
-        + of_vec(&calibration.parameters)
+    of_vec(&calibration.parameters)
         + of_vec(&calibration.values)
         + of_vec(&calibration.sigmas)
         + of_vec(&calibration.prior_sigmas)

@@ -9,7 +9,7 @@ use super::jacobian_source::{FactorRows, JacobianSource};
 use super::linearization::Linearization;
 use super::residuals::{IterationReport, ResidualSummary};
 use crate::geometry::RigidTransform;
-use crate::gimbal::{ClassicalChain, ParameterId, Singularity};
+use crate::gimbal::{ClassicalChain, ParameterId, Parameterization, Singularity};
 
 /// Where the estimator is in its life.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,8 +60,8 @@ pub struct FrameStateReport {
 /// The static calibration after the step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CalibrationEstimate {
-    /// Name of the parameterization in use, as on the command line.
-    pub parameterization: String,
+    /// The parameterization of the chain in use.
+    pub parameterization: Parameterization,
     /// The parameters in column order: those of the chain, then those of the rigid cameras beside the main one.
     pub parameters: Vec<ParameterId>,
     /// Value of each in its SI unit (rotation blocks as rotation vectors relative to the rig's value, plus that value's

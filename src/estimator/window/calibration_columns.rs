@@ -19,7 +19,7 @@ pub(crate) fn calibration_estimate(setup: &Setup, calibration: &Calibrations, si
     };
     let rigid_cameras = setup.config.rigid_cameras.iter().zip(cameras().skip(1));
     CalibrationEstimate {
-        parameterization: chain.parameterization().name().to_owned(),
+        parameterization: chain.parameterization(),
         parameters,
         values: cameras().flat_map(Calibration::values).collect(),
         sigmas,

@@ -92,15 +92,15 @@ impl ConvergencePanel {
     /// Converts the other runs to the parameterization of the shown run at the cursor.
     fn read_converted(&mut self, ctx: &PanelContext<'_>, shown: usize) {
         let runs = &ctx.recording.runs;
-        let chart = |run: usize| {
+        let parameterization_of = |run: usize| {
             let step = runs[run].step_at(ctx.cursor_ns).or_else(|| runs[run].steps.first())?;
-            Some(step.report.calibration.parameterization.as_str())
+            Some(step.report.calibration.parameterization)
         };
-        let target = chart(shown).and_then(|name| name.parse().ok());
+        let target = parameterization_of(shown);
         self.converted.resize_with(runs.len(), ConvertedHistory::default);
         for (run, converted) in self.converted.iter_mut().enumerate() {
             match target {
-                Some(target) if run != shown && chart(run) != chart(shown) => {
+                Some(target) if run != shown && parameterization_of(run) != parameterization_of(shown) => {
                     converted.read(&runs[run], &ctx.recording.rig, target);
                 }
                 _ => *converted = ConvertedHistory::default(),

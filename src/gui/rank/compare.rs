@@ -55,10 +55,10 @@ pub(super) fn singularity_ui(
     step: &StepRecord,
 ) {
     let calibration = &step.report.calibration;
-    let own = calibration.parameterization.parse::<Parameterization>().ok();
-    let (own, other) = match own {
-        Some(own @ Parameterization::Minimal) => (own, Parameterization::MinimalSwapped),
-        Some(own @ Parameterization::MinimalSwapped) => (own, Parameterization::Minimal),
+    let own = calibration.parameterization;
+    let other = match own {
+        Parameterization::Minimal => Parameterization::MinimalSwapped,
+        Parameterization::MinimalSwapped => Parameterization::Minimal,
         _ => return,
     };
     let margin_of = |form: Parameterization| {
@@ -77,7 +77,7 @@ pub(super) fn singularity_ui(
         ui.label(RichText::new(text).color(color));
         let is_there = ctx.recording.runs.iter().any(|run| {
             let newest = run.step_at(ctx.cursor_ns);
-            newest.is_some_and(|step| step.report.calibration.parameterization == other.name())
+            newest.is_some_and(|step| step.report.calibration.parameterization == other)
         });
         let spec =
             other.name().parse::<RunSpec>().ok().filter(|_| !taken && !is_there && ctx.recording.runs.len() < MAX_RUNS);

@@ -2,8 +2,8 @@
 
 use super::yard::{FIRST_TRACKED_FRAME, RandomNumbers};
 use crate::estimator::CalibrationEstimate;
-use crate::geometry::{Dimension, RigidTransform, so3};
-use crate::gimbal::{ClassicalChain, DhLink, ParameterId, ParameterPart, Quantity, Singularity};
+use crate::geometry::{Dimension, RigidTransform};
+use crate::gimbal::{Chain, ClassicalChain, DhLink, ParameterId, Parameterization, Quantity, Singularity};
 use crate::observability::{CalibrationDirection, RankReport};
 
 /// Singularity margins of the artificial calibration.
@@ -20,8 +20,9 @@ pub(crate) fn calibration_at(
 ) -> CalibrationEstimate {
     let age_s = index.saturating_sub(FIRST_TRACKED_FRAME) as f64 * 0.05;
     let mixed = mix(given, ground_truth, (-age_s / 2.0).exp());
-    let (parameters, values): (Vec<ParameterId>, Vec<f64>) =
-        if name == "classical" { classical_values(&mixed) } else { minimal_values(&mixed) }.into_iter().unzip();
+    let parameterization = if name == "classical" { Parameterization::Classical } else { Parameterization::Minimal };
+    let chain = Chain::from_classical(&mixed, parameterization);
+    let parameters = chain.parameters();
     let is_angle = |parameter: &ParameterId| parameter.dimension() == Dimension::Angle;
     let prior_sigmas: Vec<f64> =
         parameters.iter().map(|parameter| if is_angle(parameter) { 0.015 } else { 0.0035 }).collect();
@@ -35,13 +36,14 @@ pub(crate) fn calibration_at(
             if waiting { f64::NAN } else { prior / (1.0 + speed * age_s).sqrt() }
         })
         .collect();
-    let values = values
+    let values = chain
+        .values()
         .iter()
         .zip(&sigmas)
         .map(|(value, sigma)| value + if waiting { 0.0 } else { 0.15 * sigma * random_numbers.normal() })
         .collect();
     CalibrationEstimate {
-        parameterization: if name == "auto" { "minimal".to_owned() } else { name.to_owned() },
+        parameterization,
         parameters,
         values,
         sigmas,
@@ -127,67 +129,4 @@ fn mix(given: &ClassicalChain, ground_truth: &ClassicalChain, weight_of_given: f
             .collect(),
         effector_from_camera: pose(&given.effector_from_camera, &ground_truth.effector_from_camera),
     }
-}
-
-/// Parameters and values of the classical parameterization.
-fn classical_values(chain: &ClassicalChain) -> Vec<(ParameterId, f64)> {
-    let mut entries = pose_entries(ParameterPart::ImuFromBase, &chain.imu_from_base);
-    for (number, link) in (0..).zip(&chain.links) {
-        entries.extend(link_entries(number, link));
-    }
-    entries.extend(pose_entries(ParameterPart::EffectorFromCamera, &chain.effector_from_camera));
-    entries
-}
-
-/// Parameters and values of the minimal parameterization (docs/mathematics.md, section 5), three links, away from
-/// singularities.
-fn minimal_values(chain: &ClassicalChain) -> Vec<(ParameterId, f64)> {
-    let base = chain.imu_from_base.rotation_matrix();
-    let (rx, ry) = ((-base[(1, 2)]).atan2(base[(2, 2)]), base[(0, 2)].atan2(base[(1, 2)].hypot(base[(2, 2)])));
-    let psi = (-base[(0, 1)]).atan2(base[(0, 0)]);
-    let tilt = so3::exp(&nalgebra::Vector3::new(rx, 0.0, 0.0)) * so3::exp(&nalgebra::Vector3::new(0.0, ry, 0.0));
-    let shift = tilt.inverse() * chain.imu_from_base.translation_m;
-    let mut links = chain.links.clone();
-    links[0].theta_offset_rad += psi;
-    links[0].d_m += shift.z;
-    let end = links[2];
-    let rotation = RigidTransform::new(
-        so3::exp(&nalgebra::Vector3::new(0.0, 0.0, end.theta_offset_rad)),
-        nalgebra::Vector3::new(0.0, 0.0, end.d_m),
-    );
-    let twist = RigidTransform::new(
-        so3::exp(&nalgebra::Vector3::new(end.alpha_rad, 0.0, 0.0)),
-        nalgebra::Vector3::new(end.a_m, 0.0, 0.0),
-    );
-    let last = rotation * twist * chain.effector_from_camera;
-    let matrix = last.rotation_matrix();
-    let cosine = matrix[(0, 1)].hypot(matrix[(1, 1)]);
-    let theta = (-matrix[(0, 1)]).atan2(matrix[(1, 1)]);
-    let alpha = matrix[(2, 1)].atan2(cosine);
-    let beta = (-matrix[(2, 0)]).atan2(matrix[(2, 2)]);
-    let lengths = so3::exp(&nalgebra::Vector3::new(0.0, 0.0, -theta)) * last.translation_m;
-    let y = lengths.y / cosine;
-    links[2] = DhLink { theta_offset_rad: theta, d_m: lengths.z - y * alpha.sin(), a_m: lengths.x, alpha_rad: alpha };
-    let base = [(Quantity::Rx, rx), (Quantity::Ry, ry), (Quantity::Tx, shift.x), (Quantity::Ty, shift.y)];
-    let mut entries: Vec<_> =
-        base.map(|(quantity, value)| (ParameterId { part: ParameterPart::Base, quantity }, value)).into();
-    for (number, link) in (0..).zip(&links) {
-        entries.extend(link_entries(number, link));
-    }
-    for (quantity, value) in [(Quantity::Beta, beta), (Quantity::Y, y)] {
-        entries.push((ParameterId { part: ParameterPart::Link(2), quantity }, value));
-    }
-    entries
-}
-
-fn link_entries(number: u8, link: &DhLink) -> impl Iterator<Item = (ParameterId, f64)> {
-    let part = ParameterPart::Link(number);
-    let values = [link.theta_offset_rad, link.d_m, link.a_m, link.alpha_rad];
-    Quantity::LINK.map(|quantity| ParameterId { part, quantity }).into_iter().zip(values)
-}
-
-fn pose_entries(part: ParameterPart, pose: &RigidTransform) -> Vec<(ParameterId, f64)> {
-    let (rotation, shift) = (so3::log(&pose.rotation), pose.translation_m);
-    let values = [rotation.x, rotation.y, rotation.z, shift.x, shift.y, shift.z];
-    Quantity::TRANSFORM.map(|quantity| ParameterId { part, quantity }).into_iter().zip(values).collect()
 }

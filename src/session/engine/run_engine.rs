@@ -128,8 +128,7 @@ impl RunEngine {
         let linearization = report.linearization.take()?;
         let angles: Vec<&[f64]> = report.window.iter().map(|frame| frame.joint_angles_rad.as_slice()).collect();
         let calibration = &report.calibration;
-        let parameterization = calibration.parameterization.parse().ok()?;
-        let chain = Chain::from_classical(&calibration.classical, parameterization);
+        let chain = Chain::from_classical(&calibration.classical, calibration.parameterization);
         let rigid = RIGID_COLUMNS * calibration.rigid_cameras.len();
         let is_clock = |parameter: &&ParameterId| parameter.dimension() == Dimension::Time;
         let clocks = calibration.parameters.iter().filter(is_clock).count();

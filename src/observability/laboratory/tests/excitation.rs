@@ -52,7 +52,7 @@ fn step(estimator: &mut Estimator, frame: &SyntheticFrame) -> (StepReport, Optio
     let rank = report.linearization.as_ref().and_then(|linearization| {
         let angles: Vec<&[f64]> = report.window.iter().map(|frame| frame.joint_angles_rad.as_slice()).collect();
         let calibration = &report.calibration;
-        let chain = Chain::from_classical(&calibration.classical, calibration.parameterization.parse().unwrap());
+        let chain = Chain::from_classical(&calibration.classical, calibration.parameterization);
         let free = !estimator.config().use_encoder;
         let chain = if free { chain.without_joint_offsets() } else { chain };
         analyse(linearization, &chain, &angles, free)
