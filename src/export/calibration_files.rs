@@ -27,7 +27,7 @@ pub fn write_calibration(run: &CalibrationRun, report: &CalibrationReport, folde
     Ok(())
 }
 
-/// The standard deviations as a further entry of the rig, which its readers pass over.
+/// The standard deviations as an additional entry of the rig file, which readers of rigs ignore.
 fn sigmas_yaml(report: &CalibrationReport) -> String {
     let sigma_of = |parameter: &ParameterReport| {
         format!("    {}_{}: {:?}\n", parameter.name, parameter.dimension.unit(), parameter.sigma)

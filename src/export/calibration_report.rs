@@ -1,4 +1,4 @@
-//! `calibration.json` and the printed report of `dcvins calibrate`, after Kalibr's.
+//! `calibration.json` and the printed report of `dcvins calibrate`, modelled on Kalibr's.
 
 use std::fmt;
 
@@ -14,18 +14,18 @@ use crate::gimbal::{Chain, ClassicalChain, Quantity};
 use crate::sensors::{CameraMount, Rig};
 use crate::session::CalibrationRun;
 
-/// Statistics of a series of lengths, in the unit that the field's name says.
+/// Statistics of a series of lengths, in the unit of the field's name.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct StatisticsReport {
-    /// How many.
+    /// Number of values.
     pub count: usize,
-    /// Mean.
+    /// Arithmetic mean.
     pub mean: f64,
-    /// Median.
+    /// Middle of the sorted values.
     pub median: f64,
     /// Standard deviation about the mean.
     pub std: f64,
-    /// Root of the mean square.
+    /// Root mean square.
     pub rms: f64,
 }
 
@@ -36,27 +36,27 @@ impl From<Statistics> for StatisticsReport {
     }
 }
 
-/// One parameter, before and after.
+/// One parameter before and after the calibration.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ParameterReport {
-    /// Its name, joints and cameras by name.
+    /// Its name, with the names of joints and cameras.
     pub name: String,
-    /// Its dimension, written as its unit.
+    /// Its dimension, serialized as its unit.
     #[serde(rename = "unit")]
     pub dimension: Dimension,
-    /// What the rig gave.
+    /// Value in the given rig.
     pub initial: f64,
-    /// What was found.
+    /// Calibrated value.
     #[serde(rename = "final")]
     pub last: f64,
-    /// Its standard deviation.
+    /// Posterior standard deviation.
     pub sigma: f64,
-    /// Its standard deviation by the rig alone.
+    /// Prior standard deviation from the rig.
     pub prior_sigma: Option<f64>,
-    /// The true value.
+    /// Ground-truth value.
     #[serde(rename = "truth", skip_serializing_if = "Option::is_none")]
     pub ground_truth: Option<f64>,
-    /// Final minus true.
+    /// Calibrated minus ground-truth value.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<f64>,
 }
@@ -66,9 +66,9 @@ pub struct ParameterReport {
 pub struct ReprojectionReport {
     /// Key of the camera.
     pub camera: String,
-    /// Landmarks that it saw.
+    /// Number of landmarks that it observed.
     pub landmarks: usize,
-    /// Lengths in pixels, one per observation.
+    /// Lengths of the reprojection errors in pixels, one per observation.
     pub error_px: StatisticsReport,
 }
 
@@ -78,99 +78,99 @@ impl From<&PixelReport> for ReprojectionReport {
     }
 }
 
-/// Distance of a calibration from the truth.
+/// Error of a calibration against ground truth, over the joint angles of the log.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct DistanceReport {
-    /// Mean distance over the joint angles visited.
+    /// Mean distance of the camera positions in metres.
     pub translation_mean_m: f64,
-    /// Its standard deviation.
+    /// Standard deviation of the distance.
     pub translation_std_m: f64,
-    /// Mean angle.
+    /// Mean angle between the camera attitudes in radians.
     pub rotation_mean_rad: f64,
-    /// Its standard deviation.
+    /// Standard deviation of the angle.
     pub rotation_std_rad: f64,
 }
 
-/// Distances from the truth, stage by stage.
+/// Errors against ground truth by stage of the calibration.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct GroundTruthReport {
-    /// `imu_from_camera` of the static camera as the rig gave it.
+    /// `imu_from_camera` of the static camera in the given rig.
     pub static_initial: DistanceReport,
-    /// After the camera–IMU calibration alone.
+    /// After the camera–IMU calibration of the static camera alone.
     pub static_camera_imu: DistanceReport,
-    /// After the bundle of both cameras.
+    /// After the bundle adjustment of both cameras.
     pub static_final: DistanceReport,
-    /// The chain as the rig gave it.
+    /// The chain in the given rig.
     pub chain_initial: DistanceReport,
     /// After the pose loops.
     pub chain_pose_loop: DistanceReport,
-    /// After the bundle of both cameras.
+    /// After the bundle adjustment of both cameras.
     pub chain_final: DistanceReport,
 }
 
-/// Pairs of camera poses and the loops that they close.
+/// Pairs of camera poses and their loop closures.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LoopReport {
-    /// Reconstructions of the gimbal camera.
+    /// Number of reconstructions of the gimbal camera.
     pub segments: usize,
-    /// Pairs of camera poses.
+    /// Number of pairs of camera poses.
     pub pairs: usize,
-    /// Pairs that kept at least half of their weight.
+    /// Number of pairs whose robust weight is at least one half.
     pub fitting: usize,
-    /// Lengths of the gaps in metres.
+    /// Lengths of the loop-closure errors in metres.
     pub gap_m: StatisticsReport,
 }
 
-/// Ranks of the chain over the whole flight.
+/// Ranks of the chain's calibration over the whole log.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct CalibrationRank {
-    /// Parameters.
+    /// Number of parameters.
     pub columns: usize,
     /// Structural rank.
     pub rank_structural: usize,
-    /// Directions about which the flight says more than 10° and 3 cm.
+    /// Number of directions with σ below 10° and 3 cm from the log alone.
     pub rank_informed: usize,
-    /// In one line.
+    /// The result in one line.
     pub verdict: String,
 }
 
-/// `calibration.json`.
+/// Content of `calibration.json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CalibrationReport {
     /// File name of the log.
     pub log: String,
-    /// Start and end of the interval that was used, in seconds since the log began.
+    /// Start and end of the used interval, in seconds since the log began.
     pub stretch_s: [f64; 2],
-    /// Instants whose states were estimated.
+    /// Number of synchronized frame sets whose states were estimated.
     pub instants: usize,
-    /// Form in which the chain was estimated.
+    /// Name of the parameterization of the estimated chain.
     pub parameterization: String,
-    /// Static camera alone.
+    /// Reprojection errors of the static camera's calibration alone.
     pub camera_imu_reprojection: ReprojectionReport,
-    /// Both cameras in one bundle, static one first.
+    /// Reprojection errors of the bundle adjustment, static camera first.
     pub reprojection: Vec<ReprojectionReport>,
-    /// Mean angular velocity between instants against the gyroscope's, in rad/s.
+    /// Difference of mean angular rates between frames and the gyroscope's, in rad/s.
     pub gyroscope_error_rad_per_s: StatisticsReport,
-    /// Mean acceleration between instants against the accelerometer's, in m/s².
+    /// Difference of mean accelerations between frames and the accelerometer's, in m/s².
     pub accelerometer_error_m_per_s2: StatisticsReport,
-    /// The pose loops.
+    /// Result of the pose loops.
     pub pose_loops: LoopReport,
     /// Every calibrated parameter: static camera, time offsets, chain.
     pub parameters: Vec<ParameterReport>,
-    /// `T_cam_imu` of the static camera, rows.
+    /// `T_cam_imu` of the static camera, by rows.
     pub static_t_cam_imu: [[f64; 4]; 4],
-    /// `T_imu_cam` of the gimbal camera with all joints at zero, rows.
+    /// `T_imu_cam` of the gimbal camera with all joint angles at zero, by rows.
     pub gimbal_t_imu_cam_at_zero: [[f64; 4]; 4],
-    /// Observability of the chain.
+    /// Observability of the chain's calibration.
     pub rank: Option<CalibrationRank>,
-    /// Against the truth, where it is known.
+    /// Errors against ground truth, where it is known.
     #[serde(rename = "truth")]
     pub ground_truth: Option<GroundTruthReport>,
-    /// Warnings.
+    /// Warnings about the log.
     pub warnings: Vec<String>,
 }
 
-/// Puts a calibration into the report's form.
+/// The report of a calibration.
 pub fn report_calibration(run: &CalibrationRun) -> CalibrationReport {
     let outcome = &run.outcome;
     let zero = vec![0.0; outcome.chain.joint_count()];

@@ -1,32 +1,33 @@
 //! Tables of comma-separated values.
 
-/// Rows in memory contain no error but a row of another length than the header, which the code that makes it excludes.
+/// Message of the only possible error of a table in memory: a row with another number of cells than the header, which
+/// is a programming error.
 const IN_MEMORY: &str = "every row has as many cells as the header";
 
-/// A table of comma-separated values in memory; cells are quoted where they need it.
+/// A table of comma-separated values in memory; cells are quoted where necessary.
 pub(super) struct CsvTable(csv::Writer<Vec<u8>>);
 
 impl CsvTable {
-    /// A table with the names of its columns.
+    /// An empty table with the names of its columns.
     pub(super) fn new<S: AsRef<[u8]>>(header: impl IntoIterator<Item = S>) -> Self {
         let mut table = Self(csv::Writer::from_writer(Vec::new()));
         table.push(header);
         table
     }
 
-    /// Appends a row of as many cells as there are columns.
+    /// Appends a row with one cell per column.
     pub(super) fn push<S: AsRef<[u8]>>(&mut self, row: impl IntoIterator<Item = S>) {
         self.0.write_record(row).expect(IN_MEMORY);
     }
 
-    /// The table with a line break after every row.
+    /// The text of the table, with a line break after every row.
     pub(super) fn into_text(self) -> String {
         let bytes = self.0.into_inner().map_err(|error| error.to_string()).expect(IN_MEMORY);
         String::from_utf8(bytes).expect("cells are UTF-8")
     }
 }
 
-/// A number with all its digits; an empty cell for one that is not finite.
+/// A number with all its digits; empty if it is not finite.
 pub(super) fn number_cell(number: f64) -> String {
     if number.is_finite() { number.to_string() } else { String::new() }
 }

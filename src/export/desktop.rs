@@ -1,4 +1,4 @@
-//! Files, folders and memory of the machine, for the window.
+//! Access of the window to files and memory of the machine.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,25 +12,26 @@ use super::screenshot::{write_csv, write_png, write_svg};
 use super::session_file::is_session;
 use crate::gui::desktop::{Desktop, PanelExport, PathEntry};
 
-/// How many entries of a folder are looked at.
+/// Maximum number of entries of a folder that are read.
 const MAX_ENTRIES: usize = 5000;
-/// How far above the program sample logs are looked for: `target/release/dcvins` lies three folders deep.
+/// Number of parent folders of the program that are searched for sample logs: `target/release/dcvins` is three folders
+/// deep.
 const LEVELS_ABOVE: usize = 4;
 /// Where sample logs lie there: in the repository, and below the prefix of an installed package.
 const SAMPLE_FOLDERS: [&str; 2] = ["sample_logs", "share/dcvins/sample_logs"];
 
 /// File of the saved layouts in the user's state folder.
 const LAYOUTS: &str = "layouts.json";
-/// File of the settings there.
+/// File of the settings in the user's state folder.
 const SETTINGS: &str = "settings.json";
 
-/// The machine as it is.
+/// The real machine.
 #[derive(Clone, Debug)]
 pub struct Machine {
     recent: RecentFiles,
-    /// Where layouts and settings are kept, when the user has a place for them.
+    /// Folder of layouts and settings, if the user has one.
     state: Option<PathBuf>,
-    /// Where exported panels go.
+    /// Folder of exported panels.
     output: PathBuf,
 }
 
@@ -94,12 +95,12 @@ impl Desktop for Machine {
         if let Ok(folder) = std::env::current_dir() {
             dialog = dialog.set_directory(folder);
         }
-        // macOS makes the dialog on the thread of the window; any thread may wait for its answer.
+        // On macOS the dialog must be created on the window's thread; any thread may wait for its result.
         let answer = dialog.pick_file();
         let (sender, receiver) = channel();
         let wait = move || {
             let file = pollster::block_on(answer);
-            // Nobody waits any more when the window was closed meanwhile.
+            // The receiver is gone when the window was closed meanwhile.
             drop(sender.send(file.map(|file| file.path().to_path_buf())));
         };
         std::thread::Builder::new().name("file-dialog".to_owned()).spawn(wait).ok().map(|_| receiver)

@@ -11,14 +11,15 @@ use crate::session::accuracy::{
     Alignment, ErrorStatistics, RelativeDelta, absolute_errors_m, align, associate, path_length_m, relative_errors,
 };
 
-/// How to compare two trajectories; the defaults are those of `evo_ape tum --align` and `evo_rpe tum --align`.
+/// Options of a comparison of two trajectories; the defaults are those of `evo_ape tum --align` and `evo_rpe tum
+/// --align`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EvaluationOptions {
-    /// How the estimate is laid on the reference.
+    /// Alignment of the estimate with the reference.
     pub alignment: Alignment,
-    /// Length of the stretches of the relative error.
+    /// Length of the sub-trajectories of the relative error.
     pub delta: RelativeDelta,
-    /// Largest difference of two stamps that count as the same instant.
+    /// Maximum difference of the stamps of associated poses, in seconds.
     pub max_difference_s: f64,
 }
 
@@ -31,17 +32,17 @@ impl Default for EvaluationOptions {
 /// Statistics as written to JSON.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Statistics {
-    /// Root of the mean square.
+    /// Root mean square.
     pub rmse: f64,
-    /// Mean.
+    /// Arithmetic mean.
     pub mean: f64,
     /// Median.
     pub median: f64,
     /// Standard deviation.
     pub std: f64,
-    /// Smallest.
+    /// Smallest error.
     pub min: f64,
-    /// Largest.
+    /// Largest error.
     pub max: f64,
 }
 
@@ -52,28 +53,28 @@ impl From<ErrorStatistics> for Statistics {
     }
 }
 
-/// What the comparison found.
+/// Result of a comparison of two trajectories.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EvaluationReport {
     /// `none`, `yaw+position`, `se3` or `sim3`.
     pub alignment: &'static str,
-    /// Poses that had a partner.
+    /// Number of associated poses.
     pub pairs: usize,
-    /// Poses of the estimate.
+    /// Number of poses of the estimate.
     pub estimate_poses: usize,
-    /// Poses of the reference.
+    /// Number of poses of the reference.
     pub reference_poses: usize,
-    /// Path of the reference over the pairs, in metres.
+    /// Path length of the reference over the associated poses, in metres.
     pub reference_length_m: f64,
-    /// Scale that the alignment applied.
+    /// Scale factor of the alignment.
     pub scale: f64,
-    /// Absolute error, in metres.
+    /// Absolute position error in metres.
     pub ate_m: Statistics,
-    /// Relative error, translation, in metres.
+    /// Translation part of the relative error in metres.
     pub rpe_translation_m: Statistics,
-    /// Relative error, rotation, in degrees.
+    /// Rotation part of the relative error in degrees.
     pub rpe_rotation_deg: Statistics,
-    /// Stretches of the relative error.
+    /// Number of sub-trajectories of the relative error.
     pub rpe_pairs: usize,
 }
 

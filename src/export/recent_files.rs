@@ -1,15 +1,15 @@
-//! The logs opened recently, listed in a file of the user's state folder. A list that cannot be read or written is empty
-//! and no error.
+//! The list of recently opened logs, a file in the user's state folder. A list that cannot be read or written counts as
+//! empty.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use directories::ProjectDirs;
 
-/// Most logs in the list.
+/// Maximum number of logs in the list.
 const MAX_LOGS: usize = 12;
 
-/// The list in one file: a path per line, the newest first.
+/// The list as a file: one path per line, the newest first.
 #[derive(Clone, Debug)]
 pub struct RecentFiles {
     file: Option<PathBuf>,
@@ -28,12 +28,12 @@ impl RecentFiles {
         Self { file: state_folder().map(|folder| folder.join("recent")) }
     }
 
-    /// A list in a given file.
+    /// A list in a file.
     pub fn in_file(file: PathBuf) -> Self {
         Self { file: Some(file) }
     }
 
-    /// The logs that still exist, the newest first.
+    /// Logs that still exist, newest first.
     pub fn list(&self) -> Vec<PathBuf> {
         self.read().into_iter().filter(|path| path.is_file()).collect()
     }
@@ -43,7 +43,7 @@ impl RecentFiles {
         text.lines().filter(|line| !line.trim().is_empty()).map(PathBuf::from).take(MAX_LOGS).collect()
     }
 
-    /// Puts a log at the head of the list; a state folder that cannot be written leaves the list as it is.
+    /// Moves a log to the head of the list; a state folder that cannot be written leaves the list unchanged.
     pub fn remember(&self, path: &Path) {
         let Some(file) = &self.file else { return };
         let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());

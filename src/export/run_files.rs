@@ -12,19 +12,19 @@ use crate::gimbal::ParameterPart;
 use crate::sensors::{CameraMount, Rig};
 use crate::session::{Recording, RunRecord};
 
-/// What goes into the files.
+/// Options of the files of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RunFileOptions {
     /// Write measured times; without them two runs give the same bytes in every file.
     pub timing: bool,
-    /// Also write `results.mcap`, for Foxglove and Rerun.
+    /// Also write `results.mcap` for Foxglove and Rerun.
     pub mcap: bool,
     /// Also write `trajectory.euroc.csv`.
     pub euroc_trajectory: bool,
 }
 
 impl Default for RunFileOptions {
-    /// The files that every run leaves, with times.
+    /// The default files, with measured times.
     fn default() -> Self {
         Self { timing: true, mcap: false, euroc_trajectory: false }
     }
@@ -64,7 +64,7 @@ pub fn write_run(
     Ok((folder, summary))
 }
 
-/// The rig with the calibration that the run ended with.
+/// The rig with the final calibration of the run.
 fn calibrated_rig(recording: &Recording, run: &RunRecord) -> Rig {
     let mut rig = (*recording.rig).clone();
     let Some(last) = run.steps.last() else { return rig };

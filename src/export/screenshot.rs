@@ -18,10 +18,10 @@ use crate::gui::{ImageSource, PanelContext, Playback, Selection};
 use crate::observability::SlidePosition;
 use crate::session::Recording;
 
-/// The name that stands for all panels.
+/// The name of the whole window.
 const WHOLE_WINDOW: &str = "all";
 
-/// Panels by name; `all` is the whole window.
+/// Names of the panels; `all` is the whole window.
 pub const PANEL_NAMES: [&str; PanelName::ALL.len() + 1] = {
     let mut names = [WHOLE_WINDOW; PanelName::ALL.len() + 1];
     let mut index = 0;
@@ -38,7 +38,7 @@ const MAX_SIDE_PX: u32 = 16_384;
 /// Renderer of a screenshot.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Renderer {
-    /// The program itself: needs no driver, and gives the same bytes everywhere.
+    /// The CPU painter: needs no driver, and gives the same bytes on every machine.
     #[default]
     Cpu,
     /// A graphics adapter through wgpu, as in the window.
@@ -50,17 +50,17 @@ pub enum Renderer {
 pub struct ScreenshotOptions {
     /// Width and height in pixels.
     pub size_px: [u32; 2],
-    /// Pixels per point: 1 as on an ordinary screen, 2 draws everything twice as large.
+    /// Pixels per point: 1 as on an ordinary screen, 2 for twice the size.
     pub pixels_per_point: f32,
-    /// Colours.
+    /// Theme of the screenshot.
     pub theme: ThemeName,
-    /// Who draws it.
+    /// Renderer of the screenshot.
     pub renderer: Renderer,
-    /// Where the chain of the first run is moved to.
+    /// Direction and distance by which the chain of the first run is moved.
     pub slide: Option<SlidePosition>,
-    /// Where the panels of the whole window are.
+    /// Layout of the whole window.
     pub layout: Preset,
-    /// Markers, breakpoints and the like, of a session that was saved.
+    /// Markers, breakpoints and state of playback of a saved session.
     pub playback: Playback,
 }
 
@@ -78,13 +78,13 @@ impl Default for ScreenshotOptions {
     }
 }
 
-/// Why a screenshot cannot be made.
+/// The reason why a screenshot cannot be made.
 #[derive(Debug, Error)]
 pub enum ScreenshotError {
-    /// No such panel.
+    /// There is no panel of that name.
     #[error("no panel is called '{name}': expected one of {}", PANEL_NAMES.join(", "))]
     UnknownPanel {
-        /// What was asked for.
+        /// The name as written.
         name: String,
     },
     /// The size is out of range.
@@ -101,13 +101,13 @@ pub enum ScreenshotError {
         /// Pixels per point.
         scale: f32,
     },
-    /// The graphics adapter could not draw it.
+    /// The graphics adapter could not paint it.
     #[error(transparent)]
     Graphics(#[from] OffscreenError),
     /// The PNG encoder failed.
     #[error("cannot encode the screenshot as PNG: {source}")]
     Encode {
-        /// What the encoder said.
+        /// The error of the encoder.
         source: image::ImageError,
     },
     /// The file could not be written.
@@ -115,12 +115,12 @@ pub enum ScreenshotError {
     Write(#[from] ExportError),
 }
 
-/// Names of the panels, as [`draw_panel`] takes them.
+/// Names of the panels as accepted by [`draw_panel`].
 pub fn panel_names() -> &'static [&'static str] {
     &PANEL_NAMES
 }
 
-/// Draws one panel, or the whole window, over a recording at a cursor.
+/// Draws one panel, or the whole window, for a recording at a cursor.
 pub fn draw_panel(
     name: &str,
     recording: &Recording,
@@ -134,9 +134,9 @@ pub fn draw_panel(
     })
 }
 
-/// The same panel as a drawing of lines and texts (SVG); images and the scene are embedded as they are painted.
+/// The same panel as an SVG drawing; images and the 3D scene are embedded as pixels.
 ///
-/// `prefix` begins the names of its elements, so that one page can hold several; `title` is its title.
+/// `prefix` begins the ids of its elements, so that one page can hold several; `title` is its title.
 pub fn draw_panel_svg(
     name: &str,
     recording: &Recording,
@@ -150,10 +150,10 @@ pub fn draw_panel_svg(
     })
 }
 
-/// The numbers behind what a panel shows, comma separated; of the options only the slide matters.
+/// The values of a panel, comma separated; of the options only the slide has an effect.
 ///
 /// # Errors
-/// For a name that no single panel has.
+/// For a name that is not the name of a single panel.
 pub fn panel_csv(
     name: &str,
     recording: &Recording,
@@ -172,7 +172,7 @@ pub fn panel_csv(
     Ok(panel_table(panel, &mut WindowState::default(), ctx))
 }
 
-/// Hands the panel's interface to whoever draws it.
+/// Passes the panel's user interface to a function that draws it.
 fn with_panel<T>(
     name: &str,
     recording: &Recording,
@@ -192,7 +192,7 @@ fn with_panel<T>(
     let mut selection = Selection { slide: options.slide, ..Selection::default() };
     let playback = Playback { playing: false, ..options.playback.clone() };
     let mut ui = |ui: &mut Ui| {
-        // Nobody is there to carry out what a panel may ask for.
+        // Commands of the panel have no effect.
         let commands = &mut Vec::new();
         let selection = &mut selection;
         let images = &mut *images;
@@ -227,17 +227,17 @@ pub fn png_bytes(screenshot: &RgbaImage) -> Result<Vec<u8>, ScreenshotError> {
     Ok(bytes.into_inner())
 }
 
-/// Writes an image as PNG, making its folder when it is missing.
+/// Writes an image as PNG and creates its folder if necessary.
 pub fn write_png(screenshot: &RgbaImage, path: &Path) -> Result<(), ScreenshotError> {
     write_bytes(&png_bytes(screenshot)?, path)
 }
 
-/// Writes a drawing as SVG, making its folder when it is missing.
+/// Writes a drawing as SVG and creates its folder if necessary.
 pub fn write_svg(drawing: &str, path: &Path) -> Result<(), ScreenshotError> {
     write_bytes(drawing.as_bytes(), path)
 }
 
-/// Writes a table of comma-separated values, making its folder when it is missing.
+/// Writes a table of comma-separated values and creates its folder if necessary.
 pub fn write_csv(table: &str, path: &Path) -> Result<(), ScreenshotError> {
     write_bytes(table.as_bytes(), path)
 }

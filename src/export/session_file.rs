@@ -14,7 +14,7 @@ pub fn is_session(path: &Path) -> bool {
 /// Reads a saved session.
 ///
 /// # Errors
-/// When the file cannot be read or holds no session of this version.
+/// When the file cannot be read, or is no session that this version can read.
 pub fn read_session(path: &Path) -> Result<SavedSession, ExportError> {
     let text = fs::read_to_string(path).map_err(|source| ExportError::Read { source, path: path.to_owned() })?;
     SavedSession::from_text(&text)

@@ -1,4 +1,4 @@
-//! What is known to be lost, over all steps of a run.
+//! Known losses of rank over all steps of a run.
 
 use serde::Serialize;
 
@@ -6,22 +6,23 @@ use crate::gimbal::ParameterNames;
 use crate::observability::KnownLoss;
 use crate::session::RunRecord;
 
-/// A null direction known in closed form, compared with every step of a run.
+/// A null direction known in closed form, compared with the measured response in every step of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct KnownLossSummary {
-    /// Why it is lost, in one sentence with its equation.
+    /// The cause in one sentence with its equation.
     pub reason: String,
-    /// In how many steps the form of the chain had it.
+    /// Number of steps whose parameterization has it.
     pub steps: usize,
-    /// In how many of them the measurement found it null.
+    /// Number of these steps in which the measured response is null.
     pub agreeing: usize,
     /// The window's largest response to it, relative to the reference of the rank rule.
     pub largest_response: f64,
-    /// Largest spurious information of the priors along it (1: σ of 10° or 3 cm); zero with first-estimate Jacobians.
+    /// Largest spurious information of the priors along it (1 corresponds to σ of 10° or 3 cm); zero with
+    /// first-estimate Jacobians.
     pub largest_false_gain: f64,
 }
 
-/// The known losses of a run in the order in which they first appeared.
+/// The known losses of a run in the order of their first step.
 pub(super) fn known_losses(run: &RunRecord, names: &ParameterNames) -> Vec<KnownLossSummary> {
     let mut found: Vec<(KnownLoss, KnownLossSummary)> = Vec::new();
     for rank in run.steps.iter().filter_map(|step| step.rank.as_ref()) {

@@ -1,4 +1,4 @@
-//! `summary.json`: what one run came to.
+//! `summary.json`: the result of one run.
 
 use std::path::Path;
 
@@ -14,27 +14,27 @@ use crate::sensors::Rig;
 use crate::session::accuracy::{Alignment, path_length_m};
 use crate::session::{Recording, RunRecord, RunWarning, TrajectoryAccuracy};
 
-/// Frames of a run.
+/// Frame counts of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FrameCounts {
-    /// Images that reached the estimator.
+    /// Number of images passed to the estimator.
     pub total: usize,
-    /// Images with a pose.
+    /// Number of images with an estimated pose.
     pub estimated: usize,
-    /// Keyframes.
+    /// Number of keyframes.
     pub keyframes: usize,
-    /// Time of the first pose since the log began.
+    /// Stamp of the first pose, in seconds since the log began.
     pub initialized_at_s: Option<f64>,
-    /// Restarts after a failure.
+    /// Number of restarts after a failure.
     pub restarts: usize,
 }
 
-/// Relative error over one length.
+/// Relative error over one path length.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RelativeError {
-    /// Path length of a stretch.
+    /// Path length of a sub-trajectory in metres.
     pub delta_m: f64,
-    /// Number of stretches.
+    /// Number of sub-trajectories.
     pub pairs: usize,
     /// Root mean square of the translation error.
     pub translation_rmse_m: f64,
@@ -42,144 +42,144 @@ pub struct RelativeError {
     pub rotation_rmse_deg: f64,
 }
 
-/// Trajectory errors against the truth.
+/// Trajectory errors against ground truth.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Accuracy {
-    /// How the estimate was laid on the truth.
+    /// Alignment of the estimate with the ground truth.
     pub alignment: &'static str,
-    /// Root mean square of the position error.
+    /// Root mean square of the absolute position error.
     pub ate_rmse_m: f64,
-    /// Mean of the position error.
+    /// Mean of the absolute position error.
     pub ate_mean_m: f64,
     /// Its standard deviation.
     pub ate_std_m: f64,
-    /// Its median.
+    /// Median of the absolute position error.
     pub ate_median_m: f64,
-    /// The largest.
+    /// Largest absolute position error.
     pub ate_max_m: f64,
-    /// Root mean square of the position error in percent of the length.
+    /// Root mean square of the absolute position error in percent of the path length.
     pub ate_percent_of_length: f64,
-    /// Relative errors.
+    /// Relative errors by path length.
     pub rpe: Vec<RelativeError>,
 }
 
-/// One calibration parameter, first and last.
+/// One calibration parameter, initial and final.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ParameterSummary {
-    /// Its name, joints by name.
+    /// Its name, with the names of joints.
     pub name: String,
-    /// Its dimension, written as its unit.
+    /// Its dimension, serialized as its unit.
     #[serde(rename = "unit")]
     pub dimension: Dimension,
-    /// What the rig gave.
+    /// Value in the rig.
     pub initial: f64,
-    /// What the run ended with.
+    /// Final value of the run.
     #[serde(rename = "final")]
     pub last: f64,
     /// Posterior standard deviation.
     pub sigma: Option<f64>,
-    /// The true value.
+    /// Ground-truth value.
     #[serde(rename = "truth", skip_serializing_if = "Option::is_none")]
     pub ground_truth: Option<f64>,
-    /// Final minus true.
+    /// Final minus ground-truth value.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<f64>,
 }
 
-/// How far `imu_from_camera` is from the truth over the joint angles visited.
+/// Error of `imu_from_camera` against ground truth over the joint angles of the run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ChainError {
-    /// Mean distance.
+    /// Mean distance in metres.
     pub translation_mean_m: f64,
-    /// Its standard deviation.
+    /// Standard deviation of the distance.
     pub translation_std_m: f64,
-    /// Mean angle.
+    /// Mean angle in radians.
     pub rotation_mean_rad: f64,
-    /// Its standard deviation.
+    /// Standard deviation of the angle.
     pub rotation_std_rad: f64,
 }
 
 /// The calibration of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CalibrationSummary {
-    /// In use at the end.
+    /// Name of the final parameterization.
     pub parameterization: String,
     /// Number of parameters.
     pub columns: usize,
-    /// Each of them.
+    /// The parameters in column order.
     pub parameters: Vec<ParameterSummary>,
-    /// Distance of the whole chain from the truth at the end.
+    /// Final error of the whole chain against ground truth.
     pub chain_error: Option<ChainError>,
-    /// The same at the start, with the values of the rig.
+    /// Initial error of the whole chain, with the values of the rig.
     pub chain_error_initial: Option<ChainError>,
 }
 
-/// Deficit of the rank by cause.
+/// Rank deficit by cause.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct DeficitSummary {
-    /// Lost to the parameterization.
+    /// Redundant parameters of the parameterization.
     pub parameterization: usize,
     /// Joints that did not move.
     pub joints: usize,
     /// Absorbed by free joint angles.
     pub absorbed: usize,
-    /// Motion of the vehicle.
+    /// Insufficient motion of the vehicle.
     pub motion: usize,
 }
 
 /// Weight of one parameter in a direction.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DirectionWeight {
-    /// Parameter.
+    /// Name of the parameter.
     pub name: String,
     /// Signed weight in the prior-scaled unit direction.
     pub weight: f64,
 }
 
-/// Observability at the last step.
+/// Observability of the calibration at the last step.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RankSummary {
-    /// Calibration columns.
+    /// Number of calibration columns.
     pub columns: usize,
     /// Structural rank.
     pub rank_structural: usize,
     /// Informed rank.
     pub rank_informed: usize,
-    /// What is lost, by cause.
+    /// Rank deficit by cause.
     pub deficit: DeficitSummary,
-    /// Structural null directions, each as its parameters with weight over a hundredth.
+    /// Structural null directions, each by its parameters with a weight above 0.01.
     pub null_directions: Vec<Vec<DirectionWeight>>,
     /// Null directions of the parameterization that are known in closed form, compared with every step.
     pub known: Vec<KnownLossSummary>,
-    /// How fast the images of all steps narrowed each parameter, and which motions that is owed to.
+    /// Information gain of all images by parameter and by motion.
     pub information: Option<InformationSummary>,
 }
 
-/// Information gained over the steps.
+/// Information gain over the steps of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct InformationSummary {
-    /// Length of the steps together.
+    /// Total length of the steps in seconds.
     pub duration_s: f64,
-    /// The motions of each parameter's `by_motion`.
+    /// Names of the motions in `by_motion`, in its order.
     pub motions: Vec<String>,
-    /// Bits per second: one bit halves the standard deviation.
+    /// Gain by parameter; a gain of one bit halves the standard deviation.
     pub parameters: Vec<ParameterInformation>,
 }
 
-/// How fast the images narrowed one parameter.
+/// Information gain of one parameter.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ParameterInformation {
     /// Its name.
     pub name: String,
-    /// In bits per second.
+    /// Gain in bits per second.
     pub bits_per_s: f64,
-    /// Of these, the part of each motion; a negative one takes away what others bring.
+    /// Contribution of each motion in bits per second; negative for a motion that reduces the contribution of others.
     pub by_motion: Vec<f64>,
-    /// The rest: what images add by confirming earlier ones that have left the window.
+    /// The remainder: gain from images that confirm earlier ones outside the window.
     pub earlier: f64,
 }
 
-/// Percentiles of one stage's time.
+/// Percentiles of one stage's time in milliseconds.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StageSummary {
     /// Median.
@@ -193,9 +193,9 @@ pub struct StageSummary {
 /// Times of all stages in milliseconds, over the estimated frames.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TimingSummary {
-    /// Front end.
+    /// Feature tracking.
     pub frontend: StageSummary,
-    /// Solve.
+    /// Nonlinear solve of the window.
     pub optimize: StageSummary,
     /// Linearization for the observability analysis.
     pub linearize: StageSummary,
@@ -209,37 +209,37 @@ pub struct TimingSummary {
     pub step: StageSummary,
 }
 
-/// `summary.json`.
+/// Content of `summary.json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RunSummary {
     /// File name of the log.
     pub log: String,
-    /// The run as given on the command line.
+    /// Specification of the run on the command line.
     pub run: String,
-    /// Camera it watched.
+    /// Keys of its cameras.
     pub camera: String,
-    /// Frames.
+    /// Frame counts.
     pub frames: FrameCounts,
-    /// Length of the true path over the estimated frames, of the estimated one without truth.
+    /// Path length over the estimated frames in metres, of the ground truth where there is one, else of the estimate.
     pub length_m: f64,
-    /// Against the truth, when there is one and the run was initialized.
+    /// Errors against ground truth, if there is one and the run was initialized.
     pub accuracy: Option<Accuracy>,
-    /// Why there is no accuracy.
+    /// The reason why there is no accuracy.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub accuracy_missing: Option<String>,
-    /// Calibration.
+    /// The calibration.
     pub calibration: CalibrationSummary,
     /// Observability, `None` before the first solve.
     pub rank: Option<RankSummary>,
-    /// Times, `None` when they were left out for the sake of equal bytes.
+    /// Stage times, `None` if they were omitted for reproducible bytes.
     pub timing_ms: Option<TimingSummary>,
-    /// Seconds of log per second of work.
+    /// Seconds of log per second of computation.
     pub real_time_factor: Option<f64>,
-    /// What went wrong without stopping the run.
+    /// Warnings about the log and of the run.
     pub warnings: Vec<String>,
 }
 
-/// Sums up one run of a recording.
+/// The summary of one run of a recording.
 pub fn summarize(recording: &Recording, run: &RunRecord, timing: bool) -> RunSummary {
     let estimated: Vec<_> = run.steps.iter().filter(|step| step.report.newest().is_some()).collect();
     let pairs = run.pairs_with_ground_truth();
@@ -278,7 +278,7 @@ pub fn summarize(recording: &Recording, run: &RunRecord, timing: bool) -> RunSum
     }
 }
 
-/// Keys of the cameras that the run watches, the one that is shown first.
+/// Keys of the run's cameras, the main one first.
 fn cameras(run: &RunRecord) -> String {
     let rigid = run.steps.last().into_iter().flat_map(|step| &step.report.calibration.rigid_cameras);
     rigid.fold(run.camera_key.clone(), |cameras, (key, _)| format!("{cameras}, {key}"))
@@ -372,7 +372,7 @@ fn calibration(recording: &Recording, run: &RunRecord) -> CalibrationSummary {
     }
 }
 
-/// Difference of two values of a parameter, of an angle the shorter way round.
+/// Difference of two values of a parameter; of angles, wrapped to ±π.
 pub(super) fn difference(dimension: Dimension, value: f64, reference: f64) -> f64 {
     match dimension {
         Dimension::Angle => wrap_angle(value - reference),
@@ -467,7 +467,7 @@ fn real_time_factor(run: &RunRecord) -> Option<f64> {
     (work_ms > 0.0).then(|| log_s * 1e3 / work_ms)
 }
 
-/// Warnings of the log, then of the run, each with its time; a repeated warning once with its count.
+/// Warnings about the log, then of the run, each with its stamp; a repeated warning once with its count.
 fn warnings(recording: &Recording, run: &RunRecord) -> Vec<String> {
     let mut texts: Vec<String> = recording
         .warnings
@@ -482,7 +482,7 @@ fn warnings(recording: &Recording, run: &RunRecord) -> Vec<String> {
     texts
 }
 
-/// Writes a summary as the text of `summary.json`.
+/// The text of `summary.json`.
 pub(super) fn to_json(summary: &RunSummary) -> Result<String, serde_json::Error> {
     serde_json::to_string_pretty(summary).map(|text| format!("{text}\n"))
 }

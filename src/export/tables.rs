@@ -7,13 +7,13 @@ use crate::gimbal::{ParameterId, ParameterNames, Singularity};
 use crate::sensors::Rig;
 use crate::session::{RunRecord, StepRecord};
 
-/// Seconds since the log began with all their nanoseconds.
+/// Seconds since the log began with nanosecond resolution.
 fn seconds_text(stamp_ns: i64) -> String {
     format!("{:.9}", seconds_from_ns(stamp_ns))
 }
 
-/// `calibration.csv`: each parameter and its sigma, then the joint angles. A switch of the
-/// parameterization changes the parameters: the columns are those of all in use, and empty while another one is.
+/// `calibration.csv`: each parameter and its σ, then the joint angles. A switch of the parameterization changes the
+/// parameters: the columns are those of all parameterizations of the run, empty while another one is in use.
 pub(super) fn calibration_csv(run: &RunRecord, rig: &Rig) -> String {
     let names = rig.parameter_names();
     let mut columns: Vec<ParameterId> = Vec::new();
@@ -121,8 +121,8 @@ pub(super) fn rank_csv(run: &RunRecord, names: &ParameterNames) -> String {
     table.into_text()
 }
 
-/// `information.csv`: information gain of each step and parameter, in total and by motion, in bits per second; zeros
-/// where the image does not become a keyframe.
+/// `information.csv`: information gain of each step and parameter, in total and by motion, in bits per second; zero for
+/// images that do not become keyframes.
 pub(super) fn information_csv(run: &RunRecord, rig: &Rig) -> String {
     let (names, joints) = (rig.parameter_names(), rig.joint_names());
     let informed = || run.steps.iter().filter_map(|step| Some((step, step.gain()?)));
@@ -149,7 +149,7 @@ pub(super) fn information_csv(run: &RunRecord, rig: &Rig) -> String {
     table.into_text()
 }
 
-/// `frames.csv`: counts, residuals, iterations, stage times and events. Without `timing` the time cells stay empty, so
+/// `frames.csv`: counts, residuals, iterations, stage times and events. Without `timing` the time cells are empty, so
 /// that two runs give the same bytes.
 pub(super) fn frames_csv(run: &RunRecord, timing: bool) -> String {
     let mut table = CsvTable::new([

@@ -12,10 +12,10 @@ use crate::geometry::RigidTransform;
 use crate::session::RunRecord;
 use crate::session::accuracy::StampedPose;
 
-/// Furthest that the norm of a quaternion may lie from one.
+/// Maximum deviation of a quaternion's norm from 1.
 const QUATERNION_TOLERANCE: f64 = 1e-2;
 
-/// Absolute header stamp with all its nanoseconds, in seconds.
+/// Absolute header stamp in seconds with nanosecond resolution.
 fn absolute_seconds(epoch_ns: i64, stamp_ns: i64) -> String {
     let absolute_ns = i128::from(epoch_ns) + i128::from(stamp_ns);
     let sign = if absolute_ns < 0 { "-" } else { "" };
@@ -23,7 +23,7 @@ fn absolute_seconds(epoch_ns: i64, stamp_ns: i64) -> String {
     format!("{sign}{}.{:09}", absolute_ns / 1_000_000_000, absolute_ns % 1_000_000_000)
 }
 
-/// The trajectory of a run, one line per estimated frame: pose of the IMU in the estimator's world at the time of the
+/// The trajectory of a run, one line per estimated frame: pose of the IMU in the estimator's world at the stamp of the
 /// step.
 pub fn tum_of_run(run: &RunRecord, epoch_ns: i64) -> String {
     let mut text = String::new();

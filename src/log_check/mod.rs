@@ -23,7 +23,7 @@ use crate::flight_log::{FlightLog, LogError, MessageKind, TopicInfo};
 use crate::geometry::seconds_from_ns;
 use crate::sensors::Rig;
 
-/// How bad a finding is.
+/// Severity of a finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
@@ -37,7 +37,7 @@ pub enum Severity {
     Error,
 }
 
-/// What a finding is about.
+/// Subject of a finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Area {
@@ -62,9 +62,9 @@ pub enum Area {
 /// One result of the check.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Finding {
-    /// How bad it is.
+    /// Its severity.
     pub severity: Severity,
-    /// What it is about.
+    /// The checked subject.
     pub area: Area,
     /// The finding in one sentence.
     pub title: String,
@@ -81,7 +81,7 @@ pub struct TopicReport {
     pub topic: String,
     /// Message type, such as `sensor_msgs/msg/Imu`.
     pub schema: String,
-    /// Its use: `imu0`, `cam0`, `gimbal`, `ground ground_truth`, `not in the rig`, or `ignored`.
+    /// Its use: `imu0`, `cam0`, `gimbal`, `ground truth`, `not in the rig`, or `ignored`.
     pub role: String,
     /// Number of messages.
     pub count: u64,

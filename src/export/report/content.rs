@@ -1,4 +1,4 @@
-//! Everything that a report says, as data: `report.json`, and what the page is made of.
+//! The content of a report as data: `report.json`, and the input of the HTML page.
 
 use std::collections::BTreeMap;
 
@@ -12,40 +12,40 @@ use crate::geometry::seconds_from_ns;
 use crate::log_check::CheckReport;
 use crate::session::{Recording, RunRecord};
 
-/// Something notable that happened.
+/// A notable event of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(super) struct ReportEvent {
-    /// When, in seconds since the log began.
+    /// Stamp of the first frame with it, in seconds since the log began.
     pub(super) time_s: f64,
-    /// What kind.
+    /// Kind of the event.
     pub(super) kind: String,
-    /// Why, in one sentence.
+    /// Its reason in one sentence.
     pub(super) message: String,
-    /// Number of consecutive frames with the same event.
+    /// Number of consecutive frames with it.
     pub(super) times: usize,
 }
 
-/// One run.
+/// The content of one run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(super) struct RunContent {
-    /// Its label.
+    /// Label of the run.
     pub(super) label: String,
-    /// As in `summary.json`.
+    /// The summary, as in `summary.json`.
     pub(super) summary: RunSummary,
-    /// What the rank did over time.
+    /// Intervals of constant rank.
     pub(super) rank_story: Vec<RankSpell>,
-    /// What happened.
+    /// Notable events.
     pub(super) events: Vec<ReportEvent>,
-    /// How often the frequent kinds of events occurred.
+    /// Counts of the frequent kinds of events.
     pub(super) frequent_events: BTreeMap<String, usize>,
 }
 
-/// The whole report.
+/// The content of the whole report.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(super) struct ReportContent {
     /// Program and version.
     pub(super) program: &'static str,
-    /// The command as typed.
+    /// The command line.
     pub(super) command: String,
     /// File name of the log.
     pub(super) log: String,
@@ -53,18 +53,18 @@ pub(super) struct ReportContent {
     pub(super) rig: String,
     /// Length of the log.
     pub(super) duration_s: f64,
-    /// Files that went in.
+    /// Input files with their hashes.
     pub(super) inputs: Vec<InputFile>,
-    /// The runs in the order of the command.
+    /// The runs in the order of the command line.
     pub(super) runs: Vec<RunContent>,
-    /// What was found about the whole log and its rig, as `check --json` prints it.
+    /// Findings about the log and its rig, as printed by `check --json`.
     pub(super) check: Option<CheckReport>,
-    /// What is wrong with the log.
+    /// Warnings about the log.
     pub(super) log_warnings: Vec<String>,
 }
 
 impl ReportContent {
-    /// Gathers what a recording says; `summaries` are those of its runs, in order.
+    /// Collects the content of a recording; `summaries` are those of its runs, in order.
     pub(super) fn new(
         recording: &Recording,
         summaries: Vec<RunSummary>,
@@ -98,11 +98,11 @@ impl ReportContent {
     }
 }
 
-/// The notable events, those of several consecutive frames once, and the counts of the others by kind.
+/// Notable events, equal ones of consecutive frames merged, and the counts of the others by kind.
 fn events(run: &RunRecord) -> (Vec<ReportEvent>, BTreeMap<String, usize>) {
     let mut notable: Vec<ReportEvent> = Vec::new();
     let mut frequent = BTreeMap::new();
-    // By kind the number of the last frame with it, and its index in `notable`.
+    // By kind: index of the last frame with it, and its index in `notable`.
     let mut latest: BTreeMap<String, (usize, usize)> = BTreeMap::new();
     for (number, step) in run.steps.iter().enumerate() {
         for event in &step.report.events {

@@ -1,4 +1,4 @@
-//! Parts of the page that several sections share.
+//! Elements common to several sections of the page.
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
@@ -6,7 +6,7 @@ use maud::{Markup, PreEscaped, html};
 
 use super::ReportDrawing;
 
-/// An unordered list of texts, nothing when there are none.
+/// An unordered list of texts, nothing for none.
 pub(super) fn list(items: &[String]) -> Markup {
     html! {
         @if !items.is_empty() {
@@ -15,7 +15,8 @@ pub(super) fn list(items: &[String]) -> Markup {
     }
 }
 
-/// A table whose first column names the rows; cells that begin with a digit, a sign or ± are aligned as numbers.
+/// A table whose first column has the names of the rows; cells that begin with a digit, a sign or ± are aligned as
+/// numbers.
 pub(super) fn table<S: AsRef<str>>(caption: &str, header: &[S], rows: &[Vec<String>]) -> Markup {
     let number = |cell: &str| cell.starts_with(|first: char| first.is_ascii_digit() || "−-±".contains(first));
     html! {
@@ -41,7 +42,7 @@ pub(super) fn table<S: AsRef<str>>(caption: &str, header: &[S], rows: &[Vec<Stri
     }
 }
 
-/// A drawing with its caption.
+/// A figure with its caption.
 pub(super) fn figure(caption: &str, drawing: &ReportDrawing) -> Markup {
     html! {
         figure {
@@ -49,7 +50,7 @@ pub(super) fn figure(caption: &str, drawing: &ReportDrawing) -> Markup {
                 ReportDrawing::Png(png) => {
                     img alt=(caption) src={ "data:image/png;base64," (STANDARD.encode(png)) };
                 }
-                // Within HTML an SVG needs no name space, and without it nothing in the page looks like an address.
+                // SVG inside HTML needs no name space; without it the page contains nothing that looks like a URL.
                 ReportDrawing::Svg(svg) => {
                     (PreEscaped(svg.trim_end().replacen(" xmlns=\"http://www.w3.org/2000/svg\"", "", 1)))
                 }

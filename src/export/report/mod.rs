@@ -1,6 +1,6 @@
-//! `dcvins report`: one HTML file that holds everything, to be read, printed and sent, with CSV and JSON beside it.
+//! `dcvins report`: one HTML file with all figures and tables, with CSV and JSON beside it.
 //!
-//! The same log, rig, runs and command give the same bytes: no dates, no measured times.
+//! The same log, rig, runs and command give the same bytes: it contains no dates and no measured times.
 
 mod content;
 mod html;
@@ -26,31 +26,31 @@ use crate::session::Recording;
 pub struct ReportFigure {
     /// Heading above it; consecutive figures with the same heading share it.
     pub heading: String,
-    /// What it shows.
+    /// Caption below it.
     pub caption: String,
-    /// What is shown.
+    /// Its drawing.
     pub drawing: ReportDrawing,
 }
 
-/// Content of a figure.
+/// The drawing of a figure.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ReportDrawing {
-    /// PNG file, for images and the scene.
+    /// A PNG file, for images and the 3D scene.
     Png(Vec<u8>),
-    /// SVG, for plots; the prefix of its element names is unique in the report.
+    /// An SVG, for plots; the prefix of its element ids is unique in the report.
     Svg(String),
 }
 
-/// Contents of a report beyond the recording.
+/// Contents of a report in addition to the recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReportOptions {
-    /// The command that makes it, as typed.
+    /// The command line.
     pub command: String,
-    /// Files that went in, to be named with their hashes.
+    /// Input files, listed with their hashes.
     pub inputs: Vec<PathBuf>,
     /// Figures in the order of the page.
     pub figures: Vec<ReportFigure>,
-    /// What `check` found about the whole log and its rig.
+    /// Findings of `check` about the log and its rig.
     pub check: Option<CheckReport>,
 }
 

@@ -1,4 +1,4 @@
-//! The HTML page of a report, from its content and its figures.
+//! The HTML page of a report, from its content and figures.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
@@ -7,7 +7,7 @@ use super::content::{ReportContent, RunContent};
 use super::html::{figure, list, number};
 use super::{RankSpell, tables};
 
-/// Style sheet for screens and for A4, where tables and figures are not cut.
+/// Style sheet for screens and for A4, where tables and figures are not split between pages.
 const STYLE: &str = include_str!("../../../assets/report/style.css");
 
 /// The whole page.
@@ -63,7 +63,7 @@ fn has_log_section(content: &ReportContent) -> bool {
     content.check.is_some() || !content.log_warnings.is_empty()
 }
 
-/// The report in one sentence.
+/// Summary of the report in one sentence.
 fn lead(content: &ReportContent) -> String {
     let runs: Vec<String> = content
         .runs

@@ -1,4 +1,4 @@
-//! What the rank did over time, in a few sentences.
+//! Intervals of constant rank over time, as sentences.
 
 use std::collections::BTreeMap;
 
@@ -10,31 +10,32 @@ use crate::observability::RankReport;
 use crate::sensors::Rig;
 use crate::session::RunRecord;
 
-/// Ranks are reported for stretches of at least this length, each by its most frequent finding: on a real flight the
-/// informed rank flickers from frame to frame.
+/// Ranks are summarized over intervals of at least this length, each by its most frequent result: on a real flight the
+/// informed rank changes from frame to frame.
 const STRETCH_NS: i64 = 1_000_000_000;
 
-/// A stretch of time in which the ranks stayed the same.
+/// An interval of constant ranks.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(super) struct RankSpell {
-    /// Its first second since the log began.
+    /// Start, in seconds since the log began.
     pub(super) from_s: f64,
-    /// Its last one.
+    /// End, in seconds since the log began.
     pub(super) to_s: f64,
-    /// Calibration columns.
+    /// Number of calibration columns.
     pub(super) columns: usize,
     /// Structural rank.
     pub(super) structural: usize,
     /// Informed rank.
     pub(super) informed: usize,
-    /// Lost to the parameterization, to joints that did not move, absorbed by free joint angles, to the vehicle's motion.
+    /// Rank deficit by cause: parameterization, joints that did not move, absorbed by free joint angles, motion of the
+    /// vehicle.
     pub(super) lost: [usize; 4],
-    /// The parameter that is known least, most of the time.
+    /// The parameter that is least observable in most of its frames.
     pub(super) least_observable: Option<String>,
 }
 
 impl RankSpell {
-    /// The spell in words: `rank 18 of 18 from 3.2 s to 8.5 s; …`.
+    /// The interval in words: `rank 18 of 18 from 3.2 s to 8.5 s; …`.
     pub(super) fn sentence(&self) -> String {
         let causes =
             ["the parameterization", "joints that did not move", "free joint angles", "the motion of the vehicle"];
@@ -58,7 +59,7 @@ fn finding(rank: &RankReport) -> Finding {
     (rank.parameters.len(), rank.rank_structural, rank.rank_informed, lost)
 }
 
-/// What occurs most often; the smaller one of two.
+/// The most frequent item; the smaller one of equally frequent items.
 fn most_frequent<T: Ord + Clone>(items: impl Iterator<Item = T>) -> Option<T> {
     let mut counts: BTreeMap<T, usize> = BTreeMap::new();
     for item in items {
@@ -68,7 +69,7 @@ fn most_frequent<T: Ord + Clone>(items: impl Iterator<Item = T>) -> Option<T> {
     counts.into_iter().find(|(_, count)| *count == largest).map(|(item, _)| item)
 }
 
-/// The spells of a run in time order.
+/// The intervals of a run in time order.
 pub(super) fn rank_story(run: &RunRecord, rig: &Rig) -> Vec<RankSpell> {
     let ranked: Vec<(i64, &RankReport)> =
         run.steps.iter().filter_map(|step| Some((step.report.stamp_ns, step.rank.as_ref()?))).collect();

@@ -8,12 +8,12 @@ use crate::export::summary::ParameterSummary;
 use crate::geometry::Dimension;
 use crate::log_check::{CheckReport, Severity};
 
-/// Millimetres of a metre, for lengths that are shown.
+/// Millimetres per metre.
 const MM_PER_M: f64 = 1e3;
-/// Milliseconds of a second, for the offsets of clocks.
+/// Milliseconds per second.
 const MS_PER_S: f64 = 1e3;
 
-/// Frames of each run.
+/// Frame counts of each run.
 pub(super) fn frames(content: &ReportContent) -> Markup {
     let rows: Vec<Vec<String>> = content
         .runs
@@ -39,7 +39,7 @@ pub(super) fn frames(content: &ReportContent) -> Markup {
 /// Trajectory errors of each run.
 pub(super) fn accuracy(content: &ReportContent) -> Markup {
     let mut header = ["run", "ATE rmse m", "mean m", "median m", "max m", "% of length"].map(str::to_owned).to_vec();
-    // Every run has relative errors over the same lengths, as long as its path is long enough.
+    // All runs have relative errors over the same lengths, as far as their paths are long enough.
     let mut lengths_m: Vec<f64> = Vec::new();
     for relative in content.runs.iter().filter_map(|run| run.summary.accuracy.as_ref()).flat_map(|found| &found.rpe) {
         if !lengths_m.contains(&relative.delta_m) {
@@ -80,7 +80,7 @@ pub(super) fn accuracy(content: &ReportContent) -> Markup {
     )
 }
 
-/// Calibration of one run: degrees, millimetres, milliseconds.
+/// Calibration of one run in degrees, millimetres and milliseconds.
 pub(super) fn calibration(run: &RunContent) -> Markup {
     let parameters = &run.summary.calibration.parameters;
     let with_ground_truth = parameters.iter().any(|parameter| parameter.ground_truth.is_some());
@@ -113,7 +113,7 @@ fn calibration_row(parameter: &ParameterSummary, with_ground_truth: bool) -> Vec
     row
 }
 
-/// What happened in one run.
+/// Notable events of one run.
 pub(super) fn events(run: &RunContent) -> Markup {
     let rows: Vec<Vec<String>> = run
         .events
@@ -126,7 +126,7 @@ pub(super) fn events(run: &RunContent) -> Markup {
     table(&format!("Events of {}", run.label), &["at s", "event", "why", ""], &rows)
 }
 
-/// What `check` found about the log and its rig, worst first; findings that are in order as a list.
+/// Findings of `check` about the log and its rig, most severe first; findings without a problem as a list.
 pub(super) fn findings(check: &CheckReport) -> Markup {
     let (good, others): (Vec<_>, Vec<_>) = check.findings.iter().partition(|found| found.severity == Severity::Good);
     let rows: Vec<Vec<String>> = others
@@ -150,7 +150,7 @@ pub(super) fn findings(check: &CheckReport) -> Markup {
     }
 }
 
-/// What is in the log.
+/// Topics of the log.
 pub(super) fn topics(check: &CheckReport) -> Markup {
     let rows: Vec<Vec<String>> = check
         .topics
@@ -170,7 +170,7 @@ pub(super) fn topics(check: &CheckReport) -> Markup {
     table("Topics", &["topic", "type", "used as", "messages", "Hz", "s", "late ms"], &rows)
 }
 
-/// What went in.
+/// Input files.
 pub(super) fn inputs(content: &ReportContent) -> Markup {
     let row = |input: &super::InputFile| vec![input.name.clone(), input.bytes.to_string(), input.sha256.clone()];
     let rows: Vec<Vec<String>> = content.inputs.iter().map(row).collect();

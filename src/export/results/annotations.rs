@@ -1,4 +1,4 @@
-//! Tracks and residuals over the image of a step.
+//! Tracks and residuals of a step as annotations of its image.
 
 use std::collections::BTreeMap;
 
@@ -8,9 +8,9 @@ use crate::flight_log::{CircleAnnotation, LinesAnnotation, LogError, LogWriter, 
 use crate::frontend::FeatureId;
 use crate::session::StepRecord;
 
-/// Residuals are drawn so many times longer than they are.
+/// Magnification of the drawn residuals.
 const RESIDUAL_MAGNIFICATION: f64 = 20.0;
-/// Diameter of the keypoint markers in pixels: larger for features in the window, so that color is not the only cue.
+/// Diameter of the keypoint markers in pixels: larger for features in the window, so that colour is not the only cue.
 const SOLVED_PX: f64 = 9.0;
 const TRACKED_PX: f64 = 5.0;
 /// Bluish green, orange, sky blue, vermilion of Okabe and Ito.
@@ -19,10 +19,10 @@ const REJECTED: Rgba = [0.90, 0.62, 0.0, 1.0];
 const TRACKED: Rgba = [0.34, 0.71, 0.91, 1.0];
 const RESIDUAL: Rgba = [0.84, 0.37, 0.0, 1.0];
 
-/// What the solve made of a feature that the image sees.
+/// The result of the solve for a feature of the image.
 struct Solved {
     rejected: bool,
-    /// From the measurement along the magnified residual.
+    /// Line from the measurement along the magnified residual.
     residual_line_px: Option<[Vector2<f64>; 2]>,
 }
 

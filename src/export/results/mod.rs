@@ -1,8 +1,8 @@
-//! A run as an MCAP file that Foxglove, Rerun and RViz open beside the log: poses, the frames of the chain, landmarks,
-//! tracks and residuals over the image, calibration, rank and frame statistics as time series, and events.
+//! A run as an MCAP file for Foxglove, Rerun and RViz beside the log: poses, frames of the chain, landmarks, tracks and
+//! residuals over the image, calibration, rank and frame statistics as time series, and events.
 //!
-//! Topics and frames begin with the run's label, so that the files of several runs can be opened together. Log times are
-//! those of the images, so that they play in step with the log; stamps are the estimator's.
+//! Topics and frames begin with the run's label, so that the files of several runs can be opened together. Log times
+//! are those of the images, so that playback is synchronous with the log; stamps are the estimator's.
 
 mod annotations;
 mod series;
@@ -16,16 +16,16 @@ use crate::gimbal::ClassicalChain;
 use crate::session::{Recording, RunRecord, StepRecord};
 use series::Series;
 
-/// The frame that all runs share: that of the truth where there is one.
+/// The frame common to all runs: that of the ground truth where there is one.
 const WORLD: &str = "world";
-/// How often the path is written, in nanoseconds.
+/// Period of the path messages in nanoseconds.
 const PATH_PERIOD_NS: i64 = 1_000_000_000;
-/// The path is thinned to at most so many poses.
+/// Maximum number of poses of a path message; longer paths are thinned.
 const PATH_POSES: usize = 300;
 
 /// Names of the topics and frames of one run.
 struct Names {
-    /// The label with what ROS allows in a topic.
+    /// The label with the characters that ROS allows in a topic.
     label: String,
 }
 
@@ -33,7 +33,7 @@ impl Names {
     fn new(label: &str) -> Self {
         let allowed = |letter: char| if letter.is_ascii_alphanumeric() { letter } else { '_' };
         let label: String = label.chars().map(allowed).collect();
-        // A topic's name must not begin with a digit.
+        // The name of a topic must not begin with a digit.
         let digit = label.starts_with(|first: char| first.is_ascii_digit());
         Self { label: if digit || label.is_empty() { format!("run_{label}") } else { label } }
     }
@@ -55,7 +55,7 @@ pub fn write_results(recording: &Recording, run: &RunRecord, path: &Path) -> Res
     let mut results = Results {
         log: LogWriter::create(path, &LogWriterOptions::default())?,
         names: Names::new(&run.spec.label),
-        // Without a truth the run's world is the world.
+        // Without ground truth the run's world is the world.
         world_from_run: run.alignment.unwrap_or_else(RigidTransform::identity),
         trajectory: Vec::new(),
         path_due_ns: i64::MIN,
@@ -72,11 +72,11 @@ pub fn write_results(recording: &Recording, run: &RunRecord, path: &Path) -> Res
 struct Results {
     log: LogWriter,
     names: Names,
-    /// Lays the run's world on the truth's.
+    /// Alignment of the run's world with the ground truth's.
     world_from_run: RigidTransform,
     /// Absolute stamps and poses so far.
     trajectory: Vec<(i64, RigidTransform)>,
-    /// Step stamp from which the path is written again.
+    /// Stamp of the next path message.
     path_due_ns: i64,
     series: Series,
     epoch_ns: i64,
@@ -117,7 +117,7 @@ impl Results {
         Ok(())
     }
 
-    /// The frames from the world over the run's world and the IMU along the chain to the camera, and the rigid cameras.
+    /// Frames from the world through the run's world and the IMU along the chain to the camera, and the rigid cameras.
     fn transforms(&self, chain: &ClassicalChain, step: &StepRecord) -> Vec<NamedTransform> {
         let Some(newest) = step.report.newest() else { return Vec::new() };
         let named = |parent: &str, child: &str, pose| NamedTransform {
@@ -170,7 +170,7 @@ impl Results {
     }
 }
 
-/// The number of a feature as a point's field can hold it: four bytes last for four thousand million features.
+/// The id of a feature as a four-byte point field, which is enough for four thousand million features.
 fn short_id(id: FeatureId) -> u32 {
     id.0 as u32
 }

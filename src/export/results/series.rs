@@ -1,4 +1,4 @@
-//! Rows of named numbers over time: calibration with sigmas, joint angles, rank, frame statistics.
+//! Named numbers over time: calibration with σ, joint angles, rank, frame statistics.
 
 use super::Names;
 use crate::flight_log::{LogError, LogWriter, MessageTimes};
@@ -6,9 +6,9 @@ use crate::gimbal::ParameterId;
 use crate::sensors::Rig;
 use crate::session::{RunRecord, StepRecord};
 
-/// What has to be the same in all rows.
+/// The columns that all rows have.
 pub(super) struct Series {
-    /// Parameters of all charts that the run used, with the names of their two fields.
+    /// Parameters of all parameterizations of the run, with the names of their two fields.
     parameters: Vec<(ParameterId, String, String)>,
     joints: Vec<String>,
 }
@@ -41,7 +41,7 @@ impl Series {
         let calibration = &step.report.calibration;
         let mut row: Vec<(&str, f64)> = Vec::new();
         for (parameter, value_field, sigma_field) in &self.parameters {
-            // The parameters of another parameterization have no value now.
+            // Parameters of another parameterization have no value in this step.
             let index = calibration.parameters.iter().position(|known| known == parameter);
             let of = |series: &[f64]| index.and_then(|index| series.get(index)).copied().unwrap_or(f64::NAN);
             row.push((value_field, of(&calibration.values)));

@@ -38,7 +38,7 @@ impl Rig {
             .ok_or_else(|| LogError::NoRig { beside, path: log.path().to_owned() })
     }
 
-    /// The ground-truth rig, found in the same way (`NAME.ground_truth.yaml`, or attached); `None` when there is none.
+    /// The ground-truth rig, found in the same way (`NAME.truth.yaml`, or attached); `None` when there is none.
     pub fn ground_truth_for_log(log: &FlightLog, explicit: Option<&Path>) -> Result<Option<Self>, LogError> {
         let found = find(log, explicit, &log.path().with_extension("truth.yaml"), ".truth.yaml")?;
         Ok(found.map(|(rig, _)| rig))
