@@ -36,7 +36,7 @@ pub(crate) struct CalibrateArguments {
     pub json: bool,
 }
 
-/// `dcvins calibrate`.
+/// Runs `dcvins calibrate`.
 pub(crate) fn calibrate(arguments: &CalibrateArguments) -> Result<()> {
     let request = CalibrationRequest {
         log_path: arguments.log.clone(),

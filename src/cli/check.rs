@@ -25,7 +25,7 @@ pub(crate) struct CheckArguments {
     pub json: bool,
 }
 
-/// `dcvins check`.
+/// Runs `dcvins check`.
 pub(crate) fn check(arguments: &CheckArguments) -> Result<()> {
     let progress = Progress::spinner("reading the log");
     let log = Arc::new(FlightLog::open(&arguments.log)?);

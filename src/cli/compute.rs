@@ -1,4 +1,4 @@
-//! The estimation that `run`, `view`, `screenshot` and `report` share, with its progress bar.
+//! The estimation of `run`, `view`, `screenshot` and `report`, with a progress bar.
 
 use anyhow::{Result, bail};
 use dcvins::geometry::seconds_from_ns;
@@ -7,7 +7,7 @@ use dcvins::session::{self, BreakpointHit, Computation, Recording, SessionPlan};
 
 use crate::cli::terminal::Progress;
 
-/// Runs the estimators of a plan to its end, or to a time of the log.
+/// Runs the estimators of a plan to the end of the log, or to a stamp.
 pub(crate) fn compute(plan: &SessionPlan, until_ns: Option<i64>) -> Result<Computation> {
     let begin_s = plan.start_s;
     let log_end_s = seconds_from_ns(plan.log.duration_ns());

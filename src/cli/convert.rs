@@ -1,4 +1,4 @@
-//! `dcvins convert`: logs of other programs.
+//! `dcvins convert`: conversion of datasets and bags into logs.
 
 use std::path::PathBuf;
 
@@ -21,7 +21,7 @@ pub(crate) struct ConvertArguments {
     pub json: bool,
 }
 
-/// `dcvins convert`.
+/// Runs `dcvins convert`.
 pub(crate) fn convert(arguments: &ConvertArguments) -> Result<()> {
     let progress = Progress::new();
     let report = flight_log::convert::convert(&arguments.source, &arguments.output, &mut |ratio| {

@@ -89,7 +89,7 @@ fn joint_knowledge(text: &str) -> Result<JointKnowledge, String> {
     }
 }
 
-/// Runs the command.
+/// Runs `dcvins degeneracy`.
 pub(crate) fn degeneracy(arguments: &DegeneracyArguments) -> Result<()> {
     if arguments.list {
         return print(&list());
@@ -115,7 +115,7 @@ pub(crate) fn degeneracy(arguments: &DegeneracyArguments) -> Result<()> {
     print_report(&Advised::new(report, &setup, form)?, arguments.json)
 }
 
-/// An experiment with the suggested excitation after it.
+/// The results of an experiment and the excitation suggested for it.
 #[derive(Debug, serde::Serialize)]
 struct Advised {
     experiment: LaboratoryReport,

@@ -1,4 +1,4 @@
-//! `dcvins evaluate`: a trajectory against a reference.
+//! `dcvins evaluate`: errors of a trajectory against a reference.
 
 use std::path::PathBuf;
 
@@ -64,7 +64,7 @@ fn delta(text: &str) -> Result<RelativeDelta, String> {
         .ok_or_else(|| "expected frames as in 5f, or metres as in 10m".to_owned())
 }
 
-/// `dcvins evaluate`.
+/// Runs `dcvins evaluate`.
 pub(crate) fn evaluate(arguments: &EvaluateArguments) -> Result<()> {
     let options = EvaluationOptions {
         alignment: arguments.align.into(),

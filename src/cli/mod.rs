@@ -23,7 +23,7 @@ use clap::Parser as _;
 use arguments::{Arguments, Command};
 use view::ViewArguments;
 
-/// Reads the arguments of the process and does what they ask for.
+/// Parses the arguments of the process and runs the sub-command.
 ///
 /// Wrong arguments end the process with exit code 2; an error of the command is returned.
 pub(crate) fn run() -> anyhow::Result<()> {
@@ -43,7 +43,7 @@ pub(crate) fn run() -> anyhow::Result<()> {
     }
 }
 
-/// The message of an error with those of its causes that it does not quote itself.
+/// The message of an error followed by those of its causes that it does not contain.
 pub(crate) fn message(error: &anyhow::Error) -> String {
     let mut text = error.to_string();
     for cause in error.chain().skip(1).map(ToString::to_string) {

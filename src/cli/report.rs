@@ -29,7 +29,7 @@ pub(crate) struct ReportArguments {
     pub estimation: EstimationArguments,
 }
 
-/// `dcvins report`.
+/// Runs `dcvins report`.
 pub(crate) fn report(arguments: &ReportArguments) -> Result<()> {
     let plan = SessionPlan::open(&arguments.estimation.request(arguments.log.clone()))?;
     #[cfg_attr(not(feature = "gui"), expect(unused_mut, reason = "only figures need steps recomputed"))]
@@ -57,7 +57,7 @@ fn check(plan: &SessionPlan) -> CheckReport {
     log_check::check(&plan.log, Ok(&plan.rig), &rotations)
 }
 
-/// The log, and the rig and the truth where they are files of their own.
+/// Paths of the log, and of the rig and its ground truth where they are separate files.
 fn inputs(arguments: &ReportArguments) -> Vec<PathBuf> {
     let beside = |given: Option<&PathBuf>, extension: &str| {
         let beside = || Some(arguments.log.with_extension(extension)).filter(|path| path.is_file());
@@ -68,7 +68,7 @@ fn inputs(arguments: &ReportArguments) -> Vec<PathBuf> {
     [Some(arguments.log.clone()), rig, ground_truth].into_iter().flatten().collect()
 }
 
-/// The command as it can be typed again; the program by its name alone, wherever it lies.
+/// The command line in a form that can be typed again, with the program's name without its folder.
 fn command_line(mut words: impl Iterator<Item = String>) -> String {
     let program = words.next().unwrap_or_default();
     let program = Path::new(&program).file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -98,7 +98,7 @@ mod figures {
         panel: &'static str,
         size_px: [u32; 2],
         caption: &'static str,
-        /// Plots are drawn as lines and texts, images and the scene as pixels.
+        /// Whether it is drawn as SVG; images and the scene are drawn as pixels.
         plot: bool,
     }
 
@@ -106,20 +106,20 @@ mod figures {
         Shown { panel, size_px, caption, plot }
     }
 
-    /// Panels that show one instant.
-    const INSTANT: [Shown; 3] = [
+    /// Panels that show one stamp.
+    const STAMP_PANELS: [Shown; 3] = [
         shown("image", [1280, 900], "Tracks and residuals in the image", false),
         shown("scene", [1280, 900], "Trajectory, landmarks and the chain", false),
         shown("rank", [1280, 900], "Ranks, singular values and null directions", true),
     ];
-    /// Panels that show the whole flight.
-    const WHOLE: [Shown; 3] = [
+    /// Panels that show the whole log.
+    const LOG_PANELS: [Shown; 3] = [
         shown("convergence", [1680, 1200], "Calibration parameters with ±3σ and ground truth", true),
         shown("residuals", [1280, 800], "Residuals", true),
         shown("timeline", [1680, 480], "Events, ranks, features and gaps", true),
     ];
 
-    /// The figures of a report: the whole flight, then each instant (without one, the end).
+    /// The figures of a report: of the whole log, then of each stamp (without one, of the end).
     pub(super) fn draw(
         arguments: &ReportArguments,
         plan: &SessionPlan,
@@ -128,9 +128,9 @@ mod figures {
         let mut images = ImageReader::new(Arc::clone(&plan.log), &plan.rig);
         let mut figures = Vec::new();
         let end_ns = computation.recording().last_stamp_ns();
-        let instants: Vec<i64> = arguments.at.iter().map(|at_s| ns_from_seconds(*at_s).min(end_ns)).collect();
-        let instants = if instants.is_empty() { vec![end_ns] } else { instants };
-        let count = WHOLE.len() + instants.len() * INSTANT.len();
+        let stamps_ns: Vec<i64> = arguments.at.iter().map(|at_s| ns_from_seconds(*at_s).min(end_ns)).collect();
+        let stamps_ns = if stamps_ns.is_empty() { vec![end_ns] } else { stamps_ns };
+        let count = LOG_PANELS.len() + stamps_ns.len() * STAMP_PANELS.len();
         let progress = Progress::new();
         let mut draw = |heading: &str, panels: &[Shown], cursor_ns| -> Result<()> {
             computation.fill_in(cursor_ns);
@@ -152,9 +152,9 @@ mod figures {
             }
             Ok(())
         };
-        draw("The whole flight", &WHOLE, end_ns)?;
-        for cursor_ns in instants {
-            draw(&format!("At {:.2} s", seconds_from_ns(cursor_ns)), &INSTANT, cursor_ns)?;
+        draw("The whole flight", &LOG_PANELS, end_ns)?;
+        for cursor_ns in stamps_ns {
+            draw(&format!("At {:.2} s", seconds_from_ns(cursor_ns)), &STAMP_PANELS, cursor_ns)?;
         }
         Ok(figures)
     }

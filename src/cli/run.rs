@@ -1,4 +1,4 @@
-//! `dcvins run`: the estimator over a log, without a window.
+//! `dcvins run`: the estimator on a log without a window.
 
 use std::path::PathBuf;
 
@@ -47,7 +47,7 @@ fn condition(text: &str) -> Result<Condition, String> {
     text.parse::<Condition>().map_err(|problem| problem.to_string())
 }
 
-/// `dcvins run`.
+/// Runs `dcvins run`.
 pub(crate) fn run(arguments: &RunArguments) -> Result<()> {
     let plan = SessionPlan::open(&arguments.estimation.request(arguments.log.clone()))?;
     let (recording, hit) = match &arguments.break_at {

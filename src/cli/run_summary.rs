@@ -5,7 +5,7 @@ use std::path::Path;
 use dcvins::export::{self, RunSummary};
 use dcvins::observability::MIN_SPURIOUS_GAIN;
 
-/// A run's summary in a few lines.
+/// The text of a run's summary for the terminal.
 pub(crate) fn describe(folder: &Path, summary: &RunSummary) -> String {
     let frames = &summary.frames;
     let mut lines = vec![format!("{} on {} ({})\n", summary.run, summary.log, summary.camera)];

@@ -1,4 +1,4 @@
-//! `dcvins screenshot`: one panel at one instant, or at several of them.
+//! `dcvins screenshot`: one panel at one or several stamps.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -113,10 +113,10 @@ fn size(text: &str) -> Result<[usize; 2], String> {
     sides(text, 64..=8192).ok_or_else(|| "expected WIDTHxHEIGHT, each from 64 to 8192, as in 1920x1080".to_owned())
 }
 
-/// Most screenshots of one command: more is a mistyped period.
-const MOST_SCREENSHOTS: usize = 100_000;
+/// Maximum number of screenshots of one command; more is probably a mistyped period.
+const MAX_SCREENSHOTS: usize = 100_000;
 
-/// `dcvins screenshot`.
+/// Runs `dcvins screenshot`.
 pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<()> {
     if !PANEL_NAMES.contains(&arguments.panel.as_str()) {
         bail!("no panel is called '{}': expected one of {}", arguments.panel, PANEL_NAMES.join(", "));
@@ -133,20 +133,20 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<()> {
     if arguments.at.iter().any(|at_s| ns_from_seconds(*at_s) > log_end_ns) {
         notify(&format!("dcvins: the log ends at {:.3} s, which is what is drawn", seconds_from_ns(log_end_ns)));
     }
-    let mut instants: Vec<i64> = arguments.at.iter().map(|at_s| ns_from_seconds(*at_s).min(log_end_ns)).collect();
+    let mut stamps_ns: Vec<i64> = arguments.at.iter().map(|at_s| ns_from_seconds(*at_s).min(log_end_ns)).collect();
     if let Some(period_s) = arguments.every {
         let period_ns = ns_from_seconds(period_s).max(1);
         let count = ((end_ns - begin_ns) / period_ns) as usize + 1;
-        if count > MOST_SCREENSHOTS {
+        if count > MAX_SCREENSHOTS {
             bail!(
-                "--every {period_s} asks for {count} screenshots, at most {MOST_SCREENSHOTS} are drawn: give a longer period"
+                "--every {period_s} asks for {count} screenshots, at most {MAX_SCREENSHOTS} are drawn: give a longer period"
             );
         }
-        instants.extend((0..count).map(|number| begin_ns + number as i64 * period_ns));
+        stamps_ns.extend((0..count).map(|number| begin_ns + number as i64 * period_ns));
     }
-    instants.sort_unstable();
-    instants.dedup();
-    let Some(last_ns) = instants.last().copied() else { bail!("no instant is asked for: give --at or --every") };
+    stamps_ns.sort_unstable();
+    stamps_ns.dedup();
+    let Some(last_ns) = stamps_ns.last().copied() else { bail!("no instant is asked for: give --at or --every") };
     let mut computation = shown.compute(last_ns)?;
     let names = computation.recording().rig.parameter_names();
     let slide = match &arguments.slide {
@@ -177,8 +177,8 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<()> {
         layout: Preset::ALL.get(usize::from(arguments.layout) - 1).copied().unwrap_or_default(),
         playback: shown.playback(),
     };
-    let several = instants.len() > 1;
-    for cursor_ns in instants {
+    let several = stamps_ns.len() > 1;
+    for cursor_ns in stamps_ns {
         computation.fill_in(cursor_ns);
         let recording = computation.recording();
         let path = if several { numbered(&arguments.output, cursor_ns) } else { arguments.output.clone() };
@@ -204,7 +204,7 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<()> {
     Ok(())
 }
 
-/// PNG unless something else is asked for, or the file's name says so.
+/// The requested format, else that of the file's extension, else PNG.
 fn format_of(arguments: &ScreenshotArguments) -> Result<FormatArgument> {
     let extension = arguments.output.extension().map(|extension| extension.to_string_lossy().to_lowercase());
     let named = match extension.as_deref() {
@@ -222,7 +222,7 @@ fn format_of(arguments: &ScreenshotArguments) -> Result<FormatArgument> {
     Ok(format)
 }
 
-/// What is drawn: a log that is computed for it, or a saved session with its forks and breakpoints.
+/// The source of a screenshot: a log to be computed, or a saved session with its forks and breakpoints.
 struct Shown {
     source: Source,
     log_end_ns: i64,
@@ -257,7 +257,7 @@ impl Shown {
         Ok(Self { source, log_end_ns, start_s, duration_s })
     }
 
-    /// Everything up to a time; of a saved session, to its end.
+    /// Computes the runs up to a stamp; those of a saved session to their end.
     fn compute(&mut self, until_ns: i64) -> Result<Computation> {
         match &mut self.source {
             Source::Log(plan, _) => compute(plan, Some(until_ns)),

@@ -78,7 +78,7 @@ fn encoder_sigma(text: &str) -> Result<EncoderArgument, String> {
     value.map(EncoderArgument::Sigma).ok_or_else(|| "expected degrees, a number above 0, or none".to_owned())
 }
 
-/// `dcvins simulate`.
+/// Runs `dcvins simulate`.
 pub(crate) fn simulate(arguments: &SimulateArguments) -> Result<()> {
     let experiment = match arguments.experiment {
         ExperimentArgument::T1 => Experiment::T1,

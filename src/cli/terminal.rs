@@ -1,4 +1,4 @@
-//! What the program prints: results on standard output, notices and progress on standard error.
+//! Terminal output: results on standard output, notices and progress on standard error.
 
 use std::fmt::Display;
 use std::io::{self, Write as _};
@@ -8,12 +8,12 @@ use anyhow::{Context as _, Result};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
-/// Steps from the begin to the end of a progress bar.
+/// Number of steps of a progress bar.
 const PROGRESS_STEPS: u64 = 1000;
-/// Time between two frames of the animation of work whose length is unknown.
+/// Period of the animation for work of unknown length.
 const SPINNER_PERIOD: Duration = Duration::from_millis(100);
 
-/// Writes to standard output; a closed pipe is no failure.
+/// Writes to standard output; a closed pipe is no error.
 pub(crate) fn print(text: &str) -> Result<()> {
     let mut stdout = io::stdout().lock();
     match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
@@ -35,15 +35,16 @@ pub(crate) fn print_report<T: Serialize + Display>(report: &T, json: bool) -> Re
 /// Writes a line to standard error.
 #[cfg(feature = "gui")]
 pub(crate) fn notify(text: &str) {
-    // A closed standard error loses the notice and nothing else.
+    // A closed standard error loses only the notice.
     drop(writeln!(io::stderr(), "{text}"));
 }
 
-/// Progress on standard error while it lives; nothing where standard error is not a terminal.
+/// A progress display on standard error, removed when it is dropped; nothing is shown if standard error is not a
+/// terminal.
 pub(crate) struct Progress(ProgressBar);
 
 impl Progress {
-    /// A bar for work that reports how much of it is done.
+    /// A bar for work with known progress.
     pub(crate) fn new() -> Self {
         let style = ProgressStyle::with_template("{bar:32} {percent:>3} % {msg}").expect("the template is valid");
         Self(ProgressBar::new(PROGRESS_STEPS).with_style(style.progress_chars("█░")))
@@ -56,7 +57,7 @@ impl Progress {
         Self(spinner)
     }
 
-    /// Draws the bar at a ratio from 0 to 1, with a text behind it.
+    /// Shows a ratio from 0 to 1 and a text.
     pub(crate) fn show(&self, ratio: f64, text: impl FnOnce() -> String) {
         if !self.0.is_hidden() {
             self.0.set_message(text());

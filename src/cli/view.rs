@@ -21,7 +21,7 @@ pub(crate) struct ViewArguments {
 #[cfg(feature = "gui")]
 pub(crate) use window::view;
 
-/// `dcvins view` of a program that was built without the window.
+/// `dcvins view` in a build without the window.
 #[cfg(not(feature = "gui"))]
 pub(crate) fn view(_arguments: &ViewArguments) -> anyhow::Result<()> {
     anyhow::bail!("this program was built without the window (cargo feature 'gui'); 'dcvins run LOG --out DIR' works")
@@ -61,7 +61,7 @@ mod window {
         let estimation = arguments.estimation.clone();
         let open_log = move |path: &Path| {
             let mut opened = opened.lock();
-            // The log of the command line is open already; whatever comes later is opened here.
+            // The log of the command line is open already; other logs are opened here.
             let session = match opened.take().filter(|plan| plan.log_path == path) {
                 Some(plan) => Session::start(plan),
                 None if is_session(path) => {

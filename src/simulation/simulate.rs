@@ -35,7 +35,7 @@ const PLANNED_M_PER_S: f64 = 2.5;
 /// Delay from measurement to recording: IMU, encoders, first camera, and each further camera.
 const DELAYS_S: [f64; 4] = [0.0004, 0.0007, 0.018, 0.0015];
 
-/// Simulates an experiment and writes `output` (an MCAP log) with `.rig.yaml` and `.ground_truth.yaml` beside it.
+/// Simulates an experiment and writes `output` (an MCAP log) with `.rig.yaml` and `.truth.yaml` beside it.
 ///
 /// The same options and file name give the same bytes whatever the thread count. `progress` is called as images are
 /// done.
