@@ -10,20 +10,21 @@ use super::window::sliding_window::{SlidingWindow, WindowFailure};
 use crate::geometry::RigidTransform;
 use crate::gimbal::ClassicalChain;
 
-/// A sliding-window visual-inertial estimator for a camera on a gimbal, or on a rigid mount, and for rigid cameras beside it.
+/// A sliding-window visual-inertial estimator for a camera on a gimbal or a rigid camera, and for further rigid
+/// cameras.
 ///
-/// It is a plain value: a clone is a snapshot from which the same steps give the same bits.
+/// It is a plain value: a clone is a snapshot, and the same steps from it give the same bits.
 #[derive(Clone, Debug)]
 pub struct Estimator {
     pub(super) setup: Setup,
     pub(super) phase: PhaseState,
-    /// How often the window has failed.
+    /// Number of failures of the window.
     pub(super) restarts: usize,
-    /// The last pose before the last failure.
+    /// Last pose before the last failure.
     resume_at: Option<RigidTransform>,
 }
 
-/// What there is in each [`Phase`].
+/// Data of each [`Phase`].
 #[derive(Clone, Debug)]
 pub(super) enum PhaseState {
     /// No window yet.
@@ -33,14 +34,14 @@ pub(super) enum PhaseState {
 }
 
 impl Estimator {
-    /// An estimator that waits for its first images.
+    /// Returns an estimator without images.
     pub fn new(config: EstimatorConfig) -> Self {
         let setup = Setup::new(config);
         let phase = PhaseState::Initializing(Initializer::new(setup.given_calibration(), None));
         Self { setup, phase, restarts: 0, resume_at: None }
     }
 
-    /// The configuration it was made from, with what was changed since.
+    /// Configuration with the changes since its creation.
     pub fn config(&self) -> &EstimatorConfig {
         &self.setup.config
     }
@@ -53,28 +54,29 @@ impl Estimator {
         }
     }
 
-    /// Asks for [`StepReport::linearization`] from the next step on, or no longer.
+    /// Requests [`StepReport::linearization`] from the next step on, or cancels the request.
     pub fn set_keep_linearization(&mut self, keep: bool) {
         self.setup.config.options.keep_linearization = keep;
     }
 
-    /// Asks for the linearization with [`StepReport::factor_rows`] from the next step on.
+    /// Requests the linearization with [`StepReport::factor_rows`] from the next step on.
     pub fn set_keep_factor_rows(&mut self) {
         self.setup.config.options.keep_linearization = true;
         self.setup.config.options.keep_factor_rows = true;
     }
 
-    /// Most iterations of the solver from the next image on: with fewer than a step took, that step ends as it was in between.
+    /// Limits the solver's iterations from the next image on; with fewer than a step took, that step stops in
+    /// between.
     pub fn set_iterations(&mut self, iterations: usize) {
         self.setup.config.options.iterations = iterations;
     }
 
-    /// The chain as it is estimated now, in the classical parameterization.
+    /// Estimated chain in the classical form.
     pub fn classical_chain(&self) -> ClassicalChain {
         self.calibration().of(MAIN).chain().to_classical()
     }
 
-    /// Takes in one image's tracks with the IMU samples before it, and reports what came of it.
+    /// Processes the tracks of one image with the IMU samples before it and returns the report of the step.
     pub fn step(&mut self, input: &StepInput<'_>) -> StepReport {
         let begin_ms = self.setup.clock_ms();
         let mut report = match &mut self.phase {
@@ -92,8 +94,8 @@ impl Estimator {
         report
     }
 
-    /// How much memory a snapshot of it takes, in bytes: frames with their IMU samples, features, the prior and the frames
-    /// that wait; what is the same in every snapshot counts with its own size.
+    /// Memory of a snapshot in bytes: frames with their IMU samples, features, prior and waiting frames; data
+    /// shared by all snapshots counts with its inline size.
     pub fn bytes(&self) -> usize {
         size_of::<Self>()
             + match &self.phase {
@@ -116,7 +118,7 @@ impl Estimator {
         }
     }
 
-    /// Discards the window and initializes anew, this image being the first; fixed parameters stay fixed.
+    /// Discards the window and re-initializes from this image on; fixed parameters stay fixed.
     fn restart(&mut self, input: &StepInput<'_>, failure: WindowFailure) -> StepReport {
         self.resume_at = failure.last_pose.or(self.resume_at);
         self.restarts += 1;
@@ -128,7 +130,7 @@ impl Estimator {
         self.after(step)
     }
 
-    /// A window that was initialized takes the initializer's place.
+    /// Replaces the initializer by its window.
     fn after(&mut self, step: InitializationStep) -> StepReport {
         match step {
             InitializationStep::Waiting(report) => report,

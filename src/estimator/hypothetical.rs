@@ -1,5 +1,5 @@
-//! Hypothetical windows: states and landmarks with exact measurements, linearized by the estimator's own factors, to predict
-//! the information of a motion before it is flown.
+//! Hypothetical windows: states and landmarks with exact measurements, linearized by the estimator's own
+//! factors, to predict the information of a motion.
 
 use std::sync::Arc;
 
@@ -21,41 +21,41 @@ use crate::gimbal::{ClassicalChain, Parameterization};
 use crate::optimization::{Landmark, LandmarkModel, RelativePose, RobustLoss};
 use crate::sensors::{ImuNoise, ImuSample, JointAngles};
 
-/// What is known of the poses of a hypothetical window.
+/// Knowledge of the poses in a hypothetical window.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PoseKnowledge {
-    /// Everything.
+    /// Poses are known.
     Known,
-    /// What the IMU measures, its biases being known or not.
+    /// IMU measurements, with known or unknown biases.
     Imu {
-        /// Noise of the sensor.
+        /// Noise densities of the IMU.
         noise: ImuNoise,
         /// Whether the biases are known.
         biases_known: bool,
     },
 }
 
-/// What is known of the joint angles of a hypothetical window.
+/// Knowledge of the joint angles in a hypothetical window.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum JointKnowledge {
-    /// Everything.
+    /// Joint angles are known.
     Known,
-    /// A reading per frame and joint with white noise of this standard deviation, in radians.
+    /// One reading per frame and joint with white noise of this standard deviation, in radians.
     Encoder(f64),
-    /// Nothing.
+    /// Joint angles are unknown.
     Unknown,
 }
 
 /// One frame of a hypothetical window.
 #[derive(Clone, Debug)]
 pub struct HypotheticalFrame {
-    /// When, in seconds.
+    /// Time of the frame, in seconds.
     pub time_s: f64,
     /// Pose, velocity and biases.
     pub navigation: NavigationState,
     /// Joint angles without the static offsets.
     pub joints_rad: Vec<f64>,
-    /// IMU samples since the frame before it, both ends included; not needed where the poses are known.
+    /// IMU samples since the previous frame, both ends included; unused with known poses.
     pub imu: Vec<ImuSample>,
 }
 
@@ -66,39 +66,39 @@ pub struct HypotheticalLandmark {
     pub anchor: usize,
     /// Direction in the anchor's camera, of any length.
     pub bearing: Vector3<f64>,
-    /// One over the distance from the anchor's camera, in 1/m.
+    /// Inverse distance from the anchor's camera, in 1/m.
     pub inverse_distance_per_m: f64,
-    /// Slots of the other frames that see it.
+    /// Slots of the other observing frames.
     pub observers: Vec<usize>,
 }
 
 /// A window of hypothetical states with exact measurements.
 #[derive(Clone, Debug)]
 pub struct HypotheticalWindow {
-    /// The camera.
+    /// Model of the camera.
     pub camera: CameraModel,
-    /// Oldest first.
+    /// Frames, oldest first.
     pub frames: Vec<HypotheticalFrame>,
-    /// What is seen.
+    /// Landmarks with their observing frames.
     pub landmarks: Vec<HypotheticalLandmark>,
-    /// What is known of the poses.
+    /// Knowledge of the poses.
     pub poses: PoseKnowledge,
-    /// What is known of the joint angles.
+    /// Knowledge of the joint angles.
     pub joints: JointKnowledge,
     /// Standard deviation of a pixel.
     pub pixel_sigma_px: f64,
-    /// Unknowns of a landmark.
+    /// Parameterization of the landmarks.
     pub landmark_model: LandmarkModel,
     /// Gravity in the world, in m/s².
     pub gravity_in_world: Vector3<f64>,
-    /// Standard deviations of the chain's numbers in the rows of the priors, in metres and radians.
+    /// Prior standard deviations of the chain's parameters, in metres and radians.
     pub chain_prior: (f64, f64),
 }
 
 impl HypotheticalWindow {
-    /// The linearization with the mount in one form, with or without its joint offsets as columns.
+    /// Linearizes the window with the chain in one parameterization, with or without its joint offsets as columns.
     ///
-    /// What is known has no columns. The rows of the priors are those of the rig's prior alone.
+    /// Known quantities have no columns. The rows of the priors are those of the rig's prior alone.
     pub fn linearize(
         &self,
         chain: &ClassicalChain,
@@ -177,7 +177,7 @@ impl HypotheticalWindow {
         }
     }
 
-    /// The landmarks with their exact pixels; those that cannot be projected somewhere are not seen there.
+    /// Landmarks with exact pixels; where they do not project they are not observed.
     fn tracks(&self, states: &[FrameState], calibration: &Calibration) -> (Vec<Track>, Vec<Landmark>) {
         let cameras = camera_pose::by_slot(states, calibration);
         let mut tracks = Vec::with_capacity(self.landmarks.len());
@@ -204,7 +204,7 @@ impl HypotheticalWindow {
     }
 }
 
-/// For intervals of which nothing is measured.
+/// Noise of intervals without measurements.
 const NO_NOISE: ImuNoise = ImuNoise {
     accelerometer_noise_density: 0.0,
     accelerometer_random_walk: 0.0,
@@ -212,7 +212,7 @@ const NO_NOISE: ImuNoise = ImuNoise {
     gyroscope_random_walk: 0.0,
 };
 
-/// The linearization with only the first columns of each block, as many as `count` says for its group.
+/// Linearization with the first columns of each block only, as many as `count` returns for its group.
 fn keeping(whole: &Linearization, count: impl Fn(ColumnGroup) -> usize) -> Linearization {
     let mut kept = Vec::new();
     let mut columns = Vec::new();

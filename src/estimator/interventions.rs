@@ -1,4 +1,4 @@
-//! Changes to an estimator between two images, for trying another way from the same instant.
+//! Changes to an estimator between two images.
 
 use nalgebra::DVector;
 use thiserror::Error;
@@ -8,7 +8,7 @@ use crate::estimator::state::calibrations::MAIN;
 use crate::frontend::FeatureId;
 use crate::gimbal::{ParameterId, Parameterization};
 
-/// Why an estimator cannot be changed as asked.
+/// Why a change is refused.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum InterventionError {
     /// No such parameter.
@@ -20,8 +20,8 @@ pub enum InterventionError {
 }
 
 impl Estimator {
-    /// Switches the parameterization of the chain: the calibration stays what it is, and so does everything that is known
-    /// about it, as far as the new columns can express it.
+    /// Switches the parameterization of the chain: the calibration stays, and so does its prior, as far as the new
+    /// columns can represent it.
     pub fn use_parameterization(&mut self, parameterization: Parameterization, auto_parameterize: bool) {
         self.setup.config.auto_parameterize = auto_parameterize;
         self.setup.config.parameterization = parameterization;
@@ -50,7 +50,7 @@ impl Estimator {
         Ok(())
     }
 
-    /// Sets a parameter to another value; window and priors stay as they are, and pull it back.
+    /// Sets a parameter to another value; window and priors stay and pull it back.
     pub fn set_value(&mut self, parameter: ParameterId, value: f64) -> Result<(), InterventionError> {
         let (camera, index) = self.free_column(parameter)?;
         let calibration = self.calibration_mut();
@@ -61,17 +61,17 @@ impl Estimator {
         Ok(())
     }
 
-    /// Multiplies the IMU noise densities of all intervals to come.
+    /// Scales the IMU noise densities of all following intervals.
     pub fn scale_imu_noise(&mut self, factor: f64) {
         self.setup.scale_imu_noise(factor);
     }
 
-    /// Multiplies the standard deviation of a tracked pixel from the next solve on.
+    /// Scales the pixel standard deviation from the next solve on.
     pub fn scale_pixel_noise(&mut self, factor: f64) {
         self.setup.config.options.pixel_sigma_px *= factor;
     }
 
-    /// Drops features of a camera; what went into the marginalization prior because of them stays.
+    /// Drops features of a camera; their information in the marginalization prior stays.
     pub fn drop_features(&mut self, camera: usize, dropped: impl Fn(FeatureId) -> bool) {
         match &mut self.phase {
             PhaseState::Initializing(initializer) => initializer.drop_features(camera, &dropped),
@@ -83,7 +83,7 @@ impl Estimator {
         }
     }
 
-    /// The camera and the number within it of a parameter that is estimated.
+    /// Camera and column of an estimated parameter.
     fn free_column(&self, parameter: ParameterId) -> Result<(usize, usize), InterventionError> {
         let known = self.calibration().parameters();
         let Some(mut index) = known.iter().position(|known| *known == parameter) else {

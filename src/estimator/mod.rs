@@ -1,6 +1,6 @@
 //! The sliding-window estimator: state (Eq. 7), residuals (Eqs. 8–10), solver, marginalization.
 //!
-//! It takes a [`StepInput`] per image and leaves a [`StepReport`] behind; nobody reaches in between.
+//! It processes a [`StepInput`] per image and returns a [`StepReport`].
 
 mod config;
 #[expect(clippy::module_inception, reason = "the type that the folder is about")]

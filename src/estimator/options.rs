@@ -1,54 +1,54 @@
-//! What can be tuned in the estimator, with its defaults.
+//! Options of the estimator with their defaults.
 
 use nalgebra::Vector3;
 
 use crate::estimator::state::navigation::ImuBias;
 use crate::optimization::{LandmarkModel, RobustLoss};
 
-/// What becomes of a feature whose anchor leaves the window while it is still being tracked.
+/// Treatment of a tracked feature whose anchor leaves the window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TrackContinuation {
-    /// Its measurements go into the marginalization prior and stay in the window as well, as in VINS-Fusion: they count
-    /// twice, which stiffens the window and asks for a pixel sigma that is too large.
+    /// Its observations go into the marginalization prior and stay in the window, as in VINS-Fusion: they count
+    /// twice, which makes the window too confident and requires a larger pixel sigma.
     Reuse,
-    /// Every measurement is used once, as in Basalt: those that went into the prior leave the window, and the feature begins
-    /// anew with the images to come.
+    /// Every observation is used once, as in Basalt: those in the prior leave the window, and the feature restarts
+    /// with the next images.
     UseOnce,
-    /// The anchor's measurement is dropped and the others stay.
+    /// The anchor's observation is dropped, the others stay.
     DropAnchor,
 }
 
-/// Tunables of the estimator.
+/// Options of the estimator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EstimatorOptions {
     /// Number of keyframes in the window beside the newest frame.
     pub window: usize,
-    /// The first window grows to this many times `window` before anything is marginalized.
+    /// Size of the first window before marginalization starts, as a multiple of `window`.
     pub first_window_factor: usize,
-    /// Standard deviation of a well tracked pixel, per coordinate. Tracks differ: most are better than this, some are off by
-    /// a pixel, and what those count for is up to `loss`.
+    /// Standard deviation of a well tracked pixel, per coordinate. Most tracks are better, some have errors of a
+    /// pixel; `loss` limits their weight.
     pub pixel_sigma_px: f64,
-    /// Loss on the visual residuals.
+    /// Robust loss of the visual residuals.
     pub loss: RobustLoss,
-    /// Unknowns of a feature.
+    /// Parameterization of the landmarks.
     pub landmark_model: LandmarkModel,
-    /// What happens to tracks whose anchor leaves.
+    /// Treatment of tracks whose anchor leaves the window.
     pub track_continuation: TrackContinuation,
-    /// Most iterations of a solve.
+    /// Largest number of iterations of a solve.
     pub iterations: usize,
-    /// A solve ends when the cost falls by less than this share.
+    /// Converged when a step lowers the cost by less than this fraction.
     pub relative_cost_tolerance: f64,
-    /// A feature takes part from this many observations on.
+    /// Smallest number of observations of a feature in the solve.
     pub min_observations: usize,
-    /// Rays of a feature must open this far before it is triangulated, in radians.
+    /// Smallest parallax for triangulation, in radians.
     pub min_triangulation_angle_rad: f64,
-    /// Nearest and farthest distance at which a triangulated feature is believed, in metres.
+    /// Smallest and largest distance of a triangulated feature, in metres.
     pub distance_range_m: (f64, f64),
     /// Rotation-compensated mean parallax against the last keyframe that makes a keyframe, in radians.
     pub keyframe_parallax_rad: f64,
     /// Fewer features in common with the last keyframe than this make a keyframe.
     pub keyframe_min_tracked: usize,
-    /// A larger share of features new since the last keyframe makes a keyframe.
+    /// A larger ratio of new features since the last keyframe makes a keyframe.
     pub keyframe_new_ratio: f64,
     /// Features whose mean reprojection error exceeds this are rejected, in pixels.
     pub outlier_px: f64,
@@ -59,15 +59,15 @@ pub struct EstimatorOptions {
     /// chain that is degrees off, pulls the solution to a wrong place instead: a hundredth of a radian makes a derivative
     /// wrong by a percent.
     pub first_estimate_reach_rad: f64,
-    /// Jacobians of the static calibration's columns are evaluated where the prior was linearized, however far.
+    /// Jacobians of the static calibration are always evaluated at the linearization point of the prior.
     pub calibration_first_estimates: bool,
-    /// Standard deviation of the accelerometer's bias at the start, in m/s².
+    /// Initial standard deviation of the accelerometer's bias, in m/s².
     pub accelerometer_bias_sigma: f64,
-    /// Standard deviation of the gyroscope's bias at the start, in rad/s.
+    /// Initial standard deviation of the gyroscope's bias, in rad/s.
     pub gyroscope_bias_sigma: f64,
-    /// The IMU noise densities of the rig are multiplied by this.
+    /// Factor on the rig's IMU noise densities.
     pub imu_noise_factor: f64,
-    /// Change of the biases at which an interval is integrated again.
+    /// Change of the biases at which an interval is reintegrated.
     pub reintegration_change: ImuBias,
     /// Failure: norm of the accelerometer's bias, in m/s².
     pub max_accelerometer_bias: f64,
@@ -77,14 +77,14 @@ pub struct EstimatorOptions {
     pub max_velocity_m_per_s: f64,
     /// Failure: correction of the newest position against its prediction, in metres.
     pub max_position_correction_m: f64,
-    /// Failure: fewer than `min_landmarks` landmarks in view for so long, in seconds. Until then the IMU carries
-    /// the window on, which costs less than to restart.
+    /// Failure: fewer than `min_landmarks` observed landmarks for this time, in seconds. Until then IMU-only
+    /// propagation continues the window, which is better than a restart.
     pub max_blind_s: f64,
-    /// Fewer landmarks in view than this count as blind.
+    /// Fewer observed landmarks than this count as none.
     pub min_landmarks: usize,
-    /// Fill [`super::StepReport::linearization`].
+    /// Whether to fill [`super::StepReport::linearization`].
     pub keep_linearization: bool,
-    /// Keep the rows of the factors that are not of features in every report, too: [`super::StepReport::factor_rows`].
+    /// Whether every report keeps the rows of factors without a feature: [`super::StepReport::factor_rows`].
     pub keep_factor_rows: bool,
 }
 

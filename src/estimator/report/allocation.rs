@@ -1,6 +1,6 @@
-//! What an allocation costs.
+//! Memory of an allocation.
 
-/// What the allocator sets aside for so many bytes: 8 of its own, in steps of 16, at least 32 (glibc's rule on 64 bits).
+/// Bytes that the allocator reserves: 8 of its own, in steps of 16, at least 32 (glibc on 64 bits).
 pub fn allocated_bytes(bytes: usize) -> usize {
     if bytes == 0 { 0 } else { (bytes + 8).next_multiple_of(16).max(32) }
 }

@@ -1,4 +1,4 @@
-//! What the columns of a Jacobian stand for.
+//! Columns of a Jacobian.
 
 use std::fmt;
 
@@ -15,7 +15,7 @@ impl fmt::Display for FrameId {
     }
 }
 
-/// Unknowns that belong together.
+/// A block of unknowns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum ColumnId {
     /// A parameter of the static calibration, one column.
@@ -26,11 +26,11 @@ pub enum ColumnId {
     Pose(FrameId),
     /// Velocity, gyroscope and accelerometer bias of a frame, nine columns.
     VelocityBias(FrameId),
-    /// Inverse depth of the feature that a row belongs to, one column.
+    /// Inverse depth of the row's feature, one column.
     InverseDepth,
 }
 
-/// What a block of columns stands for, whichever frame or parameter it is of.
+/// Kind of a block of columns, independent of frame and parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum ColumnGroup {
     /// Static calibration.
@@ -46,7 +46,7 @@ pub enum ColumnGroup {
 }
 
 impl ColumnId {
-    /// The group that it belongs to.
+    /// Kind of the block.
     pub const fn group(self) -> ColumnGroup {
         match self {
             Self::Calibration(_) => ColumnGroup::Calibration,
@@ -57,7 +57,7 @@ impl ColumnId {
         }
     }
 
-    /// The calibration parameter that it is.
+    /// Its calibration parameter, if it is one.
     pub const fn parameter(self) -> Option<ParameterId> {
         match self {
             Self::Calibration(parameter) => Some(parameter),
@@ -65,9 +65,8 @@ impl ColumnId {
         }
     }
 
-    /// What 1 means in one of its columns, counted by `place` within the block, so that columns compare: the scale of the
-    /// dimension ([`Dimension::scale`]) of angles, lengths and clocks and the ratio of the inverse depth, 0.1 m/s, 1 °/s
-    /// and 0.1 m/s².
+    /// Unit of the column `place` within the block, so that columns are comparable: [`Dimension::scale`] for
+    /// angles, lengths, time offsets and the ratio of the inverse depth, 0.1 m/s, 1 °/s and 0.1 m/s².
     pub const fn scale(self, place: usize) -> f64 {
         const VELOCITY_M_PER_S: f64 = 0.1;
         const GYROSCOPE_BIAS_RAD_PER_S: f64 = std::f64::consts::PI / 180.0;
@@ -84,10 +83,10 @@ impl ColumnId {
     }
 }
 
-/// A run of columns that belong together.
+/// Consecutive columns of one block of unknowns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ColumnBlock {
-    /// What they stand for.
+    /// Unknowns of the block.
     pub id: ColumnId,
     /// First column.
     pub start: usize,
@@ -95,7 +94,7 @@ pub struct ColumnBlock {
     pub len: usize,
 }
 
-/// The scales of all columns of some blocks.
+/// Units of all columns of some blocks.
 pub(crate) fn scales_of(columns: &[ColumnBlock]) -> Vec<f64> {
     columns.iter().flat_map(|block| (0..block.len).map(move |place| block.id.scale(place))).collect()
 }

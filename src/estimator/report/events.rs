@@ -1,15 +1,15 @@
-//! What happened in a step: events with the value and the threshold that decided.
+//! Events of a step, with the deciding value and threshold.
 
-/// What kind of event a step reports.
+/// Kind of an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum EventKind {
-    /// An attempt to initialize that has to wait; the message says for what.
+    /// The initialization waits; the message has the reason.
     InitializationWaits,
     /// The window was initialized from motion.
     InitializedFromMotion,
-    /// The window was initialized from standstill.
+    /// The window was initialized from a stationary vehicle.
     InitializedFromStationary,
-    /// The frame became a keyframe (or did not); the value is the deciding figure.
+    /// The frame became a keyframe or not, with the deciding value.
     KeyframeChosen,
     /// The oldest frame was marginalized.
     OldestMarginalized,
@@ -21,7 +21,7 @@ pub enum EventKind {
     OutliersRejected,
     /// The vehicle is stationary.
     Stationary,
-    /// The estimator failed and starts again.
+    /// The estimator failed and restarts.
     Failure,
     /// The parameterization was switched near a singularity.
     ParameterizationSwitched,
@@ -30,13 +30,13 @@ pub enum EventKind {
 }
 
 impl EventKind {
-    /// Whether the step made the first window.
+    /// Whether the step initialized the window.
     pub fn initializes_window(self) -> bool {
         matches!(self, Self::InitializedFromMotion | Self::InitializedFromStationary)
     }
 
-    /// Whether it is rare enough to jump to, and for the lane of events; nearly every frame has one of the others, which
-    /// have lanes of their own or none.
+    /// Whether the event is rare enough for the event lane; nearly every frame has one of the others, which have
+    /// lanes of their own or none.
     pub fn is_notable(self) -> bool {
         match self {
             Self::InitializedFromMotion
@@ -54,26 +54,26 @@ impl EventKind {
     }
 }
 
-/// Something that happened in a step, with the figure that decided it.
+/// An event of a step with its deciding value.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Event {
-    /// What kind.
+    /// Kind of the event.
     pub kind: EventKind,
-    /// Why, in one sentence, with units.
+    /// Reason in one sentence, with units.
     pub message: String,
-    /// The measured value, when one decided.
+    /// Measured value, if one decided.
     pub value: Option<f64>,
-    /// The threshold that it was compared with.
+    /// Threshold of the value.
     pub threshold: Option<f64>,
 }
 
 impl Event {
-    /// An event that no value decided.
+    /// Returns an event without a value.
     pub(crate) fn new(kind: EventKind, message: impl Into<String>) -> Self {
         Self { kind, message: message.into(), value: None, threshold: None }
     }
 
-    /// An event with the value that decided it and the threshold of that.
+    /// Returns an event with the deciding value and its threshold.
     pub(crate) fn decided(kind: EventKind, message: impl Into<String>, value: f64, threshold: f64) -> Self {
         Self { kind, message: message.into(), value: Some(value), threshold: Some(threshold) }
     }

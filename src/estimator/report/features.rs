@@ -1,11 +1,11 @@
-//! The features of the window after a step: observations with residuals, counts, points in the world.
+//! Features of the window after a step: observations with residuals, counts, points in the world.
 
 use nalgebra::{Vector2, Vector3};
 
 use super::observations::Observations;
 use crate::frontend::FeatureId;
 
-/// One measurement of a feature by a frame of the window.
+/// An observation of a feature by a frame of the window.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ObservationReport {
     /// Number of the observing image in its stream.
@@ -18,16 +18,16 @@ pub struct ObservationReport {
     pub residual_after_px: Option<Vector2<f64>>,
     /// Squared whitened residual after the solve.
     pub chi2: f64,
-    /// Weight that the robust loss left it, 0 to 1.
+    /// Robust weight, 0 to 1.
     pub robust_weight: f64,
 }
 
-/// One feature that took part in the solve.
+/// A feature of the solve.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FeatureReport {
-    /// Who it is; [`FeatureId::camera`] is the number of the camera that observes it.
+    /// Identity; [`FeatureId::camera`] is the number of its camera.
     pub id: FeatureId,
-    /// The frame it is anchored in.
+    /// Anchor frame.
     pub anchor_frame_index: usize,
     /// Inverse depth along the anchor's optical axis, in 1/m.
     pub inverse_depth_per_m: f64,
@@ -37,19 +37,19 @@ pub struct FeatureReport {
     pub rejected: bool,
 }
 
-/// How many features took part in the solve; known of every step, also where the features themselves are not kept.
+/// Numbers of features in the solve, also of steps without stored features.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FeatureCounts {
-    /// Features that took part.
+    /// Features in the solve.
     pub solved: usize,
-    /// Of them rejected as outliers after the solve.
+    /// Features rejected as outliers after the solve.
     pub rejected: usize,
-    /// All their observations in the window.
+    /// Observations of all features in the window.
     pub observations: usize,
 }
 
 impl FeatureCounts {
-    /// Of the features of a report.
+    /// Counts the features of a report.
     pub fn of(features: &[FeatureReport]) -> Self {
         Self {
             solved: features.len(),
@@ -58,7 +58,7 @@ impl FeatureCounts {
         }
     }
 
-    /// Features that took part and were not rejected.
+    /// Features that were not rejected.
     pub fn inliers(&self) -> usize {
         self.solved - self.rejected
     }
@@ -67,8 +67,8 @@ impl FeatureCounts {
 /// A feature as a point of the world, for drawing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LandmarkReport {
-    /// Who it is.
+    /// Identity of the feature.
     pub id: FeatureId,
-    /// Where, in the world.
+    /// Position in the world, in metres.
     pub position_m: Vector3<f64>,
 }

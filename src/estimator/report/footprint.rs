@@ -1,4 +1,4 @@
-//! How much memory a report takes.
+//! Memory of a report.
 
 use super::allocation::allocated_bytes;
 use super::information_gain::InformationGain;
@@ -20,14 +20,14 @@ pub struct ReportBytes {
     pub landmarks: usize,
     /// The linearization, where it was kept.
     pub linearization: usize,
-    /// What the blocks of the Jacobian are written out from.
+    /// Source of the Jacobian.
     pub jacobian: usize,
     /// The report itself, events, residuals, iterations and warnings.
     pub other: usize,
 }
 
 impl ReportBytes {
-    /// All parts together.
+    /// Sum of all fields.
     pub fn total(&self) -> usize {
         self.window
             + self.calibration
@@ -49,7 +49,7 @@ fn of_text(text: &String) -> usize {
 }
 
 impl StepReport {
-    /// How much memory it takes.
+    /// Memory of the report in bytes.
     pub fn bytes(&self) -> ReportBytes {
         let messages = self.events.iter().map(|event| of_text(&event.message)).sum::<usize>()
             + self.warnings.iter().map(of_text).sum::<usize>();

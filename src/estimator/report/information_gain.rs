@@ -1,8 +1,8 @@
-//! Information gain of the newest image about the calibration, and the motion that it comes from.
+//! Information gain of the newest image about the calibration, and its attribution to motions.
 
 use super::allocation::allocated_bytes;
 
-/// Something that moves: the body along or about an axis of the IMU, or a joint.
+/// A motion: of the body along or about an axis of the IMU, or of a joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Motion {
     /// A translation along an axis of the IMU, 0 to 2.
@@ -14,12 +14,12 @@ pub enum Motion {
 }
 
 impl Motion {
-    /// All motions of a body with so many joints, in the order of the tables.
+    /// All motions of a body with this number of joints, in table order.
     pub fn all(joints: usize) -> impl Iterator<Item = Self> {
         (0..3).map(Self::Translation).chain((0..3).map(Self::Rotation)).chain((0..joints).map(Self::Joint))
     }
 
-    /// What it is called; joints by their names, where these are known.
+    /// Name of the motion; joints by their names, if known.
     pub fn name(self, joint_names: &[String]) -> String {
         let axis = |axis: usize, names: [&str; 3]| names.get(axis).copied().unwrap_or("?").to_owned();
         match self {
@@ -30,21 +30,22 @@ impl Motion {
     }
 }
 
-/// Information gain of the newest image about each parameter, and the motion of the window that it comes from.
+/// Information gain of the newest image about each parameter, and its attribution to the motions of the window.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InformationGain {
-    /// Time since the image before, in seconds.
+    /// Time since the previous image, in seconds.
     pub interval_s: f64,
     /// Number of joints.
     pub joints: usize,
-    /// By free calibration column: `log₂` of the standard deviation without the image over that with it.
+    /// Gain per free calibration column: `log₂` of the ratio of the standard deviations without and with the image.
     bits: Box<[f32]>,
-    /// Of these, by column: the part of each motion in the order of [`Motion::all`].
+    /// Contribution of each motion per column, in the order of [`Motion::all`].
     by_motion: Box<[f32]>,
 }
 
 impl InformationGain {
-    /// From the bits by free calibration column, and those of each motion by column in the order of [`Motion::all`].
+    /// From the gain per free calibration column and the contribution of each motion, in the order of
+    /// [`Motion::all`].
     pub(crate) fn new(interval_s: f64, joints: usize, bits: Vec<f32>, by_motion: Vec<f32>) -> Self {
         Self { interval_s, joints, bits: bits.into(), by_motion: by_motion.into() }
     }
@@ -54,20 +55,20 @@ impl InformationGain {
         self.bits.len()
     }
 
-    /// How fast the images narrow a parameter now, in bits per second: one bit halves the standard deviation.
+    /// Gain about a parameter in bits per second: one bit halves the standard deviation.
     pub fn bits_per_s(&self, column: usize) -> f64 {
         f64::from(self.bits[column]) / self.interval_s
     }
 
-    /// The part of each motion in [`Self::bits_per_s`]. A negative one takes away what others bring, as the joints of a
-    /// stabilized gimbal do.
+    /// Contribution of each motion to [`Self::bits_per_s`]. A negative one reduces the contributions of others, as
+    /// the joints of a stabilized gimbal do.
     pub fn by_motion_per_s(&self, column: usize) -> impl Iterator<Item = f64> + '_ {
         let motions = 6 + self.joints;
         let parts = self.by_motion.get(motions * column..motions * (column + 1)).unwrap_or_default();
         parts.iter().map(|part| f64::from(*part) / self.interval_s)
     }
 
-    /// The rest: what the image adds by confirming images that have left the window.
+    /// Remaining contribution: from confirming images that have left the window.
     pub fn earlier_per_s(&self, column: usize) -> f64 {
         self.bits_per_s(column) - self.by_motion_per_s(column).sum::<f64>()
     }

@@ -1,4 +1,4 @@
-//! The Jacobian of a step before anything is eliminated, by blocks: rows by the factor that they come from, columns by name.
+//! The full Jacobian of a step by blocks: rows by factor, columns by unknowns.
 
 use std::collections::BTreeMap;
 
@@ -21,26 +21,26 @@ use crate::optimization::{CameraPose, Landmark, RelativePoses, Reprojection};
 /// The Jacobian of a step by blocks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StepJacobian {
-    /// Calibration, joint angles, poses, velocities and biases, and last the inverse depths as one block: every feature
-    /// has its own, and no other row touches it.
+    /// Calibration, joint angles, poses, velocities and biases; last the inverse depths as one block: each feature
+    /// has its own column, which no other row touches.
     pub columns: Vec<ColumnBlock>,
     /// The features in the report's order, then the rest.
     pub rows: Vec<JacobianRow>,
 }
 
-/// The rows of one feature in some columns, two a observation.
+/// Rows of one feature in some columns, two per observation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FeatureRows {
     /// Number of the observing frame of each observation.
     pub frames: Vec<FrameId>,
-    /// By the columns of the step, those of the feature's inverse depth last; whitened: residuals by their standard
-    /// deviations with robust weights, per radian, metre, and 1/m.
+    /// Whitened rows in the columns of the step, the feature's inverse depth last: residuals over their standard
+    /// deviations with robust weights, per radian, metre and 1/m.
     pub rows: DMatrix<f64>,
 }
 
 impl StepReport {
-    /// The blocks of the Jacobian, `None` where the report does not keep its source; `cameras` are the main one and the
-    /// rigid ones beside it.
+    /// Returns the blocks of the Jacobian, `None` without a stored source; `cameras` are the main one and the
+    /// further rigid ones.
     pub fn jacobian(&self, cameras: &[&CameraModel]) -> Option<StepJacobian> {
         let writer = Writer::new(self, cameras)?;
         let mut rows = Vec::with_capacity(self.features.len());
@@ -52,7 +52,7 @@ impl StepReport {
         Some(StepJacobian { columns: writer.columns, rows })
     }
 
-    /// The rows of one feature; `cameras` as for [`Self::jacobian`].
+    /// Returns the rows of one feature; `cameras` as for [`Self::jacobian`].
     pub fn feature_rows(&self, cameras: &[&CameraModel], id: FeatureId) -> Option<FeatureRows> {
         let writer = Writer::new(self, cameras)?;
         let index = self.features.iter().position(|feature| feature.id == id)?;
@@ -63,13 +63,13 @@ impl StepReport {
 /// One camera at the states of the window.
 struct WindowCamera<'a> {
     model: VisualModel<'a>,
-    /// Its poses by slot.
+    /// Poses by slot.
     current: Vec<CameraPose>,
     relative: RelativePoses,
     linearized: RelativePoses,
-    /// By slot: how the camera's pose follows pose and joints, and the calibration.
+    /// By slot: derivative of the camera pose with respect to pose and joints, and to the calibration.
     maps: Vec<(DMatrix<f64>, DMatrix<f64>)>,
-    /// First column of its calibration.
+    /// First column of the camera's calibration.
     start: usize,
 }
 
@@ -80,7 +80,7 @@ struct Writer<'a> {
     columns: Vec<ColumnBlock>,
     states: Vec<FrameState>,
     cameras: Vec<WindowCamera<'a>>,
-    /// The landmarks in the world.
+    /// Landmarks in the world.
     places_m: BTreeMap<FeatureId, Vector3<f64>>,
 }
 
@@ -118,7 +118,7 @@ impl<'a> Writer<'a> {
         Some(Self { report, source, layout, columns, states, cameras, places_m })
     }
 
-    /// The rows of a feature; `None` where its camera is unknown.
+    /// Rows of a feature; `None` when its camera is unknown.
     fn feature(&self, index: usize, feature: &FeatureReport) -> Option<FeatureRows> {
         let camera = self.cameras.get(feature.id.camera())?;
         let slot_of = |number: usize| self.report.window.iter().position(|frame| frame.frame_index == number);
@@ -131,7 +131,7 @@ impl<'a> Writer<'a> {
             let Some(slot) = slot_of(seen.frame_index) else { continue };
             let observation = TrackObservation { slot, uv_px: seen.measured_px };
             let (now, then) = (&camera.relative, &camera.linearized);
-            // The report's residuals are rounded; the weight that the step counted with is not taken from them again.
+            // Stored residuals are rounded: the robust weight of the step is used instead of a recomputed one.
             let weight = seen.residual_after_px.map(|_| seen.robust_weight);
             let Some(term) = whitened(&camera.model, now, then, anchor, &landmark, &observation, weight) else {
                 continue;
@@ -144,7 +144,7 @@ impl<'a> Writer<'a> {
         Some(FeatureRows { frames, rows: rows.resize_vertically(height, 0.0) })
     }
 
-    /// The landmark of a feature in its anchor's camera: from its place in the world, for a rejected one as it was kept.
+    /// Landmark of a feature in its anchor's camera: from its position in the world, for a rejected one as stored.
     fn landmark(&self, index: usize, feature: &FeatureReport, anchor: &CameraPose) -> Option<Landmark> {
         let rejected = self.source.rejected.iter().find(|(place, _)| *place as usize == index);
         if let Some((_, bearing)) = rejected {
@@ -156,13 +156,13 @@ impl<'a> Writer<'a> {
         Some(Landmark { bearing: point.normalize(), inverse_distance: point.norm().recip() })
     }
 
-    /// The rows that are not of features.
+    /// Rows of factors without a feature.
     fn other_rows(&self) -> Vec<JacobianRow> {
         let numbers: Vec<FrameId> = self.report.window.iter().map(|frame| FrameId(frame.frame_index)).collect();
         let mut rows: Vec<JacobianRow> = self.source.rows(&numbers).collect();
         let is_imu = |row: &JacobianRow| matches!(row.factor, JacobianFactor::Imu { .. });
         let place = rows.iter().position(|row| !is_imu(row)).unwrap_or(rows.len());
-        // The readings of a frame touch its joint angles alone, each with the inverse of its standard deviation.
+        // Readings of a frame touch its joint angles only, each with its inverse standard deviation.
         let encoders = self.report.window.iter().enumerate().filter_map(|(slot, frame)| {
             let sigmas = frame.encoder_sigmas_rad.as_ref().filter(|sigmas| !sigmas.is_empty())?;
             let id = ColumnId::Joints(numbers[slot]);
@@ -187,7 +187,7 @@ impl<'a> Writer<'a> {
         rows
     }
 
-    /// The column of the encoders' clock and its number, where that is estimated.
+    /// Column and parameter of the encoders' time offset, if estimated.
     fn encoder_clock(&self) -> Option<(usize, &ColumnBlock)> {
         let main = self.source.clocks.first().filter(|clocks| clocks.count > 1 && self.source.calibrated)?;
         let number = self.source.chains.first()?.dof() + main.count - 1;
@@ -268,10 +268,10 @@ fn window_camera<'a>(
         let seen = camera_pose::when_seen(&state, now_s);
         let imu_from_observer = match rigid {
             Some((_, extrinsics)) => *extrinsics,
-            // With its clock right the camera is where the report has it.
+            // Without a time offset the camera pose is that of the report.
             None if now_s == 0.0 => frame.imu_from_camera,
             None => {
-                // The joints moved on meanwhile; how far is hardly another thing at the first estimate.
+                // Motion of the joints during the time offset; at the first estimate it is nearly the same.
                 let moved =
                     chain.imu_from_camera(&state.joints_rad).inverse() * chain.imu_from_camera(&seen.joints_rad);
                 frame.imu_from_camera * moved

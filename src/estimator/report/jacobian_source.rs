@@ -1,4 +1,4 @@
-//! What a report keeps of the step's Jacobian, so that any of its blocks can be written out again.
+//! Stored data of a report from which any block of the step's Jacobian can be reproduced.
 
 use std::sync::Arc;
 
@@ -11,27 +11,27 @@ use crate::geometry::RigidTransform;
 use crate::gimbal::Chain;
 use crate::optimization::{LandmarkModel, RobustLoss};
 
-/// Where the step's Jacobian was taken, and the blocks that a report could not write out again.
+/// Linearization points of the step's Jacobian, and blocks that cannot be reproduced from the report.
 ///
-/// The rows of the features are by far the most: they follow from the rest of the report, these states and the bearings.
+/// The rows of features are the largest part: they follow from the rest of the report, these states and the bearings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JacobianSource {
-    /// By slot, where derivatives are taken (first estimates): `world_from_imu` as quaternion x, y, z, w and position, then
-    /// the joint angles; in single precision, which is far finer than what is drawn.
+    /// Linearization points by slot (first estimates): `world_from_imu` as quaternion x, y, z, w and position, then
+    /// the joint angles; in single precision, much finer than the display.
     pub(crate) frames: Box<[f32]>,
-    /// The chains at which derivatives are taken, by camera.
+    /// Linearization points of the chains, by camera.
     pub(crate) chains: Box<[Chain]>,
-    /// By camera, the offsets of the clocks that are estimated; empty where none is.
+    /// Estimated time offsets by camera; empty without any.
     pub(crate) clocks: Box<[ClockColumns]>,
-    /// By slot, where clocks are estimated: rates of the body's rotation and of its position, then those of the joints.
+    /// By slot, with estimated time offsets: rates of the body's rotation and position, then of the joints.
     pub(crate) rates: Box<[f32]>,
     /// Whether the calibration has columns.
     pub(crate) calibrated: bool,
-    /// Places among the report's features of the rejected ones, which have no landmark there, and their unit directions in
+    /// Indices of the rejected features in the report, which have no landmark there, and their unit bearings in
     /// their anchors' cameras.
     pub(crate) rejected: Box<[(u32, [f32; 3])]>,
     pub(crate) rows: Box<[PackedRow]>,
-    /// Of all packed rows, one after the other: numbers of blocks of columns, and the norms there.
+    /// Norms of all packed rows: indices of column blocks, and the norms there.
     pub(crate) columns: Box<[u16]>,
     pub(crate) norms: Box<[f32]>,
     pub(crate) pixel_sigma_px: f64,
@@ -39,21 +39,21 @@ pub struct JacobianSource {
     pub(crate) landmark_model: LandmarkModel,
 }
 
-/// Offsets of clocks that are estimated with a camera.
+/// Time offsets that are estimated with a camera.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct ClockColumns {
-    /// How many: the camera's, then the encoders'.
+    /// Number of time offsets: the camera's, then the encoders'.
     pub(crate) count: usize,
-    /// The camera's where derivatives are taken, and as it is estimated, beyond what the rig says.
+    /// Camera time offset at the linearization point, and as estimated, relative to the rig.
     pub(crate) shifts_s: [f64; 2],
 }
 
-/// Rows that are neither of features nor of encoders.
+/// Rows of neither features nor encoders.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct PackedRow {
     pub(crate) kind: PackedKind,
     pub(crate) height: u16,
-    /// How many of the norms are its own.
+    /// Number of its norms.
     pub(crate) count: u16,
 }
 
@@ -67,7 +67,7 @@ pub(crate) enum PackedKind {
 }
 
 impl PackedKind {
-    /// What it stands for, with frames of these numbers.
+    /// Factor of the rows, with these frame numbers.
     pub(crate) fn factor(self, numbers: &[FrameId]) -> Option<JacobianFactor> {
         Some(match self {
             Self::Imu(slot) => {
@@ -82,10 +82,10 @@ impl PackedKind {
     }
 }
 
-/// The rows of a factor that is not a feature's.
+/// Rows of a factor without a feature.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FactorRows {
-    /// Whose they are.
+    /// Factor of the rows.
     pub factor: JacobianFactor,
     /// By the columns of the step (calibration, joints, poses, velocities and biases), whitened; the residual last, at
     /// the final estimate.

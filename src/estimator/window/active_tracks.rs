@@ -1,11 +1,11 @@
-//! The features that take part in a solve.
+//! Features of a solve.
 
 use super::features::{FeatureMap, Observation};
 use crate::estimator::factors::visual::{Track, TrackObservation};
 use crate::frontend::FeatureId;
 use crate::optimization::Landmark;
 
-/// The features of one camera that take part, in the order of their ids.
+/// Features of one camera in a solve, ordered by id.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ActiveTracks {
     pub(crate) ids: Vec<FeatureId>,
@@ -14,7 +14,7 @@ pub(crate) struct ActiveTracks {
 }
 
 impl ActiveTracks {
-    /// The triangulated features with at least two observations.
+    /// Selects the triangulated features with at least two observations.
     pub(crate) fn new(features: &FeatureMap) -> Self {
         let mut active = Self::default();
         for (id, feature) in features {
@@ -31,7 +31,7 @@ impl ActiveTracks {
         active
     }
 
-    /// Those whose tracks are wanted.
+    /// Keeps the features whose tracks `wanted` accepts.
     pub(crate) fn filtered(self, wanted: impl Fn(&Track) -> bool) -> Self {
         let mut kept = Self::default();
         for ((id, track), landmark) in self.ids.into_iter().zip(self.tracks).zip(self.landmarks) {

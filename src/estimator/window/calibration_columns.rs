@@ -1,11 +1,11 @@
-//! The static calibration as the report has it: parameters, values and standard deviations of its columns.
+//! The static calibration in the report: parameters, values and standard deviations of its columns.
 
 use crate::estimator::report::CalibrationEstimate;
 use crate::estimator::setup::Setup;
 use crate::estimator::state::calibration::Calibration;
 use crate::estimator::state::calibrations::{Calibrations, MAIN};
 
-/// The static calibration with the standard deviations of its columns, not-a-number while there are none.
+/// Returns the static calibration with the standard deviations of its columns, NaN without a solve.
 pub(crate) fn calibration_estimate(setup: &Setup, calibration: &Calibrations, sigmas: &[f64]) -> CalibrationEstimate {
     let cameras = || (0..calibration.cameras()).map(|camera| calibration.of(camera));
     let parameters = calibration.parameters();

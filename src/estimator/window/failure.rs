@@ -1,4 +1,4 @@
-//! Checks whether the window has failed, or soon may.
+//! Failure criteria of the window.
 
 use super::features::FeatureMap;
 use super::frames::Frame;
@@ -8,15 +8,15 @@ use crate::estimator::state::navigation::NavigationState;
 use crate::estimator::{Event, EventKind};
 use crate::geometry::seconds_from_ns;
 
-/// Watches whether enough landmarks are in view.
+/// Monitors the number of observed landmarks.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct LandmarkWatch {
-    /// Since when there have been too few.
+    /// Stamp of the first image with too few landmarks.
     blind_since_ns: Option<i64>,
 }
 
 impl LandmarkWatch {
-    /// Takes in a solved window; an event when the landmarks in view become too few.
+    /// Checks a solved window; returns an event when the landmarks become too few.
     pub(crate) fn observe(&mut self, window: &WindowState, options: &EstimatorOptions) -> Option<Event> {
         let required = options.min_landmarks;
         let slot = window.frames.newest_slot();
@@ -27,7 +27,7 @@ impl LandmarkWatch {
             .filter(|feature| feature.landmark.is_some() && feature.observation(slot).is_some())
             .count();
         let newest = window.frames.newest();
-        // A stationary vehicle needs no landmarks to know where it is.
+        // The zero-velocity update constrains a stationary vehicle without landmarks.
         if observed >= required || newest.stationary.is_some() {
             self.blind_since_ns = None;
             return None;
@@ -42,13 +42,13 @@ impl LandmarkWatch {
         Some(Event::decided(EventKind::MeasurementMissing, message, observed as f64, required as f64))
     }
 
-    /// How long there have been too few, in seconds.
+    /// Time with too few landmarks, in seconds.
     fn blind_s(&self, newest_ns: i64) -> f64 {
         self.blind_since_ns.map_or(0.0, |since_ns| seconds_from_ns(newest_ns - since_ns))
     }
 }
 
-/// Why the window has failed, against the prediction of the newest frame's state; `None` while it has not.
+/// Returns the failure of the window, if there is one; `predicted` is the state of the newest frame before the solve.
 pub(crate) fn failure(
     newest: &Frame,
     predicted: &NavigationState,
@@ -79,7 +79,7 @@ pub(crate) fn failure(
     Some(Event::decided(EventKind::Failure, format!("{reason}: {value:.3} (limit {limit:.3})"), value, limit))
 }
 
-/// IMU samples of the newest interval that were at the end of the sensor's range.
+/// Returns an event for saturated IMU samples in the newest interval.
 pub(crate) fn saturation(newest: &Frame) -> Option<Event> {
     let (saturated, count) = (newest.motion.saturated_samples(), newest.motion.samples().len());
     (saturated > 0).then(|| {

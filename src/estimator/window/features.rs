@@ -1,4 +1,4 @@
-//! The features of the window: observations come in, frames leave, points are triangulated.
+//! Features of the window: observations, anchors, triangulation.
 
 use std::collections::BTreeMap;
 
@@ -10,23 +10,23 @@ use crate::frontend::{FeatureId, TrackedFeature};
 use crate::optimization::LandmarkModel;
 use crate::optimization::{CameraPose, Landmark};
 
-/// One observation of a feature.
+/// An observation of a feature.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Observation {
     /// Slot of the frame.
     pub(crate) slot: usize,
     /// Measured pixel.
     pub(crate) uv_px: Vector2<f64>,
-    /// Measured unit direction.
+    /// Measured unit bearing in the camera.
     pub(crate) bearing: Vector3<f64>,
 }
 
-/// One feature with everything that the window saw of it.
+/// A feature with its observations in the window.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Feature {
-    /// In the order of the slots; the first one's frame is the anchor.
+    /// By slot, ascending; the first one is the anchor's.
     pub(crate) observations: Vec<Observation>,
-    /// Its estimate in the anchor's camera, once triangulated.
+    /// Landmark in the anchor's camera, once triangulated.
     pub(crate) landmark: Option<Landmark>,
 }
 
@@ -44,7 +44,7 @@ impl Feature {
 /// All features by their identity.
 pub(crate) type FeatureMap = BTreeMap<FeatureId, Feature>;
 
-/// Takes in what a camera saw at a frame.
+/// Adds the observations of a camera at a frame.
 pub(crate) fn observe(features: &mut FeatureMap, slot: usize, seen: &[TrackedFeature]) {
     for tracked in seen {
         let finite = tracked.bearing.iter().chain(tracked.uv_px.iter()).all(|x| x.is_finite());
@@ -56,8 +56,8 @@ pub(crate) fn observe(features: &mut FeatureMap, slot: usize, seen: &[TrackedFea
     }
 }
 
-/// Takes a frame out: its observations go, later slots move up, and landmarks that were anchored there move to the next
-/// frame that saw them. `cameras` are the poses before the frame goes.
+/// Removes a frame: its observations are dropped, later slots move up, and landmarks that it anchors move to
+/// the next observing frame. `cameras` are the poses before the removal.
 pub(crate) fn drop_frame(features: &mut FeatureMap, gone: usize, cameras: &[CameraPose]) {
     for feature in features.values_mut() {
         let anchored = feature.anchor() == Some(gone);
@@ -77,7 +77,7 @@ pub(crate) fn drop_frame(features: &mut FeatureMap, gone: usize, cameras: &[Came
     features.retain(|_, feature| !feature.observations.is_empty());
 }
 
-/// A landmark in another camera, `None` when it lies in its centre.
+/// Transforms a landmark to another camera; `None` when it lies in that camera's centre.
 fn moved(landmark: &Landmark, from: &CameraPose, to: &CameraPose) -> Option<Landmark> {
     let direction_in_world =
         from.rotation * landmark.bearing + (from.position_m - to.position_m) * landmark.inverse_distance;
@@ -88,9 +88,9 @@ fn moved(landmark: &Landmark, from: &CameraPose, to: &CameraPose) -> Option<Land
     })
 }
 
-/// The landmark of a feature from all its observations: the point with the least summed squared distance from the rays,
-/// measured across the bearings, refined once by its depth weights. `None` while the rays open too little, or when the
-/// point is out of range or behind a camera.
+/// Triangulates a feature from all its observations: least squares of the distances across the bearings,
+/// weighted by depth in a second iteration. `None` when the parallax is too small, or the point is out of range
+/// or behind a camera.
 pub(crate) fn triangulate(feature: &Feature, cameras: &[CameraPose], options: &EstimatorOptions) -> Option<Landmark> {
     let anchor = feature.observations.first()?;
     if feature.observations.len() < options.min_observations {
@@ -139,8 +139,7 @@ pub(crate) fn triangulate(feature: &Feature, cameras: &[CameraPose], options: &E
     })
 }
 
-/// Mean angle between the observations of two frames that is left once the rotation between them is taken out, with the
-/// number of features in common.
+/// Mean rotation-compensated parallax between two frames, in radians, and the number of common features.
 pub(crate) fn compensated_parallax(
     features: &FeatureMap,
     cameras: &[CameraPose],
@@ -160,7 +159,7 @@ pub(crate) fn compensated_parallax(
     (mean, angles.len())
 }
 
-/// Bytes that the features of a camera take on the heap, estimated: a node of the tree holds up to eleven entries and is two
+/// Estimated heap memory of a camera's features in bytes: a tree node has up to eleven entries and is two
 /// thirds full on average.
 pub(crate) fn heap_bytes(features: &FeatureMap) -> usize {
     const SLOTS_PER_ENTRY: f64 = 1.5;

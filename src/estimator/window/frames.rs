@@ -16,27 +16,27 @@ use crate::sensors::JointAngles;
 pub(crate) struct Frame {
     /// Number of the image in its camera's stream.
     pub(crate) index: usize,
-    /// Its stamp since the log began.
+    /// Stamp of the image since the log started.
     pub(crate) stamp_ns: i64,
     /// Current estimate.
     pub(crate) state: FrameState,
-    /// Where the marginalization prior was linearized, for frames that it holds.
+    /// Linearization point of the marginalization prior, for frames in the prior.
     pub(crate) first_estimate: Option<FrameState>,
     /// Encoder angles at the stamp.
     pub(crate) encoder: Option<JointAngles>,
-    /// Present where the vehicle is stationary.
+    /// Present while the vehicle is stationary.
     pub(crate) stationary: Option<Stationary>,
     /// Whether it is a keyframe.
     pub(crate) keyframe: bool,
-    /// IMU samples since the frame before it in the window.
+    /// IMU samples since the previous frame of the window.
     pub(crate) motion: Preintegration,
     /// Square-root information of `motion` (15 × 15), `None` when it is empty.
     pub(crate) motion_information: Option<Matrix15>,
 }
 
 impl Frame {
-    /// The state at which derivatives are taken: the first estimate while `current` is within `reach_rad` of it, in attitude
-    /// and joint angles.
+    /// Returns the state for derivatives: the first estimate while `current` is within `reach_rad` of it in
+    /// attitude and joint angles, else `current`.
     pub(crate) fn linearization_point<'a>(&'a self, current: &'a FrameState, reach_rad: f64) -> &'a FrameState {
         self.first_estimate.as_ref().filter(|first| current.rotation_from_rad(first) <= reach_rad).unwrap_or(current)
     }
@@ -54,7 +54,7 @@ impl Frame {
     }
 }
 
-/// The frames of the window, oldest first; there is always one.
+/// Frames of the window, oldest first; never empty.
 #[derive(Clone, Debug)]
 pub(crate) struct Frames(Vec<Frame>);
 
@@ -64,7 +64,7 @@ impl Frames {
         Self(vec![first])
     }
 
-    /// Adds a frame behind the newest one.
+    /// Adds the newest frame.
     pub(crate) fn push(&mut self, newest: Frame) {
         self.0.push(newest);
     }
@@ -87,14 +87,14 @@ impl Frames {
         &mut self.0[newest]
     }
 
-    /// Takes out the oldest frame; the last one stays.
+    /// Removes the oldest frame, unless it is the only one.
     pub(crate) fn remove_oldest(&mut self) {
         if self.newest_slot() > 0 {
             self.0.remove(0);
         }
     }
 
-    /// Takes out the frame at a slot before the newest one and hands its IMU samples on to the frame after it.
+    /// Removes the frame at a slot before the newest one and adds its IMU samples to the next frame.
     pub(crate) fn drop_before_newest(&mut self, slot: usize) {
         if slot >= self.newest_slot() {
             return;
@@ -106,8 +106,8 @@ impl Frames {
         next.motion = motion;
     }
 
-    /// Integrates intervals again whose bias has moved by more than [`EstimatorOptions::reintegration_change`] from where they
-    /// were integrated.
+    /// Reintegrates intervals whose bias has changed by more than [`EstimatorOptions::reintegration_change`] since
+    /// their integration.
     pub(crate) fn reintegrate(&mut self, options: &EstimatorOptions) {
         let limit = options.reintegration_change;
         for slot in 1..self.0.len() {
@@ -123,7 +123,7 @@ impl Frames {
         }
     }
 
-    /// Bytes that the frames take, with what they hold on the heap.
+    /// Memory of the frames in bytes, heap included.
     pub(crate) fn bytes(&self) -> usize {
         self.0.iter().map(Frame::bytes).sum()
     }
@@ -143,7 +143,7 @@ impl DerefMut for Frames {
     }
 }
 
-/// The layout of a window of these frames.
+/// Column layout of a window with these frames.
 pub(crate) fn layout(frames: &[Frame], calibration: usize) -> Layout {
     let joints = frames.first().map_or(0, |frame| frame.state.joints_rad.len());
     Layout { frames: frames.len(), joints, calibration }

@@ -1,12 +1,12 @@
-//! Information gain of the newest image about the calibration, and the motion that it comes from.
+//! Information gain of the newest image about the calibration, and its attribution to motions.
 //!
-//! The window's information about the calibration, everything else eliminated, is compared with the same window without the
-//! factors of the newest image: its observations, its IMU interval, its encoder readings, its zero-velocity update.
-//! What they add is `G = JcᵀU·UᵀJc`, with `U` an orthonormal basis of what the new rows say beyond all states. The
-//! calibration's columns of the observations are zero, up to a rigid move of the whole scene, where nothing moved within the
-//! window; with motion they are a sum over the motions ([`super::motion_parts`]), and so is `G`: each motion's part is the
-//! symmetric `½(JmᵀU·UᵀJc + JcᵀU·UᵀJm)`, which is also its Shapley value. What is left over comes with the marginalization
-//! prior: images that have left the window.
+//! The marginal information of the calibration in the window is compared with that of the same window without
+//! the factors of the newest image: its observations, IMU interval, encoder readings and zero-velocity update.
+//! They add `G = JcᵀU·UᵀJc`, where `U` is an orthonormal basis of the new rows orthogonal to all states.
+//! Up to a rigid motion of the scene, the calibration columns of the observations are zero without motion in
+//! the window. With motion they are a sum over motions ([`super::motion_parts`]), and so is `G`: each motion
+//! contributes the symmetric `½(JmᵀU·UᵀJc + JcᵀU·UᵀJm)`, which is also its Shapley value. The remainder comes
+//! with the marginalization prior: from images that have left the window.
 
 use nalgebra::DMatrix;
 
@@ -20,17 +20,17 @@ use crate::estimator::window::problem::{Estimate, Problem};
 use crate::geometry::seconds_from_ns;
 use crate::optimization::dense::Cholesky;
 
-/// Added to the diagonals, as the solver does: an unknown without any factor stays where it is.
+/// Added to the diagonals, as in the solver: unknowns without a factor do not move.
 const FLOOR: f64 = 1e-6;
 
-/// A gain below this share of the variance is rounding.
+/// Gains below this fraction of the variance are rounding errors.
 const ROUNDING: f64 = 1e-10;
 
-/// The observations of one camera at the final estimate, with and without the newest image.
+/// Information of one camera's observations at the final estimate, with and without the newest image.
 #[derive(Debug)]
 pub(crate) struct CameraInformation {
     maps: CameraMaps,
-    /// Information of the camera's poses, 6 each, landmarks eliminated.
+    /// Information matrix of the camera poses (6·frames square), landmarks eliminated.
     with: DMatrix<f64>,
     without: DMatrix<f64>,
 }
@@ -48,12 +48,12 @@ impl CameraInformation {
     }
 }
 
-/// How the unknowns answer to the calibration, with or without the factors of the newest frame.
+/// Response of the unknowns to the calibration, with or without the factors of the newest frame.
 struct Answer {
     /// Covariance of the free calibration.
     covariance: DMatrix<f64>,
-    /// By column of the layout (states and calibration) and free calibration column: how the states follow, least squares,
-    /// when a parameter is moved.
+    /// Derivative of the states and the calibration (columns of the layout) with respect to the free calibration
+    /// columns: least squares of the other unknowns.
     response: DMatrix<f64>,
 }
 
@@ -77,8 +77,8 @@ impl Answer {
 }
 
 impl Problem<'_> {
-    /// Information gain of the newest image; `None` without free calibration columns, in a window of one frame, or when a
-    /// matrix is not positive definite.
+    /// Returns the information gain of the newest image; `None` without free calibration columns, with a single
+    /// frame, or when a matrix is not positive definite.
     pub(crate) fn information_gain(
         &self,
         estimate: &Estimate,
@@ -99,7 +99,7 @@ impl Problem<'_> {
         let (with, without) = (answer(layout.frames)?, answer(newest)?);
         let covariance = &with.covariance;
         let motion_terms = self.motion_terms(estimate, &frames, cameras, [&with, &without], &free);
-        // `P·G·P` on the diagonal.
+        // Diagonal of `P·G·P`.
         let before = without.covariance.clone().cholesky()?;
         let kept = covariance * before.solve(covariance);
         let motions = 6 + layout.joints;
@@ -117,14 +117,15 @@ impl Problem<'_> {
         Some(InformationGain::new(interval_s, layout.joints, bits, by_motion))
     }
 
-    /// No gain, of an image that is dropped again; `None` as in [`Self::information_gain`].
+    /// Returns a zero gain, for an image that is dropped; `None` as in [`Self::information_gain`].
     pub(crate) fn no_information_gain(&self, estimate: &Estimate) -> Option<InformationGain> {
         let (interval_s, free) = self.newest_interval(estimate)?;
         let joints = self.layout.joints;
         Some(InformationGain::new(interval_s, joints, vec![0.0; free.len()], vec![0.0; free.len() * (6 + joints)]))
     }
 
-    /// Seconds since the image before the newest one, and the calibration's free columns; `None` where there are none.
+    /// Time since the previous image in seconds, and the free columns of the calibration; `None` without free
+    /// columns.
     fn newest_interval(&self, estimate: &Estimate) -> Option<(f64, Vec<usize>)> {
         let newest = self.layout.frames.checked_sub(1).filter(|newest| *newest > 0)?;
         let interval_s = seconds_from_ns(self.frames[newest].stamp_ns - self.frames[newest - 1].stamp_ns);
@@ -134,7 +135,7 @@ impl Problem<'_> {
         (!free.is_empty() && interval_s > 0.0).then_some((interval_s, free))
     }
 
-    /// Carries what is known about a camera's poses on to the unknowns; the lower triangle counts.
+    /// Adds the information of a camera's poses to the unknowns (lower triangle).
     fn carry(&self, camera: usize, maps: &CameraMaps, poses: &DMatrix<f64>, hessian: &mut DMatrix<f64>) {
         let layout = self.layout;
         let calibration = self.cameras[camera].columns.clone();
@@ -156,7 +157,7 @@ impl Problem<'_> {
         }
     }
 
-    /// The diagonals of `P·Gm·P`: a row for each motion, a column for each free parameter.
+    /// Diagonals of `P·Gm·P` (motions × free parameters).
     fn motion_terms(
         &self,
         estimate: &Estimate,
@@ -168,7 +169,7 @@ impl Problem<'_> {
         let layout = self.layout;
         let calibration = self.linearization_calibration(&estimate.calibration);
         let mut motion_terms = DMatrix::zeros(6 + layout.joints, free.len());
-        // Everything by the motion of all parameters that a change of one of them goes with.
+        // Effect of each motion for all parameters that change with one of them.
         let (with_p, without_p) = (&with.response * &with.covariance, &without.response * &with.covariance);
         for (camera, information) in cameras.iter().enumerate() {
             let maps = &information.maps;
@@ -190,7 +191,7 @@ impl Problem<'_> {
         motion_terms
     }
 
-    /// What the readings of moving joints contribute to the time offset of the encoders.
+    /// Adds the contribution of moving joints' readings to the encoders' time offset.
     fn encoder_clock_parts(
         &self,
         estimate: &Estimate,
@@ -214,7 +215,7 @@ impl Problem<'_> {
     }
 }
 
-/// How the camera's poses move, 6 rows each, when the unknowns do.
+/// Derivative of the camera poses (6 rows each) with respect to the unknowns.
 fn camera_moves(
     layout: Layout,
     maps: &CameraMaps,

@@ -1,4 +1,4 @@
-//! From a solved window to what its report keeps of the step's Jacobian.
+//! Data of a solved window from which the report reproduces the Jacobian of the step.
 
 use nalgebra::DMatrix;
 
@@ -14,7 +14,8 @@ use crate::estimator::window::solve::SolvedWindow;
 use crate::estimator::{ColumnBlock, FrameId};
 
 impl WindowState {
-    /// The source of the Jacobian at the final estimate, and the rows that are not of features where they are to be kept.
+    /// Returns the source of the Jacobian at the final estimate, and the rows without a feature if they are
+    /// requested.
     pub(crate) fn jacobian_source(&self, setup: &Setup, solved: &SolvedWindow) -> (JacobianSource, Vec<FactorRows>) {
         let problem = self.problem(setup, &solved.cameras);
         let estimate = &solved.solution.estimate;
@@ -89,7 +90,7 @@ impl WindowState {
     }
 }
 
-/// Norms of the blocks of some rows that are not zero.
+/// Norms of the nonzero blocks of some rows.
 fn norms_of(jacobian: &DMatrix<f64>, columns: &[ColumnBlock], scales: &[f64]) -> Vec<(u16, f32)> {
     let mut norms: Vec<(u16, f32)> = Vec::new();
     for (number, block) in columns.iter().enumerate() {

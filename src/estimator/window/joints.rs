@@ -1,4 +1,4 @@
-//! Joint angles of the window's frames: where they start, and what becomes of the encoders' angles.
+//! Joint angles of the frames: initial values, and the encoder readings of dropped frames.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -10,17 +10,17 @@ use crate::geometry::wrap_angle;
 use crate::optimization::{CameraPose, RelativePose, reprojection};
 use crate::sensors::JointAngles;
 
-/// Standard deviation of a joint's rotation since the frame before, without an encoder.
+/// Standard deviation of a joint's rotation since the previous frame, without an encoder.
 pub(crate) const UNKNOWN_JOINT_SIGMA_RAD: f64 = 1.0;
-/// Fewest landmarks that constrain the joint angles of a frame.
+/// Smallest number of landmarks that constrain the joint angles of a frame.
 const MIN_LANDMARKS: usize = 15;
-/// The standard deviation of an angle by the image must be smaller than the encoder's by this factor before the image may
-/// carry the encoder's angle on: then the rotation in between, as the image measures it, is independent of the encoder.
+/// The visual standard deviation of a joint angle must be smaller than the encoder's by this factor before
+/// readings are propagated with it: the visual rotation between the frames is then independent of the encoder.
 const SHARPER: f64 = 3.0;
 
 impl WindowState {
-    /// Fits the newest frame's joint angles to the observations of triangulated landmarks with the pose fixed: an encoder
-    /// may be off by many degrees, and without one there is no other initial value.
+    /// Fits the newest frame's joint angles to the observations of triangulated landmarks with a fixed pose: an
+    /// encoder may have an error of many degrees, and without encoders there is no other initial value.
     pub(crate) fn align_newest_joints(&mut self, setup: &Setup) {
         let joints = self.calibration.of(MAIN).joint_count();
         if joints == 0 {
@@ -52,8 +52,8 @@ impl WindowState {
         }
     }
 
-    /// Normal equations of a frame's joint angles from the landmarks that other frames anchor, everything else fixed, and
-    /// the number of those landmarks.
+    /// Normal equations of a frame's joint angles from landmarks with anchors in other frames, all other unknowns
+    /// fixed, and the number of these landmarks.
     fn joints_by_landmarks(
         &self,
         setup: &Setup,
@@ -96,17 +96,17 @@ impl WindowState {
         (hessian, gradient, count)
     }
 
-    /// Variances of a frame's joint angles as the image constrains them, `None` with too few landmarks.
+    /// Variances of a frame's joint angles from the image alone, `None` with too few landmarks.
     fn visual_variances(&self, setup: &Setup, slot: usize, cameras: &[CameraPose]) -> Option<DVector<f64>> {
         let (hessian, _, count) = self.joints_by_landmarks(setup, slot, &self.frames[slot].state.joints_rad, cameras);
         let inverse = hessian.cholesky()?.inverse();
         (count >= MIN_LANDMARKS).then(|| inverse.diagonal())
     }
 
-    /// A frame is about to leave, and its encoder angles with it, although they are as good as any: the next frame takes
-    /// them over, advanced by the rotation of the joints in between as the image measures it.
+    /// Combines the encoder readings of a frame that is removed with those of the next frame, propagated by the
+    /// visually measured rotation of the joints between the frames.
     ///
-    /// Only the independent part of their errors is averaged; the variance of the image's rotation is added.
+    /// Only independent errors are averaged; the variance of the visual rotation is added.
     pub(crate) fn carry_encoder(&mut self, setup: &Setup, from: usize, to: usize) {
         let (Some(removed), Some(own)) = (&self.frames[from].encoder, &self.frames[to].encoder) else { return };
         let cameras = self.camera_poses(MAIN);

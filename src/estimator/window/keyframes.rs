@@ -1,4 +1,4 @@
-//! Which frames become keyframes.
+//! Selection of keyframes.
 
 use super::features;
 use super::window_state::WindowState;
@@ -10,7 +10,7 @@ use crate::geometry::seconds_from_ns;
 /// A stationary vehicle gets a keyframe this often, so that IMU intervals stay short enough to be integrated again.
 const STATIONARY_KEYFRAME_NS: i64 = 5_000_000_000;
 
-/// Whether the newest frame becomes a keyframe, with the value that decides.
+/// Whether the newest frame becomes a keyframe, with the deciding value.
 struct Decision {
     keyframe: bool,
     event: Event,

@@ -1,4 +1,4 @@
-//! The linearization of a solved window, for the analysis of its observability and for looking at.
+//! Linearization of a solved window, for observability analysis and display.
 
 use nalgebra::DVector;
 
@@ -16,7 +16,7 @@ use crate::estimator::{FrameId, InformationGain, Linearization};
 use crate::gimbal::ParameterId;
 
 impl WindowState {
-    /// The linearization at the final estimate: the measurements' rows, and those of the priors; and the
+    /// Returns the linearization at the final estimate (rows of the measurements and of the priors) and the
     /// information gain of the newest image.
     pub(crate) fn linearization(
         &self,
@@ -27,7 +27,7 @@ impl WindowState {
         let frames: Vec<FrameId> = self.frames.iter().map(|frame| FrameId(frame.index)).collect();
         let parameters = self.calibration.parameters();
         let estimate = &solved.solution.estimate;
-        // An image that does not become a keyframe is dropped again: it constrains nothing that stays.
+        // An image that does not become a keyframe is dropped: it adds no information.
         if !self.frames.newest().keyframe {
             let linearization = problem.linearization(estimate, &parameters, &frames, None);
             return (linearization, problem.no_information_gain(estimate));
@@ -39,8 +39,8 @@ impl WindowState {
 }
 
 impl Problem<'_> {
-    /// The linearization of the whole window at an estimate; `parameters` are those of the calibration's columns, free
-    /// or fixed. What each camera has seen goes to `seen`, where that is asked for.
+    /// Linearizes the whole window at an estimate; `parameters` are those of the calibration columns, free or
+    /// fixed. The information of each camera's observations is appended to `seen`, if requested.
     pub(crate) fn linearization(
         &self,
         estimate: &Estimate,

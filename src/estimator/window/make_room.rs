@@ -1,4 +1,4 @@
-//! Which frames leave the window, and what they leave behind.
+//! Removal of frames from the window.
 
 use super::active_tracks::ActiveTracks;
 use super::features::{self, FeatureMap};
@@ -9,12 +9,12 @@ use crate::estimator::setup::Setup;
 use crate::estimator::{Event, EventKind};
 use crate::optimization::LandmarkModel;
 
-/// A window that is larger than usual shrinks by one frame per keyframe.
+/// A window above its size shrinks by one frame per keyframe.
 const MAX_MARGINALIZED_AT_ONCE: usize = 2;
 
 impl WindowState {
-    /// Makes room for the next frame: the second-newest is dropped when it is no keyframe, else the oldest of a full window
-    /// is marginalized.
+    /// Removes a frame for the next image: the second-newest one if it is no keyframe, else the oldest one of a
+    /// full window by marginalization.
     pub(crate) fn make_room(&mut self, setup: &Setup, events: &mut Vec<Event>) {
         let newest = self.frames.newest_slot();
         if newest >= 2 && !self.frames[newest - 1].keyframe {
@@ -35,13 +35,13 @@ impl WindowState {
         }
     }
 
-    /// How many frames may stay. The first window is larger: what is marginalized is linearized for good, and the chain has
-    /// to come near its true values first.
+    /// Number of frames that may remain. The first window is larger: marginalization fixes linearization points,
+    /// and the chain must be close to its true values before.
     pub(crate) fn room(&self, options: &EstimatorOptions) -> usize {
         if self.prior.is_none() { options.window * options.first_window_factor } else { options.window }
     }
 
-    /// Drops the frame at a slot before the newest one: its encoder angles and its IMU samples go to the frame after it.
+    /// Drops the frame at a slot before the newest one; its encoder readings and IMU samples go to the next frame.
     fn drop_frame(&mut self, setup: &Setup, gone: usize) {
         if self.prior.as_ref().is_none_or(|prior| !prior.holds_frame(gone)) {
             self.carry_encoder(setup, gone, gone + 1);
@@ -88,7 +88,7 @@ impl WindowState {
         self.renumber_prior(0);
     }
 
-    /// Takes the observations of a frame out of all features.
+    /// Removes the observations of a frame from all features.
     fn drop_observations(&mut self, gone: usize) {
         for camera in 0..self.features.len() {
             let poses = self.camera_poses(camera);
@@ -96,7 +96,7 @@ impl WindowState {
         }
     }
 
-    /// Landmarks that moved to another anchor lie on the bearing that it measured.
+    /// Moves landmarks with a new anchor to the bearing that the anchor measured.
     fn face_measured_bearings(&mut self) {
         for feature in self.features.iter_mut().flat_map(FeatureMap::values_mut) {
             if let (Some(first), Some(landmark)) = (feature.observations.first(), feature.landmark.as_mut()) {
@@ -105,7 +105,8 @@ impl WindowState {
         }
     }
 
-    /// The prior follows the slots after a frame has left; first estimates follow the prior.
+    /// Renumbers the slots of the prior after the removal of a frame; frames outside of the prior lose their first
+    /// estimate.
     fn renumber_prior(&mut self, gone: usize) {
         if let Some(prior) = &mut self.prior {
             prior.renumber(gone);

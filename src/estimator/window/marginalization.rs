@@ -1,4 +1,4 @@
-//! Taking a frame out of the window: what is known about the others because of it becomes their prior.
+//! Marginalization: the information of a removed frame becomes the prior of the others.
 
 use nalgebra::DMatrix;
 
@@ -7,11 +7,10 @@ use super::rows::stack;
 use crate::estimator::factors::prior::Prior;
 use crate::estimator::window::frames::Frame;
 
-/// The prior that is left when the oldest frame goes, together with the features of the problem's tracks (all that it saw
-/// and that leave with it).
+/// Returns the prior after marginalization of the oldest frame and of the features of the problem's tracks (all
+/// that it observes and that leave with it).
 ///
-/// Its residuals refer to the first estimates: of frames that the old prior held those stay, all others take the present
-/// estimate as theirs.
+/// Its residuals refer to the first estimates: frames of the old prior keep theirs, others take the present estimate.
 pub(crate) fn oldest(problem: &Problem<'_>, estimate: &Estimate) -> Option<Prior> {
     let mut parts = vec![problem.prior_rows(estimate), problem.encoder_rows(0, estimate)];
     parts.extend(problem.velocity_terms(0, &estimate.frames[0]).map(|terms| problem.zero_velocity_rows(&terms)));
@@ -23,8 +22,8 @@ pub(crate) fn oldest(problem: &Problem<'_>, estimate: &Estimate) -> Option<Prior
     eliminated(problem, estimate, &parts, 0)
 }
 
-/// The prior without the frame at `slot`, whose encoder readings go into it while its observations are dropped and its
-/// IMU samples pass to the next frame; `None` when there is no prior.
+/// Returns the prior without the frame at `slot`, whose encoder readings it takes, while the observations are
+/// dropped and the IMU samples go to the next frame; `None` without a prior.
 pub(crate) fn dropped(problem: &Problem<'_>, estimate: &Estimate, slot: usize) -> Option<Prior> {
     let prior = problem.prior?;
     if !prior.holds_frame(slot) {
@@ -34,7 +33,7 @@ pub(crate) fn dropped(problem: &Problem<'_>, estimate: &Estimate, slot: usize) -
     eliminated(problem, estimate, &[carried, problem.encoder_rows(slot, estimate)], slot)
 }
 
-/// Rows with residuals at the present estimate become a prior that keeps them at the first estimates.
+/// Converts rows with residuals at the present estimate to a prior at the first estimates.
 fn eliminated(problem: &Problem<'_>, estimate: &Estimate, parts: &[DMatrix<f64>], slot: usize) -> Option<Prior> {
     let total = problem.layout.total();
     let mut rows = stack(parts, total + 1);
@@ -44,7 +43,7 @@ fn eliminated(problem: &Problem<'_>, estimate: &Estimate, parts: &[DMatrix<f64>]
     Prior::eliminating(&rows, &problem.layout, slot)
 }
 
-/// Frames that a new prior holds keep their present state as their first estimate.
+/// Frames of a new prior keep their present state as their first estimate.
 pub(crate) fn keep_first_estimates(prior: &Prior, frames: &mut [Frame]) {
     for (slot, frame) in frames.iter_mut().enumerate() {
         if prior.holds_frame(slot) {

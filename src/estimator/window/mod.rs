@@ -1,7 +1,7 @@
-//! The sliding window: its frames and features, the least-squares problem that they make, solver and marginalization.
+//! The sliding window: frames, features, their least-squares problem, solver and marginalization.
 //!
-//! [`SlidingWindow::step`](sliding_window::SlidingWindow::step) takes in an image and returns a report or a failure; a window
-//! always has a frame.
+//! [`SlidingWindow::step`](sliding_window::SlidingWindow::step) takes an image and returns a report or a
+//! failure; a window is never without a frame.
 
 pub(crate) mod active_tracks;
 pub(crate) mod calibration_columns;

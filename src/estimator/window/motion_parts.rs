@@ -1,10 +1,12 @@
-//! How a parameter of the mount moves the camera's poses against each other, put down to what moved within the window.
+//! Relative motion of the camera poses due to a calibration parameter, split by the motions in the window.
 //!
-//! Let `D(q)` be what the parameters do to the mount at joint angles `q`, as a twist in the IMU frame, and `M` the motion
-//! from the body's pose at a frame to that at the newest one. When the whole scene moves along with the newest camera, the
-//! frame's camera moves by `D(q) − Ad(M)·D(q')`, with `q'` the newest angles: nothing, where nothing moved.
-//! The difference is a sum. `I − Ad(M)` splits by the axes of the body's rotation vector and translation, exactly, since
-//! `exp([w]) − I = [w]·Jl(w)`; `D(q) − D(q')` telescopes over the joints, as the mean of both orders.
+//! Let `D(q)` be the derivative of the extrinsics at joint angles `q` with respect to the parameters, as a
+//! twist in the IMU frame, and `M` the motion of the body from a frame to the newest one. Up to a rigid motion
+//! of the scene with the newest camera, the camera of the frame moves by `D(q) − Ad(M)·D(q')`, where `q'` are
+//! the newest joint angles. Without motion this is zero.
+//! The difference is a sum. `I − Ad(M)` splits by the axes of the body's rotation vector and translation,
+//! exactly, because `exp([w]) − I = [w]·Jl(w)`; `D(q) − D(q')` telescopes over the joints, as the mean of both
+//! orders.
 
 use std::borrow::Cow;
 
@@ -16,17 +18,17 @@ use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::state::layout::POSE;
 use crate::geometry::{RigidTransform, so3};
 
-/// A twist by each column of the calibration: turns, then shifts, in the IMU frame.
+/// Twists with respect to the calibration columns (3 × columns each): rotations and translations in the IMU frame.
 #[derive(Clone, Debug)]
 struct Twists {
     turn: Matrix3xX<f64>,
     shift: Matrix3xX<f64>,
 }
 
-/// For each motion (translations along and rotations about the IMU's axes, then the joints) how the calibration moves the
-/// camera's poses because of it: 6 rows a frame, a column for each of the calibration's.
+/// Returns, for each motion (translations along and rotations about the IMU's axes, then the joints), its
+/// contribution to the derivative of the camera poses with respect to the calibration (6·frames × columns).
 ///
-/// Their sum is the camera's map of the calibration, up to a rigid move of all its poses.
+/// The sum over motions is that derivative up to a rigid motion of all poses.
 pub(crate) fn motion_parts(
     frames: &[Cow<'_, FrameState>],
     calibration: &Calibration,
@@ -55,7 +57,7 @@ pub(crate) fn motion_parts(
     parts
 }
 
-/// What the parameters of the mount do to it; a clock does nothing to it.
+/// Twists of the extrinsics with respect to the parameters; zero for time offsets.
 fn twists(calibration: &Calibration, joints_rad: &[f64]) -> Twists {
     let linearization = calibration.linearize(joints_rad);
     let extrinsics = linearization.imu_from_camera;
@@ -68,7 +70,7 @@ fn twists(calibration: &Calibration, joints_rad: &[f64]) -> Twists {
 /// `(I − Ad(M))·D` by the axes of the translation and of the rotation.
 fn body_parts(to_newest: &RigidTransform, there: &Twists, put: &mut impl FnMut(usize, &Twists)) {
     let angle = so3::log(&to_newest.rotation);
-    // The left Jacobian is the right one of the opposite turn.
+    // The left Jacobian is the right one of the negative angle.
     let mean = so3::right_jacobian(&-angle);
     let rotation = to_newest.rotation_matrix();
     for axis in 0..3 {
@@ -80,7 +82,7 @@ fn body_parts(to_newest: &RigidTransform, there: &Twists, put: &mut impl FnMut(u
     }
 }
 
-/// `D(q) − D(q')` joint by joint, from the first to the last and from the last to the first.
+/// `D(q) − D(q')` joint by joint, as the mean of both orders.
 fn joint_parts(calibration: &Calibration, from_rad: &[f64], to_rad: &[f64], put: &mut impl FnMut(usize, &Twists)) {
     let joints = calibration.joint_count().min(to_rad.len());
     if from_rad[..joints] == to_rad[..joints] {
@@ -101,7 +103,7 @@ fn joint_parts(calibration: &Calibration, from_rad: &[f64], to_rad: &[f64], put:
     }
 }
 
-/// An offset of the camera's clock moves the camera by what moves.
+/// Contributions to a camera's time offset: it moves the camera by its velocity.
 fn clock_parts(frames: &[Cow<'_, FrameState>], maps: &CameraMaps, clock: usize, parts: &mut [DMatrix<f64>]) {
     for (slot, frame) in frames.iter().enumerate() {
         let (own, rates) = (&maps.own[slot], frame.motion());
@@ -118,7 +120,7 @@ fn clock_parts(frames: &[Cow<'_, FrameState>], maps: &CameraMaps, clock: usize, 
     }
 }
 
-/// Twists in the IMU frame as moves `[φ; δt]` of the camera's pose in the world.
+/// Converts twists in the IMU frame to `[φ; δt]` of `world_from_camera` (6 × columns).
 fn camera_moves(twists: &Twists, extrinsics: &RigidTransform, world_from_imu: &Matrix3<f64>) -> DMatrix<f64> {
     let mut moves = DMatrix::zeros(6, twists.turn.ncols());
     moves.rows_mut(0, 3).copy_from(&(extrinsics.rotation_matrix().transpose() * &twists.turn));

@@ -1,4 +1,4 @@
-//! The least-squares problem of one window: cost, normal equations, whitened rows.
+//! Least-squares problem of a window: cost, normal equations, whitened rows.
 
 use std::ops::Range;
 
@@ -20,20 +20,20 @@ use crate::optimization::Landmark;
 /// Values of all unknowns.
 #[derive(Clone, Debug)]
 pub(crate) struct Estimate {
-    /// By slot.
+    /// States by slot.
     pub(crate) frames: Vec<FrameState>,
     /// The static calibration.
     pub(crate) calibration: Calibrations,
-    /// By camera, in the order of its tracks.
+    /// Landmarks by camera, in the order of its tracks.
     pub(crate) landmarks: Vec<Vec<Landmark>>,
 }
 
-/// What one camera has seen.
+/// Visual factors of one camera.
 #[derive(Clone, Debug)]
 pub(crate) struct CameraFactors<'a> {
     pub(crate) visual: VisualModel<'a>,
     pub(crate) tracks: &'a [Track],
-    /// Columns of its calibration.
+    /// Columns of the camera's calibration.
     pub(crate) columns: Range<usize>,
 }
 
@@ -41,7 +41,7 @@ pub(crate) struct CameraFactors<'a> {
 #[derive(Clone, Debug)]
 pub(crate) struct Problem<'a> {
     pub(crate) layout: Layout,
-    /// No feature is observed by two cameras, so that each has a visual system of its own.
+    /// Cameras observe no common features, so that each has its own visual system.
     pub(crate) cameras: Vec<CameraFactors<'a>>,
     pub(crate) gravity_in_world: Vector3<f64>,
     pub(crate) frames: &'a [Frame],
@@ -51,7 +51,7 @@ pub(crate) struct Problem<'a> {
     pub(crate) calibration_first_estimates: bool,
 }
 
-/// Twice the cost by kind of factor: robust for the visual one, χ² for the others.
+/// Twice the cost by kind of factor: robust for visual factors, χ² for the others.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Costs {
     pub(crate) visual: f64,
@@ -63,13 +63,13 @@ pub(crate) struct Costs {
 }
 
 impl Costs {
-    /// The cost that the solver lowers.
+    /// Objective of the solver.
     pub(crate) fn total(&self) -> f64 {
         0.5 * (self.visual + self.imu + self.encoder + self.zero_velocity + self.calibration + self.prior)
     }
 }
 
-/// One camera's reprojection factors.
+/// Reprojection factors of one camera.
 #[derive(Clone, Debug)]
 struct CameraEquations {
     visual: VisualEquations,
@@ -81,13 +81,13 @@ struct CameraEquations {
 #[derive(Clone, Debug)]
 pub(crate) struct NormalEquations {
     cameras: Vec<CameraEquations>,
-    /// All other factors; the lower triangle counts.
+    /// All other factors (lower triangle).
     hessian: DMatrix<f64>,
     gradient: DVector<f64>,
 }
 
 impl Problem<'_> {
-    /// States at which derivatives are taken.
+    /// States at which derivatives are evaluated.
     pub(crate) fn linearization_frames(&self, estimate: &Estimate) -> Vec<FrameState> {
         self.frames
             .iter()
@@ -125,7 +125,7 @@ impl Problem<'_> {
         costs
     }
 
-    /// `x ⊟ x₀` of everything that has a first estimate, zero elsewhere.
+    /// Returns `x ⊟ x₀` of all unknowns with a first estimate, zero for the others (columns of the layout).
     pub(crate) fn first_estimate_offset(&self, estimate: &Estimate) -> DVector<f64> {
         let mut first_estimate_offset = DVector::zeros(self.layout.total());
         for (slot, (frame, current)) in self.frames.iter().zip(&estimate.frames).enumerate() {
@@ -152,7 +152,8 @@ impl Problem<'_> {
         Some(information * residual)
     }
 
-    /// Joint, whitened residual and its derivative by the angle, for each encoder reading of a frame.
+    /// Returns joint, whitened residual and its derivative with respect to the angle, for each encoder reading of a
+    /// frame.
     pub(crate) fn encoder_residuals<'s>(
         &'s self,
         slot: usize,
@@ -168,7 +169,7 @@ impl Problem<'_> {
         })
     }
 
-    /// Column of the offset of the encoders' clock, if that is estimated; its derivative is that of the angle times the
+    /// Column of the encoders' time offset, if it is estimated; its derivative is that of the angle times the
     /// joint's rate.
     pub(crate) fn encoder_clock_column(&self, estimate: &Estimate) -> Option<usize> {
         let calibration = &estimate.calibration;
@@ -176,7 +177,7 @@ impl Problem<'_> {
         Some(self.layout.calibration().start + calibration.columns(MAIN).start + column)
     }
 
-    /// The zero-velocity updates of all frames, velocity before position in each.
+    /// Zero-velocity updates of all frames, velocity before position in each.
     pub(crate) fn zero_velocity_terms<'s>(
         &'s self,
         states: &'s [FrameState],
@@ -184,7 +185,7 @@ impl Problem<'_> {
         self.zero_velocity_terms_of(states, self.frames.len())
     }
 
-    /// The zero-velocity updates of the frames before `slots`.
+    /// Zero-velocity updates of the frames before `slots`.
     fn zero_velocity_terms_of<'s>(
         &'s self,
         states: &'s [FrameState],
@@ -196,24 +197,24 @@ impl Problem<'_> {
         })
     }
 
-    /// The velocity of the frame at `slot` is zero, if the vehicle is stationary there.
+    /// Zero velocity at `slot`, if the vehicle is stationary there.
     pub(crate) fn velocity_terms(&self, slot: usize, state: &FrameState) -> Option<[ZeroVelocityTerm; 3]> {
         Some(self.frames[slot].stationary.as_ref()?.velocity_terms(self.layout, slot, state))
     }
 
-    /// The position at `slot` is the one of the frame before, if the vehicle has been stationary since then.
+    /// Zero translation since the previous frame, if the vehicle has been stationary since then.
     pub(crate) fn position_terms(&self, slot: usize, states: &[FrameState]) -> Option<[ZeroVelocityTerm; 3]> {
         let before = slot.checked_sub(1)?;
         let stationary = self.frames[slot].stationary.filter(|it| self.frames[before].stamp_ns >= it.since_ns)?;
         Some(stationary.position_terms(self.layout, slot, states))
     }
 
-    /// Calibration at which derivatives are taken.
+    /// Calibration at which derivatives are evaluated.
     pub(crate) fn linearization_calibration(&self, current: &Calibrations) -> Calibrations {
         if self.calibration_first_estimates { current.at_first_estimate() } else { current.clone() }
     }
 
-    /// Linearizes every factor.
+    /// Linearizes all factors.
     pub(crate) fn linearize(&self, estimate: &Estimate) -> NormalEquations {
         let frames = self.linearization_frames(estimate);
         let calibration = self.linearization_calibration(&estimate.calibration);
@@ -236,8 +237,8 @@ impl Problem<'_> {
         NormalEquations { cameras, hessian, gradient }
     }
 
-    /// The normal equations of everything that is not seen: of what was measured up to the frame before `slots`, and of the
-    /// priors; the derivatives by the frames are taken at `linearized`.
+    /// Normal equations of all factors but the visual ones: of measurements up to the frame before `slots`, and of
+    /// priors; derivatives with respect to the frames are evaluated at `linearized`.
     pub(crate) fn other_equations(
         &self,
         estimate: &Estimate,
@@ -300,7 +301,8 @@ impl Problem<'_> {
         (hessian, gradient)
     }
 
-    /// Whitened Jacobians and residual of the IMU factor that ends at `slot`.
+    /// Whitened Jacobians (15 × 15 with respect to either frame) and residual (15 × 1) of the IMU factor that ends
+    /// at `slot`.
     pub(crate) fn imu_blocks(
         &self,
         slot: usize,
@@ -354,7 +356,7 @@ impl Problem<'_> {
         }
     }
 
-    /// The estimate after a step.
+    /// Returns the estimate after a step.
     pub(crate) fn stepped(
         &self,
         estimate: &Estimate,
@@ -386,7 +388,7 @@ impl NormalEquations {
         self.cameras.iter().map(|camera| camera.visual.eliminate(damping)).collect()
     }
 
-    /// The reduced normal equations over poses, joints, velocities, biases and calibration; the lower triangle counts.
+    /// Reduced normal equations over poses, joints, velocities, biases and calibration (lower triangle).
     pub(crate) fn reduced(&self, layout: &Layout, visual: &[ReducedVisualEquations]) -> (DMatrix<f64>, DVector<f64>) {
         let mut hessian = self.hessian.clone();
         let mut gradient = self.gradient.clone();
@@ -396,7 +398,7 @@ impl NormalEquations {
         (hessian, gradient)
     }
 
-    /// Steps of the landmarks, by camera, that belong to a step of the unknowns.
+    /// Steps of the landmarks by camera, for a step of the other unknowns.
     pub(crate) fn landmark_steps(
         &self,
         layout: &Layout,
@@ -415,7 +417,7 @@ impl NormalEquations {
 }
 
 impl CameraEquations {
-    /// Carries what is known about the camera's poses on to the unknowns.
+    /// Adds the normal equations of the camera poses to those of the unknowns.
     fn add_to(
         &self,
         layout: &Layout,
@@ -448,7 +450,7 @@ impl CameraEquations {
         }
     }
 
-    /// Steps of the camera's poses that belong to a step of the unknowns.
+    /// Steps `[φ; δt]` of the camera poses, for a step of the unknowns.
     fn pose_steps(&self, layout: &Layout, step: &DVector<f64>) -> Vec<Vector6<f64>> {
         (0..layout.frames)
             .map(|slot| {

@@ -1,4 +1,4 @@
-//! From the window to the report of a step.
+//! Report of a step, from the window.
 
 use nalgebra::Vector2;
 
@@ -15,7 +15,7 @@ use crate::estimator::state::calibrations::MAIN;
 use crate::estimator::step_input::StepInput;
 use crate::geometry::median;
 
-/// A report that holds nothing but the calibration.
+/// Returns a report with the calibration only.
 pub(crate) fn empty_report(
     setup: &Setup,
     input: &StepInput<'_>,
@@ -51,7 +51,7 @@ pub(crate) fn empty_report(
 }
 
 impl WindowState {
-    /// The report of a solved window.
+    /// Returns the report of a solved window.
     pub(crate) fn report(
         &self,
         setup: &Setup,
@@ -145,7 +145,7 @@ impl WindowState {
                 }
             }));
         }
-        // Reports are kept: what growing left over is given back.
+        // Reports are stored: release unused capacity.
         reports.shrink_to_fit();
         reports
     }
@@ -164,7 +164,7 @@ impl WindowState {
                 }
             }));
         }
-        // Reports are kept: what growing left over is given back.
+        // Reports are stored: release unused capacity.
         landmarks.shrink_to_fit();
         landmarks
     }
@@ -200,7 +200,7 @@ impl WindowState {
     }
 }
 
-/// The standard deviation of a pixel that carries as much information as these do on average with their robust weights.
+/// Standard deviation of a pixel with the same information as these observations on average, robust weights included.
 fn effective_sigma(sigma_px: f64, features: &[FeatureReport]) -> f64 {
     let weights = || {
         let kept = features.iter().filter(|feature| !feature.rejected);

@@ -1,4 +1,4 @@
-//! Factors as whitened rows `[columns of the layout | residual]`, for the marginalization and for the report.
+//! Factors as whitened rows `[columns of the layout | residual]`, for marginalization and reports.
 
 use nalgebra::DMatrix;
 
@@ -11,7 +11,7 @@ use crate::estimator::state::layout::{POSE, VELOCITY_BIAS};
 use crate::optimization::CameraPose;
 
 impl Problem<'_> {
-    /// The reprojection factors, landmarks projected out; at most `6·frames` rows a camera.
+    /// Reprojection factors with landmarks projected out; at most `6·frames` rows per camera.
     pub(crate) fn visual_rows(&self, estimate: &Estimate) -> DMatrix<f64> {
         let frames = self.linearization_frames(estimate);
         let calibration = self.linearization_calibration(&estimate.calibration);
@@ -27,7 +27,7 @@ impl Problem<'_> {
         stack(&rows, self.layout.total() + 1)
     }
 
-    /// The reprojection factors of one camera by its poses; derivatives at `linearized`.
+    /// Reprojection factors of one camera with respect to its poses; derivatives at `linearized`.
     pub(crate) fn projected_rows(
         &self,
         camera: usize,
@@ -41,7 +41,7 @@ impl Problem<'_> {
         ProjectedRows::new(&factors.visual, &current, linearized, factors.tracks, landmarks, apart)
     }
 
-    /// Rows by the poses of a camera carried on to the unknowns.
+    /// Converts rows with respect to camera poses to rows with respect to the unknowns.
     pub(crate) fn carried_rows(&self, camera: usize, projected: &ProjectedRows, maps: &CameraMaps) -> DMatrix<f64> {
         let by_camera = &projected.rows;
         let total = self.layout.total();
@@ -57,12 +57,12 @@ impl Problem<'_> {
         rows
     }
 
-    /// The IMU factor that ends at `slot`, 15 rows, or none.
+    /// Rows of the IMU factor that ends at `slot`, 15 or none.
     pub(crate) fn imu_rows(&self, slot: usize, estimate: &Estimate) -> DMatrix<f64> {
         self.imu_rows_at(slot, estimate, &self.linearization_frames(estimate))
     }
 
-    /// [`Self::imu_rows`] with the states at which derivatives are taken.
+    /// [`Self::imu_rows`] with derivatives at `linearized`.
     pub(crate) fn imu_rows_at(&self, slot: usize, estimate: &Estimate, linearized: &[FrameState]) -> DMatrix<f64> {
         let total = self.layout.total();
         let Some((by_from, by_to, residual)) = self.imu_blocks(slot, estimate, linearized) else {
@@ -78,7 +78,7 @@ impl Problem<'_> {
         rows
     }
 
-    /// The encoder readings of a frame, a row each.
+    /// One row per encoder reading of a frame.
     pub(crate) fn encoder_rows(&self, slot: usize, estimate: &Estimate) -> DMatrix<f64> {
         let readings: Vec<_> = self.encoder_residuals(slot, estimate).collect();
         let clock = self.encoder_clock_column(estimate);
@@ -93,7 +93,7 @@ impl Problem<'_> {
         rows
     }
 
-    /// Zero-velocity updates, a row for each term.
+    /// One row per term of the zero-velocity updates.
     pub(crate) fn zero_velocity_rows(&self, terms: &[ZeroVelocityTerm]) -> DMatrix<f64> {
         let mut rows = DMatrix::zeros(terms.len(), self.layout.total() + 1);
         for (row, term) in terms.iter().enumerate() {
@@ -106,7 +106,7 @@ impl Problem<'_> {
         rows
     }
 
-    /// The marginalization prior and what was known at the start.
+    /// Rows of the marginalization prior and of the prior on the first frame.
     pub(crate) fn prior_rows(&self, estimate: &Estimate) -> DMatrix<f64> {
         let total = self.layout.total();
         let window_prior = self.prior.map_or_else(
@@ -121,7 +121,7 @@ impl Problem<'_> {
         stack(&[window_prior, rows], total + 1)
     }
 
-    /// The rig's prior on the calibration.
+    /// Rows of the rig's prior on the calibration.
     pub(crate) fn calibration_prior_rows(&self, estimate: &Estimate) -> DMatrix<f64> {
         let total = self.layout.total();
         if self.layout.calibration == 0 {
@@ -135,12 +135,12 @@ impl Problem<'_> {
     }
 }
 
-/// One matrix above the other.
+/// Stacks matrices with the same number of columns.
 pub(crate) fn stack(parts: &[DMatrix<f64>], columns: usize) -> DMatrix<f64> {
     stack_columns(parts, 0..columns)
 }
 
-/// These columns of the matrices, one above the other.
+/// Stacks the given columns of matrices.
 pub(crate) fn stack_columns(parts: &[DMatrix<f64>], columns: impl ExactSizeIterator<Item = usize>) -> DMatrix<f64> {
     let height = parts.iter().map(DMatrix::nrows).sum();
     let mut stacked = DMatrix::zeros(height, columns.len());

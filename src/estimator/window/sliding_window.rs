@@ -1,4 +1,4 @@
-//! A running window: one step predicts, observes, solves, rejects outliers, decides about keyframes and makes room.
+//! The running window. A step predicts, solves, rejects outliers, selects keyframes and removes a frame.
 
 use super::calibration_columns::calibration_estimate;
 use super::consistency::ConsistencyMonitor;
@@ -18,12 +18,12 @@ use crate::estimator::step_input::StepInput;
 use crate::geometry::{RigidTransform, median, seconds_from_ns};
 use crate::gimbal::SWITCH_MARGIN;
 
-/// Distance of a scene without triangulated landmarks.
+/// Assumed distance of a scene without triangulated landmarks.
 const UNKNOWN_DISTANCE_M: f64 = 10.0;
-/// A scene counts as no farther than this.
+/// Upper bound of the distance of a scene.
 const FARTHEST_USUAL_M: f64 = 100.0;
 
-/// A running window, and what is watched from step to step.
+/// A running window with its monitors.
 #[derive(Clone, Debug)]
 pub(crate) struct SlidingWindow {
     pub(crate) state: WindowState,
@@ -37,9 +37,9 @@ pub(crate) struct SlidingWindow {
 /// The window has failed.
 #[derive(Debug)]
 pub(crate) struct WindowFailure {
-    /// What happened in the step, the failure last.
+    /// Events of the step, the failure last.
     pub(crate) events: Vec<Event>,
-    /// The last pose before the failure, `None` when none is finite.
+    /// Last pose before the failure, `None` when none is finite.
     pub(crate) last_pose: Option<RigidTransform>,
 }
 
@@ -55,7 +55,7 @@ impl SlidingWindow {
         }
     }
 
-    /// Takes in one image's tracks with the IMU samples before it.
+    /// Processes the tracks of an image with the IMU samples before it.
     pub(crate) fn step(&mut self, setup: &Setup, input: &StepInput<'_>) -> Result<StepReport, WindowFailure> {
         let newest_stamp_ns = self.state.frames.newest().stamp_ns;
         if input.stamp_ns <= newest_stamp_ns {
@@ -102,7 +102,7 @@ impl SlidingWindow {
         self.state.heap_bytes()
     }
 
-    /// An image that is not later than the newest one changes nothing.
+    /// Skips an image that is not later than the newest one.
     fn skip(&self, setup: &Setup, input: &StepInput<'_>, newest_stamp_ns: i64) -> StepReport {
         let calibration = calibration_estimate(setup, &self.state.calibration, &self.calibration_sigmas);
         let mut report = empty_report(setup, input, Phase::Tracking, calibration);
@@ -123,7 +123,7 @@ impl SlidingWindow {
         WindowFailure { events, last_pose: self.state.frames.iter().rev().find(is_good).map(pose) }
     }
 
-    /// Adds the frame of `input` behind the newest one, its state predicted; a failure when IMU samples are missing.
+    /// Adds the frame of `input` with a predicted state; a failure when IMU samples are missing.
     fn push_frame(&mut self, setup: &Setup, input: &StepInput<'_>) -> Result<(), Event> {
         let window = &mut self.state;
         let last = window.frames.newest();
@@ -176,7 +176,7 @@ impl SlidingWindow {
         Some(event)
     }
 
-    /// Switches the minimal parameterization when the chain comes near its singularity and the configuration allows it.
+    /// Switches the minimal parameterization near its singularity, if the configuration allows it.
     fn switch_near_singularity(&mut self, setup: &Setup) -> Option<Event> {
         if !setup.config.auto_parameterize || self.state.calibration.dof() == 0 {
             return None;

@@ -1,4 +1,4 @@
-//! One solve of the window: triangulate, minimize, find outliers.
+//! One solve of the window: triangulation, minimization, outlier rejection.
 
 use nalgebra::Vector2;
 
@@ -16,17 +16,17 @@ use crate::optimization::RelativePoses;
 /// Reprojection residuals in pixels, by track and observation; `None` behind the camera.
 pub(crate) type TrackResiduals = Vec<Vec<Option<Vector2<f64>>>>;
 
-/// What a solve of the window used and found, for the report.
+/// Input and result of a solve, for the report.
 #[derive(Clone, Debug)]
 pub(crate) struct SolvedWindow {
-    /// By camera, with the landmarks as they were before.
+    /// Tracks by camera, with the landmarks before the solve.
     pub(crate) cameras: Vec<ActiveTracks>,
     pub(crate) solution: Solution,
-    /// By camera.
+    /// Residuals and outliers by camera.
     pub(crate) checks: Vec<TrackChecks>,
 }
 
-/// How well the tracks of one camera fit.
+/// Residuals and outliers of one camera's tracks.
 #[derive(Clone, Debug)]
 pub(crate) struct TrackChecks {
     pub(crate) residuals_before: TrackResiduals,
@@ -35,7 +35,7 @@ pub(crate) struct TrackChecks {
 }
 
 impl WindowState {
-    /// Solves the window, takes over the estimate and marks features that do not fit as rejected.
+    /// Solves the window, applies the estimate and marks outliers as rejected.
     pub(crate) fn solve(&mut self, setup: &Setup, iterations: usize) -> SolvedWindow {
         let options = &setup.config.options;
         self.frames.reintegrate(options);
@@ -71,7 +71,7 @@ impl WindowState {
         SolvedWindow { cameras, solution, checks }
     }
 
-    /// Drops rejected features; a track that goes on is a new feature from its next observation.
+    /// Drops rejected features; a track that continues is a new feature from its next observation on.
     pub(crate) fn drop_rejected(&mut self, solved: &SolvedWindow, options: &EstimatorOptions, events: &mut Vec<Event>) {
         let (mut count, mut all) = (0, 0);
         for (features, (active, checks)) in self.features.iter_mut().zip(solved.cameras.iter().zip(&solved.checks)) {

@@ -1,4 +1,4 @@
-//! Levenberg–Marquardt on the window, the landmarks eliminated.
+//! Levenberg–Marquardt on the window with landmarks eliminated.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -10,20 +10,20 @@ use crate::optimization::dense::Cholesky;
 /// Limits of a solve.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SolverLimits {
-    /// Most steps tried, taken or not.
+    /// Largest number of tried steps, accepted or not.
     pub(crate) iterations: usize,
-    /// Ends when a step lowers the cost by less than this share.
+    /// Converged when a step lowers the cost by less than this fraction.
     pub(crate) relative_cost_tolerance: f64,
 }
 
-/// What a solve left behind.
+/// Result of a solve.
 #[derive(Clone, Debug)]
 pub(crate) struct Solution {
     pub(crate) estimate: Estimate,
     pub(crate) costs_before: Costs,
     pub(crate) costs_after: Costs,
     pub(crate) iterations: Vec<IterationReport>,
-    /// Covariance of the calibration at the last linearization, the rest marginalized; empty without calibration.
+    /// Posterior covariance of the calibration at the last linearization; empty without calibration.
     pub(crate) calibration_covariance: DMatrix<f64>,
 }
 
@@ -35,10 +35,10 @@ impl Solution {
     }
 }
 
-/// Added to the diagonal so that an unknown without any factor stays where it is.
+/// Added to the diagonal so that unknowns without a factor do not move.
 const FLOOR: f64 = 1e-6;
 
-/// Lowers the cost from `start`.
+/// Minimizes the cost from `start`.
 pub(crate) fn solve(problem: &Problem<'_>, start: Estimate, limits: SolverLimits) -> Solution {
     let first = problem.layout.calibration().start;
     let fixed = start.calibration.frozen_columns().into_iter().map(|column| first + column).collect();
@@ -71,14 +71,14 @@ pub(crate) fn solve(problem: &Problem<'_>, start: Estimate, limits: SolverLimits
     }
 }
 
-/// The window's problem as the damped solver sees it.
+/// The window's problem for the damped solver.
 struct DampedWindow<'a> {
     problem: &'a Problem<'a>,
-    /// Columns of parameters that are not estimated at present.
+    /// Columns of fixed parameters.
     fixed: Vec<usize>,
-    /// Norm of each step whose equations were solved.
+    /// Norm of each solved step.
     step_norms: Vec<f64>,
-    /// Of the last such step.
+    /// Posterior covariance of the calibration at the last solved step.
     calibration_covariance: DMatrix<f64>,
 }
 
@@ -93,7 +93,7 @@ impl DampedWindow<'_> {
         Evaluated { costs: self.problem.costs(&estimate), estimate }
     }
 
-    /// Covariance of the calibration, the rest marginalized; zero where it is fixed.
+    /// Posterior covariance of the calibration, other unknowns marginalized; zero for fixed parameters.
     fn covariance(&self, factor: &Cholesky) -> DMatrix<f64> {
         let layout = &self.problem.layout;
         let mut covariance = factor.trailing_covariance(layout.calibration);
@@ -132,7 +132,7 @@ impl DampedProblem for DampedWindow<'_> {
     }
 }
 
-/// Takes unknowns out of the normal equations: their steps become zero, whatever the factors say.
+/// Removes unknowns from the normal equations: their steps become zero.
 fn fix(fixed: &[usize], hessian: &mut DMatrix<f64>, gradient: &mut DVector<f64>) {
     for column in fixed {
         hessian.row_mut(*column).fill(0.0);

@@ -1,8 +1,8 @@
-//! Detects a stationary vehicle while the window runs.
+//! Detection of a stationary vehicle in the running window.
 //!
-//! A landed vehicle sees no parallax, so that new features get no depth and the old ones are lost one by one; without
-//! zero-velocity updates IMU-only propagation would drift. Two criteria must agree: IMU samples of little variance (a
-//! hovering multirotor turns by more), and an image that stays the same once rotation is compensated (a gimbal may turn on
+//! A landed vehicle has no parallax: new features get no depth and old ones are lost. Without zero-velocity
+//! updates the IMU-only propagation would drift. Two criteria must hold: a small variance of the IMU samples (a
+//! hovering multirotor rotates more), and a constant image after rotation compensation (a gimbal may rotate on
 //! the ground).
 
 use std::collections::VecDeque;
@@ -18,28 +18,28 @@ use crate::frontend::{FeatureId, TrackedFeature};
 use crate::geometry::seconds_from_ns;
 use crate::sensors::ImuNoise;
 
-/// Both criteria must hold for this long.
+/// Both criteria must hold for this time.
 const QUIET_NS: i64 = 1_000_000_000;
 
-/// Largest standard deviation of the angular velocity (worst axis, averaged from image to image), beyond the sensor's own.
+/// Largest standard deviation of the angular velocity (worst axis, averaged between images), beyond the sensor noise.
 const MAX_ANGULAR_RATE_SPREAD_RAD_PER_S: f64 = 0.002;
 
-/// Largest mean angular velocity once the known bias is taken off (worst axis).
+/// Largest mean angular velocity after bias correction (worst axis).
 const MAX_ANGULAR_RATE_RAD_PER_S: f64 = 0.01;
 
-/// Largest standard deviation of the specific force (worst axis, averaged from image to image), beyond the sensor's own.
+/// Largest standard deviation of the specific force (worst axis, averaged between images), beyond the sensor noise.
 const MAX_FORCE_SPREAD_M_PER_S2: f64 = 0.03;
 
 /// Largest rotation-compensated parallax since the vehicle became stationary.
 const MAX_PARALLAX_RAD: f64 = 0.004;
 
-/// Estimated speed above which nothing is detected: something fast over a far scene shows no parallax either.
+/// Largest estimated velocity: fast motion over a distant scene has no parallax either.
 const MAX_VELOCITY_M_PER_S: f64 = 0.5;
 
-/// Fewest features in common with the reference image.
+/// Smallest number of common features with the reference image.
 const MIN_COMMON: usize = 12;
 
-/// Smallest parallax that an image is believed to resolve: a tenth of a pixel at usual focal lengths.
+/// Resolution of the parallax: a tenth of a pixel at usual focal lengths.
 const MIN_PARALLAX_RAD: f64 = 2e-4;
 
 /// Angular velocity and specific force from one image to the next.
@@ -51,7 +51,7 @@ struct Interval {
     specific_force_m_per_s2: Vector3<f64>,
 }
 
-/// The image that later ones are compared with.
+/// Reference image of the parallax.
 #[derive(Clone, Debug)]
 struct Reference {
     bearings: Vec<(FeatureId, Vector3<f64>)>,
@@ -61,15 +61,15 @@ struct Reference {
 /// Detects a stationary vehicle, image by image.
 #[derive(Clone, Debug)]
 pub(crate) struct StationaryDetector {
-    /// Of the last second and a little more.
+    /// Intervals of the last second and a little more.
     intervals: VecDeque<Interval>,
     reference: Option<Reference>,
-    /// Since when the image has not moved.
+    /// Stamp since which the image has been constant.
     unmoved_since_ns: i64,
-    /// Since when the vehicle is stationary, once that is image.
+    /// Start of the stationary phase, once detected.
     stationary_since_ns: Option<i64>,
-    /// How long the image must have been unmoved. Where it moved although the IMU samples were quiet, the vehicle creeps:
-    /// then it must stay unmoved for twice as long as that took.
+    /// Required time of a constant image. An image that moves while the IMU samples are quiet means slow motion:
+    /// the image must then be constant for twice the time of that motion.
     required_ns: i64,
 }
 
@@ -85,7 +85,7 @@ impl Default for StationaryDetector {
     }
 }
 
-/// A new image, and what the window has estimated before it.
+/// A new image with the previous estimate of the window.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Observed<'a> {
     /// The features of the leading camera.
@@ -94,12 +94,12 @@ pub(crate) struct Observed<'a> {
     pub(crate) bias: &'a ImuBias,
     pub(crate) velocity_norm_m_per_s: f64,
     pub(crate) imu_from_camera: UnitQuaternion<f64>,
-    /// Usual distance of the scene.
+    /// Median distance of the scene, in metres.
     pub(crate) distance_m: f64,
 }
 
 impl StationaryDetector {
-    /// Takes in an image; a zero-velocity update and an event when the vehicle is stationary there.
+    /// Processes an image; returns a zero-velocity update and an event when the vehicle is stationary.
     pub(crate) fn observe(&mut self, input: &StepInput<'_>, image: &Observed<'_>) -> Option<(Stationary, Event)> {
         self.take_interval(input);
         let before_ns = self.unmoved_since_ns;
@@ -169,7 +169,8 @@ impl StationaryDetector {
         }
     }
 
-    /// Rotation-compensated parallax against the reference image; an image that has moved too far becomes the reference.
+    /// Rotation-compensated parallax against the reference image; an image with too much parallax becomes the
+    /// reference.
     fn compare_image(&mut self, stamp_ns: i64, image: &Observed<'_>) -> Option<f64> {
         let (features, imu_from_camera) = (image.features, image.imu_from_camera);
         let parallax_rad = self.reference.as_ref().and_then(|reference| {
@@ -184,12 +185,12 @@ impl StationaryDetector {
             if pairs.len() < MIN_COMMON {
                 return None;
             }
-            // The vehicle's own rotation is left to the gyroscope: a stationary vehicle has none.
+            // The gyroscope checks the vehicle's own rotation: a stationary vehicle has none.
             let guess = imu_from_camera.inverse() * reference.imu_from_camera;
             Some(fit_rotation(&pairs, &guess)?.median_parallax_rad)
         });
         let moved = parallax_rad.is_none_or(|parallax_rad| parallax_rad > MAX_PARALLAX_RAD);
-        // Tracks end in a stationary image, too: detection goes on from the newest image before too few are left.
+        // Tracks end in a constant image, too: the newest image with enough common features becomes the reference.
         let fading = self.reference.is_some() && parallax_rad.is_none() && self.stationary_since_ns.is_some();
         if moved {
             let bearings = features.iter().map(|feature| (feature.id, feature.bearing)).collect();
@@ -201,7 +202,7 @@ impl StationaryDetector {
         if fading && features.len() >= MIN_COMMON { Some(MAX_PARALLAX_RAD) } else { parallax_rad }
     }
 
-    /// Standard deviations of the last second's samples, `None` while that much is not there.
+    /// Standard deviations of the last second's samples, `None` without a full second.
     fn spread(&self, stamp_ns: i64, image: &Observed<'_>) -> Option<Spread> {
         let first = self.intervals.front()?;
         let begin_ns = first.end_ns - (first.duration_s * 1e9) as i64;
@@ -224,7 +225,7 @@ impl StationaryDetector {
     }
 }
 
-/// How much the IMU samples vary, with the limits.
+/// Spread of the IMU samples with its limits.
 #[derive(Clone, Copy, Debug)]
 struct Spread {
     angular_rate: f64,
@@ -242,7 +243,7 @@ impl Spread {
     }
 }
 
-/// Mean, and the largest standard deviation of the components.
+/// Mean, and largest standard deviation over the components.
 fn mean_and_spread(values: impl Iterator<Item = Vector3<f64>> + Clone) -> (Vector3<f64>, f64) {
     let count = values.clone().count().max(1) as f64;
     let mean = values.clone().sum::<Vector3<f64>>() / count;
