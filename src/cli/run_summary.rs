@@ -87,7 +87,7 @@ pub(crate) fn describe(folder: &Path, summary: &RunSummary) -> String {
 
 /// Spurious information of the priors along the unobservable directions.
 fn spurious_information(known: &[export::KnownLossSummary]) -> String {
-    let claimed = known.iter().map(|known| known.largest_false_gain).filter(|gain| *gain > MIN_SPURIOUS_GAIN);
+    let claimed = known.iter().map(|known| known.largest_spurious_gain).filter(|gain| *gain > MIN_SPURIOUS_GAIN);
     match (claimed.clone().count(), claimed.fold(0.0, f64::max)) {
         (0, _) => "no spurious information".to_owned(),
         (count, most) => format!("spurious information on {count}, up to {most:.2} (1: σ of 10° or 3 cm)"),

@@ -142,7 +142,8 @@ pub struct CalibrationReport {
     /// Start and end of the used interval, in seconds since the log began.
     pub stretch_s: [f64; 2],
     /// Number of synchronized frame sets whose states were estimated.
-    pub instants: usize,
+    #[serde(rename = "instants")]
+    pub frame_sets: usize,
     /// Name of the parameterization of the estimated chain.
     pub parameterization: String,
     /// Reprojection errors of the static camera's calibration alone.
@@ -181,7 +182,7 @@ pub fn report_calibration(run: &CalibrationRun) -> CalibrationReport {
     CalibrationReport {
         log: log_name(&run.log_path),
         stretch_s: [seconds_from_ns(outcome.stretch_ns.0), seconds_from_ns(outcome.stretch_ns.1)],
-        instants: outcome.frame_sets,
+        frame_sets: outcome.frame_sets,
         parameterization: outcome.parameterization.to_string(),
         camera_imu_reprojection: (&outcome.static_pixels).into(),
         reprojection: outcome.pixels.iter().map(Into::into).collect(),
@@ -261,8 +262,8 @@ fn parameters(run: &CalibrationRun) -> Vec<ParameterReport> {
 
 fn mount_parameters(run: &CalibrationRun, mount: &ExtrinsicsReport) -> Vec<ParameterReport> {
     let values = |transform: &RigidTransform| {
-        let (turn, shift) = (so3::log(&transform.rotation), transform.translation_m);
-        [turn.x, turn.y, turn.z, shift.x, shift.y, shift.z]
+        let (rotation_vector, shift) = (so3::log(&transform.rotation), transform.translation_m);
+        [rotation_vector.x, rotation_vector.y, rotation_vector.z, shift.x, shift.y, shift.z]
     };
     let ground_truth = run.ground_truth_rig.as_ref().and_then(|rig| true_mount(rig, &run.static_camera));
     let (initial, last) = (values(&mount.initial), values(&mount.imu_from_camera));
@@ -332,7 +333,7 @@ impl fmt::Display for CalibrationReport {
         writeln!(
             f,
             "Offline calibration from {}, {:.2} to {:.2} s, {} instants, {} form",
-            self.log, self.stretch_s[0], self.stretch_s[1], self.instants, self.parameterization
+            self.log, self.stretch_s[0], self.stretch_s[1], self.frame_sets, self.parameterization
         )?;
         let line = |f: &mut fmt::Formatter<'_>, name: &str, unit: &str, s: &StatisticsReport| {
             writeln!(

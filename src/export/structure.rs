@@ -19,7 +19,8 @@ pub struct KnownLossSummary {
     pub largest_response: f64,
     /// Largest spurious information of the priors along it (1 corresponds to σ of 10° or 3 cm); zero with
     /// first-estimate Jacobians.
-    pub largest_false_gain: f64,
+    #[serde(rename = "largest_false_gain")]
+    pub largest_spurious_gain: f64,
 }
 
 /// The known losses of a run in the order of their first step.
@@ -29,8 +30,9 @@ pub(super) fn known_losses(run: &RunRecord, names: &ParameterNames) -> Vec<Known
         for known in &rank.known {
             let place = found.iter().position(|(loss, _)| *loss == known.loss).unwrap_or_else(|| {
                 let reason = known.loss.reason(rank.joint_count, names);
-                let (largest_response, largest_false_gain) = (0.0, 0.0);
-                let summary = KnownLossSummary { reason, steps: 0, agreeing: 0, largest_response, largest_false_gain };
+                let (largest_response, largest_spurious_gain) = (0.0, 0.0);
+                let summary =
+                    KnownLossSummary { reason, steps: 0, agreeing: 0, largest_response, largest_spurious_gain };
                 found.push((known.loss, summary));
                 found.len() - 1
             });
@@ -38,7 +40,7 @@ pub(super) fn known_losses(run: &RunRecord, names: &ParameterNames) -> Vec<Known
             summary.steps += 1;
             summary.agreeing += usize::from(known.agrees);
             summary.largest_response = summary.largest_response.max(known.response);
-            summary.largest_false_gain = summary.largest_false_gain.max(known.spurious_gain);
+            summary.largest_spurious_gain = summary.largest_spurious_gain.max(known.spurious_gain);
         }
     }
     found.into_iter().map(|(_, summary)| summary).collect()

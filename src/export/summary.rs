@@ -443,8 +443,8 @@ fn timing_summary(run: &RunRecord) -> Option<TimingSummary> {
     let stage = |time_of: fn(&StageTimes) -> f64| {
         let mut sorted: Vec<f64> = times.iter().map(|times| time_of(times)).collect();
         sorted.sort_by(f64::total_cmp);
-        let at = |share: f64| {
-            sorted.get(((sorted.len() as f64 * share) as usize).min(sorted.len().saturating_sub(1))).copied()
+        let at = |fraction: f64| {
+            sorted.get(((sorted.len() as f64 * fraction) as usize).min(sorted.len().saturating_sub(1))).copied()
         };
         Some(StageSummary { p50: at(0.5)?, p95: at(0.95)?, max: at(1.0)? })
     };

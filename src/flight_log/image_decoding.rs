@@ -9,7 +9,7 @@ use super::messages::{ImageMessage, MessageKind, read_compressed_image, read_ima
 use crate::sensors::GrayImage;
 
 /// Larger images are refused: no camera has them, so the header is damaged.
-const LARGEST_SIDE_PX: usize = 16_384;
+const MAX_SIDE_PX: usize = 16_384;
 /// The first bytes of every PNG.
 const PNG: [u8; 4] = [0x89, b'P', b'N', b'G'];
 
@@ -81,7 +81,7 @@ pub(crate) fn decode_image(kind: MessageKind, message: &[u8], depth: BitDepth) -
 
 fn gray_from_raw(raw: &ImageMessage<'_>, depth: BitDepth) -> Result<GrayImage, String> {
     let (width, height) = (raw.width, raw.height);
-    if width == 0 || height == 0 || width > LARGEST_SIDE_PX || height > LARGEST_SIDE_PX {
+    if width == 0 || height == 0 || width > MAX_SIDE_PX || height > MAX_SIDE_PX {
         return Err(format!("image of {width}×{height} pixels"));
     }
     let bytes_per_pixel = match raw.encoding {
@@ -124,8 +124,8 @@ fn luma(red: u8, green: u8, blue: u8) -> u8 {
 fn decoder(data: &[u8], codec: ImageFormat) -> CodecReader<Cursor<&[u8]>> {
     let mut reader = CodecReader::with_format(Cursor::new(data), codec);
     let mut limits = Limits::default();
-    limits.max_image_width = Some(LARGEST_SIDE_PX as u32);
-    limits.max_image_height = Some(LARGEST_SIDE_PX as u32);
+    limits.max_image_width = Some(MAX_SIDE_PX as u32);
+    limits.max_image_height = Some(MAX_SIDE_PX as u32);
     reader.limits(limits);
     reader
 }

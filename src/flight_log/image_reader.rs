@@ -80,7 +80,7 @@ impl ImageReader {
             path: self.log.path().to_owned(),
         })?;
         let key = (number, index);
-        if let Some(found) = cache.images.iter().position(|(held, _)| *held == key) {
+        if let Some(found) = cache.images.iter().position(|(cached, _)| *cached == key) {
             let entry = cache.images.remove(found);
             let image = Arc::clone(&entry.1);
             cache.images.push(entry);

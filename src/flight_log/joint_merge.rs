@@ -7,7 +7,7 @@ use crate::geometry::wrap_angle;
 use crate::sensors::JointSample;
 
 /// Readings of a joint further apart than this are not interpolated.
-const LONGEST_GAP_NS: i64 = 200_000_000;
+const MAX_GAP_NS: i64 = 200_000_000;
 
 /// One message: an angle in radians for each of the rig's joints that it names.
 #[derive(Clone, Debug, PartialEq)]
@@ -63,7 +63,7 @@ impl JointMerge {
                     queue.pop_front();
                 }
             }
-            let late = self.ended || self.newest_ns - stamp_ns > LONGEST_GAP_NS;
+            let late = self.ended || self.newest_ns - stamp_ns > MAX_GAP_NS;
             let known = |queue: &VecDeque<(i64, f64)>| queue.back().is_some_and(|(last_ns, _)| *last_ns >= stamp_ns);
             if !late && !self.readings.iter().all(known) {
                 return None;
@@ -86,7 +86,7 @@ fn angle_at(readings: &VecDeque<(i64, f64)>, stamp_ns: i64) -> Option<f64> {
     let (after_ns, after) = *readings.get(1)?;
     let gap_ns = after_ns - before_ns;
     let fraction = (stamp_ns - before_ns) as f64 / gap_ns as f64;
-    (gap_ns <= LONGEST_GAP_NS).then(|| before + fraction * wrap_angle(after - before))
+    (gap_ns <= MAX_GAP_NS).then(|| before + fraction * wrap_angle(after - before))
 }
 
 #[cfg(test)]

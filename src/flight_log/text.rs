@@ -40,14 +40,14 @@ pub fn printable_lines(text: &str) -> Cow<'_, str> {
     escaped(text, |letter| letter == '\n' || letter == '\t')
 }
 
-/// A printable name of at most `most` characters, its middle replaced by an ellipsis where it is longer.
-pub fn shortened(name: &str, most: usize) -> Cow<'_, str> {
+/// A printable name of at most `max_length` characters, its middle replaced by an ellipsis where it is longer.
+pub fn shortened(name: &str, max_length: usize) -> Cow<'_, str> {
     let name = printable(name);
     let count = name.chars().count();
-    if count <= most {
+    if count <= max_length {
         return name;
     }
-    let kept = most.saturating_sub(1);
+    let kept = max_length.saturating_sub(1);
     let head: String = name.chars().take(kept.div_ceil(2)).collect();
     let tail: String = name.chars().skip(count - kept / 2).collect();
     Cow::Owned(format!("{head}…{tail}"))

@@ -70,15 +70,15 @@ fn cases_with_missing_data() -> Vec<(&'static str, Recording, i64)> {
         }
         step.rank = None;
     }
-    let mut instant = whole.clone();
-    instant.duration_ns = 0;
+    let mut single_stamp = whole.clone();
+    single_stamp.duration_ns = 0;
     let end_ns = whole.duration_ns;
     vec![
         ("no-runs", no_runs, end_ns),
         ("no-steps", no_steps, end_ns),
         ("no-truth", no_ground_truth, end_ns),
         ("rigid", rigid, end_ns),
-        ("instant", instant, 0),
+        ("instant", single_stamp, 0),
         ("initializing", whole.clone(), SECOND_NS),
         ("before", whole.clone(), -5),
         ("after", whole, 9 * end_ns),

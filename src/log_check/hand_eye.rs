@@ -12,28 +12,28 @@ use crate::gimbal::ClassicalChain;
 use crate::sensors::{CameraMount, CameraRig, Rig};
 
 /// Minimum number of image rotations.
-const FEWEST_ROTATIONS: usize = 20;
+const MIN_ROTATIONS: usize = 20;
 /// Minimum median rotation between two images.
-const LEAST_ROTATION_RAD: f64 = 0.003;
+const MIN_ROTATION_RAD: f64 = 0.003;
 /// Largest time offset that is searched, either sign.
-const LARGEST_OFFSET_S: f64 = 0.15;
+const MAX_OFFSET_S: f64 = 0.15;
 /// Step of that search.
 const OFFSET_STEP_S: f64 = 0.005;
 /// Time offset that is reported: a twelfth of the image interval at 20 Hz; rolling shutter and exposure shift stamps by
 /// less.
 const OFFSET_TOLERANCE_S: f64 = 0.004;
 /// Minimum relative decrease of the squared misfit by a time offset.
-const LEAST_GAIN: f64 = 0.2;
+const MIN_GAIN: f64 = 0.2;
 /// Error of a camera's orientation that is tolerated.
 const ROTATION_TOLERANCE_RAD: f64 = 0.07;
 /// A larger error is a wrong matrix and not an inaccuracy.
 const WRONG_ROTATION_RAD: f64 = 0.35;
 /// Largest ratio of misfit to rotation at which the prediction is usable; noisy encoders under a stabilized camera exceed
 /// it.
-const MOST_NOISE: f64 = 0.5;
+const MAX_NOISE_RATIO: f64 = 0.5;
 /// Smallest ratio of the second singular value to the first; below it all rotations are about one axis, and the rotation
 /// about that axis is unobservable.
-const LEAST_SPREAD: f64 = 0.02;
+const MIN_SPREAD: f64 = 0.02;
 
 /// Predicted and measured rotation vector in the camera frame, in radians.
 type Pair = (Vector3<f64>, Vector3<f64>);
@@ -56,11 +56,11 @@ pub(super) fn check_against_gyroscope(
     findings: &mut Findings,
 ) {
     let rotations: Vec<_> = rotations.iter().filter(|rotation| rotation.camera_key == camera.key).collect();
-    let Some(chain) = rig.chain_of_camera(&camera.key).filter(|_| rotations.len() >= FEWEST_ROTATIONS) else { return };
+    let Some(chain) = rig.chain_of_camera(&camera.key).filter(|_| rotations.len() >= MIN_ROTATIONS) else { return };
     let hand_eye = HandEye { survey, inertial, camera, rotations };
     let given = hand_eye.pairs(&chain, 0.0);
     let angles_rad: Vec<f64> = given.iter().map(|(_, measured)| measured.norm()).collect();
-    if given.len() < FEWEST_ROTATIONS || median(&angles_rad) < LEAST_ROTATION_RAD {
+    if given.len() < MIN_ROTATIONS || median(&angles_rad) < MIN_ROTATION_RAD {
         let title = format!("{} rotates too little to check its extrinsics", camera.key);
         let evidence =
             format!("{} image rotations, {:.2}° in the median", given.len(), median(&angles_rad).to_degrees());
@@ -97,7 +97,7 @@ impl HandEye<'_> {
             let pairs = self.pairs(chain, offset_s);
             best_rotation(&pairs).map_or(f64::INFINITY, |(error, _)| misfit_rad(&pairs, &error))
         };
-        let steps = (LARGEST_OFFSET_S / OFFSET_STEP_S).round() as i32;
+        let steps = (MAX_OFFSET_S / OFFSET_STEP_S).round() as i32;
         let costs: Vec<(f64, f64)> =
             (-steps..=steps).map(|step| f64::from(step) * OFFSET_STEP_S).map(|offset| (offset, cost(offset))).collect();
         let best = (0..costs.len()).min_by(|a, b| costs[*a].1.total_cmp(&costs[*b].1)).unwrap_or(0);
@@ -112,13 +112,13 @@ impl HandEye<'_> {
         );
         let far = costs.iter().filter(|(offset, _)| (offset - offset_s).abs() > 0.05).map(|(_, cost)| *cost);
         let gain = |from: f64| 1.0 - (least / from.max(f64::MIN_POSITIVE)).powi(2);
-        if least > MOST_NOISE * rotation_rad || gain(far.fold(f64::INFINITY, f64::min)) < LEAST_GAIN {
+        if least > MAX_NOISE_RATIO * rotation_rad || gain(far.fold(f64::INFINITY, f64::min)) < MIN_GAIN {
             let title = format!("the time offset of {key} is unobservable from its rotations");
             let remedy = "rotate faster, or use a calibration such as Kalibr's timeshift_cam_imu";
             findings.add(Severity::Note, Area::Time, title, evidence, remedy);
             return 0.0;
         }
-        if offset_s.abs() < OFFSET_TOLERANCE_S || gain(unshifted) < LEAST_GAIN {
+        if offset_s.abs() < OFFSET_TOLERANCE_S || gain(unshifted) < MIN_GAIN {
             findings.good(Area::Time, format!("{key} and the gyroscope are synchronized"), evidence);
             return 0.0;
         }
@@ -150,7 +150,7 @@ impl HandEye<'_> {
                 "write the inverse of {field}: T_a_b maps points from b to a (Kalibr: T_cam_imu from the IMU to the camera)"
             );
             findings.add(Severity::Error, Area::Extrinsics, title, evidence, remedy);
-        } else if corrected > MOST_NOISE * rotation_rad {
+        } else if corrected > MAX_NOISE_RATIO * rotation_rad {
             let title = format!("the rotations of {key} are predicted too inaccurately to check its orientation");
             let remedy = if self.camera.mount == CameraMount::Gimbal {
                 "encoder noise is as large as the rotations: record with the gimbal fixed, or see the findings on encoders"
@@ -158,7 +158,7 @@ impl HandEye<'_> {
                 "images and gyroscope are inconsistent: see the findings on time and intrinsics"
             };
             findings.add(Severity::Note, Area::Extrinsics, title, evidence, remedy);
-        } else if spread < LEAST_SPREAD {
+        } else if spread < MIN_SPREAD {
             let title = format!("{key} rotated about one axis only: its orientation cannot be checked");
             findings.add(Severity::Note, Area::Extrinsics, title, evidence, "rotate about all axes");
         } else if error.angle() > ROTATION_TOLERANCE_RAD && corrected < 0.8 * given {

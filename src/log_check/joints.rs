@@ -5,7 +5,7 @@ use crate::geometry::{seconds_from_ns, wrap_angle};
 use crate::sensors::{GimbalRig, Joint, Rig};
 
 /// With a smaller range of motion over the log the parameters of a joint are unobservable.
-const SMALLEST_RANGE_RAD: f64 = 0.05;
+const MIN_RANGE_RAD: f64 = 0.05;
 /// A reading this close to a limit counts as at the limit.
 const AT_LIMIT_RAD: f64 = 0.01;
 
@@ -93,7 +93,7 @@ fn check_joint(survey: &Survey, gimbal: &GimbalRig, number: usize, joint: &Joint
     let white = white_sigma(&values);
     // The range without the noise of single readings.
     let moved = percentile(&values, 0.98) - percentile(&values, 0.02) - 4.0 * white;
-    if moved < SMALLEST_RANGE_RAD {
+    if moved < MIN_RANGE_RAD {
         let title = format!("'{name}' hardly moves");
         let remedy = "its static parameters are unobservable without joint motion: record with the joint moving, or keep them fixed";
         findings.add(Severity::Warning, Area::Encoders, title, range, remedy);

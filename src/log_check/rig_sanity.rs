@@ -6,7 +6,7 @@ use crate::flight_log::FlightLog;
 use crate::sensors::{CameraRig, ChainPrior, GimbalRig, Rig};
 
 /// A camera further from the IMU than this is unusual on a drone.
-const LONGEST_LEVER_M: f64 = 1.0;
+const MAX_LEVER_M: f64 = 1.0;
 /// Difference of the log's intrinsics from the rig's that is reported, as a ratio of the focal length.
 const INTRINSICS_TOLERANCE: f64 = 0.02;
 
@@ -131,7 +131,7 @@ fn check_chain(gimbal: &GimbalRig, findings: &mut Findings) {
         }
     }
     let evidence = format!("the gimbal camera is up to {farthest:.3} m from the IMU");
-    if farthest > LONGEST_LEVER_M {
+    if farthest > MAX_LEVER_M {
         let remedy = "lengths are in metres: check d, a and the translations of T_I_B and T_E_C";
         findings.add(Severity::Warning, Area::Extrinsics, "the gimbal chain is unusually long", evidence, remedy);
     } else {

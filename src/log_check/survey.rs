@@ -16,7 +16,7 @@ const IMAGES_PER_CAMERA: u64 = 60;
 /// Half length of the encoder readings that a parabola is fitted to; over longer spans a stabilized joint is none.
 const HALF_BATCH_NS: i64 = 25_000_000;
 /// Joint readings further apart than this are not interpolated.
-const LONGEST_GAP_NS: i64 = 200_000_000;
+const MAX_GAP_NS: i64 = 200_000_000;
 
 /// Lower bound of an encoder's standard deviation.
 const MIN_SIGMA_RAD: f64 = 1e-5;
@@ -137,7 +137,7 @@ impl Survey {
         let start = before(stamp_ns - HALF_BATCH_NS).min(after.checked_sub(1)?);
         let end = before(stamp_ns + HALF_BATCH_NS).max(after + 1);
         let batch = self.joint_samples.get(start..end)?;
-        if batch.last()?.stamp_ns - batch.first()?.stamp_ns > LONGEST_GAP_NS {
+        if batch.last()?.stamp_ns - batch.first()?.stamp_ns > MAX_GAP_NS {
             return None;
         }
         let around = &self.joint_samples.get(after)?.angles_rad;

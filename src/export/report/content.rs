@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::ReportOptions;
 use super::inputs::InputFile;
-use super::story::{RankSpell, rank_story};
+use super::story::{RankInterval, rank_story};
 use crate::export::summary::{RunSummary, log_name};
 use crate::geometry::seconds_from_ns;
 use crate::log_check::CheckReport;
@@ -33,7 +33,7 @@ pub(super) struct RunContent {
     /// The summary, as in `summary.json`.
     pub(super) summary: RunSummary,
     /// Intervals of constant rank.
-    pub(super) rank_story: Vec<RankSpell>,
+    pub(super) rank_story: Vec<RankInterval>,
     /// Notable events.
     pub(super) events: Vec<ReportEvent>,
     /// Counts of the frequent kinds of events.

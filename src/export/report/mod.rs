@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 
 use content::ReportContent;
 use inputs::InputFile;
-use story::RankSpell;
+use story::RankInterval;
 
 use super::error::ExportError;
 use super::run_files::{RunFileOptions, write_run};

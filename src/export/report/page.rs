@@ -5,7 +5,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 use super::ReportFigure;
 use super::content::{ReportContent, RunContent};
 use super::html::{figure, list, number};
-use super::{RankSpell, tables};
+use super::{RankInterval, tables};
 
 /// Style sheet for screens and for A4, where tables and figures are not split between pages.
 const STYLE: &str = include_str!("../../../assets/report/style.css");
@@ -138,7 +138,7 @@ fn run_section(index: usize, run: &RunContent) -> Markup {
 }
 
 fn rank_section(run: &RunContent) -> Markup {
-    let sentences: Vec<String> = run.rank_story.iter().map(RankSpell::sentence).collect();
+    let sentences: Vec<String> = run.rank_story.iter().map(RankInterval::sentence).collect();
     let known = run.summary.rank.iter().flat_map(|rank| &rank.known);
     let known: Vec<String> =
         known.map(|known| format!("{} (null in {} of {} steps)", known.reason, known.agreeing, known.steps)).collect();

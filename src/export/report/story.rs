@@ -12,11 +12,11 @@ use crate::session::RunRecord;
 
 /// Ranks are summarized over intervals of at least this length, each by its most frequent result: on a real flight the
 /// informed rank changes from frame to frame.
-const STRETCH_NS: i64 = 1_000_000_000;
+const MIN_INTERVAL_NS: i64 = 1_000_000_000;
 
 /// An interval of constant ranks.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub(super) struct RankSpell {
+pub(super) struct RankInterval {
     /// Start, in seconds since the log began.
     pub(super) from_s: f64,
     /// End, in seconds since the log began.
@@ -34,7 +34,7 @@ pub(super) struct RankSpell {
     pub(super) least_observable: Option<String>,
 }
 
-impl RankSpell {
+impl RankInterval {
     /// The interval in words: `rank 18 of 18 from 3.2 s to 8.5 s; …`.
     pub(super) fn sentence(&self) -> String {
         let causes =
@@ -70,14 +70,15 @@ fn most_frequent<T: Ord + Clone>(items: impl Iterator<Item = T>) -> Option<T> {
 }
 
 /// The intervals of a run in time order.
-pub(super) fn rank_story(run: &RunRecord, rig: &Rig) -> Vec<RankSpell> {
+pub(super) fn rank_story(run: &RunRecord, rig: &Rig) -> Vec<RankInterval> {
     let ranked: Vec<(i64, &RankReport)> =
         run.steps.iter().filter_map(|step| Some((step.report.stamp_ns, step.rank.as_ref()?))).collect();
     let names = rig.parameter_names();
-    let mut spells: Vec<RankSpell> = Vec::new();
-    let mut least_observable_of_spell: Vec<ParameterId> = Vec::new();
+    let mut intervals: Vec<RankInterval> = Vec::new();
+    let mut least_observable_of_interval: Vec<ParameterId> = Vec::new();
     let begin_ns = ranked.first().map_or(0, |(stamp_ns, _)| *stamp_ns);
-    let stretches = ranked.chunk_by(|(a, _), (b, _)| (a - begin_ns) / STRETCH_NS == (b - begin_ns) / STRETCH_NS);
+    let stretches =
+        ranked.chunk_by(|(a, _), (b, _)| (a - begin_ns) / MIN_INTERVAL_NS == (b - begin_ns) / MIN_INTERVAL_NS);
     for stretch in stretches {
         let Some((columns, structural, informed, lost)) = most_frequent(stretch.iter().map(|(_, rank)| finding(rank)))
         else {
@@ -86,15 +87,16 @@ pub(super) fn rank_story(run: &RunRecord, rig: &Rig) -> Vec<RankSpell> {
         let ends =
             [stretch.first(), stretch.last()].map(|end| end.map_or(0.0, |(stamp_ns, _)| seconds_from_ns(*stamp_ns)));
         let least_observable = stretch.iter().filter_map(|(_, rank)| rank.least_observable());
-        let same = |spell: &&mut RankSpell| {
-            (spell.columns, spell.structural, spell.informed, spell.lost) == (columns, structural, informed, lost)
+        let same = |interval: &&mut RankInterval| {
+            (interval.columns, interval.structural, interval.informed, interval.lost)
+                == (columns, structural, informed, lost)
         };
-        if let Some(spell) = spells.last_mut().filter(same) {
-            spell.to_s = ends[1];
-            least_observable_of_spell.extend(least_observable);
+        if let Some(interval) = intervals.last_mut().filter(same) {
+            interval.to_s = ends[1];
+            least_observable_of_interval.extend(least_observable);
         } else {
-            least_observable_of_spell = least_observable.collect();
-            spells.push(RankSpell {
+            least_observable_of_interval = least_observable.collect();
+            intervals.push(RankInterval {
                 from_s: ends[0],
                 to_s: ends[1],
                 columns,
@@ -104,12 +106,12 @@ pub(super) fn rank_story(run: &RunRecord, rig: &Rig) -> Vec<RankSpell> {
                 least_observable: None,
             });
         }
-        if let Some(spell) = spells.last_mut() {
-            spell.least_observable =
-                most_frequent(least_observable_of_spell.iter()).map(|parameter| names.name(*parameter));
+        if let Some(interval) = intervals.last_mut() {
+            interval.least_observable =
+                most_frequent(least_observable_of_interval.iter()).map(|parameter| names.name(*parameter));
         }
     }
-    spells
+    intervals
 }
 
 #[cfg(test)]
@@ -118,7 +120,7 @@ mod tests {
 
     #[test]
     fn spells_read_as_sentences() {
-        let spell = RankSpell {
+        let interval = RankInterval {
             from_s: 3.2,
             to_s: 8.5,
             columns: 24,
@@ -128,16 +130,16 @@ mod tests {
             least_observable: Some("yaw.d".to_owned()),
         };
         assert_eq!(
-            spell.sentence(),
+            interval.sentence(),
             "rank 15 of 24 from 3.2 s to 8.5 s; lost: 6 to the parameterization, 3 to the motion of the vehicle; the window \
              tells more than the rig about 11 of 24; known least: yaw.d"
         );
-        let full = RankSpell { structural: 24, lost: [0; 4], least_observable: None, ..spell };
+        let full = RankInterval { structural: 24, lost: [0; 4], least_observable: None, ..interval };
         assert!(!full.sentence().contains("lost"), "{}", full.sentence());
     }
 
     #[test]
-    fn the_most_frequent_is_told_and_of_two_the_smaller() {
+    fn the_most_frequent_is_returned_and_of_two_the_smaller() {
         assert_eq!(most_frequent([3, 1, 3, 2, 1, 3].into_iter()), Some(3));
         assert_eq!(most_frequent([3, 1, 3, 1].into_iter()), Some(1));
         assert_eq!(most_frequent(std::iter::empty::<u8>()), None);

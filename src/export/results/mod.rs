@@ -99,9 +99,9 @@ impl Results {
         self.log.write_transforms("/tf", times, &transforms)?;
         let pose = newest.world_from_imu;
         let velocity = pose.rotation.inverse() * newest.velocity_m_per_s;
-        let turn = nalgebra::Vector3::zeros();
+        let angular_rate = nalgebra::Vector3::zeros();
         let odometry = self.names.topic("odometry");
-        self.log.write_odometry(&odometry, &run_world, &imu, times, &pose, &velocity, &turn)?;
+        self.log.write_odometry(&odometry, &run_world, &imu, times, &pose, &velocity, &angular_rate)?;
         let points: Vec<_> =
             report.landmarks.iter().map(|landmark| (short_id(landmark.id), landmark.position_m)).collect();
         self.log.write_points(&self.names.topic("landmarks"), &run_world, times, &points)?;

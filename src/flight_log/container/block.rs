@@ -279,7 +279,7 @@ impl BlockCache {
 
     /// The block with a number, decoded now or before. The file's bytes of the one that has to make room are released.
     pub(crate) fn get(&mut self, file: &LogFile, blocks: &[Block], number: usize) -> Option<Arc<DecodedBlock>> {
-        if let Some(found) = self.entries.iter().position(|(held, _)| *held == number) {
+        if let Some(found) = self.entries.iter().position(|(cached, _)| *cached == number) {
             let entry = self.entries.remove(found);
             let block = Arc::clone(&entry.1);
             self.entries.push(entry);

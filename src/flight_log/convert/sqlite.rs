@@ -19,7 +19,7 @@ pub(super) enum BlobCompression {
 }
 
 /// Largest message that is decompressed; more is damage.
-const LARGEST_MESSAGE_BYTES: u64 = 1 << 30;
+const MAX_MESSAGE_BYTES: u64 = 1 << 30;
 
 #[derive(Debug)]
 struct Topic {
@@ -92,7 +92,7 @@ pub(super) fn convert(path: &Path, compression: BlobCompression, sink: &mut Sink
 fn unpack(data: &[u8]) -> Result<Vec<u8>, String> {
     let mut bytes = Vec::new();
     let decoder = zstd::Decoder::with_buffer(data).map_err(|error| error.to_string())?;
-    let read = decoder.take(LARGEST_MESSAGE_BYTES).read_to_end(&mut bytes);
+    let read = decoder.take(MAX_MESSAGE_BYTES).read_to_end(&mut bytes);
     read.map(|_| bytes).map_err(|error| format!("a message cannot be decompressed: {error}"))
 }
 

@@ -13,7 +13,7 @@ use super::super::text::shortened;
 use super::fields::Field;
 
 /// Largest rig file in bytes; the rig of 16 links and 16 cameras takes 16 kB.
-const LARGEST_RIG_BYTES: u64 = 1 << 20;
+const MAX_RIG_BYTES: u64 = 1 << 20;
 
 /// A parsed file of a rig.
 #[derive(Clone, Debug)]
@@ -29,15 +29,15 @@ impl Document {
         let failed = |source| LogError::Io { action: "read the rig", source, path: path.to_owned() };
         let file = std::fs::File::open(path).map_err(failed)?;
         let mut bytes = Vec::new();
-        file.take(LARGEST_RIG_BYTES + 1).read_to_end(&mut bytes).map_err(failed)?;
+        file.take(MAX_RIG_BYTES + 1).read_to_end(&mut bytes).map_err(failed)?;
         Self::from_bytes(bytes, path)
     }
 
     /// Parses the bytes of a file or an attachment.
     pub(super) fn from_bytes(bytes: Vec<u8>, file: &Path) -> Result<Self, LogError> {
         let syntax = |problem: String| LogError::RigSyntax { problem, path: file.to_owned() };
-        if bytes.len() as u64 > LARGEST_RIG_BYTES {
-            return Err(syntax(format!("more than {LARGEST_RIG_BYTES} bytes, expected a rig of some kilobytes")));
+        if bytes.len() as u64 > MAX_RIG_BYTES {
+            return Err(syntax(format!("more than {MAX_RIG_BYTES} bytes, expected a rig of some kilobytes")));
         }
         let text = String::from_utf8(bytes).map_err(|error| {
             let valid = error.utf8_error().valid_up_to();

@@ -14,7 +14,7 @@ use crate::geometry::RigidTransform;
 const ROTATION_TOLERANCE: f64 = 1e-3;
 
 /// Longest name of a topic, frame or joint in a rig.
-const LONGEST_TEXT_BYTES: usize = 1024;
+const MAX_TEXT_BYTES: usize = 1024;
 
 /// One field of a rig, present or not.
 #[derive(Clone, Debug)]
@@ -69,11 +69,11 @@ impl<'a> Field<'a> {
     /// A key beside a missing one that looks like a misspelling of it.
     fn nearest_sibling(&self) -> Option<&'a str> {
         /// Characters that a misspelling changes at most.
-        const MOST_CHANGED: usize = 2;
+        const MAX_EDIT_DISTANCE: usize = 2;
         let key = self.path.rsplit('.').next()?;
         let siblings = self.parent?.as_object()?.iter().filter(|(_, value)| !value.is_null());
         let (distance, nearest) = nearest_name(key, siblings.map(|(key, _)| key.as_str()))?;
-        (1..=MOST_CHANGED).contains(&distance).then_some(nearest)
+        (1..=MAX_EDIT_DISTANCE).contains(&distance).then_some(nearest)
     }
 
     /// An angle that was read from this field, when it is one in radians: beyond `largest_rad` it looks like degrees.
@@ -106,8 +106,8 @@ impl<'a> Field<'a> {
     /// A text.
     pub(super) fn text(&self, expected: &str) -> Result<&'a str, LogError> {
         let text = self.value.and_then(Value::as_str).ok_or_else(|| self.unexpected(expected))?;
-        if text.len() > LONGEST_TEXT_BYTES {
-            return Err(self.error(format!("{} bytes of text, expected at most {LONGEST_TEXT_BYTES}", text.len())));
+        if text.len() > MAX_TEXT_BYTES {
+            return Err(self.error(format!("{} bytes of text, expected at most {MAX_TEXT_BYTES}", text.len())));
         }
         Ok(text)
     }

@@ -150,17 +150,17 @@ impl Found {
     /// The unused keys, or an error about the unknown ones.
     fn into_result(self, file: &Path) -> Result<Vec<String>, LogError> {
         /// Further unknown keys that one message lists.
-        const MOST_LISTED: usize = 8;
+        const MAX_LISTED: usize = 8;
         let Some(((field, nearest), others)) = self.unknown.split_first() else { return Ok(self.unused) };
         let mut problem = match field.rsplit_once('.') {
             Some((_, "T_imu_cam")) => "unknown key, expected T_cam_imu, the inverse of T_imu_cam".to_owned(),
             _ => format!("unknown key, the nearest known key is '{nearest}'"),
         };
         if !others.is_empty() {
-            let listed = others.iter().take(MOST_LISTED);
+            let listed = others.iter().take(MAX_LISTED);
             let listed: Vec<String> =
                 listed.map(|(field, nearest)| format!("{} ('{nearest}'?)", shortened(field, 60))).collect();
-            let more = others.len().saturating_sub(MOST_LISTED);
+            let more = others.len().saturating_sub(MAX_LISTED);
             let more = if more > 0 { format!(" and {more} more") } else { String::new() };
             problem.push_str(&format!("; also unknown: {}{more}", listed.join(", ")));
         }

@@ -7,18 +7,18 @@ use crate::sensors::{CameraMount, CameraRig, ChainPrior, GimbalRig, ImuNoise, Im
 /// The version of the schema that is read and written.
 const RIG_VERSION: u64 = 1;
 /// Most joints of a gimbal: the covariance of the chain grows with the square of its links.
-const MOST_LINKS: usize = 16;
+const MAX_LINKS: usize = 16;
 /// Most cameras of a rig.
-const MOST_CAMERAS: usize = 16;
+const MAX_CAMERAS: usize = 16;
 /// Gravity for Kalibr's files, which do not contain it, in m/s².
 pub(super) const STANDARD_GRAVITY_M_PER_S2: f64 = 9.81;
 
 /// A joint offset or twist beyond a full rotation is an angle in degrees.
-const LARGEST_OFFSET_RAD: f64 = std::f64::consts::TAU;
+const MAX_OFFSET_RAD: f64 = std::f64::consts::TAU;
 /// A joint that rotates further than two rotations either way has limits in degrees.
-const LARGEST_LIMIT_RAD: f64 = 2.0 * std::f64::consts::TAU;
+const MAX_LIMIT_RAD: f64 = 2.0 * std::f64::consts::TAU;
 /// An encoder with a larger standard deviation measures nothing; 0.5 to 1 occur as degrees.
-const LARGEST_SIGMA_RAD: f64 = 0.5;
+const MAX_SIGMA_RAD: f64 = 0.5;
 
 /// Values of a log for a rig that does not contain them, by image topic.
 pub(crate) trait CameraFacts {
@@ -75,8 +75,8 @@ pub(super) fn camera_keys(root: &Field<'_>) -> Result<Vec<String>, LogError> {
     let mut keys: Vec<&str> = root.keys("a mapping with imu0, cam0, …")?;
     keys.retain(|key| number(key).is_some());
     keys.sort_by_key(|key| number(key));
-    if keys.len() > MOST_CAMERAS {
-        return Err(root.error(format!("{} cameras, expected at most {MOST_CAMERAS}", keys.len())));
+    if keys.len() > MAX_CAMERAS {
+        return Err(root.error(format!("{} cameras, expected at most {MAX_CAMERAS}", keys.len())));
     }
     Ok(keys.into_iter().map(str::to_owned).collect())
 }
@@ -203,7 +203,7 @@ fn read_gimbal(gimbal: &Field<'_>) -> Result<GimbalRig, LogError> {
     let encoder_sigma_rad =
         sigma.map(|sigma| sigma.positive("a standard deviation greater than 0 in rad, or null")).transpose()?;
     if let Some(sigma_rad) = encoder_sigma_rad {
-        gimbal.field("encoder_sigma").in_radians(sigma_rad, LARGEST_SIGMA_RAD)?;
+        gimbal.field("encoder_sigma").in_radians(sigma_rad, MAX_SIGMA_RAD)?;
     }
     let prior = gimbal.field("prior");
     let prior = ChainPrior {
@@ -221,8 +221,8 @@ fn read_gimbal(gimbal: &Field<'_>) -> Result<GimbalRig, LogError> {
     let mut links = Vec::new();
     let mut joints: Vec<Joint> = Vec::new();
     let fields = gimbal.field("links").list("a list of links with joint, theta_offset, d, a, alpha and limits")?;
-    if fields.len() > MOST_LINKS {
-        return Err(gimbal.field("links").error(format!("{} links, expected at most {MOST_LINKS}", fields.len())));
+    if fields.len() > MAX_LINKS {
+        return Err(gimbal.field("links").error(format!("{} links, expected at most {MAX_LINKS}", fields.len())));
     }
     for link in fields {
         let name = link.field("joint").text("the joint's name in the JointState")?.to_owned();
@@ -231,7 +231,7 @@ fn read_gimbal(gimbal: &Field<'_>) -> Result<GimbalRig, LogError> {
         }
         let angle = |key: &str| {
             let angle_rad = link.field(key).number("an angle in rad")?;
-            link.field(key).in_radians(angle_rad, LARGEST_OFFSET_RAD)
+            link.field(key).in_radians(angle_rad, MAX_OFFSET_RAD)
         };
         let length = |key: &str| link.field(key).number("a length in m");
         links.push(DhLink {
@@ -250,7 +250,7 @@ fn read_gimbal(gimbal: &Field<'_>) -> Result<GimbalRig, LogError> {
             return Err(link.field("limits").error(problem));
         }
         for limit_rad in limits {
-            link.field("limits").in_radians(limit_rad, LARGEST_LIMIT_RAD)?;
+            link.field("limits").in_radians(limit_rad, MAX_LIMIT_RAD)?;
         }
         joints.push(Joint { name, limits_rad: (limits[0], limits[1]) });
     }

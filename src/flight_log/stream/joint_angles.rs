@@ -11,12 +11,12 @@ use crate::sensors::{JointAngles, JointSample};
 /// Largest distance of a reading from the stamp at which it is used.
 const NEAREST_NS: i64 = 100_000_000;
 /// Largest half length of a batch; over longer spans a stabilized joint does not follow a parabola.
-const LONGEST_HALF_BATCH_NS: i64 = 25_000_000;
+const MAX_HALF_BATCH_NS: i64 = 25_000_000;
 /// The rate is fitted to this many times the batch on either side, neighbouring batches included: its noise falls with the
 /// length to the power of −3/2, and noise on a rate biases an estimated time offset towards zero.
 const RATE_BATCHES: i64 = 2;
 /// Fewest readings of a batch: with two there is nothing to average.
-const LEAST_BATCH: usize = 3;
+const MIN_BATCH: usize = 3;
 /// Standard deviation of a joint's rate where a single reading does not constrain it.
 const UNKNOWN_RATE_RAD_PER_S: f64 = 1.0;
 
@@ -71,7 +71,7 @@ impl EncoderAverage {
             readings: VecDeque::new(),
             noise: WhiteNoise::default(),
             sigma_rad,
-            half_batch_ns: half_interval_ns.min(LONGEST_HALF_BATCH_NS),
+            half_batch_ns: half_interval_ns.min(MAX_HALF_BATCH_NS),
         }
     }
 
@@ -111,7 +111,7 @@ impl EncoderAverage {
         let mut rates_rad_per_s = Vec::new();
         for joint in 0..joints {
             let near = |samples: &[&JointSample]| readings_of(samples, joint, nearest.angles_rad[joint], stamp_ns);
-            let averaged = self.noise.at(stamp_ns, joint).filter(|_| batch.len() >= LEAST_BATCH).and_then(|noise| {
+            let averaged = self.noise.at(stamp_ns, joint).filter(|_| batch.len() >= MIN_BATCH).and_then(|noise| {
                 let fitted = angle_fit::fit(&near(&batch), noise.variance.max(1e-6 * given))?;
                 let lasting = (given - noise.upper_bound()).max(0.0);
                 let variance = fitted.variance_rad2 + lasting;
@@ -126,8 +126,8 @@ impl EncoderAverage {
             };
             let rate = angle_fit::fit(&near(&around), given).map_or(0.0, |fitted| fitted.rate_rad_per_s);
             let (angle, variance, lasting) = averaged.or_else(interpolated).unwrap_or_else(|| {
-                let turned = UNKNOWN_RATE_RAD_PER_S * seconds_from_ns(nearest.stamp_ns - stamp_ns);
-                (nearest.angles_rad[joint], given + turned * turned, given)
+                let rotated_rad = UNKNOWN_RATE_RAD_PER_S * seconds_from_ns(nearest.stamp_ns - stamp_ns);
+                (nearest.angles_rad[joint], given + rotated_rad * rotated_rad, given)
             });
             angles_rad.push(angle);
             rates_rad_per_s.push(rate);
@@ -176,7 +176,7 @@ const BLOCK_NS: i64 = 50_000_000;
 /// Number of blocks that are pooled; a replay starts to read before them.
 const BLOCKS: i64 = 40;
 /// Minimum degrees of freedom of a noise measurement.
-const LEAST_FREEDOM: usize = 50;
+const MIN_DEGREES_OF_FREEDOM: usize = 50;
 
 /// Measures the white noise of each joint's readings about a smooth motion.
 #[derive(Debug, Default)]
@@ -223,6 +223,6 @@ impl WhiteNoise {
             .filter(|(block, _)| (number - BLOCKS..number).contains(block))
             .filter_map(|(_, joints)| joints.get(joint))
             .fold((0.0, 0), |(squares, freedom), (more, further)| (squares + more, freedom + further));
-        (freedom >= LEAST_FREEDOM).then(|| MeasuredNoise { variance: squares / freedom as f64, freedom })
+        (freedom >= MIN_DEGREES_OF_FREEDOM).then(|| MeasuredNoise { variance: squares / freedom as f64, freedom })
     }
 }

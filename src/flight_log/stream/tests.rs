@@ -67,8 +67,8 @@ fn white_noise_is_averaged_down_as_predicted() {
         let played = play(120, sigma, |at| Some(swing(seconds_from_ns(at)) + sigma * noise.normal()));
         let (error, stated) = errors(&played, swing);
         // Ten readings, and a little more for the curvature that they do not constrain.
-        let (least, most) = (sigma / 10_f64.sqrt(), sigma * (9.0 / 40.0_f64).sqrt());
-        assert!(stated > 0.99 * least && stated < 1.15 * most, "{sigma}: {stated} of {least} to {most}");
+        let (lower, upper) = (sigma / 10_f64.sqrt(), sigma * (9.0 / 40.0_f64).sqrt());
+        assert!(stated > 0.99 * lower && stated < 1.15 * upper, "{sigma}: {stated} of {lower} to {upper}");
         // 2000 errors determine σ to 2 %; the prior on the curvature may overstate it a little.
         assert!(error < 1.06 * stated && error > 0.8 * stated, "{sigma}: {error} against {stated}");
     }

@@ -47,8 +47,12 @@ pub(super) fn frame_ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, ste
         let aligned = alignment * newest.world_from_imu;
         let error = aligned.translation_m - ground_truth.translation_m;
         rows.push(three("position error, m", [error.x, error.y, error.z], 3));
-        let turn = so3::log(&(ground_truth.rotation.inverse() * aligned.rotation));
-        rows.push(three("attitude error, °", [turn.x, turn.y, turn.z].map(f64::to_degrees), 2));
+        let rotation_vector = so3::log(&(ground_truth.rotation.inverse() * aligned.rotation));
+        rows.push(three(
+            "attitude error, °",
+            [rotation_vector.x, rotation_vector.y, rotation_vector.z].map(f64::to_degrees),
+            2,
+        ));
     }
     rows_ui(ui, ctx.theme, "state", &rows);
     if !newest.joint_angles_rad.is_empty() {

@@ -39,13 +39,13 @@ impl CsvTable for TimelinePanel {
                 rows.push((report.stamp_ns, cells.collect()));
                 for event in report.events.iter().filter(|event| event.kind.is_notable()) {
                     let significant = |value: Option<f64>| number(value.unwrap_or(f64::NAN));
-                    let told = [
+                    let cells = [
                         name_of(event.kind).to_owned(),
                         significant(event.value),
                         significant(event.threshold),
                         event.message.clone(),
                     ];
-                    rows.push((report.stamp_ns, event_row(label, told)));
+                    rows.push((report.stamp_ns, event_row(label, cells)));
                 }
             }
         }
