@@ -3,13 +3,13 @@
 
 use thiserror::Error;
 
-/// Why a message could not be decoded.
+/// The reason why a message could not be decoded.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("{what} at byte {offset} of the message")]
 pub(crate) struct CdrError {
-    /// What is wrong.
+    /// The problem.
     pub(crate) what: String,
-    /// Where, counted from the encapsulation header.
+    /// Byte offset from the start of the message.
     pub(crate) offset: usize,
 }
 
@@ -87,7 +87,7 @@ impl<'a> CdrReader<'a> {
         Ok(values)
     }
 
-    /// The length of a sequence; an error when the remaining message is too short for it.
+    /// The length of a sequence; an error when the rest of the message is shorter.
     fn read_length(&mut self, element_size: usize, what: &str) -> Result<usize, CdrError> {
         let offset = self.position;
         let count = self.read_u32()? as usize;
@@ -187,7 +187,7 @@ impl CdrWriter {
         self.f64s(values);
     }
 
-    /// The whole message.
+    /// The finished message.
     pub(crate) fn finish(self) -> Vec<u8> {
         self.message
     }

@@ -11,27 +11,27 @@ pub enum LogError {
     /// An error of the operating system.
     #[error("cannot {action}: {source}: {}", path.display())]
     Io {
-        /// What was tried: `open the log`, `write the log`, ….
+        /// The attempted operation: `open the log`, `write the log`, ….
         action: &'static str,
         /// The error of the system.
         source: std::io::Error,
         /// The file.
         path: PathBuf,
     },
-    /// The file is no MCAP log at all.
+    /// The file is no MCAP log.
     #[error("not an MCAP log: {found}; {remedy}: {}", path.display())]
     NotALog {
-        /// What the file is instead.
+        /// Description of the file.
         found: String,
-        /// What to do.
+        /// The remedy.
         remedy: &'static str,
         /// The file.
         path: PathBuf,
     },
-    /// An MCAP file in which no message of use could be read.
+    /// An MCAP file without a readable message of a known type.
     #[error("nothing in the log can be used: {problem}: {}", path.display())]
     NothingReadable {
-        /// What was found, with its byte where there is one.
+        /// The problem, with its byte offset where there is one.
         problem: String,
         /// The log.
         path: PathBuf,
@@ -69,7 +69,7 @@ pub enum LogError {
         link: usize,
         /// Name of the joint in the rig.
         joint: String,
-        /// Where joint angles come from.
+        /// Topic of the joint angles.
         topic: String,
         /// Names of the joints in the messages.
         available: Vec<String>,
@@ -98,7 +98,7 @@ pub enum LogError {
     #[error("no rig for the log: neither {} nor an attachment named *.rig.yaml exists; give one with --rig FILE: {}",
         beside.display(), path.display())]
     NoRig {
-        /// The file that was looked for.
+        /// The expected path of the rig file.
         beside: PathBuf,
         /// The log.
         path: PathBuf,
@@ -110,7 +110,7 @@ pub enum LogError {
         topic: String,
         /// Log time in seconds since the log began.
         second: f64,
-        /// First byte in the file of the chunk that holds it.
+        /// Byte offset of the message's chunk in the file.
         byte: usize,
         /// What is wrong.
         problem: String,
@@ -132,7 +132,7 @@ pub enum LogError {
     /// The MCAP writer or the image encoder failed.
     #[error("cannot write the log: {problem}: {}", path.display())]
     Write {
-        /// What failed.
+        /// The problem.
         problem: String,
         /// The log.
         path: PathBuf,

@@ -6,7 +6,7 @@ use memmap2::Mmap;
 
 use super::LogError;
 
-/// The bytes of a log, behind a memory map.
+/// The bytes of a log through a memory map.
 #[derive(Debug)]
 pub(crate) struct LogFile {
     map: Mmap,
@@ -35,8 +35,8 @@ impl LogFile {
         Ok(Self { map: map.map_err(failed)? })
     }
 
-    /// Advises the system that a range of bytes is not needed for now: pages that were read otherwise count as resident
-    /// memory of the process until the log is closed. They can be read again at any time.
+    /// Advises the system that a range of bytes is not needed for now. Pages that were read count as resident memory of
+    /// the process otherwise; they can be read again at any time.
     #[cfg(unix)]
     pub(super) fn release(&self, bytes: &Range<usize>) {
         let (start, end) = (bytes.start.min(self.map.len()), bytes.end.min(self.map.len()));
@@ -52,7 +52,7 @@ impl LogFile {
         drop(advised);
     }
 
-    /// There is no such advice on this system.
+    /// Other systems have no such advice.
     #[cfg(not(unix))]
     #[expect(clippy::unused_self, reason = "it has a use on other systems")]
     pub(super) fn release(&self, _bytes: &Range<usize>) {}

@@ -1,4 +1,4 @@
-//! Images of a log as grey levels.
+//! Decoding of images to grey levels.
 
 use std::io::Cursor;
 
@@ -8,7 +8,7 @@ use super::FlightLog;
 use super::messages::{ImageMessage, MessageKind, read_compressed_image, read_image};
 use crate::sensors::GrayImage;
 
-/// Larger images are refused: no camera has them, so the header is damaged.
+/// Largest side of an image; a larger one in a header is damage.
 const MAX_SIDE_PX: usize = 16_384;
 /// The first bytes of every PNG.
 const PNG: [u8; 4] = [0x89, b'P', b'N', b'G'];

@@ -9,9 +9,9 @@ use super::{FlightLog, LogError};
 use crate::geometry::seconds_from_ns;
 use crate::sensors::{GrayImage, Rig, UnknownCamera};
 
-/// Decompressed blocks kept, so that neighbouring images do not decompress their chunk again.
+/// Number of cached blocks, so that adjacent images do not decompress their chunk again.
 const BLOCKS: usize = 2;
-/// Decoded images kept.
+/// Number of cached images.
 const IMAGES: usize = 8;
 
 /// Random access to the images of a log by camera and number.
@@ -33,10 +33,10 @@ struct CameraImages {
 
 #[derive(Debug)]
 struct ImageCache {
-    /// One per camera.
+    /// Messages by camera.
     topics: Vec<TopicIndex>,
     blocks: BlockCache,
-    /// By camera and number, most recently used last.
+    /// Cached images by camera and index; the most recently used is the last.
     images: Vec<((usize, usize), Arc<GrayImage>)>,
 }
 

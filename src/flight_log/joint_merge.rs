@@ -1,12 +1,12 @@
-//! Samples of all joints from messages that may each name only some of them: several drivers can publish on one topic, a
-//! joint each.
+//! Samples of all joints from messages with only some of them: several drivers can publish on one topic, one joint
+//! each.
 
 use std::collections::VecDeque;
 
 use crate::geometry::wrap_angle;
 use crate::sensors::JointSample;
 
-/// Readings of a joint further apart than this are not interpolated.
+/// Larger gaps between readings of a joint are not interpolated.
 const MAX_GAP_NS: i64 = 200_000_000;
 
 /// One message: an angle in radians for each of the rig's joints that it names.
@@ -49,7 +49,7 @@ impl JointMerge {
         taken
     }
 
-    /// No reading will follow.
+    /// Marks the end of the readings.
     pub(crate) fn finish(&mut self) {
         self.ended = true;
     }

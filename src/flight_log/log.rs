@@ -35,7 +35,7 @@ pub struct FlightLog {
     path: PathBuf,
     file: LogFile,
     index: ContainerIndex,
-    /// Channels of each topic.
+    /// Channel ids by topic.
     channel_ids: BTreeMap<String, Vec<u16>>,
     topics: Vec<TopicInfo>,
     epoch_ns: i64,
@@ -118,7 +118,7 @@ impl FlightLog {
         &self.warnings
     }
 
-    /// The content of the first attachment whose name ends so, with its name.
+    /// Name and content of the first attachment whose name ends with `name_ends_with`.
     pub fn attachment(&self, name_ends_with: &str) -> Option<(&str, &[u8])> {
         let place = self.index.attachments.iter().find(|place| place.name.ends_with(name_ends_with))?;
         Some((&place.name, ContainerIndex::attachment(&self.file, place)?))
@@ -184,7 +184,7 @@ impl FlightLog {
         }
     }
 
-    /// The block and the place in it of the message at a position, `None` when it cannot be read.
+    /// The block of the message at a position and its range in the block, `None` when it cannot be read.
     pub(super) fn message(
         &self,
         cache: &mut BlockCache,
@@ -195,7 +195,7 @@ impl FlightLog {
         Some((block, message))
     }
 
-    /// The first message of a topic that passes a test.
+    /// The first message of a topic for which `test` returns a value, and that value.
     pub(super) fn find_message<T>(&self, topic: &str, mut test: impl FnMut(&[u8]) -> Option<T>) -> Option<T> {
         let mut found = None;
         self.for_each_message(topic, |_, data| {

@@ -106,7 +106,7 @@ impl DecodedBlock {
         &self.records.of(file)[range.clone()]
     }
 
-    /// The message whose record starts at an offset given by an index.
+    /// The message whose record starts at an offset of the message index.
     pub(crate) fn message_at(&self, offset: u64) -> Option<&MessageSpan> {
         let index = self.messages.binary_search_by_key(&offset, |message| message.offset as u64).ok()?;
         self.messages.get(index)
@@ -201,7 +201,7 @@ fn unpack_chunk(file: &[u8], block: &Block) -> Result<(BlockBytes, Option<String
     Ok((records, None))
 }
 
-/// Decompresses as far as possible; the second value is the error that stopped it early.
+/// Decompresses as far as possible; the second value is the error that ended it.
 fn decompress(file: &[u8], header: &ChunkHeader, data: &Range<usize>) -> (Vec<u8>, Option<String>) {
     let mut reader = LinearReader::new_with_options(
         LinearReaderOptions::default()
@@ -225,7 +225,7 @@ fn decompress(file: &[u8], header: &ChunkHeader, data: &Range<usize>) -> (Vec<u8
     let compressed = &file[data.clone()];
     let total = prefix.len() + compressed.len();
 
-    // Sizes come from a header that may be damaged, so reserve no more than a usual compression ratio explains.
+    // Sizes in the header may be damaged: the capacity is limited by a usual compression ratio.
     let expected = usize::try_from(header.uncompressed_size).unwrap_or(usize::MAX);
     let mut records = Vec::with_capacity(expected.min(compressed.len().saturating_mul(8)));
     let mut fed = 0;
@@ -251,7 +251,7 @@ fn decompress(file: &[u8], header: &ChunkHeader, data: &Range<usize>) -> (Vec<u8
     (records, None)
 }
 
-/// Calls `copy(at, part)` for the parts of `first ++ second` between `start` and `start + count`.
+/// Calls `copy(at, bytes)` for the sections of `first ++ second` between `start` and `start + count`.
 fn for_each_part(first: &[u8], second: &[u8], start: usize, count: usize, mut copy: impl FnMut(usize, &[u8])) {
     let end = start + count;
     if start < first.len() {
@@ -263,21 +263,21 @@ fn for_each_part(first: &[u8], second: &[u8], start: usize, count: usize, mut co
     }
 }
 
-/// The blocks decoded last.
+/// A cache of the blocks decoded last.
 #[derive(Debug)]
 pub(crate) struct BlockCache {
-    /// Most recently used last.
+    /// The most recently used block is the last.
     entries: Vec<(usize, Arc<DecodedBlock>)>,
     capacity: usize,
 }
 
 impl BlockCache {
-    /// A cache that keeps `capacity` blocks.
+    /// A cache of `capacity` blocks.
     pub(crate) fn new(capacity: usize) -> Self {
         Self { entries: Vec::with_capacity(capacity + 1), capacity }
     }
 
-    /// The block with a number, decoded now or before. The file's bytes of the one that has to make room are released.
+    /// The block with a number, from the cache or decoded. The file's pages of an evicted block are released.
     pub(crate) fn get(&mut self, file: &LogFile, blocks: &[Block], number: usize) -> Option<Arc<DecodedBlock>> {
         if let Some(found) = self.entries.iter().position(|(cached, _)| *cached == number) {
             let entry = self.entries.remove(found);

@@ -7,7 +7,7 @@ use mcap::records::{ChunkHeader, Record, op};
 use super::block::{Block, DecodedBlock, chunk_header, message_header, parse_definition};
 use super::{RECORD_HEADER, record_at};
 
-/// Messages outside of chunks are gathered into blocks of about this size.
+/// Size of the blocks into which messages outside of chunks are grouped.
 const PLAIN_BLOCK_BYTES: usize = 1 << 20;
 
 /// A channel of the log.
@@ -27,7 +27,7 @@ pub(crate) struct MessagePosition {
     pub(crate) log_time_ns: u64,
     /// Number of its block.
     pub(crate) block: usize,
-    /// Start of its record in the block's records.
+    /// Offset of its record in the block's records.
     pub(crate) offset: u64,
 }
 
@@ -35,16 +35,16 @@ pub(crate) struct MessagePosition {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct AttachmentRef {
     pub(crate) name: String,
-    /// Its record in the file.
+    /// Range of its record in the file.
     pub(crate) bytes: Range<usize>,
 }
 
 /// Damage found while indexing.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Damage {
-    /// First byte in the file that cannot be read.
+    /// Byte offset of the damage in the file.
     pub(crate) byte: usize,
-    /// Largest log time read before it, 0 when there is none.
+    /// Largest log time before the damage, 0 without any.
     pub(crate) after_log_time_ns: u64,
     pub(crate) problem: String,
 }
@@ -54,7 +54,7 @@ pub(crate) struct Damage {
 enum Entries {
     /// In the message index record at this byte of the file.
     Record(usize),
-    /// Log time and offset, from scanning the file.
+    /// Log time and offset, from a scan of the file.
     Own(Vec<(u64, u64)>),
 }
 
@@ -71,7 +71,7 @@ pub(crate) struct ContainerIndex {
     pub(crate) statistics: Option<BTreeMap<u16, u64>>,
     /// Damage, in the order of the file.
     pub(crate) damages: Vec<Damage>,
-    /// Whether the file's own index was used.
+    /// Whether the file's own index is used.
     pub(crate) from_summary: bool,
 }
 
@@ -94,7 +94,7 @@ impl ContainerIndex {
         }
     }
 
-    /// The index at the end of the file. The error is the damage to report, `None` when the file simply has no index.
+    /// The index at the end of the file. The error is the damage to report, `None` when the file has no index.
     fn from_summary(file: &[u8]) -> Result<Self, Option<String>> {
         // Footer: opcode, length, summary start (8 bytes), summary offsets' start (8), checksum (4); then the magic.
         const FOOTER: usize = RECORD_HEADER + 20;
@@ -160,7 +160,7 @@ impl ContainerIndex {
             }
             position = record.end;
         }
-        // Without chunk indexes, channels or message indexes the rest has to be scanned after all.
+        // Without chunk indexes, channels or message indexes the rest has to be scanned.
         let without_entries = index.entries.iter().all(|entries| entries.is_empty());
         let lacks_chunks = match promised_chunks {
             Some((chunks, messages)) => chunks != index.blocks.len() || (messages > 0 && chunks == 0),

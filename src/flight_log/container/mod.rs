@@ -16,11 +16,11 @@ const RECORD_HEADER: usize = 9;
 struct RawRecord<'a> {
     opcode: u8,
     body: &'a [u8],
-    /// First byte after it.
+    /// Offset of the first byte after it.
     end: usize,
 }
 
-/// The record that starts at a byte, or why there is none.
+/// The record that starts at a byte offset, or the problem with it.
 fn record_at(bytes: &[u8], start: usize) -> Result<RawRecord<'_>, String> {
     let header = start.checked_add(RECORD_HEADER).and_then(|end| bytes.get(start..end));
     let Some(header) = header else {

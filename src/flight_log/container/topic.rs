@@ -1,13 +1,13 @@
 use super::index::{ContainerIndex, MessagePosition};
 
-/// The messages of one topic in the order of their log times, read group by group on demand: in a log of gigabytes the
-/// message indexes are far apart.
+/// The messages of one topic in the order of their log times. They are read in groups on demand, because the message
+/// indexes of a log of gigabytes are far apart.
 #[derive(Clone, Debug)]
 pub(crate) struct TopicIndex {
     channel_ids: Vec<u16>,
-    /// Blocks whose log times overlap, group after group in time order.
+    /// Groups of blocks with overlapping log times, in time order.
     groups: Vec<Vec<usize>>,
-    /// The first group that is not in `loaded`.
+    /// Index of the first group that is not in `loaded`.
     next_group: usize,
     loaded: Vec<MessagePosition>,
 }

@@ -14,20 +14,20 @@ pub enum ConvertError {
     /// An error of the operating system.
     #[error("cannot {action}: {source}: {}", path.display())]
     Io {
-        /// What was tried.
+        /// The attempted operation.
         action: &'static str,
         /// The error of the system.
         source: io::Error,
         /// The file.
         path: PathBuf,
     },
-    /// Nothing that can be converted.
+    /// The source is of no known kind.
     #[error(
         "{found}; expected a EuRoC/ASL folder (with mav0), a ROS 1 bag, or a ROS 2 bag (its folder, .db3 or .mcap): {}",
         path.display()
     )]
     UnknownSource {
-        /// What was found instead.
+        /// Description of the source.
         found: String,
         /// The source.
         path: PathBuf,
@@ -35,12 +35,12 @@ pub enum ConvertError {
     /// A source of a known kind that cannot be read.
     #[error("{problem}: {}", path.display())]
     Unreadable {
-        /// What is wrong, and what to do.
+        /// The problem and its remedy.
         problem: String,
         /// The file.
         path: PathBuf,
     },
-    /// A line of a table is wrong.
+    /// An invalid line of a table.
     #[error("line {line}: {problem}: {}", path.display())]
     Line {
         /// Number of the line from 1.
@@ -67,7 +67,7 @@ pub enum ConvertError {
 }
 
 impl ConvertError {
-    /// For `map_err` behind a call of the system.
+    /// For `map_err` of a system call.
     pub(super) fn io(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
         let path = path.to_owned();
         move |source| Self::Io { action, source, path }

@@ -153,7 +153,7 @@ fn stamp_of(line: usize, row: &[String], table: &Path) -> Result<i64, ConvertErr
     stamp_ns.ok_or_else(|| bad_line(line, format!("the stamp is '{text}', expected whole nanoseconds"), table))
 }
 
-/// The first numbers after the stamp.
+/// The first `N` numbers after the stamp.
 fn numbers<const N: usize>(line: usize, row: &[String], table: &Path) -> Result<[f64; N], ConvertError> {
     let cells = row.get(1..=N).ok_or_else(|| {
         bad_line(line, format!("{} numbers after the stamp, expected {N}", row.len().saturating_sub(1)), table)
@@ -187,7 +187,7 @@ fn read_images(table: &Path, camera: usize, samples: &mut Vec<(i64, Sample)>) ->
     Ok(())
 }
 
-/// Poses of a sensor in the world (`p x y z`, `q w x y z`), moved to the IMU.
+/// Poses of a sensor in the world (`p x y z`, `q w x y z`), transformed to the IMU.
 fn read_poses(
     table: &Path,
     source: usize,

@@ -14,14 +14,14 @@ pub struct ConvertedTopic {
     pub taken: u64,
     /// Number of messages skipped.
     pub left: u64,
-    /// Why the first skipped message was skipped, or a remark on those that were written.
+    /// The reason of the first skipped message, or a remark on the written ones.
     pub reason: Option<String>,
 }
 
 /// Result of a conversion.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ConversionReport {
-    /// What the source is, `ROS 1 bag`.
+    /// Kind of the source: `ROS 1 bag`.
     pub kind: String,
     /// The source.
     pub source: PathBuf,

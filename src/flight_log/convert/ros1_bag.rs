@@ -15,7 +15,7 @@ pub(super) const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
 /// Initial capacity for a decompressed chunk, in bytes.
 const CHUNK_CAPACITY: u32 = 64 << 20;
 
-/// Opcodes of the records that matter.
+/// Opcodes of the records that are read.
 mod op {
     pub(super) const MESSAGE: u8 = 0x02;
     pub(super) const BAG_HEADER: u8 = 0x03;
@@ -78,7 +78,7 @@ pub(super) fn convert(path: &Path, sink: &mut Sink<'_>) -> Result<(), ConvertErr
     Ok(())
 }
 
-/// Takes the connections that the bag's index lists, when it has one.
+/// Reads the connections of the bag's index, if it has one.
 fn read_bag_header(
     bag: &[u8],
     path: &Path,
@@ -115,7 +115,7 @@ fn read_connection(record: &BagRecord<'_>, connections: &mut Connections, sink: 
     connections.insert(id, Connection { topic: topic.to_owned(), message_type: message_type.to_owned() });
 }
 
-/// The messages of a chunk; the inner error is its damage.
+/// Reads the messages of a chunk; the inner error is its damage.
 fn take_chunk(
     chunk: &[u8],
     connections: &mut Connections,

@@ -1,12 +1,12 @@
-//! Messages in ROS 1 serialization rewritten as CDR.
+//! Conversion of messages from ROS 1 serialization to CDR.
 //!
-//! ROS 1 packs little-endian fields without padding; strings carry no terminating zero, headers a sequence number, and
-//! stamps are unsigned. Apart from that the types that are read have the same fields in the same order in both.
+//! ROS 1 writes little-endian fields without padding; strings have no terminating zero, headers have a sequence number,
+//! and stamps are unsigned. Otherwise the message types that are read have the same fields in the same order in both.
 
 use super::super::MessageKind;
 use super::super::cdr::CdrWriter;
 
-/// A field, or some of a kind.
+/// A field, or several of one kind.
 #[derive(Clone, Copy, Debug)]
 enum Field {
     Header,
@@ -40,7 +40,7 @@ fn layout(kind: MessageKind) -> &'static [Field] {
     }
 }
 
-/// The CDR of a message in ROS 1 serialization, or what is wrong with it.
+/// The CDR encoding of a message in ROS 1 serialization, or the problem with it.
 pub(super) fn cdr_from_ros1(kind: MessageKind, message: &[u8]) -> Result<Vec<u8>, String> {
     let mut reader = Ros1Reader { message, position: 0 };
     let mut out = CdrWriter::new();
@@ -82,7 +82,7 @@ pub(super) fn cdr_from_ros1(kind: MessageKind, message: &[u8]) -> Result<Vec<u8>
     Ok(out.finish())
 }
 
-/// Reads fields one after another, never past the end.
+/// Reads fields in order with bounds checks.
 struct Ros1Reader<'a> {
     message: &'a [u8],
     position: usize,

@@ -5,7 +5,7 @@
 pub(super) struct BagRecord<'a> {
     header: &'a [u8],
     pub(super) data: &'a [u8],
-    /// First byte after it.
+    /// Offset of the first byte after it.
     pub(super) end: usize,
 }
 
@@ -17,7 +17,7 @@ fn sized(bytes: &[u8], start: usize) -> Option<(&[u8], usize)> {
     Some((bytes.get(start + 4..end)?, end))
 }
 
-/// The record that starts at a byte, or why there is none.
+/// The record that starts at a byte offset, or the problem with it.
 pub(super) fn record_at(bytes: &[u8], start: usize) -> Result<BagRecord<'_>, String> {
     let ends = || format!("a record ends after the last of {} bytes", bytes.len());
     let (header, after_header) = sized(bytes, start).ok_or_else(ends)?;
@@ -40,13 +40,13 @@ pub(super) fn field<'a>(fields: &'a [u8], name: &str) -> Option<&'a [u8]> {
     None
 }
 
-/// A field that is a text.
+/// The value of a text field.
 pub(super) fn text_field<'a>(fields: &'a [u8], name: &str) -> Option<&'a str> {
     field(fields, name).and_then(|value| std::str::from_utf8(value).ok())
 }
 
 impl<'a> BagRecord<'a> {
-    /// What kind of record it is.
+    /// Opcode of the record.
     pub(super) fn opcode(&self) -> Option<u8> {
         field(self.header, "op").and_then(|value| value.first().copied())
     }

@@ -11,12 +11,12 @@ use super::sink::Sink;
 use super::sqlite::BlobCompression;
 use super::{ConvertError, mcap_segment, sqlite};
 
-/// Whether a folder is such a bag; one that lost its `metadata.yaml` is, too.
+/// Whether a folder is a ROS 2 bag, also without its `metadata.yaml`.
 pub(super) fn is_bag(folder: &Path) -> bool {
     folder.join("metadata.yaml").is_file() || segments(folder).is_ok_and(|segments| !segments.is_empty())
 }
 
-/// The name without `.zstd`, when it ends so.
+/// The path without `.zstd`, if it has that extension.
 fn plain_name(path: &Path) -> Option<PathBuf> {
     path.extension().filter(|extension| *extension == "zstd" || *extension == "zst").map(|_| path.with_extension(""))
 }
@@ -26,7 +26,7 @@ fn is_segment(path: &Path) -> bool {
     plain.extension().is_some_and(|extension| extension == "db3" || extension == "mcap")
 }
 
-/// The files of a folder that look like parts of a bag, in the order of the numbers in their names.
+/// The files of a folder that may belong to a bag, in the order of the numbers in their names.
 fn segments(folder: &Path) -> Result<Vec<PathBuf>, ConvertError> {
     let entries = fs::read_dir(folder).map_err(ConvertError::io("open the bag", folder))?;
     let mut paths = Vec::new();

@@ -44,7 +44,7 @@ pub(super) struct Tally {
 pub(super) struct Sink<'a> {
     pub(super) writer: LogWriter,
     tallies: BTreeMap<(String, String), Tally>,
-    /// The type under which each topic is in the log.
+    /// The message type of each topic in the log.
     types: BTreeMap<String, String>,
     notes: Vec<String>,
     progress: &'a mut dyn FnMut(f64),
@@ -87,7 +87,7 @@ impl<'a> Sink<'a> {
         tally
     }
 
-    /// Writes a message into the log, or counts why it cannot be.
+    /// Writes a message to the log, or counts it as skipped with the reason.
     pub(super) fn take(&mut self, message: &SourceMessage<'_>) -> Result<(), ConvertError> {
         let SourceMessage { topic, message_type, log_time_ns, .. } = *message;
         if let Some(other) = self.types.get(topic)

@@ -9,7 +9,7 @@ use rusqlite::{Connection, OpenFlags};
 use super::ConvertError;
 use super::sink::{Payload, Sink, SourceMessage};
 
-/// Whether every message is compressed on its own.
+/// Compression of single messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum BlobCompression {
     /// Uncompressed.
@@ -18,7 +18,7 @@ pub(super) enum BlobCompression {
     Zstd,
 }
 
-/// Largest message that is decompressed; more is damage.
+/// Largest decompressed message; a larger one is damaged.
 const MAX_MESSAGE_BYTES: u64 = 1 << 30;
 
 #[derive(Debug)]

@@ -11,7 +11,7 @@ use super::super::text::{nearest_name, printable, shortened};
 struct Keys {
     /// Keys that are read.
     read: &'static [&'static str],
-    /// Keys of other programs that have no meaning here, and appendices of our own that are for people.
+    /// Keys of other programs without a meaning here, and entries of our own for human readers.
     unused: &'static [&'static str],
 }
 
@@ -20,7 +20,7 @@ const ROOT: Keys = Keys {
     // Written by `dcvins calibrate` and `dcvins simulate` at the end of a rig.
     unused: APPENDICES,
 };
-/// Entries that this program appends to a rig for its reader; they are no surprise to anyone.
+/// Entries that this program appends to a rig for human readers.
 const APPENDICES: &[&str] = &["calibration", "truth"];
 /// With what Kalibr writes for its IMU models, and OpenVINS in the same files.
 const IMU: Keys = Keys {

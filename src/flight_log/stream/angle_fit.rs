@@ -1,16 +1,16 @@
-//! One joint's angle at an instant, from encoder readings around it, and its variance.
+//! A joint's angle at a stamp, estimated from encoder readings around it, and its variance.
 
 use nalgebra::{Matrix3, Vector3};
 
-/// A reading: seconds after the instant, and the angle there in radians, not wrapped.
+/// A reading: seconds relative to the stamp, and the angle in radians, not wrapped.
 pub(crate) type Reading = (f64, f64);
 
-/// The angle at the instant.
+/// The estimated angle at the stamp.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct FittedAngle {
     pub(crate) angle_rad: f64,
     pub(crate) rate_rad_per_s: f64,
-    /// From white noise on the readings and the prior on the acceleration between them.
+    /// Variance from white noise of the readings and the prior on the acceleration.
     pub(crate) variance_rad2: f64,
 }
 
@@ -21,11 +21,11 @@ pub(crate) struct FittedAngle {
 /// fitted with a line (least variance), those finer than about 0.1° with a parabola (least bias).
 const ACCELERATION_RAD_PER_S2: f64 = 10.0;
 
-/// A parabola through the readings with a prior on its curvature: least squares with white noise of the given variance on
-/// every reading and a prior of [`ACCELERATION_RAD_PER_S2`] on the acceleration, evaluated at the instant.
+/// The angle at the stamp from a parabola through the readings: least squares with white noise of the given variance on
+/// every reading and a prior of [`ACCELERATION_RAD_PER_S2`] on the acceleration.
 ///
-/// It is the linear estimate with the least mean square error for such a motion, exact for a constant rate.
-/// `None` for fewer than two instants.
+/// It is the linear estimate with minimum mean square error for such a motion, and exact for a constant rate. Returns
+/// `None` for readings at fewer than two stamps.
 pub(crate) fn fit(readings: &[Reading], white_variance_rad2: f64) -> Option<FittedAngle> {
     if readings.len() < 2 {
         return None;
@@ -46,10 +46,10 @@ pub(crate) fn scatter(readings: &[Reading]) -> Option<(f64, usize)> {
 }
 
 struct Parabola {
-    /// Of 1, u and u² with `u` the time over `span_s`.
+    /// Coefficients of 1, u and u² with `u` the time over `span_s`.
     coefficients: Vector3<f64>,
     span_s: f64,
-    /// Of the first coefficient.
+    /// Variance of the first coefficient.
     variance: f64,
 }
 

@@ -21,14 +21,14 @@ const IMU_GAP_PERIODS: f64 = 3.5;
 /// Longer gaps between images, in periods, are reported.
 const IMAGE_GAP_PERIODS: f64 = 1.75;
 
-/// An image message, not decoded yet.
+/// An image message that is not decoded yet.
 struct PendingImage {
     number: usize,
     log_time_ns: i64,
     message: Vec<u8>,
 }
 
-/// Samples of a topic around a time: those before it, and the first one after it.
+/// Samples of a topic around a stamp: those before it, and the first one after it.
 struct Lookup<T> {
     samples: OrderedSamples<T>,
     before: Option<(i64, T)>,
@@ -224,7 +224,7 @@ impl FrameSource {
         }
     }
 
-    /// Drops samples that no later frame needs, except the last one before the time.
+    /// Drops samples that no later frame needs, except the last one before the stamp.
     fn forget_samples_before(&mut self, stamp_ns: i64) {
         while self.samples.get(1).is_some_and(|second| second.stamp_ns <= stamp_ns) {
             self.samples.pop_front();
@@ -313,7 +313,7 @@ impl CameraStream {
         self.previous_stamp_ns = Some(stamp_ns);
     }
 
-    /// The image, or `None` with a warning why it is skipped.
+    /// The image, or `None` and a warning with the reason why it is skipped.
     fn decode(&self, context: &mut ReadContext, stamp_ns: i64, pending: &PendingImage) -> Option<GrayImage> {
         let problem = match decode_image(self.kind, &pending.message, self.depth) {
             Ok(image) if [image.width, image.height] == self.resolution_px => return Some(image),
@@ -334,7 +334,7 @@ impl CameraStream {
     }
 }
 
-/// The longest gap that is not reported: so many periods of the slower of the rig's rate and the log's mean rate.
+/// Largest gap that is not reported: `periods` of the slower of the rig's rate and the log's mean rate.
 fn gap_ns(periods: f64, rig_rate_hz: f64, log_rate_hz: f64) -> i64 {
     let slower = [rig_rate_hz, log_rate_hz].into_iter().filter(|rate| *rate > 0.0).fold(f64::INFINITY, f64::min);
     if slower.is_finite() { ns_from_seconds(periods / slower) } else { i64::MAX }

@@ -1,4 +1,4 @@
-//! The joint angles at an image's stamp, from all encoder readings that belong to it.
+//! The joint angles at an image's stamp, from all encoder readings around it.
 
 use std::collections::VecDeque;
 
@@ -15,7 +15,7 @@ const MAX_HALF_BATCH_NS: i64 = 25_000_000;
 /// The rate is fitted to this many times the batch on either side, neighbouring batches included: its noise falls with the
 /// length to the power of −3/2, and noise on a rate biases an estimated time offset towards zero.
 const RATE_BATCHES: i64 = 2;
-/// Fewest readings of a batch: with two there is nothing to average.
+/// Minimum number of readings of a batch; two cannot be averaged.
 const MIN_BATCH: usize = 3;
 /// Standard deviation of a joint's rate where a single reading does not constrain it.
 const UNKNOWN_RATE_RAD_PER_S: f64 = 1.0;
@@ -81,7 +81,7 @@ impl EncoderAverage {
         self.readings.back().is_none_or(|last| last.stamp_ns <= end_ns)
     }
 
-    /// The next reading; stamps must increase.
+    /// Adds the next reading; stamps must increase.
     pub(super) fn push(&mut self, sample: JointSample) {
         self.noise.push(&sample);
         self.readings.push_back(sample);
@@ -137,7 +137,7 @@ impl EncoderAverage {
         Some(JointAngles { angles_rad, sigmas_rad, lasting_sigmas_rad, rates_rad_per_s })
     }
 
-    /// Drops readings that no later stamp needs, except the last one before the time.
+    /// Drops readings that no later stamp needs, except the last one before the stamp.
     fn forget_before(&mut self, time_ns: i64) {
         while self.readings.get(1).is_some_and(|second| second.stamp_ns <= time_ns) {
             self.readings.pop_front();
@@ -156,7 +156,7 @@ fn readings_of(samples: &[&JointSample], joint: usize, around_rad: f64, stamp_ns
         .collect()
 }
 
-/// Variance of the noise that is independent from reading to reading.
+/// Variance of the white noise of the readings.
 #[derive(Clone, Copy, Debug)]
 struct MeasuredNoise {
     variance: f64,
@@ -173,7 +173,7 @@ impl MeasuredNoise {
 /// Length of the blocks within which the white noise is measured. They start at multiples of it since the log began: the
 /// result must not depend on where a replay starts.
 const BLOCK_NS: i64 = 50_000_000;
-/// Number of blocks that are pooled; a replay starts to read before them.
+/// Number of blocks that are pooled; a replay reads that many blocks before its start.
 const BLOCKS: i64 = 40;
 /// Minimum degrees of freedom of a noise measurement.
 const MIN_DEGREES_OF_FREEDOM: usize = 50;

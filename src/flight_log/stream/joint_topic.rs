@@ -9,7 +9,7 @@ use crate::sensors::{GimbalRig, JointSample};
 /// Number of messages within which every joint of the rig must be named once.
 const MESSAGES_SEARCHED: usize = 1000;
 
-/// Samples of all joints in time order; joints with messages of their own are merged by name.
+/// Samples of all joints in time order; messages with only some joints are merged by name.
 pub(super) struct JointSamples {
     topic: String,
     readings: OrderedSamples<JointReading>,
@@ -19,7 +19,7 @@ pub(super) struct JointSamples {
 }
 
 impl JointSamples {
-    /// Reads from a time on; `topic` is the gimbal's.
+    /// Reads from a stamp on; `topic` is the gimbal's.
     pub(super) fn new(log: &FlightLog, gimbal: &GimbalRig, topic: &str, from_ns: i64) -> Result<Self, LogError> {
         log.require_topic("gimbal.rostopic", topic, &[MessageKind::JointState])?;
         let names: Vec<String> = gimbal.joints.iter().map(|joint| joint.name.clone()).collect();
@@ -57,7 +57,7 @@ impl JointSamples {
     }
 }
 
-/// Whether every message names all joints; an error for a rig with a joint that none of the first messages names.
+/// Whether every message names all joints; an error if none of the first messages names one of the rig's joints.
 fn named_together(log: &FlightLog, topic: &str, names: &[String]) -> Result<bool, LogError> {
     let mut known: Vec<String> = Vec::new();
     let mut together = true;

@@ -1,4 +1,4 @@
-//! The frames of one camera, each with the samples of the other sensors that belong to it.
+//! The frames of one camera, each with the samples of the other sensors for it.
 
 pub(crate) mod angle_fit;
 mod frames;
@@ -16,20 +16,19 @@ use self::frames::FrameSource;
 use super::{FlightLog, LogError, LogWarning, SensorFrame};
 use crate::sensors::Rig;
 
-/// Frames made ahead of the reader; one takes about half a megabyte.
+/// Number of frames read ahead; one takes about half a megabyte.
 const FRAMES_AHEAD: usize = 6;
 
 /// Messages of the reading thread.
 enum Delivery {
     Frame(Box<SensorFrame>),
-    /// The log's end, with the warnings after the last frame.
+    /// The end of the log, with the warnings after the last frame.
     End(Vec<LogWarning>),
 }
 
 /// The frames of one camera in the order of their stamps.
 ///
-/// Reads the log chunk by chunk on a thread of its own, a few frames ahead; the frames do not depend on how fast they
-/// are taken.
+/// A thread reads the log chunk by chunk, a few frames ahead; the frames do not depend on the speed of their consumer.
 #[derive(Debug)]
 pub struct FrameStream {
     /// `None` once the end has been reached.

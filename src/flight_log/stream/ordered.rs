@@ -7,7 +7,7 @@ use crate::geometry::seconds_from_ns;
 
 /// Messages out of order by up to this are sorted; later ones are dropped.
 const HORIZON_NS: i64 = 100_000_000;
-/// Blocks kept: one for each topic, and one ahead for those whose messages are in the next block already.
+/// Number of cached blocks: one per topic, and one ahead for topics whose messages are in the next block already.
 const BLOCKS: usize = 8;
 
 /// The log and the warnings that all topics of a stream share.
@@ -17,7 +17,7 @@ pub(super) struct ReadContext {
     cache: BlockCache,
     /// Damaged blocks that have been reported.
     reported: BTreeSet<usize>,
-    /// Since they were last taken.
+    /// Warnings since they were last taken.
     pub(super) warnings: Vec<LogWarning>,
 }
 
@@ -48,14 +48,14 @@ impl ReadContext {
     }
 }
 
-/// Why a message was dropped, with the stamp it had if that could be read.
+/// The reason why a message was dropped, with its stamp if that could be read.
 pub(super) struct Refusal {
     pub(super) reason: &'static str,
     pub(super) detail: String,
 }
 
 impl Refusal {
-    /// Of a message whose bytes do not follow its schema.
+    /// For a message whose bytes do not match its schema.
     pub(super) fn not_decodable(error: &impl ToString) -> Self {
         Self { reason: "it cannot be decoded", detail: error.to_string() }
     }
@@ -86,12 +86,12 @@ struct DroppedRun {
 pub(super) struct OrderedSamples<T> {
     topic: String,
     messages: TopicIndex,
-    /// Number of the next message to read.
+    /// Index of the next message to read.
     next: usize,
-    /// Whether all have been read.
+    /// Whether all messages have been read.
     exhausted: bool,
     decode: Decoder<T>,
-    /// By stamp since the log began and number.
+    /// Samples by stamp since the log began and index.
     pending: BTreeMap<(i64, usize), T>,
     released_ns: Option<i64>,
     /// Whether several samples may have one stamp.

@@ -23,7 +23,7 @@ const MS: i64 = 1_000_000;
 const WIDTH: usize = 64;
 const HEIGHT: usize = 48;
 
-/// A flight of which every part can be omitted or damaged.
+/// A flight whose sensors can be omitted or damaged.
 struct Flight {
     duration_ms: i64,
     options: LogWriterOptions,

@@ -1,4 +1,4 @@
-//! Writing a flight log: MCAP with CDR messages and their definitions, as ROS 2's recorder writes it.
+//! Writing of flight logs: MCAP with CDR messages and their definitions, in the layout of ROS 2's recorder.
 
 mod encode;
 mod results;
@@ -39,7 +39,7 @@ pub enum LogCompression {
 pub struct LogWriterOptions {
     /// Compression of the chunks.
     pub compression: LogCompression,
-    /// A chunk is closed when it exceeds this size in bytes; `None` writes messages without chunks.
+    /// Maximum size of a chunk in bytes; `None` writes messages without chunks.
     pub chunk_bytes: Option<u64>,
     /// Whether the file ends with an index; without one every reader has to scan the entire file.
     pub indexed: bool,
