@@ -174,7 +174,7 @@ impl CameraModel {
             && uv_px.y <= height as f64 - 1.0 - border_px
     }
 
-    /// The geometric mean of the two focal lengths, to turn an angle at the image centre into pixels.
+    /// Geometric mean of the two focal lengths, which converts an angle at the image centre to pixels.
     pub fn focal_length_px(&self) -> f64 {
         (self.intrinsics_px[0] * self.intrinsics_px[1]).sqrt()
     }

@@ -2,7 +2,7 @@ use nalgebra::{Matrix3, Matrix4, Vector3, Vector6};
 
 use super::{RigidTransform, SplitMix64, median, so3, tangent_basis};
 
-/// Rotation vectors from tiny to just under a half turn.
+/// Rotation vectors from tiny to just under half a revolution.
 fn rotation_vectors() -> Vec<Vector3<f64>> {
     let axes = [Vector3::x(), Vector3::new(0.3, -0.5, 0.8), Vector3::new(-0.7, 0.1, -0.2)];
     let angles = [0.0, 1e-10, 1e-5, 0.9e-4, 1.1e-4, 0.01, 0.7, 2.0, 3.1];

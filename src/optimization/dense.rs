@@ -108,7 +108,7 @@ fn triangularized(mut factors: Mat<f64>) -> DMatrix<f64> {
     DMatrix::from_fn(height, columns, |row, column| if row <= column { factors[(row, column)] } else { 0.0 })
 }
 
-/// A column of a factor belongs to those before it when no more than this share of it is new.
+/// A column of a factor depends on those before it when no more than this fraction of it is independent.
 const DEPENDENT: f64 = 1e-9;
 
 /// `[A | b]` by orthogonal rows, without those that hold nothing of `A`.

@@ -1,4 +1,4 @@
-/// The joint angles of one instant, in the order of the rig's links, without the static offsets.
+/// Joint angles at one time, in the order of the rig's links, without the static offsets.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointSample {
     /// Header stamp in nanoseconds since the log began.

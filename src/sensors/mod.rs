@@ -1,5 +1,5 @@
-//! What sensors deliver and what a rig says of them, as plain types: IMU samples, joint angles, gray images, noise
-//! densities, the rig. Where they come from (a log, a simulation, a driver) is not known here.
+//! Plain types of sensor data and rig: IMU samples, joint angles, gray images, noise densities. They do not
+//! depend on the source of the data (log, simulation, driver).
 
 mod gray_image;
 mod imu;

@@ -23,7 +23,7 @@ fn quoted(keys: &[String]) -> String {
     keys.iter().map(|key| format!("'{key}'")).collect::<Vec<_>>().join(", ")
 }
 
-/// The inertial sensor.
+/// The IMU with its noise densities.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImuRig {
     /// Topic of its `sensor_msgs/msg/Imu`.
@@ -123,7 +123,7 @@ pub struct Rig {
     pub name: String,
     /// Magnitude of gravity in m/s².
     pub gravity_m_per_s2: f64,
-    /// The inertial sensor.
+    /// The IMU with its noise densities.
     pub imu: ImuRig,
     /// Cameras in the order of their keys.
     pub cameras: Vec<CameraRig>,

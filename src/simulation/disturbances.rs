@@ -36,8 +36,8 @@ pub struct Disturbances {
     pub hover_s: Option<[f64; 2]>,
     /// From when and for how long the camera keeps its orientation in the world exactly, as far as the stops let it.
     pub stabilized_s: Option<[f64; 2]>,
-    /// From when and for how long the vehicle turns about the vertical, and how fast (in rad/s), beyond the limits that
-    /// experiments keep to.
+    /// Start, duration and rate (in rad/s) of a rotation of the vehicle about the vertical, beyond the limits of
+    /// experiments.
     pub spin: Option<[f64; 3]>,
 }
 

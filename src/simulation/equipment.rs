@@ -137,8 +137,8 @@ pub(crate) fn given_rig(ground_truth: &Rig, bounds: ChainPrior, random: &mut Ran
     given
 }
 
-/// Puts a uniform error on the independent parameters: two tilts and two shifts of the base, all of each link, a turn
-/// about and a shift along the end's y axis.
+/// Adds a uniform error to the independent parameters: two rotations and two translations of the base, all of
+/// each link, a rotation about and a translation along the end's y axis.
 fn wrong_chain(chain: &ClassicalChain, bounds: ChainPrior, random: &mut RandomStream) -> ClassicalChain {
     let mut wrong = chain.clone();
     if chain.links.is_empty() {

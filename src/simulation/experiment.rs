@@ -132,7 +132,7 @@ impl Experiment {
     }
 }
 
-/// A random walk through the streets of the town that never turns on the spot.
+/// A random walk through the streets of the town without reversals.
 fn streets(length_m: f64, random: &mut RandomStream) -> Vec<Vector2<f64>> {
     let roads = TOWN_ROADS as i32;
     let position = |node: [i32; 2]| {

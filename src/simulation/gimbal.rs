@@ -139,8 +139,8 @@ pub struct JointMotion {
 }
 
 impl JointMotion {
-    /// Simulates the gimbal: at every step the controller asks for joint rates that turn the camera to what is wanted, the
-    /// motors follow with lag, and the stops hold.
+    /// Simulates the gimbal: at every step the controller requests joint rates towards the wanted orientation, the
+    /// motors follow with lag, and the limits hold.
     pub(crate) fn simulate(
         trajectory: &Trajectory,
         chain: &ClassicalChain,

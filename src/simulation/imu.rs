@@ -20,7 +20,7 @@ const ACCELEROMETER_TURN_ON_M_PER_S2: f64 = 0.196;
 /// Standard deviation of the gyroscope's turn-on bias per axis (`RotorS`), in rad/s.
 const GYROSCOPE_TURN_ON_RAD_PER_S: f64 = 0.0087;
 
-/// Biases at one instant, in the IMU frame.
+/// Biases at one time, in the IMU frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ImuBias {
     /// Added to the true specific force.

@@ -1,9 +1,9 @@
 use crate::geometry::SplitMix64;
 
-/// A stream of random numbers that is a function of a seed, a stream number and a counter only.
+/// A stream of random numbers that depends on a seed, a stream number and a counter only.
 ///
-/// The generator is PCG-RXS-M-XS 64 (O'Neill 2014) over a 64-bit linear congruential state; streams differ by their
-/// increment, so that, say, a new sensor does not shift the noise of the others.
+/// The generator is PCG-RXS-M-XS 64 (O'Neill 2014) over a 64-bit linear congruential state; streams differ by
+/// their increment, so that a new sensor does not change the noise of the others.
 #[derive(Clone, Debug)]
 pub(crate) struct RandomStream {
     state: u64,

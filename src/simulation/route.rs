@@ -66,7 +66,7 @@ impl Pace {
         fraction * fraction * fraction * (fraction * (fraction * 6.0 - 15.0) + 10.0)
     }
 
-    /// Time under way, with the ramp counted at its growing speed; its derivative is [`Self::liveliness`].
+    /// Time in motion, with the ramp counted at its growing speed; its derivative is [`Self::liveliness`].
     pub(crate) fn moving_time_s(&self, time_s: f64) -> f64 {
         let fraction = ((time_s - self.hover_s) / self.ramp_s).clamp(0.0, 1.0);
         let ramp = fraction.powi(4) * (fraction * (fraction - 3.0) + 2.5);
@@ -135,7 +135,7 @@ impl Path {
         Self { points, length_m, heading_rad, closed }
     }
 
-    /// The point this far along, and the direction there as a heading that does not jump by full turns.
+    /// Point at this distance along the path, and its direction as a continuous heading.
     pub(crate) fn at(&self, along_m: f64) -> (Vector2<f64>, f64) {
         let total = self.length_m.last().copied().unwrap_or(0.0).max(1e-9);
         let laps = if self.closed { (along_m / total).floor() } else { 0.0 };
@@ -148,7 +148,7 @@ impl Path {
         (from + step * fraction, self.heading_rad[after - 1] + heading_change)
     }
 
-    /// By how much the direction turns in one round of a closed path.
+    /// Change of direction in one round of a closed path.
     fn turn_rad(&self) -> f64 {
         let area: f64 = self.points.windows(2).map(|pair| pair[0].x * pair[1].y - pair[1].x * pair[0].y).sum();
         std::f64::consts::TAU.copysign(area)

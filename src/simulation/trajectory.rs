@@ -34,7 +34,8 @@ impl Default for VehicleLimits {
     }
 }
 
-/// The vehicle at one instant. The body frame, which is the IMU frame, has x forward, y left, z up along the thrust.
+/// State of the vehicle at one time. The body frame, which is the IMU frame, has x forward, y left, z up along
+/// the thrust.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Kinematics {
     /// Pose of the IMU in the world, whose z axis points up.

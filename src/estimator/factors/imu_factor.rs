@@ -1,4 +1,4 @@
-//! The inertial residual between two frames and its Jacobians.
+//! The IMU residual between two frames and its Jacobians.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -6,7 +6,8 @@ use super::preintegration::Preintegration;
 use crate::estimator::state::navigation::{Matrix15, NavigationState, Vector15};
 use crate::geometry::so3;
 
-/// Residual `[φ, p, v, b_g, b_a]` of two states against the samples between them (Eq. 8's inertial term), not whitened.
+/// Residual `[φ, p, v, b_g, b_a]` (15 × 1) of two states against the samples between them (IMU term of Eq. 8),
+/// not whitened.
 pub fn residual(
     preintegration: &Preintegration,
     from: &NavigationState,
@@ -32,7 +33,7 @@ pub fn residual(
     residual
 }
 
-/// Derivatives of [`residual`] by `from` and by `to`, each 15 × 15 in the order `[φ, p, v, b_g, b_a]`.
+/// Derivatives of [`residual`] with respect to `from` and to `to`, each 15 × 15 in the order `[φ, p, v, b_g, b_a]`.
 pub fn jacobians(
     preintegration: &Preintegration,
     from: &NavigationState,
@@ -56,7 +57,7 @@ pub fn jacobians(
     let gain = to.velocity_m_per_s - from.velocity_m_per_s - gravity_in_world * t;
     let identity = Matrix3::<f64>::identity();
 
-    // The bias correction turns by Exp(J δb): its derivative, seen from the far side of the rotation error.
+    // The bias correction rotates by Exp(J δb): its derivative passes through the rotation error.
     let correction = (by_bias.fixed_view::<3, 6>(0, 0) * change).fixed_rows::<3>(0).into_owned();
     let error_back: Matrix3<f64> = so3::exp(&-rotation_error).to_rotation_matrix().into_inner();
     let phi_by_bias =

@@ -1,6 +1,7 @@
-//! The residuals of the window (Eqs. 8–10) with their Jacobians: reprojection, IMU preintegration, zero velocity, priors.
+//! Residuals of the window (Eqs. 8–10) with their Jacobians: reprojection, IMU preintegration, zero velocity, priors.
 //!
-//! A factor takes states and measurements and returns whitened residuals and derivatives; it does not know the window.
+//! A factor takes states and measurements and returns whitened residuals and derivatives; it does not depend on
+//! the window.
 
 pub mod imu_factor;
 pub mod preintegration;

@@ -1,7 +1,8 @@
-//! IMU samples between two instants, summed up once (Forster et al., TRO 2017) with covariance and bias Jacobians.
+//! Preintegration of the IMU samples between two frames (Forster et al., TRO 2017) with covariance and bias
+//! Jacobians.
 //!
-//! Angular velocity and specific force are taken as linear between samples: rotations by the second Magnus term, velocity
-//! and position by Simpson's rule over each sample interval.
+//! Angular velocity and specific force are linear between samples: rotations by the second Magnus term,
+//! velocity and position by Simpson's rule over each sample interval.
 //! Error vectors are ordered `[φ, p, v, b_g, b_a]` (15), with the perturbation rule of [`crate::geometry`].
 
 use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
@@ -10,10 +11,10 @@ pub use crate::estimator::state::navigation::{ImuBias, Matrix15, NavigationState
 use crate::geometry::{RigidTransform, seconds_from_ns, so3};
 use crate::sensors::{ImuNoise, ImuSample};
 
-/// Derivative of `[φ, p, v]` by `[b_g, b_a]`.
+/// Derivative of `[φ, p, v]` with respect to `[b_g, b_a]` (9 × 6).
 pub type BiasJacobian = SMatrix<f64, 9, 6>;
 
-/// Motion of the IMU over an interval, seen in its frame at the beginning, gravity and the first velocity left out.
+/// Motion of the IMU over an interval in its frame at the start, without gravity and initial velocity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotionIncrement {
     /// `imu_i_from_imu_j`.
@@ -24,21 +25,22 @@ pub struct MotionIncrement {
     pub velocity_m_per_s: Vector3<f64>,
 }
 
-/// An axis that shows the same value so often, and one as large as [`MIN_SATURATED_RAD_PER_S`] or
-/// [`MIN_SATURATED_M_PER_S2`], is at the end of its range: noise never repeats a value of full resolution.
+/// Saturation: an axis that repeats the same value this often, at least [`MIN_SATURATED_RAD_PER_S`] or
+/// [`MIN_SATURATED_M_PER_S2`] large, is at the end of its range. Noise never repeats a value of full
+/// resolution.
 const SATURATED_REPEATS: u8 = 3;
 
-/// Slower turns are in every sensor's range.
+/// Smaller angular rates are in every sensor's range.
 const MIN_SATURATED_RAD_PER_S: f64 = 0.5;
 
-/// Every sensor's range reaches beyond gravity.
+/// Gravity is in every sensor's range.
 const MIN_SATURATED_M_PER_S2: f64 = 12.0;
 
-/// Noise density of an axis at the end of its range, as a share of what it shows, in √s: the truth lies beyond by about
-/// half of it (standard deviation) for about a tenth of a second.
+/// Noise density of a saturated axis relative to its value, in √s: the true value exceeds it by about half
+/// (standard deviation) for about a tenth of a second.
 const SATURATED_DENSITY: f64 = 0.16;
 
-/// How often each axis has shown the same value in a row.
+/// Number of repetitions of each axis' value.
 #[derive(Clone, Copy, Debug, Default)]
 struct Repeats {
     gyroscope: [u8; 3],
@@ -69,7 +71,7 @@ impl Repeats {
     }
 }
 
-/// What the IMU samples of an interval say about the motion over it.
+/// Preintegrated IMU samples of an interval.
 #[derive(Clone, Debug)]
 pub struct Preintegration {
     noise: ImuNoise,
@@ -84,7 +86,7 @@ pub struct Preintegration {
 }
 
 impl Preintegration {
-    /// An empty interval, to be integrated around `bias`.
+    /// Returns an empty interval that is integrated with `bias`.
     pub fn new(noise: ImuNoise, bias: ImuBias) -> Self {
         Self {
             noise,
@@ -103,15 +105,15 @@ impl Preintegration {
         }
     }
 
-    /// The samples of one interval, both ends included.
+    /// Integrates the samples of one interval, both ends included.
     pub fn from_samples(noise: ImuNoise, bias: ImuBias, samples: &[ImuSample]) -> Self {
         let mut preintegration = Self::new(noise, bias);
         preintegration.extend(samples);
         preintegration
     }
 
-    /// Appends the samples of the interval that follows; samples that do not lie later than the last one, or hold a number
-    /// that is not finite, are passed over.
+    /// Appends the samples of the following interval; samples that are not later than the last one or not finite
+    /// are skipped.
     pub fn extend(&mut self, samples: &[ImuSample]) {
         for sample in samples {
             let finite = sample.angular_velocity_rad_per_s.iter().all(|x| x.is_finite())
@@ -127,7 +129,7 @@ impl Preintegration {
         }
     }
 
-    /// Integrates the same samples again around another bias.
+    /// Reintegrates the samples with another bias.
     pub fn reintegrate(&mut self, bias: ImuBias) {
         let samples = std::mem::take(&mut self.samples);
         *self = Self::from_samples(self.noise, bias, &samples);
@@ -138,27 +140,27 @@ impl Preintegration {
         &self.samples
     }
 
-    /// The bias it was integrated around.
+    /// Bias of the integration.
     pub fn bias(&self) -> &ImuBias {
         &self.bias
     }
 
-    /// Length of the interval in seconds.
+    /// Duration of the interval in seconds.
     pub fn duration_s(&self) -> f64 {
         self.duration_s
     }
 
-    /// Number of samples at which an axis was at the end of its range.
+    /// Number of samples with a saturated axis.
     pub fn saturated_samples(&self) -> usize {
         self.saturated
     }
 
-    /// The motion at the bias it was integrated around.
+    /// Motion at the bias of the integration.
     pub fn increment(&self) -> &MotionIncrement {
         &self.increment
     }
 
-    /// First-order derivative of `[φ, p, v]` of the increment by `[b_g, b_a]`.
+    /// Derivative of the increment's `[φ, p, v]` with respect to `[b_g, b_a]` (9 × 6).
     pub fn bias_jacobian(&self) -> &BiasJacobian {
         &self.bias_jacobian
     }
@@ -168,7 +170,7 @@ impl Preintegration {
         &self.covariance
     }
 
-    /// The motion at another bias, to first order in the difference.
+    /// Motion at another bias, to first order in the change.
     pub fn corrected(&self, bias: &ImuBias) -> MotionIncrement {
         let change = self.bias_change(bias);
         let shift: SVector<f64, 9> = self.bias_jacobian * change;
@@ -179,7 +181,7 @@ impl Preintegration {
         }
     }
 
-    /// `[b_g, b_a]` of `bias` against the one it was integrated around.
+    /// Change `[b_g, b_a]` of `bias` from the bias of the integration (6 × 1).
     pub fn bias_change(&self, bias: &ImuBias) -> SVector<f64, 6> {
         let mut change = SVector::<f64, 6>::zeros();
         change.fixed_rows_mut::<3>(0).copy_from(&(bias.gyroscope_rad_per_s - self.bias.gyroscope_rad_per_s));
@@ -187,7 +189,7 @@ impl Preintegration {
         change
     }
 
-    /// The state at the end of the interval, from the one at its beginning.
+    /// Predicts the state at the end of the interval from the one at its start.
     pub fn predict(&self, start: &NavigationState, gravity_in_world: &Vector3<f64>) -> NavigationState {
         let motion = self.corrected(&start.bias);
         let t = self.duration_s;
@@ -250,7 +252,7 @@ impl Preintegration {
         let r = self.increment.rotation.to_rotation_matrix().into_inner();
         let e_half: Matrix3<f64> = half_rotation.to_rotation_matrix().into_inner();
         let e: Matrix3<f64> = step_rotation.to_rotation_matrix().into_inner();
-        // Derivatives of the step by a constant change of angular velocity and specific force over it.
+        // Derivatives of the step with respect to a constant change of angular velocity and specific force.
         let phi_by_w = so3::right_jacobian(&phi) * (Matrix3::identity() * h - so3::hat(&(w1 - w0)) * (h * h / 12.0));
         let phi_half_by_w = so3::right_jacobian(&phi_half)
             * (Matrix3::identity() * (0.5 * h) - so3::hat(&(w_half - w0)) * (h * h / 48.0));
@@ -319,8 +321,8 @@ impl Preintegration {
         j.fixed_view_mut::<3, 3>(0, 0).copy_from(&(step_rotation_transpose * phi_by_bg - phi_by_w));
     }
 
-    /// White noise and random walk of one sample interval, from the squared continuous densities: of the angular velocity
-    /// by axis, of the specific force as a matrix in the frame of the interval's begin.
+    /// White noise and random walk of one sample interval (15 × 15), from the squared continuous densities: of the
+    /// angular velocity by axis, of the specific force as a matrix in the frame at the interval's start.
     fn add_noise(
         &mut self,
         h: f64,
@@ -335,7 +337,7 @@ impl Preintegration {
         by_w.fixed_view_mut::<3, 3>(6, 0).copy_from(dv_by_w);
         let mut motion = self.covariance.fixed_view_mut::<9, 9>(0, 0);
         motion += by_w * Matrix3::from_diagonal(turn_noise) * by_w.transpose() / h;
-        // White specific force over the interval moves velocity and position together.
+        // White specific force over the interval correlates velocity and position.
         for (row, column, factor) in [(3, 3, h * h * h / 3.0), (3, 6, h * h / 2.0), (6, 3, h * h / 2.0), (6, 6, h)] {
             let mut block = self.covariance.fixed_view_mut::<3, 3>(row, column);
             block += force_noise * factor;

@@ -9,7 +9,7 @@ use crate::estimator::state::layout::{Layout, POSE};
 use crate::estimator::state::navigation::ImuBias;
 use crate::optimization::dense;
 
-/// Which unknown a column of the prior stands for.
+/// Unknown of a column of the prior.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum PriorColumn {
     /// Entry `offset` of the frame at `slot`, in the order of [`Layout`].
@@ -24,7 +24,7 @@ pub(crate) enum PriorColumn {
 }
 
 impl PriorColumn {
-    /// The column of the whole window that this one is.
+    /// Index of the column in the layout of the window.
     pub(crate) fn index(self, layout: &Layout) -> usize {
         match self {
             Self::Frame { slot, offset } => layout.frame(slot).start + offset,
@@ -46,7 +46,7 @@ pub(crate) struct Prior {
     columns: Vec<PriorColumn>,
     jacobian: DMatrix<f64>,
     residual: DVector<f64>,
-    /// `JᵀJ` and `Jᵀr`, which no iteration changes.
+    /// `JᵀJ` and `Jᵀr`, constant over all iterations.
     hessian: DMatrix<f64>,
     gradient: DVector<f64>,
 }
@@ -64,8 +64,8 @@ impl Prior {
             return None;
         }
         let ordered: Vec<usize> = eliminated.iter().chain(&kept).copied().chain([total]).collect();
-        // A residual that no unknown can change is no part of the prior: it would pile up over a flight, to a cost beside
-        // which no step seems to gain anything.
+        // A residual that no unknown can change is dropped: its cost would accumulate over a flight until no step
+        // seemed to lower the cost.
         let echelon = dense::echelon(&rows.select_columns(&ordered), eliminated.len());
         let (first, height) = (echelon.leading_rank, echelon.rows.nrows() - echelon.leading_rank);
         if height == 0 {
@@ -83,7 +83,7 @@ impl Prior {
         Self { columns, jacobian, residual, hessian, gradient }
     }
 
-    /// The frame at `gone` has left the window and those after it moved up; the prior must not hold it.
+    /// Renumbers the slots after the frame at `gone` has left; the prior must not contain that frame.
     pub(crate) fn renumber(&mut self, gone: usize) {
         for column in &mut self.columns {
             if let PriorColumn::Frame { slot, .. } = column {
@@ -95,14 +95,14 @@ impl Prior {
         }
     }
 
-    /// Whether it holds unknowns of the frame at `slot`.
+    /// Whether the prior has columns of the frame at `slot`.
     pub(crate) fn holds_frame(&self, slot: usize) -> bool {
         self.columns
             .iter()
             .any(|column| matches!(column, PriorColumn::Frame { slot: contained, .. } if *contained == slot))
     }
 
-    /// Whether it holds some of these calibration parameters.
+    /// Whether the prior has columns of some of these parameters.
     pub(crate) fn holds_calibration(&self, parameters: &Range<usize>) -> bool {
         let contained = |column: &PriorColumn| matches!(column, PriorColumn::Calibration(contained) if parameters.contains(contained));
         self.columns.iter().any(contained)
@@ -152,12 +152,11 @@ impl Prior {
         rows
     }
 
-    /// Transports its calibration columns to another parameterization: `old = by_new · new` to first order.
+    /// Transforms the calibration columns to another parameterization: `old = by_new · new` to first order.
     ///
-    /// `first_estimate_offsets` are the calibration's from its first estimate in the old and in the new parameterization. Where the
-    /// two differ by
-    /// more than the first order, the residual takes the difference up, so that cost and gradient stay what they are at
-    /// the present estimate.
+    /// `first_estimate_offsets` are the offsets of the calibration from its first estimate in the old and in the
+    /// new parameterization. Where they differ beyond first order, the residual compensates the difference, so that
+    /// cost and gradient are unchanged at the present estimate.
     pub(crate) fn transport_calibration(
         &mut self,
         old_from_new: &DMatrix<f64>,
@@ -191,11 +190,10 @@ impl Prior {
     }
 }
 
-/// What is known when the window begins: position and yaw of the first frame by choice of the world, and how large the
-/// biases may be.
+/// Prior at the start of the window: position and yaw of the first frame, which fix the gauge, and the biases.
 #[derive(Clone, Debug)]
 pub(crate) struct StartPrior {
-    /// The state it was set at.
+    /// State at which the prior was set.
     pub(crate) reference: FrameState,
     /// Most likely biases.
     pub(crate) bias: ImuBias,

@@ -1,5 +1,5 @@
-//! The reprojection factors as rows over the camera poses, every landmark projected out orthogonally: no normal
-//! equations are formed, so that what is exactly unseen stays exactly unseen.
+//! Reprojection factors as rows over the camera poses with every landmark projected out orthogonally: without
+//! normal equations, unobservable directions stay exactly unobservable.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -16,8 +16,8 @@ const POSE: usize = 6;
 pub(crate) struct ProjectedRows {
     /// `[camera poses 6·frames | residual]`, compressed to its upper echelon factor.
     pub(crate) rows: DMatrix<f64>,
-    /// What the sightings of the newest frame add to those of the others, of the same columns: their rows when the
-    /// landmarks were known from the others as far as those tell them. They are among `rows` already.
+    /// Rows of the newest frame's observations, conditioned on the landmarks' posterior from all other
+    /// observations, in the same columns. They are included in `rows`.
     pub(crate) newest_rows: DMatrix<f64>,
     /// `JᵀJ` of the camera poses before the landmarks were projected out.
     blocks: PoseBlocks,
@@ -39,7 +39,7 @@ impl ProjectedRows {
         let relative_linearized = RelativePoses::new(linearized);
         let mut blocks = PoseBlocks::new(frames);
         let columns = POSE * frames + 1;
-        // By the first slot that sees the feature, from its columns on.
+        // Grouped by the first observing slot, from its columns on.
         let mut rows: Vec<Vec<f64>> =
             (0..frames).map(|slot| Vec::with_capacity(height_of(tracks, slot) * (columns - POSE * slot))).collect();
         let mut newest_rows = Vec::new();
@@ -65,34 +65,34 @@ impl ProjectedRows {
             let first = first_slot(track).unwrap_or(anchor);
             local.append_to(&mut rows[first], columns, first, local.remaining());
         }
-        // Without a row that holds nothing but the residual that no camera pose can change.
+        // Without a row of the residual alone, which no camera pose can change.
         let rows = dense::triangularize_groups(&rows, POSE, columns);
         let newest_rows = DMatrix::from_row_slice(newest_rows.len() / columns, columns, &newest_rows);
         Self { rows, newest_rows, blocks }
     }
 
-    /// Sum of squares of the columns that move the cameras by `columns` (per slot 6 × n), before the projection.
+    /// Squared norms of the columns that move the cameras by `columns` (per slot 6 × n), before the projection.
     pub(crate) fn squared_column_norms(&self, columns: &[DMatrix<f64>]) -> DVector<f64> {
         self.blocks.squared_norms(columns)
     }
 }
 
-/// The anchor need not be the first to see a feature.
+/// The anchor need not be the first observing frame.
 fn first_slot(track: &Track) -> Option<usize> {
     track.observations.iter().map(|observation| observation.slot).min()
 }
 
-/// Most rows that the tracks leave which begin in a slot.
+/// Largest number of rows that start in a slot.
 fn height_of(tracks: &[Track], slot: usize) -> usize {
     let beginning = tracks.iter().filter(|track| first_slot(track) == Some(slot));
     beginning.map(|track| (2 * track.observations.len()).saturating_sub(LANDMARK)).sum()
 }
 
-/// Whether the rows that the newest frame adds are told apart.
+/// Treatment of the newest frame's rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum NewestRows {
-    /// They are not asked for.
+    /// Not requested.
     Among,
-    /// They are kept beside the others, too.
+    /// Stored separately as well.
     Apart,
 }

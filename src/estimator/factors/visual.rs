@@ -9,7 +9,7 @@ use crate::optimization::{
     ReprojectionEquations, RobustLoss, reprojection,
 };
 
-/// One measurement of a feature: the slot of the frame and the pixel.
+/// An observation of a feature: slot of the frame and pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct TrackObservation {
     /// Slot of the frame in the window.
@@ -18,14 +18,14 @@ pub(crate) struct TrackObservation {
     pub(crate) uv_px: Vector2<f64>,
 }
 
-/// The observations of one feature that takes part, its anchor's first.
+/// Observations of one feature in the solve, the anchor's first.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Track {
     /// In the order of the slots.
     pub(crate) observations: Vec<TrackObservation>,
 }
 
-/// How pixels are weighed.
+/// Camera model, pixel noise and robust loss.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct VisualModel<'a> {
     pub(crate) camera: &'a CameraModel,
@@ -39,13 +39,14 @@ impl<'a> VisualModel<'a> {
         Self { camera, sigma_px: options.pixel_sigma_px, loss: options.loss, landmark_model: options.landmark_model }
     }
 
-    /// Whether the anchor's own measurement is a residual.
+    /// Whether the anchor's own observation has a residual.
     fn measures_in_anchor(&self) -> bool {
         self.landmark_model == LandmarkModel::BearingAndInverseDistance
     }
 }
 
-/// Pixel residual of one sighting, `None` when the landmark cannot be seen there.
+/// Reprojection residual of one observation in pixels (2 × 1), `None` when the landmark does not project into
+/// the camera.
 pub(crate) fn sighting_residual_px(
     model: &VisualModel<'_>,
     relative: &RelativePoses,
@@ -102,8 +103,8 @@ pub(crate) fn equations(
     equations
 }
 
-/// One sighting linearized, divided by sigma and times the root of its robust weight: the one of its residual, unless it is
-/// known.
+/// Linearizes one observation, divided by sigma and multiplied by the root of its robust weight: that of its
+/// residual, unless given.
 pub(crate) fn whitened(
     model: &VisualModel<'_>,
     relative: &RelativePoses,

@@ -1,7 +1,7 @@
-//! The zero-velocity update (ZUPT): what a stationary vehicle says about the unknowns of a frame.
+//! The zero-velocity update (ZUPT) of a stationary vehicle.
 //!
-//! It is soft, as soft as its detection is sharp: the position is the one of the frame before and the velocity is zero, up to
-//! the motion that the images could not have shown at the distance of the scene.
+//! It is soft: position equal to that of the previous frame and zero velocity, up to the motion that the images
+//! cannot resolve at the distance of the scene.
 
 use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::state::layout::Layout;
@@ -11,13 +11,14 @@ use crate::estimator::state::layout::Layout;
 pub(crate) struct Stationary {
     /// Since when the vehicle has not moved.
     pub(crate) since_ns: i64,
-    /// Standard deviation of the position against the frame before, per axis: motion that the images could not have shown.
+    /// Standard deviation of the position relative to the previous frame, per axis: the resolution of the images.
     pub(crate) position_sigma_m: f64,
     /// Standard deviation of the velocity, per axis.
     pub(crate) velocity_sigma_m_per_s: f64,
 }
 
-/// One scalar residual of the zero-velocity update, whitened: an unknown, or its difference from the one of the frame before.
+/// One whitened scalar residual of the zero-velocity update: an unknown, or its difference from that of the
+/// previous frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ZeroVelocityTerm {
     /// Column with derivative `slope`.

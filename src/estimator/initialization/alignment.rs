@@ -1,24 +1,25 @@
 //! Metric scale, gravity, velocities and biases for camera poses that are known up to scale.
 //!
-//! Everything is expressed in the IMU frame of the first view ("start").
-//! Rotations of the IMU come from the gyroscope, rotations of the camera from the images; between them stands the mount,
-//! which a gimbal turns, so that only its rotation at the first view is one unknown, averaged over all views.
+//! All quantities are in the IMU frame of the first view ("start").
+//! Rotations of the IMU come from the gyroscope, rotations of the camera from the images. Between them are the
+//! extrinsics, which a gimbal rotates: only their rotation at the first view is an unknown, averaged over all
+//! views.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
 use crate::estimator::{ImuBias, Preintegration};
 use crate::geometry::{RigidTransform, median, so3};
 
-/// Noise of a visual rotation between two views, added to the mount's.
+/// Noise of a visual rotation between two views, added to that of the extrinsics.
 const VISUAL_ROTATION_SIGMA_RAD: f64 = 0.002;
 /// Typical distance of landmarks before the scale is known.
 const FIRST_DISTANCE_M: f64 = 8.0;
-/// Error of a gyroscope rotation over a window, which turns gravity into a false acceleration.
+/// Error of a gyroscope rotation over a window, which rotates gravity into a false acceleration.
 const TILT_SIGMA_RAD: f64 = 0.003;
-/// Rounds of the linear system; from the second on the mount's rotation is free as well.
+/// Iterations of the linear system; from the second on the rotation of the extrinsics is estimated, too.
 const ROUNDS: usize = 5;
 
-/// A Gaussian belief about a vector, the same for each axis.
+/// A Gaussian prior on a vector, the same for each axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VectorPrior {
     /// Expected value.
@@ -27,11 +28,11 @@ pub struct VectorPrior {
     pub sigma: f64,
 }
 
-/// What the alignment is given.
+/// Input of the alignment.
 pub(super) struct AlignmentInput<'a> {
     /// `first_camera_from_camera`, up to scale, one per view.
     pub(super) cameras: &'a [RigidTransform],
-    /// The mount as calibration and encoders say, one per view.
+    /// Extrinsics from calibration and encoders, one per view.
     pub(super) imu_from_camera: &'a [RigidTransform],
     /// Motion from each view to the next, one fewer than views.
     pub(super) increments: &'a [Preintegration],
@@ -39,9 +40,9 @@ pub(super) struct AlignmentInput<'a> {
     pub(super) median_distance: f64,
     pub(super) bearing_sigma_rad: f64,
     pub(super) gravity_m_per_s2: f64,
-    /// Error of the mount's rotation that all views share.
+    /// Rotation error of the extrinsics that all views share.
     pub(super) extrinsics_rotation_sigma_rad: f64,
-    /// Error of the mount's rotation of its own in each view.
+    /// Independent rotation error of the extrinsics in each view.
     pub(super) extrinsics_rotation_noise_rad: f64,
     pub(super) gyroscope_bias: VectorPrior,
     pub(super) accelerometer_bias: VectorPrior,
@@ -58,21 +59,22 @@ pub(super) struct Alignment {
     pub(super) poses: Vec<RigidTransform>,
     /// Velocity per view.
     pub(super) velocities: Vec<Vector3<f64>>,
-    /// The mount's rotation per view, after the images.
+    /// Extrinsics per view, with the rotation from the images.
     pub(super) imu_from_camera: Vec<RigidTransform>,
     pub(super) bias: ImuBias,
-    /// Weighted squares that the linear system left.
+    /// Weighted squared residuals of the linear system.
     cost: f64,
 }
 
-/// The mount's rotation at the first view and the gyroscope's bias, from rotations alone.
+/// Rotation of the extrinsics at the first view and gyroscope bias, from rotations alone.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RotationAlignment {
     pub(super) imu_from_first_camera: UnitQuaternion<f64>,
     pub(super) gyroscope_bias: Vector3<f64>,
 }
 
-/// `start_from_imu` of every view at a gyroscope bias, with the derivative of each (right perturbation) by that bias.
+/// Returns `start_from_imu` of every view for a gyroscope bias, with its derivative (right perturbation, 3 × 3)
+/// with respect to the bias.
 fn gyroscope_rotations(increments: &[Preintegration], bias: &Vector3<f64>) -> Vec<(UnitQuaternion<f64>, Matrix3<f64>)> {
     let mut rotations = vec![(UnitQuaternion::identity(), Matrix3::zeros())];
     let (mut rotation, mut by_bias) = (UnitQuaternion::identity(), Matrix3::zeros());
@@ -87,9 +89,9 @@ fn gyroscope_rotations(increments: &[Preintegration], bias: &Vector3<f64>) -> Ve
     rotations
 }
 
-/// Solves for the mount's rotation at the first view and the gyroscope's bias together, robustly.
+/// Estimates the rotation of the extrinsics at the first view and the gyroscope's bias together, robustly.
 ///
-/// Each view says `imu_from_first_camera = start_from_imu · imu_from_camera · camera_from_first_camera`.
+/// Each view gives `imu_from_first_camera = start_from_imu · imu_from_camera · camera_from_first_camera`.
 pub(super) fn align_rotations(input: &AlignmentInput<'_>) -> Option<RotationAlignment> {
     const ROUNDS: usize = 10;
     let sigma = input.extrinsics_rotation_noise_rad.hypot(VISUAL_ROTATION_SIGMA_RAD);
@@ -108,12 +110,12 @@ pub(super) fn align_rotations(input: &AlignmentInput<'_>) -> Option<RotationAlig
         {
             let predicted = start_from_imu * given.rotation * camera.rotation.inverse();
             let error = so3::log(&(extrinsics.inverse() * predicted));
-            // A right turn of `start_from_imu` passes through the rest of the product.
+            // A right perturbation of `start_from_imu` passes through the rest of the product.
             let onward = (given.rotation * camera.rotation.inverse()).inverse().to_rotation_matrix().into_inner();
             let by_bias = onward * by_bias;
             let ratio = error.norm() / sigma;
             let weight = 1.0 / (sigma * sigma * (1.0 + (ratio / 3.0).powi(2)));
-            // error(δ, db) ≈ error − δ + by_bias · db, for a right turn δ of the mount.
+            // error(δ, db) ≈ error − δ + by_bias · db, for a right perturbation δ of the extrinsics.
             let mut jacobian = nalgebra::Matrix3x6::zeros();
             jacobian.fixed_view_mut::<3, 3>(0, 0).copy_from(&-Matrix3::identity());
             jacobian.fixed_view_mut::<3, 3>(0, 3).copy_from(&by_bias);
@@ -132,20 +134,21 @@ pub(super) fn align_rotations(input: &AlignmentInput<'_>) -> Option<RotationAlig
         .then_some(RotationAlignment { imu_from_first_camera: extrinsics, gyroscope_bias: bias })
 }
 
-/// Columns of the linear system: scale, mount (3), accelerometer bias (3), gravity (3), velocities (3 each).
+/// Columns of the linear system: scale, extrinsics (3), accelerometer bias (3), gravity (3), velocities (3 each).
 const SCALE: usize = 0;
 const EXTRINSICS: usize = 1;
 const BIAS: usize = 4;
 const GRAVITY: usize = 7;
 const VELOCITY: usize = 10;
 
-/// Beyond this uncertainty of the mount's rotation the alignment is tried from rotations all around.
+/// With a larger uncertainty of the extrinsics' rotation, the alignment starts from several rotations.
 const AMPLE_EXTRINSICS_SIGMA_RAD: f64 = 0.6;
 
-/// Solves for scale, gravity of exact magnitude, velocities, accelerometer bias and what the mount's rotation still lacks.
+/// Solves for scale, gravity with exact magnitude, velocities, accelerometer bias and the remaining rotation of
+/// the extrinsics.
 ///
-/// Without encoders the mount may point anywhere: then the 24 rotations of a cube are tried as well, none of which lies
-/// further than 63° from any rotation, and the least cost wins.
+/// Without encoders the camera may point anywhere: then the 24 rotations of a cube are tried as well, one of
+/// which is within 63° of any rotation, and the smallest cost wins.
 pub(super) fn align(input: &AlignmentInput<'_>, rotation: &RotationAlignment) -> Option<Alignment> {
     let mut best = align_from(input, rotation, rotation.imu_from_first_camera);
     if input.extrinsics_rotation_sigma_rad > AMPLE_EXTRINSICS_SIGMA_RAD {
@@ -164,7 +167,7 @@ pub(super) fn align(input: &AlignmentInput<'_>, rotation: &RotationAlignment) ->
     best
 }
 
-/// The turns of a cube but for the identity.
+/// The 23 rotations of a cube other than the identity.
 fn cube_rotations() -> impl Iterator<Item = UnitQuaternion<f64>> {
     let axes = [Vector3::x(), -Vector3::x(), Vector3::y(), -Vector3::y(), Vector3::z(), -Vector3::z()];
     axes.into_iter().flat_map(|up| (0..4).map(move |quarter| (up, quarter))).filter_map(|(up, quarter)| {
@@ -176,7 +179,7 @@ fn cube_rotations() -> impl Iterator<Item = UnitQuaternion<f64>> {
     })
 }
 
-/// The alignment from one first guess of the mount's rotation at the first view.
+/// Returns the alignment from one initial rotation of the extrinsics at the first view.
 fn align_from(
     input: &AlignmentInput<'_>,
     rotation: &RotationAlignment,
@@ -197,7 +200,7 @@ fn align_from(
         let rotation_step = solution.fixed_rows::<3>(EXTRINSICS).into_owned();
         extrinsics = UnitQuaternion::new_normalize((so3::exp(&rotation_step) * extrinsics).into_inner());
         rotation_change += rotation_step;
-        // A negative scale would mirror the scene; go on from a small positive one.
+        // A negative scale would mirror the scene; continue from a small positive one.
         scale = Some(solution[SCALE].max(1e-6));
         last = Some((solution, cost));
     }
@@ -302,10 +305,10 @@ fn add_rows(
     *square += weight * side.norm_squared();
 }
 
-/// The least-squares solution of `N x = b` whose three gravity entries have exactly the given norm.
+/// Least-squares solution of `N x = b` whose three gravity entries have exactly the given norm.
 ///
-/// All else is eliminated onto gravity; the multiplier of the constraint is the root of a function that falls
-/// monotonically beyond the last pole, found by bisection.
+/// All other unknowns are eliminated onto gravity. The multiplier of the constraint is the root of a function
+/// that decreases monotonically beyond the last pole, found by bisection.
 pub(super) fn solve_with_gravity_norm(
     normal: &DMatrix<f64>,
     rhs: &DVector<f64>,
@@ -333,7 +336,7 @@ pub(super) fn solve_with_gravity_norm(
     Some(solution)
 }
 
-/// The `x` of a given norm that makes `xᵀ A x − 2 bᵀ x` least.
+/// Minimizes `xᵀ A x − 2 bᵀ x` over `x` of the given norm.
 pub(super) fn quadratic_on_sphere(a: &Matrix3<f64>, b: &Vector3<f64>, norm: f64) -> Option<Vector3<f64>> {
     const HALVINGS: usize = 200;
     let eigen = ((a + a.transpose()) * 0.5).try_symmetric_eigen(1e-15, 500)?;
@@ -351,7 +354,8 @@ pub(super) fn quadratic_on_sphere(a: &Matrix3<f64>, b: &Vector3<f64>, norm: f64)
     }
     let mu = high;
     let x = eigen.eigenvectors * c.component_div(&eigen.eigenvalues.add_scalar(mu));
-    // The norm is met to rounding; in the hard case (b orthogonal to the weakest direction) it is made so.
+    // The norm is exact up to rounding; in the hard case (b orthogonal to the eigenvector of the smallest
+    // eigenvalue) it is enforced.
     let length = x.norm();
     (length.is_finite() && length > 0.0).then(|| x * (norm / length))
 }

@@ -1,4 +1,4 @@
-//! One attempt from beginning to end.
+//! One attempt to initialize.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -19,14 +19,14 @@ use super::{
 use crate::estimator::{ImuBias, Preintegration};
 use crate::geometry::{RigidTransform, seconds_from_ns};
 
-/// Most rounds of the refinement before and after landmarks that do not fit are dropped.
+/// Largest number of iterations of the refinement before and after outlier landmarks are dropped.
 const REFINEMENT_ROUNDS: [usize; 2] = [10, 25];
-/// A landmark with a observation beyond this many standard deviations is dropped in between.
+/// A landmark with an observation beyond this many standard deviations is dropped in between.
 const OUTLIER_SIGMAS: f64 = 4.0;
-/// A change of the gyroscope's bias by more than this is integrated anew.
+/// Change of the gyroscope's bias at which intervals are reintegrated.
 const REINTEGRATE_RAD_PER_S: f64 = 0.003;
 
-/// Tries to initialize on the frames given.
+/// Tries to initialize from the given frames.
 pub fn try_initialize(input: &InitializationInput<'_>, options: &InitializationOptions) -> InitializationOutcome {
     let mut still = Checklist::default();
     let stationary = stationary::detect(input, &mut still);
@@ -43,7 +43,7 @@ pub fn try_initialize(input: &InitializationInput<'_>, options: &InitializationO
     }
 }
 
-/// Gravity along the mean specific force; of the accelerometer's bias only what lies along it is observable.
+/// Gravity along the mean specific force; only the accelerometer bias along it is observable.
 fn from_stationary(
     input: &InitializationInput<'_>,
     stationary: &StationaryEstimate,
@@ -80,10 +80,10 @@ fn from_stationary(
     }))
 }
 
-/// `world_from_imu` that turns gravity (given in the IMU frame, pointing down) to −z and leaves no yaw.
+/// Returns `world_from_imu` that rotates gravity (in the IMU frame, pointing down) to −z, without yaw.
 fn level(gravity_in_imu: &Vector3<f64>) -> UnitQuaternion<f64> {
     let up = -gravity_in_imu.normalize();
-    // The shortest turn from `up` to z, or a half turn about x when they are opposite.
+    // The shortest rotation from `up` to z, or half a revolution about x when they are opposite.
     let tilt = UnitQuaternion::rotation_between(&up, &Vector3::z())
         .unwrap_or_else(|| UnitQuaternion::from_scaled_axis(Vector3::x() * std::f64::consts::PI));
     let forward = tilt * Vector3::x();
@@ -150,7 +150,7 @@ fn from_motion(
     Some(problem.solution(&refined, parallax_rad))
 }
 
-/// Standard deviation of the mean specific force between neighbouring views, in a frame that does not turn.
+/// Standard deviation of the mean specific force between neighbouring views, in a frame that does not rotate.
 fn excitation(frames: &[InitializationFrame<'_>], selected: &[usize], camera_rotations: &[UnitQuaternion<f64>]) -> f64 {
     let forces: Vec<Vector3<f64>> = selected
         .windows(2)
@@ -229,15 +229,15 @@ fn structure_of(
     }
 }
 
-/// What the mean of so many squared normal numbers exceeds once in a thousand times (the quantile of χ² over its degrees of
-/// freedom, by the cube root of Wilson and Hilferty).
+/// Bound that the mean of this many squared normal numbers exceeds once in a thousand times (the quantile of χ²
+/// over its degrees of freedom, by the cube root of Wilson and Hilferty).
 fn upper_mean_square(count: usize) -> f64 {
     const NORMAL_QUANTILE: f64 = 3.09;
     let ratio = 2.0 / (9.0 * count.max(1) as f64);
     (1.0 - ratio + NORMAL_QUANTILE * ratio.sqrt()).powi(3)
 }
 
-/// The views that were placed, with all that the metric part needs.
+/// Reconstructed views with the data for the metric part.
 struct Problem<'a> {
     input: &'a InitializationInput<'a>,
     options: &'a InitializationOptions,
@@ -371,7 +371,7 @@ impl Problem<'_> {
         checklist.all_passed().then_some(refined)
     }
 
-    /// Turns the refined state upright.
+    /// Rotates the refined state such that gravity is vertical.
     fn solution(&self, refined: &Refined, parallax_rad: f64) -> InitializationSolution {
         let state = &refined.state;
         let given = self.extrinsics();

@@ -1,11 +1,11 @@
 //! The checklist of an attempt: each test with its value and threshold.
 
-/// One test: what it asks, what was measured, what is asked for.
+/// One check with its measured value and threshold.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WaitReason {
-    /// Short name of the test, always the same.
+    /// Short constant name of the check.
     pub test: &'static str,
-    /// What it waits for (or what was found, when passed), in one sentence with units.
+    /// Reason for waiting (or result, when passed), in one sentence with units.
     pub message: String,
     /// The measured value.
     pub value: f64,
@@ -13,20 +13,20 @@ pub struct WaitReason {
     pub threshold: f64,
 }
 
-/// Tests made so far.
+/// Checks so far.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Checklist {
     pub(super) failed: Vec<WaitReason>,
     pub(super) passed: Vec<WaitReason>,
 }
 
-/// A number's unit as people read it.
+/// Unit of a displayed value.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Shown {
     Plain(&'static str),
     /// Radians, shown as degrees.
     Degrees,
-    /// A share, shown in percent.
+    /// A ratio, displayed in percent.
     Percent,
 }
 
@@ -44,7 +44,7 @@ impl Shown {
 }
 
 impl Checklist {
-    /// The value must reach the threshold.
+    /// Checks that the value reaches the threshold.
     pub(super) fn at_least(
         &mut self,
         test: &'static str,
@@ -56,7 +56,7 @@ impl Checklist {
         self.decide(test, subject, value, threshold, shown, value >= threshold, "at least")
     }
 
-    /// The value must not exceed the threshold.
+    /// Checks that the value does not exceed the threshold.
     pub(super) fn at_most(
         &mut self,
         test: &'static str,

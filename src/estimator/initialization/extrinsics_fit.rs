@@ -1,4 +1,4 @@
-//! Joint angles and chain that explain the camera rotations of a solution.
+//! Fits joint angles and chain to the camera rotations of a solution.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -7,7 +7,7 @@ use crate::estimator::window::frames::Frames;
 use crate::estimator::window::joints::UNKNOWN_JOINT_SIGMA_RAD;
 use crate::geometry::{RigidTransform, so3};
 
-/// Standard deviation of the rotations `imu_from_camera` that the initialization found.
+/// Standard deviation of the initialization's rotations `imu_from_camera`.
 const EXTRINSICS_SIGMA_RAD: f64 = 0.01;
 const ROUNDS: usize = 10;
 

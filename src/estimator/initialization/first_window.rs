@@ -1,4 +1,4 @@
-//! The first window: made from a solution of the initialization and solved several times, outliers taken out in between.
+//! The first window: created from a solution of the initialization and solved several times with outlier rejection.
 
 use std::collections::VecDeque;
 
@@ -22,7 +22,8 @@ use crate::estimator::window::window_state::WindowState;
 use crate::frontend::TrackedFeature;
 use crate::geometry::{RigidTransform, so3};
 
-/// Most iterations of the solves of the first window: the first from far, the later ones after outliers have been taken out.
+/// Largest number of iterations per solve of the first window: the first from inaccurate values, later ones
+/// after outlier rejection.
 const FIRST_SOLVES: [usize; 3] = [15, 10, 5];
 
 /// A window made from a solution, before its first solve.
@@ -103,7 +104,7 @@ impl<'a> FirstWindow<'a> {
         Some(Self { solution, window: SlidingWindow::new(state), observed })
     }
 
-    /// Solves the window, outliers taken out in between; returns it with its report.
+    /// Solves the window with outlier rejection between solves; returns it with its report.
     pub(super) fn solve(
         mut self,
         setup: &Setup,
@@ -144,8 +145,8 @@ impl<'a> FirstWindow<'a> {
         (self.window, report)
     }
 
-    /// Adds the features of the cameras beside the leading one, and says whether there are any such cameras: their given
-    /// extrinsics may be far off, so that they do not take part in the first solve.
+    /// Adds the features of the further cameras and returns whether there are any. Their given extrinsics may have
+    /// large errors, so that they are excluded from the first solve.
     fn add_other_cameras(&mut self) -> bool {
         let window = &mut self.window.state;
         let leading = window.calibration.leading();
@@ -158,7 +159,7 @@ impl<'a> FirstWindow<'a> {
     }
 }
 
-/// Where the solution's world lies: at the origin, or with position and yaw of the window before a failure.
+/// Pose of the solution's world: at the origin, or with position and yaw of the window before a failure.
 fn world_from_solution(solution: &InitializationSolution, resume_at: Option<&RigidTransform>) -> RigidTransform {
     let (Some(resume), Some(first)) = (resume_at, solution.frames.first()) else {
         return RigidTransform::identity();

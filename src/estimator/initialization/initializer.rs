@@ -1,4 +1,4 @@
-//! Before the window runs: frames are kept until an attempt has a solution, which then becomes the first window.
+//! Initialization phase: frames are kept until an attempt has a solution, from which the first window is created.
 
 use std::borrow::Cow;
 use std::collections::VecDeque;
@@ -26,21 +26,21 @@ const LONGEST_GAP_S: f64 = 0.1;
 /// Keeps the frames of the last seconds and tries to initialize from them.
 #[derive(Clone, Debug)]
 pub(crate) struct Initializer {
-    /// As the rig gives it; parameters may be fixed or set in between.
+    /// Given calibration; parameters may be fixed or set in between.
     pub(crate) calibration: Calibrations,
-    /// Where the world of a restarted window begins: the last pose before the failure.
+    /// Last pose before the failure, at which a restarted window starts.
     resume_at: Option<RigidTransform>,
     /// Oldest first.
     waiting: VecDeque<WaitingFrame>,
     stationary: Option<StationaryEstimate>,
 }
 
-/// What came of one image while there is no window.
+/// Result of one image without a window.
 #[derive(Debug)]
 pub(crate) enum InitializationStep {
-    /// The report says why the initialization waits.
+    /// The initialization waits; the report has the reasons.
     Waiting(StepReport),
-    /// There is a window, solved and reported.
+    /// The window with its report, solved.
     Initialized(Box<SlidingWindow>, StepReport),
 }
 
@@ -50,7 +50,7 @@ impl Initializer {
         Self { calibration, resume_at, waiting: VecDeque::new(), stationary: None }
     }
 
-    /// Takes in one image's tracks with the IMU samples before it; `events` are those that the step begins with.
+    /// Processes the tracks of one image with the IMU samples before it; `events` are earlier events of the step.
     pub(crate) fn step(&mut self, setup: &Setup, input: &StepInput<'_>, mut events: Vec<Event>) -> InitializationStep {
         let begin_ms = setup.clock_ms();
         self.keep(setup, input, &mut events);
@@ -87,7 +87,7 @@ impl Initializer {
         step
     }
 
-    /// The window of a solution; the frames are used up.
+    /// Creates the window of a solution and consumes the frames.
     fn first_window<'a>(&mut self, setup: &Setup, solution: &'a InitializationSolution) -> Option<FirstWindow<'a>> {
         let waiting = std::mem::take(&mut self.waiting);
         FirstWindow::new(setup, solution, waiting, self.calibration.clone(), self.resume_at.as_ref())
@@ -116,7 +116,7 @@ impl Initializer {
         self.calibration.of(MAIN).joint_count()
     }
 
-    /// Keeps the frame of this image, and drops those that are too old or before a gap.
+    /// Keeps the frame of this image; drops frames that are too old or before a gap.
     fn keep(&mut self, setup: &Setup, input: &StepInput<'_>, events: &mut Vec<Event>) {
         let encoder = setup.encoder_reading(input, self.joints());
         let joints_rad = initial_joints_rad(encoder.as_ref(), self.joints());
@@ -174,7 +174,7 @@ impl Initializer {
 
     fn attempt(&self, setup: &Setup, options: &InitializationOptions) -> InitializationOutcome {
         let leading = self.calibration.leading();
-        // Beside other cameras the leading one may lack an image; its motion goes to the next frame.
+        // With several cameras the leading one may lack an image; its motion is added to the next frame.
         let has_image = |frame: &WaitingFrame| frame.features.len() == 1 || !frame.features[leading].is_empty();
         if !self.waiting.back().is_some_and(has_image) {
             return InitializationOutcome::Waiting { reasons: Vec::new(), passed: Vec::new(), stationary: None };

@@ -67,13 +67,13 @@ pub struct InitializationFrame<'a> {
     pub stamp_ns: i64,
     /// Its features, ordered by id; bearings are unit vectors in the camera.
     pub features: &'a [TrackedFeature],
-    /// The mount as calibration and encoders say.
+    /// Extrinsics from calibration and encoders.
     pub imu_from_camera: RigidTransform,
     /// IMU samples from the previous frame's stamp to this one's, both ends included.
     pub imu: &'a [ImuSample],
 }
 
-/// Everything that an attempt looks at.
+/// Input of an attempt.
 #[derive(Clone, Debug)]
 pub struct InitializationInput<'a> {
     /// Frames in time order, without gaps in the IMU samples between them.
@@ -82,32 +82,32 @@ pub struct InitializationInput<'a> {
     pub gravity_m_per_s2: f64,
     /// Noise of the IMU.
     pub imu_noise: ImuNoise,
-    /// What the last standstill measured, when there was one ([`InitializationOutcome::Waiting`] carries it).
+    /// Last estimate of a stationary vehicle, if there was one ([`InitializationOutcome::Waiting`] has it).
     pub stationary: Option<StationaryEstimate>,
 }
 
-/// What an attempt came to.
+/// Result of an attempt.
 #[derive(Clone, Debug, PartialEq)]
 pub enum InitializationOutcome {
     /// There is a solution.
     Initialized(Box<InitializationSolution>),
-    /// It has to wait.
+    /// The initialization waits.
     Waiting {
-        /// Tests that failed, in the order in which they are made; those after the first failing group were not made.
+        /// Failed checks, in order; checks after the first failing group were not made.
         reasons: Vec<WaitReason>,
-        /// Tests that passed, with the same figures.
+        /// Passed checks with their values.
         passed: Vec<WaitReason>,
-        /// The vehicle is stationary: to be kept and handed in with later attempts.
+        /// Estimate of a stationary vehicle, to be passed to later attempts.
         stationary: Option<StationaryEstimate>,
     },
 }
 
-/// Where the initial state came from.
+/// Origin of the initial state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InitializationOrigin {
-    /// From motion: everything is known, scale included.
+    /// From motion: scale and all states are estimated.
     FromMotion,
-    /// From standstill: no landmark has a depth.
+    /// From a stationary vehicle: no landmark has a depth.
     FromStationary,
 }
 
@@ -116,32 +116,32 @@ pub enum InitializationOrigin {
 pub struct InitializedFrame {
     /// Number of the image in its camera's stream.
     pub frame_index: usize,
-    /// Its stamp since the log began.
+    /// Stamp of the image since the log started.
     pub stamp_ns: i64,
     /// Pose.
     pub world_from_imu: RigidTransform,
     /// Velocity in the world.
     pub velocity_m_per_s: Vector3<f64>,
-    /// The mount as refined: on a gimbal with poor encoders its rotation is much better than the given one.
+    /// Refined extrinsics: with poor encoders their rotation is much more accurate than the given one.
     pub imu_from_camera: RigidTransform,
 }
 
 /// A feature with a depth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InitializedLandmark {
-    /// Who it is.
+    /// Identity of the feature.
     pub id: FeatureId,
-    /// Number of the first view (its `frame_index`) that saw it.
+    /// `frame_index` of the first observing view.
     pub anchor_frame_index: usize,
-    /// Where it is in the world.
+    /// Position in the world, in metres.
     pub position_m: Vector3<f64>,
     /// Inverse depth along the anchor's optical axis, in 1/m.
     pub inverse_depth_per_m: f64,
-    /// How many views of the solution see it.
+    /// Number of observing views of the solution.
     pub views: usize,
 }
 
-/// How good the solution is.
+/// Accuracy of the solution.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct InitializationDiagnostics {
     /// Relative standard deviation of the metric scale.
@@ -167,15 +167,15 @@ pub struct InitializationDiagnostics {
 /// A solution.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InitializationSolution {
-    /// From motion or from standstill.
+    /// From motion or from a stationary vehicle.
     pub origin: InitializationOrigin,
     /// The views, in time order; a subset of the frames given, the newest among them.
     pub frames: Vec<InitializedFrame>,
     /// Biases over the window.
     pub bias: ImuBias,
-    /// Landmarks by rising id; empty from standstill.
+    /// Landmarks by ascending id; empty for a stationary vehicle.
     pub landmarks: Vec<InitializedLandmark>,
-    /// How good it is.
+    /// Accuracy of the solution.
     pub diagnostics: InitializationDiagnostics,
     /// The tests that it passed.
     pub passed: Vec<WaitReason>,

@@ -1,50 +1,50 @@
 use crate::sensors::ChainPrior;
 
-/// What to do while the vehicle is stationary.
+/// Treatment of a stationary vehicle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StationaryPolicy {
-    /// Remember the standstill and wait for motion: the most accurate.
+    /// Keep its estimate and wait for motion: the most accurate.
     WaitForMotion,
-    /// Start at once, with velocity zero and without depths.
+    /// Initialize at once, with zero velocity and without depths.
     InitializeAtOnce,
 }
 
-/// Error of the mount's rotation in each frame without an encoder.
+/// Independent rotation error of the extrinsics in each frame without an encoder.
 const BLIND_EXTRINSICS_NOISE_RAD: f64 = 0.5;
-/// Error of the mount's rotation that all frames share without an encoder.
+/// Common rotation error of the extrinsics without an encoder.
 const BLIND_EXTRINSICS_SIGMA_RAD: f64 = 1.0;
 
-/// Tunables of [`super::try_initialize`].
+/// Options of [`super::try_initialize`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct InitializationOptions {
-    /// Standard deviation of a bearing: one pixel over the focal length, or what the tracker is worth.
+    /// Standard deviation of a bearing: pixel noise over focal length.
     pub bearing_sigma_rad: f64,
-    /// Error of the mount's rotation that all frames share (calibration).
+    /// Rotation error of the extrinsics that all frames share (calibration).
     pub extrinsics_rotation_sigma_rad: f64,
-    /// Error of the mount's rotation of its own in each frame (encoder noise; zero for a rigid camera).
+    /// Independent rotation error of the extrinsics in each frame (encoder noise; zero for a rigid camera).
     pub extrinsics_rotation_noise_rad: f64,
-    /// Error of the camera's place on the IMU.
+    /// Translation error of the extrinsics.
     pub extrinsics_translation_sigma_m: f64,
     /// Turn-on bias of the gyroscope, standard deviation per axis.
     pub gyroscope_bias_sigma_rad_per_s: f64,
     /// Turn-on bias of the accelerometer, standard deviation per axis.
     pub accelerometer_bias_sigma_m_per_s2: f64,
-    /// What to do in a standstill.
+    /// Treatment of a stationary vehicle.
     pub stationary_policy: StationaryPolicy,
 
     /// Frames older than this against the newest are not used.
     pub longest_window_s: f64,
     /// The views must span at least this.
     pub shortest_window_s: f64,
-    /// Most views.
+    /// Largest number of views.
     pub max_views: usize,
-    /// Fewest views.
+    /// Smallest number of views.
     pub min_views: usize,
-    /// Views lie at least this far apart in time.
+    /// Smallest time between views.
     pub min_spacing_s: f64,
-    /// Views lie at most this far apart in time, when nothing moves.
+    /// Largest time between views without motion.
     pub max_spacing_s: f64,
-    /// Rotation-compensated parallax at which a further view is taken.
+    /// Rotation-compensated parallax that selects the next view.
     pub spacing_parallax_rad: f64,
 
     /// Common features that neighbouring views and the base of the reconstruction need.
@@ -53,15 +53,15 @@ pub struct InitializationOptions {
     pub min_parallax_rad: f64,
     /// Standard deviation of the acceleration between views, gravity included, below which the scale is unobservable.
     pub min_excitation_m_per_s2: f64,
-    /// Share of features that must agree with a pose.
+    /// Smallest ratio of features consistent with a pose.
     pub min_inlier_ratio: f64,
-    /// Fewest landmarks with a depth.
+    /// Smallest number of landmarks with a depth.
     pub min_landmarks: usize,
-    /// Most features that take part.
+    /// Largest number of features.
     pub max_landmarks: usize,
     /// Largest root mean square reprojection error, in standard deviations of a bearing.
     pub max_reprojection_sigmas: f64,
-    /// The IMU may be noisier than its rig says by this factor before its residuals reject a solution.
+    /// Tolerated factor on the rig's IMU noise before its residuals reject a solution.
     pub imu_noise_factor: f64,
     /// Largest relative standard deviation of the scale.
     pub max_scale_sigma: f64,
@@ -108,9 +108,9 @@ impl Default for InitializationOptions {
 const PARALLAX_SIGMAS: f64 = 7.0;
 
 impl InitializationOptions {
-    /// Sets what depends on the camera: the noise of a bearing, and the parallaxes that are measured by it.
+    /// Sets the options that depend on the camera: the noise of a bearing, and parallaxes relative to it.
     ///
-    /// Times do not depend on the camera's rate: what they wait for is the motion of the vehicle.
+    /// Times do not depend on the frame rate: they depend on the motion of the vehicle.
     #[must_use]
     pub fn for_camera(mut self, focal_length_px: f64, pixel_sigma_px: f64) -> Self {
         self.bearing_sigma_rad = pixel_sigma_px / focal_length_px;
@@ -119,15 +119,15 @@ impl InitializationOptions {
         self
     }
 
-    /// Sets the mount's errors for a gimbal of `joints` joints: bounds of the chain's uniform errors, and the noise of an
-    /// encoder reading (`None` without encoders: the mount's rotation is then hardly known).
+    /// Sets the errors of the extrinsics for a gimbal with `joints` joints: bounds of the chain's uniform errors,
+    /// and the noise of an encoder reading (`None` without encoders: the rotation is then hardly known).
     #[must_use]
     pub fn for_gimbal(mut self, prior: &ChainPrior, joints: usize, encoder_sigma_rad: Option<f64>) -> Self {
         // A uniform error of bound b has standard deviation b/√3; errors of base, links and end add up along the chain.
         let parts = (joints + 2) as f64;
         let rotation = prior.rotation_bound_rad / 3.0_f64.sqrt();
         let translation = prior.translation_bound_m / 3.0_f64.sqrt();
-        // Part of the shared error turns with the joints and so differs from frame to frame.
+        // A part of the common error rotates with the joints and so differs from frame to frame.
         let wandering = 0.5 * rotation * parts.sqrt();
         self.extrinsics_rotation_sigma_rad = (rotation * parts.sqrt()).max(1e-3);
         self.extrinsics_translation_sigma_m = (translation * parts.sqrt()).max(1e-3);
@@ -140,7 +140,7 @@ impl InitializationOptions {
         self
     }
 
-    /// Sets the errors of a rigid mount.
+    /// Sets the errors of rigid extrinsics.
     #[must_use]
     pub fn for_rigid_camera(mut self, rotation_sigma_rad: f64, translation_sigma_m: f64) -> Self {
         self.extrinsics_rotation_sigma_rad = rotation_sigma_rad.max(1e-4);

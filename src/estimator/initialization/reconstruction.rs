@@ -1,4 +1,4 @@
-//! Camera poses from images alone, for those who align them by other means than the initialization.
+//! Camera poses from images alone, for callers with their own alignment.
 
 use nalgebra::UnitQuaternion;
 
@@ -7,21 +7,21 @@ use super::structure::{StructureLimits, collect_tracks, rank_pairs, reconstruct}
 use crate::frontend::TrackedFeature;
 use crate::geometry::RigidTransform;
 
-/// What is known of the cameras before a reconstruction.
+/// Prior knowledge of the cameras.
 #[derive(Clone, Copy, Debug)]
 pub struct ReconstructionGuess<'a> {
     /// Orientation of every view in any common frame.
     pub rotations: &'a [UnitQuaternion<f64>],
-    /// Standard deviation of the turns between them, in radians.
+    /// Standard deviation of the rotations between views, in radians.
     pub sigma_rad: f64,
-    /// Starts the random samples.
+    /// Seed of the random samples.
     pub seed: u64,
 }
 
 /// Poses of views up to scale, in the frame of the first one that was placed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reconstruction {
-    /// Which of the views were placed, rising.
+    /// Indices of the placed views, ascending.
     pub views: Vec<usize>,
     /// `first_camera_from_camera`, one per placed view.
     pub poses: Vec<RigidTransform>,

@@ -14,15 +14,15 @@ use crate::geometry::{RigidTransform, so3, tangent_basis};
 use crate::optimization::damped::{DampedOptions, DampedProblem, StopReason, minimize};
 use crate::optimization::{DensePoseEquations, ReducedEquations, ReprojectionEquations};
 
-/// Tightest standard deviation that a prior on the mount may have, so that "exactly known" stays solvable.
+/// Smallest standard deviation of a prior on the extrinsics, so that the equations stay solvable.
 const MIN_SIGMA: f64 = 1e-5;
 
 type Matrix9 = SMatrix<f64, 9, 9>;
 type Vector9 = SVector<f64, 9>;
 
-/// What stays the same during the adjustment.
+/// Constant input of the adjustment.
 pub(super) struct RefinementInput<'a> {
-    /// The mount as calibration and encoders say, one per view.
+    /// Extrinsics from calibration and encoders, one per view.
     pub(super) imu_from_camera: &'a [RigidTransform],
     /// Motion from each view to the next.
     pub(super) increments: &'a [Preintegration],
@@ -34,7 +34,7 @@ pub(super) struct RefinementInput<'a> {
     pub(super) accelerometer_bias: VectorPrior,
 }
 
-/// What is adjusted, in the IMU frame of the first view.
+/// Unknowns of the adjustment, in the IMU frame of the first view.
 #[derive(Clone, Debug)]
 pub(super) struct RefinedState {
     pub(super) poses: Vec<RigidTransform>,
@@ -51,7 +51,7 @@ pub(super) struct RefinedState {
 /// Standard deviations from the inverse of the last normal matrix.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct RefinementSigmas {
-    /// Of the longest distance from the first view, relatively: of the metric scale.
+    /// Relative standard deviation of the longest distance from the first view: of the metric scale.
     pub(super) scale: f64,
     pub(super) velocity_m_per_s: f64,
     pub(super) gravity_rad: f64,
@@ -59,7 +59,7 @@ pub(super) struct RefinementSigmas {
     pub(super) accelerometer_bias_m_per_s2: f64,
 }
 
-/// Where each block of columns begins.
+/// Column layout.
 pub(super) struct Layout {
     views: usize,
     per_view_rotations: bool,
@@ -87,7 +87,7 @@ impl Layout {
         self.velocity(view) + 3
     }
 
-    /// Own turn of a view's mount (3), when there is one.
+    /// Independent rotation of a view's extrinsics (3), if estimated.
     fn view_rotation(&self, view: usize) -> Option<usize> {
         self.per_view_rotations.then(|| self.velocity(view) + 9)
     }
@@ -98,9 +98,9 @@ impl Layout {
 }
 
 impl RefinedState {
-    /// Starts from an alignment; `landmarks` carry the cameras' unit of length and are scaled here.
+    /// Starts from an alignment; `landmarks` are in the cameras' unit of length and are scaled here.
     pub(super) fn new(input: &RefinementInput<'_>, alignment: &Alignment, landmarks: &[TrackedLandmark]) -> Self {
-        // What the alignment changed about the mount is split: the mean turn on the IMU's side, the rest per view.
+        // The alignment's change of the extrinsics is split: the mean rotation on the IMU's side, the rest per view.
         let changes: Vec<UnitQuaternion<f64>> = alignment
             .imu_from_camera
             .iter()
@@ -135,7 +135,7 @@ impl RefinedState {
         }
     }
 
-    /// The mount per view as adjusted.
+    /// Adjusted extrinsics per view.
     pub(super) fn imu_from_camera(&self, given: &[RigidTransform]) -> Vec<RigidTransform> {
         given
             .iter()
@@ -183,7 +183,7 @@ impl RefinedState {
     }
 }
 
-/// Whitened inertial residual `[φ, p, v]` of one interval.
+/// Whitened IMU residual `[φ, p, v]` (9 × 1) of one interval.
 fn imu_residual(
     state: &RefinedState,
     view: usize,
@@ -222,11 +222,11 @@ pub(super) struct Refinement<'a> {
     pub(super) layout: Layout,
 }
 
-/// How an adjustment ended.
+/// Result of an adjustment.
 #[derive(Clone, Debug)]
 pub(super) struct Refined {
     pub(super) state: RefinedState,
-    /// Mean square of the whitened IMU residuals, biases' priors left out.
+    /// Mean square of the whitened IMU residuals, without the priors on the biases.
     pub(super) imu_mean_square: f64,
     pub(super) sigmas: Option<RefinementSigmas>,
     pub(super) rounds: usize,
@@ -257,7 +257,7 @@ impl<'a> Refinement<'a> {
         Some(Self { input, whitening, layout })
     }
 
-    /// Adjusts in at most `rounds` rounds.
+    /// Adjusts with at most `rounds` iterations.
     pub(super) fn run(&self, start: RefinedState, rounds: usize) -> Refined {
         let options = DampedOptions {
             iterations: rounds,
@@ -361,7 +361,7 @@ impl<'a> Refinement<'a> {
         equations
     }
 
-    /// Normal matrix and gradient with the landmarks eliminated, and what finds the landmarks' steps again.
+    /// Normal matrix and gradient with landmarks eliminated, and the data for the landmarks' steps.
     pub(super) fn reduced(
         &self,
         state: &RefinedState,
@@ -382,7 +382,7 @@ impl<'a> Refinement<'a> {
         (normal, gradient, visual)
     }
 
-    /// Derivative of a camera pose by the columns it depends on: pairs of a column and a 6 × 3 block.
+    /// Derivative of a camera pose with respect to its columns: pairs of a column and a 6 × 3 block.
     fn camera_blocks(&self, state: &RefinedState, view: usize) -> Vec<(usize, SMatrix<f64, 6, 3>)> {
         let pose = &state.poses[view];
         let given = &self.input.imu_from_camera[view];
@@ -438,7 +438,7 @@ impl<'a> Refinement<'a> {
         }
     }
 
-    /// Step `[φ; δt]` of each camera pose that belongs to a step of the state.
+    /// Steps `[φ; δt]` of the camera poses for a step of the state.
     fn camera_steps(&self, state: &RefinedState, step: &DVector<f64>) -> Vec<Vector6<f64>> {
         (0..self.layout.views)
             .map(|view| {
@@ -547,7 +547,7 @@ impl<'a> Refinement<'a> {
     }
 }
 
-/// Derivative of an inertial residual by the two gravity columns (9 × 2), not yet whitened.
+/// Derivative of an IMU residual with respect to the two gravity columns (9 × 2), not whitened.
 fn gravity_columns(state: &RefinedState, back: &Matrix3<f64>, t: f64) -> SMatrix<f64, 9, 2> {
     let rotated_basis = back * state.gravity_basis();
     let mut block = SMatrix::<f64, 9, 2>::zeros();

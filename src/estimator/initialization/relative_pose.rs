@@ -28,7 +28,7 @@ const AMBIGUOUS_RATIO: f64 = 0.3;
 /// Unit bearings of one point in camera i and camera j.
 type BearingPair = (Vector3<f64>, Vector3<f64>);
 
-/// What is known of a rotation before looking.
+/// Prior on a rotation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RotationPrior {
     /// The expected rotation.
@@ -42,7 +42,7 @@ pub struct RotationPrior {
 pub struct RelativePose {
     /// Maps points of camera i into camera j; the translation has unit length.
     pub camera_j_from_camera_i: RigidTransform,
-    /// Indices of the pairs that fit and lie before both cameras.
+    /// Indices of the inliers in front of both cameras.
     pub inliers: Vec<usize>,
     /// Root mean square epipolar angle of those, in radians.
     pub rms_rad: f64,
@@ -102,7 +102,7 @@ struct Candidates<'a> {
 }
 
 impl Candidates<'_> {
-    /// What a hypothesis must undercut to be of interest.
+    /// Largest cost of a useful hypothesis.
     fn worst_kept(&self) -> f64 {
         if self.found.len() < KEPT { f64::INFINITY } else { self.found.last().map_or(f64::INFINITY, |(cost, _)| *cost) }
     }
@@ -137,7 +137,7 @@ impl Candidates<'_> {
         self.found.truncate(KEPT);
     }
 
-    /// Refines what was kept, drops what fell together or fits clearly worse than the best.
+    /// Refines the kept hypotheses; drops equal ones and those clearly worse than the best.
     fn finish(self) -> Vec<RelativePose> {
         let mut refined = Candidates { found: Vec::new(), ..self };
         for (_, pose) in &self.found {
@@ -176,14 +176,14 @@ fn epipolar_cost(pairs: &[BearingPair], essential: &Matrix3<f64>, sigma_rad: f64
     pairs.iter().map(|pair| (epipolar_angle(essential, pair) / sigma_rad).powi(2).min(limit)).sum()
 }
 
-/// Whether the pair's point lies before both cameras; too little parallax to tell counts as yes.
+/// Whether the pair's point is in front of both cameras; too little parallax counts as yes.
 fn lies_in_front(
     camera_j_from_camera_i: &RigidTransform,
     (bearing_i, bearing_j): &BearingPair,
     sigma_rad: f64,
 ) -> bool {
     let rotated = camera_j_from_camera_i.rotation * bearing_i;
-    // distance_j · bearing_j = distance_i · turned + t; cross with each ray to solve for the other distance.
+    // distance_j · bearing_j = distance_i · rotated + t; cross with each ray to solve for the other distance.
     let normal = rotated.cross(bearing_j);
     if normal.norm() < 2.0 * sigma_rad {
         return true;
@@ -202,7 +202,8 @@ fn inliers(pairs: &[BearingPair], pose: &RigidTransform, sigma_rad: f64) -> Vec<
     (0..pairs.len()).filter(|&index| fits(&pairs[index])).collect()
 }
 
-/// The direction of translation that suits a known rotation best (least eigenvector of the epipolar normals).
+/// Best direction of translation for a known rotation (eigenvector of the smallest eigenvalue of the epipolar
+/// normals).
 fn translation_for_rotation(pairs: &[BearingPair], rotation: &UnitQuaternion<f64>) -> Option<Vector3<f64>> {
     let mut moment = Matrix3::zeros();
     for (bearing_i, bearing_j) in pairs {

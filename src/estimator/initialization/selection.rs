@@ -1,4 +1,4 @@
-//! Which of the frames become views: spaced by parallax and time, newest first.
+//! Selection of views among the frames: spaced by parallax and time, newest first.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -8,7 +8,7 @@ use crate::frontend::TrackedFeature;
 use crate::geometry::{seconds_from_ns, so3};
 use crate::sensors::ImuSample;
 
-/// Rotation of the camera of every frame, `first_imu_from_camera`, by gyroscope (bias taken off) and mount.
+/// Rotation of the camera of every frame, `first_imu_from_camera`, by gyroscope (bias-corrected) and extrinsics.
 pub(super) fn guessed_rotations(
     frames: &[InitializationFrame<'_>],
     gyroscope_bias: &Vector3<f64>,
@@ -37,11 +37,11 @@ fn gyroscope_rotation(samples: &[ImuSample], bias: &Vector3<f64>) -> UnitQuatern
     rotation
 }
 
-/// Numbers of the frames that become views, rising; the newest is always one.
+/// Indices of the selected frames, ascending; the newest one is always selected.
 ///
-/// Going back in time, a frame is taken once it shows enough parallax against the last one taken or lies far enough
-/// from it in time; where the common features run out before that, the frame before they do is taken.
-/// Where even neighbouring frames share too few, the views begin.
+/// Going back in time, a frame is selected when it has enough parallax or time difference to the last selected
+/// one; where the common features run out before, the frame before is selected. The views start where even
+/// neighbouring frames have too few common features.
 pub(super) fn select_views(
     frames: &[InitializationFrame<'_>],
     rotations: &[UnitQuaternion<f64>],
@@ -52,7 +52,7 @@ pub(super) fn select_views(
     let mut selected = vec![newest];
     let mut last = newest;
     let mut candidate = newest;
-    // The farthest frame so far that still shares enough features with the last one taken.
+    // The farthest frame so far with enough common features with the last selected one.
     let mut linked = None;
     while candidate > 0 && selected.len() < options.max_views {
         candidate -= 1;
@@ -84,7 +84,7 @@ pub(super) fn select_views(
     selected
 }
 
-/// Bearings of the features that two frames share; both are ordered by id.
+/// Bearings of the common features of two frames; both are ordered by id.
 pub(super) fn shared_bearings(
     first: &[TrackedFeature],
     second: &[TrackedFeature],

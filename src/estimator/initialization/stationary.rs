@@ -1,4 +1,4 @@
-//! Detects a stationary vehicle before the window runs: IMU samples of little variance and an unmoving image.
+//! Detection of a stationary vehicle before the window runs: IMU samples of little variance and a constant image.
 
 use nalgebra::Vector3;
 
@@ -8,22 +8,22 @@ use super::selection::shared_bearings;
 use super::{InitializationFrame, InitializationInput};
 use crate::sensors::ImuSample;
 
-/// Length of the quiet stretch that counts as a standstill.
+/// Required duration of the stationary phase.
 const QUIET_S: f64 = 1.0;
-/// Samples are averaged over this long first, so that vibration and white noise do not hide that nothing moves.
+/// Averaging time of the samples, so that vibration and white noise do not prevent detection.
 const BLOCK_NS: i64 = 100_000_000;
-/// Largest standard deviation of the averaged angular velocity (worst axis), beyond the sensor's own noise.
+/// Largest standard deviation of the averaged angular velocity (worst axis), beyond the sensor noise.
 const MAX_GYROSCOPE_STD_RAD_PER_S: f64 = 0.002;
-/// Largest standard deviation of the averaged specific force (worst axis), beyond the sensor's own noise.
+/// Largest standard deviation of the averaged specific force (worst axis), beyond the sensor noise.
 const MAX_ACCELEROMETER_STD_M_PER_S2: f64 = 0.03;
-/// A slow rotation that a second cannot separate from a bias.
+/// Slow rotation that is not separable from a bias within a second.
 const HIDDEN_ANGULAR_RATE_RAD_PER_S: f64 = 0.001;
-/// Largest mean angular velocity: a turn-on bias may be this large, a turn is larger.
+/// Largest mean angular velocity: above the usual turn-on bias, below a rotation.
 const MAX_ANGULAR_RATE_RAD_PER_S: f64 = 0.15;
 /// Largest rotation-compensated parallax over the stretch.
 const MAX_PARALLAX_RAD: f64 = 0.004;
 
-/// What a standstill measures.
+/// Measurements of a stationary vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StationaryEstimate {
     /// Stamp of the newest frame that belongs to it.
@@ -36,7 +36,7 @@ pub struct StationaryEstimate {
     pub specific_force_m_per_s2: Vector3<f64>,
 }
 
-/// Looks at the last [`QUIET_S`] seconds; the tests go to `checklist`.
+/// Checks the last [`QUIET_S`] seconds; the results go to `checklist`.
 pub(super) fn detect(input: &InitializationInput<'_>, checklist: &mut Checklist) -> Option<StationaryEstimate> {
     let newest = input.frames.last()?;
     let begin = newest.stamp_ns - (QUIET_S * 1e9) as i64;

@@ -1,7 +1,8 @@
-//! Camera poses and landmarks from the images alone, up to scale: two views first, the others one by one, then all at once.
+//! Camera poses and landmarks from the images alone, up to scale: two views first, the others one by one, then
+//! all together.
 //!
-//! The cameras are free here: a gimbal may turn them as it likes.
-//! Gyroscope and encoders only give first guesses of rotations, and break the tie that a plane leaves.
+//! The cameras are free: a gimbal may rotate them. Gyroscope and encoders only give initial rotations, and
+//! resolve the ambiguity of a plane.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
@@ -17,17 +18,17 @@ use crate::geometry::RigidTransform;
 use crate::optimization::damped::{DampedOptions, DampedProblem, minimize};
 use crate::optimization::{DensePoseEquations, ReprojectionEquations};
 
-/// A feature must be seen under at least this angle before its depth counts.
+/// Smallest parallax of a landmark with a depth.
 const MIN_PARALLAX_RAD: f64 = 0.006;
-/// Pairs looked at when the parallax of two views is measured.
+/// Number of pairs for the parallax of two views.
 const PARALLAX_PAIRS: usize = 60;
 /// Parallax beyond this makes a pair of views no better.
 const AMPLE_PARALLAX_RAD: f64 = 0.14;
 /// Common features beyond this make a pair of views no better.
 const AMPLE_PAIRS: f64 = 60.0;
-/// How many pairs of views are tried.
+/// Number of tried pairs of views.
 const PAIRS_TRIED: usize = 3;
-/// A landmark with a observation beyond this many standard deviations is dropped.
+/// A landmark with an observation beyond this many standard deviations is dropped.
 const OUTLIER_SIGMAS: f64 = 4.0;
 
 /// All observations of one feature as `(view, bearing)`, views rising.
@@ -51,8 +52,9 @@ pub(super) fn collect_tracks(views: &[&[TrackedFeature]]) -> Tracks {
     tracks
 }
 
-/// Keeps at most `most` tracks: one pair of neighbouring views after the other takes the longest track that both see and
-/// that is not yet taken, so that every pair keeps its share; in the image the front end has spread them already.
+/// Keeps at most `most` tracks: each pair of neighbouring views in turn selects the longest common track that
+/// is not selected yet, so that every pair keeps its proportion. The front end has spread features over the
+/// image.
 pub(super) fn thin_out(tracks: &mut Tracks, views: usize, most: usize) {
     if tracks.len() <= most {
         return;
@@ -80,7 +82,7 @@ pub(super) fn thin_out(tracks: &mut Tracks, views: usize, most: usize) {
     tracks.retain(|id, _| kept.contains(id));
 }
 
-/// Bearings of the features that two views share.
+/// Bearings of the common features of two views.
 pub(super) fn common_bearings(tracks: &Tracks, view_i: usize, view_j: usize) -> Vec<(Vector3<f64>, Vector3<f64>)> {
     let in_view = |observations: &[(usize, Vector3<f64>)], view: usize| {
         observations.binary_search_by_key(&view, |(view, _)| *view).ok().map(|index| observations[index].1)
@@ -91,12 +93,12 @@ pub(super) fn common_bearings(tracks: &Tracks, view_i: usize, view_j: usize) -> 
         .collect()
 }
 
-/// Two views and what lies between them.
+/// A pair of views.
 #[derive(Clone, Debug)]
 pub(super) struct ViewPair {
     pub(super) view_i: usize,
     pub(super) view_j: usize,
-    /// Features that both hold.
+    /// Common features.
     pub(super) common: usize,
     /// `camera_j_from_camera_i` and the parallax it leaves.
     pub(super) fit: RotationFit,
@@ -137,17 +139,17 @@ pub(super) fn rank_pairs(
 /// Why there is no reconstruction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum StructureFailure {
-    /// No pair of views has a relative pose that enough features agree with; the best share of them.
+    /// No pair of views has a relative pose with enough inliers.
     NoRelativePose {
-        /// Inliers of the best pair over its common features.
+        /// Largest ratio of inliers to common features.
         inlier_ratio: f64,
     },
-    /// Too few landmarks remained; how many.
+    /// Too few landmarks remained.
     FewLandmarks {
         /// Landmarks with a depth.
         landmarks: usize,
     },
-    /// Too few views could be placed; how many.
+    /// Too few views were placed.
     FewViews {
         /// Placed views.
         views: usize,
@@ -325,7 +327,7 @@ impl GrowingMap<'_> {
         }
     }
 
-    /// Numbers the placed views anew, with the first of them as the frame of reference.
+    /// Renumbers the placed views, with the first of them as the reference frame.
     fn finish(self) -> Structure {
         let views: Vec<usize> = (0..self.poses.len()).filter(|&view| self.poses[view].is_some()).collect();
         let placed: Vec<RigidTransform> = self.poses.iter().filter_map(|pose| *pose).collect();

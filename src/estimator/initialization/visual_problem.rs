@@ -13,7 +13,7 @@ use crate::optimization::{
     CameraPose, DensePoseEquations, Landmark, RelativePoses, Reprojection, ReprojectionEquations, RobustLoss,
 };
 
-/// Loss on all observations.
+/// Robust loss of all observations.
 const LOSS: RobustLoss = RobustLoss::Huber(1.5);
 /// What a point behind a camera counts for, in standard deviations.
 const BEHIND_SIGMAS: f64 = 100.0;

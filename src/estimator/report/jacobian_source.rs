@@ -154,7 +154,8 @@ impl JacobianSource {
             + allocated_bytes(size_of_val(&*self.norms))
     }
 
-    /// States by slot, for frames of so many joints; speeds and rates only where clocks are estimated, biases taken off.
+    /// States by slot, for frames with this number of joints; velocities and rates only with estimated time
+    /// offsets, bias-corrected.
     pub(crate) fn frames(&self, joints: usize) -> Vec<FrameState> {
         let mut rates = self.rates.chunks_exact(POSE + joints);
         let states = self.poses(joints).into_iter().map(|(world_from_imu, joints_rad)| {

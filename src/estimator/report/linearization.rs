@@ -24,7 +24,7 @@ pub struct Linearization {
     pub rig_prior_rows: usize,
     /// Norm of each calibration column before the depths were projected out, for the reference of the rank rule.
     pub calibration_column_norms: DVector<f64>,
-    /// The chain at which the calibration's columns were taken (with first estimates not the present one).
+    /// Chain at which the calibration columns were evaluated (with first estimates not the present one).
     pub chain: Chain,
 }
 

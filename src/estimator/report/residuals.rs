@@ -81,6 +81,6 @@ pub struct IterationReport {
     pub damping: f64,
     /// Norm of the step.
     pub step_norm: f64,
-    /// Whether the step was taken.
+    /// Whether the step was accepted.
     pub accepted: bool,
 }

@@ -14,7 +14,7 @@ use crate::gimbal::{ClassicalChain, ParameterId, Parameterization, Singularity};
 /// Where the estimator is in its life.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phase {
-    /// Waiting for enough motion, or for a good standstill.
+    /// Waiting for enough motion, or for a stationary vehicle.
     Initializing,
     /// Estimating.
     Tracking,

@@ -17,7 +17,8 @@ struct BothFlights {
 }
 
 impl BothFlights {
-    /// The given chain is off by up to 10° and 3 cm in every parameter, the rigid mount by what a good calibration leaves.
+    /// The given chain has errors of up to 10° and 3 cm in every parameter, the rigid extrinsics those of a good
+    /// calibration.
     fn new(seed: u64, duration_s: f64) -> Self {
         let options = |mount| SyntheticOptions {
             mount,
@@ -117,7 +118,7 @@ fn both_calibrations_have_named_columns() {
     let columns: Vec<_> = linearization.columns[..24].iter().filter_map(|column| column.id.parameter()).collect();
     assert_eq!(columns, calibration.parameters);
 
-    // The rigid mount is found as well.
+    // The rigid extrinsics converge as well.
     let ground_truth = flights.rigid.true_rig.chain_of_camera("cam0").unwrap().imu_from_camera(&[]);
     let angle =
         |pose: &crate::geometry::RigidTransform| so3::log(&(pose.rotation.inverse() * ground_truth.rotation)).norm();
@@ -126,7 +127,7 @@ fn both_calibrations_have_named_columns() {
     let given = estimator.config().rigid_cameras[0].imu_from_camera;
     assert!(angle(mount) < 0.3 * angle(&given), "{} of {} rad", angle(mount), angle(&given));
 
-    // Features are told apart.
+    // Features are distinguished.
     let of = |camera: usize| last.features.iter().filter(|feature| feature.id.camera() == camera).count();
     assert!(of(0) > 30 && of(1) > 30, "{} and {}", of(0), of(1));
     assert!(last.landmarks.iter().any(|landmark| landmark.id.camera() == 1));

@@ -33,7 +33,8 @@ pub(super) fn run_flight(frames: &[SyntheticFrame], config: EstimatorConfig) -> 
     (estimator, reports)
 }
 
-/// Root mean square of the position errors once yaw and position are laid on the truth, and how far was flown meanwhile.
+/// Root mean square position error after alignment of yaw and position with the ground truth, and the length of
+/// the trajectory.
 pub(super) fn trajectory_error_m(frames: &[SyntheticFrame], reports: &[StepReport]) -> (f64, f64) {
     let pairs: Vec<(Vector3<f64>, Vector3<f64>)> = reports
         .iter()
@@ -113,7 +114,7 @@ fn a_fixed_chain_keeps_its_given_values() {
     assert_eq!(last.newest().unwrap().joint_angles_rad.len(), 3);
 }
 
-/// A clone goes on exactly as the original, and a second run gives the same reports.
+/// A clone continues exactly as the original, and a second run gives the same reports.
 #[test]
 fn replays_and_clones_give_the_same_bits() {
     let flight = synthetic_tracks(&SyntheticOptions { duration_s: 7.0, ..options(SyntheticMount::Gimbal) });
@@ -145,7 +146,7 @@ fn measurement_faults_are_reported_and_survived() {
             // A sample that is no number, and an image from the past.
             100 => frame.imu[3].specific_force_m_per_s2 = Vector3::repeat(f64::NAN),
             105 => frame.stamp_ns -= 400_000_000,
-            // Half a second without a picture, then one and a half without inertial samples.
+            // Half a second without images, then one and a half without IMU samples.
             120..130 => frame.tracks.features.clear(),
             140..170 => continue,
             170 => frame.imu.clear(),

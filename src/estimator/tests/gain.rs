@@ -1,4 +1,4 @@
-//! What the newest image tells, by motion.
+//! Information gain of the newest image, by motion.
 
 use nalgebra::DMatrix;
 

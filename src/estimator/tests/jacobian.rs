@@ -11,8 +11,8 @@ use crate::geometry::Dimension;
 use crate::gimbal::Parameterization;
 use crate::simulation::{SyntheticOptions, synthetic_tracks};
 
-/// Holds a report's Jacobian against its linearization: before the landmarks are projected out by the norms of the
-/// calibration's columns, and by what only the inertial factors touch.
+/// Compares a report's Jacobian with its linearization: by the norms of the calibration columns before the
+/// projection of the landmarks, and by the columns of the IMU factors alone.
 pub(super) fn check(report: &StepReport, cameras: &[&CameraModel]) -> StepJacobian {
     let linearization: &Linearization = report.linearization.as_ref().expect("it was asked for");
     let jacobian = report.jacobian(cameras).expect("its source is kept");
@@ -33,7 +33,7 @@ pub(super) fn check(report: &StepReport, cameras: &[&CameraModel]) -> StepJacobi
         let written = squared[column].sqrt();
         assert!((written - norm).abs() <= 1e-4 * norm + 1e-6, "column {column}: {written} for {norm}");
     }
-    // Speeds and biases are in inertial factors and in standing still alone.
+    // Velocities and biases are in IMU factors and zero-velocity updates only.
     for (number, block) in
         jacobian.columns.iter().enumerate().filter(|(_, block)| block.id.group() == ColumnGroup::VelocityBias)
     {

@@ -122,7 +122,7 @@ fn bias_jacobian_meets_central_differences() {
     }
 }
 
-/// White noise and walks drawn from the densities give increments that scatter as the covariance says.
+/// Increments with sampled white noise and random walks scatter according to the covariance.
 #[test]
 fn covariance_is_that_of_drawn_noise() {
     let mut random = super::Noise::new(7);

@@ -30,8 +30,7 @@ fn options(mount: SyntheticMount, motion: SyntheticMotion) -> SyntheticOptions {
     }
 }
 
-/// A flight that begins at rest, flown backwards: it lands where it took off, stays there, and takes off again.
-///
+/// A flight that starts stationary, reversed in time: it lands where it took off, stays there, and takes off again.
 struct Landing<'a> {
     flight: &'a SyntheticFlight,
     frames: Vec<SyntheticFrame>,
@@ -52,7 +51,8 @@ impl<'a> Landing<'a> {
         self.frames.last().map_or(3_000_000, |last| last.stamp_ns + FRAME_NS)
     }
 
-    /// The flight backwards: the specific force stays, velocities and turns change their sign, biases do not.
+    /// The flight reversed in time: the specific force stays, velocities and angular rates change their sign,
+    /// biases do not.
     fn land(mut self) -> Self {
         let stationary_features: Vec<FeatureId> =
             self.flight.frames[0].tracks.features.iter().map(|feature| feature.id).collect();
@@ -69,7 +69,7 @@ impl<'a> Landing<'a> {
                 });
                 backwards.collect()
             });
-            // A track that ends before the rest is not the one that begins after it.
+            // A track before the stationary phase is not the one after it.
             let features = frame.tracks.features.iter().map(|feature| {
                 let id = if stationary_features.contains(&feature.id) {
                     feature.id
@@ -208,7 +208,7 @@ fn a_landed_vehicle_does_not_drift_and_takes_off_again() {
     }
 }
 
-/// A centimetre a second, as smooth as can be: the inertial samples show nothing, only the picture does.
+/// A smooth centimetre per second: the IMU samples do not show it, the image does.
 #[test]
 fn a_slowly_moving_vehicle_gets_no_zero_velocity_update() {
     let creep = |after_s: f64| 0.01 * (after_s * after_s / (after_s.max(0.0) + 2.0));

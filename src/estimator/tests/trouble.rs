@@ -1,4 +1,4 @@
-//! Flights with something missing: encoders, pictures, an inertial sensor that is wide enough.
+//! Flights with faults: missing encoders and images, a saturated IMU.
 
 use nalgebra::DMatrix;
 
@@ -35,7 +35,7 @@ fn kinds(reports: &[StepReport]) -> Vec<EventKind> {
     reports.iter().flat_map(|report| report.events.iter().map(|event| event.kind)).collect()
 }
 
-/// Frames that go on under other names, as after a picture that no track survives.
+/// Frames with new feature ids, as after an image that no track survives.
 fn renamed(frame: &mut SyntheticFrame) {
     for feature in &mut frame.tracks.features {
         feature.id = FeatureId(feature.id.0 + 1_000_000);
@@ -107,13 +107,13 @@ fn three_seconds_without_images_are_bridged() {
         let (estimator, reports) = run_flight(&frames, config(&flight));
         let last = reports.last().unwrap();
         assert_eq!(last.phase, Phase::Tracking, "{mount:?}: {:?}", last.events);
-        // Three seconds on the inertial sensor alone: centimetres to decimetres.
+        // Three seconds of IMU-only propagation: centimetres to decimetres.
         let (error, length) = trajectory_error_m(&frames, &reports);
         assert!(error < 0.3, "{mount:?}: {error} m over {length} m, {} restarts", estimator.restarts);
     }
 }
 
-/// The frames of a flight whose pictures show nothing for a while, and new features from then on.
+/// Frames of a flight with a period without features, and new features after it.
 fn blinded(flight: &SyntheticFlight, blind: std::ops::Range<usize>) -> Vec<SyntheticFrame> {
     let mut frames = flight.frames.clone();
     for frame in &mut frames {

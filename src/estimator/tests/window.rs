@@ -163,7 +163,8 @@ fn dropping_a_frame_from_the_prior_keeps_the_information_on_the_others() {
     assert!(difference < 1e-7, "{difference}");
 }
 
-/// What a dependent column says is what those before it say: rows below belong to the others, none to the residual alone.
+/// A dependent column is in the span of the earlier ones: rows below belong to other columns, none to the
+/// residual alone.
 #[test]
 fn an_echelon_gives_dependent_columns_no_row() {
     // Columns 1 and 3 are combinations of those before them; the residual has a part outside all of them.
@@ -208,7 +209,7 @@ fn a_prior_contains_only_estimated_columns() {
     }
 }
 
-/// Along the six directions that the classical chain cannot tell apart nothing that is measured changes.
+/// No measurement changes along the six redundant directions of the classical chain.
 #[test]
 fn the_classical_chain_keeps_its_null_directions_with_first_estimates() {
     let mut estimator = fixture::window(Parameterization::Classical, true, quadratic());

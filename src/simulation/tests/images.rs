@@ -9,7 +9,7 @@ use super::flight::experiment_trajectory;
 use crate::geometry::{RigidTransform, so3};
 use crate::sensors::GrayImage;
 
-/// A picture from a place, looking along a heading, 8° down.
+/// An image from a position along a heading, 8° down.
 fn radiance(world: &World, lens: Lens, place_m: [f64; 3], heading_deg: f64) -> GrayImage {
     let view = View::new(&camera_model(0, lens, [640, 480]));
     let optical = nalgebra::Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
@@ -70,7 +70,7 @@ fn both_worlds_have_many_corners_and_good_exposure() {
 
 #[test]
 fn a_pixel_sees_what_its_ray_hits() {
-    // A point of the house's corner edge projects to where the picture changes from wall to wall.
+    // A point of the house's corner edge projects to where the image changes from wall to wall.
     let world = world::build(Environment::House, 1);
     let model = camera_model(0, Lens::Radtan, [640, 480]);
     let view = View::new(&model);

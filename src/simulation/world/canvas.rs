@@ -157,7 +157,7 @@ impl Canvas {
         }
     }
 
-    /// An ellipse, turned by an angle, its border softened over a texel.
+    /// An ellipse, rotated by an angle, its border softened over a texel.
     pub(crate) fn ellipse(&mut self, centre: [f32; 2], radii: [f32; 2], angle: f32, value: f32, fraction: f32) {
         let reach = radii[0].max(radii[1]);
         let (sine, cosine) = angle.sin_cos();

@@ -142,7 +142,7 @@ impl World {
         self.quad(origin, Vector3::new(along.x, along.y, 0.0), down, start_m, material);
     }
 
-    /// A box on its foot's centre, turned about the vertical; the texture starts at a random place on every side.
+    /// A box on its foot's centre, rotated about the vertical; the texture starts at a random place on every side.
     pub(crate) fn cuboid(
         &mut self,
         foot: Vector3<f64>,

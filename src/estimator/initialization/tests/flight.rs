@@ -1,4 +1,4 @@
-//! A made-up flight: analytic motion, inertial samples, a camera on a turning gimbal, landmarks and their tracks.
+//! A synthetic flight: analytic motion, IMU samples, a camera on a rotating gimbal, landmarks and their tracks.
 
 use nalgebra::{UnitQuaternion, Vector2, Vector3};
 
@@ -37,18 +37,18 @@ impl Random {
     }
 }
 
-/// How the vehicle moves.
+/// Motion of the vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Motion {
     /// Near-hover, then aggressive motion.
     Flight,
-    /// Near-hover for ever.
+    /// Near-hover only.
     Hover,
     /// On the ground.
     Stationary,
-    /// Turning in place.
+    /// Rotation in place.
     RotationOnly,
-    /// A straight line at constant velocity, not turning.
+    /// A straight line at constant velocity, without rotation.
     ConstantVelocity,
 }
 
@@ -60,7 +60,7 @@ pub(super) struct FlightOptions {
     pub(super) hover_s: f64,
     pub(super) duration_s: f64,
     pub(super) gimbal: bool,
-    /// Without them the estimator is told joint angles of zero.
+    /// Without encoders the given joint angles are zero.
     pub(super) encoders: bool,
     pub(super) encoder_sigma_rad: f64,
     pub(super) chain_rotation_bound_rad: f64,
@@ -110,7 +110,7 @@ pub(super) struct Frame {
     pub(super) stamp_ns: i64,
     pub(super) features: Vec<TrackedFeature>,
     pub(super) imu: Vec<ImuSample>,
-    /// The mount as the estimator is told.
+    /// Given extrinsics.
     pub(super) imu_from_camera: RigidTransform,
     pub(super) true_world_from_imu: RigidTransform,
     pub(super) true_velocity: Vector3<f64>,
@@ -277,7 +277,7 @@ fn joint_angles(options: &FlightOptions, path: &Path, t: f64) -> Vector3<f64> {
     Vector3::new(0.5 * (0.9 * t + 0.4).sin(), roll, 0.2 + 0.25 * (1.1 * t).sin())
 }
 
-/// A feature that is being followed.
+/// A tracked feature.
 #[derive(Clone, Copy)]
 struct LiveTrack {
     id: FeatureId,
@@ -288,7 +288,7 @@ struct LiveTrack {
     age: u32,
 }
 
-/// Features that are followed from frame to frame.
+/// Features tracked from frame to frame.
 struct Tracker {
     landmarks: Vec<Vector3<f64>>,
     live: Vec<LiveTrack>,

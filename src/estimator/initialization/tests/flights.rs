@@ -1,4 +1,4 @@
-//! Whole attempts on made-up flights.
+//! Whole attempts on synthetic flights.
 
 use nalgebra::Vector3;
 
@@ -50,7 +50,7 @@ fn attempt(
     )
 }
 
-/// Tries at every frame; the solution, or the last reasons.
+/// Attempts at every frame; returns the solution, or the last reasons.
 fn run(flight: &Flight, options: &InitializationOptions) -> Result<(usize, InitializationSolution), Vec<WaitReason>> {
     let mut stationary = None;
     let mut last = Vec::new();
@@ -120,7 +120,7 @@ struct Limits {
     gyroscope_rad_per_s: f64,
 }
 
-/// Flies many seeds, prints the errors and holds them against limits.
+/// Runs many seeds, prints the errors and compares them with the limits.
 fn check(name: &str, seeds: u64, flight_of: impl Fn(u64) -> FlightOptions, limits: &Limits) {
     let mut all = Vec::new();
     for seed in 0..seeds {

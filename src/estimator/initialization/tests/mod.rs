@@ -1,4 +1,4 @@
-//! Tests of the initialization: its geometry, its equations, and whole attempts on made-up flights with known truth.
+//! Tests of the initialization: geometry, equations, and whole attempts on synthetic flights with ground truth.
 
 #![expect(clippy::print_stdout, reason = "figures of many seeds are worth reading with --nocapture")]
 
