@@ -17,7 +17,7 @@ pub(crate) fn parameter_values(classical: &ClassicalChain, form: &NearestForm) -
 }
 
 /// The ground-truth values in the parameterization of a run at a step; angles differ from the estimate by less than
-/// half a turn.
+/// π.
 ///
 /// Returns `None` when the ground truth is not known.
 pub(crate) fn true_values(recording: &Recording, run: &RunRecord, stamp_ns: i64) -> Option<ParameterValues> {

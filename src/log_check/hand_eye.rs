@@ -3,7 +3,7 @@
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
-use super::inertial::InertialFacts;
+use super::imu_facts::ImuFacts;
 use super::statistics::median;
 use super::survey::Survey;
 use super::{Area, Findings, ImageRotation, Severity};
@@ -41,7 +41,7 @@ type Pair = (Vector3<f64>, Vector3<f64>);
 /// Measured rotations of one camera and the data that predict them.
 struct HandEye<'a> {
     survey: &'a Survey,
-    inertial: &'a InertialFacts,
+    imu_facts: &'a ImuFacts,
     camera: &'a CameraRig,
     rotations: Vec<&'a ImageRotation>,
 }
@@ -51,13 +51,13 @@ pub(super) fn check_against_gyroscope(
     survey: &Survey,
     rig: &Rig,
     camera: &CameraRig,
-    inertial: &InertialFacts,
+    imu_facts: &ImuFacts,
     rotations: &[ImageRotation],
     findings: &mut Findings,
 ) {
     let rotations: Vec<_> = rotations.iter().filter(|rotation| rotation.camera_key == camera.key).collect();
     let Some(chain) = rig.chain_of_camera(&camera.key).filter(|_| rotations.len() >= MIN_ROTATIONS) else { return };
-    let hand_eye = HandEye { survey, inertial, camera, rotations };
+    let hand_eye = HandEye { survey, imu_facts, camera, rotations };
     let given = hand_eye.pairs(&chain, 0.0);
     let angles_rad: Vec<f64> = given.iter().map(|(_, measured)| measured.norm()).collect();
     if given.len() < MIN_ROTATIONS || median(&angles_rad) < MIN_ROTATION_RAD {
@@ -81,7 +81,7 @@ impl HandEye<'_> {
         };
         let pair = |rotation: &&ImageRotation| {
             let (from_ns, to_ns) = (rotation.from_ns + shift, rotation.to_ns + shift);
-            let rotation_of_imu = imu_rotation(self.inertial, from_ns, to_ns)?;
+            let rotation_of_imu = imu_rotation(self.imu_facts, from_ns, to_ns)?;
             let predicted =
                 so3::log(&(imu_from_camera(to_ns)?.inverse() * rotation_of_imu * imu_from_camera(from_ns)?));
             Some((predicted, so3::log(&rotation.second_from_first)))
@@ -200,13 +200,13 @@ impl HandEye<'_> {
 
 /// Rotation of the IMU between two times by its gyroscope, bias removed: `second_from_first`, which rotates vectors from
 /// the first IMU frame to the second.
-fn imu_rotation(inertial: &InertialFacts, from_ns: i64, to_ns: i64) -> Option<UnitQuaternion<f64>> {
-    let samples = &inertial.samples;
+fn imu_rotation(imu_facts: &ImuFacts, from_ns: i64, to_ns: i64) -> Option<UnitQuaternion<f64>> {
+    let samples = &imu_facts.samples;
     let (first, last) = (samples.first()?.stamp_ns, samples.last()?.stamp_ns);
     if from_ns < first || to_ns > last || to_ns <= from_ns {
         return None;
     }
-    let bias = inertial.gyroscope_bias_rad_per_s.unwrap_or_default();
+    let bias = imu_facts.gyroscope_bias_rad_per_s.unwrap_or_default();
     let mut first_from_now = UnitQuaternion::identity();
     let first_sample = samples.partition_point(|sample| sample.stamp_ns <= from_ns).saturating_sub(1);
     for pair in samples[first_sample..].windows(2) {

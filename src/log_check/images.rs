@@ -1,5 +1,5 @@
 use super::image_measure::ImageMeasure;
-use super::inertial::InertialFacts;
+use super::imu_facts::ImuFacts;
 use super::statistics::{median, percentile};
 use super::survey::{SampledImage, Survey};
 use super::{Area, Findings, Severity};
@@ -12,7 +12,7 @@ const BLURRED: f64 = 0.5;
 const MIN_TEXTURE: f64 = 0.01;
 
 /// Size, blur, exposure and texture of each camera's images, and their motion by rotation.
-pub(super) fn check_images(survey: &Survey, rig: &Rig, inertial: &InertialFacts, findings: &mut Findings) {
+pub(super) fn check_images(survey: &Survey, rig: &Rig, imu_facts: &ImuFacts, findings: &mut Findings) {
     for camera in &rig.cameras {
         let Some(images) = survey.images.get(&camera.key).filter(|images| !images.is_empty()) else { continue };
         check_size(camera, images, findings);
@@ -24,7 +24,7 @@ pub(super) fn check_images(survey: &Survey, rig: &Rig, inertial: &InertialFacts,
         check_blur(camera, images, findings);
         check_exposure(camera, images, findings);
         check_texture(camera, images, findings);
-        check_motion(camera, inertial, findings);
+        check_motion(camera, imu_facts, findings);
     }
 }
 
@@ -126,13 +126,13 @@ fn check_texture(camera: &CameraRig, images: &[SampledImage], findings: &mut Fin
 }
 
 /// Image motion between images by the vehicle's rotation alone, in pixels; a gimbal compensates it.
-fn check_motion(camera: &CameraRig, inertial: &InertialFacts, findings: &mut Findings) {
-    if camera.mount == CameraMount::Gimbal || camera.rate_hz <= 0.0 || inertial.samples.is_empty() {
+fn check_motion(camera: &CameraRig, imu_facts: &ImuFacts, findings: &mut Findings) {
+    if camera.mount == CameraMount::Gimbal || camera.rate_hz <= 0.0 || imu_facts.samples.is_empty() {
         return;
     }
-    let bias = inertial.gyroscope_bias_rad_per_s.unwrap_or_default();
+    let bias = imu_facts.gyroscope_bias_rad_per_s.unwrap_or_default();
     let rates: Vec<f64> =
-        inertial.samples.iter().map(|sample| (sample.angular_velocity_rad_per_s - bias).norm()).collect();
+        imu_facts.samples.iter().map(|sample| (sample.angular_velocity_rad_per_s - bias).norm()).collect();
     let pixels = |rate: f64| rate / camera.rate_hz * camera.model.focal_length_px();
     let (usual, fast) = (pixels(median(&rates)), pixels(percentile(&rates, 0.99)));
     let evidence = format!(

@@ -4,7 +4,7 @@
 mod hand_eye;
 mod image_measure;
 mod images;
-mod inertial;
+mod imu_facts;
 mod joints;
 mod render;
 mod rig_sanity;
@@ -46,7 +46,8 @@ pub enum Area {
     /// Time bases, rates, gaps and order of stamps.
     Time,
     /// Units, gravity, biases, noise and saturation of the IMU.
-    Inertial,
+    #[serde(rename = "inertial")]
+    Imu,
     /// Stationary and hovering periods, fast rotation.
     Motion,
     /// Joint angles and their limits.
@@ -148,11 +149,11 @@ pub fn check(log: &FlightLog, rig: Result<&Rig, &LogError>, image_rotations: &[I
         ),
     }
     timing::check_timing(&survey, rig.ok(), &mut findings);
-    let inertial = inertial::check_inertial(&survey, rig.ok(), &mut findings);
+    let imu_facts = imu_facts::check_imu(&survey, rig.ok(), &mut findings);
     if let Ok(rig) = rig {
         joints::check_joints(&survey, rig, &mut findings);
-        images::check_images(&survey, rig, &inertial, &mut findings);
-        rotation::check_rotations(&survey, rig, &inertial, image_rotations, &mut findings);
+        images::check_images(&survey, rig, &imu_facts, &mut findings);
+        rotation::check_rotations(&survey, rig, &imu_facts, image_rotations, &mut findings);
     }
     let mut findings = findings.list;
     findings.sort_by_key(|finding| (std::cmp::Reverse(finding.severity), finding.area));

@@ -20,7 +20,7 @@ impl Area {
         match self {
             Self::Log => "log",
             Self::Time => "time",
-            Self::Inertial => "IMU",
+            Self::Imu => "IMU",
             Self::Motion => "motion",
             Self::Encoders => "encoders",
             Self::Images => "images",

@@ -2,7 +2,7 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use super::inertial::InertialFacts;
+use super::imu_facts::ImuFacts;
 use super::survey::Survey;
 use super::{Area, Findings, ImageRotation, Severity, hand_eye};
 use crate::geometry::{RigidTransform, seconds_from_ns};
@@ -12,14 +12,14 @@ use crate::sensors::{CameraMount, CameraRig, Rig};
 pub(super) fn check_rotations(
     survey: &Survey,
     rig: &Rig,
-    inertial: &InertialFacts,
+    imu_facts: &ImuFacts,
     rotations: &[ImageRotation],
     findings: &mut Findings,
 ) {
     for camera in &rig.cameras {
-        check_against_gravity(survey, rig, camera, inertial, findings);
+        check_against_gravity(survey, rig, camera, imu_facts, findings);
         check_lever(camera, findings);
-        hand_eye::check_against_gyroscope(survey, rig, camera, inertial, rotations, findings);
+        hand_eye::check_against_gyroscope(survey, rig, camera, imu_facts, rotations, findings);
     }
 }
 
@@ -43,10 +43,10 @@ fn check_against_gravity(
     survey: &Survey,
     rig: &Rig,
     camera: &CameraRig,
-    inertial: &InertialFacts,
+    imu_facts: &ImuFacts,
     findings: &mut Findings,
 ) {
-    let Some((stamp_ns, force)) = inertial.up else { return };
+    let Some((stamp_ns, force)) = imu_facts.up else { return };
     let Some(up_in_imu) = force.try_normalize(1.0) else { return };
     let Some(pose) = imu_from_camera(survey, rig, camera, stamp_ns) else { return };
     let (roll, elevation) = attitude_deg(&pose.rotation.inverse(), &up_in_imu);

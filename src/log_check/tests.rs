@@ -196,7 +196,7 @@ fn a_faultless_flight_has_no_warning() {
 }
 
 #[test]
-fn inertial_faults_are_found() {
+fn imu_faults_are_found() {
     use Severity::{Error, Note, Warning};
     let imu = |imu| Flight { imu, ..Flight::default() };
     let rig = |from: &str, to: &str| {

@@ -119,7 +119,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn spells_read_as_sentences() {
+    fn intervals_read_as_sentences() {
         let interval = RankInterval {
             from_s: 3.2,
             to_s: 8.5,

@@ -33,7 +33,7 @@ pub(super) struct Window {
 
 /// IMU samples and what they measure of the motion, for later checks.
 #[derive(Clone, Debug, Default)]
-pub(super) struct InertialFacts {
+pub(super) struct ImuFacts {
     /// Finite samples in the order of their stamps.
     pub(super) samples: Vec<ImuSample>,
     /// Mean angular rate while stationary, in the IMU frame; `None` when the vehicle never was.
@@ -44,7 +44,7 @@ pub(super) struct InertialFacts {
 }
 
 /// Units, gravity, biases, noise and saturation of the IMU, and stationary periods.
-pub(super) fn check_inertial(survey: &Survey, rig: Option<&Rig>, findings: &mut Findings) -> InertialFacts {
+pub(super) fn check_imu(survey: &Survey, rig: Option<&Rig>, findings: &mut Findings) -> ImuFacts {
     let finite = |sample: &&ImuSample| {
         let numbers = sample.angular_velocity_rad_per_s.iter().chain(&sample.specific_force_m_per_s2);
         numbers.copied().all(f64::is_finite)
@@ -55,12 +55,12 @@ pub(super) fn check_inertial(survey: &Survey, rig: Option<&Rig>, findings: &mut 
         let first = survey.imu.iter().find(|sample| !finite(sample)).map_or(0, |sample| sample.stamp_ns);
         let evidence = format!("{lost} of {} samples, the first at {:.3} s", survey.imu.len(), seconds_from_ns(first));
         let remedy = "check the driver; these samples are dropped";
-        findings.add(Severity::Warning, Area::Inertial, "IMU samples are not finite", evidence, remedy);
+        findings.add(Severity::Warning, Area::Imu, "IMU samples are not finite", evidence, remedy);
     }
     samples.sort_by_key(|sample| sample.stamp_ns);
     samples.dedup_by_key(|sample| sample.stamp_ns);
     if samples.len() < 10 {
-        return InertialFacts { samples, ..InertialFacts::default() };
+        return ImuFacts { samples, ..ImuFacts::default() };
     }
     let windows = windows_of(&samples);
     let stationary: Vec<Window> = windows.iter().filter(|window| window.stationary).copied().collect();
@@ -73,7 +73,7 @@ pub(super) fn check_inertial(survey: &Survey, rig: Option<&Rig>, findings: &mut 
     let stationary_up =
         stationary.get(stationary.len() / 2).map(|window| (window.start_ns.midpoint(window.end_ns), window.mean_force));
     let up = stationary_up.unwrap_or_else(|| (samples[samples.len() / 2].stamp_ns, mean(&forces())));
-    InertialFacts { samples, gyroscope_bias_rad_per_s: gyroscope_bias, up: Some(up) }
+    ImuFacts { samples, gyroscope_bias_rad_per_s: gyroscope_bias, up: Some(up) }
 }
 
 fn windows_of(samples: &[ImuSample]) -> Vec<Window> {
@@ -113,7 +113,7 @@ fn check_gravity(samples: &[ImuSample], stationary: &[Window], rig: Option<&Rig>
         let evidence = format!("{gravity} m/s²; on the ground it lies between 9.78 and 9.83");
         findings.add(
             Severity::Warning,
-            Area::Inertial,
+            Area::Imu,
             "the rig's gravity is unusual",
             evidence,
             "set gravity for the place of the flight",
@@ -148,9 +148,9 @@ fn check_gravity(samples: &[ImuSample], stationary: &[Window], rig: Option<&Rig>
             "the estimator finds the bias once the vehicle moves; expect a slow start, or calibrate the IMU",
         )
     } else {
-        return findings.good(Area::Inertial, "the accelerometer measures gravity", evidence);
+        return findings.good(Area::Imu, "the accelerometer measures gravity", evidence);
     };
-    findings.add(severity, Area::Inertial, title, evidence, remedy);
+    findings.add(severity, Area::Imu, title, evidence, remedy);
 }
 
 fn check_gyroscope_bias(stationary: &[Window], findings: &mut Findings) -> Option<Vector3<f64>> {
@@ -164,9 +164,9 @@ fn check_gyroscope_bias(stationary: &[Window], findings: &mut Findings) -> Optio
     let evidence = format!("({:+.4}, {:+.4}, {:+.4}) rad/s while stationary or hovering", bias.x, bias.y, bias.z);
     if bias.norm() > 0.03 {
         let remedy = "calibrate the gyroscope before the flight, unless the vehicle rotated slowly all the time";
-        findings.add(Severity::Note, Area::Inertial, "the gyroscope's bias is large", evidence, remedy);
+        findings.add(Severity::Note, Area::Imu, "the gyroscope's bias is large", evidence, remedy);
     } else {
-        findings.good(Area::Inertial, "the gyroscope's bias is small", evidence);
+        findings.good(Area::Imu, "the gyroscope's bias is small", evidence);
     }
     Some(bias)
 }
@@ -199,13 +199,7 @@ fn check_noise(
             let evidence =
                 format!("{flight:.2e} {unit} in the noisiest tenth of the windows, {quiet:.2e} {quiet_when}");
             let remedy = "isolate the IMU from vibration, or raise the noise density to the value in flight";
-            findings.add(
-                Severity::Note,
-                Area::Inertial,
-                format!("vibration on the {name} in flight"),
-                evidence,
-                remedy,
-            );
+            findings.add(Severity::Note, Area::Imu, format!("vibration on the {name} in flight"), evidence, remedy);
         }
         let Some(given) = given else { continue };
         compare_density(name, (quiet, quiet_when), given, unit, rate_hz, findings);
@@ -230,15 +224,15 @@ fn compare_density(
         let remedy =
             format!("raise {field} to {:.1e}{hint}; estimators need 2 to 10 times the measured value", 2.0 * measured);
         let title = format!("{name} noise in the rig is {ratio:.1} times too small");
-        findings.add(Severity::Warning, Area::Inertial, title, evidence, remedy);
+        findings.add(Severity::Warning, Area::Imu, title, evidence, remedy);
     } else if ratio < 1.0 / NOISE_TOO_LARGE || (measured > 0.0 && discrete(1.0 / ratio)) {
         let hint =
             if discrete(1.0 / ratio) { ": it appears to be the noise of one sample; divide it by √rate" } else { "" };
         let remedy = format!("{field} is a continuous-time density in {unit}{hint}");
         let title = format!("{name} noise in the rig is {:.0} times too large", 1.0 / ratio);
-        findings.add(Severity::Note, Area::Inertial, title, evidence, remedy);
+        findings.add(Severity::Note, Area::Imu, title, evidence, remedy);
     } else {
-        findings.good(Area::Inertial, format!("{name} noise agrees with the rig"), evidence);
+        findings.good(Area::Imu, format!("{name} noise agrees with the rig"), evidence);
     }
 }
 
@@ -263,16 +257,16 @@ fn check_clipping(samples: &[ImuSample], findings: &mut Findings) {
                 let evidence = format!("{hits} samples at exactly ±{limit:.4} {unit}");
                 let remedy =
                     "set a wider range in the sensor, or reduce vibration: clipped samples bias the preintegration";
-                findings.add(Severity::Warning, Area::Inertial, title, evidence, remedy);
+                findings.add(Severity::Warning, Area::Imu, title, evidence, remedy);
             }
         }
     }
     let evidence = format!("largest values {:.2} rad/s and {:.1} m/s²", largest[0], largest[1]);
     if largest[0] > 35.0 {
         let remedy = "check the unit: sensor_msgs/Imu requires rad/s, and 35 rad/s is 2000 °/s";
-        findings.add(Severity::Error, Area::Inertial, "angular velocities appear to be in degrees", evidence, remedy);
+        findings.add(Severity::Error, Area::Imu, "angular velocities appear to be in degrees", evidence, remedy);
     } else if !clipped {
-        findings.good(Area::Inertial, "the IMU does not saturate", evidence);
+        findings.good(Area::Imu, "the IMU does not saturate", evidence);
     }
     let same = samples.windows(2).filter(|pair| {
         pair[0].angular_velocity_rad_per_s == pair[1].angular_velocity_rad_per_s
@@ -282,7 +276,7 @@ fn check_clipping(samples: &[ImuSample], findings: &mut Findings) {
     if repeated * 100 > samples.len() {
         let evidence = format!("{repeated} of {} samples equal the previous one in all six values", samples.len());
         let remedy = "the driver sends faster than the sensor measures, or fills gaps: send each measurement once";
-        findings.add(Severity::Warning, Area::Inertial, "IMU samples repeat", evidence, remedy);
+        findings.add(Severity::Warning, Area::Imu, "IMU samples repeat", evidence, remedy);
     }
 }
 
