@@ -213,7 +213,7 @@ fn rows(transform: &RigidTransform) -> [[f64; 4]; 4] {
     std::array::from_fn(|row| std::array::from_fn(|column| matrix[(row, column)]))
 }
 
-fn true_mount(ground_truth: &Rig, key: &str) -> Option<RigidTransform> {
+fn ground_truth_extrinsics(ground_truth: &Rig, key: &str) -> Option<RigidTransform> {
     ground_truth.cameras.iter().find(|camera| camera.key == key).and_then(|camera| match &camera.mount {
         CameraMount::Static { imu_from_camera } => Some(*imu_from_camera),
         CameraMount::Gimbal => None,
@@ -222,13 +222,13 @@ fn true_mount(ground_truth: &Rig, key: &str) -> Option<RigidTransform> {
 
 fn ground_truth_report(run: &CalibrationRun, ground_truth: &Rig) -> Option<GroundTruthReport> {
     let outcome = &run.outcome;
-    let mount = true_mount(ground_truth, &run.static_camera)?;
+    let extrinsics = ground_truth_extrinsics(ground_truth, &run.static_camera)?;
     let chain = &ground_truth.gimbal.as_ref()?.chain;
     if chain.joint_count() != outcome.chain.joint_count() {
         return None;
     }
     let of_extrinsics = |found: &RigidTransform| {
-        let (translation_mean_m, rotation_mean_rad) = transform_distance(found, &mount);
+        let (translation_mean_m, rotation_mean_rad) = transform_distance(found, &extrinsics);
         DistanceReport { translation_mean_m, translation_std_m: 0.0, rotation_mean_rad, rotation_std_rad: 0.0 }
     };
     let of_chain = |found: &ClassicalChain| {
@@ -253,22 +253,22 @@ fn ground_truth_report(run: &CalibrationRun, ground_truth: &Rig) -> Option<Groun
 /// Static camera, time offsets, then the chain.
 fn parameters(run: &CalibrationRun) -> Vec<ParameterReport> {
     let outcome = &run.outcome;
-    let mut parameters = mount_parameters(run, &outcome.extrinsics);
+    let mut parameters = extrinsics_parameters(run, &outcome.extrinsics);
     parameters.push(time_shift(run, &run.static_camera, outcome.extrinsics.time_shift_s));
     parameters.extend(chain_parameters(run, outcome));
     parameters.push(time_shift(run, &run.gimbal_camera, outcome.gimbal_time_shift_s));
     parameters
 }
 
-fn mount_parameters(run: &CalibrationRun, mount: &ExtrinsicsReport) -> Vec<ParameterReport> {
+fn extrinsics_parameters(run: &CalibrationRun, extrinsics: &ExtrinsicsReport) -> Vec<ParameterReport> {
     let values = |transform: &RigidTransform| {
         let (rotation_vector, shift) = (so3::log(&transform.rotation), transform.translation_m);
         [rotation_vector.x, rotation_vector.y, rotation_vector.z, shift.x, shift.y, shift.z]
     };
-    let ground_truth = run.ground_truth_rig.as_ref().and_then(|rig| true_mount(rig, &run.static_camera));
-    let (initial, last) = (values(&mount.initial), values(&mount.imu_from_camera));
+    let ground_truth = run.ground_truth_rig.as_ref().and_then(|rig| ground_truth_extrinsics(rig, &run.static_camera));
+    let (initial, last) = (values(&extrinsics.initial), values(&extrinsics.imu_from_camera));
     let ground_truth_values = ground_truth.as_ref().map(values);
-    let error = ground_truth.map(|ground_truth| mount.imu_from_camera.minus(&ground_truth));
+    let error = ground_truth.map(|ground_truth| extrinsics.imu_from_camera.minus(&ground_truth));
     Quantity::TRANSFORM
         .into_iter()
         .enumerate()
@@ -277,7 +277,7 @@ fn mount_parameters(run: &CalibrationRun, mount: &ExtrinsicsReport) -> Vec<Param
             dimension: quantity.dimension(),
             initial: initial[axis],
             last: last[axis],
-            sigma: mount.sigmas[axis],
+            sigma: extrinsics.sigmas[axis],
             prior_sigma: None,
             ground_truth: ground_truth_values.map(|ground_truth| ground_truth[axis]),
             error: error.map(|error| error[axis]),

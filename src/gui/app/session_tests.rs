@@ -113,7 +113,7 @@ fn a_classical_run_goes_on_as_minimal_from_where_its_rank_drops() {
     }
     harness.get_by_label_contains(&format!("Run {}", fork.spec.label)).hover();
     harness.run_steps(8);
-    assert!(harness.query_by_label_contains("s: minimal").is_some(), "the legend says where it was forked");
+    assert!(harness.query_by_label_contains("s: minimal").is_some(), "the legend shows where it was forked");
 
     // The comparison has both runs; they diverge at the frame of the fork.
     harness.key_press(Key::Num5);
@@ -122,8 +122,9 @@ fn a_classical_run_goes_on_as_minimal_from_where_its_rank_drops() {
         let name = format!("Show run {} in all panels", run.spec.label);
         assert!(harness.query_by_label(&name).is_some(), "{name}");
     }
-    let parting = format!("First different number of {} from {}, go there", fork.spec.label, parent.spec.label);
-    let time = format!("{parting}: {:.3} s", step.report.stamp_ns as f64 * 1e-9);
+    let divergence_label =
+        format!("First different number of {} from {}, go there", fork.spec.label, parent.spec.label);
+    let time = format!("{divergence_label}: {:.3} s", step.report.stamp_ns as f64 * 1e-9);
     assert!(harness.query_by_label(&time).is_some(), "{time}");
 
     // The rank panel beside it shows the fork.
@@ -131,7 +132,7 @@ fn a_classical_run_goes_on_as_minimal_from_where_its_rank_drops() {
     harness.run_steps(4);
     assert_eq!(harness.state().selection.run, 1);
     let verdicts = painted_texts(&harness);
-    assert!(verdicts.iter().any(|(text, _)| text.contains("of 18")), "the rank panel tells the fork's rank");
+    assert!(verdicts.iter().any(|(text, _)| text.contains("of 18")), "the rank panel shows the fork's rank");
     let buttons = harness.query_all_by_role(Role::Button);
     let unnamed = buttons.filter(|node| node.accesskit_node().label().is_none_or(|name| name.is_empty())).count();
     assert_eq!(unnamed, 0, "every button has a name");

@@ -209,7 +209,7 @@ fn the_welcome_view_offers_logs_and_opens_them() {
     assert_eq!(*desktop.remembered.lock().unwrap(), [PathBuf::from("/samples/yard.mcap")]);
     assert!(harness.query_by_label("Play").is_some());
     assert!(harness.query_by_label("Frame 0").is_some(), "the cursor goes to the first frame");
-    assert!(harness.query_by_label("300 MiB").is_some(), "the status bar tells the memory");
+    assert!(harness.query_by_label("300 MiB").is_some(), "the status bar shows the memory");
 }
 
 #[test]
@@ -329,7 +329,7 @@ fn the_panel_clicked_last_is_written_as_screenshot_and_table() {
     let image = written(&mut harness);
     assert!(image.name.starts_with("yard/image-"), "{}", image.name);
     assert!(image.table.starts_with("id,age_frames,u_px") && image.table.lines().count() > 60, "{}", image.table);
-    assert!(harness.query_by_label_contains("/out/yard/image-").is_some(), "it says where");
+    assert!(harness.query_by_label_contains("/out/yard/image-").is_some(), "it shows the path");
 
     for _ in 0..harness.query_all_by_label("Dismiss notice").count() {
         harness.query_all_by_label("Dismiss notice").next().unwrap().click();

@@ -59,7 +59,7 @@ fn marks_have_the_values_of_the_report() {
     let solved = model.marks.iter().filter(|mark| mark.solved.is_some()).count();
     assert_eq!(solved, step.report.features.len());
     for mark in &model.marks {
-        assert_eq!(mark.trail_px.len(), (mark.age as usize).min(4), "tail of {:?}", mark.id);
+        assert_eq!(mark.trail_px.len(), (mark.age as usize).min(4), "trail of {:?}", mark.id);
         if let Some(earlier) = mark.trail_px.first() {
             let track = step.tracks.features.iter().find(|feature| feature.id == mark.id).unwrap();
             assert_eq!(Some(*earlier), track.previous_uv_px);

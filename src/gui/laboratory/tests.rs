@@ -50,7 +50,7 @@ fn experiments_have_the_results_of_the_command() {
     let mechanism = Mechanism::named("yaw-roll-pitch-ideal").unwrap();
     let setup = LaboratorySetup { motion: LaboratoryMotion::Hover, ..LaboratorySetup::new(mechanism) };
     let classical = setup.run(LaboratoryForm::whole(Parameterization::Classical)).unwrap().rank;
-    assert!(classical.rank_structural < 18, "a hover tells less than every motion");
+    assert!(classical.rank_structural < 18, "hover constrains less than every motion");
     let text = format!("{} of 24", classical.rank_structural);
     assert!(harness.query_by_label(&text).is_some(), "{text}");
     assert!(harness.query_by_label_contains(LaboratoryMotion::Hover.meaning()).is_some());

@@ -202,7 +202,7 @@ mod tests {
                 let image = draw(options, text_ui);
                 keep_screenshot(&format!("text-{}-{scale}", theme.as_str()), &image);
                 assert_eq!([image.width(), image.height()], options.size_px);
-                assert!(image == draw(options, text_ui), "two pictures differ");
+                assert!(image == draw(options, text_ui), "two screenshots differ");
                 assert!(image.pixels().all(|pixel| pixel.0[3] == 255));
                 let ground = Theme::of(theme).background.to_array();
                 let inked = image.pixels().filter(|pixel| pixel.0 != ground).count();

@@ -70,7 +70,7 @@ mod tests {
         let reading = pace.reading().unwrap();
         assert!((reading.speed - 2.0).abs() < 1e-6 && (reading.fps - 10.0).abs() < 1e-6, "{reading:?}");
         pace.frame(true, 20.0, 0);
-        assert_eq!(pace.reading(), None, "a loop begins anew");
+        assert_eq!(pace.reading(), None, "a loop restarts the measurement");
         pace.frame(false, 20.1, 0);
         assert_eq!(pace.frames.len(), 0);
     }

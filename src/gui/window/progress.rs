@@ -75,6 +75,6 @@ mod tests {
         let half = at(26, Some(20.0));
         assert!((half.fraction - 0.5).abs() < 1e-9 && (half.left_s.unwrap() - 10.0).abs() < 1e-6, "{half:?}");
         assert_eq!(at(11, Some(30.0)).left_s, None, "another run has come");
-        assert_eq!(at(26, None).left_s, None, "pictures tell no times");
+        assert_eq!(at(26, None).left_s, None, "screenshots show no times");
     }
 }

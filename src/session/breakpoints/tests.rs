@@ -172,12 +172,12 @@ fn values_of_a_condition_are_reported_with_their_text() {
     let [before, step] = steps();
     let names = rig.parameter_names();
     let context = StepContext { step: &step, previous: Some(&before), names: &names };
-    let told: Vec<String> = condition("rank < 18 or rise(rms) > 0.1 and rank > chi2(imu) + 2")
+    let texts: Vec<String> = condition("rank < 18 or rise(rms) > 0.1 and rank > chi2(imu) + 2")
         .values(&context)
         .iter()
         .map(ToString::to_string)
         .collect();
-    assert_eq!(told, ["rank = 17", "rise(rms) = 0.1500", "rms = 0.4000", "chi2(imu) is missing"]);
+    assert_eq!(texts, ["rank = 17", "rise(rms) = 0.1500", "rms = 0.4000", "chi2(imu) is missing"]);
 }
 
 /// A recording of one run with these ranks in its steps.

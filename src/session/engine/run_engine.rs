@@ -132,8 +132,8 @@ impl RunEngine {
         let rigid = RIGID_COLUMNS * calibration.rigid_cameras.len();
         let is_clock = |parameter: &&ParameterId| parameter.dimension() == Dimension::Time;
         let clocks = calibration.parameters.iter().filter(is_clock).count();
-        let mounts = calibration.parameters.len() - clocks;
-        let chain = if chain.dof() + rigid == mounts { chain } else { chain.without_joint_offsets() };
+        let chain_columns = calibration.parameters.len() - clocks;
+        let chain = if chain.dof() + rigid == chain_columns { chain } else { chain.without_joint_offsets() };
         // In a fork without encoders, frames of the window may still have encoder readings that the parent used.
         let unread = || report.window.iter().all(|frame| frame.encoder_angles_rad.is_none());
         let joints_free = self.joints_free || self.has_joints && self.altered_measurements.encoder_off() && unread();

@@ -46,7 +46,7 @@ fn triangles(corners: &[(f32, f32)], color: Color32) -> Mesh {
 
 fn rgb(image: &RgbaImage, x: u32, y: u32) -> [u8; 3] {
     let Rgba([red, green, blue, alpha]) = *image.get_pixel(x, y);
-    assert_eq!(alpha, 255, "the picture is opaque");
+    assert_eq!(alpha, 255, "the image is opaque");
     [red, green, blue]
 }
 
@@ -326,7 +326,7 @@ fn an_updated_image_equals_one_painted_again() {
         }
         fresh.set_textures(&delta);
         delta.clear();
-        assert!(image == fresh.paint(&primitives, SIZE, 1.0, GROUND), "picture {moved}");
+        assert!(image == fresh.paint(&primitives, SIZE, 1.0, GROUND), "image {moved}");
         // The reported rectangles are all that differs.
         for (rect, part) in kept.changes() {
             for (index, color) in part.pixels.iter().enumerate() {
@@ -334,6 +334,6 @@ fn an_updated_image_equals_one_painted_again() {
                 shown.put_pixel(column as u32, row as u32, Rgba(color.to_array()));
             }
         }
-        assert!(shown == image, "changes of picture {moved}");
+        assert!(shown == image, "changes of image {moved}");
     }
 }
