@@ -1,4 +1,4 @@
-//! What each part of the estimator is worth: runs that differ from the default by one option, over the same pieces.
+//! Effect of each option of the estimator: runs that differ from the default by one option, over the same intervals.
 
 use anyhow::Result;
 use dcvins::estimator::{EstimatorConfig, TrackContinuation};
@@ -58,7 +58,7 @@ fn variants() -> Vec<Variant> {
     ]
 }
 
-/// Flies the variants over the first seconds of an experiment's flights and writes what is known after each.
+/// Runs the variants on the first seconds of an experiment's flights and writes the results after each.
 pub(crate) fn fly(
     archive: &Archive,
     experiment: Experiment,

@@ -13,7 +13,8 @@ use serde::{Deserialize, Serialize};
 use crate::logs::Log;
 use crate::samples::{CalibrationErrors, PoseSquares, calibration_sample, pose_sample};
 
-/// Frames between two looks at the covariances: about as long as a window, so that samples hardly share measurements.
+/// Frames between two samples of the covariances: about as long as a window, so that samples hardly share
+/// measurements.
 const SAMPLED_FRAMES: usize = 60;
 
 /// One estimator over a log.
@@ -27,20 +28,20 @@ pub(crate) struct Variant {
 }
 
 impl Variant {
-    /// A run as its specification says.
+    /// A run of a specification.
     pub(crate) fn plain(name: &'static str, spec: &'static str) -> Self {
         Self { name, spec, analysed: false, change: |_| () }
     }
 }
 
-/// What the tables need of one estimator's flight.
+/// Results of one run for the tables.
 #[derive(Serialize, Deserialize)]
 pub(crate) struct Driven {
     /// Length of the path over the estimated frames.
     pub(crate) length_m: f64,
     pub(crate) initialized_at_s: Option<f64>,
     pub(crate) restarts: usize,
-    /// Against the truth, where it is known.
+    /// Errors against the ground truth, where it is available.
     pub(crate) accuracy: Option<Accuracy>,
     pub(crate) chain_error_initial: Option<ChainDistance>,
     /// At the end.
@@ -67,7 +68,7 @@ pub(crate) struct Accuracy {
     pub(crate) ate_percent_of_length: f64,
 }
 
-/// Mean distance of a chain from the truth over the joint angles visited.
+/// Mean distance of a chain from the ground truth over the visited joint angles.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 pub(crate) struct ChainDistance {
     pub(crate) metres: f64,
@@ -86,7 +87,7 @@ impl Driven {
         Some(self.accuracy.as_ref()?.ate_rmse_m)
     }
 
-    /// The chain's distance from the truth at the end, in millimetres.
+    /// Distance of the chain from the ground truth at the end, in millimetres.
     pub(crate) fn chain_mm(&self) -> Option<f64> {
         Some(self.chain_error?.metres * 1e3)
     }
@@ -97,7 +98,7 @@ impl Driven {
     }
 }
 
-/// Flies the variants over a log, with another rig than the log's if one is given; the results in the variants' order.
+/// Runs the variants on a log, with another rig than the log's if one is given; returns their results in order.
 pub(crate) fn drive(log: &Log, rig_path: Option<&Path>, variants: &[Variant]) -> Result<Vec<Driven>> {
     let recording = session::compute(&plan(log, rig_path, variants)?, None, &mut |_| ())?.into_recording();
     Ok(recording.runs.iter().map(|run| driven(&recording, run)).collect())

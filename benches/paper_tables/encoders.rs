@@ -10,7 +10,7 @@ use crate::table::{Table, written};
 /// Length of a flight.
 const FLIGHT_S: f64 = 40.0;
 
-/// Flies T4 with each kind of encoders.
+/// Runs T4 with each kind of encoders.
 pub(crate) fn fly(archive: &Archive, seeds: &[u64], progress: &mut dyn FnMut(&Table) -> Result<()>) -> Result<Table> {
     let kinds: [(&str, Option<f64>, &'static str); 5] = [
         ("σ 0.5°", Some(0.5), "auto"),

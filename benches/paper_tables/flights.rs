@@ -27,7 +27,7 @@ pub(crate) const FIXED: usize = 1;
 pub(crate) const STATIC: usize = 2;
 pub(crate) const CLUSTER: usize = 3;
 
-/// The offline baseline: calibrated from the same flight, then flown with that calibration held fixed.
+/// The offline baseline: calibrated from the same flight, then run with that calibration fixed.
 #[derive(Serialize, Deserialize)]
 pub(crate) struct Offline {
     pub(crate) calibration: OfflineErrors,
@@ -66,7 +66,7 @@ impl OfflineErrors {
     }
 }
 
-/// What came of one flight.
+/// Results of one flight.
 pub(crate) struct Flight {
     pub(crate) experiment: Experiment,
     pub(crate) seed: u64,
@@ -75,12 +75,12 @@ pub(crate) struct Flight {
     pub(crate) estimated: Estimated,
 }
 
-/// What the estimators made of a flight.
+/// Results of the estimators on a flight.
 #[derive(Serialize, Deserialize)]
 pub(crate) struct Estimated {
     /// In the order of [`RUNS`].
     pub(crate) runs: Vec<Driven>,
-    /// For T4 alone, as in the paper; `Err` tells why it could not be calibrated.
+    /// For T4 only, as in the paper; `Err` has the reason why the calibration failed.
     pub(crate) offline: Option<Result<Offline, String>>,
     pub(crate) in_s: f64,
 }
@@ -121,7 +121,7 @@ impl Flight {
         flights.iter().filter(move |flight| flight.experiment == experiment)
     }
 
-    /// The experiments that were flown, in their order.
+    /// Simulated experiments in order.
     pub(crate) fn experiments(flights: &[Self]) -> impl Iterator<Item = Experiment> {
         Experiment::ALL.into_iter().filter(|experiment| Self::of(flights, *experiment).next().is_some())
     }
@@ -167,7 +167,7 @@ impl Driven {
     }
 }
 
-/// The paper's other way: calibrate first, then fly with the result as it is.
+/// The paper's other procedure: calibrate offline, then run with the result fixed.
 fn calibrate_and_fly(log: &Log, folder: &Path) -> Result<Offline> {
     let begin = Instant::now();
     let request = CalibrationRequest {

@@ -1,4 +1,4 @@
-//! Results that are kept beside the logs, so that a bench that was stopped goes on where it was.
+//! Results stored beside the logs, so that an interrupted bench resumes.
 
 use std::fs;
 

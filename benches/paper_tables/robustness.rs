@@ -34,7 +34,7 @@ const ROWS: [(&str, &[&str], &str); 18] = [
 const LATE_JOINTS: &[&str] = &["joint-lag=0.02"];
 const LATE_CAMERA: &[&str] = &["camera-offset=0.01"];
 
-/// Flies each disturbance over some seeds.
+/// Runs each disturbance with several seeds.
 pub(crate) fn fly(archive: &Archive, seeds: &[u64], progress: &mut dyn FnMut(&Table) -> Result<()>) -> Result<Table> {
     let mut flown: Vec<Vec<Driven>> = ROWS.iter().map(|_| Vec::new()).collect();
     for seed in seeds {

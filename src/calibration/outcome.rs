@@ -106,7 +106,7 @@ pub struct CalibrationOutcome {
     pub pixels: [PixelReport; 2],
     /// Solver iterations of the static camera alone and of both cameras.
     pub iterations: [usize; 2],
-    /// Residuals of the inertial samples.
+    /// Residuals of the IMU samples.
     pub inertial: ImuResidualReport,
     /// Observability of the chain over the whole flight.
     pub rank: Option<RankReport>,

@@ -16,13 +16,13 @@ use crate::sensors::JointAngles;
 
 /// Standard deviation of the rotations of a measured pose, in radians: a pixel over the root of the features.
 const ROTATION_SIGMA_RAD: f64 = 1e-3;
-/// What the loops are held to at first, when the chain and the readings are far off: they pull, but do not tear.
+/// Noise of the first adjustment, when chain and readings have large errors.
 const INITIAL_NOISE: LoopNoise = LoopNoise { rotation_rad: 0.02, position_m: 0.05, loss: RobustLoss::None };
-/// Positions are never better than this, in metres.
+/// Smallest standard deviation of a measured position, in metres.
 const MIN_POSITION_SIGMA_M: f64 = 2e-3;
-/// Standard deviations at which a pair has half its weight.
+/// Residual at which a pair has half its weight, in standard deviations.
 const CAUCHY_SIGMAS: f64 = 3.0;
-/// How often the noise of the positions is learnt.
+/// Number of estimations of the position noise.
 const ROUNDS: usize = 4;
 const ITERATIONS: usize = 25;
 /// Columns of a segment's frame: rotation, translation, logarithm of the scale.
@@ -70,7 +70,7 @@ pub(super) fn paired(
         .collect()
 }
 
-/// Where a segment lies on the map.
+/// Pose and scale of a segment on the map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SegmentFrame {
     pub(super) world_from_segment: RigidTransform,
@@ -93,23 +93,23 @@ impl SegmentFrame {
     }
 }
 
-/// What the pose loops came to.
+/// Result of the pose loops.
 #[derive(Clone, Debug)]
 pub(super) struct PoseLoopSolution {
     pub(super) chain: Chain,
-    /// By segment and pair.
+    /// Joint angles by segment and pair, in radians.
     pub(super) joints_rad: Vec<Vec<Vec<f64>>>,
     pub(super) frames: Vec<SegmentFrame>,
-    /// Covariance of the chain's columns.
+    /// Covariance of the chain's columns (dof × dof).
     pub(super) covariance: DMatrix<f64>,
-    /// Standard deviation of a measured position per coordinate, as the residuals show it.
+    /// Standard deviation of a measured position per coordinate, estimated from the residuals.
     pub(super) position_sigma_m: f64,
     /// Robust weight of each pair, 0 to 1, by segment.
     pub(super) weights: Vec<Vec<f64>>,
     pub(super) iterations: usize,
 }
 
-/// How loops are weighed.
+/// Noise and robust loss of the loops.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LoopNoise {
     /// Standard deviation of a rotation's coordinate.
@@ -140,7 +140,7 @@ pub(super) struct PairRows {
     pub(super) by_chain: Matrix6xX<f64>,
 }
 
-/// Normal equations of the loops: the chain's part, and each segment's.
+/// Normal equations of the loops: block of the chain, and blocks of each segment.
 #[derive(Clone)]
 struct LoopEquations {
     hessian: DMatrix<f64>,
@@ -148,11 +148,11 @@ struct LoopEquations {
     segments: Vec<SegmentEquations>,
 }
 
-/// One segment's part: its frame and the joint angles of its views.
+/// Blocks of one segment: its frame and the joint angles of its views.
 #[derive(Clone)]
 struct SegmentEquations {
     own: DMatrix<f64>,
-    /// Own × chain.
+    /// Coupling of the segment's unknowns (rows) with the chain (columns).
     coupling: DMatrix<f64>,
     gradient: DVector<f64>,
 }
@@ -205,14 +205,14 @@ impl PoseLoops<'_> {
         })
     }
 
-    /// By how much the segments' own frames make residuals of positions smaller than their errors.
+    /// Factor by which the segments' own frames reduce position residuals below the position errors.
     fn lost_freedom(&self) -> f64 {
         let coordinates = 3.0 * self.each_pair().count() as f64;
         let free = coordinates - (FRAME * self.segments.len()) as f64;
         if free > 0.0 { (coordinates / free).sqrt() } else { 1.0 }
     }
 
-    /// Distances between the ends of the loops.
+    /// Position gaps of the loops, in metres.
     pub(super) fn gaps_m(&self, solution: &PoseLoopSolution) -> Vec<f64> {
         let state = LoopState {
             chain: solution.chain.clone(),
@@ -232,7 +232,7 @@ impl PoseLoops<'_> {
         predicted.translation_m - state.frames[segment].world_from_camera(&measured.segment_from_camera).translation_m
     }
 
-    /// The whitened loop of one pair, linearized.
+    /// Whitened residual and Jacobian rows of one pair.
     pub(super) fn rows(&self, state: &LoopState, segment: usize, pair: usize, noise: &LoopNoise) -> PairRows {
         let measured = &self.segments[segment][pair];
         let frame = &state.frames[segment];
@@ -285,7 +285,7 @@ impl PoseLoops<'_> {
         cost
     }
 
-    /// Adjusts the loops from a state; also returns the steps tried.
+    /// Adjusts the loops from a state; returns the state and the number of tried steps.
     fn adjust(&self, start: LoopState, noise: &LoopNoise) -> (LoopState, usize) {
         let options = DampedOptions {
             iterations: ITERATIONS,
@@ -299,7 +299,8 @@ impl PoseLoops<'_> {
         (solution.estimate, solution.tried)
     }
 
-    /// Covariance of the chain's columns at a state, everything else eliminated; `None` when the equations are singular.
+    /// Covariance of the chain's columns at a state (dof × dof), all other unknowns eliminated; `None` when the
+    /// equations are singular.
     fn covariance(&self, state: &LoopState, noise: &LoopNoise) -> Option<DMatrix<f64>> {
         let mut equations = self.linearize(state, noise);
         equations.eliminate(0.0)?;
@@ -315,7 +316,7 @@ impl PoseLoops<'_> {
         LoopEquations { hessian, gradient, segments }
     }
 
-    /// Normal equations of one segment; what touches the chain alone is added to `hessian` and `gradient`.
+    /// Normal equations of one segment; blocks of the chain alone are added to `hessian` and `gradient`.
     fn segment_equations(
         &self,
         state: &LoopState,
@@ -378,7 +379,7 @@ impl LoopEquations {
     }
 }
 
-/// The pose loops as the damped solver sees them.
+/// The pose loops as a problem of the damped solver.
 struct DampedLoops<'a> {
     loops: &'a PoseLoops<'a>,
     noise: &'a LoopNoise,
@@ -416,7 +417,8 @@ impl DampedProblem for DampedLoops<'_> {
     }
 }
 
-/// A segment's frame when the chain and the readings are taken as they are: mean turn, then unit and place by least squares.
+/// Initial frame of a segment for the given chain and readings: mean rotation, then scale and position by least
+/// squares.
 fn first_frame(pairs: &[PosePair], chain: &Chain) -> SegmentFrame {
     let predicted: Vec<RigidTransform> =
         pairs.iter().map(|pair| pair.world_from_imu * chain.imu_from_camera(&pair.encoder.angles_rad)).collect();
@@ -444,7 +446,7 @@ fn first_frame(pairs: &[PosePair], chain: &Chain) -> SegmentFrame {
         square_m += (pose.translation_m - middle_m).norm_squared();
     }
     let square = square.max(1e-12);
-    // A rotation that is far off may even turn the sign; the ratio of the extents is then the better guess.
+    // A large rotation error may even change the sign; the ratio of the extents is then the better initial value.
     let metres_per_unit =
         if along > 0.3 * (square * square_m).sqrt() { along / square } else { (square_m / square).sqrt() };
     let metres_per_unit = metres_per_unit.max(1e-6);

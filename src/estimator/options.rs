@@ -52,12 +52,12 @@ pub struct EstimatorOptions {
     pub keyframe_new_ratio: f64,
     /// Features whose mean reprojection error exceeds this are rejected, in pixels.
     pub outlier_px: f64,
-    /// Jacobians of states that the prior holds are evaluated where it was linearized, as long as attitude and joint
-    /// angles are no farther from there, in radians; 0 evaluates all at the present estimate.
+    /// Jacobians of states in the prior are evaluated at its linearization point while attitude and joint angles are within
+    /// this distance of it, in radians; 0 evaluates all at the present estimate.
     ///
-    /// First estimates keep what the window cannot see from being learned by mistake. A poor one, as after a start with a
-    /// chain that is degrees off, pulls the solution to a wrong place instead: a hundredth of a radian makes a derivative
-    /// wrong by a percent.
+    /// First-estimate Jacobians prevent spurious information along unobservable directions. With inaccurate first estimates,
+    /// as after a start with a chain error of degrees, they bias the solution: an error of a hundredth of a radian changes a
+    /// derivative by a percent.
     pub first_estimate_reach_rad: f64,
     /// Jacobians of the static calibration are always evaluated at the linearization point of the prior.
     pub calibration_first_estimates: bool,

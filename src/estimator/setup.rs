@@ -1,4 +1,4 @@
-//! What every step reads and none changes: the configuration, and what follows from it.
+//! Constant input of every step: the configuration and derived values.
 
 use nalgebra::Vector3;
 
@@ -14,7 +14,7 @@ pub fn gravity_in_world(gravity_m_per_s2: f64) -> Vector3<f64> {
     Vector3::new(0.0, 0.0, -gravity_m_per_s2)
 }
 
-/// The configuration, and what follows from it.
+/// The configuration and derived values.
 #[derive(Clone, Debug)]
 pub(crate) struct Setup {
     pub(crate) config: EstimatorConfig,
@@ -31,7 +31,7 @@ impl Setup {
         Self { imu_noise, gravity_in_world: gravity_in_world(config.gravity_m_per_s2), config }
     }
 
-    /// Multiplies the noise densities of all IMU intervals to come.
+    /// Scales the noise densities of all following IMU intervals.
     pub(crate) fn scale_imu_noise(&mut self, factor: f64) {
         scale_noise(&mut self.imu_noise, factor);
         scale_noise(&mut self.config.imu_noise, factor);
@@ -42,7 +42,7 @@ impl Setup {
         (self.config.clock_ms)()
     }
 
-    /// The calibration as the rig gives it, before anything is estimated.
+    /// Given calibration of the rig.
     pub(crate) fn given_calibration(&self) -> Calibrations {
         let config = &self.config;
         let given = |camera: usize| {
@@ -66,7 +66,7 @@ impl Setup {
         Calibrations::new(main, rigid)
     }
 
-    /// The encoder angles of so many joints, `None` where they are not used or not usable.
+    /// Encoder angles of the joints, `None` where they are unused or unusable.
     pub(crate) fn encoder_reading(&self, input: &StepInput<'_>, joints: usize) -> Option<JointAngles> {
         self.config.encoder_in_use()?;
         input.encoder_angles(joints).cloned()

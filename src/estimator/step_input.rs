@@ -1,9 +1,9 @@
-//! What one image brings to the estimator.
+//! Input of one step.
 
 use crate::frontend::{TrackedFeature, TrackedFrame};
 use crate::sensors::{ImuSample, JointAngles};
 
-/// What one image brings to the estimator.
+/// Measurements of one image for the estimator.
 #[derive(Clone, Debug)]
 pub struct StepInput<'a> {
     /// Number of the image in its camera's stream.
@@ -14,15 +14,15 @@ pub struct StepInput<'a> {
     pub imu: &'a [ImuSample],
     /// Encoder angles at the stamp with their standard deviations, `None` without encoders.
     pub joint_angles: Option<&'a JointAngles>,
-    /// The tracked features; none where the main camera has no image at this instant.
+    /// Tracked features; none where the main camera has no image in this frame set.
     pub tracks: &'a TrackedFrame,
-    /// Those of [`crate::estimator::EstimatorConfig::rigid_cameras`] at the same instant, in their order; none where an image
-    /// is missing.
+    /// Tracked features of [`crate::estimator::EstimatorConfig::rigid_cameras`] in the same frame set, in their
+    /// order; none where an image is missing.
     pub rigid_tracks: &'a [&'a TrackedFrame],
 }
 
 impl StepInput<'_> {
-    /// The features that a camera observes, the main camera being number 0.
+    /// Features of a camera by its number, the main camera first.
     pub(crate) fn features(&self, camera: usize) -> &[TrackedFeature] {
         match camera.checked_sub(1) {
             None => &self.tracks.features,
@@ -30,7 +30,7 @@ impl StepInput<'_> {
         }
     }
 
-    /// The encoder angles of so many joints, `None` where one is missing, not finite or without a standard deviation.
+    /// Encoder angles of the joints, `None` where one is missing, not finite or without a standard deviation.
     pub(crate) fn encoder_angles(&self, joints: usize) -> Option<&JointAngles> {
         self.joint_angles.filter(|angles| {
             angles.angles_rad.len() == joints

@@ -45,7 +45,7 @@ pub struct PredictionNoise {
     pub chain_rotation_rad: f64,
 }
 
-/// Orientations of base, joints, end effector and camera relative to the IMU at one instant.
+/// Orientations of base, joints, end effector and camera relative to the IMU at one time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChainOrientation {
     /// `imu_from_frame` of the base, of the frame after each joint, and last of the camera: N + 2 of them.

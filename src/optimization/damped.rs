@@ -11,7 +11,7 @@ pub(crate) trait DampedProblem {
     /// The cost, in any unit.
     fn cost(&self, estimate: &Self::Estimate) -> f64;
 
-    /// Linearizes at an estimate; the equations serve every damping that is tried there.
+    /// Linearizes at an estimate; the equations are reused for every damping.
     fn linearize(&self, estimate: &Self::Estimate) -> Self::Equations;
 
     /// The estimate after the step damped by `λ`, `None` when the damped equations are singular.
@@ -21,7 +21,7 @@ pub(crate) trait DampedProblem {
 /// Limits and damping of [`minimize`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct DampedOptions {
-    /// Most steps tried, accepted or not.
+    /// Largest number of tried steps, accepted or not.
     pub(crate) iterations: usize,
     /// Converged when a step lowers the cost by no more than this ratio of it.
     pub(crate) relative_cost_tolerance: f64,
@@ -40,7 +40,7 @@ const SHRINKAGE: f64 = 0.1;
 /// A step that raises the cost by no more than this ratio of it was rejected because of rounding alone.
 const ROUNDING: f64 = 1e-9;
 
-/// Why the solver stopped.
+/// Reason for which the solver stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum StopReason {
     /// The last step lowered the cost by less than the tolerance.
@@ -62,7 +62,7 @@ pub(crate) struct Iteration {
     pub(crate) accepted: bool,
 }
 
-/// Where the solver stopped.
+/// Last estimate.
 #[derive(Clone, Debug)]
 pub(crate) struct DampedSolution<E> {
     pub(crate) estimate: E,
@@ -73,7 +73,7 @@ pub(crate) struct DampedSolution<E> {
     pub(crate) stop: StopReason,
 }
 
-/// Lowers the cost of a problem from `start`.
+/// Minimizes the cost of a problem from `start`.
 pub(crate) fn minimize<P: DampedProblem>(
     problem: &mut P,
     start: P::Estimate,

@@ -28,7 +28,7 @@ impl Cholesky {
         solution
     }
 
-    /// How the leading unknowns follow the last `count` ones, each of those moved by 1: `−A₁₁⁻¹ A₁₂`.
+    /// Response of the leading unknowns to the last `count` ones: `−A₁₁⁻¹ A₁₂`.
     pub(crate) fn leading_response(&self, count: usize) -> DMatrix<f64> {
         let lower = self.0.L();
         let first = lower.nrows() - count;
@@ -115,7 +115,7 @@ const DEPENDENT: f64 = 1e-9;
 pub(crate) struct Echelon {
     /// The rows `[R | Qᵀb]`, as many as `A` has rank: each begins at a column that those above do not make up.
     pub(crate) rows: DMatrix<f64>,
-    /// How many of the rows the leading columns take up.
+    /// Number of rows of the leading columns.
     pub(crate) leading_rank: usize,
 }
 

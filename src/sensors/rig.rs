@@ -108,7 +108,7 @@ pub struct GimbalRig {
     pub encoder_sigma_rad: Option<f64>,
     /// How wrong `chain` may be.
     pub prior: ChainPrior,
-    /// Whether runs in a minimal form go over to its other chart near a lock (`parameterization: auto`).
+    /// Whether runs in a minimal parameterization switch to another one near a singularity (`parameterization: auto`).
     pub switches_parameterization: bool,
     /// The chain in the classical form (Eqs. 5–6), links in order.
     pub chain: ClassicalChain,

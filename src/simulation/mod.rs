@@ -1,8 +1,8 @@
-//! Synthetic flights with known truth, written as flight logs.
+//! Synthetic flights with ground truth, written as flight logs.
 //!
-//! A multirotor follows a smooth aggressive path within its limits, a gimbal under its nose looks around and steadies
-//! the picture with lag, and sensors measure with noise.
-//! Everything follows from a seed; the same options give the same bits whatever the thread count.
+//! A multirotor follows a smooth aggressive path within its limits, a gimbal under its nose looks around and stabilizes
+//! the image with lag, and sensors measure with noise.
+//! All randomness comes from a seed; the same options give the same bits whatever the thread count.
 
 #![cfg_attr(not(feature = "logs"), expect(dead_code, reason = "recorded flights use more than tracks do"))]
 

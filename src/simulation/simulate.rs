@@ -373,7 +373,7 @@ fn given_chain_error(scenario: &Scenario) -> (f64, f64) {
     (sums.0 / count, sums.1 / count)
 }
 
-/// What else is true, as further entries of the truth's YAML.
+/// Further entries of the ground truth's YAML.
 fn ground_truth_notes(options: &SimulationOptions, scenario: &Scenario, chain_error: (f64, f64)) -> String {
     let environment = match options.experiment.environment() {
         super::Environment::House => 1,

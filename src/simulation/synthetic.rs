@@ -97,7 +97,7 @@ impl Default for SyntheticOptions {
     }
 }
 
-/// One frame: what an estimator is given, and the truth beside it.
+/// One frame: the estimator's input and the ground truth.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SyntheticFrame {
     /// Number of the frame.

@@ -72,7 +72,7 @@ pub(crate) const AIR_DRAG_PER_S: f64 = 0.15;
 const CHECK_STEP_S: f64 = 0.02;
 
 impl Trajectory {
-    /// Flies `flight` with the perturbations of a random stream, softened where `limits` would be exceeded, for
+    /// Follows `flight` with the perturbations of a random stream, softened where `limits` would be exceeded, for
     /// `duration_s` seconds.
     pub(crate) fn new(
         flight: &dyn Flight,

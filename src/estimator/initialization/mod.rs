@@ -2,23 +2,23 @@
 //! landmarks in metres.
 //!
 //! [`try_initialize`] is a pure function of its input; call it at frames while waiting, with the frames of the last
-//! [`InitializationOptions::longest_window_s`] seconds. Either it has a solution, or it says what it waits for.
+//! [`InitializationOptions::longest_window_s`] seconds. It returns a solution, or the reasons for waiting.
 //!
-//! How it works, in the order of the checks that it reports:
+//! Steps, in the order of the reported checks:
 //!
-//! 1. *Standstill.* Quiet IMU samples and an unmoving image give the gyroscope's bias and gravity's direction.
+//! 1. *Stationary vehicle.* IMU samples of little variance and a constant image give gyroscope bias and gravity direction.
 //!    An accelerometer's turn-on bias of 0.5 m/s² tilts that direction by 3°, and only motion separates the two.
-//!    So by default a standstill is remembered ([`StationaryEstimate`]) and motion is awaited; with
+//!    By default the estimate is kept ([`StationaryEstimate`]) and the initialization waits for motion; with
 //!    [`StationaryPolicy::InitializeAtOnce`] it initializes right away, with velocity zero and no landmarks: the estimator
 //!    then has to find depths itself once there is parallax, and must give the accelerometer's bias its full prior.
 //! 2. *Selection.* A dozen views, spaced by parallax and time, so that a hover before the motion is represented by few of
 //!    them: these few bind tilt and accelerometer bias together, which makes the scale of the motion after it reliable.
-//! 3. *Structure.* Camera poses from the images alone. A gimbal's encoders may be off by many degrees, so they only guess.
-//! 4. *Alignment.* The mount's rotation and the gyroscope's bias from rotations; scale, gravity of exact magnitude,
+//! 3. *Structure.* Camera poses from the images alone. Encoders may have errors of many degrees: they only give initial values.
+//! 4. *Alignment.* Rotation of the extrinsics and gyroscope bias from rotations; scale, gravity of exact magnitude,
 //!    velocities and accelerometer bias from a linear system.
 //! 5. *Refinement.* All of it together with the IMU covariances, the calibration's error included as unknowns with priors.
 //! 6. *Acceptance.* Residuals, and the standard deviations of scale, velocity and gravity from the refined problem.
-//!    These decide: constant velocity, hover and pure rotation have no small standard deviation of the scale.
+//!    Constant velocity, hover and pure rotation fail here: their standard deviation of the scale is large.
 //!
 //! The world has z up, its origin at the IMU of the first view, and no yaw there.
 

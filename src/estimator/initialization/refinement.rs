@@ -1,9 +1,9 @@
-//! One adjustment of everything with images and IMU together: poses, velocities, biases, gravity, the mount.
+//! Joint adjustment of images and IMU samples: poses, velocities, biases, gravity, extrinsics.
 //!
 //! The IMU frame of the first view is the frame of reference, so there is no gauge freedom left; gravity is a direction in
 //! it with known magnitude.
-//! The mount is the given one with an error that all views share (a rotation on the IMU's side and a shift) and, on a
-//! gimbal, a rotation of its own in each view: `R = shared·given·own`. Every rotation is perturbed on the right.
+//! The extrinsics are the given ones with an error that all views share (a rotation on the IMU's side and a translation)
+//! and, on a gimbal, an independent rotation per view: `R = common·given·view`. Every rotation is perturbed on the right.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix3x2, SMatrix, SVector, UnitQuaternion, Vector3, Vector6};
 

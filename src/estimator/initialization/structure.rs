@@ -282,7 +282,7 @@ struct GrowingMap<'a> {
 }
 
 impl GrowingMap<'_> {
-    /// Triangulates every feature that a view holds, anew, from all views placed so far; the others stay as they are, as
+    /// Triangulates every feature of a view again from all views placed so far; the others stay as they are, as
     /// their views are the same.
     fn triangulate_seen_in(&mut self, view: usize) {
         for (id, observations) in self.tracks {

@@ -1,8 +1,8 @@
 //! Reprojection of anchored features in a handful of views: cost and normal equations over the camera poses.
 //!
 //! The residual is the angle error in the tangent plane of each measured bearing, divided by its standard deviation.
-//! The anchor's bearing is a measurement like the others: taking it as exact would make views that anchor many features
-//! look several times better known than they are, and with them the gyroscope's bias.
+//! The anchor's bearing is a measurement like the others: treating it as exact would make views with many anchors, and
+//! with them the gyroscope bias, several times overconfident.
 
 use nalgebra::{Vector2, Vector3};
 

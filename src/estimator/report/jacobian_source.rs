@@ -95,7 +95,7 @@ pub struct FactorRows {
 /// Where residuals come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum JacobianFactor {
-    /// The reprojections of a feature, two rows a observation.
+    /// The reprojections of a feature, two rows per observation.
     Feature(crate::frontend::FeatureId),
     /// The IMU samples between two frames, by the frames' numbers.
     Imu {

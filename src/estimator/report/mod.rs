@@ -1,6 +1,6 @@
-//! The immutable report that every step leaves behind: plain values with public fields, by subject.
+//! Immutable reports of the steps: plain values with public fields, by subject.
 //!
-//! A report holds everything that panels, tables and the observability analysis ask for; making one is the window's business.
+//! A report has all data for panels, tables and the observability analysis; the window creates it.
 
 mod allocation;
 pub(crate) mod columns;

@@ -1,4 +1,4 @@
-//! Everything there is to know about one step: window, calibration, features, residuals, times.
+//! Report of one step: window, calibration, features, residuals, times.
 
 use nalgebra::Vector3;
 
@@ -11,7 +11,7 @@ use super::residuals::{IterationReport, ResidualSummary};
 use crate::geometry::RigidTransform;
 use crate::gimbal::{ClassicalChain, ParameterId, Parameterization, Singularity};
 
-/// Where the estimator is in its life.
+/// Phase of the estimator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phase {
     /// Waiting for enough motion, or for a stationary vehicle.
@@ -21,7 +21,7 @@ pub enum Phase {
 }
 
 impl Phase {
-    /// One word for panels and tables.
+    /// Name in panels and tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Initializing => "initializing",
@@ -35,9 +35,9 @@ impl Phase {
 pub struct FrameStateReport {
     /// Number of the image in its camera's stream.
     pub frame_index: usize,
-    /// Its stamp since the log began.
+    /// Stamp of the image since the log started.
     pub stamp_ns: i64,
-    /// Pose.
+    /// Estimated pose of the vehicle.
     pub world_from_imu: RigidTransform,
     /// Velocity in the world.
     pub velocity_m_per_s: Vector3<f64>,
@@ -45,13 +45,13 @@ pub struct FrameStateReport {
     pub accelerometer_bias_m_per_s2: Vector3<f64>,
     /// Gyroscope bias in the IMU frame.
     pub gyroscope_bias_rad_per_s: Vector3<f64>,
-    /// Joint angles as estimated (without the static offsets), empty for a rigid camera.
+    /// Estimated joint angles (without the static offsets), empty for a rigid camera.
     pub joint_angles_rad: Vec<f64>,
     /// Encoder angles at the stamp, `None` without encoders.
     pub encoder_angles_rad: Option<Vec<f64>>,
-    /// Their standard deviations, from the noise of the readings and how many could be averaged.
+    /// Their standard deviations, from the noise of the readings and the number of averaged readings.
     pub encoder_sigmas_rad: Option<Vec<f64>>,
-    /// Pose of the camera on the IMU at these joint angles.
+    /// Camera pose in the IMU frame at the estimated joint angles.
     pub imu_from_camera: RigidTransform,
     /// Whether it is a keyframe.
     pub keyframe: bool,
@@ -75,8 +75,7 @@ pub struct CalibrationEstimate {
     pub classical: ClassicalChain,
     /// Margins to the parameterization's singularities: base, end, then |sin alpha| of each middle link.
     pub margins: Vec<(Singularity, f64)>,
-    /// The rigid cameras that are watched beside the main one, with their poses on the IMU; their columns follow the
-    /// chain's.
+    /// Further rigid cameras with their extrinsics; their columns follow the chain's.
     pub rigid_cameras: Vec<(String, RigidTransform)>,
 }
 
@@ -99,30 +98,30 @@ pub struct StageTimes {
     pub step_ms: f64,
 }
 
-/// Everything there is to know about one step.
+/// Result of one step of the estimator.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StepReport {
     /// Number of the image in its camera's stream.
     pub frame_index: usize,
-    /// Its stamp since the log began.
+    /// Stamp of the image since the log started.
     pub stamp_ns: i64,
-    /// Where the estimator is in its life.
+    /// Phase of the estimator.
     pub phase: Phase,
-    /// How often it has restarted so far.
+    /// Number of restarts so far.
     pub restarts: usize,
-    /// Standard deviation of a well tracked pixel that it counts with, per coordinate.
+    /// Assumed standard deviation of a well tracked pixel, per coordinate.
     pub pixel_sigma_px: f64,
-    /// The same with the robust weights of this step: the one that carries as much information as its pixels do on average.
+    /// Standard deviation of a pixel with the same average information, robust weights of this step included.
     pub effective_pixel_sigma_px: f64,
-    /// What happened.
+    /// Events of the step.
     pub events: Vec<Event>,
     /// The frames of the window after the solve, oldest first; empty while initializing.
     pub window: Vec<FrameStateReport>,
     /// The static calibration (the given one while initializing).
     pub calibration: CalibrationEstimate,
-    /// Features that took part in the solve.
+    /// Features of the solve.
     pub features: Vec<FeatureReport>,
-    /// How many they are.
+    /// Numbers of features.
     pub counts: FeatureCounts,
     /// Points of the map in the world.
     pub landmarks: Vec<LandmarkReport>,
@@ -132,25 +131,25 @@ pub struct StepReport {
     pub reprojection_rms_before_px: f64,
     /// The same after the solve.
     pub reprojection_rms_after_px: f64,
-    /// Median length of those after the solve, which a few bad tracks do not lead; not-a-number without any.
+    /// Median length of the residuals after the solve, robust against outliers; NaN without residuals.
     pub reprojection_median_after_px: f64,
     /// The solver's iterations.
     pub iterations: Vec<IterationReport>,
-    /// The linearization, when it was asked for and the estimator is tracking.
+    /// The linearization, when it was requested and the estimator is tracking.
     pub linearization: Option<Linearization>,
-    /// What the blocks of the Jacobian can be written out from ([`StepReport::jacobian`]), when the linearization was asked
-    /// for and the estimator is tracking.
+    /// Source of the Jacobian's blocks ([`StepReport::jacobian`]), when the linearization was requested and the
+    /// estimator is tracking.
     pub jacobian_source: Option<JacobianSource>,
-    /// The rows of the factors that are not of features, when they were asked for and the estimator is tracking.
+    /// Rows of the factors without a feature, when they were requested and the estimator is tracking.
     pub factor_rows: Option<Vec<FactorRows>>,
-    /// Information gain of the newest image about the calibration, when the linearization was asked for and the estimator
-    /// is tracking: nothing unless it becomes a keyframe, since another image is dropped again.
+    /// Information gain of the newest image about the calibration, when the linearization was requested and the
+    /// estimator is tracking; zero for an image that is no keyframe, since it is dropped.
     pub gain: Option<InformationGain>,
     /// Whether the frame is a keyframe.
     pub keyframe: bool,
     /// Stage timings (the only part of a report that differs between replays).
     pub times: StageTimes,
-    /// What went wrong without stopping the step.
+    /// Problems that did not stop the step.
     pub warnings: Vec<String>,
 }
 

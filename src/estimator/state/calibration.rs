@@ -1,19 +1,19 @@
-//! The static calibration as the window estimates it: the gimbal's chain, how wrong it may be, and where the
-//! marginalization prior was linearized.
+//! The estimated static calibration: the gimbal's chain with its prior, and the linearization point of the
+//! marginalization prior.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::{Chain, ChainLinearization, ClassicalChain, NearestForm, ParameterId, Parameterization, transport};
 
-/// How wrong the given chain may be, as standard deviations of every number of its classical form.
+/// Prior standard deviations of the given chain, for every parameter of its classical form.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct GivenSigmas {
     pub(crate) translation_m: f64,
     pub(crate) rotation_rad: f64,
 }
 
-/// What the rig says about the chain.
+/// Given chain with its prior.
 #[derive(Clone, Debug)]
 struct GivenChain {
     classical: ClassicalChain,
@@ -24,23 +24,23 @@ struct GivenChain {
     square_root_information: DMatrix<f64>,
 }
 
-/// Standard deviation of a clock's offset beyond what the rig says, in seconds: transport and exposure delay an image by
-/// a frame's length at most.
+/// Prior standard deviation of a time offset relative to the rig, in seconds: transport and exposure delay an
+/// image by a frame period at most.
 const CLOCK_SIGMA_S: f64 = 0.02;
 
-/// Which clocks are compared with the IMU's.
+/// Estimated time offsets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum FreeClocks {
-    /// All are taken to agree.
+    /// None.
     None,
-    /// The camera's.
+    /// That of the camera.
     Camera,
-    /// The camera's and the encoders'.
+    /// Those of camera and encoders.
     CameraAndEncoders,
 }
 
 impl FreeClocks {
-    /// The offsets, in the order of their columns behind the chain's; the camera is taken for the main one.
+    /// Time offsets in the order of their columns after the chain's, as parameters of the main camera.
     fn parameters(self) -> &'static [ParameterId] {
         const ALL: [ParameterId; 2] = [ParameterId::timeshift(0), ParameterId::ENCODER_TIMESHIFT];
         match self {
@@ -51,12 +51,12 @@ impl FreeClocks {
     }
 }
 
-/// The numbers that are estimated.
+/// Estimated values.
 #[derive(Clone, Debug)]
 struct Values {
     chain: Chain,
-    /// Offsets of the clocks beyond what the rig says, in seconds: the IMU's time is the stamp plus this. The
-    /// camera's, then the encoders'; as many as are estimated.
+    /// Estimated time offsets relative to the rig, in seconds: IMU time is the stamp plus the offset. The camera's,
+    /// then the encoders'.
     clocks_s: DVector<f64>,
 }
 
@@ -79,17 +79,17 @@ impl Values {
     }
 }
 
-/// The chain and the offsets of the clocks, free or fixed.
+/// A chain with its time offsets, free or fixed.
 #[derive(Clone, Debug)]
 pub(crate) struct Calibration {
     values: Values,
     given: GivenChain,
     clocks: FreeClocks,
-    /// What the rig says the camera's clock is off by: stamps have it in them already.
+    /// Time offset of the camera in the given rig: stamps already include it.
     given_timeshift_s: f64,
     first_estimate: Option<Values>,
     free: bool,
-    /// Parameters that are fixed at their values; the parameterization may change.
+    /// Parameters fixed at their values; the parameterization may change.
     frozen: Vec<ParameterId>,
 }
 
@@ -115,7 +115,7 @@ impl Calibration {
         }
     }
 
-    /// The same with offsets of clocks beside the chain; a calibration that is fixed has none.
+    /// Adds time offsets; a fixed calibration has none.
     pub(crate) fn with_clocks(self, clocks: FreeClocks, given_timeshift_s: f64) -> Self {
         let clocks = if self.free { clocks } else { FreeClocks::None };
         let clocks_s = DVector::zeros(clocks.parameters().len());
@@ -126,22 +126,22 @@ impl Calibration {
         &self.values.chain
     }
 
-    /// Offset of the camera's clock beyond what the rig says: it saw an image so many seconds after its stamp.
+    /// Time offset of the camera relative to the rig, in seconds: exposure time minus stamp.
     pub(crate) fn camera_shift_s(&self) -> f64 {
         self.values.clocks_s.get(0).copied().unwrap_or(0.0)
     }
 
-    /// Its column among the calibration's.
+    /// Column of the camera's time offset.
     pub(crate) fn camera_shift_column(&self) -> Option<usize> {
         (self.clocks != FreeClocks::None).then(|| self.chain().dof())
     }
 
-    /// Offset of the encoders' clock: their readings belong to so many seconds after their stamps.
+    /// Time offset of the encoders, in seconds: measurement time minus stamp.
     pub(crate) fn encoder_shift_s(&self) -> f64 {
         self.values.clocks_s.get(1).copied().unwrap_or(0.0)
     }
 
-    /// Its column among the calibration's.
+    /// Column of the encoders' time offset.
     pub(crate) fn encoder_shift_column(&self) -> Option<usize> {
         (self.clocks == FreeClocks::CameraAndEncoders).then(|| self.chain().dof() + 1)
     }
@@ -153,14 +153,14 @@ impl Calibration {
         parameters
     }
 
-    /// Values of all columns; the camera's clock as Kalibr's `timeshift_cam_imu`.
+    /// Values of all columns; the camera's time offset as Kalibr's `timeshift_cam_imu`.
     pub(crate) fn values(&self) -> Vec<f64> {
         let given = [self.given_timeshift_s, 0.0];
         let clocks = self.values.clocks_s.iter().zip(given).map(|(shift_s, given_s)| given_s + shift_s);
         self.chain().values().iter().copied().chain(clocks).collect()
     }
 
-    /// Holds a parameter at its value from now on.
+    /// Fixes a parameter at its present value.
     pub(crate) fn freeze(&mut self, column: usize) {
         let parameter = self.parameters()[column];
         if !self.frozen.contains(&parameter) {
@@ -168,7 +168,7 @@ impl Calibration {
         }
     }
 
-    /// Holds the same parameters as another one.
+    /// Fixes the same parameters as another calibration.
     pub(crate) fn freeze_as(&mut self, other: &Self) {
         self.frozen.clone_from(&other.frozen);
     }
@@ -191,7 +191,7 @@ impl Calibration {
         self.chain().joint_count()
     }
 
-    /// Pose of the camera at a frame's joint angles, which a rigid mount does not follow.
+    /// Returns `imu_from_camera` at a frame's joint angles; a rigid camera ignores them.
     pub(crate) fn imu_from_camera(&self, joints_rad: &[f64]) -> RigidTransform {
         self.chain().imu_from_camera(self.own(joints_rad))
     }
@@ -200,7 +200,8 @@ impl Calibration {
         &joints_rad[..self.joint_count().min(joints_rad.len())]
     }
 
-    /// Pose of the camera with its derivatives by the free columns and by the joints; clocks do not move the mount.
+    /// Returns `imu_from_camera` with its derivatives with respect to the free columns and the joint angles; those
+    /// of time offsets are zero.
     pub(crate) fn linearize(&self, joints_rad: &[f64]) -> ChainLinearization {
         let mut linearization = self.chain().linearize(self.own(joints_rad));
         if linearization.by_parameters.ncols() != self.dof() {
@@ -209,7 +210,7 @@ impl Calibration {
         linearization
     }
 
-    /// A step of the solver, counted from the first estimate where there is one.
+    /// Applies a step of the solver, counted from the first estimate where there is one.
     pub(crate) fn stepped(&self, delta: &[f64]) -> Self {
         if !self.free {
             return self.clone();
@@ -221,18 +222,19 @@ impl Calibration {
         Self { values, ..self.clone() }
     }
 
-    /// `x ⊟ x₀`, `None` without a first estimate.
+    /// Returns `x ⊟ x₀` (free columns), `None` without a first estimate.
     pub(crate) fn first_estimate_offset(&self) -> Option<DVector<f64>> {
         self.first_estimate.as_ref().map(|first| self.values.minus(first))
     }
 
-    /// The calibration at the first estimate, or as it is.
+    /// Returns the calibration at the first estimate, or the present one without it.
     pub(crate) fn at_first_estimate(&self) -> Self {
         let values = self.first_estimate.as_ref().unwrap_or(&self.values).clone();
         Self { values, ..self.clone() }
     }
 
-    /// The prior holds the calibration (keep the first estimate, or take the present one), or holds it no more.
+    /// Keeps the first estimate, or takes the present one, while the prior has calibration columns; drops it
+    /// otherwise.
     pub(crate) fn keep_first_estimate(&mut self, in_prior: bool) {
         self.first_estimate = match self.first_estimate.take() {
             Some(first) if in_prior => Some(first),
@@ -241,17 +243,17 @@ impl Calibration {
         };
     }
 
-    /// Whitened difference from the given chain and from clocks without offset, one row per column.
+    /// Whitened prior residual: difference from the given chain, and time offsets; one row per column.
     pub(crate) fn prior_residual(&self) -> DVector<f64> {
         let chain = &self.given.square_root_information * self.chain().minus(&self.given.chain);
         let clocks = self.values.clocks_s.iter().map(|shift_s| shift_s / CLOCK_SIGMA_S);
         DVector::from_iterator(self.values.dof(), chain.iter().copied().chain(clocks))
     }
 
-    /// Its derivative by a step.
+    /// Derivative of the prior residual with respect to a step (columns × columns).
     ///
-    /// For rotation blocks the logarithm of the difference rotates with the difference itself, and a step counts from the
-    /// first estimate; the inner blocks of `poe` are taken as flat.
+    /// For rotation blocks the logarithm of the difference rotates with the difference itself, and a step counts
+    /// from the first estimate; the inner blocks of `poe` count as flat.
     pub(crate) fn prior_jacobian(&self) -> DMatrix<f64> {
         let (all, chain) = (self.values.dof(), self.chain().dof());
         let mut jacobian = self.given.square_root_information.clone().resize(all, all, 0.0);
@@ -285,13 +287,14 @@ impl Calibration {
         self.given.prior_sigmas.iter().copied().chain(clocks)
     }
 
-    /// Moves to the truth of a test.
+    /// Sets the ground truth in a test.
     #[cfg(test)]
     pub(crate) fn set_chain(&mut self, chain: Chain) {
         self.values.chain = chain;
     }
 
-    /// Switches to another parameterization; returns how the old columns follow the new ones at the first estimate.
+    /// Switches to another parameterization; returns the derivative of the old columns with respect to the new ones
+    /// at the first estimate.
     pub(crate) fn switch_parameterization(&mut self, parameterization: Parameterization) -> DMatrix<f64> {
         let offsets = !self.chain().hides_joint_offsets();
         let old = &self.first_estimate.as_ref().unwrap_or(&self.values).chain;
@@ -311,10 +314,10 @@ impl Calibration {
 }
 
 impl GivenChain {
-    /// A mechanism in the given chain's form.
+    /// Converts a mechanism to the given chain's parameterization.
     ///
-    /// The classical form can say the same mechanism in many ways. Of them it takes the one nearest to the given numbers,
-    /// in units of their deviations: at any other the rig's prior would pull.
+    /// The classical form has many values for the same mechanism. The values nearest to the given ones are used, in
+    /// units of their standard deviations: at any others the rig's prior would pull.
     fn form_of(&self, mechanism: &Chain) -> Chain {
         NearestForm::new(self.chain.clone(), &self.prior_sigmas).of(mechanism)
     }
@@ -329,7 +332,7 @@ impl GivenChain {
         let chain = if joint_offsets { whole } else { whole.without_joint_offsets() };
         let covariance = chain.prior_covariance(classical, sigmas.translation_m, sigmas.rotation_rad);
         let prior_sigmas = covariance.diagonal().map(|variance| variance.max(0.0).sqrt());
-        // A column that the prior fixes entirely would make the covariance singular.
+        // A column that the prior fixes would make the covariance singular.
         let floor = 1e-12;
         let mut regular = covariance;
         for k in 0..regular.nrows() {

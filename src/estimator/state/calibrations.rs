@@ -1,4 +1,4 @@
-//! The static calibrations of all cameras that are watched, their free columns side by side.
+//! Static calibrations of all cameras with adjacent free columns.
 
 use std::ops::Range;
 
@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 use super::calibration::Calibration;
 use crate::gimbal::{ParameterId, Parameterization};
 
-/// The camera whose mount may have joints: the first one. Its image is shown, its calibration has the first columns.
+/// Index of the main camera, which may have joints. Its image is shown, its calibration has the first columns.
 pub(crate) const MAIN: usize = 0;
 
 /// The calibrations by camera, the main camera's first.
@@ -15,7 +15,7 @@ pub(crate) const MAIN: usize = 0;
 pub(crate) struct Calibrations(Vec<Calibration>);
 
 impl Calibrations {
-    /// The main camera's calibration and those of the rigid cameras beside it.
+    /// Collects the main camera's calibration and those of the further rigid cameras.
     pub(crate) fn new(main: Calibration, rigid: impl IntoIterator<Item = Calibration>) -> Self {
         Self(std::iter::once(main).chain(rigid).collect())
     }
@@ -33,12 +33,13 @@ impl Calibrations {
         &mut self.0[camera]
     }
 
-    /// The camera that the window begins with: a rigid one where there is one, since its mount is known best.
+    /// Camera with which the window starts: a rigid one if there is one, since its extrinsics are most accurate.
     pub(crate) fn leading(&self) -> usize {
         self.0.iter().position(|calibration| calibration.joint_count() == 0).unwrap_or(MAIN)
     }
 
-    /// The parameters of all columns, free or not: the main camera's chain and clocks, then those of the rigid cameras.
+    /// Parameters of all columns, free or not: the main camera's chain and time offsets, then those of the rigid
+    /// cameras.
     pub(crate) fn parameters(&self) -> Vec<ParameterId> {
         let of = |(camera, one): (usize, &Calibration)| {
             one.parameters().into_iter().map(move |parameter| parameter.of_camera(camera as u8))
@@ -51,13 +52,13 @@ impl Calibrations {
         self.0.iter().map(Calibration::dof).sum()
     }
 
-    /// Columns of one camera among those of all.
+    /// Range of one camera's columns.
     pub(crate) fn columns(&self, camera: usize) -> Range<usize> {
         let start = self.0[..camera].iter().map(Calibration::dof).sum();
         start..start + self.0[camera].dof()
     }
 
-    /// Columns that are fixed at their values.
+    /// Columns fixed at their values.
     pub(crate) fn frozen_columns(&self) -> Vec<usize> {
         let of_camera = |camera: usize| {
             let start = self.columns(camera).start;
@@ -66,19 +67,19 @@ impl Calibrations {
         (0..self.cameras()).flat_map(of_camera).collect()
     }
 
-    /// Holds the same parameters as others.
+    /// Fixes the same parameters as others.
     pub(crate) fn freeze_as(&mut self, others: &Self) {
         for (one, other) in self.0.iter_mut().zip(&others.0) {
             one.freeze_as(other);
         }
     }
 
-    /// A step of the solver, counted from the first estimates where there are any.
+    /// Applies a step of the solver, counted from the first estimates where there are any.
     pub(crate) fn stepped(&self, delta: &[f64]) -> Self {
         Self(self.0.iter().enumerate().map(|(camera, one)| one.stepped(&delta[self.columns(camera)])).collect())
     }
 
-    /// `x ⊟ x₀`, zero for a camera without a first estimate; `None` when no camera has one.
+    /// Returns `x ⊟ x₀` (free columns), zero for a camera without a first estimate; `None` when no camera has one.
     pub(crate) fn first_estimate_offset(&self) -> Option<DVector<f64>> {
         let offsets: Vec<_> = self.0.iter().map(Calibration::first_estimate_offset).collect();
         if offsets.iter().all(Option::is_none) {
@@ -94,13 +95,13 @@ impl Calibrations {
         Some(first_estimate_offset)
     }
 
-    /// The calibrations at their first estimates, or as they are.
+    /// Returns the calibrations at their first estimates, or the present ones.
     pub(crate) fn at_first_estimate(&self) -> Self {
         Self(self.0.iter().map(Calibration::at_first_estimate).collect())
     }
 
-    /// Cameras whose columns the marginalization prior holds keep their first estimate, or take the present one; the others
-    /// have none.
+    /// Cameras with columns in the marginalization prior keep their first estimate, or take the present one; the
+    /// others have none.
     pub(crate) fn keep_first_estimates(&mut self, prior_holds: impl Fn(&Range<usize>) -> bool) {
         for camera in 0..self.cameras() {
             let columns = self.columns(camera);
@@ -108,13 +109,13 @@ impl Calibrations {
         }
     }
 
-    /// Whitened deviations from what the rig says.
+    /// Whitened prior residuals of all cameras.
     pub(crate) fn prior_residual(&self) -> DVector<f64> {
         let offsets: Vec<DVector<f64>> = self.free().map(|(_, one)| one.prior_residual()).collect();
         DVector::from_iterator(self.dof(), offsets.iter().flat_map(DVector::iter).copied())
     }
 
-    /// Their derivative by a step.
+    /// Derivative of the prior residuals with respect to a step.
     pub(crate) fn prior_jacobian(&self) -> DMatrix<f64> {
         let mut jacobian = DMatrix::zeros(self.dof(), self.dof());
         for (camera, one) in self.free() {
@@ -128,8 +129,8 @@ impl Calibrations {
         self.0.iter().enumerate().filter(|(_, one)| one.dof() > 0)
     }
 
-    /// Switches the main camera's chain to another parameterization; returns how the old columns follow the new ones at
-    /// the first estimate.
+    /// Switches the main camera's chain to another parameterization; returns the derivative of the old columns with
+    /// respect to the new ones at the first estimate.
     pub(crate) fn switch_parameterization(&mut self, parameterization: Parameterization) -> DMatrix<f64> {
         let old_from_new = self.0[MAIN].switch_parameterization(parameterization);
         let (old, main) = (old_from_new.nrows(), old_from_new.ncols());

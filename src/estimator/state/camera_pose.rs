@@ -1,4 +1,4 @@
-//! Where the cameras are, and how that follows the unknowns of the window.
+//! Camera poses and their derivatives with respect to the unknowns of the window.
 
 use std::borrow::Cow;
 
@@ -11,20 +11,20 @@ use crate::geometry::so3;
 use crate::gimbal::{Chain, ChainLinearization};
 use crate::optimization::CameraPose;
 
-/// A camera's place on the vehicle and how its clock is off.
+/// Extrinsics and time offset of a camera.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct CameraExtrinsics<'a> {
     pub(crate) chain: &'a Chain,
-    /// Columns of the calibration, those of clocks behind the chain's; none when it is fixed.
+    /// Number of calibration columns, time offsets after the chain; zero when fixed.
     pub(crate) columns: usize,
-    /// The camera saw an image so many seconds after its stamp.
+    /// Time offset in seconds: exposure time minus stamp.
     pub(crate) shift_s: f64,
-    /// Column of that offset.
+    /// Column of the time offset.
     pub(crate) shift_column: Option<usize>,
 }
 
 impl CameraExtrinsics<'_> {
-    /// A rigid camera does not follow the joints.
+    /// A rigid camera ignores the joints.
     fn own<'j>(&self, joints_rad: &'j [f64]) -> &'j [f64] {
         &joints_rad[..self.chain.joint_count().min(joints_rad.len())]
     }
@@ -39,7 +39,7 @@ impl CameraExtrinsics<'_> {
 }
 
 impl Calibration {
-    /// The camera's place on the vehicle.
+    /// Extrinsics and time offset of the camera.
     pub(crate) fn extrinsics(&self) -> CameraExtrinsics<'_> {
         CameraExtrinsics {
             chain: self.chain(),
@@ -50,20 +50,20 @@ impl Calibration {
     }
 }
 
-/// Pose of the camera at a state: the IMU's pose and the mount at the state's joint angles, when the camera's clock says
-/// the frame's stamp.
+/// Returns `world_from_camera` at a state: the IMU pose and the extrinsics at the state's joint angles, both
+/// shifted by the time offset.
 pub(crate) fn at(state: &FrameState, calibration: &Calibration) -> CameraPose {
     at_extrinsics(state, &calibration.extrinsics())
 }
 
-/// [`at`] for a mount.
+/// [`at`] for given extrinsics.
 pub(crate) fn at_extrinsics(state: &FrameState, extrinsics: &CameraExtrinsics<'_>) -> CameraPose {
     let state = &*when_seen(state, extrinsics.shift_s);
     let pose = state.navigation.world_from_imu * extrinsics.chain.imu_from_camera(extrinsics.own(&state.joints_rad));
     CameraPose { rotation: pose.rotation_matrix(), position_m: pose.translation_m }
 }
 
-/// The state at which the camera took its image, `shift_s` after the stamp.
+/// State at the exposure, `shift_s` after the stamp.
 pub(crate) fn when_seen(state: &FrameState, shift_s: f64) -> Cow<'_, FrameState> {
     if shift_s == 0.0 { Cow::Borrowed(state) } else { Cow::Owned(state.later(shift_s)) }
 }
@@ -73,25 +73,25 @@ pub(crate) fn by_slot(frames: &[FrameState], calibration: &Calibration) -> Vec<C
     frames.iter().map(|state| at(state, calibration)).collect()
 }
 
-/// How the camera poses follow the unknowns, by slot: `[φ; δt]` of `world_from_camera`.
+/// Derivatives of `[φ; δt]` of `world_from_camera` with respect to the unknowns, by slot.
 #[derive(Clone, Debug)]
 pub(crate) struct CameraMaps {
-    /// 6 × (6 + N), by pose and joints of the frame.
+    /// 6 × (6 + N), with respect to pose and joints of the frame.
     pub(crate) own: Vec<DMatrix<f64>>,
-    /// 6 × the camera's own calibration.
+    /// 6 × columns, with respect to the camera's calibration.
     pub(crate) calibration: Vec<DMatrix<f64>>,
 }
 
 impl CameraMaps {
-    /// The maps at these states and this calibration.
+    /// Derivatives at these states and this calibration.
     pub(crate) fn new(frames: &[FrameState], calibration: &Calibration) -> Self {
         Self::of_extrinsics(frames, &calibration.extrinsics())
     }
 
-    /// [`Self::new`] for a mount.
+    /// [`Self::new`] for given extrinsics.
     ///
-    /// That a clock's offset multiplies velocity and gyroscope bias is left out: a centisecond of a bias' change moves
-    /// nothing.
+    /// The derivative of a time offset with respect to velocity and gyroscope bias is neglected: a bias change over
+    /// a centisecond has no effect.
     pub(crate) fn of_extrinsics(frames: &[FrameState], extrinsics: &CameraExtrinsics<'_>) -> Self {
         let mut maps = Self { own: Vec::new(), calibration: Vec::new() };
         for stamped in frames {
@@ -103,7 +103,7 @@ impl CameraMaps {
                 by_calibration.set_column(column, &(&own * state.motion()));
             }
             if extrinsics.shift_s != 0.0 {
-                // The attitude that is unknown is the one at the stamp.
+                // The unknown attitude is the one at the stamp.
                 let at_stamp = stamped.navigation.world_from_imu.rotation_matrix();
                 let by_turn = own.fixed_columns::<3>(0) * world_from_imu.tr_mul(&at_stamp);
                 own.fixed_columns_mut::<3>(0).copy_from(&by_turn);
@@ -115,8 +115,8 @@ impl CameraMaps {
     }
 }
 
-/// How the camera's pose follows pose and joints of its frame (6 × (6 + N)) and its calibration (6 × columns), at this
-/// rotation of the vehicle.
+/// Derivatives of the camera pose with respect to pose and joints of its frame (6 × (6 + N)) and to its
+/// calibration (6 × columns), at this rotation of the vehicle.
 pub(crate) fn camera_map(
     world_from_imu: &Matrix3<f64>,
     joints: usize,
@@ -134,7 +134,7 @@ pub(crate) fn camera_map(
         carried.fixed_rows_mut::<3>(3).copy_from(&shift);
         carried
     };
-    // A rigid camera does not follow the joints.
+    // A rigid camera ignores the joints.
     own.columns_mut(POSE, chain.by_joints.ncols()).copy_from(&carried(&chain.by_joints));
     (own, carried(&chain.by_parameters))
 }

@@ -1,4 +1,4 @@
-//! The unknowns of one frame: navigation state and joint angles, with the measured rates that carry them to another instant.
+//! Unknowns of one frame: navigation state and joint angles, with the measured rates for extrapolation.
 
 use std::sync::Arc;
 
@@ -16,21 +16,21 @@ pub(crate) struct FrameState {
     pub(crate) navigation: NavigationState,
     /// Joint angles without the static offsets, in radians.
     pub(crate) joints_rad: Vec<f64>,
-    /// How fast it all turned, as measured.
+    /// Measured rates of attitude and joints.
     pub(crate) rates: Arc<Rates>,
 }
 
-/// What the sensors measured of the motion at a frame's stamp: where a camera was a moment earlier or later.
+/// Measured rates at a frame's stamp, for the time offset of a camera.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Rates {
-    /// What the gyroscope showed, in rad/s.
+    /// Angular velocity of the gyroscope, in rad/s.
     pub(crate) gyroscope_rad_per_s: Vector3<f64>,
-    /// What the encoders say about each joint, in rad/s; empty without readings.
+    /// Joint rates of the encoders, in rad/s; empty without readings.
     pub(crate) joints_rad_per_s: Vec<f64>,
 }
 
 impl Rates {
-    /// The rates at the last of these samples, whose stamp is the frame's.
+    /// Rates at the last of these samples, whose stamp is the frame's.
     pub(crate) fn at(imu: &[ImuSample], encoder: Option<&JointAngles>) -> Arc<Self> {
         let gyroscope_rad_per_s = imu.last().map_or_else(Vector3::zeros, |sample| sample.angular_velocity_rad_per_s);
         let finite = gyroscope_rad_per_s.iter().all(|rate| rate.is_finite());
@@ -41,14 +41,14 @@ impl Rates {
         })
     }
 
-    /// Of one joint, in rad/s; zero where it is not measured.
+    /// Rate of one joint, in rad/s; zero without a measurement.
     pub(crate) fn joint_rad_per_s(&self, joint: usize) -> f64 {
         self.joints_rad_per_s.get(joint).copied().unwrap_or(0.0)
     }
 }
 
 impl FrameState {
-    /// The state so many seconds later, at the rates of this moment.
+    /// Extrapolates the state over a time, at constant rates.
     pub(crate) fn later(&self, seconds: f64) -> Self {
         let mut later = self.clone();
         let rotation_vector = self.body_rate_rad_per_s() * seconds;
@@ -61,7 +61,7 @@ impl FrameState {
         later
     }
 
-    /// Derivative of pose and joints, as [`Layout::camera`] orders them, by time.
+    /// Time derivative of pose and joints, in the order of [`Layout::camera`].
     pub(crate) fn motion(&self) -> DVector<f64> {
         let joints = (0..self.joints_rad.len()).map(|joint| self.rates.joint_rad_per_s(joint));
         let (angular_velocity, velocity) = (self.body_rate_rad_per_s(), self.navigation.velocity_m_per_s);
@@ -73,7 +73,7 @@ impl FrameState {
         self.rates.gyroscope_rad_per_s - self.navigation.bias.gyroscope_rad_per_s
     }
 
-    /// `x ⊞ δ` with `δ` in the order of [`Layout`]: pose, joints, speed and biases.
+    /// `x ⊞ δ` with `δ` in the order of [`Layout`]: pose, joints, velocity and biases.
     pub(crate) fn plus(&self, delta: &[f64]) -> Self {
         let joints = self.joints_rad.len();
         let mut navigation = Vector15::zeros();
@@ -99,14 +99,14 @@ impl FrameState {
         delta
     }
 
-    /// The largest of the turn of the vehicle and those of the joints from another state, in radians.
+    /// Largest rotation of vehicle or joints from another state, in radians.
     pub(crate) fn rotation_from_rad(&self, other: &Self) -> f64 {
         let vehicle = self.navigation.world_from_imu.rotation.angle_to(&other.navigation.world_from_imu.rotation);
         let joints = self.joints_rad.iter().zip(&other.joints_rad);
         joints.map(|(angle, start)| wrap_angle(angle - start).abs()).fold(vehicle, f64::max)
     }
 
-    /// A step of the solver: states that the prior holds count their step from its linearization point, so that the
+    /// Applies a step of the solver: frames in the prior count their step from its linearization point, so that the
     /// prior stays exactly linear.
     pub(crate) fn stepped(&self, first_estimate: Option<&Self>, delta: &[f64]) -> Self {
         let Some(first) = first_estimate else { return self.plus(delta) };

@@ -1,4 +1,4 @@
-//! Where each unknown of the window has its columns.
+//! Column layout of the window.
 
 use std::ops::Range;
 
@@ -27,7 +27,7 @@ impl Layout {
         slot * self.frame_len()..(slot + 1) * self.frame_len()
     }
 
-    /// Pose and joints together: what moves the camera.
+    /// Pose and joints, which move the camera.
     pub(crate) fn camera(&self, slot: usize) -> Range<usize> {
         let start = slot * self.frame_len();
         start..start + POSE + self.joints

@@ -1,6 +1,6 @@
-//! The unknowns of the window (Eq. 7): where each has its columns, the static calibration, and the camera poses that follow.
+//! Unknowns of the window (Eq. 7): column layout, static calibration, and the camera poses that depend on them.
 //!
-//! Values, their steps and their first estimates; no measurement and no solver.
+//! Values, steps and first estimates; no measurements and no solver.
 
 pub(crate) mod calibration;
 pub(crate) mod calibrations;

@@ -1,4 +1,4 @@
-//! Pose, velocity and IMU biases of a frame, and how they are perturbed.
+//! Pose, velocity and IMU biases of a frame with their perturbation.
 //!
 //! Error vectors are ordered `[φ, p, v, b_g, b_a]` (15), with the perturbation rule of [`crate::geometry`].
 
@@ -24,7 +24,7 @@ pub struct ImuBias {
 /// Pose, velocity and IMU biases of the vehicle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct NavigationState {
-    /// Pose.
+    /// Pose `world_from_imu`.
     pub world_from_imu: RigidTransform,
     /// Velocity in the world, in m/s.
     pub velocity_m_per_s: Vector3<f64>,

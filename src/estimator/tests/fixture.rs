@@ -107,7 +107,7 @@ fn flight(gimbal: bool) -> SyntheticFlight {
     })
 }
 
-/// A window of six frames at the truth (landmarks from the noisy tracks), with the given chain.
+/// A window of six frames at the ground truth (landmarks from the noisy tracks), with the given chain.
 pub(super) fn window(parameterization: Parameterization, gimbal: bool, options: EstimatorOptions) -> TestWindow {
     window_of(&flight(gimbal), None, config(&flight(gimbal).given_rig, parameterization, options))
 }

@@ -17,7 +17,7 @@ use crate::gimbal::tests::parameter;
 use crate::optimization::RobustLoss;
 use crate::simulation::{Exercise, JointSwing, SyntheticMotion, SyntheticOptions, VehicleSwing, synthetic_tracks};
 
-/// Windows with a prior, away from the truth.
+/// Windows with a prior, away from the ground truth.
 fn windows() -> Vec<(&'static str, TestWindow)> {
     let options = EstimatorOptions { loss: RobustLoss::None, ..EstimatorOptions::default() };
     let gimbal = |parameterization| fixture::window(parameterization, true, options);

@@ -85,8 +85,8 @@ impl<'a> Landing<'a> {
         self
     }
 
-    /// Stays for a time; returns the ids that the features at rest have got. `creep_m` after so many seconds is how far it
-    /// has moved along x, `ending` the share of the tracks that end in every image and begin anew.
+    /// Adds a stationary phase; returns the new ids of its features. `creep_m` is the translation along x over time,
+    /// `ending` the ratio of tracks that end in every image and restart.
     fn stay(mut self, seconds: f64, ending: f64, creep_m: fn(f64) -> f64) -> (Self, BTreeMap<FeatureId, FeatureId>) {
         let first = &self.flight.frames[0];
         let camera = &self.flight.true_rig.cameras[0].model;
@@ -189,7 +189,7 @@ fn a_landed_vehicle_does_not_drift_and_takes_off_again() {
         // Two seconds of rest are needed to notice it: one of quiet samples, and the landing itself is one.
         let stationary_reports = &reports[landed + 20..landed + 235];
         let reported = stationary_reports.iter().filter(|report| reports_stationary(report)).count();
-        assert!(reported > 200, "{mount:?}: standstill told {reported} times of {}", stationary_reports.len());
+        assert!(reported > 200, "{mount:?}: reported stationary {reported} times of {}", stationary_reports.len());
         let event = stationary_reports[100].events.iter().find(|event| event.kind == EventKind::Stationary).unwrap();
         assert!(event.value.unwrap() < event.threshold.unwrap());
         let place = |report: &StepReport| report.newest().unwrap().world_from_imu.translation_m;

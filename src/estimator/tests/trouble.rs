@@ -213,7 +213,7 @@ fn switch(estimator: &mut Estimator, parameterization: Parameterization) {
     window.state.switch_parameterization(parameterization);
 }
 
-/// The same flight with and without a switch of the chart: the posterior is carried over, not only the values.
+/// The same flight with and without a switch of parameterization: the posterior is transformed, not only the values.
 #[test]
 fn a_switch_of_parameterization_keeps_the_window_estimate() {
     let flight = synthetic_tracks(&SyntheticOptions { duration_s: 9.0, ..options(SyntheticMount::Gimbal, 5) });
@@ -230,7 +230,7 @@ fn a_switch_of_parameterization_keeps_the_window_estimate() {
     let pose = |estimator: &Estimator| estimator.calibration().of(MAIN).imu_from_camera(angles);
     assert!(pose(&stays).minus(&pose(&switches)).norm() < 1e-12);
 
-    // What is known about the chain is the same in either chart.
+    // The posterior of the chain is the same in either parameterization.
     let chain = |estimator: &Estimator| estimator.calibration().of(MAIN).chain().clone();
     let expected = transport_covariance(&chain(&stays), &calibration_covariance(&stays), &chain(&switches));
     let found = calibration_covariance(&switches);
@@ -260,7 +260,7 @@ fn a_parameterization_near_its_singularity_is_switched_once() {
     for frame in &flight.frames {
         if frame.index == 130 {
             assert_eq!(estimator.phase(), Phase::Tracking);
-            // As if the mechanism had come near: the swapped end block locks on this gimbal.
+            // As if the mechanism had come near: the swapped end block is singular on this gimbal.
             switch(&mut estimator, Parameterization::MinimalSwapped);
         }
         let report = step(&mut estimator, frame);

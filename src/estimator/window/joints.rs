@@ -141,7 +141,7 @@ impl WindowState {
     }
 }
 
-/// Variance of an encoder angle: the part of its own, and the part that neighbouring frames share.
+/// Variances of an encoder angle: the independent one, and the one that neighbouring frames share.
 fn variances(encoder: &JointAngles, joint: usize) -> (f64, f64) {
     let bias_variance = encoder.lasting_sigmas_rad[joint].powi(2);
     ((encoder.sigmas_rad[joint].powi(2) - bias_variance).max(0.0), bias_variance)

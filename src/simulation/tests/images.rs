@@ -104,8 +104,8 @@ fn a_pixel_sees_what_its_ray_hits() {
 
 #[test]
 fn textures_do_not_flicker_under_slow_motion() {
-    // Moving by a hundredth of a pixel at a time, a tracked patch must change smoothly: neighbouring pictures are far
-    // more alike than pictures a pixel apart.
+    // Moving by a hundredth of a pixel at a time, a tracked patch must change smoothly: neighbouring images are far
+    // more alike than images a pixel apart.
     let world = world::build(Environment::Town, 1);
     let renderer = Renderer::new(&world);
     let view = View::new(&camera_model(0, Lens::Pinhole, [320, 240]));

@@ -170,8 +170,7 @@ fn check(name: &str, seeds: u64, flight_of: impl Fn(u64) -> FlightOptions, limit
 
 #[test]
 fn rigid_camera_initializes() {
-    // An accelerometer's bias of 0.4 m/s² that hides in the hover tilts gravity by 2.3° (1 σ) until the motion tells.
-    // An accelerometer's bias of 0.4 m/s² that hides in the hover tilts gravity by 2.3° (1 σ) until the motion tells.
+    // An accelerometer bias of 0.4 m/s², unobservable in hover, tilts gravity by 2.3° (1 σ) until the vehicle moves.
     let limits =
         Limits { since_motion_s: 3.5, scale: 0.1, gravity_deg: 4.5, velocity_m_per_s: 0.2, gyroscope_rad_per_s: 0.004 };
     check("rigid", 8, |seed| FlightOptions::new(seed, Motion::Flight).rigid(), &limits);
@@ -246,14 +245,14 @@ fn a_stationary_estimate_is_kept_or_used_at_once() {
     let InitializationOutcome::Waiting { stationary: Some(found), reasons, .. } =
         attempt(&flight, newest, &options, None)
     else {
-        panic!("a standstill without motion waits");
+        panic!("a stationary vehicle waits for motion");
     };
     assert!(reasons.iter().any(|reason| reason.test == "parallax"), "{reasons:?}");
     assert!((found.gyroscope_bias_rad_per_s - flight.gyroscope_bias).norm() < 1e-3);
 
     let at_once = InitializationOptions { stationary_policy: StationaryPolicy::InitializeAtOnce, ..options };
     let InitializationOutcome::Initialized(solution) = attempt(&flight, newest, &at_once, None) else {
-        panic!("a standstill initializes at once when told to");
+        panic!("the policy initializes a stationary vehicle at once");
     };
     assert_eq!(solution.origin, InitializationOrigin::FromStationary);
     let errors = errors(&flight, 0.0, newest, &solution);
@@ -273,7 +272,7 @@ fn equal_input_gives_equal_bits() {
     let options = options_for(&flight_options);
     let (newest, _) = run(&flight, &options).unwrap();
     let InitializationOutcome::Initialized(first) = attempt(&flight, newest, &options, None) else {
-        panic!("no memory of a standstill is needed here");
+        panic!("this flight has no stationary phase");
     };
     let InitializationOutcome::Initialized(second) = attempt(&flight, newest, &options, None) else {
         panic!("the same attempt succeeds again");
