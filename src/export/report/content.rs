@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::ReportOptions;
 use super::inputs::InputFile;
-use super::story::{RankInterval, rank_story};
+use super::rank_intervals::{RankInterval, rank_intervals};
 use crate::export::summary::{RunSummary, log_name};
 use crate::geometry::seconds_from_ns;
 use crate::log_check::CheckReport;
@@ -33,7 +33,8 @@ pub(super) struct RunContent {
     /// The summary, as in `summary.json`.
     pub(super) summary: RunSummary,
     /// Intervals of constant rank.
-    pub(super) rank_story: Vec<RankInterval>,
+    #[serde(rename = "rank_story")]
+    pub(super) rank_intervals: Vec<RankInterval>,
     /// Notable events.
     pub(super) events: Vec<ReportEvent>,
     /// Counts of the frequent kinds of events.
@@ -76,7 +77,7 @@ impl ReportContent {
             RunContent {
                 label: run.spec.label.clone(),
                 summary,
-                rank_story: rank_story(run, &recording.rig),
+                rank_intervals: rank_intervals(run, &recording.rig),
                 events,
                 frequent_events,
             }

@@ -6,7 +6,7 @@ mod content;
 mod html;
 mod inputs;
 mod page;
-mod story;
+mod rank_intervals;
 mod tables;
 
 use std::fs;
@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 
 use content::ReportContent;
 use inputs::InputFile;
-use story::RankInterval;
+use rank_intervals::RankInterval;
 
 use super::error::ExportError;
 use super::run_files::{RunFileOptions, write_run};

@@ -138,7 +138,7 @@ fn run_section(index: usize, run: &RunContent) -> Markup {
 }
 
 fn rank_section(run: &RunContent) -> Markup {
-    let sentences: Vec<String> = run.rank_story.iter().map(RankInterval::sentence).collect();
+    let sentences: Vec<String> = run.rank_intervals.iter().map(RankInterval::sentence).collect();
     let known = run.summary.rank.iter().flat_map(|rank| &rank.known);
     let known: Vec<String> =
         known.map(|known| format!("{} (null in {} of {} steps)", known.reason, known.agreeing, known.steps)).collect();

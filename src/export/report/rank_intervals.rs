@@ -70,7 +70,7 @@ fn most_frequent<T: Ord + Clone>(items: impl Iterator<Item = T>) -> Option<T> {
 }
 
 /// The intervals of a run in time order.
-pub(super) fn rank_story(run: &RunRecord, rig: &Rig) -> Vec<RankInterval> {
+pub(super) fn rank_intervals(run: &RunRecord, rig: &Rig) -> Vec<RankInterval> {
     let ranked: Vec<(i64, &RankReport)> =
         run.steps.iter().filter_map(|step| Some((step.report.stamp_ns, step.rank.as_ref()?))).collect();
     let names = rig.parameter_names();
