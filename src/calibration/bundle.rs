@@ -62,7 +62,7 @@ pub(super) struct BundleEquations {
     visual: VisualEquations,
     maps: BTreeMap<ViewId, ViewMap>,
     /// IMU rows of two neighbouring frame sets: first column, whitened Jacobian, residual.
-    inertial: Vec<(usize, DMatrix<f64>, Vector15)>,
+    imu: Vec<(usize, DMatrix<f64>, Vector15)>,
     encoders: Vec<EncoderEquation>,
     /// Jacobian and residual of the priors on the first frame set.
     first: (DMatrix<f64>, DVector<f64>),
@@ -195,7 +195,7 @@ impl Bundle<'_> {
         let mut equations = BundleEquations {
             visual: visual::equations(&self.pixels, &poses, self.tracks, &estimate.landmarks),
             maps,
-            inertial: Vec::with_capacity(self.frame_sets.len()),
+            imu: Vec::with_capacity(self.frame_sets.len()),
             encoders: Vec::new(),
             first: self.first_rows(estimate),
             border_hessian: border_rows.tr_mul(&border_rows),
@@ -209,7 +209,7 @@ impl Bundle<'_> {
             let mut rows = DMatrix::zeros(15, 30);
             rows.fixed_columns_mut::<15>(0).copy_from(&(information * by_from));
             rows.fixed_columns_mut::<15>(15).copy_from(&(information * by_to));
-            equations.inertial.push((frame_set, rows, residual));
+            equations.imu.push((frame_set, rows, residual));
         }
         for ((frame_set, joint), information, residual) in self.encoder_terms(estimate) {
             equations.encoders.push(EncoderEquation {
@@ -248,7 +248,7 @@ impl Bundle<'_> {
         let mut band = vec![0.0; columns.band()];
         let mut border = -&equations.border_gradient;
         *matrix.corner_mut() += &equations.border_hessian;
-        for (frame_set, rows, residual) in &equations.inertial {
+        for (frame_set, rows, residual) in &equations.imu {
             let column = |entry: usize| self.navigation_column(frame_set - 1 + entry / 15, entry % 15);
             let hessian = rows.tr_mul(rows);
             let gradient = rows.tr_mul(residual);

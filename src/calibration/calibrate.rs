@@ -52,7 +52,7 @@ pub fn calibrate(
     let mut report_progress = |stage: &'static str, fraction: f64| on_progress(CalibrationProgress { stage, fraction });
     let images = input.static_camera.views.len().max(1) as f64;
     let states = trajectory::estimate_trajectory(&input.static_camera, &input.estimator, &mut |place| {
-        report_progress("flying the static camera", 0.5 * place as f64 / images);
+        report_progress("processing the static camera", 0.5 * place as f64 / images);
     })?;
     let (mut frame_sets, navigation) = frame_sets(input, options, &states);
     let stretch_ns = stretch(&frame_sets);
@@ -141,7 +141,7 @@ pub fn calibrate(
             pixels(&both, Camera::Gimbal).ok_or_else(|| singular(BOTH))?,
         ],
         iterations: [alone.iterations, both.iterations],
-        inertial: imu_residual_report(input, &frame_sets, &both.estimate).ok_or_else(|| singular(BOTH))?,
+        imu: imu_residual_report(input, &frame_sets, &both.estimate).ok_or_else(|| singular(BOTH))?,
         rank: rank(&both, &visited_rad),
         warnings: warnings(counts, &segments, &frame_sets),
         visited_rad,
@@ -202,7 +202,7 @@ fn check_measurements(
         from_s: seconds_from_ns(from_ns),
         to_s: seconds_from_ns(to_ns),
         reason: format!(
-            "of {offered} instants with a gimbal image and encoder readings {broken} had too few common features and \
+            "of {offered} frame sets with a gimbal image and encoder readings {broken} had too few common features and \
              {unsolved} too little parallax"
         ),
     })
@@ -344,7 +344,8 @@ fn warnings(counts: SegmentCounts, segments: &[Segment], frame_sets: &[FrameSet]
     let used: usize = segments.iter().map(|segment| segment.frame_sets.len()).sum();
     let missing = frame_sets.len() - counts.offered;
     if missing > 0 {
-        warnings.push(format!("{missing} of {} instants have no gimbal image with encoder readings", frame_sets.len()));
+        warnings
+            .push(format!("{missing} of {} frame sets have no gimbal image with encoder readings", frame_sets.len()));
     }
     if 2 * used < counts.offered {
         warnings.push(format!(

@@ -107,7 +107,7 @@ pub struct CalibrationOutcome {
     /// Solver iterations of the static camera alone and of both cameras.
     pub iterations: [usize; 2],
     /// Residuals of the IMU samples.
-    pub inertial: ImuResidualReport,
+    pub imu: ImuResidualReport,
     /// Observability of the chain over the whole flight.
     pub rank: Option<RankReport>,
     /// Estimated joint angles of all measurements, in radians.

@@ -186,8 +186,8 @@ pub fn report_calibration(run: &CalibrationRun) -> CalibrationReport {
         parameterization: outcome.parameterization.to_string(),
         camera_imu_reprojection: (&outcome.static_pixels).into(),
         reprojection: outcome.pixels.iter().map(Into::into).collect(),
-        gyroscope_error_rad_per_s: outcome.inertial.gyroscope_rad_per_s.into(),
-        accelerometer_error_m_per_s2: outcome.inertial.accelerometer_m_per_s2.into(),
+        gyroscope_error_rad_per_s: outcome.imu.gyroscope_rad_per_s.into(),
+        accelerometer_error_m_per_s2: outcome.imu.accelerometer_m_per_s2.into(),
         pose_loops: LoopReport {
             segments: outcome.pose_loop.segments,
             pairs: outcome.pose_loop.pairs,

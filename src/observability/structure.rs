@@ -186,8 +186,9 @@ impl Measured<'_> {
         losses
             .into_iter()
             .filter(|(_, direction)| {
-                let moves_held = (0..direction.len()).any(|column| direction[column] != 0.0 && !kept.contains(&column));
-                kept.len() <= scale.len() && !moves_held
+                let moves_fixed =
+                    (0..direction.len()).any(|column| direction[column] != 0.0 && !kept.contains(&column));
+                kept.len() <= scale.len() && !moves_fixed
             })
             .map(|(loss, direction)| {
                 let direction = direction.select_rows(kept);

@@ -86,7 +86,7 @@ impl Exercise {
     }
 
     /// Rotation of the vehicle about the vertical, in radians.
-    pub fn turn_rad(&self, time_s: f64) -> f64 {
+    pub fn heading_change_rad(&self, time_s: f64) -> f64 {
         if self.vehicle == VehicleSwing::Yaw { YAW_SWING_RAD * swing(time_s, YAW_PERIOD_S) } else { 0.0 }
     }
 

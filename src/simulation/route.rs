@@ -144,12 +144,12 @@ impl Path {
         let (from, to) = (self.points[after - 1], self.points[after]);
         let step = to - from;
         let fraction = (rest - self.length_m[after - 1]) / step.norm().max(1e-12);
-        let heading_change = if self.closed { self.turn_rad() * laps } else { 0.0 };
+        let heading_change = if self.closed { self.heading_change_rad() * laps } else { 0.0 };
         (from + step * fraction, self.heading_rad[after - 1] + heading_change)
     }
 
     /// Change of direction in one round of a closed path.
-    fn turn_rad(&self) -> f64 {
+    fn heading_change_rad(&self) -> f64 {
         let area: f64 = self.points.windows(2).map(|pair| pair[0].x * pair[1].y - pair[1].x * pair[0].y).sum();
         std::f64::consts::TAU.copysign(area)
     }
@@ -321,7 +321,9 @@ impl Flight for Drill {
         FlightPoint {
             position_m: self.position_m + warm_up * liveliness + shift,
             position_wander_m: Vector3::zeros(),
-            heading_rad: self.heading_rad + liveliness * wave(0.4, 3.7, 0.5) + self.exercise.turn_rad(exercise_s),
+            heading_rad: self.heading_rad
+                + liveliness * wave(0.4, 3.7, 0.5)
+                + self.exercise.heading_change_rad(exercise_s),
             heading_wander_rad: 0.0,
         }
     }

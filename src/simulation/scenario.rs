@@ -30,7 +30,7 @@ const ENCODER_PHASE_S: f64 = 0.002;
 pub(crate) struct Scenario {
     pub(crate) trajectory: Trajectory,
     pub(crate) joints: Option<JointMotion>,
-    pub(crate) inertial: ImuRecord,
+    pub(crate) imu_record: ImuRecord,
     pub(crate) true_rig: Rig,
     pub(crate) given_rig: Rig,
     seed: u64,
@@ -55,14 +55,14 @@ impl Scenario {
         let joints = true_rig.gimbal.as_ref().map(|gimbal| {
             JointMotion::simulate(&trajectory, &gimbal.chain, &gimbal.joints, look, &Stabilizer::default())
         });
-        let inertial = ImuRecord::measure(
+        let imu_record = ImuRecord::measure(
             &trajectory,
             &FIREFLY_IMU,
             IMU_RATE_HZ,
             options.imu_noise_scale,
             &mut random(stream::IMU),
         );
-        Self { trajectory, joints, inertial, true_rig, given_rig, seed: options.seed }
+        Self { trajectory, joints, imu_record, true_rig, given_rig, seed: options.seed }
     }
 
     /// Ground truth `world_from_camera` at a time of the IMU's clock.

@@ -130,7 +130,7 @@ fn fly_scenario(options: &SimulationOptions, name: &str) -> Scenario {
             imu_noise_scale: options.imu_noise_scale,
         },
     );
-    for sample in &mut scenario.inertial.samples {
+    for sample in &mut scenario.imu_record.samples {
         if let Some(range) = options.disturbances.gyroscope_range_rad_per_s {
             sample.angular_velocity_rad_per_s.apply(|rate| *rate = rate.clamp(-range.abs(), range.abs()));
         }
@@ -255,7 +255,7 @@ fn recordings(options: &SimulationOptions, scenario: &Scenario) -> Recordings {
     }
     // In the order in which they will be written.
     shots.sort_by_key(|shot| (shot.stamp_ns, shot.camera));
-    Recordings { imu: scenario.inertial.samples.clone(), joints, true_joints: scenario.true_joint_samples(), shots }
+    Recordings { imu: scenario.imu_record.samples.clone(), joints, true_joints: scenario.true_joint_samples(), shots }
 }
 
 /// All messages in the order of their log times, which come later than the stamps by a delay that jitters.
@@ -380,8 +380,8 @@ fn ground_truth_notes(options: &SimulationOptions, scenario: &Scenario, chain_er
         super::Environment::Town => 2,
     };
     let duration_s = scenario.trajectory.duration_s();
-    let first = scenario.inertial.biases.first().copied().unwrap_or_default();
-    let last = scenario.inertial.biases.last().copied().unwrap_or_default();
+    let first = scenario.imu_record.biases.first().copied().unwrap_or_default();
+    let last = scenario.imu_record.biases.last().copied().unwrap_or_default();
     let mut notes = String::from("truth:\n");
     let mut entry = |name: &str, value: String| {
         // Writing into a string cannot fail.

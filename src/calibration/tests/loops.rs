@@ -68,8 +68,8 @@ fn example(seed: u64, encoder_sigma_rad: f64, noise: (f64, f64), still: bool) ->
                     let camera = world_from_imu * ground_truth.imu_from_camera(&angles);
                     let mut seen = frame.world_from_segment.inverse() * camera;
                     let mut errors = || Vector3::from_fn(|_, _| random.normal(1.0));
-                    let (turn, shift) = (errors() * noise.0, errors() * noise.1);
-                    seen = RigidTransform::new(seen.rotation * so3::exp(&turn), seen.translation_m + shift);
+                    let (rotation_error, shift) = (errors() * noise.0, errors() * noise.1);
+                    seen = RigidTransform::new(seen.rotation * so3::exp(&rotation_error), seen.translation_m + shift);
                     seen.translation_m /= frame.metres_per_unit;
                     let readings = angles.iter().map(|angle| angle + random.normal(encoder_sigma_rad)).collect();
                     visited.push(angles);
@@ -152,10 +152,15 @@ fn exact_poses_recover_the_chain_up_to_encoder_noise() {
         let term = ChainTerm::new(&example.given, &prior());
         let solution = PoseLoops { segments: &example.segments, prior: &term }.solve().unwrap();
         let (before, _) = chain_distance(&example.given, &example.ground_truth, &example.visited).unwrap();
-        let (shift, turn) =
+        let (shift, rotation_error) =
             chain_distance(&solution.chain.to_classical(), &example.ground_truth, &example.visited).unwrap();
         assert!(before.mean > 0.01, "seed {seed} begins {} m off", before.mean);
-        assert!(shift.mean < 5e-4 && turn.mean < 1e-3, "seed {seed}: {} m, {} rad", shift.mean, turn.mean);
+        assert!(
+            shift.mean < 5e-4 && rotation_error.mean < 1e-3,
+            "seed {seed}: {} m, {} rad",
+            shift.mean,
+            rotation_error.mean
+        );
     }
 }
 
@@ -190,7 +195,7 @@ fn stationary_joints_leave_unobservable_directions_at_the_prior() {
         (0..covariance.nrows()).map(|k| covariance[(k, k)] / term.prior_sigmas[k].powi(2)).sum::<f64>()
     };
     assert!(total(&solution.covariance) > 5.0 * total(&moved.covariance));
-    let (shift, turn) =
+    let (shift, rotation_error) =
         chain_distance(&solution.chain.to_classical(), &example.ground_truth, &example.visited).unwrap();
-    assert!(shift.mean < 0.01 && turn.mean < 0.02, "{} m, {} rad", shift.mean, turn.mean);
+    assert!(shift.mean < 0.01 && rotation_error.mean < 0.02, "{} m, {} rad", shift.mean, rotation_error.mean);
 }

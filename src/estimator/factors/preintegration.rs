@@ -217,7 +217,7 @@ impl Preintegration {
     fn propagate(&mut self, from: &ImuSample, to: &ImuSample) {
         let h = seconds_from_ns(to.stamp_ns - from.stamp_ns);
         self.repeats.count(from, to);
-        let (turn_noise, gyroscope_saturated) = Repeats::densities(
+        let (gyroscope_noise, gyroscope_saturated) = Repeats::densities(
             &self.repeats.gyroscope,
             &to.angular_velocity_rad_per_s,
             MIN_SATURATED_RAD_PER_S,
@@ -257,8 +257,8 @@ impl Preintegration {
         let phi_half_by_w = so3::right_jacobian(&phi_half)
             * (Matrix3::identity() * (0.5 * h) - so3::hat(&(w_half - w0)) * (h * h / 48.0));
         let half_by_w = -(e_half * so3::hat(&a_half) * phi_half_by_w);
-        let end_by_w = -(e * so3::hat(&a1) * phi_by_w);
-        let dv_by_w = r * (half_by_w * 4.0 + end_by_w) * (h / 6.0);
+        let end_by_angular_rate = -(e * so3::hat(&a1) * phi_by_w);
+        let dv_by_w = r * (half_by_w * 4.0 + end_by_angular_rate) * (h / 6.0);
         let dp_by_w = r * half_by_w * (h * h / 3.0);
         let dv_by_a = r * (Matrix3::identity() + e_half * 4.0 + e) * (h / 6.0);
         let dp_by_a = r * (Matrix3::identity() + e_half * 2.0) * (h * h / 6.0);
@@ -288,7 +288,7 @@ impl Preintegration {
         self.add_noise(
             h,
             [&phi_by_w, &dp_by_w, &dv_by_w],
-            &turn_noise,
+            &gyroscope_noise,
             &(r * Matrix3::from_diagonal(&force_noise) * r.transpose()),
         );
 
@@ -327,16 +327,16 @@ impl Preintegration {
         &mut self,
         h: f64,
         [phi_by_w, dp_by_w, dv_by_w]: [&Matrix3<f64>; 3],
-        turn_noise: &Vector3<f64>,
+        gyroscope_noise: &Vector3<f64>,
         force_noise: &Matrix3<f64>,
     ) {
         let square = |density: f64| density * density;
-        let mut by_w = SMatrix::<f64, 9, 3>::zeros();
-        by_w.fixed_view_mut::<3, 3>(0, 0).copy_from(phi_by_w);
-        by_w.fixed_view_mut::<3, 3>(3, 0).copy_from(dp_by_w);
-        by_w.fixed_view_mut::<3, 3>(6, 0).copy_from(dv_by_w);
+        let mut by_angular_rate = SMatrix::<f64, 9, 3>::zeros();
+        by_angular_rate.fixed_view_mut::<3, 3>(0, 0).copy_from(phi_by_w);
+        by_angular_rate.fixed_view_mut::<3, 3>(3, 0).copy_from(dp_by_w);
+        by_angular_rate.fixed_view_mut::<3, 3>(6, 0).copy_from(dv_by_w);
         let mut motion = self.covariance.fixed_view_mut::<9, 9>(0, 0);
-        motion += by_w * Matrix3::from_diagonal(turn_noise) * by_w.transpose() / h;
+        motion += by_angular_rate * Matrix3::from_diagonal(gyroscope_noise) * by_angular_rate.transpose() / h;
         // White specific force over the interval correlates velocity and position.
         for (row, column, factor) in [(3, 3, h * h * h / 3.0), (3, 6, h * h / 2.0), (6, 3, h * h / 2.0), (6, 6, h)] {
             let mut block = self.covariance.fixed_view_mut::<3, 3>(row, column);

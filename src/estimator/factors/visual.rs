@@ -47,7 +47,7 @@ impl<'a> VisualModel<'a> {
 
 /// Reprojection residual of one observation in pixels (2 × 1), `None` when the landmark does not project into
 /// the camera.
-pub(crate) fn sighting_residual_px(
+pub(crate) fn observation_residual_px(
     model: &VisualModel<'_>,
     relative: &RelativePoses,
     anchor: usize,
@@ -67,7 +67,7 @@ pub(crate) fn cost(model: &VisualModel<'_>, cameras: &[CameraPose], tracks: &[Tr
             if observation.slot == anchor && !model.measures_in_anchor() {
                 continue;
             }
-            let residual = sighting_residual_px(model, &relative, anchor, landmark, observation);
+            let residual = observation_residual_px(model, &relative, anchor, landmark, observation);
             total += 0.5 * model.loss.cost_of(residual, model.sigma_px);
         }
     }

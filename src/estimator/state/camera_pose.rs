@@ -105,8 +105,8 @@ impl CameraMaps {
             if extrinsics.shift_s != 0.0 {
                 // The unknown attitude is the one at the stamp.
                 let at_stamp = stamped.navigation.world_from_imu.rotation_matrix();
-                let by_turn = own.fixed_columns::<3>(0) * world_from_imu.tr_mul(&at_stamp);
-                own.fixed_columns_mut::<3>(0).copy_from(&by_turn);
+                let by_rotation = own.fixed_columns::<3>(0) * world_from_imu.tr_mul(&at_stamp);
+                own.fixed_columns_mut::<3>(0).copy_from(&by_rotation);
             }
             maps.own.push(own);
             maps.calibration.push(by_calibration);

@@ -52,9 +52,9 @@ pub(super) fn trajectory_error_m(frames: &[SyntheticFrame], reports: &[StepRepor
         cosine += e.x * t.x + e.y * t.y;
         sine += e.x * t.y - e.y * t.x;
     }
-    let turn = so3::exp(&Vector3::new(0.0, 0.0, sine.atan2(cosine)));
+    let yaw_alignment = so3::exp(&Vector3::new(0.0, 0.0, sine.atan2(cosine)));
     let squares: f64 =
-        pairs.iter().map(|pair| (turn * (pair.0 - estimated) - (pair.1 - ground_truth)).norm_squared()).sum();
+        pairs.iter().map(|pair| (yaw_alignment * (pair.0 - estimated) - (pair.1 - ground_truth)).norm_squared()).sum();
     let length = pairs.windows(2).map(|two| (two[1].1 - two[0].1).norm()).sum();
     ((squares / count).sqrt(), length)
 }
@@ -63,10 +63,10 @@ pub(super) fn trajectory_error_m(frames: &[SyntheticFrame], reports: &[StepRepor
 pub(super) fn chain_error(flight: &SyntheticFlight, estimator: &Estimator) -> (f64, f64) {
     let (estimated, ground_truth) = (estimator.classical_chain(), flight.true_rig.chain_of_camera("cam0").unwrap());
     let count = flight.frames.len() as f64;
-    flight.frames.iter().fold((0.0, 0.0), |(shift, turn), frame| {
+    flight.frames.iter().fold((0.0, 0.0), |(shift, angle_rad), frame| {
         let angles = &frame.true_joint_angles_rad;
         let error = estimated.imu_from_camera(angles).inverse() * ground_truth.imu_from_camera(angles);
-        (shift + error.translation_m.norm() / count, turn + so3::log(&error.rotation).norm() / count)
+        (shift + error.translation_m.norm() / count, angle_rad + so3::log(&error.rotation).norm() / count)
     })
 }
 

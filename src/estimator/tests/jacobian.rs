@@ -37,17 +37,17 @@ pub(super) fn check(report: &StepReport, cameras: &[&CameraModel]) -> StepJacobi
     for (number, block) in
         jacobian.columns.iter().enumerate().filter(|(_, block)| block.id.group() == ColumnGroup::VelocityBias)
     {
-        let inertial = jacobian
+        let imu_rows = jacobian
             .rows
             .iter()
             .filter(|row| matches!(row.factor, JacobianFactor::Imu { .. } | JacobianFactor::ZeroVelocity));
-        let norms = inertial.flat_map(|row| &row.norms).filter(|(column, _)| usize::from(*column) == number);
+        let norms = imu_rows.flat_map(|row| &row.norms).filter(|(column, _)| usize::from(*column) == number);
         let written = norms.map(|(_, norm)| f64::from(*norm).powi(2)).sum::<f64>().sqrt();
-        let held = (0..block.len)
+        let expected = (0..block.len)
             .map(|place| (linearization.jacobian.column(block.start + place) * block.id.scale(place)).norm_squared())
             .sum::<f64>()
             .sqrt();
-        assert!((written - held).abs() <= 1e-4 * held, "{block:?}: {written} for {held}");
+        assert!((written - expected).abs() <= 1e-4 * expected, "{block:?}: {written} for {expected}");
     }
     jacobian
 }

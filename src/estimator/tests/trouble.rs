@@ -58,7 +58,7 @@ fn without_encoders_the_trajectory_is_tracked_and_the_calibration_stays_uncertai
         assert_eq!(last.parameters.len(), 15);
         let learnt: Vec<f64> =
             last.sigmas.iter().zip(&last.prior_sigmas).map(|(after, before)| after / before).collect();
-        assert!(learnt.iter().all(|share| *share > 0.05 && *share < 1.01), "seed {seed}: {learnt:?}");
+        assert!(learnt.iter().all(|ratio| *ratio > 0.05 && *ratio < 1.01), "seed {seed}: {learnt:?}");
         let after = chain_error(&flight, &estimator);
         assert!(after.1 < 1.5 * before.1, "seed {seed}: {before:?} to {after:?}");
         for report in &reports {

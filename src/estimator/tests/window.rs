@@ -44,8 +44,8 @@ fn the_gradient_of_every_factor_meets_central_differences() {
         let estimate = estimator.estimate(&active);
         let equations = problem.linearize(&estimate);
         // Damped without end, the landmarks stay where they are.
-        let held = equations.eliminate(1e14);
-        let (_, gradient) = equations.reduced(&problem.layout, &held);
+        let carried = equations.eliminate(1e14);
+        let (_, gradient) = equations.reduced(&problem.layout, &carried);
         let still: Vec<Vec<Vector3<f64>>> =
             estimate.landmarks.iter().map(|landmarks| vec![Vector3::zeros(); landmarks.len()]).collect();
         for column in 0..problem.layout.total() {
@@ -142,19 +142,19 @@ fn dropping_a_frame_from_the_prior_keeps_the_information_on_the_others() {
     let gone = 2;
     assert!(prior.holds_frame(gone));
     let zero = DVector::zeros(layout.total());
-    let held = prior.rows(&layout, &zero);
-    let rows = stack(&[held.clone(), problem.encoder_rows(gone, &estimate)], layout.total() + 1);
+    let carried = prior.rows(&layout, &zero);
+    let rows = stack(&[carried.clone(), problem.encoder_rows(gone, &estimate)], layout.total() + 1);
     let information = |rows: &DMatrix<f64>, columns: &[usize]| {
         let part = rows.select_columns(columns);
         part.tr_mul(&part)
     };
-    let leaving: Vec<usize> = layout.camera(gone).collect();
+    let removed: Vec<usize> = layout.camera(gone).collect();
     let kept: Vec<usize> = (0..layout.total())
-        .filter(|column| !leaving.contains(column))
-        .filter(|column| held.column(*column).amax() > 0.0)
+        .filter(|column| !removed.contains(column))
+        .filter(|column| carried.column(*column).amax() > 0.0)
         .collect();
-    let cross = rows.select_columns(&kept).tr_mul(&rows.select_columns(&leaving));
-    let inverse = information(&rows, &leaving).try_inverse().unwrap();
+    let cross = rows.select_columns(&kept).tr_mul(&rows.select_columns(&removed));
+    let inverse = information(&rows, &removed).try_inverse().unwrap();
     let expected = information(&rows, &kept) - &cross * inverse * cross.transpose();
     let dropped = marginalization::dropped(&problem, &estimate, gone).unwrap();
     assert!(!dropped.holds_frame(gone));

@@ -22,10 +22,10 @@ impl ActiveTracks {
             if feature.observations.len() < 2 {
                 continue;
             }
-            let sighting =
+            let track_observation =
                 |observation: &Observation| TrackObservation { slot: observation.slot, uv_px: observation.uv_px };
             active.ids.push(*id);
-            active.tracks.push(Track { observations: feature.observations.iter().map(sighting).collect() });
+            active.tracks.push(Track { observations: feature.observations.iter().map(track_observation).collect() });
             active.landmarks.push(landmark);
         }
         active

@@ -71,16 +71,16 @@ impl Problem<'_> {
         measured.push(self.zero_velocity_rows(&stationary));
         let priors = [self.calibration_prior_rows(estimate), self.prior_rows(estimate)];
         let frozen = estimate.calibration.frozen_columns();
-        let is_held = |column: usize| frozen.contains(&column);
+        let is_fixed = |column: usize| frozen.contains(&column);
         let first = layout.calibration().start;
         let order: Vec<usize> =
-            column_order(&layout).into_iter().filter(|column| *column < first || !is_held(column - first)).collect();
+            column_order(&layout).into_iter().filter(|column| *column < first || !is_fixed(column - first)).collect();
         let of = |fixed_parameters: bool| {
             let parameters =
-                parameters.iter().enumerate().filter(move |(column, _)| is_held(*column) == fixed_parameters);
+                parameters.iter().enumerate().filter(move |(column, _)| is_fixed(*column) == fixed_parameters);
             parameters.map(|(_, parameter)| *parameter).collect::<Vec<_>>()
         };
-        let free = |column: &usize| !is_held(*column);
+        let free = |column: &usize| !is_fixed(*column);
         let norms: Vec<f64> = (0..norms.len()).filter(free).map(|column| norms[column]).collect();
         Linearization {
             columns: column_blocks(&layout, &of(false), numbers),

@@ -21,7 +21,7 @@ use crate::geometry::{RigidTransform, so3};
 /// Twists with respect to the calibration columns (3 × columns each): rotations and translations in the IMU frame.
 #[derive(Clone, Debug)]
 struct Twists {
-    turn: Matrix3xX<f64>,
+    angular: Matrix3xX<f64>,
     shift: Matrix3xX<f64>,
 }
 
@@ -62,9 +62,9 @@ fn twists(calibration: &Calibration, joints_rad: &[f64]) -> Twists {
     let linearization = calibration.linearize(joints_rad);
     let extrinsics = linearization.imu_from_camera;
     let by_parameters = linearization.by_parameters;
-    let turn = extrinsics.rotation_matrix() * by_parameters.fixed_rows::<3>(0);
-    let shift = by_parameters.fixed_rows::<3>(3) + so3::hat(&extrinsics.translation_m) * &turn;
-    Twists { turn, shift }
+    let angular = extrinsics.rotation_matrix() * by_parameters.fixed_rows::<3>(0);
+    let shift = by_parameters.fixed_rows::<3>(3) + so3::hat(&extrinsics.translation_m) * &angular;
+    Twists { angular, shift }
 }
 
 /// `(I − Ad(M))·D` by the axes of the translation and of the rotation.
@@ -76,9 +76,9 @@ fn body_parts(to_newest: &RigidTransform, there: &Twists, put: &mut impl FnMut(u
     for axis in 0..3 {
         let unit: Vector3<f64> = Vector3::ith(axis, 1.0);
         let along: Matrix3<f64> = so3::hat(&(unit * -to_newest.translation_m[axis])) * rotation;
-        put(axis, &Twists { turn: &there.turn * 0.0, shift: along * &there.turn });
+        put(axis, &Twists { angular: &there.angular * 0.0, shift: along * &there.angular });
         let about: Matrix3<f64> = so3::hat(&(unit * -angle[axis])) * mean;
-        put(3 + axis, &Twists { turn: about * &there.turn, shift: about * &there.shift });
+        put(3 + axis, &Twists { angular: about * &there.angular, shift: about * &there.shift });
     }
 }
 
@@ -96,7 +96,8 @@ fn joint_parts(calibration: &Calibration, from_rad: &[f64], to_rad: &[f64], put:
             angles[joint] = to_rad[joint];
             let after = twists(calibration, &angles);
             let half = |after: &Matrix3xX<f64>, before: &Matrix3xX<f64>| (after - before) * 0.5;
-            let change = Twists { turn: half(&after.turn, &before.turn), shift: half(&after.shift, &before.shift) };
+            let change =
+                Twists { angular: half(&after.angular, &before.angular), shift: half(&after.shift, &before.shift) };
             put(6 + joint, &change);
             before = after;
         }
@@ -122,9 +123,9 @@ fn clock_parts(frames: &[Cow<'_, FrameState>], maps: &CameraMaps, clock: usize, 
 
 /// Converts twists in the IMU frame to `[φ; δt]` of `world_from_camera` (6 × columns).
 fn camera_moves(twists: &Twists, extrinsics: &RigidTransform, world_from_imu: &Matrix3<f64>) -> DMatrix<f64> {
-    let mut moves = DMatrix::zeros(6, twists.turn.ncols());
-    moves.rows_mut(0, 3).copy_from(&(extrinsics.rotation_matrix().transpose() * &twists.turn));
-    let shift = &twists.shift - so3::hat(&extrinsics.translation_m) * &twists.turn;
+    let mut moves = DMatrix::zeros(6, twists.angular.ncols());
+    moves.rows_mut(0, 3).copy_from(&(extrinsics.rotation_matrix().transpose() * &twists.angular));
+    let shift = &twists.shift - so3::hat(&extrinsics.translation_m) * &twists.angular;
     moves.rows_mut(3, 3).copy_from(&(world_from_imu * shift));
     moves
 }

@@ -139,7 +139,7 @@ impl WindowState {
                     observations: observations
                         .iter()
                         .zip(before.iter().zip(after))
-                        .map(|(sighting, (before, after))| observation(sighting.slot, sighting.uv_px, *before, *after))
+                        .map(|(tracked, (before, after))| observation(tracked.slot, tracked.uv_px, *before, *after))
                         .collect(),
                     rejected: checks.rejected[index],
                 }

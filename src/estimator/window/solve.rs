@@ -108,7 +108,7 @@ fn track_residuals(problem: &Problem<'_>, estimate: &Estimate) -> Vec<TrackResid
             .map(|(track, landmark)| {
                 let anchor = track.observations[0].slot;
                 let residual = |observation: &TrackObservation| {
-                    visual::sighting_residual_px(&factors.visual, &relative, anchor, landmark, observation)
+                    visual::observation_residual_px(&factors.visual, &relative, anchor, landmark, observation)
                 };
                 track.observations.iter().map(residual).collect()
             })

@@ -242,7 +242,7 @@ fn navigation_at(situation: &Situation, exercise: &Exercise, time_s: f64) -> Nav
     let acceleration = (after - here * 2.0 + before) / (STEP_S * STEP_S);
     let thrust = acceleration - situation.gravity_in_world;
     let tilt = UnitQuaternion::rotation_between(&Vector3::z(), &thrust).unwrap_or_else(UnitQuaternion::identity);
-    let yaw = so3::exp(&(Vector3::z() * exercise.turn_rad(time_s.max(0.0))));
+    let yaw = so3::exp(&(Vector3::z() * exercise.heading_change_rad(time_s.max(0.0))));
     let rotation = tilt * yaw * situation.navigation.world_from_imu.rotation;
     NavigationState {
         world_from_imu: RigidTransform::new(rotation, here),

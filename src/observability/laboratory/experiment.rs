@@ -156,14 +156,14 @@ impl LaboratorySetup {
     pub(super) fn window_from(&self, first: usize) -> HypotheticalWindow {
         let gravity_in_world = gravity_in_world(GRAVITY_M_PER_S2);
         let flight = Flight { mechanism: &self.mechanism, motion: self.motion, frozen: &self.frozen, gravity_in_world };
-        let inertial = matches!(self.poses, PoseKnowledge::Imu { .. });
+        let imu_poses = matches!(self.poses, PoseKnowledge::Imu { .. });
         let time_of = |slot: usize| (first + slot) as f64 * FRAME_PERIOD_S;
         let frames: Vec<HypotheticalFrame> = (0..self.frames)
             .map(|slot| HypotheticalFrame {
                 time_s: time_of(slot),
                 navigation: flight.navigation(time_of(slot)),
                 joints_rad: flight.joints_rad(time_of(slot)),
-                imu: if inertial && slot > 0 {
+                imu: if imu_poses && slot > 0 {
                     flight.imu(time_of(slot - 1), time_of(slot), IMU_RATE_HZ)
                 } else {
                     Vec::new()

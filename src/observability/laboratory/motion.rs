@@ -161,8 +161,8 @@ struct Sine {
 impl Sine {
     /// Value or derivative with respect to time.
     fn at(&self, time_s: f64, derivative: i32) -> f64 {
-        let quarter_turns = f64::from(derivative) * 0.25 * TAU;
-        let phase = self.rate_rad_per_s * time_s + self.phase_rad + quarter_turns;
+        let quarter_periods = f64::from(derivative) * 0.25 * TAU;
+        let phase = self.rate_rad_per_s * time_s + self.phase_rad + quarter_periods;
         self.size * self.rate_rad_per_s.powi(derivative) * phase.sin()
     }
 }

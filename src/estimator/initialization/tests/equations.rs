@@ -73,9 +73,9 @@ fn gradient_of_the_refinement_meets_central_differences() {
         // An endless damping of the depths leaves the plain gradient at fixed depths.
         let (normal, gradient, _) = refinement.reduced(&state, &refinement.linearized(&state), 1e15);
         assert!((&normal - normal.transpose()).amax() < 1e-9 * normal.amax());
-        let held = refinement.layout.pose(0);
+        let fixed_columns = refinement.layout.pose(0);
         for column in 0..refinement.layout.columns() {
-            if (held..held + 6).contains(&column) {
+            if (fixed_columns..fixed_columns + 6).contains(&column) {
                 continue;
             }
             let h = 1e-6;

@@ -350,7 +350,7 @@ impl Tracker {
     }
 }
 
-pub(super) fn fly(options: &FlightOptions) -> Flight {
+pub(super) fn simulate_flight(options: &FlightOptions) -> Flight {
     let mut random = Random::new(options.seed);
     let path = Path::new(options, &mut random);
     let gimbal = TestGimbal::nominal();

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::flight::{FOCAL_PX, Flight, FlightOptions, GRAVITY, Motion, fly, noise};
+use super::flight::{FOCAL_PX, Flight, FlightOptions, GRAVITY, Motion, noise, simulate_flight};
 use crate::estimator::initialization::bearing::angle_between;
 use crate::estimator::initialization::{
     InitializationFrame, InitializationInput, InitializationOptions, InitializationOrigin, InitializationOutcome,
@@ -125,7 +125,7 @@ fn check(name: &str, seeds: u64, flight_of: impl Fn(u64) -> FlightOptions, limit
     let mut all = Vec::new();
     for seed in 0..seeds {
         let flight_options = flight_of(seed);
-        let flight = fly(&flight_options);
+        let flight = simulate_flight(&flight_options);
         let options = options_for(&flight_options);
         match run(&flight, &options) {
             Ok((newest, solution)) => {
@@ -227,7 +227,7 @@ fn hover_rotation_and_constant_velocity_wait_with_reasons() {
         (Motion::ConstantVelocity, &["excitation"][..]),
     ] {
         let flight_options = FlightOptions { duration_s: 5.0, ..FlightOptions::new(7, motion) };
-        let flight = fly(&flight_options);
+        let flight = simulate_flight(&flight_options);
         let reasons = run(&flight, &options_for(&flight_options)).unwrap_err();
         println!("{motion:?}: {reasons:#?}");
         for test in tests {
@@ -239,7 +239,7 @@ fn hover_rotation_and_constant_velocity_wait_with_reasons() {
 #[test]
 fn a_stationary_estimate_is_kept_or_used_at_once() {
     let flight_options = FlightOptions { duration_s: 2.0, ..FlightOptions::new(3, Motion::Stationary) };
-    let flight = fly(&flight_options);
+    let flight = simulate_flight(&flight_options);
     let options = options_for(&flight_options);
     let newest = flight.frames.len() - 1;
     let InitializationOutcome::Waiting { stationary: Some(found), reasons, .. } =
@@ -268,7 +268,7 @@ fn a_stationary_estimate_is_kept_or_used_at_once() {
 #[test]
 fn equal_input_gives_equal_bits() {
     let flight_options = FlightOptions::new(5, Motion::Flight);
-    let flight = fly(&flight_options);
+    let flight = simulate_flight(&flight_options);
     let options = options_for(&flight_options);
     let (newest, _) = run(&flight, &options).unwrap();
     let InitializationOutcome::Initialized(first) = attempt(&flight, newest, &options, None) else {
@@ -285,11 +285,11 @@ fn broken_input_waits_instead_of_failing() {
     let flight_options = FlightOptions { duration_s: 4.0, ..FlightOptions::new(9, Motion::Flight) };
     let options = options_for(&flight_options);
     let newest = 80;
-    let mut no_imu = fly(&flight_options);
+    let mut no_imu = simulate_flight(&flight_options);
     for frame in &mut no_imu.frames {
         frame.imu.clear();
     }
-    let mut not_finite = fly(&flight_options);
+    let mut not_finite = simulate_flight(&flight_options);
     for frame in &mut not_finite.frames {
         for sample in &mut frame.imu {
             sample.specific_force_m_per_s2.x = f64::NAN;
@@ -298,7 +298,7 @@ fn broken_input_waits_instead_of_failing() {
             feature.bearing.x = f64::NAN;
         }
     }
-    let mut no_features = fly(&flight_options);
+    let mut no_features = simulate_flight(&flight_options);
     for frame in &mut no_features.frames {
         frame.features.clear();
     }

@@ -66,8 +66,8 @@ fn fixed_parameters_count_as_known() {
     // Each fixes one of the six redundant directions; without the columns that Eqs. 18–20 drop there is none left.
     let dropped = ["L1.d", "L1.theta", "L3.theta", "L3.d", "L3.a", "L3.alpha"];
     for (count, name) in dropped.into_iter().enumerate() {
-        let held = parameter(name);
-        estimator.freeze(held).unwrap();
+        let fixed = parameter(name);
+        estimator.freeze(fixed).unwrap();
         let (report, rank) = run_flight(&mut estimator, &flight, from_s, from_s + 0.2);
         from_s += 0.2;
         let lost = 5 - count;
@@ -77,12 +77,12 @@ fn fixed_parameters_count_as_known() {
             (lost, lost, lost),
             "{name}"
         );
-        assert!(rank.fixed_parameters.contains(&held) && !rank.parameters.contains(&held), "{name}");
+        assert!(rank.fixed_parameters.contains(&fixed) && !rank.parameters.contains(&fixed), "{name}");
         assert_eq!(report.gain.as_ref().unwrap().columns(), rank.parameters.len(), "{name}");
         // The chain still has all its columns; fixed ones cannot be moved.
         let chain = chain_of_step(&report, &rank).unwrap();
         assert_eq!(chain.dof(), 24, "{name}");
-        let place = chain.parameters().iter().position(|known| *known == held).unwrap();
+        let place = chain.parameters().iter().position(|known| *known == fixed).unwrap();
         for direction in 0..rank.directions.len() {
             let weights = SlideDirection::Measured(direction).weights(&rank, &chain).unwrap();
             assert!(weights.len() == 24 && weights[place] == 0.0, "{name}");
