@@ -11,8 +11,8 @@ use crate::session::{Recording, RunRecord};
 pub(crate) type ParameterValues = BTreeMap<ParameterId, f64>;
 
 /// The values of a chain in a parameterization.
-pub(crate) fn parameter_values(classical: &ClassicalChain, form: &NearestForm) -> ParameterValues {
-    let chain = form.of(&Chain::from_classical(classical, Parameterization::Classical));
+pub(crate) fn parameter_values(classical: &ClassicalChain, conversion: &NearestForm) -> ParameterValues {
+    let chain = conversion.of(&Chain::from_classical(classical, Parameterization::Classical));
     chain.parameters().into_iter().zip(chain.values().iter().copied()).collect()
 }
 

@@ -153,12 +153,12 @@ impl ConvertedHistory {
         if self.target.as_ref().is_none_or(|(known, _)| *known != target) {
             self.follower = Follower::default();
             let estimate = run.steps.first().map(|first| &first.report.calibration);
-            let form = estimate.and_then(|estimate| run.conversion_for(rig, estimate, target));
-            self.target = form.map(|form| (target, form));
+            let conversion = estimate.and_then(|estimate| run.conversion_for(rig, estimate, target));
+            self.target = conversion.map(|conversion| (target, conversion));
             self.forget();
         }
-        let Some((_, form)) = &self.target else { return };
-        let form = form.clone();
+        let Some((_, conversion)) = &self.target else { return };
+        let conversion = conversion.clone();
         let new_steps = self.follower.new_steps(run);
         if new_steps.restarted {
             self.forget();
@@ -168,7 +168,7 @@ impl ConvertedHistory {
             let row = self.stamps_ns.len();
             self.stamps_ns.push(step.report.stamp_ns);
             let calibration = &step.report.calibration;
-            let mut values = parameter_values(&calibration.classical, &form);
+            let mut values = parameter_values(&calibration.classical, &conversion);
             let rigid = (1..).zip(&calibration.rigid_cameras);
             values.extend(rigid.flat_map(|(camera, (_, pose))| rigid_columns(camera, pose)));
             unwrap_towards(&mut values, &self.last);

@@ -9,7 +9,7 @@ use crate::gui::PanelContext;
 use crate::observability::laboratory::{LABORATORY_IMU, LaboratoryForm, LaboratoryMotion, LaboratorySetup, Mechanism};
 
 /// Parameterizations that can be compared.
-const FORMS: [Parameterization; 6] = Parameterization::ALL;
+const PARAMETERIZATIONS: [Parameterization; 6] = Parameterization::ALL;
 
 /// Knowledge of the joint angles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,7 +33,7 @@ pub(super) struct Choices {
     /// A mechanism's name, `None` for the rig's.
     mechanism: Option<&'static str>,
     motion: LaboratoryMotion,
-    forms: [bool; FORMS.len()],
+    parameterizations: [bool; PARAMETERIZATIONS.len()],
     joint_offsets: bool,
     frozen: Vec<bool>,
     joints: Joints,
@@ -46,9 +46,9 @@ impl Default for Choices {
         Self {
             mechanism: None,
             motion: LaboratoryMotion::Aggressive,
-            forms: FORMS.map(|form| {
+            parameterizations: PARAMETERIZATIONS.map(|parameterization| {
                 use Parameterization::{Classical, Minimal, MinimalSwapped};
-                matches!(form, Classical | Minimal | MinimalSwapped)
+                matches!(parameterization, Classical | Minimal | MinimalSwapped)
             }),
             joint_offsets: true,
             frozen: Vec::new(),
@@ -69,8 +69,8 @@ impl Choices {
         });
         ui.horizontal_wrapped(|ui| {
             ui.label("Forms");
-            for (chosen, form) in self.forms.iter_mut().zip(FORMS) {
-                ui.checkbox(chosen, form.name());
+            for (chosen, parameterization) in self.parameterizations.iter_mut().zip(PARAMETERIZATIONS) {
+                ui.checkbox(chosen, parameterization.name());
             }
             ui.checkbox(&mut self.joint_offsets, "Joint offsets").on_hover_text("Whether they are among the columns");
         });
@@ -155,11 +155,14 @@ impl Choices {
 
     /// The chosen experiment, or the reason why it is invalid.
     pub(super) fn experiment(&self, ctx: &PanelContext<'_>) -> Result<Experiment, String> {
-        let forms = FORMS.iter().zip(self.forms).filter(|(_, chosen)| *chosen);
-        let forms: Vec<LaboratoryForm> = forms
-            .map(|(form, _)| LaboratoryForm { parameterization: *form, joint_offsets: self.joint_offsets })
+        let parameterizations = PARAMETERIZATIONS.iter().zip(self.parameterizations).filter(|(_, chosen)| *chosen);
+        let parameterizations: Vec<LaboratoryForm> = parameterizations
+            .map(|(parameterization, _)| LaboratoryForm {
+                parameterization: *parameterization,
+                joint_offsets: self.joint_offsets,
+            })
             .collect();
-        if forms.is_empty() {
+        if parameterizations.is_empty() {
             return Err("Choose a form".to_owned());
         }
         let mechanism = self.mechanism(ctx).ok_or("The rig has no mount for this run's camera")?;
@@ -183,6 +186,6 @@ impl Choices {
             Poses::Inertial => PoseKnowledge::Imu { noise, biases_known: false },
             Poses::InertialBiasKnown => PoseKnowledge::Imu { noise, biases_known: true },
         };
-        Ok(Experiment { setup, forms })
+        Ok(Experiment { setup, parameterizations })
     }
 }

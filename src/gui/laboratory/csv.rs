@@ -9,10 +9,10 @@ impl CsvTable for LaboratoryPanel {
     fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {
         let mut table = Table::new(["form", "kind", "number", "singular_value", "parameter", "weight"]);
         let names = ctx.names();
-        for (form, rank) in self.ranks(ctx) {
+        for (parameterization, rank) in self.ranks(ctx) {
             for (index, value) in rank.singular_values.iter().enumerate() {
                 let place = (index + 1).to_string();
-                let cells = [form.clone(), "singular value".to_owned(), place, number(*value)];
+                let cells = [parameterization.clone(), "singular value".to_owned(), place, number(*value)];
                 table.row(cells.into_iter().chain([String::new(), String::new()]));
             }
             for (index, direction) in rank.directions.iter().enumerate() {
@@ -20,7 +20,7 @@ impl CsvTable for LaboratoryPanel {
                 let weights = rank.parameters.iter().zip(&direction.weights);
                 for (parameter, weight) in weights.filter(|(_, weight)| **weight != 0.0) {
                     table.row([
-                        form.clone(),
+                        parameterization.clone(),
                         kind.to_owned(),
                         (index + 1).to_string(),
                         number(direction.singular_value),

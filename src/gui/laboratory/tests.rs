@@ -57,8 +57,8 @@ fn experiments_have_the_results_of_the_command() {
     harness.get_by_role_and_label(Role::CheckBox, "classical").click();
     harness.run_steps(3);
     assert!(harness.query_by_label(&text).is_none());
-    for form in ["minimal", "minimal-swapped"] {
-        harness.get_by_role_and_label(Role::CheckBox, form).click();
+    for parameterization in ["minimal", "minimal-swapped"] {
+        harness.get_by_role_and_label(Role::CheckBox, parameterization).click();
         harness.run_steps(3);
     }
     assert!(harness.query_by_label("Choose a form").is_some());

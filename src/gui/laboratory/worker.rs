@@ -12,7 +12,7 @@ use crate::observability::laboratory::{LaboratoryForm, LaboratoryResult, Laborat
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Experiment {
     pub(super) setup: LaboratorySetup,
-    pub(super) forms: Vec<LaboratoryForm>,
+    pub(super) parameterizations: Vec<LaboratoryForm>,
 }
 
 /// The requested experiment and its results so far.
@@ -47,7 +47,7 @@ impl Worker {
             let (sender, receiver) = channel();
             let given = experiment.clone();
             let work = move || {
-                given.setup.run_each(&given.forms, |result| {
+                given.setup.run_each(&given.parameterizations, |result| {
                     // The receiver is gone when another experiment was requested meanwhile.
                     sender.send(result).is_ok()
                 });
@@ -57,7 +57,7 @@ impl Worker {
                 return;
             }
         }
-        self.results = experiment.setup.run_all(&experiment.forms);
+        self.results = experiment.setup.run_all(&experiment.parameterizations);
     }
 
     /// Whether results are missing.
@@ -67,7 +67,7 @@ impl Worker {
 
     /// The results so far, and the number of parameterizations.
     pub(super) fn results(&self) -> (&[LaboratoryResult], usize) {
-        (&self.results, self.asked.as_ref().map_or(0, |experiment| experiment.forms.len()))
+        (&self.results, self.asked.as_ref().map_or(0, |experiment| experiment.parameterizations.len()))
     }
 
     /// The setup of the current experiment.

@@ -68,8 +68,11 @@ fn table_ui(ui: &mut Ui, theme: &Theme, names: &ParameterNames, columns: &[RankC
             let nearest = rank.margins.iter().min_by(|a, b| a.1.total_cmp(&b.1));
             nearest.map_or_else(
                 || ("none".to_owned(), false),
-                |(lock, margin)| {
-                    (format!("{margin:.2} ({})", names.singularity(*lock)), *margin < crate::gimbal::SWITCH_MARGIN)
+                |(singularity, margin)| {
+                    (
+                        format!("{margin:.2} ({})", names.singularity(*singularity)),
+                        *margin < crate::gimbal::SWITCH_MARGIN,
+                    )
                 },
             )
         }),

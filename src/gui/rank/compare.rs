@@ -61,9 +61,9 @@ pub(super) fn singularity_ui(
         Parameterization::MinimalSwapped => Parameterization::Minimal,
         _ => return,
     };
-    let margin_of = |form: Parameterization| {
-        let chain = Chain::from_classical(&calibration.classical, form);
-        chain.margins().into_iter().find(|(lock, _)| *lock == Singularity::End).map(|(_, margin)| margin)
+    let margin_of = |parameterization: Parameterization| {
+        let chain = Chain::from_classical(&calibration.classical, parameterization);
+        chain.margins().into_iter().find(|(singularity, _)| *singularity == Singularity::End).map(|(_, margin)| margin)
     };
     let (Some(here), Some(there)) = (margin_of(own), margin_of(other)) else { return };
     let taken = run.spec.parameterization.switches_parameterization(&ctx.recording.rig);

@@ -1,7 +1,7 @@
 //! The rank of a step in words.
 
 use crate::estimator::{EventKind, Phase};
-use crate::gimbal::{ParameterId, ParameterNames};
+use crate::gimbal::{ParameterId, ParameterNames, SWITCH_MARGIN};
 use crate::gui::units::counted;
 use crate::observability::{CalibrationDirection, KnownDirection, RankReport};
 use crate::session::StepRecord;
@@ -84,10 +84,10 @@ fn of_rank(rank: &RankReport, names: &ParameterNames) -> Verdict {
     } else if let Some(direction) = rank.directions.first() {
         reasons.push(format!("Unobservable: {}", parameters_of(names, &rank.parameters, direction, 3)));
     }
-    if let Some((lock, margin)) =
-        rank.margins.iter().min_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, m)| *m < LOW_MARGIN)
+    if let Some((singularity, margin)) =
+        rank.margins.iter().min_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, m)| *m < SWITCH_MARGIN)
     {
-        reasons.push(format!("Chart near its lock: {} margin {margin:.2}", names.singularity(*lock)));
+        reasons.push(format!("Chart near its lock: {} margin {margin:.2}", names.singularity(*singularity)));
     }
     Verdict { level, headline, reasons }
 }
@@ -102,9 +102,6 @@ pub(crate) fn structure_lines(rank: &RankReport, names: &ParameterNames) -> Vec<
     };
     rank.known.iter().map(line).collect()
 }
-
-/// Below this singularity margin the parameterization is switched (docs/mathematics.md, section 4).
-const LOW_MARGIN: f64 = 0.3;
 
 /// The parameters with the largest weights in a direction, `L1.d - I.tx`, at most `max_count`.
 pub(crate) fn parameters_of(

@@ -13,8 +13,8 @@ impl RunRecord {
     /// of the run's prior, because the run estimates near those.
     pub fn values_in(&self, rig: &Rig, given: &Rig, estimate: &CalibrationEstimate) -> Option<Vec<(ParameterId, f64)>> {
         let main = rig.chain_of_camera(&self.camera_key)?;
-        let form = self.conversion_for(given, estimate, estimate.parameterization)?;
-        let chain = form.of(&Chain::from_classical(&main, Parameterization::Classical));
+        let conversion = self.conversion_for(given, estimate, estimate.parameterization)?;
+        let chain = conversion.of(&Chain::from_classical(&main, Parameterization::Classical));
         let mut values: Vec<_> = chain.parameters().into_iter().zip(chain.values().iter().copied()).collect();
         let mut clocks = vec![(ParameterId::timeshift(0), self.camera_key.as_str())];
         for (camera, (key, _)) in (1..).zip(&estimate.rigid_cameras) {
