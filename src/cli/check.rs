@@ -10,6 +10,7 @@ use dcvins::log_check;
 use dcvins::sensors::Rig;
 use dcvins::session;
 
+use crate::cli::limit_arguments::LimitArguments;
 use crate::cli::terminal::{Progress, print_report};
 
 /// `dcvins check`.
@@ -23,12 +24,15 @@ pub(crate) struct CheckArguments {
     /// Print the findings as JSON.
     #[arg(long)]
     pub json: bool,
+    /// Limits on the log.
+    #[command(flatten)]
+    pub limits: LimitArguments,
 }
 
 /// Runs `dcvins check`.
 pub(crate) fn check(arguments: &CheckArguments) -> Result<()> {
     let progress = Progress::spinner("reading the log");
-    let log = Arc::new(FlightLog::open(&arguments.log)?);
+    let log = Arc::new(FlightLog::open_with(&arguments.log, &arguments.limits.limits())?);
     let (rig, unused_keys) = match Rig::for_log_with_unused_keys(&log, arguments.rig.as_deref()) {
         Ok((rig, unused_keys)) => (Ok(rig), unused_keys),
         Err(error) => (Err(error), Vec::new()),

@@ -6,6 +6,7 @@ use anyhow::Result;
 use clap::Args;
 use dcvins::flight_log;
 
+use crate::cli::limit_arguments::LimitArguments;
 use crate::cli::terminal::{Progress, print_report};
 
 /// `dcvins convert`.
@@ -19,12 +20,16 @@ pub(crate) struct ConvertArguments {
     /// Print the converted and skipped topics as JSON.
     #[arg(long)]
     pub json: bool,
+    /// Limits on the source.
+    #[command(flatten)]
+    pub limits: LimitArguments,
 }
 
 /// Runs `dcvins convert`.
 pub(crate) fn convert(arguments: &ConvertArguments) -> Result<()> {
     let progress = Progress::new();
-    let report = flight_log::convert::convert(&arguments.source, &arguments.output, &mut |ratio| {
+    let limits = arguments.limits.limits();
+    let report = flight_log::convert::convert_with(&arguments.source, &arguments.output, &limits, &mut |ratio| {
         progress.show(ratio, String::new);
     })?;
     drop(progress);

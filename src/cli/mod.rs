@@ -8,6 +8,7 @@ mod convert;
 mod degeneracy;
 mod estimation_arguments;
 mod evaluate;
+mod limit_arguments;
 mod report;
 mod run;
 mod run_summary;

@@ -2,6 +2,7 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
+use super::LimitExceeded;
 use crate::sensors::UnknownCamera;
 
 /// Why a log or a rig could not be read or written; every message names the problem, its place and the remedy, the path
@@ -28,7 +29,23 @@ pub enum LogError {
         /// The file.
         path: PathBuf,
     },
-    /// An MCAP file without a readable message of a known type.
+    /// The file holds or claims more than a limit allows.
+    #[error("{exceeded}: {}", path.display())]
+    Limit {
+        /// The limit, the number found and the way to raise the limit.
+        exceeded: LimitExceeded,
+        /// The file.
+        path: PathBuf,
+    },
+    /// Another process shortened the file while it was read.
+    #[error("{problem}; what was read before is incomplete: {}", path.display())]
+    Shortened {
+        /// Where the file ends now, and its length when it was opened.
+        problem: String,
+        /// The log.
+        path: PathBuf,
+    },
+    /// An MCAP file in which no message of use could be read.
     #[error("nothing in the log can be used: {problem}: {}", path.display())]
     NothingReadable {
         /// The problem, with its byte offset where there is one.

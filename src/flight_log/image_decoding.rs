@@ -2,14 +2,17 @@
 
 use std::io::Cursor;
 
-use image::{DynamicImage, ImageFormat, ImageReader as CodecReader, Limits};
+use image::{DynamicImage, ImageDecoder as _, ImageFormat, ImageReader as CodecReader, Limits};
 
 use super::FlightLog;
+use super::limits::{LogLimits, can_hold_image};
 use super::messages::{ImageMessage, MessageKind, read_compressed_image, read_image};
 use crate::sensors::GrayImage;
 
-/// Largest side of an image; a larger one in a header is damage.
-const MAX_SIDE_PX: usize = 16_384;
+/// Larger images are refused: no camera has them, so the header is damaged.
+const LARGEST_SIDE_PX: usize = 65_535;
+/// Bytes that the decoders may take for a pixel: 16 bits of red, green, blue and opacity.
+const DECODER_BYTES_PER_PIXEL: u64 = 8;
 /// The first bytes of every PNG.
 const PNG: [u8; 4] = [0x89, b'P', b'N', b'G'];
 
@@ -30,11 +33,12 @@ impl Default for BitDepth {
 impl BitDepth {
     /// From the first image of a topic that can be decoded; 16 without one.
     pub(crate) fn of_topic(log: &FlightLog, topic: &str, kind: MessageKind) -> Self {
-        log.find_message(topic, |message| Self::of(kind, message)).unwrap_or_default()
+        let limits = log.file().limits();
+        log.find_message(topic, |message| Self::of(kind, message, limits)).unwrap_or_default()
     }
 
     /// From one image message; `None` when it cannot be decoded or is black. Images of 8 bits have the default.
-    pub(crate) fn of(kind: MessageKind, message: &[u8]) -> Option<Self> {
+    pub(crate) fn of(kind: MessageKind, message: &[u8], limits: &LogLimits) -> Option<Self> {
         let brightest = if kind == MessageKind::Image {
             let raw = read_image(message).ok()?;
             if !matches!(raw.encoding, "mono16" | "16UC1") {
@@ -47,7 +51,7 @@ impl BitDepth {
             if !data.starts_with(&PNG) {
                 return Some(Self::default());
             }
-            match decoder(data, ImageFormat::Png).decode().ok()? {
+            match decode_within(data, ImageFormat::Png, limits, None).ok()? {
                 DynamicImage::ImageLuma16(gray) => gray.into_raw().into_iter().max()?,
                 _ => return Some(Self::default()),
             }
@@ -70,35 +74,97 @@ fn wide_value(pair: [u8; 2], big_endian: bool) -> u16 {
     if big_endian { u16::from_be_bytes(pair) } else { u16::from_le_bytes(pair) }
 }
 
-/// Decodes a raw or compressed image message into 8-bit grey levels; the error names the problem.
-pub(crate) fn decode_image(kind: MessageKind, message: &[u8], depth: BitDepth) -> Result<GrayImage, String> {
-    if kind == MessageKind::Image {
-        return gray_from_raw(&read_image(message).map_err(|error| error.to_string())?, depth);
-    }
-    let (format, data) = read_compressed_image(message).map_err(|error| error.to_string())?;
-    gray_from_compressed(format, data, depth)
+/// Why an image message gives no image.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum ImageProblem {
+    /// It has another resolution than the expected one; it was not decoded.
+    OtherResolution([usize; 2]),
+    /// What is wrong with it.
+    Unreadable(String),
 }
 
-fn gray_from_raw(raw: &ImageMessage<'_>, depth: BitDepth) -> Result<GrayImage, String> {
-    let (width, height) = (raw.width, raw.height);
-    if width == 0 || height == 0 || width > MAX_SIDE_PX || height > MAX_SIDE_PX {
-        return Err(format!("image of {width}×{height} pixels"));
+impl std::fmt::Display for ImageProblem {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::OtherResolution([width, height]) => write!(out, "an image of {width}×{height} pixels"),
+            Self::Unreadable(problem) => out.write_str(problem),
+        }
     }
+}
+
+fn unreadable(problem: impl ToString) -> ImageProblem {
+    ImageProblem::Unreadable(problem.to_string())
+}
+
+/// Decodes a raw or compressed image message into 8-bit grey levels, when it has the expected resolution, if there is one.
+///
+/// The resolution is read before anything is allocated.
+pub(crate) fn decode_image(
+    kind: MessageKind,
+    message: &[u8],
+    depth: BitDepth,
+    limits: &LogLimits,
+    expected_px: Option<[usize; 2]>,
+) -> Result<GrayImage, ImageProblem> {
+    if kind == MessageKind::Image {
+        return gray_from_raw(&read_image(message).map_err(unreadable)?, depth, limits, expected_px);
+    }
+    let (format, data) = read_compressed_image(message).map_err(unreadable)?;
+    gray_from_compressed(format, data, depth, limits, expected_px)
+}
+
+/// Checks the resolution that an image claims.
+fn check_resolution(
+    claimed_px: [usize; 2],
+    limits: &LogLimits,
+    expected_px: Option<[usize; 2]>,
+) -> Result<(), ImageProblem> {
+    let [width, height] = claimed_px;
+    if width == 0 || height == 0 || width > LARGEST_SIDE_PX || height > LARGEST_SIDE_PX {
+        return Err(unreadable(format!("image of {width}×{height} pixels")));
+    }
+    if expected_px.is_some_and(|expected_px| expected_px != claimed_px) {
+        return Err(ImageProblem::OtherResolution(claimed_px));
+    }
+    limits.check_image(claimed_px).map_err(unreadable)
+}
+
+/// What to do about an encoding that is not read.
+fn encoding_remedy(encoding: &str) -> &'static str {
+    if encoding.starts_with("bayer_") {
+        "a color filter mosaic: record the driver's mono8 or rgb8, or the debayered topic of image_proc (image_mono)"
+    } else if encoding.starts_with("yuv") || encoding == "uyvy" || encoding == "yuyv" {
+        "record the driver's mono8 or rgb8, or convert it with image_proc"
+    } else if encoding.starts_with("32F") || encoding.starts_with("64F") {
+        "numbers such as depths, no grey levels: name the topic of the camera's images"
+    } else {
+        "expected mono8, 8UC1, mono16, 16UC1, rgb8, bgr8 or 8UC3"
+    }
+}
+
+fn gray_from_raw(
+    raw: &ImageMessage<'_>,
+    depth: BitDepth,
+    limits: &LogLimits,
+    expected_px: Option<[usize; 2]>,
+) -> Result<GrayImage, ImageProblem> {
+    let (width, height) = (raw.width, raw.height);
+    check_resolution([width, height], limits, expected_px)?;
     let bytes_per_pixel = match raw.encoding {
         "mono8" | "8UC1" => 1,
         "mono16" | "16UC1" => 2,
         "rgb8" | "bgr8" | "8UC3" => 3,
-        other => return Err(format!("image encoding '{other}', expected mono8, 8UC1, mono16, rgb8 or bgr8")),
+        other => return Err(unreadable(format!("image encoding {other:?} is not read: {}", encoding_remedy(other)))),
     };
     let row_bytes = width * bytes_per_pixel;
-    if raw.step < row_bytes || raw.data.len() < raw.step * (height - 1) + row_bytes {
-        return Err(format!(
+    if raw.step < row_bytes || raw.data.len() < raw.step.saturating_mul(height - 1).saturating_add(row_bytes) {
+        return Err(unreadable(format!(
             "{} bytes with {} per row for {width}×{height} {}, expected at least {}",
             raw.data.len(),
             raw.step,
             raw.encoding,
             row_bytes * height
-        ));
+        )));
     }
     let mut pixels = Vec::with_capacity(width * height);
     for row in raw.data.chunks(raw.step).take(height) {
@@ -121,25 +187,54 @@ fn luma(red: u8, green: u8, blue: u8) -> u8 {
     ((u32::from(red) * 19_595 + u32::from(green) * 38_470 + u32::from(blue) * 7_471 + 32_768) >> 16) as u8
 }
 
-fn decoder(data: &[u8], codec: ImageFormat) -> CodecReader<Cursor<&[u8]>> {
+/// Decodes a compressed image whose header claims a resolution that its bytes and the limits allow.
+fn decode_within(
+    data: &[u8],
+    codec: ImageFormat,
+    limits: &LogLimits,
+    expected_px: Option<[usize; 2]>,
+) -> Result<DynamicImage, ImageProblem> {
+    let damaged = |error| unreadable(format!("damaged {codec:?} of {} bytes ({error})", data.len()));
+    let mut decoder_limits = Limits::default();
+    decoder_limits.max_alloc = Some(limits.image_pixels().saturating_mul(DECODER_BYTES_PER_PIXEL));
     let mut reader = CodecReader::with_format(Cursor::new(data), codec);
-    let mut limits = Limits::default();
-    limits.max_image_width = Some(MAX_SIDE_PX as u32);
-    limits.max_image_height = Some(MAX_SIDE_PX as u32);
-    reader.limits(limits);
-    reader
+    reader.limits(decoder_limits);
+    let decoder = reader.into_decoder().map_err(damaged)?;
+    let (width, height) = decoder.dimensions();
+    let claimed_px = [width as usize, height as usize];
+    check_resolution(claimed_px, limits, expected_px)?;
+    if !can_hold_image(data.len(), claimed_px) {
+        return Err(unreadable(format!("a header of {width}×{height} pixels in {codec:?} of {} bytes", data.len())));
+    }
+    DynamicImage::from_decoder(decoder).map_err(damaged)
 }
 
-fn gray_from_compressed(format: &str, data: &[u8], depth: BitDepth) -> Result<GrayImage, String> {
+/// The codec of a compressed image, known by its first bytes.
+fn codec_of(data: &[u8]) -> Option<ImageFormat> {
+    match data {
+        [0xFF, 0xD8, ..] => Some(ImageFormat::Jpeg),
+        _ if data.starts_with(&PNG) => Some(ImageFormat::Png),
+        _ => None,
+    }
+}
+
+/// Name of the format of a compressed image in a message, `None` when it is of no format that is read.
+pub(crate) fn compressed_format(data: &[u8]) -> Option<&'static str> {
+    codec_of(data).map(|codec| if codec == ImageFormat::Png { "png" } else { "jpeg" })
+}
+
+fn gray_from_compressed(
+    format: &str,
+    data: &[u8],
+    depth: BitDepth,
+    limits: &LogLimits,
+    expected_px: Option<[usize; 2]>,
+) -> Result<GrayImage, ImageProblem> {
     // The format field is free text ("jpeg", "rgb8; jpeg compressed bgr8"), the bytes are not.
-    let codec = match data {
-        [0xFF, 0xD8, ..] => ImageFormat::Jpeg,
-        _ if data.starts_with(&PNG) => ImageFormat::Png,
-        _ => return Err(format!("{} bytes of format '{format}' that are neither JPEG nor PNG", data.len())),
-    };
-    let image = decoder(data, codec)
-        .decode()
-        .map_err(|error| format!("damaged {codec:?} of {} bytes ({error})", data.len()))?;
+    let codec = codec_of(data).ok_or_else(|| {
+        unreadable(format!("{} bytes of format {format:?} that are neither JPEG nor PNG", data.len()))
+    })?;
+    let image = decode_within(data, codec, limits, expected_px)?;
     let (width, height) = (image.width() as usize, image.height() as usize);
     let pixels = match image {
         DynamicImage::ImageLuma8(gray) => gray.into_raw(),

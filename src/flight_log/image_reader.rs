@@ -98,8 +98,9 @@ impl ImageReader {
             let damage = block.and_then(|block| block.damage.clone());
             return Err(bad(damage.unwrap_or_else(|| "the index points to no message".into())));
         };
-        let data = block.bytes(self.log.file(), &message.data);
-        let image = Arc::new(decode_image(camera.kind, data, camera.depth).map_err(bad)?);
+        let data = block.bytes(&message.data);
+        let image = decode_image(camera.kind, data, camera.depth, self.log.file().limits(), None);
+        let image = Arc::new(image.map_err(|problem| bad(problem.to_string()))?);
         if cache.images.len() == IMAGES {
             cache.images.remove(0);
         }

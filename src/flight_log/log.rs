@@ -3,12 +3,16 @@ use std::path::{Path, PathBuf};
 
 use super::container::{BlockCache, ContainerIndex, DecodedBlock, MessagePosition, MessageSpan, TopicIndex};
 use super::file::LogFile;
+use super::limits::{LimitExceeded, LimitKind, LogLimits};
 use super::messages::{self, MessageKind};
 use super::{LogError, LogWarning};
 use crate::geometry::seconds_from_ns;
 
 /// First stamps further than this before the IMU's first one do not count for the log's start: they are of another clock.
 const CLOCK_TOLERANCE_NS: i64 = 60_000_000_000;
+
+/// Bytes at the start by which a file is recognized.
+const START_BYTES: usize = 512;
 
 /// One topic of a log.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,7 +33,7 @@ pub struct TopicInfo {
     pub rate_hz: f64,
 }
 
-/// An open flight log: an MCAP file behind a memory map, with the index of its chunks.
+/// An open flight log: an MCAP file with the index of its chunks.
 #[derive(Debug)]
 pub struct FlightLog {
     path: PathBuf,
@@ -50,13 +54,19 @@ impl FlightLog {
     /// The log starts (time zero) at the smallest header stamp among the first messages of all topics that are read, except
     /// stamps more than a minute before the first IMU message, which are of another clock.
     pub fn open(path: &Path) -> Result<Self, LogError> {
-        let file = LogFile::open(path)?;
+        Self::open_with(path, &LogLimits::default())
+    }
+
+    /// Opens a log within limits other than the usual ones.
+    pub fn open_with(path: &Path, limits: &LogLimits) -> Result<Self, LogError> {
+        let file = LogFile::open(path, limits)?;
         check_magic(&file, path)?;
         let index = ContainerIndex::read(&file);
         let mut channel_ids: BTreeMap<String, Vec<u16>> = BTreeMap::new();
         for (id, channel) in &index.channels {
             channel_ids.entry(channel.topic.clone()).or_default().push(*id);
         }
+        let warnings: Vec<LogWarning> = refuse_topics(&mut channel_ids, limits).into_iter().collect();
         let mut log = Self {
             path: path.to_owned(),
             file,
@@ -65,12 +75,10 @@ impl FlightLog {
             topics: Vec::new(),
             epoch_ns: 0,
             duration_ns: 0,
-            warnings: Vec::new(),
+            warnings,
         };
         log.find_topics_and_times()?;
         log.report_damage();
-        // Without an index all of it has been read.
-        log.file.release(&(0..log.file.len()));
         Ok(log)
     }
 
@@ -87,9 +95,12 @@ impl FlightLog {
     /// Checksum (CRC-32) of its first and its last mebibyte, which identifies the log without reading all of it.
     pub fn checksum(&self) -> u32 {
         const PART_BYTES: usize = 1 << 20;
+        let length = self.file.len();
         let mut hasher = crc32fast::Hasher::new();
-        hasher.update(&self.file[..self.file.len().min(PART_BYTES)]);
-        hasher.update(&self.file[self.file.len().saturating_sub(PART_BYTES)..]);
+        for part in [0..length.min(PART_BYTES), length.saturating_sub(PART_BYTES)..length] {
+            // A part that cannot be read any more makes it another log.
+            hasher.update(&self.file.read(part).unwrap_or_default());
+        }
         hasher.finalize()
     }
 
@@ -118,8 +129,8 @@ impl FlightLog {
         &self.warnings
     }
 
-    /// Name and content of the first attachment whose name ends with `name_ends_with`.
-    pub fn attachment(&self, name_ends_with: &str) -> Option<(&str, &[u8])> {
+    /// The content of the first attachment whose name ends so, with its name.
+    pub fn attachment(&self, name_ends_with: &str) -> Option<(&str, Vec<u8>)> {
         let place = self.index.attachments.iter().find(|place| place.name.ends_with(name_ends_with))?;
         Some((&place.name, ContainerIndex::attachment(&self.file, place)?))
     }
@@ -152,7 +163,12 @@ impl FlightLog {
         TopicIndex::new(&self.index, self.channel_ids.get(topic).map_or(&[], |ids| ids))
     }
 
-    /// The whole file.
+    /// An error when another process has shortened the file since it was opened: what was read of it is then incomplete.
+    pub fn require_unshortened(&self) -> Result<(), LogError> {
+        self.file.require_unshortened(&self.path)
+    }
+
+    /// The file.
     pub(crate) fn file(&self) -> &LogFile {
         &self.file
     }
@@ -164,7 +180,7 @@ impl FlightLog {
 
     /// A log time since the log began.
     pub(crate) fn since_start(&self, log_time_ns: u64) -> i64 {
-        i64::try_from(log_time_ns).unwrap_or(i64::MAX).saturating_sub(self.epoch_ns)
+        relative_ns(i64::try_from(log_time_ns).unwrap_or(i64::MAX), self.epoch_ns)
     }
 
     /// Calls `visit` for every readable message of a topic in the order of log times, with its log time since the log
@@ -176,7 +192,7 @@ impl FlightLog {
         while let Some(position) = topic.get(&self.index, &self.file, number) {
             number += 1;
             if let Some((block, message)) = self.message(&mut cache, position) {
-                let data = block.bytes(&self.file, &message.data);
+                let data = block.bytes(&message.data);
                 if !visit(self.since_start(position.log_time_ns), data) {
                     return;
                 }
@@ -220,7 +236,7 @@ impl FlightLog {
             if kind.is_some() {
                 let mut stamp = |position: &MessagePosition| {
                     let (block, message) = self.message(&mut cache, *position)?;
-                    messages::header_stamp_ns(block.bytes(&self.file, &message.data)).ok()
+                    messages::header_stamp_ns(block.bytes(&message.data)).ok()
                 };
                 let first_stamp = first_ones.iter().take(8).find_map(&mut stamp);
                 let last_stamp = last_ones.iter().rev().take(8).find_map(&mut stamp);
@@ -228,13 +244,18 @@ impl FlightLog {
                     stamps.push((kind == Some(MessageKind::Imu), topic.clone(), first_stamp, last_stamp));
                 }
             }
-            let counted = self.index.statistics.as_ref().map(|counts| ids.iter().filter_map(|id| counts.get(id)).sum());
+            // The statistics are claims, too.
+            let most = self.file.limits().messages(self.file.len() as u64);
+            let counted = self.index.statistics.as_ref().map(|counts| {
+                let counts = ids.iter().filter_map(|id| counts.get(id));
+                counts.fold(0_u64, |sum, count| sum.saturating_add(*count)).min(most)
+            });
             let count = counted.unwrap_or_else(|| positions.count(&self.index, &self.file) as u64);
             infos.push((topic.clone(), channel.schema_name.clone(), kind, count, *first, *last));
         }
         if infos.is_empty() {
             let problem = match self.index.damages.first() {
-                Some(damage) => format!("{} at byte {}", damage.problem, damage.byte),
+                Some(damage) => format!("at byte {}: {}", damage.byte, damage.problem),
                 None => "it has no messages; record again, or try `mcap doctor`".into(),
             };
             return Err(LogError::NothingReadable { problem, path: self.path.clone() });
@@ -244,7 +265,7 @@ impl FlightLog {
             .into_iter()
             .map(|(topic, schema, kind, count, first, last)| {
                 let (first_ns, last_ns) = (self.since_start(first.log_time_ns), self.since_start(last.log_time_ns));
-                let span_s = seconds_from_ns(last_ns - first_ns);
+                let span_s = seconds_from_ns(last_ns.saturating_sub(first_ns));
                 let rate_hz = if span_s > 0.0 { count.saturating_sub(1) as f64 / span_s } else { 0.0 };
                 TopicInfo { topic, schema, kind, count, first_ns, last_ns, rate_hz }
             })
@@ -258,7 +279,7 @@ impl FlightLog {
         let counted = || stamps.iter().filter(|entry| entry.2 >= earliest_ns && entry.2 > 0);
         let log_start_ns = i64::try_from(first_log_time_ns).unwrap_or(0);
         self.epoch_ns = counted().map(|entry| entry.2).min().unwrap_or(log_start_ns);
-        self.duration_ns = counted().map(|entry| entry.3 - self.epoch_ns).max().unwrap_or(0).max(0);
+        self.duration_ns = counted().map(|entry| relative_ns(entry.3, self.epoch_ns)).max().unwrap_or(0).max(0);
         for (_, topic, first_ns, _) in stamps {
             if *first_ns < earliest_ns || *first_ns <= 0 {
                 let message = format!(
@@ -273,8 +294,8 @@ impl FlightLog {
 
     fn report_damage(&mut self) {
         for damage in &self.index.damages {
-            let after = if damage.after_log_time_ns == 0 { self.epoch_ns } else { damage.after_log_time_ns as i64 };
-            let stamp_ns = (after - self.epoch_ns).max(0);
+            let stamp_ns =
+                if damage.after_log_time_ns == 0 { 0 } else { self.since_start(damage.after_log_time_ns).max(0) };
             let message = format!(
                 "the log is damaged after second {:.3}, at byte {} of {}: {}; everything before it is used",
                 seconds_from_ns(stamp_ns),
@@ -294,7 +315,31 @@ impl FlightLog {
     }
 }
 
-fn check_magic(file: &[u8], path: &Path) -> Result<(), LogError> {
+/// Times further from the log's start are damage; they count as so far, and differences of two of them cannot overflow.
+const FARTHEST_NS: i64 = i64::MAX / 4;
+
+/// An absolute time since the log began.
+pub(crate) fn relative_ns(absolute_ns: i64, epoch_ns: i64) -> i64 {
+    absolute_ns.saturating_sub(epoch_ns).clamp(-FARTHEST_NS, FARTHEST_NS)
+}
+
+/// Leaves out the topics beyond the limit, with a warning.
+fn refuse_topics(channel_ids: &mut BTreeMap<String, Vec<u16>>, limits: &LogLimits) -> Option<LogWarning> {
+    let (found, allowed) = (channel_ids.len() as u64, limits.topics());
+    if found <= allowed {
+        return None;
+    }
+    let last = channel_ids.keys().nth(allowed as usize).cloned();
+    if let Some(last) = last {
+        channel_ids.split_off(&last);
+    }
+    let exceeded = LimitExceeded { kind: LimitKind::Topics, subject: "a log", found, allowed };
+    Some(LogWarning { stamp_ns: 0, message: format!("{exceeded}; the others, in the order of their names, are read") })
+}
+
+fn check_magic(file: &LogFile, path: &Path) -> Result<(), LogError> {
+    let failed = |problem| LogError::NothingReadable { problem, path: path.to_owned() };
+    let file = file.read(0..file.len().min(START_BYTES)).map_err(failed)?;
     if file.starts_with(mcap::MAGIC) {
         return Ok(());
     }
@@ -303,7 +348,10 @@ fn check_magic(file: &[u8], path: &Path) -> Result<(), LogError> {
         ("a ROS 1 bag".to_owned(), convert)
     } else if file.starts_with(b"SQLite format 3") {
         ("a ROS 2 bag in SQLite".to_owned(), convert)
-    } else if file.iter().take(512).all(|byte| byte.is_ascii_graphic() || byte.is_ascii_whitespace()) {
+    } else if let Some(bytes) = lfs_pointer(&file) {
+        let found = format!("a Git LFS pointer in place of the file ({bytes} bytes)");
+        (found, "fetch the log with `git lfs pull`")
+    } else if file.iter().all(|byte| byte.is_ascii_graphic() || byte.is_ascii_whitespace()) {
         let start: String = file.iter().take(24).map(|byte| char::from(*byte)).collect();
         (format!("a text file that begins with {start:?}"), "give the .mcap file itself")
     } else {
@@ -311,4 +359,13 @@ fn check_magic(file: &[u8], path: &Path) -> Result<(), LogError> {
         (format!("the file begins with {} instead of the MCAP magic", start.join(" ")), "give an MCAP log")
     };
     Err(LogError::NotALog { found, remedy, path: path.to_owned() })
+}
+
+/// The size of the file that a pointer of Git's Large File Storage stands for, when these are the first bytes of one.
+pub(super) fn lfs_pointer(start: &[u8]) -> Option<&str> {
+    let text = std::str::from_utf8(start.get(..start.len().min(START_BYTES))?).ok()?;
+    let mut lines = text.lines();
+    lines.next().filter(|line| line.starts_with("version https://git-lfs.github.com/spec/"))?;
+    let size = lines.find_map(|line| line.strip_prefix("size ")).map(str::trim);
+    size.filter(|size| size.bytes().all(|byte| byte.is_ascii_digit())).or(Some("unknown"))
 }

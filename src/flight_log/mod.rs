@@ -11,7 +11,8 @@ mod file;
 pub(crate) mod image_decoding;
 mod image_reader;
 pub(crate) mod joint_merge;
-mod log;
+mod limits;
+pub(crate) mod log;
 pub(crate) mod messages;
 pub(crate) mod rig;
 mod sensor_frame;
@@ -23,6 +24,7 @@ mod writer;
 
 pub use error::LogError;
 pub use image_reader::ImageReader;
+pub use limits::{LimitExceeded, LimitKind, LimitSetting, LogLimits};
 pub use log::{FlightLog, TopicInfo};
 pub use messages::MessageKind;
 pub use sensor_frame::{LogWarning, SensorFrame};

@@ -5,6 +5,7 @@ use super::statistics::median;
 use crate::flight_log::container::DecodedBlock;
 use crate::flight_log::image_decoding::{BitDepth, decode_image};
 use crate::flight_log::joint_merge::{JointMerge, JointReading};
+use crate::flight_log::log::relative_ns;
 use crate::flight_log::stream::angle_fit;
 use crate::flight_log::{FlightLog, messages, messages::MessageKind};
 use crate::geometry::{seconds_from_ns, wrap_angle};
@@ -102,7 +103,9 @@ impl Survey {
         let mut counts: BTreeMap<String, u64> = BTreeMap::new();
         for block in &log.index().blocks {
             let decoded = DecodedBlock::decode(log.file(), block);
-            if let Some(damage) = decoded.damage.as_ref().filter(|_| block.bytes.end <= log.file().len()) {
+            // A scanned log has reported its damage when it was opened.
+            let reported = !log.index().from_summary || block.bytes.end > log.file().len();
+            if let Some(damage) = decoded.damage.as_ref().filter(|_| !reported) {
                 let (first, last) = block.log_time_ns;
                 survey.damages.push(format!(
                     "chunk at byte {}, from second {:.3} to {:.3}: {damage}",
@@ -119,7 +122,7 @@ impl Survey {
                 let stride = info.count.div_ceil(IMAGES_PER_CAMERA).max(1);
                 let sampled = number.is_multiple_of(stride);
                 *number += 1;
-                let data = decoded.bytes(log.file(), &message.data);
+                let data = decoded.bytes(&message.data);
                 survey.take(log, rig, &info.topic, kind, log.since_start(message.log_time_ns), data, sampled);
             }
         }
@@ -168,7 +171,7 @@ impl Survey {
             .entry(topic.to_owned())
             .or_insert_with(|| TopicSurvey { topic: topic.to_owned(), ..TopicSurvey::default() });
         let stamp_ns = match messages::header_stamp_ns(data) {
-            Ok(absolute_ns) => absolute_ns.saturating_sub(log.epoch_ns()),
+            Ok(absolute_ns) => relative_ns(absolute_ns, log.epoch_ns()),
             Err(error) => return entry.refuse(error.to_string()),
         };
         entry.times.push(Times { log_time_ns, stamp_ns });
@@ -202,16 +205,16 @@ impl Survey {
             }
         }
         if sampled && let Some(camera) = rig.cameras.iter().find(|camera| camera.topic == topic && kind.is_image()) {
-            let known = self.depths.get(&camera.key).copied().or_else(|| BitDepth::of(kind, data));
+            let known = self.depths.get(&camera.key).copied().or_else(|| BitDepth::of(kind, data, log.file().limits()));
             if let Some(depth) = known {
                 self.depths.insert(camera.key.clone(), depth);
             }
-            match decode_image(kind, data, known.unwrap_or_default()) {
+            match decode_image(kind, data, known.unwrap_or_default(), log.file().limits(), None) {
                 Ok(image) => {
                     let image = SampledImage { stamp_ns, measure: measure(&image) };
                     self.images.entry(camera.key.clone()).or_default().push(image);
                 }
-                Err(problem) => entry.refuse(problem),
+                Err(problem) => entry.refuse(problem.to_string()),
             }
         }
     }

@@ -1,13 +1,19 @@
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
+use std::sync::Arc;
 
 use mcap::MAGIC;
 use mcap::records::{ChunkHeader, Record, op};
 
-use super::block::{Block, DecodedBlock, chunk_header, message_header, parse_definition};
-use super::{RECORD_HEADER, record_at};
+use super::super::file::{FileWindow, LogFile};
+use super::super::limits::{DEFINITION_BYTES, LimitExceeded, LimitKind};
+use super::block::{Block, DecodedBlock, MESSAGE_HEADER, chunk_header, message_header, parse_definition};
+use super::{RECORD_HEADER, record_at, record_in_file};
 
-/// Size of the blocks into which messages outside of chunks are grouped.
+/// Channel (2 bytes) and size of the list (4) of a message index.
+const MESSAGE_INDEX_HEAD: usize = 6;
+const NO_END_MAGIC: &str = "the file does not end with the MCAP magic";
+/// Messages outside of chunks are gathered into blocks of about this size.
 const PLAIN_BLOCK_BYTES: usize = 1 << 20;
 
 /// A channel of the log.
@@ -18,6 +24,25 @@ pub(crate) struct ChannelRecord {
     pub(crate) schema_name: String,
     /// `cdr`.
     pub(crate) encoding: String,
+    /// The definition of its type, when it is in the language `ros2msg`.
+    pub(crate) definition: Option<Arc<str>>,
+}
+
+/// A schema of the log, with its definition when that is in the language `ros2msg`.
+#[derive(Clone, Debug)]
+struct SchemaRecord {
+    name: String,
+    definition: Option<Arc<str>>,
+}
+
+/// What [`ContainerIndex::define`] has to know of the definitions before.
+#[derive(Debug, Default)]
+struct Definitions {
+    schemas: BTreeMap<u16, SchemaRecord>,
+    /// Bytes of the definitions held.
+    bytes: usize,
+    /// Channels that are refused, reported once.
+    refused: BTreeSet<u16>,
 }
 
 /// Position of one message.
@@ -73,11 +98,15 @@ pub(crate) struct ContainerIndex {
     pub(crate) damages: Vec<Damage>,
     /// Whether the file's own index is used.
     pub(crate) from_summary: bool,
+    /// Messages indexed by scanning the file.
+    scanned_messages: u64,
+    /// Messages by channel that the index records behind a damaged block count, from scanning the file.
+    scanned_promises: BTreeMap<usize, BTreeMap<u16, u64>>,
 }
 
 impl ContainerIndex {
     /// Reads the file's index, or builds one when the file has no valid one.
-    pub(crate) fn read(file: &[u8]) -> Self {
+    pub(crate) fn read(file: &LogFile) -> Self {
         match Self::from_summary(file) {
             Ok(index) => index,
             Err(reason) => {
@@ -94,16 +123,19 @@ impl ContainerIndex {
         }
     }
 
-    /// The index at the end of the file. The error is the damage to report, `None` when the file has no index.
-    fn from_summary(file: &[u8]) -> Result<Self, Option<String>> {
+    /// The index at the end of the file. The error is the damage to report, `None` when the file simply has no index.
+    fn from_summary(file: &LogFile) -> Result<Self, Option<String>> {
         // Footer: opcode, length, summary start (8 bytes), summary offsets' start (8), checksum (4); then the magic.
         const FOOTER: usize = RECORD_HEADER + 20;
         let footer_start = file.len().checked_sub(FOOTER + MAGIC.len()).filter(|start| *start >= MAGIC.len());
-        let Some(footer_start) = footer_start.filter(|_| file.ends_with(MAGIC)) else {
-            return Err(Some("the file does not end with the MCAP magic".into()));
+        let Some(footer_start) = footer_start else {
+            return Err(Some(NO_END_MAGIC.into()));
         };
-        let footer =
-            record_at(file, footer_start).ok().and_then(|record| mcap::parse_record(record.opcode, record.body).ok());
+        let end = file.read(footer_start..file.len()).map_err(Some)?;
+        if !end.ends_with(MAGIC) {
+            return Err(Some(NO_END_MAGIC.into()));
+        }
+        let footer = record_at(&end, 0).ok().and_then(|record| mcap::parse_record(record.opcode, record.body).ok());
         let Some(Record::Footer(footer)) = footer else {
             return Err(Some("the file has no footer".into()));
         };
@@ -115,22 +147,18 @@ impl ContainerIndex {
             return Err(Some(format!("the footer places the index at byte {}", footer.summary_start)));
         };
         // The checksum covers everything from the summary's start to its own place in the footer.
-        let checksum = crc32fast::hash(&file[start..footer_start + RECORD_HEADER + 16]);
+        let summary = file.read(start..footer_start + RECORD_HEADER + 16).map_err(Some)?;
+        let checksum = crc32fast::hash(&summary);
         if footer.summary_crc != 0 && checksum != footer.summary_crc {
             return Err(Some(format!("the index at byte {start} is damaged (its checksum fails)")));
         }
         let mut index = Self { from_summary: true, ..Self::default() };
-        let mut schemas = BTreeMap::new();
+        let mut definitions = Definitions::default();
         let mut promised_chunks = None;
-        let mut position = MAGIC.len();
-        if let Ok(record) = record_at(file, position)
-            && let Some(Record::Header(header)) = parse_definition(record.opcode, record.body)
-        {
-            index.profile = header.profile;
-        }
-        position = start;
-        while position < footer_start {
-            let record = record_at(file, position).map_err(Some)?;
+        index.read_profile(file);
+        let mut position = 0;
+        while start + position < footer_start {
+            let record = record_at(&summary, position).map_err(Some)?;
             match parse_definition(record.opcode, record.body) {
                 Some(Record::ChunkIndex(chunk)) => {
                     let bytes = chunk_bytes(chunk.chunk_start_offset, chunk.chunk_length);
@@ -155,8 +183,11 @@ impl ContainerIndex {
                     promised_chunks = Some((statistics.chunk_count as usize, statistics.message_count));
                     index.statistics = Some(statistics.channel_message_counts);
                 }
-                Some(other) => index.define(&mut schemas, &other),
-                None => return Err(Some(format!("the index at byte {start} is damaged at byte {position}"))),
+                Some(other) => index.define(file, &mut definitions, &other, start + position),
+                None => {
+                    let byte = start + position;
+                    return Err(Some(format!("the index at byte {start} is damaged at byte {byte}")));
+                }
             }
             position = record.end;
         }
@@ -173,39 +204,65 @@ impl ContainerIndex {
         order.sort_by_key(|number| index.blocks[*number].bytes.start);
         index.blocks = order.iter().map(|number| index.blocks[*number].clone()).collect();
         index.entries = order.iter().map(|number| std::mem::take(&mut index.entries[*number])).collect();
+        if let Some(pair) = index.blocks.windows(2).find(|pair| pair[1].bytes.start < pair[0].bytes.end) {
+            return Err(Some(format!("the index places two chunks at byte {}", pair[1].bytes.start)));
+        }
         Ok(index)
     }
 
+    fn read_profile(&mut self, file: &LogFile) {
+        let mut window = FileWindow::new(file);
+        if let Ok((op::HEADER, body)) = record_in_file(&mut window, file, MAGIC.len())
+            && let Ok(body) = file.read(body)
+            && let Some(Record::Header(header)) = parse_definition(op::HEADER, &body)
+        {
+            self.profile = header.profile;
+        }
+    }
+
     /// Scans all records once.
-    fn from_scan(file: &[u8]) -> Self {
+    fn from_scan(file: &LogFile) -> Self {
         let mut index = Self::default();
-        let mut schemas = BTreeMap::new();
+        let mut definitions = Definitions::default();
+        let mut window = FileWindow::new(file);
         let mut position = MAGIC.len();
-        let mut finished = false;
-        while position < file.len() && !finished {
-            let record = match record_at(file, position) {
+        while position < file.len() {
+            let (opcode, body) = match record_in_file(&mut window, file, position) {
                 Ok(record) => record,
                 Err(problem) => {
-                    index.scan_cut_chunk(file, position, &mut schemas);
+                    index.scan_cut_chunk(file, position, &mut definitions);
                     index.report(position, problem);
                     return index;
                 }
             };
-            match record.opcode {
-                op::CHUNK => index.scan_chunk(file, position..record.end, &mut schemas),
-                op::MESSAGE => index.scan_plain_message(position, record.end, record.body),
-                op::MESSAGE_INDEX => {} // our own entries are there already
-                op::FOOTER => finished = true,
-                op::ATTACHMENT => match attachment(record.body) {
-                    Some((name, _)) => {
-                        index.attachments.push(AttachmentRef { name: name.into(), bytes: position..record.end });
+            let end = body.end;
+            match opcode {
+                op::CHUNK => index.scan_chunk(file, position..end, &mut definitions),
+                op::MESSAGE => {
+                    let header = window.read(body.start..body.end.min(body.start + MESSAGE_HEADER));
+                    index.scan_plain_message(position, end, header.unwrap_or_default());
+                }
+                // Our own entries are there already, except for what a damaged block held.
+                op::MESSAGE_INDEX => {
+                    if let Ok(head) = window.read(body.start..body.end.min(body.start + MESSAGE_INDEX_HEAD)) {
+                        index.scan_message_index(head);
                     }
-                    None => index.report(position, "a damaged attachment".into()),
-                },
-                op::HEADER | op::SCHEMA | op::CHANNEL => match parse_definition(record.opcode, record.body) {
-                    Some(Record::Header(header)) => index.profile = header.profile,
-                    Some(other) => index.define(&mut schemas, &other),
-                    None => index.report(position, format!("a damaged record (opcode {:#04x})", record.opcode)),
+                }
+                op::FOOTER => return index,
+                op::ATTACHMENT => {
+                    match file.read(body).map(|body| attachment(&body).map(|(name, _)| name.to_owned())) {
+                        Ok(Some(name)) => index.attachments.push(AttachmentRef { name, bytes: position..end }),
+                        Ok(None) => index.report(position, "a damaged attachment".into()),
+                        Err(problem) => index.report(position, problem),
+                    }
+                }
+                op::HEADER | op::SCHEMA | op::CHANNEL => match file.read(body) {
+                    Ok(body) => match parse_definition(opcode, &body) {
+                        Some(Record::Header(header)) => index.profile = header.profile,
+                        Some(other) => index.define(file, &mut definitions, &other, position),
+                        None => index.report(position, format!("a damaged record (opcode {opcode:#04x})")),
+                    },
+                    Err(problem) => index.report(position, problem),
                 },
                 0 => {
                     index.report(position, "zeros instead of a record".into());
@@ -213,20 +270,26 @@ impl ContainerIndex {
                 }
                 _ => {}
             }
-            position = record.end;
+            let allowed = file.limits().messages(file.len() as u64);
+            if index.scanned_messages > allowed {
+                let (kind, subject, found) = (LimitKind::Messages, "a log", index.scanned_messages);
+                index.report(position, LimitExceeded { kind, subject, found, allowed }.to_string());
+                return index;
+            }
+            position = end;
         }
         index
     }
 
-    fn scan_chunk(&mut self, file: &[u8], bytes: Range<usize>, schemas: &mut BTreeMap<u16, String>) {
+    fn scan_chunk(&mut self, file: &LogFile, bytes: Range<usize>, definitions: &mut Definitions) {
         let mut block = Block { bytes, is_chunk: true, log_time_ns: (0, 0) };
         if let Ok((ChunkHeader { message_start_time, message_end_time, .. }, _)) = chunk_header(file, &block) {
             block.log_time_ns = (message_start_time, message_end_time);
         }
         let decoded = DecodedBlock::decode(file, &block);
         for (opcode, range) in &decoded.definitions {
-            if let Some(record) = parse_definition(*opcode, decoded.bytes(file, range)) {
-                self.define(schemas, &record);
+            if let Some(record) = parse_definition(*opcode, decoded.bytes(range)) {
+                self.define(file, definitions, &record, block.bytes.start);
             }
         }
         let mut entries: BTreeMap<u16, Entries> = BTreeMap::new();
@@ -242,26 +305,37 @@ impl ContainerIndex {
                 list.push(entry);
             }
         }
+        self.scanned_messages += decoded.messages.len() as u64;
         if let Some(problem) = &decoded.damage {
             self.report(block.bytes.start, problem.clone());
+            self.scanned_promises.insert(self.blocks.len(), BTreeMap::new());
         }
         self.blocks.push(block);
         self.entries.push(entries);
     }
 
+    /// Takes the number of messages of a message index record behind a damaged chunk.
+    fn scan_message_index(&mut self, head: &[u8]) {
+        let Some(number) = self.blocks.len().checked_sub(1) else { return };
+        if let (Some(promises), &[c0, c1, s0, s1, s2, s3]) = (self.scanned_promises.get_mut(&number), head) {
+            let count = u32::from_le_bytes([s0, s1, s2, s3]) / 16;
+            promises.insert(u16::from_le_bytes([c0, c1]), u64::from(count));
+        }
+    }
+
     /// Indexes the readable messages of a truncated chunk.
-    fn scan_cut_chunk(&mut self, file: &[u8], position: usize, schemas: &mut BTreeMap<u16, String>) {
-        if file.get(position) != Some(&op::CHUNK) || file.len() < position + RECORD_HEADER {
+    fn scan_cut_chunk(&mut self, file: &LogFile, position: usize, definitions: &mut Definitions) {
+        if file.len() < position + RECORD_HEADER || file.read(position..position + 1).ok() != Some(vec![op::CHUNK]) {
             return;
         }
         let damages = self.damages.len();
-        self.scan_chunk(file, position..usize::MAX, schemas);
+        self.scan_chunk(file, position..usize::MAX, definitions);
         self.damages.truncate(damages); // the caller reports the cut
     }
 
-    fn scan_plain_message(&mut self, position: usize, end: usize, body: &[u8]) {
-        let Some((channel_id, log_time_ns)) = message_header(body) else {
-            self.report(position, format!("a message record of {} bytes", body.len()));
+    fn scan_plain_message(&mut self, position: usize, end: usize, header: &[u8]) {
+        let Some((channel_id, log_time_ns)) = message_header(header) else {
+            self.report(position, format!("a message record of {} bytes", end - position - RECORD_HEADER));
             return;
         };
         let grows = self.blocks.last().is_some_and(|block| {
@@ -271,6 +345,7 @@ impl ContainerIndex {
             self.blocks.push(Block { bytes: position..end, is_chunk: false, log_time_ns: (log_time_ns, log_time_ns) });
             self.entries.push(BTreeMap::new());
         }
+        self.scanned_messages += 1;
         if let (Some(block), Some(entries)) = (self.blocks.last_mut(), self.entries.last_mut()) {
             block.bytes.end = end;
             block.log_time_ns.0 = block.log_time_ns.0.min(log_time_ns);
@@ -282,15 +357,48 @@ impl ContainerIndex {
         }
     }
 
-    fn define(&mut self, schemas: &mut BTreeMap<u16, String>, record: &Record<'_>) {
+    /// Takes a schema or a channel; the first definition of a channel counts, and names beyond the limits are refused.
+    fn define(&mut self, file: &LogFile, definitions: &mut Definitions, record: &Record<'_>, byte: usize) {
+        let limits = file.limits();
         match record {
-            Record::Schema { header, .. } => {
-                schemas.insert(header.id, header.name.clone());
+            Record::Schema { header, data } => {
+                let allowed = limits.check_name("the name of a message type", &header.name).is_ok();
+                if !allowed || definitions.schemas.contains_key(&header.id) {
+                    return;
+                }
+                let text = std::str::from_utf8(data).ok().filter(|_| header.encoding == "ros2msg");
+                let text = text.filter(|text| definitions.bytes + text.len() <= DEFINITION_BYTES);
+                definitions.bytes += text.map_or(0, str::len);
+                let schema = SchemaRecord { name: header.name.clone(), definition: text.map(Arc::from) };
+                definitions.schemas.insert(header.id, schema);
             }
             Record::Channel(channel) => {
-                let schema_name = schemas.get(&channel.schema_id).cloned().unwrap_or_default();
-                let (topic, encoding) = (channel.topic.clone(), channel.message_encoding.clone());
-                self.channels.insert(channel.id, ChannelRecord { topic, schema_name, encoding });
+                let schema = definitions.schemas.get(&channel.schema_id);
+                let taken = ChannelRecord {
+                    topic: channel.topic.clone(),
+                    schema_name: schema.map(|schema| schema.name.clone()).unwrap_or_default(),
+                    encoding: channel.message_encoding.clone(),
+                    definition: schema.and_then(|schema| schema.definition.clone()),
+                };
+                let problem = match self.channels.get(&channel.id) {
+                    Some(known) if *known == taken => return,
+                    Some(known) => Some(format!(
+                        "channel {} is defined again as {:?}; its first definition, {:?}, is used",
+                        channel.id, taken.topic, known.topic
+                    )),
+                    None => {
+                        let names = limits.check_name("the name of a topic", &taken.topic);
+                        let names = names.and_then(|()| limits.check_name("the name of an encoding", &taken.encoding));
+                        names.err().map(|error| format!("channel {} is not read: {error}", channel.id))
+                    }
+                };
+                match problem {
+                    None => {
+                        self.channels.insert(channel.id, taken);
+                    }
+                    Some(problem) if definitions.refused.insert(channel.id) => self.report(byte, problem),
+                    Some(_) => {}
+                }
             }
             _ => {}
         }
@@ -302,9 +410,10 @@ impl ContainerIndex {
     }
 
     /// The content of an attachment, `None` when it is damaged.
-    pub(crate) fn attachment<'a>(file: &'a [u8], place: &AttachmentRef) -> Option<&'a [u8]> {
-        let record = record_at(file, place.bytes.start).ok().filter(|record| record.opcode == op::ATTACHMENT)?;
-        attachment(record.body).map(|(_, content)| content)
+    pub(crate) fn attachment(file: &LogFile, place: &AttachmentRef) -> Option<Vec<u8>> {
+        let bytes = file.read(place.bytes.start..place.bytes.end.min(file.len())).ok()?;
+        let record = record_at(&bytes, 0).ok().filter(|record| record.opcode == op::ATTACHMENT)?;
+        attachment(record.body).map(|(_, content)| content.to_vec())
     }
 
     /// Numbers of the blocks with messages of some channels.
@@ -314,13 +423,13 @@ impl ContainerIndex {
     }
 
     /// The positions of the messages of some channels in some blocks, in the order of their log times.
-    pub(super) fn positions(&self, file: &[u8], blocks: &[usize], channel_ids: &[u16]) -> Vec<MessagePosition> {
+    pub(super) fn positions(&self, file: &LogFile, blocks: &[usize], channel_ids: &[u16]) -> Vec<MessagePosition> {
         let mut positions = Vec::new();
         for number in blocks.iter().copied() {
             for (channel_id, entries) in self.entries[number].iter().filter(|(id, _)| channel_ids.contains(id)) {
                 let indexed = match entries {
                     Entries::Own(list) => Some(list.clone()),
-                    Entries::Record(at) => message_index(file, *at, *channel_id, &self.blocks[number]),
+                    Entries::Record(at) => self.message_index(file, *at, *channel_id, number),
                 };
                 let list = indexed.unwrap_or_else(|| {
                     // The index record is damaged; the block itself is read.
@@ -334,6 +443,49 @@ impl ContainerIndex {
         }
         positions.sort();
         positions
+    }
+
+    /// Number of messages of each channel that a block has by its message indexes; channels whose index is damaged are
+    /// missing.
+    pub(crate) fn promised(&self, file: &LogFile, number: usize) -> BTreeMap<u16, u64> {
+        if let Some(promises) = self.scanned_promises.get(&number) {
+            return promises.clone();
+        }
+        let count = |channel_id: u16, entries: &Entries| match entries {
+            Entries::Own(list) => Some(list.len() as u64),
+            Entries::Record(at) => self.message_index(file, *at, channel_id, number).map(|list| list.len() as u64),
+        };
+        let counts = self.entries[number].iter().filter_map(|(id, entries)| Some((*id, count(*id, entries)?)));
+        counts.collect()
+    }
+
+    /// Log times and offsets in the message index record at a byte, `None` when there is no such record or it is
+    /// inconsistent with the block: message indexes have no checksum. They lie between their chunk and the next one, so
+    /// that no two chunks share one.
+    fn message_index(&self, file: &LogFile, at: usize, channel_id: u16, number: usize) -> Option<Vec<(u64, u64)>> {
+        let block = &self.blocks[number];
+        let end = self.blocks.get(number + 1).map_or(file.len(), |next| next.bytes.start).min(file.len());
+        let at = Some(at).filter(|at| *at >= block.bytes.end && *at < end)?;
+        let mut window = FileWindow::new(file);
+        let (opcode, body) = record_in_file(&mut window, file, at).ok()?;
+        if opcode != op::MESSAGE_INDEX || body.end > end {
+            return None;
+        }
+        let body = window.read(body).ok()?;
+        // Channel (2 bytes), size of the list (4), then log time and offset (8 each) of every message.
+        let (head, list) = body.split_at_checked(MESSAGE_INDEX_HEAD)?;
+        let size = u32::from_le_bytes([head[2], head[3], head[4], head[5]]) as usize;
+        if u16::from_le_bytes([head[0], head[1]]) != channel_id || size != list.len() || !size.is_multiple_of(16) {
+            return None;
+        }
+        let (first, last) = block.log_time_ns;
+        list.chunks_exact(16)
+            .map(|entry| {
+                let log_time = u64::from_le_bytes(entry[..8].try_into().ok()?);
+                let offset = u64::from_le_bytes(entry[8..].try_into().ok()?);
+                (log_time >= first && log_time <= last).then_some((log_time, offset))
+            })
+            .collect()
     }
 }
 
@@ -358,24 +510,4 @@ fn attachment(body: &[u8]) -> Option<(&str, &[u8])> {
 fn chunk_bytes(offset: u64, length: u64) -> Option<Range<usize>> {
     let start = usize::try_from(offset).ok()?;
     Some(start..start.checked_add(usize::try_from(length).ok()?)?)
-}
-
-/// Log times and offsets in the message index record at a byte, `None` when there is no such record or it is
-/// inconsistent with the block: message indexes have no checksum.
-fn message_index(file: &[u8], at: usize, channel_id: u16, block: &Block) -> Option<Vec<(u64, u64)>> {
-    let record = record_at(file, at).ok().filter(|record| record.opcode == op::MESSAGE_INDEX)?;
-    // Channel (2 bytes), size of the list (4), then log time and offset (8 each) of every message.
-    let (head, list) = record.body.split_at_checked(6)?;
-    let size = u32::from_le_bytes([head[2], head[3], head[4], head[5]]) as usize;
-    if u16::from_le_bytes([head[0], head[1]]) != channel_id || size != list.len() || !size.is_multiple_of(16) {
-        return None;
-    }
-    let (first, last) = block.log_time_ns;
-    list.chunks_exact(16)
-        .map(|entry| {
-            let log_time = u64::from_le_bytes(entry[..8].try_into().ok()?);
-            let offset = u64::from_le_bytes(entry[8..].try_into().ok()?);
-            (log_time >= first && log_time <= last).then_some((log_time, offset))
-        })
-        .collect()
 }

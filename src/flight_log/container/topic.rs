@@ -1,3 +1,4 @@
+use super::super::file::LogFile;
 use super::index::{ContainerIndex, MessagePosition};
 
 /// The messages of one topic in the order of their log times. They are read in groups on demand, because the message
@@ -30,13 +31,13 @@ impl TopicIndex {
     }
 
     /// The position of a message, counted from the first one (or from the position of [`TopicIndex::skip_to`]).
-    pub(crate) fn get(&mut self, index: &ContainerIndex, file: &[u8], number: usize) -> Option<MessagePosition> {
+    pub(crate) fn get(&mut self, index: &ContainerIndex, file: &LogFile, number: usize) -> Option<MessagePosition> {
         while self.loaded.len() <= number && self.load_group(index, file) {}
         self.loaded.get(number).copied()
     }
 
     /// Number of the first message at or after a log time.
-    pub(crate) fn first_at(&mut self, index: &ContainerIndex, file: &[u8], log_time_ns: u64) -> usize {
+    pub(crate) fn first_at(&mut self, index: &ContainerIndex, file: &LogFile, log_time_ns: u64) -> usize {
         while self.loaded.last().is_none_or(|last| last.log_time_ns < log_time_ns) && self.load_group(index, file) {}
         self.loaded.partition_point(|position| position.log_time_ns < log_time_ns)
     }
@@ -50,19 +51,23 @@ impl TopicIndex {
     }
 
     /// The positions in the first group and in the last one.
-    pub(crate) fn ends(&self, index: &ContainerIndex, file: &[u8]) -> [Vec<MessagePosition>; 2] {
+    pub(crate) fn ends(&self, index: &ContainerIndex, file: &LogFile) -> [Vec<MessagePosition>; 2] {
         [self.groups.first(), self.groups.last()]
             .map(|group| group.map(|group| index.positions(file, group, &self.channel_ids)).unwrap_or_default())
     }
 
     /// Number of messages.
-    pub(crate) fn count(&mut self, index: &ContainerIndex, file: &[u8]) -> usize {
+    pub(crate) fn count(&mut self, index: &ContainerIndex, file: &LogFile) -> usize {
         while self.load_group(index, file) {}
         self.loaded.len()
     }
 
-    fn load_group(&mut self, index: &ContainerIndex, file: &[u8]) -> bool {
+    fn load_group(&mut self, index: &ContainerIndex, file: &LogFile) -> bool {
         let Some(group) = self.groups.get(self.next_group) else { return false };
+        // Every message has an entry in the file; more of them come from indexes that overlap.
+        if self.loaded.len() as u64 > file.limits().messages(file.len() as u64) {
+            return false;
+        }
         self.loaded.extend(index.positions(file, group, &self.channel_ids));
         self.next_group += 1;
         true

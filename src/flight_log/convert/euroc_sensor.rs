@@ -7,8 +7,8 @@ use nalgebra::Matrix4;
 use serde_json::Value;
 
 use super::super::LogError;
-use super::ConvertError;
 use super::sink::Sink;
+use super::{ConvertError, read_description};
 use crate::camera::CameraModel;
 use crate::geometry::{RigidTransform, seconds_from_ns};
 use crate::sensors::{CameraMount, CameraRig, ImuNoise, ImuRig, Rig};
@@ -48,7 +48,7 @@ impl SensorFile {
         if !path.is_file() {
             return Ok(None);
         }
-        let text = fs::read_to_string(&path).map_err(ConvertError::io("read the sensor's description", &path))?;
+        let text = read_description(&path, "read the sensor's description")?;
         // OpenCV's files start with `%YAML:1.0`, which is not a YAML directive.
         let text = if text.starts_with("%YAML:") { text.split_once('\n').map_or("", |(_, rest)| rest) } else { &text };
         let document = serde_saphyr::from_str(text).map_err(|error| {

@@ -22,7 +22,10 @@ use std::path::{Path, PathBuf};
 pub use error::ConvertError;
 pub use report::{ConversionReport, ConvertedTopic};
 
-use super::{FlightLog, LogWriter, LogWriterOptions};
+use super::file::{LogFile, ZSTD_MAGIC, kind_of, unpacked_name};
+use super::limits::DESCRIPTION_BYTES;
+use super::log::lfs_pointer;
+use super::{FlightLog, LogLimits, LogWriter, LogWriterOptions};
 use crate::geometry::seconds_from_ns;
 use crate::sensors::Rig;
 use sink::Sink;
@@ -34,6 +37,8 @@ enum SourceKind {
     Ros1Bag,
     Ros2Bag,
     Sqlite,
+    /// SQLite under Zstandard.
+    PackedSqlite,
     Mcap,
 }
 
@@ -43,7 +48,7 @@ impl SourceKind {
             Self::Euroc => "EuRoC folder",
             Self::Ros1Bag => "ROS 1 bag",
             Self::Ros2Bag => "ROS 2 bag",
-            Self::Sqlite => "ROS 2 bag (one SQLite file)",
+            Self::Sqlite | Self::PackedSqlite => "ROS 2 bag (one SQLite file)",
             Self::Mcap => "MCAP",
         }
     }
@@ -56,16 +61,26 @@ impl SourceKind {
 ///
 /// # Errors
 /// When the source is of no known kind or damaged at its start, when it has no usable message, or when files cannot be
-/// read or written. A source that is damaged later is converted up to the damage, with a note in the report.
+/// read or written. Of a damaged source everything that can be read is converted; notes in the report count what is lost.
 pub fn convert(source: &Path, output: &Path, progress: &mut dyn FnMut(f64)) -> Result<ConversionReport, ConvertError> {
-    let kind = detect(source)?;
+    convert_with(source, output, &LogLimits::default(), progress)
+}
+
+/// Converts as [`convert`] does, within limits other than the usual ones.
+pub fn convert_with(
+    source: &Path,
+    output: &Path,
+    limits: &LogLimits,
+    progress: &mut dyn FnMut(f64),
+) -> Result<ConversionReport, ConvertError> {
+    let kind = detect(source, limits)?;
     let same = |a: &Path, b: &Path| fs::canonicalize(a).ok().is_some_and(|path| fs::canonicalize(b).ok() == Some(path));
     if same(source, output) || output.parent().is_some_and(|folder| kind == SourceKind::Ros2Bag && same(source, folder))
     {
         return Err(ConvertError::OntoItself { path: output.to_owned() });
     }
     let partial = with_suffix(output, ".partial");
-    let converted = write(kind, source, &partial, progress);
+    let converted = write(kind, source, &partial, limits, progress);
     let (mut report, rig) = match converted {
         Ok(converted) => converted,
         Err(error) => {
@@ -98,19 +113,44 @@ fn write(
     kind: SourceKind,
     source: &Path,
     output: &Path,
+    limits: &LogLimits,
     progress: &mut dyn FnMut(f64),
 ) -> Result<(ConversionReport, Option<Rig>), ConvertError> {
     let writer = LogWriter::create(output, &LogWriterOptions::default())?;
-    let mut sink = Sink::new(writer, progress);
+    let mut sink = Sink::new(writer, limits.clone(), progress);
     let rig = match kind {
         SourceKind::Euroc => euroc::convert(source, &mut sink)?,
-        SourceKind::Ros1Bag => ros1_bag::convert(source, &mut sink).map(|()| None)?,
+        SourceKind::Ros1Bag => {
+            let bag = ros1_bag::open(source, &sink)?;
+            ros1_bag::convert(&bag, &mut sink).map(|()| None)?
+        }
         SourceKind::Ros2Bag => ros2_bag::convert(source, &mut sink).map(|()| None)?,
-        SourceKind::Sqlite => sqlite::convert(source, sqlite::BlobCompression::None, &mut sink).map(|()| None)?,
-        SourceKind::Mcap => mcap_segment::convert(source, &mut sink).map(|()| None)?,
+        SourceKind::Sqlite => {
+            let database = sqlite::open(source, limits)?;
+            sqlite::convert(&database, &mut sink).map(|()| None)?
+        }
+        SourceKind::PackedSqlite => {
+            let plain = ros2_bag::unpack_to_path(source, limits)?;
+            let database = sqlite::open(plain.path(), limits)?;
+            sqlite::convert(&database, &mut sink).map(|()| None)?
+        }
+        SourceKind::Mcap => {
+            let file = mcap_segment::open(source, &sink)?;
+            mcap_segment::convert(&file, source, &mut sink).map(|()| None)?
+        }
     };
     let report = sink.finish(kind.name(), source)?;
     Ok((report, rig))
+}
+
+/// Reads a small text file; a larger one is no description of a source.
+fn read_description(path: &Path, action: &'static str) -> Result<String, ConvertError> {
+    let metadata = fs::metadata(path).map_err(ConvertError::io(action, path))?;
+    if !metadata.is_file() || metadata.len() > DESCRIPTION_BYTES {
+        let problem = format!("{} bytes in place of a text file of at most {DESCRIPTION_BYTES}", metadata.len());
+        return Err(ConvertError::unreadable(problem, path));
+    }
+    fs::read_to_string(path).map_err(ConvertError::io(action, path))
 }
 
 /// `a/log.mcap` and `.partial` make `a/log.mcap.partial`.
@@ -120,34 +160,62 @@ fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
     PathBuf::from(name)
 }
 
+/// Bytes at the start by which a source is recognized.
+const START_BYTES: usize = 512;
+
 /// Kind of the source at a path.
-fn detect(source: &Path) -> Result<SourceKind, ConvertError> {
+fn detect(source: &Path, limits: &LogLimits) -> Result<SourceKind, ConvertError> {
     let metadata = fs::metadata(source).map_err(ConvertError::io("open the source", source))?;
+    let unknown = |found: String| ConvertError::UnknownSource { found, path: source.to_owned() };
     if metadata.is_dir() {
         return if euroc::root(source).is_some() {
             Ok(SourceKind::Euroc)
         } else if ros2_bag::is_bag(source) {
             Ok(SourceKind::Ros2Bag)
         } else {
-            let found = "a folder without mav0/imu0/data.csv and without metadata.yaml, .db3 or .mcap files".to_owned();
-            Err(ConvertError::UnknownSource { found, path: source.to_owned() })
+            Err(unknown(
+                "a folder without mav0/imu0/data.csv and without metadata.yaml, .db3 or .mcap files".to_owned(),
+            ))
         };
+    }
+    if !metadata.is_file() {
+        return Err(unknown(kind_of(&metadata).to_owned()));
     }
     let mut start = Vec::new();
     let file = fs::File::open(source).map_err(ConvertError::io("open the source", source))?;
-    file.take(16).read_to_end(&mut start).map_err(ConvertError::io("read the source", source))?;
-    let unknown = |found: String| ConvertError::UnknownSource { found, path: source.to_owned() };
+    file.take(START_BYTES as u64).read_to_end(&mut start).map_err(ConvertError::io("read the source", source))?;
+    let packed = start.starts_with(&ZSTD_MAGIC);
+    if packed {
+        // The name says what is inside, so that it is not unpacked twice.
+        let name = unpacked_name(source);
+        let ending = name.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
+        match ending.as_deref() {
+            Some("db3") => return Ok(SourceKind::PackedSqlite),
+            Some("mcap") => return Ok(SourceKind::Mcap),
+            Some("bag") => return Ok(SourceKind::Ros1Bag),
+            _ => {
+                let plain = LogFile::open(source, limits)?;
+                start = plain
+                    .read(0..plain.len().min(START_BYTES))
+                    .map_err(|problem| ConvertError::unreadable(problem, source))?;
+            }
+        }
+    }
     if start.starts_with(mcap::MAGIC) {
         Ok(SourceKind::Mcap)
     } else if start.starts_with(ros1_bag::MAGIC) {
         Ok(SourceKind::Ros1Bag)
     } else if start.starts_with(b"#ROSBAG") {
         let version = String::from_utf8_lossy(&start[1..]).lines().next().unwrap_or_default().to_owned();
-        Err(unknown(format!("a bag of version '{version}'; only ROSBAG V2.0 is read ('rosbag fix' makes one)")))
+        Err(unknown(format!("a bag of version {version:?}; only ROSBAG V2.0 is read ('rosbag fix' makes one)")))
     } else if start.starts_with(b"SQLite format 3") {
-        Ok(SourceKind::Sqlite)
+        Ok(if packed { SourceKind::PackedSqlite } else { SourceKind::Sqlite })
     } else if start.is_empty() {
         Err(unknown("an empty file".to_owned()))
+    } else if let Some(bytes) = lfs_pointer(&start) {
+        let problem =
+            format!("a Git LFS pointer in place of the file ({bytes} bytes): fetch the file with `git lfs pull`");
+        Err(ConvertError::unreadable(problem, source))
     } else {
         let bytes: Vec<String> = start.iter().take(8).map(|byte| format!("{byte:02x}")).collect();
         Err(unknown(format!("a file that begins with the bytes {}", bytes.join(" "))))

@@ -1,5 +1,7 @@
 //! Records of a ROS 1 bag, format 2.0: a header of named fields, and data.
 
+use super::super::file::LogFile;
+
 /// One record.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BagRecord<'a> {
@@ -25,6 +27,47 @@ pub(super) fn record_at(bytes: &[u8], start: usize) -> Result<BagRecord<'_>, Str
     let record = BagRecord { header, data, end };
     // Every record has an opcode; without one these bytes are something else.
     record.opcode().map(|_| record).ok_or_else(|| "no record starts here".to_owned())
+}
+
+/// Largest header of a record: those of connections hold the name of a topic.
+const LARGEST_HEADER_BYTES: usize = 1 << 20;
+
+/// A record of the file, read into memory.
+#[derive(Clone, Debug)]
+pub(super) struct OwnedRecord {
+    /// Header and data, each after its length.
+    bytes: Vec<u8>,
+    /// First byte after it in the file.
+    pub(super) end: usize,
+}
+
+impl OwnedRecord {
+    /// The record in it.
+    pub(super) fn record(&self) -> Result<BagRecord<'_>, String> {
+        record_at(&self.bytes, 0)
+    }
+}
+
+/// The record that starts at a byte of a file, or why there is none.
+pub(super) fn record_in_file(file: &LogFile, start: usize) -> Result<OwnedRecord, String> {
+    let length_at = |at: usize| -> Result<usize, String> {
+        let end = at.checked_add(4).filter(|end| *end <= file.len());
+        let end = end.ok_or_else(|| format!("a record ends after the last of {} bytes", file.len()))?;
+        let bytes = file.read(at..end)?;
+        Ok(u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]) as usize)
+    };
+    let header_bytes = length_at(start)?;
+    if header_bytes > LARGEST_HEADER_BYTES {
+        return Err(format!("no record starts here: its header would have {header_bytes} bytes"));
+    }
+    let data_bytes = length_at((start + 4).saturating_add(header_bytes))?;
+    let end = start.saturating_add(8).saturating_add(header_bytes).saturating_add(data_bytes);
+    if end > file.len() {
+        return Err(format!("a record of {} bytes where {} bytes are left", end - start, file.len() - start));
+    }
+    let owned = OwnedRecord { bytes: file.read(start..end)?, end };
+    owned.record().map(|_| ())?;
+    Ok(owned)
 }
 
 /// The value of a named field among `name=value` fields.

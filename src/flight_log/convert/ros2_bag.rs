@@ -1,29 +1,33 @@
 //! ROS 2 bags: a folder with `metadata.yaml` and one or more SQLite or MCAP files, plain or under zstd.
 
-use std::fs::{self, File};
-use std::io::BufReader;
-use std::path::{Path, PathBuf};
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::Write as _;
+use std::path::{Component, Path, PathBuf};
 
 use serde_json::Value;
 use tempfile::NamedTempFile;
 
+use super::super::file::{LogFile, unpacked_name};
+use super::super::limits::LogLimits;
 use super::sink::Sink;
-use super::sqlite::BlobCompression;
-use super::{ConvertError, mcap_segment, sqlite};
+use super::sqlite::BagDatabase;
+use super::{ConvertError, mcap_segment, read_description, sqlite};
+
+/// Bytes that are copied at a time.
+const COPIED_BYTES: usize = 1 << 20;
 
 /// Whether a folder is a ROS 2 bag, also without its `metadata.yaml`.
 pub(super) fn is_bag(folder: &Path) -> bool {
     folder.join("metadata.yaml").is_file() || segments(folder).is_ok_and(|segments| !segments.is_empty())
 }
 
-/// The path without `.zstd`, if it has that extension.
-fn plain_name(path: &Path) -> Option<PathBuf> {
-    path.extension().filter(|extension| *extension == "zstd" || *extension == "zst").map(|_| path.with_extension(""))
+fn is_packed(path: &Path) -> bool {
+    unpacked_name(path) != path
 }
 
 fn is_segment(path: &Path) -> bool {
-    let plain = plain_name(path).unwrap_or_else(|| path.to_owned());
-    plain.extension().is_some_and(|extension| extension == "db3" || extension == "mcap")
+    unpacked_name(path).extension().is_some_and(|extension| extension == "db3" || extension == "mcap")
 }
 
 /// The files of a folder that may belong to a bag, in the order of the numbers in their names.
@@ -42,17 +46,21 @@ fn segments(folder: &Path) -> Result<Vec<PathBuf>, ConvertError> {
 }
 
 /// Content of `metadata.yaml`.
+#[derive(Default)]
 struct BagMetadata {
     segments: Vec<PathBuf>,
-    blob_compression: BlobCompression,
+    /// Messages of the whole bag.
+    messages: Option<u64>,
+    /// Messages of its files by name, which recorders since ROS 2 Galactic write.
+    messages_by_file: BTreeMap<String, u64>,
 }
 
 fn read_metadata(folder: &Path) -> Result<BagMetadata, ConvertError> {
     let path = folder.join("metadata.yaml");
     if !path.is_file() {
-        return Ok(BagMetadata { segments: segments(folder)?, blob_compression: BlobCompression::None });
+        return Ok(BagMetadata { segments: segments(folder)?, ..BagMetadata::default() });
     }
-    let text = fs::read_to_string(&path).map_err(ConvertError::io("read the bag's metadata", &path))?;
+    let text = read_description(&path, "read the bag's metadata")?;
     let document: Value = serde_saphyr::from_str(&text).map_err(|error| {
         let problem = error.to_string();
         ConvertError::unreadable(format!("no valid YAML: {}", problem.lines().next().unwrap_or_default()), &path)
@@ -67,24 +75,50 @@ fn read_metadata(folder: &Path) -> Result<BagMetadata, ConvertError> {
     let (mode, format) = (text("compression_mode").to_ascii_lowercase(), text("compression_format"));
     let compressed = !mode.is_empty() && mode != "none";
     if compressed && format != "zstd" {
-        let problem = format!("compression_format holds '{format}', expected zstd; record or convert it without");
+        let problem = format!("compression_format holds {format:?}, expected zstd; record or convert it without");
         return Err(ConvertError::unreadable(problem, &path));
     }
-    let blob_compression = if mode == "message" { BlobCompression::Zstd } else { BlobCompression::None };
-    Ok(BagMetadata { segments, blob_compression })
+    let files = information.get("files").and_then(Value::as_array).into_iter().flatten();
+    let messages_by_file = files.filter_map(|file| {
+        let name = Path::new(file.get("path")?.as_str()?).file_name()?.to_str()?;
+        Some((name.to_owned(), file.get("message_count")?.as_u64()?))
+    });
+    Ok(BagMetadata {
+        segments,
+        messages: information.get("message_count").and_then(Value::as_u64),
+        messages_by_file: messages_by_file.collect(),
+    })
 }
 
-/// Path of a file of the bag: old recorders wrote the folder's name before it, and some omit `.zstd`.
+/// Path of a file of the bag: old recorders wrote the folder's name before it, and some omit `.zstd`. It lies in the
+/// bag's folder, whatever the name says.
 fn find(folder: &Path, name: &str) -> PathBuf {
-    let in_folder = folder.join(name);
+    let inside = Path::new(name).components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
     let beside = folder.join(Path::new(name).file_name().unwrap_or_default());
-    let mut candidates = [&in_folder, &beside].into_iter().flat_map(|path| {
-        [path.clone(), super::with_suffix(path, ".zstd"), plain_name(path).unwrap_or_else(|| path.clone())]
-    });
+    let in_folder = if inside { folder.join(name) } else { beside.clone() };
+    let mut candidates = [&in_folder, &beside]
+        .into_iter()
+        .flat_map(|path| [path.clone(), super::with_suffix(path, ".zstd"), unpacked_name(path)]);
     candidates.find(|path| path.is_file()).unwrap_or_else(|| beside.clone())
 }
 
-/// Converts a bag into a log.
+/// An open file of a bag.
+enum Segment {
+    Mcap(LogFile),
+    Sqlite(BagDatabase, Option<NamedTempFile>),
+}
+
+fn open_segment(path: &Path, sink: &Sink<'_>) -> Result<Segment, ConvertError> {
+    if unpacked_name(path).extension().is_some_and(|extension| extension == "mcap") {
+        return Ok(Segment::Mcap(mcap_segment::open(path, sink)?));
+    }
+    let unpacked = if is_packed(path) { Some(unpack_to_path(path, sink.limits())?) } else { None };
+    let plain = unpacked.as_ref().map_or(path, NamedTempFile::path);
+    let database = sqlite::open(plain, sink.limits())?;
+    Ok(Segment::Sqlite(database, unpacked))
+}
+
+/// Converts a bag into a log. A file that is missing or cannot be read is left out.
 pub(super) fn convert(folder: &Path, sink: &mut Sink<'_>) -> Result<(), ConvertError> {
     let metadata = read_metadata(folder)?;
     if !folder.join("metadata.yaml").is_file() {
@@ -96,22 +130,38 @@ pub(super) fn convert(folder: &Path, sink: &mut Sink<'_>) -> Result<(), ConvertE
         }
     }
     for path in &metadata.segments {
-        let unpacked = if plain_name(path).is_some() { Some(unpack(path)?) } else { None };
-        let plain = unpacked.as_ref().map_or(path.as_path(), NamedTempFile::path);
-        let name = plain_name(path).unwrap_or_else(|| path.clone());
-        if name.extension().is_some_and(|extension| extension == "mcap") {
-            mcap_segment::convert(plain, sink)?;
-        } else {
-            sqlite::convert(plain, metadata.blob_compression, sink)?;
+        match open_segment(path, sink) {
+            Ok(Segment::Mcap(file)) => mcap_segment::convert(&file, path, sink)?,
+            // The temporary file, if any, lives as long as the database that reads it.
+            Ok(Segment::Sqlite(database, _unpacked)) => sqlite::convert(&database, sink)?,
+            Err(problem) => {
+                let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+                let lost = match metadata.messages_by_file.get(&name) {
+                    Some(count) => format!("its {count} messages are lost"),
+                    None => "its messages are lost".to_owned(),
+                };
+                sink.note(format!("a file of the bag is left out, and {lost}: {problem}"));
+            }
         }
+    }
+    if let Some(promised) = metadata.messages
+        && promised != sink.seen()
+    {
+        sink.note(format!("metadata.yaml counts {promised} messages, {} were found", sink.seen()));
     }
     Ok(())
 }
 
-/// A compressed file, decompressed into a temporary one.
-fn unpack(path: &Path) -> Result<NamedTempFile, ConvertError> {
-    let packed = BufReader::new(File::open(path).map_err(ConvertError::io("open the bag", path))?);
+/// Unpacks a compressed database into a temporary file, which SQLite opens by its path.
+pub(super) fn unpack_to_path(path: &Path, limits: &LogLimits) -> Result<NamedTempFile, ConvertError> {
+    let file = LogFile::open(path, limits)?;
     let mut plain = NamedTempFile::new().map_err(ConvertError::io("make a temporary file for", path))?;
-    zstd::stream::copy_decode(packed, &mut plain).map_err(ConvertError::io("decompress", path))?;
+    let mut at = 0;
+    while at < file.len() {
+        let end = file.len().min(at + COPIED_BYTES);
+        let bytes = file.read(at..end).map_err(|problem| ConvertError::unreadable(problem, path))?;
+        plain.write_all(&bytes).map_err(ConvertError::io("decompress", path))?;
+        at = end;
+    }
     Ok(plain)
 }

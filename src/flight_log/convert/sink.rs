@@ -1,12 +1,23 @@
 //! The output of every conversion: the log, and the number of messages written and skipped by topic.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use super::super::container::unpack_message;
+use super::super::limits::{LimitExceeded, LimitKind, LogLimits};
+use super::super::messages::header_stamp_ns;
 use super::super::writer::MessageType;
 use super::super::{LogWriter, MessageKind, MessageTimes};
 use super::ros1_message::cdr_from_ros1;
 use super::{ConversionReport, ConvertError, ConvertedTopic};
+
+/// Characters of a name that is too long which are shown.
+const SHOWN_CHARS: usize = 48;
+/// Topics that the error of a source without usable messages describes.
+const DESCRIBED_TOPICS: usize = 16;
+/// Row of the report for the topics beyond their limit.
+const OTHER_TOPICS: &str = "(other topics)";
 
 /// Bytes of a message in the encoding of its source.
 #[derive(Clone, Copy, Debug)]
@@ -47,12 +58,31 @@ pub(super) struct Sink<'a> {
     /// The message type of each topic in the log.
     types: BTreeMap<String, String>,
     notes: Vec<String>,
+    limits: LogLimits,
+    /// Messages in the log so far.
+    count: u64,
     progress: &'a mut dyn FnMut(f64),
 }
 
 impl<'a> Sink<'a> {
-    pub(super) fn new(writer: LogWriter, progress: &'a mut dyn FnMut(f64)) -> Self {
-        Self { writer, tallies: BTreeMap::new(), types: BTreeMap::new(), notes: Vec::new(), progress }
+    pub(super) fn new(writer: LogWriter, limits: LogLimits, progress: &'a mut dyn FnMut(f64)) -> Self {
+        let (tallies, types, notes) = (BTreeMap::new(), BTreeMap::new(), Vec::new());
+        Self { writer, tallies, types, notes, limits, count: 0, progress }
+    }
+
+    /// Limits on what is read from the source.
+    pub(super) fn limits(&self) -> &LogLimits {
+        &self.limits
+    }
+
+    /// Messages found so far: those in the log and those that were skipped.
+    pub(super) fn seen(&self) -> u64 {
+        self.tallies.values().fold(0, |sum: u64, tally| sum.saturating_add(tally.taken).saturating_add(tally.left))
+    }
+
+    /// Messages in the log so far.
+    pub(super) fn count(&self) -> u64 {
+        self.count
     }
 
     /// Reports the fraction of the source that is done, from 0 to 1.
@@ -67,27 +97,56 @@ impl<'a> Sink<'a> {
 
     /// Adds a topic to the report, even without messages.
     pub(super) fn announce(&mut self, topic: &str, message_type: &str) {
-        self.tallies.entry((topic.to_owned(), message_type.to_owned())).or_default();
+        self.tally(topic, message_type);
     }
 
     /// Counts messages that were skipped.
     pub(super) fn leave(&mut self, topic: &str, message_type: &str, count: u64, reason: impl Into<String>) {
-        let tally = self.tallies.entry((topic.to_owned(), message_type.to_owned())).or_default();
-        tally.left += count;
+        let tally = self.tally(topic, message_type);
+        tally.left = tally.left.saturating_add(count);
         tally.reason.get_or_insert_with(|| reason.into());
     }
 
     /// Counts a message that is in the log.
     pub(super) fn taken(&mut self, topic: &str, message_type: &str) -> &mut Tally {
-        let tally = self.tallies.entry((topic.to_owned(), message_type.to_owned())).or_default();
-        if tally.taken == 0 {
+        self.count += 1;
+        if !self.types.contains_key(topic) {
             self.types.insert(topic.to_owned(), message_type.to_owned());
         }
+        let tally = self.tally(topic, message_type);
         tally.taken += 1;
         tally
     }
 
-    /// Writes a message to the log, or counts it as skipped with the reason.
+    /// The row of a topic in the report; topics beyond their limit share one.
+    fn tally(&mut self, topic: &str, message_type: &str) -> &mut Tally {
+        let name = |name: &str| match self.limits.check_name("a name", name) {
+            Ok(()) => name.to_owned(),
+            Err(_) => {
+                let start: String = name.chars().take(SHOWN_CHARS).collect();
+                format!("{start}… ({} bytes)", name.len())
+            }
+        };
+        let key = (name(topic), name(message_type));
+        let full = self.tallies.len() as u64 >= self.limits.topics().saturating_mul(2);
+        let key = if full && !self.tallies.contains_key(&key) { (OTHER_TOPICS.to_owned(), String::new()) } else { key };
+        self.tallies.entry(key).or_default()
+    }
+
+    /// Why a topic cannot be in the log: its names, or the number of topics before it.
+    fn refusal(&self, topic: &str, message_type: &str) -> Option<String> {
+        let names = self.limits.check_name("the name of a topic", topic);
+        if let Err(exceeded) = names.and_then(|()| self.limits.check_name("the name of a type", message_type)) {
+            return Some(exceeded.to_string());
+        }
+        let (before, allowed) = (self.types.len() as u64, self.limits.topics());
+        (before >= allowed && !self.types.contains_key(topic)).then(|| {
+            let (kind, subject) = (LimitKind::Topics, "a log");
+            LimitExceeded { kind, subject, found: before.saturating_add(1), allowed }.to_string()
+        })
+    }
+
+    /// Writes a message into the log, or counts why it cannot be.
     pub(super) fn take(&mut self, message: &SourceMessage<'_>) -> Result<(), ConvertError> {
         let SourceMessage { topic, message_type, log_time_ns, .. } = *message;
         if let Some(other) = self.types.get(topic)
@@ -97,10 +156,31 @@ impl<'a> Sink<'a> {
             self.leave(topic, message_type, 1, reason);
             return Ok(());
         }
+        if let Some(reason) = self.refusal(topic, message_type) {
+            self.leave(topic, message_type, 1, reason);
+            return Ok(());
+        }
         let kind = MessageKind::from_schema_name(message_type);
         let times = MessageTimes { stamp_ns: log_time_ns, log_time_ns };
-        let written = match (kind, message.payload) {
-            (Some(kind), Payload::Cdr(bytes)) => Ok(self.writer.write(topic, kind, times, bytes)?),
+        let unpacked: Cow<'_, [u8]>;
+        let payload = match message.payload {
+            Payload::Cdr(bytes) => match unpack_message(bytes, &self.limits) {
+                Ok(bytes) => {
+                    unpacked = bytes;
+                    Payload::Cdr(&unpacked)
+                }
+                Err(reason) => {
+                    self.leave(topic, message_type, 1, reason);
+                    return Ok(());
+                }
+            },
+            other => other,
+        };
+        let written = match (kind, payload) {
+            (Some(kind), Payload::Cdr(bytes)) => match header_stamp_ns(bytes) {
+                Ok(_) => Ok(self.writer.write(topic, kind, times, bytes)?),
+                Err(error) => Err(format!("it cannot be decoded: {error}")),
+            },
             (Some(kind), Payload::Ros1(bytes)) => match cdr_from_ros1(kind, bytes) {
                 Ok(bytes) => Ok(self.writer.write(topic, kind, times, &bytes)?),
                 Err(problem) => Err(problem),
@@ -113,7 +193,7 @@ impl<'a> Sink<'a> {
                 None => Err("the program reads no such type, and the bag does not hold its definition".to_owned()),
             },
             (None, Payload::Ros1(_)) => Err("the program reads no such type".to_owned()),
-            (_, Payload::Other(encoding)) => Err(format!("encoded as '{encoding}', expected CDR or ROS 1")),
+            (_, Payload::Other(encoding)) => Err(format!("encoded as {encoding:?}, expected CDR or ROS 1")),
         };
         match written {
             Ok(()) => {
@@ -143,11 +223,14 @@ impl<'a> Sink<'a> {
         let usable =
             |topic: &ConvertedTopic| topic.taken > 0 && MessageKind::from_schema_name(&topic.message_type).is_some();
         if !topics.iter().any(usable) {
-            let descriptions = topics.iter().map(|topic| {
+            let descriptions = topics.iter().take(DESCRIBED_TOPICS).map(|topic| {
                 let reason = topic.reason.as_deref().unwrap_or("not read");
                 format!("{} of type {}: {reason}", topic.topic, topic.message_type)
             });
             let mut reasons: Vec<String> = descriptions.collect();
+            if topics.len() > DESCRIBED_TOPICS {
+                reasons.push(format!("{} more topics", topics.len() - DESCRIBED_TOPICS));
+            }
             reasons.extend(self.notes);
             return Err(ConvertError::NothingUsable { topics: reasons.join("; "), path: source.to_owned() });
         }

@@ -62,7 +62,7 @@ fn find(
     }
     let Some((name, content)) = log.attachment(ending) else { return Ok(None) };
     let file = PathBuf::from(format!("{} (attachment {name})", log.path().display()));
-    from_document(&Document::from_bytes(content.to_vec(), &file)?, log).map(Some)
+    from_document(&Document::from_bytes(content, &file)?, log).map(Some)
 }
 
 fn from_file(path: &Path, facts: &dyn CameraFacts) -> Result<RigWithUnusedKeys, LogError> {

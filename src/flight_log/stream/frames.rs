@@ -1,7 +1,8 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use super::super::image_decoding::{BitDepth, decode_image};
+use super::super::image_decoding::{BitDepth, ImageProblem, decode_image};
+use super::super::log::relative_ns;
 use super::super::messages::{self, MessageKind};
 use super::super::{FlightLog, LogError, LogWarning, SensorFrame};
 use super::joint_angles::JointAngleStream;
@@ -315,13 +316,14 @@ impl CameraStream {
 
     /// The image, or `None` and a warning with the reason why it is skipped.
     fn decode(&self, context: &mut ReadContext, stamp_ns: i64, pending: &PendingImage) -> Option<GrayImage> {
-        let problem = match decode_image(self.kind, &pending.message, self.depth) {
-            Ok(image) if [image.width, image.height] == self.resolution_px => return Some(image),
-            Ok(image) => format!(
-                "it has {}×{} pixels, {}×{} in the rig for {}",
-                image.width, image.height, self.resolution_px[0], self.resolution_px[1], self.key
+        let limits = context.log.file().limits();
+        let problem = match decode_image(self.kind, &pending.message, self.depth, limits, Some(self.resolution_px)) {
+            Ok(image) => return Some(image),
+            Err(ImageProblem::OtherResolution([width, height])) => format!(
+                "it has {width}×{height} pixels, {}×{} in the rig for {}",
+                self.resolution_px[0], self.resolution_px[1], self.key
             ),
-            Err(problem) => problem,
+            Err(ImageProblem::Unreadable(problem)) => problem,
         };
         let message = format!(
             "{}: image {} at {:.3} s skipped: {problem}",
@@ -365,7 +367,7 @@ fn interpolate_pose(from: &RigidTransform, to: &RigidTransform, fraction: f64) -
 fn image_decoder(epoch_ns: i64) -> Decoder<PendingImage> {
     Box::new(move |source: MessageSource<'_>| {
         let stamp_ns = messages::header_stamp_ns(source.data).map_err(|error| Refusal::not_decodable(&error))?;
-        let log_time_ns = i64::try_from(source.position.log_time_ns).unwrap_or(i64::MAX).saturating_sub(epoch_ns);
+        let log_time_ns = relative_ns(i64::try_from(source.position.log_time_ns).unwrap_or(i64::MAX), epoch_ns);
         Ok((stamp_ns, PendingImage { number: source.number, log_time_ns, message: source.data.to_vec() }))
     })
 }
@@ -383,7 +385,7 @@ fn imu_decoder(epoch_ns: i64) -> Decoder<ImuSample> {
             return Err(Refusal { reason: "values are not finite", detail });
         }
         let sample = ImuSample {
-            stamp_ns: imu.stamp_ns.saturating_sub(epoch_ns),
+            stamp_ns: relative_ns(imu.stamp_ns, epoch_ns),
             angular_velocity_rad_per_s: imu.angular_velocity_rad_per_s,
             specific_force_m_per_s2: imu.specific_force_m_per_s2,
         };
@@ -425,7 +427,7 @@ fn ground_truth_samples(
         let message = messages::read_pose(kind, source.data).map_err(|error| Refusal::not_decodable(&error))?;
         let refusal = || Refusal { reason: "not a pose", detail: "not finite, or a zero quaternion".into() };
         let world_from_imu = message.pose.ok_or_else(refusal)?;
-        let sample = PoseSample { stamp_ns: message.stamp_ns.saturating_sub(epoch_ns), world_from_imu };
+        let sample = PoseSample { stamp_ns: relative_ns(message.stamp_ns, epoch_ns), world_from_imu };
         Ok((message.stamp_ns, sample))
     });
     Some(OrderedSamples::new(log, topic, from_ns, false, decode))

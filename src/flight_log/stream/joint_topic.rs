@@ -1,6 +1,7 @@
 //! The encoder messages of a log as samples of all joints.
 
 use super::super::joint_merge::{JointMerge, JointReading};
+use super::super::log::relative_ns;
 use super::super::messages::{self, JointMessage, MessageKind};
 use super::super::{FlightLog, LogError};
 use super::ordered::{Decoder, MessageSource, OrderedSamples, ReadContext, Refusal};
@@ -101,7 +102,7 @@ fn reading_decoder(names: Vec<String>, epoch_ns: i64) -> Decoder<JointReading> {
         if angles_rad.iter().all(Option::is_none) {
             return Err(Refusal { reason: "it names no joint of the rig", detail: message.names.join(", ") });
         }
-        let stamp_ns = message.stamp_ns.saturating_sub(epoch_ns);
+        let stamp_ns = relative_ns(message.stamp_ns, epoch_ns);
         Ok((message.stamp_ns, JointReading { stamp_ns, angles_rad }))
     })
 }

@@ -2,6 +2,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::super::container::{BlockCache, MessagePosition, TopicIndex};
+use super::super::log::relative_ns;
 use super::super::{FlightLog, LogWarning};
 use crate::geometry::seconds_from_ns;
 
@@ -152,10 +153,10 @@ impl<T> OrderedSamples<T> {
             context.report_block(position, block.as_ref().and_then(|block| block.damage.as_deref()));
             return;
         };
-        let data = block.bytes(log.file(), &message.data);
+        let data = block.bytes(&message.data);
         match (self.decode)(MessageSource { data, number, position }) {
             Ok((absolute_ns, sample)) => {
-                let stamp_ns = absolute_ns.saturating_sub(log.epoch_ns());
+                let stamp_ns = relative_ns(absolute_ns, log.epoch_ns());
                 let repeats = Some(stamp_ns) == self.released_ns && !self.equal_stamps;
                 let newest_out = repeats || self.released_ns.is_some_and(|released| stamp_ns < released);
                 let duplicate =

@@ -1,8 +1,16 @@
 use super::super::cdr::{CdrReader, CdrWriter};
-use super::super::image_decoding::{BitDepth, decode_image};
+use super::super::image_decoding;
+use super::super::image_decoding::{BitDepth, ImageProblem};
+use super::super::limits::LogLimits;
 use super::super::messages::{self, MessageKind};
 use super::*;
 use crate::flight_log::writer::testing as encode;
+
+/// The image of a message within the usual limits, or what is wrong with it.
+fn decode_image(kind: MessageKind, message: &[u8], depth: BitDepth) -> Result<GrayImage, String> {
+    let limits = LogLimits::default();
+    image_decoding::decode_image(kind, message, depth, &limits, None).map_err(|problem| problem.to_string())
+}
 
 /// The little-endian bytes of a message made of 4- and 8-byte numbers after a header, converted to big-endian.
 fn imu_big_endian(stamp: (i32, u32), frame: &str, numbers: &[f64]) -> Vec<u8> {
@@ -73,7 +81,12 @@ fn raw_images_of_every_encoding_become_grey() {
     let rgb = [255, 0, 0, 0, 255, 0, 0, 0, 255, 255, 255, 255];
     assert_eq!(decode("rgb8", &rgb).unwrap().pixels, [76, 150, 29, 255]);
     assert_eq!(decode("bgr8", &rgb).unwrap().pixels, [29, 150, 76, 255]);
-    assert!(decode("bayer_rggb8", &[0; 4]).unwrap_err().contains("encoding 'bayer_rggb8', expected mono8"));
+    let problem = decode("bayer_rggb8", &[0; 4]).unwrap_err();
+    assert!(
+        problem.contains("encoding \"bayer_rggb8\" is not read: a color filter mosaic") && problem.contains("mono8")
+    );
+    assert!(decode("32FC1", &[0; 16]).unwrap_err().contains("no grey levels"));
+    assert!(decode("\u{1b}[2J", &[0; 4]).unwrap_err().contains(r#""\u{1b}[2J" is not read: expected mono8"#));
     assert!(decode("mono8", &[0; 2]).unwrap_err().contains("2 bytes with 1 per row for 2×2 mono8"));
 }
 
@@ -83,7 +96,7 @@ fn wide_grey_values_keep_the_bits_that_are_in_use() {
         let data: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
         encode::image(0, "camera", [2, 2], "mono16", &data)
     };
-    let depth_of = |values: [u16; 4]| BitDepth::of(MessageKind::Image, &message(values));
+    let depth_of = |values: [u16; 4]| BitDepth::of(MessageKind::Image, &message(values), &LogLimits::default());
     let check = |values: [u16; 4], bits: u32, expected: [u8; 4]| {
         let depth = depth_of(values).unwrap();
         assert_eq!(depth.bits(), bits, "{values:?}");
@@ -102,7 +115,7 @@ fn wide_grey_values_keep_the_bits_that_are_in_use() {
     let later = decode_image(MessageKind::Image, &message([4, 1023, 1024, 4000]), first).unwrap();
     assert_eq!(later.pixels, [1, 255, 255, 255]);
     let narrow = encode::image(0, "camera", [2, 2], "mono8", &[1, 2, 3, 4]);
-    assert_eq!(BitDepth::of(MessageKind::Image, &narrow).unwrap().bits(), 16);
+    assert_eq!(BitDepth::of(MessageKind::Image, &narrow, &LogLimits::default()).unwrap().bits(), 16);
 }
 
 #[test]
@@ -159,4 +172,46 @@ fn joint_states_read_back() {
         (joints.stamp_ns, joints.names, joints.positions_rad),
         (EPOCH_NS, vec!["roll", "yaw"], vec![0.25, -1.5])
     );
+}
+
+#[test]
+fn an_image_is_not_decoded_when_its_header_claims_too_much() {
+    let picture = image_at(0, [WIDTH, HEIGHT]);
+    let gray = image::GrayImage::from_raw(WIDTH as u32, HEIGHT as u32, picture.pixels).unwrap();
+    for format in [image::ImageFormat::Png, image::ImageFormat::Jpeg] {
+        let mut data = std::io::Cursor::new(Vec::new());
+        gray.write_to(&mut data, format).unwrap();
+        let mut data = data.into_inner();
+        let (at, bytes_per_side) = match format {
+            image::ImageFormat::Png => (16, 4),
+            // Height before width, after marker, length and precision.
+            _ => (data.windows(2).position(|pair| pair == [0xFF, 0xC0]).unwrap() + 5, 2),
+        };
+        let expect = |data: &[u8], expected_px: Option<[usize; 2]>| {
+            let message = encode::compressed_image(0, "camera", "", data);
+            let (kind, depth, limits) = (MessageKind::CompressedImage, BitDepth::default(), LogLimits::default());
+            image_decoding::decode_image(kind, &message, depth, &limits, expected_px)
+        };
+        assert!(expect(&data, Some([WIDTH, HEIGHT])).is_ok());
+        assert_eq!(expect(&data, Some([1, 1])).unwrap_err(), ImageProblem::OtherResolution([WIDTH, HEIGHT]));
+        let mut claim = |side: usize| {
+            for place in [at, at + bytes_per_side] {
+                data[place..place + bytes_per_side].copy_from_slice(&(side as u64).to_be_bytes()[8 - bytes_per_side..]);
+            }
+            if format == image::ImageFormat::Png {
+                let checksum = crc32fast::hash(&data[12..29]);
+                data[29..33].copy_from_slice(&checksum.to_be_bytes());
+            }
+            expect(&data, None).unwrap_err().to_string()
+        };
+        let problem = claim(65_500);
+        assert!(
+            problem.contains("4290250000 pixels, more than the limit") && problem.contains("image-pixels="),
+            "{problem}"
+        );
+        let problem = claim(5000);
+        assert!(problem.contains("a header of 5000×5000 pixels"), "{problem}");
+    }
+    let raw = encode::image(0, "camera", [60_000, 60_000], "mono8", &[0; 16]);
+    assert!(decode_image(MessageKind::Image, &raw, BitDepth::default()).unwrap_err().contains("--limit image-pixels="));
 }
