@@ -1,11 +1,15 @@
 //! EuRoC/ASL folders: `mav0` with a folder per sensor, each with `data.csv` and `sensor.yaml`.
 
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::fs::{self, File};
+use std::io::{self, BufRead as _, BufReader, Read as _};
+use std::path::{Component, Path, PathBuf};
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use super::super::MessageTimes;
+use super::super::file::kind_of;
+use super::super::image_decoding::compressed_format;
+use super::super::limits::{LINE_BYTES, LogLimits};
 use super::ConvertError;
 use super::euroc_sensor::{CameraSensor, IMU_TOPIC, image_topic, rig_of, sensor_pose};
 use super::sink::Sink;
@@ -60,7 +64,11 @@ pub(super) fn convert(source: &Path, sink: &mut Sink<'_>) -> Result<Option<Rig>,
             read_poses(&table, poses.len(), &imu_from_sensor.inverse(), &mut samples)?;
             poses.push(name.clone());
         } else {
-            let rows = rows(&table)?.len() as u64;
+            let mut rows = 0;
+            for_each_row(&table, |_, _| {
+                rows += 1;
+                Ok(())
+            })?;
             sink.leave(&format!("/{name}"), "data.csv", rows, "no sensor that the program reads");
         }
     }
@@ -106,21 +114,13 @@ fn write(
         }
         Sample::Image { camera, name } => {
             let CameraSensor { key, folder, .. } = &cameras[*camera];
-            let (topic, path) = (image_topic(key), folder.join("data").join(name));
-            let format = match path.extension().and_then(|extension| extension.to_str()) {
-                Some("png" | "PNG") => "png",
-                Some("jpg" | "jpeg" | "JPG" | "JPEG") => "jpeg",
-                _ => {
-                    sink.leave(&topic, IMAGE_TYPE, 1, format!("{name} is neither PNG nor JPEG"));
-                    return Ok(());
-                }
-            };
-            match fs::read(&path) {
-                Ok(bytes) => {
+            let topic = image_topic(key);
+            match read_image_file(&folder.join("data"), name, sink.limits()) {
+                Ok((format, bytes)) => {
                     sink.writer.write_compressed_image(&topic, key, times, format, &bytes)?;
                     sink.taken(&topic, IMAGE_TYPE);
                 }
-                Err(error) => sink.leave(&topic, IMAGE_TYPE, 1, format!("{name} cannot be read: {error}")),
+                Err(problem) => sink.leave(&topic, IMAGE_TYPE, 1, format!("{name:?} {problem}")),
             }
         }
         Sample::Pose { source, world_from_imu } => {
@@ -132,29 +132,76 @@ fn write(
     Ok(())
 }
 
-/// The rows of a table with their line numbers, without comments and empty lines.
-fn rows(table: &Path) -> Result<Vec<(usize, Vec<String>)>, ConvertError> {
-    let text = fs::read_to_string(table).map_err(ConvertError::io("read", table))?;
-    let cells = |line: &str| line.split(',').map(|cell| cell.trim().to_owned()).collect();
-    let lines = text.lines().enumerate().map(|(index, line)| (index + 1, line.trim()));
-    Ok(lines
-        .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
-        .map(|(at, line)| (at, cells(line)))
-        .collect())
+/// Format and bytes of an image that lies in a folder; the error says why there is none.
+///
+/// Names come from a table that strangers may have written: they must not lead out of the folder, and what they name must
+/// be an image.
+fn read_image_file(folder: &Path, name: &str, limits: &LogLimits) -> Result<(&'static str, Vec<u8>), String> {
+    let mut parts = Path::new(name).components();
+    if !(matches!(parts.next(), Some(Component::Normal(_))) && parts.all(|part| matches!(part, Component::Normal(_)))) {
+        return Err("leads out of the folder of the images".to_owned());
+    }
+    let cannot = |error: io::Error| format!("cannot be read: {error}");
+    let path = fs::canonicalize(folder.join(name)).map_err(cannot)?;
+    if !path.starts_with(fs::canonicalize(folder).map_err(cannot)?) {
+        return Err("is a link that leads out of the folder of the images".to_owned());
+    }
+    let metadata = fs::metadata(&path).map_err(cannot)?;
+    if !metadata.is_file() {
+        return Err(format!("is {}, no image", kind_of(&metadata)));
+    }
+    limits
+        .check_record("an image", metadata.len(), metadata.len())
+        .map_err(|error| format!("is too large: {error}"))?;
+    let mut bytes = Vec::new();
+    let most = limits.record_bytes(metadata.len());
+    File::open(&path).and_then(|file| file.take(most).read_to_end(&mut bytes)).map_err(cannot)?;
+    compressed_format(&bytes).map(|format| (format, bytes)).ok_or_else(|| "is neither PNG nor JPEG".to_owned())
+}
+
+/// Calls `visit` with the line number and the cells of each row of a table, without comments and empty lines.
+fn for_each_row(
+    table: &Path,
+    mut visit: impl FnMut(usize, &[&str]) -> Result<(), ConvertError>,
+) -> Result<(), ConvertError> {
+    let mut reader = BufReader::new(File::open(table).map_err(ConvertError::io("read", table))?);
+    let mut line = 0;
+    let mut bytes = Vec::new();
+    loop {
+        bytes.clear();
+        let read = reader.by_ref().take(LINE_BYTES).read_until(b'\n', &mut bytes);
+        if read.map_err(ConvertError::io("read", table))? == 0 {
+            return Ok(());
+        }
+        line += 1;
+        if bytes.len() as u64 == LINE_BYTES {
+            return Err(bad_line(
+                line,
+                format!("longer than {LINE_BYTES} bytes, expected numbers between commas"),
+                table,
+            ));
+        }
+        let text = std::str::from_utf8(&bytes).map_err(|error| bad_line(line, format!("no text ({error})"), table))?;
+        let text = text.trim();
+        if !text.is_empty() && !text.starts_with('#') {
+            let cells: Vec<&str> = text.split(',').map(str::trim).collect();
+            visit(line, &cells)?;
+        }
+    }
 }
 
 fn bad_line(line: usize, problem: impl Into<String>, table: &Path) -> ConvertError {
     ConvertError::Line { line, problem: problem.into(), path: table.to_owned() }
 }
 
-fn stamp_of(line: usize, row: &[String], table: &Path) -> Result<i64, ConvertError> {
-    let text = row.first().map_or("", String::as_str);
+fn stamp_of(line: usize, row: &[&str], table: &Path) -> Result<i64, ConvertError> {
+    let text = row.first().copied().unwrap_or_default();
     let stamp_ns = text.parse::<i64>().ok().filter(|stamp_ns| *stamp_ns >= 0);
     stamp_ns.ok_or_else(|| bad_line(line, format!("the stamp is '{text}', expected whole nanoseconds"), table))
 }
 
-/// The first `N` numbers after the stamp.
-fn numbers<const N: usize>(line: usize, row: &[String], table: &Path) -> Result<[f64; N], ConvertError> {
+/// The first numbers after the stamp.
+fn numbers<const N: usize>(line: usize, row: &[&str], table: &Path) -> Result<[f64; N], ConvertError> {
     let cells = row.get(1..=N).ok_or_else(|| {
         bad_line(line, format!("{} numbers after the stamp, expected {N}", row.len().saturating_sub(1)), table)
     })?;
@@ -167,24 +214,24 @@ fn numbers<const N: usize>(line: usize, row: &[String], table: &Path) -> Result<
 }
 
 fn read_imu(table: &Path, samples: &mut Vec<(i64, Sample)>) -> Result<(), ConvertError> {
-    for (line, row) in rows(table)? {
-        let [wx, wy, wz, ax, ay, az] = numbers(line, &row, table)?;
+    for_each_row(table, |line, row| {
+        let [wx, wy, wz, ax, ay, az] = numbers(line, row, table)?;
         let sample = Sample::Imu {
             angular_velocity_rad_per_s: Vector3::new(wx, wy, wz),
             specific_force_m_per_s2: Vector3::new(ax, ay, az),
         };
-        samples.push((stamp_of(line, &row, table)?, sample));
-    }
-    Ok(())
+        samples.push((stamp_of(line, row, table)?, sample));
+        Ok(())
+    })
 }
 
 fn read_images(table: &Path, camera: usize, samples: &mut Vec<(i64, Sample)>) -> Result<(), ConvertError> {
-    for (line, row) in rows(table)? {
+    for_each_row(table, |line, row| {
         let name = row.get(1).filter(|name| !name.is_empty());
         let name = name.ok_or_else(|| bad_line(line, "no file name after the stamp", table))?;
-        samples.push((stamp_of(line, &row, table)?, Sample::Image { camera, name: name.clone() }));
-    }
-    Ok(())
+        samples.push((stamp_of(line, row, table)?, Sample::Image { camera, name: (*name).to_owned() }));
+        Ok(())
+    })
 }
 
 /// Poses of a sensor in the world (`p x y z`, `q w x y z`), transformed to the IMU.
@@ -194,15 +241,15 @@ fn read_poses(
     sensor_from_imu: &RigidTransform,
     samples: &mut Vec<(i64, Sample)>,
 ) -> Result<(), ConvertError> {
-    for (line, row) in rows(table)? {
-        let [x, y, z, qw, qx, qy, qz] = numbers(line, &row, table)?;
+    for_each_row(table, |line, row| {
+        let [x, y, z, qw, qx, qy, qz] = numbers(line, row, table)?;
         let quaternion = Quaternion::new(qw, qx, qy, qz);
         if (quaternion.norm() - 1.0).abs() > 0.1 {
             return Err(bad_line(line, format!("a quaternion of norm {:.3}, expected 1", quaternion.norm()), table));
         }
         let world_from_sensor = RigidTransform::new(UnitQuaternion::new_normalize(quaternion), Vector3::new(x, y, z));
         let sample = Sample::Pose { source, world_from_imu: world_from_sensor * *sensor_from_imu };
-        samples.push((stamp_of(line, &row, table)?, sample));
-    }
-    Ok(())
+        samples.push((stamp_of(line, row, table)?, sample));
+        Ok(())
+    })
 }
