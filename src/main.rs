@@ -7,7 +7,7 @@ use std::process::ExitCode;
 
 fn main() -> ExitCode {
     match cli::run() {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(outcome) => outcome.into(),
         Err(error) => {
             // A closed standard error loses the message; the exit code remains.
             drop(writeln!(std::io::stderr(), "dcvins: {}", cli::message(&error)));

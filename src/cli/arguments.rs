@@ -7,6 +7,7 @@ use crate::cli::check::CheckArguments;
 use crate::cli::convert::ConvertArguments;
 use crate::cli::degeneracy::DegeneracyArguments;
 use crate::cli::evaluate::EvaluateArguments;
+use crate::cli::exit;
 use crate::cli::report::ReportArguments;
 use crate::cli::run::RunArguments;
 #[cfg(feature = "gui")]
@@ -27,24 +28,34 @@ pub(crate) struct Arguments {
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     /// Open the window on a log; without a display, write screenshots instead and print their paths.
+    #[command(after_help = exit::PLAIN)]
     View(ViewArguments),
     /// Run the estimator over a log without a window and write its files.
+    #[command(after_help = exit::RUN)]
     Run(RunArguments),
     /// Draw one panel at one instant into a PNG, without a display.
     #[cfg(feature = "gui")]
+    #[command(after_help = exit::INTERRUPTIBLE)]
     Screenshot(ScreenshotArguments),
     /// Write a report on a log: one HTML file with figures and tables, with CSV and JSON beside it.
+    #[command(after_help = exit::REPORT)]
     Report(ReportArguments),
     /// Calibrate static camera and gimbal offline from a flight with both, as the paper's baseline does.
+    #[command(after_help = exit::PLAIN)]
     Calibrate(CalibrateArguments),
     /// Check a log and its rig: content, timing, calibration, noise, each finding with evidence and remedy.
+    #[command(after_help = exit::CHECK)]
     Check(CheckArguments),
     /// Write a synthetic flight: the log, its rig and the ground truth.
+    #[command(after_help = exit::INTERRUPTIBLE)]
     Simulate(SimulateArguments),
     /// Compute which calibration parameters are observable with a mechanism, a parameterization and a motion, without a log.
+    #[command(after_help = exit::PLAIN)]
     Degeneracy(DegeneracyArguments),
     /// Convert a EuRoC/ASL folder, a ROS 1 bag or a ROS 2 bag into a log.
+    #[command(after_help = exit::INTERRUPTIBLE)]
     Convert(ConvertArguments),
     /// Compare a trajectory with a reference: absolute and relative errors, as evo computes them.
+    #[command(after_help = exit::PLAIN)]
     Evaluate(EvaluateArguments),
 }

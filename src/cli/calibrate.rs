@@ -31,6 +31,10 @@ pub(crate) struct CalibrateArguments {
     /// Duration to process from there.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub duration: Option<f64>,
+    /// Overwrite rig.yaml, calibration.json and report.txt whatever they are. Without it only a calibration of a log of the
+    /// same name is replaced.
+    #[arg(long)]
+    pub force: bool,
     /// Print calibration.json instead of the report.
     #[arg(long)]
     pub json: bool,
@@ -38,6 +42,7 @@ pub(crate) struct CalibrateArguments {
 
 /// Runs `dcvins calibrate`.
 pub(crate) fn calibrate(arguments: &CalibrateArguments) -> Result<()> {
+    export::check_calibration_folder(&arguments.out, &arguments.log, arguments.force)?;
     let request = CalibrationRequest {
         log_path: arguments.log.clone(),
         rig_path: arguments.rig.clone(),

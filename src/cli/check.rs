@@ -6,10 +6,11 @@ use std::sync::Arc;
 use anyhow::Result;
 use clap::Args;
 use dcvins::flight_log::FlightLog;
-use dcvins::log_check;
+use dcvins::log_check::{self, Severity};
 use dcvins::sensors::Rig;
 use dcvins::session;
 
+use crate::cli::exit::Outcome;
 use crate::cli::limit_arguments::LimitArguments;
 use crate::cli::terminal::{Progress, print_report};
 
@@ -30,7 +31,7 @@ pub(crate) struct CheckArguments {
 }
 
 /// Runs `dcvins check`.
-pub(crate) fn check(arguments: &CheckArguments) -> Result<()> {
+pub(crate) fn check(arguments: &CheckArguments) -> Result<Outcome> {
     let progress = Progress::spinner("reading the log");
     let log = Arc::new(FlightLog::open_with(&arguments.log, &arguments.limits.limits())?);
     let (rig, unused_keys) = match Rig::for_log_with_unused_keys(&log, arguments.rig.as_deref()) {
@@ -41,5 +42,6 @@ pub(crate) fn check(arguments: &CheckArguments) -> Result<()> {
     let mut report = log_check::check(&log, rig.as_ref(), &rotations);
     report.add_unused_rig_keys(&unused_keys);
     drop(progress);
-    print_report(&report, arguments.json)
+    print_report(&report, arguments.json)?;
+    Ok(if report.worst() == Severity::Error { Outcome::ErrorsFound } else { Outcome::Success })
 }

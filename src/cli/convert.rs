@@ -4,10 +4,13 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use dcvins::flight_log;
+use dcvins::export;
+use dcvins::flight_log::{self, convert::ConvertError};
 
+use crate::cli::exit::Outcome;
+use crate::cli::interrupt::Interrupt;
 use crate::cli::limit_arguments::LimitArguments;
-use crate::cli::terminal::{Progress, print_report};
+use crate::cli::terminal::{Progress, notify, print_report};
 
 /// `dcvins convert`.
 #[derive(Args, Clone, Debug)]
@@ -17,6 +20,10 @@ pub(crate) struct ConvertArguments {
     /// The log to write; the rig, where the source describes one, gets the same name with .rig.yaml.
     #[arg(short, long, value_name = "LOG.mcap")]
     pub output: PathBuf,
+    /// Overwrite whatever has the name of the log. Without it only a log is replaced that this command wrote; a rig beside the
+    /// log that was edited is always kept.
+    #[arg(long)]
+    pub force: bool,
     /// Print the converted and skipped topics as JSON.
     #[arg(long)]
     pub json: bool,
@@ -26,12 +33,22 @@ pub(crate) struct ConvertArguments {
 }
 
 /// Runs `dcvins convert`.
-pub(crate) fn convert(arguments: &ConvertArguments) -> Result<()> {
+pub(crate) fn convert(arguments: &ConvertArguments) -> Result<Outcome> {
+    export::check_converted_log(&arguments.output, arguments.force)?;
+    let interrupt = Interrupt::watch()?;
     let progress = Progress::new();
     let limits = arguments.limits.limits();
-    let report = flight_log::convert::convert_with(&arguments.source, &arguments.output, &limits, &mut |ratio| {
+    let converted = flight_log::convert::convert_with(&arguments.source, &arguments.output, &limits, &mut |ratio| {
         progress.show(ratio, String::new);
-    })?;
+        interrupt.control_flow()
+    });
     drop(progress);
-    print_report(&report, arguments.json)
+    match converted {
+        Ok(report) => print_report(&report, arguments.json).map(|()| Outcome::Success),
+        Err(error @ ConvertError::Interrupted { .. }) => {
+            notify(&format!("dcvins: {error}"));
+            Ok(Outcome::Interrupted)
+        }
+        Err(error) => Err(error.into()),
+    }
 }

@@ -8,6 +8,8 @@ mod convert;
 mod degeneracy;
 mod estimation_arguments;
 mod evaluate;
+mod exit;
+mod interrupt;
 mod limit_arguments;
 mod report;
 mod run;
@@ -20,27 +22,30 @@ mod value_parsers;
 mod view;
 
 use clap::Parser as _;
+use dcvins::flight_log::printable_lines;
 
 use arguments::{Arguments, Command};
+use exit::Outcome;
 use view::ViewArguments;
 
 /// Parses the arguments of the process and runs the sub-command.
 ///
 /// Wrong arguments end the process with exit code 2; an error of the command is returned.
-pub(crate) fn run() -> anyhow::Result<()> {
+pub(crate) fn run() -> anyhow::Result<Outcome> {
     let arguments = Arguments::parse();
+    let done = |result: anyhow::Result<()>| result.map(|()| Outcome::Success);
     match arguments.command.unwrap_or_else(|| Command::View(ViewArguments::default())) {
-        Command::View(arguments) => view::view(&arguments),
+        Command::View(arguments) => done(view::view(&arguments)),
         Command::Run(arguments) => run::run(&arguments),
         #[cfg(feature = "gui")]
         Command::Screenshot(arguments) => screenshot::screenshot(&arguments),
         Command::Report(arguments) => report::report(&arguments),
-        Command::Calibrate(arguments) => calibrate::calibrate(&arguments),
+        Command::Calibrate(arguments) => done(calibrate::calibrate(&arguments)),
         Command::Check(arguments) => check::check(&arguments),
         Command::Simulate(arguments) => simulate::simulate(&arguments),
-        Command::Degeneracy(arguments) => degeneracy::degeneracy(&arguments),
+        Command::Degeneracy(arguments) => done(degeneracy::degeneracy(&arguments)),
         Command::Convert(arguments) => convert::convert(&arguments),
-        Command::Evaluate(arguments) => evaluate::evaluate(&arguments),
+        Command::Evaluate(arguments) => done(evaluate::evaluate(&arguments)),
     }
 }
 
@@ -52,7 +57,7 @@ pub(crate) fn message(error: &anyhow::Error) -> String {
             text = format!("{text}: {cause}");
         }
     }
-    text
+    printable_lines(&text).into_owned()
 }
 
 #[cfg(test)]

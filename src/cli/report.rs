@@ -4,13 +4,16 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use clap::Args;
-use dcvins::export::{ReportOptions, write_report};
+use dcvins::export::{self, ReportOptions, write_report};
 use dcvins::log_check::{self, CheckReport};
 use dcvins::session::{SessionPlan, image_rotations};
 
 use crate::cli::compute::compute;
 use crate::cli::estimation_arguments::EstimationArguments;
-use crate::cli::terminal::{Progress, print};
+use crate::cli::exit::Outcome;
+use crate::cli::interrupt::Interrupt;
+use crate::cli::run::{interrupted, is_initialized};
+use crate::cli::terminal::{Progress, notify, print};
 use crate::cli::value_parsers::seconds;
 
 /// `dcvins report`.
@@ -25,17 +28,28 @@ pub(crate) struct ReportArguments {
     /// end].
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub at: Vec<f64>,
+    /// Overwrite whatever is in the folder. Without it a report replaces only a report on a log of the same name and its runs.
+    #[arg(long)]
+    pub force: bool,
     #[command(flatten)]
     pub estimation: EstimationArguments,
 }
 
 /// Runs `dcvins report`.
-pub(crate) fn report(arguments: &ReportArguments) -> Result<()> {
+pub(crate) fn report(arguments: &ReportArguments) -> Result<Outcome> {
     let plan = SessionPlan::open(&arguments.estimation.request(arguments.log.clone()))?;
+    let labels: Vec<&str> = plan.runs.iter().map(|(spec, _)| spec.label.as_str()).collect();
+    export::check_report_folder(&arguments.output, &labels, &arguments.log, arguments.force)?;
+    let interrupt = Interrupt::watch()?;
+    let plan = SessionPlan { interrupted: interrupt.flag(), ..plan.clone() };
     #[cfg_attr(not(feature = "gui"), expect(unused_mut, reason = "only figures need steps recomputed"))]
     let mut computation = compute(&plan, None)?;
+    if interrupt.is_set() && computation.recording().runs.iter().all(|run| run.steps.is_empty()) {
+        notify("dcvins: interrupted before the first step; nothing is written");
+        return Ok(Outcome::Interrupted);
+    }
     let options = ReportOptions {
-        command: command_line(std::env::args()),
+        command: command_line(std::env::args_os().map(|word| word.to_string_lossy().into_owned())),
         check: Some(check(&plan)),
         inputs: inputs(arguments),
         #[cfg(feature = "gui")]
@@ -47,7 +61,14 @@ pub(crate) fn report(arguments: &ReportArguments) -> Result<()> {
     let page = write_report(recording, &arguments.output, &options)?;
     print(&format!("{}\n", page.display()))?;
     let failed: Vec<&str> = recording.runs.iter().filter_map(|run| run.error.as_deref()).collect();
-    if failed.is_empty() { Ok(()) } else { anyhow::bail!("{}", failed.join("; ")) }
+    if !failed.is_empty() {
+        anyhow::bail!("{}", failed.join("; "));
+    }
+    if interrupt.is_set() {
+        notify(&interrupted(recording));
+        return Ok(Outcome::Interrupted);
+    }
+    Ok(if recording.runs.iter().all(is_initialized) { Outcome::Success } else { Outcome::NeverInitialized })
 }
 
 /// Findings about the log and its rig.

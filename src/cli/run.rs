@@ -7,12 +7,14 @@ use clap::Args;
 use dcvins::export::{self, RunFileOptions, RunSummary};
 use dcvins::geometry::seconds_from_ns;
 use dcvins::session::breakpoints::Condition;
-use dcvins::session::{BreakpointHit, Recording, SessionPlan};
+use dcvins::session::{BreakpointHit, Recording, RunRecord, SessionPlan};
 
 use crate::cli::compute::{compute, compute_until};
 use crate::cli::estimation_arguments::EstimationArguments;
+use crate::cli::exit::Outcome;
+use crate::cli::interrupt::Interrupt;
 use crate::cli::run_summary::describe;
-use crate::cli::terminal::{print, print_json};
+use crate::cli::terminal::{notify, print, print_json};
 
 /// `dcvins run`.
 #[derive(Args, Clone, Debug)]
@@ -38,6 +40,10 @@ pub(crate) struct RunArguments {
     /// Also write trajectory.euroc.csv, a table like EuRoC's ground truth.
     #[arg(long)]
     pub euroc: bool,
+    /// Overwrite whatever is in the folders of the runs. Without it a run replaces only a run on a log of the same name, in a
+    /// folder that holds nothing else.
+    #[arg(long)]
+    pub force: bool,
     /// Print the summaries as JSON instead of a table.
     #[arg(long)]
     pub json: bool,
@@ -48,12 +54,21 @@ fn condition(text: &str) -> Result<Condition, String> {
 }
 
 /// Runs `dcvins run`.
-pub(crate) fn run(arguments: &RunArguments) -> Result<()> {
+pub(crate) fn run(arguments: &RunArguments) -> Result<Outcome> {
     let plan = SessionPlan::open(&arguments.estimation.request(arguments.log.clone()))?;
+    let labels: Vec<&str> = plan.runs.iter().map(|(spec, _)| spec.label.as_str()).collect();
+    export::check_run_folders(&arguments.out, &labels, &arguments.log, arguments.force)?;
+    let interrupt = Interrupt::watch()?;
+    let plan = SessionPlan { interrupted: interrupt.flag(), ..plan.clone() };
     let (recording, hit) = match &arguments.break_at {
         Some(condition) => compute_until(&plan, condition)?,
         None => (compute(&plan, None)?.into_recording(), None),
     };
+    let no_steps = recording.runs.iter().all(|run| run.steps.is_empty());
+    if interrupt.is_set() && no_steps {
+        notify("dcvins: interrupted before the first step; nothing is written");
+        return Ok(Outcome::Interrupted);
+    }
     let mut summaries = Vec::new();
     for run in &recording.runs {
         let options =
@@ -78,15 +93,38 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<()> {
             print(&describe_break(condition, hit.as_ref()))?;
         }
     }
+    let others = export::other_runs(&arguments.out, &labels);
+    if !others.is_empty() {
+        let folder = arguments.out.display();
+        notify(&format!("dcvins: {folder} also holds runs of earlier commands: {}", others.join(", ")));
+    }
     let failed: Vec<&str> = recording.runs.iter().filter_map(|run| run.error.as_deref()).collect();
     if !failed.is_empty() {
         bail!("{}", failed.join("; "));
     }
-    if recording.runs.iter().all(|run| run.steps.is_empty()) {
+    if interrupt.is_set() {
+        notify(&interrupted(&recording));
+        return Ok(Outcome::Interrupted);
+    }
+    if no_steps {
         let log = export::log_name(&arguments.log);
         bail!("no image of '{log}' could be used; 'dcvins check {}' says why", arguments.log.display());
     }
-    Ok(())
+    if hit.is_some() {
+        return Ok(Outcome::BreakHit);
+    }
+    Ok(if recording.runs.iter().all(is_initialized) { Outcome::Success } else { Outcome::NeverInitialized })
+}
+
+/// What an interrupted command has computed, as a notice.
+pub(crate) fn interrupted(recording: &Recording) -> String {
+    let (done_s, end_s) = (seconds_from_ns(recording.last_stamp_ns()), seconds_from_ns(recording.duration_ns));
+    format!("dcvins: interrupted at {done_s:.2} s of {end_s:.2} s; the results are those up to there")
+}
+
+/// Whether a run has estimated anything.
+pub(crate) fn is_initialized(run: &RunRecord) -> bool {
+    run.steps.iter().any(|step| step.report.newest().is_some())
 }
 
 /// The hit of `--break` as a line of text.

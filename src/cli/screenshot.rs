@@ -6,8 +6,8 @@ use std::sync::Arc;
 use anyhow::{Context as _, Result, bail};
 use clap::{Args, ValueEnum};
 use dcvins::export::{
-    PANEL_NAMES, Renderer, ScreenshotOptions, draw_panel, draw_panel_svg, is_session, log_name, panel_csv,
-    read_session, write_csv, write_png, write_svg,
+    PANEL_NAMES, Renderer, ScreenshotOptions, check_picture, draw_panel, draw_panel_svg, is_session, log_name,
+    panel_csv, read_session, write_csv, write_png, write_svg,
 };
 use dcvins::flight_log::ImageReader;
 use dcvins::geometry::{ns_from_seconds, seconds_from_ns};
@@ -19,6 +19,8 @@ use dcvins::session::{Computation, Session, SessionPlan};
 
 use crate::cli::compute::compute;
 use crate::cli::estimation_arguments::EstimationArguments;
+use crate::cli::exit::Outcome;
+use crate::cli::interrupt::Interrupt;
 use crate::cli::terminal::{notify, print};
 use crate::cli::value_parsers::{seconds, sides};
 
@@ -66,6 +68,9 @@ pub(crate) struct ScreenshotArguments {
     /// the moved chain.
     #[arg(long, value_name = "DIRECTION=VALUE")]
     pub slide: Option<dcvins::observability::SlideRequest>,
+    /// Overwrite whatever has the name of the screenshot. Without it only pictures and tables are replaced.
+    #[arg(long)]
+    pub force: bool,
     #[command(flatten)]
     pub estimation: EstimationArguments,
 }
@@ -117,7 +122,7 @@ fn size(text: &str) -> Result<[usize; 2], String> {
 const MAX_SCREENSHOTS: usize = 100_000;
 
 /// Runs `dcvins screenshot`.
-pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<()> {
+pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<Outcome> {
     if !PANEL_NAMES.contains(&arguments.panel.as_str()) {
         bail!("no panel is called '{}': expected one of {}", arguments.panel, PANEL_NAMES.join(", "));
     }
@@ -147,7 +152,24 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<()> {
     stamps_ns.sort_unstable();
     stamps_ns.dedup();
     let Some(last_ns) = stamps_ns.last().copied() else { bail!("no instant is asked for: give --at or --every") };
-    let mut computation = shown.compute(last_ns)?;
+    let several = stamps_ns.len() > 1;
+    let path_at = |cursor_ns| if several { numbered(&arguments.output, cursor_ns) } else { arguments.output.clone() };
+    for cursor_ns in &stamps_ns {
+        let path = path_at(*cursor_ns);
+        check_picture(&path, arguments.force)?;
+        if arguments.csv {
+            check_picture(&path.with_extension("csv"), arguments.force)?;
+        }
+    }
+    let interrupt = Interrupt::watch()?;
+    let stopped = |written: usize| {
+        notify(&format!("dcvins: interrupted; {written} of {} screenshots are written", stamps_ns.len()));
+        Ok(Outcome::Interrupted)
+    };
+    let mut computation = shown.compute(last_ns, &interrupt)?;
+    if interrupt.is_set() {
+        return stopped(0);
+    }
     let names = computation.recording().rig.parameter_names();
     let slide = match &arguments.slide {
         Some(request) => {
@@ -177,11 +199,13 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<()> {
         layout: Preset::ALL.get(usize::from(arguments.layout) - 1).copied().unwrap_or_default(),
         playback: shown.playback(),
     };
-    let several = stamps_ns.len() > 1;
-    for cursor_ns in stamps_ns {
+    for (number, cursor_ns) in stamps_ns.iter().copied().enumerate() {
+        if interrupt.is_set() {
+            return stopped(number);
+        }
         computation.fill_in(cursor_ns);
         let recording = computation.recording();
-        let path = if several { numbered(&arguments.output, cursor_ns) } else { arguments.output.clone() };
+        let path = path_at(cursor_ns);
         let panel = &arguments.panel;
         match format {
             FormatArgument::Png => {
@@ -201,7 +225,7 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<()> {
             print(&format!("{}\n", path.display()))?;
         }
     }
-    Ok(())
+    Ok(Outcome::Success)
 }
 
 /// The requested format, else that of the file's extension, else PNG.
@@ -258,9 +282,12 @@ impl Shown {
     }
 
     /// Computes the runs up to a stamp; those of a saved session to their end.
-    fn compute(&mut self, until_ns: i64) -> Result<Computation> {
+    fn compute(&mut self, until_ns: i64, interrupt: &Interrupt) -> Result<Computation> {
         match &mut self.source {
-            Source::Log(plan, _) => compute(plan, Some(until_ns)),
+            Source::Log(plan, _) => {
+                plan.interrupted = interrupt.flag();
+                compute(plan, Some(until_ns))
+            }
             Source::Saved(session) => {
                 session.finish();
                 session.take_notices().iter().for_each(|notice| notify(&format!("dcvins: {notice}")));
@@ -286,9 +313,10 @@ impl Shown {
 
 /// `rank.png` at 12.5 s as `rank-0012.500.png`: names that sort by time.
 fn numbered(path: &Path, cursor_ns: i64) -> PathBuf {
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    let extension = path.extension().unwrap_or_else(|| "png".as_ref()).to_string_lossy();
-    path.with_file_name(format!("{stem}-{:08.3}.{extension}", seconds_from_ns(cursor_ns)))
+    let mut name = path.file_stem().unwrap_or_default().to_owned();
+    name.push(format!("-{:08.3}.", seconds_from_ns(cursor_ns)));
+    name.push(path.extension().unwrap_or_else(|| "png".as_ref()));
+    path.with_file_name(name)
 }
 
 #[cfg(test)]

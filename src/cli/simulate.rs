@@ -4,9 +4,12 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::{Args, ValueEnum};
-use dcvins::simulation::{self, Experiment, SimulationOptions};
+use dcvins::export;
+use dcvins::simulation::{self, Experiment, SimulationError, SimulationOptions};
 
-use crate::cli::terminal::{Progress, print};
+use crate::cli::exit::Outcome;
+use crate::cli::interrupt::Interrupt;
+use crate::cli::terminal::{Progress, notify, print};
 use crate::cli::value_parsers::{seconds, sides};
 
 /// `dcvins simulate`.
@@ -36,6 +39,10 @@ pub(crate) struct SimulateArguments {
     /// Leave out the static camera: half the time and half the bytes.
     #[arg(long)]
     pub no_static_camera: bool,
+    /// Overwrite whatever has the names of the log, its rig and its truth. Without it only a simulated log with its rigs as
+    /// they were written is replaced.
+    #[arg(long)]
+    pub force: bool,
     /// A disturbance, in seconds and SI units; may be given several times: camera-offset=S, joint-lag=S,
     /// joint-start=S, image-gap=START,LENGTH, exposure=S, gyroscope-range=RAD/S, accelerometer-range=M/S²,
     /// light=START,FACTOR, blank=START,LENGTH, slew=START,LENGTH, spin=START,LENGTH,RAD/S, hold-joint=NUMBER,START,LENGTH,
@@ -79,7 +86,7 @@ fn encoder_sigma(text: &str) -> Result<EncoderArgument, String> {
 }
 
 /// Runs `dcvins simulate`.
-pub(crate) fn simulate(arguments: &SimulateArguments) -> Result<()> {
+pub(crate) fn simulate(arguments: &SimulateArguments) -> Result<Outcome> {
     let experiment = match arguments.experiment {
         ExperimentArgument::T1 => Experiment::T1,
         ExperimentArgument::T2 => Experiment::T2,
@@ -100,12 +107,22 @@ pub(crate) fn simulate(arguments: &SimulateArguments) -> Result<()> {
     for disturbance in &arguments.disturb {
         options.disturbances.set(disturbance)?;
     }
+    export::check_simulated_log(&arguments.output, arguments.force)?;
+    let interrupt = Interrupt::watch()?;
     let progress = Progress::new();
-    let summary = simulation::simulate(&options, &arguments.output, &mut |at| {
+    let simulated = simulation::simulate_interruptible(&options, &arguments.output, &mut |at| {
         let ratio = at.images_done as f64 / at.images_total.max(1) as f64;
         progress.show(ratio, || format!("{} of {} images", at.images_done, at.images_total));
-    })?;
+        interrupt.control_flow()
+    });
     drop(progress);
+    let summary = match simulated {
+        Err(error @ SimulationError::Interrupted { .. }) => {
+            notify(&format!("dcvins: {error}"));
+            return Ok(Outcome::Interrupted);
+        }
+        simulated => simulated?,
+    };
     let (translation_m, rotation_rad) = summary.given_chain_error;
     print(&format!(
         "{}: {:.1} s, {:.1} m, {} images; extrinsics error of the given chain: {:.1} mm, {:.2}°\n{}\n{}\n",
@@ -117,5 +134,6 @@ pub(crate) fn simulate(arguments: &SimulateArguments) -> Result<()> {
         rotation_rad.to_degrees(),
         summary.rig.display(),
         summary.ground_truth.display(),
-    ))
+    ))?;
+    Ok(Outcome::Success)
 }

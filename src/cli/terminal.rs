@@ -5,6 +5,7 @@ use std::io::{self, Write as _};
 use std::time::Duration;
 
 use anyhow::{Context as _, Result};
+use dcvins::flight_log::{printable, printable_lines};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
@@ -13,8 +14,13 @@ const PROGRESS_STEPS: u64 = 1000;
 /// Period of the animation for work of unknown length.
 const SPINNER_PERIOD: Duration = Duration::from_millis(100);
 
-/// Writes to standard output; a closed pipe is no error.
+/// Writes text for people to standard output, without the control characters that names in it may have; a closed pipe is
+/// no failure.
 pub(crate) fn print(text: &str) -> Result<()> {
+    write(&printable_lines(text))
+}
+
+fn write(text: &str) -> Result<()> {
     let mut stdout = io::stdout().lock();
     match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
@@ -22,9 +28,24 @@ pub(crate) fn print(text: &str) -> Result<()> {
     }
 }
 
-/// Writes a value as JSON to standard output.
+/// Writes a value as JSON to standard output; characters that control a terminal are written as JSON's own escapes.
 pub(crate) fn print_json<T: Serialize + ?Sized>(value: &T) -> Result<()> {
-    print(&format!("{}\n", serde_json::to_string_pretty(value)?))
+    write(&format!("{}\n", escaped_json(&serde_json::to_string_pretty(value)?)))
+}
+
+/// JSON text in which every unprintable character is a `\uXXXX`: they occur inside strings only, and below U+0020 the
+/// serializer has escaped them.
+fn escaped_json(json: &str) -> String {
+    let mut text = String::with_capacity(json.len());
+    let mut units = [0; 2];
+    for letter in json.chars() {
+        if letter == '\n' || printable(letter.encode_utf8(&mut [0; 4])).len() == letter.len_utf8() {
+            text.push(letter);
+        } else {
+            text.extend(letter.encode_utf16(&mut units).iter().map(|unit| format!("\\u{unit:04x}")));
+        }
+    }
+    text
 }
 
 /// Writes a report to standard output: as JSON for programs, else as text.
@@ -33,10 +54,9 @@ pub(crate) fn print_report<T: Serialize + Display>(report: &T, json: bool) -> Re
 }
 
 /// Writes a line to standard error.
-#[cfg(feature = "gui")]
 pub(crate) fn notify(text: &str) {
-    // A closed standard error loses only the notice.
-    drop(writeln!(io::stderr(), "{text}"));
+    // A closed standard error loses the notice and nothing else.
+    drop(writeln!(io::stderr(), "{}", printable_lines(text)));
 }
 
 /// A progress display on standard error, removed when it is dropped; nothing is shown if standard error is not a
@@ -69,5 +89,18 @@ impl Progress {
 impl Drop for Progress {
     fn drop(&mut self) {
         self.0.finish_and_clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn json_stays_json_without_control_characters() {
+        let name = "/a\u{1b}[2J\u{9b}\u{202e}é";
+        let json = escaped_json(&serde_json::to_string_pretty(&[name]).unwrap());
+        assert_eq!(json, "[\n  \"/a\\u001b[2J\\u009b\\u202eé\"\n]");
+        assert_eq!(serde_json::from_str::<Vec<String>>(&json).unwrap(), [name]);
     }
 }

@@ -1,10 +1,10 @@
 //! The files that `dcvins calibrate` writes.
 
-use std::fs;
 use std::path::Path;
 
 use super::calibration_report::{CalibrationReport, ParameterReport};
 use super::error::ExportError;
+use crate::flight_log::output::{self, OutputSet};
 use crate::session::CalibrationRun;
 
 /// Writes `rig.yaml`, `calibration.json` and `report.txt` into a folder.
@@ -12,25 +12,30 @@ use crate::session::CalibrationRun;
 /// # Errors
 /// When a file or the folder cannot be written.
 pub fn write_calibration(run: &CalibrationRun, report: &CalibrationReport, folder: &Path) -> Result<(), ExportError> {
-    fs::create_dir_all(folder).map_err(ExportError::write(folder))?;
+    output::create_folder(folder).map_err(ExportError::write(folder))?;
     let json = serde_json::to_string_pretty(report)
         .map_err(|source| ExportError::Write { source: source.into(), path: folder.join("calibration.json") })?;
     let files = [
-        ("rig.yaml", format!("{}{}", run.rig.to_yaml(), sigmas_yaml(report))),
         ("calibration.json", format!("{json}\n")),
+        ("rig.yaml", format!("{}{}", run.rig.to_yaml(), sigmas_yaml(report))),
         ("report.txt", report.to_string()),
     ];
+    let mut outputs = OutputSet::default();
     for (name, text) in files {
         let path = folder.join(name);
-        fs::write(&path, text).map_err(ExportError::write(&path))?;
+        outputs.write(&path, text.as_bytes()).map_err(ExportError::write(&path))?;
     }
-    Ok(())
+    outputs.commit().map_err(ExportError::commit)
 }
 
 /// The standard deviations as an additional entry of the rig file, which readers of rigs ignore.
 fn sigmas_yaml(report: &CalibrationReport) -> String {
     let sigma_of = |parameter: &ParameterReport| {
-        format!("    {}_{}: {:?}\n", parameter.name, parameter.dimension.unit(), parameter.sigma)
+        let key = format!("{}_{}", parameter.name, parameter.dimension.unit());
+        // A joint may have any name.
+        let plain = key.chars().all(|letter| letter.is_ascii_alphanumeric() || "_.".contains(letter));
+        let key = if plain { key } else { serde_json::Value::from(key).to_string() };
+        format!("    {key}: {:?}\n", parameter.sigma)
     };
     let sigmas: String = report.parameters.iter().map(sigma_of).collect();
     format!(

@@ -10,6 +10,7 @@ use super::error::ExportError;
 use super::recent_files::{RecentFiles, state_folder};
 use super::screenshot::{write_csv, write_png, write_svg};
 use super::session_file::is_session;
+use crate::flight_log::output;
 use crate::gui::desktop::{Desktop, PanelExport, PathEntry};
 
 /// Maximum number of entries of a folder that are read.
@@ -49,7 +50,7 @@ impl Machine {
         let folder =
             self.state.as_ref().ok_or_else(|| format!("there is no home folder to keep {name} in: set HOME"))?;
         let file = folder.join(name);
-        let written = fs::create_dir_all(folder).and_then(|()| fs::write(&file, text));
+        let written = output::create_folder(folder).and_then(|()| output::write_file(&file, text.as_bytes()));
         written.map_err(|error| ExportError::write(&file)(error).to_string())
     }
 }
@@ -151,9 +152,9 @@ impl Desktop for Machine {
 
     fn write_session(&self, name: &str, text: &str) -> Result<PathBuf, String> {
         let folder = self.output.join(name);
-        fs::create_dir_all(&folder).map_err(|error| ExportError::write(&folder)(error).to_string())?;
+        output::create_folder(&folder).map_err(|error| ExportError::write(&folder)(error).to_string())?;
         let path = folder.join(format!("{name}.session.json"));
-        fs::write(&path, text).map_err(|error| ExportError::write(&path)(error).to_string())?;
+        output::write_file(&path, text.as_bytes()).map_err(|error| ExportError::write(&path)(error).to_string())?;
         Ok(fs::canonicalize(&path).unwrap_or(path))
     }
 

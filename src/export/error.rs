@@ -17,6 +17,14 @@ pub enum ExportError {
         /// Path of the file or folder.
         path: PathBuf,
     },
+    /// The folder or file holds something else than results that may be replaced.
+    #[error("{problem}; give --force to overwrite, or another place to write to: {path}")]
+    Existing {
+        /// What is there.
+        problem: String,
+        /// Where.
+        path: PathBuf,
+    },
     /// A file could not be read.
     #[error("cannot read: {source}: {path}")]
     Read {
@@ -55,6 +63,11 @@ pub enum ExportError {
 }
 
 impl ExportError {
+    /// For `map_err` behind [`OutputSet::commit`](crate::flight_log::output::OutputSet::commit).
+    pub(super) fn commit((path, source): (PathBuf, io::Error)) -> Self {
+        Self::Write { source, path }
+    }
+
     /// For `map_err` of a write.
     pub(super) fn write(path: &Path) -> impl FnOnce(io::Error) -> Self + '_ {
         move |source| Self::Write { source, path: path.to_owned() }

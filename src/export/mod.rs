@@ -7,6 +7,7 @@ mod csv_table;
 mod desktop;
 mod error;
 mod evaluation;
+mod existing;
 mod recent_files;
 mod report;
 mod results;
@@ -25,6 +26,10 @@ pub use calibration_report::{CalibrationReport, report_calibration};
 pub use desktop::Machine;
 pub use error::ExportError;
 pub use evaluation::{EvaluationOptions, EvaluationReport, evaluate};
+pub use existing::{
+    check_calibration_folder, check_converted_log, check_picture, check_report_folder, check_run_folders,
+    check_simulated_log, other_runs,
+};
 pub use recent_files::RecentFiles;
 pub use report::{ReportDrawing, ReportFigure, ReportOptions, write_report};
 pub use results::write_results;

@@ -4,13 +4,19 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::error::ExportError;
-use super::results::write_results;
+use super::results::stage_results;
 use super::summary::{RunSummary, summarize, to_json};
 use super::tables::{calibration_csv, frames_csv, information_csv, rank_csv};
 use super::trajectory::{euroc_of_run, tum_of_run};
+use crate::flight_log::output::{self, OutputSet};
 use crate::gimbal::ParameterPart;
 use crate::sensors::{CameraMount, Rig};
 use crate::session::{Recording, RunRecord};
+
+/// The trajectory as a table like EuRoC's.
+const EUROC_TRAJECTORY: &str = "trajectory.euroc.csv";
+/// The run for Foxglove and Rerun.
+const RESULTS: &str = "results.mcap";
 
 /// Options of the files of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,40 +37,70 @@ impl Default for RunFileOptions {
 }
 
 /// Writes the files of one run into `folder/LABEL/` and returns that folder and the summary.
+///
+/// All files are complete before the first one replaces an older one; files of an earlier run that this one does not write
+/// are removed.
 pub fn write_run(
     recording: &Recording,
     run: &RunRecord,
     folder: &Path,
     options: RunFileOptions,
 ) -> Result<(PathBuf, RunSummary), ExportError> {
+    let mut outputs = OutputSet::default();
+    let (folder, summary) = stage_run(recording, run, folder, options, &mut outputs)?;
+    outputs.commit().map_err(ExportError::commit)?;
+    remove_unwritten(&folder, options)?;
+    Ok((folder, summary))
+}
+
+/// Prepares the files of one run without giving them their names.
+pub(super) fn stage_run(
+    recording: &Recording,
+    run: &RunRecord,
+    folder: &Path,
+    options: RunFileOptions,
+    outputs: &mut OutputSet,
+) -> Result<(PathBuf, RunSummary), ExportError> {
     let folder = folder.join(&run.spec.label);
-    fs::create_dir_all(&folder).map_err(ExportError::write(&folder))?;
+    output::create_folder(&folder).map_err(ExportError::write(&folder))?;
     let summary = summarize(recording, run, options.timing);
     let json = to_json(&summary)
         .map_err(|source| ExportError::Write { source: source.into(), path: folder.join("summary.json") })?;
+    // The summary says of which log the files are, and comes first.
     let mut files = vec![
+        ("summary.json", json),
         ("trajectory.tum", tum_of_run(run, recording.epoch_ns)),
         ("calibration.csv", calibration_csv(run, &recording.rig)),
         ("rank.csv", rank_csv(run, &recording.rig.parameter_names())),
         ("information.csv", information_csv(run, &recording.rig)),
         ("frames.csv", frames_csv(run, options.timing)),
         ("rig.yaml", calibrated_rig(recording, run).to_yaml()),
-        ("summary.json", json),
     ];
     if options.euroc_trajectory {
-        files.push(("trajectory.euroc.csv", euroc_of_run(run, recording.epoch_ns)));
+        files.push((EUROC_TRAJECTORY, euroc_of_run(run, recording.epoch_ns)));
     }
     for (name, text) in files {
         let path = folder.join(name);
-        fs::write(&path, text).map_err(ExportError::write(&path))?;
+        outputs.write(&path, text.as_bytes()).map_err(ExportError::write(&path))?;
     }
     if options.mcap {
-        write_results(recording, run, &folder.join("results.mcap"))?;
+        outputs.add(stage_results(recording, run, &folder.join(RESULTS))?);
     }
     Ok((folder, summary))
 }
 
-/// The rig with the final calibration of the run.
+/// Removes the files that an earlier run with other options left in the folder of a run.
+pub(super) fn remove_unwritten(folder: &Path, options: RunFileOptions) -> Result<(), ExportError> {
+    for (name, written) in [(EUROC_TRAJECTORY, options.euroc_trajectory), (RESULTS, options.mcap)] {
+        let path = folder.join(name);
+        if !written && path.is_file() {
+            fs::remove_file(&path).map_err(ExportError::write(&path))?;
+        }
+    }
+    Ok(())
+}
+
+/// The rig with the calibration that the run ended with.
 fn calibrated_rig(recording: &Recording, run: &RunRecord) -> Rig {
     let mut rig = (*recording.rig).clone();
     let Some(last) = run.steps.last() else { return rig };

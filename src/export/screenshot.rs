@@ -1,6 +1,5 @@
 //! Screenshots of panels without a window: the same bytes on every machine.
 
-use std::fs;
 use std::io::Cursor;
 use std::path::Path;
 
@@ -10,6 +9,7 @@ use image::{ExtendedColorType, ImageEncoder as _, RgbaImage};
 use thiserror::Error;
 
 use super::error::ExportError;
+use crate::flight_log::output;
 use crate::gui::rendering::offscreen::{Offscreen, OffscreenError};
 use crate::gui::rendering::{headless, headless::HeadlessOptions};
 use crate::gui::theme::{Theme, ThemeName};
@@ -244,13 +244,15 @@ pub fn write_csv(table: &str, path: &Path) -> Result<(), ScreenshotError> {
 
 fn write_bytes(bytes: &[u8], path: &Path) -> Result<(), ScreenshotError> {
     if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
-        fs::create_dir_all(folder).map_err(ExportError::write(folder))?;
+        output::create_folder(folder).map_err(ExportError::write(folder))?;
     }
-    Ok(fs::write(path, bytes).map_err(ExportError::write(path))?)
+    Ok(output::write_file(path, bytes).map_err(ExportError::write(path))?)
 }
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
     use crate::gui::samples::{sample_images, sample_recording};
     use crate::gui::tests::keep_screenshot;

@@ -14,6 +14,7 @@ pub(crate) mod joint_merge;
 mod limits;
 pub(crate) mod log;
 pub(crate) mod messages;
+pub mod output;
 pub(crate) mod rig;
 mod sensor_frame;
 pub(crate) mod stream;

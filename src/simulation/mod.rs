@@ -41,7 +41,7 @@ pub use imu::ImuBias;
 #[cfg(feature = "logs")]
 pub use options::{SimulationError, SimulationOptions, SimulationProgress, SimulationSummary};
 #[cfg(feature = "logs")]
-pub use simulate::simulate;
+pub use simulate::{simulate, simulate_interruptible};
 pub use synthetic::{
     SyntheticFlight, SyntheticFrame, SyntheticMotion, SyntheticMount, SyntheticOptions, synthetic_tracks,
 };

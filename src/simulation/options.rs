@@ -141,6 +141,14 @@ pub enum SimulationError {
         /// The encoder's answer.
         problem: String,
     },
+    /// The caller has stopped it.
+    #[error("interrupted after {images_done} of {images_total} images; nothing is written")]
+    Interrupted {
+        /// Images so far.
+        images_done: usize,
+        /// Images of the whole log.
+        images_total: usize,
+    },
     /// A file could not be written.
     #[error(transparent)]
     Log(#[from] LogError),

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, VecDeque};
 use std::fmt::Write as _;
+use std::ops::ControlFlow;
 use std::path::Path;
 
 use image::codecs::jpeg::JpegEncoder;
@@ -18,7 +19,8 @@ use super::render::{Renderer, Sensor, SensorOptions, View, Workspace};
 use super::scenario::{Scenario, ScenarioOptions, gravity_m_per_s2, stream};
 use super::trajectory::{AIR_DRAG_PER_S, Trajectory, VehicleLimits};
 use super::world;
-use crate::flight_log::{LogWriter, LogWriterOptions, MessageTimes};
+use crate::flight_log::output::OutputSet;
+use crate::flight_log::{LogError, LogWriter, LogWriterOptions, MessageTimes};
 use crate::geometry::{ns_from_seconds, seconds_from_ns, so3};
 use crate::sensors::{CameraRig, ImuSample, JointSample};
 
@@ -47,6 +49,21 @@ pub fn simulate(
     output: &Path,
     progress: &mut dyn FnMut(SimulationProgress),
 ) -> Result<SimulationSummary, SimulationError> {
+    simulate_interruptible(options, output, &mut |at| {
+        progress(at);
+        ControlFlow::Continue(())
+    })
+}
+
+/// [`simulate`] that ends where `progress` breaks.
+///
+/// # Errors
+/// As [`simulate`], and [`SimulationError::Interrupted`], in which case no file is written.
+pub fn simulate_interruptible(
+    options: &SimulationOptions,
+    output: &Path,
+    progress: &mut dyn FnMut(SimulationProgress) -> ControlFlow<()>,
+) -> Result<SimulationSummary, SimulationError> {
     options.check()?;
     let name = output.file_stem().map_or_else(|| "simulation".to_owned(), |stem| stem.to_string_lossy().into_owned());
     let scenario = fly_scenario(options, &name);
@@ -68,9 +85,11 @@ pub fn simulate(
     for (kind, text) in attachments {
         log.attach(&format!("{name}.{kind}.yaml"), "application/yaml", &text, EPOCH_NS)?;
     }
-    log.finish()?;
-    scenario.given_rig.save(&rig_path, "")?;
-    scenario.true_rig.save(&ground_truth_path, &ground_truth_notes)?;
+    let mut outputs = OutputSet::default();
+    outputs.add(log.finish_staged()?);
+    outputs.add(scenario.given_rig.stage(&rig_path, "")?);
+    outputs.add(scenario.true_rig.stage(&ground_truth_path, &ground_truth_notes)?);
+    outputs.commit().map_err(|(path, source)| LogError::Io { action: "write the simulation", source, path })?;
     let duration_s = scenario.trajectory.duration_s();
     Ok(SimulationSummary {
         log: output.to_owned(),
@@ -171,7 +190,7 @@ fn write_messages(
     options: &SimulationOptions,
     scenario: &Scenario,
     log: &mut LogWriter,
-    progress: &mut dyn FnMut(SimulationProgress),
+    progress: &mut dyn FnMut(SimulationProgress) -> ControlFlow<()>,
 ) -> Result<usize, SimulationError> {
     let recordings = recordings(options, scenario);
     let schedule = schedule(&recordings, options.seed);
@@ -224,7 +243,9 @@ fn write_messages(
                     log.write_compressed_image(&camera.topic, &camera.frame_id, times, "jpeg", &jpeg)?;
                 }
                 done += 1;
-                progress(SimulationProgress { images_done: done, images_total: total });
+                if progress(SimulationProgress { images_done: done, images_total: total }).is_break() {
+                    return Err(SimulationError::Interrupted { images_done: done, images_total: total });
+                }
             }
         }
     }

@@ -15,9 +15,12 @@ use std::path::{Path, PathBuf};
 use content::ReportContent;
 use inputs::InputFile;
 use rank_intervals::RankInterval;
+use serde_json::Value;
 
 use super::error::ExportError;
-use super::run_files::{RunFileOptions, write_run};
+use super::existing::{RUN_FILES, check_run_folder, read_index};
+use super::run_files::{RunFileOptions, remove_unwritten, stage_run};
+use crate::flight_log::output::{self, OutputSet};
 use crate::log_check::CheckReport;
 use crate::session::Recording;
 
@@ -59,19 +62,60 @@ pub struct ReportOptions {
 /// # Errors
 /// When a file cannot be read or written.
 pub fn write_report(recording: &Recording, folder: &Path, options: &ReportOptions) -> Result<PathBuf, ExportError> {
-    fs::create_dir_all(folder).map_err(ExportError::write(folder))?;
+    output::create_folder(folder).map_err(ExportError::write(folder))?;
     let run_options = RunFileOptions { timing: false, ..RunFileOptions::default() };
-    let mut summaries = Vec::new();
+    let mut outputs = OutputSet::default();
+    let (mut folders, mut summaries) = (Vec::new(), Vec::new());
     for run in &recording.runs {
-        summaries.push(write_run(recording, run, folder, run_options)?.1);
+        let (folder, summary) = stage_run(recording, run, folder, run_options, &mut outputs)?;
+        folders.push(folder);
+        summaries.push(summary);
     }
     let inputs = options.inputs.iter().map(|path| InputFile::read(path)).collect::<Result<Vec<_>, _>>()?;
     let content = ReportContent::new(recording, summaries, inputs, options);
     let json_path = folder.join("report.json");
+    let earlier_runs = labels_in(&json_path);
     let json = serde_json::to_string_pretty(&content)
         .map_err(|source| ExportError::Write { source: source.into(), path: json_path.clone() })?;
-    fs::write(&json_path, format!("{json}\n")).map_err(ExportError::write(&json_path))?;
+    outputs.write(&json_path, format!("{json}\n").as_bytes()).map_err(ExportError::write(&json_path))?;
     let path = folder.join("report.html");
-    fs::write(&path, page::page(&content, &options.figures)).map_err(ExportError::write(&path))?;
+    let page = page::page(&content, &options.figures);
+    outputs.write(&path, page.as_bytes()).map_err(ExportError::write(&path))?;
+    outputs.commit().map_err(ExportError::commit)?;
+    for folder in &folders {
+        remove_unwritten(folder, run_options)?;
+    }
+    for label in earlier_runs.iter().filter(|label| recording.runs.iter().all(|run| run.spec.label != **label)) {
+        remove_run(&folder.join(label), &content.log)?;
+    }
     Ok(path)
+}
+
+/// The labels of the runs of a report that was written before, where they are plain names of folders.
+fn labels_in(json: &Path) -> Vec<String> {
+    let report = read_index(json).unwrap_or_default();
+    let runs = report.get("runs").and_then(Value::as_array).into_iter().flatten();
+    let labels = runs.filter_map(|run| run.get("label")?.as_str()).map(str::to_owned);
+    labels.filter(|label| is_folder_name(label)).collect()
+}
+
+fn is_folder_name(label: &str) -> bool {
+    let plain = |letter: char| letter.is_ascii_alphanumeric() || "-_.".contains(letter);
+    !label.trim_matches('.').is_empty() && label.chars().all(plain)
+}
+
+/// Removes the folder of a run of the earlier report, unless it holds anything else.
+fn remove_run(folder: &Path, log: &str) -> Result<(), ExportError> {
+    if !folder.is_dir() || check_run_folder(folder, log).is_err() {
+        return Ok(());
+    }
+    for name in RUN_FILES {
+        let path = folder.join(name);
+        if path.is_file() {
+            fs::remove_file(&path).map_err(ExportError::write(&path))?;
+        }
+    }
+    // Only an empty folder can be removed so.
+    drop(fs::remove_dir(folder));
+    Ok(())
 }

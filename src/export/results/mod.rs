@@ -9,6 +9,7 @@ mod series;
 
 use std::path::Path;
 
+use crate::flight_log::output::StagedFile;
 use crate::flight_log::{LogError, LogLevel, LogWriter, LogWriterOptions, MessageTimes, NamedTransform};
 use crate::frontend::FeatureId;
 use crate::geometry::RigidTransform;
@@ -52,6 +53,12 @@ impl Names {
 /// # Errors
 /// When the file cannot be written.
 pub fn write_results(recording: &Recording, run: &RunRecord, path: &Path) -> Result<(), LogError> {
+    let staged = stage_results(recording, run, path)?;
+    staged.commit().map_err(|source| LogError::Io { action: "write the log", source, path: path.to_owned() })
+}
+
+/// The same without giving the file its name.
+pub(super) fn stage_results(recording: &Recording, run: &RunRecord, path: &Path) -> Result<StagedFile, LogError> {
     let mut results = Results {
         log: LogWriter::create(path, &LogWriterOptions::default())?,
         names: Names::new(&run.spec.label),
@@ -66,7 +73,7 @@ pub fn write_results(recording: &Recording, run: &RunRecord, path: &Path) -> Res
     for (index, step) in run.steps.iter().enumerate() {
         results.write_step(step, index == last)?;
     }
-    results.log.finish()
+    results.log.finish_staged()
 }
 
 struct Results {

@@ -58,6 +58,12 @@ pub enum ConvertError {
         /// The source.
         path: PathBuf,
     },
+    /// The caller has stopped it.
+    #[error("interrupted; nothing is written: {}", path.display())]
+    Interrupted {
+        /// The source.
+        path: PathBuf,
+    },
     /// The log would overwrite its source.
     #[error("the log would be inside or overwrite its own source; give another -o: {}", path.display())]
     OntoItself {

@@ -78,6 +78,7 @@ pub(super) fn convert(source: &Path, sink: &mut Sink<'_>) -> Result<Option<Rig>,
     for (index, (stamp_ns, sample)) in samples.into_iter().enumerate() {
         write(stamp_ns, &sample, &cameras, &poses, sink)?;
         sink.progress((index + 1) as f64 / count as f64);
+        sink.ensure_running()?;
     }
     let ground_truth = POSE_FOLDERS.into_iter().find(|name| poses.iter().any(|present| present == name));
     rig_of(source, &root, &cameras, ground_truth.map(pose_topic), sink)

@@ -17,6 +17,7 @@ mod sqlite;
 
 use std::fs;
 use std::io::Read as _;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 pub use error::ConvertError;
@@ -63,15 +64,21 @@ impl SourceKind {
 /// When the source is of no known kind or damaged at its start, when it has no usable message, or when files cannot be
 /// read or written. Of a damaged source everything that can be read is converted; notes in the report count what is lost.
 pub fn convert(source: &Path, output: &Path, progress: &mut dyn FnMut(f64)) -> Result<ConversionReport, ConvertError> {
-    convert_with(source, output, &LogLimits::default(), progress)
+    convert_with(source, output, &LogLimits::default(), &mut |ratio| {
+        progress(ratio);
+        ControlFlow::Continue(())
+    })
 }
 
-/// Converts as [`convert`] does, within limits other than the usual ones.
+/// Converts as [`convert`] does, within limits other than the usual ones, and ends where `progress` breaks.
+///
+/// # Errors
+/// As [`convert`], and [`ConvertError::Interrupted`], in which case no file is written.
 pub fn convert_with(
     source: &Path,
     output: &Path,
     limits: &LogLimits,
-    progress: &mut dyn FnMut(f64),
+    progress: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<ConversionReport, ConvertError> {
     let kind = detect(source, limits)?;
     let same = |a: &Path, b: &Path| fs::canonicalize(a).ok().is_some_and(|path| fs::canonicalize(b).ok() == Some(path));
@@ -79,23 +86,20 @@ pub fn convert_with(
     {
         return Err(ConvertError::OntoItself { path: output.to_owned() });
     }
-    let partial = with_suffix(output, ".partial");
-    let converted = write(kind, source, &partial, limits, progress);
-    let (mut report, rig) = match converted {
-        Ok(converted) => converted,
-        Err(error) => {
-            // The first error is the one to report.
-            drop(fs::remove_file(&partial));
-            return Err(error);
-        }
-    };
-    fs::rename(&partial, output).map_err(ConvertError::io("write the log", output))?;
+    let (mut report, rig) = write(kind, source, output, limits, progress)?;
     let log = FlightLog::open(output)?;
     report.duration_s = seconds_from_ns(log.duration_ns());
     report.log = output.to_owned();
     if let Some(rig) = rig {
         let path = output.with_extension("rig.yaml");
-        rig.save(&path, "")?;
+        match fs::read(&path) {
+            // Edited by hand, or a rig of the user's own.
+            Ok(existing) if existing != rig.to_yaml().as_bytes() => report.notes.push(format!(
+                "the rig beside the log is kept; it differs from the calibration of the source: {}",
+                path.display()
+            )),
+            _ => rig.save(&path, "")?,
+        }
         report.rig = Some(path);
     } else if output.with_extension("rig.yaml").is_file() {
         report.rig = Some(output.with_extension("rig.yaml"));
@@ -114,7 +118,7 @@ fn write(
     source: &Path,
     output: &Path,
     limits: &LogLimits,
-    progress: &mut dyn FnMut(f64),
+    progress: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<(ConversionReport, Option<Rig>), ConvertError> {
     let writer = LogWriter::create(output, &LogWriterOptions::default())?;
     let mut sink = Sink::new(writer, limits.clone(), progress);
@@ -153,7 +157,7 @@ fn read_description(path: &Path, action: &'static str) -> Result<String, Convert
     fs::read_to_string(path).map_err(ConvertError::io(action, path))
 }
 
-/// `a/log.mcap` and `.partial` make `a/log.mcap.partial`.
+/// `a/log.mcap` and `.zstd` make `a/log.mcap.zstd`.
 fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(suffix);

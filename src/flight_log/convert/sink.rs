@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use super::super::container::unpack_message;
@@ -61,13 +62,25 @@ pub(super) struct Sink<'a> {
     limits: LogLimits,
     /// Messages in the log so far.
     count: u64,
-    progress: &'a mut dyn FnMut(f64),
+    progress: &'a mut dyn FnMut(f64) -> ControlFlow<()>,
+    /// The last fraction that was reported, and messages since then.
+    fraction: f64,
+    since: u32,
+    interrupted: bool,
 }
 
+/// Messages after which a source that reports no progress is asked whether to go on.
+const MESSAGES_PER_REPORT: u32 = 64;
+
 impl<'a> Sink<'a> {
-    pub(super) fn new(writer: LogWriter, limits: LogLimits, progress: &'a mut dyn FnMut(f64)) -> Self {
+    pub(super) fn new(
+        writer: LogWriter,
+        limits: LogLimits,
+        progress: &'a mut dyn FnMut(f64) -> ControlFlow<()>,
+    ) -> Self {
         let (tallies, types, notes) = (BTreeMap::new(), BTreeMap::new(), Vec::new());
-        Self { writer, tallies, types, notes, limits, count: 0, progress }
+        let (fraction, since, interrupted) = (0.0, 0, false);
+        Self { writer, tallies, types, notes, limits, count: 0, progress, fraction, since, interrupted }
     }
 
     /// Limits on what is read from the source.
@@ -87,7 +100,16 @@ impl<'a> Sink<'a> {
 
     /// Reports the fraction of the source that is done, from 0 to 1.
     pub(super) fn progress(&mut self, fraction: f64) {
-        (self.progress)(fraction);
+        (self.fraction, self.since) = (fraction, 0);
+        self.interrupted |= (self.progress)(fraction).is_break();
+    }
+
+    /// An error when the caller has stopped the conversion.
+    pub(super) fn ensure_running(&self) -> Result<(), ConvertError> {
+        if self.interrupted {
+            return Err(ConvertError::Interrupted { path: self.writer.path().to_owned() });
+        }
+        Ok(())
     }
 
     /// Adds a remark to the report.
@@ -148,6 +170,11 @@ impl<'a> Sink<'a> {
 
     /// Writes a message into the log, or counts why it cannot be.
     pub(super) fn take(&mut self, message: &SourceMessage<'_>) -> Result<(), ConvertError> {
+        self.since += 1;
+        if self.since >= MESSAGES_PER_REPORT {
+            self.progress(self.fraction);
+        }
+        self.ensure_running()?;
         let SourceMessage { topic, message_type, log_time_ns, .. } = *message;
         if let Some(other) = self.types.get(topic)
             && other != message_type
@@ -209,6 +236,7 @@ impl<'a> Sink<'a> {
 
     /// Completes the log.
     pub(super) fn finish(self, kind: &str, source: &Path) -> Result<ConversionReport, ConvertError> {
+        self.ensure_running()?;
         let topics: Vec<ConvertedTopic> = self
             .tallies
             .into_iter()

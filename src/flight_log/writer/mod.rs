@@ -8,8 +8,7 @@ pub use results::{CircleAnnotation, LinesAnnotation, LogLevel, NamedTransform, R
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::BufWriter;
+use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 
 use image::codecs::jpeg::JpegEncoder;
@@ -18,6 +17,7 @@ use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, Compression, WriteOptions, Writer};
 use nalgebra::Vector3;
 
+use super::output::{OutputFile, StagedFile};
 use super::{LogError, MessageKind};
 use crate::camera::CameraModel;
 use crate::geometry::RigidTransform;
@@ -83,7 +83,7 @@ impl<'a> MessageType<'a> {
 
 /// Writes a log, message by message in the order of log times.
 pub struct LogWriter {
-    writer: Writer<BufWriter<File>>,
+    writer: Writer<BufWriter<OutputFile>>,
     /// Channel and number of messages so far, by topic.
     channels: BTreeMap<String, (u16, u32)>,
     path: PathBuf,
@@ -113,10 +113,10 @@ const QOS_PROFILE: &str = "\
 ";
 
 impl LogWriter {
-    /// Creates or overwrites a log.
+    /// Starts a log, which gets its name when it is finished; an older file stays until then.
     pub fn create(path: &Path, options: &LogWriterOptions) -> Result<Self, LogError> {
         let failed = |source| LogError::Io { action: "write the log", source, path: path.to_owned() };
-        let file = BufWriter::with_capacity(1 << 20, File::create(path).map_err(failed)?);
+        let file = BufWriter::with_capacity(1 << 20, OutputFile::create(path).map_err(failed)?);
         let compression = match options.compression {
             LogCompression::None => None,
             LogCompression::Lz4 => Some(Compression::Lz4),
@@ -134,6 +134,11 @@ impl LogWriter {
             .emit_message_indexes(options.indexed);
         let writer = write_options.create(file).map_err(|error| write_error(path, &error))?;
         Ok(Self { writer, channels: BTreeMap::new(), path: path.to_owned() })
+    }
+
+    /// The path that it will have.
+    pub(super) fn path(&self) -> &Path {
+        &self.path
     }
 
     /// Writes an IMU sample: angular velocity in rad/s and specific force in m/s² (+g upwards while stationary), both in the
@@ -274,12 +279,19 @@ impl LogWriter {
         self.writer.write_metadata(&metadata).map_err(|error| write_error(&self.path, &error))
     }
 
-    /// Completes the file.
-    pub fn finish(mut self) -> Result<(), LogError> {
+    /// Completes the file, in place of an older one.
+    pub fn finish(self) -> Result<(), LogError> {
+        let path = self.path.clone();
+        let staged = self.finish_staged()?;
+        staged.commit().map_err(|source| LogError::Io { action: "write the log", source, path })
+    }
+
+    /// Completes the file without giving it its name, so that it can appear together with others.
+    pub fn finish_staged(mut self) -> Result<StagedFile, LogError> {
         self.writer.finish().map_err(|error| write_error(&self.path, &error))?;
-        let flushed = self.writer.into_inner().into_inner();
-        let failed = |source| LogError::Io { action: "write the log", source, path: self.path.clone() };
-        flushed.map(drop).map_err(|error| failed(error.into_error()))
+        let flushed = self.writer.into_inner().into_inner().map_err(io::IntoInnerError::into_error);
+        let staged = flushed.and_then(OutputFile::stage);
+        staged.map_err(|source| LogError::Io { action: "write the log", source, path: self.path })
     }
 
     /// Writes a message that is encoded already.

@@ -14,7 +14,7 @@ use crate::calibration::{
 use crate::flight_log::{FlightLog, LogError, LogWarning};
 use crate::geometry::{Dimension, RigidTransform, ns_from_seconds, seconds_from_ns};
 use crate::sensors::{CameraMount, CameraRig, ChainPrior, GimbalRig, Rig};
-use crate::session::plan::{ParameterizationChoice, RunSpec, SessionError};
+use crate::session::plan::{ParameterizationChoice, RunSpec, SessionError, check_start};
 
 /// Fraction of the progress that feature tracking takes.
 const TRACKING_RATIO: f64 = 0.6;
@@ -106,6 +106,7 @@ pub fn calibrate(
     on_progress: &mut dyn FnMut(CalibrationProgress),
 ) -> Result<CalibrationRun, CalibrationRunError> {
     let log = Arc::new(FlightLog::open(&request.log_path)?);
+    check_start(&log, request.start_s)?;
     let given_rig = Rig::for_log(&log, request.rig_path.as_deref())?;
     let ground_truth_rig = Rig::ground_truth_for_log(&log, request.ground_truth_path.as_deref())?;
     let entries = CalibratedEntries::of(&given_rig, request)?;

@@ -1,5 +1,7 @@
 //! Computation of runs to their end or to a stamp; the caller waits.
 
+use std::sync::atomic::Ordering;
+
 use super::computation::Computation;
 use super::message::EngineMessage;
 use super::threads::Engine;
@@ -41,7 +43,8 @@ pub fn compute_until(
             computation.recording_mut().end_at(until_ns);
         }
         on_step(computation.recording());
-        if computation.recording().runs.iter().all(|run| run.finished || run.ends_at(until_ns)) {
+        let interrupted = plan.interrupted.load(Ordering::Relaxed);
+        if interrupted || computation.recording().runs.iter().all(|run| run.finished || run.ends_at(until_ns)) {
             break;
         }
     }
@@ -72,7 +75,8 @@ pub fn compute(
     while let Some(message) = engine.receive() {
         computation.apply(ended_at(message, until_ns.unwrap_or(i64::MAX)));
         on_step(computation.recording());
-        if computation.recording().runs.iter().all(|run| run.finished) {
+        let interrupted = plan.interrupted.load(Ordering::Relaxed);
+        if interrupted || computation.recording().runs.iter().all(|run| run.finished) {
             break;
         }
     }

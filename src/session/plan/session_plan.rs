@@ -3,12 +3,14 @@
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use thiserror::Error;
 
 use super::run_spec::{ParameterizationChoice, RunSpec, distinct_labels};
 use crate::estimator::{EstimatorConfig, rigid_columns};
 use crate::flight_log::{FlightLog, LogError};
+use crate::geometry::seconds_from_ns;
 use crate::gimbal::{Chain, ParameterId, Parameterization};
 use crate::sensors::{CameraMount, CameraRig, Rig};
 
@@ -38,6 +40,16 @@ pub enum SessionError {
     TooManyRuns {
         /// Requested number of runs.
         count: usize,
+    },
+    /// The part of the log that is to be read begins behind its end.
+    #[error("--start {start_s} begins behind the end of the log, which has {end_s:.3} s: {}", path.display())]
+    StartBeyondEnd {
+        /// Where it begins.
+        start_s: f64,
+        /// Length of the log.
+        end_s: f64,
+        /// The log.
+        path: PathBuf,
     },
     /// A thread could not be started.
     #[error("cannot start a thread for the estimation: {source}")]
@@ -92,6 +104,8 @@ pub struct SessionPlan {
     /// Memory budget of record and histories in bytes. Beyond it, only summaries of steps are kept, and steps at the
     /// cursor are recomputed.
     pub memory_budget_bytes: usize,
+    /// Ends the computation after the current step when it is set, from any thread or a signal; what is computed stays.
+    pub interrupted: Arc<AtomicBool>,
 }
 
 /// Memory budget with which the whole process stays below 1.5 GiB while a log is played.
@@ -101,6 +115,7 @@ impl SessionPlan {
     /// Opens the log and its rigs and finds each run's camera.
     pub fn open(request: &SessionRequest) -> Result<Self, SessionError> {
         let log = Arc::new(FlightLog::open(&request.log_path)?);
+        check_start(&log, request.start_s)?;
         let rig = Rig::for_log(&log, request.rig_path.as_deref())?;
         let ground_truth_rig = Rig::ground_truth_for_log(&log, request.ground_truth_path.as_deref())?;
         let mut specs = request.specs.clone();
@@ -128,6 +143,7 @@ impl SessionPlan {
             changes: Vec::new(),
             keep_linearization_every: None,
             memory_budget_bytes: DEFAULT_MEMORY_BUDGET_BYTES,
+            interrupted: Arc::default(),
         })
     }
 
@@ -147,6 +163,15 @@ impl SessionPlan {
         parameters.retain(|parameter| known.insert(*parameter));
         parameters
     }
+}
+
+/// Whether there is something to read of a log from a time on.
+pub(in crate::session) fn check_start(log: &FlightLog, start_s: f64) -> Result<(), SessionError> {
+    let end_s = seconds_from_ns(log.duration_ns());
+    if start_s > 0.0 && start_s >= end_s {
+        return Err(SessionError::StartBeyondEnd { start_s, end_s, path: log.path().to_owned() });
+    }
+    Ok(())
 }
 
 /// The cameras of a run.

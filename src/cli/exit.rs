@@ -1,0 +1,48 @@
+//! The exit codes of the program, for scripts.
+
+use std::process::ExitCode;
+
+/// How a command ended without an error of its own; an error is 1, and wrong arguments are 2.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Outcome {
+    /// Everything was done.
+    Success,
+    /// A run never initialized.
+    NeverInitialized,
+    /// `check` has found errors.
+    ErrorsFound,
+    /// The condition of `--break` became true.
+    BreakHit,
+    /// Ended by Ctrl+C; what was computed is written.
+    Interrupted,
+}
+
+impl From<Outcome> for ExitCode {
+    fn from(outcome: Outcome) -> Self {
+        Self::from(match outcome {
+            Outcome::Success => 0,
+            Outcome::NeverInitialized => 3,
+            Outcome::ErrorsFound => 4,
+            Outcome::BreakHit => 5,
+            Outcome::Interrupted => INTERRUPTED,
+        })
+    }
+}
+
+/// Exit code of an interrupted command, as of a shell's.
+pub(crate) const INTERRUPTED: u8 = 130;
+
+/// Exit codes of the commands that only do their work or fail, for `--help`.
+pub(crate) const PLAIN: &str = "Exit codes: 0 success, 1 failure, 2 wrong use.";
+/// Those of `simulate`, `convert` and `screenshot`.
+pub(crate) const INTERRUPTIBLE: &str = "Exit codes: 0 success, 1 failure, 2 wrong use, 130 interrupted (Ctrl+C; files \
+    that are not complete are not written; a second Ctrl+C ends at once).";
+/// Those of `run`.
+pub(crate) const RUN: &str = "Exit codes: 0 success, 1 failure, 2 wrong use, 3 a run never initialized, 5 the condition of \
+    --break became true, 130 interrupted (Ctrl+C; the steps so far are written; a second Ctrl+C ends at once).";
+/// Those of `report`.
+pub(crate) const REPORT: &str = "Exit codes: 0 success, 1 failure, 2 wrong use, 3 a run never initialized, 130 \
+    interrupted (Ctrl+C; the steps so far are written; a second Ctrl+C ends at once).";
+/// Those of `check`.
+pub(crate) const CHECK: &str =
+    "Exit codes: 0 no errors found (warnings and notes may be), 1 failure, 2 wrong use, 4 errors found.";

@@ -1,0 +1,265 @@
+//! What lies already where results are to be written, and what of it may be replaced.
+//!
+//! Results are replaced without a question where they are results of the same command for the same log: a folder of a run
+//! must hold nothing but such files, `report` and `calibrate` look at the files of their own names. Anything else needs
+//! `--force`.
+
+use std::ffi::OsStr;
+use std::fs;
+use std::io::Read as _;
+use std::path::Path;
+
+use serde_json::Value;
+
+use super::error::ExportError;
+use super::summary::log_name;
+use crate::flight_log::output;
+use crate::flight_log::{FlightLog, shortened};
+
+/// Names of all files that a run can write.
+pub(super) const RUN_FILES: [&str; 9] = [
+    "summary.json",
+    "trajectory.tum",
+    "calibration.csv",
+    "rank.csv",
+    "information.csv",
+    "frames.csv",
+    "rig.yaml",
+    "trajectory.euroc.csv",
+    "results.mcap",
+];
+const REPORT_FILES: [&str; 2] = ["report.json", "report.html"];
+const CALIBRATION_FILES: [&str; 3] = ["calibration.json", "rig.yaml", "report.txt"];
+/// Largest file that is read for the name of its log.
+const LARGEST_INDEX_BYTES: u64 = 64 << 20;
+
+/// Whether the results of runs on a log may be written into the folders of their labels, below `folder`.
+///
+/// # Errors
+/// When a folder cannot be written or, without `force`, holds something else than a run on the same log.
+pub fn check_run_folders(folder: &Path, labels: &[&str], log: &Path, force: bool) -> Result<(), ExportError> {
+    output::check_folder(folder).map_err(ExportError::write(folder))?;
+    for label in labels {
+        let folder = folder.join(label);
+        output::check_folder(&folder).map_err(ExportError::write(&folder))?;
+        if !force {
+            check_run_folder(&folder, &log_name(log))?;
+        }
+    }
+    Ok(())
+}
+
+/// The same for a report and the runs in it.
+///
+/// # Errors
+/// As [`check_run_folders`], and for another log's report in the folder.
+pub fn check_report_folder(folder: &Path, labels: &[&str], log: &Path, force: bool) -> Result<(), ExportError> {
+    check_run_folders(folder, labels, log, force)?;
+    if force { Ok(()) } else { check_files(folder, &REPORT_FILES, &log_name(log)) }
+}
+
+/// The same for an offline calibration.
+///
+/// # Errors
+/// As [`check_run_folders`], and for another log's calibration, or a rig, in the folder.
+pub fn check_calibration_folder(folder: &Path, log: &Path, force: bool) -> Result<(), ExportError> {
+    output::check_folder(folder).map_err(ExportError::write(folder))?;
+    if force { Ok(()) } else { check_files(folder, &CALIBRATION_FILES, &log_name(log)) }
+}
+
+/// Whether a log and its rigs may be written by `simulate`: an existing log must be a simulation of the same experiment, and
+/// the rigs beside it must be as the simulation wrote them.
+///
+/// # Errors
+/// When a file cannot be written or, without `force`, is something else.
+pub fn check_simulated_log(log: &Path, force: bool) -> Result<(), ExportError> {
+    output::check_file(log).map_err(ExportError::write(log))?;
+    let beside = ["rig.yaml", "truth.yaml"].map(|ending| (format!(".{ending}"), log.with_extension(ending)));
+    for (_, path) in &beside {
+        output::check_file(path).map_err(ExportError::write(path))?;
+    }
+    if force {
+        return Ok(());
+    }
+    let existing =
+        |problem: &str, path: &Path| ExportError::Existing { problem: problem.to_owned(), path: path.to_owned() };
+    let simulated = if log.exists() {
+        let simulated = FlightLog::open(log).ok().filter(|log| log.attachment(".truth.yaml").is_some());
+        Some(simulated.ok_or_else(|| existing("the file exists and is no simulated log", log))?)
+    } else {
+        None
+    };
+    for (ending, path) in &beside {
+        let Ok(text) = fs::read(path) else { continue };
+        let written = simulated.as_ref().and_then(|log| log.attachment(ending));
+        if !written.is_some_and(|(_, content)| content == text) {
+            return Err(existing("the rig exists and is not as 'dcvins simulate' wrote it", path));
+        }
+    }
+    Ok(())
+}
+
+/// Whether a log may be written by `convert`: an existing file must be a log that this program has written, and no simulation.
+///
+/// # Errors
+/// When the file cannot be written or, without `force`, is something else.
+pub fn check_converted_log(log: &Path, force: bool) -> Result<(), ExportError> {
+    /// The header with the name of the program that wrote the log lies before this byte.
+    const HEADER_BYTES: u64 = 128;
+    output::check_file(log).map_err(ExportError::write(log))?;
+    if force || !log.exists() {
+        return Ok(());
+    }
+    let mut start = Vec::new();
+    let read = fs::File::open(log).and_then(|file| file.take(HEADER_BYTES).read_to_end(&mut start));
+    read.map_err(|source| ExportError::Read { source, path: log.to_owned() })?;
+    let ours = start.starts_with(b"\x89MCAP") && start.windows(7).any(|bytes| bytes == b"dcvins ");
+    if ours && FlightLog::open(log).is_ok_and(|log| log.attachment(".truth.yaml").is_none()) {
+        return Ok(());
+    }
+    let problem = "the file exists and is no log that 'dcvins convert' wrote".to_owned();
+    Err(ExportError::Existing { problem, path: log.to_owned() })
+}
+
+/// Whether a picture or table may be written: an existing file must be of the same format.
+///
+/// # Errors
+/// When the file cannot be written or, without `force`, is something else.
+pub fn check_picture(path: &Path, force: bool) -> Result<(), ExportError> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    output::check_folder(folder).map_err(ExportError::write(folder))?;
+    if !path.exists() {
+        return Ok(());
+    }
+    output::check_file(path).map_err(ExportError::write(path))?;
+    let mut start = Vec::new();
+    let file = fs::File::open(path).map_err(|source| ExportError::Read { source, path: path.to_owned() })?;
+    file.take(16).read_to_end(&mut start).map_err(|source| ExportError::Read { source, path: path.to_owned() })?;
+    let text = || String::from_utf8_lossy(&start).trim_start().to_owned();
+    let extension = path.extension().and_then(OsStr::to_str).unwrap_or_default().to_ascii_lowercase();
+    let same = match extension.as_str() {
+        "csv" => std::str::from_utf8(&start).is_ok_and(|text| text.contains(['_', ','])),
+        _ => {
+            start.is_empty()
+                || start.starts_with(b"\x89PNG")
+                || text().starts_with("<svg")
+                || text().starts_with("<?xml")
+        }
+    };
+    if force || same {
+        return Ok(());
+    }
+    Err(ExportError::Existing {
+        problem: "the file exists and is no picture or table".to_owned(),
+        path: path.to_owned(),
+    })
+}
+
+/// Labels of runs in a folder other than the given ones, in the order of their names.
+pub fn other_runs(folder: &Path, labels: &[&str]) -> Vec<String> {
+    let entries = fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok);
+    let names = entries.filter(|entry| entry.path().join(RUN_FILES[0]).is_file()).map(|entry| entry.file_name());
+    let mut names: Vec<String> = names.map(|name| name.to_string_lossy().into_owned()).collect();
+    names.retain(|name| !labels.contains(&name.as_str()));
+    names.sort();
+    names
+}
+
+/// A folder of a run must hold nothing, or a run on this log and nothing else.
+pub(super) fn check_run_folder(folder: &Path, log: &str) -> Result<(), ExportError> {
+    let existing = |problem: String| ExportError::Existing { problem, path: folder.to_owned() };
+    for entry in fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok) {
+        let name = entry.file_name();
+        let ours = name.to_str().is_some_and(|name| RUN_FILES.contains(&name)) && entry.path().is_file();
+        if !ours && !output::is_temporary(&name) {
+            let name = name.to_string_lossy();
+            return Err(existing(format!(
+                "the folder of the run holds '{}', which no run writes",
+                shortened(&name, 80)
+            )));
+        }
+    }
+    check_files(folder, &RUN_FILES, log)
+}
+
+/// Where one of the files exists, the first one must exist and name the log.
+fn check_files(folder: &Path, names: &[&str], log: &str) -> Result<(), ExportError> {
+    let existing = |problem: String| Err(ExportError::Existing { problem, path: folder.to_owned() });
+    let Some(found) = names.iter().find(|name| folder.join(name).exists()) else { return Ok(()) };
+    let index = names[0];
+    match log_of(&folder.join(index)) {
+        Some(other) if other == log => Ok(()),
+        Some(other) => existing(format!("the folder holds results of the log '{}'", shortened(&other, 80))),
+        None => existing(format!("the folder holds '{found}' and no {index} that says of which log it is")),
+    }
+}
+
+/// The log that a file of results names.
+fn log_of(index: &Path) -> Option<String> {
+    let value = read_index(index)?;
+    value.get("log").and_then(Value::as_str).map(str::to_owned)
+}
+
+/// A JSON file of results.
+pub(super) fn read_index(index: &Path) -> Option<Value> {
+    let file = fs::File::open(index).ok()?;
+    let mut text = String::new();
+    file.take(LARGEST_INDEX_BYTES).read_to_string(&mut text).ok()?;
+    serde_json::from_str(&text).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn problem(result: Result<(), ExportError>) -> String {
+        result.unwrap_err().to_string()
+    }
+
+    #[test]
+    fn only_runs_on_the_same_log_are_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let (out, log) = (folder.path(), Path::new("a/flight.mcap"));
+        let check = |force| check_run_folders(out, &["auto"], log, force);
+        check(false).unwrap();
+        let run = out.join("auto");
+        fs::create_dir(&run).unwrap();
+        check(false).unwrap();
+        fs::write(run.join("rig.yaml"), "rig_version: 1").unwrap();
+        assert!(problem(check(false)).starts_with("the folder holds 'rig.yaml' and no summary.json"));
+        fs::write(run.join("summary.json"), r#"{"log": "flight.mcap"}"#).unwrap();
+        fs::write(run.join(".rank.csv.dcvins-abc123.tmp"), "left").unwrap();
+        check(false).unwrap();
+        let other = check_run_folders(out, &["auto"], Path::new("other.mcap"), false);
+        assert!(problem(other).starts_with("the folder holds results of the log 'flight.mcap'; give --force"));
+        fs::write(run.join("notes.txt"), "mine").unwrap();
+        assert!(problem(check(false)).contains("holds 'notes.txt', which no run writes"));
+        check(true).unwrap();
+        assert_eq!(other_runs(out, &[]), ["auto"]);
+        assert!(other_runs(out, &["auto"]).is_empty());
+    }
+
+    #[test]
+    fn a_rig_that_lies_in_the_folder_of_a_calibration_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let check = |force| check_calibration_folder(folder.path(), Path::new("flight.mcap"), force);
+        fs::write(folder.path().join("other.txt"), "mine").unwrap();
+        check(false).unwrap();
+        fs::write(folder.path().join("rig.yaml"), "rig_version: 1").unwrap();
+        assert!(problem(check(false)).contains("holds 'rig.yaml' and no calibration.json"));
+        check(true).unwrap();
+    }
+
+    #[test]
+    fn pictures_replace_pictures() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("flight.mcap");
+        check_picture(&path, false).unwrap();
+        fs::write(&path, b"\x89MCAP0\r\n").unwrap();
+        assert!(problem(check_picture(&path, false)).starts_with("the file exists and is no picture"));
+        check_picture(&path, true).unwrap();
+        fs::write(&path, b"\x89PNG\r\n").unwrap();
+        check_picture(&path, false).unwrap();
+        assert!(problem(check_picture(folder.path(), true)).contains("it is a folder"));
+    }
+}
