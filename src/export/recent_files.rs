@@ -6,7 +6,9 @@ use std::path::{Path, PathBuf};
 
 use directories::ProjectDirs;
 
-/// Maximum number of logs in the list.
+use crate::flight_log::output;
+
+/// Most logs in the list.
 const MAX_LOGS: usize = 12;
 
 /// The list as a file: one path per line, the newest first.
@@ -39,31 +41,56 @@ impl RecentFiles {
     }
 
     fn read(&self) -> Vec<PathBuf> {
-        let text = self.file.as_ref().and_then(|file| fs::read_to_string(file).ok()).unwrap_or_default();
-        text.lines().filter(|line| !line.trim().is_empty()).map(PathBuf::from).take(MAX_LOGS).collect()
+        let text = self.file.as_ref().and_then(|file| fs::read(file).ok()).unwrap_or_default();
+        let lines = text.split(|byte| *byte == b'\n').filter(|line| !line.trim_ascii().is_empty());
+        lines.map(path_of_line).take(MAX_LOGS).collect()
     }
 
     /// Moves a log to the head of the list; a state folder that cannot be written leaves the list unchanged.
     pub fn remember(&self, path: &Path) {
         let Some(file) = &self.file else { return };
         let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
-        let line = path.to_string_lossy().into_owned();
-        if line.contains('\n') {
+        let line = line_of_path(&path);
+        if line.contains(&b'\n') {
             return;
         }
         let mut lines = vec![line];
         for known in self.read() {
-            let known = known.to_string_lossy().into_owned();
+            let known = line_of_path(&known);
             if lines.len() < MAX_LOGS && !lines.contains(&known) {
                 lines.push(known);
             }
         }
         if let Some(folder) = file.parent() {
-            drop(fs::create_dir_all(folder));
+            drop(output::create_folder(folder));
         }
-        let text: String = lines.iter().flat_map(|line| [line.as_str(), "\n"]).collect();
-        drop(fs::write(file, text));
+        let mut text = lines.join(&b'\n');
+        text.push(b'\n');
+        drop(output::write_file(file, &text));
     }
+}
+
+/// A path as a line of the list: its bytes on Unix, where it need not be UTF-8.
+#[cfg(unix)]
+fn line_of_path(path: &Path) -> Vec<u8> {
+    use std::os::unix::ffi::OsStrExt as _;
+    path.as_os_str().as_bytes().to_vec()
+}
+
+#[cfg(unix)]
+fn path_of_line(line: &[u8]) -> PathBuf {
+    use std::os::unix::ffi::OsStrExt as _;
+    PathBuf::from(std::ffi::OsStr::from_bytes(line))
+}
+
+#[cfg(not(unix))]
+fn line_of_path(path: &Path) -> Vec<u8> {
+    path.to_string_lossy().into_owned().into_bytes()
+}
+
+#[cfg(not(unix))]
+fn path_of_line(line: &[u8]) -> PathBuf {
+    PathBuf::from(String::from_utf8_lossy(line).trim_end().to_owned())
 }
 
 #[cfg(test)]
@@ -88,6 +115,19 @@ mod tests {
         assert_eq!(names.iter().filter(|name| *name == "15").count(), 1);
         fs::remove_file(&logs[15]).unwrap();
         assert_eq!(recent.list().len(), MAX_LOGS - 1, "what is gone is not offered");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn names_need_not_be_utf_8() {
+        use std::os::unix::ffi::OsStrExt as _;
+        let folder = tempfile::tempdir().unwrap();
+        let recent = RecentFiles::in_file(folder.path().join("recent"));
+        let log = folder.path().canonicalize().unwrap().join(std::ffi::OsStr::from_bytes(b"\xff.mcap"));
+        fs::write(&log, "").unwrap();
+        recent.remember(&log);
+        recent.remember(&log);
+        assert_eq!(recent.list(), [log]);
     }
 
     #[test]

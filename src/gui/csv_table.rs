@@ -31,7 +31,7 @@ impl Table {
             if number > 0 {
                 self.text.push(',');
             }
-            if cell.contains([',', '"', '\n']) {
+            if cell.contains([',', '"', '\n', '\r']) {
                 write!(self.text, "\"{}\"", cell.replace('"', "\"\"")).expect("writing into a string cannot fail");
             } else {
                 self.text.push_str(&cell);

@@ -1,6 +1,7 @@
 use std::fmt::{Display, Formatter, Result, Write as _};
 
 use super::{Area, CheckReport, Severity};
+use crate::flight_log::{printable, shortened};
 
 impl Severity {
     /// Lowercase name, printed before a finding.
@@ -40,8 +41,8 @@ impl Display for CheckReport {
         let mut rows = vec![header];
         for topic in &self.topics {
             rows.push([
-                topic.topic.clone(),
-                topic.schema.clone(),
+                shortened(&topic.topic, WIDEST_NAME).into_owned(),
+                shortened(&topic.schema, WIDEST_NAME).into_owned(),
                 topic.role.clone(),
                 topic.count.to_string(),
                 format!("{:.1}", topic.rate_hz),
@@ -63,11 +64,11 @@ impl Display for CheckReport {
                     "{:<8}{:<11} {}: {}",
                     severity.label(),
                     finding.area.label(),
-                    finding.title,
-                    finding.evidence
+                    printable(&finding.title),
+                    printable(&finding.evidence)
                 )?;
                 if !finding.remedy.is_empty() {
-                    write!(out, "\n{:20}→ {}", "", finding.remedy)?;
+                    write!(out, "\n{:20}→ {}", "", printable(&finding.remedy))?;
                 }
                 writeln!(out)?;
             }
@@ -75,6 +76,9 @@ impl Display for CheckReport {
         Ok(())
     }
 }
+
+/// Characters of a topic or a type in the table; longer ones are cut.
+const WIDEST_NAME: usize = 60;
 
 /// Columns as wide as their widest cell, numbers to the right.
 fn write_table<const N: usize>(out: &mut Formatter<'_>, rows: &[[String; N]]) -> Result {

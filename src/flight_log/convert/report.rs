@@ -1,7 +1,9 @@
 use std::fmt::{Display, Formatter, Result};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
+
+use crate::flight_log::text::{printable, shortened};
 
 /// Result of one topic of a source.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -24,10 +26,13 @@ pub struct ConversionReport {
     /// Kind of the source: `ROS 1 bag`.
     pub kind: String,
     /// The source.
+    #[serde(serialize_with = "as_text")]
     pub source: PathBuf,
     /// The log that was written.
+    #[serde(serialize_with = "as_text")]
     pub log: PathBuf,
     /// The rig beside the log: written from the source's calibration, or found there.
+    #[serde(serialize_with = "optional_as_text")]
     pub rig: Option<PathBuf>,
     /// Length of the log in seconds.
     pub duration_s: f64,
@@ -37,6 +42,19 @@ pub struct ConversionReport {
     pub notes: Vec<String>,
 }
 
+/// A path that need not be UTF-8, as text.
+fn as_text<S: Serializer>(path: &Path, serializer: S) -> std::result::Result<S::Ok, S::Error> {
+    path.to_string_lossy().serialize(serializer)
+}
+
+#[expect(clippy::ref_option, reason = "the signature that serde calls")]
+fn optional_as_text<S: Serializer>(path: &Option<PathBuf>, serializer: S) -> std::result::Result<S::Ok, S::Error> {
+    path.as_deref().map(Path::to_string_lossy).serialize(serializer)
+}
+
+/// Characters of a topic or a type in the table; longer ones are cut.
+const WIDEST_NAME: usize = 60;
+
 /// A table of the topics, then the notes and the files.
 impl Display for ConversionReport {
     fn fmt(&self, out: &mut Formatter<'_>) -> Result {
@@ -44,11 +62,11 @@ impl Display for ConversionReport {
         let header = ["topic", "type", "taken", "left", ""].map(str::to_owned);
         let rows = self.topics.iter().map(|topic| {
             [
-                topic.topic.clone(),
-                topic.message_type.clone(),
+                shortened(&topic.topic, WIDEST_NAME).into_owned(),
+                shortened(&topic.message_type, WIDEST_NAME).into_owned(),
                 topic.taken.to_string(),
                 topic.left.to_string(),
-                topic.reason.clone().unwrap_or_default(),
+                topic.reason.as_deref().map(printable).unwrap_or_default().into_owned(),
             ]
         });
         let rows: Vec<[String; 5]> = std::iter::once(header).chain(rows).collect();
@@ -62,7 +80,7 @@ impl Display for ConversionReport {
             writeln!(out, "{}", line.trim_end())?;
         }
         for note in &self.notes {
-            writeln!(out, "  note: {note}")?;
+            writeln!(out, "  note: {}", printable(note))?;
         }
         writeln!(out, "{}", self.log.display())?;
         self.rig.iter().try_for_each(|rig| writeln!(out, "{}", rig.display()))

@@ -10,6 +10,11 @@ use crate::flight_log::nearest_name;
 
 /// Limit of nested parentheses and signs; deeper nesting is an error, because it could overflow the stack.
 const MAX_DEPTH: usize = 60;
+/// Limit of the characters of a condition.
+const MAX_CHARACTERS: usize = 4000;
+/// Limit of the words and signs of a condition: a chain of `and` is a tree as deep as it has terms, and evaluating it takes
+/// that much stack.
+const MAX_TOKENS: usize = 1000;
 /// Unit suffixes and their factors to radians, metres, seconds or pixels.
 const UNITS: [(&str, f64); 11] = [
     ("deg", std::f64::consts::PI / 180.0),
@@ -52,7 +57,22 @@ impl FromStr for Condition {
 
 /// Parses a condition.
 fn parse(text: &str) -> Result<Condition> {
-    let mut parser = Parser { text, tokens: tokens(text)?, at: 0, depth: 0 };
+    let too_long = |message: String| {
+        let text = format!("{}…", text.chars().take(60).collect::<String>());
+        ConditionProblem { text, column: 1, message }
+    };
+    if text.len() > MAX_CHARACTERS {
+        let count = text.chars().count();
+        if count > MAX_CHARACTERS {
+            return Err(too_long(format!("a condition of {count} characters, expected at most {MAX_CHARACTERS}")));
+        }
+    }
+    let tokens = tokens(text)?;
+    if tokens.len() > MAX_TOKENS {
+        let count = tokens.len();
+        return Err(too_long(format!("a condition of {count} words and signs, expected at most {MAX_TOKENS}")));
+    }
+    let mut parser = Parser { text, tokens, at: 0, depth: 0 };
     if matches!(parser.peek(), Token::End) {
         return Err(parser.problem_at(0, "a condition is missing, such as 'rank < 18 or features < 40'"));
     }

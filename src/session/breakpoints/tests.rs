@@ -242,3 +242,15 @@ fn breakpoints_are_hit_where_they_become_true_as_the_run_grows() {
     breakpoints.read(&other);
     assert_eq!(breakpoints.list()[0].hits_ns(&other.runs[0]).collect::<Vec<_>>(), [0]);
 }
+
+#[test]
+fn a_condition_is_bounded() {
+    let problem = |text: String| text.parse::<Condition>().unwrap_err().to_string();
+    let chain = |terms: usize| vec!["keyframe"; terms].join(" and ");
+    let message = problem(chain(200_000));
+    assert!(message.starts_with("column 1: a condition of 2599995 characters, expected at most 4000"), "{message}");
+    assert!(message.len() < 300, "{message}");
+    let message = problem(vec!["1"; 900].join("+") + " > 1");
+    assert!(message.starts_with("column 1: a condition of 1802 words and signs, expected at most 1000"), "{message}");
+    chain(300).parse::<Condition>().unwrap();
+}

@@ -6,6 +6,7 @@ mod recomputed_view;
 mod restore;
 mod runs;
 mod saved;
+mod saved_path;
 mod session;
 mod shared;
 

@@ -46,9 +46,10 @@ pub struct SavedSession {
     /// The log, with a checksum to recognize it.
     pub log: SavedLog,
     /// Path of the rig file, when it was given.
+    #[serde(default, with = "super::saved_path::optional")]
     pub rig: Option<PathBuf>,
     /// Path of the ground-truth rig file, when it was given.
-    #[serde(rename = "truth")]
+    #[serde(default, rename = "truth", with = "super::saved_path::optional")]
     pub ground_truth: Option<PathBuf>,
     /// Seconds to skip at the start of the log.
     pub start_s: f64,
@@ -72,6 +73,7 @@ pub struct SavedSession {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SavedLog {
     /// Path of the log.
+    #[serde(with = "super::saved_path")]
     pub path: PathBuf,
     /// Size of the file in bytes.
     pub bytes: u64,
@@ -144,4 +146,36 @@ pub(super) fn entry_error(error: impl ToString) -> SavedSessionError {
 pub(in crate::session) struct PendingRestore {
     pub(in crate::session) forks: Vec<(SavedFork, ForkChanges)>,
     pub(in crate::session) cursor_ns: Option<i64>,
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use std::ffi::OsString;
+    use std::os::unix::ffi::OsStringExt as _;
+
+    use super::*;
+
+    #[test]
+    fn paths_need_not_be_utf_8() {
+        let path = |name: &[u8]| PathBuf::from(OsString::from_vec(name.to_vec()));
+        let session = SavedSession {
+            session_version: VERSION,
+            log: SavedLog { path: path(b"/logs/\xff.mcap"), bytes: 1, crc32: 2 },
+            rig: Some(path(b"/logs/\xfe.rig.yaml")),
+            ground_truth: Some(path(b"/logs/plain.yaml")),
+            start_s: 0.0,
+            duration_s: None,
+            runs: Vec::new(),
+            forks: Vec::new(),
+            breakpoints: Vec::new(),
+            markers_ns: Vec::new(),
+            cursor_ns: 0,
+            layout: None,
+        };
+        let text = session.to_text();
+        assert!(text.contains("\"truth\": \"/logs/plain.yaml\""), "{text}");
+        assert_eq!(SavedSession::from_text(&text).unwrap(), session);
+        let none = SavedSession { rig: None, ..session };
+        assert_eq!(SavedSession::from_text(&none.to_text()).unwrap(), none);
+    }
 }

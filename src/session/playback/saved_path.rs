@@ -1,0 +1,63 @@
+//! Paths in a saved session: as text, or as bytes where a path of Unix is no UTF-8.
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+/// A path as JSON holds it.
+#[derive(Serialize, Deserialize)]
+#[serde(untagged)]
+enum Written {
+    Text(String),
+    Bytes { unix_bytes: Vec<u8> },
+}
+
+impl From<&Path> for Written {
+    fn from(path: &Path) -> Self {
+        #[cfg(unix)]
+        if path.to_str().is_none() {
+            use std::os::unix::ffi::OsStrExt as _;
+            return Self::Bytes { unix_bytes: path.as_os_str().as_bytes().to_vec() };
+        }
+        Self::Text(path.to_string_lossy().into_owned())
+    }
+}
+
+impl From<Written> for PathBuf {
+    fn from(written: Written) -> Self {
+        match written {
+            Written::Text(text) => Self::from(text),
+            #[cfg(unix)]
+            Written::Bytes { unix_bytes } => {
+                use std::os::unix::ffi::OsStringExt as _;
+                Self::from(std::ffi::OsString::from_vec(unix_bytes))
+            }
+            #[cfg(not(unix))]
+            Written::Bytes { unix_bytes } => Self::from(String::from_utf8_lossy(&unix_bytes).into_owned()),
+        }
+    }
+}
+
+pub(super) fn serialize<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
+    Written::from(path).serialize(serializer)
+}
+
+pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<PathBuf, D::Error> {
+    Written::deserialize(deserializer).map(PathBuf::from)
+}
+
+/// The same for a path that may be missing.
+pub(super) mod optional {
+    use super::{Deserialize as _, Deserializer, PathBuf, Serialize as _, Serializer, Written};
+
+    #[expect(clippy::ref_option, reason = "the signature that serde calls")]
+    pub(in super::super) fn serialize<S: Serializer>(path: &Option<PathBuf>, serializer: S) -> Result<S::Ok, S::Error> {
+        path.as_deref().map(Written::from).serialize(serializer)
+    }
+
+    pub(in super::super) fn deserialize<'de, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<Option<PathBuf>, D::Error> {
+        Ok(Option::<Written>::deserialize(deserializer)?.map(PathBuf::from))
+    }
+}
