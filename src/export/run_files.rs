@@ -100,7 +100,7 @@ pub(super) fn remove_unwritten(folder: &Path, options: RunFileOptions) -> Result
     Ok(())
 }
 
-/// The rig with the calibration that the run ended with.
+/// The rig with the final calibration of the run.
 fn calibrated_rig(recording: &Recording, run: &RunRecord) -> Rig {
     let mut rig = (*recording.rig).clone();
     let Some(last) = run.steps.last() else { return rig };
