@@ -13,7 +13,7 @@
 //!    then has to find depths itself once there is parallax, and must give the accelerometer's bias its full prior.
 //! 2. *Selection.* A dozen views, spaced by parallax and time, so that a hover before the motion is represented by few of
 //!    them: these few bind tilt and accelerometer bias together, which makes the scale of the motion after it reliable.
-//! 3. *Structure.* Camera poses from the images alone. Encoders may have errors of many degrees: they only give initial values.
+//! 3. *Structure.* Camera poses from the images alone. Encoders may have errors of many degrees and only give initial values.
 //! 4. *Alignment.* Rotation of the extrinsics and gyroscope bias from rotations; scale, gravity of exact magnitude,
 //!    velocities and accelerometer bias from a linear system.
 //! 5. *Refinement.* All of it together with the IMU covariances, the calibration's error included as unknowns with priors.
