@@ -160,18 +160,19 @@ pub fn fit_rotation(pairs: &[BearingPair], start: &UnitQuaternion<f64>, floor: f
         lengths.sort_by(f64::total_cmp);
         let Some(median) = lengths.get(lengths.len() / 2) else { return rotation };
         let scale = (2.0 * median).max(floor);
+        let previous_from_now = rotation.inverse();
         let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
         for pair in pairs {
-            let rotated = rotation * pair.previous;
-            let ratio = (pair.now - rotated).norm_squared() / (scale * scale);
+            let now_in_previous = previous_from_now * pair.now;
+            let ratio = (now_in_previous - pair.previous).norm_squared() / (scale * scale);
             let weight = 1.0 / ((1.0 + ratio) * (1.0 + ratio));
-            normal += weight * (Matrix3::identity() - rotated * rotated.transpose());
-            right += weight * rotated.cross(&pair.now);
+            normal += weight * (Matrix3::identity() - pair.previous * pair.previous.transpose());
+            right += weight * pair.previous.cross(&now_in_previous);
         }
         // A few bearings close together do not constrain the rotation about their mean; it keeps its initial value.
         normal += Matrix3::identity() * (1e-6 * normal.trace() + f64::MIN_POSITIVE);
         let Some(step) = normal.cholesky().map(|factor| factor.solve(&right)) else { return rotation };
-        rotation = UnitQuaternion::new_normalize((so3::exp(&step) * rotation).into_inner());
+        rotation = UnitQuaternion::new_normalize((rotation * so3::exp(&step)).into_inner());
         if step.norm() < 1e-7 {
             break;
         }
@@ -193,7 +194,7 @@ const MINIMAL_ITERATIONS: usize = 5;
 /// Prior on the rotation, in units of an inlier's variance.
 struct Prior {
     rotation: UnitQuaternion<f64>,
-    /// Information relative to that of an inlier (3 × 3, no unit).
+    /// Information about the error in the current camera frame (3 × 3, 1/rad²), as [`PredictedRotation`] defines it.
     information: Matrix3<f64>,
     track_sigma_rad: f64,
 }
@@ -207,7 +208,8 @@ impl Prior {
         }
     }
 
-    /// Information (3 × 3) relative to squared track residuals over `scale`, and the error of a rotation, in radians.
+    /// Information (3 × 3) relative to squared track residuals over `scale`, and the error `Log(rotation·predictedᵀ)` of a
+    /// rotation in the current camera frame (3 × 1), in radians.
     ///
     /// Where the scale is larger than the noise of the tracks, the prior is weakened alike.
     fn at(&self, rotation: &UnitQuaternion<f64>, scale: f64) -> (Matrix3<f64>, Vector3<f64>) {
@@ -380,7 +382,9 @@ const MIN_INFORMATION: f64 = 1e-9;
 /// A Gauss–Newton step on the epipolar distances of `pairs` in units of `scale`, with weights that decrease with
 /// the distance.
 ///
-/// `prior` is the information of the prior rotation (3 × 3), `rotation_error` the deviation from it, in radians.
+/// The step is `[φ; δ]`: a right perturbation of the rotation, and two columns on the tangent plane of the direction.
+/// `prior` is the information of the prior rotation (3 × 3), `rotation_error` its error in the current camera
+/// frame, in radians; a step `φ` changes that error by `R·φ` to first order in the error.
 fn step_towards(
     pairs: &[BearingPair],
     at: &Hypothesis,
@@ -389,6 +393,7 @@ fn step_towards(
     rotation_error: &Vector3<f64>,
 ) -> Option<(UnitQuaternion<f64>, Vector3<f64>)> {
     let basis = tangent_basis(&at.direction);
+    let previous_from_now = at.rotation.to_rotation_matrix().into_inner().transpose();
     let mut normal = SMatrix::<f64, 5, 5>::zeros();
     let mut right = SVector::<f64, 5>::zeros();
     for pair in pairs {
@@ -402,23 +407,23 @@ fn step_towards(
         }
         let ratio = gap * gap / (spread * scale * scale);
         let weight = 1.0 / (spread * scale * scale * (1.0 + ratio) * (1.0 + ratio));
-        let by_rotation = rotated.cross(&other_plane);
+        let by_rotation = previous_from_now * rotated.cross(&other_plane);
         let by_direction = basis.tr_mul(&rotated.cross(&pair.now));
         let row = SVector::<f64, 5>::new(by_rotation.x, by_rotation.y, by_rotation.z, by_direction.x, by_direction.y);
         normal += row * row.transpose() * weight;
         right -= row * (gap * weight);
     }
     let mut corner = normal.fixed_view_mut::<3, 3>(0, 0);
-    corner += prior;
+    corner += previous_from_now * prior * previous_from_now.transpose();
     let mut top = right.fixed_rows_mut::<3>(0);
-    top -= prior * rotation_error;
+    top -= previous_from_now * (prior * rotation_error);
     for k in 0..5 {
         // Without parallax the direction is unobservable, and without a prior the rotation about a single track.
         normal[(k, k)] += MIN_INFORMATION;
     }
     let step = normal.cholesky()?.solve(&right);
-    let rotation_vector = so3::exp(&Vector3::new(step[0], step[1], step[2]));
-    let rotation = UnitQuaternion::new_normalize((rotation_vector * at.rotation).into_inner());
+    let rotation_step = so3::exp(&Vector3::new(step[0], step[1], step[2]));
+    let rotation = UnitQuaternion::new_normalize((at.rotation * rotation_step).into_inner());
     let direction = (at.direction + basis * step.fixed_rows::<2>(3)).try_normalize(1e-9)?;
     Some((rotation, direction))
 }

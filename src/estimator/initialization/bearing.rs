@@ -28,17 +28,18 @@ pub fn fit_rotation(
     let mut rotation = *camera_j_from_camera_i;
     for _ in 0..ROUNDS {
         let scale = median_angle(pairs, &rotation).max(1e-6);
+        let camera_i_from_camera_j = rotation.inverse();
         let (mut normal, mut rhs) = (Matrix3::zeros(), Vector3::zeros());
         for (bearing_i, bearing_j) in pairs {
-            let rotated = rotation * bearing_i;
-            let error = bearing_j.cross(&rotated);
+            let measured_in_i = camera_i_from_camera_j * bearing_j;
+            let error = measured_in_i.cross(bearing_i);
             let weight = 1.0 / (1.0 + (error.norm() / scale).powi(2));
-            // A small left rotation δ moves `rotated` by δ × turned; only its part across the bearing is seen.
-            normal += (Matrix3::identity() - rotated * rotated.transpose()) * weight;
-            rhs += rotated.cross(bearing_j) * weight;
+            // A step φ moves `bearing_i` by φ × bearing_i; its component along the bearing has no effect.
+            normal += (Matrix3::identity() - bearing_i * bearing_i.transpose()) * weight;
+            rhs += bearing_i.cross(&measured_in_i) * weight;
         }
         let step = normal.cholesky()?.solve(&rhs);
-        rotation = UnitQuaternion::new_normalize((so3::exp(&step) * rotation).into_inner());
+        rotation = UnitQuaternion::new_normalize((rotation * so3::exp(&step)).into_inner());
         if step.norm() < 1e-7 {
             break;
         }
