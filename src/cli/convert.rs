@@ -34,8 +34,8 @@ pub(crate) struct ConvertArguments {
 
 /// Runs `dcvins convert`.
 pub(crate) fn convert(arguments: &ConvertArguments) -> Result<Outcome> {
-    export::check_converted_log(&arguments.output, arguments.force)?;
     let interrupt = Interrupt::watch()?;
+    export::check_converted_log(&arguments.output, arguments.force)?;
     let progress = Progress::new();
     let limits = arguments.limits.limits();
     let converted = flight_log::convert::convert_with(&arguments.source, &arguments.output, &limits, &mut |ratio| {

@@ -107,8 +107,8 @@ pub(crate) fn simulate(arguments: &SimulateArguments) -> Result<Outcome> {
     for disturbance in &arguments.disturb {
         options.disturbances.set(disturbance)?;
     }
-    export::check_simulated_log(&arguments.output, arguments.force)?;
     let interrupt = Interrupt::watch()?;
+    export::check_simulated_log(&arguments.output, arguments.force)?;
     let progress = Progress::new();
     let simulated = simulation::simulate_interruptible(&options, &arguments.output, &mut |at| {
         let ratio = at.images_done as f64 / at.images_total.max(1) as f64;

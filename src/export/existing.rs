@@ -84,7 +84,7 @@ pub fn check_simulated_log(log: &Path, force: bool) -> Result<(), ExportError> {
     let existing =
         |problem: &str, path: &Path| ExportError::Existing { problem: problem.to_owned(), path: path.to_owned() };
     let simulated = if log.exists() {
-        let simulated = FlightLog::open(log).ok().filter(|log| log.attachment(".truth.yaml").is_some());
+        let simulated = (writer_of(log) == Some(LogOrigin::Simulation)).then(|| FlightLog::open(log).ok()).flatten();
         Some(simulated.ok_or_else(|| existing("the file exists and is no simulated log", log))?)
     } else {
         None
@@ -104,21 +104,32 @@ pub fn check_simulated_log(log: &Path, force: bool) -> Result<(), ExportError> {
 /// # Errors
 /// When the file cannot be written or, without `force`, is something else.
 pub fn check_converted_log(log: &Path, force: bool) -> Result<(), ExportError> {
-    /// The header with the name of the program that wrote the log lies before this byte.
-    const HEADER_BYTES: u64 = 128;
     output::check_file(log).map_err(ExportError::write(log))?;
-    if force || !log.exists() {
-        return Ok(());
-    }
-    let mut start = Vec::new();
-    let read = fs::File::open(log).and_then(|file| file.take(HEADER_BYTES).read_to_end(&mut start));
-    read.map_err(|source| ExportError::Read { source, path: log.to_owned() })?;
-    let ours = start.starts_with(b"\x89MCAP") && start.windows(7).any(|bytes| bytes == b"dcvins ");
-    if ours && FlightLog::open(log).is_ok_and(|log| log.attachment(".truth.yaml").is_none()) {
+    if force || !log.exists() || writer_of(log) == Some(LogOrigin::Other) {
         return Ok(());
     }
     let problem = "the file exists and is no log that 'dcvins convert' wrote".to_owned();
     Err(ExportError::Existing { problem, path: log.to_owned() })
+}
+
+/// What a log of this program is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum LogOrigin {
+    Simulation,
+    Other,
+}
+
+/// What a log is by its first bytes, the header with the program that wrote it and the metadata of a simulation; `None` for
+/// files of other programs.
+fn writer_of(log: &Path) -> Option<LogOrigin> {
+    const START_BYTES: u64 = 512;
+    let mut start = Vec::new();
+    fs::File::open(log).ok()?.take(START_BYTES).read_to_end(&mut start).ok()?;
+    let holds = |text: &[u8]| start.windows(text.len()).any(|bytes| bytes == text);
+    if !start.starts_with(b"\x89MCAP") || !holds(b"dcvins ") {
+        return None;
+    }
+    Some(if holds(b"dcvins simulate") { LogOrigin::Simulation } else { LogOrigin::Other })
 }
 
 /// Whether a picture or table may be written: an existing file must be of the same format.

@@ -211,7 +211,8 @@ fn check_file(log: &FlightLog, survey: &Survey, findings: &mut Findings) {
     }
     for topic in survey.topics.values().filter(|topic| topic.unreadable > 0) {
         let title = format!("messages of {} cannot be decoded", topic.topic);
-        let evidence = format!("{} of {}; the first: {}", topic.unreadable, topic.times.len(), topic.first_problem);
+        let count = log.topic(&topic.topic).map_or(0, |info| info.count).max(topic.unreadable as u64);
+        let evidence = format!("{} of {count}; the first: {}", topic.unreadable, topic.first_problem);
         findings.add(Severity::Warning, Area::Log, title, evidence, "check the recorder's message definitions");
     }
     let ignored: Vec<&str> =

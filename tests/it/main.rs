@@ -8,6 +8,7 @@ mod dependencies;
 mod documentation;
 mod evaluate;
 mod layering;
+mod outputs;
 #[cfg(feature = "gui")]
 mod renderers;
 mod report;

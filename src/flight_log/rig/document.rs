@@ -189,6 +189,10 @@ fn syntax_problem(error: &Error, text: &str) -> String {
     // What is missing at the end is reported behind the last line.
     let count = text.lines().count() as u64;
     let line = location.line().clamp(1, count.max(1));
+    let unclosed = |open, close| line_of_unclosed(text, open, close);
+    let (list, mapping) = (unclosed('[', ']'), unclosed('{', '}'));
+    // The parser stops behind the line that lacks a bracket.
+    let line = list.or(mapping).map_or(line, |unclosed| unclosed.min(line));
     let found = text.lines().nth(line as usize - 1).unwrap_or_default();
     let field = field_at(text, line as usize - 1).map(|field| format!(", in {field}")).unwrap_or_default();
     let what = match error {
@@ -197,8 +201,8 @@ fn syntax_problem(error: &Error, text: &str) -> String {
         Error::Eof { .. } => "the text ends here, expected a mapping with rig_version, imu0, cam0, …",
         Error::Budget { .. } => "too many values or aliases, expected a rig of some kilobytes",
         _ if found.trim_start_matches(' ').starts_with('\t') => "a tab, expected spaces before a key",
-        _ if unclosed(text, '[', ']') => "a list '[' without its ']', expected [value, value, …]",
-        _ if unclosed(text, '{', '}') => "a mapping '{' without its '}', expected {key: value, …}",
+        _ if list.is_some() => "a list '[' without its ']', expected [value, value, …]",
+        _ if mapping.is_some() => "a mapping '{' without its '}', expected {key: value, …}",
         _ if unclosed_quote(found) => "a quote that is not closed",
         _ if !found.contains(':') && !found.trim_start().starts_with('-') => "no 'key: value', expected one",
         _ => "expected 'key: value', with the keys of one mapping indented by the same number of spaces",
@@ -206,11 +210,19 @@ fn syntax_problem(error: &Error, text: &str) -> String {
     format!("line {line}{field}: '{}': {what}", shortened(found.trim(), 60))
 }
 
-/// Whether a bracket is opened more often than closed, comments aside.
-fn unclosed(text: &str, open: char, close: char) -> bool {
-    let code = || text.lines().map(|line| line.split(" #").next().unwrap_or_default());
-    let count = |bracket: char| code().map(|line| line.matches(bracket).count()).sum::<usize>();
-    count(open) > count(close)
+/// The line of the last bracket that is not closed, comments aside.
+fn line_of_unclosed(text: &str, open: char, close: char) -> Option<u64> {
+    let mut lines: Vec<u64> = Vec::new();
+    for (number, line) in (1..).zip(text.lines()) {
+        for letter in line.split(" #").next().unwrap_or_default().chars() {
+            if letter == open {
+                lines.push(number);
+            } else if letter == close {
+                lines.pop();
+            }
+        }
+    }
+    lines.pop()
 }
 
 fn unclosed_quote(line: &str) -> bool {
@@ -270,6 +282,10 @@ mod tests {
         check(
             "rig_version: 1\ncam0:\n  intrinsics: [1, 2\n",
             "line 3, in cam0.intrinsics: 'intrinsics: [1, 2': a list '[' without its ']', expected [value, value, …]",
+        );
+        check(
+            "cam0:\n  intrinsics: [1, 2\n  distortion_model: none\n  resolution: [3, 4]\n",
+            "line 2, in cam0.intrinsics: 'intrinsics: [1, 2': a list '[' without its ']', expected [value, value, …]",
         );
         check(
             "imu0:\n  rostopic: /imu\n  rostopic: /imu\n",

@@ -8,6 +8,7 @@ pub use results::{CircleAnnotation, LinesAnnotation, LogLevel, NamedTransform, R
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::error::Error;
 use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 
@@ -341,8 +342,13 @@ impl LogWriter {
     }
 }
 
-fn write_error(path: &Path, error: &impl ToString) -> LogError {
-    LogError::Write { problem: error.to_string(), path: path.to_owned() }
+/// An error of the MCAP writer or the image encoder, by its innermost cause: theirs do not say that a disk is full.
+fn write_error(path: &Path, error: &(dyn Error + 'static)) -> LogError {
+    let mut cause = error;
+    while let Some(source) = cause.source() {
+        cause = source;
+    }
+    LogError::Write { problem: cause.to_string(), path: path.to_owned() }
 }
 
 /// The encoders, for tests of the decoders.
