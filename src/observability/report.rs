@@ -55,19 +55,19 @@ pub struct CalibrationDirection {
 }
 
 impl RankReport {
-    /// Summary in one line: `18 of 24 structural; 6 redundant in the parameterization; 15 informed; weakest yaw.d`.
+    /// Summary in one line: `structural rank 18 of 24; 6 redundant in the parameterization; informed rank 15; least observable yaw.d`.
     pub fn verdict(&self, names: &ParameterNames) -> String {
         let causes = [
             (self.deficit_parameterization, "redundant in the parameterization"),
-            (self.deficit_joints, "lost to joints that did not move"),
+            (self.deficit_joints, "lost to stationary joints"),
             (self.deficit_absorbed, "absorbed by free joint angles"),
-            (self.deficit_motion, "lost to the motion of the vehicle"),
+            (self.deficit_motion, "lost to the vehicle's motion"),
         ];
-        let mut parts = vec![format!("{} of {} structural", self.rank_structural, self.parameters.len())];
+        let mut parts = vec![format!("structural rank {} of {}", self.rank_structural, self.parameters.len())];
         parts.extend(causes.iter().filter(|(count, _)| *count > 0).map(|(count, cause)| format!("{count} {cause}")));
-        parts.push(format!("{} informed", self.rank_informed));
+        parts.push(format!("informed rank {}", self.rank_informed));
         if let Some(parameter) = self.least_observable() {
-            parts.push(format!("weakest {}", names.name(parameter)));
+            parts.push(format!("least observable {}", names.name(parameter)));
         }
         parts.join("; ")
     }

@@ -256,16 +256,16 @@ impl KnownLoss {
                 )
             }
             Self::RigidRotation(about) => format!(
-                "without joints a rotation of imu_from_base about {} is one of effector_from_camera",
+                "without joints a rotation of imu_from_base about {} and one of effector_from_camera are the same motion",
                 axis(about)
             ),
             Self::RigidShift(along) => format!(
-                "without joints a translation of imu_from_base along {} is one of effector_from_camera",
+                "without joints a translation of imu_from_base along {} and one of effector_from_camera are the same motion",
                 axis(along)
             ),
             Self::FreeAngle(joint) => {
                 format!(
-                    "{}.theta and the unknown angles of joint {} are seen as their sum only",
+                    "{}.theta and the unknown angles of joint {} are observable only as their sum",
                     link(joint),
                     joint + 1
                 )
@@ -278,7 +278,7 @@ impl KnownLoss {
                 link(index + 1)
             ),
             Self::CoaxialTheta(index) => format!(
-                "the axes of joints {} and {} are one line, so that {}.theta and {}.theta are the same motion",
+                "the axes of joints {} and {} are collinear, so that {}.theta and {}.theta are the same motion",
                 index + 1,
                 index + 2,
                 link(index),

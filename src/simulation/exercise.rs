@@ -52,9 +52,9 @@ pub const SWING_M: f64 = 0.75;
 /// Period of a slow swing.
 const SWING_PERIOD_S: f64 = 4.0;
 /// Quick ones go this far.
-const ROCK_M: f64 = 0.12;
+pub const ROCK_M: f64 = 0.12;
 /// Period of a quick swing: 3 m/s² and 17° of tilt at its turning points.
-const ROCK_PERIOD_S: f64 = 1.25;
+pub const ROCK_PERIOD_S: f64 = 1.25;
 /// The vehicle's yaw goes this far.
 pub const YAW_SWING_RAD: f64 = 20.0 * std::f64::consts::PI / 180.0;
 /// Period of the vehicle's yaw.

@@ -19,7 +19,7 @@ impl Motion {
         (0..3).map(Self::Translation).chain((0..3).map(Self::Rotation)).chain((0..joints).map(Self::Joint))
     }
 
-    /// Name of the motion; joints by their names, if known.
+    /// Name of the motion in tables and files; joints by their names, if known.
     pub fn name(self, joint_names: &[String]) -> String {
         let axis = |axis: usize, names: [&str; 3]| names.get(axis).copied().unwrap_or("?").to_owned();
         match self {
@@ -27,6 +27,11 @@ impl Motion {
             Self::Rotation(about) => axis(about, ["turn x", "turn y", "turn z"]),
             Self::Joint(joint) => joint_names.get(joint).cloned().unwrap_or_else(|| format!("joint {}", joint + 1)),
         }
+    }
+
+    /// Label of the motion on the screen: `trans x`, `rot z`; joints as in [`Self::name`].
+    pub fn label(self, joint_names: &[String]) -> String {
+        self.name(joint_names).replace("move ", "trans ").replace("turn ", "rot ")
     }
 }
 

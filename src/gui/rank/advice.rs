@@ -120,22 +120,18 @@ impl AdviceUi {
 /// The suggested excitation; `time` is the stamp it was computed for, where that is not the cursor's.
 fn advice_ui(ui: &mut Ui, ctx: &PanelContext<'_>, advice: Option<&Advice>, time: &str, room: bool) {
     let Some(advice) = advice else {
-        ui.label(RichText::new("No motion can tell more about this calibration").color(ctx.theme.text_weak));
+        ui.label(RichText::new("No candidate motion constrains this calibration further").color(ctx.theme.text_weak));
         return;
     };
-    let sentence = format!("Fly next{time}: {}", advice.sentence().unwrap_or_default());
+    let sentence = format!("Suggested excitation{time}: {}", advice.sentence().unwrap_or_default());
     let response = ui.add(egui::Label::new(RichText::new(sentence).color(ctx.theme.text_strong)).wrap());
-    let others: Vec<String> = advice
-        .candidates
-        .iter()
-        .skip(1)
-        .take(OTHERS_SHOWN)
-        .map(|candidate| format!("{:.0} % left: {}", 100.0 * candidate.remaining, candidate.words))
-        .collect();
+    let others: Vec<String> =
+        advice.candidates.iter().skip(1).take(OTHERS_SHOWN).map(|candidate| advice.line(candidate)).collect();
     let listed = if room { String::new() } else { format!("\n{}", others.join("\n")) };
     response.on_hover_text(format!(
-        "Candidate motions of vehicle and joints, linearized from here and ordered by what they would leave of the \
-         direction that is known least of all that some motion can tell{listed}"
+        "Predicted σ of the least observable direction after {:.0} s of a motion of vehicle and joints, linearized at \
+         the estimate of this step; smallest σ first{listed}",
+        advice.duration_s
     ));
     for text in others.into_iter().filter(|_| room) {
         ui.add(egui::Label::new(RichText::new(text).small().color(ctx.theme.text_weak)).truncate());
@@ -152,5 +148,5 @@ fn since(before: &[Arc<StepRecord>], step: &StepRecord, names: &ParameterNames) 
     let first_ns = before.get(before.len() - lost).map_or(step.report.stamp_ns, |first| first.report.stamp_ns);
     let kind = if direction.structural { "null" } else { "weak" };
     let named = parameters_of(names, &rank.parameters, direction, 2);
-    Some(format!("{named}: {kind} without interruption since {:.2} s", seconds_from_ns(first_ns)))
+    Some(format!("Least observable direction: {named}, {kind} since {:.2} s", seconds_from_ns(first_ns)))
 }

@@ -23,7 +23,7 @@ pub(in crate::gui) struct RankColumn<'a> {
 }
 
 /// Width of the names on the left in points.
-const NAMES: f32 = 116.0;
+const NAMES: f32 = 128.0;
 /// Gap between two reports in points.
 const GAP: f32 = 10.0;
 /// Maximum width of a direction's column.
@@ -47,24 +47,35 @@ pub(in crate::gui) fn columns_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, column
 
 fn table_ui(ui: &mut Ui, theme: &Theme, names: &ParameterNames, columns: &[RankColumn<'_>], width: f32) {
     type Cell = fn(&RankReport, &ParameterNames) -> (String, bool);
-    let rows: [(&str, Cell); 8] = [
-        ("structural rank", |rank, _| {
+    let rows: [(&str, &str, Cell); 8] = [
+        ("structural rank", "Singular values above the numerical zero, of the number of columns", |rank, _| {
             let whole = rank.rank_structural == rank.parameters.len();
             (format!("{} of {}", rank.rank_structural, rank.parameters.len()), !whole)
         }),
-        ("informed rank", |rank, _| (rank.rank_informed.to_string(), false)),
-        ("lost to the form", |rank, _| lost(rank.deficit_parameterization)),
-        ("to joints at rest", |rank, _| lost(rank.deficit_joints)),
-        ("to free angles", |rank, _| lost(rank.deficit_absorbed)),
-        ("to the motion", |rank, _| lost(rank.deficit_motion)),
-        ("falsely known", |rank, _| {
-            let claimed = rank.claimed();
-            (
-                if claimed == 0 { lost(0).0 } else { format!("{claimed}, up to {:.2}", rank.spurious_gain()) },
-                claimed > 0,
-            )
+        ("informed rank", "Singular values of 1 or more: as much information as a prior of 10° or 3 cm", |rank, _| {
+            (rank.rank_informed.to_string(), false)
         }),
-        ("nearest lock", |rank, names| {
+        ("lost: parameterization", "Rank deficit from redundant or singular parameters", |rank, _| {
+            lost(rank.deficit_parameterization)
+        }),
+        ("lost: joints", "Rank deficit from joints that are stationary in the window", |rank, _| {
+            lost(rank.deficit_joints)
+        }),
+        ("lost: free angles", "Rank deficit absorbed by unknown joint angles", |rank, _| lost(rank.deficit_absorbed)),
+        ("lost: motion", "Rank deficit from the vehicle's motion", |rank, _| lost(rank.deficit_motion)),
+        (
+            "spurious information",
+            "Information of the priors on unobservable directions: their number and the largest \
+             singular value (1: σ of 10° or 3 cm)",
+            |rank, _| {
+                let claimed = rank.claimed();
+                (
+                    if claimed == 0 { lost(0).0 } else { format!("{claimed} dir., ≤ {:.2}", rank.spurious_gain()) },
+                    claimed > 0,
+                )
+            },
+        ),
+        ("singularity margin", "Smallest margin of the parameterization: 0 = singular", |rank, names| {
             let nearest = rank.margins.iter().min_by(|a, b| a.1.total_cmp(&b.1));
             nearest.map_or_else(
                 || ("none".to_owned(), false),
@@ -81,16 +92,17 @@ fn table_ui(ui: &mut Ui, theme: &Theme, names: &ParameterNames, columns: &[RankC
         let cell = |ui: &mut Ui, width: f32, text: RichText| {
             ui.allocate_ui(vec2(width, 14.0), |ui| {
                 ui.set_width(width);
-                ui.add(Label::new(text).truncate());
-            });
+                ui.add(Label::new(text).truncate())
+            })
+            .inner
         };
         cell(ui, NAMES, RichText::new(""));
         for column in columns {
             cell(ui, width, RichText::new(&column.title).strong().color(column.color));
         }
         ui.end_row();
-        for (name, of) in rows {
-            cell(ui, NAMES, RichText::new(name).color(theme.text_weak));
+        for (name, meaning, of) in rows {
+            cell(ui, NAMES, RichText::new(name).color(theme.text_weak)).on_hover_text(meaning);
             for column in columns {
                 let (text, bad) = of(column.rank, names);
                 cell(
@@ -111,7 +123,7 @@ fn lost(count: usize) -> (String, bool) {
 fn spectra_ui(ui: &mut Ui, theme: &Theme, names: &ParameterNames, columns: &[RankColumn<'_>], width: f32) {
     let height = (0.16 * ui.available_height()).clamp(50.0, 130.0);
     let (_, whole) = ui.allocate_space(vec2(ui.available_width(), height));
-    let caption = ["singular values", "by decades;", "marks: with priors"];
+    let caption = ["singular values", "(log scale)", "line: with priors"];
     for (line, text) in caption.into_iter().enumerate() {
         let at = whole.left_top() + vec2(0.0, 2.0 + 13.0 * line as f32);
         ui.painter().text(at, Align2::LEFT_TOP, text, theme::label_font(), theme.text_weak);
@@ -141,7 +153,7 @@ fn heat_map_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, columns: &[RankColumn<'_
         let pitch = ((width - GAP) / directions.len().max(1) as f32).min(MAX_COLUMN_WIDTH);
         if directions.is_empty() {
             let at = pos2(left, whole.top() + HEADER);
-            ui.painter().text(at, Align2::LEFT_TOP, "✔ nothing lost", theme::label_font(), theme.ok);
+            ui.painter().text(at, Align2::LEFT_TOP, "✔ full informed rank", theme::label_font(), theme.ok);
         }
         for (place, direction) in directions.iter().enumerate() {
             let (mark, color) = if direction.structural { ("null", theme.error) } else { ("weak", theme.warn) };
@@ -164,7 +176,7 @@ fn heat_map_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, columns: &[RankColumn<'_
         name_ui(ui, ctx, *parameter, line);
     }
     if omitted > 0 {
-        let text = format!("Not shown: {}", counted(omitted, "stronger direction"));
+        let text = format!("Not shown: {}", counted(omitted, "more observable direction"));
         ui.label(RichText::new(text).small().color(theme.text_weak));
     }
 }

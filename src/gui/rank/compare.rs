@@ -70,9 +70,9 @@ pub(super) fn singularity_ui(
     ui.horizontal_wrapped(|ui| {
         let color = if here < SWITCH_MARGIN { ctx.theme.error } else { ctx.theme.text };
         let text = format!(
-            "{}: {here:.2} from its own lock at the end (0 locked, 1 far away); as {other} it would be {there:.2}{}",
+            "{}: singularity margin {here:.2} (end link; 0 = singular). {other}: {there:.2}{}",
             run.spec.label,
-            if taken { format!("; it goes over below {SWITCH_MARGIN:.2}") } else { String::new() }
+            if taken { format!(". Switches below {SWITCH_MARGIN:.2}") } else { String::new() }
         );
         ui.label(RichText::new(text).color(color));
         let is_there = ctx.recording.runs.iter().any(|run| {
@@ -84,7 +84,10 @@ pub(super) fn singularity_ui(
         if let Some(spec) = spec {
             let spec = RunSpec { encoder: run.spec.encoder, calibrate: run.spec.calibrate, ..spec };
             let button = ui.small_button(format!("Add run {other}"));
-            let button = button.on_hover_text(format!("Run {} of this log in the other chart", number + 1));
+            let button = button.on_hover_text(format!(
+                "Adds a run with run {}'s options and the other end block of the chain",
+                number + 1
+            ));
             if button.clicked() {
                 ctx.commands.push(Command::AddRun(spec));
             }

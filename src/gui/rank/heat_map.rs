@@ -66,10 +66,10 @@ pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, rank: &RankReport, hei
     if left_out > 0 || count < rank.directions.len() {
         let mut notes = Vec::new();
         if left_out > 0 {
-            notes.push(format!("{} with weights under {MIN_SHOWN_WEIGHT}", counted(left_out, "parameter")));
+            notes.push(format!("{} with |weight| < {MIN_SHOWN_WEIGHT}", counted(left_out, "parameter")));
         }
         if count < rank.directions.len() {
-            notes.push(counted(rank.directions.len() - count, "stronger direction"));
+            notes.push(counted(rank.directions.len() - count, "more observable direction"));
         }
         ui.label(RichText::new(format!("Not shown: {}", notes.join(", "))).small().color(theme.text_weak));
     }
@@ -102,8 +102,10 @@ fn header(
     let response = ui.interact(cell, ui.unique_id().with(("direction", column)), Sense::hover());
     let named = parameters_of(&ctx.names(), &rank.parameters, direction, 6);
     response.widget_info(|| WidgetInfo::labeled(Role::Label, true, format!("{mark} direction {named}")));
-    response
-        .on_hover_text(format!("{mark} direction, singular value {}\n{named}", significant(direction.singular_value)));
+    response.on_hover_text(format!(
+        "{mark} direction, singular value {} (1: σ of 10° or 3 cm)\n{named}",
+        significant(direction.singular_value)
+    ));
 }
 
 fn row_ui(
@@ -146,5 +148,8 @@ fn row_ui(
     if response.clicked() {
         ctx.selection.parameter = if selected { None } else { Some(parameter) };
     }
-    response.on_hover_text(format!("{name}: {}", meaning_of(parameter, &ctx.recording.rig)));
+    response.on_hover_text(format!(
+        "{name}: {}\nWeights in the unit right singular vectors, columns scaled by 10° and 3 cm",
+        meaning_of(parameter, &ctx.recording.rig)
+    ));
 }

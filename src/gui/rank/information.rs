@@ -67,17 +67,18 @@ fn fitting<'a>(ui: &Ui, headlines: &'a [String; 3]) -> &'a str {
 fn headlines(rate: &InformationRate, names: &ParameterNames, joints: &[String]) -> [String; 3] {
     let main_motion = rate
         .leading(None)
-        .map_or_else(String::new, |(motion, part)| format!(", most by {} ({part:.2})", motion.name(joints)));
+        .map_or_else(String::new, |(motion, part)| format!(", mostly from {} ({part:.2})", motion.label(joints)));
     let fastest = (0..rate.parameters.len())
         .max_by(|a, b| rate.parameters[*a].bits_per_s.total_cmp(&rate.parameters[*b].bits_per_s))
         .filter(|fastest| rate.parameters[*fastest].bits_per_s > 0.0);
     let fastest = fastest.map_or_else(String::new, |fastest| {
         let parameter = &rate.parameters[fastest];
-        let by =
-            rate.leading(Some(fastest)).map_or_else(String::new, |(motion, _)| format!(" by {}", motion.name(joints)));
-        format!("; fastest {} {:.2}{by}", names.name(parameter.parameter), parameter.bits_per_s)
+        let by = rate
+            .leading(Some(fastest))
+            .map_or_else(String::new, |(motion, _)| format!(" from {}", motion.label(joints)));
+        format!("; largest: {} {:.2}{by}", names.name(parameter.parameter), parameter.bits_per_s)
     });
-    let total = format!("Told in the last {:.1} s: {:.2} bit/s", rate.duration_s, rate.total());
+    let total = format!("Information gain, last {:.1} s: {:.2} bit/s", rate.duration_s, rate.total());
     [format!("{total}{main_motion}{fastest}"), format!("{total}{main_motion}"), total]
 }
 
@@ -85,7 +86,7 @@ fn table_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, rate: &InformationRate, joi
     let (theme, names) = (*ctx.theme, ctx.names());
     ui.label(
         RichText::new(
-            "bit/s (one bit halves σ) that keyframes told of each parameter, and which motion they are owed to",
+            "bit/s by parameter (one bit halves σ): total, attributed to each motion, and from earlier images",
         )
         .small()
         .color(theme.text_weak),
@@ -95,15 +96,15 @@ fn table_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, rate: &InformationRate, joi
     let parts = rate.parameters.iter().flat_map(|parameter| &parameter.by_motion);
     let largest = parts.fold(0.0_f64, |largest, part| largest.max(part.abs()));
     Grid::new("information by motion").spacing(vec2(4.0, 0.0)).min_col_width(0.0).min_row_height(13.0).show(ui, |ui| {
-        for head in ["", "all"] {
+        for head in ["", "total"] {
             ui.label(RichText::new(head).small().color(theme.text_weak));
         }
         for motion in &rate.motions {
-            ui.label(RichText::new(motion.name(joints)).small().color(theme.text_weak))
+            ui.label(RichText::new(motion.label(joints)).small().color(theme.text_weak))
                 .on_hover_text(meaning_of_motion(*motion, joints));
         }
-        let earlier = ui.label(RichText::new("before").small().color(theme.text_weak));
-        earlier.on_hover_text("What the images add by confirming earlier ones that have left the window");
+        let earlier = ui.label(RichText::new("earlier").small().color(theme.text_weak));
+        earlier.on_hover_text("Gain in bit/s from observations of landmarks whose earlier frames have left the window (marginalization prior)");
         ui.end_row();
         for index in order {
             let parameter = &rate.parameters[index];
@@ -139,8 +140,12 @@ fn number_ui(ui: &mut Ui, theme: &Theme, number: f64, ratio: f64) {
 fn meaning_of_motion(motion: Motion, joints: &[String]) -> String {
     let axis = |axis: usize| ["x", "y", "z"].get(axis).copied().unwrap_or("?");
     match motion {
-        Motion::Translation(along) => format!("The vehicle's translation along the {} axis of the IMU", axis(along)),
-        Motion::Rotation(about) => format!("The vehicle's rotation about the {} axis of the IMU", axis(about)),
-        Motion::Joint(_) => format!("The gimbal's joint {}", motion.name(joints)),
+        Motion::Translation(along) => {
+            format!("Gain in bit/s from the vehicle's translation along the {} axis of the IMU", axis(along))
+        }
+        Motion::Rotation(about) => {
+            format!("Gain in bit/s from the vehicle's rotation about the {} axis of the IMU", axis(about))
+        }
+        Motion::Joint(_) => format!("Gain in bit/s from the rotation of joint {}", motion.name(joints)),
     }
 }

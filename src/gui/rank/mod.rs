@@ -142,7 +142,7 @@ impl RankPanel {
         let rect = egui::Rect::from_min_max(all.min + vec2(0.0, CAPTION), all.max);
         let (begin_ns, end_ns) = visible_range(ctx);
         let area = PlotArea { rect, begin_ns, end_ns, low: 0.0, high: max_rank * 1.08 };
-        let caption = format!("informed rank over time, of {max_rank:.0} (faint: structural)");
+        let caption = format!("informed rank over time, of {max_rank:.0} (faint: structural rank)");
         let place = all.left_top() + vec2(3.0, 0.0);
         ui.painter().text(place, egui::Align2::LEFT_TOP, caption, super::theme::label_font(), theme.text_weak);
         let painter = ui.painter_at(rect);
@@ -190,7 +190,11 @@ fn verdict_ui(ui: &mut Ui, theme: &Theme, names: &ParameterNames, step: &StepRec
         response.on_hover_text(reason);
     }
     let Some(rank) = step.rank.as_ref().filter(|rank| !rank.known.is_empty()) else { return };
-    let title = format!("Known structure: {} of {} measured as null", rank.known_agreeing(), rank.known.len());
+    let title = format!(
+        "Closed-form null directions: {} of {} confirmed by the measured Jacobian",
+        rank.known_agreeing(),
+        rank.known.len()
+    );
     let title =
         RichText::new(title).color(if rank.known_agreeing() == rank.known.len() { theme.text } else { theme.error });
     egui::CollapsingHeader::new(title).id_salt("known structure").show(ui, |ui| {

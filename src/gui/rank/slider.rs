@@ -45,9 +45,9 @@ impl SliderUi {
                     let structural = rank.directions.get(*index).is_some_and(|direction| direction.structural);
                     format!("{} {}", if structural { "null" } else { "weak" }, index + 1)
                 }
-                SlideDirection::Parameter(parameter) => return format!("{} alone", names.name(*parameter)),
-                SlideDirection::Known(loss) if is_other(direction, rank) => return format!("{} alone", loss.name()),
-                SlideDirection::Known(_) => "known".to_owned(),
+                SlideDirection::Parameter(parameter) => return format!("{} only", names.name(*parameter)),
+                SlideDirection::Known(loss) if is_other(direction, rank) => return format!("{} only", loss.name()),
+                SlideDirection::Known(_) => "closed form".to_owned(),
             };
             format!("{kind}: {}", parameters_of_weights(&names, &parameters, &weights, 2))
         };
@@ -55,13 +55,14 @@ impl SliderUi {
         let mut direction = position.as_ref().map_or(first, |position| position.direction);
         let mut amount = position.map_or(0.0, |position| position.amount);
         ui.horizontal(|ui| {
-            let (sign, name) = if self.playing { ("⏸", "Hold the chain") } else { ("▶", "Slide the chain") };
-            let play = ui.small_button(sign).on_hover_text("Move the chain to and fro along the direction");
+            let (sign, name) =
+                if self.playing { ("⏸", "Pause the animation") } else { ("▶", "Animate the direction") };
+            let play = ui.small_button(sign).on_hover_text("Moves the chain back and forth along the direction");
             play.widget_info(|| WidgetInfo::labeled(Role::Button, true, name));
             if play.clicked() {
                 self.playing = !self.playing;
             }
-            let along = ui.label(RichText::new("Move along").color(ctx.theme.text_weak));
+            let along = ui.label(RichText::new("Direction").color(ctx.theme.text_weak));
             let chosen = ComboBox::from_id_salt("direction of the slider")
                 .selected_text(label(&direction))
                 .width(0.5 * ui.available_width())
@@ -76,8 +77,8 @@ impl SliderUi {
             ui.spacing_mut().slider_width = (ui.available_width() - 12.0).max(40.0);
             let slider = Slider::new(&mut amount, -MAX_DISPLACEMENT..=MAX_DISPLACEMENT).show_value(false);
             let slider = ui.add(slider).on_hover_text(
-                "Moves the chain along this direction, by up to 20° and 6 cm, the poses of the vehicle held; double click \
-                 for back",
+                "Displacement of the chain along this direction, up to 20° and 6 cm, with the vehicle's poses fixed; \
+                 double-click: zero",
             );
             let slider = slider.labelled_by(along.id);
             if slider.double_clicked() {
@@ -116,8 +117,8 @@ fn outcome_ui(ui: &mut Ui, ctx: &PanelContext<'_>, slide: &ChainSlide, parameter
     let stays = slide.largest_px <= ZERO_CHANGE_PX;
     let (mark, color) = if stays { ("✔", ctx.theme.ok) } else { ("✖", ctx.theme.warn) };
     let (finite, first_order) = (significant(slide.largest_px), significant(slide.largest_first_order_px));
-    let verb = if stays { "stay" } else { "move" };
-    let text = format!("{mark} Reprojections {verb}: by up to {finite} px, {first_order} px to first order");
+    let verdict = if stays { "unchanged" } else { "changed" };
+    let text = format!("{mark} Reprojections {verdict}: at most {finite} px ({first_order} px to first order)");
     ui.add(Label::new(RichText::new(&text).color(color)).truncate()).on_hover_text(text);
     let mut moved: Vec<usize> = (0..slide.changes.len().min(parameters.len())).collect();
     let scaled = |column: &usize| (slide.changes[*column] / parameters[*column].dimension().scale()).abs();

@@ -68,16 +68,17 @@ pub(super) fn paint(
         }
     }
     threshold(&painter, theme, plot, axis.y(rank.informed_threshold), "informed");
-    threshold(&painter, theme, plot, axis.y(rank.structural_threshold), "structural zero");
+    threshold(&painter, theme, plot, axis.y(rank.structural_threshold), "structural");
 
     let response = ui.interact(rect, ui.unique_id().with(("spectrum", number)), Sense::hover());
     response.widget_info(|| WidgetInfo::labeled(Role::Image, true, "Singular values"));
     if let Some(pointer) = response.hover_pos() {
         let index = ((pointer.x - plot.left()) / pitch) as usize;
         if let Some(value) = rank.singular_values.get(index).filter(|_| plot.x_range().contains(pointer.x)) {
-            let mut lines = vec![format!("σ{} = {}", index + 1, significant(*value))];
+            let mut lines =
+                vec![format!("singular value {}: {} (1: σ of 10° or 3 cm)", index + 1, significant(*value))];
             if let Some(with_priors) = rank.singular_values_with_priors.get(index) {
-                lines.push(format!("with priors {}", significant(*with_priors)));
+                lines.push(format!("with priors: {}", significant(*with_priors)));
             }
             // Directions start with the least observable one, singular values with the largest.
             let direction = (rank.singular_values.len() - 1).checked_sub(index).and_then(|d| rank.directions.get(d));

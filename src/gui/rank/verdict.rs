@@ -34,13 +34,14 @@ pub(crate) struct Verdict {
 pub(crate) fn verdict(step: &StepRecord, names: &ParameterNames) -> Verdict {
     match &step.rank {
         Some(rank) if rank.parameters.is_empty() => {
-            let headline = "This run estimates no calibration".to_owned();
+            let headline = "Calibration fixed in this run".to_owned();
             Verdict { level: Level::None, headline, reasons: Vec::new() }
         }
         Some(rank) => of_rank(rank, names),
         None => {
             let initializing = step.report.phase == Phase::Initializing;
-            let headline = if initializing { "Initializing, no rank yet" } else { "No rank for this step" };
+            let headline =
+                if initializing { "Initializing: no rank yet" } else { "No linearization in this step: no rank" };
             let waits = step.report.events.iter().filter(|event| event.kind == EventKind::InitializationWaits);
             let reasons = waits.map(|event| event.message.clone()).collect();
             Verdict { level: Level::None, headline: headline.to_owned(), reasons }
@@ -53,41 +54,47 @@ fn of_rank(rank: &RankReport, names: &ParameterNames) -> Verdict {
     let null = columns.saturating_sub(rank.rank_structural);
     let weak = rank.rank_structural.saturating_sub(rank.rank_informed);
     let (level, headline) = match (null, weak) {
-        (0, 0) => (Level::Good, format!("All {columns} directions informed")),
-        (0, _) => (Level::Weak, format!("Rank {columns} of {columns}, {} informed, {weak} weak", rank.rank_informed)),
+        (0, 0) => (Level::Good, format!("Full rank: {columns} of {columns} directions informed")),
+        (0, _) => (
+            Level::Weak,
+            format!("Structural rank {columns} of {columns}, informed rank {}: {weak} weak", rank.rank_informed),
+        ),
         _ => {
             let kept = rank.rank_structural;
-            (Level::Lost, format!("Rank {kept} of {columns}: {null} unobservable, {weak} weak"))
+            (Level::Lost, format!("Structural rank {kept} of {columns}: {null} unobservable, {weak} weak"))
         }
     };
     let mut reasons = Vec::new();
     let causes = [
         (rank.deficit_parameterization, "redundant in the parameterization"),
-        (rank.deficit_joints, "joints that did not move"),
+        (rank.deficit_joints, "stationary joints"),
         (rank.deficit_absorbed, "absorbed by free joint angles"),
-        (rank.deficit_motion, "motion of the vehicle"),
+        (rank.deficit_motion, "vehicle motion"),
     ];
     let causes: Vec<String> =
         causes.iter().filter(|(count, _)| *count > 0).map(|(count, cause)| format!("{count} {cause}")).collect();
     if !causes.is_empty() {
-        reasons.push(format!("Lost to: {}", causes.join(", ")));
+        reasons.push(format!("Rank deficit: {}", causes.join(", ")));
     }
     if rank.claimed() > 0 {
         reasons.push(format!(
-            "The prior falsely claims {} of what cannot be told, up to {:.2} of 10° or 3 cm",
+            "Spurious information in the priors on {} unobservable directions, up to {:.2} (1: σ of 10° or 3 cm)",
             rank.claimed(),
             rank.spurious_gain()
         ));
     }
     if let Some(direction) = rank.directions.iter().find(|direction| !direction.structural) {
-        reasons.push(format!("Weakest: {}", parameters_of(names, &rank.parameters, direction, 3)));
+        reasons.push(format!("Least observable: {}", parameters_of(names, &rank.parameters, direction, 3)));
     } else if let Some(direction) = rank.directions.first() {
         reasons.push(format!("Unobservable: {}", parameters_of(names, &rank.parameters, direction, 3)));
     }
     if let Some((singularity, margin)) =
         rank.margins.iter().min_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, m)| *m < SWITCH_MARGIN)
     {
-        reasons.push(format!("Chart near its lock: {} margin {margin:.2}", names.singularity(*singularity)));
+        reasons.push(format!(
+            "Parameterization near a singularity: {}, margin {margin:.2} < {SWITCH_MARGIN:.2}",
+            names.singularity(*singularity)
+        ));
     }
     Verdict { level, headline, reasons }
 }
@@ -96,8 +103,11 @@ fn of_rank(rank: &RankReport, names: &ParameterNames) -> Verdict {
 pub(crate) fn structure_lines(rank: &RankReport, names: &ParameterNames) -> Vec<String> {
     let line = |known: &KnownDirection| {
         let mark = if known.agrees { "✔" } else { "✖" };
-        let claimed =
-            if known.is_claimed() { format!("; falsely known: {:.2}", known.spurious_gain) } else { String::new() };
+        let claimed = if known.is_claimed() {
+            format!("; spurious information {:.2}", known.spurious_gain)
+        } else {
+            String::new()
+        };
         format!("{mark} {}{claimed}", known.loss.reason(rank.joint_count, names))
     };
     rank.known.iter().map(line).collect()
@@ -154,12 +164,12 @@ mod tests {
         let recording = sample_recording_of(FIRST_TRACKED_FRAME + 10, &["auto", "classical"]);
         let said = |run: usize, step: usize| verdict(&recording.runs[run].steps[step], &ParameterNames::default());
         let waiting = said(0, 3);
-        assert_eq!((waiting.level, waiting.headline.as_str()), (Level::None, "Initializing, no rank yet"));
+        assert_eq!((waiting.level, waiting.headline.as_str()), (Level::None, "Initializing: no rank yet"));
         assert_eq!(said(0, FIRST_TRACKED_FRAME + 5).level, Level::Weak);
         let classical = said(1, FIRST_TRACKED_FRAME + 5);
         assert_eq!(classical.level, Level::Lost);
-        assert!(classical.headline.starts_with("Rank 18 of 24: 6 unobservable"), "{}", classical.headline);
-        assert_eq!(classical.reasons[0], "Lost to: 6 redundant in the parameterization");
+        assert!(classical.headline.starts_with("Structural rank 18 of 24: 6 unobservable"), "{}", classical.headline);
+        assert_eq!(classical.reasons[0], "Rank deficit: 6 redundant in the parameterization");
     }
 
     #[test]

@@ -344,7 +344,7 @@ fn panels_show_names_and_values() {
         assert!(harness.query_all_by_label_contains(&format!("{name} ")).next().is_some(), "{name}");
     }
     let rank = step.rank.as_ref().unwrap();
-    let headline = format!("Rank 18 of 18, {} informed", rank.rank_informed);
+    let headline = format!("Structural rank 18 of 18, informed rank {}", rank.rank_informed);
     assert!(harness.query_by_label_contains(&headline).is_some());
     assert!(harness.query_by_label(&format!("Frame {}", step.report.frame_index)).is_some());
     assert!(harness.query_by_label_contains("Run auto ATE").is_some());
@@ -355,7 +355,7 @@ fn panels_show_names_and_values() {
     harness.get_by_label_contains("Run classical").click();
     harness.run_steps(3);
     assert_eq!(harness.state().selection.run, 1);
-    assert!(harness.query_by_label_contains("Rank 18 of 24: 6 unobservable").is_some());
+    assert!(harness.query_by_label_contains("Structural rank 18 of 24: 6 unobservable").is_some());
     assert!(harness.query_all_by_label_contains("EC.rx ").next().is_some());
 }
 
@@ -380,13 +380,13 @@ fn a_parameter_is_selected_everywhere() {
 fn the_chain_slides_from_the_rank_panel() {
     let mut harness = bench();
     assert_eq!(harness.state().selection.slide, None);
-    harness.get_by_label("Slide the chain").click();
+    harness.get_by_label("Animate the direction").click();
     harness.run_steps(4);
     let amount = |harness: &Harness<'static, Bench>| harness.state().selection.slide.map(|slide| slide.amount);
     let first = amount(&harness).expect("it slides");
     harness.run_steps(3);
     assert_ne!(amount(&harness), Some(first), "it goes on");
-    harness.get_by_label("Hold the chain").click();
+    harness.get_by_label("Pause the animation").click();
     harness.run_steps(2);
     let before = amount(&harness);
     harness.run_steps(2);
@@ -394,13 +394,13 @@ fn the_chain_slides_from_the_rank_panel() {
     let names = harness.state().recording.rig.parameter_names();
     // Along a known unobservable direction the reprojections stay; along a single parameter they move.
     harness.state_mut().selection.run = 1;
-    for (position, said) in [("base-d=1", "Reprojections stay"), ("roll.alpha=1", "Reprojections move")] {
+    for (position, said) in [("base-d=1", "Reprojections unchanged"), ("roll.alpha=1", "Reprojections changed")] {
         harness.state_mut().selection.slide = position.parse::<SlideRequest>().unwrap().position(&names);
         harness.run_steps(2);
         assert!(harness.query_by_label_contains(said).is_some(), "{position}");
     }
     let chosen = |text: &str| harness.get_all_by_role(Role::ComboBox).any(|node| node.value().as_deref() == Some(text));
-    assert!(chosen("roll.alpha alone"));
+    assert!(chosen("roll.alpha only"));
     harness.key_press(Key::Escape);
     harness.run_steps(2);
     assert_eq!(harness.state().selection.slide, None);

@@ -16,7 +16,9 @@ use crate::estimator::{
 use crate::geometry::{Dimension, RigidTransform, ns_from_seconds, so3};
 use crate::optimization::LandmarkModel;
 use crate::sensors::ImuSample;
-use crate::simulation::{Exercise, JOINT_PERIOD_S, JointSwing, SWING_M, VehicleSwing, YAW_SWING_RAD};
+use crate::simulation::{
+    Exercise, JOINT_PERIOD_S, JointSwing, ROCK_M, ROCK_PERIOD_S, SWING_M, VehicleSwing, YAW_SWING_RAD,
+};
 
 /// Duration of a candidate, in seconds.
 pub const ADVICE_DURATION_S: f64 = 4.0;
@@ -339,69 +341,88 @@ fn words(exercise: &Exercise, joints: &[LaboratoryJoint]) -> String {
         let name = joints.get(swing.joint).map_or("a joint", |joint| joint.name.as_str());
         let size_deg = swing.amplitude_rad.to_degrees();
         if ["yaw", "pitch", "roll", "pan", "tilt"].contains(&name) {
-            format!("{name} the gimbal ±{size_deg:.0}°")
+            format!("{name} gimbal ±{size_deg:.0}°")
         } else {
-            format!("swing {name} ±{size_deg:.0}°")
+            format!("rotate {name} ±{size_deg:.0}°")
         }
     });
     let yaw_deg = YAW_SWING_RAD.to_degrees();
-    let (alone, beside) = match exercise.vehicle {
-        VehicleSwing::Hover => ("hover".to_owned(), "hovering".to_owned()),
-        VehicleSwing::Forward => {
-            (format!("fly forward and back ±{SWING_M} m"), format!("flying forward and back ±{SWING_M} m"))
-        }
-        VehicleSwing::Sideways => {
-            (format!("translate sideways ±{SWING_M} m"), format!("translating sideways ±{SWING_M} m"))
-        }
-        VehicleSwing::UpDown => (format!("climb and sink ±{SWING_M} m"), format!("climbing and sinking ±{SWING_M} m")),
-        VehicleSwing::Roll => ("rock quickly in roll".to_owned(), "rocking quickly in roll".to_owned()),
-        VehicleSwing::Pitch => ("rock quickly in pitch".to_owned(), "rocking quickly in pitch".to_owned()),
-        VehicleSwing::Yaw => (format!("yaw the vehicle ±{yaw_deg:.0}°"), format!("yawing the vehicle ±{yaw_deg:.0}°")),
+    let (rock_m, period_s) = (ROCK_M, ROCK_PERIOD_S);
+    let vehicle = match exercise.vehicle {
+        VehicleSwing::Hover => "hover".to_owned(),
+        VehicleSwing::Forward => format!("translate forward and back ±{SWING_M} m"),
+        VehicleSwing::Sideways => format!("translate sideways ±{SWING_M} m"),
+        VehicleSwing::UpDown => format!("climb and descend ±{SWING_M} m"),
+        VehicleSwing::Roll => format!("translate sideways ±{rock_m} m every {period_s} s (roll)"),
+        VehicleSwing::Pitch => format!("translate forward and back ±{rock_m} m every {period_s} s (pitch)"),
+        VehicleSwing::Yaw => format!("yaw vehicle ±{yaw_deg:.0}°"),
     };
     match swing {
-        Some(swing) => format!("{swing} while {beside}"),
-        None if joints.is_empty() => alone,
-        None => format!("{alone} with the gimbal held"),
+        Some(swing) => format!("{swing}, {vehicle}"),
+        None if joints.is_empty() => vehicle,
+        None => format!("{vehicle}, gimbal fixed"),
     }
 }
 
 impl Advice {
-    /// The best candidate and its effect in one sentence.
+    /// The best candidate and its effect in one line:
+    /// `roll gimbal ±15°, hover for 4 s → σ(L3.d, with L3.a) 1.68 → 1.26 mm`.
     pub fn sentence(&self) -> Option<String> {
-        let best = self.candidates.first()?;
-        Some(format!(
-            "{}: {:.0} s of it leave {:.0} % of the deviation of {}",
-            best.words,
-            self.duration_s,
-            100.0 * best.remaining,
-            self.least_observable
-        ))
+        self.candidates.first().map(|best| self.line(best))
+    }
+
+    /// A candidate and its effect in one line.
+    pub fn line(&self, candidate: &CandidateReport) -> String {
+        let least = &self.least_observable;
+        let (factor, unit) = least.unit();
+        let before = least.leading_sigma * factor;
+        let after = before * candidate.remaining;
+        let label = least.label();
+        format!("{} for {:.0} s → {label} {before:.2} → {after:.2}{unit}", candidate.words, self.duration_s)
+    }
+}
+
+impl WeakDirection {
+    /// The leading parameter's σ as a symbol, `σ(L3.d, with L3.a)`.
+    fn label(&self) -> String {
+        let others =
+            self.names.iter().zip(&self.weights).filter(|(name, weight)| **name != self.leading && weight.abs() >= 0.3);
+        let others: Vec<&str> = others.map(|(name, _)| name.as_str()).collect();
+        if others.is_empty() {
+            format!("σ({})", self.leading)
+        } else {
+            format!("σ({}, with {})", self.leading, others.join(", "))
+        }
+    }
+
+    /// Shown units per stored unit of the leading parameter, and the shown unit.
+    fn unit(&self) -> (f64, &'static str) {
+        match self.dimension {
+            Dimension::Angle => (1_f64.to_degrees(), "°"),
+            _ => (1e3, " mm"),
+        }
     }
 }
 
 impl fmt::Display for WeakDirection {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (size, unit) = match self.dimension {
-            Dimension::Angle => (self.leading_sigma.to_degrees(), "°"),
-            _ => (self.leading_sigma * 1e3, " mm"),
-        };
-        write!(out, "{} (±{size:.2}{unit}", self.leading)?;
-        let others =
-            self.names.iter().zip(&self.weights).filter(|(name, weight)| **name != self.leading && weight.abs() >= 0.3);
-        let others: Vec<&str> = others.map(|(name, _)| name.as_str()).collect();
-        if !others.is_empty() {
-            write!(out, ", with {}", others.join(", "))?;
-        }
-        write!(out, ")")
+        let (factor, unit) = self.unit();
+        write!(out, "{} = {:.2}{unit}", self.label(), self.leading_sigma * factor)
     }
 }
 
 impl fmt::Display for Advice {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(out, "known least   {}", self.least_observable)?;
-        writeln!(out, "to be flown   what {:.0} s of it leave of that deviation, in percent", self.duration_s)?;
+        let (factor, unit) = self.least_observable.unit();
+        writeln!(out, "least observable direction   {}", self.least_observable)?;
+        writeln!(
+            out,
+            "candidate excitations        predicted σ after {:.0} s, and its ratio to σ now",
+            self.duration_s
+        )?;
         for candidate in &self.candidates {
-            writeln!(out, "  {:5.1}  {}", 100.0 * candidate.remaining, candidate.words)?;
+            let after = self.least_observable.leading_sigma * factor * candidate.remaining;
+            writeln!(out, "  {after:7.2}{unit}  {:5.1} %  {}", 100.0 * candidate.remaining, candidate.words)?;
         }
         Ok(())
     }

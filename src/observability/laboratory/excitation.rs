@@ -128,8 +128,8 @@ impl fmt::Display for Excitation {
         let joints = self.motions.len().saturating_sub(6);
         writeln!(
             out,
-            "information   bits per second (one halves a deviation) over {:.2} s, and what would be missing without a\n             {:14}motion of the body (axes of the IMU) or of {joints} joints",
-            self.duration_s, ""
+            "information gain   bit/s (one bit halves σ) over {:.2} s: all, and the loss without one motion of the vehicle\n                   (IMU axes) or of one of {joints} joints",
+            self.duration_s
         )?;
         let width = |name: &str| name.len().max(6) + 2;
         write!(out, "  {:<12}{:>8}", "", "all")?;

@@ -144,5 +144,5 @@ fn empty_linearizations_are_analysed() {
     linearization.calibration_column_norms = nalgebra::DVector::zeros(0);
     let report = analyse(&linearization, &chain, &[vec![0.0; JOINTS]], false).unwrap();
     assert!(report.parameters.is_empty() && report.singular_values.is_empty());
-    assert_eq!(report.verdict(&ParameterNames::default()), "0 of 0 structural; 0 informed");
+    assert_eq!(report.verdict(&ParameterNames::default()), "structural rank 0 of 0; informed rank 0");
 }

@@ -176,15 +176,15 @@ fn excluded_parameters_leave_the_null_directions() {
     let verdict = case(true, Motion::Exciting, false, Parameterization::Classical).report;
     let names = ParameterNames::default();
     let verdict = verdict.verdict(&names);
-    assert_eq!(verdict, "18 of 24 structural; 6 redundant in the parameterization; 18 informed");
+    assert_eq!(verdict, "structural rank 18 of 24; 6 redundant in the parameterization; informed rank 18");
     let hover = case(true, Motion::Hover, true, minimal).report;
     let weak = hover.rank_structural - hover.rank_informed;
     let expected = format!(
-        "{} of 18 structural; 3 absorbed by free joint angles; {} lost to the motion of the vehicle; {} informed",
+        "structural rank {} of 18; 3 absorbed by free joint angles; {} lost to the vehicle's motion; informed rank {}",
         hover.rank_structural, hover.deficit_motion, hover.rank_informed
     );
     let expected = match hover.least_observable() {
-        Some(parameter) if weak > 0 => format!("{expected}; weakest {}", names.name(parameter)),
+        Some(parameter) if weak > 0 => format!("{expected}; least observable {}", names.name(parameter)),
         _ => expected,
     };
     assert_eq!(hover.verdict(&names), expected);

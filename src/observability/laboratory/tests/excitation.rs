@@ -122,7 +122,7 @@ fn check_advice(seed: u64) {
     let (advice, outcomes) = run_advised(seed, 5);
     let table: Vec<String> = outcomes
         .iter()
-        .map(|(words, predicted, left)| format!("{predicted:.3} foretold, {left:.3} left: {words}"))
+        .map(|(words, predicted, left)| format!("{predicted:.3} predicted, {left:.3} estimated: {words}"))
         .collect();
     let table = format!("seed {seed}: {}\n{}", advice.least_observable, table.join("\n"));
     assert_eq!(advice.candidates.len(), 28, "seven swings of the vehicle with none or one of three joints");
@@ -148,7 +148,7 @@ fn advice_is_repeatable_and_rendered_as_text() {
     assert_eq!(advice, advise(&situation).unwrap());
     // Hover does not constrain lever arms on the IMU side, and a camera that does not translate makes no
     // keyframes: more hover gains nothing, a moving vehicle does.
-    let hover = advice.candidates.iter().find(|candidate| candidate.words == "hover with the gimbal held").unwrap();
+    let hover = advice.candidates.iter().find(|candidate| candidate.words == "hover, gimbal fixed").unwrap();
     assert!(hover.remaining > 0.999, "{advice}");
     assert!(!advice.candidates[0].words.contains("hover"), "{advice}");
     assert!(advice.candidates[0].remaining < 0.9, "{advice}");
