@@ -8,6 +8,7 @@ use dcvins::calibration::CalibrationOptions;
 use dcvins::export;
 use dcvins::session::{self, CalibrationRequest};
 
+use crate::cli::limit_arguments::LimitArguments;
 use crate::cli::terminal::{Progress, print, print_json};
 use crate::cli::value_parsers::seconds;
 
@@ -38,6 +39,9 @@ pub(crate) struct CalibrateArguments {
     /// Print calibration.json instead of the report.
     #[arg(long)]
     pub json: bool,
+    /// Limits on the log.
+    #[command(flatten)]
+    pub limits: LimitArguments,
 }
 
 /// Runs `dcvins calibrate`.
@@ -49,6 +53,7 @@ pub(crate) fn calibrate(arguments: &CalibrateArguments) -> Result<()> {
         ground_truth_path: arguments.ground_truth.clone(),
         start_s: arguments.start,
         duration_s: arguments.duration,
+        limits: arguments.limits.limits(),
     };
     let progress = Progress::new();
     let run = session::calibrate(&request, &CalibrationOptions::default(), &mut |at| {

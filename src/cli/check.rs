@@ -41,6 +41,7 @@ pub(crate) fn check(arguments: &CheckArguments) -> Result<Outcome> {
     let rotations = rig.as_ref().map_or_else(|_| Vec::new(), |rig| session::image_rotations(&log, rig));
     let mut report = log_check::check(&log, rig.as_ref(), &rotations);
     report.add_unused_rig_keys(&unused_keys);
+    log.require_unshortened()?;
     drop(progress);
     print_report(&report, arguments.json)?;
     Ok(if report.worst() == Severity::Error { Outcome::ErrorsFound } else { Outcome::Success })

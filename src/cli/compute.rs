@@ -14,10 +14,12 @@ pub(crate) fn compute(plan: &SessionPlan, until_ns: Option<i64>) -> Result<Compu
     let end_s = plan.duration_s.map_or(log_end_s, |duration_s| log_end_s.min(begin_s + duration_s));
     let end_s = until_ns.map_or(end_s, |until_ns| end_s.min(seconds_from_ns(until_ns)));
     let progress = Progress::new();
-    Ok(session::compute(plan, until_ns, &mut |recording| {
+    let computation = session::compute(plan, until_ns, &mut |recording| {
         let now_s = seconds_from_ns(recording.computed_ns());
         progress.show((now_s - begin_s) / (end_s - begin_s).max(1e-3), || format!("{now_s:.1} of {end_s:.1} s"));
-    })?)
+    })?;
+    plan.log.require_unshortened()?;
+    Ok(computation)
 }
 
 /// Runs the estimators of a plan until a condition becomes true; returns the hit, if there is one.
@@ -34,5 +36,6 @@ pub(crate) fn compute_until(plan: &SessionPlan, condition: &Condition) -> Result
         let now_s = seconds_from_ns(recording.computed_ns());
         progress.show(now_s / end_s.max(1e-3), || format!("{now_s:.1} s, looking for {condition}"));
     })?;
+    plan.log.require_unshortened()?;
     Ok((computation.into_recording(), hit))
 }

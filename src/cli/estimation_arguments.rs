@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use dcvins::session::{RunSpec, SessionRequest};
 
+use crate::cli::limit_arguments::LimitArguments;
 use crate::cli::value_parsers::seconds;
 
 /// Runs, rig, ground truth and time range, shared by the sub-commands that run the estimator.
@@ -27,6 +28,9 @@ pub(crate) struct EstimationArguments {
     /// Duration to process from there.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub duration: Option<f64>,
+    /// Limits on the log.
+    #[command(flatten)]
+    pub limits: LimitArguments,
 }
 
 impl EstimationArguments {
@@ -39,6 +43,7 @@ impl EstimationArguments {
             specs: self.runs.clone(),
             start_s: self.start,
             duration_s: self.duration,
+            limits: self.limits.limits(),
         }
     }
 }

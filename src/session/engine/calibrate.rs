@@ -11,7 +11,7 @@ use crate::calibration::{
     self, CalibrationError, CalibrationInput, CalibrationOptions, CalibrationOutcome, CalibrationProgress,
     GimbalCamera, StaticCamera, TrackedView,
 };
-use crate::flight_log::{FlightLog, LogError, LogWarning};
+use crate::flight_log::{FlightLog, LogError, LogLimits, LogWarning};
 use crate::geometry::{Dimension, RigidTransform, ns_from_seconds, seconds_from_ns};
 use crate::sensors::{CameraMount, CameraRig, ChainPrior, GimbalRig, Rig};
 use crate::session::plan::{ParameterizationChoice, RunSpec, SessionError, check_start};
@@ -73,6 +73,8 @@ pub struct CalibrationRequest {
     pub start_s: f64,
     /// Seconds to read from there, `None` for the rest of the log.
     pub duration_s: Option<f64>,
+    /// Limits on what is read of the log.
+    pub limits: LogLimits,
 }
 
 /// The result of an offline calibration.
@@ -105,7 +107,7 @@ pub fn calibrate(
     options: &CalibrationOptions,
     on_progress: &mut dyn FnMut(CalibrationProgress),
 ) -> Result<CalibrationRun, CalibrationRunError> {
-    let log = Arc::new(FlightLog::open(&request.log_path)?);
+    let log = Arc::new(FlightLog::open_with(&request.log_path, &request.limits)?);
     check_start(&log, request.start_s)?;
     let given_rig = Rig::for_log(&log, request.rig_path.as_deref())?;
     let ground_truth_rig = Rig::ground_truth_for_log(&log, request.ground_truth_path.as_deref())?;

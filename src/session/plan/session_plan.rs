@@ -9,7 +9,7 @@ use thiserror::Error;
 
 use super::run_spec::{ParameterizationChoice, RunSpec, distinct_labels};
 use crate::estimator::{EstimatorConfig, rigid_columns};
-use crate::flight_log::{FlightLog, LogError};
+use crate::flight_log::{FlightLog, LogError, LogLimits};
 use crate::geometry::seconds_from_ns;
 use crate::gimbal::{Chain, ParameterId, Parameterization};
 use crate::sensors::{CameraMount, CameraRig, Rig};
@@ -74,6 +74,8 @@ pub struct SessionRequest {
     pub start_s: f64,
     /// Seconds to read from there, `None` for the rest of the log.
     pub duration_s: Option<f64>,
+    /// Limits on what is read of the log.
+    pub limits: LogLimits,
 }
 
 /// A request with its log opened and a camera found for each run.
@@ -114,7 +116,7 @@ pub const DEFAULT_MEMORY_BUDGET_BYTES: usize = 1200 << 20;
 impl SessionPlan {
     /// Opens the log and its rigs and finds each run's camera.
     pub fn open(request: &SessionRequest) -> Result<Self, SessionError> {
-        let log = Arc::new(FlightLog::open(&request.log_path)?);
+        let log = Arc::new(FlightLog::open_with(&request.log_path, &request.limits)?);
         check_start(&log, request.start_s)?;
         let rig = Rig::for_log(&log, request.rig_path.as_deref())?;
         let ground_truth_rig = Rig::ground_truth_for_log(&log, request.ground_truth_path.as_deref())?;

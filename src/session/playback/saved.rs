@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use crate::flight_log::LogLimits;
 use crate::session::plan::{ForkChanges, RunSpec, SessionError, SessionRequest};
 
 /// The version of the format that this program writes.
@@ -132,6 +133,7 @@ impl SavedSession {
             specs: specs.map_err(entry_error)?,
             start_s: self.start_s,
             duration_s: self.duration_s,
+            limits: LogLimits::default(),
         })
     }
 }
