@@ -3,6 +3,8 @@
 
 use thiserror::Error;
 
+use super::file::ZSTD_MAGIC;
+
 /// The reason why a message could not be decoded.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("{what} at byte {offset} of the message")]
@@ -45,6 +47,11 @@ impl<'a> CdrReader<'a> {
         let big_endian = match message {
             [0, 0, _, _, ..] => true,
             [0, 1, _, _, ..] => false,
+            _ if message.starts_with(&ZSTD_MAGIC) => {
+                let what =
+                    "a message that is compressed on its own (zstd): convert the log with `dcvins convert`".into();
+                return Err(CdrError { what, offset: 0 });
+            }
             [first, second, _, _, ..] => {
                 let what =
                     format!("encapsulation {first:#04x} {second:#04x} instead of plain CDR (0x00 0x00 or 0x00 0x01)");

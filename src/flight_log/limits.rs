@@ -47,8 +47,6 @@ pub(crate) const DEFINITION_BYTES: usize = 64 << 20;
 pub(crate) const DESCRIPTION_BYTES: u64 = 16 << 20;
 /// A line of a table, such as EuRoC's `data.csv`.
 pub(crate) const LINE_BYTES: u64 = 64 << 10;
-/// Joint names that are listed; a message of more joints is read, but names no more of them.
-pub(crate) const JOINT_NAMES: usize = 64;
 
 /// What a limit is on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

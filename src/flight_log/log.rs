@@ -45,6 +45,19 @@ pub struct FlightLog {
     epoch_ns: i64,
     duration_ns: i64,
     warnings: Vec<LogWarning>,
+    /// What each warning is about.
+    warning_kinds: Vec<WarningKind>,
+}
+
+/// What a warning of an open log is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum WarningKind {
+    /// Bytes that cannot be read.
+    Damage,
+    /// Header stamps of another clock, or none.
+    Stamps,
+    /// Topics that are not read.
+    Topics,
 }
 
 impl FlightLog {
@@ -75,6 +88,7 @@ impl FlightLog {
             topics: Vec::new(),
             epoch_ns: 0,
             duration_ns: 0,
+            warning_kinds: vec![WarningKind::Topics; warnings.len()],
             warnings,
         };
         log.find_topics_and_times()?;
@@ -127,6 +141,16 @@ impl FlightLog {
     /// Problems found when opening the log. Every [`FrameStream`](super::FrameStream) reports them again at their time.
     pub fn warnings(&self) -> &[LogWarning] {
         &self.warnings
+    }
+
+    /// The warnings of [`FlightLog::warnings`] with what each is about.
+    pub(crate) fn warnings_by_kind(&self) -> impl Iterator<Item = (WarningKind, &LogWarning)> {
+        self.warning_kinds.iter().copied().zip(&self.warnings)
+    }
+
+    fn warn(&mut self, kind: WarningKind, stamp_ns: i64, message: String) {
+        self.warning_kinds.push(kind);
+        self.warnings.push(LogWarning { stamp_ns, message });
     }
 
     /// The content of the first attachment whose name ends so, with its name.
@@ -281,19 +305,24 @@ impl FlightLog {
         self.epoch_ns = counted().map(|entry| entry.2).min().unwrap_or(log_start_ns);
         self.duration_ns = counted().map(|entry| relative_ns(entry.3, self.epoch_ns)).max().unwrap_or(0).max(0);
         for (_, topic, first_ns, _) in stamps {
-            if *first_ns < earliest_ns || *first_ns <= 0 {
+            if *first_ns == 0 {
+                let message = format!(
+                    "{topic}: its first header stamp is 0, so it was never set; the topic does not count for the log's start"
+                );
+                self.warn(WarningKind::Stamps, 0, message);
+            } else if *first_ns < earliest_ns || *first_ns < 0 {
                 let message = format!(
                     "{topic}: its first header stamp is {:.3} s before the log's start: it is of another clock, or the \
                      stamp was never set; the topic does not count for the log's start",
                     seconds_from_ns(self.epoch_ns.saturating_sub(*first_ns))
                 );
-                self.warnings.push(LogWarning { stamp_ns: 0, message });
+                self.warn(WarningKind::Stamps, 0, message);
             }
         }
     }
 
     fn report_damage(&mut self) {
-        for damage in &self.index.damages {
+        for damage in self.index.damages.clone() {
             let stamp_ns =
                 if damage.after_log_time_ns == 0 { 0 } else { self.since_start(damage.after_log_time_ns).max(0) };
             let message = format!(
@@ -303,14 +332,14 @@ impl FlightLog {
                 self.file.len(),
                 damage.problem
             );
-            self.warnings.push(LogWarning { stamp_ns, message });
+            self.warn(WarningKind::Damage, stamp_ns, message);
         }
         if self.index.profile != "ros2" && !self.topics.iter().any(|info| info.kind.is_some()) {
             let message = format!(
-                "no topic has messages that are read: the profile is '{}', expected 'ros2' with CDR messages; convert the log",
+                "no topic has messages that are read: the profile is {:?}, expected 'ros2' with CDR messages; convert the log",
                 self.index.profile
             );
-            self.warnings.push(LogWarning { stamp_ns: 0, message });
+            self.warn(WarningKind::Topics, 0, message);
         }
     }
 }

@@ -178,6 +178,18 @@ pub(crate) struct JointMessage<'a> {
     pub(crate) positions_rad: Vec<f64>,
 }
 
+impl JointMessage<'_> {
+    /// Whether joints are named that have no position.
+    pub(crate) fn lacks_positions(&self) -> bool {
+        self.positions_rad.len() < self.names.len()
+    }
+
+    /// The numbers of names and positions, for a message in which they differ.
+    pub(crate) fn length_problem(&self) -> String {
+        format!("it names {} joints and has {} positions", self.names.len(), self.positions_rad.len())
+    }
+}
+
 pub(crate) fn read_joint_state(message: &[u8]) -> Result<JointMessage<'_>, CdrError> {
     let mut reader = CdrReader::new(message)?;
     let header = read_header(&mut reader)?;

@@ -19,6 +19,7 @@ use nalgebra::UnitQuaternion;
 use serde::Serialize;
 
 use self::survey::Survey;
+use crate::flight_log::log::WarningKind;
 use crate::flight_log::{FlightLog, LogError, MessageKind, TopicInfo};
 use crate::geometry::seconds_from_ns;
 use crate::sensors::Rig;
@@ -200,10 +201,21 @@ impl Findings {
 
 /// Damage to the file, unreadable messages, and topics of other types.
 fn check_file(log: &FlightLog, survey: &Survey, findings: &mut Findings) {
-    for warning in log.warnings() {
-        let evidence = warning.message.clone();
-        let remedy = "copy the file again from the recorder; data after the damage are not used";
-        findings.add(Severity::Warning, Area::Log, "the file is truncated or damaged", evidence, remedy);
+    for (kind, warning) in log.warnings_by_kind() {
+        let (area, title, remedy) = match kind {
+            WarningKind::Damage => (
+                Area::Log,
+                "the file is truncated or damaged",
+                "copy the file again from the recorder; data after the damage are not used",
+            ),
+            WarningKind::Stamps => (
+                Area::Time,
+                "the stamps of a topic are not of the log's time",
+                "set header.stamp to the time of measurement in the driver",
+            ),
+            WarningKind::Topics => (Area::Log, "topics are not read", ""),
+        };
+        findings.add(Severity::Warning, area, title, warning.message.clone(), remedy);
     }
     for damage in &survey.damages {
         let remedy = "copy the file again; the chunk is skipped and reading continues after it";
@@ -231,15 +243,13 @@ fn check_topics(log: &FlightLog, rig: &Rig, findings: &mut Findings) {
     let mut named = 0;
     let mut require = |field: String, topic: &str, kinds: &[MessageKind], severity| {
         named += 1;
-        if let Err(error) = log.require_topic(&field, topic, kinds) {
-            let remedy = "name one of the log's topics in the rig";
-            findings.add(
-                severity,
-                Area::Log,
-                format!("{field} names a topic that is not in the log"),
-                error.to_string(),
-                remedy,
-            );
+        if log.require_topic(&field, topic, kinds).is_err() {
+            let quoted: Vec<String> = log.topics_of(kinds).iter().map(|topic| format!("'{topic}'")).collect();
+            let available = if quoted.is_empty() { "none".to_owned() } else { quoted.join(", ") };
+            let expected: Vec<&str> = kinds.iter().map(|kind| kind.schema_name()).collect();
+            let evidence = format!("'{topic}'; the log's topics of type {} are {available}", expected.join(" or "));
+            let title = format!("{field} names a topic that is not in the log");
+            findings.add(severity, Area::Log, title, evidence, "name one of the log's topics in the rig");
             named -= 1;
         }
     };
@@ -281,6 +291,8 @@ fn role_of(topic: &str, kind: Option<MessageKind>, rig: Option<&Rig>) -> String 
 fn topic_reports(log: &FlightLog, survey: &Survey, rig: Option<&Rig>) -> Vec<TopicReport> {
     let report = |info: &TopicInfo| {
         let times = survey.topics.get(&info.topic).filter(|topic| !topic.times.is_empty());
+        // Stamps that were never set say nothing about time.
+        let times = times.filter(|topic| !topic.has_one_stamp());
         let stamps = times.map(|topic| topic.stamp_range());
         let (first_ns, last_ns) = stamps.unwrap_or((info.first_ns, info.last_ns));
         TopicReport {

@@ -11,6 +11,9 @@ use crate::flight_log::{FlightLog, messages, messages::MessageKind};
 use crate::geometry::{seconds_from_ns, wrap_angle};
 use crate::sensors::{ImuSample, JointSample, Rig};
 
+/// Joint names that are listed; messages may name more.
+const JOINT_NAMES: usize = 64;
+
 /// Number of images of each camera that are decoded, evenly over the log.
 const IMAGES_PER_CAMERA: u64 = 60;
 
@@ -43,6 +46,12 @@ impl TopicSurvey {
     pub(super) fn stamp_range(&self) -> (i64, i64) {
         let stamps = || self.times.iter().map(|times| times.stamp_ns);
         (stamps().min().unwrap_or(0), stamps().max().unwrap_or(0))
+    }
+
+    /// Whether all of several messages have the same stamp, as when it was never set.
+    pub(super) fn has_one_stamp(&self) -> bool {
+        let (first, last) = self.stamp_range();
+        self.times.len() > 2 && first == last
     }
 
     pub(super) fn median_latency_s(&self) -> f64 {
@@ -188,6 +197,7 @@ impl Survey {
         let Some(rig) = rig else { return };
         if let Some(gimbal) = rig.gimbal.as_ref().filter(|gimbal| gimbal.topic.as_deref() == Some(topic)) {
             match messages::read_joint_state(data) {
+                Ok(message) if message.lacks_positions() => entry.refuse(message.length_problem()),
                 Ok(message) => {
                     let angle = |name: &str| {
                         let place = message.names.iter().position(|known| *known == name)?;
@@ -196,7 +206,8 @@ impl Survey {
                     let angles_rad = gimbal.joints.iter().map(|joint| angle(&joint.name)).collect();
                     self.joints.push(JointReading { stamp_ns, angles_rad });
                     for name in &message.names {
-                        if !self.joint_names.iter().any(|known| known == name) {
+                        let room = self.joint_names.len() < JOINT_NAMES;
+                        if room && !self.joint_names.iter().any(|known| known == name) {
                             self.joint_names.push((*name).to_owned());
                         }
                     }

@@ -17,15 +17,25 @@ const OVERLAP_TOLERANCE_S: f64 = 1.0;
 
 /// Rates, gaps, order and time bases of every topic that the rig names.
 pub(super) fn check_timing(survey: &Survey, rig: Option<&Rig>, findings: &mut Findings) {
-    let used = used_topics(survey, rig);
+    let mut used = used_topics(survey, rig);
+    used.retain(|(role, topic, ..)| {
+        let unset = topic.has_one_stamp();
+        if unset {
+            let evidence = format!("{} messages", topic.times.len());
+            let remedy =
+                "set header.stamp to the time of measurement in the driver; without stamps the topic has no times";
+            findings.add(Severity::Error, Area::Time, format!("all stamps of {role} are equal"), evidence, remedy);
+        }
+        !unset
+    });
     let mut regular = Vec::new();
     for (role, topic, nominal_hz, sparse) in &used {
         let before = findings.list.len();
         check_order_and_gaps(role, topic, *sparse, findings);
         check_rate(role, topic, *nominal_hz, findings);
         check_latency(role, topic, findings);
-        if findings.list.len() == before {
-            regular.push(format!("{role} {:.1} Hz", 1.0 / period_s(topic).max(f64::MIN_POSITIVE)));
+        if findings.list.len() == before && period_s(topic) > 0.0 {
+            regular.push(format!("{role} {:.1} Hz", 1.0 / period_s(topic)));
         }
     }
     if !regular.is_empty() {
@@ -123,7 +133,11 @@ fn check_order_and_gaps(role: &str, topic: &TopicSurvey, sparse: bool, findings:
 }
 
 fn check_rate(role: &str, topic: &TopicSurvey, nominal_hz: Option<f64>, findings: &mut Findings) {
-    let measured_hz = 1.0 / period_s(topic).max(f64::MIN_POSITIVE);
+    let period_s = period_s(topic);
+    if period_s <= 0.0 {
+        return; // stamps that repeat or run backwards are reported as such
+    }
+    let measured_hz = 1.0 / period_s;
     if let Some(nominal_hz) = nominal_hz.filter(|rate| *rate > 0.0)
         && (measured_hz / nominal_hz - 1.0).abs() > RATE_TOLERANCE
     {
@@ -205,7 +219,9 @@ fn check_clocks(used: &[Used<'_>], findings: &mut Findings) {
         let title = "log times equal the header stamps: arrival times are unknown";
         return findings.add(Severity::Note, Area::Time, title, evidence, remedy);
     }
-    findings.good(Area::Time, "all sensors appear to be stamped by one clock", evidence);
+    if used.len() > 1 {
+        findings.good(Area::Time, "all sensors appear to be stamped by one clock", evidence);
+    }
 }
 
 fn check_overlap(used: &[Used<'_>], findings: &mut Findings) {

@@ -94,6 +94,9 @@ fn named_together(log: &FlightLog, topic: &str, names: &[String]) -> Result<bool
 fn reading_decoder(names: Vec<String>, epoch_ns: i64) -> Decoder<JointReading> {
     Box::new(move |source: MessageSource<'_>| {
         let message = messages::read_joint_state(source.data).map_err(|error| Refusal::not_decodable(&error))?;
+        if message.lacks_positions() {
+            return Err(Refusal { reason: "joints have no position", detail: message.length_problem() });
+        }
         let angles_rad: Vec<Option<f64>> = names.iter().map(|name| angle_of(&message, name)).collect();
         if let Some(joint) = angles_rad.iter().position(|angle| angle.is_some_and(|angle| !angle.is_finite())) {
             let detail = format!("{}: {}", names[joint], angles_rad[joint].unwrap_or(f64::NAN));

@@ -20,12 +20,18 @@ fn files_that_are_not_logs_are_identified() {
         (b"#ROSBAG V2.0\n", "a ROS 1 bag; convert it with `dcvins convert`"),
         (b"SQLite format 3\0\0\0", "a ROS 2 bag in SQLite"),
         (b"\x89PNG\r\n\x1a\n\0\0\0", "begins with 89 50 4e 47"),
-        (b"\x89MCAP0\r\n", "does not end with the MCAP magic at byte 8"),
+        (b"\x89MCAP0\r\n", "at byte 8: the file does not end with the MCAP magic"),
     ];
     for (content, expected) in cases {
         let message = open_error(content);
         assert!(message.contains(expected), "{message}");
     }
+    let pointer = b"version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 55196154\n";
+    let message = open_error(pointer);
+    assert!(
+        message.contains("a Git LFS pointer in place of the file (55196154 bytes); fetch the log with"),
+        "{message}"
+    );
     let missing = FlightLog::open(Path::new("/nowhere/at/all.mcap")).unwrap_err().to_string();
     assert!(missing.contains("cannot open the log"), "{missing}");
     let folder = TempDir::new().unwrap();
