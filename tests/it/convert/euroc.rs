@@ -144,3 +144,41 @@ fn a_wrong_folder_says_where() {
     check("cam0/sensor.yaml", &CAMERA_YAML.replace("0.0, 0.0, 1.0, 0.1", "0.0, 0.0, 2.0, 0.1"), &["T_BS", "rigid"]);
     check("imu0/sensor.yaml", &IMU_YAML.replace("1.6968e-04", "-1"), &["gyroscope_noise_density", "-1"]);
 }
+
+#[test]
+fn image_names_stay_inside_their_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    let (source, path) = (folder.path().join("flight"), folder.path().join("flight.mcap"));
+    write_folder(&source);
+    let data = source.join("mav0/cam0/data");
+    let good = data.join(format!("{STAMP_NS}.png"));
+    fs::copy(&good, folder.path().join("secret.png")).unwrap();
+    fs::copy(&good, data.join("no_ending")).unwrap();
+    fs::write(data.join("text.png"), "root:x:0:0").unwrap();
+    fs::create_dir(data.join("folder.png")).unwrap();
+    let outside = folder.path().join("secret.png");
+    let mut names = vec![
+        "../../../../secret.png".to_owned(),
+        outside.to_str().unwrap().to_owned(),
+        "text.png".to_owned(),
+        "folder.png".to_owned(),
+        "no_ending".to_owned(),
+    ];
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink(&outside, data.join("link.png")).unwrap();
+        names.push("link.png".to_owned());
+    }
+    for name in names {
+        fs::write(source.join("mav0/cam0/data.csv"), format!("{STAMP_NS},{STAMP_NS}.png\n{STAMP_NS},{name}\n"))
+            .unwrap();
+        let report = run(&source, &path).unwrap();
+        let images = topic(&report, "/cam0/image_raw/compressed");
+        // A name without an ending is an image all the same.
+        let expected = if name == "no_ending" { (2, 0) } else { (1, 1) };
+        assert_eq!((images.taken, images.left), expected, "{name}\n{report}");
+        let reasons = ["leads out of the folder", "neither PNG nor JPEG", "no image", "link that leads out"];
+        let told = images.reason.as_ref().is_some_and(|reason| reasons.iter().any(|words| reason.contains(words)));
+        assert!(told || name == "no_ending", "{name}\n{report}");
+    }
+}

@@ -1,6 +1,7 @@
 //! `convert`: bags, databases and folders made here, held against the log that the same values give when they are
 //! written directly.
 
+mod damage;
 mod euroc;
 mod ros1;
 
