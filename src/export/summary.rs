@@ -467,15 +467,17 @@ fn real_time_factor(run: &RunRecord) -> Option<f64> {
     (work_ms > 0.0).then(|| log_s * 1e3 / work_ms)
 }
 
-/// Warnings about the log, then of the run, each with its stamp; a repeated warning once with its count.
+/// Warnings about the log, then of the run, each with its stamp; a repeated warning once with its count and its last
+/// stamp.
 fn warnings(recording: &Recording, run: &RunRecord) -> Vec<String> {
     let mut texts: Vec<String> = recording
         .warnings
         .iter()
         .map(|warning| format!("{:.3} s: {}", seconds_from_ns(warning.stamp_ns), warning.message))
         .collect();
-    for RunWarning { message, first_ns, steps } in &run.warnings {
-        let times = if *steps > 1 { format!(" ({steps} times)") } else { String::new() };
+    for RunWarning { message, first_ns, last_ns, steps } in &run.warnings {
+        let last_s = seconds_from_ns(*last_ns);
+        let times = if *steps > 1 { format!(" ({steps} steps, last at {last_s:.3} s)") } else { String::new() };
         texts.push(format!("{:.3} s: {message}{times}", seconds_from_ns(*first_ns)));
     }
     texts.extend(run.error.iter().cloned());

@@ -20,6 +20,7 @@ mod status_bar;
 mod tests;
 mod tiles;
 mod top_bar;
+mod warning_lines;
 
 use std::cmp::Ordering;
 use std::path::PathBuf;

@@ -2,10 +2,11 @@
 
 use egui::{Align2, Area, Button, Frame, Id, Margin, Order, Panel, RichText, ScrollArea, Ui, vec2};
 
+use super::warning_lines::warning_lines;
 use crate::gui::PanelContext;
 use crate::gui::theme::{Theme, dialog_frame};
-use crate::gui::units::{counted, seconds};
-use crate::session::{Command, RunWarning};
+use crate::gui::units::seconds;
+use crate::session::Command;
 
 /// Severity of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -95,25 +96,19 @@ impl Notices {
         let mut open = self.list_open;
         let window = egui::Window::new("Warnings").open(&mut open).collapsible(false).default_size(vec2(520.0, 260.0));
         window.anchor(Align2::RIGHT_BOTTOM, vec2(-16.0, -40.0)).show(ui.ctx(), |ui| {
-            let of_log = ctx.recording.warnings.iter().map(|warning| (warning.stamp_ns, warning.message.clone()));
-            let of_runs = ctx.recording.runs.iter().flat_map(|run| {
-                run.warnings.iter().map(|warning| {
-                    let RunWarning { message, first_ns, steps } = warning;
-                    (*first_ns, format!("{}, {}: {message}", run.spec.label, counted(*steps, "step")))
-                })
-            });
-            let warnings: Vec<(i64, String)> = of_log.chain(of_runs).collect();
+            let warnings = warning_lines(ctx.recording);
             if warnings.is_empty() {
-                ui.label(RichText::new("Nothing is wrong so far").color(theme.text_weak));
+                ui.label(RichText::new("No warnings").color(theme.text_weak));
             }
             ScrollArea::vertical().auto_shrink([false, true]).show(ui, |ui| {
-                for (stamp_ns, message) in warnings {
+                for warning in warnings {
+                    let stamp_ns = warning.first_ns;
                     ui.horizontal_top(|ui| {
                         let time = Button::new(RichText::new(format!("{} s", seconds(stamp_ns))).monospace());
-                        if ui.add(time).on_hover_text("Go there").clicked() {
+                        if ui.add(time).on_hover_text("Move the cursor to this time").clicked() {
                             ctx.commands.push(Command::Seek { stamp_ns });
                         }
-                        ui.add(egui::Label::new(RichText::new(message).color(theme.text)).wrap());
+                        ui.add(egui::Label::new(RichText::new(warning.text()).color(theme.text)).wrap());
                     });
                 }
             });

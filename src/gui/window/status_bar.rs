@@ -4,6 +4,7 @@ use std::path::Path;
 
 use egui::{Align, Button, Layout as UiLayout, ProgressBar, RichText, Ui};
 
+use super::warning_lines::warning_lines;
 use super::{Progress, WindowState};
 use crate::gui::PanelContext;
 use crate::gui::units::{bytes, counted, fixed};
@@ -24,37 +25,41 @@ pub(super) fn ui(ui: &mut Ui, state: &mut WindowState, ctx: &PanelContext<'_>) {
         };
         if let Some(run) = run.filter(|_| state.show_times) {
             if let Some(step) = run.step_at(ctx.cursor_ns) {
-                let hover = "Time that the step at the cursor took";
+                let hover = "Processing time of the step at the cursor, ms";
                 pair(ui, "step", format!("{} ms", fixed(step.report.times.step_ms, 1)), hover);
             }
             if let Some(factor) = real_time_factor(run, ctx.cursor_ns) {
-                let hover = "Log seconds per second of computing, over the last hundred steps";
-                pair(ui, "speed", format!("{}× real time", fixed(factor, 1)), hover);
+                let hover = "Real-time factor: log time over processing time, last 100 steps";
+                pair(ui, "speed", format!("{}× real-time", fixed(factor, 1)), hover);
             }
         }
         if let Some(memory) = state.memory_bytes {
-            pair(ui, "memory", bytes(memory), "Memory of the whole process");
+            pair(ui, "memory", bytes(memory), "Resident memory of the process");
             let (text, hover) = recorded(ctx.recording);
-            pair(ui, "recorded", text, &hover);
+            pair(ui, "recording", text, &hover);
         }
         let delay = run.and_then(|run| run.step_at(ctx.cursor_ns)).map(|step| log_delay(step));
-        let clock = delay.map_or_else(|| "header stamp".to_owned(), |delay| format!("header stamp, log {delay}"));
-        pair(ui, "clock", clock, "The header stamp drives; the log time is kept beside it");
+        let clock = delay.map_or_else(|| "header stamp".to_owned(), |delay| format!("header stamp (log time {delay})"));
+        pair(
+            ui,
+            "clock",
+            clock,
+            "Time base header.stamp; in parentheses MCAP log time minus header.stamp, frame at the cursor",
+        );
         if let Some(step) = run.and_then(|run| run.step_at(ctx.cursor_ns)) {
             let stamp_ns = ctx.recording.epoch_ns + step.report.stamp_ns;
             let text = format!("{}.{:09}", stamp_ns.div_euclid(1_000_000_000), stamp_ns.rem_euclid(1_000_000_000));
-            pair(ui, "stamp", text, "Absolute header stamp of the frame, in seconds since the epoch");
+            pair(ui, "stamp", text, "header.stamp of the frame at the cursor, s since the Unix epoch");
         }
         ui.with_layout(UiLayout::right_to_left(Align::Center), |ui| {
-            let of_runs: usize = ctx.recording.runs.iter().map(|run| run.warnings.len()).sum();
-            let count = ctx.recording.warnings.len() + of_runs;
+            let count = warning_lines(ctx.recording).len();
             let (text, color) = if count == 0 {
                 ("No warnings".to_owned(), theme.text_weak)
             } else {
                 (format!("⚠ {}", counted(count, "warning")), theme.warn)
             };
             let button = Button::new(RichText::new(text).small().color(color)).frame(count > 0);
-            if ui.add(button).on_hover_text("What is wrong with the log and its runs (W)").clicked() {
+            if ui.add(button).on_hover_text("Warnings of the log and the runs (W)").clicked() {
                 state.notices.list_open = !state.notices.list_open;
             }
             if let Some(progress) = &state.progress {
@@ -70,12 +75,12 @@ pub(super) fn ui(ui: &mut Ui, state: &mut WindowState, ctx: &PanelContext<'_>) {
 /// The progress of the estimation.
 fn progress_ui(ui: &mut Ui, progress: &Progress) {
     let left = progress.left_s.map_or_else(String::new, |left_s| format!(", {} s left", fixed(left_s.ceil(), 0)));
-    let text = format!("{} {} %{left}", counted(progress.runs, "run"), fixed(100.0 * progress.fraction, 0));
+    let text = format!("{}: {} %{left}", counted(progress.runs, "run"), fixed(100.0 * progress.fraction, 0));
     let bar = ProgressBar::new(progress.fraction as f32).desired_width(150.0).text(RichText::new(&text).small());
     let response = ui.add(bar);
     response
         .widget_info(|| egui::WidgetInfo::labeled(egui::Role::ProgressIndicator, true, format!("Computing {text}")));
-    response.on_hover_text("How far the estimators have come");
+    response.on_hover_text("Estimation progress: processed log time of all runs, remaining wall-clock time");
 }
 
 /// Another log is being opened.
@@ -91,9 +96,11 @@ fn recorded(recording: &Recording) -> (String, String) {
     let summarized: usize = recording.runs.iter().map(|run| run.memory.summaries).sum();
     let fraction =
         format!("{} of {}", bytes(recording.memory_bytes() as u64), bytes(recording.memory_budget_bytes as u64));
-    let text = if summarized > 0 { format!("{fraction}, {summarized} of {steps} steps in outline") } else { fraction };
-    let hover = "Memory of all steps and of the snapshots of the estimators. When it is full, features and landmarks of \
-                 older steps are let go, and taken again from the nearest snapshot, to the same bits, when you go there";
+    let text =
+        if summarized > 0 { format!("{fraction}, {summarized} of {steps} steps summary only") } else { fraction };
+    let hover = "Memory of all steps and estimator snapshots, of the budget in the settings. Over the budget, features and \
+                 landmarks of older steps are evicted (summary only) and recomputed bit by bit from the nearest \
+                 snapshot when the cursor moves there";
     (text, hover.to_owned())
 }
 

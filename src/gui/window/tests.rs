@@ -266,9 +266,9 @@ fn a_fork_is_made_by_key_and_label_and_has_a_lane() {
     harness.key_press(Key::F);
     harness.run_steps(3);
     assert!(harness.query_by_label("Fork auto at 3.000 s").is_some());
-    assert!(harness.query_by_label("nothing is changed").is_some());
+    assert!(harness.query_by_label("No changes").is_some());
     commands_of(&mut harness, |harness| {
-        let combo = harness.get_all_by_role(Role::ComboBox).find(|node| node.value().as_deref() == Some("as before"));
+        let combo = harness.get_all_by_role(Role::ComboBox).find(|node| node.value().as_deref() == Some("unchanged"));
         combo.unwrap().click();
     });
     harness.get_by_label("classical").click();
@@ -327,11 +327,11 @@ fn while_the_user_types_keys_are_letters() {
         harness.key_press(Key::L);
     });
     assert!(pushed.is_empty(), "{pushed:?}");
-    assert!(harness.query_by_label("Loop over the visible range").is_some());
+    assert!(harness.query_by_label("Loop over the visible time range").is_some());
     assert!(harness.query_by_label("Go to start").is_some_and(|node| node.accesskit_node().role() == Role::Button));
     let pushed = commands_of(&mut harness, |harness| harness.key_press(Key::Enter));
     assert_eq!(pushed, [Command::SetLoop(Some((0, 4 * SECOND_NS)))]);
-    assert!(harness.query_by_label("Loop over the visible range").is_none(), "the palette closes");
+    assert!(harness.query_by_label("Loop over the visible time range").is_none(), "the palette closes");
 }
 
 #[test]
@@ -414,11 +414,16 @@ fn warnings_are_listed_and_lead_to_their_time() {
     assert!(harness.query_by_label_contains("no IMU sample for 0.034 s").is_some());
     let pushed = commands_of(&mut harness, |harness| harness.get_by_label("6.000 s").click());
     assert_eq!(pushed, [Command::Seek { stamp_ns: 6 * SECOND_NS }]);
-    let warning = RunWarning { message: "joint angles contradict".to_owned(), first_ns: 4 * SECOND_NS, steps: 80 };
+    let warning = RunWarning {
+        message: "joint angles inconsistent".to_owned(),
+        first_ns: 4 * SECOND_NS,
+        last_ns: 8 * SECOND_NS,
+        steps: 80,
+    };
     harness.state_mut().recording.runs[1].warnings.push(warning);
     harness.run_steps(2);
     assert!(harness.query_by_label("⚠ 2 warnings").is_some());
-    assert!(harness.query_by_label("classical, 80 steps: joint angles contradict").is_some());
+    assert!(harness.query_by_label("classical: joint angles inconsistent (80 steps, 4.000–8.000 s)").is_some());
     let pushed = commands_of(&mut harness, |harness| harness.get_by_label("4.000 s").click());
     assert_eq!(pushed, [Command::Seek { stamp_ns: 4 * SECOND_NS }]);
 }

@@ -12,6 +12,8 @@ pub struct RunWarning {
     pub message: String,
     /// Header stamp of the first step that reported it.
     pub first_ns: i64,
+    /// Header stamp of the last step that reported it.
+    pub last_ns: i64,
     /// Number of steps that reported it.
     pub steps: usize,
 }
@@ -29,8 +31,16 @@ pub(in crate::session) fn warnings_of(steps: &[Arc<StepRecord>]) -> Vec<RunWarni
 pub(in crate::session) fn add_warnings(warnings: &mut Vec<RunWarning>, report: &StepReport) {
     for message in &report.warnings {
         match warnings.iter_mut().find(|known| known.message == *message) {
-            Some(known) => known.steps += 1,
-            None => warnings.push(RunWarning { message: message.clone(), first_ns: report.stamp_ns, steps: 1 }),
+            Some(known) => {
+                known.steps += 1;
+                known.last_ns = report.stamp_ns;
+            }
+            None => warnings.push(RunWarning {
+                message: message.clone(),
+                first_ns: report.stamp_ns,
+                last_ns: report.stamp_ns,
+                steps: 1,
+            }),
         }
     }
 }

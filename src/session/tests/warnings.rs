@@ -16,6 +16,7 @@ fn a_warning_is_kept_once_with_its_first_time_and_its_count() {
     for warning in &run.warnings {
         let steps: Vec<_> = run.steps.iter().filter(|step| warns(step, &warning.message)).collect();
         assert_eq!((warning.first_ns, warning.steps), (steps[0].report.stamp_ns, steps.len()), "{}", warning.message);
+        assert_eq!(Some(warning.last_ns), steps.last().map(|step| step.report.stamp_ns), "{}", warning.message);
     }
     let first_ns = run.warnings.iter().map(|warning| warning.first_ns).min().unwrap();
     let first = run.steps.iter().position(|step| step.report.stamp_ns == first_ns).unwrap();
