@@ -91,7 +91,7 @@ impl Desktop for Machine {
 
     fn pick_log(&self) -> Option<Receiver<Option<PathBuf>>> {
         let mut dialog = rfd::AsyncFileDialog::new()
-            .set_title("Open a flight log or a saved session")
+            .set_title("Open flight log or session")
             .add_filter("Flight logs and sessions", &["mcap", "MCAP", "json"]);
         if let Ok(folder) = std::env::current_dir() {
             dialog = dialog.set_directory(folder);

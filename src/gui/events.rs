@@ -25,16 +25,16 @@ pub(crate) enum Mark {
 /// The name of a kind of event in the window.
 pub(crate) fn name_of(kind: EventKind) -> &'static str {
     match kind {
-        EventKind::InitializationWaits => "initialization waits",
+        EventKind::InitializationWaits => "waiting for initialization",
         EventKind::InitializedFromMotion => "initialized from motion",
-        EventKind::InitializedFromStationary => "initialized from standstill",
+        EventKind::InitializedFromStationary => "initialized while stationary",
         EventKind::KeyframeChosen => "keyframe",
         EventKind::OldestMarginalized => "oldest frame marginalized",
         EventKind::SecondNewestDropped => "second-newest frame dropped",
         EventKind::OutliersRejected => "outliers rejected",
-        EventKind::Stationary => "standstill",
+        EventKind::Stationary => "stationary",
         EventKind::Failure => "failure",
-        EventKind::ParameterizationSwitched => "chart switched",
+        EventKind::ParameterizationSwitched => "parameterization switched",
         EventKind::MeasurementMissing => "measurement missing",
     }
 }

@@ -200,7 +200,7 @@ impl App {
         let count = recording.warnings.len();
         if count > 0 && self.reported_warnings == 0 {
             let first = &recording.warnings[0].message;
-            let text = format!("{} about the log, the first: {first}\nW lists them all", counted(count, "warning"));
+            let text = format!("{} about the log; first: {first}\nFull list: W", counted(count, "warning"));
             self.state.notices.show_message(NoticeLevel::Warning, text);
         }
         self.reported_warnings = count;
@@ -213,7 +213,7 @@ impl App {
         let Some(text) = log.saved(layout) else { return };
         match self.desktop.write_session(&stem.unwrap_or_else(|| "log".to_owned()), &text) {
             Ok(path) => {
-                let text = format!("Session written, to be opened like a log:\n{}", path.display());
+                let text = format!("Session saved (opens like a log):\n{}", path.display());
                 self.state.notices.show_message(NoticeLevel::Info, text);
             }
             Err(problem) => self.state.notices.show_message(NoticeLevel::Error, problem),
@@ -224,7 +224,7 @@ impl App {
         match self.desktop.write_panel(export) {
             Ok(paths) => {
                 let paths: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
-                self.state.notices.show_message(NoticeLevel::Info, format!("Written:\n{}", paths.join("\n")));
+                self.state.notices.show_message(NoticeLevel::Info, format!("Exported:\n{}", paths.join("\n")));
             }
             Err(problem) => self.state.notices.show_message(NoticeLevel::Error, problem),
         }
@@ -237,7 +237,7 @@ impl App {
         if elapsed_s < MAX_FRAME_TIME_S {
             log.advance(elapsed_s);
         } else if log.playback().playing {
-            let text = format!("Nothing could be drawn for {elapsed_s:.1} s; playing goes on from where it was");
+            let text = format!("Rendering stalled for {elapsed_s:.1} s; playback resumed");
             self.state.notices.show_message(NoticeLevel::Warning, text);
         }
         for notice in log.take_notices() {
@@ -298,7 +298,7 @@ impl App {
             }
             Err(TryRecvError::Empty) => {}
             Err(TryRecvError::Disconnected) => {
-                let text = format!("Opening {} ended without a result", opening.path.display());
+                let text = format!("Cannot open {}: the loader thread stopped", opening.path.display());
                 self.state.notices.show_message(NoticeLevel::Error, text);
                 self.opening = None;
             }
@@ -310,7 +310,7 @@ impl App {
         let dropped: Vec<PathBuf> =
             ui.input(|input| input.raw.dropped_files.iter().map(|file| file.path().to_path_buf()).collect());
         if dropped.len() > 1 {
-            let text = format!("{} files were dropped: the first one is opened", dropped.len());
+            let text = format!("{} files dropped; only the first one is opened", dropped.len());
             self.state.notices.show_message(NoticeLevel::Info, text);
         }
         if let Some(path) = dropped.into_iter().next() {

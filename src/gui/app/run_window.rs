@@ -24,8 +24,8 @@ const ICON_PNG: &[u8] = include_bytes!("../../../assets/icon/dcvins-128.png");
 pub enum WindowError {
     /// No display.
     #[error(
-        "there is no display: neither WAYLAND_DISPLAY nor DISPLAY is set\n\
-         start it in a desktop session or with 'ssh -X', or draw pictures without a display with 'dcvins screenshot'"
+        "no display: neither WAYLAND_DISPLAY nor DISPLAY is set\n\
+         start it in a desktop session or through 'ssh -X'; 'dcvins screenshot' renders panels without a display"
     )]
     NoDisplay,
     /// A library or a graphics driver is missing, or the display refused the connection.
@@ -114,7 +114,7 @@ fn display_error(problem: String) -> WindowError {
     let remedy = if cfg!(target_os = "linux") {
         format!(
             "on a machine without a desktop install what the window needs: apt-get install {WINDOW_PACKAGES}\n\
-             pictures need nothing: 'dcvins screenshot'"
+             'dcvins screenshot' renders panels without a display"
         )
     } else {
         "check that the graphics driver supports Vulkan, Metal, Direct3D 12 or OpenGL".to_owned()

@@ -78,7 +78,7 @@ fn a_classical_run_goes_on_as_minimal_from_where_its_rank_drops() {
     harness.key_press(Key::F);
     harness.run_steps(3);
     assert!(harness.query_by_label_contains("Fork classical at ").is_some());
-    let combo = harness.get_all_by_role(Role::ComboBox).find(|node| node.value().as_deref() == Some("as before"));
+    let combo = harness.get_all_by_role(Role::ComboBox).find(|node| node.value().as_deref() == Some("unchanged"));
     combo.unwrap().click();
     harness.run_steps(3);
     harness.get_by_label("minimal").click();

@@ -358,16 +358,16 @@ fn a_layout_is_kept_for_the_next_start() {
     harness.get_by_label("Panels").click();
     harness.run_steps(2);
     let name = || egui::Role::TextInput;
-    harness.get_by_role_and_label(name(), "Name of the layout").focus();
+    harness.get_by_role_and_label(name(), "Layout name").focus();
     harness.run_steps(1);
-    harness.get_by_role_and_label(name(), "Name of the layout").type_text("flight");
+    harness.get_by_role_and_label(name(), "Layout name").type_text("flight");
     harness.run_steps(2);
     harness.get_by_label("Save layout").click();
     harness.run_steps(2);
     assert!(harness.query_by_label("Layout flight").is_some());
     let kept = desktop.layouts.lock().unwrap().clone().unwrap();
     assert!(kept.contains("flight"), "{kept}");
-    harness.get_by_label("Forget flight").click();
+    harness.get_by_label("Delete layout flight").click();
     harness.run_steps(2);
     assert_eq!(desktop.layouts.lock().unwrap().as_deref(), Some("{}"));
 }
@@ -417,10 +417,10 @@ fn warnings_of_a_log_are_reported_once() {
     harness.get_by_label("Open yard.mcap").click();
     run_until(&mut harness, |harness| opened(harness).is_some());
     harness.run_steps(2);
-    assert!(harness.query_by_label_contains("1 warning about the log, the first:").is_some());
+    assert!(harness.query_by_label_contains("1 warning about the log; first:").is_some());
     harness.get_by_label("Dismiss notice").click();
     harness.run_steps(5);
-    assert!(harness.query_by_label_contains("about the log, the first:").is_none());
+    assert!(harness.query_by_label_contains("about the log; first:").is_none());
 }
 
 #[test]

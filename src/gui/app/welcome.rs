@@ -30,7 +30,7 @@ impl Welcome {
         ui.with_layout(Layout::top_down(Align::Center), |ui| {
             ui.add_space((0.08 * ui.available_height()).clamp(8.0, 80.0));
             ui.label(RichText::new("dcvins").size(30.0).color(theme.text_strong));
-            let subtitle = "A debugger for visual-inertial navigation with a camera on a gimbal";
+            let subtitle = "Debugger for visual-inertial navigation with a gimballed camera";
             ui.label(RichText::new(subtitle).size(14.0).color(theme.text_weak));
             ui.add_space(16.0);
             if let Some(path) = opening {
@@ -46,8 +46,8 @@ impl Welcome {
                     chosen = self.path_field.ui(ui, theme, false, 130.0);
                     ui.add_space(10.0);
                     let lists = [
-                        ("Sample logs", &self.samples, "None found beside the program"),
-                        ("Recent logs", &self.recent, "None yet"),
+                        ("Sample logs", &self.samples, "No sample logs installed"),
+                        ("Recent logs", &self.recent, "No recent logs"),
                     ];
                     ui.columns(2, |columns| {
                         for (ui, (title, logs, none)) in columns.iter_mut().zip(lists) {
@@ -79,7 +79,7 @@ fn drop_target_ui(ui: &mut Ui, theme: &Theme) {
     );
     let below = center + vec2(0.0, 12.0);
     let font = egui::FontId::proportional(12.0);
-    let text = "its rig lies beside it (.rig.yaml) or in it";
+    let text = "Rig: NAME.rig.yaml next to NAME.mcap, or attached to the log";
     ui.painter().text(below, egui::Align2::CENTER_CENTER, text, font, theme.text_weak);
 }
 

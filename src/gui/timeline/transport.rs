@@ -67,12 +67,12 @@ fn speed_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>) {
             }
         }
     });
-    response.response.on_hover_text("Playback speed");
+    response.response.on_hover_text("Playback speed, log seconds per second");
 }
 
 fn loop_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>) {
     let on = ctx.playback.loop_range_ns.is_some();
-    if icon_button(ui, "🔁", "Loop", "L; Shift and drag over the lanes for a range", on) {
+    if icon_button(ui, "🔁", "Loop", "L; loop range: Shift+drag on the lanes", on) {
         ctx.commands.push(toggled_loop(ctx));
     }
 }
@@ -101,8 +101,8 @@ fn time_ui(ui: &mut Ui, ctx: &PanelContext<'_>) {
         solver_ui(ui, ctx, run);
     }
     if ctx.playback.recomputing {
-        ui.label(RichText::new("taken again…").color(theme.text_weak))
-            .on_hover_text("What this step left is computed again from the nearest snapshot of the estimator");
+        ui.label(RichText::new("recomputing…").color(theme.text_weak))
+            .on_hover_text("Details of this step are recomputed from the nearest estimator snapshot");
     }
 }
 
@@ -116,12 +116,11 @@ fn solver_ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord) {
         return;
     };
     let text = format!("{} of {}", trace.at, trace.iterations());
-    ui.label(RichText::new(text).monospace().color(theme.warn)).on_hover_text(
-        "The picture shows the window after so many iterations of its solver; , and . step through them",
-    );
+    ui.label(RichText::new(text).monospace().color(theme.warn))
+        .on_hover_text("Panels show the window after this solver iteration (keys: , and .)");
     if let Some(iteration) = trace.shown().and_then(|state| state.report.iterations.last()) {
         let (before, after) = (fixed(iteration.cost_before, 2), fixed(iteration.cost_after, 2));
-        let taken = if iteration.accepted { "" } else { ", not taken" };
+        let taken = if iteration.accepted { "" } else { ", rejected" };
         ui.label(RichText::new(format!("cost {before} → {after}{taken}")).monospace().color(theme.text));
     }
 }
@@ -132,11 +131,12 @@ fn pace_ui(ui: &mut Ui, ctx: &PanelContext<'_>, pace: Reading) {
     /// Below this ratio of the set speed the cursor counts as slow.
     const LATE_RATIO: f64 = 0.9;
     let theme = ctx.theme;
-    let text = format!("{} pictures/s", fixed(pace.fps, 0));
-    ui.label(RichText::new(text).color(theme.text_weak)).on_hover_text("Pictures drawn per second while playing");
+    let text = format!("{} fps", fixed(pace.fps, 0));
+    ui.label(RichText::new(text).color(theme.text_weak)).on_hover_text("Rendered frames per second during playback");
     if pace.speed < LATE_RATIO * ctx.playback.speed {
-        let text = format!("⚠ {}×, waits for the estimation", fixed(pace.speed, 2));
-        ui.label(RichText::new(text).color(theme.warn)).on_hover_text("The speed that is reached");
+        let text = format!("⚠ {}×, estimator behind", fixed(pace.speed, 2));
+        ui.label(RichText::new(text).color(theme.warn))
+            .on_hover_text("Achieved playback speed: the cursor waits for the estimator");
     }
     ui.add_space(8.0);
 }

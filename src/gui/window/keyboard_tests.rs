@@ -74,9 +74,9 @@ fn the_palette_has_every_action_with_its_keys_and_moves_by_key() {
     assert!(first.is_some() && chosen(&harness).is_some() && chosen(&harness) != first);
     harness.event(egui::Event::Text("qqqq".to_owned()));
     harness.run_steps(2);
-    assert!(harness.query_by_label("Nothing is called so").is_some());
+    assert!(harness.query_by_label("No match").is_some());
     assert!(commands_of(&mut harness, |harness| harness.key_press(Key::Escape)).is_empty());
-    assert!(harness.query_by_label("Nothing is called so").is_none(), "Escape closes it");
+    assert!(harness.query_by_label("No match").is_none(), "Escape closes it");
 }
 
 #[test]
@@ -123,7 +123,7 @@ fn panels_get_the_focus_by_key_in_the_order_on_the_screen() {
     // A saved layout by key, and the notice without one.
     harness.key_press_modifiers(Modifiers::COMMAND, Key::Num3);
     harness.run_steps(3);
-    assert!(harness.query_by_label_contains("No layout of your own has that number").is_some());
+    assert!(harness.query_by_label_contains("No saved layout has this number").is_some());
 }
 
 /// Every node that can be clicked or focused has a name, in every preset and with every dialog open.

@@ -125,12 +125,16 @@ fn details(run: &RunRecord, statistics: Option<&ErrorStatistics>) -> String {
     if let Some(last) = run.steps.last() {
         lines.push(format!("parameterization {}", last.report.calibration.parameterization));
         let tracked = run.steps.iter().filter(|step| !step.report.window.is_empty()).count();
-        lines.push(format!("{} frames, {tracked} estimated, {} restarts", run.steps.len(), last.report.restarts));
+        lines.push(format!(
+            "frames: {}, of these estimated: {tracked}, restarts: {}",
+            run.steps.len(),
+            last.report.restarts
+        ));
     }
     if let Some(statistics) = statistics {
         let [rmse, mean, max] = [statistics.rmse, statistics.mean, statistics.max].map(|error| fixed(error, 3));
-        lines.push(format!("absolute trajectory error: RMS {rmse} m, mean {mean} m, max {max} m"));
-        lines.push("aligned in yaw and position, as far as computed".to_owned());
+        lines.push(format!("absolute trajectory error (ATE): RMS {rmse} m, mean {mean} m, max {max} m"));
+        lines.push("over the computed frames, aligned in yaw and position".to_owned());
     }
     if let Some(error) = &run.error {
         lines.push(error.clone());

@@ -57,8 +57,10 @@ impl SavedLayouts {
                 if take.clicked() {
                     layout.take(tree.clone());
                 }
-                let forget = ui.add(Button::new("x").small()).on_hover_text("Forget this layout");
-                forget.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, format!("Forget {name}")));
+                let forget = ui.add(Button::new("x").small()).on_hover_text("Delete this layout");
+                forget.widget_info(|| {
+                    egui::WidgetInfo::labeled(egui::Role::Button, true, format!("Delete layout {name}"))
+                });
                 if forget.clicked() {
                     forgotten = Some(name.clone());
                 }
@@ -68,7 +70,7 @@ impl SavedLayouts {
         ui.horizontal(|ui| {
             let edit = TextEdit::singleline(&mut self.typed).hint_text("Name").desired_width(114.0);
             let edit = ui.add(edit);
-            edit.widget_info(|| egui::WidgetInfo::labeled(egui::Role::TextInput, true, "Name of the layout"));
+            edit.widget_info(|| egui::WidgetInfo::labeled(egui::Role::TextInput, true, "Layout name"));
             let name = self.typed.trim().to_owned();
             let room = self.layouts.len() < MAX_LAYOUTS || self.layouts.contains_key(&name);
             let save = ui.add_enabled(!name.is_empty() && room, Button::new("Save layout"));
@@ -79,7 +81,7 @@ impl SavedLayouts {
             }
         });
         if self.layouts.len() >= MAX_LAYOUTS {
-            ui.label(RichText::new(format!("{MAX_LAYOUTS} layouts are kept at most")).small().color(theme.text_weak));
+            ui.label(RichText::new(format!("At most {MAX_LAYOUTS} saved layouts")).small().color(theme.text_weak));
         }
         changed
     }

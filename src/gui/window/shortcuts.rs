@@ -8,18 +8,18 @@ use crate::gui::theme::Theme;
 /// Actions of the pointer.
 const POINTER: [(&str, &str); 6] = [
     ("Drag", "move the cursor"),
-    ("Ctrl+scroll", "zoom in time, in all plots at once; over the timeline scrolling is enough"),
-    ("Middle drag", "move through time"),
-    ("Double click", "show the whole log"),
-    ("Shift+drag on the timeline", "set the range that is played over and over"),
-    ("Click a parameter or a feature", "select it in all panels"),
+    ("Ctrl+scroll", "zoom the time axis of all plots (timeline: scroll without Ctrl)"),
+    ("Middle drag", "pan in time"),
+    ("Double-click", "zoom out to the whole log"),
+    ("Shift+drag on the timeline", "set the loop range"),
+    ("Click a parameter or a feature", "select in all panels"),
 ];
 
 /// Keys that work everywhere.
 const EVERYWHERE: [(&str, &str); 3] = [
-    ("Tab, Shift+Tab", "the next or previous button, tab or plot; Enter or Space presses it"),
-    ("Ctrl and +, − or 0", "everything larger, smaller, or as it was"),
-    ("Ctrl+P, then a number", "go to a time, a frame, a feature"),
+    ("Tab, Shift+Tab", "focus the next or previous control; Enter or Space activates it"),
+    ("Ctrl and +, − or 0", "zoom in, zoom out, reset zoom"),
+    ("Ctrl+P, then a number", "go to a time or frame, select a feature"),
 ];
 
 /// Draws the list while it is open.
@@ -39,7 +39,7 @@ pub(super) fn ui(ui: &Ui, theme: &Theme, open: &mut bool) {
                 ui.add_space(24.0);
             }
         });
-        for (title, rows) in [("Everywhere", &EVERYWHERE[..]), ("With the pointer over a plot", &POINTER[..])] {
+        for (title, rows) in [("Keyboard", &EVERYWHERE[..]), ("Pointer on a plot or the timeline", &POINTER[..])] {
             ui.separator();
             ui.label(RichText::new(title).color(theme.text_weak));
             Grid::new(title).spacing(vec2(16.0, 4.0)).show(ui, |ui| {

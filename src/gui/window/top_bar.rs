@@ -18,7 +18,7 @@ pub(super) fn ui(ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_
         action_button(ui, "Fork…", Action::Dialog(Dialog::Fork), room, actions);
         ui.separator();
         ui.label(RichText::new(log_name(ctx.recording)).color(ctx.theme.text_strong));
-        ui.label(RichText::new(format!("rig {}", ctx.recording.rig.name)).color(ctx.theme.text_weak));
+        ui.label(RichText::new(format!("rig: {}", ctx.recording.rig.name)).color(ctx.theme.text_weak));
         ui.separator();
         state.legend.ui(ui, ctx);
         ui.with_layout(UiLayout::right_to_left(Align::Center), |ui| {

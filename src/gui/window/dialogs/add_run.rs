@@ -8,13 +8,13 @@ use crate::session::{Command, RunSpec};
 
 /// Name of a parameterization on the command line, and its description.
 const CHOICES: [(&str, &str); 7] = [
-    ("auto", "the minimal form in the chart that suits the mechanism"),
-    ("minimal", "the minimal form as printed"),
-    ("minimal-swapped", "the minimal form with the end block swapped"),
-    ("classical", "base, links and camera, with redundant directions"),
-    ("poe", "the chart-free product of exponentials"),
-    ("static", "the rigid camera of the rig"),
-    ("cluster", "the gimbal camera and the rigid one in one window"),
+    ("auto", "minimal, switched away from singularities"),
+    ("minimal", "minimal, as in the paper"),
+    ("minimal-swapped", "minimal, end block swapped"),
+    ("classical", "base, links and end effector, with redundant directions"),
+    ("poe", "product of exponentials, without singularities"),
+    ("static", "static camera of the rig, rigid extrinsics"),
+    ("cluster", "gimbal camera and static camera in one window"),
 ];
 
 /// State of the dialog.
@@ -73,7 +73,7 @@ impl AddRunDialog {
     /// Draws the dialog and pushes the command that adds the run. Returns whether it stays open.
     pub(super) fn ui(&mut self, ui: &Ui, ctx: &mut PanelContext<'_>) -> bool {
         let theme = *ctx.theme;
-        let title = "Add a run over the same log and the same tracks";
+        let title = "Add a run on the same log and tracks";
         let modal = Modal { name: "add run", title, width: 430.0 };
         let contents = modal.ui(ui, &theme, |ui| {
             ui.add_space(4.0);
@@ -111,20 +111,22 @@ impl AddRunDialog {
             ui.checkbox(&mut self.encoder, "Encoder readings");
             ui.end_row();
             ui.label("Estimate");
-            ui.checkbox(&mut self.calibrate, "Static calibration");
+            ui.checkbox(&mut self.calibrate, "Calibration parameters");
             ui.end_row();
             ui.label("");
-            ui.add_enabled_ui(self.calibrate, |ui| ui.checkbox(&mut self.timeshift, "Offsets of the clocks"));
+            ui.add_enabled_ui(self.calibrate, |ui| {
+                ui.checkbox(&mut self.timeshift, "Time offsets of cameras and encoders")
+            });
             ui.end_row();
-            ui.label("Linearize");
-            ui.checkbox(&mut self.first_estimates, "At first estimates")
-                .on_hover_text("Without, priors come to claim what nobody can measure");
+            ui.label("Linearization");
+            ui.checkbox(&mut self.first_estimates, "First-estimate Jacobians (FEJ)")
+                .on_hover_text("Off: the prior gains spurious information about unobservable directions");
             ui.end_row();
             let name = ui.label("Keyframes in the window");
             ui.add(egui::DragValue::new(&mut self.window).range(4..=30)).labelled_by(name.id);
             ui.end_row();
             let name = ui.label("Name");
-            let edit = TextEdit::singleline(&mut self.name).hint_text("as above").desired_width(260.0);
+            let edit = TextEdit::singleline(&mut self.name).hint_text("automatic").desired_width(260.0);
             ui.add(edit).labelled_by(name.id);
             ui.end_row();
         });

@@ -8,7 +8,7 @@ use crate::gui::units::seconds;
 use crate::session::{Command, FORK_PARAMETERIZATIONS, ForkChanges, RunSpec};
 
 /// First entry of the list: no other parameterization.
-const AS_BEFORE: &str = "as before";
+const AS_BEFORE: &str = "unchanged";
 
 /// State of the dialog.
 #[derive(Debug)]
@@ -101,7 +101,7 @@ impl ForkDialog {
             let asked = parsed.and_then(|changes| Ok((changes, self.label()?)));
             ui.add_space(6.0);
             match &asked {
-                Ok(_) if written.is_empty() => ui.label(RichText::new("nothing is changed").color(theme.text_weak)),
+                Ok(_) if written.is_empty() => ui.label(RichText::new("No changes").color(theme.text_weak)),
                 Ok(_) => ui.label(RichText::new(&written).monospace().color(theme.text_weak)),
                 Err(problem) => ui.add(egui::Label::new(RichText::new(problem).color(theme.error)).wrap()),
             };
@@ -130,29 +130,29 @@ impl ForkDialog {
             let parameter = selected.0.map_or_else(|| "yaw.alpha".to_owned(), |parameter| ctx.names().name(parameter));
             let feature = selected.1.map_or_else(|| "12 15".to_owned(), |id| id.0.to_string());
             let value = format!("{parameter}=1deg");
-            let camera = second_camera(ctx).unwrap_or_else(|| "of a cluster, one of its two".to_owned());
+            let camera = second_camera(ctx).unwrap_or_else(|| "cluster runs only: one of the two cameras".to_owned());
             for (label, text, hint) in [
                 ("Freeze parameters", &mut self.frozen, &parameter),
                 ("Set parameters", &mut self.values, &value),
                 ("Drop features", &mut self.dropped, &feature),
-                ("Leave out camera", &mut self.without, &camera),
-                ("Name", &mut self.name, &"as it is changed".to_owned()),
+                ("Exclude camera", &mut self.without, &camera),
+                ("Name", &mut self.name, &"automatic".to_owned()),
             ] {
                 let name = ui.label(label);
                 ui.add(TextEdit::singleline(text).hint_text(hint).desired_width(260.0)).labelled_by(name.id);
                 ui.end_row();
             }
-            ui.label("From here on use");
+            ui.label("Use from the cursor on");
             ui.checkbox(&mut self.encoder, "Encoder readings");
             ui.end_row();
-            let name = ui.label("Noise on joint angles");
+            let name = ui.label("Noise added to joint angles, σ");
             ui.add(DragValue::new(&mut self.joint_noise_deg).range(0.0..=45.0).speed(0.05).suffix("°"))
                 .labelled_by(name.id);
             ui.end_row();
             for (label, factor) in [
-                ("Inertial noise", &mut self.imu_noise),
-                ("Pixel noise", &mut self.pixel_noise),
-                ("Encoder noise", &mut self.encoder_noise),
+                ("Assumed IMU noise", &mut self.imu_noise),
+                ("Assumed pixel noise", &mut self.pixel_noise),
+                ("Assumed encoder noise", &mut self.encoder_noise),
             ] {
                 let name = ui.label(label);
                 let drag = DragValue::new(factor).range(0.001..=1000.0).speed(0.02).prefix("× ");

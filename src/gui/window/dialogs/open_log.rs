@@ -76,9 +76,10 @@ impl OpenLogDialog {
 
     /// Draws the dialog. Returns the chosen path, and whether the dialog stays open.
     pub(super) fn ui(&mut self, ui: &Ui, theme: &Theme) -> (Option<PathBuf>, bool) {
-        let modal = Modal { name: "open log", title: "Open a flight log or a saved session", width: 560.0 };
+        let modal =
+            Modal { name: "open log", title: "Open flight log (.mcap) or session (.session.json)", width: 560.0 };
         modal.ui(ui, theme, |ui| {
-            ui.label(RichText::new("Either can also be dropped onto the window").color(theme.text_weak));
+            ui.label(RichText::new("Files can also be dropped onto the window").color(theme.text_weak));
             ui.add_space(4.0);
             let chosen = self.path_field.ui(ui, theme, true, 300.0);
             ui.add_space(4.0);

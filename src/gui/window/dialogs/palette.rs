@@ -37,7 +37,7 @@ impl CommandPalette {
         let modal = Modal { name: "command palette", title: "", width };
         let (choice, stays_open) = modal.ui(ui, &theme, |ui| {
             let moved = moves(ui);
-            let hint = "Type a command, a time (12.5), a frame, a feature, a parameter";
+            let hint = "Command, time (12.5), frame, feature or parameter";
             // It gets the focus before it is drawn, so that no typed letter is lost.
             let id = ui.unique_id().with("command");
             ui.memory_mut(|memory| memory.request_focus(id));
@@ -55,7 +55,7 @@ impl CommandPalette {
                 Some(Move::Enter) | None => self.chosen.min(last),
             };
             if items.is_empty() {
-                ui.label(RichText::new("Nothing is called so").color(theme.text_weak));
+                ui.label(RichText::new("No match").color(theme.text_weak));
             }
             let clicked = list_ui(ui, ctx, &items, self.chosen, self.chosen != before || edit.changed());
             let entered = matches!(moved, Some(Move::Enter)).then_some(self.chosen);

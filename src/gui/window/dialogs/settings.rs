@@ -30,7 +30,7 @@ impl SettingsDialog {
             ui.add_space(4.0);
             fields_ui(ui, settings, layouts);
             ui.add_space(4.0);
-            ui.label(RichText::new("They hold at once and are kept for the next start").color(theme.text_weak));
+            ui.label(RichText::new("Applied immediately and saved for the next start").color(theme.text_weak));
             ui.add_space(6.0);
             self.buttons_ui(ui, settings);
         });
@@ -62,7 +62,7 @@ impl SettingsDialog {
             if let Some(other) = other.cloned() {
                 *settings = other;
             }
-            if ui.button("As delivered").clicked() {
+            if ui.button("Restore defaults").clicked() {
                 *settings = Settings { theme: settings.theme, ..Settings::default() };
             }
         });
@@ -81,16 +81,16 @@ fn fields_ui<'a>(ui: &mut Ui, settings: &mut Settings, layouts: impl Iterator<It
         });
         shown.response.labelled_by(name.id);
         ui.end_row();
-        let name = ui.label("Size of everything");
+        let name = ui.label("Scale");
         let drag = DragValue::new(&mut settings.scale).range(SCALES).speed(0.01).max_decimals(2).suffix("×");
-        ui.add(drag).labelled_by(name.id).on_hover_text("Ctrl and +, − or 0 do the same");
+        ui.add(drag).labelled_by(name.id).on_hover_text("Scale of the user interface (Ctrl and +, − or 0)");
         ui.end_row();
-        let name = ui.label("Memory of a recording");
+        let name = ui.label("Recording memory");
         ui.add(DragValue::new(&mut settings.memory_mib).range(MEMORY_MIB).speed(4.0).suffix(" MiB"))
             .labelled_by(name.id)
-            .on_hover_text("What does not fit is kept in outline and taken again when you go there");
+            .on_hover_text("Budget for steps and snapshots; over it older steps are summary only and recomputed when the cursor moves there");
         ui.end_row();
-        let name = ui.label("Layout at the start");
+        let name = ui.label("Initial layout");
         let combo = ComboBox::from_id_salt("layout").width(200.0).selected_text(&settings.layout);
         let shown = combo.show_ui(ui, |ui| {
             for layout in Preset::ALL.map(Preset::name).into_iter().chain(layouts) {
@@ -99,7 +99,7 @@ fn fields_ui<'a>(ui: &mut Ui, settings: &mut Settings, layouts: impl Iterator<It
         });
         shown.response.labelled_by(name.id);
         ui.end_row();
-        let name = ui.label("Speed at the start");
+        let name = ui.label("Initial playback speed");
         let text = |speed: f64| format!("{speed}×");
         let combo = ComboBox::from_id_salt("speed at the start").width(200.0).selected_text(text(settings.speed));
         let shown = combo.show_ui(ui, |ui| {
