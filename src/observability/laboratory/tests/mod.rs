@@ -1,4 +1,4 @@
-//! The expected tables of docs/mathematics.md, suggested excitation, and chains moved along null directions.
+//! The tables of docs/mathematics.md, sections 7 and 9, suggested excitation, and chains moved along null directions.
 
 mod excitation;
 mod expected_table;
