@@ -143,7 +143,7 @@ fn unpack(packed: File, packed_bytes: u64, path: &Path, limits: &LogLimits) -> R
     let mut plain = tempfile::tempfile().map_err(|source| LogError::Io {
         action: "create a temporary file to unpack the log",
         source,
-        path: std::env::temp_dir(),
+        path: path.to_owned(),
     })?;
     let allowed = limits.unpacked_bytes(packed_bytes);
     let mut buffer = vec![0; UNPACK_BYTES];
@@ -168,9 +168,9 @@ fn unpack(packed: File, packed_bytes: u64, path: &Path, limits: &LogLimits) -> R
             return Err(LogError::Limit { exceeded, path: path.to_owned() });
         }
         plain.write_all(&buffer[..count]).map_err(|source| LogError::Io {
-            action: "write the unpacked log",
+            action: "write the temporary file of the unpacked log",
             source,
-            path: std::env::temp_dir(),
+            path: path.to_owned(),
         })?;
     }
     Ok(plain)

@@ -92,6 +92,7 @@ impl std::fmt::Display for ImageProblem {
     }
 }
 
+#[expect(clippy::needless_pass_by_value, reason = "for map_err")]
 fn unreadable(problem: impl ToString) -> ImageProblem {
     ImageProblem::Unreadable(problem.to_string())
 }
