@@ -5,7 +5,7 @@ use std::fmt;
 use nalgebra::Matrix4;
 use serde::Serialize;
 
-use super::summary::{difference, log_name};
+use super::summary::{difference, in_range, log_name};
 use crate::calibration::{
     CalibrationOutcome, ExtrinsicsReport, PixelReport, Statistics, chain_distance, transform_distance,
 };
@@ -313,16 +313,16 @@ fn chain_parameters(run: &CalibrationRun, outcome: &CalibrationOutcome) -> Vec<P
         .enumerate()
         .map(|(place, parameter)| {
             let ground_truth = ground_truth.as_ref().map(|values| values[place]);
+            let dimension = parameter.parameter.dimension();
             ParameterReport {
                 name: names.name(parameter.parameter),
-                dimension: parameter.parameter.dimension(),
-                initial: parameter.initial,
-                last: parameter.value,
+                dimension,
+                initial: in_range(dimension, parameter.initial),
+                last: in_range(dimension, parameter.value),
                 sigma: parameter.sigma,
                 prior_sigma: Some(parameter.prior_sigma),
-                ground_truth,
-                error: ground_truth
-                    .map(|ground_truth| difference(parameter.parameter.dimension(), parameter.value, ground_truth)),
+                ground_truth: ground_truth.map(|ground_truth| in_range(dimension, ground_truth)),
+                error: ground_truth.map(|ground_truth| difference(dimension, parameter.value, ground_truth)),
             }
         })
         .collect()

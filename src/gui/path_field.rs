@@ -100,7 +100,7 @@ impl PathField {
                 }
             }
             if entries.len() > shown.len() {
-                let text = format!("and {} more", entries.len() - shown.len());
+                let text = format!("{} more", entries.len() - shown.len());
                 ui.label(RichText::new(text).small().color(theme.text_weak));
             }
         });

@@ -29,7 +29,7 @@ impl BreakpointsPanel {
                 self.breakpoint_ui(ui, ctx, number, breakpoint);
             }
             if breakpoints.list().is_empty() {
-                let text = "No breakpoints yet: type a condition, or press B for one at this frame";
+                let text = "No breakpoints: type a condition, or press B to set one at this frame";
                 ui.add(egui::Label::new(RichText::new(text).color(ctx.theme.text_weak)).wrap());
             }
             help_ui(ui, ctx);
@@ -76,13 +76,13 @@ impl BreakpointsPanel {
             let mut enabled = breakpoint.enabled;
             let name = RichText::new(text).monospace().color(theme.text_strong);
             let check = ui.checkbox(&mut enabled, name);
-            if check.on_hover_text("Whether the cursor stops there").changed() {
+            if check.on_hover_text("Stop the cursor where the condition becomes true").changed() {
                 ctx.commands.push(Command::EnableBreakpoint { number, enabled });
             }
             for (run, record) in ctx.recording.runs.iter().enumerate() {
                 let hits = counted(breakpoint.hit_count(record), "hit");
                 let text = RichText::new(format!("{} {hits}", record.spec.label)).small().color(theme.run(run).color);
-                ui.label(text).on_hover_text("How often the condition has become true in this run so far");
+                ui.label(text).on_hover_text("Number of times that the condition became true in this run");
             }
             let small = |ui: &mut Ui, sign: &str, name: String| {
                 let button = ui.add(Button::new(sign).small());
@@ -107,7 +107,7 @@ fn buttons_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>) {
         let any = ctx.playback.breakpoints.list().iter().any(|breakpoint| breakpoint.enabled);
         for (text, keys, forward) in [("Previous hit", "Shift+N", false), ("Next hit", "N", true)] {
             let button = ui.add_enabled(any, Button::new(text));
-            if button.on_hover_text(format!("Run there ({keys})")).clicked() {
+            if button.on_hover_text(format!("Run to this hit ({keys})")).clicked() {
                 ctx.commands.push(Command::RunToBreakpoint { forward });
             }
         }
@@ -120,9 +120,9 @@ fn buttons_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>) {
 /// The list of quantities for conditions.
 fn help_ui(ui: &mut Ui, ctx: &PanelContext<'_>) {
     let theme = ctx.theme;
-    let header = CollapsingHeader::new("What can be asked for").id_salt("quantities");
+    let header = CollapsingHeader::new("Quantities and syntax").id_salt("quantities");
     header.show(ui, |ui| {
-        let text = "Compare with < <= > >= == !=, join with and, or, not; numbers may have deg, mrad, mm, cm, px, %. \
+        let text = "Comparisons: < <= > >= == !=. Operators: and, or, not. Units of numbers: deg, mrad, mm, cm, px, %. \
                     A breakpoint is hit where its condition becomes true.";
         ui.add(egui::Label::new(RichText::new(text).color(theme.text_weak)).wrap());
         Grid::new("quantities").num_columns(2).show(ui, |ui| {

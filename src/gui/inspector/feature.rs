@@ -13,38 +13,41 @@ pub(super) fn ui(ui: &mut Ui, ctx: &PanelContext<'_>, step: &StepRecord, id: Fea
     let track = step.tracks.features.iter().find(|feature| feature.id == id);
     let report = step.report.features.iter().find(|feature| feature.id == id);
     if track.is_none() && report.is_none() {
-        ui.label(RichText::new("Not seen in this frame").color(theme.text_weak));
+        ui.label(RichText::new("No observation in this frame").color(theme.text_weak));
         return;
     }
     let mut rows = Vec::new();
     if let Some(track) = track {
-        rows.push(("pixel".to_owned(), vec![format!("{}, {}", fixed(track.uv_px.x, 2), fixed(track.uv_px.y, 2))]));
-        rows.push(("age".to_owned(), vec![format!("{} images", track.age)]));
+        rows.push((
+            "position, px".to_owned(),
+            vec![format!("{}, {}", fixed(track.uv_px.x, 2), fixed(track.uv_px.y, 2))],
+        ));
+        rows.push(("track age, images".to_owned(), vec![track.age.to_string()]));
         if let Some(previous) = track.previous_uv_px {
             let flow = track.uv_px - previous;
-            rows.push(("moved".to_owned(), vec![format!("{} px", fixed(flow.norm(), 2))]));
+            rows.push(("flow since the previous image, px".to_owned(), vec![fixed(flow.norm(), 2)]));
         }
     }
     if let Some(report) = report {
-        rows.push(("anchor".to_owned(), vec![format!("frame {}", report.anchor_frame_index)]));
+        rows.push(("anchor frame".to_owned(), vec![report.anchor_frame_index.to_string()]));
         let depth = 1.0 / report.inverse_depth_per_m;
-        rows.push(("depth".to_owned(), vec![format!("{} m", fixed(depth, 2))]));
-        let state = if report.rejected { "rejected as an outlier" } else { "in the solve" };
+        rows.push(("depth in the anchor frame, m".to_owned(), vec![fixed(depth, 2)]));
+        let state = if report.rejected { "rejected as an outlier" } else { "used in the solve" };
         rows.push(("state".to_owned(), vec![state.to_owned()]));
     } else {
-        rows.push(("state".to_owned(), vec!["not in the solve".to_owned()]));
+        rows.push(("state".to_owned(), vec!["not used in the solve".to_owned()]));
     }
     if let Some(landmark) = step.report.landmarks.iter().find(|landmark| landmark.id == id) {
         let position = landmark.position_m;
         let values = [position.x, position.y, position.z].map(|value| fixed(value, 3));
-        rows.push(("position, m".to_owned(), vec![values.join(", ")]));
+        rows.push(("landmark position, m".to_owned(), vec![values.join(", ")]));
     }
     rows_ui(ui, theme, "feature", &rows);
     let Some(report) = report else { return };
     let length = |residual: Option<nalgebra::Vector2<f64>>| {
         residual.map_or_else(|| "–".to_owned(), |residual| fixed(residual.norm(), 2))
     };
-    let headings = ["frame", "u px", "v px", "before px", "after px", "χ²", "weight"];
+    let headings = ["frame", "u, px", "v, px", "residual before, px", "after, px", "χ²", "robust weight"];
     let lines = report.observations.iter().map(|one| {
         vec![
             one.frame_index.to_string(),

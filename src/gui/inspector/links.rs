@@ -55,7 +55,7 @@ impl Links {
         let selected = ctx.selection.feature;
         let names =
             links.iter().take(SHOWN).map(|(id, norm)| (format!("feature {}", id.0), *norm, selected == Some(*id)));
-        if let Some(index) = links_ui(ui, ctx, "residuals that follow it most", names) {
+        if let Some(index) = links_ui(ui, ctx, "features with the largest derivatives", names) {
             let id = links[index].0;
             ctx.selection.feature = (selected != Some(id)).then_some(id);
         }
@@ -82,7 +82,7 @@ impl Links {
         let (selected, names) = (ctx.selection.parameter, ctx.names());
         let shown = links.iter().take(SHOWN);
         let shown = shown.map(|(parameter, norm)| (names.name(*parameter), *norm, selected == Some(*parameter)));
-        if let Some(index) = links_ui(ui, ctx, "parameters that they follow most", shown) {
+        if let Some(index) = links_ui(ui, ctx, "parameters with the largest derivatives", shown) {
             let parameter = links[index].0;
             ctx.selection.parameter = (selected != Some(parameter)).then_some(parameter);
         }
@@ -102,7 +102,10 @@ fn links_ui(
         for (index, (name, norm, selected)) in links.enumerate() {
             let text = RichText::new(format!("{name} ({})", significant(f64::from(norm)))).small();
             let link = ui.selectable_label(selected, text);
-            if link.on_hover_text("Norm of the block in σ by 10° or 3 cm; a click selects it everywhere").clicked() {
+            if link
+                .on_hover_text("Norm of the Jacobian block in σ per 10° or 3 cm; click: select in all panels")
+                .clicked()
+            {
                 clicked = Some(index);
             }
         }
@@ -129,8 +132,9 @@ pub(super) fn block_ui(
     };
     let shown = Shown::of(parameter.dimension());
     let unit = shown.unit.trim();
-    let heads = ["frame", "residual u", "residual v", "χ²", &format!("∂u px/{unit}"), &format!("∂v px/{unit}")]
-        .map(str::to_owned);
+    let heads =
+        ["frame", "residual u, px", "residual v, px", "χ²", &format!("∂u, px/{unit}"), &format!("∂v, px/{unit}")]
+            .map(str::to_owned);
     let lines = rows.frames.iter().enumerate().filter_map(|(place, frame)| {
         let seen = feature.observations.iter().find(|seen| seen.frame_index == frame.0)?;
         let residual = seen.residual_after_px.map_or([f64::NAN; 2], |residual| [residual.x, residual.y]);

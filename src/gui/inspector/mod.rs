@@ -60,7 +60,7 @@ impl InspectorPanel {
             });
         }
         if let (Some(id), Some(parameter)) = (ctx.selection.feature, ctx.selection.parameter) {
-            let title = format!("Block feature {} by {}", id.0, ctx.names().name(parameter));
+            let title = format!("Block: feature {} × {}", id.0, ctx.names().name(parameter));
             section_ui(ui, ctx.theme, &title, |ui| links::block_ui(ui, ctx, run, step, id, parameter));
         }
         let title = format!("Frame {}", step.report.frame_index);

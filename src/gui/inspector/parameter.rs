@@ -16,7 +16,7 @@ pub(super) fn ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, step: &St
     ui.add(egui::Label::new(RichText::new(meaning_of(parameter, &ctx.recording.rig)).color(theme.text)).wrap());
     let calibration = &step.report.calibration;
     let Some(index) = calibration.parameters.iter().position(|known| *known == parameter) else {
-        let text = format!("Run {} has no such parameter here", run.spec.label);
+        let text = format!("Not a parameter of run {} in this step", run.spec.label);
         ui.label(RichText::new(text).color(theme.text_weak));
         return;
     };
@@ -34,19 +34,19 @@ pub(super) fn ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, step: &St
     let begin =
         begin.and_then(|first| first.values.get(first.parameters.iter().position(|known| *known == parameter)?));
     if let Some(begin) = begin {
-        rows.push(("at the start".to_owned(), vec![shown.value(*begin, sigma)]));
-        rows.push(("moved by".to_owned(), vec![shown.value(value - begin, sigma)]));
+        rows.push(("initial value".to_owned(), vec![shown.value(*begin, sigma)]));
+        rows.push(("change since the start".to_owned(), vec![shown.value(value - begin, sigma)]));
     }
     let ground_truth =
         true_values(ctx.recording, run, ctx.cursor_ns).and_then(|ground_truth| ground_truth.get(&parameter).copied());
     if let Some(ground_truth) = ground_truth {
-        rows.push(("truth".to_owned(), vec![shown.value(ground_truth, sigma)]));
+        rows.push(("ground truth".to_owned(), vec![shown.value(ground_truth, sigma)]));
         let times = fixed((value - ground_truth).abs() / sigma, 1);
         rows.push(("error".to_owned(), vec![format!("{} ({times}σ)", shown.value(value - ground_truth, sigma))]));
     }
     let state = parameter_states(step.rank.as_ref())
         .map_or(ParameterState::Waiting, |known| known.get(&parameter).copied().unwrap_or(ParameterState::Informed));
     let state = if state == ParameterState::Informed { "informed" } else { state.tag() };
-    rows.push(("in this window".to_owned(), vec![state.to_owned()]));
+    rows.push(("observability in this window".to_owned(), vec![state.to_owned()]));
     rows_ui(ui, theme, "parameter", &rows);
 }

@@ -4,7 +4,7 @@ use egui::{RichText, Sense, Ui, vec2};
 
 use super::{rows_ui, table_ui};
 use crate::estimator::StepReport;
-use crate::geometry::so3;
+use crate::geometry::{so3, wrap_angle};
 use crate::gui::PanelContext;
 use crate::gui::events::{look_of, name_of, paint_mark};
 use crate::gui::theme::Theme;
@@ -17,15 +17,15 @@ pub(super) fn frame_ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, ste
     let delay_ms = (step.log_time_ns - report.stamp_ns) as f64 * 1e-6;
     let keyframe = if report.keyframe { ", keyframe" } else { "" };
     let mut rows = vec![
-        ("time".to_owned(), vec![format!("{} s, logged {delay_ms:+.1} ms", seconds(report.stamp_ns))]),
+        ("stamp, s".to_owned(), vec![format!("{}, log time {delay_ms:+.1} ms", seconds(report.stamp_ns))]),
         ("phase".to_owned(), vec![format!("{}{keyframe}", report.phase.name())]),
     ];
     if report.restarts > 0 {
         rows.push(("restarts".to_owned(), vec![report.restarts.to_string()]));
     }
     let statistics = &step.tracks.statistics;
-    let tracks = format!("{} tracked, {} new", statistics.tracked, statistics.detected);
-    rows.push(("features".to_owned(), vec![tracks]));
+    let tracks = format!("{} continued, {} new", statistics.tracked, statistics.detected);
+    rows.push(("feature tracks".to_owned(), vec![tracks]));
     rows_ui(ui, ctx.theme, "step", &rows);
     let Some(newest) = report.newest() else { return };
 
@@ -39,7 +39,7 @@ pub(super) fn frame_ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, ste
         (String::new(), ["x", "y", "z"].map(str::to_owned).to_vec()),
         three("position, m", [p.x, p.y, p.z], 3),
         three("velocity, m/s", [v.x, v.y, v.z], 3),
-        three("roll pitch yaw, °", [roll, pitch, yaw].map(f64::to_degrees), 2),
+        three("roll, pitch, yaw, °", [roll, pitch, yaw].map(f64::to_degrees), 2),
         three("accelerometer bias, m/s²", [a.x, a.y, a.z], 4),
         three("gyroscope bias, °/s", [g.x, g.y, g.z].map(f64::to_degrees), 4),
     ];
@@ -61,17 +61,17 @@ pub(super) fn frame_ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, ste
         let lines = newest.joint_angles_rad.iter().enumerate().map(|(number, angle)| {
             let encoder = encoders.and_then(|angles| angles.get(number)).copied().unwrap_or(f64::NAN);
             let name = joints.get(number).map_or_else(|| format!("joint {}", number + 1), |joint| joint.name.clone());
-            let shown = |angle: f64| fixed(angle.to_degrees(), 2);
+            let shown = |angle: f64| fixed(wrap_angle(angle).to_degrees(), 2);
             vec![name, shown(*angle), shown(encoder), shown(angle - encoder)]
         });
-        table_ui(ui, ctx.theme, "joints", &["joint", "estimate °", "encoder °", "difference °"], lines);
+        table_ui(ui, ctx.theme, "joints", &["joint", "estimate, °", "encoder, °", "difference, °"], lines);
     }
 }
 
 /// The events of the step with the values that caused them.
 pub(super) fn events_ui(ui: &mut Ui, theme: &Theme, report: &StepReport) {
     if report.events.is_empty() && report.warnings.is_empty() {
-        ui.label(RichText::new("Nothing happened").color(theme.text_weak));
+        ui.label(RichText::new("No events in this step").color(theme.text_weak));
     }
     for event in &report.events {
         ui.horizontal(|ui| {
@@ -85,7 +85,7 @@ pub(super) fn events_ui(ui: &mut Ui, theme: &Theme, report: &StepReport) {
             };
             if !event_values.is_empty() {
                 let text = RichText::new(event_values).monospace().color(theme.text_strong);
-                ui.label(text).on_hover_text("measured value / threshold");
+                ui.label(text).on_hover_text("Measured value / threshold; the unit is that of the message");
             }
             let text = RichText::new(&event.message).color(theme.text);
             ui.add(egui::Label::new(text).truncate().sense(Sense::hover())).on_hover_text(format!(
@@ -113,10 +113,10 @@ pub(super) fn iterations_ui(ui: &mut Ui, theme: &Theme, report: &StepReport) {
             significant(iteration.cost_after),
             significant(iteration.step_norm),
             significant(iteration.damping),
-            if iteration.accepted { "taken" } else { "refused" }.to_owned(),
+            if iteration.accepted { "accepted" } else { "rejected" }.to_owned(),
         ]
     });
-    table_ui(ui, theme, "iterations", &["", "cost before", "after", "step", "damping", ""], lines);
+    table_ui(ui, theme, "iterations", &["", "cost before", "cost after", "step norm", "damping λ", ""], lines);
 }
 
 /// Stage times in milliseconds.
@@ -130,7 +130,7 @@ pub(super) fn times_ui(ui: &mut Ui, theme: &Theme, report: &StepReport) {
         row("report", times.report_ms),
         row("marginalize", times.marginalize_ms),
         row("observability", times.observability_ms),
-        row("whole step", times.step_ms),
+        row("total", times.step_ms),
     ];
     rows_ui(ui, theme, "times", &rows);
 }

@@ -7,7 +7,7 @@ use super::model::{JacobianModel, cameras, name_of, unit_text};
 use super::numbers_table::numbers_ui;
 use crate::estimator::{ColumnBlock, ColumnId, FeatureRows, FrameId, JacobianFactor};
 use crate::frontend::FeatureId;
-use crate::geometry::Dimension;
+use crate::geometry::{Dimension, wrap_angle};
 use crate::gui::PanelContext;
 use crate::gui::units::{Shown, fixed, significant};
 use crate::session::{RunRecord, StepRecord};
@@ -17,7 +17,7 @@ pub(super) fn headline(model: &JacobianModel, row: usize, column: usize) -> Stri
     let (of_row, block) = (&model.jacobian.rows[row], &model.jacobian.columns[column]);
     let norm = model.norm(row, column);
     let size = format!("{} × {}", of_row.height, block.len);
-    let name = format!("{} by {}", name_of(&of_row.factor), model.columns.strips[column].name);
+    let name = format!("{} × {}", name_of(&of_row.factor), model.columns.strips[column].name);
     if norm == 0.0 {
         return format!("{name}: zero ({size})");
     }
@@ -65,7 +65,11 @@ fn strongest_columns(model: &JacobianModel, row: usize) -> String {
     });
     let shown = shown.collect::<Vec<_>>().join(", ");
     let name = name_of(&of_row.factor);
-    if shown.is_empty() { format!("{name}: no parameter") } else { format!("{name}, strongest: {shown}") }
+    if shown.is_empty() {
+        format!("{name}: no calibration parameter")
+    } else {
+        format!("{name}, largest block norms: {shown}")
+    }
 }
 
 /// The rows with the largest norms in a column.
@@ -81,7 +85,7 @@ fn strongest_rows(model: &JacobianModel, column: usize) -> String {
         format!("{} ({})", name_of(&model.jacobian.rows[*row].factor), significant(f64::from(*norm)))
     });
     let shown = shown.collect::<Vec<_>>().join(", ");
-    format!("{}: in {count} rows of blocks, strongest: {shown}", model.columns.strips[column].name)
+    format!("{}: non-zero in {count} factors, largest block norms: {shown}", model.columns.strips[column].name)
 }
 
 fn block_ui(
@@ -104,8 +108,10 @@ fn block_ui(
             let kind = factor.kind();
             if let Some(summary) = step.report.residuals.iter().find(|summary| summary.factor == kind) {
                 let (before, after) = (significant(summary.chi2_before), significant(summary.chi2_after));
-                let text =
-                    format!("all residuals of this kind: χ² {before} before, {after} after, {} rows", summary.count);
+                let text = format!(
+                    "All factors of this kind: χ² {before} before the solve, {after} after, {} residuals",
+                    summary.count
+                );
                 ui.label(RichText::new(text).color(ctx.theme.text));
             }
             if let JacobianFactor::Encoder(frame) = factor {
@@ -130,7 +136,8 @@ fn observations_ui(
     let block = &model.jacobian.columns[column];
     let Some(feature) = step.report.features.iter().find(|feature| feature.id == id) else { return };
     let parts = scalar_columns(block);
-    let mut heads = ["frame", "u px", "v px", "residual u", "residual v", "weight"].map(str::to_owned).to_vec();
+    let mut heads =
+        ["frame", "u, px", "v, px", "residual u, px", "residual v, px", "robust weight"].map(str::to_owned).to_vec();
     heads.extend(parts.iter().flat_map(|(name, _)| [format!("∂u{name}"), format!("∂v{name}")]));
     let lines = rows.frames.iter().enumerate().filter_map(|(place, frame)| {
         let seen = feature.observations.iter().find(|seen| seen.frame_index == frame.0)?;
@@ -172,14 +179,19 @@ fn readings_ui(
         };
         vec![
             (joint + 1).to_string(),
-            fixed(reading.to_degrees(), 3),
-            fixed(angle.to_degrees(), 3),
+            fixed(wrap_angle(*reading).to_degrees(), 3),
+            fixed(wrap_angle(*angle).to_degrees(), 3),
             fixed(sigma.to_degrees(), 3),
-            fixed(crate::geometry::wrap_angle(angle - reading) / sigma, 2),
+            fixed(wrap_angle(angle - reading) / sigma, 2),
             slope,
         ]
     });
-    numbers_ui(ui, ctx, &["joint", "reading °", "estimate °", "σ °", "residual σ", "∂ σ/°"].map(str::to_owned), lines);
+    numbers_ui(
+        ui,
+        ctx,
+        &["joint", "reading, °", "estimate, °", "σ, °", "residual, σ", "∂, σ/°"].map(str::to_owned),
+        lines,
+    );
 }
 
 /// The scalar columns of a block: the label of each, and its shown units per stored unit.

@@ -43,7 +43,7 @@ pub(super) fn block_ui(
     };
     let rows = known.rows.as_ref().and_then(|rows| rows.iter().find(|rows| rows.factor == factor));
     let Some(FactorRows { rows, .. }) = rows else {
-        note(ui, "Only the norms of this block were kept");
+        note(ui, "Only the norms of this block are stored");
         return;
     };
     let block = &model.jacobian.columns[column];
@@ -60,10 +60,14 @@ pub(super) fn block_ui(
         order.truncate(MAX_ROWS);
     }
     let squared = rows.column(residuals).norm_squared();
-    let shown = if count > order.len() { format!(", the strongest {} shown", order.len()) } else { String::new() };
-    let text = format!("its {} residuals: χ² {}; {count} touch this block{shown}", rows.nrows(), significant(squared));
+    let shown = if count > order.len() { format!(", the largest {} shown", order.len()) } else { String::new() };
+    let text = format!(
+        "{} residuals of this factor: χ² {}; {count} non-zero rows in this block{shown}",
+        rows.nrows(),
+        significant(squared)
+    );
     ui.label(RichText::new(text).color(ctx.theme.text));
-    let mut heads = vec!["row".to_owned(), "residual σ".to_owned()];
+    let mut heads = vec!["row".to_owned(), "residual, σ".to_owned()];
     heads.extend(parts.iter().map(|(name, _)| name.clone()));
     let lines = order.iter().map(|row| {
         let mut cells = vec![(row + 1).to_string(), fixed(rows[(*row, residuals)], 3)];
@@ -78,10 +82,10 @@ pub(super) fn block_ui(
 fn scalar_columns(block: &ColumnBlock) -> Vec<(String, f64)> {
     let shown = |name: &str, dimension: Dimension| {
         let shown = Shown::of(dimension);
-        (format!("∂{name} σ/{}", shown.unit.trim()), shown.factor)
+        (format!("∂{name}, σ/{}", shown.unit.trim()), shown.factor)
     };
     let three =
-        |names: [&str; 3], unit: &'static str, factor: f64| names.map(|name| (format!("∂{name} σ/{unit}"), factor));
+        |names: [&str; 3], unit: &'static str, factor: f64| names.map(|name| (format!("∂{name}, σ/{unit}"), factor));
     let degrees = 1_f64.to_degrees();
     match block.id {
         ColumnId::Calibration(parameter) => vec![shown("", parameter.dimension())],

@@ -115,9 +115,9 @@ pub(in crate::gui) fn name_of(factor: &JacobianFactor) -> String {
         JacobianFactor::Feature(id) => format!("feature {}", id.0),
         JacobianFactor::Imu { from, to } => format!("IMU {from} to {to}"),
         JacobianFactor::Encoder(frame) => format!("encoders {frame}"),
-        JacobianFactor::ZeroVelocity => "standstill".to_owned(),
+        JacobianFactor::ZeroVelocity => "zero velocity".to_owned(),
         JacobianFactor::CalibrationPrior => "rig prior".to_owned(),
-        JacobianFactor::MarginalizationPrior => "marginal prior".to_owned(),
+        JacobianFactor::MarginalizationPrior => "marginalization prior".to_owned(),
     }
 }
 
@@ -150,7 +150,7 @@ fn rows_of(jacobian: &StepJacobian) -> Axis {
 
 /// Calibration columns are wide, so that they can be read one by one; states of the frames are narrow.
 fn columns_of(jacobian: &StepJacobian, names: &ParameterNames) -> Axis {
-    let groups = ["calibration", "joints", "poses", "speeds, biases", "depth"].map(str::to_owned);
+    let groups = ["calibration", "joints", "poses", "velocities, biases", "depth"].map(str::to_owned);
     let strips = jacobian.columns.iter().map(|block| {
         let (group, weight) = match block.id {
             ColumnId::Calibration(_) => (0, 3.0),
@@ -171,7 +171,7 @@ pub(in crate::gui) fn column_name(id: ColumnId, names: &ParameterNames) -> Strin
         ColumnId::Joints(frame) => format!("joints {frame}"),
         ColumnId::Pose(frame) => format!("pose {frame}"),
         ColumnId::VelocityBias(frame) => format!("velocity-bias {frame}"),
-        ColumnId::InverseDepth => "own depth".to_owned(),
+        ColumnId::InverseDepth => "inverse depth".to_owned(),
     }
 }
 
@@ -182,11 +182,11 @@ pub(super) fn unit_text(id: ColumnId) -> &'static str {
             Dimension::Angle => "σ per 10°",
             Dimension::Length => "σ per 3 cm",
             Dimension::Time => "σ per 20 ms",
-            Dimension::Ratio => "σ per tenth",
+            Dimension::Ratio => "σ per 0.1",
         },
         ColumnId::Joints(_) => "σ per 10°",
         ColumnId::Pose(_) => "σ per 10° and 3 cm",
         ColumnId::VelocityBias(_) => "σ per 0.1 m/s, 1 °/s and 0.1 m/s²",
-        ColumnId::InverseDepth => "σ per tenth of the inverse depth",
+        ColumnId::InverseDepth => "σ per 10 % of the inverse depth",
     }
 }

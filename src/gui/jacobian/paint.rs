@@ -177,7 +177,7 @@ pub(super) fn legend(ui: &Ui, theme: &Theme, rect: Rect, model: &JacobianModel) 
         let drawn = painter.text(at, Align2::LEFT_CENTER, text, label_font(), theme.text_weak);
         drawn.right() + 5.0
     };
-    at.x = text(at, format!("norm of a block, 1e{low:.0}"));
+    at.x = text(at, format!("block norm, 1e{low:.0}"));
     let bar = Rect::from_min_size(pos2(at.x, rect.center().y - 6.0), vec2(WIDTH, 12.0));
     for step in 0..STEPS {
         let [left, right] = [step, step + 1].map(|edge| bar.left() + WIDTH * f32::from(edge) / f32::from(STEPS));
@@ -185,5 +185,5 @@ pub(super) fn legend(ui: &Ui, theme: &Theme, rect: Rect, model: &JacobianModel) 
         painter.rect_filled(Rect::from_min_max(pos2(left, bar.top()), pos2(right, bar.bottom())), 0.0, color);
     }
     at.x = bar.right() + 5.0;
-    text(at, format!("1e{high:.0} σ by 10°, 3 cm, 0.1 m/s, 1 °/s, 0.1 m/s², a tenth of the inverse depth"));
+    text(at, format!("1e{high:.0} σ per 10°, 3 cm, 0.1 m/s, 1 °/s, 0.1 m/s², 10 % of the inverse depth"));
 }

@@ -70,7 +70,7 @@ fn axes_are_whole_and_in_order() {
     assert_eq!(model.rows.strips.len(), model.jacobian.rows.len());
     assert_eq!(model.columns.strips.len(), model.jacobian.columns.len());
     let names: Vec<&str> = model.columns.groups.iter().map(|group| group.name.as_str()).collect();
-    assert_eq!(names, ["calibration", "joints", "poses", "speeds, biases", "depth"]);
+    assert_eq!(names, ["calibration", "joints", "poses", "velocities, biases", "depth"]);
 }
 
 #[test]
@@ -84,12 +84,12 @@ fn a_click_selects_feature_and_parameter_and_shows_their_values() {
     click(&mut harness, at);
     let selection = &harness.state().1;
     assert_eq!((selection.feature, selection.parameter), (Some(id), Some(parameter("L2.alpha"))));
-    assert!(harness.query_by_label_contains(&format!("feature {} by roll.alpha: ", id.0)).is_some());
+    assert!(harness.query_by_label_contains(&format!("feature {} × roll.alpha: ", id.0)).is_some());
     assert!(harness.query_by_label("∂u, px/°").is_some());
     // A parameter selected in another panel is shown alone, with the rows of the largest norms.
     harness.state_mut().1 = Selection { parameter: Some(parameter("L1.alpha")), ..Selection::default() };
     harness.run_steps(2);
-    assert!(harness.query_by_label_contains("yaw.alpha: in ").is_some());
+    assert!(harness.query_by_label_contains("yaw.alpha: non-zero in ").is_some());
     // An IMU factor with respect to a pose is selected only here.
     let is_imu = |factor: &JacobianFactor| matches!(factor, JacobianFactor::Imu { .. });
     let row = model.jacobian.rows.iter().position(|row| is_imu(&row.factor)).unwrap();
@@ -99,7 +99,7 @@ fn a_click_selects_feature_and_parameter_and_shows_their_values() {
     let selection = &harness.state().1;
     assert_eq!((selection.feature, selection.parameter), (None, None));
     assert!(harness.query_by_label_contains("15 × 6").is_some());
-    assert!(harness.query_by_label_contains("all residuals of this kind").is_some());
+    assert!(harness.query_by_label_contains("All factors of this kind").is_some());
 }
 
 #[test]

@@ -68,17 +68,18 @@ impl Choices {
             self.knowledge_ui(ui);
         });
         ui.horizontal_wrapped(|ui| {
-            ui.label("Forms");
+            ui.label("Parameterizations");
             for (chosen, parameterization) in self.parameterizations.iter_mut().zip(PARAMETERIZATIONS) {
                 ui.checkbox(chosen, parameterization.name());
             }
-            ui.checkbox(&mut self.joint_offsets, "Joint offsets").on_hover_text("Whether they are among the columns");
+            ui.checkbox(&mut self.joint_offsets, "Joint offsets")
+                .on_hover_text("Whether the joint offsets are estimated, as calibration columns");
         });
         let names = self.mechanism(ctx).map(|mechanism| mechanism.joints).unwrap_or_default();
         self.frozen.resize(names.len(), false);
         if !names.is_empty() {
             ui.horizontal_wrapped(|ui| {
-                ui.label("Hold");
+                ui.label("Fixed joints");
                 for (frozen, joint) in self.frozen.iter_mut().zip(&names) {
                     ui.checkbox(frozen, &joint.name);
                 }
@@ -115,7 +116,7 @@ impl Choices {
         let words = |joints: Joints| match joints {
             Joints::Known => "known",
             Joints::Encoder => "encoders",
-            Joints::Unknown => "none",
+            Joints::Unknown => "no encoders",
         };
         let combo = ComboBox::from_id_salt("joint angles").width(80.0).selected_text(words(self.joints));
         let shown = combo.show_ui(ui, |ui| {
@@ -132,7 +133,7 @@ impl Choices {
         let words = |poses: Poses| match poses {
             Poses::Known => "known",
             Poses::Inertial => "from the IMU",
-            Poses::InertialBiasKnown => "IMU, biases known",
+            Poses::InertialBiasKnown => "from the IMU, biases known",
         };
         let combo = ComboBox::from_id_salt("poses").width(110.0).selected_text(words(self.poses));
         let shown = combo.show_ui(ui, |ui| {
@@ -163,9 +164,9 @@ impl Choices {
             })
             .collect();
         if parameterizations.is_empty() {
-            return Err("Choose a form".to_owned());
+            return Err("No parameterization selected".to_owned());
         }
-        let mechanism = self.mechanism(ctx).ok_or("The rig has no mount for this run's camera")?;
+        let mechanism = self.mechanism(ctx).ok_or("No extrinsics of this run's camera in the rig")?;
         let mut setup = LaboratorySetup::new(mechanism);
         if self.mechanism.is_none() {
             let run = ctx.recording.runs.get(ctx.selection.run);

@@ -88,10 +88,10 @@ fn assumptions(report: &LaboratoryReport) -> String {
     let frozen = if report.frozen_joints.is_empty() {
         String::new()
     } else {
-        format!(", {} held", report.frozen_joints.join(", "))
+        format!(", {} fixed", report.frozen_joints.join(", "))
     };
     format!(
-        "{}: {}{frozen}. Joint angles {}, poses {}; {} frames {} s apart, {} landmarks, {} px; columns by 10° and 3 cm.",
+        "{}: {}{frozen}. Joint angles {}, poses {}; {} frames every {} s, {} landmarks, pixel σ {} px; column scale 10° and 3 cm",
         report.motion,
         report.motion_meaning,
         report.joint_angles,

@@ -61,7 +61,7 @@ fn experiments_have_the_results_of_the_command() {
         harness.get_by_role_and_label(Role::CheckBox, parameterization).click();
         harness.run_steps(3);
     }
-    assert!(harness.query_by_label("Choose a form").is_some());
+    assert!(harness.query_by_label("No parameterization selected").is_some());
 }
 
 #[test]
