@@ -3,6 +3,7 @@ use std::path::PathBuf;
 use thiserror::Error;
 
 use super::LimitExceeded;
+use super::text::printable;
 use crate::sensors::UnknownCamera;
 
 /// Why a log or a rig could not be read or written; every message names the problem, its place and the remedy, the path
@@ -161,5 +162,5 @@ fn list(items: &[String]) -> String {
     if items.is_empty() {
         return "none".into();
     }
-    items.iter().map(|item| format!("'{item}'")).collect::<Vec<_>>().join(", ")
+    items.iter().map(|item| format!("'{}'", printable(item))).collect::<Vec<_>>().join(", ")
 }

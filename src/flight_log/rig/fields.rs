@@ -6,7 +6,7 @@ use nalgebra::Matrix4;
 use serde_json::Value;
 
 use super::super::LogError;
-use super::super::text::{nearest_name, shortened};
+use super::super::text::{nearest_name, printable, shortened};
 use crate::geometry::RigidTransform;
 
 /// A rotation block may be this far from orthonormal (largest entry of `RᵀR − I`); Kalibr writes 1e-16, hand-written files
@@ -108,6 +108,11 @@ impl<'a> Field<'a> {
         let text = self.value.and_then(Value::as_str).ok_or_else(|| self.unexpected(expected))?;
         if text.len() > MAX_TEXT_BYTES {
             return Err(self.error(format!("{} bytes of text, expected at most {MAX_TEXT_BYTES}", text.len())));
+        }
+        if text != printable(text) {
+            return Err(
+                self.error(format!("holds '{}', expected text without control characters", shortened(text, 60)))
+            );
         }
         Ok(text)
     }

@@ -159,6 +159,8 @@ fn an_unknown_key_is_named_with_the_nearest_known_one() {
     let hostile = RIG.replace("rig_version: 1", "rig_version: 1\n\"\\e[2J\": 1");
     let message = parse(&hostile).unwrap_err();
     assert!(message.starts_with(r"\u{1b}[2J: unknown key"), "{message}");
+    let message = parse(&RIG.replace("joint: yaw", "joint: \"yaw\\e[2J\\n\"")).unwrap_err();
+    assert!(message.starts_with(r"gimbal.links[0].joint: holds 'yaw\u{1b}[2J\n', expected text without"), "{message}");
 }
 
 #[test]
