@@ -195,7 +195,7 @@ fn syntax_problem(error: &Error, text: &str) -> String {
     let line = list.or(mapping).map_or(line, |unclosed| unclosed.min(line));
     let found = text.lines().nth(line as usize - 1).unwrap_or_default();
     let field = field_at(text, line as usize - 1).map(|field| format!(", in {field}")).unwrap_or_default();
-    let what = match error {
+    let what = match error.without_snippet() {
         Error::DuplicateMappingKey { .. } => "the key is there already, expected each key once",
         Error::MultipleDocuments { .. } => "a second document ('---'), expected one",
         Error::Eof { .. } => "the text ends here, expected a mapping with rig_version, imu0, cam0, …",

@@ -126,9 +126,9 @@ fn an_unknown_key_is_named_with_the_nearest_known_one() {
         (
             "timeshift_cam_imu: 0.0",
             "timeshift_cam_imuu: 0.05",
-            "cam0.timeshift_cam_imuu: unknown key, the nearest known key is 'timeshift_cam_imu', line 15",
+            "cam0.timeshift_cam_imuu: unknown key, the nearest known key is 'timeshift_cam_imu', line 16",
         ),
-        ("limits: [", "limit: [", "gimbal.links[0].limit: unknown key, the nearest known key is 'limits', line 22"),
+        ("limits: [", "limit: [", "gimbal.links[0].limit: unknown key, the nearest known key is 'limits', line 24"),
         ("rig_version: 1", "rig_version: 1\nnames: x", "names: unknown key, the nearest known key is 'name', line 2"),
         ("{rostopic: /truth}", "{rostopic: /truth, topic: /t}", "ground_truth.topic: unknown key"),
         ("rotation_bound: 0.0087", "rotation_bound: 0.0087, turn_bound: 1", "gimbal.prior.turn_bound: unknown key"),
@@ -285,7 +285,7 @@ fn keys_of_kalibr_without_a_use_are_listed() {
     fs::write(folder.path().join("imu.yaml"), format!("{IMU}{imu}")).unwrap();
     let log = FlightLog::open(&path).unwrap();
     let (_, unused) = Rig::for_log_with_unused_keys(&log, Some(&chain)).unwrap();
-    assert_eq!(unused, ["cam0.cam_overlaps", "cam0.T_cn_cnm1", "T_i_b", "model", "time_offset"]);
+    assert_eq!(unused, ["cam0.T_cn_cnm1", "cam0.cam_overlaps", "T_i_b", "model", "time_offset"]);
     // An unknown key of the IMU's own file is named with that file.
     fs::write(folder.path().join("imu.yaml"), format!("{IMU}updaterate: 1\n")).unwrap();
     let message = Rig::for_log(&log, Some(&chain)).unwrap_err().to_string();

@@ -11,10 +11,10 @@ use crate::flight_log::nearest_name;
 /// Limit of nested parentheses and signs; deeper nesting is an error, because it could overflow the stack.
 const MAX_DEPTH: usize = 60;
 /// Limit of the characters of a condition.
-const MAX_CHARACTERS: usize = 4000;
-/// Limit of the words and signs of a condition: a chain of `and` is a tree as deep as it has terms, and evaluating it takes
-/// that much stack.
-const MAX_TOKENS: usize = 1000;
+const MAX_CHARACTERS: usize = 1_000_000;
+/// Limit of the operators that join terms: a chain of `and` is a tree as deep as it is long, and evaluating it takes that
+/// much stack.
+const MAX_OPERATORS: usize = 500;
 /// Unit suffixes and their factors to radians, metres, seconds or pixels.
 const UNITS: [(&str, f64); 11] = [
     ("deg", std::f64::consts::PI / 180.0),
@@ -43,6 +43,7 @@ struct Parser<'a> {
     tokens: Vec<(Token, Span)>,
     at: usize,
     depth: usize,
+    operators: usize,
 }
 
 type Result<T> = std::result::Result<T, ConditionProblem>;
@@ -55,24 +56,18 @@ impl FromStr for Condition {
     }
 }
 
+/// A problem of a text that is too long to be shown.
+fn too_long(text: &str, message: String) -> ConditionProblem {
+    let text = format!("{}…", text.chars().take(60).collect::<String>());
+    ConditionProblem { text, column: 1, message: format!("the condition is too long: {message}") }
+}
+
 /// Parses a condition.
 fn parse(text: &str) -> Result<Condition> {
-    let too_long = |message: String| {
-        let text = format!("{}…", text.chars().take(60).collect::<String>());
-        ConditionProblem { text, column: 1, message }
-    };
     if text.len() > MAX_CHARACTERS {
-        let count = text.chars().count();
-        if count > MAX_CHARACTERS {
-            return Err(too_long(format!("a condition of {count} characters, expected at most {MAX_CHARACTERS}")));
-        }
+        return Err(too_long(text, format!("{} bytes, expected at most {MAX_CHARACTERS}", text.len())));
     }
-    let tokens = tokens(text)?;
-    if tokens.len() > MAX_TOKENS {
-        let count = tokens.len();
-        return Err(too_long(format!("a condition of {count} words and signs, expected at most {MAX_TOKENS}")));
-    }
-    let mut parser = Parser { text, tokens, at: 0, depth: 0 };
+    let mut parser = Parser { text, tokens: tokens(text)?, at: 0, depth: 0, operators: 0 };
     if matches!(parser.peek(), Token::End) {
         return Err(parser.problem_at(0, "a condition is missing, such as 'rank < 18 or features < 40'"));
     }
@@ -140,6 +135,15 @@ impl Parser<'_> {
         }
     }
 
+    fn count_operator(&mut self) -> Result<()> {
+        self.operators += 1;
+        if self.operators > MAX_OPERATORS {
+            let message = format!("more than {MAX_OPERATORS} operators such as 'and', 'or' and '+'");
+            return Err(too_long(self.text, message));
+        }
+        Ok(())
+    }
+
     fn alternatives(&mut self) -> Result<Expression> {
         self.joined(&Token::Or, Self::conjunction, Predicate::Or)
     }
@@ -157,6 +161,7 @@ impl Parser<'_> {
         let begin = self.begin();
         let mut left = expression(self)?;
         while self.take(operator) {
+            self.count_operator()?;
             let right_begin = self.begin();
             let right = expression(self)?;
             let (first, second) = (self.predicate(left, begin)?, self.predicate(right, right_begin)?);
@@ -210,6 +215,7 @@ impl Parser<'_> {
         let mut left = expression(self)?;
         while let Some(arithmetic) = operator(self.peek()) {
             self.at += 1;
+            self.count_operator()?;
             let right_begin = self.begin();
             let right = expression(self)?;
             let (first, second) = (self.number(left, begin)?, self.number(right, right_begin)?);
