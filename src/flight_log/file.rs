@@ -82,7 +82,10 @@ impl LogFile {
         let mut done = 0;
         while done < buffer.len() {
             match read_at(&self.file, &mut buffer[done..], (start + done) as u64) {
-                Ok(0) => return Err(self.shrunk(start + done)),
+                Ok(0) => {
+                    let end = self.file.metadata().map_or(start + done, |metadata| metadata.len() as usize);
+                    return Err(self.shrunk(end));
+                }
                 Ok(count) => done += count,
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
                 Err(error) => return Err(format!("byte {} cannot be read ({error})", start + done)),
