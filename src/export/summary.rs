@@ -348,7 +348,7 @@ fn calibration(recording: &Recording, run: &RunRecord) -> CalibrationSummary {
         .map(|(index, parameter)| {
             let parameter = *parameter;
             let dimension = parameter.dimension();
-            let value = last.values[index];
+            let value = parameter.principal_value(last.values[index]);
             let ground_truth = value_of(&true_values, parameter);
             ParameterSummary {
                 name: names.name(parameter),

@@ -8,3 +8,9 @@ pub fn wrap_angle(angle_rad: f64) -> f64 {
     let revolutions = ((angle_rad - PI) / TAU).ceil();
     angle_rad - revolutions * TAU
 }
+
+/// Returns the equivalent angle in (−π, π], in radians: the form in which angles are shown and written.
+pub fn principal_angle(angle_rad: f64) -> f64 {
+    let revolutions = ((angle_rad - PI) / TAU).ceil();
+    angle_rad - revolutions * TAU
+}

@@ -15,7 +15,7 @@ mod tangent;
 #[cfg(test)]
 mod tests;
 
-pub use angle::wrap_angle;
+pub use angle::{principal_angle, wrap_angle};
 pub use dimension::Dimension;
 pub use median::median;
 pub use rigid_transform::RigidTransform;

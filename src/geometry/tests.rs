@@ -131,6 +131,18 @@ fn rows_are_split_by_a_column_space_even_with_dependent_columns() {
 }
 
 #[test]
+fn principal_angles_lie_above_minus_pi_and_up_to_pi() {
+    use super::principal_angle;
+    use std::f64::consts::PI;
+    for angle in [0.0, 0.1, -2.5, 3.13, PI, -PI + 1e-15] {
+        assert_eq!(principal_angle(angle), angle, "{angle}");
+    }
+    assert_eq!(principal_angle(-PI), PI);
+    assert!((principal_angle((-267.7_f64).to_radians()).to_degrees() - 92.3).abs() < 1e-12);
+    assert!((principal_angle(7.0 * PI) - PI).abs() < 1e-14);
+}
+
+#[test]
 fn wrap_angle_maps_to_one_revolution() {
     use super::wrap_angle;
     use std::f64::consts::{PI, TAU};

@@ -1,6 +1,6 @@
 //! Identity of a calibration parameter and its name.
 
-use crate::geometry::Dimension;
+use crate::geometry::{Dimension, principal_angle};
 
 use super::Singularity;
 
@@ -88,6 +88,14 @@ impl ParameterId {
     /// Physical dimension, which gives unit and scale.
     pub const fn dimension(self) -> Dimension {
         self.quantity.dimension()
+    }
+
+    /// A value as it is shown and written: angles of the base block and of links in (−π, π], in radians; everything
+    /// else unchanged, because components of rotation vectors have no period.
+    pub fn principal_value(self, value: f64) -> f64 {
+        let is_angle =
+            self.dimension() == Dimension::Angle && matches!(self.part, ParameterPart::Base | ParameterPart::Link(_));
+        if is_angle { principal_angle(value) } else { value }
     }
 
     /// Whether it is the offset of a joint angle.

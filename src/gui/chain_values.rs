@@ -13,7 +13,13 @@ pub(crate) type ParameterValues = BTreeMap<ParameterId, f64>;
 /// The values of a chain in a parameterization.
 pub(crate) fn parameter_values(classical: &ClassicalChain, conversion: &NearestForm) -> ParameterValues {
     let chain = conversion.of(&Chain::from_classical(classical, Parameterization::Classical));
-    chain.parameters().into_iter().zip(chain.values().iter().copied()).collect()
+    principal_values(&chain.parameters(), chain.values().as_slice())
+}
+
+/// Values by parameter, angles in (−π, π].
+pub(crate) fn principal_values(parameters: &[ParameterId], values: &[f64]) -> ParameterValues {
+    let entries = parameters.iter().zip(values);
+    entries.map(|(parameter, value)| (*parameter, parameter.principal_value(*value))).collect()
 }
 
 /// The ground-truth values in the parameterization of a run at a step; angles differ from the estimate by less than
@@ -24,7 +30,7 @@ pub(crate) fn true_values(recording: &Recording, run: &RunRecord, stamp_ns: i64)
     let calibration = &run.step_at(stamp_ns).or_else(|| run.steps.first())?.report.calibration;
     let ground_truth = recording.ground_truth_rig.as_ref()?;
     let mut values: ParameterValues = run.values_in(ground_truth, &recording.rig, calibration)?.into_iter().collect();
-    let estimate = calibration.parameters.iter().copied().zip(calibration.values.iter().copied()).collect();
+    let estimate = principal_values(&calibration.parameters, &calibration.values);
     unwrap_towards(&mut values, &estimate);
     Some(values)
 }

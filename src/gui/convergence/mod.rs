@@ -49,11 +49,11 @@ impl ConvergencePanel {
 
         let shown = ctx.selection.run.min(self.histories.len().saturating_sub(1));
         let Some(history) = self.histories.get(shown) else {
-            empty_ui(ui, "No run yet");
+            empty_ui(ui, "No runs");
             return;
         };
         if history.stamps_ns.is_empty() {
-            empty_ui(ui, "Waiting for the first step");
+            empty_ui(ui, "No steps yet");
             return;
         }
         // Only the parameters of the parameterization at the cursor: after a switch the old ones are no longer
@@ -67,7 +67,7 @@ impl ConvergencePanel {
             .collect();
         if parameters.is_empty() {
             let label = &ctx.recording.runs[shown].spec.label;
-            empty_ui(ui, &format!("Run {label} estimates no calibration"));
+            empty_ui(ui, &format!("Calibration fixed in run {label}"));
             return;
         }
         parameters.sort_by_key(|parameter| names::part_of(*parameter));

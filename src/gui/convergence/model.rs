@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::estimator::rigid_columns;
 use crate::gimbal::{NearestForm, ParameterId, Parameterization};
-use crate::gui::chain_values::{ParameterValues, parameter_values, unwrap_towards};
+use crate::gui::chain_values::{ParameterValues, parameter_values, principal_values, unwrap_towards};
 use crate::gui::follow::Follower;
 use crate::observability::RankReport;
 use crate::sensors::Rig;
@@ -33,10 +33,10 @@ impl ParameterState {
     pub(crate) fn tag(self) -> &'static str {
         match self {
             Self::Informed => "",
-            Self::Fixed => "held",
+            Self::Fixed => "fixed",
             Self::Weak => "weak",
             Self::Unobservable => "unobservable",
-            Self::Waiting => "waiting",
+            Self::Waiting => "initializing",
         }
     }
 }
@@ -90,8 +90,7 @@ impl CalibrationHistory {
         let row = self.stamps_ns.len();
         self.stamps_ns.push(step.report.stamp_ns);
         let known = parameter_states(step.rank.as_ref());
-        let mut values: ParameterValues =
-            calibration.parameters.iter().copied().zip(calibration.values.iter().copied()).collect();
+        let mut values = principal_values(&calibration.parameters, &calibration.values);
         unwrap_towards(&mut values, &self.last);
         for (index, parameter) in calibration.parameters.iter().enumerate() {
             let known_place = self.parameters.iter().position(|(known, _)| known == parameter);

@@ -45,31 +45,33 @@ fn joint_name(number: usize, rig: &Rig) -> Option<&str> {
 pub(crate) fn meaning_of(parameter: ParameterId, rig: &Rig) -> String {
     let part = part_of(parameter);
     let kind = match parameter.quantity {
-        Quantity::Theta => "constant added to the encoder's angle",
-        Quantity::D => "shift along the joint's axis",
-        Quantity::A => "shift along the link",
-        Quantity::Alpha => "twist about the link, towards the next axis",
-        Quantity::Beta => "turn about the camera's y axis at the end of the chain",
-        Quantity::Y => "shift along the camera's y axis at the end of the chain",
+        Quantity::Theta => "joint offset θ₀, added to the encoder angle",
+        Quantity::D => "DH offset d along the joint axis",
+        Quantity::A => "DH link length a",
+        Quantity::Alpha => "DH twist α about the link",
+        Quantity::Beta => "rotation β about the camera's y axis",
+        Quantity::Y => "translation along the camera's y axis",
         Quantity::Rx => "rotation about x",
         Quantity::Ry => "rotation about y",
         Quantity::Rz => "rotation about z",
         Quantity::Tx => "translation along x",
         Quantity::Ty => "translation along y",
         Quantity::Tz => "translation along z",
-        Quantity::Wx | Quantity::Wy => "small rotation of the chart-free form",
-        Quantity::Vx | Quantity::Vy => "small translation of the chart-free form",
-        Quantity::Timeshift => "calibration parameter",
+        Quantity::Wx | Quantity::Wy => "local rotation of the product of exponentials",
+        Quantity::Vx | Quantity::Vy => "local translation of the product of exponentials",
+        Quantity::Timeshift => "time offset, t_imu = t_sensor + timeshift",
     };
     let place = match part {
+        _ if parameter == ParameterId::ENCODER_TIMESHIFT => "joint encoders".to_owned(),
+        _ if parameter.quantity == Quantity::Timeshift => "camera".to_owned(),
         ChainPart::Base => "IMU to gimbal base".to_owned(),
         ChainPart::Link(number) => match joint_name(number, rig) {
             Some(joint) => format!("link {number}, joint {joint}"),
             None => format!("link {number}"),
         },
-        ChainPart::End if parameter.part == ParameterPart::EffectorFromCamera => "effector to camera".to_owned(),
+        ChainPart::End if parameter.part == ParameterPart::EffectorFromCamera => "end effector to camera".to_owned(),
         ChainPart::End => "end of the chain".to_owned(),
-        ChainPart::Rigid => format!("IMU to the rigid {}", rig.parameter_names().part(parameter.part)),
+        ChainPart::Rigid => format!("IMU to rigid {}", rig.parameter_names().part(parameter.part)),
     };
     format!("{kind} ({place})")
 }
@@ -94,12 +96,9 @@ mod tests {
     #[test]
     fn meanings_name_the_joint() {
         let rig = sample_recording_of(1, &["auto"]).rig;
-        assert_eq!(
-            meaning_of(id("L2.alpha"), &rig),
-            "twist about the link, towards the next axis (link 2, joint roll)"
-        );
-        assert_eq!(meaning_of(id("L7.d"), &rig), "shift along the joint's axis (link 7)");
+        assert_eq!(meaning_of(id("L2.alpha"), &rig), "DH twist α about the link (link 2, joint roll)");
+        assert_eq!(meaning_of(id("L7.d"), &rig), "DH offset d along the joint axis (link 7)");
         assert_eq!(heading_of(part_of(id("I.rx")), &rig), "base");
-        assert_eq!(meaning_of(id("timeshift"), &rig), "calibration parameter (end of the chain)");
+        assert_eq!(meaning_of(id("timeshift"), &rig), "time offset, t_imu = t_sensor + timeshift (camera)");
     }
 }

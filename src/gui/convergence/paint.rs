@@ -66,11 +66,11 @@ pub(super) fn legend(ui: &Ui, ctx: &PanelContext<'_>, rect: Rect) {
         painter.rect_filled(place, 0.0, band);
     });
     if ctx.recording.ground_truth_rig.is_some() {
-        add_entry("truth", &|place| {
+        add_entry("ground truth", &|place| {
             paint_line(&painter, &[place.left_center(), place.right_center()], theme.ground_truth_style(), CURVE_WIDTH);
         });
     }
-    for (state, text) in MARKED.into_iter().zip(["weak: no better than the prior", "unobservable", "initializing"]) {
+    for (state, text) in MARKED.into_iter().zip(["weak: less than the prior", "unobservable", "initializing"]) {
         add_entry(text, &|place| {
             if state != ParameterState::Weak {
                 paint_hatch(&painter, place, theme.hatch);
@@ -118,9 +118,10 @@ impl<'a> PlotData<'a> {
             let (_, stamps_ns, values) = self.values(run, parameter)?;
             let row = stamps_ns.partition_point(|stamp_ns| *stamp_ns <= ctx.cursor_ns).checked_sub(1)?;
             let value = values.get(row).copied().filter(|value| value.is_finite())?;
-            let outside = if (area.low..=area.high).contains(&value) { "" } else { ", outside this axis" };
+            let outside = if (area.low..=area.high).contains(&value) { "" } else { ", outside the axis range" };
             let label = &ctx.recording.runs.get(run)?.spec.label;
-            Some(format!("{label}: {}{outside}", shown.value(value, f64::NAN)))
+            let value = shown.value(parameter.principal_value(value), f64::NAN);
+            Some(format!("{label}: {value}{outside}"))
         };
         runs.iter().filter(|run| **run != self.shown).filter_map(|run| line(*run)).collect()
     }
@@ -200,13 +201,15 @@ pub(super) fn cell_ui(
     let row = history.row_at(ctx.cursor_ns);
     let state = row.map_or(ParameterState::Waiting, |row| parameter.states[row]);
     let value = row.map(|row| (parameter.values[row], parameter.sigmas[row]));
-    title(&painter, ctx, rect, name, shown, value, state, selected);
+    let shown_value = value.map(|(value, sigma)| (id.principal_value(value), sigma));
+    title(&painter, ctx, rect, name, shown, shown_value, state, selected);
     if !state.tag().is_empty() {
         let place = plot.right_top() + vec2(-3.0, 1.0);
         boxed_text(&inner, &theme, place, Align2::RIGHT_TOP, state.tag(), state_color(&theme, state));
     }
 
-    let error = value.zip(ground_truth).map(|((value, sigma), ground_truth)| (value - ground_truth, sigma));
+    let error =
+        value.zip(ground_truth).map(|((value, sigma), ground_truth)| (id.principal_value(value - ground_truth), sigma));
     if let Some((error, sigma)) = error {
         let far = error.abs() > 3.0 * sigma;
         let place = plot.right_bottom() + vec2(-3.0, -STRIP_HEIGHT - 1.0);
@@ -214,7 +217,7 @@ pub(super) fn cell_ui(
         boxed_text(&inner, &theme, place, Align2::RIGHT_BOTTOM, &error_text(shown, error, sigma), color);
     }
 
-    let mut text = value
+    let mut text = shown_value
         .map_or_else(String::new, |(value, sigma)| format!("{} ± {}", shown.value(value, sigma), shown.sigma(sigma)));
     if let Some((error, sigma)) = error {
         text.push_str(", ");
@@ -239,7 +242,7 @@ fn error_text(shown: Shown, error: f64, sigma: f64) -> String {
     let times = error.abs() / sigma;
     let value = shown.value(error, sigma);
     let text = if value.starts_with('-') { value } else { format!("+{value}") };
-    if times.is_finite() { format!("{text} ({times:.1}σ) off") } else { format!("{text} off") }
+    if times.is_finite() { format!("error {text} ({times:.1}σ)") } else { format!("error {text}") }
 }
 
 /// Hatches the ranges in which the parameter is not informed; a strip at the bottom shows the state.

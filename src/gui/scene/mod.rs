@@ -136,13 +136,14 @@ impl ScenePanel {
     fn controls_ui(&mut self, ui: &mut Ui) {
         ui.horizontal_wrapped(|ui| {
             ui.selectable_value(&mut self.follow, Follow::Trajectory, "Trajectory")
-                .on_hover_text("Keep all trajectories in view");
-            ui.selectable_value(&mut self.follow, Follow::Vehicle, "Vehicle").on_hover_text("Stay with the vehicle");
-            if ui.button("Fit").on_hover_text("Back to the view that shows everything (double click)").clicked() {
+                .on_hover_text("View of all trajectories");
+            ui.selectable_value(&mut self.follow, Follow::Vehicle, "Vehicle")
+                .on_hover_text("View that follows the vehicle");
+            if ui.button("Fit").on_hover_text("Reset the view (double-click)").clicked() {
                 self.world = default_world_orbit();
                 self.close_up = None;
             }
-            if ui.button("Top").on_hover_text("Look straight down").clicked() {
+            if ui.button("Top").on_hover_text("View from above").clicked() {
                 self.world = Orbit::from_direction(Vector3::new(0.0, -0.01, 1.0));
             }
             ui.separator();
@@ -236,7 +237,7 @@ impl ScenePanel {
         let label = context.recording.runs.get(context.selection.run).map_or("", |run| run.spec.label.as_str());
         let text = match &chain.ground_truth {
             Some(_) if chain.moved => format!("Gimbal chain, {label}, moved; estimate dashed"),
-            Some(_) => format!("Gimbal chain, {label}; truth dashed"),
+            Some(_) => format!("Gimbal chain, {label}; ground truth dashed"),
             None => format!("Gimbal chain, {label}"),
         };
         let at = title.left_center() + vec2(8.0, 0.0);
@@ -255,16 +256,16 @@ fn legend_lines(views: &[RunView<'_>], theme: &super::theme::Theme) -> Vec<Legen
         .map(|view| {
             let label = &view.run.spec.label;
             let text = match (view.error_m(), view.newest(), view.run.alignment) {
-                (Some(error_m), ..) => format!("{label}, {error_m:.2} m from truth"),
+                (Some(error_m), ..) => format!("{label}, position error {error_m:.2} m"),
                 (None, None, _) => format!("{label}, initializing"),
-                (None, Some(_), None) if view.has_ground_truth() => format!("{label}, not aligned yet"),
+                (None, Some(_), None) if view.has_ground_truth() => format!("{label}, not aligned with ground truth"),
                 _ => label.clone(),
             };
             LegendLine { style: theme.run(view.number), text }
         })
         .collect();
     if views.first().is_some_and(RunView::has_ground_truth) {
-        lines.push(LegendLine { style: theme.ground_truth_style(), text: "truth".to_owned() });
+        lines.push(LegendLine { style: theme.ground_truth_style(), text: "ground truth".to_owned() });
     }
     lines
 }

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::camera::{View, round_length};
 use super::chain::{ChainModel, axis_colors};
 use super::layout::ScreenLabel;
+use crate::geometry::principal_angle;
 use crate::gui::theme::{self, RunStyle, Theme};
 
 /// Height of one line of text.
@@ -165,7 +166,11 @@ pub(super) fn chain_table(painter: &Painter, rect: Rect, theme: &Theme, chain: &
     }
     for link in &chain.rows {
         let degrees = |angle_rad: f64, decimals: usize| {
-            if angle_rad.is_finite() { format!("{:.decimals$}", angle_rad.to_degrees()) } else { "–".to_owned() }
+            if angle_rad.is_finite() {
+                format!("{:.decimals$}", principal_angle(angle_rad).to_degrees())
+            } else {
+                "–".to_owned()
+            }
         };
         let millimetres = |length_m: f64| format!("{:.1}", length_m * 1e3);
         row(
@@ -181,7 +186,7 @@ pub(super) fn chain_table(painter: &Painter, rect: Rect, theme: &Theme, chain: &
         );
     }
     if let Some((distance_m, angle_rad)) = chain.camera_error {
-        let what = if chain.moved { "camera moved by" } else { "camera off the truth:" };
+        let what = if chain.moved { "camera moved by" } else { "extrinsics error:" };
         let text = format!("{what} {:.1} mm, {:.2}°", distance_m * 1e3, angle_rad.to_degrees());
         let at = pos2(inner.left(), y + 0.5 * LINE_HEIGHT);
         painter.text(at, Align2::LEFT_CENTER, text, theme::label_font(), theme.text_strong);

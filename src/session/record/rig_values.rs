@@ -7,7 +7,7 @@ use crate::sensors::Rig;
 
 impl RunRecord {
     /// The rig's values of the run's calibration parameters in the parameterization of `estimate`, in radians, metres
-    /// and seconds. Returns `None` when the rig does not have the cameras.
+    /// and seconds; angles lie in (−π, π]. Returns `None` when the rig does not have the cameras.
     ///
     /// The classical parameterization has several equivalent values; the result has those nearest to `given`, the rig
     /// of the run's prior, because the run estimates near those.
@@ -23,6 +23,9 @@ impl RunRecord {
         }
         for (clock, key) in clocks.into_iter().filter(|(clock, _)| estimate.parameters.contains(clock)) {
             values.push((clock, rig.camera(key).ok()?.timeshift_cam_imu_s));
+        }
+        for (parameter, value) in &mut values {
+            *value = parameter.principal_value(*value);
         }
         Some(values)
     }
