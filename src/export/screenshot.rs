@@ -311,7 +311,7 @@ mod tests {
             ("scene", "Trajectory"),
             ("convergence", "±3σ"),
             ("rank", "informed rank over time"),
-            ("residuals", "reprojection RMS over time, px"),
+            ("residuals", "reprojection RMS after the solve, px"),
             ("timeline", "features"),
         ];
         for name in panel_names() {

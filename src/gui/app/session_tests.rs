@@ -122,8 +122,7 @@ fn a_classical_run_goes_on_as_minimal_from_where_its_rank_drops() {
         let name = format!("Show run {} in all panels", run.spec.label);
         assert!(harness.query_by_label(&name).is_some(), "{name}");
     }
-    let divergence_label =
-        format!("First different number of {} from {}, go there", fork.spec.label, parent.spec.label);
+    let divergence_label = format!("First bitwise difference of {} from {}", fork.spec.label, parent.spec.label);
     let time = format!("{divergence_label}: {:.3} s", step.report.stamp_ns as f64 * 1e-9);
     assert!(harness.query_by_label(&time).is_some(), "{time}");
 

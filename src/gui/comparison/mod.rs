@@ -39,12 +39,12 @@ enum View {
 
 impl View {
     const ALL: [(Self, &'static str, &'static str); 6] = [
-        (Self::All, "All", "As much as there is room for"),
-        (Self::Numbers, "Numbers", "Accuracy of all runs, and where they part"),
+        (Self::All, "All", "All views that fit into the panel"),
+        (Self::Numbers, "Numbers", "Accuracy of all runs and first divergences"),
         (Self::OverTime, "Differences", "Differences from the reference over time"),
         (Self::Images, "Images", "The image of each run"),
         (Self::Scenes, "Scenes", "The scene of each run"),
-        (Self::Directions, "Directions", "Ranks, spectra and lost directions with one order of rows"),
+        (Self::Directions, "Directions", "Ranks, spectra and lost directions with common rows"),
     ];
 }
 
@@ -73,7 +73,7 @@ impl ComparisonPanel {
     pub fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
         let runs = &ctx.recording.runs;
         if runs.is_empty() {
-            empty_ui(ui, "No run yet");
+            empty_ui(ui, "No runs");
             return;
         }
         self.read(ctx);
@@ -119,7 +119,7 @@ impl ComparisonPanel {
                     ui.selectable_value(&mut self.reference, run, label(run));
                 }
             });
-            shown.response.labelled_by(name.id).on_hover_text("The run that the others are held against");
+            shown.response.labelled_by(name.id).on_hover_text("Reference run of all differences");
             ui.separator();
             for (choice, name, hover) in View::ALL {
                 let response = ui.selectable_label(view == choice, name);
@@ -157,7 +157,7 @@ impl ComparisonPanel {
 
     fn over_time_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
         if ctx.recording.runs.len() < 2 {
-            empty_ui(ui, "One run alone differs from nothing: add one, or fork it");
+            empty_ui(ui, "Nothing to compare yet: add a run or fork this one");
         } else {
             self.over_time.ui(ui, ctx, self.reference, &self.comparisons);
         }

@@ -29,7 +29,7 @@ pub(super) fn difference_text(quantity: Quantity, apart: f64) -> String {
 pub(super) fn accuracy_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, scores: &Scores) {
     let theme = *ctx.theme;
     let runs = &ctx.recording.runs;
-    ui.label(RichText::new("Accuracy over the whole flight so far").color(theme.text_strong));
+    ui.label(RichText::new("Accuracy over all processed frames").color(theme.text_strong));
     Grid::new("accuracy").striped(true).spacing(vec2(14.0, 2.0)).show(ui, |ui| {
         ui.label("");
         ui.label("");
@@ -60,7 +60,7 @@ pub(super) fn accuracy_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, scores: &Scor
         }
     });
     if !ctx.recording.runs.iter().any(|run| run.alignment.is_some()) {
-        let text = "No errors of the trajectory: the log holds no truth, or no run has enough frames with it yet";
+        let text = "No trajectory errors: no ground truth in the log, or too few processed frames with ground truth";
         ui.label(RichText::new(text).color(theme.text_weak));
     }
 }
@@ -75,21 +75,22 @@ pub(super) fn divergences_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, reference:
         }
         let (own, other) = (&run.spec.label, &base.spec.label);
         ui.horizontal_wrapped(|ui| {
-            let text = RichText::new(format!("{own} against {other}")).strong();
+            let text = RichText::new(format!("{own} vs. {other}")).strong();
             ui.label(text.color(theme.run(number).color));
             if comparison.stamps_ns.is_empty() {
-                ui.label(RichText::new("no frame that both have").color(theme.text_weak));
+                ui.label(RichText::new("no common frames").color(theme.text_weak));
             } else if comparison.first_exact().is_none() {
-                ui.label(RichText::new("the same numbers in every frame so far").color(theme.ok));
+                ui.label(RichText::new("identical in all common frames").color(theme.ok));
             }
         });
-        for (what, first) in
-            [("First different number", comparison.first_exact()), ("First part notably", comparison.first_notable())]
-        {
+        for (what, first) in [
+            ("First bitwise difference", comparison.first_exact()),
+            ("First notable divergence", comparison.first_notable()),
+        ] {
             let Some((stamp_ns, quantity)) = first else { continue };
             ui.horizontal(|ui| {
                 ui.label(RichText::new(format!("{what}: {} at", quantity.name())).color(theme.text));
-                let name = format!("{what} of {own} from {other}, go there");
+                let name = format!("{what} of {own} from {other}");
                 time_button(ui, ctx, Some(stamp_ns), &name);
                 if let Some(frame) = run.index_at(stamp_ns).and_then(|step| run.steps.get(step)) {
                     let text = format!("frame {}", frame.report.frame_index);
@@ -107,7 +108,7 @@ pub(super) fn divergences_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, reference:
 fn table_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, number: usize, own: &str, comparison: &Comparison) {
     let theme = *ctx.theme;
     Grid::new(("partings", number)).striped(true).spacing(vec2(12.0, 2.0)).show(ui, |ui| {
-        for heading in ["", "differs from", "notable", "from", "now", "largest", "at"] {
+        for heading in ["", "first difference", "threshold", "first above it", "at cursor", "maximum", "at"] {
             ui.label(RichText::new(heading).small().color(theme.text_weak));
         }
         ui.end_row();
@@ -117,16 +118,16 @@ fn table_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, number: usize, own: &str, c
             let name = |what: &str| format!("{own}, {}: {what}", quantity.name());
             let apart = comparison.at(quantity, ctx.cursor_ns);
             ui.label(RichText::new(quantity.name()).color(theme.text));
-            time_button(ui, ctx, exact_ns, &name("first different number"));
+            time_button(ui, ctx, exact_ns, &name("first bitwise difference"));
             let tolerance = format!("≥ {}", difference_text(quantity, quantity.notable()));
             ui.label(RichText::new(tolerance).small().color(theme.text_weak));
-            time_button(ui, ctx, notable_ns, &name("first notable difference"));
+            time_button(ui, ctx, notable_ns, &name("first difference above the threshold"));
             let now = apart.map_or_else(|| "–".to_owned(), |apart| difference_text(quantity, apart));
             let is_notable = apart.is_some_and(|apart| apart >= quantity.notable());
             let color = if is_notable { theme.warn } else { theme.text_strong };
             ui.label(RichText::new(now).monospace().color(color));
             ui.label(RichText::new(difference_text(quantity, largest)).monospace().color(theme.text_strong));
-            time_button(ui, ctx, (largest > 0.0).then_some(largest_ns), &name("largest difference"));
+            time_button(ui, ctx, (largest > 0.0).then_some(largest_ns), &name("maximum difference"));
             ui.end_row();
         }
     });
@@ -141,7 +142,7 @@ fn time_button(ui: &mut Ui, ctx: &mut PanelContext<'_>, stamp_ns: Option<i64>, n
     let text = format!("{} s", seconds(stamp_ns));
     let button = ui.add(Button::new(RichText::new(&text).small().monospace()).small());
     button.widget_info(|| WidgetInfo::labeled(egui::Role::Button, true, format!("{name}: {text}")));
-    if button.on_hover_text(format!("{name}; go there")).clicked() {
+    if button.on_hover_text(format!("{name}; click: move the cursor there")).clicked() {
         ctx.commands.push(Command::Seek { stamp_ns });
     }
 }

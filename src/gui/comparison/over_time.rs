@@ -44,7 +44,7 @@ impl OverTime {
         };
         let rows: Vec<(usize, Quantity)> = DRAWN.into_iter().enumerate().filter(|(_, it)| known(*it)).collect();
         if rows.is_empty() {
-            super::empty_ui(ui, "No frame yet that two runs have estimated");
+            super::empty_ui(ui, "No common estimated frames");
             return;
         }
         let height = (ui.available_height() / rows.len() as f32 - 3.0).clamp(*HEIGHTS.start(), *HEIGHTS.end());

@@ -96,7 +96,7 @@ impl Scores {
             row("ATE mean", "m", less, None, &|score| Some(absolute(score)?.mean)),
             row("ATE median", "m", less, None, &|score| Some(absolute(score)?.median)),
             row("ATE max", "m", less, None, &|score| Some(absolute(score)?.max)),
-            row("ATE RMS of the path", "%", less, Some(2), &|score| {
+            row("ATE RMS / path length", "%", less, Some(2), &|score| {
                 let accuracy = score.accuracy.as_ref().filter(|accuracy| accuracy.length_m > 0.0)?;
                 Some(100.0 * accuracy.absolute_m.rmse / accuracy.length_m)
             }),
@@ -111,13 +111,13 @@ impl Scores {
         }
         let chain = |score: &RunScore| score.chain;
         rows.extend([
-            row("camera on IMU, mean", "mm", less, Some(2), &|score| Some(1e3 * chain(score)?.translation_m.mean)),
-            row("camera on IMU, mean", "°", less, Some(3), &|score| {
+            row("extrinsics error, mean", "mm", less, Some(2), &|score| Some(1e3 * chain(score)?.translation_m.mean)),
+            row("extrinsics error, mean", "°", less, Some(3), &|score| {
                 Some(chain(score)?.rotation_rad.mean.to_degrees())
             }),
-            row("length of the path", "m", None, Some(1), &|score| Some(score.accuracy.as_ref()?.length_m)),
+            row("path length", "m", None, Some(1), &|score| Some(score.accuracy.as_ref()?.length_m)),
             row("frames", "", None, Some(0), &|score| Some(score.count as f64)),
-            row("estimated", "", Some(false), Some(0), &|score| Some(score.estimated as f64)),
+            row("estimated frames", "", Some(false), Some(0), &|score| Some(score.estimated as f64)),
             row("initialized at", "s", less, Some(2), &|score| score.initialized_s),
             row("restarts", "", less, Some(0), &|score| Some(score.restarts as f64)),
             row("calibration columns", "", None, Some(0), &|score| Some(score.columns as f64)),

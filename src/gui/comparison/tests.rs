@@ -65,15 +65,15 @@ fn numbers_show_accuracy_and_lead_to_the_divergence() {
     assert!(harness.query_all_by_label_contains(&rms.text(0)).next().is_some());
     let (first_ns, quantity) = harness.state().panel.comparisons[1].first_notable().unwrap();
     let time = format!("{} s", crate::gui::units::seconds(first_ns));
-    let label = format!("First part notably of classical from auto, go there: {time}");
-    assert!(harness.query_by_label(&format!("First part notably: {} at", quantity.name())).is_some());
+    let label = format!("First notable divergence of classical from auto: {time}");
+    assert!(harness.query_by_label(&format!("First notable divergence: {} at", quantity.name())).is_some());
     harness.get_by_label(&label).click();
     harness.run_steps(2);
     assert_eq!(harness.state().commands, [Command::Seek { stamp_ns: first_ns }]);
     // With the reference exchanged they diverge at the same frame.
     harness.state_mut().panel.reference = 1;
     harness.run_steps(2);
-    assert!(harness.query_by_label("auto against classical").is_some());
+    assert!(harness.query_by_label("auto vs. classical").is_some());
     assert_eq!(harness.state().panel.comparisons[0].first_notable().map(|(stamp_ns, _)| stamp_ns), Some(first_ns));
     harness.get_by_label("Show run classical in all panels").click();
     harness.run_steps(2);
@@ -83,23 +83,22 @@ fn numbers_show_accuracy_and_lead_to_the_divergence() {
 #[test]
 fn a_single_run_and_an_equal_run_are_reported() {
     let mut harness = bench(&["auto"], [900.0, 700.0]);
-    assert!(harness.query_by_label("Accuracy over the whole flight so far").is_some());
+    assert!(harness.query_by_label("Accuracy over all processed frames").is_some());
     harness.get_by_label("Differences").click();
     harness.run_steps(2);
-    assert!(harness.query_by_label_contains("One run alone").is_some());
+    assert!(harness.query_by_label_contains("Nothing to compare yet").is_some());
     let mut twin = harness.state().recording.runs[0].clone();
     (twin.id, twin.spec.label) = (u64::MAX, "twin".to_owned());
     harness.state_mut().recording.runs.push(twin);
     harness.get_by_label("Numbers").click();
     harness.run_steps(3);
-    assert!(harness.query_by_label("the same numbers in every frame so far").is_some());
+    assert!(harness.query_by_label("identical in all common frames").is_some());
 }
 
 #[test]
 fn every_view_is_complete_and_differences_seek() {
     let mut harness = bench(&["auto", "classical"], [1500.0, 900.0]);
-    for label in ["Accuracy over the whole flight so far", "Difference in position over time", "classical against auto"]
-    {
+    for label in ["Accuracy over all processed frames", "Difference in position over time", "classical vs. auto"] {
         assert!(harness.query_by_label(label).is_some(), "{label} in the view of all");
     }
     assert_eq!(harness.query_all_by_label("Landmarks").count(), 2, "a scene for each run");

@@ -102,7 +102,7 @@ impl ImagePanel {
     /// Draws options, image, overlay and legend.
     pub fn ui(&mut self, ui: &mut Ui, context: &mut PanelContext<'_>) {
         let Some(run) = context.recording.runs.get(context.selection.run) else {
-            message_ui(ui, "No run to show");
+            message_ui(ui, "No runs");
             return;
         };
         self.controls_ui(ui, context.theme, context.selection.run, &run.spec.label);
@@ -132,8 +132,9 @@ impl ImagePanel {
             ui.colored_label(theme.run(run).color, run_label);
             ui.separator();
             ui.selectable_value(&mut self.side, SolveSide::Before, "Before")
-                .on_hover_text("Residuals before the solve");
-            ui.selectable_value(&mut self.side, SolveSide::After, "After").on_hover_text("Residuals after the solve");
+                .on_hover_text("Reprojection residuals before the solve of this step");
+            ui.selectable_value(&mut self.side, SolveSide::After, "After")
+                .on_hover_text("Reprojection residuals after the solve of this step");
             if ui.available_width() >= OPTIONS_WIDTH {
                 self.options_ui(ui);
             } else {
@@ -155,8 +156,8 @@ impl ImagePanel {
                 .prefix("×")
                 .text("magnification"),
         );
-        ui.checkbox(&mut self.trails, "Tails");
-        ui.checkbox(&mut self.ids, "Ids");
+        ui.checkbox(&mut self.trails, "Track trails");
+        ui.checkbox(&mut self.ids, "Feature ids");
     }
 
     fn image_ui(
@@ -195,7 +196,7 @@ impl ImagePanel {
             for (_, [now, moved]) in &slide.predictions_px {
                 paint::moved_prediction(&painter, &place, now, moved);
             }
-            let text = format!("chain moved: reprojections change by up to {} px", significant(slide.largest_px));
+            let text = format!("Chain moved: predicted features shift by up to {} px", significant(slide.largest_px));
             paint::label(&painter, area.left_top() + vec2(8.0, 8.0), Align2::LEFT_TOP, &text);
         }
         self.pick_ui(ui, &painter, &place, response, context, model);

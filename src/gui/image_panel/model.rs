@@ -127,22 +127,20 @@ impl ImageModel {
         })
     }
 
-    /// The text `frame 120 · 6.000 s · keyframe · 98 tracked, 12 new, 9 lost, 5 rejected · RMS 0.93 px before, 0.40 px
-    /// after the solve, median 0.12 px`.
+    /// The text `frame 120 · 6.000 s · keyframe · tracked 98, new 12, lost 9, rejected 5 · reprojection RMS 0.93 → 0.40
+    /// px, median 0.12 px`.
     pub(super) fn caption(&self) -> String {
         let mut parts = vec![format!("frame {}", self.frame_index), format!("{:.3} s", seconds_from_ns(self.stamp_ns))];
         if self.keyframe {
             parts.push("keyframe".to_owned());
         }
         let FrontEndStatistics { tracked, detected, lost, rejected, .. } = self.statistics;
-        parts.push(format!("{tracked} tracked, {detected} new, {lost} lost, {} rejected", rejected + self.rejected));
+        parts.push(format!("tracked {tracked}, new {detected}, lost {lost}, rejected {}", rejected + self.rejected));
         parts.push(match self.phase {
             Phase::Initializing => self.phase.name().to_owned(),
             Phase::Tracking => {
                 let Self { rms_before_px, rms_after_px, median_after_px, .. } = self;
-                format!(
-                    "RMS {rms_before_px:.2} px before, {rms_after_px:.2} px after the solve, median {median_after_px:.2} px"
-                )
+                format!("reprojection RMS {rms_before_px:.2} → {rms_after_px:.2} px, median {median_after_px:.2} px")
             }
         });
         parts.join(" · ")
@@ -153,22 +151,22 @@ impl ImageModel {
 pub(super) fn description(mark: &FeatureMark) -> String {
     let mut lines = vec![
         format!("feature {}", mark.id.0),
-        format!("age {} frames", mark.age),
-        format!("at ({:.2}, {:.2}) px", mark.measured_px.x, mark.measured_px.y),
+        format!("track age: {} frames", mark.age),
+        format!("observation (u, v): ({:.2}, {:.2}) px", mark.measured_px.x, mark.measured_px.y),
     ];
     let Some(solved) = &mark.solved else {
-        lines.push("not in the solve".to_owned());
+        lines.push("not used in the solve".to_owned());
         return lines.join("\n");
     };
     let residual = |vector: Option<Vector2<f64>>| {
         vector.map_or_else(|| "–".to_owned(), |v| format!("{:.2} px ({:+.2}, {:+.2})", v.norm(), v.x, v.y))
     };
-    lines.push(format!("residual before {}", residual(solved.residual_before_px)));
-    lines.push(format!("residual after {}", residual(solved.residual_after_px)));
-    lines.push(format!("χ² {:.2}, weight {:.2}", solved.chi2, solved.robust_weight));
-    lines.push(format!("depth {:.2} m from {} frames", solved.depth_m, solved.observation_count));
+    lines.push(format!("residual before the solve: {}", residual(solved.residual_before_px)));
+    lines.push(format!("residual after the solve: {}", residual(solved.residual_after_px)));
+    lines.push(format!("χ² {:.2}, robust weight {:.2}", solved.chi2, solved.robust_weight));
+    lines.push(format!("depth: {:.2} m, {} observations", solved.depth_m, solved.observation_count));
     if solved.rejected {
-        lines.push("rejected as an outlier".to_owned());
+        lines.push("outlier, rejected".to_owned());
     }
     lines.join("\n")
 }

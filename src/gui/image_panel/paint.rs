@@ -175,9 +175,9 @@ pub(super) fn legend(painter: &Painter, rect: Rect, theme: &Theme, options: &Mar
     pen.gap();
     if moved {
         let stroke = Stroke::new(1.5, theme.runs[3]);
-        pen.symbol("with the moved chain", |painter, at| upright_cross(painter, at, 5.0, stroke));
+        pen.symbol("predicted, moved chain", |painter, at| upright_cross(painter, at, 5.0, stroke));
     }
-    pen.symbol("in the solve", |painter, at| {
+    pen.symbol("used in the solve", |painter, at| {
         painter.circle_stroke(at, MARKER_RADIUS, Stroke::new(1.5, theme.text));
     });
     pen.symbol("tracked only", |painter, at| {

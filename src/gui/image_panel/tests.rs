@@ -35,8 +35,8 @@ fn the_caption_is_that_of_the_step_at_or_before_the_cursor() {
     let mut lengths: Vec<f64> = observations.filter_map(|seen| Some(seen.residual_after_px?.norm())).collect();
     lengths.sort_by(f64::total_cmp);
     let expected = format!(
-        "frame 70 · 3.500 s · {} tracked, {} new, {} lost, {rejected} rejected · RMS {:.2} px before, {:.2} px after the \
-         solve, median {:.2} px",
+        "frame 70 · 3.500 s · tracked {}, new {}, lost {}, rejected {rejected} · reprojection RMS {:.2} → {:.2} px, \
+         median {:.2} px",
         statistics.tracked,
         statistics.detected,
         statistics.lost,
@@ -67,9 +67,9 @@ fn marks_have_the_values_of_the_report() {
     }
     let rejected = model.marks.iter().find(|mark| mark.solved.is_some_and(|solved| solved.rejected)).unwrap();
     let text = description(rejected);
-    assert!(text.contains(&format!("feature {}", rejected.id.0)) && text.contains("rejected as an outlier"), "{text}");
+    assert!(text.contains(&format!("feature {}", rejected.id.0)) && text.contains("outlier, rejected"), "{text}");
     let fresh = model.marks.iter().find(|mark| mark.solved.is_none()).unwrap();
-    assert!(description(fresh).contains("not in the solve"));
+    assert!(description(fresh).contains("not used in the solve"));
 }
 
 #[test]
@@ -93,8 +93,8 @@ fn controls_are_found_by_label_and_work() {
     harness.run();
     assert_eq!(harness.state().0.side, SolveSide::After);
     harness.get_by_label("Before").click();
-    harness.get_by_label("Ids").click();
-    harness.get_by_label("Tails").click();
+    harness.get_by_label("Feature ids").click();
+    harness.get_by_label("Track trails").click();
     harness.run();
     let panel = &harness.state().0;
     assert_eq!((panel.side, panel.ids, panel.trails), (SolveSide::Before, true, false));
@@ -156,7 +156,7 @@ fn missing_runs_frames_and_images_are_reported() {
         harness.run();
         harness.get_by_label_contains(expected);
     };
-    check(7, 0, "No run to show");
+    check(7, 0, "No runs");
     check(0, -1, "No image at or before the cursor");
     check(0, i64::MAX, "frame 79");
 }

@@ -37,7 +37,7 @@ impl ResidualsPanel {
         let recording = ctx.recording;
         let run = ctx.selection.run.min(recording.runs.len().saturating_sub(1));
         let Some(step) = recording.runs.get(run).and_then(|run| run.step_at(ctx.cursor_ns)) else {
-            empty_ui(ui, "No step at the cursor yet");
+            empty_ui(ui, "No step at the cursor");
             return;
         };
         if !self.counted.as_ref().is_some_and(|(counted, _)| Arc::ptr_eq(counted, step)) {
@@ -73,7 +73,7 @@ impl ResidualsPanel {
     fn over_time_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>, height: f32) {
         let theme = *ctx.theme;
         let top = ui.cursor().top();
-        ui.label(RichText::new("reprojection RMS over time, px").small().color(theme.text_weak));
+        ui.label(RichText::new("reprojection RMS after the solve, px").small().color(theme.text_weak));
         let height = height - (ui.cursor().top() - top);
         let (_, rect) = ui.allocate_space(vec2(ui.available_width(), height));
         let (begin_ns, end_ns) = visible_range(ctx);
@@ -116,7 +116,7 @@ fn summary_ui(ui: &mut Ui, theme: &Theme, report: &StepReport, histogram: &Resid
         pair("RMS", format!("{before} → {} px", fixed(report.reprojection_rms_after_px, 2)));
         pair("median", format!("{} px", fixed(histogram.median_px, 2)));
         pair("95 %", format!("{} px", fixed(histogram.p95_px, 2)));
-        pair("mean u, v", format!("{}, {}", fixed(histogram.mean_px[0], 2), fixed(histogram.mean_px[1], 2)));
+        pair("mean u, v", format!("{}, {} px", fixed(histogram.mean_px[0], 2), fixed(histogram.mean_px[1], 2)));
         pair("observations", histogram.observations.to_string());
         pair("downweighted", histogram.downweighted.to_string());
         pair("rejected", histogram.rejected.to_string());
@@ -192,7 +192,7 @@ fn factors_ui(ui: &mut Ui, theme: &Theme, residuals: &[ResidualSummary]) {
         return;
     }
     Grid::new("chi2 by factor").num_columns(5).spacing(vec2(10.0, 2.0)).striped(true).show(ui, |ui| {
-        for heading in ["factor", "residuals", "χ² before", "χ² after", "per residual"] {
+        for heading in ["factor", "residuals", "χ² before", "χ² after", "χ²/residual"] {
             ui.label(RichText::new(heading).small().color(theme.text_weak));
         }
         ui.end_row();
@@ -213,11 +213,11 @@ fn ratio_ui(ui: &mut Ui, theme: &Theme, ratio: f64) {
     let (color, meaning) = if !ratio.is_finite() {
         (theme.text_weak, "")
     } else if ratio > 2.0 {
-        (theme.error, "residuals larger than their noise says")
+        (theme.error, "χ² per residual above 2: residuals larger than the noise model")
     } else if ratio < 0.3 {
-        (theme.warn, "residuals smaller than their noise says")
+        (theme.warn, "χ² per residual below 0.3: residuals smaller than the noise model")
     } else {
-        (theme.ok, "as the noise says")
+        (theme.ok, "χ² per residual, expected value 1: consistent with the noise model")
     };
     let response = ui
         .horizontal(|ui| {
