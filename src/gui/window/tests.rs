@@ -281,7 +281,7 @@ fn a_fork_is_made_by_key_and_label_and_has_a_lane() {
     };
     type_text(&mut harness, "Freeze parameters", "yaw.d");
     type_text(&mut harness, "Drop features", "twelve");
-    assert!(harness.query_by_label_contains("'twelve' is no number of a feature").is_some());
+    assert!(harness.query_by_label_contains("'twelve' is not a feature id").is_some());
     assert!(harness.get_by_label("Fork").accesskit_node().is_disabled());
     harness.get_by_role_and_label(Role::TextInput, "Drop features").focus();
     harness.run_steps(1);

@@ -19,9 +19,9 @@ const MISSING_IMAGE_OFFSET: usize = 1 << 30;
 /// The reason why a run cannot use its cameras together.
 #[derive(Debug, Error, PartialEq)]
 #[error(
-    "the images of {first} and {second} were not taken together: those of {second} are {offset_ms:+.2} ms from those of \
-     {first} (median of {count}, at most {:.1} ms is allowed); trigger both cameras at once, or correct \
-     timeshift_cam_imu in the rig if there is a time offset, or use one camera each in two runs",
+    "cameras {first} and {second} are not synchronized: images of {second} are {offset_ms:+.2} ms from those of {first} \
+     (median of {count}, limit {:.1} ms); trigger both cameras together, correct timeshift_cam_imu in the rig if there \
+     is a time offset, or use one camera each in two runs",
     MAX_STAMP_DIFFERENCE_NS as f64 * 1e-6
 )]
 pub(in crate::session) struct SynchronizationError {

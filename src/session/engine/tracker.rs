@@ -70,7 +70,7 @@ impl CameraTracker {
                 }
                 Err(error) => {
                     rejected.append(&mut frame.warnings);
-                    rejected.push(LogWarning { stamp_ns: frame.stamp_ns, message: format!("image left out: {error}") });
+                    rejected.push(LogWarning { stamp_ns: frame.stamp_ns, message: format!("image skipped: {error}") });
                 }
             }
         }

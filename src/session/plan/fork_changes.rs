@@ -71,14 +71,14 @@ pub enum ForkError {
         present: String,
     },
     /// The fork would have no camera.
-    #[error("without {without} the run would have no visual measurements: leave it one of its cameras")]
+    #[error("without {without} the run has no visual measurements: keep one of its cameras")]
     Blind {
         /// The given keys.
         without: String,
     },
     /// The run has no such parameter.
     #[error(
-        "this run cannot be forked so: there is no parameter '{name}' in this parameterization; there are {}",
+        "cannot fork this run: no parameter '{name}' in this parameterization; expected one of {}",
         known.join(", ")
     )]
     UnknownParameter {
@@ -88,10 +88,10 @@ pub enum ForkError {
         known: Vec<String>,
     },
     /// The estimator rejected the change.
-    #[error("this run cannot be forked so: {0}")]
+    #[error("cannot fork this run: {0}")]
     Estimator(#[from] InterventionError),
     /// There is no step at the cursor, or it cannot be recomputed.
-    #[error("there is no step of the run '{run}' here to fork from")]
+    #[error("run '{run}' has no step at the cursor to fork from")]
     NoStep {
         /// Label of the run.
         run: String,

@@ -20,15 +20,16 @@ impl FromStr for ForkChanges {
                     if ParameterizationChoice::all().any(|(name, _)| name == item) {
                         bad(format!("'{item}' uses other cameras: {OTHER_CAMERA}; run {item} beside it instead"))
                     } else {
-                        bad(format!("'{item}' is no parameterization that a fork can have ({known})"))
+                        bad(format!("unknown parameterization '{item}', expected one of {known}"))
                     }
                 };
                 changes.parameterization = Some(choice.ok_or_else(expected)?);
                 continue;
             };
             let quantity = |text: &str| {
-                number(text)
-                    .ok_or_else(|| bad(format!("{key} is '{text}', expected a number, with deg or mm if you like")))
+                number(text).ok_or_else(|| {
+                    bad(format!("{key} is '{text}', expected a number with an optional unit (deg, mrad, rad, mm, m)"))
+                })
             };
             let factor = |text: &str| {
                 let expected = || bad(format!("{key} is '{text}', expected a factor from 0.001 to 1000"));
@@ -39,15 +40,15 @@ impl FromStr for ForkChanges {
                 "freeze" => changes.frozen.extend(several().map(str::to_owned)),
                 "set" => {
                     for one in several_values(value) {
-                        let (name, value) = one
-                            .split_once(':')
-                            .ok_or_else(|| bad(format!("'{one}' has no value; write set=yaw.alpha:1deg")))?;
+                        let (name, value) = one.split_once(':').ok_or_else(|| {
+                            bad(format!("'{one}' has no value; expected set=PARAMETER:VALUE, as in set=yaw.alpha:1deg"))
+                        })?;
                         changes.values.push((name.trim().to_owned(), quantity(value)?));
                     }
                 }
                 "drop" => {
                     for id in several() {
-                        let expected = || bad(format!("'{id}' is no number of a feature"));
+                        let expected = || bad(format!("'{id}' is not a feature id"));
                         changes.dropped.insert(id.parse().ok().ok_or_else(expected)?);
                     }
                 }
@@ -56,8 +57,8 @@ impl FromStr for ForkChanges {
                 "encoder" => {
                     if value.trim() != "off" {
                         return Err(bad(format!(
-                            "encoder is '{value}', a fork can only turn it off: a calibration that was initialized without \
-                             readings has no joint offsets, which they need; add a run with encoder=on instead"
+                            "encoder is '{value}', expected off: a calibration that was initialized without encoder readings has \
+                             no joint offsets; add a run with encoder=on instead"
                         )));
                     }
                     changes.encoder_off = true;

@@ -137,7 +137,7 @@ impl FromStr for RunSpec {
         for option in options.split(',').filter(|option| !option.is_empty()) {
             let (key, value) = option
                 .split_once('=')
-                .ok_or_else(|| bad(format!("'{option}' has no value; write key=value, as in encoder=off")))?;
+                .ok_or_else(|| bad(format!("option '{option}' has no value; expected key=value, as in encoder=off")))?;
             match key {
                 "encoder" => run.encoder = on_or_off(value).map_err(|problem| bad(format!("encoder: {problem}")))?,
                 "calibrate" => {
@@ -169,7 +169,7 @@ impl FromStr for RunSpec {
             }
         }
         if run.timeshift && !run.calibrate {
-            return Err(bad("timeshift=on estimates part of the calibration; leave calibrate=off out".to_owned()));
+            return Err(bad("timeshift=on requires calibrate=on".to_owned()));
         }
         Ok(run)
     }

@@ -36,7 +36,7 @@ pub enum SessionError {
         present: String,
     },
     /// More than [`MAX_RUNS`] runs.
-    #[error("{count} runs were asked for, at most {MAX_RUNS} fit side by side: leave some out")]
+    #[error("{count} runs requested, at most {MAX_RUNS} are possible")]
     TooManyRuns {
         /// Requested number of runs.
         count: usize,
@@ -52,7 +52,7 @@ pub enum SessionError {
         path: PathBuf,
     },
     /// A thread could not be started.
-    #[error("cannot start a thread for the estimation: {source}")]
+    #[error("cannot start an estimator thread: {source}")]
     Thread {
         /// The error of the operating system.
         source: std::io::Error,

@@ -44,11 +44,11 @@ impl MoveOutcome {
     pub fn message(self, recording: &Recording, breakpoints: &Breakpoints) -> String {
         match self {
             Self::Hit(hit) => format!("Breakpoint {}", breakpoints.describe(recording, hit)),
-            Self::NoBreakpoint => "There is no breakpoint: set one in the breakpoints panel, or with B".to_owned(),
-            Self::NoHitBefore => "No breakpoint was hit before this frame".to_owned(),
-            Self::NoHitAfter => "No breakpoint is hit after this frame".to_owned(),
-            Self::NoHitToEnd => "No breakpoint was hit up to the end of the log".to_owned(),
-            Self::BadSpeed => "The speed must be a positive number".to_owned(),
+            Self::NoBreakpoint => "No breakpoints: add one in the Breakpoints panel or press B".to_owned(),
+            Self::NoHitBefore => "No breakpoint hit before this frame".to_owned(),
+            Self::NoHitAfter => "No breakpoint hit after this frame".to_owned(),
+            Self::NoHitToEnd => "No breakpoint hit up to the end of the log".to_owned(),
+            Self::BadSpeed => "The playback speed must be positive".to_owned(),
         }
     }
 }

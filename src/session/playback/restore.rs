@@ -24,7 +24,7 @@ impl SavedSession {
         let same = (plan.log.size_bytes(), plan.log.checksum()) == (self.log.bytes, self.log.crc32);
         let mut session = Session::start(plan)?;
         if !same {
-            let text = "The log is not the one that the session was saved with: its bytes differ";
+            let text = "The log file differs from the log of the saved session";
             session.notices.push(text.to_owned());
         }
         session.change_breakpoints(|all| {
@@ -113,10 +113,7 @@ impl Session {
                 }
             } else if run.is_none_or(|run| run.finished) {
                 self.pending.forks.remove(0);
-                let text = format!(
-                    "The fork {} cannot be made again: {} does not reach its first step",
-                    fork.name, fork.parent
-                );
+                let text = format!("Fork {} not restored: run {} ends before its first step", fork.name, fork.parent);
                 self.notices.push(text);
             }
         }
@@ -199,7 +196,7 @@ mod tests {
     fn invalid_session_files_are_rejected() {
         let saved = Session::start(garden(3.0)).unwrap().saved(None);
         let refused = |text: &str| SavedSession::from_text(text).unwrap_err().to_string();
-        assert!(refused("hello").contains("no saved session"));
+        assert!(refused("hello").contains("not a saved session"));
         assert!(refused("{}").contains("session_version"));
         assert!(refused("{\"session_version\": 9}").contains("version 9"));
         let problem = |saved: SavedSession| saved.open().err().map(|error| error.to_string()).unwrap_or_default();
@@ -208,6 +205,6 @@ mod tests {
         assert!(problem(SavedSession { breakpoints, ..saved.clone() }).contains("column 7"));
         let log = SavedLog { crc32: saved.log.crc32 ^ 1, ..saved.log.clone() };
         let mut other = SavedSession { log, ..saved }.open().unwrap();
-        assert!(other.take_notices()[0].contains("not the one"));
+        assert!(other.take_notices()[0].contains("differs"));
     }
 }

@@ -75,7 +75,7 @@ impl Session {
             self.plan.runs.pop();
             self.shared.change(Computation::remove_last_run);
         } else {
-            self.notices.push("Only the last run can be removed, once it is computed".to_owned());
+            self.notices.push("Only the last run can be removed, after it has finished".to_owned());
         }
     }
 }

@@ -17,19 +17,21 @@ pub(super) const VERSION: u32 = 1;
 #[derive(Debug, Error)]
 pub enum SavedSessionError {
     /// The text does not have the format of a session.
-    #[error("this is no saved session: {problem}")]
+    #[error("not a saved session: {problem}")]
     Format {
         /// The problem.
         problem: String,
     },
     /// The file was written by a later version of the program.
-    #[error("the session has version {found}, this program reads {VERSION}: open it with the program that saved it")]
+    #[error(
+        "session version {found}, but this program reads version {VERSION}: open it with the program that saved it"
+    )]
     Version {
         /// Version of the file's format.
         found: u32,
     },
     /// A run, a fork or a breakpoint in it cannot be parsed.
-    #[error("in the saved session: {problem}")]
+    #[error("invalid saved session: {problem}")]
     Entry {
         /// The problem.
         problem: String,

@@ -298,7 +298,7 @@ fn a_session_stops_at_breakpoints_and_forks_there() {
     };
     session.apply(Command::GoToStart);
     session.apply(Command::RunToBreakpoint { forward: true });
-    assert!(session.take_notices().pop().unwrap().contains("There is no breakpoint"));
+    assert!(session.take_notices().pop().unwrap().contains("No breakpoints"));
     let condition: Condition = "tracking and features > 20".parse().unwrap();
     session.apply(Command::AddBreakpoint(condition));
     session.apply(Command::RunToBreakpoint { forward: true });
