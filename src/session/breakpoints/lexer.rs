@@ -63,7 +63,7 @@ pub(super) fn tokens(text: &str) -> Result<Vec<(Token, Span)>, ConditionProblem>
             at = end_of_number(&characters, at);
             let written: String = characters[begin..at].iter().collect();
             let value = written.parse::<f64>().ok().filter(|value| value.is_finite());
-            Token::Number(value.ok_or_else(|| problem(begin, format!("'{written}' is no number")))?)
+            Token::Number(value.ok_or_else(|| problem(begin, format!("'{written}' is not a number")))?)
         } else if character.is_alphabetic() || *character == '_' || *character == '°' {
             at = end_of_run(&characters, at, |character| character.is_alphanumeric() || "_.°".contains(character));
             let name: String = characters[begin..at].iter().collect();

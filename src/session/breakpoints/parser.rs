@@ -75,7 +75,7 @@ fn parse(text: &str) -> Result<Condition> {
     let expression = parser.alternatives()?;
     match parser.peek() {
         Token::End => {}
-        Token::Close => return Err(parser.problem("this bracket closes nothing")),
+        Token::Close => return Err(parser.problem("unmatched bracket: it closes nothing")),
         Token::Compare(_) => return Err(parser.problem("comparisons do not chain: write 'a < b and b < c'")),
         _ => return Err(parser.problem("expected 'and', 'or' or the end of the condition")),
     }
@@ -404,7 +404,7 @@ fn unknown<'a>(what: &str, name: &str, known: impl Iterator<Item = &'a str>) -> 
     let known: Vec<&str> = known.collect();
     let near = nearest_name(name, known.iter().copied()).filter(|(far, _)| *far <= 2);
     match near {
-        Some((_, near)) => format!("there is no {what} '{name}'; do you mean '{near}'?"),
-        None => format!("there is no {what} '{name}'; expected one of {}", known.join(", ")),
+        Some((_, near)) => format!("unknown {what} '{name}'; did you mean '{near}'?"),
+        None => format!("unknown {what} '{name}'; expected one of {}", known.join(", ")),
     }
 }

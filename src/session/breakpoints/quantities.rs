@@ -34,50 +34,50 @@ pub(super) const NUMBERS: &[NumberName] = &[
     number("rank_informed", "informed rank", |step| Some(step.rank.as_ref()?.rank_informed as f64)),
     number("columns", "calibration columns", |step| Some(step.rank.as_ref()?.parameters.len() as f64)),
     number("singular_min", "smallest singular value", |step| step.rank.as_ref()?.singular_values.last().copied()),
-    number("margin", "least margin to a lock of the chart", |step| {
+    number("margin", "smallest singularity margin of the parameterization", |step| {
         step.report.calibration.margins.iter().map(|(_, margin)| *margin).reduce(f64::min)
     }),
     number("features", "features in the image", |step| Some(step.tracks.features.len() as f64)),
-    number("solved", "features that took part in the solve", |step| {
+    number("solved", "features used in the solve", |step| {
         tracking(step).then_some(step.report.counts.solved as f64)
     }),
-    number("inliers", "of them not rejected", |step| tracking(step).then_some(step.report.counts.inliers() as f64)),
-    number("outliers", "of them rejected", |step| tracking(step).then_some(step.report.counts.rejected as f64)),
+    number("inliers", "features in the solve, not rejected", |step| tracking(step).then_some(step.report.counts.inliers() as f64)),
+    number("outliers", "features in the solve, rejected", |step| tracking(step).then_some(step.report.counts.rejected as f64)),
     number("rms", "reprojection RMS after the solve, px", |step| {
         tracking(step).then_some(step.report.reprojection_rms_after_px)
     }),
-    number("rms_before", "the same before the solve, px", |step| {
+    number("rms_before", "reprojection RMS before the solve, px", |step| {
         tracking(step).then_some(step.report.reprojection_rms_before_px)
     }),
     number("chi2", "χ² of all factors after the solve", |step| {
         let summaries = &step.report.residuals;
         (!summaries.is_empty()).then(|| summaries.iter().map(|summary| summary.chi2_after).sum())
     }),
-    number("nis", "χ² over the number of residuals", |step| {
+    number("nis", "χ² per residual of all factors after the solve", |step| {
         let summaries = &step.report.residuals;
         let count: usize = summaries.iter().map(|summary| summary.count).sum();
         (count > 0).then(|| summaries.iter().map(|summary| summary.chi2_after).sum::<f64>() / count as f64)
     }),
-    number("cost", "cost after the last iteration", |step| Some(step.report.iterations.last()?.cost_after)),
-    number("cost_before", "cost before the first iteration", |step| Some(step.report.iterations.first()?.cost_before)),
-    number("cost_rise", "largest share by which an iteration raised the cost", |step| {
+    number("cost", "cost after the last solver iteration", |step| Some(step.report.iterations.last()?.cost_after)),
+    number("cost_before", "cost before the first solver iteration", |step| Some(step.report.iterations.first()?.cost_before)),
+    number("cost_rise", "largest relative cost increase in one solver iteration", |step| {
         let rises = step.report.iterations.iter().map(|it| it.cost_after / it.cost_before - 1.0);
         rises.map(|rise| rise.max(0.0)).reduce(f64::max)
     }),
-    number("iterations", "iterations of the solver", |step| Some(step.report.iterations.len() as f64)),
-    number("rejected_iterations", "iterations that were not taken", |step| {
+    number("iterations", "solver iterations", |step| Some(step.report.iterations.len() as f64)),
+    number("rejected_iterations", "rejected solver iterations", |step| {
         Some(step.report.iterations.iter().filter(|iteration| !iteration.accepted).count() as f64)
     }),
-    number("speed", "speed, m/s", |step| Some(step.report.newest()?.velocity_m_per_s.norm())),
-    number("gyro_bias", "norm of the gyroscope's bias, rad/s", |step| {
+    number("speed", "velocity, norm, m/s", |step| Some(step.report.newest()?.velocity_m_per_s.norm())),
+    number("gyro_bias", "gyroscope bias, norm, rad/s", |step| {
         Some(step.report.newest()?.gyroscope_bias_rad_per_s.norm())
     }),
-    number("accel_bias", "norm of the accelerometer's bias, m/s²", |step| {
+    number("accel_bias", "accelerometer bias, norm, m/s²", |step| {
         Some(step.report.newest()?.accelerometer_bias_m_per_s2.norm())
     }),
-    number("restarts", "restarts so far", |step| Some(step.report.restarts as f64)),
-    number("frame", "number of the image", |step| Some(step.report.frame_index as f64)),
-    number("time", "seconds since the log began", |step| Some(seconds_from_ns(step.report.stamp_ns))),
+    number("restarts", "re-initializations so far", |step| Some(step.report.restarts as f64)),
+    number("frame", "frame index", |step| Some(step.report.frame_index as f64)),
+    number("time", "header stamp since the start of the log, s", |step| Some(seconds_from_ns(step.report.stamp_ns))),
 ];
 
 fn tracking(step: &StepRecord) -> bool {
@@ -100,13 +100,13 @@ pub(super) enum NamedNumber {
 /// All quantities with an argument: name, kind, example of the argument, meaning.
 pub(super) const NAMED: [(&str, NamedNumber, &str, &str); 8] = [
     ("sigma", NamedNumber::Sigma, "yaw.alpha", "standard deviation of a parameter, rad or m"),
-    ("prior_sigma", NamedNumber::PriorSigma, "yaw.alpha", "its prior standard deviation"),
+    ("prior_sigma", NamedNumber::PriorSigma, "yaw.alpha", "prior standard deviation of a parameter, rad or m"),
     ("value", NamedNumber::Value, "yaw.alpha", "value of a parameter, rad or m"),
     ("joint", NamedNumber::Joint, "yaw", "estimated joint angle, rad"),
-    ("margin", NamedNumber::Margin, "end", "margin to one lock of the chart"),
-    ("lost", NamedNumber::Lost, "motion", "columns lost to parameterization, joints, absorbed or motion"),
+    ("margin", NamedNumber::Margin, "end", "margin of one singularity"),
+    ("lost", NamedNumber::Lost, "motion", "lost calibration columns by cause: parameterization, joints, absorbed or motion"),
     ("chi2", NamedNumber::Chi2, "visual", "χ² of a factor after the solve"),
-    ("nis", NamedNumber::Nis, "imu", "χ² of a factor over its number of residuals"),
+    ("nis", NamedNumber::Nis, "imu", "χ² per residual of a factor after the solve"),
 ];
 
 /// Causes of lost rank.
@@ -134,12 +134,12 @@ impl FlagName {
 
 /// All Boolean properties.
 pub(super) const FLAGS: &[FlagName] = &[
-    FlagName { name: "tracking", meaning: "the window runs", value: tracking },
-    FlagName { name: "initializing", meaning: "it waits for a window", value: |step| !tracking(step) },
+    FlagName { name: "tracking", meaning: "estimator initialized and tracking", value: tracking },
+    FlagName { name: "initializing", meaning: "estimator initializing", value: |step| !tracking(step) },
     FlagName { name: "keyframe", meaning: "the frame is a keyframe", value: |step| step.report.keyframe },
     FlagName {
         name: "warning",
-        meaning: "the step warns of something",
+        meaning: "the step has warnings",
         value: |step| !step.report.warnings.is_empty(),
     },
 ];
@@ -163,15 +163,15 @@ pub fn quantity_help() -> Vec<(String, &'static str)> {
     let numbers = NUMBERS.iter().map(|it| (it.name.to_owned(), it.meaning));
     let named = NAMED.iter().map(|(name, _, example, meaning)| (format!("{name}({example})"), *meaning));
     let functions = [
-        ("singular(1)", "a singular value, the largest first"),
-        ("rise(x)", "change since the step before"),
-        ("abs(x)", "magnitude"),
-        ("min(x, y)", "the lesser"),
-        ("max(x, y)", "the greater"),
+        ("singular(1)", "singular value by index, 1 for the largest"),
+        ("rise(x)", "change since the previous step"),
+        ("abs(x)", "absolute value"),
+        ("min(x, y)", "minimum"),
+        ("max(x, y)", "maximum"),
     ];
     let flags = FLAGS.iter().map(|it| (it.name.to_owned(), it.meaning));
     let events: Vec<&str> = EVENTS.iter().map(|(name, _)| *name).collect();
-    let events = (format!("event({})", events.join("|")), "something of this kind happened");
+    let events = (format!("event({})", events.join("|")), "an event of this kind in the step");
     numbers
         .chain(named)
         .chain(functions.map(|(name, meaning)| (name.to_owned(), meaning)))
