@@ -49,7 +49,10 @@ fn a_damaged_chunk_of_an_mcap_is_left_out_and_counted() {
             assert!(imu.taken > about_half, "{compression:?}, indexed {indexed}:\n{report}");
             assert!(report.notes.iter().any(|note| note.contains("damaged") && note.contains("lost")), "{report}");
             if indexed {
-                assert_eq!(imu.taken + imu.left, MESSAGES as u64, "{compression:?}:\n{report}");
+                // Where the damage also hits the chunk's message index, the total of the log's index shows the loss.
+                let total = format!("its index counts {MESSAGES} messages, {} were read", imu.taken);
+                let by_total = report.notes.iter().any(|note| note.contains(&total));
+                assert!(imu.taken + imu.left == MESSAGES as u64 || by_total, "{compression:?}:\n{report}");
             }
         }
     }
