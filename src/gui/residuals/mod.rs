@@ -107,19 +107,33 @@ pub(crate) fn rms_px(report: &StepReport) -> f64 {
 fn summary_ui(ui: &mut Ui, theme: &Theme, report: &StepReport, histogram: &ResidualHistogram) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = vec2(4.0, 2.0);
-        let mut pair = |name: &str, value: String| {
-            ui.label(RichText::new(name).color(theme.text_weak));
-            ui.label(RichText::new(value).monospace().color(theme.text_strong));
+        let mut pair = |name: &str, value: String, hover: &str| {
+            ui.label(RichText::new(name).color(theme.text_weak)).on_hover_text(hover);
+            ui.label(RichText::new(value).monospace().color(theme.text_strong)).on_hover_text(hover);
             ui.add_space(6.0);
         };
         let before = fixed(report.reprojection_rms_before_px, 2);
-        pair("RMS", format!("{before} → {} px", fixed(report.reprojection_rms_after_px, 2)));
-        pair("median", format!("{} px", fixed(histogram.median_px, 2)));
-        pair("95 %", format!("{} px", fixed(histogram.p95_px, 2)));
-        pair("mean u, v", format!("{}, {} px", fixed(histogram.mean_px[0], 2), fixed(histogram.mean_px[1], 2)));
-        pair("observations", histogram.observations.to_string());
-        pair("downweighted", histogram.downweighted.to_string());
-        pair("rejected", histogram.rejected.to_string());
+        pair(
+            "RMS",
+            format!("{before} → {} px", fixed(report.reprojection_rms_after_px, 2)),
+            "Reprojection RMS before → after the solve",
+        );
+        pair(
+            "median",
+            format!("{} px", fixed(histogram.median_px, 2)),
+            "Median norm of the reprojection residuals after the solve",
+        );
+        pair("95 %", format!("{} px", fixed(histogram.p95_px, 2)), "95th percentile of the norm after the solve");
+        pair(
+            "mean u, v",
+            format!("{}, {} px", fixed(histogram.mean_px[0], 2), fixed(histogram.mean_px[1], 2)),
+            "Mean residual (bias) along the image axes u and v, prediction − measurement",
+        );
+        let hover = "Observations in the window with a residual after the solve";
+        pair("observations", histogram.observations.to_string(), hover);
+        let hover = "Observations with a robust weight below 0.5";
+        pair("downweighted", histogram.downweighted.to_string(), hover);
+        pair("rejected", histogram.rejected.to_string(), "Features rejected as outliers");
     });
 }
 

@@ -46,9 +46,25 @@ impl Lane {
             Self::Events => "events".to_owned(),
             Self::Rank => "informed rank".to_owned(),
             Self::Features => "features".to_owned(),
-            Self::Reprojection => "reprojection px".to_owned(),
+            Self::Reprojection => "reprojection, px".to_owned(),
             Self::Outliers => "outliers".to_owned(),
             Self::Warnings => "warnings".to_owned(),
+        }
+    }
+
+    /// What the lane shows, with its unit and its file column.
+    pub(super) const fn meaning(self) -> &'static str {
+        match self {
+            Self::Run(_) => "Phases of the run: hatched while initializing, filled while tracking; ticks: keyframes",
+            Self::Breakpoints => "Breakpoint hits of all runs",
+            Self::Events => "Events of all runs (column events of frames.csv)",
+            Self::Rank => "Informed rank of the calibration (rank.csv)",
+            Self::Features => "Number of features in the image",
+            Self::Reprojection => {
+                "Reprojection RMS after the solve, px (column reprojection_rms_after_px of frames.csv)"
+            }
+            Self::Outliers => "Number of features that the estimator rejects as outliers",
+            Self::Warnings => "Warnings of the log (squares) and of the runs' steps; list: W",
         }
     }
 

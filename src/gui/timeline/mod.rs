@@ -9,7 +9,7 @@ mod transport;
 pub use pace::{Pace, Reading};
 pub(crate) use transport::{SPEEDS, toggled_loop};
 
-use egui::{Align2, FontFamily, FontId, PointerButton, Rect, Response, Stroke, Ui, pos2, vec2};
+use egui::{Align2, FontFamily, FontId, PointerButton, Rect, Response, Sense, Stroke, Ui, pos2, vec2};
 
 use self::lanes::Lane;
 use self::model::RunLanes;
@@ -122,6 +122,8 @@ impl TimelinePanel {
             _ => theme.text_weak,
         };
         lanes::label(&painter, &theme, label_rect, &lane.name(ctx), value, color);
+        let label = ui.interact(label_rect, ui.unique_id().with(("lane", lane.name(ctx))), Sense::hover());
+        label.on_hover_text(lane.meaning());
     }
 
     /// Shift and drag sets the loop range.

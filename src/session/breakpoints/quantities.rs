@@ -38,11 +38,13 @@ pub(super) const NUMBERS: &[NumberName] = &[
         step.report.calibration.margins.iter().map(|(_, margin)| *margin).reduce(f64::min)
     }),
     number("features", "features in the image", |step| Some(step.tracks.features.len() as f64)),
-    number("solved", "features used in the solve", |step| {
-        tracking(step).then_some(step.report.counts.solved as f64)
+    number("solved", "features used in the solve", |step| tracking(step).then_some(step.report.counts.solved as f64)),
+    number("inliers", "features in the solve, not rejected", |step| {
+        tracking(step).then_some(step.report.counts.inliers() as f64)
     }),
-    number("inliers", "features in the solve, not rejected", |step| tracking(step).then_some(step.report.counts.inliers() as f64)),
-    number("outliers", "features in the solve, rejected", |step| tracking(step).then_some(step.report.counts.rejected as f64)),
+    number("outliers", "features in the solve, rejected", |step| {
+        tracking(step).then_some(step.report.counts.rejected as f64)
+    }),
     number("rms", "reprojection RMS after the solve, px", |step| {
         tracking(step).then_some(step.report.reprojection_rms_after_px)
     }),
@@ -59,7 +61,9 @@ pub(super) const NUMBERS: &[NumberName] = &[
         (count > 0).then(|| summaries.iter().map(|summary| summary.chi2_after).sum::<f64>() / count as f64)
     }),
     number("cost", "cost after the last solver iteration", |step| Some(step.report.iterations.last()?.cost_after)),
-    number("cost_before", "cost before the first solver iteration", |step| Some(step.report.iterations.first()?.cost_before)),
+    number("cost_before", "cost before the first solver iteration", |step| {
+        Some(step.report.iterations.first()?.cost_before)
+    }),
     number("cost_rise", "largest relative cost increase in one solver iteration", |step| {
         let rises = step.report.iterations.iter().map(|it| it.cost_after / it.cost_before - 1.0);
         rises.map(|rise| rise.max(0.0)).reduce(f64::max)
@@ -104,7 +108,12 @@ pub(super) const NAMED: [(&str, NamedNumber, &str, &str); 8] = [
     ("value", NamedNumber::Value, "yaw.alpha", "value of a parameter, rad or m"),
     ("joint", NamedNumber::Joint, "yaw", "estimated joint angle, rad"),
     ("margin", NamedNumber::Margin, "end", "margin of one singularity"),
-    ("lost", NamedNumber::Lost, "motion", "lost calibration columns by cause: parameterization, joints, absorbed or motion"),
+    (
+        "lost",
+        NamedNumber::Lost,
+        "motion",
+        "lost calibration columns by cause: parameterization, joints, absorbed or motion",
+    ),
     ("chi2", NamedNumber::Chi2, "visual", "χ² of a factor after the solve"),
     ("nis", NamedNumber::Nis, "imu", "χ² per residual of a factor after the solve"),
 ];
@@ -137,11 +146,7 @@ pub(super) const FLAGS: &[FlagName] = &[
     FlagName { name: "tracking", meaning: "estimator initialized and tracking", value: tracking },
     FlagName { name: "initializing", meaning: "estimator initializing", value: |step| !tracking(step) },
     FlagName { name: "keyframe", meaning: "the frame is a keyframe", value: |step| step.report.keyframe },
-    FlagName {
-        name: "warning",
-        meaning: "the step has warnings",
-        value: |step| !step.report.warnings.is_empty(),
-    },
+    FlagName { name: "warning", meaning: "the step has warnings", value: |step| !step.report.warnings.is_empty() },
 ];
 
 /// Names of event kinds.
