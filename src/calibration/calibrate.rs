@@ -23,7 +23,7 @@ use crate::sensors::JointAngles;
 /// Names of the stages in messages.
 const ALONE: &str = "camera-IMU calibration";
 const LOOPS: &str = "pose loops";
-const BOTH: &str = "bundle of both cameras";
+const BOTH: &str = "bundle adjustment of both cameras";
 
 fn singular(stage: &'static str) -> CalibrationError {
     CalibrationError::Singular { stage }
@@ -104,7 +104,7 @@ pub fn calibrate(
     tracks.extend(observations::collect(input, options, &frame_sets, Camera::Gimbal, &|frame_set| measured[frame_set]));
     tracks.sort_by_key(|track| track.observations[0].view);
     let both = stage(BOTH).run(&mut frame_sets, &tracks, start, &mut |round| {
-        report_progress("adjusting both cameras together", 0.8 + 0.05 * round as f64);
+        report_progress("bundle adjustment of both cameras", 0.8 + 0.05 * round as f64);
     })?;
 
     let visited_rad: Vec<Vec<f64>> =
@@ -202,8 +202,8 @@ fn check_measurements(
         from_s: seconds_from_ns(from_ns),
         to_s: seconds_from_ns(to_ns),
         reason: format!(
-            "of {offered} frame sets with a gimbal image and encoder readings {broken} had too few common features and \
-             {unsolved} too little parallax"
+            "frame sets with a gimbal image and encoder readings: {offered}, too few common features in {broken}, too \
+             little parallax in {unsolved}"
         ),
     })
 }
@@ -349,7 +349,7 @@ fn warnings(counts: SegmentCounts, segments: &[Segment], frame_sets: &[FrameSet]
     }
     if 2 * used < counts.offered {
         warnings.push(format!(
-            "only {used} of {} gimbal images could be measured: {} had too few common features, {} too little parallax",
+            "relative pose from only {used} of {} gimbal images: too few common features in {}, too little parallax in {}",
             counts.offered, counts.broken, counts.unsolved
         ));
     }

@@ -4,7 +4,7 @@ use thiserror::Error;
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum CalibrationError {
     /// The estimator of the static camera did not initialize.
-    #[error("the static camera '{camera}' gives no trajectory: {reason}; 'dcvins check' says more")]
+    #[error("the static camera '{camera}' has no trajectory: {reason}; details: 'dcvins check'")]
     NoTrajectory {
         /// Key of the camera.
         camera: String,
@@ -28,8 +28,8 @@ pub enum CalibrationError {
     },
     /// Fewer pairs of camera poses than the calibration needs.
     #[error(
-        "only {found} pairs of static and gimbal camera poses could be measured between {from_s:.1} and {to_s:.1} s, \
-         {needed} are needed ({reason}): record a longer flight with both cameras over textured ground"
+        "only {found} pose pairs of static and gimbal camera between {from_s:.1} and {to_s:.1} s, {needed} required \
+         ({reason}): record a longer flight with both cameras over textured ground"
     )]
     TooFewMeasurements {
         /// Number of measured pairs.
@@ -44,7 +44,7 @@ pub enum CalibrationError {
         reason: String,
     },
     /// A least-squares problem that has no solution.
-    #[error("the {stage} did not converge: its equations are singular; 'dcvins check' may say why")]
+    #[error("the {stage} did not converge: its equations are singular; possible reasons: 'dcvins check'")]
     Singular {
         /// Name of the stage.
         stage: &'static str,

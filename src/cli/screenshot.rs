@@ -124,7 +124,7 @@ const MAX_SCREENSHOTS: usize = 100_000;
 /// Runs `dcvins screenshot`.
 pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<Outcome> {
     if !PANEL_NAMES.contains(&arguments.panel.as_str()) {
-        bail!("no panel is called '{}': expected one of {}", arguments.panel, PANEL_NAMES.join(", "));
+        bail!("unknown panel '{}': expected one of {}", arguments.panel, PANEL_NAMES.join(", "));
     }
     if arguments.csv && arguments.panel == "all" {
         bail!("--csv writes the table of one panel: name it with --panel");

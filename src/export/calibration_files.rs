@@ -39,7 +39,7 @@ fn sigmas_yaml(report: &CalibrationReport) -> String {
     };
     let sigmas: String = report.parameters.iter().map(sigma_of).collect();
     format!(
-        "# Standard deviations of the calibrated parameters, in the form named here.\n\
+        "# Standard deviations of the calibrated parameters, in the parameterization named here.\n\
          calibration:\n  parameterization: {}\n  sigmas:\n{sigmas}",
         report.parameterization
     )

@@ -332,7 +332,7 @@ impl fmt::Display for CalibrationReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
-            "Offline calibration from {}, {:.2} to {:.2} s, {} instants, {} form",
+            "Offline calibration of {}, {:.2} to {:.2} s, {} synchronized frame sets, parameterization {}",
             self.log, self.stretch_s[0], self.stretch_s[1], self.frame_sets, self.parameterization
         )?;
         let line = |f: &mut fmt::Formatter<'_>, name: &str, unit: &str, s: &StatisticsReport| {
@@ -354,11 +354,11 @@ impl fmt::Display for CalibrationReport {
         let loops = &self.pose_loops;
         writeln!(
             f,
-            "  {} pairs of static and gimbal camera poses in {} stretches, {} of them fitting",
+            "  {} pose pairs of static and gimbal camera in {} segments, {} inliers",
             loops.pairs, loops.segments, loops.fitting
         )?;
-        line(f, "Gap of a loop", "m", &loops.gap_m)?;
-        writeln!(f, "\nBundle of both cameras")?;
+        line(f, "Loop closure error", "m", &loops.gap_m)?;
+        writeln!(f, "\nBundle adjustment of both cameras")?;
         for camera in &self.reprojection {
             line(f, &format!("Reprojection error ({})", camera.camera), "px", &camera.error_px)?;
         }
@@ -367,7 +367,7 @@ impl fmt::Display for CalibrationReport {
         if let Some(rank) = &self.rank {
             writeln!(f, "  Observability: {}", rank.verdict)?;
         }
-        writeln!(f, "\nParameters                        initial       final     ± sigma")?;
+        writeln!(f, "\nParameters                        initial       final     ± σ")?;
         for parameter in &self.parameters {
             let (factor, unit) = match parameter.dimension {
                 Dimension::Angle => (180.0 / std::f64::consts::PI, "°"),
@@ -391,12 +391,12 @@ impl fmt::Display for CalibrationReport {
         matrix(f, "T_cam_imu of the static camera", &self.static_t_cam_imu)?;
         matrix(f, "T_imu_cam of the gimbal camera, all joints at zero", &self.gimbal_t_imu_cam_at_zero)?;
         if let Some(ground_truth) = &self.ground_truth {
-            writeln!(f, "\nAgainst the truth")?;
+            writeln!(f, "\nExtrinsics errors against the ground truth")?;
             for (name, distance) in [
-                ("static camera, given", &ground_truth.static_initial),
+                ("static camera, rig", &ground_truth.static_initial),
                 ("static camera, camera-IMU", &ground_truth.static_camera_imu),
                 ("static camera, bundle", &ground_truth.static_final),
-                ("gimbal, given", &ground_truth.chain_initial),
+                ("gimbal, rig", &ground_truth.chain_initial),
                 ("gimbal, pose loops", &ground_truth.chain_pose_loop),
                 ("gimbal, bundle", &ground_truth.chain_final),
             ] {

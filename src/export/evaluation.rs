@@ -111,14 +111,14 @@ pub fn evaluate(
     }
     let transform = align(&pairs, options.alignment).ok_or_else(|| {
         not_comparable(format!(
-            "{} common poses do not fix an alignment '{}'; try --align none",
+            "{} associated poses do not determine the alignment '{}'; try --align none",
             pairs.len(),
             alignment_name(options.alignment)
         ))
     })?;
     let (translations, rotations) = relative_errors(&pairs, &transform, options.delta);
     let rotations_deg: Vec<f64> = rotations.iter().map(|angle| angle.to_degrees()).collect();
-    let too_short = || not_comparable("the trajectory is shorter than one --delta; give a smaller one".to_owned());
+    let too_short = || not_comparable("the trajectory is shorter than one --delta: give a smaller --delta".to_owned());
     let ate = ErrorStatistics::of(&absolute_errors_m(&pairs, &transform)).ok_or_else(too_short)?;
     let rpe_translation = ErrorStatistics::of(&translations).ok_or_else(too_short)?;
     let rpe_rotation = ErrorStatistics::of(&rotations_deg).ok_or_else(too_short)?;
@@ -140,7 +140,7 @@ impl fmt::Display for EvaluationReport {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             formatter,
-            "{} pairs of {} and {} poses, reference {:.2} m, alignment {}{}",
+            "{} associated poses of {} estimated and {} reference poses, path length {:.2} m, alignment {}{}",
             self.pairs,
             self.estimate_poses,
             self.reference_poses,
@@ -156,7 +156,7 @@ impl fmt::Display for EvaluationReport {
         let rows = [
             ("ATE (m)", &self.ate_m),
             ("RPE translation (m)", &self.rpe_translation_m),
-            ("RPE rotation (deg)", &self.rpe_rotation_deg),
+            ("RPE rotation (°)", &self.rpe_rotation_deg),
         ];
         for (name, row) in rows {
             let Statistics { rmse, mean, median, std, min, max } = row;

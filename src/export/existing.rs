@@ -161,7 +161,7 @@ pub fn check_picture(path: &Path, force: bool) -> Result<(), ExportError> {
         return Ok(());
     }
     Err(ExportError::Existing {
-        problem: "the file exists and is no picture or table".to_owned(),
+        problem: "the file exists and is no screenshot or table".to_owned(),
         path: path.to_owned(),
     })
 }
@@ -201,7 +201,7 @@ fn check_files(folder: &Path, names: &[&str], log: &str) -> Result<(), ExportErr
     match log_of(&folder.join(index)) {
         Some(other) if other == log => Ok(()),
         Some(other) => existing(format!("the folder holds results of the log '{}'", shortened(&other, 80))),
-        None => existing(format!("the folder holds '{found}' and no {index} that says of which log it is")),
+        None => existing(format!("the folder holds '{found}' and no {index} that names its log")),
     }
 }
 
@@ -267,7 +267,7 @@ mod tests {
         let path = folder.path().join("flight.mcap");
         check_picture(&path, false).unwrap();
         fs::write(&path, b"\x89MCAP0\r\n").unwrap();
-        assert!(problem(check_picture(&path, false)).starts_with("the file exists and is no picture"));
+        assert!(problem(check_picture(&path, false)).starts_with("the file exists and is no screenshot"));
         check_picture(&path, true).unwrap();
         fs::write(&path, b"\x89PNG\r\n").unwrap();
         check_picture(&path, false).unwrap();

@@ -82,7 +82,7 @@ impl Default for ScreenshotOptions {
 #[derive(Debug, Error)]
 pub enum ScreenshotError {
     /// There is no panel of that name.
-    #[error("no panel is called '{name}': expected one of {}", PANEL_NAMES.join(", "))]
+    #[error("unknown panel '{name}': expected one of {}", PANEL_NAMES.join(", "))]
     UnknownPanel {
         /// The name as written.
         name: String,
@@ -357,7 +357,7 @@ mod tests {
             draw_panel(name, &recording, 0, &mut sample_images(), &options).unwrap_err().to_string()
         };
         let text = draw("images", [640, 480], 1.0);
-        assert!(text.starts_with("no panel is called 'images': expected one of all, image, scene"), "{text}");
+        assert!(text.starts_with("unknown panel 'images': expected one of all, image, scene"), "{text}");
         let text = draw("image", [0, 480], 1.0);
         assert!(text.starts_with("a screenshot of 0×480 pixels cannot be drawn"), "{text}");
         for scale in [0.0, -1.0, f32::NAN, 100.0] {

@@ -253,7 +253,7 @@ pub fn summarize(recording: &Recording, run: &RunRecord, timing: bool) -> RunSum
     let accuracy_missing = match (&accuracy, estimated.is_empty(), pairs.is_empty()) {
         (Some(_), _, _) => None,
         (None, true, _) => Some(never_initialized(run)),
-        (None, false, true) => Some("the log holds no ground truth for the estimated frames".to_owned()),
+        (None, false, true) => Some("no ground truth for the estimated frames in the log".to_owned()),
         (None, false, false) => Some("too few frames with ground truth to align".to_owned()),
     };
     RunSummary {
@@ -298,7 +298,7 @@ fn never_initialized(run: &RunRecord) -> String {
     });
     waits.map_or_else(
         || "the run never initialized: no image reached the estimator".to_owned(),
-        |reasons| format!("the run never initialized; the last attempt says: {reasons}"),
+        |reasons| format!("the run never initialized; last attempt: {reasons}"),
     )
 }
 

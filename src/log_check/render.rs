@@ -37,7 +37,7 @@ impl Display for CheckReport {
         let rig = self.rig.as_deref().map_or_else(|| "no rig".to_owned(), |name| format!("rig {name}"));
         writeln!(out, "{}: {:.3} s, {rig}", self.log, self.duration_s)?;
         writeln!(out)?;
-        let header = ["topic", "type", "used as", "messages", "Hz", "from s", "to s", "late ms"].map(str::to_owned);
+        let header = ["topic", "type", "role", "messages", "Hz", "first, s", "last, s", "delay, ms"].map(str::to_owned);
         let mut rows = vec![header];
         for topic in &self.topics {
             rows.push([

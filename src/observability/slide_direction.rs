@@ -41,7 +41,7 @@ pub struct SlideRequest {
 /// A text that is no change.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error(
-    "'{given}' is no direction with a value: expected DIRECTION=VALUE, as in 1=0.5 (the weakest direction by half of 10° \
+    "'{given}' is no direction with a value: expected DIRECTION=VALUE, as in 1=0.5 (the least observable direction by half of 10° \
      and 3 cm), base-d=1 or yaw.alpha=-1"
 )]
 pub struct InvalidSlide {

@@ -76,7 +76,7 @@ fn experiments_name_what_is_lost_and_why() {
     let rig = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("sample_logs/garden.rig.yaml");
     let rig = rig.to_str().expect("paths of tests are UTF-8");
     check(&["--rig", rig, "--form", "minimal", "--poses", "imu"], 18, &["garden (3 joints)"]);
-    check(&["--rig", rig, "--form", "classical", "--motion", "hover"], 11, &["as known"]);
+    check(&["--rig", rig, "--form", "classical", "--motion", "hover"], 11, &["confirmed"]);
 }
 
 #[test]

@@ -12,7 +12,7 @@ const STYLE: &str = include_str!("../../../assets/report/style.css");
 
 /// The whole page.
 pub(super) fn page(content: &ReportContent, figures: &[ReportFigure]) -> String {
-    let title = format!("Flight report of {}", content.log);
+    let title = format!("Flight report: {}", content.log);
     let page = html! {
         (DOCTYPE)
         html lang="en" {
@@ -34,23 +34,23 @@ pub(super) fn page(content: &ReportContent, figures: &[ReportFigure]) -> String 
                     (run_section(index, run))
                 }
                 @if has_log_section(content) {
-                    h2 #log { "The log and its rig" }
+                    h2 #log { "Log and rig" }
                 }
                 @if let Some(check) = &content.check {
                     (tables::findings(check))
                     (tables::topics(check))
                 }
                 @if !content.log_warnings.is_empty() {
-                    h3 { "Warnings while it was read" }
+                    h3 { "Warnings of the log reader" }
                     (list(&content.log_warnings))
                 }
-                h2 #origin { "Origin" }
-                p { "This report was made by" }
+                h2 #origin { "Reproduction" }
+                p { "Command" }
                 pre { (content.command) }
                 (tables::inputs(content))
                 p {
-                    "Made with " (content.program) ". The same files, command and version give the same bytes. Beside this \
-                     page lie report.json and, for each run, trajectory.tum, calibration.csv, rank.csv, information.csv, \
+                    "Version: " (content.program) ". The same files, command and version give the same bytes. Files beside \
+                     this page: report.json and, for each run, trajectory.tum, calibration.csv, rank.csv, information.csv, \
                      frames.csv, rig.yaml and summary.json."
                 }
             }
@@ -73,8 +73,7 @@ fn lead(content: &ReportContent) -> String {
             None => run.label.clone(),
         })
         .collect();
-    let what =
-        if content.runs.iter().any(|run| run.summary.accuracy.is_some()) { "position error (rmse) of " } else { "" };
+    let what = if content.runs.iter().any(|run| run.summary.accuracy.is_some()) { "ATE RMSE: " } else { "" };
     format!("{} s, rig {}; {what}{}.", number(content.duration_s, 1), content.rig, runs.join(", "))
 }
 
@@ -88,9 +87,9 @@ fn contents(content: &ReportContent) -> Markup {
                     " " li { a href={ "#run-" (index) } { (run.label) } }
                 }
                 @if has_log_section(content) {
-                    " " li { a href="#log" { "The log and its rig" } }
+                    " " li { a href="#log" { "Log and rig" } }
                 }
-                " " li { a href="#origin" { "Origin" } }
+                " " li { a href="#origin" { "Reproduction" } }
             }
         }
     }
@@ -116,10 +115,10 @@ fn run_section(index: usize, run: &RunContent) -> Markup {
         h2 id={ "run-" (index) } { "Run " (run.label) }
         @if let (Some(first), Some(last)) = (&calibration.chain_error_initial, &calibration.chain_error) {
             p {
-                "Over the joint angles visited, the camera sits " (number(first.translation_mean_m * 1e3, 1)) " mm and "
-                (number(first.rotation_mean_rad.to_degrees(), 2)) "° from the truth with the rig's values, and "
-                (number(last.translation_mean_m * 1e3, 1)) " mm and " (number(last.rotation_mean_rad.to_degrees(), 2))
-                "° at the end."
+                "Extrinsics error of the camera, mean over the joint angles of the run: "
+                (number(first.translation_mean_m * 1e3, 1)) " mm, " (number(first.rotation_mean_rad.to_degrees(), 2))
+                "° with the rig's values; " (number(last.translation_mean_m * 1e3, 1)) " mm, "
+                (number(last.rotation_mean_rad.to_degrees(), 2)) "° with the final calibration."
             }
         }
         @if !calibration.parameters.is_empty() {
@@ -131,7 +130,7 @@ fn run_section(index: usize, run: &RunContent) -> Markup {
             (tables::events(run))
         }
         @if !frequent.is_empty() {
-            p { "Besides: " (frequent.join(", ")) "." }
+            p { "Number of other events: " (frequent.join(", ")) "." }
         }
         (list(&run.summary.warnings))
     }
@@ -140,16 +139,17 @@ fn run_section(index: usize, run: &RunContent) -> Markup {
 fn rank_section(run: &RunContent) -> Markup {
     let sentences: Vec<String> = run.rank_intervals.iter().map(RankInterval::sentence).collect();
     let known = run.summary.rank.iter().flat_map(|rank| &rank.known);
-    let known: Vec<String> =
-        known.map(|known| format!("{} (null in {} of {} steps)", known.reason, known.agreeing, known.steps)).collect();
+    let known: Vec<String> = known
+        .map(|known| format!("{} (confirmed in {} of {} steps)", known.reason, known.agreeing, known.steps))
+        .collect();
     html! {
         h3 { "Rank over time" }
         @if sentences.is_empty() {
-            p { "There was no linearization to analyse." }
+            p { "No rank analysis: no step of the run was linearized." }
         } @else {
             (list(&sentences))
             @if !known.is_empty() {
-                p { "Known from the form of the chain, and measured:" }
+                p { "Null directions of the parameterization in closed form, and the steps whose Jacobian confirms them:" }
                 (list(&known))
             }
         }

@@ -35,18 +35,17 @@ pub(super) struct RankInterval {
 }
 
 impl RankInterval {
-    /// The interval in words: `rank 18 of 18 from 3.2 s to 8.5 s; …`.
+    /// The interval in words: `3.2 to 8.5 s: structural rank 18 of 18, informed rank 15, least observable yaw.d`.
     pub(super) fn sentence(&self) -> String {
-        let causes =
-            ["the parameterization", "joints that did not move", "free joint angles", "the motion of the vehicle"];
+        let causes = ["parameterization", "stationary joints", "free joint angles", "vehicle motion"];
         let lost = self.lost.iter().zip(causes).filter(|(count, _)| **count > 0);
-        let lost: Vec<String> = lost.map(|(count, cause)| format!("{count} to {cause}")).collect();
-        let lost = if lost.is_empty() { String::new() } else { format!("; lost: {}", lost.join(", ")) };
+        let lost: Vec<String> = lost.map(|(count, cause)| format!("{count} {cause}")).collect();
+        let lost = if lost.is_empty() { String::new() } else { format!(" (deficit: {})", lost.join(", ")) };
         let least_observable =
-            self.least_observable.as_ref().map_or_else(String::new, |name| format!("; known least: {name}"));
+            self.least_observable.as_ref().map_or_else(String::new, |name| format!(", least observable {name}"));
         format!(
-            "rank {} of {} from {:.1} s to {:.1} s{lost}; the window tells more than the rig about {} of {}{least_observable}",
-            self.structural, self.columns, self.from_s, self.to_s, self.informed, self.columns
+            "{:.1} to {:.1} s: structural rank {} of {}{lost}, informed rank {}{least_observable}",
+            self.from_s, self.to_s, self.structural, self.columns, self.informed
         )
     }
 }
@@ -131,11 +130,11 @@ mod tests {
         };
         assert_eq!(
             interval.sentence(),
-            "rank 15 of 24 from 3.2 s to 8.5 s; lost: 6 to the parameterization, 3 to the motion of the vehicle; the window \
-             tells more than the rig about 11 of 24; known least: yaw.d"
+            "3.2 to 8.5 s: structural rank 15 of 24 (deficit: 6 parameterization, 3 vehicle motion), informed rank 11, \
+             least observable yaw.d"
         );
         let full = RankInterval { structural: 24, lost: [0; 4], least_observable: None, ..interval };
-        assert!(!full.sentence().contains("lost"), "{}", full.sentence());
+        assert!(!full.sentence().contains("deficit"), "{}", full.sentence());
     }
 
     #[test]

@@ -32,13 +32,15 @@ pub(super) fn frames(content: &ReportContent) -> Markup {
             ]
         })
         .collect();
-    let header = ["run", "camera", "images", "estimated", "keyframes", "initialized at s", "restarts", "length m"];
-    table("Frames and length of the path", &header, &rows)
+    let header =
+        ["run", "camera", "images", "estimated frames", "keyframes", "initialized at, s", "restarts", "path length, m"];
+    table("Frames and path length", &header, &rows)
 }
 
 /// Trajectory errors of each run.
 pub(super) fn accuracy(content: &ReportContent) -> Markup {
-    let mut header = ["run", "ATE rmse m", "mean m", "median m", "max m", "% of length"].map(str::to_owned).to_vec();
+    let mut header =
+        ["run", "ATE RMSE, m", "mean, m", "median, m", "max, m", "RMSE, % of length"].map(str::to_owned).to_vec();
     // All runs have relative errors over the same lengths, as far as their paths are long enough.
     let mut lengths_m: Vec<f64> = Vec::new();
     for relative in content.runs.iter().filter_map(|run| run.summary.accuracy.as_ref()).flat_map(|found| &found.rpe) {
@@ -47,7 +49,7 @@ pub(super) fn accuracy(content: &ReportContent) -> Markup {
         }
     }
     lengths_m.sort_by(f64::total_cmp);
-    header.extend(lengths_m.iter().map(|length_m| format!("over {length_m} m")));
+    header.extend(lengths_m.iter().map(|length_m| format!("RPE over {length_m} m")));
     let rows: Vec<Vec<String>> = content
         .runs
         .iter()
@@ -74,7 +76,7 @@ pub(super) fn accuracy(content: &ReportContent) -> Markup {
         })
         .collect();
     table(
-        "Position error after alignment by yaw and position, and relative error (rmse) over stretches",
+        "Absolute trajectory error (ATE) after alignment by yaw and position; relative pose error (RPE, RMSE)",
         &header,
         &rows,
     )
@@ -84,13 +86,14 @@ pub(super) fn accuracy(content: &ReportContent) -> Markup {
 pub(super) fn calibration(run: &RunContent) -> Markup {
     let parameters = &run.summary.calibration.parameters;
     let with_ground_truth = parameters.iter().any(|parameter| parameter.ground_truth.is_some());
-    let mut header = vec!["parameter", "unit", "given", "at the end", "± σ"];
+    let mut header = vec!["parameter", "unit", "rig", "final", "± σ"];
     if with_ground_truth {
-        header.extend(["truth", "error", "error / σ"]);
+        header.extend(["ground truth", "error", "error / σ"]);
     }
     let rows: Vec<Vec<String>> =
         parameters.iter().map(|parameter| calibration_row(parameter, with_ground_truth)).collect();
-    let caption = format!("Calibration of {}, {} form", run.label, run.summary.calibration.parameterization);
+    let caption =
+        format!("Calibration of run {}, parameterization {}", run.label, run.summary.calibration.parameterization);
     table(&caption, &header, &rows)
 }
 
@@ -119,11 +122,11 @@ pub(super) fn events(run: &RunContent) -> Markup {
         .events
         .iter()
         .map(|event| {
-            let times = if event.times > 1 { format!("{} frames in a row", event.times) } else { String::new() };
+            let times = if event.times > 1 { format!("{} consecutive frames", event.times) } else { String::new() };
             vec![number(event.time_s, 2), event.kind.clone(), event.message.clone(), times]
         })
         .collect();
-    table(&format!("Events of {}", run.label), &["at s", "event", "why", ""], &rows)
+    table(&format!("Events of run {}", run.label), &["time, s", "event", "message", ""], &rows)
 }
 
 /// Findings of `check` about the log and its rig, most severe first; findings without a problem as a list.
@@ -139,12 +142,12 @@ pub(super) fn findings(check: &CheckReport) -> Markup {
     let good: Vec<String> = good.iter().map(|found| format!("{}: {}", found.title, found.evidence)).collect();
     html! {
         @if rows.is_empty() {
-            p { "Nothing is wrong with the log and its rig, as far as can be told beforehand." }
+            p { "No problems found in the log and the rig." }
         } @else {
-            (table("Found in the whole log, before any estimation", &["", "about", "what", "remedy"], &rows))
+            (table("Problems of the log and the rig (dcvins check)", &["severity", "area", "finding", "remedy"], &rows))
         }
         @if !good.is_empty() {
-            p { "In order:" }
+            p { "Checks without problems:" }
             (list(&good))
         }
     }
@@ -167,14 +170,14 @@ pub(super) fn topics(check: &CheckReport) -> Markup {
             ]
         })
         .collect();
-    table("Topics", &["topic", "type", "used as", "messages", "Hz", "s", "late ms"], &rows)
+    table("Topics", &["topic", "type", "role", "messages", "rate, Hz", "stamps, s", "median delay, ms"], &rows)
 }
 
 /// Input files.
 pub(super) fn inputs(content: &ReportContent) -> Markup {
     let row = |input: &super::InputFile| vec![input.name.clone(), input.bytes.to_string(), input.sha256.clone()];
     let rows: Vec<Vec<String>> = content.inputs.iter().map(row).collect();
-    table("Files that went in", &["file", "bytes", "SHA-256"], &rows)
+    table("Input files", &["file", "bytes", "SHA-256"], &rows)
 }
 
 #[cfg(test)]

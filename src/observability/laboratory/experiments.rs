@@ -223,7 +223,7 @@ pub(super) const SECTIONS: [Section; 6] = [
             experiment("joint 2 moves", OFFSET).freezing(&[1, 3]),
             experiment("joint 3 moves", OFFSET).freezing(&[1, 2]),
             experiment("no joint moves", OFFSET).freezing(&[1, 2, 3]),
-            experiment("joint 2 rests, axes 1, 3 parallel", "outer-parallel").freezing(&[2]),
+            experiment("joint 2 stationary, axes 1, 3 parallel", "outer-parallel").freezing(&[2]),
             experiment("no encoder, joints 1, 3 move", OFFSET).freezing(&[2]).without_encoder().frames(16),
             experiment("no encoder, joint 1 moves", OFFSET).freezing(&[2, 3]).without_encoder().frames(16),
             experiment("no encoder, no joint moves", OFFSET).freezing(&[1, 2, 3]).without_encoder().frames(16),

@@ -45,10 +45,7 @@ type JointAxis = (Vector3<f64>, Vector3<f64>);
 impl Mechanism {
     /// The names that [`Self::named`] takes, each with its meaning.
     pub const NAMES: [(&'static str, &'static str); 19] = [
-        (
-            "yaw-roll-pitch-offset",
-            "axes off each other by 2 to 8 cm and out of square by degrees, optical camera frame",
-        ),
+        ("yaw-roll-pitch-offset", "axes 2 to 8 cm apart and some degrees from perpendicular, optical camera frame"),
         ("yaw-roll-pitch-ideal", "axes intersect at right angles, optical camera frame"),
         ("yaw-roll-pitch-flu", "body-style camera frame: the last axis is parallel to the camera's y"),
         ("yaw-roll-pitch-flu-centred", "the same with the camera's centre on the last axis"),
@@ -56,11 +53,11 @@ impl Mechanism {
         ("roll-first", "the first axis is parallel to the IMU's x"),
         ("parallel-axes", "axes 1 and 2 parallel, 6 cm apart"),
         ("parallel-axes-2-3", "axes 2 and 3 parallel, 6 cm apart"),
-        ("coaxial-axes", "axes 1 and 2 on one line"),
+        ("coaxial-axes", "axes 1 and 2 collinear"),
         ("outer-parallel", "axes 1 and 3 parallel while joint 2 is at zero"),
         ("one-joint", "pan only, optical camera frame: its axis is parallel to the camera's y"),
         ("one-joint-tilted", "pan only, the camera tilted against its axis"),
-        ("pan-tilt", "two joints, out of square by degrees"),
+        ("pan-tilt", "two joints, some degrees from perpendicular"),
         ("rigid", "no joints"),
         ("generic", "three joints, drawn at random"),
         ("generic-1", "one joint, drawn at random"),

@@ -109,26 +109,28 @@ impl LaboratoryMotion {
     /// Description of the motion.
     pub fn meaning(self) -> &'static str {
         match self {
-            Self::Aggressive => "the vehicle turns and translates about all axes",
+            Self::Aggressive => "the vehicle rotates and translates about all axes",
             Self::TranslationOnly => "the vehicle translates and never rotates",
             Self::Hover => "the vehicle neither translates nor rotates",
             Self::ConstantVelocity => "the vehicle moves at constant velocity without rotation",
             Self::YawOnly => "the level vehicle yaws and translates in space",
             Self::YawPlanar => "the level vehicle yaws and translates in the horizontal plane",
-            Self::YawTilted => "the tilted vehicle turns about the vertical only and translates",
+            Self::YawTilted => "the tilted vehicle rotates about the vertical only and translates",
             Self::YawInPlace => "the vehicle yaws without translating",
             Self::RotationOnly => "the vehicle rotates about all axes without translating",
             Self::ConstantVelocityRotation => "the vehicle rotates about all axes at constant velocity",
             Self::StraightLine => "the vehicle rotates and accelerates on a straight line",
             Self::Stabilized => "the camera never rotates in the world while vehicle and joints move",
-            Self::YawFollowing => "the camera turns about the vertical only while vehicle and joints move",
+            Self::YawFollowing => "the camera rotates about the vertical only while vehicle and joints move",
             Self::StabilizedRotationOnly => "the camera never rotates in the world, the vehicle does not translate",
-            Self::StabilizedTranslationOnly => "the camera never rotates in the world, nor do vehicle and joints",
-            Self::CameraStationary => "the camera neither turns nor moves in the world while vehicle and joints do",
-            Self::OneJointFrozen => {
-                "all move about all axes but the second joint, or the only one, which is stationary"
+            Self::StabilizedTranslationOnly => "neither camera, vehicle nor joints rotate in the world",
+            Self::CameraStationary => {
+                "the camera neither rotates nor translates in the world while vehicle and joints move"
             }
-            Self::AllJointsFrozen => "the vehicle turns and translates about all axes while all joints rest",
+            Self::OneJointFrozen => {
+                "vehicle and joints move about all axes, except the second (or only) joint, which is stationary"
+            }
+            Self::AllJointsFrozen => "the vehicle rotates and translates about all axes, all joints are stationary",
         }
     }
 

@@ -124,7 +124,7 @@ impl LaboratoryReport {
             frozen_joints: setup.frozen.iter().map(joint_name).collect(),
             joint_angles: match setup.joints {
                 JointKnowledge::Known => "known".to_owned(),
-                JointKnowledge::Encoder(sigma_rad) => format!("read within {:.3}°", sigma_rad.to_degrees()),
+                JointKnowledge::Encoder(sigma_rad) => format!("from encoders, σ {:.3}°", sigma_rad.to_degrees()),
                 JointKnowledge::Unknown => "unknown".to_owned(),
             },
             poses: match setup.poses {
@@ -200,7 +200,7 @@ impl fmt::Display for DirectionReport {
             write!(out, "{sign}{:.2} {}", entry.weight.abs(), entry.name)?;
         }
         if self.parameters.len() > SHOWN {
-            write!(out, " and {} smaller", self.parameters.len() - SHOWN)?;
+            write!(out, " and {} smaller weights", self.parameters.len() - SHOWN)?;
         }
         Ok(())
     }
@@ -216,10 +216,10 @@ impl fmt::Display for LaboratoryReport {
         if !self.frozen_joints.is_empty() {
             writeln!(out, "           {} fixed", self.frozen_joints.join(", "))?;
         }
-        writeln!(out, "knowledge  joint angles {}, poses {}", self.joint_angles, self.poses)?;
+        writeln!(out, "measured   joint angles {}, poses {}", self.joint_angles, self.poses)?;
         writeln!(
             out,
-            "window     {} frames {} s apart, {} landmarks, {} px; columns scaled by 10° and 3 cm\n",
+            "window     {} frames every {} s, {} landmarks, pixel σ {} px; columns scaled by 10° and 3 cm\n",
             self.frames, self.frame_period_s, self.landmarks, self.pixel_sigma_px
         )?;
         self.write_columns(out)?;
@@ -248,7 +248,7 @@ impl LaboratoryReport {
         line(out, "lost to stationary joints", &|form| form.deficit.joints.to_string())?;
         line(out, "absorbed by free angles", &|form| form.deficit.absorbed.to_string())?;
         line(out, "lost to the motion", &|form| form.deficit.motion.to_string())?;
-        line(out, "least observable direction", &|form| {
+        line(out, "smallest singular value > 0", &|form| {
             let least_observable = form.rank_structural.checked_sub(1).map(|index| form.singular_values[index]);
             least_observable.map_or_else(|| "-".to_owned(), |value| format!("{value:.3}"))
         })?;
@@ -274,7 +274,7 @@ impl fmt::Display for FormReport {
             writeln!(out, "  {mark}  {value}{direction}")?;
         }
         for known in &self.known {
-            let mark = if known.agrees { "as known" } else { "AGAINST what is known" };
+            let mark = if known.agrees { "confirmed" } else { "NOT CONFIRMED" };
             writeln!(out, "  {mark}  {}", known.reason)?;
         }
         let values: Vec<String> = self
@@ -283,7 +283,7 @@ impl fmt::Display for FormReport {
             .map(|value| if *value <= self.structural_threshold { "0".to_owned() } else { format!("{value:.3}") })
             .collect();
         let lines: Vec<String> = values.chunks(12).map(|part| part.join(" ")).collect();
-        write!(out, "  spectrum  {}", lines.join("\n            "))?;
+        write!(out, "  singular values  {}", lines.join("\n                   "))?;
         write!(out, "  (0: at most {:.0e})", self.structural_threshold)
     }
 }

@@ -27,8 +27,8 @@ const KNOWN: f64 = 1.0;
 /// Heading of the rows.
 pub(super) fn title() -> String {
     format!(
-        "Spurious information of two windows, the calibration changed between them: largest scaled singular value of the\n\
-         directions that are unobservable in both (1: σ of 10° or 3 cm), and how many are over 1; {DRAWS} draws"
+        "Spurious information of two windows with different calibrations: largest scaled singular value along the directions\n\
+         that are unobservable in both (1: σ of 10° or 3 cm), and the number above 1; {DRAWS} random draws"
     )
 }
 
@@ -146,7 +146,7 @@ impl fmt::Display for SpuriousRow {
         };
         write!(
             out,
-            "with FEJ {:.0e}, without {least:.2} to {most:.2}; over 1: {known} of {}",
+            "with FEJ {:.0e}, without {least:.2} to {most:.2}; above 1: {known} of {}",
             self.with_first_estimates, self.null
         )
     }

@@ -164,9 +164,9 @@ impl fmt::Display for Survey {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             out,
-            "Structural rank of columns. C classical, M minimal, B minimal-swapped, Mb minimal-yx, P poe, - without joint\n\
-             offsets. Deficit of the first: G parameterization, F joints that do not move, E free joint angles, M motion;\n\
-             = how many of its null directions known in closed form were computed to be null."
+            "Structural rank / number of columns. C classical, M minimal, B minimal-swapped, Mb minimal-yx, P poe, - without joint\n\
+             offsets. Deficit of the first: G parameterization, F stationary joints, E free joint angles, M motion;\n\
+             = number of its closed-form null directions that the computed Jacobian confirms."
         )?;
         for section in &self.sections {
             writeln!(out, "\n{}", section.title)?;
@@ -174,9 +174,9 @@ impl fmt::Display for Survey {
                 writeln!(out, "{row}")?;
             }
         }
-        writeln!(out, "\nLeast number of frames for the full rank of the minimal form (three joints, generic)")?;
+        writeln!(out, "\nSmallest number of frames for full rank, minimal parameterization (three joints, generic)")?;
         for MinFramesRow { scenario, columns, rank, frames } in &self.least_frames {
-            writeln!(out, "  {scenario:<42}M {rank}/{columns} from {frames} frames on")?;
+            writeln!(out, "  {scenario:<42}M {rank}/{columns} from {frames} frames")?;
         }
         writeln!(out, "\n{}", spurious::title())?;
         for row in &self.spurious {

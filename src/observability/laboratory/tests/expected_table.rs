@@ -102,7 +102,7 @@ const SECTIONS: [(&str, &[Expected]); 6] = [
             expected("joint 2 moves", &[10, 10], [6, 8, 0, 0], None),
             expected("joint 3 moves", &[10, 10], [6, 8, 0, 0], None),
             expected("no joint moves", &[6, 6], [6, 12, 0, 0], None),
-            expected("joint 2 rests, axes 1, 3 parallel", &[14, 14], [6, 4, 0, 0], None),
+            expected("joint 2 stationary, axes 1, 3 parallel", &[14, 14], [6, 4, 0, 0], None),
             expected("no encoder, joints 1, 3 move", &[11, 11], [6, 4, 3, 0], None),
             expected("no encoder, joint 1 moves", &[7, 7], [6, 8, 3, 0], None),
             expected("no encoder, no joint moves", &[3, 3], [6, 12, 3, 0], None),
