@@ -48,7 +48,7 @@ pub(super) fn accuracy_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, scores: &Scor
         ui.end_row();
         for row in scores.rows() {
             let best = row.best();
-            ui.label(RichText::new(&row.name).color(theme.text));
+            ui.label(RichText::new(&row.name).color(theme.text)).on_hover_text(row.meaning);
             ui.label(RichText::new(row.unit).color(theme.text_weak));
             for run in 0..runs.len() {
                 let text = row.text(run);
@@ -117,7 +117,7 @@ fn table_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, number: usize, own: &str, c
             let Some((largest, largest_ns)) = largest else { continue };
             let name = |what: &str| format!("{own}, {}: {what}", quantity.name());
             let apart = comparison.at(quantity, ctx.cursor_ns);
-            ui.label(RichText::new(quantity.name()).color(theme.text));
+            ui.label(RichText::new(quantity.name()).color(theme.text)).on_hover_text(quantity.meaning());
             time_button(ui, ctx, exact_ns, &name("first bitwise difference"));
             let tolerance = format!("≥ {}", difference_text(quantity, quantity.notable()));
             ui.label(RichText::new(tolerance).small().color(theme.text_weak));

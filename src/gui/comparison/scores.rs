@@ -34,6 +34,8 @@ pub(crate) struct Scores {
 pub(crate) struct ScoreRow {
     /// Name of the value.
     pub(crate) name: String,
+    /// Definition of the value.
+    pub(super) meaning: &'static str,
     /// Shown unit, empty for counts.
     pub(crate) unit: &'static str,
     /// Values by run, in the shown unit.
@@ -84,44 +86,71 @@ impl Scores {
     pub(crate) fn rows(&self) -> Vec<ScoreRow> {
         let row = |name: &str, unit: &'static str, less, decimals, of: &dyn Fn(&RunScore) -> Option<f64>| ScoreRow {
             name: name.to_owned(),
+            meaning: "",
             unit,
             values: self.runs.iter().map(of).collect(),
             less_is_better: less,
             decimals,
         };
+        let with = |meaning: &'static str, row: ScoreRow| ScoreRow { meaning, ..row };
         let less = Some(true);
         let absolute = |score: &RunScore| score.accuracy.as_ref().map(|accuracy| accuracy.absolute_m);
+        let ate = |row| with("Absolute trajectory error: position error after alignment in yaw and position", row);
         let mut rows = vec![
-            row("ATE RMS", "m", less, None, &|score| Some(absolute(score)?.rmse)),
-            row("ATE mean", "m", less, None, &|score| Some(absolute(score)?.mean)),
-            row("ATE median", "m", less, None, &|score| Some(absolute(score)?.median)),
-            row("ATE max", "m", less, None, &|score| Some(absolute(score)?.max)),
-            row("ATE RMS / path length", "%", less, Some(2), &|score| {
+            ate(row("ATE RMS", "m", less, None, &|score| Some(absolute(score)?.rmse))),
+            ate(row("ATE mean", "m", less, None, &|score| Some(absolute(score)?.mean))),
+            ate(row("ATE median", "m", less, None, &|score| Some(absolute(score)?.median))),
+            ate(row("ATE max", "m", less, None, &|score| Some(absolute(score)?.max))),
+            ate(row("ATE RMS / path length", "%", less, Some(2), &|score| {
                 let accuracy = score.accuracy.as_ref().filter(|accuracy| accuracy.length_m > 0.0)?;
                 Some(100.0 * accuracy.absolute_m.rmse / accuracy.length_m)
-            }),
+            })),
         ];
+        let rpe = |row| with("Relative pose error over sub-trajectories of this length", row);
+        let extrinsics = |row| {
+            with("Error of imu_from_camera against the ground-truth rig, mean over the visited joint angles", row)
+        };
         for delta_m in RELATIVE_LENGTHS_M {
             let over = |score: &RunScore| {
                 score.accuracy.as_ref()?.relative.iter().find(|over| over.delta_m == delta_m).copied()
             };
             let name = format!("RPE {delta_m:.0} m RMS");
-            rows.push(row(&name, "m", less, None, &|score| Some(over(score)?.translation_m.rmse)));
-            rows.push(row(&name, "°", less, None, &|score| Some(over(score)?.rotation_rad.rmse.to_degrees())));
+            rows.push(rpe(row(&name, "m", less, None, &|score| Some(over(score)?.translation_m.rmse))));
+            rows.push(rpe(row(&name, "°", less, None, &|score| Some(over(score)?.rotation_rad.rmse.to_degrees()))));
         }
         let chain = |score: &RunScore| score.chain;
         rows.extend([
-            row("extrinsics error, mean", "mm", less, Some(2), &|score| Some(1e3 * chain(score)?.translation_m.mean)),
-            row("extrinsics error, mean", "°", less, Some(3), &|score| {
+            extrinsics(row("extrinsics error, mean", "mm", less, Some(2), &|score| {
+                Some(1e3 * chain(score)?.translation_m.mean)
+            })),
+            extrinsics(row("extrinsics error, mean", "°", less, Some(3), &|score| {
                 Some(chain(score)?.rotation_rad.mean.to_degrees())
-            }),
-            row("path length", "m", None, Some(1), &|score| Some(score.accuracy.as_ref()?.length_m)),
-            row("frames", "", None, Some(0), &|score| Some(score.count as f64)),
-            row("estimated frames", "", Some(false), Some(0), &|score| Some(score.estimated as f64)),
-            row("initialized at", "s", less, Some(2), &|score| score.initialized_s),
-            row("restarts", "", less, Some(0), &|score| Some(score.restarts as f64)),
-            row("calibration columns", "", None, Some(0), &|score| Some(score.columns as f64)),
-            row("informed rank at the end", "", None, Some(0), &|score| score.informed.map(|rank| rank as f64)),
+            })),
+            with(
+                "Length of the ground-truth path over the estimated frames",
+                row("path length", "m", None, Some(1), &|score| Some(score.accuracy.as_ref()?.length_m)),
+            ),
+            with("Processed frames", row("frames", "", None, Some(0), &|score| Some(score.count as f64))),
+            with(
+                "Frames with an estimated pose",
+                row("estimated frames", "", Some(false), Some(0), &|score| Some(score.estimated as f64)),
+            ),
+            with(
+                "Stamp of the first frame with an estimated pose",
+                row("initialized at", "s", less, Some(2), &|score| score.initialized_s),
+            ),
+            with(
+                "Re-initializations after a failure",
+                row("restarts", "", less, Some(0), &|score| Some(score.restarts as f64)),
+            ),
+            with(
+                "Estimated calibration parameters of the last step",
+                row("calibration columns", "", None, Some(0), &|score| Some(score.columns as f64)),
+            ),
+            with(
+                "Informed rank of the last step with a calibration",
+                row("informed rank at the end", "", None, Some(0), &|score| score.informed.map(|rank| rank as f64)),
+            ),
         ]);
         rows.retain(|row| row.values.iter().any(Option::is_some));
         rows

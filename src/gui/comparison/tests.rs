@@ -56,7 +56,7 @@ fn numbers_show_accuracy_and_lead_to_the_divergence() {
     assert_eq!(rms.best(), (rms.text(0) != rms.text(1)).then_some(usize::from(classical < auto)));
     let row = |values: [f64; 2]| {
         let (name, values) = ("ATE RMS".to_owned(), values.map(Some).to_vec());
-        ScoreRow { name, unit: "m", values, less_is_better: Some(true), decimals: None }
+        ScoreRow { name, meaning: "", unit: "m", values, less_is_better: Some(true), decimals: None }
     };
     assert_eq!(
         [row([0.12, 0.11]), row([0.11, 0.12]), row([0.11, 0.110_000_1])].map(|row| row.best()),

@@ -30,8 +30,8 @@ pub enum OffscreenError {
     },
     /// The screenshot is larger than the adapter's largest texture.
     #[error(
-        "a picture of {width}×{height} pixels is too large for the graphics adapter {adapter}, which draws up to \
-         {largest} each way; use --renderer cpu"
+        "a screenshot of {width}×{height} pixels exceeds the limit of the graphics adapter {adapter}, {largest} pixels per \
+         side; use --renderer cpu"
     )]
     TooLarge {
         /// Width in pixels.
@@ -44,7 +44,7 @@ pub enum OffscreenError {
         adapter: String,
     },
     /// The driver did not return the pixels.
-    #[error("the graphics adapter {adapter} delivered no picture: {problem}; use --renderer cpu")]
+    #[error("the graphics adapter {adapter} returned no image: {problem}; use --renderer cpu")]
     NotDelivered {
         /// Name of the adapter.
         adapter: String,

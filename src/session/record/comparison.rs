@@ -87,6 +87,26 @@ impl Quantity {
         self.facts().0
     }
 
+    /// Definition of the difference.
+    pub const fn meaning(self) -> &'static str {
+        match self {
+            Self::Phase => "1 where one run is initializing and the other is tracking",
+            Self::Tracks => "Number of features that only one of the runs tracks",
+            Self::Keyframe => "1 where the frame is a keyframe in one run only",
+            Self::Position => "Distance of the IMU positions, after alignment of the worlds in yaw and position",
+            Self::Attitude => "Angle between the IMU attitudes, after alignment of the worlds in yaw",
+            Self::Velocity => "Norm of the velocity difference, after alignment of the worlds in yaw",
+            Self::AccelerometerBias => "Norm of the difference of the accelerometer biases",
+            Self::GyroscopeBias => "Norm of the difference of the gyroscope biases",
+            Self::JointAngles => "Largest difference of the estimated joint angles",
+            Self::ChainTranslation => "Difference of imu_from_camera at the joint angles of the frame, translation",
+            Self::ChainRotation => "Difference of imu_from_camera at the joint angles of the frame, rotation",
+            Self::Reprojection => "Difference of the reprojection RMS after the solve",
+            Self::RankStructural => "Difference of the structural ranks",
+            Self::RankInformed => "Difference of the informed ranks",
+        }
+    }
+
     /// Unit as stored; empty for counts.
     pub const fn unit(self) -> &'static str {
         self.facts().1
