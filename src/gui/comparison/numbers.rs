@@ -108,7 +108,7 @@ pub(super) fn divergences_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, reference:
 fn table_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, number: usize, own: &str, comparison: &Comparison) {
     let theme = *ctx.theme;
     Grid::new(("partings", number)).striped(true).spacing(vec2(12.0, 2.0)).show(ui, |ui| {
-        for heading in ["", "first difference", "threshold", "first above it", "at cursor", "maximum", "at"] {
+        for heading in ["", "first difference", "threshold", "exceeded at", "at cursor", "maximum", "at"] {
             ui.label(RichText::new(heading).small().color(theme.text_weak));
         }
         ui.end_row();

@@ -214,13 +214,14 @@ pub(super) fn cell_ui(
         let far = error.abs() > 3.0 * sigma;
         let place = plot.right_bottom() + vec2(-3.0, -STRIP_HEIGHT - 1.0);
         let color = if far { theme.error } else { theme.text_weak };
-        boxed_text(&inner, &theme, place, Align2::RIGHT_BOTTOM, &error_text(shown, error, sigma), color);
+        let text = format!("Δ {}", error_text(shown, error, sigma));
+        boxed_text(&inner, &theme, place, Align2::RIGHT_BOTTOM, &text, color);
     }
 
     let mut text = shown_value
         .map_or_else(String::new, |(value, sigma)| format!("{} ± {}", shown.value(value, sigma), shown.sigma(sigma)));
     if let Some((error, sigma)) = error {
-        text.push_str(", ");
+        text.push_str(", error ");
         text.push_str(&error_text(shown, error, sigma));
     }
     let label = format!("{name} {text} {}", state.tag());
@@ -242,7 +243,7 @@ fn error_text(shown: Shown, error: f64, sigma: f64) -> String {
     let times = error.abs() / sigma;
     let value = shown.value(error, sigma);
     let text = if value.starts_with('-') { value } else { format!("+{value}") };
-    if times.is_finite() { format!("error {text} ({times:.1}σ)") } else { format!("error {text}") }
+    if times.is_finite() { format!("{text} ({times:.1}σ)") } else { text }
 }
 
 /// Hatches the ranges in which the parameter is not informed; a strip at the bottom shows the state.

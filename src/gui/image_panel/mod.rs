@@ -146,7 +146,8 @@ impl ImagePanel {
 
     /// The options of the overlay: in a row where there is room, else in a menu.
     fn options_ui(&mut self, ui: &mut Ui) {
-        ui.checkbox(&mut self.residuals, "Residuals");
+        ui.checkbox(&mut self.residuals, "Residuals")
+            .on_hover_text("Reprojection residuals, prediction − measurement, px, magnified");
         ui.spacing_mut().slider_width = 70.0;
         ui.add_enabled(
             self.residuals,
@@ -156,8 +157,8 @@ impl ImagePanel {
                 .prefix("×")
                 .text("magnification"),
         );
-        ui.checkbox(&mut self.trails, "Track trails");
-        ui.checkbox(&mut self.ids, "Feature ids");
+        ui.checkbox(&mut self.trails, "Trails").on_hover_text("Track trails: earlier pixels of each feature");
+        ui.checkbox(&mut self.ids, "Ids").on_hover_text("Feature ids");
     }
 
     fn image_ui(

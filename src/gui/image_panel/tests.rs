@@ -93,8 +93,8 @@ fn controls_are_found_by_label_and_work() {
     harness.run();
     assert_eq!(harness.state().0.side, SolveSide::After);
     harness.get_by_label("Before").click();
-    harness.get_by_label("Feature ids").click();
-    harness.get_by_label("Track trails").click();
+    harness.get_by_label("Ids").click();
+    harness.get_by_label("Trails").click();
     harness.run();
     let panel = &harness.state().0;
     assert_eq!((panel.side, panel.ids, panel.trails), (SolveSide::Before, true, false));

@@ -150,14 +150,13 @@ impl CalibratedEntries {
             path: request.log_path.clone(),
         };
         let gimbal = rig.gimbal.clone().filter(|gimbal| !gimbal.joints.is_empty()).ok_or_else(|| {
-            missing(
-                "gimbal",
-                "the offline calibration is for gimbals; a rigid camera calibrates in 'dcvins run --run static'",
-            )
+            missing("gimbal", "offline calibration requires a gimbal; for a rigid camera use 'dcvins run --run static'")
         })?;
-        let gimbal_camera = rig.cameras.iter().find(|camera| camera.mount == CameraMount::Gimbal).ok_or_else(|| {
-            missing("camera with mount: gimbal", "name the camera that the gimbal carries in the rig")
-        })?;
+        let gimbal_camera = rig
+            .cameras
+            .iter()
+            .find(|camera| camera.mount == CameraMount::Gimbal)
+            .ok_or_else(|| missing("camera with mount: gimbal", "declare the camera on the gimbal in the rig"))?;
         let found = rig.cameras.iter().find_map(|camera| match &camera.mount {
             CameraMount::Static { imu_from_camera } => Some((camera, *imu_from_camera)),
             CameraMount::Gimbal => None,
@@ -165,13 +164,13 @@ impl CalibratedEntries {
         let (static_camera, imu_from_camera) = found.ok_or_else(|| {
             missing(
                 "camera with mount: static",
-                "the gimbal is calibrated against a static camera; record one, or calibrate online with 'dcvins run --run auto'",
+                "offline calibration requires a static camera as reference; record one, or calibrate online with 'dcvins run --run auto'",
             )
         })?;
         if gimbal.encoder_sigma_rad.is_none() || gimbal.topic.is_none() {
             return Err(missing(
                 "encoders (gimbal.rostopic and gimbal.encoder_sigma)",
-                "the offline calibration needs joint angles; calibrate online with 'dcvins run --run auto:encoder=off'",
+                "offline calibration requires joint angles; calibrate online with 'dcvins run --run auto:encoder=off'",
             ));
         }
         Ok(Self { static_camera: static_camera.clone(), imu_from_camera, gimbal_camera: gimbal_camera.clone(), gimbal })

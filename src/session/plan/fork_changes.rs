@@ -99,8 +99,8 @@ pub enum ForkError {
 }
 
 /// The reason why a fork cannot use another camera.
-pub(super) const OTHER_CAMERA: &str = "the window of the run holds features that only its own cameras have observed, so that a fork \
-                            can leave a camera of two out (without=cam1) but not add another one";
+pub(super) const OTHER_CAMERA: &str = "the window of the run contains features that only its own cameras have observed, so that a \
+                            fork can exclude one of two cameras (without=cam1) but not add another one";
 
 /// Parameterizations that a fork can change to. Those on another camera would need other tracks.
 pub const FORK_PARAMETERIZATIONS: [ParameterizationChoice; 5] = [

@@ -42,7 +42,7 @@ pub enum SessionError {
         count: usize,
     },
     /// The part of the log that is to be read begins behind its end.
-    #[error("--start {start_s} begins behind the end of the log, which has {end_s:.3} s: {}", path.display())]
+    #[error("--start {start_s} s is after the end of the log ({end_s:.3} s): {}", path.display())]
     StartBeyondEnd {
         /// Where it begins.
         start_s: f64,

@@ -11,7 +11,7 @@ const CHOICES: [(&str, &str); 7] = [
     ("auto", "minimal, switched away from singularities"),
     ("minimal", "minimal, as in the paper"),
     ("minimal-swapped", "minimal, end block swapped"),
-    ("classical", "base, links and end effector, with redundant directions"),
+    ("classical", "base, links, end effector; redundant directions"),
     ("poe", "product of exponentials, without singularities"),
     ("static", "static camera of the rig, rigid extrinsics"),
     ("cluster", "gimbal camera and static camera in one window"),

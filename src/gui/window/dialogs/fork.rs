@@ -145,7 +145,7 @@ impl ForkDialog {
             ui.label("Use from the cursor on");
             ui.checkbox(&mut self.encoder, "Encoder readings");
             ui.end_row();
-            let name = ui.label("Noise added to joint angles, σ");
+            let name = ui.label("Added joint noise, σ");
             ui.add(DragValue::new(&mut self.joint_noise_deg).range(0.0..=45.0).speed(0.05).suffix("°"))
                 .labelled_by(name.id);
             ui.end_row();
