@@ -37,14 +37,14 @@ pub(crate) struct DegeneracyArguments {
     /// Motion of vehicle and camera; `--list` prints all [default: aggressive].
     #[arg(long, value_name = "NAME")]
     pub motion: Option<LaboratoryMotion>,
-    /// Numbers of joints that do not move, from 1.
+    /// Numbers of the stationary joints, from 1.
     #[arg(long, value_name = "N,…", value_delimiter = ',')]
     pub freeze: Vec<usize>,
     /// Standard deviation of the encoders in degrees, `known` for exact angles, `none` without encoders
     /// [default: known].
     #[arg(long, value_name = "D|known|none", value_parser = joint_knowledge)]
     pub encoder_sigma_deg: Option<JointKnowledge>,
-    /// Knowledge of the vehicle's poses [default: known].
+    /// Source of the vehicle's poses [default: known].
     #[arg(long, value_enum)]
     pub poses: Option<PosesArgument>,
     /// Number of frames, 0.25 s apart [default: 10].
@@ -53,8 +53,8 @@ pub(crate) struct DegeneracyArguments {
     /// Number of landmarks [default: 100].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=2000))]
     pub landmarks: Option<u16>,
-    /// Suggest excitation: candidate motions from the end of the experiment, by the σ that they would leave of the least
-    /// observable direction, and the information gain of each motion so far; for the first parameterization.
+    /// Suggest excitation for the first parameterization: candidate motions from the end of the experiment with the
+    /// predicted σ of the least observable direction, and the information gain of each motion so far.
     #[arg(long, conflicts_with = "table")]
     pub advise: bool,
     /// Print the names of the mechanisms and motions.
@@ -105,13 +105,16 @@ pub(crate) fn degeneracy(arguments: &DegeneracyArguments) -> Result<()> {
     };
     let results = setup.run_all(&forms);
     if results.len() < forms.len() {
-        bail!("the numbers of the mechanism '{}' are too large to compute with", setup.mechanism.name);
+        bail!(
+            "the Jacobian of the mechanism '{}' is not finite: its lengths or angles are too large",
+            setup.mechanism.name
+        );
     }
     let report = LaboratoryReport::new(&setup, &results);
     if !arguments.advise {
         return print_report(&report, arguments.json);
     }
-    let form = forms.first().copied().context("--advise needs a form")?;
+    let form = forms.first().copied().context("--advise requires a parameterization (--form)")?;
     print_report(&Advised::new(report, &setup, form)?, arguments.json)
 }
 
@@ -132,7 +135,7 @@ impl Advised {
             experiment,
             form: form.name(),
             excitation: excitation(&setup.window(), &form.chain(&setup.mechanism), &names, &setup.mechanism.names),
-            advice: advice.context("no motion constrains this mechanism")?,
+            advice: advice.context("no candidate motion constrains this mechanism")?,
         })
     }
 }

@@ -129,15 +129,15 @@ mod figures {
 
     /// Panels that show one stamp.
     const STAMP_PANELS: [Shown; 3] = [
-        shown("image", [1280, 900], "Tracks and residuals in the image", false),
-        shown("scene", [1280, 900], "Trajectory, landmarks and the chain", false),
+        shown("image", [1280, 900], "Image with feature tracks and residuals", false),
+        shown("scene", [1280, 900], "Trajectory, landmarks and gimbal chain", false),
         shown("rank", [1280, 900], "Ranks, singular values and null directions", true),
     ];
     /// Panels that show the whole log.
     const LOG_PANELS: [Shown; 3] = [
         shown("convergence", [1680, 1200], "Calibration parameters with ±3σ and ground truth", true),
-        shown("residuals", [1280, 800], "Residuals", true),
-        shown("timeline", [1680, 480], "Events, ranks, features and gaps", true),
+        shown("residuals", [1280, 800], "Reprojection residuals, and χ² by factor", true),
+        shown("timeline", [1680, 480], "Events, informed rank, features and warnings", true),
     ];
 
     /// The figures of a report: of the whole log, then of each stamp (without one, of the end).
@@ -173,7 +173,7 @@ mod figures {
             }
             Ok(())
         };
-        draw("The whole flight", &LOG_PANELS, end_ns)?;
+        draw("Whole log", &LOG_PANELS, end_ns)?;
         for cursor_ns in stamps_ns {
             draw(&format!("At {:.2} s", seconds_from_ns(cursor_ns)), &STAMP_PANELS, cursor_ns)?;
         }

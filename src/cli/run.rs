@@ -108,7 +108,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<Outcome> {
     }
     if no_steps {
         let log = export::log_name(&arguments.log);
-        bail!("no image of '{log}' could be used; 'dcvins check {}' says why", arguments.log.display());
+        bail!("no image of '{log}' could be used; reasons: 'dcvins check {}'", arguments.log.display());
     }
     if hit.is_some() {
         return Ok(Outcome::BreakHit);
@@ -119,7 +119,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<Outcome> {
 /// What an interrupted command has computed, as a notice.
 pub(crate) fn interrupted(recording: &Recording) -> String {
     let (done_s, end_s) = (seconds_from_ns(recording.last_stamp_ns()), seconds_from_ns(recording.duration_ns));
-    format!("dcvins: interrupted at {done_s:.2} s of {end_s:.2} s; the results are those up to there")
+    format!("dcvins: interrupted at {done_s:.2} s of {end_s:.2} s; the results up to this time are written")
 }
 
 /// Whether a run has estimated anything.

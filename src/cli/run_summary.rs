@@ -18,7 +18,7 @@ pub(crate) fn describe(folder: &Path, summary: &RunSummary) -> String {
     ));
     if let Some(accuracy) = &summary.accuracy {
         lines.push(format!(
-            "  accuracy     ATE {:.3} m rmse, {:.3} m max ({}), {:.2} % of {:.1} m\n",
+            "  accuracy     ATE {:.3} m RMSE, {:.3} m max (alignment {}), {:.2} % of {:.1} m\n",
             accuracy.ate_rmse_m,
             accuracy.ate_max_m,
             accuracy.alignment,
@@ -26,12 +26,12 @@ pub(crate) fn describe(folder: &Path, summary: &RunSummary) -> String {
             summary.length_m
         ));
     } else if let Some(reason) = &summary.accuracy_missing {
-        lines.push(format!("  accuracy     none: {reason}\n"));
+        lines.push(format!("  accuracy     not available: {reason}\n"));
     }
     let calibration = &summary.calibration;
     if let (Some(first), Some(last)) = (&calibration.chain_error_initial, &calibration.chain_error) {
         lines.push(format!(
-            "  chain error  {:.1} mm, {:.2}° with the rig's values; {:.1} ± {:.1} mm, {:.2} ± {:.2}° at the end ({})\n",
+            "  chain error  {:.1} mm, {:.2}° (rig) → {:.1} ± {:.1} mm, {:.2} ± {:.2}° (final, {})\n",
             first.translation_mean_m * 1e3,
             first.rotation_mean_rad.to_degrees(),
             last.translation_mean_m * 1e3,
@@ -56,13 +56,13 @@ pub(crate) fn describe(folder: &Path, summary: &RunSummary) -> String {
         if !rank.known.is_empty() {
             let agreeing = rank.known.iter().filter(|known| null_throughout(known)).count();
             lines.push(format!(
-                "  structure    {agreeing} of {} null directions known in closed form null in every step; {}\n",
+                "  structure    {agreeing} of {} closed-form null directions confirmed in every step; {}\n",
                 rank.known.len(),
                 spurious_information(&rank.known)
             ));
         }
         lines.extend(rank.known.iter().filter(|known| !null_throughout(known)).map(|known| {
-            format!("               null in {} of {} steps only: {}\n", known.agreeing, known.steps, known.reason)
+            format!("               confirmed in {} of {} steps only: {}\n", known.agreeing, known.steps, known.reason)
         }));
     }
     if let (Some(timing), Some(factor)) = (&summary.timing_ms, summary.real_time_factor) {
@@ -90,6 +90,6 @@ fn spurious_information(known: &[export::KnownLossSummary]) -> String {
     let claimed = known.iter().map(|known| known.largest_spurious_gain).filter(|gain| *gain > MIN_SPURIOUS_GAIN);
     match (claimed.clone().count(), claimed.fold(0.0, f64::max)) {
         (0, _) => "no spurious information".to_owned(),
-        (count, most) => format!("spurious information on {count}, up to {most:.2} (1: σ of 10° or 3 cm)"),
+        (count, most) => format!("spurious information on {count} of them, up to {most:.2} (1: σ of 10° or 3 cm)"),
     }
 }

@@ -33,10 +33,10 @@ pub(crate) struct ScreenshotArguments {
     /// the file names.
     #[arg(long, value_name = "SECONDS", value_parser = seconds, required_unless_present = "every")]
     pub at: Vec<f64>,
-    /// A screenshot every so many seconds from the start to the end of the log (or from --start, for --duration).
+    /// Period of the screenshots, from the start to the end of the log (or from --start, for --duration).
     #[arg(long, value_name = "SECONDS", value_parser = period)]
     pub every: Option<f64>,
-    /// Which panel; `all` is the whole window.
+    /// Panel to draw; `all`: the whole window.
     #[arg(long, value_name = "NAME", default_value = "all")]
     pub panel: String,
     /// Layout of the whole window, as its keys 1 to 5: overview, calibration, front end, scene, comparison.
@@ -63,9 +63,9 @@ pub(crate) struct ScreenshotArguments {
     /// Renderer: cpu needs no driver and gives the same bytes on every machine, wgpu uses a graphics adapter.
     #[arg(long, value_enum, default_value_t = RendererArgument::Cpu)]
     pub renderer: RendererArgument,
-    /// Move the first run's chain along a direction: its number in the rank panel (1 is the least observable), a known one
-    /// (base-d, end-theta, …) or a parameter by name, and how far in units of 10° and 3 cm. Scene and image show
-    /// the moved chain.
+    /// Move the first run's chain along a direction: its number in the rank panel (1 is the least observable), a
+    /// closed-form null direction (base-d, end-theta, …) or a parameter by name; VALUE in units of 10° and 3 cm. Scene
+    /// and image show the moved chain.
     #[arg(long, value_name = "DIRECTION=VALUE")]
     pub slide: Option<dcvins::observability::SlideRequest>,
     /// Overwrite whatever has the name of the screenshot. Without it only pictures and tables are replaced.
@@ -96,11 +96,11 @@ pub(crate) enum RendererArgument {
 /// Values of `--theme`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum ThemeArgument {
-    /// Dark on light.
+    /// Dark text on a light background.
     Light,
-    /// Light on dark.
+    /// Light text on a dark background.
     Dark,
-    /// For paper.
+    /// Colours for print on white paper.
     Print,
 }
 
@@ -127,7 +127,7 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<Outcome> {
         bail!("unknown panel '{}': expected one of {}", arguments.panel, PANEL_NAMES.join(", "));
     }
     if arguments.csv && arguments.panel == "all" {
-        bail!("--csv writes the table of one panel: name it with --panel");
+        bail!("--csv writes the values of one panel: name the panel with --panel");
     }
     let format = format_of(arguments)?;
     let mut shown = Shown::open(arguments)?;
@@ -136,22 +136,20 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<Outcome> {
     let end_ns =
         shown.duration_s.map_or(log_end_ns, |duration_s| log_end_ns.min(begin_ns + ns_from_seconds(duration_s)));
     if arguments.at.iter().any(|at_s| ns_from_seconds(*at_s) > log_end_ns) {
-        notify(&format!("dcvins: the log ends at {:.3} s, which is what is drawn", seconds_from_ns(log_end_ns)));
+        notify(&format!("dcvins: the log ends at {:.3} s: the last step is drawn", seconds_from_ns(log_end_ns)));
     }
     let mut stamps_ns: Vec<i64> = arguments.at.iter().map(|at_s| ns_from_seconds(*at_s).min(log_end_ns)).collect();
     if let Some(period_s) = arguments.every {
         let period_ns = ns_from_seconds(period_s).max(1);
         let count = ((end_ns - begin_ns) / period_ns) as usize + 1;
         if count > MAX_SCREENSHOTS {
-            bail!(
-                "--every {period_s} asks for {count} screenshots, at most {MAX_SCREENSHOTS} are drawn: give a longer period"
-            );
+            bail!("--every {period_s}: {count} screenshots, more than {MAX_SCREENSHOTS}; give a longer period");
         }
         stamps_ns.extend((0..count).map(|number| begin_ns + number as i64 * period_ns));
     }
     stamps_ns.sort_unstable();
     stamps_ns.dedup();
-    let Some(last_ns) = stamps_ns.last().copied() else { bail!("no instant is asked for: give --at or --every") };
+    let Some(last_ns) = stamps_ns.last().copied() else { bail!("no time given: use --at or --every") };
     let several = stamps_ns.len() > 1;
     let path_at = |cursor_ns| if several { numbered(&arguments.output, cursor_ns) } else { arguments.output.clone() };
     for cursor_ns in &stamps_ns {
@@ -175,7 +173,7 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<Outcome> {
         Some(request) => {
             let known = || {
                 format!(
-                    "'{}' is no direction: expected a number, one such as base-d, or a parameter",
+                    "unknown direction '{}': expected a number, a name such as base-d, or a parameter",
                     request.direction
                 )
             };
@@ -263,7 +261,7 @@ impl Shown {
     fn open(arguments: &ScreenshotArguments) -> Result<Self> {
         let (source, start_s, duration_s) = if is_session(&arguments.log) {
             if !arguments.estimation.runs.is_empty() {
-                bail!("a saved session has its own runs: leave --run out");
+                bail!("a saved session contains its runs: leave --run out");
             }
             let saved = read_session(&arguments.log)?;
             let (start_s, duration_s) = (saved.start_s, saved.duration_s);

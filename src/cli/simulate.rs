@@ -18,13 +18,13 @@ pub(crate) struct SimulateArguments {
     /// The paper's experiment: T1, T2, T3 or T4.
     #[arg(value_name = "EXPERIMENT", ignore_case = true)]
     pub experiment: ExperimentArgument,
-    /// The log to write; its rig and truth get the same name with .rig.yaml and .truth.yaml.
+    /// The log to write; its rig and the ground truth of the rig get the same name with .rig.yaml and .truth.yaml.
     #[arg(short, long, value_name = "LOG.mcap")]
     pub output: PathBuf,
-    /// Seed of every random number.
+    /// Seed of the random numbers.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// Length of the flight [default: the experiment's].
+    /// Duration of the flight [default: the experiment's].
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub duration: Option<f64>,
     /// Standard deviation of the encoders in degrees, or none [default: the experiment's].
@@ -33,13 +33,13 @@ pub(crate) struct SimulateArguments {
     /// Size of the images in pixels; the field of view stays the same.
     #[arg(long, value_name = "WxH", default_value = "640x480", value_parser = image_size)]
     pub size: [usize; 2],
-    /// Images per second.
+    /// Frame rate of the cameras in Hz.
     #[arg(long, value_name = "HZ", default_value_t = 20.0)]
     pub rate: f64,
-    /// Leave out the static camera: half the time and half the bytes.
+    /// Leave out the static camera: half the computing time and half the file size.
     #[arg(long)]
     pub no_static_camera: bool,
-    /// Overwrite whatever has the names of the log, its rig and its truth. Without it only a simulated log with its rigs as
+    /// Overwrite whatever has the names of the log, its rig and its ground truth. Without it only a simulated log with its rigs as
     /// they were written is replaced.
     #[arg(long)]
     pub force: bool,

@@ -5,7 +5,7 @@ use std::fmt;
 use nalgebra::Matrix4;
 use serde::Serialize;
 
-use super::summary::{difference, in_range, log_name};
+use super::summary::{difference, log_name};
 use crate::calibration::{
     CalibrationOutcome, ExtrinsicsReport, PixelReport, Statistics, chain_distance, transform_distance,
 };
@@ -317,11 +317,11 @@ fn chain_parameters(run: &CalibrationRun, outcome: &CalibrationOutcome) -> Vec<P
             ParameterReport {
                 name: names.name(parameter.parameter),
                 dimension,
-                initial: in_range(dimension, parameter.initial),
-                last: in_range(dimension, parameter.value),
+                initial: parameter.parameter.principal_value(parameter.initial),
+                last: parameter.parameter.principal_value(parameter.value),
                 sigma: parameter.sigma,
                 prior_sigma: Some(parameter.prior_sigma),
-                ground_truth: ground_truth.map(|ground_truth| in_range(dimension, ground_truth)),
+                ground_truth: ground_truth.map(|ground_truth| parameter.parameter.principal_value(ground_truth)),
                 error: ground_truth.map(|ground_truth| difference(dimension, parameter.value, ground_truth)),
             }
         })

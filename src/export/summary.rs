@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::evaluation::alignment_name;
 use super::structure::{KnownLossSummary, known_losses};
 use crate::estimator::{EventKind, Phase, StageTimes};
-use crate::geometry::{Dimension, seconds_from_ns, wrap_angle};
+use crate::geometry::{Dimension, principal_angle, seconds_from_ns};
 use crate::gimbal::{ClassicalChain, ParameterId};
 use crate::observability::{ParameterRate, information_rate};
 use crate::sensors::Rig;
@@ -353,10 +353,10 @@ fn calibration(recording: &Recording, run: &RunRecord) -> CalibrationSummary {
             ParameterSummary {
                 name: names.name(parameter),
                 dimension,
-                initial: in_range(dimension, value_of(&initial_values, parameter).unwrap_or(value)),
-                last: in_range(dimension, value),
+                initial: value_of(&initial_values, parameter).unwrap_or(value),
+                last: value,
                 sigma: last.sigmas.get(index).copied().filter(|sigma| sigma.is_finite()),
-                ground_truth: ground_truth.map(|ground_truth| in_range(dimension, ground_truth)),
+                ground_truth,
                 error: ground_truth.map(|ground_truth| difference(dimension, value, ground_truth)),
             }
         })
@@ -374,14 +374,9 @@ fn calibration(recording: &Recording, run: &RunRecord) -> CalibrationSummary {
 
 /// Difference of two values of a parameter; of angles, in (−π, π].
 pub(super) fn difference(dimension: Dimension, value: f64, reference: f64) -> f64 {
-    in_range(dimension, value - reference)
-}
-
-/// The value of a parameter; an angle as the equivalent one in (−π, π].
-pub(super) fn in_range(dimension: Dimension, value: f64) -> f64 {
     match dimension {
-        Dimension::Angle => wrap_angle(value),
-        _ => value,
+        Dimension::Angle => principal_angle(value - reference),
+        _ => value - reference,
     }
 }
 

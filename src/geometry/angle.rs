@@ -2,10 +2,10 @@
 
 use std::f64::consts::{PI, TAU};
 
-/// Returns the equivalent angle in (−π, π], in radians; −π becomes π. An angle already in this range is
+/// Returns the equivalent angle in [−π, π), in radians; π becomes −π. An angle already in this range is
 /// returned bit by bit.
 pub fn wrap_angle(angle_rad: f64) -> f64 {
-    let revolutions = ((angle_rad - PI) / TAU).ceil();
+    let revolutions = ((angle_rad + PI) / TAU).floor();
     angle_rad - revolutions * TAU
 }
 

@@ -1,6 +1,6 @@
 //! Display of numbers: degrees and millimetres on the screen, radians and metres in the data.
 
-use crate::geometry::{Dimension, wrap_angle};
+use crate::geometry::Dimension;
 
 /// Conversion of a stored unit to the shown one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -9,25 +9,21 @@ pub(crate) struct Shown {
     pub(crate) factor: f64,
     /// The shown unit with its leading space.
     pub(crate) unit: &'static str,
-    /// Whether values are angles, shown in (−180°, 180°].
-    is_angle: bool,
 }
 
 impl Shown {
     /// The conversion for a dimension: to degrees, millimetres, milliseconds.
     pub(crate) const fn of(dimension: Dimension) -> Self {
         match dimension {
-            Dimension::Angle => Self { factor: 180.0 / std::f64::consts::PI, unit: "°", is_angle: true },
-            Dimension::Length => Self { factor: 1000.0, unit: " mm", is_angle: false },
-            Dimension::Time => Self { factor: 1000.0, unit: " ms", is_angle: false },
-            Dimension::Ratio => Self { factor: 1.0, unit: "", is_angle: false },
+            Dimension::Angle => Self { factor: 180.0 / std::f64::consts::PI, unit: "°" },
+            Dimension::Length => Self { factor: 1000.0, unit: " mm" },
+            Dimension::Time => Self { factor: 1000.0, unit: " ms" },
+            Dimension::Ratio => Self { factor: 1.0, unit: "" },
         }
     }
 
-    /// A stored value with its unit, with the precision of two digits of its standard deviation; an angle in
-    /// (−180°, 180°].
+    /// A stored value with its unit, with the precision of two digits of its standard deviation.
     pub(crate) fn value(self, stored: f64, stored_sigma: f64) -> String {
-        let stored = if self.is_angle { wrap_angle(stored) } else { stored };
         format!("{}{}", fixed(stored * self.factor, decimals_for(stored_sigma * self.factor)), self.unit)
     }
 
@@ -94,7 +90,6 @@ mod tests {
         let angle = Shown::of(Dimension::Angle);
         assert_eq!(angle.value(1.0, 0.0002), "57.296°");
         assert_eq!(angle.sigma(0.0002), "0.011°");
-        assert_eq!(angle.value(-267.7_f64.to_radians(), 0.002), "92.30°");
         assert_eq!(Shown::of(Dimension::Length).value(-0.0123, 0.0004), "-12.30 mm");
         assert_eq!(Shown::of(Dimension::Length).value(0.05, f64::NAN), "50.00 mm");
         assert_eq!(angle.sigma(f64::NAN), "–");

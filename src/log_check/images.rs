@@ -136,7 +136,7 @@ fn check_motion(camera: &CameraRig, imu_facts: &ImuFacts, findings: &mut Finding
     let pixels = |rate: f64| rate / camera.rate_hz * camera.model.focal_length_px();
     let (usual, fast) = (pixels(median(&rates)), pixels(percentile(&rates, 0.99)));
     let evidence = format!(
-        "about {usual:.0} px from image to image by rotation, {fast:.0} px in the fastest hundredth ({:.2} rad/s)",
+        "image motion by rotation: {usual:.0} px per image in the median, {fast:.0} px in the fastest 1 % ({:.2} rad/s)",
         percentile(&rates, 0.99)
     );
     if fast > 0.15 * camera.model.resolution_px[0] as f64 {

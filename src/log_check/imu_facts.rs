@@ -185,7 +185,7 @@ fn check_noise(
         let white = if gyroscope { window.white_rate } else { window.white_force };
         (white.norm_squared() / 3.0).sqrt() / rate_hz.sqrt()
     };
-    let quiet_when = if stationary.is_empty() { "in the quietest tenth of the flight" } else { "while stationary" };
+    let quiet_when = if stationary.is_empty() { "in the quietest 10 % of the flight" } else { "while stationary" };
     let sensors = [
         ("gyroscope", true, rig.map(|rig| rig.imu.noise.gyroscope_noise_density), "rad/s/√Hz"),
         ("accelerometer", false, rig.map(|rig| rig.imu.noise.accelerometer_noise_density), "m/s²/√Hz"),
@@ -196,8 +196,7 @@ fn check_noise(
         let quiet = if stationary_noise.is_empty() { percentile(&all, 0.1) } else { median(&stationary_noise) };
         let flight = percentile(&all, 0.9);
         if quiet > 0.0 && flight > 10.0 * quiet {
-            let evidence =
-                format!("{flight:.2e} {unit} in the noisiest tenth of the windows, {quiet:.2e} {quiet_when}");
+            let evidence = format!("{flight:.2e} {unit} in the noisiest 10 % of the windows, {quiet:.2e} {quiet_when}");
             let remedy = "isolate the IMU from vibration, or raise the noise density to the value in flight";
             findings.add(Severity::Note, Area::Imu, format!("vibration on the {name} in flight"), evidence, remedy);
         }
@@ -299,7 +298,7 @@ fn check_stationary(windows: &[Window], findings: &mut Findings) {
             Severity::Note,
             Area::Motion,
             title,
-            format!("no stationary second in {total_s:.0} s"),
+            format!("no stationary interval of 1 s in {total_s:.0} s"),
             remedy,
         );
     }

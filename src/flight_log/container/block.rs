@@ -132,7 +132,7 @@ pub(crate) fn chunk_header(file: &LogFile, block: &Block) -> Result<(ChunkHeader
     }
     let start = file.read(block.bytes.start..block.bytes.start.saturating_add(LARGEST).min(record_end))?;
     if start[0] != op::CHUNK {
-        return Err(format!("opcode {:#04x} where the index promises a chunk", start[0]));
+        return Err(format!("opcode {:#04x}, expected a chunk by the index", start[0]));
     }
     let body = &start[RECORD_HEADER..];
     let name_length = body

@@ -25,7 +25,7 @@ pub(super) fn ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, step: &St
     let (value, sigma, prior) =
         (entry(&calibration.values), entry(&calibration.sigmas), entry(&calibration.prior_sigmas));
     let mut rows = vec![
-        ("value".to_owned(), vec![shown.value(value, sigma)]),
+        ("value".to_owned(), vec![shown.value(parameter.principal_value(value), sigma)]),
         ("σ".to_owned(), vec![shown.sigma(sigma)]),
         ("prior σ".to_owned(), vec![shown.sigma(prior)]),
         ("σ / prior σ".to_owned(), vec![fixed(sigma / prior, 3)]),
@@ -34,15 +34,19 @@ pub(super) fn ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, step: &St
     let begin =
         begin.and_then(|first| first.values.get(first.parameters.iter().position(|known| *known == parameter)?));
     if let Some(begin) = begin {
-        rows.push(("initial value".to_owned(), vec![shown.value(*begin, sigma)]));
-        rows.push(("change since the start".to_owned(), vec![shown.value(value - begin, sigma)]));
+        rows.push(("initial value".to_owned(), vec![shown.value(parameter.principal_value(*begin), sigma)]));
+        rows.push((
+            "change since the start".to_owned(),
+            vec![shown.value(parameter.principal_value(value - begin), sigma)],
+        ));
     }
     let ground_truth =
         true_values(ctx.recording, run, ctx.cursor_ns).and_then(|ground_truth| ground_truth.get(&parameter).copied());
     if let Some(ground_truth) = ground_truth {
-        rows.push(("ground truth".to_owned(), vec![shown.value(ground_truth, sigma)]));
-        let times = fixed((value - ground_truth).abs() / sigma, 1);
-        rows.push(("error".to_owned(), vec![format!("{} ({times}σ)", shown.value(value - ground_truth, sigma))]));
+        rows.push(("ground truth".to_owned(), vec![shown.value(parameter.principal_value(ground_truth), sigma)]));
+        let error = parameter.principal_value(value - ground_truth);
+        let ratio = fixed(error.abs() / sigma, 1);
+        rows.push(("error".to_owned(), vec![format!("{} ({ratio} σ)", shown.value(error, sigma))]));
     }
     let state = parameter_states(step.rank.as_ref())
         .map_or(ParameterState::Waiting, |known| known.get(&parameter).copied().unwrap_or(ParameterState::Informed));

@@ -4,7 +4,7 @@ use egui::{RichText, Sense, Ui, vec2};
 
 use super::{rows_ui, table_ui};
 use crate::estimator::StepReport;
-use crate::geometry::{so3, wrap_angle};
+use crate::geometry::{principal_angle, so3};
 use crate::gui::PanelContext;
 use crate::gui::events::{look_of, name_of, paint_mark};
 use crate::gui::theme::Theme;
@@ -61,7 +61,7 @@ pub(super) fn frame_ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, ste
         let lines = newest.joint_angles_rad.iter().enumerate().map(|(number, angle)| {
             let encoder = encoders.and_then(|angles| angles.get(number)).copied().unwrap_or(f64::NAN);
             let name = joints.get(number).map_or_else(|| format!("joint {}", number + 1), |joint| joint.name.clone());
-            let shown = |angle: f64| fixed(wrap_angle(angle).to_degrees(), 2);
+            let shown = |angle: f64| fixed(principal_angle(angle).to_degrees(), 2);
             vec![name, shown(*angle), shown(encoder), shown(angle - encoder)]
         });
         table_ui(ui, ctx.theme, "joints", &["joint", "estimate, °", "encoder, °", "difference, °"], lines);

@@ -7,7 +7,7 @@ use super::model::{JacobianModel, cameras, name_of, unit_text};
 use super::numbers_table::numbers_ui;
 use crate::estimator::{ColumnBlock, ColumnId, FeatureRows, FrameId, JacobianFactor};
 use crate::frontend::FeatureId;
-use crate::geometry::{Dimension, wrap_angle};
+use crate::geometry::{Dimension, principal_angle};
 use crate::gui::PanelContext;
 use crate::gui::units::{Shown, fixed, significant};
 use crate::session::{RunRecord, StepRecord};
@@ -179,10 +179,10 @@ fn readings_ui(
         };
         vec![
             (joint + 1).to_string(),
-            fixed(wrap_angle(*reading).to_degrees(), 3),
-            fixed(wrap_angle(*angle).to_degrees(), 3),
+            fixed(principal_angle(*reading).to_degrees(), 3),
+            fixed(principal_angle(*angle).to_degrees(), 3),
             fixed(sigma.to_degrees(), 3),
-            fixed(wrap_angle(angle - reading) / sigma, 2),
+            fixed(principal_angle(angle - reading) / sigma, 2),
             slope,
         ]
     });
