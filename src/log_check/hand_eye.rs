@@ -61,7 +61,7 @@ pub(super) fn check_against_gyroscope(
     let given = hand_eye.pairs(&chain, 0.0);
     let angles_rad: Vec<f64> = given.iter().map(|(_, measured)| measured.norm()).collect();
     if given.len() < MIN_ROTATIONS || median(&angles_rad) < MIN_ROTATION_RAD {
-        let title = format!("{} rotates too little to check its extrinsics", camera.key);
+        let title = format!("too little rotation of {} to check its extrinsics", camera.key);
         let evidence =
             format!("{} image rotations, {:.2}° in the median", given.len(), median(&angles_rad).to_degrees());
         return findings.add(Severity::Note, Area::Extrinsics, title, evidence, "rotate about all axes");

@@ -58,7 +58,7 @@ fn check_blur(camera: &CameraRig, images: &[SampledImage], findings: &mut Findin
     let usual = median(&edges);
     let blurred: Vec<&SampledImage> = images.iter().filter(|image| image.measure.edge < BLURRED * usual).collect();
     let evidence = format!(
-        "edge gradient {usual:.0} grey levels per pixel in the median, {:.0} in the most blurred of {} images",
+        "edge gradient {usual:.0} grey levels per pixel in the median image, {:.0} in the most blurred of {} images",
         percentile(&edges, 0.0),
         images.len()
     );
@@ -71,7 +71,7 @@ fn check_blur(camera: &CameraRig, images: &[SampledImage], findings: &mut Findin
             blurred.iter().take(5).map(|image| format!("{:.1} s", seconds_from_ns(image.stamp_ns))).collect();
         let title = format!("some images of {} are blurred", camera.key);
         let evidence = format!("{} of {} images, at {}; {evidence}", blurred.len(), images.len(), times.join(", "));
-        let remedy = "shorten the exposure, add light or rotate slower; tracks are lost there";
+        let remedy = "shorten the exposure, add light or rotate more slowly; tracks are lost there";
         findings.add(Severity::Warning, Area::Images, title, evidence, remedy);
     } else {
         findings.good(Area::Images, format!("the images of {} are sharp", camera.key), evidence);
@@ -140,10 +140,10 @@ fn check_motion(camera: &CameraRig, imu_facts: &ImuFacts, findings: &mut Finding
         percentile(&rates, 0.99)
     );
     if fast > 0.15 * camera.model.resolution_px[0] as f64 {
-        let title = format!("{} rotates fast", camera.key);
-        let remedy = "tracking then depends on the gyroscope's prediction: extrinsics and time offset must be correct";
+        let title = format!("high angular rate of {}", camera.key);
+        let remedy = "tracking depends on the gyroscope's prediction: extrinsics and time offset must be correct";
         findings.add(Severity::Note, Area::Motion, title, evidence, remedy);
     } else {
-        findings.good(Area::Motion, format!("{} rotates slowly enough for tracking", camera.key), evidence);
+        findings.good(Area::Motion, format!("the angular rate of {} is low enough for tracking", camera.key), evidence);
     }
 }

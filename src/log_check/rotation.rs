@@ -52,7 +52,7 @@ fn check_against_gravity(
     let (roll, elevation) = attitude_deg(&pose.rotation.inverse(), &up_in_imu);
     let (inverse_roll, inverse_elevation) = attitude_deg(&pose.rotation, &up_in_imu);
     let evidence = format!(
-        "against the specific force at {:.1} s its axis is {elevation:+.0}° above the horizon and its image rolled by {roll:+.0}°; \
+        "relative to the specific force at {:.1} s: elevation of the optical axis {elevation:+.0}°, image roll {roll:+.0}°; \
          with the inverse matrix {inverse_elevation:+.0}° and {inverse_roll:+.0}°",
         seconds_from_ns(stamp_ns)
     );
@@ -81,7 +81,7 @@ fn check_lever(camera: &CameraRig, findings: &mut Findings) {
     }
     if imu_from_camera.rotation.angle() == 0.0 {
         let title = format!("the rotation of {} is the identity", camera.key);
-        let evidence = "T_cam_imu has the axes of camera and IMU coincide: z forward, x right, y down";
+        let evidence = "the axes of camera and IMU coincide by T_cam_imu: z forward, x right, y down";
         let remedy = "this is usually a default value: calibrate it, for example with Kalibr";
         findings.add(Severity::Warning, Area::Extrinsics, title, evidence, remedy);
     }

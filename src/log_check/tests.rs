@@ -358,7 +358,7 @@ fn faults_of_images_and_lenses_are_found() {
         true
     };
     expect(&image(bright), Warning, &["cam0 is overexposed"]);
-    expect(&rig("update_rate: 20.0", "update_rate: 2.0"), Note, &["cam0 rotates fast"]);
+    expect(&rig("update_rate: 20.0", "update_rate: 2.0"), Note, &["high angular rate of cam0"]);
 }
 
 #[test]

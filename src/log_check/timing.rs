@@ -158,7 +158,7 @@ fn check_rate(role: &str, topic: &TopicSurvey, nominal_hz: Option<f64>, findings
     };
     if measured_hz < 0.95 * slowest_hz {
         let evidence = format!("{measured_hz:.1} Hz, usually at least {slowest_hz:.0} Hz");
-        let remedy = "record faster: motion between samples is assumed smooth";
+        let remedy = "record at a higher rate: motion between samples is assumed smooth";
         findings.add(Severity::Warning, Area::Time, format!("{role} is slow"), evidence, remedy);
     }
 }

@@ -126,16 +126,16 @@ fn from_motion(
     let min_common = options.min_common_features as f64;
     checklist.at_least(
         "features",
-        "features that neighbouring views share",
+        "features in common between neighbouring views",
         common as f64,
         min_common,
         Shown::Plain(""),
     );
     let parallax_rad = pairs.first().map_or(0.0, |pair: &ViewPair| pair.fit.median_parallax_rad);
-    let subject = "parallax between the best two views, rotation compensated,";
+    let subject = "parallax of the best pair of views, rotation compensated";
     checklist.at_least("parallax", subject, parallax_rad, options.min_parallax_rad, Shown::Degrees);
     let excitation = excitation(input.frames, &selected, &rotations);
-    let subject = "spread of the acceleration between views";
+    let subject = "σ of the acceleration between views";
     checklist.at_least("excitation", subject, excitation, options.min_excitation_m_per_s2, Shown::Plain(" m/s²"));
     if !checklist.all_passed() {
         return None;
@@ -202,13 +202,7 @@ fn structure_of(
                 plain,
             );
             let newest = structure.views.last().is_some_and(|&last| last + 1 == guesses.len());
-            checklist.at_least(
-                "newest view",
-                "whether the newest view could be placed",
-                f64::from(u8::from(newest)),
-                1.0,
-                plain,
-            );
+            checklist.at_least("newest view", "newest views with a pose", f64::from(u8::from(newest)), 1.0, plain);
             checklist.all_passed().then_some(structure)
         }
         Err(StructureFailure::NoRelativePose { inlier_ratio }) => {
@@ -222,7 +216,7 @@ fn structure_of(
             None
         }
         Err(StructureFailure::FewViews { views }) => {
-            let subject = "views that could be placed";
+            let subject = "views with a pose";
             checklist.at_least("placed views", subject, views as f64, limits.min_views as f64, plain);
             None
         }
@@ -299,7 +293,7 @@ impl Problem<'_> {
             ImuBias { gyroscope_rad_per_s: self.gyroscope_prior.mean, accelerometer_m_per_s2: Vector3::zeros() };
         let mut increments = self.increments(bias);
         let rotation = align_rotations(&self.alignment_input(&extrinsics, &increments));
-        let subject = "gyroscope and images agree about rotations";
+        let subject = "rotation alignments of gyroscope and images found";
         checklist.at_least("rotations", subject, f64::from(u8::from(rotation.is_some())), 1.0, Shown::Plain(""));
         let rotation = rotation?;
         if (rotation.gyroscope_bias - bias.gyroscope_rad_per_s).norm() > REINTEGRATE_RAD_PER_S {
@@ -308,7 +302,7 @@ impl Problem<'_> {
         }
         let alignment = align(&self.alignment_input(&extrinsics, &increments), &rotation);
         let scale = alignment.as_ref().map_or(0.0, |alignment| alignment.scale);
-        let subject = "metres per unit of the reconstruction, by the linear alignment,";
+        let subject = "scale of the reconstruction by the linear alignment";
         let positive = checklist.at_least("linear scale", subject, scale, 1e-3, Shown::Plain(" m"));
         alignment.filter(|_| positive).map(|alignment| (alignment, increments))
     }
@@ -341,14 +335,14 @@ impl Problem<'_> {
         let mut refined = refinement.run(refined.state, REFINEMENT_ROUNDS[1]);
         refined.rounds += rounds;
 
-        let subject = "convergence of the refinement";
+        let subject = "refinements converged";
         checklist.at_least("converged", subject, f64::from(u8::from(refined.converged)), 1.0, Shown::Plain(""));
         let ratio = refined.state.landmarks.len() as f64 / before.max(1) as f64;
         let subject = "ratio of landmarks with positive depth and small residuals";
         checklist.at_least("positive depth", subject, ratio, options.min_inlier_ratio, Shown::Percent);
         let cameras = refined.state.cameras(&extrinsics);
         let rms = mean_square(&refined.state.landmarks, &cameras, options.bearing_sigma_rad).sqrt();
-        let subject = "reprojection error over its standard deviation";
+        let subject = "reprojection RMS in σ";
         checklist.at_most("reprojection", subject, rms, options.max_reprojection_sigmas, Shown::Plain(""));
         let subject = "mean square of the whitened IMU residuals";
         let value = refined.imu_mean_square;
@@ -360,13 +354,13 @@ impl Problem<'_> {
         let sigmas = refined.sigmas;
         let or_far = |value: Option<f64>| value.unwrap_or(f64::INFINITY);
         let scale = or_far(sigmas.map(|sigmas| sigmas.scale));
-        let subject = "standard deviation of the scale";
+        let subject = "σ of the scale";
         checklist.at_most("scale", subject, scale, options.max_scale_sigma, Shown::Percent);
         let velocity = or_far(sigmas.map(|sigmas| sigmas.velocity_m_per_s));
-        let subject = "standard deviation of the velocity";
+        let subject = "σ of the velocity";
         checklist.at_most("velocity", subject, velocity, options.max_velocity_sigma_m_per_s, Shown::Plain(" m/s"));
         let gravity = or_far(sigmas.map(|sigmas| sigmas.gravity_rad));
-        let subject = "standard deviation of gravity's direction";
+        let subject = "σ of the gravity direction";
         checklist.at_most("gravity", subject, gravity, options.max_gravity_sigma_rad, Shown::Degrees);
         checklist.all_passed().then_some(refined)
     }

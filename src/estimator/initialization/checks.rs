@@ -79,7 +79,7 @@ impl Checklist {
         passed: bool,
         relation: &str,
     ) -> bool {
-        let message = format!("{subject} is {}, {relation} {} is needed", shown.text(value), shown.text(threshold));
+        let message = format!("{subject}: {} ({relation} {} required)", shown.text(value), shown.text(threshold));
         let reason = WaitReason { test, message, value, threshold };
         if passed {
             self.passed.push(reason);

@@ -54,7 +54,7 @@ pub(super) fn detect(input: &InitializationInput<'_>, checklist: &mut Checklist)
     let gyroscope_limit = MAX_GYROSCOPE_STD_RAD_PER_S.hypot(own(input.imu_noise.gyroscope_noise_density));
     let force_limit = MAX_ACCELEROMETER_STD_M_PER_S2.hypot(own(input.imu_noise.accelerometer_noise_density));
     let plain = Shown::Plain;
-    let subject = "spread of the angular velocity";
+    let subject = "σ of the angular velocity";
     checklist.at_most("stationary gyroscope", subject, gyroscope_std, gyroscope_limit, plain(" rad/s"));
     checklist.at_most(
         "stationary angular rate",
@@ -63,7 +63,7 @@ pub(super) fn detect(input: &InitializationInput<'_>, checklist: &mut Checklist)
         MAX_ANGULAR_RATE_RAD_PER_S,
         plain(" rad/s"),
     );
-    let subject = "spread of the specific force";
+    let subject = "σ of the specific force";
     checklist.at_most("stationary accelerometer", subject, force_std, force_limit, plain(" m/s²"));
     if !checklist.all_passed() {
         return None;
@@ -71,7 +71,7 @@ pub(super) fn detect(input: &InitializationInput<'_>, checklist: &mut Checklist)
     let pairs = shared_bearings(frames.first()?.features, newest.features);
     let guess = frames.first()?.imu_from_camera.rotation;
     let fit = fit_rotation(&pairs, &(newest.imu_from_camera.rotation.inverse() * guess))?;
-    let subject = "parallax within a second, rotation compensated,";
+    let subject = "parallax within 1 s, rotation compensated";
     checklist.at_most("stationary image", subject, fit.median_parallax_rad, MAX_PARALLAX_RAD, Shown::Degrees);
     checklist.all_passed().then(|| StationaryEstimate {
         stamp_ns: newest.stamp_ns,

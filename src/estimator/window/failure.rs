@@ -58,22 +58,18 @@ pub(crate) fn failure(
     let state = newest.state.navigation;
     let checks = [
         (
-            "the accelerometer's bias is out of bounds, m/s²",
+            "accelerometer bias out of bounds, m/s²",
             state.bias.accelerometer_m_per_s2.norm(),
             options.max_accelerometer_bias,
         ),
+        ("gyroscope bias out of bounds, rad/s", state.bias.gyroscope_rad_per_s.norm(), options.max_gyroscope_bias),
+        ("velocity out of bounds, m/s", state.velocity_m_per_s.norm(), options.max_velocity_m_per_s),
         (
-            "the gyroscope's bias is out of bounds, rad/s",
-            state.bias.gyroscope_rad_per_s.norm(),
-            options.max_gyroscope_bias,
-        ),
-        ("the velocity is out of bounds, m/s", state.velocity_m_per_s.norm(), options.max_velocity_m_per_s),
-        (
-            "the correction of the newest position is too large, m",
+            "correction of the newest position too large, m",
             (state.world_from_imu.translation_m - predicted.world_from_imu.translation_m).norm(),
             options.max_position_correction_m,
         ),
-        ("too few landmarks observed for too long, s", landmarks.blind_s(newest.stamp_ns), options.max_blind_s),
+        ("time with too few observed landmarks too long, s", landmarks.blind_s(newest.stamp_ns), options.max_blind_s),
     ];
     let (reason, value, limit) = checks.into_iter().find(|(_, value, limit)| !value.is_finite() || value > limit)?;
     Some(Event::decided(EventKind::Failure, format!("{reason}: {value:.3} (limit {limit:.3})"), value, limit))

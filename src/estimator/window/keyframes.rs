@@ -39,10 +39,10 @@ impl WindowState {
             let age_ns = self.frames[newest].stamp_ns - self.frames[last].stamp_ns;
             let age_s = seconds_from_ns(age_ns);
             if self.frames[last].stamp_ns < stationary.since_ns {
-                return Decision::new(true, "keyframe: the first while stationary", age_s, 0.0);
+                return Decision::new(true, "keyframe: first one while stationary", age_s, 0.0);
             }
             let limit_s = seconds_from_ns(STATIONARY_KEYFRAME_NS);
-            let message = "stationary: keyframes by time only, s";
+            let message = "stationary: keyframes by elapsed time only, s";
             return Decision::new(age_ns >= STATIONARY_KEYFRAME_NS, message, age_s, limit_s);
         }
         // Any camera can request a keyframe; a camera without an image takes no part.
@@ -71,18 +71,18 @@ impl WindowState {
         let new_ratio = 1.0 - common as f64 / observed.max(1) as f64;
         if common < options.keyframe_min_tracked {
             let limit = options.keyframe_min_tracked as f64;
-            let message = format!("keyframe: only {common} features in common with the last one");
+            let message = format!("keyframe: only {common} features in common with the last keyframe");
             return Decision::new(true, message, common as f64, limit);
         }
         if new_ratio > options.keyframe_new_ratio {
-            let message = format!("keyframe: {:.0} % of the features are new since the last one", 100.0 * new_ratio);
+            let message = format!("keyframe: {:.0} % new features since the last keyframe", 100.0 * new_ratio);
             return Decision::new(true, message, new_ratio, options.keyframe_new_ratio);
         }
         let limit = options.keyframe_parallax_rad;
         let chosen = parallax >= limit;
         let verdict = if chosen { "keyframe" } else { "no keyframe" };
         let message = format!(
-            "{verdict}: parallax against the last one {:.2}° (threshold {:.2}°), rotation compensated",
+            "{verdict}: parallax to the last keyframe {:.2}° (threshold {:.2}°), rotation compensated",
             parallax.to_degrees(),
             limit.to_degrees()
         );

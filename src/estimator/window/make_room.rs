@@ -18,7 +18,7 @@ impl WindowState {
     pub(crate) fn make_room(&mut self, setup: &Setup, events: &mut Vec<Event>) {
         let newest = self.frames.newest_slot();
         if newest >= 2 && !self.frames[newest - 1].keyframe {
-            let message = format!("image {} dropped: no keyframe", self.frames[newest - 1].index);
+            let message = format!("frame {} dropped: no keyframe", self.frames[newest - 1].index);
             events.push(Event::new(EventKind::SecondNewestDropped, message));
             self.drop_frame(setup, newest - 1);
             return;
@@ -28,7 +28,7 @@ impl WindowState {
             if self.frames.len() <= room {
                 break;
             }
-            let message = format!("image {} marginalized: the window is full", self.frames.oldest().index);
+            let message = format!("frame {} marginalized: the window is full", self.frames.oldest().index);
             let count = self.frames.len() as f64;
             events.push(Event::decided(EventKind::OldestMarginalized, message, count, room as f64));
             self.marginalize_oldest(setup);

@@ -124,7 +124,7 @@ impl StationaryDetector {
         let event = Event {
             kind: EventKind::Stationary,
             message: format!(
-                "stationary for {:.1} s: parallax {:.2}° (limit {:.2}°, rotation compensated), spread of the angular velocity \
+                "stationary for {:.1} s: parallax {:.2}° (limit {:.2}°, rotation compensated), σ of the angular velocity \
                  {:.4} (limit {:.4}) rad/s, of the specific force {:.3} (limit {:.3}) m/s²",
                 seconds_from_ns(input.stamp_ns - since_ns),
                 parallax_rad.to_degrees(),
