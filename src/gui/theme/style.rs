@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use egui::{Color32, CornerRadius, FontFamily, FontId, Frame, Shadow, Stroke, TextStyle, vec2};
+use egui::{Color32, CornerRadius, FontDefinitions, FontFamily, FontId, Frame, Shadow, Stroke, TextStyle, vec2};
 
 use super::{CORNER_RADIUS, Theme, mix};
 
@@ -11,6 +11,7 @@ impl Theme {
     pub fn apply(&self, ctx: &egui::Context) {
         let base = if self.is_dark() { egui::Theme::Dark } else { egui::Theme::Light };
         let style = std::sync::Arc::new(self.style(base));
+        ctx.set_fonts(fonts());
         // The user chooses the theme, not the desktop: both of egui's slots hold it.
         ctx.set_style_of(egui::Theme::Dark, style.clone());
         ctx.set_style_of(egui::Theme::Light, style);
@@ -66,6 +67,14 @@ impl Theme {
         widgets.active.bg_stroke = Stroke::new(1.0, self.accent);
         style
     }
+}
+
+/// The fonts of egui; the proportional family falls back to the monospace font, which alone has arrows.
+fn fonts() -> FontDefinitions {
+    let mut fonts = FontDefinitions::default();
+    let monospace = fonts.families.get(&FontFamily::Monospace).and_then(|names| names.first()).cloned();
+    fonts.families.entry(FontFamily::Proportional).or_default().extend(monospace);
+    fonts
 }
 
 fn text_styles() -> BTreeMap<TextStyle, FontId> {

@@ -467,10 +467,11 @@ fn f1_shows_every_shortcut() {
 #[test]
 fn every_sign_has_a_glyph() {
     // A missing glyph panics here; in the window it would be an empty box.
-    let mut harness = Harness::new_ui(|ui| {
-        ui.label("°±²·×ρσχ–—…ℹ−■▶◀☀⚑⚠✔✖⏩⏪⏭⏮⏸📁🔁");
-        ui.monospace("→ °±×σχ–");
-    });
+    let mut harness =
+        Harness::builder().with_context_setup(|ctx| Theme::of(ThemeName::Dark).apply(ctx)).build_ui(|ui| {
+            ui.label("°±²·×αβθλρσχΔ₀–—…→∂≤≥ℹ−■▶◀☀⚑⚠✔✖⏩⏪⏭⏮⏸📁🔁");
+            ui.monospace("→ °±×σχ–");
+        });
     harness.run();
     assert!(harness.query_by_label("→ °±×σχ–").is_some());
 }
