@@ -335,7 +335,7 @@ fn the_panel_clicked_last_is_written_as_screenshot_and_table() {
         harness.query_all_by_label("Dismiss notice").next().unwrap().click();
         harness.run_steps(2);
     }
-    let verdict = harness.get_by_label_contains("Rank 18 of 18").rect().center();
+    let verdict = harness.get_by_label_contains("Structural rank 18 of 18").rect().center();
     harness.event(egui::Event::PointerMoved(verdict));
     for pressed in [true, false] {
         let (button, modifiers) = (egui::PointerButton::Primary, Modifiers::NONE);

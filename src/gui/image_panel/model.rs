@@ -127,8 +127,8 @@ impl ImageModel {
         })
     }
 
-    /// The text `frame 120 · 6.000 s · keyframe · tracked 98, new 12, lost 9, rejected 5 · reprojection RMS 0.93 → 0.40
-    /// px, median 0.12 px`.
+    /// The text `frame 120 · 6.000 s · keyframe · tracked 98, new 12, lost 9, rejected 5 · reprojection RMS 0.40 px (before
+    /// the solve 0.93 px), median 0.12 px`.
     pub(super) fn caption(&self) -> String {
         let mut parts = vec![format!("frame {}", self.frame_index), format!("{:.3} s", seconds_from_ns(self.stamp_ns))];
         if self.keyframe {
@@ -140,7 +140,7 @@ impl ImageModel {
             Phase::Initializing => self.phase.name().to_owned(),
             Phase::Tracking => {
                 let Self { rms_before_px, rms_after_px, median_after_px, .. } = self;
-                format!("reprojection RMS {rms_before_px:.2} → {rms_after_px:.2} px, median {median_after_px:.2} px")
+                format!("reprojection RMS {rms_after_px:.2} px (before the solve {rms_before_px:.2} px), median {median_after_px:.2} px")
             }
         });
         parts.join(" · ")

@@ -35,13 +35,13 @@ fn the_caption_is_that_of_the_step_at_or_before_the_cursor() {
     let mut lengths: Vec<f64> = observations.filter_map(|seen| Some(seen.residual_after_px?.norm())).collect();
     lengths.sort_by(f64::total_cmp);
     let expected = format!(
-        "frame 70 · 3.500 s · tracked {}, new {}, lost {}, rejected {rejected} · reprojection RMS {:.2} → {:.2} px, \
-         median {:.2} px",
+        "frame 70 · 3.500 s · tracked {}, new {}, lost {}, rejected {rejected} · reprojection RMS {:.2} px (before the \
+         solve {:.2} px), median {:.2} px",
         statistics.tracked,
         statistics.detected,
         statistics.lost,
-        step.report.reprojection_rms_before_px,
         step.report.reprojection_rms_after_px,
+        step.report.reprojection_rms_before_px,
         lengths[lengths.len() / 2],
     );
     assert_eq!(model.caption(), expected);

@@ -116,7 +116,7 @@ fn summary_ui(ui: &mut Ui, theme: &Theme, report: &StepReport, histogram: &Resid
         pair(
             "RMS",
             format!("{before} → {} px", fixed(report.reprojection_rms_after_px, 2)),
-            "Reprojection RMS before → after the solve",
+            "Reprojection RMS before and after the solve",
         );
         pair(
             "median",
