@@ -129,6 +129,8 @@ impl OverTime {
         paint_cursor(&painter, &theme, &area, ctx.cursor_ns);
         let id = ui.unique_id().with(("difference", index));
         let name = format!("Difference in {} over time", quantity.name());
-        navigate(ui, ctx, &area, id, &name, Clicks::Seek, false);
+        let response = navigate(ui, ctx, &area, id, &name, Clicks::Seek, false);
+        let threshold = difference_text(quantity, quantity.notable());
+        response.on_hover_text(format!("{}\nTriangle: first difference ≥ {threshold}", quantity.meaning()));
     }
 }

@@ -232,7 +232,8 @@ pub(super) fn cell_ui(
     }
     let meaning = meaning_of(id, &ctx.recording.rig);
     response.on_hover_ui_at_pointer(|ui| {
-        let mut lines = vec![format!("{name}: {meaning}"), text];
+        let column = format!("calibration.csv: {name}_{}", id.dimension().unit());
+        let mut lines = vec![format!("{name}: {meaning}"), text, column];
         lines.extend(data.others_lines(ctx, &overlaid, id, shown, &area));
         ui.label(lines.join("\n"));
     });

@@ -94,7 +94,8 @@ impl ResidualsPanel {
         }
         paint_cursor(&painter, &theme, &area, ctx.cursor_ns);
         let id = ui.unique_id().with("rms over time");
-        navigate(ui, ctx, &area, id, "Reprojection RMS over time", Clicks::Seek, false);
+        navigate(ui, ctx, &area, id, "Reprojection RMS over time", Clicks::Seek, false)
+            .on_hover_text("Reprojection RMS after the solve, px (reprojection_rms_after_px in frames.csv)");
     }
 }
 
@@ -197,6 +198,7 @@ fn histogram_ui(ui: &mut Ui, theme: &Theme, histogram: &ResidualHistogram, heigh
     }
     let response = ui.interact(rect, ui.unique_id().with("histogram"), Sense::hover());
     response.widget_info(|| WidgetInfo::labeled(Role::Image, true, "Histogram of reprojection residuals"));
+    response.on_hover_text("Components u and v of the reprojection residuals in the window, px");
 }
 
 /// χ² by kind of factor: before, after, and per residual, which is expected to be about 1.
