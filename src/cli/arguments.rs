@@ -33,7 +33,7 @@ pub(crate) enum Command {
     /// Run the estimator over a log without a window and write its files.
     #[command(after_help = exit::RUN)]
     Run(RunArguments),
-    /// Draw one panel at one instant into a PNG, without a display.
+    /// Draw one panel at one time into a PNG or an SVG, without a display.
     #[cfg(feature = "gui")]
     #[command(after_help = exit::INTERRUPTIBLE)]
     Screenshot(ScreenshotArguments),

@@ -68,7 +68,7 @@ pub(crate) struct ScreenshotArguments {
     /// and image show the moved chain.
     #[arg(long, value_name = "DIRECTION=VALUE")]
     pub slide: Option<dcvins::observability::SlideRequest>,
-    /// Overwrite whatever has the name of the screenshot. Without it only pictures and tables are replaced.
+    /// Overwrite whatever has the name of the screenshot. Without it only PNG, SVG and CSV files are replaced.
     #[arg(long)]
     pub force: bool,
     #[command(flatten)]

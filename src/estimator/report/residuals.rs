@@ -32,19 +32,21 @@ impl FactorKind {
     pub const fn name(self) -> &'static str {
         match self {
             Self::Visual => "visual",
-            Self::Imu => "imu",
+            Self::Imu => "IMU",
             Self::Encoder => "encoder",
             Self::CalibrationPrior => "calibration prior",
             Self::MarginalizationPrior => "marginalization prior",
-            Self::ZeroVelocity => "standstill",
+            Self::ZeroVelocity => "zero velocity",
         }
     }
 
     /// Name in tables and conditions, without spaces.
     pub const fn key(self) -> &'static str {
         match self {
+            Self::Imu => "imu",
             Self::CalibrationPrior => "calibration_prior",
             Self::MarginalizationPrior => "marginalization_prior",
+            Self::ZeroVelocity => "standstill",
             _ => self.name(),
         }
     }

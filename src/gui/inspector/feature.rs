@@ -25,13 +25,13 @@ pub(super) fn ui(ui: &mut Ui, ctx: &PanelContext<'_>, step: &StepRecord, id: Fea
         rows.push(("track age, images".to_owned(), vec![track.age.to_string()]));
         if let Some(previous) = track.previous_uv_px {
             let flow = track.uv_px - previous;
-            rows.push(("flow since the previous image, px".to_owned(), vec![fixed(flow.norm(), 2)]));
+            rows.push(("flow, px".to_owned(), vec![fixed(flow.norm(), 2)]));
         }
     }
     if let Some(report) = report {
         rows.push(("anchor frame".to_owned(), vec![report.anchor_frame_index.to_string()]));
         let depth = 1.0 / report.inverse_depth_per_m;
-        rows.push(("depth in the anchor frame, m".to_owned(), vec![fixed(depth, 2)]));
+        rows.push(("depth, m".to_owned(), vec![fixed(depth, 2)]));
         let state = if report.rejected { "rejected as an outlier" } else { "used in the solve" };
         rows.push(("state".to_owned(), vec![state.to_owned()]));
     } else {
@@ -47,7 +47,9 @@ pub(super) fn ui(ui: &mut Ui, ctx: &PanelContext<'_>, step: &StepRecord, id: Fea
     let length = |residual: Option<nalgebra::Vector2<f64>>| {
         residual.map_or_else(|| "–".to_owned(), |residual| fixed(residual.norm(), 2))
     };
-    let headings = ["frame", "u, px", "v, px", "residual before, px", "after, px", "χ²", "robust weight"];
+    let caption = "Observations: residual before and after the solve, χ² and robust weight";
+    ui.label(RichText::new(caption).small().color(theme.text_weak));
+    let headings = ["frame", "u, px", "v, px", "before, px", "after, px", "χ²", "weight"];
     let lines = report.observations.iter().map(|one| {
         vec![
             one.frame_index.to_string(),

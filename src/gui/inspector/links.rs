@@ -133,8 +133,7 @@ pub(super) fn block_ui(
     let shown = Shown::of(parameter.dimension());
     let unit = shown.unit.trim();
     let heads =
-        ["frame", "residual u, px", "residual v, px", "χ²", &format!("∂u, px/{unit}"), &format!("∂v, px/{unit}")]
-            .map(str::to_owned);
+        ["frame", "Δu, px", "Δv, px", "χ²", &format!("∂u, px/{unit}"), &format!("∂v, px/{unit}")].map(str::to_owned);
     let lines = rows.frames.iter().enumerate().filter_map(|(place, frame)| {
         let seen = feature.observations.iter().find(|seen| seen.frame_index == frame.0)?;
         let residual = seen.residual_after_px.map_or([f64::NAN; 2], |residual| [residual.x, residual.y]);
@@ -148,5 +147,7 @@ pub(super) fn block_ui(
         Some(cells)
     });
     let heads: Vec<&str> = heads.iter().map(String::as_str).collect();
+    let caption = "Residuals Δu, Δv after the solve and derivatives of the projection";
+    ui.label(RichText::new(caption).small().color(ctx.theme.text_weak));
     table_ui(ui, ctx.theme, "block", &heads, lines);
 }

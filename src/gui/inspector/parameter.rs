@@ -51,6 +51,6 @@ pub(super) fn ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, step: &St
     let state = parameter_states(step.rank.as_ref())
         .map_or(ParameterState::Waiting, |known| known.get(&parameter).copied().unwrap_or(ParameterState::Informed));
     let state = if state == ParameterState::Informed { "informed" } else { state.tag() };
-    rows.push(("observability in this window".to_owned(), vec![state.to_owned()]));
+    rows.push(("observability".to_owned(), vec![state.to_owned()]));
     rows_ui(ui, theme, "parameter", &rows);
 }
