@@ -30,7 +30,7 @@ impl InspectorPanel {
         let recording = ctx.recording;
         let run = ctx.selection.run.min(recording.runs.len().saturating_sub(1));
         let Some((run, step)) = recording.runs.get(run).and_then(|run| Some((run, run.step_at(ctx.cursor_ns)?))) else {
-            empty_ui(ui, "No step at the cursor yet");
+            empty_ui(ui, "No step at the cursor");
             return;
         };
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {

@@ -74,7 +74,7 @@ impl JacobianPanel {
     pub fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
         let run = ctx.recording.runs.get(ctx.selection.run.min(ctx.recording.runs.len().saturating_sub(1)));
         let Some((run, step)) = run.and_then(|run| Some((run, run.step_at(ctx.cursor_ns)?))) else {
-            empty_ui(ui, "No step at the cursor yet");
+            empty_ui(ui, "No step at the cursor");
             return;
         };
         if !self.model.as_ref().is_some_and(|model| Arc::ptr_eq(&model.step, step)) {

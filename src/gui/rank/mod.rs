@@ -65,11 +65,11 @@ impl RankPanel {
     pub fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
         let recording = ctx.recording;
         let Some(run) = recording.runs.get(ctx.selection.run.min(recording.runs.len().saturating_sub(1))) else {
-            empty_ui(ui, "No run yet");
+            empty_ui(ui, "No runs");
             return;
         };
         let Some(step) = run.step_at(ctx.cursor_ns) else {
-            empty_ui(ui, "No step at the cursor yet");
+            empty_ui(ui, "No step at the cursor");
             return;
         };
         let height = ui.available_height();
