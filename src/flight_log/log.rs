@@ -306,14 +306,13 @@ impl FlightLog {
         self.duration_ns = counted().map(|entry| relative_ns(entry.3, self.epoch_ns)).max().unwrap_or(0).max(0);
         for (_, topic, first_ns, _) in stamps {
             if *first_ns == 0 {
-                let message = format!(
-                    "{topic}: its first header stamp is 0, so it was never set; the topic does not count for the log's start"
-                );
+                let message =
+                    format!("{topic}: first header stamp 0 (never set); the topic does not count for the log's start");
                 self.warn(WarningKind::Stamps, 0, message);
             } else if *first_ns < earliest_ns || *first_ns < 0 {
                 let message = format!(
-                    "{topic}: its first header stamp is {:.3} s before the log's start: it is of another clock, or the \
-                     stamp was never set; the topic does not count for the log's start",
+                    "{topic}: first header stamp {:.3} s before the log's start (another clock, or a stamp that was never \
+                     set); the topic does not count for the log's start",
                     seconds_from_ns(self.epoch_ns.saturating_sub(*first_ns))
                 );
                 self.warn(WarningKind::Stamps, 0, message);

@@ -182,7 +182,8 @@ fn for_each_row(
                 table,
             ));
         }
-        let text = std::str::from_utf8(&bytes).map_err(|error| bad_line(line, format!("no text ({error})"), table))?;
+        let text =
+            std::str::from_utf8(&bytes).map_err(|error| bad_line(line, format!("not UTF-8 text ({error})"), table))?;
         let text = text.trim();
         if !text.is_empty() && !text.starts_with('#') {
             let cells: Vec<&str> = text.split(',').map(str::trim).collect();

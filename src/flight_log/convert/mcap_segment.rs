@@ -83,7 +83,7 @@ pub(super) fn convert(file: &LogFile, path: &Path, sink: &mut Sink<'_>) -> Resul
         let content = ContainerIndex::attachment(file, place).and_then(|content| String::from_utf8(content).ok());
         match content {
             Some(content) => sink.writer.attach(&place.name, "text/plain", &content, 0)?,
-            None => sink.note(format!("the attachment {:?} is damaged or no text, and is left out", place.name)),
+            None => sink.note(format!("the attachment {:?} is damaged or not text, and is left out", place.name)),
         }
     }
     if file.require_unshortened(path).is_err() {
