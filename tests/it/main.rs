@@ -7,6 +7,7 @@ mod degeneracy;
 mod dependencies;
 mod documentation;
 mod evaluate;
+mod hostile_logs;
 mod layering;
 mod outputs;
 #[cfg(feature = "gui")]

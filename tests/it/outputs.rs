@@ -104,7 +104,7 @@ fn scripts_can_tell_the_ends_of_commands_apart() {
 fn an_edited_rig_is_kept() {
     let folder = folder();
     let simulate = |more: &[&str], code: i32, words: &[&str]| {
-        let arguments = ["simulate", "T1", "-o", "s.mcap", "--duration", "0.3", "--size", "64x48"];
+        let arguments = ["simulate", "T1", "-o", "s.mcap", "--duration", "0.5", "--size", "64x48"];
         check(folder.path(), &[&arguments[..], more].concat(), code, words);
     };
     simulate(&[], 0, &[]);
@@ -137,6 +137,6 @@ fn an_interrupt_and_a_kill_leave_no_part_of_a_file() {
         assert!(!folder.path().join("k.mcap").exists());
         assert_eq!(temporary(), code.is_none(), "only a killed process leaves its temporary file");
     }
-    check(folder.path(), &["simulate", "T1", "-o", "k.mcap", "--duration", "0.3", "--size", "64x48"], 0, &[]);
+    check(folder.path(), &["simulate", "T1", "-o", "k.mcap", "--duration", "0.5", "--size", "64x48"], 0, &[]);
     assert!(names(folder.path()).iter().all(|name| !name.starts_with('.')), "the next command removes it");
 }
