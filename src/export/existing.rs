@@ -92,7 +92,7 @@ pub fn check_simulated_log(log: &Path, force: bool) -> Result<(), ExportError> {
     for (ending, path) in &beside {
         let Ok(text) = fs::read(path) else { continue };
         let written = simulated.as_ref().and_then(|log| log.attachment(ending));
-        if !written.is_some_and(|(_, content)| content == text) {
+        if written.is_none_or(|(_, content)| content != text) {
             return Err(existing("the rig exists and is not as 'dcvins simulate' wrote it", path));
         }
     }
@@ -137,7 +137,7 @@ fn writer_of(log: &Path) -> Option<LogOrigin> {
 /// # Errors
 /// When the file cannot be written or, without `force`, is something else.
 pub fn check_picture(path: &Path, force: bool) -> Result<(), ExportError> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
     output::check_folder(folder).map_err(ExportError::write(folder))?;
     if !path.exists() {
         return Ok(());

@@ -146,7 +146,7 @@ fn the_readme_is_short() {
 /// What `dcvins COMMAND --help` prints; without a command, the list of the commands.
 fn help(command: Option<&str>) -> String {
     let output = Command::new(env!("CARGO_BIN_EXE_dcvins")).args(command).arg("--help").output();
-    String::from_utf8(output.expect("the program runs").stdout).unwrap()
+    String::from_utf8(output.expect("the program runs").stdout).expect("help is text")
 }
 
 /// The names of the commands that the program offers.

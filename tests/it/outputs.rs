@@ -26,16 +26,17 @@ fn check(folder: &Path, arguments: &[&str], code: i32, words: &[&str]) {
 
 /// A folder with the sample log.
 fn folder() -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = tempfile::tempdir().expect("a folder can be made");
     for name in ["garden.mcap", "garden.rig.yaml", "garden.truth.yaml"] {
-        fs::copy(sample(name), folder.path().join(name)).unwrap();
+        fs::copy(sample(name), folder.path().join(name)).expect("the sample can be copied");
     }
     folder
 }
 
 fn names(folder: &Path) -> Vec<String> {
-    let entries = fs::read_dir(folder).unwrap();
-    let mut names: Vec<String> = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    let entries = fs::read_dir(folder).expect("the folder can be listed");
+    let mut names: Vec<String> =
+        entries.map(|entry| entry.expect("the entry can be read").file_name().to_string_lossy().into_owned()).collect();
     names.sort();
     names
 }

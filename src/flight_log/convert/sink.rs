@@ -142,12 +142,12 @@ impl<'a> Sink<'a> {
 
     /// The row of a topic in the report; topics beyond their limit share one.
     fn tally(&mut self, topic: &str, message_type: &str) -> &mut Tally {
-        let name = |name: &str| match self.limits.check_name("a name", name) {
-            Ok(()) => name.to_owned(),
-            Err(_) => {
-                let start: String = name.chars().take(SHOWN_CHARS).collect();
-                format!("{start}… ({} bytes)", name.len())
+        let name = |name: &str| {
+            if self.limits.check_name("a name", name).is_ok() {
+                return name.to_owned();
             }
+            let start: String = name.chars().take(SHOWN_CHARS).collect();
+            format!("{start}… ({} bytes)", name.len())
         };
         let key = (name(topic), name(message_type));
         let full = self.tallies.len() as u64 >= self.limits.topics().saturating_mul(2);

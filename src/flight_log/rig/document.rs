@@ -41,7 +41,7 @@ impl Document {
         }
         let text = String::from_utf8(bytes).map_err(|error| {
             let valid = error.utf8_error().valid_up_to();
-            let line = error.as_bytes()[..valid].iter().filter(|byte| **byte == b'\n').count() + 1;
+            let line = error.as_bytes()[..valid].split(|byte| *byte == b'\n').count();
             syntax(format!("line {line}: byte {valid} is not UTF-8, expected a text file"))
         })?;
         Self::parse(text, file)

@@ -162,7 +162,7 @@ impl Found {
                 listed.map(|(field, nearest)| format!("{} ('{nearest}'?)", shortened(field, 60))).collect();
             let more = others.len().saturating_sub(MAX_LISTED);
             let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-            problem.push_str(&format!("; also unknown: {}{more}", listed.join(", ")));
+            problem = format!("{problem}; also unknown: {}{more}", listed.join(", "));
         }
         Err(LogError::Rig { field: printable(field).into_owned(), problem, path: file.to_owned() })
     }

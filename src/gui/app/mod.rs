@@ -105,7 +105,7 @@ impl App {
         match thread {
             Ok(_) => self.opening = Some(Opening { path, result }),
             Err(error) => {
-                self.state.notices.show_message(NoticeLevel::Error, format!("Cannot start a thread: {error}"))
+                self.state.notices.show_message(NoticeLevel::Error, format!("Cannot start a thread: {error}"));
             }
         }
     }

@@ -57,7 +57,7 @@ impl FromStr for Condition {
 }
 
 /// A problem of a text that is too long to be shown.
-fn too_long(text: &str, message: String) -> ConditionProblem {
+fn too_long(text: &str, message: &str) -> ConditionProblem {
     let text = format!("{}…", text.chars().take(60).collect::<String>());
     ConditionProblem { text, column: 1, message: format!("the condition is too long: {message}") }
 }
@@ -65,7 +65,7 @@ fn too_long(text: &str, message: String) -> ConditionProblem {
 /// Parses a condition.
 fn parse(text: &str) -> Result<Condition> {
     if text.len() > MAX_CHARACTERS {
-        return Err(too_long(text, format!("{} bytes, expected at most {MAX_CHARACTERS}", text.len())));
+        return Err(too_long(text, &format!("{} bytes, expected at most {MAX_CHARACTERS}", text.len())));
     }
     let mut parser = Parser { text, tokens: tokens(text)?, at: 0, depth: 0, operators: 0 };
     if matches!(parser.peek(), Token::End) {
@@ -139,7 +139,7 @@ impl Parser<'_> {
         self.operators += 1;
         if self.operators > MAX_OPERATORS {
             let message = format!("more than {MAX_OPERATORS} operators such as 'and', 'or' and '+'");
-            return Err(too_long(self.text, message));
+            return Err(too_long(self.text, &message));
         }
         Ok(())
     }

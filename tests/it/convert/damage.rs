@@ -44,7 +44,7 @@ fn chunks(bytes: &[u8]) -> Vec<Range<usize>> {
 
 /// Numbers of messages in the log and lost, as the report counts them.
 fn counts(source: &Path, log: &Path) -> (u64, u64) {
-    let report = run(source, log).unwrap();
+    let report = run(source, log).expect("it is converted");
     let imu = topic(&report, "/imu");
     (imu.taken, imu.left)
 }
@@ -148,7 +148,7 @@ fn a_missing_file_of_a_bag_is_left_out_and_counted() {
     write_directly(&source.join("bag_0.mcap"));
     write_metadata(&source, "bag_0.mcap\n    - bag_1.mcap\n    - ../../etc/bag_2.mcap", "", "");
     let text = fs::read_to_string(source.join("metadata.yaml")).unwrap();
-    let text = text + "  message_count: 12\n  files:\n    - path: bag_1.mcap\n      message_count: 3\n";
+    let text = format!("{text}  message_count: 12\n  files:\n    - path: bag_1.mcap\n      message_count: 3\n");
     fs::write(source.join("metadata.yaml"), text).unwrap();
     let report = run(&source, &log).unwrap();
     assert_eq!(topic(&report, "/imu").taken, 2);
