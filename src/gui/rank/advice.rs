@@ -4,9 +4,7 @@ use std::sync::Arc;
 
 use egui::{RichText, Ui};
 
-use super::verdict::parameters_of;
 use crate::geometry::seconds_from_ns;
-use crate::gimbal::ParameterNames;
 use crate::gui::PanelContext;
 use crate::gui::step_work::{REPAINT, StepWork};
 use crate::observability::laboratory::{Advice, Situation, advise};
@@ -109,10 +107,7 @@ impl AdviceUi {
                 .as_ref()
                 .and_then(|rank| Situation::of_step(&step.report, rank, &ctx.recording.rig, &run.camera_key));
             let step = Arc::clone(step);
-            let names = ctx.names();
-            move || {
-                Some(StepAdvice { since: since(&earlier, &step, &names), advice: situation.as_ref().and_then(advise) })
-            }
+            move || Some(StepAdvice { since: since(&earlier, &step), advice: situation.as_ref().and_then(advise) })
         });
     }
 }
@@ -138,15 +133,14 @@ fn advice_ui(ui: &mut Ui, ctx: &PanelContext<'_>, advice: Option<&Advice>, time:
     }
 }
 
-/// The least observable direction and the stamp since which it has been null or weak without interruption; `before` are
-/// the run's earlier steps.
-fn since(before: &[Arc<StepRecord>], step: &StepRecord, names: &ParameterNames) -> Option<String> {
+/// Since when the least observable direction, which the verdict names, has been null or weak without interruption;
+/// `before` are the run's earlier steps.
+fn since(before: &[Arc<StepRecord>], step: &StepRecord) -> Option<String> {
     let rank = step.rank.as_ref()?;
     let weak = rank.directions.iter().find(|direction| !direction.structural);
     let direction = weak.or_else(|| rank.directions.first())?;
     let lost = steps_lost(&rank.parameters, &direction.weights, before.iter().rev().map(|step| step.rank.as_ref()));
     let first_ns = before.get(before.len() - lost).map_or(step.report.stamp_ns, |first| first.report.stamp_ns);
-    let kind = if direction.structural { "null" } else { "weak" };
-    let named = parameters_of(names, &rank.parameters, direction, 2);
-    Some(format!("Least observable direction: {named}, {kind} since {:.2} s", seconds_from_ns(first_ns)))
+    let kind = if direction.structural { "Unobservable" } else { "Weak" };
+    Some(format!("{kind} since {:.2} s without interruption", seconds_from_ns(first_ns)))
 }
