@@ -51,7 +51,7 @@ fn read_log(path: &Path) {
     let rig = Rig::from_yaml(RIG, Path::new("rig.yaml")).expect("the rig of the seeds is valid");
     for camera in &rig.cameras {
         if let Ok(frames) = FrameStream::new(Arc::clone(&log), &rig, &camera.key, 0.0, None) {
-            drop(frames.take(MAX_READ).count());
+            frames.take(MAX_READ).for_each(drop);
         }
     }
     let images = ImageReader::new(Arc::clone(&log), &rig);
