@@ -6,7 +6,7 @@ use std::sync::Arc;
 use anyhow::{Context as _, Result, bail};
 use clap::{Args, ValueEnum};
 use dcvins::export::{
-    PANEL_NAMES, Renderer, ScreenshotOptions, check_picture, draw_panel, draw_panel_svg, is_session, log_name,
+    PANEL_NAMES, Renderer, ScreenshotOptions, check_screenshot, draw_panel, draw_panel_svg, is_session, log_name,
     panel_csv, read_session, write_csv, write_png, write_svg,
 };
 use dcvins::flight_log::ImageReader;
@@ -154,9 +154,9 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<Outcome> {
     let path_at = |cursor_ns| if several { numbered(&arguments.output, cursor_ns) } else { arguments.output.clone() };
     for cursor_ns in &stamps_ns {
         let path = path_at(*cursor_ns);
-        check_picture(&path, arguments.force)?;
+        check_screenshot(&path, arguments.force)?;
         if arguments.csv {
-            check_picture(&path.with_extension("csv"), arguments.force)?;
+            check_screenshot(&path.with_extension("csv"), arguments.force)?;
         }
     }
     let interrupt = Interrupt::watch()?;

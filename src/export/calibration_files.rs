@@ -1,10 +1,11 @@
 //! The files that `dcvins calibrate` writes.
 
+use std::fs;
 use std::path::Path;
 
 use super::calibration_report::{CalibrationReport, ParameterReport};
 use super::error::ExportError;
-use crate::flight_log::output::{self, OutputSet};
+use crate::flight_log::output::OutputSet;
 use crate::session::CalibrationRun;
 
 /// Writes `rig.yaml`, `calibration.json` and `report.txt` into a folder.
@@ -12,7 +13,7 @@ use crate::session::CalibrationRun;
 /// # Errors
 /// When a file or the folder cannot be written.
 pub fn write_calibration(run: &CalibrationRun, report: &CalibrationReport, folder: &Path) -> Result<(), ExportError> {
-    output::create_folder(folder).map_err(ExportError::write(folder))?;
+    fs::create_dir_all(folder).map_err(ExportError::write(folder))?;
     let json = serde_json::to_string_pretty(report)
         .map_err(|source| ExportError::Write { source: source.into(), path: folder.join("calibration.json") })?;
     let files = [

@@ -50,7 +50,7 @@ impl Machine {
         let folder =
             self.state.as_ref().ok_or_else(|| format!("there is no home folder to keep {name} in: set HOME"))?;
         let file = folder.join(name);
-        let written = output::create_folder(folder).and_then(|()| output::write_file(&file, text.as_bytes()));
+        let written = fs::create_dir_all(folder).and_then(|()| output::write_file(&file, text.as_bytes()));
         written.map_err(|error| ExportError::write(&file)(error).to_string())
     }
 }
@@ -152,7 +152,7 @@ impl Desktop for Machine {
 
     fn write_session(&self, name: &str, text: &str) -> Result<PathBuf, String> {
         let folder = self.output.join(name);
-        output::create_folder(&folder).map_err(|error| ExportError::write(&folder)(error).to_string())?;
+        fs::create_dir_all(&folder).map_err(|error| ExportError::write(&folder)(error).to_string())?;
         let path = folder.join(format!("{name}.session.json"));
         output::write_file(&path, text.as_bytes()).map_err(|error| ExportError::write(&path)(error).to_string())?;
         Ok(fs::canonicalize(&path).unwrap_or(path))

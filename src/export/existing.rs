@@ -132,13 +132,13 @@ fn writer_of(log: &Path) -> Option<LogOrigin> {
     Some(if holds(b"dcvins simulate") { LogOrigin::Simulation } else { LogOrigin::Other })
 }
 
-/// Whether a picture or table may be written: an existing file must be of the same format.
+/// Whether a screenshot or table may be written: an existing file must be of the same format.
 ///
 /// # Errors
 /// When the file cannot be written or, without `force`, is something else.
-pub fn check_picture(path: &Path, force: bool) -> Result<(), ExportError> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
-    output::check_folder(folder).map_err(ExportError::write(folder))?;
+pub fn check_screenshot(path: &Path, force: bool) -> Result<(), ExportError> {
+    let folder = output::folder_of(path);
+    output::check_folder(&folder).map_err(ExportError::write(&folder))?;
     if !path.exists() {
         return Ok(());
     }
@@ -262,15 +262,15 @@ mod tests {
     }
 
     #[test]
-    fn pictures_replace_pictures() {
+    fn screenshots_replace_screenshots() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("flight.mcap");
-        check_picture(&path, false).unwrap();
+        check_screenshot(&path, false).unwrap();
         fs::write(&path, b"\x89MCAP0\r\n").unwrap();
-        assert!(problem(check_picture(&path, false)).starts_with("the file exists and is no screenshot"));
-        check_picture(&path, true).unwrap();
+        assert!(problem(check_screenshot(&path, false)).starts_with("the file exists and is no screenshot"));
+        check_screenshot(&path, true).unwrap();
         fs::write(&path, b"\x89PNG\r\n").unwrap();
-        check_picture(&path, false).unwrap();
-        assert!(problem(check_picture(folder.path(), true)).contains("it is a folder"));
+        check_screenshot(&path, false).unwrap();
+        assert!(problem(check_screenshot(folder.path(), true)).contains("it is a folder"));
     }
 }

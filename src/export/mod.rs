@@ -27,7 +27,7 @@ pub use desktop::Machine;
 pub use error::ExportError;
 pub use evaluation::{EvaluationOptions, EvaluationReport, evaluate};
 pub use existing::{
-    check_calibration_folder, check_converted_log, check_picture, check_report_folder, check_run_folders,
+    check_calibration_folder, check_converted_log, check_report_folder, check_run_folders, check_screenshot,
     check_simulated_log, other_runs,
 };
 pub use recent_files::RecentFiles;

@@ -62,7 +62,7 @@ impl RecentFiles {
             }
         }
         if let Some(folder) = file.parent() {
-            drop(output::create_folder(folder));
+            drop(fs::create_dir_all(folder));
         }
         let mut text = lines.join(&b'\n');
         text.push(b'\n');

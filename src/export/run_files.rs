@@ -8,7 +8,7 @@ use super::results::stage_results;
 use super::summary::{RunSummary, summarize, to_json};
 use super::tables::{calibration_csv, frames_csv, information_csv, rank_csv};
 use super::trajectory::{euroc_of_run, tum_of_run};
-use crate::flight_log::output::{self, OutputSet};
+use crate::flight_log::output::OutputSet;
 use crate::gimbal::ParameterPart;
 use crate::sensors::{CameraMount, Rig};
 use crate::session::{Recording, RunRecord};
@@ -62,7 +62,7 @@ pub(super) fn stage_run(
     outputs: &mut OutputSet,
 ) -> Result<(PathBuf, RunSummary), ExportError> {
     let folder = folder.join(&run.spec.label);
-    output::create_folder(&folder).map_err(ExportError::write(&folder))?;
+    fs::create_dir_all(&folder).map_err(ExportError::write(&folder))?;
     let summary = summarize(recording, run, options.timing);
     let json = to_json(&summary)
         .map_err(|source| ExportError::Write { source: source.into(), path: folder.join("summary.json") })?;

@@ -1,5 +1,6 @@
 //! Screenshots of panels without a window: the same bytes on every machine.
 
+use std::fs;
 use std::io::Cursor;
 use std::path::Path;
 
@@ -244,7 +245,7 @@ pub fn write_csv(table: &str, path: &Path) -> Result<(), ScreenshotError> {
 
 fn write_bytes(bytes: &[u8], path: &Path) -> Result<(), ScreenshotError> {
     if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
-        output::create_folder(folder).map_err(ExportError::write(folder))?;
+        fs::create_dir_all(folder).map_err(ExportError::write(folder))?;
     }
     Ok(output::write_file(path, bytes).map_err(ExportError::write(path))?)
 }

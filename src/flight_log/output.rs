@@ -173,11 +173,6 @@ pub fn check_folder(folder: &Path) -> io::Result<()> {
     temporary_file(nearest, OsStr::new("output")).map(drop)
 }
 
-/// Makes a folder with those above it.
-pub fn create_folder(folder: &Path) -> io::Result<()> {
-    fs::create_dir_all(folder)
-}
-
 /// Where a file really lies: behind a link. Folders, devices and pipes are no files that can be replaced.
 fn target_of(path: &Path) -> io::Result<PathBuf> {
     let Ok(metadata) = fs::metadata(path) else { return Ok(path.to_owned()) };
@@ -191,7 +186,8 @@ fn target_of(path: &Path) -> io::Result<PathBuf> {
     if fs::symlink_metadata(path)?.is_symlink() { fs::canonicalize(path) } else { Ok(path.to_owned()) }
 }
 
-fn folder_of(path: &Path) -> PathBuf {
+/// The folder that a file lies in, `.` for a name alone.
+pub fn folder_of(path: &Path) -> PathBuf {
     match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder.to_owned(),
         _ => PathBuf::from("."),

@@ -20,7 +20,7 @@ use serde_json::Value;
 use super::error::ExportError;
 use super::existing::{RUN_FILES, check_run_folder, read_index};
 use super::run_files::{RunFileOptions, remove_unwritten, stage_run};
-use crate::flight_log::output::{self, OutputSet};
+use crate::flight_log::output::OutputSet;
 use crate::log_check::CheckReport;
 use crate::session::Recording;
 
@@ -62,7 +62,7 @@ pub struct ReportOptions {
 /// # Errors
 /// When a file cannot be read or written.
 pub fn write_report(recording: &Recording, folder: &Path, options: &ReportOptions) -> Result<PathBuf, ExportError> {
-    output::create_folder(folder).map_err(ExportError::write(folder))?;
+    fs::create_dir_all(folder).map_err(ExportError::write(folder))?;
     let run_options = RunFileOptions { timing: false, ..RunFileOptions::default() };
     let mut outputs = OutputSet::default();
     let (mut folders, mut summaries) = (Vec::new(), Vec::new());
