@@ -26,6 +26,9 @@ const LAYOUTS: &str = "layouts.json";
 /// File of the settings in the user's state folder.
 const SETTINGS: &str = "settings.json";
 
+/// File of the window's size, place and layout in the user's state folder.
+const WINDOW: &str = "window.json";
+
 /// The real machine.
 #[derive(Clone, Debug)]
 pub struct Machine {
@@ -138,6 +141,14 @@ impl Desktop for Machine {
 
     fn keep_settings(&self, text: &str) -> Result<(), String> {
         self.keep(SETTINGS, text)
+    }
+
+    fn kept_window(&self) -> Option<String> {
+        self.kept(WINDOW)
+    }
+
+    fn keep_window(&self, text: &str) -> Result<(), String> {
+        self.keep(WINDOW, text)
     }
 
     fn write_panel(&self, export: &PanelExport) -> Result<Vec<PathBuf>, String> {

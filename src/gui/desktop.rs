@@ -51,6 +51,10 @@ pub trait Desktop: Send + Sync {
     fn kept_settings(&self) -> Option<String>;
     /// Stores the settings for the next start.
     fn keep_settings(&self, text: &str) -> Result<(), String>;
+    /// The text of the last [`Desktop::keep_window`].
+    fn kept_window(&self) -> Option<String>;
+    /// Stores size, place and layout of the window for the next start.
+    fn keep_window(&self, text: &str) -> Result<(), String>;
     /// Writes a panel as images and as a table, and returns the paths.
     fn write_panel(&self, export: &PanelExport) -> Result<Vec<PathBuf>, String>;
     /// Writes a session of a log with this name, and returns the path.

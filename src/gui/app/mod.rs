@@ -1,6 +1,9 @@
 //! The window's program: it owns the session, passes time and commands to it, and draws its results.
 
+mod kept_window;
+mod leaving;
 mod playing_log;
+mod requests;
 pub mod run_window;
 mod session_log;
 #[cfg(test)]
@@ -16,15 +19,15 @@ use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
 use egui::{CentralPanel, Frame, Ui, ViewportCommand};
 
+use self::kept_window::{KeptWindow, WindowKeeper};
+use self::leaving::{Departure, Leaving, Work};
 use self::playing_log::{Images, go_to_first_frame};
 pub use self::playing_log::{OpenLog, PlayingLog};
 use self::welcome::Welcome;
-use crate::gui::desktop::{Desktop, PanelExport};
+use crate::gui::desktop::Desktop;
 use crate::gui::theme::{Theme, ThemeName};
 use crate::gui::units::counted;
-use crate::gui::window::{
-    NoticeLevel, ProgressMeter, SCALES, SavedLayouts, Settings, WindowRequest, WindowState, window_ui,
-};
+use crate::gui::window::{NoticeLevel, ProgressMeter, SCALES, SavedLayouts, Settings, WindowState, window_ui};
 use crate::gui::{PanelContext, Selection};
 use crate::session::{Command, PlaybackSpeed, Recording};
 
@@ -50,6 +53,8 @@ pub struct App {
     /// Whether the cursor has been moved to the first frame of the log.
     at_first_frame: bool,
     opening: Option<Opening>,
+    departure: Departure,
+    keeper: WindowKeeper,
     welcome: Welcome,
     state: WindowState,
     selection: Selection,
@@ -73,8 +78,8 @@ impl App {
         state.dialogs.set_desktop(Arc::clone(&desktop));
         state.saved_layouts = SavedLayouts::from_text(&desktop.kept_layouts().unwrap_or_default());
         state.settings = Settings::from_text(&desktop.kept_settings().unwrap_or_default(), theme);
-        let layout = state.settings.layout.clone();
-        state.arrange_by_name(&layout);
+        let kept = KeptWindow::from_text(&desktop.kept_window().unwrap_or_default());
+        state.arrange_for_start(kept.layout.as_ref());
         let theme = Theme::of(state.settings.theme);
         Self {
             welcome: Welcome::new(Arc::clone(&desktop)),
@@ -83,6 +88,8 @@ impl App {
             log: None,
             at_first_frame: false,
             opening: None,
+            departure: Departure::default(),
+            keeper: WindowKeeper::new(kept),
             state,
             selection: Selection::default(),
             theme,
@@ -119,6 +126,7 @@ impl App {
         if let Some(layout) = log.layout() {
             self.state.take_layout(layout);
         }
+        self.departure.saved = Work::of(log.as_ref());
         self.log = Some(log);
         self.at_first_frame = false;
         self.selection = Selection::default();
@@ -133,6 +141,7 @@ impl App {
 
     /// Draws one frame and executes the commands and requests of that frame.
     pub fn ui(&mut self, ui: &mut Ui) {
+        self.guard_closing(ui);
         self.apply_settings(ui);
         self.take_opened();
         self.take_dropped(ui);
@@ -142,21 +151,9 @@ impl App {
         } else {
             self.welcome_ui(ui);
         }
-        for request in std::mem::take(&mut self.state.requests) {
-            // The next frame shows the result.
-            ui.ctx().request_repaint();
-            match request {
-                WindowRequest::OpenLog(path) => self.open(path),
-                WindowRequest::KeepLayouts(text) => {
-                    if let Err(problem) = self.desktop.keep_layouts(&text) {
-                        self.state.notices.show_message(NoticeLevel::Error, problem);
-                    }
-                }
-                WindowRequest::SaveSession => self.save_session(),
-                WindowRequest::WritePanel(export) => self.write_panel(&export),
-            }
-        }
+        self.take_requests(ui);
         self.update_title(ui);
+        self.keep_window(ui);
         if self.opening.is_some() {
             ui.ctx().request_repaint_after(std::time::Duration::from_millis(POLL_PERIOD_MS));
         }
@@ -204,30 +201,6 @@ impl App {
             self.state.notices.show_message(NoticeLevel::Warning, text);
         }
         self.reported_warnings = count;
-    }
-
-    fn save_session(&mut self) {
-        let layout = self.state.layout_value();
-        let Some(log) = &self.log else { return };
-        let stem = log.recording().log_path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
-        let Some(text) = log.saved(layout) else { return };
-        match self.desktop.write_session(&stem.unwrap_or_else(|| "log".to_owned()), &text) {
-            Ok(path) => {
-                let text = format!("Session saved (opens like a log):\n{}", path.display());
-                self.state.notices.show_message(NoticeLevel::Info, text);
-            }
-            Err(problem) => self.state.notices.show_message(NoticeLevel::Error, problem),
-        }
-    }
-
-    fn write_panel(&mut self, export: &PanelExport) {
-        match self.desktop.write_panel(export) {
-            Ok(paths) => {
-                let paths: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
-                self.state.notices.show_message(NoticeLevel::Info, format!("Exported:\n{}", paths.join("\n")));
-            }
-            Err(problem) => self.state.notices.show_message(NoticeLevel::Error, problem),
-        }
     }
 
     fn session_ui(&mut self, ui: &mut Ui) {
@@ -314,7 +287,7 @@ impl App {
             self.state.notices.show_message(NoticeLevel::Info, text);
         }
         if let Some(path) = dropped.into_iter().next() {
-            self.open(path);
+            self.leave(ui, Leaving::Open(path));
         }
     }
 
@@ -346,5 +319,9 @@ impl App {
 impl eframe::App for App {
     fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
         Self::ui(self, ui);
+    }
+
+    fn on_exit(&mut self) {
+        self.store_window();
     }
 }

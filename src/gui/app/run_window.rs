@@ -7,6 +7,7 @@ use std::sync::Arc;
 use egui::{IconData, ViewportBuilder};
 use thiserror::Error;
 
+use super::kept_window::{KeptWindow, move_inside_screen};
 use super::software_window::SoftwareWindow;
 use crate::gui::app::{App, OpenLog, PlayingLog};
 use crate::gui::desktop::Desktop;
@@ -58,14 +59,14 @@ pub fn run_window(options: WindowOptions) -> Result<(), WindowError> {
     if cfg!(target_os = "linux") && !["WAYLAND_DISPLAY", "WAYLAND_SOCKET", "DISPLAY"].into_iter().any(set) {
         return Err(WindowError::NoDisplay);
     }
+    let kept = KeptWindow::from_text(&options.desktop.kept_window().unwrap_or_default());
     let viewport = ViewportBuilder::default()
         .with_title("dcvins")
         // The name of the desktop entry, `assets/linux/dcvins.desktop`.
         .with_app_id("dcvins")
         .with_icon(icon())
-        .with_inner_size([1600.0, 900.0])
-        .with_min_inner_size([640.0, 400.0])
         .with_drag_and_drop(true);
+    let viewport = kept.place.of(viewport);
     let native = eframe::NativeOptions { viewport, system_font_fallback: false, ..eframe::NativeOptions::default() };
     let start = move || {
         eframe::run_native(
@@ -73,6 +74,9 @@ pub fn run_window(options: WindowOptions) -> Result<(), WindowError> {
             native,
             Box::new(move |creation| {
                 arrange_drawing(creation.wgpu_render_state.as_ref(), &creation.egui_ctx);
+                if let Some(window) = creation.winit_window() {
+                    move_inside_screen(window);
+                }
                 let mut app = App::new(options.open_log, options.desktop, options.theme);
                 if let Some(log) = options.log {
                     app.show(log, None);

@@ -92,6 +92,7 @@ pub(super) struct TestDesktop {
     written: Mutex<Vec<PanelExport>>,
     sessions: Mutex<Vec<String>>,
     settings: Mutex<Option<String>>,
+    window: Mutex<Option<String>>,
     /// The answer of the desktop's file dialog, where it has one.
     picked: Mutex<Option<Receiver<Option<PathBuf>>>>,
 }
@@ -137,6 +138,15 @@ impl Desktop for TestDesktop {
 
     fn keep_settings(&self, text: &str) -> Result<(), String> {
         *self.settings.lock().unwrap() = Some(text.to_owned());
+        Ok(())
+    }
+
+    fn kept_window(&self) -> Option<String> {
+        self.window.lock().unwrap().clone()
+    }
+
+    fn keep_window(&self, text: &str) -> Result<(), String> {
+        *self.window.lock().unwrap() = Some(text.to_owned());
         Ok(())
     }
 

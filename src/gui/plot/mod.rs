@@ -10,7 +10,7 @@ use egui::epaint::{Mesh, Vertex, WHITE_UV};
 use egui::{Align2, Color32, Painter, Pos2, Rangef, Rect, Shape, Stroke, pos2};
 
 pub(crate) use curve::{BandCurve, Curve, StateCurve};
-pub(crate) use navigate::{Clicks, navigate, visible_range};
+pub(crate) use navigate::{Clicks, navigate, visible_range, zoom_about_cursor};
 pub(crate) use ticks::{decimals_of_step, ticks};
 
 use super::theme::{self, RunStyle, Theme};

@@ -76,6 +76,22 @@ pub(crate) fn navigate(
     response
 }
 
+/// Factor of one step of zooming by key.
+const ZOOM_STEP: f64 = 1.5;
+
+/// Zooms the time axis of all plots in (`closer`) or out, about the cursor.
+pub(crate) fn zoom_about_cursor(ctx: &mut PanelContext<'_>, closer: bool) {
+    let (begin_ns, end_ns) = visible_range(ctx);
+    let fixed_ns = ctx.cursor_ns.clamp(begin_ns, end_ns);
+    zoom(ctx, (begin_ns, end_ns), fixed_ns, if closer { ZOOM_STEP } else { 1.0 / ZOOM_STEP });
+}
+
+/// Zooms a time range by a factor about a stamp, which stays where it is.
+fn zoom(ctx: &mut PanelContext<'_>, (begin_ns, end_ns): (i64, i64), fixed_ns: i64, factor: f64) {
+    let scaled = |stamp_ns: i64| fixed_ns + ((stamp_ns - fixed_ns) as f64 / factor).round() as i64;
+    show(ctx, scaled(begin_ns), scaled(end_ns));
+}
+
 /// Shows a time range, limited to the log and to the minimum range; the whole log if the range covers it.
 fn show(ctx: &mut PanelContext<'_>, begin_ns: i64, end_ns: i64) {
     let whole_ns = ctx.recording.duration_ns.max(1);

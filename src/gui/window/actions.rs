@@ -1,11 +1,12 @@
 //! The actions of keys, buttons and the command palette in one table.
 
-use egui::{Key, KeyboardShortcut, Modifiers, Popup, Ui};
+use egui::{Event, Key, KeyboardShortcut, Modifiers, Popup, Ui};
 
 use super::tiles::Preset;
-use super::{Dialog, NoticeLevel, PanelName, WindowState};
+use super::{Dialog, NoticeLevel, PanelName, WindowRequest, WindowState, copying};
 use crate::frontend::FeatureId;
 use crate::gui::PanelContext;
+use crate::gui::plot::zoom_about_cursor;
 use crate::gui::theme::ThemeName;
 use crate::gui::timeline::toggled_loop;
 use crate::session::{Command, PlaybackSpeed};
@@ -35,6 +36,8 @@ pub(crate) enum Action {
     Hit(bool),
     /// Show the whole log in all plots.
     WholeLog,
+    /// Zoom the time axis of all plots in (`true`) or out, about the cursor.
+    ZoomTime(bool),
     /// Clear the selection and close open lists.
     Dismiss,
     /// Show the next run in the panels that show one.
@@ -49,6 +52,18 @@ pub(crate) enum Action {
     Save,
     /// Write the panel with the focus to files.
     Export,
+    /// Copy the value under the pointer, or the table of the panel with the focus.
+    Copy,
+    /// Copy the table of a panel.
+    CopyTable(PanelName),
+    /// Undo the last change of settings or layout.
+    Undo,
+    /// Redo it.
+    Redo,
+    /// Close the log and go back to the welcome view.
+    CloseLog,
+    /// Quit the program.
+    Quit,
     /// Arrange the panels as in a preset.
     Layout(Preset),
     /// Arrange the panels as in a saved layout, by its index.
@@ -98,9 +113,16 @@ const fn entry(
 const NONE: Modifiers = Modifiers::NONE;
 const SHIFT: Modifiers = Modifiers::SHIFT;
 const CTRL: Modifiers = Modifiers::COMMAND;
+const CTRL_SHIFT: Modifiers = CTRL.plus(SHIFT);
 
 /// All actions. Those with more modifiers come first, because a shortcut also matches with further modifiers.
 pub(crate) const TABLE: &[Entry] = &[
+    entry(Action::Redo, "Redo the change of settings or layout", "Ctrl+Shift+Z", &[(CTRL_SHIFT, Key::Z)]),
+    entry(Action::Undo, "Undo the last change of settings or layout", "Ctrl+Z", &[(CTRL, Key::Z)]),
+    // The desktop's own key for copying arrives as an event.
+    entry(Action::Copy, "Copy the value under the pointer, or the focused panel's table", "Ctrl+C", &[]),
+    entry(Action::CloseLog, "Close the log", "Ctrl+W", &[(CTRL, Key::W)]),
+    entry(Action::Quit, "Quit", "Ctrl+Q", &[(CTRL, Key::Q)]),
     entry(Action::Event(true), "Next event", "Ctrl+Right", &[(CTRL, Key::ArrowRight)]),
     entry(Action::Event(false), "Previous event", "Ctrl+Left", &[(CTRL, Key::ArrowLeft)]),
     entry(Action::Step(10), "Ten frames forward", "Shift+Right", &[(SHIFT, Key::ArrowRight)]),
@@ -124,6 +146,8 @@ pub(crate) const TABLE: &[Entry] = &[
     entry(Action::Breakpoint, "Set or clear a breakpoint at the cursor", "B", &[(NONE, Key::B)]),
     entry(Action::Hit(true), "Run to the next breakpoint hit", "N", &[(NONE, Key::N)]),
     entry(Action::WholeLog, "Zoom out to the whole log", "Z", &[(NONE, Key::Z)]),
+    entry(Action::ZoomTime(true), "Zoom in on the cursor", "+", &[(NONE, Key::Plus), (NONE, Key::Equals)]),
+    entry(Action::ZoomTime(false), "Zoom out from the cursor", "-", &[(NONE, Key::Minus)]),
     entry(Action::NextRun, "Show the next run", "R", &[(NONE, Key::R)]),
     entry(Action::Dialog(Dialog::Fork), "Fork the shown run at the cursor…", "F", &[(NONE, Key::F)]),
     entry(Action::Dialog(Dialog::AddRun), "Add a run…", "A", &[(NONE, Key::A)]),
@@ -159,6 +183,9 @@ pub(crate) fn pressed(ui: &Ui) -> Vec<Action> {
     let menu_open = Popup::is_any_open(ui.ctx());
     let mut actions = Vec::new();
     ui.input_mut(|input| {
+        if input.events.contains(&Event::Copy) {
+            actions.push(Action::Copy);
+        }
         for (number, key) in LAYOUT_KEYS.into_iter().enumerate() {
             if input.consume_shortcut(&KeyboardShortcut::new(CTRL, key)) {
                 actions.push(Action::SavedLayout(number));
@@ -202,6 +229,7 @@ pub(crate) fn perform(action: Action, state: &mut WindowState, ctx: &mut PanelCo
             (ctx.selection.feature, ctx.selection.parameter, ctx.selection.slide) = (None, None, None);
             state.close_dialogs();
         }
+        Action::ZoomTime(closer) => zoom_about_cursor(ctx, closer),
         Action::NextRun => {
             ctx.selection.run = (ctx.selection.run + 1) % ctx.recording.runs.len().max(1);
         }
@@ -210,9 +238,15 @@ pub(crate) fn perform(action: Action, state: &mut WindowState, ctx: &mut PanelCo
         Action::Warnings => state.notices.list_open = !state.notices.list_open,
         Action::Export => {
             let export = super::panel_export::export(state, ctx);
-            state.requests.push(super::WindowRequest::WritePanel(Box::new(export)));
+            state.requests.push(WindowRequest::WritePanel(Box::new(export)));
         }
-        Action::Save => state.requests.push(super::WindowRequest::SaveSession),
+        Action::Copy => copying::copy(state, ctx),
+        Action::CopyTable(panel) => copying::copy_table(panel, state, ctx),
+        Action::Undo => state.undo(),
+        Action::Redo => state.redo(),
+        Action::CloseLog => state.requests.push(WindowRequest::CloseLog),
+        Action::Quit => state.requests.push(WindowRequest::Quit),
+        Action::Save => state.requests.push(WindowRequest::SaveSession),
         Action::Layout(preset) => state.layout.arrange(preset),
         Action::SavedLayout(number) => {
             if !state.saved_layouts.take(number, &mut state.layout) {

@@ -3,8 +3,10 @@
 //! The real window and headless screenshots both draw [`window_ui`].
 
 mod actions;
+mod copying;
 mod dialogs;
 mod focus_ring;
+mod history;
 #[cfg(test)]
 mod keyboard_tests;
 mod legend;
@@ -30,6 +32,7 @@ use egui::{CentralPanel, Frame, Margin, Panel, Rect, Ui, Vec2};
 use self::actions::Action;
 pub use self::dialogs::{Dialog, Dialogs};
 use self::focus_ring::FocusRing;
+use self::history::{Arrangement, History};
 pub use self::legend::RunLegend;
 pub use self::notices::{NoticeLevel, Notices};
 pub use self::panel_export::{alone_ui, panel_table};
@@ -53,6 +56,15 @@ pub enum WindowRequest {
     KeepLayouts(String),
     /// Write the session to a file.
     SaveSession,
+    /// Close the log and go back to the welcome view.
+    CloseLog,
+    /// Quit the program.
+    Quit,
+    /// Leave the session after the question about unsaved work, with or without saving it.
+    Leave {
+        /// Whether the session is saved before.
+        save: bool,
+    },
     /// Write a panel to files.
     WritePanel(Box<PanelExport>),
 }
@@ -86,6 +98,11 @@ pub struct WindowState {
     pub opening: Option<PathBuf>,
     ring: FocusRing,
     layout: Layout,
+    history: History,
+    /// The layout when its last change was noticed.
+    noticed: Option<Layout>,
+    /// Text for the clipboard.
+    copied: Option<String>,
     /// The panel that was clicked last.
     focus: Option<PanelName>,
     /// The rectangles of the panels on the screen.
@@ -93,10 +110,35 @@ pub struct WindowState {
 }
 
 impl WindowState {
+    /// Closes all dialogs and lists, for a session that ends.
+    pub(in crate::gui) fn close_everything(&mut self) {
+        self.close_dialogs();
+        (self.progress, self.opening) = (None, None);
+    }
+
     fn close_dialogs(&mut self) {
         self.dialogs.close();
         self.shortcuts_open = false;
         self.notices.list_open = false;
+    }
+
+    /// Restores settings and layout as before the last change.
+    fn undo(&mut self) {
+        let before = self.history.undo();
+        self.restore(before, "Nothing to undo");
+    }
+
+    /// Restores settings and layout as before the last undo.
+    fn redo(&mut self) {
+        let undone = self.history.redo();
+        self.restore(undone, "Nothing to redo");
+    }
+
+    fn restore(&mut self, arrangement: Option<Arrangement>, none: &str) {
+        match arrangement {
+            Some(Arrangement { settings, layout }) => (self.settings, self.layout) = (settings, layout),
+            None => self.notices.show_message(NoticeLevel::Info, none),
+        }
     }
 
     /// The focused panel, to which commands about one panel apply, and its size in points.
@@ -133,6 +175,29 @@ impl WindowState {
     /// Restores the layout of a saved session.
     pub fn take_layout(&mut self, value: &serde_json::Value) {
         saved_layouts::take_layout(&mut self.layout, value);
+    }
+
+    /// Whether the layout has changed since the last call.
+    pub(in crate::gui) fn take_layout_changed(&mut self) -> bool {
+        let changed = self.noticed.as_ref().is_some_and(|noticed| *noticed != self.layout);
+        if changed || self.noticed.is_none() {
+            self.noticed = Some(self.layout.clone());
+        }
+        changed
+    }
+
+    /// The layout of the panels for the next start.
+    pub(in crate::gui) fn last_layout_value(&self) -> Option<serde_json::Value> {
+        saved_layouts::last_layout_value(&self.layout)
+    }
+
+    /// Arranges the panels for the start: as at the end of the last use, or as the settings say.
+    pub(in crate::gui) fn arrange_for_start(&mut self, last: Option<&serde_json::Value>) {
+        let name = self.settings.layout.clone();
+        match last.filter(|_| name == settings::LAST_LAYOUT) {
+            Some(last) => saved_layouts::take_last_layout(&mut self.layout, last),
+            None => self.arrange_by_name(&name),
+        }
     }
 
     /// Arranges the panels as in a preset.
@@ -189,5 +254,10 @@ pub fn window_ui(ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_
     state.ring.ui(ui, &theme);
     for action in actions {
         actions::perform(action, state, ctx);
+    }
+    let settled = !ui.input(|input| input.pointer.any_down());
+    state.history.follow(&state.settings, &state.layout, settled);
+    if let Some(text) = state.copied.take() {
+        ui.copy_text(text);
     }
 }

@@ -6,7 +6,7 @@ use egui::{Button, RichText, TextEdit, Ui};
 use egui_tiles::Tree;
 
 use super::PanelName;
-use super::tiles::Layout;
+use super::tiles::{Layout, Preset};
 use crate::gui::theme::Theme;
 
 /// Maximum number of saved layouts.
@@ -99,6 +99,22 @@ pub(super) fn take_layout(layout: &mut Layout, value: &serde_json::Value) {
     }
 }
 
+/// The current layout for the next start, with the name of its preset.
+pub(super) fn last_layout_value(layout: &Layout) -> Option<serde_json::Value> {
+    let preset = layout.preset.map(Preset::name);
+    Some(serde_json::json!({ "preset": preset, "panels": layout_value(layout)? }))
+}
+
+/// Applies the value of [`last_layout_value`] if this program has its panels.
+pub(super) fn take_last_layout(layout: &mut Layout, value: &serde_json::Value) {
+    if let Some(panels) = value.get("panels") {
+        take_layout(layout, panels);
+        let name = value.get("preset").and_then(serde_json::Value::as_str);
+        let preset = Preset::ALL.into_iter().find(|preset| name == Some(preset.name()));
+        layout.preset = layout.preset.or(preset);
+    }
+}
+
 /// A layout with at least one panel. Panels that are missing in it can be added.
 fn tree_of(value: serde_json::Value) -> Option<Tree<PanelName>> {
     let tree: Tree<PanelName> = serde_json::from_value(value).ok()?;
@@ -108,7 +124,6 @@ fn tree_of(value: serde_json::Value) -> Option<Tree<PanelName>> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tiles::Preset;
     use super::*;
 
     #[test]
@@ -133,5 +148,18 @@ mod tests {
         assert!(back.take(1, &mut layout) && !layout.is_visible(PanelName::Rank));
         layout.set_visible(PanelName::Rank, true);
         assert!(layout.is_visible(PanelName::Rank) && !back.take(2, &mut layout));
+    }
+
+    #[test]
+    fn the_last_layout_is_restored_with_the_name_of_its_preset() {
+        let mut layout = Layout::default();
+        layout.arrange(Preset::FrontEnd);
+        layout.set_visible(PanelName::Scene, false);
+        let value = last_layout_value(&layout).unwrap();
+        let mut next = Layout::default();
+        take_last_layout(&mut next, &value);
+        assert!(next == layout && next.preset == Some(Preset::FrontEnd));
+        take_last_layout(&mut next, &serde_json::json!({ "preset": "Overview", "panels": 7 }));
+        assert!(next == layout, "a value of another format changes nothing");
     }
 }

@@ -2,7 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::tiles::Preset;
 use crate::gui::theme::ThemeName;
 use crate::session::DEFAULT_MEMORY_BUDGET_BYTES;
 
@@ -10,6 +9,9 @@ use crate::session::DEFAULT_MEMORY_BUDGET_BYTES;
 pub const SCALES: std::ops::RangeInclusive<f32> = 0.5..=3.0;
 /// Range of the memory budget of a recording in MiB.
 pub(super) const MEMORY_MIB: std::ops::RangeInclusive<usize> = 64..=65_536;
+
+/// The initial layout that is the one at the end of the last use.
+pub(super) const LAST_LAYOUT: &str = "Last used";
 
 /// The user's settings, stored for the next start.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
@@ -21,7 +23,7 @@ pub struct Settings {
     pub scale: f32,
     /// Memory budget of a recording in MiB.
     pub memory_mib: usize,
-    /// Initial layout: name of a preset or of a saved layout.
+    /// Initial layout: the last one, or the name of a preset or of a saved layout.
     pub layout: String,
     /// Initial speed of playback in log seconds per second.
     pub speed: f64,
@@ -33,7 +35,7 @@ impl Default for Settings {
             theme: ThemeName::default(),
             scale: 1.0,
             memory_mib: DEFAULT_MEMORY_BUDGET_BYTES >> 20,
-            layout: Preset::default().name().to_owned(),
+            layout: LAST_LAYOUT.to_owned(),
             speed: 1.0,
         }
     }

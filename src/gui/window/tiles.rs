@@ -42,7 +42,7 @@ impl Preset {
 }
 
 /// The layout of the movable panels.
-#[derive(Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Layout {
     tree: Tree<PanelName>,
     /// The preset that was chosen last, `None` for a saved layout.
@@ -71,6 +71,20 @@ impl Layout {
     /// The tree of panels, for storing.
     pub(crate) fn tree(&self) -> &Tree<PanelName> {
         &self.tree
+    }
+
+    /// Whether another layout has the same panels in the same places, with other tabs in front.
+    pub(crate) fn differs_by_open_tabs_only(&self, other: &Self) -> bool {
+        let without_open_tabs = |layout: &Self| {
+            let mut tree = layout.tree.clone();
+            for (_, tile) in tree.tiles.iter_mut() {
+                if let Tile::Container(Container::Tabs(tabs)) = tile {
+                    tabs.active = None;
+                }
+            }
+            tree
+        };
+        self != other && self.preset == other.preset && without_open_tabs(self) == without_open_tabs(other)
     }
 
     /// Whether a panel is shown.

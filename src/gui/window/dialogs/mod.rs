@@ -8,6 +8,7 @@ mod open_log;
 mod palette;
 mod palette_items;
 mod settings;
+mod unsaved;
 
 use std::sync::Arc;
 
@@ -17,7 +18,6 @@ use self::add_run::AddRunDialog;
 use self::fork::ForkDialog;
 use self::open_log::{OpenLogDialog, Picked};
 use self::palette::CommandPalette;
-use self::settings::SettingsDialog;
 use super::actions::Action;
 use super::{WindowRequest, WindowState};
 use crate::gui::PanelContext;
@@ -36,6 +36,8 @@ pub enum Dialog {
     Palette,
     /// The settings.
     Settings,
+    /// The question before unsaved work is left.
+    Unsaved,
 }
 
 /// The state of all dialogs, open or not.
@@ -46,7 +48,8 @@ pub struct Dialogs {
     add_run: AddRunDialog,
     fork: ForkDialog,
     palette: CommandPalette,
-    settings: SettingsDialog,
+    /// The work that is not saved, as text.
+    unsaved: String,
 }
 
 impl Dialogs {
@@ -65,6 +68,12 @@ impl Dialogs {
         self.open = Some(dialog);
     }
 
+    /// Asks whether to save the session before it is left; `lost` counts what is not saved.
+    pub fn ask_to_save(&mut self, lost: String) {
+        self.unsaved = lost;
+        self.open = Some(Dialog::Unsaved);
+    }
+
     /// Whether a dialog is open.
     pub fn is_open(&self) -> bool {
         self.open.is_some()
@@ -78,7 +87,7 @@ impl Dialogs {
 
 /// Draws the dialog that is open.
 pub(super) fn ui(ui: &Ui, state: &mut WindowState, ctx: &mut PanelContext<'_>, actions: &mut Vec<Action>) {
-    let WindowState { dialogs, requests, saved_layouts, settings, layout, .. } = state;
+    let WindowState { dialogs, requests, saved_layouts, settings, layout, history, .. } = state;
     let picked = dialogs.open_log.picked(ui);
     if picked.is_some() && dialogs.open == Some(Dialog::OpenLog) {
         dialogs.open = None;
@@ -96,7 +105,8 @@ pub(super) fn ui(ui: &Ui, state: &mut WindowState, ctx: &mut PanelContext<'_>, a
         Some(Dialog::AddRun) => dialogs.add_run.ui(ui, ctx),
         Some(Dialog::Fork) => dialogs.fork.ui(ui, ctx),
         Some(Dialog::Palette) => dialogs.palette.ui(ui, ctx, saved_layouts, layout, actions),
-        Some(Dialog::Settings) => dialogs.settings.ui(ui, ctx.theme, settings, saved_layouts.names()),
+        Some(Dialog::Settings) => settings::ui(ui, ctx.theme, settings, history, saved_layouts.names(), actions),
+        Some(Dialog::Unsaved) => unsaved::ui(ui, ctx, &dialogs.unsaved, requests),
     };
     if !stays_open {
         dialogs.open = None;

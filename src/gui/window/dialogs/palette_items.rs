@@ -68,6 +68,9 @@ fn commands(ctx: &PanelContext<'_>, layouts: &SavedLayouts, layout: &Layout) -> 
     for panel in PanelName::ALL {
         items.push(item(format!("Panel: show {}", panel.as_str()), Action::Show(panel)));
     }
+    for panel in PanelName::ALL {
+        items.push(item(format!("Copy table of {} (CSV)", panel.as_str()), Action::CopyTable(panel)));
+    }
     for panel in PanelName::movable().filter(|panel| layout.is_visible(*panel)) {
         items.push(item(format!("Panel: hide {}", panel.as_str()), Action::Hide(panel)));
     }

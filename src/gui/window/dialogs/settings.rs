@@ -1,72 +1,59 @@
 //! The dialog for the settings.
 
-use egui::util::undoer::Undoer;
 use egui::{ComboBox, DragValue, Grid, Key, Modifiers, RichText, Ui, vec2};
 
 use super::modal::Modal;
 use crate::gui::theme::{Theme, ThemeName};
 use crate::gui::timeline::SPEEDS;
-use crate::gui::window::settings::{MEMORY_MIB, SCALES, Settings};
+use crate::gui::window::actions::Action;
+use crate::gui::window::history::History;
+use crate::gui::window::settings::{LAST_LAYOUT, MEMORY_MIB, SCALES, Settings};
 use crate::gui::window::tiles::Preset;
 
-/// State of the dialog.
-#[derive(Debug, Default)]
-pub(super) struct SettingsDialog {
-    undoer: Undoer<Settings>,
+/// Draws the dialog; changes have effect at once. Returns whether it stays open.
+pub(super) fn ui<'a>(
+    ui: &Ui,
+    theme: &Theme,
+    settings: &mut Settings,
+    history: &History,
+    layouts: impl Iterator<Item = &'a str>,
+    actions: &mut Vec<Action>,
+) -> bool {
+    let modal = Modal { name: "settings", title: "Settings", width: 430.0 };
+    let contents = modal.ui(ui, theme, |ui| {
+        ui.add_space(4.0);
+        fields_ui(ui, settings, layouts);
+        ui.add_space(4.0);
+        ui.label(RichText::new("Applied immediately and saved for the next start").color(theme.text_weak));
+        ui.add_space(6.0);
+        buttons_ui(ui, settings, history, actions);
+    });
+    contents.1
 }
 
-impl SettingsDialog {
-    /// Draws the dialog; changes have effect at once. Returns whether it stays open.
-    pub(super) fn ui<'a>(
-        &mut self,
-        ui: &Ui,
-        theme: &Theme,
-        settings: &mut Settings,
-        layouts: impl Iterator<Item = &'a str>,
-    ) -> bool {
-        self.undoer.feed_state(ui.input(|input| input.time), settings);
-        let modal = Modal { name: "settings", title: "Settings", width: 430.0 };
-        let contents = modal.ui(ui, theme, |ui| {
-            ui.add_space(4.0);
-            fields_ui(ui, settings, layouts);
-            ui.add_space(4.0);
-            ui.label(RichText::new("Applied immediately and saved for the next start").color(theme.text_weak));
-            ui.add_space(6.0);
-            self.buttons_ui(ui, settings);
-        });
-        contents.1
-    }
-
-    fn buttons_ui(&mut self, ui: &mut Ui, settings: &mut Settings) {
-        let keys = ui.input_mut(|input| {
-            let redo = input.consume_key(Modifiers::COMMAND | Modifiers::SHIFT, Key::Z);
-            (!redo && input.consume_key(Modifiers::COMMAND, Key::Z), redo)
-        });
-        ui.horizontal(|ui| {
-            if ui.button("Close").clicked() {
-                ui.close();
-            }
-            let (undoes, redoes) = (self.undoer.has_undo(settings), self.undoer.has_redo(settings));
-            let button = |ui: &mut Ui, able: bool, text: &str, keys: &str| {
-                ui.add_enabled(able, egui::Button::new(text)).on_hover_text(keys).clicked()
-            };
-            let undo = button(ui, undoes, "Undo", "Ctrl+Z") || keys.0 && undoes;
-            let redo = button(ui, redoes, "Redo", "Ctrl+Shift+Z") || keys.1 && redoes;
-            let other = if undo {
-                self.undoer.undo(settings)
-            } else if redo {
-                self.undoer.redo(settings)
-            } else {
-                None
-            };
-            if let Some(other) = other.cloned() {
-                *settings = other;
-            }
-            if ui.button("Restore defaults").clicked() {
-                *settings = Settings { theme: settings.theme, ..Settings::default() };
-            }
-        });
-    }
+fn buttons_ui(ui: &mut Ui, settings: &mut Settings, history: &History, actions: &mut Vec<Action>) {
+    let keys = ui.input_mut(|input| {
+        let redo = input.consume_key(Modifiers::COMMAND | Modifiers::SHIFT, Key::Z);
+        (!redo && input.consume_key(Modifiers::COMMAND, Key::Z), redo)
+    });
+    ui.horizontal(|ui| {
+        if ui.button("Close").clicked() {
+            ui.close();
+        }
+        let (undoes, redoes) = (history.can_undo(), history.can_redo());
+        let button = |ui: &mut Ui, able: bool, text: &str, keys: &str| {
+            ui.add_enabled(able, egui::Button::new(text)).on_hover_text(keys).clicked()
+        };
+        if button(ui, undoes, "Undo", "Ctrl+Z") || keys.0 && undoes {
+            actions.push(Action::Undo);
+        }
+        if button(ui, redoes, "Redo", "Ctrl+Shift+Z") || keys.1 && redoes {
+            actions.push(Action::Redo);
+        }
+        if ui.button("Restore defaults").clicked() {
+            *settings = Settings { theme: settings.theme, ..Settings::default() };
+        }
+    });
 }
 
 fn fields_ui<'a>(ui: &mut Ui, settings: &mut Settings, layouts: impl Iterator<Item = &'a str>) {
@@ -93,7 +80,7 @@ fn fields_ui<'a>(ui: &mut Ui, settings: &mut Settings, layouts: impl Iterator<It
         let name = ui.label("Initial layout");
         let combo = ComboBox::from_id_salt("layout").width(200.0).selected_text(&settings.layout);
         let shown = combo.show_ui(ui, |ui| {
-            for layout in Preset::ALL.map(Preset::name).into_iter().chain(layouts) {
+            for layout in [LAST_LAYOUT].into_iter().chain(Preset::ALL.map(Preset::name)).chain(layouts) {
                 ui.selectable_value(&mut settings.layout, layout.to_owned(), layout);
             }
         });

@@ -1,0 +1,63 @@
+//! The window's requests to the application.
+
+use egui::Ui;
+
+use super::App;
+use super::leaving::{Leaving, Work};
+use crate::gui::desktop::PanelExport;
+use crate::gui::window::{NoticeLevel, WindowRequest};
+
+impl App {
+    /// Executes the requests of a frame.
+    pub(super) fn take_requests(&mut self, ui: &Ui) {
+        for request in std::mem::take(&mut self.state.requests) {
+            // The next frame shows the result.
+            ui.ctx().request_repaint();
+            match request {
+                WindowRequest::OpenLog(path) => self.leave(ui, Leaving::Open(path)),
+                WindowRequest::CloseLog => self.leave(ui, Leaving::CloseLog),
+                WindowRequest::Quit => self.leave(ui, Leaving::Quit),
+                WindowRequest::Leave { save } => self.leave_as_asked(ui, save),
+                WindowRequest::KeepLayouts(text) => {
+                    if let Err(problem) = self.desktop.keep_layouts(&text) {
+                        self.state.notices.show_message(NoticeLevel::Error, problem);
+                    }
+                }
+                WindowRequest::SaveSession => {
+                    self.save_session();
+                }
+                WindowRequest::WritePanel(export) => self.write_panel(&export),
+            }
+        }
+    }
+
+    /// Writes the session to its file; returns whether it is written.
+    pub(super) fn save_session(&mut self) -> bool {
+        let layout = self.state.layout_value();
+        let Some(log) = &self.log else { return false };
+        let stem = log.recording().log_path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
+        let Some(text) = log.saved(layout) else { return false };
+        match self.desktop.write_session(&stem.unwrap_or_else(|| "log".to_owned()), &text) {
+            Ok(path) => {
+                self.departure.saved = Work::of(log.as_ref());
+                let text = format!("Session saved (opens like a log):\n{}", path.display());
+                self.state.notices.show_message(NoticeLevel::Info, text);
+                true
+            }
+            Err(problem) => {
+                self.state.notices.show_message(NoticeLevel::Error, problem);
+                false
+            }
+        }
+    }
+
+    fn write_panel(&mut self, export: &PanelExport) {
+        match self.desktop.write_panel(export) {
+            Ok(paths) => {
+                let paths: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
+                self.state.notices.show_message(NoticeLevel::Info, format!("Exported:\n{}", paths.join("\n")));
+            }
+            Err(problem) => self.state.notices.show_message(NoticeLevel::Error, problem),
+        }
+    }
+}

@@ -1,0 +1,37 @@
+//! The question before unsaved work is left.
+
+use egui::{Button, Key, RichText, Ui};
+
+use super::modal::Modal;
+use crate::gui::PanelContext;
+use crate::gui::window::WindowRequest;
+use crate::gui::window::top_bar::log_name;
+
+/// Draws the question; `lost` counts what is not saved. Returns whether it stays open.
+pub(super) fn ui(ui: &Ui, ctx: &PanelContext<'_>, lost: &str, requests: &mut Vec<WindowRequest>) -> bool {
+    let modal = Modal { name: "unsaved", title: "Save the session?", width: 430.0 };
+    let contents = modal.ui(ui, ctx.theme, |ui| {
+        ui.add_space(4.0);
+        ui.label(format!("Not saved in {}: {lost}", log_name(ctx.recording)));
+        let hint = "A saved session opens like a log; its results are computed anew, to the same bits";
+        ui.label(RichText::new(hint).color(ctx.theme.text_weak));
+        ui.add_space(6.0);
+        let enter = ui.input(|input| input.key_pressed(Key::Enter));
+        ui.horizontal(|ui| {
+            let save = ui.add(Button::new("Save"));
+            // The safe answer has the focus, so that Enter saves and Tab goes on to the others.
+            if ui.memory(|memory| memory.focused().is_none()) {
+                save.request_focus();
+            }
+            let saves = save.clicked() || enter && save.has_focus();
+            let discards = ui.button("Discard").clicked();
+            if saves || discards {
+                requests.push(WindowRequest::Leave { save: saves });
+            }
+            if ui.button("Cancel").clicked() || saves || discards {
+                ui.close();
+            }
+        });
+    });
+    contents.1
+}

@@ -1,0 +1,132 @@
+//! Undo and redo for settings and layout.
+
+use std::collections::VecDeque;
+
+use super::Settings;
+use super::tiles::Layout;
+
+/// Maximum number of changes that can be undone.
+const MAX_CHANGES: usize = 100;
+
+/// Settings and layout at one time.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Arrangement {
+    /// The settings.
+    pub(super) settings: Settings,
+    /// The layout of the panels.
+    pub(super) layout: Layout,
+}
+
+/// The changes of settings and layout, oldest first.
+#[derive(Debug, Default)]
+pub(super) struct History {
+    before: VecDeque<Arrangement>,
+    undone: Vec<Arrangement>,
+    /// The state to which `before` leads and from which `undone` goes on.
+    current: Option<Arrangement>,
+}
+
+impl History {
+    /// Records a change since the last call. A change that is still going on (`settled` is false while a button of the
+    /// pointer is down) is recorded when it is complete; another open tab alone is no change.
+    pub(super) fn follow(&mut self, settings: &Settings, layout: &Layout, settled: bool) {
+        let now = || Arrangement { settings: settings.clone(), layout: layout.clone() };
+        let Some(current) = &mut self.current else {
+            self.current = Some(now());
+            return;
+        };
+        if current.settings == *settings && current.layout == *layout {
+            return;
+        }
+        if current.settings == *settings && current.layout.differs_by_open_tabs_only(layout) {
+            *current = now();
+        } else if settled {
+            self.before.push_back(std::mem::replace(current, now()));
+            self.undone.clear();
+            if self.before.len() > MAX_CHANGES {
+                self.before.pop_front();
+            }
+        }
+    }
+
+    /// Whether there is a change to undo.
+    pub(super) fn can_undo(&self) -> bool {
+        !self.before.is_empty()
+    }
+
+    /// Whether there is a change to redo.
+    pub(super) fn can_redo(&self) -> bool {
+        !self.undone.is_empty()
+    }
+
+    /// Goes back by one change and returns the state before it.
+    pub(super) fn undo(&mut self) -> Option<Arrangement> {
+        let before = self.before.pop_back()?;
+        self.undone.extend(self.current.replace(before.clone()));
+        Some(before)
+    }
+
+    /// Goes forward by one change that was undone and returns the state after it.
+    pub(super) fn redo(&mut self) -> Option<Arrangement> {
+        let after = self.undone.pop()?;
+        self.before.extend(self.current.replace(after.clone()));
+        Some(after)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::PanelName;
+    use super::super::tiles::Preset;
+    use super::*;
+    use crate::gui::theme::ThemeName;
+
+    #[test]
+    fn changes_are_undone_and_redone_in_order() {
+        let (mut settings, mut layout) = (Settings::default(), Layout::default());
+        let mut history = History::default();
+        history.follow(&settings, &layout, true);
+        assert!(!history.can_undo() && history.undo().is_none());
+        layout.arrange(Preset::Scene);
+        history.follow(&settings, &layout, true);
+        // A slider that is being dragged is one change.
+        for scale in [1.1, 1.2, 1.3] {
+            settings.scale = scale;
+            history.follow(&settings, &layout, false);
+        }
+        history.follow(&settings, &layout, true);
+        layout.set_visible(PanelName::Rank, false);
+        history.follow(&settings, &layout, true);
+
+        let shown = |step: Option<Arrangement>| {
+            step.map(|step| (step.layout.preset, step.settings.scale, step.layout.is_visible(PanelName::Rank)))
+        };
+        assert_eq!(shown(history.undo()), Some((Some(Preset::Scene), 1.3, true)));
+        assert_eq!(shown(history.undo()), Some((Some(Preset::Scene), 1.0, true)));
+        assert_eq!(shown(history.undo()), Some((Some(Preset::Overview), 1.0, true)));
+        assert_eq!(shown(history.undo()), None);
+        assert_eq!(shown(history.redo()), Some((Some(Preset::Scene), 1.0, true)));
+        assert_eq!(shown(history.redo()), Some((Some(Preset::Scene), 1.3, true)));
+        // A new change takes the place of those that were undone.
+        let Some(Arrangement { mut settings, layout }) = history.current.clone() else { panic!() };
+        settings.theme = ThemeName::Print;
+        history.follow(&settings, &layout, true);
+        assert!(!history.can_redo());
+        assert_eq!(history.undo().map(|step| step.settings.theme), Some(ThemeName::default()));
+    }
+
+    #[test]
+    fn an_open_tab_is_no_change_and_the_number_of_changes_is_limited() {
+        let (mut settings, mut layout) = (Settings::default(), Layout::default());
+        let mut history = History::default();
+        history.follow(&settings, &layout, true);
+        layout.set_visible(PanelName::Residuals, true);
+        history.follow(&settings, &layout, true);
+        assert!(!history.can_undo(), "the tab of the residuals is in front now, and nothing else changed");
+        for memory_mib in 0..2 * MAX_CHANGES {
+            settings.memory_mib = memory_mib;
+            history.follow(&settings, &layout, true);
+        }
+        assert_eq!(history.before.len(), MAX_CHANGES);
+    }
+}
