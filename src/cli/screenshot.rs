@@ -14,7 +14,7 @@ use dcvins::geometry::{ns_from_seconds, seconds_from_ns};
 use dcvins::gui::app::PlayingLog;
 use dcvins::gui::theme::ThemeName;
 use dcvins::gui::window::Preset;
-use dcvins::gui::{ImageSource, Playback};
+use dcvins::gui::{ImageSource, Playback, Presentation};
 use dcvins::session::{Computation, Session, SessionPlan};
 
 use crate::cli::compute::compute;
@@ -68,6 +68,9 @@ pub(crate) struct ScreenshotArguments {
     /// and image show the moved chain.
     #[arg(long, value_name = "DIRECTION=VALUE")]
     pub slide: Option<dcvins::observability::SlideRequest>,
+    /// Draw a single panel with its buttons and selectors, as in the window, instead of as a figure.
+    #[arg(long)]
+    pub controls: bool,
     /// Overwrite whatever has the name of the screenshot. Without it only PNG, SVG and CSV files are replaced.
     #[arg(long)]
     pub force: bool,
@@ -196,6 +199,7 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<Outcome> {
         slide,
         layout: Preset::ALL.get(usize::from(arguments.layout) - 1).copied().unwrap_or_default(),
         playback: shown.playback(),
+        presentation: if arguments.controls { Presentation::Interactive } else { Presentation::Figure },
     };
     for (number, cursor_ns) in stamps_ns.iter().copied().enumerate() {
         if interrupt.is_set() {

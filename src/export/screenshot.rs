@@ -15,7 +15,7 @@ use crate::gui::rendering::offscreen::{Offscreen, OffscreenError};
 use crate::gui::rendering::{headless, headless::HeadlessOptions};
 use crate::gui::theme::{Theme, ThemeName};
 use crate::gui::window::{PanelName, Preset, WindowState, alone_ui, panel_table, window_ui};
-use crate::gui::{ImageSource, PanelContext, Playback, Selection};
+use crate::gui::{ImageSource, PanelContext, Playback, Presentation, Selection};
 use crate::observability::SlidePosition;
 use crate::session::Recording;
 
@@ -63,6 +63,8 @@ pub struct ScreenshotOptions {
     pub layout: Preset,
     /// Markers, breakpoints and state of playback of a saved session.
     pub playback: Playback,
+    /// Whether a single panel is drawn as a figure or with its controls; the whole window always has its controls.
+    pub presentation: Presentation,
 }
 
 impl Default for ScreenshotOptions {
@@ -75,6 +77,7 @@ impl Default for ScreenshotOptions {
             slide: None,
             layout: Preset::default(),
             playback: Playback::default(),
+            presentation: Presentation::Figure,
         }
     }
 }
@@ -167,9 +170,9 @@ pub fn panel_csv(
     let theme = Theme::of(options.theme);
     let mut selection = Selection { slide: options.slide, ..Selection::default() };
     let playback = Playback { playing: false, ..options.playback.clone() };
-    let (selection, commands) = (&mut selection, &mut Vec::new());
-    let ctx =
-        &mut PanelContext { recording, cursor_ns, playback: &playback, images, selection, theme: &theme, commands };
+    let (selection, commands, playback, theme) = (&mut selection, &mut Vec::new(), &playback, &theme);
+    let presentation = options.presentation;
+    let ctx = &mut PanelContext { recording, cursor_ns, playback, images, selection, theme, presentation, commands };
     Ok(panel_table(panel, &mut WindowState::default(), ctx))
 }
 
@@ -197,8 +200,10 @@ fn with_panel<T>(
         let commands = &mut Vec::new();
         let selection = &mut selection;
         let images = &mut *images;
+        let (playback, theme) = (&playback, &theme);
+        let presentation = if panel.is_some() { options.presentation } else { Presentation::Interactive };
         let context =
-            &mut PanelContext { recording, cursor_ns, playback: &playback, images, selection, theme: &theme, commands };
+            &mut PanelContext { recording, cursor_ns, playback, images, selection, theme, presentation, commands };
         match panel {
             Some(panel) => alone_ui(panel, ui, &mut state, context),
             None => window_ui(ui, &mut state, context),

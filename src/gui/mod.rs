@@ -34,6 +34,8 @@ pub mod window;
 
 use std::sync::Arc;
 
+use egui::{Role, Sense};
+
 use self::theme::Theme;
 use crate::frontend::FeatureId;
 use crate::gimbal::{ParameterId, ParameterNames};
@@ -101,6 +103,29 @@ impl Default for Playback {
     }
 }
 
+/// How a panel is drawn: in the window, or as a figure of a report or of an exported file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Presentation {
+    /// With toolbars, buttons and selectors.
+    #[default]
+    Interactive,
+    /// Without them: values, plots and legends only.
+    Figure,
+}
+
+impl Presentation {
+    /// Whether buttons, selectors and hints are left out.
+    pub fn is_figure(self) -> bool {
+        self == Self::Figure
+    }
+
+    /// Sense and accessibility role of a painted element that a click selects: a button in the window; in a figure it
+    /// has the given role and reacts to nothing.
+    pub(crate) fn clickable(self, role_in_figure: Role) -> (Sense, Role) {
+        if self.is_figure() { (Sense::hover(), role_in_figure) } else { (Sense::click(), Role::Button) }
+    }
+}
+
 /// The inputs and outputs of a panel in one frame.
 pub struct PanelContext<'a> {
     /// The results so far.
@@ -115,6 +140,8 @@ pub struct PanelContext<'a> {
     pub selection: &'a mut Selection,
     /// Colours and sizes.
     pub theme: &'a Theme,
+    /// Whether the panel is part of the window or a figure.
+    pub presentation: Presentation,
     /// Commands of the panel, applied after this frame.
     pub commands: &'a mut Vec<Command>,
 }

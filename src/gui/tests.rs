@@ -1,5 +1,5 @@
 use super::theme::Theme;
-use super::{ImageSource, PanelContext, Playback, Selection};
+use super::{ImageSource, PanelContext, Playback, Presentation, Selection};
 use crate::gui::samples::{FIRST_TRACKED_FRAME, sample_images, sample_recording};
 use crate::session::Recording;
 
@@ -39,5 +39,7 @@ pub(crate) fn with_context(
 ) {
     let (playback, mut commands) = (Playback::default(), Vec::new());
     let commands = &mut commands;
-    show(&mut PanelContext { recording, cursor_ns, playback: &playback, images, selection, theme, commands });
+    let presentation = Presentation::Interactive;
+    let playback = &playback;
+    show(&mut PanelContext { recording, cursor_ns, playback, images, selection, theme, presentation, commands });
 }

@@ -28,7 +28,7 @@ use crate::gui::desktop::Desktop;
 use crate::gui::theme::{Theme, ThemeName};
 use crate::gui::units::counted;
 use crate::gui::window::{NoticeLevel, ProgressMeter, SCALES, SavedLayouts, Settings, WindowState, window_ui};
-use crate::gui::{PanelContext, Selection};
+use crate::gui::{PanelContext, Presentation, Selection};
 use crate::session::{Command, PlaybackSpeed, Recording};
 
 /// After a longer pause between two frames the cursor does not catch up: the window was hidden or the machine
@@ -231,6 +231,7 @@ impl App {
             images: &mut Images(log.as_mut()),
             selection: &mut self.selection,
             theme: &self.theme,
+            presentation: Presentation::Interactive,
             commands: &mut commands,
         };
         window_ui(ui, &mut self.state, &mut context);

@@ -20,19 +20,25 @@ pub struct BreakpointsPanel {
 impl BreakpointsPanel {
     /// Draws editor, list and buttons.
     pub fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
-        buttons_ui(ui, ctx);
-        self.editor_ui(ui, ctx);
-        ui.add_space(4.0);
+        let figure = ctx.presentation.is_figure();
+        if !figure {
+            buttons_ui(ui, ctx);
+            self.editor_ui(ui, ctx);
+            ui.add_space(4.0);
+        }
         ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
             let breakpoints = std::sync::Arc::clone(&ctx.playback.breakpoints);
             for (number, breakpoint) in breakpoints.list().iter().enumerate() {
                 self.breakpoint_ui(ui, ctx, number, breakpoint);
             }
             if breakpoints.list().is_empty() {
-                let text = "No breakpoints: type a condition, or press B to set one at this frame";
+                let hint = "No breakpoints: type a condition, or press B to set one at this frame";
+                let text = if figure { "No breakpoints" } else { hint };
                 ui.add(egui::Label::new(RichText::new(text).color(ctx.theme.text_weak)).wrap());
             }
-            help_ui(ui, ctx);
+            if !figure {
+                help_ui(ui, ctx);
+            }
         });
     }
 
@@ -75,14 +81,24 @@ impl BreakpointsPanel {
         ui.horizontal(|ui| {
             let mut enabled = breakpoint.enabled;
             let name = RichText::new(text).monospace().color(theme.text_strong);
-            let check = ui.checkbox(&mut enabled, name);
-            if check.on_hover_text("Stop the cursor where the condition becomes true").changed() {
-                ctx.commands.push(Command::EnableBreakpoint { number, enabled });
+            if ctx.presentation.is_figure() {
+                ui.label(name);
+                if !enabled {
+                    ui.label(RichText::new("disabled").small().color(theme.text_weak));
+                }
+            } else {
+                let check = ui.checkbox(&mut enabled, name);
+                if check.on_hover_text("Stop the cursor where the condition becomes true").changed() {
+                    ctx.commands.push(Command::EnableBreakpoint { number, enabled });
+                }
             }
             for (run, record) in ctx.recording.runs.iter().enumerate() {
                 let hits = counted(breakpoint.hit_count(record), "hit");
                 let text = RichText::new(format!("{} {hits}", record.spec.label)).small().color(theme.run(run).color);
                 ui.label(text).on_hover_text("Number of times that the condition became true in this run");
+            }
+            if ctx.presentation.is_figure() {
+                return;
             }
             let small = |ui: &mut Ui, sign: &str, name: String| {
                 let button = ui.add(Button::new(sign).small());

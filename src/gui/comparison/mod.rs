@@ -107,12 +107,16 @@ impl ComparisonPanel {
         self.scores.read(ctx.recording);
     }
 
-    /// The selectors of reference and view.
+    /// The selectors of reference and view; in a figure the reference.
     fn controls_ui(&mut self, ui: &mut Ui, ctx: &PanelContext<'_>) -> View {
         let mut view = self.view.unwrap_or(View::All);
         ui.horizontal_wrapped(|ui| {
             let name = ui.label(RichText::new("Reference").color(ctx.theme.text_weak));
             let label = |run: usize| ctx.recording.runs.get(run).map_or("", |run| run.spec.label.as_str());
+            if ctx.presentation.is_figure() {
+                ui.label(RichText::new(label(self.reference)).color(ctx.theme.run(self.reference).color));
+                return;
+            }
             let combo = ComboBox::from_id_salt("reference run").width(110.0).selected_text(label(self.reference));
             let shown = combo.show_ui(ui, |ui| {
                 for run in 0..ctx.recording.runs.len() {

@@ -35,6 +35,10 @@ pub(super) fn accuracy_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, scores: &Scor
         ui.label("");
         for (number, run) in runs.iter().enumerate() {
             let text = RichText::new(&run.spec.label).strong().color(theme.run(number).color);
+            if ctx.presentation.is_figure() {
+                ui.label(text);
+                continue;
+            }
             let chosen = ctx.selection.run == number;
             let button = ui.add(Button::new(text).frame(false).selected(chosen));
             button.widget_info(|| {
@@ -133,13 +137,17 @@ fn table_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, number: usize, own: &str, c
     });
 }
 
-/// A stamp as a button that moves the cursor there; a dash without one.
+/// A stamp as a button that moves the cursor there, in a figure as text; a dash without one.
 fn time_button(ui: &mut Ui, ctx: &mut PanelContext<'_>, stamp_ns: Option<i64>, name: &str) {
     let Some(stamp_ns) = stamp_ns else {
         ui.label(RichText::new("–").color(ctx.theme.text_weak));
         return;
     };
     let text = format!("{} s", seconds(stamp_ns));
+    if ctx.presentation.is_figure() {
+        ui.label(RichText::new(text).monospace().color(ctx.theme.text_strong));
+        return;
+    }
     let button = ui.add(Button::new(RichText::new(&text).small().monospace()).small());
     button.widget_info(|| WidgetInfo::labeled(egui::Role::Button, true, format!("{name}: {text}")));
     if button.on_hover_text(format!("{name}; click: move the cursor there")).clicked() {

@@ -80,10 +80,11 @@ fn each_run(ui: &mut Ui, ctx: &mut PanelContext<'_>, mut draw: impl FnMut(&mut U
         let slide = ctx.selection.slide.filter(|_| run == shown);
         let before = Selection { feature, run, slide, ..ctx.selection.clone() };
         let mut selection = before.clone();
-        let PanelContext { recording, cursor_ns, playback, theme, .. } = *ctx;
+        let PanelContext { recording, cursor_ns, playback, theme, presentation, .. } = *ctx;
         let (images, commands) = (&mut *ctx.images, &mut *ctx.commands);
+        let own = &mut selection;
         let inner =
-            &mut PanelContext { recording, cursor_ns, playback, images, selection: &mut selection, theme, commands };
+            &mut PanelContext { recording, cursor_ns, playback, images, selection: own, theme, presentation, commands };
         ui.push_id(run, |ui| {
             ui.scope_builder(UiBuilder::new().max_rect(cell), |ui| {
                 ui.set_clip_rect(ui.clip_rect().intersect(cell));

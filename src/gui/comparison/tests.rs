@@ -7,7 +7,7 @@ use super::ComparisonPanel;
 use super::scores::ScoreRow;
 use crate::gui::samples::{sample_images, sample_recording_of};
 use crate::gui::theme::{Theme, ThemeName};
-use crate::gui::{PanelContext, Playback, Selection};
+use crate::gui::{PanelContext, Playback, Presentation, Selection};
 use crate::session::{Command, Quantity, Recording};
 
 struct Bench {
@@ -28,6 +28,7 @@ impl Bench {
             images: &mut sample_images(),
             selection: &mut self.selection,
             theme: &theme,
+            presentation: Presentation::Interactive,
             commands: &mut self.commands,
         };
         self.panel.ui(ui, &mut context);

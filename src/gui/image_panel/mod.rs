@@ -14,7 +14,6 @@ use egui::{Align2, ColorImage, PopupCloseBehavior, Rect, Sense, TextureHandle, T
 use self::model::ImageModel;
 pub use self::model::SolveSide;
 use self::paint::{ImagePlacement, MarkOptions};
-use super::theme::Theme;
 use super::units::significant;
 use super::{PanelContext, slide};
 use crate::sensors::GrayImage;
@@ -105,7 +104,7 @@ impl ImagePanel {
             message_ui(ui, "No runs");
             return;
         };
-        self.controls_ui(ui, context.theme, context.selection.run, &run.spec.label);
+        self.controls_ui(ui, context, &run.spec.label);
         let Some(model) = ImageModel::at(run, context.cursor_ns) else {
             message_ui(ui, "No image at or before the cursor");
             return;
@@ -127,9 +126,14 @@ impl ImagePanel {
         MarkOptions { side, magnification, residuals, trails, ids }
     }
 
-    fn controls_ui(&mut self, ui: &mut Ui, theme: &Theme, run: usize, run_label: &str) {
+    fn controls_ui(&mut self, ui: &mut Ui, context: &PanelContext<'_>, run_label: &str) {
         ui.horizontal(|ui| {
-            ui.colored_label(theme.run(run).color, run_label);
+            ui.colored_label(context.theme.run(context.selection.run).color, run_label);
+            if context.presentation.is_figure() {
+                let side = if self.side == SolveSide::Before { "before" } else { "after" };
+                ui.weak(format!("residuals {side} the solve"));
+                return;
+            }
             ui.separator();
             ui.selectable_value(&mut self.side, SolveSide::Before, "Before")
                 .on_hover_text("Reprojection residuals before the solve of this step");

@@ -101,6 +101,10 @@ fn links_ui(
         ui.label(RichText::new(title).color(ctx.theme.text_weak));
         for (index, (name, norm, selected)) in links.enumerate() {
             let text = RichText::new(format!("{name} ({})", significant(f64::from(norm)))).small();
+            if ctx.presentation.is_figure() {
+                ui.label(text);
+                continue;
+            }
             let link = ui.selectable_label(selected, text);
             if link
                 .on_hover_text("Norm of the Jacobian block in σ per 10° or 3 cm; click: select in all panels")

@@ -40,7 +40,8 @@ impl InspectorPanel {
     }
 
     fn sections_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>, run: &RunRecord, step: &Arc<StepRecord>) {
-        if ctx.selection.parameter.is_some() || ctx.selection.feature.is_some() {
+        let figure = ctx.presentation.is_figure();
+        if !figure && (ctx.selection.parameter.is_some() || ctx.selection.feature.is_some()) {
             let clear = ui.small_button("Clear selection").on_hover_text("Escape");
             if clear.clicked() {
                 (ctx.selection.parameter, ctx.selection.feature) = (None, None);
@@ -48,35 +49,41 @@ impl InspectorPanel {
         }
         if let Some(parameter) = ctx.selection.parameter {
             let title = format!("Parameter {}", ctx.names().name(parameter));
-            section_ui(ui, ctx.theme, &title, |ui| {
+            section_ui(ui, ctx.theme, figure, &title, |ui| {
                 parameter::ui(ui, ctx, run, step, parameter);
                 self.links.of_parameter_ui(ui, ctx, run, step, parameter);
             });
         }
         if let Some(id) = ctx.selection.feature {
-            section_ui(ui, ctx.theme, &format!("Feature {}", id.0), |ui| {
+            section_ui(ui, ctx.theme, figure, &format!("Feature {}", id.0), |ui| {
                 feature::ui(ui, ctx, step, id);
                 self.links.of_feature_ui(ui, ctx, run, step, id);
             });
         }
         if let (Some(id), Some(parameter)) = (ctx.selection.feature, ctx.selection.parameter) {
             let title = format!("Block: feature {} × {}", id.0, ctx.names().name(parameter));
-            section_ui(ui, ctx.theme, &title, |ui| links::block_ui(ui, ctx, run, step, id, parameter));
+            section_ui(ui, ctx.theme, figure, &title, |ui| links::block_ui(ui, ctx, run, step, id, parameter));
         }
         let title = format!("Frame {}", step.report.frame_index);
-        section_ui(ui, ctx.theme, &title, |ui| step::frame_ui(ui, ctx, run, step));
-        section_ui(ui, ctx.theme, "Events", |ui| step::events_ui(ui, ctx.theme, &step.report));
-        section_ui(ui, ctx.theme, "Solver iterations", |ui| step::iterations_ui(ui, ctx.theme, &step.report));
+        section_ui(ui, ctx.theme, figure, &title, |ui| step::frame_ui(ui, ctx, run, step));
+        section_ui(ui, ctx.theme, figure, "Events", |ui| step::events_ui(ui, ctx.theme, &step.report));
+        section_ui(ui, ctx.theme, figure, "Solver iterations", |ui| step::iterations_ui(ui, ctx.theme, &step.report));
         if self.show_times {
-            section_ui(ui, ctx.theme, "Stage times", |ui| step::times_ui(ui, ctx.theme, &step.report));
+            section_ui(ui, ctx.theme, figure, "Stage times", |ui| step::times_ui(ui, ctx.theme, &step.report));
         }
     }
 }
 
-fn section_ui(ui: &mut Ui, theme: &Theme, title: &str, contents: impl FnOnce(&mut Ui)) {
+/// A section under its title, which opens and closes it in the window.
+fn section_ui(ui: &mut Ui, theme: &Theme, figure: bool, title: &str, contents: impl FnOnce(&mut Ui)) {
     // The first word identifies the section: it stays open or closed when another parameter or frame is shown.
     let salt = title.split(' ').next().unwrap_or(title);
     let title = RichText::new(title).strong().color(theme.text_strong);
+    if figure {
+        ui.label(title);
+        contents(ui);
+        return;
+    }
     CollapsingHeader::new(title).id_salt(salt).default_open(true).show_unindented(ui, contents);
 }
 

@@ -87,6 +87,14 @@ impl Choices {
         }
     }
 
+    /// The choices that the results do not state, as text.
+    pub(super) fn summary_ui(&self, ui: &mut Ui, ctx: &PanelContext<'_>) {
+        let rig = format!("rig {}", ctx.recording.rig.name);
+        let mechanism = self.mechanism.map_or(rig, str::to_owned);
+        let offsets = if self.joint_offsets { "estimated" } else { "fixed" };
+        ui.label(format!("Mechanism: {mechanism}; joint offsets {offsets}"));
+    }
+
     fn mechanism_ui(&mut self, ui: &mut Ui, ctx: &PanelContext<'_>) {
         let rig = format!("rig {}", ctx.recording.rig.name);
         let name = ui.label("Mechanism");

@@ -45,7 +45,11 @@ impl LaboratoryPanel {
     pub fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
             ui.spacing_mut().item_spacing.y = 3.0;
-            self.choices.ui(ui, ctx);
+            if ctx.presentation.is_figure() {
+                self.choices.summary_ui(ui, ctx);
+            } else {
+                self.choices.ui(ui, ctx);
+            }
             let experiment = match self.choices.experiment(ctx) {
                 Ok(experiment) => experiment,
                 Err(problem) => {

@@ -24,7 +24,7 @@ pub(crate) enum Clicks {
     Select,
 }
 
-/// Moves the cursor (drag or click), zooms (wheel with Ctrl, or the wheel alone when `scroll_zooms`), pans (middle
+/// In the window: moves the cursor (drag or click), zooms (wheel with Ctrl, or the wheel alone when `scroll_zooms`), pans (middle
 /// button) and shows the whole log (double click).
 pub(crate) fn navigate(
     ui: &Ui,
@@ -35,6 +35,11 @@ pub(crate) fn navigate(
     clicks: Clicks,
     scroll_zooms: bool,
 ) -> Response {
+    if ctx.presentation.is_figure() {
+        let response = ui.interact(area.rect, id, Sense::hover());
+        response.widget_info(|| WidgetInfo::labeled(Role::Image, true, label));
+        return response;
+    }
     let response = ui.interact(area.rect, id, Sense::click_and_drag());
     response.widget_info(|| WidgetInfo::labeled(Role::Button, true, label));
     if let Some(pointer) = response.interact_pointer_pos() {

@@ -1,7 +1,7 @@
 //! Several rank reports side by side: causes of lost rank, spectra on one axis, and null and weak directions in one
 //! heat map with a common order of rows.
 
-use egui::{Align2, Color32, FontFamily, FontId, Grid, Label, Rect, RichText, Role, Sense, Stroke, Ui, WidgetInfo};
+use egui::{Align2, Color32, FontFamily, FontId, Grid, Label, Rect, RichText, Role, Stroke, Ui, WidgetInfo};
 use egui::{StrokeKind, pos2, vec2};
 
 use super::spectrum;
@@ -215,8 +215,9 @@ fn name_ui(ui: &Ui, ctx: &mut PanelContext<'_>, parameter: ParameterId, line: Re
     let selected = ctx.selection.parameter == Some(parameter);
     let color = if selected { theme.accent } else { theme.text };
     ui.painter().text(line.left_center(), Align2::LEFT_CENTER, &name, theme::label_font(), color);
-    let response = ui.interact(line, ui.unique_id().with(("side by side", &name)), Sense::click());
-    response.widget_info(|| WidgetInfo::selected(Role::Button, true, selected, format!("{name} in all columns")));
+    let (sense, role) = ctx.presentation.clickable(Role::Label);
+    let response = ui.interact(line, ui.unique_id().with(("side by side", &name)), sense);
+    response.widget_info(|| WidgetInfo::selected(role, true, selected, format!("{name} in all columns")));
     if selected || response.hovered() {
         let stroke = Stroke::new(1.0, if selected { theme.accent } else { theme.outline });
         ui.painter().rect_stroke(line, 0.0, stroke, StrokeKind::Inside);

@@ -81,6 +81,7 @@ pub(super) fn singularity_ui(
         });
         let spec =
             other.name().parse::<RunSpec>().ok().filter(|_| !taken && !is_there && ctx.recording.runs.len() < MAX_RUNS);
+        let spec = spec.filter(|_| !ctx.presentation.is_figure());
         if let Some(spec) = spec {
             let spec = RunSpec { encoder: run.spec.encoder, calibrate: run.spec.calibrate, ..spec };
             let button = ui.small_button(format!("Add run {other}"));

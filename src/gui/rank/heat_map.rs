@@ -139,8 +139,9 @@ fn row_ui(
             painter.text(cell.center(), Align2::CENTER_CENTER, sign, font, Theme::text_on(ground));
         }
     }
-    let response = ui.interact(line, ui.unique_id().with(("row", &name)), Sense::click());
-    response.widget_info(|| WidgetInfo::selected(Role::Button, true, selected, format!("{name} weights")));
+    let (sense, role) = ctx.presentation.clickable(Role::Label);
+    let response = ui.interact(line, ui.unique_id().with(("row", &name)), sense);
+    response.widget_info(|| WidgetInfo::selected(role, true, selected, format!("{name} weights")));
     if selected || response.hovered() {
         let stroke = Stroke::new(1.0, if selected { theme.accent } else { theme.outline });
         painter.rect_stroke(line, 0.0, stroke, StrokeKind::Inside);

@@ -41,6 +41,13 @@ impl InformationUi {
         let joints = ctx.recording.rig.joint_names();
         let headlines = headlines(rate, &ctx.names(), &joints);
         let title = RichText::new(fitting(ui, &headlines)).color(ctx.theme.text);
+        if ctx.presentation.is_figure() {
+            ui.label(title);
+            if room {
+                table_ui(ui, ctx, rate, &joints);
+            }
+            return;
+        }
         let header = CollapsingHeader::new(title).id_salt("information").default_open(room);
         let shown = header.show(ui, |ui| table_ui(ui, ctx, rate, &joints));
         shown.header_response.on_hover_text(&headlines[0]);
@@ -111,7 +118,8 @@ fn table_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, rate: &InformationRate, joi
             let name = names.name(parameter.parameter);
             let selected = ctx.selection.parameter == Some(parameter.parameter);
             let color = if selected { theme.accent } else { theme.text };
-            let label = Label::new(RichText::new(name).small().color(color)).sense(egui::Sense::click());
+            let (sense, _) = ctx.presentation.clickable(egui::Role::Label);
+            let label = Label::new(RichText::new(name).small().color(color)).sense(sense);
             let response = ui.add(label).on_hover_text(meaning_of(parameter.parameter, &ctx.recording.rig));
             if response.clicked() {
                 ctx.selection.parameter = if selected { None } else { Some(parameter.parameter) };

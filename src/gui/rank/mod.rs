@@ -25,7 +25,6 @@ use super::convergence::empty_ui;
 use super::follow::RunTables;
 use super::plot::{Clicks, Curve, PlotArea, navigate, paint_cursor, paint_ground, paint_steps, visible_range};
 use super::theme::{CURVE_WIDTH, RunStyle, Theme};
-use crate::gimbal::ParameterNames;
 use crate::session::{RunRecord, StepRecord};
 
 /// Columns of the tables over time.
@@ -82,7 +81,10 @@ impl RankPanel {
             ui.scope_builder(UiBuilder::new().max_rect(all), |ui| compare::ui(ui, ctx));
             return;
         }
-        if count > 1 {
+        if count > 1 && ctx.presentation.is_figure() {
+            let number = ctx.selection.run.min(recording.runs.len().saturating_sub(1));
+            ui.label(RichText::new(&run.spec.label).strong().color(ctx.theme.run(number).color));
+        } else if count > 1 {
             ui.horizontal(|ui| {
                 ui.selectable_value(&mut self.all_runs, false, "This run");
                 ui.selectable_value(&mut self.all_runs, true, "All runs").on_hover_text("Side by side");
@@ -107,7 +109,7 @@ impl RankPanel {
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
             ui.spacing_mut().item_spacing.y = 3.0;
             let top = ui.cursor().top();
-            verdict_ui(ui, ctx.theme, &ctx.names(), step);
+            verdict_ui(ui, ctx, step);
             let Some(rank) = step.rank.as_ref().filter(|rank| !rank.parameters.is_empty()) else {
                 self.over_time_ui(ui, ctx);
                 return;
@@ -176,7 +178,8 @@ fn halves(rect: egui::Rect, fraction: f32) -> [egui::Rect; 2] {
 }
 
 /// The verdict: a symbol, one line, and the reasons.
-fn verdict_ui(ui: &mut Ui, theme: &Theme, names: &ParameterNames, step: &StepRecord) {
+fn verdict_ui(ui: &mut Ui, ctx: &PanelContext<'_>, step: &StepRecord) {
+    let (theme, names) = (ctx.theme, &ctx.names());
     let verdict = verdict::verdict(step, names);
     let (mark, color) = mark_of(verdict.level, theme);
     ui.horizontal(|ui| {
@@ -197,6 +200,10 @@ fn verdict_ui(ui: &mut Ui, theme: &Theme, names: &ParameterNames, step: &StepRec
     );
     let title =
         RichText::new(title).color(if rank.known_agreeing() == rank.known.len() { theme.text } else { theme.error });
+    if ctx.presentation.is_figure() {
+        ui.label(title);
+        return;
+    }
     egui::CollapsingHeader::new(title).id_salt("known structure").show(ui, |ui| {
         for line in verdict::structure_lines(rank, names) {
             ui.add(egui::Label::new(RichText::new(line).small().color(theme.text)).wrap());

@@ -54,6 +54,14 @@ impl SliderUi {
 
         let mut direction = position.as_ref().map_or(first, |position| position.direction);
         let mut amount = position.map_or(0.0, |position| position.amount);
+        if ctx.presentation.is_figure() {
+            if let Some(slide) = slide::of(ctx, step.report.stamp_ns) {
+                let text = format!("Chain moved along {} by {}", label(&direction), signed(amount));
+                ui.add(Label::new(RichText::new(text).color(ctx.theme.text)).truncate());
+                outcome_ui(ui, ctx, slide, &parameters);
+            }
+            return;
+        }
         ui.horizontal(|ui| {
             let (sign, name) =
                 if self.playing { ("⏸", "Pause the animation") } else { ("▶", "Animate the direction") };

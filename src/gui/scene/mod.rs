@@ -119,7 +119,9 @@ impl ScenePanel {
 
     /// Draws world, close-up and legend.
     pub fn ui(&mut self, ui: &mut Ui, context: &mut PanelContext<'_>) {
-        self.controls_ui(ui);
+        if !context.presentation.is_figure() {
+            self.controls_ui(ui);
+        }
         let (area, response) =
             ui.allocate_exact_size(ui.available_size().max(Vec2::splat(16.0)), Sense::click_and_drag());
         response.widget_info(|| WidgetInfo::labeled(Role::Image, true, "View of the scene"));

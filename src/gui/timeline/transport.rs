@@ -13,11 +13,15 @@ pub(super) const HEIGHT: f32 = 26.0;
 /// Selectable speeds in log seconds per second.
 pub(crate) const SPEEDS: [f64; 7] = [0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 10.0];
 
-/// Draws the buttons, the time, and the progress of the estimation.
+/// Draws the buttons, the time, and the progress of the estimation; in a figure only the time.
 pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, pace: Option<Reading>) {
     ui.horizontal(|ui| {
         ui.set_height(HEIGHT - 4.0);
         ui.spacing_mut().item_spacing.x = 3.0;
+        if ctx.presentation.is_figure() {
+            time_ui(ui, ctx);
+            return;
+        }
         let playing = ctx.playback.playing;
         let (icon, name) = if playing { ("⏸", "Pause") } else { ("▶", "Play") };
         let buttons = [

@@ -5,6 +5,8 @@
 mod actions;
 mod copying;
 mod dialogs;
+#[cfg(test)]
+mod figure_tests;
 mod focus_ring;
 mod history;
 #[cfg(test)]

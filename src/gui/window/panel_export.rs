@@ -8,7 +8,7 @@ use crate::gui::desktop::PanelExport;
 use crate::gui::rendering::{headless, headless::HeadlessOptions};
 use crate::gui::slide;
 use crate::gui::theme::PANEL_MARGIN;
-use crate::gui::{PanelContext, Playback};
+use crate::gui::{PanelContext, Playback, Presentation};
 
 /// Pixels per point of the screenshot: twice an ordinary screen, so that it can be printed.
 const PIXELS_PER_POINT: f32 = 2.0;
@@ -43,7 +43,9 @@ pub(super) fn export(state: &WindowState, ctx: &mut PanelContext<'_>) -> PanelEx
         // Commands of the panel have no effect.
         let commands = &mut Vec::new();
         let (images, selection, playback) = (&mut *images, &mut selection, &playback);
-        let context = &mut PanelContext { recording, cursor_ns, playback, images, selection, theme, commands };
+        let presentation = Presentation::Figure;
+        let context =
+            &mut PanelContext { recording, cursor_ns, playback, images, selection, theme, presentation, commands };
         alone_ui(panel, ui, &mut copy, context);
     };
     let screenshot = headless::draw(options, &mut draw_ui);

@@ -10,7 +10,7 @@ use super::{PanelName, Preset, WindowState, window_ui};
 use crate::gimbal::tests::parameter;
 use crate::gui::samples::{sample_images, sample_recording_of};
 use crate::gui::theme::{Theme, ThemeName};
-use crate::gui::{PanelContext, Playback, Selection};
+use crate::gui::{PanelContext, Playback, Presentation, Selection};
 use crate::observability::SlideRequest;
 use crate::session::breakpoints::Breakpoints;
 use crate::session::{Command, ForkChanges, ForkOrigin, PlaybackSpeed, Recording, RunWarning};
@@ -37,6 +37,7 @@ impl Bench {
             images: &mut sample_images(),
             selection: &mut self.selection,
             theme: &theme,
+            presentation: Presentation::Interactive,
             commands: &mut self.commands,
         };
         window_ui(ui, &mut self.window, &mut context);

@@ -1,0 +1,85 @@
+//! Panels as figures hold nothing that a person could operate.
+
+use std::sync::Arc;
+
+use egui::Role;
+use egui_kittest::Harness;
+use egui_kittest::kittest::{By, NodeT as _, Queryable as _};
+
+use super::{PanelName, WindowState, alone_ui};
+use crate::gimbal::tests::parameter;
+use crate::gui::samples::{sample_images, sample_recording_of};
+use crate::gui::theme::{Theme, ThemeName};
+use crate::gui::{PanelContext, Playback, Presentation, Selection};
+use crate::observability::{SlideDirection, SlidePosition};
+use crate::session::Recording;
+use crate::session::breakpoints::Breakpoints;
+
+/// Roles of what a click, a drag or a key changes.
+const OPERABLE: [Role; 12] = [
+    Role::Button,
+    Role::CheckBox,
+    Role::ComboBox,
+    Role::DisclosureTriangle,
+    Role::Link,
+    Role::MenuItem,
+    Role::RadioButton,
+    Role::Slider,
+    Role::SpinButton,
+    Role::Switch,
+    Role::Tab,
+    Role::TextInput,
+];
+
+/// Labels of the operable widgets of a panel that shows a selection, a moved chain and a breakpoint.
+fn operable(recording: &Recording, panel: PanelName, presentation: Presentation, size: [f32; 2]) -> Vec<String> {
+    let cursor_ns = recording.last_stamp_ns();
+    let mut breakpoints = Breakpoints::default();
+    breakpoints.add("features < 40".parse().unwrap());
+    breakpoints.read(recording);
+    let playback = Playback { breakpoints: Arc::new(breakpoints), ..Playback::default() };
+    let step = recording.runs[0].step_at(cursor_ns).unwrap();
+    let selection = Selection {
+        feature: step.report.features.first().map(|feature| feature.id),
+        parameter: Some(parameter("L2.alpha")),
+        slide: Some(SlidePosition { direction: SlideDirection::Measured(0), amount: 0.5 }),
+        ..Selection::default()
+    };
+    let ui = |ui: &mut egui::Ui, (window, selection): &mut (WindowState, Selection)| {
+        let theme = Theme::of(ThemeName::Print);
+        let mut context = PanelContext {
+            recording,
+            cursor_ns,
+            playback: &playback,
+            images: &mut sample_images(),
+            selection,
+            theme: &theme,
+            presentation,
+            commands: &mut Vec::new(),
+        };
+        alone_ui(panel, ui, window, &mut context);
+    };
+    let mut harness =
+        Harness::builder().with_size(size).with_max_steps(20).build_ui_state(ui, (WindowState::default(), selection));
+    harness.run_steps(3);
+    let nodes = harness.query_all(By::new().predicate(|node| OPERABLE.contains(&node.role())));
+    nodes
+        .map(|node| format!("{:?} {}", node.accesskit_node().role(), node.accesskit_node().label().unwrap_or_default()))
+        .collect()
+}
+
+#[test]
+fn figures_have_no_buttons_sliders_or_selectors() {
+    for runs in [&["auto"][..], &["auto", "classical"]] {
+        let recording = sample_recording_of(80, runs);
+        for panel in PanelName::ALL {
+            for size in [[1400.0, 900.0], [640.0, 480.0]] {
+                let found = operable(&recording, panel, Presentation::Figure, size);
+                assert!(found.is_empty(), "{} with {} runs at {size:?}: {found:?}", panel.as_str(), runs.len());
+            }
+            // The same panel in the window: so the list of roles finds what there is.
+            let found = operable(&recording, panel, Presentation::Interactive, [1400.0, 900.0]);
+            assert!(panel == PanelName::Jacobian || !found.is_empty(), "{} has no controls", panel.as_str());
+        }
+    }
+}
