@@ -1,5 +1,6 @@
 //! One flight of an experiment, estimated by every run.
 
+use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Instant;
 
@@ -175,7 +176,7 @@ fn calibrate_and_fly(log: &Log, folder: &Path) -> Result<Offline> {
         duration_s: Some(log.duration_s),
         ..CalibrationRequest::default()
     };
-    let calibrated = session::calibrate(&request, &CalibrationOptions::default(), &mut |_| ())?;
+    let calibrated = session::calibrate(&request, &CalibrationOptions::default(), &mut |_| ControlFlow::Continue(()))?;
     let report = report_calibration(&calibrated);
     let rig_folder = folder.join(format!("offline-{}-{}", log.experiment.name(), log.seed));
     write_calibration(&calibrated, &report, &rig_folder)?;

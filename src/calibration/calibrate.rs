@@ -1,5 +1,7 @@
 //! The calibration, stage by stage.
 
+use std::ops::ControlFlow;
+
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::bundle::{Priors, gimbal_view};
@@ -43,16 +45,21 @@ pub struct CalibrationProgress {
 ///
 /// # Errors
 ///
-/// When the flight does not constrain the calibration: no trajectory, no moving joint, too few pairs of camera poses.
+/// When the flight does not constrain the calibration: no trajectory, no moving joint, too few pairs of camera poses. When
+/// `on_progress` breaks, [`CalibrationError::Interrupted`].
 pub fn calibrate(
     input: &CalibrationInput,
     options: &CalibrationOptions,
-    on_progress: &mut dyn FnMut(CalibrationProgress),
+    on_progress: &mut dyn FnMut(CalibrationProgress) -> ControlFlow<()>,
 ) -> Result<CalibrationOutcome, CalibrationError> {
-    let mut report_progress = |stage: &'static str, fraction: f64| on_progress(CalibrationProgress { stage, fraction });
+    let mut report_progress =
+        |stage: &'static str, fraction: f64| match on_progress(CalibrationProgress { stage, fraction }) {
+            ControlFlow::Continue(()) => Ok(()),
+            ControlFlow::Break(()) => Err(CalibrationError::Interrupted { stage }),
+        };
     let images = input.static_camera.views.len().max(1) as f64;
     let states = trajectory::estimate_trajectory(&input.static_camera, &input.estimator, &mut |place| {
-        report_progress("processing the static camera", 0.5 * place as f64 / images);
+        report_progress("processing the static camera", 0.5 * place as f64 / images)
     })?;
     let (mut frame_sets, navigation) = frame_sets(input, options, &states);
     let stretch_ns = stretch(&frame_sets);
@@ -82,13 +89,13 @@ pub fn calibrate(
     };
     let static_tracks = observations::collect(input, options, &frame_sets, Camera::Static, &|_| true);
     let alone = stage(ALONE).run(&mut frame_sets, &static_tracks, first, &mut |round| {
-        report_progress("calibrating the static camera", 0.5 + 0.05 * round as f64);
+        report_progress("calibrating the static camera", 0.5 + 0.05 * round as f64)
     })?;
 
-    report_progress("reconstructing the gimbal camera's poses", 0.7);
+    report_progress("reconstructing the gimbal camera's poses", 0.7)?;
     let (segments, counts) = segments::reconstruct(input, options, &frame_sets, &alone.estimate);
     check_measurements(options, &segments, counts, stretch_ns)?;
-    report_progress("closing the pose loops", 0.75);
+    report_progress("closing the pose loops", 0.75)?;
     let (loops, gaps_m) = close_loops(input, &priors, &frame_sets, &segments, &alone.estimate)?;
 
     let mut start = alone.estimate.clone();
@@ -104,7 +111,7 @@ pub fn calibrate(
     tracks.extend(observations::collect(input, options, &frame_sets, Camera::Gimbal, &|frame_set| measured[frame_set]));
     tracks.sort_by_key(|track| track.observations[0].view);
     let both = stage(BOTH).run(&mut frame_sets, &tracks, start, &mut |round| {
-        report_progress("bundle adjustment of both cameras", 0.8 + 0.05 * round as f64);
+        report_progress("bundle adjustment of both cameras", 0.8 + 0.05 * round as f64)
     })?;
 
     let visited_rad: Vec<Vec<f64>> =

@@ -49,4 +49,10 @@ pub enum CalibrationError {
         /// Name of the stage.
         stage: &'static str,
     },
+    /// The caller ended the calibration.
+    #[error("interrupted, stage '{stage}': nothing is written")]
+    Interrupted {
+        /// Name of the stage.
+        stage: &'static str,
+    },
 }

@@ -81,13 +81,13 @@ impl Stage<'_> {
         }
     }
 
-    /// Adjusts all unknowns to all tracks in rounds.
+    /// Adjusts all unknowns to all tracks in rounds; an error of `on_round`, called before each round, ends them.
     pub(super) fn run(
         &self,
         frame_sets: &mut [FrameSet],
         all_tracks: &[Track],
         start: Estimate,
-        on_round: &mut dyn FnMut(usize),
+        on_round: &mut dyn FnMut(usize) -> Result<(), CalibrationError>,
     ) -> Result<StageResult, CalibrationError> {
         let singular = || CalibrationError::Singular { stage: self.name };
         let columns = columns(&start);
@@ -97,7 +97,7 @@ impl Stage<'_> {
         let mut kept: Vec<Track> = Vec::new();
         let rounds = self.options.rounds.max(1);
         for round in 0..=rounds {
-            on_round(round);
+            on_round(round)?;
             Self::reintegrate(frame_sets, &estimate);
             let poses = self.bundle(frame_sets, columns, all_tracks, sigma_px).poses(&estimate);
             let (tracks, landmarks) = observations::triangulated(all_tracks.to_vec(), &poses, self.options);

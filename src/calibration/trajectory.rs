@@ -7,11 +7,12 @@ use super::input::StaticCamera;
 use crate::estimator::{Estimator, EstimatorConfig, EventKind, ImuBias, NavigationState, StepInput};
 
 /// Returns the last estimated state of every image of the static camera, `None` where the estimator was not
-/// running. A restart leaves a gap of one image between the intervals.
+/// running. A restart leaves a gap of one image between the intervals. An error of `on_image`, called before each image, ends
+/// the estimation.
 pub(super) fn estimate_trajectory(
     camera: &StaticCamera,
     config: &EstimatorConfig,
-    on_image: &mut dyn FnMut(usize),
+    on_image: &mut dyn FnMut(usize) -> Result<(), CalibrationError>,
 ) -> Result<Vec<Option<NavigationState>>, CalibrationError> {
     let mut estimator = Estimator::new(config.clone());
     let places: BTreeMap<usize, usize> =
@@ -20,7 +21,7 @@ pub(super) fn estimate_trajectory(
     let mut restarts = 0;
     let mut waits = "no image reached the estimator".to_owned();
     for (place, view) in camera.views.iter().enumerate() {
-        on_image(place);
+        on_image(place)?;
         let report = estimator.step(&StepInput {
             frame_index: view.frame_index,
             stamp_ns: view.stamp_ns,

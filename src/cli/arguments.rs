@@ -41,7 +41,7 @@ pub(crate) enum Command {
     #[command(after_help = exit::REPORT)]
     Report(ReportArguments),
     /// Calibrate static camera and gimbal offline from a flight with both, as the paper's baseline does.
-    #[command(after_help = exit::PLAIN)]
+    #[command(after_help = exit::INTERRUPTIBLE)]
     Calibrate(CalibrateArguments),
     /// Check a log and its rig: content, timing, calibration, noise, each finding with evidence and remedy.
     #[command(after_help = exit::CHECK)]

@@ -4,12 +4,14 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use dcvins::calibration::CalibrationOptions;
+use dcvins::calibration::{CalibrationError, CalibrationOptions};
 use dcvins::export;
-use dcvins::session::{self, CalibrationRequest};
+use dcvins::session::{self, CalibrationRequest, CalibrationRunError};
 
+use crate::cli::exit::Outcome;
+use crate::cli::interrupt::Interrupt;
 use crate::cli::limit_arguments::LimitArguments;
-use crate::cli::terminal::{Progress, print, print_json};
+use crate::cli::terminal::{Progress, notify, print, print_json};
 use crate::cli::value_parsers::seconds;
 
 /// `dcvins calibrate`.
@@ -45,7 +47,7 @@ pub(crate) struct CalibrateArguments {
 }
 
 /// Runs `dcvins calibrate`.
-pub(crate) fn calibrate(arguments: &CalibrateArguments) -> Result<()> {
+pub(crate) fn calibrate(arguments: &CalibrateArguments) -> Result<Outcome> {
     export::check_calibration_folder(&arguments.out, &arguments.log, arguments.force)?;
     let request = CalibrationRequest {
         log_path: arguments.log.clone(),
@@ -55,16 +57,26 @@ pub(crate) fn calibrate(arguments: &CalibrateArguments) -> Result<()> {
         duration_s: arguments.duration,
         limits: arguments.limits.limits(),
     };
+    let interrupt = Interrupt::watch()?;
     let progress = Progress::new();
     let run = session::calibrate(&request, &CalibrationOptions::default(), &mut |at| {
         progress.show(at.fraction, || at.stage.to_owned());
-    })?;
+        interrupt.control_flow()
+    });
     drop(progress);
+    let run = match run {
+        Err(error @ CalibrationRunError::Calibration { reason: CalibrationError::Interrupted { .. }, .. }) => {
+            notify(&format!("dcvins: {error}"));
+            return Ok(Outcome::Interrupted);
+        }
+        run => run?,
+    };
     let report = export::report_calibration(&run);
     export::write_calibration(&run, &report, &arguments.out)?;
     if arguments.json {
-        print_json(&report)
+        print_json(&report)?;
     } else {
-        print(&format!("{report}  files        {}\n", arguments.out.display()))
+        print(&format!("{report}  files        {}\n", arguments.out.display()))?;
     }
+    Ok(Outcome::Success)
 }

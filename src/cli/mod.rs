@@ -40,7 +40,7 @@ pub(crate) fn run() -> anyhow::Result<Outcome> {
         #[cfg(feature = "gui")]
         Command::Screenshot(arguments) => screenshot::screenshot(&arguments),
         Command::Report(arguments) => report::report(&arguments),
-        Command::Calibrate(arguments) => done(calibrate::calibrate(&arguments)),
+        Command::Calibrate(arguments) => calibrate::calibrate(&arguments),
         Command::Check(arguments) => check::check(&arguments),
         Command::Simulate(arguments) => simulate::simulate(&arguments),
         Command::Degeneracy(arguments) => done(degeneracy::degeneracy(&arguments)),

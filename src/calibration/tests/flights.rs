@@ -1,5 +1,7 @@
 //! Whole synthetic flights against their ground truth.
 
+use std::ops::ControlFlow;
+
 use super::fixture::flight;
 use crate::calibration::{CalibrationError, CalibrationOptions, calibrate, chain_distance, transform_distance};
 use crate::geometry::{Dimension, wrap_angle};
@@ -43,7 +45,8 @@ fn a_wrong_chain_is_found_within_its_sigmas() {
     let mut of_pixels = 0.0;
     for seed in 1..=3 {
         let flight = flight(&options(seed));
-        let outcome = calibrate(&flight.input, &CalibrationOptions::default(), &mut |_| {}).unwrap();
+        let outcome =
+            calibrate(&flight.input, &CalibrationOptions::default(), &mut |_| ControlFlow::Continue(())).unwrap();
         let distance = |chain| chain_distance(chain, &flight.true_chain, &outcome.visited_rad).unwrap();
         let ((given_m, given_rad), (_, loop_rad)) =
             (distance(&outcome.given_chain), distance(&outcome.pose_loop.chain));
@@ -70,7 +73,7 @@ fn a_wrong_chain_is_found_within_its_sigmas() {
 #[test]
 fn the_same_flight_gives_the_same_numbers() {
     let flight = flight(&SyntheticOptions { duration_s: 10.0, ..options(4) });
-    let once = || calibrate(&flight.input, &CalibrationOptions::default(), &mut |_| {}).unwrap();
+    let once = || calibrate(&flight.input, &CalibrationOptions::default(), &mut |_| ControlFlow::Continue(())).unwrap();
     assert_eq!(once(), once());
 }
 
@@ -79,17 +82,34 @@ fn an_unusable_flight_is_refused_with_the_reason() {
     let mut flight = flight(&SyntheticOptions { duration_s: 8.0, ..options(5) });
     let options = CalibrationOptions::default();
     let more = CalibrationOptions { min_measurements: 1000, ..options };
-    let error = calibrate(&flight.input, &more, &mut |_| {}).unwrap_err();
+    let error = calibrate(&flight.input, &more, &mut |_| ControlFlow::Continue(())).unwrap_err();
     assert!(matches!(error, CalibrationError::TooFewMeasurements { needed: 1000, .. }), "{error}");
     for view in &mut flight.input.gimbal_camera.views {
         if let Some(angles) = &mut view.joint_angles {
             angles.angles_rad = vec![0.3, 0.0, -0.2];
         }
     }
-    let error = calibrate(&flight.input, &options, &mut |_| {}).unwrap_err();
+    let error = calibrate(&flight.input, &options, &mut |_| ControlFlow::Continue(())).unwrap_err();
     assert!(matches!(error, CalibrationError::NoJointMotion { .. }), "{error}");
     assert!(error.to_string().contains("yaw 0.0°"), "{error}");
     flight.input.static_camera.views.truncate(20);
-    let error = calibrate(&flight.input, &options, &mut |_| {}).unwrap_err();
+    let error = calibrate(&flight.input, &options, &mut |_| ControlFlow::Continue(())).unwrap_err();
     assert!(matches!(error, CalibrationError::NoTrajectory { .. }), "{error}");
+}
+
+#[test]
+fn a_calibration_ends_at_the_stage_in_which_it_is_interrupted() {
+    let flight = flight(&SyntheticOptions { duration_s: 8.0, ..options(5) });
+    let stage_at = |last: usize| {
+        let mut calls = 0;
+        let outcome = calibrate(&flight.input, &CalibrationOptions::default(), &mut |_| {
+            calls += 1;
+            if calls > last { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        });
+        assert_eq!(calls, last + 1, "no work after the interrupt");
+        outcome.unwrap_err()
+    };
+    let images = flight.input.static_camera.views.len();
+    assert_eq!(stage_at(0), CalibrationError::Interrupted { stage: "processing the static camera" });
+    assert_eq!(stage_at(images), CalibrationError::Interrupted { stage: "calibrating the static camera" });
 }

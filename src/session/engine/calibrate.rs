@@ -1,7 +1,9 @@
 //! Offline calibration of a log: features of both cameras are tracked first, then the calibration is estimated.
 
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use thiserror::Error;
 
@@ -18,6 +20,8 @@ use crate::session::plan::{ParameterizationChoice, RunSpec, SessionError, check_
 
 /// Fraction of the progress that feature tracking takes.
 const TRACKING_RATIO: f64 = 0.6;
+/// Name of that part in messages.
+const TRACKING: &str = "tracking both cameras";
 /// Ratio of the bound of a uniform error to its standard deviation: √3.
 const BOUND_PER_SIGMA: f64 = 1.732_050_807_568_877_2;
 
@@ -101,11 +105,12 @@ pub struct CalibrationRun {
 /// Tracks both cameras over the log and calibrates.
 ///
 /// # Errors
-/// When the log cannot be read, the rig lacks a camera or encoders, or the calibration is not observable.
+/// When the log cannot be read, the rig lacks a camera or encoders, the calibration is not observable, or `on_progress`
+/// breaks ([`CalibrationError::Interrupted`]).
 pub fn calibrate(
     request: &CalibrationRequest,
     options: &CalibrationOptions,
-    on_progress: &mut dyn FnMut(CalibrationProgress),
+    on_progress: &mut dyn FnMut(CalibrationProgress) -> ControlFlow<()>,
 ) -> Result<CalibrationRun, CalibrationRunError> {
     let log = Arc::new(FlightLog::open_with(&request.log_path, &request.limits)?);
     check_start(&log, request.start_s)?;
@@ -117,7 +122,7 @@ pub fn calibrate(
         on_progress(CalibrationProgress {
             fraction: TRACKING_RATIO + (1.0 - TRACKING_RATIO) * progress.fraction,
             ..progress
-        });
+        })
     })
     .map_err(|reason| CalibrationRunError::Calibration { reason, path: request.log_path.clone() })?;
     Ok(CalibrationRun {
@@ -183,21 +188,32 @@ fn track(
     rig: &Rig,
     entries: &CalibratedEntries,
     request: &CalibrationRequest,
-    on_progress: &mut dyn FnMut(CalibrationProgress),
+    on_progress: &mut dyn FnMut(CalibrationProgress) -> ControlFlow<()>,
 ) -> Result<(CalibrationInput, Vec<LogWarning>), CalibrationRunError> {
     let tracker =
         |camera: &CameraRig| CameraTracker::new(Arc::clone(log), rig, &camera.key, request.start_s, request.duration_s);
     let (mut of_static, mut of_gimbal) = (tracker(&entries.static_camera)?, tracker(&entries.gimbal_camera)?);
     let end_s = seconds_from_ns(log.duration_ns()) - request.start_s;
     let length_s = request.duration_s.map_or(end_s, |duration_s| duration_s.min(end_s)).max(1e-3);
+    let interrupted = AtomicBool::new(false);
     let (static_result, gimbal_result) = std::thread::scope(|scope| {
-        let gimbal = scope.spawn(|| views(&mut of_gimbal, &entries.gimbal_camera, &mut |_| {}));
+        let gimbal = scope.spawn(|| {
+            views(&mut of_gimbal, &entries.gimbal_camera, &mut |_| {
+                if interrupted.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            })
+        });
         let rigid = views(&mut of_static, &entries.static_camera, &mut |stamp_ns| {
             let fraction = TRACKING_RATIO * (seconds_from_ns(stamp_ns) - request.start_s) / length_s;
-            on_progress(CalibrationProgress { stage: "tracking both cameras", fraction });
+            let flow = on_progress(CalibrationProgress { stage: TRACKING, fraction });
+            interrupted.fetch_or(flow.is_break(), Ordering::Relaxed);
+            flow
         });
         (rigid, gimbal.join())
     });
+    if interrupted.into_inner() {
+        let reason = CalibrationError::Interrupted { stage: TRACKING };
+        return Err(CalibrationRunError::Calibration { reason, path: request.log_path.clone() });
+    }
     let Ok((gimbal_views, gimbal_warnings)) = gimbal_result else {
         let camera = entries.gimbal_camera.key.clone();
         return Err(CalibrationRunError::Tracking { camera, path: request.log_path.clone() });
@@ -237,15 +253,18 @@ fn track(
     Ok((input, warnings))
 }
 
+/// The tracked images of a camera, up to the image at which `on_image` breaks, with the warnings of the reader.
 fn views(
     tracker: &mut CameraTracker,
     camera: &CameraRig,
-    on_image: &mut dyn FnMut(i64),
+    on_image: &mut dyn FnMut(i64) -> ControlFlow<()>,
 ) -> (Vec<TrackedView>, Vec<LogWarning>) {
     let shift_ns = ns_from_seconds(camera.timeshift_cam_imu_s);
     let (mut views, mut warnings) = (Vec::new(), Vec::new());
     while let Some((input, of_input)) = tracker.next_input() {
-        on_image(input.stamp_ns);
+        if on_image(input.stamp_ns).is_break() {
+            break;
+        }
         warnings.extend(of_input);
         views.push(TrackedView {
             frame_index: input.frame_index,
