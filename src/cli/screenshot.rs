@@ -238,6 +238,12 @@ fn format_of(arguments: &ScreenshotArguments) -> Result<FormatArgument> {
         Some("png") => Some(FormatArgument::Png),
         _ => None,
     };
+    if named.is_none() && arguments.format.is_none() && extension.is_some() {
+        bail!(
+            "the extension of {} is neither .png nor .svg: rename it or give --format; --csv writes the panel's values beside it",
+            arguments.output.display()
+        );
+    }
     let format = arguments.format.or(named).unwrap_or(FormatArgument::Png);
     if named.is_some_and(|named| named != format) {
         bail!("--format and the name of {} contradict each other: leave one out", arguments.output.display());

@@ -21,6 +21,20 @@ fn draw(folder: &Path, arguments: &[&str]) -> (Option<i32>, Vec<String>) {
 }
 
 #[test]
+fn a_name_that_no_screenshot_has_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let log = Path::new(env!("CARGO_MANIFEST_DIR")).join("sample_logs/garden.mcap");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_dcvins"));
+    let output =
+        command.arg("screenshot").arg(log).args(["--at", "0.5", "-o"]).arg(folder.path().join("line.csv")).output();
+    let output = output.expect("the program starts");
+    assert_eq!(output.status.code(), Some(1));
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(message.contains("neither .png nor .svg"), "{message}");
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0, "nothing is written");
+}
+
+#[test]
 fn several_instants_are_named_by_their_time() {
     let check = |arguments: &[&str], code: i32, names: &[&str]| {
         let folder = tempfile::tempdir().unwrap();
