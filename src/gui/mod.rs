@@ -9,6 +9,7 @@ pub mod csv_table;
 pub mod desktop;
 mod events;
 mod follow;
+mod help;
 pub mod image_panel;
 pub mod inspector;
 pub mod jacobian;

@@ -457,7 +457,7 @@ fn dialogs_are_drawn() {
         ("add-run", Some(key(Key::A, Modifiers::NONE))),
         ("palette", Some(key(Key::P, Modifiers::COMMAND))),
         ("open", Some(key(Key::O, Modifiers::COMMAND))),
-        ("shortcuts", Some(key(Key::F1, Modifiers::NONE))),
+        ("shortcuts", Some(key(Key::Questionmark, Modifiers::SHIFT))),
         ("warnings", Some(key(Key::W, Modifiers::NONE))),
     ];
     for (name, event) in cases {

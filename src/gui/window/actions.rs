@@ -44,6 +44,10 @@ pub(crate) enum Action {
     NextRun,
     /// Open a dialog.
     Dialog(Dialog),
+    /// Explain the focused panel.
+    Explain,
+    /// Open the manual.
+    Manual,
     /// List all shortcuts.
     Shortcuts,
     /// List the warnings.
@@ -134,6 +138,7 @@ pub(crate) const TABLE: &[Entry] = &[
     entry(Action::Export, "Export focused panel (PNG, SVG, CSV)", "Ctrl+E", &[(CTRL, Key::E)]),
     entry(Action::Save, "Save session", "Ctrl+S", &[(CTRL, Key::S)]),
     entry(Action::Dialog(Dialog::Palette), "Command palette…", "Ctrl+P", &[(CTRL, Key::P)]),
+    entry(Action::Manual, "Manual", "Shift+F1", &[(SHIFT, Key::F1)]),
     entry(Action::TogglePlay, "Play or pause", "Space", &[(NONE, Key::Space)]),
     entry(Action::Step(1), "One frame forward", "Right", &[(NONE, Key::ArrowRight)]),
     entry(Action::Step(-1), "One frame back", "Left", &[(NONE, Key::ArrowLeft)]),
@@ -160,7 +165,8 @@ pub(crate) const TABLE: &[Entry] = &[
     entry(Action::Layout(Preset::Comparison), "Layout: comparison", "5", &[(NONE, Key::Num5)]),
     entry(Action::SavedLayout(0), "Saved layout 1 to 9", "Ctrl+1 to 9", &[]),
     entry(Action::NextPanel(true), "Focus the next panel", "F6", &[(NONE, Key::F6)]),
-    entry(Action::Shortcuts, "Shortcuts", "F1", &[(NONE, Key::F1)]),
+    entry(Action::Explain, "What is this? (focused panel)", "F1", &[(NONE, Key::F1)]),
+    entry(Action::Shortcuts, "Shortcuts", "?", &[(NONE, Key::Questionmark)]),
     entry(Action::Dismiss, "Clear the selection", "Escape", &[(NONE, Key::Escape)]),
 ];
 
@@ -225,6 +231,7 @@ pub(crate) fn perform(action: Action, state: &mut WindowState, ctx: &mut PanelCo
         Action::Hit(forward) => ctx.commands.push(Command::RunToBreakpoint { forward }),
         Action::Marker => ctx.commands.push(Command::ToggleMarker),
         Action::WholeLog => ctx.selection.visible_ns = None,
+        Action::Dismiss if state.help.manual.is_open() => state.help.manual.close(),
         Action::Dismiss => {
             (ctx.selection.feature, ctx.selection.parameter, ctx.selection.slide) = (None, None, None);
             state.close_dialogs();
@@ -234,6 +241,8 @@ pub(crate) fn perform(action: Action, state: &mut WindowState, ctx: &mut PanelCo
             ctx.selection.run = (ctx.selection.run + 1) % ctx.recording.runs.len().max(1);
         }
         Action::Dialog(dialog) => state.dialogs.show(dialog),
+        Action::Explain => state.explain_focused(),
+        Action::Manual => state.help.manual.show(None),
         Action::Shortcuts => state.shortcuts_open = !state.shortcuts_open,
         Action::Warnings => state.notices.list_open = !state.notices.list_open,
         Action::Export => {

@@ -170,6 +170,8 @@ fn everything_that_can_be_used_has_a_name() {
         (Modifiers::NONE, Key::F),
         (Modifiers::NONE, Key::W),
         (Modifiers::NONE, Key::F1),
+        (Modifiers::SHIFT, Key::F1),
+        (Modifiers::SHIFT, Key::Questionmark),
         (Modifiers::COMMAND, Key::O),
         (Modifiers::COMMAND, Key::P),
         (Modifiers::COMMAND, Key::Comma),

@@ -29,7 +29,7 @@ mod warning_lines;
 use std::cmp::Ordering;
 use std::path::PathBuf;
 
-use egui::{CentralPanel, Frame, Margin, Panel, Rect, Ui, Vec2};
+use egui::{CentralPanel, Frame, Margin, Panel, Rect, Ui, UiBuilder, Vec2, vec2};
 
 use self::actions::Action;
 pub use self::dialogs::{Dialog, Dialogs};
@@ -46,6 +46,7 @@ use self::tiles::Layout;
 pub use self::tiles::Preset;
 use super::PanelContext;
 use super::desktop::PanelExport;
+use super::help::{self, Help};
 use super::slide;
 use super::timeline::TimelinePanel;
 
@@ -98,6 +99,8 @@ pub struct WindowState {
     pub progress: Option<Progress>,
     /// The log that is being opened while another one is shown.
     pub opening: Option<PathBuf>,
+    /// "What is this?" and the manual.
+    pub(crate) help: Help,
     ring: FocusRing,
     layout: Layout,
     history: History,
@@ -122,6 +125,7 @@ impl WindowState {
         self.dialogs.close();
         self.shortcuts_open = false;
         self.notices.list_open = false;
+        self.help.manual.close();
     }
 
     /// Restores settings and layout as before the last change.
@@ -159,6 +163,16 @@ impl WindowState {
         let at = shown.iter().position(|(panel, _)| Some(*panel) == self.focus);
         let next = at.map_or(0, |at| if forward { at + 1 } else { at + count - 1 } % count.max(1));
         self.focus = shown.get(next).map(|(panel, _)| *panel).or(self.focus);
+    }
+
+    /// Opens "What is this?" about the focused panel where it is on the screen, else about the first one.
+    fn explain_focused(&mut self) {
+        let shown = |wanted: PanelName| self.places.iter().any(|(panel, _)| *panel == wanted);
+        let focused = self.focus.filter(|panel| shown(*panel));
+        let first = self.places.iter().map(|(panel, _)| *panel).find(|panel| *panel != PanelName::Timeline);
+        if let Some(panel) = focused.or(first) {
+            self.help.ask(panel);
+        }
     }
 
     /// A click into a panel focuses it.
@@ -239,19 +253,33 @@ pub fn window_ui(ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_
     let wanted = TimelinePanel::height_for(ctx.recording.runs.len()).min(0.25 * ui.available_height());
     let frame = Frame::new().fill(theme.surface).inner_margin(Margin::symmetric(6, 4));
     let timeline = Panel::bottom("timeline").resizable(true).default_size(wanted).min_size(60.0).frame(frame);
-    let timeline = timeline.show(ui, |ui| state.panels.timeline.ui(ui, ctx));
+    let mut asked = None;
+    let timeline = timeline.show(ui, |ui| {
+        let corner = ui.max_rect().right_top() + vec2(-24.0, 2.0);
+        state.panels.timeline.ui(ui, ctx);
+        let place = UiBuilder::new().max_rect(Rect::from_min_size(corner, vec2(20.0, 18.0)));
+        asked = ui
+            .scope_builder(place, |ui| help::button_ui(ui, &theme, PanelName::Timeline))
+            .inner
+            .then_some(PanelName::Timeline);
+    });
     state.places.clear();
     state.places.push((PanelName::Timeline, timeline.response.rect));
 
     let ground = Frame::new().fill(theme.background).inner_margin(Margin::same(3));
     CentralPanel::no_frame().frame(ground).show(ui, |ui| {
-        state.layout.ui(ui, &mut state.panels, ctx, state.focus, &mut state.places);
+        let pressed = state.layout.ui(ui, &mut state.panels, ctx, state.focus, &mut state.places);
+        asked = pressed.or(asked);
     });
     state.follow_focus(ui);
+    if let Some(panel) = asked {
+        state.help.toggle(ui.ctx(), panel);
+    }
 
     dialogs::ui(ui, state, ctx, &mut actions);
     shortcuts::ui(ui, &theme, &mut state.shortcuts_open);
     state.notices.list_ui(ui, ctx);
+    state.help.ui(ui, &theme, &state.places);
     state.notices.toasts_ui(ui, &theme);
     state.ring.ui(ui, &theme);
     for action in actions {

@@ -87,6 +87,11 @@ impl PanelName {
         self.names().0
     }
 
+    /// Anchor of the section of the manual about it.
+    pub(crate) const fn section(self) -> &'static str {
+        self.as_str()
+    }
+
     /// Its title in the window.
     pub const fn title(self) -> &'static str {
         self.names().1

@@ -455,9 +455,33 @@ fn panels_can_be_hidden_and_brought_back() {
 }
 
 #[test]
-fn f1_shows_every_shortcut() {
+fn every_panel_explains_itself_and_leads_to_its_section() {
     let mut harness = bench();
+    for panel in [PanelName::Rank, PanelName::Timeline, PanelName::Image] {
+        harness.get_by_label(&format!("What is this? {}", panel.title())).click();
+        harness.run_steps(3);
+        harness.get_by_label(&format!("Open manual: {}", panel.title())).click();
+        harness.run_steps(6);
+        assert!(harness.state().window.help.manual.is_open(), "{panel:?}");
+        let heading = harness.query_all_by_label(panel.title()).any(|node| node.role() == Role::Label);
+        assert!(heading, "{panel:?}");
+        harness.key_press(Key::Escape);
+        harness.run_steps(3);
+        assert!(!harness.state().window.help.manual.is_open(), "Escape closes the manual");
+    }
+    harness.state_mut().window.focus = Some(PanelName::Scene);
     harness.key_press(Key::F1);
+    harness.run_steps(3);
+    assert!(harness.query_by_label("Open manual: Scene").is_some());
+    harness.key_press(Key::Enter);
+    harness.run_steps(3);
+    assert!(harness.state().window.help.manual.is_open(), "the popup of a key has the focus");
+}
+
+#[test]
+fn a_question_mark_shows_every_shortcut() {
+    let mut harness = bench();
+    harness.key_press(Key::Questionmark);
     harness.run_steps(3);
     for entry in super::actions::TABLE {
         assert!(harness.query_all_by_label(entry.name).next().is_some(), "{}", entry.name);

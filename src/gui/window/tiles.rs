@@ -2,11 +2,12 @@
 
 use egui::{Color32, Rect, Stroke, Ui, Visuals, WidgetText};
 use egui_tiles::{
-    Behavior, Container, Linear, LinearDir, SimplificationOptions, Tile, TileId, Tiles, Tree, UiResponse,
+    Behavior, Container, Linear, LinearDir, SimplificationOptions, Tabs, Tile, TileId, Tiles, Tree, UiResponse,
 };
 
 use super::{PanelName, Panels};
 use crate::gui::PanelContext;
+use crate::gui::help;
 use crate::gui::theme::{PANEL_MARGIN, Theme};
 
 /// A predefined layout.
@@ -109,7 +110,7 @@ impl Layout {
         }
     }
 
-    /// Draws the panels, marks the focused one, and stores their rectangles.
+    /// Draws the panels, marks the focused one, and stores their rectangles. Returns the panel whose "?" was pressed.
     pub(crate) fn ui(
         &mut self,
         ui: &mut Ui,
@@ -117,8 +118,10 @@ impl Layout {
         ctx: &mut PanelContext<'_>,
         focus: Option<PanelName>,
         places: &mut Vec<(PanelName, Rect)>,
-    ) {
-        self.tree.ui(&mut Shown { panels, ctx, focus, places }, ui);
+    ) -> Option<PanelName> {
+        let mut shown = Shown { panels, ctx, focus, places, asked: None };
+        self.tree.ui(&mut shown, ui);
+        shown.asked
     }
 }
 
@@ -184,6 +187,8 @@ struct Shown<'a, 'b> {
     ctx: &'a mut PanelContext<'b>,
     focus: Option<PanelName>,
     places: &'a mut Vec<(PanelName, Rect)>,
+    /// The panel whose "?" was pressed.
+    asked: Option<PanelName>,
 }
 
 impl Behavior<PanelName> for Shown<'_, '_> {
@@ -203,6 +208,21 @@ impl Behavior<PanelName> for Shown<'_, '_> {
 
     fn tab_title_for_pane(&mut self, pane: &PanelName) -> WidgetText {
         pane.title().into()
+    }
+
+    /// A "?" about the panel in front.
+    fn top_bar_right_ui(
+        &mut self,
+        tiles: &Tiles<PanelName>,
+        ui: &mut Ui,
+        _tile: TileId,
+        tabs: &Tabs,
+        _scroll_offset: &mut f32,
+    ) {
+        let Some(Tile::Pane(panel)) = tabs.active.and_then(|tile| tiles.get(tile)) else { return };
+        if help::button_ui(ui, self.ctx.theme, *panel) {
+            self.asked = Some(*panel);
+        }
     }
 
     fn is_tab_closable(&self, tiles: &Tiles<PanelName>, tile: TileId) -> bool {

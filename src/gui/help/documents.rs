@@ -1,0 +1,129 @@
+//! The documents of `docs/`, built into the program, and the links between them.
+
+use std::sync::OnceLock;
+
+use super::markdown::{Block, parse};
+
+/// One embedded document.
+#[derive(Debug)]
+struct Document {
+    /// Path in the repository.
+    path: &'static str,
+    text: &'static str,
+}
+
+/// The manual comes first.
+const DOCUMENTS: [Document; 10] = [
+    Document { path: "docs/manual.md", text: include_str!("../../../docs/manual.md") },
+    Document { path: "docs/tutorial.md", text: include_str!("../../../docs/tutorial.md") },
+    Document { path: "docs/commands.md", text: include_str!("../../../docs/commands.md") },
+    Document { path: "docs/formats.md", text: include_str!("../../../docs/formats.md") },
+    Document { path: "docs/coming_from.md", text: include_str!("../../../docs/coming_from.md") },
+    Document { path: "docs/mathematics.md", text: include_str!("../../../docs/mathematics.md") },
+    Document { path: "docs/accuracy.md", text: include_str!("../../../docs/accuracy.md") },
+    Document { path: "docs/packages.md", text: include_str!("../../../docs/packages.md") },
+    Document { path: "docs/architecture.md", text: include_str!("../../../docs/architecture.md") },
+    Document { path: "assets/README.md", text: include_str!("../../../assets/README.md") },
+];
+
+/// An embedded document by its place in the list; the default is the manual.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct DocumentId(usize);
+
+/// The target of a link.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Target {
+    /// A section of an embedded document; without an anchor its beginning.
+    Section(DocumentId, Option<String>),
+    /// A page of the web.
+    Web(String),
+}
+
+impl DocumentId {
+    /// All embedded documents.
+    pub(super) fn all() -> impl Iterator<Item = Self> {
+        (0..DOCUMENTS.len()).map(Self)
+    }
+
+    /// Its blocks, parsed once.
+    pub(super) fn blocks(self) -> &'static [Block] {
+        static PARSED: OnceLock<Vec<Vec<Block>>> = OnceLock::new();
+        &PARSED.get_or_init(|| DOCUMENTS.iter().map(|document| parse(document.text)).collect())[self.0]
+    }
+
+    /// Its first heading.
+    pub(super) fn title(self) -> String {
+        let heading = self.blocks().iter().find_map(|block| match block {
+            Block::Heading { spans, .. } => Some(spans),
+            _ => None,
+        });
+        heading.map_or_else(String::new, |spans| spans.iter().map(|span| span.text.as_str()).collect())
+    }
+
+    /// Whether it has a heading with this anchor.
+    #[cfg(test)]
+    pub(super) fn has_anchor(self, wanted: &str) -> bool {
+        self.blocks().iter().any(|block| matches!(block, Block::Heading { anchor, .. } if anchor == wanted))
+    }
+
+    /// The target of a link in this document; `None` if it leads to no embedded document.
+    pub(super) fn follow(self, link: &str) -> Option<Target> {
+        if link.starts_with("https://") || link.starts_with("http://") {
+            return Some(Target::Web(link.to_owned()));
+        }
+        let (path, anchor) = link.split_once('#').unwrap_or((link, ""));
+        let anchor = (!anchor.is_empty()).then(|| anchor.to_owned());
+        if path.is_empty() {
+            return Some(Target::Section(self, anchor));
+        }
+        let (folder, _) = DOCUMENTS[self.0].path.rsplit_once('/').unwrap_or_default();
+        let mut parts: Vec<&str> = folder.split('/').collect();
+        for part in path.split('/') {
+            match part {
+                "." => {}
+                ".." => drop(parts.pop()),
+                _ => parts.push(part),
+            }
+        }
+        let wanted = parts.join("/");
+        let place = DOCUMENTS.iter().position(|document| document.path == wanted)?;
+        Some(Target::Section(Self(place), anchor))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gui::help::markdown::links_of;
+
+    #[test]
+    fn links_are_followed_from_the_folder_of_their_document() {
+        let manual = DocumentId::default();
+        let section =
+            |id: usize, anchor: Option<&str>| Some(Target::Section(DocumentId(id), anchor.map(str::to_owned)));
+        assert_eq!(manual.follow("#rank"), section(0, Some("rank")));
+        assert_eq!(manual.follow("commands.md"), section(2, None));
+        assert_eq!(manual.follow("../assets/README.md"), section(9, None));
+        assert_eq!(manual.follow("https://mcap.dev"), Some(Target::Web("https://mcap.dev".to_owned())));
+        assert_eq!(manual.follow("nowhere.md#rank"), None);
+        assert!(manual.has_anchor("rank") && !manual.has_anchor("nowhere"));
+        assert_eq!(manual.title(), "Manual of the window");
+    }
+
+    #[test]
+    fn every_link_of_every_document_leads_to_a_section() {
+        let mut followed = 0;
+        for document in DocumentId::all() {
+            for link in document.blocks().iter().flat_map(links_of) {
+                let found = match document.follow(link) {
+                    Some(Target::Section(target, Some(anchor))) => target.has_anchor(&anchor),
+                    Some(Target::Section(_, None) | Target::Web(_)) => true,
+                    None => false,
+                };
+                assert!(found, "{}: '{link}' leads nowhere", document.title());
+                followed += 1;
+            }
+        }
+        assert!(followed >= 40, "only {followed} links were found");
+    }
+}

@@ -1,0 +1,254 @@
+//! Markdown documents as a list of blocks.
+
+use pulldown_cmark::{Event, HeadingLevel, Options, Parser, Tag, TagEnd};
+
+/// A stretch of text with one look.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct Span {
+    /// The text without markup.
+    pub(super) text: String,
+    /// Whether it is bold.
+    pub(super) strong: bool,
+    /// Whether it is italic.
+    pub(super) emphasis: bool,
+    /// Whether it is code.
+    pub(super) code: bool,
+    /// The link as written.
+    pub(super) link: Option<String>,
+}
+
+/// A block of a document.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Block {
+    /// A heading with the anchor by which links name it.
+    Heading {
+        /// 1 for the title of the document.
+        level: u8,
+        /// The anchor without `#`.
+        anchor: String,
+        /// The text.
+        spans: Vec<Span>,
+    },
+    /// A paragraph, or an item of a list.
+    Paragraph {
+        /// Number of lists around it.
+        depth: usize,
+        /// Mark of the item: a bullet or a number with its point.
+        marker: Option<String>,
+        /// The text.
+        spans: Vec<Span>,
+    },
+    /// Lines of code.
+    Code(String),
+    /// Rows of cells; the first row is the header.
+    Table(Vec<Vec<Vec<Span>>>),
+}
+
+/// The links of a block as written.
+#[cfg(test)]
+pub(super) fn links_of(block: &Block) -> impl Iterator<Item = &str> {
+    let spans: Vec<&Span> = match block {
+        Block::Heading { spans, .. } | Block::Paragraph { spans, .. } => spans.iter().collect(),
+        Block::Code(_) => Vec::new(),
+        Block::Table(rows) => rows.iter().flatten().flatten().collect(),
+    };
+    spans.into_iter().filter_map(|span| span.link.as_deref())
+}
+
+/// The blocks of a document.
+pub(super) fn parse(text: &str) -> Vec<Block> {
+    let mut reader = Reader::default();
+    for event in Parser::new_ext(text, Options::ENABLE_TABLES) {
+        reader.read(event);
+    }
+    reader.blocks
+}
+
+/// The state between two events of the parser.
+#[derive(Debug, Default)]
+struct Reader {
+    blocks: Vec<Block>,
+    /// Anchors without the number of a repetition.
+    anchors: Vec<String>,
+    /// The text that is being read, and its look.
+    spans: Vec<Span>,
+    look: Span,
+    /// By list around the text: the number of the next item, `None` for bullets.
+    lists: Vec<Option<u64>>,
+    /// Mark of an item whose text has not begun.
+    marker: Option<String>,
+    code: Option<String>,
+    rows: Vec<Vec<Vec<Span>>>,
+}
+
+impl Reader {
+    fn read(&mut self, event: Event<'_>) {
+        match event {
+            Event::Start(tag) => self.begin(tag),
+            Event::End(tag) => self.end(tag),
+            Event::Text(text) => self.push(&text, false),
+            Event::Code(text) => self.push(&text, true),
+            Event::SoftBreak | Event::HardBreak => self.push(" ", false),
+            Event::InlineMath(_)
+            | Event::DisplayMath(_)
+            | Event::Html(_)
+            | Event::InlineHtml(_)
+            | Event::FootnoteReference(_)
+            | Event::Rule
+            | Event::TaskListMarker(_) => {}
+        }
+    }
+
+    fn push(&mut self, text: &str, code: bool) {
+        if let Some(block) = &mut self.code {
+            block.push_str(text);
+            return;
+        }
+        let span = Span { text: text.to_owned(), code, ..self.look.clone() };
+        match self.spans.last_mut() {
+            Some(last)
+                if (Span { text: String::new(), ..last.clone() }) == (Span { text: String::new(), ..span.clone() }) =>
+            {
+                last.text.push_str(text);
+            }
+            _ => self.spans.push(span),
+        }
+    }
+
+    fn begin(&mut self, tag: Tag<'_>) {
+        match tag {
+            Tag::Strong => self.look.strong = true,
+            Tag::Emphasis => self.look.emphasis = true,
+            Tag::Link { dest_url, .. } => self.look.link = Some(dest_url.into_string()),
+            // Figures are not embedded: their description stands for them.
+            Tag::Image { .. } => {
+                self.look.emphasis = true;
+                self.push("Figure: ", false);
+            }
+            Tag::List(first) => {
+                self.paragraph();
+                self.lists.push(first);
+            }
+            Tag::Item => {
+                self.marker = Some(match self.lists.last_mut() {
+                    Some(Some(number)) => {
+                        *number += 1;
+                        format!("{}.", *number - 1)
+                    }
+                    _ => "•".to_owned(),
+                });
+            }
+            Tag::CodeBlock(_) => self.code = Some(String::new()),
+            Tag::Table(_) => self.rows.clear(),
+            Tag::TableHead | Tag::TableRow => self.rows.push(Vec::new()),
+            _ => {}
+        }
+    }
+
+    fn end(&mut self, tag: TagEnd) {
+        match tag {
+            TagEnd::Strong => self.look.strong = false,
+            TagEnd::Emphasis | TagEnd::Image => self.look.emphasis = false,
+            TagEnd::Link => self.look.link = None,
+            TagEnd::Heading(level) => self.heading(level),
+            TagEnd::Paragraph | TagEnd::Item => self.paragraph(),
+            TagEnd::List(_) => drop(self.lists.pop()),
+            TagEnd::CodeBlock => {
+                let text = self.code.take().unwrap_or_default();
+                self.blocks.push(Block::Code(text.trim_end().to_owned()));
+            }
+            TagEnd::TableCell => {
+                let cell = std::mem::take(&mut self.spans);
+                if let Some(row) = self.rows.last_mut() {
+                    row.push(cell);
+                }
+            }
+            TagEnd::Table => self.blocks.push(Block::Table(std::mem::take(&mut self.rows))),
+            _ => {}
+        }
+    }
+
+    fn heading(&mut self, level: HeadingLevel) {
+        let spans = std::mem::take(&mut self.spans);
+        let text: String = spans.iter().map(|span| span.text.as_str()).collect();
+        let plain = anchor_of(&text);
+        let earlier = self.anchors.iter().filter(|known| **known == plain).count();
+        let anchor = if earlier == 0 { plain.clone() } else { format!("{plain}-{earlier}") };
+        self.anchors.push(plain);
+        self.blocks.push(Block::Heading { level: level as u8, anchor, spans });
+    }
+
+    /// Ends a paragraph or the text of an item.
+    fn paragraph(&mut self) {
+        let spans = std::mem::take(&mut self.spans);
+        if !spans.is_empty() {
+            let (depth, marker) = (self.lists.len(), self.marker.take());
+            self.blocks.push(Block::Paragraph { depth, marker, spans });
+        }
+    }
+}
+
+/// The anchor of a heading, as forges make it.
+fn anchor_of(heading: &str) -> String {
+    let letters = heading.trim().to_lowercase().replace(' ', "-");
+    letters.chars().filter(|letter| letter.is_alphanumeric() || "-_".contains(*letter)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plain(text: &str) -> Span {
+        Span { text: text.to_owned(), ..Span::default() }
+    }
+
+    #[test]
+    fn blocks_keep_their_text_and_their_look() {
+        let text = "# A `b` title\n\nOne\nline, **bold** and [a link](x.md#y).\n\n```sh\nrun it\n```\n\n\
+                    | a | b |\n| --- | --- |\n| 1 | `2` |\n";
+        let blocks = parse(text);
+        let [Block::Heading { level: 1, anchor, .. }, Block::Paragraph { depth: 0, marker: None, spans }, rest @ ..] =
+            blocks.as_slice()
+        else {
+            panic!("{blocks:?}")
+        };
+        assert_eq!(anchor, "a-b-title");
+        let bold = Span { strong: true, ..plain("bold") };
+        let link = Span { link: Some("x.md#y".to_owned()), ..plain("a link") };
+        assert_eq!(spans[..], [plain("One line, "), bold, plain(" and "), link, plain(".")]);
+        let code = Span { code: true, ..plain("2") };
+        let rows = vec![vec![vec![plain("a")], vec![plain("b")]], vec![vec![plain("1")], vec![code]]];
+        assert_eq!(rest[..], [Block::Code("run it".to_owned()), Block::Table(rows)]);
+        assert_eq!(links_of(&blocks[1]).collect::<Vec<_>>(), ["x.md#y"]);
+    }
+
+    #[test]
+    fn items_have_marks_and_depths() {
+        let blocks = parse("1. one\n   - inner\n2. two\n\nafter\n");
+        let item = |depth: usize, marker: Option<&str>, text: &str| Block::Paragraph {
+            depth,
+            marker: marker.map(str::to_owned),
+            spans: vec![plain(text)],
+        };
+        let expected = [
+            item(1, Some("1."), "one"),
+            item(2, Some("•"), "inner"),
+            item(1, Some("2."), "two"),
+            item(0, None, "after"),
+        ];
+        assert_eq!(blocks[..], expected);
+    }
+
+    #[test]
+    fn a_repeated_heading_has_a_numbered_anchor() {
+        let blocks = parse("## Ranks\n\n## Ranks\n\n## 10. Strength (χ²)\n");
+        let anchors: Vec<&str> = blocks
+            .iter()
+            .filter_map(|block| match block {
+                Block::Heading { anchor, .. } => Some(anchor.as_str()),
+                _ => None,
+            })
+            .collect();
+        assert_eq!(anchors, ["ranks", "ranks-1", "10-strength-χ²"]);
+    }
+}

@@ -1,0 +1,117 @@
+//! Help: what each panel shows, the manual in the window, and what each shown quantity is.
+
+mod blocks_ui;
+mod documents;
+mod manual;
+mod markdown;
+pub(crate) mod terms;
+
+use egui::{Button, Id, Popup, PopupAnchor, PopupCloseBehavior, Rect, RectAlign, RichText, Ui, WidgetInfo, vec2};
+
+use self::blocks_ui::spans_ui;
+pub(crate) use self::manual::Manual;
+use self::manual::first_paragraph;
+use super::theme::Theme;
+use super::window::PanelName;
+
+/// Width of the popup in points.
+const WIDTH: f32 = 360.0;
+/// Side of the button in points.
+const BUTTON: f32 = 18.0;
+
+/// State of the help: the panel that the popup is about, and the manual.
+#[derive(Debug, Default)]
+pub(crate) struct Help {
+    panel: Option<PanelName>,
+    /// The panel that a key asks about; its button takes the focus.
+    asked: Option<PanelName>,
+    /// The manual.
+    pub(crate) manual: Manual,
+}
+
+fn popup_id() -> Id {
+    Id::unique("what is this")
+}
+
+impl Help {
+    /// Opens the popup about a panel, or closes it if it is open.
+    pub(crate) fn toggle(&mut self, context: &egui::Context, panel: PanelName) {
+        if self.panel == Some(panel) && Popup::is_id_open(context, popup_id()) {
+            Popup::close_id(context, popup_id());
+        } else {
+            self.panel = Some(panel);
+            Popup::open_id(context, popup_id());
+        }
+    }
+
+    /// Opens or closes the popup about a panel in the next frame, and moves the focus to it.
+    pub(crate) fn ask(&mut self, panel: PanelName) {
+        self.asked = Some(panel);
+    }
+
+    /// Draws the popup below the upper right corner of its panel, and the manual. `places` are the panels on the
+    /// screen.
+    pub(crate) fn ui(&mut self, ui: &Ui, theme: &Theme, places: &[(PanelName, Rect)]) {
+        let by_key = self.asked.is_some();
+        if let Some(panel) = self.asked.take() {
+            self.toggle(ui.ctx(), panel);
+        }
+        if let Some(panel) = self.panel {
+            let place = places.iter().find(|(known, _)| *known == panel).map(|(_, place)| *place);
+            self.popup_ui(ui, theme, panel, place.unwrap_or_else(|| ui.ctx().content_rect()), by_key);
+        }
+        self.manual.ui(ui, theme);
+    }
+
+    fn popup_ui(&mut self, ui: &Ui, theme: &Theme, panel: PanelName, place: Rect, by_key: bool) {
+        let corner = Rect::from_min_size(place.right_top() - vec2(BUTTON, 0.0), vec2(BUTTON, 1.0));
+        let popup = Popup::new(popup_id(), ui.ctx().clone(), PopupAnchor::ParentRect(corner), ui.layer_id())
+            .open_memory(None)
+            .align(RectAlign::BOTTOM_END)
+            .close_behavior(PopupCloseBehavior::CloseOnClickOutside)
+            .width(WIDTH);
+        let shown = popup.show(|ui| {
+            ui.set_width(WIDTH);
+            ui.label(RichText::new(panel.title()).size(15.0).color(theme.text_strong));
+            let mut link = first_paragraph(panel.section()).and_then(|spans| spans_ui(ui, theme, spans, None));
+            let button = ui.button(format!("Open manual: {}", panel.title()));
+            if by_key {
+                button.request_focus();
+            }
+            if button.clicked() {
+                link = Some(format!("#{}", panel.section()));
+            }
+            link
+        });
+        let Some(shown) = shown else {
+            self.panel = None;
+            return;
+        };
+        if let Some(link) = shown.inner {
+            self.manual.follow(&link);
+            Popup::close_id(ui.ctx(), popup_id());
+        }
+    }
+}
+
+/// The button that opens the popup about a panel.
+pub(crate) fn button_ui(ui: &mut Ui, theme: &Theme, panel: PanelName) -> bool {
+    let sign = RichText::new("?").color(theme.text_weak);
+    let button = ui.add(Button::new(sign).small().min_size(vec2(BUTTON, 16.0)));
+    button.widget_info(|| WidgetInfo::labeled(egui::Role::Button, true, format!("What is this? {}", panel.title())));
+    button.on_hover_text("What is this? (F1: the focused panel)").clicked()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_manual_has_a_paragraph_about_every_panel() {
+        for panel in PanelName::ALL {
+            let spans = first_paragraph(panel.section());
+            let text: String = spans.unwrap_or_default().iter().map(|span| span.text.as_str()).collect();
+            assert!((80..=700).contains(&text.len()), "{}: {} letters: {text}", panel.title(), text.len());
+        }
+    }
+}

@@ -1,0 +1,239 @@
+//! The shown quantities with their explanations: what it is, its unit, and where it comes from.
+
+/// A shown quantity.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Term {
+    /// Its name in the window.
+    pub(crate) name: &'static str,
+    /// What it is, its unit, and where it comes from.
+    pub(crate) meaning: &'static str,
+}
+
+/// Constants of the terms, and a list of all.
+macro_rules! terms {
+    ($($constant:ident: $name:literal => $meaning:literal;)*) => {
+        $(
+            #[doc = concat!("The quantity `", $name, "`.")]
+            pub(crate) const $constant: Term = Term { name: $name, meaning: $meaning };
+        )*
+        /// All terms of this list.
+        #[cfg(test)]
+        pub(super) const ALL: &[Term] = &[$($constant),*];
+    };
+}
+
+/// The inspector: the frame at the cursor.
+pub(crate) mod frame {
+    use super::Term;
+
+    terms! {
+        STAMP: "stamp, s" => "Header stamp of the image in s since the log began. The second value is the log time (time of recording) minus this stamp.";
+        PHASE: "phase" => "Initializing, or tracking with a window of frames. A keyframe stays in the window, another frame is dropped with the next image.";
+        RESTARTS: "restarts" => "Number of re-initializations after a failure, up to this step.";
+        TRACKS: "feature tracks" => "Features that the front end tracked from the previous image, and features detected anew in this one.";
+        AXES: "" => "Components along the axes of the row's frame.";
+        POSITION: "position, m" => "Position of the IMU in the world of the run, m, after the solve. Axis z is up; origin and yaw come from the initialization.";
+        VELOCITY: "velocity, m/s" => "Velocity of the IMU in the world of the run, m/s, after the solve.";
+        ATTITUDE: "roll, pitch, yaw, °" => "Attitude of the IMU in the world of the run after the solve, as Euler angles in degrees: world_from_imu = Rz(yaw) Ry(pitch) Rx(roll).";
+        ACCELEROMETER_BIAS: "accelerometer bias, m/s²" => "Estimated bias of the accelerometer in IMU axes, m/s². It is subtracted from the measured specific force.";
+        GYROSCOPE_BIAS: "gyroscope bias, °/s" => "Estimated bias of the gyroscope in IMU axes, °/s. It is subtracted from the measured angular rate.";
+        POSITION_ERROR: "position error, m" => "Estimate minus ground truth along the axes of the ground truth's world, m, after alignment in yaw and position.";
+        ATTITUDE_ERROR: "attitude error, °" => "Rotation vector from the ground-truth attitude to the estimate in IMU axes, degrees, after alignment in yaw.";
+    }
+}
+
+/// The inspector: joint angles of the newest frame.
+pub(crate) mod joints {
+    use super::Term;
+
+    terms! {
+        JOINT: "joint" => "Joint of the gimbal by its name in the rig, from the base to the camera.";
+        ESTIMATE: "estimate, °" => "Joint angle of the newest frame after the solve, degrees, without the static offset θ₀.";
+        ENCODER: "encoder, °" => "Encoder angle at the stamp of the frame, degrees, from the readings around it.";
+        DIFFERENCE: "difference, °" => "Estimate minus encoder reading, degrees. Expected: about the encoder σ of the rig.";
+    }
+}
+
+/// The inspector: the selected feature.
+pub(crate) mod feature {
+    use super::Term;
+
+    terms! {
+        POSITION: "position, px" => "Pixel (u, v) at which the front end tracked the feature in this image.";
+        AGE: "track age, images" => "Number of earlier images with an observation of this feature.";
+        FLOW: "flow, px" => "Distance between the feature's pixels in the previous image and in this one.";
+        ANCHOR: "anchor frame" => "Number of the image whose first observation anchors the landmark's inverse depth.";
+        DEPTH: "depth, m" => "Depth along the optical axis of the anchor camera, m: the reciprocal of the estimated inverse depth.";
+        STATE: "state" => "Whether the solve used the feature, and whether it was rejected as an outlier afterwards.";
+        LANDMARK: "landmark position, m" => "Position of the landmark in the world of the run, m, from anchor pose, extrinsics and inverse depth.";
+    }
+}
+
+/// The inspector: observations of the selected feature.
+pub(crate) mod observations {
+    use super::Term;
+
+    terms! {
+        FRAME: "frame" => "Number of the observing image in its stream.";
+        U: "u, px" => "Measured column of the pixel.";
+        V: "v, px" => "Measured row of the pixel.";
+        BEFORE: "before, px" => "Norm of the reprojection residual (prediction − measurement) before the solve, px. None in the anchor frame.";
+        AFTER: "after, px" => "Norm of the reprojection residual (prediction − measurement) after the solve, px.";
+        CHI2: "χ²" => "Squared residual after the solve over the variance of a pixel. Expected value 2: two components.";
+        WEIGHT: "weight" => "Weight of the robust loss after the solve: 1 = full, towards 0 = outlier.";
+    }
+}
+
+/// The inspector: the block of a feature and a parameter.
+pub(crate) mod block {
+    use super::Term;
+
+    terms! {
+        FRAME: "frame" => "Number of the observing image in its stream.";
+        RESIDUAL_U: "Δu, px" => "Column of the prediction minus column of the measurement after the solve, px.";
+        RESIDUAL_V: "Δv, px" => "Row of the prediction minus row of the measurement after the solve, px.";
+        CHI2: "χ²" => "Squared residual after the solve over the variance of a pixel. Expected value 2: two components.";
+        SLOPE_U: "∂u" => "Derivative of the predicted column with respect to the parameter, px per shown unit, from the Jacobian of this step.";
+        SLOPE_V: "∂v" => "Derivative of the predicted row with respect to the parameter, px per shown unit, from the Jacobian of this step.";
+    }
+}
+
+/// The inspector: the selected calibration parameter.
+pub(crate) mod parameter {
+    use super::Term;
+
+    terms! {
+        VALUE: "value" => "Estimate after the solve of this step, in degrees, mm or ms. Column of calibration.csv.";
+        SIGMA: "σ" => "Posterior standard deviation after this step: the window, the marginalization prior and the prior of the rig together.";
+        PRIOR_SIGMA: "prior σ" => "Standard deviation of the rig's prior: how wrong the given value may be.";
+        RATIO: "σ / prior σ" => "Posterior over prior standard deviation: 1 = the log adds nothing, 0.1 = ten times better than given.";
+        INITIAL: "initial value" => "Value in the first step: that of the rig, in the parameterization of the run.";
+        CHANGE: "change since the start" => "Estimate minus initial value; angles in (−180°, 180°].";
+        GROUND_TRUTH: "ground truth" => "True value from NAME.truth.yaml, converted to the parameterization of the run.";
+        ERROR: "error" => "Estimate minus ground truth, and its absolute value in posterior σ. Above 3 σ the estimate is inconsistent.";
+        OBSERVABILITY: "observability" => "Informed, weak or unobservable in this window: whether a quarter of the parameter lies in weak or null directions of the rank analysis.";
+    }
+}
+
+/// The inspector: iterations of the solver.
+pub(crate) mod iterations {
+    use super::Term;
+
+    terms! {
+        NUMBER: "" => "Number of the iteration; keys , and . show the window after it.";
+        COST_BEFORE: "cost before" => "Half the sum of all squared whitened residuals before the iteration, reprojections by their robust loss. No unit.";
+        COST_AFTER: "cost after" => "The same cost after the iteration.";
+        STEP_NORM: "step norm" => "Norm of the update of poses, velocities, biases, joint angles and calibration (landmarks excluded), in SI units.";
+        DAMPING: "damping λ" => "Levenberg–Marquardt damping: it is raised after a rejected iteration.";
+        ACCEPTED: "result" => "An iteration that does not lower the cost is rejected.";
+    }
+}
+
+/// The inspector: times of the stages.
+pub(crate) mod times {
+    use super::Term;
+
+    terms! {
+        FRONTEND: "front end" => "Tracking and detecting features, ms. Images are decoded ahead on another thread.";
+        OPTIMIZE: "optimize" => "Preintegration, prediction and solve, ms; during initialization, its attempts.";
+        LINEARIZE: "linearize" => "Linearization of the window at its final estimate for the rank analysis, ms.";
+        REPORT: "report" => "Collecting what the panels show, ms.";
+        MARGINALIZE: "marginalize" => "Outlier rejection, switch of the parameterization and marginalization, ms.";
+        OBSERVABILITY: "observability" => "Rank analysis: projection and singular values, ms.";
+        TOTAL: "total" => "Processing time of the whole step, ms. A camera of 20 Hz leaves 50 ms.";
+    }
+}
+
+/// The comparison: divergences of a run from the reference.
+pub(crate) mod divergence {
+    use super::Term;
+
+    terms! {
+        QUANTITY: "" => "Compared quantity; hover it for its definition.";
+        EXACT: "first difference" => "Time of the first common frame in which the quantity differs by a single bit. Click: move the cursor there.";
+        THRESHOLD: "threshold" => "Difference from which a divergence counts as notable.";
+        EXCEEDED: "exceeded at" => "Time of the first common frame with a difference of at least the threshold. Click: move the cursor there.";
+        AT_CURSOR: "at cursor" => "Difference between the steps of both runs at the cursor.";
+        MAXIMUM: "maximum" => "Largest difference over all common frames.";
+        AT: "at" => "Time of the largest difference. Click: move the cursor there.";
+    }
+}
+
+/// The residuals: χ² by kind of factor.
+pub(crate) mod factors {
+    use super::Term;
+
+    terms! {
+        FACTOR: "factor" => "Kind of measurement or prior in the window.";
+        COUNT: "residuals" => "Number of scalar residuals: two for each observation of a feature, fifteen for each IMU interval.";
+        CHI2_BEFORE: "χ² before" => "Sum of the squared whitened residuals before the solve, reprojections by their robust loss. No unit.";
+        CHI2_AFTER: "χ² after" => "The same sum after the solve.";
+        RATIO: "χ²/residual" => "χ² after the solve over the number of residuals: about 1 where the noise of the rig is right.";
+        VISUAL: "visual" => "Reprojections of features: prediction − measurement over the standard deviation of a pixel.";
+        IMU: "IMU" => "Preintegrated IMU samples between two frames, whitened by the noise densities of the rig.";
+        ENCODER: "encoder" => "Joint angles minus encoder readings over the encoder σ of the rig.";
+        CALIBRATION_PRIOR: "calibration prior" => "Calibration minus the value of the rig over the prior σ of the rig.";
+        MARGINALIZATION_PRIOR: "marginalization prior" => "What the frames that left the window say about those in it.";
+        ZERO_VELOCITY: "zero velocity" => "Zero-velocity update (ZUPT) of a stationary vehicle.";
+    }
+}
+
+/// The status bar, the caption of the image, the scene's table, and what other panels show once.
+pub(crate) mod window {
+    use super::Term;
+
+    terms! {
+        CURSOR: "cursor" => "Position of the cursor in s since the log began. Panels show the last step at or before it.";
+        DURATION: "duration" => "Time from the first to the last message of the log, s.";
+        FRAME: "frame" => "Number of the image at the cursor in its camera's stream, from 0.";
+        COST: "cost" => "Half the sum of all squared whitened residuals before and after the shown solver iteration. No unit.";
+        CAPTION: "caption" => "Frame number, stamp, features tracked, new, lost and rejected (front end and solve), and the RMS and median of the reprojection residuals in px over all observations of the window.";
+        CHAIN_ROW: "chain table" => "Denavit–Hartenberg parameters of the estimated chain at the cursor: joint angle q, offset θ₀ and twist α in degrees, d and a in mm.";
+        CHAIN_FRAMES: "chain frames" => "Frames of the chain: I IMU, B base, J2, J3 … after each joint, E end effector, C camera. Axes x red, y green, z blue; dashed: ground truth.";
+        CHAIN_ERROR: "extrinsics error" => "Distance and angle between imu_from_camera of the estimate and of the ground truth at the joint angles of the cursor.";
+        SCENE_LEGEND: "scene legend" => "Distance between the estimated position at the cursor and the ground truth, m, after alignment in yaw and position. Landmarks are coloured by their height.";
+        INITIALIZATION: "initialization" => "What the last attempt of the initialization waits for; the measured value and its threshold are in the inspector.";
+        MECHANISM: "mechanism" => "Chain of joints from the rig, or a standard one.";
+        MOTION: "motion" => "Motion of vehicle and joints in the synthetic window.";
+        JOINT_ANGLES: "joint angles" => "Whether joint angles are known, measured by encoders of this σ in degrees, or unknowns.";
+        POSES: "poses" => "Whether the poses are known, or follow from IMU samples with the noise of the rig.";
+        VERDICT: "verdict" => "Structural rank: directions that the measurements of the window constrain in principle. Informed rank: those with at least the information of a prior of 10° or 3 cm.";
+        LEAST_OBSERVABLE: "least observable" => "Direction with the smallest singular value, by the parameters with the largest weights.";
+        RANK_DEFICIT: "rank deficit" => "Unobservable directions by cause: parameterization, stationary joints, free joint angles, motion of the vehicle.";
+        SINGULARITY_MARGIN: "singularity margin" => "Distance of the chain from a singularity of its parameterization: 1 far, 0 singular. The second value is that of the other minimal parameterization.";
+        SPURIOUS: "spurious information" => "What priors claim about directions that no measurement observes, as a singular value (1: σ of 10° or 3 cm).";
+        RANKS_OVER_TIME: "ranks over time" => "Informed rank of each run by step, and faint the structural rank (rank.csv).";
+        ASSUMPTIONS: "assumptions" => "Synthetic window of the experiment: motion, knowledge of joint angles and poses, number of frames and landmarks. No log is used.";
+        JACOBIAN_NORM: "block norm" => "Frobenius norm of a block of the whitened Jacobian: change of the residuals in σ per 10°, 3 cm, 0.1 m/s, 1 °/s, 0.1 m/s² or 10 % of the inverse depth.";
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn explanations_are_short_sentences() {
+        let lists = [
+            frame::ALL,
+            joints::ALL,
+            feature::ALL,
+            observations::ALL,
+            block::ALL,
+            parameter::ALL,
+            iterations::ALL,
+            times::ALL,
+            divergence::ALL,
+            factors::ALL,
+            window::ALL,
+        ];
+        for list in lists {
+            for (place, term) in list.iter().enumerate() {
+                let sentences = term.meaning.matches(". ").count() + 1;
+                assert!(sentences <= 2 && term.meaning.len() <= 260, "{}: too long", term.name);
+                assert!(term.meaning.ends_with(['.', ']', '|']), "{}: {}", term.name, term.meaning);
+                assert!(list[..place].iter().all(|other| other.name != term.name), "'{}' twice", term.name);
+            }
+        }
+    }
+}
