@@ -4,6 +4,7 @@ use egui::{Button, Grid, RichText, Ui, WidgetInfo, vec2};
 
 use super::scores::Scores;
 use crate::gui::PanelContext;
+use crate::gui::help::terms::divergence;
 use crate::gui::units::{fixed, seconds, significant};
 use crate::session::{Command, Comparison, Divergence, Quantity};
 
@@ -53,12 +54,12 @@ pub(super) fn accuracy_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, scores: &Scor
         for row in scores.rows() {
             let best = row.best();
             ui.label(RichText::new(&row.name).color(theme.text)).on_hover_text(row.meaning);
-            ui.label(RichText::new(row.unit).color(theme.text_weak));
+            ui.label(RichText::new(row.unit).color(theme.text_weak)).on_hover_text(row.meaning);
             for run in 0..runs.len() {
                 let text = row.text(run);
                 let text = if best == Some(run) { format!("{text} ✔") } else { text };
                 let color = if best == Some(run) { theme.ok } else { theme.text_strong };
-                ui.label(RichText::new(text).monospace().color(color));
+                ui.label(RichText::new(text).monospace().color(color)).on_hover_text(row.meaning);
             }
             ui.end_row();
         }
@@ -112,8 +113,16 @@ pub(super) fn divergences_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, reference:
 fn table_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, number: usize, own: &str, comparison: &Comparison) {
     let theme = *ctx.theme;
     Grid::new(("partings", number)).striped(true).spacing(vec2(12.0, 2.0)).show(ui, |ui| {
-        for heading in ["", "first difference", "threshold", "exceeded at", "at cursor", "maximum", "at"] {
-            ui.label(RichText::new(heading).small().color(theme.text_weak));
+        for term in [
+            divergence::QUANTITY,
+            divergence::EXACT,
+            divergence::THRESHOLD,
+            divergence::EXCEEDED,
+            divergence::AT_CURSOR,
+            divergence::MAXIMUM,
+            divergence::AT,
+        ] {
+            ui.label(RichText::new(term.name).small().color(theme.text_weak)).on_hover_text(term.meaning);
         }
         ui.end_row();
         for (quantity, divergence) in Quantity::ALL.into_iter().zip(&comparison.divergences) {
@@ -124,13 +133,16 @@ fn table_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, number: usize, own: &str, c
             ui.label(RichText::new(quantity.name()).color(theme.text)).on_hover_text(quantity.meaning());
             time_button(ui, ctx, exact_ns, &name("first bitwise difference"));
             let tolerance = format!("≥ {}", difference_text(quantity, quantity.notable()));
-            ui.label(RichText::new(tolerance).small().color(theme.text_weak));
+            let tolerance = ui.label(RichText::new(tolerance).small().color(theme.text_weak));
+            tolerance.on_hover_text(divergence::THRESHOLD.meaning);
             time_button(ui, ctx, notable_ns, &name("first difference above the threshold"));
             let now = apart.map_or_else(|| "–".to_owned(), |apart| difference_text(quantity, apart));
             let is_notable = apart.is_some_and(|apart| apart >= quantity.notable());
             let color = if is_notable { theme.warn } else { theme.text_strong };
-            ui.label(RichText::new(now).monospace().color(color));
-            ui.label(RichText::new(difference_text(quantity, largest)).monospace().color(theme.text_strong));
+            let now = ui.label(RichText::new(now).monospace().color(color));
+            now.on_hover_text(divergence::AT_CURSOR.meaning);
+            let maximum = RichText::new(difference_text(quantity, largest)).monospace().color(theme.text_strong);
+            ui.label(maximum).on_hover_text(divergence::MAXIMUM.meaning);
             time_button(ui, ctx, (largest > 0.0).then_some(largest_ns), &name("maximum difference"));
             ui.end_row();
         }

@@ -95,7 +95,12 @@ impl Scores {
         let with = |meaning: &'static str, row: ScoreRow| ScoreRow { meaning, ..row };
         let less = Some(true);
         let absolute = |score: &RunScore| score.accuracy.as_ref().map(|accuracy| accuracy.absolute_m);
-        let ate = |row| with("Absolute trajectory error: position error after alignment in yaw and position", row);
+        let ate = |row| {
+            with(
+                "Absolute trajectory error: distance to the ground truth after alignment in yaw and position, over the estimated frames",
+                row,
+            )
+        };
         let mut rows = vec![
             ate(row("ATE RMS", "m", less, None, &|score| Some(absolute(score)?.rmse))),
             ate(row("ATE mean", "m", less, None, &|score| Some(absolute(score)?.mean))),
@@ -106,7 +111,8 @@ impl Scores {
                 Some(100.0 * accuracy.absolute_m.rmse / accuracy.length_m)
             })),
         ];
-        let rpe = |row| with("Relative pose error over sub-trajectories of this length", row);
+        let rpe =
+            |row| with("Relative pose error against the ground truth over sub-trajectories of this path length", row);
         let extrinsics = |row| {
             with("Error of imu_from_camera against the ground-truth rig, mean over the visited joint angles", row)
         };

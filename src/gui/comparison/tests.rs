@@ -52,6 +52,7 @@ fn bench(runs: &[&str], size: [f32; 2]) -> Harness<'static, Bench> {
 fn numbers_show_accuracy_and_lead_to_the_divergence() {
     let mut harness = bench(&["auto", "classical"], [900.0, 900.0]);
     let rows = harness.state().panel.scores.rows();
+    assert!(rows.iter().all(|row| row.meaning.len() > 15), "{rows:?}");
     let rms = rows.iter().find(|row| row.name == "ATE RMS").unwrap();
     let [auto, classical] = [rms.values[0].unwrap(), rms.values[1].unwrap()];
     assert_eq!(rms.best(), (rms.text(0) != rms.text(1)).then_some(usize::from(classical < auto)));

@@ -14,6 +14,7 @@ use egui::{Align2, ColorImage, PopupCloseBehavior, Rect, Sense, TextureHandle, T
 use self::model::ImageModel;
 pub use self::model::SolveSide;
 use self::paint::{ImagePlacement, MarkOptions};
+use super::help::terms::window;
 use super::units::significant;
 use super::{PanelContext, slide};
 use crate::sensors::GrayImage;
@@ -118,7 +119,9 @@ impl ImagePanel {
         let (legend, _) = ui.allocate_exact_size(vec2(ui.available_width(), LINE_HEIGHT), Sense::hover());
         let moved = slide::of(context, model.stamp_ns).is_some();
         paint::legend(ui.painter(), legend, context.theme, &self.mark_options(), moved);
-        ui.add(egui::Label::new(model.caption()).truncate());
+        let caption = model.caption();
+        let line = ui.add(egui::Label::new(&caption).truncate());
+        line.on_hover_text(format!("{caption}\n{}", window::CAPTION.meaning));
     }
 
     fn mark_options(&self) -> MarkOptions {

@@ -5,42 +5,40 @@ use egui::{RichText, Ui};
 use super::{rows_ui, table_ui};
 use crate::frontend::FeatureId;
 use crate::gui::PanelContext;
+use crate::gui::help::terms::{feature, observations};
 use crate::gui::units::{fixed, significant};
 use crate::session::StepRecord;
 
 pub(super) fn ui(ui: &mut Ui, ctx: &PanelContext<'_>, step: &StepRecord, id: FeatureId) {
     let theme = ctx.theme;
-    let track = step.tracks.features.iter().find(|feature| feature.id == id);
-    let report = step.report.features.iter().find(|feature| feature.id == id);
+    let track = step.tracks.features.iter().find(|known| known.id == id);
+    let report = step.report.features.iter().find(|known| known.id == id);
     if track.is_none() && report.is_none() {
         ui.label(RichText::new("No observation in this frame").color(theme.text_weak));
         return;
     }
     let mut rows = Vec::new();
     if let Some(track) = track {
-        rows.push((
-            "position, px".to_owned(),
-            vec![format!("{}, {}", fixed(track.uv_px.x, 2), fixed(track.uv_px.y, 2))],
-        ));
-        rows.push(("track age, images".to_owned(), vec![track.age.to_string()]));
+        rows.push((feature::POSITION, vec![format!("{}, {}", fixed(track.uv_px.x, 2), fixed(track.uv_px.y, 2))]));
+        rows.push((feature::AGE, vec![track.age.to_string()]));
         if let Some(previous) = track.previous_uv_px {
             let flow = track.uv_px - previous;
-            rows.push(("flow, px".to_owned(), vec![fixed(flow.norm(), 2)]));
+            rows.push((feature::FLOW, vec![fixed(flow.norm(), 2)]));
         }
     }
     if let Some(report) = report {
-        rows.push(("anchor frame".to_owned(), vec![report.anchor_frame_index.to_string()]));
+        rows.push((feature::ANCHOR, vec![report.anchor_frame_index.to_string()]));
         let depth = 1.0 / report.inverse_depth_per_m;
-        rows.push(("depth, m".to_owned(), vec![fixed(depth, 2)]));
+        rows.push((feature::DEPTH, vec![fixed(depth, 2)]));
         let state = if report.rejected { "rejected as an outlier" } else { "used in the solve" };
-        rows.push(("state".to_owned(), vec![state.to_owned()]));
+        rows.push((feature::STATE, vec![state.to_owned()]));
     } else {
-        rows.push(("state".to_owned(), vec!["not used in the solve".to_owned()]));
+        rows.push((feature::STATE, vec!["not used in the solve".to_owned()]));
     }
     if let Some(landmark) = step.report.landmarks.iter().find(|landmark| landmark.id == id) {
         let position = landmark.position_m;
         let values = [position.x, position.y, position.z].map(|value| fixed(value, 3));
-        rows.push(("landmark position, m".to_owned(), vec![values.join(", ")]));
+        rows.push((feature::LANDMARK, vec![values.join(", ")]));
     }
     rows_ui(ui, theme, "feature", &rows);
     let Some(report) = report else { return };
@@ -49,7 +47,15 @@ pub(super) fn ui(ui: &mut Ui, ctx: &PanelContext<'_>, step: &StepRecord, id: Fea
     };
     let caption = "Observations: residual before and after the solve, χ² and robust weight";
     ui.label(RichText::new(caption).small().color(theme.text_weak));
-    let headings = ["frame", "u, px", "v, px", "before, px", "after, px", "χ²", "weight"];
+    let columns = [
+        observations::FRAME,
+        observations::U,
+        observations::V,
+        observations::BEFORE,
+        observations::AFTER,
+        observations::CHI2,
+        observations::WEIGHT,
+    ];
     let lines = report.observations.iter().map(|one| {
         vec![
             one.frame_index.to_string(),
@@ -61,5 +67,5 @@ pub(super) fn ui(ui: &mut Ui, ctx: &PanelContext<'_>, step: &StepRecord, id: Fea
             fixed(one.robust_weight, 2),
         ]
     });
-    table_ui(ui, theme, "observations", &headings, lines);
+    table_ui(ui, theme, "observations", &columns, lines);
 }

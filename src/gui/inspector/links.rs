@@ -4,11 +4,12 @@ use std::sync::Arc;
 
 use egui::{RichText, Ui};
 
-use super::table_ui;
+use super::headed_table_ui;
 use crate::estimator::{JacobianFactor, StepJacobian};
 use crate::frontend::FeatureId;
 use crate::gimbal::ParameterId;
 use crate::gui::PanelContext;
+use crate::gui::help::terms::block;
 use crate::gui::jacobian::cameras;
 use crate::gui::units::{Shown, fixed, significant};
 use crate::session::{RunRecord, StepRecord};
@@ -136,8 +137,9 @@ pub(super) fn block_ui(
     };
     let shown = Shown::of(parameter.dimension());
     let unit = shown.unit.trim();
-    let heads =
-        ["frame", "Δu, px", "Δv, px", "χ²", &format!("∂u, px/{unit}"), &format!("∂v, px/{unit}")].map(str::to_owned);
+    let known = [block::FRAME, block::RESIDUAL_U, block::RESIDUAL_V, block::CHI2];
+    let slopes = [block::SLOPE_U, block::SLOPE_V].map(|term| (format!("{}, px/{unit}", term.name), term));
+    let heads: Vec<_> = known.into_iter().map(|term| (term.name.to_owned(), term)).chain(slopes).collect();
     let lines = rows.frames.iter().enumerate().filter_map(|(place, frame)| {
         let seen = feature.observations.iter().find(|seen| seen.frame_index == frame.0)?;
         let residual = seen.residual_after_px.map_or([f64::NAN; 2], |residual| [residual.x, residual.y]);
@@ -150,8 +152,7 @@ pub(super) fn block_ui(
         cells.extend(slopes);
         Some(cells)
     });
-    let heads: Vec<&str> = heads.iter().map(String::as_str).collect();
     let caption = "Residuals Δu, Δv after the solve and derivatives of the projection";
     ui.label(RichText::new(caption).small().color(ctx.theme.text_weak));
-    table_ui(ui, ctx.theme, "block", &heads, lines);
+    headed_table_ui(ui, ctx.theme, "block", &heads, lines);
 }

@@ -13,6 +13,7 @@ use egui::{CollapsingHeader, Grid, RichText, ScrollArea, Ui, vec2};
 use self::links::Links;
 use super::PanelContext;
 use super::convergence::empty_ui;
+use super::help::terms::Term;
 use super::theme::Theme;
 use crate::session::{RunRecord, StepRecord};
 
@@ -87,29 +88,44 @@ fn section_ui(ui: &mut Ui, theme: &Theme, figure: bool, title: &str, contents: i
     CollapsingHeader::new(title).id_salt(salt).default_open(true).show_unindented(ui, contents);
 }
 
-/// Aligned rows of a name and its values.
-fn rows_ui(ui: &mut Ui, theme: &Theme, salt: &str, rows: &[(String, Vec<String>)]) {
+/// A row: the quantity and its values.
+type Row = (Term, Vec<String>);
+
+/// Aligned rows of a name and its values; hovering either explains the quantity.
+fn rows_ui(ui: &mut Ui, theme: &Theme, salt: &str, rows: &[Row]) {
     Grid::new(salt).spacing(vec2(8.0, 1.0)).min_row_height(15.0).show(ui, |ui| {
-        for (name, values) in rows {
-            ui.label(RichText::new(name).color(theme.text_weak));
+        for (term, values) in rows {
+            ui.label(RichText::new(term.name).color(theme.text_weak)).on_hover_text(term.meaning);
             for value in values {
-                ui.label(RichText::new(value).monospace().color(theme.text_strong));
+                ui.label(RichText::new(value).monospace().color(theme.text_strong)).on_hover_text(term.meaning);
             }
             ui.end_row();
         }
     });
 }
 
-/// A table with column headings.
-fn table_ui(ui: &mut Ui, theme: &Theme, salt: &str, headings: &[&str], rows: impl Iterator<Item = Vec<String>>) {
+/// A table with column headings; hovering a cell explains its column.
+fn table_ui(ui: &mut Ui, theme: &Theme, salt: &str, columns: &[Term], rows: impl Iterator<Item = Vec<String>>) {
+    let headings: Vec<(String, Term)> = columns.iter().map(|term| (term.name.to_owned(), *term)).collect();
+    headed_table_ui(ui, theme, salt, &headings, rows);
+}
+
+/// The same with headings that differ from the names of the quantities.
+fn headed_table_ui(
+    ui: &mut Ui,
+    theme: &Theme,
+    salt: &str,
+    headings: &[(String, Term)],
+    rows: impl Iterator<Item = Vec<String>>,
+) {
     Grid::new(salt).striped(true).spacing(vec2(9.0, 1.0)).min_row_height(15.0).show(ui, |ui| {
-        for heading in headings {
-            ui.label(RichText::new(*heading).small().color(theme.text_weak));
+        for (heading, term) in headings {
+            ui.label(RichText::new(heading).small().color(theme.text_weak)).on_hover_text(term.meaning);
         }
         ui.end_row();
         for row in rows {
-            for cell in row {
-                ui.label(RichText::new(cell).monospace().color(theme.text_strong));
+            for (cell, (_, term)) in row.into_iter().zip(headings) {
+                ui.label(RichText::new(cell).monospace().color(theme.text_strong)).on_hover_text(term.meaning);
             }
             ui.end_row();
         }

@@ -8,6 +8,7 @@ use crate::gui::PanelContext;
 use crate::gui::chain_values::true_values;
 use crate::gui::convergence::names::meaning_of;
 use crate::gui::convergence::{ParameterState, parameter_states};
+use crate::gui::help::terms::parameter as terms;
 use crate::gui::units::{Shown, fixed};
 use crate::session::{RunRecord, StepRecord};
 
@@ -25,32 +26,29 @@ pub(super) fn ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, step: &St
     let (value, sigma, prior) =
         (entry(&calibration.values), entry(&calibration.sigmas), entry(&calibration.prior_sigmas));
     let mut rows = vec![
-        ("value".to_owned(), vec![shown.value(parameter.principal_value(value), sigma)]),
-        ("σ".to_owned(), vec![shown.sigma(sigma)]),
-        ("prior σ".to_owned(), vec![shown.sigma(prior)]),
-        ("σ / prior σ".to_owned(), vec![fixed(sigma / prior, 3)]),
+        (terms::VALUE, vec![shown.value(parameter.principal_value(value), sigma)]),
+        (terms::SIGMA, vec![shown.sigma(sigma)]),
+        (terms::PRIOR_SIGMA, vec![shown.sigma(prior)]),
+        (terms::RATIO, vec![fixed(sigma / prior, 3)]),
     ];
     let begin = run.steps.first().map(|first| &first.report.calibration);
     let begin =
         begin.and_then(|first| first.values.get(first.parameters.iter().position(|known| *known == parameter)?));
     if let Some(begin) = begin {
-        rows.push(("initial value".to_owned(), vec![shown.value(parameter.principal_value(*begin), sigma)]));
-        rows.push((
-            "change since the start".to_owned(),
-            vec![shown.value(parameter.principal_value(value - begin), sigma)],
-        ));
+        rows.push((terms::INITIAL, vec![shown.value(parameter.principal_value(*begin), sigma)]));
+        rows.push((terms::CHANGE, vec![shown.value(parameter.principal_value(value - begin), sigma)]));
     }
     let ground_truth =
         true_values(ctx.recording, run, ctx.cursor_ns).and_then(|ground_truth| ground_truth.get(&parameter).copied());
     if let Some(ground_truth) = ground_truth {
-        rows.push(("ground truth".to_owned(), vec![shown.value(parameter.principal_value(ground_truth), sigma)]));
+        rows.push((terms::GROUND_TRUTH, vec![shown.value(parameter.principal_value(ground_truth), sigma)]));
         let error = parameter.principal_value(value - ground_truth);
         let ratio = fixed(error.abs() / sigma, 1);
-        rows.push(("error".to_owned(), vec![format!("{} ({ratio} σ)", shown.value(error, sigma))]));
+        rows.push((terms::ERROR, vec![format!("{} ({ratio} σ)", shown.value(error, sigma))]));
     }
     let state = parameter_states(step.rank.as_ref())
         .map_or(ParameterState::Waiting, |known| known.get(&parameter).copied().unwrap_or(ParameterState::Informed));
     let state = if state == ParameterState::Informed { "informed" } else { state.tag() };
-    rows.push(("observability".to_owned(), vec![state.to_owned()]));
+    rows.push((terms::OBSERVABILITY, vec![state.to_owned()]));
     rows_ui(ui, theme, "parameter", &rows);
 }

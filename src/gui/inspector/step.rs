@@ -2,11 +2,12 @@
 
 use egui::{RichText, Sense, Ui, vec2};
 
-use super::{rows_ui, table_ui};
+use super::{Row, rows_ui, table_ui};
 use crate::estimator::StepReport;
 use crate::geometry::{principal_angle, so3};
 use crate::gui::PanelContext;
 use crate::gui::events::{look_of, name_of, paint_mark};
+use crate::gui::help::terms::{Term, frame, iterations, joints, times};
 use crate::gui::theme::Theme;
 use crate::gui::units::{fixed, seconds, significant};
 use crate::session::{RunRecord, StepRecord};
@@ -17,39 +18,39 @@ pub(super) fn frame_ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, ste
     let delay_ms = (step.log_time_ns - report.stamp_ns) as f64 * 1e-6;
     let keyframe = if report.keyframe { ", keyframe" } else { "" };
     let mut rows = vec![
-        ("stamp, s".to_owned(), vec![format!("{}, log time {delay_ms:+.1} ms", seconds(report.stamp_ns))]),
-        ("phase".to_owned(), vec![format!("{}{keyframe}", report.phase.name())]),
+        (frame::STAMP, vec![format!("{}, log time {delay_ms:+.1} ms", seconds(report.stamp_ns))]),
+        (frame::PHASE, vec![format!("{}{keyframe}", report.phase.name())]),
     ];
     if report.restarts > 0 {
-        rows.push(("restarts".to_owned(), vec![report.restarts.to_string()]));
+        rows.push((frame::RESTARTS, vec![report.restarts.to_string()]));
     }
     let statistics = &step.tracks.statistics;
     let tracks = format!("{} continued, {} new", statistics.tracked, statistics.detected);
-    rows.push(("feature tracks".to_owned(), vec![tracks]));
+    rows.push((frame::TRACKS, vec![tracks]));
     rows_ui(ui, ctx.theme, "step", &rows);
     let Some(newest) = report.newest() else { return };
 
-    let three = |name: &str, values: [f64; 3], decimals: usize| {
-        (name.to_owned(), values.map(|value| fixed(value, decimals)).to_vec())
+    let three = |term: Term, values: [f64; 3], decimals: usize| -> Row {
+        (term, values.map(|value| fixed(value, decimals)).to_vec())
     };
     let (roll, pitch, yaw) = newest.world_from_imu.rotation.euler_angles();
     let [p, v] = [newest.world_from_imu.translation_m, newest.velocity_m_per_s];
     let [a, g] = [newest.accelerometer_bias_m_per_s2, newest.gyroscope_bias_rad_per_s];
     let mut rows = vec![
-        (String::new(), ["x", "y", "z"].map(str::to_owned).to_vec()),
-        three("position, m", [p.x, p.y, p.z], 3),
-        three("velocity, m/s", [v.x, v.y, v.z], 3),
-        three("roll, pitch, yaw, °", [roll, pitch, yaw].map(f64::to_degrees), 2),
-        three("accelerometer bias, m/s²", [a.x, a.y, a.z], 4),
-        three("gyroscope bias, °/s", [g.x, g.y, g.z].map(f64::to_degrees), 4),
+        (frame::AXES, ["x", "y", "z"].map(str::to_owned).to_vec()),
+        three(frame::POSITION, [p.x, p.y, p.z], 3),
+        three(frame::VELOCITY, [v.x, v.y, v.z], 3),
+        three(frame::ATTITUDE, [roll, pitch, yaw].map(f64::to_degrees), 2),
+        three(frame::ACCELEROMETER_BIAS, [a.x, a.y, a.z], 4),
+        three(frame::GYROSCOPE_BIAS, [g.x, g.y, g.z].map(f64::to_degrees), 4),
     ];
     if let (Some(alignment), Some(ground_truth)) = (run.alignment, step.ground_truth) {
         let aligned = alignment * newest.world_from_imu;
         let error = aligned.translation_m - ground_truth.translation_m;
-        rows.push(three("position error, m", [error.x, error.y, error.z], 3));
+        rows.push(three(frame::POSITION_ERROR, [error.x, error.y, error.z], 3));
         let rotation_vector = so3::log(&(ground_truth.rotation.inverse() * aligned.rotation));
         rows.push(three(
-            "attitude error, °",
+            frame::ATTITUDE_ERROR,
             [rotation_vector.x, rotation_vector.y, rotation_vector.z].map(f64::to_degrees),
             2,
         ));
@@ -57,14 +58,16 @@ pub(super) fn frame_ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, ste
     rows_ui(ui, ctx.theme, "state", &rows);
     if !newest.joint_angles_rad.is_empty() {
         let encoders = newest.encoder_angles_rad.as_deref();
-        let joints = ctx.recording.rig.gimbal.as_ref().map_or(&[][..], |gimbal| &gimbal.joints);
+        let rig_joints = ctx.recording.rig.gimbal.as_ref().map_or(&[][..], |gimbal| &gimbal.joints);
         let lines = newest.joint_angles_rad.iter().enumerate().map(|(number, angle)| {
             let encoder = encoders.and_then(|angles| angles.get(number)).copied().unwrap_or(f64::NAN);
-            let name = joints.get(number).map_or_else(|| format!("joint {}", number + 1), |joint| joint.name.clone());
+            let name =
+                rig_joints.get(number).map_or_else(|| format!("joint {}", number + 1), |joint| joint.name.clone());
             let shown = |angle: f64| fixed(principal_angle(angle).to_degrees(), 2);
             vec![name, shown(*angle), shown(encoder), shown(angle - encoder)]
         });
-        table_ui(ui, ctx.theme, "joints", &["joint", "estimate, °", "encoder, °", "difference, °"], lines);
+        let columns = [joints::JOINT, joints::ESTIMATE, joints::ENCODER, joints::DIFFERENCE];
+        table_ui(ui, ctx.theme, "joints", &columns, lines);
     }
 }
 
@@ -116,21 +119,29 @@ pub(super) fn iterations_ui(ui: &mut Ui, theme: &Theme, report: &StepReport) {
             if iteration.accepted { "accepted" } else { "rejected" }.to_owned(),
         ]
     });
-    table_ui(ui, theme, "iterations", &["", "cost before", "cost after", "step norm", "damping λ", ""], lines);
+    let columns = [
+        iterations::NUMBER,
+        iterations::COST_BEFORE,
+        iterations::COST_AFTER,
+        iterations::STEP_NORM,
+        iterations::DAMPING,
+        iterations::ACCEPTED,
+    ];
+    table_ui(ui, theme, "iterations", &columns, lines);
 }
 
 /// Stage times in milliseconds.
 pub(super) fn times_ui(ui: &mut Ui, theme: &Theme, report: &StepReport) {
-    let times = &report.times;
-    let row = |name: &str, value: f64| (name.to_owned(), vec![format!("{} ms", fixed(value, 1))]);
+    let stages = &report.times;
+    let row = |term: Term, value: f64| -> Row { (term, vec![format!("{} ms", fixed(value, 1))]) };
     let rows = [
-        row("front end", times.frontend_ms),
-        row("optimize", times.optimize_ms),
-        row("linearize", times.linearize_ms),
-        row("report", times.report_ms),
-        row("marginalize", times.marginalize_ms),
-        row("observability", times.observability_ms),
-        row("total", times.step_ms),
+        row(times::FRONTEND, stages.frontend_ms),
+        row(times::OPTIMIZE, stages.optimize_ms),
+        row(times::LINEARIZE, stages.linearize_ms),
+        row(times::REPORT, stages.report_ms),
+        row(times::MARGINALIZE, stages.marginalize_ms),
+        row(times::OBSERVABILITY, stages.observability_ms),
+        row(times::TOTAL, stages.step_ms),
     ];
     rows_ui(ui, theme, "times", &rows);
 }

@@ -19,6 +19,7 @@ use self::model::JacobianModel;
 pub(super) use self::model::{cameras, column_name, name_of};
 use super::PanelContext;
 use super::convergence::empty_ui;
+use super::help::terms::window;
 use crate::estimator::{ColumnId, JacobianFactor};
 use crate::session::{RunRecord, StepRecord};
 
@@ -126,7 +127,8 @@ impl JacobianPanel {
             paint::hover(ui, ctx.theme, area, place, model, (row, column));
             response.on_hover_text_at_pointer(details::headline(model, row, column));
         }
-        let (_, legend) = ui.allocate_space(vec2(ui.available_width(), LEGEND));
+        let (legend, hovered_legend) = ui.allocate_exact_size(vec2(ui.available_width(), LEGEND), Sense::hover());
+        hovered_legend.on_hover_text(window::JACOBIAN_NORM.meaning);
         paint::legend(ui, ctx.theme, legend, model);
         if let Some(selected_block) = selected_block.filter(|_| with_details) {
             if let Some(row) = selected_block.0 {

@@ -6,6 +6,7 @@ use super::worker::Experiment;
 use crate::estimator::{JointKnowledge, PoseKnowledge};
 use crate::gimbal::Parameterization;
 use crate::gui::PanelContext;
+use crate::gui::help::terms::window;
 use crate::observability::laboratory::{LABORATORY_IMU, LaboratoryForm, LaboratoryMotion, LaboratorySetup, Mechanism};
 
 /// Parameterizations that can be compared.
@@ -105,7 +106,7 @@ impl Choices {
                 ui.selectable_value(&mut self.mechanism, Some(known), known).on_hover_text(meaning);
             }
         });
-        shown.response.labelled_by(name.id);
+        shown.response.labelled_by(name.id).on_hover_text(window::MECHANISM.meaning);
     }
 
     fn motion_ui(&mut self, ui: &mut Ui) {
@@ -116,7 +117,7 @@ impl Choices {
                 ui.selectable_value(&mut self.motion, motion, motion.name()).on_hover_text(motion.meaning());
             }
         });
-        shown.response.labelled_by(name.id);
+        shown.response.labelled_by(name.id).on_hover_text(window::MOTION.meaning);
     }
 
     fn knowledge_ui(&mut self, ui: &mut Ui) {
@@ -132,10 +133,10 @@ impl Choices {
                 ui.selectable_value(&mut self.joints, joints, words(joints));
             }
         });
-        shown.response.labelled_by(name.id);
+        shown.response.labelled_by(name.id).on_hover_text(window::JOINT_ANGLES.meaning);
         if self.joints == Joints::Encoder {
             let sigma = egui::DragValue::new(&mut self.encoder_sigma_deg).range(1e-3..=45.0).speed(0.01).suffix("°");
-            ui.add(sigma).labelled_by(name.id);
+            ui.add(sigma).labelled_by(name.id).on_hover_text(window::JOINT_ANGLES.meaning);
         }
         let name = ui.label("Poses");
         let words = |poses: Poses| match poses {
@@ -149,7 +150,7 @@ impl Choices {
                 ui.selectable_value(&mut self.poses, poses, words(poses));
             }
         });
-        shown.response.labelled_by(name.id);
+        shown.response.labelled_by(name.id).on_hover_text(window::POSES.meaning);
     }
 
     fn mechanism(&self, ctx: &PanelContext<'_>) -> Option<Mechanism> {

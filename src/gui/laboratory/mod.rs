@@ -14,6 +14,7 @@ use egui::{Label, RichText, ScrollArea, Ui};
 use self::choices::Choices;
 use self::worker::Worker;
 use super::PanelContext;
+use super::help::terms::window;
 use super::rank::columns::{RankColumn, columns_ui};
 use crate::observability::RankReport;
 use crate::observability::laboratory::{LaboratoryReport, LaboratoryResult};
@@ -69,7 +70,8 @@ impl LaboratoryPanel {
             }
             if let Some(setup) = self.worker.setup() {
                 let text = assumptions(&LaboratoryReport::new(setup, &[]));
-                ui.add(Label::new(RichText::new(text).small().color(ctx.theme.text_weak)).wrap());
+                let line = Label::new(RichText::new(text).small().color(ctx.theme.text_weak)).wrap();
+                ui.add(line).on_hover_text(window::ASSUMPTIONS.meaning);
             }
             let theme = *ctx.theme;
             let column = |(number, result): (usize, &LaboratoryResult)| (number, result.clone());

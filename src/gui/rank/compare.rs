@@ -5,6 +5,7 @@ use egui::{RichText, ScrollArea, Ui};
 use super::columns::{RankColumn, columns_ui};
 use crate::gimbal::{Chain, Parameterization, SWITCH_MARGIN, Singularity};
 use crate::gui::PanelContext;
+use crate::gui::help::terms::window;
 use crate::observability::RankReport;
 use crate::session::{Command, MAX_RUNS, RunRecord, RunSpec, StepRecord};
 
@@ -74,7 +75,7 @@ pub(super) fn singularity_ui(
             run.spec.label,
             if taken { format!(". Switches below {SWITCH_MARGIN:.2}") } else { String::new() }
         );
-        ui.label(RichText::new(text).color(color));
+        ui.label(RichText::new(text).color(color)).on_hover_text(window::SINGULARITY_MARGIN.meaning);
         let is_there = ctx.recording.runs.iter().any(|run| {
             let newest = run.step_at(ctx.cursor_ns);
             newest.is_some_and(|step| step.report.calibration.parameterization == other)

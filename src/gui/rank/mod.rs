@@ -23,6 +23,7 @@ use self::verdict::Level;
 use super::PanelContext;
 use super::convergence::empty_ui;
 use super::follow::RunTables;
+use super::help::terms::window;
 use super::plot::{Clicks, Curve, PlotArea, navigate, paint_cursor, paint_ground, paint_steps, visible_range};
 use super::theme::{CURVE_WIDTH, RunStyle, Theme};
 use crate::session::{RunRecord, StepRecord};
@@ -160,7 +161,8 @@ impl RankPanel {
         }
         paint_cursor(&painter, &theme, &area, ctx.cursor_ns);
         let id = ui.unique_id().with("rank over time");
-        navigate(ui, ctx, &area, id, "Rank over time", Clicks::Seek, false);
+        navigate(ui, ctx, &area, id, "Rank over time", Clicks::Seek, false)
+            .on_hover_text(window::RANKS_OVER_TIME.meaning);
     }
 }
 
@@ -185,12 +187,14 @@ fn verdict_ui(ui: &mut Ui, ctx: &PanelContext<'_>, step: &StepRecord) {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 5.0;
         ui.label(RichText::new(mark).color(color).size(14.0));
-        ui.add(egui::Label::new(RichText::new(&verdict.headline).color(theme.text_strong).size(14.0)).truncate());
+        let headline = RichText::new(&verdict.headline).color(theme.text_strong).size(14.0);
+        let headline = ui.add(egui::Label::new(headline).truncate());
+        headline.on_hover_text(format!("{}\n{}", verdict.headline, window::VERDICT.meaning));
     });
     for reason in &verdict.reasons {
         let response =
-            ui.add(egui::Label::new(RichText::new(reason).color(theme.text)).truncate().sense(Sense::hover()));
-        response.on_hover_text(reason);
+            ui.add(egui::Label::new(RichText::new(&reason.text).color(theme.text)).truncate().sense(Sense::hover()));
+        response.on_hover_text(format!("{}\n{}", reason.text, reason.term.meaning));
     }
     let Some(rank) = step.rank.as_ref().filter(|rank| !rank.known.is_empty()) else { return };
     let title = format!(

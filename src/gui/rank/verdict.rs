@@ -2,6 +2,7 @@
 
 use crate::estimator::{EventKind, Phase};
 use crate::gimbal::{ParameterId, ParameterNames, SWITCH_MARGIN};
+use crate::gui::help::terms::{Term, window};
 use crate::gui::units::counted;
 use crate::observability::{CalibrationDirection, KnownDirection, RankReport};
 use crate::session::StepRecord;
@@ -26,8 +27,17 @@ pub(crate) struct Verdict {
     pub(crate) level: Level,
     /// One line.
     pub(crate) headline: String,
-    /// The reasons, one line each.
-    pub(crate) reasons: Vec<String>,
+    /// The reasons.
+    pub(crate) reasons: Vec<Reason>,
+}
+
+/// One reason of a verdict.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Reason {
+    /// What it is about.
+    pub(crate) term: Term,
+    /// One line.
+    pub(crate) text: String,
 }
 
 /// The observability of the calibration in a step.
@@ -43,8 +53,8 @@ pub(crate) fn verdict(step: &StepRecord, names: &ParameterNames) -> Verdict {
             let headline =
                 if initializing { "Initializing: no rank yet" } else { "No linearization in this step: no rank" };
             let waits = step.report.events.iter().filter(|event| event.kind == EventKind::InitializationWaits);
-            let reasons = waits.map(|event| event.message.clone()).collect();
-            Verdict { level: Level::None, headline: headline.to_owned(), reasons }
+            let reasons = waits.map(|event| Reason { term: window::INITIALIZATION, text: event.message.clone() });
+            Verdict { level: Level::None, headline: headline.to_owned(), reasons: reasons.collect() }
         }
     }
 }
@@ -65,6 +75,7 @@ fn of_rank(rank: &RankReport, names: &ParameterNames) -> Verdict {
         }
     };
     let mut reasons = Vec::new();
+    let mut push = |term: Term, text: String| reasons.push(Reason { term, text });
     let causes = [
         (rank.deficit_parameterization, "redundant in the parameterization"),
         (rank.deficit_joints, "stationary joints"),
@@ -74,27 +85,39 @@ fn of_rank(rank: &RankReport, names: &ParameterNames) -> Verdict {
     let causes: Vec<String> =
         causes.iter().filter(|(count, _)| *count > 0).map(|(count, cause)| format!("{count} {cause}")).collect();
     if !causes.is_empty() {
-        reasons.push(format!("Rank deficit: {}", causes.join(", ")));
+        push(window::RANK_DEFICIT, format!("Rank deficit: {}", causes.join(", ")));
     }
     if rank.claimed() > 0 {
-        reasons.push(format!(
-            "Spurious information in the priors on {} unobservable directions, up to {:.2} (1: σ of 10° or 3 cm)",
-            rank.claimed(),
-            rank.spurious_gain()
-        ));
+        push(
+            window::SPURIOUS,
+            format!(
+                "Spurious information in the priors on {} unobservable directions, up to {:.2} (1: σ of 10° or 3 cm)",
+                rank.claimed(),
+                rank.spurious_gain()
+            ),
+        );
     }
     if let Some(direction) = rank.directions.iter().find(|direction| !direction.structural) {
-        reasons.push(format!("Least observable: {}", parameters_of(names, &rank.parameters, direction, 3)));
+        push(
+            window::LEAST_OBSERVABLE,
+            format!("Least observable: {}", parameters_of(names, &rank.parameters, direction, 3)),
+        );
     } else if let Some(direction) = rank.directions.first() {
-        reasons.push(format!("Unobservable: {}", parameters_of(names, &rank.parameters, direction, 3)));
+        push(
+            window::LEAST_OBSERVABLE,
+            format!("Unobservable: {}", parameters_of(names, &rank.parameters, direction, 3)),
+        );
     }
     if let Some((singularity, margin)) =
         rank.margins.iter().min_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, m)| *m < SWITCH_MARGIN)
     {
-        reasons.push(format!(
-            "Parameterization near a singularity: {}, margin {margin:.2} < {SWITCH_MARGIN:.2}",
-            names.singularity(*singularity)
-        ));
+        push(
+            window::SINGULARITY_MARGIN,
+            format!(
+                "Parameterization near a singularity: {}, margin {margin:.2} < {SWITCH_MARGIN:.2}",
+                names.singularity(*singularity)
+            ),
+        );
     }
     Verdict { level, headline, reasons }
 }
@@ -169,7 +192,7 @@ mod tests {
         let classical = said(1, FIRST_TRACKED_FRAME + 5);
         assert_eq!(classical.level, Level::Lost);
         assert!(classical.headline.starts_with("Structural rank 18 of 24: 6 unobservable"), "{}", classical.headline);
-        assert_eq!(classical.reasons[0], "Rank deficit: 6 redundant in the parameterization");
+        assert_eq!(classical.reasons[0].text, "Rank deficit: 6 redundant in the parameterization");
     }
 
     #[test]

@@ -12,13 +12,14 @@ use egui::{
 use super::PanelContext;
 use super::convergence::empty_ui;
 use super::follow::RunTables;
+use super::help::terms::{Term, factors};
 use super::plot::{
     Clicks, Curve, PlotArea, decimals_of_step, navigate, paint_cursor, paint_curve, paint_ground, paint_value_grid,
     ticks, visible_range,
 };
 use super::theme::{CURVE_WIDTH, Theme, label_font};
 use super::units::{fixed, significant};
-use crate::estimator::{ResidualSummary, StepReport};
+use crate::estimator::{FactorKind, ResidualSummary, StepReport};
 use crate::gui::residuals::histogram::ResidualHistogram;
 use crate::session::StepRecord;
 
@@ -208,20 +209,35 @@ fn factors_ui(ui: &mut Ui, theme: &Theme, residuals: &[ResidualSummary]) {
         return;
     }
     Grid::new("chi2 by factor").num_columns(5).spacing(vec2(10.0, 2.0)).striped(true).show(ui, |ui| {
-        for heading in ["factor", "residuals", "χ² before", "χ² after", "χ²/residual"] {
-            ui.label(RichText::new(heading).small().color(theme.text_weak));
+        for term in [factors::FACTOR, factors::COUNT, factors::CHI2_BEFORE, factors::CHI2_AFTER, factors::RATIO] {
+            ui.label(RichText::new(term.name).small().color(theme.text_weak)).on_hover_text(term.meaning);
         }
         ui.end_row();
         for summary in residuals {
-            ui.label(RichText::new(summary.factor.name()).color(theme.text));
-            let number = |text: String| RichText::new(text).monospace().color(theme.text_strong);
-            ui.label(number(summary.count.to_string()));
-            ui.label(number(significant(summary.chi2_before)));
-            ui.label(number(significant(summary.chi2_after)));
+            let name = ui.label(RichText::new(summary.factor.name()).color(theme.text));
+            name.on_hover_text(term_of(summary.factor).meaning);
+            let number = |ui: &mut Ui, text: String, term: Term| {
+                ui.label(RichText::new(text).monospace().color(theme.text_strong)).on_hover_text(term.meaning);
+            };
+            number(ui, summary.count.to_string(), factors::COUNT);
+            number(ui, significant(summary.chi2_before), factors::CHI2_BEFORE);
+            number(ui, significant(summary.chi2_after), factors::CHI2_AFTER);
             ratio_ui(ui, theme, summary.mean_square().unwrap_or(f64::NAN));
             ui.end_row();
         }
     });
+}
+
+/// The explanation of a kind of factor.
+const fn term_of(factor: FactorKind) -> Term {
+    match factor {
+        FactorKind::Visual => factors::VISUAL,
+        FactorKind::Imu => factors::IMU,
+        FactorKind::Encoder => factors::ENCODER,
+        FactorKind::CalibrationPrior => factors::CALIBRATION_PRIOR,
+        FactorKind::MarginalizationPrior => factors::MARGINALIZATION_PRIOR,
+        FactorKind::ZeroVelocity => factors::ZERO_VELOCITY,
+    }
 }
 
 /// χ² per residual with a bar around 1.

@@ -27,6 +27,7 @@ use self::chain::{ChainModel, ChainPose};
 use self::layout::lay_out;
 use self::overlay::LegendLine;
 use self::world::{RunView, Trajectories, WorldBuilder, WorldOptions, framing_points_m, ground_height_m};
+use super::help::terms::{Term, window};
 use super::{PanelContext, slide};
 use crate::camera::CameraModel;
 use crate::sensors::Rig;
@@ -48,6 +49,8 @@ const VEHICLE_DISTANCE_RATIO: f64 = 0.3;
 const ROTATION_PER_POINT_RAD: f64 = 0.008;
 /// Width of the table of the chain's links in points.
 const TABLE_WIDTH: f32 = 256.0;
+/// Width of the legend that explains itself to a pointer, in points.
+const LEGEND_WIDTH: f32 = 220.0;
 /// Height of the axes and the scale below the legend in points.
 const GIZMO_ROOM: f32 = 105.0;
 /// Smallest panel size with a close-up.
@@ -206,6 +209,8 @@ impl ScenePanel {
         let painter = ui.painter_at(area);
         overlay::labels(&painter, area, scale, &drawing.labels, theme.plot_background);
         overlay::legend(&painter, area, theme, &legend_lines(&views, theme), builder.height_range_m);
+        let legend = Rect::from_min_size(area.min, vec2(LEGEND_WIDTH.min(area.width()), key));
+        explain(ui, legend, "scene legend", window::SCENE_LEGEND);
         overlay::scale_bar(&painter, area, scale, theme, &view, &format!(", grid {spacing_m} m"));
         // In a low panel the legend covers the place of the axes.
         if area.height() > key + GIZMO_ROOM {
@@ -246,9 +251,22 @@ impl ScenePanel {
         painter.text(at, egui::Align2::LEFT_CENTER, text, super::theme::label_font(), theme.text_strong);
         let table = Rect::from_min_max(view_rect.left_bottom(), rect.max);
         overlay::chain_table(&painter, table, theme, chain);
+        let (mut values, mut error) = (table, table);
+        if chain.camera_error.is_some() {
+            values.max.y -= overlay::LINE_HEIGHT;
+            error.min.y = values.max.y;
+            explain(ui, error, "chain error", window::CHAIN_ERROR);
+        }
+        explain(ui, values, "chain values", window::CHAIN_ROW);
+        explain(ui, title, "chain title", window::CHAIN_FRAMES);
         let outline = egui::Stroke::new(1.0, theme.outline);
         painter.rect_stroke(rect, 0.0, outline, egui::StrokeKind::Inside);
     }
+}
+
+/// Explains what is painted in a rectangle to a pointer over it.
+fn explain(ui: &Ui, rect: Rect, name: &str, term: Term) {
+    ui.interact(rect, ui.scope_id().with(name), Sense::hover()).on_hover_text(term.meaning);
 }
 
 /// The runs in order, then the ground truth.

@@ -4,6 +4,7 @@ use egui::{Button, ComboBox, RichText, Ui, vec2};
 
 use super::pace::Reading;
 use crate::gui::PanelContext;
+use crate::gui::help::terms::window;
 use crate::gui::units::{fixed, seconds};
 use crate::session::{Command, PlaybackSpeed, RunRecord};
 
@@ -90,14 +91,17 @@ pub(crate) fn toggled_loop(ctx: &PanelContext<'_>) -> Command {
 /// The time at the cursor, the length of the log, and the index of the frame.
 fn time_ui(ui: &mut Ui, ctx: &PanelContext<'_>) {
     let theme = ctx.theme;
-    ui.label(RichText::new(format!("{} s", seconds(ctx.cursor_ns))).monospace().size(14.0).color(theme.text_strong));
+    let cursor = RichText::new(format!("{} s", seconds(ctx.cursor_ns))).monospace().size(14.0);
+    ui.label(cursor.color(theme.text_strong)).on_hover_text(window::CURSOR.meaning);
     ui.add_space(5.0);
-    ui.label(RichText::new(format!("of {} s", seconds(ctx.recording.duration_ns))).monospace().color(theme.text_weak));
+    let duration = RichText::new(format!("of {} s", seconds(ctx.recording.duration_ns))).monospace();
+    ui.label(duration.color(theme.text_weak)).on_hover_text(window::DURATION.meaning);
     let run = ctx.recording.runs.get(ctx.selection.run.min(ctx.recording.runs.len().saturating_sub(1)));
     if let Some(step) = run.and_then(|run| run.step_at(ctx.cursor_ns)) {
         ui.add_space(8.0);
-        ui.label(RichText::new("frame").color(theme.text_weak));
-        ui.label(RichText::new(step.report.frame_index.to_string()).monospace().color(theme.text_strong));
+        ui.label(RichText::new("frame").color(theme.text_weak)).on_hover_text(window::FRAME.meaning);
+        let number = RichText::new(step.report.frame_index.to_string()).monospace().color(theme.text_strong);
+        ui.label(number).on_hover_text(window::FRAME.meaning);
     }
     if ctx.playback.solver.is_some()
         && let Some(run) = run
@@ -125,7 +129,8 @@ fn solver_ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord) {
     if let Some(iteration) = trace.shown().and_then(|state| state.report.iterations.last()) {
         let (before, after) = (fixed(iteration.cost_before, 2), fixed(iteration.cost_after, 2));
         let taken = if iteration.accepted { "" } else { ", rejected" };
-        ui.label(RichText::new(format!("cost {before} → {after}{taken}")).monospace().color(theme.text));
+        let cost = RichText::new(format!("cost {before} → {after}{taken}")).monospace().color(theme.text);
+        ui.label(cost).on_hover_text(window::COST.meaning);
     }
 }
 
