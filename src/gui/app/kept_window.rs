@@ -1,6 +1,6 @@
 //! Size and place of the window and the layout of its panels, kept for the next start.
 
-use egui::{Ui, ViewportBuilder, ViewportInfo, pos2, vec2};
+use egui::{Ui, ViewportBuilder, ViewportCommand, ViewportInfo, pos2, vec2};
 use serde::{Deserialize, Serialize};
 
 use super::App;
@@ -10,6 +10,8 @@ use crate::gui::window::NoticeLevel;
 const FIRST_SIZE: [f32; 2] = [1600.0, 900.0];
 /// Minimum size in logical pixels.
 const MIN_SIZE: [f32; 2] = [640.0, 400.0];
+/// Number of frames after which a window is shown with its frame.
+const SHOWN_FRAMES: u32 = 4;
 /// Seconds after which a change is stored.
 const STORED_AFTER_S: f64 = 1.0;
 
@@ -138,16 +140,36 @@ pub(super) fn move_inside_screen(window: &winit::window::Window) {
 pub(super) struct WindowKeeper {
     kept: KeptWindow,
     changed_s: Option<f64>,
+    /// Whether the window is to be maximized when it is shown.
+    maximizes: bool,
+    /// Number of frames in which the window was shown, until it has its place.
+    shown: u32,
 }
 
 impl WindowKeeper {
     /// Starts with what was stored.
     pub(super) fn new(kept: KeptWindow) -> Self {
-        Self { kept, changed_s: None }
+        Self { maximizes: kept.place.maximized, kept, changed_s: None, shown: 0 }
     }
 }
 
 impl App {
+    /// Gives the window its place once it is shown: before, X11 ignores the wish to be maximized, and the size of the
+    /// frame is not known.
+    pub(super) fn place_window(&mut self, ui: &Ui, window: &winit::window::Window) {
+        if self.keeper.shown > SHOWN_FRAMES {
+            return;
+        }
+        self.keeper.shown += 1;
+        if self.keeper.shown <= SHOWN_FRAMES {
+            ui.request_repaint();
+        } else if self.keeper.maximizes {
+            ui.send_viewport_cmd(ViewportCommand::Maximized(true));
+        } else {
+            move_inside_screen(window);
+        }
+    }
+
     /// Reads size, place and layout, and stores them some time after a change.
     pub(super) fn keep_window(&mut self, ui: &Ui) {
         let scale = ui.zoom_factor();

@@ -318,8 +318,11 @@ impl App {
 }
 
 impl eframe::App for App {
-    fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
+    fn ui(&mut self, ui: &mut Ui, frame: &mut eframe::Frame) {
         Self::ui(self, ui);
+        if let Some(window) = frame.winit_window() {
+            self.place_window(ui, window);
+        }
     }
 
     fn on_exit(&mut self) {
