@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use egui::{Align2, Color32, FontFamily, FontId, Pos2, Rect, Stroke, StrokeKind, Ui, pos2, vec2};
+use egui::{Align2, Color32, Pos2, Rect, Stroke, StrokeKind, Ui, pos2, vec2};
 
 use super::ParameterCurves;
 use super::model::{CalibrationHistory, ConvertedHistory, ParameterState};
@@ -20,6 +20,8 @@ use crate::gui::units::{Shown, fixed};
 
 /// Height of the state strip at the bottom of a plot.
 const STRIP_HEIGHT: f32 = 3.0;
+/// Width beside the error that the values of the axis need.
+const TICK_WIDTH: f32 = 46.0;
 /// Height of the line with name and value.
 const TITLE_HEIGHT: f32 = 15.0;
 
@@ -214,8 +216,11 @@ pub(super) fn cell_ui(
         let far = error.abs() > 3.0 * sigma;
         let place = plot.right_bottom() + vec2(-3.0, -STRIP_HEIGHT - 1.0);
         let color = if far { theme.error } else { theme.text_weak };
-        let text = format!("Δ {}", error_text(shown, error, sigma));
-        boxed_text(&inner, &theme, place, Align2::RIGHT_BOTTOM, &text, color);
+        let room = plot.width() - TICK_WIDTH;
+        let texts = [error_text(shown, error, sigma), signed(shown, error, sigma)].map(|text| format!("Δ {text}"));
+        let width = |text: &String| painter.layout_no_wrap(text.clone(), theme::label_font(), color).size().x;
+        let text = texts.iter().find(|text| width(text) <= room).unwrap_or(&texts[1]);
+        boxed_text(&inner, &theme, place, Align2::RIGHT_BOTTOM, text, color);
     }
 
     let mut text = shown_value
@@ -239,11 +244,16 @@ pub(super) fn cell_ui(
     });
 }
 
+/// The signed error against the ground truth.
+fn signed(shown: Shown, error: f64, sigma: f64) -> String {
+    let value = shown.value(error, sigma);
+    if value.starts_with('-') { value } else { format!("+{value}") }
+}
+
 /// The signed error against the ground truth, also in standard deviations.
 fn error_text(shown: Shown, error: f64, sigma: f64) -> String {
     let times = error.abs() / sigma;
-    let value = shown.value(error, sigma);
-    let text = if value.starts_with('-') { value } else { format!("+{value}") };
+    let text = signed(shown, error, sigma);
     if times.is_finite() { format!("{text} ({times:.1}σ)") } else { text }
 }
 
@@ -287,7 +297,7 @@ fn title(
     let end = painter.text(rect.left_top(), Align2::LEFT_TOP, name, theme::label_font(), name_color).right();
     let Some((value, sigma)) = value else { return };
     let color = if state == ParameterState::Informed { theme.text_strong } else { theme.text_weak };
-    let font = FontId::new(10.5, FontFamily::Monospace);
+    let font = theme::number_font();
     let with_sigma = format!("{} ±{}", fixed_value(shown, value, sigma), shown.sigma(sigma));
     let texts = [with_sigma, shown.value(value, sigma)];
     for text in texts.into_iter().skip(usize::from(!sigma.is_finite())) {
@@ -307,7 +317,7 @@ fn fixed_value(shown: Shown, value: f64, sigma: f64) -> String {
 
 /// Text with a background, legible over curves.
 fn boxed_text(painter: &egui::Painter, theme: &theme::Theme, place: Pos2, align: Align2, text: &str, color: Color32) {
-    let galley = painter.layout_no_wrap(text.to_owned(), FontId::new(9.5, FontFamily::Proportional), color);
+    let galley = painter.layout_no_wrap(text.to_owned(), theme::label_font(), color);
     let rect = align.anchor_size(place, galley.size());
     painter.rect_filled(rect.expand2(vec2(2.0, 0.0)), 2.0, theme.plot_background.gamma_multiply(0.85));
     painter.galley(rect.min, galley, color);

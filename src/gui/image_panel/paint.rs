@@ -231,7 +231,7 @@ impl LegendPen<'_> {
     }
 
     fn color_bar(&mut self) {
-        const WIDTH: f32 = 84.0;
+        const WIDTH: f32 = 96.0;
         let bar = Rect::from_min_size(self.at - vec2(0.0, 7.0), vec2(WIDTH, 14.0));
         const STEPS: u16 = 28;
         for step in 0..STEPS {
@@ -249,7 +249,7 @@ impl LegendPen<'_> {
             };
             let at = pos2(bar.left() + WIDTH * fraction + inset, bar.center().y);
             let ink = Theme::text_on(age_color(age));
-            self.painter.text(at, align, age.to_string(), egui::FontId::proportional(9.5), ink);
+            self.painter.text(at, align, age.to_string(), theme::label_font(), ink);
         }
         self.at.x = bar.right() + 4.0;
     }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use egui::epaint::{Mesh, TextShape};
-use egui::{Align2, Color32, FontFamily, FontId, Painter, Rect, Shape, Stroke, StrokeKind, Ui, pos2, vec2};
+use egui::{Align2, Color32, Painter, Rect, Shape, Stroke, StrokeKind, Ui, pos2, vec2};
 
 use super::model::{Axis, JacobianModel, Strip};
 use super::rect_of;
@@ -12,7 +12,7 @@ use crate::gui::theme::{Theme, ThemeName, label_font};
 use crate::session::StepRecord;
 
 /// Minimum width in points of a row or column with a name.
-const MIN_NAMED_WIDTH: f32 = 9.0;
+const MIN_NAMED_WIDTH: f32 = 11.0;
 
 /// The blocks as triangles, cached while step, rectangle and colours stay the same.
 #[derive(Debug, Default)]
@@ -127,7 +127,7 @@ fn row_names(painter: &Painter, theme: &Theme, left: Rect, place: Rect, rows: &A
 }
 
 fn column_names(painter: &Painter, theme: &Theme, top: Rect, place: Rect, columns: &Axis, selected: Option<usize>) {
-    let small = FontId::new(10.5, FontFamily::Proportional);
+    let small = label_font();
     for group in &columns.groups {
         let seen = span(place.left(), place.width(), group).intersection(top.x_range());
         if seen.span() > 0.0 {

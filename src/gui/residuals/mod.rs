@@ -5,8 +5,10 @@ mod histogram;
 
 use std::sync::Arc;
 
+use egui::text::{LayoutJob, TextFormat};
 use egui::{
-    Align2, FontFamily, FontId, Grid, Rect, RichText, Role, ScrollArea, Sense, Stroke, Ui, WidgetInfo, pos2, vec2,
+    Align2, Grid, Label, Rect, RichText, Role, ScrollArea, Sense, Stroke, TextStyle, TextWrapMode, Ui, WidgetInfo,
+    pos2, vec2,
 };
 
 use super::PanelContext;
@@ -17,7 +19,7 @@ use super::plot::{
     Clicks, Curve, PlotArea, decimals_of_step, navigate, paint_cursor, paint_curve, paint_ground, paint_value_grid,
     ticks, visible_range,
 };
-use super::theme::{CURVE_WIDTH, Theme, label_font};
+use super::theme::{CURVE_WIDTH, Theme, label_font, number_font};
 use super::units::{fixed, significant};
 use crate::estimator::{FactorKind, ResidualSummary, StepReport};
 use crate::gui::residuals::histogram::ResidualHistogram;
@@ -108,11 +110,14 @@ pub(crate) fn rms_px(report: &StepReport) -> f64 {
 /// Summary of the step in one line.
 fn summary_ui(ui: &mut Ui, theme: &Theme, report: &StepReport, histogram: &ResidualHistogram) {
     ui.horizontal_wrapped(|ui| {
-        ui.spacing_mut().item_spacing = vec2(4.0, 2.0);
+        ui.spacing_mut().item_spacing = vec2(12.0, 2.0);
         let mut pair = |name: &str, value: String, hover: &str| {
-            ui.label(RichText::new(name).color(theme.text_weak)).on_hover_text(hover);
-            ui.label(RichText::new(value).monospace().color(theme.text_strong)).on_hover_text(hover);
-            ui.add_space(6.0);
+            // Name and value stay on one line.
+            let mut job = LayoutJob::default();
+            let (body, monospace) = (TextStyle::Body.resolve(ui.style()), TextStyle::Monospace.resolve(ui.style()));
+            job.append(&format!("{name} "), 0.0, TextFormat::simple(body, theme.text_weak));
+            job.append(&value, 0.0, TextFormat::simple(monospace, theme.text_strong));
+            ui.add(Label::new(job).wrap_mode(TextWrapMode::Extend)).on_hover_text(hover);
         };
         let before = fixed(report.reprojection_rms_before_px, 2);
         pair(
@@ -143,10 +148,10 @@ fn histogram_ui(ui: &mut Ui, theme: &Theme, histogram: &ResidualHistogram, heigh
     let (_, rect) = ui.allocate_space(vec2(ui.available_width(), height));
     let painter = ui.painter_at(rect);
     paint_ground(&painter, theme, rect);
-    let plot = Rect::from_min_max(rect.min + vec2(2.0, 4.0), rect.max - vec2(2.0, 14.0));
+    let plot = Rect::from_min_max(rect.min + vec2(2.0, 4.0), rect.max - vec2(2.0, 15.0));
     let reach = histogram.reach_px;
     let x = |value: f64| plot.center().x + (value / reach) as f32 * plot.width() / 2.0;
-    let font = FontId::new(9.0, FontFamily::Monospace);
+    let font = number_font();
     let (marks, step) = ticks(-reach, reach, (plot.width() / 60.0) as usize);
     for mark in marks {
         painter.vline(x(mark), plot.y_range(), Stroke::new(1.0, theme.grid));

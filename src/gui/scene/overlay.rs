@@ -1,6 +1,6 @@
 //! Texts and legends over the scene.
 
-use egui::{Align2, Color32, FontId, Galley, Painter, Pos2, Rect, Shape, Stroke, Vec2, pos2, vec2};
+use egui::{Align2, Color32, Galley, Painter, Pos2, Rect, Shape, Stroke, Vec2, pos2, vec2};
 use std::sync::Arc;
 
 use super::camera::{View, round_length};
@@ -146,10 +146,10 @@ pub(super) fn chain_table_height(chain: &ChainModel) -> f32 {
 
 /// The values of the links in degrees and millimetres.
 pub(super) fn chain_table(painter: &Painter, rect: Rect, theme: &Theme, chain: &ChainModel) {
-    let font = FontId::monospace(10.5);
+    let font = theme::number_font();
     let mut y = rect.top() + 2.0;
     // Right edges of the columns of numbers, as fractions of the width.
-    const EDGES: [f32; 5] = [0.3, 0.49, 0.65, 0.81, 1.0];
+    const EDGES: [f32; 5] = [0.31, 0.51, 0.67, 0.82, 1.0];
     let inner = rect.shrink2(vec2(8.0, 0.0));
     let mut row = |cells: [String; 6], color: Color32| {
         let [name, numbers @ ..] = cells;

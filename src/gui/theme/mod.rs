@@ -82,6 +82,8 @@ pub const MAX_RUNS: usize = RUN_DASHES.len();
 pub const CORNER_RADIUS: u8 = 3;
 /// Space around the content of a panel in points.
 pub const PANEL_MARGIN: i8 = 6;
+/// Size of the smallest text in points; a text of a plot is not smaller, whatever its room.
+pub const SMALLEST_TEXT: f32 = 11.0;
 /// Height of one line of a table or list in points.
 pub const ROW_HEIGHT: f32 = 16.0;
 /// Height of a lane of the timeline in points.

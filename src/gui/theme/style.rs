@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use egui::{Color32, CornerRadius, FontDefinitions, FontFamily, FontId, Frame, Shadow, Stroke, TextStyle, vec2};
 
-use super::{CORNER_RADIUS, Theme, mix};
+use super::{CORNER_RADIUS, SMALLEST_TEXT, Theme, mix};
 
 impl Theme {
     /// Applies the theme to egui: colours, fonts, spacing.
@@ -80,7 +80,7 @@ fn fonts() -> FontDefinitions {
 fn text_styles() -> BTreeMap<TextStyle, FontId> {
     use FontFamily::{Monospace, Proportional};
     [
-        (TextStyle::Small, FontId::new(10.5, Proportional)),
+        (TextStyle::Small, FontId::new(SMALLEST_TEXT, Proportional)),
         (TextStyle::Body, FontId::new(12.5, Proportional)),
         (TextStyle::Button, FontId::new(12.5, Proportional)),
         (TextStyle::Heading, FontId::new(15.0, Proportional)),
@@ -92,12 +92,12 @@ fn text_styles() -> BTreeMap<TextStyle, FontId> {
 
 /// Font of numbers in plots and tables.
 pub fn number_font() -> FontId {
-    FontId::new(11.0, FontFamily::Monospace)
+    FontId::new(SMALLEST_TEXT, FontFamily::Monospace)
 }
 
 /// Font of small labels in plots.
 pub fn label_font() -> FontId {
-    FontId::new(11.0, FontFamily::Proportional)
+    FontId::new(SMALLEST_TEXT, FontFamily::Proportional)
 }
 
 /// The frame of dialogs, notices and menus.
