@@ -4,14 +4,17 @@ use std::sync::Arc;
 
 use egui::{RichText, Ui};
 
+use super::verdict::least_observable;
+use super::{fact_ui, section_ui};
 use crate::geometry::seconds_from_ns;
 use crate::gui::PanelContext;
 use crate::gui::step_work::{REPAINT, StepWork};
+use crate::gui::theme::ROW_HEIGHT;
 use crate::observability::laboratory::{Advice, Situation, advise};
 use crate::observability::steps_lost;
 use crate::session::{RunRecord, StepRecord};
 
-/// Number of alternatives shown below the best motion.
+/// Number of alternatives to the best motion.
 const OTHERS_SHOWN: usize = 3;
 
 /// Seconds without a move of the cursor before advice is computed in the background.
@@ -22,7 +25,7 @@ const MIN_PERIOD_S: f64 = 1.0;
 /// The results for one step.
 #[derive(Debug)]
 struct StepAdvice {
-    /// Text: since when the least observable direction has been unobservable.
+    /// Since when the least observable direction has been unobservable: `weak since 5.55 s`.
     since: Option<String>,
     /// The suggested excitation.
     advice: Option<Advice>,
@@ -41,19 +44,17 @@ pub(super) struct AdviceUi {
 }
 
 impl AdviceUi {
-    /// Draws since when the least observable direction has been unobservable, and the suggested excitation.
+    /// Computes since when the least observable direction has been unobservable, and the suggested excitation.
     ///
     /// Both are computed while the caller waits, or in the background: then for the step at which the cursor rests, and
-    /// once per second while it moves. The results of an earlier step stay until then, with its stamp. Without `room`
-    /// only the best motion is shown, the alternatives in a tooltip.
-    pub(super) fn ui(
+    /// once per second while it moves. The results of an earlier step stay until then.
+    pub(super) fn update(
         &mut self,
-        ui: &mut Ui,
+        ui: &Ui,
         ctx: &PanelContext<'_>,
         run: &RunRecord,
         step: &Arc<StepRecord>,
         in_background: bool,
-        room: bool,
     ) {
         if self.run != Some(run.id) {
             *self = Self { run: Some(run.id), ..Self::default() };
@@ -72,10 +73,18 @@ impl AdviceUi {
                 ui.ctx().request_repaint_after(REPAINT);
             }
         }
+    }
+
+    /// Since when the least observable direction of the step has been unobservable, once it is computed.
+    pub(super) fn since(&self, step: &Arc<StepRecord>) -> Option<&str> {
+        let (of, results) = self.results.last()?;
+        results.filter(|_| Arc::ptr_eq(of, step))?.since.as_deref()
+    }
+
+    /// Draws the suggested excitation, with the stamp of its step where that is not the cursor's.
+    pub(super) fn ui(&self, ui: &mut Ui, ctx: &PanelContext<'_>, step: &Arc<StepRecord>) {
         let Some((of, results)) = self.results.last() else {
-            if step.rank.is_some() {
-                ui.label(RichText::new("Linearizing candidate motions…").color(ctx.theme.text_weak));
-            }
+            ui.label(RichText::new("Linearizing candidate motions…").color(ctx.theme.text_weak));
             return;
         };
         let time = if Arc::ptr_eq(of, step) {
@@ -83,12 +92,21 @@ impl AdviceUi {
         } else {
             format!(" at {:.2} s", seconds_from_ns(of.report.stamp_ns))
         };
-        if let Some(text) = results.and_then(|results| results.since.as_ref()) {
-            ui.add(egui::Label::new(RichText::new(text).color(ctx.theme.text)).truncate()).on_hover_text(text);
-        }
         if of.rank.is_some() {
-            advice_ui(ui, ctx, results.and_then(|results| results.advice.as_ref()), &time, room);
+            advice_ui(ui, ctx, results.and_then(|results| results.advice.as_ref()), &time);
         }
+    }
+
+    /// Draws the alternatives to the suggested excitation.
+    pub(super) fn alternatives_ui(&self, ui: &mut Ui, ctx: &PanelContext<'_>) {
+        let advice = self.results.last().and_then(|(_, results)| results?.advice.as_ref());
+        let lines = advice.map(alternatives).filter(|lines| !lines.is_empty());
+        let Some(lines) = lines else { return };
+        section_ui(ui, ctx.theme, ctx.presentation, "Other excitations", ROW_HEIGHT * lines.len() as f32, |ui| {
+            for text in lines {
+                ui.add(egui::Label::new(RichText::new(text).small().color(ctx.theme.text)).wrap());
+            }
+        });
     }
 
     /// Whether a computation in the background is due.
@@ -113,34 +131,38 @@ impl AdviceUi {
 }
 
 /// The suggested excitation; `time` is the stamp it was computed for, where that is not the cursor's.
-fn advice_ui(ui: &mut Ui, ctx: &PanelContext<'_>, advice: Option<&Advice>, time: &str, room: bool) {
+fn advice_ui(ui: &mut Ui, ctx: &PanelContext<'_>, advice: Option<&Advice>, time: &str) {
     let Some(advice) = advice else {
         ui.label(RichText::new("No candidate motion constrains this calibration further").color(ctx.theme.text_weak));
         return;
     };
-    let sentence = format!("Suggested excitation{time}: {}", advice.sentence().unwrap_or_default());
-    let response = ui.add(egui::Label::new(RichText::new(sentence).color(ctx.theme.text_strong)).wrap());
-    let others: Vec<String> =
-        advice.candidates.iter().skip(1).take(OTHERS_SHOWN).map(|candidate| advice.line(candidate)).collect();
-    let listed = if room { String::new() } else { format!("\n{}", others.join("\n")) };
+    let response = fact_ui(
+        ui,
+        ctx.theme,
+        &format!("Suggested excitation{time}: "),
+        &advice.sentence().unwrap_or_default(),
+        ctx.theme.text_strong,
+    );
     response.on_hover_text(format!(
         "Predicted σ of the least observable direction after {:.0} s of a motion of vehicle and joints, linearized at \
-         the estimate of this step; smallest σ first{listed}",
-        advice.duration_s
+         the estimate of this step; smallest σ first\n{}",
+        advice.duration_s,
+        alternatives(advice).join("\n")
     ));
-    for text in others.into_iter().filter(|_| room) {
-        ui.add(egui::Label::new(RichText::new(text).small().color(ctx.theme.text_weak)).truncate());
-    }
+}
+
+/// The motions after the best one, one line each.
+fn alternatives(advice: &Advice) -> Vec<String> {
+    advice.candidates.iter().skip(1).take(OTHERS_SHOWN).map(|candidate| advice.line(candidate)).collect()
 }
 
 /// Since when the least observable direction, which the verdict names, has been null or weak without interruption;
 /// `before` are the run's earlier steps.
 fn since(before: &[Arc<StepRecord>], step: &StepRecord) -> Option<String> {
     let rank = step.rank.as_ref()?;
-    let weak = rank.directions.iter().find(|direction| !direction.structural);
-    let direction = weak.or_else(|| rank.directions.first())?;
+    let direction = least_observable(rank)?;
     let lost = steps_lost(&rank.parameters, &direction.weights, before.iter().rev().map(|step| step.rank.as_ref()));
     let first_ns = before.get(before.len() - lost).map_or(step.report.stamp_ns, |first| first.report.stamp_ns);
-    let kind = if direction.structural { "Unobservable" } else { "Weak" };
-    Some(format!("{kind} since {:.2} s without interruption", seconds_from_ns(first_ns)))
+    let kind = if direction.structural { "unobservable" } else { "weak" };
+    Some(format!("{kind} since {:.2} s", seconds_from_ns(first_ns)))
 }

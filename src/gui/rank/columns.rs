@@ -1,7 +1,7 @@
 //! Several rank reports side by side: causes of lost rank, spectra on one axis, and null and weak directions in one
 //! heat map with a common order of rows.
 
-use egui::{Align2, Color32, FontFamily, FontId, Grid, Label, Rect, RichText, Role, Stroke, Ui, WidgetInfo};
+use egui::{Align2, Color32, Grid, Label, Rect, RichText, Role, Stroke, Ui, WidgetInfo};
 use egui::{StrokeKind, pos2, vec2};
 
 use super::spectrum;
@@ -27,10 +27,10 @@ const NAMES: f32 = 128.0;
 /// Gap between two reports in points.
 const GAP: f32 = 10.0;
 /// Maximum width of a direction's column.
-const MAX_COLUMN_WIDTH: f32 = 42.0;
+const MAX_COLUMN_WIDTH: f32 = 46.0;
 /// Minimum width of a column with signed numbers.
-const MIN_COLUMN_WIDTH: f32 = 30.0;
-const MIN_ROW_HEIGHT: f32 = 11.0;
+const MIN_COLUMN_WIDTH: f32 = 36.0;
+const MIN_ROW_HEIGHT: f32 = 13.0;
 const MAX_ROW_HEIGHT: f32 = 20.0;
 
 /// Draws the reports side by side.
@@ -159,7 +159,7 @@ fn heat_map_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, columns: &[RankColumn<'_
             let (mark, color) = if direction.structural { ("null", theme.error) } else { ("weak", theme.warn) };
             let mark = if pitch < MIN_COLUMN_WIDTH - 6.0 { &mark[..1] } else { mark };
             let at = pos2(left + (place as f32 + 0.5) * pitch, whole.top());
-            ui.painter().text(at, Align2::CENTER_TOP, mark, FontId::new(10.0, FontFamily::Proportional), color);
+            ui.painter().text(at, Align2::CENTER_TOP, mark, theme::label_font(), color);
         }
         for (row, parameter) in parameters.iter().enumerate() {
             let Some(entry) = column.rank.parameters.iter().position(|known| known == parameter) else { continue };
@@ -198,7 +198,6 @@ fn cell_ui(ui: &Ui, theme: &Theme, direction: &CalibrationDirection, entry: usiz
     let ground = theme.diverging(weight);
     let painter = ui.painter();
     painter.rect_filled(cell, 1.0, ground);
-    let font = FontId::new((cell.height() - 1.5).clamp(7.0, 11.0), FontFamily::Monospace);
     let text = if weight.abs() >= 0.05 && cell.width() >= MIN_COLUMN_WIDTH {
         format!("{weight:+.2}")
     } else if weight.abs() >= 0.2 {
@@ -206,7 +205,7 @@ fn cell_ui(ui: &Ui, theme: &Theme, direction: &CalibrationDirection, entry: usiz
     } else {
         return;
     };
-    painter.text(cell.center(), Align2::CENTER_CENTER, text, font, Theme::text_on(ground));
+    painter.text(cell.center(), Align2::CENTER_CENTER, text, theme::number_font(), Theme::text_on(ground));
 }
 
 fn name_ui(ui: &Ui, ctx: &mut PanelContext<'_>, parameter: ParameterId, line: Rect) {

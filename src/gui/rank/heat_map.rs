@@ -1,78 +1,145 @@
 //! Null and weak directions by parameter name: a heat map with the signed weights as text.
 
 use egui::epaint::TextShape;
-use egui::{Align2, FontFamily, FontId, Rect, RichText, Role, Sense, Stroke, StrokeKind, Ui, WidgetInfo, pos2, vec2};
+use egui::{Align2, Rect, RichText, Role, Sense, Stroke, StrokeKind, Ui, WidgetInfo, pos2, vec2};
 
 use super::verdict::parameters_of;
 use crate::gimbal::ParameterId;
 use crate::gui::PanelContext;
 use crate::gui::convergence::names::{meaning_of, part_of};
 use crate::gui::theme::{self, Theme};
-use crate::gui::units::{counted, significant};
+use crate::gui::units::{counted, fixed, significant};
 use crate::observability::{CalibrationDirection, RankReport};
 
-const NAME_WIDTH: f32 = 62.0;
 const HEADER_HEIGHT: f32 = 28.0;
 /// Height of the header of narrow columns, whose numbers are vertical.
-const UPRIGHT_HEADER_HEIGHT: f32 = 40.0;
-const MAX_ROW_HEIGHT: f32 = 26.0;
+const UPRIGHT_HEADER_HEIGHT: f32 = 46.0;
+const MAX_ROW_HEIGHT: f32 = 22.0;
 const MIN_ROW_HEIGHT: f32 = 12.0;
+/// Height of the line about rows and columns that are not shown.
+const NOTE_HEIGHT: f32 = 16.0;
+/// Number of rows that are shown in a panel of any height.
+const MIN_ROWS: usize = 3;
 /// Minimum width of a column with signed numbers.
-const NUMBER_WIDTH: f32 = 30.0;
+const NUMBER_WIDTH: f32 = 37.0;
 /// Minimum width of a column whose singular value fits beside its neighbours'.
-const HEAD_WIDTH: f32 = 40.0;
+const HEAD_WIDTH: f32 = 44.0;
 const MAX_COLUMN_WIDTH: f32 = 84.0;
 const MIN_COLUMN_WIDTH: f32 = 15.0;
-/// Rows with smaller weights may be omitted when room is short.
-const MIN_SHOWN_WEIGHT: f64 = 0.1;
+/// Smaller weights have no text in their cell.
+const MIN_SHOWN_WEIGHT: f64 = 0.05;
+/// Range of the width of the names.
+const NAME_WIDTHS: std::ops::RangeInclusive<f32> = 40.0..=130.0;
 
-/// Draws the heat map in about `height` points; it takes more if necessary.
-pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, rank: &RankReport, height: f32) {
+/// Draws the heat map in the first of the `heights`, in points, if all parameters fit into it, else in the second with
+/// the parameters of the largest weights.
+pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, rank: &RankReport, heights: [f32; 2]) {
     let theme = *ctx.theme;
     if rank.directions.is_empty() {
         ui.label(RichText::new("No null or weak direction").color(theme.text_weak));
         return;
     }
+    let names = ctx.names();
+    let name_width = |parameter: &ParameterId| {
+        ui.painter().layout_no_wrap(names.name(*parameter), theme::label_font(), theme.text).size().x
+    };
+    let widest = rank.parameters.iter().map(name_width).fold(0.0, f32::max);
+    let name_width = (widest + 8.0).clamp(*NAME_WIDTHS.start(), *NAME_WIDTHS.end());
     let width = ui.available_width();
-    let room = (width - NAME_WIDTH).max(MIN_COLUMN_WIDTH);
+    let room = (width - name_width).max(MIN_COLUMN_WIDTH);
     let count = rank.directions.len().min((room / MIN_COLUMN_WIDTH) as usize).max(1);
     let pitch = (room / count as f32).min(MAX_COLUMN_WIDTH);
     let directions = &rank.directions[..count];
 
-    let mut rows: Vec<usize> = (0..rank.parameters.len()).collect();
-    rows.sort_by_key(|row| part_of(rank.parameters[*row]));
-    let all = rows.len();
     let header_height = if pitch >= HEAD_WIDTH { HEADER_HEIGHT } else { UPRIGHT_HEADER_HEIGHT };
-    if (height - header_height) / (rows.len() as f32) < MIN_ROW_HEIGHT {
-        rows.retain(|row| {
-            let weight = |direction: &CalibrationDirection| direction.weights.get(*row).copied().unwrap_or(0.0);
-            directions.iter().any(|direction| weight(direction).abs() >= MIN_SHOWN_WEIGHT)
-        });
-    }
-    let left_out = all - rows.len();
-    let row_height = ((height - header_height) / rows.len().max(1) as f32).clamp(MIN_ROW_HEIGHT, MAX_ROW_HEIGHT);
+    let Rows { rows, row_height, omitted } = Rows::of(rank, directions, heights.map(|height| height - header_height));
     let (_, rect) = ui.allocate_space(vec2(width, header_height + row_height * rows.len() as f32));
 
     for (column, direction) in directions.iter().enumerate() {
-        let left = rect.left() + NAME_WIDTH + column as f32 * pitch;
+        let left = rect.left() + name_width + column as f32 * pitch;
         let cell = Rect::from_min_size(pos2(left, rect.top()), vec2(pitch, header_height));
         header(ui, ctx, rank, direction, column, cell);
     }
     for (place, row) in rows.iter().enumerate() {
         let top = rect.top() + header_height + place as f32 * row_height;
-        let line = Rect::from_min_size(pos2(rect.left(), top), vec2(NAME_WIDTH + pitch * count as f32, row_height));
-        row_ui(ui, ctx, rank.parameters[*row], *row, directions, line, pitch);
+        let line = Rect::from_min_size(pos2(rect.left(), top), vec2(name_width + pitch * count as f32, row_height));
+        row_ui(ui, ctx, rank.parameters[*row], *row, directions, line, [name_width, pitch]);
     }
-    if left_out > 0 || count < rank.directions.len() {
-        let mut notes = Vec::new();
-        if left_out > 0 {
-            notes.push(format!("{} with |weight| < {MIN_SHOWN_WEIGHT}", counted(left_out, "parameter")));
-        }
-        if count < rank.directions.len() {
-            notes.push(counted(rank.directions.len() - count, "more observable direction"));
-        }
+    let mut notes = Vec::new();
+    if let Some(largest) = omitted {
+        let left_out = rank.parameters.len() - rows.len();
+        // Rounded up, so that it bounds all of them.
+        let bound = ((100.0 * largest).floor() + 1.0) / 100.0;
+        notes.push(format!("{} with |weight| < {}", counted(left_out, "parameter"), fixed(bound, 2)));
+    }
+    if count < rank.directions.len() {
+        notes.push(counted(rank.directions.len() - count, "more observable direction"));
+    }
+    if !notes.is_empty() {
         ui.label(RichText::new(format!("Not shown: {}", notes.join(", "))).small().color(theme.text_weak));
     }
+}
+
+/// The shown rows.
+struct Rows {
+    /// Indices of the parameters, in chain order.
+    rows: Vec<usize>,
+    row_height: f32,
+    /// Largest |weight| of the parameters that are not shown, `None` if all are.
+    omitted: Option<f64>,
+}
+
+impl Rows {
+    /// All rows where they fit into the first of the `heights`, or at least into the second; else those with the
+    /// largest weights that fit into the second.
+    fn of(rank: &RankReport, directions: &[CalibrationDirection], heights: [f32; 2]) -> Self {
+        let height_of =
+            |height: f32, count: usize| (height / count.max(1) as f32).clamp(MIN_ROW_HEIGHT, MAX_ROW_HEIGHT);
+        let all = rank.parameters.len();
+        let sorted = |mut rows: Vec<usize>| {
+            rows.sort_by_key(|row| part_of(rank.parameters[*row]));
+            rows
+        };
+        if MIN_ROW_HEIGHT * all as f32 <= heights[1] {
+            let rows = sorted((0..all).collect());
+            return Self { rows, row_height: height_of(heights[0], all), omitted: None };
+        }
+        let fitting = ((heights[1] - NOTE_HEIGHT) / MIN_ROW_HEIGHT) as usize;
+        let rows = sorted(largest_rows(all, directions, fitting.clamp(MIN_ROWS.min(all), all)));
+        let weight = |row: usize| {
+            let weights = directions.iter().map(|direction| weight_of(direction, row));
+            weights.fold(0.0, f64::max)
+        };
+        let omitted = (0..all).filter(|row| !rows.contains(row)).map(weight).reduce(f64::max);
+        let row_height = height_of(heights[1] - NOTE_HEIGHT, rows.len());
+        Self { rows, row_height, omitted }
+    }
+}
+
+fn weight_of(direction: &CalibrationDirection, row: usize) -> f64 {
+    direction.weights.get(row).copied().unwrap_or(0.0).abs()
+}
+
+/// At most `count` of `all` rows: the row with the largest weight in each direction, then the row with the second
+/// largest, and so on while weights are shown.
+fn largest_rows(all: usize, directions: &[CalibrationDirection], count: usize) -> Vec<usize> {
+    let by_weight: Vec<Vec<usize>> = directions
+        .iter()
+        .map(|direction| {
+            let mut rows: Vec<usize> = (0..all).filter(|row| weight_of(direction, *row) >= MIN_SHOWN_WEIGHT).collect();
+            rows.sort_by(|a, b| weight_of(direction, *b).total_cmp(&weight_of(direction, *a)));
+            rows
+        })
+        .collect();
+    let mut rows = Vec::new();
+    for place in 0..all {
+        for row in by_weight.iter().filter_map(|rows| rows.get(place)) {
+            if rows.len() < count && !rows.contains(row) {
+                rows.push(*row);
+            }
+        }
+    }
+    rows
 }
 
 /// Number and singular value of a direction.
@@ -89,10 +156,10 @@ fn header(
     let painter = ui.painter();
     let mark = if direction.structural { "null" } else { "weak" };
     let value = if direction.structural { "0".to_owned() } else { significant(direction.singular_value) };
-    let small = FontId::new(9.5, FontFamily::Monospace);
+    let small = theme::number_font();
     if cell.width() >= HEAD_WIDTH {
         let top = cell.center_top();
-        painter.text(top, Align2::CENTER_TOP, mark, FontId::new(10.0, FontFamily::Proportional), color);
+        painter.text(top, Align2::CENTER_TOP, mark, theme::label_font(), color);
         painter.text(top + vec2(0.0, 13.0), Align2::CENTER_TOP, value, small, theme.text_weak);
     } else {
         let galley = painter.layout_no_wrap(value, small, color);
@@ -115,7 +182,7 @@ fn row_ui(
     row: usize,
     directions: &[CalibrationDirection],
     line: Rect,
-    pitch: f32,
+    [name_width, pitch]: [f32; 2],
 ) {
     let theme = *ctx.theme;
     let name = ctx.names().name(parameter);
@@ -125,19 +192,18 @@ fn row_ui(
     painter.text(line.left_center(), Align2::LEFT_CENTER, &name, theme::label_font(), color);
     for (column, direction) in directions.iter().enumerate() {
         let weight = direction.weights.get(row).copied().unwrap_or(0.0);
-        let left = line.left() + NAME_WIDTH + column as f32 * pitch;
+        let left = line.left() + name_width + column as f32 * pitch;
         let cell = Rect::from_min_size(pos2(left, line.top()), vec2(pitch, line.height())).shrink(0.5);
         let ground = theme.diverging(weight);
         painter.rect_filled(cell, 1.0, ground);
-        if weight.abs() >= 0.05 && pitch >= NUMBER_WIDTH {
-            let font =
-                FontId::new((line.height() - 3.0).min(if pitch > 50.0 { 12.0 } else { 10.0 }), FontFamily::Monospace);
-            painter.text(cell.center(), Align2::CENTER_CENTER, format!("{weight:+.2}"), font, Theme::text_on(ground));
+        let text = if weight.abs() >= MIN_SHOWN_WEIGHT && pitch >= NUMBER_WIDTH {
+            format!("{weight:+.2}")
         } else if weight.abs() >= 0.2 {
-            let sign = if weight < 0.0 { "−" } else { "+" };
-            let font = FontId::new(10.0, FontFamily::Monospace);
-            painter.text(cell.center(), Align2::CENTER_CENTER, sign, font, Theme::text_on(ground));
-        }
+            if weight < 0.0 { "−" } else { "+" }.to_owned()
+        } else {
+            continue;
+        };
+        painter.text(cell.center(), Align2::CENTER_CENTER, text, theme::number_font(), Theme::text_on(ground));
     }
     let (sense, role) = ctx.presentation.clickable(Role::Label);
     let response = ui.interact(line, ui.unique_id().with(("row", &name)), sense);
@@ -153,4 +219,20 @@ fn row_ui(
         "{name}: {}\nWeights in the unit right singular vectors, columns scaled by 10° and 3 cm",
         meaning_of(parameter, &ctx.recording.rig)
     ));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_low_map_shows_the_largest_weights_of_every_direction() {
+        let direction =
+            |weights: &[f64]| CalibrationDirection { singular_value: 0.0, structural: true, weights: weights.to_vec() };
+        let directions = [direction(&[0.9, -0.4, 0.0, 0.1, 0.01]), direction(&[0.0, 0.3, -0.2, 0.8, 0.02])];
+        assert_eq!(largest_rows(5, &directions, 2), [0, 3]);
+        assert_eq!(largest_rows(5, &directions, 3), [0, 3, 1]);
+        // The last row has no weight that is shown.
+        assert_eq!(largest_rows(5, &directions, 5), [0, 3, 1, 2]);
+    }
 }

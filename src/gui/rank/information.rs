@@ -8,7 +8,7 @@ use crate::estimator::Motion;
 use crate::gimbal::ParameterNames;
 use crate::gui::PanelContext;
 use crate::gui::convergence::names::{meaning_of, part_of};
-use crate::gui::theme::Theme;
+use crate::gui::theme::{Theme, number_font};
 use crate::gui::units::fixed;
 use crate::observability::{InformationRate, information_rate};
 use crate::session::{RunRecord, StepRecord};
@@ -25,15 +25,8 @@ pub(super) struct InformationUi {
 }
 
 impl InformationUi {
-    /// Draws one line, and the table if it is open (initially with `room`).
-    pub(super) fn ui(
-        &mut self,
-        ui: &mut Ui,
-        ctx: &mut PanelContext<'_>,
-        run: &RunRecord,
-        step: &Arc<StepRecord>,
-        room: bool,
-    ) {
+    /// Draws one line, and the table if it is open.
+    pub(super) fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>, run: &RunRecord, step: &Arc<StepRecord>) {
         if !self.cached.as_ref().is_some_and(|(known, _)| Arc::ptr_eq(known, step)) {
             self.cached = Some((Arc::clone(step), rate_before(run, step)));
         }
@@ -43,12 +36,9 @@ impl InformationUi {
         let title = RichText::new(fitting(ui, &headlines)).color(ctx.theme.text);
         if ctx.presentation.is_figure() {
             ui.label(title);
-            if room {
-                table_ui(ui, ctx, rate, &joints);
-            }
             return;
         }
-        let header = CollapsingHeader::new(title).id_salt("information").default_open(room);
+        let header = CollapsingHeader::new(title).id_salt("information");
         let shown = header.show(ui, |ui| table_ui(ui, ctx, rate, &joints));
         shown.header_response.on_hover_text(&headlines[0]);
     }
@@ -137,7 +127,7 @@ fn table_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, rate: &InformationRate, joi
 fn number_ui(ui: &mut Ui, theme: &Theme, number: f64, ratio: f64) {
     let text = if number.abs() < MIN_SHOWN { "·".to_owned() } else { fixed(number, 2) };
     // Right-aligned, so that signs and decimal points are aligned.
-    let mut text = RichText::new(format!("{text:>5}")).monospace().size(10.5).color(theme.text_strong);
+    let mut text = RichText::new(format!("{text:>5}")).font(number_font()).color(theme.text_strong);
     if ratio.abs() >= 0.05 {
         let ground = theme.diverging(ratio);
         text = text.color(Theme::text_on(ground)).background_color(ground);

@@ -14,18 +14,21 @@ pub(super) use self::compare::ui as all_runs_ui;
 
 use std::sync::Arc;
 
-use egui::{RichText, ScrollArea, Sense, Ui, UiBuilder, vec2};
+use egui::text::{LayoutJob, TextFormat};
+use egui::{RichText, ScrollArea, TextStyle, Ui, UiBuilder, vec2};
 
 use self::advice::AdviceUi;
 use self::information::InformationUi;
 use self::slider::SliderUi;
-use self::verdict::Level;
-use super::PanelContext;
+use self::verdict::{Level, Verdict};
 use super::convergence::empty_ui;
 use super::follow::RunTables;
 use super::help::terms::window;
 use super::plot::{Clicks, Curve, PlotArea, navigate, paint_cursor, paint_ground, paint_steps, visible_range};
 use super::theme::{CURVE_WIDTH, RunStyle, Theme};
+use super::{PanelContext, Presentation};
+use crate::gimbal::ParameterNames;
+use crate::observability::RankReport;
 use crate::session::{RunRecord, StepRecord};
 
 /// Columns of the tables over time.
@@ -36,14 +39,20 @@ const PARAMETERS: usize = 2;
 /// Width in points of the lines about one run.
 const RUN_WIDTH: f32 = 480.0;
 
-/// Panel height in points from which the ranks over time are shown.
-const MIN_HEIGHT_WITH_TIME: f32 = 340.0;
+/// Size of the headline of the verdict in points.
+const HEADLINE: f32 = 13.5;
 
-/// Panel height in points from which alternatives to the best motion are shown.
-const MIN_HEIGHT_WITH_ALTERNATIVES: f32 = 300.0;
+/// Width in points from which the details are beside the heat map instead of below it.
+const MIN_WIDTH_WITH_DETAILS_BESIDE: f32 = 760.0;
 
-/// Panel height in points from which the table of the information gain is shown beside the heat map.
-const MIN_HEIGHT_WITH_INFORMATION: f32 = 1000.0;
+/// Height in points that the details below the heat map get before its rows grow.
+const DETAILS_HEIGHT: f32 = 210.0;
+
+/// Height of the ranks over time in points.
+const OVER_TIME_HEIGHT: f32 = 62.0;
+
+/// Height in points below the heat map in which its slider and the first heading stay visible.
+const HEAD_OF_DETAILS: f32 = 26.0;
 
 /// State of the rank panel.
 #[derive(Debug, Default)]
@@ -98,7 +107,7 @@ impl RankPanel {
         self.run_ui(ui, ctx, run, step, ui.available_height());
     }
 
-    /// One run.
+    /// One run: the answers and the heat map above the fold, details below or beside them.
     fn run_ui(
         &mut self,
         ui: &mut Ui,
@@ -107,41 +116,93 @@ impl RankPanel {
         step: &Arc<StepRecord>,
         height: f32,
     ) {
-        ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-            ui.spacing_mut().item_spacing.y = 3.0;
-            let top = ui.cursor().top();
-            verdict_ui(ui, ctx, step);
-            let Some(rank) = step.rank.as_ref().filter(|rank| !rank.parameters.is_empty()) else {
-                self.over_time_ui(ui, ctx);
-                return;
-            };
-            self.advice.ui(ui, ctx, run, step, self.in_background, height > MIN_HEIGHT_WITH_ALTERNATIVES);
-            self.information.ui(ui, ctx, run, step, height > MIN_HEIGHT_WITH_INFORMATION);
-            let number = ctx.selection.run.min(ctx.recording.runs.len().saturating_sub(1));
-            compare::singularity_ui(ui, ctx, number, run, step);
-            self.slider.ui(ui, ctx, step);
-            spectrum::ui(ui, ctx.theme, &ctx.names(), rank, (0.16 * height).clamp(60.0, 150.0));
-            // The timeline has a lane for it too, so it yields to the heat map first.
-            if height > MIN_HEIGHT_WITH_TIME {
-                self.over_time_ui(ui, ctx);
-            }
-            let left = height - (ui.cursor().top() - top) - 4.0;
-            heat_map::ui(ui, ctx, rank, left);
+        let all = ui.available_rect_before_wrap();
+        if all.width() < MIN_WIDTH_WITH_DETAILS_BESIDE {
+            ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+                let bottom = ui.cursor().top() + height;
+                if self.answers_ui(ui, ctx, run, step, bottom, [DETAILS_HEIGHT, HEAD_OF_DETAILS]) {
+                    self.details_ui(ui, ctx, run, step);
+                }
+            });
+            return;
+        }
+        let [left, right] = halves(all, 0.5);
+        let mut ranked = false;
+        ui.scope_builder(UiBuilder::new().max_rect(left), |ui| {
+            ScrollArea::vertical().id_salt("answers").auto_shrink(false).show(ui, |ui| {
+                let bottom = ui.cursor().top() + height;
+                ranked = self.answers_ui(ui, ctx, run, step, bottom, [0.0; 2]);
+            });
         });
+        ui.scope_builder(UiBuilder::new().max_rect(right), |ui| {
+            ScrollArea::vertical().id_salt("details").auto_shrink(false).show(ui, |ui| {
+                if ranked {
+                    self.details_ui(ui, ctx, run, step);
+                }
+            });
+        });
+    }
+
+    /// Verdict, least observable direction and since when, suggested excitation, heat map. Returns whether the step has
+    /// a rank.
+    ///
+    /// The heat map leaves the first of the `details` heights above `bottom` free if all its rows fit, else the second.
+    fn answers_ui(
+        &mut self,
+        ui: &mut Ui,
+        ctx: &mut PanelContext<'_>,
+        run: &RunRecord,
+        step: &Arc<StepRecord>,
+        bottom: f32,
+        details: [f32; 2],
+    ) -> bool {
+        ui.spacing_mut().item_spacing.y = 3.0;
+        self.advice.update(ui, ctx, run, step, self.in_background);
+        let verdict = verdict::verdict(step, &ctx.names());
+        verdict_ui(ui, ctx.theme, &verdict, self.advice.since(step));
+        let Some(rank) = step.rank.as_ref().filter(|rank| !rank.parameters.is_empty()) else {
+            self.over_time_ui(ui, ctx);
+            return false;
+        };
+        self.advice.ui(ui, ctx, step);
+        let left = bottom - ui.cursor().top();
+        heat_map::ui(ui, ctx, rank, details.map(|below| left - below));
+        true
+    }
+
+    /// What the answers follow from, in sections that are open where there is room.
+    fn details_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>, run: &RunRecord, step: &Arc<StepRecord>) {
+        let Some(rank) = &step.rank else { return };
+        let (theme, names, presentation) = (*ctx.theme, ctx.names(), ctx.presentation);
+        ui.spacing_mut().item_spacing.y = 3.0;
+        self.slider.ui(ui, ctx, step);
+        for note in verdict::verdict(step, &names).notes {
+            let line = ui.add(egui::Label::new(RichText::new(note.text).color(theme.warn)).wrap());
+            line.on_hover_text(note.term.meaning);
+        }
+        let height = (0.2 * ui.clip_rect().height()).clamp(70.0, 150.0);
+        section_ui(ui, &theme, presentation, "Singular values", height, |ui| {
+            spectrum::ui(ui, &theme, &names, rank, height)
+        });
+        self.information.ui(ui, ctx, run, step);
+        let number = ctx.selection.run.min(ctx.recording.runs.len().saturating_sub(1));
+        compare::singularity_ui(ui, ctx, number, run, step);
+        section_ui(ui, &theme, presentation, "Ranks over time", OVER_TIME_HEIGHT, |ui| self.over_time_ui(ui, ctx));
+        self.advice.alternatives_ui(ui, ctx);
+        structure_ui(ui, ctx, &names, rank);
     }
 
     /// Structural and informed rank of all runs over time.
     fn over_time_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
-        /// Heights of the caption and of the plot.
+        /// Height of the caption.
         const CAPTION: f32 = 14.0;
-        const HEIGHT: f32 = 58.0;
         let theme = *ctx.theme;
         let tables = self.tables.read(&ctx.recording.runs, rank_row);
         let max_rank = tables.iter().flat_map(|table| &table.columns[PARAMETERS]).copied().fold(0.0, f64::max);
         if max_rank == 0.0 {
             return;
         }
-        let (_, all) = ui.allocate_space(vec2(ui.available_width(), HEIGHT));
+        let (_, all) = ui.allocate_space(vec2(ui.available_width(), OVER_TIME_HEIGHT));
         let rect = egui::Rect::from_min_max(all.min + vec2(0.0, CAPTION), all.max);
         let (begin_ns, end_ns) = visible_range(ctx);
         let area = PlotArea { rect, begin_ns, end_ns, low: 0.0, high: max_rank * 1.08 };
@@ -179,29 +240,73 @@ fn halves(rect: egui::Rect, fraction: f32) -> [egui::Rect; 2] {
     [left.with_max_x(left.right() - GAP), right]
 }
 
-/// The verdict: a symbol, one line, and the reasons.
-fn verdict_ui(ui: &mut Ui, ctx: &PanelContext<'_>, step: &StepRecord) {
-    let (theme, names) = (ctx.theme, &ctx.names());
-    let verdict = verdict::verdict(step, names);
+/// The verdict: a symbol, one line, the reasons, and the least observable direction.
+fn verdict_ui(ui: &mut Ui, theme: &Theme, verdict: &Verdict, since: Option<&str>) {
     let (mark, color) = mark_of(verdict.level, theme);
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 5.0;
         ui.label(RichText::new(mark).color(color).size(14.0));
-        let headline = RichText::new(&verdict.headline).color(theme.text_strong).size(14.0);
-        let headline = ui.add(egui::Label::new(headline).truncate());
-        headline.on_hover_text(format!("{}\n{}", verdict.headline, window::VERDICT.meaning));
+        let headline = RichText::new(&verdict.headline).color(theme.text_strong).size(HEADLINE);
+        ui.add(egui::Label::new(headline).wrap()).on_hover_text(window::VERDICT.meaning);
     });
     for reason in &verdict.reasons {
-        let response =
-            ui.add(egui::Label::new(RichText::new(&reason.text).color(theme.text)).truncate().sense(Sense::hover()));
-        response.on_hover_text(format!("{}\n{}", reason.text, reason.term.meaning));
+        let line = ui.add(egui::Label::new(RichText::new(&reason.text).color(theme.text)).wrap());
+        line.on_hover_text(reason.term.meaning);
     }
-    let Some(rank) = step.rank.as_ref().filter(|rank| !rank.known.is_empty()) else { return };
+    if let Some(direction) = &verdict.direction
+        && let Some((kind, names)) = direction.text.split_once(": ")
+    {
+        let since = since.map_or_else(String::new, |since| format!(", {since}"));
+        let line = fact_ui(ui, theme, &format!("{kind}: "), &format!("{names}{since}"), theme.text_strong);
+        line.on_hover_text(direction.term.meaning);
+    }
+}
+
+/// A name and what it is, wrapped.
+fn fact_ui(ui: &mut Ui, theme: &Theme, name: &str, text: &str, color: egui::Color32) -> egui::Response {
+    let font = TextStyle::Body.resolve(ui.style());
+    let mut job = LayoutJob::default();
+    job.append(name, 0.0, TextFormat::simple(font.clone(), theme.text_weak));
+    job.append(text, 0.0, TextFormat::simple(font, color));
+    ui.add(egui::Label::new(job).wrap())
+}
+
+/// A section with a heading, open at first where `height` points are left above the fold.
+///
+/// A figure has the sections that fit, and no headings to click.
+fn section_ui(
+    ui: &mut Ui,
+    theme: &Theme,
+    presentation: Presentation,
+    title: &str,
+    height: f32,
+    contents: impl FnOnce(&mut Ui),
+) {
+    const HEADING: f32 = 24.0;
+    let room = ui.clip_rect().bottom() - ui.cursor().top();
+    let heading = RichText::new(title).color(theme.text);
+    if presentation.is_figure() {
+        if room >= height + HEADING {
+            ui.label(heading);
+            contents(ui);
+        }
+        return;
+    }
+    let header = egui::CollapsingHeader::new(heading).id_salt(title).default_open(room >= height + HEADING);
+    header.show_unindented(ui, contents);
+}
+
+/// The null directions that are known in closed form.
+fn structure_ui(ui: &mut Ui, ctx: &PanelContext<'_>, names: &ParameterNames, rank: &RankReport) {
+    if rank.known.is_empty() {
+        return;
+    }
     let title = format!(
         "Closed-form null directions: {} of {} confirmed by the measured Jacobian",
         rank.known_agreeing(),
         rank.known.len()
     );
+    let theme = ctx.theme;
     let title =
         RichText::new(title).color(if rank.known_agreeing() == rank.known.len() { theme.text } else { theme.error });
     if ctx.presentation.is_figure() {

@@ -16,6 +16,9 @@ const MAX_DISPLACEMENT: f64 = 2.0;
 const PERIOD_S: f64 = 4.0;
 /// Changes of the reprojections up to here count as zero, in pixels.
 const ZERO_CHANGE_PX: f64 = 0.1;
+/// Minimum width of the slider and maximum width of the choice of the direction, in points.
+const MIN_SLIDER_WIDTH: f32 = 70.0;
+const MAX_CHOICE_WIDTH: f32 = 300.0;
 /// Number of parameters whose changes are listed.
 const CHANGES_SHOWN: usize = 4;
 
@@ -71,18 +74,22 @@ impl SliderUi {
                 self.playing = !self.playing;
             }
             let along = ui.label(RichText::new("Direction").color(ctx.theme.text_weak));
-            let chosen = ComboBox::from_id_salt("direction of the slider")
-                .selected_text(label(&direction))
-                .width(0.5 * ui.available_width())
-                .truncate()
-                .show_ui(ui, |ui| {
+            let width = (ui.available_width() - MIN_SLIDER_WIDTH - 24.0).clamp(60.0, MAX_CHOICE_WIDTH);
+            let text = label(&direction);
+            let combo = ComboBox::from_id_salt("direction of the slider").selected_text(text.as_str()).width(width);
+            let chosen = ui.scope(|ui| {
+                ui.set_max_width(width);
+                combo.truncate().show_ui(ui, |ui| {
                     for choice in directions {
                         let text = label(&choice);
                         ui.selectable_value(&mut direction, choice, text);
                     }
-                });
+                })
+            });
+            let chosen = chosen.inner;
+            chosen.response.clone().on_hover_text(text);
             chosen.response.labelled_by(along.id);
-            ui.spacing_mut().slider_width = (ui.available_width() - 12.0).max(40.0);
+            ui.spacing_mut().slider_width = (ui.available_width() - 12.0).max(MIN_SLIDER_WIDTH);
             let slider = Slider::new(&mut amount, -MAX_DISPLACEMENT..=MAX_DISPLACEMENT).show_value(false);
             let slider = ui.add(slider).on_hover_text(
                 "Displacement of the chain along this direction, up to 20° and 6 cm, with the vehicle's poses fixed; \

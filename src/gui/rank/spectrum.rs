@@ -1,11 +1,11 @@
 //! The singular values on a logarithmic axis with both thresholds.
 
-use egui::{Align2, FontFamily, FontId, Rect, Role, Sense, Stroke, StrokeKind, Ui, WidgetInfo, pos2, vec2};
+use egui::{Align2, Rect, Role, Sense, Stroke, StrokeKind, Ui, WidgetInfo, pos2, vec2};
 
 use super::verdict::parameters_of;
 use crate::gimbal::ParameterNames;
 use crate::gui::plot::paint_ground;
-use crate::gui::theme::Theme;
+use crate::gui::theme::{Theme, label_font, number_font};
 use crate::gui::units::significant;
 use crate::observability::RankReport;
 
@@ -27,11 +27,11 @@ pub(super) fn paint(
 ) {
     let painter = ui.painter_at(rect);
     paint_ground(&painter, theme, rect);
-    let plot = Rect::from_min_max(rect.min + vec2(30.0, 3.0), rect.max - vec2(4.0, 3.0));
+    let plot = Rect::from_min_max(rect.min + vec2(36.0, 3.0), rect.max - vec2(4.0, 3.0));
     let Some(axis) = LogAxis::of(peers, plot).filter(|_| !rank.singular_values.is_empty()) else { return };
 
     // Grid lines at thirds of decades, with powers of ten as labels.
-    let font = FontId::new(9.0, FontFamily::Monospace);
+    let font = number_font();
     for decade in (axis.low.ceil() as i32..=axis.high.floor() as i32).filter(|decade| decade.rem_euclid(3) == 0) {
         let y = axis.y_of_power(f64::from(decade));
         painter.hline(plot.x_range(), y, Stroke::new(1.0, theme.grid));
@@ -93,8 +93,7 @@ pub(super) fn paint(
 fn threshold(painter: &egui::Painter, theme: &Theme, plot: Rect, y: f32, name: &str) {
     let points = [pos2(plot.left(), y), pos2(plot.right(), y)];
     painter.extend(egui::Shape::dashed_line(&points, Stroke::new(1.0, theme.text_strong), 4.0, 3.0));
-    let galley =
-        painter.layout_no_wrap(name.to_owned(), FontId::new(10.0, FontFamily::Proportional), theme.text_strong);
+    let galley = painter.layout_no_wrap(name.to_owned(), label_font(), theme.text_strong);
     let place = pos2(plot.right() - galley.size().x - 2.0, y - galley.size().y);
     let ground = Rect::from_min_size(place, galley.size()).expand2(vec2(2.0, -1.0));
     painter.rect_filled(ground, 2.0, theme.plot_background.gamma_multiply(0.8));

@@ -27,8 +27,19 @@ pub(crate) struct Verdict {
     pub(crate) level: Level,
     /// One line.
     pub(crate) headline: String,
-    /// The reasons.
+    /// Where the rank is lost, or what the initialization waits for.
     pub(crate) reasons: Vec<Reason>,
+    /// The least observable direction by parameter name.
+    pub(crate) direction: Option<Reason>,
+    /// Further findings.
+    pub(crate) notes: Vec<Reason>,
+}
+
+impl Verdict {
+    /// A verdict on a step without a rank.
+    fn none(headline: &str, reasons: Vec<Reason>) -> Self {
+        Self { level: Level::None, headline: headline.to_owned(), reasons, direction: None, notes: Vec::new() }
+    }
 }
 
 /// One reason of a verdict.
@@ -43,10 +54,7 @@ pub(crate) struct Reason {
 /// The observability of the calibration in a step.
 pub(crate) fn verdict(step: &StepRecord, names: &ParameterNames) -> Verdict {
     match &step.rank {
-        Some(rank) if rank.parameters.is_empty() => {
-            let headline = "Calibration fixed in this run".to_owned();
-            Verdict { level: Level::None, headline, reasons: Vec::new() }
-        }
+        Some(rank) if rank.parameters.is_empty() => Verdict::none("Calibration fixed in this run", Vec::new()),
         Some(rank) => of_rank(rank, names),
         None => {
             let initializing = step.report.phase == Phase::Initializing;
@@ -54,7 +62,7 @@ pub(crate) fn verdict(step: &StepRecord, names: &ParameterNames) -> Verdict {
                 if initializing { "Initializing: no rank yet" } else { "No linearization in this step: no rank" };
             let waits = step.report.events.iter().filter(|event| event.kind == EventKind::InitializationWaits);
             let reasons = waits.map(|event| Reason { term: window::INITIALIZATION, text: event.message.clone() });
-            Verdict { level: Level::None, headline: headline.to_owned(), reasons: reasons.collect() }
+            Verdict::none(headline, reasons.collect())
         }
     }
 }
@@ -75,7 +83,6 @@ fn of_rank(rank: &RankReport, names: &ParameterNames) -> Verdict {
         }
     };
     let mut reasons = Vec::new();
-    let mut push = |term: Term, text: String| reasons.push(Reason { term, text });
     let causes = [
         (rank.deficit_parameterization, "redundant in the parameterization"),
         (rank.deficit_joints, "stationary joints"),
@@ -85,41 +92,42 @@ fn of_rank(rank: &RankReport, names: &ParameterNames) -> Verdict {
     let causes: Vec<String> =
         causes.iter().filter(|(count, _)| *count > 0).map(|(count, cause)| format!("{count} {cause}")).collect();
     if !causes.is_empty() {
-        push(window::RANK_DEFICIT, format!("Rank deficit: {}", causes.join(", ")));
+        reasons.push(Reason { term: window::RANK_DEFICIT, text: format!("Rank deficit: {}", causes.join(", ")) });
     }
+    let mut notes = Vec::new();
     if rank.claimed() > 0 {
-        push(
-            window::SPURIOUS,
-            format!(
+        notes.push(Reason {
+            term: window::SPURIOUS,
+            text: format!(
                 "Spurious information in the priors on {} unobservable directions, up to {:.2} (1: σ of 10° or 3 cm)",
                 rank.claimed(),
                 rank.spurious_gain()
             ),
-        );
+        });
     }
-    if let Some(direction) = rank.directions.iter().find(|direction| !direction.structural) {
-        push(
-            window::LEAST_OBSERVABLE,
-            format!("Least observable: {}", parameters_of(names, &rank.parameters, direction, 3)),
-        );
-    } else if let Some(direction) = rank.directions.first() {
-        push(
-            window::LEAST_OBSERVABLE,
-            format!("Unobservable: {}", parameters_of(names, &rank.parameters, direction, 3)),
-        );
-    }
+    let direction = least_observable(rank).map(|direction| {
+        let kind = if direction.structural { "Unobservable" } else { "Least observable" };
+        let text = format!("{kind}: {}", parameters_of(names, &rank.parameters, direction, 3));
+        Reason { term: window::LEAST_OBSERVABLE, text }
+    });
     if let Some((singularity, margin)) =
         rank.margins.iter().min_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, m)| *m < SWITCH_MARGIN)
     {
-        push(
-            window::SINGULARITY_MARGIN,
-            format!(
+        notes.push(Reason {
+            term: window::SINGULARITY_MARGIN,
+            text: format!(
                 "Parameterization near a singularity: {}, margin {margin:.2} < {SWITCH_MARGIN:.2}",
                 names.singularity(*singularity)
             ),
-        );
+        });
     }
-    Verdict { level, headline, reasons }
+    Verdict { level, headline, reasons, direction, notes }
+}
+
+/// The least observable direction that is not lost altogether, else the first unobservable one.
+pub(crate) fn least_observable(rank: &RankReport) -> Option<&CalibrationDirection> {
+    let weak = rank.directions.iter().find(|direction| !direction.structural);
+    weak.or_else(|| rank.directions.first())
 }
 
 /// Every known loss with its reason and the measured response, one line each.

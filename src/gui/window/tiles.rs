@@ -159,12 +159,12 @@ fn tree_of(preset: Preset) -> Tree<PanelName> {
             let residuals = tabs(tiles, &[Residuals, Jacobian, Laboratory]);
             let above = split(tiles, Horizontal, [image, residuals], 0.6);
             let below = split(tiles, Horizontal, [convergence, scene], 0.7);
-            (split(tiles, Vertical, [above, below], 0.64), split(tiles, Vertical, [inspector, rank], 0.6))
+            (split(tiles, Vertical, [above, below], 0.64), split(tiles, Vertical, [inspector, rank], 0.42))
         }
         Preset::Scene => {
             let plots = tabs(tiles, &[Convergence, Residuals, Jacobian, Laboratory, Comparison]);
             let below = split(tiles, Horizontal, [image, plots], 0.32);
-            (split(tiles, Vertical, [scene, below], 0.68), split(tiles, Vertical, [inspector, rank], 0.5))
+            (split(tiles, Vertical, [scene, below], 0.68), split(tiles, Vertical, [inspector, rank], 0.42))
         }
     };
     let root = split(tiles, Horizontal, [left, right], 0.745);
