@@ -23,6 +23,9 @@ use crate::sensors::GrayImage;
 const MAX_ZOOM: f32 = 16.0;
 /// Width in points of the row with all options.
 const OPTIONS_WIDTH: f32 = 395.0;
+/// The whole legend in words, for images too narrow for it.
+const LEGEND: &str = "Colour: age of the track in frames\nRing: used in the solve\nDot: tracked only\nCross: rejected\n\
+    Line: residual (prediction − measurement), magnified";
 /// Height of legend and caption in points.
 const LINE_HEIGHT: f32 = 18.0;
 
@@ -116,12 +119,15 @@ impl ImagePanel {
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &name));
         let image = context.images.image(&run.camera_key, model.frame_index);
         self.image_ui(ui, area, &response, context, &model, image);
-        let (legend, _) = ui.allocate_exact_size(vec2(ui.available_width(), LINE_HEIGHT), Sense::hover());
+        let (legend, line) = ui.allocate_exact_size(vec2(ui.available_width(), LINE_HEIGHT), Sense::hover());
+        line.on_hover_text(LEGEND);
         let moved = slide::of(context, model.stamp_ns).is_some();
         paint::legend(ui.painter(), legend, context.theme, &self.mark_options(), moved);
-        let caption = model.caption();
-        let line = ui.add(egui::Label::new(&caption).truncate());
-        line.on_hover_text(format!("{caption}\n{}", window::CAPTION.meaning));
+        let (room, font) = (ui.available_width(), egui::TextStyle::Body.resolve(ui.style()));
+        let width =
+            |text: &str| ui.painter().layout_no_wrap(text.to_owned(), font.clone(), context.theme.text).size().x;
+        let line = ui.add(egui::Label::new(model.fitting_caption(|text| width(text) <= room)).truncate());
+        line.on_hover_text(format!("{}\n{}", model.caption(), window::CAPTION.meaning));
     }
 
     fn mark_options(&self) -> MarkOptions {

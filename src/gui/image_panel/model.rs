@@ -7,6 +7,9 @@ use crate::frontend::{FeatureId, FrontEndStatistics};
 use crate::geometry::seconds_from_ns;
 use crate::session::RunRecord;
 
+/// Between two parts of the caption.
+const SEPARATOR: &str = " · ";
+
 /// Length of a track trail in images.
 const TRAIL_FRAMES: usize = 4;
 
@@ -127,23 +130,43 @@ impl ImageModel {
         })
     }
 
-    /// The text `frame 120 · 6.000 s · keyframe · tracked 98, new 12, lost 9, rejected 5 · reprojection RMS 0.40 px (before
-    /// the solve 0.93 px), median 0.12 px`.
-    pub(super) fn caption(&self) -> String {
+    /// The parts of the caption, the most important first: `frame 120`, `6.000 s`, `reprojection RMS 0.40 px`,
+    /// `tracked 98`, `keyframe`, `before the solve 0.93 px`, `median 0.12 px`, `new 12`, `lost 9`, `rejected 5`.
+    fn caption_parts(&self) -> Vec<String> {
         let mut parts = vec![format!("frame {}", self.frame_index), format!("{:.3} s", seconds_from_ns(self.stamp_ns))];
+        let tracking = self.phase == Phase::Tracking;
+        if tracking {
+            parts.push(format!("reprojection RMS {:.2} px", self.rms_after_px));
+        } else {
+            parts.push(self.phase.name().to_owned());
+        }
+        let FrontEndStatistics { tracked, detected, lost, rejected, .. } = self.statistics;
+        parts.push(format!("tracked {tracked}"));
         if self.keyframe {
             parts.push("keyframe".to_owned());
         }
-        let FrontEndStatistics { tracked, detected, lost, rejected, .. } = self.statistics;
-        parts.push(format!("tracked {tracked}, new {detected}, lost {lost}, rejected {}", rejected + self.rejected));
-        parts.push(match self.phase {
-            Phase::Initializing => self.phase.name().to_owned(),
-            Phase::Tracking => {
-                let Self { rms_before_px, rms_after_px, median_after_px, .. } = self;
-                format!("reprojection RMS {rms_after_px:.2} px (before the solve {rms_before_px:.2} px), median {median_after_px:.2} px")
-            }
-        });
-        parts.join(" · ")
+        if tracking {
+            parts.push(format!("before the solve {:.2} px", self.rms_before_px));
+            parts.push(format!("median {:.2} px", self.median_after_px));
+        }
+        parts.extend([
+            format!("new {detected}"),
+            format!("lost {lost}"),
+            format!("rejected {}", rejected + self.rejected),
+        ]);
+        parts
+    }
+
+    /// The caption with all its parts.
+    pub(super) fn caption(&self) -> String {
+        self.caption_parts().join(SEPARATOR)
+    }
+
+    /// The caption with as many of the most important parts as `fits` accepts, at least the first.
+    pub(super) fn fitting_caption(&self, fits: impl Fn(&str) -> bool) -> String {
+        let parts = self.caption_parts();
+        let captions = (1..=parts.len()).rev().map(|count| parts[..count].join(SEPARATOR));
+        captions.into_iter().find(|caption| fits(caption)).unwrap_or_else(|| parts[0].clone())
     }
 }
 

@@ -35,18 +35,22 @@ fn the_caption_is_that_of_the_step_at_or_before_the_cursor() {
     let mut lengths: Vec<f64> = observations.filter_map(|seen| Some(seen.residual_after_px?.norm())).collect();
     lengths.sort_by(f64::total_cmp);
     let expected = format!(
-        "frame 70 · 3.500 s · tracked {}, new {}, lost {}, rejected {rejected} · reprojection RMS {:.2} px (before the \
-         solve {:.2} px), median {:.2} px",
-        statistics.tracked,
-        statistics.detected,
-        statistics.lost,
+        "frame 70 · 3.500 s · reprojection RMS {:.2} px · tracked {} · before the solve {:.2} px · median {:.2} px · \
+         new {} · lost {} · rejected {rejected}",
         step.report.reprojection_rms_after_px,
+        statistics.tracked,
         step.report.reprojection_rms_before_px,
         lengths[lengths.len() / 2],
+        statistics.detected,
+        statistics.lost,
     );
     assert_eq!(model.caption(), expected);
+    assert_eq!(model.fitting_caption(|_| true), expected);
+    let short = model.fitting_caption(|text| text.chars().count() < 60);
+    assert!(expected.starts_with(&short) && short.contains("RMS") && short.chars().count() < 60, "{short}");
+    assert_eq!(model.fitting_caption(|_| false), "frame 70");
     let waiting = ImageModel::at(&recording.runs[0], (FIRST_TRACKED_FRAME as i64 - 1) * FRAME_PERIOD_NS).unwrap();
-    assert!(waiting.caption().ends_with("initializing"), "{}", waiting.caption());
+    assert!(waiting.caption().contains(" · initializing · "), "{}", waiting.caption());
     assert!(ImageModel::at(&recording.runs[0], -1).is_none());
 }
 

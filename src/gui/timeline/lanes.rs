@@ -2,7 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use egui::{Align2, Color32, FontFamily, FontId, Painter, Pos2, Rect, Stroke, pos2, vec2};
+use egui::text::{LayoutJob, TextWrapping};
+use egui::{Align2, Color32, Painter, Pos2, Rect, Stroke, Ui, pos2, vec2};
 
 use super::model::{FEATURES, INFORMED, RMS, RunLanes, STRUCTURAL};
 use crate::gui::PanelContext;
@@ -96,9 +97,8 @@ pub(super) fn run(painter: &Painter, theme: &Theme, area: &PlotArea, lanes: &Run
         let rect = Rect::from_x_y_ranges(segment, bar.y_range());
         painter.rect_filled(rect, 0.0, style.color.gamma_multiply(0.12));
         paint_hatch(painter, rect, style.color.gamma_multiply(0.5));
-        if rect.width() > 64.0 {
-            let font = FontId::new(9.5, FontFamily::Proportional);
-            let galley = painter.layout_no_wrap("initializing".to_owned(), font, theme.text_strong);
+        if rect.width() > 70.0 {
+            let galley = painter.layout_no_wrap("initializing".to_owned(), theme::label_font(), theme.text_strong);
             let place = rect.left_center() + vec2(4.0, -galley.size().y / 2.0);
             let ground = Rect::from_min_size(place, galley.size()).expand2(vec2(2.0, -1.0));
             painter.rect_filled(ground, 2.0, theme.plot_background.gamma_multiply(0.85));
@@ -267,11 +267,16 @@ pub(super) fn label(painter: &Painter, theme: &Theme, rect: Rect, name: &str, va
         let place = pos2(right, rect.center().y);
         right = painter.text(place, Align2::RIGHT_CENTER, value, theme::number_font(), theme.text_strong).left() - 4.0;
     }
-    let font = theme::label_font();
-    let galley = clipped.layout_no_wrap(name.to_owned(), font, color);
-    let room = Rect::from_min_max(rect.min, pos2(right, rect.bottom()));
+    let mut job = LayoutJob::simple_singleline(name.to_owned(), theme::label_font(), color);
+    job.wrap = TextWrapping::truncate_at_width(right - rect.left() - 2.0);
+    let galley = clipped.layout_job(job);
     let place = pos2(rect.left() + 2.0, rect.center().y - galley.size().y / 2.0);
-    painter.with_clip_rect(room.intersect(painter.clip_rect())).galley(place, galley, color);
+    clipped.galley(place, galley, color);
+}
+
+/// Width of the name of a lane in points.
+pub(super) fn name_width(ui: &Ui, ctx: &PanelContext<'_>, lane: Lane) -> f32 {
+    ui.painter().layout_no_wrap(lane.name(ctx), theme::label_font(), ctx.theme.text).size().x
 }
 
 #[cfg(test)]

@@ -9,19 +9,21 @@ mod transport;
 pub use pace::{Pace, Reading};
 pub(crate) use transport::{SPEEDS, toggled_loop};
 
-use egui::{Align2, FontFamily, FontId, PointerButton, Rect, Response, Sense, Stroke, Ui, pos2, vec2};
+use egui::{Align2, PointerButton, Rect, Response, Sense, Stroke, Ui, pos2, vec2};
 
 use self::lanes::Lane;
 use self::model::RunLanes;
 use super::PanelContext;
 use super::events::name_of;
 use super::plot::{Clicks, Curve, PlotArea, decimals_of_step, navigate, paint_ground, ticks, visible_range};
-use super::theme::{LANE_HEIGHT, LANE_LABEL_WIDTH, Theme};
+use super::theme::{LANE_HEIGHT, LANE_LABEL_WIDTH, Theme, number_font};
 use super::units::{fixed, seconds};
 use crate::geometry::seconds_from_ns;
 use crate::session::Command;
 
 const RULER_HEIGHT: f32 = 18.0;
+/// Maximum width of the names beside the lanes in points.
+const MAX_LABEL_WIDTH: f32 = 220.0;
 /// Maximum height of a lane in points.
 const MAX_LANE_HEIGHT: f32 = 90.0;
 
@@ -51,7 +53,7 @@ impl TimelinePanel {
         }
         transport::ui(ui, ctx, self.pace.reading());
         let rect = ui.available_rect_before_wrap();
-        let left = (rect.left() + LANE_LABEL_WIDTH).min(rect.center().x);
+        let left = (rect.left() + self.label_width(ui, ctx)).min(rect.center().x);
         let plot = Rect::from_min_max(pos2(left, rect.top()), rect.max - vec2(4.0, 0.0));
         if plot.width() < 8.0 || plot.height() < RULER_HEIGHT {
             return;
@@ -93,6 +95,14 @@ impl TimelinePanel {
         self.hover(ui, ctx, &area, response);
     }
 
+    /// Width of the names beside the lanes, so that those of the runs fit.
+    fn label_width(&self, ui: &Ui, ctx: &PanelContext<'_>) -> f32 {
+        /// Space around a name.
+        const MARGIN: f32 = 10.0;
+        let width = |run: usize| lanes::name_width(ui, ctx, Lane::Run(run)) + MARGIN;
+        (0..self.runs.len()).map(width).fold(LANE_LABEL_WIDTH, f32::max).min(MAX_LABEL_WIDTH)
+    }
+
     fn lane(&mut self, ui: &Ui, ctx: &PanelContext<'_>, lane: Lane, area: PlotArea, label_rect: Rect) {
         let theme = *ctx.theme;
         let painter = ui.painter_at(area.rect.union(label_rect));
@@ -123,7 +133,7 @@ impl TimelinePanel {
         };
         lanes::label(&painter, &theme, label_rect, &lane.name(ctx), value, color);
         let label = ui.interact(label_rect, ui.unique_id().with(("lane", lane.name(ctx))), Sense::hover());
-        label.on_hover_text(lane.meaning());
+        label.on_hover_text(format!("{}\n{}", lane.name(ctx), lane.meaning()));
     }
 
     /// Shift and drag sets the loop range.
@@ -202,15 +212,14 @@ fn paint_ruler(painter: &egui::Painter, theme: &Theme, area: &PlotArea) {
         let x = area.x((mark * 1e9).round() as i64).round() + 0.5;
         painter.vline(x, area.rect.top() + RULER_HEIGHT - 4.0..=area.rect.bottom(), Stroke::new(1.0, theme.grid));
         let text = format!("{} s", fixed(mark, decimals_of_step(step)));
-        let font = FontId::new(9.5, FontFamily::Monospace);
-        let align = if x + 24.0 > area.rect.right() {
+        let align = if x + 30.0 > area.rect.right() {
             Align2::RIGHT_TOP
-        } else if x - 16.0 < area.rect.left() {
+        } else if x - 20.0 < area.rect.left() {
             Align2::LEFT_TOP
         } else {
             Align2::CENTER_TOP
         };
-        painter.text(pos2(x, area.rect.top()), align, text, font, theme.text_weak);
+        painter.text(pos2(x, area.rect.top()), align, text, number_font(), theme.text_weak);
     }
 }
 

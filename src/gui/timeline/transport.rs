@@ -1,6 +1,6 @@
 //! The buttons above the lanes: play, pause, step, seek.
 
-use egui::{Button, ComboBox, RichText, Ui, vec2};
+use egui::{Button, ComboBox, RichText, TextStyle, Ui, vec2};
 
 use super::pace::Reading;
 use crate::gui::PanelContext;
@@ -154,15 +154,27 @@ fn pace_ui(ui: &mut Ui, ctx: &PanelContext<'_>, pace: Reading) {
 fn progress_ui(ui: &mut Ui, ctx: &PanelContext<'_>) {
     let theme = ctx.theme;
     let duration_ns = ctx.recording.duration_ns.max(1);
-    for (number, run) in ctx.recording.runs.iter().enumerate().filter(|(_, run)| !run.finished) {
-        let computed_ns = run.steps.last().map_or(0, |step| step.report.stamp_ns);
-        let fraction = (computed_ns as f64 / duration_ns as f64).clamp(0.0, 1.0);
-        let text = format!(
-            "{} computed to {} s ({} %)",
-            run.spec.label,
-            fixed(computed_ns as f64 * 1e-9, 1),
-            fixed(100.0 * fraction, 0)
-        );
-        ui.label(RichText::new(text).color(theme.run(number).color));
+    let lines: Vec<(usize, [String; 3])> = ctx
+        .recording
+        .runs
+        .iter()
+        .enumerate()
+        .filter(|(_, run)| !run.finished)
+        .map(|(number, run)| {
+            let computed_ns = run.steps.last().map_or(0, |step| step.report.stamp_ns);
+            let percent = fixed(100.0 * (computed_ns as f64 / duration_ns as f64).clamp(0.0, 1.0), 0);
+            let (label, computed_s) = (&run.spec.label, fixed(computed_ns as f64 * 1e-9, 1));
+            let long = format!("{label} computed to {computed_s} s ({percent} %)");
+            (number, [long, format!("{label} {percent} %"), format!("{percent} %")])
+        })
+        .collect();
+    // The longest form in which the lines of all runs fit.
+    let font = TextStyle::Body.resolve(ui.style());
+    let width = |text: &String| ui.painter().layout_no_wrap(text.clone(), font.clone(), theme.text).size().x + 8.0;
+    let fits = |form: usize| lines.iter().map(|(_, texts)| width(&texts[form])).sum::<f32>() <= ui.available_width();
+    let form = (0..2).find(|form| fits(*form)).unwrap_or(2);
+    for (number, texts) in &lines {
+        let text = RichText::new(&texts[form]).color(theme.run(*number).color);
+        ui.label(text).on_hover_text(&texts[0]);
     }
 }
