@@ -1,11 +1,13 @@
-//! The comparison panel: up to four runs at one cursor, as tables, as differences over time, and as images and scenes
+//! The comparison panel: one run against the ground truth, or up to four runs at one cursor, as tables, as differences over time, and as images and scenes
 //! side by side.
 
 mod csv;
 mod numbers;
 mod over_time;
+mod row;
 pub(crate) mod scores;
 mod side_by_side;
+mod single;
 #[cfg(test)]
 mod tests;
 
@@ -14,9 +16,11 @@ use egui::{ComboBox, Rect, RichText, ScrollArea, Ui, UiBuilder, Vec2, vec2};
 use self::over_time::OverTime;
 use self::scores::Scores;
 use self::side_by_side::{Images, Scenes};
+use self::single::Single;
 use super::PanelContext;
 use super::convergence::empty_ui;
 use super::rank;
+use super::window::Dialog;
 use crate::session::Comparison;
 
 /// Panel size from which all views are shown at once.
@@ -60,6 +64,9 @@ pub struct ComparisonPanel {
     over_time: OverTime,
     images: Images,
     scenes: Scenes,
+    single: Single,
+    /// The dialog that was asked for in the last frame; the window takes it.
+    pub asked: Option<Dialog>,
 }
 
 impl ComparisonPanel {
@@ -77,6 +84,10 @@ impl ComparisonPanel {
             return;
         }
         self.read(ctx);
+        if runs.len() == 1 {
+            self.asked = self.single.ui(ui, ctx, &self.scores);
+            return;
+        }
         let view = self.controls_ui(ui, ctx);
         let room = ui.available_size();
         match view {
@@ -160,11 +171,7 @@ impl ComparisonPanel {
     }
 
     fn over_time_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
-        if ctx.recording.runs.len() < 2 {
-            empty_ui(ui, "Nothing to compare yet: add a run or fork this one");
-        } else {
-            self.over_time.ui(ui, ctx, self.reference, &self.comparisons);
-        }
+        self.over_time.ui(ui, ctx, self.reference, &self.comparisons);
     }
 
     /// Tables on the left; differences and images on the right.

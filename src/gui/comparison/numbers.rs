@@ -5,6 +5,7 @@ use egui::{Button, Grid, RichText, Ui, WidgetInfo, vec2};
 use super::scores::Scores;
 use crate::gui::PanelContext;
 use crate::gui::help::terms::divergence;
+use crate::gui::theme::ROW_HEIGHT;
 use crate::gui::units::{fixed, seconds, significant};
 use crate::session::{Command, Comparison, Divergence, Quantity};
 
@@ -31,7 +32,8 @@ pub(super) fn accuracy_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, scores: &Scor
     let theme = *ctx.theme;
     let runs = &ctx.recording.runs;
     ui.label(RichText::new("Accuracy over all processed frames").color(theme.text_strong));
-    Grid::new("accuracy").striped(true).spacing(vec2(14.0, 2.0)).show(ui, |ui| {
+    let grid = Grid::new("accuracy").striped(true).min_row_height(ROW_HEIGHT).spacing(vec2(14.0, 2.0));
+    grid.show(ui, |ui| {
         ui.label("");
         ui.label("");
         for (number, run) in runs.iter().enumerate() {
@@ -112,7 +114,8 @@ pub(super) fn divergences_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, reference:
 
 fn table_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, number: usize, own: &str, comparison: &Comparison) {
     let theme = *ctx.theme;
-    Grid::new(("partings", number)).striped(true).spacing(vec2(12.0, 2.0)).show(ui, |ui| {
+    let grid = Grid::new(("partings", number)).striped(true).min_row_height(ROW_HEIGHT);
+    grid.spacing(vec2(12.0, 2.0)).show(ui, |ui| {
         for term in [
             divergence::QUANTITY,
             divergence::EXACT,

@@ -7,6 +7,7 @@ use super::ComparisonPanel;
 use super::scores::ScoreRow;
 use crate::gui::samples::{sample_images, sample_recording_of};
 use crate::gui::theme::{Theme, ThemeName};
+use crate::gui::window::Dialog;
 use crate::gui::{PanelContext, Playback, Presentation, Selection};
 use crate::session::{Command, Quantity, Recording};
 
@@ -85,10 +86,16 @@ fn numbers_show_accuracy_and_lead_to_the_divergence() {
 #[test]
 fn a_single_run_and_an_equal_run_are_reported() {
     let mut harness = bench(&["auto"], [900.0, 700.0]);
-    assert!(harness.query_by_label("Accuracy over all processed frames").is_some());
-    harness.get_by_label("Differences").click();
+    for label in ["Accuracy over all processed frames", "position error over time", "Nothing to compare yet"] {
+        assert!(harness.query_by_label_contains(label).is_some(), "{label}");
+    }
+    assert!(harness.query_by_label("Add run auto").is_none(), "the run itself is not offered");
+    harness.get_by_label("Add run classical").click();
     harness.run_steps(2);
-    assert!(harness.query_by_label_contains("Nothing to compare yet").is_some());
+    assert_eq!(harness.state().commands, [Command::AddRun("classical".parse().unwrap())]);
+    harness.get_by_label("Fork at the cursor…").click();
+    harness.run_steps(1);
+    assert_eq!(harness.state().panel.asked, Some(Dialog::Fork));
     let mut twin = harness.state().recording.runs[0].clone();
     (twin.id, twin.spec.label) = (u64::MAX, "twin".to_owned());
     harness.state_mut().recording.runs.push(twin);

@@ -275,6 +275,7 @@ pub fn window_ui(ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_
     if let Some(panel) = asked {
         state.help.toggle(ui.ctx(), panel);
     }
+    actions.extend(state.panels.comparison.asked.take().map(Action::Dialog));
 
     dialogs::ui(ui, state, ctx, &mut actions);
     shortcuts::ui(ui, &theme, &mut state.shortcuts_open);

@@ -1,0 +1,102 @@
+//! One row of a plot over time: name and values at the cursor on the left, curves on the right.
+
+use egui::{Align2, Rect, Shape, Stroke, Ui, pos2, vec2};
+
+use crate::gui::PanelContext;
+use crate::gui::plot::{
+    Clicks, Curve, PlotArea, navigate, paint_cursor, paint_curve, paint_ground, paint_steps, paint_value_grid,
+    visible_range,
+};
+use crate::gui::theme::{self, CURVE_WIDTH};
+
+/// Width of names and values on the left.
+const NAMES: f32 = 158.0;
+
+/// A row.
+pub(super) struct Row<'a> {
+    pub(super) name: &'a str,
+    /// Shown unit, empty for counts.
+    pub(super) unit: &'a str,
+    /// Shown value per stored value.
+    pub(super) factor: f64,
+    /// Value of the dotted line, as stored.
+    pub(super) threshold: Option<f64>,
+    /// The axis reaches at least this value, so that rounding errors are not magnified.
+    pub(super) min_high: f64,
+    /// Whether values are constant until the next one.
+    pub(super) steps: bool,
+    /// Unique in the panel.
+    pub(super) id: usize,
+    /// Name for screen readers.
+    pub(super) label: &'a str,
+    /// Tooltip.
+    pub(super) hover: &'a str,
+}
+
+/// The values of one run in a row.
+pub(super) struct Line<'a> {
+    /// Index of the run, for its colour and dashes.
+    pub(super) run: usize,
+    pub(super) epoch: u64,
+    pub(super) stamps_ns: &'a [i64],
+    pub(super) values: &'a [f64],
+    /// The value at the cursor.
+    pub(super) text: Option<String>,
+    /// Stamp of a triangle on the upper edge.
+    pub(super) mark_ns: Option<i64>,
+}
+
+/// Draws a row; `curves` are the caches of the lines.
+pub(super) fn row_ui(
+    ui: &mut Ui,
+    ctx: &mut PanelContext<'_>,
+    row: &Row<'_>,
+    lines: &[Line<'_>],
+    curves: &mut [Curve],
+    height: f32,
+) {
+    let theme = *ctx.theme;
+    let (_, whole) = ui.allocate_space(vec2(ui.available_width(), height));
+    let rect = Rect::from_min_max(pos2(whole.left() + NAMES.min(0.4 * whole.width()), whole.top()), whole.max);
+    let (begin_ns, end_ns) = visible_range(ctx);
+    let mut area = PlotArea { rect, begin_ns, end_ns, low: 0.0, high: 1.0 };
+    let mut max_value = 0.0_f64;
+    for (line, curve) in lines.iter().zip(curves.iter_mut()) {
+        curve.update(&area, line.epoch, line.stamps_ns, line.values);
+        max_value = max_value.max(curve.extent.map_or(0.0, |(_, max_value)| max_value));
+    }
+    area = area.with_values(0.0, 1.15 * max_value.max(row.min_high));
+    let painter = ui.painter_at(whole);
+    paint_ground(&painter, &theme, rect);
+    paint_value_grid(&painter, &theme, &area, row.factor, (height / 22.0) as usize);
+    let threshold = row.threshold.map(|threshold| area.y(threshold)).filter(|y| rect.y_range().contains(*y));
+    if let Some(y) = threshold {
+        let ends = [pos2(rect.left(), y), pos2(rect.right(), y)];
+        painter.extend(Shape::dotted_line(&ends, theme.warn.gamma_multiply(0.7), 6.0, 0.7));
+    }
+    let name = if row.unit.is_empty() { row.name.to_owned() } else { format!("{}, {}", row.name, row.unit) };
+    let names = painter.with_clip_rect(whole.with_max_x(rect.left() - 2.0));
+    let mut at = whole.left_top();
+    names.text(at, Align2::LEFT_TOP, name, theme::label_font(), theme.text);
+    let inner = painter.with_clip_rect(rect);
+    for (line, curve) in lines.iter().zip(curves.iter()) {
+        let style = theme.run(line.run);
+        if row.steps {
+            paint_steps(&inner, &area, curve, style, CURVE_WIDTH);
+        } else {
+            paint_curve(&inner, &area, curve, style, CURVE_WIDTH);
+        }
+        let mark = line.mark_ns.map(|stamp_ns| area.x(stamp_ns)).filter(|x| rect.x_range().contains(*x));
+        if let Some(x) = mark {
+            let triangle = vec![pos2(x - 4.0, rect.top()), pos2(x + 4.0, rect.top()), pos2(x, rect.top() + 7.0)];
+            painter.add(Shape::convex_polygon(triangle, style.color, Stroke::NONE));
+        }
+        if let Some(text) = &line.text {
+            at.y += 13.0;
+            names.text(at, Align2::LEFT_TOP, text, theme::label_font(), style.color);
+        }
+    }
+    paint_cursor(&painter, &theme, &area, ctx.cursor_ns);
+    let id = ui.unique_id().with(("row over time", row.id));
+    navigate(ui, ctx, &area, id, row.label, Clicks::Seek, false).on_hover_text(row.hover);
+}
