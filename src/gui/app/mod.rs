@@ -80,6 +80,7 @@ impl App {
         state.settings = Settings::from_text(&desktop.kept_settings().unwrap_or_default(), theme);
         let kept = KeptWindow::from_text(&desktop.kept_window().unwrap_or_default());
         state.arrange_for_start(kept.layout.as_ref());
+        state.recent_logs = desktop.recent_logs();
         let theme = Theme::of(state.settings.theme);
         Self {
             welcome: Welcome::new(Arc::clone(&desktop)),
@@ -121,6 +122,7 @@ impl App {
     pub fn show(&mut self, log: Box<dyn PlayingLog>, path: Option<&Path>) {
         let mut log = log;
         self.desktop.remember_log(path.unwrap_or(&log.recording().log_path));
+        self.state.recent_logs = self.desktop.recent_logs();
         log.apply(Command::SetMemoryBudget(self.state.settings.memory_bytes()));
         log.apply(Command::SetSpeed(PlaybackSpeed(self.state.settings.speed)));
         if let Some(layout) = log.layout() {

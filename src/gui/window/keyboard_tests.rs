@@ -189,7 +189,7 @@ fn tab_reaches_everything_and_shows_where_it_is() {
     let mut harness = bench();
     let focused = |harness: &Harness<'static, Bench>| harness.ctx.memory(egui::Memory::focused);
     let mut wanted = Vec::new();
-    for name in ["Open…", "Panels", "Play", "Go to end", "Timeline", "Rank", "View of the scene"] {
+    for name in ["File", "Panels", "Play", "Go to end", "Timeline", "Rank", "View of the scene"] {
         harness.get_by_label(name).focus();
         harness.run_steps(1);
         wanted.push((name, focused(&harness)));

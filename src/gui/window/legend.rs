@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use egui::{Align2, Sense, Stroke, StrokeKind, Ui, WidgetInfo, pos2, vec2};
+use egui::text::{LayoutJob, TextWrapping};
+use egui::{Align2, Color32, Galley, Sense, Stroke, StrokeKind, TextStyle, Ui, WidgetInfo, pos2, vec2};
 
 use crate::geometry::RigidTransform;
 use crate::gui::PanelContext;
@@ -28,18 +29,44 @@ pub struct RunLegend {
 }
 
 impl RunLegend {
-    /// Draws one entry per run; a click selects the run.
-    pub fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
-        let recording = ctx.recording;
-        self.runs.resize_with(recording.runs.len(), RunAccuracy::default);
-        for (number, (run, accuracy)) in recording.runs.iter().zip(&mut self.runs).enumerate() {
+    /// Widths in points of all entries, with and without the accuracies.
+    pub(super) fn widths(&mut self, ui: &Ui, ctx: &PanelContext<'_>) -> [f32; 2] {
+        self.update(ctx);
+        [true, false].map(|accuracy| {
+            let runs = ctx.recording.runs.iter().zip(&self.runs);
+            let entries = runs.map(|(run, known)| {
+                let text = known.text().filter(|_| accuracy);
+                Entry::new(ui, ctx, run, text, f32::INFINITY, ctx.theme.text).width + ui.spacing().item_spacing.x
+            });
+            entries.sum()
+        })
+    }
+
+    /// Draws one entry per run in a total `width`; a click selects the run. Long names are shortened.
+    pub fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>, accuracy: bool, width: f32) {
+        self.update(ctx);
+        let count = self.runs.len().max(1) as f32;
+        let enough = self.widths(ui, ctx)[usize::from(!accuracy)] <= width + 0.5;
+        let max_width = if enough { f32::INFINITY } else { width / count - ui.spacing().item_spacing.x };
+        for (number, (run, known)) in ctx.recording.runs.iter().zip(&self.runs).enumerate() {
+            entry_ui(ui, ctx, number, run, known, accuracy, max_width);
+        }
+    }
+
+    fn update(&mut self, ctx: &PanelContext<'_>) {
+        self.runs.resize_with(ctx.recording.runs.len(), RunAccuracy::default);
+        for (run, accuracy) in ctx.recording.runs.iter().zip(&mut self.runs) {
             accuracy.update(run);
-            entry_ui(ui, ctx, number, run, accuracy.statistics.as_ref());
         }
     }
 }
 
 impl RunAccuracy {
+    /// The absolute trajectory error as a text.
+    fn text(&self) -> Option<String> {
+        self.statistics.as_ref().map(|statistics| format!("ATE {} m", fixed(statistics.rmse, 3)))
+    }
+
     fn update(&mut self, run: &RunRecord) {
         let same = self.count == run.steps.len()
             && self.alignment == run.alignment
@@ -66,23 +93,54 @@ fn position_errors(run: &RunRecord, alignment: &RigidTransform) -> Option<ErrorS
     ErrorStatistics::of(&errors_m)
 }
 
+/// The laid out texts of an entry.
+struct Entry {
+    label: Arc<Galley>,
+    accuracy: Option<Arc<Galley>>,
+    width: f32,
+}
+
+impl Entry {
+    /// Width of the sample of the line on the left, and the margin on the right.
+    const LINE: f32 = 34.0;
+    const MARGIN: f32 = 6.0;
+
+    fn new(
+        ui: &Ui,
+        ctx: &PanelContext<'_>,
+        run: &RunRecord,
+        accuracy: Option<String>,
+        max_width: f32,
+        color: Color32,
+    ) -> Self {
+        let font = TextStyle::Body.resolve(ui.style());
+        let accuracy =
+            accuracy.map(|text| ui.painter().layout_no_wrap(text, theme::number_font(), ctx.theme.text_weak));
+        let beside = accuracy.as_ref().map_or(0.0, |galley| galley.size().x + Self::MARGIN);
+        let room = (max_width - Self::LINE - Self::MARGIN - beside).max(12.0);
+        let mut job = LayoutJob::simple_singleline(run.spec.label.clone(), font, color);
+        job.wrap = TextWrapping::truncate_at_width(room);
+        let label = ui.painter().layout_job(job);
+        let width = Self::LINE + label.size().x + beside + Self::MARGIN;
+        Self { label, accuracy, width }
+    }
+}
+
 fn entry_ui(
     ui: &mut Ui,
     ctx: &mut PanelContext<'_>,
     number: usize,
     run: &RunRecord,
-    statistics: Option<&ErrorStatistics>,
+    known: &RunAccuracy,
+    accuracy: bool,
+    max_width: f32,
 ) {
     let theme = *ctx.theme;
-    let accuracy = statistics.map(|statistics| format!("ATE {} m", fixed(statistics.rmse, 3)));
     let shown = ctx.selection.run == number;
     let text_color = if shown { theme.text_strong } else { theme.text };
-    let label = ui.painter().layout_no_wrap(run.spec.label.clone(), egui::FontId::proportional(12.5), text_color);
-    let accuracy_label =
-        ui.painter().layout_no_wrap(accuracy.clone().unwrap_or_default(), theme::number_font(), theme.text_weak);
-    let width = 34.0 + label.size().x + if accuracy.is_some() { 6.0 + accuracy_label.size().x } else { 0.0 } + 6.0;
-    let (rect, response) = ui.allocate_exact_size(vec2(width, 22.0), Sense::click());
-    let name = format!("Run {} {}", run.spec.label, accuracy.clone().unwrap_or_default());
+    let entry = Entry::new(ui, ctx, run, known.text().filter(|_| accuracy), max_width, text_color);
+    let (rect, response) = ui.allocate_exact_size(vec2(entry.width, 22.0), Sense::click());
+    let name = format!("Run {} {}", run.spec.label, known.text().unwrap_or_default());
     response.widget_info(|| WidgetInfo::selected(egui::Role::Button, true, shown, name.trim_end()));
 
     let painter = ui.painter_at(rect);
@@ -95,10 +153,12 @@ fn entry_ui(
     let middle = rect.center().y;
     let line = [pos2(rect.left() + 5.0, middle), pos2(rect.left() + 29.0, middle)];
     paint_line(&painter, &line, theme.run(number), CURVE_WIDTH + 0.5);
-    let place = Align2::LEFT_CENTER.anchor_size(pos2(rect.left() + 34.0, middle), label.size());
-    painter.galley(place.min, label, text_color);
-    let place = Align2::LEFT_CENTER.anchor_size(pos2(place.right() + 6.0, middle), accuracy_label.size());
-    painter.galley(place.min, accuracy_label, theme.text_weak);
+    let place = Align2::LEFT_CENTER.anchor_size(pos2(rect.left() + Entry::LINE, middle), entry.label.size());
+    painter.galley(place.min, entry.label, text_color);
+    if let Some(galley) = entry.accuracy {
+        let place = Align2::LEFT_CENTER.anchor_size(pos2(place.right() + Entry::MARGIN, middle), galley.size());
+        painter.galley(place.min, galley, theme.text_weak);
+    }
 
     if response.clicked() {
         ctx.selection.run = number;
@@ -111,7 +171,7 @@ fn entry_ui(
     });
     // All steps are read only for an open tooltip.
     response.on_hover_ui(|ui| {
-        ui.label(details(run, statistics));
+        ui.label(details(run, known.statistics.as_ref()));
     });
 }
 

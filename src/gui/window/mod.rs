@@ -7,11 +7,14 @@ mod copying;
 mod dialogs;
 #[cfg(test)]
 mod figure_tests;
+#[cfg(test)]
+mod fit_tests;
 mod focus_ring;
 mod history;
 #[cfg(test)]
 mod keyboard_tests;
 mod legend;
+mod menu;
 mod notices;
 mod panel_export;
 mod panels;
@@ -101,6 +104,8 @@ pub struct WindowState {
     pub opening: Option<PathBuf>,
     /// "What is this?" and the manual.
     pub(crate) help: Help,
+    /// Recently opened logs and sessions, newest first, for the menu.
+    pub recent_logs: Vec<PathBuf>,
     ring: FocusRing,
     layout: Layout,
     history: History,

@@ -2,13 +2,19 @@
 
 use std::path::Path;
 
-use egui::{Align, Button, Layout as UiLayout, ProgressBar, RichText, Ui};
+use egui::{Align, Button, FontId, Label, Layout as UiLayout, ProgressBar, RichText, TextStyle, Ui};
 
 use super::warning_lines::warning_lines;
 use super::{Progress, WindowState};
 use crate::gui::PanelContext;
+use crate::gui::theme::{self, Theme};
 use crate::gui::units::{bytes, counted, fixed};
 use crate::session::{Recording, RunRecord, StepRecord};
+
+/// Widths in points of the warnings, of the progress, and of the log that is being opened.
+const RIGHT_WIDTH: f32 = 110.0;
+const PROGRESS_WIDTH: f32 = 160.0;
+const OPENING_WIDTH: f32 = 200.0;
 
 /// Number of steps over which the real-time factor is averaged.
 const STEPS_OF_MEAN: usize = 100;
@@ -18,30 +24,29 @@ pub(super) fn ui(ui: &mut Ui, state: &mut WindowState, ctx: &PanelContext<'_>) {
     let run = ctx.recording.runs.get(ctx.selection.run.min(ctx.recording.runs.len().saturating_sub(1)));
     ui.horizontal_centered(|ui| {
         ui.spacing_mut().item_spacing.x = 5.0;
-        let pair = |ui: &mut Ui, name: &str, value: String, hover: &str| {
-            ui.label(RichText::new(name).small().color(theme.text_weak)).on_hover_text(hover);
-            ui.label(RichText::new(value).monospace().size(10.5).color(theme.text)).on_hover_text(hover);
-            ui.add_space(10.0);
+        let mut fields = Vec::new();
+        let mut pair = |rank: u8, name: &'static str, value: String, hover: &str| {
+            fields.push(Field { rank, name, value, hover: hover.to_owned() });
         };
         if let Some(run) = run.filter(|_| state.show_times) {
             if let Some(step) = run.step_at(ctx.cursor_ns) {
                 let hover = "Processing time of the step at the cursor, ms";
-                pair(ui, "step", format!("{} ms", fixed(step.report.times.step_ms, 1)), hover);
+                pair(1, "step", format!("{} ms", fixed(step.report.times.step_ms, 1)), hover);
             }
             if let Some(factor) = real_time_factor(run, ctx.cursor_ns) {
                 let hover = "Real-time factor: log time over processing time, last 100 steps";
-                pair(ui, "speed", format!("{}× real-time", fixed(factor, 1)), hover);
+                pair(2, "speed", format!("{}× real-time", fixed(factor, 1)), hover);
             }
         }
         if let Some(memory) = state.memory_bytes {
-            pair(ui, "memory", bytes(memory), "Resident memory of the process");
+            pair(4, "memory", bytes(memory), "Resident memory of the process");
             let (text, hover) = recorded(ctx.recording);
-            pair(ui, "recording", text, &hover);
+            pair(0, "recording", text, &hover);
         }
         let delay = run.and_then(|run| run.step_at(ctx.cursor_ns)).map(|step| log_delay(step));
         let clock = delay.map_or_else(|| "header stamp".to_owned(), |delay| format!("header stamp (log time {delay})"));
         pair(
-            ui,
+            3,
             "clock",
             clock,
             "Time base header.stamp; in parentheses MCAP log time minus header.stamp, frame at the cursor",
@@ -49,10 +54,14 @@ pub(super) fn ui(ui: &mut Ui, state: &mut WindowState, ctx: &PanelContext<'_>) {
         if let Some(step) = run.and_then(|run| run.step_at(ctx.cursor_ns)) {
             let stamp_ns = ctx.recording.epoch_ns + step.report.stamp_ns;
             let text = format!("{}.{:09}", stamp_ns.div_euclid(1_000_000_000), stamp_ns.rem_euclid(1_000_000_000));
-            pair(ui, "stamp", text, "header.stamp of the frame at the cursor, s since the Unix epoch");
+            pair(5, "stamp", text, "header.stamp of the frame at the cursor, s since the Unix epoch");
         }
+        let count = warning_lines(ctx.recording).len();
+        let reserved = RIGHT_WIDTH
+            + if state.progress.is_some() { PROGRESS_WIDTH + 5.0 } else { 0.0 }
+            + if state.opening.is_some() { OPENING_WIDTH } else { 0.0 };
+        fields_ui(ui, &theme, fields, ui.available_width() - reserved);
         ui.with_layout(UiLayout::right_to_left(Align::Center), |ui| {
-            let count = warning_lines(ctx.recording).len();
             let (text, color) = if count == 0 {
                 ("No warnings".to_owned(), theme.text_weak)
             } else {
@@ -72,11 +81,42 @@ pub(super) fn ui(ui: &mut Ui, state: &mut WindowState, ctx: &PanelContext<'_>) {
     });
 }
 
+/// A value of the bar.
+struct Field {
+    /// Its rank: those with a higher one are left out first where the window is narrow.
+    rank: u8,
+    name: &'static str,
+    value: String,
+    hover: String,
+}
+
+/// The fields that fit into a width.
+fn fields_ui(ui: &mut Ui, theme: &Theme, mut fields: Vec<Field>, room: f32) {
+    const GAP: f32 = 10.0;
+    let small = TextStyle::Small.resolve(ui.style());
+    let width_of = |field: &Field| {
+        let width = |text: &str, font: FontId| ui.painter().layout_no_wrap(text.to_owned(), font, theme.text).size().x;
+        let gaps = 3.0 * ui.spacing().item_spacing.x + GAP;
+        width(field.name, small.clone()) + width(&field.value, theme::number_font()) + gaps
+    };
+    while fields.iter().map(width_of).sum::<f32>() > room {
+        let last = fields.iter().enumerate().max_by_key(|(_, field)| field.rank).map(|(index, _)| index);
+        let Some(last) = last else { return };
+        fields.remove(last);
+    }
+    for Field { name, value, hover, .. } in fields {
+        ui.label(RichText::new(name).small().color(theme.text_weak)).on_hover_text(&hover);
+        ui.label(RichText::new(value).font(theme::number_font()).color(theme.text)).on_hover_text(&hover);
+        ui.add_space(GAP);
+    }
+}
+
 /// The progress of the estimation.
 fn progress_ui(ui: &mut Ui, progress: &Progress) {
     let left = progress.left_s.map_or_else(String::new, |left_s| format!(", {} s left", fixed(left_s.ceil(), 0)));
     let text = format!("{}: {} %{left}", counted(progress.runs, "run"), fixed(100.0 * progress.fraction, 0));
-    let bar = ProgressBar::new(progress.fraction as f32).desired_width(150.0).text(RichText::new(&text).small());
+    let bar =
+        ProgressBar::new(progress.fraction as f32).desired_width(PROGRESS_WIDTH).text(RichText::new(&text).small());
     let response = ui.add(bar);
     response
         .widget_info(|| egui::WidgetInfo::labeled(egui::Role::ProgressIndicator, true, format!("Computing {text}")));
@@ -86,7 +126,8 @@ fn progress_ui(ui: &mut Ui, progress: &Progress) {
 /// Another log is being opened.
 fn opening_ui(ui: &mut Ui, path: &Path) {
     let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-    ui.label(RichText::new(format!("opening {name}…")).small());
+    let text = RichText::new(format!("opening {name}…")).small();
+    ui.add_sized([OPENING_WIDTH - 30.0, 14.0], Label::new(text).truncate()).on_hover_text(path.display().to_string());
     ui.add(egui::Spinner::new().size(12.0));
 }
 

@@ -45,14 +45,19 @@ impl Bench {
 }
 
 /// Computed once, because it takes longer than all other tests.
-fn sample() -> Recording {
+pub(super) fn sample() -> Recording {
     static SAMPLE: std::sync::OnceLock<Recording> = std::sync::OnceLock::new();
     SAMPLE.get_or_init(|| sample_recording_of(80, &["auto", "classical"])).clone()
 }
 
 pub(super) fn bench() -> Harness<'static, Bench> {
+    bench_of(sample(), [1600.0, 900.0])
+}
+
+/// A window of a size in points with a recording.
+pub(super) fn bench_of(recording: Recording, size: [f32; 2]) -> Harness<'static, Bench> {
     let bench = Bench {
-        recording: sample(),
+        recording,
         cursor_ns: 3 * SECOND_NS,
         playback: Playback::default(),
         selection: Selection::default(),
@@ -60,7 +65,7 @@ pub(super) fn bench() -> Harness<'static, Bench> {
         commands: Vec::new(),
     };
     let mut harness = Harness::builder()
-        .with_size([1600.0, 900.0])
+        .with_size(size)
         .with_max_steps(20)
         .with_context_setup(|ctx| Theme::of(ThemeName::Dark).apply(ctx))
         .build_ui_state(|ui, bench: &mut Bench| bench.ui(ui), bench);
@@ -463,7 +468,7 @@ fn every_panel_explains_itself_and_leads_to_its_section() {
         harness.get_by_label(&format!("Open manual: {}", panel.title())).click();
         harness.run_steps(6);
         assert!(harness.state().window.help.manual.is_open(), "{panel:?}");
-        let heading = harness.query_all_by_label(panel.title()).any(|node| node.role() == Role::Label);
+        let heading = harness.query_all_by_label(panel.title()).any(|node| node.accesskit_node().role() == Role::Label);
         assert!(heading, "{panel:?}");
         harness.key_press(Key::Escape);
         harness.run_steps(3);

@@ -1,0 +1,137 @@
+//! What a small screen shows: whole texts of a legible size, and the answers of the rank panel without scrolling.
+
+use egui::{Key, Rect, Shape};
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable as _;
+
+use super::tests::{Bench, bench_of, sample};
+use super::{PanelName, Preset};
+use crate::gui::theme::SMALLEST_TEXT;
+use crate::session::Recording;
+
+/// The size of a small laptop's screen in points.
+const SMALL: [f32; 2] = [1366.0, 768.0];
+
+/// A painted text.
+#[derive(Debug)]
+struct Painted {
+    text: String,
+    rect: Rect,
+    clip: Rect,
+    elided: bool,
+    smallest: f32,
+}
+
+fn painted(harness: &Harness<'static, Bench>) -> Vec<Painted> {
+    fn collect(shape: &Shape, clip: Rect, texts: &mut Vec<Painted>) {
+        match shape {
+            Shape::Text(text) => {
+                let sizes = text.galley.job.sections.iter().map(|section| section.format.font_id.size);
+                texts.push(Painted {
+                    text: text.galley.text().to_owned(),
+                    rect: text.visual_bounding_rect(),
+                    clip,
+                    elided: text.galley.elided,
+                    smallest: sizes.fold(f32::INFINITY, f32::min),
+                });
+            }
+            Shape::Vec(shapes) => shapes.iter().for_each(|shape| collect(shape, clip, texts)),
+            _ => {}
+        }
+    }
+    let mut texts = Vec::new();
+    harness.output().shapes.iter().for_each(|clipped| collect(&clipped.shape, clipped.clip_rect, &mut texts));
+    texts.retain(|painted| !painted.text.trim().is_empty() && painted.clip.y_range().contains(painted.rect.center().y));
+    texts
+}
+
+/// Asserts that texts are whole and legible. Names of places in the scene move with the view and are exempt.
+fn check_texts(harness: &Harness<'static, Bench>, what: &str) {
+    let scene = harness.state().window.places.iter().find(|(panel, _)| *panel == PanelName::Scene);
+    let scene = scene.map_or(Rect::NOTHING, |(_, rect)| *rect);
+    let texts = painted(harness);
+    assert!(texts.len() > 50, "{what}: {} texts", texts.len());
+    for painted in texts {
+        assert!(painted.smallest >= SMALLEST_TEXT, "{what}: small text {painted:?}");
+        let (rect, clip) = (painted.rect, painted.clip.expand(1.0));
+        let cut = rect.left() < clip.left() || rect.right() > clip.right();
+        // The choice of the direction has a tooltip with the whole text.
+        let choice = painted.text.starts_with("weak ") || painted.text.starts_with("null ");
+        assert!(choice || !painted.elided, "{what}: shortened text {painted:?}");
+        assert!(!cut || scene.contains(rect.center()), "{what}: text that is cut off {painted:?}");
+    }
+}
+
+fn runs(count: usize) -> Recording {
+    let mut recording = sample();
+    recording.runs.truncate(count);
+    recording
+}
+
+#[test]
+fn a_small_screen_shows_whole_texts_in_every_layout() {
+    for count in [1, 2] {
+        for preset in Preset::ALL {
+            let mut harness = bench_of(runs(count), SMALL);
+            harness.state_mut().window.arrange(preset);
+            harness.run_steps(4);
+            check_texts(&harness, &format!("{} with {count} runs", preset.name()));
+        }
+    }
+}
+
+#[test]
+fn a_small_screen_shows_whole_texts_in_every_panel() {
+    for panel in PanelName::movable() {
+        let mut harness = bench_of(runs(2), SMALL);
+        harness.state_mut().window.layout.set_visible(panel, true);
+        harness.run_steps(4);
+        check_texts(&harness, panel.title());
+    }
+}
+
+#[test]
+fn the_heat_map_is_above_the_fold_in_every_layout() {
+    for (count, run) in [(1, 0), (2, 0), (2, 1)] {
+        for preset in Preset::ALL {
+            let mut harness = bench_of(runs(count), SMALL);
+            harness.state_mut().window.arrange(preset);
+            harness.state_mut().selection.run = run;
+            harness.run_steps(4);
+            let what = format!("{}, run {run} of {count}", preset.name());
+            let panel = harness.state().window.places.iter().find(|(panel, _)| *panel == PanelName::Rank).unwrap().1;
+            for answer in ["Structural rank 18 of", "Least observable: ", "Suggested excitation"] {
+                let rect = harness.get_by_label_contains(answer).rect();
+                assert!(panel.contains_rect(rect), "{what}: {answer} at {rect:?} of {panel:?}");
+            }
+            let rows: Vec<Rect> = harness.query_all_by_label_contains(" weights").map(|row| row.rect()).collect();
+            assert!(rows.len() >= 3, "{what}: {} rows", rows.len());
+            for row in rows {
+                assert!(panel.contains_rect(row), "{what}: row {row:?} of {panel:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_list_of_shortcuts_fits_and_is_complete() {
+    for size in [[1600.0, 900.0], SMALL, [800.0, 500.0]] {
+        let mut harness = bench_of(runs(1), size);
+        harness.key_press(Key::Questionmark);
+        harness.run_steps(4);
+        let screen = Rect::from_min_size(egui::Pos2::ZERO, size.into());
+        for heading in ["File", "Playback", "Everywhere"] {
+            // The menu has the same name.
+            let inside =
+                harness.query_all_by_label(heading).all(|node| screen.x_range().contains(node.rect().center().x));
+            assert!(inside, "{heading} at {size:?}");
+        }
+        let title = harness.get_by_label("Shortcuts").rect();
+        assert!(screen.contains_rect(title), "{title:?} at {size:?}");
+        let whole = size != [800.0, 500.0];
+        for entry in super::actions::TABLE {
+            let mut rects = harness.query_all_by_label(entry.name).map(|node| node.rect());
+            assert!(rects.any(|rect| !whole || screen.contains_rect(rect)), "{} at {size:?}", entry.name);
+        }
+    }
+}

@@ -1,0 +1,246 @@
+//! The menus of the bar at the top: the actions of the table with their keys, and what changes with the session.
+
+use std::path::Path;
+
+use egui::containers::menu::{MenuButton, MenuConfig};
+use egui::{Button, PopupCloseBehavior, Ui, WidgetInfo};
+
+use super::actions::{Action, Entry, TABLE};
+use super::tiles::Preset;
+use super::{Dialog, PanelName, WindowRequest, WindowState};
+use crate::gui::PanelContext;
+use crate::gui::theme::{MAX_RUNS, ThemeName};
+use crate::gui::timeline::SPEEDS;
+
+/// Maximum number of recent files in the menu.
+const MAX_RECENT: usize = 10;
+
+/// A menu of the bar.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Menu {
+    File,
+    View,
+    Run,
+    Playback,
+    Help,
+}
+
+impl Menu {
+    /// All menus from left to right; the menu of the panels stands after the view.
+    pub(super) const ALL: [Self; 5] = [Self::File, Self::View, Self::Run, Self::Playback, Self::Help];
+
+    /// Its title.
+    pub(super) const fn title(self) -> &'static str {
+        match self {
+            Self::File => "File",
+            Self::View => "View",
+            Self::Run => "Run",
+            Self::Playback => "Playback",
+            Self::Help => "Help",
+        }
+    }
+
+    /// The actions in groups, from above.
+    const fn actions(self) -> &'static [&'static [Action]] {
+        match self {
+            Self::File => &[
+                &[Action::Dialog(Dialog::OpenLog)],
+                &[Action::Save, Action::Export, Action::Copy],
+                &[Action::Dialog(Dialog::Settings), Action::Undo, Action::Redo],
+                &[Action::CloseLog, Action::Quit],
+            ],
+            Self::View => &[
+                &[
+                    Action::Layout(Preset::Overview),
+                    Action::Layout(Preset::Calibration),
+                    Action::Layout(Preset::FrontEnd),
+                    Action::Layout(Preset::Scene),
+                    Action::Layout(Preset::Comparison),
+                    Action::SavedLayout(0),
+                ],
+                &[Action::ZoomTime(true), Action::ZoomTime(false), Action::WholeLog],
+                &[Action::Dismiss, Action::Warnings],
+                &[Action::NextPanel(true), Action::NextPanel(false), Action::Theme],
+            ],
+            Self::Run => &[
+                &[Action::Dialog(Dialog::AddRun), Action::Dialog(Dialog::Fork), Action::NextRun],
+                &[Action::Breakpoint, Action::Hit(true), Action::Hit(false)],
+            ],
+            Self::Playback => &[
+                &[Action::TogglePlay, Action::Start, Action::End],
+                &[Action::Step(1), Action::Step(-1), Action::Step(10), Action::Step(-10)],
+                &[Action::Iteration(true), Action::Iteration(false)],
+                &[Action::Event(true), Action::Event(false)],
+                &[Action::Loop, Action::Marker],
+            ],
+            Self::Help => &[&[Action::Manual, Action::Explain], &[Action::Shortcuts, Action::Dialog(Dialog::Palette)]],
+        }
+    }
+
+    /// The entries of the table in groups. An action without a place in any menu is in the menu of the view.
+    pub(super) fn groups(self) -> Vec<Vec<&'static Entry>> {
+        let mut groups: Vec<Vec<&Entry>> = self
+            .actions()
+            .iter()
+            .map(|group| {
+                let entry = |action: &Action| TABLE.iter().find(|entry| entry.action == *action);
+                group.iter().filter_map(entry).collect()
+            })
+            .collect();
+        if self == Self::View {
+            let placed = |action: Action| {
+                Self::ALL.into_iter().any(|menu| menu.actions().iter().any(|group| group.contains(&action)))
+            };
+            groups.push(TABLE.iter().filter(|entry| !placed(entry.action)).collect());
+        }
+        groups.retain(|group| !group.is_empty());
+        groups
+    }
+}
+
+/// Draws the buttons of all menus, and the menu that is open.
+pub(super) fn ui(ui: &mut Ui, state: &mut WindowState, ctx: &PanelContext<'_>, actions: &mut Vec<Action>) {
+    for menu in Menu::ALL {
+        MenuButton::from_button(Button::new(menu.title()).frame_when_inactive(false)).ui(ui, |ui| {
+            ui.set_min_width(230.0);
+            for (number, group) in menu.groups().into_iter().enumerate() {
+                if number > 0 {
+                    ui.separator();
+                }
+                for entry in group {
+                    entry_ui(ui, state, ctx, entry, actions);
+                }
+                if number == 0 {
+                    first_group_ui(ui, menu, state, ctx, actions);
+                }
+            }
+            last_group_ui(ui, menu, ctx, actions);
+        });
+        if menu == Menu::View {
+            panels_ui(ui, state, ctx);
+        }
+    }
+}
+
+/// One action with its keys.
+fn entry_ui(ui: &mut Ui, state: &WindowState, ctx: &PanelContext<'_>, entry: &Entry, actions: &mut Vec<Action>) {
+    if matches!(entry.action, Action::SavedLayout(_)) {
+        return;
+    }
+    let room = ctx.recording.runs.len() < MAX_RUNS;
+    let enabled = room || !matches!(entry.action, Action::Dialog(Dialog::AddRun | Dialog::Fork));
+    let on = matches!(entry.action, Action::Layout(preset) if state.layout.preset == Some(preset));
+    if item_ui(ui, entry.name, entry.keys, enabled, on) {
+        actions.push(entry.action);
+    }
+}
+
+fn item_ui(ui: &mut Ui, name: &str, keys: &str, enabled: bool, on: bool) -> bool {
+    let response = ui.add_enabled(enabled, Button::new(name).shortcut_text(keys).selected(on));
+    response.widget_info(|| WidgetInfo::selected(egui::Role::Button, enabled, on, name));
+    response.clicked()
+}
+
+/// What belongs to the first group of a menu and depends on the session.
+fn first_group_ui(ui: &mut Ui, menu: Menu, state: &mut WindowState, ctx: &PanelContext<'_>, actions: &mut Vec<Action>) {
+    match menu {
+        Menu::File => {
+            ui.add_enabled_ui(!state.recent_logs.is_empty(), |ui| {
+                ui.menu_button("Open recent", |ui| {
+                    for path in state.recent_logs.iter().take(MAX_RECENT) {
+                        if recent_ui(ui, path) {
+                            state.requests.push(WindowRequest::OpenLog(path.clone()));
+                        }
+                    }
+                });
+            });
+        }
+        Menu::View => {
+            for (number, name) in state.saved_layouts.names().enumerate() {
+                let keys = if number < 9 { format!("Ctrl+{}", number + 1) } else { String::new() };
+                if item_ui(ui, &format!("Layout: {name}"), &keys, true, false) {
+                    actions.push(Action::SavedLayout(number));
+                }
+            }
+        }
+        Menu::Run => {
+            let runs = &ctx.recording.runs;
+            for (number, run) in runs.iter().enumerate().filter(|_| runs.len() > 1) {
+                if item_ui(ui, &format!("Show run {}", run.spec.label), "", true, ctx.selection.run == number) {
+                    actions.push(Action::Run(number));
+                }
+            }
+            if let Some(last) = runs.last().filter(|_| runs.len() > 1)
+                && item_ui(ui, &format!("Remove run {}", last.spec.label), "", true, false)
+            {
+                actions.push(Action::RemoveRun(runs.len() - 1));
+            }
+        }
+        Menu::Playback => {
+            ui.menu_button("Speed", |ui| {
+                for speed in SPEEDS {
+                    if item_ui(ui, &format!("{speed}× log time"), "", true, ctx.playback.speed == speed) {
+                        actions.push(Action::Speed(speed));
+                    }
+                }
+            });
+        }
+        Menu::Help => {}
+    }
+}
+
+/// A recent file by its name; the folder is in the tooltip.
+fn recent_ui(ui: &mut Ui, path: &Path) -> bool {
+    let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
+    let response = ui.button(&name);
+    response.widget_info(|| WidgetInfo::labeled(egui::Role::Button, true, format!("Open {name}")));
+    response.on_hover_text(path.display().to_string()).clicked()
+}
+
+/// What belongs to the last group of a menu and depends on the session.
+fn last_group_ui(ui: &mut Ui, menu: Menu, ctx: &PanelContext<'_>, actions: &mut Vec<Action>) {
+    if menu == Menu::View {
+        for theme in [ThemeName::Light, ThemeName::Dark, ThemeName::Print] {
+            if item_ui(ui, &format!("Theme: {}", theme.as_str()), "", true, ctx.theme.name == theme) {
+                actions.push(Action::SetTheme(theme));
+            }
+        }
+    }
+}
+
+/// The menu of the panels stays open while panels are chosen.
+fn panels_ui(ui: &mut Ui, state: &mut WindowState, ctx: &PanelContext<'_>) {
+    let config = MenuConfig::new().close_behavior(PopupCloseBehavior::CloseOnClickOutside);
+    let button = Button::new("Panels").frame_when_inactive(false);
+    MenuButton::from_button(button).config(config).ui(ui, |ui| {
+        for panel in PanelName::movable() {
+            let mut visible = state.layout.is_visible(panel);
+            if ui.checkbox(&mut visible, panel.title()).changed() {
+                state.layout.set_visible(panel, visible);
+            }
+        }
+        ui.separator();
+        if state.saved_layouts.ui(ui, ctx.theme, &mut state.layout) {
+            state.requests.push(WindowRequest::KeepLayouts(state.saved_layouts.to_text()));
+        }
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_action_of_the_table_is_in_exactly_one_menu() {
+        for entry in TABLE {
+            let count =
+                |menu: Menu| menu.groups().iter().flatten().filter(|other| other.action == entry.action).count();
+            let counts: usize = Menu::ALL.into_iter().map(count).sum();
+            assert_eq!(counts, 1, "{}", entry.name);
+        }
+        let listed = Menu::ALL.into_iter().flat_map(|menu| menu.actions().iter().copied().flatten());
+        for action in listed {
+            assert!(TABLE.iter().any(|entry| entry.action == *action), "{action:?} is not in the table");
+        }
+    }
+}
