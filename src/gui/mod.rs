@@ -1,10 +1,12 @@
 //! Panels, the 3D scene and the window: they read a recording at a cursor and push commands.
 
+mod accessible;
 pub mod app;
 pub mod breakpoints;
 mod chain_values;
 pub mod comparison;
 pub mod convergence;
+mod copied_value;
 pub mod csv_table;
 pub mod desktop;
 mod events;
@@ -14,6 +16,7 @@ pub mod image_panel;
 pub mod inspector;
 pub mod jacobian;
 pub mod laboratory;
+mod pan_zoom;
 #[cfg(test)]
 mod panel_tests;
 mod path_field;

@@ -3,13 +3,13 @@
 use egui::{ScrollArea, Ui};
 
 use super::numbers::{difference_text, shown};
-use super::row::{Line, Row, row_ui};
+use super::row::{Line, MIN_HEIGHT, Row, row_ui};
 use crate::gui::PanelContext;
 use crate::gui::plot::Curve;
 use crate::session::{Comparison, Quantity};
 
 /// Range of the row height in points.
-const HEIGHTS: std::ops::RangeInclusive<f32> = 46.0..=120.0;
+const HEIGHTS: std::ops::RangeInclusive<f32> = MIN_HEIGHT..=120.0;
 
 /// The plotted quantities.
 const DRAWN: [Quantity; 8] = [

@@ -4,13 +4,16 @@ use egui::{Align2, Rect, Shape, Stroke, Ui, pos2, vec2};
 
 use crate::gui::PanelContext;
 use crate::gui::plot::{
-    Clicks, Curve, PlotArea, navigate, paint_cursor, paint_curve, paint_ground, paint_steps, paint_value_grid,
-    visible_range,
+    Clicks, Curve, Interaction, PlotArea, Wheel, navigate, paint_cursor, paint_curve, paint_ground, paint_steps,
+    paint_value_grid, visible_range,
 };
 use crate::gui::theme::{self, CURVE_WIDTH};
 
 /// Width of names and values on the left.
 const NAMES: f32 = 158.0;
+
+/// Minimum height of a row in points; a list of rows that are so low may scroll.
+pub(super) const MIN_HEIGHT: f32 = 46.0;
 
 /// A row.
 pub(super) struct Row<'a> {
@@ -98,5 +101,8 @@ pub(super) fn row_ui(
     }
     paint_cursor(&painter, &theme, &area, ctx.cursor_ns);
     let id = ui.unique_id().with(("row over time", row.id));
-    navigate(ui, ctx, &area, id, row.label, Clicks::Seek, false).on_hover_text(row.hover);
+    let values: Vec<&str> = lines.iter().filter_map(|line| line.text.as_deref()).collect();
+    let wheel = Wheel::in_list(height <= MIN_HEIGHT);
+    let plot = Interaction { id, name: row.label, value: &values.join(", "), clicks: Clicks::Seek, wheel };
+    navigate(ui, ctx, &area, &plot).on_hover_text(row.hover);
 }

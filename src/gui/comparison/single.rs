@@ -3,7 +3,7 @@
 use egui::{Button, Label, Rect, RichText, ScrollArea, Ui, UiBuilder, WidgetInfo, vec2};
 
 use super::numbers;
-use super::row::{Line, Row, row_ui};
+use super::row::{Line, MIN_HEIGHT, Row, row_ui};
 use super::scores::Scores;
 use crate::estimator::StepReport;
 use crate::geometry::{RigidTransform, so3, wrap_angle};
@@ -18,7 +18,7 @@ use crate::session::{Command, RunRecord, RunSpec, StepRecord};
 /// Panel width from which the errors over time stand beside the numbers.
 const MIN_WIDTH_FOR_BOTH: f32 = 700.0;
 /// Range of the row height in points.
-const HEIGHTS: std::ops::RangeInclusive<f32> = 46.0..=120.0;
+const HEIGHTS: std::ops::RangeInclusive<f32> = MIN_HEIGHT..=120.0;
 
 /// A value over time: name, shown unit, factor from the stored unit, meaning.
 const ROWS: [(&str, &str, f64, &str); 7] = [

@@ -15,7 +15,7 @@ use self::model::{CalibrationHistory, ConvertedHistory};
 pub(crate) use self::model::{ParameterState, parameter_states};
 use super::PanelContext;
 use super::chain_values::{ParameterValues, true_values};
-use super::plot::{BandCurve, Curve, StateCurve};
+use super::plot::{BandCurve, Curve, StateCurve, Wheel};
 use crate::gimbal::ParameterId;
 
 /// The cached curves of one parameter of one run.
@@ -82,10 +82,10 @@ impl ConvergencePanel {
                 let narrow = Rect::from_min_size(top, vec2(available.width() - 10.0, available.height()));
                 let layout = layout::lay_out(&parameters, narrow);
                 ui.allocate_space(vec2(1.0, layout.height));
-                self.cells_ui(ui, ctx, shown, &parameters, &ground_truth, &layout);
+                self.cells_ui(ui, ctx, (shown, Wheel::Scrolls), &parameters, &ground_truth, &layout);
             });
         } else {
-            self.cells_ui(ui, ctx, shown, &parameters, &ground_truth, &layout);
+            self.cells_ui(ui, ctx, (shown, Wheel::Zooms), &parameters, &ground_truth, &layout);
         }
     }
 
@@ -112,7 +112,7 @@ impl ConvergencePanel {
         &mut self,
         ui: &Ui,
         ctx: &mut PanelContext<'_>,
-        shown: usize,
+        (shown, wheel): (usize, Wheel),
         parameters: &[ParameterId],
         ground_truth: &ParameterValues,
         layout: &layout::Layout,
@@ -125,8 +125,13 @@ impl ConvergencePanel {
         }
         for (parameter, rect) in parameters.iter().zip(&layout.cells) {
             if ui.is_rect_visible(*rect) {
-                let data =
-                    paint::PlotData { histories: &self.histories, converted: &self.converted, ground_truth, shown };
+                let data = paint::PlotData {
+                    histories: &self.histories,
+                    converted: &self.converted,
+                    ground_truth,
+                    shown,
+                    wheel,
+                };
                 paint::cell_ui(ui, ctx, &data, &mut self.curves, *parameter, *rect);
             }
         }

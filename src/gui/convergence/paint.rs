@@ -11,9 +11,10 @@ use super::range::{paint_outside, value_range};
 use crate::gimbal::ParameterId;
 use crate::gui::PanelContext;
 use crate::gui::chain_values::ParameterValues;
+use crate::gui::copied_value::offer;
 use crate::gui::plot::{
-    Clicks, PlotArea, navigate, paint_band, paint_cursor, paint_curve, paint_ground, paint_hatch, paint_line,
-    paint_value_grid, visible_range,
+    Clicks, Interaction, PlotArea, Wheel, navigate, paint_band, paint_cursor, paint_curve, paint_ground, paint_hatch,
+    paint_line, paint_value_grid, visible_range,
 };
 use crate::gui::theme::{self, CURVE_WIDTH};
 use crate::gui::units::{Shown, fixed};
@@ -93,6 +94,8 @@ pub(super) struct PlotData<'a> {
     pub(super) ground_truth: &'a ParameterValues,
     /// Index of the shown run.
     pub(super) shown: usize,
+    /// The effect of the wheel.
+    pub(super) wheel: Wheel,
 }
 
 impl<'a> PlotData<'a> {
@@ -231,7 +234,11 @@ pub(super) fn cell_ui(
     }
     let label = format!("{name} {text} {}", state.tag());
     let widget = ui.unique_id().with(("parameter", name));
-    let response = navigate(ui, ctx, &area, widget, label.trim_end(), Clicks::Select, false);
+    let plot = Interaction { id: widget, name: label.trim_end(), value: "", clicks: Clicks::Select, wheel: data.wheel };
+    let response = navigate(ui, ctx, &area, &plot);
+    if response.hovered() {
+        offer(ui, format!("{name} {text}"));
+    }
     if response.clicked() {
         ctx.selection.parameter = if selected { None } else { Some(id) };
     }

@@ -14,7 +14,10 @@ use egui::{Align2, ColorImage, PopupCloseBehavior, Rect, Sense, TextureHandle, T
 use self::model::ImageModel;
 pub use self::model::SolveSide;
 use self::paint::{ImagePlacement, MarkOptions};
+use super::accessible::describe;
+use super::copied_value::offer;
 use super::help::terms::window;
+use super::pan_zoom::PanZoom;
 use super::units::significant;
 use super::{PanelContext, slide};
 use crate::sensors::GrayImage;
@@ -41,7 +44,7 @@ pub struct ImagePanel {
     pub trails: bool,
     /// Write every feature's id.
     pub ids: bool,
-    view: View,
+    view: PanZoom,
     texture: Option<CachedTexture>,
 }
 
@@ -53,24 +56,9 @@ impl Default for ImagePanel {
             residuals: true,
             trails: true,
             ids: false,
-            view: View::default(),
+            view: PanZoom::default(),
             texture: None,
         }
-    }
-}
-
-/// The visible region of the image.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct View {
-    /// Size relative to the fitted size.
-    zoom: f32,
-    /// Centre of the region as fractions of the image size.
-    centre: Vec2,
-}
-
-impl Default for View {
-    fn default() -> Self {
-        Self { zoom: 1.0, centre: Vec2::splat(0.5) }
     }
 }
 
@@ -117,6 +105,7 @@ impl ImagePanel {
         let (area, response) = ui.allocate_exact_size(size.max(Vec2::splat(16.0)), Sense::click_and_drag());
         let name = format!("Image of {}", run.spec.label);
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &name));
+        describe(&response, &model.caption());
         let image = context.images.image(&run.camera_key, model.frame_index);
         self.image_ui(ui, area, &response, context, &model, image);
         let (legend, line) = ui.allocate_exact_size(vec2(ui.available_width(), LINE_HEIGHT), Sense::hover());
@@ -191,8 +180,9 @@ impl ImagePanel {
             let camera = cameras.iter().find(|camera| Some(camera.key.as_str()) == camera_key);
             camera.map_or([640, 480], |camera| camera.model.resolution_px)
         });
-        self.navigate(ui, area, response, size_px);
-        let place = self.placement(area, size_px);
+        let fitted = fitted_size(area, size_px);
+        self.view.navigate(ui, context.theme, area, fitted, response, MAX_ZOOM);
+        let place = ImagePlacement { rect: self.view.place(area, fitted), size_px };
         if let Some(image) = image {
             let texture = self.texture(ui, image);
             let uv = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
@@ -251,39 +241,10 @@ impl ImagePanel {
         if let Some(mark) = nearest {
             paint::selection(painter, place, place.position(&mark.measured_px));
             ui.ctx().set_cursor_icon(egui::CursorIcon::PointingHand);
-            response.clone().on_hover_text_at_pointer(model::description(mark));
+            let text = model::description(mark);
+            offer(ui, text.clone());
+            response.clone().on_hover_text_at_pointer(text);
         }
-    }
-
-    /// The wheel zooms about the pointer, dragging pans, a double click fits the image.
-    fn navigate(&mut self, ui: &Ui, area: Rect, response: &egui::Response, size_px: [usize; 2]) {
-        if response.double_clicked() {
-            self.view = View::default();
-        }
-        let before = self.placement(area, size_px);
-        if let Some(pointer) = response.hover_pos() {
-            let factor = ui.input(|input| input.zoom_delta() * (input.smooth_scroll_delta().y * 0.004).exp());
-            let zoom = (self.view.zoom * factor).clamp(1.0, MAX_ZOOM);
-            if zoom != self.view.zoom {
-                // The position under the pointer stays fixed.
-                let anchor = (pointer - before.rect.min) / before.rect.size();
-                self.view.centre = anchor + (self.view.centre - anchor) * (self.view.zoom / zoom);
-                self.view.zoom = zoom;
-            }
-        }
-        if response.dragged() {
-            self.view.centre -= response.drag_delta() / before.rect.size();
-        }
-        let room = 0.5 / self.view.zoom;
-        self.view.centre = self.view.centre.clamp(Vec2::splat(room), Vec2::splat(1.0 - room));
-    }
-
-    fn placement(&self, area: Rect, size_px: [usize; 2]) -> ImagePlacement {
-        let image = vec2(size_px[0].max(1) as f32, size_px[1].max(1) as f32);
-        let fitting = (area.width() / image.x).min(area.height() / image.y);
-        let size = image * fitting * self.view.zoom;
-        let rect = Rect::from_min_size(area.center() - self.view.centre * size, size);
-        ImagePlacement { rect, size_px }
     }
 
     fn texture(&mut self, ui: &Ui, image: Arc<GrayImage>) -> egui::TextureId {
@@ -304,6 +265,12 @@ impl ImagePanel {
         cached.image = image;
         self.texture.insert(cached).handle.id()
     }
+}
+
+/// Size in points of an image that fills the area in one direction.
+fn fitted_size(area: Rect, size_px: [usize; 2]) -> Vec2 {
+    let image = vec2(size_px[0].max(1) as f32, size_px[1].max(1) as f32);
+    image * (area.width() / image.x).min(area.height() / image.y)
 }
 
 fn message_ui(ui: &mut Ui, text: &str) {

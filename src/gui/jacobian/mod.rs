@@ -13,13 +13,16 @@ mod tests;
 
 use std::sync::Arc;
 
-use egui::{Pos2, Rect, Response, Role, Sense, Ui, Vec2, WidgetInfo, pos2, vec2};
+use egui::{Pos2, Rect, Role, Sense, Ui, Vec2, WidgetInfo, pos2, vec2};
 
 use self::model::JacobianModel;
 pub(super) use self::model::{cameras, column_name, name_of};
 use super::PanelContext;
+use super::accessible::describe;
 use super::convergence::empty_ui;
+use super::copied_value::offer;
 use super::help::terms::window;
+use super::pan_zoom::PanZoom;
 use crate::estimator::{ColumnId, JacobianFactor};
 use crate::session::{RunRecord, StepRecord};
 
@@ -41,33 +44,11 @@ const DETAILS_LINE: f32 = 34.0;
 pub struct JacobianPanel {
     model: Option<JacobianModel>,
     mesh: paint::CachedMesh,
-    view: View,
+    view: PanZoom,
     /// The selected row, when it is not a feature (features are selected in all panels).
     row: Option<JacobianFactor>,
     /// The selected column, when it is not a parameter.
     column: Option<ColumnId>,
-}
-
-/// The visible region of the matrix.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct View {
-    zoom: f32,
-    /// Centre of the region as fractions of the matrix size.
-    centre: Vec2,
-}
-
-impl Default for View {
-    fn default() -> Self {
-        Self { zoom: 1.0, centre: Vec2::splat(0.5) }
-    }
-}
-
-impl View {
-    /// Rectangle of the whole matrix, which may be larger than the visible region.
-    fn place(self, area: Rect) -> Rect {
-        let size = area.size() * self.zoom;
-        Rect::from_min_size(area.center() - self.centre * size, size)
-    }
 }
 
 impl JacobianPanel {
@@ -115,8 +96,9 @@ impl JacobianPanel {
         }
         let response = ui.interact(area, ui.unique_id().with("blocks"), Sense::click_and_drag());
         response.widget_info(|| WidgetInfo::labeled(Role::Image, true, "Jacobian blocks"));
-        self.navigate(ui, area, &response);
-        let place = self.view.place(area);
+        describe(&response, &model.summary());
+        self.view.navigate(ui, ctx.theme, area, area.size(), &response, MAX_ZOOM);
+        let place = self.view.place(area, area.size());
         let hovered = response.hover_pos().and_then(|pointer| block_at(model, place, pointer));
         self.mesh.paint(ui, ctx.theme, area, place, model);
         paint::axes(ui, ctx.theme, whole, area, place, model, selected_block);
@@ -125,7 +107,9 @@ impl JacobianPanel {
         }
         if let Some((row, column)) = hovered {
             paint::hover(ui, ctx.theme, area, place, model, (row, column));
-            response.on_hover_text_at_pointer(details::headline(model, row, column));
+            let text = details::headline(model, row, column);
+            offer(ui, text.clone());
+            response.on_hover_text_at_pointer(text);
         }
         let (legend, hovered_legend) = ui.allocate_exact_size(vec2(ui.available_width(), LEGEND), Sense::hover());
         hovered_legend.on_hover_text(window::JACOBIAN_NORM.meaning);
@@ -160,29 +144,6 @@ impl JacobianPanel {
             ColumnId::Calibration(parameter) => ctx.selection.parameter = Some(parameter),
             other => self.column = Some(other),
         }
-    }
-
-    /// The wheel zooms about the pointer, dragging pans, a double click fits the matrix.
-    fn navigate(&mut self, ui: &Ui, area: Rect, response: &Response) {
-        if response.double_clicked() {
-            self.view = View::default();
-        }
-        let before = self.view.place(area);
-        if let Some(pointer) = response.hover_pos() {
-            let factor = ui.input(|input| input.zoom_delta() * (input.smooth_scroll_delta().y * 0.004).exp());
-            let zoom = (self.view.zoom * factor).clamp(1.0, MAX_ZOOM);
-            if zoom != self.view.zoom {
-                // The position under the pointer stays fixed.
-                let anchor = (pointer - before.min) / before.size();
-                self.view.centre = anchor + (self.view.centre - anchor) * (self.view.zoom / zoom);
-                self.view.zoom = zoom;
-            }
-        }
-        if response.dragged() {
-            self.view.centre -= response.drag_delta() / before.size();
-        }
-        let room = 0.5 / self.view.zoom;
-        self.view.centre = self.view.centre.clamp(Vec2::splat(room), Vec2::splat(1.0 - room));
     }
 }
 

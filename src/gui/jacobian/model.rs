@@ -49,6 +49,13 @@ pub(in crate::gui) fn cameras<'a>(rig: &'a Rig, run: &RunRecord, step: &StepReco
 }
 
 impl JacobianModel {
+    /// Number of rows and columns, and the range of the norms, in words.
+    pub(super) fn summary(&self) -> String {
+        let rows = counted(self.rows.strips.len(), "row");
+        let columns = counted(self.columns.strips.len(), "column");
+        format!("{rows} and {columns} of blocks, norms from 1e{:.0} to 1e{:.0}", self.decades.0, self.decades.1)
+    }
+
     /// The matrix of a step, `None` if it has none.
     pub(super) fn of_step(rig: &Rig, names: &ParameterNames, run: &RunRecord, step: &Arc<StepRecord>) -> Option<Self> {
         let jacobian = step.report.jacobian(&cameras(rig, run, step))?;

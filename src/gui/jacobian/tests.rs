@@ -3,7 +3,7 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 
 use super::model::JacobianModel;
-use super::{JacobianPanel, View, rect_of};
+use super::{JacobianPanel, PanZoom, rect_of};
 use crate::estimator::{ColumnGroup, JacobianFactor};
 use crate::gimbal::tests::parameter;
 use crate::gui::Selection;
@@ -51,7 +51,7 @@ fn click(harness: &mut Harness<'static, Shown>, at: egui::Pos2) {
 /// Centre of a block on the screen, in the layout of the test.
 fn middle(harness: &Harness<'static, Shown>, row: usize, column: usize) -> egui::Pos2 {
     let area = harness.get_by_label("Jacobian blocks").rect();
-    rect_of(&model(), View::default().place(area), row, column).center()
+    rect_of(&model(), PanZoom::default().place(area, area.size()), row, column).center()
 }
 
 #[test]
@@ -110,12 +110,12 @@ fn the_matrix_zooms_and_steps_without_a_linearization_are_reported() {
         let options = HeadlessOptions { size_px: [1000, 640], pixels_per_point: 1.0, theme };
         let whole = draw(options, |ui| show(ui, &mut shown, simulated_recording(), theme));
         keep_screenshot(&format!("jacobian-flown-{}", theme.as_str()), &whole);
-        shown.0.view = View { zoom: 6.0, centre: egui::vec2(0.15, 0.3) };
+        shown.0.view = PanZoom { zoom: 6.0, centre: egui::vec2(0.15, 0.3) };
         let near = draw(options, |ui| show(ui, &mut shown, simulated_recording(), theme));
         keep_screenshot(&format!("jacobian-near-{}", theme.as_str()), &near);
         assert!(whole != near);
     }
-    let place = View { zoom: 2.0, centre: egui::vec2(0.25, 0.5) }
+    let place = PanZoom { zoom: 2.0, centre: egui::vec2(0.25, 0.5) }
         .place(egui::Rect::from_min_max(pos2(0.0, 0.0), pos2(100.0, 50.0)));
     assert_eq!(place, egui::Rect::from_min_max(pos2(0.0, -25.0), pos2(200.0, 75.0)));
 

@@ -6,11 +6,12 @@ mod curve;
 mod navigate;
 mod ticks;
 
+use egui::containers::scroll_area::ScrollAreaOutput;
 use egui::epaint::{Mesh, Vertex, WHITE_UV};
 use egui::{Align2, Color32, Painter, Pos2, Rangef, Rect, Shape, Stroke, pos2};
 
 pub(crate) use curve::{BandCurve, Curve, StateCurve};
-pub(crate) use navigate::{Clicks, navigate, visible_range, zoom_about_cursor};
+pub(crate) use navigate::{Clicks, Interaction, Wheel, navigate, visible_range, zoom_about_cursor};
 pub(crate) use ticks::{decimals_of_step, ticks};
 
 use super::theme::{self, RunStyle, Theme};
@@ -64,6 +65,11 @@ impl PlotArea {
         (self.low, self.high) = (low - widen, high + widen);
         self
     }
+}
+
+/// Whether the content of a list is higher than its panel.
+pub(crate) fn overflows<R>(list: &ScrollAreaOutput<R>) -> bool {
+    list.content_size.y > list.inner_rect.height() + 1.0
 }
 
 /// Background and border of a plot.

@@ -1,13 +1,16 @@
 //! Navigation in time with the pointer, the same in every plot.
 
-use egui::{Id, PointerButton, Response, Role, Sense, Ui, WidgetInfo};
+use egui::{Id, PointerButton, Rangef, Rect, Response, Role, Sense, Stroke, Ui, WidgetInfo};
 
 use super::PlotArea;
 use crate::gui::PanelContext;
+use crate::gui::accessible::describe;
 use crate::session::Command;
 
 /// Minimum visible time range.
 const MIN_VISIBLE_NS: i64 = 200_000_000;
+/// Minimum width of a range that is selected with the pointer, in points.
+const MIN_RANGE_WIDTH: f32 = 6.0;
 
 /// The time range of all plots: the zoomed range, or the whole log.
 pub(crate) fn visible_range(ctx: &PanelContext<'_>) -> (i64, i64) {
@@ -15,70 +18,165 @@ pub(crate) fn visible_range(ctx: &PanelContext<'_>) -> (i64, i64) {
     ctx.selection.visible_ns.filter(|(begin, end)| begin < end).unwrap_or(whole)
 }
 
-/// The effect of a click on a plot.
+/// The effect of the pointer's primary button on a plot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Clicks {
-    /// It moves the cursor there.
+    /// A click and a drag move the cursor: the timeline.
+    Scrub,
+    /// A click moves the cursor, a drag pans.
     Seek,
-    /// It selects the plot; dragging still moves the cursor.
+    /// A click selects the plot, a drag pans.
     Select,
 }
 
-/// In the window: moves the cursor (drag or click), zooms (wheel with Ctrl, or the wheel alone when `scroll_zooms`), pans (middle
-/// button) and shows the whole log (double click).
-pub(crate) fn navigate(
-    ui: &Ui,
-    ctx: &mut PanelContext<'_>,
-    area: &PlotArea,
-    id: Id,
-    label: &str,
-    clicks: Clicks,
-    scroll_zooms: bool,
-) -> Response {
-    if ctx.presentation.is_figure() {
-        let response = ui.interact(area.rect, id, Sense::hover());
-        response.widget_info(|| WidgetInfo::labeled(Role::Image, true, label));
+/// The effect of the wheel on a plot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Wheel {
+    /// It zooms.
+    Zooms,
+    /// It scrolls the list around the plot; with Ctrl it zooms.
+    Scrolls,
+}
+
+impl Wheel {
+    /// The wheel scrolls a list that is higher than its panel, and zooms where there is nothing to scroll.
+    pub(crate) fn in_list(overflows: bool) -> Self {
+        if overflows { Self::Scrolls } else { Self::Zooms }
+    }
+}
+
+/// A plot as the pointer and a screen reader meet it.
+pub(crate) struct Interaction<'a> {
+    /// Its id in the window.
+    pub(crate) id: Id,
+    /// Its name.
+    pub(crate) name: &'a str,
+    /// What it shows at the cursor, as text.
+    pub(crate) value: &'a str,
+    /// The effect of the primary button.
+    pub(crate) clicks: Clicks,
+    /// The effect of the wheel.
+    pub(crate) wheel: Wheel,
+}
+
+/// In the window: zooms the time axis about the pointer (wheel, pinch), pans (drag, or the middle button on the
+/// timeline; horizontal scrolling), zooms to a range (drag with the secondary button), shows the whole log (double
+/// click) and moves the cursor.
+pub(crate) fn navigate(ui: &Ui, ctx: &mut PanelContext<'_>, area: &PlotArea, plot: &Interaction<'_>) -> Response {
+    let Interaction { id, name, value, clicks, wheel } = *plot;
+    let figure = ctx.presentation.is_figure();
+    let sense = if figure { Sense::hover() } else { Sense::click_and_drag() };
+    let response = ui.interact(area.rect, id, sense);
+    let role = match clicks {
+        Clicks::Scrub => Role::Slider,
+        Clicks::Select if !figure => Role::Button,
+        Clicks::Seek | Clicks::Select => Role::Image,
+    };
+    response.widget_info(|| WidgetInfo::labeled(role, true, name));
+    describe(&response, value);
+    if figure {
         return response;
     }
-    let response = ui.interact(area.rect, id, Sense::click_and_drag());
-    response.widget_info(|| WidgetInfo::labeled(Role::Button, true, label));
-    if let Some(pointer) = response.interact_pointer_pos() {
-        let seeks = match clicks {
-            Clicks::Seek => response.is_pointer_button_down_on() || response.clicked(),
-            Clicks::Select => response.dragged_by(PointerButton::Primary),
-        };
-        let primary = ui.input(|input| {
-            input.pointer.button_down(PointerButton::Primary) || input.pointer.button_released(PointerButton::Primary)
-        });
-        if seeks && primary && !ui.input(|input| input.modifiers.shift) {
-            let stamp_ns = area.stamp_ns_at(pointer.x).clamp(0, ctx.recording.duration_ns.max(0));
-            ctx.commands.push(Command::Seek { stamp_ns });
-        }
+    move_cursor(ui, ctx, area, clicks, &response);
+    let pans = clicks != Clicks::Scrub && response.dragged_by(PointerButton::Primary)
+        || response.dragged_by(PointerButton::Middle);
+    if pans {
+        pan(ctx, area, response.drag_delta().x);
     }
-    let (begin_ns, end_ns) = (area.begin_ns, area.end_ns);
-    if response.dragged_by(PointerButton::Middle) {
-        let shift_ns = area.stamp_ns_at(area.rect.left() + response.drag_delta().x) - begin_ns;
-        show(ctx, begin_ns - shift_ns, end_ns - shift_ns);
+    if let Some((range, complete)) = dragged_range(ui, area.rect, &response) {
+        if complete {
+            show(ctx, area.stamp_ns_at(range.min), area.stamp_ns_at(range.max));
+        } else {
+            paint_range(ui, ctx, Rect::from_x_y_ranges(range, area.rect.y_range()));
+        }
     }
     if response.double_clicked() {
         ctx.selection.visible_ns = None;
     }
     if let Some(pointer) = response.hover_pos() {
-        let zoom = ui.input(|input| {
-            let pinched = f64::from(input.zoom_delta());
-            if scroll_zooms && pinched == 1.0 {
-                (f64::from(input.smooth_scroll_delta().y) / 200.0).exp()
-            } else {
-                pinched
-            }
-        });
-        if zoom != 1.0 {
-            let fixed_ns = area.stamp_ns_at(pointer.x);
-            let scaled = |stamp_ns: i64| fixed_ns + ((stamp_ns - fixed_ns) as f64 / zoom).round() as i64;
-            show(ctx, scaled(begin_ns), scaled(end_ns));
+        let Scroll { zoom: factor, pan_x } = Scroll::read(ui, wheel);
+        if factor != 1.0 {
+            zoom(ctx, (area.begin_ns, area.end_ns), area.stamp_ns_at(pointer.x), factor);
+        } else if pan_x != 0.0 {
+            pan(ctx, area, pan_x);
         }
     }
     response
+}
+
+/// Clicks, and drags on the timeline, move the cursor to the pointer.
+fn move_cursor(ui: &Ui, ctx: &mut PanelContext<'_>, area: &PlotArea, clicks: Clicks, response: &Response) {
+    let Some(pointer) = response.interact_pointer_pos() else { return };
+    let seeks = match clicks {
+        Clicks::Scrub => response.is_pointer_button_down_on() || response.clicked(),
+        Clicks::Seek => response.clicked(),
+        Clicks::Select => false,
+    };
+    let primary = ui.input(|input| {
+        input.pointer.button_down(PointerButton::Primary) || input.pointer.button_released(PointerButton::Primary)
+    });
+    if seeks && primary && !ui.input(|input| input.modifiers.shift) {
+        let stamp_ns = area.stamp_ns_at(pointer.x).clamp(0, ctx.recording.duration_ns.max(0));
+        ctx.commands.push(Command::Seek { stamp_ns });
+    }
+}
+
+/// The wheel and gestures of a frame.
+struct Scroll {
+    /// Factor of the magnification.
+    zoom: f64,
+    /// Displacement to the right in points.
+    pan_x: f32,
+}
+
+impl Scroll {
+    fn read(ui: &Ui, wheel: Wheel) -> Self {
+        ui.input(|input| {
+            let (pinched, scrolled) = (f64::from(input.zoom_delta()), input.smooth_scroll_delta());
+            let turned = if wheel == Wheel::Zooms && scrolled.y.abs() > scrolled.x.abs() {
+                (f64::from(scrolled.y) / 200.0).exp()
+            } else {
+                1.0
+            };
+            Self { zoom: pinched * turned, pan_x: scrolled.x }
+        })
+    }
+}
+
+/// The range that is dragged with the secondary button, and whether the button has just been released.
+fn dragged_range(ui: &Ui, rect: Rect, response: &Response) -> Option<(Rangef, bool)> {
+    let complete = response.drag_stopped_by(PointerButton::Secondary);
+    if !complete && !response.dragged_by(PointerButton::Secondary) {
+        return None;
+    }
+    // The origin of the press is gone when the button is released.
+    let stored = response.id.with("range");
+    let origin = ui.input(|input| input.pointer.press_origin()).map(|origin| origin.x);
+    let begin = match origin {
+        Some(begin) if !complete => {
+            ui.data_mut(|data| data.insert_temp(stored, begin));
+            begin
+        }
+        _ => ui.data_mut(|data| data.remove_temp::<f32>(stored))?,
+    };
+    let end = response.interact_pointer_pos()?.x;
+    let range = Rangef::new(begin.min(end), begin.max(end)).intersection(rect.x_range());
+    (range.span() >= MIN_RANGE_WIDTH).then_some((range, complete))
+}
+
+/// The range that is being selected.
+fn paint_range(ui: &Ui, ctx: &PanelContext<'_>, rect: Rect) {
+    let painter = ui.painter_at(rect.expand(1.0));
+    painter.rect_filled(rect, 0.0, ctx.theme.accent.gamma_multiply(0.2));
+    for x in [rect.left(), rect.right()] {
+        painter.vline(x, rect.y_range(), Stroke::new(1.0, ctx.theme.accent));
+    }
+}
+
+/// Moves the visible range with a drag of the content by `points` to the right.
+fn pan(ctx: &mut PanelContext<'_>, area: &PlotArea, points: f32) {
+    let shift_ns = area.stamp_ns_at(area.rect.left() + points) - area.begin_ns;
+    show(ctx, area.begin_ns - shift_ns, area.end_ns - shift_ns);
 }
 
 /// Factor of one step of zooming by key.

@@ -6,6 +6,7 @@ use egui::{Align2, Rect, RichText, Role, Sense, Stroke, StrokeKind, Ui, WidgetIn
 use super::verdict::parameters_of;
 use crate::gimbal::ParameterId;
 use crate::gui::PanelContext;
+use crate::gui::accessible::describe;
 use crate::gui::convergence::names::{meaning_of, part_of};
 use crate::gui::theme::{self, Theme};
 use crate::gui::units::{counted, fixed, significant};
@@ -208,6 +209,9 @@ fn row_ui(
     let (sense, role) = ctx.presentation.clickable(Role::Label);
     let response = ui.interact(line, ui.unique_id().with(("row", &name)), sense);
     response.widget_info(|| WidgetInfo::selected(role, true, selected, format!("{name} weights")));
+    let weights = directions.iter().map(|direction| direction.weights.get(row).copied().unwrap_or(0.0));
+    let weights = weights.enumerate().map(|(number, weight)| format!("direction {} {weight:+.2}", number + 1));
+    describe(&response, &weights.collect::<Vec<_>>().join(", "));
     if selected || response.hovered() {
         let stroke = Stroke::new(1.0, if selected { theme.accent } else { theme.outline });
         painter.rect_stroke(line, 0.0, stroke, StrokeKind::Inside);

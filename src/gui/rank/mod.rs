@@ -24,7 +24,10 @@ use self::verdict::{Level, Verdict};
 use super::convergence::empty_ui;
 use super::follow::RunTables;
 use super::help::terms::window;
-use super::plot::{Clicks, Curve, PlotArea, navigate, paint_cursor, paint_ground, paint_steps, visible_range};
+use super::plot::{
+    Clicks, Curve, Interaction, PlotArea, Wheel, navigate, overflows, paint_cursor, paint_ground, paint_steps,
+    visible_range,
+};
 use super::theme::{CURVE_WIDTH, RunStyle, Theme};
 use super::{PanelContext, Presentation};
 use crate::gimbal::ParameterNames;
@@ -67,6 +70,8 @@ pub struct RankPanel {
     slider: SliderUi,
     /// Show all runs side by side, in a panel too small for both views.
     all_runs: bool,
+    /// Whether the content is higher than the panel, so that the wheel scrolls.
+    overflows: bool,
 }
 
 impl RankPanel {
@@ -118,12 +123,13 @@ impl RankPanel {
     ) {
         let all = ui.available_rect_before_wrap();
         if all.width() < MIN_WIDTH_WITH_DETAILS_BESIDE {
-            ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+            let shown = ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
                 let bottom = ui.cursor().top() + height;
                 if self.answers_ui(ui, ctx, run, step, bottom, [DETAILS_HEIGHT, HEAD_OF_DETAILS]) {
                     self.details_ui(ui, ctx, run, step);
                 }
             });
+            self.overflows = overflows(&shown);
             return;
         }
         let [left, right] = halves(all, 0.5);
@@ -135,11 +141,12 @@ impl RankPanel {
             });
         });
         ui.scope_builder(UiBuilder::new().max_rect(right), |ui| {
-            ScrollArea::vertical().id_salt("details").auto_shrink(false).show(ui, |ui| {
+            let shown = ScrollArea::vertical().id_salt("details").auto_shrink(false).show(ui, |ui| {
                 if ranked {
                     self.details_ui(ui, ctx, run, step);
                 }
             });
+            self.overflows = overflows(&shown);
         });
     }
 
@@ -222,9 +229,18 @@ impl RankPanel {
         }
         paint_cursor(&painter, &theme, &area, ctx.cursor_ns);
         let id = ui.unique_id().with("rank over time");
-        navigate(ui, ctx, &area, id, "Rank over time", Clicks::Seek, false)
-            .on_hover_text(window::RANKS_OVER_TIME.meaning);
+        let value = ctx.selected_run().and_then(|run| run.step_at(ctx.cursor_ns)).and_then(|step| step.rank.as_ref());
+        let value = value.map_or_else(String::new, ranks_text);
+        let (name, wheel) = ("Rank over time", Wheel::in_list(self.overflows));
+        let plot = Interaction { id, name, value: &value, clicks: Clicks::Seek, wheel };
+        navigate(ui, ctx, &area, &plot).on_hover_text(window::RANKS_OVER_TIME.meaning);
     }
+}
+
+/// Both ranks in words.
+fn ranks_text(rank: &RankReport) -> String {
+    let count = rank.parameters.len();
+    format!("structural rank {} of {count}, informed rank {} of {count}", rank.rank_structural, rank.rank_informed)
 }
 
 fn rank_row(step: &StepRecord) -> [f64; 3] {

@@ -4,6 +4,7 @@ use egui::{Align2, Rect, Role, Sense, Stroke, StrokeKind, Ui, WidgetInfo, pos2, 
 
 use super::verdict::parameters_of;
 use crate::gimbal::ParameterNames;
+use crate::gui::accessible::describe;
 use crate::gui::plot::paint_ground;
 use crate::gui::theme::{Theme, label_font, number_font};
 use crate::gui::units::significant;
@@ -72,6 +73,7 @@ pub(super) fn paint(
 
     let response = ui.interact(rect, ui.unique_id().with(("spectrum", number)), Sense::hover());
     response.widget_info(|| WidgetInfo::labeled(Role::Image, true, "Singular values"));
+    describe(&response, &super::ranks_text(rank));
     if let Some(pointer) = response.hover_pos() {
         let index = ((pointer.x - plot.left()) / pitch) as usize;
         if let Some(value) = rank.singular_values.get(index).filter(|_| plot.x_range().contains(pointer.x)) {

@@ -12,12 +12,13 @@ use egui::{
 };
 
 use super::PanelContext;
+use super::accessible::describe;
 use super::convergence::empty_ui;
 use super::follow::RunTables;
 use super::help::terms::{Term, factors};
 use super::plot::{
-    Clicks, Curve, PlotArea, decimals_of_step, navigate, paint_cursor, paint_curve, paint_ground, paint_value_grid,
-    ticks, visible_range,
+    Clicks, Curve, Interaction, PlotArea, Wheel, decimals_of_step, navigate, overflows, paint_cursor, paint_curve,
+    paint_ground, paint_value_grid, ticks, visible_range,
 };
 use super::theme::{CURVE_WIDTH, Theme, label_font, number_font};
 use super::units::{fixed, significant};
@@ -32,6 +33,8 @@ pub struct ResidualsPanel {
     curves: Vec<Curve>,
     /// The step of the histogram, and the histogram.
     counted: Option<(Arc<StepRecord>, ResidualHistogram)>,
+    /// Whether the content is higher than the panel, so that the wheel scrolls.
+    overflows: bool,
 }
 
 impl ResidualsPanel {
@@ -48,7 +51,7 @@ impl ResidualsPanel {
         }
         let height = ui.available_height();
         let wide = ui.available_width() > 1.6 * height && ui.available_width() > 560.0;
-        ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        let shown = ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
             ui.spacing_mut().item_spacing.y = 3.0;
             if wide {
                 ui.columns(2, |columns| {
@@ -61,6 +64,7 @@ impl ResidualsPanel {
                 factors_ui(ui, ctx.theme, &step.report.residuals);
             }
         });
+        self.overflows = overflows(&shown);
     }
 
     fn left_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>, report: &StepReport, height: f32) {
@@ -97,7 +101,11 @@ impl ResidualsPanel {
         }
         paint_cursor(&painter, &theme, &area, ctx.cursor_ns);
         let id = ui.unique_id().with("rms over time");
-        navigate(ui, ctx, &area, id, "Reprojection RMS over time", Clicks::Seek, false)
+        let value = ctx.selected_run().and_then(|run| run.step_at(ctx.cursor_ns));
+        let value = value.map_or_else(String::new, |step| format!("{} px", fixed(rms_px(&step.report), 2)));
+        let (name, wheel) = ("Reprojection RMS over time", Wheel::in_list(self.overflows));
+        let plot = Interaction { id, name, value: &value, clicks: Clicks::Seek, wheel };
+        navigate(ui, ctx, &area, &plot)
             .on_hover_text("Reprojection RMS after the solve, px (reprojection_rms_after_px in frames.csv)");
     }
 }
@@ -204,6 +212,8 @@ fn histogram_ui(ui: &mut Ui, theme: &Theme, histogram: &ResidualHistogram, heigh
     }
     let response = ui.interact(rect, ui.unique_id().with("histogram"), Sense::hover());
     response.widget_info(|| WidgetInfo::labeled(Role::Image, true, "Histogram of reprojection residuals"));
+    let (median, p95) = (fixed(histogram.median_px, 2), fixed(histogram.p95_px, 2));
+    describe(&response, &format!("median {median} px, 95 % below {p95} px, {} observations", histogram.observations));
     response.on_hover_text("Components u and v of the reprojection residuals in the window, px");
 }
 

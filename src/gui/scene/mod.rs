@@ -27,6 +27,7 @@ use self::chain::{ChainModel, ChainPose};
 use self::layout::lay_out;
 use self::overlay::LegendLine;
 use self::world::{RunView, Trajectories, WorldBuilder, WorldOptions, framing_points_m, ground_height_m};
+use super::accessible::describe;
 use super::help::terms::{Term, window};
 use super::{PanelContext, slide};
 use crate::camera::CameraModel;
@@ -184,6 +185,8 @@ impl ScenePanel {
             framing = OrbitCamera { target_m: at, distance_m: framing.distance_m * VEHICLE_DISTANCE_RATIO, ..framing };
         }
         let view = View::new(self.world.applied(framing), viewport);
+        let lines = legend_lines(&views, theme);
+        describe(response, &lines.iter().map(|line| line.text.as_str()).collect::<Vec<_>>().join(", "));
         navigate(ui, response, &mut self.world, default_world_orbit(), &view);
         let view = View::new(self.world.applied(framing), viewport);
 
@@ -208,7 +211,7 @@ impl ScenePanel {
         let drawing = self.world_canvas.show(ui, area, drawing);
         let painter = ui.painter_at(area);
         overlay::labels(&painter, area, scale, &drawing.labels, theme.plot_background);
-        overlay::legend(&painter, area, theme, &legend_lines(&views, theme), builder.height_range_m);
+        overlay::legend(&painter, area, theme, &lines, builder.height_range_m);
         let legend = Rect::from_min_size(area.min, vec2(LEGEND_WIDTH.min(area.width()), key));
         explain(ui, legend, "scene legend", window::SCENE_LEGEND);
         overlay::scale_bar(&painter, area, scale, theme, &view, &format!(", grid {spacing_m} m"));
@@ -248,7 +251,9 @@ impl ScenePanel {
             None => format!("Gimbal chain, {label}"),
         };
         let at = title.left_center() + vec2(8.0, 0.0);
-        painter.text(at, egui::Align2::LEFT_CENTER, text, super::theme::label_font(), theme.text_strong);
+        painter.text(at, egui::Align2::LEFT_CENTER, &text, super::theme::label_font(), theme.text_strong);
+        let error = overlay::camera_error_text(chain);
+        describe(&response, &error.map_or_else(|| text.clone(), |error| format!("{text}; {error}")));
         let table = Rect::from_min_max(view_rect.left_bottom(), rect.max);
         overlay::chain_table(&painter, table, theme, chain);
         let (mut values, mut error) = (table, table);

@@ -144,6 +144,13 @@ pub(super) fn chain_table_height(chain: &ChainModel) -> f32 {
     (rows + footer) as f32 * LINE_HEIGHT + 6.0
 }
 
+/// The error of the camera's extrinsics, or by how much the camera is moved.
+pub(super) fn camera_error_text(chain: &ChainModel) -> Option<String> {
+    let (distance_m, angle_rad) = chain.camera_error?;
+    let what = if chain.moved { "camera moved by" } else { "extrinsics error:" };
+    Some(format!("{what} {:.1} mm, {:.2}°", distance_m * 1e3, angle_rad.to_degrees()))
+}
+
 /// The values of the links in degrees and millimetres.
 pub(super) fn chain_table(painter: &Painter, rect: Rect, theme: &Theme, chain: &ChainModel) {
     let font = theme::number_font();
@@ -185,9 +192,7 @@ pub(super) fn chain_table(painter: &Painter, rect: Rect, theme: &Theme, chain: &
             theme.text,
         );
     }
-    if let Some((distance_m, angle_rad)) = chain.camera_error {
-        let what = if chain.moved { "camera moved by" } else { "extrinsics error:" };
-        let text = format!("{what} {:.1} mm, {:.2}°", distance_m * 1e3, angle_rad.to_degrees());
+    if let Some(text) = camera_error_text(chain) {
         let at = pos2(inner.left(), y + 0.5 * LINE_HEIGHT);
         painter.text(at, Align2::LEFT_CENTER, text, theme::label_font(), theme.text_strong);
     }

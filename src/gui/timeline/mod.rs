@@ -9,16 +9,19 @@ mod transport;
 pub use pace::{Pace, Reading};
 pub(crate) use transport::{SPEEDS, toggled_loop};
 
-use egui::{Align2, PointerButton, Rect, Response, Sense, Stroke, Ui, pos2, vec2};
+use egui::{Align2, PointerButton, Rect, Response, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
 
 use self::lanes::Lane;
 use self::model::RunLanes;
 use super::PanelContext;
+use super::copied_value::offer;
 use super::events::name_of;
-use super::plot::{Clicks, Curve, PlotArea, decimals_of_step, navigate, paint_ground, ticks, visible_range};
+use super::plot::{
+    Clicks, Curve, Interaction, PlotArea, Wheel, decimals_of_step, navigate, paint_ground, ticks, visible_range,
+};
 use super::theme::{LANE_HEIGHT, LANE_LABEL_WIDTH, Theme, number_font};
 use super::units::{fixed, seconds};
-use crate::geometry::seconds_from_ns;
+use crate::geometry::{ns_from_seconds, seconds_from_ns};
 use crate::session::Command;
 
 const RULER_HEIGHT: f32 = 18.0;
@@ -90,7 +93,10 @@ impl TimelinePanel {
         paint_cursor(&painter, &theme, &area, ctx.cursor_ns);
 
         let id = ui.unique_id().with("timeline");
-        let response = navigate(ui, ctx, &area, id, "Timeline", Clicks::Seek, true);
+        let value = self.value_text(ctx);
+        let (clicks, wheel) = (Clicks::Scrub, Wheel::Zooms);
+        let response = navigate(ui, ctx, &area, &Interaction { id, name: "Timeline", value: &value, clicks, wheel });
+        step_by_assistance(ui, ctx, &response);
         self.select_range(ui, ctx, &area, &response);
         self.hover(ui, ctx, &area, response);
     }
@@ -131,9 +137,25 @@ impl TimelinePanel {
             Lane::Run(run) => theme.run(run).color,
             _ => theme.text_weak,
         };
-        lanes::label(&painter, &theme, label_rect, &lane.name(ctx), value, color);
+        lanes::label(&painter, &theme, label_rect, &lane.name(ctx), value.clone(), color);
         let label = ui.interact(label_rect, ui.unique_id().with(("lane", lane.name(ctx))), Sense::hover());
+        let text = value.map_or_else(|| lane.name(ctx), |value| format!("{} {value}", lane.name(ctx)));
+        label.widget_info(|| WidgetInfo::labeled(Role::Label, true, &text));
         label.on_hover_text(format!("{}\n{}", lane.name(ctx), lane.meaning()));
+    }
+
+    /// Position of the cursor, the frame there, and the visible range.
+    fn value_text(&self, ctx: &PanelContext<'_>) -> String {
+        let run = ctx.recording.runs.get(ctx.selection.run.min(self.runs.len().saturating_sub(1)));
+        let step = run.and_then(|run| run.step_at(ctx.cursor_ns));
+        let mut text = format!("cursor {} s", seconds(ctx.cursor_ns));
+        if let Some(step) = step {
+            text.push_str(&format!(", frame {}", step.report.frame_index));
+        }
+        if let Some((begin_ns, end_ns)) = ctx.selection.visible_ns {
+            text.push_str(&format!(", visible {} to {} s", seconds(begin_ns), seconds(end_ns)));
+        }
+        text
     }
 
     /// Shift and drag sets the loop range.
@@ -186,8 +208,36 @@ impl TimelinePanel {
         for warning in ctx.recording.warnings.iter().filter(|warning| near(warning.stamp_ns)) {
             push_line(warning.message.clone());
         }
+        offer(ui, text.clone());
         response.on_hover_text_at_pointer(text);
     }
+}
+
+/// The timeline as a slider of a screen reader: its value is the cursor in seconds, a step is a frame.
+fn step_by_assistance(ui: &Ui, ctx: &mut PanelContext<'_>, response: &Response) {
+    use egui::accesskit::{Action, ActionData};
+
+    response.ctx.accesskit_node_builder(response.id, |node| {
+        node.set_numeric_value(seconds_from_ns(ctx.cursor_ns));
+        node.set_min_numeric_value(0.0);
+        node.set_max_numeric_value(seconds_from_ns(ctx.recording.duration_ns));
+        for action in [Action::Increment, Action::Decrement, Action::SetValue] {
+            node.add_action(action);
+        }
+    });
+    ui.input(|input| {
+        for (action, frames) in [(Action::Increment, 1), (Action::Decrement, -1)] {
+            let count = input.num_accesskit_action_requests(response.id, action);
+            if let Some(count) = i64::try_from(count).ok().filter(|count| *count > 0) {
+                ctx.commands.push(Command::StepFrames(frames * count));
+            }
+        }
+        for request in input.accesskit_action_requests(response.id, Action::SetValue) {
+            if let Some(ActionData::NumericValue(cursor_s)) = request.data {
+                ctx.commands.push(Command::Seek { stamp_ns: ns_from_seconds(cursor_s) });
+            }
+        }
+    });
 }
 
 /// The loop range.

@@ -249,7 +249,10 @@ pub(crate) fn perform(action: Action, state: &mut WindowState, ctx: &mut PanelCo
             let export = super::panel_export::export(state, ctx);
             state.requests.push(WindowRequest::WritePanel(Box::new(export)));
         }
-        Action::Copy => copying::copy(state, ctx),
+        Action::Copy => {
+            let value = state.pointed.take();
+            copying::copy(value, state, ctx);
+        }
         Action::CopyTable(panel) => copying::copy_table(panel, state, ctx),
         Action::Undo => state.undo(),
         Action::Redo => state.redo(),

@@ -1,13 +1,65 @@
-//! Copying values and tables to the clipboard.
+//! Copying values and tables to the clipboard: by key, and by the menu of the secondary button.
+
+use egui::epaint::TextShape;
+use egui::{Id, LayerId, Popup, PopupAnchor, PopupCloseBehavior, Pos2, Shape, Ui};
 
 use super::{NoticeLevel, PanelName, WindowState};
 use crate::gui::PanelContext;
+use crate::gui::copied_value::offered;
 use crate::gui::units::counted;
 
+/// Letters of a copied value that its notice shows.
+const SHOWN_LETTERS: usize = 60;
+
+/// The menu of a panel.
+#[derive(Debug)]
+pub(super) struct PanelMenu {
+    panel: PanelName,
+    at: Pos2,
+    /// The value under the pointer when the menu was opened.
+    value: Option<String>,
+}
+
+/// The value under the pointer: the one that a panel offers, or the text that is painted there.
+pub(super) fn value_under_pointer(ui: &Ui) -> Option<String> {
+    let pointer = ui.input(|input| input.pointer.hover_pos())?;
+    let free = ui.ctx().layer_id_at(pointer) == Some(ui.layer_id());
+    free.then(|| offered(ui.ctx()).or_else(|| text_at(ui, ui.layer_id(), pointer))).flatten()
+}
+
+/// The text that is painted at a position of a layer.
+fn text_at(ui: &Ui, layer: LayerId, position: Pos2) -> Option<String> {
+    fn text_in(shape: &Shape, position: Pos2) -> Option<&TextShape> {
+        match shape {
+            Shape::Text(text) => text.visual_bounding_rect().expand(1.0).contains(position).then_some(text),
+            Shape::Vec(shapes) => shapes.iter().rev().find_map(|shape| text_in(shape, position)),
+            _ => None,
+        }
+    }
+    ui.ctx().graphics(|graphics| {
+        let shapes: Vec<_> = graphics.get(layer)?.all_entries().collect();
+        let here = shapes.into_iter().rev().filter(|clipped| clipped.clip_rect.contains(position));
+        let texts = here.filter_map(|clipped| text_in(&clipped.shape, position));
+        texts.map(|text| text.galley.text().trim().to_owned()).find(|text| !text.is_empty())
+    })
+}
+
 /// Copies the value under the pointer, or else the table of the panel with the focus.
-pub(super) fn copy(state: &mut WindowState, ctx: &PanelContext<'_>) {
-    let (panel, _) = state.focused();
-    copy_table(panel, state, ctx);
+pub(super) fn copy(value: Option<String>, state: &mut WindowState, ctx: &PanelContext<'_>) {
+    match value {
+        Some(value) => copy_value(value, state),
+        None => copy_table(state.focused().0, state, ctx),
+    }
+}
+
+fn copy_value(value: String, state: &mut WindowState) {
+    let mut shown: String =
+        value.chars().take(SHOWN_LETTERS).map(|letter| if letter == '\n' { ' ' } else { letter }).collect();
+    if value.chars().count() > SHOWN_LETTERS {
+        shown.push('…');
+    }
+    state.notices.show_message(NoticeLevel::Info, format!("Copied: {shown}"));
+    state.copied = Some(value);
 }
 
 /// Copies the values of a panel as comma-separated values.
@@ -22,4 +74,46 @@ pub(super) fn copy_table(panel: PanelName, state: &mut WindowState, ctx: &PanelC
     let text = format!("Copied the table of {}: {} (CSV)", panel.title(), counted(rows, "row"));
     state.notices.show_message(NoticeLevel::Info, text);
     state.copied = Some(table);
+}
+
+fn menu_id() -> Id {
+    Id::unique("panel menu")
+}
+
+/// Opens the menu of the panel that is clicked with the secondary button, and draws it.
+pub(super) fn menu_ui(ui: &Ui, state: &mut WindowState, ctx: &PanelContext<'_>) {
+    let clicked = ui.input(|input| input.pointer.secondary_clicked().then(|| input.pointer.interact_pos()).flatten());
+    let clicked = clicked.filter(|at| ui.ctx().layer_id_at(*at) == Some(ui.layer_id()));
+    let panel = clicked.and_then(|at| state.places.iter().find(|(_, place)| place.contains(at)).map(|it| (it.0, at)));
+    if let Some((panel, at)) = panel {
+        state.menu = Some(PanelMenu { panel, at, value: value_under_pointer(ui) });
+        Popup::open_id(ui.ctx(), menu_id());
+    }
+    let Some(menu) = state.menu.take() else { return };
+    let popup = Popup::new(menu_id(), ui.ctx().clone(), PopupAnchor::Position(menu.at), ui.layer_id())
+        .open_memory(None)
+        .close_behavior(PopupCloseBehavior::CloseOnClick);
+    let mut chosen = None;
+    let shown = popup.show(|ui| {
+        ui.set_min_width(150.0);
+        let value = ui.add_enabled(menu.value.is_some(), egui::Button::new("Copy value"));
+        let value = match &menu.value {
+            Some(text) => value.on_hover_text(text),
+            None => value,
+        };
+        if value.clicked() {
+            chosen = Some(true);
+        }
+        if ui.button("Copy table (CSV)").clicked() {
+            chosen = Some(false);
+        }
+    });
+    if shown.is_none() {
+        return;
+    }
+    match (chosen, menu.value.clone()) {
+        (Some(true), Some(value)) => copy_value(value, state),
+        (Some(false), _) => copy_table(menu.panel, state, ctx),
+        _ => state.menu = Some(menu),
+    }
 }

@@ -35,6 +35,7 @@ use std::path::PathBuf;
 use egui::{CentralPanel, Frame, Margin, Panel, Rect, Ui, UiBuilder, Vec2, vec2};
 
 use self::actions::Action;
+use self::copying::PanelMenu;
 pub use self::dialogs::{Dialog, Dialogs};
 use self::focus_ring::FocusRing;
 use self::history::{Arrangement, History};
@@ -111,8 +112,12 @@ pub struct WindowState {
     history: History,
     /// The layout when its last change was noticed.
     noticed: Option<Layout>,
+    /// The value under the pointer.
+    pointed: Option<String>,
     /// Text for the clipboard.
     copied: Option<String>,
+    /// The open menu of a panel.
+    menu: Option<PanelMenu>,
     /// The panel that was clicked last.
     focus: Option<PanelName>,
     /// The rectangles of the panels on the screen.
@@ -288,6 +293,10 @@ pub fn window_ui(ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_
     state.help.ui(ui, &theme, &state.places);
     state.notices.toasts_ui(ui, &theme);
     state.ring.ui(ui, &theme);
+    copying::menu_ui(ui, state, ctx);
+    if actions.contains(&Action::Copy) {
+        state.pointed = copying::value_under_pointer(ui);
+    }
     for action in actions {
         actions::perform(action, state, ctx);
     }
