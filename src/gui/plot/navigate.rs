@@ -68,9 +68,9 @@ pub(crate) fn navigate(ui: &Ui, ctx: &mut PanelContext<'_>, area: &PlotArea, plo
     let sense = if figure { Sense::hover() } else { Sense::click_and_drag() };
     let response = ui.interact(area.rect, id, sense);
     let role = match clicks {
-        Clicks::Scrub => Role::Slider,
+        Clicks::Scrub if !figure => Role::Slider,
         Clicks::Select if !figure => Role::Button,
-        Clicks::Seek | Clicks::Select => Role::Image,
+        _ => Role::Image,
     };
     response.widget_info(|| WidgetInfo::labeled(role, true, name));
     describe(&response, value);

@@ -1,23 +1,49 @@
-//! A ring around the widget with the keyboard focus.
+//! The keyboard focus: a ring around the widget that has it, and names of the lines between panels.
 
-use egui::{Event, Key, LayerId, Order, Stroke, StrokeKind, Ui};
+use egui::accesskit::{Orientation, Role};
+use egui::{Event, Id, Key, LayerId, Order, Stroke, StrokeKind, Ui, WidgetRect};
 
 use crate::gui::theme::{CORNER_RADIUS, Theme};
+
+/// Maximum width of a line between panels and its minimum length in points.
+const LINE_WIDTH: f32 = 14.0;
+const MIN_LINE_LENGTH: f32 = 40.0;
 
 /// Whether the user navigates by keyboard.
 #[derive(Debug, Default)]
 pub(super) struct FocusRing {
     by_key: bool,
+    /// Whether the focus moves backwards.
+    backward: bool,
 }
 
 impl FocusRing {
     /// Draws the ring; none while the pointer moves the focus.
     pub(super) fn ui(&mut self, ui: &Ui, theme: &Theme) {
+        self.read_keys(ui);
+        let widgets = focusable(ui);
+        for line in widgets.iter().filter(|widget| is_line(widget)) {
+            name_line(ui, line);
+        }
+        let Some(focused) = ui.memory(egui::Memory::focused).filter(|_| self.by_key) else { return };
+        let focused = self.passed_over(ui, &widgets, focused);
+        let Some(response) = ui.ctx().read_response(focused) else { return };
+        // Above everything, so that adjacent widgets do not cover the ring.
+        let layer = LayerId::new(Order::Tooltip, Id::unique("focus ring"));
+        let painter = ui.ctx().layer_painter(layer).with_clip_rect(ui.ctx().content_rect());
+        let rect = response.rect.intersect(response.interact_rect.expand(2.0)).expand(1.0);
+        painter.rect_stroke(rect, CORNER_RADIUS, Stroke::new(2.0, theme.accent), StrokeKind::Outside);
+    }
+
+    fn read_keys(&mut self, ui: &Ui) {
         ui.input(|input| {
             for event in &input.raw.events {
                 match event {
+                    Event::Key { key: Key::Tab, pressed: true, modifiers, .. } => {
+                        (self.by_key, self.backward) = (true, modifiers.shift);
+                    }
                     Event::Key {
-                        key: Key::Tab | Key::ArrowDown | Key::ArrowUp | Key::ArrowLeft | Key::ArrowRight,
+                        key: Key::ArrowDown | Key::ArrowUp | Key::ArrowLeft | Key::ArrowRight,
                         pressed: true,
                         ..
                     } => self.by_key = true,
@@ -26,12 +52,47 @@ impl FocusRing {
                 }
             }
         });
-        let focused = ui.memory(egui::Memory::focused).filter(|_| self.by_key);
-        let Some(response) = focused.and_then(|id| ui.ctx().read_response(id)) else { return };
-        // Above everything, so that adjacent widgets do not cover the ring.
-        let layer = LayerId::new(Order::Tooltip, egui::Id::unique("focus ring"));
-        let painter = ui.ctx().layer_painter(layer).with_clip_rect(ui.ctx().content_rect());
-        let rect = response.rect.intersect(response.interact_rect.expand(2.0)).expand(1.0);
-        painter.rect_stroke(rect, CORNER_RADIUS, Stroke::new(2.0, theme.accent), StrokeKind::Outside);
     }
+
+    /// Moves the focus on from a line between panels: no key moves the line. Returns the widget with the focus.
+    fn passed_over(&self, ui: &Ui, widgets: &[WidgetRect], focused: Id) -> Id {
+        let Some(at) = widgets.iter().position(|widget| widget.id == focused) else { return focused };
+        if !is_line(&widgets[at]) {
+            return focused;
+        }
+        let (before, from) = widgets.split_at(at);
+        let mut onward = from.iter().chain(before);
+        let stop = |widget: &&WidgetRect| !is_line(widget);
+        let next = if self.backward { onward.rev().find(stop) } else { onward.find(stop) };
+        let Some(next) = next else { return focused };
+        ui.memory_mut(|memory| memory.request_focus(next.id));
+        next.id
+    }
+}
+
+/// The widgets in the layer of `ui` that can have the focus, in the order of the Tab key.
+fn focusable(ui: &Ui) -> Vec<WidgetRect> {
+    ui.ctx().viewport(|viewport| {
+        let widgets = viewport.this_pass.widgets.layers().filter(|(layer, _)| **layer == ui.layer_id());
+        let can = |widget: &&WidgetRect| widget.enabled && widget.visible && widget.sense.is_focusable();
+        widgets.flat_map(|(_, widgets)| widgets.iter().filter(can).copied()).collect()
+    })
+}
+
+/// Whether a widget is a line between panels, or a scroll bar: the pointer drags it, no key does.
+fn is_line(widget: &WidgetRect) -> bool {
+    let size = widget.rect.size();
+    widget.sense.senses_drag() && size.min_elem() < LINE_WIDTH && size.max_elem() >= MIN_LINE_LENGTH
+}
+
+/// Names a line between panels, which the libraries leave without a name.
+fn name_line(ui: &Ui, line: &WidgetRect) {
+    let upright = line.rect.height() > line.rect.width();
+    ui.ctx().accesskit_node_builder(line.id, |node| {
+        if node.role() == Role::Unknown && node.label().is_none() {
+            node.set_role(Role::Splitter);
+            node.set_label("Resize panels");
+            node.set_orientation(if upright { Orientation::Vertical } else { Orientation::Horizontal });
+        }
+    });
 }

@@ -29,7 +29,6 @@ mod tiles;
 mod top_bar;
 mod warning_lines;
 
-use std::cmp::Ordering;
 use std::path::PathBuf;
 
 use egui::{CentralPanel, Frame, Margin, Panel, Rect, Ui, UiBuilder, Vec2, vec2};
@@ -120,7 +119,9 @@ pub struct WindowState {
     menu: Option<PanelMenu>,
     /// The panel that was clicked last.
     focus: Option<PanelName>,
-    /// The rectangles of the panels on the screen.
+    /// Height of timeline and status bar in the last frame.
+    below_height: Option<f32>,
+    /// The rectangles of the panels on the screen, in the order of drawing.
     places: Vec<(PanelName, Rect)>,
 }
 
@@ -166,9 +167,7 @@ impl WindowState {
 
     /// Moves the focus to the next or previous panel on the screen.
     fn focus_neighbour(&mut self, forward: bool) {
-        let mut shown = self.places.clone();
-        shown
-            .sort_by(|(_, a), (_, b)| (a.top(), a.left()).partial_cmp(&(b.top(), b.left())).unwrap_or(Ordering::Equal));
+        let shown = &self.places;
         let count = shown.len();
         let at = shown.iter().position(|(panel, _)| Some(*panel) == self.focus);
         let next = at.map_or(0, |at| if forward { at + 1 } else { at + count - 1 } % count.max(1));
@@ -241,6 +240,9 @@ impl WindowState {
     }
 }
 
+/// Height of the status bar in points.
+const STATUS_HEIGHT: f32 = 22.0;
+
 /// Draws the window for a session.
 pub fn window_ui(ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_>) {
     let theme = *ctx.theme;
@@ -256,31 +258,41 @@ pub fn window_ui(ui: &mut Ui, state: &mut WindowState, ctx: &mut PanelContext<'_
 
     let bar = Frame::new().fill(theme.surface).inner_margin(Margin::symmetric(8, 3));
     Panel::top("top bar").exact_size(30.0).frame(bar).show(ui, |ui| top_bar::ui(ui, state, ctx, &mut actions));
-    let status = Frame::new().fill(theme.surface).inner_margin(Margin::symmetric(8, 2));
-    Panel::bottom("status bar").exact_size(22.0).frame(status).show(ui, |ui| status_bar::ui(ui, state, ctx));
     notices::banner_ui(ui, ctx);
 
-    let wanted = TimelinePanel::height_for(ctx.recording.runs.len()).min(0.25 * ui.available_height());
+    // The panels are drawn before the timeline below them: the Tab key follows the order of drawing.
+    let wanted = TimelinePanel::height_for(ctx.recording.runs.len());
+    let wanted = wanted.min(0.25 * (ui.available_height() - STATUS_HEIGHT));
+    let below = state.below_height.unwrap_or(wanted + STATUS_HEIGHT);
+    let rest = ui.available_rect_before_wrap();
+    let above = rest.with_max_y((rest.bottom() - below).max(rest.top()));
+    let mut asked = None;
+    state.places.clear();
+    let ground = Frame::new().fill(theme.background).inner_margin(Margin::same(3));
+    let mut panels_ui = ui.new_child(UiBuilder::new().max_rect(above));
+    CentralPanel::no_frame().frame(ground).show(&mut panels_ui, |ui| {
+        asked = state.layout.ui(ui, &mut state.panels, ctx, state.focus, &mut state.places);
+    });
+
+    // The status bar takes its room first, because it is the lowest.
+    let status = Frame::new().fill(theme.surface).inner_margin(Margin::symmetric(8, 2));
+    let status = Panel::bottom("status bar").exact_size(STATUS_HEIGHT).frame(status);
+    let status = status.show(ui, |ui| ui.max_rect());
     let frame = Frame::new().fill(theme.surface).inner_margin(Margin::symmetric(6, 4));
     let timeline = Panel::bottom("timeline").resizable(true).default_size(wanted).min_size(60.0).frame(frame);
-    let mut asked = None;
     let timeline = timeline.show(ui, |ui| {
         let corner = ui.max_rect().right_top() + vec2(-24.0, 2.0);
         state.panels.timeline.ui(ui, ctx);
         let place = UiBuilder::new().max_rect(Rect::from_min_size(corner, vec2(20.0, 18.0)));
-        asked = ui
-            .scope_builder(place, |ui| help::button_ui(ui, &theme, PanelName::Timeline))
-            .inner
-            .then_some(PanelName::Timeline);
+        let pressed = ui.scope_builder(place, |ui| help::button_ui(ui, &theme, PanelName::Timeline)).inner;
+        asked = pressed.then_some(PanelName::Timeline).or(asked);
     });
-    state.places.clear();
     state.places.push((PanelName::Timeline, timeline.response.rect));
-
-    let ground = Frame::new().fill(theme.background).inner_margin(Margin::same(3));
-    CentralPanel::no_frame().frame(ground).show(ui, |ui| {
-        let pressed = state.layout.ui(ui, &mut state.panels, ctx, state.focus, &mut state.places);
-        asked = pressed.or(asked);
-    });
+    ui.scope_builder(UiBuilder::new().max_rect(status.inner), |ui| status_bar::ui(ui, state, ctx));
+    let below = rest.bottom() - timeline.response.rect.top();
+    if state.below_height.replace(below).is_none_or(|known| known != below) {
+        ui.request_repaint();
+    }
     state.follow_focus(ui);
     if let Some(panel) = asked {
         state.help.toggle(ui.ctx(), panel);

@@ -6,13 +6,15 @@ use super::menu::Menu;
 use crate::gui::theme::Theme;
 
 /// Actions of the pointer.
-const POINTER: [(&str, &str); 6] = [
-    ("Drag", "move the cursor"),
-    ("Ctrl+scroll", "zoom the time axis of all plots (timeline: scroll without Ctrl)"),
-    ("Middle drag", "pan in time"),
-    ("Double-click", "zoom out to the whole log"),
-    ("Shift+drag on the timeline", "set the loop range"),
-    ("Click a parameter or a feature", "select in all panels"),
+const POINTER: [(&str, &str); 8] = [
+    ("Scroll, pinch", "zoom about the pointer (Ctrl+scroll where the panel scrolls)"),
+    ("Drag", "pan; on the timeline: move the cursor"),
+    ("Shift+scroll", "pan in time, as horizontal scrolling and middle drag"),
+    ("Right drag", "zoom to a time range, or to a box of the image"),
+    ("Double-click", "show the whole log, fit the image"),
+    ("Right click", "copy the value or the panel's table"),
+    ("Shift+drag", "on the timeline: set the loop range"),
+    ("Click", "a plot: move the cursor; a parameter or feature: select it"),
 ];
 
 /// Keys that work everywhere.

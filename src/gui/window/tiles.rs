@@ -1,6 +1,6 @@
 //! The movable panels and their layouts.
 
-use egui::{Color32, Rect, Stroke, Ui, Visuals, WidgetText};
+use egui::{Color32, CursorIcon, Id, Rect, Sense, Stroke, Ui, Visuals, WidgetText};
 use egui_tiles::{
     Behavior, Container, Linear, LinearDir, SimplificationOptions, Tabs, Tile, TileId, Tiles, Tree, UiResponse,
 };
@@ -119,7 +119,8 @@ impl Layout {
         focus: Option<PanelName>,
         places: &mut Vec<(PanelName, Rect)>,
     ) -> Option<PanelName> {
-        let mut shown = Shown { panels, ctx, focus, places, asked: None };
+        let tree = TreeIds { id: self.tree.id(), root: self.tree.root() };
+        let mut shown = Shown { panels, ctx, focus, places, tree, asked: None };
         self.tree.ui(&mut shown, ui);
         shown.asked
     }
@@ -181,12 +182,20 @@ fn split(tiles: &mut Tiles<PanelName>, direction: LinearDir, children: [TileId; 
     tiles.insert_container(Container::Linear(Linear::new_binary(direction, children, fraction)))
 }
 
+/// The ids of the tree that is drawn.
+#[derive(Clone, Copy)]
+struct TreeIds {
+    id: Id,
+    root: Option<TileId>,
+}
+
 /// The panels while they are drawn.
 struct Shown<'a, 'b> {
     panels: &'a mut Panels,
     ctx: &'a mut PanelContext<'b>,
     focus: Option<PanelName>,
     places: &'a mut Vec<(PanelName, Rect)>,
+    tree: TreeIds,
     /// The panel whose "?" was pressed.
     asked: Option<PanelName>,
 }
@@ -229,8 +238,40 @@ impl Behavior<PanelName> for Shown<'_, '_> {
         matches!(tiles.get(tile), Some(Tile::Pane(_)))
     }
 
-    /// Panels are dragged by their tabs. A bar that drags all of its tabs would be another unnamed stop for the
-    /// keyboard.
+    /// The bar behind the tabs drags all of them. It is no stop of the Tab key, as the one of the library would be.
+    fn tab_bar_trailing_ui(&mut self, _tiles: &Tiles<PanelName>, ui: &mut Ui, tile: TileId, _tabs: &Tabs) {
+        let room = ui.available_rect_before_wrap().intersect(ui.clip_rect());
+        if self.tree.root == Some(tile) || !room.is_positive() {
+            return;
+        }
+        let bar = ui.interact(room, ui.scope_id().with("move tabs"), Sense::DRAG);
+        if bar.on_hover_cursor(CursorIcon::Grab).drag_started() {
+            ui.set_dragged_id(tile.egui_id(self.tree.id));
+        }
+    }
+
+    /// A dragged group has the names of its panels.
+    fn tab_title_for_tile(&mut self, tiles: &Tiles<PanelName>, tile: TileId) -> WidgetText {
+        let names: Vec<&str> = match tiles.get(tile) {
+            Some(Tile::Pane(panel)) => vec![panel.title()],
+            Some(Tile::Container(container)) => {
+                let panes = container.children().filter_map(|child| tiles.get_pane(child));
+                panes.map(|panel| panel.title()).collect()
+            }
+            None => Vec::new(),
+        };
+        names.join(", ").into()
+    }
+
+    fn drag_preview_stroke(&self, _visuals: &Visuals) -> Stroke {
+        Stroke::new(1.5, self.ctx.theme.accent)
+    }
+
+    fn drag_preview_color(&self, _visuals: &Visuals) -> Color32 {
+        self.ctx.theme.accent.gamma_multiply(0.25)
+    }
+
+    /// Panels are dragged by their tabs.
     fn is_tile_draggable(&self, tiles: &Tiles<PanelName>, tile: TileId) -> bool {
         matches!(tiles.get(tile), Some(Tile::Pane(_)))
     }
